@@ -97,7 +97,7 @@ MAPPING = Kind(
 _KINDS: dict[str, Kind] = {
     **dict.fromkeys(("direct", "gradient", "premultiplied", "progress", "raw"), FLAG),
     **dict.fromkeys(("half", "resume", "temporal", "validation", "verify"), FLAG),
-    **dict.fromkeys(("bits", "border", "levels", "max_calls", "most", "period"), INTEGER),
+    **dict.fromkeys(("bits", "levels", "max_calls", "most", "period"), INTEGER),
     **dict.fromkeys(("quality", "settle", "subimage", "texel", "width"), INTEGER),
     **dict.fromkeys(("expand", "flicker", "gain", "glow_intensity", "growth", "radius"), NUMBER),
     **dict.fromkeys(("intensity", "jitter", "light", "limit", "peak", "ripple", "rtol"), NUMBER),
@@ -130,9 +130,9 @@ def checked_as(**kinds: Kind) -> Callable[[_Function], _Function]:
     def decorate(function: _Function) -> _Function:
         parameters = inspect.signature(function).parameters
         known = {**_KINDS, **kinds}
-        found = {
-            name: (known[name], one.default is None)
-            for name, one in parameters.items()
+        tests = {
+            name: (known[name], parameter.default is None)
+            for name, parameter in parameters.items()
             if name in known
         }
         names = tuple(parameters)
@@ -143,9 +143,9 @@ def checked_as(**kinds: Kind) -> Callable[[_Function], _Function]:
             __tracebackhide__ = True
             # Too many and unknown arguments are left to Python's own error.
             for name, value in (*zip(names, args, strict=False), *kwargs.items()):
-                if name not in found or (value is None and found[name][1]):
+                if name not in tests or (value is None and tests[name][1]):
                     continue
-                what, test = found[name][0]
+                what, test = tests[name][0]
                 if not test(value):
                     raise TypeError(f"{name}: {reprlib.repr(value)} is not {what}")
             return function(*args, **kwargs)

@@ -44,10 +44,10 @@ class ArrayCache:
     def find(self, key: Hashable) -> _Sized | None:
         """Return an array, which becomes the newest one."""
         with self._lock:
-            found = self._arrays.pop(key, None)
-            if found is not None:
-                self._arrays[key] = found
-            return found
+            array = self._arrays.pop(key, None)
+            if array is not None:
+                self._arrays[key] = array
+            return array
 
     def add(self, key: Hashable, array: _Sized) -> None:
         """Add the newest array."""
@@ -78,10 +78,10 @@ def kept(make: Callable[..., _Made]) -> Callable[..., _Made]:
     def find_or_make(*arguments: Any) -> _Made:
         arrays = _of_renderers() or _IN_PROCESS
         key = make, arguments
-        found = arrays.find(key)
-        if found is None:
-            found = make(*arguments)
-            arrays.add(key, found)
-        return cast("_Made", found)
+        array = arrays.find(key)
+        if array is None:
+            array = make(*arguments)
+            arrays.add(key, array)
+        return cast("_Made", array)
 
     return find_or_make

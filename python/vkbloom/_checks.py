@@ -256,9 +256,9 @@ def _viewed(
     dims = getattr(image, "dims", None)
     if isinstance(dims, tuple) and hasattr(image, "transpose"):
         # A grid's channels are named after their framebuffer, such as "final_channel".
-        order = [_dimension(dims, one) for one in dimensions]
+        order = [_dimension(dims, dimension) for dimension in dimensions]
         if len(dims) != len(order) or None in order:
-            others = [dim for dim, one in zip(dims, order, strict=False) if dim not in order]
+            others = [dim for dim, dimension in zip(dims, order, strict=False) if dim not in order]
             hint = (
                 f"select one value of the others first, such as {name}.isel({others[0]}=0)"
                 if len(dims) > len(order) and others

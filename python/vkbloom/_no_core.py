@@ -50,5 +50,5 @@ def stand_in(reason: ImportError) -> ModuleType:
 
 def _as_tuples(value: Any) -> Any:
     if isinstance(value, dict):
-        return {name: _as_tuples(one) for name, one in value.items()}
+        return {name: _as_tuples(part) for name, part in value.items()}
     return tuple(map(_as_tuples, value)) if isinstance(value, list) else value

@@ -21,11 +21,11 @@ def nearest(name: object, known: Iterable[str]) -> str | None:
     """
     import difflib  # noqa: PLC0415  costs start-up time
 
-    plain = {one.lower().replace("-", "_").strip("_"): one for one in known}
+    plain = {word.lower().replace("-", "_").strip("_"): word for word in known}
     asked = str(name).lower().replace("-", "_").strip("_")
     near = difflib.get_close_matches(asked, plain, 1, _MIN_RATIO)
     if not near and len(asked) >= _MIN_LETTERS:
-        near = [one for one in plain if asked in one.split("_") or one in asked.split("_")]
+        near = [word for word in plain if asked in word.split("_") or word in asked.split("_")]
     return plain[near[0]] if near else None
 
 
@@ -36,17 +36,17 @@ def did_you_mean(name: object, known: Iterable[str]) -> str:
 
 
 def lacking(
-    owner: str, names: Sequence[str], own: Iterable[str], others: Mapping[str, Iterable[str]]
+    owner: str, names: Sequence[str], known: Iterable[str], others: Mapping[str, Iterable[str]]
 ) -> str:
     """Return a text that something lacks fields: what was meant, or what has them."""
-    own = list(own)
+    known = list(known)
     text = f"{owner} has no {', '.join(map(repr, names))}"
-    if near := did_you_mean(names[0], own):
+    if near := did_you_mean(names[0], known):
         return text + near
     having = [other for other, fields in others.items() if set(names) <= set(fields)]
     if having:
         return f"{text}, which {', '.join(having)} {'has' if len(having) == 1 else 'have'}"
-    return f"{text}; it has {', '.join(own)}"
+    return f"{text}; it has {', '.join(known)}"
 
 
 def unknown(what: str, name: object, known: Iterable[str]) -> str:
@@ -128,7 +128,7 @@ class Named(Mapping[str, T]):
 
     def _rows(self) -> list[tuple[str, ...]]:
         """Return the name of each entry, what it is, and whose."""
-        return [(name, one.what, one.whose) for name, one in self._entries.items()]
+        return [(name, entry.what, entry.whose) for name, entry in self._entries.items()]
 
     def __repr__(self) -> str:
         width = max(map(len, self), default=0)

@@ -419,7 +419,7 @@ def test_only_what_is_read_is_computed(renderer: Renderer) -> None:
         pullback, cotangents, expected = pulled(own, image, Separable(threshold=0.2, knee=0.5))
         found = pullback(cotangents)
     assert isinstance(found, DeviceGradients)
-    assert [*found._found] == ["image"]
+    assert [*found._known] == ["image"]
     check(found, expected, "knee")
     assert "blur_scale" in found
     assert found.keys() == expected.keys()

@@ -286,7 +286,7 @@ FAULTS: dict[str, Fault] = {
         "gain",
         "the mean gain of 16 values is off by -0.0",
     ),
-    "flickers with jitter": Fault(lambda: every_other_pixel, lambda: wide, "jitter", "8 positions"),
+    "flickers with jitter": Fault(lambda: every_other_pixel, lambda: wide, "jitter", "4 positions"),
     "keeps history": Fault(with_history, lambda: at_present, "history", "after a light has jumped"),
     "strobes": Fault(
         lambda: strobing, lambda: at_present, "history", "that stays the same changes by 1"

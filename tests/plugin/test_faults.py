@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.plugin.faults import FAULTS
+from tests.plugin.faults import FAULTS, Image
 from vkbloom import presets, reference, testing
 from vkbloom.testing._law_table import LAWS
 
@@ -30,6 +30,18 @@ def test_laws_that_need_more_than_an_image_say_so() -> None:
     assert found.rows[0].held is None
     assert "takes no keyword region" in found.rows[0].message
     testing.report(lambda image: image, size=SIZE).assert_held()
+
+
+def test_laws_share_images_and_render_few() -> None:
+    """For border 11, sizes 8, round and flat images 4, alpha 2, jitter 15, history 16."""
+    images = []
+
+    def bloom(image: Image) -> Image:
+        images.append(image)
+        return FAULTS["wraps around"].twin()(image)
+
+    testing.report(bloom, size=SIZE, laws=NEW)
+    assert len(images) <= 60
 
 
 def test_each_law_has_a_limit() -> None:

@@ -160,7 +160,7 @@ def _write_images(grid: layout.Grid, target: str, renderer: vkbloom.Renderer, **
     with progress.Progress(len(points), done, shown=not terminal.is_quiet()) as bar:
         path = map(grid.point, todo)
         for index, frames in sources.visit(renderer, grid.source, path, grid.wanted):
-            picture = pictures[int(grid.point(index).place)] if pictures else None
+            picture = pictures[int(grid.point(index).entry)] if pictures else None
             _save(
                 frames,
                 {name: out / f"{stems[index]}{name}{suffix}" for name in frames},

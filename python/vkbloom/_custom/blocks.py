@@ -52,8 +52,8 @@ class Block:
 
     def last(self, name: str) -> Directive | None:
         """Return the last directive of a name: of several, this one counts."""
-        found = self.all(name)
-        return found[-1] if found else None
+        directives = self.all(name)
+        return directives[-1] if directives else None
 
     def all(self, name: str) -> list[Directive]:
         """Return the directives of a name."""

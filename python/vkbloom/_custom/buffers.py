@@ -68,7 +68,7 @@ def read_buffer(source: Source, block: Block) -> Buffer:
     head = block.directives[0]
     name = check_name(source, head, "BUFFER")
     storage = block.last("STORAGE") is not None
-    variables = tuple(read_variable(source, one) for one in block.all("VAR"))
+    variables = tuple(read_variable(source, directive) for directive in block.all("VAR"))
     if not variables:
         raise source.fault(head.line, f"BUFFER {name}: the block has no //!VAR")
     size = packed_size(variables, storage)
@@ -85,12 +85,12 @@ def read_buffer(source: Source, block: Block) -> Buffer:
 
 def read_variable(source: Source, directive: Directive) -> Variable:
     """Read a directive VAR: a type, a name, and for an array its length."""
-    found = re.fullmatch(r"(\S+)\s+([A-Za-z_]\w*)\s*(\[\s*(\S*?)\s*\])?", directive.value, re.ASCII)
-    if not found:
+    match = re.fullmatch(r"(\S+)\s+([A-Za-z_]\w*)\s*(\[\s*(\S*?)\s*\])?", directive.value, re.ASCII)
+    if not match:
         raise source.fault(
             directive.line, f"VAR: {directive.value!r} is not 'type name' or 'type name[count]'"
         )
-    kind, name, array, length = found.groups()
+    kind, name, array, length = match.groups()
     if kind not in TYPES:
         raise source.fault(directive.line, f"VAR: {kind!r} is not one of {', '.join(TYPES)}")
     if array is None:

@@ -51,10 +51,10 @@ def find_compiler() -> str:
     """Return the path of the compiler: the wheel's, or the system's."""
     with contextlib.suppress(ImportError):
         return str(importlib.import_module("vkbloom_glslang").PATH)
-    found = shutil.which("glslangValidator") or shutil.which("glslang")
-    if found is None:
+    program = shutil.which("glslangValidator") or shutil.which("glslang")
+    if program is None:
         raise ShaderError(MISSING)
-    return found
+    return program
 
 
 @functools.cache
@@ -67,11 +67,11 @@ def identity() -> bytes:
     return known.digest()
 
 
-def compile_shader(file: CustomFile, one: CustomPass, shader: Shader) -> bytes:
+def compile_shader(file: CustomFile, item: CustomPass, shader: Shader) -> bytes:
     """Return the SPIR-V of a pass, from the cache where it is there."""
     code = cached_code(shader)
     if code is None:
-        code = compiled(file, one, shader)
+        code = compiled(file, item, shader)
         CACHE.write(_key(shader), code)
     return code
 
@@ -85,7 +85,7 @@ def _key(shader: Shader) -> bytes:
     return hashlib.sha256(identity() + bytes([shader.compute]) + shader.text.encode()).digest()
 
 
-def compiled(file: CustomFile, one: CustomPass, shader: Shader) -> bytes:
+def compiled(file: CustomFile, item: CustomPass, shader: Shader) -> bytes:
     """Run the compiler; raise ShaderError with the user's file and line if it refuses."""
     with tempfile.TemporaryDirectory(prefix="vkbloom") as folder:
         target = Path(folder) / "shader.spv"
@@ -94,10 +94,10 @@ def compiled(file: CustomFile, one: CustomPass, shader: Shader) -> bytes:
         status, text = run_limited(command, shader.text, folder)
         code = target.read_bytes() if status == 0 and target.exists() else b""
     if not code:
-        raise ShaderError(explained(file, one, status, text))
+        raise ShaderError(explained(file, item, status, text))
     words = np.frombuffer(code, "=u4")
     if len(code) % 4 or len(words) < 6 or words[0] != SPIRV_MAGIC:
-        raise ShaderError(file.source.where(one.line, "the compiler's result is not SPIR-V"))
+        raise ShaderError(file.source.where(item.line, "the compiler's result is not SPIR-V"))
     return np.array(without_contraction(tuple(words.tolist())), "=u4").tobytes()
 
 
@@ -144,7 +144,7 @@ def limit(process: int) -> None:
             resource.prlimit(process, which, (most, most))
 
 
-def explained(file: CustomFile, one: CustomPass, status: int, text: str) -> str:
+def explained(file: CustomFile, item: CustomPass, status: int, text: str) -> str:
     """Return the message of a pass that does not compile."""
     source = file.source
     if status < 0 or status > 128:
@@ -152,22 +152,22 @@ def explained(file: CustomFile, one: CustomPass, status: int, text: str) -> str:
         known = number in set(signal.Signals)
         name = signal.Signals(number).name if known else f"status {status}"
         return source.where(
-            one.line,
+            item.line,
             f"the compiler was ended by {name}: it may take {MAX_PROCESSOR_SECONDS} s and "
             f"{MAX_MEMORY >> 20} MiB for a pass",
         )
-    last = one.body_line + one.body.count("\n")
+    last = item.body_line + item.body.count("\n")
     for part, number, cause in MESSAGE.findall(text):
         if part == str(BODY):
             return source.where(min(max(int(number), 1), last), cause.strip())
     if "'hook'" in text:
-        kind = "void hook()" if one.compute else "vec4 hook()"
-        return source.where(one.body_line, f"the pass defines no function '{kind}'")
-    found = MESSAGE.search(text)
-    cause = found[3].strip() if found else text.strip().split("\n")[-1]
+        kind = "void hook()" if item.compute else "vec4 hook()"
+        return source.where(item.body_line, f"the pass defines no function '{kind}'")
+    match = MESSAGE.search(text)
+    cause = match[3].strip() if match else text.strip().split("\n")[-1]
     # A name of a block that GLSL does not accept, in the lines before the body.
     lines = {block.name: block.line for block in (*file.params, *file.given.values())}
     for name in re.findall(r"'(\w+)'", cause):
         if name in lines:
             return source.where(lines[name], f"{name!r} is not possible as a name: {cause}")
-    return source.where(one.body_line, f"the pass is not complete GLSL: {cause}")
+    return source.where(item.body_line, f"the pass is not complete GLSL: {cause}")

@@ -51,10 +51,10 @@ class Values:
 
 def tokens(text: str) -> list[str]:
     """Return the tokens of an expression; only blanks separate them."""
-    found = [token for token in text.split(" ") if token]
-    if len(found) > MAX_TOKENS:
-        raise ExpressionError(f"{len(found)} tokens are more than {MAX_TOKENS}")
-    return found
+    words = [token for token in text.split(" ") if token]
+    if len(words) > MAX_TOKENS:
+        raise ExpressionError(f"{len(words)} tokens are more than {MAX_TOKENS}")
+    return words
 
 
 def evaluate(text: str, values: Values, *, finite: bool = True) -> float:

@@ -31,20 +31,20 @@ class CustomFile:
     @property
     def given(self) -> dict[str, Texture | Buffer]:
         """The textures and buffers whose data is in the file, by name."""
-        found: dict[str, Texture | Buffer] = {one.name: one for one in self.textures}
-        return {**found, **{one.name: one for one in self.buffers}}
+        blocks: dict[str, Texture | Buffer] = {block.name: block for block in self.textures}
+        return {**blocks, **{block.name: block for block in self.buffers}}
 
     @property
     def saves_bloom(self) -> bool:
         """Whether the file gives the bloom, and leaves the composite to the package."""
-        return any(one.saved_at(stage) == BLOOM for stage, one in self.runs())
+        return any(item.saved_at(stage) == BLOOM for stage, item in self.runs())
 
     def runs(self) -> Iterator[tuple[str, CustomPass]]:
         """Return each pass with its stage, in the order in which they run."""
         for stage in STAGES:
-            for one in self.passes:
-                if stage in one.stages:
-                    yield stage, one
+            for item in self.passes:
+                if stage in item.stages:
+                    yield stage, item
 
     def words(self, values: dict[str, float]) -> dict[str, float]:
         """Return what the words of expressions mean, for some values of the parameters."""
@@ -95,31 +95,31 @@ def check_names(file: CustomFile) -> None:
     """Check that each name of a pass is known when the pass runs, whatever the image."""
     known: set[str] = set()
     words = file.words({param.name: param.default for param in file.params})
-    for place, (stage, one) in enumerate(file.runs()):
+    for number, (stage, item) in enumerate(file.runs()):
         reached = {*STAGES[: STAGES.index(stage) + 1], *known}
-        for binding in one.bindings:
+        for binding in item.bindings:
             name = stage_of(binding.value)
             if name not in {*reached, *file.given, HOOKED, GLOW}:
                 raise file.source.fault(
-                    binding.line, unknown_texture(file, place, stage, binding.value)
+                    binding.line, unknown_texture(file, number, stage, binding.value)
                 )
         sizes = dict.fromkeys({*reached, *KNOWN_SIZES, "MAINPRESUB"}, (7, 5))
         if "MAIN" not in reached:
             del sizes["MAINPRESUB"]
-        for expression in (one.when, one.width, one.height):
+        for expression in (item.when, item.width, item.height):
             check_expression(file, expression, Values(sizes, words))
-        if saved := one.saved_at(stage):
+        if saved := item.saved_at(stage):
             known.add(saved)
 
 
-def unknown_texture(file: CustomFile, place: int, stage: str, name: str) -> str:
+def unknown_texture(file: CustomFile, index: int, stage: str, name: str) -> str:
     """Return why a texture is not known to a pass."""
-    later = [one for at, one in list(file.runs())[place:] if one.saved_at(at) == stage_of(name)]
+    later = [item for at, item in list(file.runs())[index:] if item.saved_at(at) == stage_of(name)]
     if later:
         return f"BIND: {name!r} is saved only by a later pass, in line {later[0].line}"
     if stage_of(name) in STAGES:
         return f"BIND: the stage {name} comes after the pass's own, {stage}"
-    saved = [one.save.value for _, one in list(file.runs())[:place] if one.save]
+    saved = [item.save.value for _, item in list(file.runs())[:index] if item.save]
     known = dict.fromkeys([HOOKED, GLOW, *saved, *file.given])
     return f"BIND: {name!r} is not a texture here; known are {', '.join(known)} and the stages"
 
@@ -136,7 +136,7 @@ def check_expression(file: CustomFile, expression: Expression | None, values: Va
 
 def check_picture(file: CustomFile) -> None:
     """Check that the file gives a bloom or a picture."""
-    if not any(one.saved_at(stage) in (None, BLOOM) for stage, one in file.runs()):
+    if not any(item.saved_at(stage) in (None, BLOOM) for stage, item in file.runs()):
         raise file.source.fault(
             file.passes[-1].line,
             "no pass writes the picture or saves BLOOM; let the last pass replace the picture "

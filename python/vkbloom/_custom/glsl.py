@@ -146,12 +146,14 @@ def block_members(file: CustomFile, body: str, images: list[tuple[str, list[str]
     """Return the members of the block: what the body's words need, vectors first."""
     words = set(re.findall(r"[A-Za-z_]\w*", body))
     members = []
-    for place, (image, names) in enumerate(images):
+    for number, (image, names) in enumerate(images):
         suffixes = ("size", "pt", "texOff")
         if any(f"{name}_{suffix}" in words for name in names for suffix in suffixes):
-            members.append(Member("vec2", f"vkb_size_of_vkb_image_{place}", image))
+            members.append(Member("vec2", f"vkb_size_of_vkb_image_{number}", image))
     positions = ("pos", "map", "texOff")
-    if any(f"{name}_{one}" in words for _, names in images for name in names for one in positions):
+    if any(
+        f"{name}_{ending}" in words for _, names in images for name in names for ending in positions
+    ):
         members.append(Member("vec2", "vkb_target"))
     members += [Member("vec2", name) for name in ("input_size", "target_size") if name in words]
     members += [
@@ -164,27 +166,27 @@ def block_members(file: CustomFile, body: str, images: list[tuple[str, list[str]
 
 
 def write_shader(
-    file: CustomFile, one: CustomPass, stage: str, values: Mapping[str, float]
+    file: CustomFile, item: CustomPass, stage: str, values: Mapping[str, float]
 ) -> Shader:
     """Write the shader of a pass at a stage; `values` has the number of each parameter."""
-    bound = {binding.value for binding in one.bindings}
+    bound = {binding.value for binding in item.bindings}
     textures = [texture for texture in file.textures if texture.name in bound]
     buffers = [buffer for buffer in file.buffers if buffer.name in bound]
-    found = dict.fromkeys(
+    names_bound = dict.fromkeys(
         stage if binding.value == HOOKED else stage_of(binding.value)
-        for binding in one.bindings
+        for binding in item.bindings
         if binding.value not in file.given
     )
-    images = [(image, names_of(image, stage, bound)) for image in found]
-    members = block_members(file, without_remarks(one.body), images)
-    compute = one.compute is not None
+    images = [(image, names_of(image, stage, bound)) for image in names_bound]
+    members = block_members(file, without_remarks(item.body), images)
+    compute = item.compute is not None
     lines = ["#version 450", "#extension GL_GOOGLE_include_directive : enable"]
     if members:
         inside = "".join(f"{member.type} {member.name}; " for member in members)
         lines.append(f"layout(binding = 0, std140) uniform vkb_parameters {{ {inside}}};")
-    for place, (_, names) in enumerate(images):
-        sampler = f"vkb_image_{place}"
-        lines.append(f"layout(binding = {place + 1}) uniform sampler2D {sampler};")
+    for index, (_, names) in enumerate(images):
+        sampler = f"vkb_image_{index}"
+        lines.append(f"layout(binding = {index + 1}) uniform sampler2D {sampler};")
         lines += [image_lines(name, sampler, compute) for name in names]
     binding = len(images) + 1
     for texture in textures:
@@ -193,8 +195,8 @@ def write_shader(
     for buffer in buffers:
         lines.append(buffer_lines(buffer, binding))
         binding += 1
-    if one.compute:
-        width, height = one.compute.threads
+    if item.compute:
+        width, height = item.compute.threads
         lines.append(f"layout(local_size_x = {width}, local_size_y = {height}) in;")
         lines.append(f"layout(binding = {binding}) uniform writeonly image2D out_image;")
     lines += [
@@ -202,8 +204,8 @@ def write_shader(
         "#define linearize(c) (c)",
         "#define delinearize(c) (c)",
         constant_lines(file, values),
-        f"#line {one.body_line} {BODY}",
-        one.body,
+        f"#line {item.body_line} {BODY}",
+        item.body,
         f"#line 1 {REST}",
         main_lines(compute),
     ]
@@ -211,7 +213,7 @@ def write_shader(
         "\n".join(lines) + "\n",
         compute,
         tuple(members),
-        tuple(found),
+        tuple(names_bound),
         tuple(textures),
         tuple(buffers),
     )

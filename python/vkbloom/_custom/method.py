@@ -92,10 +92,10 @@ class CustomMethod(Settings, metaclass=CustomType):
         """Whether passes change textures or buffers, so that frames depend on those before."""
         return any(block.storage for block in self.file.given.values())
 
-    def _in_sequence(self, place: int, state: dict[Any, Any]) -> Self:
+    def _in_sequence(self, index: int, state: dict[Any, Any]) -> Self:
         """Return a copy for a frame of a sequence, which counts the frames before it."""
         copied = copy.copy(self)
-        object.__setattr__(copied, "_place", place)
+        object.__setattr__(copied, "_place", index)
         object.__setattr__(copied, "_state", state)
         return copied
 

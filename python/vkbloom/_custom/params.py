@@ -80,10 +80,10 @@ def read_param(source: Source, block: Block) -> Param:
 
 def read_type(source: Source, block: Block) -> tuple[Number, Use, bool]:
     """Return number and use of the parameter, and whether it is an ENUM."""
-    head, found = block.directives[0], block.last("TYPE")
-    if found is None:
+    head, declared = block.directives[0], block.last("TYPE")
+    if declared is None:
         raise source.fault(head.line, f"PARAM {head.value}: the block has no //!TYPE")
-    words = found.value.split()
+    words = declared.value.split()
     uses: dict[str, Use] = {"DYNAMIC": "uniform", "CONSTANT": "constant"}
     if words == ["DEFINE"]:
         return "int", "define", False
@@ -95,8 +95,8 @@ def read_type(source: Source, block: Block) -> tuple[Number, Use, bool]:
         if kinds == [number]:
             return number, use, False
     raise source.fault(
-        found.line,
-        f"TYPE: {found.value!r} is not one of float, int, uint, DYNAMIC or CONSTANT with one of "
+        declared.line,
+        f"TYPE: {declared.value!r} is not one of float, int, uint, DYNAMIC or CONSTANT with one of "
         "these, DEFINE, ENUM int, ENUM DEFINE",
     )
 

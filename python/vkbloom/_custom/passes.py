@@ -112,14 +112,14 @@ def read_stages(source: Source, block: Block) -> tuple[str, ...]:
 
 def read_expression(source: Source, block: Block, name: str) -> Expression | None:
     """Read an expression; an empty one counts as none."""
-    found = block.last(name)
-    if found is None or not found.value:
+    directive = block.last(name)
+    if directive is None or not directive.value:
         return None
     try:
-        tokens(found.value)
+        tokens(directive.value)
     except ExpressionError as error:
-        raise source.fault(found.line, f"{name}: {error}") from None
-    return Expression(found.value, found.line, name)
+        raise source.fault(directive.line, f"{name}: {error}") from None
+    return Expression(directive.value, directive.line, name)
 
 
 def numbers(directive: Directive) -> list[int] | None:
@@ -132,17 +132,20 @@ def numbers(directive: Directive) -> list[int] | None:
 
 def read_compute(source: Source, block: Block) -> Compute | None:
     """Read //!COMPUTE: two or four numbers."""
-    found = block.last("COMPUTE")
-    if found is None:
+    directive = block.last("COMPUTE")
+    if directive is None:
         return None
-    given = numbers(found)
+    given = numbers(directive)
     if given is None or len(given) not in (2, 4):
-        raise source.fault(found.line, f"COMPUTE: {found.value!r} is not two or four numbers")
+        raise source.fault(
+            directive.line, f"COMPUTE: {directive.value!r} is not two or four numbers"
+        )
     width, height = given[:2]
     threads = (given[-2], given[-1])
     if not (1 <= width <= LARGEST_BLOCK and 1 <= height <= LARGEST_BLOCK):
         raise source.fault(
-            found.line, f"COMPUTE: {width} x {height} pixels are out of range, 1 to {LARGEST_BLOCK}"
+            directive.line,
+            f"COMPUTE: {width} x {height} pixels are out of range, 1 to {LARGEST_BLOCK}",
         )
     if (
         min(threads) < 1
@@ -150,7 +153,7 @@ def read_compute(source: Source, block: Block) -> Compute | None:
         or any(side > limit for side, limit in zip(threads, LARGEST_GROUP, strict=True))
     ):
         raise source.fault(
-            found.line,
+            directive.line,
             f"COMPUTE: {threads[0]} x {threads[1]} threads are out of range, 1 to {MAX_THREADS}",
         )
     return Compute((width, height), threads)
@@ -158,14 +161,18 @@ def read_compute(source: Source, block: Block) -> Compute | None:
 
 def check_ignored(source: Source, block: Block) -> None:
     """Check the directives that change no pixel here: OFFSET and COMPONENTS."""
-    for found in block.all("COMPONENTS"):
-        given = numbers(found)
+    for directive in block.all("COMPONENTS"):
+        given = numbers(directive)
         if given is None or len(given) != 1 or not 1 <= given[0] <= 4:
-            raise source.fault(found.line, f"COMPONENTS: {found.value!r} is not a number, 1 to 4")
-    for found in block.all("OFFSET"):
-        words = found.value.split()
+            raise source.fault(
+                directive.line, f"COMPONENTS: {directive.value!r} is not a number, 1 to 4"
+            )
+    for directive in block.all("OFFSET"):
+        words = directive.value.split()
         number = r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?"
         if words != ["ALIGN"] and not (
             len(words) == 2 and all(re.fullmatch(number, word, re.ASCII) for word in words)
         ):
-            raise source.fault(found.line, f"OFFSET: {found.value!r} is not two numbers or ALIGN")
+            raise source.fault(
+                directive.line, f"OFFSET: {directive.value!r} is not two numbers or ALIGN"
+            )

@@ -52,7 +52,7 @@ class Request:
 class Step:
     """A pass that runs, with the images that it reads and writes."""
 
-    one: CustomPass
+    item: CustomPass
     stage: str
     saved: str | None
     image: Image
@@ -74,32 +74,32 @@ class Planner:
         for stage in STAGES:
             self._saved.pop(stage, None)
             self._left[stage] = self._picture
-            for one in file.passes:
-                if stage in one.stages and self._holds(one.when, stage):
-                    self._run(stage, one)
+            for item in file.passes:
+                if stage in item.stages and self._holds(item.when, stage):
+                    self._run(stage, item)
         self._check_size()
 
     def _holds(self, when: Expression | None, stage: str) -> bool:
         return when is None or self._value(when, stage) != 0
 
-    def _run(self, stage: str, one: CustomPass) -> None:
+    def _run(self, stage: str, item: CustomPass) -> None:
         images = self._images(stage)
-        for binding in one.bindings:
+        for binding in item.bindings:
             if binding.value not in images and binding.value not in self._file.given:
                 raise self._file.source.fault(
                     binding.line,
                     f"BIND: {binding.value!r} was not saved, since the WHEN of its pass is 0",
                 )
-        size = (self._side(one.width, stage, 0), self._side(one.height, stage, 1))
-        saved = one.saved_at(stage)
+        size = (self._side(item.width, stage, 0), self._side(item.height, stage, 1))
+        saved = item.saved_at(stage)
         if saved is None and stage not in RESIZING and size != self._picture.size:
             raise self._file.source.fault(
-                one.line,
+                item.line,
                 f"the picture's size is {size} after this pass, not {self._picture.size}; only the "
                 f"stages {', '.join(RESIZING)} can change it",
             )
         image = Image(f"{len(self.steps)}.{saved or PICTURE}"[:LONGEST], size)
-        self.steps.append(Step(one, stage, saved, image, images))
+        self.steps.append(Step(item, stage, saved, image, images))
         if saved is None:
             self._picture = self._left[stage] = image
         else:
@@ -107,11 +107,11 @@ class Planner:
 
     def _images(self, stage: str) -> dict[str, Image]:
         """Return the images that a pass of a stage finds, by name."""
-        found = {GLOW: Image(GLOW, self._request.buffers), **self._left, **self._saved}
-        found[HOOKED] = found[stage] = self._picture
-        if "MAIN" in found:
-            found["MAINPRESUB"] = found["MAIN"]
-        return found
+        images = {GLOW: Image(GLOW, self._request.buffers), **self._left, **self._saved}
+        images[HOOKED] = images[stage] = self._picture
+        if "MAIN" in images:
+            images["MAINPRESUB"] = images["MAIN"]
+        return images
 
     def _value(self, expression: Expression, stage: str) -> float:
         """Return the value of an expression at this place."""
@@ -141,7 +141,7 @@ class Planner:
             return
         last = next(step for step in self.steps if step.image == self._picture)
         raise self._file.source.fault(
-            last.one.line, f"the picture's size is {size} at the end, not the frame's, {frame}"
+            last.item.line, f"the picture's size is {size} at the end, not the frame's, {frame}"
         )
 
 
@@ -150,26 +150,26 @@ def planned(file: CustomFile, shaders: Shaders, request: Request) -> tuple[Row, 
     steps = Planner(file, request).steps
     names = framebuffers(file, steps)
     rows = []
-    for place, step in enumerate(steps):
-        shader, core_shader = shaders.of(step.one, step.stage, request.values)
+    for number, step in enumerate(steps):
+        shader, core_shader = shaders.of(step.item, step.stage, request.values)
         given = {
             **request.values,
             "vkb_target": step.image.size,
             "input_size": request.frame,
             "target_size": request.frame,
-            "frame": request.index * len(steps) + place + 1,
-            "random": random_number(request.seed, request.index * len(steps) + place),
+            "frame": request.index * len(steps) + number + 1,
+            "random": random_number(request.seed, request.index * len(steps) + number),
             **{name: image.size for name, image in step.sizes.items()},
         }
         name = names.get(step.image.name, step.image.name)
         shown = name not in (step.image.name, PICTURE)
         images = [step.sizes[image].name for image in shader.images]
         reads = tuple(names.get(image, image) for image in images)
-        block = step.one.compute.block if step.one.compute else None
+        block = step.item.compute.block if step.item.compute else None
         params = shader.packed(given)
         blocks: list[Texture | Buffer] = [*shader.textures, *shader.buffers]
-        bound = tuple(request.resources[one.name] for one in blocks)
-        turn = next(TURNS) if any(one.storage for one in blocks) else 0
+        bound = tuple(request.resources[given_block.name] for given_block in blocks)
+        turn = next(TURNS) if any(given_block.storage for given_block in blocks) else 0
         size = step.image.size
         rows.append(Row(name, core_shader, size, reads, shown, params, block, bound, turn))
     written = {row.name for row in rows}

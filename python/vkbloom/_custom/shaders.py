@@ -46,49 +46,49 @@ class Shaders:
         self._compiled: dict[tuple[Any, ...], tuple[Shader, CoreShader]] = {}
 
     def of(
-        self, one: CustomPass, stage: str, values: Mapping[str, float]
+        self, item: CustomPass, stage: str, values: Mapping[str, float]
     ) -> tuple[Shader, CoreShader]:
         """Return the shader of a pass at a stage, for the values that the compiler must know."""
-        key = self._key(one, stage, values)
-        found = self._compiled.get(key)
-        if found is None:
-            shader = write_shader(self._file, one, stage, values)
-            found = self._keep(key, one, shader, compile_shader(self._file, one, shader))
-        return found
+        key = self._key(item, stage, values)
+        kept = self._compiled.get(key)
+        if kept is None:
+            shader = write_shader(self._file, item, stage, values)
+            kept = self._keep(key, item, shader, compile_shader(self._file, item, shader))
+        return kept
 
     def compile_all(self, values: Mapping[str, float]) -> None:
         """Compile all passes, several at a time."""
         missing = []
-        for stage, one in self._file.runs():
+        for stage, item in self._file.runs():
             # The cache has most, and a thread takes longer than to read them.
-            shader = write_shader(self._file, one, stage, values)
+            shader = write_shader(self._file, item, stage, values)
             code = cached_code(shader)
             if code is None:
-                missing.append((one, stage))
+                missing.append((item, stage))
             else:
-                self._keep(self._key(one, stage, values), one, shader, code)
+                self._keep(self._key(item, stage, values), item, shader, code)
         if not missing:
             return
         with ThreadPoolExecutor(os.cpu_count()) as threads:
-            futures = [threads.submit(self.of, one, stage, values) for one, stage in missing]
+            futures = [threads.submit(self.of, item, stage, values) for item, stage in missing]
         for future in futures:
             future.result()
 
-    def _key(self, one: CustomPass, stage: str, values: Mapping[str, float]) -> tuple[Any, ...]:
+    def _key(self, item: CustomPass, stage: str, values: Mapping[str, float]) -> tuple[Any, ...]:
         fixed = tuple(values[param.name] for param in self._file.params if param.use != "uniform")
-        return one.line, stage, fixed
+        return item.line, stage, fixed
 
     def _keep(
-        self, key: tuple[Any, ...], one: CustomPass, shader: Shader, code: bytes
+        self, key: tuple[Any, ...], item: CustomPass, shader: Shader, code: bytes
     ) -> tuple[Shader, CoreShader]:
         digest = hashlib.sha256(code).digest()[:16]
-        found = shader, CoreShader(f"{self._name}_{one.line}", code, digest)
-        self._compiled[key] = found
-        return found
+        made = shader, CoreShader(f"{self._name}_{item.line}", code, digest)
+        self._compiled[key] = made
+        return made
 
 
 @functools.cache
-def package_shader(place: int) -> CoreShader:
+def package_shader(index: int) -> CoreShader:
     """Return the shader of one of the package's passes."""
     file = read_file(Source("vkbloom", PACKAGE_PASSES))
-    return Shaders("own", file).of(file.passes[place], "MAIN", {})[1]
+    return Shaders("own", file).of(file.passes[index], "MAIN", {})[1]

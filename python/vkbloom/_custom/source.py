@@ -62,6 +62,6 @@ def read_source(source: str | Path) -> Source:
 
 def checked(source: Source) -> Source:
     """Return the source; raise ValueError if it has a null character."""
-    if (place := source.text.find("\0")) >= 0:
-        raise source.fault(source.text.count("\n", 0, place) + 1, "the line has a null character")
+    if (offset := source.text.find("\0")) >= 0:
+        raise source.fault(source.text.count("\n", 0, offset) + 1, "the line has a null character")
     return source

@@ -95,11 +95,11 @@ RGBA32_FLOAT: Final = 109
 
 def numbered(bits: int, kind: str, channels: int, file: str) -> TextureFormat:
     """Return a format of the table; `file` is the type of a channel in the file."""
-    place = {1: 0, 2: 1, 3: 2, 4: 2}[channels]
+    index = {1: 0, 2: 1, 3: 2, 4: 2}[channels]
     letter = {"": "u", "s": "i"}.get(kind, kind) + str(bits // 8)
     return TextureFormat(
-        NUMBERS[bits, kind][place],
-        ("r", "rg", "rgba")[place] + str(bits) + LAYOUT_KINDS[kind],
+        NUMBERS[bits, kind][index],
+        ("r", "rg", "rgba")[index] + str(bits) + LAYOUT_KINDS[kind],
         SCALARS.get(kind, "float"),
         channels,
         channels * int(file[1:]),
@@ -158,22 +158,24 @@ def read_texture(source: Source, block: Block) -> Texture:
     name = check_name(source, head, "TEXTURE")
     storage = block.last("STORAGE") is not None
     sides = read_sides(source, block)
-    found = block.last("FORMAT")
-    if found is None:
+    directive = block.last("FORMAT")
+    if directive is None:
         raise source.fault(head.line, f"TEXTURE {name}: the block has no //!FORMAT")
-    if found.value not in FORMATS:
+    if directive.value not in FORMATS:
         raise source.fault(
-            found.line, f"FORMAT: {found.value!r} is not one of {', '.join(FORMATS)}"
+            directive.line, f"FORMAT: {directive.value!r} is not one of {', '.join(FORMATS)}"
         )
-    texels = FORMATS[found.value]
+    texels = FORMATS[directive.value]
     if storage and not texels.stored:
         raise source.fault(
-            found.line, f"FORMAT: {found.value} has no STORAGE; use rgba8 or rgba32f"
+            directive.line, f"FORMAT: {directive.value} has no STORAGE; use rgba8 or rgba32f"
         )
     filtering = read_word(source, block, "FILTER", FILTERS)
     if filtering == "LINEAR" and texels.scalar != "float":
         line = block.all("FILTER")[-1].line
-        raise source.fault(line, f"FILTER: LINEAR is not possible with integers ({found.value})")
+        raise source.fault(
+            line, f"FILTER: LINEAR is not possible with integers ({directive.value})"
+        )
     data = read_hex(source, block)
     size = texels.file_bytes * int(np.prod(sides))
     if len(data) != size and not (storage and not data):
@@ -181,7 +183,7 @@ def read_texture(source: Source, block: Block) -> Texture:
         raise source.fault(
             line,
             f"TEXTURE {name}: the data has {len(data)} bytes, not {size}: "
-            f"{' x '.join(map(str, sides))} texels of {texels.file_bytes} ({found.value})",
+            f"{' x '.join(map(str, sides))} texels of {texels.file_bytes} ({directive.value})",
         )
     return Texture(
         name,
@@ -197,31 +199,35 @@ def read_texture(source: Source, block: Block) -> Texture:
 
 def read_sides(source: Source, block: Block) -> tuple[int, ...]:
     """Read //!SIZE: one to three numbers."""
-    found = block.last("SIZE")
-    if found is None:
+    directive = block.last("SIZE")
+    if directive is None:
         return (1, 1)
-    words = found.value.split()
+    words = directive.value.split()
     if not 1 <= len(words) <= 3 or not all(re.fullmatch(r"\d+", word, re.ASCII) for word in words):
-        raise source.fault(found.line, f"SIZE: {found.value!r} is not one, two or three numbers")
+        raise source.fault(
+            directive.line, f"SIZE: {directive.value!r} is not one, two or three numbers"
+        )
     sides = tuple(int(word) for word in words)
     largest = LARGEST_SIDES[len(sides)]
     if not all(1 <= side <= largest for side in sides):
         raise source.fault(
-            found.line,
-            f"SIZE: {found.value} is out of range, 1 to {largest} in {len(sides)} dimensions",
+            directive.line,
+            f"SIZE: {directive.value} is out of range, 1 to {largest} in {len(sides)} dimensions",
         )
     return sides
 
 
 def read_word(source: Source, block: Block, name: str, words: tuple[Word, ...]) -> Word:
     """Read a directive whose value is one of some words; the first is the default."""
-    found = block.last(name)
-    if found is None:
+    directive = block.last(name)
+    if directive is None:
         return words[0]
     for word in words:
-        if found.value == word:
+        if directive.value == word:
             return word
-    raise source.fault(found.line, f"{name}: {found.value!r} is not one of {', '.join(words)}")
+    raise source.fault(
+        directive.line, f"{name}: {directive.value!r} is not one of {', '.join(words)}"
+    )
 
 
 def read_hex(source: Source, block: Block) -> bytes:

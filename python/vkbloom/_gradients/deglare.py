@@ -79,17 +79,17 @@ def deglare(
     _, pullback = vjp(picture, lens, renderer=renderer)
 
     def spread(values: NDArray[Any]) -> NDArray[np.float32]:
-        found: NDArray[np.float32] = renderer.apply(
+        result: NDArray[np.float32] = renderer.apply(
             values.astype(np.float32), lens, framebuffers="final"
         )["final"]
-        return found
+        return result
 
-    found = np.maximum(picture, 0).astype(np.float64)
-    residual = picture - spread(found)
-    direction, last, first = np.zeros_like(found), np.inf, 0.0
+    estimate = np.maximum(picture, 0).astype(np.float64)
+    residual = picture - spread(estimate)
+    direction, last, first = np.zeros_like(estimate), np.inf, 0.0
     for _ in range(iterations):
         slope = pullback({"final": residual})["image"].astype(np.float64)
-        slope[(found == 0) & (slope < 0)] = 0
+        slope[(estimate == 0) & (slope < 0)] = 0
         square = float(np.vdot(slope, slope))
         first = max(first, square)
         # Further steps only follow the rounding of single floats.
@@ -98,9 +98,11 @@ def deglare(
         direction = np.where(slope == 0, 0, slope + square / last * direction)
         moved = spread(direction)
         length = float(np.vdot(slope, direction)) / float(np.vdot(moved, moved))
-        ahead = found + length * direction
-        found = np.maximum(ahead, 0)
+        ahead = estimate + length * direction
+        estimate = np.maximum(ahead, 0)
         is_inside = (ahead >= 0).all()
-        residual = residual - np.float32(length) * moved if is_inside else picture - spread(found)
+        residual = (
+            residual - np.float32(length) * moved if is_inside else picture - spread(estimate)
+        )
         last = square if is_inside else np.inf
-    return np.concatenate([found, given[..., 3:] / levels], axis=2, dtype=np.float32)
+    return np.concatenate([estimate, given[..., 3:] / levels], axis=2, dtype=np.float32)

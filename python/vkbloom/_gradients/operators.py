@@ -168,8 +168,8 @@ def _pulled_on_device(  # noqa: PLR0917
     core = renderer._core
     masks = None if mask is None else mask.detach().reshape(-1, *mask.shape[-2:]).cpu().numpy()
     images, emissions, cotangents = (
-        None if one is None else take(_batch(one), name, core, (4,))
-        for name, one in (("image", image), ("emission", emission), ("cotangent", cotangent))
+        None if tensor is None else take(_batch(tensor), name, core, (4,))
+        for name, tensor in (("image", image), ("emission", emission), ("cotangent", cotangent))
     )
     assert images
     assert cotangents
@@ -227,14 +227,14 @@ def _bloom(  # noqa: PLR0917
     if image.is_cuda and image.dtype != torch.float64:
         return _on_device(image, mask, emission, values, names, settings, renderer)
     final = np.empty(image.shape, _dtype(image))
-    for index, arrays, one in _each(image, mask, emission, values, names, settings):
+    for index, arrays, chosen in _each(image, mask, emission, values, names, settings):
         given = dict(arrays)
         pixels = given.pop("image")
         if pixels.dtype == np.float64:
-            final[index] = reference_apply(pixels, one, **given)["final"]
+            final[index] = reference_apply(pixels, chosen, **given)["final"]
         else:
             frames = _renderer(renderer).apply(
-                pixels, one.replace(format="rgba32float"), framebuffers="final", **given
+                pixels, chosen.replace(format="rgba32float"), framebuffers="final", **given
             )
             final[index] = frames["final"]
     return torch.from_numpy(final).to(image.device)
@@ -259,18 +259,20 @@ def _on_device(  # noqa: PLR0917
         frames = renderer.map(images, settings, framebuffers="final")
     else:
         masks, emissions = (
-            [None] * len(images) if one is None else one.detach().reshape(-1, *one.shape[-sides:])
-            for one, sides in ((mask, 2), (emission, 3))
+            [None] * len(images)
+            if tensor is None
+            else tensor.detach().reshape(-1, *tensor.shape[-sides:])
+            for tensor, sides in ((mask, 2), (emission, 3))
         )
         frames = (
             renderer.apply(
-                one, settings, mask=masks[i], emission=emissions[i], framebuffers="final"
+                tensor, settings, mask=masks[i], emission=emissions[i], framebuffers="final"
             )
-            for i, one in enumerate(images)
+            for i, tensor in enumerate(images)
         )
     # The images of a batch are in the same memory.
-    batches = merged([cast("DeviceArray", one["final"]) for one in frames])
-    return _joined([torch.from_dlpack(one) for one in batches], image, torch.cat)
+    batches = merged([cast("DeviceArray", tensor["final"]) for tensor in frames])
+    return _joined([torch.from_dlpack(tensor) for tensor in batches], image, torch.cat)
 
 
 def _dtype(tensor: Any) -> Any:
@@ -303,24 +305,27 @@ def _backward(  # noqa: PLR0917
     inputs = {"image": image, "mask": mask, "emission": emission}
     images = {name: part for name, part in inputs.items() if part is not None}
     fields = dict(zip(_split(names), values, strict=True))
-    found: dict[str, list[Any]] = {name: [] for name in (*images, *fields)}
+    derivatives: dict[str, list[Any]] = {name: [] for name in (*images, *fields)}
     # An empty batch has nothing to take to the device.
     on_device = image.is_cuda and image.dtype != torch.float64 and image.numel() > 0
     if on_device:
-        one = replaced(_settings(settings), fields)
-        pulled = _pulled_on_device(cotangent, image, mask, emission, one, renderer)
+        chosen = replaced(_settings(settings), fields)
+        pulled = _pulled_on_device(cotangent, image, mask, emission, chosen, renderer)
     else:
         wanted = cotangent.detach().cpu().numpy()
         pulled = (
-            _pulled(arrays, one, renderer, wanted[index])
-            for index, arrays, one in _each(image, mask, emission, values, names, settings)
+            _pulled(arrays, chosen, renderer, wanted[index])
+            for index, arrays, chosen in _each(image, mask, emission, values, names, settings)
         )
     for gradients in pulled:
-        for name, parts in found.items():
+        for name, parts in derivatives.items():
             parts.append(_as_tensor(gradients[name]))
     return [
-        *(_joined(found[name], part) for name, part in images.items()),
-        *(sum(found[name], torch.zeros(part.shape)).to(part) for name, part in fields.items()),
+        *(_joined(derivatives[name], part) for name, part in images.items()),
+        *(
+            sum(derivatives[name], torch.zeros(part.shape)).to(part)
+            for name, part in fields.items()
+        ),
     ]
 
 
@@ -365,8 +370,14 @@ def _keep(ctx: Any, inputs: tuple[Any, ...], output: Any) -> None:
 def _back(ctx: Any, cotangent: Any) -> tuple[Any, ...]:
     saved = iter(ctx.saved_tensors)
     inputs = [next(saved) if given else None for given in ctx.given]
-    found = iter(torch.ops.vkbloom.bloom_backward(cotangent, *inputs, [*saved], *ctx.texts))
-    return *(next(found) if given else None for given in ctx.given), [*found], None, None, None
+    derivatives = iter(torch.ops.vkbloom.bloom_backward(cotangent, *inputs, [*saved], *ctx.texts))
+    return (
+        *(next(derivatives) if given else None for given in ctx.given),
+        [*derivatives],
+        None,
+        None,
+        None,
+    )
 
 
 def _refuse(ctx: Any, *cotangents: Any) -> Any:

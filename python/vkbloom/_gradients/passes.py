@@ -46,7 +46,7 @@ class Running:
     passes: Passes
     plan: _core.Plan
     arrays: tuple[NDArray[Any] | _core.Exported, ...]
-    place: Destination
+    destination: Destination
     submission: _core.Submission | None
 
     def named(self) -> dict[str, NDArray[Any]]:
@@ -55,19 +55,21 @@ class Running:
         # The device counts what is not finite in all inputs together.
         if any(counts):
             check_finite(self.passes.cotangents)
-        return requests.named(self.plan, self.arrays, self.place)
+        return requests.named(self.plan, self.arrays, self.destination)
 
     def images(self) -> dict[str, NDArray[Any]]:
         """Wait, and return the derivatives by image, mask and emission."""
-        found = self.named()
+        framebuffers = self.named()
         return {
-            name: found[f"by_{name}"] if f"by_{name}" in found else self._zeros(part.shape)
+            name: framebuffers[f"by_{name}"]
+            if f"by_{name}" in framebuffers
+            else self._zeros(part.shape)
             for name, part in self.passes.inputs.named().items()
         }
 
     def _zeros(self, shape: tuple[int, ...]) -> NDArray[Any]:
         core = self.passes.renderer._core
-        return cast("NDArray[Any]", placed(np.zeros(shape, np.float32), self.place, core))
+        return cast("NDArray[Any]", placed(np.zeros(shape, np.float32), self.destination, core))
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,14 +77,14 @@ class Passes:
     """The adjoint passes of an image with settings and cotangents.
 
     - `cotangents`: Checked, by framebuffer; those on the device but for NaN and infinity.
-    - `place`: Where the derivatives by images go.
+    - `destination`: Where the derivatives by images go.
     """
 
     renderer: Renderer
     inputs: Inputs
     settings: Settings
     cotangents: Mapping[str, NDArray[Any] | ImportedArray]
-    place: Destination = "host"
+    destination: Destination = "host"
 
     def submit(self, *, sums: bool = False) -> Running | None:
         """Submit the passes of the derivatives by images, or the sums of those by fields.
@@ -99,21 +101,21 @@ class Passes:
         plan = core.plan(source, self.settings, None, tuple(self.cotangents), sums)
         if plan is None:
             return None
-        place: Destination = "host" if sums else self.place
-        arrays = requests.new_arrays(core, plan, place)
+        destination: Destination = "host" if sums else self.destination
+        arrays = requests.new_arrays(core, plan, destination)
         submission = core.run(source, (plan,), (arrays,)) if plan.outputs else None
-        return Running(self, plan, arrays, place, submission)
+        return Running(self, plan, arrays, destination, submission)
 
     def fields(self) -> dict[str, NDArray[np.float32]]:
         """Return the derivatives by fields that are exact to single floats."""
         wanted = device_fields(self.settings)
         running = self.submit(sums=True) if wanted else None
-        found = running.named() if running else {}
+        totals = running.named() if running else {}
         results: dict[str, NDArray[np.float32]] = {}
         for kind, names in _SUMS.items():
-            if kind not in found:
+            if kind not in totals:
                 continue
-            sums, squares = (found[key][0, 0] for key in (kind, f"{kind}_squares"))
+            sums, squares = (totals[key][0, 0] for key in (kind, f"{kind}_squares"))
             for name, total, square in zip(names, sums, squares, strict=False):
                 if name in wanted and abs(total) >= _MIN_SHARE * np.sqrt(square):
                     results[name] = np.asarray(total)
@@ -151,7 +153,7 @@ def device_fields(settings: Settings) -> frozenset[str]:
 class DeviceGradients(Mapping[str, NDArray[Any]]):
     """Derivatives of the device; others are computed when the first of them is read.
 
-    - `found`: Those by images.
+    - `known`: Those by images.
     - `names`: All names, in the order of the reference.
     - `fields`: Returns those by some of the fields.
     - `every`: Returns all, from the reference.
@@ -159,20 +161,20 @@ class DeviceGradients(Mapping[str, NDArray[Any]]):
 
     def __init__(
         self,
-        found: Mapping[str, NDArray[Any]],
+        known: Mapping[str, NDArray[Any]],
         names: Iterable[str],
         fields: Callable[[], Mapping[str, NDArray[Any]]],
         every: Callable[[], Mapping[str, NDArray[Any]]],
     ) -> None:
-        self._found = dict(found)
+        self._known = dict(known)
         self._names = tuple(names)
         self._sources = [fields, every]
 
     def __getitem__(self, name: str) -> NDArray[Any]:
         check_known(name, self._names)
-        while name not in self._found:
-            self._found = {**self._sources.pop(0)(), **self._found}
-        return self._found[name]
+        while name not in self._known:
+            self._known = {**self._sources.pop(0)(), **self._known}
+        return self._known[name]
 
     def __contains__(self, name: object) -> bool:
         return name in self._names

@@ -112,8 +112,8 @@ def vjp(
         uploaded = Image(source, shape, np.dtype(dtype))
     floats = settings.replace(format="rgba32float")
     frames = renderer.apply(uploaded, floats, device=device)
-    place = place_of(next(iter(frames.values())))
-    pulled = pullback_of(renderer, inputs, settings, place)
+    destination = place_of(next(iter(frames.values())))
+    pulled = pullback_of(renderer, inputs, settings, destination)
 
     def pullback(cotangents: Mapping[str, NDArray[Any]]) -> Derivatives:
         return pulled(_checked(cotangents, frames, core))
@@ -128,24 +128,24 @@ def _checked(cotangents: Any, frames: Mapping[str, Any], core: Any) -> Checked:
     """
     if not isinstance(cotangents, Mapping):
         return check_cotangents(cotangents, frames)
-    found: dict[str, NDArray[Any] | ImportedArray] = {}
+    result: dict[str, NDArray[Any] | ImportedArray] = {}
     for name, given in cotangents.items():
         part = take(given, f"cotangents[{name!r}]", core) if on_cuda(given) else given
         if isinstance(part, ImportedArray) and part.dtype != "uint8":
             check_shape(name, part.shape, frames)
-            found[name] = part
+            result[name] = part
         else:
             # Levels of bytes would be read as shares of 255.
             part = part.numpy() if isinstance(part, ImportedArray) else part
-            found |= check_cotangents({name: part}, frames)
-    return found
+            result |= check_cotangents({name: part}, frames)
+    return result
 
 
 def pullback_of(
-    renderer: Renderer, inputs: Inputs, settings: Settings, place: Destination = "host"
+    renderer: Renderer, inputs: Inputs, settings: Settings, destination: Destination = "host"
 ) -> Callable[[Checked], Derivatives]:
     """Return the pullback alone, of arrays that do not change, and checked cotangents."""
-    start = _starter(renderer, inputs, settings, place)
+    start = _starter(renderer, inputs, settings, destination)
     return lambda cotangents: start(cotangents)()
 
 
@@ -153,12 +153,12 @@ def pull_each(
     renderer: Renderer,
     settings: Settings,
     sequence: Iterable[tuple[Inputs, Checked]],
-    place: Destination = "host",
+    destination: Destination = "host",
 ) -> Iterator[Derivatives]:
     """Yield the derivatives of each image. The device works on later ones meanwhile."""
     started: deque[Callable[[], Derivatives]] = deque()
     for inputs, cotangents in sequence:
-        started.append(_starter(renderer, inputs, settings, place)(cotangents))
+        started.append(_starter(renderer, inputs, settings, destination)(cotangents))
         if len(started) == IMAGES_AHEAD:
             yield started.popleft()()
     while started:
@@ -166,7 +166,7 @@ def pull_each(
 
 
 def _starter(
-    renderer: Renderer, inputs: Inputs, settings: Settings, place: Destination
+    renderer: Renderer, inputs: Inputs, settings: Settings, destination: Destination
 ) -> Callable[[Checked], Callable[[], Derivatives]]:
     """Return a function that submits passes, and returns one that waits for the derivatives."""
     floats = settings.replace(format="rgba32float")
@@ -177,16 +177,16 @@ def _starter(
 
     def by_reference(cotangents: Checked) -> Gradients:
         check_finite(cotangents)
-        found = recorded()({name: _on_host(part) for name, part in cotangents.items()})
-        return Gradients((name, part.astype(np.float32)) for name, part in found.items())
+        derivatives = recorded()({name: _on_host(part) for name, part in cotangents.items()})
+        return Gradients((name, part.astype(np.float32)) for name, part in derivatives.items())
 
     def start(cotangents: Checked) -> Callable[[], Derivatives]:
-        passes = Passes(renderer, inputs, floats, cotangents, place)
+        passes = Passes(renderer, inputs, floats, cotangents, destination)
         running = passes.submit()
 
         def end() -> Derivatives:
             if running is None:
-                return _placed(by_reference(cotangents), inputs, place, renderer)
+                return _placed(by_reference(cotangents), inputs, destination, renderer)
             return DeviceGradients(
                 running.images(), names, passes.fields, lambda: by_reference(cotangents)
             )
@@ -205,10 +205,12 @@ def _on_host(part: NDArray[Any] | ImportedArray) -> NDArray[Any]:
     return part.numpy() if isinstance(part, ImportedArray) else part
 
 
-def _placed(found: Gradients, inputs: Inputs, place: Destination, renderer: Renderer) -> Gradients:
+def _placed(
+    derivatives: Gradients, inputs: Inputs, destination: Destination, renderer: Renderer
+) -> Gradients:
     """Move the derivatives by images to where those of the device would be."""
     core = renderer._core
     if not core.closed:
         for name in inputs.named():
-            found[name] = cast("NDArray[Any]", placed(found[name], place, core))
-    return found
+            derivatives[name] = cast("NDArray[Any]", placed(derivatives[name], destination, core))
+    return derivatives

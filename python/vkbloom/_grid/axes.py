@@ -124,7 +124,7 @@ def read_axes(
             f"settings: the axis {next(iter(whole))} sets all settings; leave the argument out, "
             "and vary fields by further axes"
         )
-    bases = [one for axis in whole.values() for one in settings_of(axis)] or [
+    bases = [base for axis in whole.values() for base in settings_of(axis)] or [
         check_settings(settings, of_image=not has_time)
     ]
     read: list[Axis] = []
@@ -157,7 +157,7 @@ def read_axes(
 
 def settings_of(axis: Axis) -> tuple[Settings, ...]:
     """Return the settings at each value of an axis of presets or settings."""
-    return tuple(presets[one] if axis.name == "preset" else one for one in axis.values)
+    return tuple(presets[value] if axis.name == "preset" else value for value in axis.values)
 
 
 def image_axis(labels: tuple[Any, ...]) -> Axis:

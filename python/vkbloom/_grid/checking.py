@@ -87,14 +87,14 @@ def _report(identity: Mapping[str, Any], folder: Path) -> GridReport:
     ]
     done = 0
     for block in blocks(shape, chunks.chunk, range(len(shape))) if not problems else ():
-        found = {name: chunks.problem(name, block) for name in (DONE, *variables)}
-        if found[DONE] == MISSING:
+        told = {name: chunks.problem(name, block) for name in (DONE, *variables)}
+        if told[DONE] == MISSING:
             continue
-        done += block.count * (found[DONE] is None)
+        done += block.count * (told[DONE] is None)
         points = describe(axes, block)
         problems += [
             f"{chunks.key(name, block)} is {problem}, of {points}"
-            for name, problem in found.items()
+            for name, problem in told.items()
             if problem
         ]
     return GridReport(math.prod(shape), done, tuple(problems))

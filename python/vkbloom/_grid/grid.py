@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from vkbloom._argument_types import checked
 from vkbloom._checks import check_index, import_extra
+from vkbloom._grid import cluster
 from vkbloom._grid.filling import Filler, Tally
 from vkbloom._grid.identity import chunk_in
 from vkbloom._grid.layout import Grid, Layout, ask, lay_out
@@ -44,8 +45,6 @@ def grid(
     settings: Settings | str | None = None,
     axes: Mapping[str, Iterable[Any]] | None = None,
     *,
-    mask: NDArray[Any] | None = None,
-    emission: NDArray[Any] | None = None,
     size: tuple[int, int] | None = None,
     shading: Shading = "forward",
     time: float = 0.0,
@@ -66,8 +65,8 @@ def grid(
     ----------
     source : Scene, image, or list or mapping of images
         Several images add the dimension "image" before all others, with a mapping's keys as
-        labels. They must have the same shape and dtype. Uploaded images belong to one renderer:
-        they have no store that a cluster fills.
+        labels. They must have the same shape and dtype. Uploaded images have their mask and
+        emission; they belong to one renderer, so they have no store that a cluster fills.
     settings : Settings or str, optional
         The settings that the axes change, or the name of a preset. Default:
         ``presets["bevy_natural"]`` for images, ``presets["tutorial"]`` for a scene.
@@ -76,8 +75,6 @@ def grid(
         `vkbloom.presets`, the axis "settings" a list of Settings of any methods. Only one of these
         two axes and the argument `settings` can be given. All other axes change the settings of
         these axes, too.
-    mask, emission : ndarray, optional
-        Of all images, as for `apply`.
     size : (int, int), optional
         Width and height of a scene's frames. Default: (1280, 720).
     shading, time
@@ -165,8 +162,6 @@ def grid(
         source,
         settings,
         axes,
-        mask=mask,
-        emission=emission,
         size=size,
         shading=shading,
         time=time,
@@ -212,8 +207,6 @@ def _filled_there(
     progress: bool | None,
 ) -> Tally:
     """Let the workers of a cluster render the points of a store that are not done."""
-    from vkbloom._grid import cluster  # noqa: PLC0415  Dask is optional
-
     cluster.check_client(client)
     shared = cluster.shared_grid(client, asked)
     store = prepared(cluster.lay_out_there(client, shared, adapter))

@@ -18,7 +18,7 @@ _LONGEST: Final = 60  # characters of a value in a message
 
 def identity(grid: Grid, layout: Layout, chunk: Index) -> dict[str, Any]:
     """Return everything that determines the contents of a grid's arrays, as JSON values."""
-    found = {
+    facts = {
         "format": FORMAT,
         "version": layout.version,
         "adapter": layout.adapter,
@@ -35,7 +35,7 @@ def identity(grid: Grid, layout: Layout, chunk: Index) -> dict[str, Any]:
         "chunk": chunk,
     }
     # The same conversion as by storing it in JSON, which turns tuples into lists.
-    plain: dict[str, Any] = json.loads(json.dumps(found))
+    plain: dict[str, Any] = json.loads(json.dumps(facts))
     return plain
 
 

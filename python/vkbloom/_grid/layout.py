@@ -64,7 +64,7 @@ class Grid:
 
     def point(self, index: Index) -> Point:
         """Return the point at an index."""
-        place = self.source.place
+        entry = self.source.entry
         base = self.settings
         changes = {}
         for axis, number in zip(self.axes, index, strict=True):
@@ -73,8 +73,8 @@ class Grid:
             elif axis.kind == "settings":
                 changes[axis.name] = axis.values[number]
             else:
-                place = number if axis.kind == "image" else axis.values[number]
-        return Point(index, base.replace(**changes) if changes else base, place)
+                entry = number if axis.kind == "image" else axis.values[number]
+        return Point(index, base.replace(**changes) if changes else base, entry)
 
     def named(self, index: Index) -> str:
         """Return a point's axis values as text for messages."""
@@ -133,8 +133,6 @@ def ask(
     settings: Settings | str | None,
     axes: Mapping[str, Any] | None,
     *,
-    mask: object = None,
-    emission: object = None,
     size: tuple[int, int] | None,
     shading: str,
     time: float,
@@ -144,15 +142,15 @@ def ask(
     """Check the arguments that all grids share."""
     if settings is not None:
         settings = check_settings(settings)
-    checked = read_source(source, size, shading, time, mask=mask, emission=emission)
-    found = read_axes(settings, {} if axes is None else axes, has_time=checked.has_time)
+    checked = read_source(source, size, shading, time)
+    grid_axes = read_axes(settings, {} if axes is None else axes, has_time=checked.has_time)
     if checked.labels:
-        found = (image_axis(checked.labels), *found)
+        grid_axes = (image_axis(checked.labels), *grid_axes)
     names = check_framebuffers(framebuffers)
     if reduce is not None and not isinstance(reduce, Mapping):
         raise TypeError(f"reduce: {reduce!r} is not a mapping of names to callables")
     reductions = {} if reduce is None else dict(reduce)
-    taken = {"y", "x", "channel", "done", *(axis.name for axis in found), *(names or ())}
+    taken = {"y", "x", "channel", "done", *(axis.name for axis in grid_axes), *(names or ())}
     for name, reduction in reductions.items():
         if not isinstance(name, str) or not name.isidentifier() or name in taken:
             raise ValueError(f"reduce: {name!r} is not a possible name of a variable of this grid")
@@ -163,7 +161,7 @@ def ask(
     return Grid(
         checked,
         check_settings(settings, of_image=not checked.has_time),
-        found,
+        grid_axes,
         "all" if names is None else names,
         reductions,
     )
@@ -233,16 +231,16 @@ def ranking(grid: Grid) -> tuple[int, ...]:
 def _planned(grid: Grid, path: list[Index]) -> tuple[tuple[_core.Source, _core.Plan], ...]:
     """Return the points of a path with plans for all framebuffers, so that no pass is fused."""
     points = [grid.point(index) for index in path]
-    sources = {place: grid.source.for_core(place) for place in {point.place for point in points}}
+    sources = {entry: grid.source.for_core(entry) for entry in {point.entry for point in points}}
     return tuple(
-        (sources[point.place], _core.plan(sources[point.place], point.settings, None))
+        (sources[point.entry], _core.plan(sources[point.entry], point.settings, None))
         for point in points
     )
 
 
 def _framebuffers_at(grid: Grid, renderer: Renderer, index: Index) -> Mapping[str, Framebuffer]:
     point = grid.point(index)
-    return grid.source.plan(renderer, point.settings, point.place).framebuffers
+    return grid.source.plan(renderer, point.settings, point.entry).framebuffers
 
 
 def _survey(grid: Grid, renderer: Renderer) -> Mapping[str, Framebuffer]:
@@ -256,8 +254,8 @@ def _survey(grid: Grid, renderer: Renderer) -> Mapping[str, Framebuffer]:
     for corner in {first, tuple(count - 1 for count in grid.shape)}:
         basis = _framebuffers_at(grid, renderer, corner)
         for number, axis in enumerate(grid.axes):
-            for place in range(len(axis)):
-                index = (*corner[:number], place, *corner[number + 1 :])
+            for step in range(len(axis)):
+                index = (*corner[:number], step, *corner[number + 1 :])
                 if index != corner and _framebuffers_at(grid, renderer, index) != basis:
                     structural.add(number)
                     break
@@ -266,13 +264,13 @@ def _survey(grid: Grid, renderer: Renderer) -> Mapping[str, Framebuffer]:
     ranges = (range(len(axis)) if i in structural else (0,) for i, axis in enumerate(grid.axes))
     promoted: dict[str, Framebuffer] = dict(expected)
     for index in itertools.product(*ranges):
-        found = _framebuffers_at(grid, renderer, index)
-        if grid.framebuffers == "all" and set(found) != set(expected):
-            names = tuple(sorted(set(found) ^ set(expected)))
-        for name in (name for name in names if name in expected or name in found):
-            common = _common(promoted.get(name), found.get(name))
+        planned = _framebuffers_at(grid, renderer, index)
+        if grid.framebuffers == "all" and set(planned) != set(expected):
+            names = tuple(sorted(set(planned) ^ set(expected)))
+        for name in (name for name in names if name in expected or name in planned):
+            common = _common(promoted.get(name), planned.get(name))
             if common is None:
-                _refuse(grid, name, (first, expected.get(name)), (index, found.get(name)))
+                _refuse(grid, name, (first, expected.get(name)), (index, planned.get(name)))
             else:
                 promoted[name] = common
     for name in names:
@@ -281,31 +279,31 @@ def _survey(grid: Grid, renderer: Renderer) -> Mapping[str, Framebuffer]:
     return {name: promoted[name] for name in names}
 
 
-def _common(one: Framebuffer | None, other: Framebuffer | None) -> Framebuffer | None:
+def _common(first: Framebuffer | None, second: Framebuffer | None) -> Framebuffer | None:
     """Return a framebuffer that can hold both: floats of the larger dtype; None if there is none.
 
     uint8 and floats have no common one, since a level is not the same value as a float.
     """
-    if one is None or other is None or one[0] != other[0]:
+    if first is None or second is None or first[0] != second[0]:
         return None
-    if one[1] != other[1] and "u" in (one[1].kind, other[1].kind):
+    if first[1] != second[1] and "u" in (first[1].kind, second[1].kind):
         return None
-    return one[0], np.promote_types(one[1], other[1])
+    return first[0], np.promote_types(first[1], second[1])
 
 
 def _refuse(
     grid: Grid,
     name: str,
-    *places: tuple[Index, tuple[tuple[int, ...], np.dtype[Any]] | None],
+    *points: tuple[Index, tuple[tuple[int, ...], np.dtype[Any]] | None],
 ) -> None:
     """Raise ValueError for a framebuffer that is not the same at two points."""
-    (first, _), (second, _) = places
-    varied = [number for number, place in enumerate(second) if place != first[number]]
+    (first, _), (second, _) = points
+    varied = [number for number, step in enumerate(second) if step != first[number]]
     names = " and ".join(grid.axes[number].name for number in varied)
     reasons = []
-    for index, found in places:
+    for index, framebuffer in points:
         where = ", ".join(f"{grid.axes[i].name}={grid.axes[i].label(index[i])}" for i in varied)
-        what = f"{found[0]} {found[1]}" if found else "not there"
+        what = f"{framebuffer[0]} {framebuffer[1]}" if framebuffer else "not there"
         reasons.append(f"{what} at {where}")
     raise ValueError(
         f"axes: {name} changes its shape or dtype along {names}: {'; '.join(reasons)}; request "
@@ -322,7 +320,7 @@ def _frame_variables(
     shapes = {name: np.empty(shape, dtype) for name, (shape, dtype) in framebuffers.items()}
     dims = dimensions(shapes)
     lead = leading(shapes)
-    found = {}
+    frame_variables = {}
     for name, array in shapes.items():
         scale = ", 255 being 1" if array.dtype == np.uint8 else ""
         kind = "Depth" if array.ndim == 2 else "Framebuffer"
@@ -331,8 +329,8 @@ def _frame_variables(
             "units": "1",
             "description": f"{kind} {name}{scale}" + (", the picture" * (name == lead == "final")),
         }
-        found[name] = Variable(dims[name], array.shape, array.dtype, attributes)
-    return found
+        frame_variables[name] = Variable(dims[name], array.shape, array.dtype, attributes)
+    return frame_variables
 
 
 def _sample(grid: Grid, renderer: Renderer) -> Frames:

@@ -206,8 +206,10 @@ def multiplied(values: NDArray[Any]) -> NDArray[Any]:
 def divided(values: NDArray[Any]) -> NDArray[Any]:
     """Return colours divided by alpha, in the same dtype; unchanged where alpha is 0."""
     alpha = values[:, :, -1:].astype(np.float32)
-    one = np.float32(1 if values.dtype.kind == "f" else np.iinfo(values.dtype).max)
-    return _with_alpha(values, np.where(alpha == 0, one, one * one / np.where(alpha, alpha, one)))
+    unit = np.float32(1 if values.dtype.kind == "f" else np.iinfo(values.dtype).max)
+    return _with_alpha(
+        values, np.where(alpha == 0, unit, unit * unit / np.where(alpha, alpha, unit))
+    )
 
 
 def _with_alpha(values: NDArray[Any], factor: NDArray[Any]) -> NDArray[Any]:

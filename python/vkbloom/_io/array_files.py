@@ -146,9 +146,9 @@ def _check_conversions(values: NDArray[Any], saved: Saved, bits: int | None) -> 
             else f"encoding: {encoding!r} needs floats; {values.dtype} is written unchanged"
         )
     if bits is not None and (bits not in image_writing.BITS or not is_float):
-        own = 8 * values.dtype.itemsize
-        if bits != own or is_float:
-            raise ValueError(f"bits: {bits!r} is not one of {'8, 16, 32' if is_float else own}")
+        size = 8 * values.dtype.itemsize
+        if bits != size or is_float:
+            raise ValueError(f"bits: {bits!r} is not one of {'8, 16, 32' if is_float else size}")
     check_saved(saved)
     needs_three = saved.view is not None or saved.primaries != "rec709"
     if needs_three and (not is_float or values.shape[2] < 3):

@@ -50,8 +50,8 @@ def orientation_of(path: str | os.PathLike[str], kind: str, stated: Any) -> int:
     stated = stated if isinstance(stated, int) else None
     if kind == "hdr" or (stated is None and kind in _FINDERS):
         with open(path, "rb") as stream:
-            found = _FINDERS[kind](stream)
-            stated = stated if found is None else found
+            stored = _FINDERS[kind](stream)
+            stated = stated if stored is None else stored
     if kind in ("dpx", "cineon") and stated in (5, 6, 7, 8):
         # OpenImageIO exchanges width and height before it reads the lines.
         raise ValueError(f"{os.fspath(path)}: {kind} with lines along the columns is not supported")
@@ -129,9 +129,9 @@ def _tiff_field(stream: BinaryIO, tag: int, part: int) -> NDArray[Any] | None:
         if remaining or not start:
             stream.seek(count * (4 + 2 * size), os.SEEK_CUR)
     for _ in range(count):
-        own, kind, length = numbers("HH" + offset_form)
+        field_tag, kind, length = numbers("HH" + offset_form)
         value = stream.read(size)
-        if own != tag:
+        if field_tag != tag:
             continue
         dtype = np.dtype(order + _TIFF_TYPES[kind])
         if length * dtype.itemsize > size:
@@ -143,16 +143,16 @@ def _tiff_field(stream: BinaryIO, tag: int, part: int) -> NDArray[Any] | None:
 
 def _of_tiff(stream: BinaryIO) -> int | None:
     """Return the orientation of Exif, which is a TIFF stream, or that of XMP in it."""
-    found = tiff_field(stream, _ORIENTATION)
-    if found is not None and found.size:
-        return int(found[0])
+    numbers = tiff_field(stream, _ORIENTATION)
+    if numbers is not None and numbers.size:
+        return int(numbers[0])
     packet = tiff_field(stream, _XMP)
     return None if packet is None else _of_xmp(packet.tobytes())
 
 
 def _of_xmp(packet: bytes) -> int | None:
-    found = _IN_XMP.search(packet)
-    return None if found is None else int(found[1])
+    match = _IN_XMP.search(packet)
+    return None if match is None else int(match[1])
 
 
 def _of_png(stream: BinaryIO) -> int | None:
@@ -160,8 +160,8 @@ def _of_png(stream: BinaryIO) -> int | None:
     by_xmp = None
     for kind, content in png_chunks(stream, (b"eXIf", b"iTXt")):
         if kind == b"eXIf" and content is not None:
-            if (found := _of_tiff(BytesIO(content))) is not None:
-                return found
+            if (orientation := _of_tiff(BytesIO(content))) is not None:
+                return orientation
         elif content is not None and content.startswith(_XMP_OF_PNG):
             is_packed, rest = content[len(_XMP_OF_PNG)], content[len(_XMP_OF_PNG) + 2 :]
             text = rest.split(b"\0", 2)[-1]
@@ -201,8 +201,8 @@ def _of_webp(stream: BinaryIO) -> int | None:
 
 
 def _of_radiance(stream: BinaryIO) -> int | None:
-    found = _RESOLUTION.search(stream.read(1 << 16))
-    axes = b"" if found is None else found[1] + found[2]
+    match = _RESOLUTION.search(stream.read(1 << 16))
+    axes = b"" if match is None else match[1] + match[2]
     return _RADIANCE.index(axes) + 1 if axes in _RADIANCE else None
 
 

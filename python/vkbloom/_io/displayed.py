@@ -203,7 +203,7 @@ def _views(oiio: ModuleType) -> list[tuple[str, str]]:
     """Return all displays with their views; listing them takes 70 ms."""
     config = oiio.ColorConfig(_CONFIGURATION)
     return [
-        (shown, one) for shown in config.getDisplayNames() for one in config.getViewNames(shown)
+        (shown, view) for shown in config.getDisplayNames() for view in config.getViewNames(shown)
     ]
 
 

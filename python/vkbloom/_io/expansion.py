@@ -49,6 +49,6 @@ def expanded(image: NDArray[Any], expand: float | None) -> NDArray[Any]:
     over = peak - image.dtype.type(KNEE)
     steepness = 1 / (1 - KNEE) - 1 / (limit - KNEE)
     factor = (KNEE + over / (1 - steepness * over)) / peak
-    found = image.copy()
-    found[:, :, :3] *= factor.astype(image.dtype)
-    return found
+    result = image.copy()
+    result[:, :, :3] *= factor.astype(image.dtype)
+    return result

@@ -105,11 +105,11 @@ def from_lab(values: NDArray[np.unsignedinteger], space: str) -> NDArray[np.floa
 def _tags(content: bytes) -> dict[bytes, bytes]:
     """Return the contents of a profile's tags by signature."""
     (count,) = struct.unpack_from(">I", content, 128)
-    found = {}
+    tags = {}
     for index in range(min(count, _MAX_TAGS)):
         signature, start, size = struct.unpack_from(">4sII", content, 132 + 12 * index)
-        found[signature] = content[start : start + size]
-    return found
+        tags[signature] = content[start : start + size]
+    return tags
 
 
 def _fixed(content: bytes, start: int, count: int) -> tuple[float, ...]:

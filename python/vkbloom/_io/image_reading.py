@@ -95,7 +95,7 @@ def readable_extensions() -> set[str]:
     # "openexr:exr,sxr,mxr;png:png;..."
     formats = oiio.get_string_attribute("input_format_list").split(",")
     listed = oiio.get_string_attribute("extension_list").split(";")
-    pairs = (one.partition(":") for one in listed)
+    pairs = (entry.partition(":") for entry in listed)
     return {f".{word}" for name, _, words in pairs if name in formats for word in words.split(",")}
 
 
@@ -201,12 +201,12 @@ def of_layer(stored: StoredImage, spec: OpenImageIO.ImageSpec, layer: str | None
     """Return an image with a layer's channels alone, by their names in it; None: all."""
     if layer is None:
         return stored
-    own = [index for index, of in enumerate(_layers(spec)) if of == layer]
+    chosen = [index for index, of in enumerate(_layers(spec)) if of == layer]
     return replace(
         stored,
-        pixels=stored.pixels[:, :, own],
-        channels=tuple(stored.channels[index].rpartition(".")[2] for index in own),
-        numbers=tuple(stored.numbers[index] for index in own),
+        pixels=stored.pixels[:, :, chosen],
+        channels=tuple(stored.channels[index].rpartition(".")[2] for index in chosen),
+        numbers=tuple(stored.numbers[index] for index in chosen),
     )
 
 
@@ -221,7 +221,7 @@ def describe(reader: OpenImageIO.ImageInput, name: str) -> StoredImage:
         listed = " ".join(map(str, points))
         notes.append(f"the code points {listed} of its colours are not known, and are ignored")
     # Before the reader goes to other parts.
-    found = StoredImage(
+    stored = StoredImage(
         pixels=np.empty((0, 0, spec.nchannels), DTYPES[str(spec.format)]),
         channels=tuple(
             "" if channel == "A" and meaning is Meaning.NONE else channel
@@ -243,7 +243,7 @@ def describe(reader: OpenImageIO.ImageInput, name: str) -> StoredImage:
         is_ultra_hdr=_is_ultra_hdr(reader, spec),
         notes=tuple(notes),
     )
-    return replace(found, parts=tuple(_parts(reader)))
+    return replace(stored, parts=tuple(_parts(reader)))
 
 
 def points_of(spec: OpenImageIO.ImageSpec) -> tuple[int, ...] | None:
@@ -297,15 +297,15 @@ def _layers(spec: OpenImageIO.ImageSpec) -> list[str]:
 
 def _part_with(reader: OpenImageIO.ImageInput, name: str, subimage: int, layer: str) -> int:
     """Return the first part, from `subimage` on, that has a layer."""
-    found: dict[str, None] = {}
+    known: dict[str, None] = {}
     for index in range(max(subimage, 0), subimage + _MAX_PARTS):
         if not _seek(reader, index):
             break
         layers = _layers(reader.spec())
         if layer in layers:
             return index
-        found.update(dict.fromkeys(filter(None, layers)))
-    listed = f"its layers are {', '.join(found)}" if found else "it has no named layers"
+        known.update(dict.fromkeys(filter(None, layers)))
+    listed = f"its layers are {', '.join(known)}" if known else "it has no named layers"
     raise ValueError(f"{name}: there is no layer {layer!r}; {listed}")
 
 
@@ -399,10 +399,10 @@ def _chosen_channels(names: tuple[str, ...]) -> tuple[list[int], list[str]]:
     layers = dict.fromkeys(name.rpartition(".")[0] for name in names)
     # If all channels have the same layer, its name is not needed.
     plain = [name.rpartition(".")[2] if len(layers) == 1 else name for name in names]
-    places = {name.upper(): index for index, name in reversed(list(enumerate(plain)))}
-    alpha = [places[name] for name in ("A", "ALPHA") if name in places][:1]
-    if {"R", "G", "B"} <= places.keys():
-        chosen = [places["R"], places["G"], places["B"], *alpha]
+    indices = {name.upper(): index for index, name in reversed(list(enumerate(plain)))}
+    alpha = [indices[name] for name in ("A", "ALPHA") if name in indices][:1]
+    if {"R", "G", "B"} <= indices.keys():
+        chosen = [indices["R"], indices["G"], indices["B"], *alpha]
     elif len([name for name in names if name and not _UNNAMED.match(name)]) == 1 + len(alpha):
         grey = [index for index in range(len(names)) if index not in alpha]
         chosen = [min(grey, key=lambda index: bool(_UNNAMED.match(names[index]))), *alpha]

@@ -144,7 +144,11 @@ def prepared(
 ) -> tuple[NDArray[Any], Picture, tuple[str, ...]]:
     """Return the values to write in a layout, what describes them, and notes about losses."""
     channels, numbers = layout
-    values = next(one for one in _layouts(picture, True) if one.shape[2] == channels)
+    values = next(
+        layout_values
+        for layout_values in _layouts(picture, True)
+        if layout_values.shape[2] == channels
+    )
     integer = numbers.startswith("uint")
     has_alpha = channels in (2, 4)
     notes = _losses(picture, target, values, has_alpha, integer)

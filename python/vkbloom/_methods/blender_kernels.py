@@ -126,9 +126,9 @@ def _reduced(image: NDArray[np.float64], factor: int) -> NDArray[np.float64]:
         count = length // factor
         if count == 0:
             return np.zeros((1, 1, image.shape[2]))
-        place = (np.arange(count) + 0.5) / count * length - 0.5
-        low = place.astype(int)
-        part = (place - low)[:, np.newaxis, np.newaxis]
+        position = (np.arange(count) + 0.5) / count * length - 0.5
+        low = position.astype(int)
+        part = (position - low)[:, np.newaxis, np.newaxis]
         image = (1 - part) * image[low] + part * image[np.minimum(low + 1, length - 1)]
         image = image.swapaxes(0, 1)
     return image

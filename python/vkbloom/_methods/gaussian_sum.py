@@ -53,7 +53,7 @@ def _core_kernel(settings: GaussianSum, frame: Size, buffers: Size) -> CoreKerne
 
 def gaussian(deviation: float, radius: int) -> NDArray[np.float64]:
     """Return a Gaussian of 2 radius + 1 pixels whose sum is 1."""
-    places = np.arange(-radius, radius + 1)
-    weights = np.exp(-0.5 * (places / deviation) ** 2) if radius else np.ones(1)
+    offsets = np.arange(-radius, radius + 1)
+    weights = np.exp(-0.5 * (offsets / deviation) ** 2) if radius else np.ones(1)
     line: NDArray[np.float64] = weights / math.fsum(weights)
     return line

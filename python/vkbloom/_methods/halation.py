@@ -89,7 +89,7 @@ class Halation(GaussianSum):
         pixel = self.pixel_size or _FILM / max(frame)
         scales = [side / of / pixel for side, of in zip(buffers, frame, strict=True)]
         pairs = [*zip(self.sizes, self.scattering_sizes, strict=True)]
-        return [[(scale * one, scale * other) for one, other in pairs] for scale in scales]
+        return [[(scale * first, scale * other) for first, other in pairs] for scale in scales]
 
     def _kernel(self, frame: Size, buffers: Size) -> NDArray[np.float64]:
         sides = zip(
@@ -112,13 +112,13 @@ def _radius(deviation: float) -> int:
     return int(7 * deviation + 0.5)
 
 
-def _lines(one: float, other: float, length: int) -> NDArray[np.float64]:
+def _lines(inner: float, outer: float, length: int) -> NDArray[np.float64]:
     """Return a point, both Gaussians, and one after the other, folded to a length."""
-    first, second = (gaussian(deviation, _radius(deviation)) for deviation in (one, other))
-    found = np.zeros((4, length))
+    first, second = (gaussian(deviation, _radius(deviation)) for deviation in (inner, outer))
+    lines = np.zeros((4, length))
     for line, kernel in zip(
-        found, (np.ones(1), first, second, np.convolve(first, second)), strict=True
+        lines, (np.ones(1), first, second, np.convolve(first, second)), strict=True
     ):
-        places = np.arange(len(kernel)) - len(kernel) // 2 + length // 2
-        np.add.at(line, places % length, kernel)
-    return found
+        indices = np.arange(len(kernel)) - len(kernel) // 2 + length // 2
+        np.add.at(line, indices % length, kernel)
+    return lines

@@ -95,6 +95,6 @@ def _line(deviation: float, length: int) -> NDArray[np.float64]:
     """
     radius = math.ceil(3 * deviation)
     line = np.zeros(2 * length - 1)
-    places = np.clip(np.arange(-radius, radius + 1), 1 - length, length - 1) + length - 1
-    np.add.at(line, places, gaussian(deviation, radius))
+    indices = np.clip(np.arange(-radius, radius + 1), 1 - length, length - 1) + length - 1
+    np.add.at(line, indices, gaussian(deviation, radius))
     return line

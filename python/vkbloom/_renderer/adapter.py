@@ -107,11 +107,11 @@ def adapters() -> tuple[AdapterInfo, ...]:
         First those of the system's Vulkan loader, then those of the bundled driver. Empty if no
         driver works.
     """
-    found: list[_core._AdapterTuple] = []
+    listed: list[_core._AdapterTuple] = []
     for driver in dict.fromkeys(("", bundled_driver())):
         with contextlib.suppress(_core.AdapterNotFoundError):
-            found += _core.adapters(driver)
-    return tuple(from_core(adapter) for adapter in found)
+            listed += _core.adapters(driver)
+    return tuple(from_core(adapter) for adapter in listed)
 
 
 def from_core(adapter: _core._AdapterTuple) -> AdapterInfo:

@@ -51,10 +51,10 @@ class _Adapter(NamedTuple):
 
     def has_address(self, text: str) -> bool:
         """Whether its address on the PCI bus is this one, whose domain may be missing."""
-        given, own = _ADDRESS.fullmatch(text), _ADDRESS.fullmatch(self.info.pci)
-        if not given or not own:
+        given, address = _ADDRESS.fullmatch(text), _ADDRESS.fullmatch(self.info.pci)
+        if not given or not address:
             return False
-        return [int(a or "0", 16) for a in given.groups()] == [int(a, 16) for a in own.groups()]
+        return [int(a or "0", 16) for a in given.groups()] == [int(a, 16) for a in address.groups()]
 
     def described(self, choice: str) -> str:
         """Return name, type and what selects it, for messages."""
@@ -130,22 +130,22 @@ def chosen_adapter(choice: str, driver: str) -> tuple[int, str]:
     `driver` is that of a bundled driver, "" for none; "" is returned for the system's. A bundled
     software adapter takes precedence over the system's; for "software" those are then not listed.
     """
-    found: list[_Adapter] = []
+    adapters: list[_Adapter] = []
     best: _Adapter | None = None
     if not driver or choice != "software":
         try:
-            found = _listed("")
+            adapters = _listed("")
         except _core.AdapterNotFoundError:
             if not driver:
                 raise
-        best = _best(choice, found)
+        best = _best(choice, adapters)
     if driver and (best is None or best.rank >= (False, _TYPES.index("cpu"))):
         bundled = _listed(driver)
-        found += bundled
+        adapters += bundled
         best = _best(choice, bundled) or best
     if best is not None:
         return best.number, best.driver
-    names = ", ".join(adapter.described(choice) for adapter in found) or "none"
+    names = ", ".join(adapter.described(choice) for adapter in adapters) or "none"
     is_limited = _limiting(choice) is not None
     among = " among the GPUs that CUDA_VISIBLE_DEVICES names" * is_limited
     _core.fail_without_adapter(f'no Vulkan adapter for "{choice}"{among}; found: {names}')

@@ -119,8 +119,8 @@ class Batches:
         if settings._has_state or count < MIN_LAYERS:
             return 0
         if self._size is None or self._size[:2] != (settings, kind):
-            one = self._core.plan(_core.image_source(batch.at(0).image()), settings, None)
-            self._size = settings, kind, one.image_size
+            single = self._core.plan(_core.image_source(batch.at(0).image()), settings, None)
+            self._size = settings, kind, single.image_size
         parts = math.ceil(count / max(1, min(MAX_LAYERS, MAX_BYTES // self._size[2])))
         layers = math.ceil(count / parts)
         return layers if layers >= MIN_LAYERS else 0

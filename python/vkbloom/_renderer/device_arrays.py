@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 import sys
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, NoReturn
@@ -82,8 +83,8 @@ class DeviceArray:
         return self.shape[0]
 
     def __repr__(self) -> str:
-        place = "the host" if isinstance(self._memory, np.ndarray) else "CUDA"
-        return f"<vkbloom.DeviceArray {self.shape} {self.dtype} on {place}>"
+        owner = "the host" if isinstance(self._memory, np.ndarray) else "CUDA"
+        return f"<vkbloom.DeviceArray {self.shape} {self.dtype} on {owner}>"
 
     def __reduce__(self) -> NoReturn:
         raise TypeError("a DeviceArray cannot be pickled; pickle its numpy()")
@@ -226,13 +227,13 @@ def memory_for(core: _core.Renderer, size: int) -> _core.Exported:
 
 
 def placed(
-    array: NDArray[Any], place: Destination, core: _core.Renderer
+    array: NDArray[Any], destination: Destination, core: _core.Renderer
 ) -> NDArray[Any] | DeviceArray:
     """Return an array of the host as if it were a framebuffer at that place."""
-    if place == "host":
+    if destination == "host":
         return array
     memory: _core.Exported | NDArray[Any] = array
-    if place == "cuda":
+    if destination == "cuda":
         memory = memory_for(core, array.nbytes)
         memory.write(np.ascontiguousarray(array))
     return DeviceArray(memory, array.shape, array.dtype.name)
@@ -331,34 +332,43 @@ def _contiguous(shape: tuple[int, ...]) -> tuple[int, ...]:
     return tuple(strides[: len(shape)])
 
 
+def _capsule(image: Any, stream: int) -> Any:
+    """Return a capsule of DLPack that is ordered before later work of the stream."""
+    try:
+        return image.__dlpack__(stream=stream, max_version=(1, 0))
+    except TypeError:  # the producer knows no versions of DLPack
+        return image.__dlpack__(stream=stream)
+
+
 def _from_dlpack(image: Any, name: str, core: _core.Renderer) -> _Array:
     kind, ordinal = (int(number) for number in image.__dlpack_device__())
     if kind == _CUDA_MANAGED:
         raise ValueError(
             f"{name}: it is in managed (unified) memory; copy it to the device's own memory"
         )
-    ours, _ = core.cuda()
+    ours, stream = core.cuda()
     if ordinal != ours:
         raise ValueError(
             f"{name}: it is on {core.cuda_name(ordinal)}, and the renderer is on "
             f"{core.cuda_name(ours)}; open a renderer with the array's GPU as adapter, or move the "
             "array"
         )
-    capsule = core.dlpack(image)
+    # PyTorch exports only tensors of the current device.
+    capsule = core.in_context(functools.partial(_capsule, image, stream))
     address, (kind, _), (code, bits, lanes), shape, strides = _core.read_dlpack(capsule)
     if kind != _CUDA:
         raise ValueError(f"{name}: its DLPack capsule is of device type {kind}, not 2 (CUDA)")
     dtype = _check_dtype(name, code, bits, lanes)
     size = np.dtype(dtype).itemsize
     elements = _contiguous(shape) if strides is None else strides
-    if any(abs(one) >= _MAX_ELEMENTS for one in elements):
+    if any(abs(stride) >= _MAX_ELEMENTS for stride in elements):
         # CuPy 14 divides negative strides as if they had no sign.
         if hasattr(image, "__cuda_array_interface__"):
             # The capsule has ordered our stream after the producer's work.
             return _from_interface(image, name)._replace(stream=0)
         raise ValueError(f"{name}: strides {elements} are out of range; make it contiguous")
     # The producer has ordered our stream after its own work.
-    return _Array(capsule, address, shape, tuple(size * one for one in elements), dtype, 0)
+    return _Array(capsule, address, shape, tuple(size * stride for stride in elements), dtype, 0)
 
 
 def _from_interface(image: Any, name: str) -> _Array:
@@ -376,7 +386,7 @@ def _from_interface(image: Any, name: str) -> _Array:
             f"it: {name}.astype('float32')"
         )
     size = np.dtype(dtype).itemsize
-    strides = about.get("strides") or tuple(size * one for one in _contiguous(shape))
+    strides = about.get("strides") or tuple(size * stride for stride in _contiguous(shape))
     stream = about.get("stream")
     # Before version 3 nothing tells of a stream, so the default stream is waited for.
     after = _LEGACY if stream is None and about.get("version", 0) < 3 else stream or 0
@@ -393,7 +403,7 @@ def fill(target: Any, name: str, made: DeviceArray, core: _core.Renderer) -> Non
             f"and {made.dtype}"
         )
     size = made.dtype.itemsize
-    if array.strides != tuple(size * one for one in _contiguous(made.shape)):
+    if array.strides != tuple(size * stride for stride in _contiguous(made.shape)):
         raise ValueError(f"{name} must be C-contiguous")
     if isinstance(made._memory, np.ndarray):
         raise TypeError(f"{name}: the framebuffer is on the host")

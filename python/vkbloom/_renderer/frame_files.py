@@ -71,7 +71,7 @@ def save(frames: Framebuffers, path: str | os.PathLike[str]) -> list[Path]:
 
 def load(path: str | os.PathLike[str]) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
     """Read framebuffers from files that `save` wrote, as `Frames.load` documents."""
-    found: dict[str, tuple[int, NDArray[Any], Path]] = {}
+    frames: dict[str, tuple[int, NDArray[Any], Path]] = {}
     facts: dict[str, Any] = {}
     target = Path(check_name(path))
     # In a folder, files without the attributes of `save` are ignored.
@@ -89,16 +89,18 @@ def load(path: str | os.PathLike[str]) -> tuple[dict[str, NDArray[Any]], dict[st
                     },
                 }
                 name, array = said["framebuffer"], _as_dtype(pixels, said["dtype"])
-                if name in found:
-                    raise ValueError(f"{name} is in {found[name][2]} as well; remove the older one")
-                found[name] = int(said["place"]), array, file
+                if name in frames:
+                    raise ValueError(
+                        f"{name} is in {frames[name][2]} as well; remove the older one"
+                    )
+                frames[name] = int(said["place"]), array, file
             except KeyError as error:
                 raise ValueError(f"{file}: not written by Frames.save: no {error}") from error
             except (TypeError, ValueError) as error:
                 raise ValueError(f"{file}: {error}") from error
-    if not found:
+    if not frames:
         raise ValueError(f"{target}: not written by Frames.save: no file has its attributes")
-    ordered = sorted(found.items(), key=lambda one: one[1][0])
+    ordered = sorted(frames.items(), key=lambda item: item[1][0])
     return {name: array for name, (_, array, _) in ordered}, facts
 
 
@@ -164,19 +166,19 @@ def _described(text: str) -> dict[str, str]:
 def _files_of(path: Path) -> list[Path]:
     """Return the files that `save` may have written for a path."""
     if path.is_dir():
-        found = sorted(
+        files = sorted(
             file for file in path.iterdir() if file.is_file() and file.suffix in (".png", ".exr")
         )
     elif path.exists():
         return [path]
     else:
         stem = glob.escape(path.stem)
-        found = [path.with_suffix(".exr")] if path.with_suffix(".exr").exists() else []
+        files = [path.with_suffix(".exr")] if path.with_suffix(".exr").exists() else []
         for suffix in dict.fromkeys((path.suffix, ".exr")):
-            found += sorted(path.parent.glob(f"{stem}_*{suffix}"))
-    if not found:
+            files += sorted(path.parent.glob(f"{stem}_*{suffix}"))
+    if not files:
         raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), str(path))
-    return found
+    return files
 
 
 def _as_dtype(pixels: NDArray[Any], dtype: str) -> NDArray[Any]:

@@ -100,7 +100,7 @@ class Plan:
 
     def to_mermaid(self) -> str:
         """Return the passes as a Mermaid flowchart."""
-        images = dict.fromkeys(name for one in self.passes for name in (*one.reads, *one.writes))
+        images = dict.fromkeys(name for step in self.passes for name in (*step.reads, *step.writes))
         lines = ["flowchart LR"]
         for name in images:
             if name in self.framebuffers:
@@ -108,15 +108,15 @@ class Plan:
                 lines.append(f'{name}["{name}<br>{shape[1]} x {shape[0]}, {dtype}"]')
             else:
                 lines.append(f"{name}({name})")
-        for number, one in enumerate(self.passes):
-            lines.append(f'pass{number}{{{{"{one.name}<br>{one.shader}"}}}}')
-            reads = f"{' & '.join(one.reads)} --> " if one.reads else ""
-            lines.append(f"{reads}pass{number} --> {' & '.join(one.writes)}")
+        for number, step in enumerate(self.passes):
+            lines.append(f'pass{number}{{{{"{step.name}<br>{step.shader}"}}}}')
+            reads = f"{' & '.join(step.reads)} --> " if step.reads else ""
+            lines.append(f"{reads}pass{number} --> {' & '.join(step.writes)}")
         return "\n    ".join(lines)
 
     def _repr_html_(self) -> str:
         """Return a table of the passes."""
-        rows = [[_text(part) for part in one] for one in self.passes]
+        rows = [[_text(part) for part in step] for step in self.passes]
         return str(markup.table(rows, Pass._fields, caption=self._title))
 
 

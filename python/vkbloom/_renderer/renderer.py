@@ -93,14 +93,14 @@ def _arrays_for(
     core: _core.Renderer,
     plan: _core.Plan,
     out: Mapping[str, Any] | None,
-    place: Destination,
+    destination: Destination,
 ) -> tuple[NDArray[Any] | _core.Exported, ...]:
     """Return the arrays to fill: those of `out`, and new ones.
 
     Arrays of `out` that are on the device are filled later, from new ones that are there.
     """
     if out is None:
-        return requests.new_arrays(core, plan, place)
+        return requests.new_arrays(core, plan, destination)
     names = [name for name, _, _ in plan.outputs]
     for name in out:
         if name not in names:
@@ -118,7 +118,7 @@ def _arrays_for(
     return tuple(
         given[name]
         if name in given
-        else requests.new_memory(core, shape, dtype, "cuda" if name in out else place)
+        else requests.new_memory(core, shape, dtype, "cuda" if name in out else destination)
         for name, shape, dtype in plan.outputs
     )
 
@@ -129,9 +129,9 @@ def _sources(images: Iterable[Any], core: _core.Renderer) -> Iterator[_core.Sour
         yield from batch_sources(take_batch(images, core))
         return
     # Not by enumerate(), which keeps a reference to the image.
-    places = itertools.count()
+    numbers = itertools.count()
     for image in images:
-        source = image_source(image, core=core, name=f"images[{next(places)}]")
+        source = image_source(image, core=core, name=f"images[{next(numbers)}]")
         # The iterable may overwrite the array when it yields the next image.
         del image
         yield source
@@ -487,7 +487,7 @@ class Renderer:
         chosen: Settings | Sequence[Settings]
         if isinstance(settings, abc.Sequence) and not isinstance(settings, str):
             chosen = [
-                check_settings(one, f"settings[{number}]") for number, one in enumerate(settings)
+                check_settings(item, f"settings[{number}]") for number, item in enumerate(settings)
             ]
             if isinstance(images, abc.Sized) and len(images) != len(chosen):
                 raise ValueError(
@@ -500,11 +500,11 @@ class Renderer:
         if names and not (self._named[0] is chosen and self._named[1] == names):
             self._check_names(image_source(_ANY_IMAGE), chosen, names)
             self._named = chosen, names
-        place = self._placed(device)
+        destination = self._placed(device)
         if on_cuda(images) and device != "host" and isinstance(chosen, Settings):
-            return self._run_batch(images, chosen, names, place)
+            return self._run_batch(images, chosen, names, destination)
         sequence = requests.uploaded(self._core, _paired(_sources(images, self._core), chosen))
-        return self._run_requests(sequence, names, place, alone=True)
+        return self._run_requests(sequence, names, destination, alone=True)
 
     @checked
     def upload(
@@ -586,8 +586,8 @@ class Renderer:
         of the settings of a sequence has are raised by the call.
         """
         self._pending.wait()
-        found = any_source(source, size, shading, time, self._core)
-        return self._run_many(found, settings, check_framebuffers(framebuffers), device)
+        frame_source = any_source(source, size, shading, time, self._core)
+        return self._run_many(frame_source, settings, check_framebuffers(framebuffers), device)
 
     @checked
     def plan(
@@ -664,13 +664,13 @@ class Renderer:
         out: Mapping[str, Any] | None,
         device: Device | None,
     ) -> Frames:
-        place = self._placed(device)(source)
+        destination = self._placed(device)(source)
         self._pending.wait()
         plan = self._plan_of(source, settings, names)
-        arrays = _arrays_for(self._core, plan, out, place)
+        arrays = _arrays_for(self._core, plan, out, destination)
         submission = self._core.run(source, (plan,), (arrays,), True)
         # While the device works.
-        frames = self._frames(settings, requests.named(plan, arrays, place))
+        frames = self._frames(settings, requests.named(plan, arrays, destination))
         if not out and submission.ordered:
             frames._finish_later(self._pending.add(submission).of_request)
             self._save_pipelines()
@@ -686,14 +686,14 @@ class Renderer:
         images: Any,
         settings: Settings,
         names: tuple[str, ...] | None,
-        place: Callable[[_core.Source], Destination],
+        destination: Callable[[_core.Source], Destination],
     ) -> Iterator[Frames]:
         self._pending.wait()
         batch = take_batch(images, self._core)
 
         def rest(first: int) -> Iterator[Frames]:
             sequence = _paired(batch_sources(batch, first), settings)
-            return self._run_requests(sequence, names, place, alone=True)
+            return self._run_requests(sequence, names, destination, alone=True)
 
         for frames in self._batches.run(batch, settings, names, self._frames, rest):
             self._save_pipelines()
@@ -704,13 +704,13 @@ class Renderer:
         if device not in (None, "host", "device"):
             raise ValueError(f"device: {device!r} is not 'host' or 'device'")
 
-        def place(source: _core.Source) -> Destination:
+        def destination(source: _core.Source) -> Destination:
             if device == "host" or (device is None and not source.exported):
                 return "host"
             # The memory of a CPU adapter is the host's.
             return "cuda" if source.exported or self.info.type != "cpu" else "viewed"
 
-        return place
+        return destination
 
     def _plan_of(
         self, source: _core.Source, settings: Settings, names: tuple[str, ...] | None
@@ -734,7 +734,7 @@ class Renderer:
         names: tuple[str, ...] | None,
         device: Device | None = None,
     ) -> Iterator[Frames]:
-        place = self._placed(device)
+        destination = self._placed(device)
         # Not a generator, so that arguments are checked at the call and not with the first frame.
         if not isinstance(settings, abc.Iterable) or isinstance(settings, str | bytes):
             raise TypeError(f"settings: {settings!r} is not an iterable of Settings")
@@ -746,11 +746,11 @@ class Renderer:
                 self._check_names(source, settings, names)
         return self._run_requests(
             (
-                requests.Request(source, check_settings(one, f"settings[{number}]"))
-                for number, one in enumerate(settings)
+                requests.Request(source, check_settings(item, f"settings[{number}]"))
+                for number, item in enumerate(settings)
             ),
             names,
-            place,
+            destination,
         )
 
     def _check_names(
@@ -760,27 +760,27 @@ class Renderer:
         names: tuple[str, ...] | None,
     ) -> None:
         """Raise ValueError for framebuffers that none of the settings has, at any size."""
-        found: dict[str, None] = {}
-        for one in [settings] if isinstance(settings, Settings) else settings:
+        known: dict[str, None] = {}
+        for item in [settings] if isinstance(settings, Settings) else settings:
             # An error of these settings is raised in their turn, after the frames of earlier ones.
             with contextlib.suppress(_core.Error, TypeError, ValueError):
-                plan = self._core.plan(source, check_settings(one), None)
-                found.update((name, None) for name, _, _ in plan.outputs)
-        kinds = {_NUMBER.sub("#", name) for name in found}
+                plan = self._core.plan(source, check_settings(item), None)
+                known.update((name, None) for name, _, _ in plan.outputs)
+        kinds = {_NUMBER.sub("#", name) for name in known}
         for name in names or ():
-            if found and _NUMBER.sub("#", name) not in kinds:
-                raise ValueError(unknown("framebuffers: unknown framebuffer", name, found))
+            if known and _NUMBER.sub("#", name) not in kinds:
+                raise ValueError(unknown("framebuffers: unknown framebuffer", name, known))
 
     def _run_requests(
         self,
         sequence: Iterable[requests.Request],
         names: tuple[str, ...] | None,
-        place: Callable[[_core.Source], Destination] = lambda _: "host",
+        destination: Callable[[_core.Source], Destination] = lambda _: "host",
         *,
         alone: bool = False,
     ) -> Iterator[Frames]:
         self._pending.wait()
-        results = requests.run(sequence, self._core, names, alone=alone, place=place)
+        results = requests.run(sequence, self._core, names, alone=alone, destination=destination)
         return (self._frames_of(settings, result) for settings, result in results)
 
     def _frames_of(self, settings: Settings, result: requests.Result) -> Frames:

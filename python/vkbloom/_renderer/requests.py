@@ -136,23 +136,23 @@ def new_array(core: _core.Renderer, shape: tuple[int, ...], dtype: str) -> NDArr
 
 
 def new_memory(
-    core: _core.Renderer, shape: tuple[int, ...], dtype: str, place: Destination
+    core: _core.Renderer, shape: tuple[int, ...], dtype: str, destination: Destination
 ) -> NDArray[Any] | _core.Exported:
     """Return an array for a framebuffer, or memory on the device."""
-    if place == "cuda":
+    if destination == "cuda":
         return memory_for(core, math.prod(shape) * np.dtype(dtype).itemsize)
     return new_array(core, shape, dtype)
 
 
 def new_arrays(
-    core: _core.Renderer, plan: _core.Plan, place: Destination = "host"
+    core: _core.Renderer, plan: _core.Plan, destination: Destination = "host"
 ) -> tuple[NDArray[Any] | _core.Exported, ...]:
     """Return an array, or memory on the device, for each of a plan's outputs."""
     arrays: list[NDArray[Any] | _core.Exported] = []
     # Not a generator expression, for which `core` would be a cell. CPython 3.11 leaks all arguments
     # of a call if it cannot allocate a cell.
     for _, shape, dtype in plan.outputs:
-        arrays.append(new_memory(core, shape, dtype, place))
+        arrays.append(new_memory(core, shape, dtype, destination))
     return tuple(arrays)
 
 
@@ -175,13 +175,15 @@ def uploaded(core: _core.Renderer, sequence: Iterable[Request]) -> Iterator[Requ
 
 
 def named(
-    plan: _core.Plan, arrays: tuple[NDArray[Any] | _core.Exported, ...], place: Destination = "host"
+    plan: _core.Plan,
+    arrays: tuple[NDArray[Any] | _core.Exported, ...],
+    destination: Destination = "host",
 ) -> dict[str, NDArray[Any]]:
     """Return the arrays of a plan's outputs by name."""
     frames: dict[str, NDArray[Any]] = {}
-    # Not a comprehension, for the reason above: `place` would be a cell.
+    # Not a comprehension, for the reason above: `destination` would be a cell.
     for (name, shape, dtype), array in zip(plan.outputs, arrays, strict=True):
-        if place == "viewed" or isinstance(array, _core.Exported):
+        if destination == "viewed" or isinstance(array, _core.Exported):
             # Annotated as arrays of NumPy, which they are unless the caller asked for others.
             frames[name] = cast("NDArray[Any]", DeviceArray(array, shape, dtype))
         else:
@@ -200,14 +202,14 @@ class _Planned(NamedTuple):
     request: Request
     plan: _core.Plan
     arrays: tuple[NDArray[Any] | _core.Exported, ...]
-    place: Destination
+    destination: Destination
 
 
 def _taken(
     planned: _Planned, timings: dict[str, float], counts: tuple[int, int]
 ) -> tuple[Settings, Result]:
     return planned.request.settings, Result(
-        named(planned.plan, planned.arrays, planned.place), timings, counts
+        named(planned.plan, planned.arrays, planned.destination), timings, counts
     )
 
 
@@ -230,13 +232,13 @@ class _Requests:
         core: _core.Renderer,
         names: tuple[str, ...] | None,
         most: int,
-        place: Callable[[_core.Source], Destination],
+        destination: Callable[[_core.Source], Destination],
     ) -> None:
         self._sequence = iter(sequence)
         self._core = core
         self._names = names
         self._ever = most
-        self._place = place
+        self._destination = destination
         self._waiting: deque[Request] = deque()  # taken from the sequence, not submitted yet
         self._limit = 1
         self._most = most  # that fit into MAX_SECONDS, as far as is known
@@ -285,9 +287,9 @@ class _Requests:
                 ):
                     self._waiting.appendleft(request)
                     break
-                place = self._place(request.source)
-                arrays = new_arrays(self._core, plan, place)
-                requests.append(_Planned(request, plan, arrays, place))
+                destination = self._destination(request.source)
+                arrays = new_arrays(self._core, plan, destination)
+                requests.append(_Planned(request, plan, arrays, destination))
             except Exception as error:
                 self._fail(error)
                 break
@@ -319,14 +321,14 @@ def run(
     names: tuple[str, ...] | None,
     *,
     alone: bool = False,
-    place: Callable[[_core.Source], Destination] = lambda _: "host",
+    destination: Callable[[_core.Source], Destination] = lambda _: "host",
 ) -> Iterator[tuple[Settings, Result]]:
     """Yield the result of each request, in their order.
 
     Work is taken before earlier results are yielded, so that the device is busy while the caller
     uses results: none before the first result, then enough for `AHEAD` submissions.
     """
-    waiting = _Requests(sequence, core, names, 1 if alone else MAX_REQUESTS, place)
+    waiting = _Requests(sequence, core, names, 1 if alone else MAX_REQUESTS, destination)
     submitted: deque[_Submitted] = deque()
     ahead = 1
     before = 0.0  # when the last submission ended

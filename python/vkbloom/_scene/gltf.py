@@ -211,13 +211,13 @@ class _Loader:
                 total += geometry.vertex_count
                 if max(total, corners / 3) > MAX_VERTICES:
                     self._file.fail(f"too large: over {MAX_VERTICES} vertices or triangles")
-                rows, places, triangles = self._bake(geometry, world, f"{user}: {what}")
+                rows, coordinates, triangles = self._bake(geometry, world, f"{user}: {what}")
                 material = geometry.material
                 indices.setdefault(material.textures, []).append(
                     (triangles + (total - len(rows))).astype(np.uint32).ravel()
                 )
                 vertices.append(rows)
-                texcoords.append(places)
+                texcoords.append(coordinates)
                 emission.append(
                     np.broadcast_to(material.emission.astype(np.float32), (len(rows), 3))
                 )

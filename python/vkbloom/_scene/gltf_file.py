@@ -252,20 +252,25 @@ class GltfFile:
 
     def _with_sparse(self, sparse: Parsed, elements: NDArray[Any], what: str) -> NDArray[Any]:
         """Return `elements` with those replaced that the sparse part contains (3.6.2.3)."""
-        places: Parsed = getattr(sparse, "indices", None)
+        indices: Parsed = getattr(sparse, "indices", None)
         values: Parsed = getattr(sparse, "values", None)
-        if not hasattr(places, "componentType") or not hasattr(values, "bufferView"):
+        if not hasattr(indices, "componentType") or not hasattr(values, "bufferView"):
             self.fail(f"damaged: {what}.sparse lacks its indices or its values")
         count = self.integer(sparse.count, f"{what}.sparse.count", 1, len(elements))
-        if places.componentType not in INTEGERS:
+        if indices.componentType not in INTEGERS:
             self.fail(
                 f"{what}.sparse.indices is of component type "
-                f"{reprlib.repr(places.componentType)}; {INTEGERS} is possible"
+                f"{reprlib.repr(indices.componentType)}; {INTEGERS} is possible"
             )
-        kind = np.dtype(_COMPONENTS[places.componentType])
+        kind = np.dtype(_COMPONENTS[indices.componentType])
         where = (
             self._elements(
-                places.bufferView, places.byteOffset, count, 1, kind, what=f"{what}.sparse.indices"
+                indices.bufferView,
+                indices.byteOffset,
+                count,
+                1,
+                kind,
+                what=f"{what}.sparse.indices",
             )
             .ravel()
             .astype(np.int64)

@@ -74,7 +74,7 @@ class TextureReader:
         if texture.source is None:
             self._file.leave_out("textures whose image only an extension gives")
             return None
-        place = 0 if info.texCoord is None else info.texCoord
+        coordinate_set = 0 if info.texCoord is None else info.texCoord
         transform = np.eye(3)[:2]
         extensions = info.extensions
         if isinstance(extensions, dict) and TEXTURE_TRANSFORM in extensions:
@@ -82,12 +82,12 @@ class TextureReader:
             if not isinstance(given, dict):
                 self._file.fail(f"{what}.{TEXTURE_TRANSFORM} is not an object")
             transform = self._transform(given, what)
-            place = given.get("texCoord", place)
-        place = self._file.integer(place, f"{what}.texCoord", 0, 2**31 - 1)
+            coordinate_set = given.get("texCoord", coordinate_set)
+        coordinate_set = self._file.integer(coordinate_set, f"{what}.texCoord", 0, 2**31 - 1)
         key = (texture.source, texture.sampler)
         if key not in self._textures:
             self._textures[key] = self._texture(texture, user)
-        return TextureUse(self._textures[key], f"TEXCOORD_{place}", transform)
+        return TextureUse(self._textures[key], f"TEXCOORD_{coordinate_set}", transform)
 
     def _transform(self, given: dict[str, Any], what: str) -> Floats:
         """Return the matrix ``(2, 3)`` of KHR_texture_transform: offset * rotation * scale.

@@ -94,10 +94,10 @@ def _header(data: bytes) -> tuple[Literal["<", ">"], tuple[int, str], int, int, 
 
 
 def _level(
-    data: bytes, offset: int, place: tuple[int, int], order: str, texel: tuple[int, str]
+    data: bytes, offset: int, shape: tuple[int, int], order: str, texel: tuple[int, str]
 ) -> tuple[NDArray[Any], int]:
-    """Return the texels of a level as stored, and the offset of the next; `place`: number, side."""
-    level, side = place
+    """Return the texels of a level as stored, and the offset of the next; `shape`: number, side."""
+    level, side = shape
     channels, kind = texel
     stored = np.dtype(kind).newbyteorder(order)  # type: ignore[arg-type]
     row = _aligned(side * channels * stored.itemsize)

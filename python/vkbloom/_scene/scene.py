@@ -19,6 +19,7 @@ import numpy as np
 
 from vkbloom._argument_types import PATH, checked_as
 from vkbloom._checks import check_above, check_floats, check_number
+from vkbloom._scene import gltf
 from vkbloom._scene import skybox as sky
 from vkbloom._scene.mesh import Mesh
 from vkbloom._scene.skybox import Cubemap, SkyboxSource
@@ -178,9 +179,6 @@ class Scene:
         -------
         Scene
         """
-        # Imported here, since other scenes do not need it.
-        from vkbloom._scene import gltf  # noqa: PLC0415
-
         return cls(
             body=gltf.load_mesh(base),
             glow=None if glow is None else gltf.load_mesh(glow),

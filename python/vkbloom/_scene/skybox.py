@@ -163,14 +163,14 @@ def project_equirectangular(panorama: NDArray[Any], side: int) -> NDArray[Any]:
     height, width = panorama.shape[:2]
     centres = (2.0 * np.arange(side) + 1.0) / side - 1.0
     t, s = np.meshgrid(centres, centres, indexing="ij")
-    one = np.ones_like(s)
+    unit = np.ones_like(s)
     directions = (
-        (one, -t, -s),
-        (-one, -t, s),
-        (s, one, t),
-        (s, -one, -t),
-        (s, -t, one),
-        (-s, -t, -one),
+        (unit, -t, -s),
+        (-unit, -t, s),
+        (s, unit, t),
+        (s, -unit, -t),
+        (s, -t, unit),
+        (-s, -t, -unit),
     )
     source = finite_floats(panorama)
     faces = np.empty((6, side, side, panorama.shape[2]), panorama.dtype)

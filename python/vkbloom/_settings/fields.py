@@ -189,24 +189,26 @@ def read_numbers(name: str, values: Sequence[float], count: int, most: float) ->
 
 def fields_of(kind: type[Any]) -> Mapping[str, FieldInfo]:
     """Return the descriptions of a dataclass's fields, by name."""
-    found: Mapping[str, FieldInfo] | None = kind.__dict__.get("__field_infos__")
-    if found is None:
+    infos: Mapping[str, FieldInfo] | None = kind.__dict__.get("__field_infos__")
+    if infos is None:
         inherited: dict[str, FieldInfo] = {}
         for base in reversed(kind.__bases__):
             if dataclasses.is_dataclass(base):
                 inherited.update(fields_of(base))
         # Without the annotations of bases, which are in `inherited`.
-        own = inspect.get_annotations(kind, eval_str=True)
-        found = types.MappingProxyType(
+        annotations = inspect.get_annotations(kind, eval_str=True)
+        infos = types.MappingProxyType(
             {
-                field.name: _described(kind, field, own[field.name], inherited.get(field.name))
-                if field.name in own
+                field.name: _described(
+                    kind, field, annotations[field.name], inherited.get(field.name)
+                )
+                if field.name in annotations
                 else dataclasses.replace(inherited[field.name], owner=kind)
                 for field in dataclasses.fields(kind)
             }
         )
-        kind.__field_infos__ = found
-    return found
+        kind.__field_infos__ = infos
+    return infos
 
 
 def _described(
@@ -226,16 +228,16 @@ def _described(
         kind = "choice"
         declared["narrowed"] = "choices" in declared or (base is not None and base.narrowed)
         declared.setdefault("choices", base.choices if base else typing.get_args(annotation))
-    found = {"kind": kind, "default": field.default, "owner": owner, "optional": optional}
+    described = {"kind": kind, "default": field.default, "owner": owner, "optional": optional}
     if base is not None:
         if "range" in declared:
             declared.setdefault("slider", None)
-        return dataclasses.replace(base, **{**found, "kind": base.kind, **declared})
+        return dataclasses.replace(base, **{**described, "kind": base.kind, **declared})
     if kind == "flag":
         declared["range"] = 0, 1
     if kind in ("number", "integer"):
         declared.setdefault("unit", "1")
-    return FieldInfo(**{"name": field.name, "option": field.name, **found, **declared})
+    return FieldInfo(**{"name": field.name, "option": field.name, **described, **declared})
 
 
 def check_fields(record: Any) -> None:
@@ -259,7 +261,7 @@ class _ConstructorSignature:
 
 def _unknown(kind: type[Record], name: str, unknown: list[str]) -> str:
     """Return the text of an error for fields that a class lacks."""
-    others = {other: fields_of(one) for other, one in kind._classes().items()}
+    others = {other: fields_of(other_kind) for other, other_kind in kind._classes().items()}
     return lacking(name, unknown, fields_of(kind), others)
 
 
@@ -333,14 +335,14 @@ class Record:
         """
         if not isinstance(fields, Mapping):
             raise TypeError(f"{cls._subject}: a mapping is needed, not {type(fields).__name__}")
-        key, classes, own = cls._class_key, cls._classes(), cls._class_name()
-        name = fields.get(key, own)
+        key, classes, own_name = cls._class_key, cls._classes(), cls._class_name()
+        name = fields.get(key, own_name)
         if not isinstance(name, str) or name not in classes:
             load = "; load its file with vkbloom.load_method" if "sha256" in fields else ""
             near = did_you_mean(name, classes)
             raise ValueError(f"{key}: {name!r} is not one of {', '.join(classes)}{load or near}")
-        if own not in (None, name):
-            raise ValueError(f"{key}: {name!r} is not the {own!r} of {cls.__name__}")
+        if own_name not in (None, name):
+            raise ValueError(f"{key}: {name!r} is not the {own_name!r} of {cls.__name__}")
         values = {field: value for field, value in fields.items() if field != key}
         classes[name]._check_stored(values)
         declared = fields_of(classes[name])

@@ -74,29 +74,29 @@ def check_glare(glare: object) -> tuple[Glare, ...]:
         glare = (glare,)
     if isinstance(glare, str | bytes) or not isinstance(glare, Iterable):
         raise TypeError(f"glare: {glare!r} is not a sequence of stages")
-    found = []
-    for one in glare:
-        stage = Glare.from_dict(one) if isinstance(one, Mapping) else one
+    stages = []
+    for part in glare:
+        stage = Glare.from_dict(part) if isinstance(part, Mapping) else part
         if not isinstance(stage, Glare):
-            raise TypeError(f"glare: {one!r} is not a stage, such as Streaks()")
-        found.append(stage)
-    if sum(stage.stage == "dirt" for stage in found) > 1:
+            raise TypeError(f"glare: {part!r} is not a stage, such as Streaks()")
+        stages.append(stage)
+    if sum(stage.stage == "dirt" for stage in stages) > 1:
         raise ValueError("glare: there is more than one Dirt; give one")
-    if len(found) > _core.MAX_STAGES:
-        raise ValueError(f"glare: {len(found)} stages are out of range, 0 to {_core.MAX_STAGES}")
-    return tuple(found)
+    if len(stages) > _core.MAX_STAGES:
+        raise ValueError(f"glare: {len(stages)} stages are out of range, 0 to {_core.MAX_STAGES}")
+    return tuple(stages)
 
 
 def stage_field_of(glare: tuple[Glare, ...], name: str) -> tuple[int, str]:
     """Return the stage and the field of a name such as "glare.0.intensity"."""
     parts = name.split(".")
     if len(parts) == 3 and parts[0] == "glare" and parts[1].isdecimal():
-        place = int(parts[1])
-        if place < len(glare) and parts[2] in fields_of(type(glare[place])):
-            return place, parts[2]
+        index = int(parts[1])
+        if index < len(glare) and parts[2] in fields_of(type(glare[index])):
+            return index, parts[2]
     known = [
-        f"glare.{place}.{field}"
-        for place, stage in enumerate(glare)
+        f"glare.{index}.{field}"
+        for index, stage in enumerate(glare)
         for field in fields_of(type(stage))
     ]
     raise ValueError(
@@ -108,7 +108,7 @@ def replaced_stages(glare: tuple[Glare, ...], changes: Mapping[str, Any]) -> tup
     """Return stages with some fields changed, by names such as "glare.0.intensity"."""
     stages_now = list(glare)
     for name, value in changes.items():
-        place, field = stage_field_of(glare, name)
-        changed: Any = dataclasses.replace(stages_now[place], **{field: value})
-        stages_now[place] = changed
+        index, field = stage_field_of(glare, name)
+        changed: Any = dataclasses.replace(stages_now[index], **{field: value})
+        stages_now[index] = changed
     return tuple(stages_now)

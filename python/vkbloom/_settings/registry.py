@@ -43,14 +43,14 @@ class Registry(Named[type[Any]]):
     def __init__(self, kind: str) -> None:
         super().__init__(kind, _imported)
 
-    def supply(self, package: str, places: Mapping[str, str]) -> None:
+    def supply(self, package: str, sources: Mapping[str, str]) -> None:
         """Set the classes of a package: "module:Class" by name."""
-        self.fill(lambda: {name: f"{package}.{place}" for name, place in places.items()})
+        self.fill(lambda: {name: f"{package}.{source}" for name, source in sources.items()})
 
     def _rows(self) -> list[tuple[str, ...]]:
         return [
-            (name, one if isinstance(one, str) else one.__name__, "")
-            for name, one in self._entries.items()
+            (name, entry if isinstance(entry, str) else entry.__name__, "")
+            for name, entry in self._entries.items()
         ]
 
     def is_added(self, name: str) -> bool:

@@ -183,8 +183,8 @@ class Settings(Record):
         """Return the value of a field, or of a stage's field, such as "glare.0.intensity"."""
         if "." not in name:
             return getattr(self, name)
-        place, field = stage_field_of(self.glare, name)
-        return getattr(self.glare[place], field)
+        index, field = stage_field_of(self.glare, name)
+        return getattr(self.glare[index], field)
 
     def _core_block(self) -> bytes:
         """Return the settings as the core reads them."""
@@ -195,7 +195,7 @@ class Settings(Record):
         """Whether frames depend on those before; only custom methods can."""
         return False
 
-    def _in_sequence(self, place: int, state: dict[Any, Any]) -> Self:
+    def _in_sequence(self, index: int, state: dict[Any, Any]) -> Self:
         """Return the settings for a frame of a sequence, whose frames share the state."""
         return self
 
@@ -208,8 +208,8 @@ def field_info(settings: Settings, name: str) -> FieldInfo:
     """Return the description of a field, or of a stage's field, such as "glare.0.intensity"."""
     if "." not in name:
         return fields_of(type(settings))[name]
-    place, field = stage_field_of(settings.glare, name)
-    return fields_of(type(settings.glare[place]))[field]
+    index, field = stage_field_of(settings.glare, name)
+    return fields_of(type(settings.glare[index]))[field]
 
 
 def no_knee(method: str) -> Any:

@@ -43,8 +43,8 @@ def passes(source: BlurInput, settings: BevyBloom) -> dict[str, Array]:
     for _ in range(1, _level_count(settings)):
         level = halved(level)
         downs.append(source.store(downsample(downs[-1], level, scale=scale)))
-    own, coarse = _shares(settings)
-    return combine(downs, source, own=own, coarse=coarse, upsample=up, last=up)
+    fine, coarse = _shares(settings)
+    return combine(downs, source, fine=fine, coarse=coarse, upsample=up, last=up)
 
 
 def gain(settings: BevyBloom, size: tuple[int, int]) -> float:

@@ -35,9 +35,9 @@ def passes(source: BlurInput, settings: BlenderGlare) -> dict[str, Array]:
     factor = FACTORS[settings.quality]
     reduced = _means(source.image, factor)
     bright = source.store(masked(_highlights(reduced, settings), source.mask))
-    found = {"glow": bright}
+    framebuffers = {"glow": bright}
     if factor > 1:
-        found = {"highlights": bright, "glow": source.store(sample(bright, (width, height)))}
+        framebuffers = {"highlights": bright, "glow": source.store(sample(bright, (width, height)))}
     # 8 bits and few bits of mantissa hold too little of what spreads over hundreds of pixels.
     exact = source.store.high > 65024
     store = source.store if exact or settings.type == "bloom" else storage("rgba16float")
@@ -46,7 +46,11 @@ def passes(source: BlurInput, settings: BlenderGlare) -> dict[str, Array]:
     rounding = 1e-6 if settings.type in ("fog_glow", "kernel") else 1e-14
     rgb = np.multiply(_settled(light[..., :3], settings.saturation, rounding), settings.tint)
     alpha = light[..., 3:] * (sum(settings.tint[i] for i in range(3)) / 3)
-    return {**found, **images, "bloom": source.store.end(np.concatenate([rgb, alpha], axis=2))}
+    return {
+        **framebuffers,
+        **images,
+        "bloom": source.store.end(np.concatenate([rgb, alpha], axis=2)),
+    }
 
 
 def _enlarged(light: Array, size: tuple[int, int], version: str) -> Array:
@@ -69,11 +73,13 @@ def gain(settings: BlenderGlare, size: tuple[int, int]) -> Any:
 
     The saturation of a grey is 0. Streaks and ghosts have colours.
     """
-    one = float(_highlights(np.ones((1, 1, 1)), settings)[0, 0, 0])
-    found = (
-        one * GAINS[settings.type](settings, size) if settings.type in GAINS else np.full(3, one)
+    bright = float(_highlights(np.ones((1, 1, 1)), settings)[0, 0, 0])
+    levels = (
+        bright * GAINS[settings.type](settings, size)
+        if settings.type in GAINS
+        else np.full(3, bright)
     )
-    tinted = saturated(found, settings.saturation) * np.array(settings.tint)
+    tinted = saturated(levels, settings.saturation) * np.array(settings.tint)
     return float(tinted[0]) if (tinted == tinted[0]).all() else tinted
 
 
@@ -115,10 +121,10 @@ def _means(image: Array, factor: int) -> Array:
     """Return the means of factor x factor pixels, rows from below, with the last ones repeated."""
     for axis, length in enumerate(image.shape[:2]):
         count = -(-length // factor)
-        places = np.minimum(np.arange(count * factor), length - 1)
+        indices = np.minimum(np.arange(count * factor), length - 1)
         if axis == 0:
-            places = (length - 1 - places)[::-1]
-        taps = image[places] if axis == 0 else image[:, places]
+            indices = (length - 1 - indices)[::-1]
+        taps = image[indices] if axis == 0 else image[:, indices]
         parts = [taps[i::factor] if axis == 0 else taps[:, i::factor] for i in range(factor)]
         image = sum(parts[1:], parts[0]) / factor
     return image

@@ -35,9 +35,9 @@ def reads_next(size: int, count: int, offset: Any = 0) -> Array:
     """
     single = np.float32
     shares = (np.arange(count, dtype=single) + single(0.5)) / single(count) + single(offset)
-    place = shares * single(size) - single(0.5)
-    found: Array = np.floor(place + single(1)) > np.floor(place) + single(1)
-    return found
+    position = shares * single(size) - single(0.5)
+    is_next: Array = np.floor(position + single(1)) > np.floor(position) + single(1)
+    return is_next
 
 
 def _tap(light: Array, version: str, angle: float, distance: float, tap: int) -> Array:
@@ -187,15 +187,15 @@ def _simple_star(bright: Array, settings: BlenderGlare, store: Storage, size: An
     height, width, _ = bright.shape
     upwards = bright[::-1]
     if not settings.diagonal:
-        one = np.ones((max(height, width), 1, 1))
-        across = _recursed(upwards.swapaxes(0, 1), one, settings, store).swapaxes(0, 1)
-        return {"light": store(_recursed(upwards, one, settings, store) + across)[::-1]}
+        unit = np.ones((max(height, width), 1, 1))
+        across = _recursed(upwards.swapaxes(0, 1), unit, settings, store).swapaxes(0, 1)
+        return {"light": store(_recursed(upwards, unit, settings, store) + across)[::-1]}
     total: Any = 0.0
     rows = np.arange(height)[:, np.newaxis]
     for shift in (height - 1 - rows, rows):
-        place = np.arange(width + height - 1) - shift
-        inside = ((place >= 0) & (place < width)).astype(np.float64)[..., np.newaxis]
-        lines = inside * upwards[rows, np.clip(place, 0, width - 1)]
+        column = np.arange(width + height - 1) - shift
+        inside = ((column >= 0) & (column < width)).astype(np.float64)[..., np.newaxis]
+        lines = inside * upwards[rows, np.clip(column, 0, width - 1)]
         filtered = _recursed(lines, inside, settings, store)
         total = total + filtered[rows, np.arange(width) + shift]
     return {"light": store(total)[::-1]}
@@ -239,12 +239,12 @@ def _sun_beams(bright: Array, settings: BlenderGlare, store: Storage, size: Any)
     weights = np.zeros((height, width))
     going = np.ones((height, width), np.bool_)
     for i in range(int(count.max()) + 1):
-        place: Any = np.full((height, width), float(i))
+        step: Any = np.full((height, width), float(i))
         if jitter > 0:
-            place = (i + _hashed(x, y)) / (1 - jitter) if jitter < 1 else 0 * place
-        at_x, at_y = share_x + place * step_x, share_y + place * step_y
+            step = (i + _hashed(x, y)) / (1 - jitter) if jitter < 1 else 0 * step
+        at_x, at_y = share_x + step * step_x, share_y + step * step_y
         going &= (at_x >= 0) & (at_y >= 0) & (at_x <= 1) & (at_y <= 1)
-        weight = np.where(going & (i <= count.astype(int)), (1 - place / steps) ** 2, 0.0)
+        weight = np.where(going & (i <= count.astype(int)), (1 - step / steps) ** 2, 0.0)
         seen = texels_at(upwards, at_x * width - 0.5, at_y * height - 0.5)
         total = total + weight[..., np.newaxis] * seen
         weights += weight

@@ -186,8 +186,8 @@ def _noise(size: tuple[int, int], seed: int) -> Array:
     state = [columns, rows, np.full(size, seed, np.uint32)]
     state = [np.uint32(1664525) * number + np.uint32(1013904223) for number in state]
     for mixing in range(2):
-        for place in range(3):
-            state[place] = state[place] + state[place - 2] * state[place - 1]
+        for channel in range(3):
+            state[channel] = state[channel] + state[channel - 2] * state[channel - 1]
         if mixing == 0:
             state = [number ^ (number >> np.uint32(16)) for number in state]
     return (np.stack(state, axis=-1) // np.uint32(2**20) + 0.5) / 4096

@@ -32,8 +32,8 @@ def passes(source: BlurInput, settings: Convolution) -> dict[str, Array]:
 
 def gain(settings: Convolution, size: tuple[int, int]) -> Array:
     """Return the bloom of a flat image of 1 far from a boundary of zeros: the kernel's sums."""
-    one = prefiltered(np.ones((1, 1, 3)), settings.prefilter)[0, 0]
-    sums: Array = one * settings.kernel(size).sum(axis=(0, 1))
+    flat = prefiltered(np.ones((1, 1, 3)), settings.prefilter)[0, 0]
+    sums: Array = flat * settings.kernel(size).sum(axis=(0, 1))
     return sums
 
 
@@ -45,10 +45,10 @@ def prefiltered(glow: Array, prefilter: tuple[float, float, float]) -> Array:
     low, high, factor = prefilter
     if high < low or glow.shape[2] not in (3, 4):
         return glow
-    found = luminance(glow[..., :3])
-    wanted = np.minimum(factor * (found - low) + low, high)
-    scale = np.where(found > 0, wanted / np.maximum(found, 1e-30), factor)
-    rgb = joined(found, low, glow[..., :3], glow[..., :3] * scale)
+    light = luminance(glow[..., :3])
+    wanted = np.minimum(factor * (light - low) + low, high)
+    scale = np.where(light > 0, wanted / np.maximum(light, 1e-30), factor)
+    rgb = joined(light, low, glow[..., :3], glow[..., :3] * scale)
     return np.concatenate([rgb, glow[..., 3:]], axis=2)
 
 
@@ -78,7 +78,7 @@ def convolve(glow: Array, kernel: Array, boundary: str) -> Array:
 def _valid(image: Array, kernel: Array) -> Array:
     """Return the convolution where the kernel lies inside of the image."""
     shape = image.shape[:2]
-    values = [np.fft.rfft2(value_of(one), shape, axes=(0, 1)) for one in (image, kernel)]
+    values = [np.fft.rfft2(value_of(part), shape, axes=(0, 1)) for part in (image, kernel)]
     rows, columns = (image.shape[i] - kernel.shape[i] + 1 for i in (0, 1))
 
     def spread(product: Any) -> Array:

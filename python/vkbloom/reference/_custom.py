@@ -26,18 +26,18 @@ def framebuffers(
     """
     height, width, channels = scene.shape
     image = scene if channels == 4 else np.dstack([scene, np.ones((height, width))])
-    found = {
+    result = {
         name: np.asarray(array, np.float64) for name, array in function(image, settings).items()
     }
-    if "final" in found:
-        final = found.pop("final")[..., :channels]
-        found.setdefault(
+    if "final" in result:
+        final = result.pop("final")[..., :channels]
+        result.setdefault(
             "bloom", np.dstack([final[..., :3] - scene[..., :3], image[..., 3:] * 0 + 1])
         )
-        return {**found, "final": final}
-    if "bloom" not in found:
+        return {**result, "final": final}
+    if "bloom" not in result:
         raise ValueError(
-            f"reference: it returned {', '.join(found) or 'nothing'}; it must return 'bloom' "
+            f"reference: it returned {', '.join(result) or 'nothing'}; it must return 'bloom' "
             "or 'final'"
         )
-    return {**found, "final": composite(scene, found["bloom"], settings, dtype)}
+    return {**result, "final": composite(scene, result["bloom"], settings, dtype)}

@@ -106,7 +106,7 @@ def vjp(
         inputs["mask"] = Traced(weights)
     traced: Any = _TracedSettings(settings, inputs)
     arrays: dict[str, Any] = {**inputs}
-    found: dict[str, Any] = framebuffers(
+    results_by_name: dict[str, Any] = framebuffers(
         arrays["image"],
         arrays.get("emission", arrays["image"]),
         traced,
@@ -115,13 +115,15 @@ def vjp(
         format="rgba32float",
         dtype=np.asarray(image).dtype,
     )
-    values: dict[str, Array] = {name: value_of(part) for name, part in found.items()}
+    values: dict[str, Array] = {name: value_of(part) for name, part in results_by_name.items()}
 
     def pullback(cotangents: Mapping[str, NDArray[Any]]) -> Gradients:
         given = check_cotangents(cotangents, values)
-        given = {name: part for name, part in given.items() if isinstance(found[name], Traced)}
+        given = {
+            name: part for name, part in given.items() if isinstance(results_by_name[name], Traced)
+        }
         derivatives = gradients(
-            [(found[name], part) for name, part in given.items()], [*inputs.values()]
+            [(results_by_name[name], part) for name, part in given.items()], [*inputs.values()]
         )
         results = Gradients(zip(inputs, derivatives, strict=True))
         for name, pixels in (("image", scene), ("emission", source)):
@@ -137,21 +139,21 @@ def vjp(
 def differentiable(settings: Any) -> dict[str, Any]:
     """Return the values of the real fields with a derivative, by name."""
     method = getattr(settings, "method", "")
-    found = {
+    fields = {
         name: getattr(settings, name)
         for name, info in fields_of(type(settings)).items()
         if not ({name, f"{method}.{name}"} & DISCRETE or info.fixed)
         and _is_real(getattr(settings, name))
     }
-    for place, stage in enumerate(getattr(settings, "glare", ())):
-        found |= {f"glare.{place}.{name}": value for name, value in differentiable(stage).items()}
-    return found
+    for index, stage in enumerate(getattr(settings, "glare", ())):
+        fields |= {f"glare.{index}.{name}": value for name, value in differentiable(stage).items()}
+    return fields
 
 
 def _is_real(value: Any) -> bool:
     """Whether a value is a float, or a tuple of such or of tuples of them, all of one length."""
     if isinstance(value, tuple) and value:
-        return all(map(_is_real, value)) and len({np.shape(one) for one in value}) == 1
+        return all(map(_is_real, value)) and len({np.shape(item) for item in value}) == 1
     return isinstance(value, float)
 
 
@@ -167,8 +169,8 @@ class _TracedSettings:
             setattr(self, name, inputs[prefix + name])
         if stages := getattr(settings, "glare", ()):
             self.glare = tuple(
-                _TracedSettings(stage, inputs, f"glare.{place}.")
-                for place, stage in enumerate(stages)
+                _TracedSettings(stage, inputs, f"glare.{index}.")
+                for index, stage in enumerate(stages)
             )
         if callable(getattr(settings, "kernel", None)):
             self._inputs = inputs

@@ -132,15 +132,15 @@ def framebuffers(
         glow = store(masked(apply_threshold(reduced, settings.threshold, settings.knee), mask))
     blurred = method.passes(BlurInput(glow, (width, height), store, mask), settings)
     stages = glare.stages(_glowing(glow, settings, mask), settings.glare, format)
-    found = _with_alphas({"glow": glow, **stages, **blurred})
+    results = _with_alphas({"glow": glow, **stages, **blurred})
     strength = strength_of(settings)
     if settings.glare:
-        images = [found[name] for name in stages]
-        light = glare.light(found["bloom"], strength, images, settings.glare)
+        images = [results[name] for name in stages]
+        light = glare.light(results["bloom"], strength, images, settings.glare)
     else:
-        light = found["bloom"] * strength
-    found["final"] = composite_checked(scene, light, settings, dtype, share)
-    return found
+        light = results["bloom"] * strength
+    results["final"] = composite_checked(scene, light, settings, dtype, share)
+    return results
 
 
 def _glowing(glow: Array, settings: Settings, mask: Array | None) -> Array:

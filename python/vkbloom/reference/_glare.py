@@ -25,14 +25,14 @@ def stages(source: Array, glare: Sequence[Any], format: str) -> dict[str, Array]
     store = storage(stage_format(format))
     counts = Counter(stage.stage for stage in glare)
     seen: Counter[str] = Counter()
-    found = {}
+    images = {}
     for stage in _lights(glare):
         name = stage.stage
         number = f"_{seen[name]}" if counts[name] > 1 else ""
         seen[name] += 1
         image = _reduced(source, stage.halvings, store)
-        found[name + number] = store(_STAGES[name](image, stage, store))
-    return found
+        images[name + number] = store(_STAGES[name](image, stage, store))
+    return images
 
 
 def light(bloom: Array, intensity: float, images: Sequence[Array], glare: Sequence[Any]) -> Array:
@@ -141,10 +141,13 @@ def texels_at(image: Array, column: Array, row: Array) -> Array:
     # value is the same.
     is_traced = isinstance(column, Traced) or isinstance(row, Traced)
     near = 1e-9
-    both = (lambda place: np.floor(place + near), lambda place: np.ceil(place - near) - 1)
+    both = (
+        lambda position: np.floor(position + near),
+        lambda position: np.ceil(position - near) - 1,
+    )
     sides = both if is_traced else (np.floor,)
-    found = [_between(image, column, row, side(column), side(row)) for side in sides]
-    mean: Array = sum(found[1:], found[0]) / len(sides)
+    readings = [_between(image, column, row, side(column), side(row)) for side in sides]
+    mean: Array = sum(readings[1:], readings[0]) / len(sides)
     return mean
 
 
@@ -159,8 +162,8 @@ def _between(image: Array, column: Array, row: Array, left: Array, top: Array) -
                 rows.clip(0, height - 1).astype(int), columns.clip(0, width - 1).astype(int)
             ]
             total = total + (row_share * share * inside)[..., np.newaxis] * texels
-    found: Array = total
-    return found
+    result: Array = total
+    return result
 
 
 def _seen(image: Array, stage: Any, x: Array, y: Array) -> Array:

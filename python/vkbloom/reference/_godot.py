@@ -111,7 +111,7 @@ def _blur_rows(samples: Array) -> Array:
     length = samples.shape[0]
     total = np.zeros_like(samples)
     for tap in range(-4, 5):
-        place = np.arange(length) + tap
-        pair = np.clip(place - place % 2, 0, max(length - 2, 0))
-        total += _WEIGHTS[abs(tap)] * samples[np.minimum(pair + place % 2, length - 1)]
+        row = np.arange(length) + tap
+        pair = np.clip(row - row % 2, 0, max(length - 2, 0))
+        total += _WEIGHTS[abs(tap)] * samples[np.minimum(pair + row % 2, length - 1)]
     return total

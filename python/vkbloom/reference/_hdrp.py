@@ -62,7 +62,7 @@ def passes(source: BlurInput, settings: HdrpBloom) -> dict[str, Array]:
     return combine(
         downs,
         source,
-        own=[1 - share] * count,
+        fine=[1 - share] * count,
         coarse=[share] * count,
         upsample=lambda image, larger: _along_both(image, larger, rows),
         last=cubic,
@@ -100,14 +100,14 @@ def _convolve(rows: Array, count: int) -> Array:
 
 
 def _blur_rows(image: Array, count: int) -> Array:
-    places = np.arange(-_RADIUS, count + _RADIUS)
-    texels = np.minimum(np.where(places < 0, places % 2, places), count - 1)
+    indices = np.arange(-_RADIUS, count + _RADIUS)
+    texels = np.minimum(np.where(indices < 0, indices % 2, indices), count - 1)
     return _convolve(image[texels], count)
 
 
 def _shrink_rows(image: Array, count: int) -> Array:
-    places = np.minimum(np.arange(-_RADIUS, count + _RADIUS), count - 1)
-    return _convolve(read_rows(image, (places + 0.5) * image.shape[0] / count - 0.5), count)
+    indices = np.minimum(np.arange(-_RADIUS, count + _RADIUS), count - 1)
+    return _convolve(read_rows(image, (indices + 0.5) * image.shape[0] / count - 0.5), count)
 
 
 def _up_positions(length: int, count: int) -> Array:

@@ -43,17 +43,17 @@ def passes(source: BlurInput, settings: PmndrsBloom) -> dict[str, Array]:
         # The second level is the first one again.
         downs.append(downs[0])
     count = len(downs)
-    found = combine(
+    framebuffers = combine(
         downs,
         source,
-        own=[1 - share] * count,
+        fine=[1 - share] * count,
         coarse=[share] * count,
         upsample=tent,
         last=linear,
     )
     if settings.levels == 1:
-        del found["down_1"]
-    return {"bright": bright, **found}
+        del framebuffers["down_1"]
+    return {"bright": bright, **framebuffers}
 
 
 def gain(settings: PmndrsBloom, size: tuple[int, int]) -> float:

@@ -49,7 +49,7 @@ def passes(source: BlurInput, settings: Pyramid) -> dict[str, Array]:
     return combine(
         downs,
         source,
-        own=shares,
+        fine=shares,
         coarse=[1.0] * count,
         upsample=up,
         last=up,

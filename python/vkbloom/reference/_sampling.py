@@ -47,30 +47,30 @@ def sample(
 def _filter_rows(image: Array, count: int, taps: Taps) -> Array:
     """Apply the taps along the first axis, for `count` rows of output."""
     values, offsets, shares = value_of(image), *zip(*taps, strict=True)
-    places = np.array([value_of(offset) for offset in offsets], dtype=np.float64)
+    positions = np.array([value_of(offset) for offset in offsets], dtype=np.float64)
     weights = np.array([value_of(share) for share in shares], dtype=np.float64)
     length = values.shape[0]
-    is_traced = any(isinstance(one, Traced) for one in (*offsets, *shares))
+    is_traced = any(isinstance(value, Traced) for value in (*offsets, *shares))
     if count == length and tuple(taps) == CENTRE and not is_traced:
         return image
     source = values.reshape(length, -1)
     result = np.empty((count, source.shape[1]))
-    for rows, texels, matrix in _bands(length, count, places, weights):
+    for rows, texels, matrix in _bands(length, count, positions, weights):
         result[rows] = matrix @ source[texels]
 
     def by_image(derivative: Array) -> Array:
         total: Array = np.zeros(source.shape)
-        for rows, texels, matrix in _bands(length, count, places, weights):
+        for rows, texels, matrix in _bands(length, count, positions, weights):
             total[texels] += matrix.T @ derivative[rows].reshape(len(matrix), -1)
         return total.reshape(values.shape)
 
     def by_weight(tap: int) -> Callable[[Array], Array]:
-        alone = ((float(places[tap]), 1.0),)
+        alone = ((float(positions[tap]), 1.0),)
         return lambda derivative: (derivative * _filter_rows(values, count, alone)).sum()
 
     def by_offset(tap: int) -> Callable[[Array], Array]:
         return lambda derivative: (
-            weights[tap] * (derivative * _slopes(values, count, places[tap])).sum()
+            weights[tap] * (derivative * _slopes(values, count, positions[tap])).sum()
         )
 
     filtered: Array = operation(
@@ -115,8 +115,8 @@ def _slopes(image: Array, count: int, offset: float) -> Array:
     # A centre is met with roundings.
     left, right = np.ceil(positions - 1e-9) - 1, np.floor(positions + 1e-9)
     texels = [
-        image[np.clip(place, 0, length - 1).astype(np.intp)]
-        for place in (left, left + 1, right, right + 1)
+        image[np.clip(texel, 0, length - 1).astype(np.intp)]
+        for texel in (left, left + 1, right, right + 1)
     ]
     slopes: Array = (texels[1] - texels[0] + texels[3] - texels[2]) / 2
     return slopes

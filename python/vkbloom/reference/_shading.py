@@ -59,7 +59,7 @@ def shade(
         "position": position,
         "brightness": brightness,
     }
-    colour, normals, places, emitted = (
+    colour, normals, positions, emitted = (
         as_float(array, name, (3, 4))[..., :3] for name, array in given.items()
     )
     for name, array in given.items():
@@ -69,7 +69,7 @@ def shade(
                 f"{colour.shape[:2]}"
             )
     is_surface = normals.any(axis=-1, keepdims=True)
-    n, to_light, to_camera = _unit(normals), _unit(_LIGHT - places), _unit(-places)
+    n, to_light, to_camera = _unit(normals), _unit(_LIGHT - positions), _unit(-positions)
     facing = _dot(n, to_light)
     reflected = 2 * facing * n - to_light
     # Rounded to the albedo's dtype, so that a half float of 0.9 is still a lamp.

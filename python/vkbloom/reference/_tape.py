@@ -125,14 +125,14 @@ class Traced(np.lib.mixins.NDArrayOperatorsMixin):
         return self._extreme(np.min, axis, keepdims)
 
     def _extreme(self, function: Callable[..., Array], axis: int, keepdims: bool) -> Traced:
-        found = function(self.value, axis=axis, keepdims=True)
-        share = (self.value == found).astype(np.float64)
+        extreme = function(self.value, axis=axis, keepdims=True)
+        share = (self.value == extreme).astype(np.float64)
         share /= share.sum(axis=axis, keepdims=True)
-        value = found if keepdims else function(self.value, axis=axis)
-        return _traced(value, (self, lambda d: share * d.reshape(found.shape)))
+        value = extreme if keepdims else function(self.value, axis=axis)
+        return _traced(value, (self, lambda d: share * d.reshape(extreme.shape)))
 
     def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, **options: Any) -> Any:
-        values = [value_of(one) for one in inputs]
+        values = [value_of(part) for part in inputs]
         if method != "__call__":
             return NotImplemented
         if ufunc in _FLAT:
@@ -153,8 +153,8 @@ class Traced(np.lib.mixins.NDArrayOperatorsMixin):
         return _traced(
             result,
             *(
-                (one, _scaled(one, factor, apart))
-                for one, factor in zip(inputs, factors, strict=True)
+                (part, _scaled(part, factor, apart))
+                for part, factor in zip(inputs, factors, strict=True)
             ),
         )
 
@@ -189,9 +189,9 @@ def contiguous(array: Array) -> Array:
     return same
 
 
-def joined(place: Any, at: float, below: Any, above: Any) -> Any:
+def joined(position: Any, at: float, below: Any, above: Any) -> Any:
     """Return one curve up to a place and another above it, which have equal values there."""
-    value = value_of(place)
+    value = value_of(position)
     falling, growing = np.less_equal(value, at), np.less(value, at)
     return operation(
         np.where(falling, value_of(below), value_of(above)),
@@ -202,7 +202,7 @@ def joined(place: Any, at: float, below: Any, above: Any) -> Any:
 
 def _traced(value: Any, *arguments: tuple[Any, Rule | Sides]) -> Traced:
     return Traced(
-        value, _Node([(one.node, rule) for one, rule in arguments if isinstance(one, Traced)])
+        value, _Node([(part.node, rule) for part, rule in arguments if isinstance(part, Traced)])
     )
 
 
@@ -212,7 +212,7 @@ def gradients(results: Sequence[tuple[Traced, Array]], inputs: Sequence[Traced])
     if not kinked:
         return growing
     falling, _ = _gradients(results, inputs, 1)
-    return [(one + other) / 2 for one, other in zip(growing, falling, strict=True)]
+    return [(first + second) / 2 for first, second in zip(growing, falling, strict=True)]
 
 
 def _gradients(
@@ -227,21 +227,21 @@ def _gradients(
         known = derivatives.get(node)
         derivatives[node] = derivative if known is None else known + derivative
 
-    wanted = {one.node for one in inputs}
+    wanted = {part.node for part in inputs}
     for result, cotangent in results:
         add(result.node, cotangent)
-    found: dict[_Node, Array] = {}
+    results_of_inputs: dict[_Node, Array] = {}
     kinked = False
     while waiting:
         node = waiting.pop(max(waiting))
         derivative = derivatives.pop(node)
         if node in wanted:
-            found[node] = derivative
+            results_of_inputs[node] = derivative
         for argument, rule in node.arguments:
             sides = rule if isinstance(rule, tuple) else (rule, rule)
             kinked = kinked or isinstance(rule, tuple)
             add(argument, sides[side](derivative))
-    return [found.get(one.node, np.zeros(one.shape)) for one in inputs], kinked
+    return [results_of_inputs.get(part.node, np.zeros(part.shape)) for part in inputs], kinked
 
 
 def _times(derivative: Array, factor: Any) -> Array:
@@ -279,8 +279,8 @@ def _power(result: Array, base: Any, exponent: Any) -> tuple[Any, Any]:
     return by_base, np.where(base > 0, result * np.log(np.where(base > 0, base, 1.0)), 0.0)
 
 
-def _larger(one: Any, other: Any) -> Any:
-    return np.greater(one, other) + 0.5 * np.equal(one, other)
+def _larger(first: Any, second: Any) -> Any:
+    return np.greater(first, second) + 0.5 * np.equal(first, second)
 
 
 # Their results are counts or conditions, without a derivative.
@@ -321,11 +321,11 @@ _UFUNCS: Mapping[np.ufunc, Callable[..., tuple[Any, ...]]] = {
 _KINKS: Mapping[np.ufunc, float] = {np.maximum: 0.5, np.minimum: -0.5, np.absolute: 1.0}
 
 
-def _where(condition: Any, one: Any, other: Any) -> Any:
+def _where(condition: Any, first: Any, second: Any) -> Any:
     mask = value_of(condition)
-    value = np.where(mask, value_of(one), value_of(other))
+    value = np.where(mask, value_of(first), value_of(second))
     return operation(
-        value, (one, _chosen(one, mask)), (other, _chosen(other, np.logical_not(mask)))
+        value, (first, _chosen(first, mask)), (second, _chosen(second, np.logical_not(mask)))
     )
 
 
@@ -345,25 +345,25 @@ def _clip(array: Any, low: Any, high: Any) -> Any:
 def _concatenate(parts: Sequence[Any], axis: int = 0) -> Any:
     ends = np.cumsum([np.shape(part)[axis] for part in parts])
 
-    def rule(place: int) -> Rule:
-        start = ends[place - 1] if place else 0
-        return lambda d: np.take(d, np.arange(start, ends[place]), axis=axis)
+    def rule(index: int) -> Rule:
+        start = ends[index - 1] if index else 0
+        return lambda d: np.take(d, np.arange(start, ends[index]), axis=axis)
 
     value = np.concatenate([value_of(part) for part in parts], axis=axis)
     return operation(value, *((part, rule(i)) for i, part in enumerate(parts)))
 
 
 def _pad(array: Any, widths: Any, mode: str = "constant") -> Any:
-    places = np.arange(array.value.size).reshape(array.shape)
+    indices = np.arange(array.value.size).reshape(array.shape)
     # Beside the array, constants are 0 and have no place.
     options: dict[str, Any] = {"constant_values": -1} if mode == "constant" else {}
-    places = np.pad(places, widths, mode, **options)  # type: ignore[call-overload]
-    value = np.append(array.value.ravel(), 0.0)[places]
+    indices = np.pad(indices, widths, mode, **options)  # type: ignore[call-overload]
+    value = np.append(array.value.ravel(), 0.0)[indices]
 
     def back(derivative: Array) -> Array:
-        kept = places.ravel() >= 0
+        kept = indices.ravel() >= 0
         sums = np.bincount(
-            places.ravel()[kept], derivative.ravel()[kept], minlength=array.value.size
+            indices.ravel()[kept], derivative.ravel()[kept], minlength=array.value.size
         )
         return sums.reshape(array.shape)
 

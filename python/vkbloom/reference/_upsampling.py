@@ -78,7 +78,7 @@ def combine(
     *,
     upsample: Filter,
     last: Filter,
-    own: Sequence[float] | None = None,
+    fine: Sequence[float] | None = None,
     coarse: Sequence[float] | None = None,
     smallest: float = 1.0,
     gain: float = 1.0,
@@ -86,31 +86,31 @@ def combine(
 ) -> dict[str, Array]:
     """Return the framebuffers of a chain of levels.
 
-    up_N-1 = smallest * down_N-1, up_k = own[k] down_k + coarse[k] upsample(up_k+1), and the bloom
+    up_N-1 = smallest * down_N-1, up_k = fine[k] down_k + coarse[k] upsample(up_k+1), and the bloom
     is gain * last(up_0). Buffers of rgba8unorm hold values up to 1: there up_k is divided by the
     value that it has if all levels are 1 (with the sizes of the shares instead of the shares), and
     the bloom is multiplied by that of up_0.
     """
     size, store = source.size, source.store
     framebuffers = {f"down_{k}": down for k, down in enumerate(downs)}
-    own = own or [1.0] * len(downs)
+    fine = fine or [1.0] * len(downs)
     coarse = coarse or [1.0] * len(downs)
     # up_k is the stored image times the factor. The smallest level is stored without its factor.
     up, factor = downs[-1], smallest
     for k in range(len(downs) - 2, -1, -1):
         height, width, _ = downs[k].shape
         below = coarse[k] * factor
-        total = own[k] * downs[k] + below * upsample(up, (width, height))
-        factor = (abs(own[k]) + abs(below) or 1.0) if store.holds_means else 1.0
+        total = fine[k] * downs[k] + below * upsample(up, (width, height))
+        factor = (abs(fine[k]) + abs(below) or 1.0) if store.holds_means else 1.0
         up = store(total / factor)
         framebuffers[f"up_{k}"] = up
     framebuffers["bloom"] = (end or store.end)(gain * factor * last(up, size))
     return framebuffers
 
 
-def flat_gain(own: Sequence[float], coarse: Sequence[float], levels: Sequence[float]) -> float:
+def flat_gain(fine: Sequence[float], coarse: Sequence[float], levels: Sequence[float]) -> float:
     """Return the bloom that `combine` computes from flat levels, for a gain of 1."""
     value = levels[-1]
     for k in range(len(levels) - 2, -1, -1):
-        value = own[k] * levels[k] + coarse[k] * value
+        value = fine[k] * levels[k] + coarse[k] * value
     return value

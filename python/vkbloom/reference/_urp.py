@@ -57,9 +57,9 @@ def passes(source: BlurInput, settings: UrpBloom) -> dict[str, Array]:
         level = halved(level)
         horizontal = source.store(_across(downs[-1], level, settings))
         downs.append(source.store(sample(horizontal, level, y_taps=_taps(1.0))))
-    own, coarse = _shares(settings, len(downs))
+    fine, coarse = _shares(settings, len(downs))
     kernel = _kernel(settings)
-    return combine(downs, source, own=own, coarse=coarse, upsample=kernel, last=kernel)
+    return combine(downs, source, fine=fine, coarse=coarse, upsample=kernel, last=kernel)
 
 
 def _across(image: Array, size: tuple[int, int], settings: UrpBloom) -> Array:

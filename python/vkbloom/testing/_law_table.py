@@ -178,7 +178,9 @@ LAWS: Final[Mapping[str, Law]] = {
         ),
         Law(
             "border",
-            lambda subject, limit: border.assert_border(subject.bloom, subject.lamp, limits=limit),
+            lambda subject, limit: border.check_border(
+                subject.bloom, subject.lamp, subject.dark[0], limit
+            ),
             "a light at the border has the bloom of a light far from it, cut off by the frame, and "
             "a flat image the same bloom in a corner as in the middle",
             "Where the outermost pixels are repeated, a light in them counts for what is beyond "
@@ -196,7 +198,9 @@ LAWS: Final[Mapping[str, Law]] = {
         ),
         Law(
             "sizes",
-            lambda subject, limit: shape.assert_sizes(subject.bloom, subject.probe, limits=limit),
+            lambda subject, limit: shape.check_sizes(
+                subject.bloom, subject.probe, float(subject.dark[0].mean()), limit
+            ),
             "width, centroid and energy of the bloom of a square are the same in images whose "
             "sizes are 1 to 3 pixels beside a multiple of 16",
             "A chain of halved images rounds each size: the levels cover a little more or less "
@@ -205,7 +209,7 @@ LAWS: Final[Mapping[str, Law]] = {
         ),
         Law(
             "round",
-            lambda subject, limit: shape.assert_round(subject.bloom, subject.lamp, limit=limit),
+            lambda subject, limit: shape.check_round(subject.spread, limit),
             "contours of the bloom of a pixel at 1/2, 1/10 and 1/100 of the peak are circles",
             "Boxes and tents are square, streaks and blades are stars. A wide pyramid shows the "
             "square texels of its small levels.",

@@ -144,16 +144,19 @@ def assert_centroid_kept(
 
 
 def measured_spread(
-    bloom: Bloom, probe: Probe, at: tuple[int, int] | None = None
+    bloom: Bloom,
+    probe: Probe,
+    at: tuple[int, int] | None = None,
+    dark: tuple[Image, float] | None = None,
 ) -> tuple[Image, float]:
-    """Return the point spread and the error of its values."""
+    """Return the point spread and the error of its values; `dark` are those of a black image."""
     __tracebackhide__ = True
     position = at or probe.centre
     if not all(0 <= number < side for number, side in zip(position, probe.size, strict=True)):
         raise ValueError(f"at: {at!r} is not inside an image of {probe.size}")
     lit, lit_error = probe.apply(bloom, probe.point(position, probe.value))
-    dark, dark_error = probe.apply(bloom, probe.flat(0.0))
-    return (lit - dark) / probe.value, (lit_error + dark_error) / probe.value
+    black, dark_error = dark or probe.apply(bloom, probe.flat(0.0))
+    return (lit - black) / probe.value, (lit_error + dark_error) / probe.value
 
 
 def _check_lit(assertion: str, spread: Image, error: float) -> None:

@@ -64,15 +64,22 @@ class Subject:
         return dataclasses.replace(probe, value=_LAMP) if dim else probe
 
     @cached_property
+    def dark(self) -> tuple[Image, float]:
+        """The bloom of a black image, and the error of its values."""
+        return self.probe.apply(self.bloom, self.probe.flat(0.0))
+
+    @cached_property
     def pixel(self) -> tuple[Image, float]:
         """The point spread of the probe's brightest value, and the error of its values."""
-        return measured_spread(self.bloom, self.probe)
+        return measured_spread(self.bloom, self.probe, dark=self.dark)
 
     @cached_property
     def spread(self) -> Image:
         """The point spread of the lamp."""
         lamp = self.lamp
-        return self.pixel[0] if lamp is self.probe else point_spread(self.bloom, lamp)
+        if lamp is self.probe:
+            return self.pixel[0]
+        return measured_spread(self.bloom, lamp, dark=self.dark)[0]
 
     @cached_property
     def stability(self) -> Stability:
