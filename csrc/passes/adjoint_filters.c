@@ -37,7 +37,7 @@ bool vkb_transpose_blur(struct vkb_adjoint *adjoint, const struct vkb_pass_row *
     if (direction != DIRECTION_HORIZONTAL)
         set_line(params, radius, params->step_y, pass->constants.taps, &filter.y);
     if (pass->constants.upsample)
-        filter.x.kind = VKB_KIND_INSET_LINEAR;
+        filter.x.kind = UPSAMPLE_INSET_LINEAR;
     return vkb_accumulate_filter(adjoint, &filter, vkb_cotangent_of(adjoint, pass), pass->reads[0],
                                  error);
 }
@@ -136,13 +136,6 @@ bool vkb_transpose_godot_blur(struct vkb_adjoint *adjoint, const struct vkb_pass
                                  error);
 }
 
-// What the taps of a row sample, by UPSAMPLE_*.
-static const enum vkb_kind kinds[] = {
-    [UPSAMPLE_LINEAR] = VKB_KIND_LINEAR,           [UPSAMPLE_CUBIC] = VKB_KIND_CUBIC,
-    [UPSAMPLE_INSIDE] = VKB_KIND_INSIDE,           [UPSAMPLE_INSET_LINEAR] = VKB_KIND_INSET_LINEAR,
-    [UPSAMPLE_INSET_CUBIC] = VKB_KIND_INSET_CUBIC,
-};
-
 static void set_taps(const float (*taps)[4], int32_t count, enum vkb_mode kind,
                      struct vkb_axis *axis)
 {
@@ -153,7 +146,7 @@ static void set_taps(const float (*taps)[4], int32_t count, enum vkb_mode kind,
         for (int kernel = 0; kernel < MAX_KERNELS; ++kernel)
             tap->weights[kernel] = taps[i][kernel + 1];
     }
-    axis->kind = kinds[kind];
+    axis->kind = kind;
 }
 
 bool vkb_transpose_filter(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
@@ -186,7 +179,7 @@ bool vkb_transpose_gather(struct vkb_adjoint *adjoint, const struct vkb_pass_row
     for (int level = 0; level < pass->constants.levels; ++level) {
         vkb_filter_begin(adjoint->graph, pass->reads[level], pass->targets[0], &filter);
         filter.gain = pass->params.gather.shares[level / 4][level % 4];
-        filter.x.kind = filter.y.kind = kinds[pass->constants.upsample];
+        filter.x.kind = filter.y.kind = (enum vkb_mode)pass->constants.upsample;
         if (!vkb_accumulate_filter(adjoint, &filter, vkb_cotangent_of(adjoint, pass),
                                    pass->reads[level], error))
             return false;
