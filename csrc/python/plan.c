@@ -61,16 +61,16 @@ static bool choose_outputs(struct vkb_plan *plan, uint32_t first, PyObject *name
         plan->output_count = count;
         return true;
     }
-    PyObject *module = PyImport_ImportModule("vkbloom._suggestions");
-    PyObject *flags = module ? PyObject_CallMethod(module, "wanted", "ON", names,
-                                                   vkb_image_names(graph, plan->outputs, count))
-                             : NULL;
+    PyObject *known = vkb_image_names(graph, plan->outputs, count);
+    PyObject *module = known ? PyImport_ImportModule("vkbloom._suggestions") : NULL;
+    PyObject *flags = module ? PyObject_CallMethod(module, "wanted", "OO", names, known) : NULL;
     const bool done = flags && PyBytes_Check(flags) && PyBytes_Size(flags) == (Py_ssize_t)count;
     for (uint32_t i = 0; done && i < count; ++i)
         if (PyBytes_AsString(flags)[i])
             plan->outputs[plan->output_count++] = plan->outputs[i];
     Py_XDECREF(flags);
     Py_XDECREF(module);
+    Py_XDECREF(known);
     return done;
 }
 
