@@ -69,6 +69,10 @@ bool vkb_accumulate_through(struct vkb_adjoint *adjoint, const struct vkb_pass_r
                             const struct vkb_filter *filter, uint32_t image, uint32_t target,
                             struct vkb_error *error);
 
+// The same of an image that the pixels of the target sample linearly.
+bool vkb_accumulate_sampled(struct vkb_adjoint *adjoint, const struct vkb_pass_row *row,
+                            uint32_t image, uint32_t target, struct vkb_error *error);
+
 // If the pass reads a mask, its second image: accumulates the row's result by it, at the target's
 // pixels.
 bool vkb_accumulate_mask(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,

@@ -107,14 +107,13 @@ static bool accumulate_first_blur(struct vkb_adjoint *adjoint, const struct vkb_
     const struct vkb_size size = {blur->x.to, blur->y.to};
     const bool rows = pass->constants.direction == DIRECTION_HORIZONTAL;
     uint32_t cotangents = vkb_cotangent_of(adjoint, pass);
-    struct vkb_filter filter;
 
     if (rows && !vkb_filter_to_image(adjoint, blur, cotangents, size, &cotangents, error))
         return false;
     struct vkb_pass_row row = vkb_slope_row(adjoint, pass, &vkb_shader_adjoint_godot_blur_frag, 2);
     row.reads[2] = cotangents;
-    vkb_filter_begin(adjoint->graph, source, target, &filter);
-    return vkb_accumulate_through(adjoint, &row, rows ? &filter : blur, source, target, error)
+    return (rows ? vkb_accumulate_sampled(adjoint, &row, source, target, error)
+                 : vkb_accumulate_through(adjoint, &row, blur, source, target, error))
         && vkb_accumulate_mask(adjoint, pass, &row, error);
 }
 

@@ -61,16 +61,16 @@ static bool choose_outputs(struct vkb_plan *plan, uint32_t first, PyObject *name
         plan->output_count = count;
         return true;
     }
-    PyObject *module = PyImport_ImportModule("vkbloom._suggestions");
-    PyObject *flags = module ? PyObject_CallMethod(module, "wanted", "ON", names,
-                                                   vkb_image_names(graph, plan->outputs, count))
-                             : NULL;
+    PyObject *known = vkb_image_names(graph, plan->outputs, count);
+    PyObject *module = known ? PyImport_ImportModule("vkbloom._suggestions") : NULL;
+    PyObject *flags = module ? PyObject_CallMethod(module, "wanted", "OO", names, known) : NULL;
     const bool done = flags && PyBytes_Check(flags) && PyBytes_Size(flags) == (Py_ssize_t)count;
     for (uint32_t i = 0; done && i < count; ++i)
         if (PyBytes_AsString(flags)[i])
             plan->outputs[plan->output_count++] = plan->outputs[i];
     Py_XDECREF(flags);
     Py_XDECREF(module);
+    Py_XDECREF(known);
     return done;
 }
 
@@ -368,17 +368,6 @@ static PyObject *get_outputs(PyObject *object, void *unused)
     return Py_NewRef(((struct vkb_plan_object *)object)->outputs);
 }
 
-static PyObject *get_size(PyObject *object, void *unused)
-{
-    const struct vkb_plan *plan = &((struct vkb_plan_object *)object)->plan;
-    size_t size = 0;
-
-    (void)unused;
-    for (uint32_t i = 0; i < plan->output_count; ++i)
-        size += vkb_output_size(plan, i);
-    return PyLong_FromSize_t(size);
-}
-
 static PyObject *get_image_size(PyObject *object, void *unused)
 {
     (void)unused;
@@ -453,7 +442,6 @@ static PyGetSetDef attributes[] = {
      "[(name, shader, reads, writes, variant, number of its render pass), ...] of what runs where "
      "nothing has run before.",
      NULL},
-    {"size", get_size, NULL, "Bytes of all outputs.", NULL},
     {"image_size", get_image_size, NULL, "Bytes of all images on the device.", NULL},
     {0},
 };

@@ -177,7 +177,7 @@ def look(renderer: Renderer, which: int, size: int) -> Any:
     assert plan.shares_images(plan)
     assert plan.is_of_image(source)
     scene = scene_source((64, 36))
-    found = [plan.outputs, plan.passes, any_plan.passes, plan.size, source.kind]
+    found: list[Any] = [plan.outputs, plan.passes, any_plan.passes, source.kind]
     found += [_core.dry_run(((source, plan), (source, plan))), core.info, source.exported]
     found += [_core.plan(scene, Separable(), None).passes, len(core.pages(1 << 20))]
     _core.read_dlpack(IMAGES[size].__dlpack__())
