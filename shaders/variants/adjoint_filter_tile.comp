@@ -31,7 +31,7 @@ Window window_at(ivec2 pixel, bool along_x)
     Window window;
     window.first = readers.x;
     if (!along_x && EXACT_ROWS != 0)
-        window.first = offset_of(pixel.y) - (EXACT_ROWS == EXACT_DOUBLE ? 1 : 0) - (WINDOW / 2 - 1);
+        window.first = exact_first(EXACT_ROWS, pixel.y);
     [[unroll]] for (int i = 0; i < WINDOW; ++i) {
         int at = window.first + i - readers.x;
         int place = readers.z + (LEVELS == 0 ? at / 4 : at);
