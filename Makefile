@@ -7,6 +7,7 @@
 #   such as each fault point; takes hours.
 # make check: for use during development: lints the changed files, runs a fast part of the tests.
 # make docs: builds the documentation into build/docs; a warning is a failure.
+# make first-page: the same, and runs the test that reads the built pages.
 # make tables: measures again, and writes the tables of docs/evidence, in more than an hour.
 # make wheels: builds the source distribution, and the wheels of vkbloom, its driver and its compiler for
 #   x86-64 and aarch64, into dist/ (docs/releasing.md); as root.
@@ -51,7 +52,7 @@ FAST := tests/core/test_settings.py tests/core/test_core_arguments.py tests/core
 	tests/methods/test_dither.py tests/methods/test_original_blur.py tests/scene/test_scene.py \
 	tests/io/test_files.py tests/views
 
-.PHONY: demo test test-devices exhaustive check docs tables bench engines engine-laws libplacebo cluster wheels lint \
+.PHONY: demo test test-devices exhaustive check docs first-page tables bench engines engine-laws libplacebo cluster wheels lint \
 	freethreaded try-core try-wheels test-pure test-aarch64 format sanitize clean
 .DELETE_ON_ERROR:
 
@@ -85,6 +86,9 @@ check: build/stamp/core build/stamp/test build/stamp/lint
 docs: build/stamp/core build/stamp/docs
 	rm -rf docs/api docs/examples
 	$(PYTHON) -m sphinx -q -W --keep-going -b html docs build/docs
+
+first-page: docs build/stamp/test
+	$(PYTHON) -m pytest -q tests/docs/test_first_page.py
 
 tables: build/stamp/core build/stamp/test build/stamp/peers
 	$(PYTHON) tools/tables/write.py

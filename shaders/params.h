@@ -673,7 +673,6 @@
     NAME(STORED_UFLOAT, 4, ufloat) \
     NAME(STORED_SRGB8, 5, srgb8) \
     NAME(BLOOM_OWN, 0, own_image) \
-    NAME(BLOOM_LINES, 1, lines) \
     NAME(BLOOM_LIT, 2, lit) \
     NAME(UPSAMPLE_TENT, 0, tent) \
     NAME(UPSAMPLE_LINEAR, 1, linear) \
@@ -682,6 +681,8 @@
     NAME(UPSAMPLE_INSET_CUBIC, 4, inset_cubic) \
     NAME(UPSAMPLE_CORNERS, 5, corners) \
     NAME(UPSAMPLE_INSIDE, 6, inside) \
+    NAME(UPSAMPLE_LEFT_PAIR, 7, left_pair) \
+    NAME(UPSAMPLE_RIGHT_PAIR, 8, right_pair) \
     NAME(GROUPS_PYRAMID, 10, pyramid) \
     NAME(GROUPS_PYGFX, 1, pygfx) \
     NAME(GROUPS_PYGFX_KARIS, 2, pygfx_karis) \

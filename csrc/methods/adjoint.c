@@ -64,21 +64,13 @@ static bool add_table(struct vkb_adjoint *adjoint, struct vkb_error *error)
     return vkb_graph_add_image(adjoint->graph, &row, &adjoint->table_image, error);
 }
 
-// Whether a pass reads texels by rounding, which no transpose does.
-static bool reads_next(const struct vkb_pass_row *pass)
-{
-    return pass->block == VKB_BLOCK_streaks
-             ? pass->params.streaks.reads_next
-             : pass->block == VKB_BLOCK_blender_end && pass->params.blender_end.reads_next;
-}
-
 // Adds the adjoint passes, from the last pass to the first.
 static bool add_passes(struct vkb_adjoint *adjoint, const struct vkb_settings *settings,
                        bool *possible, struct vkb_error *error)
 {
     for (uint32_t i = adjoint->graph->pass_count; *possible && i-- > 0;) {
         const struct vkb_pass_row pass = adjoint->graph->passes[i];
-        vkb_transpose *transpose = reads_next(&pass) ? NULL : transposes[pass.block];
+        vkb_transpose *transpose = pass.no_transpose ? NULL : transposes[pass.block];
         if (pass.target_count != 1 || vkb_cotangent_of(adjoint, &pass) == VKB_NO_IMAGE)
             continue;
         const bool convolved = pass.block == VKB_BLOCK_fft;
@@ -86,7 +78,6 @@ static bool add_passes(struct vkb_adjoint *adjoint, const struct vkb_settings *s
         if (convolved ? !vkb_transpose_convolution(adjoint, settings, &pass, error)
                       : transpose && !transpose(adjoint, &pass, error))
             return false;
-        *possible = *possible && !adjoint->scattered;
     }
     return !*possible || vkb_end_scene(adjoint, error);
 }

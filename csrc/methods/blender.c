@@ -377,7 +377,8 @@ static bool add_end(const struct glare *glare, uint32_t light, uint32_t *bloom,
         float *next = row.params.blender_end.next[0];
         next[0] = next_bits(from.width, to.width, 0.0f, 0.0);
         next[1] = next_bits(from.height, to.height, 0.0f, 0.0);
-        row.params.blender_end.reads_next = next[0] > 0.0f || next[1] > 0.0f;
+        row.no_transpose = next[0] > 0.0f || next[1] > 0.0f;
+        row.params.blender_end.reads_next = row.no_transpose;
     }
     return vkb_graph_add_pass(glare->levels.graph, &row, error);
 }

@@ -39,15 +39,6 @@ static struct vkb_size size_of(const struct stage *stage, uint32_t image)
     return (struct vkb_size){row->width, row->height};
 }
 
-// Its taps may be anywhere, and its images are beside the bloom's levels.
-static struct vkb_pass_row glare_row(const struct vkb_levels *levels,
-                                     const struct vkb_shader *fragment, uint32_t from, uint32_t to)
-{
-    struct vkb_pass_row row = vkb_fetching_row(levels, fragment, from, to);
-
-    return row;
-}
-
 // The weights of iteration i: f^(k base^i) for tap k, all divided by their sum, times a gain. Of
 // each tap but the first two channels, which alternate, are less.
 static void set_weights(const struct vkb_glare_values *values, int iteration, double gain,
@@ -89,7 +80,8 @@ bool vkb_add_ray(const struct vkb_levels *levels, const struct vkb_ray *ray,
 {
     const struct vkb_glare_values *values = ray->values;
     const double step = values->length * pow(values->base, ray->iteration);
-    struct vkb_pass_row row = glare_row(levels, &vkb_shader_streaks_frag, ray->from, ray->to);
+    struct vkb_pass_row row =
+        vkb_fetching_row(levels, &vkb_shader_streaks_frag, ray->from, ray->to);
     struct vkb_streaks_params *params = &row.params.streaks;
 
     add_before(&row, ray->before);
@@ -101,7 +93,8 @@ bool vkb_add_ray(const struct vkb_levels *levels, const struct vkb_ray *ray,
     params->step_y = step_of(step * sin(ray->angle));
     params->threshold = ray->iteration == 0 ? values->threshold : 0.0f;
     params->limit = vkb_formats[levels->source->format].limit;
-    params->reads_next = ray->next != NULL;
+    row.no_transpose = ray->next != NULL;
+    params->reads_next = row.no_transpose;
     if (ray->next)
         memcpy(params->next, ray->next, sizeof params->next);
     return vkb_graph_add_pass(levels->graph, &row, error);
@@ -155,12 +148,13 @@ bool vkb_add_flare(const struct vkb_levels *levels, const struct vkb_stage *stag
 {
     const struct vkb_glare_values *values = &stage->values;
     const bool ghosts = stage->kind == VKB_STAGE_GHOSTS;
-    struct vkb_pass_row row =
-        glare_row(levels, ghosts ? &vkb_shader_ghosts_frag : &vkb_shader_halo_frag, from, to);
+    struct vkb_pass_row row = vkb_fetching_row(
+        levels, ghosts ? &vkb_shader_ghosts_frag : &vkb_shader_halo_frag, from, to);
 
     if (ghosts)
         add_before(&row, before);
     row.block = VKB_BLOCK_flare;
+    row.no_transpose = !ghosts || values->aberration > 0.0f;
     row.params.flare = (struct vkb_flare_params){
         .threshold = values->threshold,
         .limit = vkb_formats[levels->source->format].limit,

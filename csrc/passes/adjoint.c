@@ -171,6 +171,21 @@ static bool accumulate_twice(struct vkb_adjoint *adjoint, const struct vkb_filte
         && accumulate_along(adjoint, filter, !rows, between, image, error);
 }
 
+// The row of both axes at once.
+static bool make_row_of_both(struct vkb_adjoint *adjoint, const struct vkb_filter *filter,
+                             uint32_t cotangents, struct vkb_pass_row *row, struct vkb_error *error)
+{
+    uint32_t x, y;
+
+    *row = filter_row(adjoint, filter, DIRECTION_BOTH, cotangents);
+    if (!vkb_axis_transpose(&filter->x, true, &adjoint->table, &x, error)
+        || !vkb_axis_transpose(&filter->y, true, &adjoint->table, &y, error))
+        return false;
+    row->params.adjoint_filter.start_x = (int)x;
+    row->params.adjoint_filter.start_y = (int)y;
+    return true;
+}
+
 // Whether the filter leaves the cotangents as they are, and nothing is added to them.
 static bool keeps_cotangents(const struct vkb_adjoint *adjoint, const struct vkb_filter *filter,
                              uint32_t image)
@@ -187,9 +202,7 @@ bool vkb_accumulate_filter(struct vkb_adjoint *adjoint, const struct vkb_filter 
         adjoint->cotangents[image] = cotangents;
         return true;
     }
-    struct vkb_pass_row row = filter_row(adjoint, filter, DIRECTION_BOTH, cotangents);
-    struct vkb_adjoint_filter_params *params = &row.params.adjoint_filter;
-    uint32_t start_x, start_y;
+    struct vkb_pass_row row;
 
     if (filter->kernels == 1) {
         if (vkb_axis_is_identity(&filter->y))
@@ -199,12 +212,8 @@ bool vkb_accumulate_filter(struct vkb_adjoint *adjoint, const struct vkb_filter 
         if (vkb_axis_readers(&filter->x) * vkb_axis_readers(&filter->y) > MAX_IN_ONE_PASS)
             return accumulate_twice(adjoint, filter, cotangents, image, error);
     }
-    if (!vkb_axis_transpose(&filter->x, true, &adjoint->table, &start_x, error)
-        || !vkb_axis_transpose(&filter->y, true, &adjoint->table, &start_y, error))
-        return false;
-    params->start_x = (int)start_x;
-    params->start_y = (int)start_y;
-    return vkb_accumulate_cotangent(adjoint, &row, image, error);
+    return make_row_of_both(adjoint, filter, cotangents, &row, error)
+        && vkb_accumulate_cotangent(adjoint, &row, image, error);
 }
 
 bool vkb_add_adjoint_image(struct vkb_adjoint *adjoint, const struct vkb_pass_row *given,
@@ -220,15 +229,10 @@ bool vkb_filter_to_image(struct vkb_adjoint *adjoint, const struct vkb_filter *f
                          uint32_t cotangents, struct vkb_size size, uint32_t *image,
                          struct vkb_error *error)
 {
-    struct vkb_pass_row row = filter_row(adjoint, filter, DIRECTION_BOTH, cotangents);
-    uint32_t start_x, start_y;
+    struct vkb_pass_row row;
 
-    if (!vkb_axis_transpose(&filter->x, true, &adjoint->table, &start_x, error)
-        || !vkb_axis_transpose(&filter->y, true, &adjoint->table, &start_y, error))
-        return false;
-    row.params.adjoint_filter.start_x = (int)start_x;
-    row.params.adjoint_filter.start_y = (int)start_y;
-    return vkb_add_adjoint_image(adjoint, &row, size, image, error);
+    return make_row_of_both(adjoint, filter, cotangents, &row, error)
+        && vkb_add_adjoint_image(adjoint, &row, size, image, error);
 }
 
 bool vkb_accumulate_through(struct vkb_adjoint *adjoint, const struct vkb_pass_row *row,
@@ -249,17 +253,21 @@ bool vkb_accumulate_through(struct vkb_adjoint *adjoint, const struct vkb_pass_r
     return done;
 }
 
+bool vkb_accumulate_sampled(struct vkb_adjoint *adjoint, const struct vkb_pass_row *row,
+                            uint32_t image, uint32_t target, struct vkb_error *error)
+{
+    struct vkb_filter filter;
+
+    vkb_filter_begin(adjoint->graph, image, target, &filter);
+    return vkb_accumulate_through(adjoint, row, &filter, image, target, error);
+}
+
 bool vkb_accumulate_mask(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
                          struct vkb_pass_row *row, struct vkb_error *error)
 {
-    const uint32_t target = pass->targets[0];
-    struct vkb_filter filter;
-
-    if (!pass->constants.masked)
-        return true;
     row->constants.by = BY_MASK;
-    vkb_filter_begin(adjoint->graph, pass->reads[1], target, &filter);
-    return vkb_accumulate_through(adjoint, row, &filter, pass->reads[1], target, error);
+    return !pass->constants.masked
+        || vkb_accumulate_sampled(adjoint, row, pass->reads[1], pass->targets[0], error);
 }
 
 static struct vkb_size blocks_of(struct vkb_size size)

@@ -14,8 +14,7 @@ struct vkb_adjoint {
     uint32_t *cotangents;  // by forward image: its cotangents so far; VKB_NO_IMAGE: none
     uint32_t added;        // images so far
     uint32_t max_side;
-    bool sums;       // the derivatives by fields are wanted, not those by images
-    bool scattered;  // a pass has samples that are not on a grid, whose transpose the core lacks
+    bool sums;  // the derivatives by fields are wanted, not those by images
     // The cotangents of the scene of a composite without a curve are `share` times those that the
     // composite has. The next pass that accumulates cotangents of the scene adds them itself.
     uint32_t scene;  // VKB_NO_IMAGE: there is no such composite, or its row was added
@@ -69,6 +68,10 @@ bool vkb_filter_to_image(struct vkb_adjoint *adjoint, const struct vkb_filter *f
 bool vkb_accumulate_through(struct vkb_adjoint *adjoint, const struct vkb_pass_row *row,
                             const struct vkb_filter *filter, uint32_t image, uint32_t target,
                             struct vkb_error *error);
+
+// The same of an image that the pixels of the target sample linearly.
+bool vkb_accumulate_sampled(struct vkb_adjoint *adjoint, const struct vkb_pass_row *row,
+                            uint32_t image, uint32_t target, struct vkb_error *error);
 
 // If the pass reads a mask, its second image: accumulates the row's result by it, at the target's
 // pixels.

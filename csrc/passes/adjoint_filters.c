@@ -37,7 +37,7 @@ bool vkb_transpose_blur(struct vkb_adjoint *adjoint, const struct vkb_pass_row *
     if (direction != DIRECTION_HORIZONTAL)
         set_line(params, radius, params->step_y, pass->constants.taps, &filter.y);
     if (pass->constants.upsample)
-        filter.x.kind = VKB_KIND_INSET_LINEAR;
+        filter.x.kind = UPSAMPLE_INSET_LINEAR;
     return vkb_accumulate_filter(adjoint, &filter, vkb_cotangent_of(adjoint, pass), pass->reads[0],
                                  error);
 }
@@ -107,14 +107,13 @@ static bool accumulate_first_blur(struct vkb_adjoint *adjoint, const struct vkb_
     const struct vkb_size size = {blur->x.to, blur->y.to};
     const bool rows = pass->constants.direction == DIRECTION_HORIZONTAL;
     uint32_t cotangents = vkb_cotangent_of(adjoint, pass);
-    struct vkb_filter filter;
 
     if (rows && !vkb_filter_to_image(adjoint, blur, cotangents, size, &cotangents, error))
         return false;
     struct vkb_pass_row row = vkb_slope_row(adjoint, pass, &vkb_shader_adjoint_godot_blur_frag, 2);
     row.reads[2] = cotangents;
-    vkb_filter_begin(adjoint->graph, source, target, &filter);
-    return vkb_accumulate_through(adjoint, &row, rows ? &filter : blur, source, target, error)
+    return (rows ? vkb_accumulate_sampled(adjoint, &row, source, target, error)
+                 : vkb_accumulate_through(adjoint, &row, blur, source, target, error))
         && vkb_accumulate_mask(adjoint, pass, &row, error);
 }
 
@@ -136,13 +135,6 @@ bool vkb_transpose_godot_blur(struct vkb_adjoint *adjoint, const struct vkb_pass
                                  error);
 }
 
-// What the taps of a row sample, by UPSAMPLE_*.
-static const enum vkb_kind kinds[] = {
-    [UPSAMPLE_LINEAR] = VKB_KIND_LINEAR,           [UPSAMPLE_CUBIC] = VKB_KIND_CUBIC,
-    [UPSAMPLE_INSIDE] = VKB_KIND_INSIDE,           [UPSAMPLE_INSET_LINEAR] = VKB_KIND_INSET_LINEAR,
-    [UPSAMPLE_INSET_CUBIC] = VKB_KIND_INSET_CUBIC,
-};
-
 static void set_taps(const float (*taps)[4], int32_t count, enum vkb_mode kind,
                      struct vkb_axis *axis)
 {
@@ -153,7 +145,7 @@ static void set_taps(const float (*taps)[4], int32_t count, enum vkb_mode kind,
         for (int kernel = 0; kernel < MAX_KERNELS; ++kernel)
             tap->weights[kernel] = taps[i][kernel + 1];
     }
-    axis->kind = kinds[kind];
+    axis->kind = kind;
 }
 
 bool vkb_transpose_filter(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
@@ -186,7 +178,7 @@ bool vkb_transpose_gather(struct vkb_adjoint *adjoint, const struct vkb_pass_row
     for (int level = 0; level < pass->constants.levels; ++level) {
         vkb_filter_begin(adjoint->graph, pass->reads[level], pass->targets[0], &filter);
         filter.gain = pass->params.gather.shares[level / 4][level % 4];
-        filter.x.kind = filter.y.kind = kinds[pass->constants.upsample];
+        filter.x.kind = filter.y.kind = (enum vkb_mode)pass->constants.upsample;
         if (!vkb_accumulate_filter(adjoint, &filter, vkb_cotangent_of(adjoint, pass),
                                    pass->reads[level], error))
             return false;

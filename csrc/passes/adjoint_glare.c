@@ -88,9 +88,6 @@ bool vkb_transpose_flare(struct vkb_adjoint *adjoint, const struct vkb_pass_row 
     struct vkb_pass_row row = vkb_slope_row(adjoint, pass, &vkb_shader_adjoint_flare_frag, 1);
     struct vkb_filter filter;
 
-    adjoint->scattered = params->count == 0 || params->aberration > 0.0f;
-    if (adjoint->scattered)
-        return true;
     if (pass->constants.add_own && !accumulate_all(adjoint, row.reads[1], pass->reads[1], error))
         return false;
     row.constants.add_own = 0;

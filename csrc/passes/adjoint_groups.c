@@ -64,8 +64,8 @@ static void set_group(const struct vkb_pass_row *row, int group, struct vkb_filt
         filter->x.taps[0].offset = place[0];
         filter->y.taps[0].offset = place[1];
     } else if (groups == GROUPS_FILAMENT && row->constants.thresholded) {
-        filter->x.kind = group & 1 ? VKB_KIND_RIGHT_PAIR : VKB_KIND_LEFT_PAIR;
-        filter->y.kind = group & 2 ? VKB_KIND_RIGHT_PAIR : VKB_KIND_LEFT_PAIR;
+        filter->x.kind = group & 1 ? UPSAMPLE_RIGHT_PAIR : UPSAMPLE_LEFT_PAIR;
+        filter->y.kind = group & 2 ? UPSAMPLE_RIGHT_PAIR : UPSAMPLE_LEFT_PAIR;
     } else if (groups == GROUPS_FILAMENT) {
         vkb_filter_three(filter, 1.0, 0.25);
     } else if (groups == GROUPS_HIGHLIGHTS && row->constants.radius > 1) {

@@ -120,16 +120,6 @@ bool vkb_transpose_godot_composite(struct vkb_adjoint *adjoint, const struct vkb
     return accumulate_composite(adjoint, &row, error);
 }
 
-// Accumulates what is at the pixels of the target for an image that these sample linearly.
-static bool accumulate_sampled(struct vkb_adjoint *adjoint, const struct vkb_pass_row *row,
-                               uint32_t image, uint32_t target, struct vkb_error *error)
-{
-    struct vkb_filter filter;
-
-    vkb_filter_begin(adjoint->graph, image, target, &filter);
-    return vkb_accumulate_through(adjoint, row, &filter, image, target, error);
-}
-
 bool vkb_transpose_threshold(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
                              struct vkb_error *error)
 {
@@ -140,7 +130,7 @@ bool vkb_transpose_threshold(struct vkb_adjoint *adjoint, const struct vkb_pass_
         && !vkb_add_sums(adjoint, &row, size_of(adjoint, target), "by_threshold", error))
         return false;
     row.constants.by = BY_SCENE;
-    return accumulate_sampled(adjoint, &row, pass->reads[0], target, error)
+    return vkb_accumulate_sampled(adjoint, &row, pass->reads[0], target, error)
         && vkb_accumulate_mask(adjoint, pass, &row, error);
 }
 
@@ -149,5 +139,5 @@ bool vkb_transpose_blender_end(struct vkb_adjoint *adjoint, const struct vkb_pas
 {
     struct vkb_pass_row row = vkb_slope_row(adjoint, pass, &vkb_shader_adjoint_blender_end_frag, 1);
 
-    return accumulate_sampled(adjoint, &row, pass->reads[0], pass->targets[0], error);
+    return vkb_accumulate_sampled(adjoint, &row, pass->reads[0], pass->targets[0], error);
 }

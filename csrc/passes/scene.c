@@ -7,8 +7,9 @@ struct vkb_mesh_params vkb_scene_params(const struct vkb_scene_source *source)
 {
     struct vkb_mesh_params params = {0};
 
-    vkb_scene_matrices(&source->camera, source->time,
-                       (double)source->size.width / source->size.height, &params);
+    memcpy(params.projection, source->projection, sizeof params.projection);
+    memcpy(params.model_view, source->model_view, sizeof params.model_view);
+    memcpy(params.sky, source->sky, sizeof params.sky);
     return params;
 }
 

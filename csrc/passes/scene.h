@@ -7,8 +7,8 @@
 
 // A frame of a scene.
 struct vkb_scene_source {
-    struct vkb_camera camera;
-    double time;
+    // Those of the camera and of the body (python/vkbloom/_scene/view.py).
+    float projection[1][4], model_view[3][4], sky[3][4];
     struct vkb_size size;
     double glow_intensity;
     bool has_sky, has_glow, has_emission;  // the body's materials emit

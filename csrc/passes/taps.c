@@ -14,7 +14,8 @@ static void begin_axis(uint32_t from, uint32_t to, struct vkb_axis *axis)
     const struct vkb_tap centre = {.weights = {1.0}};
     const double step = (double)from / to;
 
-    *axis = (struct vkb_axis){.from = from, .to = to, .origin = 0.5 * step - 0.5, .step = step};
+    *axis = (struct vkb_axis){
+        .from = from, .to = to, .origin = 0.5 * step - 0.5, .step = step, .kind = UPSAMPLE_LINEAR};
     vkb_axis_set(axis, &centre, 1);
 }
 
@@ -45,7 +46,7 @@ void vkb_axis_set(struct vkb_axis *axis, const struct vkb_tap *taps, uint32_t co
 bool vkb_axis_is_identity(const struct vkb_axis *axis)
 {
     return axis->from == axis->to && axis->origin == 0.0 && axis->step == 1.0 && axis->first == 0
-        && axis->kind == VKB_KIND_LINEAR && axis->count == 1 && axis->taps[0].offset == 0.0
+        && axis->kind == UPSAMPLE_LINEAR && axis->count == 1 && axis->taps[0].offset == 0.0
         && axis->taps[0].weights[0] == 1.0;
 }
 
@@ -58,7 +59,7 @@ double vkb_axis_readers(const struct vkb_axis *axis)
         high = fmax(high, axis->taps[i].offset);
     }
     const double apart = axis->border > VKB_BORDER_ZERO ? axis->step : 1.0;
-    return ((high - low) * apart + (axis->kind == VKB_KIND_CUBIC ? 4.0 : 2.0)) / fabs(axis->step);
+    return ((high - low) * apart + (axis->kind == UPSAMPLE_CUBIC ? 4.0 : 2.0)) / fabs(axis->step);
 }
 
 // The texels from `first` on that a pixel samples with a tap, and their shares.
@@ -130,19 +131,21 @@ static struct sample sample_at(const struct vkb_axis *axis, uint32_t pixel, doub
     const double inset = fmin(position, axis->from - 1.5);
 
     switch (axis->kind) {
-    case VKB_KIND_CUBIC:
+    case UPSAMPLE_CUBIC:
         return cubic_sample(position);
-    case VKB_KIND_INSIDE:
+    case UPSAMPLE_INSIDE:
         if (offset != 0.0 && (position < -0.5001 || position > axis->from - 0.4999))
             return (struct sample){.count = 0};
         return linear_sample(position);
-    case VKB_KIND_INSET_LINEAR:
+    case UPSAMPLE_INSET_LINEAR:
         return linear_sample(inset);
-    case VKB_KIND_INSET_CUBIC:
+    case UPSAMPLE_INSET_CUBIC:
         return inset_cubic_sample(axis, fmin(position - offset, axis->from - 1.5), offset);
-    case VKB_KIND_LEFT_PAIR:
+    // Filament's reduction: the texels around a position have the weights (1 - f, 2 - f, 1 + f, f).
+    // The first two of them, or the last two, divided by their sum.
+    case UPSAMPLE_LEFT_PAIR:
         return linear_sample(texel - 1.0 + (2.0 - part) / (3.0 - 2.0 * part));
-    case VKB_KIND_RIGHT_PAIR:
+    case UPSAMPLE_RIGHT_PAIR:
         return linear_sample(texel + 1.0 + part / (1.0 + 2.0 * part));
     default:
         return linear_sample(position);

@@ -19,22 +19,6 @@ struct vkb_tap {
     double offset, weights[VKB_MAX_KERNELS];
 };
 
-// What a tap samples at its position.
-enum vkb_kind {
-    VKB_KIND_LINEAR,
-    VKB_KIND_CUBIC,   // a cubic B-spline
-    VKB_KIND_INSIDE,  // linear; nothing where the position is outside of the image
-    // HDRP's upsampling: no position is beyond the middle of the last two texels. The cubic
-    // B-spline is two linear samples, with the offsets -1 and 1, neither beyond 1 - 1 / size of the
-    // target.
-    VKB_KIND_INSET_LINEAR,
-    VKB_KIND_INSET_CUBIC,
-    // Filament's reduction: the texels around a position have the weights (1 - f, 2 - f, 1 + f, f).
-    // The first two of them, or the last two, divided by their sum.
-    VKB_KIND_LEFT_PAIR,
-    VKB_KIND_RIGHT_PAIR,
-};
-
 // What taps read beyond the first and the last pixel, where they are pixels of the target apart.
 enum vkb_border {
     VKB_BORDER_NONE,  // they are texels apart
@@ -50,7 +34,7 @@ enum vkb_border {
 struct vkb_axis {
     uint32_t from, to;
     double origin, step;
-    enum vkb_kind kind;
+    enum vkb_mode kind;  // what a tap samples at its position: UPSAMPLE_*
     enum vkb_border border;
     uint32_t first;  // where pixel 0 is in the image that the transpose reads
     uint32_t count;

@@ -1,6 +1,7 @@
 // DLPack's structs: https://dmlc.github.io/dlpack/latest/c_api.html
 #include "python/dlpack.h"
 #include "python/module.h"
+#include "python/values.h"
 
 enum { DEVICE_CUDA = 2 };  // kDLCUDA
 
@@ -47,38 +48,13 @@ struct shared {
     struct versioned versioned;
 };
 
-// A producer that knows no versions of DLPack raises TypeError for `max_version`.
-PyObject *vkb_call_dlpack(PyObject *array, void *stream)
-{
-    PyObject *method = PyObject_GetAttrString(array, "__dlpack__");
-    PyObject *nothing = PyTuple_New(0);
-    PyObject *options =
-        Py_BuildValue("{sNs(ii)}", "stream", PyLong_FromVoidPtr(stream), "max_version", 1, 0);
-    PyObject *capsule = NULL;
-
-    if (method && nothing && options) {
-        capsule = PyObject_Call(method, nothing, options);
-        if (!capsule && PyErr_ExceptionMatches(PyExc_TypeError)) {
-            PyErr_Clear();
-            if (PyDict_DelItemString(options, "max_version") == 0)
-                capsule = PyObject_Call(method, nothing, options);
-        }
-    }
-    Py_XDECREF(method);
-    Py_XDECREF(nothing);
-    Py_XDECREF(options);
-    return capsule;
-}
-
 static PyObject *numbers(const int64_t *values, int32_t count)
 {
     PyObject *tuple = PyTuple_New(count);
 
-    for (int32_t i = 0; tuple && i < count; ++i) {
-        PyObject *number = PyLong_FromLongLong(values[i]);
-        if (!number || PyTuple_SetItem(tuple, i, number) < 0)
+    for (int32_t i = 0; tuple && i < count; ++i)
+        if (!vkb_set_item(tuple, i, PyLong_FromLongLong(values[i])))
             Py_CLEAR(tuple);
-    }
     return tuple;
 }
 

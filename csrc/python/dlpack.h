@@ -4,9 +4,6 @@
 
 #include "python/objects.h"
 
-// Asks an array for a capsule that is ordered before later work of the stream.
-PyObject *vkb_call_dlpack(PyObject *array, void *stream);
-
 // A dense array on a GPU.
 struct vkb_dlpack_array {
     PyObject *owner;  // which keeps the memory

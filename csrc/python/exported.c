@@ -25,7 +25,7 @@ void vkb_release_exports(struct vkb_exports *exports)
     do {
         VKB_LOCK(vkb_memory);
         surplus = vkb_exports_surplus(exports);
-        last = !surplus && vkb_exports_end_use(exports);
+        last = !surplus && --exports->users == 0;
         VKB_UNLOCK(vkb_memory);
         if (surplus) {
             Py_BEGIN_ALLOW_THREADS
@@ -91,7 +91,7 @@ static struct vkb_exports *use_exports(struct vkb_renderer *renderer, struct vkb
     VKB_LOCK(vkb_memory);
     struct vkb_exports *exports = open_exports(renderer, error);
     if (exports)
-        vkb_exports_begin_use(exports);
+        ++exports->users;
     VKB_UNLOCK(vkb_memory);
     return exports;
 }
@@ -172,29 +172,28 @@ PyObject *vkb_renderer_cuda_name(PyObject *object, PyObject *ordinal)
     return exports ? PyUnicode_FromString(name) : vkb_raise(state, &error);
 }
 
-PyObject *vkb_renderer_dlpack(PyObject *object, PyObject *image)
+PyObject *vkb_renderer_in_context(PyObject *object, PyObject *function)
 {
     const struct vkb_module_state *state = PyType_GetModuleState(Py_TYPE(object));
     struct vkb_error error = {0};
-    PyObject *capsule = NULL;
+    PyObject *result = NULL;
 
-    // The producer's code may close the renderer, and so may other threads beside it.
+    // The function may close the renderer, and so may other threads beside it.
     struct vkb_exports *exports = use_exports((struct vkb_renderer *)object, &error);
     if (!exports)
         return vkb_raise(state, &error);
-    // PyTorch exports only tensors of the current device.
     bool done = vkb_cuda_require_no_capture(exports->cuda, NULL, &error)
              && vkb_cuda_enter(exports->cuda, &error);
     if (done) {
-        capsule = vkb_call_dlpack(image, vkb_cuda_stream(exports->cuda));
+        result = PyObject_CallObject(function, NULL);
         vkb_cuda_leave(exports->cuda);
         // A producer whose stream is captured takes this one into the capture.
-        done = !capsule || vkb_cuda_require_no_capture(exports->cuda, NULL, &error);
+        done = !result || vkb_cuda_require_no_capture(exports->cuda, NULL, &error);
     }
     vkb_release_exports(exports);
     if (done)
-        return capsule;
-    Py_XDECREF(capsule);
+        return result;
+    Py_XDECREF(result);
     return vkb_raise(state, &error);
 }
 
@@ -383,7 +382,7 @@ static PyObject *clone_export(PyObject *object, PyObject *arguments)
     VKB_LOCK(vkb_memory);
     const bool open = self->exports->device;
     if (open) {
-        vkb_exports_begin_use(self->exports);
+        ++self->exports->users;
         other->exports = self->exports;
     }
     VKB_UNLOCK(vkb_memory);

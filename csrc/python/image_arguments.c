@@ -6,18 +6,12 @@
 
 #include <string.h>
 
-// NumPy writes "=" for unaligned arrays, and "<" or ">" where a dtype names its byte order.
+// NumPy writes "=" for unaligned arrays.
 char vkb_element_code(const Py_buffer *view)
 {
     const char *format = view->format ? view->format : "B";
-    const uint16_t probe = 1;
-    const bool is_little = *(const unsigned char *)&probe == 1;
-    const bool is_native = *format == '@' || *format == '=' || *format == (is_little ? '<' : '>')
-                        || (*format == '!' && !is_little);
 
-    // A byte has no order.
-    if (is_native || (view->itemsize == 1 && *format && strchr("<>!", *format)))
-        ++format;
+    format += *format == '=';
     return strlen(format) == 1 ? *format : 0;
 }
 
@@ -33,12 +27,6 @@ enum vkb_format vkb_pixel_format(char code)
     return code == 'B' ? VKB_FORMAT_RGBA8_UNORM
          : code == 'e' ? VKB_FORMAT_RGBA16_FLOAT
                        : VKB_FORMAT_RGBA32_FLOAT;
-}
-
-static bool hold_image(PyObject *array, struct vkb_held_image *image)
-{
-    image->held = PyObject_GetBuffer(array, &image->view, PyBUF_STRIDES | PyBUF_FORMAT) == 0;
-    return image->held;
 }
 
 static bool has_sides(const Py_buffer *view)
@@ -96,47 +84,43 @@ static bool read_exported(PyObject *tuple, struct vkb_held_image *image)
     return true;
 }
 
-bool vkb_read_image(PyObject *array, const char *name, struct vkb_held_image *image)
+// An array with those element types, of two dimensions or, with channels, of three.
+static bool read_array(PyObject *array, const char *name, const char *codes, bool has_channels,
+                       struct vkb_held_image *image)
 {
     const Py_buffer *view = &image->view;
 
+    image->held = PyObject_GetBuffer(array, &image->view, PyBUF_STRIDES | PyBUF_FORMAT) == 0;
+    if (!image->held)
+        return false;
+    if (!vkb_has_element(view, codes)) {
+        PyErr_Format(PyExc_TypeError, "%s: elements of the format \"%s\" are not of \"%s\"", name,
+                     view->format ? view->format : "B", codes);
+        return false;
+    }
+    if (view->ndim == 2 + has_channels && has_sides(view)
+        && (!has_channels || view->shape[2] == 3 || view->shape[2] == 4))
+        return true;
+    PyErr_Format(PyExc_ValueError, "%s: a shape of %s is needed", name,
+                 has_channels ? "(H, W, 3) or (H, W, 4)" : "(H, W)");
+    return false;
+}
+
+bool vkb_read_image(PyObject *array, const char *name, struct vkb_held_image *image)
+{
     if (PyTuple_Check(array))
         return read_exported(array, image);
-    if (!hold_image(array, image))
+    if (!read_array(array, name, "Bef", true, image))
         return false;
-    if (!vkb_has_element(view, "Bef")) {
-        PyErr_Format(PyExc_TypeError,
-                     "%s: elements of the format \"%s\" are not uint8, float16 or float32 in this "
-                     "machine's byte order",
-                     name, view->format);
-        return false;
-    }
-    if (view->ndim != 3 || !has_sides(view) || (view->shape[2] != 3 && view->shape[2] != 4)) {
-        PyErr_Format(PyExc_ValueError, "%s: a shape of (H, W, 3) or (H, W, 4) is needed", name);
-        return false;
-    }
-    image->input = input_of(view, vkb_pixel_format(vkb_element_code(view)));
+    image->input = input_of(&image->view, vkb_pixel_format(vkb_element_code(&image->view)));
     return true;
 }
 
 bool vkb_read_mask(PyObject *array, struct vkb_held_image *image)
 {
-    const Py_buffer *view = &image->view;
-
-    if (!hold_image(array, image))
+    if (!read_array(array, "mask", "f", false, image))
         return false;
-    if (!vkb_has_element(view, "f")) {
-        PyErr_Format(PyExc_TypeError,
-                     "mask: elements of the format \"%s\" are not float32 in this machine's byte "
-                     "order",
-                     view->format ? view->format : "B");
-        return false;
-    }
-    if (view->ndim != 2 || !has_sides(view)) {
-        PyErr_SetString(PyExc_ValueError, "mask: a shape of (H, W) is needed");
-        return false;
-    }
-    image->input = input_of(view, VKB_FORMAT_R32_FLOAT);
+    image->input = input_of(&image->view, VKB_FORMAT_R32_FLOAT);
     return true;
 }
 

@@ -7,16 +7,17 @@ static bool read_kernel_tuple(PyObject *tuple, struct vkb_held_kernel *held,
                               struct vkb_kernel_data *kernel)
 {
     PyObject *pixels;
+    unsigned long long serial;
     int grey;
 
     if (!vkb_require_tuple(tuple, "core_kernel")
-        || !PyArg_ParseTuple(tuple,
-                             "OO&p(fff);core_kernel must be (pixels, serial, grey, prefilter)",
-                             &pixels, vkb_read_serial, &kernel->serial, &grey,
-                             &kernel->prefilter[0], &kernel->prefilter[1], &kernel->prefilter[2])
+        || !PyArg_ParseTuple(
+            tuple, "OKp(fff);core_kernel must be (pixels, serial, grey, prefilter)", &pixels,
+            &serial, &grey, &kernel->prefilter[0], &kernel->prefilter[1], &kernel->prefilter[2])
         || PyObject_GetBuffer(pixels, &held->view, PyBUF_C_CONTIGUOUS | PyBUF_FORMAT) < 0)
         return false;
     held->held = true;
+    kernel->serial = serial;
     if (!vkb_has_element(&held->view, "f") || held->view.ndim != 3 || held->view.shape[2] != 4
         || held->view.shape[0] < 1 || held->view.shape[0] > VKB_MAX_SIDE || held->view.shape[1] < 1
         || held->view.shape[1] > VKB_MAX_SIDE) {

@@ -24,6 +24,10 @@ static void release_views(struct vkb_pending *pending)
 
 void vkb_pending_release(struct vkb_pending *pending)
 {
+    PyObject *type, *value, *traceback;
+
+    // Released objects may run Python code.
+    PyErr_Fetch(&type, &value, &traceback);
     release_views(pending);
     vkb_free(pending->requests);
     vkb_free(pending->outputs);
@@ -33,6 +37,7 @@ void vkb_pending_release(struct vkb_pending *pending)
     Py_XDECREF(pending->plans);
     release_source(pending);
     vkb_free(pending);
+    PyErr_Restore(type, value, traceback);
 }
 
 int vkb_pending_traverse(const struct vkb_pending *pending, visitproc visit, void *arg)
@@ -106,20 +111,14 @@ static struct vkb_pending *take_over(struct vkb_renderer *self)
 }
 
 // Called with the GIL and without the lock: it may run Python code, which may wait for a thread
-// that waits for the renderer. A set exception is kept.
+// that waits for the renderer.
 static void release_all(struct vkb_pending *over)
 {
-    PyObject *type, *value, *traceback;
-
-    if (!over)
-        return;
-    PyErr_Fetch(&type, &value, &traceback);
     while (over) {
         struct vkb_pending *next = over->next;
         vkb_pending_release(over);
         over = next;
     }
-    PyErr_Restore(type, value, traceback);
 }
 
 void vkb_renderer_release_finished(struct vkb_renderer *self)

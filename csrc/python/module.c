@@ -1,6 +1,7 @@
 // The extension module: its state, its exceptions, the tables of the settings.
 #include "python/module.h"
 #include "python/arguments.h"
+#include "python/values.h"
 
 #include "graph/params.h"
 
@@ -28,12 +29,9 @@ static PyObject *adapters(PyObject *module, PyObject *arguments)
         return vkb_raise(vkb_module_state(module), &error);
 
     PyObject *list = PyList_New(0);
-    for (uint32_t i = 0; list && i < count; ++i) {
-        PyObject *tuple = vkb_adapter_tuple(&found[i]);
-        if (!tuple || PyList_Append(list, tuple) < 0)
+    for (uint32_t i = 0; list && i < count; ++i)
+        if (!vkb_append_item(list, vkb_adapter_tuple(&found[i])))
             Py_CLEAR(list);
-        Py_XDECREF(tuple);
-    }
     return list;
 }
 
@@ -108,11 +106,9 @@ static PyObject *name_tuple(const char *const *names, Py_ssize_t count)
 {
     PyObject *tuple = PyTuple_New(count);
 
-    for (Py_ssize_t i = 0; tuple && i < count; ++i) {
-        PyObject *name = PyUnicode_FromString(names[i]);
-        if (!name || PyTuple_SetItem(tuple, i, name) < 0)
+    for (Py_ssize_t i = 0; tuple && i < count; ++i)
+        if (!vkb_set_item(tuple, i, PyUnicode_FromString(names[i])))
             Py_CLEAR(tuple);
-    }
     return tuple;
 }
 
@@ -145,41 +141,34 @@ static PyObject *choice_table(void)
     return table;
 }
 
-// The exceptions under vkbloom.Error, by kind; each may have a built-in class as a second base.
+// The exceptions under vkbloom.Error, by kind.
 static const struct error_row {
     enum vkb_error_kind kind;
     const char *name;
     const char *doc;
+    PyObject **second;  // a built-in class that is its second base; NULL: none
 } error_rows[] = {
     {VKB_ERROR_GENERAL, "Error",
      "Something failed in the core; base of the package's own exceptions.\n\n"
      "Attributes\n----------\n"
      "vk_call : str or None\n    The Vulkan call that failed.\n"
-     "vk_result : int or None\n    The VkResult that it answered."},
+     "vk_result : int or None\n    The VkResult that it answered.",
+     NULL},
     {VKB_ERROR_ADAPTER_NOT_FOUND, "AdapterNotFoundError",
-     "No adapter fits; says what was found, what is missing and what to install."},
+     "No adapter fits; says what was found, what is missing and what to install.",
+     &PyExc_RuntimeError},
     {VKB_ERROR_DEVICE_LOST, "DeviceLostError",
-     "The device was lost or did not answer; the renderer can only be closed."},
-    {VKB_ERROR_OUT_OF_MEMORY, "OutOfMemoryError", "The host or the device has no memory left."},
-    {VKB_ERROR_VALIDATION, "ValidationError", "The validation layer objected to a Vulkan call."},
-    {VKB_ERROR_SHADER, "ShaderError", "The driver refused a shader."},
+     "The device was lost or did not answer; the renderer can only be closed.", NULL},
+    {VKB_ERROR_OUT_OF_MEMORY, "OutOfMemoryError", "The host or the device has no memory left.",
+     &PyExc_MemoryError},
+    {VKB_ERROR_VALIDATION, "ValidationError", "The validation layer objected to a Vulkan call.",
+     NULL},
+    {VKB_ERROR_SHADER, "ShaderError", "The driver refused a shader.", NULL},
 };
-
-static PyObject *second_base(enum vkb_error_kind kind)
-{
-    switch (kind) {
-    case VKB_ERROR_ADAPTER_NOT_FOUND:
-        return PyExc_RuntimeError;
-    case VKB_ERROR_OUT_OF_MEMORY:
-        return PyExc_MemoryError;
-    default:
-        return NULL;
-    }
-}
 
 static PyObject *new_error(const struct vkb_module_state *state, const struct error_row *row)
 {
-    PyObject *error = state->errors[VKB_ERROR_GENERAL], *second = second_base(row->kind);
+    PyObject *error = state->errors[VKB_ERROR_GENERAL], *second = row->second ? *row->second : NULL;
     PyObject *name = PyUnicode_FromFormat("vkbloom.%s", row->name);
     PyObject *bases = error ? second ? PyTuple_Pack(2, error, second) : PyTuple_Pack(1, error)
                             : PyTuple_Pack(1, PyExc_Exception);
@@ -240,33 +229,24 @@ static int execute(PyObject *module)
              : -1;
 }
 
+// The state consists of references.
+enum { REFERENCES = sizeof(struct vkb_module_state) / sizeof(PyObject *) };
+
 static int traverse(PyObject *module, visitproc visit, void *arg)
 {
-    struct vkb_module_state *state = vkb_module_state(module);
+    PyObject **references = (PyObject **)vkb_module_state(module);
 
-    Py_VISIT(state->renderer_type);
-    Py_VISIT(state->source_type);
-    Py_VISIT(state->plan_type);
-    Py_VISIT(state->submission_type);
-    Py_VISIT(state->pages_type);
-    Py_VISIT(state->exported_type);
-    for (size_t i = 0; i < sizeof state->errors / sizeof state->errors[0]; ++i)
-        Py_VISIT(state->errors[i]);
+    for (size_t i = 0; i < REFERENCES; ++i)
+        Py_VISIT(references[i]);
     return 0;
 }
 
 static int clear(PyObject *module)
 {
-    struct vkb_module_state *state = vkb_module_state(module);
+    PyObject **references = (PyObject **)vkb_module_state(module);
 
-    Py_CLEAR(state->renderer_type);
-    Py_CLEAR(state->source_type);
-    Py_CLEAR(state->plan_type);
-    Py_CLEAR(state->submission_type);
-    Py_CLEAR(state->pages_type);
-    Py_CLEAR(state->exported_type);
-    for (size_t i = 0; i < sizeof state->errors / sizeof state->errors[0]; ++i)
-        Py_CLEAR(state->errors[i]);
+    for (size_t i = 0; i < REFERENCES; ++i)
+        Py_CLEAR(references[i]);
     return 0;
 }
 

@@ -24,7 +24,7 @@ PyObject *vkb_new_pages(PyObject *renderer, PyObject *size);
 PyObject *vkb_renderer_upload(PyObject *renderer, PyObject *arguments);
 PyObject *vkb_renderer_export(PyObject *renderer, PyObject *size);
 PyObject *vkb_renderer_cuda(PyObject *renderer, PyObject *unused);
-PyObject *vkb_renderer_dlpack(PyObject *renderer, PyObject *array);
+PyObject *vkb_renderer_in_context(PyObject *renderer, PyObject *function);
 PyObject *vkb_renderer_cuda_name(PyObject *renderer, PyObject *ordinal);
 PyObject *vkb_renderer_snapshot(PyObject *renderer, PyObject *arguments);
 

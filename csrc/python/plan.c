@@ -61,16 +61,16 @@ static bool choose_outputs(struct vkb_plan *plan, uint32_t first, PyObject *name
         plan->output_count = count;
         return true;
     }
-    PyObject *module = PyImport_ImportModule("vkbloom._suggestions");
-    PyObject *flags = module ? PyObject_CallMethod(module, "wanted", "ON", names,
-                                                   vkb_image_names(graph, plan->outputs, count))
-                             : NULL;
+    PyObject *known = vkb_image_names(graph, plan->outputs, count);
+    PyObject *module = known ? PyImport_ImportModule("vkbloom._suggestions") : NULL;
+    PyObject *flags = module ? PyObject_CallMethod(module, "wanted", "OO", names, known) : NULL;
     const bool done = flags && PyBytes_Check(flags) && PyBytes_Size(flags) == (Py_ssize_t)count;
     for (uint32_t i = 0; done && i < count; ++i)
         if (PyBytes_AsString(flags)[i])
             plan->outputs[plan->output_count++] = plan->outputs[i];
     Py_XDECREF(flags);
     Py_XDECREF(module);
+    Py_XDECREF(known);
     return done;
 }
 
@@ -316,31 +316,6 @@ static PyObject *describe_pass(const struct vkb_graph *graph, const char *name, 
                          pass->variant ? pass->variant : "fragment", group);
 }
 
-// (source subpass, target subpass, source stages, target stages, source access, target access,
-// flags); an external subpass is -1.
-static PyObject *describe_dependency(const VkSubpassDependency *dependency)
-{
-    return Py_BuildValue(
-        "(iikkkkk)", (int)dependency->srcSubpass, (int)dependency->dstSubpass,
-        (unsigned long)dependency->srcStageMask, (unsigned long)dependency->dstStageMask,
-        (unsigned long)dependency->srcAccessMask, (unsigned long)dependency->dstAccessMask,
-        (unsigned long)dependency->dependencyFlags);
-}
-
-static PyObject *describe_dependencies(const struct vkb_graph *graph, uint32_t first, uint32_t end)
-{
-    struct vkb_target_use uses[VKB_MAX_TARGETS + 1];
-    VkSubpassDependency dependencies[VKB_MAX_DEPENDENCIES];
-    const uint32_t use_count = vkb_graph_target_uses(graph, first, end, uses);
-    const uint32_t count = vkb_subpass_dependencies(uses, use_count, dependencies);
-    PyObject *tuple = PyTuple_New(count);
-
-    for (uint32_t i = 0; tuple && i < count; ++i)
-        if (!vkb_set_item(tuple, i, describe_dependency(&dependencies[i])))
-            Py_CLEAR(tuple);
-    return tuple;
-}
-
 // By pass, whether a group of passes that starts with it runs where nothing has run before; freed
 // by the caller. NULL with an exception set.
 static bool *mark_alone(PyObject *object)
@@ -370,54 +345,27 @@ static bool add_group(PyObject *list, const struct vkb_graph *graph, uint32_t fi
     return done;
 }
 
-// A list of the passes that run, or of the dependencies of their render passes.
-static PyObject *describe_groups(PyObject *object, bool dependencies)
+static PyObject *get_passes(PyObject *object, void *unused)
 {
     const struct vkb_graph *graph = &((struct vkb_plan_object *)object)->plan.graph;
     bool *ran = mark_alone(object);
     PyObject *list = ran ? PyList_New(0) : NULL;
     uint32_t group = 0;
 
+    (void)unused;
     for (uint32_t first = 0, end; list && first < graph->pass_count; first = end) {
         end = vkb_graph_group_end(graph, first);
-        if (!ran[first])
-            continue;
-        if (dependencies ? !vkb_append_item(list, describe_dependencies(graph, first, end))
-                         : !add_group(list, graph, first, end, group))
+        if (ran[first] && !add_group(list, graph, first, end, group++))
             Py_CLEAR(list);
-        ++group;
     }
     vkb_free(ran);
     return list;
-}
-
-static PyObject *get_passes(PyObject *object, void *unused)
-{
-    (void)unused;
-    return describe_groups(object, false);
-}
-
-static PyObject *get_dependencies(PyObject *object, void *unused)
-{
-    (void)unused;
-    return describe_groups(object, true);
 }
 
 static PyObject *get_outputs(PyObject *object, void *unused)
 {
     (void)unused;
     return Py_NewRef(((struct vkb_plan_object *)object)->outputs);
-}
-
-static PyObject *get_size(PyObject *object, void *unused)
-{
-    const struct vkb_plan *plan = &((struct vkb_plan_object *)object)->plan;
-    size_t size = 0;
-
-    (void)unused;
-    for (uint32_t i = 0; i < plan->output_count; ++i)
-        size += vkb_output_size(plan, i);
-    return PyLong_FromSize_t(size);
 }
 
 static PyObject *get_image_size(PyObject *object, void *unused)
@@ -494,11 +442,6 @@ static PyGetSetDef attributes[] = {
      "[(name, shader, reads, writes, variant, number of its render pass), ...] of what runs where "
      "nothing has run before.",
      NULL},
-    {"dependencies", get_dependencies, NULL,
-     "Of each render pass: ((source subpass, target subpass, source stages, target stages, source "
-     "access, target access, flags), ...)",
-     NULL},
-    {"size", get_size, NULL, "Bytes of all outputs.", NULL},
     {"image_size", get_image_size, NULL, "Bytes of all images on the device.", NULL},
     {0},
 };

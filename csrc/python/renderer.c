@@ -302,7 +302,7 @@ static PyMethodDef methods[] = {
      "`spare`: None, or such a source that nobody needs any more, whose memory it takes; "
      "`recycled`: it will be one."},
     {"open_screen", vkb_open_screen, METH_VARARGS,
-     "open_screen(surface, mailbox) -> screen, a number. Takes over a VkSurfaceKHR; 0: one without "
+     "open_screen(surface) -> screen, a number. Takes over a VkSurfaceKHR; 0: one without "
      "a window."},
     {"close_screen", vkb_close_screen, METH_O,
      "close_screen(screen). Waits for the device and destroys the surface, if it is still there."},
@@ -315,8 +315,8 @@ static PyMethodDef methods[] = {
     {"cuda", vkb_renderer_cuda, METH_NOARGS,
      "cuda() -> (ordinal, stream). Opens CUDA for the renderer's GPU, if it is one of its."},
     {"cuda_name", vkb_renderer_cuda_name, METH_O, "cuda_name(ordinal) -> name and UUID."},
-    {"dlpack", vkb_renderer_dlpack, METH_O,
-     "dlpack(array) -> a capsule of DLPack, ordered for the renderer's stream."},
+    {"in_context", vkb_renderer_in_context, METH_O,
+     "in_context(function): what it returns, in CUDA's context of the renderer's GPU."},
     {"export", vkb_renderer_export, METH_O,
      "export(size) -> Exported. Memory of the device for an array; reused when it is gone."},
     {"snapshot", vkb_renderer_snapshot, METH_VARARGS,

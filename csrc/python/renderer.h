@@ -76,7 +76,7 @@ bool vkb_renderer_is_ours(const struct vkb_renderer *renderer);
 // Makes the renderer the owner of a submission that nobody waits for. With the GIL.
 void vkb_renderer_abandon(struct vkb_renderer *renderer, struct vkb_pending *pending);
 
-// With the GIL; the device must have finished the submission.
+// With the GIL; the device must have finished the submission. A set exception is kept.
 void vkb_pending_release(struct vkb_pending *pending);
 int vkb_pending_traverse(const struct vkb_pending *pending, visitproc visit, void *arg);
 

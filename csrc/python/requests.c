@@ -78,7 +78,7 @@ static struct vkb_pending *new_pending(PyObject *source, PyObject *plans, struct
     VKB_LOCK(vkb_memory);
     pending->resident = given->resident;
     if (pending->resident)
-        vkb_resident_use(pending->resident);
+        ++pending->resident->uses;
     VKB_UNLOCK(vkb_memory);
     if (given->residents && !pending->resident) {
         vkb_fail(error, VKB_ERROR_VALUE, "image: another upload has taken its memory");
@@ -246,13 +246,8 @@ static PyObject *run(struct vkb_renderer *renderer, PyObject *source, PyObject *
         return NULL;
     struct submission *self = new_submission(renderer, source, plans, arrays);
     if (self && !submit(renderer, given, self->pending, in_place, show, &error)) {
-        // The exception is kept while the arrays are released, which may run Python code.
         vkb_raise(state_of((PyObject *)renderer), &error);
-        PyObject *type, *value, *traceback;
-        PyErr_Fetch(&type, &value, &traceback);
-        Py_DECREF(self);
-        PyErr_Restore(type, value, traceback);
-        return NULL;
+        Py_CLEAR(self);
     }
     return (PyObject *)self;
 }
@@ -389,10 +384,7 @@ static PyObject *wait_for(PyObject *object, PyObject *unused)
     if (done)
         complete_exported(pending);
     PyObject *result = done ? results(pending) : vkb_raise(state_of(object), &error);
-    PyObject *type, *value, *traceback;
-    PyErr_Fetch(&type, &value, &traceback);
     vkb_pending_release(pending);
-    PyErr_Restore(type, value, traceback);
     return result;
 }
 

@@ -4,11 +4,11 @@
 
 #include <string.h>
 
-// In Python "Q11d10I32s".
+// In Python "Qd28f10I32s".
 struct scene_block {
     uint64_t serial;
-    struct vkb_camera camera;
-    double time, glow_intensity;
+    double glow_intensity;
+    float projection[1][4], model_view[3][4], sky[3][4];
     uint32_t size[2];
     // Numbers of vertices, indices and surfaces; no vertices: there is no such mesh.
     uint32_t body[3], glow[3];
@@ -182,8 +182,6 @@ bool vkb_read_scene(PyObject *bytes, PyObject *pictures, PyObject *arrays,
         .kind = VKB_SOURCE_SCENE,
         .scene =
             {
-                .camera = block.camera,
-                .time = block.time,
                 .size = {block.size[0], block.size[1]},
                 .glow_intensity = block.glow_intensity,
                 .has_sky = data->sky.level_count > 0,
@@ -193,6 +191,9 @@ bool vkb_read_scene(PyObject *bytes, PyObject *pictures, PyObject *arrays,
                 .glow_textured = data->glow.surface_count > 0,
             },
     };
+    memcpy(source->scene.projection, block.projection, sizeof block.projection);
+    memcpy(source->scene.model_view, block.model_view, sizeof block.model_view);
+    memcpy(source->scene.sky, block.sky, sizeof block.sky);
     memcpy(source->shading, block.shading, sizeof source->shading);
     return done;
 }

@@ -16,16 +16,15 @@ PyObject *vkb_open_screen(PyObject *object, PyObject *arguments)
 {
     struct vkb_renderer *renderer = (struct vkb_renderer *)object;
     unsigned long long surface;
-    int mailbox;
     struct vkb_screen *screen = NULL;
     struct vkb_error error = {0};
 
-    if (!PyArg_ParseTuple(arguments, "Kp:open_screen", &surface, &mailbox))
+    if (!PyArg_ParseTuple(arguments, "K:open_screen", &surface))
         return NULL;
     bool done = vkb_renderer_enter(renderer, &error);
     if (done) {
         done = vkb_require_open(renderer, &error)
-            && (screen = vkb_screen_create(&renderer->device, (VkSurfaceKHR)surface, mailbox,
+            && (screen = vkb_screen_create(&renderer->device, (VkSurfaceKHR)surface,
                                            &renderer->frame.screens, &error));
         done = vkb_renderer_check_messages(renderer, done, &error);
         vkb_renderer_leave(renderer);

@@ -14,11 +14,8 @@ static bool fits_image(const struct vkb_source_object *self, enum vkb_input_kind
             && (kind == VKB_INPUT_MASK
                 || (other->format == image->format && other->channels == image->channels))))
         return true;
-    if (kind == VKB_INPUT_MASK)
-        PyErr_SetString(PyExc_ValueError, "mask: its size differs from the image's");
-    else
-        PyErr_SetString(PyExc_ValueError,
-                        "emission: its shape and dtype are not those of the image");
+    PyErr_Format(PyExc_ValueError, "%s: its size or dtype differs from the image's",
+                 kind == VKB_INPUT_MASK ? "mask" : "emission");
     return false;
 }
 

@@ -26,18 +26,6 @@ int vkb_read_uint32(PyObject *object, void *number)
     return 0;
 }
 
-int vkb_read_serial(PyObject *object, void *number)
-{
-    const unsigned long long serial = PyLong_AsUnsignedLongLong(object);
-
-    if (PyErr_Occurred())
-        return 0;
-    if (serial == 0)
-        PyErr_SetString(PyExc_ValueError, "scene: the serial 0 is reserved");
-    *(uint64_t *)number = serial;
-    return serial != 0;
-}
-
 bool vkb_set_item(PyObject *tuple, Py_ssize_t index, PyObject *item)
 {
     return item && PyTuple_SetItem(tuple, index, item) == 0;

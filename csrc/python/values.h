@@ -13,7 +13,6 @@ bool vkb_require_tuple(PyObject *object, const char *what);
 // Converters for PyArg_ParseTuple ("O&"): its own codes for unsigned integers accept any number
 // modulo 2^32. 0 with an exception set.
 int vkb_read_uint32(PyObject *object, void *number);
-int vkb_read_serial(PyObject *object, void *number);  // 64 bits, not 0
 
 // The buffer protocol's code of the element type; 0 if it is not a single number in this machine's
 // byte order, whether or not the format names the order.

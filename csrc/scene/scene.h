@@ -62,13 +62,6 @@ struct vkb_scene {
     uint32_t texture_count;
 };
 
-struct vkb_camera {
-    double position[3];
-    double rotation[3];  // degrees around x, y, z
-    double fov;          // vertical, degrees
-    double near, far;
-};
-
 // Records the upload of the data, which replaces the scene's content. The device must not use the
 // old content any more. Call vkb_scene_end when the commands have run. On failure the scene is
 // empty or unchanged. An index beyond the vertices is a failure.
@@ -78,10 +71,6 @@ bool vkb_scene_begin(const struct vkb_device *device, struct vkb_commands *comma
 void vkb_scene_end(const struct vkb_device *device, const struct vkb_scene_data *data,
                    struct vkb_scene *scene);
 void vkb_scene_destroy(const struct vkb_device *device, struct vkb_scene *scene);
-
-// Writes the matrices at `time` (in turns).
-void vkb_scene_matrices(const struct vkb_camera *camera, double time, double aspect,
-                        struct vkb_mesh_params *params);
 
 // Whether every pixel of a target of that size has less than a texel of the sky, so that no smaller
 // level is read. llvmpipe compiles a view of one level in half the time.

@@ -1,5 +1,7 @@
 #include "share/cuda.h"
 
+#include "vulkan/adapter.h"
+
 #include <stdio.h>
 #include <string.h>
 
@@ -158,17 +160,15 @@ static bool load(struct vkb_cuda *cuda, struct vkb_error *error)
 void vkb_cuda_name(const struct vkb_cuda *cuda, int ordinal, char name[VKB_CUDA_NAME_SIZE])
 {
     struct uuid uuid = {{0}};
-    char device_name[256] = "unknown GPU";
+    char device_name[256] = "unknown GPU", text[VKB_UUID_TEXT_SIZE];
     int device;
 
     if (cuda->cuDeviceGet(&device, ordinal) == 0) {
         cuda->cuDeviceGetName(device_name, sizeof device_name, device);
         cuda->cuDeviceGetUuid(&uuid, device);
     }
-    name += snprintf(name, VKB_CUDA_NAME_SIZE, "%.200s (uuid:", device_name);
-    for (int i = 0; i < 16; ++i)
-        name += sprintf(name, "%s%02x", i >= 4 && i <= 10 && i % 2 == 0 ? "-" : "", uuid.bytes[i]);
-    strcpy(name, ")");
+    vkb_uuid_text(uuid.bytes, text);
+    snprintf(name, VKB_CUDA_NAME_SIZE, "%.200s (uuid:%s)", device_name, text);
 }
 
 static bool fail_missing(const struct vkb_cuda *cuda, const char *name, int count,

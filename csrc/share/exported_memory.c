@@ -223,16 +223,6 @@ void vkb_exports_remove(struct vkb_export *one)
     destroy_export(one);
 }
 
-void vkb_exports_begin_use(struct vkb_exports *exports)
-{
-    ++exports->users;
-}
-
-bool vkb_exports_end_use(struct vkb_exports *exports)
-{
-    return --exports->users == 0;
-}
-
 void vkb_exports_free(struct vkb_exports *exports)
 {
     vkb_cuda_close(exports->cuda);

@@ -45,8 +45,6 @@ void vkb_exports_close(struct vkb_exports *exports, bool settled);
 
 // Each taken memory has a user, and so has each call that leaves the lock. The last one of closed
 // exports frees them with vkb_exports_free, without the lock: true.
-void vkb_exports_begin_use(struct vkb_exports *exports);
-bool vkb_exports_end_use(struct vkb_exports *exports);
 void vkb_exports_free(struct vkb_exports *exports);
 
 // Takes at least `size` bytes, of undefined content.

@@ -1,8 +1,5 @@
 #include "spirv/instructions.h"
 
-// Of GLSL.std.450: they also write through a pointer.
-enum { GLSL_MODF = 35, GLSL_FREXP = 51 };
-
 bool vkb_is_debug(const uint32_t *at)
 {
     const uint32_t code = vkb_opcode(at);
@@ -30,7 +27,7 @@ uint32_t vkb_target(const uint32_t *at, uint32_t i)
     return 0;
 }
 
-// Whether all instructions with that opcode are pure.
+// Whether it is an operation without an effect of its own that has a type and a result.
 static bool is_plain(uint32_t code)
 {
     return code == SPV_PHI || code == SPV_LOAD || code == SPV_ACCESS_CHAIN
@@ -38,13 +35,6 @@ static bool is_plain(uint32_t code)
         || (code >= SPV_VECTOR_EXTRACT_DYNAMIC && code <= SPV_IMAGE_READ)
         || (code >= SPV_IMAGE && code <= SPV_IMAGE_QUERY_SAMPLES)
         || (code >= SPV_CONVERT_F_TO_U && code <= SPV_FWIDTH_COARSE);
-}
-
-bool vkb_is_pure(const uint32_t *at)
-{
-    const uint32_t code = vkb_opcode(at);
-
-    return is_plain(code) || (code == SPV_EXT_INST && at[4] != GLSL_MODF && at[4] != GLSL_FREXP);
 }
 
 static bool is_type(uint32_t code)

@@ -129,9 +129,6 @@ uint32_t vkb_target(const uint32_t *at, uint32_t i);
 // Whether vkb_result may read its words.
 bool vkb_has_result(uint32_t opcode);
 
-// Whether it has a result, and no effect if nothing uses the result.
-bool vkb_is_pure(const uint32_t *at);
-
 // The id that a type, a constant, a label or an instruction of a function defines; 0: none.
 uint32_t vkb_result(const uint32_t *at);
 

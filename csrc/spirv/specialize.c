@@ -13,7 +13,6 @@ struct id {
     uint32_t block;       // the label of its block; of a function, that of its first block
     uint32_t loop;        // between a loop's header and a continue block that nothing reaches
     bool known;           // a 32-bit integer or a bool whose value is known
-    bool used;            // of an instruction in a function: it stays
     bool reached;         // of a label
     uint8_t role;         // of a label, enum role
 };
@@ -163,7 +162,7 @@ static bool find_values(struct module *module)
 
     for (const uint32_t *at = module->read.functions; at < module->read.end; at = vkb_next(at)) {
         struct id *id = &module->ids[vkb_result(at)];
-        if (!vkb_is_pure(at) || id->known || !module->ids[id->block].reached
+        if (!vkb_result(at) || id->known || !module->ids[id->block].reached
             || !vkb_is_word(&module->read, at[1]))
             continue;
         id->known = vkb_opcode(at) == SPV_PHI ? phi_value(module, at, &id->value)
@@ -209,26 +208,6 @@ static void find_constants(struct module *module, const struct vkb_constants *co
     }
 }
 
-static void use(struct module *module, uint32_t word)
-{
-    struct id *id = &module->ids[word < module->read.bound ? word : 0];
-
-    if (id->used || !id->block || !module->ids[id->block].reached)
-        return;
-    id->used = true;
-    module->stack[module->stack_count++] = word;
-}
-
-// Uses all operands. A number among them may equal an id: then an instruction too many stays.
-static void use_operands(struct module *module, const uint32_t *at)
-{
-    const bool is_phi = vkb_opcode(at) == SPV_PHI;
-
-    for (uint32_t i = 1; i < vkb_word_count(at); ++i)
-        if (!is_phi || i < 3 || i % 2 == 0 || follows(module, at[i + 1], module->ids[at[2]].block))
-            use(module, at[i]);
-}
-
 // Notes which blocks a header names that nothing reaches.
 static void keep_structure(struct module *module, const uint32_t *at, uint32_t header)
 {
@@ -249,23 +228,18 @@ static bool stays(const struct module *module, const uint32_t *at)
     return vkb_opcode(at) != SPV_SELECTION_MERGE || !only_target(module, vkb_next(at));
 }
 
-// Finds the instructions that what has effects uses.
-static void find_used(struct module *module)
+// Notes the blocks that nothing reaches and that the headers of those that are reached name.
+static void find_structure(struct module *module)
 {
     uint32_t block = 0;
 
     for (const uint32_t *at = module->read.functions; at < module->read.end; at = vkb_next(at)) {
         if (vkb_opcode(at) == SPV_LABEL)
             block = at[1];
-        if (!module->ids[block].reached || vkb_is_pure(at) || !stays(module, at))
-            continue;
-        if (vkb_opcode(at) == SPV_SELECTION_MERGE || vkb_opcode(at) == SPV_LOOP_MERGE)
+        if (module->ids[block].reached && stays(module, at)
+            && (vkb_opcode(at) == SPV_SELECTION_MERGE || vkb_opcode(at) == SPV_LOOP_MERGE))
             keep_structure(module, at, block);
-        else if (!only_target(module, at))
-            use_operands(module, at);
     }
-    while (module->stack_count > 0)
-        use_operands(module, module->read.at[module->stack[--module->stack_count]]);
 }
 
 static void write_declarations(struct module *module)
@@ -278,7 +252,7 @@ static void write_declarations(struct module *module)
         if (vkb_is_debug(at)
             || (code == SPV_DECORATE
                 && (at[2] == SPV_SPEC_ID
-                    || (read->at[id] >= read->functions && !module->ids[id].used))))
+                    || (module->ids[id].block && !module->ids[module->ids[id].block].reached))))
             continue;
         if (module->ids[id].known && code >= SPV_SPEC_CONSTANT_TRUE && code <= SPV_SPEC_CONSTANT_OP)
             vkb_write_constant(&module->made, read, at[1], id, module->ids[id].value);
@@ -333,7 +307,7 @@ static void write_functions(struct module *module)
             if (!reached)
                 write_unreached(module, at);
         }
-        if (!reached || vkb_is_debug(at) || (vkb_is_pure(at) && !id->used) || !stays(module, at))
+        if (!reached || vkb_is_debug(at) || !stays(module, at))
             continue;
         if (only)
             VKB_WRITE(&module->made, SPV_BRANCH, only);
@@ -361,7 +335,7 @@ bool vkb_specialize(const struct vkb_shader *shader, const struct vkb_constants 
         do
             find_reached(&module);
         while (find_values(&module));
-        find_used(&module);
+        find_structure(&module);
         vkb_write(&module.made, shader->code, SPV_HEADER_WORDS);
         write_declarations(&module);
         write_functions(&module);

@@ -64,11 +64,6 @@ void vkb_resident_release(struct vkb_residents *residents, struct vkb_resident *
     free_closed(residents);
 }
 
-void vkb_resident_use(struct vkb_resident *resident)
-{
-    ++resident->uses;
-}
-
 void vkb_resident_end_use(struct vkb_residents *residents, struct vkb_resident *resident)
 {
     --resident->uses;
@@ -96,6 +91,7 @@ bool vkb_resident_fill(struct vkb_device *device, struct vkb_resident *resident,
                | (device->dispatch ? vkb_access_usage(VKB_ACCESS_DISPATCH_LOADED) : 0),
     };
     struct vkb_cached_image *cached = &resident->inputs[kind].cached;
+    bool changed;
 
     if (!vkb_check_size(row.name, row.width, row.height, device->max_side, error)
         || !vkb_limits_check_image(device, &row, error))
@@ -105,7 +101,8 @@ bool vkb_resident_fill(struct vkb_device *device, struct vkb_resident *resident,
         if (!vkb_image_create_row(device, &row, &cached->image, error))
             return false;
     }
-    if (!vkb_upload_copy(device, &resident->inputs[kind].upload, input, &cached->image, error))
+    if (!vkb_upload_stage(device, &resident->inputs[kind].upload, NULL, 0, input, &cached->image,
+                          &changed, error))
         return false;
     resident->staged = !cached->image.mapped;
     cached->content.version = ++*clock;

@@ -32,9 +32,7 @@ struct vkb_resident *vkb_resident_add(struct vkb_residents *residents, struct vk
 // The device must have finished all work on it.
 void vkb_resident_release(struct vkb_residents *residents, struct vkb_resident *resident);
 
-// Enclose a submission that reads it: before the submission; after the device has finished it, or
-// if there was none.
-void vkb_resident_use(struct vkb_resident *resident);
+// Ends a use by a submission: after the device has finished it, or if there was none.
 void vkb_resident_end_use(struct vkb_residents *residents, struct vkb_resident *resident);
 
 // Creates the image of this kind, with the input's size, format and pixels. No submission may use

@@ -35,26 +35,16 @@ static bool check_surface(const struct vkb_device *device, const struct vkb_scre
     const struct vkb_instance_table *vk = &device->instance->vk;
     const struct vkb_adapter_info *adapter = &device->adapter;
     VkBool32 supported;
-    VkPresentModeKHR modes[16];
-    uint32_t count = sizeof modes / sizeof modes[0];
 
     if (!VK(error, vk->vkGetPhysicalDeviceSurfaceSupportKHR(
-                       adapter->physical, adapter->queue_family, screen->surface, &supported))
-        || !VK(error, vk->vkGetPhysicalDeviceSurfacePresentModesKHR(
-                          adapter->physical, screen->surface, &count, modes)))
+                       adapter->physical, adapter->queue_family, screen->surface, &supported)))
         return false;
-    if (!supported || !device->presents)
-        return vkb_fail(error, VKB_ERROR_GENERAL, "%s cannot present on this surface",
-                        adapter->name);
-    for (uint32_t i = 0; i < count; ++i)
-        if (modes[i] == screen->mode)
-            return true;
-    return vkb_fail(error, VKB_ERROR_VALUE, "mailbox: the surface has FIFO only");
+    return (supported && device->presents)
+        || vkb_fail(error, VKB_ERROR_GENERAL, "%s cannot present on this surface", adapter->name);
 }
 
 struct vkb_screen *vkb_screen_create(const struct vkb_device *device, VkSurfaceKHR surface,
-                                     bool mailbox, struct vkb_screen **screens,
-                                     struct vkb_error *error)
+                                     struct vkb_screen **screens, struct vkb_error *error)
 {
     struct vkb_screen *screen = vkb_alloc(error, 1, sizeof *screen);
 
@@ -64,7 +54,6 @@ struct vkb_screen *vkb_screen_create(const struct vkb_device *device, VkSurfaceK
         return NULL;
     }
     screen->surface = surface;
-    screen->mode = mailbox ? VK_PRESENT_MODE_MAILBOX_KHR : VK_PRESENT_MODE_FIFO_KHR;
     screen->stale = true;
     screen->next = *screens;
     *screens = screen;
@@ -196,7 +185,7 @@ static bool renew(struct vkb_device *device, struct vkb_screen *screen, const st
         .preTransform = surface.currentTransform,
         // The lowest bit is opaque.
         .compositeAlpha = surface.supportedCompositeAlpha & (~surface.supportedCompositeAlpha + 1),
-        .presentMode = screen->mode,
+        .presentMode = VK_PRESENT_MODE_FIFO_KHR,
         .clipped = VK_TRUE,
     };
     if (!VK(error,

@@ -10,7 +10,6 @@ enum { VKB_MAX_SCREEN_IMAGES = 16 };
 
 struct vkb_screen {
     VkSurfaceKHR surface;
-    VkPresentModeKHR mode;
     VkExtent2D wanted;         // what the swapchain was made for, where the surface has no size
     bool linear;               // its images get linear light, which their format encodes as sRGB
     VkSwapchainKHR swapchain;  // VK_NULL_HANDLE: the surface has no area
@@ -34,8 +33,7 @@ struct vkb_show {
 // Makes a screen, which owns the surface from now on, also on failure. VK_NULL_HANDLE: a surface
 // without a window is created. The screen is added to a list. NULL on failure.
 struct vkb_screen *vkb_screen_create(const struct vkb_device *device, VkSurfaceKHR surface,
-                                     bool mailbox, struct vkb_screen **screens,
-                                     struct vkb_error *error);
+                                     struct vkb_screen **screens, struct vkb_error *error);
 // After vkb_device_wait_idle, if something was shown.
 void vkb_screen_destroy(const struct vkb_device *device, struct vkb_screen *screen,
                         struct vkb_screen **screens);

@@ -299,27 +299,12 @@ static void send_done(void *context, uint32_t end)
         sending->failed = !send_rows(sending, end);
 }
 
-bool vkb_upload_copy(const struct vkb_device *device, struct vkb_upload *upload,
-                     const struct vkb_input *input, const struct vkb_image *image,
-                     struct vkb_error *error)
-{
-    struct rows rows = {.upload = upload, .input = input};
-
-    if (!begin(device, upload, input, image, error))
-        return false;
-    vkb_in_parts(device->workers, pack_part, NULL, &rows, 0, input->height,
-                 input->height * row_size(input));
-    sum_non_finite(upload);
-    return upload->pixels != upload->staging.mapped
-        || vkb_buffer_flush(device, &upload->staging, error);
-}
-
 bool vkb_upload_stage(struct vkb_device *device, struct vkb_upload *upload,
                       struct vkb_submissions *submissions, uint64_t number,
                       const struct vkb_input *input, struct vkb_image *image, bool *changed,
                       struct vkb_error *error)
 {
-    const bool fresh = !holds_such(upload, input);
+    const bool fresh = !submissions || !holds_such(upload, input);
     const uint32_t first = fresh ? 0 : first_difference(device, upload, input);
     const size_t size = row_size(input);
     const uint32_t least = (uint32_t)(BAND_SIZE / size) + 1, band = input->height / BANDS + 1;
@@ -337,11 +322,11 @@ bool vkb_upload_stage(struct vkb_device *device, struct vkb_upload *upload,
     *changed = first < input->height;
     if (!*changed)
         return true;
-    if (!vkb_submissions_wait(device, submissions, error)
+    if ((submissions && !vkb_submissions_wait(device, submissions, error))
         || (fresh && !begin(device, upload, input, image, error)))
         return false;
-    vkb_in_parts(device->workers, pack_part, image->mapped ? NULL : send_done, &sending, first,
-                 input->height, (input->height - first) * size);
+    vkb_in_parts(device->workers, pack_part, image->mapped || !submissions ? NULL : send_done,
+                 &sending, first, input->height, (input->height - first) * size);
     sum_non_finite(upload);
     return !sending.failed && (image->mapped || vkb_buffer_flush(device, &upload->staging, error));
 }

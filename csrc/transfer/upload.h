@@ -56,16 +56,12 @@ void vkb_upload_forget(struct vkb_upload *upload);
 // differs from the last one. Pending submissions may still read the last one, so it is overwritten
 // only after a wait for them. `image` is the device's image. If it is mapped, it has the pixels
 // now; otherwise vkb_upload_record copies them. Copies of the first rows of a large image are
-// submitted before, each as a submission of its own with that number.
+// submitted before, each as a submission of its own with that number. Without submissions, NULL,
+// nothing is compared, waited for or submitted.
 bool vkb_upload_stage(struct vkb_device *device, struct vkb_upload *upload,
                       struct vkb_submissions *submissions, uint64_t number,
                       const struct vkb_input *input, struct vkb_image *image, bool *changed,
                       struct vkb_error *error);
-
-// The same without a comparison, and without a copy before vkb_upload_record.
-bool vkb_upload_copy(const struct vkb_device *device, struct vkb_upload *upload,
-                     const struct vkb_input *input, const struct vkb_image *image,
-                     struct vkb_error *error);
 
 // Records the copy of the rows that were not sent yet, from staging memory to the image.
 void vkb_upload_record(const struct vkb_device *device, VkCommandBuffer commands,

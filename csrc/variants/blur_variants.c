@@ -109,7 +109,6 @@ bool vkb_add_enlarged(const struct vkb_variant_choice *choice, const struct vkb_
     struct vkb_pass_row line = line_row(choice, pass, lines, -1);
     struct vkb_pass_row row =
         vkb_fullscreen_row(pass->name, &vkb_shader_enlarge_frag, pass->targets[0]);
-    row.constants.bloom = BLOOM_LINES;
     row.constants.sampling = unorm ? SAMPLING_FILTER : SAMPLING_FETCH;
     row.constants.alpha = pass->constants.alpha;
     row.reads[0] = lines;
@@ -230,27 +229,6 @@ bool vkb_add_strips(const struct vkb_variant_choice *choice, const struct vkb_pa
                 vertical);
     return vkb_add_fullscreen(choice, pass, error)
         && vkb_graph_add_pass(choice->graph, &row, error);
-}
-
-// Adds the composite, and after it a fused pass that samples the bloom from the blurred lines.
-bool vkb_add_from_lines(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
-                        bool *fits, struct vkb_error *error)
-{
-    const struct vkb_pass_row *enlarging = NULL;
-    struct vkb_pass_row row;
-
-    if (vkb_is_composite(pass))
-        enlarging = vkb_writer_of(choice->graph, pass->reads[1]);
-    *fits = enlarging && enlarging->block == VKB_BLOCK_threshold
-         && enlarging->constants.bloom == BLOOM_LINES;
-    if (!*fits)
-        return true;
-    memcpy(&row, pass, sizeof row);
-    row.reads[1] = enlarging->reads[0];
-    row.constants.bloom = BLOOM_LINES;
-    row.constants.format = vkb_storage_mode(choice->plain.images[pass->reads[1]].format);
-    row.fused = true;
-    return vkb_add_fullscreen(choice, pass, error) && vkb_add_fullscreen(choice, &row, error);
 }
 
 static bool fits_tiles(const struct vkb_device *device)

@@ -53,9 +53,10 @@ static bool is_half(const struct vkb_graph *graph, const struct vkb_pass_row *pa
     return source->width == 2 * target->width && source->height == 2 * target->height;
 }
 
-// Adds the pass as one of linear texels, which loads the texels of its first image.
+// Adds the pass as one of linear texels, which loads the texels of its first image. With `fuses`,
+// its shader has FROM_IMAGE: adds a fused pass that reads the image itself.
 static bool add_linear(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
-                       const struct vkb_shader *shader, uint32_t columns, uint32_t rows,
+                       const struct vkb_shader *shader, uint32_t columns, uint32_t rows, bool fuses,
                        struct vkb_error *error)
 {
     struct vkb_pass_row row;
@@ -64,7 +65,8 @@ static bool add_linear(const struct vkb_variant_choice *choice, const struct vkb
     row.constants.sampling = 0;
     vkb_drop_reads(&row, 1);
     vkb_make_linear(&row, shader, columns, rows);
-    return vkb_graph_add_pass(choice->graph, &row, error);
+    return vkb_graph_add_pass(choice->graph, &row, error)
+        && (!fuses || vkb_add_from_image(choice, pass, &row, error));
 }
 
 bool vkb_add_halved_taps(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
@@ -75,22 +77,7 @@ bool vkb_add_halved_taps(const struct vkb_variant_choice *choice, const struct v
     *fits = weights_taps(pass) && is_half(&choice->plain, pass) && loads(choice, pass);
     return !*fits
         || add_linear(choice, pass, halve_taps_linear[source->format], HALVE_LINEAR_COLUMNS,
-                      HALVE_LINEAR_ROWS, error);
-}
-
-// Adds the pass as one of linear texels, and a fused pass that reads the image itself.
-static bool add_prefilter(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
-                          const struct vkb_shader *shader, uint32_t columns, uint32_t rows,
-                          struct vkb_error *error)
-{
-    struct vkb_pass_row row;
-
-    memcpy(&row, pass, sizeof row);
-    row.constants.sampling = 0;
-    vkb_drop_reads(&row, 1);
-    vkb_make_linear(&row, shader, columns, rows);
-    return vkb_graph_add_pass(choice->graph, &row, error)
-        && vkb_add_from_image(choice, pass, &row, error);
+                      HALVE_LINEAR_ROWS, false, error);
 }
 
 bool vkb_add_prefiltered(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
@@ -111,8 +98,8 @@ bool vkb_add_prefiltered(const struct vkb_variant_choice *choice, const struct v
         return true;
     memcpy(&row, pass, sizeof row);
     row.constants.exact = same ? EXACT_SAME : EXACT_HALF;
-    return add_prefilter(choice, &row, prefilter_linear[format],
-                         PREFILTER_COLUMNS(vkb_formats[format].channel_size), TEXEL_ROWS, error);
+    return add_linear(choice, &row, prefilter_linear[format],
+                      PREFILTER_COLUMNS(vkb_formats[format].channel_size), TEXEL_ROWS, true, error);
 }
 
 bool vkb_add_shrunk(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
@@ -129,8 +116,8 @@ bool vkb_add_shrunk(const struct vkb_variant_choice *choice, const struct vkb_pa
     struct vkb_pass_row row;
     memcpy(&row, pass, sizeof row);
     row.constants.enlarged = source->height < target->height;
-    return add_prefilter(choice, &row, shrink_linear[source->format],
-                         4 / vkb_formats[source->format].channel_size, SHRINK_ROWS, error);
+    return add_linear(choice, &row, shrink_linear[source->format],
+                      4 / vkb_formats[source->format].channel_size, SHRINK_ROWS, true, error);
 }
 
 // HDRP's blurs of images of the same size, and of twice the size along the line; Godot's horizontal
@@ -154,7 +141,8 @@ bool vkb_add_nine(const struct vkb_variant_choice *choice, const struct vkb_pass
     memcpy(&row, pass, sizeof row);
     row.constants.exact =
         pass->constants.first && pass->constants.groups == GROUPS_HDRP_BLUR ? EXACT_SAME : 0;
-    return rows ? add_linear(choice, &row, rows_linear[format], NINE_OUTPUTS, GATHER_ROWS, error)
+    return rows ? add_linear(choice, &row, rows_linear[format], NINE_OUTPUTS, GATHER_ROWS, false,
+                             error)
                 : add_linear(choice, &row, columns_linear[format],
-                             4 / vkb_formats[format].channel_size, NINE_OUTPUTS, error);
+                             4 / vkb_formats[format].channel_size, NINE_OUTPUTS, false, error);
 }

@@ -11,7 +11,7 @@ static const struct vkb_shader *const threshold_shaders[VKB_FORMAT_COUNT] =
 // Whether the pass is a composite whose images have the same size and format.
 static bool blends(const struct vkb_graph *graph, const struct vkb_pass_row *pass)
 {
-    return vkb_is_composite(pass) && pass->constants.bloom != BLOOM_LINES && !pass->constants.masked
+    return vkb_is_composite(pass) && !pass->constants.masked
         && vkb_same_size(graph, pass->reads[0], pass->targets[0])
         && vkb_same_size(graph, pass->reads[1], pass->targets[0])
         && vkb_has_format_of(graph, pass->reads[0], pass->reads[1])

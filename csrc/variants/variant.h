@@ -23,7 +23,7 @@ typedef bool vkb_variant_add(const struct vkb_variant_choice *choice,
 
 // Lines and enlarged lines of a blur; fused passes for the complete bloom of an image, in strips
 // and in tiles.
-vkb_variant_add vkb_add_line, vkb_add_enlarged, vkb_add_strips, vkb_add_from_lines, vkb_add_tiles;
+vkb_variant_add vkb_add_line, vkb_add_enlarged, vkb_add_strips, vkb_add_tiles;
 // For derivatives of these by the image.
 vkb_variant_add vkb_add_adjoint_strips, vkb_add_adjoint_tiles;
 // Levels of exactly half the size, with taps that are weighted by brightness.

@@ -33,7 +33,6 @@ extern const char vkb_install_hint[];
     NAME(vkGetPhysicalDeviceQueueFamilyProperties) \
     NAME(vkGetPhysicalDeviceSurfaceCapabilitiesKHR) \
     NAME(vkGetPhysicalDeviceSurfaceFormatsKHR) \
-    NAME(vkGetPhysicalDeviceSurfacePresentModesKHR) \
     NAME(vkGetPhysicalDeviceSurfaceSupportKHR) \
     NAME(vkCreateHeadlessSurfaceEXT) \
     NAME(vkDestroySurfaceKHR) \

@@ -97,7 +97,7 @@ MAPPING = Kind(
 _KINDS: dict[str, Kind] = {
     **dict.fromkeys(("direct", "gradient", "premultiplied", "progress", "raw"), FLAG),
     **dict.fromkeys(("half", "resume", "temporal", "validation", "verify"), FLAG),
-    **dict.fromkeys(("bits", "border", "levels", "max_calls", "most", "period"), INTEGER),
+    **dict.fromkeys(("bits", "levels", "max_calls", "most", "period"), INTEGER),
     **dict.fromkeys(("quality", "settle", "subimage", "texel", "width"), INTEGER),
     **dict.fromkeys(("expand", "flicker", "gain", "glow_intensity", "growth", "radius"), NUMBER),
     **dict.fromkeys(("intensity", "jitter", "light", "limit", "peak", "ripple", "rtol"), NUMBER),

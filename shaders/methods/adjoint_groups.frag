@@ -83,7 +83,10 @@ vec4 back_weighted(vec4 found[5], vec4 cotangent, Place place)
     vec3 slope, own_slope = vec3(0.0);
     vec4 sum = vec4(0.0), own = vec4(0.0);
     float total = 0.0, own_weight = 0.0;
-    for (int group = 0; group < group_count(); ++group) {
+    // Not in the loop's condition: lavapipe 22.3.6 ends a loop early whose condition has branches by
+    // specialization constants.
+    int count = group_count();
+    for (int group = 0; group < count; ++group) {
         float weight = weight_of(found[group], share_of(group, place), slope);
         sum += weight * found[group];
         total += weight;

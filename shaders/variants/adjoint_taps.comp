@@ -6,7 +6,9 @@
 // texels next to each other are read by. The table has an entry for
 // each block of four texels: the first column or row of pixels that read these, and where their weights
 // are, a texel for each, with those of the four. After the first there are RADIX_1 columns and RADIX_2
-// rows more. LEVELS is the number of kernels. BY is as there.
+// rows more. LEVELS is the number of kernels. BY is as there. In the tiles of GPUs `Pyramid` takes 102 ms
+// backwards in place of 32, `BevyBloom` 621 in place of 244 (processor time of 960 x 544 in float32, lavapipe of
+// Mesa 22.3.6, 2026-11-27).
 #include "lib/block.glsl"
 #include "lib/finite.glsl"
 

@@ -269,14 +269,3 @@ def test_folders_are_made_for_one_picture_and_checked_before(tmp_path: Path) -> 
             "directory" if target == "a.png/" else f"no folder {tmp_path}/no\n"
         ) in failed.stderr
     assert not (tmp_path / "no").exists()
-
-
-def test_hashes_are_digits(tmp_path: Path) -> None:
-    for number in (3, 12):
-        picture(tmp_path / f"f.{number:04d}.png")
-    done(tmp_path / "f.####.png", tmp_path / "g.##.png")
-    assert sorted(file.name for file in tmp_path.glob("g*")) == ["g.03.png", "g.12.png"]
-    # A file with this name is meant.
-    picture(tmp_path / "f.####.png")
-    done(tmp_path / "f.####.png", tmp_path / "one.png")
-    assert (tmp_path / "one.png").is_file()

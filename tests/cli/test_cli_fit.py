@@ -11,6 +11,7 @@ from click.testing import CliRunner
 
 import vkbloom
 from vkbloom._cli.program import program
+from vkbloom._fit import fitting
 
 pytestmark = pytest.mark.usefixtures("kept_renderers")
 
@@ -48,8 +49,13 @@ def test_a_poor_fit_says_so(files: tuple[str, str]) -> None:
     assert verdict == "  poor: no bloom was found"
 
 
-def test_screenshots(tmp_path: Path) -> None:
-    """Every preset is ranked, the preset photo with and without an expanded image."""
+def test_screenshots(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every preset is ranked, the preset photo with and without an expanded image.
+
+    All there are take seconds (tests/fits/test_fit.py).
+    """
+    few = {name: vkbloom.presets[name] for name in ("unity_urp", "photo", "unity_hdrp", "tutorial")}
+    monkeypatch.setattr(fitting, "presets", few)
     names = [str(tmp_path / name) for name in ("image.png", "target.png")]
     image = (np.random.default_rng(0).random((24, 32, 3)) ** 4).astype(np.float32)
     vkbloom.write(names[0], image)
@@ -59,7 +65,7 @@ def test_screenshots(tmp_path: Path) -> None:
     done = CliRunner().invoke(program, words)
     assert done.exit_code == 0, done.output
     methods = [line.split(":")[0] for line in done.stdout.splitlines() if " loss " in line]
-    searched = [preset.method for preset in vkbloom.presets.values()]
+    searched = [preset.method for preset in few.values()]
     assert sorted(methods) == sorted([*searched, vkbloom.presets["photo"].method])
     words = ["fit", *names, "--preset", "unity_urp", "--json"]
     (found,) = json.loads(CliRunner().invoke(program, words).stdout)

@@ -54,7 +54,7 @@ def test_at_an_import(number: int, way: str) -> None:
 @pytest.mark.parametrize("words", [("adapters",), ("apply", "a.exr", "b.exr")])
 def test_at_any_time(tmp_path: Path, words: tuple[str, ...]) -> None:
     vkbloom.write(tmp_path / "a.exr", np.ones((16, 16, 3), np.float32))
-    code = "print(flush=True); from vkbloom._cli import main; main()"
+    code = "from vkbloom._cli import main; print(flush=True); main()"
     chosen = random.Random(7)
     for _ in range(20 if EXHAUSTIVE else 8):
         with subprocess.Popen(

@@ -184,7 +184,7 @@ def test_errors_are_one_line_and_leave_nothing(words: str, error: str) -> None:
 
 
 NAMES = {
-    "presets": [entry.name for entry in presets_command.entries()],
+    "presets": [entry["name"] for entry in presets_command.entries()],
     "glares": [*STAGES, *vkbloom.glares],
     "psfs": list(functions()),
 }
@@ -221,7 +221,7 @@ def test_a_narrow_terminal_cuts_the_last_columns() -> None:
     rows = [words for words in lines[2:] if not words[-1].endswith(":")]
     assert [words[0] for words in rows] == NAMES["presets"]
     for words, entry in zip(rows, entries, strict=True):
-        assert words[1:3] == [entry.composite, "yes" if entry.needs_hdr else "no"]
+        assert words[1:3] == [entry["composite"], "yes" if entry["needs_hdr"] else "no"]
 
 
 def test_what_is_said_of_presets_and_glares() -> None:
@@ -252,7 +252,7 @@ def test_what_needs_values_above_1(renderer: vkbloom.Renderer) -> None:
     """Only those presets show nothing of white."""
     image = np.zeros((48, 64, 3), np.float32)
     image[16:32, 24:40] = 1
-    found = {one.name: one.needs_hdr for one in presets_command.entries()}
+    found = {one["name"]: one["needs_hdr"] for one in presets_command.entries()}
     for name in ("tutorial", "kino", "unity_hdrp", "filament", "godot_4_6"):
         bloom = renderer.apply(image, vkbloom.presets[name], framebuffers=["bloom"])["bloom"]
         assert found[name] == (float(bloom[20:28, 28:36, :3].mean()) < 0.01)

@@ -177,7 +177,7 @@ def look(renderer: Renderer, which: int, size: int) -> Any:
     assert plan.shares_images(plan)
     assert plan.is_of_image(source)
     scene = scene_source((64, 36))
-    found = [plan.outputs, plan.passes, any_plan.dependencies, plan.size, source.kind]
+    found: list[Any] = [plan.outputs, plan.passes, any_plan.passes, source.kind]
     found += [_core.dry_run(((source, plan), (source, plan))), core.info, source.exported]
     found += [_core.plan(scene, Separable(), None).passes, len(core.pages(1 << 20))]
     _core.read_dlpack(IMAGES[size].__dlpack__())
@@ -200,7 +200,7 @@ def show(renderer: Renderer, which: int, size: int) -> Any:
     source = _core.image_source(IMAGES[size])
     plan = core.plan(source, SETTINGS[which], ("final",))
     try:
-        screen = core.open_screen(0, False)
+        screen = core.open_screen(0)
     except _core.Error as error:
         assert "VK_EXT_headless_surface" in str(error)  # noqa: PT017  Mesa 22.3 has none
         return []

@@ -91,7 +91,8 @@ class CountingCore:
 
     def run(self, source: Any, plans: Any, arrays: Any) -> _core.Submission:
         self.counts.append(len(plans))
-        self.sizes.append(sum(plan.size for plan in plans))
+        outputs = [output for plan in plans for output in plan.outputs]
+        self.sizes.append(sum(requests.array_bytes(shape, dtype) for _, shape, dtype in outputs))
         return self.core.run(source, plans, arrays)
 
 

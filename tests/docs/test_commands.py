@@ -34,6 +34,7 @@ NOT_RUN: Final = {
     "python -m benchmarks --adapter": "the same",
     "python -m benchmarks --beside": "the same",
     "python -m benchmarks --quick": "the same",
+    "vkbloom fit photo.jpg photo.jpg --preset all": "takes seconds; tests/fits/test_fit.py does",
     "vkbloom doctor": "takes seconds; tests/cli/test_doctor.py does",
     "vkbloom check --preset unity_urp --against": "needs an engine; test_check.py does",
     "vkbloom view": "does not end, and needs a screen; tests/cli/test_view.py does",

@@ -68,9 +68,6 @@ class TestTranslate:
         assert seen == [(64, 96, 3)]
         assert found.settings.to_dict()["blur_scale"] == pytest.approx(1.8, rel=0.01)
         assert found.loss < 0.02
-        image, start = lights(SIZE), Separable(blur_scale=1.8)
-        of_fit = vkbloom.fit(image, bloom, start, ["intensity"], renderer=renderer)
-        assert of_fit.settings.intensity == pytest.approx(0.4, rel=1e-3)
 
     def test_the_usual_size_is_the_same_everywhere(self) -> None:
         (option,) = (one for one in translate.command.params if one.name == "size")

@@ -171,28 +171,24 @@ class TestWhole:
         with pytest.raises(ValueError, match=rf"axes\.{axis}"):
             vkbloom.grid(source(), settings, {axis: values[:1]}, store=store)
 
-    def test_masks_and_emissions_belong_to_the_source(
-        self, tmp_path: Path, renderer: Renderer
-    ) -> None:
+    def test_uploaded_images_have_their_masks(self, tmp_path: Path, renderer: Renderer) -> None:
         levels = np.arange(16 * 21, dtype=np.uint16).reshape(16, 21).astype(np.uint8)
-        given: dict[str, Any] = {
-            "mask": levels,
-            "emission": noise(16, 21, 3, dtype="float32", seed=5),
-        }
-        axes = {"exposure": [0.0, 1.0]}
-        store = tmp_path / "glow.zarr"
         both = [source(), noise(16, 21, 3, dtype="float32", seed=6)]
-        grid = vkbloom.grid(both, Pyramid(), axes, store=store, **given)
+        store = tmp_path / "glow.zarr"
+
+        def made(mask: Any, **more: Any) -> Any:
+            images = [renderer.upload(image, mask=mask) for image in both]
+            axes = {"exposure": [0.0, 1.0]}
+            return vkbloom.grid(images, Pyramid(), axes, renderer=renderer, **more)
+
+        grid = made(levels, store=store)
         for number, image in enumerate(both):
-            expected = renderer.apply(image, Pyramid(exposure=1.0), **given)["final"]
+            expected = renderer.apply(image, Pyramid(exposure=1.0), mask=levels)["final"]
             assert np.array_equal(grid["final"].isel(image=number, exposure=1), expected)
-        in_memory = vkbloom.grid(both, Pyramid(), axes, **given, progress=False, renderer=renderer)
-        assert np.array_equal(in_memory["final"], grid["final"])
-        assert vkbloom.grid(both, Pyramid(), axes, store=store, **given).attrs["passes_run"] == 0
-        with pytest.raises(ValueError, match=r"source\.mask\.sha256"):
-            vkbloom.grid(both, Pyramid(), axes, store=store, **{**given, "mask": 255 - levels})
-        with pytest.raises(ValueError, match="uploaded already"):
-            vkbloom.grid(renderer.upload(source()), axes=axes, mask=levels, renderer=renderer)
+        assert np.array_equal(made(levels)["final"], grid["final"])
+        assert made(levels, store=store).attrs["passes_run"] == 0
+        with pytest.raises(ValueError, match=r"source\.images"):
+            made(255 - levels, store=store)
 
     def test_default_chunks_hold_about_a_megabyte(self, tmp_path: Path) -> None:
         axes = {"intensity": np.linspace(0, 1, 40), "blur_scale": np.linspace(1, 2, 3)}
@@ -304,8 +300,6 @@ class TestRefused:
             ({"axes": dict(reversed(AXES.items()))}, "order of axes"),
             ({"axes": {**AXES, "knee": [0.0]}}, "axes.knee: not in the store"),
             ({"source": noise(16, 21, 3, dtype="float32", seed=9)}, "source.images"),
-            ({"mask": np.ones((16, 21), np.uint8)}, "source.mask: not in the store"),
-            ({"emission": source()}, "source.emission: not in the store"),
             ({"framebuffers": "final"}, "variables.bloom: .* not requested"),
             ({"reduce": {**REDUCE, "mean": count_frames}}, "reduce.mean"),
             ({"chunks": {}}, r"chunk: \[3, 1, 2\] in the store, \[1, 1, 1\] requested"),

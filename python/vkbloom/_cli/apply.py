@@ -118,7 +118,7 @@ def command(
     """Add bloom to the image IN and write the result to OUT.
 
     The extension selects the format: OpenEXR, Radiance HDR, PNG, JPEG, TIFF and others. IN and OUT
-    may be folders, patterns of numbers (f.%04d.exr, f.####.exr) or - for a pipe. IN may also be a
+    may be folders, patterns of numbers (f.%04d.exr) or - for a pipe. IN may also be a
     glob, or several files.
 
     Without --preset, --method and --settings, each file of integers (JPEG, PNG) starts from the

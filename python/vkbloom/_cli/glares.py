@@ -24,8 +24,11 @@ def _entry(name: str, what: str, whose: str, stages: Sequence[Glare]) -> Entry:
     lights = [stage for stage in stages if isinstance(stage, GlareLight)]
     composite = "add" if lights else "multiply"
     needs_hdr = bool(lights) and min(stage.threshold for stage in lights) >= 1
-    values = {"glare": [stage.to_dict() for stage in stages]}
-    return Entry(name, what, whose, composite, needs_hdr, values)
+    return {
+        **{"name": name, "what": what, "whose": whose},
+        **{"composite": composite, "needs_hdr": needs_hdr},
+        "glare": [stage.to_dict() for stage in stages],
+    }
 
 
 command = listing_command(

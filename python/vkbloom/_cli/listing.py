@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import dataclasses
 import json
 from collections.abc import Callable, Iterable
-from typing import Any, Final
+from typing import Any, Final, TypeAlias
 
 import click
 from rich import box
@@ -17,23 +16,10 @@ from rich.text import Text
 _UNBROKEN: Final = 4096
 
 
-@dataclasses.dataclass(frozen=True)
-class Entry:
-    """What has a published name.
-
-    - `what`: What it looks like.
-    - `whose`: Its source.
-    - `composite`: How its light comes into the picture: "add", "mix", ...
-    - `needs_hdr`: Whether only values above 1 glow.
-    - `values`: Further keys of the JSON.
-    """
-
-    name: str
-    what: str
-    whose: str
-    composite: str
-    needs_hdr: bool
-    values: dict[str, Any] = dataclasses.field(default_factory=dict)
+#: What has a published name, as --json prints it: "name"; "what" it looks like; "whose" it is, its
+#: source; "composite", how its light comes into the picture; "needs_hdr", whether only values above
+#: 1 glow; and further keys.
+Entry: TypeAlias = dict[str, Any]
 
 
 def listing_command(text: str, entries: Callable[[], Iterable[Entry]]) -> Any:
@@ -42,16 +28,10 @@ def listing_command(text: str, entries: Callable[[], Iterable[Entry]]) -> Any:
     @click.command(help=text)
     @click.option("--json", "as_json", is_flag=True, help="Print a list of objects.")
     def command(*, as_json: bool) -> None:
-        listed = list(entries())
         if as_json:
-            objects = [
-                {key: value for key, value in dataclasses.asdict(entry).items() if key != "values"}
-                | entry.values
-                for entry in listed
-            ]
-            click.echo(json.dumps(objects, indent=2))
+            click.echo(json.dumps(list(entries()), indent=2))
         else:
-            _show(_table(listed))
+            _show(_table(entries()))
 
     return command
 
@@ -59,7 +39,7 @@ def listing_command(text: str, entries: Callable[[], Iterable[Entry]]) -> Any:
 def _table(entries: Iterable[Entry]) -> Table:
     """Return a table of one line for each entry; a narrow terminal cuts the last two columns."""
     listed = list(entries)
-    is_grouped = any("engine" in item.values for item in listed)
+    is_grouped = any("engine" in item for item in listed)
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
     for title in ("name", "composite", "needs HDR", *["confirmed by"] * is_grouped):
         table.add_column(title, no_wrap=True)
@@ -68,13 +48,13 @@ def _table(entries: Iterable[Entry]) -> Table:
     table.add_column("whose")
     engine = ""
     for item in listed:
-        if item.values.get("engine", "") != engine:
-            engine = item.values["engine"]
+        if item.get("engine", "") != engine:
+            engine = item["engine"]
             table.add_row(Text(f"{engine}:", style="bold"))
-        texts = (Text(text, no_wrap=True, overflow="ellipsis") for text in (item.what, item.whose))
-        confirmed = [item.values["confirmed"]] if is_grouped else []
-        hdr = "yes" if item.needs_hdr else "no"
-        table.add_row(item.name, item.composite, hdr, *confirmed, *texts)
+        cut = (Text(item[key], no_wrap=True, overflow="ellipsis") for key in ("what", "whose"))
+        confirmed = [item["confirmed"]] if is_grouped else []
+        hdr = "yes" if item["needs_hdr"] else "no"
+        table.add_row(item["name"], item["composite"], hdr, *confirmed, *cut)
     return table
 
 

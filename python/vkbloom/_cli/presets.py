@@ -19,9 +19,12 @@ def entries() -> Iterator[Entry]:
         settings = item.make()
         # The command line expands the highlights of a photograph for the preset photo.
         needs_hdr = (settings.threshold or 0) >= 1 and name != PRESET_OF_PHOTOS
-        values = {"intensity": settings.intensity, "settings": settings.to_dict()}
-        values |= {"engine": engine, "confirmed": confirmed}
-        yield Entry(name, item.what, item.whose, settings.composite, needs_hdr, values)
+        yield {
+            **{"name": name, "what": item.what, "whose": item.whose},
+            **{"composite": settings.composite, "needs_hdr": needs_hdr},
+            **{"intensity": settings.intensity, "settings": settings.to_dict()},
+            **{"engine": engine, "confirmed": confirmed},
+        }
 
 
 command = listing_command(

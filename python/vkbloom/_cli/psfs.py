@@ -18,8 +18,11 @@ def entries() -> Iterator[Entry]:
         what = text.partition("\n")[0].rstrip(".")
         source = re.search(r"^Source: (.+?)(?:[;.] |[;.]?\n\n|[;.]?\Z)", text, re.S | re.M)
         whose = " ".join(source[1].split()).rstrip(".") if source else "vkbloom"
-        values = {"parameters": list(fields_of(kind)), "unit": kind.unit}
-        yield Entry(name, what[:1].lower() + what[1:], whose, "mix", False, values)
+        yield {
+            **{"name": name, "what": what[:1].lower() + what[1:], "whose": whose},
+            **{"composite": "mix", "needs_hdr": False},
+            **{"parameters": list(fields_of(kind)), "unit": kind.unit},
+        }
 
 
 command = listing_command(

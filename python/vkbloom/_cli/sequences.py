@@ -21,13 +21,10 @@ from vkbloom._io.image_reading import readable_extensions
 _MAX_NAMES: Final = 5
 
 _NUMBER: Final = re.compile(r"%(0?)(\d*)d")
-# Digits of a number as OpenImageIO and Houdini write them: f.####.exr.
-_HASHES: Final = re.compile(r"#{2,}|(?<=[._])#(?=\.)")
 
 
 def pairs(sources: Sequence[str], target: str) -> list[tuple[str, str]]:
     """Return the files to read, each with the file to write."""
-    target = _with_number(target)
     results = [pair for source in sources for pair in expanded(source)]
     is_folder = os.path.isdir(target) or target.endswith(("/", os.sep))
     is_pattern = _NUMBER.search(os.path.basename(target)) is not None
@@ -89,20 +86,11 @@ def _check_folder(target: str, *, makes: bool) -> None:
         raise OSError(errno.EACCES, os.strerror(errno.EACCES), existing)
 
 
-def _with_number(name: str) -> str:
-    """Return a name with %0Nd instead of N hashes, unless a file has the name."""
-    if os.path.exists(name):
-        return name
-    folder, base = os.path.split(name)
-    return os.path.join(folder, _HASHES.sub(lambda run: f"%0{len(run[0])}d", base, count=1))
-
-
 def expanded(source: str) -> list[tuple[str, int | None]]:
     """Return the files of a word, with their numbers if the word is a pattern."""
     # The name of an existing file may look like a pattern.
     if source == PIPE or os.path.isfile(source):
         return [(source, None)]
-    source = _with_number(source)
     folder, name = os.path.split(source)
     results: list[tuple[str, int | None]] = []
     if os.path.isdir(source):

@@ -69,7 +69,7 @@ def likely_cause(
     is_bloom = _is_bloom(target, residual, plain)
     encoding = _other_encoding(target, result)
     if encoding or not is_bloom:
-        return _with_bloom(encoding, is_bloom)
+        return "; ".join(filter(None, ("" if is_bloom else NOTHING_FOUND, encoding)))
     return (
         f"the method {method} does not reach it with {', '.join(vary)}; vary more fields, start "
         "from another preset, or raise max_calls"
@@ -86,10 +86,6 @@ def _is_bloom(target: Array, residual: Array, plain: Array) -> bool:
     explains_some = np.linalg.norm(residual) < (1 - _SOME) * changed
     is_recoloured = _recoloured(plain, target) < (1 - _MOST) * changed
     return bool(is_lighter and explains_some and not is_recoloured)
-
-
-def _with_bloom(cause: str, is_bloom: bool) -> str:
-    return cause if is_bloom else "; ".join(filter(None, (NOTHING_FOUND, cause)))
 
 
 def _other_encoding(target: Array, result: Array) -> str:

@@ -30,9 +30,6 @@ from vkbloom._renderer.sources import Inputs, image_source
 from vkbloom._settings.registry import presets
 from vkbloom._settings.settings import Settings, check_settings
 
-#: A function of an image, such as `vkbloom.testing.command` makes of a program.
-Maker = Callable[[NDArray[Any]], NDArray[Any]]
-
 # Longer side of the image of the first search in pixels, and its share of the calls.
 _COARSE_SIDE: Final = 384
 _COARSE_CALLS: Final = 0.6
@@ -43,7 +40,7 @@ _FAINT: Final = 0.02
 @overload
 def fit(
     image: NDArray[Any] | Image,
-    target: NDArray[Any] | Maker,
+    target: NDArray[Any],
     settings: Settings,
     vary: str | Sequence[str],
     *,
@@ -58,7 +55,7 @@ def fit(
 @overload
 def fit(
     image: NDArray[Any] | Image,
-    target: NDArray[Any] | Maker,
+    target: NDArray[Any],
     settings: Sequence[Settings] | Literal["all"],
     vary: str | Sequence[str],
     *,
@@ -73,7 +70,7 @@ def fit(
 @checked_as(settings=MANY_SETTINGS)
 def fit(
     image: NDArray[Any] | Image,
-    target: NDArray[Any] | Maker,
+    target: NDArray[Any],
     settings: Settings | Sequence[Settings] | Literal["all"],
     vary: str | Sequence[str],
     *,
@@ -91,12 +88,10 @@ def fit(
     ----------
     image : ndarray, shape (H, W, 3) or (H, W, 4), or Image
         As for `Renderer.apply`. A handle of `Renderer.upload` needs its `renderer`.
-    target : ndarray, shape (H, W, 3) or (H, W, 4), or callable
+    target : ndarray, shape (H, W, 3) or (H, W, 4)
         The picture that the framebuffer should be, of the same size; uint8 is scaled to 0..1.
         Alpha is not compared. With a target of 8 bits, such as a screenshot from `vkbloom.read`,
-        framebuffers are clipped and rounded as it is, and its saturated pixels are left out. Of a
-        callable, such as `vkbloom.testing.command` makes of a program, what it makes of the image,
-        which is then an array.
+        framebuffers are clipped and rounded as it is, and its saturated pixels are left out.
     settings : Settings, sequence of Settings, or "all"
         Where the search starts, and the fields that stay as they are. Of several, such as presets
         of several engines, each is searched by itself. "all": every preset; of a preset those of
@@ -163,10 +158,6 @@ def fit(
     if renderer is None and isinstance(image, Image):
         raise ValueError("renderer: an uploaded image needs the renderer that has it")
     pixels = None if isinstance(image, Image) else check_image(image)
-    if callable(target):
-        if pixels is None:
-            raise TypeError("image: a callable target needs an array, not an uploaded image")
-        target = target(pixels)
     measure = Measure.of(check_image(target, "target"), loss_named(loss))
     brightest = math.inf if pixels is None else float(light(pixels).max())
     limits = (bounds or {}, brightest, len(measure.target))

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping, Sequence
-from typing import Final
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom._argument_types import checked
 from vkbloom._checks import check_size
-from vkbloom._fit.fitting import Maker, fit
+from vkbloom._fit.fitting import fit
 from vkbloom._fit.losses import Loss
 from vkbloom._fit.result import FitResult
 from vkbloom._fit.space import Bounds, varied_as
@@ -20,6 +20,9 @@ from vkbloom._renderer.renderer import Renderer
 from vkbloom._settings.fields import fields_of
 from vkbloom._settings.registry import METHODS
 from vkbloom._settings.settings import Settings, check_settings
+
+#: A function of an image, such as `vkbloom.testing.command` makes of a program.
+Maker = Callable[[NDArray[Any]], NDArray[Any]]
 
 # What a user of a method turns; other fields of `to` stay as they are.
 _KNOBS: Final[Mapping[str, tuple[str, ...]]] = {
@@ -107,7 +110,7 @@ def translate(
     renderer = renderer or default_renderer()
     result = fit(
         image,
-        settings if callable(settings) else _applied(renderer, image, settings),
+        settings(image) if callable(settings) else _applied(renderer, image, settings),
         _plain(start),
         names,
         framebuffer="final",

@@ -45,8 +45,6 @@ def grid(
     settings: Settings | str | None = None,
     axes: Mapping[str, Iterable[Any]] | None = None,
     *,
-    mask: NDArray[Any] | None = None,
-    emission: NDArray[Any] | None = None,
     size: tuple[int, int] | None = None,
     shading: Shading = "forward",
     time: float = 0.0,
@@ -67,8 +65,8 @@ def grid(
     ----------
     source : Scene, image, or list or mapping of images
         Several images add the dimension "image" before all others, with a mapping's keys as
-        labels. They must have the same shape and dtype. Uploaded images belong to one renderer:
-        they have no store that a cluster fills.
+        labels. They must have the same shape and dtype. Uploaded images have their mask and
+        emission; they belong to one renderer, so they have no store that a cluster fills.
     settings : Settings or str, optional
         The settings that the axes change, or the name of a preset. Default:
         ``presets["bevy_natural"]`` for images, ``presets["tutorial"]`` for a scene.
@@ -77,8 +75,6 @@ def grid(
         `vkbloom.presets`, the axis "settings" a list of Settings of any methods. Only one of these
         two axes and the argument `settings` can be given. All other axes change the settings of
         these axes, too.
-    mask, emission : ndarray, optional
-        Of all images, as for `apply`.
     size : (int, int), optional
         Width and height of a scene's frames. Default: (1280, 720).
     shading, time
@@ -166,8 +162,6 @@ def grid(
         source,
         settings,
         axes,
-        mask=mask,
-        emission=emission,
         size=size,
         shading=shading,
         time=time,

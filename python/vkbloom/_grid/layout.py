@@ -133,8 +133,6 @@ def ask(
     settings: Settings | str | None,
     axes: Mapping[str, Any] | None,
     *,
-    mask: object = None,
-    emission: object = None,
     size: tuple[int, int] | None,
     shading: str,
     time: float,
@@ -144,7 +142,7 @@ def ask(
     """Check the arguments that all grids share."""
     if settings is not None:
         settings = check_settings(settings)
-    checked = read_source(source, size, shading, time, mask=mask, emission=emission)
+    checked = read_source(source, size, shading, time)
     grid_axes = read_axes(settings, {} if axes is None else axes, has_time=checked.has_time)
     if checked.labels:
         grid_axes = (image_axis(checked.labels), *grid_axes)

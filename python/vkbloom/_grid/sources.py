@@ -14,14 +14,13 @@ import numpy as np
 
 from vkbloom import _core
 from vkbloom._checks import (
-    check_emission,
     check_framebuffers,
     check_image,
-    check_mask,
     check_size,
     check_time,
 )
 from vkbloom._grid.order import Index
+from vkbloom._renderer.device_arrays import ImportedArray
 from vkbloom._renderer.frames import Frames
 from vkbloom._renderer.image import Image
 from vkbloom._renderer.renderer import Renderer
@@ -66,29 +65,23 @@ def visit(
 
 
 class ImageSource:
-    """One image, or several images of the same shape, which share a mask and an emission."""
+    """One image, or several images of the same shape."""
 
     has_time = False
     #: The place of points without an image axis.
     entry = 0.0
 
     def __init__(
-        self,
-        images: Sequence[NDArray[Any] | Image],
-        labels: tuple[Any, ...] = (),
-        mask: NDArray[Any] | None = None,
-        emission: NDArray[Any] | None = None,
+        self, images: Sequence[NDArray[Any] | Image], labels: tuple[Any, ...] = ()
     ) -> None:
         self.images = tuple(images)
         self.labels = labels
-        self.mask = mask
-        self.emission = emission
         #: Images on a renderer's device by place, the latest last.
         self._uploaded: tuple[_core.Renderer | None, dict[int, _core.Source]] = None, {}
 
     def __reduce__(self) -> tuple[Any, ...]:
         # The device is not sent to other processes.
-        return type(self), (self.images, self.labels, self.mask, self.emission)
+        return type(self), (self.images, self.labels)
 
     def on(self, renderer: Renderer, entry: float) -> _core.Source:
         """Return an image on a renderer's device. The latest images are kept there."""
@@ -109,21 +102,25 @@ class ImageSource:
 
     def for_core(self, entry: float) -> _core.Source:
         """Return the core's Source of an image."""
-        return image_source(self.images[int(entry)], self.mask, self.emission)
+        return image_source(self.images[int(entry)])
 
     @functools.cached_property
     def description(self) -> dict[str, Any]:
         """The identity of the source: shapes, dtypes and digests."""
-        given = {"mask": self.mask, "emission": self.emission}
-        return {
-            "kind": "image",
-            "images": [_described(image) for image in self.images if not isinstance(image, Image)],
-            **{name: _described(array) for name, array in given.items() if array is not None},
-        }
+        return {"kind": "image", "images": list(map(_described, self.images))}
 
 
-def _described(array: NDArray[Any]) -> dict[str, Any]:
-    return {"shape": list(array.shape), "dtype": array.dtype.name, "sha256": digest(array)}
+def _described(image: NDArray[Any] | Image) -> dict[str, Any]:
+    """Return the identity of an image; of an uploaded one what is on the host: mask, emission."""
+    arrays = image._inputs if isinstance(image, Image) else {"sha256": image}
+    return {
+        "shape": list(image.shape),
+        "dtype": image.dtype.name,
+        **{
+            name: digest(part.numpy() if isinstance(part, ImportedArray) else part)
+            for name, part in arrays.items()
+        },
+    }
 
 
 class SceneSource:
@@ -179,16 +176,9 @@ def read_source(
     size: tuple[int, int] | None,
     shading: str,
     time: float,
-    *,
-    mask: object = None,
-    emission: object = None,
 ) -> Source:
     """Check the source of a grid."""
-    given = {"mask": mask, "emission": emission}
     if isinstance(source, Scene):
-        for name, array in given.items():
-            if array is not None:
-                raise ValueError(f"{name}: the source is a scene; leave the argument out")
         frame = check_size("size", size or SCENE_SIZE)
         return SceneSource(source, frame, check_shading(shading), check_time(time))
     for name, is_given in (
@@ -199,7 +189,7 @@ def read_source(
         if is_given:
             raise ValueError(f"{name}: the source is not a scene; leave the argument out")
     if is_image(source):
-        return _image_source([_checked(source)], (), **given)
+        return ImageSource([_checked(source)])
     labels: list[Any]
     if isinstance(source, Mapping):
         images, labels = list(source.values()), [str(label) for label in source]
@@ -211,25 +201,7 @@ def read_source(
         )
     if not images:
         raise ValueError("source: the list of images is empty")
-    return _image_source([_checked(image) for image in images], tuple(labels), **given)
-
-
-def _image_source(
-    images: list[NDArray[Any] | Image], labels: tuple[Any, ...], mask: object, emission: object
-) -> ImageSource:
-    """Return the source; a mask and an emission must fit each of the images."""
-    if mask is None and emission is None:
-        return ImageSource(images, labels)
-    held_mask = held_emission = None
-    for image in images:
-        # Refuses one that is uploaded.
-        image_source(image, mask, emission)
-        assert not isinstance(image, Image)
-        if mask is not None:
-            held_mask = check_mask(mask, (image.shape[0], image.shape[1]))
-        if emission is not None:
-            held_emission = check_emission(emission, image)
-    return ImageSource(images, labels, held_mask, held_emission)
+    return ImageSource([_checked(image) for image in images], tuple(labels))
 
 
 def _checked(image: object) -> NDArray[Any] | Image:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 import sys
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, NoReturn
@@ -331,20 +332,29 @@ def _contiguous(shape: tuple[int, ...]) -> tuple[int, ...]:
     return tuple(strides[: len(shape)])
 
 
+def _capsule(image: Any, stream: int) -> Any:
+    """Return a capsule of DLPack that is ordered before later work of the stream."""
+    try:
+        return image.__dlpack__(stream=stream, max_version=(1, 0))
+    except TypeError:  # the producer knows no versions of DLPack
+        return image.__dlpack__(stream=stream)
+
+
 def _from_dlpack(image: Any, name: str, core: _core.Renderer) -> _Array:
     kind, ordinal = (int(number) for number in image.__dlpack_device__())
     if kind == _CUDA_MANAGED:
         raise ValueError(
             f"{name}: it is in managed (unified) memory; copy it to the device's own memory"
         )
-    ours, _ = core.cuda()
+    ours, stream = core.cuda()
     if ordinal != ours:
         raise ValueError(
             f"{name}: it is on {core.cuda_name(ordinal)}, and the renderer is on "
             f"{core.cuda_name(ours)}; open a renderer with the array's GPU as adapter, or move the "
             "array"
         )
-    capsule = core.dlpack(image)
+    # PyTorch exports only tensors of the current device.
+    capsule = core.in_context(functools.partial(_capsule, image, stream))
     address, (kind, _), (code, bits, lanes), shape, strides = _core.read_dlpack(capsule)
     if kind != _CUDA:
         raise ValueError(f"{name}: its DLPack capsule is of device type {kind}, not 2 (CUDA)")

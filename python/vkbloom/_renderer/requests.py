@@ -123,12 +123,17 @@ class Result(NamedTuple):
     counts: tuple[int, int]
 
 
+def array_bytes(shape: tuple[int, ...], dtype: str) -> int:
+    """Return the size of an array."""
+    return math.prod(shape) * np.dtype(dtype).itemsize
+
+
 def new_array(core: _core.Renderer, shape: tuple[int, ...], dtype: str) -> NDArray[Any]:
     """Return an array for a framebuffer. Its content is undefined.
 
     A large one is in pages that its `base` owns. They are reused when the array is freed.
     """
-    size = math.prod(shape) * np.dtype(dtype).itemsize
+    size = array_bytes(shape, dtype)
     if size < LARGE_BYTES:
         return np.empty(shape, dtype)
     # NumPy's type hints accept only buffers of the standard library.
@@ -140,7 +145,7 @@ def new_memory(
 ) -> NDArray[Any] | _core.Exported:
     """Return an array for a framebuffer, or memory on the device."""
     if destination == "cuda":
-        return memory_for(core, math.prod(shape) * np.dtype(dtype).itemsize)
+        return memory_for(core, array_bytes(shape, dtype))
     return new_array(core, shape, dtype)
 
 
@@ -293,7 +298,7 @@ class _Requests:
             except Exception as error:
                 self._fail(error)
                 break
-            size += plan.size
+            size += sum(array_bytes(shape, dtype) for _, shape, dtype in plan.outputs)
         return requests
 
     def _next(self) -> Request | None:

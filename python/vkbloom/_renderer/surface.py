@@ -58,8 +58,8 @@ class Surface:
     - `window`: A window of PyPI's ``glfw``, created with the hint CLIENT_API = NO_API; or None: a
       display without a window, by VK_EXT_headless_surface, which Mesa's lavapipe 25 has.
     - `size`: Width and height in pixels without a window. A window has its own.
-    - `mailbox`: False: each refresh of the screen shows the next image (FIFO); True: it shows the
-      newest one (MAILBOX), which not every surface has.
+
+    Each refresh of the screen shows the next image (FIFO).
     """
 
     def __init__(
@@ -68,12 +68,11 @@ class Surface:
         window: Any = None,
         *,
         size: tuple[int, int] = (1280, 720),
-        mailbox: bool = False,
     ) -> None:
         self._size = check_size("size", size)
         handle = 0 if window is None else _window_surface(renderer, window)
         self._renderer, self._window = renderer, window
-        self._screen = renderer._core.open_screen(handle, mailbox)
+        self._screen = renderer._core.open_screen(handle)
         self._pending: deque[_core.Submission] = deque()
 
     @property

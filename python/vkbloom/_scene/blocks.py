@@ -13,6 +13,7 @@ from vkbloom import _core
 from vkbloom._scene.mesh import Mesh
 from vkbloom._scene.scene import Scene
 from vkbloom._scene.textures import Texture
+from vkbloom._scene.view import matrices
 
 #: As Vulkan numbers them.
 _ADDRESS_MODES: Final = ("repeat", "mirror-repeat", "clamp-to-edge")
@@ -30,18 +31,12 @@ def scene_arguments(scene: Scene, size: tuple[int, int], shading: str, turns: fl
     body, body_counts = _mesh(scene.body, numbers)
     glow, glow_counts = ([], (0, 0, 0)) if scene.glow is None else _mesh(scene.glow, numbers)
     sky = () if scene.skybox is None else scene.skybox.levels
-    camera = scene.camera
     block = struct.pack(
-        "=Q11d10I32s",
+        "=Qd112s10I32s",
         scene.contents_serial,
-        *camera.position,
-        *camera.rotation,
-        camera.fov,
-        camera.near,
-        camera.far,
-        # `time` has period 1. It is reduced first, so that large times keep their float precision.
-        math.fmod(turns, 1.0),
         scene.glow_intensity,
+        # `turns` has period 1. It is reduced first, so that large times keep their precision.
+        matrices(scene.camera, math.fmod(turns, 1.0), size[0] / size[1]).tobytes(),
         *size,
         *body_counts,
         *glow_counts,

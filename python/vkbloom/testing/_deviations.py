@@ -70,7 +70,6 @@ def compare_with_law(
     expected: Image,
     allowed: float,
     *,
-    border: int = 0,
     note: str = "",
 ) -> None:
     """Raise AssertionError with the deviation, its position and the law if a value is wrong."""
@@ -82,8 +81,8 @@ def compare_with_law(
         fail(
             assertion,
             law,
-            f"{actual[position]:.6g} instead of {expected[position]:.6g} at x {x + border}, "
-            f"y {y + border}, channel {channel}: off by {difference[position]:.3g}, {allowed:.3g} "
+            f"{actual[position]:.6g} instead of {expected[position]:.6g} at x {x}, "
+            f"y {y}, channel {channel}: off by {difference[position]:.3g}, {allowed:.3g} "
             f"allowed{note}",
         )
 

@@ -94,7 +94,7 @@ def assert_additive(
 
 
 @checked
-def assert_gain(bloom: Bloom, gain: float, probe: Probe = _DEFAULT, *, border: int = 0) -> None:
+def assert_gain(bloom: Bloom, gain: float, probe: Probe = _DEFAULT) -> None:
     """Assert the gain of flat images.
 
     The law: B(v) = gain * v at every pixel, for flat images of v = `probe.value`, half and a
@@ -109,22 +109,18 @@ def assert_gain(bloom: Bloom, gain: float, probe: Probe = _DEFAULT, *, border: i
         The expected gain; `vkbloom.reference.gain` computes it for vkbloom's custom methods.
     probe : Probe
         With integers, `value` times `gain` must be at most 1.
-    border : int
-        Pixels at each side that are ignored, for methods that read black outside the image.
     """
     __tracebackhide__ = True
     check_number("gain", gain, 0.0, math.inf)
     for part in (1.0, 0.5, 0.25):
         image = _divisible_by_four(probe, probe.flat(probe.value)) * part
         result, error = probe.apply(bloom, image)
-        inner = _inner(probe, border)
         compare_with_law(
             "assert_gain",
             f"B(v) = {gain:.6g} v, for a flat image of v = {image.flat[0]:.6g}",
-            result[inner],
-            gain * image[inner],
+            result,
+            gain * image,
             error,
-            border=border,
         )
 
 
@@ -166,7 +162,7 @@ def assert_symmetric(
 
 
 @checked
-def assert_no_ringing(bloom: Bloom, probe: Probe = _DEFAULT, *, border: int = 0) -> None:
+def assert_no_ringing(bloom: Bloom, probe: Probe = _DEFAULT) -> None:
     """Assert that the bloom of an edge has no dark or bright line beside the edge.
 
     The law: across a step from black to `probe.value`, along x and along y, values do not decrease.
@@ -179,13 +175,10 @@ def assert_no_ringing(bloom: Bloom, probe: Probe = _DEFAULT, *, border: int = 0)
     bloom : callable
         Takes an image and returns one of the same height and width.
     probe : Probe
-    border : int
-        Pixels at each side that are ignored, for methods that read black outside the image.
     """
     __tracebackhide__ = True
     dark, dark_error = probe.apply(bloom, probe.flat(0.0))
     bright, bright_error = probe.apply(bloom, probe.flat(probe.value))
-    inner = _inner(probe, border)
     width, height = probe.size
     for axis, across, lit in (
         (1, "x", (slice(None), slice(width // 2, None))),
@@ -197,20 +190,17 @@ def assert_no_ringing(bloom: Bloom, probe: Probe = _DEFAULT, *, border: int = 0)
         compare_with_law(
             "assert_no_ringing",
             f"a step along {across} stays between the bloom of black and of the flat image",
-            result[inner],
-            np.clip(result, dark, bright)[inner],
+            result,
+            np.clip(result, dark, bright),
             error + max(dark_error, bright_error),
-            border=border,
         )
-        inside = result[inner]
         # The running maximum. No later value may be lower.
         compare_with_law(
             "assert_no_ringing",
             f"along {across}, values only rise across a step from black to bright",
-            inside,
-            np.maximum.accumulate(inside, axis=axis),
+            result,
+            np.maximum.accumulate(result, axis=axis),
             2 * error,
-            border=border,
         )
 
 
@@ -282,12 +272,3 @@ def _mirrored(image: Image, axis: str) -> Image:
     if axis == "xy":
         return image.swapaxes(0, 1)
     return np.flip(image, 1 if axis == "x" else 0)
-
-
-def _inner(probe: Probe, border: int) -> tuple[slice, slice]:
-    width, height = probe.size
-    if not 0 <= border < min(width, height) / 2:
-        raise ValueError(
-            f"border: {border!r} is out of range, 0 to under half of {min(width, height)}"
-        )
-    return slice(border, height - border), slice(border, width - border)
