@@ -1,9 +1,10 @@
-"""Draw the pictures of the presets, for docs/gallery.md and docs/presets.md.
+"""Draw the pictures of the presets, for the docs.
 
 python tools/docs_pictures.py docs/pictures
 
 - gallery.jpg: a street at night with each preset
 - presets.png, profiles.png: how the light of a point spreads with each preset
+- psf_presets.png: the functions of docs/evidence/psf_atlas.md
 - hero.jpg: the saucer without bloom beside the saucer with bloom
 - the flowchart of docs/plans.md, from a plan
 """
@@ -144,6 +145,48 @@ def draw_points(renderer: vkbloom.Renderer, folder: Path) -> None:
     write_sheet(folder / "presets.png", tiles, 5)
 
 
+def draw_functions(renderer: vkbloom.Renderer, path: Path) -> None:
+    """Draw profile, encircled energy and transfer function of each preset without a threshold."""
+    image = np.zeros((512, 512, 3), np.float32)
+    blooms = {}
+    for name, settings in vkbloom.presets.items():
+        exact = settings.replace(format="rgba32float", threshold=None)
+        # Bevy's prefilter makes 0.0001 of black.
+        black = renderer.apply(image, exact, framebuffers="bloom")["bloom"]
+        image[256, 256] = 1
+        lit = renderer.apply(image, exact, framebuffers="bloom")["bloom"]
+        image[256, 256] = 0
+        blooms[name] = (lit - black)[..., 1].astype(np.float64)
+    # KinoBloom removes a single pixel as a firefly.
+    blooms = {name: bloom for name, bloom in blooms.items() if bloom.sum() > 0}
+    figure, grid = plt.subplots(
+        -(-len(blooms) // 6), 3, figsize=(12, 15), sharex="col", sharey="col", layout="constrained"
+    )
+    distance = np.hypot(*(np.indices((512, 512)) - 256)).round().astype(int).ravel()
+    for index, (name, bloom) in enumerate(blooms.items()):
+        profile, within, transfer = grid[index // 6]
+        light = np.bincount(distance, bloom.ravel())[:256]
+        mean = light / np.bincount(distance)[:256]
+        profile.loglog(np.arange(256) + 0.5, np.where(mean > 0, mean, np.nan), label=name)
+        within.semilogx(np.arange(256) + 0.5, light.cumsum() / bloom.sum(), label=name)
+        line = np.abs(np.fft.rfft(bloom.sum(axis=0))) / bloom.sum()
+        transfer.plot(np.fft.rfftfreq(512), line, label=name)
+    for row in grid:
+        row[0].set_ylim(1e-8, 10)
+        row[2].set_ylim(0, 1.05)
+        row[2].legend(fontsize=8, loc="upper left", bbox_to_anchor=(1, 1))
+        for axes in row:
+            axes.grid(alpha=0.3)
+    names = ("share of the pixel, mean", "encircled energy, share", "modulation transfer")
+    for axes, text in zip(grid[0], names, strict=True):
+        axes.set_title(text)
+    units = ("distance, pixels (+ 0.5)", "distance, pixels (+ 0.5)", "cycles per pixel, along x")
+    for axes, text in zip(grid[-1], units, strict=True):
+        axes.set_xlabel(text)
+    figure.savefig(path, dpi=80)
+    plt.close(figure)
+
+
 def write_flowchart(page: Path) -> None:
     """Put the forward system's flowchart in the place of the one in a page."""
     os.environ["VKBLOOM_VARIANT"] = "fragment"
@@ -161,6 +204,7 @@ def main(folder: Path) -> None:
         draw_hero(renderer, folder / "hero.jpg")
         draw_gallery(renderer, folder / "gallery.jpg")
         draw_points(renderer, folder)
+        draw_functions(renderer, folder / "psf_presets.png")
 
 
 if __name__ == "__main__":
