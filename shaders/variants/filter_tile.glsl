@@ -1,8 +1,8 @@
 // A filter for GPUs, or its transpose. A workgroup computes the weights of its columns and rows once, and adds up
 // each row of the source that it needs along x once, into shared memory. From there an invocation adds up some rows
-// of a column. It loads what these share once where the ratio of heights is simple (EXACT_ROWS), and texels that two
-// columns share where both ratios are and windows have PHASES. The including
-// shader declares `target`, includes lib/window.glsl, and defines the functions below.
+// of a column. What these share is loaded once where the ratio of heights is simple (EXACT_ROWS), and what columns
+// share where windows have PHASES. The including shader declares `target`, includes lib/window.glsl, and defines the
+// functions below.
 
 const int RUN = FILTER_TILE_RUN;
 
