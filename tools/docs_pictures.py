@@ -160,7 +160,13 @@ def draw_functions(renderer: vkbloom.Renderer, path: Path) -> None:
     # KinoBloom removes a single pixel as a firefly.
     blooms = {name: bloom for name, bloom in blooms.items() if bloom.sum() > 0}
     figure, grid = plt.subplots(
-        -(-len(blooms) // 6), 3, figsize=(12, 15), sharex="col", sharey="col", layout="constrained"
+        -(-len(blooms) // 6),
+        3,
+        figsize=(12, 15),
+        sharex="col",
+        sharey="col",
+        squeeze=False,
+        layout="constrained",
     )
     distance = np.hypot(*(np.indices((512, 512)) - 256)).round().astype(int).ravel()
     for index, (name, bloom) in enumerate(blooms.items()):
