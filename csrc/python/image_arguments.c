@@ -6,12 +6,18 @@
 
 #include <string.h>
 
-// NumPy writes "=" for unaligned arrays.
+// NumPy writes "=" for unaligned arrays, and "<" or ">" where a dtype names its byte order.
 char vkb_element_code(const Py_buffer *view)
 {
     const char *format = view->format ? view->format : "B";
+    const uint16_t probe = 1;
+    const bool is_little = *(const unsigned char *)&probe == 1;
+    const bool is_native = *format == '@' || *format == '=' || *format == (is_little ? '<' : '>')
+                        || (*format == '!' && !is_little);
 
-    format += *format == '=';
+    // A byte has no order.
+    if (is_native || (view->itemsize == 1 && *format && strchr("<>!", *format)))
+        ++format;
     return strlen(format) == 1 ? *format : 0;
 }
 

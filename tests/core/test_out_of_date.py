@@ -77,7 +77,7 @@ CHANGES: list[tuple[dict[str, Any], list[str]]] = [
     ({"composite": "screen"}, ["final"]),
     ({"tonemap": "aces"}, ["final"]),
     ({"encoding": "srgb"}, ["final"]),
-    # Passes that read the scene in another way give its image another usage, so that it is drawn again.
+    # Passes that read the scene in another way give its image another usage: it is drawn again.
     ({"bloom": False}, ["scene", "final"]),
     ({"threshold": 0.5}, ["glow", *BLUR]),
     ({"bloom_size": (64, 64)}, ["glow", *BLUR]),
