@@ -56,7 +56,7 @@ static PyMethodDef functions[] = {
      "image_source(image, emission=None, mask=None, levels=()) -> Source. The levels are images "
      "that another part of a graph has made."},
     {"scene_source", vkb_scene_source, METH_VARARGS,
-     "scene_source(block, pictures, arrays) -> Source. As scene_blocks.py packs it."},
+     "scene_source(block, pictures, arrays) -> Source. As _scene/blocks.py packs it."},
     {"plan", vkb_any_plan, METH_VARARGS,
      "plan(source, settings, names, variants=\"fragment\") -> Plan. For no renderer: what one with "
      "those variants would do; by default it draws every pass as its method defines it."},

@@ -1,4 +1,4 @@
-// A scene as Python packs it: blocks of bytes (_renderer/scene_blocks.py) and arrays.
+// A scene as Python packs it: blocks of bytes (_scene/blocks.py) and arrays.
 #include "python/arguments.h"
 #include "python/values.h"
 

@@ -140,19 +140,19 @@ static void find_reached(struct module *module)
 
 static bool phi_value(const struct module *module, const uint32_t *at, uint32_t *value)
 {
-    const struct id *found = NULL;
+    const struct id *first = NULL;
 
     for (uint32_t i = 3; i + 1 < vkb_word_count(at); i += 2) {
-        const struct id *one = &module->ids[at[i]];
+        const struct id *operand = &module->ids[at[i]];
         if (at[i] == at[2] || !follows(module, at[i + 1], module->ids[at[2]].block))
             continue;
-        if (!one->known || (found && one->value != found->value))
+        if (!operand->known || (first && operand->value != first->value))
             return false;
-        found = one;
+        first = operand;
     }
-    if (found)
-        *value = found->value;
-    return found != NULL;
+    if (first)
+        *value = first->value;
+    return first != NULL;
 }
 
 // Finds values in the blocks that are reached. Returns whether there were new ones.

@@ -202,7 +202,7 @@ def test_unrequested_framebuffers_are_not_allocated(opened: Renderer, scene: Sce
     huge = Separable(bloom_size=(side, side), format="rgba32float")
     frames = opened.render(scene, huge, SIZE, framebuffers=["scene", "depth"])
     assert list(frames) == ["scene", "depth"]
-    assert list(frames.timings) == ["scene"]  # whose image has fewer usages
+    assert list(frames.timings) == ["scene"]  # whose image gets usages of that plan
 
 
 # Many changes

@@ -55,7 +55,10 @@ def _mesh(
     """Return a mesh's arrays and their lengths; textures get the next numbers."""
     arrays = [mesh.packed, np.ascontiguousarray(mesh.indices, np.uint32)]
     surfaces = [
-        (part.index_count, *(numbers.setdefault(one, len(numbers)) for one in part.textures))
+        (
+            part.index_count,
+            *(numbers.setdefault(texture, len(numbers)) for texture in part.textures),
+        )
         for part in mesh.surfaces
     ]
     if surfaces:
