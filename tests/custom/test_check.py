@@ -19,7 +19,6 @@ from scipy import ndimage
 import vkbloom
 from vkbloom import Renderer, testing
 from vkbloom._cli.program import program
-from vkbloom._custom.compiler import find_compiler
 from vkbloom.testing import _measuring as measuring
 from vkbloom.testing._law_report import law_report
 from vkbloom.testing._programs import Program
@@ -80,14 +79,6 @@ HELD = [
 ]
 
 
-@pytest.fixture(scope="module")
-def compiler() -> None:
-    try:
-        find_compiler()
-    except vkbloom.ShaderError as error:
-        pytest.skip(str(error))
-
-
 @pytest.fixture(autouse=True)
 def two_presets(monkeypatch: pytest.MonkeyPatch) -> None:
     """Search the nearest of two presets, since all take seconds."""
@@ -111,7 +102,7 @@ def of_text(folder: Path, text: str, *words: str) -> tuple[Result, dict[str, Any
     return checked(str(file), *SMALL, *words)
 
 
-@pytest.mark.usefixtures("compiler")
+@pytest.mark.usefixtures("glslang")
 def test_a_sound_bloom(tmp_path: Path) -> None:
     done, found = of_text(tmp_path, SOUND, "--require", ",".join(HELD))
     assert done.exit_code == 0, done.output
@@ -124,7 +115,7 @@ def test_a_sound_bloom(tmp_path: Path) -> None:
     assert found["reference"] is None
 
 
-@pytest.mark.usefixtures("compiler")
+@pytest.mark.usefixtures("glslang")
 @pytest.mark.parametrize(
     ("text", "laws"),
     [
@@ -152,7 +143,7 @@ def test_a_planted_fault_is_named(tmp_path: Path, text: str, laws: set[str]) -> 
         assert all(found["laws"][law]["held"] for law in unbroken), found["laws"]
 
 
-@pytest.mark.usefixtures("compiler")
+@pytest.mark.usefixtures("glslang")
 def test_a_page_and_parameters(tmp_path: Path) -> None:
     examples = Path(__file__).resolve().parents[2] / "examples" / "custom_methods"
     page = tmp_path / "page.html"
@@ -365,7 +356,7 @@ def test_veiling_glare_of_a_flat_share() -> None:
 LEAKY = chain("return 0.9 * GLOW_texOff(0.5);")
 
 
-@pytest.mark.usefixtures("compiler")
+@pytest.mark.usefixtures("glslang")
 @pytest.mark.parametrize(
     ("text", "against", "verdict", "newly"),
     [

@@ -16,9 +16,10 @@ from tests.images import picture
 from vkbloom import Renderer, Settings, load_method, psf, reference, testing
 from vkbloom._cli.live import Live
 from vkbloom._cli.program import program
-from vkbloom._custom.compiler import find_compiler
 from vkbloom._explorer.controls import as_code
 from vkbloom._settings.registry import METHODS
+
+pytestmark = pytest.mark.usefixtures("glslang")
 
 xarray = pytest.importorskip("xarray")
 
@@ -58,14 +59,6 @@ vec4 hook() {
     return sum / total;
 }
 """
-
-
-@pytest.fixture(scope="module", autouse=True)
-def compiler() -> None:
-    try:
-        find_compiler()
-    except vkbloom.ShaderError as error:
-        pytest.skip(str(error))
 
 
 @pytest.fixture

@@ -18,21 +18,14 @@ from tests.images import picture
 from tests.refusals import assert_refused, rows
 from vkbloom import Renderer, Settings, load_method, reference
 from vkbloom._cli.program import program
-from vkbloom._custom.compiler import find_compiler
 from vkbloom._settings.registry import METHODS
+
+pytestmark = pytest.mark.usefixtures("glslang")
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples" / "custom_methods"
 COPY = "//!HOOK MAIN\n//!BIND HOOKED\nvec4 hook() { return HOOKED_texOff(0); }\n"
 
 Array = NDArray[Any]
-
-
-@pytest.fixture(scope="module", autouse=True)
-def compiler() -> None:
-    try:
-        find_compiler()
-    except vkbloom.ShaderError as error:
-        pytest.skip(str(error))
 
 
 def own(text: str, name: str = "tried", **fields: Any) -> Settings:
