@@ -103,7 +103,8 @@ class TestFormats:
         image = light(20, 30, channels, dtype="uint8")
         done(png(tmp_path / "a.png", image), tmp_path / f"b.{suffix}")
         written = pixels(tmp_path / f"b.{suffix}")
-        assert (written.dtype, written.shape) == (np.uint8, image.shape)
+        assert written.dtype == np.uint8
+        assert written.shape == image.shape
         rgb = linear(np.repeat(image, 3 // channels, axis=2))
         expected = levels(applied(rgb))[:, :, :channels]
         assert np.abs(written - expected).max() <= ROUNDING
