@@ -218,27 +218,14 @@ def test_report_has_page_and_json(tmp_path: Path) -> None:
     written = write(Report(machine, (section,)), tmp_path / "new" / "b.md")
     assert [path.name for path in written] == ["b.md", "b.json"]
     page = written[0].read_text()
-    for line in (
-        "Written by `make bench`, a day.",
-        "| CuPy | not installed |",
-        "## A title (`id`)",
-        "**Rows**",
-        "| 1\\|2 | 3 |",
-        "| x / y | at least 3 | 2 | no | id |",
-        "| y / x | at most 3 | nan | no | id |",
-        "- CuPy is not installed",
-    ):
-        assert line in page.splitlines()
-    assert "times are wall-clock times" in page
+    rows = ["| CuPy | not installed |", "| 1\\|2 | 3 |", "| x / y | at least 3 | 2 | no | id |"]
+    rows += ["| y / x | at most 3 | nan | no | id |", "- CuPy is not installed"]
+    assert {*rows, "Written by `make bench`, a day.", "## A title (`id`)"} <= {*page.splitlines()}
     values = json.loads(written[1].read_text(), parse_constant=pytest.fail)
     (found,) = values["sections"]
     assert values["machine"] == machine
-    assert found["times"]["group"]["one"] == {
-        "median": 1.0,
-        "least": 0.5,
-        "quartiles": [0.75, 1.25],
-        "seconds": [0.5, 1.5, 1.0],
-    }
+    one = {"median": 1, "least": 0.5, "quartiles": [0.75, 1.25], "seconds": [0.5, 1.5, 1]}
+    assert found["times"]["group"]["one"] == one
     assert [goal["ratio"] for goal in found["goals"]] == [2.0, None]
 
 
