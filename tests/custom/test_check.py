@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import importlib.resources
 import json
-import math
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -55,13 +54,6 @@ SOUND = chain("return GLOW_texOff(0);")
 HELD = [
     name for name in LAWS if name not in {"bounded_fireflies", "resolution", "views", "reference"}
 ]
-
-
-@pytest.fixture(autouse=True)
-def two_presets(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Search the nearest of two presets, since all take seconds."""
-    few = {name: vkbloom.presets[name] for name in ("dual_kawase", "tutorial")}
-    monkeypatch.setattr(measuring, "presets", few)
 
 
 def checked(*words: str) -> tuple[Result, dict[str, Any]]:
@@ -117,7 +109,17 @@ def test_a_preset() -> None:
     done, found = checked("--preset", "dual_kawase", *SMALL, "--require", "symmetric,reference")
     assert done.exit_code == 0, done.output
     assert found["laws"]["bounded_fireflies"]["held"] is False
-    assert found["nearest_preset"]["name"] == "tutorial"
+    assert found["nearest_preset"]["name"] == "unity_urp_dual"
+
+
+def test_the_stored_blooms_of_presets(renderer: vkbloom.Renderer) -> None:
+    with np.load(measuring.PRESET_BLOOMS) as stored:
+        assert {*stored} == {*vkbloom.presets}
+        for name, settings in vkbloom.presets.items():
+            bloom = measuring.shown(renderer, measuring.exact(settings), "bloom")
+            made = measuring.sketch(bloom)
+            off = np.abs(made - stored[name]).max() / made.max()
+            assert off < 2e-3, f"{name} changed; run python -m tools.preset_blooms"
 
 
 FIREFLIES = {"unclamped"}
@@ -180,8 +182,6 @@ def test_a_fault_of_a_program_is_named(
     monkeypatch.setattr(Program, "__call__", lambda _, image: bloom(image))
     every = "stability,gain,energy,colour,channels,grey,unclamped,finite"
     run = ["--command", "engine {input} {output}", *SMALL, *words, "--require", every]
-    monkeypatch.setattr(measuring, "presets", {})
-    monkeypatch.setattr(measuring, "nearest_preset", lambda *_: ("", math.nan))
     done, found = checked(*run)
     broken = {name for name in every.split(",") if found["laws"][name]["held"] is False}
     assert broken == laws

@@ -18,14 +18,18 @@ from tests.framebuffers import names_in
 from tests.io.parts import written
 from vkbloom._io import safe_writing
 from vkbloom._io.displayed import Saved
-from vkbloom._io.image_reading import decode, load
+from vkbloom._io.image_reading import decode_file, load
 from vkbloom._io.image_writing import save
-from vkbloom._io.images import Picture, SavedColour, Window
+from vkbloom._io.images import Picture, SavedColour, StoredImage, Window
 from vkbloom._io.srgb import decode_srgb, encode_srgb
 
 oiio = pytest.importorskip("OpenImageIO")
 
 DTYPES = {"uint8": "uint8", "uint16": "uint16", "half": "float16", "float": "float32"}
+
+
+def decode(stored: StoredImage, colour: str | None = None) -> Picture:
+    return decode_file(stored, "image", colour)
 
 
 def noise(*shape: int, numbers: str, seed: int = 3) -> NDArray[Any]:
