@@ -108,7 +108,7 @@ def test_frames_that_fill_a_submission_alone(
     results = list(requests.run(work, counting, ("final",)))
     assert len(results) == 20
     assert max(counting.sizes) == frames * image.nbytes
-    for one, (arrays, _, _) in results:
+    for one, arrays, _ in results:
         np.testing.assert_array_equal(arrays["final"], renderer.apply(image, one)["final"])
 
 
@@ -123,7 +123,7 @@ def test_a_submission_is_as_long_as_a_wait_may_be(
     source = _core.image_source(image)
     work = [requests.Request(source, one) for one in settings]
     results = list(requests.run(work, counting, ("final",)))
-    assert [one for one, _ in results] == settings
+    assert [one for one, *_ in results] == settings
     assert max(counting.counts) == most
     assert sum(counting.counts) == len(settings)
 
@@ -368,7 +368,7 @@ def test_an_error_of_the_device_loses_the_frames_of_its_submission(
     results, error = run_failing(settings, {settings[50]: blame})
     assert error is blame
     # Only the frames of its submission, which begins after 1 + 2 + 4 + 8 + 16, are lost.
-    assert [point for point, _ in results] == settings[:31]
+    assert [point for point, *_ in results] == settings[:31]
 
 
 # The core's own types
