@@ -152,8 +152,8 @@ def test_a_bloom_is_its_engines(renderer: Renderer, shared_data: Path, key: str)
     ):
         found = factor * every(frames[name], stride)
         assert np.abs(found - expected).max() < 1e-3 * np.abs(expected).max()
-        if key.startswith("engines"):
-            assert relative(found, expected).max() < 1e-3
+        # darktable's values are rounded by its lightness.
+        assert relative(found, expected).max() < (5e-3 if "darktable" in key else 1e-3)
 
 
 class Cut(Storage):

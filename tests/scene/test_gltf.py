@@ -40,8 +40,6 @@ from tests.scene.gltf_documents import (
 from vkbloom._scene import Mesh, gltf_file
 from vkbloom._scene.gltf import load_mesh
 
-SEED_DATA = Path(__file__).resolve().parents[3] / "shared" / "data"
-
 
 def corners(mesh: Mesh) -> np.ndarray:
     """Corner positions of each triangle, y up again: (t, 3, 3)."""
@@ -598,47 +596,3 @@ def test_any_json_value_in_any_place_loads_or_is_refused(tmp_path: Path) -> None
     # Most of them break something; were all let through, the checks would be off.
     step, least = (1, 1200) if EXHAUSTIVE else (12, 100)
     assert refusals(path, original, places(original), step=step) > least
-
-
-# The original meshes
-
-
-@pytest.mark.skipif(not SEED_DATA.exists(), reason="the shared data folder is not there")
-@pytest.mark.parametrize("name", ["retroufo", "retroufo_glow"])
-def test_the_original_meshes(name: str) -> None:
-    path = SEED_DATA / "retroufo" / f"{name}.gltf"
-    mesh = load_mesh(path)
-    text = json.loads(path.read_text())
-    counts = [
-        text["accessors"][primitive["indices"]]["count"]
-        for node in text["nodes"]
-        if "mesh" in node
-        for primitive in text["meshes"][node["mesh"]]["primitives"]
-    ]
-    assert len(mesh.indices) == sum(counts)
-    np.testing.assert_allclose(np.linalg.norm(mesh.vertices[:, 3:6], axis=1), 1.0, atol=1e-6)
-    factors = np.array(
-        [m["pbrMetallicRoughness"]["baseColorFactor"][:3] for m in text["materials"]], np.float32
-    )
-    used = np.unique(mesh.vertices[:, 6:], axis=0)
-    assert all((factors == colour).all(axis=1).any() for colour in used)
-
-
-@pytest.mark.skipif(not SEED_DATA.exists(), reason="the shared data folder is not there")
-def test_the_original_glow_mesh_lies_where_the_original_program_drew_it() -> None:
-    image_module = pytest.importorskip("skimage.io", reason="scikit-image is not installed")
-    drawn = image_module.imread(SEED_DATA / "seed_frames" / "glow.png")[..., :3].max(axis=2) > 0
-    case = json.loads((SEED_DATA / "seed_frames" / "case.json").read_text())
-    matrix = np.eye(4)
-    for name in ("proj", "view", "model"):
-        matrix = matrix @ np.reshape(case["matrices_column_major"][name], (4, 4)).T
-    mesh = load_mesh(SEED_DATA / "retroufo" / "retroufo_glow.gltf")
-    bright = mesh.vertices[mesh.vertices[:, 6:].max(axis=1) > 0]
-    clip = np.column_stack((bright[:, :3], np.ones(len(bright)))) @ matrix.T
-    pixels = (clip[:, :2] / clip[:, 3:] + 1.0) / 2.0 * drawn.shape[::-1]
-    rows, columns = np.nonzero(drawn)
-    # The light's cone leaves the picture at the bottom; at the other sides the outermost vertex
-    # lies within the outermost pixel or just beyond its centre.
-    assert abs(pixels[:, 1].min() - rows.min()) < 1.5
-    assert abs(pixels[:, 0].min() - columns.min()) < 1.5
-    assert abs(pixels[:, 0].max() - (columns.max() + 1)) < 1.5
