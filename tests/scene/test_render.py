@@ -271,7 +271,7 @@ def test_a_screen_is_the_glow_that_it_is_made_from(renderer: Renderer, format: A
 
 
 @pytest.mark.parametrize("threshold", [{"threshold": 1.0}, {"threshold": 1.5, "knee": 0.5}])
-def test_the_threshold_is_that_of_images(renderer: Renderer, threshold: dict[str, float]) -> None:
+def test_the_threshold_is_that_of_images(renderer: Renderer, threshold: dict[str, Any]) -> None:
     image = noise((37, 23), 4.0)
     settings = Separable(**threshold, format="rgba32float", bloom_size=(37, 23))
     glow = rgb(renderer.render(screen(image, (64, 36)), settings, (64, 36))["glow"])
