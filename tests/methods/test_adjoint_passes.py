@@ -179,11 +179,14 @@ def test_passes_are_the_transposes_of_the_reference(renderer: Renderer, name: st
     [
         vkbloom.DarktableBloom(threshold=40.0, blur_size=2.0),
         BlenderGlare(type="streaks", version="5.2", threshold=0.3, streaks=2),
+        BlenderGlare(type="sun_beams", threshold=None),
+        Pyramid(levels=1, glare=(vkbloom.Halo(),)),
+        Pyramid(levels=1, glare=(vkbloom.Ghosts(scales=(0.001, 0.5), aberration=0.05),)),
     ],
-    ids=["darktable", "blender 5.2"],
 )
 def test_the_reference_derives_what_has_no_transpose(renderer: Renderer, settings: Any) -> None:
-    """Boxes of darktable, and what Blender 5.2 reads by rounding (in 41 columns)."""
+    """Boxes of darktable, what Blender 5.2 reads by rounding (in 41 columns), and samples that are
+    not on a grid."""
     image = random_image(9, 41, channels=3, seed=1).astype(np.float32)
     pullback, cotangents, expected = pulled(renderer, image, settings)
     found = pullback(cotangents)

@@ -145,16 +145,6 @@ def test_kinos_threshold_is_0_8_in_srgb() -> None:
     assert KinoBloom().threshold == pytest.approx(0.6038273, abs=1e-7)
 
 
-def test_kinos_median_removes_a_single_bright_pixel_and_keeps_a_large_light() -> None:
-    image = np.zeros((64, 64, 3))
-    image[20, 20] = 100
-    assert not reference.blur(image, KinoBloom()).any()
-    image[30:33, 30:33] = 100
-    bright = reference.passes(image, KinoBloom())["bright"]
-    assert (bright[..., 0] > 0).sum() == 9
-    assert reference.blur(image, KinoBloom(anti_flicker=False))[20, 20].min() > 1
-
-
 @pytest.mark.parametrize(
     "settings",
     [BevyBloom(max_mip_dimension=16), FilamentBloom(resolution=16)],
