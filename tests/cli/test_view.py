@@ -71,7 +71,7 @@ def view(*arguments: str, env: dict[str, str]) -> subprocess.CompletedProcess[st
 def test_a_window_is_controlled_by_keys(display: dict[str, str], tmp_path: Path) -> None:
     # (The fourth framebuffer is gone without bloom.)
     keys = "B,B,4,B,1,P,SPACE,Q"
-    done = view("tests.cli.keys", keys, "--size", "64x36", "--validation", env=display)
+    done = view("tests.cli.keys", keys, "--size", "64x36", env=display)
     assert done.returncode == 0, done.stderr
     picture = str(vkbloom.write(tmp_path / "a.png", np.full((9, 16, 3), 0.5, np.float32)))
     done = view("tests.cli.keys", "2,SPACE,ESCAPE", picture, env=display)

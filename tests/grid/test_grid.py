@@ -89,19 +89,6 @@ class TestValues:
             for name in ("final", "depth"):
                 np.testing.assert_array_equal(dataset[name].values[place], expected[name])
 
-    @pytest.mark.parametrize("labels", [None, ["a", "b", "c"]])
-    def test_lists_of_images(
-        self, renderer: Renderer, filled: Call, labels: list[Any] | None
-    ) -> None:
-        images = [noise(9, 11, 4, dtype="uint8", seed=seed) for seed in range(3)]
-        source = images if labels is None else dict(zip(labels, images, strict=True))
-        dataset = filled(source, Pyramid(), {"radius": [0.5, 2.0], "intensity": [0.1, 1.0]})
-        assert dataset["final"].dims == ("image", "radius", "intensity", "y", "x", "channel")
-        assert list(dataset["image"].values) == (labels or [0, 1, 2])
-        for number, one in enumerate(images):
-            expected = renderer.apply(one, Pyramid(radius=2.0, intensity=0.1))["final"]
-            np.testing.assert_array_equal(dataset["final"].values[number, 1, 0], expected)
-
     def test_no_axes(self, renderer: Renderer, filled: Call, image: Any) -> None:
         dataset = filled(image)
         assert dataset["final"].dims == ("y", "x", "channel")

@@ -20,6 +20,7 @@ import vkbloom
 from vkbloom._background_writer import written_in_background
 from vkbloom._cli import no_bloom
 from vkbloom._cli.image_files import finished, read_picture
+from vkbloom._cli.program import as_wrong_use
 from vkbloom._cli.streams import PIPE, is_stream
 from vkbloom._cli.terminal import hides_progress, note, say
 from vkbloom._io import image_writing
@@ -35,14 +36,12 @@ Pair: TypeAlias = tuple[str, str]
 Begun: TypeAlias = tuple[vkbloom.Settings, float | None]
 
 #: From an image to its mask and emission.
-Glow: TypeAlias = Callable[[NDArray[Any]], dict[str, NDArray[Any]]]
+Glow: TypeAlias = Callable[[NDArray[Any]], dict[str, Any]]
 
 # Errors of one file, after which a batch goes on. A lost device fails for all of them.
 _FAILURES: Final = (OSError, ValueError, MemoryError, click.ClickException)
 # 8-bit pictures of this many pixels or more become half floats, whose steps are finer.
 _HALVED: Final = 1 << 26
-# Errors about what a picture has, by the argument at their beginning; others hold for all pictures.
-_OF_PICTURES: Final = ("image", "mask", "emission", "alpha")
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -61,9 +60,7 @@ class Options:
     bits: int | None
     quality: int | None
     pipe_format: str
-    framebuffers: str
     overwrite: bool
-    skip_existing: bool
     expand: float | None
     settings: Callable[[str], Begun]
 
@@ -71,11 +68,6 @@ class Options:
     def saved(self) -> Saved:
         """What the colours of a written file are to be."""
         return Saved(self.output_colour, self.primaries, self.view)
-
-    @property
-    def names(self) -> str | list[str]:
-        """The framebuffers to write."""
-        return "all" if self.framebuffers == "all" else ["final", *self.framebuffers.split(",")]
 
 
 def of_format(target: str, pipe_format: str) -> str:
@@ -124,18 +116,6 @@ class Run:
             for text in texts:
                 note(text)
 
-    @contextlib.contextmanager
-    def _wrong_use_of_all(self) -> Iterator[None]:
-        """Convert an error of an option to click.UsageError; pass over what fails for one image."""
-        try:
-            yield
-        except (TypeError, ValueError, MemoryError) as error:
-            if self._several and str(error).startswith(_OF_PICTURES):
-                return
-            if isinstance(error, MemoryError):
-                raise
-            raise click.UsageError(str(error)) from error
-
     def _made(
         self, files: Iterable[Pair], settings: vkbloom.Settings, expand: float | None
     ) -> Iterator[tuple[list[str], Callable[[], object]]]:
@@ -144,9 +124,8 @@ class Run:
         Notes are printed by the thread that reads files, because it silences standard error.
         """
         is_blended = settings.alpha != "keep"
-        wanted = no_bloom.with_bloom(self._options.names, settings)
+        wanted = no_bloom.with_bloom(["final"], settings)
         glow_of = self._glow_of(is_blended)
-        is_planned = False
         for pair in files:
             picture = None
             with self._of_file(pair):
@@ -155,18 +134,13 @@ class Run:
                 continue
             # Opened after the first file is read, so that a wrong file fails at once.
             renderer = self._renderer()
-            if not is_planned:
-                is_planned = True
-                with self._wrong_use_of_all():
-                    given = _with_glow(renderer, picture.pixels, glow_of)
-                    renderer.plan(given, settings, framebuffers=wanted)
             with self._of_file(pair):
-                given = _with_glow(renderer, picture.pixels, glow_of)
-                frames = renderer.apply(given, settings, framebuffers=wanted)
+                with as_wrong_use():
+                    image, glow = picture.pixels, glow_of(picture.pixels)
+                    frames = renderer.apply(image, settings, **glow, framebuffers=wanted)
                 self._tell(pair, picture, frames)
-                kept = no_bloom.only(frames, self._options.names)
                 texts: list[str] = []
-                yield texts, functools.partial(self._write, pair, picture, kept, expand, texts)
+                yield texts, functools.partial(self._write, pair, picture, frames, expand, texts)
 
     def _tell(self, pair: Pair, picture: Picture, frames: vkbloom.Frames) -> None:
         """Print a note about the bloom of a file."""
@@ -230,7 +204,6 @@ class Run:
             if is_stream(target):
                 suffix = Path(of_format(target, self._options.pipe_format)).suffix
                 file = self._folder / f"output{suffix}"
-            written = _save_others(frames, file)
             notes += image_writing.save(
                 finished(picture, frames["final"], frames.settings),
                 file,
@@ -242,14 +215,7 @@ class Run:
             if is_stream(target):
                 _send(file, target)
             elif not self._several:
-                for path in (file, *written):
-                    say(f"wrote {path}")
-
-
-def _with_glow(renderer: vkbloom.Renderer, image: NDArray[Any], glow_of: Glow) -> Any:
-    """Return an image, or a handle of it with its mask and its emission."""
-    glow = glow_of(image)
-    return renderer.upload(image, **glow) if glow else image
+                say(f"wrote {file}")
 
 
 def _send(file: Path, target: str) -> None:
@@ -261,15 +227,3 @@ def _send(file: Path, target: str) -> None:
             sys.stdout.buffer.flush()
         else:
             shutil.copyfileobj(content, stack.enter_context(open(target, "wb")))
-
-
-def _save_others(frames: vkbloom.Frames, target: Path) -> list[Path]:
-    """Write each framebuffer except `final` to its own file."""
-    written: list[Path] = []
-    for name, array in frames.items():
-        if name != "final":
-            alone = vkbloom.Frames(
-                {name: array}, timings=frames.timings, settings=frames.settings, info=frames.info
-            )
-            written += alone.save(target.with_name(f"{target.stem}_{name}{target.suffix}"))
-    return written

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import functools
 import itertools
-import os
 import tempfile
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
@@ -15,7 +14,6 @@ import click
 
 import vkbloom
 from vkbloom._cli.applied import Options, Pair, Run, of_format
-from vkbloom._cli.device_options import device_options
 from vkbloom._cli.fields import Command
 from vkbloom._cli.image_files import (
     check_input_colour,
@@ -24,7 +22,7 @@ from vkbloom._cli.image_files import (
     layer_option,
     subimage_option,
 )
-from vkbloom._cli.program import as_wrong_use, described
+from vkbloom._cli.program import adapter_option, as_wrong_use, described
 from vkbloom._cli.sequences import check_targets, pairs
 from vkbloom._cli.settings_options import settings_options_by_file
 from vkbloom._cli.streams import is_stream
@@ -49,14 +47,6 @@ CURVES = ("linear", "srgb", "gamma22", "pq", "hlg")
 )
 @click.option(
     "--pipe-format", metavar="EXTENSION", default="png", help="Format of standard output."
-)
-@click.option(
-    "--framebuffers",
-    metavar="all|NAME,...",
-    default="final",
-    help="The framebuffers to write. final is written to OUT; each other framebuffer is written "
-    "beside it, as OUT's name with _NAME appended, its values not converted. A framebuffer that "
-    "OUT's format cannot hold is written as .exr.",
 )
 @input_colour_option
 @click.option(
@@ -92,7 +82,6 @@ CURVES = ("linear", "srgb", "gamma22", "pq", "hlg")
     "floats]",
 )
 @click.option("--overwrite", is_flag=True, help="OUT may be a file that is read as IN.")
-@click.option("--skip-existing", is_flag=True, help="Leave out images whose OUT exists.")
 @expand_option
 @subimage_option
 @layer_option
@@ -110,11 +99,9 @@ CURVES = ("linear", "srgb", "gamma22", "pq", "hlg")
     help="An image of the same size that glows instead of the image, such as a renderer's pass of "
     "emissive materials. It is decoded like the image.",
 )
-@device_options
+@adapter_option
 @settings_options_by_file
-def command(
-    *, sources: tuple[str, ...], out: str | None, adapter: str, validation: bool, **given: Any
-) -> int:
+def command(*, sources: tuple[str, ...], out: str | None, adapter: str, **given: Any) -> int:
     """Add bloom to the image IN and write the result to OUT.
 
     The extension selects the format: OpenEXR, Radiance HDR, PNG, JPEG, TIFF and others. IN and OUT
@@ -135,13 +122,11 @@ def command(
     options = Options(**given)
     inputs, target = _arguments(sources, out)
     work = _planned(options, inputs, target)
-    if not work:
-        return 0
     with tempfile.TemporaryDirectory() as folder, ExitStack() as stack:
 
         @functools.cache
         def renderer() -> vkbloom.Renderer:
-            opened = stack.enter_context(opened_renderer(adapter, validation))
+            opened = stack.enter_context(opened_renderer(adapter))
             # Standard output may have the picture.
             tell_device(opened, err=is_stream(target))
             return opened
@@ -170,15 +155,9 @@ def _tell_failures(failures: Mapping[str, Exception], work: Sequence[Pair]) -> i
 def _planned(options: Options, sources: list[str], out: str) -> list[Pair]:
     """Check the options, and return the files to read, each with the file to write."""
     check_input_colour(options.input_colour)
-    if is_stream(out) and options.framebuffers != "final":
-        raise click.UsageError("a pipe takes only final; leave out --framebuffers")
     work = pairs(sources, out)
     settings, _ = options.settings(work[0][0])
     _check_colours(settings, options.saved)
-    if options.skip_existing:
-        left = [pair for pair in work if is_stream(pair[1]) or not os.path.exists(pair[1])]
-        say(f"skipped {len(work) - len(left)} of {len(work)} images, whose OUT exists")
-        work = left
     check_targets(work, out, overwrite=options.overwrite)
     with as_wrong_use():
         for target in {Path(target).suffix: target for _, target in work}.values():

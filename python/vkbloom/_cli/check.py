@@ -19,9 +19,8 @@ from rich.status import Status
 
 import vkbloom
 from vkbloom._cli.check_sequence import judge
-from vkbloom._cli.device_options import device_options
 from vkbloom._cli.fields import SIZE, Command
-from vkbloom._cli.program import as_wrong_use, given
+from vkbloom._cli.program import adapter_option, as_wrong_use, given
 from vkbloom._cli.settings_options import settings_options
 from vkbloom._cli.terminal import is_quiet, note, say
 from vkbloom._custom.method import CustomMethod, identifier_of
@@ -143,7 +142,7 @@ def _laws(_: click.Context, __: click.Parameter, text: str) -> tuple[str, ...]:
 @click.option(
     "--markdown", metavar="FILE", type=click.Path(), help="Write tables for a pull request."
 )
-@device_options
+@adapter_option
 @settings_options
 def command(
     *,
@@ -156,7 +155,6 @@ def command(
     page: str | None,
     markdown: str | None,
     adapter: str,
-    validation: bool,
     settings: vkbloom.Settings,
     **how: Any,
 ) -> int:
@@ -177,7 +175,7 @@ def command(
         return judge(sequence, how["fps"], how["degrees"], as_json=as_json)
     _check_choice(file, program, reference, against, page)
     console = Console(stderr=True, quiet=is_quiet())
-    with opened_renderer(adapter, validation) as renderer, console.status("") as bar:
+    with opened_renderer(adapter) as renderer, console.status("") as bar:
         if reference is not None:
             _add_reference(settings, reference)
         preset = click.get_current_context().params["preset"]

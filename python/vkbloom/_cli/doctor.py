@@ -12,7 +12,7 @@ from tqdm import tqdm
 
 import vkbloom
 from vkbloom._cli import bare
-from vkbloom._cli.device_options import adapter_option
+from vkbloom._cli.program import adapter_option
 from vkbloom._cli.terminal import hides_progress, say
 from vkbloom._doctor import self_test
 

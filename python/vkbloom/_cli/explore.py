@@ -53,7 +53,6 @@ def command(
     size: tuple[int, int],
     shading: Shading,
     adapter: str,
-    validation: bool,
     scene: Callable[[], vkbloom.Scene],
     settings: vkbloom.Settings,
 ) -> int:
@@ -75,7 +74,7 @@ def command(
             looked_at = dataclasses.replace(looked_at, glow_intensity=GLOW)
         if settings == vkbloom.presets["tutorial"] and not any(given(name) for name in STARTS):
             begun = None
-    with vkbloom.Renderer(adapter, validation=validation) as renderer:
+    with vkbloom.Renderer(adapter) as renderer:
 
         def new_viewer() -> Viewer:
             return Viewer(looked_at, begun, size=size, shading=shading, renderer=renderer, **origin)

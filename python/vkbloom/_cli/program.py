@@ -200,6 +200,12 @@ def given(name: str, context: click.Context | None = None) -> bool:
     return source not in (None, ParameterSource.DEFAULT, ParameterSource.DEFAULT_MAP)
 
 
+#: ``--adapter``, the argument of `vkbloom.Renderer`.
+adapter_option: Final = click.option(
+    "--adapter", default="auto", help="auto, software, hardware, or a part of an adapter's name."
+)
+
+
 @click.group(
     cls=Program,
     # A call without a command prints one line instead of the help text.

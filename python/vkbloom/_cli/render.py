@@ -8,9 +8,8 @@ import click
 
 import vkbloom
 from vkbloom._cli import no_bloom
-from vkbloom._cli.device_options import device_options
 from vkbloom._cli.fields import SIZE, Command
-from vkbloom._cli.program import as_wrong_use
+from vkbloom._cli.program import adapter_option, as_wrong_use
 from vkbloom._cli.scene_options import scene_options
 from vkbloom._cli.settings_options import settings_options
 from vkbloom._cli.terminal import note, say, tell_device
@@ -36,7 +35,7 @@ from vkbloom._settings.settings import SHADINGS, Shading
     default="all",
     help="The framebuffers to write.",
 )
-@device_options
+@adapter_option
 @scene_options
 @settings_options
 def command(
@@ -47,7 +46,6 @@ def command(
     shading: Shading,
     framebuffers: str,
     adapter: str,
-    validation: bool,
     scene: Callable[[], vkbloom.Scene],
     settings: vkbloom.Settings,
 ) -> None:
@@ -59,7 +57,7 @@ def command(
         raise click.UsageError("render does not write to a pipe; give --out a file or a folder")
     names = "all" if framebuffers == "all" else framebuffers.split(",")
     loaded = scene()
-    with vkbloom.Renderer(adapter, validation=validation) as renderer:
+    with vkbloom.Renderer(adapter) as renderer:
         tell_device(renderer)
         with as_wrong_use():
             frames = renderer.render(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final
 
@@ -29,8 +29,6 @@ _PRESET_OF_SCENES: Final = "tutorial"
 DEFAULT_PRESETS: Final = (PRESET_OF_IMAGES, PRESET_OF_PHOTOS, _PRESET_OF_SCENES)
 #: Parameters that say what a call starts from.
 STARTS: Final = ("preset", "method", "stored")
-# Names of the commands' arguments for image files; explore and grid may be called without one.
-_IMAGES: Final = ("source", "sources", "images")
 
 
 def settings_options(command: Callable[..., Any]) -> Callable[..., Any]:
@@ -91,11 +89,7 @@ def _settings_options(command: Callable[..., Any], *, by_file: bool) -> Callable
         )
         if by_file:
             return command(settings=start.of, **rest)
-        images = _images_of(rest)
-        # An axis of presets gives every image the same settings.
-        axes: Any = rest.get("words", ())
-        has_presets = any(str(word).startswith("preset=") for word in axes)
-        settings, expand = start.of_all(images[:1] if has_presets else images)
+        settings, expand = start.of(str(rest.get("source") or ""))
         if "expand" in rest:
             rest["expand"] = expand
         return command(settings=settings, **rest)
@@ -124,16 +118,6 @@ class Start:
         begun, expand = self._begun(image)
         return _changed(begun, self.changes), expand if self.expand is None else self.expand
 
-    def of_all(self, images: Sequence[str]) -> tuple[vkbloom.Settings, float | None]:
-        """Return the settings for image files that have the same, and the value for --expand."""
-        results = list(dict.fromkeys(self.of(image) for image in images or ("",)))
-        if len(results) > 1:
-            raise click.UsageError(
-                f"files of integers start from the preset {PRESET_OF_PHOTOS}, files of floats from "
-                f"{PRESET_OF_IMAGES}, and here are both; give --preset NAME for all"
-            )
-        return results[0]
-
     def _begun(self, image: str) -> tuple[vkbloom.Settings, float | None]:
         if self.stored is not None:
             begun, expand = self.stored
@@ -154,12 +138,6 @@ def _preset_of(image: str, *, expands: bool) -> str:
     if not image:
         return _PRESET_OF_SCENES
     return PRESET_OF_PHOTOS if expands and is_photograph(image) else PRESET_OF_IMAGES
-
-
-def _images_of(rest: dict[str, Any]) -> Sequence[str]:
-    """Return a command's image files."""
-    names = next((value for name in _IMAGES if (value := rest.get(name))), ())
-    return [names] if isinstance(names, str) else names
 
 
 def read_settings(name: str) -> tuple[vkbloom.Settings, float | None]:

@@ -8,9 +8,8 @@ from typing import Any
 import click
 
 import vkbloom
-from vkbloom._cli.device_options import device_options
 from vkbloom._cli.fields import SIZE, Command, NameOf
-from vkbloom._cli.program import as_wrong_use, given
+from vkbloom._cli.program import adapter_option, as_wrong_use, given
 from vkbloom._cli.search_options import search_options
 from vkbloom._cli.settings_options import STARTS, settings_options
 from vkbloom._renderer.interruptible import opened_renderer
@@ -33,7 +32,7 @@ from vkbloom._settings.registry import METHODS
     "of the frame at every size but this.",
 )
 @search_options(vary=None, loss="log", max_calls=300)
-@device_options
+@adapter_option
 @settings_options
 def command(
     *,
@@ -42,7 +41,6 @@ def command(
     search: dict[str, Any],
     show_results: Callable[[Sequence[vkbloom.FitResult]], None],
     adapter: str,
-    validation: bool,
     settings: vkbloom.Settings,
 ) -> None:
     """Find another method's parameters whose bloom comes closest.
@@ -56,6 +54,6 @@ def command(
             "give what to translate: --preset NAME, --method NAME or --settings FILE"
         )
     start = vkbloom.presets[target] if target in vkbloom.presets else METHODS[target]()
-    with opened_renderer(adapter, validation) as renderer, as_wrong_use():
+    with opened_renderer(adapter) as renderer, as_wrong_use():
         result = vkbloom.translate(settings, start, size=size, renderer=renderer, **search)
     show_results([result])

@@ -35,7 +35,6 @@ def command(
     size: tuple[int, int] | None,
     shading: Shading,
     adapter: str,
-    validation: bool,
     scene: Callable[[], vkbloom.Scene],
     settings: vkbloom.Settings,
 ) -> None:
@@ -45,7 +44,7 @@ def command(
     loaded = scene() if image is None else image
     with (
         _opened(glfw, size or (min(width, _LARGEST[0]), min(height, _LARGEST[1]))) as window,
-        vkbloom.Renderer(adapter, validation=validation) as renderer,
+        vkbloom.Renderer(adapter) as renderer,
         Surface(renderer, window) as surface,
     ):
         source = loaded if isinstance(loaded, vkbloom.Scene) else renderer.upload(loaded)

@@ -11,8 +11,8 @@ import numpy as np
 from tqdm import tqdm
 
 import vkbloom
-from vkbloom._cli.device_options import adapter_option
 from vkbloom._cli.fields import SIZE, NameOf
+from vkbloom._cli.program import adapter_option
 from vkbloom._cli.terminal import hides_progress, say
 from vkbloom._settings.registry import METHODS
 

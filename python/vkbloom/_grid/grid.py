@@ -37,11 +37,7 @@ if TYPE_CHECKING:
 
 @checked
 def grid(
-    source: Scene
-    | NDArray[Any]
-    | Image
-    | Sequence[NDArray[Any] | Image]
-    | Mapping[str, NDArray[Any] | Image],
+    source: Scene | NDArray[Any] | Image,
     settings: Settings | str | None = None,
     axes: Mapping[str, Iterable[Any]] | None = None,
     *,
@@ -63,10 +59,9 @@ def grid(
 
     Parameters
     ----------
-    source : Scene, image, or list or mapping of images
-        Several images add the dimension "image" before all others, with a mapping's keys as
-        labels. They must have the same shape and dtype. Uploaded images have their mask and
-        emission; they belong to one renderer, so they have no store that a cluster fills.
+    source : Scene or image
+        An uploaded image has its mask and emission; it belongs to one renderer, so it has no store
+        that a cluster fills.
     settings : Settings or str, optional
         The settings that the axes change, or the name of a preset. Default:
         ``presets["bevy_natural"]`` for images, ``presets["tutorial"]`` for a scene.
@@ -170,7 +165,7 @@ def grid(
     )
     with ExitStack() as stack:
         if client is None and adapter is not None:
-            renderer = stack.enter_context(opened_renderer(adapter, False))
+            renderer = stack.enter_context(opened_renderer(adapter))
         if folder is None:
             return in_memory(asked, renderer or default_renderer(), progress)
         numbers = read_part(part)
@@ -224,11 +219,7 @@ def _progress(store: GridStore, shown: bool | None) -> Progress:
 
 def _check_stored(grid: Grid, chunks: Mapping[str, int] | None, *, is_shared: bool) -> None:
     """Raise TypeError or ValueError for a grid that cannot be stored, or not by workers."""
-    if (
-        is_shared
-        and isinstance(grid.source, ImageSource)
-        and any(isinstance(image, Image) for image in grid.source.images)
-    ):
+    if is_shared and isinstance(grid.source, ImageSource) and isinstance(grid.source.image, Image):
         raise TypeError("source: an uploaded image belongs to one renderer; give the array itself")
     names = [axis.name for axis in grid.axes]
     if "done" in names:
