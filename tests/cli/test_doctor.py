@@ -21,7 +21,7 @@ import vkbloom
 from vkbloom import _doctor as doctor
 from vkbloom._cli.program import program
 from vkbloom._doctor import child, drivers, installation, probe
-from vkbloom._doctor.finding import Finding
+from vkbloom._doctor.installation import Finding
 
 linux_only = pytest.mark.skipif(sys.platform != "linux", reason="as the loader works on Linux")
 

@@ -13,7 +13,7 @@ import pytest
 import vkbloom
 from tests.core.builds import ROOT
 from vkbloom import Pyramid, Separable
-from vkbloom._cli.live import Live
+from vkbloom._cli.view import Live
 
 NAMES = ["glow", "blur_vertical", "bloom", "scene", "final"]
 

@@ -40,64 +40,35 @@ CURVES = ("linear", "srgb", "gamma22", "pq", "hlg")
     "-o", "--out", metavar="OUT", type=click.Path(), help="The file to write, instead of OUT."
 )
 @click.option(
-    "--quality",
-    metavar="N",
-    type=click.IntRange(1, 100),
-    help="Quality of JPEG, WebP and JPEG XL [default 98 for JPEG]",
+    "--quality", metavar="N", type=click.IntRange(1, 100), help="Of JPEG, WebP and JPEG XL."
 )
 @click.option(
     "--pipe-format", metavar="EXTENSION", default="png", help="Format of standard output."
 )
 @input_colour_option
+@click.option("--output-colour", type=click.Choice(CURVES), help="Encoding of the colours in OUT.")
 @click.option(
-    "--output-colour",
-    type=click.Choice(CURVES),
-    help="Encoding of the colours in OUT [default linear for floats, srgb for integers]; pq and "
-    "hlg have 16 bits where the format has them",
+    "--primaries", type=click.Choice([*PRIMARIES]), default="rec709", help="Of the colours in OUT."
 )
 @click.option(
-    "--primaries",
-    type=click.Choice([*PRIMARIES]),
-    default="rec709",
-    help="Primaries of the colours in OUT, which PNG and OpenEXR can name.",
+    "--view", metavar="VIEW", help="A display's view of OpenColorIO's built-in configuration."
 )
-@click.option(
-    "--view",
-    metavar="VIEW",
-    help="A view of OpenColorIO's built-in configuration, such as 'ACES 2.0 - SDR 100 nits "
-    "(Rec.709)', or DISPLAY/VIEW. It has a tone curve, an encoding and primaries of its own. The "
-    "error for an unknown one lists all.",
-)
-@click.option(
-    "--half",
-    is_flag=True,
-    help="Hold pictures in half floats, which need half the memory, as 8-bit files of at least 64 "
-    "million pixels are.",
-)
+@click.option("--half", is_flag=True, help="Hold pictures in half floats, in half the memory.")
 @click.option(
     "--bits",
     type=click.Choice(["8", "16", "32"]),
     callback=lambda _, __, value: value and int(value),
-    help="Size of a number in OUT [default that of IN, where the format has it; 8 for a PNG of "
-    "floats]",
+    help="Size of a number in OUT [default that of IN]",
 )
 @click.option("--overwrite", is_flag=True, help="OUT may be a file that is read as IN.")
 @expand_option
 @subimage_option
 @layer_option
 @click.option(
-    "--mask",
-    metavar="FILE",
-    type=click.Path(),
-    help="A grey image of the same size, which multiplies what glows: white keeps it, black "
-    "removes it. Its values are not decoded.",
+    "--mask", metavar="FILE", type=click.Path(), help="A grey image: white glows, black does not."
 )
 @click.option(
-    "--emission",
-    metavar="FILE",
-    type=click.Path(),
-    help="An image of the same size that glows instead of the image, such as a renderer's pass of "
-    "emissive materials. It is decoded like the image.",
+    "--emission", metavar="FILE", type=click.Path(), help="An image that glows instead of IN."
 )
 @adapter_option
 @settings_options_by_file

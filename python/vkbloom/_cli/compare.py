@@ -49,17 +49,9 @@ def tolerances_of(
 @click.argument("first", metavar="A", type=click.Path())
 @click.argument("second", metavar="B", type=click.Path())
 @click.option(
-    "--diff",
-    metavar="OUT",
-    type=click.Path(),
-    help="Write a picture of the absolute differences. Differences in alpha are white; pixels "
-    "that are NaN or infinite in only one image are magenta.",
+    "--diff", metavar="OUT", type=click.Path(), help="Write a picture of the absolute differences."
 )
-@click.option(
-    "--allow-nan",
-    is_flag=True,
-    help="Accept NaN, and infinity of the same sign, at pixels where both images have it.",
-)
+@click.option("--allow-nan", is_flag=True, help="Accept NaN and infinity that both images have.")
 @click.option("--json", "as_json", is_flag=True, help="Print one object.")
 @subimage_option
 @_limit("max_error", "Largest allowed difference of a value; integers are scaled to 0..1")

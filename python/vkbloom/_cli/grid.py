@@ -15,7 +15,7 @@ import vkbloom
 from vkbloom._cli import fields, image_files, no_bloom, program, terminal
 from vkbloom._cli.scene_options import scene_options
 from vkbloom._cli.settings_options import DEFAULT_PRESETS, settings_options
-from vkbloom._grid import filling, layout, order, progress, sources
+from vkbloom._grid import filling, layout, order, sources
 from vkbloom._io import image_writing
 from vkbloom._io.images import Picture
 from vkbloom._renderer.frame_files import settings_facts
@@ -177,13 +177,13 @@ def _write_images(
     single = (1,) * len(grid.shape)
     points = [block.start for block in order.blocks(grid.shape, single, ranking, part)]
     digits = [max(3, len(str(count - 1))) for count in grid.shape]
-    with progress.Progress(len(points), shown=not terminal.is_quiet()) as bar:
+    with filling.progress_bar(len(points), shown=not terminal.is_quiet()) as count:
         path = map(grid.point, points)
         for index, frames in sources.visit(renderer, grid.source, path, grid.wanted):
             stem = "".join(map("{:0{}}_".format, index, digits))
             for name in frames:
                 _save(frames, name, folder / f"{stem}{name}{suffix}", picture, expand)
-            bar.add(filling.Tally(1, len(frames.timings)))
+            count(1)
 
 
 def _save(

@@ -29,12 +29,7 @@ from vkbloom._settings.settings import SHADINGS, Shading
 @click.option("--size", type=SIZE, default="1280x720", help="Size of the frame, in pixels.")
 @click.option("--time", default=0.0, help="Time of the animation; its period is 1.")
 @click.option("--shading", type=click.Choice(SHADINGS), default=SHADINGS[0])
-@click.option(
-    "--framebuffers",
-    metavar="all|NAME,...",
-    default="all",
-    help="The framebuffers to write.",
-)
+@click.option("--framebuffers", metavar="all|NAME,...", default="all", help="What to write.")
 @adapter_option
 @scene_options
 @settings_options

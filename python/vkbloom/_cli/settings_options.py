@@ -53,8 +53,7 @@ def _settings_options(command: Callable[..., Any], *, by_file: bool) -> Callable
     @click.option(
         "--method",
         type=fields.NameOf("method", METHODS),
-        help="The method of the blur, with its defaults, or a file of a custom method "
-        "[default the preset's]",
+        help="The method of the blur, with its defaults, or a file of a custom method.",
     )
     @fields.options({"": vkbloom.Settings}, "shared")
     @fields.options(METHODS, "of_method", base=vkbloom.Settings)
@@ -63,9 +62,7 @@ def _settings_options(command: Callable[..., Any], *, by_file: bool) -> Callable
         "stored",
         metavar="FILE",
         type=click.Path(),
-        help="A file of settings to start from: JSON, as the explorer saves it, or a picture that "
-        "holds settings, such as a PNG or an OpenEXR file of vkbloom apply. JSON expands the "
-        "highlights of files of integers, as the explorer does.",
+        help="Settings to start from: JSON, or a PNG or OpenEXR picture that vkbloom wrote.",
     )
     @functools.wraps(command)
     def run(

@@ -22,15 +22,9 @@ from vkbloom._settings.registry import METHODS
     "target",
     required=True,
     type=NameOf("preset or method", vkbloom.presets, METHODS),
-    help="A preset or a method: where the search starts, and the settings that do not vary.",
+    help="A preset or a method: where the search starts, and what does not vary.",
 )
-@click.option(
-    "--size",
-    type=SIZE,
-    default="640x360",
-    help="Size of the picture. Methods that blur by pixels differ from those that blur by shares "
-    "of the frame at every size but this.",
-)
+@click.option("--size", type=SIZE, default="640x360", help="Size of the picture.")
 @search_options(vary=None, loss="log", max_calls=300)
 @adapter_option
 @settings_options

@@ -28,28 +28,16 @@ _KEPT: Final[tuple[Any, ...]] = ("all", ("final",))
     "presets",
     type=NameOf("preset", vkbloom.presets),
     multiple=True,
-    help="Only this preset; repeat it for more [default: all, and the built-in scene]",
+    help="Only this preset; repeat it for more.",
 )
 @click.option(
-    "--method",
-    "methods",
-    type=NameOf("method", METHODS),
-    multiple=True,
-    help="Only this method with its defaults, or a file of a custom method; repeat it for more",
+    "--method", "methods", type=NameOf("method", METHODS), multiple=True, help="Only this method."
 )
 @click.option(
-    "--type",
-    "types",
-    type=click.Choice(_TYPES),
-    multiple=True,
-    help="Only images of this type; repeat it for more [default: all]",
+    "--type", "types", type=click.Choice(_TYPES), multiple=True, help="Only images of this type."
 )
 @click.option(
-    "--size",
-    "sizes",
-    type=SIZE,
-    multiple=True,
-    help="Size of the images to come; repeat it for more [default: 1920x1080]",
+    "--size", "sizes", type=SIZE, multiple=True, help="Of the images to come [default: 1920x1080]"
 )
 @adapter_option
 def command(

@@ -13,7 +13,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from vkbloom._doctor import child, drivers, installation
-from vkbloom._doctor.finding import Finding, Report
+from vkbloom._doctor.installation import Finding, Report
 
 
 def examine() -> Report:

@@ -220,10 +220,7 @@ def _checked_names(vary: str | Sequence[str]) -> tuple[str, ...]:
 
 
 def _stages(
-    renderer: Renderer,
-    image: NDArray[Any] | Image,
-    pixels: NDArray[Any] | None,
-    measure: Measure,
+    renderer: Renderer, image: NDArray[Any] | Image, pixels: NDArray[Any] | None, measure: Measure
 ) -> list[_Stage]:
     """Return the image at its own size, and before it a smaller one where it is large."""
     handle = image if isinstance(image, Image) else renderer.upload(image)

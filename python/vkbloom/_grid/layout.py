@@ -111,13 +111,11 @@ class Layout:
 
     - `ranking`: The axes from the slowest to the fastest.
     - `coordinates`: Coordinates of dimensions that are not axes.
-    - `ran`: Passes that ran to learn the shapes and dtypes of the reductions.
     """
 
     ranking: tuple[int, ...]
     variables: Mapping[str, Variable]
     coordinates: Mapping[str, tuple[NDArray[Any], Mapping[str, str]]]
-    ran: int
     adapter: str
     driver: str
     version: str
@@ -178,21 +176,15 @@ def lay_out(
         if len(variable.dims) == 3:
             labels = np.array(_CHANNELS[: variable.shape[2]])
             coordinates[variable.dims[2]] = (labels, {"long_name": "channel"})
-    ran = 0
     if grid.reduce:
         sample = _sample(grid, renderer)
-        ran = len(sample.timings)
         for name, reduction in grid.reduce.items():
             value = checked_value(name, reduction(sample))
             dims = tuple(f"{name}_dim_{number}" for number in range(value.ndim))
             attributes = {"long_name": name, "units": "1"}
             variables[name] = Variable(dims, value.shape, value.dtype, attributes)
     return Layout(
-        ranking=ranking(grid),
-        variables=variables,
-        coordinates=coordinates,
-        ran=ran,
-        **origin(renderer),
+        ranking=ranking(grid), variables=variables, coordinates=coordinates, **origin(renderer)
     )
 
 
@@ -289,9 +281,7 @@ def _common(first: Framebuffer | None, second: Framebuffer | None) -> Framebuffe
 
 
 def _refuse(
-    grid: Grid,
-    name: str,
-    *points: tuple[Index, tuple[tuple[int, ...], np.dtype[Any]] | None],
+    grid: Grid, name: str, *points: tuple[Index, tuple[tuple[int, ...], np.dtype[Any]] | None]
 ) -> None:
     """Raise ValueError for a framebuffer that is not the same at two points."""
     (first, _), (second, _) = points
@@ -308,9 +298,7 @@ def _refuse(
     )
 
 
-def _frame_variables(
-    framebuffers: Mapping[str, Framebuffer],
-) -> dict[str, Variable]:
+def _frame_variables(framebuffers: Mapping[str, Framebuffer]) -> dict[str, Variable]:
     if not framebuffers:
         return {}
     # Only the shapes are used. Memory that is never touched costs nothing.

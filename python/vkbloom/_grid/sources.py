@@ -156,12 +156,7 @@ class SceneSource:
 Source: TypeAlias = ImageSource | SceneSource
 
 
-def read_source(
-    source: object,
-    size: tuple[int, int] | None,
-    shading: str,
-    time: float,
-) -> Source:
+def read_source(source: object, size: tuple[int, int] | None, shading: str, time: float) -> Source:
     """Check the source of a grid."""
     if isinstance(source, Scene):
         frame = check_size("size", size or SCENE_SIZE)
