@@ -21,6 +21,7 @@ from vkbloom._background_writer import written_in_background
 from vkbloom._cli import no_bloom
 from vkbloom._cli.image_files import finished, read_picture
 from vkbloom._cli.program import as_wrong_use
+from vkbloom._cli.settings_options import Start
 from vkbloom._cli.streams import PIPE, is_stream
 from vkbloom._cli.terminal import hides_progress, note, say
 from vkbloom._io import image_writing
@@ -32,9 +33,6 @@ from vkbloom._renderer.frame_files import settings_facts
 
 #: A file to read, and the file to write.
 Pair: TypeAlias = tuple[str, str]
-#: The settings of a file, and what its highlights are expanded up to.
-Begun: TypeAlias = tuple[vkbloom.Settings, float | None]
-
 #: From an image to its mask and emission.
 Glow: TypeAlias = Callable[[NDArray[Any]], dict[str, Any]]
 
@@ -62,7 +60,7 @@ class Options:
     pipe_format: str
     overwrite: bool
     expand: float | None
-    settings: Callable[[str], Begun]
+    start: Start
 
     @property
     def saved(self) -> Saved:
@@ -76,27 +74,16 @@ def of_format(target: str, pipe_format: str) -> str:
     return f"image.{pipe_format}" if is_nameless else target
 
 
+@dataclasses.dataclass(kw_only=True, eq=False)
 class Run:
     """The files of one call; `failures` has the errors of a batch by the file that was read."""
 
-    def __init__(
-        self,
-        options: Options,
-        out: str,
-        folder: Path,
-        renderer: Callable[[], vkbloom.Renderer],
-        *,
-        several: bool,
-    ) -> None:
-        self._options = options
-        self._out = out
-        self._folder = folder
-        self._renderer = renderer
-        self._several = several
-        self._hidden = hides_progress()
-        # The files are read once.
-        self._glow_of = functools.cache(self._read_glow)
-        self.failures: dict[str, Exception] = {}
+    options: Options
+    out: str
+    folder: Path
+    renderer: Callable[[], vkbloom.Renderer]
+    several: bool
+    failures: dict[str, Exception] = dataclasses.field(default_factory=dict)
 
     @contextlib.contextmanager
     def _of_file(self, pair: Pair) -> Iterator[None]:
@@ -104,13 +91,13 @@ class Run:
         try:
             yield
         except _FAILURES as error:
-            if not self._several:
+            if not self.several:
                 raise
             self.failures[pair[0]] = error
 
     def sequence(self, files: list[Pair], settings: vkbloom.Settings, expand: float | None) -> None:
         """Add bloom to files one after the other; each is written while the next one is made."""
-        hidden = self._hidden if self._several else True
+        hidden = hides_progress() if self.several else True
         bar = tqdm(files, unit="image", leave=False, disable=hidden)
         for texts in written_in_background(self._made(bar, settings, expand)):
             for text in texts:
@@ -133,7 +120,7 @@ class Run:
             if picture is None:
                 continue
             # Opened after the first file is read, so that a wrong file fails at once.
-            renderer = self._renderer()
+            renderer = self.renderer()
             with self._of_file(pair):
                 with as_wrong_use():
                     image, glow = picture.pixels, glow_of(picture.pixels)
@@ -152,14 +139,14 @@ class Run:
         elif self._is_straight(picture, target):
             text = no_bloom.hidden(frames["final"], frames.settings)
         if text:
-            note(f"{name}: {text}" if self._several else text)
+            note(f"{name}: {text}" if self.several else text)
 
     def _is_straight(self, picture: Picture, target: str) -> bool:
-        file = of_format(target, self._options.pipe_format)
+        file = of_format(target, self.options.pipe_format)
         return image_writing.is_straight(file, is_associated=picture.stored.associated)
 
     def _read(self, source: str, expand: float | None, *, is_blended: bool) -> Picture:
-        options = self._options
+        options = self.options
         picture = read_picture(
             source,
             options.subimage,
@@ -175,9 +162,14 @@ class Run:
             picture = dataclasses.replace(picture, pixels=pixels.astype(np.float16))
         return picture
 
+    @functools.cached_property
+    def _glow_of(self) -> Callable[[bool], Glow]:
+        # The files are read once.
+        return functools.cache(self._read_glow)
+
     def _read_glow(self, is_blended: bool) -> Glow:
         """Return a function that gives mask and emission for an image."""
-        options = self._options
+        options = self.options
         given: dict[str, NDArray[Any]] = {}
         if options.mask is not None:
             mask = read_picture(options.mask, 0, "linear").pixels
@@ -199,22 +191,22 @@ class Run:
         target = pair[1]
         with self._of_file(pair):
             file = Path(target)
-            if target != self._out:
+            if target != self.out:
                 file.parent.mkdir(exist_ok=True)
             if is_stream(target):
-                suffix = Path(of_format(target, self._options.pipe_format)).suffix
-                file = self._folder / f"output{suffix}"
+                suffix = Path(of_format(target, self.options.pipe_format)).suffix
+                file = self.folder / f"output{suffix}"
             notes += image_writing.save(
                 finished(picture, frames["final"], frames.settings),
                 file,
-                self._options.saved,
+                self.options.saved,
                 settings_facts(frames.settings, expand),
-                self._options.quality,
-                bits=self._options.bits,
+                self.options.quality,
+                bits=self.options.bits,
             )
             if is_stream(target):
                 _send(file, target)
-            elif not self._several:
+            elif not self.several:
                 say(f"wrote {file}")
 
 

@@ -24,7 +24,7 @@ from vkbloom._cli.image_files import (
 )
 from vkbloom._cli.program import adapter_option, as_wrong_use, described
 from vkbloom._cli.sequences import check_targets, pairs
-from vkbloom._cli.settings_options import settings_options_by_file
+from vkbloom._cli.settings_options import start_options
 from vkbloom._cli.streams import is_stream
 from vkbloom._cli.terminal import complain, say, tell_device
 from vkbloom._io import image_writing
@@ -71,7 +71,7 @@ CURVES = ("linear", "srgb", "gamma22", "pq", "hlg")
     "--emission", metavar="FILE", type=click.Path(), help="An image that glows instead of IN."
 )
 @adapter_option
-@settings_options_by_file
+@start_options
 def command(*, sources: tuple[str, ...], out: str | None, adapter: str, **given: Any) -> int:
     """Add bloom to the image IN and write the result to OUT.
 
@@ -102,8 +102,11 @@ def command(*, sources: tuple[str, ...], out: str | None, adapter: str, **given:
             tell_device(opened, err=is_stream(target))
             return opened
 
-        run = Run(options, target, Path(folder), renderer, several=len(work) > 1)
-        for begun, group in itertools.groupby(work, key=lambda pair: options.settings(pair[0])):
+        several = len(work) > 1
+        run = Run(
+            options=options, out=target, folder=Path(folder), renderer=renderer, several=several
+        )
+        for begun, group in itertools.groupby(work, key=lambda pair: options.start.of(pair[0])):
             run.sequence([*group], *begun)
     written = [target for name, target in work if name not in run.failures]
     if len(work) > 1 and written:
@@ -127,7 +130,7 @@ def _planned(options: Options, sources: list[str], out: str) -> list[Pair]:
     """Check the options, and return the files to read, each with the file to write."""
     check_input_colour(options.input_colour)
     work = pairs(sources, out)
-    settings, _ = options.settings(work[0][0])
+    settings, _ = options.start.of(work[0][0])
     _check_colours(settings, options.saved)
     check_targets(work, out, overwrite=options.overwrite)
     with as_wrong_use():

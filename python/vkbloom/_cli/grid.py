@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from collections.abc import Sequence
 from pathlib import Path
@@ -192,10 +191,8 @@ def _save(
     """Write a framebuffer of a point; `final` in the colours of the image's file."""
     settings = frames.settings
     if name == "final" and picture is not None:
-        encoding = picture.encoding if settings.encoding == "none" else settings.encoding
-        final = Picture.of_values(frames[name], picture.numbers, encoding)
-        facts = settings_facts(settings, expand)
-        image_writing.save(dataclasses.replace(final, grey=picture.grey), path, None, facts)
+        final = image_files.finished(picture, frames[name], settings)
+        image_writing.save(final, path, None, settings_facts(settings, expand))
     else:
         # Without the timings, so that the same call writes the same file.
         alone = {name: frames[name]}

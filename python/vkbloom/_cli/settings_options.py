@@ -33,15 +33,18 @@ STARTS: Final = ("preset", "method", "stored")
 
 def settings_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """Add the options of the settings to a command; its argument `settings` has the result."""
-    return _settings_options(command, by_file=False)
+
+    def run(*, start: Start, **rest: Any) -> Any:
+        settings, expand = start.of(str(rest.get("source") or ""))
+        if "expand" in rest:
+            rest["expand"] = expand
+        return command(settings=settings, **rest)
+
+    return start_options(functools.update_wrapper(run, command))
 
 
-def settings_options_by_file(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add the options of the settings to a command; its argument `settings` is `Start.of`."""
-    return _settings_options(command, by_file=True)
-
-
-def _settings_options(command: Callable[..., Any], *, by_file: bool) -> Callable[..., Any]:
+def start_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Add the options of the settings to a command; its argument `start` has them."""
 
     @click.option(
         "--preset",
@@ -72,8 +75,8 @@ def _settings_options(command: Callable[..., Any], *, by_file: bool) -> Callable
         stored: str | None,
         shared: dict[str, Any],
         of_method: dict[str, Any],
-        **rest: object,
-    ) -> object:
+        **rest: Any,
+    ) -> Any:
         if stored is not None and preset is not None:
             raise click.UsageError("--settings and --preset exclude each other; leave one out")
         start = Start(
@@ -82,14 +85,9 @@ def _settings_options(command: Callable[..., Any], *, by_file: bool) -> Callable
             stored=None if stored is None else read_settings(stored),
             changes={**shared, **of_method},
             expands="expand" in rest,
-            expand=rest.get("expand"),  # type: ignore[arg-type]
+            expand=rest.get("expand"),
         )
-        if by_file:
-            return command(settings=start.of, **rest)
-        settings, expand = start.of(str(rest.get("source") or ""))
-        if "expand" in rest:
-            rest["expand"] = expand
-        return command(settings=settings, **rest)
+        return command(start=start, **rest)
 
     return run
 

@@ -133,8 +133,6 @@ class FitResult:
         Number of renders, at all sizes.
     history : ndarray of float64, shape (calls,)
         The loss of each; the first ones may be of a smaller image.
-    seconds : float
-        Time of the search.
     framebuffer : str
         Name of the framebuffer that was compared.
     loss_name : str
@@ -165,7 +163,6 @@ class FitResult:
     start_loss: float
     calls: int
     history: NDArray[np.float64]
-    seconds: float
     framebuffer: str
     loss_name: str
     vary: tuple[str, ...]
@@ -219,9 +216,7 @@ class FitResult:
             style = f"width:{_WIDTH}px;max-width:100%;image-rendering:pixelated"
             image = markup.image(data, name, style=style)
             parts.append(markup.figure(image, element("b", name), f" {note}", style="margin:0"))
-        summary = (
-            f", from a loss ({self.loss_name}) of {self.start_loss:.3g}, in {self.seconds:.1f} s"
-        )
+        summary = f", from a loss ({self.loss_name}) of {self.start_loss:.3g}"
         code = "color:inherit;background:none;padding:0;white-space:pre-wrap"
         report = element(
             "div",

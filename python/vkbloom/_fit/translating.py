@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any, Final
+from collections.abc import Mapping, Sequence
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,9 +20,6 @@ from vkbloom._renderer.renderer import Renderer
 from vkbloom._settings.fields import fields_of
 from vkbloom._settings.registry import METHODS
 from vkbloom._settings.settings import Settings, check_settings
-
-#: A function of an image, such as `vkbloom.testing.command` makes of a program.
-Maker = Callable[[NDArray[Any]], NDArray[Any]]
 
 # What a user of a method turns; other fields of `to` stay as they are.
 _KNOBS: Final[Mapping[str, tuple[str, ...]]] = {
@@ -58,7 +55,7 @@ _MIN_SIDE: Final = 3
 
 @checked
 def translate(
-    settings: Settings | Maker,
+    settings: Settings,
     to: Settings | type[Settings],
     *,
     size: tuple[int, int] = (640, 360),
@@ -77,9 +74,8 @@ def translate(
 
     Parameters
     ----------
-    settings : Settings or callable
-        The bloom to come close to; a callable takes an image and returns it with its bloom, as
-        those do that `vkbloom.testing.command` makes of programs.
+    settings : Settings
+        The bloom to come close to.
     to : Settings or a class of them
         The other method: where the search starts, and its fields that do not vary.
     size : (int, int)
@@ -100,8 +96,7 @@ def translate(
         encoding.
 
     """
-    if not callable(settings):
-        check_settings(settings)
+    settings = check_settings(settings)
     start = to() if isinstance(to, type) and issubclass(to, Settings) else to
     if not isinstance(start, Settings):
         raise TypeError(f"to: {to!r} is not a Settings or a class of settings")
@@ -110,7 +105,7 @@ def translate(
     renderer = renderer or default_renderer()
     result = fit(
         image,
-        settings(image) if callable(settings) else _applied(renderer, image, settings),
+        renderer.apply(image, _plain(settings), framebuffers=["final"])["final"],
         _plain(start),
         names,
         framebuffer="final",
@@ -122,15 +117,6 @@ def translate(
     )
     look = {name: getattr(start, name) for name in ("tonemap", "encoding", "exposure")}
     return dataclasses.replace(result, settings=result.settings.replace(**look))
-
-
-def _applied(
-    renderer: Renderer, image: NDArray[np.float32], settings: Settings
-) -> NDArray[np.float32]:
-    final: NDArray[np.float32] = renderer.apply(image, _plain(settings), framebuffers=["final"])[
-        "final"
-    ]
-    return final
 
 
 def lights(size: tuple[int, int]) -> NDArray[np.float32]:

@@ -6,6 +6,7 @@ import functools
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import dataclass
 from importlib.util import find_spec
 from typing import Any
 
@@ -29,36 +30,34 @@ def _ignored(points: int) -> None:
     """Count nothing."""
 
 
+@dataclass(frozen=True, eq=False)
 class Filler:
     """Renders points of one grid on one renderer."""
 
-    def __init__(
-        self, grid: Grid, layout: Layout, renderer: Renderer, count: Count = _ignored
-    ) -> None:
-        self._grid = grid
-        self._layout = layout
-        self._renderer = renderer
-        self._count = count
+    grid: Grid
+    layout: Layout
+    renderer: Renderer
+    count: Count = _ignored
 
     def fill(self, block: Block, arrays: Mapping[str, NDArray[Any]]) -> None:
         """Render the points of a block."""
-        grid = self._grid
-        path = map(grid.point, points(block, self._layout.ranking))
-        for index, frames in visit(self._renderer, grid.source, path, grid.wanted):
+        grid = self.grid
+        path = map(grid.point, points(block, self.layout.ranking))
+        for index, frames in visit(self.renderer, grid.source, path, grid.wanted):
             inside = tuple(i - start for i, start in zip(index, block.start, strict=True))
             for name, array in arrays.items():
                 array[inside] = self._value(name, index, frames)
-            self._count(1)
+            self.count(1)
 
     def _value(self, name: str, index: Index, frames: Frames) -> NDArray[Any]:
-        variable = self._layout.variables[name]
-        reduction = self._grid.reduce.get(name)
+        variable = self.layout.variables[name]
+        reduction = self.grid.reduce.get(name)
         value = frames[name] if reduction is None else checked_value(name, reduction(frames))
         if value.shape != variable.shape or not np.can_cast(
             value.dtype, variable.dtype, "same_kind"
         ):
             raise ValueError(
-                f"{name}: {value.shape} {value.dtype} at {self._grid.named(index)} is not "
+                f"{name}: {value.shape} {value.dtype} at {self.grid.named(index)} is not "
                 f"{variable.shape} {variable.dtype} as at the grid's first point"
             )
         return value
@@ -70,7 +69,7 @@ class Filler:
             for block in todo:
                 arrays = {
                     name: np.empty((*block.shape, *variable.shape), variable.dtype)
-                    for name, variable in self._layout.variables.items()
+                    for name, variable in self.layout.variables.items()
                 }
                 self.fill(block, arrays)
                 yield None, functools.partial(chunks.write, block, arrays)

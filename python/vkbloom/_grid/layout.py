@@ -143,8 +143,6 @@ def ask(
     checked = read_source(source, size, shading, time)
     grid_axes = read_axes(settings, {} if axes is None else axes, has_time=checked.has_time)
     names = check_framebuffers(framebuffers)
-    if reduce is not None and not isinstance(reduce, Mapping):
-        raise TypeError(f"reduce: {reduce!r} is not a mapping of names to callables")
     reductions = {} if reduce is None else dict(reduce)
     taken = {"y", "x", "channel", "done", *(axis.name for axis in grid_axes), *(names or ())}
     for name, reduction in reductions.items():
