@@ -198,54 +198,6 @@ def test_no_loader(without_loader: dict[str, str]) -> None:
     assert "loader (libvulkan.so.1) is missing" in by_topic(findings, "adapters").found
 
 
-def validation() -> Finding:
-    """Return the finding about the validation layer."""
-    return doctor._validation(os.environ["VKBLOOM_ADAPTER"])
-
-
-@linux_only
-def test_no_validation_layer(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setenv("VK_LAYER_PATH", str(tmp_path))
-    layer = validation()
-    assert layer.status == "note"
-    assert "is not installed" in layer.found
-    assert "apt install libvulkan1 vulkan-validationlayers" in layer.advice
-
-
-def test_without_a_loader_there_is_no_validation(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The driver of the wheel renders without a loader: nothing is broken."""
-    failure = "validation=True needs the system's Vulkan loader, also for the bundled driver"
-    monkeypatch.setattr(child, "ask", lambda *_: child.Answer(None, failure))
-    layer = validation()
-    assert (layer.status, layer.found) == ("note", "there is no loader")
-
-
-@linux_only
-def test_a_validation_layer_that_does_not_open(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    absent = tmp_path / "absent.so"
-    (tmp_path / "layer.json").write_text(
-        json.dumps(
-            {
-                "file_format_version": "1.2.0",
-                "layer": {
-                    "name": "VK_LAYER_KHRONOS_validation",
-                    "type": "GLOBAL",
-                    "library_path": str(absent),
-                    "api_version": "1.3.0",
-                    "implementation_version": "1",
-                    "description": "none",
-                },
-            }
-        )
-    )
-    monkeypatch.setenv("VK_LAYER_PATH", str(tmp_path))
-    layer = validation()
-    assert layer.status == "problem"
-    assert "the test render fails with it" in layer.found
-
-
 def test_driver_without_adapters_is_a_problem(monkeypatch: pytest.MonkeyPatch) -> None:
     """Every process fails: the doctor still reports."""
     failed = child.Answer(None, "no answer within 60 s", ("driver says no",))
@@ -436,7 +388,7 @@ def test_a_process_that_gives_no_answer(
 
 
 def test_a_question_that_fails_is_answered() -> None:
-    answer = child.ask("render", "no such adapter", "plain")
+    answer = child.ask("render", "no such adapter")
     assert answer.value is None
     # Without the advice for those who do not ask the doctor.
     assert answer.failure.startswith('no Vulkan adapter for "no such adapter"; found: ')

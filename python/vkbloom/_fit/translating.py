@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Final
 
 import numpy as np
@@ -20,6 +20,9 @@ from vkbloom._renderer.renderer import Renderer
 from vkbloom._settings.fields import fields_of
 from vkbloom._settings.registry import METHODS
 from vkbloom._settings.settings import Settings, check_settings
+
+#: A function of an image, such as `vkbloom.testing.command` makes of a program.
+Maker = Callable[[NDArray[Any]], NDArray[Any]]
 
 # What a user of a method turns; other fields of `to` stay as they are.
 _KNOBS: Final[Mapping[str, tuple[str, ...]]] = {
@@ -55,7 +58,7 @@ _MIN_SIDE: Final = 3
 
 @checked
 def translate(
-    settings: Settings,
+    settings: Settings | Maker,
     to: Settings | type[Settings],
     *,
     size: tuple[int, int] = (640, 360),
@@ -74,8 +77,9 @@ def translate(
 
     Parameters
     ----------
-    settings : Settings
-        The bloom to come close to.
+    settings : Settings or callable
+        The bloom to come close to; a callable takes an image and returns it with its bloom, as
+        those do that `vkbloom.testing.command` makes of programs.
     to : Settings or a class of them
         The other method: where the search starts, and its fields that do not vary.
     size : (int, int)
@@ -96,16 +100,20 @@ def translate(
         encoding.
 
     """
-    settings = check_settings(settings)
     start = to() if isinstance(to, type) and issubclass(to, Settings) else to
     if not isinstance(start, Settings):
         raise TypeError(f"to: {to!r} is not a Settings or a class of settings")
     image = lights(check_size("size", size))
     names = _knobs(start) if vary is None else vary
     renderer = renderer or default_renderer()
+    if callable(settings):
+        target = settings(image)
+    else:
+        plain = _plain(check_settings(settings))
+        target = renderer.apply(image, plain, framebuffers=["final"])["final"]
     result = fit(
         image,
-        renderer.apply(image, _plain(settings), framebuffers=["final"])["final"],
+        target,
         _plain(start),
         names,
         framebuffer="final",

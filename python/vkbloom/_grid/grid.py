@@ -18,7 +18,7 @@ from vkbloom._free_memory import memory_left
 from vkbloom._grid import cluster
 from vkbloom._grid.filling import Filler, progress_bar
 from vkbloom._grid.layout import Grid, Layout, Variable, ask, lay_out, made_dataset
-from vkbloom._grid.order import Index, blocks, default_chunk, read_part
+from vkbloom._grid.order import Block, Index, default_chunk, read_part
 from vkbloom._grid.sources import ImageSource
 from vkbloom._grid.store import IDENTITY, GridStore, chunk_in, folder_of, prepare, stored_identity
 from vkbloom._renderer.default import default_renderer
@@ -270,8 +270,5 @@ def in_memory(grid: Grid, renderer: Renderer, progress: bool | None) -> xarray.D
         for name, variable in layout.variables.items()
     }
     with progress_bar(math.prod(shape), shown=progress) as count:
-        filler = Filler(grid, layout, renderer, count)
-        for block in blocks(shape, chunk_of(grid, layout), layout.ranking):
-            views = {name: array[block.slices] for name, array in arrays.items()}
-            filler.fill(block, views)
+        Filler(grid, layout, renderer, count).fill(Block((0,) * len(shape), shape), arrays)
     return made_dataset(grid, layout, arrays)

@@ -8,7 +8,7 @@ import hashlib
 from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
 
 import numpy as np
 
@@ -59,15 +59,17 @@ def visit(
         yield drawn.popleft(), frames
 
 
+@dataclass(eq=False)
 class ImageSource:
     """An image."""
 
-    has_time = False
-    time = 0.0
+    has_time: ClassVar = False
+    time: ClassVar = 0.0
 
-    def __init__(self, image: NDArray[Any] | Image) -> None:
-        self.image = image
-        self._uploaded: tuple[_core.Renderer, _core.Source] | None = None
+    image: NDArray[Any] | Image
+    _uploaded: tuple[_core.Renderer, _core.Source] | None = dataclasses.field(
+        default=None, init=False
+    )
 
     def __reduce__(self) -> tuple[Any, ...]:
         # The device is not sent to other processes.
@@ -109,19 +111,17 @@ def _described(image: NDArray[Any] | Image) -> dict[str, Any]:
     }
 
 
+@dataclass(eq=False)
 class SceneSource:
     """A scene, rendered at one size in one shading."""
 
-    has_time = True
+    has_time: ClassVar = True
 
-    def __init__(
-        self, scene: Scene, size: tuple[int, int], shading: Shading, time: float = 0.0
-    ) -> None:
-        self.scene = scene
-        self.size = size
-        self.shading: Shading = shading
-        self.time = time
-        self._latest: tuple[float, _core.Source] | None = None
+    scene: Scene
+    size: tuple[int, int]
+    shading: Shading
+    time: float = 0.0
+    _latest: tuple[float, _core.Source] | None = dataclasses.field(default=None, init=False)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return type(self), (self.scene, self.size, self.shading, self.time)
