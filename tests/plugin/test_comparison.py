@@ -152,14 +152,6 @@ class TestFigures:
         (reason,) = reasons(found, tolerances_of(min_ssim=-1))
         assert reason.startswith("SSIM is not computed: a side is under")
 
-    def test_an_openimageio_without_flip(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        monkeypatch.delattr(oiio.ImageBufAlgo, "FLIP_diff")
-        a = noise_image(8, 8, 3)
-        found = compare(a, a)
-        assert (found.flip, found.identical) == (None, True)
-        assert found.not_computed == {"flip": "OpenImageIO 3.2 is needed"}
-        assert len(reasons(found, tolerances_of(max_flip=1))) == 1
-
     def test_extreme_values(self) -> None:
         a = np.full((8, 8, 3), 1.7e308)
         found = compare(a, -a)
