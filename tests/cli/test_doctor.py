@@ -55,15 +55,6 @@ def manifests() -> list[Finding]:
     return drivers.examine(child.ask("adapters", "all", environment=drivers.LOG).messages)
 
 
-@pytest.fixture(scope="module")
-def lavapipe() -> Path:
-    """Return the manifest of lavapipe."""
-    for finding in manifests():
-        if finding.topic.startswith("driver lvp"):
-            return Path(finding.found.partition(":")[0])
-    pytest.skip("no manifest of lavapipe is here")
-
-
 @pytest.fixture
 def without_variables(monkeypatch: pytest.MonkeyPatch) -> None:
     for name in VARIABLES:
@@ -151,22 +142,6 @@ def test_no_driver() -> None:
     ended = CliRunner().invoke(program, ["doctor"], env={"VK_DRIVER_FILES": ABSENT})
     assert (ended.exit_code, ended.stderr) == (1, "")
     assert ended.stdout.endswith("\nThis machine cannot render. Problems found: 2.\n")
-
-
-@linux_only
-def test_a_broken_driver_beside_one_that_works(
-    monkeypatch: pytest.MonkeyPatch, without_variables: None, tmp_path: Path, lavapipe: Path
-) -> None:
-    missing = tmp_path / "missing.json"
-    library = {"library_path": str(tmp_path / "none.so")}
-    missing.write_text(json.dumps({"file_format_version": "1.0.0", "ICD": library}))
-    monkeypatch.setenv("VK_DRIVER_FILES", f"{missing}:{lavapipe}")
-    listed = child.ask("adapters", "all", environment=drivers.LOG)
-    assert listed.value is not None
-    assert listed.value["adapters"]
-    findings = drivers.examine(listed.messages)
-    assert by_topic(findings, "driver missing.json").status == "problem"
-    assert by_topic(findings, f"driver {lavapipe.name}").status == "ok"
 
 
 @pytest.fixture

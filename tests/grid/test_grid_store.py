@@ -103,14 +103,6 @@ class TestWhole:
             assert found[name].attrs == expected[name].attrs
         assert found["done"].values.all()
 
-    def test_xarray_reads_it_lazily(self, undisturbed: Path, renderer: Renderer) -> None:
-        final = xr.open_zarr(undisturbed)["final"]
-        assert final.chunks[0] == (3,)
-        chosen = final.sel(blur_scale=1.1, method="nearest").isel(exposure=2, threshold=1)
-        assert chosen.chunks is not None
-        expected = renderer.apply(source(), Separable(exposure=2, threshold=0.5))["final"]
-        np.testing.assert_array_equal(chosen.compute().values, expected)
-
     def test_black_pictures_are_stored_too(self, tmp_path: Path) -> None:
         black = np.zeros((4, 4, 3), np.uint8)
         make(tmp_path / "a.zarr", source=black, reduce=None, framebuffers="final")
