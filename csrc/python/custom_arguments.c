@@ -61,18 +61,15 @@ static bool read_resources(PyObject *tuple, struct vkb_pass_content *content,
     return true;
 }
 
-static bool read_shader(const char *name, PyObject *code, PyObject *hash, struct vkb_shader *shader)
+static bool read_shader(PyObject *code, PyObject *hash, struct vkb_shader *shader)
 {
     enum { MAGIC = 0x07230203, HEADER_BYTES = 20 };
     const Py_ssize_t size = PyBytes_Size(code);
 
-    *shader = (struct vkb_shader){
-        .name = name,
-        .code = (const void *)PyBytes_AsString(code),
-        .size = (size_t)size,
-    };
+    shader->code = (const void *)PyBytes_AsString(code);
+    shader->size = (size_t)size;
     if (size < HEADER_BYTES || size % 4 != 0 || *shader->code != MAGIC) {
-        PyErr_Format(PyExc_ValueError, "shader: %s is not SPIR-V", name);
+        PyErr_Format(PyExc_ValueError, "shader: %s is not SPIR-V", shader->name);
         return false;
     }
     if (PyBytes_Size(hash) != sizeof shader->hash.bytes)
@@ -92,22 +89,24 @@ static bool is_valid(const struct vkb_custom_pass *pass)
     return valid;
 }
 
-// (block, name of the shader, its SPIR-V, its hash, (resource, ...))
+// (block, name of the shader, its SPIR-V, its hash, its threads along x and y, its bytes of shared
+// memory, (resource, ...))
 static bool read_pass(PyObject *tuple, struct vkb_pass_content *content,
                       struct vkb_custom_pass *pass)
 {
-    const char *name;
+    struct vkb_shader *shader = &content->shader;
     PyObject *block, *code, *hash, *resources;
 
     if (!vkb_require_tuple(tuple, "core_passes")
-        || !PyArg_ParseTuple(tuple, "SsSSO!:core_passes", &block, &name, &code, &hash,
+        || !PyArg_ParseTuple(tuple, "SsSSIIIO!:core_passes", &block, &shader->name, &code, &hash,
+                             &shader->threads[0], &shader->threads[1], &shader->shared,
                              &PyTuple_Type, &resources))
         return false;
     if (PyBytes_Size(block) != PASS_SIZE)
         return refuse("a pass");
     memcpy(pass, PyBytes_AsString(block), PASS_SIZE);
-    pass->shader = &content->shader;
-    return (is_valid(pass) || refuse("a pass")) && read_shader(name, code, hash, &content->shader)
+    pass->shader = shader;
+    return (is_valid(pass) || refuse("a pass")) && read_shader(code, hash, shader)
         && read_resources(resources, content, pass);
 }
 
