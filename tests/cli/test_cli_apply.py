@@ -12,11 +12,9 @@ from click.testing import CliRunner, Result
 from numpy.typing import NDArray
 
 import vkbloom
-from tests.io.parts import written
+from tests.io.profiles import store_png as png
 from vkbloom._cli.program import program
 from vkbloom._io.image_reading import load
-from vkbloom._io.image_writing import save
-from vkbloom._io.images import Picture
 from vkbloom._io.srgb import decode_srgb, encode_srgb
 from vkbloom._methods.mip_chain import Pyramid
 
@@ -35,22 +33,6 @@ def light(*shape: int, dtype: str = "float32") -> NDArray[Any]:
     if dtype.startswith("u"):
         return np.rint(values * np.iinfo(dtype).max).astype(dtype)
     return values.astype(dtype)
-
-
-def stored(path: Path, pixels: NDArray[Any]) -> Path:
-    """Write values as they are."""
-    save(Picture.of_values(pixels, "half" if pixels.dtype == np.float16 else "float"), path)
-    return path
-
-
-def png(path: Path, pixels: NDArray[Any]) -> Path:
-    """Write integers of 8 or 16 bits with 1 to 4 channels."""
-    height, width, channels = pixels.shape
-    spec = oiio.ImageSpec(width, height, channels, str(pixels.dtype))
-    spec.attribute("oiio:UnassociatedAlpha", 1)
-    if channels == 2:
-        spec.channelnames = ("Y", "A")
-    return written(path, spec, pixels)
 
 
 def run(*arguments: str | Path, adapter: str = "auto") -> Result:
@@ -105,22 +87,28 @@ class TestFormats:
     def test_exr_stays_as_it_is(self, tmp_path: Path, dtype: str, channels: int) -> None:
         image = light(20, 30, channels, dtype=dtype)
         image[:, :, 3:] = 1
-        path = stored(tmp_path / "a.exr", image)
+        path = vkbloom.write(tmp_path / "a.exr", image)
         result = done(path, tmp_path / "b.exr")
         assert pixels(tmp_path / "b.exr").dtype == dtype
         assert np.array_equal(pixels(tmp_path / "b.exr"), applied(image))
         assert result.stdout.startswith("Rendering on ")
         assert result.stdout.endswith(f"\nwrote {tmp_path / 'b.exr'}\n")
 
-    @pytest.mark.parametrize("suffix", ["png", "tif", "bmp", "tga"])
-    def test_8_bits_bloom_as_linear_floats(self, tmp_path: Path, suffix: str) -> None:
-        image = light(20, 30, 3, dtype="uint8")
+    @pytest.mark.parametrize(
+        ("suffix", "channels"), [*((one, 3) for one in ("png", "tif", "bmp", "tga")), ("png", 1)]
+    )
+    def test_8_bits_bloom_as_linear_floats(
+        self, tmp_path: Path, suffix: str, channels: int
+    ) -> None:
+        image = light(20, 30, channels, dtype="uint8")
         done(png(tmp_path / "a.png", image), tmp_path / f"b.{suffix}")
         written = pixels(tmp_path / f"b.{suffix}")
         assert written.dtype == np.uint8
-        expected = levels(applied(linear(image)))
+        assert written.shape == image.shape
+        rgb = linear(np.repeat(image, 3 // channels, axis=2))
+        expected = levels(applied(rgb))[:, :, :channels]
         assert np.abs(written - expected).max() <= ROUNDING
-        assert np.abs(expected - image).max() > 20
+        assert np.abs(expected - image).max() > 10
 
     @pytest.mark.parametrize(
         ("dtype", "channels"), [(dtype, n) for dtype in ("uint8", "uint16") for n in (1, 2, 3, 4)]
@@ -133,24 +121,12 @@ class TestFormats:
         done(path, tmp_path / "b.png", "--no-bloom")
         assert np.array_equal(pixels(tmp_path / "b.png"), image)
 
-    @pytest.mark.parametrize("with_alpha", [False, True])
-    def test_grey_stays_grey(self, tmp_path: Path, with_alpha: bool) -> None:
-        image = light(20, 30, 1 + with_alpha, dtype="uint8")
-        done(png(tmp_path / "a.png", image), tmp_path / "b.png", "--tonemap", "aces")
-        written = pixels(tmp_path / "b.png")
-        assert written.shape == image.shape
-        rgb = linear(np.repeat(image[:, :, :1], 3, axis=2))
-        expected = levels(applied(rgb, NATURAL.replace(tonemap="aces")))
-        assert np.abs(written[:, :, 0] - expected[:, :, 0]).max() <= ROUNDING
-        if with_alpha:
-            assert np.array_equal(written[:, :, 1], image[:, :, 1])
-
 
 class TestColours:
     @pytest.mark.parametrize("encoding", ["srgb", "gamma22"])
     def test_an_encoding_is_the_only_one(self, tmp_path: Path, encoding: Any) -> None:
         image = light(20, 30, 3)
-        path = stored(tmp_path / "a.exr", image)
+        path = vkbloom.write(tmp_path / "a.exr", image)
         options = ("--tonemap", "reinhard", "--encoding", encoding)
         for name in ("b.exr", "b.png"):
             done(path, tmp_path / name, *options)
@@ -160,7 +136,7 @@ class TestColours:
 
     def test_settings_are_those_of_render(self, tmp_path: Path) -> None:
         image = light(40, 30, 3)
-        path = stored(tmp_path / "a.exr", image)
+        path = vkbloom.write(tmp_path / "a.exr", image)
         words = "--method pyramid --levels 3 --threshold 0.5 --knee 0.2 --intensity 0.5"
         done(path, tmp_path / "b.exr", *words.split())
         settings = Pyramid(levels=3, threshold=0.5, knee=0.2, intensity=0.5)
@@ -174,7 +150,7 @@ class TestColours:
     def test_nan_and_infinity_are_told(self, tmp_path: Path) -> None:
         image = light(20, 30, 3)
         image[0, 0], image[1, 1, 0] = np.nan, -np.inf
-        path = stored(tmp_path / "a.exr", image)
+        path = vkbloom.write(tmp_path / "a.exr", image)
         result = run(path, tmp_path / "b.exr")
         assert result.exit_code == 0
         assert result.stderr == (
@@ -194,7 +170,7 @@ class TestColours:
 class TestFramebuffers:
     def test_all_are_beside_the_output(self, tmp_path: Path) -> None:
         image = light(20, 30, 3, dtype="float16")
-        path = stored(tmp_path / "a.exr", image)
+        path = vkbloom.write(tmp_path / "a.exr", image)
         result = done(path, tmp_path / "b.exr", "--framebuffers", "all")
         with vkbloom.Renderer() as renderer:
             frames = renderer.apply(image, NATURAL)
@@ -207,26 +183,10 @@ class TestFramebuffers:
         written = [line for line in result.stdout.splitlines() if line.startswith("wrote ")]
         assert len(written) == len(frames)
 
-    @pytest.mark.parametrize(
-        ("words", "more"),
-        [
-            ("--framebuffers bloom,final", "b_bloom.exr"),
-            ("", "b.png"),
-        ],
-    )
-    def test_files_beside_a_png(self, tmp_path: Path, words: str, more: str) -> None:
+    def test_files_beside_a_png(self, tmp_path: Path) -> None:
         path = png(tmp_path / "a.png", light(20, 30, 3, dtype="uint8"))
-        done(path, tmp_path / "b.png", *words.split())
-        assert {file.name for file in tmp_path.iterdir()} == {"a.png", "b.png", more}
-
-
-class TestErrors:
-    def test_an_array_of_numpy_says_how_to_convert_it(self, tmp_path: Path) -> None:
-        file = tmp_path / "a.npy"
-        np.save(file, light(20, 30, 3))
-        result = run(file, tmp_path / "b.png")
-        assert result.exit_code == 1
-        assert f"vkbloom.write('image.exr', numpy.load('{file}'))" in result.stderr
+        done(path, tmp_path / "b.png", "--framebuffers", "bloom,final")
+        assert {file.name for file in tmp_path.iterdir()} == {"a.png", "b.png", "b_bloom.exr"}
 
 
 def picture(path: Path) -> Path:

@@ -91,24 +91,13 @@ class TestStores:
     def test_resumed_by_the_same_call(self, tmp_path: Path, image_file: Path) -> None:
         words = [image_file, "--axis", "exposure=0,1", "-o", tmp_path / "a.zarr"]
         done(*words)
-        (tmp_path / "a.zarr" / "final" / "c.0.0.0.0").write_bytes(b"")
         again = run(*words, "--no-resume")
         assert again.exit_code == 1
         assert "resume it" in again.stderr
-        done(*words)
-        assert vkbloom.check_grid(tmp_path / "a.zarr").complete
+        assert "passes run 0" in done(*words)
         other = run(*words, "--intensity", "0.5")
         assert other.exit_code == 1
         assert "settings.intensity: 0.15 in the store, 0.5 requested" in other.stderr
-
-
-def test_presets_as_an_axis(tmp_path: Path, image_file: Path) -> None:
-    words = ("--axis", "preset=kino,filament", "--axis", "intensity=0.5,1", "-o")
-    result = run(image_file, *words, tmp_path / "a.zarr")
-    assert result.exit_code == 0, result.stderr
-    with xr.open_zarr(tmp_path / "a.zarr") as dataset:
-        assert dict(dataset.sizes)["preset"] == 2
-        assert list(dataset["preset"].values) == ["kino", "filament"]
 
 
 def test_presets_of_files_of_both_kinds(tmp_path: Path, image_file: Path) -> None:

@@ -147,20 +147,8 @@ def test_grids_leave_a_reserve(monkeypatch: pytest.MonkeyPatch, renderer: vkbloo
 @pytest.mark.parametrize(("number", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 0)])
 def test_explore_ends_with_the_status_of_shells(number: int, status: int) -> None:
     pytest.importorskip("tornado")
-    running = subprocess.Popen(
-        [
-            sys.executable,
-            "-u",
-            "-m",
-            "vkbloom._cli",
-            "explore",
-            "--no-open",
-            "--adapter",
-            "software",
-        ],
-        stdout=subprocess.PIPE,
-        text=True,
-    )
+    words = ["-u", "-m", "vkbloom._cli", "explore", "--no-open", "--adapter", "software"]
+    running = subprocess.Popen([sys.executable, *words], stdout=subprocess.PIPE, text=True)
     assert running.stdout is not None
     for line in running.stdout:
         if "Ctrl-C" in line:

@@ -24,8 +24,6 @@ from tests.io.parts import written
 from tests.refusals import assert_matches, rows
 from vkbloom._cli import listing
 from vkbloom._cli import presets as presets_command
-from vkbloom._presets.named_glares import GLARES
-from vkbloom._presets.named_settings import PRESETS
 from vkbloom._settings.registry import STAGES
 from vkbloom.psf._base import functions
 
@@ -222,16 +220,6 @@ def test_a_narrow_terminal_cuts_the_last_columns() -> None:
     assert [words[0] for words in rows] == NAMES["presets"]
     for words, entry in zip(rows, entries, strict=True):
         assert words[1:3] == [entry["composite"], "yes" if entry["needs_hdr"] else "no"]
-
-
-def test_what_is_said_of_presets_and_glares() -> None:
-    text = run("presets").stdout
-    for name, one in PRESETS.items():
-        (line,) = (line for line in text.splitlines() if line.split()[:1] == [name])
-        assert one.what in line
-        assert one.whose in line
-        assert line.split()[1] == one.make().composite
-    assert all(one.what in run("glares").stdout for one in GLARES.values())
 
 
 @pytest.mark.parametrize("command", NAMES)

@@ -24,7 +24,6 @@ import vkbloom
 from tests.docs.pages import ROOT
 from tests.exhaustive import witness
 from tests.processes import output
-from vkbloom.testing import _measuring as measuring
 
 #: The arguments of a script, in a folder with `photo.exr`; a module that it cannot do without.
 RUN: Final[dict[str, tuple[str, str]]] = {
@@ -55,6 +54,7 @@ ELSEWHERE: Final = {
     "examples/training_pairs.py": "tests/device/test_training_pairs.py",
     "tools/cluster/": "Makefile",
     "tools/core_tables.py": "tests/core/test_no_core.py",
+    "tools/preset_blooms.py": "tests/custom/test_check.py",
     "tools/coverage.sh": "docs/robustness.md",  # compiles and runs for minutes
     "tools/coverage_report.py": "tools/coverage.sh",
     "tools/engines/": "Makefile",
@@ -99,7 +99,6 @@ def test_a_script_runs(
     (folder / "pictures").mkdir()
     shutil.copy(ROOT / "docs" / "plans.md", folder)  # a script writes its flowchart
     monkeypatch.setattr(vkbloom, "presets", Few(vkbloom.presets, "kino", "unity_urp"))
-    monkeypatch.setattr(measuring, "presets", vkbloom.presets)
     monkeypatch.setattr(vkbloom, "glares", Few(vkbloom.glares, next(iter(vkbloom.glares))))
     for name, value in {"GRID_SIDE": "16", "GRID_COUNTS": "2,2,2", "GRID_SINGLES": "2"}.items():
         monkeypatch.setenv(name, value)

@@ -148,10 +148,6 @@ class TestControls:
         assert {"intensity", "directions", "fade", "halvings"} <= fields
 
     @pytest.mark.parametrize("settings", EXAMPLES)
-    def test_settings_come_back_from_the_page(self, settings: Settings) -> None:
-        assert settings_from(json.loads(json.dumps(settings.to_dict()))) == settings
-
-    @pytest.mark.parametrize("settings", EXAMPLES)
     def test_code_makes_the_settings(self, settings: Settings) -> None:
         code = as_code(settings)
         ast.parse(code)
@@ -171,21 +167,6 @@ class TestControls:
         assert as_code(Pyramid(tonemap="aces", threshold=0.5)) == (
             'vkbloom.Pyramid(threshold=0.5, tonemap="aces")'
         )
-
-    @pytest.mark.parametrize(
-        ("fields", "message"),
-        [
-            (None, "fields: a mapping is needed"),
-            ({}, "method: None"),
-            ({"method": "__class__"}, "is not one of separable"),
-            ({"method": "pyramid", "levels": 99}, "levels: 99 is out of range"),
-            ({"method": "pyramid", "blur_scale": 1.0}, "blur_scale"),
-            ({"method": "kino", "composite": "mix"}, "composite"),
-        ],
-    )
-    def test_wrong_settings_of_a_page_are_refused(self, fields: Any, message: str) -> None:
-        with pytest.raises((TypeError, ValueError), match=message):
-            settings_from(fields)
 
 
 class TestShown:

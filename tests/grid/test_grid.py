@@ -368,12 +368,3 @@ def test_default_chunks_keep_the_order_of_nested_loops(
     assert math.prod(chunk) <= most
     found = visited(shape, chunk, ranking)
     assert found == sorted(found, key=lambda index: [index[axis] for axis in ranking])
-
-
-@pytest.mark.parametrize("ranking", [(0, 1), (1, 0)])
-def test_blocks_cover_the_grid(ranking: tuple[int, int]) -> None:
-    count = np.zeros((5, 4), int)
-    for block in blocks((5, 4), (2, 3), ranking):
-        assert block.count == count[block.slices].size
-        count[block.slices] += 1
-    assert (count == 1).all()

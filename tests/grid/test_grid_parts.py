@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pytest
 from click.testing import CliRunner
 
 import vkbloom
@@ -133,12 +132,6 @@ def test_damage_in_a_part_is_repaired_by_it_alone(tmp_path: Path) -> None:
         make(store, part=f"{number}/4")
         assert contents(store) in (before, files)
     assert contents(store) == files
-
-
-def test_another_grid_is_refused(tmp_path: Path) -> None:
-    make(tmp_path / "a.zarr", part=(1, 2))
-    with pytest.raises(ValueError, match="contains another grid; variables"):
-        make(tmp_path / "a.zarr", part=(2, 2), framebuffers=("bloom",))
 
 
 def test_command_line(tmp_path: Path) -> None:

@@ -7,9 +7,6 @@ import json
 import os
 import re
 import shutil
-import subprocess
-import sys
-import time
 import tracemalloc
 from collections.abc import Callable
 from pathlib import Path
@@ -20,7 +17,6 @@ import pytest
 
 import vkbloom
 from tests.exhaustive import by_turns
-from tests.grid import grid_to_kill
 from tests.grid.stores import contents
 from tests.images import noise
 from vkbloom import Frames, Pyramid, Renderer, Separable, check_grid, psf
@@ -254,25 +250,6 @@ class TestResumed:
         assert made["done"].values.all()
         assert contents(store) == contents(undisturbed)
 
-    def test_killed_process_is_resumed_with_the_same_bytes(self, tmp_path: Path) -> None:
-        script = grid_to_kill.__file__
-        whole, store = tmp_path / "whole.zarr", tmp_path / "killed.zarr"
-        for seconds in (0.0, 0.2):
-            process = subprocess.Popen([sys.executable, script, str(store)])
-            try:
-                # From the first chunk on, at different places.
-                while not any((store / "final").glob("c.*")) and process.poll() is None:
-                    time.sleep(0.01)
-                time.sleep(seconds)
-            finally:
-                process.kill()
-                process.wait()
-            if (store / "zarr.json").exists():
-                assert int(xr.open_zarr(store)["done"].sum()) < 1000
-        for each in (store, whole):
-            grid_to_kill.fill(each)
-        assert contents(store) == contents(whole)
-
     def test_resume_false_refuses_an_existing_store(self, copy: Path) -> None:
         before = contents(copy)
         with pytest.raises(FileExistsError, match="already has a grid"):
@@ -389,13 +366,6 @@ class TestDamaged:
         make(copy)
         assert contents(copy) == contents(undisturbed)
         assert check_grid(copy).complete
-
-    def test_temporary_files_of_a_killed_writer_are_removed(
-        self, copy: Path, undisturbed: Path
-    ) -> None:
-        (copy / "final" / "c.0.0.0.0.0.5c5c.partial").write_bytes(b"half")
-        make(copy)
-        assert contents(copy) == contents(undisturbed)
 
 
 def with_sum(content: bytes) -> bytes:

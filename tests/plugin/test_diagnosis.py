@@ -100,8 +100,8 @@ def planted(cause: str) -> tuple[Image, Image]:
     return image, np.ascontiguousarray(PLANTED[cause][0](image))
 
 
-@pytest.mark.parametrize("cause", PLANTED)
 class TestPlanted:
+    @pytest.mark.parametrize("cause", PLANTED)
     def test_in_python(self, cause: str) -> None:
         found = diagnose(*planted(cause))
         _, value, text = PLANTED[cause]
@@ -113,22 +113,19 @@ class TestPlanted:
         if cause not in ("size", "rounding"):
             assert found.residual < 1e-3
 
-    def test_in_the_plugin(self, cause: str, tmp_path: Path) -> None:
-        expected, actual = planted(cause)
+    def test_in_the_plugin(self, tmp_path: Path) -> None:
+        expected, actual = planted("gain")
         (verdict,) = judge({"bloom": expected}, {"bloom": actual}, Tolerances(atol=0.0))
-        text = PLANTED[cause][2]
-        assert (verdict.diagnosis is None) == (cause == "equal")
-        if verdict.diagnosis is None:
-            assert verdict.passed
-            return
+        assert verdict.diagnosis is not None
         regression = FrameRegression(
             folder=tmp_path, name="image", update=False, save=None, written=[]
         )
         with pytest.raises(AssertionError) as caught:
             regression.compare(actual, expected)
-        assert f"\n  image: cause: {text}" in str(caught.value)
+        assert f"\n  image: cause: {PLANTED['gain'][2]}" in str(caught.value)
         assert f"; residual {verdict.diagnosis.residual:.3g}\n" in str(caught.value)
 
+    @pytest.mark.parametrize("cause", ["gain", "nan", "size"])
     def test_on_the_command_line(self, cause: str, tmp_path: Path) -> None:
         files = [
             str(write(tmp_path / f"{name}.exr", image.astype(np.float32), premultiplied=True))

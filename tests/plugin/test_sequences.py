@@ -136,16 +136,6 @@ def test_a_quarter_of_a_field_counts(share: float, failed: bool) -> None:
     assert flash(still, FPS, degrees=10).general is failed
 
 
-def test_frames_are_checked() -> None:
-    picture = np.zeros((4, 4, 3), np.uint8)
-    with pytest.raises(ValueError, match="a sequence has at least 2"):
-        flash([picture], FPS, degrees=40)
-    with pytest.raises(ValueError, match="all must be the same"):
-        flicker([picture, picture[:2]], FPS)
-    with pytest.raises(ValueError, match="is not"):
-        flash([picture[..., 0]] * 2, FPS, degrees=40)
-
-
 def test_contrast_at_each_frequency() -> None:
     found = flicker(frames(flashing(6, 0.06, "sine", seconds=1)), FPS)
     peak = int(found.contrast.argmax())

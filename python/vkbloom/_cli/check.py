@@ -237,10 +237,9 @@ def _measured(
         passes, device = measuring.pass_times(renderer, source, size), renderer.info.summary
     try:
         report = law_report(subject, LAWS, how["require"], lambda law: bar.update(f"{name}: {law}"))
-        bar.update(f"{name}: presets")
         settings = None if isinstance(source, str) else source
         about = {"name": name, "adapter": device, "size": size, "passes": passes}
-        return measuring.values_of(renderer, subject, report, settings, **about), report, subject
+        return measuring.values_of(subject, report, settings, **about), report, subject
     except AssertionError as error:
         raise click.ClickException(f"{name}: {error}") from error
 

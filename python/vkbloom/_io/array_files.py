@@ -112,10 +112,7 @@ def read(
     subimage = check_index("subimage", subimage, -(2**31), 2**31 - 1)
     check_expansion(expand)
     stored = image_reading.load(path, subimage, layer)
-    try:
-        picture = image_reading.decode(stored, expand=expand)
-    except ValueError as error:
-        raise ValueError(f"{os.fspath(path)}: {error}") from error
+    picture = image_reading.decode_file(stored, os.fspath(path), expand=expand)
     pixels = picture.pixels
     has_alpha = pixels.shape[2] == 4
     if has_alpha and picture.stored.associated is not premultiplied:

@@ -14,7 +14,14 @@ import numpy as np
 from vkbloom._checks import import_extra
 from vkbloom._io.alpha import Meaning, channels_of, divided, in_order, light_of, meaning_of
 from vkbloom._io.colour import LAB, linear
-from vkbloom._io.containers import HEIF_ADVICE, is_heif, orientation_of, padded, upright
+from vkbloom._io.containers import (
+    HEIF_ADVICE,
+    is_heif,
+    orientation_of,
+    padded,
+    png_gamma,
+    upright,
+)
 from vkbloom._io.displayed import has_hdr_curve, of_code_points
 from vkbloom._io.expansion import expanded
 from vkbloom._io.images import (
@@ -29,7 +36,6 @@ from vkbloom._io.images import (
     is_kept,
     warnings_of,
 )
-from vkbloom._io.png_gamma import png_gamma
 
 if TYPE_CHECKING:
     import OpenImageIO
@@ -332,13 +338,7 @@ def non_finite_note(nan: int, infinite: int) -> str | None:
     )
 
 
-def decode(
-    stored: StoredImage,
-    colour: Colour | None = None,
-    *,
-    expand: float | None = None,
-) -> Picture:
-    """Decode a stored image to a picture of linear values."""
+def _decoded(stored: StoredImage, colour: Colour | None, expand: float | None) -> Picture:
     chosen, left_out = _chosen_channels(stored.channels)
     values = stored.pixels[:, :, chosen]
     kinds = {stored.numbers[index] for index in chosen}
@@ -381,15 +381,11 @@ def decode(
 
 
 def decode_file(
-    stored: StoredImage,
-    file: str,
-    colour: Colour | None,
-    *,
-    expand: float | None = None,
+    stored: StoredImage, file: str, colour: Colour | None = None, *, expand: float | None = None
 ) -> Picture:
-    """Decode an image as `decode` does; a ValueError names the file."""
+    """Decode a stored image to a picture of linear values; a ValueError names the file."""
     try:
-        return decode(stored, colour, expand=expand)
+        return _decoded(stored, colour, expand)
     except ValueError as error:
         raise ValueError(f"{file}: {error}") from error
 

@@ -16,6 +16,8 @@ from vkbloom.testing._deviations import fail, is_within
 from vkbloom.testing._point_spread import border_share, check_inside
 from vkbloom.testing._probe import Bloom, Image, Probe
 
+__tracebackhide__ = True
+
 #: Limits of the figures of a moving light.
 LIMITS: Final = {"ripple": 0.02, "jitter": 0.1, "shimmer": 0.1, "growth": 0.05}
 # Side of the light in pixels.
@@ -125,7 +127,6 @@ def stability(
         With the figures `ripple` of the energy, `jitter` of the centroid, `flicker` and `shimmer`
         of the peak, and `growth` of the radius.
     """
-    __tracebackhide__ = True
     check_index("texel", texel, 1, 4096)
     check_number("steps", steps, 1e-3, 1e3)
     probe = probe or _wide(texel)
@@ -193,7 +194,6 @@ def assert_stable(
     texel, steps, probe
         As for `stability`. The image must be large enough that no light reaches the border.
     """
-    __tracebackhide__ = True
     limits = {"ripple": ripple, "jitter": jitter, "flicker": flicker, "growth": growth}
     for name, limit in limits.items():
         check_number(name, limit, 0.0, math.inf)
@@ -204,7 +204,6 @@ def assert_stable(
 
 def check_stable(figures: Stability, limits: Mapping[str, float], probe: Probe) -> None:
     """Raise AssertionError if a figure is above its limit, ValueError if light is cut off."""
-    __tracebackhide__ = True
     if not figures.energy.max() > 0:
         fail(
             "assert_stable",
