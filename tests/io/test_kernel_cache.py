@@ -11,7 +11,8 @@ import pytest
 
 from vkbloom import BlenderGlare, Convolution, Pyramid, psf
 from vkbloom import _array_cache as array_cache
-from vkbloom import _core_kernel as kernels
+from vkbloom._core_kernel import core_kernel
+from vkbloom.psf import _core_kernels as kernels
 
 SIZES = (8, 6), (8, 6)
 APERTURE = psf.aperture(psf.iris(size=16), f_number=2, pixel_pitch=8)
@@ -35,7 +36,7 @@ PADDED = np.pad(COLOURS, ((3, 0), (1, 2), (0, 0)))
     "values", [COLOURS, PADDED, COLOURS[..., 0], PADDED[..., 0], np.zeros((3, 2))]
 )
 def test_what_is_read_is_what_was_written(values: np.ndarray[Any, Any]) -> None:
-    made = kernels.core_kernel(values)
+    made = core_kernel(values)
     found = kernels._unpack(kernels._pack(made))
     assert np.array_equal(found.pixels, made.pixels)
     assert found[1:] == made[1:]
@@ -51,7 +52,7 @@ def test_methods_use_it(
     made = settings.core_kernel(*SIZES)
     (file,) = folder.iterdir()
     with monkeypatch.context() as patch:
-        patch.setattr(kernels, "core_kernel", lambda _: pytest.fail("made again"))
+        patch.setattr("vkbloom.psf._core_kernels.core_kernel", lambda _: pytest.fail("made again"))
         assert np.array_equal(settings.core_kernel(*SIZES).pixels, made.pixels)
     file.write_bytes(file.read_bytes()[:-1])
     assert np.array_equal(settings.core_kernel(*SIZES).pixels, made.pixels)
