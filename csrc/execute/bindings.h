@@ -5,15 +5,6 @@
 
 #include "graph/graph.h"
 
-// The descriptors after the parameter block.
-enum vkb_binding_kind {
-    VKB_BINDINGS_DRAW,           // images, each with a sampler
-    VKB_BINDINGS_DISPATCH,       // the same, and a storage image as the target
-    VKB_BINDINGS_LOAD,           // storage images, the target is one too
-    VKB_BINDINGS_LINEAR_TEXELS,  // linear texels, and the sizes of all images as push constants
-    VKB_BINDING_KINDS
-};
-
 // Push constants: the sizes of images that are accessed as linear texels (variants/pixels.glsl).
 struct vkb_linear_texels {
     int32_t target[4];  // width, height, words in a row, first row of the bound buffer
@@ -32,6 +23,9 @@ bool vkb_layouts_create(const struct vkb_device *device,
                         const VkDescriptorSetLayoutBinding *bindings, uint32_t count,
                         uint32_t constants, struct vkb_layouts *layouts, struct vkb_error *error);
 void vkb_layouts_destroy(const struct vkb_device *device, struct vkb_layouts *layouts);
+
+bool vkb_sampler_create(const struct vkb_device *device, VkFilter filter,
+                        VkSamplerAddressMode border, VkSampler *sampler, struct vkb_error *error);
 
 struct vkb_pass_layouts;
 
