@@ -217,8 +217,7 @@ static bool record_and_submit(struct vkb_run *run, struct vkb_request *requests,
             return false;
     // After all copies and stores to buffers.
     vkb_barrier_record(device, commands, NULL, true, VKB_ACCESS_RESOURCE, VKB_ACCESS_HOST_READ);
-    // Not earlier: the host records while CUDA copies the inputs.
-    return vkb_buffer_flush(device, &submission->uniforms, error) && vkb_exported_wait(run, error)
+    return vkb_buffer_flush(device, &submission->uniforms, error)
         && vkb_submission_submit(device, submission, &run->sync, error);
 }
 

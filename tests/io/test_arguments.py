@@ -42,10 +42,6 @@ class WithoutView(OnCuda):
 
     __array__ = None  # type: ignore[assignment]
 
-    @property
-    def __cuda_array_interface__(self) -> dict[str, Any]:
-        return {}
-
 
 def settings() -> Iterator[vkbloom.Settings]:
     pytest.fail("an iterator was consumed")
