@@ -459,51 +459,35 @@ static void begin_rendering(struct vkb_run *run, const struct vkb_pass_row *pass
     vk->vkCmdSetScissor(commands, 0, 1, &area);
 }
 
-static void add_timing(struct vkb_run *run, uint32_t first)
+// Records passes first..end-1, a dispatch or those of a render pass, with one timing. Within a
+// render pass, tiling devices and lavapipe do not keep the order of draws, so single draws cannot
+// be timed.
+static bool record_passes(struct vkb_run *run, uint32_t first, uint32_t end,
+                          struct vkb_error *error)
 {
+    struct vkb_device *device = run->device;
+    struct vkb_timer *timer = &run->submission->timer;
+    const struct vkb_pass_row *pass = &run->graph->passes[first];
+    const bool draws = pass->geometry != VKB_GEOMETRY_DISPATCH;
+    const VkCommandBuffer commands = run->submission->commands.buffer;
     struct vkb_timing *timing = &run->request->timings[run->request->timing_count++];
 
-    memcpy(timing->name, vkb_graph_timed_as(run->graph, first), sizeof timing->name);
-}
-
-static bool record_dispatch(struct vkb_run *run, uint32_t index, struct vkb_error *error)
-{
-    struct vkb_device *device = run->device;
-    struct vkb_submission *submission = run->submission;
-    const struct vkb_pass_row *pass = &run->graph->passes[index];
-    VkCommandBuffer commands = submission->commands.buffer;
-
     // The timer starts before the barriers, since lavapipe takes a timestamp at the next barrier.
-    vkb_timer_start(device, commands, &submission->timer);
-    transition_reads(run, index, index + 1);
-    vkb_image_transition(device, commands, &run->images[pass->targets[0]]->image,
-                         vkb_pass_in_place(pass) ? VKB_ACCESS_DISPATCH_CHANGED
-                                                 : VKB_ACCESS_DISPATCH_STORED);
-    if (!record_pass(run, index, error))
-        return false;
-    vkb_timer_stop(device, commands, &submission->timer);
-    add_timing(run, index);
-    return true;
-}
-
-// Records passes first..end-1 as one render pass with one timing. Within a render pass, tiling
-// devices and lavapipe do not keep the order of draws, so single draws cannot be timed.
-static bool record_render_pass(struct vkb_run *run, uint32_t first, uint32_t end,
-                               struct vkb_error *error)
-{
-    struct vkb_device *device = run->device;
-    struct vkb_submission *submission = run->submission;
-    const VkCommandBuffer commands = submission->commands.buffer;
-
-    vkb_timer_start(device, commands, &submission->timer);
+    vkb_timer_start(device, commands, timer);
     transition_reads(run, first, end);
-    begin_rendering(run, &run->graph->passes[first]);
+    if (draws)
+        begin_rendering(run, pass);
+    else
+        vkb_image_transition(device, commands, &run->images[pass->targets[0]]->image,
+                             vkb_pass_in_place(pass) ? VKB_ACCESS_DISPATCH_CHANGED
+                                                     : VKB_ACCESS_DISPATCH_STORED);
     for (uint32_t i = first; i < end; ++i)
         if (!record_pass(run, i, error))
             return false;
-    device->vk.vkCmdEndRendering(commands);
-    vkb_timer_stop(device, commands, &submission->timer);
-    add_timing(run, first);
+    if (draws)
+        device->vk.vkCmdEndRendering(commands);
+    vkb_timer_stop(device, commands, timer);
+    memcpy(timing->name, vkb_graph_timed_as(run->graph, first), sizeof timing->name);
     return true;
 }
 
@@ -530,9 +514,9 @@ bool vkb_record_group(void *context, uint32_t first, uint32_t end, struct vkb_er
         if (!load_resources(run, &run->graph->passes[i], error))
             return false;
     if (run->graph->passes[first].geometry != VKB_GEOMETRY_DISPATCH)
-        return record_render_pass(run, first, end, error);
+        return record_passes(run, first, end, error);
     for (uint32_t i = first; i < end; ++i)
-        if (!record_dispatch(run, i, error))
+        if (!record_passes(run, i, i + 1, error))
             return false;
     return true;
 }
