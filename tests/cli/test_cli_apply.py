@@ -12,6 +12,7 @@ from click.testing import CliRunner, Result
 from numpy.typing import NDArray
 
 import vkbloom
+from tests.images import lights
 from tests.io.profiles import store_png as png
 from vkbloom._cli.program import program
 from vkbloom._io.image_reading import load
@@ -23,16 +24,6 @@ oiio = pytest.importorskip("OpenImageIO")
 pytestmark = pytest.mark.usefixtures("kept_renderers")
 
 NATURAL = vkbloom.presets["bevy_natural"]
-
-
-def light(*shape: int, dtype: str = "float32") -> NDArray[Any]:
-    """Return a dark image with a few lights, which go above 1 in floats."""
-    generator = np.random.default_rng(11)
-    values = generator.random(shape) * 0.2
-    values[4:7, 6:9] = generator.random((3, 3, shape[2])) * (1 if dtype.startswith("u") else 6)
-    if dtype.startswith("u"):
-        return np.rint(values * np.iinfo(dtype).max).astype(dtype)
-    return values.astype(dtype)
 
 
 def run(*arguments: str | Path, adapter: str = "auto") -> Result:
@@ -85,7 +76,7 @@ class TestFormats:
     @pytest.mark.parametrize("dtype", ["float16", "float32"])
     @pytest.mark.parametrize("channels", [3, 4])
     def test_exr_stays_as_it_is(self, tmp_path: Path, dtype: str, channels: int) -> None:
-        image = light(20, 30, channels, dtype=dtype)
+        image = lights(30, 20, channels, dtype=dtype)
         image[:, :, 3:] = 1
         path = vkbloom.write(tmp_path / "a.exr", image)
         result = done(path, tmp_path / "b.exr")
@@ -100,7 +91,7 @@ class TestFormats:
     def test_8_bits_bloom_as_linear_floats(
         self, tmp_path: Path, suffix: str, channels: int
     ) -> None:
-        image = light(20, 30, channels, dtype="uint8")
+        image = lights(30, 20, channels, dtype="uint8")
         done(png(tmp_path / "a.png", image), tmp_path / f"b.{suffix}")
         written = pixels(tmp_path / f"b.{suffix}")
         assert written.dtype == np.uint8
@@ -125,7 +116,7 @@ class TestFormats:
 class TestColours:
     @pytest.mark.parametrize("encoding", ["srgb", "gamma22"])
     def test_an_encoding_is_the_only_one(self, tmp_path: Path, encoding: Any) -> None:
-        image = light(20, 30, 3)
+        image = lights(30, 20, 3)
         path = vkbloom.write(tmp_path / "a.exr", image)
         options = ("--tonemap", "reinhard", "--encoding", encoding)
         for name in ("b.exr", "b.png"):
@@ -135,7 +126,7 @@ class TestColours:
         assert np.abs(pixels(tmp_path / "b.png") - expected * 255.0).max() <= ROUNDING
 
     def test_settings_are_those_of_render(self, tmp_path: Path) -> None:
-        image = light(40, 30, 3)
+        image = lights(30, 40, 3)
         path = vkbloom.write(tmp_path / "a.exr", image)
         words = "--method pyramid --levels 3 --threshold 0.5 --knee 0.2 --intensity 0.5"
         done(path, tmp_path / "b.exr", *words.split())
@@ -148,7 +139,7 @@ class TestColours:
         assert np.array_equal(pixels(tmp_path / "c.exr"), applied(image, outline))
 
     def test_nan_and_infinity_are_told(self, tmp_path: Path) -> None:
-        image = light(20, 30, 3)
+        image = lights(30, 20, 3)
         image[0, 0], image[1, 1, 0] = np.nan, -np.inf
         path = vkbloom.write(tmp_path / "a.exr", image)
         result = run(path, tmp_path / "b.exr")
@@ -169,7 +160,7 @@ class TestColours:
 
 class TestFramebuffers:
     def test_all_are_beside_the_output(self, tmp_path: Path) -> None:
-        image = light(20, 30, 3, dtype="float16")
+        image = lights(30, 20, 3, dtype="float16")
         path = vkbloom.write(tmp_path / "a.exr", image)
         result = done(path, tmp_path / "b.exr", "--framebuffers", "all")
         with vkbloom.Renderer() as renderer:
@@ -184,13 +175,13 @@ class TestFramebuffers:
         assert len(written) == len(frames)
 
     def test_files_beside_a_png(self, tmp_path: Path) -> None:
-        path = png(tmp_path / "a.png", light(20, 30, 3, dtype="uint8"))
+        path = png(tmp_path / "a.png", lights(30, 20, 3, dtype="uint8"))
         done(path, tmp_path / "b.png", "--framebuffers", "bloom,final")
         assert {file.name for file in tmp_path.iterdir()} == {"a.png", "b.png", "b_bloom.exr"}
 
 
 def picture(path: Path) -> Path:
-    return png(path, light(16, 24, 3, dtype="uint8"))
+    return png(path, lights(24, 16, 3, dtype="uint8"))
 
 
 def test_a_file_that_is_read_needs_overwrite(tmp_path: Path) -> None:

@@ -130,15 +130,8 @@ class TestCommand:
         assert found["max_error"] == 1 / 255
         assert found["max_error_at"] == [7, 3, 2]
         assert len(found["max_error_values"]) == 2
-        fields = set(Comparison.__dataclass_fields__)
-        assert found.keys() == fields | {
-            "a",
-            "b",
-            "passed",
-            "failures",
-            "identical",
-            "diff_scale",
-        } | {"diagnosis"}
+        more = {"a", "b", "passed", "failures", "identical", "diff_scale", "diagnosis"}
+        assert found.keys() == {*Comparison.__dataclass_fields__} | more
 
     def test_json_has_no_infinity(self, files: dict[str, Path]) -> None:
         found = json.loads(

@@ -11,6 +11,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 import vkbloom
+from tests.framebuffers import names_in
 from tests.io.profiles import store_png
 from tests.processes import python
 from vkbloom._cli.program import program
@@ -27,10 +28,6 @@ def run(*words: object) -> Result:
         # Files of integers start from the preset photo: see test_cli_photo.py.
         given += ["--preset", "bevy_natural", "--composite", "add"]
     return CliRunner().invoke(program, ["apply", *given])
-
-
-def names(folder: Path) -> list[str]:
-    return sorted(path.name for path in folder.iterdir())
 
 
 @pytest.fixture
@@ -64,7 +61,7 @@ class TestSequences:
         result = run(".", "out/")
         assert result.exit_code == 0
         assert result.stderr == "vkbloom: note: .: left out what is no image: notes.txt\n"
-        assert names(frames / "out") == [f"f.{n:04d}.png" for n in range(8, 12)]
+        assert names_in(frames / "out") == [f"f.{n:04d}.png" for n in range(8, 12)]
 
     @pytest.mark.parametrize("which", [(8,), (9, 10), (11,), (8, 9, 10, 11)])
     def test_the_other_images_are_done(self, frames: Path, which: tuple[int, ...]) -> None:
@@ -78,7 +75,7 @@ class TestSequences:
         ]
         assert last == f"vkbloom: {len(which)} of 4 images failed"
         done = [f"g.{number:04d}.png" for number in range(8, 12) if number not in which]
-        assert [name for name in names(frames) if name[0] == "g"] == done
+        assert [name for name in names_in(frames) if name[0] == "g"] == done
 
     @pytest.mark.parametrize("words", [("--mask", "m.png"), ("--alpha", "max")])
     def test_an_image_that_options_do_not_fit(self, frames: Path, words: tuple[str, ...]) -> None:
@@ -93,7 +90,7 @@ class TestSequences:
         result = run("f.0008.png", "b.exr", "f.0009.png", "out", *words)
         assert result.exit_code == 1
         assert result.stderr.endswith(f"vkbloom: {len(wrong)} of 3 images failed\n")
-        assert names(frames / "out") == sorted(right)
+        assert names_in(frames / "out") == sorted(right)
 
     def test_a_target_that_cannot_be_written(self, frames: Path) -> None:
         (frames / "g.0009.png").mkdir()

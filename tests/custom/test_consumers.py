@@ -35,29 +35,22 @@ BLUR = """\
 //!TYPE ENUM int
 gauss
 box
-//!HOOK MAIN
-//!BIND GLOW
-//!SAVE ROWS
-vec4 hook() {
-    vec4 sum = vec4(0.0), total = vec4(0.0);
-    for (int i = -8; i <= 8; i++) {
-        float w = shape == box ? 1.0 : exp(-0.5 * float(i * i) / (spread * spread));
-        sum += w * GLOW_texOff(vec2(i, 0)), total += w;
-    }
-    return sum / total;
-}
-//!HOOK MAIN
-//!BIND ROWS
-//!SAVE BLOOM
-vec4 hook() {
-    vec4 sum = vec4(0.0), total = vec4(0.0);
-    for (int i = -8; i <= 8; i++) {
-        float w = shape == box ? 1.0 : exp(-0.5 * float(i * i) / (spread * spread));
-        sum += w * ROWS_texOff(vec2(0, i)), total += w;
-    }
-    return sum / total;
-}
 """
+PASS = """\
+//!HOOK MAIN
+//!BIND {source}
+//!SAVE {target}
+vec4 hook() {{
+    vec4 sum = vec4(0.0), total = vec4(0.0);
+    for (int i = -8; i <= 8; i++) {{
+        float w = shape == box ? 1.0 : exp(-0.5 * float(i * i) / (spread * spread));
+        sum += w * {source}_texOff(vec2({along})), total += w;
+    }}
+    return sum / total;
+}}
+"""
+BLUR += PASS.format(source="GLOW", target="ROWS", along="i, 0")
+BLUR += PASS.format(source="ROWS", target="BLOOM", along="0, i")
 
 
 @pytest.fixture

@@ -218,12 +218,6 @@ def test_a_method_is_registered_and_stored() -> None:
     METHODS.unregister("stored_one")
 
 
-def test_values_of_parameters() -> None:
-    kind: Any = load_method(PARAMETERS + COPY, name="tried")
-    assert kind(mode="hard").mode == "hard"
-    assert kind(mode=1) == kind(mode="hard")
-
-
 def test_a_param_can_be_the_setting_of_the_reference_white(renderer: Renderer) -> None:
     text = "//!PARAM reference_white\n//!TYPE float\n//!MINIMUM 0\n//!MAXIMUM 1000\n100\n"
     settings = own(text + COPY.replace("return", "return 0.01 * reference_white *"))

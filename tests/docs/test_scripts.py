@@ -23,7 +23,6 @@ import pytest
 import vkbloom
 from tests.docs.pages import ROOT
 from tests.exhaustive import witness
-from tests.processes import output
 
 #: The arguments of a script, in a folder with `photo.exr`; a module that it cannot do without.
 RUN: Final[dict[str, tuple[str, str]]] = {
@@ -48,7 +47,7 @@ LONG: Final = ("tools/tables/write.py",)
 #: What is run elsewhere, by its path or folder, and where: a test, a target of make.
 ELSEWHERE: Final = {
     "benchmarks/": "tests/bench/test_bench.py",
-    "examples/cluster/": "tests/docs/test_scripts.py",
+    "examples/cluster/": "tools/cluster/run.py",
     "examples/image_quality/": "tests/plugin/test_guide.py",
     "examples/custom_methods/": "tests/custom/test_rendering.py",
     "examples/training_pairs.py": "tests/device/test_training_pairs.py",
@@ -142,25 +141,6 @@ def test_shell_scripts_parse() -> None:
     for name in listed("tools", "examples", "packaging", ".ci"):
         if not name.endswith(".py"):
             subprocess.run(["bash", "-n", ROOT / name], check=True)
-
-
-# The scripts in examples/cluster: that of one machine runs as it stands there.
-
-
-FOLDER = Path(__file__).resolve().parents[2] / "examples" / "cluster"
-
-
-@witness("its workers take 10 s; tests/grid/test_grid_cluster.py runs grids on such a cluster")
-def test_on_this_machine(tmp_path: Path) -> None:
-    pytest.importorskip("distributed")
-    xarray = pytest.importorskip("xarray")
-    for script in FOLDER.glob("*.py"):
-        shutil.copy(script, tmp_path)
-    package = str(Path(vkbloom.__file__).parents[1])
-    output("on_this_machine.py", cwd=tmp_path, PYTHONPATH=package)
-    with xarray.open_zarr(tmp_path / "local.zarr", consolidated=False) as stored:
-        assert stored["final"].shape == (8, 4, 90, 160, 3)
-        assert bool(stored["done"].all())
 
 
 # The examples in docstrings run as written.

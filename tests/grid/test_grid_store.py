@@ -103,14 +103,6 @@ class TestWhole:
             assert found[name].attrs == expected[name].attrs
         assert found["done"].values.all()
 
-    def test_xarray_reads_it_lazily(self, undisturbed: Path, renderer: Renderer) -> None:
-        final = xr.open_zarr(undisturbed)["final"]
-        assert final.chunks[0] == (3,)
-        chosen = final.sel(blur_scale=1.1, method="nearest").isel(exposure=2, threshold=1)
-        assert chosen.chunks is not None
-        expected = renderer.apply(source(), Separable(exposure=2, threshold=0.5))["final"]
-        np.testing.assert_array_equal(chosen.compute().values, expected)
-
     def test_passes_are_counted_per_call(self, copy: Path) -> None:
         again = make(copy)
         assert again.attrs["passes_run"] == 0

@@ -288,7 +288,7 @@ class TestWrite:
     @pytest.mark.parametrize("channels", [0, 1, 2, 3, 4])
     def test_integers_stay(self, tmp_path: Path, dtype: str, channels: int) -> None:
         pixels = levels(*((5, 7, channels) if channels else (5, 7)), dtype=dtype)
-        for name in ("b.png", "b.tif"):
+        for name in ("b.PNG", "b.tif"):
             plain = oiio.ImageSpec()
             plain.attribute("oiio:UnassociatedAlpha", 1)
             path = str(vkbloom.write(tmp_path / name, pixels))

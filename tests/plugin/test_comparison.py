@@ -56,15 +56,6 @@ class TestFigures:
         (reason,) = reasons(found)
         assert " % of the pixels differ; largest difference " in reason
 
-    def test_pixels_over_a_threshold(self) -> None:
-        a = np.zeros((10, 10, 3), np.float32)
-        b = a.copy()
-        b[0, :, :] = 0.25
-        b[1, :5, 1] = 0.5
-        assert compare(a, b).percent_over == 15
-        assert compare(a, b, threshold=0.25).percent_over == 5
-        assert compare(a, b, threshold=0.5).percent_over == 0
-
     @pytest.mark.parametrize(("dtype", "largest"), [("uint8", 255), ("uint16", 65535)])
     def test_steps_of_integers_are_exact(self, dtype: str, largest: int) -> None:
         a = np.repeat(np.arange(largest, dtype=dtype)[:, None], 8, axis=1)

@@ -24,7 +24,7 @@ import vkbloom
 
 NODES = ("node1", "node2")
 CORES = 4  # of each node, as the scripts ask for
-LOCAL = "from workload import render; render(None, 'local.zarr')"
+LOCAL = "from workload import render; render(None, 'alone.zarr')"
 
 
 @contextmanager
@@ -140,12 +140,14 @@ def main() -> None:
     # The number of parts sets the chunks, which must be equal.
     script = Path("parts.sbatch").read_text().replace("$SLURM_ARRAY_TASK_ID/16", "$part/16")
     script = script.replace("parts.zarr", "whole.zarr")
-    timed("local", sys.executable, "-c", LOCAL)
+    timed("whole", sys.executable, "-c", LOCAL)
+    timed("two workers", sys.executable, "on_this_machine.py")
+    compare("local.zarr", "alone.zarr")
     parts = f"SLURM_CPUS_PER_TASK=4; for part in $(seq 16); do\n{script}\ndone"
     timed("parts, local", "sh", "-c", parts)
     with slurm(work / "slurm.daemons"):
         timed("slurm", sys.executable, "on_slurm.py")
-        compare("slurm.zarr", "local.zarr")
+        compare("slurm.zarr", "alone.zarr")
         timed("job array", "sbatch", "--wait", "--array=1-16", "parts.sbatch")
         compare("parts.zarr", "whole.zarr")
 
