@@ -2,15 +2,6 @@
 
 #include <string.h>
 
-// The layouts for passes with these descriptors after the parameters.
-struct vkb_pass_layouts {
-    bool draw;
-    enum vkb_reading reading;
-    VkDescriptorType descriptors[VKB_MAX_DESCRIPTORS];
-    uint32_t count;
-    struct vkb_layouts made;
-};
-
 bool vkb_sampler_create(const struct vkb_device *device, VkFilter filter,
                         VkSamplerAddressMode border, VkSampler *sampler, struct vkb_error *error)
 {
@@ -122,53 +113,40 @@ uint32_t vkb_pass_descriptor_images(const struct vkb_pass_row *pass)
     return pass->textured ? 2 : pass->geometry == VKB_GEOMETRY_SKYBOX ? 1 : pass->read_count;
 }
 
-struct vkb_binding_types vkb_pass_binding_types(const struct vkb_pass_row *pass)
-{
-    // By enum vkb_reading.
-    static const struct vkb_binding_types types[] = {
-        [VKB_READING_SAMPLED] = {VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER,
-                                 VK_DESCRIPTOR_TYPE_STORAGE_IMAGE},
-        [VKB_READING_LOADED] = {VK_DESCRIPTOR_TYPE_STORAGE_IMAGE, VK_DESCRIPTOR_TYPE_STORAGE_IMAGE},
-        [VKB_READING_LINEAR_TEXELS] = {VK_DESCRIPTOR_TYPE_UNIFORM_TEXEL_BUFFER,
-                                       VK_DESCRIPTOR_TYPE_STORAGE_BUFFER},
-    };
-
-    return types[pass->reading];
-}
-
 VkPipelineBindPoint vkb_pass_bind_point(const struct vkb_pass_row *pass)
 {
     return pass->geometry == VKB_GEOMETRY_DISPATCH ? VK_PIPELINE_BIND_POINT_COMPUTE
                                                    : VK_PIPELINE_BIND_POINT_GRAPHICS;
 }
 
-VkDescriptorType vkb_resource_descriptor(const struct vkb_resource *resource)
+// The descriptors after the parameters: the images read, the resources, the target of a dispatch.
+static struct vkb_pass_layouts described(const struct vkb_pass_row *pass)
 {
-    static const VkDescriptorType types[VKB_RESOURCE_KINDS] = {
+    // Of the images read and of the target.
+    static const VkDescriptorType types[][2] = {
+        [VKB_READING_SAMPLED] = {VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER,
+                                 VK_DESCRIPTOR_TYPE_STORAGE_IMAGE},
+        [VKB_READING_LOADED] = {VK_DESCRIPTOR_TYPE_STORAGE_IMAGE, VK_DESCRIPTOR_TYPE_STORAGE_IMAGE},
+        [VKB_READING_LINEAR_TEXELS] = {VK_DESCRIPTOR_TYPE_UNIFORM_TEXEL_BUFFER,
+                                       VK_DESCRIPTOR_TYPE_STORAGE_BUFFER},
+    };
+    static const VkDescriptorType resource_types[VKB_RESOURCE_KINDS] = {
         [VKB_RESOURCE_TEXTURE] = VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER,
         [VKB_RESOURCE_IMAGE] = VK_DESCRIPTOR_TYPE_STORAGE_IMAGE,
         [VKB_RESOURCE_UNIFORM] = VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER,
         [VKB_RESOURCE_STORAGE] = VK_DESCRIPTOR_TYPE_STORAGE_BUFFER,
     };
-
-    return types[resource->kind];
-}
-
-// The descriptors after the parameters.
-static struct vkb_pass_layouts described(const struct vkb_pass_row *pass)
-{
     struct vkb_pass_layouts layouts = {
         .draw = pass->geometry != VKB_GEOMETRY_DISPATCH,
         .reading = pass->reading,
     };
-    const struct vkb_binding_types types = vkb_pass_binding_types(pass);
 
     while (layouts.count < vkb_pass_descriptor_images(pass))
-        layouts.descriptors[layouts.count++] = types.read;
+        layouts.descriptors[layouts.count++] = types[pass->reading][0];
     for (uint32_t i = 0; i < pass->resource_count; ++i)
-        layouts.descriptors[layouts.count++] = vkb_resource_descriptor(pass->resources[i]);
+        layouts.descriptors[layouts.count++] = resource_types[pass->resources[i]->kind];
     if (!layouts.draw)
-        layouts.descriptors[layouts.count++] = types.target;
+        layouts.descriptors[layouts.count++] = types[pass->reading][1];
     return layouts;
 }
 
@@ -207,10 +185,10 @@ bool vkb_bindings_prepare(const struct vkb_device *device, struct vkb_bindings *
     return true;
 }
 
-const struct vkb_layouts *vkb_bindings_layouts(const struct vkb_bindings *bindings,
-                                               const struct vkb_pass_row *pass)
+const struct vkb_pass_layouts *vkb_bindings_layouts(const struct vkb_bindings *bindings,
+                                                    const struct vkb_pass_row *pass)
 {
     const struct vkb_pass_layouts layouts = described(pass);
 
-    return &bindings->layouts[find_layouts(bindings, &layouts)].made;
+    return &bindings->layouts[find_layouts(bindings, &layouts)];
 }

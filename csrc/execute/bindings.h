@@ -27,7 +27,14 @@ void vkb_layouts_destroy(const struct vkb_device *device, struct vkb_layouts *la
 bool vkb_sampler_create(const struct vkb_device *device, VkFilter filter,
                         VkSamplerAddressMode border, VkSampler *sampler, struct vkb_error *error);
 
-struct vkb_pass_layouts;
+// The layouts for passes with these descriptors after the parameters.
+struct vkb_pass_layouts {
+    bool draw;
+    enum vkb_reading reading;
+    VkDescriptorType descriptors[VKB_MAX_DESCRIPTORS];
+    uint32_t count;
+    struct vkb_layouts made;
+};
 
 struct vkb_bindings {
     VkSampler filter, nearest;
@@ -48,22 +55,14 @@ bool vkb_bindings_prepare(const struct vkb_device *device, struct vkb_bindings *
                           const struct vkb_pass_row *pass, uint32_t *number,
                           struct vkb_error *error);
 
-VkDescriptorType vkb_resource_descriptor(const struct vkb_resource *resource);
-
 // The number of images that the pass reads through descriptors, with the scene's cubemap or
 // textures.
 uint32_t vkb_pass_descriptor_images(const struct vkb_pass_row *pass);
 
-// The types of the descriptors of the images that the pass reads, and of its target.
-struct vkb_binding_types {
-    VkDescriptorType read, target;
-};
-struct vkb_binding_types vkb_pass_binding_types(const struct vkb_pass_row *pass);
-
 VkPipelineBindPoint vkb_pass_bind_point(const struct vkb_pass_row *pass);
 
 // The layouts of a pass that vkb_bindings_prepare has made.
-const struct vkb_layouts *vkb_bindings_layouts(const struct vkb_bindings *bindings,
-                                               const struct vkb_pass_row *pass);
+const struct vkb_pass_layouts *vkb_bindings_layouts(const struct vkb_bindings *bindings,
+                                                    const struct vkb_pass_row *pass);
 
 #endif

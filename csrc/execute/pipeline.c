@@ -283,7 +283,7 @@ static bool create_graphics(const struct vkb_device *device, const struct vkb_pi
                         .pAttachments = blends,
                     },
                 .pDynamicState = &dynamic_viewport,
-                .layout = vkb_bindings_layouts(&pipelines->bindings, pass)->pipeline,
+                .layout = vkb_bindings_layouts(&pipelines->bindings, pass)->made.pipeline,
             },
             NULL, pipeline));
 }
@@ -297,7 +297,7 @@ static bool create_pipeline(const struct vkb_device *device, const struct vkb_pi
 
     if (pass->geometry == VKB_GEOMETRY_DISPATCH)
         return vkb_compute_create(device, pipelines->cache, pass->shader, &pass->constants,
-                                  vkb_bindings_layouts(&pipelines->bindings, pass)->pipeline,
+                                  vkb_bindings_layouts(&pipelines->bindings, pass)->made.pipeline,
                                   pipeline, error);
     const bool done = create_module(device, pass->vertex, &modules[0], error)
                    && create_module(device, pass->shader, &modules[1], error)

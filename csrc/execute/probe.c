@@ -51,8 +51,6 @@ static bool fetch(struct vkb_run *run, enum vkb_format format, const void *value
         .format = format,
         .width = TEXELS,
         .height = 1,
-        .layers = 1,
-        .levels = 1,
         .usage = vkb_access_usage(VKB_ACCESS_COPY_TARGET)
                | vkb_access_usage(VKB_ACCESS_DISPATCH_SAMPLED),
     };

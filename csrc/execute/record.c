@@ -74,7 +74,6 @@ static void write_resource(const struct vkb_run *run, const struct vkb_resource 
     *image = (VkDescriptorImageInfo){entry->sampler, entry->image.view, VK_IMAGE_LAYOUT_GENERAL};
     *buffer = (VkDescriptorBufferInfo){.buffer = entry->buffer.handle, .range = VK_WHOLE_SIZE};
     *write = (VkWriteDescriptorSet){
-        .descriptorType = vkb_resource_descriptor(resource),
         .pImageInfo = image,
         .pBufferInfo = buffer,
     };
@@ -89,7 +88,6 @@ static bool write_read(struct vkb_run *run, const struct binding *binding, uint3
 
     *write = (VkWriteDescriptorSet){
         .dstBinding = i + 1,
-        .descriptorType = vkb_pass_binding_types(pass).read,
         .pImageInfo = info,
     };
     if (pass->reading != VKB_READING_LINEAR_TEXELS)
@@ -101,7 +99,8 @@ static bool write_read(struct vkb_run *run, const struct binding *binding, uint3
 
 // Fills the set with the parameters, the images read, the resources and the target of a dispatch.
 static bool write_descriptors(struct vkb_run *run, const struct binding *binding,
-                              VkDescriptorSet set, struct vkb_error *error)
+                              const struct vkb_pass_layouts *layouts, VkDescriptorSet set,
+                              struct vkb_error *error)
 {
     const struct vkb_pass_row *pass = binding->pass;
     const uint32_t image_count = vkb_pass_descriptor_images(pass);
@@ -115,10 +114,7 @@ static bool write_descriptors(struct vkb_run *run, const struct binding *binding
         .range = vkb_block_sizes[pass->block],
     };
     if (pass->block != VKB_BLOCK_NONE)
-        writes[write_count++] = (VkWriteDescriptorSet){
-            .descriptorType = VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER,
-            .pBufferInfo = &params,
-        };
+        writes[write_count++] = (VkWriteDescriptorSet){.pBufferInfo = &params};
     for (uint32_t i = 0; i < image_count; ++i)
         if (!write_read(run, binding, i, &images[i], &writes[write_count++], error))
             return false;
@@ -136,7 +132,6 @@ static bool write_descriptors(struct vkb_run *run, const struct binding *binding
         };
         writes[write_count++] = (VkWriteDescriptorSet){
             .dstBinding = last + 1,
-            .descriptorType = vkb_pass_binding_types(pass).target,
             .pImageInfo = &images[last],
             .pBufferInfo = binding->band ? &binding->band->buffer : NULL,
         };
@@ -145,6 +140,9 @@ static bool write_descriptors(struct vkb_run *run, const struct binding *binding
         writes[i].sType = VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET;
         writes[i].dstSet = set;
         writes[i].descriptorCount = 1;
+        writes[i].descriptorType = writes[i].dstBinding
+                                     ? layouts->descriptors[writes[i].dstBinding - 1]
+                                     : VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER;
     }
     run->device->vk.vkUpdateDescriptorSets(run->device->handle, write_count, writes, 0, NULL);
     return true;
@@ -155,8 +153,8 @@ static bool bind_descriptors(struct vkb_run *run, const struct binding *binding,
 {
     const struct vkb_pass_row *pass = binding->pass;
     const struct VolkDeviceTable *vk = &run->device->vk;
-    const struct vkb_bindings *bindings = &run->frame->pipelines.bindings;
-    const struct vkb_layouts *layouts = vkb_bindings_layouts(bindings, pass);
+    const struct vkb_pass_layouts *layouts =
+        vkb_bindings_layouts(&run->frame->pipelines.bindings, pass);
     VkDescriptorSet set;
 
     if (!VK(error, vk->vkAllocateDescriptorSets(
@@ -165,13 +163,13 @@ static bool bind_descriptors(struct vkb_run *run, const struct binding *binding,
                            .sType = VK_STRUCTURE_TYPE_DESCRIPTOR_SET_ALLOCATE_INFO,
                            .descriptorPool = run->submission->descriptors,
                            .descriptorSetCount = 1,
-                           .pSetLayouts = &layouts->set,
+                           .pSetLayouts = &layouts->made.set,
                        },
                        &set))
-        || !write_descriptors(run, binding, set, error))
+        || !write_descriptors(run, binding, layouts, set, error))
         return false;
     vk->vkCmdBindDescriptorSets(run->submission->commands.buffer, vkb_pass_bind_point(pass),
-                                layouts->pipeline, 0, 1, &set, 0, NULL);
+                                layouts->made.pipeline, 0, 1, &set, 0, NULL);
     return true;
 }
 
@@ -294,7 +292,7 @@ static void push_linear_texels(const struct vkb_run *run, const struct vkb_pass_
     }
     run->device->vk.vkCmdPushConstants(
         run->submission->commands.buffer,
-        vkb_bindings_layouts(&run->frame->pipelines.bindings, pass)->pipeline,
+        vkb_bindings_layouts(&run->frame->pipelines.bindings, pass)->made.pipeline,
         VK_SHADER_STAGE_COMPUTE_BIT, 0, sizeof shapes, &shapes);
 }
 

@@ -64,8 +64,6 @@ static bool create_image(const struct vkb_device *device, const struct vkb_resou
         .width = resource->width,
         .height = resource->height,
         .depth = resource->depth,
-        .layers = 1,
-        .levels = 1,
         .usage = VK_IMAGE_USAGE_TRANSFER_DST_BIT
                | (stored ? VK_IMAGE_USAGE_STORAGE_BIT : VK_IMAGE_USAGE_SAMPLED_BIT),
     };

@@ -341,12 +341,12 @@ static bool create_handle(const struct vkb_device *device, const struct vkb_imag
             &(VkImageCreateInfo){
                 .sType = VK_STRUCTURE_TYPE_IMAGE_CREATE_INFO,
                 .flags =
-                    spec->layers == 6 && !spec->array ? VK_IMAGE_CREATE_CUBE_COMPATIBLE_BIT : 0,
+                    image->layers == 6 && !spec->array ? VK_IMAGE_CREATE_CUBE_COMPATIBLE_BIT : 0,
                 .imageType = image_type(spec),
                 .format = format_of(spec),
                 .extent = {spec->width, spec->height, image->depth},
-                .mipLevels = spec->levels,
-                .arrayLayers = spec->layers,
+                .mipLevels = image->levels,
+                .arrayLayers = image->layers,
                 .samples = VK_SAMPLE_COUNT_1_BIT,
                 .tiling = spec->mapped ? VK_IMAGE_TILING_LINEAR : VK_IMAGE_TILING_OPTIMAL,
                 .usage = spec->usage,
@@ -527,8 +527,8 @@ bool vkb_image_create(const struct vkb_device *device, const struct vkb_image_sp
         .width = spec->width,
         .height = spec->height,
         .depth = spec->dimensions ? spec->depth : 1,
-        .layers = spec->layers,
-        .levels = spec->levels,
+        .layers = spec->layers ? spec->layers : 1,
+        .levels = spec->levels ? spec->levels : 1,
         .usage = spec->usage,
         .array = spec->array,
         .channels = vkb_formats[spec->format].channels,
@@ -541,8 +541,8 @@ bool vkb_image_create(const struct vkb_device *device, const struct vkb_image_sp
                           &requirements, NULL, &image->memory, &flags, error)
         || !VK(error, vk->vkBindImageMemory(device->handle, image->handle, image->memory, 0))
         || (spec->mapped && !map_image(device, image, error))
-        || ((spec->layers == 1 || spec->array) && (spec->usage & VIEWED)
-            && !create_view(device, image, type, format_of(spec), spec->levels, &image->view,
+        || ((image->layers == 1 || spec->array) && (spec->usage & VIEWED)
+            && !create_view(device, image, type, format_of(spec), image->levels, &image->view,
                             error))) {
         vkb_image_destroy(device, image);
         return false;

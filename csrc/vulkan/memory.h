@@ -41,7 +41,8 @@ struct vkb_image {
     VkBufferView linear_texels;  // created at its first use
 };
 
-// Six layers make a cubemap, unless it is an array. A mapped image has one layer and one level, and
+// Without numbers of layers and levels there is one. Six layers make a cubemap, unless it is an
+// array. A mapped image has one layer and one level, and
 // its memory is also a buffer; this requires device->linear_texels.
 struct vkb_image_spec {
     enum vkb_format format;
