@@ -15,6 +15,7 @@ from vkbloom._cli.compare import tolerances_of
 from vkbloom._io.srgb import decode_srgb
 from vkbloom._views.comparison import Comparison, compare, difference, flip_map
 from vkbloom._views.tolerances import Tolerances, failures
+from vkbloom.testing import diagnose
 
 oiio = pytest.importorskip("OpenImageIO")
 metrics = pytest.importorskip("skimage.metrics")
@@ -327,7 +328,7 @@ class TestTolerances:
 
 @pytest.mark.parametrize(("call", "error"), rows(__file__, "comparisons"))
 def test_a_wrong_value_is_refused(call: str, error: str) -> None:
-    assert_refused(call, error, globals())
+    assert_refused(call, error, {**globals(), "diagnose": diagnose})
 
 
 class TestDifference:
