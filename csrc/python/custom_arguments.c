@@ -40,15 +40,17 @@ static bool read_resource(PyObject *tuple, struct vkb_resource *resource)
     return data == Py_None || resource->data;
 }
 
-// (block, name of the shader, its SPIR-V, its hash, (resource, ...))
+// (block, name of the shader, its SPIR-V, its hash, its threads along x and y, its bytes of shared
+// memory, (resource, ...))
 static bool read_pass(PyObject *tuple, struct vkb_pass_content *content,
                       struct vkb_custom_pass *pass)
 {
     struct vkb_shader *shader = &content->shader;
     PyObject *block, *code, *hash, *resources;
 
-    if (!PyArg_ParseTuple(tuple, "SsSSO!:core_passes", &block, &shader->name, &code, &hash,
-                          &PyTuple_Type, &resources)
+    if (!PyArg_ParseTuple(tuple, "SsSSIIIO!:core_passes", &block, &shader->name, &code, &hash,
+                          &shader->threads[0], &shader->threads[1], &shader->shared, &PyTuple_Type,
+                          &resources)
         || !copy_block(block, pass, PASS_SIZE)
         || !copy_block(hash, shader->hash.bytes, sizeof shader->hash.bytes))
         return false;

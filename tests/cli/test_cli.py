@@ -346,16 +346,6 @@ def test_render_without_bloom_says_so(tmp_path: Path) -> None:
     assert vkb("render", "-o", tmp_path / "a.png", *SMALL).stderr == ""
 
 
-@pytest.mark.parametrize("words", ["render -o out.exr --size 16x16", "apply a.png out.exr"])
-def test_validation_is_handed_on(tmp_path: Path, words: str) -> None:
-    vkbloom.write(tmp_path / "a.png", np.zeros((8, 8, 3), np.uint8))
-    # In a new process, since an existing instance keeps its layers.
-    command = ("-m", "vkbloom._cli", *words.split(), "--validation")
-    ended = python(*command, cwd=tmp_path, VK_LAYER_PATH=str(tmp_path))
-    assert ended.returncode == 1
-    assert "validation" in one_line(ended.stderr)
-
-
 # adapters
 
 

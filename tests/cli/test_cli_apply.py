@@ -158,28 +158,6 @@ class TestColours:
         assert (pixels(tmp_path / "b.png")[0, 0] == 0).all()
 
 
-class TestFramebuffers:
-    def test_all_are_beside_the_output(self, tmp_path: Path) -> None:
-        image = lights(30, 20, 3, dtype="float16")
-        path = vkbloom.write(tmp_path / "a.exr", image)
-        result = done(path, tmp_path / "b.exr", "--framebuffers", "all")
-        with vkbloom.Renderer() as renderer:
-            frames = renderer.apply(image, NATURAL)
-        others = [name for name in frames if name != "final"]
-        assert sorted(file.name for file in tmp_path.iterdir()) == sorted(
-            ["a.exr", "b.exr", *(f"b_{name}.exr" for name in others)]
-        )
-        for name in others:
-            assert np.array_equal(pixels(tmp_path / f"b_{name}.exr"), frames[name])
-        written = [line for line in result.stdout.splitlines() if line.startswith("wrote ")]
-        assert len(written) == len(frames)
-
-    def test_files_beside_a_png(self, tmp_path: Path) -> None:
-        path = png(tmp_path / "a.png", lights(30, 20, 3, dtype="uint8"))
-        done(path, tmp_path / "b.png", "--framebuffers", "bloom,final")
-        assert {file.name for file in tmp_path.iterdir()} == {"a.png", "b.png", "b_bloom.exr"}
-
-
 def picture(path: Path) -> Path:
     return png(path, lights(24, 16, 3, dtype="uint8"))
 

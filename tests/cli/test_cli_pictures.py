@@ -97,16 +97,6 @@ class TestSequences:
         assert result.stderr.endswith("g.0009.png: Is a directory\nvkbloom: 1 of 4 images failed\n")
         assert (frames / "g.0011.png").is_file()
 
-    def test_existing_images_are_skipped(self, frames: Path) -> None:
-        for number in (8, 10):
-            (frames / f"g.{number:04d}.png").write_bytes(b"before")
-        result = run("f.%04d.png", "g.%04d.png", "--skip-existing")
-        assert result.exit_code == 0
-        assert "skipped 2 of 4 images" in result.stdout
-        assert (frames / "g.0010.png").read_bytes() == b"before"
-        assert vkbloom.read(frames / "g.0011.png").shape == IMAGE.shape
-        assert run("f.%04d.png", "g.%04d.png", "--skip-existing").exit_code == 0
-
     @pytest.mark.parametrize("order", ["exr first", "png first", "between"])
     def test_each_file_starts_from_its_own_preset(self, frames: Path, order: str) -> None:
         values = np.random.default_rng(0).random((5, 7, 3)).astype(np.float32) ** 8 * 3

@@ -19,7 +19,6 @@ from tests.images import noise_image
 from tests.io.parts import written
 from tests.refusals import assert_matches, rows
 from vkbloom._cli import listing
-from vkbloom._cli import presets as presets_command
 from vkbloom._cli.program import program
 from vkbloom._settings.registry import STAGES
 from vkbloom.psf._base import functions
@@ -136,7 +135,7 @@ def test_errors_are_one_line_and_leave_nothing(words: str, error: str) -> None:
 
 
 NAMES = {
-    "presets": [entry["name"] for entry in presets_command.entries()],
+    "presets": [entry["name"] for entry in listing.preset_entries()],
     "glares": [*STAGES, *vkbloom.glares],
     "psfs": list(functions()),
 }
@@ -167,7 +166,7 @@ def test_presets_are_grouped_by_engine() -> None:
 def test_a_narrow_terminal_cuts_the_last_columns() -> None:
     printed = io.StringIO()
     console = Console(width=80, file=printed, force_terminal=True, color_system=None)
-    entries = list(presets_command.entries())
+    entries = list(listing.preset_entries())
     console.print(listing._table(entries))
     lines = [line.split() for line in printed.getvalue().splitlines() if line.strip()]
     rows = [words for words in lines[2:] if not words[-1].endswith(":")]
@@ -194,7 +193,7 @@ def test_what_needs_values_above_1(renderer: vkbloom.Renderer) -> None:
     """Only those presets show nothing of white."""
     image = np.zeros((48, 64, 3), np.float32)
     image[16:32, 24:40] = 1
-    found = {one["name"]: one["needs_hdr"] for one in presets_command.entries()}
+    found = {one["name"]: one["needs_hdr"] for one in listing.preset_entries()}
     for name in ("tutorial", "kino", "unity_hdrp", "filament", "godot_4_6"):
         bloom = renderer.apply(image, vkbloom.presets[name], framebuffers=["bloom"])["bloom"]
         assert found[name] == (float(bloom[20:28, 28:36, :3].mean()) < 0.01)

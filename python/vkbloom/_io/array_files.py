@@ -231,8 +231,8 @@ def write(
     layout = image_writing.chosen_layout(
         oiio, picture, target, is_hdr=False, bits=bits if is_float else None
     )
-    if layout[0] != values.shape[2]:
-        raise ValueError(f"{target}: its format has no alpha; write array[..., :{layout[0]}]")
+    if (channels := layout[0].shape[2]) != values.shape[2]:
+        raise ValueError(f"{target}: its format has no alpha; write array[..., :{channels}]")
     if not is_float and layout[1] != numbers:
         raise ValueError(
             f"{target}: its format holds {layout[1]}, not {numbers}; write linear floats, as "
