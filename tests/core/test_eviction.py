@@ -108,15 +108,3 @@ def test_pipelines_do_not_go_under_submissions_that_wait(
     for step in range(MIN_AGE + 20):
         renderer.apply(picture(9 + step % 5, 9), Pyramid(exposure=step / 100))
     assert len(list(waiting)) == 39
-
-
-def test_alternating_sizes_reuse_images(new_renderer: Callable[[], Renderer]) -> None:
-    renderer = new_renderer()
-    sizes = [(16, 16), (33, 20), (8, 50), (64, 64)]
-    created = []
-    for _ in range(2 * MIN_AGE // len(sizes)):
-        for height, width in sizes:
-            renderer.apply(picture(width, height), Pyramid())
-            renderer.apply(picture(width, height), Separable())
-        created.append(renderer._core.pipeline_count)
-    assert created[-1] == created[0]
