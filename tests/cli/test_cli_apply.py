@@ -26,9 +26,9 @@ pytestmark = pytest.mark.usefixtures("kept_renderers")
 NATURAL = vkbloom.presets["bevy_natural"]
 
 
-def run(*arguments: str | Path, adapter: str = "auto") -> Result:
-    words = ["apply", *(str(argument) for argument in arguments), "--adapter", adapter]
-    if not {"--preset", "--method", "--help"} & set(words):
+def run(*arguments: str | Path) -> Result:
+    words = ["apply", *map(str, arguments)]
+    if not {"--preset", "--method"} & set(words):
         # Files of integers start from the preset photo: see test_cli_photo.py.
         words += ["--preset", "bevy_natural"]
     return CliRunner().invoke(program, words)
@@ -156,28 +156,6 @@ class TestColours:
         assert result.exit_code == 0
         assert "b.png has integers: NaN is written as 0, infinity as 1" in result.stderr
         assert (pixels(tmp_path / "b.png")[0, 0] == 0).all()
-
-
-class TestFramebuffers:
-    def test_all_are_beside_the_output(self, tmp_path: Path) -> None:
-        image = lights(30, 20, 3, dtype="float16")
-        path = vkbloom.write(tmp_path / "a.exr", image)
-        result = done(path, tmp_path / "b.exr", "--framebuffers", "all")
-        with vkbloom.Renderer() as renderer:
-            frames = renderer.apply(image, NATURAL)
-        others = [name for name in frames if name != "final"]
-        assert sorted(file.name for file in tmp_path.iterdir()) == sorted(
-            ["a.exr", "b.exr", *(f"b_{name}.exr" for name in others)]
-        )
-        for name in others:
-            assert np.array_equal(pixels(tmp_path / f"b_{name}.exr"), frames[name])
-        written = [line for line in result.stdout.splitlines() if line.startswith("wrote ")]
-        assert len(written) == len(frames)
-
-    def test_files_beside_a_png(self, tmp_path: Path) -> None:
-        path = png(tmp_path / "a.png", lights(30, 20, 3, dtype="uint8"))
-        done(path, tmp_path / "b.png", "--framebuffers", "bloom,final")
-        assert {file.name for file in tmp_path.iterdir()} == {"a.png", "b.png", "b_bloom.exr"}
 
 
 def picture(path: Path) -> Path:

@@ -62,12 +62,10 @@ class TestCommand:
     @pytest.mark.parametrize(
         ("limits", "status"),
         [
-            ("--max-error 0.004 --min-ssim 0.99 --max-flip 0.001 --fail-percent 0", 0),
+            ("--max-error 0.004 --min-ssim 0.99 --max-flip 0.001", 0),
             ("--max-error 0.0039", 1),
             ("--max-error 0.004 --min-ssim 1", 1),
             ("--max-flip 0", 1),
-            ("--fail-percent 0.3", 0),
-            ("--fail-percent 0.2", 1),
             ("--max-error none", 1),
         ],
     )

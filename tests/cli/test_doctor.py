@@ -21,7 +21,7 @@ import vkbloom
 from vkbloom import _doctor as doctor
 from vkbloom._cli.program import program
 from vkbloom._doctor import child, drivers, installation, probe
-from vkbloom._doctor.finding import Finding
+from vkbloom._doctor.installation import Finding
 
 linux_only = pytest.mark.skipif(sys.platform != "linux", reason="as the loader works on Linux")
 
@@ -29,9 +29,6 @@ linux_only = pytest.mark.skipif(sys.platform != "linux", reason="as the loader w
 VARIABLES = ("VK_DRIVER_FILES", "VK_ICD_FILENAMES", "VK_ADD_DRIVER_FILES")
 # A manifest that is not there, and an environment in which not all is well.
 ABSENT = "/none/absent.json"
-LAYER = """{"file_format_version": "1.2.0", "layer": {
-    "name": "VK_LAYER_KHRONOS_validation", "type": "GLOBAL", "library_path": "ABSENT",
-    "api_version": "1.3.0", "implementation_version": "1", "description": "none"}}"""
 PROBLEMS = {"VKBLOOM_ADAPTER": "nonsense", "VKBLOOM_CACHE_DIR": "/dev/null/cache"}
 
 
@@ -165,40 +162,6 @@ def test_no_loader(without_loader: dict[str, str]) -> None:
     assert loader.found.startswith("not found: ")
     assert "apt install libvulkan1" in loader.advice
     assert "loader (libvulkan.so.1) is missing" in by_topic(findings, "adapters").found
-
-
-def validation() -> Finding:
-    """Return the finding about the validation layer."""
-    return doctor._validation(os.environ["VKBLOOM_ADAPTER"])
-
-
-@linux_only
-def test_no_validation_layer(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setenv("VK_LAYER_PATH", str(tmp_path))
-    layer = validation()
-    assert layer.status == "note"
-    assert "is not installed" in layer.found
-    assert "apt install libvulkan1 vulkan-validationlayers" in layer.advice
-
-
-def test_without_a_loader_there_is_no_validation(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The driver of the wheel renders without a loader: nothing is broken."""
-    failure = "validation=True needs the system's Vulkan loader, also for the bundled driver"
-    monkeypatch.setattr(child, "ask", lambda *_: child.Answer(None, failure))
-    layer = validation()
-    assert (layer.status, layer.found) == ("note", "there is no loader")
-
-
-@linux_only
-def test_a_validation_layer_that_does_not_open(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    absent = tmp_path / "absent.so"
-    (tmp_path / "layer.json").write_text(LAYER.replace("ABSENT", str(absent)))
-    monkeypatch.setenv("VK_LAYER_PATH", str(tmp_path))
-    layer = validation()
-    assert layer.status == "problem"
-    assert "the test render fails with it" in layer.found
 
 
 def test_driver_without_adapters_is_a_problem(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -391,7 +354,7 @@ def test_a_process_that_gives_no_answer(
 
 
 def test_a_question_that_fails_is_answered() -> None:
-    answer = child.ask("render", "no such adapter", "plain")
+    answer = child.ask("render", "no such adapter")
     assert answer.value is None
     # Without the advice for those who do not ask the doctor.
     assert answer.failure.startswith('no Vulkan adapter for "no such adapter"; found: ')

@@ -11,7 +11,7 @@ import vkbloom
 from tests.core.builds import ROOT
 from tests.processes import python
 from vkbloom import Pyramid, Separable
-from vkbloom._cli.live import Live
+from vkbloom._cli.view import Live
 
 NAMES = ["glow", "blur_vertical", "bloom", "scene", "final"]
 
@@ -64,8 +64,7 @@ def test_the_title_has_the_values() -> None:
 def test_a_window_is_controlled_by_keys(display: dict[str, str], tmp_path: Path) -> None:
     # (The fourth framebuffer is gone without bloom.)
     keys = "B,B,4,B,1,P,SPACE,Q"
-    words = ("--size", "64x36", "--validation")
-    done = python("-m", "tests.cli.keys", keys, *words, cwd=ROOT, **display)
+    done = python("-m", "tests.cli.keys", keys, "--size", "64x36", cwd=ROOT, **display)
     assert done.returncode == 0, done.stderr
     picture = str(vkbloom.write(tmp_path / "a.png", np.full((9, 16, 3), 0.5, np.float32)))
     done = python("-m", "tests.cli.keys", "2,SPACE,ESCAPE", picture, cwd=ROOT, **display)

@@ -173,7 +173,7 @@ class TestFigures:
         assert found.cause == "shift"
         assert found.value == pytest.approx(shift, abs=0.02)
 
-    @pytest.mark.parametrize("order", ["linear", "spline", "Catmull-Rom", "sinc"])
+    @pytest.mark.parametrize("order", ["linear", "spline", "sinc"])
     @pytest.mark.parametrize("kind", ["noise", "lights"])
     def test_half_a_pixel_by_each_interpolation(self, kind: str, order: str) -> None:
         ndimage = pytest.importorskip("scipy.ndimage")
@@ -182,9 +182,6 @@ class TestFigures:
             spectrum = np.fft.fft(image, axis=1)
             frequency = 2j * np.pi * np.fft.fftfreq(64)[:, np.newaxis]
             moved = np.fft.ifft(spectrum * np.exp(-0.5 * frequency), axis=1).real
-        elif order == "Catmull-Rom":
-            taps = {-1: -1 / 16, 0: 9 / 16, 1: 9 / 16, 2: -1 / 16}
-            moved = sum((tap * np.roll(image, x, 1) for x, tap in taps.items()), np.zeros(1))
         else:
             degree = {"linear": 1, "spline": 3}[order]
             moved = ndimage.shift(image, (0, 0.5, 0), order=degree, mode="nearest")
@@ -240,12 +237,6 @@ class TestFigures:
         assert found.cause == "gain"
         expected = np.sqrt(np.mean((b - found.value * a) ** 2))
         assert found.residual == pytest.approx(expected, rel=1e-12)
-
-    def test_wrong_images(self) -> None:
-        with pytest.raises(TypeError, match="b: dtype int64 is not one of uint8"):
-            diagnose(picture(), picture().astype(np.int64))
-        with pytest.raises(ValueError, match=r"a: shape \(0, 4\) is not"):
-            diagnose(np.zeros((0, 4)), picture())
 
 
 def pairs(seeds: int) -> list[tuple[str, Image, Image]]:

@@ -8,7 +8,6 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom._core_kernel import WithKernel
 from vkbloom._methods.blender_kernels import kernel_of, kernel_sides
 from vkbloom._methods.convolution import PSFLike, read_psf
 from vkbloom._settings.fields import (
@@ -19,6 +18,7 @@ from vkbloom._settings.fields import (
     value_field,
 )
 from vkbloom._settings.settings import PublishedSettings
+from vkbloom.psf._core_kernels import WithKernel
 
 GlareType = Literal["bloom", "ghosts", "streaks", "fog_glow", "simple_star", "sun_beams", "kernel"]
 Quality = Literal["high", "medium", "low"]
