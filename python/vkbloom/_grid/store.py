@@ -250,9 +250,8 @@ def _put(folder: Path, key: str, content: bytes, *, replaces: bool) -> None:
     zarr = import_extra("zarr", "grid", _PURPOSE)
     store = zarr.storage.LocalStore(folder)
     put = store.set if replaces else store.set_if_not_exists
-    buffers = import_extra("zarr.buffer", "grid", _PURPOSE).default_buffer_prototype()
-    sync = import_extra("zarr.core.sync", "grid", _PURPOSE).sync
-    sync(put(key, buffers.buffer.from_bytes(content)))
+    buffers = zarr.core.buffer.default_buffer_prototype()
+    zarr.core.sync.sync(put(key, buffers.buffer.from_bytes(content)))
 
 
 @dataclass(frozen=True)
