@@ -22,8 +22,8 @@ from vkbloom._cli.image_files import expand_option, layer_option, read_picture, 
 from vkbloom._cli.interrupts import INTERRUPTED
 from vkbloom._cli.program import adapter_option, as_wrong_use, given
 from vkbloom._cli.scene_options import scene_options
+from vkbloom._cli.sequences import is_stream
 from vkbloom._cli.settings_options import STARTS, settings_options
-from vkbloom._cli.streams import is_stream
 from vkbloom._cli.terminal import tell_device
 from vkbloom._explorer.viewer import GLOW, Viewer
 from vkbloom._renderer.surface import Surface
