@@ -53,6 +53,7 @@ Glow: TypeAlias = Callable[[NDArray[Any]], dict[str, Any]]
 _FAILURES: Final = (OSError, ValueError, MemoryError, click.ClickException)
 # 8-bit pictures of this many pixels or more become half floats, whose steps are finer.
 _HALVED: Final = 1 << 26
+CURVES = ("linear", "srgb", "gamma22", "pq", "hlg")
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -232,9 +233,6 @@ def _send(file: Path, target: str) -> None:
             sys.stdout.buffer.flush()
         else:
             shutil.copyfileobj(content, stack.enter_context(open(target, "wb")))
-
-
-CURVES = ("linear", "srgb", "gamma22", "pq", "hlg")
 
 
 @click.command(cls=Command)

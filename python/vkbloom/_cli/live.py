@@ -31,6 +31,18 @@ from vkbloom._settings.settings import SHADINGS, Settings, Shading
 
 #: Options of a scene, by the names of their parameters.
 _OF_SCENE: Final = {"base": "--scene", "shading": "--shading", "size": "--size"}
+HELP: Final = """\
+B              bloom on, off
+1 ... 9        the framebuffer that is shown
+P              the next preset
+Space          pauses the animation
+Q, Escape      close\
+"""
+_TURN_SECONDS: Final = 8.0
+_LARGEST: Final = (1600, 900)  # size of a window for an image
+_TITLE_SECONDS: Final = 0.5  # between updates of the title
+_WAIT_SECONDS: Final = 0.1  # while the window is hidden
+_KEYS: Final = ("SPACE", "ESCAPE", *"BPQ", *"123456789")
 
 
 def _live_options(*, image_has_size: bool) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
@@ -76,17 +88,6 @@ def _live_options(*, image_has_size: bool) -> Callable[[Callable[..., Any]], Cal
         return run
 
     return add
-
-
-HELP: Final = """\
-B              bloom on, off
-1 ... 9        the framebuffer that is shown
-P              the next preset
-Space          pauses the animation
-Q, Escape      close\
-"""
-
-_TURN_SECONDS: Final = 8.0
 
 
 @dataclasses.dataclass
@@ -138,12 +139,6 @@ class Live:
             f"{seconds * 1e3:.1f} ms, {1 / seconds:.0f} frames/s",
         ]
         return " | ".join(parts)
-
-
-_LARGEST: Final = (1600, 900)  # size of a window for an image
-_TITLE_SECONDS: Final = 0.5  # between updates of the title
-_WAIT_SECONDS: Final = 0.1  # while the window is hidden
-_KEYS: Final = ("SPACE", "ESCAPE", *"BPQ", *"123456789")
 
 
 @click.command(cls=Command, epilog=f"\b\n{HELP}")

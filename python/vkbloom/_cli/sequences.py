@@ -25,6 +25,9 @@ PIPE: Final = "-"
 
 # Where a call keeps its folder of copies.
 _FOLDER: Final = "vkbloom.streams"
+#: The most names in a note.
+_MAX_NAMES: Final = 5
+_NUMBER: Final = re.compile(r"%(0?)(\d*)d")
 
 
 def is_stream(name: str) -> bool:
@@ -79,12 +82,6 @@ def _opened(name: str) -> Iterator[BinaryIO]:
         raise OSError(errno.EBADF, "is closed", shown(name))
     else:
         yield sys.stdin.buffer
-
-
-#: The most names in a note.
-_MAX_NAMES: Final = 5
-
-_NUMBER: Final = re.compile(r"%(0?)(\d*)d")
 
 
 def pairs(sources: Sequence[str], target: str) -> list[tuple[str, str]]:
