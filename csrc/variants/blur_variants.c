@@ -29,21 +29,10 @@ static struct vkb_pass_row line_row(const struct vkb_variant_choice *choice,
     row.reading = VKB_READING_LOADED;
     row.targets[0] = target;
     row.constants.radius = radius <= LINE_SHORT_RADIUS ? radius : 0;
-    row.constants.rolled = choice->variants == VKB_VARIANTS_CPU && row.constants.radius > 0
-                        && (uint64_t)image->width * image->height <= ROLLED_PIXELS;
-    if (!row.constants.rolled) {
-        row.constants.direction = blur->constants.direction;
-    } else {
-        const uint32_t across = vertical ? image->width : image->height;
-        const uint32_t along = vertical ? image->height : image->width;
-        row.groups_width = (across + ROW_INVOCATIONS - 1) / ROW_INVOCATIONS;
-        row.groups_height = (along + ROLLED_OUTPUTS - 1) / ROLLED_OUTPUTS;
-    }
+    row.constants.direction = blur->constants.direction;
     row.block = VKB_BLOCK_line;
     row.params.line.radius = radius;
     row.params.line.origin = origin;
-    row.params.line.vertical = vertical;
-    row.params.line.levels = row.constants.rolled && image->format == VKB_FORMAT_RGBA8_UNORM;
     row.params.line.limit = vkb_formats[image->format].limit;
     for (int tap = 0; tap <= 2 * radius; ++tap) {
         const int weight = abs(tap - radius);
@@ -53,28 +42,22 @@ static struct vkb_pass_row line_row(const struct vkb_variant_choice *choice,
     return row;
 }
 
-static bool add_line_row(struct vkb_graph *graph, const struct vkb_pass_row *row,
-                         struct vkb_error *error)
-{
-    if (!vkb_graph_add_pass(graph, row, error))
-        return false;
-    if (row->params.line.levels)
-        graph->passes[graph->pass_count - 1].constants.stored = STORED_SINGLE;
-    return true;
-}
-
 // Adds a line blur if the source has the target's size.
 bool vkb_add_line(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
                   bool *fits, struct vkb_error *error)
 {
+    const struct vkb_image_row *target = &choice->plain.images[pass->targets[0]];
+    const bool is_large = (uint64_t)target->width * target->height > LINE_PIXELS;
+
     *fits = (vkb_is_line(pass, DIRECTION_VERTICAL, LINE_RADIUS)
              || vkb_is_line(pass, DIRECTION_HORIZONTAL, LINE_RADIUS))
+         && (is_large || pass->constants.radius > LINE_SHORT_RADIUS)
          && vkb_same_size(&choice->plain, pass->reads[0], pass->targets[0])
          && vkb_is_written_once(&choice->plain, pass->targets[0]);
     if (!*fits)
         return true;
     struct vkb_pass_row row = line_row(choice, pass, pass->targets[0], 0);
-    return add_line_row(choice->graph, &row, error);
+    return vkb_graph_add_pass(choice->graph, &row, error);
 }
 
 // For a horizontal blur into a target of another size whose taps are integer texels apart. Such a
@@ -116,7 +99,8 @@ bool vkb_add_enlarged(const struct vkb_variant_choice *choice, const struct vkb_
     row.block = VKB_BLOCK_threshold;
     // Not of `plain`: a new image may have moved these.
     VKB_SET_TARGET(&row, threshold, &choice->graph->images[pass->targets[0]]);
-    return add_line_row(choice->graph, &line, error) && vkb_add_fullscreen(choice, &row, error);
+    return vkb_graph_add_pass(choice->graph, &line, error)
+        && vkb_add_fullscreen(choice, &row, error);
 }
 
 // A composite of two lines of a threshold, all at the size of the image.
