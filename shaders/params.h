@@ -81,10 +81,14 @@
     VEC4S(B, offsets, OFFSET_VEC4S)
 
 // The same blur on integer texels: a symmetric kernel from the first tap to the last, then zeros.
-// `origin` is the position of the target's first pixel in the source, along the line.
+// `origin` is the position of the target's first pixel in the source, along the line. For ROLLED,
+// so that both directions share a pipeline: whether lines are columns, and whether texels are 8-bit
+// levels.
 #define LINE_BLOCK(B, READS, INPUT, VEC4S) \
     INPUT(B, int, radius) \
     INPUT(B, int, origin) \
+    INPUT(B, int, vertical) \
+    INPUT(B, int, levels) \
     INPUT(B, float, limit) \
     VEC4S(B, kernel, LINE_VEC4S)
 
@@ -425,11 +429,12 @@
 
 // Kernels on integer texels, w0.. in vec4s: the longest half-kernel of a line and of a fused bloom.
 // A line up to LINE_SHORT_RADIUS is compiled for its radius. On a CPU, for a target of at most
-// LINE_PIXELS that takes longer than the pass, which is drawn instead.
+// ROLLED_PIXELS that takes longer than the pass, unless the loop over its pixels stays one.
 #define LINE_RADIUS         64
 #define LINE_SHORT_RADIUS   8
 #define LINE_OUTPUTS        8
-#define LINE_PIXELS         0x40000
+#define ROLLED_PIXELS       0x40000
+#define ROLLED_OUTPUTS      32
 #define LINE_VEC4S          34
 #define STRIP_RADIUS        4
 #define STRIP_COLUMNS       240
@@ -504,7 +509,7 @@
 // The specialization constants of all shaders: CONSTANT(id, name in GLSL, name in C). Each is an
 // int, and 0 if a pass does not set it. SAMPLING is how taps are filtered. FORMAT is how values
 // that a fused pass keeps are rounded (STORED_*). RADIUS is 0 for a line whose kernel is too
-// long to unroll its loops. With FINITE the
+// long to unroll its loops; with ROLLED the loop over a line's pixels stays one. With FINITE the
 // source is known to have no NaN and no infinity. TAP_COUNT, KERNELS and WINDOW are of filters
 // (lib/filter.glsl), and SOURCE_ROWS of their tiles. TAKEN_X and TAKEN_Y have a bit for each texel
 // of a window and each kernel that may have a weight; 0: all may. EXACT says that their images are
@@ -554,6 +559,7 @@
     CONSTANT(33, RADIX_4, radix_4) \
     CONSTANT(34, GROUP_WIDTH, group_width) \
     CONSTANT(35, GROUP_HEIGHT, group_height) \
+    CONSTANT(36, ROLLED, rolled) \
     CONSTANT(37, FINITE, finite) \
     CONSTANT(39, BY, by) \
     CONSTANT(40, BOUNDARY, boundary) \

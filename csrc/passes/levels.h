@@ -5,19 +5,6 @@
 
 #include "passes/pass.h"
 
-// What a method builds its graph with. After a failure all functions of it do nothing, and an image
-// that they return is the glow.
-struct vkb_levels {
-    const struct vkb_settings *settings;
-    const struct vkb_bloom_source *source;
-    struct vkb_graph *graph;
-    struct vkb_error *error;
-    bool failed;
-    struct vkb_size sizes[MAX_LEVELS];
-    uint32_t downs[MAX_LEVELS];
-    uint32_t count;
-};
-
 // How the bloom is made from the levels: up_k = own[k] down_k + coarse[k] U(up_k+1) with up_N-1 =
 // smallest * down_N-1, bloom = gain * V(up_0).
 struct vkb_combination {
@@ -44,29 +31,6 @@ struct vkb_size vkb_halved_up(struct vkb_size size);
 // Appends sizes, each half of the one before, until there are `count`. It stops before a level of 1
 // x 1, unless that is the first.
 void vkb_levels_halve(struct vkb_levels *levels, struct vkb_size above, uint32_t count);
-
-// Adds an image that has pixels; an image that passes write.
-uint32_t vkb_levels_add(struct vkb_levels *levels, const struct vkb_image_row *row);
-uint32_t vkb_levels_target(struct vkb_levels *levels, const char *name, enum vkb_format format,
-                           struct vkb_size size, bool framebuffer);
-
-// Adds a framebuffer in the format of the bloom buffers. `number` replaces a %u in the name.
-uint32_t vkb_levels_image(struct vkb_levels *levels, const char *name, uint32_t number,
-                          struct vkb_size size);
-
-// Adds the image of a level, `levels->downs[level]`.
-uint32_t vkb_levels_down(struct vkb_levels *levels, uint32_t level);
-
-// As vkb_levels_image, for an intermediate image, which is not a framebuffer.
-uint32_t vkb_levels_step(struct vkb_levels *levels, const char *name, uint32_t number,
-                         struct vkb_size size);
-
-// Adds a pass.
-void vkb_levels_pass(struct vkb_levels *levels, const struct vkb_pass_row *row);
-
-// Adds a pass with the prefilter's block, whose result the mask of the source multiplies, if there
-// is one.
-void vkb_levels_masked(struct vkb_levels *levels, struct vkb_pass_row *row);
 
 // The row of a pass from one image to another that filters its taps in the shader: without a block
 // yet; with the prefilter's block.
@@ -123,9 +87,6 @@ void vkb_levels_blur(struct vkb_levels *levels, uint32_t level, uint32_t from,
 // to the size of `to`.
 void vkb_levels_gather(struct vkb_levels *levels, const double *shares, enum vkb_mode kernel,
                        uint32_t to);
-
-// The image "bloom", of the final size.
-uint32_t vkb_levels_bloom(struct vkb_levels *levels);
 
 // A pass that resizes an image bilinearly and multiplies it by a gain.
 void vkb_levels_resize(struct vkb_levels *levels, uint32_t from, double gain, uint32_t to);

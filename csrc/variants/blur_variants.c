@@ -29,10 +29,21 @@ static struct vkb_pass_row line_row(const struct vkb_variant_choice *choice,
     row.reading = VKB_READING_LOADED;
     row.targets[0] = target;
     row.constants.radius = radius <= LINE_SHORT_RADIUS ? radius : 0;
-    row.constants.direction = blur->constants.direction;
+    row.constants.rolled = choice->variants == VKB_VARIANTS_CPU && row.constants.radius > 0
+                        && (uint64_t)image->width * image->height <= ROLLED_PIXELS;
+    if (!row.constants.rolled) {
+        row.constants.direction = blur->constants.direction;
+    } else {
+        const uint32_t across = vertical ? image->width : image->height;
+        const uint32_t along = vertical ? image->height : image->width;
+        row.groups_width = (across + ROW_INVOCATIONS - 1) / ROW_INVOCATIONS;
+        row.groups_height = (along + ROLLED_OUTPUTS - 1) / ROLLED_OUTPUTS;
+    }
     row.block = VKB_BLOCK_line;
     row.params.line.radius = radius;
     row.params.line.origin = origin;
+    row.params.line.vertical = vertical;
+    row.params.line.levels = row.constants.rolled && image->format == VKB_FORMAT_RGBA8_UNORM;
     row.params.line.limit = vkb_formats[image->format].limit;
     for (int tap = 0; tap <= 2 * radius; ++tap) {
         const int weight = abs(tap - radius);
@@ -42,22 +53,28 @@ static struct vkb_pass_row line_row(const struct vkb_variant_choice *choice,
     return row;
 }
 
+static bool add_line_row(struct vkb_graph *graph, const struct vkb_pass_row *row,
+                         struct vkb_error *error)
+{
+    if (!vkb_graph_add_pass(graph, row, error))
+        return false;
+    if (row->params.line.levels)
+        graph->passes[graph->pass_count - 1].constants.stored = STORED_SINGLE;
+    return true;
+}
+
 // Adds a line blur if the source has the target's size.
 bool vkb_add_line(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
                   bool *fits, struct vkb_error *error)
 {
-    const struct vkb_image_row *target = &choice->plain.images[pass->targets[0]];
-    const bool is_large = (uint64_t)target->width * target->height > LINE_PIXELS;
-
     *fits = (vkb_is_line(pass, DIRECTION_VERTICAL, LINE_RADIUS)
              || vkb_is_line(pass, DIRECTION_HORIZONTAL, LINE_RADIUS))
-         && (is_large || pass->constants.radius > LINE_SHORT_RADIUS)
          && vkb_same_size(&choice->plain, pass->reads[0], pass->targets[0])
          && vkb_is_written_once(&choice->plain, pass->targets[0]);
     if (!*fits)
         return true;
     struct vkb_pass_row row = line_row(choice, pass, pass->targets[0], 0);
-    return vkb_graph_add_pass(choice->graph, &row, error);
+    return add_line_row(choice->graph, &row, error);
 }
 
 // For a horizontal blur into a target of another size whose taps are integer texels apart. Such a
@@ -99,8 +116,7 @@ bool vkb_add_enlarged(const struct vkb_variant_choice *choice, const struct vkb_
     row.block = VKB_BLOCK_threshold;
     // Not of `plain`: a new image may have moved these.
     VKB_SET_TARGET(&row, threshold, &choice->graph->images[pass->targets[0]]);
-    return vkb_graph_add_pass(choice->graph, &line, error)
-        && vkb_add_fullscreen(choice, &row, error);
+    return add_line_row(choice->graph, &line, error) && vkb_add_fullscreen(choice, &row, error);
 }
 
 // A composite of two lines of a threshold, all at the size of the image.
@@ -191,30 +207,6 @@ static void make_strips(const struct vkb_variant_choice *choice, struct vkb_pass
     }
 }
 
-// Adds the composite, and after it the fused pass in strips, which may replace it.
-bool vkb_add_strips(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
-                    bool *fits, struct vkb_error *error)
-{
-    const enum vkb_format format = choice->plain.images[pass->targets[0]].format;
-    // Strips below each other load the same rows at the same time. With four single floats this
-    // takes 7 % less time, with three 5 to 11 % more, and with halves 13 % more.
-    const bool vertical = format == VKB_FORMAT_RGBA32_FLOAT
-                       && vkb_graph_channels(&choice->plain, pass->reads[0]) == 4;
-    struct nest nest;
-
-    *fits = find_nest(&choice->plain, pass, STRIP_RADIUS, vkb_threshold_of, &nest)
-         && vkb_fits_linear(choice, pass) && (!pass->transposed || vkb_are_floats(choice, pass));
-    if (!*fits)
-        return true;
-    struct vkb_pass_row row = fused_row(choice, &nest);
-    make_strips(choice, &row,
-                pass->transposed ? &vkb_shader_strip_mixed_linear_rgba32float
-                                 : strip_shaders[format],
-                vertical);
-    return vkb_add_fullscreen(choice, pass, error)
-        && vkb_graph_add_pass(choice->graph, &row, error);
-}
-
 static bool fits_tiles(const struct vkb_device *device)
 {
     const size_t shared = 3 * sizeof(float) * TILE_ROWS * TILE_LOADED;
@@ -235,19 +227,33 @@ static void make_tiles(struct vkb_pass_row *row, const struct vkb_shader *shader
     row->constants.radius = radius;
 }
 
-// The same in tiles.
-bool vkb_add_tiles(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
+// Adds the composite, and after it the fused pass in strips or in tiles, which may replace it.
+bool vkb_add_fused(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
                    bool *fits, struct vkb_error *error)
 {
+    const bool gpu = choice->variants == VKB_VARIANTS_GPU;
+    const enum vkb_format format = choice->plain.images[pass->targets[0]].format;
     struct nest nest;
 
-    *fits = fits_tiles(choice->device)
-         && find_nest(&choice->plain, pass, TILE_RADIUS,
-                      pass->transposed ? vkb_writer_of : vkb_threshold_of, &nest);
+    *fits = find_nest(&choice->plain, pass, gpu ? TILE_RADIUS : STRIP_RADIUS,
+                      gpu && pass->transposed ? vkb_writer_of : vkb_threshold_of, &nest)
+         && (gpu ? fits_tiles(choice->device)
+                 : vkb_fits_linear(choice, pass)
+                       && (!pass->transposed || vkb_are_floats(choice, pass)));
     if (!*fits)
         return true;
     struct vkb_pass_row row = fused_row(choice, &nest);
-    make_tiles(&row, pass->transposed ? &vkb_shader_tile_mixed_comp : &vkb_shader_tile_comp, &nest);
+    // Strips below each other load the same rows at the same time. With four single floats this
+    // takes 7 % less time, with three 5 to 11 % more, and with halves 13 % more.
+    if (gpu)
+        make_tiles(&row, pass->transposed ? &vkb_shader_tile_mixed_comp : &vkb_shader_tile_comp,
+                   &nest);
+    else
+        make_strips(choice, &row,
+                    pass->transposed ? &vkb_shader_strip_mixed_linear_rgba32float
+                                     : strip_shaders[format],
+                    format == VKB_FORMAT_RGBA32_FLOAT
+                        && vkb_graph_channels(&choice->plain, pass->reads[0]) == 4);
     return vkb_add_fullscreen(choice, pass, error)
         && vkb_graph_add_pass(choice->graph, &row, error);
 }
@@ -316,30 +322,20 @@ static struct vkb_pass_row adjoint_row(const struct vkb_variant_choice *choice,
     return row;
 }
 
-bool vkb_add_adjoint_tiles(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
+bool vkb_add_adjoint_fused(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
                            bool *fits, struct vkb_error *error)
 {
+    const bool gpu = choice->variants == VKB_VARIANTS_GPU;
     struct nest nest;
 
-    *fits =
-        fits_tiles(choice->device) && find_adjoint_nest(&choice->plain, pass, TILE_RADIUS, &nest);
+    *fits = find_adjoint_nest(&choice->plain, pass, gpu ? TILE_RADIUS : STRIP_RADIUS, &nest)
+         && (gpu ? fits_tiles(choice->device) : vkb_are_floats(choice, nest.composite));
     if (!*fits)
         return true;
     struct vkb_pass_row row = adjoint_row(choice, pass, &nest);
-    make_tiles(&row, &vkb_shader_adjoint_tile_comp, &nest);
-    return vkb_graph_add_pass(choice->graph, &row, error);
-}
-
-bool vkb_add_adjoint_strips(const struct vkb_variant_choice *choice,
-                            const struct vkb_pass_row *pass, bool *fits, struct vkb_error *error)
-{
-    struct nest nest;
-
-    *fits = find_adjoint_nest(&choice->plain, pass, STRIP_RADIUS, &nest)
-         && vkb_are_floats(choice, nest.composite);
-    if (!*fits)
-        return true;
-    struct vkb_pass_row row = adjoint_row(choice, pass, &nest);
-    make_strips(choice, &row, &vkb_shader_adjoint_strip_linear_rgba32float, false);
+    if (gpu)
+        make_tiles(&row, &vkb_shader_adjoint_tile_comp, &nest);
+    else
+        make_strips(choice, &row, &vkb_shader_adjoint_strip_linear_rgba32float, false);
     return vkb_graph_add_pass(choice->graph, &row, error);
 }

@@ -16,7 +16,8 @@ const int LOADED = LINE_OUTPUTS + 2 * RADIUS;
 
 ivec2 along()
 {
-    return DIRECTION == DIRECTION_VERTICAL ? ivec2(0, 1) : ivec2(1, 0);
+    bool vertical = ROLLED != 0 ? params.vertical != 0 : DIRECTION == DIRECTION_VERTICAL;
+    return vertical ? ivec2(0, 1) : ivec2(1, 0);
 }
 
 vec4 load(ivec2 pixel, int texels)
@@ -60,7 +61,60 @@ void write(ivec2 pixel, vec4 sum)
         imageStore(target, pixel, stored(sum));
 }
 
-void main()
+// With `levels` STORED is that of floats.
+vec3 stored_rolled(vec3 sum, bool levels, float limit)
+{
+    if (STORED != STORED_SINGLE)
+        return storable(sum);
+    return levels ? nearest_level(sum) * (1.0 / 255.0) : limited(sum, limit);
+}
+
+// The same as with add_short, where a compiler takes longer than the pass: it has one load and one
+// store to translate. sums[tap] is of the pixel that gets this tap of the texel. The number of texels
+// is no constant, so that the loop stays one. Workgroups lie across the lines. All parameters are read
+// before the loop: in it, llvmpipe loads them for one invocation after the other.
+void blur_rolled()
+{
+    ivec2 place = ivec2(gl_GlobalInvocationID.xy) * ivec2(1, ROLLED_OUTPUTS);
+    ivec2 direction = along(), first = direction.y != 0 ? place : place.yx;
+    ivec2 size = imageSize(target), last = imageSize(source) - 1;
+    ivec2 texel = first + (params.origin - RADIUS) * direction;
+    ivec2 pixel = first - 2 * RADIUS * direction;
+    int number = 0, count = ROLLED_OUTPUTS + 2 * params.radius;
+    bool levels = params.levels != 0;
+    float limit = params.limit;
+    float weights[2 * RADIUS + 1];
+    // Alpha apart: compilers do not remove a part of a vector that lives over an iteration.
+    vec3 sums[2 * RADIUS + 1];
+    float alphas[2 * RADIUS + 1];
+
+    [[unroll]] for (int tap = 0; tap < 2 * RADIUS + 1; ++tap) {
+        // The kernel is symmetric.
+        int same = max(tap, 2 * RADIUS - tap);
+        weights[tap] = params.kernel[same >> 2][same & 3];
+        sums[tap] = vec3(0.0);
+        alphas[tap] = 0.0;
+    }
+    do {
+        vec4 value = imageLoad(source, clamp(texel, ivec2(0), last));
+        [[unroll]] for (int j = 2 * RADIUS; j > 0; --j) {
+            sums[j] = sums[j - 1] + weights[j] * value.rgb;
+            alphas[j] = alphas[j - 1] + weights[j] * value.a;
+        }
+        sums[0] = weights[0] * value.rgb;
+        alphas[0] = weights[0] * value.a;
+        if (number >= 2 * RADIUS && all(lessThan(pixel, size))) {
+            vec3 colour = stored_rolled(sums[2 * RADIUS], levels, limit);
+            float alpha = stored_rolled(vec3(alphas[2 * RADIUS]), levels, limit).r;
+            imageStore(target, pixel, vec4(colour, ALPHA == ALPHA_BLUR ? alpha : 1.0));
+        }
+        texel += direction;
+        pixel += direction;
+        ++number;
+    } while (number < count);
+}
+
+void blur_unrolled()
 {
     ivec2 first = ivec2(gl_GlobalInvocationID.xy) * (along() * (LINE_OUTPUTS - 1) + 1);
     vec4 sums[LINE_OUTPUTS];
@@ -75,4 +129,12 @@ void main()
         add_long(first, sums);
     [[unroll]] for (int i = 0; i < LINE_OUTPUTS; ++i)
         write(first + i * along(), sums[i]);
+}
+
+void main()
+{
+    if (ROLLED != 0)
+        blur_rolled();
+    else
+        blur_unrolled();
 }

@@ -16,8 +16,9 @@
 //   constant operand; one that follows from that of the store before is computed once (store_at).
 // - A loop whose rounds depend on data runs until no invocation goes on: its condition comes last. Both sides of
 //   an `if` run: what the format of a target decides is a constant (STORED, CHANNEL_BYTES).
-// - A number of rounds that Mesa 22.3 knows unrolls a loop. Parameters are read before a loop: in it or after a
-//   return, Mesa 22.3 loads them for each invocation.
+// - A pass of a short line costs most when it is compiled: there the loop over pixels stays one (ROLLED). Its
+//   number of rounds is a parameter, since Mesa 22.3 unrolls every loop whose rounds it knows. Parameters are
+//   read before the loop: in a loop or after a return, Mesa 22.3 loads them for each invocation.
 // - A float becomes an integer by a sum with 2^23, and a stored word is the maximum of itself and a zero that
 //   the compiler does not know. Else Mesa 25 converts, and LLVM packs, lane by lane.
 // - What is used after a store is copied to variables before the first (copy_shapes): it would be loaded again.

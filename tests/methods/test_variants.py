@@ -98,7 +98,7 @@ def test_the_largest_halves_stay_finite(varied: Renderer, threshold: float | Non
 
 
 def test_lines_of_a_large_image(monkeypatch: pytest.MonkeyPatch, unfused: Renderer) -> None:
-    # On a CPU, short lines have a shader of their own for more than 2^18 pixels.
+    # On a CPU, lines are unrolled only for more than 2^18 pixels.
     monkeypatch.setenv("VKBLOOM_VARIANT", "cpu")
     image = hdr_picture(257, 1028, 4, "uint8")
     with Renderer(validation=True) as renderer:
