@@ -23,8 +23,7 @@
 # make engine-laws: takes both through all laws, in a quarter of an hour.
 # make libplacebo HOOKS=folder: compares the user shaders of a folder with libplacebo 7 as it runs,
 #   which comes as packages of Debian 13 that are unpacked, not installed.
-# make cluster: renders grids under Slurm with two nodes on this machine, and kills some; installs
-#   it (with apt, as root). CLUSTER="--driver MANIFEST": a driver that they must refuse.
+# make cluster: renders grids under Slurm with two nodes on this machine; installs it (with apt, as root).
 # make bench: times vkbloom beside its peers into out/bench.md, in about a quarter of an hour.
 
 VENV := .venv
@@ -158,7 +157,7 @@ build/libplacebo/apply_hook: tools/libplacebo/build.sh tools/libplacebo/apply_ho
 
 # Tries examples/cluster, and prints the times (docs/grids.md).
 cluster: build/stamp/core build/cluster/done
-	build/cluster/python/bin/python tools/cluster/run.py build/cluster examples/cluster $(CLUSTER)
+	build/cluster/python/bin/python tools/cluster/run.py build/cluster examples/cluster
 
 build/cluster/done: tools/cluster/setup.sh
 	tools/cluster/setup.sh $(@D) $(PYTHON)

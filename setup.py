@@ -303,7 +303,7 @@ def write_spirv(jobs: int) -> None:
         declared += f"extern const struct vkb_shader vkb_shader_{module.name};\n"
         objects += (
             f'const struct vkb_shader vkb_shader_{module.name} = {{"{module.name}", {module.name}, '
-            f"sizeof {module.name}, {{{{{hashed}}}}}, {pointers}}};\n"
+            f"sizeof {module.name}, {{{{{hashed}}}}}, {pointers}, {{0, 0}}, 0}};\n"
         )
     (SPIRV / "spirv.h").write_text(
         "// Made by setup.py from shaders/.\n#ifndef VKB_SPIRV_H\n#define VKB_SPIRV_H\n\n"

@@ -11,8 +11,7 @@ from rich.console import Console
 from benchmarks import BENCHMARKS, Plan, run, write
 from benchmarks.plan import usable_cores
 from benchmarks.writing import read_earlier
-from vkbloom._cli.device_options import adapter_option
-from vkbloom._cli.program import as_wrong_use
+from vkbloom._cli.program import adapter_option, as_wrong_use
 
 
 def _print_ids(context: click.Context, _: click.Parameter, wanted: bool) -> None:

@@ -2,7 +2,7 @@
 
 Each part prints its figures. With names of parts as arguments, only these parts run.
 
-    python benchmarks/grid.py [points|tiny|workers] ...
+    python benchmarks/grid.py [points|workers] ...
 """
 
 from __future__ import annotations
@@ -31,7 +31,6 @@ SIDE = int(os.environ.get("GRID_SIDE", "256"))
 SETTINGS = vkbloom.Separable()
 #: blur_scale x blur_strength x intensity
 COUNTS = tuple(int(n) for n in os.environ.get("GRID_COUNTS", "20,20,25").split(","))
-TINY = int(os.environ.get("GRID_TINY", "100000"))
 SINGLES = int(os.environ.get("GRID_SINGLES", "500"))
 
 
@@ -65,10 +64,10 @@ def folder() -> Iterator[Path]:
 
 
 @contextmanager
-def memory(process: psutil.Process | None = None) -> Iterator[list[float]]:
-    """Collect the resident memory of a process, in MiB, five times a second."""
+def memory() -> Iterator[list[float]]:
+    """Collect the resident memory of this process, in MiB, five times a second."""
     samples: list[float] = []
-    watched = process or psutil.Process()
+    watched = psutil.Process()
     end = threading.Event()
 
     def watch() -> None:
@@ -103,7 +102,6 @@ def points() -> None:
         size = sum(file.stat().st_size for file in path.rglob("*") if file.is_file())
         print(f"{total} points of {SIDE} x {SIDE} into Zarr: {seconds:.1f} s, "
               f"{total / seconds:.0f} points/s, {size / 2**20:.0f} MiB")  # fmt: skip
-        print(f"  passes run {made.attrs['passes_run']}")
         print(f"  memory: {spread(samples)}")
         with vkbloom.Renderer(ADAPTER) as renderer:
             every = list(np.ndindex(*made["done"].shape))
@@ -154,57 +152,6 @@ def singles(image: np.ndarray[Any, Any], values: dict[str, Any], rate: float) ->
           f"{rate / alone:.2f} times that")  # fmt: skip
 
 
-def tiny() -> None:
-    """Many points of tiny images on two workers: the load and memory of the scheduler."""
-    values = {
-        "blur_scale": np.linspace(0.1, 4, min(100, TINY // 10)),
-        "intensity": np.linspace(0, 2, max(1, TINY // 1000)),
-        "exposure": np.linspace(-2, 2, 10),
-    }
-    with (
-        folder() as path,
-        distributed.LocalCluster(  # type: ignore[no-untyped-call]
-            n_workers=2, threads_per_worker=1, dashboard_address="127.0.0.1:0", protocol="tcp"
-        ) as cluster,
-        distributed.Client(cluster) as client,  # type: ignore[no-untyped-call]
-    ):
-        most, tasks, workers = [0], [0], list(client.run(os.getpid).values())
-        before = set(client.run_on_scheduler(lambda dask_scheduler: set(dask_scheduler.tasks)))
-
-        def watch(dask_scheduler: Any = None) -> int:
-            return len(dask_scheduler.tasks)
-
-        submit = client.submit
-
-        def counting(*rest: Any, **more: Any) -> Any:
-            made = submit(*rest, **more)
-            tasks[0] += 1
-            most[0] = max(most[0], client.run_on_scheduler(watch) - len(before))
-            return made
-
-        client.submit = counting
-        times = psutil.Process().cpu_times()
-        memories = [psutil.Process(pid).memory_info().rss / 2**20 for pid in workers]
-        with memory() as samples:
-            start = time.perf_counter()
-            made = vkbloom.grid(
-                picture(16), SETTINGS, values, store=path / "a.zarr", client=client, adapter=ADAPTER
-            )
-            seconds = time.perf_counter() - start
-        used = psutil.Process().cpu_times()
-        count = int(made["done"].size)
-        after = [psutil.Process(pid).memory_info().rss / 2**20 for pid in workers]
-        assert bool(made["done"].values.all())
-        print(f"{count} points of 16 x 16, two workers: {seconds:.1f} s, "
-              f"{count / seconds:.0f} points/s")  # fmt: skip
-        print(f"  passes run {made.attrs['passes_run']}")
-        print(f"  {tasks[0]} tasks in all, at most {most[0]} on the scheduler at a time")
-        print(f"  scheduler and client: {used.user + used.system - times.user - times.system:.1f} "
-              f"s of processor time; memory {spread(samples)}")  # fmt: skip
-        grown = zip(memories, after, strict=True)
-        print(f"  workers: {', '.join(f'{b:.0f} -> {a:.0f} MiB' for b, a in grown)}")
-
-
 def workers() -> None:
     """Two workers against one, and against this process."""
     image, values = picture(), axes()
@@ -226,21 +173,16 @@ def workers() -> None:
                 vkbloom.grid(image, SETTINGS, warm, store=path / "w.zarr", client=client,
                                      adapter=ADAPTER)  # fmt: skip
                 start = time.perf_counter()
-                made = vkbloom.grid(image, SETTINGS, values, store=path / "a.zarr", client=client,
+                vkbloom.grid(image, SETTINGS, values, store=path / "a.zarr", client=client,
                                             adapter=ADAPTER)  # fmt: skip
                 rates[count] = total / (time.perf_counter() - start)
                 print(f"{count} workers, lavapipe threads for each worker: {threads}: "
-                      f"{rates[count]:.0f} points/s of {total}; passes run "
-                      f"{made.attrs['passes_run']}")  # fmt: skip
+                      f"{rates[count]:.0f} points/s of {total}")  # fmt: skip
         print(f"  two against one: {rates[2] / rates[1]:.2f}")
     os.environ.pop("LP_NUM_THREADS", None)
 
 
-PARTS: dict[str, Callable[[], None]] = {
-    "points": points,
-    "tiny": tiny,
-    "workers": workers,
-}
+PARTS: dict[str, Callable[[], None]] = {"points": points, "workers": workers}
 
 if __name__ == "__main__":
     for part in sys.argv[1:] or PARTS:

@@ -20,6 +20,7 @@ import vkbloom
 from tests.device.exceptions import reason_against
 from tests.time_budget import TimeBudget
 from vkbloom import AdapterInfo, Renderer, Scene, Settings, adapters
+from vkbloom._custom.compiler import find_compiler
 from vkbloom._renderer import interruptible
 from vkbloom._settings.registry import METHODS
 
@@ -175,6 +176,15 @@ def software(environment: None) -> AdapterInfo:
         if adapter.type == "cpu":
             return adapter
     pytest.skip("there is no software adapter here, such as Mesa's lavapipe")
+
+
+@pytest.fixture(scope="session")
+def glslang() -> None:
+    """A test that uses this is skipped if no compiler of shaders is here."""
+    try:
+        find_compiler()
+    except vkbloom.ShaderError as error:
+        pytest.skip(str(error))
 
 
 @pytest.fixture(scope="session")

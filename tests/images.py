@@ -57,7 +57,7 @@ def lights(
     points = generator.random((height, width)) < 0.02
     points[height // 2, width // 3] = True
     brightest = 1.0 if dtype == "uint8" else highest
-    image[points, :3] = generator.random((int(points.sum()), 3)) * brightest
+    image[points, :3] = generator.random((int(points.sum()), min(channels, 3))) * brightest
     return np.rint(image * 255).astype(np.uint8) if dtype == "uint8" else image.astype(dtype)
 
 

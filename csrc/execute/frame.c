@@ -252,8 +252,7 @@ static bool record_and_submit(struct vkb_run *run, struct vkb_request *requests,
                             error))
             return false;
     vkb_barrier_record_host_read(device, commands);
-    // Not earlier: the host records while CUDA copies the inputs.
-    return vkb_buffer_flush(device, &submission->uniforms, error) && vkb_exported_wait(run, error)
+    return vkb_buffer_flush(device, &submission->uniforms, error)
         && vkb_submission_submit(device, submission, &run->sync, error);
 }
 

@@ -1,7 +1,5 @@
 #include "execute/limits.h"
 
-#include "spirv/module.h"
-
 #include <math.h>
 #include <string.h>
 
@@ -58,78 +56,18 @@ static bool check_bindings(const struct vkb_device *device, const struct vkb_pas
         {"bindings", LIMIT(maxPerStageResources), .needed = every});
 }
 
-static uint64_t type_bytes(const struct vkb_module *module, uint32_t id, int depth);
-
-static uint64_t struct_bytes(const struct vkb_module *module, const uint32_t *type, int depth)
-{
-    uint64_t size = 0;
-
-    for (uint32_t i = 2; i < vkb_word_count(type); ++i)
-        size += type_bytes(module, type[i], depth);
-    return size;
-}
-
-// A size without padding; types that shared memory does not hold have none.
-static uint64_t type_bytes(const struct vkb_module *module, uint32_t id, int depth)
-{
-    enum { MAX_DEPTH = 16 };  // a faulty module may name a type within itself
-    const uint32_t *type = id < module->bound ? module->at[id] : NULL;
-    uint32_t length;
-
-    if (!type || depth > MAX_DEPTH)
-        return 0;
-    switch (vkb_opcode(type)) {
-    case SPV_TYPE_BOOL:
-        return sizeof(uint32_t);
-    case SPV_TYPE_INT:
-    case SPV_TYPE_FLOAT:
-        return type[2] / 8;
-    case SPV_TYPE_VECTOR:
-    case SPV_TYPE_MATRIX:
-        return type_bytes(module, type[2], depth + 1) * type[3];
-    case SPV_TYPE_ARRAY:
-        return module->at[type[3]] && vkb_constant(module, module->at[type[3]], &length)
-                 ? type_bytes(module, type[2], depth + 1) * length
-                 : 0;
-    case SPV_TYPE_STRUCT:
-        return struct_bytes(module, type, depth + 1);
-    default:
-        return 0;
-    }
-}
-
-// What the module declares of a workgroup: its threads along each axis, and its shared memory.
 static bool check_workgroup(const struct vkb_device *device, const struct vkb_pass_row *pass,
                             struct vkb_error *error)
 {
-    const VkPhysicalDeviceLimits *limits = &device->limits;
-    uint32_t threads[3] = {1, 1, 1};
-    uint64_t shared = 0;
-    struct vkb_module module;
-    const bool done = vkb_read_module(pass->shader, &module, error);
+    const uint32_t *threads = pass->shader->threads;
+    const uint32_t *allowed = device->limits.maxComputeWorkGroupSize;
 
-    for (const uint32_t *at = module.first; done && at < module.functions; at = vkb_next(at))
-        if (vkb_opcode(at) == SPV_EXECUTION_MODE && vkb_word_count(at) == 6
-            && at[2] == SPV_LOCAL_SIZE)
-            memcpy(threads, at + 3, sizeof threads);
-        else if (vkb_opcode(at) == SPV_VARIABLE && vkb_word_count(at) >= 4
-                 && at[3] == SPV_WORKGROUP) {
-            const uint32_t *pointer = at[1] < module.bound ? module.at[at[1]] : NULL;
-            shared += pointer && vkb_opcode(pointer) == SPV_TYPE_POINTER
-                        ? type_bytes(&module, pointer[3], 0)
-                        : 0;
-        }
-    vkb_free(module.at);
-    return done
-        && CHECK({"threads of a workgroup", LIMIT(maxComputeWorkGroupInvocations),
-                  .needed = (uint64_t)threads[0] * threads[1] * threads[2]},
-                 {"threads along x", "maxComputeWorkGroupSize", threads[0],
-                  limits->maxComputeWorkGroupSize[0]},
-                 {"threads along y", "maxComputeWorkGroupSize", threads[1],
-                  limits->maxComputeWorkGroupSize[1]},
-                 {"threads along z", "maxComputeWorkGroupSize", threads[2],
-                  limits->maxComputeWorkGroupSize[2]},
-                 {"bytes of shared memory", LIMIT(maxComputeSharedMemorySize), .needed = shared});
+    return CHECK({"threads of a workgroup", LIMIT(maxComputeWorkGroupInvocations),
+                  .needed = (uint64_t)threads[0] * threads[1]},
+                 {"threads along x", "maxComputeWorkGroupSize", threads[0], allowed[0]},
+                 {"threads along y", "maxComputeWorkGroupSize", threads[1], allowed[1]},
+                 {"bytes of shared memory", LIMIT(maxComputeSharedMemorySize),
+                  .needed = pass->shader->shared});
 }
 
 static bool check_pass(const struct vkb_device *device, const struct vkb_pass_row *pass,

@@ -1,7 +1,6 @@
 #include "execute/pipeline.h"
 
 #include "scene/scene.h"
-#include "spirv/specialize.h"
 
 #include <string.h>
 
@@ -227,55 +226,61 @@ bool vkb_pipelines_render_pass(const struct vkb_device *device, struct vkb_pipel
     return true;
 }
 
+// The driver copies the values.
+static VkSpecializationInfo specialization(const struct vkb_constants *constants)
+{
+    return (VkSpecializationInfo){
+        .mapEntryCount = VKB_CONSTANT_COUNT,
+        .pMapEntries = vkb_constant_rows,
+        .dataSize = sizeof *constants,
+        .pData = constants,
+    };
+}
+
 static VkPipelineShaderStageCreateInfo shader_stage(VkShaderStageFlagBits stage,
-                                                    VkShaderModule module)
+                                                    VkShaderModule module,
+                                                    const VkSpecializationInfo *constants)
 {
     return (VkPipelineShaderStageCreateInfo){
         .sType = VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO,
         .stage = stage,
         .module = module,
         .pName = "main",
+        .pSpecializationInfo = constants,
     };
 }
 
 static bool create_module(const struct vkb_device *device, const struct vkb_shader *shader,
-                          const struct vkb_constants *constants, VkShaderModule *module,
-                          struct vkb_error *error)
+                          VkShaderModule *module, struct vkb_error *error)
 {
-    uint32_t *code;
-    size_t size;
-
-    if (!vkb_specialize(shader, constants, &code, &size, error))
-        return false;
-    const bool done =
-        VK(error,
-           device->vk.vkCreateShaderModule(device->handle,
-                                           &(VkShaderModuleCreateInfo){
-                                               .sType = VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO,
-                                               .codeSize = size,
-                                               .pCode = code,
-                                           },
-                                           NULL, module));
-    vkb_free(code);
-    return done;
+    return VK(error, device->vk.vkCreateShaderModule(
+                         device->handle,
+                         &(VkShaderModuleCreateInfo){
+                             .sType = VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO,
+                             .codeSize = shader->size,
+                             .pCode = shader->code,
+                         },
+                         NULL, module));
 }
 
 bool vkb_compute_create(const struct vkb_device *device, VkPipelineCache cache,
                         const struct vkb_shader *shader, const struct vkb_constants *constants,
                         VkPipelineLayout layout, VkPipeline *pipeline, struct vkb_error *error)
 {
+    const VkSpecializationInfo special = specialization(constants);
     VkShaderModule module;
 
-    if (!create_module(device, shader, constants, &module, error))
+    if (!create_module(device, shader, &module, error))
         return false;
-    const bool done = VK(error, device->vk.vkCreateComputePipelines(
-                                    device->handle, cache, 1,
-                                    &(VkComputePipelineCreateInfo){
-                                        .sType = VK_STRUCTURE_TYPE_COMPUTE_PIPELINE_CREATE_INFO,
-                                        .stage = shader_stage(VK_SHADER_STAGE_COMPUTE_BIT, module),
-                                        .layout = layout,
-                                    },
-                                    NULL, pipeline));
+    const bool done =
+        VK(error, device->vk.vkCreateComputePipelines(
+                      device->handle, cache, 1,
+                      &(VkComputePipelineCreateInfo){
+                          .sType = VK_STRUCTURE_TYPE_COMPUTE_PIPELINE_CREATE_INFO,
+                          .stage = shader_stage(VK_SHADER_STAGE_COMPUTE_BIT, module, &special),
+                          .layout = layout,
+                      },
+                      NULL, pipeline));
     device->vk.vkDestroyShaderModule(device->handle, module, NULL);
     return done;
 }
@@ -368,6 +373,7 @@ static bool create_graphics(const struct vkb_device *device, const struct vkb_pi
                             VkRenderPass render_pass, VkPipeline *pipeline, struct vkb_error *error)
 {
     const struct geometry_state *state = &geometry_states[pass->geometry];
+    const VkSpecializationInfo special = specialization(&pass->constants);
     const VkPipelineVertexInputStateCreateInfo vertices = vertex_input(pass);
     const VkPipelineRasterizationStateCreateInfo raster = rasterization(state);
     const VkPipelineDepthStencilStateCreateInfo depth = depth_test(state);
@@ -383,8 +389,8 @@ static bool create_graphics(const struct vkb_device *device, const struct vkb_pi
                       .stageCount = 2,
                       .pStages =
                           (VkPipelineShaderStageCreateInfo[]){
-                              shader_stage(VK_SHADER_STAGE_VERTEX_BIT, modules[0]),
-                              shader_stage(VK_SHADER_STAGE_FRAGMENT_BIT, modules[1]),
+                              shader_stage(VK_SHADER_STAGE_VERTEX_BIT, modules[0], &special),
+                              shader_stage(VK_SHADER_STAGE_FRAGMENT_BIT, modules[1], &special),
                           },
                       .pVertexInputState = &vertices,
                       .pInputAssemblyState = &triangles,
@@ -417,8 +423,8 @@ static bool create_pipeline(const struct vkb_device *device, const struct vkb_pi
                                   vkb_bindings_layouts(&pipelines->bindings, pass)->pipeline,
                                   pipeline, error);
     const bool done =
-        create_module(device, pass->vertex, &pass->constants, &modules[0], error)
-        && create_module(device, pass->shader, &pass->constants, &modules[1], error)
+        create_module(device, pass->vertex, &modules[0], error)
+        && create_module(device, pass->shader, &modules[1], error)
         && create_graphics(device, pipelines, pass, modules, render_pass, pipeline, error);
     for (int i = 0; i < 2; ++i)
         device->vk.vkDestroyShaderModule(device->handle, modules[i], NULL);

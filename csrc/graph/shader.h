@@ -19,6 +19,8 @@ struct vkb_shader {
     // The same pass as a compute shader; with a target of three channels; with a first image of
     // three; for images with layers. NULL: there is none.
     const struct vkb_shader *dispatch, *packed, *rgb, *layers;
+    // Of a compute shader that is made at run time: threads of a workgroup, bytes of shared memory.
+    uint32_t threads[2], shared;
 };
 
 // That of NULL is zero.

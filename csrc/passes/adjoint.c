@@ -276,22 +276,18 @@ static struct vkb_size blocks_of(struct vkb_size size)
                              (size.height + SUM_SIDE - 1) / SUM_SIDE};
 }
 
-static bool add_sums(struct vkb_adjoint *adjoint, const struct vkb_pass_row *given,
-                     struct vkb_size size, const char *name, struct vkb_error *error)
+// Adds up an image of values to one pixel. `by` is that of the first sums.
+static bool add_sums(struct vkb_adjoint *adjoint, uint32_t image, struct vkb_size size,
+                     enum vkb_mode by, const char *name, struct vkb_error *error)
 {
-    struct vkb_pass_row row = *given;
-    uint32_t image;
-
-    read_nothing(&row);
-    size = blocks_of(size);
-    if (!add_row(adjoint, &row, size, &image, error))
-        return false;
-    while (size.width > 1 || size.height > 1) {
-        row = vkb_adjoint_row(&vkb_shader_adjoint_sum_frag, &image, 1);
+    do {
+        struct vkb_pass_row row = vkb_adjoint_row(&vkb_shader_adjoint_sum_frag, &image, 1);
+        row.constants.by = by;
+        by = BY_VALUES;
         size = blocks_of(size);
         if (!add_row(adjoint, &row, size, &image, error))
             return false;
-    }
+    } while (size.width > 1 || size.height > 1);
     snprintf(adjoint->graph->images[image].name, VKB_NAME_SIZE, "%s", name);
     adjoint->graph->images[image].framebuffer = true;
     return true;
@@ -302,13 +298,13 @@ bool vkb_add_sums(struct vkb_adjoint *adjoint, const struct vkb_pass_row *given,
 {
     struct vkb_pass_row row = *given;
     char squares[VKB_NAME_SIZE];
+    uint32_t image;
 
     if (!adjoint->sums)
         return true;
     snprintf(squares, sizeof squares, "%s_squares", name);
     row.constants.by = BY_VALUES;
-    if (!add_sums(adjoint, &row, size, name, error))
-        return false;
-    row.constants.by = BY_SQUARES;
-    return add_sums(adjoint, &row, size, squares, error);
+    return vkb_add_adjoint_image(adjoint, &row, size, &image, error)
+        && add_sums(adjoint, image, size, BY_VALUES, name, error)
+        && add_sums(adjoint, image, size, BY_SQUARES, squares, error);
 }

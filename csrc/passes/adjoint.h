@@ -78,9 +78,8 @@ bool vkb_accumulate_sampled(struct vkb_adjoint *adjoint, const struct vkb_pass_r
 bool vkb_accumulate_mask(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
                          struct vkb_pass_row *row, struct vkb_error *error);
 
-// If sums are wanted: adds the row, which adds up values in blocks of `size`, and the passes that
-// add up these sums to one pixel, the framebuffer `name`; and the same for the squares of the
-// values, which tell how exact the sum is.
+// If sums are wanted: adds the row of an image of values, and the passes that add these up to one
+// pixel, the framebuffer `name`; and the same for their squares, which tell how exact the sum is.
 bool vkb_add_sums(struct vkb_adjoint *adjoint, const struct vkb_pass_row *row, struct vkb_size size,
                   const char *name, struct vkb_error *error);
 

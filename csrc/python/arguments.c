@@ -1,7 +1,6 @@
 // Settings as Python packs them: the members of struct vkb_settings before its pointers, by the
 // tables that this file gives. All functions return false with an exception set.
 #include "python/arguments.h"
-#include "python/values.h"
 
 #include <stddef.h>
 #include <string.h>
@@ -98,89 +97,17 @@ PyObject *vkb_settings_block_table(void)
     return table;
 }
 
-static double as_stored(const struct vkb_value_row *row, double number)
-{
-    return row->type == VKB_VALUE_FLOAT ? (float)number : number;
-}
-
-// A default may be out of the range.
-static bool has_values(const struct vkb_value_row *rows, size_t count, const void *values)
-{
-    bool valid = true;
-
-    for (size_t i = 0; valid && i < count; ++i) {
-        const struct vkb_value_row *row = &rows[i];
-        const char *at = (const char *)values + row->offset;
-        const double number = row->type == VKB_VALUE_DOUBLE ? *(const double *)at
-                            : row->type == VKB_VALUE_INT    ? *(const int *)at
-                                                            : *(const float *)at;
-        valid = number == as_stored(row, row->initial)
-             || (number >= as_stored(row, row->low) && number <= as_stored(row, row->high));
-    }
-    return valid;
-}
-
-// What a kernel's taps are found by must be neither negative nor NaN.
-static bool has_layers(const struct vkb_settings *settings)
-{
-    bool valid = settings->layer_count <= MAX_LAYERS;
-
-    for (uint32_t i = 0; valid && i < settings->layer_count; ++i) {
-        const struct vkb_layer *layer = &settings->layers[i];
-        valid = layer->scale >= 0.0f && layer->scale <= (float)LAYER_LIMIT
-             && layer->strength >= 0.0f && layer->strength <= (float)LAYER_LIMIT;
-    }
-    return valid;
-}
-
-static bool has_stages(const struct vkb_settings *settings)
-{
-    bool valid = settings->stage_count <= MAX_STAGES;
-
-    for (uint32_t i = 0; valid && i < settings->stage_count; ++i)
-        valid = settings->stages[i].kind < VKB_STAGE_COUNT
-             && settings->stages[i].ghost_count <= MAX_GHOSTS
-             && has_values(vkb_glare_rows, vkb_glare_row_count, &settings->stages[i].values);
-    return valid;
-}
-
-static bool has_choices(const struct vkb_settings *settings)
-{
-    bool valid = settings->method < VKB_METHOD_COUNT && settings->format < VKB_FORMAT_COUNT
-              && vkb_formats[settings->format].channels != 1;
-
-    for (int i = 0; valid && i < VKB_CHOICE_COUNT; ++i)
-        valid = settings->choices[i] >= 0 && settings->choices[i] < vkb_choice_rows[i].count;
-    return valid;
-}
-
-// Whether no number leads out of a table or an array. (Python names the value that is wrong.)
-static bool is_valid(const struct vkb_settings *settings)
-{
-    const bool needs_kernel = settings->method == VKB_METHOD_SEPARABLE;
-
-    return has_choices(settings) && has_layers(settings) && has_stages(settings)
-        && has_values(vkb_value_rows, vkb_value_row_count, &settings->values)
-        && !settings->bloom_width == !settings->bloom_height
-        && settings->weight_count <= MAX_WEIGHTS && settings->level_weight_count <= MAX_LEVELS
-        && (!needs_kernel || (settings->weight_count && settings->layer_count));
-}
-
 bool vkb_read_settings(PyObject *object, struct vkb_settings *settings)
 {
     PyObject *block = PyObject_CallMethod(object, "_core_block", NULL);
-    bool done = block && PyBytes_Check(block) && PyBytes_Size(block) == BLOCK_SIZE;
+    const bool done = block && PyBytes_Check(block) && PyBytes_Size(block) == BLOCK_SIZE;
 
     if (block && !done)
         PyErr_Format(PyExc_TypeError, "settings: a block of %d bytes is needed, not %R",
                      (int)BLOCK_SIZE, block);
     memset(settings, 0, sizeof *settings);
-    if (done) {
+    if (done)
         memcpy(settings, PyBytes_AsString(block), BLOCK_SIZE);
-        done = is_valid(settings);
-        if (!done)
-            PyErr_SetString(PyExc_ValueError, "settings: the block has values out of their ranges");
-    }
     Py_XDECREF(block);
     return done;
 }

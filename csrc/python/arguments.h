@@ -16,21 +16,15 @@ PyObject *vkb_stage_block_table(void);
 // Asks a settings object for its block; false with an exception set.
 bool vkb_read_settings(PyObject *object, struct vkb_settings *settings);
 
-// The kernel of a convolution, held until vkb_release_kernel, which may be called on a zeroed one.
-struct vkb_held_kernel {
-    Py_buffer view;
-    bool held;
-};
-
-// Asks a convolution's settings for the kernel of these sizes, or only for about its size.
+// Asks a convolution's settings for the kernel of these sizes, which `view` holds, or only for
+// about its size.
 bool vkb_read_kernel_size(PyObject *object, struct vkb_size frame, struct vkb_size buffers,
                           struct vkb_kernel_data *kernel);
 bool vkb_read_kernel(PyObject *object, struct vkb_size frame, struct vkb_size buffers,
-                     struct vkb_held_kernel *held, struct vkb_kernel_data *kernel);
-void vkb_release_kernel(struct vkb_held_kernel *held);
+                     Py_buffer *view, struct vkb_kernel_data *kernel);
 
 // Asks the stage of dirt, if there is one, for its picture.
-bool vkb_read_dirt(PyObject *object, struct vkb_held_kernel *held, struct vkb_settings *settings);
+bool vkb_read_dirt(PyObject *object, Py_buffer *view, struct vkb_settings *settings);
 
 // The arrays of a scene, held until vkb_release_scene. Releasing a zeroed or half-read one is safe.
 struct vkb_held_scene {
@@ -45,20 +39,16 @@ bool vkb_read_scene(PyObject *block, PyObject *pictures, PyObject *arrays,
                     struct vkb_held_scene *scene, struct vkb_source *source);
 void vkb_release_scene(struct vkb_held_scene *scene);
 
-// The pixels of an image, held until vkb_release_image. Releasing a zeroed or half-read one is
-// safe.
+// The pixels of an image. The view holds the array or, of an image in exported memory, the
+// Exported; it has no object where there is no image.
 struct vkb_held_image {
     struct vkb_input input;
     Py_buffer view;
-    bool held;
 };
 
-// An array (H, W, 3) or (H, W, 4) of uint8, float16 or float32, any strides; or (Exported, offset,
-// (H, W, C), strides, code of the element). `name` is the argument's.
-bool vkb_read_image(PyObject *array, const char *name, struct vkb_held_image *image);
-// An array (H, W) of float32, any strides.
-bool vkb_read_mask(PyObject *array, struct vkb_held_image *image);
-void vkb_release_image(struct vkb_held_image *image);
+// An array (H, W, 3) or (H, W, 4) of uint8, float16 or float32, or a mask (H, W) of float32, any
+// strides; or (Exported, offset, (H, W, C), strides, bytes of an element).
+bool vkb_read_image(PyObject *array, struct vkb_held_image *image);
 
 // Whether the object is memory that CUDA shares; that memory, and to what it belongs.
 bool vkb_is_exported(PyObject *object);

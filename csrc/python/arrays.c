@@ -21,10 +21,6 @@ PyObject *vkb_new_pages(PyObject *object, PyObject *argument)
 
     if (PyErr_Occurred())
         return NULL;
-    if (size < 1) {
-        PyErr_Format(PyExc_ValueError, "pages: a size of %zd bytes is not above 0", size);
-        return NULL;
-    }
     struct pages_object *self = vkb_new_object(state->pages_type);
     if (!self)
         return NULL;

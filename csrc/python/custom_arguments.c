@@ -1,12 +1,10 @@
-// The passes of a settings object that bring their shaders, textures and buffers along. All
-// functions return false with an exception set.
+// The passes of a settings object that bring their shaders, textures and buffers along, as Python
+// packs them (_custom/rows.py). All functions return false with an exception set.
 #include "python/arguments.h"
-#include "python/values.h"
 
 #include <stddef.h>
 #include <string.h>
 
-// What Python packs (_custom/rows.py).
 enum {
     PASS_SIZE = offsetof(struct vkb_custom_pass, shader),
     RESOURCE_SIZE = offsetof(struct vkb_resource, data),
@@ -18,11 +16,16 @@ struct vkb_pass_content {
     struct vkb_resource resources[VKB_MAX_RESOURCES];
 };
 
-static bool refuse(const char *what)
+static bool copy_block(PyObject *block, void *to, Py_ssize_t size)
 {
-    PyErr_Format(PyExc_ValueError, "passes: %s has the wrong size or values out of their ranges",
-                 what);
-    return false;
+    const bool fits = PyBytes_Size(block) == size;
+
+    if (fits)
+        memcpy(to, PyBytes_AsString(block), (size_t)size);
+    else
+        PyErr_Format(PyExc_ValueError, "passes: a block of %zd bytes is needed, not of %zd", size,
+                     PyBytes_Size(block));
+    return fits;
 }
 
 // (block, bytes or None)
@@ -30,94 +33,44 @@ static bool read_resource(PyObject *tuple, struct vkb_resource *resource)
 {
     PyObject *block, *data;
 
-    if (!vkb_require_tuple(tuple, "passes: resource")
-        || !PyArg_ParseTuple(tuple, "SO:resource", &block, &data))
+    if (!PyArg_ParseTuple(tuple, "SO:resource", &block, &data)
+        || !copy_block(block, resource, RESOURCE_SIZE))
         return false;
-    if (PyBytes_Size(block) != RESOURCE_SIZE)
-        return refuse("a resource");
-    memcpy(resource, PyBytes_AsString(block), RESOURCE_SIZE);
-    if (data != Py_None && !(resource->data = PyBytes_AsString(data)))
-        return false;
-    return (resource->size > 0 && resource->kind < VKB_RESOURCE_KINDS
-            && (data == Py_None || (uint64_t)PyBytes_Size(data) == resource->size)
-            && (!vkb_resource_is_image(resource)
-                || (resource->dimensions >= 1 && resource->dimensions <= 3)))
-        || refuse("a resource");
+    resource->data = data == Py_None ? NULL : PyBytes_AsString(data);
+    return data == Py_None || resource->data;
 }
 
-static bool read_resources(PyObject *tuple, struct vkb_pass_content *content,
-                           struct vkb_custom_pass *pass)
+// (block, name of the shader, its SPIR-V, its hash, its threads along x and y, its bytes of shared
+// memory, (resource, ...))
+static bool read_pass(PyObject *tuple, struct vkb_pass_content *content,
+                      struct vkb_custom_pass *pass)
 {
-    const Py_ssize_t count = PyTuple_Size(tuple);
+    struct vkb_shader *shader = &content->shader;
+    PyObject *block, *code, *hash, *resources;
 
-    if (count > VKB_MAX_RESOURCES)
-        return refuse("the number of textures and buffers");
-    for (; pass->resource_count < count; ++pass->resource_count) {
+    if (!PyArg_ParseTuple(tuple, "SsSSIIIO!:core_passes", &block, &shader->name, &code, &hash,
+                          &shader->threads[0], &shader->threads[1], &shader->shared, &PyTuple_Type,
+                          &resources)
+        || !copy_block(block, pass, PASS_SIZE)
+        || !copy_block(hash, shader->hash.bytes, sizeof shader->hash.bytes))
+        return false;
+    shader->code = (const void *)PyBytes_AsString(code);
+    shader->size = (size_t)PyBytes_Size(code);
+    pass->shader = shader;
+    for (; pass->resource_count < PyTuple_Size(resources); ++pass->resource_count) {
         struct vkb_resource *resource = &content->resources[pass->resource_count];
         pass->resources[pass->resource_count] = resource;
-        if (!read_resource(PyTuple_GetItem(tuple, pass->resource_count), resource))
+        if (!read_resource(PyTuple_GetItem(resources, pass->resource_count), resource))
             return false;
     }
     return true;
 }
 
-static bool read_shader(const char *name, PyObject *code, PyObject *hash, struct vkb_shader *shader)
-{
-    enum { MAGIC = 0x07230203, HEADER_BYTES = 20 };
-    const Py_ssize_t size = PyBytes_Size(code);
-
-    *shader = (struct vkb_shader){
-        .name = name,
-        .code = (const void *)PyBytes_AsString(code),
-        .size = (size_t)size,
-    };
-    if (size < HEADER_BYTES || size % 4 != 0 || *shader->code != MAGIC) {
-        PyErr_Format(PyExc_ValueError, "shader: %s is not SPIR-V", name);
-        return false;
-    }
-    if (PyBytes_Size(hash) != sizeof shader->hash.bytes)
-        return refuse("a hash");
-    memcpy(shader->hash.bytes, PyBytes_AsString(hash), sizeof shader->hash.bytes);
-    return true;
-}
-
-// Strings end in their arrays, and no number leads out of one.
-static bool is_valid(const struct vkb_custom_pass *pass)
-{
-    bool valid = *pass->name && !pass->name[VKB_NAME_SIZE - 1] && pass->read_count <= VKB_MAX_READS
-              && !pass->block_width == !pass->block_height;
-
-    for (uint32_t i = 0; valid && i < pass->read_count; ++i)
-        valid = !pass->reads[i][VKB_NAME_SIZE - 1];
-    return valid;
-}
-
-// (block, name of the shader, its SPIR-V, its hash, (resource, ...))
-static bool read_pass(PyObject *tuple, struct vkb_pass_content *content,
-                      struct vkb_custom_pass *pass)
-{
-    const char *name;
-    PyObject *block, *code, *hash, *resources;
-
-    if (!vkb_require_tuple(tuple, "core_passes")
-        || !PyArg_ParseTuple(tuple, "SsSSO!:core_passes", &block, &name, &code, &hash,
-                             &PyTuple_Type, &resources))
-        return false;
-    if (PyBytes_Size(block) != PASS_SIZE)
-        return refuse("a pass");
-    memcpy(pass, PyBytes_AsString(block), PASS_SIZE);
-    pass->shader = &content->shader;
-    return (is_valid(pass) || refuse("a pass")) && read_shader(name, code, hash, &content->shader)
-        && read_resources(resources, content, pass);
-}
-
 static bool read_passes(struct vkb_held_passes *held, struct vkb_settings *settings)
 {
     struct vkb_error error;
-
-    if (!vkb_require_tuple(held->tuple, "core_passes"))
-        return false;
     const Py_ssize_t count = PyTuple_Size(held->tuple);
+
     held->rows = vkb_alloc(&error, (size_t)count + 1, sizeof *held->rows);
     held->content = vkb_alloc(&error, (size_t)count + 1, sizeof *held->content);
     if (!held->rows || !held->content) {

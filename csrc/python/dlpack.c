@@ -1,26 +1,9 @@
 // DLPack's structs: https://dmlc.github.io/dlpack/latest/c_api.html
 #include "python/dlpack.h"
 #include "python/module.h"
-#include "python/values.h"
-
-enum { DEVICE_CUDA = 2 };  // kDLCUDA
-
-struct tensor {
-    void *data;
-    struct {
-        int32_t type, id;
-    } device;
-    int32_t ndim;
-    struct {
-        uint8_t code, bits;
-        uint16_t lanes;
-    } dtype;
-    int64_t *shape, *strides;
-    uint64_t byte_offset;
-};
 
 struct managed {
-    struct tensor tensor;
+    struct vkb_tensor tensor;
     void *context;
     void (*deleter)(struct managed *self);
 };
@@ -32,7 +15,7 @@ struct versioned {
     void *context;
     void (*deleter)(struct versioned *self);
     uint64_t flags;
-    struct tensor tensor;
+    struct vkb_tensor tensor;
 };
 
 #define NAME           "dltensor"
@@ -60,7 +43,7 @@ static PyObject *numbers(const int64_t *values, int32_t count)
 
 PyObject *vkb_read_dlpack(PyObject *module, PyObject *capsule)
 {
-    const struct tensor *tensor;
+    const struct vkb_tensor *tensor;
 
     (void)module;
     if (PyCapsule_IsValid(capsule, VERSIONED_NAME)) {
@@ -117,44 +100,24 @@ static void destroy_capsule(PyObject *capsule)
     }
 }
 
-static bool read_shape(PyObject *shape, struct shared *shared)
+PyObject *vkb_dlpack_capsule(PyObject *owner, const struct vkb_tensor *array, PyObject *shape,
+                             bool versioned)
 {
-    const Py_ssize_t count = PyTuple_Size(shape);
+    struct vkb_tensor tensor = *array;
+    struct vkb_error error;
+    struct shared *shared = vkb_alloc(&error, 1, sizeof *shared);
     int64_t stride = 1;
 
-    if (count < 0 || count > MAX_DIMENSIONS) {
-        if (!PyErr_Occurred())
-            PyErr_SetString(PyExc_ValueError, "shape: too many dimensions");
-        return false;
-    }
-    for (Py_ssize_t i = count - 1; i >= 0; --i) {
+    if (!shared)
+        return vkb_raise(PyType_GetModuleState(Py_TYPE(owner)), &error);
+    for (int32_t i = tensor.ndim - 1; i >= 0; --i) {
         shared->shape[i] = PyLong_AsLongLong(PyTuple_GetItem(shape, i));
         shared->strides[i] = stride;
         stride *= shared->shape[i];
     }
-    return !PyErr_Occurred();
-}
-
-PyObject *vkb_dlpack_capsule(const struct vkb_dlpack_array *array, PyObject *shape, bool versioned)
-{
-    struct vkb_error error;
-    struct shared *shared = vkb_alloc(&error, 1, sizeof *shared);
-
-    if (!shared)
-        return vkb_raise(PyType_GetModuleState(Py_TYPE(array->owner)), &error);
-    if (!read_shape(shape, shared)) {
-        vkb_free(shared);
-        return NULL;
-    }
-    shared->owner = Py_NewRef(array->owner);
-    const struct tensor tensor = {
-        .data = (void *)array->address,
-        .device = {DEVICE_CUDA, array->ordinal},
-        .ndim = (int32_t)PyTuple_Size(shape),
-        .dtype = {array->code, array->bits, 1},
-        .shape = shared->shape,
-        .strides = shared->strides,
-    };
+    tensor.shape = shared->shape;
+    tensor.strides = shared->strides;
+    shared->owner = Py_NewRef(owner);
     shared->managed = (struct managed){tensor, shared, delete_managed};
     shared->versioned = (struct versioned){{1, 0}, shared, delete_versioned, 0, tensor};
     PyObject *capsule = versioned

@@ -4,15 +4,26 @@
 
 #include "python/objects.h"
 
-// A dense array on a GPU.
-struct vkb_dlpack_array {
-    PyObject *owner;  // which keeps the memory
-    uintptr_t address;
-    int ordinal;  // CUDA's number of the GPU
-    uint8_t code, bits;
+enum { VKB_DEVICE_CUDA = 2 };  // kDLCUDA
+
+// DLPack's DLTensor.
+struct vkb_tensor {
+    void *data;
+    struct {
+        int32_t type, id;
+    } device;
+    int32_t ndim;
+    struct {
+        uint8_t code, bits;
+        uint16_t lanes;
+    } dtype;
+    int64_t *shape, *strides;
+    uint64_t byte_offset;
 };
 
-// Makes a capsule that holds the owner until its consumer lets go.
-PyObject *vkb_dlpack_capsule(const struct vkb_dlpack_array *array, PyObject *shape, bool versioned);
+// Makes a capsule of a dense array of that shape, of up to 4 sides. The capsule holds the owner of
+// the memory until its consumer lets go.
+PyObject *vkb_dlpack_capsule(PyObject *owner, const struct vkb_tensor *array, PyObject *shape,
+                             bool versioned);
 
 #endif

@@ -3,7 +3,6 @@
 
 #include "python/module.h"
 #include "python/plan.h"
-#include "python/values.h"
 
 // The names that the passes are timed under, without those that come again.
 static PyObject *names_of(const struct vkb_graph *graph, const bool *ran)
@@ -35,9 +34,8 @@ static PyObject *dry_step(const struct vkb_module_state *state, struct vkb_dry_r
     PyObject *source, *object;
     struct vkb_error error = {0};
 
-    if (!vkb_require_tuple(step, "dry_run")
-        || !PyArg_ParseTuple(step, "O!O!:dry_run", state->source_type, &source, state->plan_type,
-                             &object))
+    if (!PyArg_ParseTuple(step, "O!O!:dry_run", state->source_type, &source, state->plan_type,
+                          &object))
         return NULL;
     const struct vkb_plan *plan = &((struct vkb_plan_object *)object)->plan;
     bool *ran = vkb_alloc(&error, plan->graph.pass_count, sizeof *ran);
@@ -52,8 +50,6 @@ PyObject *vkb_dry_run_names(PyObject *module, PyObject *steps)
 {
     struct vkb_dry_run dry_run = {0};
 
-    if (!vkb_require_tuple(steps, "dry_run"))
-        return NULL;
     PyObject *list = PyList_New(0);
     for (Py_ssize_t i = 0, count = PyTuple_Size(steps); list && i < count; ++i)
         if (!vkb_append_item(

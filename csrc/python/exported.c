@@ -46,22 +46,21 @@ void vkb_release_exports(struct vkb_exports *exports)
 static void dealloc(PyObject *object)
 {
     struct exported_object *self = exported_of(object);
-    struct vkb_error ignored;
 
     // A forked process returns nothing: the device belongs to its parent.
     if (self->exports && self->process == vkb_current_process()) {
-        if (self->run) {
-            // After a failure. Other memory was filled before the device read it.
-            Py_BEGIN_ALLOW_THREADS
-            vkb_export_filled(self->run, &ignored);
-            Py_END_ALLOW_THREADS
-            VKB_LOCK(vkb_memory);
+        VKB_LOCK(vkb_memory);
+        if (self->run)
             vkb_exports_give_back(self->exports, self->run);
-            VKB_UNLOCK(vkb_memory);
-        }
+        VKB_UNLOCK(vkb_memory);
         vkb_release_exports(self->exports);
     }
     vkb_free_object(object);
+}
+
+static vkb_cuda_address address_of(const struct exported_object *self, Py_ssize_t offset)
+{
+    return self->run->memory.address + (vkb_cuda_address)offset;
 }
 
 bool vkb_is_exported(PyObject *object)
@@ -113,10 +112,6 @@ static struct exported_object *new_exported(struct vkb_renderer *renderer, Py_ss
     const struct vkb_module_state *state = PyType_GetModuleState(Py_TYPE((PyObject *)renderer));
     struct vkb_error error = {0};
 
-    if (size < 1) {
-        PyErr_Format(PyExc_ValueError, "export: a size of %zd bytes is not above 0", size);
-        return NULL;
-    }
     struct exported_object *self = vkb_new_object(state->exported_type);
     if (!self)
         return NULL;
@@ -182,13 +177,13 @@ PyObject *vkb_renderer_in_context(PyObject *object, PyObject *function)
     struct vkb_exports *exports = use_exports((struct vkb_renderer *)object, &error);
     if (!exports)
         return vkb_raise(state, &error);
-    bool done = vkb_cuda_require_no_capture(exports->cuda, NULL, &error)
-             && vkb_cuda_enter(exports->cuda, &error);
+    bool done =
+        vkb_cuda_require_no_capture(exports->cuda, &error) && vkb_cuda_enter(exports->cuda, &error);
     if (done) {
         result = PyObject_CallObject(function, NULL);
         vkb_cuda_leave(exports->cuda);
         // A producer whose stream is captured takes this one into the capture.
-        done = !result || vkb_cuda_require_no_capture(exports->cuda, NULL, &error);
+        done = !result || vkb_cuda_require_no_capture(exports->cuda, &error);
     }
     vkb_release_exports(exports);
     if (done)
@@ -199,46 +194,32 @@ PyObject *vkb_renderer_in_context(PyObject *object, PyObject *function)
 
 PyObject *vkb_renderer_snapshot(PyObject *object, PyObject *arguments)
 {
-    const struct vkb_module_state *state = PyType_GetModuleState(Py_TYPE(object));
-    struct vkb_renderer *renderer = (struct vkb_renderer *)object;
-    const char *what;
-    unsigned long long address, after;
+    unsigned long long address;
     Py_ssize_t size;
-    int waits;
     struct vkb_error error = {0};
     bool done;
 
-    if (!PyArg_ParseTuple(arguments, "sKnKp:snapshot", &what, &address, &size, &after, &waits))
+    if (!PyArg_ParseTuple(arguments, "Kn:snapshot", &address, &size))
         return NULL;
-    // Before memory is taken, which would make the capture invalid.
-    struct vkb_exports *exports = use_exports(renderer, &error);
-    done = exports && vkb_cuda_require_no_capture(exports->cuda, (void *)(uintptr_t)after, &error);
-    if (exports)
-        vkb_release_exports(exports);
-    if (!done)
-        return vkb_raise(state, &error);
-    struct exported_object *self = new_exported(renderer, size);
+    struct exported_object *self = new_exported((struct vkb_renderer *)object, size);
     if (!self)
         return NULL;
     struct vkb_cuda *cuda = self->exports->cuda;
-    done = vkb_cuda_check(cuda, what, address, &error);
-    if (done) {
+    Py_BEGIN_ALLOW_THREADS
+    done = vkb_cuda_begin_copy(cuda, &self->run->memory, address, (size_t)size, &error);
+    Py_END_ALLOW_THREADS
+    VKB_LOCK(vkb_memory);
+    const bool ordered = done && vkb_export_order_copy(self->run);
+    VKB_UNLOCK(vkb_memory);
+    if (done && !ordered) {
         Py_BEGIN_ALLOW_THREADS
-        done = vkb_cuda_begin_copy(cuda, &self->run->memory, address, (size_t)size,
-                                   (void *)(uintptr_t)after, &error);
-        self->run->filling = done;
-        done = done && (!waits || vkb_export_filled(self->run, &error));
+        done = vkb_cuda_end_copy(cuda, &self->run->memory, &error);
         Py_END_ALLOW_THREADS
-    }
-    if (done && !waits) {
-        VKB_LOCK(vkb_memory);
-        done = vkb_export_filling(self->run, &error);
-        VKB_UNLOCK(vkb_memory);
     }
     if (done)
         return (PyObject *)self;
     Py_DECREF(self);
-    return vkb_raise(state, &error);
+    return vkb_raise(PyType_GetModuleState(Py_TYPE(object)), &error);
 }
 
 // Orders a stream of CUDA, NULL: the renderer's, after what the device draws to the memory.
@@ -248,6 +229,11 @@ static bool order_stream(const struct exported_object *self, void *stream, struc
     const bool done = vkb_export_drawn(self->run, stream, error);
     VKB_UNLOCK(vkb_memory);
     return done;
+}
+
+static PyObject *finish(PyObject *object, bool done, const struct vkb_error *error)
+{
+    return done ? Py_NewRef(Py_None) : vkb_raise(PyType_GetModuleState(Py_TYPE(object)), error);
 }
 
 static PyObject *complete(PyObject *object, PyObject *unused)
@@ -268,13 +254,12 @@ static PyObject *complete(PyObject *object, PyObject *unused)
         self->run->drawn = done ? 0 : self->run->drawn;
         VKB_UNLOCK(vkb_memory);
     }
-    return done ? Py_NewRef(Py_None) : vkb_raise(PyType_GetModuleState(Py_TYPE(object)), &error);
+    return finish(object, done, &error);
 }
 
 static PyObject *make_capsule(PyObject *object, PyObject *arguments)
 {
     struct exported_object *self = exported_of(object);
-    struct vkb_dlpack_array array = {.owner = object};
     PyObject *shape;
     int code, bits, versioned;
     Py_ssize_t offset;
@@ -286,120 +271,86 @@ static PyObject *make_capsule(PyObject *object, PyObject *arguments)
         return NULL;
     if (!order_stream(self, (void *)(uintptr_t)stream, &error))
         return vkb_raise(PyType_GetModuleState(Py_TYPE(object)), &error);
-    array.address = (uintptr_t)(self->run->memory.address + (vkb_cuda_address)offset);
-    array.ordinal = vkb_cuda_ordinal(self->exports->cuda);
-    array.code = (uint8_t)code;
-    array.bits = (uint8_t)bits;
-    return vkb_dlpack_capsule(&array, shape, versioned);
+    const struct vkb_tensor tensor = {
+        .data = (void *)(uintptr_t)address_of(self, offset),
+        .device = {VKB_DEVICE_CUDA, vkb_cuda_ordinal(self->exports->cuda)},
+        .ndim = (int32_t)PyTuple_Size(shape),
+        .dtype = {(uint8_t)code, (uint8_t)bits, 1},
+    };
+    return vkb_dlpack_capsule(object, &tensor, shape, versioned);
 }
 
-// Whether the memory holds so many bytes from `offset` on.
-static bool reaches(const struct exported_object *self, Py_ssize_t offset, Py_ssize_t size)
+// Copies bytes between the memory and other memory, after what the device draws to it, and waits.
+static bool copy_bytes(const struct exported_object *self, vkb_cuda_address to,
+                       vkb_cuda_address from, Py_ssize_t size, struct vkb_error *error)
 {
-    if (offset >= 0 && size >= 0 && (uint64_t)offset + (uint64_t)size <= self->run->size)
-        return true;
-    PyErr_SetString(PyExc_ValueError, "size: the bytes are outside of the memory");
-    return false;
-}
+    bool done = order_stream(self, NULL, error);
 
-// Between an array of the host and the memory, from `offset` on.
-static PyObject *move_bytes(PyObject *object, PyObject *array, Py_ssize_t offset, bool writes)
-{
-    struct exported_object *self = exported_of(object);
-    Py_buffer view;
-    struct vkb_error error = {0};
-    bool done = false;
-
-    if (PyObject_GetBuffer(array, &view, PyBUF_C_CONTIGUOUS | (writes ? 0 : PyBUF_WRITABLE)) < 0)
-        return NULL;
-    if (reaches(self, offset, view.len)) {
-        const vkb_cuda_address address = self->run->memory.address + (vkb_cuda_address)offset;
-        const size_t size = (size_t)view.len;
-        done = order_stream(self, NULL, &error);
-        Py_BEGIN_ALLOW_THREADS
-        done = done
-            && (writes ? vkb_cuda_write(self->exports->cuda, address, view.buf, size, &error)
-                       : vkb_cuda_read(self->exports->cuda, view.buf, address, size, &error));
-        Py_END_ALLOW_THREADS
-        if (!done)
-            vkb_raise(PyType_GetModuleState(Py_TYPE(object)), &error);
-    }
-    PyBuffer_Release(&view);
-    return done ? Py_NewRef(Py_None) : NULL;
+    Py_BEGIN_ALLOW_THREADS
+    done = done && vkb_cuda_copy(self->exports->cuda, to, from, (size_t)size, error);
+    Py_END_ALLOW_THREADS
+    return done;
 }
 
 static PyObject *read_bytes(PyObject *object, PyObject *arguments)
 {
-    PyObject *array;
+    const struct exported_object *self = exported_of(object);
+    struct vkb_error error = {0};
+    Py_buffer view;
     Py_ssize_t offset;
 
-    return PyArg_ParseTuple(arguments, "On:read", &array, &offset)
-             ? move_bytes(object, array, offset, false)
-             : NULL;
+    if (!PyArg_ParseTuple(arguments, "w*n:read", &view, &offset))
+        return NULL;
+    const bool done =
+        copy_bytes(self, (uintptr_t)view.buf, address_of(self, offset), view.len, &error);
+    PyBuffer_Release(&view);
+    return finish(object, done, &error);
 }
 
-static PyObject *write_bytes(PyObject *object, PyObject *array)
+static PyObject *write_bytes(PyObject *object, PyObject *arguments)
 {
-    return move_bytes(object, array, 0, true);
+    const struct exported_object *self = exported_of(object);
+    struct vkb_error error = {0};
+    Py_buffer view;
+
+    if (!PyArg_ParseTuple(arguments, "y*:write", &view))
+        return NULL;
+    const bool done = copy_bytes(self, address_of(self, 0), (uintptr_t)view.buf, view.len, &error);
+    PyBuffer_Release(&view);
+    return finish(object, done, &error);
 }
 
 static PyObject *copy_to(PyObject *object, PyObject *arguments)
 {
-    struct exported_object *self = exported_of(object);
-    unsigned long long address, after;
-    Py_ssize_t size, offset = 0;
+    const struct exported_object *self = exported_of(object);
     struct vkb_error error = {0};
-    bool done;
+    unsigned long long address;
+    Py_ssize_t size, offset;
 
-    if (!PyArg_ParseTuple(arguments, "KnK|n:copy_to", &address, &size, &after, &offset)
-        || !reaches(self, offset, size))
+    if (!PyArg_ParseTuple(arguments, "Knn:copy_to", &address, &size, &offset))
         return NULL;
-    done = vkb_cuda_check(self->exports->cuda, "out", address, &error)
-        && order_stream(self, NULL, &error);
-    if (done) {
-        Py_BEGIN_ALLOW_THREADS
-        done = vkb_cuda_copy(self->exports->cuda, address,
-                             self->run->memory.address + (vkb_cuda_address)offset, (size_t)size,
-                             (void *)(uintptr_t)after, &error);
-        Py_END_ALLOW_THREADS
-    }
-    return done ? Py_NewRef(Py_None) : vkb_raise(PyType_GetModuleState(Py_TYPE(object)), &error);
+    return finish(object, copy_bytes(self, address, address_of(self, offset), size, &error),
+                  &error);
 }
 
 static PyObject *clone_export(PyObject *object, PyObject *arguments)
 {
     struct exported_object *self = exported_of(object);
-    Py_ssize_t size, offset = 0;
+    Py_ssize_t size, offset;
     struct vkb_error error = {0};
-    bool done;
 
-    if (!PyArg_ParseTuple(arguments, "n|n:clone", &size, &offset) || !reaches(self, offset, size))
+    if (!PyArg_ParseTuple(arguments, "nn:clone", &size, &offset))
         return NULL;
     struct exported_object *other = vkb_new_object((PyObject *)Py_TYPE(object));
     if (!other)
         return NULL;
     other->process = self->process;
     VKB_LOCK(vkb_memory);
-    const bool open = self->exports->device;
-    if (open) {
-        ++self->exports->users;
-        other->exports = self->exports;
-    }
+    ++self->exports->users;
     VKB_UNLOCK(vkb_memory);
-    if (!open) {
-        PyErr_SetString(PyExc_BufferError, "copy: the renderer is closed; copy the result");
-        Py_DECREF(other);
-        return NULL;
-    }
-    done = take_memory(other, size, &error) && order_stream(self, NULL, &error);
-    if (done) {
-        Py_BEGIN_ALLOW_THREADS
-        done = vkb_cuda_copy(self->exports->cuda, other->run->memory.address,
-                             self->run->memory.address + (vkb_cuda_address)offset, (size_t)size,
-                             NULL, &error);
-        Py_END_ALLOW_THREADS
-    }
-    if (done)
+    other->exports = self->exports;
+    if (take_memory(other, size, &error)
+        && copy_bytes(self, address_of(other, 0), address_of(self, offset), size, &error))
         return (PyObject *)other;
     Py_DECREF(other);
     return vkb_raise(PyType_GetModuleState(Py_TYPE(object)), &error);
@@ -408,7 +359,7 @@ static PyObject *clone_export(PyObject *object, PyObject *arguments)
 static PyObject *get_address(PyObject *object, void *unused)
 {
     (void)unused;
-    return PyLong_FromUnsignedLongLong(exported_of(object)->run->memory.address);
+    return PyLong_FromUnsignedLongLong(address_of(exported_of(object), 0));
 }
 
 static PyObject *get_ordinal(PyObject *object, void *unused)
@@ -423,12 +374,11 @@ static PyMethodDef methods[] = {
      "waits for the device; 0: the renderer's."},
     {"complete", complete, METH_NOARGS, "complete(). Waits until the device has drawn to it."},
     {"read", read_bytes, METH_VARARGS, "read(array, offset). Fills an array of the host."},
-    {"write", write_bytes, METH_O, "write(array). Copies an array of the host there."},
+    {"write", write_bytes, METH_VARARGS, "write(array). Copies an array of the host there."},
     {"clone", clone_export, METH_VARARGS,
-     "clone(size, offset=0) -> Exported. A copy of so many bytes."},
+     "clone(size, offset) -> Exported. A copy of so many bytes."},
     {"copy_to", copy_to, METH_VARARGS,
-     "copy_to(address, size, stream, offset=0). To other memory of the GPU, after the stream's "
-     "work."},
+     "copy_to(address, size, offset). To other memory of the GPU."},
     {0},
 };
 

@@ -1,7 +1,6 @@
 // The extension module: its state, its exceptions, the tables of the settings.
 #include "python/module.h"
 #include "python/arguments.h"
-#include "python/values.h"
 
 #include "graph/params.h"
 
@@ -141,51 +140,29 @@ static PyObject *choice_table(void)
     return table;
 }
 
-// The exceptions under vkbloom.Error, by kind.
-static const struct error_row {
-    enum vkb_error_kind kind;
-    const char *name;
-    const char *doc;
-    PyObject **second;  // a built-in class that is its second base; NULL: none
-} error_rows[] = {
-    {VKB_ERROR_GENERAL, "Error",
-     "Something failed in the core; base of the package's own exceptions.\n\n"
-     "Attributes\n----------\n"
-     "vk_call : str or None\n    The Vulkan call that failed.\n"
-     "vk_result : int or None\n    The VkResult that it answered.",
-     NULL},
-    {VKB_ERROR_ADAPTER_NOT_FOUND, "AdapterNotFoundError",
-     "No adapter fits; says what was found, what is missing and what to install.",
-     &PyExc_RuntimeError},
-    {VKB_ERROR_DEVICE_LOST, "DeviceLostError",
-     "The device was lost or did not answer; the renderer can only be closed.", NULL},
-    {VKB_ERROR_OUT_OF_MEMORY, "OutOfMemoryError", "The host or the device has no memory left.",
-     &PyExc_MemoryError},
-    {VKB_ERROR_VALIDATION, "ValidationError", "The validation layer objected to a Vulkan call.",
-     NULL},
-    {VKB_ERROR_SHADER, "ShaderError", "The driver refused a shader.", NULL},
+// The exceptions of vkbloom/_errors.py.
+static const char *const error_names[VKB_ERROR_VALUE] = {
+    [VKB_ERROR_GENERAL] = "Error",
+    [VKB_ERROR_ADAPTER_NOT_FOUND] = "AdapterNotFoundError",
+    [VKB_ERROR_DEVICE_LOST] = "DeviceLostError",
+    [VKB_ERROR_OUT_OF_MEMORY] = "OutOfMemoryError",
+    [VKB_ERROR_VALIDATION] = "ValidationError",
+    [VKB_ERROR_SHADER] = "ShaderError",
 };
 
-static PyObject *new_error(const struct vkb_module_state *state, const struct error_row *row)
+static bool add_errors(PyObject *module)
 {
-    PyObject *error = state->errors[VKB_ERROR_GENERAL], *second = row->second ? *row->second : NULL;
-    PyObject *name = PyUnicode_FromFormat("vkbloom.%s", row->name);
-    PyObject *bases = error ? second ? PyTuple_Pack(2, error, second) : PyTuple_Pack(1, error)
-                            : PyTuple_Pack(1, PyExc_Exception);
-    // Also without a Vulkan call behind it an exception has the two attributes.
-    PyObject *members = Py_BuildValue("{sOsO}", "vk_call", Py_None, "vk_result", Py_None);
-    PyObject *type = NULL;
+    struct vkb_module_state *state = vkb_module_state(module);
+    PyObject *errors = PyImport_ImportModule("vkbloom._errors");
+    bool done = errors;
 
-    if (name && bases && members) {
-        PyObject *text = PyUnicode_AsUTF8String(name);
-        if (text)
-            type = PyErr_NewExceptionWithDoc(PyBytes_AsString(text), row->doc, bases, members);
-        Py_XDECREF(text);
+    for (int kind = VKB_ERROR_GENERAL; done && kind < VKB_ERROR_VALUE; ++kind) {
+        state->errors[kind] = PyObject_GetAttrString(errors, error_names[kind]);
+        done = PyModule_AddObjectRef(module, error_names[kind], state->errors[kind]) == 0;
     }
-    Py_XDECREF(name);
-    Py_XDECREF(bases);
-    Py_XDECREF(members);
-    return type;
+    Py_XDECREF(errors);
+    state->errors[VKB_ERROR_VALUE] = Py_NewRef(PyExc_ValueError);
+    return done;
 }
 
 static bool add_type(PyObject *module, PyType_Spec *spec, const char *name, PyObject **type)
@@ -198,15 +175,8 @@ static int execute(PyObject *module)
 {
     struct vkb_module_state *state = vkb_module_state(module);
 
-    for (size_t i = 0; i < sizeof error_rows / sizeof error_rows[0]; ++i) {
-        const struct error_row *row = &error_rows[i];
-        state->errors[row->kind] = new_error(state, row);
-        if (!state->errors[row->kind]
-            || PyModule_AddObjectRef(module, row->name, state->errors[row->kind]) < 0)
-            return -1;
-    }
-    state->errors[VKB_ERROR_VALUE] = Py_NewRef(PyExc_ValueError);
-    return add_type(module, &vkb_renderer_spec, "Renderer", &state->renderer_type)
+    return add_errors(module)
+                && add_type(module, &vkb_renderer_spec, "Renderer", &state->renderer_type)
                 && add_type(module, &vkb_source_spec, "Source", &state->source_type)
                 && add_type(module, &vkb_plan_spec, "Plan", &state->plan_type)
                 && add_type(module, &vkb_submission_spec, "Submission", &state->submission_type)

@@ -8,15 +8,6 @@ struct vkb_module_state *vkb_module_state(PyObject *module)
     return PyModule_GetState(module);
 }
 
-static bool set_steal(PyObject *object, const char *name, PyObject *value)
-{
-    if (!value)
-        return false;
-    int result = PyObject_SetAttrString(object, name, value);
-    Py_DECREF(value);
-    return result == 0;
-}
-
 PyObject *vkb_raise(const struct vkb_module_state *state, const struct vkb_error *error)
 {
     // The exception of what interrupted is there already.
@@ -26,19 +17,12 @@ PyObject *vkb_raise(const struct vkb_module_state *state, const struct vkb_error
     // Where a long message is cut, a character may be, too.
     PyObject *message =
         PyUnicode_DecodeUTF8(error->message, (Py_ssize_t)strlen(error->message), "replace");
-    if (error->kind == VKB_ERROR_VALUE) {
-        if (message)
-            PyErr_SetObject(type, message);
-        Py_XDECREF(message);
-        return NULL;
-    }
-    PyObject *exception = message ? PyObject_CallFunctionObjArgs(type, message, NULL) : NULL;
-    const bool from_vulkan = error->call[0] != '\0';
-    if (exception
-        && set_steal(exception, "vk_call",
-                     from_vulkan ? PyUnicode_FromString(error->call) : Py_NewRef(Py_None))
-        && set_steal(exception, "vk_result",
-                     from_vulkan ? PyLong_FromLong(error->result) : Py_NewRef(Py_None)))
+    PyObject *exception =
+        message && *error->call
+            ? PyObject_CallFunction(type, "Osi", message, error->call, (int)error->result)
+            : Py_XNewRef(message);
+
+    if (exception)
         PyErr_SetObject(type, exception);
     Py_XDECREF(exception);
     Py_XDECREF(message);
@@ -59,6 +43,19 @@ PyObject *vkb_adapter_tuple(const struct vkb_adapter_info *adapter)
                          (const char *)adapter->driver_uuid, (Py_ssize_t)VK_UUID_SIZE,
                          PyBool_FromLong(adapter->bundled), uuid, adapter->pci, adapter->vendor,
                          PyBool_FromLong(!adapter->nonconformant));
+}
+
+bool vkb_set_item(PyObject *tuple, Py_ssize_t index, PyObject *item)
+{
+    return item && PyTuple_SetItem(tuple, index, item) == 0;
+}
+
+bool vkb_append_item(PyObject *list, PyObject *item)
+{
+    const bool done = item && PyList_Append(list, item) == 0;
+
+    Py_XDECREF(item);
+    return done;
 }
 
 void *vkb_new_object(PyObject *type)

@@ -27,6 +27,11 @@ void vkb_dealloc(PyObject *object);
 #define VKB_TYPE_FLAGS \
     (Py_TPFLAGS_DEFAULT | Py_TPFLAGS_IMMUTABLETYPE | Py_TPFLAGS_DISALLOW_INSTANTIATION)
 
+// Sets an item of a new tuple, whose reference the tuple gets; false if it is NULL.
+bool vkb_set_item(PyObject *tuple, Py_ssize_t index, PyObject *item);
+// Appends an item to a list and releases it; false if it is NULL.
+bool vkb_append_item(PyObject *list, PyObject *item);
+
 // Raises the exception class of the error; returns NULL.
 PyObject *vkb_raise(const struct vkb_module_state *state, const struct vkb_error *error);
 

@@ -1,7 +1,6 @@
 // The Plan type: the graph of a source with some settings, made without a call to Vulkan.
 #include "python/plan.h"
 #include "python/module.h"
-#include "python/values.h"
 
 #include "execute/limits.h"
 #include "graph/dry_run.h"
@@ -41,6 +40,16 @@ static const struct vkb_device any_device = {
     .linear_texels = true,
 };
 
+static PyObject *image_names(const struct vkb_graph *graph, const uint32_t *images, uint32_t count)
+{
+    PyObject *tuple = PyTuple_New(count);
+
+    for (uint32_t i = 0; tuple && i < count; ++i)
+        if (!vkb_set_item(tuple, i, PyUnicode_FromString(graph->images[images[i]].name)))
+            Py_CLEAR(tuple);
+    return tuple;
+}
+
 // The framebuffers from the image `first` on; those with a name among the names, unless that is
 // None.
 static bool choose_outputs(struct vkb_plan *plan, uint32_t first, PyObject *names)
@@ -61,17 +70,16 @@ static bool choose_outputs(struct vkb_plan *plan, uint32_t first, PyObject *name
         plan->output_count = count;
         return true;
     }
-    PyObject *known = vkb_image_names(graph, plan->outputs, count);
+    PyObject *known = image_names(graph, plan->outputs, count);
     PyObject *module = known ? PyImport_ImportModule("vkbloom._suggestions") : NULL;
     PyObject *flags = module ? PyObject_CallMethod(module, "wanted", "OO", names, known) : NULL;
-    const bool done = flags && PyBytes_Check(flags) && PyBytes_Size(flags) == (Py_ssize_t)count;
-    for (uint32_t i = 0; done && i < count; ++i)
+    for (uint32_t i = 0; flags && i < count; ++i)
         if (PyBytes_AsString(flags)[i])
             plan->outputs[plan->output_count++] = plan->outputs[i];
     Py_XDECREF(flags);
     Py_XDECREF(module);
     Py_XDECREF(known);
-    return done;
+    return flags;
 }
 
 static PyObject *describe_output(const struct vkb_graph *graph, uint32_t image)
@@ -172,11 +180,10 @@ static bool hold_kernel(const struct vkb_module_state *state, const struct vkb_d
     return false;
 }
 
-// `renderer` is the serial of the plan's renderer, or 0; `portion` may be NULL.
+// `portion` may be NULL.
 static PyObject *new_plan(const struct vkb_module_state *state, const struct vkb_device *device,
-                          enum vkb_variants variants, uint64_t renderer, PyObject *source,
-                          PyObject *settings_object, struct vkb_settings *settings,
-                          struct portion *portion, PyObject *names)
+                          enum vkb_variants variants, PyObject *source, PyObject *settings_object,
+                          struct vkb_settings *settings, struct portion *portion, PyObject *names)
 {
     struct vkb_plan_object *self = vkb_new_object(state->plan_type);
     struct vkb_error error = {0};
@@ -184,7 +191,6 @@ static PyObject *new_plan(const struct vkb_module_state *state, const struct vkb
     if (!self)
         return NULL;
     self->source = ((struct vkb_source_object *)source)->source;
-    self->renderer = renderer;
     if ((settings->values.bloom && !vkb_read_dirt(settings_object, &self->dirt, settings))
         || !hold_kernel(state, device, settings_object, settings, self)
         || !vkb_hold_passes(state, settings_object, device->max_side, &self->source, &self->passes,
@@ -198,9 +204,9 @@ static PyObject *new_plan(const struct vkb_module_state *state, const struct vkb
         return vkb_raise(state, &error);
     }
     // A plan without a renderer cannot be run: it needs only the serials.
-    if (!renderer) {
-        vkb_release_kernel(&self->kernel);
-        vkb_release_kernel(&self->dirt);
+    if (device->adapter.physical == VK_NULL_HANDLE) {
+        PyBuffer_Release(&self->kernel);
+        PyBuffer_Release(&self->dirt);
     }
     if (!choose_outputs(&self->plan, portion ? portion->first : 0, names)
         || !(self->outputs = describe_outputs(&self->plan))) {
@@ -218,18 +224,12 @@ static PyObject *new_plan(const struct vkb_module_state *state, const struct vkb
 
 static bool read_cotangents(PyObject *tuple, struct vkb_cotangents *cotangents)
 {
-    const Py_ssize_t given = PyTuple_Size(tuple);
-
-    if (given > GATHERED_LEVELS) {
-        PyErr_Format(PyExc_ValueError, "names: %zd names are out of range, 0 to %d", given,
-                     GATHERED_LEVELS);
-        return false;
-    }
-    for (cotangents->count = 0; cotangents->count < given; ++cotangents->count) {
-        const char *name = PyUnicode_AsUTF8AndSize(PyTuple_GetItem(tuple, cotangents->count), NULL);
+    cotangents->count = (uint32_t)PyTuple_Size(tuple);
+    for (uint32_t i = 0; i < cotangents->count; ++i) {
+        const char *name = PyUnicode_AsUTF8AndSize(PyTuple_GetItem(tuple, i), NULL);
         if (!name)
             return false;
-        snprintf(cotangents->names[cotangents->count], VKB_NAME_SIZE, "%s", name);
+        snprintf(cotangents->names[i], VKB_NAME_SIZE, "%s", name);
     }
     return true;
 }
@@ -255,9 +255,8 @@ PyObject *vkb_renderer_plan(PyObject *object, PyObject *arguments)
         return vkb_raise(state, &error);
     if (!vkb_check_source(renderer, (struct vkb_source_object *)source))
         return NULL;
-    PyObject *plan =
-        new_plan(state, &renderer->device, renderer->variants, renderer->serial, source,
-                 settings_object, &settings, cotangents ? &portion : NULL, names);
+    PyObject *plan = new_plan(state, &renderer->device, renderer->variants, source, settings_object,
+                              &settings, cotangents ? &portion : NULL, names);
     if (!plan || portion.is_possible)
         return plan;
     Py_DECREF(plan);
@@ -284,7 +283,7 @@ PyObject *vkb_any_plan(PyObject *module, PyObject *arguments)
     device.adapter.device_type = variants == VKB_VARIANTS_CPU
                                    ? VK_PHYSICAL_DEVICE_TYPE_CPU
                                    : VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU;
-    return new_plan(state, &device, variants, 0, source, settings_object, &settings, NULL, names);
+    return new_plan(state, &device, variants, source, settings_object, &settings, NULL, names);
 }
 
 // The images that the pass reads, each once; returns how many.
@@ -311,8 +310,8 @@ static PyObject *describe_pass(const struct vkb_graph *graph, const char *name, 
     const uint32_t target_count = vkb_pass_targets(pass, targets);
 
     return Py_BuildValue("(ssNNsI)", name, pass->shader->name,
-                         vkb_image_names(graph, reads, read_count),
-                         vkb_image_names(graph, targets, target_count),
+                         image_names(graph, reads, read_count),
+                         image_names(graph, targets, target_count),
                          pass->variant ? pass->variant : "fragment", group);
 }
 
@@ -377,26 +376,16 @@ static PyObject *get_image_size(PyObject *object, void *unused)
 
 static PyObject *shares_images(PyObject *object, PyObject *other)
 {
-    if (Py_TYPE(other) != Py_TYPE(object)) {
-        PyErr_Format(PyExc_TypeError, "shares_images: a Plan is needed, not %R", other);
-        return NULL;
-    }
     return PyBool_FromLong(vkb_graph_same_images(&((struct vkb_plan_object *)object)->plan.graph,
                                                  &((struct vkb_plan_object *)other)->plan.graph));
 }
 
 static PyObject *is_of_image(PyObject *object, PyObject *other)
 {
-    const struct vkb_plan_object *self = (const struct vkb_plan_object *)object;
-    const struct vkb_module_state *state = PyType_GetModuleState(Py_TYPE(object));
-
-    if ((PyObject *)Py_TYPE(other) != state->source_type) {
-        PyErr_Format(PyExc_TypeError, "is_of_image: a Source is needed, not %R", other);
-        return NULL;
-    }
     const struct vkb_source *source = &((struct vkb_source_object *)other)->source;
+
     return PyBool_FromLong(source->kind == VKB_SOURCE_IMAGE
-                           && vkb_source_fits(&self->source, source));
+                           && vkb_source_fits(&((struct vkb_plan_object *)object)->source, source));
 }
 
 static int traverse(PyObject *object, visitproc visit, void *arg)
@@ -405,10 +394,8 @@ static int traverse(PyObject *object, visitproc visit, void *arg)
 
     Py_VISIT(Py_TYPE(object));
     Py_VISIT(self->outputs);
-    if (self->kernel.held)
-        Py_VISIT(self->kernel.view.obj);
-    if (self->dirt.held)
-        Py_VISIT(self->dirt.view.obj);
+    Py_VISIT(self->kernel.obj);
+    Py_VISIT(self->dirt.obj);
     Py_VISIT(self->passes.tuple);
     return 0;
 }
@@ -419,8 +406,8 @@ static void dealloc(PyObject *object)
 
     PyObject_GC_UnTrack(object);
     vkb_plan_destroy(&self->plan);
-    vkb_release_kernel(&self->kernel);
-    vkb_release_kernel(&self->dirt);
+    PyBuffer_Release(&self->kernel);
+    PyBuffer_Release(&self->dirt);
     vkb_release_passes(&self->passes);
     Py_XDECREF(self->outputs);
     vkb_free_object(object);

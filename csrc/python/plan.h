@@ -23,9 +23,8 @@ struct vkb_plan_object {
     PyObject_HEAD
     struct vkb_source source;
     struct vkb_plan plan;
-    uint64_t renderer;  // serial of its renderer; 0: none, for inspection only
     PyObject *outputs;  // ((name, shape, dtype), ...)
-    struct vkb_held_kernel kernel, dirt;
+    Py_buffer kernel, dirt;
     struct vkb_held_passes passes;
 };
 

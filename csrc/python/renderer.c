@@ -1,7 +1,6 @@
 // The Renderer type: a device with everything on it.
 #include "python/renderer.h"
 #include "python/module.h"
-#include "python/values.h"
 
 static struct vkb_module_state *state_of(PyObject *self)
 {
@@ -57,22 +56,13 @@ static PyObject *new_renderer(PyTypeObject *type, PyObject *arguments, PyObject 
     PyObject *read_cache;
     struct vkb_error error = {0};
 
-    if (keywords && PyDict_Size(keywords) > 0) {
-        PyErr_SetString(PyExc_TypeError, "Renderer takes no keyword arguments");
+    (void)keywords;
+    if (!PyArg_ParseTuple(arguments, "IspsdO:Renderer", &adapter, &driver, &validation, &variants,
+                          &frame_seconds, &read_cache))
         return NULL;
-    }
-    if (!PyArg_ParseTuple(arguments, "O&spsdO:Renderer", vkb_read_uint32, &adapter, &driver,
-                          &validation, &variants, &frame_seconds, &read_cache))
-        return NULL;
-    if (!(frame_seconds > 0.0)) {
-        PyErr_SetString(PyExc_ValueError, "frame_seconds: a number above 0 is needed");
-        return NULL;
-    }
     struct vkb_renderer *self = vkb_new_object((PyObject *)type);
     if (!self)
         return NULL;
-    static VKB_ATOMIC(uint64_t) last_serial;
-    self->serial = ++last_serial;
     self->process = vkb_current_process();
     self->lock = PyThread_allocate_lock();
     if (!self->lock)
@@ -320,8 +310,7 @@ static PyMethodDef methods[] = {
     {"export", vkb_renderer_export, METH_O,
      "export(size) -> Exported. Memory of the device for an array; reused when it is gone."},
     {"snapshot", vkb_renderer_snapshot, METH_VARARGS,
-     "snapshot(what, address, size, stream, waits) -> Exported. A copy of CUDA's memory, after the "
-     "stream's work (0: the copy need not wait). `waits`: until it is complete; else `run` does."},
+     "snapshot(address, size) -> Exported. A copy of CUDA's memory, on the renderer's stream."},
     {"pipeline_cache", pipeline_cache, METH_NOARGS, "The driver's pipeline cache as bytes."},
     {0},
 };

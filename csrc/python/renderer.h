@@ -36,8 +36,7 @@ struct vkb_renderer {
     long process;                      // that opened it; a forked process must not use the device
     atomic_bool open;                  // written with the lock, read without it
     const struct vkb_messages
-        *before;      // receives the messages when the thread with the lock leaves
-    uint64_t serial;  // identifies the renderer of a plan; never 0
+        *before;  // receives the messages when the thread with the lock leaves
     // Written with the lock and vkb_memory. Used with vkb_memory, if the renderer is open then.
     VKB_ATOMIC(struct vkb_pages *) pages;          // of large arrays; NULL: closed
     VKB_ATOMIC(struct vkb_residents *) residents;  // of handles; NULL: closed

@@ -1,7 +1,6 @@
 // Plans run on a renderer: the Submission type. The GIL is released around all device work.
 #include "python/module.h"
 #include "python/plan.h"
-#include "python/values.h"
 
 #include <string.h>
 
@@ -20,41 +19,6 @@ static struct vkb_module_state *state_of(PyObject *object)
 static const struct vkb_plan_object *plan_at(PyObject *plans, Py_ssize_t index)
 {
     return (const struct vkb_plan_object *)PyTuple_GetItem(plans, index);
-}
-
-static bool check_plan(const struct vkb_renderer *renderer, const struct vkb_source *source,
-                       PyObject *plans, Py_ssize_t index)
-{
-    const struct vkb_plan_object *plan = plan_at(plans, index);
-
-    if (!PyObject_TypeCheck(PyTuple_GetItem(plans, index),
-                            (PyTypeObject *)state_of((PyObject *)renderer)->plan_type))
-        PyErr_SetString(PyExc_TypeError, "plans: a tuple of Plans is needed");
-    else if (plan->renderer != renderer->serial)
-        PyErr_SetString(PyExc_ValueError, "plans: a plan was made for another renderer");
-    else if (!vkb_source_fits(&plan->source, source))
-        PyErr_SetString(PyExc_ValueError, "plans: a plan was made for another source");
-    else if (!vkb_graph_same_images(&plan_at(plans, 0)->plan.graph, &plan->plan.graph))
-        PyErr_SetString(PyExc_ValueError, "plans: their images differ");
-    else
-        return true;
-    return false;
-}
-
-static bool check_plans(const struct vkb_renderer *renderer, const struct vkb_source *source,
-                        PyObject *plans, PyObject *arrays)
-{
-    const Py_ssize_t count = PyTuple_Size(plans);
-
-    if (count < 1 || PyTuple_Size(arrays) != count) {
-        PyErr_Format(PyExc_ValueError, "arrays: %zd tuples do not match %zd plans",
-                     PyTuple_Size(arrays), count);
-        return false;
-    }
-    for (Py_ssize_t i = 0; i < count; ++i)
-        if (!check_plan(renderer, source, plans, i))
-            return false;
-    return true;
 }
 
 // Allocates the memory that the requests need in addition to their plans.
@@ -80,11 +44,6 @@ static struct vkb_pending *new_pending(PyObject *source, PyObject *plans, struct
     if (pending->resident)
         ++pending->resident->uses;
     VKB_UNLOCK(vkb_memory);
-    if (given->residents && !pending->resident) {
-        vkb_fail(error, VKB_ERROR_VALUE, "image: another upload has taken its memory");
-        vkb_pending_release(pending);
-        return NULL;
-    }
     pending->requests = vkb_alloc(error, (size_t)count, sizeof *pending->requests);
     pending->outputs = vkb_alloc(error, output_count, sizeof *pending->outputs);
     pending->views = vkb_alloc(error, output_count, sizeof *pending->views);
@@ -97,30 +56,6 @@ static struct vkb_pending *new_pending(PyObject *source, PyObject *plans, struct
     return NULL;
 }
 
-static bool hold_exported(const struct vkb_renderer *renderer, struct vkb_pending *pending,
-                          const struct vkb_plan *plan, uint32_t output, PyObject *array)
-{
-    const struct vkb_image_row *row = &plan->graph.images[plan->outputs[output]];
-    const struct vkb_exports *exports;
-    struct vkb_export *exported = vkb_export_of(array, &exports);
-    const uint32_t layers = plan->graph.layers;
-    const size_t stride = layers ? vkb_layer_stride(plan, output) : 0;
-
-    if (exports != renderer->exports
-        || exported->size < (layers ? layers * stride : vkb_output_size(plan, output))) {
-        PyErr_Format(PyExc_ValueError, "%s: the memory does not fit", row->name);
-        return false;
-    }
-    pending->views[pending->view_count] = (Py_buffer){.obj = Py_NewRef(array)};
-    pending->outputs[pending->view_count++] = (struct vkb_output){
-        .row_count = row->height,
-        .channels = vkb_graph_channels(&plan->graph, plan->outputs[output]),
-        .exported = exported,
-        .layer_stride = stride,
-    };
-    return true;
-}
-
 static struct vkb_page_run *find_pages(const struct vkb_renderer *renderer, const void *memory)
 {
     VKB_LOCK(vkb_memory);
@@ -129,36 +64,29 @@ static struct vkb_page_run *find_pages(const struct vkb_renderer *renderer, cons
     return run;
 }
 
+// An array has the output's size. None: the output stays in its image.
 static bool hold_array(const struct vkb_renderer *renderer, struct vkb_pending *pending,
-                       const struct vkb_plan *plan, uint32_t output, PyObject *array)
+                       const struct vkb_plan *plan, uint32_t index, PyObject *array)
 {
-    const struct vkb_image_row *row = &plan->graph.images[plan->outputs[output]];
+    const struct vkb_exports *exports;
     Py_buffer *view = &pending->views[pending->view_count];
+    struct vkb_output *output = &pending->outputs[pending->view_count];
 
-    if (plan->graph.layers && !vkb_is_exported(array)) {
-        PyErr_Format(PyExc_TypeError, "%s: a batch stays on the device", row->name);
-        return false;
-    }
-    if (array == Py_None) {
-        // The view stays without an object.
-        pending->outputs[pending->view_count++].row_count = row->height;
-        return true;
-    }
-    if (vkb_is_exported(array))
-        return hold_exported(renderer, pending, plan, output, array);
-    if (PyObject_GetBuffer(array, view, PyBUF_WRITABLE | PyBUF_C_CONTIGUOUS) < 0)
-        return false;
-    pending->outputs[pending->view_count++] = (struct vkb_output){
-        .row_count = row->height,
-        .channels = vkb_graph_channels(&plan->graph, plan->outputs[output]),
-        .memory = view->buf,
+    output->row_count = plan->graph.images[plan->outputs[index]].height;
+    output->channels = vkb_graph_channels(&plan->graph, plan->outputs[index]);
+    if (vkb_is_exported(array)) {
+        view->obj = Py_NewRef(array);
+        output->exported = vkb_export_of(array, &exports);
+        output->layer_stride = plan->graph.layers ? vkb_layer_stride(plan, index) : 0;
+    } else if (array != Py_None) {
+        if (PyObject_GetBuffer(array, view, PyBUF_WRITABLE | PyBUF_C_CONTIGUOUS) < 0)
+            return false;
+        output->memory = view->buf;
         // Only large arrays are looked up: the search takes time in proportion to the kept arrays.
-        .pages = view->len >= VKB_IMPORTED_BYTES ? find_pages(renderer, view->buf) : NULL,
-    };
-    if ((size_t)view->len == vkb_output_size(plan, output))
-        return true;
-    PyErr_Format(PyExc_ValueError, "%s: the array has the wrong size", row->name);
-    return false;
+        output->pages = view->len >= VKB_IMPORTED_BYTES ? find_pages(renderer, view->buf) : NULL;
+    }
+    ++pending->view_count;
+    return true;
 }
 
 static bool hold_arrays(const struct vkb_renderer *renderer, struct vkb_pending *pending,
@@ -176,13 +104,6 @@ static bool hold_arrays(const struct vkb_renderer *renderer, struct vkb_pending 
             .layer_non_finite = pending->layer_non_finite,
         };
         passes += plan->graph.pass_count;
-        if (!vkb_require_tuple(tuple, "arrays"))
-            return false;
-        if (PyTuple_Size(tuple) != (Py_ssize_t)plan->output_count) {
-            PyErr_Format(PyExc_ValueError, "arrays: %zd arrays do not match %u framebuffers",
-                         PyTuple_Size(tuple), plan->output_count);
-            return false;
-        }
         for (uint32_t output = 0; output < plan->output_count; ++output)
             if (!hold_array(renderer, pending, plan, output, PyTuple_GetItem(tuple, output)))
                 return false;
@@ -222,7 +143,7 @@ static bool submit(struct vkb_renderer *renderer, const struct vkb_source_object
     };
 
     for (int kind = 0; kind < VKB_INPUT_COUNT; ++kind)
-        if (source->images[kind].held)
+        if (source->images[kind].view.obj)
             data.inputs[kind] = &source->images[kind].input;
 
     if (!vkb_renderer_enter(renderer, error))
@@ -242,7 +163,7 @@ static PyObject *run(struct vkb_renderer *renderer, PyObject *source, PyObject *
     struct vkb_source_object *given = (struct vkb_source_object *)source;
     struct vkb_error error = {0};
 
-    if (!vkb_check_source(renderer, given) || !check_plans(renderer, &given->source, plans, arrays))
+    if (!vkb_check_source(renderer, given))
         return NULL;
     struct submission *self = new_submission(renderer, source, plans, arrays);
     if (self && !submit(renderer, given, self->pending, in_place, show, &error)) {
@@ -274,9 +195,8 @@ PyObject *vkb_renderer_show(PyObject *object, PyObject *arguments)
     struct vkb_show show = {0};
     int linear;
 
-    if (!PyArg_ParseTuple(arguments, "O!O!KO&O&p:show", state->source_type, &source,
-                          state->plan_type, &plan, &screen, vkb_read_uint32, &show.extent.width,
-                          vkb_read_uint32, &show.extent.height, &linear))
+    if (!PyArg_ParseTuple(arguments, "O!O!KIIp:show", state->source_type, &source, state->plan_type,
+                          &plan, &screen, &show.extent.width, &show.extent.height, &linear))
         return NULL;
     show.screen = (struct vkb_screen *)(uintptr_t)screen;
     show.linear = linear;
@@ -312,10 +232,10 @@ static PyObject *describe_non_finite(const struct vkb_request *request)
     PyObject *tuple = PyTuple_New(2 * (Py_ssize_t)count);
 
     for (uint32_t i = 0; tuple && i < count; ++i) {
-        const struct vkb_non_finite *own =
+        const struct vkb_non_finite *input =
             layers ? &request->layer_non_finite[i] : &request->non_finite;
-        if (!vkb_set_item(tuple, 2 * (Py_ssize_t)i, PyLong_FromUnsignedLongLong(own->nan))
-            || !vkb_set_item(tuple, 2 * (Py_ssize_t)i + 1, PyLong_FromUnsignedLongLong(own->inf)))
+        if (!vkb_set_item(tuple, 2 * (Py_ssize_t)i, PyLong_FromUnsignedLongLong(input->nan))
+            || !vkb_set_item(tuple, 2 * (Py_ssize_t)i + 1, PyLong_FromUnsignedLongLong(input->inf)))
             Py_CLEAR(tuple);
     }
     return tuple;

@@ -1,6 +1,5 @@
 // A scene as Python packs it: blocks of bytes (_scene/blocks.py) and arrays.
 #include "python/arguments.h"
-#include "python/values.h"
 
 #include <string.h>
 
@@ -22,13 +21,6 @@ struct picture_block {
     uint32_t address_modes[2], filters[3];  // filters: of magnification, minification, mip levels
 };
 
-static bool refuse(const char *what)
-{
-    PyErr_Format(PyExc_ValueError, "scene: %s has the wrong size or values out of their ranges",
-                 what);
-    return false;
-}
-
 // Holds the next array, which must have that size.
 static bool hold_next(struct vkb_held_scene *scene, PyObject *arrays, size_t size,
                       const void **memory)
@@ -36,26 +28,15 @@ static bool hold_next(struct vkb_held_scene *scene, PyObject *arrays, size_t siz
     const Py_ssize_t next = (Py_ssize_t)scene->view_count;
     Py_buffer *view = &scene->views[next];
 
-    if (next == PyTuple_Size(arrays))
-        return refuse("the number of arrays");
     if (PyObject_GetBuffer(PyTuple_GetItem(arrays, next), view, PyBUF_C_CONTIGUOUS) < 0)
         return false;
     ++scene->view_count;
     *memory = view->buf;
-    return (size_t)view->len == size || refuse("an array");
-}
-
-static bool has_surfaces(const struct vkb_mesh_data *mesh, uint32_t texture_count)
-{
-    uint64_t taken = 0;
-    bool valid = true;
-
-    for (uint32_t i = 0; valid && i < mesh->surface_count; ++i) {
-        taken += mesh->surfaces[i].index_count;
-        valid =
-            mesh->surfaces[i].base < texture_count && mesh->surfaces[i].emission < texture_count;
-    }
-    return valid && taken <= mesh->index_count;
+    if ((size_t)view->len == size)
+        return true;
+    PyErr_Format(PyExc_ValueError, "scene: an array of %zu bytes is needed, not of %zd", size,
+                 view->len);
+    return false;
 }
 
 static bool read_mesh(struct vkb_held_scene *scene, PyObject *arrays, const uint32_t counts[3],
@@ -81,17 +62,7 @@ static bool read_mesh(struct vkb_held_scene *scene, PyObject *arrays, const uint
         .index_count = counts[1],
         .surface_count = counts[2],
     };
-    return has_surfaces(mesh, scene->data.texture_count) || refuse("a surface");
-}
-
-static bool is_picture(const struct picture_block *block, uint32_t layers)
-{
-    const uint32_t longest = block->width > block->height ? block->width : block->height;
-
-    return block->format < VKB_FORMAT_COUNT && vkb_formats[block->format].channels == 4
-        && block->width > 0 && block->height > 0 && longest <= VKB_MAX_SIDE
-        && block->level_count <= VKB_MAX_MIP_LEVELS && longest >> (block->level_count - 1) > 0
-        && (layers == 1 || block->width == block->height);
+    return true;
 }
 
 // The mip levels, with the layers of a cube one after the other.
@@ -100,10 +71,6 @@ static bool read_picture(struct vkb_held_scene *scene, PyObject *arrays,
                          struct vkb_picture_data *picture)
 {
     picture->layers = layers;
-    if (block->level_count == 0)
-        return layers > 1 || refuse("a texture");
-    if (!is_picture(block, layers))
-        return refuse("a picture");
     picture->format = (enum vkb_format)block->format;
     picture->width = block->width;
     picture->height = block->height;
@@ -123,10 +90,6 @@ static bool read_texture(struct vkb_held_scene *scene, PyObject *arrays,
 {
     const uint32_t *modes = block->address_modes, *filters = block->filters;
 
-    if (modes[0] > VK_SAMPLER_ADDRESS_MODE_CLAMP_TO_EDGE
-        || modes[1] > VK_SAMPLER_ADDRESS_MODE_CLAMP_TO_EDGE || filters[0] > VK_FILTER_LINEAR
-        || filters[1] > VK_FILTER_LINEAR || filters[2] > VK_SAMPLER_MIPMAP_MODE_LINEAR)
-        return refuse("a texture");
     *texture = (struct vkb_texture_data){
         .address_modes = {(VkSamplerAddressMode)modes[0], (VkSamplerAddressMode)modes[1]},
         .mag_filter = (VkFilter)filters[0],
@@ -136,17 +99,15 @@ static bool read_texture(struct vkb_held_scene *scene, PyObject *arrays,
     return read_picture(scene, arrays, block, 1, &texture->picture);
 }
 
-static bool allocate(const struct scene_block *block, PyObject *pictures, PyObject *arrays,
+static bool allocate(const struct scene_block *block, PyObject *arrays,
                      struct vkb_held_scene *scene)
 {
-    const size_t picture_count = 1 + (size_t)block->texture_count;
     struct vkb_error error;
 
-    if ((size_t)PyBytes_Size(pictures) != picture_count * sizeof(struct picture_block))
-        return refuse("the number of pictures");
     // Views must not move once they are held.
     scene->views = vkb_alloc(&error, (size_t)PyTuple_Size(arrays) + 1, sizeof *scene->views);
-    scene->data.textures = vkb_alloc(&error, picture_count, sizeof *scene->data.textures);
+    scene->data.textures =
+        vkb_alloc(&error, 1 + (size_t)block->texture_count, sizeof *scene->data.textures);
     if (!scene->views || !scene->data.textures)
         PyErr_NoMemory();
     return scene->views && scene->data.textures;
@@ -159,13 +120,12 @@ bool vkb_read_scene(PyObject *bytes, PyObject *pictures, PyObject *arrays,
     struct picture_block picture;
     struct vkb_scene_data *data = &scene->data;
 
-    if (PyBytes_Size(bytes) != sizeof block)
-        return refuse("the block");
+    if (PyBytes_Size(bytes) != sizeof block) {
+        PyErr_SetString(PyExc_ValueError, "scene: the block has the wrong size");
+        return false;
+    }
     memcpy(&block, PyBytes_AsString(bytes), sizeof block);
-    // 0 is the serial of no scene.
-    if (block.serial == 0 || block.shading[VKB_NAME_SIZE - 1] || block.body[0] == 0)
-        return refuse("the block");
-    if (!allocate(&block, pictures, arrays, scene))
+    if (!allocate(&block, arrays, scene))
         return false;
     const char *next = PyBytes_AsString(pictures);
     data->serial = block.serial;

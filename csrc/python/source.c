@@ -1,37 +1,14 @@
 // The Source type: an image or a scene, converted once from Python objects.
 #include "python/module.h"
 #include "python/plan.h"
-#include "python/values.h"
-
-// Whether the emission or the mask fits the image. A missing one does.
-static bool fits_image(const struct vkb_source_object *self, enum vkb_input_kind kind)
-{
-    const struct vkb_input *image = &self->images[VKB_INPUT_IMAGE].input;
-    const struct vkb_input *other = &self->images[kind].input;
-
-    if (!self->images[kind].held
-        || (other->width == image->width && other->height == image->height
-            && (kind == VKB_INPUT_MASK
-                || (other->format == image->format && other->channels == image->channels))))
-        return true;
-    PyErr_Format(PyExc_ValueError, "%s: its size or dtype differs from the image's",
-                 kind == VKB_INPUT_MASK ? "mask" : "emission");
-    return false;
-}
 
 static bool read_levels(PyObject *levels, struct vkb_source_object *self)
 {
     struct vkb_image_source *image = &self->source.image;
-    const Py_ssize_t count = PyTuple_Size(levels);
 
-    if (count > GATHERED_LEVELS) {
-        PyErr_Format(PyExc_ValueError, "levels: %zd levels are out of range, 0 to %d", count,
-                     GATHERED_LEVELS);
-        return false;
-    }
-    for (Py_ssize_t i = 0; i < count; ++i) {
+    for (Py_ssize_t i = 0; i < PyTuple_Size(levels); ++i) {
         struct vkb_held_image *held = &self->images[VKB_INPUT_LEVEL + i];
-        if (!vkb_read_image(PyTuple_GetItem(levels, i), "levels", held))
+        if (!vkb_read_image(PyTuple_GetItem(levels, i), held))
             return false;
         image->levels[image->level_count++] = (struct vkb_level){
             .format = held->input.format,
@@ -51,11 +28,9 @@ PyObject *vkb_image_source(PyObject *module, PyObject *arguments)
     struct vkb_source_object *self = vkb_new_object(vkb_module_state(module)->source_type);
     if (!self)
         return NULL;
-    if (!vkb_read_image(image, "image", &self->images[VKB_INPUT_IMAGE])
-        || (emission != Py_None
-            && !vkb_read_image(emission, "emission", &self->images[VKB_INPUT_EMISSION]))
-        || (mask != Py_None && !vkb_read_mask(mask, &self->images[VKB_INPUT_MASK]))
-        || !fits_image(self, VKB_INPUT_EMISSION) || !fits_image(self, VKB_INPUT_MASK)) {
+    if (!vkb_read_image(image, &self->images[VKB_INPUT_IMAGE])
+        || (emission != Py_None && !vkb_read_image(emission, &self->images[VKB_INPUT_EMISSION]))
+        || (mask != Py_None && !vkb_read_image(mask, &self->images[VKB_INPUT_MASK]))) {
         Py_DECREF(self);
         return NULL;
     }
@@ -97,8 +72,7 @@ bool vkb_check_source(const struct vkb_renderer *renderer, const struct vkb_sour
     const struct vkb_exports *exports = renderer->exports;
 
     for (int kind = 0; kind < VKB_INPUT_COUNT; ++kind)
-        if (source->images[kind].held && source->images[kind].input.exported
-            && exports == renderer->exports)
+        if (source->images[kind].input.exported && exports == renderer->exports)
             vkb_export_of(source->images[kind].view.obj, &exports);
     // A closed renderer says so itself.
     if (!renderer->open)
@@ -117,7 +91,7 @@ bool vkb_check_source(const struct vkb_renderer *renderer, const struct vkb_sour
 static bool is_exported(const struct vkb_source_object *source)
 {
     for (int kind = 0; kind < VKB_INPUT_COUNT; ++kind)
-        if (source->images[kind].held && source->images[kind].input.exported)
+        if (source->images[kind].input.exported)
             return true;
     return false;
 }
@@ -153,7 +127,7 @@ static bool stage_all(struct vkb_renderer *renderer, struct vkb_resident *reside
                       const struct vkb_source_object *source, struct vkb_error *error)
 {
     for (int kind = 0; kind < VKB_INPUT_COUNT; ++kind)
-        if (source->images[kind].held
+        if (source->images[kind].view.obj
             && !vkb_resident_fill(&renderer->device, resident, kind, &source->images[kind].input,
                                   &renderer->frame.cache.clock, error))
             return false;
@@ -176,19 +150,13 @@ PyObject *vkb_renderer_upload(PyObject *object, PyObject *arguments)
 {
     struct vkb_renderer *renderer = (struct vkb_renderer *)object;
     const struct vkb_module_state *state = PyType_GetModuleState(Py_TYPE(object));
-    PyTypeObject *type = (PyTypeObject *)state->source_type;
     PyObject *given, *spare;
     int recycled;
     struct vkb_error error = {0};
 
-    if (!PyArg_ParseTuple(arguments, "O!Op:upload", type, &given, &spare, &recycled))
+    if (!PyArg_ParseTuple(arguments, "O!Op:upload", state->source_type, &given, &spare, &recycled))
         return NULL;
     const struct vkb_source_object *source = (struct vkb_source_object *)given;
-    if (!source->images[VKB_INPUT_IMAGE].held || is_exported(source)
-        || (spare != Py_None && !PyObject_TypeCheck(spare, type))) {
-        PyErr_SetString(PyExc_ValueError, "upload: an image in host memory is needed");
-        return NULL;
-    }
     struct vkb_source_object *self = vkb_new_object(state->source_type);
     if (!self)
         return NULL;
@@ -210,8 +178,7 @@ static int traverse(PyObject *object, visitproc visit, void *arg)
 
     Py_VISIT(Py_TYPE(object));
     for (int kind = 0; kind < VKB_INPUT_COUNT; ++kind)
-        if (self->images[kind].held)
-            Py_VISIT(self->images[kind].view.obj);
+        Py_VISIT(self->images[kind].view.obj);
     for (size_t i = 0; i < self->scene.view_count; ++i)
         Py_VISIT(self->scene.views[i].obj);
     return 0;
@@ -224,8 +191,10 @@ static int clear(PyObject *object)
 
     self->source = (struct vkb_source){0};
     vkb_release_scene(&self->scene);
-    for (int kind = 0; kind < VKB_INPUT_COUNT; ++kind)
-        vkb_release_image(&self->images[kind]);
+    for (int kind = 0; kind < VKB_INPUT_COUNT; ++kind) {
+        PyBuffer_Release(&self->images[kind].view);
+        self->images[kind] = (struct vkb_held_image){0};
+    }
     // A submission that uses it has this object, and is released first. A forked process keeps its
     // copy: the device is its parent's.
     if (self->resident && self->process == vkb_current_process()) {

@@ -105,32 +105,12 @@ static bool load_textures(const struct vkb_device *device, VkCommandBuffer comma
     return true;
 }
 
-static bool check_indices(const struct vkb_device *device, const struct vkb_mesh_data *data,
-                          struct vkb_error *error)
-{
-    uint32_t largest = 0;
-
-    for (uint32_t i = 0; i < data->index_count; ++i)
-        if (data->indices[i] > largest)
-            largest = data->indices[i];
-    if (data->index_count > 0 && largest >= data->vertex_count)
-        return vkb_fail(error, VKB_ERROR_VALUE, "scene: index %u is beyond the mesh's %u vertices",
-                        largest, data->vertex_count);
-    if (largest > device->limits.maxDrawIndexedIndexValue)
-        return vkb_fail(error, VKB_ERROR_VALUE,
-                        "scene: index %u is beyond this adapter's limit of %u", largest,
-                        device->limits.maxDrawIndexedIndexValue);
-    return true;
-}
-
 bool vkb_scene_begin(const struct vkb_device *device, struct vkb_commands *commands,
                      const struct vkb_scene_data *data, struct vkb_scene *scene,
                      struct vkb_error *error)
 {
     struct vkb_staging *staging = &scene->staging;
 
-    if (!check_indices(device, &data->body, error) || !check_indices(device, &data->glow, error))
-        return false;
     vkb_scene_destroy(device, scene);
     bool done = vkb_buffer_create(device, VKB_MEMORY_UPLOAD, VK_BUFFER_USAGE_TRANSFER_SRC_BIT,
                                   scene_size(data), &staging->buffer, error)

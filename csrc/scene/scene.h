@@ -64,7 +64,7 @@ struct vkb_scene {
 
 // Records the upload of the data, which replaces the scene's content. The device must not use the
 // old content any more. Call vkb_scene_end when the commands have run. On failure the scene is
-// empty or unchanged. An index beyond the vertices is a failure.
+// empty or unchanged.
 bool vkb_scene_begin(const struct vkb_device *device, struct vkb_commands *commands,
                      const struct vkb_scene_data *data, struct vkb_scene *scene,
                      struct vkb_error *error);

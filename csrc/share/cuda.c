@@ -17,8 +17,6 @@ enum {
     CAPTURE_MODE_RELAXED = 2,
     STREAM_NON_BLOCKING = 1,
     EVENT_DISABLE_TIMING = 2,
-    ATTRIBUTE_IS_MANAGED = 8,
-    ATTRIBUTE_DEVICE_ORDINAL = 9,
     HANDLE_OPAQUE_FD = 1,
     MEMORY_DEDICATED = 1,
     HANDLE_TIMELINE_FD = 9,
@@ -75,7 +73,6 @@ struct uuid {
     NAME(cuStreamCreate, "cuStreamCreate", (void **, unsigned)) \
     NAME(cuStreamDestroy, "cuStreamDestroy_v2", (void *)) \
     NAME(cuStreamSynchronize, "cuStreamSynchronize", (void *)) \
-    NAME(cuStreamWaitEvent, "cuStreamWaitEvent", (void *, void *, unsigned)) \
     NAME(cuStreamIsCapturing, "cuStreamIsCapturing", (void *, int *)) \
     NAME(cuThreadExchangeStreamCaptureMode, "cuThreadExchangeStreamCaptureMode", (int *)) \
     NAME(cuEventCreate, "cuEventCreate", (void **, unsigned)) \
@@ -83,7 +80,6 @@ struct uuid {
     NAME(cuEventRecord, "cuEventRecord", (void *, void *)) \
     NAME(cuEventQuery, "cuEventQuery", (void *)) \
     NAME(cuEventSynchronize, "cuEventSynchronize", (void *)) \
-    NAME(cuPointerGetAttribute, "cuPointerGetAttribute", (void *, int, vkb_cuda_address)) \
     NAME(cuImportExternalMemory, "cuImportExternalMemory", \
          (void **, const struct memory_handle *)) \
     NAME(cuExternalMemoryGetMappedBuffer, "cuExternalMemoryGetMappedBuffer", \
@@ -97,11 +93,7 @@ struct uuid {
     NAME(cuWaitExternalSemaphoresAsync, "cuWaitExternalSemaphoresAsync", \
          (void *const *, const struct semaphore_point *, unsigned, void *)) \
     NAME(cuMemFree, "cuMemFree_v2", (vkb_cuda_address)) \
-    NAME(cuMemcpyDtoDAsync, "cuMemcpyDtoDAsync_v2", \
-         (vkb_cuda_address, vkb_cuda_address, size_t, void *)) \
-    NAME(cuMemcpyDtoHAsync, "cuMemcpyDtoHAsync_v2", (void *, vkb_cuda_address, size_t, void *)) \
-    NAME(cuMemcpyHtoDAsync, "cuMemcpyHtoDAsync_v2", \
-         (vkb_cuda_address, const void *, size_t, void *)) \
+    NAME(cuMemcpyAsync, "cuMemcpyAsync", (vkb_cuda_address, vkb_cuda_address, size_t, void *)) \
     NAME(cuCtxRecordEvent, "cuCtxRecordEvent", (void *, void *)) \
     NAME(cuCtxWaitEvent, "cuCtxWaitEvent", (void *, void *))
 
@@ -293,9 +285,9 @@ void vkb_cuda_leave(struct vkb_cuda *cuda)
     cuda->cuCtxPopCurrent(&context);
 }
 
-bool vkb_cuda_require_no_capture(struct vkb_cuda *cuda, void *stream, struct vkb_error *error)
+bool vkb_cuda_require_no_capture(struct vkb_cuda *cuda, struct vkb_error *error)
 {
-    return enter_streams(cuda, stream, error) && leave(cuda, true);
+    return enter_streams(cuda, NULL, error) && leave(cuda, true);
 }
 
 int vkb_cuda_ordinal(const struct vkb_cuda *cuda)
@@ -415,66 +407,26 @@ bool vkb_cuda_settle(struct vkb_cuda *cuda)
     return enter(cuda, &ignored) && leave(cuda, cuda->cuCtxSynchronize() == 0);
 }
 
-bool vkb_cuda_check(struct vkb_cuda *cuda, const char *what, vkb_cuda_address address,
-                    struct vkb_error *error)
+static bool copy(struct vkb_cuda *cuda, vkb_cuda_address to, vkb_cuda_address from, size_t size,
+                 struct vkb_error *error)
 {
-    int ordinal = -1;
-    unsigned managed = 0;
-    char theirs[VKB_CUDA_NAME_SIZE], ours[VKB_CUDA_NAME_SIZE];
-
-    if (!enter(cuda, error))
-        return false;
-    const bool known = leave(
-        cuda, cuda->cuPointerGetAttribute(&ordinal, ATTRIBUTE_DEVICE_ORDINAL, address) == 0
-                  && cuda->cuPointerGetAttribute(&managed, ATTRIBUTE_IS_MANAGED, address) == 0);
-    if (!known)
-        return vkb_fail(error, VKB_ERROR_VALUE,
-                        "%s: its address is not in CUDA's memory; it may have been freed", what);
-    if (managed)
-        return vkb_fail(error, VKB_ERROR_VALUE,
-                        "%s: it is in managed (unified) memory; copy it to the device's own", what);
-    if (ordinal == cuda->ordinal)
-        return true;
-    vkb_cuda_name(cuda, ordinal, theirs);
-    vkb_cuda_name(cuda, cuda->ordinal, ours);
-    return vkb_fail(error, VKB_ERROR_VALUE,
-                    "%s: it is on %s, and the renderer is on %s; open a renderer with the array's "
-                    "GPU as adapter, or move the array",
-                    what, theirs, ours);
-}
-
-// The stream waits for what another one has got so far.
-static bool follow(struct vkb_cuda *cuda, void *after, struct vkb_error *error)
-{
-    void *event = NULL;
-
-    if (!after)
-        return true;
-    const bool done = CU(error, cuda->cuEventCreate(&event, EVENT_DISABLE_TIMING))
-                   && CU(error, cuda->cuEventRecord(event, after))
-                   && CU(error, cuda->cuStreamWaitEvent(cuda->stream, event, 0));
-    if (event)
-        cuda->cuEventDestroy(event);
-    return done;
+    return CU(error, cuda->cuMemcpyAsync(to, from, size, cuda->stream));
 }
 
 bool vkb_cuda_copy(struct vkb_cuda *cuda, vkb_cuda_address to, vkb_cuda_address from, size_t size,
-                   void *after, struct vkb_error *error)
+                   struct vkb_error *error)
 {
-    return enter_streams(cuda, after, error)
-        && leave(cuda, follow(cuda, after, error)
-                           && CU(error, cuda->cuMemcpyDtoDAsync(to, from, size, cuda->stream))
+    return enter_streams(cuda, NULL, error)
+        && leave(cuda, copy(cuda, to, from, size, error)
                            && CU(error, cuda->cuStreamSynchronize(cuda->stream)));
 }
 
 bool vkb_cuda_begin_copy(struct vkb_cuda *cuda, struct vkb_cuda_memory *to, vkb_cuda_address from,
-                         size_t size, void *after, struct vkb_error *error)
+                         size_t size, struct vkb_error *error)
 {
-    return enter_streams(cuda, after, error)
-        && leave(cuda,
-                 follow(cuda, after, error)
-                     && CU(error, cuda->cuMemcpyDtoDAsync(to->address, from, size, cuda->stream))
-                     && CU(error, cuda->cuEventRecord(to->event, cuda->stream)));
+    return enter_streams(cuda, NULL, error)
+        && leave(cuda, copy(cuda, to->address, from, size, error)
+                           && CU(error, cuda->cuEventRecord(to->event, cuda->stream)));
 }
 
 bool vkb_cuda_order_copy(struct vkb_cuda *cuda, const struct vkb_cuda_memory *to)
@@ -489,22 +441,6 @@ bool vkb_cuda_end_copy(struct vkb_cuda *cuda, const struct vkb_cuda_memory *to,
                        struct vkb_error *error)
 {
     return enter(cuda, error) && leave(cuda, CU(error, cuda->cuEventSynchronize(to->event)));
-}
-
-bool vkb_cuda_read(struct vkb_cuda *cuda, void *to, vkb_cuda_address from, size_t size,
-                   struct vkb_error *error)
-{
-    return enter_streams(cuda, NULL, error)
-        && leave(cuda, CU(error, cuda->cuMemcpyDtoHAsync(to, from, size, cuda->stream))
-                           && CU(error, cuda->cuStreamSynchronize(cuda->stream)));
-}
-
-bool vkb_cuda_write(struct vkb_cuda *cuda, vkb_cuda_address to, const void *from, size_t size,
-                    struct vkb_error *error)
-{
-    return enter_streams(cuda, NULL, error)
-        && leave(cuda, CU(error, cuda->cuMemcpyHtoDAsync(to, from, size, cuda->stream))
-                           && CU(error, cuda->cuStreamSynchronize(cuda->stream)));
 }
 
 bool vkb_cuda_mark(struct vkb_cuda *cuda, struct vkb_cuda_memory *memory)

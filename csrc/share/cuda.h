@@ -28,9 +28,9 @@ void vkb_cuda_close(struct vkb_cuda *cuda);
 bool vkb_cuda_enter(struct vkb_cuda *cuda, struct vkb_error *error);
 void vkb_cuda_leave(struct vkb_cuda *cuda);
 
-// Fails if the own stream or another one (NULL: none) is captured into a graph, which stays as it
-// is. All functions below that give work to streams do so, too.
-bool vkb_cuda_require_no_capture(struct vkb_cuda *cuda, void *stream, struct vkb_error *error);
+// Fails if the own stream is captured into a graph, which stays as it is. All functions below that
+// give work to streams do so, too.
+bool vkb_cuda_require_no_capture(struct vkb_cuda *cuda, struct vkb_error *error);
 
 // Imports an exported timeline semaphore. The descriptor belongs to CUDA or is closed.
 void *vkb_cuda_import_semaphore(struct vkb_cuda *cuda, int descriptor, struct vkb_error *error);
@@ -62,28 +62,19 @@ bool vkb_cuda_import(struct vkb_cuda *cuda, int descriptor, uint64_t size,
 // Waits for work that uses it. May overlap with other calls.
 void vkb_cuda_free(struct vkb_cuda *cuda, struct vkb_cuda_memory *memory);
 
-// Fails with a value error unless this is memory of the GPU that is not managed. `what` is the
-// argument's name.
-bool vkb_cuda_check(struct vkb_cuda *cuda, const char *what, vkb_cuda_address address,
-                    struct vkb_error *error);
-
-// Copies on the stream, after the work that `after` (a stream; NULL: none) has got so far, and
-// waits. May overlap with other calls.
+// Copies on the own stream between addresses of CUDA's memory and the host's, and waits. May
+// overlap with other calls.
 bool vkb_cuda_copy(struct vkb_cuda *cuda, vkb_cuda_address to, vkb_cuda_address from, size_t size,
-                   void *after, struct vkb_error *error);
+                   struct vkb_error *error);
 // The same to imported memory, without the wait, which follows. Both may overlap with other calls.
 bool vkb_cuda_begin_copy(struct vkb_cuda *cuda, struct vkb_cuda_memory *to, vkb_cuda_address from,
-                         size_t size, void *after, struct vkb_error *error);
+                         size_t size, struct vkb_error *error);
 bool vkb_cuda_end_copy(struct vkb_cuda *cuda, const struct vkb_cuda_memory *to,
                        struct vkb_error *error);
 // Makes all work that the context gets from now on wait for the copy, so that its source can be
 // freed or overwritten: nothing tells which stream would do that. False while a graph is captured,
 // which becomes invalid; then the host has to wait.
 bool vkb_cuda_order_copy(struct vkb_cuda *cuda, const struct vkb_cuda_memory *to);
-bool vkb_cuda_read(struct vkb_cuda *cuda, void *to, vkb_cuda_address from, size_t size,
-                   struct vkb_error *error);
-bool vkb_cuda_write(struct vkb_cuda *cuda, vkb_cuda_address to, const void *from, size_t size,
-                    struct vkb_error *error);
 
 // Remembers the work that the context has got so far, which may use the memory; and whether it is
 // over. It is not possible while a stream is captured into a graph, which becomes invalid.

@@ -216,19 +216,6 @@ static bool prepare(struct vkb_run *run, struct vkb_request *requests, uint32_t 
     return vkb_buffer_flush(run->device, &readback->counts, error);
 }
 
-bool vkb_exported_wait(struct vkb_run *run, struct vkb_error *error)
-{
-    for (int kind = 0; kind < VKB_INPUT_COUNT; ++kind) {
-        const struct vkb_input *input = run->inputs[kind].input;
-        if (!input)
-            continue;
-        if (!vkb_export_filled(input->exported, error))
-            return false;
-        vkb_export_wait(input->exported, &run->sync.waits[VKB_EXTERNAL_CUDA]);
-    }
-    return true;
-}
-
 static bool finish(struct vkb_run *run, const struct vkb_request *requests, uint32_t request_count,
                    struct vkb_error *error)
 {

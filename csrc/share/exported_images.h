@@ -16,8 +16,4 @@ bool vkb_exported_check(const struct vkb_device *device, const struct vkb_input 
 bool vkb_exported_record_input(struct vkb_run *run, struct vkb_staged_input *staged,
                                struct vkb_error *error);
 
-// Orders the submission after what CUDA fills. Where the device has no timelines, this waits until
-// CUDA has filled the memory of the inputs.
-bool vkb_exported_wait(struct vkb_run *run, struct vkb_error *error);
-
 #endif

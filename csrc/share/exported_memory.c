@@ -125,7 +125,7 @@ struct vkb_export *vkb_exports_take(struct vkb_exports *exports, uint64_t size,
                                     struct vkb_error *error)
 {
     // Marks make captures of graphs invalid.
-    if (!vkb_cuda_require_no_capture(exports->cuda, NULL, error))
+    if (!vkb_cuda_require_no_capture(exports->cuda, error))
         return NULL;
     struct vkb_export *one = find_idle(exports, size);
 
@@ -135,27 +135,20 @@ struct vkb_export *vkb_exports_take(struct vkb_exports *exports, uint64_t size,
         VKB_PUSH(&exports->taken, one);
     else
         return NULL;
-    one->filling = one->marked = false;
+    one->marked = false;
     one->filled = one->drawn = 0;
     return one;
 }
 
-bool vkb_export_filled(struct vkb_export *one, struct vkb_error *error)
-{
-    one->filling = one->filling && !vkb_cuda_end_copy(one->exports->cuda, &one->memory, error);
-    return !one->filling;
-}
-
-bool vkb_export_filling(struct vkb_export *one, struct vkb_error *error)
+bool vkb_export_order_copy(struct vkb_export *one)
 {
     struct vkb_shared_timeline *timeline = &one->exports->filled;
+    struct vkb_error ignored;
 
-    if (!timeline->semaphore || !vkb_cuda_order_copy(one->exports->cuda, &one->memory))
-        return true;
-    if (!vkb_cuda_signal(one->exports->cuda, timeline->cuda, timeline->value + 1, error))
+    if (!timeline->semaphore || !vkb_cuda_order_copy(one->exports->cuda, &one->memory)
+        || !vkb_cuda_signal(one->exports->cuda, timeline->cuda, timeline->value + 1, &ignored))
         return false;
     one->filled = ++timeline->value;
-    one->filling = false;
     return true;
 }
 

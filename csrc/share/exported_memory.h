@@ -14,8 +14,7 @@ struct vkb_export {
     struct vkb_cuda_memory memory;
     uint64_t size;
     struct vkb_exports *exports;
-    bool filling;  // CUDA may still copy to it, and no point tells when it is filled
-    bool marked;   // of an idle one: its event tells when its last use is over
+    bool marked;  // of an idle one: its event tells when its last use is over
     // The points at which CUDA has filled it and the device has drawn to it. 0: it was waited for.
     uint64_t filled, drawn;
 };
@@ -50,13 +49,10 @@ void vkb_exports_free(struct vkb_exports *exports);
 // Takes at least `size` bytes, of undefined content.
 struct vkb_export *vkb_exports_take(struct vkb_exports *exports, uint64_t size,
                                     struct vkb_error *error);
-// Waits for a copy that vkb_cuda_begin_copy has begun. May overlap with calls for other memory.
-bool vkb_export_filled(struct vkb_export *one, struct vkb_error *error);
-
-// Lets CUDA signal that the copy is complete, so that the host need not wait for it, if CUDA can
-// order it with the work of other streams.
-bool vkb_export_filling(struct vkb_export *one, struct vkb_error *error);
-// The point of the copy, if it is later than `point` and the host does not wait for it.
+// Lets CUDA signal that the copy which vkb_cuda_begin_copy has begun is complete. False: the host
+// has to wait, since CUDA cannot order it with the work of other streams.
+bool vkb_export_order_copy(struct vkb_export *one);
+// The point of the copy, if it is later than `point` and the host has not waited for it.
 void vkb_export_wait(const struct vkb_export *one, struct vkb_sync_point *point);
 // The next point of the device's work, with the renderer's lock; none without timelines.
 void vkb_export_signal(const struct vkb_export *one, struct vkb_sync_point *point);

@@ -208,14 +208,13 @@ def native_order(array: NDArray[Any]) -> NDArray[Any]:
     return array.astype(native, copy=False).view(native)
 
 
-def check_emission(emission: object, image: NDArray[Any]) -> NDArray[Any]:
-    """Return the emission if it fits an image that `check_image` returned."""
-    array = check_image(emission, "emission")
-    if array.shape != image.shape:
-        raise ValueError(f"emission: shape {array.shape} is not the image's, {image.shape}")
-    if array.dtype != image.dtype:
-        raise ValueError(f"emission: dtype {array.dtype} is not the image's, {image.dtype}")
-    return array
+def check_emission(emission: Any, image: Any) -> Any:
+    """Return the emission, an image itself, if it has the image's shape and dtype."""
+    for what in ("shape", "dtype"):
+        given, needed = getattr(emission, what), getattr(image, what)
+        if given != needed:
+            raise ValueError(f"emission: {what} {given} is not the image's, {needed}")
+    return emission
 
 
 def check_mask(mask: object, size: tuple[int, int]) -> NDArray[np.float32]:
@@ -292,8 +291,6 @@ def on_another_device(image: object, name: str) -> str:
 
 def _is_on_device(image: object) -> bool:
     """Return whether an array that NumPy cannot view is in the memory of another device."""
-    if hasattr(image, "__cuda_array_interface__"):
-        return True
     try:
         kind, _ = image.__dlpack_device__()  # type: ignore[attr-defined]
     except Exception:  # whatever a foreign object raises

@@ -2,53 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import ItemsView, Iterator, Mapping
-from typing import Any, Protocol
+from collections.abc import Mapping
+from typing import Any
 
 from numpy.typing import NDArray
 
 
-class MadeWith(Protocol):
-    """The part of `Settings` that viewers and writers of framebuffers use."""
-
-    @property
-    def encoding(self) -> str:
-        """The encoding of `final`, or "none"."""
-
-    @property
-    def glow_note(self) -> str:
-        """What `glow` shows if it is not the light above the threshold."""
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the fields by name, and ``method``."""
-
-
-class Framebuffers(Protocol):
-    """The part of `Frames` that viewers and writers of framebuffers use."""
-
-    @property
-    def timings(self) -> Mapping[str, float]:
-        """Seconds on the device by pass name."""
-
-    @property
-    def settings(self) -> MadeWith:
-        """The settings of the request."""
-
-    @property
-    def info(self) -> Mapping[str, Any]:
-        """Adapter, driver and version, and other facts."""
-
-    def __getitem__(self, name: str, /) -> NDArray[Any]: ...
-
-    def __iter__(self) -> Iterator[str]: ...
-
-    def __len__(self) -> int: ...
-
-    def items(self) -> ItemsView[str, NDArray[Any]]:
-        """Return the framebuffers with their names, in the order of the data flow."""
-
-
-def leading(arrays: Mapping[str, NDArray[Any]] | Framebuffers) -> str:
+def leading(arrays: Mapping[str, NDArray[Any]]) -> str:
     """Return the name of the framebuffer that represents all of them."""
     if "final" in arrays:
         return "final"

@@ -12,6 +12,8 @@ from importlib.resources import files
 from types import ModuleType
 from typing import Any
 
+from vkbloom import _errors
+
 
 def stand_in(reason: ImportError) -> ModuleType:
     """Return a module with the names of the core, which is also `vkbloom._core` from now on."""
@@ -20,19 +22,12 @@ def stand_in(reason: ImportError) -> ModuleType:
     for name, value in json.loads(text).items():
         setattr(module, name, _as_tuples(value))
 
-    def error(name: str, *bases: type) -> type:
-        made = type(name, bases, {"__module__": "vkbloom", "vk_call": None, "vk_result": None})
-        setattr(module, name, made)
-        return made
-
-    base = error("Error", Exception)
-    missing = error("AdapterNotFoundError", base, RuntimeError)
-    error("OutOfMemoryError", base, MemoryError)
-    for name in ("DeviceLostError", "ValidationError", "ShaderError"):
-        error(name, base)
+    for name, value in vars(_errors).items():
+        if name.endswith("Error"):
+            setattr(module, name, value)
 
     def refuse(*_: object, **__: object) -> Any:
-        raise missing(
+        raise _errors.AdapterNotFoundError(
             f"vkbloom's core cannot be loaded: {reason}. Without it, vkbloom.reference and "
             "vkbloom.testing work, and nothing renders. Wheels with the core are for Linux on "
             "x86-64 and aarch64; elsewhere, or for a newer core, build it from the source"

@@ -4,23 +4,23 @@
 
 // A pixel, and the cotangents of the picture before exposure and curves.
 struct Pixel {
-    vec4 scene, bloom, cotangent;
+    vec4 scene, bloom;
     float share;
-    vec3 mixed, by_mixed;
-    // By exposure and reference white.
-    vec2 by_curves;
+    // Of both sides: by colour and alpha, by exposure and by reference white.
+    mat2x3 by_mixed;
+    vec2 by_alpha, by_exposure, by_white;
 };
 
 // Within the range of the picture's format.
-vec3 stored(vec3 value)
+mat2x3 stored(vec3 value)
 {
     return inside(value, params.limit == 1.0 ? 0.0 : -params.limit, params.limit);
 }
 
-vec3 back_through_encoding(vec3 toned, vec3 cotangent)
+mat2x3 back_through_encoding(vec3 toned, vec3 cotangent)
 {
-    vec3 kept = cotangent * stored(apply_encoding(toned, ENCODING, params.reference_white));
-    return kept * encoding_slope(toned, ENCODING, params.reference_white);
+    mat2x3 kept = times(stored(apply_encoding(toned, ENCODING, params.reference_white)), cotangent);
+    return matrixCompMult(kept, encoding_slope(toned, ENCODING, params.reference_white));
 }
 
 // The light that the alpha shows.
@@ -45,20 +45,19 @@ Pixel pixel_of(vec4 given, vec4 bloom, float share, vec4 cotangent)
     p.scene = finite_or_zero(given);
     p.bloom = bloom;
     p.share = share;
-    p.cotangent = where_finite(cotangent, given);
-    p.cotangent.a *= stored(vec3(mixed_alpha(p.scene, bloom))).r;
-    p.mixed = composite(p.scene.rgb, p.bloom.rgb, p.share);
+    cotangent = where_finite(cotangent, given);
+    p.by_alpha = cotangent.a * first_row(stored(vec3(mixed_alpha(p.scene, bloom))));
+    vec3 mixed = composite(p.scene.rgb, p.bloom.rgb, p.share);
     // As exactly_toned(): without a difference near 0.
     if (COMPOSITE == COMPOSITE_MIX)
-        p.mixed = (1.0 - params.intensity * p.share) * p.scene.rgb + light_of(p.bloom.rgb);
-    vec3 exposed = p.mixed * exp2(params.exposure), toned = exactly_toned(exposed, TONEMAP);
-    vec3 by_toned = back_through_encoding(toned, p.cotangent.rgb);
-    vec3 by_exposed = back_through_tonemap(exposed, by_toned, TONEMAP);
+        mixed = (1.0 - params.intensity * p.share) * p.scene.rgb + light_of(p.bloom.rgb);
+    vec3 exposed = mixed * exp2(params.exposure), toned = exactly_toned(exposed, TONEMAP);
+    mat2x3 by_toned = back_through_encoding(toned, cotangent.rgb);
+    mat2x3 by_exposed = back_through_tonemap(exposed, by_toned, TONEMAP);
     p.by_mixed = by_exposed * exp2(params.exposure);
-    p.by_curves.x = log(2.0) * dot(by_exposed, exposed);
+    p.by_exposure = log(2.0) * dots(by_exposed, exposed);
     // The encoding takes the product of both.
-    p.by_curves.y =
-        ENCODING == ENCODING_PQ ? dot(by_toned, toned) / params.reference_white : 0.0;
+    p.by_white = ENCODING == ENCODING_PQ ? dots(by_toned, toned) / params.reference_white : vec2(0.0);
     return p;
 }
 
@@ -70,30 +69,33 @@ vec3 screened(vec3 other, vec3 product)
 }
 
 // By the light, i b.
-vec3 by_light(Pixel p)
+mat2x3 by_light(Pixel p)
 {
     vec3 light = light_of(p.bloom.rgb);
     if (COMPOSITE == COMPOSITE_UNCLAMPED_SCREEN)
-        return p.by_mixed * screened(p.scene.rgb, p.scene.rgb * light);
+        return times(p.by_mixed, screened(p.scene.rgb, p.scene.rgb * light));
     if (COMPOSITE != COMPOSITE_SCREEN)
         return p.by_mixed;
-    return p.by_mixed * (1.0 - clamp(p.scene.rgb, 0.0, 1.0)) * inside(light_of(p.bloom.rgb), 0.0, 1.0);
+    return matrixCompMult(times(p.by_mixed, 1.0 - clamp(p.scene.rgb, 0.0, 1.0)),
+                          inside(light, 0.0, 1.0));
 }
 
 // Of the light that the alpha shows, as the alpha's cotangent weighs it.
-vec4 by_alpha_light(Pixel p)
+mat2x4 by_alpha_light(Pixel p)
 {
     if (ALPHA == ALPHA_KEEP || COMPOSITE == COMPOSITE_OFF)
-        return vec4(0.0);
-    if (ALPHA == ALPHA_BLUR) {
-        float light = light_of(p.bloom.aaa).r;
-        return vec4(vec3(0.0), p.cotangent.a * (1.0 - p.scene.a) * inside(vec3(light), 0.0, 1.0).r);
-    }
-    float brightest = max(p.bloom.r, max(p.bloom.g, p.bloom.b)), light = light_of(vec3(brightest)).r;
-    float held = clamp(light, 0.0, 1.0);
-    float share = held > p.scene.a ? 1.0 : held == p.scene.a ? 0.5 : 0.0;
-    share *= inside(vec3(light), 0.0, 1.0).r;
-    return vec4(p.cotangent.a * share * equal_shares(p.bloom.rgb, brightest), 0.0);
+        return mat2x4(0.0);
+    bool blurred = ALPHA == ALPHA_BLUR;
+    float brightest = max(p.bloom.r, max(p.bloom.g, p.bloom.b));
+    float light = light_of(vec3(blurred ? p.bloom.a : brightest)).r, held = clamp(light, 0.0, 1.0);
+    float share = blurred             ? 1.0 - p.scene.a
+                : held == p.scene.a ? 0.5
+                                    : float(held > p.scene.a);
+    vec2 by_held = p.by_alpha * share * first_row(inside(vec3(light), 0.0, 1.0));
+    vec4 shares = vec4(0.0, 0.0, 0.0, 1.0);
+    if (!blurred)
+        shares = vec4(equal_shares(p.bloom.rgb, brightest), 0.0);
+    return outerProduct(shares, by_held);
 }
 
 // Of the picture's alpha by that of the scene.
@@ -105,46 +107,46 @@ float alpha_slope(Pixel p)
     return ALPHA == ALPHA_BLUR ? 1.0 - light : p.scene.a == light ? 0.5 : float(p.scene.a > light);
 }
 
-vec4 by_scene(Pixel p)
+mat2x4 by_scene(Pixel p)
 {
-    vec3 colour = p.by_mixed;
+    mat2x3 colour = p.by_mixed;
     if (COMPOSITE == COMPOSITE_MIX)
         colour *= 1.0 - params.intensity * p.share;
     if (COMPOSITE == COMPOSITE_SCREEN)
-        colour *= (1.0 - clamp(light_of(p.bloom.rgb), 0.0, 1.0)) * inside(p.scene.rgb, 0.0, 1.0);
+        colour = matrixCompMult(times(colour, 1.0 - clamp(light_of(p.bloom.rgb), 0.0, 1.0)),
+                                inside(p.scene.rgb, 0.0, 1.0));
     if (COMPOSITE == COMPOSITE_UNCLAMPED_SCREEN)
-        colour *= screened(light_of(p.bloom.rgb), p.scene.rgb * light_of(p.bloom.rgb));
+        colour = times(colour, screened(light_of(p.bloom.rgb), p.scene.rgb * light_of(p.bloom.rgb)));
     if (COMPOSITE == COMPOSITE_ADD_TO_POSITIVE)
-        colour *= above(p.scene.rgb, 0.0);
-    return vec4(colour, p.cotangent.a * alpha_slope(p));
+        colour = matrixCompMult(colour, above(p.scene.rgb, 0.0));
+    return with_alpha(colour, p.by_alpha * alpha_slope(p));
 }
 
-vec4 by_bloom(Pixel p)
+mat2x4 by_bloom(Pixel p)
 {
     float gain = BLOOM == BLOOM_LIT ? 1.0 : params.intensity;
-    return gain * (vec4(by_light(p), 0.0) + by_alpha_light(p));
+    return gain * (with_alpha(by_light(p), vec2(0.0)) + by_alpha_light(p));
 }
 
 // By intensity, exposure and reference white.
-vec4 by_values(Pixel p)
+mat2x4 by_values(Pixel p)
 {
     vec3 unit = COMPOSITE == COMPOSITE_MIX ? p.bloom.rgb - p.share * p.scene.rgb : p.bloom.rgb;
-    float by_intensity = COMPOSITE == COMPOSITE_OFF
-                           ? 0.0
-                           : dot(by_light(p), unit) + dot(by_alpha_light(p), p.bloom);
-    return vec4(by_intensity, p.by_curves, 0.0);
+    vec2 by_intensity = vec2(0.0);
+    if (COMPOSITE != COMPOSITE_OFF)
+        by_intensity = dots(by_light(p), unit) + p.bloom * by_alpha_light(p);
+    return transpose(mat4x2(by_intensity, p.by_exposure, p.by_white, vec2(0.0)));
 }
 
-vec4 back_on_side(vec4 given, vec4 bloom, float share, vec4 cotangent, int by, bool side)
+mat2x4 back_on_sides(vec4 given, vec4 bloom, float share, vec4 cotangent, int by)
 {
-    growing = side;
     Pixel p = pixel_of(given, bloom, share, cotangent);
     if (by == BY_MIXED)
-        return vec4(p.by_mixed, p.cotangent.a);
-    if (by >= BY_VALUES)
+        return with_alpha(p.by_mixed, p.by_alpha);
+    if (by == BY_VALUES)
         return by_values(p);
     if (by == BY_MASK)
-        return vec4(-params.intensity * dot(p.by_mixed, p.scene.rgb), 0.0, 0.0, 0.0);
+        return outerProduct(vec4(1.0, 0.0, 0.0, 0.0), -params.intensity * dots(p.by_mixed, p.scene.rgb));
     return by == BY_BLOOM ? by_bloom(p) : by_scene(p);
 }
 
@@ -153,8 +155,7 @@ vec4 back_on_side(vec4 given, vec4 bloom, float share, vec4 cotangent, int by, b
 // the bloom to a share of the scene.
 vec4 back_composite(vec4 given, vec4 bloom, float share, vec4 cotangent, int by)
 {
-    vec4 grown = back_on_side(given, bloom, share, cotangent, by, true);
-    vec4 mean = mean_of_sides(grown, back_on_side(given, bloom, share, cotangent, by, false));
+    mat2x4 sides = back_on_sides(given, bloom, share, cotangent, by);
     bool clamped = GROUPS == GROUPS_PYGFX && by == BY_BLOOM;
-    return mix(mean, grown, clamped ? equal(bloom, vec4(0.0)) : bvec4(false));
+    return mix(mean_of_sides(sides), sides[0], clamped ? equal(bloom, vec4(0.0)) : bvec4(false));
 }

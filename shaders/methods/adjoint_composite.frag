@@ -18,18 +18,11 @@ layout(set = 0, binding = 4) uniform sampler2D cotangents;
 #include "lib/fullscreen.glsl"
 #include "lib/adjoint.glsl"
 #include "lib/adjoint_composite.glsl"
-#include "lib/sums.glsl"
-
-vec4 back(ivec2 at)
-{
-    return back_composite(
-        texelFetch(scene, at, 0), COMPOSITE == COMPOSITE_OFF ? vec4(0.0) : texelFetch(bloom, at, 0),
-        MASKED != 0 ? texelFetch(mask, at, 0).r : 1.0, texelFetch(cotangents, at, 0), BY);
-}
-
-SUM_OF_BLOCK(back)
 
 vec4 shade()
 {
-    return BY == BY_VALUES || BY == BY_SQUARES ? sum_of_block(textureSize(scene, 0)) : gathered(back(PIXEL));
+    vec4 light = COMPOSITE == COMPOSITE_OFF ? vec4(0.0) : texelFetch(bloom, PIXEL, 0);
+    float share = MASKED != 0 ? texelFetch(mask, PIXEL, 0).r : 1.0;
+    return gathered(back_composite(texelFetch(scene, PIXEL, 0), light, share,
+                                   texelFetch(cotangents, PIXEL, 0), BY));
 }

@@ -21,61 +21,61 @@ layout(set = 0, binding = 4) uniform sampler2D cotangents;
 
 // By the exposed scene and by the light.
 struct Parts {
-    vec3 scene, light;
+    mat2x3 scene, light;
 };
 
-Parts back_soft_light(vec3 s, vec3 light, vec3 cotangent)
+Parts back_soft_light(vec3 s, vec3 light, mat2x3 cotangents)
 {
     vec3 toned = apply_tonemap(s, TONEMAP), toned_light = apply_tonemap(light, TONEMAP);
     vec3 low = max(toned, -1e6), dark = (48.0 * low - 24.0) * low + 4.0;
     vec3 slope = mix(0.5 / sqrt(max(toned, 0.25)), dark, lessThanEqual(toned, vec3(0.25)));
-    vec3 lit = 1.0 - above(toned, 1.0);
-    vec3 by_toned = cotangent * (1.0 + lit * clamp(toned_light, 0.0, 1.0) * (slope - 1.0));
-    vec3 by_light = cotangent * lit * (soft_full(toned) - toned) * inside(toned_light, 0.0, 1.0);
+    mat2x3 lit = matrixCompMult(cotangents, below(toned, 1.0));
+    mat2x3 by_toned = cotangents + times(lit, clamp(toned_light, 0.0, 1.0) * (slope - 1.0));
+    mat2x3 by_light =
+        matrixCompMult(times(lit, soft_full(toned) - toned), inside(toned_light, 0.0, 1.0));
     return Parts(back_through_tonemap(s, by_toned, TONEMAP),
                  back_through_tonemap(light, by_light, TONEMAP));
 }
 
-Parts back_blend(vec3 s, vec3 bloom_light, float share, vec3 cotangent)
+Parts back_blend(vec3 s, vec3 bloom_light, float share, mat2x3 cotangents)
 {
     vec3 light = light_of(bloom_light);
     if (COMPOSITE == COMPOSITE_SOFT_LIGHT)
-        return back_soft_light(s, light, cotangent);
-    vec3 by_sum = back_through_tonemap(blended_sum(s, bloom_light, share), cotangent, TONEMAP);
+        return back_soft_light(s, light, cotangents);
+    mat2x3 by_sum = back_through_tonemap(blended_sum(s, bloom_light, share), cotangents, TONEMAP);
     if (COMPOSITE == COMPOSITE_MIX)
         return Parts((1.0 - params.intensity * share) * by_sum, by_sum);
     if (COMPOSITE == COMPOSITE_REPLACE)
-        return Parts(vec3(0.0), by_sum);
+        return Parts(mat2x3(0.0), by_sum);
     if (COMPOSITE == COMPOSITE_SCREEN) {
         vec3 part = light / params.white;
-        return Parts((1.0 - clamp(part, 0.0, 1.0)) * by_sum,
-                     (params.white - s) / params.white * inside(part, 0.0, 1.0) * by_sum);
+        return Parts(times(by_sum, 1.0 - clamp(part, 0.0, 1.0)),
+                     matrixCompMult(times(by_sum, (params.white - s) / params.white),
+                                    inside(part, 0.0, 1.0)));
     }
     return Parts(by_sum, by_sum);
 }
 
-vec4 to_one_side(vec4 pixel, bool side)
+mat2x4 back_on_sides(vec4 pixel)
 {
-    growing = side;
     Pixel p;
     p.scene = finite_or_zero(pixel);
     p.bloom = texelFetch(bloom, PIXEL, 0);
     p.share = MASKED != 0 ? texelFetch(mask, PIXEL, 0).r : 1.0;
-    p.cotangent = where_finite(texelFetch(cotangents, PIXEL, 0), pixel);
-    p.cotangent.a *= stored(vec3(mixed_alpha(p.scene, p.bloom))).r;
+    vec4 cotangent = where_finite(texelFetch(cotangents, PIXEL, 0), pixel);
+    p.by_alpha = cotangent.a * first_row(stored(vec3(mixed_alpha(p.scene, p.bloom))));
     vec3 s = p.scene.rgb * exp2(params.exposure);
-    vec3 by_toned = back_through_encoding(blend(s, p.bloom.rgb, p.share), p.cotangent.rgb);
+    mat2x3 by_toned = back_through_encoding(blend(s, p.bloom.rgb, p.share), cotangent.rgb);
     Parts parts = back_blend(s, p.bloom.rgb, p.share, by_toned);
     if (BY == BY_MASK)
-        return vec4(-params.intensity * dot(parts.light, s), 0.0, 0.0, 0.0);
+        return outerProduct(vec4(1.0, 0.0, 0.0, 0.0), -params.intensity * dots(parts.light, s));
     if (BY == BY_SCENE)
-        return vec4(parts.scene * exp2(params.exposure), p.cotangent.a * alpha_slope(p));
+        return with_alpha(parts.scene * exp2(params.exposure), p.by_alpha * alpha_slope(p));
     float gain = BLOOM == BLOOM_LIT ? 1.0 : params.intensity;
-    return gain * (vec4(parts.light, 0.0) + by_alpha_light(p));
+    return gain * (with_alpha(parts.light, vec2(0.0)) + by_alpha_light(p));
 }
 
 vec4 shade()
 {
-    vec4 pixel = texelFetch(scene, PIXEL, 0);
-    return gathered(mean_of_sides(to_one_side(pixel, true), to_one_side(pixel, false)));
+    return gathered(mean_of_sides(back_on_sides(texelFetch(scene, PIXEL, 0))));
 }

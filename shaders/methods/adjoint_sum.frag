@@ -1,22 +1,24 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
-// Adds up the pixels of an image, block by block.
+// Adds up the pixels of an image, or their squares, in blocks of SUM_SIDE x SUM_SIDE, always in the same order.
 #include "lib/block.glsl"
 
 layout(set = 0, binding = 1) uniform sampler2D source;
 
 #define TARGET_BINDING 2
 #include "lib/fullscreen.glsl"
-#include "lib/sums.glsl"
-
-vec4 value(ivec2 pixel)
-{
-    return texelFetch(source, pixel, 0);
-}
-
-SUM_OF_BLOCK(value)
 
 vec4 shade()
 {
-    return sum_of_block(textureSize(source, 0));
+    ivec2 first = PIXEL * SUM_SIDE, end = min(first + SUM_SIDE, textureSize(source, 0));
+    vec4 sum = vec4(0.0);
+    for (int y = first.y; y < end.y; ++y) {
+        vec4 row = vec4(0.0);
+        for (int x = first.x; x < end.x; ++x) {
+            vec4 value = texelFetch(source, ivec2(x, y), 0);
+            row += BY == BY_SQUARES ? value * value : value;
+        }
+        sum += row;
+    }
+    return sum;
 }

@@ -13,33 +13,18 @@
 UNIFORM_BLOCK(THRESHOLD_BLOCK);
 
 layout(set = 0, binding = 1) uniform sampler2D image;
-layout(set = 0, binding = 2) uniform sampler2D mask;
 layout(set = 0, binding = 3) uniform sampler2D cotangents;
 
 #define TARGET_BINDING 6
 #include "lib/fullscreen.glsl"
 #include "lib/adjoint.glsl"
-#include "lib/sums.glsl"
+#include "lib/mask.glsl"
 
-#define PLACE_OF(source, pixel) \
-    place_in(source, pixel, ivec2(params.target_width, params.target_height))
-
-vec4 reduced(ivec2 pixel)
+vec4 reduced()
 {
-    Place place = PLACE_OF(image, pixel);
+    Place place = PLACE_IN(image);
     bool within = THRESHOLD_MODE == THRESHOLD_HARD && SAMPLING == SAMPLING_FETCH;
     return within ? fetch_within(image, place) : sample_at(image, place, vec2(0.0), SAMPLING);
-}
-
-float mask_at(ivec2 pixel)
-{
-    return MASKED == 0 ? 1.0 : sample_at(mask, PLACE_OF(mask, pixel), vec2(0.0), SAMPLING).r;
-}
-
-vec4 cotangent_at(ivec2 pixel)
-{
-    vec4 value = texelFetch(cotangents, pixel, 0);
-    return ALPHA == ALPHA_BLUR ? value : vec4(value.rgb, 0.0);
 }
 
 // The derivatives of the soft threshold's factor by threshold and knee.
@@ -58,25 +43,19 @@ vec2 soft_values(float brightness)
     return by_top / max(brightness, 1e-5);
 }
 
-vec4 by_values(ivec2 pixel)
-{
-    vec4 colour = reduced(pixel);
-    float brightness = max(colour.r, max(colour.g, colour.b));
-    float whole = dot(cotangent_at(pixel), colour) * mask_at(pixel);
-    return vec4(soft_values(brightness) * whole, 0.0, 0.0);
-}
-
-SUM_OF_BLOCK(by_values)
-
 vec4 shade()
 {
-    if (BY >= BY_VALUES)
-        return sum_of_block(ivec2(params.target_width, params.target_height));
-    vec4 colour = reduced(PIXEL), cotangent = cotangent_at(PIXEL);
+    vec4 colour = reduced(), cotangent = texelFetch(cotangents, PIXEL, 0);
+    if (ALPHA != ALPHA_BLUR)
+        cotangent.a = 0.0;
+    if (BY == BY_VALUES) {
+        float whole = dot(cotangent, colour) * mask_value();
+        return vec4(soft_values(max(colour.r, max(colour.g, colour.b))) * whole, 0.0, 0.0);
+    }
     if (BY == BY_MASK) {
         vec4 kept = apply_threshold(colour, THRESHOLD_MODE, params.threshold, params.knee);
         return gathered(vec4(dot(kept, cotangent), 0.0, 0.0, 0.0));
     }
-    return gathered(back_through_threshold(colour, mask_at(PIXEL) * cotangent, THRESHOLD_MODE,
+    return gathered(back_through_threshold(colour, mask_value() * cotangent, THRESHOLD_MODE,
                                            params.threshold, params.knee));
 }

@@ -15,7 +15,7 @@ from benchmarks import BENCHMARKS, Plan, Report, peers, run, write
 from benchmarks.__main__ import command as program
 from benchmarks.cost import Line
 from benchmarks.image import SETTINGS, _time_one, full_kernel
-from benchmarks.inputs import REC709, THRESHOLD, pictures
+from benchmarks.inputs import THRESHOLD, pictures
 from benchmarks.plan import VARIANTS_VARIABLE
 from benchmarks.results import Goal, Section, Table, agreement
 from benchmarks.spread import spread
@@ -172,20 +172,6 @@ def test_peers_make_the_references_picture(name: str, channels: int, dtype: Any)
 # Inputs
 
 
-@pytest.mark.parametrize("dtype", [np.uint8, np.float16, np.float32])
-def test_no_rounding_decides_what_is_bright(dtype: Any) -> None:
-    several = pictures((100, 70), dtype)
-    for image in several:
-        colours = image[..., :3] / 255 if dtype == np.uint8 else image[..., :3].astype(float)
-        luminance = colours @ np.array(REC709)
-        assert np.abs(luminance - THRESHOLD).min() > 0.01
-        assert 0.1 < (luminance > THRESHOLD).mean() < 0.5
-        assert colours.max() <= 0.7 + 1 / 255
-        assert (image[..., 3] == (255 if dtype == np.uint8 else 1)).all()
-    assert not np.array_equal(several[0], several[1])
-    assert not np.array_equal(several[1], several[2])
-
-
 def test_the_spread_of_a_known_blur() -> None:
     ndimage = pytest.importorskip("scipy.ndimage")
 
@@ -232,27 +218,14 @@ def test_report_has_page_and_json(tmp_path: Path) -> None:
     written = write(Report(machine, (section,)), tmp_path / "new" / "b.md")
     assert [path.name for path in written] == ["b.md", "b.json"]
     page = written[0].read_text()
-    for line in (
-        "Written by `make bench`, a day.",
-        "| CuPy | not installed |",
-        "## A title (`id`)",
-        "**Rows**",
-        "| 1\\|2 | 3 |",
-        "| x / y | at least 3 | 2 | no | id |",
-        "| y / x | at most 3 | nan | no | id |",
-        "- CuPy is not installed",
-    ):
-        assert line in page.splitlines()
-    assert "times are wall-clock times" in page
+    rows = ["| CuPy | not installed |", "| 1\\|2 | 3 |", "| x / y | at least 3 | 2 | no | id |"]
+    rows += ["| y / x | at most 3 | nan | no | id |", "- CuPy is not installed"]
+    assert {*rows, "Written by `make bench`, a day.", "## A title (`id`)"} <= {*page.splitlines()}
     values = json.loads(written[1].read_text(), parse_constant=pytest.fail)
     (found,) = values["sections"]
     assert values["machine"] == machine
-    assert found["times"]["group"]["one"] == {
-        "median": 1.0,
-        "least": 0.5,
-        "quartiles": [0.75, 1.25],
-        "seconds": [0.5, 1.5, 1.0],
-    }
+    one = {"median": 1, "least": 0.5, "quartiles": [0.75, 1.25], "seconds": [0.5, 1.5, 1]}
+    assert found["times"]["group"]["one"] == one
     assert [goal["ratio"] for goal in found["goals"]] == [2.0, None]
 
 

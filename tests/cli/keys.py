@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import functools
 import sys
 from typing import Any
 
 import glfw as glfw_module
 
+import vkbloom
 from vkbloom._cli.program import program
 
 callbacks: list[Any] = []
@@ -28,4 +30,5 @@ def press() -> None:
 
 
 glfw.set_key_callback, glfw.poll_events = remember, press
+vkbloom.Renderer = functools.partial(vkbloom.Renderer, validation=True)  # type: ignore
 program(["view", *sys.argv[2:]])

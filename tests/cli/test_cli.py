@@ -368,30 +368,7 @@ def test_render_without_bloom_says_so(tmp_path: Path) -> None:
     assert vkb("render", "-o", tmp_path / "a.png", *SMALL).stderr == ""
 
 
-@pytest.mark.parametrize("words", ["render -o out.exr --size 16x16", "apply a.png out.exr"])
-def test_validation_is_handed_on(tmp_path: Path, words: str) -> None:
-    vkbloom.write(tmp_path / "a.png", np.zeros((8, 8, 3), np.uint8))
-    # In a new process, since an existing instance keeps its layers.
-    command = ("-m", "vkbloom._cli", *words.split(), "--validation")
-    ended = python(*command, cwd=tmp_path, VK_LAYER_PATH=str(tmp_path))
-    assert ended.returncode == 1
-    assert "validation" in one_line(ended.stderr)
-
-
 # adapters
-
-
-def test_adapters_are_a_line_each() -> None:
-    result = vkb("adapters")
-    assert result.exit_code == 0
-    assert result.stdout.splitlines() == [one.summary for one in vkbloom.adapters()]
-
-
-def test_adapters_as_json() -> None:
-    result = vkb("adapters", "--json")
-    assert result.exit_code == 0
-    found = [vkbloom.AdapterInfo(**entry) for entry in json.loads(result.stdout)]
-    assert tuple(found) == vkbloom.adapters() != ()
 
 
 @pytest.mark.parametrize(("options", "stdout"), [((), ""), (("--json",), "[]\n")])
@@ -438,7 +415,8 @@ def test_without_extras_the_first_commands_work(words: tuple[str, ...]) -> None:
     elif words == ("doctor",):
         assert "This machine can render." in ended.stdout
     else:
-        assert len(json.loads(ended.stdout)) == len(vkbloom.adapters())
+        found = [vkbloom.AdapterInfo(**entry) for entry in json.loads(ended.stdout)]
+        assert tuple(found) == vkbloom.adapters() != ()
 
 
 @pytest.mark.parametrize(("encoding", "name"), [("ascii", "\u2600"), ("latin-1", r"\u2600")])

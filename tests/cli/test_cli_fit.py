@@ -70,16 +70,8 @@ def test_screenshots(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     words = ["fit", *names, "--preset", "unity_urp", "--json"]
     (found,) = json.loads(CliRunner().invoke(program, words).stdout)
     assert found["verdict"] == "good"
-    assert found["varied"] == pytest.approx({"threshold": 0.4, "intensity": 0.5}, rel=0.1)
-
-
-def test_json(files: tuple[str, str]) -> None:
-    words = ["--preset", "tutorial", "--vary", "intensity", "--max-calls", "9", "--json"]
-    done = CliRunner().invoke(program, ["fit", *files, *words])
-    (found,) = json.loads(done.stdout)
-    assert found["calls"] == 9
-    assert found["varied"] == {"intensity": found["settings"]["intensity"]}
     assert found["loss"] <= found["start_loss"]
+    assert found["varied"] == pytest.approx({"threshold": 0.4, "intensity": 0.5}, rel=0.1)
 
 
 def test_translate(renderer: vkbloom.Renderer) -> None:

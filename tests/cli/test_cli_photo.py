@@ -50,20 +50,11 @@ def snow() -> Image:
     return image
 
 
-def sunset() -> Image:
-    """Return a sun, and a gradient from orange to blue."""
-    down, across = np.mgrid[:SIDE, :SIDE] / SIDE
-    sun = np.exp(-((np.hypot(down - 0.6, across - 0.5) / 0.08) ** 2))[..., None] * 255
-    sky = np.stack([230 * down, 120 + 60 * down, 200 * (1 - down)], axis=2)
-    return np.asarray(np.clip(sky + sun, 0, 255), np.uint8)
-
-
-# Six kinds of photographs; those of scikit-image are in its wheel.
+# Five kinds of photographs; those of scikit-image are in its wheel.
 PHOTOS: dict[str, Callable[[], Image]] = {
     "night": night,
     "room": room,
     "snow": snow,
-    "sunset": sunset,
     "astronaut": lambda: data.astronaut()[::3, ::3],
     "coffee": lambda: data.coffee()[::3, ::3],
 }
@@ -122,12 +113,6 @@ def test_the_command_is_the_preset_in_python(tmp_path: Path, renderer: vkbloom.R
     final = renderer.apply(photo, vkbloom.presets["photo"])["final"]
     written = vkbloom.write(tmp_path / "c.png", final)
     np.testing.assert_array_equal(load(tmp_path / "b.png").pixels, load(written).pixels)
-
-
-def test_the_first_try_has_no_notes(tmp_path: Path) -> None:
-    path = png(tmp_path / "city.png", room())
-    words: list[str | Path] = [path, tmp_path / "o.png", "--threshold", "0.7", "--intensity", "0.5"]
-    assert apply(*words).stderr == ""
 
 
 def test_expand(tmp_path: Path) -> None:

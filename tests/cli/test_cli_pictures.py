@@ -11,6 +11,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 import vkbloom
+from tests.framebuffers import names_in
 from tests.io.profiles import store_png
 from tests.processes import python
 from vkbloom._cli.program import program
@@ -27,10 +28,6 @@ def run(*words: object) -> Result:
         # Files of integers start from the preset photo: see test_cli_photo.py.
         given += ["--preset", "bevy_natural", "--composite", "add"]
     return CliRunner().invoke(program, ["apply", *given])
-
-
-def names(folder: Path) -> list[str]:
-    return sorted(path.name for path in folder.iterdir())
 
 
 @pytest.fixture
@@ -64,7 +61,7 @@ class TestSequences:
         result = run(".", "out/")
         assert result.exit_code == 0
         assert result.stderr == "vkbloom: note: .: left out what is no image: notes.txt\n"
-        assert names(frames / "out") == [f"f.{n:04d}.png" for n in range(8, 12)]
+        assert names_in(frames / "out") == [f"f.{n:04d}.png" for n in range(8, 12)]
 
     @pytest.mark.parametrize("which", [(8,), (9, 10), (11,), (8, 9, 10, 11)])
     def test_the_other_images_are_done(self, frames: Path, which: tuple[int, ...]) -> None:
@@ -78,7 +75,7 @@ class TestSequences:
         ]
         assert last == f"vkbloom: {len(which)} of 4 images failed"
         done = [f"g.{number:04d}.png" for number in range(8, 12) if number not in which]
-        assert [name for name in names(frames) if name[0] == "g"] == done
+        assert [name for name in names_in(frames) if name[0] == "g"] == done
 
     @pytest.mark.parametrize("words", [("--mask", "m.png"), ("--alpha", "max")])
     def test_an_image_that_options_do_not_fit(self, frames: Path, words: tuple[str, ...]) -> None:
@@ -93,7 +90,7 @@ class TestSequences:
         result = run("f.0008.png", "b.exr", "f.0009.png", "out", *words)
         assert result.exit_code == 1
         assert result.stderr.endswith(f"vkbloom: {len(wrong)} of 3 images failed\n")
-        assert names(frames / "out") == sorted(right)
+        assert names_in(frames / "out") == sorted(right)
 
     def test_a_target_that_cannot_be_written(self, frames: Path) -> None:
         (frames / "g.0009.png").mkdir()
@@ -102,21 +99,11 @@ class TestSequences:
         assert result.stderr.endswith("g.0009.png: Is a directory\nvkbloom: 1 of 4 images failed\n")
         assert (frames / "g.0011.png").is_file()
 
-    def test_existing_images_are_skipped(self, frames: Path) -> None:
-        for number in (8, 10):
-            (frames / f"g.{number:04d}.png").write_bytes(b"before")
-        result = run("f.%04d.png", "g.%04d.png", "--skip-existing")
-        assert result.exit_code == 0
-        assert "skipped 2 of 4 images" in result.stdout
-        assert (frames / "g.0010.png").read_bytes() == b"before"
-        assert vkbloom.read(frames / "g.0011.png").shape == IMAGE.shape
-        assert run("f.%04d.png", "g.%04d.png", "--skip-existing").exit_code == 0
-
     @pytest.mark.parametrize("order", ["exr first", "png first", "between"])
     def test_each_file_starts_from_its_own_preset(self, frames: Path, order: str) -> None:
-        values = np.random.default_rng(0).random((12, 16, 3)).astype(np.float32) ** 8 * 3
+        values = np.random.default_rng(0).random((5, 7, 3)).astype(np.float32) ** 8 * 3
         vkbloom.write("x.exr", values)
-        vkbloom.write("y.png", values)
+        store_png(frames / "y.png", IMAGE)
         kinds = {"exr first": "eepp", "png first": "ppee", "between": "epep"}[order]
         (frames / "in").mkdir()
         for place, kind in enumerate(kinds):
@@ -128,20 +115,6 @@ class TestSequences:
             alone = vkbloom.read(f"alone{file.suffix}")
             np.testing.assert_array_equal(vkbloom.read(file), alone)
 
-    def test_sizes_and_types_change(self, frames: Path) -> None:
-        values = np.linspace(0, 2, 5 * 7 * 3, dtype=np.float32).reshape(5, 7, 3)
-        vkbloom.write(frames / "x.exr", values)
-        assert run("f.0008.png", "x.exr", "f.0009.png", "out").exit_code == 0
-        for name in ("f.0008.png", "x.exr", "f.0009.png"):
-            assert run(name, f"alone_{name}").exit_code == 0
-            alone = vkbloom.read(frames / f"alone_{name}")
-            assert np.array_equal(vkbloom.read(frames / "out" / name), alone)
-
-    def test_no_bloom_names_its_image(self, frames: Path) -> None:
-        result = run("f.*.png", "out", "--method", "pyramid", "--threshold", "1")
-        for number in range(8, 12):
-            assert f"f.{number:04d}.png: the bloom is zero everywhere" in result.stderr
-
     def test_libraries_are_silenced_and_notes_are_not(self, frames: Path) -> None:
         """libpng prints of its own while the notes of other images are printed."""
         content = (frames / "f.0011.png").read_bytes()
@@ -152,6 +125,7 @@ class TestSequences:
         lines = ended.stderr.splitlines()
         assert len(lines) == 5
         assert all(line.startswith("vkbloom: ") for line in lines)
+        assert "f.0008.png: the bloom is zero everywhere" in ended.stderr
         assert "f.0011.png: " in lines[-2]
 
 
@@ -168,11 +142,7 @@ class TestNotes:
         ],
     )
     def test_clipping_gives_a_hint(
-        self,
-        tmp_path: Path,
-        out: str,
-        words: tuple[str, ...],
-        is_told: bool,
+        self, tmp_path: Path, out: str, words: tuple[str, ...], is_told: bool
     ) -> None:
         file = vkbloom.write(tmp_path / "a.exr", np.full((24, 32, 3), 3, np.float32))
         result = run(file, tmp_path / out, *words)
@@ -191,11 +161,7 @@ class TestNotes:
         ],
     )
     def test_alpha_that_hides_the_bloom(
-        self,
-        tmp_path: Path,
-        suffix: str,
-        words: tuple[str, ...],
-        is_told: bool,
+        self, tmp_path: Path, suffix: str, words: tuple[str, ...], is_told: bool
     ) -> None:
         image = np.zeros((24, 32, 4), np.float32)
         image[8:16, 8:16] = 1
@@ -214,23 +180,11 @@ class TestNotes:
         ("a.png", "b.exr", "32", "float"),
         ("a.png", "b.png", "16", "uint16"),
         ("a.exr", "b.tif", "8", "uint8"),
-        ("a.exr", "b.jpg", "16", "jpeg has no numbers of 16 bits"),
-        ("a.exr", "b.exr", "8", "openexr has no numbers of 8 bits"),
     ],
 )
-def test_bits(
-    tmp_path: Path,
-    source: str,
-    out: str,
-    bits: str,
-    numbers: str,
-) -> None:
+def test_bits(tmp_path: Path, source: str, out: str, bits: str, numbers: str) -> None:
     vkbloom.write(tmp_path / source, np.linspace(0, 1, 24 * 3, dtype=np.float32).reshape(6, 4, 3))
     result = run(tmp_path / source, tmp_path / out, "--bits", bits)
-    if " " in numbers:
-        assert (result.exit_code, result.stderr.count("\n")) == (2, 1)
-        assert numbers in result.stderr
-        return
     assert result.exit_code == 0, result.stderr
     _, facts = vkbloom.read(tmp_path / out, metadata=True)
     assert facts["numbers"] == numbers

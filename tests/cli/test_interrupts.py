@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 import vkbloom
-from tests.exhaustive import EXHAUSTIVE, some
+from tests.exhaustive import EXHAUSTIVE
 from tests.processes import output, python
 from vkbloom._grid import memory
 
@@ -98,38 +98,18 @@ def test_imports_of_compiled_packages_are_not_interrupted(tmp_path: Path) -> Non
     assert (ended.returncode, ended.stdout) == (0, "1\n"), ended.stderr
 
 
-# Commands under a limit of address space: no crash, and messages that name memory.
-
-
-def limited(megabytes: int, *arguments: str) -> subprocess.CompletedProcess[str]:
-    """Run a command in a process that can map this much."""
-    size = megabytes << 20
-    return subprocess.run(
-        [sys.executable, "-m", "vkbloom._cli", *arguments],
-        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (size, size)),
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=False,
-    )
-
-
-@pytest.mark.parametrize("megabytes", some([300, 400, 500, 600, 700, 850, 1000, 1500, 2000], 3))
-def test_apply_works_or_names_memory(tmp_path: Path, megabytes: int) -> None:
-    source, target = tmp_path / "a.png", tmp_path / "b.png"
-    vkbloom.write(source, np.full((32, 32, 3), 0.5, np.float32))
-    ended = limited(megabytes, "apply", str(source), str(target))
-    if ended.returncode == 0:
-        assert target.is_file()
-    else:
-        assert ended.returncode == 1
-        assert "memory is short" in ended.stderr
-        assert "ulimit -v" in ended.stderr
-        assert "driver." not in ended.stderr
+# Under a limit of address space; tests/core/test_low_memory.py has its errors.
 
 
 def test_doctor_does_not_blame_the_driver() -> None:
-    ended = limited(600, "doctor")
+    size = 600 << 20
+    ended = subprocess.run(
+        [sys.executable, "-m", "vkbloom._cli", "doctor"],
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (size, size)),
+        capture_output=True,
+        text=True,
+        check=False,
+    )
     assert ended.returncode == 1
     assert "memory is short: a limit leaves" in ended.stdout
     assert "Update its driver" not in ended.stdout
@@ -147,20 +127,8 @@ def test_grids_leave_a_reserve(monkeypatch: pytest.MonkeyPatch, renderer: vkbloo
 @pytest.mark.parametrize(("number", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 0)])
 def test_explore_ends_with_the_status_of_shells(number: int, status: int) -> None:
     pytest.importorskip("tornado")
-    running = subprocess.Popen(
-        [
-            sys.executable,
-            "-u",
-            "-m",
-            "vkbloom._cli",
-            "explore",
-            "--no-open",
-            "--adapter",
-            "software",
-        ],
-        stdout=subprocess.PIPE,
-        text=True,
-    )
+    words = ["-u", "-m", "vkbloom._cli", "explore", "--no-open", "--adapter", "software"]
+    running = subprocess.Popen([sys.executable, *words], stdout=subprocess.PIPE, text=True)
     assert running.stdout is not None
     for line in running.stdout:
         if "Ctrl-C" in line:

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -12,8 +9,9 @@ import pytest
 
 import vkbloom
 from tests.core.builds import ROOT
+from tests.processes import python
 from vkbloom import Pyramid, Separable
-from vkbloom._cli.live import Live
+from vkbloom._cli.view import Live
 
 NAMES = ["glow", "blur_vertical", "bloom", "scene", "final"]
 
@@ -63,25 +61,18 @@ def test_the_title_has_the_values() -> None:
     assert "no bloom" in Live(Separable(bloom=False), None).title(0.02)
 
 
-def view(*arguments: str, env: dict[str, str]) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", *arguments]
-    return subprocess.run(command, cwd=ROOT, env=env, capture_output=True, text=True, check=False)
-
-
 def test_a_window_is_controlled_by_keys(display: dict[str, str], tmp_path: Path) -> None:
     # (The fourth framebuffer is gone without bloom.)
     keys = "B,B,4,B,1,P,SPACE,Q"
-    done = view("tests.cli.keys", keys, "--size", "64x36", "--validation", env=display)
+    done = python("-m", "tests.cli.keys", keys, "--size", "64x36", cwd=ROOT, **display)
     assert done.returncode == 0, done.stderr
     picture = str(vkbloom.write(tmp_path / "a.png", np.full((9, 16, 3), 0.5, np.float32)))
-    done = view("tests.cli.keys", "2,SPACE,ESCAPE", picture, env=display)
+    done = python("-m", "tests.cli.keys", "2,SPACE,ESCAPE", picture, cwd=ROOT, **display)
     assert done.returncode == 0, done.stderr
 
 
 def test_without_a_display_it_says_so() -> None:
     pytest.importorskip("glfw")
-    names = ("DISPLAY", "WAYLAND_DISPLAY")
-    env = {name: value for name, value in os.environ.items() if name not in names}
-    done = view("vkbloom._cli", "view", env=env)
+    done = python("-m", "vkbloom._cli", "view", DISPLAY="", WAYLAND_DISPLAY="")
     assert (done.returncode, done.stdout) == (1, "")
     assert "no window was opened: " in done.stderr

@@ -156,12 +156,9 @@ static void change_properties(VkPhysicalDeviceProperties *properties)
     }
     if (lacks("limits"))
         lower_limits(&properties->limits);
-    // Less than any device may have: to the first the validation layer must object, the second is
-    // for a mesh of few vertices.
+    // Less than any device may have: the validation layer must object.
     if (lacks("bindings"))
         properties->limits.maxPerStageDescriptorStorageImages = 0;
-    if (lacks("indices"))
-        properties->limits.maxDrawIndexedIndexValue = 9;
     if (lacks("allocations"))
         properties->limits.maxMemoryAllocationCount = 24;
     // Less than the largest image of the test has.

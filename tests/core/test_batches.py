@@ -14,11 +14,9 @@ import pytest
 import vkbloom
 from tests.framebuffers import assert_same
 from tests.images import picture
-from tests.planned import changed
 from vkbloom import BevyBloom, DualKawase, Pyramid, Renderer, Scene, Separable, Settings, _core
 from vkbloom._renderer import requests
 from vkbloom._renderer.requests import new_arrays
-from vkbloom._scene.blocks import scene_arguments
 
 SIZE = (64, 36)
 # As the default, of levels that do not take most of the time.
@@ -395,18 +393,6 @@ def test_a_plan_runs_as_often_as_it_is_wanted(renderer: Renderer) -> None:
     assert again == {}
     for (array,) in (first, second):
         np.testing.assert_array_equal(array, renderer.apply(image, Separable())["final"])
-
-
-def test_indices_without_vertices(renderer: Renderer, scene: Scene) -> None:
-    # A Scene cannot have them, and the device must never get them.
-    block, pictures, (vertices, indices, *rest) = scene_arguments(scene, SIZE, "forward", 0.0)
-    wrong = indices.copy()
-    wrong[-1] = len(vertices)
-    right = renderer.render(scene, None, SIZE)
-    source = _core.scene_source(changed(block, at1=2**31), pictures, (vertices, wrong, *rest))
-    with pytest.raises(ValueError, match=f"index {len(vertices)} is beyond the mesh's"):
-        submitted(renderer, source, [Separable()])
-    assert_same(renderer.render(scene, None, SIZE), right)
 
 
 def test_a_submission_of_a_closed_renderer() -> None:

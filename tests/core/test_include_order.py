@@ -12,7 +12,6 @@ SHADERS = CORE.parent / "shaders"
 LAYERS = (
     ("vulkan",),
     ("graph",),
-    ("spirv",),
     ("scene",),
     ("passes",),
     ("methods",),

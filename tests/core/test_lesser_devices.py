@@ -185,16 +185,6 @@ def test_no_depth(layer: Path, name: str) -> None:
         )
 
 
-def test_meshes_of_too_many_vertices(layer: Path, name: str) -> None:
-    done = run(layer, name, "indices", (*WORK, "whole"))
-    assert done.returncode == 0, done.stderr
-    wrong: dict[str, str] = json.loads(done.stdout)["wrong"]
-    words = r"^ValueError: scene: index \d+ is beyond this adapter's limit of 9$"
-    assert re.search(words, wrong["whole forward"])
-    assert re.search(words, wrong["whole deferred"])
-    assert "whole uint8" not in wrong
-
-
 # Prints the errors of plans that need more memory than the device has. The kernel of the second one
 # has four times the size of the image and must not be computed first.
 TOO_LARGE = """

@@ -10,29 +10,20 @@ from typing import Any
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 from numpy.typing import NDArray
 
 import vkbloom
 from tests.images import picture
 from tests.refusals import assert_refused, rows
 from vkbloom import Renderer, Settings, load_method, reference
-from vkbloom._cli.program import program
-from vkbloom._custom.compiler import find_compiler
 from vkbloom._settings.registry import METHODS
+
+pytestmark = pytest.mark.usefixtures("glslang")
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples" / "custom_methods"
 COPY = "//!HOOK MAIN\n//!BIND HOOKED\nvec4 hook() { return HOOKED_texOff(0); }\n"
 
 Array = NDArray[Any]
-
-
-@pytest.fixture(scope="module", autouse=True)
-def compiler() -> None:
-    try:
-        find_compiler()
-    except vkbloom.ShaderError as error:
-        pytest.skip(str(error))
 
 
 def own(text: str, name: str = "tried", **fields: Any) -> Settings:
@@ -227,12 +218,6 @@ def test_a_method_is_registered_and_stored() -> None:
     METHODS.unregister("stored_one")
 
 
-def test_values_of_parameters() -> None:
-    kind: Any = load_method(PARAMETERS + COPY, name="tried")
-    assert kind(mode="hard").mode == "hard"
-    assert kind(mode=1) == kind(mode="hard")
-
-
 def test_a_param_can_be_the_setting_of_the_reference_white(renderer: Renderer) -> None:
     text = "//!PARAM reference_white\n//!TYPE float\n//!MINIMUM 0\n//!MAXIMUM 1000\n100\n"
     settings = own(text + COPY.replace("return", "return 0.01 * reference_white *"))
@@ -253,17 +238,6 @@ def test_a_scene(renderer: Renderer, shading: Any) -> None:
     scene = frames["scene"][..., :3].astype(np.float64)
     drawn = scene if shading == "forward" else 255 * scene
     assert difference(frames["final"][..., :3], np.clip(0.5 * drawn, 0, 255)) <= 1
-
-
-def test_a_command_takes_a_file(tmp_path: Path) -> None:
-    vkbloom.write(tmp_path / "in.exr", picture(24, 16, highest=2)[..., :3])
-    words = ["apply", str(tmp_path / "in.exr"), "-o", str(tmp_path / "out.exr")]
-    words += ["--method", str(EXAMPLES / "forty_lines.hook"), "--spread"]
-    result = CliRunner().invoke(program, [*words, "3"])
-    assert result.exit_code == 0, result.output
-    result = CliRunner().invoke(program, [*words, "30"])
-    assert result.exit_code == 2
-    assert "spread: 30.0 is out of range, 0.5 to 6" in result.output
 
 
 LEVEL = """\

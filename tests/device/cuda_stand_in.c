@@ -26,9 +26,8 @@ enum {
     CAPTURE_UNSUPPORTED = 900,
 };
 enum { CAPTURE_MODE_GLOBAL = 0 };
-enum { IS_MANAGED = 8, DEVICE_ORDINAL = 9 };
 
-// What is there now, by kind; and bytes that go to and come from the host.
+// What is there now, by kind; and bytes that go to the host.
 static _Atomic long contexts, streams, events, memories, mappings, host_bytes, current;
 // Each thread has its own stack of contexts.
 static _Thread_local long current_here;
@@ -74,11 +73,12 @@ struct memory_handle {
     unsigned flags, reserved[16];
 };
 
-struct memory {
+static struct memory {
+    struct memory *next;
     char *start;
     size_t size;
     int descriptor;
-};
+} *imported;
 
 // A timeline semaphore of the layer (lesser_device.c), as it describes itself in a file.
 struct semaphore {
@@ -380,18 +380,6 @@ EXPORT int cuCtxWaitEvent(void *context, void *event)
     return context == &contexts && event ? SUCCESS : INVALID_VALUE;
 }
 
-// Addresses 1 to 3 stand for freed memory, managed memory and memory of the other GPU.
-EXPORT int cuPointerGetAttribute(void *value, int attribute, unsigned long long address)
-{
-    if (address == 1)
-        return INVALID_VALUE;
-    if (attribute == IS_MANAGED)
-        *(unsigned *)value = address == 2;
-    else if (attribute == DEVICE_ORDINAL)
-        *(int *)value = address == 3 ? 0 : 1;
-    return SUCCESS;
-}
-
 EXPORT int cuImportExternalMemory(void **handle, const struct memory_handle *given)
 {
     struct memory *memory = calloc(1, sizeof *memory);
@@ -426,6 +414,10 @@ EXPORT int cuExternalMemoryGetMappedBuffer(unsigned long long *address, void *ha
         return INVALID_VALUE;
     *address = (unsigned long long)(uintptr_t)(memory->start + header[1] + buffer[0]);
     ++mappings;
+    pthread_mutex_lock(&queue.mutex);
+    memory->next = imported;
+    imported = memory;
+    pthread_mutex_unlock(&queue.mutex);
     return SUCCESS;
 }
 
@@ -441,6 +433,13 @@ EXPORT int cuDestroyExternalMemory(void *handle)
 {
     struct memory *memory = handle;
 
+    pthread_mutex_lock(&queue.mutex);
+    for (struct memory **link = &imported; *link; link = &(*link)->next)
+        if (*link == memory) {
+            *link = memory->next;
+            break;
+        }
+    pthread_mutex_unlock(&queue.mutex);
     if (memory->start)
         munmap(memory->start, memory->size);
     close(memory->descriptor);
@@ -449,30 +448,28 @@ EXPORT int cuDestroyExternalMemory(void *handle)
     return SUCCESS;
 }
 
-EXPORT int cuMemcpyDtoDAsync_v2(unsigned long long to, unsigned long long from, size_t size,
-                                void *stream)
+// Whether the address lies in memory that was imported.
+static int is_imported(const char *address)
 {
+    int found = 0;
+
+    pthread_mutex_lock(&queue.mutex);
+    for (const struct memory *memory = imported; memory; memory = memory->next)
+        found |= (size_t)(address - memory->start) < memory->size;
+    pthread_mutex_unlock(&queue.mutex);
+    return found;
+}
+
+// What goes to other memory is counted as the host's.
+EXPORT int cuMemcpyAsync(unsigned long long to, unsigned long long from, size_t size, void *stream)
+{
+    if (!is_imported((const char *)(uintptr_t)to))
+        host_bytes += (long)size;
     push((struct work){
         .to = (void *)(uintptr_t)to,
         .from = (const void *)(uintptr_t)from,
         .size = size,
     });
-    return stream == &streams ? SUCCESS : INVALID_VALUE;
-}
-
-EXPORT int cuMemcpyDtoHAsync_v2(void *to, unsigned long long from, size_t size, void *stream)
-{
-    capture.invalid |= capture.joined;
-    finish();
-    host_bytes += (long)size;
-    memcpy(to, (const void *)(uintptr_t)from, size);
-    return stream == &streams ? SUCCESS : INVALID_VALUE;
-}
-
-EXPORT int cuMemcpyHtoDAsync_v2(unsigned long long to, const void *from, size_t size, void *stream)
-{
-    host_bytes += (long)size;
-    memcpy((void *)(uintptr_t)to, from, size);
     return stream == &streams ? SUCCESS : INVALID_VALUE;
 }
 

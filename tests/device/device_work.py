@@ -45,6 +45,7 @@ class OnDevice:
 
     def __init__(self, array: NDArray[Any], device: tuple[int, int] = (2, 1), code: int = 0):
         self.array, self.device, self.code = array, device, code
+        self.unsigned = False
         self.streams: list[int | None] = []
 
     def __dlpack_device__(self) -> tuple[int, int]:
@@ -61,23 +62,12 @@ class OnDevice:
         ctypes.c_int32.from_address(tensor + 12).value = self.device[1]
         if self.code:
             ctypes.c_uint8.from_address(tensor + 20).value = self.code
+        strides = ctypes.c_uint64.from_address(tensor + 32).value
+        for axis, stride in enumerate(self.array.strides if self.unsigned else ()):
+            # CuPy 14 divides negative strides as if they had no sign.
+            stored = stride % 2**64 // self.array.itemsize
+            ctypes.c_uint64.from_address(strides + 8 * axis).value = stored
         return capsule
-
-
-class Interfaced:
-    """The same through the interface of Numba."""
-
-    def __init__(self, array: NDArray[Any], **about: Any):
-        self.array = array
-        start = array.__array_interface__["data"][0]
-        self.__cuda_array_interface__ = {
-            "shape": array.shape,
-            "typestr": array.dtype.str,
-            "data": (start, False),
-            "strides": array.strides,
-            "version": 3,
-            **about,
-        }
 
 
 def strided(rng: np.random.Generator, dtype: str) -> NDArray[Any]:
@@ -127,8 +117,9 @@ def layouts(renderer: Any) -> None:
         mask: Any = rng.random(image.shape[:2], np.float32) if step % 5 == 0 else None
         settings = methods[step % len(methods)]
         expected = renderer.apply(image, settings, mask=mask)
-        given = OnDevice(image) if step % 2 else Interfaced(image)
         device_mask = OnDevice(mask) if mask is not None and step % 2 else mask
+        given = OnDevice(image)
+        given.unsigned = step % 2 == 0
         same(renderer.apply(given, settings, mask=device_mask), expected)
         # And the host's again: its image on the device was replaced.
         again = renderer.apply(image, settings, mask=mask)
@@ -140,9 +131,6 @@ def streams(renderer: Any) -> None:
     renderer.apply(image)
     assert len(image.streams) == 1
     assert image.streams[0] not in (None, 0)
-    # The copy waits for the producer's stream; before version 3 it is the default one.
-    for about in ({"stream": 7}, {"version": 2}):
-        same(renderer.apply(Interfaced(image.array, **about)), renderer.apply(image.array))
 
 
 def sequences(renderer: Any) -> None:
@@ -402,7 +390,7 @@ def gradients(renderer: Any) -> None:
         equal_gradients(pullback({"final": cotangent}), expected)
         # Channels first, and all of one element, as PyTorch has them.
         first = np.ascontiguousarray(np.moveaxis(cotangent, -1, 0))
-        found = pullback({"final": Interfaced(np.moveaxis(first, 0, -1))})
+        found = pullback({"final": OnDevice(np.moveaxis(first, 0, -1))})
         equal_gradients(found, expected, tolerance=tolerance)
     one = np.lib.stride_tricks.as_strided(np.ones(1, np.float32), image.shape, (0, 0, 0))
     expected = vjp(image, Pyramid(levels=2), renderer=renderer)[1]({"final": np.ones(image.shape)})
@@ -440,7 +428,6 @@ def gradient_places(renderer: Any) -> None:
         ("final", OnDevice(image, (2, 0)), ValueError, "cotangents['final']: it is on Stand-in 0"),
         ("final", OnDevice(image.astype("f8")), TypeError, "float64 is not one of"),
         ("final", OnDevice(image.astype("f2"), code=4), TypeError, "cotangents['final'].to(torch."),
-        ("final", Interfaced(image, data=(1, False)), ValueError, "may have been freed"),
         ("blom", OnDevice(image), ValueError, "unknown framebuffer 'blom'; available: glow"),
     ]
     for name, given, kind, part in refused:
@@ -473,10 +460,6 @@ def errors(renderer: Any) -> None:
         (OnDevice(image[..., 0]), ValueError, "is not (H, W, 3)"),
         (OnDevice(np.moveaxis(image, -1, 0)), ValueError, "image.permute(1, 2, 0)"),
         (OnDevice(image[None]), ValueError, "map(image)"),
-        (Interfaced(image, data=(1, False)), ValueError, "may have been freed"),
-        (Interfaced(image, data=(2, False)), ValueError, "managed (unified)"),
-        (Interfaced(image, data=(3, False)), ValueError, "it is on Stand-in 0"),
-        (Interfaced(image, typestr="<c8"), TypeError, "complex64"),
     ]
     for given, kind, part in wrong:
         raises(kind, part, functools.partial(apply, given))

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tests.docs.pages import ROOT, blocks
-from vkbloom import presets, write
+from vkbloom import write
 from vkbloom._io.image_writing import save
 from vkbloom._io.images import Picture
 from vkbloom.testing import _measuring as measuring
@@ -18,8 +18,7 @@ from vkbloom.testing import _measuring as measuring
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A working folder with the files that pages name."""
     monkeypatch.chdir(tmp_path)
-    # To find the nearest of all presets takes half a minute, to time large frames three seconds.
-    monkeypatch.setattr(measuring, "presets", {"tutorial": presets["tutorial"]})
+    # To time large frames takes three seconds.
     timed = measuring.pass_times
     monkeypatch.setattr(measuring, "pass_times", lambda one, of, _: timed(one, of, (64, 36), 1))
     photo = (np.random.default_rng(0).random((24, 32, 3)) ** 8 * 20).astype(np.float16)

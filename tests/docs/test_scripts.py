@@ -23,8 +23,6 @@ import pytest
 import vkbloom
 from tests.docs.pages import ROOT
 from tests.exhaustive import witness
-from tests.processes import output
-from vkbloom.testing import _measuring as measuring
 
 #: The arguments of a script, in a folder with `photo.exr`; a module that it cannot do without.
 RUN: Final[dict[str, tuple[str, str]]] = {
@@ -49,12 +47,13 @@ LONG: Final = ("tools/tables/write.py",)
 #: What is run elsewhere, by its path or folder, and where: a test, a target of make.
 ELSEWHERE: Final = {
     "benchmarks/": "tests/bench/test_bench.py",
-    "examples/cluster/": "tests/docs/test_scripts.py",
+    "examples/cluster/": "tools/cluster/run.py",
     "examples/image_quality/": "tests/plugin/test_guide.py",
     "examples/custom_methods/": "tests/custom/test_rendering.py",
     "examples/training_pairs.py": "tests/device/test_training_pairs.py",
     "tools/cluster/": "Makefile",
     "tools/core_tables.py": "tests/core/test_no_core.py",
+    "tools/preset_blooms.py": "tests/custom/test_check.py",
     "tools/coverage.sh": "docs/robustness.md",  # compiles and runs for minutes
     "tools/coverage_report.py": "tools/coverage.sh",
     "tools/engines/": "Makefile",
@@ -99,7 +98,6 @@ def test_a_script_runs(
     (folder / "pictures").mkdir()
     shutil.copy(ROOT / "docs" / "plans.md", folder)  # a script writes its flowchart
     monkeypatch.setattr(vkbloom, "presets", Few(vkbloom.presets, "kino", "unity_urp"))
-    monkeypatch.setattr(measuring, "presets", vkbloom.presets)
     monkeypatch.setattr(vkbloom, "glares", Few(vkbloom.glares, next(iter(vkbloom.glares))))
     for name, value in {"GRID_SIDE": "16", "GRID_COUNTS": "2,2,2", "GRID_SINGLES": "2"}.items():
         monkeypatch.setenv(name, value)
@@ -143,25 +141,6 @@ def test_shell_scripts_parse() -> None:
     for name in listed("tools", "examples", "packaging", ".ci"):
         if not name.endswith(".py"):
             subprocess.run(["bash", "-n", ROOT / name], check=True)
-
-
-# The scripts in examples/cluster: that of one machine runs as it stands there.
-
-
-FOLDER = Path(__file__).resolve().parents[2] / "examples" / "cluster"
-
-
-@witness("its workers take 10 s; tests/grid/test_grid_cluster.py runs grids on such a cluster")
-def test_on_this_machine(tmp_path: Path) -> None:
-    pytest.importorskip("distributed")
-    xarray = pytest.importorskip("xarray")
-    for script in FOLDER.glob("*.py"):
-        shutil.copy(script, tmp_path)
-    package = str(Path(vkbloom.__file__).parents[1])
-    output("on_this_machine.py", cwd=tmp_path, PYTHONPATH=package)
-    with xarray.open_zarr(tmp_path / "local.zarr", consolidated=False) as stored:
-        assert stored["final"].shape == (8, 4, 90, 160, 3)
-        assert bool(stored["done"].all())
 
 
 # The examples in docstrings run as written.

@@ -13,10 +13,11 @@ import pytest
 
 import vkbloom
 from vkbloom import Renderer, Settings
-from vkbloom._custom.compiler import find_compiler
 from vkbloom._explorer.controls import as_code, controls, settings_from
 from vkbloom._explorer.viewer import Viewer
 from vkbloom._settings.registry import METHODS
+
+pytestmark = pytest.mark.usefixtures("glslang")
 
 TEXT = """\
 //!PARAM gain
@@ -37,14 +38,6 @@ vec4 hook() {
     return gain * (kind == 1 ? glow * glow : glow);
 }
 """
-
-
-@pytest.fixture(autouse=True)
-def compiler() -> None:
-    try:
-        find_compiler()
-    except vkbloom.ShaderError as error:
-        pytest.skip(str(error))
 
 
 @pytest.fixture

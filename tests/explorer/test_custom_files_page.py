@@ -13,7 +13,7 @@ import pytest
 
 import vkbloom
 from tests.explorer.explorer_hosts import CHROMIUM
-from tests.explorer.test_custom_files import TEXT, compiler, file, save  # noqa: F401
+from tests.explorer.test_custom_files import TEXT, file, save  # noqa: F401
 from tests.explorer.test_explorer_page import field, opened, see
 from vkbloom import Renderer
 from vkbloom._explorer.viewer import Viewer
@@ -21,7 +21,10 @@ from vkbloom._explorer.viewer import Viewer
 if TYPE_CHECKING:
     from playwright.sync_api import Browser
 
-pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not installed")
+pytestmark = [
+    pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not installed"),
+    pytest.mark.usefixtures("glslang"),
+]
 
 
 def test_an_edited_file(

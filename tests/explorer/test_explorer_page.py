@@ -1,12 +1,10 @@
 """The explorer's page in a browser: Debian's Chromium, run by playwright.
 
-The shown pixels are compared with those of the renderer: in the page of `vkbloom._explorer.server`,
-and in JupyterLab.
+The shown pixels are compared with those of the renderer.
 """
 
 from __future__ import annotations
 
-import base64
 import dataclasses
 import time
 from collections.abc import Callable, Iterator
@@ -19,8 +17,8 @@ import pytest
 from numpy.typing import NDArray
 
 import vkbloom
-from tests.exhaustive import by_turns, witness
-from tests.explorer.explorer_hosts import CHROMIUM, PATIENCE, jupyterlab
+from tests.exhaustive import by_turns
+from tests.explorer.explorer_hosts import CHROMIUM, PATIENCE
 from tests.framebuffers import decode
 from vkbloom import KinoBloom, Pyramid, Renderer, Scene, Separable, presets
 from vkbloom._explorer.fast_pictures import picture_of
@@ -32,9 +30,6 @@ if TYPE_CHECKING:
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not installed")
 
 ASPECT = (1280, 720)
-NOTEBOOK = (
-    'import vkbloom\nexplorer = vkbloom.explore(vkbloom.Scene.ufo(), shading="forward")\nexplorer'
-)
 
 
 @pytest.fixture(scope="module")
@@ -97,12 +92,6 @@ def see(page: Page, folder: Path) -> NDArray[np.uint8]:
     picture = page.locator(".vkbloom canvas").screenshot(caret="initial")
     page.evaluate(visibility + '"visible"')
     return decode(picture, folder)[:, :, :3]
-
-
-def read(page: Page, folder: Path) -> NDArray[np.uint8]:
-    """Return the content of the canvas, for cases where it is between pixels of the screen."""
-    url = page.evaluate('document.querySelector(".vkbloom canvas").toDataURL("image/png")')
-    return decode(base64.b64decode(url.partition(",")[2]), folder)[:, :, :3]
 
 
 def field(page: Page, name: str) -> Locator:
@@ -600,45 +589,3 @@ def test_no_rule_of_accessibility_is_broken(page: Page, theme: Any, width: int) 
     page.wait_for_timeout(300)
     found = axe.run(page)
     assert found.violations_count == 0, found.generate_report()
-
-
-@pytest.fixture(scope="module")
-def lab(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    """A JupyterLab with a notebook, and where it is."""
-    pytest.importorskip("jupyterlab")
-    folder = tmp_path_factory.mktemp("lab")
-    with jupyterlab(folder, [NOTEBOOK], {}) as url:
-        yield url
-
-
-def run_cell(browser: Browser, lab: str, theme: Any) -> Page:
-    page = browser.new_page(viewport={"width": 1280, "height": 900}, color_scheme=theme)
-    page.on("pageerror", lambda error: pytest.fail(str(error)))
-    page.goto(lab)
-    page.get_by_text("Python 3 (ipykernel) | Idle").wait_for(timeout=1000 * PATIENCE)
-    page.locator(".jp-CodeCell .cm-content").first.click()
-    page.keyboard.press("Shift+Enter")
-    page.locator(".vkb-status", has_text="until shown").wait_for(timeout=1000 * PATIENCE)
-    return page
-
-
-@witness("JupyterLab takes 20 s to start; test_explorer.py has the widget's messages")
-def test_jupyterlab(
-    browser: Browser, lab: str, renderer: Renderer, scene: Scene, tmp_path: Path
-) -> None:
-    page = run_cell(browser, lab, "light")
-    assert_shows(read(page, tmp_path), renderer, scene, Separable())
-    field(page, "blur_scale").fill("0.1")
-    wait_for_code(page, "vkbloom.Separable(blur_scale=0.1)")
-    assert_shows(read(page, tmp_path), renderer, scene, Separable(blur_scale=0.1))
-    # Code sees what the page shows, and changes it.
-    cell = page.locator(".jp-CodeCell .cm-content").nth(1)
-    cell.click()
-    page.keyboard.type("explorer.settings = vkbloom.Separable(loops=3); explorer.against")
-    page.keyboard.press("Shift+Enter")
-    wait_for_code(page, "vkbloom.Separable(loops=3)")
-    page.locator(".jp-OutputArea", has_text="fields at their defaults").wait_for()
-    page.emulate_media(color_scheme="dark")
-    page.locator("body[data-jp-theme-light=false]").wait_for(state="attached")
-    assert_theme(page, "dark")
-    page.close()

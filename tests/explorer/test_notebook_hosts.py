@@ -1,17 +1,16 @@
-"""The explorer's widget in marimo, and in a host that does not transport binary buffers."""
+"""The explorer's widget in a host with a theme that does not transport binary buffers."""
 
 from __future__ import annotations
 
 import base64
 from importlib import resources
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
 
 import vkbloom
-from tests.exhaustive import witness
-from tests.explorer.explorer_hosts import CHROMIUM, PATIENCE, marimo
+from tests.explorer.explorer_hosts import CHROMIUM, PATIENCE
+from tests.explorer.test_explorer_page import assert_theme
 from vkbloom import Renderer, Scene
 
 if TYPE_CHECKING:
@@ -19,6 +18,7 @@ if TYPE_CHECKING:
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not installed")
 
+SCRIPT = '<script type="module" src="host.js"></script>'
 FILES = resources.files("vkbloom._explorer")
 # A model as anywidget has it: messages travel as JSON, and buffers are lost.
 HOST = """
@@ -34,7 +34,7 @@ const model = {
     for (const answer of answers) for (const listener of listeners) listener(answer, []);
   },
 };
-widget.render({ model, el: document.body });
+widget.render({ model, el: document.body.appendChild(document.createElement("div")) });
 """
 
 
@@ -58,9 +58,10 @@ def test_pictures_come_as_text_where_buffers_are_lost(
         return list(sent)
 
     files = {
-        "/": ("text/html", '<body><script type="module" src="host.js"></script>'),
+        "/": ("text/html", '<link rel="stylesheet" href="page.css"><body>' + SCRIPT),
         "/host.js": ("text/javascript", HOST),
         "/page.js": ("text/javascript", (FILES / "page.js").read_text()),
+        "/page.css": ("text/css", (FILES / "page.css").read_text()),
     }
 
     def serve(route: Any) -> None:
@@ -85,27 +86,10 @@ def test_pictures_come_as_text_where_buffers_are_lost(
         {"name": "other.png", "mimeType": "image/png", "buffer": picture}
     )
     page.get_by_text("other.png").first.wait_for()
+    # The names of JupyterLab's themes, and of marimo's.
+    for name, values in {"jp-theme-light": ("true", "false"), "theme": ("light", "dark")}.items():
+        for value, theme in zip(values, ("light", "dark"), strict=True):
+            page.evaluate(f"document.body.setAttribute('data-{name}', '{value}')")
+            assert_theme(page, theme)
+        page.evaluate(f"document.body.removeAttribute('data-{name}')")
     page.close()
-
-
-@witness("marimo takes 20 s to start; test_explorer.py has the widget's traits")
-@pytest.mark.parametrize("theme", ["light", "dark"])
-def test_marimo(browser: Browser, tmp_path: Path, theme: Any) -> None:
-    pytest.importorskip("marimo")
-    with marimo(tmp_path, theme) as url:
-        page = browser.new_page(viewport={"width": 1280, "height": 1000})
-        page.goto(url)
-        before = wait_for_picture(page)
-        # A cell reads the trait, and runs again.
-        page.get_by_text("loops: 1, 1").wait_for(timeout=1000 * PATIENCE)
-        page.locator("input[type=range]").nth(2).fill("3")
-        page.get_by_label("loops", exact=True).first.fill("4")
-        page.get_by_text("loops: 4, 4").wait_for(timeout=1000 * PATIENCE)
-        assert wait_for_picture(page) != before
-        red = "element => +getComputedStyle(element).color.match(/\\d+/)[0]"
-        assert (page.locator(".vkbloom").evaluate(red) < 128) == (theme == "light")
-        # The table of the plan.
-        padding = "element => getComputedStyle(element).paddingLeft"
-        assert page.locator("td[style*=padding]").first.evaluate(padding) == "8px"
-        page.screenshot(path=tmp_path / "page.png", full_page=True)
-        page.close()

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import functools
-import importlib.util
+import importlib
 import inspect
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -128,12 +127,7 @@ class TestPyramid:
 
 pytest.importorskip("skimage.data")
 pytest.importorskip("PIL.Image")
-_FILE = Path(__file__).parents[2] / "tools" / "tables" / "screenshots.py"
-_SPEC = importlib.util.spec_from_file_location("screenshots", _FILE)
-assert _SPEC is not None
-assert _SPEC.loader is not None
-pairs: Any = importlib.util.module_from_spec(_SPEC)
-_SPEC.loader.exec_module(pairs)
+pairs: Any = importlib.import_module("tools.tables.screenshots")
 
 
 @pytest.mark.parametrize("bloom", some(pairs.BLOOMS, 2), ids=lambda one: "-".join(one[:2]))

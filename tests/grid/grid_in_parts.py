@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 import vkbloom
-from vkbloom._grid.chunks import Chunks
+from vkbloom._grid.store import Chunks
 
 
 def render(store: Path, part: str | None) -> None:

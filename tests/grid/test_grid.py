@@ -26,10 +26,9 @@ from vkbloom import (
     Separable,
     Settings,
 )
-from vkbloom._grid.filling import Tally
+from vkbloom._grid.filling import progress_bar
 from vkbloom._grid.layout import Grid, ask, lay_out
 from vkbloom._grid.order import blocks, default_chunk, points, read_part
-from vkbloom._grid.progress import Progress
 
 AXES: dict[str, list[Any]] = {
     "exposure": [0.0, 1.0],
@@ -58,6 +57,18 @@ def filled(renderer: Renderer) -> Call:
 @pytest.fixture(scope="module")
 def image() -> Any:
     return noise(23, 37, 3, dtype="float32")
+
+
+class Ran:
+    """A reduction that counts the passes of the points, and of the one that tells its shape."""
+
+    def __init__(self, *framebuffers: str) -> None:
+        self.framebuffers = framebuffers
+        self.passes = 0
+
+    def __call__(self, frames: Frames) -> int:
+        self.passes += len(frames.timings)
+        return 0
 
 
 def fewest(depends: dict[str, list[str]], axes: dict[str, list[Any]]) -> int:
@@ -89,19 +100,6 @@ class TestValues:
             for name in ("final", "depth"):
                 np.testing.assert_array_equal(dataset[name].values[place], expected[name])
 
-    @pytest.mark.parametrize("labels", [None, ["a", "b", "c"]])
-    def test_lists_of_images(
-        self, renderer: Renderer, filled: Call, labels: list[Any] | None
-    ) -> None:
-        images = [noise(9, 11, 4, dtype="uint8", seed=seed) for seed in range(3)]
-        source = images if labels is None else dict(zip(labels, images, strict=True))
-        dataset = filled(source, Pyramid(), {"radius": [0.5, 2.0], "intensity": [0.1, 1.0]})
-        assert dataset["final"].dims == ("image", "radius", "intensity", "y", "x", "channel")
-        assert list(dataset["image"].values) == (labels or [0, 1, 2])
-        for number, one in enumerate(images):
-            expected = renderer.apply(one, Pyramid(radius=2.0, intensity=0.1))["final"]
-            np.testing.assert_array_equal(dataset["final"].values[number, 1, 0], expected)
-
     def test_no_axes(self, renderer: Renderer, filled: Call, image: Any) -> None:
         dataset = filled(image)
         assert dataset["final"].dims == ("y", "x", "channel")
@@ -116,19 +114,20 @@ class TestPasses:
         axes: dict[str, list[Any]] = {
             list(AXES)[number]: list(AXES.values())[number] for number in order
         }
-        dataset = vkbloom.grid(
-            image, Separable(), axes, framebuffers="all", renderer=new_renderer()
-        )
+        ran = Ran("all")
+        how: dict[str, Any] = {"framebuffers": "all", "reduce": {"ran": ran}}
+        dataset = vkbloom.grid(image, Separable(), axes, renderer=new_renderer(), **how)
         assert list(dataset["final"].dims[:4]) == list(axes)
-        assert dataset.attrs["passes_run"] == fewest(DEPENDS, axes)
+        assert ran.passes == fewest(DEPENDS, axes)
 
     def test_one_requested_framebuffer_runs_no_further_pass(
         self, new_renderer: Callable[[], Renderer], image: Any
     ) -> None:
-        dataset = vkbloom.grid(image, Separable(), AXES, renderer=new_renderer())
+        ran = Ran("final")
+        vkbloom.grid(image, Separable(), AXES, reduce={"ran": ran}, renderer=new_renderer())
         points = math.prod(map(len, AXES.values()))
         # Several passes may run as one.
-        assert points <= dataset.attrs["passes_run"] <= fewest(DEPENDS, AXES)
+        assert points <= ran.passes <= fewest(DEPENDS, AXES)
 
     def test_a_scene_is_drawn_once_a_time(
         self, new_renderer: Callable[[], Renderer], scene: Scene
@@ -136,9 +135,9 @@ class TestPasses:
         axes = {"exposure": [0.0, 1.0], "time": [0.0, 0.1, 0.2], "blur_scale": [1.0, 2.0]}
         # All but the depths, which their passes share.
         names = ("glow", "blur_vertical", "bloom", "scene", "final")
-        dataset = vkbloom.grid(
-            scene, None, axes, size=(32, 18), framebuffers=names, renderer=new_renderer()
-        )
+        ran = Ran(*names)
+        how: dict[str, Any] = {"framebuffers": names, "reduce": {"ran": ran}, "size": (32, 18)}
+        vkbloom.grid(scene, None, axes, renderer=new_renderer(), **how)
         depends = {
             "scene": ["time"],
             "glow": ["time"],
@@ -146,7 +145,7 @@ class TestPasses:
             "bloom": ["time", "blur_scale"],
             "final": list(axes),
         }
-        assert dataset.attrs["passes_run"] == fewest(depends, axes)
+        assert ran.passes == fewest(depends, axes)
 
     def test_the_order_does_not_trust_the_first_corner(
         self, new_renderer: Callable[[], Renderer], image: Any
@@ -327,15 +326,13 @@ class TestExtras:
 
 
 class TestProgress:
-    def test_a_terminal_sees_passes(
+    def test_a_terminal_sees_points(
         self, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
     ) -> None:
-        monkeypatch.setattr("vkbloom._grid.progress._is_watched", lambda: True)
-        with Progress(4, 1, shown=True) as shown:
-            shown.add(Tally(3, ran=5))
-        message = capsys.readouterr().err
-        assert "4/4" in message
-        assert "passes run 5" in message
+        monkeypatch.setattr("vkbloom._grid.filling._is_watched", lambda: True)
+        with progress_bar(4, 1, shown=True) as count:
+            count(3)
+        assert "4/4" in capsys.readouterr().err
 
 
 @st.composite
@@ -368,12 +365,3 @@ def test_default_chunks_keep_the_order_of_nested_loops(
     assert math.prod(chunk) <= most
     found = visited(shape, chunk, ranking)
     assert found == sorted(found, key=lambda index: [index[axis] for axis in ranking])
-
-
-@pytest.mark.parametrize("ranking", [(0, 1), (1, 0)])
-def test_blocks_cover_the_grid(ranking: tuple[int, int]) -> None:
-    count = np.zeros((5, 4), int)
-    for block in blocks((5, 4), (2, 3), ranking):
-        assert block.count == count[block.slices].size
-        count[block.slices] += 1
-    assert (count == 1).all()

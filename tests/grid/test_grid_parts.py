@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import multiprocessing
 import random
 import signal
 import subprocess
 import sys
 import threading
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -17,12 +17,13 @@ from click.testing import CliRunner
 
 import vkbloom
 from tests.grid.grid_in_parts import render
-from tests.grid.prepared_at_once import prepare, prepare_all
 from tests.grid.stores import contents
 from tests.images import noise
 from vkbloom import check_grid
 from vkbloom._cli.program import program
+from vkbloom._grid.layout import Grid, Layout, Variable, ask
 from vkbloom._grid.order import blocks
+from vkbloom._grid.store import prepare
 
 SCRIPT = "tests.grid.grid_in_parts"
 ROOT = Path(__file__).resolve().parents[2]
@@ -68,33 +69,46 @@ def test_ten_parts_of_three_processes_of_which_one_is_killed(tmp_path: Path) -> 
     assert contents(store) == contents(tmp_path / "whole.zarr")
 
 
-def test_processes_create_a_store_at_once(tmp_path: Path) -> None:
-    """Of four processes with two grids, those of one grid go on, and the others are refused."""
-    context = multiprocessing.get_context("forkserver")
-    # What all need is imported once.
-    context.set_forkserver_preload(["tests.grid.prepared_at_once", "zarr"])
-    start, said = context.Barrier(4), context.Queue()
-    stores = [tmp_path / str(turn) for turn in range(4)]
+def laid_out(intensity: float) -> tuple[Grid, Layout]:
+    """Return a grid and its variables, without a device."""
+    grid = ask(
+        np.zeros((4, 4, 3), np.uint8),
+        vkbloom.Separable(intensity=intensity),
+        {"exposure": np.linspace(0, 1, 8)},
+        size=None,
+        shading="forward",
+        time=0,
+        framebuffers="final",
+        reduce=None,
+    )
+    final = Variable(("y", "x", "channel"), (4, 4, 3), np.dtype(np.uint8), {})
+    return grid, Layout((0,), {"final": final}, {}, "adapter", "driver", "1.0")
+
+
+@pytest.mark.parametrize("turn", range(4))
+def test_a_store_is_created_at_once(tmp_path: Path, turn: int) -> None:
+    """Of four calls with two grids, those of one grid go on, and the others are refused."""
     grids = (0.25, 0.5, 0.25, 0.5)
-    processes = [
-        context.Process(target=prepare_all, args=(stores, (number, 4), grid, start, said))
-        for number, grid in enumerate(grids, 1)
-    ]
-    for process in processes:
-        process.start()
-    for process in processes:
-        process.join(60)
-    assert [process.exitcode for process in processes] == [0] * 4
-    lines = sorted(said.get(timeout=1) for _ in range(len(stores) * len(grids)))
-    for store, each in zip(stores, zip(*[iter(lines)] * 4, strict=True), strict=True):
-        refused = [line for line in each if "contains another grid; settings.intensity" in line]
-        assert len(refused) == 2, each
-        assert refused in (list(each[:2]), list(each[2:]))
-        assert all(line.endswith(": ") for line in each if line not in refused)
-        own, alone = 0.5 if refused[0] == each[0] else 0.25, tmp_path / f"{store.name} alone"
-        for number in (1, 3) if own == 0.25 else (2, 4):
-            prepare(alone, (number, 4), own, threading.Barrier(1))
-        assert contents(store) == contents(alone)
+    start = threading.Barrier(4)
+
+    def prepared(number: int) -> str:
+        asked = laid_out(grids[number - 1])
+        start.wait(60)
+        try:
+            prepare(tmp_path / "a.zarr", *asked, (1,), (number, 4), resume=True)
+        except ValueError as error:
+            return str(error)
+        return ""
+
+    with ThreadPoolExecutor(4) as pool:
+        said = list(pool.map(prepared, range(1, 5)))
+    assert said[0] == said[2] == "" or said[1] == said[3] == "", said
+    refused = [text for text in said if "contains another grid; settings.intensity" in text]
+    assert len(refused) == 2, said
+    own = next(grid for grid, text in zip(grids, said, strict=True) if not text)
+    for number in (1, 3) if own == 0.25 else (2, 4):
+        prepare(tmp_path / "alone", *laid_out(own), (1,), (number, 4), resume=True)
+    assert contents(tmp_path / "a.zarr") == contents(tmp_path / "alone")
 
 
 def test_parts_are_disjoint_and_complete() -> None:
@@ -133,12 +147,6 @@ def test_damage_in_a_part_is_repaired_by_it_alone(tmp_path: Path) -> None:
         make(store, part=f"{number}/4")
         assert contents(store) in (before, files)
     assert contents(store) == files
-
-
-def test_another_grid_is_refused(tmp_path: Path) -> None:
-    make(tmp_path / "a.zarr", part=(1, 2))
-    with pytest.raises(ValueError, match="contains another grid; variables"):
-        make(tmp_path / "a.zarr", part=(2, 2), framebuffers=("bloom",))
 
 
 def test_command_line(tmp_path: Path) -> None:

@@ -7,9 +7,6 @@ import json
 import os
 import re
 import shutil
-import subprocess
-import sys
-import time
 import tracemalloc
 from collections.abc import Callable
 from pathlib import Path
@@ -20,12 +17,11 @@ import pytest
 
 import vkbloom
 from tests.exhaustive import by_turns
-from tests.grid import grid_to_kill
 from tests.grid.stores import contents
 from tests.images import noise
 from vkbloom import Frames, Pyramid, Renderer, Separable, check_grid, psf
-from vkbloom._grid.chunks import Chunks
 from vkbloom._grid.filling import Filler
+from vkbloom._grid.store import Chunks
 
 xr = pytest.importorskip("xarray")
 zarr = pytest.importorskip("zarr")
@@ -107,25 +103,12 @@ class TestWhole:
             assert found[name].attrs == expected[name].attrs
         assert found["done"].values.all()
 
-    def test_xarray_reads_it_lazily(self, undisturbed: Path, renderer: Renderer) -> None:
-        final = xr.open_zarr(undisturbed)["final"]
-        assert final.chunks[0] == (3,)
-        chosen = final.sel(blur_scale=1.1, method="nearest").isel(exposure=2, threshold=1)
-        assert chosen.chunks is not None
-        expected = renderer.apply(source(), Separable(exposure=2, threshold=0.5))["final"]
-        np.testing.assert_array_equal(chosen.compute().values, expected)
-
-    def test_passes_are_counted_per_call(self, copy: Path) -> None:
-        again = make(copy)
-        assert again.attrs["passes_run"] == 0
-        assert "vkbloom_grid" not in again.attrs
-
     def test_black_pictures_are_stored_too(self, tmp_path: Path) -> None:
         black = np.zeros((4, 4, 3), np.uint8)
         make(tmp_path / "a.zarr", source=black, reduce=None, framebuffers="final")
         assert check_grid(tmp_path / "a.zarr").complete
 
-    def test_scenes_lists_and_one_point(self, tmp_path: Path, scene: vkbloom.Scene) -> None:
+    def test_scenes_and_one_point(self, tmp_path: Path, scene: vkbloom.Scene) -> None:
         plain: dict[str, Any] = {"chunks": None, "reduce": None, "framebuffers": "final"}
         lone = make(tmp_path / "a.zarr", source=scene, axes={}, size=(20, 10), **plain)
         assert lone["final"].shape == (10, 20, 4)
@@ -134,12 +117,7 @@ class TestWhole:
             tmp_path / "b.zarr", source=scene, axes={"time": [0, 0.5]}, size=(20, 10), **plain
         )
         np.testing.assert_array_equal(moving["final"][0].values, lone["final"].values)
-        images = {"x": source(), "y": source()[::-1]}
-        listed = make(
-            tmp_path / "c.zarr", source=images, axes={"radius": [1]}, settings=Pyramid(), **plain
-        )
-        assert list(listed["image"].values) == ["x", "y"]
-        assert check_grid(tmp_path / "c.zarr").complete
+        assert check_grid(tmp_path / "b.zarr").complete
 
     @pytest.mark.parametrize(
         ("settings", "axis", "values"),
@@ -166,27 +144,28 @@ class TestWhole:
             source(), settings, {axis: values}, progress=False, renderer=renderer
         )
         assert list(in_memory[axis].values) == list(stored[axis].values)
-        again = vkbloom.grid(source(), settings, {axis: values}, store=store)
-        assert again.attrs["passes_run"] == 0
+        kept = contents(store)
+        vkbloom.grid(source(), settings, {axis: values}, store=store)
+        assert contents(store) == kept
         with pytest.raises(ValueError, match=rf"axes\.{axis}"):
             vkbloom.grid(source(), settings, {axis: values[:1]}, store=store)
 
     def test_uploaded_images_have_their_masks(self, tmp_path: Path, renderer: Renderer) -> None:
         levels = np.arange(16 * 21, dtype=np.uint16).reshape(16, 21).astype(np.uint8)
-        both = [source(), noise(16, 21, 3, dtype="float32", seed=6)]
         store = tmp_path / "glow.zarr"
 
         def made(mask: Any, **more: Any) -> Any:
-            images = [renderer.upload(image, mask=mask) for image in both]
+            image = renderer.upload(source(), mask=mask)
             axes = {"exposure": [0.0, 1.0]}
-            return vkbloom.grid(images, Pyramid(), axes, renderer=renderer, **more)
+            return vkbloom.grid(image, Pyramid(), axes, renderer=renderer, **more)
 
         grid = made(levels, store=store)
-        for number, image in enumerate(both):
-            expected = renderer.apply(image, Pyramid(exposure=1.0), mask=levels)["final"]
-            assert np.array_equal(grid["final"].isel(image=number, exposure=1), expected)
+        expected = renderer.apply(source(), Pyramid(exposure=1.0), mask=levels)["final"]
+        assert np.array_equal(grid["final"].isel(exposure=1), expected)
         assert np.array_equal(made(levels)["final"], grid["final"])
-        assert made(levels, store=store).attrs["passes_run"] == 0
+        kept = contents(store)
+        made(levels, store=store)
+        assert contents(store) == kept
         with pytest.raises(ValueError, match=r"source\.images"):
             made(255 - levels, store=store)
 
@@ -253,25 +232,6 @@ class TestResumed:
         assert sum(filled) == POINTS - 3 * 6
         assert made["done"].values.all()
         assert contents(store) == contents(undisturbed)
-
-    def test_killed_process_is_resumed_with_the_same_bytes(self, tmp_path: Path) -> None:
-        script = grid_to_kill.__file__
-        whole, store = tmp_path / "whole.zarr", tmp_path / "killed.zarr"
-        for seconds in (0.0, 0.2):
-            process = subprocess.Popen([sys.executable, script, str(store)])
-            try:
-                # From the first chunk on, at different places.
-                while not any((store / "final").glob("c.*")) and process.poll() is None:
-                    time.sleep(0.01)
-                time.sleep(seconds)
-            finally:
-                process.kill()
-                process.wait()
-            if (store / "zarr.json").exists():
-                assert int(xr.open_zarr(store)["done"].sum()) < 1000
-        for each in (store, whole):
-            grid_to_kill.fill(each)
-        assert contents(store) == contents(whole)
 
     def test_resume_false_refuses_an_existing_store(self, copy: Path) -> None:
         before = contents(copy)
@@ -389,13 +349,6 @@ class TestDamaged:
         make(copy)
         assert contents(copy) == contents(undisturbed)
         assert check_grid(copy).complete
-
-    def test_temporary_files_of_a_killed_writer_are_removed(
-        self, copy: Path, undisturbed: Path
-    ) -> None:
-        (copy / "final" / "c.0.0.0.0.0.5c5c.partial").write_bytes(b"half")
-        make(copy)
-        assert contents(copy) == contents(undisturbed)
 
 
 def with_sum(content: bytes) -> bytes:

@@ -1,10 +1,10 @@
-"""Wrong arguments are refused at the call, by errors that name them."""
+"""Wrong arguments are refused at the call, by errors that name them, and leave no file."""
 
 from __future__ import annotations
 
 import copy
 import pickle
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -13,10 +13,15 @@ import pytest
 from numpy.typing import NDArray
 
 import vkbloom
-from tests.io.profiles import store_png
+from tests.framebuffers import names_in
+from tests.refusals import assert_refused, rows
 from vkbloom._checks import check_image, check_mask
 
 IMAGE = np.zeros((16, 24, 3), np.float32)
+RANDOM = np.random.default_rng(2).random((5, 7, 3), dtype=np.float32)
+RGBA = np.ones((4, 5, 4), np.float32)
+LEVELS = np.zeros((4, 5, 3), np.uint8)
+SDR = "ACES 2.0 - SDR 100 nits (Rec.709)"
 
 
 class OnCuda:
@@ -37,60 +42,28 @@ class WithoutView(OnCuda):
 
     __array__ = None  # type: ignore[assignment]
 
-    @property
-    def __cuda_array_interface__(self) -> dict[str, Any]:
-        return {}
-
 
 def settings() -> Iterator[vkbloom.Settings]:
     pytest.fail("an iterator was consumed")
     yield vkbloom.Pyramid()
 
 
-CALLS: dict[str, Callable[[vkbloom.Renderer], object]] = {
-    "framebuffers each": lambda one: one.map([IMAGE], framebuffers=("nonsense",)),
-    "framebuffers iterator": lambda one: one.map(iter([IMAGE]), framebuffers="nonsense"),
-    "framebuffers settings": lambda one: one.map(
-        iter([IMAGE]), [vkbloom.Pyramid(levels=2)], framebuffers=("blur_vertical",)
-    ),
-    "framebuffers many": lambda one: one.sweep(
-        IMAGE, [vkbloom.Pyramid(levels=2)], framebuffers=("nonsense",)
-    ),
-    "framebuffers scene": lambda one: one.sweep(
-        vkbloom.Scene.ufo(), [vkbloom.Pyramid(levels=2)], size=(64, 48), framebuffers=("nonsense",)
-    ),
-    "framebuffers type": lambda one: one.sweep(IMAGE, settings(), framebuffers=(3,)),  # type: ignore[arg-type]
-    "psf: 'spencer'": lambda _: vkbloom.Convolution(psf="spencer"),
-    "psf: complex": lambda _: vkbloom.Convolution(psf=np.ones((3, 3), complex)),
-    "psf: an array": lambda _: vkbloom.Convolution(psf=[[1, 2], [3]]),
-    "image: an array is needed, not 'dirt.png'": lambda _: vkbloom.Dirt(image="dirt.png"),
-    "radii": lambda _: vkbloom.psf.spencer().encircled_energy(["x"]),
-    "reduce: 3": lambda one: vkbloom.grid(IMAGE, axes={"exposure": [2]}, reduce=3, renderer=one),  # type: ignore[arg-type]
-    "axes: 3": lambda one: vkbloom.grid(IMAGE, axes={3: [1]}, renderer=one),  # type: ignore[dict-item]
-    "metadata: 3": lambda _: vkbloom.write("o.png", IMAGE, metadata=3),  # type: ignore[arg-type]
-    "path: b'o.png'": lambda _: vkbloom.write(b"o.png", IMAGE),  # type: ignore[arg-type]
-    "path: b'i.png'": lambda _: vkbloom.read(b"i.png"),  # type: ignore[call-overload]
-    "path: 3": lambda _: vkbloom.read(3),  # type: ignore[call-overload]
-    "image: OnCuda is on another device; copy it to the CPU: image.cpu() for PyTorch": lambda one: (
-        one.apply(OnCuda())  # type: ignore[arg-type]
-    ),
-    "image: WithoutView is on another device": lambda one: one.apply(WithoutView()),  # type: ignore[arg-type]
-}
-
-
-@pytest.mark.parametrize("named", CALLS)
-def test_errors_at_the_call_name_the_argument(named: str, renderer: vkbloom.Renderer) -> None:
-    with pytest.raises((TypeError, ValueError)) as caught:
-        CALLS[named](renderer)
-    text = str(caught.value)
-    assert text.startswith(named if ":" in named else f"{named.split(maxsplit=1)[0]}:"), text
-
-
-@pytest.mark.parametrize("subimage", ["one", 1.5, None])
-def test_subimages_are_integers(tmp_path: Path, subimage: Any) -> None:
-    path = store_png(tmp_path / "a.png", np.zeros((4, 4, 3), np.uint8))
-    with pytest.raises(TypeError, match=r"^subimage: "):
-        vkbloom.read(path, subimage=subimage)
+@pytest.mark.parametrize(
+    ("call", "error"), [*rows(__file__, "arguments"), *rows(__file__, "files")]
+)
+def test_a_wrong_value_is_refused(
+    renderer: vkbloom.Renderer,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    call: str,
+    error: str,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    vkbloom.write("a.png", LEVELS)
+    modules = {"copy": copy, "pickle": pickle, "Settings": vkbloom.Settings}
+    of_files = {"read": vkbloom.read, "write": vkbloom.write}
+    assert_refused(call, error, {**globals(), **modules, **of_files, "renderer": renderer})
+    assert names_in(tmp_path) == ["a.png"]
 
 
 def test_names_of_levels_of_larger_images_are_accepted(renderer: vkbloom.Renderer) -> None:
@@ -101,9 +74,6 @@ def test_names_of_levels_of_larger_images_are_accepted(renderer: vkbloom.Rendere
 
 
 # Objects other than ndarrays as images, and the errors for objects that are none.
-
-
-RANDOM = np.random.default_rng(2).random((5, 7, 3), dtype=np.float32)
 
 
 class Viewed:
@@ -176,18 +146,6 @@ def test_errors_give_a_hint(image: NDArray[Any], error: type[Exception], hint: s
     assert str(caught.value).endswith(hint)
     mended = eval(hint, {"image": image, "np": np})
     assert check_image(mended).shape == (5, 7, 3)
-
-
-def test_a_scene_is_no_array(renderer: vkbloom.Renderer) -> None:
-    with pytest.raises(TypeError, match=r"^scene: ndarray is not a Scene$"):
-        renderer.render(RANDOM)  # type: ignore[arg-type]
-
-
-@pytest.mark.parametrize("duplicate", [copy.copy, copy.deepcopy, pickle.dumps])
-def test_renderers_are_not_copied(renderer: vkbloom.Renderer, duplicate: Any) -> None:
-    with pytest.raises(TypeError, match="a Renderer cannot be copied or pickled"):
-        duplicate(renderer)
-    assert not renderer.closed
 
 
 def test_unknown_presets_suggest_the_nearest() -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import struct
 from pathlib import Path
 from typing import Any
 
@@ -260,26 +259,6 @@ class TestRead:
             vkbloom.read(path, layer="one", subimage=1)
         assert vkbloom.read(path, metadata=True)[1]["parts"] == ("one", "two")
 
-    def test_luminance_chroma_is_refused(self, tmp_path: Path) -> None:
-        channels = {name: RNG.random((4, 4)).astype(np.float16) for name in ("Y", "RY", "BY")}
-        path = store_exr(tmp_path / "a.exr", **channels)
-        with pytest.raises(ValueError, match=r"a\.exr: the channels Y, BY, RY are not R, G, B or"):
-            vkbloom.read(path)
-
-    def test_damage_names_the_file(self, tmp_path: Path) -> None:
-        whole = store_png(tmp_path / "a.png", levels(40, 50, 3)).read_bytes()
-        for name, content in (
-            ("empty.png", b""),
-            ("cut.png", whole[:300]),
-            ("words.exr", b"hello"),
-            ("size.png", whole[:16] + struct.pack(">II", 2**30, 2**30) + whole[24:]),
-        ):
-            (tmp_path / name).write_bytes(content)
-            with pytest.raises((OSError, ValueError), match=name):
-                vkbloom.read(tmp_path / name)
-        with pytest.raises(FileNotFoundError):
-            vkbloom.read(tmp_path / "no.png")
-
 
 class TestWrite:
     @pytest.mark.parametrize(("bits", "dtype"), [(None, "uint8"), (8, "uint8"), (16, "uint16")])
@@ -309,8 +288,7 @@ class TestWrite:
     @pytest.mark.parametrize("channels", [0, 1, 2, 3, 4])
     def test_integers_stay(self, tmp_path: Path, dtype: str, channels: int) -> None:
         pixels = levels(*((5, 7, channels) if channels else (5, 7)), dtype=dtype)
-        for name in ("b.png", "b.tif"):
-            buffer = oiio.ImageBuf()
+        for name in ("b.PNG", "b.tif"):
             plain = oiio.ImageSpec()
             plain.attribute("oiio:UnassociatedAlpha", 1)
             path = str(vkbloom.write(tmp_path / name, pixels))
@@ -326,21 +304,6 @@ class TestWrite:
             assert np.array_equal(made, pixels.astype(dtype))
         half = vkbloom.write(tmp_path / "b.exr", pixels.astype(np.float16))
         assert vkbloom.read(half).dtype == np.float16
-
-    def test_quality(self, tmp_path: Path) -> None:
-        pixels = RNG.random((64, 64, 3), dtype=np.float32)
-        sizes = [
-            vkbloom.write(tmp_path / "b.jpg", pixels, quality=quality).stat().st_size
-            for quality in (10, 50, 100)
-        ]
-        assert sizes == sorted(sizes)
-        assert sizes[2] > 4 * sizes[0]
-        spec = oiio.ImageBuf(str(tmp_path / "b.jpg")).spec()
-        assert spec["jpeg:subsampling"] == "4:4:4"
-        with pytest.raises(ValueError, match="png has no quality; jpeg, webp, jpegxl have one"):
-            vkbloom.write(tmp_path / "b.png", pixels, quality=90)
-        with pytest.raises(ValueError, match="quality: 0 is outside 1 to 100"):
-            vkbloom.write(tmp_path / "b.jpg", pixels, quality=0)
 
     def test_exif_is_kept(self, tmp_path: Path) -> None:
         image = pytest.importorskip("PIL.Image")
@@ -363,34 +326,3 @@ class TestWrite:
             inner = found.get_ifd(0x8769)
             assert inner[0x9003] == "2020:01:02 03:04:05"
             assert float(inner[33434]) == 0.5
-
-    def test_format_refuses_pixels_that_it_cannot_hold(self, tmp_path: Path) -> None:
-        rgba = RNG.random((4, 5, 4), dtype=np.float32)
-        for name in ("b.jpg", "b.hdr"):
-            with pytest.raises(ValueError, match=r"no alpha; write array\[\.\.\., :3\]"):
-                vkbloom.write(tmp_path / name, rgba)
-        for dtype in ("uint8", "uint16"):
-            with pytest.raises(ValueError, match=f"holds float, not {dtype}; write linear"):
-                vkbloom.write(tmp_path / "b.exr", levels(4, 5, 3, dtype=dtype))
-        with pytest.raises(ValueError, match="holds uint8, not uint16"):
-            vkbloom.write(tmp_path / "b.jpg", levels(4, 5, 3, dtype="uint16"))
-        with pytest.raises(ValueError, match="is not the extension of a writable image format"):
-            vkbloom.write(tmp_path / "b.unknown", rgba)
-        assert [*tmp_path.iterdir()] == []
-
-    def test_wrong_arguments(self, tmp_path: Path) -> None:
-        path, rgb = tmp_path / "b.png", RNG.random((4, 5, 3), dtype=np.float32)
-        for error, match, array, arguments in (
-            (ValueError, r"array: shape \(4,\)", rgb[:, 0, 0], {}),
-            (ValueError, r"array: shape \(3, 4, 5\)", rgb.transpose(2, 0, 1), {}),
-            (TypeError, "dtype int64", levels(4, 5, 3).astype(np.int64), {}),
-            (ValueError, "encoding: 'sRGB' is not one of", rgb, {"encoding": "sRGB"}),
-            (ValueError, "encoding: 'srgb' needs floats", levels(4, 5, 3), {"encoding": "srgb"}),
-            (ValueError, "bits: 12 is not one of 8, 16, 32", rgb, {"bits": 12}),
-            (ValueError, "bits: 16 is not one of 8", levels(4, 5, 3), {"bits": 16}),
-            (ValueError, "png cannot hold 3 channels of float; use another", rgb, {"bits": 32}),
-            (TypeError, "metadata: 'Make' is", rgb, {"metadata": {"Make": object()}}),
-        ):
-            with pytest.raises(error, match=match):
-                vkbloom.write(path, array, **arguments)
-        assert [*tmp_path.iterdir()] == []

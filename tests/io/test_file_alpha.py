@@ -86,6 +86,28 @@ def beside(pixels: NDArray[Any], *channels: int) -> NDArray[Any]:
 
 GREY = STRAIGHT[..., [1, 1, 1, 3]]
 OPAQUE = (STRAIGHT[..., :3], False)
+EXTRA_SAMPLES = ("unspecified", "assocalpha", "unassalpha")
+#: What is stored and what is meant, by the numbers of the extra samples; whether it is multiplied.
+TIFFS: dict[str, tuple[NDArray[Any], NDArray[Any], bool]] = {
+    "0": (STRAIGHT, *OPAQUE),
+    "1": (MULTIPLIED, MULTIPLIED, True),
+    "1 deep": (deep(MULTIPLIED), deep(MULTIPLIED), True),
+    "2": (STRAIGHT, STRAIGHT, False),
+    "2 deep": (deep(STRAIGHT), deep(STRAIGHT), False),
+    "0 2": (beside(STRAIGHT[..., :3], 4, 3), STRAIGHT, False),
+    "1 0": (beside(MULTIPLIED[..., :3], 3, 4), MULTIPLIED, True),
+    "1 2": (beside(MULTIPLIED[..., :3], 3, 4), MULTIPLIED, True),
+    "grey 1": (MULTIPLIED[..., [1, 3]], MULTIPLIED[..., [1, 1, 1, 3]], True),
+    "grey 2": (STRAIGHT[..., [1, 3]], GREY, False),
+    "grey 0 2": (beside(STRAIGHT[..., [1]], 4, 3), GREY, False),
+}
+
+
+def of_tiff(name: str, pixels: NDArray[Any]) -> Callable[[Path], None]:
+    extra = [EXTRA_SAMPLES[int(word)] for word in name.split() if word.isdigit()]
+    return tiff(pixels, *extra, photometric="minisblack" if "grey" in name else "rgb")
+
+
 # A name, what writes the file, what is in it, and whether its colours are multiplied.
 ROWS: list[tuple[str, Callable[[Path], Any], NDArray[Any], bool]] = [
     ("a.png", pillow(STRAIGHT), STRAIGHT, False),
@@ -136,58 +158,14 @@ ROWS: list[tuple[str, Callable[[Path], Any], NDArray[Any], bool]] = [
     ),
     ("bgrx 40.bmp", lambda path: foreign.bmp(path, WORDS, 40, foreign.BGRA[:3]), *OPAQUE),
     ("a.tif", pillow(STRAIGHT), STRAIGHT, False),
-    ("2.tif", tiff(STRAIGHT, "unassalpha"), STRAIGHT, False),
-    ("2 deep.tif", tiff(deep(STRAIGHT), "unassalpha"), deep(STRAIGHT), False),
-    ("1.tif", tiff(MULTIPLIED, "assocalpha"), MULTIPLIED, True),
-    ("1 deep.tif", tiff(deep(MULTIPLIED), "assocalpha"), deep(MULTIPLIED), True),
-    ("0.tif", tiff(STRAIGHT, "unspecified"), *OPAQUE),
     ("none.tif", tiff_without_tag, STRAIGHT, False),
-    (
-        "0 2.tif",
-        tiff(beside(STRAIGHT[..., :3], 4, 3), "unspecified", "unassalpha"),
-        STRAIGHT,
-        False,
-    ),
-    (
-        "1 0.tif",
-        tiff(beside(MULTIPLIED[..., :3], 3, 4), "assocalpha", "unspecified"),
-        MULTIPLIED,
-        True,
-    ),
-    (
-        "1 2.tif",
-        tiff(beside(MULTIPLIED[..., :3], 3, 4), "assocalpha", "unassalpha"),
-        MULTIPLIED,
-        True,
-    ),
-    (
-        "grey 2.tif",
-        tiff(STRAIGHT[..., [1, 3]], "unassalpha", photometric="minisblack"),
-        GREY,
-        False,
-    ),
-    (
-        "grey 1.tif",
-        tiff(MULTIPLIED[..., [1, 3]], "assocalpha", photometric="minisblack"),
-        MULTIPLIED[..., [1, 1, 1, 3]],
-        True,
-    ),
-    (
-        "grey 0 2.tif",
-        tiff(
-            beside(STRAIGHT[..., [1]], 4, 3), "unspecified", "unassalpha", photometric="minisblack"
-        ),
-        GREY,
-        False,
-    ),
+    *((f"{name}.tif", of_tiff(name, one[0]), one[1], one[2]) for name, one in TIFFS.items()),
 ]
 
 
 @pytest.mark.parametrize("row", ROWS, ids=[row[0] for row in ROWS])
 def test_files_of_others(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    row: tuple[str, Callable[[Path], Any], NDArray[Any], bool],
+    tmp_path: Path, row: tuple[str, Callable[[Path], Any], NDArray[Any], bool]
 ) -> None:
     name, store, codes, is_multiplied = row
     path = tmp_path / name

@@ -22,14 +22,6 @@ SHADER = (ROOT / "examples" / "custom_methods" / "forty_lines.hook").read_text()
 GOOD = SHADER.replace("2.5\n//!HOOK", "2.0\n//!HOOK")
 BAD = SHADER.replace("return sum / total;", "return 1.08 * sum / total;")
 OPTIONS = "--measure-size 64x64 --size 64x48"
-# The program, whose nearest preset is always the same: the search takes most of its time.
-PROGRAM = """
-import vkbloom
-from vkbloom._cli.program import program
-from vkbloom.testing import _measuring
-_measuring.presets = {"tutorial": vkbloom.presets["tutorial"]}
-program(prog_name="vkbloom")
-"""
 
 
 def git(folder: Path, *words: str) -> str:
@@ -61,7 +53,7 @@ def programs(tmp_path: Path) -> dict[str, str]:
     folder = tmp_path / "bin"
     folder.mkdir()
     (folder / "python").write_text(f'#!/bin/sh\nexec {shlex.quote(sys.executable)} "$@"\n')
-    (folder / "vkbloom").write_text(f'#!/bin/sh\nexec python -c {shlex.quote(PROGRAM)} "$@"\n')
+    (folder / "vkbloom").write_text('#!/bin/sh\nexec python -m vkbloom "$@"\n')
     for program in folder.iterdir():
         program.chmod(0o755)
     return {**os.environ, "PATH": f"{folder}{os.pathsep}{os.environ['PATH']}"}

@@ -252,9 +252,6 @@ FAULTS: dict[str, Fault] = {
         "jitter",
         "a lit pixel blooms from 4",
     ),
-    "box instead of tent": Fault(
-        lambda: box, lambda: lambda a: box(box(a, 9), 9), "round", "1.37 times as far"
-    ),
     "square kernel": Fault(
         lambda: lambda a: box(a, 25), lambda: wider, "round", "times as far in one direction"
     ),
@@ -290,12 +287,6 @@ FAULTS: dict[str, Fault] = {
     "keeps history": Fault(with_history, lambda: at_present, "history", "after a light has jumped"),
     "strobes": Fault(
         lambda: strobing, lambda: at_present, "history", "that stays the same changes by 1"
-    ),
-    "mirrors a narrow bloom": Fault(
-        lambda: lambda a: gaussian(a, mode="reflect"),
-        lambda: gaussian,
-        "border",
-        "where the middle has none",
     ),
     "white outside": Fault(
         lambda: (

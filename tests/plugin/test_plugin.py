@@ -107,11 +107,6 @@ def test_again(bloom_renderer):
         wanted = software.name[:8].upper()
         run(project, f"--bloom-adapter={wanted}").assert_outcomes(passed=2)
 
-    def test_a_missing_adapter_is_an_error(self, project: pytest.Pytester) -> None:
-        write(project, self.RENDER)
-        result = run(project, "--bloom-adapter=Voodoo")
-        result.assert_outcomes(errors=2)
-
     def test_images_need_no_vulkan(
         self, project: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
     ) -> None:

@@ -349,19 +349,3 @@ def test_unnamed(frame_regression):
                 ]
             )
         assert not (project.path / "bloom_references").exists()
-
-    def test_wrong_arguments(self, project: pytest.Pytester) -> None:
-        write(
-            project,
-            PROJECT
-            + """
-@pytest.mark.parametrize(("name", "value"), [
-    ("atol", -1), ("rtol", float("nan")), ("fail_percent", 101), ("hard_fail", -1), ("ssim", 2),
-    ("flip", -1),
-])
-def test_frames(frame_regression, name, value):
-    with pytest.raises(ValueError, match=name):
-        frame_regression.check(frames(), **{name: value})
-""",
-        )
-        run(project).assert_outcomes(passed=6)

@@ -12,11 +12,13 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from tests.plugin.broken_laws import fails
+from tests.refusals import assert_refused, rows
 from vkbloom import testing
 from vkbloom.testing import Probe
 
 Image = NDArray[Any]
 SMALL = Probe(size=(48, 48), channels=1)
+PICTURE = np.zeros((4, 4, 3), np.uint8)
 TAPS = (1 / 8, 3 / 8, 3 / 8, 1 / 8)
 
 
@@ -148,26 +150,6 @@ class TestStability:
         np.testing.assert_allclose(found.energy, 1, rtol=1e-4)
         assert found.jitter < 1e-3
 
-    def test_light_that_leaves_the_image(self) -> None:
-        with pytest.raises(ValueError, match="in the outermost pixels of an image of 20 x 20"):
-            testing.assert_stable(lambda image: gaussian(image, 4.0), probe=Probe(size=(20, 20)))
-
-    @pytest.mark.parametrize(
-        ("options", "message"),
-        [
-            ({"texel": 0}, "texel: 0 is outside 1 to"),
-            ({"steps": 0}, "steps: 0 is out of range"),
-            ({"texel": 47, "probe": SMALL}, r"a path of 47 pixels leaves an image of \(48, 48\)"),
-        ],
-    )
-    def test_wrong_arguments(self, options: dict[str, Any], message: str) -> None:
-        with pytest.raises(ValueError, match=message):
-            testing.stability(gaussian, **options)
-        with pytest.raises(ValueError, match="growth: -1 is out of range"):
-            testing.assert_stable(gaussian, growth=-1)
-        with pytest.raises(TypeError, match="bloom: None is not callable"):
-            testing.stability(None)  # type: ignore[arg-type]
-
 
 class TestResolution:
     def test_a_radius_in_shares_of_the_height(self) -> None:
@@ -211,15 +193,7 @@ class TestResolution:
         )
         testing.assert_resolution_independent(bloom, (1, 2), peak=0.7, probe=SMALL)
 
-    @pytest.mark.parametrize(
-        ("options", "message"),
-        [
-            ({"scales": ()}, "scales: the sequence is empty"),
-            ({"scales": (0.3,)}, "scales: 0.3 makes 14.4 x 14.4 of an image of 48 x 48"),
-            ({"scales": (0,)}, "scales: 0 is out of range"),
-            ({"light": 0}, "light: 0 is out of range"),
-        ],
-    )
-    def test_wrong_arguments(self, options: dict[str, Any], message: str) -> None:
-        with pytest.raises(ValueError, match=message):
-            testing.resolution_response(gaussian, probe=SMALL, **options)
+
+@pytest.mark.parametrize(("call", "error"), rows(__file__, "figures"))
+def test_a_wrong_value_is_refused(call: str, error: str) -> None:
+    assert_refused(call, error, globals())

@@ -48,6 +48,11 @@ def test_a_mesh_keeps_its_own_read_only_arrays() -> None:
         assert not array.flags.writeable
 
 
+def test_a_mesh_has_the_vertices_of_its_indices() -> None:
+    with pytest.raises(ValueError, match="indices: 3 is beyond the mesh's 3 vertices"):
+        mesh(indices=np.array([0, 1, 3], np.uint32))
+
+
 def test_a_mesh_does_not_trust_a_read_only_view() -> None:
     owner = np.ones((3, 9), np.float32)
     view = owner.view()

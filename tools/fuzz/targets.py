@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import base64
 import contextlib
-import functools
 import json
 import os
 import struct
@@ -17,7 +16,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import folders
 import numpy as np
 import OpenImageIO
 
@@ -239,11 +237,6 @@ def _own_seeds() -> list[bytes]:
     return [_BLOCKS, *(file.read_bytes() for file in sorted(examples.glob("*.hook")))]
 
 
-@functools.cache
-def _folders() -> folders.Folders:
-    return folders.Folders(FOLDER)
-
-
 TARGETS = {
     "gltf": Target(_gltf, _gltf_seeds),
     "ktx": Target(_ktx, _ktx_seeds),
@@ -251,7 +244,6 @@ TARGETS = {
     "equirectangular": Target(_equirectangular, lambda: _image_seeds((4, 8, 3))),
     "pipelines": Target(_pipelines, _pipeline_seeds),
     "own": Target(_own, _own_seeds),
-    "images": Target(lambda data: _folders().run(data), lambda: _folders().seeds()),
 }
 
 

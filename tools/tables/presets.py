@@ -48,7 +48,6 @@ def check(renderer: vkbloom.Renderer, quick: bool) -> str:
     laws, figures = [], []
     for name in tqdm(vkbloom.presets):
         words = ["check", "--preset", name, "--json", "--measure-size", size]
-        # In one process, which renders the nearest presets once.
         done = CliRunner().invoke(
             program, [*words, "--adapter", renderer.info.name], catch_exceptions=False
         )

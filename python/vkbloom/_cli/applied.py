@@ -20,6 +20,8 @@ import vkbloom
 from vkbloom._background_writer import written_in_background
 from vkbloom._cli import no_bloom
 from vkbloom._cli.image_files import finished, read_picture
+from vkbloom._cli.program import as_wrong_use
+from vkbloom._cli.settings_options import Start
 from vkbloom._cli.streams import PIPE, is_stream
 from vkbloom._cli.terminal import hides_progress, note, say
 from vkbloom._io import image_writing
@@ -31,18 +33,13 @@ from vkbloom._renderer.frame_files import settings_facts
 
 #: A file to read, and the file to write.
 Pair: TypeAlias = tuple[str, str]
-#: The settings of a file, and what its highlights are expanded up to.
-Begun: TypeAlias = tuple[vkbloom.Settings, float | None]
-
 #: From an image to its mask and emission.
-Glow: TypeAlias = Callable[[NDArray[Any]], dict[str, NDArray[Any]]]
+Glow: TypeAlias = Callable[[NDArray[Any]], dict[str, Any]]
 
 # Errors of one file, after which a batch goes on. A lost device fails for all of them.
 _FAILURES: Final = (OSError, ValueError, MemoryError, click.ClickException)
 # 8-bit pictures of this many pixels or more become half floats, whose steps are finer.
 _HALVED: Final = 1 << 26
-# Errors about what a picture has, by the argument at their beginning; others hold for all pictures.
-_OF_PICTURES: Final = ("image", "mask", "emission", "alpha")
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -61,21 +58,14 @@ class Options:
     bits: int | None
     quality: int | None
     pipe_format: str
-    framebuffers: str
     overwrite: bool
-    skip_existing: bool
     expand: float | None
-    settings: Callable[[str], Begun]
+    start: Start
 
     @property
     def saved(self) -> Saved:
         """What the colours of a written file are to be."""
         return Saved(self.output_colour, self.primaries, self.view)
-
-    @property
-    def names(self) -> str | list[str]:
-        """The framebuffers to write."""
-        return "all" if self.framebuffers == "all" else ["final", *self.framebuffers.split(",")]
 
 
 def of_format(target: str, pipe_format: str) -> str:
@@ -84,27 +74,16 @@ def of_format(target: str, pipe_format: str) -> str:
     return f"image.{pipe_format}" if is_nameless else target
 
 
+@dataclasses.dataclass(kw_only=True, eq=False)
 class Run:
     """The files of one call; `failures` has the errors of a batch by the file that was read."""
 
-    def __init__(
-        self,
-        options: Options,
-        out: str,
-        folder: Path,
-        renderer: Callable[[], vkbloom.Renderer],
-        *,
-        several: bool,
-    ) -> None:
-        self._options = options
-        self._out = out
-        self._folder = folder
-        self._renderer = renderer
-        self._several = several
-        self._hidden = hides_progress()
-        # The files are read once.
-        self._glow_of = functools.cache(self._read_glow)
-        self.failures: dict[str, Exception] = {}
+    options: Options
+    out: str
+    folder: Path
+    renderer: Callable[[], vkbloom.Renderer]
+    several: bool
+    failures: dict[str, Exception] = dataclasses.field(default_factory=dict)
 
     @contextlib.contextmanager
     def _of_file(self, pair: Pair) -> Iterator[None]:
@@ -112,29 +91,17 @@ class Run:
         try:
             yield
         except _FAILURES as error:
-            if not self._several:
+            if not self.several:
                 raise
             self.failures[pair[0]] = error
 
     def sequence(self, files: list[Pair], settings: vkbloom.Settings, expand: float | None) -> None:
         """Add bloom to files one after the other; each is written while the next one is made."""
-        hidden = self._hidden if self._several else True
+        hidden = hides_progress() if self.several else True
         bar = tqdm(files, unit="image", leave=False, disable=hidden)
         for texts in written_in_background(self._made(bar, settings, expand)):
             for text in texts:
                 note(text)
-
-    @contextlib.contextmanager
-    def _wrong_use_of_all(self) -> Iterator[None]:
-        """Convert an error of an option to click.UsageError; pass over what fails for one image."""
-        try:
-            yield
-        except (TypeError, ValueError, MemoryError) as error:
-            if self._several and str(error).startswith(_OF_PICTURES):
-                return
-            if isinstance(error, MemoryError):
-                raise
-            raise click.UsageError(str(error)) from error
 
     def _made(
         self, files: Iterable[Pair], settings: vkbloom.Settings, expand: float | None
@@ -144,9 +111,8 @@ class Run:
         Notes are printed by the thread that reads files, because it silences standard error.
         """
         is_blended = settings.alpha != "keep"
-        wanted = no_bloom.with_bloom(self._options.names, settings)
+        wanted = no_bloom.with_bloom(["final"], settings)
         glow_of = self._glow_of(is_blended)
-        is_planned = False
         for pair in files:
             picture = None
             with self._of_file(pair):
@@ -154,19 +120,14 @@ class Run:
             if picture is None:
                 continue
             # Opened after the first file is read, so that a wrong file fails at once.
-            renderer = self._renderer()
-            if not is_planned:
-                is_planned = True
-                with self._wrong_use_of_all():
-                    given = _with_glow(renderer, picture.pixels, glow_of)
-                    renderer.plan(given, settings, framebuffers=wanted)
+            renderer = self.renderer()
             with self._of_file(pair):
-                given = _with_glow(renderer, picture.pixels, glow_of)
-                frames = renderer.apply(given, settings, framebuffers=wanted)
+                with as_wrong_use():
+                    image, glow = picture.pixels, glow_of(picture.pixels)
+                    frames = renderer.apply(image, settings, **glow, framebuffers=wanted)
                 self._tell(pair, picture, frames)
-                kept = no_bloom.only(frames, self._options.names)
                 texts: list[str] = []
-                yield texts, functools.partial(self._write, pair, picture, kept, expand, texts)
+                yield texts, functools.partial(self._write, pair, picture, frames, expand, texts)
 
     def _tell(self, pair: Pair, picture: Picture, frames: vkbloom.Frames) -> None:
         """Print a note about the bloom of a file."""
@@ -178,14 +139,14 @@ class Run:
         elif self._is_straight(picture, target):
             text = no_bloom.hidden(frames["final"], frames.settings)
         if text:
-            note(f"{name}: {text}" if self._several else text)
+            note(f"{name}: {text}" if self.several else text)
 
     def _is_straight(self, picture: Picture, target: str) -> bool:
-        file = of_format(target, self._options.pipe_format)
+        file = of_format(target, self.options.pipe_format)
         return image_writing.is_straight(file, is_associated=picture.stored.associated)
 
     def _read(self, source: str, expand: float | None, *, is_blended: bool) -> Picture:
-        options = self._options
+        options = self.options
         picture = read_picture(
             source,
             options.subimage,
@@ -201,9 +162,14 @@ class Run:
             picture = dataclasses.replace(picture, pixels=pixels.astype(np.float16))
         return picture
 
+    @functools.cached_property
+    def _glow_of(self) -> Callable[[bool], Glow]:
+        # The files are read once.
+        return functools.cache(self._read_glow)
+
     def _read_glow(self, is_blended: bool) -> Glow:
         """Return a function that gives mask and emission for an image."""
-        options = self._options
+        options = self.options
         given: dict[str, NDArray[Any]] = {}
         if options.mask is not None:
             mask = read_picture(options.mask, 0, "linear").pixels
@@ -225,31 +191,23 @@ class Run:
         target = pair[1]
         with self._of_file(pair):
             file = Path(target)
-            if target != self._out:
+            if target != self.out:
                 file.parent.mkdir(exist_ok=True)
             if is_stream(target):
-                suffix = Path(of_format(target, self._options.pipe_format)).suffix
-                file = self._folder / f"output{suffix}"
-            written = _save_others(frames, file)
+                suffix = Path(of_format(target, self.options.pipe_format)).suffix
+                file = self.folder / f"output{suffix}"
             notes += image_writing.save(
                 finished(picture, frames["final"], frames.settings),
                 file,
-                self._options.saved,
+                self.options.saved,
                 settings_facts(frames.settings, expand),
-                self._options.quality,
-                bits=self._options.bits,
+                self.options.quality,
+                bits=self.options.bits,
             )
             if is_stream(target):
                 _send(file, target)
-            elif not self._several:
-                for path in (file, *written):
-                    say(f"wrote {path}")
-
-
-def _with_glow(renderer: vkbloom.Renderer, image: NDArray[Any], glow_of: Glow) -> Any:
-    """Return an image, or a handle of it with its mask and its emission."""
-    glow = glow_of(image)
-    return renderer.upload(image, **glow) if glow else image
+            elif not self.several:
+                say(f"wrote {file}")
 
 
 def _send(file: Path, target: str) -> None:
@@ -261,15 +219,3 @@ def _send(file: Path, target: str) -> None:
             sys.stdout.buffer.flush()
         else:
             shutil.copyfileobj(content, stack.enter_context(open(target, "wb")))
-
-
-def _save_others(frames: vkbloom.Frames, target: Path) -> list[Path]:
-    """Write each framebuffer except `final` to its own file."""
-    written: list[Path] = []
-    for name, array in frames.items():
-        if name != "final":
-            alone = vkbloom.Frames(
-                {name: array}, timings=frames.timings, settings=frames.settings, info=frames.info
-            )
-            written += alone.save(target.with_name(f"{target.stem}_{name}{target.suffix}"))
-    return written

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import functools
 import itertools
-import os
 import tempfile
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
@@ -15,7 +14,6 @@ import click
 
 import vkbloom
 from vkbloom._cli.applied import Options, Pair, Run, of_format
-from vkbloom._cli.device_options import device_options
 from vkbloom._cli.fields import Command
 from vkbloom._cli.image_files import (
     check_input_colour,
@@ -24,9 +22,9 @@ from vkbloom._cli.image_files import (
     layer_option,
     subimage_option,
 )
-from vkbloom._cli.program import as_wrong_use, described
+from vkbloom._cli.program import adapter_option, as_wrong_use, described
 from vkbloom._cli.sequences import check_targets, pairs
-from vkbloom._cli.settings_options import settings_options_by_file
+from vkbloom._cli.settings_options import start_options
 from vkbloom._cli.streams import is_stream
 from vkbloom._cli.terminal import complain, say, tell_device
 from vkbloom._io import image_writing
@@ -42,79 +40,39 @@ CURVES = ("linear", "srgb", "gamma22", "pq", "hlg")
     "-o", "--out", metavar="OUT", type=click.Path(), help="The file to write, instead of OUT."
 )
 @click.option(
-    "--quality",
-    metavar="N",
-    type=click.IntRange(1, 100),
-    help="Quality of JPEG, WebP and JPEG XL [default 98 for JPEG]",
+    "--quality", metavar="N", type=click.IntRange(1, 100), help="Of JPEG, WebP and JPEG XL."
 )
 @click.option(
     "--pipe-format", metavar="EXTENSION", default="png", help="Format of standard output."
 )
-@click.option(
-    "--framebuffers",
-    metavar="all|NAME,...",
-    default="final",
-    help="The framebuffers to write. final is written to OUT; each other framebuffer is written "
-    "beside it, as OUT's name with _NAME appended, its values not converted. A framebuffer that "
-    "OUT's format cannot hold is written as .exr.",
-)
 @input_colour_option
+@click.option("--output-colour", type=click.Choice(CURVES), help="Encoding of the colours in OUT.")
 @click.option(
-    "--output-colour",
-    type=click.Choice(CURVES),
-    help="Encoding of the colours in OUT [default linear for floats, srgb for integers]; pq and "
-    "hlg have 16 bits where the format has them",
+    "--primaries", type=click.Choice([*PRIMARIES]), default="rec709", help="Of the colours in OUT."
 )
 @click.option(
-    "--primaries",
-    type=click.Choice([*PRIMARIES]),
-    default="rec709",
-    help="Primaries of the colours in OUT, which PNG and OpenEXR can name.",
+    "--view", metavar="VIEW", help="A display's view of OpenColorIO's built-in configuration."
 )
-@click.option(
-    "--view",
-    metavar="VIEW",
-    help="A view of OpenColorIO's built-in configuration, such as 'ACES 2.0 - SDR 100 nits "
-    "(Rec.709)', or DISPLAY/VIEW. It has a tone curve, an encoding and primaries of its own. The "
-    "error for an unknown one lists all.",
-)
-@click.option(
-    "--half",
-    is_flag=True,
-    help="Hold pictures in half floats, which need half the memory, as 8-bit files of at least 64 "
-    "million pixels are.",
-)
+@click.option("--half", is_flag=True, help="Hold pictures in half floats, in half the memory.")
 @click.option(
     "--bits",
     type=click.Choice(["8", "16", "32"]),
     callback=lambda _, __, value: value and int(value),
-    help="Size of a number in OUT [default that of IN, where the format has it; 8 for a PNG of "
-    "floats]",
+    help="Size of a number in OUT [default that of IN]",
 )
 @click.option("--overwrite", is_flag=True, help="OUT may be a file that is read as IN.")
-@click.option("--skip-existing", is_flag=True, help="Leave out images whose OUT exists.")
 @expand_option
 @subimage_option
 @layer_option
 @click.option(
-    "--mask",
-    metavar="FILE",
-    type=click.Path(),
-    help="A grey image of the same size, which multiplies what glows: white keeps it, black "
-    "removes it. Its values are not decoded.",
+    "--mask", metavar="FILE", type=click.Path(), help="A grey image: white glows, black does not."
 )
 @click.option(
-    "--emission",
-    metavar="FILE",
-    type=click.Path(),
-    help="An image of the same size that glows instead of the image, such as a renderer's pass of "
-    "emissive materials. It is decoded like the image.",
+    "--emission", metavar="FILE", type=click.Path(), help="An image that glows instead of IN."
 )
-@device_options
-@settings_options_by_file
-def command(
-    *, sources: tuple[str, ...], out: str | None, adapter: str, validation: bool, **given: Any
-) -> int:
+@adapter_option
+@start_options
+def command(*, sources: tuple[str, ...], out: str | None, adapter: str, **given: Any) -> int:
     """Add bloom to the image IN and write the result to OUT.
 
     The extension selects the format: OpenEXR, Radiance HDR, PNG, JPEG, TIFF and others. IN and OUT
@@ -135,19 +93,20 @@ def command(
     options = Options(**given)
     inputs, target = _arguments(sources, out)
     work = _planned(options, inputs, target)
-    if not work:
-        return 0
     with tempfile.TemporaryDirectory() as folder, ExitStack() as stack:
 
         @functools.cache
         def renderer() -> vkbloom.Renderer:
-            opened = stack.enter_context(opened_renderer(adapter, validation))
+            opened = stack.enter_context(opened_renderer(adapter))
             # Standard output may have the picture.
             tell_device(opened, err=is_stream(target))
             return opened
 
-        run = Run(options, target, Path(folder), renderer, several=len(work) > 1)
-        for begun, group in itertools.groupby(work, key=lambda pair: options.settings(pair[0])):
+        several = len(work) > 1
+        run = Run(
+            options=options, out=target, folder=Path(folder), renderer=renderer, several=several
+        )
+        for begun, group in itertools.groupby(work, key=lambda pair: options.start.of(pair[0])):
             run.sequence([*group], *begun)
     written = [target for name, target in work if name not in run.failures]
     if len(work) > 1 and written:
@@ -170,15 +129,9 @@ def _tell_failures(failures: Mapping[str, Exception], work: Sequence[Pair]) -> i
 def _planned(options: Options, sources: list[str], out: str) -> list[Pair]:
     """Check the options, and return the files to read, each with the file to write."""
     check_input_colour(options.input_colour)
-    if is_stream(out) and options.framebuffers != "final":
-        raise click.UsageError("a pipe takes only final; leave out --framebuffers")
     work = pairs(sources, out)
-    settings, _ = options.settings(work[0][0])
+    settings, _ = options.start.of(work[0][0])
     _check_colours(settings, options.saved)
-    if options.skip_existing:
-        left = [pair for pair in work if is_stream(pair[1]) or not os.path.exists(pair[1])]
-        say(f"skipped {len(work) - len(left)} of {len(work)} images, whose OUT exists")
-        work = left
     check_targets(work, out, overwrite=options.overwrite)
     with as_wrong_use():
         for target in {Path(target).suffix: target for _, target in work}.values():

@@ -11,23 +11,26 @@ import warnings
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import click
+import numpy as np
+from numpy.typing import NDArray
 from rich.console import Console
 from rich.status import Status
 
 import vkbloom
-from vkbloom._cli.check_sequence import judge
-from vkbloom._cli.device_options import device_options
+from vkbloom import testing
 from vkbloom._cli.fields import SIZE, Command
-from vkbloom._cli.program import as_wrong_use, given
+from vkbloom._cli.program import adapter_option, as_wrong_use, given
+from vkbloom._cli.sequences import expanded
 from vkbloom._cli.settings_options import settings_options
 from vkbloom._cli.terminal import is_quiet, note, say
 from vkbloom._custom.method import CustomMethod, identifier_of
 from vkbloom._io import safe_writing
 from vkbloom._renderer.interruptible import opened_renderer
 from vkbloom._suggestions import did_you_mean
+from vkbloom._views.plain_values import plain
 from vkbloom.testing import _comparing as comparing
 from vkbloom.testing import _measuring as measuring
 from vkbloom.testing import _showing as showing
@@ -35,6 +38,8 @@ from vkbloom.testing._law_report import LawReport, law_report
 from vkbloom.testing._law_table import LAWS, law_name
 from vkbloom.testing._programs import Program
 from vkbloom.testing._subject import Subject
+
+_ABOVE_0: Final = click.FloatRange(0, min_open=True)
 
 
 class CheckCommand(Command):
@@ -68,73 +73,35 @@ def _laws(_: click.Context, __: click.Parameter, text: str) -> tuple[str, ...]:
 @click.command(cls=CheckCommand)
 @click.argument("file", required=False, metavar="[FILE]")
 @click.option(
-    "--command",
-    "program",
-    metavar="'PROGRAM {input} {output}'",
-    help="Measure a program, which reads one image file and writes another.",
+    "--command", "program", metavar="'PROGRAM {input} {output}'", help="Measure a program."
 )
 @click.option("--suffix", default=".exr", help="The type of the program's image files.")
 @click.option(
-    "--timeout",
-    type=click.FloatRange(0, min_open=True),
-    default=60.0,
-    help="Seconds that one run of the program may take.",
+    "--timeout", type=_ABOVE_0, default=60.0, help="Of one run of the program, in seconds."
 )
 @click.option(
-    "--less-input",
-    is_flag=True,
-    help="Measure what the program writes less its input: the bloom alone.",
+    "--less-input", is_flag=True, help="Measure the program's bloom alone, less its input."
 )
 @click.option(
-    "--reference",
-    "reference",
-    metavar="FILE.py:FUNCTION",
-    help="Compare each framebuffer with a reference in NumPy.",
+    "--reference", metavar="FILE.py:FUNCTION", help="A reference of the framebuffers in NumPy."
 )
+@click.option("--gain", type=click.FloatRange(0), help="The gain of flat images, else measured.")
 @click.option(
-    "--gain",
-    type=click.FloatRange(0),
-    help="The gain that flat images should have [default: 1 for programs and for files that save "
-    "BLOOM; otherwise what is measured]",
-)
-@click.option(
-    "--measure-size",
-    "measured",
-    type=SIZE,
-    default="256x256",
-    help="Size of the test images; a wide bloom needs a large one.",
+    "--measure-size", "measured", type=SIZE, default="256x256", help="Of the test images."
 )
 @click.option("--size", type=SIZE, default="1280x720", help="Size of the times.")
 @click.option(
-    "--require",
-    metavar="LAW,...",
-    default="",
-    callback=_laws,
-    help="Exit status 1 if one of these laws is not held.",
+    "--require", metavar="LAW,...", default="", callback=_laws, help="Fail if one is not held."
 )
 @click.option(
-    "--against",
-    metavar="FILE|PRESET|COMMAND",
-    help="Measure another bloom, too, and tell what is better and worse than there. Exit status 1 "
-    "if a law of --require is newly broken.",
+    "--against", metavar="FILE|PRESET|COMMAND", help="Another bloom, and what changed since then."
 )
 @click.option(
-    "--sequence",
-    metavar="PATTERN",
-    help="Judge frames in time instead, such as f.%04d.exr: flashes by WCAG 2.2, and flicker. "
-    "Exit status 1 if the flashes are too many.",
+    "--sequence", metavar="PATTERN", help="Judge frames in time instead, such as f.%04d.exr."
 )
+@click.option("--fps", type=_ABOVE_0, default=60.0, help="Frames a second of --sequence.")
 @click.option(
-    "--fps",
-    type=click.FloatRange(0, min_open=True),
-    default=60.0,
-    help="Frames a second of --sequence.",
-)
-@click.option(
-    "--degrees",
-    type=click.FloatRange(0, 360, min_open=True),
-    default=40.0,
-    help="Width of the picture of --sequence in the field of view.",
+    "--degrees", type=_ABOVE_0, default=40.0, help="Width of --sequence in the field of view."
 )
 @click.option("--json", "as_json", is_flag=True, help="Print one object.")
 @click.option(
@@ -143,7 +110,7 @@ def _laws(_: click.Context, __: click.Parameter, text: str) -> tuple[str, ...]:
 @click.option(
     "--markdown", metavar="FILE", type=click.Path(), help="Write tables for a pull request."
 )
-@device_options
+@adapter_option
 @settings_options
 def command(
     *,
@@ -156,7 +123,6 @@ def command(
     page: str | None,
     markdown: str | None,
     adapter: str,
-    validation: bool,
     settings: vkbloom.Settings,
     **how: Any,
 ) -> int:
@@ -177,7 +143,7 @@ def command(
         return judge(sequence, how["fps"], how["degrees"], as_json=as_json)
     _check_choice(file, program, reference, against, page)
     console = Console(stderr=True, quiet=is_quiet())
-    with opened_renderer(adapter, validation) as renderer, console.status("") as bar:
+    with opened_renderer(adapter) as renderer, console.status("") as bar:
         if reference is not None:
             _add_reference(settings, reference)
         preset = click.get_current_context().params["preset"]
@@ -237,10 +203,9 @@ def _measured(
         passes, device = measuring.pass_times(renderer, source, size), renderer.info.summary
     try:
         report = law_report(subject, LAWS, how["require"], lambda law: bar.update(f"{name}: {law}"))
-        bar.update(f"{name}: presets")
         settings = None if isinstance(source, str) else source
         about = {"name": name, "adapter": device, "size": size, "passes": passes}
-        return measuring.values_of(renderer, subject, report, settings, **about), report, subject
+        return measuring.values_of(subject, report, settings, **about), report, subject
     except AssertionError as error:
         raise click.ClickException(f"{name}: {error}") from error
 
@@ -312,3 +277,27 @@ def _add_reference(settings: vkbloom.Settings, where: str) -> None:
     if not callable(reference):
         raise click.UsageError(f"--reference: {path} has no function {function!r}")
     type(settings).numpy_reference = staticmethod(reference)
+
+
+def judge(pattern: str, fps: float, degrees: float, *, as_json: bool) -> int:
+    """Print flashes and flicker of a sequence of files; return 1 if it fails WCAG 2.2, else 0."""
+    files = [path for path, _ in expanded(pattern)]
+
+    def frames() -> Iterator[NDArray[Any]]:
+        return (vkbloom.read(file)[..., :3].astype(np.float32) for file in files)
+
+    flashes = testing.flash(frames(), fps, degrees=degrees)
+    seen = testing.flicker(frames(), fps)
+    strongest = int(seen.contrast.argmax())
+    if as_json:
+        values = {"frames": len(files), "fps": fps, "flash": flashes, "flicker": seen}
+        click.echo(json.dumps(plain(values), indent=2))
+    else:
+        click.echo(f"{len(files)} frames at {fps:g} a second, {degrees:g} degrees wide")
+        click.echo(str(flashes))
+        click.echo(
+            f"flicker: contrast up to {seen.contrast[strongest]:.3g}, at "
+            f"{seen.frequencies[strongest]:.3g} Hz"
+            + ("" if seen.jod is None else f"; {seen.jod:.2f} JOD beside a still")
+        )
+    return int(flashes.general or flashes.red)

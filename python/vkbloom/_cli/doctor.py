@@ -12,7 +12,7 @@ from tqdm import tqdm
 
 import vkbloom
 from vkbloom._cli import bare
-from vkbloom._cli.device_options import adapter_option
+from vkbloom._cli.program import adapter_option
 from vkbloom._cli.terminal import hides_progress, say
 from vkbloom._doctor import self_test
 
@@ -21,11 +21,7 @@ _COLOURS: Final = {"ok": "green", "note": "yellow", "problem": "red"}
 
 @click.command()
 @click.option(
-    "--self-test",
-    "compares",
-    is_flag=True,
-    help="Compare about 200 cases with the reference on this device instead, in about a minute. "
-    "Please attach the output of --json to a report.",
+    "--self-test", "compares", is_flag=True, help="Compare this device with the reference instead."
 )
 @adapter_option
 @click.option(
@@ -34,7 +30,7 @@ _COLOURS: Final = {"ok": "green", "note": "yellow", "problem": "red"}
     is_flag=False,
     flag_value="-",
     metavar="[FILE]",
-    help="Print one object with all findings; with a file, write it there and print the table.",
+    help="Print one object with all findings, or write it to FILE and print the table.",
 )
 def command(compares: bool, adapter: str, as_json: str | None) -> int:
     """Check whether this machine can render, and explain what prevents it.

@@ -8,7 +8,7 @@ import dataclasses
 import signal
 import webbrowser
 from collections.abc import Callable
-from typing import Any, Final
+from typing import Any
 
 import click
 from numpy.typing import NDArray
@@ -24,23 +24,14 @@ from vkbloom._cli.terminal import tell_device
 from vkbloom._explorer.viewer import GLOW, Viewer
 from vkbloom._settings.settings import SHADINGS, Shading
 
-_LARGEST_PORT: Final = 65535
-
 
 @click.command(cls=Command)
 @click.option(
-    "--port",
-    type=click.IntRange(0, _LARGEST_PORT),
-    default=0,
-    show_default="any free port",
-    help="Port of 127.0.0.1 to listen on.",
+    "--port", type=click.IntRange(0, 65535), default=0, help="Of 127.0.0.1; 0: any free port."
 )
 @click.option("--open/--no-open", "opens", default=True, help="Whether to open a browser.")
 @click.option(
-    "--size",
-    type=SIZE,
-    default="1280x720",
-    help="Size of a scene's frame, which gives its aspect; the page renders at the shown size.",
+    "--size", type=SIZE, default="1280x720", help="Of a scene's frame, which gives its aspect."
 )
 @click.option("--shading", type=click.Choice(SHADINGS), default="deferred")
 @live_options(image_has_size=False)
@@ -53,7 +44,6 @@ def command(
     size: tuple[int, int],
     shading: Shading,
     adapter: str,
-    validation: bool,
     scene: Callable[[], vkbloom.Scene],
     settings: vkbloom.Settings,
 ) -> int:
@@ -75,7 +65,7 @@ def command(
             looked_at = dataclasses.replace(looked_at, glow_intensity=GLOW)
         if settings == vkbloom.presets["tutorial"] and not any(given(name) for name in STARTS):
             begun = None
-    with vkbloom.Renderer(adapter, validation=validation) as renderer:
+    with vkbloom.Renderer(adapter) as renderer:
 
         def new_viewer() -> Viewer:
             return Viewer(looked_at, begun, size=size, shading=shading, renderer=renderer, **origin)

@@ -206,10 +206,7 @@ class FieldOption(click.Option):
         option = f"{prefix}{first.option}".replace("_", "-")
         is_flag = first.kind == "flag"
         super().__init__(
-            [
-                f"--{option}/--no-{option}" if is_flag else f"--{option}",
-                option.replace("-", "_"),
-            ],
+            [f"--{option}/--no-{option}" if is_flag else f"--{option}", option.replace("-", "_")],
             default=None,
             type=None if is_flag else option_type(widest),
             help=" ".join(_help(label, info) for label, info in infos.items()),

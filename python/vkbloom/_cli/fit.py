@@ -9,12 +9,11 @@ import click
 from numpy.typing import NDArray
 
 import vkbloom
-from vkbloom._cli.device_options import device_options
 from vkbloom._cli.fields import Command, NameOf
-from vkbloom._cli.image_files import input_colour_option, is_photograph, layer_option, read_picture
-from vkbloom._cli.program import as_wrong_use
+from vkbloom._cli.image_files import input_colour_option, is_photograph, read_picture
+from vkbloom._cli.program import adapter_option, as_wrong_use
 from vkbloom._cli.search_options import search_options
-from vkbloom._cli.settings_options import PRESET_OF_IMAGES, PRESET_OF_PHOTOS, read_settings
+from vkbloom._cli.settings_options import PRESET_OF_IMAGES, PRESET_OF_PHOTOS
 from vkbloom._cli.terminal import note
 from vkbloom._io.expansion import PHOTO_EXPANSION
 from vkbloom._renderer.interruptible import opened_renderer
@@ -39,39 +38,19 @@ from vkbloom._settings.registry import METHODS
     type=NameOf("method", METHODS),
     help="A method whose defaults start a search; may be repeated.",
 )
-@click.option(
-    "--settings",
-    "files",
-    metavar="FILE",
-    multiple=True,
-    type=click.Path(),
-    help="A file of settings to start a search from, as for vkbloom apply; may be repeated.",
-)
-@click.option(
-    "--framebuffer",
-    metavar="NAME",
-    default="final",
-    help="The framebuffer that TARGET shows: final is the picture with its bloom, bloom the bloom "
-    "alone.",
-)
 @search_options(vary="threshold,intensity", loss="relative", max_calls=1000)
 @input_colour_option
-@layer_option
-@device_options
+@adapter_option
 def command(
     *,
     image: str,
     target: str,
     presets: tuple[str, ...],
     kinds: tuple[str, ...],
-    files: tuple[str, ...],
-    framebuffer: str,
     search: dict[str, Any],
     show_results: Callable[[Sequence[vkbloom.FitResult]], None],
     input_colour: Any,
-    layer: str | None,
     adapter: str,
-    validation: bool,
 ) -> None:
     """Find the settings with which the bloom of IMAGE matches TARGET.
 
@@ -83,29 +62,27 @@ def command(
     the settings that may change. The results are printed as Python code, sorted by loss, with a
     verdict (good, fair or poor) and the likely cause, such as a target without bloom.
     """
-    pixels = read_picture(image, 0, input_colour, layer=layer).pixels
-    wanted = read_picture(target, 0, input_colour, layer=layer).pixels
-    searches = _searches(presets, kinds, files, pixels)
+    pixels = read_picture(image, 0, input_colour).pixels
+    wanted = read_picture(target, 0, input_colour).pixels
+    searches = _searches(presets, kinds, pixels)
     if is_photograph(image) and (photo := _photo_of(presets, search["vary"])):
-        bright = read_picture(image, 0, input_colour, layer=layer, expand=PHOTO_EXPANSION).pixels
+        bright = read_picture(image, 0, input_colour, expand=PHOTO_EXPANSION).pixels
         searches.append((bright, [photo]))
         note(f"{image}: its highlights are expanded to {PHOTO_EXPANSION:g} for the preset photo")
-    with opened_renderer(adapter, validation) as renderer, as_wrong_use():
+    with opened_renderer(adapter) as renderer, as_wrong_use():
         results = [
             item
             for image_of, begun in searches
-            for item in vkbloom.fit(
-                image_of, wanted, begun, framebuffer=framebuffer, renderer=renderer, **search
-            )
+            for item in vkbloom.fit(image_of, wanted, begun, renderer=renderer, **search)
         ]
     show_results(sorted(results, key=lambda item: item.loss))
 
 
 def _searches(
-    presets: Sequence[str], kinds: Sequence[str], files: Sequence[str], pixels: NDArray[Any]
+    presets: Sequence[str], kinds: Sequence[str], pixels: NDArray[Any]
 ) -> list[tuple[NDArray[Any], Any]]:
     """Return what `vkbloom.fit` gets of each search: the image, and the settings."""
-    begun = [METHODS[kind]() for kind in kinds] + [read_settings(file)[0] for file in files]
+    begun = [METHODS[kind]() for kind in kinds]
     if "all" in presets:
         return [(pixels, "all"), *([(pixels, begun)] if begun else [])]
     begun += [vkbloom.presets[name] for name in presets]

@@ -2,31 +2,32 @@
 
 from __future__ import annotations
 
-import dataclasses
-import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import click
+import numpy as np
 
 import vkbloom
 from vkbloom._cli import fields, image_files, no_bloom, program, terminal
-from vkbloom._cli.axis_options import axis_values
-from vkbloom._cli.device_options import device_options
 from vkbloom._cli.scene_options import scene_options
 from vkbloom._cli.settings_options import DEFAULT_PRESETS, settings_options
-from vkbloom._grid import filling, identity, layout, order, progress, sources
-from vkbloom._io import image_writing, safe_writing
+from vkbloom._grid import filling, layout, order, sources
+from vkbloom._io import image_writing
 from vkbloom._io.images import Picture
 from vkbloom._renderer.frame_files import settings_facts
 from vkbloom._renderer.interruptible import opened_renderer
-from vkbloom._settings.settings import SHADINGS
+from vkbloom._settings.fields import fields_of
+from vkbloom._settings.settings import SHADINGS, field_info
+from vkbloom._suggestions import did_you_mean
+
+_PRESETS: Final = fields.NameOf("preset", vkbloom.presets)
 
 
 @click.command(cls=fields.Command)
-@click.argument("images", metavar="[IMAGE]...", nargs=-1, type=click.Path())
+@click.argument("source", metavar="[IMAGE]", required=False, type=click.Path())
 @click.option("-o", "--out", required=True, type=click.Path(), help="NAME.zarr, or a folder")
 @click.option("--axis", "words", metavar="NAME=VALUES", multiple=True, help="Values, as above")
 @click.option("--size", type=fields.SIZE, help="Size of a scene's frames [default 1280x720]")
@@ -34,38 +35,39 @@ from vkbloom._settings.settings import SHADINGS
 @click.option("--shading", type=click.Choice(SHADINGS), default=SHADINGS[0])
 @click.option("--framebuffers", metavar="all|NAME,...", default="final")
 @click.option("--image-format", metavar="EXTENSION", default="png")
-@click.option("--resume/--no-resume", default=True, help="Continue a grid that is there")
+@click.option("--resume/--no-resume", default=True, help="Continue a store that is there")
 @click.option("--part", metavar="I/N", help="Render part I of N, from 1, as above")
 @image_files.input_colour_option
 @image_files.subimage_option
 @image_files.layer_option
 @image_files.expand_option
-@device_options
+@program.adapter_option
 @scene_options
 @settings_options
-def command(*, images: tuple[str, ...], out: str, words: tuple[str, ...], **given: Any) -> None:
+def command(*, source: str | None, out: str, words: tuple[str, ...], **given: Any) -> None:
     """Render all combinations of the axes' values.
 
-    The source is a scene, or each IMAGE, read as vkbloom apply reads it: files of integers (JPEG,
-    PNG) start from the preset photo and are expanded, except with an axis of presets. The points of
-    the grid are rendered in the order that runs the fewest passes. A store can be opened while it
-    is written. The same call again continues a grid that was killed, and gives the same result.
+    The source is a scene, or IMAGE, read as vkbloom apply reads it: files of integers (JPEG, PNG)
+    start from the preset photo and are expanded, except with an axis of presets. The points of the
+    grid are rendered in the order that runs the fewest passes. A store can be opened while it is
+    written. The same call again continues a store whose process was killed, and gives the same
+    result. In a folder, files are replaced.
 
-    The NAME of an axis is a settings field, time or preset. Its values are FIRST:LAST:COUNT,
-    FIRST:LAST:COUNT:log, or A,B,... (A;B;... if values contain commas). Repeat --axis for more
-    axes; the dimensions have the order of the options.
+    The NAME of an axis is a settings field, time or preset. Its values are FIRST:LAST:COUNT, or
+    A,B,... (A;B;... if values contain commas). Repeat --axis for more axes; the dimensions have
+    the order of the options.
 
     Other processes may render other parts at the same time.
     """
-    is_store = out.endswith(".zarr")
     suffix = f".{given['image_format'].lstrip('.')}"
     with program.as_wrong_use():
         image_writing.check_writable(f"image{suffix}")
         part = order.read_part(given["part"])
+    is_store = out.endswith(".zarr")
     if not is_store and Path(out).suffix and not Path(out).is_dir():
         hint = f"name a folder, and give --image-format {Path(out).suffix[1:]}"
         raise click.UsageError(f"--out: {out} is not NAME.zarr; for an image of each point {hint}")
-    if not words and len(images) < 2:
+    if not words:
         raise click.UsageError("there is no --axis; give one, such as exposure=-1:1:5")
     settings: vkbloom.Settings | None = given["settings"]
     axes = axis_values(words, given["settings"])
@@ -75,118 +77,123 @@ def command(*, images: tuple[str, ...], out: str, words: tuple[str, ...], **give
         settings = None
     # The presets of an axis differ in whether they expand.
     expand: float | None = given["expand"] if settings or program.given("expand") else None
-    pictures, source = _source(images, expand, given)
+    picture = None
+    if source is not None:
+        reading = {name: given[name] for name in ("subimage", "layer")}
+        picture = image_files.read_picture(
+            source, colour=given["input_colour"], expand=expand, **reading
+        )
+    looked_at = given["scene"]() if picture is None else picture.pixels
     names = given["framebuffers"].split(",")
     shared = {name: given[name] for name in ("size", "shading", "time")}
     shared["framebuffers"] = "all" if names == ["all"] else names
     with program.as_wrong_use():
-        grid = layout.ask(source, settings, axes, reduce=None, **shared)
-    how: dict[str, Any] = {"resume": given["resume"] or given["part"] is not None, "part": part}
-    _note_no_bloom(grid, given["adapter"], given["validation"])
-    with opened_renderer(given["adapter"], given["validation"]) as renderer:
+        grid = layout.ask(looked_at, settings, axes, reduce=None, **shared)
+    _note_no_bloom(grid, given["adapter"])
+    how: dict[str, Any]
+    with opened_renderer(given["adapter"]) as renderer:
         if is_store:
-            how |= {"store": out, "progress": not terminal.is_quiet()}
-            stored = vkbloom.grid(source, settings, axes, renderer=renderer, **shared, **how)
-            ran = stored.attrs["passes_run"]
+            how = {"resume": given["resume"] or part != order.WHOLE, "part": part}
+            how["progress"] = not terminal.is_quiet()
+            vkbloom.grid(looked_at, settings, axes, store=out, renderer=renderer, **shared, **how)
         else:
-            how |= {"suffix": suffix, "pictures": pictures, "expand": expand}
-            ran = _write_images(grid, out, renderer, **how)
+            how = {"suffix": suffix, "picture": picture, "expand": expand}
+            _write_images(grid, Path(out), renderer, part=part, **how)
     which = f"part {part[0]}/{part[1]} of " if given["part"] else ""
-    points = math.prod(grid.shape)
-    terminal.say(f"wrote {out}, {which}{points} points; passes run {ran}")
+    terminal.say(f"wrote {out}, {which}{math.prod(grid.shape)} points")
 
 
-def _source(
-    images: Sequence[str],
-    expand: float | None,
-    given: Mapping[str, Any],
-) -> tuple[list[Picture], Any]:
-    """Return the pictures, and the source of the grid."""
-    if not images:
-        return [], given["scene"]()
-    colour, reading = given["input_colour"], {n: given[n] for n in ("subimage", "layer")}
-    reading["expand"] = expand
-    pictures = [image_files.read_picture(image, colour=colour, **reading) for image in images]
-    # Labels are the file names, or numbers if a file is given twice.
-    labels = images if len(set(images)) == len(images) else range(len(images))
-    named = {str(label): item.pixels for label, item in zip(labels, pictures, strict=True)}
-    return pictures, named if len(images) > 1 else pictures[0].pixels
+def axis_values(words: Sequence[str], settings: vkbloom.Settings) -> dict[str, Sequence[Any]]:
+    """Return the values of each ``NAME=VALUES``."""
+    begun = [settings]
+    for word in words:
+        if word.startswith("preset="):
+            begun = [vkbloom.presets[value] for value in _values(word, _PRESETS)]
+    results: dict[str, Sequence[Any]] = {}
+    for word in words:
+        name = word.partition("=")[0].strip().replace("-", "_")
+        if name in results:
+            raise click.UsageError(f"--axis: {name} is given twice; list all values in one")
+        results[name] = _values(word, _type_of(name, begun))
+    return results
 
 
-def _note_no_bloom(grid: layout.Grid, adapter: str, validation: bool) -> None:
+def _type_of(name: str, begun: Sequence[vkbloom.Settings]) -> Any:
+    """Return the type of a field's option, so that axes and options have one syntax."""
+    if name in ("preset", "time"):
+        return click.FLOAT if name == "time" else _PRESETS
+    lacking = [settings for settings in begun if name not in fields_of(type(settings))]
+    if lacking and not name.startswith("glare."):
+        near = did_you_mean(name, fields_of(type(lacking[0])))
+        raise click.UsageError(f"--axis: {lacking[0].method} has no field {name!r}{near}")
+    with program.as_wrong_use():
+        return fields.option_type(field_info(begun[0], name))
+
+
+def _values(word: str, kind: Any) -> Sequence[Any]:
+    text = word.partition("=")[2]
+    values = [part.strip() for part in text.split(";" if ";" in text else ",") if part]
+    if not values:
+        raise click.UsageError(f"--axis: {word!r} is not NAME=FIRST:LAST:COUNT or NAME=A,B,...")
+    try:
+        if text.count(":") == 2 and "," not in text and ";" not in text:
+            first, last, count = text.split(":")
+            spaced: list[float] = np.linspace(float(first), float(last), int(count)).tolist()
+            return spaced
+        return [kind.convert(part, None, None) for part in values]
+    except (click.BadParameter, ValueError) as error:
+        hint = "; a range is FIRST:LAST:COUNT" if ":" in text else ""
+        raise click.UsageError(f"--axis {word}: {error}{hint}") from error
+
+
+def _note_no_bloom(grid: layout.Grid, adapter: str) -> None:
     """Print a note if the first and the last point of a grid have no bloom."""
     corners = {tuple(0 for _ in grid.shape), tuple(count - 1 for count in grid.shape)}
     lit = [point for point in map(grid.point, sorted(corners)) if point.settings.bloom]
     # A renderer of its own, so that the passes of the grid are counted from the first.
-    with vkbloom.Renderer(adapter, validation=validation) as renderer:
+    with vkbloom.Renderer(adapter) as renderer:
         frames = [frames for _, frames in sources.visit(renderer, grid.source, lit, ("bloom",))]
     if lit and all(map(no_bloom.is_without, frames)):
         terminal.note(f"at the first and the last point, {no_bloom.reason(lit[-1].settings)}")
 
 
-def prepare(folder: Path, wanted: Mapping[str, Any], *, resume: bool) -> None:
-    """Create a folder for the images of a grid with this identity, or examine an existing one."""
-    folder.mkdir(parents=True, exist_ok=True)
-    index = folder / "grid.json"
-    if all(safe_writing.is_temporary(path) for path in folder.iterdir()):
-        safe_writing.write_file(index, json.dumps(wanted, indent=1).encode())
-    elif not index.exists():
-        raise ValueError(f"{folder}: the folder is not empty, and its content is not a grid")
-    elif not resume:
-        raise FileExistsError(f"{folder}: already has a grid; resume it, or name another folder")
-    try:
-        result = identity.differences(json.loads(index.read_bytes()), wanted)
-    except (ValueError, RecursionError) as error:
-        raise ValueError(f"{index}: damaged, {error}") from error
-    if result:
-        raise ValueError(f"{folder}: contains another grid; {'; '.join(result)}")
-
-
-def _write_images(grid: layout.Grid, target: str, renderer: vkbloom.Renderer, **how: Any) -> int:
-    """Write a part's points as ``<index along each axis>_<framebuffer>``; return passes run.
-
-    A framebuffer that the format cannot hold is written as ``.exr``.
-    """
-    laid = layout.lay_out(grid, renderer)
-    out, suffix, pictures = Path(target), how["suffix"], how["pictures"]
-    prepare(out, identity.identity(grid, laid, ()) | {"suffix": suffix}, resume=how["resume"])
-    single = (1,) * len(grid.shape)
-    points = [block.start for block in order.blocks(grid.shape, single, laid.ranking, how["part"])]
-    digits = [max(3, len(str(count - 1))) for count in grid.shape]
-    stems = {index: "".join(map("{:0{}}_".format, index, digits)) for index in points}
-    there = {path.stem for path in out.iterdir()}
-    todo = [i for i in points if not {f"{stems[i]}{name}" for name in laid.variables} <= there]
-    done = len(points) - len(todo)
-    with progress.Progress(len(points), done, shown=not terminal.is_quiet()) as bar:
-        path = map(grid.point, todo)
-        for index, frames in sources.visit(renderer, grid.source, path, grid.wanted):
-            picture = pictures[int(grid.point(index).entry)] if pictures else None
-            _save(
-                frames,
-                {name: out / f"{stems[index]}{name}{suffix}" for name in frames},
-                picture,
-                how["expand"],
-            )
-            bar.add(filling.Tally(1, len(frames.timings)))
-    return bar.tally.ran
-
-
-def _save(
-    frames: vkbloom.Frames,
-    files: Mapping[str, Path],
+def _write_images(
+    grid: layout.Grid,
+    folder: Path,
+    renderer: vkbloom.Renderer,
+    *,
+    suffix: str,
+    part: order.Part,
     picture: Picture | None,
     expand: float | None,
 ) -> None:
-    """Write a point's files, each atomically."""
-    settings, info = frames.settings, frames.info
-    for name, path in files.items():
-        if name == "final" and picture is not None:
-            encoding = picture.encoding if settings.encoding == "none" else settings.encoding
-            final = Picture.of_values(frames[name], picture.numbers, encoding)
-            facts = settings_facts(settings, expand)
-            image_writing.save(dataclasses.replace(final, grey=picture.grey), path, None, facts)
-        else:
-            # Without the timings, so that the same call writes the same file.
-            vkbloom.Frames({name: frames[name]}, timings={}, settings=settings, info=info).save(
-                path
-            )
+    """Write a part's points as ``<index along each axis>_<framebuffer>``.
+
+    A framebuffer that the format cannot hold is written as ``.exr``.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    ranking = layout.lay_out(grid, renderer).ranking
+    single = (1,) * len(grid.shape)
+    points = [block.start for block in order.blocks(grid.shape, single, ranking, part)]
+    digits = [max(3, len(str(count - 1))) for count in grid.shape]
+    with filling.progress_bar(len(points), shown=not terminal.is_quiet()) as count:
+        path = map(grid.point, points)
+        for index, frames in sources.visit(renderer, grid.source, path, grid.wanted):
+            stem = "".join(map("{:0{}}_".format, index, digits))
+            for name in frames:
+                _save(frames, name, folder / f"{stem}{name}{suffix}", picture, expand)
+            count(1)
+
+
+def _save(
+    frames: vkbloom.Frames, name: str, path: Path, picture: Picture | None, expand: float | None
+) -> None:
+    """Write a framebuffer of a point; `final` in the colours of the image's file."""
+    settings = frames.settings
+    if name == "final" and picture is not None:
+        final = image_files.finished(picture, frames[name], settings)
+        image_writing.save(final, path, None, settings_facts(settings, expand))
+    else:
+        # Without the timings, so that the same call writes the same file.
+        alone = {name: frames[name]}
+        vkbloom.Frames(alone, timings={}, settings=settings, info=frames.info).save(path)

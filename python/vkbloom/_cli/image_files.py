@@ -31,11 +31,7 @@ _STANDARD_ERROR = 2
 
 
 subimage_option: Final = click.option(
-    "--subimage",
-    metavar="N",
-    type=click.IntRange(min=0),
-    default=0,
-    help="Index of the part to read from a file with several parts.",
+    "--subimage", metavar="N", type=click.IntRange(min=0), default=0, help="A part of the file."
 )
 layer_option: Final = click.option(
     "--layer",

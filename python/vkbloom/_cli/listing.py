@@ -1,9 +1,11 @@
-"""Commands that list what has a published name."""
+"""``vkbloom presets``, ``glares``, ``psfs``: list what has a published name."""
 
 from __future__ import annotations
 
+import inspect
 import json
-from collections.abc import Callable, Iterable
+import re
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any, Final, TypeAlias
 
 import click
@@ -11,6 +13,14 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
+
+from vkbloom._cli.settings_options import PRESET_OF_PHOTOS
+from vkbloom._presets.named_glares import GLARES
+from vkbloom._presets.named_settings import ENGINES, PRESETS
+from vkbloom._settings.fields import fields_of
+from vkbloom._settings.glare import Glare, GlareLight
+from vkbloom._settings.registry import STAGES
+from vkbloom.psf._base import functions
 
 # Console width for output to a file or another program, where lines must not be wrapped.
 _UNBROKEN: Final = 4096
@@ -22,10 +32,10 @@ _UNBROKEN: Final = 4096
 Entry: TypeAlias = dict[str, Any]
 
 
-def listing_command(text: str, entries: Callable[[], Iterable[Entry]]) -> Any:
-    """Return the command that lists entries, with the help `text`."""
+def _command(entries: Callable[[], Iterable[Entry]]) -> click.Command:
+    """Return the command that lists entries; their docstring is its help."""
 
-    @click.command(help=text)
+    @click.command(help=inspect.getdoc(entries))
     @click.option("--json", "as_json", is_flag=True, help="Print a list of objects.")
     def command(*, as_json: bool) -> None:
         if as_json:
@@ -70,3 +80,71 @@ def _show(table: Table) -> None:
     # rich pads every cell to the width of its column; strip the padding of the last column.
     for line in captured.get().splitlines():
         click.echo(line.rstrip())
+
+
+def preset_entries() -> Iterator[Entry]:
+    """List the presets by engine.
+
+    What they look like, their versions, what confirmed them (frames of the engine's shaders, the
+    program itself, or a formula alone), whether they mix or add, and whether they need values above
+    1.
+    """
+    engines = {
+        name: (engine, confirmed) for engine, confirmed, names in ENGINES for name in names.split()
+    }
+    for name, (engine, confirmed) in engines.items():
+        item = PRESETS[name]
+        settings = item.make()
+        # The command line expands the highlights of a photograph for the preset photo.
+        needs_hdr = (settings.threshold or 0) >= 1 and name != PRESET_OF_PHOTOS
+        yield {
+            **{"name": name, "what": item.what, "whose": item.whose},
+            **{"composite": settings.composite, "needs_hdr": needs_hdr},
+            **{"intensity": settings.intensity, "settings": settings.to_dict()},
+            **{"engine": engine, "confirmed": confirmed},
+        }
+
+
+def glare_entries() -> Iterator[Entry]:
+    """List what --glare takes: stages and published glares.
+
+    Whose they are, and whether they need values above 1. Stages add their light to the bloom, dirt
+    multiplies it.
+    """
+    for name, kind in STAGES.items():
+        what = (inspect.getdoc(kind) or "").partition(".")[0]
+        yield _entry(name, what[:1].lower() + what[1:], "a stage with its defaults", (kind(),))
+    for name, item in GLARES.items():
+        yield _entry(name, item.what, item.whose, item.stages)
+
+
+def _entry(name: str, what: str, whose: str, stages: Sequence[Glare]) -> Entry:
+    lights = [stage for stage in stages if isinstance(stage, GlareLight)]
+    composite = "add" if lights else "multiply"
+    needs_hdr = bool(lights) and min(stage.threshold for stage in lights) >= 1
+    return {
+        **{"name": name, "what": what, "whose": whose},
+        **{"composite": composite, "needs_hdr": needs_hdr},
+        "glare": [stage.to_dict() for stage in stages],
+    }
+
+
+def psf_entries() -> Iterator[Entry]:
+    """List the point-spread functions that --method convolution --psf takes, and whose they are.
+
+    They stand for the complete picture: mix them, with the share of the light that they describe
+    as the intensity.
+    """
+    for name, kind in functions().items():
+        text = inspect.getdoc(kind) or ""
+        what = text.partition("\n")[0].rstrip(".")
+        source = re.search(r"^Source: (.+?)(?:[;.] |[;.]?\n\n|[;.]?\Z)", text, re.S | re.M)
+        whose = " ".join(source[1].split()).rstrip(".") if source else "vkbloom"
+        yield {
+            **{"name": name, "what": what[:1].lower() + what[1:], "whose": whose},
+            **{"composite": "mix", "needs_hdr": False},
+            **{"parameters": list(fields_of(kind)), "unit": kind.unit},
+        }
+
+
+presets, glares, psfs = map(_command, (preset_entries, glare_entries, psf_entries))

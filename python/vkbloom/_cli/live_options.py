@@ -8,9 +8,8 @@ from typing import Any, Final
 
 import click
 
-from vkbloom._cli.device_options import device_options
 from vkbloom._cli.image_files import expand_option, layer_option, read_picture, subimage_option
-from vkbloom._cli.program import given
+from vkbloom._cli.program import adapter_option, given
 from vkbloom._cli.scene_options import scene_options
 from vkbloom._cli.settings_options import settings_options
 from vkbloom._cli.streams import is_stream
@@ -32,7 +31,7 @@ def live_options(*, image_has_size: bool) -> Callable[[Callable[..., Any]], Call
         @subimage_option
         @layer_option
         @expand_option
-        @device_options
+        @adapter_option
         @scene_options
         @settings_options
         @functools.wraps(command)

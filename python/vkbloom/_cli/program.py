@@ -36,8 +36,11 @@ COMMANDS: Final = {
     "psfs": "List the point-spread functions",
     "adapters": "List the Vulkan adapters that vkbloom can use",
     "doctor": "Check whether this machine can render, and explain what prevents it",
-    "warm": "Fill the caches of pipelines and kernels before the first call needs them",
+    "warm": "Fill the caches of pipelines before the first call needs them",
 }
+
+# Modules of several commands.
+_MODULES: Final = dict.fromkeys(("presets", "glares", "psfs"), "listing")
 
 _FAILURES: Final = (vkbloom.Error, OSError, ValueError, ImportError, MemoryError)
 
@@ -62,7 +65,8 @@ class Program(click.Group):
         """Import and return a command; None if there is no such command."""
         if cmd_name not in COMMANDS:
             return None
-        command: click.Command = importlib.import_module(f"vkbloom._cli.{cmd_name}").command
+        module = importlib.import_module(f"vkbloom._cli.{_MODULES.get(cmd_name, cmd_name)}")
+        command: click.Command = getattr(module, cmd_name if cmd_name in _MODULES else "command")
         raise_interrupts()
         if terminal.QUIET_OPTION not in command.params:
             command.params.append(terminal.QUIET_OPTION)
@@ -198,6 +202,12 @@ def given(name: str, context: click.Context | None = None) -> bool:
     """Return whether the user set a parameter of the running command, or of another context's."""
     source = (context or click.get_current_context()).get_parameter_source(name)
     return source not in (None, ParameterSource.DEFAULT, ParameterSource.DEFAULT_MAP)
+
+
+#: ``--adapter``, the argument of `vkbloom.Renderer`.
+adapter_option: Final = click.option(
+    "--adapter", default="auto", help="auto, software, hardware, or a part of an adapter's name."
+)
 
 
 @click.group(

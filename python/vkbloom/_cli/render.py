@@ -8,9 +8,8 @@ import click
 
 import vkbloom
 from vkbloom._cli import no_bloom
-from vkbloom._cli.device_options import device_options
 from vkbloom._cli.fields import SIZE, Command
-from vkbloom._cli.program import as_wrong_use
+from vkbloom._cli.program import adapter_option, as_wrong_use
 from vkbloom._cli.scene_options import scene_options
 from vkbloom._cli.settings_options import settings_options
 from vkbloom._cli.terminal import note, say, tell_device
@@ -30,13 +29,8 @@ from vkbloom._settings.settings import SHADINGS, Shading
 @click.option("--size", type=SIZE, default="1280x720", help="Size of the frame, in pixels.")
 @click.option("--time", default=0.0, help="Time of the animation; its period is 1.")
 @click.option("--shading", type=click.Choice(SHADINGS), default=SHADINGS[0])
-@click.option(
-    "--framebuffers",
-    metavar="all|NAME,...",
-    default="all",
-    help="The framebuffers to write.",
-)
-@device_options
+@click.option("--framebuffers", metavar="all|NAME,...", default="all", help="What to write.")
+@adapter_option
 @scene_options
 @settings_options
 def command(
@@ -47,7 +41,6 @@ def command(
     shading: Shading,
     framebuffers: str,
     adapter: str,
-    validation: bool,
     scene: Callable[[], vkbloom.Scene],
     settings: vkbloom.Settings,
 ) -> None:
@@ -59,7 +52,7 @@ def command(
         raise click.UsageError("render does not write to a pipe; give --out a file or a folder")
     names = "all" if framebuffers == "all" else framebuffers.split(",")
     loaded = scene()
-    with vkbloom.Renderer(adapter, validation=validation) as renderer:
+    with vkbloom.Renderer(adapter) as renderer:
         tell_device(renderer)
         with as_wrong_use():
             frames = renderer.render(

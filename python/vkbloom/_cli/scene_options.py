@@ -28,30 +28,20 @@ def scene_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """
 
     @click.option(
-        "--scene",
-        "base",
-        default=_BUILT_IN,
-        metavar="ufo|PATH",
-        help="The lit mesh: a glTF file, or the built-in saucer",
+        "--scene", "base", default=_BUILT_IN, metavar="ufo|PATH", help="The lit mesh, a glTF file."
     )
     @click.option(
-        "--glow",
-        type=click.Path(),
-        help="The glowing mesh: a glTF file. Without it, materials that emit glow.",
+        "--glow", type=click.Path(), help="The glowing mesh; without it, materials that emit glow."
     )
     @click.option(
         "--skybox",
         "sky",
         type=click.Path(),
         multiple=True,
-        help="Given once: a KTX 1 cubemap or an equirectangular image. Given six times: the "
-        "images of the faces +x, -x, +y, -y, +z, -z.",
+        help="A KTX 1 cubemap or an equirectangular image; or six times a face, +x to -z.",
     )
     @click.option(
-        "--glow-intensity",
-        type=float,
-        default=1.0,
-        help="Factor of the glow mesh's colour in deferred shading, 0 or more.",
+        "--glow-intensity", type=float, default=1.0, help="Factor of the glow in deferred shading."
     )
     @fields.options({"": Camera}, "camera", prefix="camera-")
     @functools.wraps(command)
@@ -71,11 +61,7 @@ def scene_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def _load(
-    base: str,
-    glow: str | None,
-    sky: tuple[str, ...],
-    glow_intensity: float,
-    camera: dict[str, Any],
+    base: str, glow: str | None, sky: tuple[str, ...], glow_intensity: float, camera: dict[str, Any]
 ) -> Scene:
     with ExitStack() as stack:
         files = [stack.enter_context(as_file(face)) for face in sky]

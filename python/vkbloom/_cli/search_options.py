@@ -72,7 +72,7 @@ def _show_results(fits: Sequence[vkbloom.FitResult], *, as_json: bool) -> None:
         for item in fits:
             click.echo(
                 f"{item.settings.method}: {item.loss_name} loss {item.loss:.4g}, from "
-                f"{item.start_loss:.4g}; {item.calls} renders in {item.seconds:.1f} s"
+                f"{item.start_loss:.4g}; {item.calls} renders"
             )
             click.echo(f"  {as_code(item.settings)}")
             click.echo(f"  {item.words}")
@@ -90,5 +90,4 @@ def _object(fit: vkbloom.FitResult) -> dict[str, Any]:
         "verdict": fit.verdict,
         "cause": fit.cause,
         "calls": fit.calls,
-        "seconds": fit.seconds,
     }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final
 
@@ -29,21 +29,22 @@ _PRESET_OF_SCENES: Final = "tutorial"
 DEFAULT_PRESETS: Final = (PRESET_OF_IMAGES, PRESET_OF_PHOTOS, _PRESET_OF_SCENES)
 #: Parameters that say what a call starts from.
 STARTS: Final = ("preset", "method", "stored")
-# Names of the commands' arguments for image files; explore and grid may be called without one.
-_IMAGES: Final = ("source", "sources", "images")
 
 
 def settings_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """Add the options of the settings to a command; its argument `settings` has the result."""
-    return _settings_options(command, by_file=False)
+
+    def run(*, start: Start, **rest: Any) -> Any:
+        settings, expand = start.of(str(rest.get("source") or ""))
+        if "expand" in rest:
+            rest["expand"] = expand
+        return command(settings=settings, **rest)
+
+    return start_options(functools.update_wrapper(run, command))
 
 
-def settings_options_by_file(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add the options of the settings to a command; its argument `settings` is `Start.of`."""
-    return _settings_options(command, by_file=True)
-
-
-def _settings_options(command: Callable[..., Any], *, by_file: bool) -> Callable[..., Any]:
+def start_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Add the options of the settings to a command; its argument `start` has them."""
 
     @click.option(
         "--preset",
@@ -55,8 +56,7 @@ def _settings_options(command: Callable[..., Any], *, by_file: bool) -> Callable
     @click.option(
         "--method",
         type=fields.NameOf("method", METHODS),
-        help="The method of the blur, with its defaults, or a file of a custom method "
-        "[default the preset's]",
+        help="The method of the blur, with its defaults, or a file of a custom method.",
     )
     @fields.options({"": vkbloom.Settings}, "shared")
     @fields.options(METHODS, "of_method", base=vkbloom.Settings)
@@ -65,9 +65,7 @@ def _settings_options(command: Callable[..., Any], *, by_file: bool) -> Callable
         "stored",
         metavar="FILE",
         type=click.Path(),
-        help="A file of settings to start from: JSON, as the explorer saves it, or a picture that "
-        "holds settings, such as a PNG or an OpenEXR file of vkbloom apply. JSON expands the "
-        "highlights of files of integers, as the explorer does.",
+        help="Settings to start from: JSON, or a PNG or OpenEXR picture that vkbloom wrote.",
     )
     @functools.wraps(command)
     def run(
@@ -77,8 +75,8 @@ def _settings_options(command: Callable[..., Any], *, by_file: bool) -> Callable
         stored: str | None,
         shared: dict[str, Any],
         of_method: dict[str, Any],
-        **rest: object,
-    ) -> object:
+        **rest: Any,
+    ) -> Any:
         if stored is not None and preset is not None:
             raise click.UsageError("--settings and --preset exclude each other; leave one out")
         start = Start(
@@ -87,18 +85,9 @@ def _settings_options(command: Callable[..., Any], *, by_file: bool) -> Callable
             stored=None if stored is None else read_settings(stored),
             changes={**shared, **of_method},
             expands="expand" in rest,
-            expand=rest.get("expand"),  # type: ignore[arg-type]
+            expand=rest.get("expand"),
         )
-        if by_file:
-            return command(settings=start.of, **rest)
-        images = _images_of(rest)
-        # An axis of presets gives every image the same settings.
-        axes: Any = rest.get("words", ())
-        has_presets = any(str(word).startswith("preset=") for word in axes)
-        settings, expand = start.of_all(images[:1] if has_presets else images)
-        if "expand" in rest:
-            rest["expand"] = expand
-        return command(settings=settings, **rest)
+        return command(start=start, **rest)
 
     return run
 
@@ -124,16 +113,6 @@ class Start:
         begun, expand = self._begun(image)
         return _changed(begun, self.changes), expand if self.expand is None else self.expand
 
-    def of_all(self, images: Sequence[str]) -> tuple[vkbloom.Settings, float | None]:
-        """Return the settings for image files that have the same, and the value for --expand."""
-        results = list(dict.fromkeys(self.of(image) for image in images or ("",)))
-        if len(results) > 1:
-            raise click.UsageError(
-                f"files of integers start from the preset {PRESET_OF_PHOTOS}, files of floats from "
-                f"{PRESET_OF_IMAGES}, and here are both; give --preset NAME for all"
-            )
-        return results[0]
-
     def _begun(self, image: str) -> tuple[vkbloom.Settings, float | None]:
         if self.stored is not None:
             begun, expand = self.stored
@@ -154,12 +133,6 @@ def _preset_of(image: str, *, expands: bool) -> str:
     if not image:
         return _PRESET_OF_SCENES
     return PRESET_OF_PHOTOS if expands and is_photograph(image) else PRESET_OF_IMAGES
-
-
-def _images_of(rest: dict[str, Any]) -> Sequence[str]:
-    """Return a command's image files."""
-    names = next((value for name in _IMAGES if (value := rest.get(name))), ())
-    return [names] if isinstance(names, str) else names
 
 
 def read_settings(name: str) -> tuple[vkbloom.Settings, float | None]:

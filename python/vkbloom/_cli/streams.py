@@ -5,7 +5,6 @@ from __future__ import annotations
 import errno
 import os
 import shutil
-import stat
 import sys
 import tempfile
 from collections.abc import Iterator
@@ -70,21 +69,8 @@ def _copy_of(name: str) -> str:
 def _opened(name: str) -> Iterator[BinaryIO]:
     if name != PIPE:
         with open(name, "rb") as stream:
-            _check_ends(stream, name)
             yield stream
     elif sys.stdin is None:
         raise OSError(errno.EBADF, "is closed", shown(name))
     else:
-        _check_ends(sys.stdin.buffer, shown(name))
         yield sys.stdin.buffer
-
-
-def _check_ends(stream: BinaryIO, name: str) -> None:
-    """Raise OSError for a device, which may have no end, unless it is a terminal."""
-    try:
-        mode = os.fstat(stream.fileno()).st_mode
-    except (OSError, ValueError):
-        # A stream of Python without a descriptor.
-        return
-    if (stat.S_ISCHR(mode) or stat.S_ISBLK(mode)) and not stream.isatty():
-        raise OSError(errno.EINVAL, "is a device, not a file", name)

@@ -8,9 +8,8 @@ from typing import Any
 import click
 
 import vkbloom
-from vkbloom._cli.device_options import device_options
 from vkbloom._cli.fields import SIZE, Command, NameOf
-from vkbloom._cli.program import as_wrong_use, given
+from vkbloom._cli.program import adapter_option, as_wrong_use, given
 from vkbloom._cli.search_options import search_options
 from vkbloom._cli.settings_options import STARTS, settings_options
 from vkbloom._renderer.interruptible import opened_renderer
@@ -23,17 +22,11 @@ from vkbloom._settings.registry import METHODS
     "target",
     required=True,
     type=NameOf("preset or method", vkbloom.presets, METHODS),
-    help="A preset or a method: where the search starts, and the settings that do not vary.",
+    help="A preset or a method: where the search starts, and what does not vary.",
 )
-@click.option(
-    "--size",
-    type=SIZE,
-    default="640x360",
-    help="Size of the picture. Methods that blur by pixels differ from those that blur by shares "
-    "of the frame at every size but this.",
-)
+@click.option("--size", type=SIZE, default="640x360", help="Size of the picture.")
 @search_options(vary=None, loss="log", max_calls=300)
-@device_options
+@adapter_option
 @settings_options
 def command(
     *,
@@ -42,7 +35,6 @@ def command(
     search: dict[str, Any],
     show_results: Callable[[Sequence[vkbloom.FitResult]], None],
     adapter: str,
-    validation: bool,
     settings: vkbloom.Settings,
 ) -> None:
     """Find another method's parameters whose bloom comes closest.
@@ -56,6 +48,6 @@ def command(
             "give what to translate: --preset NAME, --method NAME or --settings FILE"
         )
     start = vkbloom.presets[target] if target in vkbloom.presets else METHODS[target]()
-    with opened_renderer(adapter, validation) as renderer, as_wrong_use():
+    with opened_renderer(adapter) as renderer, as_wrong_use():
         result = vkbloom.translate(settings, start, size=size, renderer=renderer, **search)
     show_results([result])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import time
 from collections.abc import Callable, Iterator
 from typing import Any, Final
@@ -13,10 +14,71 @@ from numpy.typing import NDArray
 import vkbloom
 from vkbloom._checks import import_extra
 from vkbloom._cli.fields import SIZE, Command
-from vkbloom._cli.live import HELP, Live
 from vkbloom._cli.live_options import live_options
 from vkbloom._renderer.surface import Surface
-from vkbloom._settings.settings import SHADINGS, Shading
+from vkbloom._settings.settings import SHADINGS, Settings, Shading
+
+HELP: Final = """\
+B              bloom on, off
+1 ... 9        the framebuffer that is shown
+P              the next preset
+Space          pauses the animation
+Q, Escape      close\
+"""
+
+_TURN_SECONDS: Final = 8.0
+
+
+@dataclasses.dataclass
+class Live:
+    """The state of a window.
+
+    - `shading`: Of a scene.
+    - `framebuffer`: Name of the framebuffer that is shown.
+    - `time`: Time of the animation, in periods.
+    """
+
+    settings: Settings
+    source: Any
+    shading: Shading = "forward"
+    framebuffer: str = "final"
+    time: float = 0.0
+    paused: bool = False
+    closed: bool = False
+
+    def press(self, key: str, names: list[str]) -> None:
+        """Do what a key stands for; `names` are the framebuffers that there are."""
+        if key in "bp":
+            # The next settings may lack the framebuffer.
+            self.framebuffer = "final"
+        if key == "b":
+            self.settings = self.settings.replace(bloom=not self.settings.bloom)
+        elif key in "123456789" and int(key) <= len(names):
+            self.framebuffer = names[int(key) - 1]
+        elif key == "p":
+            known = list(vkbloom.presets.values())
+            shown = known.index(self.settings) if self.settings in known else -1
+            self.settings = known[(shown + 1) % len(known)]
+        elif key == "space":
+            self.paused = not self.paused
+        elif key in ("q", "escape"):
+            self.closed = True
+
+    def advance(self, seconds: float) -> None:
+        """Let time pass."""
+        if not self.paused:
+            self.time = (self.time + seconds / _TURN_SECONDS) % 1.0
+
+    def title(self, seconds: float) -> str:
+        """Return the text of the title; `seconds` is the time of a frame."""
+        parts = [
+            f"{self.framebuffer}: {self.settings.method}",
+            *([] if self.settings.bloom else ["no bloom"]),
+            *(["paused"] if self.paused else []),
+            f"{seconds * 1e3:.1f} ms, {1 / seconds:.0f} frames/s",
+        ]
+        return " | ".join(parts)
+
 
 _LARGEST: Final = (1600, 900)  # size of a window for an image
 _TITLE_SECONDS: Final = 0.5  # between updates of the title
@@ -35,7 +97,6 @@ def command(
     size: tuple[int, int] | None,
     shading: Shading,
     adapter: str,
-    validation: bool,
     scene: Callable[[], vkbloom.Scene],
     settings: vkbloom.Settings,
 ) -> None:
@@ -45,7 +106,7 @@ def command(
     loaded = scene() if image is None else image
     with (
         _opened(glfw, size or (min(width, _LARGEST[0]), min(height, _LARGEST[1]))) as window,
-        vkbloom.Renderer(adapter, validation=validation) as renderer,
+        vkbloom.Renderer(adapter) as renderer,
         Surface(renderer, window) as surface,
     ):
         source = loaded if isinstance(loaded, vkbloom.Scene) else renderer.upload(loaded)

@@ -1,9 +1,8 @@
-"""``vkbloom warm``: fill the caches of pipelines and kernels before the first call needs them."""
+"""``vkbloom warm``: fill the caches of pipelines before the first call needs them."""
 
 from __future__ import annotations
 
 import itertools
-import time
 from typing import Any, Final
 
 import click
@@ -11,8 +10,8 @@ import numpy as np
 from tqdm import tqdm
 
 import vkbloom
-from vkbloom._cli.device_options import adapter_option
 from vkbloom._cli.fields import SIZE, NameOf
+from vkbloom._cli.program import adapter_option
 from vkbloom._cli.terminal import hides_progress, say
 from vkbloom._settings.registry import METHODS
 
@@ -28,28 +27,16 @@ _KEPT: Final[tuple[Any, ...]] = ("all", ("final",))
     "presets",
     type=NameOf("preset", vkbloom.presets),
     multiple=True,
-    help="Only this preset; repeat it for more [default: all, and the built-in scene]",
+    help="Only this preset; repeat it for more.",
 )
 @click.option(
-    "--method",
-    "methods",
-    type=NameOf("method", METHODS),
-    multiple=True,
-    help="Only this method with its defaults, or a file of a custom method; repeat it for more",
+    "--method", "methods", type=NameOf("method", METHODS), multiple=True, help="Only this method."
 )
 @click.option(
-    "--type",
-    "types",
-    type=click.Choice(_TYPES),
-    multiple=True,
-    help="Only images of this type; repeat it for more [default: all]",
+    "--type", "types", type=click.Choice(_TYPES), multiple=True, help="Only images of this type."
 )
 @click.option(
-    "--size",
-    "sizes",
-    type=SIZE,
-    multiple=True,
-    help="Size of the images to come; repeat it for more [default: 1920x1080]",
+    "--size", "sizes", type=SIZE, multiple=True, help="Of the images to come [default: 1920x1080]"
 )
 @adapter_option
 def command(
@@ -69,7 +56,6 @@ def command(
     container's image is built, or in the step whose caches CI keeps. Mesa's software driver
     compiles for the CPU that it runs on: another type of CPU does not find these pipelines.
     """
-    begun, used = time.perf_counter(), time.process_time()
     everything = not presets and not methods
     warmed = [vkbloom.presets[name] for name in (vkbloom.presets if everything else presets)]
     warmed += [METHODS[name]() for name in methods]
@@ -86,5 +72,4 @@ def command(
             image = np.zeros((size[1], size[0], channels), dtype)
             renderer.apply(image, settings, framebuffers=framebuffers)
         name = renderer.info.summary
-    seconds, processor = time.perf_counter() - begun, time.process_time() - used
-    say(f"{len(calls)} kinds of calls on {name}: {seconds:.1f} s, {processor:.1f} s of CPU")
+    say(f"{len(calls)} kinds of calls on {name}")

@@ -14,11 +14,17 @@ NAME_SIZE: Final = 32
 
 
 class CoreShader(NamedTuple):
-    """A shader: its name in plans, its SPIR-V, and 16 bytes that are equal only for equal code."""
+    """A shader: its name in plans, its SPIR-V, and 16 bytes that are equal only for equal code.
+
+    Of a compute shader also the threads of a workgroup, and its bytes of shared memory.
+    """
 
     name: str
     code: bytes
     hash: bytes
+    threads_x: int = 1
+    threads_y: int = 1
+    shared: int = 0
 
 
 class Resource(NamedTuple):

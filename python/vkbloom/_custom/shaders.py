@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import hashlib
 import os
+import struct
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, Final
@@ -16,6 +17,7 @@ from vkbloom._custom.passes import CustomPass
 from vkbloom._custom.resources import made_resources
 from vkbloom._custom.rows import CoreShader
 from vkbloom._custom.source import Source
+from vkbloom._custom.spirv import shared_bytes
 
 #: Passes that the package adds: a copy, the difference of two pictures, and black.
 PACKAGE_PASSES: Final = """\
@@ -83,6 +85,10 @@ class Shaders:
     ) -> tuple[Shader, CoreShader]:
         digest = hashlib.sha256(code).digest()[:16]
         made = shader, CoreShader(f"{self._name}_{item.line}", code, digest)
+        if item.compute:
+            words = struct.unpack(f"={len(code) // 4}I", code)
+            threads = item.compute.threads
+            made = shader, CoreShader(*made[1][:3], *threads, shared_bytes(words))
         self._compiled[key] = made
         return made
 

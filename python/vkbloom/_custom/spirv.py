@@ -9,6 +9,8 @@ TYPES = range(19, 40)
 FLOAT_ARITHMETIC = {127, 129, 131, 133, 136, 140, 141, *range(142, 149)}
 DECORATE = 3 << 16 | 71
 NO_CONTRACTION = 42
+# The storage class of memory that a workgroup shares.
+WORKGROUP = 4
 
 
 def without_contraction(words: tuple[int, ...]) -> tuple[int, ...]:
@@ -34,3 +36,36 @@ def without_contraction(words: tuple[int, ...]) -> tuple[int, ...]:
         position += count
     # Decorations come before all types.
     return (*words[:first_type], *decorations, *words[first_type:])
+
+
+def shared_bytes(words: tuple[int, ...]) -> int:
+    """Return the size of what a workgroup shares, without padding."""
+    sizes: dict[int, int] = {}
+    pointed: dict[int, int] = {}
+    lengths: dict[int, int] = {}
+    total = 0
+    position = HEADER_WORDS
+    while position < len(words):
+        opcode, end = words[position] & 0xFFFF, position + (words[position] >> 16)
+        a, b, c = (*words[position + 1 : position + 4], 0, 0, 0)[:3]
+        match opcode:
+            case 20:  # OpTypeBool
+                sizes[a] = 4
+            case 21 | 22:  # OpTypeInt, OpTypeFloat
+                sizes[a] = b // 8
+            case 23 | 24:  # OpTypeVector, OpTypeMatrix
+                sizes[a] = sizes[b] * c
+            case 28:  # OpTypeArray
+                sizes[a] = sizes.get(b, 0) * lengths.get(c, 0)
+            case 30:  # OpTypeStruct
+                sizes[a] = sum(sizes.get(member, 0) for member in words[position + 2 : end])
+            case 32:  # OpTypePointer
+                pointed[a] = c
+            case 43 | 50:  # OpConstant, OpSpecConstant
+                lengths[b] = c
+            case 59 if c == WORKGROUP:  # OpVariable
+                total += sizes.get(pointed[a], 0)
+            case 54:  # OpFunction: there are no declarations after it
+                break
+        position = end
+    return total

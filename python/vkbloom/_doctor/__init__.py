@@ -13,7 +13,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from vkbloom._doctor import child, drivers, installation
-from vkbloom._doctor.finding import Finding, Report
+from vkbloom._doctor.installation import Finding, Report
 
 
 def examine() -> Report:
@@ -25,12 +25,11 @@ def examine() -> Report:
         return Report((installation.package(), *core, *installation.extras()), False)
     listed = child.ask("adapters", "all", environment=drivers.LOG)
     adapters: list[Mapping[str, Any]] = listed.value["adapters"] if listed.value else []
-    chosen = child.ask("render", "auto", "plain")
+    chosen = child.ask("render", "auto")
     renders = {} if chosen.value is None else {chosen.value["name"]: chosen}
     for adapter in adapters:
         if adapter["name"] not in renders:
-            renders[adapter["name"]] = child.ask("render", adapter["name"], "plain")
-    working = [name for name, answer in renders.items() if answer.value is not None]
+            renders[adapter["name"]] = child.ask("render", adapter["name"])
     loading = [_loader(listed), *drivers.examine(listed.messages)]
     if any(adapter["bundled"] for adapter in adapters):
         # The bundled driver needs neither loader nor manifest.
@@ -44,7 +43,6 @@ def examine() -> Report:
         *installation.gpu_nodes(any(adapter["type"] != "cpu" for adapter in adapters)),
         *([_chosen(chosen)] if adapters else []),
         *(_test_render(name, answer) for name, answer in renders.items()),
-        *map(_validation, working[:1]),
         *installation.caches(),
         *installation.extras(),
     ]
@@ -100,21 +98,3 @@ def _test_render(name: str, answer: child.Answer) -> Finding:
         text = f"{name} renders wrong values: {'; '.join(answer.value['differences'])}"
         return Finding(topic, "problem", text, f"{advice} Do not trust its framebuffers.")
     return Finding(topic, "ok", f"{name} renders the expected values in all framebuffers")
-
-
-def _validation(adapter: str) -> Finding:
-    """Check the validation layer by a test render on an adapter that works without it."""
-    topic = "validation layer"
-    answer = child.ask("render", adapter, "validated")
-    if answer.value is not None:
-        return Finding(topic, "ok", "installed; the test render has no validation errors")
-    missing = {
-        "is not installed": "it is not installed",
-        "needs the system's": "there is no loader",
-    }
-    for said, text in missing.items():
-        if said in answer.failure:
-            advice = "To use validation=True: apt install libvulkan1 vulkan-validationlayers."
-            return Finding(topic, "note", text, advice)
-    advice = "Install the layer again, in the loader's version, or do not use validation=True."
-    return Finding(topic, "problem", f"the test render fails with it: {answer.failure}", advice)

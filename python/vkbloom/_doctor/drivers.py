@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from vkbloom._doctor import child, installation
-from vkbloom._doctor.finding import Finding
+from vkbloom._doctor.installation import Finding
 
 #: The environment in which the loader writes its log to standard error.
 LOG: Final = {"VK_LOADER_DEBUG": "all"}

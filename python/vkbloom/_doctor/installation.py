@@ -8,14 +8,36 @@ import re
 import tempfile
 from importlib import metadata
 from pathlib import Path
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from vkbloom import _core
-from vkbloom._doctor.finding import Finding
 from vkbloom._free_memory import ADVICE, address_space_left
 from vkbloom._io import disk_cache
+
+
+class Finding(NamedTuple):
+    """The result of one check.
+
+    - `topic`: What was checked, in one or two words.
+    - `status`: "ok": correct; "note": information, nothing is broken; "problem": must be repaired.
+    - `found`: What was found, and what it means.
+    - `advice`: What to do; "" if nothing has to be done.
+    """
+
+    topic: str
+    status: str
+    found: str
+    advice: str = ""
+
+
+class Report(NamedTuple):
+    """The findings of one examination; at least one adapter rendered correctly if `can_render`."""
+
+    findings: tuple[Finding, ...]
+    can_render: bool
+
 
 # Address space of a render of a small image on lavapipe, with the interpreter.
 _AMPLE: Final = 1 << 30

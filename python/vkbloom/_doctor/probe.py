@@ -52,9 +52,9 @@ def adapters(which: str) -> dict[str, Any]:
     return {"adapters": results, "reason": reason} if results or not reason else {"failure": reason}
 
 
-def render(adapter: str, validation: str) -> dict[str, Any]:
-    """Make the test render, with the validation layer if `validation` is "validated"."""
-    with vkbloom.Renderer(adapter, validation=validation == "validated") as renderer:
+def render(adapter: str) -> dict[str, Any]:
+    """Make the test render."""
+    with vkbloom.Renderer(adapter) as renderer:
         info, results = renderer.info, differences(renderer.apply(IMAGE, SETTINGS))
         return {"name": info.name, "summary": info.summary, "differences": results}
 

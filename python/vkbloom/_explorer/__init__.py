@@ -71,12 +71,5 @@ def explore(
     from vkbloom._explorer.widget import Explorer  # noqa: PLC0415  needs anywidget
 
     return Explorer(
-        Viewer(
-            source,
-            settings,
-            against=against,
-            size=size,
-            shading=shading,
-            renderer=renderer,
-        )
+        Viewer(source, settings, against=against, size=size, shading=shading, renderer=renderer)
     )

@@ -27,6 +27,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import os
 import tempfile
 from collections.abc import Mapping, Sequence
 from functools import partial
@@ -38,6 +39,8 @@ from numpy.typing import NDArray
 
 from vkbloom import _core
 from vkbloom._checks import check_image, check_number, check_size
+from vkbloom._custom.method import CustomType, registered
+from vkbloom._custom.source import read_source
 from vkbloom._explorer.controls import (
     as_fields,
     code_with_image,
@@ -45,14 +48,14 @@ from vkbloom._explorer.controls import (
     described,
     settings_from,
 )
-from vkbloom._explorer.custom_files import CustomFiles, current
 from vkbloom._explorer.fast_pictures import picture_of, texts_of
 from vkbloom._io.array_files import read
 from vkbloom._io.expansion import PHOTO_EXPANSION
 from vkbloom._renderer.plans import Pass
 from vkbloom._renderer.renderer import Renderer
 from vkbloom._scene import Scene
-from vkbloom._settings.registry import presets
+from vkbloom._settings.fields import fields_of
+from vkbloom._settings.registry import METHODS, presets
 from vkbloom._settings.settings import SHADINGS, check_settings, check_shading
 from vkbloom._views.pictures import reduced
 
@@ -249,10 +252,7 @@ class Viewer:
                 frames, names, plan = self._render(settings, size, message)
                 (shown,) = frames
                 picture = picture_of(
-                    frames[shown],
-                    shown,
-                    is_encoded=settings.encoding != "none",
-                    stops=stops,
+                    frames[shown], shown, is_encoded=settings.encoding != "none", stops=stops
                 )
             except _FAILURES as error:
                 # The other side is still shown.
@@ -375,3 +375,64 @@ def _probed(array: NDArray[Any], at: tuple[float, float]) -> dict[str, Any]:
     # A position of 1 is the far edge of the last pixel.
     x, y = min(int(at[0] * width), width - 1), min(int(at[1] * height), height - 1)
     return {"x": x, "y": y, "values": texts_of(array[y, x])}
+
+
+class CustomFiles:
+    """The custom methods that a page knows, and the errors of their files."""
+
+    def __init__(self) -> None:
+        self._known = {name: METHODS[name] for name in METHODS if METHODS.is_added(name)}
+        self._read: dict[str, tuple[int, int]] = {}
+        self._errors: dict[str, str] = {}
+
+    def __bool__(self) -> bool:
+        return bool(self._known)
+
+    def changes(self) -> tuple[dict[str, type[Settings]], dict[str, str]]:
+        """Load changed files again.
+
+        Returns: the classes that are new since the last call, and the errors of all files that do
+        not load, by the names of the methods. A method whose file does not load stays as it was.
+        """
+        new: dict[str, type[Settings]] = {}
+        for name in self._known:
+            self._load(name)
+            if name in METHODS and METHODS[name] is not self._known[name]:
+                new[name] = self._known[name] = METHODS[name]
+        return new, self._errors
+
+    def _load(self, name: str) -> None:
+        """Load a method's file again if it is another than before."""
+        kind = METHODS.get(name)
+        if not isinstance(kind, CustomType) or kind.file.source.name == "<text>":
+            return
+        try:
+            result = os.stat(kind.file.source.name)
+            stamp = (result.st_mtime_ns, result.st_size)
+            if self._read.get(name) == stamp:
+                return
+            self._read[name] = stamp
+            source = read_source(kind.file.source.name)
+            if source != kind.file.source:
+                registered(name, source, kind.numpy_reference)
+            self._errors.pop(name, None)
+        except (_core.Error, OSError, ValueError) as error:
+            self._errors[name] = str(error)
+
+
+def current(settings: Settings) -> Settings:
+    """Return settings of a custom method as those of the class that is loaded now.
+
+    Fields that the class does not have, or whose values it does not accept, are its defaults.
+    """
+    kind = METHODS.get(settings.method)
+    if kind is None or isinstance(settings, kind):
+        return settings
+    begun: Settings = kind()
+    for name in fields_of(kind):
+        if hasattr(settings, name):
+            try:
+                begun = begun.replace(**{name: getattr(settings, name)})
+            except (TypeError, ValueError):
+                continue
+    return begun

@@ -6,7 +6,6 @@ import contextlib
 import dataclasses
 import itertools
 import math
-import time
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from typing import Any, Final, Literal, overload
@@ -220,10 +219,7 @@ def _checked_names(vary: str | Sequence[str]) -> tuple[str, ...]:
 
 
 def _stages(
-    renderer: Renderer,
-    image: NDArray[Any] | Image,
-    pixels: NDArray[Any] | None,
-    measure: Measure,
+    renderer: Renderer, image: NDArray[Any] | Image, pixels: NDArray[Any] | None, measure: Measure
 ) -> list[_Stage]:
     """Return the image at its own size, and before it a smaller one where it is large."""
     handle = image if isinstance(image, Image) else renderer.upload(image)
@@ -301,7 +297,6 @@ def _fitted(
     gradient: bool,
 ) -> FitResult:
     """Return what is found from one start."""
-    began = time.perf_counter()
     history: list[float] = []
     points = [space.origin]
     searches = []
@@ -333,10 +328,7 @@ def _fitted(
         history += search.history
         points.append(search.best)
         searches.append(search)
-    seconds = time.perf_counter() - began
-    return _result(
-        renderer, stages[-1], space, searches[-1], framebuffer, history=history, seconds=seconds
-    )
+    return _result(renderer, stages[-1], space, searches[-1], framebuffer, history=history)
 
 
 def _result(
@@ -347,7 +339,6 @@ def _result(
     framebuffer: str,
     *,
     history: list[float],
-    seconds: float,
 ) -> FitResult:
     """Return what a search found, judged at the image's own size."""
     settings = space.settings(last.best)
@@ -365,7 +356,6 @@ def _result(
         start_loss=last.history[0],
         calls=len(history),
         history=np.array(history),
-        seconds=seconds,
         framebuffer=framebuffer,
         loss_name=loss_text(measure.loss),
         vary=tuple(axis.name for axis in space.axes),

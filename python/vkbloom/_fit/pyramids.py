@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterable
 from typing import Any, Final, Literal, get_args
 
@@ -74,13 +73,10 @@ def fit_pyramid(
     Lawson and Hanson, "Solving Least Squares Problems", 1974, chapter 23, on non-negative least
     squares. With "log" the rows are divided by the function: log(a / b) is nearly (a - b) / b.
     """
-    if not isinstance(psf, PSF):
-        raise TypeError(f"psf: {psf!r} is not a PSF")
     check_index("levels", levels, 1, 16)
     if loss not in get_args(PyramidLoss):
         raise ValueError(f"loss: {loss!r} is not one of {', '.join(get_args(PyramidLoss))}")
     width, height = check_size("size", size)
-    began = time.perf_counter()
     wanted = psf.array((width, height), pixels_per_degree).mean(axis=2, keepdims=True)
     measure = Measure(np.repeat(wanted, 3, axis=2), loss)
     point = np.zeros((height, width, 3), np.float32)
@@ -110,7 +106,6 @@ def fit_pyramid(
         start_loss=losses[0],
         calls=levels + 2,
         history=np.array(losses),
-        seconds=time.perf_counter() - began,
         framebuffer=framebuffer,
         loss_name=loss,
         vary=("level_weights", "intensity") if direct else ("level_weights",),

@@ -100,17 +100,20 @@ def translate(
         encoding.
 
     """
-    if not callable(settings):
-        check_settings(settings)
     start = to() if isinstance(to, type) and issubclass(to, Settings) else to
     if not isinstance(start, Settings):
         raise TypeError(f"to: {to!r} is not a Settings or a class of settings")
     image = lights(check_size("size", size))
     names = _knobs(start) if vary is None else vary
     renderer = renderer or default_renderer()
+    if callable(settings):
+        target = settings(image)
+    else:
+        plain = _plain(check_settings(settings))
+        target = renderer.apply(image, plain, framebuffers=["final"])["final"]
     result = fit(
         image,
-        settings(image) if callable(settings) else _applied(renderer, image, settings),
+        target,
         _plain(start),
         names,
         framebuffer="final",
@@ -122,15 +125,6 @@ def translate(
     )
     look = {name: getattr(start, name) for name in ("tonemap", "encoding", "exposure")}
     return dataclasses.replace(result, settings=result.settings.replace(**look))
-
-
-def _applied(
-    renderer: Renderer, image: NDArray[np.float32], settings: Settings
-) -> NDArray[np.float32]:
-    final: NDArray[np.float32] = renderer.apply(image, _plain(settings), framebuffers=["final"])[
-        "final"
-    ]
-    return final
 
 
 def lights(size: tuple[int, int]) -> NDArray[np.float32]:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from vkbloom._array_cache import kept
 from vkbloom._checks import check_number
-from vkbloom._core_kernel import CoreKernel, core_kernel
+from vkbloom._core_kernel import CoreKernel, WithKernel
 from vkbloom._settings.fields import value_field
 from vkbloom._settings.glare import Glare, stage_field
 from vkbloom.psf._sampled import check_values
@@ -23,7 +23,7 @@ def _read_image(image: Any) -> Any:
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class Dirt(Glare):
+class Dirt(WithKernel, Glare):
     """A picture of dirt on the lens, which multiplies bloom and glare.
 
     Parameters
@@ -45,6 +45,7 @@ class Dirt(Glare):
     """
 
     stage: ClassVar[str] = "dirt"
+    shaping: ClassVar[tuple[str, ...]] = ("image", "seed")
 
     image: Any = value_field(None, optional=True, read=_read_image)
     seed: int = stage_field("seed", slider=(0, 100))
@@ -68,16 +69,10 @@ class Dirt(Glare):
 
     def core_kernel(self, frame: object, buffers: object) -> CoreKernel:
         """Return the picture as the core reads a kernel."""
-        return _core_dirt(self.replace_look())
+        return super().core_kernel((0, 0), (0, 0))
 
-    def replace_look(self) -> Dirt:
-        """Return the dirt with defaults in the fields that do not change its picture."""
-        return Dirt(image=self.image, seed=self.seed)
-
-
-@kept
-def _core_dirt(dirt: Dirt) -> CoreKernel:
-    return core_kernel(dirt.pixels)
+    def _kernel(self, frame: object, buffers: object) -> NDArray[np.float32]:
+        return self.pixels
 
 
 @kept

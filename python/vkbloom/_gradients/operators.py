@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, Final, cast
+from typing import Any, Final, NamedTuple, cast
 
 import numpy as np
 
@@ -128,23 +128,41 @@ def number_of(renderer: Renderer | None) -> int:
     return _DEFAULT if renderer is None else renderer._number
 
 
-def _each(  # noqa: PLR0917
-    image: Any, mask: Any, emission: Any, values: Sequence[Any], names: str, text: str
-) -> Iterator[tuple[tuple[int, ...], dict[str, Any], Settings]]:
-    """Yield the index, the arrays and the settings of each image of a batch."""
-    given = {"image": image, "mask": mask, "emission": emission}
-    arrays = {
-        name: part.detach().cpu().contiguous().numpy()
-        for name, part in given.items()
-        if part is not None
-    }
-    settings = replaced(_settings(text), dict(zip(_split(names), values, strict=True)))
-    for index in np.ndindex(tuple(image.shape[:-3])):
-        yield index, {name: part[index] for name, part in arrays.items()}, settings
+class _Call(NamedTuple):
+    """The arguments of an operator: images, the tensors of fields, texts, and a renderer."""
 
+    image: Any
+    mask: Any
+    emission: Any
+    values: Sequence[Any]
+    names: str
+    settings: str
+    renderer: int
 
-def _split(names: str) -> list[str]:
-    return names.split(",") if names else []
+    @property
+    def images(self) -> dict[str, Any]:
+        """The image, and mask and emission where they are given."""
+        named = {"image": self.image, "mask": self.mask, "emission": self.emission}
+        return {name: part for name, part in named.items() if part is not None}
+
+    @property
+    def fields(self) -> dict[str, Any]:
+        """The tensors by field."""
+        return dict(zip(self.names.split(",") if self.names else [], self.values, strict=True))
+
+    @property
+    def on_device(self) -> bool:
+        """Whether the work stays on the GPU."""
+        return bool(self.image.is_cuda and self.image.dtype != torch.float64)
+
+    def each(self) -> Iterator[tuple[tuple[int, ...], dict[str, Any], Settings]]:
+        """Yield the index, the arrays and the settings of each image of a batch."""
+        arrays = {
+            name: part.detach().cpu().contiguous().numpy() for name, part in self.images.items()
+        }
+        settings = replaced(_settings(self.settings), self.fields)
+        for index in np.ndindex(tuple(self.image.shape[:-3])):
+            yield index, {name: part[index] for name, part in arrays.items()}, settings
 
 
 def _pulled(arrays: dict[str, Any], settings: Settings, renderer: int, cotangent: Any) -> Any:
@@ -155,21 +173,17 @@ def _pulled(arrays: dict[str, Any], settings: Settings, renderer: int, cotangent
     return pullback(check_cotangents({"final": cotangent}, {"final": cotangent}))
 
 
-def _pulled_on_device(  # noqa: PLR0917
-    cotangent: Any,
-    image: Any,
-    mask: Any,
-    emission: Any,
-    settings: Settings,
-    number: int,
-) -> Iterator[Any]:
+def _pulled_on_device(call: _Call, cotangent: Any) -> Iterator[Any]:
     """Yield the derivatives of each image, with those by images as tensors of the GPU."""
-    renderer = _renderer(number, image)
+    renderer, mask = _renderer(call.renderer, call.image), call.mask
     core = renderer._core
     masks = None if mask is None else mask.detach().reshape(-1, *mask.shape[-2:]).cpu().numpy()
     images, emissions, cotangents = (
         None if tensor is None else take(_batch(tensor), name, core, (4,))
-        for name, tensor in (("image", image), ("emission", emission), ("cotangent", cotangent))
+        for name, tensor in (
+            *(("image", call.image), ("emission", call.emission)),
+            ("cotangent", cotangent),
+        )
     )
     assert images
     assert cotangents
@@ -184,6 +198,7 @@ def _pulled_on_device(  # noqa: PLR0917
         )
         for index in range(images.shape[0])
     )
+    settings = replaced(_settings(call.settings), call.fields)
     yield from pull_each(renderer, settings, sequence, "cuda")
 
 
@@ -214,55 +229,39 @@ def refuse_capture(image: Any) -> None:
 
 
 @_operator("vkbloom::bloom", "", "Tensor")  # type: ignore[untyped-decorator]
-def _bloom(  # noqa: PLR0917
-    image: Any,
-    mask: Any,
-    emission: Any,
-    values: Sequence[Any],
-    names: str,
-    settings: str,
-    renderer: int,
-) -> Any:
+def _bloom(*given: Any) -> Any:
+    call = _Call(*given)
+    image = call.image
     refuse_capture(image)
-    if image.is_cuda and image.dtype != torch.float64:
-        return _on_device(image, mask, emission, values, names, settings, renderer)
+    if call.on_device:
+        return _on_device(call)
     final = np.empty(image.shape, _dtype(image))
-    for index, arrays, chosen in _each(image, mask, emission, values, names, settings):
-        given = dict(arrays)
-        pixels = given.pop("image")
+    for index, arrays, chosen in call.each():
+        pixels = arrays.pop("image")
         if pixels.dtype == np.float64:
-            final[index] = reference_apply(pixels, chosen, **given)["final"]
+            final[index] = reference_apply(pixels, chosen, **arrays)["final"]
         else:
-            frames = _renderer(renderer).apply(
-                pixels, chosen.replace(format="rgba32float"), framebuffers="final", **given
+            frames = _renderer(call.renderer).apply(
+                pixels, chosen.replace(format="rgba32float"), framebuffers="final", **arrays
             )
             final[index] = frames["final"]
     return torch.from_numpy(final).to(image.device)
 
 
-def _on_device(  # noqa: PLR0917
-    image: Any,
-    mask: Any,
-    emission: Any,
-    values: Sequence[Any],
-    names: str,
-    text: str,
-    number: int,
-) -> Any:
+def _on_device(call: _Call) -> Any:
     """Run the operator without the host; a batch without masks changes the context once."""
-    settings = _in_floats(text)
-    if names:
-        settings = replaced(settings, dict(zip(_split(names), values, strict=True)))
-    renderer = _renderer(number, image)
-    images = _batch(image)
-    if mask is None and emission is None and len(images) > 1:
+    settings = _in_floats(call.settings)
+    if call.names:
+        settings = replaced(settings, call.fields)
+    renderer, images = _renderer(call.renderer, call.image), _batch(call.image)
+    if call.mask is None and call.emission is None and len(images) > 1:
         frames = renderer.map(images, settings, framebuffers="final")
     else:
         masks, emissions = (
             [None] * len(images)
             if tensor is None
             else tensor.detach().reshape(-1, *tensor.shape[-sides:])
-            for tensor, sides in ((mask, 2), (emission, 3))
+            for tensor, sides in ((call.mask, 2), (call.emission, 3))
         )
         frames = (
             renderer.apply(
@@ -272,7 +271,7 @@ def _on_device(  # noqa: PLR0917
         )
     # The images of a batch are in the same memory.
     batches = merged([cast("DeviceArray", tensor["final"]) for tensor in frames])
-    return _joined([torch.from_dlpack(tensor) for tensor in batches], image, torch.cat)
+    return _joined([torch.from_dlpack(tensor) for tensor in batches], call.image, torch.cat)
 
 
 def _dtype(tensor: Any) -> Any:
@@ -280,42 +279,28 @@ def _dtype(tensor: Any) -> Any:
 
 
 @_bloom.register_fake  # type: ignore[untyped-decorator]
-def _(  # noqa: PLR0917
-    image: Any, mask: Any, emission: Any, values: Any, names: str, settings: str, renderer: int
-) -> Any:
+def _(image: Any, *rest: Any) -> Any:
     return torch.empty(image.shape, dtype=image.dtype, device=image.device)
 
 
 @_operator("vkbloom::bloom_backward", "Tensor cotangent, ", "Tensor[]")  # type: ignore[untyped-decorator]
-def _backward(  # noqa: PLR0917
-    cotangent: Any,
-    image: Any,
-    mask: Any,
-    emission: Any,
-    values: Sequence[Any],
-    names: str,
-    settings: str,
-    renderer: int,
-) -> list[Any]:
+def _backward(cotangent: Any, *given: Any) -> list[Any]:
     """Return the derivatives by the image, those of mask and emission that are there, and values.
 
     Of a batch, the derivatives by values are added.
     """
-    refuse_capture(image)
-    inputs = {"image": image, "mask": mask, "emission": emission}
-    images = {name: part for name, part in inputs.items() if part is not None}
-    fields = dict(zip(_split(names), values, strict=True))
+    call = _Call(*given)
+    refuse_capture(call.image)
+    images, fields = call.images, call.fields
     derivatives: dict[str, list[Any]] = {name: [] for name in (*images, *fields)}
     # An empty batch has nothing to take to the device.
-    on_device = image.is_cuda and image.dtype != torch.float64 and image.numel() > 0
-    if on_device:
-        chosen = replaced(_settings(settings), fields)
-        pulled = _pulled_on_device(cotangent, image, mask, emission, chosen, renderer)
+    if call.on_device and call.image.numel() > 0:
+        pulled = _pulled_on_device(call, cotangent)
     else:
         wanted = cotangent.detach().cpu().numpy()
         pulled = (
-            _pulled(arrays, chosen, renderer, wanted[index])
-            for index, arrays, chosen in _each(image, mask, emission, values, names, settings)
+            _pulled(arrays, chosen, call.renderer, wanted[index])
+            for index, arrays, chosen in call.each()
         )
     for gradients in pulled:
         for name, parts in derivatives.items():
@@ -345,18 +330,12 @@ def _joined(parts: list[Any], like: Any, join: Any = None) -> Any:
 
 
 @_backward.register_fake  # type: ignore[untyped-decorator]
-def _(  # noqa: PLR0917
-    cotangent: Any,
-    image: Any,
-    mask: Any,
-    emission: Any,
-    values: Any,
-    names: str,
-    settings: str,
-    renderer: int,
-) -> Any:
-    parts = [part for part in (image, mask, emission, *values) if part is not None]
-    return [torch.empty(part.shape, dtype=part.dtype, device=part.device) for part in parts]
+def _(cotangent: Any, *given: Any) -> Any:
+    call = _Call(*given)
+    return [
+        torch.empty(part.shape, dtype=part.dtype, device=part.device)
+        for part in (*call.images.values(), *call.values)
+    ]
 
 
 def _keep(ctx: Any, inputs: tuple[Any, ...], output: Any) -> None:

@@ -1,4 +1,4 @@
-"""The axes of a grid: a settings field, time or images, with their values and attributes."""
+"""The axes of a grid: a settings field or time, with their values and attributes."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from vkbloom._settings.registry import presets
 from vkbloom._settings.settings import Settings, check_settings, field_info
 from vkbloom._suggestions import did_you_mean
 
-Kind = Literal["settings", "time", "image", "preset"]
+Kind = Literal["settings", "time", "preset"]
 
 #: Axes whose values are settings of any methods, on which the other axes' fields are changed.
 WHOLE: Final = ("preset", "settings")
@@ -27,9 +27,9 @@ _TIME_DESCRIPTION = "Time of the animation; its period is 1"
 
 @dataclass(frozen=True)
 class Axis:
-    """One axis of a grid: a settings field, "time", "image", "preset" or "settings".
+    """One axis of a grid: a settings field, "time", "preset" or "settings".
 
-    - `values`: As the settings store them; labels of images, names of presets.
+    - `values`: As the settings store them; names of presets.
     - `kind`: The axis "settings" has the kind "preset": its values are settings of any methods.
     - `unit`: "1" for a number without a unit.
     """
@@ -158,8 +158,3 @@ def read_axes(
 def settings_of(axis: Axis) -> tuple[Settings, ...]:
     """Return the settings at each value of an axis of presets or settings."""
     return tuple(presets[value] if axis.name == "preset" else value for value in axis.values)
-
-
-def image_axis(labels: tuple[Any, ...]) -> Axis:
-    """Return the axis of a list of images."""
-    return Axis("image", labels, "image", "", "The image that bloom is added to")

@@ -10,9 +10,16 @@ from typing import Any
 
 from vkbloom._argument_types import checked
 from vkbloom._grid.axes import Axis
-from vkbloom._grid.chunks import DONE, METADATA, MISSING, Chunks
 from vkbloom._grid.order import Block, blocks
-from vkbloom._grid.store import checked_identity, folder_of, is_empty
+from vkbloom._grid.store import (
+    DONE,
+    METADATA,
+    MISSING,
+    Chunks,
+    checked_identity,
+    folder_of,
+    is_empty,
+)
 
 
 @dataclass(frozen=True)

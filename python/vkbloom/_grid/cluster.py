@@ -1,7 +1,7 @@
 """Render blocks of points on the workers of a Dask cluster.
 
-Workers write the frames that they render and return only tallies. A task is a run of neighbouring
-blocks, so that its points share passes.
+Workers write the frames that they render and return only numbers of points. A task is a run of
+neighbouring blocks, so that its points share passes.
 """
 
 from __future__ import annotations
@@ -15,12 +15,10 @@ from typing import Any, Final, TypeAlias
 
 from vkbloom._checks import import_extra
 from vkbloom._core import Error
-from vkbloom._grid.chunks import Chunks
-from vkbloom._grid.filling import Filler, Tally
+from vkbloom._grid.filling import Count, Filler
 from vkbloom._grid.layout import Grid, Layout, lay_out, origin
 from vkbloom._grid.order import Block
-from vkbloom._grid.progress import Progress
-from vkbloom._grid.store import GridStore
+from vkbloom._grid.store import Chunks, GridStore
 from vkbloom._renderer.default import renderer_on
 from vkbloom._renderer.renderer import Renderer
 
@@ -66,13 +64,14 @@ def _refusal(renderer: Renderer, layout: Layout) -> str:
     return ""
 
 
-def _render(run: _Run, grid: Grid) -> Tally | str:
+def _render(run: _Run, grid: Grid) -> int | str:
     """Render and write a run's blocks; called in a worker. Text: why this worker may not."""
     renderer = renderer_on(run.adapter)
     # Returned and not raised, since Dask would repeat the task, perhaps on another worker.
     if refusal := _refusal(renderer, run.layout):
         return refusal
-    return Filler(grid, run.layout, renderer).store(run.blocks, run.chunks)
+    Filler(grid, run.layout, renderer).store(run.blocks, run.chunks)
+    return sum(block.count for block in run.blocks)
 
 
 def check_client(client: Any) -> None:
@@ -114,9 +113,7 @@ def _runs(todo: Iterable[Block], layout: Layout, points: int) -> Iterator[tuple[
         yield tuple(run)
 
 
-def run_there(
-    client: Client, shared: Future, store: GridStore, adapter: str, progress: Progress
-) -> None:
+def run_there(client: Client, shared: Future, store: GridStore, adapter: str, count: Count) -> None:
     """Render missing blocks on the workers of a cluster."""
     distributed = import_extra("distributed", "grid", _PURPOSE)
     missing = sum(block.count for block in store.missing)
@@ -127,10 +124,10 @@ def run_there(
     ]
     futures = client.map(_render, runs, grid=shared, pure=False, retries=_RETRIES)
     try:
-        for _, tally in distributed.as_completed(futures, with_results=True):
-            if isinstance(tally, str):
-                raise ValueError(tally)
-            progress.add(tally)
+        for _, result in distributed.as_completed(futures, with_results=True):
+            if isinstance(result, str):
+                raise ValueError(result)
+            count(result)
     except distributed.KilledWorker as error:
         raise Error(f"client: too many workers died: {error}") from error
     finally:

@@ -3,96 +3,102 @@
 from __future__ import annotations
 
 import functools
+import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
+from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom._background_writer import written_in_background
-from vkbloom._grid.chunks import Chunks
+from vkbloom._checks import import_extra
 from vkbloom._grid.layout import Grid, Layout, checked_value
 from vkbloom._grid.order import Block, Index, points
 from vkbloom._grid.sources import visit
+from vkbloom._grid.store import Chunks
 from vkbloom._renderer.frames import Frames
 from vkbloom._renderer.renderer import Renderer
 
-
-@dataclass
-class Tally:
-    """Number of points, and of the passes that ran."""
-
-    points: int = 0
-    ran: int = 0
-
-    def add(self, other: Tally) -> None:
-        """Add another tally."""
-        self.points += other.points
-        self.ran += other.ran
+#: Is called with the number of points that are done.
+Count = Callable[[int], object]
 
 
+def _ignored(points: int) -> None:
+    """Count nothing."""
+
+
+@dataclass(frozen=True, eq=False)
 class Filler:
     """Renders points of one grid on one renderer."""
 
-    def __init__(self, grid: Grid, layout: Layout, renderer: Renderer) -> None:
-        self._grid = grid
-        self._layout = layout
-        self._renderer = renderer
+    grid: Grid
+    layout: Layout
+    renderer: Renderer
+    count: Count = _ignored
 
-    def fill(
-        self,
-        block: Block,
-        arrays: Mapping[str, NDArray[Any]],
-        on_point: Callable[[Tally], object] = lambda tally: None,
-    ) -> Tally:
+    def fill(self, block: Block, arrays: Mapping[str, NDArray[Any]]) -> None:
         """Render the points of a block."""
-        grid, total = self._grid, Tally()
-        path = map(grid.point, points(block, self._layout.ranking))
-        for index, frames in visit(self._renderer, grid.source, path, grid.wanted):
+        grid = self.grid
+        path = map(grid.point, points(block, self.layout.ranking))
+        for index, frames in visit(self.renderer, grid.source, path, grid.wanted):
             inside = tuple(i - start for i, start in zip(index, block.start, strict=True))
             for name, array in arrays.items():
-                self._put(name, index, frames, array, inside)
-            count = Tally(1, len(frames.timings))
-            total.add(count)
-            on_point(count)
-        return total
+                array[inside] = self._value(name, index, frames)
+            self.count(1)
 
-    def _put(
-        self, name: str, index: Index, frames: Frames, array: NDArray[Any], inside: Index
-    ) -> None:
-        variable = self._layout.variables[name]
-        reduction = self._grid.reduce.get(name)
+    def _value(self, name: str, index: Index, frames: Frames) -> NDArray[Any]:
+        variable = self.layout.variables[name]
+        reduction = self.grid.reduce.get(name)
         value = frames[name] if reduction is None else checked_value(name, reduction(frames))
         if value.shape != variable.shape or not np.can_cast(
             value.dtype, variable.dtype, "same_kind"
         ):
             raise ValueError(
-                f"{name}: {value.shape} {value.dtype} at {self._grid.named(index)} is not "
+                f"{name}: {value.shape} {value.dtype} at {self.grid.named(index)} is not "
                 f"{variable.shape} {variable.dtype} as at the grid's first point"
             )
-        array[inside] = value
+        return value
 
-    def store(
-        self,
-        todo: Iterable[Block],
-        chunks: Chunks,
-        on_point: Callable[[Tally], object] = lambda tally: None,
-    ) -> Tally:
+    def store(self, todo: Iterable[Block], chunks: Chunks) -> None:
         """Render blocks, and write each while the next one is rendered."""
-        total = Tally()
 
-        def made() -> Iterator[tuple[Tally, Callable[[], None]]]:
+        def made() -> Iterator[tuple[None, Callable[[], None]]]:
             for block in todo:
                 arrays = {
                     name: np.empty((*block.shape, *variable.shape), variable.dtype)
-                    for name, variable in self._layout.variables.items()
+                    for name, variable in self.layout.variables.items()
                 }
-                yield (
-                    self.fill(block, arrays, on_point),
-                    functools.partial(chunks.write, block, arrays),
-                )
+                self.fill(block, arrays)
+                yield None, functools.partial(chunks.write, block, arrays)
 
-        for tally in written_in_background(made()):
-            total.add(tally)
-        return total
+        for _ in written_in_background(made()):
+            pass
+
+
+def _is_watched() -> bool:
+    """Return whether standard error is a terminal, or this process a notebook's kernel."""
+    if sys.stderr is not None and sys.stderr.isatty():
+        return True
+    kernel = sys.modules.get("IPython")
+    shell = kernel.get_ipython() if kernel else None
+    return shell is not None and "IPKernelApp" in shell.config
+
+
+@contextmanager
+def progress_bar(total: int, done: int = 0, *, shown: bool | None = None) -> Iterator[Count]:
+    """Yield a function that counts points, and show them in a terminal or a notebook.
+
+    - `total`: Number of points of the grid.
+    - `done`: Number of points that were done before.
+    - `shown`: None: if tqdm is installed.
+    """
+    if shown is False or (shown is None and find_spec("tqdm") is None):
+        yield _ignored
+        return
+    tqdm = import_extra("tqdm.auto", "grid", "A progress bar").tqdm
+    hidden = not _is_watched()
+    with tqdm(total=total, initial=done, unit="point", mininterval=0.2, disable=hidden) as bar:
+        yield bar.update

@@ -2,25 +2,25 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
+import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom._argument_types import checked
 from vkbloom._checks import check_index, import_extra
+from vkbloom._free_memory import memory_left
 from vkbloom._grid import cluster
-from vkbloom._grid.filling import Filler, Tally
-from vkbloom._grid.identity import chunk_in
-from vkbloom._grid.layout import Grid, Layout, ask, lay_out
-from vkbloom._grid.memory import chunk_of, in_memory
-from vkbloom._grid.order import Index, read_part
-from vkbloom._grid.progress import Progress
+from vkbloom._grid.filling import Filler, progress_bar
+from vkbloom._grid.layout import Grid, Layout, Variable, ask, lay_out, made_dataset
+from vkbloom._grid.order import Block, Index, default_chunk, read_part
 from vkbloom._grid.sources import ImageSource
-from vkbloom._grid.store import IDENTITY, GridStore, folder_of, prepare, stored_identity
+from vkbloom._grid.store import IDENTITY, GridStore, chunk_in, folder_of, prepare, stored_identity
 from vkbloom._renderer.default import default_renderer
 from vkbloom._renderer.frames import Frames
 from vkbloom._renderer.image import Image
@@ -37,11 +37,7 @@ if TYPE_CHECKING:
 
 @checked
 def grid(
-    source: Scene
-    | NDArray[Any]
-    | Image
-    | Sequence[NDArray[Any] | Image]
-    | Mapping[str, NDArray[Any] | Image],
+    source: Scene | NDArray[Any] | Image,
     settings: Settings | str | None = None,
     axes: Mapping[str, Iterable[Any]] | None = None,
     *,
@@ -63,10 +59,9 @@ def grid(
 
     Parameters
     ----------
-    source : Scene, image, or list or mapping of images
-        Several images add the dimension "image" before all others, with a mapping's keys as
-        labels. They must have the same shape and dtype. Uploaded images have their mask and
-        emission; they belong to one renderer, so they have no store that a cluster fills.
+    source : Scene or image
+        An uploaded image has its mask and emission; it belongs to one renderer, so it has no store
+        that a cluster fills.
     settings : Settings or str, optional
         The settings that the axes change, or the name of a preset. Default:
         ``presets["bevy_natural"]`` for images, ``presets["tutorial"]`` for a scene.
@@ -118,8 +113,7 @@ def grid(
     xarray.Dataset
         One dimension for each axis, in the given order, then "y", "x" and "channel"; one variable
         for each framebuffer and each reduction. The attributes have the remaining settings (as
-        JSON), the adapter, the driver, the version and the number of passes that ran
-        ("passes_run"). A store is opened lazily.
+        JSON), the adapter, the driver and the version. A store is opened lazily.
 
     Raises
     ------
@@ -170,7 +164,7 @@ def grid(
     )
     with ExitStack() as stack:
         if client is None and adapter is not None:
-            renderer = stack.enter_context(opened_renderer(adapter, False))
+            renderer = stack.enter_context(opened_renderer(adapter))
         if folder is None:
             return in_memory(asked, renderer or default_renderer(), progress)
         numbers = read_part(part)
@@ -181,54 +175,36 @@ def grid(
             return prepare(folder, asked, layout, chunk, numbers, resume=resume)
 
         if client is not None:
-            tally = _filled_there(asked, prepared, client, adapter or "auto", progress)
+            _fill_there(asked, prepared, client, adapter or "auto", progress)
         else:
-            tally = _filled_here(asked, prepared, renderer or default_renderer(), progress)
+            renderer = renderer or default_renderer()
+            stored = prepared(lay_out(asked, renderer))
+            with progress_bar(stored.total, stored.done, shown=progress) as count:
+                filler = Filler(asked, stored.layout, renderer, count)
+                filler.store(stored.missing, stored.chunks)
     dataset: xarray.Dataset = xr.open_zarr(folder)
     dataset.attrs.pop(IDENTITY, None)
-    return dataset.assign_attrs(passes_run=tally.ran)
+    return dataset
 
 
-def _filled_here(
-    asked: Grid, prepared: Callable[[Layout], GridStore], renderer: Renderer, progress: bool | None
-) -> Tally:
-    """Render the points of a store that are not done."""
-    store = prepared(lay_out(asked, renderer))
-    with _progress(store, progress) as shown:
-        Filler(asked, store.layout, renderer).store(store.missing, store.chunks, shown.add)
-    return shown.tally
-
-
-def _filled_there(
+def _fill_there(
     asked: Grid,
     prepared: Callable[[Layout], GridStore],
     client: Client,
     adapter: str,
     progress: bool | None,
-) -> Tally:
+) -> None:
     """Let the workers of a cluster render the points of a store that are not done."""
     cluster.check_client(client)
     shared = cluster.shared_grid(client, asked)
     store = prepared(cluster.lay_out_there(client, shared, adapter))
-    with _progress(store, progress) as shown:
-        cluster.run_there(client, shared, store, adapter, shown)
-    return shown.tally
-
-
-def _progress(store: GridStore, shown: bool | None) -> Progress:
-    progress = Progress(store.total, store.done, shown=shown)
-    if store.missing:
-        progress.add(Tally(ran=store.layout.ran))
-    return progress
+    with progress_bar(store.total, store.done, shown=progress) as count:
+        cluster.run_there(client, shared, store, adapter, count)
 
 
 def _check_stored(grid: Grid, chunks: Mapping[str, int] | None, *, is_shared: bool) -> None:
     """Raise TypeError or ValueError for a grid that cannot be stored, or not by workers."""
-    if (
-        is_shared
-        and isinstance(grid.source, ImageSource)
-        and any(isinstance(image, Image) for image in grid.source.images)
-    ):
+    if is_shared and isinstance(grid.source, ImageSource) and isinstance(grid.source.image, Image):
         raise TypeError("source: an uploaded image belongs to one renderer; give the array itself")
     names = [axis.name for axis in grid.axes]
     if "done" in names:
@@ -250,3 +226,49 @@ def _chunk(
         held = None if stored is None else chunk_in(stored, grid.shape)
         return chunk_of(grid, layout, parts) if held is None else held
     return tuple(min(int(chunks.get(axis.name, 1)), len(axis)) for axis in grid.axes)
+
+
+#: Limits of a block: large enough for an efficient file, small enough to render again if lost.
+BLOCK_BYTES = 1 << 20
+BLOCK_POINTS = 1024
+# A grid may take all free memory but this part of its own size.
+_MARGIN = 10
+
+
+def chunk_of(grid: Grid, layout: Layout, parts: int = 1) -> tuple[int, ...]:
+    """Return the number of points per block along each axis, with a block for each part."""
+    most = min(
+        BLOCK_POINTS, math.prod(grid.shape) // parts, BLOCK_BYTES // max(layout.point_size, 1)
+    )
+    return default_chunk(grid.shape, layout.ranking, max(most, 1))
+
+
+def check_fits(grid: Grid, variables: Mapping[str, Variable]) -> None:
+    """Raise MemoryError for a grid that does not fit into the free memory."""
+    points = math.prod(grid.shape)
+    size = points * sum(variable.size for variable in variables.values())
+    left = memory_left()
+    # NumPy, the device and the results that are reduced need memory, too.
+    if left is not None and size + size // _MARGIN > left:
+        raise MemoryError(
+            f"a grid of {points} points with {', '.join(variables)} needs {_gigabytes(size)} of "
+            f"memory and a tenth as reserve, but {_gigabytes(left)} are free; write a store with "
+            "grid, or keep only the figures of reduce with framebuffers=()"
+        )
+
+
+def _gigabytes(size: int) -> str:
+    return f"{size / 1e9:,.1f} GB"
+
+
+def in_memory(grid: Grid, renderer: Renderer, progress: bool | None) -> xarray.Dataset:
+    """Render a grid into a Dataset."""
+    layout = lay_out(grid, renderer, lambda variables: check_fits(grid, variables))
+    shape = grid.shape
+    arrays = {
+        name: np.empty((*shape, *variable.shape), variable.dtype)
+        for name, variable in layout.variables.items()
+    }
+    with progress_bar(math.prod(shape), shown=progress) as count:
+        Filler(grid, layout, renderer, count).fill(Block((0,) * len(shape), shape), arrays)
+    return made_dataset(grid, layout, arrays)

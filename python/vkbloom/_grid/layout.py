@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from vkbloom import _core
 from vkbloom._checks import check_framebuffers, import_extra
 from vkbloom._framebuffers import dimensions, leading
-from vkbloom._grid.axes import Axis, image_axis, read_axes, settings_of
+from vkbloom._grid.axes import Axis, read_axes, settings_of
 from vkbloom._grid.order import Index, ranking_of, walk
 from vkbloom._grid.sources import Point, Source, read_source, visit
 from vkbloom._renderer.frames import Frames
@@ -64,7 +64,7 @@ class Grid:
 
     def point(self, index: Index) -> Point:
         """Return the point at an index."""
-        entry = self.source.entry
+        time = self.source.time
         base = self.settings
         changes = {}
         for axis, number in zip(self.axes, index, strict=True):
@@ -73,8 +73,8 @@ class Grid:
             elif axis.kind == "settings":
                 changes[axis.name] = axis.values[number]
             else:
-                entry = number if axis.kind == "image" else axis.values[number]
-        return Point(index, base.replace(**changes) if changes else base, entry)
+                time = axis.values[number]
+        return Point(index, base.replace(**changes) if changes else base, time)
 
     def named(self, index: Index) -> str:
         """Return a point's axis values as text for messages."""
@@ -111,13 +111,11 @@ class Layout:
 
     - `ranking`: The axes from the slowest to the fastest.
     - `coordinates`: Coordinates of dimensions that are not axes.
-    - `ran`: Passes that ran to learn the shapes and dtypes of the reductions.
     """
 
     ranking: tuple[int, ...]
     variables: Mapping[str, Variable]
     coordinates: Mapping[str, tuple[NDArray[Any], Mapping[str, str]]]
-    ran: int
     adapter: str
     driver: str
     version: str
@@ -144,11 +142,7 @@ def ask(
         settings = check_settings(settings)
     checked = read_source(source, size, shading, time)
     grid_axes = read_axes(settings, {} if axes is None else axes, has_time=checked.has_time)
-    if checked.labels:
-        grid_axes = (image_axis(checked.labels), *grid_axes)
     names = check_framebuffers(framebuffers)
-    if reduce is not None and not isinstance(reduce, Mapping):
-        raise TypeError(f"reduce: {reduce!r} is not a mapping of names to callables")
     reductions = {} if reduce is None else dict(reduce)
     taken = {"y", "x", "channel", "done", *(axis.name for axis in grid_axes), *(names or ())}
     for name, reduction in reductions.items():
@@ -180,21 +174,15 @@ def lay_out(
         if len(variable.dims) == 3:
             labels = np.array(_CHANNELS[: variable.shape[2]])
             coordinates[variable.dims[2]] = (labels, {"long_name": "channel"})
-    ran = 0
     if grid.reduce:
         sample = _sample(grid, renderer)
-        ran = len(sample.timings)
         for name, reduction in grid.reduce.items():
             value = checked_value(name, reduction(sample))
             dims = tuple(f"{name}_dim_{number}" for number in range(value.ndim))
             attributes = {"long_name": name, "units": "1"}
             variables[name] = Variable(dims, value.shape, value.dtype, attributes)
     return Layout(
-        ranking=ranking(grid),
-        variables=variables,
-        coordinates=coordinates,
-        ran=ran,
-        **origin(renderer),
+        ranking=ranking(grid), variables=variables, coordinates=coordinates, **origin(renderer)
     )
 
 
@@ -231,16 +219,15 @@ def ranking(grid: Grid) -> tuple[int, ...]:
 def _planned(grid: Grid, path: list[Index]) -> tuple[tuple[_core.Source, _core.Plan], ...]:
     """Return the points of a path with plans for all framebuffers, so that no pass is fused."""
     points = [grid.point(index) for index in path]
-    sources = {entry: grid.source.for_core(entry) for entry in {point.entry for point in points}}
+    sources = {time: grid.source.for_core(time) for time in {point.time for point in points}}
     return tuple(
-        (sources[point.entry], _core.plan(sources[point.entry], point.settings, None))
+        (sources[point.time], _core.plan(sources[point.time], point.settings, None))
         for point in points
     )
 
 
 def _framebuffers_at(grid: Grid, renderer: Renderer, index: Index) -> Mapping[str, Framebuffer]:
-    point = grid.point(index)
-    return grid.source.plan(renderer, point.settings, point.entry).framebuffers
+    return grid.source.plan(renderer, grid.point(index).settings).framebuffers
 
 
 def _survey(grid: Grid, renderer: Renderer) -> Mapping[str, Framebuffer]:
@@ -292,9 +279,7 @@ def _common(first: Framebuffer | None, second: Framebuffer | None) -> Framebuffe
 
 
 def _refuse(
-    grid: Grid,
-    name: str,
-    *points: tuple[Index, tuple[tuple[int, ...], np.dtype[Any]] | None],
+    grid: Grid, name: str, *points: tuple[Index, tuple[tuple[int, ...], np.dtype[Any]] | None]
 ) -> None:
     """Raise ValueError for a framebuffer that is not the same at two points."""
     (first, _), (second, _) = points
@@ -311,9 +296,7 @@ def _refuse(
     )
 
 
-def _frame_variables(
-    framebuffers: Mapping[str, Framebuffer],
-) -> dict[str, Variable]:
+def _frame_variables(framebuffers: Mapping[str, Framebuffer]) -> dict[str, Variable]:
     if not framebuffers:
         return {}
     # Only the shapes are used. Memory that is never touched costs nothing.

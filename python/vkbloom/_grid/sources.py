@@ -1,4 +1,4 @@
-"""The source of a grid: a scene, an image or several images."""
+"""The source of a grid: a scene or an image."""
 
 from __future__ import annotations
 
@@ -6,25 +6,20 @@ import dataclasses
 import functools
 import hashlib
 from collections import deque
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
 
 import numpy as np
 
 from vkbloom import _core
-from vkbloom._checks import (
-    check_framebuffers,
-    check_image,
-    check_size,
-    check_time,
-)
+from vkbloom._checks import check_framebuffers, check_image, check_size, check_time
 from vkbloom._grid.order import Index
 from vkbloom._renderer.device_arrays import ImportedArray
 from vkbloom._renderer.frames import Frames
 from vkbloom._renderer.image import Image
 from vkbloom._renderer.renderer import Renderer
-from vkbloom._renderer.requests import IMAGES_AHEAD, Request
+from vkbloom._renderer.requests import Request
 from vkbloom._renderer.sources import SCENE_SIZE, image_source, is_image, scene_source
 from vkbloom._scene import Scene
 from vkbloom._settings.settings import Settings, check_shading
@@ -39,11 +34,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Point:
-    """A point of a grid: its index, its settings, and the image's number or the time."""
+    """A point of a grid: its index, its settings and the time."""
 
     index: Index
     settings: Settings
-    entry: float
+    time: float
 
 
 def visit(
@@ -58,56 +53,49 @@ def visit(
     def work() -> Iterator[Request]:
         for point in points:
             drawn.append(point.index)
-            yield Request(source.on(renderer, point.entry), point.settings)
+            yield Request(source.on(renderer, point.time), point.settings)
 
     for frames in renderer._run_requests(work(), check_framebuffers(framebuffers)):
         yield drawn.popleft(), frames
 
 
+@dataclass(eq=False)
 class ImageSource:
-    """One image, or several images of the same shape."""
+    """An image."""
 
-    has_time = False
-    #: The place of points without an image axis.
-    entry = 0.0
+    has_time: ClassVar = False
+    time: ClassVar = 0.0
 
-    def __init__(
-        self, images: Sequence[NDArray[Any] | Image], labels: tuple[Any, ...] = ()
-    ) -> None:
-        self.images = tuple(images)
-        self.labels = labels
-        #: Images on a renderer's device by place, the latest last.
-        self._uploaded: tuple[_core.Renderer | None, dict[int, _core.Source]] = None, {}
+    image: NDArray[Any] | Image
+    _uploaded: tuple[_core.Renderer, _core.Source] | None = dataclasses.field(
+        default=None, init=False
+    )
 
     def __reduce__(self) -> tuple[Any, ...]:
         # The device is not sent to other processes.
-        return type(self), (self.images, self.labels)
+        return type(self), (self.image,)
 
-    def on(self, renderer: Renderer, entry: float) -> _core.Source:
-        """Return an image on a renderer's device. The latest images are kept there."""
-        image = self.images[int(entry)]
-        if isinstance(image, Image):
-            return self.for_core(entry)
-        core, held = self._uploaded
-        if core is not renderer._core:
-            core, held = self._uploaded = renderer._core, {}
-        if int(entry) not in held:
-            spare = held.pop(next(iter(held))) if len(held) == IMAGES_AHEAD else None
-            held[int(entry)] = core.upload(self.for_core(entry), spare, True)
-        return held[int(entry)]
+    def on(self, renderer: Renderer, time: float) -> _core.Source:
+        """Return the image on a renderer's device, where it is kept."""
+        if isinstance(self.image, Image):
+            return self.for_core(time)
+        if self._uploaded is None or self._uploaded[0] is not renderer._core:
+            core = renderer._core
+            self._uploaded = core, core.upload(self.for_core(time), None, True)
+        return self._uploaded[1]
 
-    def plan(self, renderer: Renderer, settings: Settings, entry: float) -> Plan:
-        """Return the plan of an image."""
-        return renderer.plan(self.images[int(entry)], settings)
+    def plan(self, renderer: Renderer, settings: Settings) -> Plan:
+        """Return the plan of the image."""
+        return renderer.plan(self.image, settings)
 
-    def for_core(self, entry: float) -> _core.Source:
-        """Return the core's Source of an image."""
-        return image_source(self.images[int(entry)])
+    def for_core(self, time: float) -> _core.Source:
+        """Return the core's Source of the image."""
+        return image_source(self.image)
 
     @functools.cached_property
     def description(self) -> dict[str, Any]:
-        """The identity of the source: shapes, dtypes and digests."""
-        return {"kind": "image", "images": list(map(_described, self.images))}
+        """The identity of the source: shape, dtype and digest."""
+        return {"kind": "image", "images": [_described(self.image)]}
 
 
 def _described(image: NDArray[Any] | Image) -> dict[str, Any]:
@@ -123,38 +111,35 @@ def _described(image: NDArray[Any] | Image) -> dict[str, Any]:
     }
 
 
+@dataclass(eq=False)
 class SceneSource:
     """A scene, rendered at one size in one shading."""
 
-    has_time = True
-    labels: tuple[Any, ...] = ()
+    has_time: ClassVar = True
 
-    def __init__(
-        self, scene: Scene, size: tuple[int, int], shading: Shading, time: float = 0.0
-    ) -> None:
-        self.scene = scene
-        self.size = size
-        self.shading: Shading = shading
-        self.entry = time
-        self._latest: tuple[float, _core.Source] | None = None
+    scene: Scene
+    size: tuple[int, int]
+    shading: Shading
+    time: float = 0.0
+    _latest: tuple[float, _core.Source] | None = dataclasses.field(default=None, init=False)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return type(self), (self.scene, self.size, self.shading, self.entry)
+        return type(self), (self.scene, self.size, self.shading, self.time)
 
-    def on(self, renderer: Renderer, entry: float) -> _core.Source:
+    def on(self, renderer: Renderer, time: float) -> _core.Source:
         """Return the scene at a time. The renderer keeps its data on the device."""
         # One object for each time, so that requests of the same time share submissions.
-        if self._latest is None or self._latest[0] != entry:
-            self._latest = entry, self.for_core(entry)
+        if self._latest is None or self._latest[0] != time:
+            self._latest = time, self.for_core(time)
         return self._latest[1]
 
-    def plan(self, renderer: Renderer, settings: Settings, entry: float) -> Plan:
+    def plan(self, renderer: Renderer, settings: Settings) -> Plan:
         """Return the plan of the scene."""
         return renderer.plan(self.scene, settings, self.size, shading=self.shading)
 
-    def for_core(self, entry: float) -> _core.Source:
+    def for_core(self, time: float) -> _core.Source:
         """Return the core's Source of the scene at a time."""
-        return scene_source(self.scene, self.size, self.shading, entry)
+        return scene_source(self.scene, self.size, self.shading, time)
 
     @functools.cached_property
     def description(self) -> dict[str, Any]:
@@ -164,19 +149,14 @@ class SceneSource:
             "sha256": digest(self.scene),
             "size": list(self.size),
             "shading": self.shading,
-            "time": self.entry,
+            "time": self.time,
         }
 
 
 Source: TypeAlias = ImageSource | SceneSource
 
 
-def read_source(
-    source: object,
-    size: tuple[int, int] | None,
-    shading: str,
-    time: float,
-) -> Source:
+def read_source(source: object, size: tuple[int, int] | None, shading: str, time: float) -> Source:
     """Check the source of a grid."""
     if isinstance(source, Scene):
         frame = check_size("size", size or SCENE_SIZE)
@@ -188,24 +168,9 @@ def read_source(
     ):
         if is_given:
             raise ValueError(f"{name}: the source is not a scene; leave the argument out")
-    if is_image(source):
-        return ImageSource([_checked(source)])
-    labels: list[Any]
-    if isinstance(source, Mapping):
-        images, labels = list(source.values()), [str(label) for label in source]
-    elif isinstance(source, list | tuple):
-        images, labels = list(source), list(range(len(source)))
-    else:
-        raise TypeError(
-            f"source: {type(source).__name__} is not a Scene, an image or a list of images"
-        )
-    if not images:
-        raise ValueError("source: the list of images is empty")
-    return ImageSource([_checked(image) for image in images], tuple(labels))
-
-
-def _checked(image: object) -> NDArray[Any] | Image:
-    return image if isinstance(image, Image) else check_image(image, "source")
+    if not is_image(source):
+        raise TypeError(f"source: {type(source).__name__} is not a Scene or an image")
+    return ImageSource(source if isinstance(source, Image) else check_image(source, "source"))
 
 
 def digest(value: object) -> str:

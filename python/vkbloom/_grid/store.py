@@ -18,17 +18,166 @@ from __future__ import annotations
 import json
 import os
 import warnings
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vkbloom._checks import import_extra
-from vkbloom._grid.chunks import DONE, METADATA, Chunks
-from vkbloom._grid.identity import FORMAT, differences, identity, short
 from vkbloom._grid.layout import Grid, Layout, Variable, made_dataset
 from vkbloom._grid.order import WHOLE, Block, Index, Part, blocks
+from vkbloom._settings.fields import plain_value
+
+#: Version of the store's layout. A store with another version cannot be read.
+FORMAT: Final = 3
+
+_LONGEST: Final = 60  # characters of a value in a message
+
+
+def identity(grid: Grid, layout: Layout, chunk: Index) -> dict[str, Any]:
+    """Return everything that determines the contents of a grid's arrays, as JSON values."""
+    facts = {
+        "format": FORMAT,
+        "version": layout.version,
+        "adapter": layout.adapter,
+        "driver": layout.driver,
+        "source": grid.source.description,
+        "settings": grid.remaining_settings,
+        "axes": {axis.name: [plain_value(value) for value in axis.values] for axis in grid.axes},
+        "order of axes": [axis.name for axis in grid.axes],
+        "variables": {
+            name: {"shape": variable.shape, "dtype": variable.dtype.name}
+            for name, variable in layout.variables.items()
+        },
+        "reduce": {name: _named(reduction) for name, reduction in grid.reduce.items()},
+        "chunk": chunk,
+    }
+    # The same conversion as by storing it in JSON, which turns tuples into lists.
+    plain: dict[str, Any] = json.loads(json.dumps(facts))
+    return plain
+
+
+def chunk_in(stored: Mapping[str, Any], shape: Index) -> Index | None:
+    """Return the chunk of a stored identity; None if it is not valid for the grid's shape.
+
+    The identity may be damaged, so any value is possible.
+    """
+    held = stored.get("chunk")
+    if stored.get("format") != FORMAT or not isinstance(held, list) or len(held) != len(shape):
+        return None
+    for count, size in zip(held, shape, strict=True):
+        if type(count) is not int or not 1 <= count <= max(size, 1):
+            return None
+    return tuple(held)
+
+
+def _named(reduction: Any) -> str:
+    kind = reduction if hasattr(reduction, "__qualname__") else type(reduction)
+    return f"{kind.__module__}.{kind.__qualname__}"
+
+
+def differences(stored: Mapping[str, Any], asked: Mapping[str, Any]) -> list[str]:
+    """List the differences between the grid in a store and the requested one."""
+    return list(_differences("", stored, asked))
+
+
+def _differences(name: str, stored: Any, asked: Any) -> Iterator[str]:
+    if isinstance(stored, Mapping) and isinstance(asked, Mapping):
+        for key in dict.fromkeys((*stored, *asked)):
+            inner = f"{name}.{key}" if name else key
+            if key not in stored:
+                yield f"{inner}: not in the store, {short(asked[key])} requested"
+            elif key not in asked:
+                yield f"{inner}: {short(stored[key])} in the store, not requested"
+            else:
+                yield from _differences(inner, stored[key], asked[key])
+    elif stored != asked:
+        yield f"{name}: {short(stored)} in the store, {short(asked)} requested"
+
+
+def short(value: Any) -> str:
+    """Return any JSON value as a short text for a message."""
+    text = json.dumps(value)
+    if len(text) <= _LONGEST:
+        return text
+    return f"{text[: _LONGEST - 20]} ... {text[-12:]}"
+
+
+DONE: Final = "done"
+METADATA: Final = "zarr.json"
+MISSING: Final = "missing"
+
+
+@dataclass
+class Chunks:
+    """Reads and writes blocks; it can be sent to the process that renders them.
+
+    `trailing` has the number of dimensions that are not axes, by variable; `chunk` has the number
+    of values per block, by axis.
+    """
+
+    folder: Path
+    trailing: Mapping[str, int]
+    chunk: Index
+    _opened: dict[str, Any] = field(default_factory=dict)
+
+    def _array(self, name: str) -> Any:
+        if name not in self._opened:
+            zarr = import_extra("zarr", "grid", "Grids on disk")
+            array = zarr.open_array(self.folder / name, mode="r+")
+            # Also write chunks of zeros: a missing key would look like a missing point.
+            self._opened[name] = array.with_config({"write_empty_chunks": True})
+        return self._opened[name]
+
+    def key(self, name: str, block: Block) -> str:
+        """Return the key of a block's chunk of a variable."""
+        numbers = (start // size for start, size in zip(block.start, self.chunk, strict=True))
+        # An array without dimensions has the key "c".
+        trailing = "0" * self.trailing.get(name, 0)
+        return f"{name}/" + ".".join(["c", *map(str, numbers), *trailing])
+
+    def write(self, block: Block, arrays: Mapping[str, NDArray[Any]]) -> None:
+        """Write a block's variables, then mark it as done."""
+        for name, values in {**arrays, DONE: np.True_}.items():
+            try:
+                self._array(name)[block.slices] = values
+            except OSError as error:
+                # A full disk names no file.
+                error.filename = error.filename or str(self.folder / name)
+                raise
+
+    def problem(self, name: str, block: Block) -> str | None:
+        """Return what is wrong with a block's chunk of a variable: it is missing or damaged."""
+        if not (self.folder / self.key(name, block)).exists():
+            return MISSING
+        return self._damage(name, block.slices)
+
+    def array_problem(self, name: str) -> str | None:
+        """Return what is wrong with an array's metadata, or with the values of a coordinate."""
+        is_coordinate = name not in (DONE, *self.trailing)
+        keys = [f"{name}/{METADATA}", *[f"{name}/c.0"] * is_coordinate]
+        for key in keys:
+            if not (self.folder / key).exists():
+                return f"{key} is missing"
+        damage = self._damage(name, (...,) if is_coordinate else None)
+        return f"{keys[-1]} is {damage}" if damage else None
+
+    def _damage(self, name: str, slices: tuple[Any, ...] | None) -> str | None:
+        """Return how a part of a variable is damaged; None: only its metadata are read."""
+        try:
+            array = self._array(name)
+            if slices is not None:
+                array[slices]
+        except MemoryError:
+            raise
+        except Exception as error:  # Zarr does not document what damaged metadata and chunks raise
+            text = str(error).partition(". ")[0].removesuffix(".") or type(error).__name__
+            return f"damaged ({text})"
+        return None
+
 
 IDENTITY: Final = "vkbloom_grid"
 

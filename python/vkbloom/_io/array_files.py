@@ -112,10 +112,7 @@ def read(
     subimage = check_index("subimage", subimage, -(2**31), 2**31 - 1)
     check_expansion(expand)
     stored = image_reading.load(path, subimage, layer)
-    try:
-        picture = image_reading.decode(stored, expand=expand)
-    except ValueError as error:
-        raise ValueError(f"{os.fspath(path)}: {error}") from error
+    picture = image_reading.decode_file(stored, os.fspath(path), expand=expand)
     pixels = picture.pixels
     has_alpha = pixels.shape[2] == 4
     if has_alpha and picture.stored.associated is not premultiplied:
@@ -234,8 +231,8 @@ def write(
     layout = image_writing.chosen_layout(
         oiio, picture, target, is_hdr=False, bits=bits if is_float else None
     )
-    if layout[0] != values.shape[2]:
-        raise ValueError(f"{target}: its format has no alpha; write array[..., :{layout[0]}]")
+    if (channels := layout[0].shape[2]) != values.shape[2]:
+        raise ValueError(f"{target}: its format has no alpha; write array[..., :{channels}]")
     if not is_float and layout[1] != numbers:
         raise ValueError(
             f"{target}: its format holds {layout[1]}, not {numbers}; write linear floats, as "

@@ -29,6 +29,8 @@ _JPEG_XL_BYTES: Final = 128
 _PNG_SIGNATURE: Final = b"\x89PNG\r\n\x1a\n"
 # The largest four-byte integer of PNG.
 _LARGEST_CHUNK: Final = 2**31 - 1
+# A gAMA chunk holds the exponent of the encoding times this number; 0 is no exponent.
+_GAMMA_SCALE: Final = 100_000
 # Metadata in bytes: a damaged file may claim more.
 _LARGEST_PACKET: Final = 1 << 24
 # The field types of TIFF 6.0 that are read: bytes, text, SHORT, LONG and undefined bytes.
@@ -100,6 +102,27 @@ def png_chunks(stream: BinaryIO, wanted: tuple[bytes, ...]) -> Iterator[tuple[by
         content = stream.read(size)
         is_whole = stream.read(4) == zlib.crc32(kind + content).to_bytes(4, "big")
         yield kind, content if is_whole else None
+
+
+def png_gamma(path: str | os.PathLike[str]) -> float | None:
+    """Return the exponent that decodes a PNG file's colours to light; None if none is stated.
+
+    OpenImageIO rounds it to one decimal place.
+
+    An sRGB chunk has precedence over a gAMA chunk (PNG, third edition, 4.3). Chunks that are
+    damaged, or that follow the palette or the pixels, are ignored.
+    """
+    stated = None
+    with open(path, "rb") as stream:
+        for kind, content in png_chunks(stream, (b"gAMA", b"sRGB")):
+            if kind in (b"PLTE", b"IDAT"):
+                break
+            if kind == b"sRGB" and content is not None:
+                return None
+            value = int.from_bytes(content or b"", "big")
+            if stated is None and len(content or b"") == 4 and 0 < value <= _LARGEST_CHUNK:
+                stated = _GAMMA_SCALE / value
+    return stated
 
 
 def tiff_field(stream: BinaryIO, tag: int, part: int = 0) -> NDArray[Any] | None:

@@ -14,7 +14,14 @@ import numpy as np
 from vkbloom._checks import import_extra
 from vkbloom._io.alpha import Meaning, channels_of, divided, in_order, light_of, meaning_of
 from vkbloom._io.colour import LAB, linear
-from vkbloom._io.containers import HEIF_ADVICE, is_heif, orientation_of, padded, upright
+from vkbloom._io.containers import (
+    HEIF_ADVICE,
+    is_heif,
+    orientation_of,
+    padded,
+    png_gamma,
+    upright,
+)
 from vkbloom._io.displayed import has_hdr_curve, of_code_points
 from vkbloom._io.expansion import expanded
 from vkbloom._io.images import (
@@ -29,7 +36,6 @@ from vkbloom._io.images import (
     is_kept,
     warnings_of,
 )
-from vkbloom._io.png_gamma import png_gamma
 
 if TYPE_CHECKING:
     import OpenImageIO
@@ -118,13 +124,12 @@ def load(path: str | os.PathLike[str], subimage: int = 0, layer: str | None = No
 def _read(
     reader: OpenImageIO.ImageInput, name: str, subimage: int, layer: str | None
 ) -> StoredImage:
-    subimage, spec = chosen_part(reader, name, subimage, layer)
-    stored_as = str(spec.format)
+    subimage, spec = _chosen_part(reader, name, subimage, layer)
     display = (spec.full_x, spec.full_y, spec.full_width, spec.full_height)
     left, top = min(spec.x, display[0]), min(spec.y, display[1])
     width, height = _covered(spec)
-    dtype = DTYPES[stored_as]
-    wanted = stored_as if stored_as != "double" else "float"
+    dtype = DTYPES[str(spec.format)]
+    wanted = str(spec.format) if str(spec.format) != "double" else "float"
     data = reader.read_image(subimage, 0, 0, spec.nchannels, wanted)
     notes = warnings_of(reader, name)
     pixels = np.asarray(complete(data, reader, name), dtype).reshape(
@@ -136,25 +141,47 @@ def _read(
         whole = np.zeros((height, width, spec.nchannels), dtype)
         whole[row : row + spec.height, column : column + spec.width] = pixels
         pixels = whole
-    described = describe(reader, name)
-    described = replace(described, pixels=pixels, notes=(*described.notes, *notes))
-    described = of_layer(described, spec, layer)
-    pixels = described.pixels
     orientation = spec.get_int_attribute("Orientation", 1)
     if orientation != 1:
         x, y = display[0] - left, display[1] - top
         pixels = upright(pixels[y : y + display[3], x : x + display[2]], orientation)
         left, top = 0, 0
         display = (0, 0, pixels.shape[1], pixels.shape[0])
-    return replace(
-        described,
-        pixels=np.ascontiguousarray(pixels),
+    kept = [index for index, part in enumerate(_layers(spec)) if layer in (None, part)]
+    space, gamma = _stated_curve(reader, spec, name)
+    kind, meaning = reader.format_name(), meaning_of(reader, spec, name)
+    names = [
+        "" if channel == "A" and meaning is Meaning.NONE else channel
+        for channel in channels_of(spec, kind)
+    ]
+    points, known = spec.getattribute("CICP"), points_of(spec)
+    if points is not None and known is None and points[1] != _UNSPECIFIED:
+        listed = " ".join(map(str, points))
+        notes.insert(0, f"the code points {listed} of its colours are not known, and are ignored")
+    stored = StoredImage(
+        pixels=np.ascontiguousarray(pixels if layer is None else pixels[:, :, kept]),
+        channels=tuple(names if layer is None else (names[i].rpartition(".")[2] for i in kept)),
+        numbers=tuple(str(spec.channelformat(index)) for index in kept),
         origin=(left, top),
         display=display,
+        associated=meaning is Meaning.MULTIPLIED,
+        space=space,
+        gamma=gamma,
+        attributes={
+            attribute.name: (attribute.type, attribute.value)
+            for attribute in spec.extra_attribs
+            if is_kept(attribute.name)
+        },
+        profile_name=spec.get_string_attribute("ICCProfile:profile_description"),
+        code_points=known,
+        is_ultra_hdr=_is_ultra_hdr(reader, spec),
+        notes=tuple(notes),
     )
+    # Last, since the reader goes to other parts.
+    return replace(stored, parts=tuple(_parts(reader)))
 
 
-def chosen_part(
+def _chosen_part(
     reader: OpenImageIO.ImageInput, name: str, subimage: int, layer: str | None
 ) -> tuple[int, OpenImageIO.ImageSpec]:
     """Make the part to read the current one, and return its number and what it is."""
@@ -195,55 +222,6 @@ def _covered(spec: OpenImageIO.ImageSpec) -> tuple[int, int]:
     right = max(spec.x + spec.width, spec.full_x + spec.full_width)
     bottom = max(spec.y + spec.height, spec.full_y + spec.full_height)
     return right - min(spec.x, spec.full_x), bottom - min(spec.y, spec.full_y)
-
-
-def of_layer(stored: StoredImage, spec: OpenImageIO.ImageSpec, layer: str | None) -> StoredImage:
-    """Return an image with a layer's channels alone, by their names in it; None: all."""
-    if layer is None:
-        return stored
-    chosen = [index for index, of in enumerate(_layers(spec)) if of == layer]
-    return replace(
-        stored,
-        pixels=stored.pixels[:, :, chosen],
-        channels=tuple(stored.channels[index].rpartition(".")[2] for index in chosen),
-        numbers=tuple(stored.numbers[index] for index in chosen),
-    )
-
-
-def describe(reader: OpenImageIO.ImageInput, name: str) -> StoredImage:
-    """Return the description of a file's current part; this may change the current part."""
-    notes = warnings_of(reader, name)
-    spec = reader.spec()
-    space, gamma = _stated_curve(reader, spec, name)
-    kind, meaning = reader.format_name(), meaning_of(reader, spec, name)
-    points, known = spec.getattribute("CICP"), points_of(spec)
-    if points is not None and known is None and points[1] != _UNSPECIFIED:
-        listed = " ".join(map(str, points))
-        notes.append(f"the code points {listed} of its colours are not known, and are ignored")
-    # Before the reader goes to other parts.
-    stored = StoredImage(
-        pixels=np.empty((0, 0, spec.nchannels), DTYPES[str(spec.format)]),
-        channels=tuple(
-            "" if channel == "A" and meaning is Meaning.NONE else channel
-            for channel in channels_of(spec, kind)
-        ),
-        numbers=tuple(str(spec.channelformat(index)) for index in range(spec.nchannels)),
-        origin=(spec.x, spec.y),
-        display=(spec.full_x, spec.full_y, spec.full_width, spec.full_height),
-        associated=meaning is Meaning.MULTIPLIED,
-        space=space,
-        gamma=gamma,
-        attributes={
-            attribute.name: (attribute.type, attribute.value)
-            for attribute in spec.extra_attribs
-            if is_kept(attribute.name)
-        },
-        profile_name=spec.get_string_attribute("ICCProfile:profile_description"),
-        code_points=known,
-        is_ultra_hdr=_is_ultra_hdr(reader, spec),
-        notes=tuple(notes),
-    )
-    return replace(stored, parts=tuple(_parts(reader)))
 
 
 def points_of(spec: OpenImageIO.ImageSpec) -> tuple[int, ...] | None:
@@ -332,13 +310,7 @@ def non_finite_note(nan: int, infinite: int) -> str | None:
     )
 
 
-def decode(
-    stored: StoredImage,
-    colour: Colour | None = None,
-    *,
-    expand: float | None = None,
-) -> Picture:
-    """Decode a stored image to a picture of linear values."""
+def _decoded(stored: StoredImage, colour: Colour | None, expand: float | None) -> Picture:
     chosen, left_out = _chosen_channels(stored.channels)
     values = stored.pixels[:, :, chosen]
     kinds = {stored.numbers[index] for index in chosen}
@@ -381,15 +353,11 @@ def decode(
 
 
 def decode_file(
-    stored: StoredImage,
-    file: str,
-    colour: Colour | None,
-    *,
-    expand: float | None = None,
+    stored: StoredImage, file: str, colour: Colour | None = None, *, expand: float | None = None
 ) -> Picture:
-    """Decode an image as `decode` does; a ValueError names the file."""
+    """Decode a stored image to a picture of linear values; a ValueError names the file."""
     try:
-        return decode(stored, colour, expand=expand)
+        return _decoded(stored, colour, expand)
     except ValueError as error:
         raise ValueError(f"{file}: {error}") from error
 

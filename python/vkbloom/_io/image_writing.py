@@ -43,6 +43,10 @@ BITS: Final[Mapping[int | None, tuple[str, ...]]] = {
 _LOSSY: Final = ("jpeg", "webp", "jpegxl")
 
 
+#: The values to write, with the file's channels, and the file's number type.
+Layout = tuple[NDArray[Any], str]
+
+
 class Part(NamedTuple):
     """Values to write unchanged, shape (H, W, C) with 1 to 4 channels, and what describes them."""
 
@@ -98,7 +102,7 @@ def save(
     quality: int | None = None,
     *,
     bits: int | None = None,
-    layout: tuple[int, str] | None = None,
+    layout: Layout | None = None,
 ) -> tuple[str, ...]:
     """Write a picture to a file, with its own number type or the closest one of the format.
 
@@ -118,42 +122,27 @@ def save(
     safe_writing.check_extension(oiio, target.suffix)
     check_quality(target, quality)
     added = {} if quality is None else {"CompressionQuality": quality}
-    picture = in_colour(picture, saved)
+    if saved.view is not None or saved.primaries != "rec709":
+        picture = dataclasses.replace(picture, grey=False)
     if layout is None:
         is_hdr = displayed.is_hdr(saved)
         layout = chosen_layout(oiio, picture, target, is_hdr=is_hdr, bits=bits)
-    values, described, notes = prepared(oiio, picture, layout, saved, target)
+    values, described, notes = _prepared(oiio, picture, layout, saved, target)
     part = Part(values, described, {**(attributes or {}), **added})
     with safe_writing.replacing(oiio, {target: values.nbytes}) as (temporary,):
         put(oiio, [part], temporary, target)
     return notes
 
 
-def in_colour(picture: Picture, saved: Saved) -> Picture:
-    """Return a grey picture with three channels, where a view or other primaries need them."""
-    needs_three = saved.view is not None or saved.primaries != "rec709"
-    return dataclasses.replace(picture, grey=False) if needs_three else picture
-
-
-def prepared(
-    oiio: ModuleType,
-    picture: Picture,
-    layout: tuple[int, str],
-    saved: Saved,
-    target: Path,
+def _prepared(
+    oiio: ModuleType, picture: Picture, layout: Layout, saved: Saved, target: Path
 ) -> tuple[NDArray[Any], Picture, tuple[str, ...]]:
     """Return the values to write in a layout, what describes them, and notes about losses."""
-    channels, numbers = layout
-    values = next(
-        layout_values
-        for layout_values in _layouts(picture, True)
-        if layout_values.shape[2] == channels
-    )
+    values, numbers = layout
     integer = numbers.startswith("uint")
-    has_alpha = channels in (2, 4)
-    notes = _losses(picture, target, values, has_alpha, integer)
+    notes = _losses(picture, target, values, integer)
     if picture.encoding is None:
-        return as_numbers(values, numbers), picture, tuple(notes)
+        return _as_numbers(values, numbers), picture, tuple(notes)
     what: tuple[str, str] | str = ("rec709", picture.encoding)
     is_shown = saved.view is not None or displayed.is_hdr(saved)
     if picture.encoding == "linear":
@@ -174,7 +163,7 @@ def prepared(
         # The settings made these colours, not the file's options.
         described = dataclasses.replace(picture, encoding=None)
         notes.append(str(error))
-    return as_numbers(values, numbers), described, tuple(notes)
+    return _as_numbers(values, numbers), described, tuple(notes)
 
 
 def _is_above_1(pixels: NDArray[Any]) -> bool:
@@ -200,7 +189,7 @@ def put(oiio: ModuleType, parts: Sequence[Part], temporary: Path, target: Path) 
     writer = oiio.ImageOutput.create(str(temporary))
     if not writer.supports("displaywindow"):
         parts = [part._replace(values=_displayed(part)) for part in parts]
-    specs = [spec_of(oiio, writer, part, target) for part in parts]
+    specs = [_spec_of(oiio, writer, part, target) for part in parts]
     is_written = True
     for index, (part, spec) in enumerate(zip(parts, specs, strict=True)):
         mode = ("AppendSubimage",) if index else ()
@@ -227,7 +216,7 @@ def _displayed(part: Part) -> NDArray[Any]:
     return part.values[row : row + height, column : column + width]
 
 
-def spec_of(
+def _spec_of(
     oiio: ModuleType, writer: OpenImageIO.ImageOutput, part: Part, target: Path
 ) -> OpenImageIO.ImageSpec:
     """Return OpenImageIO's description of a part."""
@@ -253,14 +242,9 @@ def spec_of(
 
 
 def chosen_layout(
-    oiio: ModuleType,
-    picture: Picture,
-    target: Path,
-    *,
-    is_hdr: bool,
-    bits: int | None,
-) -> tuple[int, str]:
-    """Return the closest number of channels and number type that the format supports."""
+    oiio: ModuleType, picture: Picture, target: Path, *, is_hdr: bool, bits: int | None
+) -> Layout:
+    """Return the closest channels and number type that the format supports."""
     wanted = _DEEP if is_hdr else _PREFERENCES[picture.numbers]
     if bits is not None:
         wanted = BITS[bits]
@@ -268,7 +252,7 @@ def chosen_layout(
     for values in _layouts(picture, safe_writing.has_alpha(writer)):
         for numbers in wanted:
             if safe_writing.holds(oiio, target.suffix, values.shape[2], numbers):
-                return values.shape[2], numbers
+                return values, numbers
     raise ValueError(
         f"{target}: {writer.format_name()} cannot hold {picture.pixels.shape[2]} channels of "
         f"{' or '.join(wanted)}; use another format, or other channels"
@@ -285,12 +269,10 @@ def _layouts(picture: Picture, with_alpha: bool) -> Iterator[NDArray[Any]]:
         yield from layouts
 
 
-def _losses(
-    picture: Picture, target: Path, values: NDArray[Any], has_alpha: bool, integer: bool
-) -> list[str]:
+def _losses(picture: Picture, target: Path, values: NDArray[Any], integer: bool) -> list[str]:
     """Return notes about information that the file loses or that readers interpret differently."""
     notes: list[str] = []
-    is_float = values.dtype.kind == "f"
+    is_float, has_alpha = values.dtype.kind == "f", values.shape[2] in (2, 4)
     if picture.pixels.shape[2] == 4:
         opaque = 1.0 if is_float else np.iinfo(values.dtype).max
         is_opaque = bool((picture.pixels[:, :, 3] == opaque).all())
@@ -309,7 +291,7 @@ def _losses(
     return notes
 
 
-def as_numbers(values: NDArray[Any], numbers: str) -> NDArray[Any]:
+def _as_numbers(values: NDArray[Any], numbers: str) -> NDArray[Any]:
     """Return values as numbers of a file; for integers 1 becomes the largest value."""
     dtype = DTYPES[numbers]
     if values.dtype.kind == "u":

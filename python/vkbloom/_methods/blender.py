@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import Any, ClassVar, Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom._core_kernel import CoreKernel
-from vkbloom._methods.blender_kernels import core_kernel_of, kernel_of, kernel_sides
+from vkbloom._core_kernel import WithKernel
+from vkbloom._methods.blender_kernels import kernel_of, kernel_sides
 from vkbloom._methods.convolution import PSFLike, read_psf
 from vkbloom._settings.blocks import settings_block
 from vkbloom._settings.fields import (
     choice_field,
     flag_field,
     number_field,
-    read_numbers,
+    numbers_field,
     value_field,
 )
 from vkbloom._settings.settings import BloomFormat, Composite, Settings, no_knee
@@ -26,16 +26,8 @@ Quality = Literal["high", "medium", "low"]
 Version = Literal["5.0", "5.2", "4.3"]
 
 
-def _read_tint(tint: Any) -> tuple[float, ...]:
-    return read_numbers("tint", tint, 3, 65504.0)
-
-
-def _read_position(position: Any) -> tuple[float, ...]:
-    return read_numbers("sun_position", position, 2, 16.0)
-
-
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class BlenderGlare(Settings):
+class BlenderGlare(WithKernel, Settings):
     """The Glare node of Blender 5.0, as its compositor runs it on a CPU.
 
     ``glow`` is the node's output Highlights, `intensity` times ``bloom`` its Glare, ``final`` its
@@ -135,6 +127,7 @@ class BlenderGlare(Settings):
     """
 
     method: ClassVar[str] = "blender"
+    shaping: ClassVar[tuple[str, ...]] = ("type", "quality", "version", "size", "kernel")
     published: ClassVar[bool] = True
     #: `glow` is the node's output Highlights.
     glow_note: ClassVar[str] = ""
@@ -151,7 +144,7 @@ class BlenderGlare(Settings):
     smoothness: float = number_field("smoothness")
     maximum: float | None = number_field("maximum", default=None, slider=(0, 20))
     saturation: float = number_field("saturation", slider=(0, 1))
-    tint: tuple[float, float, float] = value_field((1.0, 1.0, 1.0), read=_read_tint)
+    tint: tuple[float, float, float] = numbers_field((1.0, 1.0, 1.0))
     size: float = number_field("size", option="glare-size")
     streaks: int = number_field("streaks", option="glare-streaks")
     streaks_angle: float = number_field("streaks_angle", unit="degree")
@@ -159,7 +152,7 @@ class BlenderGlare(Settings):
     fade: float = number_field("fade")
     color_modulation: float = number_field("color_modulation")
     diagonal: bool = flag_field("diagonal")
-    sun_position: tuple[float, ...] = value_field((0.5, 0.5), read=_read_position)
+    sun_position: tuple[float, ...] = numbers_field((0.5, 0.5), -16.0, 16.0)
     jitter: float = number_field("jitter")
     kernel: PSFLike | None = value_field(None, kind="psf", read=read_psf)
     version: Version = choice_field("version", ("5.0", "5.2", "4.3"), option="blender-version")
@@ -172,9 +165,8 @@ class BlenderGlare(Settings):
         """Return the kernel of fog glow or of an image, (h, w, 3), with its point in the middle."""
         return kernel_of(self, buffers)
 
-    def core_kernel(self, frame: tuple[int, int], buffers: tuple[int, int]) -> CoreKernel:
-        """Return the kernel as the core reads it."""
-        return core_kernel_of(self, buffers)
+    def _kernel(self, frame: tuple[int, int], buffers: tuple[int, int]) -> NDArray[np.float64]:
+        return kernel_of(self, buffers)
 
     def core_kernel_size(self, frame: tuple[int, int], buffers: tuple[int, int]) -> tuple[int, int]:
         """Return the kernel's width and height, without the kernel."""

@@ -7,9 +7,6 @@ from typing import TYPE_CHECKING, Any, Final, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom._array_cache import kept
-from vkbloom._core_kernel import CoreKernel, core_kernel
-from vkbloom.psf import _kernel_cache as kernel_cache
 from vkbloom.psf._eye import spencer
 
 if TYPE_CHECKING:
@@ -17,8 +14,6 @@ if TYPE_CHECKING:
     from vkbloom.psf._base import PSF
 
 
-#: The fields that a kernel follows from.
-_SHAPE: Final = ("type", "quality", "version", "size", "kernel")
 #: What the sides are divided by.
 FACTORS: Final = {"high": 1, "medium": 2, "low": 4}
 
@@ -52,20 +47,6 @@ def kernel_sides(settings: BlenderGlare, buffers: tuple[int, int]) -> tuple[int,
         side = _side_of_4_3((width, height), settings.size)
         return side, side
     return 2 * width - 1, 2 * height - 1
-
-
-def core_kernel_of(settings: BlenderGlare, buffers: tuple[int, int]) -> CoreKernel:
-    """Return the kernel as the core reads it."""
-    fields: dict[str, Any] = {name: getattr(settings, name) for name in _SHAPE}
-    return _kept_kernel(type(settings)(**fields), buffers)
-
-
-@kept
-def _kept_kernel(settings: BlenderGlare, buffers: tuple[int, int]) -> CoreKernel:
-    fields = (getattr(settings, name) for name in _SHAPE)
-    return kernel_cache.find_or_make(
-        ("blender", *fields, buffers), lambda: core_kernel(kernel_of(settings, buffers))
-    )
 
 
 def _even_length(least: int) -> int:

@@ -10,11 +10,9 @@ from typing import Any, ClassVar, Literal, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vkbloom._array_cache import kept
-from vkbloom._core_kernel import CoreKernel, core_kernel
+from vkbloom._core_kernel import WithKernel
 from vkbloom._settings.fields import choice_field, number_field
 from vkbloom._settings.settings import Settings
-from vkbloom.psf import _kernel_cache as kernel_cache
 from vkbloom.psf._base import PSF
 from vkbloom.psf._eye import spencer
 from vkbloom.psf._resampling import box_resample
@@ -43,7 +41,7 @@ def read_psf(psf: Any) -> PSF:
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class Convolution(Settings):
+class Convolution(WithKernel, Settings):
     """A convolution with a point-spread function, by Fourier transforms.
 
     Parameters
@@ -74,6 +72,7 @@ class Convolution(Settings):
     """
 
     method: ClassVar[str] = "convolution"
+    shaping: ClassVar[tuple[str, ...]] = ("psf", "normalize", "pixels_per_degree", "kernel_size")
 
     psf: PSFLike = dataclasses.field(
         default=spencer(), kw_only=False, metadata={"kind": "psf", "read": read_psf}
@@ -90,8 +89,7 @@ class Convolution(Settings):
         Before the convolution, a luminance L above min becomes min(mult (L - min) + min, max).
         There is no prefilter if min is above max.
         """
-        none = (1.0, 0.0, 1.0)
-        return cast("tuple[float, float, float]", getattr(self.psf, "prefilter", none))
+        return cast("tuple[float, float, float]", getattr(self.psf, "prefilter", super().prefilter))
 
     def kernel(
         self, frame: tuple[int, int], buffers: tuple[int, int] | None = None
@@ -110,11 +108,7 @@ class Convolution(Settings):
         ndarray of float64, shape (h, w, 3)
             The kernel in pixels of the bloom buffers.
         """
-        return _kernel(self._shape, frame, buffers or frame)
-
-    def core_kernel(self, frame: tuple[int, int], buffers: tuple[int, int]) -> CoreKernel:
-        """Return the kernel as the core reads it."""
-        return _core_kernel(self._shape, frame, buffers)._replace(prefilter=self.prefilter)
+        return self._kernel(frame, buffers or frame)
 
     def core_kernel_size(self, frame: tuple[int, int], buffers: tuple[int, int]) -> tuple[int, int]:
         """Return estimates of the kernel's width and height, without the kernel."""
@@ -127,43 +121,18 @@ class Convolution(Settings):
         )
         return width, height
 
-    @property
-    def _shape(self) -> Convolution:
-        """The settings with defaults in the fields that do not change the kernel."""
-        return Convolution(
-            self.psf,
-            normalize=self.normalize,
-            pixels_per_degree=self.pixels_per_degree,
-            kernel_size=self.kernel_size,
-        )
-
-
-def _kernel(
-    settings: Convolution, frame: tuple[int, int], buffers: tuple[int, int]
-) -> NDArray[np.float64]:
-    kernel = cast("PSF", settings.psf).kernel(
-        frame, settings.kernel_size, settings.pixels_per_degree
-    )
-    if buffers != frame:
-        scale = buffers[1] / frame[1], buffers[0] / frame[0]
-        kernel = box_resample(kernel, (kernel.shape[0] // 2, kernel.shape[1] // 2), scale)
-    if settings.normalize:
-        sums = kernel.sum(axis=(0, 1))
-        for name, total in zip(("red", "green", "blue"), sums, strict=True):
-            if not total > 0:
-                raise ValueError(
-                    f"psf: the sum of its {name} is {total:g}, not above 0; use normalize=False"
-                )
-        kernel = kernel / sums
-    return kernel
-
-
-@kept
-def _core_kernel(
-    settings: Convolution, frame: tuple[int, int], buffers: tuple[int, int]
-) -> CoreKernel:
-    what = settings.psf, settings.normalize, settings.pixels_per_degree, settings.kernel_size
-    return kernel_cache.find_or_make(
-        ("convolution", *what, frame, buffers),
-        lambda: core_kernel(_kernel(settings, frame, buffers)),
-    )
+    def _kernel(self, frame: tuple[int, int], buffers: tuple[int, int]) -> NDArray[np.float64]:
+        psf = cast("PSF", self.psf)
+        kernel = psf.kernel(frame, self.kernel_size, self.pixels_per_degree)
+        if buffers != frame:
+            scale = buffers[1] / frame[1], buffers[0] / frame[0]
+            kernel = box_resample(kernel, (kernel.shape[0] // 2, kernel.shape[1] // 2), scale)
+        if self.normalize:
+            sums = kernel.sum(axis=(0, 1))
+            for name, total in zip(("red", "green", "blue"), sums, strict=True):
+                if not total > 0:
+                    raise ValueError(
+                        f"psf: the sum of its {name} is {total:g}, not above 0; use normalize=False"
+                    )
+            kernel = kernel / sums
+        return kernel

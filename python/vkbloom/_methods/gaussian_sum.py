@@ -9,46 +9,29 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom._array_cache import kept
-from vkbloom._core_kernel import CoreKernel, core_kernel
+from vkbloom._core_kernel import WithKernel
 from vkbloom._settings.settings import Settings
 
 Size = tuple[int, int]
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class GaussianSum(Settings):
+class GaussianSum(WithKernel, Settings):
     """Settings of a bloom that is a convolution with a sum of Gaussians.
 
     - `boundary`: What lies outside of the frame, a name of the core.
-    - `shaping`: The fields that change the kernel.
     """
 
     published: ClassVar[bool] = True
     boundary: ClassVar[str]
-    shaping: ClassVar[tuple[str, ...]]
-    prefilter: ClassVar[tuple[float, float, float]] = (1.0, 0.0, 1.0)
 
     def kernel(self, frame: Size, buffers: Size | None = None) -> NDArray[np.float64]:
         """Return the kernel for a frame in pixels of the bloom buffers, shape (h, w, 3)."""
         return self._kernel(frame, buffers or frame)
 
-    def core_kernel(self, frame: Size, buffers: Size) -> CoreKernel:
-        """Return the kernel as the core reads it."""
-        shape = type(self)(**{name: getattr(self, name) for name in self.shaping})
-        return _core_kernel(shape, frame, buffers)
-
     def core_kernel_size(self, frame: Size, buffers: Size) -> Size:
         """Return the kernel's width and height, without the kernel."""
         raise NotImplementedError
-
-    def _kernel(self, frame: Size, buffers: Size) -> NDArray[np.float64]:
-        raise NotImplementedError
-
-
-@kept
-def _core_kernel(settings: GaussianSum, frame: Size, buffers: Size) -> CoreKernel:
-    return core_kernel(settings.kernel(frame, buffers))
 
 
 def gaussian(deviation: float, radius: int) -> NDArray[np.float64]:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom._methods.gaussian_sum import GaussianSum, gaussian
 from vkbloom._settings.blocks import settings_block
-from vkbloom._settings.fields import choice_field, number_field, read_numbers, value_field
+from vkbloom._settings.fields import choice_field, number_field, numbers_field, value_field
 from vkbloom._settings.settings import Composite, no_knee
 
 Channels = tuple[float, float, float]
@@ -18,13 +18,6 @@ Size = tuple[int, int]
 
 #: Micrometres along the longer side of a frame of film.
 _FILM = 35000.0
-
-
-def _channels(name: str, default: Channels) -> Any:
-    def read(values: Any) -> tuple[float, ...]:
-        return read_numbers(name, values, 3, 65504.0)
-
-    return value_field(default, read=read, option=f"halation_{name}")
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -67,10 +60,14 @@ class Halation(GaussianSum):
     knee: float = no_knee("halation")
     composite: Composite = choice_field("composite", ("mix",))
     intensity: float = number_field("intensity", default=1.0, range=(0, 1))
-    strength: Channels = _channels("strength", (0.08, 0.005, 0.001))
-    sizes: Channels = _channels("sizes", (200.0, 200.0, 200.0))
-    scattering_strength: Channels = _channels("scattering_strength", (0.01, 0.02, 0.04))
-    scattering_sizes: Channels = _channels("scattering_sizes", (30.0, 20.0, 15.0))
+    strength: Channels = numbers_field((0.08, 0.005, 0.001), option="halation_strength")
+    sizes: Channels = numbers_field((200.0, 200.0, 200.0), option="halation_sizes")
+    scattering_strength: Channels = numbers_field(
+        (0.01, 0.02, 0.04), option="halation_scattering_strength"
+    )
+    scattering_sizes: Channels = numbers_field(
+        (30.0, 20.0, 15.0), option="halation_scattering_sizes"
+    )
     pixel_size: float | None = number_field(default=None, range=(0.01, 65504), slider=(1, 100))
 
     def core_kernel_size(self, frame: Size, buffers: Size) -> Size:

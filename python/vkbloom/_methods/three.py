@@ -14,7 +14,7 @@ Tint = tuple[float, float, float]
 
 
 def _read_tints(tints: Any) -> tuple[Tint, ...]:
-    read = tuple(read_numbers("tints", tint, 3, 65504.0) for tint in tints)
+    read = tuple(read_numbers("tints", tint, 3, 0.0, 65504.0) for tint in tints)
     if len(read) != 5:
         raise ValueError(f"tints: {tints!r} is not five colours, one for each level")
     return cast("tuple[Tint, ...]", read)

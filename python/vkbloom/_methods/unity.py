@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from typing import Any, ClassVar, Literal
+from typing import ClassVar, Literal
 
 from vkbloom._settings.blocks import settings_block
 from vkbloom._settings.fields import (
     choice_field,
     flag_field,
     number_field,
-    read_numbers,
+    numbers_field,
     value_field,
 )
 from vkbloom._settings.settings import BloomFormat, Composite, Settings, no_knee
@@ -24,14 +24,6 @@ def _linear(value: float) -> float:
     if value > 1:
         return float(value**2.2)
     return value / 12.92 if value <= 0.04045 else float(((value + 0.055) / 1.055) ** 2.4)
-
-
-def _read_tint(tint: Any) -> tuple[float, ...]:
-    return read_numbers("tint", tint, 3, 65504.0)
-
-
-def _read_color(color: Any) -> tuple[float, ...]:
-    return read_numbers("color", color, 3, 65504.0)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -102,7 +94,7 @@ class UrpBloom(Settings):
     iterations: int = number_field("iterations")
     downscale: Literal["half", "quarter"] = choice_field("downscale", ("half", "quarter"))
     high_quality: bool = value_field(False)
-    tint: tuple[float, float, float] = value_field((1.0, 1.0, 1.0), read=_read_tint)
+    tint: tuple[float, float, float] = numbers_field((1.0, 1.0, 1.0))
     clamp: float = number_field("clamp_max", slider=(0, 100))
     version: Literal["17", "12"] = choice_field("version", ("17", "12"))
 
@@ -229,7 +221,7 @@ class PostProcessingBloom(Settings):
     diffusion: float = number_field("diffusion")
     anamorphic_ratio: float = number_field("anamorphism")
     fast: bool = flag_field("fast")
-    color: tuple[float, float, float] = value_field((1.0, 1.0, 1.0), read=_read_color)
+    color: tuple[float, float, float] = numbers_field((1.0, 1.0, 1.0))
 
     def _core_block(self) -> bytes:
         """Return the settings with the core's names and units."""

@@ -4,23 +4,15 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom._methods.gaussian_sum import GaussianSum, gaussian
 from vkbloom._settings.blocks import settings_block
-from vkbloom._settings.fields import choice_field, number_field, read_numbers, value_field
+from vkbloom._settings.fields import choice_field, number_field, numbers_field
 from vkbloom._settings.settings import Composite, no_knee
-
-
-def _read_sizes(sizes: Any) -> tuple[float, ...]:
-    return read_numbers("sizes", sizes, 6, 65504.0)
-
-
-def _read_tints(tints: Any) -> tuple[float, ...]:
-    return read_numbers("tints", tints, 6, 65504.0)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -62,9 +54,9 @@ class UnrealBloom(GaussianSum):
     knee: float = no_knee("unreal")
     composite: Composite = choice_field("composite", ("add",))
     intensity: float = number_field("intensity", default=0.675)
-    sizes: tuple[float, ...] = value_field((0.3, 1.0, 2.0, 10.0, 30.0, 64.0), read=_read_sizes)
-    tints: tuple[float, ...] = value_field(
-        (0.3465, 0.138, 0.1176, 0.066, 0.066, 0.061), read=_read_tints
+    sizes: tuple[float, ...] = numbers_field((0.3, 1.0, 2.0, 10.0, 30.0, 64.0))
+    tints: tuple[float, ...] = numbers_field(
+        (0.3465, 0.138, 0.1176, 0.066, 0.066, 0.061), low=-65504.0
     )
     size_scale: float = number_field(default=4.0, range=(0, 64))
 

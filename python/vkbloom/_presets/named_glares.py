@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from vkbloom._glare.dirt import Dirt
 from vkbloom._glare.flares import Ghosts, Halo
@@ -21,25 +21,10 @@ if TYPE_CHECKING:
 def _filament() -> tuple[Glare, ...]:
     """Return four ghosts of the spacing 0.6 and a halo, with the strength of the bloom."""
     scales = tuple(0.6 * ghost - 1 for ghost in range(4))
+    reads: Any = {"threshold": 10, "maximum": 1, "aberration": 0.005, "halvings": 1}
     return (
-        Ghosts(
-            scales=scales,
-            falloff=0,
-            threshold=10,
-            maximum=1,
-            aberration=0.005,
-            intensity=0.1,
-            halvings=1,
-        ),
-        Halo(
-            radius=0.4,
-            width=0.1,
-            threshold=10,
-            maximum=1,
-            aberration=0.005,
-            intensity=0.1,
-            halvings=1,
-        ),
+        Ghosts(scales=scales, falloff=0, intensity=0.1, **reads),
+        Halo(radius=0.4, width=0.1, intensity=0.1, **reads),
     )
 
 
@@ -56,58 +41,35 @@ def _unreal() -> tuple[Glare, ...]:
         0.15: (0.9, 0.7, 0.7),
     }
     scales = tuple(1 / (7 * alpha - 3.5) for alpha in tints)
-    return (
-        Ghosts(
-            scales=scales,
-            tints=tuple(tints.values()),
-            threshold=8 / 3,
-            falloff=2,
-            radius=math.sqrt(0.5),
-            halvings=4,
-        ),
-    )
+    look: Any = {"threshold": 8 / 3, "falloff": 2, "radius": math.sqrt(0.5), "halvings": 4}
+    return (Ghosts(scales=scales, tints=tuple(tints.values()), **look),)
 
 
-def _blender_ghosts(modulation: float = 0.25, iterations: int = 3) -> tuple[Glare, ...]:
+def _blender_ghosts() -> tuple[Glare, ...]:
     """Return the first of the iterations that Blender adds up, for its two blurs."""
-    offset, kept = 0.5 * (iterations % 2), 1 - modulation
-    scales = []
-    for ghost in range(4):
-        scale = 2.1 * (1 - (4 + ghost + offset) / (4 * iterations))
-        scales.append(-0.99 / scale if ghost % 2 else scale)
-    tints = ((1.0, 1.0, 1.0), (1.0, kept, kept), (kept, kept, 1.0), (kept, 1.0, kept))
+    # Of three iterations, and a modulation of colours of 0.25.
+    scales = [2.1 * (1 - (4.5 + ghost) / 12) for ghost in range(4)]
+    scales[1::2] = [-0.99 / scale for scale in scales[1::2]]
+    tints = ((1.0, 1.0, 1.0), (1.0, 0.75, 0.75), (0.75, 0.75, 1.0), (0.75, 1.0, 0.75))
+    look: Any = {"tints": tints, "falloff": 1, "radius": 0.5, "threshold": 1, "intensity": 0.25}
     return tuple(
-        Ghosts(
-            scales=tuple(base * scale for scale in scales),
-            tints=tints,
-            falloff=1,
-            radius=0.5,
-            threshold=1,
-            intensity=0.25,
-            halvings=halvings,
-        )
+        Ghosts(scales=tuple(base * scale for scale in scales), halvings=halvings, **look)
         for base, halvings in ((2.13, 3), (-0.97, 4))
     )
 
 
-def _blender_streaks(
-    fade: float = 0.9, modulation: float = 0.25, iterations: int = 3, count: int = 4
-) -> tuple[Glare, ...]:
+def _blender_streaks() -> tuple[Glare, ...]:
     """Return streaks. Blender halves the sum of four taps and does not average the streaks."""
-    gain = count / (6.0 - iterations)
-    for iteration in range(iterations):
-        gain *= sum(fade ** (tap * 4**iteration) for tap in range(4)) / 2
-    return (
-        Streaks(
-            directions=count,
-            fade=fade,
-            iterations=iterations,
-            colour_shift=modulation,
-            threshold=1,
-            intensity=gain,
-            halvings=1,
-        ),
-    )
+    gain = 4 / 3
+    for iteration in range(3):
+        gain *= sum(0.9 ** (tap * 4**iteration) for tap in range(4)) / 2
+    look: Any = {"directions": 4, "fade": 0.9, "iterations": 3, "colour_shift": 0.25}
+    return (Streaks(threshold=1, intensity=gain, halvings=1, **look),)
+
+
+def _anamorphic() -> tuple[Glare, ...]:
+    taps: Any = {"fade": 0.97, "base": 6, "iterations": 3}
+    return (Streaks(directions=1, threshold=1, intensity=0.3, halvings=1, **taps),)
 
 
 _URP_SCALE = 1.25**1.5
@@ -129,14 +91,7 @@ GLARES: Final[Mapping[str, NamedGlare]] = {
         "google/filament, flare.mat @ 523a261b1052, Options.h @ 044f3ebdf780",
     ),
     "three_lensflare": NamedGlare(
-        (
-            Ghosts(
-                scales=tuple(0.25 * ghost - 1 for ghost in range(4)),
-                threshold=0.5,
-                falloff=25,
-                radius=1,
-            ),
-        ),
+        (Ghosts(scales=(-1.0, -0.75, -0.5, -0.25), threshold=0.5, falloff=25, radius=1),),
         "four ghosts of what is above 0.5, near the centre",
         "mrdoob/three.js, LensflareNode.js @ 0a0cd97338d3",
     ),
@@ -161,17 +116,7 @@ GLARES: Final[Mapping[str, NamedGlare]] = {
         "Blender 5, Glare node, Streaks (formulas)",
     ),
     "anamorphic": NamedGlare(
-        (
-            Streaks(
-                directions=1,
-                threshold=1,
-                fade=0.97,
-                base=6,
-                iterations=3,
-                intensity=0.3,
-                halvings=1,
-            ),
-        ),
+        _anamorphic(),
         "a long horizontal streak of what is above 1",
         "vkbloom, after anamorphic lenses",
     ),

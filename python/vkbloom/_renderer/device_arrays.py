@@ -27,11 +27,8 @@ _CPU, _CUDA, _CUDA_HOST, _CUDA_MANAGED = 1, 2, 3, 13
 _UINT, _FLOAT, _BFLOAT, _COMPLEX, _BOOL = 1, 2, 4, 5, 6
 _DTYPES = {(_UINT, 8): "uint8", (_FLOAT, 16): "float16", (_FLOAT, 32): "float32"}
 _CODES = {"u": _UINT, "f": _FLOAT}
-_FORMATS = {"uint8": "B", "float16": "e", "float32": "f"}
 # CUDA's handles of the default stream and of each thread's; 0 is not one of DLPack.
 _LEGACY = 1
-# More elements than any memory has.
-_MAX_ELEMENTS = 1 << 48
 
 
 class DeviceArray:
@@ -241,13 +238,10 @@ def placed(
 
 def on_cuda(image: object) -> bool:
     """Return whether an object is an array in the memory of a GPU with CUDA."""
-    if isinstance(image, np.ndarray | DeviceArray):
-        return isinstance(image, DeviceArray) and image.__dlpack_device__()[0] == _CUDA
-    device = getattr(image, "__dlpack_device__", None)
-    if device is None:
-        return hasattr(image, "__cuda_array_interface__")
+    if isinstance(image, np.ndarray):
+        return False
     try:
-        kind = int(device()[0])
+        kind = int(image.__dlpack_device__()[0])  # type: ignore[attr-defined]
     except Exception:  # whatever a foreign object raises; a later use of it tells more
         return False
     return kind in (_CUDA, _CUDA_MANAGED)
@@ -256,20 +250,19 @@ def on_cuda(image: object) -> bool:
 def likeness(image: Any) -> NDArray[Any]:
     """Return an array of the host with an array's shape and dtype, of undefined content."""
     dtype = str(image.dtype).rsplit(".", 1)[-1]
-    if dtype not in _FORMATS:
+    if dtype not in _DTYPES.values():
         raise TypeError(f"image: dtype {dtype} is not one of uint8, float16, float32 on the device")
     return np.empty(tuple(image.shape), dtype)
 
 
 class _Array(NamedTuple):
-    """An array of CUDA, strides in bytes; `stream`: what the copy waits for, 0: nothing."""
+    """An array of CUDA, strides in bytes. The renderer's stream waits for its producer's work."""
 
     owner: object
     address: int
     shape: tuple[int, ...]
     strides: tuple[int, ...]
     dtype: str
-    stream: int
 
 
 class ImportedArray(NamedTuple):
@@ -288,7 +281,7 @@ class ImportedArray(NamedTuple):
 
     def image(self) -> Any:
         """Return it as the core reads it."""
-        return self.memory, self.offset, self.shape, self.strides, _FORMATS[self.dtype]
+        return self.memory, self.offset, self.shape, self.strides, np.dtype(self.dtype).itemsize
 
     def layers(self, first: int, count: int) -> Any:
         """Return images of a batch from `first` on, as the core reads them together."""
@@ -361,42 +354,14 @@ def _from_dlpack(image: Any, name: str, core: _core.Renderer) -> _Array:
     dtype = _check_dtype(name, code, bits, lanes)
     size = np.dtype(dtype).itemsize
     elements = _contiguous(shape) if strides is None else strides
-    if any(abs(stride) >= _MAX_ELEMENTS for stride in elements):
-        # CuPy 14 divides negative strides as if they had no sign.
-        if hasattr(image, "__cuda_array_interface__"):
-            # The capsule has ordered our stream after the producer's work.
-            return _from_interface(image, name)._replace(stream=0)
-        raise ValueError(f"{name}: strides {elements} are out of range; make it contiguous")
-    # The producer has ordered our stream after its own work.
-    return _Array(capsule, address, shape, tuple(size * stride for stride in elements), dtype, 0)
-
-
-def _from_interface(image: Any, name: str) -> _Array:
-    about = image.__cuda_array_interface__
-    shape, typestr = tuple(about["shape"]), about["typestr"]
-    if about.get("mask") is not None:
-        raise ValueError(f"{name}: a mask of __cuda_array_interface__ is not taken")
-    try:
-        dtype = np.dtype(typestr).name if np.dtype(typestr).isnative else typestr
-    except TypeError:
-        dtype = typestr
-    if dtype not in _FORMATS:
-        raise TypeError(
-            f"{name}: dtype {dtype} is not one of uint8, float16, float32 on the device; convert "
-            f"it: {name}.astype('float32')"
-        )
-    size = np.dtype(dtype).itemsize
-    strides = about.get("strides") or tuple(size * stride for stride in _contiguous(shape))
-    stream = about.get("stream")
-    # Before version 3 nothing tells of a stream, so the default stream is waited for.
-    after = _LEGACY if stream is None and about.get("version", 0) < 3 else stream or 0
-    return _Array(image, about["data"][0], shape, tuple(strides), dtype, after)
+    # Modulo 2**64, since CuPy 14 divides negative strides as if they had no sign.
+    in_bytes = [(size * stride + 2**63) % 2**64 - 2**63 for stride in elements]
+    return _Array(capsule, address, shape, tuple(in_bytes), dtype)
 
 
 def fill(target: Any, name: str, made: DeviceArray, core: _core.Renderer) -> None:
     """Copy a framebuffer to the caller's array on the device, after what its producer works on."""
-    array = _from_dlpack(target, name, core) if hasattr(target, "__dlpack__") else None
-    array = array or _from_interface(target, name)
+    array = _from_dlpack(target, name, core)
     if (array.shape, array.dtype) != (made.shape, made.dtype.name):
         raise ValueError(
             f"{name} has shape {array.shape} and dtype {array.dtype}, it must have {made.shape} "
@@ -407,16 +372,11 @@ def fill(target: Any, name: str, made: DeviceArray, core: _core.Renderer) -> Non
         raise ValueError(f"{name} must be C-contiguous")
     if isinstance(made._memory, np.ndarray):
         raise TypeError(f"{name}: the framebuffer is on the host")
-    made._memory.copy_to(array.address, made.nbytes, array.stream, made._offset)
+    made._memory.copy_to(array.address, made.nbytes, made._offset)
 
 
 def take(
-    image: Any,
-    name: str,
-    core: _core.Renderer,
-    sides: tuple[int, ...] = (3,),
-    *,
-    waits: bool = True,
+    image: Any, name: str, core: _core.Renderer, sides: tuple[int, ...] = (3,)
 ) -> ImportedArray:
     """Copy an array of CUDA to memory that Vulkan shares, ordered after its producer's work."""
     _require_no_capture()
@@ -426,10 +386,7 @@ def take(
         if type(error) is not _core.Error:
             raise
         raise TypeError(f"{on_another_device(image, name)} ({error})") from None
-    if isinstance(image, DeviceArray) or hasattr(image, "__dlpack__"):
-        array = _from_dlpack(image, name, core)
-    else:
-        array = _from_interface(image, name)
+    array = _from_dlpack(image, name, core)
     shape = array.shape
     if len(shape) not in sides or 0 in shape or (len(shape) > 2 and shape[-1] not in (3, 4)):
         raise ValueError(
@@ -442,5 +399,5 @@ def take(
             )
         )
     low, high = _span(shape, array.strides, array.dtype)
-    memory = core.snapshot(name, array.address + low, high - low, array.stream, waits)
+    memory = core.snapshot(array.address + low, high - low)
     return ImportedArray(memory, -low, shape, array.strides, array.dtype)

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom._checks import import_extra
-from vkbloom._framebuffers import Framebuffers, leading
+from vkbloom._framebuffers import leading
 from vkbloom._io import image_reading, safe_writing
 from vkbloom._io.displayed import HDR_CURVES
 from vkbloom._io.image_writing import Part, described_as, put
@@ -29,13 +29,15 @@ from vkbloom._version import installed_version
 if TYPE_CHECKING:
     import OpenImageIO
 
+    from vkbloom._renderer.frames import Frames
+
 # The text before the JSON in a description.
 _DESCRIBED = ", all of it: "
 # Attributes that `_attributes` writes in addition to the entries of `info`.
 _OWN = ("settings", "timings", "dtype", "framebuffer", "place")
 
 
-def save(frames: Framebuffers, path: str | os.PathLike[str]) -> list[Path]:
+def save(frames: Frames, path: str | os.PathLike[str]) -> list[Path]:
     """Write framebuffers to image files, as `Frames.save` documents."""
     if not frames:
         raise ValueError("frames: there is no framebuffer to save")
@@ -191,7 +193,7 @@ def _as_dtype(pixels: NDArray[Any], dtype: str) -> NDArray[Any]:
     return made[:, :, 0] if made.shape[2] == 1 else made
 
 
-def _image_part(oiio: ModuleType, frames: Framebuffers, name: str, file: Path) -> Part | None:
+def _image_part(oiio: ModuleType, frames: Frames, name: str, file: Path) -> Part | None:
     """Return a framebuffer for a file of any format; None if the format cannot hold it."""
     pixels = np.atleast_3d(frames[name])
     writer = oiio.ImageOutput.create(file.name)
@@ -210,7 +212,7 @@ def _image_part(oiio: ModuleType, frames: Framebuffers, name: str, file: Path) -
     return Part(pixels, picture, _attributes(frames, name, file))
 
 
-def _exr_part(frames: Framebuffers, name: str, file: Path) -> Part:
+def _exr_part(frames: Frames, name: str, file: Path) -> Part:
     """Return a framebuffer for a part of an OpenEXR file, in the display window of the frame."""
     pixels = np.atleast_3d(frames[name])
     if pixels.dtype == np.uint8:
@@ -225,7 +227,7 @@ def _exr_part(frames: Framebuffers, name: str, file: Path) -> Part:
     return Part(pixels, replace(picture, stored=stored), attributes)
 
 
-def _attributes(frames: Framebuffers, name: str, file: Path) -> dict[str, str | int]:
+def _attributes(frames: Frames, name: str, file: Path) -> dict[str, str | int]:
     """Return what a file says of a framebuffer."""
     settings = json.dumps(frames.settings.to_dict())
     adapter = frames.info.get("adapter", "an unnamed adapter")

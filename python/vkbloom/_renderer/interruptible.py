@@ -10,9 +10,9 @@ from vkbloom._renderer.renderer import Renderer
 
 
 @contextmanager
-def opened_renderer(adapter: str, validation: bool) -> Iterator[Renderer]:
+def opened_renderer(adapter: str) -> Iterator[Renderer]:
     """Open a renderer; if a signal ends the work, close it without waiting for the device."""
-    renderer = Renderer(adapter, validation=validation)
+    renderer = Renderer(adapter)
     try:
         yield renderer
     except Exception:

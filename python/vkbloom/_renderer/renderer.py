@@ -421,7 +421,7 @@ class Renderer:
         """
         settings = check_settings(settings, of_image=True)
         self._pending.wait()
-        source = image_source(image, mask, emission, self._core, waits=False)
+        source = image_source(image, mask, emission, self._core)
         return self._run_one(source, settings, check_framebuffers(framebuffers), out, device)
 
     @checked

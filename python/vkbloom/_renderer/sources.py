@@ -61,28 +61,22 @@ def _as_read(array: Any) -> Any:
     return array.image() if isinstance(array, ImportedArray) else array
 
 
+def _taken(image: object, name: str, core: _core.Renderer | None) -> Any:
+    return take(image, name, core) if core and on_cuda(image) else check_image(image, name)
+
+
 def checked_inputs(
     image: object,
     mask: object | None = None,
-    emission: object | None = None,
+    emission: Any = None,
     core: _core.Renderer | None = None,
     name: str = "image",
-    *,
-    waits: bool = True,
 ) -> Inputs:
     """Check the arrays of an image, and copy those that are on the renderer's device."""
-    if core is None or not any(map(on_cuda, (image, mask, emission))):
-        core = None
-    pixels: Any
-    if core and on_cuda(image):
-        pixels = take(image, name, core, waits=waits)
-    else:
-        pixels = check_image(image, name)
-    glowing: Any = emission
-    if core and on_cuda(emission):
-        glowing = take(emission, "emission", core, waits=waits)
-    elif emission is not None:
-        glowing = check_emission(emission, pixels)
+    pixels = _taken(image, name, core)
+    glowing = emission
+    if emission is not None:
+        glowing = check_emission(_taken(emission, "emission", core), pixels)
     if core and on_cuda(mask):
         # Its values are checked on the host; it has one channel of the image's three or four.
         mask = take(mask, "mask", core, (2,)).numpy()
@@ -96,13 +90,11 @@ def image_source(
     emission: object | None = None,
     core: _core.Renderer | None = None,
     name: str = "image",
-    *,
-    waits: bool = True,
 ) -> _core.Source:
     """Return the core's Source of an image. Its arrays must not change while it is used.
 
     With a renderer, arrays may be on its device; these are copied. Errors of the image start with
-    `name`. `waits`: As for `device_arrays.take`.
+    `name`.
     """
     if isinstance(image, Image):
         for what, given in (("mask", mask), ("emission", emission)):
@@ -111,7 +103,7 @@ def image_source(
                     f"{what}: the image was uploaded already; upload it together with its {what}"
                 )
         return image._source
-    return checked_inputs(image, mask, emission, core, name, waits=waits).source()
+    return checked_inputs(image, mask, emission, core, name).source()
 
 
 def uploaded_inputs(image: Image, pixels: Callable[[], NDArray[Any]]) -> Inputs:
@@ -121,8 +113,8 @@ def uploaded_inputs(image: Image, pixels: Callable[[], NDArray[Any]]) -> Inputs:
 
 
 def take_batch(images: Any, core: _core.Renderer) -> ImportedArray:
-    """Copy a batch on the device at once; `run` waits for the copy."""
-    return take(images, "images", core, (4,), waits=False)
+    """Copy a batch on the device at once."""
+    return take(images, "images", core, (4,))
 
 
 def batch_sources(batch: ImportedArray, first: int = 0) -> Iterator[_core.Source]:
@@ -134,8 +126,7 @@ def batch_sources(batch: ImportedArray, first: int = 0) -> Iterator[_core.Source
 def is_image(source: object) -> bool:
     """Return whether a source is an image, or an object that NumPy can view."""
     return isinstance(source, Image | memoryview) or any(
-        hasattr(source, name)
-        for name in ("__array__", "__array_interface__", "__dlpack__", "__cuda_array_interface__")
+        hasattr(source, name) for name in ("__array__", "__array_interface__", "__dlpack__")
     )
 
 

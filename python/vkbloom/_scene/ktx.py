@@ -14,6 +14,8 @@ from typing import Any, Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from vkbloom._scene.arrays import MAX_SIDE
+
 IDENTIFIER: Final = b"\xabKTX 11\xbb\r\n\x1a\n"
 _KTX2_IDENTIFIER: Final = b"\xabKTX 20\xbb\r\n\x1a\n"
 _HEADER_SIZE: Final = 64
@@ -78,8 +80,8 @@ def _header(data: bytes) -> tuple[Literal["<", ">"], tuple[int, str], int, int, 
         )
     if faces != 6:
         raise ValueError(f"has {faces} faces; a cubemap has 6")
-    if width != height or width == 0:
-        raise ValueError(f"faces of {width} x {height}; they must be square")
+    if width != height or not 1 <= width <= MAX_SIDE:
+        raise ValueError(f"faces of {width} x {height}; a square of 1..{MAX_SIDE} is needed")
     texel = _TEXELS.get((internal, form, kind))
     if texel is None:
         raise ValueError(

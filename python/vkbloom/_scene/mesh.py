@@ -39,6 +39,11 @@ class Mesh:
         for name in ("vertices", "indices", "emission", "texcoords"):
             if getattr(self, name) is not None:
                 object.__setattr__(self, name, read_only(getattr(self, name)))
+        # The device reads vertices without a check.
+        if self.indices.size and self.indices.max() >= len(self.vertices):
+            raise ValueError(
+                f"indices: {self.indices.max()} is beyond the mesh's {len(self.vertices)} vertices"
+            )
 
     def __reduce__(self) -> tuple[type[Mesh], tuple[Any, ...]]:
         # Through the constructor, because NumPy pickles do not keep arrays read-only.

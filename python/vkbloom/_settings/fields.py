@@ -57,6 +57,7 @@ class FieldInfo:
     - `unit`: "1" for numbers without a unit, "" for others.
     - `fixed`: Why the method takes only the default; "" for other fields.
     - `narrowed`: Whether the class has fewer choices than the annotation.
+    - `count`: How many numbers a tuple has, the least and the largest of them.
     - `read`: Checks a value of another kind and returns the value to store.
     - `text`: The help of a class without a docstring.
     """
@@ -73,6 +74,7 @@ class FieldInfo:
     option: str = ""
     fixed: str = ""
     narrowed: bool = False
+    count: tuple[int, float, float] | None = None
     read: Callable[[Any], Any] | None = None
     text: str = ""
 
@@ -116,6 +118,8 @@ class FieldInfo:
             checked = check_size(self.name, value)
         elif self.range is not None:
             checked = self._number(value, self.range)
+        elif self.count is not None:
+            checked = read_numbers(self.name, value, *self.count)
         if self.fixed and checked != self.default:
             only = f"{self.default:g}" if isinstance(self.default, float) else self.default
             raise ValueError(f"{self.name}: {value!r} is not {only}; {self.fixed}")
@@ -177,13 +181,22 @@ def value_field(default: Any = dataclasses.MISSING, **declared: Any) -> Any:
     return dataclasses.field(default=default, metadata=declared)
 
 
-def read_numbers(name: str, values: Sequence[float], count: int, most: float) -> tuple[float, ...]:
-    """Return so many numbers: three factors of colours, or two positions of either sign."""
+def numbers_field(
+    default: tuple[float, ...], low: float = 0.0, high: float = 65504.0, **declared: Any
+) -> Any:
+    """Declare a field of as many numbers as its default has, such as the factors of a colour."""
+    return value_field(default, count=(len(default), low, high), **declared)
+
+
+def read_numbers(
+    name: str, values: Sequence[float], count: int, low: float, high: float
+) -> tuple[float, ...]:
+    """Return so many numbers in a range."""
     numbers = check_floats(name, values)
     if len(numbers) != count:
         raise ValueError(f"{name}: {numbers!r} is not {count} numbers")
     for number in numbers:
-        check_number(name, number, 0 if count == 3 else -most, most)
+        check_number(name, number, low, high)
     return numbers
 
 

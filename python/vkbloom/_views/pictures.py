@@ -4,22 +4,25 @@ from __future__ import annotations
 
 import struct
 import zlib
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom._framebuffers import Framebuffers, leading
+from vkbloom._framebuffers import leading
 from vkbloom._io.displayed import scaled_to_1
 from vkbloom._io.srgb import encode_srgb
 from vkbloom._views import markup
 from vkbloom._views.markup import element
 
+if TYPE_CHECKING:
+    from vkbloom._renderer.frames import Frames
+
 _CODE = "color:inherit;background:none;padding:0;white-space:pre-wrap;overflow-wrap:anywhere"
 _THUMBNAIL_SIDE = 320  # pixels; keeps the page of a whole frame under about 1 MB
 
 
-def leading_png(frames: Framebuffers) -> bytes:
+def leading_png(frames: Frames) -> bytes:
     """Return the picture of `final`, or else of the last image, or else of the last framebuffer.
 
     8-bit images are shown as stored. Float images are shown with the sRGB curve, unless the
@@ -31,7 +34,7 @@ def leading_png(frames: Framebuffers) -> bytes:
     return png(_picture(frames, leading(frames)))
 
 
-def contact_sheet_html(frames: Framebuffers) -> str:
+def contact_sheet_html(frames: Frames) -> str:
     """Return a contact sheet of all framebuffers, with the pass times, as HTML.
 
     Pictures are made as in `leading_png`, without alpha, and averaged to at most 320 pixels.
@@ -75,9 +78,7 @@ def contact_sheet_html(frames: Framebuffers) -> str:
     return str(sheet)
 
 
-def _picture(
-    frames: Framebuffers, name: str, size: tuple[int, int] | None = None
-) -> NDArray[np.uint8]:
+def _picture(frames: Frames, name: str, size: tuple[int, int] | None = None) -> NDArray[np.uint8]:
     """Return a framebuffer as an 8-bit (H, W, C) picture, resized to (width, height)."""
     encoded = name == "final" and frames.settings.encoding != "none"
     return picture(frames[name], name, encoded=encoded, size=size)
@@ -132,7 +133,7 @@ def _described(array: NDArray[Any], note: str = "") -> str:
     return f"{array.shape[1]} x {array.shape[0]}, {array.dtype}" + (f", {note}" if note else "")
 
 
-def _note(frames: Framebuffers, name: str) -> str:
+def _note(frames: Frames, name: str) -> str:
     """Return what a framebuffer shows where its name does not tell it."""
     return frames.settings.glow_note if name == "glow" else ""
 

@@ -74,7 +74,6 @@ def _interpolations(a: _Image, b: _Image, shift: _Shift) -> Iterator[tuple[_Imag
         return
     # The first image may be an interpolation of the second.
     yield ndimage.shift(b, (-y, -x, 0), order=1, mode="grid-wrap"), a, b
-    yield _catmull_rom(a, shift), b, a
     yield ndimage.shift(a, (y, x, 0), order=3, mode="mirror"), b, a
     spectrum = ndimage.fourier_shift(np.fft.fft2(a, axes=(0, 1)), (y, x, 0))
     yield np.fft.ifft2(spectrum, axes=(0, 1)).real, b, a
@@ -94,25 +93,6 @@ def _is_explained(
 def _compressed(image: _Image) -> _Image:
     compressed: _Image = image / (1 + np.abs(image))
     return compressed
-
-
-def _catmull_rom(image: _Image, shift: _Shift) -> _Image:
-    """Return an image moved by (x, y) pixels; edges wrap.
-
-    Source: Catmull and Rom, "A Class of Local Interpolating Splines", 1974.
-    """
-    for axis, value in ((1, shift[0]), (0, shift[1])):
-        whole = int(np.floor(value))
-        t = value - whole
-        taps = (
-            (-t + 2 * t**2 - t**3) / 2,
-            (2 - 5 * t**2 + 3 * t**3) / 2,
-            (t + 4 * t**2 - 3 * t**3) / 2,
-            (-(t**2) + t**3) / 2,
-        )
-        moved = [tap * np.roll(image, whole - 1 + i, axis) for i, tap in enumerate(taps) if tap]
-        image = np.sum(moved, axis=0)
-    return image
 
 
 def _inner(shape: tuple[int, ...], shift: _Shift) -> tuple[slice, slice]:

@@ -13,6 +13,8 @@ import numpy as np
 
 from vkbloom.testing._probe import Image
 
+__tracebackhide__ = True
+
 
 class NotTaken(ValueError):
     """A bloom does not take what a law needs, such as a region or alpha; so it is not tested."""
@@ -58,6 +60,12 @@ def breaches(law: str, measured: Iterable[Measured]) -> list[str]:
     return [text for name, off, limit, text in measured if not is_within(law, off, limit, name)]
 
 
+def judge(assertion: str, law: str, *measured: Measured) -> None:
+    """Raise AssertionError with what is wrong with the deviations beyond their limits, if any."""
+    if reasons := breaches(law, measured):
+        fail(assertion, law, "; ".join(reasons))
+
+
 def figure(name: str, value: float) -> None:
     """Collect a figure that has no limit."""
     is_within("", value, math.inf, name)
@@ -73,21 +81,17 @@ def compare_with_law(
     note: str = "",
 ) -> None:
     """Raise AssertionError with the deviation, its position and the law if a value is wrong."""
-    __tracebackhide__ = True
     difference = np.abs(actual - expected)
     position = np.unravel_index(int(difference.argmax()), difference.shape)
-    if not is_within(law, float(difference[position]), allowed):
-        y, x, channel = (int(index) for index in position)
-        fail(
-            assertion,
-            law,
-            f"{actual[position]:.6g} instead of {expected[position]:.6g} at x {x}, "
-            f"y {y}, channel {channel}: off by {difference[position]:.3g}, {allowed:.3g} "
-            f"allowed{note}",
-        )
+    y, x, channel = map(int, position)
+    off = float(difference[position])
+    text = (
+        f"{actual[position]:.6g} instead of {expected[position]:.6g} at x {x}, y {y}, channel "
+        f"{channel}: off by {off:.3g}, {allowed:.3g} allowed{note}"
+    )
+    judge(assertion, law, ("off", off, allowed, text))
 
 
 def fail(assertion: str, law: str, figure: str) -> NoReturn:
     """Raise AssertionError with the figure and the law."""
-    __tracebackhide__ = True
     raise AssertionError(f"{assertion}: {figure}\n  law: {law}")

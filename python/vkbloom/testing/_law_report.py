@@ -21,6 +21,8 @@ from vkbloom.testing._law_table import LAWS, Law, law_name
 from vkbloom.testing._probe import Bloom, Probe
 from vkbloom.testing._subject import Subject, fitting_probe
 
+__tracebackhide__ = True
+
 #: Colours of the rows: of a law that was promised and is broken, and of one that was not promised.
 COLOURS: Final = {"required": "#c33", "broken": "#b60", "untested": "#888", "held": "inherit"}
 
@@ -106,7 +108,6 @@ class LawReport:
         ValueError
             There is no law of this name.
         """
-        __tracebackhide__ = True
         known = {row.name: row for row in self.rows}
         try:
             chosen = [law_name(name, known) for name in names] or [

@@ -18,7 +18,7 @@ from vkbloom.testing import _laws as laws
 from vkbloom.testing import _moving_light as moving_light
 from vkbloom.testing import _point_spread as point_spread
 from vkbloom.testing import _scaled_scene as scaled_scene
-from vkbloom.testing._deviations import compare_with_law, fail, figure, is_within
+from vkbloom.testing._deviations import compare_with_law, figure, judge
 from vkbloom.testing._probe import Bloom, Image, Probe
 from vkbloom.testing._subject import TEXEL, Subject
 
@@ -53,14 +53,10 @@ def _unbiased(subject: Subject, promised: float) -> None:
         given = probe.given(probe.flat(value))
         result, _ = probe.values(subject.bloom(given), given)
         gains.append(float(result[y, x].mean()) / float(probe.values(given, given)[0][y, x].mean()))
-    off, law = float(np.mean(gains)) / promised - 1, "half floats are rounded, not truncated"
-    if not is_within(law, abs(off), _BIAS, "bias"):
-        fail(
-            "assert_gain",
-            law,
-            f"the mean gain of {_VALUES} values is off by {100 * off:+.3g} %: {100 * _BIAS:.2g} % "
-            "allowed",
-        )
+    off = float(np.mean(gains)) / promised - 1
+    text = f"the mean gain of {_VALUES} values is off by {100 * off:+.3g} %: {100 * _BIAS:.2g} % "
+    law = "half floats are rounded, not truncated"
+    judge("assert_gain", law, ("bias", abs(off), _BIAS, f"{text}allowed"))
 
 
 def centroid_kept(subject: Subject, limit: float) -> None:
@@ -119,12 +115,8 @@ def energy(subject: Subject, limit: float) -> None:
     promised = 1.0 if subject.gain is None else subject.gain
     off, allowed = abs(energy - promised), limit * max(promised, energy)
     law = f"the bloom of a lit pixel has {promised:.4g} times the light of the pixel"
-    if not is_within(law, off, allowed):
-        fail(
-            "assert_energy",
-            law,
-            f"{energy:.4g} instead of {promised:.4g}: off by {off:.3g}, {allowed:.3g} allowed",
-        )
+    text = f"{energy:.4g} instead of {promised:.4g}: off by {off:.3g}, {allowed:.3g} allowed"
+    judge("assert_energy", law, ("off", off, allowed, text))
 
 
 def _coloured(probe: Probe) -> None:
@@ -204,13 +196,8 @@ def finite(subject: Subject, limit: float) -> None:
             reached = _not_finite(bloom(probe.given(image)))
             reached[y, x] = False
             count = int(reached.sum())
-            if not is_within(law, count, limit, name):
-                fail(
-                    "assert_finite",
-                    law,
-                    f"{value} at x {x}, y {y} reaches {count} other pixels of the {name}: "
-                    f"{limit:g} allowed",
-                )
+            text = f"{value} at x {x}, y {y} reaches {count} other pixels of the {name}: "
+            judge("assert_finite", law, (name, count, limit, f"{text}{limit:g} allowed"))
 
 
 def _not_finite(result: Any) -> NDArray[np.bool_]:
@@ -222,11 +209,13 @@ def reference(subject: Subject, limit: float) -> None:
     if subject.differences is None:
         raise ValueError("the bloom has no reference")
     law = "each framebuffer is that of the reference"
-    result = subject.reference
-    over = [name for name, off in result.items() if not is_within(law, off, limit, name)]
-    if over:
-        names = ", ".join(f"{name} is off by {result[name]:.3g}" for name in over)
-        fail("assert_reference", law, f"{names} of its largest value, {limit:g} allowed")
+    end = f"of its largest value, {limit:g} allowed"
+    result = subject.reference.items()
+    judge(
+        "assert_reference",
+        law,
+        *((name, off, limit, f"{name} is off by {off:.3g} {end}") for name, off in result),
+    )
 
 
 def shift_explained(subject: Subject, why: str) -> str:

@@ -18,6 +18,8 @@ from vkbloom._checks import check_number
 from vkbloom.testing._deviations import compare_with_law
 from vkbloom.testing._probe import Bloom, Image, Probe
 
+__tracebackhide__ = True
+
 _DEFAULT = Probe()
 
 
@@ -29,7 +31,6 @@ def assert_superposition(bloom: Bloom, probe: Probe = _DEFAULT) -> None:
     additivity and homogeneity (Oppenheim and Willsky, "Signals and Systems", chapter 1). A method
     with a threshold, a clamp or a firefly filter is not linear.
     """
-    __tracebackhide__ = True
     # Otherwise the dtype would round halves and quarters of the values in the test images.
     a, b = (_divisible_by_four(probe, probe.noise(index, probe.value)) for index in (0, 1))
     whole, whole_error = probe.apply(bloom, a / 2 + b / 4)
@@ -70,7 +71,6 @@ def assert_additive(
     probe : Probe
         With integers, `value` must be low enough that image plus bloom is not clamped.
     """
-    __tracebackhide__ = True
     check_number("intensity", intensity, 0.0, math.inf)
     image = probe.noise(0, probe.value)
     picture, error = probe.apply(bloom, image)
@@ -110,7 +110,6 @@ def assert_gain(bloom: Bloom, gain: float, probe: Probe = _DEFAULT) -> None:
     probe : Probe
         With integers, `value` times `gain` must be at most 1.
     """
-    __tracebackhide__ = True
     check_number("gain", gain, 0.0, math.inf)
     for part in (1.0, 0.5, 0.25):
         image = _divisible_by_four(probe, probe.flat(probe.value)) * part
@@ -144,7 +143,6 @@ def assert_symmetric(
     axes : sequence of {"x", "y", "xy"}
         "x" swaps left and right, "y" top and bottom, "xy" rows and columns.
     """
-    __tracebackhide__ = True
     image = probe.noise(0, probe.value)
     result, error = probe.apply(bloom, image)
     for axis in axes:
@@ -176,7 +174,6 @@ def assert_no_ringing(bloom: Bloom, probe: Probe = _DEFAULT) -> None:
         Takes an image and returns one of the same height and width.
     probe : Probe
     """
-    __tracebackhide__ = True
     dark, dark_error = probe.apply(bloom, probe.flat(0.0))
     bright, bright_error = probe.apply(bloom, probe.flat(probe.value))
     width, height = probe.size
@@ -235,7 +232,6 @@ def assert_bounded_fireflies(
         The law is tested at period x period positions of the pixel, because the result of a chain
         of halved images depends on the position. Use 2 for one halving and 4 for two.
     """
-    __tracebackhide__ = True
     if probe.dtype.kind == "u":
         raise TypeError(f"probe: {probe.dtype} has no values above 1; use a float dtype")
     check_number("limit", limit, 0.0, math.inf)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
@@ -13,7 +14,6 @@ from vkbloom import reference
 from vkbloom._custom.method import CustomMethod
 from vkbloom._fit.translating import lights
 from vkbloom._renderer.renderer import Renderer
-from vkbloom._settings.registry import presets
 from vkbloom._settings.settings import Settings
 from vkbloom._views.plain_values import plain
 from vkbloom.psf._sampled import samples
@@ -27,6 +27,8 @@ from vkbloom.testing._veiling_glare import veiling_glare_index
 Array = NDArray[np.float64]
 
 VIEW: Final = (256, 144)
+#: The `sketch` of each preset's bloom, as `python -m tools.preset_blooms` writes them.
+PRESET_BLOOMS: Final = Path(__file__).with_name("preset_blooms.npz")
 
 
 # What the values of a bloom hold of a law, of the moving light, and of the response to the size.
@@ -36,11 +38,7 @@ _OF_RESOLUTION: Final = ("sizes", "r50", "r90", "peak")
 
 
 def values_of(
-    renderer: Renderer,
-    subject: Subject,
-    report: LawReport,
-    settings: Settings | None,
-    **about: Any,
+    subject: Subject, report: LawReport, settings: Settings | None, **about: Any
 ) -> dict[str, Any]:
     """Return all that is measured as plain values; what is not a number is None.
 
@@ -53,7 +51,7 @@ def values_of(
         patch=max(1, min(probe.size) // 8),
         value=probe.value,
     )
-    near, difference = nearest_preset(about["name"], subject.bloom, renderer)
+    near, difference = nearest_preset(about["name"], subject.bloom)
     passes = [{"name": name, "seconds": time} for name, time in about.pop("passes").items()]
     values: dict[str, Any] = plain(
         about
@@ -207,31 +205,24 @@ def differences(renderer: Renderer, settings: Settings) -> dict[str, float]:
     return results
 
 
-def nearest_preset(excluded: str, bloom: Bloom, renderer: Renderer) -> tuple[str, float]:
+def sketch(bloom: Bloom) -> Array:
+    """Return the bloom of four lights as means of 4 x 4 pixels."""
+    light = np.asarray(bloom(lights(VIEW)))[..., :3].astype(np.float64)
+    boxes = light.reshape(VIEW[1] // 4, 4, VIEW[0] // 4, 4, 3)
+    return np.asarray(boxes.mean(axis=(1, 3)))
+
+
+def nearest_preset(excluded: str, bloom: Bloom) -> tuple[str, float]:
     """Return the other preset whose bloom of four lights is nearest, at its best intensity."""
-    image = lights(VIEW)
-    target = np.asarray(bloom(image))[..., :3].astype(np.float64)
-    if not np.linalg.norm(target) > 0:
+    target = sketch(bloom)
+    length = float(np.linalg.norm(target))
+    if not length > 0:
         return "", math.nan
     results = {}
-    for name in presets:
-        if excluded == name:
-            continue
-        light = preset_bloom(renderer, name).astype(np.float64)
-        power = float((light * light).sum())
-        factor = max(0.0, float((light * target).sum()) / power) if power > 0 else 0.0
-        results[name] = float(np.linalg.norm(target - factor * light) / np.linalg.norm(target))
+    with np.load(PRESET_BLOOMS) as blooms:
+        for name in blooms.keys() - {excluded}:
+            light = blooms[name].astype(np.float64)
+            factor = max(0.0, float((light * target).sum()) / float((light * light).sum()))
+            results[name] = float(np.linalg.norm(target - factor * light)) / length
     best = min(results, key=lambda name: results[name])
     return best, results[best]
-
-
-#: Blooms of presets by the adapter and their name: most of the time goes into their pipelines.
-_BLOOMS: Final[dict[tuple[str, str], NDArray[Any]]] = {}
-
-
-def preset_bloom(renderer: Renderer, name: str) -> NDArray[Any]:
-    """Return the bloom that a preset gives to four lights, rendered once."""
-    key = (renderer.info.summary, name)
-    if key not in _BLOOMS:
-        _BLOOMS[key] = shown(renderer, exact(presets[name]), "bloom")(lights(VIEW))
-    return _BLOOMS[key]

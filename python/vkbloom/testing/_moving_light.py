@@ -12,9 +12,11 @@ from numpy.typing import NDArray
 
 from vkbloom._argument_types import checked
 from vkbloom._checks import check_index, check_number
-from vkbloom.testing._deviations import fail, is_within
+from vkbloom.testing._deviations import fail, judge
 from vkbloom.testing._point_spread import border_share, check_inside
 from vkbloom.testing._probe import Bloom, Image, Probe
+
+__tracebackhide__ = True
 
 #: Limits of the figures of a moving light.
 LIMITS: Final = {"ripple": 0.02, "jitter": 0.1, "shimmer": 0.1, "growth": 0.05}
@@ -125,7 +127,6 @@ def stability(
         With the figures `ripple` of the energy, `jitter` of the centroid, `flicker` and `shimmer`
         of the peak, and `growth` of the radius.
     """
-    __tracebackhide__ = True
     check_index("texel", texel, 1, 4096)
     check_number("steps", steps, 1e-3, 1e3)
     probe = probe or _wide(texel)
@@ -193,7 +194,6 @@ def assert_stable(
     texel, steps, probe
         As for `stability`. The image must be large enough that no light reaches the border.
     """
-    __tracebackhide__ = True
     limits = {"ripple": ripple, "jitter": jitter, "flicker": flicker, "growth": growth}
     for name, limit in limits.items():
         check_number(name, limit, 0.0, math.inf)
@@ -204,7 +204,6 @@ def assert_stable(
 
 def check_stable(figures: Stability, limits: Mapping[str, float], probe: Probe) -> None:
     """Raise AssertionError if a figure is above its limit, ValueError if light is cut off."""
-    __tracebackhide__ = True
     if not figures.energy.max() > 0:
         fail(
             "assert_stable",
@@ -213,34 +212,23 @@ def check_stable(figures: Stability, limits: Mapping[str, float], probe: Probe) 
             "allowed",
         )
     check_inside(figures.at_border, probe.size)
+    change = "changes by {:.3g} of its mean"
     shown = {
-        "ripple": (figures.energy, "the energy of the bloom", "changes by {:.3g} of its mean"),
+        "ripple": ("energy", figures.energy, change),
         "jitter": (
-            np.hypot(figures.shift[..., 0], figures.shift[..., 1]),
-            "the centroid of the bloom",
+            *("centroid", np.hypot(figures.shift[..., 0], figures.shift[..., 1])),
             "is {:.3g} pixels from that of the image",
         ),
-        "shimmer": (
-            figures.peak / figures.ideal,
-            "the peak of the bloom",
-            "changes by {:.3g} of its mean, beside that of a convolution",
-        ),
-        "growth": (figures.radius, "the radius of the bloom", "changes by {:.3g} of its mean"),
+        "shimmer": ("peak", figures.peak / figures.ideal, f"{change}, beside a convolution's"),
+        "growth": ("radius", figures.radius, change),
     }
-    laws = {
-        name: f"{shown[name][1]} stays the same while a light smaller than a pixel moves"
-        for name in limits
-    }
-    off = {name: getattr(figures, name) for name in limits}
-    over = [name for name in limits if not is_within(laws[name], off[name], limits[name], name)]
-    for name in over[:1]:
-        values, what, how = shown[name]
-        fail(
-            "assert_stable",
-            laws[name],
-            f"{what} {how.format(off[name])}, {_extremes(figures, values)}: {limits[name]:.3g} "
-            "allowed" + f"; also above their limits: {', '.join(over[1:])}" * bool(over[1:]),
-        )
+    measured = []
+    for name, limit in limits.items():
+        (what, values, how), off = shown[name], getattr(figures, name)
+        text = f"the {what} of the bloom {how.format(off)}, {_extremes(figures, values)}"
+        measured.append((name, off, limit, f"{text}: {limit:.3g} allowed"))
+    law = "the bloom stays the same while a light smaller than a pixel moves"
+    judge("assert_stable", law, *measured)
 
 
 def area_sampled(

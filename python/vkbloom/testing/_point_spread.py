@@ -9,8 +9,10 @@ import numpy as np
 
 from vkbloom._argument_types import checked
 from vkbloom._checks import check_number
-from vkbloom.testing._deviations import compare_with_law, fail, is_within
+from vkbloom.testing._deviations import compare_with_law, fail, judge
 from vkbloom.testing._probe import Bloom, Image, Probe
+
+__tracebackhide__ = True
 
 _DEFAULT = Probe()
 # Allowed share of a point's light in the outermost pixels. Clamping to the edge at most doubles
@@ -52,7 +54,6 @@ def point_spread(
            [0.125 , 0.25  , 0.125 ],
            [0.0625, 0.125 , 0.0625]])
     """
-    __tracebackhide__ = True
     return measured_spread(bloom, probe, at)[0]
 
 
@@ -73,7 +74,6 @@ def assert_separable(bloom: Bloom, probe: Probe = _DEFAULT) -> None:
     probe : Probe
         `value` must be low enough that nothing is clamped.
     """
-    __tracebackhide__ = True
     spread, error = measured_spread(bloom, probe, None)
     _check_lit("assert_separable", spread, error)
     product = np.empty_like(spread)
@@ -121,7 +121,6 @@ def assert_centroid_kept(
         Allowed distance along each axis in pixels, in addition to the effect of the errors of
         single values.
     """
-    __tracebackhide__ = True
     check_number("within", within, 0.0, math.inf)
     spread, error = measured_spread(bloom, probe, at)
     _check_lit("assert_centroid_kept", spread, error)
@@ -133,14 +132,12 @@ def assert_centroid_kept(
             distance = np.arange(len(profile), dtype=np.float64) - position[axis]
             off = float((profile * distance).sum() / profile.sum())
             allowed = within + _moment_error(spread[:, :, channel], error, axis, distance)
+            text = (
+                f"the centroid is {name} {position[axis] + off:.6g}, {off:+.3g} pixels from "
+                f"{name} {position[axis]}, channel {channel}: {allowed:.3g} allowed"
+            )
             law = "the centroid of the light of a pixel is that pixel"
-            if not is_within(law, abs(off), allowed):
-                fail(
-                    "assert_centroid_kept",
-                    law,
-                    f"the centroid is {name} {position[axis] + off:.6g}, {off:+.3g} pixels from "
-                    f"{name} {position[axis]}, channel {channel}: {allowed:.3g} allowed",
-                )
+            judge("assert_centroid_kept", law, ("off", abs(off), allowed, text))
 
 
 def measured_spread(
@@ -150,7 +147,6 @@ def measured_spread(
     dark: tuple[Image, float] | None = None,
 ) -> tuple[Image, float]:
     """Return the point spread and the error of its values; `dark` are those of a black image."""
-    __tracebackhide__ = True
     position = at or probe.centre
     if not all(0 <= number < side for number, side in zip(position, probe.size, strict=True)):
         raise ValueError(f"at: {at!r} is not inside an image of {probe.size}")
@@ -161,7 +157,6 @@ def measured_spread(
 
 def _check_lit(assertion: str, spread: Image, error: float) -> None:
     """Raise AssertionError if the point spread is black."""
-    __tracebackhide__ = True
     for channel in range(spread.shape[2]):
         largest = float(np.abs(spread[:, :, channel]).max())
         if largest <= error or not spread[:, :, channel].sum() > 0:

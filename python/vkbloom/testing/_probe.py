@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 
 from vkbloom._checks import check_index, check_number, check_size
 
+__tracebackhide__ = True
+
 #: An image in real units: integers are scaled to 0..1.
 Image: TypeAlias = NDArray[np.float64]
 
@@ -116,7 +118,6 @@ class Probe:
 
         The pixel `exempt`, x and y, is ignored; it is 0 in the result.
         """
-        __tracebackhide__ = True
         if not callable(bloom):
             raise TypeError(f"bloom: {bloom!r} is not callable")
         given = self.given(image)
@@ -135,7 +136,6 @@ class Probe:
         self, result: object, given: NDArray[Any], *, exempt: tuple[int, int] | None = None
     ) -> tuple[Image, float]:
         """Check the result of a bloom for the input `given`, and return the same as `apply`."""
-        __tracebackhide__ = True
         if isinstance(result, Mapping):
             raise TypeError(
                 "bloom: it returns a mapping; name the framebuffer, for example "

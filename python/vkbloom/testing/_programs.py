@@ -21,6 +21,8 @@ from vkbloom._checks import check_number
 from vkbloom._io.array_files import read, write
 from vkbloom.testing._probe import Bloom
 
+__tracebackhide__ = True
+
 _PLACEHOLDERS: Final = ("{input}", "{output}")
 _PLACEHOLDER: Final = re.compile("|".join(map(re.escape, _PLACEHOLDERS)))
 #: Bits of the integers in a file, by OpenImageIO's name of the type.
@@ -82,7 +84,6 @@ class Program:
 
     def __call__(self, image: NDArray[Any]) -> NDArray[Any]:
         """Run the program once."""
-        __tracebackhide__ = True
         height, width = image.shape[:2]
         with tempfile.TemporaryDirectory(prefix="vkbloom-") as folder:
             source, target = (Path(folder) / f"{name}{self._suffix}" for name in ("in", "out"))
@@ -110,7 +111,6 @@ class Program:
         return f"command {Path(self._argv[0]).name!r}"
 
     def _run(self, values: Mapping[str, str]) -> None:
-        __tracebackhide__ = True
         words = [_PLACEHOLDER.sub(lambda match: values[match[0]], word) for word in self._argv]
         # A session of its own, so that what the program started ends with it.
         with subprocess.Popen(
@@ -136,7 +136,6 @@ class Program:
             )
 
     def _read(self, target: Path) -> NDArray[Any]:
-        __tracebackhide__ = True
         try:
             pixels, about = read(target, premultiplied=True, metadata=True)
         except (OSError, ValueError) as error:

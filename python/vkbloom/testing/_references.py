@@ -16,8 +16,9 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom._io import image_reading, image_writing, safe_writing
-from vkbloom._io.images import Picture
+from vkbloom._io import array_files, image_reading, safe_writing
+
+__tracebackhide__ = True
 
 #: Allowed names of references and framebuffers: safe as file names on every system.
 NAME: Final = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_+,=.-]{0,99}")
@@ -25,13 +26,8 @@ _FRAMEBUFFER: Final = re.compile(r"[A-Za-z_][A-Za-z0-9_-]{0,99}")
 _FILE: Final = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_+,=.-]*")
 _FORMAT: Final = 2
 
-# Extension, and OpenImageIO's name of the number type, by the array's dtype.
-_FILES: Final[Mapping[str, tuple[str, str]]] = {
-    "uint8": (".png", "uint8"),
-    "uint16": (".png", "uint16"),
-    "float16": (".exr", "half"),
-    "float32": (".exr", "float"),
-}
+# Extension by the array's dtype.
+_FILES: Final = {"uint8": ".png", "uint16": ".png", "float16": ".exr", "float32": ".exr"}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -136,24 +132,10 @@ class ReferenceFolder:
         return pixels.reshape(shape)
 
     def _write_image(self, name: str, framebuffer: str, image: NDArray[Any]) -> dict[str, Any]:
-        suffix, numbers = _FILES[image.dtype.name]
+        suffix = _FILES[image.dtype.name]
         file = self.path / f"{name}.{framebuffer}{suffix}"
-        pixels = image.reshape(_with_channels(image.shape))
-        is_grey = pixels.shape[2] < 3
-        if is_grey:
-            # Channels of a grey image in a `Picture`: grey three times, then alpha.
-            pixels = pixels[:, :, [0, 0, 0, *range(1, pixels.shape[2])]]
-        picture = Picture.of_values(np.ascontiguousarray(pixels), numbers)
-        image_writing.save(
-            Picture(
-                pixels=picture.pixels,
-                encoding=None,
-                numbers=numbers,
-                grey=is_grey,
-                stored=picture.stored,
-            ),
-            file,
-        )
+        # What each type of file has, so that no value changes.
+        array_files.write(file, image, premultiplied=suffix == ".exr")
         entry = {
             "name": framebuffer,
             "file": file.name,
@@ -168,7 +150,6 @@ class ReferenceFolder:
 
 def check_name(name: str) -> None:
     """Raise TypeError or ValueError if the name is not allowed for a reference."""
-    __tracebackhide__ = True
     if not isinstance(name, str):
         raise TypeError(f"name: {name!r} is not a str")
     if not NAME.fullmatch(name):

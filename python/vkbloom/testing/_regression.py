@@ -19,6 +19,8 @@ from vkbloom._views.tolerances import Tolerances
 from vkbloom.testing._judging import Verdict, first_failure, judge
 from vkbloom.testing._references import Origin, Reference, ReferenceFolder, check_name
 
+__tracebackhide__ = True
+
 
 class Limits(TypedDict, total=False):
     """The fields of `Tolerances`."""
@@ -98,7 +100,6 @@ class FrameRegression:
             Fields of `vkbloom.testing.Tolerances`. With ``atol=math.inf`` only SSIM and FLIP
             decide.
         """
-        __tracebackhide__ = True
         tolerances = Tolerances(**limits)
         given = _Given(
             self._chosen_name(name), _images("frames", frames), _origin(frames, info), tolerances
@@ -148,7 +149,6 @@ class FrameRegression:
         **limits
             As for `check`.
         """
-        __tracebackhide__ = True
         tolerances = Tolerances(**limits)
         if name is not None:
             check_name(name)
@@ -161,7 +161,6 @@ class FrameRegression:
         self._conclude(given, reference, judge(reference.images, given.images, tolerances))
 
     def _chosen_name(self, name: str | None) -> str:
-        __tracebackhide__ = True
         if name is not None:
             check_name(name)
             return name
@@ -174,7 +173,6 @@ class FrameRegression:
 
     def _conclude(self, given: _Given, reference: Reference, verdicts: tuple[Verdict, ...]) -> None:
         """Raise AssertionError if a framebuffer failed."""
-        __tracebackhide__ = True
         if first_failure(verdicts) is None:
             return
         message = _message(given, verdicts, reference)
@@ -209,7 +207,6 @@ def name_of_test(test: str) -> str:
 
 def _images(field: str, frames: object) -> dict[str, NDArray[Any]]:
     """Return framebuffers by name, in native byte order."""
-    __tracebackhide__ = True
     if isinstance(frames, np.ndarray):
         frames = {"image": frames}
     if not isinstance(frames, Mapping) or not frames:

@@ -11,10 +11,12 @@ import numpy as np
 
 from vkbloom._argument_types import checked
 from vkbloom._checks import check_number
-from vkbloom.testing._deviations import NotTaken, fail, figure, is_within
+from vkbloom.testing._deviations import NotTaken, fail, figure, is_within, judge
 from vkbloom.testing._moving_light import moments
 from vkbloom.testing._point_spread import border_share, check_inside, point_spread
 from vkbloom.testing._probe import Bloom, Image, Probe, beside_multiple
+
+__tracebackhide__ = True
 
 _DEFAULT = Probe()
 #: Shares of the peak whose contours are measured.
@@ -81,26 +83,26 @@ def assert_round(bloom: Bloom, probe: Probe = _DEFAULT, *, limit: float = 1.35) 
     probe : Probe
     limit : float
     """
-    __tracebackhide__ = True
     check_round(point_spread(bloom, probe), limit)
 
 
 def check_round(spread: Image, limit: float) -> None:
     """Raise AssertionError if a contour of a point spread is not round."""
-    __tracebackhide__ = True
     check_number("limit", limit, 1.0, math.inf)
     ratios = _contours(spread)
     if not ratios:
         raise NotTaken("probe: no contour is inside of the image and three pixels from the middle")
     law = "the contours of the bloom of a pixel are circles"
-    reasons = [
-        f"at {level:g} of the peak, the contour is {ratio:.3g} times as far in one direction as in "
-        "another"
-        for level, ratio in ratios.items()
-        if not is_within(law, ratio, limit, f"round_{level:g}")
-    ]
-    if reasons:
-        fail("assert_round", law, f"{'; '.join(reasons)}: {limit:.3g} allowed")
+    text = "of the peak, the contour is {:.3g} times as far in one direction as in another"
+    allowed = f": {limit:.3g} allowed"
+    judge(
+        "assert_round",
+        law,
+        *(
+            (f"round_{level:g}", ratio, limit, f"at {level:g} {text.format(ratio)}{allowed}")
+            for level, ratio in ratios.items()
+        ),
+    )
 
 
 @checked
@@ -124,14 +126,12 @@ def assert_sizes(
         Largest difference from the size 16 n: "width", "energy" and "flat" as shares, "centroid" in
         pixels; by default 0.05, 0.05, 0.1, 0.3.
     """
-    __tracebackhide__ = True
     dark = float(probe.apply(bloom, probe.flat(0.0))[0].mean())
     check_sizes(bloom, probe, dark, SIZE_LIMITS | dict(limits or {}))
 
 
 def check_sizes(bloom: Bloom, probe: Probe, dark: float, allowed: Mapping[str, float]) -> None:
     """Raise AssertionError if sizes matter; `dark` is the mean of the bloom of a black image."""
-    __tracebackhide__ = True
     # Small images first, which are faster. Where light leaves them, the probe's size decides.
     reasons: dict[str, str] = {}
     for most in (_SMALL, max(probe.size)):
@@ -158,7 +158,6 @@ def _compare_sizes(
 
     In a small image that light leaves, the first difference is enough.
     """
-    __tracebackhide__ = True
     width, height = probe.size
     # At the same pixels in all sizes, since a chain of halved images spreads each differently.
     at = ((width - _SQUARE) // 2, (height - _SQUARE) // 2)
@@ -206,7 +205,6 @@ def _square_figures(
     bloom: Bloom, probe: Probe, at: tuple[int, int], dark: float
 ) -> tuple[float, float, float, float, float]:
     """Return width, energy, shift along x and y, and share at the border of a square's bloom."""
-    __tracebackhide__ = True
     image = probe.flat(0.0)
     left, top = at
     image[top : top + _SQUARE, left : left + _SQUARE] = probe.value

@@ -12,9 +12,11 @@ from numpy.typing import NDArray
 from vkbloom._argument_types import checked
 from vkbloom._checks import check_number
 from vkbloom.testing._border import takes
-from vkbloom.testing._deviations import fail, figure, is_within
+from vkbloom.testing._deviations import fail, figure, is_within, judge
 from vkbloom.testing._moving_light import area_sampled
 from vkbloom.testing._probe import Bloom, Image, Probe, small_probe
+
+__tracebackhide__ = True
 
 __all__ = ["HISTORY_LIMITS", "JITTER_LIMITS", "assert_history", "assert_jitter", "halton"]
 
@@ -92,7 +94,6 @@ def assert_jitter(
     AssertionError
         The law does not hold, or a result is not finite.
     """
-    __tracebackhide__ = True
     check_number("feedback", feedback, 0.0, 1.0)
     allowed = JITTER_LIMITS | dict(limits or {})
     law = "the light of a bloom does not change with the jitter of the camera"
@@ -124,7 +125,6 @@ def _flickers(
     feedback: float,
 ) -> Iterator[tuple[str, str, float]]:
     """Yield the positions, the kind and the value of each figure of a scene."""
-    __tracebackhide__ = True
     frames = [scene(probe, x, y) for x, y in halton(len(_ORDER))]
     lights: list[float] = []
     off = math.inf
@@ -190,7 +190,6 @@ def _taa(frames: list[Image], feedback: float) -> Iterator[Image]:
 
 def _light(bloom: Bloom, probe: Probe, share: Image) -> float:
     """Return the sum of the bloom of a plane, whose values are shares of the probe's value."""
-    __tracebackhide__ = True
     image = np.repeat(share[:, :, np.newaxis], probe.colours, axis=2) * probe.value
     return float(probe.apply(bloom, image)[0].sum())
 
@@ -198,41 +197,28 @@ def _light(bloom: Bloom, probe: Probe, share: Image) -> float:
 def _threshold_ratio(bloom: Bloom, probe: Probe, limit: float) -> float:
     """Return the value from which a pixel blooms, divided by that of a flat image.
 
-    1 if the ratio is at most the limit; far above it, both are within a factor of the limit.
+    1 if the ratio is at most the limit, or a pixel of the probe's value does not bloom.
     """
-    __tracebackhide__ = True
 
     def blooms(value: float, pixel: bool) -> bool:
         image = probe.point(probe.centre, value) if pixel else probe.flat(value)
         return bool(probe.apply(bloom, image)[0].max() > 1e-6 * value)
 
-    def bracket(pixel: bool, low: float) -> tuple[float, float]:
-        """Return values of which the second one, and not the first one, blooms."""
-        high = 4 * low
-        while high < probe.value and not blooms(high, pixel):
-            low, high = high, 4 * high
-        return low, high
-
-    def narrowed(pixel: bool, low: float, high: float, accuracy: float) -> tuple[float, float]:
-        while high > accuracy * low:
+    def first(pixel: bool, low: float) -> float:
+        """Return the value from which an image blooms, by bisection of its logarithm."""
+        high = probe.value
+        while high > _ACCURACY * low:
             middle = math.sqrt(low * high)
             low, high = (low, middle) if blooms(middle, pixel) else (middle, high)
-        return low, high
+        return high
 
     least = _LEAST * probe.value
     if blooms(least, False):
         return 1.0
-    coarse = max(limit, _ACCURACY)
-    flat = narrowed(False, *bracket(False, least), coarse)
-    # A flat image needs more than this divided by the limit.
-    if blooms(flat[1], True):
+    flat = first(False, least)
+    if blooms(min(flat * limit, probe.value), True):
         return 1.0
-    lit = bracket(True, flat[1])
-    if lit[1] >= probe.value:
-        return 1.0
-    if lit[0] < coarse * flat[1]:
-        flat, lit = (narrowed(bool(i), *item, _ACCURACY) for i, item in enumerate((flat, lit)))
-    return narrowed(True, *lit, coarse)[1] / flat[1]
+    return first(True, flat) / flat if blooms(probe.value, True) else 1.0
 
 
 @checked
@@ -260,7 +246,6 @@ def assert_history(
     AssertionError
         The law does not hold, or a result is not finite.
     """
-    __tracebackhide__ = True
     allowed = HISTORY_LIMITS | dict(limits or {})
     law = "the bloom of an image depends on that image alone"
     probe = small_probe(probe)
@@ -284,20 +269,19 @@ def assert_history(
     left = [float(np.abs(image - images[-1]).sum()) / last for image in images]
     sums = np.array([image.sum() for image in images[count // 2 :]])
     steady = float(np.ptp(sums) / sums.mean()) if sums.mean() > 0 else math.inf
-    figure("frames", float(sum(share > allowed["stays"] for share in left)))
-    reasons = []
-    if not is_within(law, steady, allowed["steady"], "steady"):
-        reasons.append(
-            f"the bloom of an image that stays the same changes by {steady:.3g} of its mean"
-        )
-    if not is_within(law, left[0], allowed["stays"], "stays"):
-        reasons.append(
-            f"after a light has jumped, {left[0]:.3g} of the light differs from what it becomes, "
-            f"and {sum(share > allowed['stays'] for share in left)} frames are above "
-            f"{allowed['stays']:g}"
-        )
-    if reasons:
-        fail("assert_history", law, "; ".join(reasons))
+    above = sum(share > allowed["stays"] for share in left)
+    figure("frames", float(above))
+    changes = f"the bloom of an image that stays the same changes by {steady:.3g} of its mean"
+    stays = (
+        f"after a light has jumped, {left[0]:.3g} of the light differs from what it becomes, "
+        f"and {above} frames are above {allowed['stays']:g}"
+    )
+    judge(
+        "assert_history",
+        law,
+        ("steady", steady, allowed["steady"], changes),
+        ("stays", left[0], allowed["stays"], stays),
+    )
 
 
 def _square(probe: Probe, at: tuple[int, int]) -> Image:

@@ -9,8 +9,10 @@ from numpy.typing import NDArray
 
 from vkbloom._argument_types import checked
 from vkbloom._checks import check_number
-from vkbloom.testing._deviations import NotTaken, fail, is_within
+from vkbloom.testing._deviations import NotTaken, judge
 from vkbloom.testing._probe import Bloom, Image, Probe, small_probe
+
+__tracebackhide__ = True
 
 _DEFAULT = Probe()
 # Below common thresholds, since a threshold is not linear.
@@ -36,7 +38,6 @@ def assert_alpha(bloom: Bloom, probe: Probe = _DEFAULT, *, limit: float = 0.01) 
     limit : float
         Allowed difference, as a share of the brightest value of the image.
     """
-    __tracebackhide__ = True
     check_number("limit", limit, 0.0, 1.0)
     if probe.dtype.kind == "u" or probe.colours < 3:
         raise NotTaken(f"probe: {probe.colours} channels of {probe.dtype} hold no sum with alpha")
@@ -78,7 +79,6 @@ def _colours_alike(
 
     And whether they are pictures with alpha.
     """
-    __tracebackhide__ = True
     try:
         result = _apply(bloom, probe, colours, alpha)
     except (TypeError, ValueError) as error:
@@ -102,15 +102,12 @@ def _apply(bloom: Bloom, probe: Probe, colours: Image, alpha: Image) -> Image:
 
 def _judge(law: str, off: Image, largest: float, limit: float, where: str) -> None:
     """Compare differences with the limit."""
-    __tracebackhide__ = True
     position = np.unravel_index(int(np.abs(off).argmax()), off.shape)
     share = abs(float(off[position])) / largest
-    if not is_within(law, share, limit, "alpha"):
-        y, x, channel = position
-        fail(
-            "assert_alpha",
-            law,
-            f"{where}x {x}, y {y}, channel {channel} is too "
-            f"{'bright' if off[position] > 0 else 'dark'} by {share:.3g} of the brightest value: "
-            f"{limit:g} allowed",
-        )
+    y, x, channel = position
+    text = (
+        f"{where}x {x}, y {y}, channel {channel} is too "
+        f"{'bright' if off[position] > 0 else 'dark'} by {share:.3g} of the brightest value: "
+        f"{limit:g} allowed"
+    )
+    judge("assert_alpha", law, ("alpha", share, limit, text))

@@ -8,6 +8,8 @@ from vkbloom._argument_types import checked
 from vkbloom._checks import check_number, check_size
 from vkbloom.testing._probe import Bloom, Probe
 
+__tracebackhide__ = True
+
 
 @checked
 def veiling_glare_index(
@@ -40,7 +42,6 @@ def veiling_glare_index(
         0 without glare; the bloom's share of the light far from the patch is near 100 times its
         gain.
     """
-    __tracebackhide__ = True
     probe = Probe(size=size)
     width, height = check_size("patch", (patch, patch) if isinstance(patch, int) else patch)
     if width >= probe.size[0] or height >= probe.size[1]:
