@@ -225,6 +225,7 @@ static void make_tiles(struct vkb_pass_row *row, const struct vkb_shader *shader
         radius *= 2;
     vkb_make_dispatch(row, shader, (uint32_t)(TILE_LOADED - 2 * radius), TILE_ROWS);
     row->constants.radius = radius;
+    row->gains_if_finite = true;
 }
 
 // Adds the composite, and after it the fused pass in strips or in tiles, which may replace it.

@@ -11,7 +11,7 @@ import pytest
 import vkbloom
 from tests.images import random_image
 from tests.methods.test_adjoint_passes import check
-from vkbloom import BlenderGlare, Ghosts, Halo, Pyramid, Renderer, reference
+from vkbloom import BlenderGlare, Ghosts, Pyramid, Renderer, reference
 from vkbloom._gradients.passes import DeviceGradients
 
 
@@ -121,28 +121,6 @@ VARIANTS = ("fragment", "cpu", "gpu")
 #: Sides that are odd and even, one pixel, and less than a sample.
 SIDES = (1, 2, 3, 8, 13, 24, 31)
 SCALES = (0.0, 0.001, -0.1, 0.5, -1.0, 1.0, 1.5, -3.0, 16.0)
-
-
-def scattered(stage: Any) -> Pyramid:
-    return Pyramid(levels=1, glare=(stage,))
-
-
-@pytest.mark.parametrize(
-    "settings",
-    [
-        scattered(Halo()),
-        scattered(Ghosts(scales=(0.001, 0.5), aberration=0.05)),
-        BlenderGlare(type="sun_beams", threshold=None),
-    ],
-)
-def test_samples_that_are_not_on_a_grid_come_from_the_reference(
-    renderer: Renderer, settings: Any
-) -> None:
-    image = random_image(13, 24, channels=3, seed=1).astype(np.float32)
-    cotangents = {"final": image}
-    found = vkbloom.vjp(image, settings, renderer=renderer)[1](cotangents)
-    assert not isinstance(found, DeviceGradients)
-    check(found, reference.vjp(image, settings)[1](cotangents), "image")
 
 
 def ghosts(random: np.random.Generator, alpha: Any) -> Pyramid:
