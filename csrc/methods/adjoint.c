@@ -17,9 +17,6 @@ static vkb_transpose *const transposes[VKB_BLOCK_COUNT] = {
     [VKB_BLOCK_prefilter] = vkb_transpose_groups,
     [VKB_BLOCK_blender_end] = vkb_transpose_blender_end,
     [VKB_BLOCK_streaks] = vkb_transpose_streaks,
-    [VKB_BLOCK_flare] = vkb_transpose_flare,
-    [VKB_BLOCK_dirt] = vkb_transpose_dirt,
-    [VKB_BLOCK_star] = vkb_transpose_star,
 };
 
 // The image of a framebuffer's cotangents, a level of the source.

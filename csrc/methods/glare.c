@@ -154,7 +154,6 @@ bool vkb_add_flare(const struct vkb_levels *levels, const struct vkb_stage *stag
     if (ghosts)
         add_before(&row, before);
     row.block = VKB_BLOCK_flare;
-    row.no_transpose = !ghosts || values->aberration > 0.0f;
     row.params.flare = (struct vkb_flare_params){
         .threshold = values->threshold,
         .limit = vkb_formats[levels->source->format].limit,

@@ -45,7 +45,6 @@ COMPLETE = (
         "hdrp",
         "godot threshold",
         "blender",
-        "ghosts",
         "unreal standard",
         "halation",
     ),
@@ -56,7 +55,6 @@ BEVY = BevyBloom(max_mip_dimension=16)
 STREAKS = vkbloom.Streaks(
     angle=10, directions=3, iterations=2, halvings=1, colour_shift=0.3, threshold=0.2
 )
-GHOSTS = vkbloom.Ghosts(threshold=0.3, maximum=0.4, vignette=0.3, halvings=0)
 KERNEL = np.random.default_rng(1).random((5, 5)) ** 8
 CASES: dict[str, Any] = {
     "separable": Separable(),
@@ -116,11 +114,8 @@ CASES: dict[str, Any] = {
     "blender streaks": BlenderGlare(type="streaks", threshold=0.3, streaks=3, streaks_angle=20),
     "blender ghosts": BlenderGlare(type="ghosts", threshold=0.3, quality="medium"),
     "blender fog": BlenderGlare(type="fog_glow", threshold=0.3, quality="medium"),
-    "streaks": Separable(
-        threshold=0.3, knee=0.5, glare=(STREAKS, vkbloom.Dirt(seed=1, mode="lerp"))
-    ),
-    "ghosts": UrpBloom(threshold=0.3, glare=(GHOSTS, STREAKS)),
-    "glare alpha": Pyramid(levels=2, alpha="blur", glare=(GHOSTS, STREAKS)),
+    "streaks": Separable(threshold=0.3, knee=0.5, glare=(STREAKS,)),
+    "glare alpha": Pyramid(levels=2, alpha="blur", glare=(STREAKS,)),
     "psf": vkbloom.Convolution(psf=vkbloom.psf.unreal(KERNEL, prefilter=(0.5, 1.2, 1.5))),
 }
 
@@ -317,7 +312,7 @@ def test_the_alpha_gets_nothing_of_the_bloom(renderer: Renderer) -> None:
     cotangents = {"final": random_image(9, 14, channels=4, seed=2).astype(np.float32)}
     streaks = vkbloom.Streaks(halvings=0, iterations=1)
     for settings in (
-        Separable(glare=(streaks, streaks, vkbloom.Dirt(seed=1))),
+        Separable(glare=(streaks, streaks)),
         Separable(glare=(vkbloom.Streaks(halvings=1, iterations=1),)),
         vkbloom.Convolution(psf=KERNEL),
     ):
