@@ -1,7 +1,7 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
-// The complete bloom of an image for GPUs: symmetric kernels along columns and rows. A workgroup writes a tile, and keeps
-// its vertical sums in shared memory between the two.
+// The complete bloom of an image for GPUs: symmetric kernels along columns and rows. A workgroup writes a tile, and
+// keeps its vertical sums in shared memory between the two.
 #include "variants/fused_bloom.glsl"
 
 layout(set = 0, binding = 1) uniform sampler2D image;

@@ -112,7 +112,6 @@ CASES: dict[str, Any] = {
         quality="low", size=1.0, maximum=0.4, threshold=0.3, saturation=0.4
     ),
     "blender streaks": BlenderGlare(type="streaks", threshold=0.3, streaks=3, streaks_angle=20),
-    "blender ghosts": BlenderGlare(type="ghosts", threshold=0.3, quality="medium"),
     "blender fog": BlenderGlare(type="fog_glow", threshold=0.3, quality="medium"),
     "streaks": Separable(threshold=0.3, knee=0.5, glare=(STREAKS,)),
     "glare alpha": Pyramid(levels=2, alpha="blur", glare=(STREAKS,)),

@@ -126,6 +126,7 @@ def scattered(stage: Any) -> Pyramid:
         scattered(Dirt(seed=1)),
         BlenderGlare(type="sun_beams", threshold=None),
         BlenderGlare(type="simple_star", threshold=None),
+        BlenderGlare(type="ghosts", threshold=None),
     ],
 )
 def test_stages_without_adjoint_passes_come_from_the_reference(
