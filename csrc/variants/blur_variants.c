@@ -239,7 +239,19 @@ static bool fits_tiles(const struct vkb_device *device)
         && device->limits.maxComputeWorkGroupInvocations >= TILE_LOADED * TILE_RUNS;
 }
 
-// The same in tiles, for kernels of up to TILE_RADIUS in three steps.
+// For kernels of up to TILE_RADIUS in three steps.
+static void make_tiles(struct vkb_pass_row *row, const struct vkb_shader *shader,
+                       const struct nest *nest)
+{
+    int radius = TILE_RADIUS / 4;
+
+    while (radius < nest->vertical->constants.radius || radius < nest->horizontal->constants.radius)
+        radius *= 2;
+    vkb_make_dispatch(row, shader, (uint32_t)(TILE_LOADED - 2 * radius), TILE_ROWS);
+    row->constants.radius = radius;
+}
+
+// The same in tiles.
 bool vkb_add_tiles(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
                    bool *fits, struct vkb_error *error)
 {
@@ -251,13 +263,7 @@ bool vkb_add_tiles(const struct vkb_variant_choice *choice, const struct vkb_pas
     if (!*fits)
         return true;
     struct vkb_pass_row row = fused_row(choice, &nest);
-    const struct vkb_shader *shader =
-        pass->transposed ? &vkb_shader_tile_mixed_comp : &vkb_shader_tile_comp;
-    int radius = TILE_RADIUS / 4;
-    while (radius < nest.vertical->constants.radius || radius < nest.horizontal->constants.radius)
-        radius *= 2;
-    vkb_make_dispatch(&row, shader, (uint32_t)(TILE_LOADED - 2 * radius), TILE_ROWS);
-    row.constants.radius = radius;
+    make_tiles(&row, pass->transposed ? &vkb_shader_tile_mixed_comp : &vkb_shader_tile_comp, &nest);
     return vkb_add_fullscreen(choice, pass, error)
         && vkb_graph_add_pass(choice->graph, &row, error);
 }
@@ -276,10 +282,10 @@ static const struct vkb_pass_row *sole_adjoint(const struct vkb_graph *graph, ui
 }
 
 // The graph's nest. The formats of image and bloom may differ.
-static bool find_any_nest(const struct vkb_graph *graph, struct nest *nest)
+static bool find_any_nest(const struct vkb_graph *graph, int radius, struct nest *nest)
 {
     for (uint32_t i = 0; i < graph->pass_count; ++i)
-        if (find_nest(graph, &graph->passes[i], STRIP_RADIUS, vkb_writer_of, nest))
+        if (find_nest(graph, &graph->passes[i], radius, vkb_writer_of, nest))
             return true;
     return false;
 }
@@ -288,14 +294,14 @@ static bool find_any_nest(const struct vkb_graph *graph, struct nest *nest)
 // vertical blur, if there is no threshold. The nest's composite is its adjoint then, a factor.
 // The cotangents of the scene are an image, or left to the last pass.
 static bool find_adjoint_nest(const struct vkb_graph *graph, const struct vkb_pass_row *pass,
-                              struct nest *nest)
+                              int radius, struct nest *nest)
 {
     const enum vkb_block filter = VKB_BLOCK_adjoint_filter, composite = VKB_BLOCK_composite;
     const bool thresholds = vkb_transposes(pass, VKB_BLOCK_threshold)
                          && pass->constants.by == BY_SCENE && !pass->constants.masked;
 
     if (!(thresholds || (pass->block == filter && pass->constants.from_image))
-        || !pass->constants.add_own || !find_any_nest(graph, nest))
+        || !pass->constants.add_own || !find_any_nest(graph, radius, nest))
         return false;
     const struct vkb_pass_row *first =
         thresholds ? sole_adjoint(graph, pass->reads[2], filter) : pass;
@@ -326,13 +332,27 @@ static struct vkb_pass_row adjoint_row(const struct vkb_variant_choice *choice,
     return row;
 }
 
+bool vkb_add_adjoint_tiles(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
+                           bool *fits, struct vkb_error *error)
+{
+    struct nest nest;
+
+    *fits =
+        fits_tiles(choice->device) && find_adjoint_nest(&choice->plain, pass, TILE_RADIUS, &nest);
+    if (!*fits)
+        return true;
+    struct vkb_pass_row row = adjoint_row(choice, pass, &nest);
+    make_tiles(&row, &vkb_shader_adjoint_tile_comp, &nest);
+    return vkb_graph_add_pass(choice->graph, &row, error);
+}
+
 bool vkb_add_adjoint_strips(const struct vkb_variant_choice *choice,
                             const struct vkb_pass_row *pass, bool *fits, struct vkb_error *error)
 {
     struct nest nest;
 
-    *fits =
-        find_adjoint_nest(&choice->plain, pass, &nest) && vkb_are_floats(choice, nest.composite);
+    *fits = find_adjoint_nest(&choice->plain, pass, STRIP_RADIUS, &nest)
+         && vkb_are_floats(choice, nest.composite);
     if (!*fits)
         return true;
     struct vkb_pass_row row = adjoint_row(choice, pass, &nest);

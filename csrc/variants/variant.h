@@ -25,7 +25,7 @@ typedef bool vkb_variant_add(const struct vkb_variant_choice *choice,
 // and in tiles.
 vkb_variant_add vkb_add_line, vkb_add_enlarged, vkb_add_strips, vkb_add_tiles;
 // For derivatives of these by the image.
-vkb_variant_add vkb_add_adjoint_strips;
+vkb_variant_add vkb_add_adjoint_strips, vkb_add_adjoint_tiles;
 // Levels of exactly half the size, with taps that are weighted by brightness.
 vkb_variant_add vkb_add_halved_taps;
 // First passes of published methods, with taps among 4 x 4 texels of an image of twice the size, or

@@ -62,6 +62,7 @@ static const struct variant variants_table[] = {
     {VKB_VARIANTS_CPU, "pixels", vkb_add_pixels, 0},
     {VKB_VARIANTS_GPU, "enlarged", vkb_add_enlarged, 0},
     {VKB_VARIANTS_GPU, "tiles", vkb_add_tiles, 0},
+    {VKB_VARIANTS_GPU, "tiles", vkb_add_adjoint_tiles, 0},
     {VKB_VARIANTS_GPU, "tiles", vkb_add_adjoint_filter, 0},
     {VKB_VARIANTS_GPU, "pixels", vkb_add_adjoint_groups, 0},
     {VKB_VARIANTS_GPU, "lines", vkb_add_lines, 0},

@@ -1,17 +1,13 @@
 #version 450
 #extension GL_GOOGLE_include_directive : require
-// The complete bloom of an image for GPUs: symmetric kernels along columns and rows. A workgroup writes a tile, and
-// keeps its vertical sums in shared memory between the two.
+// The complete bloom of an image for GPUs.
 #include "variants/fused_bloom.glsl"
 
 layout(set = 0, binding = 1) uniform sampler2D image;
 #define ENDED_BINDING 2
 #include "lib/ended.glsl"
 layout(set = 0, binding = ENDED_TARGET) uniform writeonly image2D target;
-
-const int RUN = TILE_ROWS / TILE_RUNS;
-
-layout(local_size_x = TILE_LOADED, local_size_y = TILE_RUNS) in;
+#include "variants/tile.glsl"
 
 // The vertical sums, packed in the format of their image. They are stored in planes of words, so
 // that neighbours are in neighbouring banks.
@@ -53,49 +49,16 @@ vec3 value_at(ivec2 place, ivec2 last)
     return thresholded(texelFetch(image, clamp(place, ivec2(0), last), 0).rgb);
 }
 
-// Computes a run of vertical sums in one column and loads each pixel once.
-void sum_vertically(ivec2 place, ivec2 last, int top, int column)
+void end_run(ivec2 place, ivec2 last, inout vec3 run[RUN])
 {
-    vec3 run[RUN];
-    for (int i = 0; i < RUN; ++i)
-        run[i] = vec3(0.0);
-    for (int at = -RADIUS; at < RUN + RADIUS; ++at) {
-        vec3 value = value_at(place + ivec2(0, at), last);
-        for (int i = 0; i < RUN; ++i)
-            if (abs(at - i) <= RADIUS)
-                run[i] += vertical_weight(at - i) * value;
-    }
-    for (int i = 0; i < RUN; ++i)
-        keep_sum(top + i, column, run[i]);
 }
 
-vec3 sum_horizontally(int row, int column)
+void end_row(int row, int column, bool starts, bool ends, inout vec3 sum)
 {
-    vec3 sum = vec3(0.0);
-    for (int tap = -RADIUS; tap <= RADIUS; ++tap)
-        sum += horizontal_weight(tap) * kept_sum(row, column + RADIUS + tap);
-    return sum;
 }
 
-void main()
+vec4 shade(ivec2 pixel, vec3 sum)
 {
-    const int columns = TILE_LOADED - 2 * RADIUS;
-    ivec2 last = textureSize(image, 0) - 1;
-    ivec2 first = ivec2(gl_WorkGroupID.xy) * ivec2(columns, TILE_ROWS);
-    int column = int(gl_LocalInvocationID.x), top = int(gl_LocalInvocationID.y) * RUN;
-
-    sum_vertically(first + ivec2(column - RADIUS, top), last, top, column);
-    barrier();
-    if (column >= columns || first.x + column > last.x)
-        return;
-    for (int i = 0; i < RUN; ++i) {
-        // Consecutive invocations take consecutive rows, so that the accesses of a warp are
-        // adjacent in memory.
-        int row = i * TILE_RUNS + int(gl_LocalInvocationID.y);
-        ivec2 pixel = first + ivec2(column, row);
-        if (pixel.y > last.y)
-            continue;
-        vec4 bloom = vec4(as_stored(sum_horizontally(row, column), FORMAT), 1.0);
-        imageStore(target, pixel, ended(texelFetch(image, pixel, 0), bloom, pixel));
-    }
+    vec4 bloom = vec4(as_stored(sum, FORMAT), 1.0);
+    return ended(texelFetch(image, pixel, 0), bloom, pixel);
 }

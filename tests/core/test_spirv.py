@@ -75,6 +75,7 @@ LOOSE: dict[str, str] = {
     "adjoint_godot_blur.frag": "exp2",
     "adjoint_godot_final.frag": "exp2 sqrt",
     "adjoint_strip.comp": "exp2",
+    "adjoint_tile.comp": "exp2",
     "composite.glsl": "exp2",
     "flare.glsl": "length pow",
     "gbuffer_mesh.glsl": "length",

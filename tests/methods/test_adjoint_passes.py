@@ -192,15 +192,15 @@ def test_the_cubic_filter_of_large_frames_is_transposed(renderer: Renderer) -> N
     check(pullback(cotangents), expected, "image")
 
 
-#: Sizes of several tiles, and kernels of all lengths that tiles have, and whether a curve follows a
-#: sum.
+#: Sizes of several tiles, and kernels of all lengths that tiles have, with the number of passes; 0:
+#: the composite is no sum.
 TILED = (
-    (Separable(threshold=0.5, knee=0.5, tonemap="reinhard"), (35, 61), "f4", True),
-    (Separable(threshold=0.5, blur_scale=2, intensity=0.7), (70, 50), "f4", False),
-    (Separable(blur_scale=4, tonemap="aces"), (9, 40), "f2", True),
-    (Separable(blur_scale=4, composite="screen"), (9, 40), "f2", False),
-    (Separable(alpha="max", threshold=0.2, knee=0.3), (1, 70), "f4", False),
-    (Separable(composite="mix", encoding="srgb", exposure=0.5), (7, 1), "u1", True),
+    (Separable(threshold=0.5, knee=0.5, tonemap="reinhard"), (35, 61), "f4", 2),
+    (Separable(threshold=0.5, blur_scale=2, intensity=0.7), (70, 50), "f4", 1),
+    (Separable(blur_scale=4, tonemap="aces"), (9, 40), "f2", 2),
+    (Separable(blur_scale=4, composite="screen"), (9, 40), "f2", 0),
+    (Separable(alpha="max", threshold=0.2, knee=0.3), (1, 70), "f4", 0),
+    (Separable(composite="mix", encoding="srgb", exposure=0.5), (7, 1), "u1", 2),
 )
 
 
@@ -209,7 +209,7 @@ def test_a_complete_bloom_is_transposed_in_tiles(monkeypatch: pytest.MonkeyPatch
     monkeypatch.setenv("VKBLOOM_VARIANT", "gpu")
     random = np.random.default_rng(1)
     with Renderer("software") as renderer:
-        for settings, size, dtype, curved in TILED:
+        for settings, size, dtype, passes in TILED:
             pixels = random.random((*size, 4)) ** 2 * (255 if dtype == "u1" else 1.5)
             image = pixels.astype(dtype)
             cotangents = {"final": random.standard_normal(image.shape).astype(np.float32)}
@@ -220,7 +220,8 @@ def test_a_complete_bloom_is_transposed_in_tiles(monkeypatch: pytest.MonkeyPatch
             plan = renderer._core.plan(source, floats, None, ("final",), False)
             assert plan
             shaders = [shader for _, shader, *_ in plan.passes]
-            assert ("tile_mixed_comp" in shaders) == curved
+            tiles = ["tile_mixed_comp", "adjoint_tile_comp"]
+            assert (shaders == tiles[2 - passes :]) if passes else (tiles[1] not in shaders)
             # The sums need the images between; the other derivatives keep their bits.
             both = Passes(renderer, Inputs(image), floats, cotangents)
             both.fields()
