@@ -213,41 +213,6 @@ enum vkb_access vkb_pass_reads_as(const struct vkb_pass_row *pass)
                                                 : VKB_ACCESS_DISPATCH_LOADED;
 }
 
-enum vkb_access vkb_graph_rest(const struct vkb_graph *graph, uint32_t image)
-{
-    for (uint32_t i = 0; i < graph->pass_count; ++i)
-        if (vkb_pass_reads(&graph->passes[i], image))
-            return vkb_pass_reads_as(&graph->passes[i]);
-    return graph->images[image].format == VKB_FORMAT_DEPTH32_FLOAT ? VKB_ACCESS_DEPTH_TARGET
-                                                                   : VKB_ACCESS_COPY_SOURCE;
-}
-
-uint32_t vkb_graph_target_uses(const struct vkb_graph *graph, uint32_t first, uint32_t end,
-                               struct vkb_target_use *uses)
-{
-    const struct vkb_pass_row *pass = &graph->passes[first];
-    enum vkb_access during = VKB_ACCESS_COLOR_TARGET;
-    uint32_t count = 0;
-
-    for (uint32_t i = first; i < end; ++i)
-        if (graph->passes[i].blend != VKB_BLEND_NONE)
-            during = VKB_ACCESS_COLOR_BLEND;
-    // Depth first, since the depth test comes first.
-    if (pass->depth != VKB_NO_IMAGE) {
-        enum vkb_access rest = vkb_graph_rest(graph, pass->depth);
-        uses[count++] = (struct vkb_target_use){
-            .before = rest,
-            .during = VKB_ACCESS_DEPTH_TARGET,
-            .after = rest == VKB_ACCESS_DEPTH_TARGET ? VKB_ACCESS_NONE : rest,
-        };
-    }
-    for (uint32_t i = 0; i < pass->target_count; ++i) {
-        enum vkb_access rest = vkb_graph_rest(graph, pass->targets[i]);
-        uses[count++] = (struct vkb_target_use){.before = rest, .during = during, .after = rest};
-    }
-    return count;
-}
-
 uint32_t vkb_graph_find(const struct vkb_graph *graph, const char *name)
 {
     for (uint32_t i = 0; i < graph->image_count; ++i)
@@ -266,10 +231,7 @@ void vkb_graph_set_usages(struct vkb_graph *graph)
 {
     for (uint32_t i = 0; i < graph->image_count; ++i) {
         struct vkb_image_row *row = &graph->images[i];
-        const enum vkb_access rest = vkb_graph_rest(graph, i);
-        row->usage = (row->framebuffer || rest == VKB_ACCESS_COPY_SOURCE
-                          ? vkb_access_usage(VKB_ACCESS_COPY_SOURCE)
-                          : 0)
+        row->usage = (row->framebuffer ? vkb_access_usage(VKB_ACCESS_COPY_SOURCE) : 0)
                    | (row->serial ? vkb_access_usage(VKB_ACCESS_COPY_TARGET) : 0);
     }
     for (uint32_t i = 0; i < graph->pass_count; ++i) {

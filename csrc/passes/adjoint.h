@@ -102,8 +102,4 @@ vkb_transpose vkb_transpose_blur, vkb_transpose_filter, vkb_transpose_gather,
 vkb_transpose vkb_transpose_groups;
 vkb_transpose vkb_transpose_streaks;
 
-// Accumulates the cotangents of what a convolution's prefilter of bright colours makes of the glow.
-bool vkb_transpose_bright(struct vkb_adjoint *adjoint, const float prefilter[3], uint32_t glow,
-                          uint32_t cotangents, enum vkb_mode alpha, struct vkb_error *error);
-
 #endif

@@ -1,4 +1,4 @@
-// The adjoints of rays of streaks, and of the prefilter of a convolution.
+// The adjoints of rays of streaks.
 #include "passes/adjoint.h"
 
 // Accumulates the cotangents of another image as they are.
@@ -41,20 +41,4 @@ bool vkb_transpose_streaks(struct vkb_adjoint *adjoint, const struct vkb_pass_ro
     row = vkb_slope_row(adjoint, pass, &vkb_shader_adjoint_above_frag, 1);
     row.reads[1] = moved;
     return vkb_accumulate_cotangent(adjoint, &row, source, error);
-}
-
-bool vkb_transpose_bright(struct vkb_adjoint *adjoint, const float prefilter[3], uint32_t glow,
-                          uint32_t cotangents, enum vkb_mode alpha, struct vkb_error *error)
-{
-    const uint32_t reads[] = {glow, cotangents};
-    struct vkb_pass_row row = vkb_adjoint_row(&vkb_shader_adjoint_bright_frag, reads, 2);
-
-    row.constants.alpha = alpha;
-    row.block = VKB_BLOCK_adjoint_bright;
-    row.params.adjoint_bright = (struct vkb_adjoint_bright_params){
-        .prefilter_min = prefilter[0],
-        .prefilter_max = prefilter[1],
-        .prefilter_factor = prefilter[2],
-    };
-    return vkb_accumulate_cotangent(adjoint, &row, glow, error);
 }

@@ -122,7 +122,8 @@ bool vkb_scene_begin(const struct vkb_device *device, struct vkb_commands *comma
              && load_textures(device, commands->buffer, staging, data, scene, error)
              && vkb_buffer_flush(device, &staging->buffer, error);
     if (done)
-        vkb_barrier_record_upload(device, commands->buffer);
+        vkb_barrier_record(device, commands->buffer, NULL, true, VKB_ACCESS_COPY_TARGET,
+                           VKB_ACCESS_VERTICES);
     else
         vkb_scene_destroy(device, scene);
     return done;

@@ -249,6 +249,7 @@ static void make_tiles(struct vkb_pass_row *row, const struct vkb_shader *shader
         radius *= 2;
     vkb_make_dispatch(row, shader, (uint32_t)(TILE_LOADED - 2 * radius), TILE_ROWS);
     row->constants.radius = radius;
+    row->gains_if_finite = true;
 }
 
 // The same in tiles.

@@ -17,7 +17,7 @@ import pytest
 import vkbloom
 from tests.exhaustive import EXHAUSTIVE
 from tests.processes import output, python
-from vkbloom._grid import memory
+from vkbloom._grid import grid
 
 # Sends SIGINT to itself at an import, counted from the moment at which the program answers it.
 AT_AN_IMPORT = """
@@ -119,7 +119,7 @@ def test_doctor_does_not_blame_the_driver() -> None:
 def test_grids_leave_a_reserve(monkeypatch: pytest.MonkeyPatch, renderer: vkbloom.Renderer) -> None:
     image = np.zeros((16, 16, 4), np.float32)
     size = 2 * image.nbytes
-    monkeypatch.setattr(memory, "memory_left", lambda: size + size // 20)
+    monkeypatch.setattr(grid, "memory_left", lambda: size + size // 20)
     with pytest.raises(MemoryError, match="a tenth as reserve"):
         vkbloom.grid(image, axes={"exposure": [0, 1]}, renderer=renderer)
 

@@ -2,13 +2,12 @@
 
 Half of them use one renderer, the others many. Each result must equal what one thread gave before,
 bit by bit. Arrays on the device are those of the stand-in for CUDA, and one of the methods is an
-own one. Prints how many calls were made, and whether the GIL is off; fails if a function or method
-of the core was not among them. VKBLOOM_VALIDATED=1: the renderers are validated.
+own one. Prints how many calls were made, and whether the GIL is off. VKBLOOM_VALIDATED=1: the
+renderers are validated.
 """
 
 from __future__ import annotations
 
-import contextlib
 import gc
 import os
 import random
@@ -16,10 +15,9 @@ import sys
 import tempfile
 import threading
 from collections import Counter, deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from types import BuiltinFunctionType, MethodDescriptorType, ModuleType
 from typing import Any, Final
 
 import numpy as np
@@ -270,50 +268,14 @@ def same(got: Any, right: Any) -> bool:
     )
 
 
-def entry_points() -> set[str]:
-    """Return all functions and methods of the core."""
-    kinds = [one for one in vars(_core).values() if isinstance(one, type)]
-    owners: list[Any] = [_core, *(kind for kind in kinds if not issubclass(kind, Exception))]
-    return {
-        f"{owner.__name__}.{name}"
-        for owner in owners
-        for name, one in vars(owner).items()
-        if isinstance(one, BuiltinFunctionType | MethodDescriptorType) and name[0] != "_"
-    }
-
-
-@contextlib.contextmanager
-def recorded(called: set[str]) -> Iterator[None]:
-    """Add the functions and methods that this thread calls."""
-
-    def note(frame: object, event: str, called_now: Any) -> None:
-        del frame
-        if event == "c_call":
-            owner: Any = called_now.__self__
-            kind: Any = owner if isinstance(owner, ModuleType) else type(owner)
-            called.add(f"{kind.__name__}.{called_now.__name__}")
-
-    sys.setprofile(note)
-    try:
-        yield
-    finally:
-        sys.setprofile(None)
-
-
 def play(calls: int) -> Counter[str]:
     """Make so many calls; return how often each was made."""
     names = {call.__name__: call for call in CALLS}
     kinds = range(len(SETTINGS))
     keys = [(name, which, size) for name in names for which in kinds for size in range(3)]
-    called: set[str] = set()
     with Renderer() as single, tempfile.TemporaryDirectory() as folder:
         stand_in.load(Path(folder), single.info)
-        with recorded(called):
-            right = {key: names[key[0]](single, *key[1:]) for key in keys}
-    missing = entry_points() - called
-    # Without VK_EXT_headless_surface, no screen is opened. The last one only raises.
-    allowed = {"Renderer.show", "Renderer.close_screen", "vkbloom._core.fail_without_adapter"}
-    assert missing <= allowed, missing
+        right = {key: names[key[0]](single, *key[1:]) for key in keys}
     validation = "VKBLOOM_VALIDATED" in os.environ
     renderers = [Renderer(validation=validation) for _ in range(1 + MANY)]
     start = threading.Barrier(THREADS)

@@ -87,17 +87,6 @@ def test_pages_are_a_buffer(own: Renderer) -> None:
     assert (array == 5).all()
 
 
-def test_an_array_given_back_is_written_in_place(own: Renderer) -> None:
-    image = picture(SIDE - 1, SIDE, dtype="float16")
-    expected = final(own, image, 0.5).copy()
-    array = final(own, image, 1.0)
-    frames = own.apply(
-        image, Separable(bloom=False, exposure=0.5), framebuffers="final", out={"final": array}
-    )
-    assert frames["final"] is array
-    np.testing.assert_array_equal(array, expected)
-
-
 # Slices of an array's pages, at multiples of a pixel and between them.
 @pytest.mark.parametrize("start", [0, 4, 1, 2])
 def test_slices_of_an_array_are_written_in_place(own: Renderer, start: int) -> None:

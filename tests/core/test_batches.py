@@ -4,6 +4,7 @@ errors."""
 from __future__ import annotations
 
 import gc
+import itertools
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
@@ -77,10 +78,14 @@ def test_scenes_one_by_one_and_many(
 
 
 class CountingCore:
-    """A renderer's core that records the number of plans in each submission, and their bytes."""
+    """A renderer's core that records the number of plans in each submission, and their bytes.
 
-    def __init__(self, core: _core.Renderer) -> None:
+    `failing`: the exceptions of submissions, `at5` that of the sixth.
+    """
+
+    def __init__(self, core: _core.Renderer, **failing: Exception) -> None:
         self.core = core
+        self.failing = failing
         self.counts: list[int] = []
         self.sizes: list[int] = []
 
@@ -88,6 +93,8 @@ class CountingCore:
         return getattr(self.core, name)
 
     def run(self, source: Any, plans: Any, arrays: Any) -> _core.Submission:
+        if error := self.failing.get(f"at{len(self.counts)}"):
+            raise error
         self.counts.append(len(plans))
         outputs = [output for plan in plans for output in plan.outputs]
         self.sizes.append(sum(requests.array_bytes(shape, dtype) for _, shape, dtype in outputs))
@@ -108,7 +115,7 @@ def test_frames_that_fill_a_submission_alone(
     results = list(requests.run(work, counting, ("final",)))
     assert len(results) == 20
     assert max(counting.sizes) == frames * image.nbytes
-    for one, (arrays, _, _) in results:
+    for one, arrays, _ in results:
         np.testing.assert_array_equal(arrays["final"], renderer.apply(image, one)["final"])
 
 
@@ -123,7 +130,7 @@ def test_a_submission_is_as_long_as_a_wait_may_be(
     source = _core.image_source(image)
     work = [requests.Request(source, one) for one in settings]
     results = list(requests.run(work, counting, ("final",)))
-    assert [one for one, _ in results] == settings
+    assert [one for one, *_ in results] == settings
     assert max(counting.counts) == most
     assert sum(counting.counts) == len(settings)
 
@@ -299,59 +306,7 @@ def test_an_error_of_the_sequence_comes_in_its_turn(renderer: Renderer, place: i
         next(frames)
 
 
-# The core's errors: from a device that fails where it is told to
-
-
-class Planned:
-    """A plan without framebuffers."""
-
-    outputs = ()
-    size = 0
-
-    def __init__(self, settings: Settings) -> None:
-        self.settings = settings
-
-    def shares_images(self, other: Planned) -> bool:
-        return True
-
-
-class Submitted:
-    def __init__(self, plans: tuple[Planned, ...]) -> None:
-        self.plans = plans
-
-    def wait(self) -> Any:
-        return [{str(plan.settings.exposure): 0.0} for plan in self.plans], (0, 0)
-
-
-class FailingCore:
-    """A core whose submission fails if it has one of the given settings."""
-
-    def __init__(self, failing: dict[Settings, Exception]) -> None:
-        self.failing = failing
-
-    def plan(self, _: object, settings: Settings, __: object) -> Planned:
-        return Planned(settings)
-
-    def run(self, _: object, plans: tuple[Planned, ...], __: object) -> Submitted:
-        for plan in plans:
-            if plan.settings in self.failing:
-                raise self.failing[plan.settings]
-        return Submitted(plans)
-
-
-def run_failing(
-    settings: list[Settings], failing: dict[Settings, Exception]
-) -> tuple[list[Any], Exception | None]:
-    results: list[Any] = []
-    core: Any = FailingCore(failing)
-    nothing: Any = None
-    work = [requests.Request(nothing, one) for one in settings]
-    try:
-        for result in requests.run(work, core, None):
-            results.append(result)
-    except Exception as error:
-        return results, error
-    return results, None
+# The core's errors
 
 
 @pytest.mark.parametrize(
@@ -359,16 +314,18 @@ def run_failing(
     [_core.OutOfMemoryError, _core.ValidationError, _core.DeviceLostError, ValueError],
 )
 def test_an_error_of_the_device_loses_the_frames_of_its_submission(
-    kind: type[Exception], monkeypatch: pytest.MonkeyPatch
+    renderer: Renderer, kind: type[Exception], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # Batches double up to the largest size, however slow the machine is.
     monkeypatch.setattr(requests, "MAX_SECONDS", 1e6)
-    settings: list[Settings] = [Separable(exposure=exposure / 100) for exposure in range(100)]
-    blame = kind("all")
-    results, error = run_failing(settings, {settings[50]: blame})
-    assert error is blame
+    settings = [Separable(exposure=exposure / 100) for exposure in range(100)]
+    failing: Any = CountingCore(renderer._core, at5=kind("all"))
+    source = _core.image_source(picture(8, 8))
+    results = requests.run([requests.Request(source, one) for one in settings], failing, ())
     # Only the frames of its submission, which begins after 1 + 2 + 4 + 8 + 16, are lost.
-    assert [point for point, _ in results] == settings[:31]
+    assert [one for one, *_ in itertools.islice(results, 31)] == settings[:31]
+    with pytest.raises(kind, match="all"):
+        next(results)
 
 
 # The core's own types

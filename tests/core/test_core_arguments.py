@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gc
-import threading
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -178,28 +177,3 @@ def test_the_collector_sees_what_is_held(renderer: Renderer) -> None:
     for made in (renderer._core, source, *plans, submission):
         assert gc.is_tracked(made)
     submission.wait()
-
-
-def test_a_submission_is_waited_for_by_one_thread(renderer: Renderer) -> None:
-    image = np.random.default_rng(3).random((80, 80, 4), np.float32)
-    # So that all threads wait for the renderer at once: 65 x 65 taps a pixel take a while.
-    slow = Separable(weights=(1 / 65,) * 33, direct=True, blur_scale=0.5)
-
-    def wait(submission: _core.Submission, counts: list[int]) -> None:
-        try:
-            counts.append(len(submission.wait()[0]))
-        except RuntimeError:
-            counts.append(0)
-
-    source = _core.image_source(image)
-    for exposure in range(2):
-        plan = renderer._core.plan(source, Separable(exposure=exposure), None)
-        submission = renderer._core.run(source, (plan,), arrays_for(plan))
-        counts: list[int] = []
-        threads = [threading.Thread(target=renderer.apply, args=(image + exposure, slow))]
-        threads += [threading.Thread(target=wait, args=(submission, counts)) for _ in range(3)]
-        for thread in threads:
-            thread.start()
-        for thread in threads:
-            thread.join()
-        assert sorted(counts) == [0, 0, 1]

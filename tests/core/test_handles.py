@@ -296,23 +296,6 @@ def test_an_error_comes_at_its_images_turn(
         next(results)
 
 
-def test_a_renderer_that_closes_meanwhile(new_renderer: Callable[[], Renderer]) -> None:
-    renderer = new_renderer()
-    results = renderer.map(picture(16, 16) for _ in range(9))
-    next(results)
-    renderer.close()
-    with pytest.raises(ValueError, match="closed"):
-        list(results)
-
-
-def test_unread_results_of_images_are_dropped(renderer: Renderer) -> None:
-    results = renderer.map(picture(300, 301, 4, "float32") for _ in range(9))
-    next(results)
-    del results
-    gc.collect()
-    assert renderer.apply(picture(16, 16)).timings
-
-
 # Images of several megabytes, whose rows several threads compare and pack
 
 

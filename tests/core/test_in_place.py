@@ -6,7 +6,7 @@ more, and from then on only those that are out of date: this shows which way was
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -107,14 +107,6 @@ def test_an_output_over_the_image(renderer: Renderer, shift: int) -> None:
     np.testing.assert_array_equal(out, expected)
 
 
-def test_an_array_that_changes_is_noticed(renderer: Renderer) -> None:
-    image = picture(640, 560, 4, "float16", 8)
-    for turn in range(5):
-        image[100 * turn : 100 * turn + 9] *= 0.5
-        expected = renderer.apply(image.copy(), SETTINGS[0])["glow"]
-        np.testing.assert_array_equal(renderer.apply(image, SETTINGS[0])["glow"], expected)
-
-
 @pytest.mark.parametrize("dtype", ["float16", "float32"])
 def test_specials_come_and_go(renderer: Renderer, dtype: str) -> None:
     """The passes know whether the image has NaN or infinity, and stop checking if it has none."""
@@ -132,20 +124,6 @@ def test_specials_come_and_go(renderer: Renderer, dtype: str) -> None:
         np.testing.assert_array_equal(final, expected["final"])
     again = renderer.apply(image, SETTINGS[0], framebuffers=("final",))
     np.testing.assert_array_equal(again["final"], before["final"])
-
-
-def test_a_sequence_may_reuse_its_array(renderer: Renderer) -> None:
-    pictures = [picture(640, 560, 4, "float32", seed) for seed in range(4)]
-    shared = np.empty_like(pictures[0])
-
-    def images() -> Iterator[Any]:
-        for one in pictures:
-            shared[:] = one
-            yield shared
-
-    for frames, one in zip(renderer.map(images(), SETTINGS[0]), pictures, strict=True):
-        expected = renderer.apply(one, SETTINGS[0])["final"]
-        np.testing.assert_array_equal(frames["final"], expected)
 
 
 def test_a_file_in_memory(renderer: Renderer, tmp_path: Path) -> None:

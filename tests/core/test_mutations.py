@@ -64,30 +64,6 @@ MUTATIONS = {
         different=("up_1", "up_0", "bloom", "final"),
         cases=": pyramid, ",
     ),
-    # In the horizontal pass of two, the second tap to each side is read where the third one is.
-    "tap moved by one": Mutation(
-        shader="blur.frag",
-        original="centre + place_of(tap) * tap_step",
-        mutated="centre + place_of(DIRECTION == DIRECTION_HORIZONTAL && abs(tap) == 2"
-        " ? tap + sign(tap) : tap) * tap_step",
-        test=IMAGE.format(settings="Separable()"),
-        equal=("glow", "blur_vertical"),
-        different=("bloom", "final"),
-        cases=": tutorial, ",
-    ),
-    "missing half-texel": Mutation(
-        shader="filter.frag",
-        original='#include "lib/filter_image.glsl"\n',
-        mutated="Place displaced(Place place)\n{\n"
-        "    place.part -= KERNELS == 3 ? 0.5 : 0.0;\n    return place;\n}\n"
-        "#undef PLACE_IN\n#define PLACE_IN(source) displaced(place_in(source, PIXEL, "
-        "ivec2(params.target_width, params.target_height)))\n"
-        '#include "lib/filter_image.glsl"\n',
-        test=IMAGE.format(settings="DualKawase(levels=3)"),
-        equal=("glow", "down_0", "down_1", "down_2"),
-        different=("up_1", "up_0", "bloom", "final"),
-        cases=": dual-kawase, ",
-    ),
     # In the vertical pass of two, of a scene.
     "rows flipped": Mutation(
         shader="blur.frag",

@@ -107,13 +107,6 @@ def test_change_of_settings_runs_only_dependent_passes(
     assert_same(opened.render(scene, None, SIZE), default)
 
 
-def test_nothing_runs_twice(opened: Renderer, scene: Scene) -> None:
-    first = opened.render(scene, None, SIZE)
-    second = opened.render(scene, Separable(), SIZE, time=1.0)
-    assert list(first.timings) == list(second.timings) == []
-    assert_same(first, second)
-
-
 def test_a_size_of_the_same_aspect_leaves_the_bloom_buffers(
     opened: Renderer, scene: Scene, alone: Alone
 ) -> None:
@@ -206,15 +199,6 @@ def test_unrequested_framebuffers_are_not_allocated(opened: Renderer, scene: Sce
 
 
 # Many changes
-
-
-def test_alternating_settings(opened: Renderer, scene: Scene, alone: Alone) -> None:
-    one, other = Separable(), Separable(blur_strength=0.3)
-    right = {s: alone(scene, s, SIZE) for s in (one, other)}
-    for settings in (other, one, other, one):
-        frames = opened.render(scene, settings, SIZE)
-        assert list(frames.timings) == BLUR
-        assert_same(frames, right[settings])
 
 
 def test_bloom_off_and_on(opened: Renderer, scene: Scene, alone: Alone) -> None:

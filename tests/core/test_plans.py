@@ -128,29 +128,6 @@ def test_a_plan_of_a_scene_is_what_runs(scene: Scene, shading: Any) -> None:
             assert (plan.source, plan.dtype, plan.channels) == (shading, None, None)
 
 
-def test_variants_are_seen_without_a_renderer() -> None:
-    source = image_source(picture(*SIZE, 4, dtype="float16"))
-
-    def variants(name: str, names: Any = None) -> list[tuple[str, str]]:
-        rows = _core.plan(source, Separable(), names, name).passes
-        return [(one[1], one[4]) for one in rows]
-
-    assert variants("fragment") == [
-        ("threshold_frag", "fragment"),
-        ("blur_frag", "fragment"),
-        ("blur_frag", "fragment"),
-        ("composite_frag", "fragment"),
-    ]
-    assert variants("cpu") == [
-        ("threshold_linear_rgba16float", "pixels"),
-        ("line_comp_rgba16float", "line"),
-        ("line_comp_rgba16float", "line"),
-        ("blend_linear_rgba16float", "pixels"),
-    ]
-    assert variants("cpu", ("final",)) == [("strip_linear_rgba16float", "strips")]
-    assert variants("gpu", ("final",)) == [("tile_comp", "tiles")]
-
-
 @pytest.fixture
 def plain() -> np.ndarray[Any, Any]:
     return np.zeros((9, 16, 4), np.float32)
@@ -215,7 +192,7 @@ def test_planning_makes_nothing(new_renderer: Callable[[], Renderer], plain: Any
     for method in METHODS.values():
         renderer.plan(plain, method)
     assert renderer._core.pipeline_count == 0
-    assert renderer._core.cached == (0, 0, 0)
+    assert renderer._core.cached == (0, 0)
 
 
 # The dry run

@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 
 from vkbloom import _core
-from vkbloom._doctor.deviations import _SINGLE
 
 MAGIC = 0x07230203
 HEADER_WORDS = 5
@@ -67,67 +66,6 @@ def test_no_function_has_an_absolute_error() -> None:
     }
     assert len(used) > 5, "functions were not found"
     assert not used & set(range(13, 26))
-
-
-#: What Vulkan lets a device compute loosely, beside quotients (2.5 units in the last place).
-LOOSE: dict[str, str] = {
-    "adjoint_composite.glsl": "exp2 log",
-    "adjoint_godot_blur.frag": "exp2",
-    "adjoint_godot_final.frag": "exp2 sqrt",
-    "adjoint_strip.comp": "exp2",
-    "adjoint_tile.comp": "exp2",
-    "composite.glsl": "exp2",
-    "flare.glsl": "length pow",
-    "gbuffer_mesh.glsl": "length",
-    "godot.glsl": "exp2",
-    "godot_blend.glsl": "sqrt",
-    "godot_final.frag": "exp2",
-    "lab.glsl": "pow",
-    "lighting.frag": "normalize",
-    "lit_mesh.glsl": "normalize",
-    "phong.glsl": "normalize pow",
-    "prefilters.glsl": "pow",
-    "rounding.glsl": "pow",
-    "sun_beams.frag": "length",
-    "tonemap.glsl": "exp log log2 pow sqrt",
-    "tonemap_slopes.glsl": "exp log log2 pow sqrt",
-}
-UNIT = 2.0**-23
-
-
-def exp2_error(size: float) -> float:
-    """Return the relative error that Vulkan allows 2 to the power of up to `size`."""
-    return (3 + 2 * size) * UNIT
-
-
-def power_error(exponent: float, logarithm: float) -> float:
-    """Return that of a power of values whose logarithms to base 2 are up to `logarithm`."""
-    of_logarithm = max(2.0**-21, 3 * UNIT * logarithm)
-    return exp2_error(exponent * logarithm) + float(np.log(2)) * exponent * of_logarithm
-
-
-def test_every_loose_function_is_listed_and_within_the_promise() -> None:
-    """A function that is not listed needs a bound below, or a formula of its own."""
-    folders = (Path(__file__).parents[2] / "shaders", Path(_core.__file__).parent / "_custom/glsl")
-    names = "a?(sin|cos|tan)h?|pow|exp2?|log2?|sqrt|inversesqrt|length|distance|normalize|inverse"
-    found = {
-        file.name: " ".join(sorted({match[1] for match in re.finditer(rf"\b({names})\(", text)}))
-        for folder in folders
-        for file in folder.rglob("*.*")
-        for text in [re.sub(r"//.*", "", file.read_text())]
-    }
-    assert {name: used for name, used in found.items() if used} == LOOSE
-    bounds = {
-        "exposure": exp2_error(32),
-        # Of what half floats hold, and of single floats in light that a curve has compressed.
-        "srgb, gamma22": power_error(1 / 2.2, 24),
-        "agx": power_error(2.2, 24) + UNIT * 2.5,
-        # From 1e-5 cd/m2 on; the second base is between C1 and 1.
-        "pq": power_error(0.159, 30) * 78.84 * 0.16 + power_error(78.84, float(-np.log2(0.8359))),
-        "phong": power_error(8, 16),
-        "length, normalize, sqrt": 2 * 2.5 * UNIT,
-    }
-    assert all(bound < _SINGLE for bound in bounds.values()), bounds
 
 
 def test_loops_over_arrays_are_unrolled() -> None:

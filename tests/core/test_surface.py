@@ -15,7 +15,6 @@ import pytest
 
 import vkbloom
 from tests.core.builds import ROOT
-from tests.images import picture
 from tests.processes import output
 from tests.refusals import assert_refused, rows
 from vkbloom import Renderer, Scene, Separable, _core
@@ -80,21 +79,6 @@ def test_frames_are_presented_and_stay_as_they_were(
     np.testing.assert_array_equal(renderer.render(scene, size=SIZE)["final"], before)
 
 
-def test_sizes(surface: Surface, renderer: Renderer, scene: Scene) -> None:
-    assert surface.size == SIZE
-    for size in ((5, 300), (1, 1)):
-        with Surface(renderer, size=size) as opened:
-            assert opened.size == size
-            assert opened.present(scene)
-            assert opened.present(scene, size=(64, 36), framebuffer="glow")
-
-
-def test_an_image_is_presented(surface: Surface, renderer: Renderer) -> None:
-    image = picture(*SIZE, 3, dtype="uint8")
-    assert surface.present(image)
-    assert surface.present(renderer.upload(image), Separable(loops=2))
-
-
 def test_ctrl_c_ends_a_wait(surface: Surface, scene: Scene) -> None:
     class Alarm(BaseException):
         pass
@@ -112,18 +96,6 @@ def test_ctrl_c_ends_a_wait(surface: Surface, scene: Scene) -> None:
         signal.setitimer(signal.ITIMER_REAL, 0)
         signal.signal(signal.SIGALRM, before)
     assert surface.present(scene)
-
-
-def test_a_renderer_closes_its_surfaces(scene: Scene) -> None:
-    with Renderer(validation=True) as renderer:
-        left = open_or_skip(renderer)
-        assert left.present(scene)
-        assert left.present(scene, time=0.5)
-    left.close()
-    with pytest.raises(ValueError, match="closed"):
-        left.present(scene)
-    with pytest.raises(ValueError, match="the renderer is closed"):
-        Surface(renderer)
 
 
 def test_a_closed_surface_is_refused(surface: Surface, scene: Scene) -> None:

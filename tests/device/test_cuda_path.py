@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 import json
-import subprocess
 from pathlib import Path
 
 import pytest
 
-from tests.core.builds import ROOT
 from tests.core.test_lesser_devices import layer, run  # noqa: F401  a fixture
 from tests.device import stand_in
-from tests.exhaustive import EXHAUSTIVE
-from tests.processes import python
 from vkbloom import AdapterInfo
 
 
@@ -21,76 +17,41 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return stand_in.build(tmp_path_factory.mktemp("cuda"))
 
 
-@pytest.mark.parametrize("validation", ["validated", *["plain"] * EXHAUSTIVE])
-def test_all_of_it(folder: Path, software: AdapterInfo, validation: str) -> None:
-    """Layouts, batches, places, capsules, lifetimes and errors (device_work.py)."""
-    done = python(
-        *("-m", "tests.device.device_work", validation),
-        cwd=ROOT,
-        **stand_in.variables(folder, software),
-    )
-    check(done, folder)
+WORK = "tests.device.device_work"
+LIMITS = "tests.device.device_limits"
+#: What the layer takes from the device, the program, and the functions of it; all without.
+RUNS = (
+    # Layouts, batches, places, capsules, lifetimes and errors.
+    ("", WORK, "validated"),
+    # The same bits with timeline semaphores that CUDA shares, and calls return earlier.
+    ("waits", WORK, "validated"),
+    ("waits,cpu", WORK, "validated"),
+    # What reads and writes pixels on an adapter that is not a CPU, as GPUs do it.
+    ("cpu", WORK, "validated layouts sequences layers places gradients"),
+    # What exceeds the range of buffers.
+    ("bands", WORK, "validated ranges"),
+    ("bands,cpu", WORK, "validated ranges"),
+    # Code of others that comes between: lifetimes, failures, captures of graphs and callbacks.
+    ("", LIMITS, "validated"),
+    ("waits", LIMITS, "validated"),
+    # A renderer on another GPU.
+    ("missing", WORK, "validated missing"),
+)
 
 
-@pytest.mark.parametrize("lesser", ["", "waits"])
-def test_code_of_others_comes_between(
+@pytest.mark.parametrize("run_of", RUNS, ids=str)
+def test_arrays_on_the_device(
     folder: Path,
     software: AdapterInfo,
     layer: Path,  # noqa: F811
-    lesser: str,
+    run_of: tuple[str, str, str],
 ) -> None:
-    """Lifetimes, failures, captures of graphs and callbacks (device_limits.py)."""
+    lesser, program, words = run_of
     # Freed memory has other content, so that a use of it is found.
     variables = stand_in.variables(folder, software) | {"MALLOC_PERTURB_": "165"}
-    program = ("-m", "tests.device.device_limits", "validated")
-    check(run(layer, software.name, lesser, program, **variables), folder)
-
-
-def test_a_renderer_on_another_gpu(folder: Path, software: AdapterInfo) -> None:
-    variables = stand_in.variables(folder, software) | {"STAND_IN_UUID": "11" * 16}
-    program = ("-m", "tests.device.device_work", "validated", "missing")
-    check(python(*program, cwd=ROOT, **variables), folder)
-
-
-@pytest.mark.parametrize("lesser", ["bands", "bands,cpu"])
-def test_what_exceeds_the_range_of_buffers(
-    folder: Path,
-    software: AdapterInfo,
-    layer: Path,  # noqa: F811
-    lesser: str,
-) -> None:
-    program = ("-m", "tests.device.device_work", "validated", "ranges")
-    variables = stand_in.variables(folder, software)
-    check(run(layer, software.name, lesser, program, **variables), folder)
-
-
-WORK = ("layouts", "sequences", "layers", "places", "gradients")
-
-
-def test_dispatches_access_images(
-    folder: Path,
-    software: AdapterInfo,
-    layer: Path,  # noqa: F811
-) -> None:
-    """What reads and writes pixels on an adapter that is not a CPU, as GPUs do it."""
-    program = ("-m", "tests.device.device_work", "validated", *WORK)
-    check(run(layer, software.name, "cpu", program, **stand_in.variables(folder, software)), folder)
-
-
-@pytest.mark.parametrize("lesser", ["waits", "waits,cpu"])
-def test_the_host_does_not_wait(
-    folder: Path,
-    software: AdapterInfo,
-    layer: Path,  # noqa: F811
-    lesser: str,
-) -> None:
-    """With timeline semaphores that CUDA shares: the same bits, and calls return earlier."""
-    program = ("-m", "tests.device.device_work", "validated")
-    variables = stand_in.variables(folder, software)
-    check(run(layer, software.name, lesser, program, **variables), folder)
-
-
-def check(done: subprocess.CompletedProcess[str], folder: Path) -> None:
+    if "missing" in words:
+        variables["STAND_IN_UUID"] = "11" * 16
+    done = run(layer, software.name, lesser, ("-m", program, *words.split()), **variables)
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout) == {}
     left = (folder / "left").read_text().split()

@@ -5,7 +5,6 @@ from __future__ import annotations
 import importlib.util
 import json
 import multiprocessing
-import pickle
 import sys
 from pathlib import Path
 from types import ModuleType
@@ -66,14 +65,6 @@ def test_the_seed_decides(example: Any) -> None:
 
     np.testing.assert_array_equal(first(1)["glared"], first(1)["glared"])
     assert first(1)["settings"] != first(2)["settings"]
-
-
-def test_workers_open_their_own_renderer(example: Any) -> None:
-    pairs = example.TrainingPairs([lamps()], seed=1, adapter="software")
-    expected = pairs[0]
-    copied = pickle.loads(pickle.dumps(pairs))
-    assert copied._renderer is None
-    np.testing.assert_array_equal(copied[0]["glared"], expected["glared"])
 
 
 def test_as_a_dataset_of_pytorch(example: Any, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -66,7 +66,7 @@ GIVEN: dict[str, tuple[Settings, tuple[str, ...]]] = {
     "separable-mask": (Separable(threshold=0.3, knee=0.5, composite="mix"), MASK),
     "separable-both": (Separable(threshold=HARD_THRESHOLD), BOTH),
     "pyramid-mask": (Pyramid(levels=3, threshold=0.3, composite="mix"), MASK),
-    "pyramid-max": (Pyramid(levels=2, alpha="max", exposure=1.0), EMISSION),
+    "pyramid-max": (Pyramid(levels=2, alpha="max", composite="mix", intensity=0.25), EMISSION),
     "separable-half": (Separable(bloom_scale=0.5, alpha="blur"), MASK),
     "separable-layers": (
         Separable(layers=((1.0, 1.0), (2.0, 0.5)), alpha="blur", blur_strength=0.5),
@@ -104,9 +104,11 @@ GIVEN: dict[str, tuple[Settings, tuple[str, ...]]] = {
     ),
     "godot-emission": (GodotBloom(composite="mix", alpha="max"), EMISSION),
     "blender-mask": (BlenderGlare(threshold=0.5, alpha="blur"), MASK),
-    "pygfx-mask": (PygfxBloom(karis_average=True, alpha="blur"), MASK),
+    "pygfx-mask": (PygfxBloom(karis_average=True, alpha="blur", composite="mix"), BOTH),
     "convolution-mask": (Convolution(NOISE[:5, :7], alpha="blur"), MASK),
     "convolution-emission": (Convolution(NOISE[:5, :7], alpha="max"), EMISSION),
+    "godot-none": (GodotBloom(level_weights=(0,) * 7), ()),
+    "godot-last": (GodotBloom(level_weights=(0, 1, 0, 1e-4, 0, 0, 0)), ()),
 }
 KERNEL = (np.random.default_rng(7).random((7, 4, 3)) ** 4).astype(np.float32)
 GODOTS: Any = itertools.product(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -115,7 +116,7 @@ CASES: dict[str, Any] = {
     "blender fog": BlenderGlare(type="fog_glow", threshold=0.3, quality="medium"),
     "streaks": Separable(threshold=0.3, knee=0.5, glare=(STREAKS,)),
     "glare alpha": Pyramid(levels=2, alpha="blur", glare=(STREAKS,)),
-    "psf": vkbloom.Convolution(psf=vkbloom.psf.unreal(KERNEL, prefilter=(0.5, 1.2, 1.5))),
+    "psf": vkbloom.Convolution(psf=KERNEL, threshold=0.3),
 }
 
 
@@ -172,11 +173,18 @@ def test_passes_are_the_transposes_of_the_reference(renderer: Renderer, name: st
     [
         vkbloom.DarktableBloom(threshold=40.0, blur_size=2.0),
         BlenderGlare(type="streaks", version="5.2", threshold=0.3, streaks=2),
+        BlenderGlare(type="sun_beams", threshold=None),
+        BlenderGlare(type="simple_star", threshold=None),
+        BlenderGlare(type="ghosts", threshold=None),
+        Pyramid(levels=1, glare=(vkbloom.Halo(),)),
+        Pyramid(levels=1, glare=(vkbloom.Dirt(seed=1),)),
+        vkbloom.Convolution(psf=vkbloom.psf.unreal(KERNEL, prefilter=(0.5, 1.2, 1.5))),
+        Pyramid(levels=1, glare=(vkbloom.Ghosts(scales=(0.001, 0.5), aberration=0.05),)),
     ],
-    ids=["darktable", "blender 5.2"],
 )
 def test_the_reference_derives_what_has_no_transpose(renderer: Renderer, settings: Any) -> None:
-    """Boxes of darktable, and what Blender 5.2 reads by rounding (in 41 columns)."""
+    """Boxes of darktable, what Blender 5.2 reads by rounding (in 41 columns), and samples that are
+    not on a grid."""
     image = random_image(9, 41, channels=3, seed=1).astype(np.float32)
     pullback, cotangents, expected = pulled(renderer, image, settings)
     found = pullback(cotangents)
@@ -192,117 +200,108 @@ def test_the_cubic_filter_of_large_frames_is_transposed(renderer: Renderer) -> N
     check(pullback(cotangents), expected, "image")
 
 
-#: Sizes of several tiles, and kernels of all lengths that tiles have, with the number of passes; 0:
-#: the composite is no sum.
-TILED = (
-    (Separable(threshold=0.5, knee=0.5, tonemap="reinhard"), (35, 61), "f4", 2),
-    (Separable(threshold=0.5, blur_scale=2, intensity=0.7), (70, 50), "f4", 1),
-    (Separable(blur_scale=4, tonemap="aces"), (9, 40), "f2", 2),
-    (Separable(blur_scale=4, composite="screen"), (9, 40), "f2", 0),
-    (Separable(alpha="max", threshold=0.2, knee=0.3), (1, 70), "f4", 0),
-    (Separable(composite="mix", encoding="srgb", exposure=0.5), (7, 1), "u1", 2),
-)
-
-
-@pytest.mark.usefixtures("software")
-def test_a_complete_bloom_is_transposed_in_tiles(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("VKBLOOM_VARIANT", "gpu")
-    random = np.random.default_rng(1)
-    with Renderer("software") as renderer:
-        for settings, size, dtype, passes in TILED:
-            pixels = random.random((*size, 4)) ** 2 * (255 if dtype == "u1" else 1.5)
-            image = pixels.astype(dtype)
-            cotangents = {"final": random.standard_normal(image.shape).astype(np.float32)}
-            found = vkbloom.vjp(image, settings, renderer=renderer)[1](cotangents)
-            check(found, reference.vjp(image, settings)[1](cotangents), "image")
-            floats = settings.replace(format="rgba32float")
-            source = Inputs(image).source((cotangents["final"],))
-            plan = renderer._core.plan(source, floats, None, ("final",), False)
-            assert plan
-            shaders = [shader for _, shader, *_ in plan.passes]
-            tiles = ["tile_mixed_comp", "adjoint_tile_comp"]
-            assert (shaders == tiles[2 - passes :]) if passes else (tiles[1] not in shaders)
-            # The sums need the images between; the other derivatives keep their bits.
-            both = Passes(renderer, Inputs(image), floats, cotangents)
-            both.fields()
-            again = vkbloom.vjp(image, settings, renderer=renderer)[1](cotangents)
-            assert np.array_equal(again["image"], found["image"])
-
-
-#: Levels of which all, some or none have exactly half the size: several tiles, less than one, and
-#: sides of one texel. Then the number of filters in tiles.
-LEVELS = (
-    (Pyramid(levels=4), (64, 288, 3), 8),
-    (Pyramid(levels=1, radius=0.5), (36, 140, 3), 2),
-    (Pyramid(levels=2, radius=0, tonemap="aces"), (20, 252, 3), 4),
+SINGLE: Any = {"format": "rgba32float"}
+TILES = ("tile_mixed_comp", "adjoint_tile_comp")
+STRIPS = ("strip_mixed_linear_rgba32float", "adjoint_strip_linear_rgba32float")
+CURVED = "filter_final_mixed_linear_rgba32float"
+LEVELS = "adjoint_filter_tile_comp"
+TAPS = "adjoint_taps_linear_rgba32float"
+#: By variant: settings, sizes and dtypes with the passes of the variant's own among those that make
+#: the derivative by the image. A composite that is no sum, and a curve, need the bloom.
+TRANSPOSED: tuple[tuple[str, Any, tuple[int, ...], str, tuple[str, ...]], ...] = (
+    # Several tiles, and kernels of all lengths that tiles have.
+    ("gpu", Separable(threshold=0.5, knee=0.5, tonemap="reinhard"), (35, 61, 4), "f4", TILES),
+    ("gpu", Separable(threshold=0.5, blur_scale=2, intensity=0.7), (70, 50, 4), "f4", TILES[1:]),
+    ("gpu", Separable(blur_scale=4, tonemap="aces"), (9, 40, 4), "f2", TILES),
+    ("gpu", Separable(blur_scale=4, composite="screen"), (9, 40, 4), "f2", ()),
+    ("gpu", Separable(alpha="max", threshold=0.2, knee=0.3), (1, 70, 4), "f4", (LEVELS,)),
+    ("gpu", Separable(composite="mix", encoding="srgb", exposure=0.5), (7, 1, 4), "u1", TILES),
+    # Levels of which all, some or none have exactly half the size: several tiles, less than one,
+    # and sides of one texel.
+    ("gpu", Pyramid(levels=4), (64, 288, 3), "f4", (LEVELS,) * 8),
+    ("gpu", Pyramid(levels=1, radius=0.5), (36, 140, 3), "f4", (LEVELS,) * 2),
+    ("gpu", Pyramid(levels=2, radius=0, tonemap="aces"), (20, 252, 3), "f4", (LEVELS,) * 4),
     (
+        "gpu",
         Pyramid(levels=2, alpha="blur", level_weights=(0.3, 0.9), threshold=0.4, knee=0.5),
         (34, 250, 4),
-        4,
+        "f4",
+        (LEVELS,) * 4,
     ),
-    (Pyramid(levels=3, composite="mix", intensity=0.4), (4, 8, 3), 4),
-    (Pyramid(levels=1), (2, 2, 4), 2),
-    (Pyramid(levels=2), (2, 70, 3), 4),
-    (Pyramid(levels=2), (35, 65, 3), 4),
+    ("gpu", Pyramid(levels=3, composite="mix", intensity=0.4), (4, 8, 3), "f4", (LEVELS,) * 4),
+    ("gpu", Pyramid(levels=1), (2, 2, 4), "f4", (LEVELS,) * 2),
+    ("gpu", Pyramid(levels=2), (2, 70, 3), "f4", (LEVELS,) * 4),
+    ("gpu", Pyramid(levels=2), (35, 65, 3), "f4", (LEVELS,) * 4),
+    ("gpu", Pyramid(levels=2, composite="mix", exposure=0.5), (35, 62, 3), "f4", (LEVELS,) * 4),
+    # Several strips, less than one, and less than a kernel.
+    ("cpu", Separable(threshold=0.5, knee=0.5), (35, 261, 3), "f4", STRIPS[1:]),
+    ("cpu", Separable(threshold=0.5, intensity=0.7, exposure=0.5), (70, 50, 4), "f4", STRIPS[1:]),
+    (
+        "cpu",
+        Separable(threshold=0.5, tonemap="reinhard", exposure=0.5),
+        (70, 50, 4),
+        "f4",
+        STRIPS,
+    ),
+    ("cpu", Separable(composite="mix", intensity=0.4), (3, 9, 3), "f4", STRIPS[1:]),
+    ("cpu", Separable(composite="mix", intensity=0.4, tonemap="aces"), (3, 9, 3), "f4", STRIPS),
+    ("cpu", Separable(threshold=0.2, knee=0.3), (1, 70, 4), "f4", STRIPS[1:]),
+    ("cpu", Separable(), (7, 1, 3), "f4", STRIPS[1:]),
+    (
+        "cpu",
+        Pyramid(levels=1, threshold=0.5, tonemap="aces"),
+        (8, 32, 3),
+        "f4",
+        (CURVED, *(TAPS,) * 3),
+    ),
+    (
+        "cpu",
+        DualKawase(levels=1, threshold=0.5, tonemap="aces"),
+        (8, 32, 3),
+        "f4",
+        (CURVED, TAPS),
+    ),
+    ("cpu", Pyramid(levels=2, composite="mix", exposure=0.5), (35, 62, 3), "f4", (TAPS,) * 6),
 )
 
 
-def shaders_of_transpose(
-    renderer: Renderer, settings: Any, size: tuple[int, ...], random: np.random.Generator
-) -> list[str]:
-    """Check the derivatives by an image, and their bits from run to run; return the shaders."""
-    image = (random.random(size, np.float32) ** 2) * 1.5
-    cotangents = {"final": random.standard_normal(size, np.float32)}
+@pytest.fixture(scope="module")
+def varied(software: Any) -> Iterator[dict[str, Renderer]]:
+    renderers = {}
+    with pytest.MonkeyPatch.context() as patch:
+        for variant in ("cpu", "gpu"):
+            patch.setenv("VKBLOOM_VARIANT", variant)
+            renderers[variant] = Renderer("software")
+    yield renderers
+    for renderer in renderers.values():
+        renderer.close()
+
+
+@pytest.mark.parametrize("case", TRANSPOSED)
+def test_variants_are_transposed(varied: dict[str, Renderer], case: tuple[Any, ...]) -> None:
+    """Derivatives by an image, their bits from run to run, and the passes that make them."""
+    variant, settings, size, dtype, passes = case
+    renderer, random = varied[variant], np.random.default_rng(1)
+    pixels = random.random(size) ** 2 * (255 if dtype == "u1" else 1.5)
+    cotangents = {"final": random.standard_normal(size).astype(np.float32)}
+    floats = settings.replace(**SINGLE)
     # A finite image has another pipeline.
-    for value in (0.5, np.nan):
-        image[0, 0, 1] = value
+    for value in (0.5, np.nan)[: 1 + (dtype == "f4")]:
+        pixels[0, 0, 1] = value
+        image = pixels.astype(dtype)
         found = vkbloom.vjp(image, settings, renderer=renderer)[1](cotangents)
         check(found, reference.vjp(image, settings)[1](cotangents), "image")
+        # The sums need the images between; the other derivatives keep their bits.
+        Passes(renderer, Inputs(image), floats, cotangents).fields()
         again = vkbloom.vjp(image, settings, renderer=renderer)[1](cotangents)
         assert np.array_equal(again["image"], found["image"])
     source = Inputs(image).source((cotangents["final"],))
-    floats = settings.replace(format="rgba32float")
     plan = renderer._core.plan(source, floats, None, ("final",), False)
     assert plan
-    return [shader for _, shader, *_ in plan.passes]
-
-
-@pytest.mark.usefixtures("software")
-def test_levels_are_transposed_in_tiles(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("VKBLOOM_VARIANT", "gpu")
-    random = np.random.default_rng(1)
-    with Renderer("software") as renderer:
-        for settings, size, passes in LEVELS:
-            shaders = shaders_of_transpose(renderer, settings, size, random)
-            assert shaders.count("adjoint_filter_tile_comp") == passes, (size, shaders)
-
-
-#: Several strips, less than one, and less than a kernel. A curve needs the bloom.
-STRIPS = (
-    (Separable(threshold=0.5, knee=0.5), (35, 261, 3), 1),
-    (Separable(threshold=0.5, intensity=0.7, exposure=0.5), (70, 50, 4), 1),
-    (Separable(threshold=0.5, tonemap="reinhard", exposure=0.5), (70, 50, 4), 2),
-    (Separable(composite="mix", intensity=0.4), (3, 9, 3), 1),
-    (Separable(composite="mix", intensity=0.4, tonemap="aces"), (3, 9, 3), 2),
-    (Separable(threshold=0.2, knee=0.3), (1, 70, 4), 1),
-    (Separable(), (7, 1, 3), 1),
-)
-
-
-@pytest.mark.usefixtures("software")
-def test_a_complete_bloom_is_transposed_in_strips(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("VKBLOOM_VARIANT", "cpu")
-    random = np.random.default_rng(1)
-    with Renderer("software") as renderer:
-        linear = has_linear_texels(renderer)
-        for settings, size, passes in STRIPS:
-            shaders = shaders_of_transpose(renderer, settings, size, random)
-            strips = ["strip_mixed_linear_rgba32float", "adjoint_strip_linear_rgba32float"]
-            assert (shaders == strips[2 - passes :]) == linear
-        for levels in (Pyramid, DualKawase):
-            curved = levels(levels=1, threshold=0.5, tonemap="aces")
-            shaders = shaders_of_transpose(renderer, curved, (8, 32, 3), random)
-            assert ("filter_final_mixed_linear_rgba32float" in shaders) == linear
+    shaders = [shader for _, shader, *_ in plan.passes]
+    if variant == "gpu" or has_linear_texels(renderer):
+        special = (*TILES, *STRIPS, CURVED, LEVELS, TAPS)
+        assert tuple(shader for shader in shaders if shader in special) == passes
 
 
 def test_the_alpha_gets_nothing_of_the_bloom(renderer: Renderer) -> None:
@@ -331,30 +330,6 @@ MASKED = (
     GodotBloom(threshold=0.3, threshold_scale=0.4, composite="mix", intensity=0.5),
     BlenderGlare(threshold=0.3, size=0.3),
 )
-
-
-@pytest.mark.usefixtures("software")
-@pytest.mark.parametrize("variant", ["cpu", "gpu"])
-def test_filters_have_variants(monkeypatch: pytest.MonkeyPatch, variant: str) -> None:
-    """In blocks or tiles; cotangents through a composite without a curve need no image."""
-    monkeypatch.setenv("VKBLOOM_VARIANT", variant)
-    settings = Pyramid(levels=2, composite="mix", exposure=0.5, format="rgba32float")
-    image = random_image(35, 62, seed=1).astype(np.float32)[..., :3].copy()
-    cotangents = {"final": np.random.default_rng(1).standard_normal(image.shape).astype("f4")}
-    with Renderer("software") as renderer:
-        # A finite image has another pipeline.
-        for value in (0.5, np.nan):
-            image[3, 4, 1] = value
-            found = vkbloom.vjp(image, settings, renderer=renderer)[1](cotangents)
-            check(found, reference.vjp(image, settings)[1](cotangents), "image")
-        source = Inputs(image).source((cotangents["final"],))
-        plan = renderer._core.plan(source, settings, None, ("final",), False)
-        drawn = variant == "cpu" and not has_linear_texels(renderer)
-    assert plan
-    linear = {"adjoint_taps_linear_rgba32float"}
-    tiles = {"adjoint_filter_tile_comp"}
-    shaders = {shader for _, shader, *_ in plan.passes}
-    assert shaders == (linear if variant == "cpu" else tiles) or drawn
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float16, np.uint8])

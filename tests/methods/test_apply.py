@@ -1,4 +1,4 @@
-"""Every method and size of `apply` against `vkbloom.reference`, and on flat images.
+"""What `apply` makes of extreme values, against `vkbloom.reference`: curves, exposures, thresholds.
 
 Formats, presets and last passes are cases of the self-test (tests/device/test_self_test.py).
 """
@@ -32,28 +32,9 @@ from vkbloom._doctor.cases import COMPOSITES, ENCODINGS, TONEMAPS
 Image = NDArray[Any]
 
 
-# Of the last one a float32 framebuffer has more than a mebibyte, and comes back another way.
-SIZES = ((1, 1), (1, 7), (7, 1), (13, 17), (97, 61), (211, 317))
-# Of the last one, which takes a third of the time of all, every third method.
-CASES = [
-    (method, size, dtype)
-    for number, (method, size, dtype) in enumerate(by_turns(METHODS, SIZES, turns=DTYPES))
-    if EXHAUSTIVE or size != SIZES[-1] or number // len(SIZES) % 3 == 0
-]
-
-
 def flat(value: Any, dtype: str, size: tuple[int, int] = (37, 22)) -> Image:
     width, height = size
     return np.full((height, width, 3), value, dtype)
-
-
-@pytest.mark.parametrize(("method", "size", "dtype"), CASES)
-def test_reference(renderer: Renderer, method: str, dtype: str, size: tuple[int, int]) -> None:
-    width, height = size
-    # Three and four channels by turns.
-    image = hdr_picture(width, height, 3 + width % 4 // 2, dtype)
-    settings = METHODS[method]
-    assert_matches_reference(renderer.apply(image, settings), image, settings)
 
 
 def test_reference_of_a_large_image(renderer: Renderer) -> None:
@@ -73,18 +54,6 @@ def test_no_settings_are_bevys(renderer: Renderer) -> None:
     assert_matches_reference(frames, image, Separable())
 
 
-@pytest.mark.parametrize(("method", "dtype"), by_turns(METHODS, turns=DTYPES))
-def test_flat_image_gets_the_gain(renderer: Renderer, method: str, dtype: str) -> None:
-    settings = METHODS[method].replace(threshold=None)
-    gain = reference.gain(settings)
-    # As bright as a stage of 8 bits lets it be.
-    value: Any = int(255 * 0.95 / max(gain, 1.0)) if dtype == "uint8" else 3.0
-    image = flat(value, dtype)
-    bloom = renderer.apply(image, settings, framebuffers="bloom")["bloom"][..., :3]
-    expected = np.full(bloom.shape, gain * float(real(image)[0, 0, 0]))
-    assert_close("bloom", bloom, expected, tolerance(dtype, expected, stages_of_8_bits=2))
-
-
 # --- Composite, exposure, tone map, encoding ---
 
 
@@ -101,15 +70,6 @@ def assert_composite(renderer: Renderer, image: Image, settings: Settings) -> No
 def bright(dtype: str) -> Image:
     values = 0.1 + 0.8 * np.random.default_rng(3).random((14, 19, 4))
     return np.rint(255 * values).astype(np.uint8) if dtype == "uint8" else values.astype(dtype)
-
-
-@pytest.mark.parametrize("composite", COMPOSITES)
-@pytest.mark.parametrize("dtype", ["float16", "float32"])
-def test_composite_beyond_white_and_black(renderer: Renderer, dtype: str, composite: Any) -> None:
-    image = hdr_picture(14, 19, 4, dtype)
-    assert image.min() < -0.4
-    assert image.max() > 6
-    assert_composite(renderer, image, Separable(composite=composite, intensity=0.7))
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from tests.exhaustive import some
 from vkbloom import BlenderGlare, PygfxBloom, Renderer, Settings, reference
 
 Array = NDArray[Any]
@@ -92,12 +91,3 @@ def test_the_fog_glow_of_4_3(renderer: Renderer) -> None:
     )
     for frames in (reference.apply(image, settings), renderer.apply(image, settings)):
         assert np.abs(frames["bloom"][..., :3] - glare).max() < 1e-5 * glare.max()
-
-
-@pytest.mark.parametrize("variant", ["fragment", "cpu", "gpu"])
-def test_every_variant_is_the_engine(variant: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("VKBLOOM_VARIANT", variant)
-    with Renderer(validation=True) as renderer:
-        for name in some(CASES[::5], 5 if variant == "fragment" else 3):
-            settings, image = read(name)
-            compare(name, settings, renderer.apply(image, settings))

@@ -134,6 +134,7 @@ CASES: dict[str, Case] = {
         GodotBloom(glare=(SHORT,), composite="mix", format="rgba32float", bloom_scale=0.6),
         given=("mask",),
     ),
+    "no-bloom": Case(Pyramid(glare=(SHORT,), bloom=False)),
     "no-intensity": Case(Pyramid(glare=(SHORT,), intensity=0)),
 }
 
@@ -168,10 +169,6 @@ def test_stages(renderer: Renderer, name: str) -> None:
             frames[framebuffer].dtype, expected[framebuffer], stages_of_8_bits=2, stages=8
         )
         assert_close(framebuffer, frames[framebuffer], expected[framebuffer], limit)
-    final = reference.apply(image, case.settings.replace(glare=()), **given)["final"]
-    # (No light of the picture is above these.)
-    if name not in ("filament_flare", "unreal_flare"):
-        assert np.abs(final - expected["final"]).max() > 0.01
 
 
 @pytest.mark.parametrize(
@@ -211,37 +208,6 @@ def test_nan_and_infinity(renderer: Renderer, stage: Glare) -> None:
     clean = renderer.apply(np.where(np.isfinite(image), image, 0), Pyramid(glare=(stage,)))
     np.testing.assert_array_equal(frames[stage.stage], clean[stage.stage])
     np.testing.assert_array_equal(np.isfinite(frames["final"]), np.isfinite(image))
-
-
-def spread(renderer: Renderer, stage: Glare, x: int, y: int) -> Image:
-    """Return the light of a point of 1000."""
-    image = np.zeros((65, 65, 3), np.float32)
-    image[y, x] = 1000
-    light: Image = renderer.apply(image, Pyramid(glare=(stage,)))[stage.stage]
-    return light[..., 0]
-
-
-def test_energy_of_streaks(renderer: Renderer) -> None:
-    """Rays keep all light that stays in the picture; in the corner, one of four does."""
-    for angle in (0, 33):
-        streaks = Streaks(directions=4, angle=angle, fade=0.8, base=3, iterations=3, halvings=0)
-        assert spread(renderer, streaks, 32, 32).sum() == pytest.approx(1000, rel=1e-5)
-    streaks = streaks.from_dict({**streaks.to_dict(), "angle": 0})
-    # Two rays go along the border, the others keep only their first tap.
-    first = 1000 * (1 - 0.8) / (1 - 0.8**27)
-    corner = spread(renderer, streaks, 0, 0).sum()
-    assert corner == pytest.approx(500 + 2 * first / 4, rel=1e-5)
-
-
-def test_directions_of_streaks(renderer: Renderer) -> None:
-    """Angles count counter-clockwise from the right; one direction is a line."""
-    streaks = Streaks(directions=3, angle=90, base=2, iterations=3, halvings=0)
-    light = spread(renderer, streaks, 32, 32)
-    assert light[26, 32] > 0
-    assert light[38, 32] == 0
-    line = spread(renderer, Streaks(directions=1, base=2, iterations=3, halvings=0), 32, 32)
-    assert (np.nonzero(line)[0] == 32).all()
-    np.testing.assert_array_equal(line[32, 25:40], line[32, 25:40][::-1])
 
 
 def test_change_of_glare_runs_only_dependent_passes(new_renderer: Callable[[], Renderer]) -> None:
@@ -315,11 +281,6 @@ def test_scenes(renderer: Renderer, scene: Scene) -> None:
         frames = renderer.render(scene, settings, (160, 90), shading=cast("Any", shading))
         assert frames["streaks"][..., :3].max() > 0
         assert (frames["final"] != plain["final"]).any()
-
-
-def test_without_bloom_there_is_no_glare(renderer: Renderer) -> None:
-    image = hdr_picture(16, 9, 3, "float32")
-    assert list(renderer.apply(image, Pyramid(glare=(SHORT,), bloom=False))) == ["final"]
 
 
 def test_settings() -> None:

@@ -6,19 +6,17 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose, assert_array_equal
+from numpy.testing import assert_array_equal
 from numpy.typing import NDArray
 
 from tests.images import hdr_picture, picture
 from tests.methods.cases import GIVEN
 from tests.tolerance import assert_matches_reference
 from vkbloom import (
-    PygfxBloom,
     Pyramid,
     Renderer,
     Scene,
     Separable,
-    Settings,
 )
 
 Image = NDArray[Any]
@@ -47,46 +45,6 @@ def test_a_mask_of_one_changes_no_bit_and_one_of_zero_leaves_no_bloom(
     dark = renderer.apply(image, settings, mask=~ones)
     assert not dark["bloom"][..., :3].any()
     assert_array_equal(dark["final"][..., 3], image[..., 3])
-
-
-# --- Formulas, by hand ---
-
-
-def flat(*colour: float) -> Image:
-    return np.broadcast_to(np.array(colour, np.float32), (8, 12, len(colour))).copy()
-
-
-@pytest.mark.parametrize(
-    "settings", [Pyramid(levels=2), PygfxBloom(levels=1, format="rgba32float")]
-)
-def test_mix_takes_from_the_scene_what_the_bloom_came_of(
-    renderer: Renderer, settings: Settings
-) -> None:
-    # Flat images stay flat: the bloom is m s or e.
-    mixed = settings.replace(composite="mix", intensity=0.25)
-    image, mask = flat(0.8, 0.4, 0.2), np.full((8, 12), 0.5, np.float32)
-    masked = renderer.apply(image, mixed, mask=mask)
-    assert_allclose(masked["bloom"][..., :3], 0.5 * image, rtol=1e-5)
-    # s + i (b - m s) with b = m s.
-    assert_allclose(masked["final"], image, rtol=1e-5)
-    emission = flat(0.0, 1.0, 2.0)
-    for white in (None, np.full((8, 12), 255, np.uint8)):
-        lit = renderer.apply(image, mixed, emission=emission, mask=white)
-        assert_allclose(lit["final"], image + 0.25 * emission, rtol=1e-5)
-
-
-def test_alpha_blur(renderer: Renderer) -> None:
-    image = flat(0.5, 0.25, 0.25, 0.5)
-    settings = Pyramid(levels=1, alpha="blur", intensity=0.5)
-    frames = renderer.apply(image, settings, mask=np.full((8, 12), 0.5, np.float16))
-    assert_allclose(frames["glow"][..., 3], 0.25)
-    assert_allclose(frames["bloom"][..., 3], 0.25, rtol=1e-6)
-    # 1 - (1 - a)(1 - i b_a)
-    assert_allclose(frames["final"][..., 3], 1 - 0.5 * (1 - 0.125), rtol=1e-6)
-    # What does not pass the threshold has no alpha either.
-    dark = renderer.apply(image, settings.replace(threshold=1.0))
-    assert not dark["bloom"].any()
-    assert_array_equal(dark["final"], image)
 
 
 @pytest.mark.parametrize("alpha", ["max", "blur"])

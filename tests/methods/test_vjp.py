@@ -10,9 +10,7 @@ import pytest
 
 import vkbloom
 from tests.images import random_image
-from tests.methods.test_adjoint_passes import check
-from vkbloom import BlenderGlare, Dirt, Ghosts, Halo, Pyramid, Renderer, reference
-from vkbloom._gradients.passes import DeviceGradients
+from vkbloom import Renderer, reference
 
 
 def test_arrays_may_change_before_the_pullback(renderer: Renderer) -> None:
@@ -112,28 +110,3 @@ def test_wrong_cotangent_is_refused_by_name(
         pullback: Any = vjp(image, vkbloom.Separable())[1]
         with pytest.raises((TypeError, ValueError), match=message):
             pullback(cotangents)
-
-
-def scattered(stage: Any) -> Pyramid:
-    return Pyramid(levels=1, glare=(stage,))
-
-
-@pytest.mark.parametrize(
-    "settings",
-    [
-        scattered(Halo()),
-        scattered(Ghosts(scales=(0.001, 0.5), aberration=0.05)),
-        scattered(Dirt(seed=1)),
-        BlenderGlare(type="sun_beams", threshold=None),
-        BlenderGlare(type="simple_star", threshold=None),
-        BlenderGlare(type="ghosts", threshold=None),
-    ],
-)
-def test_stages_without_adjoint_passes_come_from_the_reference(
-    renderer: Renderer, settings: Any
-) -> None:
-    image = random_image(13, 24, channels=3, seed=1).astype(np.float32)
-    cotangents = {"final": image}
-    found = vkbloom.vjp(image, settings, renderer=renderer)[1](cotangents)
-    assert not isinstance(found, DeviceGradients)
-    check(found, reference.vjp(image, settings)[1](cotangents), "image")

@@ -59,34 +59,6 @@ def frames(renderer: Renderer, scene: Scene) -> Frames:
 # Names, shapes, formats
 
 
-@pytest.mark.parametrize(
-    ("format", "dtype"),
-    [
-        (None, "float16"),
-        ("rgba8unorm", "uint8"),
-        ("rgba16float", "float16"),
-        ("rgba32float", "float32"),
-    ],
-)
-def test_shapes_and_dtypes(renderer: Renderer, scene: Scene, format: Any, dtype: str) -> None:
-    settings = Separable(format=format, bloom_size=(40, 24))
-    shown = deferred(renderer, scene, settings, (64, 36))
-    assert [(name, array.shape, array.dtype.name) for name, array in shown.items()] == [
-        ("albedo", (36, 64, 4), "float16"),
-        ("normal", (36, 64, 4), "float16"),
-        ("position", (36, 64, 4), "float16"),
-        ("brightness", (36, 64, 4), "float16"),
-        ("depth", (36, 64), "float32"),
-        ("blur_vertical", (24, 40, 4), dtype),
-        ("bloom", (36, 64, 4), dtype),
-        ("scene", (36, 64, 4), "float16"),
-        ("final", (36, 64, 4), "uint8"),
-    ]
-    for name, array in shown.items():
-        if name != "depth":
-            assert (array[..., 3] == (255 if array.dtype == np.uint8 else 1)).all(), name
-
-
 def test_bloom_buffers_have_the_frames_size(renderer: Renderer, scene: Scene) -> None:
     assert deferred(renderer, scene)["blur_vertical"].shape[1::-1] == SIZE
     half = deferred(renderer, scene, Separable(bloom_scale=0.5))
@@ -155,16 +127,6 @@ def test_camera_and_animation_place_every_point(renderer: Renderer, turns: float
     for name in ("depth", "glow_depth"):
         np.testing.assert_array_equal(forward[name], seen["depth"], err_msg=name)
     np.testing.assert_array_equal(forward["glow"], seen["brightness"])
-
-
-def test_normals_are_those_of_the_surface(frames: Frames) -> None:
-    normal, position = rgb(frames["normal"]), rgb(frames["position"])
-    body = frames["depth"] < 1
-    lengths = np.linalg.norm(normal, axis=-1)
-    np.testing.assert_allclose(lengths[body], 1, atol=2 * HALF)
-    # What is seen faces the camera.
-    facing = (normal * position).sum(axis=-1)[body]
-    assert (facing < 0.05 * np.linalg.norm(position[body], axis=-1)).mean() > 0.99
 
 
 def test_a_body_is_drawn_as_it_is(renderer: Renderer) -> None:
@@ -260,18 +222,6 @@ def test_the_glow_mesh_changes_nothing_but_the_brightness(
     assert not rgb(bare["bloom"]).any()
 
 
-def test_the_body_does_not_hide_the_glow(renderer: Renderer, scene: Scene) -> None:
-    wall = screen(WHITE, SIZE)
-    assert wall.glow is not None
-    camera = Camera(position=(0, 1, -10.25), rotation=(0, 0, 0))
-    hidden, shown = (
-        deferred(renderer, Scene(body=body, glow=scene.glow, camera=camera))["brightness"]
-        for body in (wall.glow, scene.body)
-    )
-    assert rgb(hidden).any()
-    np.testing.assert_array_equal(hidden, shown)
-
-
 def test_what_the_body_emits_is_bright(renderer: Renderer) -> None:
     colours = noise((16, 9))
     wall = screen(colours, (16, 9))
@@ -286,22 +236,6 @@ def test_what_the_body_emits_is_bright(renderer: Renderer) -> None:
     np.testing.assert_allclose(rgb(both["brightness"]), 9 * colours, rtol=4 * HALF, atol=1e-6)
     off = deferred(renderer, lit, Separable(bloom=False), (16, 9))
     np.testing.assert_array_equal(off["brightness"], shown["brightness"])
-
-
-def test_emission_needs_the_nearest_surface(renderer: Renderer) -> None:
-    near, far = screen(WHITE, SIZE).glow, screen(WHITE, SIZE).glow
-    assert near is not None
-    assert far is not None
-    behind = far.vertices.copy()
-    behind[:, 2] -= 1.0
-    body = Mesh(
-        np.concatenate((near.vertices, behind)),
-        np.concatenate((near.indices, far.indices + np.uint32(len(near.vertices)))),
-        np.repeat(np.array([[0, 0, 0], [9, 9, 9]], np.float32), len(near.vertices), axis=0),
-    )
-    shown = deferred(renderer, Scene(body=body, camera=screen(WHITE, SIZE).camera))
-    # The wall behind is smaller on the screen than the one before it.
-    assert not rgb(shown["brightness"]).any()
 
 
 def test_with_a_glow_mesh_emission_is_the_deferred_systems(
@@ -413,50 +347,3 @@ def test_a_lamp_is_one_in_both_systems(renderer: Renderer) -> None:
     forward = rgb(renderer.render(scene, None, (3, 3))["scene"]) / 255
     # Half a level, and what half floats round.
     np.testing.assert_allclose(np.clip(rgb(shown["scene"]), 0, 1), forward, atol=1 / 255)
-
-
-# HDR
-
-
-def test_eight_times_white_is_eight_times_the_halo(renderer: Renderer) -> None:
-    point = np.zeros((9, 16, 3))
-    point[4, 8] = 1
-    settings = presets["deferred"].replace(blur_scale=4.0, tonemap="reinhard", encoding="gamma22")
-    white, bright = (
-        deferred(renderer, dataclasses.replace(screen(point, SIZE), glow_intensity=i), settings)
-        for i in (1, 8)
-    )
-    lit = rgb(white["bloom"]) > 1e-3
-    assert lit.mean() > 0.01
-    # Until the tone map in proportion, by the roundings of six passes to half.
-    np.testing.assert_allclose(rgb(bright["brightness"]), 8 * rgb(white["brightness"]))
-    np.testing.assert_allclose(rgb(bright["bloom"])[lit], 8 * rgb(white["bloom"])[lit], rtol=4e-3)
-    # After it brighter everywhere in the halo, less than in proportion, and wider.
-    before, after = (rgb(shown["final"])[lit] for shown in (white, bright))
-    assert (after > before).all()
-    assert (after < 8 * before).all()
-    width = [(rgb(shown["final"])[..., 0] > 32).any(axis=0).sum() for shown in (white, bright)]
-    assert width[1] > 1.1 * width[0]
-
-
-# The reference's light
-
-
-def test_shade_by_hand() -> None:
-    # The light straight above a point on the camera's axis, and a normal between the two: V, N and
-    # R lie so that R = V, the highlight's peak.
-    position = np.array([-5.0, -5.0, -10.0])
-    to_light, to_camera = np.array([0.0, 0.0, 1.0]), -position / math.sqrt(150)
-    half_way = (to_light + to_camera) / np.linalg.norm(to_light + to_camera)
-    n_l = float(half_way @ to_light)
-    brightness = np.array([0.5, 0.25, 0.0])
-    for colour, ambient in (([0.2, 0.4, 0.8], 0.0), ([0.2, 0.4, 0.9], 0.25)):
-        c = np.array(colour)
-        pixel = [array.reshape(1, 1, 3) for array in (c, 3 * half_way, position, brightness)]
-        expected = ambient * c + n_l * c + 0.75 + brightness
-        np.testing.assert_allclose(reference.shade(*pixel)[0, 0], [*expected, 1], rtol=1e-12)
-    # The highlight has no sign: R is the same for both.
-    turned = reference.shade(pixel[0], -pixel[1], pixel[2], pixel[3])[0, 0, :3]
-    np.testing.assert_allclose(turned, 0.25 * c + 0.75 + brightness, rtol=1e-12)
-    unlit = reference.shade(pixel[0], 0 * pixel[1], 0 * pixel[2], pixel[3])[0, 0, :3]
-    np.testing.assert_allclose(unlit, c + brightness, rtol=1e-12)

@@ -22,7 +22,6 @@ from tests.refusals import assert_refused, rows
 from tests.scene.gltf_documents import (
     BYTE,
     CHANGES,
-    DTYPES,
     FLOAT,
     INT,
     NORMALS,
@@ -39,8 +38,6 @@ from tests.scene.gltf_documents import (
 )
 from vkbloom._scene import Mesh, gltf_file
 from vkbloom._scene.gltf import load_mesh
-
-SEED_DATA = Path(__file__).resolve().parents[3] / "shared" / "data"
 
 
 def corners(mesh: Mesh) -> np.ndarray:
@@ -61,28 +58,19 @@ NESTED_VERTICES = [
 ]
 
 
-def test_transforms_are_baked_colours_multiplied_and_y_negated(tmp_path: Path) -> None:
-    mesh = nested().load(tmp_path)
+@pytest.mark.parametrize("noise", [None, 0.0, 1e-17, 6e-8, -3e-6])
+def test_transforms_are_baked_colours_multiplied_and_y_negated(
+    tmp_path: Path, noise: float | None
+) -> None:
+    """Of two nodes; of a column-major matrix, rounded as exporters multiply those of floats."""
+    document = nested()
+    if noise is not None:
+        matrix = [0, 2, 0, noise, -6, 0, 0, -noise, 0, 0, 2, noise, 10, 20, 30, 1 + noise]
+        document.json["nodes"] = [{"mesh": 0, "matrix": matrix}]
+    mesh = document.load(tmp_path)
     np.testing.assert_allclose(mesh.vertices, NESTED_VERTICES, atol=1e-6)
     assert mesh.indices.tolist() == [0, 1, 2]
     assert mesh.emission is None
-
-
-def test_a_matrix_is_column_major(tmp_path: Path) -> None:
-    document = nested()
-    document.json["nodes"] = [
-        {"mesh": 0, "matrix": [0, 2, 0, 0, -6, 0, 0, 0, 0, 0, 2, 0, 10, 20, 30, 1]}
-    ]
-    np.testing.assert_allclose(document.load(tmp_path).vertices, NESTED_VERTICES, atol=1e-6)
-
-
-@pytest.mark.parametrize("noise", [1e-17, 6e-8, -3e-6])
-def test_a_matrix_may_be_rounded(tmp_path: Path, noise: float) -> None:
-    # As exporters write that multiply single-precision matrices.
-    document = nested()
-    matrix = [0, 2, 0, noise, -6, 0, 0, -noise, 0, 0, 2, noise, 10, 20, 30, 1 + noise]
-    document.json["nodes"] = [{"mesh": 0, "matrix": matrix}]
-    np.testing.assert_allclose(document.load(tmp_path).vertices, NESTED_VERTICES, atol=1e-6)
 
 
 def test_colours_are_never_negative(tmp_path: Path) -> None:
@@ -108,16 +96,6 @@ def test_extras_may_be_anything_anywhere(tmp_path: Path, extras: Any) -> None:
     text["extras"] = extras
     file.write_text(json.dumps(text))
     np.testing.assert_array_equal(load_mesh(file).vertices, expected.vertices)
-
-
-def test_arrays_are_read_only_and_contiguous(tmp_path: Path) -> None:
-    mesh = triangle().load(tmp_path)
-    assert mesh.vertices.dtype == np.dtype(np.float32)
-    assert mesh.indices.dtype == np.dtype(np.uint32)
-    assert mesh.vertices.flags.c_contiguous
-    for array in (mesh.vertices, mesh.indices):
-        with pytest.raises(ValueError, match="read-only"):
-            array[0] = 0
 
 
 def test_no_material_and_no_colours_are_white(tmp_path: Path) -> None:
@@ -232,26 +210,6 @@ def test_interleaved_attributes(tmp_path: Path) -> None:
     document.json["meshes"][0]["primitives"] = [{"attributes": {"POSITION": 0, "NORMAL": 1}}]
     vertices = document.load(tmp_path).vertices[:, :6] * (1, -1, 1, 1, -1, 1)
     np.testing.assert_allclose(vertices, np.hstack((POSITIONS, NORMALS)), atol=1e-7)
-
-
-@pytest.mark.parametrize("component", [BYTE, SHORT, INT])
-@pytest.mark.parametrize("with_base", [False, True])
-def test_sparse_accessors(tmp_path: Path, component: int, with_base: bool) -> None:
-    document = triangle()
-    accessor = document.json["accessors"][1]
-    assert accessor["type"] == "VEC3"
-    accessor["sparse"] = {
-        "count": 2,
-        "indices": {
-            "bufferView": document.view(np.array([0, 2], DTYPES[component]).tobytes()),
-            "componentType": component,
-        },
-        "values": {"bufferView": document.view(np.array([[5, 6, 7], [8, 9, 1]], "<f4").tobytes())},
-    }
-    if not with_base:
-        del accessor["bufferView"]
-    middle = POSITIONS[1] if with_base else [0, 0, 0]
-    assert corners(document.load(tmp_path))[0].tolist() == [[5, 6, 7], middle, [8, 9, 1]]
 
 
 def test_glb_and_outer_buffers_give_the_same_mesh(tmp_path: Path) -> None:
@@ -442,6 +400,7 @@ def test_without_pygltflib_the_message_says_what_to_install(
         ("elsewhere/../a.bin", "a.bin"),
         ("../model/a.bin", "a.bin"),
         ("sub%2F..%2Fa.bin", "a.bin"),
+        ("link.bin", "a.bin"),
         ("part%201%3A2%25.bin", "part 1:2%.bin"),
         ("teil ü.bin", "teil ü.bin"),
         ("teil%20%C3%BC.bin", "teil ü.bin"),
@@ -452,17 +411,10 @@ def test_a_uri_within_the_folder_is_read(tmp_path: Path, uri: str, name: str) ->
     folder = tmp_path / "model"
     (folder / "sub").mkdir(parents=True)
     (folder / "elsewhere").symlink_to(tmp_path)
+    (folder / "link.bin").symlink_to("a.bin")
     (folder / name).write_bytes(document.data)
     (folder / "mesh.gltf").write_bytes(document.as_gltf(uri))
     assert len(load_mesh(folder / "mesh.gltf").indices) == 3
-
-
-def test_a_link_within_the_folder_is_followed(tmp_path: Path) -> None:
-    document = triangle()
-    (tmp_path / "real.bin").write_bytes(document.data)
-    (tmp_path / "link.bin").symlink_to("real.bin")
-    (tmp_path / "mesh.gltf").write_bytes(document.as_gltf("link.bin"))
-    assert len(load_mesh(tmp_path / "mesh.gltf").indices) == 3
 
 
 def test_a_link_that_loops_is_an_os_error(tmp_path: Path) -> None:
@@ -509,14 +461,6 @@ class Damage:
     def with_indices(self, indices: list[int]) -> Mesh:
         document = Document()
         document.primitive(indices=document.accessor(indices, BYTE))
-        return document.load(self.folder)
-
-    def with_sparse(self, places: list[int]) -> Mesh:
-        document = triangle()
-        indices = {"bufferView": document.view(bytes(places)), "componentType": BYTE}
-        values = {"bufferView": document.view(bytes(24))}
-        sparse = {"count": 2, "indices": indices, "values": values}
-        document.json["accessors"][1]["sparse"] = sparse
         return document.load(self.folder)
 
     def with_header(self, place: int) -> Mesh:
@@ -581,11 +525,6 @@ def test_changed_bytes_load_or_are_refused(tmp_path: Path, changes: list[tuple[i
 
 def test_any_json_value_in_any_place_loads_or_is_refused(tmp_path: Path) -> None:
     document = nested()
-    document.json["accessors"][0]["sparse"] = {
-        "count": 1,
-        "indices": {"bufferView": document.view(b"\0"), "componentType": BYTE},
-        "values": {"bufferView": document.view(b"\0")},
-    }
     document.json["materials"][0]["extensions"] = {
         "KHR_materials_emissive_strength": {"emissiveStrength": 2.0}
     }
@@ -598,47 +537,3 @@ def test_any_json_value_in_any_place_loads_or_is_refused(tmp_path: Path) -> None
     # Most of them break something; were all let through, the checks would be off.
     step, least = (1, 1200) if EXHAUSTIVE else (12, 100)
     assert refusals(path, original, places(original), step=step) > least
-
-
-# The original meshes
-
-
-@pytest.mark.skipif(not SEED_DATA.exists(), reason="the shared data folder is not there")
-@pytest.mark.parametrize("name", ["retroufo", "retroufo_glow"])
-def test_the_original_meshes(name: str) -> None:
-    path = SEED_DATA / "retroufo" / f"{name}.gltf"
-    mesh = load_mesh(path)
-    text = json.loads(path.read_text())
-    counts = [
-        text["accessors"][primitive["indices"]]["count"]
-        for node in text["nodes"]
-        if "mesh" in node
-        for primitive in text["meshes"][node["mesh"]]["primitives"]
-    ]
-    assert len(mesh.indices) == sum(counts)
-    np.testing.assert_allclose(np.linalg.norm(mesh.vertices[:, 3:6], axis=1), 1.0, atol=1e-6)
-    factors = np.array(
-        [m["pbrMetallicRoughness"]["baseColorFactor"][:3] for m in text["materials"]], np.float32
-    )
-    used = np.unique(mesh.vertices[:, 6:], axis=0)
-    assert all((factors == colour).all(axis=1).any() for colour in used)
-
-
-@pytest.mark.skipif(not SEED_DATA.exists(), reason="the shared data folder is not there")
-def test_the_original_glow_mesh_lies_where_the_original_program_drew_it() -> None:
-    image_module = pytest.importorskip("skimage.io", reason="scikit-image is not installed")
-    drawn = image_module.imread(SEED_DATA / "seed_frames" / "glow.png")[..., :3].max(axis=2) > 0
-    case = json.loads((SEED_DATA / "seed_frames" / "case.json").read_text())
-    matrix = np.eye(4)
-    for name in ("proj", "view", "model"):
-        matrix = matrix @ np.reshape(case["matrices_column_major"][name], (4, 4)).T
-    mesh = load_mesh(SEED_DATA / "retroufo" / "retroufo_glow.gltf")
-    bright = mesh.vertices[mesh.vertices[:, 6:].max(axis=1) > 0]
-    clip = np.column_stack((bright[:, :3], np.ones(len(bright)))) @ matrix.T
-    pixels = (clip[:, :2] / clip[:, 3:] + 1.0) / 2.0 * drawn.shape[::-1]
-    rows, columns = np.nonzero(drawn)
-    # The light's cone leaves the picture at the bottom; at the other sides the outermost vertex
-    # lies within the outermost pixel or just beyond its centre.
-    assert abs(pixels[:, 1].min() - rows.min()) < 1.5
-    assert abs(pixels[:, 0].min() - columns.min()) < 1.5
-    assert abs(pixels[:, 0].max() - (columns.max() + 1)) < 1.5

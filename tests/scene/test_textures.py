@@ -193,14 +193,6 @@ def test_a_glow_mesh_with_a_texture(renderer: Renderer) -> None:
     np.testing.assert_array_equal(rgb(shown["brightness"]), 4 * rgb(colours))
 
 
-def test_emission_by_texture_and_a_glow_mesh_are_added(renderer: Renderer) -> None:
-    colours, size = half_colours(16, 9), (16, 9)
-    body = panel(size, emission=texture(colours), radiance=(3.0, 3.0, 3.0))
-    shown = deferred(renderer, body, size, glow=panel(size, texture(colours)))
-    expected = 4 * rgb(colours)
-    np.testing.assert_allclose(rgb(shown["brightness"]), expected, rtol=3 * HALF, atol=1e-6)
-
-
 # The emission of a body
 
 
@@ -346,17 +338,6 @@ def test_a_pixel_is_the_mean_of_its_texels(renderer: Renderer, scale: int) -> No
     blocks = rgb(colours).reshape(size[1], scale, size[0], scale, 3)
     # The level is chosen by a logarithm that devices round, so a little of the next ones may come.
     np.testing.assert_allclose(shown, blocks.mean(axis=(1, 3)), atol=0.02)
-
-
-def test_minified_stripes_do_not_alias(renderer: Renderer) -> None:
-    stripes = np.ones((256, 256, 4), np.float16)
-    stripes[:, ::2, :3] = 0
-    # 9.14 texels a pixel: without mip levels the stripes beat with the pixels.
-    size = (28, 28)
-    smooth = deferred(renderer, panel(size, Texture(mip_levels(stripes))), size)["albedo"]
-    np.testing.assert_allclose(rgb(smooth), 0.5, atol=0.01)
-    wild = deferred(renderer, panel(size, texture(stripes)), size)["albedo"]
-    assert set(np.unique(rgb(wild))) == {0, 1}
 
 
 def test_filters_between_levels(renderer: Renderer) -> None:

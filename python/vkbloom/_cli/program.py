@@ -36,7 +36,7 @@ COMMANDS: Final = {
     "psfs": "List the point-spread functions",
     "adapters": "List the Vulkan adapters that vkbloom can use",
     "doctor": "Check whether this machine can render, and explain what prevents it",
-    "warm": "Fill the caches of pipelines before the first call needs them",
+    "warm": "Fill the caches of pipelines and kernels before the first call needs them",
 }
 
 # Modules of several commands.

@@ -22,16 +22,6 @@ STAGES: Final = (
 )
 #: Those at which the picture may get another size.
 RESIZING: Final = ("RGB", "NATIVE", "MAIN")
-#: The stages of mpv that pictures of one plane in RGB never reach.
-UNREACHED: Final = (
-    "LUMA",
-    "CHROMA",
-    "ALPHA",
-    "XYZ",
-    "CHROMA_SCALED",
-    "ALPHA_SCALED",
-    "SIGMOID",
-)
 HOOKED: Final = "HOOKED"
 GLOW: Final = "GLOW"
 BLOOM: Final = "BLOOM"

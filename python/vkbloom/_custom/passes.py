@@ -8,14 +8,13 @@ from typing import Final
 
 from vkbloom._custom.blocks import Block, Directive
 from vkbloom._custom.expressions import ExpressionError, tokens
-from vkbloom._custom.names import GLOW, HOOKED, LONGEST, STAGES, UNREACHED, check_name, stage_of
+from vkbloom._custom.names import GLOW, HOOKED, LONGEST, STAGES, check_name, stage_of
 from vkbloom._custom.source import Source
 
 MAX_STAGES: Final = 16
 MAX_BINDINGS: Final = 16
-#: Threads of a workgroup, and of its sides: what every device of Vulkan has.
+#: Threads of a workgroup: what every device of Vulkan has.
 MAX_THREADS: Final = 1024
-LARGEST_GROUP: Final = (1024, 1024)
 LARGEST_BLOCK: Final = 16384
 
 
@@ -98,14 +97,12 @@ def read_stages(source: Source, block: Block) -> tuple[str, ...]:
     if len(hooks) > MAX_STAGES:
         raise source.fault(hooks[MAX_STAGES].line, f"HOOK: a pass has at most {MAX_STAGES}")
     for hook in hooks:
-        if hook.value in UNREACHED:
+        if stage_of(hook.value) not in STAGES:
             raise source.fault(
                 hook.line,
                 f"HOOK: the stage {hook.value} is never reached, since pictures are linear RGB; "
                 f"it is not one of {', '.join(STAGES)}",
             )
-        if stage_of(hook.value) not in STAGES:
-            raise source.fault(hook.line, f"HOOK: {hook.value!r} is not one of {', '.join(STAGES)}")
     named = {stage_of(hook.value) for hook in hooks}
     return tuple(stage for stage in STAGES if stage in named)
 
@@ -147,11 +144,7 @@ def read_compute(source: Source, block: Block) -> Compute | None:
             directive.line,
             f"COMPUTE: {width} x {height} pixels are out of range, 1 to {LARGEST_BLOCK}",
         )
-    if (
-        min(threads) < 1
-        or threads[0] * threads[1] > MAX_THREADS
-        or any(side > limit for side, limit in zip(threads, LARGEST_GROUP, strict=True))
-    ):
+    if min(threads) < 1 or threads[0] * threads[1] > MAX_THREADS:
         raise source.fault(
             directive.line,
             f"COMPUTE: {threads[0]} x {threads[1]} threads are out of range, 1 to {MAX_THREADS}",

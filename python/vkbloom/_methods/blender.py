@@ -8,7 +8,6 @@ from typing import ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom._core_kernel import WithKernel
 from vkbloom._methods.blender_kernels import kernel_of, kernel_sides
 from vkbloom._methods.convolution import PSFLike, read_psf
 from vkbloom._settings.blocks import settings_block
@@ -20,6 +19,7 @@ from vkbloom._settings.fields import (
     value_field,
 )
 from vkbloom._settings.settings import BloomFormat, Composite, Settings, no_knee
+from vkbloom.psf._core_kernels import WithKernel
 
 GlareType = Literal["bloom", "ghosts", "streaks", "fog_glow", "simple_star", "sun_beams", "kernel"]
 Quality = Literal["high", "medium", "low"]

@@ -9,8 +9,8 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom._core_kernel import WithKernel
 from vkbloom._settings.settings import Settings
+from vkbloom.psf._core_kernels import WithKernel
 
 Size = tuple[int, int]
 

@@ -75,22 +75,14 @@ def _listed(driver: str) -> list[_Adapter]:
     ]
 
 
-def _in_order_of_cuda(gpus: list[_Adapter]) -> list[_Adapter]:
-    """Sort by address, if CUDA_DEVICE_ORDER says so or all GPUs have one name.
-
-    Otherwise CUDA counts the fastest first, which only it knows; Vulkan's order stands for it.
-    """
-    names = {gpu.info.name for gpu in gpus}
-    if os.environ.get("CUDA_DEVICE_ORDER") == "PCI_BUS_ID" or len(names) == 1:
-        return sorted(gpus, key=lambda gpu: gpu.info.pci)
-    return gpus
-
-
 def _visible(gpus: list[_Adapter], listed: str) -> list[_Adapter]:
-    """Return the GPU that CUDA_VISIBLE_DEVICES lists first, if it is there."""
+    """Return the GPU that CUDA_VISIBLE_DEVICES lists first, if it is there.
+
+    CUDA counts different GPUs by address only where CUDA_DEVICE_ORDER is PCI_BUS_ID.
+    """
     first = re.split("[, ]", listed.lstrip(" "))[0]
     if first.isdecimal():
-        return _in_order_of_cuda(gpus)[int(first) :][:1]
+        return sorted(gpus, key=lambda gpu: gpu.info.pci)[int(first) :][:1]
     return [gpu for gpu in gpus if first.lower().startswith("gpu-") and gpu.has_uuid(first)][:1]
 
 

@@ -679,7 +679,7 @@ class Renderer:
         for name, target in (out or {}).items():
             if on_cuda(target):
                 fill(target, f"out: {name}", cast("DeviceArray", frames[name]), self._core)
-        return self._finished(frames, timings, (counts[0], counts[1]))
+        return self._finished(frames, timings, *counts)
 
     def _run_batch(
         self,
@@ -781,20 +781,17 @@ class Renderer:
     ) -> Iterator[Frames]:
         self._pending.wait()
         results = requests.run(sequence, self._core, names, alone=alone, destination=destination)
-        return (self._frames_of(settings, result) for settings, result in results)
-
-    def _frames_of(self, settings: Settings, result: requests.Result) -> Frames:
-        frames = self._frames(settings, result.arrays)
-        return self._finished(frames, result.timings, result.counts)
+        return (
+            self._finished(self._frames(settings, arrays), *known)
+            for settings, arrays, known in results
+        )
 
     def _frames(self, settings: Settings, arrays: Mapping[str, NDArray[Any]]) -> Frames:
         return Frames(arrays, timings={}, settings=settings, info=self._made_by)
 
-    def _finished(
-        self, frames: Frames, timings: dict[str, float], counts: tuple[int, int]
-    ) -> Frames:
+    def _finished(self, frames: Frames, timings: dict[str, float], nan: int, inf: int) -> Frames:
         self._save_pipelines()
-        frames._finish(timings, *counts)
+        frames._finish(timings, nan, inf)
         return frames
 
     def _save_pipelines(self) -> None:

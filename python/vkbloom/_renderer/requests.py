@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 
     from vkbloom._settings.settings import Settings
 
+    #: The settings of a request, its arrays, and the arguments of `Frames._finish`.
+    Result = tuple[Settings, dict[str, NDArray[Any]], tuple[dict[str, float], int, int]]
+
 #: The most requests in one submission.
 MAX_REQUESTS = 32
 #: The most bytes of framebuffers in one submission. A single request may have more.
@@ -112,17 +115,6 @@ class PendingSubmissions:
         self._pending.clear()
 
 
-class Result(NamedTuple):
-    """The result of a request.
-
-    `counts`: The numbers of NaNs and infinities in the input.
-    """
-
-    arrays: dict[str, NDArray[Any]]
-    timings: dict[str, float]
-    counts: tuple[int, int]
-
-
 def array_bytes(shape: tuple[int, ...], dtype: str) -> int:
     """Return the size of an array."""
     return math.prod(shape) * np.dtype(dtype).itemsize
@@ -209,13 +201,9 @@ class _Planned(NamedTuple):
     arrays: tuple[NDArray[Any] | _core.Exported, ...]
     destination: Destination
 
-
-def _taken(
-    planned: _Planned, timings: dict[str, float], counts: tuple[int, int]
-) -> tuple[Settings, Result]:
-    return planned.request.settings, Result(
-        named(planned.plan, planned.arrays, planned.destination), timings, counts
-    )
+    def result(self, timings: dict[str, float], counts: tuple[int, ...]) -> Result:
+        arrays = named(self.plan, self.arrays, self.destination)
+        return self.request.settings, arrays, (timings, counts[0], counts[1])
 
 
 class _Submitted(NamedTuple):
@@ -327,7 +315,7 @@ def run(
     *,
     alone: bool = False,
     destination: Callable[[_core.Source], Destination] = lambda _: "host",
-) -> Iterator[tuple[Settings, Result]]:
+) -> Iterator[Result]:
     """Yield the result of each request, in their order.
 
     Work is taken before earlier results are yielded, so that the device is busy while the caller
@@ -354,7 +342,7 @@ def run(
             requests.reverse()
             timings.reverse()
             while requests:
-                yield _taken(requests.pop(), timings.pop(), (counts[0], counts[1]))
+                yield requests.pop().result(timings.pop(), counts)
             ahead = IMAGES_AHEAD if alone else AHEAD
     finally:
         # Waits here for submissions whose results nobody takes, not at the next garbage
