@@ -434,23 +434,21 @@
 #define STRIP_ROWS(CHANNEL) ((CHANNEL) == 1 ? 4 : 8)
 // Blocks of pixels that fill complete words, also with three channels. CHANNEL is the size of a
 // channel in bytes.
-#define HALVE_LINEAR_COLUMNS       8
-#define HALVE_LINEAR_ROWS          32
-#define PREFILTER_COLUMNS(CHANNEL) ((CHANNEL) == 2 ? 8 : 4)
-#define TEXEL_COLUMNS(CHANNEL)     (16 / (CHANNEL))
-#define TEXEL_ROWS                 16
-#define WINDOW_COLUMNS(CHANNEL)    (8 / (CHANNEL))
-#define WINDOW_ROWS                64
-#define SHRINK_ROWS                32
-#define GATHER_COLUMNS             4
-#define GATHER_ROWS                16
-#define NINE_OUTPUTS               8
-#define STREAK_COLUMNS             8
-#define STREAK_ROWS                32
-#define TILE_LOADED                64
-#define TILE_ROWS                  32
-#define TILE_RUNS                  4
-#define TILE_RADIUS                16
+#define TAP_COLUMNS(CHANNEL)    ((CHANNEL) == 2 ? 8 : 4)
+#define TAP_ROWS                32
+#define TEXEL_COLUMNS(CHANNEL)  (16 / (CHANNEL))
+#define TEXEL_ROWS              16
+#define WINDOW_COLUMNS(CHANNEL) (8 / (CHANNEL))
+#define WINDOW_ROWS             64
+#define GATHER_COLUMNS          4
+#define GATHER_ROWS             16
+#define NINE_OUTPUTS            8
+#define STREAK_COLUMNS          8
+#define STREAK_ROWS             32
+#define TILE_LOADED             64
+#define TILE_ROWS               32
+#define TILE_RUNS               4
+#define TILE_RADIUS             16
 // Tiles of filters: their rows, and those that an invocation adds up.
 #define FILTER_TILE_ROWS 16
 #define FILTER_TILE_RUN  4

@@ -4,6 +4,7 @@
 // fold back to the edge. With a mirror, whose kernels are symmetric, it is the convolution itself.
 #include "methods/adjoint.h"
 #include "passes/adjoint.h"
+#include "passes/levels.h"
 
 // The kernel with its centre at the same place: an even side becomes one longer.
 static bool mirror_kernel(const struct vkb_kernel_data *kernel, struct vkb_graph *graph,
@@ -60,7 +61,8 @@ bool vkb_transpose_convolution(struct vkb_adjoint *adjoint, const struct vkb_set
     const struct vkb_image_row result = {.name = "adjoint_convolved",
                                          .format = VKB_FORMAT_RGBA32_FLOAT};
     struct vkb_filter filter = {.kernels = 1, .gain = 1.0};
-    uint32_t convolved;
+    struct vkb_levels levels = {
+        .settings = &mirrored, .source = &source, .graph = graph, .error = error};
 
     if (boundary != BOUNDARY_MIRROR)
         mirrored.choices[VKB_CHOICE_boundary] =
@@ -69,8 +71,10 @@ bool vkb_transpose_convolution(struct vkb_adjoint *adjoint, const struct vkb_set
     vkb_axis_move(&filter.y, extended.height, size.height, above);
     if ((boundary != BOUNDARY_MIRROR && !mirror_kernel(kernel, graph, &mirrored.kernel, error))
         || (edge_y
-            && !vkb_filter_to_image(adjoint, &filter, source.glow, extended, &source.glow, error))
-        || !vkb_convolve(&mirrored, &source, &result, "adjoint_", graph, &convolved, error))
+            && !vkb_filter_to_image(adjoint, &filter, source.glow, extended, &source.glow, error)))
+        return false;
+    uint32_t convolved = vkb_convolve(&levels, &result, "adjoint_");
+    if (levels.failed)
         return false;
     // The alpha is one of a cotangent, not 1.
     for (uint32_t i = first; i < graph->pass_count; ++i)
