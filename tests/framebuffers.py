@@ -12,6 +12,7 @@ import OpenImageIO as oiio
 from numpy.typing import NDArray
 
 from tests.images import noise
+from tests.io.parts import written
 from vkbloom import Separable, Settings
 from vkbloom._renderer.frames import Frames
 
@@ -79,19 +80,19 @@ def read(file: Path) -> dict[str, Part]:
     return parts
 
 
-def write_image(path: Path, pixels: NDArray[Any], kind: str = "", **attributes: Any) -> Path:
-    """Write pixels (h, w, C) as they are; without the first attribute PNG divides by alpha."""
-    spec = oiio.ImageSpec(
-        pixels.shape[1], pixels.shape[0], pixels.shape[2], kind or pixels.dtype.name
-    )
-    for name, value in {"oiio:UnassociatedAlpha": 1, **attributes}.items():
-        spec.attribute(name, value)
-    writer = oiio.ImageOutput.create(str(path))
-    assert writer is not None, oiio.geterror()
-    assert writer.open(str(path), spec), writer.geterror()
-    assert writer.write_image(np.ascontiguousarray(pixels)), writer.geterror()
-    writer.close()
-    return path
+def write_image(path: Path, pixels: NDArray[Any], kind: str = "", **changes: Any) -> Path:
+    """Write pixels (h, w, C) as they are, without the package; `changes`: fields or attributes.
+
+    Without the first attribute PNG divides by alpha. Names have "__" in place of a colon.
+    """
+    height, width, channels = pixels.shape
+    spec = oiio.ImageSpec(width, height, channels, kind or pixels.dtype.name)
+    for name, value in {"oiio:UnassociatedAlpha": 1, **changes}.items():
+        if hasattr(spec, name):
+            setattr(spec, name, value)
+        else:
+            spec.attribute(name.replace("__", ":"), value)
+    return written(path, spec, np.ascontiguousarray(pixels))
 
 
 def decode(data: bytes | None, folder: Path) -> NDArray[np.uint8]:

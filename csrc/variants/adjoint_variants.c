@@ -268,35 +268,56 @@ static const struct vkb_pass_row *other_axis(const struct vkb_graph *graph,
              : NULL;
 }
 
-// The texel of the source at or before the position of a row of the target.
-static int32_t row_before(int32_t ratio, int32_t row)
+// The texel of the source at or before the position of a texel of the target.
+static int32_t texel_before(int32_t ratio, int32_t texel)
 {
-    return ratio == EXACT_HALF ? 2 * row : ratio == EXACT_SAME ? row : (row + 1) / 2 - 1;
+    return ratio == EXACT_HALF ? 2 * texel : ratio == EXACT_SAME ? texel : (texel + 1) / 2 - 1;
 }
 
-// Gives `row` the window of columns, from their first reader on, and of rows, which begin there or,
-// if their ratio is simple, as those of a filter.
-static void set_windows(const struct axis *x, const struct axis *y, int32_t ratio,
-                        struct vkb_pass_row *row)
+// The most readers of a texel.
+static int32_t most_readers(const struct axis *axis)
+{
+    int32_t most = 1;
+
+    for (uint32_t texel = 0; texel < axis->size; ++texel)
+        most = (int32_t)fmaxf((float)most, entry_of(axis, texel)[1]);
+    return most;
+}
+
+// The most readers before or after the middle of the window that a filter in this ratio has.
+static int32_t most_beside(const struct axis *axis, int32_t ratio)
+{
+    int32_t most = 1;
+
+    for (uint32_t texel = 0; texel < axis->size; ++texel) {
+        const float *entry = entry_of(axis, texel);
+        const int32_t before = texel_before(ratio, (int32_t)texel) - (int32_t)entry[0] + 1;
+        const int32_t after = (int32_t)entry[1] - before;
+        most = most > before ? most : before;
+        most = most > after ? most : after;
+    }
+    return most;
+}
+
+// Gives `row` the windows of both axes, which begin at the first reader or, where the ratio is
+// simple, as those of a filter. Columns share texels if both ratios are simple.
+static void set_windows(const struct axis *x, const struct axis *y, int32_t ratio_x,
+                        int32_t ratio_y, struct vkb_pass_row *row)
 {
     struct vkb_constants *constants = &row->constants;
-    int32_t columns = 1, rows = 1, around = 1;
+    const int32_t rows = ratio_y ? 2 * most_beside(y, ratio_y) : MAX_WINDOW + 1;
+    const int32_t columns = ratio_x ? 2 * most_beside(x, ratio_x) : MAX_WINDOW + 1;
 
-    for (uint32_t texel = 0; texel < x->size; ++texel)
-        columns = (int32_t)fmaxf((float)columns, entry_of(x, texel)[1]);
-    for (uint32_t texel = 0; texel < y->size; ++texel) {
-        const int32_t count = (int32_t)entry_of(y, texel)[1];
-        const int32_t before = row_before(ratio, (int32_t)texel) - (int32_t)entry_of(y, texel)[0];
-        rows = rows > count ? rows : count;
-        around = around > before + 1 ? around : before + 1;
-        around = around > count - 1 - before ? around : count - 1 - before;
-    }
-    constants->exact_rows = ratio && 2 * around <= MAX_WINDOW ? ratio : 0;
-    rows = constants->exact_rows ? 2 * around : rows;
-    constants->window = columns > rows ? columns : rows;
+    constants->exact_rows = rows <= MAX_WINDOW ? ratio_y : 0;
+    constants->exact = constants->exact_rows && columns <= MAX_WINDOW ? ratio_x : 0;
+    const int32_t of_rows = constants->exact_rows ? rows : most_readers(y);
+    const int32_t of_columns = constants->exact ? columns : most_readers(x);
+    constants->window = of_columns > of_rows ? of_columns : of_rows;
     constants->taken_x = constants->taken_y = 0;
-    for (int32_t kernel = 0; columns < constants->window && kernel < constants->kernels; ++kernel)
-        constants->taken_x |= ((1 << columns) - 1) << MAX_WINDOW * kernel;
+    for (int32_t kernel = 0;
+         !constants->exact && of_columns < constants->window && kernel < constants->kernels;
+         ++kernel)
+        constants->taken_x |= ((1 << of_columns) - 1) << MAX_WINDOW * kernel;
 }
 
 // The most rows that a tile reads; 0: the readers of a row begin above those of the row before.
@@ -311,7 +332,7 @@ static uint32_t tile_rows(const struct axis *y, const struct vkb_constants *cons
     for (uint32_t texel = 0; texel < y->size; texel += FILTER_TILE_ROWS) {
         const uint32_t last = texel + FILTER_TILE_ROWS - 1;
         const int32_t rows =
-            ratio ? row_before(ratio, (int32_t)last) - row_before(ratio, (int32_t)texel)
+            ratio ? texel_before(ratio, (int32_t)last) - texel_before(ratio, (int32_t)texel)
                   : (int32_t)(entry_of(y, last)[0] - entry_of(y, texel)[0]);
         most = rows > most ? rows : most;
     }
@@ -339,10 +360,12 @@ static bool make_tiles(const struct vkb_variant_choice *choice, const struct vkb
     row->params.adjoint_filter.gain *= other ? other->params.adjoint_filter.gain : 1.0f;
     row->constants.direction = 0;
     row->constants.kernels = pass->constants.levels ? pass->constants.levels : 1;
-    const int32_t ratio = vkb_ratio_of(graph->images[row->reads[0]].height, y.size);
-    if (!other && !ratio && pass->constants.levels < 2)
+    const struct vkb_image_row *source = &graph->images[row->reads[0]];
+    const int32_t ratio_x = vkb_ratio_of(source->width, x.size);
+    const int32_t ratio_y = vkb_ratio_of(source->height, y.size);
+    if (!other && !ratio_y && pass->constants.levels < 2)
         return false;
-    set_windows(&x, &y, ratio, row);
+    set_windows(&x, &y, ratio_x, ratio_y, row);
     const uint32_t source_rows = tile_rows(&y, &row->constants);
     return row->constants.window <= MAX_WINDOW && source_rows > 0
         && vkb_make_tiles(choice, &vkb_shader_adjoint_filter_tile_comp, source_rows, row);

@@ -3,14 +3,10 @@
 from __future__ import annotations
 
 import hashlib
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-
-from vkbloom._array_cache import kept
-
-Size = tuple[int, int]
 
 
 class CoreKernel(NamedTuple):
@@ -43,31 +39,3 @@ def core_kernel(values: NDArray[Any]) -> CoreKernel:
     # 0 and the largest number are reserved.
     serial = min(max(int.from_bytes(digest, "little"), 1), 2**64 - 2)
     return CoreKernel(pixels, serial, bool((pixels == pixels[..., :1]).all()))
-
-
-class WithKernel:
-    """Settings and stages whose kernel the core is given.
-
-    - `shaping`: The fields that change the kernel.
-    """
-
-    shaping: ClassVar[tuple[str, ...]]
-
-    @property
-    def prefilter(self) -> tuple[float, float, float]:
-        """min, max and mult of Unreal Engine's prefilter."""
-        return 1.0, 0.0, 1.0
-
-    def _kernel(self, frame: Size, buffers: Size) -> NDArray[Any]:
-        """Return the kernel in pixels of the bloom buffers."""
-        raise NotImplementedError
-
-    def core_kernel(self, frame: Size, buffers: Size) -> CoreKernel:
-        """Return the kernel as the core reads it."""
-        shape = type(self)(**{name: getattr(self, name) for name in self.shaping})
-        return _core_kernel(shape, frame, buffers)._replace(prefilter=self.prefilter)
-
-
-@kept
-def _core_kernel(shape: WithKernel, frame: Size, buffers: Size) -> CoreKernel:
-    return core_kernel(shape._kernel(frame, buffers))

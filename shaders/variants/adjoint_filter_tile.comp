@@ -16,6 +16,7 @@ layout(set = 0, binding = 3) uniform sampler2D scene;
 layout(set = 0, binding = 4) uniform sampler2D added;
 layout(set = 0, binding = 5) uniform sampler2D differentiated;
 layout(set = 0, binding = 6) uniform writeonly image2D target;
+#define IS_TRANSPOSED true
 #include "variants/filter_tile.glsl"
 
 vec4 entry(int place)
@@ -23,15 +24,14 @@ vec4 entry(int place)
     return texelFetch(table, ivec2(place % TABLE_WIDTH, place / TABLE_WIDTH), 0);
 }
 
-// Windows of rows in a simple ratio begin as those of filters. Pixels that do not read the texel have no weight.
+// Windows in a simple ratio begin as those of filters. Pixels that do not read the texel have no weight.
 Window window_at(ivec2 pixel, bool along_x)
 {
     ivec2 within = min(pixel, imageSize(target) - 1);
     ivec3 readers = ivec3(entry(along_x ? params.start_x + within.x : params.start_y + within.y).xyz);
     Window window;
-    window.first = readers.x;
-    if (!along_x && EXACT_ROWS != 0)
-        window.first = exact_first(EXACT_ROWS, pixel.y);
+    int exact = along_x ? EXACT : EXACT_ROWS, at_pixel = along_x ? pixel.x : pixel.y;
+    window.first = exact != 0 ? exact_first(exact, at_pixel) : readers.x;
     [[unroll]] for (int i = 0; i < WINDOW; ++i) {
         int at = window.first + i - readers.x;
         int place = readers.z + (LEVELS == 0 ? at / 4 : at);

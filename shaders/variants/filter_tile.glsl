@@ -15,12 +15,16 @@ vec4 texel_at(ivec2 texel);
 vec4 own_at(ivec2 pixel);
 vec4 shade(vec4 own, vec4 sum, ivec2 pixel);
 
-// Where both sides are in a simple ratio, the weights of every RUN columns and rows are the same.
-const bool PHASES = EXACT != 0 && EXACT_ROWS != 0;
+// Where both sides are in a simple ratio, columns share texels, and the weights of every RUN columns and rows of a
+// filter are the same. Those of a transposed filter are others at the edges.
+#ifndef IS_TRANSPOSED
+#define IS_TRANSPOSED false
+#endif
+const bool SIMPLE = EXACT != 0 && EXACT_ROWS != 0, PHASES = SIMPLE && !IS_TRANSPOSED;
 const int WEIGHT_COLUMNS = PHASES ? RUN : GROUP_WIDTH, WEIGHT_ROWS = PHASES ? RUN : FILTER_TILE_ROWS;
 // Columns that share texels, since fetches take most of the time: halving 3840 x 2160 of float32 takes 163 us on an
 // H100, 188 with two columns, 242 with one.
-const int COLUMNS = !PHASES ? 1 : EXACT == EXACT_HALF ? RUN : RUN / 2;
+const int COLUMNS = !SIMPLE ? 1 : EXACT == EXACT_HALF ? RUN : RUN / 2;
 
 // Of columns, then of rows: the first texel of the window, and the weights. A constant's default is 0, which is
 // no size of an array.
@@ -51,12 +55,12 @@ int exact_first(int exact, int pixel)
 
 int first_column(ivec2 first, int column)
 {
-    return PHASES ? exact_first(EXACT, first.x + column) : firsts[column];
+    return SIMPLE ? exact_first(EXACT, first.x + column) : firsts[column];
 }
 
 int first_row(ivec2 first, int row)
 {
-    return PHASES ? exact_first(EXACT_ROWS, first.y + row) : firsts[WEIGHT_COLUMNS + row];
+    return EXACT_ROWS != 0 ? exact_first(EXACT_ROWS, first.y + row) : firsts[WEIGHT_COLUMNS + row];
 }
 
 // Adds up a row of the tile along x, and each of `step` rows from it on, at this column and those beside it.
@@ -68,7 +72,7 @@ void keep_sums(ivec2 first, int column, int row, int step)
 
     [[unroll]] for (int i = 0; i < COLUMNS; ++i)
         [[unroll]] for (int at = 0; at < WINDOW; ++at)
-            of_columns[i][at] = weights[at][PHASES ? i : column];
+            of_columns[i][at] = weights[at][PHASES ? i : column + i];
     for (; row < rows; row += step) {
         vec4 kept[COLUMNS][3];
         [[unroll]] for (int i = 0; i < COLUMNS; ++i)

@@ -263,23 +263,6 @@ def test_the_help_has_general_options_or_those_of_a_method(name: str) -> None:
         assert len(text.splitlines()) < 50
 
 
-def test_a_field_that_no_word_can_give_has_no_option() -> None:
-    @dataclasses.dataclass
-    class Odd:
-        table: dict[str, float]
-
-    assert command_of({"": Odd}).main([], standalone_mode=False) == {}
-    with pytest.raises(click.NoSuchOption, match="--table"):
-        command_of({"": Odd}).main(["--table", "1"], standalone_mode=False)
-
-
-def test_fields_of_one_name_and_two_types_are_refused() -> None:
-    one = dataclasses.make_dataclass("one", [("radius", float, 1.0)])
-    other = dataclasses.make_dataclass("other", [("radius", int, 1)])
-    with pytest.raises(TypeError, match="radius is"):
-        command_of({"one": one, "other": other}).main([], standalone_mode=False)
-
-
 # render
 
 
@@ -306,18 +289,6 @@ def test_render_tells_adapter_pass_times_and_files(tmp_path: Path) -> None:
     assert stdout.endswith(f"\nwrote {tmp_path / 'out.exr'}\n")
 
 
-def test_render_in_deferred_shading(tmp_path: Path) -> None:
-    out = tmp_path / "out.png"
-    options = ("--shading", "deferred", "--glow-intensity", "8", "--framebuffers", "final")
-    result = vkb("render", "-o", out, *SMALL, *options)
-    assert result.exit_code == 0
-    expected = rendered(
-        scene=dataclasses.replace(Scene.ufo(), glow_intensity=8.0), shading="deferred"
-    )
-    assert (rgb(pixels(out)) == rgb(expected["final"])).all()
-    assert (rgb(expected["final"]) != rgb(rendered(shading="deferred")["final"])).any()
-
-
 @pytest.mark.parametrize("out", ["folder", "folder/"])
 def test_render_writes_into_a_folder(tmp_path: Path, out: str) -> None:
     result = vkb("render", "-o", f"{tmp_path}/{out}", *SMALL, "--framebuffers", "final,bloom")
@@ -325,20 +296,27 @@ def test_render_writes_into_a_folder(tmp_path: Path, out: str) -> None:
     assert {path.name for path in (tmp_path / "folder").iterdir()} == {"bloom.png", "final.png"}
 
 
-def test_render_uses_settings_time_and_camera(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("words", "scene", "changes"),
+    [
+        ("--shading deferred --glow-intensity 8", {"glow_intensity": 8}, {"shading": "deferred"}),
+        (
+            "--time 0.25 --blur-strength 3 --camera-position 0,0,-14 --camera-fov 30",
+            {"camera": Camera(position=(0, 0, -14), fov=30)},
+            {"settings": SMALL_SETTINGS.replace(blur_strength=3.0), "time": 0.25},
+        ),
+    ],
+)
+def test_options_of_render(
+    tmp_path: Path, words: str, scene: dict[str, Any], changes: dict[str, Any]
+) -> None:
     out = tmp_path / "out.png"
-    result = vkb(
-        *("render", "-o", out, *SMALL, "--framebuffers", "final", "--time", "0.25"),
-        *("--blur-strength", "3", "--camera-position", "0,0,-14", "--camera-fov", "30"),
-    )
+    result = vkb("render", "-o", out, *SMALL, "--framebuffers", "final", *words.split())
     assert result.exit_code == 0
-    expected = rendered(
-        scene=dataclasses.replace(Scene.ufo(), camera=Camera(position=(0, 0, -14), fov=30)),
-        settings=SMALL_SETTINGS.replace(blur_strength=3.0),
-        time=0.25,
-    )
-    assert (rgb(pixels(out)) == rgb(expected["final"])).all()
-    assert (rgb(expected["final"]) != rgb(rendered()["final"])).any()
+    expected = rendered(scene=dataclasses.replace(Scene.ufo(), **scene), **changes)["final"]
+    assert (rgb(pixels(out)) == rgb(expected)).all()
+    # Each of them changes the picture.
+    assert (rgb(expected) != rgb(rendered(**changes)["final"])).any()
 
 
 def test_render_loads_scenes(tmp_path: Path) -> None:

@@ -26,9 +26,9 @@ pytestmark = pytest.mark.usefixtures("kept_renderers")
 NATURAL = vkbloom.presets["bevy_natural"]
 
 
-def run(*arguments: str | Path, adapter: str = "auto") -> Result:
-    words = ["apply", *(str(argument) for argument in arguments), "--adapter", adapter]
-    if not {"--preset", "--method", "--help"} & set(words):
+def run(*arguments: str | Path) -> Result:
+    words = ["apply", *map(str, arguments)]
+    if not {"--preset", "--method"} & set(words):
         # Files of integers start from the preset photo: see test_cli_photo.py.
         words += ["--preset", "bevy_natural"]
     return CliRunner().invoke(program, words)

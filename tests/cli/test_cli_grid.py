@@ -149,10 +149,6 @@ class TestImageFiles:
 
     def test_a_folder_named_like_an_image(self, tmp_path: Path, image_file: Path) -> None:
         words = [image_file, "--axis", "exposure=0", "-o", tmp_path / "g.exr"]
-        result = run(*words)
-        assert (result.exit_code, result.stderr.count("\n")) == (2, 1)
-        assert "name a folder, and give --image-format exr" in result.stderr
-        assert not (tmp_path / "g.exr").exists()
         # Such a folder may exist.
         (tmp_path / "g.exr").mkdir()
         done(*words)

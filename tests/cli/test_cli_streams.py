@@ -144,6 +144,7 @@ def test_a_reader_that_ends_early_is_no_error(folder: Path, line: str) -> None:
         f"VK render -o out.png --framebuffers final {SMALL}",
         "VK apply a.png >(cat > got.png); wait",
         "VK apply a.png /dev/stdout | cat > got.png",
+        "VK apply - - --pipe-format png < a.png > got.png",
     ],
 )
 def test_streams_are_written(folder: Path, line: str) -> None:

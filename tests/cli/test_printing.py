@@ -1,18 +1,15 @@
-"""What commands print with --quiet, and completion in bash."""
+"""What commands print with --quiet, and completion."""
 
 from __future__ import annotations
 
 import io
 import json
-import os
-import stat
-import subprocess
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
+from click.shell_completion import ShellComplete
 from rich.console import Console
 
 import vkbloom
@@ -22,6 +19,7 @@ from tests.images import noise_image
 from tests.io.parts import written
 from tests.refusals import assert_matches, rows
 from vkbloom._cli import listing
+from vkbloom._cli.program import program
 from vkbloom._settings.registry import STAGES
 from vkbloom.psf._base import functions
 
@@ -67,43 +65,20 @@ def test_other_commands_are_quiet(tmp_path: Path, dark: Path, words: tuple[str, 
     assert len(list(tmp_path.iterdir())) > 1
 
 
-# Completion
-
-# The script that the documented line loads, called as bash calls it at the Tab key.
-_LOAD = 'eval "$(_VKBLOOM_COMPLETE=bash_source vkbloom)"\n'
-_BASH = """
-COMP_WORDS=({words}) COMP_CWORD={last} COMPREPLY=()
-_vkbloom_completion vkbloom
-printf '%s\\n' "${{COMPREPLY[@]}}"
-"""
-
-
-def test_completion(tmp_path: Path) -> None:
-    program_file = tmp_path / "vkbloom"
-    program_file.write_text(f"#!{sys.executable}\nfrom vkbloom._cli import main\n\nmain()\n")
-    program_file.chmod(program_file.stat().st_mode | stat.S_IXUSR)
-    environment = {**os.environ, "PATH": f"{tmp_path}{os.pathsep}{os.environ['PATH']}"}
-    script = _LOAD
-    for words in (
-        ["vkbloom", "gl"],
-        ["vkbloom", "apply", "--thresh"],
-        ["vkbloom", "apply", "--preset", "unity"],
-    ):
-        quoted = " ".join(f"'{word}'" for word in words)
-        script += _BASH.format(words=quoted, last=len(words) - 1) + "echo ---\n"
-    done = subprocess.run(
-        ["bash", "--norc", "-c", script],
-        env=environment,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert [set(part.split()) for part in done.stdout.split("---\n")] == [
-        {"glares"},
-        {"--threshold", "--threshold-scale"},
-        {"unity_urp", "unity_urp_kawase", "unity_urp_dual", "unity_hdrp", "unity_ppv2"},
-        set(),
-    ], done.stderr
+@pytest.mark.parametrize(
+    ("words", "offered"),
+    [
+        (["gl"], {"glares"}),
+        (["apply", "--thresh"], {"--threshold", "--threshold-scale"}),
+        (
+            ["apply", "--preset", "unity"],
+            {"unity_urp", "unity_urp_kawase", "unity_urp_dual", "unity_hdrp", "unity_ppv2"},
+        ),
+    ],
+)
+def test_completion(words: list[str], offered: set[str]) -> None:
+    asked = ShellComplete(program, {}, "vkbloom", "_VKBLOOM_COMPLETE")
+    assert {item.value for item in asked.get_completions(words[:-1], words[-1])} == offered
 
 
 # Wrong use and failures of all commands: one line on standard error, a status, and no file.

@@ -40,15 +40,6 @@ def test_no_rule_of_accessibility_is_broken(page: Any) -> None:
         assert found.violations_count == 0, found.generate_report()
 
 
-def test_it_says_for_whom_it_is_and_how_to_install_it(page: Any) -> None:
-    for readers in ("Photographers", "Programmers", "Researchers"):
-        assert page.locator("article strong", has_text=readers).is_visible()
-    assert page.locator("article pre", has_text="pip install").count() == 3
-    assert page.locator("button.copybtn").count() == page.locator("article pre").count()
-    for chapter in ("check.html", "gradients.html"):
-        assert page.locator(f"li.toctree-l1 > a[href='{chapter}']").count() > 0
-
-
 def test_the_picture_shows_both_sides_on_a_narrow_screen(page: Any) -> None:
     page.set_viewport_size({"width": 390, "height": 844})
     hero = page.locator("article img").first

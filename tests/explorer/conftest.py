@@ -2,17 +2,42 @@
 
 from __future__ import annotations
 
+import asyncio
+import queue
+import threading
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack
+from contextlib import ExitStack, contextmanager
 from typing import TYPE_CHECKING
 
 import pytest
 
-from tests.explorer.explorer_hosts import CHROMIUM, served
+from tests.explorer.explorer_hosts import CHROMIUM, PATIENCE
+from vkbloom._explorer.server import Server
 from vkbloom._explorer.viewer import Viewer
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser
+
+
+@contextmanager
+def served(new_viewer: Callable[[], Viewer]) -> Iterator[str]:
+    """Serve the page from a thread, and yield its address."""
+    started: queue.Queue[tuple[str, asyncio.AbstractEventLoop, asyncio.Event]] = queue.Queue()
+
+    async def main() -> None:
+        server, stopped = Server(new_viewer), asyncio.Event()
+        started.put((server.url, asyncio.get_running_loop(), stopped))
+        await stopped.wait()
+        await server.stop()
+
+    thread = threading.Thread(target=lambda: asyncio.run(main()))
+    thread.start()
+    url, loop, stopped = started.get(timeout=PATIENCE)
+    try:
+        yield url
+    finally:
+        loop.call_soon_threadsafe(stopped.set)
+        thread.join()
 
 
 @pytest.fixture(scope="module")

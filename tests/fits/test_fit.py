@@ -231,22 +231,25 @@ class TestVerdict:
         assert (found.framebuffer, found.verdict, found.cause) == ("final", "good", "")
         assert repr(found).endswith("; good>")
 
-    def test_a_clipped_target(self, fit: Call, truth: Image) -> None:
-        found = self.fitted(fit, np.minimum(truth, 1))
+    @pytest.mark.parametrize(
+        ("change", "words"),
+        [
+            (lambda truth: np.minimum(truth, 1), "the target is clipped at 1 ("),
+            (
+                lambda truth: np.maximum(truth, 0) ** (1 / 2.2),
+                "has another encoding: about the power of 0.4",
+            ),
+            (
+                lambda _: target_of(KinoBloom(threshold=0.5, intensity=0.5, radius=2.0), "final"),
+                "the method pyramid does not reach it",
+            ),
+        ],
+    )
+    def test_causes(self, fit: Call, truth: Image, change: Any, words: str) -> None:
+        found = self.fitted(fit, change(truth))
         assert found.verdict == "poor"
-        assert found.cause.startswith("the target is clipped at 1 (")
+        assert words in found.cause
         assert found.cause in found._repr_html_()
-
-    def test_an_encoded_target(self, fit: Call, truth: Image) -> None:
-        found = self.fitted(fit, np.maximum(truth, 0) ** (1 / 2.2))
-        assert found.verdict == "poor"
-        assert "has another encoding: about the power of 0.4" in found.cause
-
-    def test_another_method(self, fit: Call) -> None:
-        truth = KinoBloom(threshold=0.5, intensity=0.5, radius=2.0)
-        found = self.fitted(fit, target_of(truth, "final"))
-        assert found.verdict == "poor"
-        assert found.cause.startswith("the method pyramid does not reach it")
 
     @pytest.mark.parametrize("kind", ["float32", "uint8", "decoded"])
     @pytest.mark.parametrize("change", ["equal", "another picture", "mirrored", "brighter"])

@@ -14,7 +14,7 @@ import pytest
 import vkbloom
 from tests.exhaustive import some
 from vkbloom import DualKawase, Pyramid, Renderer, Separable, UrpBloom, psf, reference
-from vkbloom._cli import fields, translate
+from vkbloom._cli import fields, search
 from vkbloom._fit.translating import lights
 
 SIZE = (96, 64)
@@ -69,7 +69,7 @@ class TestTranslate:
         assert found.loss < 0.02
 
     def test_the_usual_size_is_the_same_everywhere(self) -> None:
-        (option,) = (one for one in translate.command.params if one.name == "size")
+        (option,) = (one for one in search.translate.params if one.name == "size")
         usual = inspect.signature(vkbloom.translate).parameters["size"].default
         assert fields.SIZE.convert(str(option.default), None, None) == usual == (640, 360)
 
@@ -138,11 +138,3 @@ def test_settings_are_found_or_the_verdict_is_poor(renderer: Renderer, bloom: An
     values = {name: getattr(found.settings, name) for name in ("threshold", "intensity")}
     known = {"threshold": bloom.threshold, "intensity": bloom.intensity}
     assert found.verdict == "poor" or values == pytest.approx(known, rel=0.1), found
-
-
-@pytest.mark.parametrize("preset", some(["unity_urp", "bevy_natural"], 1))
-@pytest.mark.parametrize("other", some(pairs.OTHERS, 3), ids="-".join)
-def test_no_bloom_is_found(renderer: Renderer, other: tuple[str, str], preset: str) -> None:
-    found = pairs.fitted(renderer, pairs.without_bloom(*other), preset, max_calls=100)
-    assert found.verdict == "poor"
-    assert found.cause.startswith("no bloom was found"), found.cause

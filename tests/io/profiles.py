@@ -63,17 +63,6 @@ def profile(
     return _icc(tags, b"RGB ")
 
 
-def grey_profile(name: str, gamma: float) -> bytes:
-    """Return a profile of one channel."""
-    tags = {
-        b"desc": _text(name),
-        b"cprt": _text("none"),
-        b"wtpt": _xyz(_D50),
-        b"kTRC": para(0, gamma),
-    }
-    return _icc(tags, b"GRAY")
-
-
 def _icc(tags: dict[bytes, bytes], space: bytes) -> bytes:
     table, body = struct.pack(">I", len(tags)), b""
     start = 128 + 4 + 12 * len(tags)

@@ -16,7 +16,6 @@ from tests.io.profiles import (
     REC_709,
     curv,
     gamma_chunk,
-    grey_profile,
     para,
     png_chunk,
     profile,
@@ -188,9 +187,12 @@ class TestRead:
         both = vkbloom.read(store_png(tmp_path / "a.png", pixels, chunks))
         assert np.array_equal(both, by_cicp)
 
-    @pytest.mark.parametrize("content", [b"no profile" * 20, grey_profile("Dot Gain", 1.75)])
-    def test_profiles_that_cannot_be_used_are_told(self, tmp_path: Path, content: bytes) -> None:
-        image = pytest.importorskip("PIL.Image")
+    @pytest.mark.parametrize("space", ["", "LAB"])
+    def test_profiles_that_cannot_be_used_are_told(self, tmp_path: Path, space: str) -> None:
+        image, cms = map(pytest.importorskip, ("PIL.Image", "PIL.ImageCms"))
+        content = b"no profile" * 20
+        if space:
+            content = cms.ImageCmsProfile(cms.createProfile(space)).tobytes()
         path, pixels = tmp_path / "a.tif", levels(8, 8)
         image.fromarray(pixels).save(path, icc_profile=content)
         made, facts = vkbloom.read(path, metadata=True)

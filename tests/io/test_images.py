@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from tests import images
 from tests.framebuffers import names_in
+from tests.framebuffers import write_image as store
 from tests.io.parts import written
 from vkbloom._io import safe_writing
 from vkbloom._io.displayed import Saved
@@ -35,19 +36,6 @@ def decode(stored: StoredImage, colour: str | None = None) -> Picture:
 def noise(*shape: int, numbers: str, seed: int = 3) -> NDArray[Any]:
     """Return values that each type holds; floats also under 0 and far above 1."""
     return images.noise(*shape, dtype=DTYPES[numbers], seed=seed, spread=20)
-
-
-def store(path: Path, pixels: NDArray[Any], numbers: str, **changes: Any) -> Path:
-    """Write a file without the package's own code; `changes` are fields or attributes."""
-    height, width, channels = pixels.shape
-    spec = oiio.ImageSpec(width, height, channels, numbers)
-    spec.attribute("oiio:UnassociatedAlpha", 1)
-    for name, value in changes.items():
-        if hasattr(spec, name):
-            setattr(spec, name, value)
-        else:
-            spec.attribute(name.replace("__", ":"), value)
-    return written(path, spec, pixels)
 
 
 def reread(path: Path) -> tuple[Any, NDArray[Any]]:

@@ -36,11 +36,16 @@ COMMANDS: Final = {
     "psfs": "List the point-spread functions",
     "adapters": "List the Vulkan adapters that vkbloom can use",
     "doctor": "Check whether this machine can render, and explain what prevents it",
-    "warm": "Fill the caches of pipelines before the first call needs them",
+    "warm": "Fill the caches of pipelines and kernels before the first call needs them",
 }
 
 # Modules of several commands.
-_MODULES: Final = dict.fromkeys(("presets", "glares", "psfs"), "listing")
+_MODULES: Final = {
+    **dict.fromkeys(("presets", "glares", "psfs"), "listing"),
+    **dict.fromkeys(("fit", "translate"), "search"),
+    **dict.fromkeys(("view", "explore"), "live"),
+    "adapters": "doctor",
+}
 
 _FAILURES: Final = (vkbloom.Error, OSError, ValueError, ImportError, MemoryError)
 

@@ -1,4 +1,4 @@
-"""``vkbloom warm``: fill the caches of pipelines before the first call needs them."""
+"""``vkbloom warm``: fill the caches of pipelines and kernels before the first call needs them."""
 
 from __future__ import annotations
 

@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from vkbloom._array_cache import kept
 from vkbloom._checks import check_number
-from vkbloom._core_kernel import CoreKernel, WithKernel
+from vkbloom._core_kernel import CoreKernel
 from vkbloom._settings.fields import value_field
 from vkbloom._settings.glare import Glare, stage_field
+from vkbloom.psf._core_kernels import WithKernel
 from vkbloom.psf._sampled import check_values
 
 DirtMode = Literal["multiply", "lerp"]

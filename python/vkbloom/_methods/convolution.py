@@ -10,10 +10,10 @@ from typing import Any, ClassVar, Literal, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vkbloom._core_kernel import WithKernel
 from vkbloom._settings.fields import choice_field, number_field
 from vkbloom._settings.settings import Settings
 from vkbloom.psf._base import PSF
+from vkbloom.psf._core_kernels import WithKernel
 from vkbloom.psf._eye import spencer
 from vkbloom.psf._resampling import box_resample
 from vkbloom.psf._sampled import samples

@@ -1,0 +1,140 @@
+"""Kernels that settings and stages make, for the core.
+
+They are cached on disk, since a kernel of 3840 x 2160 takes 5 to 10 s of processor time in each
+process. Their key is what a kernel follows from: its class and fields, the sizes, the package's
+source of the formulas, and the version of NumPy. A kernel that was computed in less than
+`MIN_SECONDS` has no file: reading one takes a part of that, too.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import hashlib
+import struct
+import time
+from pathlib import Path
+from typing import Any, ClassVar, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vkbloom._array_cache import kept
+from vkbloom._core_kernel import CoreKernel, core_kernel
+from vkbloom._io.disk_cache import DiskCache
+
+Size = tuple[int, int]
+
+CACHE: Final = DiskCache("kernels")
+#: Of processor time of the thread.
+MIN_SECONDS: Final = 0.02
+
+# Serial, width, height; left, top, width, height and channels of the part that is not 0.
+_HEADER: Final = struct.Struct("<Q7I")
+_PACKAGE: Final = Path(__file__).parents[1]
+# Modules whose functions follow from their fields alone. Those of users may change at any time.
+_PURE_MODULES: Final = {f"vkbloom.psf._{name}" for name in ("aperture", "eye", "lens", "renderers")}
+
+
+class WithKernel:
+    """Settings and stages whose kernel the core is given.
+
+    - `shaping`: The fields that change the kernel.
+    """
+
+    shaping: ClassVar[tuple[str, ...]]
+
+    @property
+    def prefilter(self) -> tuple[float, float, float]:
+        """min, max and mult of Unreal Engine's prefilter."""
+        return 1.0, 0.0, 1.0
+
+    def _kernel(self, frame: Size, buffers: Size) -> NDArray[Any]:
+        """Return the kernel in pixels of the bloom buffers."""
+        raise NotImplementedError
+
+    def core_kernel(self, frame: Size, buffers: Size) -> CoreKernel:
+        """Return the kernel as the core reads it."""
+        shape = type(self)(**{name: getattr(self, name) for name in self.shaping})
+        return _core_kernel(shape, frame, buffers)._replace(prefilter=self.prefilter)
+
+
+@kept
+def _core_kernel(shape: WithKernel, frame: Size, buffers: Size) -> CoreKernel:
+    fields = tuple(getattr(shape, name) for name in shape.shaping)
+    key = _key((type(shape).__name__, *fields, frame, buffers))
+    data = CACHE.read(key) if key else None
+    if data is not None:
+        return _unpack(data)
+    start = time.thread_time()
+    kernel = core_kernel(shape._kernel(frame, buffers))
+    if key and time.thread_time() - start >= MIN_SECONDS:
+        CACHE.write(key, _pack(kernel))
+    return kernel
+
+
+def _key(what: tuple[object, ...]) -> bytes | None:
+    """Return a digest; None if something may change that is not in it."""
+    formulas = _formulas()
+    digest = hashlib.blake2b(formulas or b"", digest_size=32)
+    return digest.digest() if formulas and _update(digest, what) else None
+
+
+def _update(digest: Any, value: Any) -> bool:
+    """Add a value to a digest; return whether it and all that it contains is known."""
+    array = getattr(value, "array", None)
+    if value is None or isinstance(value, bool | int | float | str):
+        digest.update(f"{value!r}\n".encode())
+        return True
+    if isinstance(array, np.ndarray):
+        digest.update(f"{array.shape}\n".encode())
+        digest.update(array)
+        return True
+    if isinstance(value, tuple):
+        digest.update(f"{len(value)}\n".encode())
+        return all(_update(digest, item) for item in value)
+    if not dataclasses.is_dataclass(value) or type(value).__module__ not in _PURE_MODULES:
+        return False
+    digest.update(f"{type(value).__name__}\n".encode())
+    return all(_update(digest, getattr(value, field.name)) for field in dataclasses.fields(value))
+
+
+@functools.cache
+def _formulas() -> bytes | None:
+    """Return a digest of the source of all formulas; None if it cannot be read."""
+    digest = hashlib.blake2b(np.__version__.encode())
+    folders = [_PACKAGE / name for name in ("psf", "_methods", "_glare")]
+    try:
+        for file in (
+            _PACKAGE / "_core_kernel.py",
+            *sorted(f for base in folders for f in base.glob("*.py")),
+        ):
+            digest.update(file.read_bytes())
+    except OSError:
+        return None
+    return digest.digest()
+
+
+def _pack(kernel: CoreKernel) -> bytes:
+    """Return the content of a kernel's file."""
+    height, width = kernel.pixels.shape[:2]
+    filled = np.asarray(kernel.pixels.any(axis=2))
+    rows, columns = _extent(filled, 1), _extent(filled, 0)
+    part = kernel.pixels[rows, columns, : 1 if kernel.is_grey else 4]
+    sides = width, height, columns.start, rows.start, part.shape[1], part.shape[0], part.shape[2]
+    return _HEADER.pack(kernel.serial, *sides) + part.tobytes()
+
+
+def _extent(filled: NDArray[np.bool_], axis: int) -> slice:
+    """Return the first to the last of the lines along an axis that have a True."""
+    lines = np.flatnonzero(filled.any(axis=axis))
+    return slice(int(lines[0]), int(lines[-1]) + 1) if len(lines) else slice(0, 0)
+
+
+def _unpack(data: bytes) -> CoreKernel:
+    """Return the kernel of a file."""
+    serial, width, height, left, top, across, down, channels = _HEADER.unpack_from(data)
+    pixels = np.zeros((height, width, 4), np.float32)
+    values: NDArray[np.float32] = np.frombuffer(data, np.float32, offset=_HEADER.size)
+    pixels[top : top + down, left : left + across] = values.reshape(down, across, channels)
+    return CoreKernel(pixels, serial, channels == 1)

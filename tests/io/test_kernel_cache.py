@@ -1,0 +1,108 @@
+"""The cache of kernels on disk: found again, and only where nothing else can change them."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from vkbloom import BlenderGlare, Convolution, Pyramid, psf
+from vkbloom import _array_cache as array_cache
+from vkbloom._core_kernel import core_kernel
+from vkbloom.psf import _core_kernels as kernels
+
+SIZES = (8, 6), (8, 6)
+APERTURE = psf.aperture(psf.iris(size=16), f_number=2, pixel_pitch=8)
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("VKBLOOM_CACHE_DIR", str(tmp_path / "cache"))
+    monkeypatch.setattr(kernels.CACHE, "written", {})
+    monkeypatch.setattr(kernels, "MIN_SECONDS", 0)
+    # Nothing is found in memory.
+    monkeypatch.setattr(array_cache, "_of_renderers", lambda: array_cache.ArrayCache(0, 0))
+    return tmp_path / "cache" / "kernels"
+
+
+COLOURS = np.random.default_rng(1).random((5, 6, 3))
+PADDED = np.pad(COLOURS, ((3, 0), (1, 2), (0, 0)))
+
+
+@pytest.mark.parametrize(
+    "values", [COLOURS, PADDED, COLOURS[..., 0], PADDED[..., 0], np.zeros((3, 2))]
+)
+def test_what_is_read_is_what_was_written(values: np.ndarray[Any, Any]) -> None:
+    made = core_kernel(values)
+    found = kernels._unpack(kernels._pack(made))
+    assert np.array_equal(found.pixels, made.pixels)
+    assert found[1:] == made[1:]
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [Convolution(APERTURE), Convolution(psf.unreal(APERTURE)), BlenderGlare(type="fog_glow")],
+)
+def test_methods_use_it(
+    folder: Path, settings: Convolution | BlenderGlare, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made = settings.core_kernel(*SIZES)
+    (file,) = folder.iterdir()
+    with monkeypatch.context() as patch:
+        patch.setattr("vkbloom.psf._core_kernels.core_kernel", lambda _: pytest.fail("made again"))
+        assert np.array_equal(settings.core_kernel(*SIZES).pixels, made.pixels)
+    file.write_bytes(file.read_bytes()[:-1])
+    assert np.array_equal(settings.core_kernel(*SIZES).pixels, made.pixels)
+    settings.core_kernel((8, 5), (8, 5))
+    assert len([*folder.iterdir()]) == 2
+
+
+@dataclasses.dataclass(frozen=True)
+class mine(psf.spencer):
+    """A function of a user, whose formula may change."""
+
+
+@pytest.mark.parametrize(
+    "spread",
+    [
+        mine(),
+        psf.samples(np.eye(3)),
+        psf.measured(Pyramid(levels=2), size=(8, 8)),
+        psf.unreal(psf.measured(Pyramid(levels=2), size=(8, 8))),
+    ],
+)
+def test_what_may_change_is_not_written(folder: Path, spread: psf.PSF) -> None:
+    Convolution(spread).core_kernel(*SIZES)
+    assert not folder.exists()
+
+
+def test_what_is_fast_is_not_written(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(kernels, "MIN_SECONDS", 1000)
+    Convolution(APERTURE).core_kernel(*SIZES)
+    assert not folder.exists()
+
+
+def test_another_formula_is_another_kernel(monkeypatch: pytest.MonkeyPatch, folder: Path) -> None:
+    Convolution(APERTURE).core_kernel(*SIZES)
+    monkeypatch.setattr(np, "__version__", "1.0")
+    monkeypatch.setattr(kernels, "_formulas", kernels._formulas.__wrapped__)
+    Convolution(APERTURE).core_kernel(*SIZES)
+    assert len([*folder.iterdir()]) == 2
+
+
+def test_all_that_differs_is_in_the_key() -> None:
+    masks = [np.eye(8), 1 - np.eye(8), np.ones((9, 9))]
+    keys = [
+        *((), ((),), (1,), (1.0,), ("1",), (True,), (None,), (1, 2), ((1, 2),), ((1,), 2)),
+        (psf.fog_glow(8),),
+        (psf.fog_glow(9),),
+        *((psf.aperture(mask),) for mask in masks),
+        *((psf.unreal(psf.aperture(mask)),) for mask in masks),
+        *((psf.aperture(psf.iris(size=8), f_number=f),) for f in (8, 8 + 1e-15)),
+        *((psf.cie_general(age),) for age in (35, 36)),
+        (psf.cie_total(),),
+    ]
+    assert len({kernels._key(key) for key in keys} - {None}) == len(keys)
