@@ -73,7 +73,6 @@ def pixels(renderer: Renderer) -> None:
             frames = renderer.render(UFO, size=SIZE, shading="deferred", framebuffers=name)
             # The device's curve is not the exact one.
             assert difference(pictures.picture(np.minimum(frames[name], 1), name), 1) <= 1, name
-        # `scene` is shown in place of a `final` that would be a copy of it.
         for settings in (Separable(bloom=False), Separable(bloom=False, exposure=1.0)):
             assert surface.present(UFO, settings)
             expected = renderer.render(UFO, settings, SIZE)["final"]

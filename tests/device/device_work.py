@@ -361,7 +361,6 @@ PULLED = (
     vkbloom.DualKawase(levels=2),
     vkbloom.BevyBloom(max_mip_dimension=16),
     vkbloom.Convolution(psf=np.ones((3, 5, 3))),
-    Separable(glare=(vkbloom.Ghosts(),)),
 )
 
 

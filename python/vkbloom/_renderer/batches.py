@@ -41,7 +41,7 @@ class _Part(NamedTuple):
     submission: _core.Submission
     first: int
     layers: int
-    outputs: tuple[tuple[str, tuple[int, ...], str, int, _core.Exported], ...]
+    outputs: list[tuple[str, tuple[int, ...], str, int, _core.Exported]]
     frames: list[Frames]
 
     def arrays(self, layer: int) -> dict[str, Any]:
@@ -53,23 +53,18 @@ class _Part(NamedTuple):
 
 
 class Batches:
-    """The batches of a renderer. Keeps the last plan: of small images it takes long to make."""
+    """The batches of a renderer."""
 
     def __init__(self, core: _core.Renderer, ends: PendingSubmissions) -> None:
         self._core = core
         self._pending = ends
-        self._last: tuple[Settings, tuple[str, ...] | None, _core.Plan] | None = None
         self._size: tuple[Settings, tuple[Any, ...], int] | None = None
-
-    def forget(self) -> None:
-        """Release the plan."""
-        self._last = None
 
     def run(
         self,
         batch: ImportedArray,
         settings: Settings,
-        names: tuple[str, ...] | None,
+        plan_of: Callable[[_core.Source], _core.Plan],
         frames: Callable[[Settings, dict[str, Any]], Frames],
         rest: Callable[[int], Iterator[Frames]],
     ) -> Iterator[Frames]:
@@ -84,7 +79,7 @@ class Batches:
                     # All parts have the same number of images, so that they use the same memory.
                     first = min(submitted, count - layers)
                     try:
-                        part = self._submit(batch, first, layers, settings, names)
+                        part = self._submit(batch, first, layers, plan_of)
                     except _core.ValidationError:
                         raise
                     except (_core.Error, ValueError):
@@ -130,29 +125,14 @@ class Batches:
         batch: ImportedArray,
         first: int,
         layers: int,
-        settings: Settings,
-        names: tuple[str, ...] | None,
+        plan_of: Callable[[_core.Source], _core.Plan],
     ) -> _Part:
         source = _core.image_source(batch.layers(first, layers))
-        if (
-            self._last is None
-            or self._last[:2] != (settings, names)
-            or not self._last[2].is_of_image(source)
-        ):
-            self._last = settings, names, self._core.plan(source, settings, names)
-        plan = self._last[2]
-        outputs = tuple(
-            [
-                (
-                    name,
-                    shape,
-                    dtype,
-                    _stride(shape, dtype),
-                    memory_for(self._core, layers * _stride(shape, dtype)),
-                )
-                for name, shape, dtype in plan.outputs
-            ]
-        )
+        plan = plan_of(source)
+        outputs = []
+        for name, shape, dtype in plan.outputs:
+            stride = _stride(shape, dtype)
+            outputs.append((name, shape, dtype, stride, memory_for(self._core, layers * stride)))
         arrays = tuple([memory for *_, memory in outputs])
         self._pending.wait()
         return _Part(self._core.run(source, (plan,), (arrays,)), first, layers, outputs, [])

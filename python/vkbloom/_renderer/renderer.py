@@ -275,7 +275,6 @@ class Renderer:
     def close(self) -> None:
         """Release the device and everything on it. May be called twice."""
         self._planned = self._kept = None
-        self._batches.forget()
         try:
             self._pending.wait()
         except ValueError:  # the device belongs to the process that this one was forked from
@@ -695,7 +694,10 @@ class Renderer:
             sequence = _paired(batch_sources(batch, first), settings)
             return self._run_requests(sequence, names, destination, alone=True)
 
-        for frames in self._batches.run(batch, settings, names, self._frames, rest):
+        def plan_of(source: _core.Source) -> _core.Plan:
+            return self._plan_of(source, settings, names)
+
+        for frames in self._batches.run(batch, settings, plan_of, self._frames, rest):
             self._save_pipelines()
             yield frames
 
