@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 import vkbloom
 from tests.images import picture
 from vkbloom import Renderer, load_method, psf, reference, testing
+from vkbloom._cli.live import Live
 from vkbloom._cli.program import program
-from vkbloom._cli.view import Live
 from vkbloom._explorer.controls import as_code
 from vkbloom._settings.registry import METHODS
 

@@ -85,3 +85,10 @@ def _show_groups(report: dict[str, Any]) -> None:
     click.echo(
         f"\n{report['cases']} cases in {report['seconds']:.0f} s, wrong: {len(report['wrong'])}."
     )
+
+
+@click.command()
+@click.option("--json", "as_json", is_flag=True, help="Print a list of objects.")
+def adapters(as_json: bool) -> int:
+    """List the Vulkan adapters that vkbloom can use."""
+    return bare.list_adapters(as_json=as_json)
