@@ -288,6 +288,8 @@ class Record:
     _class_key: ClassVar[str]
     #: The beginning of error messages about the fields.
     _subject: ClassVar[str]
+    #: What to use instead of an abstract class.
+    _example: ClassVar[str]
 
     #: The constructor's, since `inspect` would show the arguments of `__new__`.
     __signature__ = _ConstructorSignature()
@@ -302,6 +304,8 @@ class Record:
         return super().__new__(cls)
 
     def __post_init__(self) -> None:
+        if self._class_name() is None:
+            raise TypeError(f"{type(self).__name__} is abstract; use {self._example}")
         check_fields(self)
 
     @classmethod
