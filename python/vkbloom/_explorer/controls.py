@@ -20,10 +20,10 @@ from vkbloom.psf._base import PSF, functions
 _FIRST: Final = ("bloom", "intensity", "threshold")
 _LAST: Final = ("exposure", "tonemap")
 # Numbers of methods that are rarely changed.
-_RARE: Final = frozenset(
-    "clamp jitter low_frequency_boost_curvature luminance_cap max_mip_dimension maximum saturation "
-    "scale_x scale_y smoothness white".split()
-)
+_RARE: Final = {
+    *("clamp", "jitter", "low_frequency_boost_curvature", "luminance_cap", "max_mip_dimension"),
+    *("maximum", "saturation", "scale_x", "scale_y", "smoothness", "white"),
+}
 # Fields that keep their values on the page when another preset or method is selected.
 _LOOK: Final = ("bloom", "exposure", "tonemap", "encoding", "dither", "dither_seed")
 
