@@ -238,12 +238,6 @@
     INPUT(B, float, share) \
     INPUT(B, float, limit)
 
-// The adjoint of a convolution's filter of bright colours (adjoint_bright.frag), as of FFT_BLOCK.
-#define ADJOINT_BRIGHT_BLOCK(B, READS, INPUT, VEC4S) \
-    INPUT(B, float, prefilter_min) \
-    INPUT(B, float, prefilter_max) \
-    INPUT(B, float, prefilter_factor)
-
 // The composite of Godot.
 #define GODOT_FINAL_BLOCK(B, READS, INPUT, VEC4S) \
     COMPOSITE_ROWS(B, READS, INPUT) \
@@ -324,7 +318,6 @@
     BLOCK(lighting, LIGHTING_BLOCK) \
     BLOCK(composite, COMPOSITE_BLOCK) \
     BLOCK(adjoint_filter, ADJOINT_FILTER_BLOCK) \
-    BLOCK(adjoint_bright, ADJOINT_BRIGHT_BLOCK) \
     BLOCK(godot_final, GODOT_FINAL_BLOCK)
 
 // Settings that no shader reads, because they shape the graph. Integers: COUNT(name, default, min,

@@ -22,28 +22,23 @@ static bool read_image(struct vkb_run *run, const struct vkb_pass_row *pass,
                        const struct vkb_surface *surface, uint32_t index,
                        VkDescriptorImageInfo *info, struct vkb_error *error)
 {
-    struct vkb_scene *scene = &run->frame->scene;
-    const bool sky = pass->geometry == VKB_GEOMETRY_SKYBOX;
+    const struct vkb_scene *scene = &run->frame->scene;
     const struct vkb_texture *texture = NULL;
     const struct vkb_image *image;
 
     if (surface) {
         texture = &scene->textures[index == 0 ? surface->base : surface->emission];
         image = &texture->image;
+    } else if (pass->geometry == VKB_GEOMETRY_SKYBOX) {
+        image = &scene->sky;
     } else {
-        image = sky ? &scene->sky : &run->images[pass->reads[index]]->image;
+        image = &run->images[pass->reads[index]]->image;
     }
     *info = (VkDescriptorImageInfo){
         .sampler = texture ? texture->sampler : VK_NULL_HANDLE,
         .imageView = image->view,
         .imageLayout = vkb_image_layout(image, vkb_pass_reads_as(pass)),
     };
-    if (sky) {
-        const struct vkb_image *target = &run->images[pass->targets[0]]->image;
-        const bool smaller = !vkb_sky_is_magnified(image, &pass->params.mesh, target);
-        if (!vkb_image_view(run->device, &scene->sky, smaller, &info->imageView, error))
-            return false;
-    }
     return texture || pass->reading != VKB_READING_SAMPLED
         || vkb_bindings_sampler(run->device, &run->frame->pipelines.bindings, image->format,
                                 &info->sampler, error);

@@ -167,8 +167,9 @@ bool vkb_graph_add_pass(struct vkb_graph *graph, const struct vkb_pass_row *row,
 // How shaders round what they store to an image of that format: of STORED_*.
 enum vkb_mode vkb_storage_mode(enum vkb_format format);
 
-// Checks the rows, so that Vulkan gets only valid graphs.
-bool vkb_graph_check(const struct vkb_graph *graph, uint32_t max_side, struct vkb_error *error);
+// Checks the sizes of all images.
+bool vkb_graph_check_sizes(const struct vkb_graph *graph, uint32_t max_side,
+                           struct vkb_error *error);
 
 // Checks that both sides are 1 to max_side; `name` is used in the message.
 bool vkb_check_size(const char *name, uint32_t width, uint32_t height, uint32_t max_side,

@@ -29,9 +29,6 @@ static bool mirror_kernel(const struct vkb_kernel_data *kernel, struct vkb_graph
     mirrored->pixels = graph->owned[1] = pixels;
     mirrored->width = width;
     mirrored->height = height;
-    // The cotangents are not filtered.
-    mirrored->prefilter[0] = 1.0f;
-    mirrored->prefilter[1] = 0.0f;
     mirrored->serial = kernel->serial ^ UINT64_C(0x9e3779b97f4a7c15);
     return true;
 }
@@ -59,7 +56,6 @@ bool vkb_transpose_convolution(struct vkb_adjoint *adjoint, const struct vkb_set
                                       size.height + (edge_y ? kernel->height - 1 : 0)};
     const double left = edge_x ? kernel->width - 1 - kernel->width / 2 : 0;
     const double above = edge_y ? kernel->height - 1 - kernel->height / 2 : 0;
-    const float *prefilter = settings->kernel.prefilter;
     struct vkb_settings mirrored = *settings;
     struct vkb_bloom_source source = {.buffers = extended, .glow = vkb_cotangent_of(adjoint, pass)};
     const struct vkb_image_row result = {.name = "adjoint_convolved",
@@ -85,9 +81,5 @@ bool vkb_transpose_convolution(struct vkb_adjoint *adjoint, const struct vkb_set
         graph->passes[i].constants.alpha = ALPHA_BLUR;
     vkb_axis_move(&filter.x, size.width, extended.width, -left);
     vkb_axis_move(&filter.y, size.height, extended.height, -above);
-    if (prefilter[0] > prefilter[1])
-        return vkb_accumulate_filter(adjoint, &filter, convolved, glow, error);
-    return vkb_filter_to_image(adjoint, &filter, convolved, size, &convolved, error)
-        && vkb_transpose_bright(adjoint, prefilter, glow, convolved,
-                                (enum vkb_mode)pass->constants.alpha, error);
+    return vkb_accumulate_filter(adjoint, &filter, convolved, glow, error);
 }

@@ -148,7 +148,6 @@ void vkb_add_flare(struct vkb_levels *levels, const struct vkb_stage *stage, uin
     if (ghosts)
         add_before(&row, before);
     row.block = VKB_BLOCK_flare;
-    row.no_transpose = !ghosts || values->aberration > 0.0f;
     row.params.flare = (struct vkb_flare_params){
         .threshold = values->threshold,
         .limit = vkb_formats[levels->source->format].limit,

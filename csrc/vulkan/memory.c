@@ -355,18 +355,17 @@ static bool create_handle(const struct vkb_device *device, const struct vkb_imag
             NULL, &image->handle));
 }
 
-static VkImageSubresourceRange levels_of_image(const struct vkb_image *image, uint32_t levels)
+static VkImageSubresourceRange range_of_image(const struct vkb_image *image)
 {
     return (VkImageSubresourceRange){
         .aspectMask = vkb_formats[image->format].aspect,
-        .levelCount = levels,
+        .levelCount = image->levels,
         .layerCount = image->layers,
     };
 }
 
-static bool create_view(const struct vkb_device *device, const struct vkb_image *image,
-                        VkImageViewType type, VkFormat format, uint32_t levels, VkImageView *view,
-                        struct vkb_error *error)
+static bool create_view(const struct vkb_device *device, VkImageViewType type, VkFormat format,
+                        struct vkb_image *image, struct vkb_error *error)
 {
     return VK(error,
               device->vk.vkCreateImageView(device->handle,
@@ -375,23 +374,9 @@ static bool create_view(const struct vkb_device *device, const struct vkb_image 
                                                .image = image->handle,
                                                .viewType = type,
                                                .format = format,
-                                               .subresourceRange = levels_of_image(image, levels),
+                                               .subresourceRange = range_of_image(image),
                                            },
-                                           NULL, view));
-}
-
-bool vkb_image_view(const struct vkb_device *device, struct vkb_image *image, bool all_levels,
-                    VkImageView *view, struct vkb_error *error)
-{
-    const bool all = all_levels || image->levels == 1;
-    VkImageView *kept = all ? &image->view : &image->base_view;
-
-    if (!*kept
-        && !create_view(device, image, VK_IMAGE_VIEW_TYPE_CUBE, vkb_formats[image->format].vk,
-                        all ? image->levels : 1, kept, error))
-        return false;
-    *view = *kept;
-    return true;
+                                           NULL, &image->view));
 }
 
 static bool create_linear_texels(const struct vkb_device *device, struct vkb_image *image,
@@ -517,8 +502,9 @@ bool vkb_image_create(const struct vkb_device *device, const struct vkb_image_sp
                       struct vkb_image *image, struct vkb_error *error)
 {
     const struct VolkDeviceTable *vk = &device->vk;
-    const VkImageViewType type =
-        spec->array ? VK_IMAGE_VIEW_TYPE_2D_ARRAY : (VkImageViewType)image_type(spec);
+    const VkImageViewType type = spec->array       ? VK_IMAGE_VIEW_TYPE_2D_ARRAY
+                               : spec->layers == 6 ? VK_IMAGE_VIEW_TYPE_CUBE
+                                                   : (VkImageViewType)image_type(spec);
     VkMemoryRequirements requirements;
     VkMemoryPropertyFlags flags;
 
@@ -541,9 +527,7 @@ bool vkb_image_create(const struct vkb_device *device, const struct vkb_image_sp
                           &requirements, NULL, &image->memory, &flags, error)
         || !VK(error, vk->vkBindImageMemory(device->handle, image->handle, image->memory, 0))
         || (spec->mapped && !map_image(device, image, error))
-        || ((image->layers == 1 || spec->array) && (spec->usage & VIEWED)
-            && !create_view(device, image, type, format_of(spec), image->levels, &image->view,
-                            error))) {
+        || ((spec->usage & VIEWED) && !create_view(device, type, format_of(spec), image, error))) {
         vkb_image_destroy(device, image);
         return false;
     }
@@ -555,7 +539,6 @@ void vkb_image_destroy(const struct vkb_device *device, struct vkb_image *image)
     device->vk.vkDestroyBufferView(device->handle, image->linear_texels, NULL);
     device->vk.vkDestroyBuffer(device->handle, image->buffer, NULL);
     device->vk.vkDestroyImageView(device->handle, image->view, NULL);
-    device->vk.vkDestroyImageView(device->handle, image->base_view, NULL);
     device->vk.vkDestroyImage(device->handle, image->handle, NULL);
     free_memory(device, image->memory);
     *image = (struct vkb_image){0};
@@ -575,7 +558,7 @@ void vkb_image_transition(const struct vkb_device *device, VkCommandBuffer comma
         .oldLayout = vkb_image_layout(image, image->access),
         .newLayout = vkb_image_layout(image, access),
         .image = image->handle,
-        .subresourceRange = levels_of_image(image, image->levels),
+        .subresourceRange = range_of_image(image),
     };
 
     // A mapped image is also accessed as a buffer, and only a memory barrier covers these writes.

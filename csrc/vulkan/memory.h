@@ -27,7 +27,7 @@ struct vkb_buffer {
 struct vkb_image {
     VkImage handle;
     VkDeviceMemory memory;
-    VkImageView view, base_view;  // of all levels and of the first; of cubemaps see vkb_image_view
+    VkImageView view;  // of all levels
     enum vkb_format format;
     uint32_t width, height, depth, layers, levels;
     VkImageUsageFlags usage;
@@ -103,10 +103,6 @@ struct vkb_borrowed {
 // False without an error if the device cannot do this.
 bool vkb_image_borrow(const struct vkb_device *device, const struct vkb_borrowed *borrowed,
                       struct vkb_image *image);
-
-// Creates the view of a cubemap with all levels, or with the first one, if there is none.
-bool vkb_image_view(const struct vkb_device *device, struct vkb_image *image, bool all_levels,
-                    VkImageView *view, struct vkb_error *error);
 
 // Creates the view of a mapped image's linear texels if there is none. The image must be small
 // enough (see vkb_image_fits_linear_texels).
