@@ -76,7 +76,7 @@ def run(plan: Plan, section: Section) -> None:
             if on_cpu:
                 ours = {name: _processor_time(call) for name, call in ours.items()}
             times[name] = alternate_seconds(ours, plan.times(ROUNDS), warm_up=3)
-            memory = renderer._core.cached[2]
+            memory = renderer._core.cached[1]
         backward = times[name]["backward"].over(times[name]["forward"]).value
         section.goals.append(Goal(f"{name}: backward / forward", backward, MOST, at_most=True))
         section.times[name] = times[name]

@@ -238,12 +238,6 @@
     INPUT(B, float, share) \
     INPUT(B, float, limit)
 
-// The adjoint of a convolution's filter of bright colours (adjoint_bright.frag), as of FFT_BLOCK.
-#define ADJOINT_BRIGHT_BLOCK(B, READS, INPUT, VEC4S) \
-    INPUT(B, float, prefilter_min) \
-    INPUT(B, float, prefilter_max) \
-    INPUT(B, float, prefilter_factor)
-
 // The composite of Godot.
 #define GODOT_FINAL_BLOCK(B, READS, INPUT, VEC4S) \
     COMPOSITE_ROWS(B, READS, INPUT) \
@@ -324,7 +318,6 @@
     BLOCK(lighting, LIGHTING_BLOCK) \
     BLOCK(composite, COMPOSITE_BLOCK) \
     BLOCK(adjoint_filter, ADJOINT_FILTER_BLOCK) \
-    BLOCK(adjoint_bright, ADJOINT_BRIGHT_BLOCK) \
     BLOCK(godot_final, GODOT_FINAL_BLOCK)
 
 // Settings that no shader reads, because they shape the graph. Integers: COUNT(name, default, min,
@@ -441,23 +434,21 @@
 #define STRIP_ROWS(CHANNEL) ((CHANNEL) == 1 ? 4 : 8)
 // Blocks of pixels that fill complete words, also with three channels. CHANNEL is the size of a
 // channel in bytes.
-#define HALVE_LINEAR_COLUMNS       8
-#define HALVE_LINEAR_ROWS          32
-#define PREFILTER_COLUMNS(CHANNEL) ((CHANNEL) == 2 ? 8 : 4)
-#define TEXEL_COLUMNS(CHANNEL)     (16 / (CHANNEL))
-#define TEXEL_ROWS                 16
-#define WINDOW_COLUMNS(CHANNEL)    (8 / (CHANNEL))
-#define WINDOW_ROWS                64
-#define SHRINK_ROWS                32
-#define GATHER_COLUMNS             4
-#define GATHER_ROWS                16
-#define NINE_OUTPUTS               8
-#define STREAK_COLUMNS             8
-#define STREAK_ROWS                32
-#define TILE_LOADED                64
-#define TILE_ROWS                  32
-#define TILE_RUNS                  4
-#define TILE_RADIUS                16
+#define TAP_COLUMNS(CHANNEL)    ((CHANNEL) == 2 ? 8 : 4)
+#define TAP_ROWS                32
+#define TEXEL_COLUMNS(CHANNEL)  (16 / (CHANNEL))
+#define TEXEL_ROWS              16
+#define WINDOW_COLUMNS(CHANNEL) (8 / (CHANNEL))
+#define WINDOW_ROWS             64
+#define GATHER_COLUMNS          4
+#define GATHER_ROWS             16
+#define NINE_OUTPUTS            8
+#define STREAK_COLUMNS          8
+#define STREAK_ROWS             32
+#define TILE_LOADED             64
+#define TILE_ROWS               32
+#define TILE_RUNS               4
+#define TILE_RADIUS             16
 // Tiles of filters: their rows, and those that an invocation adds up.
 #define FILTER_TILE_ROWS 16
 #define FILTER_TILE_RUN  4

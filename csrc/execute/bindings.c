@@ -2,42 +2,23 @@
 
 #include <string.h>
 
-// The layouts for passes with these descriptors after the parameters.
-struct vkb_pass_layouts {
-    enum vkb_binding_kind kind;
-    VkDescriptorType descriptors[VKB_MAX_DESCRIPTORS];
-    uint32_t count;
-    struct vkb_layouts made;
-};
-
-static bool create_sampler(const struct vkb_device *device, VkFilter filter, VkSampler *sampler,
-                           struct vkb_error *error)
+bool vkb_sampler_create(const struct vkb_device *device, VkFilter filter,
+                        VkSamplerAddressMode border, VkSampler *sampler, struct vkb_error *error)
 {
-    return VK(error,
-              device->vk.vkCreateSampler(device->handle,
-                                         &(VkSamplerCreateInfo){
-                                             .sType = VK_STRUCTURE_TYPE_SAMPLER_CREATE_INFO,
-                                             .magFilter = filter,
-                                             .minFilter = filter,
-                                             .mipmapMode = filter == VK_FILTER_LINEAR
-                                                             ? VK_SAMPLER_MIPMAP_MODE_LINEAR
-                                                             : VK_SAMPLER_MIPMAP_MODE_NEAREST,
-                                             .addressModeU = VK_SAMPLER_ADDRESS_MODE_CLAMP_TO_EDGE,
-                                             .addressModeV = VK_SAMPLER_ADDRESS_MODE_CLAMP_TO_EDGE,
-                                             .addressModeW = VK_SAMPLER_ADDRESS_MODE_CLAMP_TO_EDGE,
-                                             .maxLod = VK_LOD_CLAMP_NONE,
-                                         },
-                                         NULL, sampler));
+    return VK(error, device->vk.vkCreateSampler(device->handle,
+                                                &(VkSamplerCreateInfo){
+                                                    .sType = VK_STRUCTURE_TYPE_SAMPLER_CREATE_INFO,
+                                                    .magFilter = filter,
+                                                    .minFilter = filter,
+                                                    // The modes have the filters' values.
+                                                    .mipmapMode = (VkSamplerMipmapMode)filter,
+                                                    .addressModeU = border,
+                                                    .addressModeV = border,
+                                                    .addressModeW = border,
+                                                    .maxLod = VK_LOD_CLAMP_NONE,
+                                                },
+                                                NULL, sampler));
 }
-
-static const struct vkb_binding_types binding_types[VKB_BINDING_KINDS] = {
-    [VKB_BINDINGS_DRAW] = {.read = VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER},
-    [VKB_BINDINGS_DISPATCH] = {VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER,
-                               VK_DESCRIPTOR_TYPE_STORAGE_IMAGE},
-    [VKB_BINDINGS_LOAD] = {VK_DESCRIPTOR_TYPE_STORAGE_IMAGE, VK_DESCRIPTOR_TYPE_STORAGE_IMAGE},
-    [VKB_BINDINGS_LINEAR_TEXELS] = {VK_DESCRIPTOR_TYPE_UNIFORM_TEXEL_BUFFER,
-                                    VK_DESCRIPTOR_TYPE_STORAGE_BUFFER},
-};
 
 bool vkb_layouts_create(const struct vkb_device *device,
                         const VkDescriptorSetLayoutBinding *bindings, uint32_t count,
@@ -79,15 +60,14 @@ void vkb_layouts_destroy(const struct vkb_device *device, struct vkb_layouts *la
 static bool create_layouts(const struct vkb_device *device, struct vkb_pass_layouts *layouts,
                            struct vkb_error *error)
 {
-    const bool draw = layouts->kind == VKB_BINDINGS_DRAW;
     const VkShaderStageFlags stages =
-        draw ? VK_SHADER_STAGE_FRAGMENT_BIT : VK_SHADER_STAGE_COMPUTE_BIT;
+        layouts->draw ? VK_SHADER_STAGE_FRAGMENT_BIT : VK_SHADER_STAGE_COMPUTE_BIT;
     VkDescriptorSetLayoutBinding rows[VKB_MAX_DESCRIPTORS + 1] = {
         {
             .binding = 0,
             .descriptorType = VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER,
             .descriptorCount = 1,
-            .stageFlags = stages | (draw ? VK_SHADER_STAGE_VERTEX_BIT : 0),
+            .stageFlags = stages | (layouts->draw ? VK_SHADER_STAGE_VERTEX_BIT : 0),
         },
     };
 
@@ -99,7 +79,7 @@ static bool create_layouts(const struct vkb_device *device, struct vkb_pass_layo
             .stageFlags = stages,
         };
     const uint32_t constants =
-        layouts->kind == VKB_BINDINGS_LINEAR_TEXELS ? sizeof(struct vkb_linear_texels) : 0;
+        layouts->reading == VKB_READING_LINEAR_TEXELS ? sizeof(struct vkb_linear_texels) : 0;
     return vkb_layouts_create(device, rows, layouts->count + 1, constants, &layouts->made, error);
 }
 
@@ -121,7 +101,8 @@ bool vkb_bindings_sampler(const struct vkb_device *device, struct vkb_bindings *
     VkSampler *kept = filters ? &bindings->filter : &bindings->nearest;
 
     if (!*kept
-        && !create_sampler(device, filters ? VK_FILTER_LINEAR : VK_FILTER_NEAREST, kept, error))
+        && !vkb_sampler_create(device, filters ? VK_FILTER_LINEAR : VK_FILTER_NEAREST,
+                               VK_SAMPLER_ADDRESS_MODE_CLAMP_TO_EDGE, kept, error))
         return false;
     *sampler = *kept;
     return true;
@@ -132,50 +113,40 @@ uint32_t vkb_pass_descriptor_images(const struct vkb_pass_row *pass)
     return pass->textured ? 2 : pass->geometry == VKB_GEOMETRY_SKYBOX ? 1 : pass->read_count;
 }
 
-static enum vkb_binding_kind kind_of(const struct vkb_pass_row *pass)
-{
-    if (pass->geometry != VKB_GEOMETRY_DISPATCH)
-        return VKB_BINDINGS_DRAW;
-    return pass->reading == VKB_READING_SAMPLED ? VKB_BINDINGS_DISPATCH
-         : pass->reading == VKB_READING_LOADED  ? VKB_BINDINGS_LOAD
-                                                : VKB_BINDINGS_LINEAR_TEXELS;
-}
-
-struct vkb_binding_types vkb_pass_binding_types(const struct vkb_pass_row *pass)
-{
-    return binding_types[kind_of(pass)];
-}
-
 VkPipelineBindPoint vkb_pass_bind_point(const struct vkb_pass_row *pass)
 {
     return pass->geometry == VKB_GEOMETRY_DISPATCH ? VK_PIPELINE_BIND_POINT_COMPUTE
                                                    : VK_PIPELINE_BIND_POINT_GRAPHICS;
 }
 
-VkDescriptorType vkb_resource_descriptor(const struct vkb_resource *resource)
+// The descriptors after the parameters: the images read, the resources, the target of a dispatch.
+static struct vkb_pass_layouts described(const struct vkb_pass_row *pass)
 {
-    static const VkDescriptorType types[VKB_RESOURCE_KINDS] = {
+    // Of the images read and of the target.
+    static const VkDescriptorType types[][2] = {
+        [VKB_READING_SAMPLED] = {VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER,
+                                 VK_DESCRIPTOR_TYPE_STORAGE_IMAGE},
+        [VKB_READING_LOADED] = {VK_DESCRIPTOR_TYPE_STORAGE_IMAGE, VK_DESCRIPTOR_TYPE_STORAGE_IMAGE},
+        [VKB_READING_LINEAR_TEXELS] = {VK_DESCRIPTOR_TYPE_UNIFORM_TEXEL_BUFFER,
+                                       VK_DESCRIPTOR_TYPE_STORAGE_BUFFER},
+    };
+    static const VkDescriptorType resource_types[VKB_RESOURCE_KINDS] = {
         [VKB_RESOURCE_TEXTURE] = VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER,
         [VKB_RESOURCE_IMAGE] = VK_DESCRIPTOR_TYPE_STORAGE_IMAGE,
         [VKB_RESOURCE_UNIFORM] = VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER,
         [VKB_RESOURCE_STORAGE] = VK_DESCRIPTOR_TYPE_STORAGE_BUFFER,
     };
-
-    return types[resource->kind];
-}
-
-// The descriptors after the parameters.
-static struct vkb_pass_layouts described(const struct vkb_pass_row *pass)
-{
-    struct vkb_pass_layouts layouts = {.kind = kind_of(pass)};
-    const struct vkb_binding_types types = binding_types[layouts.kind];
+    struct vkb_pass_layouts layouts = {
+        .draw = pass->geometry != VKB_GEOMETRY_DISPATCH,
+        .reading = pass->reading,
+    };
 
     while (layouts.count < vkb_pass_descriptor_images(pass))
-        layouts.descriptors[layouts.count++] = types.read;
+        layouts.descriptors[layouts.count++] = types[pass->reading][0];
     for (uint32_t i = 0; i < pass->resource_count; ++i)
-        layouts.descriptors[layouts.count++] = vkb_resource_descriptor(pass->resources[i]);
-    if (layouts.kind != VKB_BINDINGS_DRAW)
-        layouts.descriptors[layouts.count++] = types.target;
+        layouts.descriptors[layouts.count++] = resource_types[pass->resources[i]->kind];
+    if (!layouts.draw)
+        layouts.descriptors[layouts.count++] = types[pass->reading][1];
     return layouts;
 }
 
@@ -186,7 +157,8 @@ static uint32_t find_layouts(const struct vkb_bindings *bindings,
 
     for (; i < bindings->layout_count; ++i) {
         const struct vkb_pass_layouts *kept = &bindings->layouts[i];
-        if (kept->kind == layouts->kind && kept->count == layouts->count
+        if (kept->draw == layouts->draw && kept->reading == layouts->reading
+            && kept->count == layouts->count
             && memcmp(kept->descriptors, layouts->descriptors, sizeof kept->descriptors) == 0)
             break;
     }
@@ -213,10 +185,10 @@ bool vkb_bindings_prepare(const struct vkb_device *device, struct vkb_bindings *
     return true;
 }
 
-const struct vkb_layouts *vkb_bindings_layouts(const struct vkb_bindings *bindings,
-                                               const struct vkb_pass_row *pass)
+const struct vkb_pass_layouts *vkb_bindings_layouts(const struct vkb_bindings *bindings,
+                                                    const struct vkb_pass_row *pass)
 {
     const struct vkb_pass_layouts layouts = described(pass);
 
-    return &bindings->layouts[find_layouts(bindings, &layouts)].made;
+    return &bindings->layouts[find_layouts(bindings, &layouts)];
 }

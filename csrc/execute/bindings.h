@@ -5,15 +5,6 @@
 
 #include "graph/graph.h"
 
-// The descriptors after the parameter block.
-enum vkb_binding_kind {
-    VKB_BINDINGS_DRAW,           // images, each with a sampler
-    VKB_BINDINGS_DISPATCH,       // the same, and a storage image as the target
-    VKB_BINDINGS_LOAD,           // storage images, the target is one too
-    VKB_BINDINGS_LINEAR_TEXELS,  // linear texels, and the sizes of all images as push constants
-    VKB_BINDING_KINDS
-};
-
 // Push constants: the sizes of images that are accessed as linear texels (variants/pixels.glsl).
 struct vkb_linear_texels {
     int32_t target[4];  // width, height, words in a row, first row of the bound buffer
@@ -33,7 +24,17 @@ bool vkb_layouts_create(const struct vkb_device *device,
                         uint32_t constants, struct vkb_layouts *layouts, struct vkb_error *error);
 void vkb_layouts_destroy(const struct vkb_device *device, struct vkb_layouts *layouts);
 
-struct vkb_pass_layouts;
+bool vkb_sampler_create(const struct vkb_device *device, VkFilter filter,
+                        VkSamplerAddressMode border, VkSampler *sampler, struct vkb_error *error);
+
+// The layouts for passes with these descriptors after the parameters.
+struct vkb_pass_layouts {
+    bool draw;
+    enum vkb_reading reading;
+    VkDescriptorType descriptors[VKB_MAX_DESCRIPTORS];
+    uint32_t count;
+    struct vkb_layouts made;
+};
 
 struct vkb_bindings {
     VkSampler filter, nearest;
@@ -54,22 +55,14 @@ bool vkb_bindings_prepare(const struct vkb_device *device, struct vkb_bindings *
                           const struct vkb_pass_row *pass, uint32_t *number,
                           struct vkb_error *error);
 
-VkDescriptorType vkb_resource_descriptor(const struct vkb_resource *resource);
-
 // The number of images that the pass reads through descriptors, with the scene's cubemap or
 // textures.
 uint32_t vkb_pass_descriptor_images(const struct vkb_pass_row *pass);
 
-// The types of the descriptors of the images that the pass reads, and of its target.
-struct vkb_binding_types {
-    VkDescriptorType read, target;
-};
-struct vkb_binding_types vkb_pass_binding_types(const struct vkb_pass_row *pass);
-
 VkPipelineBindPoint vkb_pass_bind_point(const struct vkb_pass_row *pass);
 
 // The layouts of a pass that vkb_bindings_prepare has made.
-const struct vkb_layouts *vkb_bindings_layouts(const struct vkb_bindings *bindings,
-                                               const struct vkb_pass_row *pass);
+const struct vkb_pass_layouts *vkb_bindings_layouts(const struct vkb_bindings *bindings,
+                                                    const struct vkb_pass_row *pass);
 
 #endif

@@ -78,7 +78,7 @@ static bool reserve(struct vkb_run *run, const struct vkb_request *requests, uin
     const struct vkb_scene *scene = &run->frame->scene;
     const uint32_t surfaces = scene->body.surface_count + scene->glow.surface_count;
     struct vkb_submission *submission = run->submission;
-    uint32_t passes = 0, sets = 0;
+    uint32_t passes = 0, sets = 2;  // of the probe
 
     for (uint32_t i = 0; i < request_count; ++i) {
         const struct vkb_plan *plan = requests[i].plan;
@@ -110,84 +110,49 @@ static bool load_scene(struct vkb_run *run, const struct vkb_scene_data *data,
     return true;
 }
 
-// Whether the image holds the pixels of the row.
-static bool holds_constant(const struct vkb_cached_image *cached, const struct vkb_image_row *row)
+// The bytes of the image in the staging memory, if the host fills it once and it does not hold its
+// pixels yet; else 0. Offsets of copies are multiples of a pixel.
+static size_t missing_size(const struct vkb_run *run, uint32_t index)
 {
-    return cached->content.valid && cached->content.version == row->serial;
+    const struct vkb_image_row *row = &run->graph->images[index];
+    const struct vkb_content *content = run->contents[index];
+
+    return row->serial && !(content->valid && content->version == row->serial)
+             ? ((size_t)vkb_image_size(row) + 15) & ~(size_t)15
+             : 0;
 }
 
-static size_t size_of_pixels(const struct vkb_image_row *row)
+// Fills the images whose pixels the graph has: a kernel, a picture of dirt, weights.
+static bool fill_constants(struct vkb_run *run, struct vkb_error *error)
 {
-    return (size_t)row->width * row->height * vkb_pixel_size(row->format);
-}
-
-// Finds the images of the graph that are filled once and do not hold their pixels. Returns the size
-// of these in *size.
-static bool find_constants(struct vkb_run *run, const void **pixels, size_t *size,
-                           struct vkb_error *error)
-{
-    const size_t most = sizeof run->constants / sizeof run->constants[0];
-
-    *size = 0;
-    for (uint32_t i = 0; i < run->graph->image_count; ++i) {
-        const struct vkb_image_row *row = &run->graph->images[i];
-        if (!row->serial)
-            continue;
-        if (!vkb_run_resolve(run, i, error))
-            return false;
-        if (holds_constant(run->images[i], row))
-            continue;
-        if (run->constant_count == most)
-            return vkb_fail(error, VKB_ERROR_GENERAL, "graph: more than %zu images are filled once",
-                            most);
-        run->images[i]->content.valid = false;
-        run->images[i]->content.version = row->serial;
-        pixels[run->constant_count] = row->pixels;
-        run->constant_starts[run->constant_count] = *size;
-        run->constants[run->constant_count++] = run->images[i];
-        *size += size_of_pixels(row);
-    }
-    return true;
-}
-
-static bool stage_constants(struct vkb_run *run, struct vkb_error *error)
-{
-    const void *pixels[sizeof run->constants / sizeof run->constants[0]];
+    const struct vkb_graph *graph = run->graph;
     struct vkb_buffer *staging = &run->frame->constants;
-    size_t size;
+    VkDeviceSize size = 0, start = 0;
 
-    if (!find_constants(run, pixels, &size, error))
-        return false;
+    for (uint32_t i = 0; i < graph->image_count; ++i) {
+        if (graph->images[i].serial && !vkb_run_resolve(run, i, error))
+            return false;
+        size += missing_size(run, i);
+    }
     if (size == 0)
         return true;
     if (!vkb_submissions_wait(run->device, &run->frame->submissions, error)
         || !vkb_buffer_reserve(run->device, VKB_MEMORY_UPLOAD, VK_BUFFER_USAGE_TRANSFER_SRC_BIT,
                                size, staging, error))
         return false;
-    for (uint32_t i = 0; i < run->constant_count; ++i) {
-        const size_t start = run->constant_starts[i];
-        const size_t end = i + 1 < run->constant_count ? run->constant_starts[i + 1] : size;
-        memcpy((char *)staging->mapped + start, pixels[i], end - start);
+    for (uint32_t i = 0; i < graph->image_count; ++i) {
+        const size_t missing = missing_size(run, i);
+        if (missing == 0)
+            continue;
+        memcpy((char *)staging->mapped + start, graph->images[i].pixels,
+               (size_t)vkb_image_size(&graph->images[i]));
+        vkb_image_fill(run->device, run->submission->commands.buffer, &run->images[i]->image,
+                       staging->handle, start);
+        run->contents[i]->version = graph->images[i].serial;
+        run->contents[i]->valid = true;
+        start += missing;
     }
     return vkb_buffer_flush(run->device, staging, error);
-}
-
-static void record_constants(struct vkb_run *run)
-{
-    for (uint32_t i = 0; i < run->constant_count; ++i) {
-        struct vkb_image *image = &run->constants[i]->image;
-        VkBufferImageCopy copy = {
-            .bufferOffset = run->constant_starts[i],
-            .imageSubresource = {VK_IMAGE_ASPECT_COLOR_BIT, 0, 0, 1},
-            .imageExtent = {image->width, image->height, 1},
-        };
-        vkb_image_transition(run->device, run->submission->commands.buffer, image,
-                             VKB_ACCESS_COPY_TARGET);
-        run->device->vk.vkCmdCopyBufferToImage(
-            run->submission->commands.buffer, run->frame->constants.handle, image->handle,
-            vkb_image_layout(image, VKB_ACCESS_COPY_TARGET), 1, &copy);
-        run->constants[i]->content.valid = true;
-    }
 }
 
 // `next` is the following request; NULL: `request` is the last one.
@@ -244,14 +209,14 @@ static bool record_and_submit(struct vkb_run *run, struct vkb_request *requests,
     if (!vkb_commands_begin(device, &submission->commands, error))
         return false;
     vkb_timer_reset(device, commands, &submission->timer);
-    if (!vkb_sources_record(run, error))
+    if (!vkb_sources_record(run, error) || !fill_constants(run, error))
         return false;
-    record_constants(run);
     for (uint32_t i = 0; i < request_count; ++i)
         if (!record_request(run, &requests[i], i + 1 < request_count ? &requests[i + 1] : NULL,
                             error))
             return false;
-    vkb_barrier_record_host_read(device, commands);
+    // After all copies and stores to buffers.
+    vkb_barrier_record(device, commands, NULL, true, VKB_ACCESS_RESOURCE, VKB_ACCESS_HOST_READ);
     return vkb_buffer_flush(device, &submission->uniforms, error)
         && vkb_submission_submit(device, submission, &run->sync, error);
 }
@@ -285,8 +250,8 @@ static bool submit(struct vkb_run *run, const struct vkb_frame_source *source,
     find_usages(run, source, requests, request_count);
     return (!source->scene || load_scene(run, source->scene, error))
         && vkb_sources_stage(run, source, requests, request_count, error)
-        && stage_constants(run, error) && vkb_probe_texels(run, requests, request_count, error)
         && reserve(run, requests, request_count, error)
+        && vkb_probe_texels(run, requests, request_count, error)
         && record_and_submit(run, requests, request_count, error);
 }
 
@@ -333,7 +298,6 @@ struct vkb_cached vkb_frame_cached(const struct vkb_frame *frame)
 {
     return (struct vkb_cached){
         .pipelines = frame->pipelines.entry_count,
-        .framebuffers = frame->cache.framebuffer_count,
         .image_bytes = vkb_image_cache_size(&frame->cache),
     };
 }
@@ -437,14 +401,9 @@ bool vkb_frame_collect(struct vkb_device *device, struct vkb_frame *frame,
 bool vkb_frame_drop(struct vkb_device *device, struct vkb_frame *frame,
                     struct vkb_submission *submission)
 {
-    struct vkb_error error;
-
+    // A wait is interruptible and takes the GIL, which the caller holds.
     if (!vkb_submission_over(device, submission))
         return false;
-    // A wait is interruptible and takes the GIL, which the caller holds.
-    if (submission->pending && !vkb_commands_reset(device, &submission->commands, &error))
-        return false;
-    submission->pending = false;
     vkb_submissions_give_back(device, &frame->submissions, submission);
     return true;
 }

@@ -89,7 +89,7 @@ bool vkb_frame_drop(struct vkb_device *device, struct vkb_frame *frame,
 
 // The number of cached objects, and their size.
 struct vkb_cached {
-    size_t pipelines, framebuffers;
+    size_t pipelines;
     uint64_t image_bytes;
 };
 struct vkb_cached vkb_frame_cached(const struct vkb_frame *frame);

@@ -4,56 +4,23 @@
 
 #include <string.h>
 
-// Keys are compared byte by byte. All members have 64 bits, so there is no padding.
-struct framebuffer_key {
-    VkRenderPass render_pass;
-    uint64_t images[VKB_MAX_TARGETS + 1];
-};
-_Static_assert(sizeof(struct framebuffer_key) == (VKB_MAX_TARGETS + 2) * sizeof(uint64_t),
-               "a framebuffer's key has padding");
-
-struct vkb_framebuffer_entry {
-    struct framebuffer_key key;
-    VkFramebuffer handle;
-};
-
-// Destroys the framebuffers of an image that will be destroyed. No image has the id 0.
-static void destroy_framebuffers(const struct vkb_device *device, struct vkb_image_cache *cache,
-                                 uint64_t image_id)
-{
-    for (size_t i = image_id ? cache->framebuffer_count : 0; i-- > 0;) {
-        struct vkb_framebuffer_entry *entry = &cache->framebuffers[i];
-        bool uses = false;
-        for (uint32_t target = 0; target <= VKB_MAX_TARGETS; ++target)
-            uses |= entry->key.images[target] == image_id;
-        if (!uses)
-            continue;
-        device->vk.vkDestroyFramebuffer(device->handle, entry->handle, NULL);
-        *entry = cache->framebuffers[--cache->framebuffer_count];
-    }
-}
-
 void vkb_image_cache_destroy(const struct vkb_device *device, struct vkb_image_cache *cache)
 {
     for (size_t i = 0; i < cache->count; ++i) {
         struct vkb_cached_image *cached = cache->images[i];
-        destroy_framebuffers(device, cache, cached->image_id);
         vkb_image_destroy(device, &cached->image);
         vkb_free(cached->content.recipe);
         vkb_free(cached);
     }
     vkb_free(cache->images);
-    vkb_free(cache->framebuffers);
-    // The clock continues, so that ids and versions stay unique.
+    // The clock continues, so that versions stay unique.
     *cache = (struct vkb_image_cache){.clock = cache->clock, .now = cache->now};
 }
 
 // Destroys the image and keeps its entry, since there are only a few names.
-static void destroy_image(const struct vkb_device *device, struct vkb_image_cache *cache,
-                          struct vkb_cached_image *cached)
+static void destroy_image(const struct vkb_device *device, struct vkb_cached_image *cached)
 {
     cached->content.valid = false;
-    destroy_framebuffers(device, cache, cached->image_id);
     vkb_image_destroy(device, &cached->image);
 }
 
@@ -89,7 +56,7 @@ void vkb_image_cache_trim(const struct vkb_device *device, struct vkb_image_cach
         if (!oldest || !vkb_is_old(oldest->used, age))
             return;
         size -= image_size(&oldest->image);
-        destroy_image(device, cache, oldest);
+        destroy_image(device, oldest);
     }
 }
 
@@ -102,8 +69,7 @@ bool vkb_image_create_row(const struct vkb_device *device, const struct vkb_imag
             .format = row->format,
             .width = row->width,
             .height = row->height,
-            .layers = row->layers ? row->layers : 1,
-            .levels = 1,
+            .layers = row->layers,
             .array = row->layers > 0,
             .usage = row->usage,
             .mapped = device->linear_texels && row->format != VKB_FORMAT_DEPTH32_FLOAT,
@@ -176,52 +142,11 @@ bool vkb_image_cache_resolve(const struct vkb_device *device, struct vkb_image_c
     // Also for the plans that it has been for: they may come by turns.
     struct vkb_image_row both = *row;
     both.usage |= is_alike(&cached->image, row) ? cached->image.usage : 0;
-    destroy_image(device, cache, cached);
-    cached->image_id = ++cache->clock;
+    destroy_image(device, cached);
     if (!vkb_image_create_row(device, &both, &cached->image, error))
         return false;
     vkb_label_object(device, VK_OBJECT_TYPE_IMAGE, (uint64_t)cached->image.handle, row->name);
     if (cached->image.buffer)
         vkb_label_object(device, VK_OBJECT_TYPE_BUFFER, (uint64_t)cached->image.buffer, row->name);
-    return true;
-}
-
-bool vkb_image_cache_framebuffer(const struct vkb_device *device, struct vkb_image_cache *cache,
-                                 struct vkb_cached_image **targets, uint32_t target_count,
-                                 VkRenderPass render_pass, VkFramebuffer *framebuffer,
-                                 struct vkb_error *error)
-{
-    struct framebuffer_key key;
-    VkImageView views[VKB_MAX_TARGETS + 1];
-
-    memset(&key, 0, sizeof key);
-    key.render_pass = render_pass;
-    for (uint32_t i = 0; i < target_count; ++i) {
-        views[i] = targets[i]->image.view;
-        key.images[i] = targets[i]->image_id;
-    }
-    for (size_t i = 0; i < cache->framebuffer_count; ++i)
-        if (memcmp(&cache->framebuffers[i].key, &key, sizeof key) == 0) {
-            *framebuffer = cache->framebuffers[i].handle;
-            return true;
-        }
-    if (!vkb_grow(error, &cache->framebuffers, &cache->framebuffer_capacity,
-                  cache->framebuffer_count + 1, sizeof *cache->framebuffers)
-        || !VK(error, device->vk.vkCreateFramebuffer(
-                          device->handle,
-                          &(VkFramebufferCreateInfo){
-                              .sType = VK_STRUCTURE_TYPE_FRAMEBUFFER_CREATE_INFO,
-                              .renderPass = render_pass,
-                              .attachmentCount = target_count,
-                              .pAttachments = views,
-                              .width = targets[0]->image.width,
-                              .height = targets[0]->image.height,
-                              .layers = 1,
-                          },
-                          NULL, framebuffer)))
-        return false;
-    struct vkb_framebuffer_entry *entry = &cache->framebuffers[cache->framebuffer_count++];
-    memcpy(&entry->key, &key, sizeof key);
-    entry->handle = *framebuffer;
     return true;
 }

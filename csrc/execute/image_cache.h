@@ -12,27 +12,22 @@ struct vkb_cached_image {
     char name[VKB_NAME_SIZE];
     bool array;  // the images of batches are other ones
     struct vkb_image image;
-    uint64_t image_id;  // new each time that the image is created
-    uint64_t used;      // the last submission that used it
+    uint64_t used;  // the last submission that used it
     struct vkb_content content;
 };
-
-struct vkb_framebuffer_entry;
 
 struct vkb_image_cache {
     struct vkb_cached_image **images;  // pointers, since the elements must not move
     size_t count, capacity;
-    uint64_t clock;  // the last id or version that was assigned
+    uint64_t clock;  // the last version that was assigned
     uint64_t now;    // the number of the submission that uses them
-    struct vkb_framebuffer_entry *framebuffers;
-    size_t framebuffer_count, framebuffer_capacity;
 };
 
 // Bytes of all images' pixels.
 uint64_t vkb_image_cache_size(const struct vkb_image_cache *cache);
 
 // Begins a submission. If the images take more than VKB_KEPT_IMAGE_BYTES, the old ones are
-// destroyed with their framebuffers, the oldest first, until they take half of that.
+// destroyed, the oldest first, until they take half of that.
 enum { VKB_KEPT_IMAGE_BYTES = 256 << 20 };
 void vkb_image_cache_trim(const struct vkb_device *device, struct vkb_image_cache *cache,
                           const struct vkb_age *age);
@@ -57,11 +52,5 @@ bool vkb_image_cache_replaces(const struct vkb_image_cache *cache, const struct 
 bool vkb_image_cache_resolve(const struct vkb_device *device, struct vkb_image_cache *cache,
                              const struct vkb_image_row *row, struct vkb_cached_image **cached,
                              struct vkb_error *error);
-
-// The framebuffer of these targets. It is kept until one of their images is replaced.
-bool vkb_image_cache_framebuffer(const struct vkb_device *device, struct vkb_image_cache *cache,
-                                 struct vkb_cached_image **targets, uint32_t target_count,
-                                 VkRenderPass render_pass, VkFramebuffer *framebuffer,
-                                 struct vkb_error *error);
 
 #endif

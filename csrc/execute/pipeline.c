@@ -5,38 +5,21 @@
 #include <string.h>
 
 // Keys are compared byte by byte, so they have no padding.
-struct render_pass_key {
-    enum vkb_format formats[VKB_MAX_TARGETS];
-    enum vkb_format depth_format;
-    uint32_t target_count;
-    enum vkb_load load;
-    struct vkb_target_use uses[VKB_MAX_TARGETS + 1];
-    uint32_t use_count;
-};
-_Static_assert(sizeof(struct render_pass_key)
-                   == (VKB_MAX_TARGETS + 4) * sizeof(uint32_t)
-                          + sizeof(struct vkb_target_use[VKB_MAX_TARGETS + 1]),
-               "a render pass's key has padding");
-
-struct vkb_render_pass_entry {
-    struct render_pass_key key;
-    VkRenderPass handle;
-};
-
 struct pipeline_key {
-    VkRenderPass render_pass;
     struct vkb_hash vertex, shader;
+    // Of the targets; the depth is the last.
+    enum vkb_format formats[VKB_MAX_TARGETS + 1];
     uint32_t geometry;         // enum vkb_geometry
     uint32_t textured, blend;  // enum vkb_blend
-    uint32_t target_count;
-    uint32_t layout;  // the number of the layouts
+    uint32_t layout;           // the number of the layouts
     // An even number of integers, so that the key has no padding.
     uint32_t unused[1 + VKB_CONSTANT_COUNT % 2];
     struct vkb_constants constants;
 };
 _Static_assert(sizeof(struct pipeline_key)
-                   == sizeof(VkRenderPass) + 2 * sizeof(struct vkb_hash)
-                          + (6 + VKB_CONSTANT_COUNT % 2 + VKB_CONSTANT_COUNT) * sizeof(uint32_t),
+                   == 2 * sizeof(struct vkb_hash)
+                          + (VKB_MAX_TARGETS + 6 + VKB_CONSTANT_COUNT % 2 + VKB_CONSTANT_COUNT)
+                                * sizeof(uint32_t),
                "a pipeline's key has padding");
 
 struct vkb_pipeline_entry {
@@ -66,12 +49,9 @@ void vkb_pipelines_destroy(const struct vkb_device *device, struct vkb_pipelines
 
     for (size_t i = 0; i < pipelines->entry_count; ++i)
         vk->vkDestroyPipeline(device->handle, pipelines->entries[i].handle, NULL);
-    for (size_t i = 0; i < pipelines->render_pass_count; ++i)
-        vk->vkDestroyRenderPass(device->handle, pipelines->render_passes[i].handle, NULL);
     vkb_bindings_destroy(device, &pipelines->bindings);
     vk->vkDestroyPipelineCache(device->handle, pipelines->cache, NULL);
     vkb_free(pipelines->entries);
-    vkb_free(pipelines->render_passes);
     *pipelines = (struct vkb_pipelines){0};
 }
 
@@ -110,120 +90,6 @@ bool vkb_pipelines_save(const struct vkb_device *device, const struct vkb_pipeli
     vkb_free(*data);
     *data = NULL;
     return false;
-}
-
-// Colour images whose memory is also a buffer stay in the general layout.
-static VkImageLayout attachment_layout(const struct vkb_device *device, enum vkb_format format,
-                                       enum vkb_access access)
-{
-    return device->linear_texels && format != VKB_FORMAT_DEPTH32_FLOAT ? VK_IMAGE_LAYOUT_GENERAL
-                                                                       : vkb_access_layout(access);
-}
-
-static VkAttachmentDescription describe_attachment(const struct vkb_device *device,
-                                                   enum vkb_format format, enum vkb_load load,
-                                                   const struct vkb_target_use *use)
-{
-    enum vkb_access last = use->after == VKB_ACCESS_NONE ? use->during : use->after;
-
-    return (VkAttachmentDescription){
-        .format = vkb_formats[format].vk,
-        .samples = VK_SAMPLE_COUNT_1_BIT,
-        .loadOp =
-            load == VKB_LOAD_CLEAR ? VK_ATTACHMENT_LOAD_OP_CLEAR : VK_ATTACHMENT_LOAD_OP_DONT_CARE,
-        // Depth is stored, since it is a framebuffer. (The forward system's source discards it.)
-        .storeOp = VK_ATTACHMENT_STORE_OP_STORE,
-        .stencilLoadOp = VK_ATTACHMENT_LOAD_OP_DONT_CARE,
-        .stencilStoreOp = VK_ATTACHMENT_STORE_OP_DONT_CARE,
-        .initialLayout = VK_IMAGE_LAYOUT_UNDEFINED,
-        .finalLayout = attachment_layout(device, format, last),
-    };
-}
-
-static bool create_render_pass(const struct vkb_device *device, const struct render_pass_key *key,
-                               VkRenderPass *handle, struct vkb_error *error)
-{
-    VkAttachmentDescription attachments[VKB_MAX_TARGETS + 1];
-    VkAttachmentReference references[VKB_MAX_TARGETS];
-    VkSubpassDependency dependencies[VKB_MAX_DEPENDENCIES];
-    const bool depth = key->depth_format != VKB_FORMAT_NONE;
-    // In `uses` the depth comes first, in `attachments` the colours.
-    const struct vkb_target_use *colour_uses = key->uses + depth;
-
-    for (uint32_t i = 0; i < key->target_count; ++i) {
-        attachments[i] = describe_attachment(device, key->formats[i], key->load, &colour_uses[i]);
-        references[i] = (VkAttachmentReference){
-            i, attachment_layout(device, key->formats[i], VKB_ACCESS_COLOR_TARGET)};
-    }
-    if (depth)
-        attachments[key->target_count] =
-            describe_attachment(device, key->depth_format, VKB_LOAD_CLEAR, &key->uses[0]);
-    return VK(error,
-              device->vk.vkCreateRenderPass(
-                  device->handle,
-                  &(VkRenderPassCreateInfo){
-                      .sType = VK_STRUCTURE_TYPE_RENDER_PASS_CREATE_INFO,
-                      .attachmentCount = key->target_count + depth,
-                      .pAttachments = attachments,
-                      .subpassCount = 1,
-                      .pSubpasses =
-                          &(VkSubpassDescription){
-                              .pipelineBindPoint = VK_PIPELINE_BIND_POINT_GRAPHICS,
-                              .colorAttachmentCount = key->target_count,
-                              .pColorAttachments = references,
-                              .pDepthStencilAttachment =
-                                  depth ? &(VkAttachmentReference){key->target_count,
-                                                                   vkb_access_layout(
-                                                                       VKB_ACCESS_DEPTH_TARGET)}
-                                        : NULL,
-                          },
-                      .dependencyCount =
-                          vkb_subpass_dependencies(key->uses, key->use_count, dependencies),
-                      .pDependencies = dependencies,
-                  },
-                  NULL, handle));
-}
-
-// Where colour images are always in the general layout, their render passes need not know who reads
-// them. So render passes of the same formats share their pipelines, which a CPU compiles slowly.
-static void generalize(struct vkb_target_use *uses, uint32_t count)
-{
-    for (uint32_t i = 0; i < count; ++i)
-        if (uses[i].during != VKB_ACCESS_DEPTH_TARGET)
-            uses[i].before = uses[i].after = VKB_ACCESS_ANY_READ;
-}
-
-bool vkb_pipelines_render_pass(const struct vkb_device *device, struct vkb_pipelines *pipelines,
-                               const struct vkb_graph *graph, uint32_t first, uint32_t end,
-                               VkRenderPass *render_pass, struct vkb_error *error)
-{
-    const struct vkb_pass_row *pass = &graph->passes[first];
-    struct render_pass_key key;
-
-    memset(&key, 0, sizeof key);
-    key.target_count = pass->target_count;
-    for (uint32_t i = 0; i < pass->target_count; ++i)
-        key.formats[i] = graph->images[pass->targets[i]].format;
-    if (pass->depth != VKB_NO_IMAGE)
-        key.depth_format = graph->images[pass->depth].format;
-    key.load = pass->load;
-    key.use_count = vkb_graph_target_uses(graph, first, end, key.uses);
-    if (device->linear_texels)
-        generalize(key.uses, key.use_count);
-
-    for (size_t i = 0; i < pipelines->render_pass_count; ++i)
-        if (memcmp(&pipelines->render_passes[i].key, &key, sizeof key) == 0) {
-            *render_pass = pipelines->render_passes[i].handle;
-            return true;
-        }
-    if (!vkb_grow(error, &pipelines->render_passes, &pipelines->render_pass_capacity,
-                  pipelines->render_pass_count + 1, sizeof *pipelines->render_passes)
-        || !create_render_pass(device, &key, render_pass, error))
-        return false;
-    struct vkb_render_pass_entry *entry = &pipelines->render_passes[pipelines->render_pass_count++];
-    memcpy(&entry->key, &key, sizeof key);
-    entry->handle = *render_pass;
-    return true;
 }
 
 // The driver copies the values.
@@ -369,8 +235,9 @@ static VkPipelineColorBlendAttachmentState blending(enum vkb_blend blend)
 }
 
 static bool create_graphics(const struct vkb_device *device, const struct vkb_pipelines *pipelines,
-                            const struct vkb_pass_row *pass, const VkShaderModule modules[2],
-                            VkRenderPass render_pass, VkPipeline *pipeline, struct vkb_error *error)
+                            const struct pipeline_key *key, const struct vkb_pass_row *pass,
+                            const VkShaderModule modules[2], VkPipeline *pipeline,
+                            struct vkb_error *error)
 {
     const struct geometry_state *state = &geometry_states[pass->geometry];
     const VkSpecializationInfo special = specialization(&pass->constants);
@@ -378,41 +245,51 @@ static bool create_graphics(const struct vkb_device *device, const struct vkb_pi
     const VkPipelineRasterizationStateCreateInfo raster = rasterization(state);
     const VkPipelineDepthStencilStateCreateInfo depth = depth_test(state);
     VkPipelineColorBlendAttachmentState blends[VKB_MAX_TARGETS];
+    VkFormat formats[VKB_MAX_TARGETS];
 
-    for (uint32_t i = 0; i < pass->target_count; ++i)
+    for (uint32_t i = 0; i < pass->target_count; ++i) {
         blends[i] = blending(pass->blend);
-    return VK(error,
-              device->vk.vkCreateGraphicsPipelines(
-                  device->handle, pipelines->cache, 1,
-                  &(VkGraphicsPipelineCreateInfo){
-                      .sType = VK_STRUCTURE_TYPE_GRAPHICS_PIPELINE_CREATE_INFO,
-                      .stageCount = 2,
-                      .pStages =
-                          (VkPipelineShaderStageCreateInfo[]){
-                              shader_stage(VK_SHADER_STAGE_VERTEX_BIT, modules[0], &special),
-                              shader_stage(VK_SHADER_STAGE_FRAGMENT_BIT, modules[1], &special),
-                          },
-                      .pVertexInputState = &vertices,
-                      .pInputAssemblyState = &triangles,
-                      .pViewportState = &one_viewport,
-                      .pRasterizationState = &raster,
-                      .pMultisampleState = &one_sample,
-                      .pDepthStencilState = &depth,
-                      .pColorBlendState =
-                          &(VkPipelineColorBlendStateCreateInfo){
-                              .sType = VK_STRUCTURE_TYPE_PIPELINE_COLOR_BLEND_STATE_CREATE_INFO,
-                              .attachmentCount = pass->target_count,
-                              .pAttachments = blends,
-                          },
-                      .pDynamicState = &dynamic_viewport,
-                      .layout = vkb_bindings_layouts(&pipelines->bindings, pass)->pipeline,
-                      .renderPass = render_pass,
-                  },
-                  NULL, pipeline));
+        formats[i] = vkb_formats[key->formats[i]].vk;
+    }
+    return VK(
+        error,
+        device->vk.vkCreateGraphicsPipelines(
+            device->handle, pipelines->cache, 1,
+            &(VkGraphicsPipelineCreateInfo){
+                .sType = VK_STRUCTURE_TYPE_GRAPHICS_PIPELINE_CREATE_INFO,
+                .pNext =
+                    &(VkPipelineRenderingCreateInfo){
+                        .sType = VK_STRUCTURE_TYPE_PIPELINE_RENDERING_CREATE_INFO,
+                        .colorAttachmentCount = pass->target_count,
+                        .pColorAttachmentFormats = formats,
+                        .depthAttachmentFormat = vkb_formats[key->formats[VKB_MAX_TARGETS]].vk,
+                    },
+                .stageCount = 2,
+                .pStages =
+                    (VkPipelineShaderStageCreateInfo[]){
+                        shader_stage(VK_SHADER_STAGE_VERTEX_BIT, modules[0], &special),
+                        shader_stage(VK_SHADER_STAGE_FRAGMENT_BIT, modules[1], &special),
+                    },
+                .pVertexInputState = &vertices,
+                .pInputAssemblyState = &triangles,
+                .pViewportState = &one_viewport,
+                .pRasterizationState = &raster,
+                .pMultisampleState = &one_sample,
+                .pDepthStencilState = &depth,
+                .pColorBlendState =
+                    &(VkPipelineColorBlendStateCreateInfo){
+                        .sType = VK_STRUCTURE_TYPE_PIPELINE_COLOR_BLEND_STATE_CREATE_INFO,
+                        .attachmentCount = pass->target_count,
+                        .pAttachments = blends,
+                    },
+                .pDynamicState = &dynamic_viewport,
+                .layout = vkb_bindings_layouts(&pipelines->bindings, pass)->made.pipeline,
+            },
+            NULL, pipeline));
 }
 
 static bool create_pipeline(const struct vkb_device *device, const struct vkb_pipelines *pipelines,
-                            const struct vkb_pass_row *pass, VkRenderPass render_pass,
+                            const struct pipeline_key *key, const struct vkb_pass_row *pass,
                             VkPipeline *pipeline, struct vkb_error *error)
 {
     // A driver copies what it needs of a module: none has to be kept.
@@ -420,12 +297,11 @@ static bool create_pipeline(const struct vkb_device *device, const struct vkb_pi
 
     if (pass->geometry == VKB_GEOMETRY_DISPATCH)
         return vkb_compute_create(device, pipelines->cache, pass->shader, &pass->constants,
-                                  vkb_bindings_layouts(&pipelines->bindings, pass)->pipeline,
+                                  vkb_bindings_layouts(&pipelines->bindings, pass)->made.pipeline,
                                   pipeline, error);
-    const bool done =
-        create_module(device, pass->vertex, &modules[0], error)
-        && create_module(device, pass->shader, &modules[1], error)
-        && create_graphics(device, pipelines, pass, modules, render_pass, pipeline, error);
+    const bool done = create_module(device, pass->vertex, &modules[0], error)
+                   && create_module(device, pass->shader, &modules[1], error)
+                   && create_graphics(device, pipelines, key, pass, modules, pipeline, error);
     for (int i = 0; i < 2; ++i)
         device->vk.vkDestroyShaderModule(device->handle, modules[i], NULL);
     return done;
@@ -444,9 +320,10 @@ static bool has_room_to_compile(const struct vkb_device *device, struct vkb_erro
 }
 
 bool vkb_pipelines_get(const struct vkb_device *device, struct vkb_pipelines *pipelines,
-                       const struct vkb_pass_row *pass, VkRenderPass render_pass,
+                       const struct vkb_graph *graph, const struct vkb_pass_row *pass,
                        VkPipeline *pipeline, struct vkb_error *error)
 {
+    const bool draws = pass->geometry != VKB_GEOMETRY_DISPATCH;
     struct pipeline_key key;
 
     memset(&key, 0, sizeof key);
@@ -457,9 +334,11 @@ bool vkb_pipelines_get(const struct vkb_device *device, struct vkb_pipelines *pi
     key.geometry = pass->geometry;
     key.textured = pass->textured;
     key.blend = pass->blend;
-    key.target_count = pass->target_count;
     key.constants = pass->constants;
-    key.render_pass = render_pass;
+    for (uint32_t i = 0; draws && i < pass->target_count; ++i)
+        key.formats[i] = graph->images[pass->targets[i]].format;
+    if (pass->depth != VKB_NO_IMAGE)
+        key.formats[VKB_MAX_TARGETS] = graph->images[pass->depth].format;
 
     for (size_t i = 0; i < pipelines->entry_count; ++i)
         if (memcmp(&pipelines->entries[i].key, &key, sizeof key) == 0) {
@@ -470,7 +349,7 @@ bool vkb_pipelines_get(const struct vkb_device *device, struct vkb_pipelines *pi
     if (!vkb_grow(error, &pipelines->entries, &pipelines->entry_capacity,
                   pipelines->entry_count + 1, sizeof *pipelines->entries)
         || !has_room_to_compile(device, error)
-        || !create_pipeline(device, pipelines, pass, render_pass, pipeline, error))
+        || !create_pipeline(device, pipelines, &key, pass, pipeline, error))
         return false;
     struct vkb_pipeline_entry *entry = &pipelines->entries[pipelines->entry_count++];
     memcpy(&entry->key, &key, sizeof key);

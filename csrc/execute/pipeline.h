@@ -1,20 +1,17 @@
-// The Vulkan objects of a pass row: render pass and pipeline. Each is created once for its key. If
-// there are many pipelines, the old ones are destroyed. The other objects are few.
+// The pipelines of pass rows. Each is created once for its key. If there are many, the old ones are
+// destroyed.
 #ifndef VKB_PIPELINE_H
 #define VKB_PIPELINE_H
 
 #include "execute/age.h"
 #include "execute/bindings.h"
 
-struct vkb_render_pass_entry;
 struct vkb_pipeline_entry;
 
 struct vkb_pipelines {
     VkPipelineCache cache;
     struct vkb_bindings bindings;
-    struct vkb_render_pass_entry *render_passes;
     struct vkb_pipeline_entry *entries;
-    size_t render_pass_count, render_pass_capacity;
     size_t entry_count, entry_capacity;
     size_t created;  // pipelines created so far
     uint64_t now;    // the number of the submission that uses them
@@ -37,14 +34,9 @@ enum { VKB_KEPT_PIPELINES = 256 };
 void vkb_pipelines_trim(const struct vkb_device *device, struct vkb_pipelines *pipelines,
                         const struct vkb_age *age);
 
-// The render pass of passes first..end-1, with the dependencies that follow from their rows.
-bool vkb_pipelines_render_pass(const struct vkb_device *device, struct vkb_pipelines *pipelines,
-                               const struct vkb_graph *graph, uint32_t first, uint32_t end,
-                               VkRenderPass *render_pass, struct vkb_error *error);
-
-// `render_pass` is VK_NULL_HANDLE for a dispatch.
+// The pipeline of a pass of the graph, or of a changed copy of one.
 bool vkb_pipelines_get(const struct vkb_device *device, struct vkb_pipelines *pipelines,
-                       const struct vkb_pass_row *pass, VkRenderPass render_pass,
+                       const struct vkb_graph *graph, const struct vkb_pass_row *pass,
                        VkPipeline *pipeline, struct vkb_error *error);
 
 // Creates a compute pipeline, which the caller keeps.

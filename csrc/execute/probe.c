@@ -7,82 +7,35 @@
 
 enum { TEXELS = 64, VALUES = 4 * TEXELS };
 
-struct probe {
-    struct vkb_image image;
-    struct vkb_buffer given, fetched;  // the latter with counts that nobody reads
-    VkDescriptorPool pool;
-};
-
-static void destroy(const struct vkb_device *device, struct probe *probe)
-{
-    device->vk.vkDestroyDescriptorPool(device->handle, probe->pool, NULL);
-    vkb_buffer_destroy(device, &probe->given);
-    vkb_buffer_destroy(device, &probe->fetched);
-    vkb_image_destroy(device, &probe->image);
-}
-
-static bool create(const struct vkb_device *device, enum vkb_format format, struct probe *probe,
-                   struct vkb_error *error)
-{
-    const VkDescriptorPoolSize sizes[] = {{VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER, 1},
-                                          {VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, 2}};
-
-    return vkb_image_create(device,
-                            &(struct vkb_image_spec){
-                                .format = format,
-                                .width = TEXELS,
-                                .height = 1,
-                                .layers = 1,
-                                .levels = 1,
-                                .usage = vkb_access_usage(VKB_ACCESS_COPY_TARGET)
-                                       | vkb_access_usage(VKB_ACCESS_DISPATCH_SAMPLED),
-                            },
-                            &probe->image, error)
-        && vkb_buffer_create(device, VKB_MEMORY_UPLOAD, VK_BUFFER_USAGE_TRANSFER_SRC_BIT,
-                             TEXELS * vkb_pixel_size(format), &probe->given, error)
-        && vkb_buffer_create(device, VKB_MEMORY_READBACK, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT,
-                             VALUES * sizeof(float) + VKB_COUNTS_SIZE, &probe->fetched, error)
-        && VK(error, device->vk.vkCreateDescriptorPool(
-                         device->handle,
-                         &(VkDescriptorPoolCreateInfo){
-                             .sType = VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO,
-                             .maxSets = 1,
-                             .poolSizeCount = 2,
-                             .pPoolSizes = sizes,
-                         },
-                         NULL, &probe->pool));
-}
-
-static bool record(struct vkb_run *run, struct probe *probe, struct vkb_error *error)
+// Records that the texels of the staged values are fetched to the buffer of counts, behind which
+// nobody reads the counts.
+static bool record(struct vkb_run *run, struct vkb_image *image, struct vkb_error *error)
 {
     const struct vkb_device *device = run->device;
     const VkCommandBuffer commands = run->submission->commands.buffer;
+    const VkBuffer fetched = run->submission->readback.counts.handle;
     struct vkb_frame *frame = run->frame;
     const VkDeviceSize size = VALUES * sizeof(float);
     struct vkb_strided_copy_work work = {
         .kind = VKB_FETCH_TEXELS,
         .layout = {.width = TEXELS, .height = 1, .channels = 4, .size = sizeof(float)},
-        .to = {probe->fetched.handle, 0, size},
-        .counts = {probe->fetched.handle, size, VKB_COUNTS_SIZE},
-        .image = {.imageView = probe->image.view,
-                  .imageLayout = vkb_image_layout(&probe->image, VKB_ACCESS_DISPATCH_SAMPLED)},
+        .to = {fetched, 0, size},
+        .counts = {fetched, size, VKB_COUNTS_SIZE},
+        .image = {.imageView = image->view,
+                  .imageLayout = vkb_image_layout(image, VKB_ACCESS_DISPATCH_SAMPLED)},
     };
 
-    vkb_image_transition(device, commands, &probe->image, VKB_ACCESS_COPY_TARGET);
-    device->vk.vkCmdCopyBufferToImage(
-        commands, probe->given.handle, probe->image.handle,
-        vkb_image_layout(&probe->image, VKB_ACCESS_COPY_TARGET), 1,
-        &(VkBufferImageCopy){.imageSubresource = {VK_IMAGE_ASPECT_COLOR_BIT, 0, 0, 1},
-                             .imageExtent = {TEXELS, 1, 1}});
-    vkb_image_transition(device, commands, &probe->image, VKB_ACCESS_DISPATCH_SAMPLED);
-    if (!vkb_bindings_sampler(device, &frame->pipelines.bindings, probe->image.format,
+    vkb_image_fill(device, commands, image, frame->constants.handle, 0);
+    vkb_image_transition(device, commands, image, VKB_ACCESS_DISPATCH_SAMPLED);
+    if (!vkb_bindings_sampler(device, &frame->pipelines.bindings, image->format,
                               &work.image.sampler, error)
         || !vkb_strided_copy_create(device, frame->pipelines.cache, work.kind,
                                     &frame->strided_copies, error)
-        || !vkb_strided_copy_record(device, &frame->strided_copies, commands, probe->pool, &work,
-                                    error))
+        || !vkb_strided_copy_record(device, &frame->strided_copies, commands,
+                                    run->submission->descriptors, &work, error))
         return false;
-    vkb_barrier_record_host_read(device, commands);
+    vkb_barrier_record(device, commands, NULL, true, VKB_ACCESS_DISPATCH_STORED,
+                       VKB_ACCESS_HOST_READ);
     return true;
 }
 
@@ -91,21 +44,36 @@ static bool fetch(struct vkb_run *run, enum vkb_format format, const void *value
                   struct vkb_error *error)
 {
     struct vkb_device *device = run->device;
-    struct probe probe = {0};
-    bool done = create(device, format, &probe, error);
+    struct vkb_submission *submission = run->submission;
+    struct vkb_buffer *given = &run->frame->constants, *counts = &submission->readback.counts;
+    const size_t size = TEXELS * vkb_pixel_size(format);
+    const struct vkb_image_spec spec = {
+        .format = format,
+        .width = TEXELS,
+        .height = 1,
+        .usage = vkb_access_usage(VKB_ACCESS_COPY_TARGET)
+               | vkb_access_usage(VKB_ACCESS_DISPATCH_SAMPLED),
+    };
+    struct vkb_image image = {0};
+    bool done = vkb_submissions_wait(device, &run->frame->submissions, error)
+             && vkb_buffer_reserve(device, VKB_MEMORY_UPLOAD, VK_BUFFER_USAGE_TRANSFER_SRC_BIT,
+                                   size, given, error)
+             && vkb_buffer_reserve(device, VKB_MEMORY_READBACK, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT,
+                                   VALUES * sizeof(float) + VKB_COUNTS_SIZE, counts, error)
+             && vkb_image_create(device, &spec, &image, error);
 
     if (done)
-        memcpy(probe.given.mapped, values, TEXELS * vkb_pixel_size(format));
-    done = done && vkb_buffer_flush(device, &probe.given, error)
-        && vkb_commands_begin(device, &run->submission->commands, error)
-        && record(run, &probe, error) && vkb_submission_submit(device, run->submission, NULL, error)
-        && vkb_submission_wait(device, &run->frame->submissions, run->submission, error)
-        && vkb_buffer_invalidate(device, &probe.fetched, error);
+        memcpy(given->mapped, values, size);
+    done = done && vkb_buffer_flush(device, given, error)
+        && vkb_commands_begin(device, &submission->commands, error) && record(run, &image, error)
+        && vkb_submission_submit(device, submission, NULL, error)
+        && vkb_submission_wait(device, &run->frame->submissions, submission, error)
+        && vkb_buffer_invalidate(device, counts, error);
     if (done)
-        memcpy(fetched, probe.fetched.mapped, VALUES * sizeof *fetched);
+        memcpy(fetched, counts->mapped, VALUES * sizeof *fetched);
     // The device may still use what an interrupted wait was for.
-    if (!run->submission->pending)
-        destroy(device, &probe);
+    if (!submission->pending)
+        vkb_image_destroy(device, &image);
     return done;
 }
 

@@ -22,28 +22,23 @@ static bool read_image(struct vkb_run *run, const struct vkb_pass_row *pass,
                        const struct vkb_surface *surface, uint32_t index,
                        VkDescriptorImageInfo *info, struct vkb_error *error)
 {
-    struct vkb_scene *scene = &run->frame->scene;
-    const bool sky = pass->geometry == VKB_GEOMETRY_SKYBOX;
+    const struct vkb_scene *scene = &run->frame->scene;
     const struct vkb_texture *texture = NULL;
     const struct vkb_image *image;
 
     if (surface) {
         texture = &scene->textures[index == 0 ? surface->base : surface->emission];
         image = &texture->image;
+    } else if (pass->geometry == VKB_GEOMETRY_SKYBOX) {
+        image = &scene->sky;
     } else {
-        image = sky ? &scene->sky : &run->images[pass->reads[index]]->image;
+        image = &run->images[pass->reads[index]]->image;
     }
     *info = (VkDescriptorImageInfo){
         .sampler = texture ? texture->sampler : VK_NULL_HANDLE,
         .imageView = image->view,
         .imageLayout = vkb_image_layout(image, vkb_pass_reads_as(pass)),
     };
-    if (sky) {
-        const struct vkb_image *target = &run->images[pass->targets[0]]->image;
-        const bool smaller = !vkb_sky_is_magnified(image, &pass->params.mesh, target);
-        if (!vkb_image_view(run->device, &scene->sky, smaller, &info->imageView, error))
-            return false;
-    }
     return texture || pass->reading != VKB_READING_SAMPLED
         || vkb_bindings_sampler(run->device, &run->frame->pipelines.bindings, image->format,
                                 &info->sampler, error);
@@ -71,10 +66,9 @@ static void write_resource(const struct vkb_run *run, const struct vkb_resource 
 {
     const struct vkb_resource_entry *entry = vkb_resources_find(&run->frame->resources, resource);
 
-    *image = (VkDescriptorImageInfo){entry->sampler, entry->view, VK_IMAGE_LAYOUT_GENERAL};
+    *image = (VkDescriptorImageInfo){entry->sampler, entry->image.view, VK_IMAGE_LAYOUT_GENERAL};
     *buffer = (VkDescriptorBufferInfo){.buffer = entry->buffer.handle, .range = VK_WHOLE_SIZE};
     *write = (VkWriteDescriptorSet){
-        .descriptorType = vkb_resource_descriptor(resource),
         .pImageInfo = image,
         .pBufferInfo = buffer,
     };
@@ -89,7 +83,6 @@ static bool write_read(struct vkb_run *run, const struct binding *binding, uint3
 
     *write = (VkWriteDescriptorSet){
         .dstBinding = i + 1,
-        .descriptorType = vkb_pass_binding_types(pass).read,
         .pImageInfo = info,
     };
     if (pass->reading != VKB_READING_LINEAR_TEXELS)
@@ -101,7 +94,8 @@ static bool write_read(struct vkb_run *run, const struct binding *binding, uint3
 
 // Fills the set with the parameters, the images read, the resources and the target of a dispatch.
 static bool write_descriptors(struct vkb_run *run, const struct binding *binding,
-                              VkDescriptorSet set, struct vkb_error *error)
+                              const struct vkb_pass_layouts *layouts, VkDescriptorSet set,
+                              struct vkb_error *error)
 {
     const struct vkb_pass_row *pass = binding->pass;
     const uint32_t image_count = vkb_pass_descriptor_images(pass);
@@ -115,10 +109,7 @@ static bool write_descriptors(struct vkb_run *run, const struct binding *binding
         .range = vkb_block_sizes[pass->block],
     };
     if (pass->block != VKB_BLOCK_NONE)
-        writes[write_count++] = (VkWriteDescriptorSet){
-            .descriptorType = VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER,
-            .pBufferInfo = &params,
-        };
+        writes[write_count++] = (VkWriteDescriptorSet){.pBufferInfo = &params};
     for (uint32_t i = 0; i < image_count; ++i)
         if (!write_read(run, binding, i, &images[i], &writes[write_count++], error))
             return false;
@@ -136,7 +127,6 @@ static bool write_descriptors(struct vkb_run *run, const struct binding *binding
         };
         writes[write_count++] = (VkWriteDescriptorSet){
             .dstBinding = last + 1,
-            .descriptorType = vkb_pass_binding_types(pass).target,
             .pImageInfo = &images[last],
             .pBufferInfo = binding->band ? &binding->band->buffer : NULL,
         };
@@ -145,6 +135,9 @@ static bool write_descriptors(struct vkb_run *run, const struct binding *binding
         writes[i].sType = VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET;
         writes[i].dstSet = set;
         writes[i].descriptorCount = 1;
+        writes[i].descriptorType = writes[i].dstBinding
+                                     ? layouts->descriptors[writes[i].dstBinding - 1]
+                                     : VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER;
     }
     run->device->vk.vkUpdateDescriptorSets(run->device->handle, write_count, writes, 0, NULL);
     return true;
@@ -155,8 +148,8 @@ static bool bind_descriptors(struct vkb_run *run, const struct binding *binding,
 {
     const struct vkb_pass_row *pass = binding->pass;
     const struct VolkDeviceTable *vk = &run->device->vk;
-    const struct vkb_bindings *bindings = &run->frame->pipelines.bindings;
-    const struct vkb_layouts *layouts = vkb_bindings_layouts(bindings, pass);
+    const struct vkb_pass_layouts *layouts =
+        vkb_bindings_layouts(&run->frame->pipelines.bindings, pass);
     VkDescriptorSet set;
 
     if (!VK(error, vk->vkAllocateDescriptorSets(
@@ -165,13 +158,13 @@ static bool bind_descriptors(struct vkb_run *run, const struct binding *binding,
                            .sType = VK_STRUCTURE_TYPE_DESCRIPTOR_SET_ALLOCATE_INFO,
                            .descriptorPool = run->submission->descriptors,
                            .descriptorSetCount = 1,
-                           .pSetLayouts = &layouts->set,
+                           .pSetLayouts = &layouts->made.set,
                        },
                        &set))
-        || !write_descriptors(run, binding, set, error))
+        || !write_descriptors(run, binding, layouts, set, error))
         return false;
     vk->vkCmdBindDescriptorSets(run->submission->commands.buffer, vkb_pass_bind_point(pass),
-                                layouts->pipeline, 0, 1, &set, 0, NULL);
+                                layouts->made.pipeline, 0, 1, &set, 0, NULL);
     return true;
 }
 
@@ -294,7 +287,7 @@ static void push_linear_texels(const struct vkb_run *run, const struct vkb_pass_
     }
     run->device->vk.vkCmdPushConstants(
         run->submission->commands.buffer,
-        vkb_bindings_layouts(&run->frame->pipelines.bindings, pass)->pipeline,
+        vkb_bindings_layouts(&run->frame->pipelines.bindings, pass)->made.pipeline,
         VK_SHADER_STAGE_COMPUTE_BIT, 0, sizeof shapes, &shapes);
 }
 
@@ -367,33 +360,23 @@ static bool keeps_levels(const struct vkb_run *run, const struct vkb_pass_row *p
         && run->device->texels == VKB_TEXELS_SCALED;
 }
 
-static bool record_pass(struct vkb_run *run, uint32_t index, VkRenderPass render_pass,
-                        struct vkb_error *error)
+static bool record_pass(struct vkb_run *run, uint32_t index, struct vkb_error *error)
 {
-    const struct vkb_pass_row *pass = &run->graph->passes[index];
+    struct vkb_pass_row row = run->graph->passes[index];
+    const struct vkb_pass_row *pass = &row;
     VkCommandBuffer commands = run->submission->commands.buffer;
     const bool linear = pass->reading == VKB_READING_LINEAR_TEXELS;
     struct vkb_output *output = linear ? find_stored(run, pass) : NULL;
-    struct vkb_pass_row known;
     VkPipeline pipeline;
 
-    if (linear) {
-        memcpy(&known, pass, sizeof known);
-        if (run->images[pass->reads[0]]->image.channels == 3)
-            known.shader = known.shader->rgb;
-        if (output && !vkb_readback_is_complete(output))
-            known.shader = known.shader->packed;
-        known.constants.finite = reads_finite(run, pass);
-        pass = &known;
-    } else if (reads_finite(run, pass) || keeps_levels(run, pass)) {
-        memcpy(&known, pass, sizeof known);
-        known.constants.finite = reads_finite(run, pass);
-        pass = &known;
-    }
+    if (linear && run->images[pass->reads[0]]->image.channels == 3)
+        row.shader = row.shader->rgb;
+    if (output && !vkb_readback_is_complete(output))
+        row.shader = row.shader->packed;
+    row.constants.finite = reads_finite(run, pass);
     if (keeps_levels(run, pass))
-        known.constants.format = STORED_UNORM8_SCALED;
-    if (!vkb_pipelines_get(run->device, &run->frame->pipelines, pass, render_pass, &pipeline,
-                           error))
+        row.constants.format = STORED_UNORM8_SCALED;
+    if (!vkb_pipelines_get(run->device, &run->frame->pipelines, run->graph, pass, &pipeline, error))
         return false;
     vkb_label_begin(run->device, commands, pass->name);
     run->device->vk.vkCmdBindPipeline(commands, vkb_pass_bind_point(pass), pipeline);
@@ -417,124 +400,87 @@ static void transition_reads(struct vkb_run *run, uint32_t first, uint32_t end)
     }
 }
 
-// Transitions the images that the passes read, and the targets to the access from which the render
-// pass's dependencies start.
-static void transition_images(struct vkb_run *run, uint32_t first, uint32_t end)
+// Transitions the image and describes it as an attachment.
+static VkRenderingAttachmentInfo attach(struct vkb_run *run, uint32_t index, enum vkb_access access,
+                                        enum vkb_load load)
 {
-    VkCommandBuffer commands = run->submission->commands.buffer;
-    const struct vkb_pass_row *pass = &run->graph->passes[first];
-    struct vkb_target_use uses[VKB_MAX_TARGETS + 1];
-    const uint32_t use_count = vkb_graph_target_uses(run->graph, first, end, uses);
-    const uint32_t depth_uses = use_count - pass->target_count;
+    struct vkb_image *image = &run->images[index]->image;
+    const bool depth = access == VKB_ACCESS_DEPTH_TARGET;
 
-    transition_reads(run, first, end);
-    for (uint32_t i = 0; i < use_count; ++i) {
-        uint32_t target = i < depth_uses ? pass->depth : pass->targets[i - depth_uses];
-        struct vkb_image *image = &run->images[target]->image;
-        // A new image needs no barrier. Any other must have the access that its graph leaves it in.
-        if (image->access != VKB_ACCESS_NONE && image->access != uses[i].before)
-            vkb_image_transition(run->device, commands, image, uses[i].before);
-        image->access = uses[i].after == VKB_ACCESS_NONE ? uses[i].during : uses[i].after;
-    }
+    vkb_image_transition(run->device, run->submission->commands.buffer, image, access);
+    return (VkRenderingAttachmentInfo){
+        .sType = VK_STRUCTURE_TYPE_RENDERING_ATTACHMENT_INFO,
+        .imageView = image->view,
+        .imageLayout = vkb_image_layout(image, access),
+        .loadOp =
+            load == VKB_LOAD_CLEAR ? VK_ATTACHMENT_LOAD_OP_CLEAR : VK_ATTACHMENT_LOAD_OP_DONT_CARE,
+        // Depth is stored, since it is a framebuffer. (The forward system's source discards it.)
+        .storeOp = VK_ATTACHMENT_STORE_OP_STORE,
+        .clearValue = depth ? (VkClearValue){.depthStencil = {.depth = 1.0f}}
+                            : (VkClearValue){.color = {.float32 = {0.0f, 0.0f, 0.0f, 1.0f}}},
+    };
 }
 
-static void begin_render_pass(const struct vkb_run *run, VkRenderPass render_pass,
-                              VkFramebuffer framebuffer, const struct vkb_pass_row *pass,
-                              VkExtent2D extent)
+static void begin_rendering(struct vkb_run *run, const struct vkb_pass_row *pass)
 {
     const struct VolkDeviceTable *vk = &run->device->vk;
-    VkCommandBuffer commands = run->submission->commands.buffer;
-    VkClearValue clears[VKB_MAX_TARGETS + 1];
+    const VkCommandBuffer commands = run->submission->commands.buffer;
+    const struct vkb_image_row *target =
+        &run->graph->images[pass->target_count ? pass->targets[0] : pass->depth];
+    const VkRect2D area = {.extent = {target->width, target->height}};
+    VkRenderingAttachmentInfo colours[VKB_MAX_TARGETS], depth;
 
     for (uint32_t i = 0; i < pass->target_count; ++i)
-        clears[i] = (VkClearValue){.color = {.float32 = {0.0f, 0.0f, 0.0f, 1.0f}}};
-    clears[pass->target_count] = (VkClearValue){.depthStencil = {.depth = 1.0f}};
-    vk->vkCmdBeginRenderPass(commands,
-                             &(VkRenderPassBeginInfo){
-                                 .sType = VK_STRUCTURE_TYPE_RENDER_PASS_BEGIN_INFO,
-                                 .renderPass = render_pass,
-                                 .framebuffer = framebuffer,
-                                 .renderArea = {.extent = extent},
-                                 .clearValueCount = pass->target_count + 1,
-                                 .pClearValues = clears,
-                             },
-                             VK_SUBPASS_CONTENTS_INLINE);
+        colours[i] = attach(run, pass->targets[i], VKB_ACCESS_COLOR_TARGET, pass->load);
+    if (pass->depth != VKB_NO_IMAGE)
+        depth = attach(run, pass->depth, VKB_ACCESS_DEPTH_TARGET, VKB_LOAD_CLEAR);
+    vk->vkCmdBeginRendering(commands,
+                            &(VkRenderingInfo){
+                                .sType = VK_STRUCTURE_TYPE_RENDERING_INFO,
+                                .renderArea = area,
+                                .layerCount = 1,
+                                .colorAttachmentCount = pass->target_count,
+                                .pColorAttachments = colours,
+                                .pDepthAttachment = pass->depth != VKB_NO_IMAGE ? &depth : NULL,
+                            });
     vk->vkCmdSetViewport(commands, 0, 1,
                          &(VkViewport){
-                             .width = (float)extent.width,
-                             .height = (float)extent.height,
+                             .width = (float)target->width,
+                             .height = (float)target->height,
                              .maxDepth = 1.0f,
                          });
-    vk->vkCmdSetScissor(commands, 0, 1, &(VkRect2D){.extent = extent});
+    vk->vkCmdSetScissor(commands, 0, 1, &area);
 }
 
-static void add_timing(struct vkb_run *run, uint32_t first)
+// Records passes first..end-1, a dispatch or those of a render pass, with one timing. Within a
+// render pass, tiling devices and lavapipe do not keep the order of draws, so single draws cannot
+// be timed.
+static bool record_passes(struct vkb_run *run, uint32_t first, uint32_t end,
+                          struct vkb_error *error)
 {
+    struct vkb_device *device = run->device;
+    struct vkb_timer *timer = &run->submission->timer;
+    const struct vkb_pass_row *pass = &run->graph->passes[first];
+    const bool draws = pass->geometry != VKB_GEOMETRY_DISPATCH;
+    const VkCommandBuffer commands = run->submission->commands.buffer;
     struct vkb_timing *timing = &run->request->timings[run->request->timing_count++];
 
-    memcpy(timing->name, vkb_graph_timed_as(run->graph, first), sizeof timing->name);
-}
-
-static bool record_dispatch(struct vkb_run *run, uint32_t index, struct vkb_error *error)
-{
-    struct vkb_device *device = run->device;
-    struct vkb_submission *submission = run->submission;
-    const struct vkb_pass_row *pass = &run->graph->passes[index];
-    VkCommandBuffer commands = submission->commands.buffer;
-
     // The timer starts before the barriers, since lavapipe takes a timestamp at the next barrier.
-    vkb_timer_start(device, commands, &submission->timer);
-    transition_reads(run, index, index + 1);
-    vkb_image_transition(device, commands, &run->images[pass->targets[0]]->image,
-                         vkb_pass_in_place(pass) ? VKB_ACCESS_DISPATCH_CHANGED
-                                                 : VKB_ACCESS_DISPATCH_STORED);
-    if (!record_pass(run, index, VK_NULL_HANDLE, error))
-        return false;
-    vkb_timer_stop(device, commands, &submission->timer);
-    add_timing(run, index);
-    return true;
-}
-
-static uint32_t target_images(const struct vkb_run *run, const struct vkb_pass_row *pass,
-                              struct vkb_cached_image **cache)
-{
-    uint32_t targets[VKB_MAX_TARGETS + 1];
-    const uint32_t count = vkb_pass_targets(pass, targets);
-
-    for (uint32_t i = 0; i < count; ++i)
-        cache[i] = run->images[targets[i]];
-    return count;
-}
-
-// Records passes first..end-1 as one render pass with one timing. Within a render pass, tiling
-// devices and lavapipe do not keep the order of draws, so single draws cannot be timed.
-static bool record_render_pass(struct vkb_run *run, uint32_t first, uint32_t end,
-                               struct vkb_error *error)
-{
-    struct vkb_device *device = run->device;
-    struct vkb_frame *frame = run->frame;
-    struct vkb_submission *submission = run->submission;
-    VkCommandBuffer commands = submission->commands.buffer;
-    struct vkb_cached_image *targets[VKB_MAX_TARGETS + 1];
-    const uint32_t target_count = target_images(run, &run->graph->passes[first], targets);
-    VkRenderPass render_pass;
-    VkFramebuffer framebuffer;
-
-    if (!vkb_pipelines_render_pass(device, &frame->pipelines, run->graph, first, end, &render_pass,
-                                   error)
-        || !vkb_image_cache_framebuffer(device, &frame->cache, targets, target_count, render_pass,
-                                        &framebuffer, error))
-        return false;
-    transition_images(run, first, end);
-    vkb_timer_start(device, commands, &submission->timer);
-    begin_render_pass(run, render_pass, framebuffer, &run->graph->passes[first],
-                      (VkExtent2D){targets[0]->image.width, targets[0]->image.height});
+    vkb_timer_start(device, commands, timer);
+    transition_reads(run, first, end);
+    if (draws)
+        begin_rendering(run, pass);
+    else
+        vkb_image_transition(device, commands, &run->images[pass->targets[0]]->image,
+                             vkb_pass_in_place(pass) ? VKB_ACCESS_DISPATCH_CHANGED
+                                                     : VKB_ACCESS_DISPATCH_STORED);
     for (uint32_t i = first; i < end; ++i)
-        if (!record_pass(run, i, render_pass, error))
+        if (!record_pass(run, i, error))
             return false;
-    device->vk.vkCmdEndRenderPass(commands);
-    vkb_timer_stop(device, commands, &submission->timer);
-    add_timing(run, first);
+    if (draws)
+        device->vk.vkCmdEndRendering(commands);
+    vkb_timer_stop(device, commands, timer);
+    memcpy(timing->name, vkb_graph_timed_as(run->graph, first), sizeof timing->name);
     return true;
 }
 
@@ -561,9 +507,9 @@ bool vkb_record_group(void *context, uint32_t first, uint32_t end, struct vkb_er
         if (!load_resources(run, &run->graph->passes[i], error))
             return false;
     if (run->graph->passes[first].geometry != VKB_GEOMETRY_DISPATCH)
-        return record_render_pass(run, first, end, error);
+        return record_passes(run, first, end, error);
     for (uint32_t i = first; i < end; ++i)
-        if (!record_dispatch(run, i, error))
+        if (!record_passes(run, i, i + 1, error))
             return false;
     return true;
 }

@@ -26,11 +26,6 @@ struct vkb_run {
     struct vkb_content **contents;                    // of the cache
     VkImageUsageFlags *usages;                        // by image: what all requests need
     struct vkb_staged_input inputs[VKB_INPUT_COUNT];  // by kind
-    // Images to be filled by this submission, and where their pixels start in the staging memory: a
-    // kernel, a picture of dirt, and the weights and the kernel of adjoint passes at most.
-    struct vkb_cached_image *constants[4];
-    size_t constant_starts[4];
-    uint32_t constant_count;
     bool unknown_non_finite;  // whether the source has NaN or infinity is counted on the device
     struct vkb_sync sync;     // what the submission waits for and signals
 };

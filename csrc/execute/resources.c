@@ -1,15 +1,13 @@
 #include "execute/resources.h"
 
+#include "execute/bindings.h"
+
 #include <string.h>
 
 static void destroy_entry(const struct vkb_device *device, struct vkb_resource_entry *entry)
 {
-    const struct VolkDeviceTable *vk = &device->vk;
-
-    vk->vkDestroySampler(device->handle, entry->sampler, NULL);
-    vk->vkDestroyImageView(device->handle, entry->view, NULL);
-    vk->vkDestroyImage(device->handle, entry->image, NULL);
-    vkb_memory_free(device, entry->memory);
+    device->vk.vkDestroySampler(device->handle, entry->sampler, NULL);
+    vkb_image_destroy(device, &entry->image);
     vkb_buffer_destroy(device, &entry->buffer);
     vkb_buffer_destroy(device, &entry->staging);
     vkb_free(entry);
@@ -37,24 +35,6 @@ void vkb_resources_trim(const struct vkb_device *device, struct vkb_resources *r
     }
 }
 
-static bool create_sampler(const struct vkb_device *device, const struct vkb_resource *resource,
-                           VkSampler *sampler, struct vkb_error *error)
-{
-    const VkFilter filter = resource->linear ? VK_FILTER_LINEAR : VK_FILTER_NEAREST;
-    const VkSamplerAddressMode border = (VkSamplerAddressMode)resource->border;
-
-    return VK(error, device->vk.vkCreateSampler(device->handle,
-                                                &(VkSamplerCreateInfo){
-                                                    .sType = VK_STRUCTURE_TYPE_SAMPLER_CREATE_INFO,
-                                                    .magFilter = filter,
-                                                    .minFilter = filter,
-                                                    .addressModeU = border,
-                                                    .addressModeV = border,
-                                                    .addressModeW = border,
-                                                },
-                                                NULL, sampler));
-}
-
 static bool check_format(const struct vkb_device *device, const struct vkb_resource *resource,
                          struct vkb_error *error)
 {
@@ -74,57 +54,25 @@ static bool check_format(const struct vkb_device *device, const struct vkb_resou
     return true;
 }
 
-static bool create_view(const struct vkb_device *device, const struct vkb_resource *resource,
-                        struct vkb_resource_entry *entry, struct vkb_error *error)
-{
-    static const VkImageViewType types[] = {VK_IMAGE_VIEW_TYPE_1D, VK_IMAGE_VIEW_TYPE_2D,
-                                            VK_IMAGE_VIEW_TYPE_3D};
-
-    return VK(error, device->vk.vkCreateImageView(
-                         device->handle,
-                         &(VkImageViewCreateInfo){
-                             .sType = VK_STRUCTURE_TYPE_IMAGE_VIEW_CREATE_INFO,
-                             .image = entry->image,
-                             .viewType = types[resource->dimensions - 1],
-                             .format = (VkFormat)resource->format,
-                             .subresourceRange = {VK_IMAGE_ASPECT_COLOR_BIT, 0, 1, 0, 1},
-                         },
-                         NULL, &entry->view));
-}
-
 static bool create_image(const struct vkb_device *device, const struct vkb_resource *resource,
                          struct vkb_resource_entry *entry, struct vkb_error *error)
 {
-    const struct VolkDeviceTable *vk = &device->vk;
-    static const VkImageType types[] = {VK_IMAGE_TYPE_1D, VK_IMAGE_TYPE_2D, VK_IMAGE_TYPE_3D};
-    VkMemoryRequirements requirements;
-    VkMemoryPropertyFlags flags;
+    const bool stored = resource->kind == VKB_RESOURCE_IMAGE;
+    const struct vkb_image_spec spec = {
+        .other = (VkFormat)resource->format,
+        .dimensions = resource->dimensions,
+        .width = resource->width,
+        .height = resource->height,
+        .depth = resource->depth,
+        .usage = VK_IMAGE_USAGE_TRANSFER_DST_BIT
+               | (stored ? VK_IMAGE_USAGE_STORAGE_BIT : VK_IMAGE_USAGE_SAMPLED_BIT),
+    };
 
-    if (!check_format(device, resource, error)
-        || !VK(error,
-               vk->vkCreateImage(
-                   device->handle,
-                   &(VkImageCreateInfo){
-                       .sType = VK_STRUCTURE_TYPE_IMAGE_CREATE_INFO,
-                       .imageType = types[resource->dimensions - 1],
-                       .format = (VkFormat)resource->format,
-                       .extent = {resource->width, resource->height, resource->depth},
-                       .mipLevels = 1,
-                       .arrayLayers = 1,
-                       .samples = VK_SAMPLE_COUNT_1_BIT,
-                       .usage = VK_IMAGE_USAGE_TRANSFER_DST_BIT
-                              | (resource->kind == VKB_RESOURCE_IMAGE ? VK_IMAGE_USAGE_STORAGE_BIT
-                                                                      : VK_IMAGE_USAGE_SAMPLED_BIT),
-                   },
-                   NULL, &entry->image)))
-        return false;
-    vk->vkGetImageMemoryRequirements(device->handle, entry->image, &requirements);
-    return vkb_memory_allocate(device, VKB_MEMORY_DEVICE, &requirements, NULL, &entry->memory,
-                               &flags, error)
-        && VK(error, vk->vkBindImageMemory(device->handle, entry->image, entry->memory, 0))
-        && create_view(device, resource, entry, error)
-        && (resource->kind == VKB_RESOURCE_IMAGE
-            || create_sampler(device, resource, &entry->sampler, error));
+    return check_format(device, resource, error)
+        && vkb_image_create(device, &spec, &entry->image, error)
+        && (stored
+            || vkb_sampler_create(device, resource->linear ? VK_FILTER_LINEAR : VK_FILTER_NEAREST,
+                                  (VkSamplerAddressMode)resource->border, &entry->sampler, error));
 }
 
 static bool create_entry(const struct vkb_device *device, const struct vkb_resource *resource,
@@ -151,30 +99,16 @@ static bool create_entry(const struct vkb_device *device, const struct vkb_resou
 
 // Records the copy of the data. All images of resources are in the general layout.
 static void record_fill(const struct vkb_device *device, VkCommandBuffer commands,
-                        const struct vkb_resource *resource, const struct vkb_resource_entry *entry)
+                        const struct vkb_resource *resource, struct vkb_resource_entry *entry)
 {
-    const struct VolkDeviceTable *vk = &device->vk;
-
     if (vkb_resource_is_image(resource)) {
-        vkb_barrier_record(device, commands,
-                           &(VkImageMemoryBarrier){
-                               .oldLayout = VK_IMAGE_LAYOUT_UNDEFINED,
-                               .newLayout = VK_IMAGE_LAYOUT_GENERAL,
-                               .image = entry->image,
-                               .subresourceRange = {VK_IMAGE_ASPECT_COLOR_BIT, 0, 1, 0, 1},
-                           },
-                           false, VKB_ACCESS_RESOURCE, VKB_ACCESS_RESOURCE);
-        vk->vkCmdCopyBufferToImage(
-            commands, entry->staging.handle, entry->image, VK_IMAGE_LAYOUT_GENERAL, 1,
-            &(VkBufferImageCopy){
-                .imageSubresource = {VK_IMAGE_ASPECT_COLOR_BIT, 0, 0, 1},
-                .imageExtent = {resource->width, resource->height, resource->depth},
-            });
+        vkb_image_fill(device, commands, &entry->image, entry->staging.handle, 0);
+        vkb_image_transition(device, commands, &entry->image, VKB_ACCESS_RESOURCE);
     } else {
-        vk->vkCmdCopyBuffer(commands, entry->staging.handle, entry->buffer.handle, 1,
-                            &(VkBufferCopy){.size = resource->size});
+        device->vk.vkCmdCopyBuffer(commands, entry->staging.handle, entry->buffer.handle, 1,
+                                   &(VkBufferCopy){.size = resource->size});
+        vkb_barrier_record(device, commands, NULL, true, VKB_ACCESS_RESOURCE, VKB_ACCESS_RESOURCE);
     }
-    vkb_barrier_record(device, commands, NULL, true, VKB_ACCESS_RESOURCE, VKB_ACCESS_RESOURCE);
 }
 
 static struct vkb_resource_entry *find(const struct vkb_resources *resources, uint64_t serial)

@@ -11,9 +11,7 @@
 struct vkb_resource_entry {
     uint64_t serial, used;  // `used`: the last submission that used it
     struct vkb_buffer buffer, staging;
-    VkImage image;
-    VkDeviceMemory memory;
-    VkImageView view;
+    struct vkb_image image;
     VkSampler sampler;
 };
 

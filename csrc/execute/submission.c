@@ -28,35 +28,25 @@ void vkb_submissions_destroy(const struct vkb_device *device, struct vkb_submiss
     *submissions = (struct vkb_submissions){0};
 }
 
-static struct vkb_submission *find_free(const struct vkb_submissions *submissions)
+// Also notices which abandoned submissions the device has finished: copies of rows.
+static struct vkb_submission *find_free(const struct vkb_device *device,
+                                        const struct vkb_submissions *submissions)
 {
-    for (size_t i = 0; i < submissions->count; ++i)
-        if (!submissions->submissions[i]->taken && !submissions->submissions[i]->pending)
-            return submissions->submissions[i];
-    return NULL;
-}
+    struct vkb_submission *free = NULL;
 
-// Frees the submissions that nobody waits for and that the device has finished: copies of rows.
-static bool free_finished(const struct vkb_device *device, struct vkb_submissions *submissions,
-                          struct vkb_error *error)
-{
     for (size_t i = 0; i < submissions->count; ++i) {
         struct vkb_submission *submission = submissions->submissions[i];
-        if (submission->taken || !submission->pending || !vkb_submission_over(device, submission))
-            continue;
-        if (!vkb_commands_reset(device, &submission->commands, error))
-            return false;
-        submission->pending = false;
+        if (!submission->taken && vkb_submission_over(device, submission))
+            free = submission;
     }
-    return true;
+    return free;
 }
 
 bool vkb_submissions_take(const struct vkb_device *device, struct vkb_submissions *submissions,
                           struct vkb_submission **taken, struct vkb_error *error)
 {
-    if (!free_finished(device, submissions, error))
-        return false;
-    struct vkb_submission *submission = find_free(submissions);
+    struct vkb_submission *submission = find_free(device, submissions);
+
     if (!submission
         && !(submission = vkb_append(error, &submissions->submissions, &submissions->count,
                                      &submissions->capacity, sizeof *submission)))
@@ -94,7 +84,9 @@ void vkb_submissions_give_back(const struct vkb_device *device, struct vkb_submi
 bool vkb_submission_submit(struct vkb_device *device, struct vkb_submission *submission,
                            const struct vkb_sync *order, struct vkb_error *error)
 {
-    submission->pending = vkb_commands_submit(device, &submission->commands, order, error);
+    submission->pending = VK(error, device->vk.vkEndCommandBuffer(submission->commands.buffer))
+                       && vkb_device_submit(device, submission->commands.buffer, order,
+                                            submission->commands.fence, error);
     return submission->pending;
 }
 
@@ -108,9 +100,15 @@ uint64_t vkb_submissions_pending(const struct vkb_submissions *submissions, uint
     return first;
 }
 
-bool vkb_submission_over(const struct vkb_device *device, const struct vkb_submission *submission)
+bool vkb_submission_over(const struct vkb_device *device, struct vkb_submission *submission)
 {
-    return !submission->pending || vkb_commands_over(device, &submission->commands);
+    const VkFence *fence = &submission->commands.fence;
+    struct vkb_error ignored;
+
+    submission->pending = submission->pending
+                       && (device->vk.vkGetFenceStatus(device->handle, *fence) != VK_SUCCESS
+                           || !VK(&ignored, device->vk.vkResetFences(device->handle, 1, fence)));
+    return !submission->pending;
 }
 
 // All pending submissions may run before this one. A submission without requests loads a scene, and
@@ -131,7 +129,7 @@ bool vkb_submission_wait(struct vkb_device *device, const struct vkb_submissions
                          struct vkb_submission *submission, struct vkb_error *error)
 {
     if (submission->pending
-        && !vkb_commands_wait(device, &submission->commands, count_frames(submissions), error))
+        && !vkb_device_wait(device, submission->commands.fence, count_frames(submissions), error))
         return false;
     submission->pending = false;
     return true;

@@ -43,10 +43,10 @@ void vkb_submissions_give_back(const struct vkb_device *device, struct vkb_submi
 // The number of the first pending submission; `now` if there is none.
 uint64_t vkb_submissions_pending(const struct vkb_submissions *submissions, uint64_t now);
 
-// Whether the device has finished the submission; does not wait.
-bool vkb_submission_over(const struct vkb_device *device, const struct vkb_submission *submission);
+// Whether the device has finished the submission, which then no longer is pending; does not wait.
+bool vkb_submission_over(const struct vkb_device *device, struct vkb_submission *submission);
 
-// Ends the recording and submits it, as vkb_commands_submit does.
+// Ends the recording and submits it. The device runs submissions in order. `order` may be NULL.
 bool vkb_submission_submit(struct vkb_device *device, struct vkb_submission *submission,
                            const struct vkb_sync *order, struct vkb_error *error);
 // Waits until the device has finished the submission and all before it. On failure it is still

@@ -31,8 +31,7 @@ bool vkb_graph_add_pass(struct vkb_graph *graph, const struct vkb_pass_row *row,
                   sizeof *graph->passes))
         return false;
     graph->passes[graph->pass_count] = *row;
-    // (A row without an image is found by vkb_graph_check.)
-    if (row->targets[0] < graph->image_count)
+    if (row->target_count)
         graph->passes[graph->pass_count].constants.stored =
             (int32_t)vkb_storage_mode(graph->images[row->targets[0]].format);
     ++graph->pass_count;
@@ -214,41 +213,6 @@ enum vkb_access vkb_pass_reads_as(const struct vkb_pass_row *pass)
                                                 : VKB_ACCESS_DISPATCH_LOADED;
 }
 
-enum vkb_access vkb_graph_rest(const struct vkb_graph *graph, uint32_t image)
-{
-    for (uint32_t i = 0; i < graph->pass_count; ++i)
-        if (vkb_pass_reads(&graph->passes[i], image))
-            return vkb_pass_reads_as(&graph->passes[i]);
-    return graph->images[image].format == VKB_FORMAT_DEPTH32_FLOAT ? VKB_ACCESS_DEPTH_TARGET
-                                                                   : VKB_ACCESS_COPY_SOURCE;
-}
-
-uint32_t vkb_graph_target_uses(const struct vkb_graph *graph, uint32_t first, uint32_t end,
-                               struct vkb_target_use *uses)
-{
-    const struct vkb_pass_row *pass = &graph->passes[first];
-    enum vkb_access during = VKB_ACCESS_COLOR_TARGET;
-    uint32_t count = 0;
-
-    for (uint32_t i = first; i < end; ++i)
-        if (graph->passes[i].blend != VKB_BLEND_NONE)
-            during = VKB_ACCESS_COLOR_BLEND;
-    // Depth first, since the depth test comes first.
-    if (pass->depth != VKB_NO_IMAGE) {
-        enum vkb_access rest = vkb_graph_rest(graph, pass->depth);
-        uses[count++] = (struct vkb_target_use){
-            .before = rest,
-            .during = VKB_ACCESS_DEPTH_TARGET,
-            .after = rest == VKB_ACCESS_DEPTH_TARGET ? VKB_ACCESS_NONE : rest,
-        };
-    }
-    for (uint32_t i = 0; i < pass->target_count; ++i) {
-        enum vkb_access rest = vkb_graph_rest(graph, pass->targets[i]);
-        uses[count++] = (struct vkb_target_use){.before = rest, .during = during, .after = rest};
-    }
-    return count;
-}
-
 uint32_t vkb_graph_find(const struct vkb_graph *graph, const char *name)
 {
     for (uint32_t i = 0; i < graph->image_count; ++i)
@@ -267,10 +231,7 @@ void vkb_graph_set_usages(struct vkb_graph *graph)
 {
     for (uint32_t i = 0; i < graph->image_count; ++i) {
         struct vkb_image_row *row = &graph->images[i];
-        const enum vkb_access rest = vkb_graph_rest(graph, i);
-        row->usage = (row->framebuffer || rest == VKB_ACCESS_COPY_SOURCE
-                          ? vkb_access_usage(VKB_ACCESS_COPY_SOURCE)
-                          : 0)
+        row->usage = (row->framebuffer ? vkb_access_usage(VKB_ACCESS_COPY_SOURCE) : 0)
                    | (row->serial ? vkb_access_usage(VKB_ACCESS_COPY_TARGET) : 0);
     }
     for (uint32_t i = 0; i < graph->pass_count; ++i) {
@@ -293,15 +254,6 @@ void vkb_graph_set_usages(struct vkb_graph *graph)
             graph->images[i].usage = vkb_access_usage(VKB_ACCESS_COPY_SOURCE);
 }
 
-// Whether the image is given, or written before pass `pass_index`.
-static bool is_filled(const struct vkb_graph *graph, uint32_t image, uint32_t pass_index)
-{
-    for (uint32_t i = 0; i < pass_index; ++i)
-        if (vkb_pass_writes(&graph->passes[i], image))
-            return true;
-    return vkb_is_given(&graph->images[image]);
-}
-
 bool vkb_check_size(const char *name, uint32_t width, uint32_t height, uint32_t max_side,
                     struct vkb_error *error)
 {
@@ -313,94 +265,12 @@ bool vkb_check_size(const char *name, uint32_t width, uint32_t height, uint32_t 
     return true;
 }
 
-static bool check_image(const struct vkb_graph *graph, uint32_t index, uint32_t max_side,
-                        struct vkb_error *error)
-{
-    const struct vkb_image_row *row = &graph->images[index];
-
-    if (!vkb_check_size(row->name, row->width, row->height, max_side, error))
-        return false;
-    if (row->format == VKB_FORMAT_NONE || row->format >= VKB_FORMAT_COUNT)
-        return vkb_fail(error, VKB_ERROR_GENERAL, "graph: image %s has no format", row->name);
-    for (uint32_t i = 0; i < index; ++i)
-        if (strcmp(graph->images[i].name, row->name) == 0)
-            return vkb_fail(error, VKB_ERROR_GENERAL, "graph: two images are named %s", row->name);
-    return true;
-}
-
-static bool check_target(const struct vkb_graph *graph, uint32_t pass_index, uint32_t target,
-                         bool depth, struct vkb_error *error)
-{
-    const struct vkb_pass_row *pass = &graph->passes[pass_index];
-    const struct vkb_image_row *row;
-    const uint32_t first = pass->target_count ? pass->targets[0] : pass->depth;
-
-    if (target >= graph->image_count)
-        return vkb_fail(error, VKB_ERROR_GENERAL, "graph: pass %s has an unknown target",
-                        pass->name);
-    row = &graph->images[target];
-    if ((row->format == VKB_FORMAT_DEPTH32_FLOAT) != depth)
-        return vkb_fail(error, VKB_ERROR_GENERAL, "graph: pass %s: %s has the wrong kind of format",
-                        pass->name, row->name);
-    if (vkb_pass_reads(pass, target)
-        && (!vkb_pass_in_place(pass) || pass_index == 0
-            || vkb_graph_group_end(graph, pass_index - 1) <= pass_index))
-        return vkb_fail(error, VKB_ERROR_GENERAL, "graph: pass %s reads its own target %s",
-                        pass->name, row->name);
-    if (row->width != graph->images[first].width || row->height != graph->images[first].height)
-        return vkb_fail(error, VKB_ERROR_GENERAL, "graph: pass %s has targets of several sizes",
-                        pass->name);
-    // Earlier writers must be in the group of this pass.
-    for (uint32_t i = pass_index; i-- > 0;) {
-        if (vkb_graph_group_end(graph, i) > pass_index || (pass->fused && i == pass_index - 1))
-            continue;
-        if (vkb_pass_writes(&graph->passes[i], target) || vkb_pass_reads(&graph->passes[i], target))
-            return vkb_fail(error, VKB_ERROR_GENERAL,
-                            "graph: pass %s writes %s, which pass %s used before", pass->name,
-                            row->name, graph->passes[i].name);
-    }
-    return true;
-}
-
-static bool check_pass(const struct vkb_graph *graph, uint32_t index, struct vkb_error *error)
-{
-    const struct vkb_pass_row *pass = &graph->passes[index];
-
-    if (pass->target_count > VKB_MAX_TARGETS
-        || pass->read_count > (pass->reading == VKB_READING_LOADED ? VKB_MAX_LOADS : VKB_MAX_READS)
-        || (pass->reading != VKB_READING_SAMPLED && pass->geometry != VKB_GEOMETRY_DISPATCH)
-        || (pass->target_count == 0 && pass->depth == VKB_NO_IMAGE)
-        || (pass->geometry == VKB_GEOMETRY_DISPATCH
-            && (pass->target_count != 1 || pass->depth != VKB_NO_IMAGE || pass->blend
-                || pass->block_width == 0 || pass->block_height == 0)))
-        return vkb_fail(error, VKB_ERROR_GENERAL, "graph: pass %s has too many or too few columns",
-                        pass->name);
-    if (pass->fused
-        && (index == 0 || pass->target_count != 1
-            || graph->passes[index - 1].targets[0] != pass->targets[0]))
-        return vkb_fail(error, VKB_ERROR_GENERAL, "graph: pass %s replaces no pass", pass->name);
-    if (pass->textured && (pass->read_count > 0 || !vkb_is_mesh(pass->geometry)))
-        return vkb_fail(error, VKB_ERROR_GENERAL,
-                        "graph: pass %s has textures, but no mesh or images beside them",
-                        pass->name);
-    for (uint32_t i = 0; i < pass->read_count; ++i)
-        if (pass->reads[i] >= graph->image_count || !is_filled(graph, pass->reads[i], index))
-            return vkb_fail(error, VKB_ERROR_GENERAL,
-                            "graph: pass %s reads an image that is unknown or not written before",
-                            pass->name);
-    for (uint32_t i = 0; i < pass->target_count; ++i)
-        if (!check_target(graph, index, pass->targets[i], false, error))
-            return false;
-    return pass->depth == VKB_NO_IMAGE || check_target(graph, index, pass->depth, true, error);
-}
-
-bool vkb_graph_check(const struct vkb_graph *graph, uint32_t max_side, struct vkb_error *error)
+bool vkb_graph_check_sizes(const struct vkb_graph *graph, uint32_t max_side,
+                           struct vkb_error *error)
 {
     for (uint32_t i = 0; i < graph->image_count; ++i)
-        if (!check_image(graph, i, max_side, error))
-            return false;
-    for (uint32_t i = 0; i < graph->pass_count; ++i)
-        if (!check_pass(graph, i, error))
+        if (!vkb_check_size(graph->images[i].name, graph->images[i].width, graph->images[i].height,
+                            max_side, error))
             return false;
     return true;
 }

@@ -1,5 +1,5 @@
 // A graph as data: the images and the passes of one frame. Rows are plain values. Barriers,
-// layouts, render passes and descriptor sets are derived from them.
+// layouts, attachments and descriptor sets are derived from them.
 #ifndef VKB_GRAPH_H
 #define VKB_GRAPH_H
 
@@ -167,8 +167,9 @@ bool vkb_graph_add_pass(struct vkb_graph *graph, const struct vkb_pass_row *row,
 // How shaders round what they store to an image of that format: of STORED_*.
 enum vkb_mode vkb_storage_mode(enum vkb_format format);
 
-// Checks the rows, so that Vulkan gets only valid graphs.
-bool vkb_graph_check(const struct vkb_graph *graph, uint32_t max_side, struct vkb_error *error);
+// Checks the sizes of all images.
+bool vkb_graph_check_sizes(const struct vkb_graph *graph, uint32_t max_side,
+                           struct vkb_error *error);
 
 // Checks that both sides are 1 to max_side; `name` is used in the message.
 bool vkb_check_size(const char *name, uint32_t width, uint32_t height, uint32_t max_side,
@@ -217,14 +218,6 @@ bool vkb_graph_blends(const struct vkb_graph *graph, uint32_t image);
 
 // How a pass reads its images.
 enum vkb_access vkb_pass_reads_as(const struct vkb_pass_row *pass);
-
-// The access of an image between frames: that of its first reader, or copy source if no pass reads
-// it. A depth image that no pass reads stays an attachment.
-enum vkb_access vkb_graph_rest(const struct vkb_graph *graph, uint32_t image);
-
-// The accesses of passes first..end-1 to their targets: the colours in order, then the depth.
-uint32_t vkb_graph_target_uses(const struct vkb_graph *graph, uint32_t first, uint32_t end,
-                               struct vkb_target_use *uses);
 
 // The channels of the image that are read back.
 uint32_t vkb_graph_channels(const struct vkb_graph *graph, uint32_t image);

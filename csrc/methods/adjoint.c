@@ -17,9 +17,6 @@ static vkb_transpose *const transposes[VKB_BLOCK_COUNT] = {
     [VKB_BLOCK_prefilter] = vkb_transpose_groups,
     [VKB_BLOCK_blender_end] = vkb_transpose_blender_end,
     [VKB_BLOCK_streaks] = vkb_transpose_streaks,
-    [VKB_BLOCK_flare] = vkb_transpose_flare,
-    [VKB_BLOCK_dirt] = vkb_transpose_dirt,
-    [VKB_BLOCK_star] = vkb_transpose_star,
 };
 
 // The image of a framebuffer's cotangents, a level of the source.
@@ -73,7 +70,9 @@ static bool add_passes(struct vkb_adjoint *adjoint, const struct vkb_settings *s
         vkb_transpose *transpose = pass.no_transpose ? NULL : transposes[pass.block];
         if (pass.target_count != 1 || vkb_cotangent_of(adjoint, &pass) == VKB_NO_IMAGE)
             continue;
-        const bool convolved = pass.block == VKB_BLOCK_fft;
+        // A prefilter of bright colours is left to the reference.
+        const bool convolved = pass.block == VKB_BLOCK_fft
+                            && settings->kernel.prefilter[0] > settings->kernel.prefilter[1];
         *possible = convolved || transpose;
         if (convolved ? !vkb_transpose_convolution(adjoint, settings, &pass, error)
                       : transpose && !transpose(adjoint, &pass, error))
@@ -96,24 +95,6 @@ static void find_glow(struct vkb_adjoint *adjoint, const struct vkb_cotangents *
             adjoint->glow = graph->passes[i].targets[0];
             adjoint->image = graph->passes[i].reads[0];
         }
-}
-
-// Of the passes that accumulate an image's cotangents, only the last one removes NaN and
-// infinity.
-static void end_at_last(struct vkb_graph *graph, uint32_t first)
-{
-    for (uint32_t i = first; i < graph->pass_count; ++i) {
-        const struct vkb_pass_row *last = &graph->passes[i];
-        if (!last->constants.from_image || !last->constants.add_own)
-            continue;
-        for (uint32_t j = first; j < i; ++j) {
-            struct vkb_pass_row *row = &graph->passes[j];
-            if (row->targets[0] != last->reads[last->read_count - 2] || !row->constants.from_image)
-                continue;
-            row->constants.from_image = false;
-            row->reads[row->read_count - 1] = row->reads[0];
-        }
-    }
 }
 
 // Makes the cotangents of the source's images framebuffers.
@@ -154,7 +135,7 @@ bool vkb_build_adjoint(const struct vkb_source *source, const struct vkb_setting
     if (!vkb_source_build(source, settings, max_side, graph, error))
         return false;
     find_glow(&adjoint, cotangents);
-    const uint32_t image_count = *first = graph->image_count, pass_count = graph->pass_count;
+    const uint32_t image_count = *first = graph->image_count;
     adjoint.cotangents = vkb_alloc(error, image_count, sizeof *adjoint.cotangents);
     bool done = adjoint.cotangents && add_table(&adjoint, error);
     for (uint32_t i = 0; adjoint.cotangents && i < image_count; ++i)
@@ -164,7 +145,6 @@ bool vkb_build_adjoint(const struct vkb_source *source, const struct vkb_setting
     *possible = true;
     done = done && add_passes(&adjoint, settings, possible, error)
         && vkb_table_end(&adjoint.table, graph, adjoint.table_image, error);
-    end_at_last(graph, pass_count);
     if (done && !cotangents->sums)
         show_results(&adjoint, image_count);
     vkb_free(adjoint.table.texels);

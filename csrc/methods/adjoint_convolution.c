@@ -4,6 +4,7 @@
 // fold back to the edge. With a mirror, whose kernels are symmetric, it is the convolution itself.
 #include "methods/adjoint.h"
 #include "passes/adjoint.h"
+#include "passes/levels.h"
 
 // The kernel with its centre at the same place: an even side becomes one longer.
 static bool mirror_kernel(const struct vkb_kernel_data *kernel, struct vkb_graph *graph,
@@ -28,9 +29,6 @@ static bool mirror_kernel(const struct vkb_kernel_data *kernel, struct vkb_graph
     mirrored->pixels = graph->owned[1] = pixels;
     mirrored->width = width;
     mirrored->height = height;
-    // The cotangents are not filtered.
-    mirrored->prefilter[0] = 1.0f;
-    mirrored->prefilter[1] = 0.0f;
     mirrored->serial = kernel->serial ^ UINT64_C(0x9e3779b97f4a7c15);
     return true;
 }
@@ -58,13 +56,13 @@ bool vkb_transpose_convolution(struct vkb_adjoint *adjoint, const struct vkb_set
                                       size.height + (edge_y ? kernel->height - 1 : 0)};
     const double left = edge_x ? kernel->width - 1 - kernel->width / 2 : 0;
     const double above = edge_y ? kernel->height - 1 - kernel->height / 2 : 0;
-    const float *prefilter = settings->kernel.prefilter;
     struct vkb_settings mirrored = *settings;
     struct vkb_bloom_source source = {.buffers = extended, .glow = vkb_cotangent_of(adjoint, pass)};
     const struct vkb_image_row result = {.name = "adjoint_convolved",
                                          .format = VKB_FORMAT_RGBA32_FLOAT};
     struct vkb_filter filter = {.kernels = 1, .gain = 1.0};
-    uint32_t convolved;
+    struct vkb_levels levels = {
+        .settings = &mirrored, .source = &source, .graph = graph, .error = error};
 
     if (boundary != BOUNDARY_MIRROR)
         mirrored.choices[VKB_CHOICE_boundary] =
@@ -73,17 +71,15 @@ bool vkb_transpose_convolution(struct vkb_adjoint *adjoint, const struct vkb_set
     vkb_axis_move(&filter.y, extended.height, size.height, above);
     if ((boundary != BOUNDARY_MIRROR && !mirror_kernel(kernel, graph, &mirrored.kernel, error))
         || (edge_y
-            && !vkb_filter_to_image(adjoint, &filter, source.glow, extended, &source.glow, error))
-        || !vkb_convolve(&mirrored, &source, &result, "adjoint_", graph, &convolved, error))
+            && !vkb_filter_to_image(adjoint, &filter, source.glow, extended, &source.glow, error)))
+        return false;
+    uint32_t convolved = vkb_convolve(&levels, &result, "adjoint_");
+    if (levels.failed)
         return false;
     // The alpha is one of a cotangent, not 1.
     for (uint32_t i = first; i < graph->pass_count; ++i)
         graph->passes[i].constants.alpha = ALPHA_BLUR;
     vkb_axis_move(&filter.x, size.width, extended.width, -left);
     vkb_axis_move(&filter.y, size.height, extended.height, -above);
-    if (prefilter[0] > prefilter[1])
-        return vkb_accumulate_filter(adjoint, &filter, convolved, glow, error);
-    return vkb_filter_to_image(adjoint, &filter, convolved, size, &convolved, error)
-        && vkb_transpose_bright(adjoint, prefilter, glow, convolved,
-                                (enum vkb_mode)pass->constants.alpha, error);
+    return vkb_accumulate_filter(adjoint, &filter, convolved, glow, error);
 }

@@ -32,40 +32,25 @@ static void choose_sizes(struct vkb_levels *levels)
         levels->sizes[levels->count++] = size;
 }
 
-// The pass from the frame to the first level.
-static struct vkb_pass_row first_row(const struct vkb_levels *levels, uint32_t from)
+uint32_t vkb_add_bevy(struct vkb_levels *levels)
 {
-    struct vkb_pass_row row = vkb_groups_row(levels, GROUPS_BEVY, from, levels->downs[0]);
-
-    vkb_set_steps(&row, levels->settings->values.scale_x, levels->settings->values.scale_y);
-    vkb_mask_prefilter(levels, &row);
-    return row;
-}
-
-bool vkb_add_bevy(const struct vkb_settings *settings, const struct vkb_bloom_source *source,
-                  struct vkb_graph *graph, uint32_t *bloom, struct vkb_error *error)
-{
-    struct vkb_levels levels = {.settings = settings, .source = source, .graph = graph};
+    const struct vkb_settings *settings = levels->settings;
     const bool mixed = settings->choices[VKB_CHOICE_composite] == COMPOSITE_MIX;
+    const double x = settings->values.scale_x, y = settings->values.scale_y;
     struct vkb_combination combination = vkb_combine(UPSAMPLE_TENT, 1.0, 1.0);
-    uint32_t from = source->glow;
 
-    choose_sizes(&levels);
-    for (uint32_t level = 0; level < levels.count; from = levels.downs[level++]) {
-        if (!vkb_levels_down(&levels, level, error))
-            return false;
-        const struct vkb_pass_row row = first_row(&levels, source->glow);
-        if (level ? !vkb_levels_reduce(&levels, settings->values.scale_x, settings->values.scale_y,
-                                       from, levels.downs[level], error)
-                  : !vkb_graph_add_pass(graph, &row, error))
-            return false;
-    }
-    for (uint32_t level = 0; level + 1 < levels.count; ++level) {
-        const double factor = blend_factor(settings, level + 1, levels.count);
+    choose_sizes(levels);
+    const uint32_t first = vkb_levels_down(levels, 0);
+    struct vkb_pass_row row = vkb_groups_row(levels, GROUPS_BEVY, levels->source->glow, first);
+    vkb_set_steps(&row, x, y);
+    vkb_levels_masked(levels, &row);
+    vkb_levels_reduce_rest(levels, x, y);
+    for (uint32_t level = 0; level + 1 < levels->count; ++level) {
+        const double factor = blend_factor(settings, level + 1, levels->count);
         combination.own[level] = mixed ? 1.0 - factor : 1.0;
         combination.coarse[level] = factor;
     }
-    combination.radius_x = settings->values.scale_x;
-    combination.radius_y = settings->values.scale_y;
-    return vkb_levels_combine(&levels, &combination, bloom, error);
+    combination.radius_x = x;
+    combination.radius_y = y;
+    return vkb_levels_combine(levels, &combination);
 }

@@ -20,9 +20,7 @@ struct reach {
 
 // Both axes of a convolution.
 struct convolution {
-    const struct vkb_settings *settings;
-    const struct vkb_bloom_source *source;
-    struct vkb_graph *graph;
+    struct vkb_levels *levels;
     const char *prefix;  // of the names of images
     struct vkb_fft_axis x, y;
     struct reach reach_x, reach_y;
@@ -64,10 +62,10 @@ static struct vkb_fft_axis make_axis(enum vkb_mode direction, enum vkb_boundary 
 }
 
 // The kernel as the host gives it.
-static bool add_kernel(const struct convolution *convolution, uint32_t *image,
-                       struct vkb_error *error)
+static uint32_t add_kernel(const struct convolution *convolution)
 {
-    const struct vkb_kernel_data *kernel = &convolution->settings->kernel;
+    struct vkb_levels *levels = convolution->levels;
+    const struct vkb_kernel_data *kernel = &levels->settings->kernel;
     struct vkb_image_row row = {
         .format = VKB_FORMAT_RGBA32_FLOAT,
         .width = kernel->width,
@@ -79,22 +77,20 @@ static bool add_kernel(const struct convolution *convolution, uint32_t *image,
     };
 
     snprintf(row.name, sizeof row.name, "%skernel", convolution->prefix);
-    return vkb_graph_add_image(convolution->graph, &row, image, error);
+    return vkb_levels_add(levels, &row);
 }
 
-static bool add_spectrum(const struct convolution *convolution, const char *name,
-                         struct vkb_size size, uint32_t *image, struct vkb_error *error)
+static uint32_t add_spectrum(const struct convolution *convolution, const char *name,
+                             struct vkb_size size)
 {
     char named[VKB_NAME_SIZE];
 
     snprintf(named, sizeof named, "%s%s", convolution->prefix, name);
-    return vkb_add_target(convolution->graph, named, VKB_FORMAT_RGBA32_FLOAT, size, false, image,
-                          error);
+    return vkb_levels_target(convolution->levels, named, VKB_FORMAT_RGBA32_FLOAT, size, false);
 }
 
 // The pass that puts the kernel to its places in the padded lines.
-static bool add_placing(const struct convolution *convolution, uint32_t kernel, uint32_t spectrum,
-                        struct vkb_error *error)
+static void add_placing(const struct convolution *convolution, uint32_t kernel, uint32_t spectrum)
 {
     const struct vkb_fft_axis *x = &convolution->x, *y = &convolution->y;
     struct vkb_pass_row row = vkb_fullscreen_row("kernel", &vkb_shader_fft_kernel_comp, spectrum);
@@ -120,24 +116,21 @@ static bool add_placing(const struct convolution *convolution, uint32_t kernel, 
         .period_y = (int)y->extent,
         .before_y = (int)convolution->reach_y.before,
         .after_y = (int)convolution->reach_y.after,
-        .grey = convolution->settings->kernel.grey,
+        .grey = convolution->levels->settings->kernel.grey,
         // That of the way back.
         .gain = (float)(1.0 / ((double)x->line.length * y->line.length)),
     };
-    return vkb_graph_add_pass(convolution->graph, &row, error);
+    vkb_levels_pass(convolution->levels, &row);
 }
 
-static bool add_stage(const struct convolution *convolution, const struct vkb_fft_stage *stage,
-                      struct vkb_error *error)
+static struct vkb_pass_row stage_row(const struct convolution *convolution,
+                                     const struct vkb_fft_stage *stage)
 {
-    const struct vkb_pass_row row = vkb_fft_row(convolution->graph, stage);
-
-    return vkb_graph_add_pass(convolution->graph, &row, error);
+    return vkb_fft_row(convolution->levels->graph, stage);
 }
 
 // The kernel's spectrum, in place.
-static bool add_kernel_spectrum(const struct convolution *convolution, uint32_t spectrum,
-                                struct vkb_error *error)
+static void add_kernel_spectrum(const struct convolution *convolution, uint32_t spectrum)
 {
     const struct vkb_fft_axis *axes[] = {&convolution->x, &convolution->y};
 
@@ -152,48 +145,45 @@ static bool add_kernel_spectrum(const struct convolution *convolution, uint32_t 
         // The first columns have the glow's pipeline, though none of their elements is padding.
         stage.padded = i == 1 && axes[i]->line.length > axes[i]->extent;
         for (; stage.number < axes[i]->line.stage_count; ++stage.number) {
-            struct vkb_pass_row row = vkb_fft_row(convolution->graph, &stage);
+            struct vkb_pass_row row = stage_row(convolution, &stage);
             row.params.fft.extent = INT32_MAX;
-            if (!vkb_graph_add_pass(convolution->graph, &row, error))
-                return false;
+            vkb_levels_pass(convolution->levels, &row);
             stage.padded = false;
         }
     }
-    return true;
 }
 
 // The glow's transform along its rows.
-static bool add_rows(const struct convolution *convolution, uint32_t rows, struct vkb_error *error)
+static void add_rows(const struct convolution *convolution, uint32_t rows)
 {
-    const float *prefilter = convolution->settings->kernel.prefilter;
+    const float *prefilter = convolution->levels->settings->kernel.prefilter;
     struct vkb_fft_stage stage = {
         .name = "spectrum",
         .axis = &convolution->x,
         .lines = convolution->y.extent,
         .padded = convolution->x.line.length > convolution->x.extent,
-        .from = convolution->source->glow,
+        .from = convolution->levels->source->glow,
         .to = rows,
     };
-    struct vkb_pass_row row = vkb_fft_row(convolution->graph, &stage);
 
-    row.constants.stage = STAGE_FIRST;
-    row.constants.prefiltered = prefilter[1] >= prefilter[0];
-    row.params.fft.prefilter_min = prefilter[0];
-    row.params.fft.prefilter_max = prefilter[1];
-    row.params.fft.prefilter_factor = prefilter[2];
-    if (!vkb_graph_add_pass(convolution->graph, &row, error))
-        return false;
-    stage.padded = false;
-    stage.from = rows;
-    for (stage.number = 1; stage.number < stage.axis->line.stage_count; ++stage.number)
-        if (!add_stage(convolution, &stage, error))
-            return false;
-    return true;
+    for (; stage.number < stage.axis->line.stage_count; ++stage.number) {
+        struct vkb_pass_row row = stage_row(convolution, &stage);
+        if (stage.number == 0) {
+            row.constants.stage = STAGE_FIRST;
+            row.constants.prefiltered = prefilter[1] >= prefilter[0];
+            row.params.fft.prefilter_min = prefilter[0];
+            row.params.fft.prefilter_max = prefilter[1];
+            row.params.fft.prefilter_factor = prefilter[2];
+        }
+        vkb_levels_pass(convolution->levels, &row);
+        stage.padded = false;
+        stage.from = rows;
+    }
 }
 
 // Along the columns forth and back, with the product between.
-static bool add_columns(const struct convolution *convolution, uint32_t rows, uint32_t spectrum,
-                        uint32_t columns, struct vkb_error *error)
+static void add_columns(const struct convolution *convolution, uint32_t rows, uint32_t spectrum,
+                        uint32_t columns)
 {
     const uint32_t last = convolution->y.line.stage_count - 1;
     struct vkb_fft_stage stage = {
@@ -205,33 +195,26 @@ static bool add_columns(const struct convolution *convolution, uint32_t rows, ui
         .to = columns,
     };
 
-    for (; stage.number < last; ++stage.number) {
-        if (!add_stage(convolution, &stage, error))
-            return false;
+    for (; stage.number <= last; ++stage.number) {
+        struct vkb_pass_row row = stage_row(convolution, &stage);
+        if (stage.number == last)
+            vkb_fft_multiply(&convolution->x, &convolution->y, spectrum,
+                             convolution->levels->settings->kernel.grey, &row);
+        vkb_levels_pass(convolution->levels, &row);
         stage.padded = false;
         stage.from = columns;
     }
-    struct vkb_pass_row row = vkb_fft_row(convolution->graph, &stage);
-    vkb_fft_multiply(&convolution->x, &convolution->y, spectrum, convolution->settings->kernel.grey,
-                     &row);
-    if (!vkb_graph_add_pass(convolution->graph, &row, error))
-        return false;
     stage.inverse = true;
-    stage.padded = false;
-    stage.from = columns;
-    while (stage.number-- > 0) {
-        row = vkb_fft_row(convolution->graph, &stage);
+    for (stage.number = last; stage.number-- > 0;) {
+        struct vkb_pass_row row = stage_row(convolution, &stage);
         // The rows back need no other.
         if (stage.number == 0)
             row.params.fft.kept = (int)convolution->y.extent;
-        if (!vkb_graph_add_pass(convolution->graph, &row, error))
-            return false;
+        vkb_levels_pass(convolution->levels, &row);
     }
-    return true;
 }
 
-static bool add_rows_back(const struct convolution *convolution, uint32_t columns, uint32_t target,
-                          struct vkb_error *error)
+static void add_rows_back(const struct convolution *convolution, uint32_t columns, uint32_t target)
 {
     struct vkb_fft_stage stage = {
         .name = "bloom",
@@ -239,34 +222,30 @@ static bool add_rows_back(const struct convolution *convolution, uint32_t column
         .lines = convolution->y.extent,
         .inverse = true,
         .from = columns,
-        .to = columns,
     };
 
-    for (stage.number = stage.axis->line.stage_count - 1; stage.number > 0; --stage.number)
-        if (!add_stage(convolution, &stage, error))
-            return false;
-    stage.to = target;
-    struct vkb_pass_row row = vkb_fft_row(convolution->graph, &stage);
-    row.constants.stage = STAGE_LAST;
-    return vkb_graph_add_pass(convolution->graph, &row, error);
+    for (stage.number = stage.axis->line.stage_count; stage.number-- > 0;) {
+        stage.to = stage.number ? columns : target;
+        struct vkb_pass_row row = stage_row(convolution, &stage);
+        if (stage.number == 0)
+            row.constants.stage = STAGE_LAST;
+        vkb_levels_pass(convolution->levels, &row);
+    }
 }
 
-bool vkb_convolve(const struct vkb_settings *settings, const struct vkb_bloom_source *source,
-                  const struct vkb_image_row *result, const char *prefix, struct vkb_graph *graph,
-                  uint32_t *target, struct vkb_error *error)
+uint32_t vkb_convolve(struct vkb_levels *levels, const struct vkb_image_row *result,
+                      const char *prefix)
 {
+    const struct vkb_settings *settings = levels->settings;
     const int boundary = settings->choices[VKB_CHOICE_boundary];
     const bool wrap_x = boundary == BOUNDARY_WRAP_X;
-    const struct vkb_size size = source->buffers;
+    const struct vkb_size size = levels->source->buffers;
     struct convolution convolution = {
-        .settings = settings,
-        .source = source,
-        .graph = graph,
+        .levels = levels,
         .prefix = prefix,
         .reach_x.kernel = settings->kernel.width,
         .reach_y.kernel = settings->kernel.height,
     };
-    uint32_t kernel, spectrum, rows, columns;
 
     convolution.x =
         make_axis(DIRECTION_HORIZONTAL, wrap_x ? BOUNDARY_WRAP : (enum vkb_boundary)boundary,
@@ -276,52 +255,52 @@ bool vkb_convolve(const struct vkb_settings *settings, const struct vkb_bloom_so
                   size.height, most_radix(size), &convolution.reach_y);
     const struct vkb_size padded = {convolution.x.line.length, convolution.y.line.length};
     const struct vkb_size lines = {padded.width, size.height};
-    return add_kernel(&convolution, &kernel, error)
-        && add_spectrum(&convolution, "kernel_spectrum", padded, &spectrum, error)
-        && add_spectrum(&convolution, "rows_spectrum", lines, &rows, error)
-        && add_spectrum(&convolution, "spectrum", padded, &columns, error)
-        && vkb_add_target(graph, result->name, result->format, size, result->framebuffer, target,
-                          error)
-        && add_placing(&convolution, kernel, spectrum, error)
-        && add_kernel_spectrum(&convolution, spectrum, error) && add_rows(&convolution, rows, error)
-        && add_columns(&convolution, rows, spectrum, columns, error)
-        && add_rows_back(&convolution, columns, *target, error);
+    const uint32_t kernel = add_kernel(&convolution);
+    const uint32_t spectrum = add_spectrum(&convolution, "kernel_spectrum", padded);
+    const uint32_t rows = add_spectrum(&convolution, "rows_spectrum", lines);
+    const uint32_t columns = add_spectrum(&convolution, "spectrum", padded);
+    const uint32_t target =
+        vkb_levels_target(levels, result->name, result->format, size, result->framebuffer);
+    add_placing(&convolution, kernel, spectrum);
+    add_kernel_spectrum(&convolution, spectrum);
+    add_rows(&convolution, rows);
+    add_columns(&convolution, rows, spectrum, columns);
+    add_rows_back(&convolution, columns, target);
+    return target;
 }
 
-bool vkb_add_convolution(const struct vkb_settings *settings, const struct vkb_bloom_source *source,
-                         struct vkb_graph *graph, uint32_t *bloom, struct vkb_error *error)
+uint32_t vkb_add_convolution(struct vkb_levels *levels)
 {
+    const struct vkb_bloom_source *source = levels->source;
     const struct vkb_size size = source->buffers;
     const bool same = size.width == source->final.width && size.height == source->final.height;
-    const struct vkb_levels levels = {.settings = settings, .source = source, .graph = graph};
     const struct vkb_image_row whole = {
         .name = "bloom", .format = source->format, .framebuffer = true};
     const struct vkb_image_row part = {.name = "convolved", .format = VKB_FORMAT_RGBA32_FLOAT};
+    const uint32_t convolved = vkb_convolve(levels, same ? &whole : &part, "");
 
-    return vkb_convolve(settings, source, same ? &whole : &part, "", graph, bloom, error)
-        && (same || vkb_levels_enlarge(&levels, UPSAMPLE_LINEAR, *bloom, 1.0, bloom, error));
+    return same ? convolved : vkb_levels_enlarge(levels, UPSAMPLE_LINEAR, convolved, 1.0);
 }
 
 // Film's halation: the kernel is a sum of Gaussians, too.
-bool vkb_add_halation(const struct vkb_settings *settings, const struct vkb_bloom_source *source,
-                      struct vkb_graph *graph, uint32_t *bloom, struct vkb_error *error)
+uint32_t vkb_add_halation(struct vkb_levels *levels)
 {
-    return vkb_add_unreal(settings, source, graph, bloom, error);
+    return vkb_add_unreal(levels);
 }
 
 // Unreal Engine's standard bloom, by its documentation: the kernel is a sum of Gaussians.
-bool vkb_add_unreal(const struct vkb_settings *settings, const struct vkb_bloom_source *source,
-                    struct vkb_graph *graph, uint32_t *bloom, struct vkb_error *error)
+uint32_t vkb_add_unreal(struct vkb_levels *levels)
 {
-    const struct vkb_levels levels = {.settings = settings, .source = source, .graph = graph};
+    const struct vkb_bloom_source *source = levels->source;
     struct vkb_bloom_source masked = *source;
 
-    if (source->mask == VKB_NO_IMAGE && !settings->thresholded)
-        return vkb_add_convolution(settings, source, graph, bloom, error);
-    if (!vkb_levels_step(&levels, "highlights", 0, source->buffers, &masked.glow, error))
-        return false;
-    struct vkb_pass_row row = vkb_groups_row(&levels, GROUPS_UNREAL, source->glow, masked.glow);
-    vkb_mask_prefilter(&levels, &row);
-    return vkb_graph_add_pass(graph, &row, error)
-        && vkb_add_convolution(settings, &masked, graph, bloom, error);
+    if (source->mask != VKB_NO_IMAGE || levels->settings->thresholded) {
+        masked.glow = vkb_levels_step(levels, "highlights", 0, source->buffers);
+        struct vkb_pass_row row = vkb_groups_row(levels, GROUPS_UNREAL, source->glow, masked.glow);
+        vkb_levels_masked(levels, &row);
+    }
+    levels->source = &masked;
+    const uint32_t bloom = vkb_add_convolution(levels);
+    levels->source = source;
+    return bloom;
 }

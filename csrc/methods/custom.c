@@ -8,6 +8,11 @@
 
 static const char BLOOM[] = "bloom";
 
+// Keeps the first failure.
+#define FAIL(levels, ...) \
+    ((levels)->failed = \
+         (levels)->failed || !vkb_fail((levels)->error, VKB_ERROR_VALUE, __VA_ARGS__))
+
 static uint32_t find_read(const struct vkb_bloom_source *source, const struct vkb_graph *graph,
                           const char *name)
 {
@@ -16,25 +21,22 @@ static uint32_t find_read(const struct vkb_bloom_source *source, const struct vk
                                      : vkb_graph_find(graph, name);
 }
 
-static bool add_pass(const struct vkb_custom_pass *pass, const char *name,
-                     const struct vkb_bloom_source *source, struct vkb_graph *graph,
-                     uint32_t *image, struct vkb_error *error)
+static uint32_t add_pass(struct vkb_levels *levels, const struct vkb_custom_pass *pass,
+                         const char *name)
 {
     const struct vkb_size size = {pass->width, pass->height};
+    struct vkb_graph *graph = levels->graph;
 
     if (vkb_graph_find(graph, name) != VKB_NO_IMAGE)
-        return vkb_fail(error, VKB_ERROR_VALUE, "passes: there are two images named %s", name);
-    if (!vkb_add_target(graph, name, source->format, size, pass->framebuffer && name == pass->name,
-                        image, error))
-        return false;
-    struct vkb_pass_row row = vkb_fullscreen_row(pass->name, pass->shader, *image);
+        FAIL(levels, "passes: there are two images named %s", name);
+    const uint32_t image = vkb_levels_target(levels, name, levels->source->format, size,
+                                             pass->framebuffer && name == pass->name);
+    struct vkb_pass_row row = vkb_fullscreen_row(pass->name, pass->shader, image);
     for (; row.read_count < pass->read_count; ++row.read_count) {
         const char *read = pass->reads[row.read_count];
-        const uint32_t found = find_read(source, graph, read);
-        if (found == VKB_NO_IMAGE || found == *image)
-            return vkb_fail(error, VKB_ERROR_VALUE,
-                            "passes: %s reads %s, which no pass before it writes", pass->name,
-                            read);
+        const uint32_t found = find_read(levels->source, graph, read);
+        if (found == VKB_NO_IMAGE || found == image)
+            FAIL(levels, "passes: %s reads %s, which no pass before it writes", pass->name, read);
         row.reads[row.read_count] = found;
     }
     if (pass->block_width) {
@@ -48,7 +50,8 @@ static bool add_pass(const struct vkb_custom_pass *pass, const char *name,
     row.resources = pass->resources;
     row.resource_count = pass->resource_count;
     row.turn = pass->turn;
-    return vkb_graph_add_pass(graph, &row, error);
+    vkb_levels_pass(levels, &row);
+    return image;
 }
 
 static bool has_size(const struct vkb_custom_pass *pass, struct vkb_size size)
@@ -56,30 +59,23 @@ static bool has_size(const struct vkb_custom_pass *pass, struct vkb_size size)
     return pass->width == size.width && pass->height == size.height;
 }
 
-bool vkb_add_custom(const struct vkb_settings *settings, const struct vkb_bloom_source *source,
-                    struct vkb_graph *graph, uint32_t *bloom, struct vkb_error *error)
+uint32_t vkb_add_custom(struct vkb_levels *levels)
 {
-    const struct vkb_levels levels = {.settings = settings, .source = source, .graph = graph};
+    const struct vkb_settings *settings = levels->settings;
+    const struct vkb_size final = levels->source->final;
+    uint32_t bloom = VKB_NO_IMAGE;
 
-    *bloom = VKB_NO_IMAGE;
     for (uint32_t i = 0; i < settings->pass_count; ++i) {
         const struct vkb_custom_pass *pass = &settings->passes[i];
-        const bool enlarged = strcmp(pass->name, BLOOM) == 0 && !has_size(pass, source->final);
-        uint32_t image;
-        if (!add_pass(pass, enlarged ? "bloom_own" : pass->name, source, graph, &image, error)
-            || (enlarged
-                && !vkb_levels_enlarge(&levels, UPSAMPLE_LINEAR, image, 1.0, &image, error)))
-            return false;
-        if (strcmp(pass->name, BLOOM) == 0)
-            *bloom = image;
-        else if (strcmp(pass->name, VKB_CUSTOM_PICTURE) == 0 && !has_size(pass, source->final))
-            return vkb_fail(error, VKB_ERROR_VALUE,
-                            "passes: %s is %u x %u, which is not the frame's size, %u x %u",
-                            VKB_CUSTOM_PICTURE, pass->width, pass->height, source->final.width,
-                            source->final.height);
+        const bool is_bloom = strcmp(pass->name, BLOOM) == 0, fits = has_size(pass, final);
+        const uint32_t image = add_pass(levels, pass, is_bloom && !fits ? "bloom_own" : pass->name);
+        if (is_bloom)
+            bloom = fits ? image : vkb_levels_enlarge(levels, UPSAMPLE_LINEAR, image, 1.0);
+        else if (strcmp(pass->name, VKB_CUSTOM_PICTURE) == 0 && !fits)
+            FAIL(levels, "passes: %s is %u x %u, which is not the frame's size, %u x %u",
+                 VKB_CUSTOM_PICTURE, pass->width, pass->height, final.width, final.height);
     }
-    if (*bloom == VKB_NO_IMAGE && vkb_graph_find(graph, VKB_CUSTOM_PICTURE) == VKB_NO_IMAGE)
-        return vkb_fail(error, VKB_ERROR_VALUE, "passes: none writes %s or %s", BLOOM,
-                        VKB_CUSTOM_PICTURE);
-    return true;
+    if (bloom == VKB_NO_IMAGE && vkb_graph_find(levels->graph, VKB_CUSTOM_PICTURE) == VKB_NO_IMAGE)
+        FAIL(levels, "passes: none writes %s or %s", BLOOM, VKB_CUSTOM_PICTURE);
+    return bloom;
 }

@@ -7,46 +7,38 @@
 
 enum { BOXES = 8, MAX_RADIUS = 256 };
 
-static bool add_box(const struct vkb_levels *levels, uint32_t number, uint32_t *image,
-                    struct vkb_error *error)
+static uint32_t add_box(struct vkb_levels *levels, uint32_t number, uint32_t from)
 {
     const struct vkb_size size = levels->sizes[0];
     const bool across = number % 2 == 0;
-    const uint32_t from = *image, lines = across ? size.height : size.width;
+    const uint32_t lines = across ? size.height : size.width;
+    const uint32_t to = vkb_levels_step(levels, "box_%u", number, size);
+    struct vkb_pass_row row = vkb_row_of_lines(levels, &vkb_shader_box_mean_comp, lines, from, to);
 
-    if (!vkb_levels_step(levels, "box_%u", number, size, image, error))
-        return false;
-    struct vkb_pass_row row =
-        vkb_row_of_lines(levels, &vkb_shader_box_mean_comp, lines, from, *image);
     row.block = VKB_BLOCK_box;
     row.params.box = (struct vkb_box_params){
         .across = across,
         .radius = (int)floor(MAX_RADIUS * levels->settings->values.size + 0.5),
         .limit = vkb_formats[levels->source->format].limit,
     };
-    return vkb_graph_add_pass(levels->graph, &row, error);
+    vkb_levels_pass(levels, &row);
+    return to;
 }
 
-bool vkb_add_darktable(const struct vkb_settings *settings, const struct vkb_bloom_source *source,
-                       struct vkb_graph *graph, uint32_t *bloom, struct vkb_error *error)
+uint32_t vkb_add_darktable(struct vkb_levels *levels)
 {
+    const struct vkb_bloom_source *source = levels->source;
     struct vkb_bloom_source floats = *source;
-    struct vkb_levels levels = {.settings = settings, .source = source, .graph = graph, .count = 1};
-    uint32_t image;
+    uint32_t image = vkb_levels_image(levels, "bright", 0, source->buffers);
+    struct vkb_pass_row row = vkb_groups_row(levels, GROUPS_DARKTABLE, source->glow, image);
 
-    levels.sizes[0] = source->buffers;
-    if (!vkb_levels_image(&levels, "bright", 0, source->buffers, &image, error))
-        return false;
-    struct vkb_pass_row row = vkb_groups_row(&levels, GROUPS_DARKTABLE, source->glow, image);
-    vkb_mask_prefilter(&levels, &row);
-    if (!vkb_graph_add_pass(graph, &row, error))
-        return false;
+    vkb_levels_masked(levels, &row);
+    levels->sizes[levels->count++] = source->buffers;
     // Sixteen roundings would be seen.
     floats.format = VKB_FORMAT_RGBA32_FLOAT;
-    levels.source = &floats;
+    levels->source = &floats;
     for (uint32_t i = 0; i < 2 * BOXES; ++i)
-        if (!add_box(&levels, i, &image, error))
-            return false;
-    levels.source = source;
-    return vkb_levels_enlarge(&levels, UPSAMPLE_LINEAR, image, 1.0, bloom, error);
+        image = add_box(levels, i, image);
+    levels->source = source;
+    return vkb_levels_enlarge(levels, UPSAMPLE_LINEAR, image, 1.0);
 }

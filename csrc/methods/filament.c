@@ -30,69 +30,60 @@ static void choose_sizes(struct vkb_levels *levels)
 
 // A 3 x 3 binomial filter of `from` at the target's pixels. The first one of a frame applies the
 // threshold and the mask.
-static bool add_reduction(const struct vkb_levels *levels, uint32_t from, uint32_t to,
-                          struct vkb_error *error)
+static void add_reduction(struct vkb_levels *levels, uint32_t from, uint32_t to)
 {
+    const bool first = from == levels->source->glow;
     struct vkb_pass_row row = vkb_groups_row(levels, GROUPS_FILAMENT, from, to);
 
-    if (from == levels->source->glow)
-        vkb_mask_prefilter(levels, &row);
-    else
-        row.constants.thresholded = 0;
-    return vkb_graph_add_pass(levels->graph, &row, error);
+    vkb_apply_mask(&row, first ? levels->source->mask : VKB_NO_IMAGE);
+    row.constants.thresholded = first && row.constants.thresholded;
+    vkb_levels_pass(levels, &row);
 }
 
-// Halves the frame until level 0 is larger than half of the result. *image is the image that level
-// 0 reads.
-static bool add_halvings(const struct vkb_levels *levels, uint32_t *image, struct vkb_error *error)
+// Halves the frame until level 0 is larger than half of the result. Returns the image that level 0
+// reads.
+static uint32_t add_halvings(struct vkb_levels *levels)
 {
     const struct vkb_size least = levels->sizes[0];
     struct vkb_size size = levels->source->buffers;
+    uint32_t from = levels->source->glow, to;
 
-    *image = levels->source->glow;
     for (uint32_t i = 0; 2 * least.width < size.width || 2 * least.height < size.height; ++i) {
-        const uint32_t from = *image;
         size = vkb_halved(size);
-        if (!vkb_levels_step(levels, "half_%u", i, size, image, error)
-            || !add_reduction(levels, from, *image, error))
-            return false;
+        to = vkb_levels_step(levels, "half_%u", i, size);
+        add_reduction(levels, from, to);
+        from = to;
     }
-    return true;
+    return from;
 }
 
 // A level with even sides: 3 x 3 bilinear taps that approximate a Gaussian (bloomDownsample9.mat
 // @ 523a261b1052).
-static bool add_down(const struct vkb_levels *levels, uint32_t level, struct vkb_error *error)
+static void add_down(struct vkb_levels *levels, uint32_t level)
 {
-    const uint32_t from = levels->downs[level - 1];
+    const uint32_t from = levels->downs[level - 1], to = vkb_levels_down(levels, level);
     const struct vkb_size above = levels->sizes[level - 1];
-    const bool even = above.width % 2 == 0 && above.height % 2 == 0;
-    const uint32_t to = levels->downs[level];
     const struct vkb_side_taps taps = {FILAMENT_OFFSET, FILAMENT_OUTER, 1.0 - 2.0 * FILAMENT_OUTER};
     struct vkb_pass_row row = vkb_filter_row(levels, from, to, 1.0);
 
     vkb_filter_add(&row, 0, taps, taps);
-    return even ? vkb_filter_end(levels, &row, error)
-                : vkb_levels_reduce(levels, 1.0, 1.0, from, to, error);
+    if (above.width % 2 == 0 && above.height % 2 == 0)
+        vkb_filter_end(levels, &row);
+    else
+        vkb_levels_reduce(levels, 1.0, 1.0, from, to);
 }
 
-bool vkb_add_filament(const struct vkb_settings *settings, const struct vkb_bloom_source *source,
-                      struct vkb_graph *graph, uint32_t *bloom, struct vkb_error *error)
+uint32_t vkb_add_filament(struct vkb_levels *levels)
 {
-    struct vkb_levels levels = {.settings = settings, .source = source, .graph = graph};
     struct vkb_combination combination = vkb_combine(UPSAMPLE_TENT, 1.0, 1.0);
-    uint32_t reduced;
 
-    choose_sizes(&levels);
-    if (!add_halvings(&levels, &reduced, error))
-        return false;
-    for (uint32_t level = 0; level < levels.count; ++level)
-        if (!vkb_levels_down(&levels, level, error)
-            || !(level ? add_down(&levels, level, error)
-                       : add_reduction(&levels, reduced, levels.downs[0], error)))
-            return false;
+    choose_sizes(levels);
+    const uint32_t reduced = add_halvings(levels);
+    add_reduction(levels, reduced, vkb_levels_down(levels, 0));
+    for (uint32_t level = 1; level < levels->count; ++level)
+        add_down(levels, level);
     combination.last_kernel = UPSAMPLE_LINEAR;
     combination.target_step = true;
-    combination.gain = 1.0 / levels.count;
-    return vkb_levels_combine(&levels, &combination, bloom, error);
+    combination.gain = 1.0 / levels->count;
+    return vkb_levels_combine(levels, &combination);
 }

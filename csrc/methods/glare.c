@@ -19,7 +19,7 @@ struct stage {
     uint32_t from;
 };
 
-typedef bool add_stage(const struct stage *stage, uint32_t *image, struct vkb_error *error);
+typedef uint32_t add_stage(struct stage *stage);
 static add_stage add_streaks, add_flare, add_dirt;
 #define add_ghosts add_flare
 #define add_halo   add_flare
@@ -75,8 +75,7 @@ static void add_before(struct vkb_pass_row *row, uint32_t before)
     row->constants.add_own = before != VKB_NO_IMAGE;
 }
 
-bool vkb_add_ray(const struct vkb_levels *levels, const struct vkb_ray *ray,
-                 struct vkb_error *error)
+void vkb_add_ray(struct vkb_levels *levels, const struct vkb_ray *ray)
 {
     const struct vkb_glare_values *values = ray->values;
     const double step = values->length * pow(values->base, ray->iteration);
@@ -97,36 +96,32 @@ bool vkb_add_ray(const struct vkb_levels *levels, const struct vkb_ray *ray,
     params->reads_next = row.no_transpose;
     if (ray->next)
         memcpy(params->next, ray->next, sizeof params->next);
-    return vkb_graph_add_pass(levels->graph, &row, error);
+    vkb_levels_pass(levels, &row);
 }
 
-// Adds the image that a pass of ray `ray` writes; the last one is the stage's framebuffer.
-static bool add_ray_image(const struct stage *stage, int ray, int iteration, bool last,
-                          uint32_t *image, struct vkb_error *error)
+// The framebuffer of a stage.
+static uint32_t add_end(struct stage *stage)
 {
-    char name[2 * VKB_NAME_SIZE];
-
-    if (last)
-        return vkb_levels_image(&stage->levels, stage->name, 0, size_of(stage, stage->from), image,
-                                error);
-    snprintf(name, sizeof name, "%s_%d_%d", stage->name, ray, iteration);
-    return vkb_levels_step(&stage->levels, name, 0, size_of(stage, stage->from), image, error);
+    return vkb_levels_image(&stage->levels, stage->name, 0, size_of(stage, stage->from));
 }
 
 // Each ray is iterated by itself; its last iteration adds the rays before.
-static bool add_streaks(const struct stage *stage, uint32_t *image, struct vkb_error *error)
+static uint32_t add_streaks(struct stage *stage)
 {
     const struct vkb_glare_values *values = &stage->settings->values;
     // One direction is a line to both sides.
     const int rays = values->directions == 1 ? 2 : values->directions;
-    uint32_t before = VKB_NO_IMAGE;
+    uint32_t image = VKB_NO_IMAGE, before = VKB_NO_IMAGE;
 
-    for (int ray = 0; ray < rays; ++ray, before = *image) {
+    for (int ray = 0; ray < rays; ++ray, before = image) {
         uint32_t from = stage->from;
-        for (int iteration = 0; iteration < values->iterations; ++iteration, from = *image) {
+        for (int iteration = 0; iteration < values->iterations; ++iteration, from = image) {
             const bool last = iteration == values->iterations - 1;
-            if (!add_ray_image(stage, ray, iteration, last && ray == rays - 1, image, error))
-                return false;
+            char name[2 * VKB_NAME_SIZE];
+            snprintf(name, sizeof name, "%s_%d_%d", stage->name, ray, iteration);
+            image = last && ray == rays - 1
+                      ? add_end(stage)
+                      : vkb_levels_step(&stage->levels, name, 0, size_of(stage, stage->from));
             const struct vkb_ray row = {
                 .values = values,
                 .angle = acos(-1.0) * (values->angle / 180.0 + 2.0 * ray / rays),
@@ -134,17 +129,16 @@ static bool add_streaks(const struct stage *stage, uint32_t *image, struct vkb_e
                 .iteration = iteration,
                 .from = from,
                 .before = last ? before : VKB_NO_IMAGE,
-                .to = *image,
+                .to = image,
             };
-            if (!vkb_add_ray(&stage->levels, &row, error))
-                return false;
+            vkb_add_ray(&stage->levels, &row);
         }
     }
-    return true;
+    return image;
 }
 
-bool vkb_add_flare(const struct vkb_levels *levels, const struct vkb_stage *stage, uint32_t from,
-                   uint32_t before, uint32_t to, struct vkb_error *error)
+void vkb_add_flare(struct vkb_levels *levels, const struct vkb_stage *stage, uint32_t from,
+                   uint32_t before, uint32_t to)
 {
     const struct vkb_glare_values *values = &stage->values;
     const bool ghosts = stage->kind == VKB_STAGE_GHOSTS;
@@ -154,7 +148,6 @@ bool vkb_add_flare(const struct vkb_levels *levels, const struct vkb_stage *stag
     if (ghosts)
         add_before(&row, before);
     row.block = VKB_BLOCK_flare;
-    row.no_transpose = !ghosts || values->aberration > 0.0f;
     row.params.flare = (struct vkb_flare_params){
         .threshold = values->threshold,
         .limit = vkb_formats[levels->source->format].limit,
@@ -167,24 +160,23 @@ bool vkb_add_flare(const struct vkb_levels *levels, const struct vkb_stage *stag
         .count = (int)stage->ghost_count,
     };
     memcpy(row.params.flare.ghosts, stage->ghosts, sizeof row.params.flare.ghosts);
-    return vkb_graph_add_pass(levels->graph, &row, error);
+    vkb_levels_pass(levels, &row);
 }
 
 // A stage of one pass with the block of ghosts and halo.
-static bool add_flare(const struct stage *stage, uint32_t *image, struct vkb_error *error)
+static uint32_t add_flare(struct stage *stage)
 {
-    return vkb_levels_image(&stage->levels, stage->name, 0, size_of(stage, stage->from), image,
-                            error)
-        && vkb_add_flare(&stage->levels, stage->settings, stage->from, VKB_NO_IMAGE, *image, error);
+    const uint32_t image = add_end(stage);
+
+    vkb_add_flare(&stage->levels, stage->settings, stage->from, VKB_NO_IMAGE, image);
+    return image;
 }
 
 // Dirt has no image of its own.
-static bool add_dirt(const struct stage *stage, uint32_t *image, struct vkb_error *error)
+static uint32_t add_dirt(struct stage *stage)
 {
     (void)stage;
-    (void)error;
-    *image = VKB_NO_IMAGE;
-    return true;
+    return VKB_NO_IMAGE;
 }
 
 bool vkb_has_glare(const struct vkb_settings *settings)
@@ -194,34 +186,31 @@ bool vkb_has_glare(const struct vkb_settings *settings)
 
 // What the stages read: the glow, or in published methods what the threshold and the mask leave of
 // it.
-static bool add_source(const struct vkb_settings *settings, const struct vkb_bloom_source *source,
-                       const struct vkb_levels *levels, uint32_t *image, struct vkb_error *error)
+static uint32_t add_source(struct vkb_levels *levels)
 {
+    const struct vkb_settings *settings = levels->settings;
+    const struct vkb_bloom_source *source = levels->source;
     const enum vkb_mode mode = vkb_own_threshold_mode(settings);
 
-    *image = source->glow;
     if (!vkb_is_published(settings) || (mode == THRESHOLD_NONE && source->mask == VKB_NO_IMAGE))
-        return true;
-    return vkb_levels_step(levels, "glare_source", 0, source->buffers, image, error)
-        && vkb_add_threshold_in(mode, settings, source->glow, source->mask, *image, levels->graph,
-                                error);
+        return source->glow;
+    const uint32_t image = vkb_levels_step(levels, "glare_source", 0, source->buffers);
+    levels->failed = levels->failed
+                  || !vkb_add_threshold_in(mode, settings, source->glow, source->mask, image,
+                                           levels->graph, levels->error);
+    return image;
 }
 
 // Adds images of half the size, until there are as many as the stage wants.
-static bool add_halvings(const struct vkb_levels *levels, int halvings, uint32_t *images,
-                         int *count, struct vkb_error *error)
+static void add_halvings(struct vkb_levels *levels, int halvings, uint32_t *images, int *count)
 {
     for (; *count <= halvings; ++*count) {
         const uint32_t from = images[*count - 1];
         const struct vkb_image_row *above = &levels->graph->images[from];
         const struct vkb_size size = vkb_halved((struct vkb_size){above->width, above->height});
-        if (!vkb_levels_step(levels, "glare_down_%u", (uint32_t)*count - 1, size, &images[*count],
-                             error))
-            return false;
-        if (!vkb_levels_reduce(levels, 1.0, 1.0, from, images[*count], error))
-            return false;
+        images[*count] = vkb_levels_step(levels, "glare_down_%u", (uint32_t)*count - 1, size);
+        vkb_levels_reduce(levels, 1.0, 1.0, from, images[*count]);
     }
-    return true;
 }
 
 // The framebuffer of stage `index`: its kind, with a number where there are several of it.
@@ -240,38 +229,34 @@ static void name_stage(const struct vkb_settings *settings, uint32_t index, char
         snprintf(name, VKB_NAME_SIZE, "%s_%u", kinds[kind].name, number);
 }
 
-bool vkb_add_stages(const struct vkb_settings *settings, const struct vkb_bloom_source *source,
-                    struct vkb_graph *graph, uint32_t *stages, struct vkb_error *error)
+void vkb_add_stages(struct vkb_levels *levels, uint32_t *stages)
 {
-    struct vkb_bloom_source floats = *source;
-    struct stage stage = {.levels = {.settings = settings, .source = &floats, .graph = graph}};
+    const struct vkb_settings *settings = levels->settings;
+    struct vkb_bloom_source floats = *levels->source;
+    struct stage stage = {.levels = *levels};
     uint32_t images[MAX_HALVINGS + 1];
     int count = 1;
 
-    if (!vkb_has_glare(settings))
-        return true;
     // A streak spreads a pixel over hundreds: 8 bits and 6 bits of mantissa hold too little.
-    if (source->format != VKB_FORMAT_RGBA32_FLOAT)
+    if (floats.format != VKB_FORMAT_RGBA32_FLOAT)
         floats.format = VKB_FORMAT_RGBA16_FLOAT;
-    if (!add_source(settings, source, &stage.levels, &images[0], error))
-        return false;
+    stage.levels.source = &floats;
+    images[0] = add_source(&stage.levels);
     for (uint32_t i = 0; i < settings->stage_count; ++i) {
         stage.settings = &settings->stages[i];
         name_stage(settings, i, stage.name);
         const bool is_dirt = stage.settings->kind == VKB_STAGE_DIRT;
         const int halvings = is_dirt ? 0 : stage.settings->values.halvings;
-        if (!add_halvings(&stage.levels, halvings, images, &count, error))
-            return false;
+        add_halvings(&stage.levels, halvings, images, &count);
         stage.from = images[halvings];
-        if (!kinds[stage.settings->kind].add(&stage, &stages[i], error))
-            return false;
+        stages[i] = kinds[stage.settings->kind].add(&stage);
     }
-    return true;
+    levels->failed = stage.levels.failed;
 }
 
-// Adds the picture of dirt and the pass that multiplies the light by it; *light becomes its image.
-static bool add_dirty_light(const struct vkb_levels *levels, const struct vkb_glare_values *values,
-                            uint32_t *light, struct vkb_error *error)
+// Adds the picture of dirt and the pass that multiplies the light by it. Returns its image.
+static uint32_t add_dirty_light(struct vkb_levels *levels, const struct vkb_glare_values *values,
+                                uint32_t light)
 {
     const struct vkb_kernel_data *data = &levels->settings->dirt;
     const struct vkb_image_row picture = {
@@ -282,12 +267,10 @@ static bool add_dirty_light(const struct vkb_levels *levels, const struct vkb_gl
         .pixels = data->pixels,
         .serial = data->serial,
     };
-    uint32_t dirt, dirty;
+    const uint32_t dirt = vkb_levels_add(levels, &picture);
+    const uint32_t dirty = vkb_levels_step(levels, "dirty_light", 0, levels->source->final);
+    struct vkb_pass_row row = vkb_fetching_row(levels, &vkb_shader_dirt_frag, light, dirty);
 
-    if (!vkb_graph_add_image(levels->graph, &picture, &dirt, error)
-        || !vkb_levels_step(levels, "dirty_light", 0, levels->source->final, &dirty, error))
-        return false;
-    struct vkb_pass_row row = vkb_fetching_row(levels, &vkb_shader_dirt_frag, *light, dirty);
     row.reads[1] = dirt;
     row.read_count = 2;
     row.block = VKB_BLOCK_dirt;
@@ -296,24 +279,24 @@ static bool add_dirty_light(const struct vkb_levels *levels, const struct vkb_gl
         .share = values->strength,
     };
     VKB_SET_TARGET(&row, dirt, &levels->graph->images[dirty]);
-    *light = dirty;
-    return vkb_graph_add_pass(levels->graph, &row, error);
+    vkb_levels_pass(levels, &row);
+    return dirty;
 }
 
-bool vkb_add_light(const struct vkb_settings *settings, const struct vkb_bloom_source *source,
-                   const uint32_t *stages, struct vkb_graph *graph, uint32_t *bloom,
-                   struct vkb_error *error)
+uint32_t vkb_add_light(struct vkb_levels *method, const uint32_t *stages, uint32_t bloom)
 {
-    struct vkb_bloom_source floats = *source;
-    struct vkb_levels levels = {.settings = settings, .source = &floats, .graph = graph};
+    const struct vkb_settings *settings = method->settings;
+    struct vkb_bloom_source floats = *method->source;
+    struct vkb_levels levels = *method;
     double shares[MAX_STAGES + 1] = {settings->values.intensity};
     const struct vkb_glare_values *dirt = NULL;
-    uint32_t light;
 
     // Not rounded where the bloom's buffers are coarse: the composite rounds.
-    if (vkb_end_format(settings, source->format) != VKB_FORMAT_RGBA16_FLOAT)
+    if (vkb_end_format(settings, floats.format) != VKB_FORMAT_RGBA16_FLOAT)
         floats.format = VKB_FORMAT_RGBA32_FLOAT;
-    levels.downs[levels.count++] = *bloom;
+    levels.source = &floats;
+    levels.downs[0] = bloom;
+    levels.count = 1;
     for (uint32_t i = 0; i < settings->stage_count; ++i) {
         if (settings->stages[i].kind == VKB_STAGE_DIRT) {
             dirt = &settings->stages[i].values;
@@ -322,9 +305,10 @@ bool vkb_add_light(const struct vkb_settings *settings, const struct vkb_bloom_s
         shares[levels.count] = settings->stages[i].values.intensity;
         levels.downs[levels.count++] = stages[i];
     }
-    if (!vkb_levels_step(&levels, "light", 0, source->final, &light, error))
-        return false;
-    *bloom = light;
-    return vkb_levels_gather(&levels, shares, UPSAMPLE_LINEAR, light, error)
-        && (!dirt || add_dirty_light(&levels, dirt, bloom, error));
+    uint32_t light = vkb_levels_step(&levels, "light", 0, floats.final);
+    vkb_levels_gather(&levels, shares, UPSAMPLE_LINEAR, light);
+    if (dirt)
+        light = add_dirty_light(&levels, dirt, light);
+    method->failed = levels.failed;
+    return light;
 }

@@ -8,8 +8,8 @@
 // Levels with a weight up to this one are left out.
 static const float MIN_WEIGHT = 1e-4f;
 
-static bool add_blur(const struct vkb_levels *levels, enum vkb_mode direction, bool first,
-                     uint32_t from, uint32_t to, struct vkb_error *error)
+static void add_blur(struct vkb_levels *levels, enum vkb_mode direction, bool first, uint32_t from,
+                     uint32_t to)
 {
     struct vkb_pass_row row = vkb_prefilter_row(levels, &vkb_shader_nine_frag, from, to);
 
@@ -17,47 +17,37 @@ static bool add_blur(const struct vkb_levels *levels, enum vkb_mode direction, b
     row.constants.direction = direction;
     row.constants.first = first;
     if (first && direction == DIRECTION_VERTICAL)
-        vkb_mask_prefilter(levels, &row);
+        vkb_apply_mask(&row, levels->source->mask);
     row.params.prefilter.exposure = first ? levels->settings->values.exposure : 0.0f;
-    return vkb_graph_add_pass(levels->graph, &row, error);
+    vkb_levels_pass(levels, &row);
 }
 
-// Always single floats: the engine stores nothing between the blurs, and the threshold would
-// magnify a rounding error.
-static bool add_step(const struct vkb_levels *levels, uint32_t level, uint32_t *image,
-                     struct vkb_error *error)
+uint32_t vkb_add_godot(struct vkb_levels *levels)
 {
-    char name[VKB_NAME_SIZE];
-
-    snprintf(name, sizeof name, "down_%u_across", level);
-    return vkb_add_target(levels->graph, name, VKB_FORMAT_RGBA32_FLOAT, levels->sizes[level], false,
-                          image, error);
-}
-
-bool vkb_add_godot(const struct vkb_settings *settings, const struct vkb_bloom_source *source,
-                   struct vkb_graph *graph, uint32_t *bloom, struct vkb_error *error)
-{
-    struct vkb_levels levels = {.settings = settings, .source = source, .graph = graph};
+    const struct vkb_settings *settings = levels->settings;
     const enum vkb_mode kernel = settings->values.bicubic ? UPSAMPLE_CUBIC : UPSAMPLE_LINEAR;
-    struct vkb_size size = vkb_halved(source->buffers);
+    struct vkb_size size = vkb_halved(levels->source->buffers);
     double shares[GATHERED_LEVELS] = {0};
-    uint32_t from = source->glow, step;
+    uint32_t from = levels->source->glow;
 
-    levels.count = 1;
+    levels->count = 1;
     for (uint32_t level = 0; level < settings->level_weight_count; ++level)
         if (settings->level_weights[level] > MIN_WEIGHT) {
             shares[level] = settings->level_weights[level];
-            levels.count = level + 1;
+            levels->count = level + 1;
         }
-    for (uint32_t level = 0; level < levels.count; from = levels.downs[level++]) {
-        levels.sizes[level] = size;
+    for (uint32_t level = 0; level < levels->count; from = levels->downs[level++]) {
+        char name[VKB_NAME_SIZE];
+        snprintf(name, sizeof name, "down_%u_across", level);
+        levels->sizes[level] = size;
+        // Always single floats: the engine stores nothing between the blurs, and the threshold
+        // would magnify a rounding error.
+        const uint32_t step = vkb_levels_target(levels, name, VKB_FORMAT_RGBA32_FLOAT, size, false);
+        add_blur(levels, DIRECTION_HORIZONTAL, level == 0, from, step);
+        add_blur(levels, DIRECTION_VERTICAL, level == 0, step, vkb_levels_down(levels, level));
         size = vkb_halved(size);
-        if (!add_step(&levels, level, &step, error)
-            || !add_blur(&levels, DIRECTION_HORIZONTAL, level == 0, from, step, error)
-            || !vkb_levels_down(&levels, level, error)
-            || !add_blur(&levels, DIRECTION_VERTICAL, level == 0, step, levels.downs[level], error))
-            return false;
     }
-    return vkb_levels_bloom(&levels, bloom, error)
-        && vkb_levels_gather(&levels, shares, kernel, *bloom, error);
+    const uint32_t bloom = vkb_levels_bloom(levels);
+    vkb_levels_gather(levels, shares, kernel, bloom);
+    return bloom;
 }

@@ -19,37 +19,24 @@ static double choose_sizes(struct vkb_levels *levels)
     return 0.5 + lg - trunc(lg);
 }
 
-// The first level's box may weight its taps against fireflies.
-static bool add_box(const struct vkb_levels *levels, bool firefly_filter, uint32_t from,
-                    uint32_t to, struct vkb_error *error)
+uint32_t vkb_add_kino(struct vkb_levels *levels)
 {
-    const struct vkb_pass_row row = vkb_groups_row(levels, GROUPS_BOX, from, to);
-
-    return firefly_filter ? vkb_graph_add_pass(levels->graph, &row, error)
-                          : vkb_levels_box(levels, from, to, error);
-}
-
-bool vkb_add_kino(const struct vkb_settings *settings, const struct vkb_bloom_source *source,
-                  struct vkb_graph *graph, uint32_t *bloom, struct vkb_error *error)
-{
-    struct vkb_levels levels = {.settings = settings, .source = source, .graph = graph};
+    const bool anti_flicker = levels->settings->values.anti_flicker;
     struct vkb_combination combination = vkb_combine(UPSAMPLE_TENT, 1.0, 1.0);
-    uint32_t from;
 
-    combination.radius_x = combination.radius_y = choose_sizes(&levels);
-    if (!vkb_levels_image(&levels, "bright", 0, source->buffers, &from, error))
-        return false;
-    struct vkb_pass_row prefilter = vkb_groups_row(&levels, GROUPS_KINO, source->glow, from);
-    prefilter.constants.anti_flicker = settings->values.anti_flicker;
-    vkb_mask_prefilter(&levels, &prefilter);
-    if (!vkb_graph_add_pass(graph, &prefilter, error))
-        return false;
-    for (uint32_t level = 0; level < levels.count; from = levels.downs[level++]) {
-        if (!vkb_levels_down(&levels, level, error))
-            return false;
-        if (!add_box(&levels, settings->values.anti_flicker && level == 0, from,
-                     levels.downs[level], error))
-            return false;
+    combination.radius_x = combination.radius_y = choose_sizes(levels);
+    uint32_t from = vkb_levels_image(levels, "bright", 0, levels->source->buffers);
+    struct vkb_pass_row row = vkb_groups_row(levels, GROUPS_KINO, levels->source->glow, from);
+    row.constants.anti_flicker = anti_flicker;
+    vkb_levels_masked(levels, &row);
+    for (uint32_t level = 0; level < levels->count; from = levels->downs[level++]) {
+        const uint32_t to = vkb_levels_down(levels, level);
+        row = vkb_groups_row(levels, GROUPS_BOX, from, to);
+        // The first level's box may weight its taps against fireflies.
+        if (anti_flicker && level == 0)
+            vkb_levels_pass(levels, &row);
+        else
+            vkb_levels_box(levels, from, to);
     }
-    return vkb_levels_combine(&levels, &combination, bloom, error);
+    return vkb_levels_combine(levels, &combination);
 }

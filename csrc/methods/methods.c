@@ -3,9 +3,7 @@
 
 #include <string.h>
 
-static bool (*const methods[VKB_METHOD_COUNT])(const struct vkb_settings *,
-                                               const struct vkb_bloom_source *, struct vkb_graph *,
-                                               uint32_t *, struct vkb_error *) = {
+static uint32_t (*const methods[VKB_METHOD_COUNT])(struct vkb_levels *) = {
 #define METHOD_ROW(constant, name, published) [VKB_METHOD_##constant] = vkb_add_##name,
     VKB_METHODS(METHOD_ROW)
 #undef METHOD_ROW
@@ -14,12 +12,16 @@ static bool (*const methods[VKB_METHOD_COUNT])(const struct vkb_settings *,
 bool vkb_add_bloom(const struct vkb_settings *settings, const struct vkb_bloom_source *source,
                    struct vkb_graph *graph, uint32_t *bloom, struct vkb_error *error)
 {
+    struct vkb_levels levels = {
+        .settings = settings, .source = source, .graph = graph, .error = error};
     uint32_t stages[MAX_STAGES];
 
-    return vkb_add_stages(settings, source, graph, stages, error)
-        && methods[settings->method](settings, source, graph, bloom, error)
-        && (!vkb_has_glare(settings)
-            || vkb_add_light(settings, source, stages, graph, bloom, error));
+    if (vkb_has_glare(settings))
+        vkb_add_stages(&levels, stages);
+    *bloom = methods[settings->method](&levels);
+    if (vkb_has_glare(settings))
+        *bloom = vkb_add_light(&levels, stages, *bloom);
+    return !levels.failed;
 }
 
 bool vkb_check_sizes(const struct vkb_settings *settings, const char *name, struct vkb_size frame,

@@ -41,21 +41,17 @@ bool vkb_build_image(const struct vkb_settings *settings, const struct vkb_image
 // Whether the settings have glare that is added to the bloom.
 bool vkb_has_glare(const struct vkb_settings *settings);
 
-// Adds the rows of the stages of glare to the graph; `stages` gets the image of each.
-bool vkb_add_stages(const struct vkb_settings *settings, const struct vkb_bloom_source *source,
-                    struct vkb_graph *graph, uint32_t *stages, struct vkb_error *error);
-// Adds the sum of the bloom and the stages, each times its intensity; *bloom becomes this image.
-bool vkb_add_light(const struct vkb_settings *settings, const struct vkb_bloom_source *source,
-                   const uint32_t *stages, struct vkb_graph *graph, uint32_t *bloom,
-                   struct vkb_error *error);
-
 struct vkb_levels;
 
-// Adds the convolution of source->glow with the kernel of the settings. `result` has the name and
-// the format of the image that it writes, and whether this is a framebuffer.
-bool vkb_convolve(const struct vkb_settings *settings, const struct vkb_bloom_source *source,
-                  const struct vkb_image_row *result, const char *prefix, struct vkb_graph *graph,
-                  uint32_t *target, struct vkb_error *error);
+// Adds the rows of the stages of glare to the graph; `stages` gets the image of each.
+void vkb_add_stages(struct vkb_levels *levels, uint32_t *stages);
+// Adds the sum of the bloom and the stages, each times its intensity. Returns this image.
+uint32_t vkb_add_light(struct vkb_levels *method, const uint32_t *stages, uint32_t bloom);
+
+// Adds the convolution of the source's glow with the kernel of the settings. `result` has the name
+// and the format of the image that it writes and returns, and whether this is a framebuffer.
+uint32_t vkb_convolve(struct vkb_levels *levels, const struct vkb_image_row *result,
+                      const char *prefix);
 
 // Adds an iteration of a ray of streaks from `from`, with the numbers of a stage, into the image
 // `to`. `before`, if there is one, is added. `gain` is the sum of the taps' weights. `next`, if
@@ -67,20 +63,18 @@ struct vkb_ray {
     int iteration;
     uint32_t from, before, to;
 };
-bool vkb_add_ray(const struct vkb_levels *levels, const struct vkb_ray *ray,
-                 struct vkb_error *error);
+void vkb_add_ray(struct vkb_levels *levels, const struct vkb_ray *ray);
 
 // Adds the ghosts of a stage of `from` into the image `to`. `before`, if there is one, is added.
-bool vkb_add_flare(const struct vkb_levels *levels, const struct vkb_stage *stage, uint32_t from,
-                   uint32_t before, uint32_t to, struct vkb_error *error);
+void vkb_add_flare(struct vkb_levels *levels, const struct vkb_stage *stage, uint32_t from,
+                   uint32_t before, uint32_t to);
 
 // Adds the rows of the method that the settings name, and those of glare; *bloom is the last image.
 bool vkb_add_bloom(const struct vkb_settings *settings, const struct vkb_bloom_source *source,
                    struct vkb_graph *graph, uint32_t *bloom, struct vkb_error *error);
+// Each method adds its rows, and returns the last image.
 #define VKB_METHOD_FUNCTION(constant, name, published) \
-    bool vkb_add_##name(const struct vkb_settings *settings, \
-                        const struct vkb_bloom_source *source, struct vkb_graph *graph, \
-                        uint32_t *bloom, struct vkb_error *error);
+    uint32_t vkb_add_##name(struct vkb_levels *levels);
 VKB_METHODS(VKB_METHOD_FUNCTION)
 #undef VKB_METHOD_FUNCTION
 

@@ -3,59 +3,46 @@
 #include "methods/methods.h"
 #include "passes/filter.h"
 
-static bool add_down(struct vkb_levels *levels, uint32_t level, struct vkb_error *error)
+uint32_t vkb_add_pyramid(struct vkb_levels *levels)
 {
-    const struct vkb_values *values = &levels->settings->values;
-    const uint32_t from = level ? levels->downs[level - 1] : levels->source->glow;
-
-    if (!vkb_levels_down(levels, level, error))
-        return false;
-    if (!values->firefly_filter || level > 0)
-        return vkb_levels_reduce(levels, values->scale_x, values->scale_y, from,
-                                 levels->downs[level], error);
-    struct vkb_pass_row row = vkb_groups_row(levels, GROUPS_PYRAMID, from, levels->downs[level]);
-    vkb_set_steps(&row, values->scale_x, values->scale_y);
-    return vkb_graph_add_pass(levels->graph, &row, error);
-}
-
-bool vkb_add_pyramid(const struct vkb_settings *settings, const struct vkb_bloom_source *source,
-                     struct vkb_graph *graph, uint32_t *bloom, struct vkb_error *error)
-{
-    struct vkb_levels levels = {.settings = settings, .source = source, .graph = graph};
+    const struct vkb_settings *settings = levels->settings;
+    const double x = settings->values.scale_x, y = settings->values.scale_y;
     struct vkb_combination combination = vkb_combine(UPSAMPLE_TENT, 1.0, 1.0);
+    const uint32_t glow = levels->source->glow;
 
-    vkb_levels_halve(&levels, source->buffers, (uint32_t)settings->values.levels);
-    for (uint32_t level = 0; level < levels.count; ++level)
-        if (!add_down(&levels, level, error))
-            return false;
-    combination.radius_x = settings->values.radius * settings->values.scale_x;
-    combination.radius_y = settings->values.radius * settings->values.scale_y;
-    combination.gain = 1.0 / levels.count;
+    vkb_levels_halve(levels, levels->source->buffers, (uint32_t)settings->values.levels);
+    const uint32_t first = vkb_levels_down(levels, 0);
+    if (settings->values.firefly_filter) {
+        struct vkb_pass_row row = vkb_groups_row(levels, GROUPS_PYRAMID, glow, first);
+        vkb_set_steps(&row, x, y);
+        vkb_levels_pass(levels, &row);
+    } else {
+        vkb_levels_reduce(levels, x, y, glow, first);
+    }
+    vkb_levels_reduce_rest(levels, x, y);
+    combination.radius_x = settings->values.radius * x;
+    combination.radius_y = settings->values.radius * y;
+    combination.gain = 1.0 / levels->count;
     if (settings->level_weight_count) {
-        for (uint32_t level = 0; level < levels.count; ++level)
+        for (uint32_t level = 0; level < levels->count; ++level)
             combination.own[level] = settings->level_weights[level];
-        combination.smallest = settings->level_weights[levels.count - 1];
+        combination.smallest = settings->level_weights[levels->count - 1];
         combination.gain = 1.0;
     }
-    return vkb_levels_combine(&levels, &combination, bloom, error);
+    return vkb_levels_combine(levels, &combination);
 }
 
-bool vkb_add_dual_kawase(const struct vkb_settings *settings, const struct vkb_bloom_source *source,
-                         struct vkb_graph *graph, uint32_t *bloom, struct vkb_error *error)
+uint32_t vkb_add_dual_kawase(struct vkb_levels *levels)
 {
-    struct vkb_levels levels = {.settings = settings, .source = source, .graph = graph};
-    const double offset = settings->values.offset;
-    uint32_t from = source->glow, to;
+    const struct vkb_values *values = &levels->settings->values;
+    uint32_t from = levels->source->glow;
 
-    vkb_levels_halve(&levels, source->buffers, (uint32_t)settings->values.levels);
-    for (uint32_t level = 0; level < levels.count; ++level, from = to)
-        if (!vkb_levels_image(&levels, "down_%u", level, levels.sizes[level], &to, error)
-            || !vkb_kawase_down(&levels, offset, from, to, error))
-            return false;
-    for (uint32_t level = levels.count - 1; level-- > 0; from = to)
-        if (!vkb_levels_image(&levels, "up_%u", level, levels.sizes[level], &to, error)
-            || !vkb_kawase_up(&levels, offset, from, to, error))
-            return false;
-    return vkb_levels_image(&levels, "bloom", 0, source->final, bloom, error)
-        && vkb_kawase_up(&levels, offset, from, *bloom, error);
+    vkb_levels_halve(levels, levels->source->buffers, (uint32_t)values->levels);
+    for (uint32_t level = 0; level < levels->count; from = levels->downs[level++])
+        vkb_kawase_down(levels, values->offset, from, vkb_levels_down(levels, level));
+    from = vkb_kawase_rise(levels, values->offset);
+    const uint32_t bloom =
+        vkb_levels_target(levels, "bloom", levels->source->format, levels->source->final, true);
+    vkb_kawase_up(levels, values->offset, from, bloom);
+    return bloom;
 }

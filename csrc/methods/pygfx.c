@@ -13,35 +13,22 @@ static uint32_t most_levels(struct vkb_size first)
     return count;
 }
 
-bool vkb_add_pygfx(const struct vkb_settings *settings, const struct vkb_bloom_source *source,
-                   struct vkb_graph *graph, uint32_t *bloom, struct vkb_error *error)
+uint32_t vkb_add_pygfx(struct vkb_levels *levels)
 {
-    struct vkb_levels levels = {.settings = settings, .source = source, .graph = graph};
+    const struct vkb_values *values = &levels->settings->values;
+    const enum vkb_mode groups = values->karis_average ? GROUPS_PYGFX_KARIS : GROUPS_PYGFX;
     struct vkb_combination combination = vkb_combine(UPSAMPLE_TENT, 1.0, 1.0);
-    struct vkb_size size = vkb_halved(source->buffers);
-    const uint32_t wanted = (uint32_t)settings->values.levels, most = most_levels(size);
-    uint32_t from = source->glow;
+    struct vkb_size size = vkb_halved(levels->source->buffers);
+    const uint32_t wanted = (uint32_t)values->levels, most = most_levels(size);
 
-    levels.count = wanted < most ? wanted : most;
-    for (uint32_t level = 0; level < levels.count; from = levels.downs[level++]) {
-        levels.sizes[level] = size;
-        if (!vkb_levels_down(&levels, level, error))
-            return false;
-        size = vkb_halved(size);
-        if (level > 0) {
-            if (!vkb_levels_reduce(&levels, 1.0, 1.0, from, levels.downs[level], error))
-                return false;
-            continue;
-        }
-        struct vkb_pass_row row = vkb_groups_row(
-            &levels, settings->values.karis_average ? GROUPS_PYGFX_KARIS : GROUPS_PYGFX, from,
-            levels.downs[0]);
-        vkb_mask_prefilter(&levels, &row);
-        if (!vkb_graph_add_pass(graph, &row, error))
-            return false;
-    }
+    for (; levels->count < (wanted < most ? wanted : most); size = vkb_halved(size))
+        levels->sizes[levels->count++] = size;
+    const uint32_t first = vkb_levels_down(levels, 0);
+    struct vkb_pass_row row = vkb_groups_row(levels, groups, levels->source->glow, first);
+    vkb_levels_masked(levels, &row);
+    vkb_levels_reduce_rest(levels, 1.0, 1.0);
     combination.last_kernel = UPSAMPLE_LINEAR;
-    combination.radius_x = combination.radius_y = settings->values.filter_radius;
+    combination.radius_x = combination.radius_y = values->filter_radius;
     combination.width_step = true;
-    return vkb_levels_combine(&levels, &combination, bloom, error);
+    return vkb_levels_combine(levels, &combination);
 }

@@ -48,8 +48,7 @@ static uint32_t merge(float *weights, double *offsets, uint32_t count)
     return merged;
 }
 
-static bool add_level(struct vkb_levels *levels, uint32_t level, uint32_t from,
-                      struct vkb_error *error)
+static void add_level(struct vkb_levels *levels, uint32_t level, uint32_t from)
 {
     float weights[THREE_LONGEST + 1] = {0};
     double offsets[THREE_LONGEST + 1] = {0};
@@ -62,66 +61,55 @@ static bool add_level(struct vkb_levels *levels, uint32_t level, uint32_t from,
         kernel.count = merge(weights, offsets, kernel.count);
         kernel.offsets = offsets;
     }
-    return vkb_levels_blur(levels, level, from, &kernel, error);
+    vkb_levels_blur(levels, level, from, &kernel);
 }
 
 // Multiplies the levels by the tints, three factors for each level.
-static bool add_tints(struct vkb_levels *levels, const float *tints, struct vkb_error *error)
+static void add_tints(struct vkb_levels *levels, const float *tints)
 {
     for (uint32_t level = 0; level < levels->count; ++level, tints += 3) {
-        uint32_t tinted;
-
         if (tints[0] == 1.0f && tints[1] == 1.0f && tints[2] == 1.0f)
             continue;
-        if (!vkb_levels_step(levels, "tinted_%u", level, levels->sizes[level], &tinted, error))
-            return false;
+        const uint32_t tinted = vkb_levels_step(levels, "tinted_%u", level, levels->sizes[level]);
         struct vkb_pass_row row =
             vkb_groups_row(levels, GROUPS_POST_PROCESSING, levels->downs[level], tinted);
         row.constants.thresholded = false;
         row.params.prefilter.clamp_max = (float)SINGLE_LIMIT;
         vkb_set_tint(&row, tints);
+        vkb_levels_pass(levels, &row);
         levels->downs[level] = tinted;
-        if (!vkb_graph_add_pass(levels->graph, &row, error))
-            return false;
     }
-    return true;
 }
 
-bool vkb_add_three(const struct vkb_settings *settings, const struct vkb_bloom_source *source,
-                   struct vkb_graph *graph, uint32_t *bloom, struct vkb_error *error)
+uint32_t vkb_add_three(struct vkb_levels *levels)
 {
-    struct vkb_levels levels = {.settings = settings, .source = source, .graph = graph};
+    const struct vkb_settings *settings = levels->settings;
     double shares[THREE_LEVELS];
-    struct vkb_size size = source->buffers;
+    struct vkb_size size = levels->source->buffers;
     double total = 0.0;
-    uint32_t from, sum;
 
-    for (; levels.count < THREE_LEVELS; ++levels.count) {
-        const double factor = bloom_factors[levels.count];
-        levels.sizes[levels.count] = size =
-            levels.count ? half_of(settings, size) : first_of(settings, size);
-        shares[levels.count] = factor + (1.2 - 2.0 * factor) * settings->values.radius;
-        total += shares[levels.count];
+    for (; levels->count < THREE_LEVELS; ++levels->count) {
+        const double factor = bloom_factors[levels->count];
+        levels->sizes[levels->count] = size =
+            levels->count ? half_of(settings, size) : first_of(settings, size);
+        shares[levels->count] = factor + (1.2 - 2.0 * factor) * settings->values.radius;
+        total += shares[levels->count];
     }
     // A format whose largest value is 1 holds the mean of the levels, and the bloom is multiplied
     // by `total`.
-    if (!vkb_stores_means(source->format))
+    if (!vkb_stores_means(levels->source->format))
         total = 1.0;
     for (uint32_t level = 0; level < THREE_LEVELS; ++level)
         shares[level] /= total;
-    if (!vkb_levels_image(&levels, "bright", 0, levels.sizes[0], &from, error))
-        return false;
-    struct vkb_pass_row row = vkb_groups_row(&levels, GROUPS_THREE, source->glow, from);
+    uint32_t from = vkb_levels_image(levels, "bright", 0, levels->sizes[0]);
+    struct vkb_pass_row row = vkb_groups_row(levels, GROUPS_THREE, levels->source->glow, from);
     // The luminance has the weights of three.js' colour management.
     row.constants.node = settings->choices[VKB_CHOICE_variant] != VARIANT_R185;
-    vkb_mask_prefilter(&levels, &row);
-    if (!vkb_graph_add_pass(graph, &row, error))
-        return false;
-    for (uint32_t level = 0; level < levels.count; from = levels.downs[level++])
-        if (!add_level(&levels, level, from, error))
-            return false;
-    return add_tints(&levels, settings->level_weights, error)
-        && vkb_levels_image(&levels, "up_%u", 0, levels.sizes[0], &sum, error)
-        && vkb_levels_gather(&levels, shares, UPSAMPLE_LINEAR, sum, error)
-        && vkb_levels_enlarge(&levels, UPSAMPLE_LINEAR, sum, total, bloom, error);
+    vkb_levels_masked(levels, &row);
+    for (uint32_t level = 0; level < levels->count; from = levels->downs[level++])
+        add_level(levels, level, from);
+    add_tints(levels, settings->level_weights);
+    const uint32_t sum = vkb_levels_image(levels, "up_%u", 0, levels->sizes[0]);
+    vkb_levels_gather(levels, shares, UPSAMPLE_LINEAR, sum);
+    return vkb_levels_enlarge(levels, UPSAMPLE_LINEAR, sum, total);
 }

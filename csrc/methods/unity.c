@@ -37,9 +37,9 @@ static enum vkb_mode urp_kernel(const struct vkb_levels *levels)
 }
 
 // The levels below the first one, which is prefiltered, and the bloom from them.
-typedef bool add_urp(struct vkb_levels *levels, uint32_t *bloom, struct vkb_error *error);
+typedef uint32_t add_urp(struct vkb_levels *levels);
 
-static bool add_gaussian(struct vkb_levels *levels, uint32_t *bloom, struct vkb_error *error)
+static uint32_t add_gaussian(struct vkb_levels *levels)
 {
     const struct vkb_combination combination = scattered(levels->settings, urp_kernel(levels));
     const struct vkb_kernel kernel = {.weights = urp_weights,
@@ -48,14 +48,13 @@ static bool add_gaussian(struct vkb_levels *levels, uint32_t *bloom, struct vkb_
                                       .inset = !levels->settings->values.urp_12};
 
     for (uint32_t level = 1; level < levels->count; ++level)
-        if (!vkb_levels_blur(levels, level, levels->downs[level - 1], &kernel, error))
-            return false;
-    return vkb_levels_combine(levels, &combination, bloom, error);
+        vkb_levels_blur(levels, level, levels->downs[level - 1], &kernel);
+    return vkb_levels_combine(levels, &combination);
 }
 
 // URP 17: the first level, mixed again and again with the mean of four diagonal taps, each time
 // further away. With a scatter of nearly 1 it is the mean alone.
-static bool add_kawase(struct vkb_levels *levels, uint32_t *bloom, struct vkb_error *error)
+static uint32_t add_kawase(struct vkb_levels *levels)
 {
     const double scatter = levels->settings->values.scatter;
     const double share = scatter >= 0.999 ? 1.0 : 0.05 + 0.9 * scatter;
@@ -64,34 +63,24 @@ static bool add_kawase(struct vkb_levels *levels, uint32_t *bloom, struct vkb_er
 
     for (uint32_t i = 0; i < levels->count; ++i, from = to) {
         const double distance = 0.5 + (i > levels->count / 2 ? i - 1 : i);
-        if (!vkb_levels_image(levels, "kawase_%u", i, levels->sizes[0], &to, error))
-            return false;
+        to = vkb_levels_image(levels, "kawase_%u", i, levels->sizes[0]);
         struct vkb_pass_row row = vkb_filter_row(levels, from, to, 1.0);
         vkb_filter_add(&row, 0, own, centre);
         vkb_filter_add(&row, 1, (struct vkb_side_taps){distance, 0.5 * share, 0.0},
                        (struct vkb_side_taps){distance, 0.5, 0.0});
-        if (!vkb_filter_end(levels, &row, error))
-            return false;
+        vkb_filter_end(levels, &row);
     }
-    return vkb_levels_enlarge(levels, urp_kernel(levels), from, 1.0, bloom, error);
+    return vkb_levels_enlarge(levels, urp_kernel(levels), from, 1.0);
 }
 
 // URP 17: dual Kawase, whose way up begins with the last level and adds no other.
-static bool add_dual(struct vkb_levels *levels, uint32_t *bloom, struct vkb_error *error)
+static uint32_t add_dual(struct vkb_levels *levels)
 {
     const double offset = 0.3 + levels->settings->values.scatter;
-    uint32_t from, to;
 
     for (uint32_t level = 1; level < levels->count; ++level)
-        if (!vkb_levels_down(levels, level, error)
-            || !vkb_kawase_down(levels, 1.0, levels->downs[level - 1], levels->downs[level], error))
-            return false;
-    from = levels->downs[levels->count - 1];
-    for (uint32_t level = levels->count - 1; level-- > 0; from = to)
-        if (!vkb_levels_image(levels, "up_%u", level, levels->sizes[level], &to, error)
-            || !vkb_kawase_up(levels, offset, from, to, error))
-            return false;
-    return vkb_levels_enlarge(levels, urp_kernel(levels), from, 1.0, bloom, error);
+        vkb_kawase_down(levels, 1.0, levels->downs[level - 1], vkb_levels_down(levels, level));
+    return vkb_levels_enlarge(levels, urp_kernel(levels), vkb_kawase_rise(levels, offset), 1.0);
 }
 
 static add_urp *const urp_filters[] = {
@@ -102,7 +91,7 @@ static add_urp *const urp_filters[] = {
 
 // The first level: one sample, in high quality 13 taps half a texel apart. URP 12 takes a texel's
 // width for its height.
-static bool add_urp_first(struct vkb_levels *levels, struct vkb_error *error)
+static void add_urp_first(struct vkb_levels *levels)
 {
     const struct vkb_bloom_source *source = levels->source;
     const struct vkb_size frame = source->buffers;
@@ -110,30 +99,26 @@ static bool add_urp_first(struct vkb_levels *levels, struct vkb_error *error)
     const double step_y = levels->settings->values.urp_12 ? 0.5 * aspect : 0.5;
     uint32_t from = source->glow;
 
-    if (levels->settings->values.high_quality_filtering
-        && (!vkb_levels_step(levels, "reduced", 0, levels->sizes[0], &from, error)
-            || !vkb_levels_reduce(levels, 0.5, step_y, source->glow, from, error)))
-        return false;
-    if (!vkb_levels_down(levels, 0, error))
-        return false;
-    struct vkb_pass_row row = vkb_groups_row(levels, GROUPS_URP, from, levels->downs[0]);
+    if (levels->settings->values.high_quality_filtering) {
+        from = vkb_levels_step(levels, "reduced", 0, levels->sizes[0]);
+        vkb_levels_reduce(levels, 0.5, step_y, source->glow, from);
+    }
+    struct vkb_pass_row row = vkb_groups_row(levels, GROUPS_URP, from, vkb_levels_down(levels, 0));
     vkb_set_tint(&row, levels->settings->tint);
-    vkb_mask_prefilter(levels, &row);
-    return vkb_graph_add_pass(levels->graph, &row, error);
+    vkb_levels_masked(levels, &row);
 }
 
-bool vkb_add_urp(const struct vkb_settings *settings, const struct vkb_bloom_source *source,
-                 struct vkb_graph *graph, uint32_t *bloom, struct vkb_error *error)
+uint32_t vkb_add_urp(struct vkb_levels *levels)
 {
-    struct vkb_levels levels = {.settings = settings, .source = source, .graph = graph};
-    const struct vkb_size half = vkb_halved(source->buffers);
+    const struct vkb_settings *settings = levels->settings;
+    const struct vkb_size half = vkb_halved(levels->source->buffers);
     struct vkb_size size = settings->values.quarter ? vkb_halved(half) : half;
     const uint32_t count = level_count(size.width, size.height, 1.0, settings->values.iterations);
 
-    for (; levels.count < count; size = vkb_halved(size))
-        levels.sizes[levels.count++] = size;
-    return add_urp_first(&levels, error)
-        && urp_filters[settings->choices[VKB_CHOICE_filter]](&levels, bloom, error);
+    for (; levels->count < count; size = vkb_halved(size))
+        levels->sizes[levels->count++] = size;
+    add_urp_first(levels);
+    return urp_filters[settings->choices[VKB_CHOICE_filter]](levels);
 }
 
 // scale * W / 2^(k + 1), rounded half to even.
@@ -143,8 +128,8 @@ static uint32_t rounded(uint32_t side, double scale, uint32_t level)
     return size < 1.0 ? 1 : (uint32_t)size;
 }
 
-static bool add_hdrp_blur(const struct vkb_levels *levels, enum vkb_mode direction, bool first,
-                          uint32_t from, uint32_t to, struct vkb_error *error)
+static void add_hdrp_blur(struct vkb_levels *levels, enum vkb_mode direction, bool first,
+                          uint32_t from, uint32_t to)
 {
     struct vkb_pass_row row = vkb_prefilter_row(levels, &vkb_shader_nine_frag, from, to);
     const struct vkb_image_row *source = &levels->graph->images[from];
@@ -156,29 +141,25 @@ static bool add_hdrp_blur(const struct vkb_levels *levels, enum vkb_mode directi
     if (direction == DIRECTION_HORIZONTAL ? source->width == 2 * target->width
                                           : source->height == 2 * target->height)
         row.constants.sampling = SAMPLING_TEXEL;
-    return vkb_graph_add_pass(levels->graph, &row, error);
+    vkb_levels_pass(levels, &row);
 }
 
 // A level from the image above it: a horizontal blur at the height of that image, then a vertical
 // one.
-static bool add_hdrp_level(struct vkb_levels *levels, uint32_t level, uint32_t from,
-                           struct vkb_error *error)
+static void add_hdrp_level(struct vkb_levels *levels, uint32_t level, uint32_t from)
 {
     const struct vkb_size size = levels->sizes[level];
     const struct vkb_size middle = {size.width, levels->graph->images[from].height};
-    uint32_t step;
+    const uint32_t step = vkb_levels_step(levels, "down_%u_across", level, middle);
 
-    return vkb_levels_step(levels, "down_%u_across", level, middle, &step, error)
-        && add_hdrp_blur(levels, DIRECTION_HORIZONTAL, level == 0, from, step, error)
-        && vkb_levels_down(levels, level, error)
-        && add_hdrp_blur(levels, DIRECTION_VERTICAL, level == 0, step, levels->downs[level], error);
+    add_hdrp_blur(levels, DIRECTION_HORIZONTAL, level == 0, from, step);
+    add_hdrp_blur(levels, DIRECTION_VERTICAL, level == 0, step, vkb_levels_down(levels, level));
 }
 
-bool vkb_add_hdrp(const struct vkb_settings *settings, const struct vkb_bloom_source *source,
-                  struct vkb_graph *graph, uint32_t *bloom, struct vkb_error *error)
+uint32_t vkb_add_hdrp(struct vkb_levels *levels)
 {
-    struct vkb_levels levels = {.settings = settings, .source = source, .graph = graph};
-    const struct vkb_size frame = source->buffers;
+    const struct vkb_settings *settings = levels->settings;
+    const struct vkb_size frame = levels->source->buffers;
     // In small frames the bicubic filter is too wide for the last levels.
     const bool cubic = settings->values.high_quality_filtering && frame.width >= HDRP_MIN_WIDTH
                     && frame.height >= HDRP_MIN_HEIGHT;
@@ -188,20 +169,16 @@ bool vkb_add_hdrp(const struct vkb_settings *settings, const struct vkb_bloom_so
     // Levels of smaller width stretch the bloom along x, levels of smaller height along y.
     const double anamorphism = 0.5 * settings->values.anamorphism;
     const double across = 1.0 + fmin(anamorphism, 0.0), down = 1.0 - fmax(anamorphism, 0.0);
-    uint32_t from;
 
-    for (; levels.count < count; ++levels.count)
-        levels.sizes[levels.count] = (struct vkb_size){rounded(frame.width, across, levels.count),
-                                                       rounded(frame.height, down, levels.count)};
-    if (!vkb_levels_step(&levels, "reduced", 0, levels.sizes[0], &from, error))
-        return false;
-    struct vkb_pass_row row = vkb_groups_row(&levels, GROUPS_HDRP, source->glow, from);
-    vkb_mask_prefilter(&levels, &row);
-    if (!vkb_graph_add_pass(graph, &row, error))
-        return false;
-    for (uint32_t level = 0; level < count; from = levels.downs[level++])
-        if (!add_hdrp_level(&levels, level, from, error))
-            return false;
+    for (uint32_t level = 0; level < count; ++level)
+        levels->sizes[level] = (struct vkb_size){rounded(frame.width, across, level),
+                                                 rounded(frame.height, down, level)};
+    levels->count = count;
+    uint32_t from = vkb_levels_step(levels, "reduced", 0, levels->sizes[0]);
+    struct vkb_pass_row row = vkb_groups_row(levels, GROUPS_HDRP, levels->source->glow, from);
+    vkb_levels_masked(levels, &row);
+    for (uint32_t level = 0; level < count; from = levels->downs[level++])
+        add_hdrp_level(levels, level, from);
     combination.last_kernel = UPSAMPLE_CUBIC;
-    return vkb_levels_combine(&levels, &combination, bloom, error);
+    return vkb_levels_combine(levels, &combination);
 }

@@ -41,9 +41,8 @@ struct vkb_pass_row vkb_slope_row(const struct vkb_adjoint *adjoint,
     return row;
 }
 
-// Adds the row with a new image as its target.
-static bool add_row(struct vkb_adjoint *adjoint, struct vkb_pass_row *row, struct vkb_size size,
-                    uint32_t *image, struct vkb_error *error)
+bool vkb_add_adjoint_row(struct vkb_adjoint *adjoint, struct vkb_pass_row *row,
+                         struct vkb_size size, uint32_t *image, struct vkb_error *error)
 {
     char name[VKB_NAME_SIZE];
 
@@ -113,7 +112,7 @@ bool vkb_accumulate_cotangent(struct vkb_adjoint *adjoint, const struct vkb_pass
         forward->input == VKB_INPUT_IMAGE || forward->input == VKB_INPUT_EMISSION;
     if (row.constants.from_image)
         row.reads[row.read_count - 1] = image;
-    return add_row(adjoint, &row, size, cotangent, error);
+    return vkb_add_adjoint_row(adjoint, &row, size, cotangent, error);
 }
 
 static struct vkb_pass_row filter_row(const struct vkb_adjoint *adjoint,
@@ -167,7 +166,7 @@ static bool accumulate_twice(struct vkb_adjoint *adjoint, const struct vkb_filte
     if (!vkb_axis_transpose(rows ? x : y, false, &adjoint->table, &start, error))
         return false;
     *(rows ? &params->start_x : &params->start_y) = (int)start;
-    return add_row(adjoint, &row, size, &between, error)
+    return vkb_add_adjoint_row(adjoint, &row, size, &between, error)
         && accumulate_along(adjoint, filter, !rows, between, image, error);
 }
 
@@ -222,7 +221,7 @@ bool vkb_add_adjoint_image(struct vkb_adjoint *adjoint, const struct vkb_pass_ro
     struct vkb_pass_row row = *given;
 
     read_nothing(&row);
-    return add_row(adjoint, &row, size, image, error);
+    return vkb_add_adjoint_row(adjoint, &row, size, image, error);
 }
 
 bool vkb_filter_to_image(struct vkb_adjoint *adjoint, const struct vkb_filter *filter,
@@ -285,7 +284,7 @@ static bool add_sums(struct vkb_adjoint *adjoint, uint32_t image, struct vkb_siz
         row.constants.by = by;
         by = BY_VALUES;
         size = blocks_of(size);
-        if (!add_row(adjoint, &row, size, &image, error))
+        if (!vkb_add_adjoint_row(adjoint, &row, size, &image, error))
             return false;
     } while (size.width > 1 || size.height > 1);
     snprintf(adjoint->graph->images[image].name, VKB_NAME_SIZE, "%s", name);

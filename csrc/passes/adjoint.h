@@ -56,8 +56,12 @@ bool vkb_end_scene(struct vkb_adjoint *adjoint, struct vkb_error *error);
 bool vkb_accumulate_filter(struct vkb_adjoint *adjoint, const struct vkb_filter *filter,
                            uint32_t cotangents, uint32_t image, struct vkb_error *error);
 
-// Adds the row, whose result is a new image of `size`, to which no other cotangents are added; the
-// same of the transpose of a filter.
+// Adds the row with a new image of `size` as its target.
+bool vkb_add_adjoint_row(struct vkb_adjoint *adjoint, struct vkb_pass_row *row,
+                         struct vkb_size size, uint32_t *image, struct vkb_error *error);
+
+// The same of a row by vkb_slope_row(), to which no other cotangents are added, and of the
+// transpose of a filter.
 bool vkb_add_adjoint_image(struct vkb_adjoint *adjoint, const struct vkb_pass_row *row,
                            struct vkb_size size, uint32_t *image, struct vkb_error *error);
 bool vkb_filter_to_image(struct vkb_adjoint *adjoint, const struct vkb_filter *filter,
@@ -96,11 +100,6 @@ vkb_transpose vkb_transpose_blur, vkb_transpose_filter, vkb_transpose_gather,
     vkb_transpose_hdrp_blur, vkb_transpose_godot_blur;
 // Downsamplings that are not linear in groups of their taps.
 vkb_transpose vkb_transpose_groups;
-// Glare.
-vkb_transpose vkb_transpose_streaks, vkb_transpose_flare, vkb_transpose_dirt, vkb_transpose_star;
-
-// Accumulates the cotangents of what a convolution's prefilter of bright colours makes of the glow.
-bool vkb_transpose_bright(struct vkb_adjoint *adjoint, const float prefilter[3], uint32_t glow,
-                          uint32_t cotangents, enum vkb_mode alpha, struct vkb_error *error);
+vkb_transpose vkb_transpose_streaks;
 
 #endif

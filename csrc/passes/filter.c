@@ -135,8 +135,7 @@ static int32_t taken(float (*taps)[4], int32_t window, uint32_t source, uint32_t
     return bits;
 }
 
-bool vkb_filter_end(const struct vkb_levels *levels, struct vkb_pass_row *row,
-                    struct vkb_error *error)
+void vkb_filter_end(struct vkb_levels *levels, struct vkb_pass_row *row)
 {
     struct vkb_filter_params *params = &row->params.filter;
     const double rows = furthest(params->taps_y);
@@ -151,11 +150,10 @@ bool vkb_filter_end(const struct vkb_levels *levels, struct vkb_pass_row *row,
         row->constants.taken_x = taken(params->taps_x, window, source->width, target->width);
         row->constants.taken_y = taken(params->taps_y, window, source->height, target->height);
     }
-    return vkb_graph_add_pass(levels->graph, row, error);
+    vkb_levels_pass(levels, row);
 }
 
-bool vkb_kawase_down(const struct vkb_levels *levels, double offset, uint32_t from, uint32_t to,
-                     struct vkb_error *error)
+void vkb_kawase_down(struct vkb_levels *levels, double offset, uint32_t from, uint32_t to)
 {
     const struct vkb_side_taps centre = {0.0, 0.0, 1.0};
     const struct vkb_side_taps sides = {0.5 * offset, 0.5, 0.0};
@@ -163,11 +161,10 @@ bool vkb_kawase_down(const struct vkb_levels *levels, double offset, uint32_t fr
 
     vkb_filter_add(&row, 0, centre, centre);
     vkb_filter_add(&row, 1, sides, sides);
-    return vkb_filter_end(levels, &row, error);
+    vkb_filter_end(levels, &row);
 }
 
-bool vkb_kawase_up(const struct vkb_levels *levels, double offset, uint32_t from, uint32_t to,
-                   struct vkb_error *error)
+void vkb_kawase_up(struct vkb_levels *levels, double offset, uint32_t from, uint32_t to)
 {
     const struct vkb_side_taps centre = {0.0, 0.0, 1.0}, axial = {offset, 1.0, 0.0};
     const struct vkb_side_taps diagonal = {0.5 * offset, 1.0, 0.0};
@@ -179,5 +176,17 @@ bool vkb_kawase_up(const struct vkb_levels *levels, double offset, uint32_t from
     vkb_filter_add(&row, 2, diagonal, twice);
     // Its inverse is no float.
     row.params.filter.divisor = 12.0f;
-    return vkb_filter_end(levels, &row, error);
+    vkb_filter_end(levels, &row);
+}
+
+uint32_t vkb_kawase_rise(struct vkb_levels *levels, double offset)
+{
+    uint32_t from = levels->downs[levels->count - 1];
+
+    for (uint32_t level = levels->count - 1; level-- > 0;) {
+        const uint32_t to = vkb_levels_image(levels, "up_%u", level, levels->sizes[level]);
+        vkb_kawase_up(levels, offset, from, to);
+        from = to;
+    }
+    return from;
 }

@@ -23,17 +23,16 @@ void vkb_filter_add(struct vkb_pass_row *row, int kernel, struct vkb_side_taps x
 void vkb_filter_add_own(struct vkb_pass_row *row, uint32_t own, double share);
 
 // Adds the pass to the graph.
-bool vkb_filter_end(const struct vkb_levels *levels, struct vkb_pass_row *row,
-                    struct vkb_error *error);
+void vkb_filter_end(struct vkb_levels *levels, struct vkb_pass_row *row);
 
 // Passes of dual Kawase (Bjorge, "Bandwidth-Efficient Rendering", SIGGRAPH 2015). Down: four times
 // the centre, and four diagonal taps at a distance of half a texel times the offset. Up: four axial
 // taps at a distance of one texel of the smaller level times the offset, and four diagonal ones at
 // half that distance with twice the weight.
-bool vkb_kawase_down(const struct vkb_levels *levels, double offset, uint32_t from, uint32_t to,
-                     struct vkb_error *error);
-bool vkb_kawase_up(const struct vkb_levels *levels, double offset, uint32_t from, uint32_t to,
-                   struct vkb_error *error);
+void vkb_kawase_down(struct vkb_levels *levels, double offset, uint32_t from, uint32_t to);
+void vkb_kawase_up(struct vkb_levels *levels, double offset, uint32_t from, uint32_t to);
+// The images up_N-2 ... up_0 from the last level, and the passes up to them; the last image.
+uint32_t vkb_kawase_rise(struct vkb_levels *levels, double offset);
 
 static inline bool vkb_is_filter(const struct vkb_pass_row *pass)
 {

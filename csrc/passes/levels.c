@@ -4,7 +4,6 @@
 #include "passes/filter.h"
 
 #include <math.h>
-#include <stdio.h>
 #include <string.h>
 
 struct vkb_combination vkb_combine(enum vkb_mode kernel, double own, double coarse)
@@ -64,58 +63,23 @@ void vkb_levels_halve(struct vkb_levels *levels, struct vkb_size above, uint32_t
     }
 }
 
-static bool add_image(const struct vkb_levels *levels, enum vkb_format format, const char *name,
-                      uint32_t number, struct vkb_size size, bool framebuffer, uint32_t *image,
-                      struct vkb_error *error)
-{
-    char numbered[VKB_NAME_SIZE];
-
-    snprintf(numbered, sizeof numbered, name, number);
-    return vkb_add_target(levels->graph, numbered, format, size, framebuffer, image, error);
-}
-
-bool vkb_levels_image(const struct vkb_levels *levels, const char *name, uint32_t number,
-                      struct vkb_size size, uint32_t *image, struct vkb_error *error)
-{
-    return add_image(levels, levels->source->format, name, number, size, true, image, error);
-}
-
-bool vkb_levels_down(struct vkb_levels *levels, uint32_t level, struct vkb_error *error)
-{
-    return vkb_levels_image(levels, "down_%u", level, levels->sizes[level], &levels->downs[level],
-                            error);
-}
-
-bool vkb_levels_step(const struct vkb_levels *levels, const char *name, uint32_t number,
-                     struct vkb_size size, uint32_t *image, struct vkb_error *error)
-{
-    return add_image(levels, levels->source->format, name, number, size, false, image, error);
-}
-
-bool vkb_levels_bloom(const struct vkb_levels *levels, uint32_t *bloom, struct vkb_error *error)
-{
-    return add_image(levels, vkb_end_format(levels->settings, levels->source->format), "bloom", 0,
-                     levels->source->final, true, bloom, error);
-}
-
 void vkb_set_steps(struct vkb_pass_row *row, double step_x, double step_y)
 {
     row->params.prefilter.step_x = (float)step_x;
     row->params.prefilter.step_y = (float)step_y;
 }
 
-bool vkb_levels_box(const struct vkb_levels *levels, uint32_t from, uint32_t to,
-                    struct vkb_error *error)
+void vkb_levels_box(struct vkb_levels *levels, uint32_t from, uint32_t to)
 {
     const struct vkb_side_taps corners = {1.0, 0.5, 0.0};
     struct vkb_pass_row row = vkb_filter_row(levels, from, to, 1.0);
 
     vkb_filter_add(&row, 0, corners, corners);
-    return vkb_filter_end(levels, &row, error);
+    vkb_filter_end(levels, &row);
 }
 
-bool vkb_levels_reduce(const struct vkb_levels *levels, double step_x, double step_y, uint32_t from,
-                       uint32_t to, struct vkb_error *error)
+void vkb_levels_reduce(struct vkb_levels *levels, double step_x, double step_y, uint32_t from,
+                       uint32_t to)
 {
     struct vkb_pass_row row = vkb_filter_row(levels, from, to, 0.5);
 
@@ -123,7 +87,14 @@ bool vkb_levels_reduce(const struct vkb_levels *levels, double step_x, double st
                    (struct vkb_side_taps){2.0 * step_y, 0.25, 0.5});
     vkb_filter_add(&row, 1, (struct vkb_side_taps){step_x, 0.5, 0.0},
                    (struct vkb_side_taps){step_y, 0.5, 0.0});
-    return vkb_filter_end(levels, &row, error);
+    vkb_filter_end(levels, &row);
+}
+
+void vkb_levels_reduce_rest(struct vkb_levels *levels, double step_x, double step_y)
+{
+    for (uint32_t level = 1; level < levels->count; ++level)
+        vkb_levels_reduce(levels, step_x, step_y, levels->downs[level - 1],
+                          vkb_levels_down(levels, level));
 }
 
 struct vkb_pass_row vkb_prefilter_row(const struct vkb_levels *levels,
@@ -161,14 +132,8 @@ struct vkb_pass_row vkb_groups_row(const struct vkb_levels *levels, enum vkb_mod
     return row;
 }
 
-void vkb_mask_prefilter(const struct vkb_levels *levels, struct vkb_pass_row *row)
-{
-    vkb_apply_mask(row, levels->source->mask);
-}
-
-static bool add_blur(const struct vkb_levels *levels, const struct vkb_kernel *kernel,
-                     enum vkb_mode direction, double step, uint32_t from, uint32_t to,
-                     struct vkb_error *error)
+static void add_blur(struct vkb_levels *levels, const struct vkb_kernel *kernel,
+                     enum vkb_mode direction, double step, uint32_t from, uint32_t to)
 {
     struct vkb_blur blur = {
         .direction = direction,
@@ -185,21 +150,19 @@ static bool add_blur(const struct vkb_levels *levels, const struct vkb_kernel *k
         blur.weights[tap] = kernel->weights[tap];
     const struct vkb_pass_row row =
         vkb_blur_row(levels->graph, levels->graph->images[to].name, &blur, from, to);
-    return vkb_graph_add_pass(levels->graph, &row, error);
+    vkb_levels_pass(levels, &row);
 }
 
-bool vkb_levels_blur(struct vkb_levels *levels, uint32_t level, uint32_t from,
-                     const struct vkb_kernel *kernel, struct vkb_error *error)
+void vkb_levels_blur(struct vkb_levels *levels, uint32_t level, uint32_t from,
+                     const struct vkb_kernel *kernel)
 {
     const struct vkb_size size = levels->sizes[level];
     const uint32_t width = levels->graph->images[from].width;
     const double step_x = kernel->step_x > 0.0 ? kernel->step_x : (double)width / size.width;
-    uint32_t step;
+    const uint32_t step = vkb_levels_step(levels, "down_%u_across", level, size);
 
-    return vkb_levels_step(levels, "down_%u_across", level, size, &step, error)
-        && add_blur(levels, kernel, DIRECTION_HORIZONTAL, step_x, from, step, error)
-        && vkb_levels_down(levels, level, error)
-        && add_blur(levels, kernel, DIRECTION_VERTICAL, 1.0, step, levels->downs[level], error);
+    add_blur(levels, kernel, DIRECTION_HORIZONTAL, step_x, from, step);
+    add_blur(levels, kernel, DIRECTION_VERTICAL, 1.0, step, vkb_levels_down(levels, level));
 }
 
 // How UPSAMPLE_TENT and the others sample a smaller level, with the distances of the taps of a
@@ -225,9 +188,9 @@ static void set_kernel(struct vkb_pass_row *row, enum vkb_mode kernel, double ra
 }
 
 // Upsamples the smaller level `from` to `to`, and adds the level `own`, if there is one.
-static bool add_up(const struct vkb_levels *levels, const struct vkb_combination *combination,
+static void add_up(struct vkb_levels *levels, const struct vkb_combination *combination,
                    enum vkb_mode kernel, uint32_t from, uint32_t to, uint32_t own, double own_share,
-                   double coarse_share, struct vkb_error *error)
+                   double coarse_share)
 {
     struct vkb_pass_row row = vkb_filter_row(levels, from, to, coarse_share);
     const struct vkb_image_row *smaller = &levels->graph->images[from];
@@ -241,63 +204,60 @@ static bool add_up(const struct vkb_levels *levels, const struct vkb_combination
     }
     vkb_filter_add_own(&row, own, own_share);
     set_kernel(&row, kernel, x, y);
-    return vkb_filter_end(levels, &row, error);
+    vkb_filter_end(levels, &row);
 }
 
 // Adds up levels. In rgba8unorm, whose largest value is 1, each image holds its sum divided by the
 // sum for a constant image of 1 (`flat`; negative shares count as positive), and the bloom is
 // multiplied by this.
-bool vkb_levels_add_up(const struct vkb_levels *levels, const struct vkb_combination *combination,
-                       uint32_t *top, double *below, struct vkb_error *error)
+uint32_t vkb_levels_add_up(struct vkb_levels *levels, const struct vkb_combination *combination,
+                           double *below)
 {
     const bool means = vkb_stores_means(levels->source->format);
+    uint32_t top = levels->downs[levels->count - 1];
 
-    *top = levels->downs[levels->count - 1];
     *below = combination->smallest;
     for (uint32_t level = levels->count - 1; level-- > 0;) {
-        const uint32_t from = *top;
+        const uint32_t from = top;
         const double own = combination->own[level], coarse = combination->coarse[level] * *below;
         const double sum = fabs(own) + fabs(coarse), flat = means && sum > 0.0 ? sum : 1.0;
-        if (!vkb_levels_image(levels, "up_%u", level, levels->sizes[level], top, error)
-            || !add_up(levels, combination, combination->kernel, from, *top, levels->downs[level],
-                       own / flat, coarse / flat, error))
-            return false;
+        top = vkb_levels_image(levels, "up_%u", level, levels->sizes[level]);
+        add_up(levels, combination, combination->kernel, from, top, levels->downs[level],
+               own / flat, coarse / flat);
         *below = flat;
     }
-    return true;
+    return top;
 }
 
-bool vkb_levels_combine(const struct vkb_levels *levels, const struct vkb_combination *combination,
-                        uint32_t *bloom, struct vkb_error *error)
+uint32_t vkb_levels_combine(struct vkb_levels *levels, const struct vkb_combination *combination)
 {
-    uint32_t top;
     double below;
+    const uint32_t top = vkb_levels_add_up(levels, combination, &below);
+    const uint32_t bloom = vkb_levels_bloom(levels);
 
-    return vkb_levels_add_up(levels, combination, &top, &below, error)
-        && vkb_levels_bloom(levels, bloom, error)
-        && add_up(levels, combination, combination->last_kernel, top, *bloom, VKB_NO_IMAGE, 0.0,
-                  combination->gain * below, error);
+    add_up(levels, combination, combination->last_kernel, top, bloom, VKB_NO_IMAGE, 0.0,
+           combination->gain * below);
+    return bloom;
 }
 
-bool vkb_levels_resize(const struct vkb_levels *levels, uint32_t from, double gain, uint32_t to,
-                       struct vkb_error *error)
+static const struct vkb_combination enlarging = {0};
+
+void vkb_levels_resize(struct vkb_levels *levels, uint32_t from, double gain, uint32_t to)
 {
-    static const struct vkb_combination enlarging = {0};
-
-    return add_up(levels, &enlarging, UPSAMPLE_LINEAR, from, to, VKB_NO_IMAGE, 0.0, gain, error);
+    add_up(levels, &enlarging, UPSAMPLE_LINEAR, from, to, VKB_NO_IMAGE, 0.0, gain);
 }
 
-bool vkb_levels_enlarge(const struct vkb_levels *levels, enum vkb_mode kernel, uint32_t from,
-                        double gain, uint32_t *bloom, struct vkb_error *error)
+uint32_t vkb_levels_enlarge(struct vkb_levels *levels, enum vkb_mode kernel, uint32_t from,
+                            double gain)
 {
-    static const struct vkb_combination enlarging = {0};
+    const uint32_t bloom = vkb_levels_bloom(levels);
 
-    return vkb_levels_bloom(levels, bloom, error)
-        && add_up(levels, &enlarging, kernel, from, *bloom, VKB_NO_IMAGE, 0.0, gain, error);
+    add_up(levels, &enlarging, kernel, from, bloom, VKB_NO_IMAGE, 0.0, gain);
+    return bloom;
 }
 
-bool vkb_levels_gather(const struct vkb_levels *levels, const double *shares, enum vkb_mode kernel,
-                       uint32_t to, struct vkb_error *error)
+void vkb_levels_gather(struct vkb_levels *levels, const double *shares, enum vkb_mode kernel,
+                       uint32_t to)
 {
     struct vkb_pass_row row =
         vkb_fetching_row(levels, &vkb_shader_gather_frag, levels->downs[0], to);
@@ -314,5 +274,5 @@ bool vkb_levels_gather(const struct vkb_levels *levels, const double *shares, en
     for (uint32_t level = 0; level < levels->count; ++level)
         row.params.gather.shares[level / 4][level % 4] = (float)shares[level];
     VKB_SET_TARGET(&row, gather, &levels->graph->images[to]);
-    return vkb_graph_add_pass(levels->graph, &row, error);
+    vkb_levels_pass(levels, &row);
 }

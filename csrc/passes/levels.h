@@ -5,15 +5,6 @@
 
 #include "passes/pass.h"
 
-struct vkb_levels {
-    const struct vkb_settings *settings;
-    const struct vkb_bloom_source *source;
-    struct vkb_graph *graph;
-    struct vkb_size sizes[MAX_LEVELS];
-    uint32_t downs[MAX_LEVELS];
-    uint32_t count;
-};
-
 // How the bloom is made from the levels: up_k = own[k] down_k + coarse[k] U(up_k+1) with up_N-1 =
 // smallest * down_N-1, bloom = gain * V(up_0).
 struct vkb_combination {
@@ -41,17 +32,6 @@ struct vkb_size vkb_halved_up(struct vkb_size size);
 // x 1, unless that is the first.
 void vkb_levels_halve(struct vkb_levels *levels, struct vkb_size above, uint32_t count);
 
-// Adds an image in the format of the bloom buffers. `number` replaces a %u in the name.
-bool vkb_levels_image(const struct vkb_levels *levels, const char *name, uint32_t number,
-                      struct vkb_size size, uint32_t *image, struct vkb_error *error);
-
-// Adds the image of a level, `levels->downs[level]`.
-bool vkb_levels_down(struct vkb_levels *levels, uint32_t level, struct vkb_error *error);
-
-// As vkb_levels_image, for an intermediate image, which is not a framebuffer.
-bool vkb_levels_step(const struct vkb_levels *levels, const char *name, uint32_t number,
-                     struct vkb_size size, uint32_t *image, struct vkb_error *error);
-
 // The row of a pass from one image to another that filters its taps in the shader: without a block
 // yet; with the prefilter's block.
 struct vkb_pass_row vkb_fetching_row(const struct vkb_levels *levels,
@@ -71,9 +51,6 @@ void vkb_set_steps(struct vkb_pass_row *row, double step_x, double step_y);
 // Sets the factors of the colours. That of alpha is 1.
 void vkb_set_tint(struct vkb_pass_row *row, const float *tint);
 
-// Makes a prefilter multiply its result by the mask of the source, if there is one.
-void vkb_mask_prefilter(const struct vkb_levels *levels, struct vkb_pass_row *row);
-
 // The row of a pass that makes of its taps what GROUPS_* says: of a downsampling that weights
 // groups of them by brightness, or of the first pass of a published method. The steps are one
 // texel.
@@ -82,12 +59,15 @@ struct vkb_pass_row vkb_groups_row(const struct vkb_levels *levels, enum vkb_mod
 
 // A pass that downsamples with four diagonal taps at a distance of one texel: a box of 4 x 4
 // texels.
-bool vkb_levels_box(const struct vkb_levels *levels, uint32_t from, uint32_t to,
-                    struct vkb_error *error);
+void vkb_levels_box(struct vkb_levels *levels, uint32_t from, uint32_t to);
 
 // A pass that downsamples with the pyramid's 13 taps, whose inner ones are at these distances.
-bool vkb_levels_reduce(const struct vkb_levels *levels, double step_x, double step_y, uint32_t from,
-                       uint32_t to, struct vkb_error *error);
+void vkb_levels_reduce(struct vkb_levels *levels, double step_x, double step_y, uint32_t from,
+                       uint32_t to);
+
+// The images of all levels after the first one, and the passes that downsample the level above to
+// them in this way.
+void vkb_levels_reduce_rest(struct vkb_levels *levels, double step_x, double step_y);
 
 // The kernel of a separable blur while downsampling.
 struct vkb_kernel {
@@ -100,31 +80,26 @@ struct vkb_kernel {
 };
 
 // Adds the image down_`level` and the two passes that blur `from` into it.
-bool vkb_levels_blur(struct vkb_levels *levels, uint32_t level, uint32_t from,
-                     const struct vkb_kernel *kernel, struct vkb_error *error);
+void vkb_levels_blur(struct vkb_levels *levels, uint32_t level, uint32_t from,
+                     const struct vkb_kernel *kernel);
 
 // A pass that adds up shares[k] down_k of up to GATHERED_LEVELS levels, each enlarged by the kernel
 // to the size of `to`.
-bool vkb_levels_gather(const struct vkb_levels *levels, const double *shares, enum vkb_mode kernel,
-                       uint32_t to, struct vkb_error *error);
-
-// The image "bloom", of the final size.
-bool vkb_levels_bloom(const struct vkb_levels *levels, uint32_t *bloom, struct vkb_error *error);
+void vkb_levels_gather(struct vkb_levels *levels, const double *shares, enum vkb_mode kernel,
+                       uint32_t to);
 
 // A pass that resizes an image bilinearly and multiplies it by a gain.
-bool vkb_levels_resize(const struct vkb_levels *levels, uint32_t from, double gain, uint32_t to,
-                       struct vkb_error *error);
+void vkb_levels_resize(struct vkb_levels *levels, uint32_t from, double gain, uint32_t to);
 
 // The pass "bloom": enlarges the image by a kernel of UPSAMPLE_* and multiplies it by a gain.
-bool vkb_levels_enlarge(const struct vkb_levels *levels, enum vkb_mode kernel, uint32_t from,
-                        double gain, uint32_t *bloom, struct vkb_error *error);
+uint32_t vkb_levels_enlarge(struct vkb_levels *levels, enum vkb_mode kernel, uint32_t from,
+                            double gain);
 
-// The passes up_N-2 ... up_0, the last of which is *top, without `last_kernel` and `gain`.
-bool vkb_levels_add_up(const struct vkb_levels *levels, const struct vkb_combination *combination,
-                       uint32_t *top, double *below, struct vkb_error *error);
+// The passes up_N-2 ... up_0, without `last_kernel` and `gain`; the last image.
+uint32_t vkb_levels_add_up(struct vkb_levels *levels, const struct vkb_combination *combination,
+                           double *below);
 
 // The passes up_N-2 ... up_0 and "bloom".
-bool vkb_levels_combine(const struct vkb_levels *levels, const struct vkb_combination *combination,
-                        uint32_t *bloom, struct vkb_error *error);
+uint32_t vkb_levels_combine(struct vkb_levels *levels, const struct vkb_combination *combination);
 
 #endif

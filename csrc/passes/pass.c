@@ -75,3 +75,70 @@ enum vkb_format vkb_end_format(const struct vkb_settings *settings, enum vkb_for
     return vkb_is_rounded(buffers) && vkb_is_published(settings) ? VKB_FORMAT_RGBA32_FLOAT
                                                                  : buffers;
 }
+
+uint32_t vkb_levels_add(struct vkb_levels *levels, const struct vkb_image_row *row)
+{
+    uint32_t image = levels->source->glow;
+
+    levels->failed =
+        levels->failed || !vkb_graph_add_image(levels->graph, row, &image, levels->error);
+    return image;
+}
+
+uint32_t vkb_levels_target(struct vkb_levels *levels, const char *name, enum vkb_format format,
+                           struct vkb_size size, bool framebuffer)
+{
+    struct vkb_image_row row = {
+        .format = format,
+        .width = size.width,
+        .height = size.height,
+        .framebuffer = framebuffer,
+    };
+
+    snprintf(row.name, sizeof row.name, "%s", name);
+    return vkb_levels_add(levels, &row);
+}
+
+static uint32_t add_image(struct vkb_levels *levels, const char *name, uint32_t number,
+                          struct vkb_size size, bool framebuffer)
+{
+    char numbered[VKB_NAME_SIZE];
+
+    snprintf(numbered, sizeof numbered, name, number);
+    return vkb_levels_target(levels, numbered, levels->source->format, size, framebuffer);
+}
+
+uint32_t vkb_levels_image(struct vkb_levels *levels, const char *name, uint32_t number,
+                          struct vkb_size size)
+{
+    return add_image(levels, name, number, size, true);
+}
+
+uint32_t vkb_levels_down(struct vkb_levels *levels, uint32_t level)
+{
+    return levels->downs[level] = vkb_levels_image(levels, "down_%u", level, levels->sizes[level]);
+}
+
+uint32_t vkb_levels_step(struct vkb_levels *levels, const char *name, uint32_t number,
+                         struct vkb_size size)
+{
+    return add_image(levels, name, number, size, false);
+}
+
+uint32_t vkb_levels_bloom(struct vkb_levels *levels)
+{
+    return vkb_levels_target(levels, "bloom",
+                             vkb_end_format(levels->settings, levels->source->format),
+                             levels->source->final, true);
+}
+
+void vkb_levels_pass(struct vkb_levels *levels, const struct vkb_pass_row *row)
+{
+    levels->failed = levels->failed || !vkb_graph_add_pass(levels->graph, row, levels->error);
+}
+
+void vkb_levels_masked(struct vkb_levels *levels, struct vkb_pass_row *row)
+{
+    vkb_apply_mask(row, levels->source->mask);
+    vkb_levels_pass(levels, row);
+}

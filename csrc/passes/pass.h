@@ -67,4 +67,43 @@ void vkb_apply_mask(struct vkb_pass_row *row, uint32_t mask);
 // Removes all images after the first `read_count` from the images that the pass reads.
 void vkb_drop_reads(struct vkb_pass_row *row, uint32_t read_count);
 
+// What a method builds its graph with. After a failure all functions of it do nothing, and an image
+// that they return is the glow.
+struct vkb_levels {
+    const struct vkb_settings *settings;
+    const struct vkb_bloom_source *source;
+    struct vkb_graph *graph;
+    struct vkb_error *error;
+    bool failed;
+    struct vkb_size sizes[MAX_LEVELS];
+    uint32_t downs[MAX_LEVELS];
+    uint32_t count;
+};
+
+// Adds an image that has pixels; an image that passes write.
+uint32_t vkb_levels_add(struct vkb_levels *levels, const struct vkb_image_row *row);
+uint32_t vkb_levels_target(struct vkb_levels *levels, const char *name, enum vkb_format format,
+                           struct vkb_size size, bool framebuffer);
+
+// Adds a framebuffer in the format of the bloom buffers. `number` replaces a %u in the name.
+uint32_t vkb_levels_image(struct vkb_levels *levels, const char *name, uint32_t number,
+                          struct vkb_size size);
+
+// Adds the image of a level, `levels->downs[level]`.
+uint32_t vkb_levels_down(struct vkb_levels *levels, uint32_t level);
+
+// As vkb_levels_image, for an intermediate image, which is not a framebuffer.
+uint32_t vkb_levels_step(struct vkb_levels *levels, const char *name, uint32_t number,
+                         struct vkb_size size);
+
+// Adds a pass.
+void vkb_levels_pass(struct vkb_levels *levels, const struct vkb_pass_row *row);
+
+// Adds a pass with the prefilter's block, whose result the mask of the source multiplies, if there
+// is one.
+void vkb_levels_masked(struct vkb_levels *levels, struct vkb_pass_row *row);
+
+// The image "bloom", of the final size.
+uint32_t vkb_levels_bloom(struct vkb_levels *levels);
+
 #endif

@@ -58,8 +58,8 @@ double vkb_axis_readers(const struct vkb_axis *axis)
         low = fmin(low, axis->taps[i].offset);
         high = fmax(high, axis->taps[i].offset);
     }
-    const double apart = axis->border > VKB_BORDER_ZERO ? axis->step : 1.0;
-    return ((high - low) * apart + (axis->kind == UPSAMPLE_CUBIC ? 4.0 : 2.0)) / fabs(axis->step);
+    const double apart = axis->border != VKB_BORDER_NONE ? axis->step : 1.0;
+    return ((high - low) * apart + (axis->kind == UPSAMPLE_CUBIC ? 4.0 : 2.0)) / axis->step;
 }
 
 // The texels from `first` on that a pixel samples with a tap, and their shares.
@@ -82,7 +82,7 @@ static double at_border(const struct vkb_axis *axis, double at)
 
 static double position_of(const struct vkb_axis *axis, uint32_t pixel, double offset)
 {
-    const double position = axis->border > VKB_BORDER_ZERO
+    const double position = axis->border != VKB_BORDER_NONE
                               ? axis->origin + axis->step * at_border(axis, pixel + offset)
                               : axis->origin + axis->step * pixel + offset;
     // A texel's centre is met with roundings.
@@ -152,12 +152,9 @@ static struct sample sample_at(const struct vkb_axis *axis, uint32_t pixel, doub
     }
 }
 
-// The texel that is read; `from` if there is none.
 static uint32_t read_texel(const struct vkb_axis *axis, double texel)
 {
-    const double within = fmin(fmax(texel, 0.0), axis->from - 1.0);
-
-    return axis->border == VKB_BORDER_ZERO && texel != within ? axis->from : (uint32_t)within;
+    return (uint32_t)fmin(fmax(texel, 0.0), axis->from - 1.0);
 }
 
 // The pixels that read a texel, and where their weights begin.
@@ -174,10 +171,7 @@ static size_t find_readers(const struct vkb_axis *axis, struct readers *readers)
         for (uint32_t tap = 0; tap < axis->count; ++tap) {
             const struct sample sample = sample_at(axis, pixel, axis->taps[tap].offset);
             for (uint32_t i = 0; i < sample.count; ++i) {
-                const uint32_t read = read_texel(axis, sample.first + i);
-                struct readers *texel = &readers[read];
-                if (read == axis->from)
-                    continue;
+                struct readers *texel = &readers[read_texel(axis, sample.first + i)];
                 if (!texel->end)
                     texel->first = pixel;
                 texel->end = pixel + 1;
@@ -201,10 +195,7 @@ static void add_weights(const struct vkb_axis *axis, const struct readers *reade
         for (uint32_t tap = 0; tap < axis->count; ++tap) {
             const struct sample sample = sample_at(axis, pixel, axis->taps[tap].offset);
             for (uint32_t i = 0; i < sample.count; ++i) {
-                const uint32_t read = read_texel(axis, sample.first + i);
-                const struct readers *texel = &readers[read];
-                if (read == axis->from)
-                    continue;
+                const struct readers *texel = &readers[read_texel(axis, sample.first + i)];
                 double *sums = weights[texel->start + pixel - texel->first];
                 for (int kernel = 0; kernel < VKB_MAX_KERNELS; ++kernel)
                     sums[kernel] += sample.shares[i] * axis->taps[tap].weights[kernel];

@@ -22,7 +22,6 @@ struct vkb_tap {
 // What taps read beyond the first and the last pixel, where they are pixels of the target apart.
 enum vkb_border {
     VKB_BORDER_NONE,  // they are texels apart
-    VKB_BORDER_ZERO,  // the same, and there is nothing beyond the edges of the source
     VKB_BORDER_LAST,  // the outermost texels
     // The first two samples in turn, and the last one; or the last two in turn, too, where these
     // are the ends of a pair (Godot).

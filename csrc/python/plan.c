@@ -140,9 +140,9 @@ static bool build_graph(const struct vkb_device *device, enum vkb_variants varia
                                      &portion->first, &portion->is_possible, error)
                  : vkb_source_build(source, settings, device->max_side, graph, error))
         // Variants divide by the sizes of images, and add images of their own.
-        && vkb_graph_check(graph, device->max_side, error)
+        && vkb_graph_check_sizes(graph, device->max_side, error)
         && vkb_variants_choose(variants, device, graph, error)
-        && vkb_graph_check(graph, device->max_side, error);
+        && vkb_graph_check_sizes(graph, device->max_side, error);
     if (!built)
         return false;
     vkb_graph_set_usages(graph);

@@ -271,7 +271,7 @@ static PyObject *get_cached(PyObject *object, void *unused)
     VKB_LOCK(self->guard);
     const struct vkb_cached cached = self->cached;
     VKB_UNLOCK(self->guard);
-    return Py_BuildValue("(nnK)", (Py_ssize_t)cached.pipelines, (Py_ssize_t)cached.framebuffers,
+    return Py_BuildValue("(nK)", (Py_ssize_t)cached.pipelines,
                          (unsigned long long)cached.image_bytes);
 }
 
@@ -321,8 +321,8 @@ static PyGetSetDef attributes[] = {
     {"info", get_info, NULL, "The adapter, as adapters() describes it.", NULL},
     {"instance", get_instance, NULL, "The VkInstance, if it is open.", NULL},
     {"pipeline_count", get_pipeline_count, NULL, "Pipelines created so far.", NULL},
-    {"cached", get_cached, NULL,
-     "(pipelines, framebuffers, bytes of images) that are kept for later frames.", NULL},
+    {"cached", get_cached, NULL, "(pipelines, bytes of images) that are kept for later frames.",
+     NULL},
     {0},
 };
 

@@ -1,6 +1,5 @@
 #include "scene/scene.h"
 
-#include <math.h>
 #include <string.h>
 
 const VkVertexInputAttributeDescription vkb_vertex_attributes[VKB_TEXTURED_ATTRIBUTES] = {
@@ -122,7 +121,8 @@ bool vkb_scene_begin(const struct vkb_device *device, struct vkb_commands *comma
              && load_textures(device, commands->buffer, staging, data, scene, error)
              && vkb_buffer_flush(device, &staging->buffer, error);
     if (done)
-        vkb_barrier_record_upload(device, commands->buffer);
+        vkb_barrier_record(device, commands->buffer, NULL, true, VKB_ACCESS_COPY_TARGET,
+                           VKB_ACCESS_VERTICES);
     else
         vkb_scene_destroy(device, scene);
     return done;
@@ -154,21 +154,4 @@ void vkb_scene_destroy(const struct vkb_device *device, struct vkb_scene *scene)
         vkb_texture_destroy(device, &scene->textures[i]);
     vkb_free(scene->textures);
     *scene = (struct vkb_scene){0};
-}
-
-static double length(const float vector[4])
-{
-    return sqrt(vector[0] * vector[0] + vector[1] * vector[1] + vector[2] * vector[2]);
-}
-
-bool vkb_sky_is_magnified(const struct vkb_image *sky, const struct vkb_mesh_params *params,
-                          const struct vkb_image *target)
-{
-    // From the centre to an edge.
-    const double x = length(params->sky[1]) / (target->width / 2.0);
-    const double y = length(params->sky[2]) / (target->height / 2.0);
-
-    // A step in the picture, a plane at a distance of 1, is the longest at a corner of a face of
-    // the cube: sqrt(3) times, since that is as far away, and as much again, since it is oblique.
-    return 3.0 * fmax(x, y) * (sky->width / 2.0) <= 1.0;
 }

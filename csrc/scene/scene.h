@@ -72,9 +72,4 @@ void vkb_scene_end(const struct vkb_device *device, const struct vkb_scene_data 
                    struct vkb_scene *scene);
 void vkb_scene_destroy(const struct vkb_device *device, struct vkb_scene *scene);
 
-// Whether every pixel of a target of that size has less than a texel of the sky, so that no smaller
-// level is read. llvmpipe compiles a view of one level in half the time.
-bool vkb_sky_is_magnified(const struct vkb_image *sky, const struct vkb_mesh_params *params,
-                          const struct vkb_image *target);
-
 #endif

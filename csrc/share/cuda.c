@@ -163,24 +163,6 @@ void vkb_cuda_name(const struct vkb_cuda *cuda, int ordinal, char name[VKB_CUDA_
     snprintf(name, VKB_CUDA_NAME_SIZE, "%.200s (uuid:%s)", device_name, text);
 }
 
-static bool fail_missing(const struct vkb_cuda *cuda, const char *name, int count,
-                         struct vkb_error *error)
-{
-    char found[VKB_CUDA_NAME_SIZE];
-
-    vkb_fail(error, VKB_ERROR_VALUE,
-             "device: the renderer is on %s, which is not among CUDA's GPUs:", name);
-    for (int i = 0; i < count; ++i) {
-        vkb_cuda_name(cuda, i, found);
-        vkb_add_words(error, "%s %s", i ? "," : "", found);
-    }
-    vkb_add_words(error,
-                  "%s. Open a renderer with the adapter \"uuid:...\" of one of them, or use "
-                  "arrays on the host",
-                  count ? "" : " there are none");
-    return false;
-}
-
 static bool find_device(struct vkb_cuda *cuda, const uint8_t uuid[16], const char *name,
                         struct vkb_error *error)
 {
@@ -196,7 +178,11 @@ static bool find_device(struct vkb_cuda *cuda, const uint8_t uuid[16], const cha
         if (memcmp(found.bytes, uuid, sizeof found.bytes) == 0)
             return true;
     }
-    return fail_missing(cuda, name, count, error);
+    return vkb_fail(error, VKB_ERROR_VALUE,
+                    "device: the renderer is on %s, which is not among CUDA's %d GPUs. Open a "
+                    "renderer with the adapter \"uuid:...\" of one of them, or use arrays on the "
+                    "host",
+                    name, count);
 }
 
 // What this thread's calls do to captures of graphs, while the core makes calls.

@@ -19,8 +19,8 @@ struct vkb_cuda_memory {
     void *event;  // recorded by vkb_cuda_begin_copy and vkb_cuda_mark
 };
 
-// Opens the context of the GPU with that UUID; `name` is the adapter's. A value error names the
-// GPUs that CUDA has if that one is not among them.
+// Opens the context of the GPU with that UUID; `name` is the adapter's. Fails with a value error if
+// CUDA does not have that one.
 struct vkb_cuda *vkb_cuda_open(const uint8_t uuid[16], const char *name, struct vkb_error *error);
 void vkb_cuda_close(struct vkb_cuda *cuda);
 

@@ -132,7 +132,8 @@ bool vkb_exported_record_input(struct vkb_run *run, struct vkb_staged_input *sta
     const VkCommandBuffer commands = run->submission->commands.buffer;
     const VkBuffer buffer = staged->input->exported->buffer.handle;
 
-    vkb_barrier_record_acquire(run->device, commands, buffer);
+    vkb_barrier_record_owner(run->device, commands, buffer, VKB_ACCESS_NONE,
+                             VKB_ACCESS_DISPATCH_LOADED);
     vkb_image_transition(run->device, commands, &staged->image->image, VKB_ACCESS_DISPATCH_STORED);
     // Non-finite elements are counted again in each submission.
     if ((staged->send || staged->input->format != VKB_FORMAT_RGBA8_UNORM)
@@ -140,7 +141,8 @@ bool vkb_exported_record_input(struct vkb_run *run, struct vkb_staged_input *sta
         return false;
     staged->image->content.valid = true;
     // CUDA may fill it again, and another submission acquire it.
-    vkb_barrier_record_release(run->device, commands, buffer, VKB_ACCESS_ANY_READ);
+    vkb_barrier_record_owner(run->device, commands, buffer, VKB_ACCESS_DISPATCH_LOADED,
+                             VKB_ACCESS_PRESENTED);
     return true;
 }
 
@@ -269,9 +271,10 @@ static bool record(struct vkb_run *run, struct vkb_error *error)
             vkb_readback_copy(run->device, commands, image, output, buffer, 0);
         else if (!copy_output(run, image, output, error))
             return false;
-        vkb_barrier_record_release(run->device, commands, buffer,
-                                   is_copied(output) ? VKB_ACCESS_COPY_TARGET
-                                                     : VKB_ACCESS_DISPATCH_STORED);
+        vkb_barrier_record_owner(run->device, commands, buffer,
+                                 is_copied(output) ? VKB_ACCESS_COPY_TARGET
+                                                   : VKB_ACCESS_DISPATCH_STORED,
+                                 VKB_ACCESS_PRESENTED);
     }
     return true;
 }

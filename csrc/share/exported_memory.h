@@ -5,7 +5,7 @@
 #define VKB_EXPORTS_H
 
 #include "share/cuda.h"
-#include "vulkan/export.h"
+#include "vulkan/memory.h"
 #include "vulkan/timeline.h"
 
 struct vkb_export {

@@ -207,30 +207,6 @@ static void make_strips(const struct vkb_variant_choice *choice, struct vkb_pass
     }
 }
 
-// Adds the composite, and after it the fused pass in strips, which may replace it.
-bool vkb_add_strips(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
-                    bool *fits, struct vkb_error *error)
-{
-    const enum vkb_format format = choice->plain.images[pass->targets[0]].format;
-    // Strips below each other load the same rows at the same time. With four single floats this
-    // takes 7 % less time, with three 5 to 11 % more, and with halves 13 % more.
-    const bool vertical = format == VKB_FORMAT_RGBA32_FLOAT
-                       && vkb_graph_channels(&choice->plain, pass->reads[0]) == 4;
-    struct nest nest;
-
-    *fits = find_nest(&choice->plain, pass, STRIP_RADIUS, vkb_threshold_of, &nest)
-         && vkb_fits_linear(choice, pass) && (!pass->transposed || vkb_are_floats(choice, pass));
-    if (!*fits)
-        return true;
-    struct vkb_pass_row row = fused_row(choice, &nest);
-    make_strips(choice, &row,
-                pass->transposed ? &vkb_shader_strip_mixed_linear_rgba32float
-                                 : strip_shaders[format],
-                vertical);
-    return vkb_add_fullscreen(choice, pass, error)
-        && vkb_graph_add_pass(choice->graph, &row, error);
-}
-
 static bool fits_tiles(const struct vkb_device *device)
 {
     const size_t shared = 3 * sizeof(float) * TILE_ROWS * TILE_LOADED;
@@ -252,19 +228,33 @@ static void make_tiles(struct vkb_pass_row *row, const struct vkb_shader *shader
     row->gains_if_finite = true;
 }
 
-// The same in tiles.
-bool vkb_add_tiles(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
+// Adds the composite, and after it the fused pass in strips or in tiles, which may replace it.
+bool vkb_add_fused(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
                    bool *fits, struct vkb_error *error)
 {
+    const bool gpu = choice->variants == VKB_VARIANTS_GPU;
+    const enum vkb_format format = choice->plain.images[pass->targets[0]].format;
     struct nest nest;
 
-    *fits = fits_tiles(choice->device)
-         && find_nest(&choice->plain, pass, TILE_RADIUS,
-                      pass->transposed ? vkb_writer_of : vkb_threshold_of, &nest);
+    *fits = find_nest(&choice->plain, pass, gpu ? TILE_RADIUS : STRIP_RADIUS,
+                      gpu && pass->transposed ? vkb_writer_of : vkb_threshold_of, &nest)
+         && (gpu ? fits_tiles(choice->device)
+                 : vkb_fits_linear(choice, pass)
+                       && (!pass->transposed || vkb_are_floats(choice, pass)));
     if (!*fits)
         return true;
     struct vkb_pass_row row = fused_row(choice, &nest);
-    make_tiles(&row, pass->transposed ? &vkb_shader_tile_mixed_comp : &vkb_shader_tile_comp, &nest);
+    // Strips below each other load the same rows at the same time. With four single floats this
+    // takes 7 % less time, with three 5 to 11 % more, and with halves 13 % more.
+    if (gpu)
+        make_tiles(&row, pass->transposed ? &vkb_shader_tile_mixed_comp : &vkb_shader_tile_comp,
+                   &nest);
+    else
+        make_strips(choice, &row,
+                    pass->transposed ? &vkb_shader_strip_mixed_linear_rgba32float
+                                     : strip_shaders[format],
+                    format == VKB_FORMAT_RGBA32_FLOAT
+                        && vkb_graph_channels(&choice->plain, pass->reads[0]) == 4);
     return vkb_add_fullscreen(choice, pass, error)
         && vkb_graph_add_pass(choice->graph, &row, error);
 }
@@ -333,30 +323,20 @@ static struct vkb_pass_row adjoint_row(const struct vkb_variant_choice *choice,
     return row;
 }
 
-bool vkb_add_adjoint_tiles(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
+bool vkb_add_adjoint_fused(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
                            bool *fits, struct vkb_error *error)
 {
+    const bool gpu = choice->variants == VKB_VARIANTS_GPU;
     struct nest nest;
 
-    *fits =
-        fits_tiles(choice->device) && find_adjoint_nest(&choice->plain, pass, TILE_RADIUS, &nest);
+    *fits = find_adjoint_nest(&choice->plain, pass, gpu ? TILE_RADIUS : STRIP_RADIUS, &nest)
+         && (gpu ? fits_tiles(choice->device) : vkb_are_floats(choice, nest.composite));
     if (!*fits)
         return true;
     struct vkb_pass_row row = adjoint_row(choice, pass, &nest);
-    make_tiles(&row, &vkb_shader_adjoint_tile_comp, &nest);
-    return vkb_graph_add_pass(choice->graph, &row, error);
-}
-
-bool vkb_add_adjoint_strips(const struct vkb_variant_choice *choice,
-                            const struct vkb_pass_row *pass, bool *fits, struct vkb_error *error)
-{
-    struct nest nest;
-
-    *fits = find_adjoint_nest(&choice->plain, pass, STRIP_RADIUS, &nest)
-         && vkb_are_floats(choice, nest.composite);
-    if (!*fits)
-        return true;
-    struct vkb_pass_row row = adjoint_row(choice, pass, &nest);
-    make_strips(choice, &row, &vkb_shader_adjoint_strip_linear_rgba32float, false);
+    if (gpu)
+        make_tiles(&row, &vkb_shader_adjoint_tile_comp, &nest);
+    else
+        make_strips(choice, &row, &vkb_shader_adjoint_strip_linear_rgba32float, false);
     return vkb_graph_add_pass(choice->graph, &row, error);
 }

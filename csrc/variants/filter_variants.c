@@ -91,16 +91,10 @@ bool vkb_add_gathered(const struct vkb_variant_choice *choice, const struct vkb_
     return vkb_graph_add_pass(choice->graph, &row, error);
 }
 
-// Whether the pass is a filter whose taps are in a window.
-static bool has_window(const struct vkb_pass_row *pass)
-{
-    return vkb_is_filter(pass) && pass->constants.window > 0;
-}
-
-// The same, whose images have one format.
+// Whether the pass is a filter whose images have one format.
 static bool fits_strips(const struct vkb_graph *graph, const struct vkb_pass_row *pass)
 {
-    return has_window(pass) && vkb_has_format_of(graph, pass->reads[0], pass->targets[0])
+    return vkb_has_format_of(graph, pass->reads[0], pass->targets[0])
         && (!pass->constants.add_own || vkb_has_format_of(graph, pass->reads[1], pass->targets[0]));
 }
 
@@ -131,33 +125,6 @@ static void take_filter(const struct vkb_variant_choice *choice, const struct vk
     row->constants.exact_rows = has_phases(pass) ? vkb_ratio_of(source->height, target->height) : 0;
 }
 
-// Makes `row` the strips of the filter `pass`.
-static void make_strips(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
-                        struct vkb_pass_row *row, const struct vkb_shader *const *shaders)
-{
-    const struct vkb_image_row *source = &choice->plain.images[pass->reads[0]];
-    const struct vkb_image_row *target = &choice->plain.images[pass->targets[0]];
-
-    take_filter(choice, pass, row);
-    row->constants.enlarged = source->height <= target->height;
-    vkb_make_linear(row, shaders[target->format],
-                    WINDOW_COLUMNS(vkb_formats[target->format].channel_size), WINDOW_ROWS);
-}
-
-bool vkb_add_filtered(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
-                      bool *fits, struct vkb_error *error)
-{
-    struct vkb_pass_row row;
-
-    *fits = fits_strips(&choice->plain, pass) && vkb_fits_linear(choice, pass);
-    if (!*fits)
-        return true;
-    memcpy(&row, pass, sizeof row);
-    make_strips(choice, pass, &row, strip_shaders);
-    return vkb_graph_add_pass(choice->graph, &row, error)
-        && vkb_add_from_image(choice, pass, &row, error);
-}
-
 // The most rows of its source that a tile of a filter reads.
 static uint32_t tile_rows(const struct vkb_graph *graph, const struct vkb_pass_row *pass)
 {
@@ -166,6 +133,45 @@ static uint32_t tile_rows(const struct vkb_graph *graph, const struct vkb_pass_r
 
     return (uint32_t)(((FILTER_TILE_ROWS - 1) * source + target - 1) / target) + 1
          + (uint32_t)pass->constants.window;
+}
+
+// The shaders of a filter: strips by format, and tiles.
+struct filter_shaders {
+    const struct vkb_shader *const *strips, *tiles;
+};
+
+// Makes `row` the variant of the filter `pass`: strips on CPUs, tiles on GPUs. False: none fits.
+static bool make_filter(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
+                        struct filter_shaders shaders, struct vkb_pass_row *row)
+{
+    const struct vkb_image_row *source = &choice->plain.images[pass->reads[0]];
+    const struct vkb_image_row *target = &choice->plain.images[pass->targets[0]];
+
+    // Its taps are in a window.
+    if (!vkb_is_filter(pass) || pass->constants.window == 0)
+        return false;
+    take_filter(choice, pass, row);
+    if (choice->variants == VKB_VARIANTS_GPU)
+        return vkb_make_tiles(choice, shaders.tiles, tile_rows(&choice->plain, pass), row);
+    if (!fits_strips(&choice->plain, pass) || !vkb_fits_linear(choice, row))
+        return false;
+    row->constants.enlarged = source->height <= target->height;
+    vkb_make_linear(row, shaders.strips[target->format],
+                    WINDOW_COLUMNS(vkb_formats[target->format].channel_size), WINDOW_ROWS);
+    return true;
+}
+
+bool vkb_add_filtered(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
+                      bool *fits, struct vkb_error *error)
+{
+    const struct filter_shaders shaders = {strip_shaders, &vkb_shader_filter_tile_comp};
+    struct vkb_pass_row row;
+
+    memcpy(&row, pass, sizeof row);
+    *fits = make_filter(choice, pass, shaders, &row);
+    return !*fits
+        || (vkb_graph_add_pass(choice->graph, &row, error)
+            && vkb_add_from_image(choice, pass, &row, error));
 }
 
 #define TAKE_INPUT(B, type, name) params->name = up->params.filter.name;
@@ -217,53 +223,20 @@ bool vkb_add_filtered_final(const struct vkb_variant_choice *choice,
                             const struct vkb_pass_row *pass, bool *fits, struct vkb_error *error)
 {
     const struct vkb_pass_row *up = vkb_nested_filter(choice, pass);
-
-    *fits = up && fits_strips(&choice->plain, up) && vkb_fits_linear(choice, pass)
-         && (!pass->transposed || vkb_are_floats(choice, pass));
-    if (!*fits)
-        return true;
-    struct vkb_pass_row row = vkb_nested_row(choice, pass, up);
-    make_strips(choice, up, &row, pass->transposed ? mixed_shaders : final_shaders);
-    return vkb_add_fullscreen(choice, pass, error)
-        && vkb_graph_add_pass(choice->graph, &row, error);
-}
-
-// Makes `row` tiles of the filter `pass`. False: no tile fits.
-static bool make_tiles(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
-                       struct vkb_pass_row *row, const struct vkb_shader *shader)
-{
-    take_filter(choice, pass, row);
-    return vkb_make_tiles(choice, shader, tile_rows(&choice->plain, pass), row);
-}
-
-bool vkb_add_filter_tiles(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
-                          bool *fits, struct vkb_error *error)
-{
+    const struct filter_shaders shaders = {
+        pass->transposed ? mixed_shaders : final_shaders,
+        pass->transposed ? &vkb_shader_filter_tile_final_mixed_comp
+                         : &vkb_shader_filter_tile_final_comp,
+    };
     struct vkb_pass_row row;
 
-    *fits = has_window(pass);
+    *fits = up != NULL;
     if (!*fits)
         return true;
-    memcpy(&row, pass, sizeof row);
-    *fits = make_tiles(choice, pass, &row, &vkb_shader_filter_tile_comp);
-    return !*fits
-        || (vkb_graph_add_pass(choice->graph, &row, error)
-            && vkb_add_from_image(choice, pass, &row, error));
-}
-
-bool vkb_add_filter_tiles_final(const struct vkb_variant_choice *choice,
-                                const struct vkb_pass_row *pass, bool *fits,
-                                struct vkb_error *error)
-{
-    const struct vkb_pass_row *up = vkb_nested_filter(choice, pass);
-
-    *fits = up && has_window(up);
-    if (!*fits)
-        return true;
-    struct vkb_pass_row row = vkb_nested_row(choice, pass, up);
-    *fits = make_tiles(choice, up, &row,
-                       pass->transposed ? &vkb_shader_filter_tile_final_mixed_comp
-                                        : &vkb_shader_filter_tile_final_comp);
+    row = vkb_nested_row(choice, pass, up);
+    *fits = make_filter(choice, up, shaders, &row)
+         && (choice->variants == VKB_VARIANTS_GPU || !pass->transposed
+             || vkb_are_floats(choice, pass));
     return !*fits
         || (vkb_add_fullscreen(choice, pass, error)
             && vkb_graph_add_pass(choice->graph, &row, error));

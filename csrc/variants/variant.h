@@ -23,22 +23,16 @@ typedef bool vkb_variant_add(const struct vkb_variant_choice *choice,
 
 // Lines and enlarged lines of a blur; fused passes for the complete bloom of an image, in strips
 // and in tiles.
-vkb_variant_add vkb_add_line, vkb_add_enlarged, vkb_add_strips, vkb_add_tiles;
+vkb_variant_add vkb_add_line, vkb_add_enlarged, vkb_add_fused;
 // For derivatives of these by the image.
-vkb_variant_add vkb_add_adjoint_strips, vkb_add_adjoint_tiles;
-// Levels of exactly half the size, with taps that are weighted by brightness.
-vkb_variant_add vkb_add_halved_taps;
-// First passes of published methods, with taps among 4 x 4 texels of an image of twice the size, or
-// of the same size.
-vkb_variant_add vkb_add_prefiltered;
-// The same of an image of any larger size.
-vkb_variant_add vkb_add_shrunk;
+vkb_variant_add vkb_add_adjoint_fused;
+// Downsamplings that are not linear, and first passes of published methods.
+vkb_variant_add vkb_add_windowed;
 // Blurs of nine taps, of images of the same size and of twice the size.
 vkb_variant_add vkb_add_nine;
 // Filters in strips and in tiles, also fused with the composite; the sum of several levels that are
 // filtered.
-vkb_variant_add vkb_add_filtered, vkb_add_filtered_final, vkb_add_filter_tiles,
-    vkb_add_filter_tiles_final, vkb_add_gathered;
+vkb_variant_add vkb_add_filtered, vkb_add_filtered_final, vkb_add_gathered;
 // Iterations of streaks.
 vkb_variant_add vkb_add_streaks;
 // Transforms: of complete lines in shared memory; stages of images with linear texels.

@@ -5,32 +5,34 @@
 
 const char *vkb_adapter_type(const struct vkb_adapter_info *adapter)
 {
-    switch (adapter->device_type) {
-    case VK_PHYSICAL_DEVICE_TYPE_CPU:
-        return "cpu";
-    case VK_PHYSICAL_DEVICE_TYPE_INTEGRATED_GPU:
-        return "integrated";
-    case VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU:
-        return "discrete";
-    case VK_PHYSICAL_DEVICE_TYPE_VIRTUAL_GPU:
-        return "virtual";
-    default:
-        return "other";
-    }
+    static const char *const types[] = {
+        [VK_PHYSICAL_DEVICE_TYPE_OTHER] = "other",
+        [VK_PHYSICAL_DEVICE_TYPE_INTEGRATED_GPU] = "integrated",
+        [VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU] = "discrete",
+        [VK_PHYSICAL_DEVICE_TYPE_VIRTUAL_GPU] = "virtual",
+        [VK_PHYSICAL_DEVICE_TYPE_CPU] = "cpu",
+    };
+    const size_t type = (size_t)adapter->device_type;
+
+    return types[type < sizeof types / sizeof types[0] ? type : 0];
 }
 
-// A queue family with graphics and compute, which implies transfer; UINT32_MAX if there is none.
-static uint32_t find_queue_family(const struct vkb_instance *instance, VkPhysicalDevice physical)
+// Finds a queue family with graphics and compute, which implies transfer.
+static bool find_queue_family(const struct vkb_instance *instance, struct vkb_adapter_info *adapter)
 {
     VkQueueFamilyProperties families[16];
-    uint32_t count = sizeof families / sizeof families[0];
+    uint32_t count = sizeof families / sizeof families[0], i = 0;
     const VkQueueFlags needed = VK_QUEUE_GRAPHICS_BIT | VK_QUEUE_COMPUTE_BIT;
 
-    instance->vk.vkGetPhysicalDeviceQueueFamilyProperties(physical, &count, families);
-    for (uint32_t i = 0; i < count; ++i)
-        if ((families[i].queueFlags & needed) == needed)
-            return i;
-    return UINT32_MAX;
+    instance->vk.vkGetPhysicalDeviceQueueFamilyProperties(adapter->physical, &count, families);
+    while (i < count && (families[i].queueFlags & needed) != needed)
+        ++i;
+    if (i == count)
+        return false;
+    const uint32_t bits = families[i].timestampValidBits;
+    adapter->queue_family = i;
+    adapter->timestamp_mask = bits >= 64 ? UINT64_MAX : (UINT64_C(1) << bits) - 1;
+    return true;
 }
 
 void vkb_uuid_text(const uint8_t uuid[VK_UUID_SIZE], char text[VKB_UUID_TEXT_SIZE])
@@ -39,21 +41,23 @@ void vkb_uuid_text(const uint8_t uuid[VK_UUID_SIZE], char text[VKB_UUID_TEXT_SIZ
         text += sprintf(text, "%s%02x", i >= 4 && i <= 10 && i % 2 == 0 ? "-" : "", uuid[i]);
 }
 
-bool vkb_has_extension(const struct vkb_instance *instance, VkPhysicalDevice physical,
-                       const char *name, bool *found, struct vkb_error *error)
+bool vkb_find_extensions(const struct vkb_instance *instance, VkPhysicalDevice physical,
+                         const char *const *names, uint32_t name_count, bool *found,
+                         struct vkb_error *error)
 {
     const struct vkb_instance_table *vk = &instance->vk;
     VkExtensionProperties *extensions;
     uint32_t count = 0;
 
-    *found = false;
+    memset(found, 0, name_count * sizeof *found);
     if (!VK(error, vk->vkEnumerateDeviceExtensionProperties(physical, NULL, &count, NULL))
         || !(extensions = vkb_alloc(error, count, sizeof *extensions)))
         return false;
-    bool done =
+    const bool done =
         VK(error, vk->vkEnumerateDeviceExtensionProperties(physical, NULL, &count, extensions));
     for (uint32_t i = 0; done && i < count; ++i)
-        *found |= strcmp(extensions[i].extensionName, name) == 0;
+        for (uint32_t name = 0; name < name_count; ++name)
+            found[name] |= strcmp(extensions[i].extensionName, names[name]) == 0;
     vkb_free(extensions);
     return done;
 }
@@ -71,8 +75,8 @@ static void read_pci(const struct vkb_instance *instance, struct vkb_adapter_inf
     struct vkb_error error = {0};
     bool found;
 
-    if (!vkb_has_extension(instance, adapter->physical, VK_EXT_PCI_BUS_INFO_EXTENSION_NAME, &found,
-                           &error)
+    if (!vkb_find_extensions(instance, adapter->physical,
+                             &(const char *){VK_EXT_PCI_BUS_INFO_EXTENSION_NAME}, 1, &found, &error)
         || !found)
         return;
     instance->vk.vkGetPhysicalDeviceProperties2(adapter->physical, &properties);
@@ -89,6 +93,7 @@ static bool describe(const struct vkb_instance *instance, VkPhysicalDevice physi
     };
     VkPhysicalDeviceIDProperties id = {
         .sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_ID_PROPERTIES,
+        .pNext = &driver,
     };
     VkPhysicalDeviceProperties2 properties = {
         .sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2,
@@ -97,22 +102,17 @@ static bool describe(const struct vkb_instance *instance, VkPhysicalDevice physi
     VkPhysicalDeviceProperties plain;
 
     instance->vk.vkGetPhysicalDeviceProperties(physical, &plain);
-    if (plain.apiVersion < VK_API_VERSION_1_1)
+    if (plain.apiVersion < VK_API_VERSION_1_3)
         return false;
-    // Driver properties are core since Vulkan 1.2.
-    const bool has_driver = plain.apiVersion >= VK_API_VERSION_1_2;
-    if (has_driver)
-        id.pNext = &driver;
     instance->vk.vkGetPhysicalDeviceProperties2(physical, &properties);
 
     *adapter = (struct vkb_adapter_info){
         .physical = physical,
         .device_type = plain.deviceType,
         .driver_id = driver.driverID,
-        .nonconformant = has_driver && driver.conformanceVersion.major == 0,
+        .nonconformant = driver.conformanceVersion.major == 0,
         .api_version = plain.apiVersion,
         .driver_version = plain.driverVersion,
-        .queue_family = find_queue_family(instance, physical),
         .vendor = plain.vendorID,
         .bundled = instance->driver[0] != 0,
     };
@@ -122,7 +122,7 @@ static bool describe(const struct vkb_instance *instance, VkPhysicalDevice physi
     memcpy(adapter->driver_uuid, id.driverUUID, sizeof adapter->driver_uuid);
     memcpy(adapter->uuid, id.deviceUUID, sizeof adapter->uuid);
     read_pci(instance, adapter);
-    return adapter->queue_family != UINT32_MAX;
+    return find_queue_family(instance, adapter);
 }
 
 bool vkb_adapters_list(const struct vkb_instance *instance, struct vkb_adapter_info *adapters,

@@ -58,27 +58,3 @@ bool vkb_commands_begin(const struct vkb_device *device, struct vkb_commands *co
                                                .flags = VK_COMMAND_BUFFER_USAGE_ONE_TIME_SUBMIT_BIT,
                                            }));
 }
-
-bool vkb_commands_submit(struct vkb_device *device, struct vkb_commands *commands,
-                         const struct vkb_sync *order, struct vkb_error *error)
-{
-    return VK(error, device->vk.vkEndCommandBuffer(commands->buffer))
-        && vkb_device_submit(device, commands->buffer, order, commands->fence, error);
-}
-
-bool vkb_commands_wait(struct vkb_device *device, struct vkb_commands *commands, uint32_t frames,
-                       struct vkb_error *error)
-{
-    return vkb_device_wait(device, commands->fence, frames, error);
-}
-
-bool vkb_commands_reset(const struct vkb_device *device, const struct vkb_commands *commands,
-                        struct vkb_error *error)
-{
-    return VK(error, device->vk.vkResetFences(device->handle, 1, &commands->fence));
-}
-
-bool vkb_commands_over(const struct vkb_device *device, const struct vkb_commands *commands)
-{
-    return device->vk.vkGetFenceStatus(device->handle, commands->fence) == VK_SUCCESS;
-}

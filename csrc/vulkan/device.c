@@ -8,27 +8,12 @@
 #include <string.h>
 #include <time.h>
 
-// In a header of beta extensions.
-#define PORTABILITY_SUBSET "VK_KHR_portability_subset"
-
-static bool has_extension(const struct vkb_device *device, const char *name, bool *found,
-                          struct vkb_error *error)
-{
-    return vkb_has_extension(device->instance, device->adapter.physical, name, found, error);
-}
-
 VkBufferUsageFlags vkb_device_import_usage(const struct vkb_device *device)
 {
     return device->adapter.device_type == VK_PHYSICAL_DEVICE_TYPE_CPU
              ? VK_BUFFER_USAGE_TRANSFER_DST_BIT | VK_BUFFER_USAGE_STORAGE_BUFFER_BIT
                    | VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT
              : VK_BUFFER_USAGE_TRANSFER_DST_BIT;
-}
-
-VkBufferUsageFlags vkb_device_export_usage(void)
-{
-    return VK_BUFFER_USAGE_TRANSFER_SRC_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT
-         | VK_BUFFER_USAGE_STORAGE_BUFFER_BIT;
 }
 
 // What the device can do with buffers over that kind of memory.
@@ -51,16 +36,6 @@ static VkExternalMemoryFeatureFlags external_features(const struct vkb_device *d
     return properties.externalMemoryProperties.externalMemoryFeatures;
 }
 
-// Whether the device can import host memory.
-static bool imports_buffers(const struct vkb_device *device)
-{
-    const VkExternalMemoryFeatureFlags features =
-        external_features(device, vkb_device_import_usage(device),
-                          VK_EXTERNAL_MEMORY_HANDLE_TYPE_HOST_ALLOCATION_BIT_EXT);
-    return (features & VK_EXTERNAL_MEMORY_FEATURE_IMPORTABLE_BIT)
-        && !(features & VK_EXTERNAL_MEMORY_FEATURE_DEDICATED_ONLY_BIT);
-}
-
 static VkDeviceSize import_alignment(const struct vkb_device *device)
 {
     VkPhysicalDeviceExternalMemoryHostPropertiesEXT host = {
@@ -75,29 +50,7 @@ static VkDeviceSize import_alignment(const struct vkb_device *device)
     return host.minImportedHostPointerAlignment;
 }
 
-static VkPhysicalDeviceFeatures available_features(const struct vkb_device *device)
-{
-    VkPhysicalDeviceFeatures available;
-
-    device->instance->vk.vkGetPhysicalDeviceFeatures(device->adapter.physical, &available);
-    return available;
-}
-
-static bool has_scalar_layout(const struct vkb_device *device)
-{
-    VkPhysicalDeviceScalarBlockLayoutFeatures layout = {
-        .sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_SCALAR_BLOCK_LAYOUT_FEATURES,
-    };
-
-    device->instance->vk.vkGetPhysicalDeviceFeatures2(
-        device->adapter.physical, &(VkPhysicalDeviceFeatures2){
-                                      .sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2,
-                                      .pNext = &layout,
-                                  });
-    return layout.scalarBlockLayout;
-}
-
-// Whether the device can export timeline semaphores, if it has the extensions.
+// Whether the device can export timeline semaphores, if it has the extension.
 static bool exports_timelines(const struct vkb_device *device)
 {
     const VkSemaphoreTypeCreateInfo type = {
@@ -107,15 +60,7 @@ static bool exports_timelines(const struct vkb_device *device)
     VkExternalSemaphoreProperties properties = {
         .sType = VK_STRUCTURE_TYPE_EXTERNAL_SEMAPHORE_PROPERTIES,
     };
-    VkPhysicalDeviceTimelineSemaphoreFeatures timelines = {
-        .sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_TIMELINE_SEMAPHORE_FEATURES,
-    };
 
-    device->instance->vk.vkGetPhysicalDeviceFeatures2(
-        device->adapter.physical, &(VkPhysicalDeviceFeatures2){
-                                      .sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2,
-                                      .pNext = &timelines,
-                                  });
     device->instance->vk.vkGetPhysicalDeviceExternalSemaphoreProperties(
         device->adapter.physical,
         &(VkPhysicalDeviceExternalSemaphoreInfo){
@@ -124,110 +69,101 @@ static bool exports_timelines(const struct vkb_device *device)
             .handleType = VK_EXTERNAL_SEMAPHORE_HANDLE_TYPE_OPAQUE_FD_BIT,
         },
         &properties);
-    return timelines.timelineSemaphore
-        && (properties.externalSemaphoreFeatures & VK_EXTERNAL_SEMAPHORE_FEATURE_EXPORTABLE_BIT);
+    return properties.externalSemaphoreFeatures & VK_EXTERNAL_SEMAPHORE_FEATURE_EXPORTABLE_BIT;
 }
 
-enum { MAX_EXTENSIONS = 7 };
-
-struct extensions {
-    const char *names[MAX_EXTENSIONS];
-    uint32_t count;
+// Optional extensions. The portability subset, which a header of beta extensions names, must be
+// enabled where it is; what such devices lack, no pass needs.
+enum { HOST_MEMORY, SWAPCHAIN, MEMORY_FD, SEMAPHORE_FD, PORTABILITY, EXTENSION_COUNT };
+static const char *const extension_names[EXTENSION_COUNT] = {
+    [HOST_MEMORY] = VK_EXT_EXTERNAL_MEMORY_HOST_EXTENSION_NAME,
+    [SWAPCHAIN] = VK_KHR_SWAPCHAIN_EXTENSION_NAME,
+    [MEMORY_FD] = VK_KHR_EXTERNAL_MEMORY_FD_EXTENSION_NAME,
+    [SEMAPHORE_FD] = VK_KHR_EXTERNAL_SEMAPHORE_FD_EXTENSION_NAME,
+    [PORTABILITY] = "VK_KHR_portability_subset",
 };
 
-// What shares buffers with CUDA, and the order of the work on them.
-static bool choose_exports(struct vkb_device *device, struct extensions *extensions,
-                           struct vkb_error *error)
+// Finds the extensions that the device can use, and what they are for.
+static bool choose_extensions(struct vkb_device *device, const char *names[EXTENSION_COUNT],
+                              uint32_t *count, struct vkb_error *error)
 {
-    bool has_timelines;
+    bool found[EXTENSION_COUNT];
 
-    if (!has_extension(device, VK_KHR_EXTERNAL_MEMORY_FD_EXTENSION_NAME, &device->exports, error)
-        || !has_extension(device, VK_KHR_EXTERNAL_SEMAPHORE_FD_EXTENSION_NAME, &device->timelines,
-                          error)
-        || !has_extension(device, VK_KHR_TIMELINE_SEMAPHORE_EXTENSION_NAME, &has_timelines, error))
+    if (!vkb_find_extensions(device->instance, device->adapter.physical, extension_names,
+                             EXTENSION_COUNT, found, error))
         return false;
-    device->exports = device->exports
-                   && (external_features(device, vkb_device_export_usage(),
-                                         VK_EXTERNAL_MEMORY_HANDLE_TYPE_OPAQUE_FD_BIT)
-                       & VK_EXTERNAL_MEMORY_FEATURE_EXPORTABLE_BIT);
-    device->timelines =
-        device->exports && device->timelines && has_timelines && exports_timelines(device);
-    if (device->exports)
-        extensions->names[extensions->count++] = VK_KHR_EXTERNAL_MEMORY_FD_EXTENSION_NAME;
-    if (device->timelines) {
-        extensions->names[extensions->count++] = VK_KHR_EXTERNAL_SEMAPHORE_FD_EXTENSION_NAME;
-        extensions->names[extensions->count++] = VK_KHR_TIMELINE_SEMAPHORE_EXTENSION_NAME;
-    }
-    return true;
-}
-
-// Finds the optional extensions that the device can use, and what they are for.
-static bool choose_extensions(struct vkb_device *device, struct extensions *extensions,
-                              struct vkb_error *error)
-{
-    bool has_import, is_subset;
-
-    *extensions = (struct extensions){0};
-    if (!has_extension(device, VK_EXT_EXTERNAL_MEMORY_HOST_EXTENSION_NAME, &has_import, error)
-        || !has_extension(device, VK_KHR_SWAPCHAIN_EXTENSION_NAME, &device->presents, error)
-        || !has_extension(device, VK_EXT_SCALAR_BLOCK_LAYOUT_EXTENSION_NAME, &device->scalar_layout,
-                          error)
-        || !has_extension(device, PORTABILITY_SUBSET, &is_subset, error)
-        || !choose_exports(device, extensions, error))
-        return false;
-    // Must be enabled where it is. What such devices lack, no pass needs.
-    if (is_subset)
-        extensions->names[extensions->count++] = PORTABILITY_SUBSET;
+    const VkExternalMemoryFeatureFlags imports =
+        external_features(device, vkb_device_import_usage(device),
+                          VK_EXTERNAL_MEMORY_HANDLE_TYPE_HOST_ALLOCATION_BIT_EXT);
+    const VkExternalMemoryFeatureFlags exports =
+        external_features(device, VKB_EXPORT_USAGE, VK_EXTERNAL_MEMORY_HANDLE_TYPE_OPAQUE_FD_BIT);
     // A CPU reads and writes through the parent's own pages.
     const bool keeps_pages =
         device->adapter.device_type == VK_PHYSICAL_DEVICE_TYPE_CPU || vkb_fork_leaves_pinned();
-    if (has_import && keeps_pages && imports_buffers(device)) {
-        device->import_alignment = import_alignment(device);
-        extensions->names[extensions->count++] = VK_EXT_EXTERNAL_MEMORY_HOST_EXTENSION_NAME;
-    }
+    found[HOST_MEMORY] = found[HOST_MEMORY] && keeps_pages
+                      && (imports & VK_EXTERNAL_MEMORY_FEATURE_IMPORTABLE_BIT)
+                      && !(imports & VK_EXTERNAL_MEMORY_FEATURE_DEDICATED_ONLY_BIT);
+    device->import_alignment = found[HOST_MEMORY] ? import_alignment(device) : 0;
     // It depends on the instance's extension.
-    device->presents = device->presents && device->instance->surfaces;
-    if (device->presents)
-        extensions->names[extensions->count++] = VK_KHR_SWAPCHAIN_EXTENSION_NAME;
-    device->scalar_layout = device->scalar_layout && has_scalar_layout(device);
-    if (device->scalar_layout)
-        extensions->names[extensions->count++] = VK_EXT_SCALAR_BLOCK_LAYOUT_EXTENSION_NAME;
+    device->presents = found[SWAPCHAIN] = found[SWAPCHAIN] && device->instance->surfaces;
+    device->exports = found[MEMORY_FD] =
+        found[MEMORY_FD] && (exports & VK_EXTERNAL_MEMORY_FEATURE_EXPORTABLE_BIT);
+    device->timelines = found[SEMAPHORE_FD] =
+        found[SEMAPHORE_FD] && device->exports && exports_timelines(device);
+    *count = 0;
+    for (int i = 0; i < EXTENSION_COUNT; ++i)
+        if (found[i])
+            names[(*count)++] = extension_names[i];
     return true;
 }
 
+// Sets linear_texels if the device has the features that its shaders need.
 static bool create_logical(struct vkb_device *device, struct vkb_error *error)
 {
     const struct vkb_instance_table *vk = &device->instance->vk;
-    const VkPhysicalDeviceFeatures available = available_features(device);
-    struct extensions extensions;
-
-    if (!choose_extensions(device, &extensions, error))
-        return false;
-    VkPhysicalDeviceScalarBlockLayoutFeatures scalar_layout = {
-        .sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_SCALAR_BLOCK_LAYOUT_FEATURES,
-        .scalarBlockLayout = VK_TRUE,
+    const char *extensions[EXTENSION_COUNT];
+    uint32_t extension_count;
+    VkPhysicalDeviceVulkan12Features available12 = {
+        .sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_FEATURES,
     };
-    VkPhysicalDeviceTimelineSemaphoreFeatures timelines = {
-        .sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_TIMELINE_SEMAPHORE_FEATURES,
-        .pNext = device->scalar_layout ? &scalar_layout : NULL,
+    VkPhysicalDeviceFeatures2 available2 = {
+        .sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2,
+        .pNext = &available12,
+    };
+    const VkPhysicalDeviceFeatures *available = &available2.features;
+
+    if (!choose_extensions(device, extensions, &extension_count, error))
+        return false;
+    vk->vkGetPhysicalDeviceFeatures2(device->adapter.physical, &available2);
+    device->dispatch = available->shaderStorageImageWriteWithoutFormat;
+    device->linear_texels = device->adapter.device_type == VK_PHYSICAL_DEVICE_TYPE_CPU
+                         && device->dispatch && available->shaderInt64
+                         && available12.scalarBlockLayout;
+    VkPhysicalDeviceVulkan13Features vulkan13 = {
+        .sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_3_FEATURES,
+        .dynamicRendering = VK_TRUE,
+    };
+    VkPhysicalDeviceVulkan12Features vulkan12 = {
+        .sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_FEATURES,
+        .pNext = &vulkan13,
+        .scalarBlockLayout = available12.scalarBlockLayout,
         .timelineSemaphore = VK_TRUE,
     };
-    device->dispatch = available.shaderStorageImageWriteWithoutFormat;
     return VK(error,
               vk->vkCreateDevice(
                   device->adapter.physical,
                   &(VkDeviceCreateInfo){
                       .sType = VK_STRUCTURE_TYPE_DEVICE_CREATE_INFO,
-                      .pNext = device->timelines ? &timelines : timelines.pNext,
+                      .pNext = &vulkan12,
                       .pEnabledFeatures =
                           &(VkPhysicalDeviceFeatures){
                               .shaderStorageImageWriteWithoutFormat = device->dispatch,
-                              .shaderInt64 = available.shaderInt64,
+                              .shaderInt64 = available->shaderInt64,
                               // For passes that are given at run time.
-                              .fragmentStoresAndAtomics = available.fragmentStoresAndAtomics,
+                              .fragmentStoresAndAtomics = available->fragmentStoresAndAtomics,
                               .shaderStorageImageExtendedFormats =
-                                  available.shaderStorageImageExtendedFormats,
-                              .shaderImageGatherExtended = available.shaderImageGatherExtended,
+                                  available->shaderStorageImageExtendedFormats,
+                              .shaderImageGatherExtended = available->shaderImageGatherExtended,
                           },
                       .queueCreateInfoCount = 1,
                       .pQueueCreateInfos =
@@ -237,21 +173,10 @@ static bool create_logical(struct vkb_device *device, struct vkb_error *error)
                               .queueCount = 1,
                               .pQueuePriorities = &(float){1.0f},
                           },
-                      .enabledExtensionCount = extensions.count,
-                      .ppEnabledExtensionNames = extensions.names,
+                      .enabledExtensionCount = extension_count,
+                      .ppEnabledExtensionNames = extensions,
                   },
                   NULL, &device->handle));
-}
-
-static uint64_t timestamp_mask(const struct vkb_device *device)
-{
-    VkQueueFamilyProperties families[16];
-    uint32_t count = sizeof families / sizeof families[0];
-
-    device->instance->vk.vkGetPhysicalDeviceQueueFamilyProperties(device->adapter.physical, &count,
-                                                                  families);
-    uint32_t bits = families[device->adapter.queue_family].timestampValidBits;
-    return bits >= 64 ? UINT64_MAX : (UINT64_C(1) << bits) - 1;
 }
 
 static uint32_t smallest(uint32_t a, uint32_t b)
@@ -277,7 +202,6 @@ static void read_properties(struct vkb_device *device)
                                                 &ways);
         device->features[format] = ways.optimalTilingFeatures;
     }
-    device->timestamp_mask = timestamp_mask(device);
 }
 
 // Whether images of the format can do with linear tiling all that they can do with optimal tiling.
@@ -337,9 +261,6 @@ static bool has_linear_texels(const struct vkb_device *device)
 {
     VkFormatProperties properties;
 
-    if (device->adapter.device_type != VK_PHYSICAL_DEVICE_TYPE_CPU || !device->dispatch
-        || !device->scalar_layout || !available_features(device).shaderInt64)
-        return false;
     for (int format = VKB_FORMAT_NONE + 1; format < VKB_FORMAT_COUNT; ++format)
         if (format != VKB_FORMAT_DEPTH32_FLOAT && !is_linear(device, vkb_formats[format].vk))
             return false;
@@ -394,7 +315,7 @@ static bool create_handle(struct vkb_device *device, uint32_t adapter, const cha
     device->vk.vkGetDeviceQueue(device->handle, device->adapter.queue_family, 0, &device->queue);
     read_properties(device);
     device->dispatch = device->dispatch && stores_all(device);
-    device->linear_texels = has_linear_texels(device);
+    device->linear_texels = device->linear_texels && device->dispatch && has_linear_texels(device);
     return true;
 }
 
@@ -485,7 +406,7 @@ bool vkb_device_submit(struct vkb_device *device, VkCommandBuffer commands,
     };
     const VkSubmitInfo submit = {
         .sType = VK_STRUCTURE_TYPE_SUBMIT_INFO,
-        .pNext = device->timelines ? &values : NULL,
+        .pNext = &values,
         .waitSemaphoreCount = wait_count,
         .pWaitSemaphores = waits,
         .pWaitDstStageMask = stages,

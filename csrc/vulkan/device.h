@@ -29,13 +29,11 @@ struct vkb_device {
     uint32_t max_side;                                // of images that passes write
     VkFormatFeatureFlags features[VKB_FORMAT_COUNT];  // of images with optimal tiling
     enum vkb_texels texels;                           // found when it is first needed (probe.c)
-    bool dispatch;       // compute shaders can write images of every format
-    bool scalar_layout;  // VK_EXT_scalar_block_layout is enabled
+    bool dispatch;  // compute shaders can write images of every format
     // Colour images have linear tiling and lie in host-visible memory, which shaders also access as
     // buffers of 16-byte words. This is the case on a CPU: its memory is host memory.
     bool linear_texels;
-    uint64_t timestamp_mask;  // 0: the queue has no timestamps
-    bool presents;            // VK_KHR_swapchain is there
+    bool presents;  // VK_KHR_swapchain is there
     // Imported host memory starts and ends at multiples of this; 0: import is not supported.
     VkDeviceSize import_alignment;
     bool exports;      // buffers can be exported as descriptors
@@ -64,8 +62,10 @@ bool vkb_device_supports(const struct vkb_device *device, enum vkb_format format
 // How the device uses host memory of the caller that it imports as a buffer.
 VkBufferUsageFlags vkb_device_import_usage(const struct vkb_device *device);
 
-// How the device uses buffers that it exports.
-VkBufferUsageFlags vkb_device_export_usage(void);
+// How a device uses buffers that it exports.
+#define VKB_EXPORT_USAGE \
+    (VK_BUFFER_USAGE_TRANSFER_SRC_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT \
+     | VK_BUFFER_USAGE_STORAGE_BUFFER_BIT)
 
 // Submits the recorded commands. The unsignalled `fence` is signalled when the device has run them
 // and all earlier submissions. The commands wait for a screen before VKB_ACCESS_ACQUIRED, and for

@@ -36,57 +36,44 @@ void vkb_add_words(struct vkb_error *error, const char *format, ...)
     va_end(arguments);
 }
 
-#define RESULT_NAMES(NAME) \
-    NAME(VK_NOT_READY) \
-    NAME(VK_TIMEOUT) \
-    NAME(VK_INCOMPLETE) \
-    NAME(VK_ERROR_OUT_OF_HOST_MEMORY) \
-    NAME(VK_ERROR_OUT_OF_DEVICE_MEMORY) \
-    NAME(VK_ERROR_INITIALIZATION_FAILED) \
-    NAME(VK_ERROR_DEVICE_LOST) \
-    NAME(VK_ERROR_MEMORY_MAP_FAILED) \
-    NAME(VK_ERROR_LAYER_NOT_PRESENT) \
-    NAME(VK_ERROR_EXTENSION_NOT_PRESENT) \
-    NAME(VK_ERROR_FEATURE_NOT_PRESENT) \
-    NAME(VK_ERROR_INCOMPATIBLE_DRIVER) \
-    NAME(VK_ERROR_TOO_MANY_OBJECTS) \
-    NAME(VK_ERROR_FORMAT_NOT_SUPPORTED) \
-    NAME(VK_ERROR_FRAGMENTED_POOL) \
-    NAME(VK_ERROR_OUT_OF_POOL_MEMORY) \
-    NAME(VK_ERROR_INVALID_EXTERNAL_HANDLE) \
-    NAME(VK_ERROR_FRAGMENTATION) \
-    NAME(VK_ERROR_SURFACE_LOST_KHR) \
-    NAME(VK_ERROR_NATIVE_WINDOW_IN_USE_KHR) \
-    NAME(VK_ERROR_INVALID_SHADER_NV)
+#define RESULT(name, kind) {name, #name, VKB_ERROR_##kind}
 
-static const char *result_name(VkResult result)
-{
-    switch (result) {
-#define RESULT_CASE(name) \
-    case name: \
-        return #name;
-        RESULT_NAMES(RESULT_CASE)
-#undef RESULT_CASE
-    default:
-        return "VK_ERROR_UNKNOWN";
-    }
-}
+static const struct result_info {
+    VkResult result;
+    const char *name;
+    enum vkb_error_kind kind;
+} results[] = {
+    RESULT(VK_NOT_READY, GENERAL),
+    RESULT(VK_TIMEOUT, GENERAL),
+    RESULT(VK_INCOMPLETE, GENERAL),
+    RESULT(VK_ERROR_OUT_OF_HOST_MEMORY, OUT_OF_MEMORY),
+    RESULT(VK_ERROR_OUT_OF_DEVICE_MEMORY, OUT_OF_MEMORY),
+    RESULT(VK_ERROR_INITIALIZATION_FAILED, GENERAL),
+    RESULT(VK_ERROR_DEVICE_LOST, DEVICE_LOST),
+    RESULT(VK_ERROR_MEMORY_MAP_FAILED, GENERAL),
+    RESULT(VK_ERROR_LAYER_NOT_PRESENT, GENERAL),
+    RESULT(VK_ERROR_EXTENSION_NOT_PRESENT, GENERAL),
+    RESULT(VK_ERROR_FEATURE_NOT_PRESENT, GENERAL),
+    RESULT(VK_ERROR_INCOMPATIBLE_DRIVER, GENERAL),
+    RESULT(VK_ERROR_TOO_MANY_OBJECTS, GENERAL),
+    RESULT(VK_ERROR_FORMAT_NOT_SUPPORTED, GENERAL),
+    RESULT(VK_ERROR_FRAGMENTED_POOL, OUT_OF_MEMORY),
+    RESULT(VK_ERROR_OUT_OF_POOL_MEMORY, OUT_OF_MEMORY),
+    RESULT(VK_ERROR_INVALID_EXTERNAL_HANDLE, GENERAL),
+    RESULT(VK_ERROR_FRAGMENTATION, GENERAL),
+    RESULT(VK_ERROR_SURFACE_LOST_KHR, GENERAL),
+    RESULT(VK_ERROR_NATIVE_WINDOW_IN_USE_KHR, GENERAL),
+    RESULT(VK_ERROR_INVALID_SHADER_NV, SHADER),
+    RESULT(VK_ERROR_UNKNOWN, GENERAL),  // the last: any other
+};
 
-static enum vkb_error_kind result_kind(VkResult result)
+static const struct result_info *find_result(VkResult result)
 {
-    switch (result) {
-    case VK_ERROR_OUT_OF_HOST_MEMORY:
-    case VK_ERROR_OUT_OF_DEVICE_MEMORY:
-    case VK_ERROR_OUT_OF_POOL_MEMORY:
-    case VK_ERROR_FRAGMENTED_POOL:
-        return VKB_ERROR_OUT_OF_MEMORY;
-    case VK_ERROR_DEVICE_LOST:
-        return VKB_ERROR_DEVICE_LOST;
-    case VK_ERROR_INVALID_SHADER_NV:
-        return VKB_ERROR_SHADER;
-    default:
-        return VKB_ERROR_GENERAL;
-    }
+    const struct result_info *info = results;
+
+    while (info->result != result && info->result != VK_ERROR_UNKNOWN)
+        ++info;
+    return info;
 }
 
 const char *vkb_call_name(const char *call_text, size_t *length)
@@ -107,8 +94,9 @@ bool vkb_check(struct vkb_error *error, VkResult result, const char *call_text)
     size_t length;
     const char *name = vkb_call_name(call_text, &length);
 
-    vkb_fail(error, result_kind(result), "%.*s failed with %s", (int)length, name,
-             result_name(result));
+    const struct result_info *info = find_result(result);
+
+    vkb_fail(error, info->kind, "%.*s failed with %s", (int)length, name, info->name);
     if (error->kind == VKB_ERROR_OUT_OF_MEMORY)
         vkb_add_words(error, ": memory is short. %s", vkb_memory_hint);
     error->result = result;

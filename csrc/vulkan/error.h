@@ -26,16 +26,12 @@ struct vkb_error {
 };
 
 // Fills `error` and returns false, so that a caller can `return vkb_fail(...)`.
-#if defined(__GNUC__)
-__attribute__((format(printf, 3, 4)))
-#endif
-bool vkb_fail(struct vkb_error *error, enum vkb_error_kind kind, const char *format, ...);
+__attribute__((format(printf, 3, 4))) bool
+vkb_fail(struct vkb_error *error, enum vkb_error_kind kind, const char *format, ...);
 
 // Adds to the message, as far as there is space.
-#if defined(__GNUC__)
-__attribute__((format(printf, 2, 3)))
-#endif
-void vkb_add_words(struct vkb_error *error, const char *format, ...);
+__attribute__((format(printf, 2, 3))) void vkb_add_words(struct vkb_error *error,
+                                                         const char *format, ...);
 
 // The function's name in the text of a call, for example "vkCreateImage" in
 // "device->vk.vkCreateImage(...)", and its length.

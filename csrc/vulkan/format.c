@@ -5,77 +5,24 @@
 #include <float.h>
 #include <string.h>
 
+#define COLOUR VK_IMAGE_ASPECT_COLOR_BIT
+
 const struct vkb_format_info vkb_formats[VKB_FORMAT_COUNT] = {
-    [VKB_FORMAT_NONE] = {.name = "none", .dtype = "none"},
-    [VKB_FORMAT_RGBA8_UNORM] =
-        {
-            .name = "rgba8unorm",
-            .dtype = "uint8",
-            .vk = VK_FORMAT_R8G8B8A8_UNORM,
-            .channels = 4,
-            .channel_size = 1,
-            .aspect = VK_IMAGE_ASPECT_COLOR_BIT,
-            .limit = (float)UNORM_LIMIT,
-        },
-    [VKB_FORMAT_RGBA16_FLOAT] =
-        {
-            .name = "rgba16float",
-            .dtype = "float16",
-            .vk = VK_FORMAT_R16G16B16A16_SFLOAT,
-            .channels = 4,
-            .channel_size = 2,
-            .aspect = VK_IMAGE_ASPECT_COLOR_BIT,
-            .limit = (float)HALF_LIMIT,
-        },
-    [VKB_FORMAT_RGBA32_FLOAT] =
-        {
-            .name = "rgba32float",
-            .dtype = "float32",
-            .vk = VK_FORMAT_R32G32B32A32_SFLOAT,
-            .channels = 4,
-            .channel_size = 4,
-            .aspect = VK_IMAGE_ASPECT_COLOR_BIT,
-            .limit = FLT_MAX,
-        },
+    // Also of the textures of custom methods, which have formats of their own.
+    [VKB_FORMAT_NONE] = {.name = "none", .dtype = "none", .aspect = COLOUR},
+    [VKB_FORMAT_RGBA8_UNORM] = {"rgba8unorm", "uint8", VK_FORMAT_R8G8B8A8_UNORM, 4, 1, COLOUR,
+                                (float)UNORM_LIMIT},
+    [VKB_FORMAT_RGBA16_FLOAT] = {"rgba16float", "float16", VK_FORMAT_R16G16B16A16_SFLOAT, 4, 2,
+                                 COLOUR, (float)HALF_LIMIT},
+    [VKB_FORMAT_RGBA32_FLOAT] = {"rgba32float", "float32", VK_FORMAT_R32G32B32A32_SFLOAT, 4, 4,
+                                 COLOUR, FLT_MAX},
     // Few devices draw into R11G11B10 and store to it, and they may cut bits off; none stores to
     // sRGB: the shaders round, and single floats hold what they rounded to.
-    [VKB_FORMAT_RG11B10_UFLOAT] =
-        {
-            .name = "rg11b10ufloat",
-            .dtype = "float32",
-            .vk = VK_FORMAT_R32G32B32A32_SFLOAT,
-            .channels = 4,
-            .channel_size = 4,
-            .aspect = VK_IMAGE_ASPECT_COLOR_BIT,
-            .limit = (float)UFLOAT11_LIMIT,
-        },
-    [VKB_FORMAT_RGBA8_SRGB] =
-        {
-            .name = "rgba8unorm-srgb",
-            .dtype = "float32",
-            .vk = VK_FORMAT_R32G32B32A32_SFLOAT,
-            .channels = 4,
-            .channel_size = 4,
-            .aspect = VK_IMAGE_ASPECT_COLOR_BIT,
-            .limit = (float)UNORM_LIMIT,
-        },
-    [VKB_FORMAT_R32_FLOAT] =
-        {
-            .name = "r32float",
-            .dtype = "float32",
-            .vk = VK_FORMAT_R32_SFLOAT,
-            .channels = 1,
-            .channel_size = 4,
-            .aspect = VK_IMAGE_ASPECT_COLOR_BIT,
-            .limit = FLT_MAX,
-        },
-    [VKB_FORMAT_DEPTH32_FLOAT] =
-        {
-            .name = "depth32float",
-            .dtype = "float32",
-            .vk = VK_FORMAT_D32_SFLOAT,
-            .channels = 1,
-            .channel_size = 4,
-            .aspect = VK_IMAGE_ASPECT_DEPTH_BIT,
-        },
+    [VKB_FORMAT_RG11B10_UFLOAT] = {"rg11b10ufloat", "float32", VK_FORMAT_R32G32B32A32_SFLOAT, 4, 4,
+                                   COLOUR, (float)UFLOAT11_LIMIT},
+    [VKB_FORMAT_RGBA8_SRGB] = {"rgba8unorm-srgb", "float32", VK_FORMAT_R32G32B32A32_SFLOAT, 4, 4,
+                               COLOUR, (float)UNORM_LIMIT},
+    [VKB_FORMAT_R32_FLOAT] = {"r32float", "float32", VK_FORMAT_R32_SFLOAT, 1, 4, COLOUR, FLT_MAX},
+    [VKB_FORMAT_DEPTH32_FLOAT] = {"depth32float", "float32", VK_FORMAT_D32_SFLOAT, 1, 4,
+                                  VK_IMAGE_ASPECT_DEPTH_BIT, 0.0f},
 };

@@ -41,50 +41,14 @@ static bool loader_open;
 // if their stacks have the same addresses. So no driver thread of the child may be left at exit.
 static bool forked;
 
-static bool open_loader(struct vkb_error *error)
+// The result of the loader does not always name the cause if there is no adapter.
+static bool check_created(VkResult result, bool direct, struct vkb_error *error)
 {
-    if (!loader_open)
-        loader_open = VK_RESULT(volkInitialize()) == VK_SUCCESS;
-    return loader_open
-        || vkb_fail(error, VKB_ERROR_ADAPTER_NOT_FOUND,
-                    "no Vulkan adapter: the Vulkan loader (libvulkan.so.1) is missing. %s",
-                    vkb_install_hint);
-}
-
-static bool validation_available(void)
-{
-    VkLayerProperties layers[128];
-    uint32_t count = sizeof layers / sizeof layers[0];
-    VkResult result = VK_RESULT(vkEnumerateInstanceLayerProperties(&count, layers));
-
-    if (result != VK_SUCCESS && result != VK_INCOMPLETE)
-        return false;
-    for (uint32_t i = 0; i < count; ++i)
-        if (strcmp(layers[i].layerName, VALIDATION_LAYER) == 0)
-            return true;
-    return false;
-}
-
-static bool check_loader(bool validation, struct vkb_error *error)
-{
-    if (!open_loader(error))
-        return false;
-    if (vkEnumerateInstanceVersion == NULL)
-        return vkb_fail(
-            error, VKB_ERROR_ADAPTER_NOT_FOUND,
-            "no Vulkan adapter: the Vulkan loader knows only Vulkan 1.0, 1.1 is needed. %s",
-            vkb_install_hint);
-    if (validation && !validation_available())
+    if (result == VK_ERROR_LAYER_NOT_PRESENT)
         return vkb_fail(error, VKB_ERROR_GENERAL,
                         "validation was asked for, but %s is not installed. "
                         "On Debian or Ubuntu: apt install vulkan-validationlayers",
                         VALIDATION_LAYER);
-    return true;
-}
-
-// The result of the loader does not always name the cause if there is no adapter.
-static bool check_created(VkResult result, bool direct, struct vkb_error *error)
-{
     // Loaders open single drivers from 1.3.234 on; some that know the extension (1.3.239) do not
     // list it, and refuse it.
     if (direct
@@ -122,13 +86,21 @@ static bool open_source(struct vkb_instance *instance, PFN_vkGetInstanceProcAddr
         instance->get = *driver;
         return true;
     }
-    if (*driver && !open_loader(error))
+    loader_open = loader_open || VK_RESULT(volkInitialize()) == VK_SUCCESS;
+    if (!loader_open && *driver)
         return vkb_fail(error, VKB_ERROR_GENERAL,
                         "validation=True needs the system's Vulkan loader, also for the bundled "
                         "driver, and the loader (libvulkan.so.1) is missing. On Debian or Ubuntu: "
                         "apt install libvulkan1 vulkan-validationlayers");
-    if (!check_loader(instance->validation, error))
-        return false;
+    if (!loader_open)
+        return vkb_fail(error, VKB_ERROR_ADAPTER_NOT_FOUND,
+                        "no Vulkan adapter: the Vulkan loader (libvulkan.so.1) is missing. %s",
+                        vkb_install_hint);
+    if (vkEnumerateInstanceVersion == NULL)
+        return vkb_fail(
+            error, VKB_ERROR_ADAPTER_NOT_FOUND,
+            "no Vulkan adapter: the Vulkan loader knows only Vulkan 1.0, 1.3 is needed. %s",
+            vkb_install_hint);
     instance->get = vkGetInstanceProcAddr;
     return true;
 }
@@ -143,7 +115,6 @@ static const struct wish {
     {"VK_KHR_xcb_surface", "DISPLAY"},
     {"VK_KHR_xlib_surface", "DISPLAY"},
     {"VK_KHR_wayland_surface", "WAYLAND_DISPLAY"},
-    {"VK_KHR_win32_surface", NULL},
     {"VK_EXT_metal_surface", NULL},
     // Adapters that do less than Vulkan demands, such as MoltenVK's, are hidden without.
     {VK_KHR_PORTABILITY_ENUMERATION_EXTENSION_NAME, NULL},
@@ -234,7 +205,7 @@ static bool create_handle(struct vkb_instance *instance, PFN_vkGetInstanceProcAd
                     &(VkApplicationInfo){
                         .sType = VK_STRUCTURE_TYPE_APPLICATION_INFO,
                         .pApplicationName = "vkbloom",
-                        .apiVersion = VK_API_VERSION_1_1,
+                        .apiVersion = VK_API_VERSION_1_3,
                     },
                 .enabledLayerCount = messenger ? 1 : 0,
                 .ppEnabledLayerNames = (const char *[]){VALIDATION_LAYER},

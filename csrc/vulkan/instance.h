@@ -23,7 +23,6 @@ extern const char vkb_install_hint[];
     NAME(vkGetDeviceProcAddr) \
     NAME(vkGetPhysicalDeviceExternalBufferProperties) \
     NAME(vkGetPhysicalDeviceExternalSemaphoreProperties) \
-    NAME(vkGetPhysicalDeviceFeatures) \
     NAME(vkGetPhysicalDeviceFeatures2) \
     NAME(vkGetPhysicalDeviceFormatProperties) \
     NAME(vkGetPhysicalDeviceImageFormatProperties) \

@@ -72,17 +72,19 @@ static bool allocate(const struct vkb_device *device, const VkMemoryAllocateInfo
     return false;
 }
 
-void vkb_memory_free(const struct vkb_device *device, VkDeviceMemory memory)
+static void free_memory(const struct vkb_device *device, VkDeviceMemory memory)
 {
     device->vk.vkFreeMemory(device->handle, memory, NULL);
     if (memory)
         atomic_fetch_sub(device->allocations, 1);
 }
 
-bool vkb_memory_allocate(const struct vkb_device *device, enum vkb_memory_kind kind,
-                         const VkMemoryRequirements *requirements, const void *next,
-                         VkDeviceMemory *memory, VkMemoryPropertyFlags *flags,
-                         struct vkb_error *error)
+// Memory of a kind that fits the requirements; *flags gets the properties of its type. `next`:
+// what extends VkMemoryAllocateInfo.
+static bool allocate_kind(const struct vkb_device *device, enum vkb_memory_kind kind,
+                          const VkMemoryRequirements *requirements, const void *next,
+                          VkDeviceMemory *memory, VkMemoryPropertyFlags *flags,
+                          struct vkb_error *error)
 {
     uint32_t type = find_memory_type(device, kind, requirements->memoryTypeBits);
 
@@ -113,25 +115,51 @@ static const char *buffer_name(VkBufferUsageFlags usage)
                                                       : "readback";
 }
 
-bool vkb_buffer_create(const struct vkb_device *device, enum vkb_memory_kind kind,
-                       VkBufferUsageFlags usage, VkDeviceSize size, struct vkb_buffer *buffer,
-                       struct vkb_error *error)
+// Creates the handle of a buffer, whose memory has that external type; 0: none.
+static bool create_buffer(const struct vkb_device *device, VkBufferUsageFlags usage,
+                          VkDeviceSize size, VkExternalMemoryHandleTypeFlags type, VkBuffer *buffer,
+                          struct vkb_error *error)
+{
+    const VkExternalMemoryBufferCreateInfo external = {
+        .sType = VK_STRUCTURE_TYPE_EXTERNAL_MEMORY_BUFFER_CREATE_INFO,
+        .handleTypes = type,
+    };
+
+    return VK(error, device->vk.vkCreateBuffer(device->handle,
+                                               &(VkBufferCreateInfo){
+                                                   .sType = VK_STRUCTURE_TYPE_BUFFER_CREATE_INFO,
+                                                   .pNext = type ? &external : NULL,
+                                                   .size = size,
+                                                   .usage = usage,
+                                               },
+                                               NULL, buffer));
+}
+
+// A buffer with its own memory, which can be exported as that type; 0: it is not.
+static bool create(const struct vkb_device *device, enum vkb_memory_kind kind,
+                   VkBufferUsageFlags usage, VkDeviceSize size,
+                   VkExternalMemoryHandleTypeFlags type, struct vkb_buffer *buffer,
+                   struct vkb_error *error)
 {
     const struct VolkDeviceTable *vk = &device->vk;
     VkMemoryRequirements requirements;
     VkMemoryPropertyFlags flags;
 
     *buffer = (struct vkb_buffer){0};
-    if (!VK(error, vk->vkCreateBuffer(device->handle,
-                                      &(VkBufferCreateInfo){
-                                          .sType = VK_STRUCTURE_TYPE_BUFFER_CREATE_INFO,
-                                          .size = size,
-                                          .usage = usage,
-                                      },
-                                      NULL, &buffer->handle)))
+    if (!create_buffer(device, usage, size, type, &buffer->handle, error))
         return false;
     vk->vkGetBufferMemoryRequirements(device->handle, buffer->handle, &requirements);
-    if (!vkb_memory_allocate(device, kind, &requirements, NULL, &buffer->memory, &flags, error)
+    const VkMemoryDedicatedAllocateInfo dedicated = {
+        .sType = VK_STRUCTURE_TYPE_MEMORY_DEDICATED_ALLOCATE_INFO,
+        .buffer = buffer->handle,
+    };
+    const VkExportMemoryAllocateInfo exported = {
+        .sType = VK_STRUCTURE_TYPE_EXPORT_MEMORY_ALLOCATE_INFO,
+        .pNext = &dedicated,
+        .handleTypes = type,
+    };
+    if (!allocate_kind(device, kind, &requirements, type ? &exported : NULL, &buffer->memory,
+                       &flags, error)
         || !VK(error, vk->vkBindBufferMemory(device->handle, buffer->handle, buffer->memory, 0))
         || (kind != VKB_MEMORY_DEVICE
             && !VK(error, vk->vkMapMemory(device->handle, buffer->memory, 0, VK_WHOLE_SIZE, 0,
@@ -143,15 +171,41 @@ bool vkb_buffer_create(const struct vkb_device *device, enum vkb_memory_kind kin
         vkb_advise_large(buffer->mapped, (size_t)size);
     vkb_label_object(device, VK_OBJECT_TYPE_BUFFER, (uint64_t)buffer->handle, buffer_name(usage));
     // Only a complete buffer has a size; vkb_buffer_reserve relies on that.
-    buffer->size = size;
+    buffer->size = type ? requirements.size : size;
     buffer->coherent = flags & VK_MEMORY_PROPERTY_HOST_COHERENT_BIT;
     return true;
+}
+
+bool vkb_buffer_create(const struct vkb_device *device, enum vkb_memory_kind kind,
+                       VkBufferUsageFlags usage, VkDeviceSize size, struct vkb_buffer *buffer,
+                       struct vkb_error *error)
+{
+    return create(device, kind, usage, size, 0, buffer, error);
+}
+
+bool vkb_buffer_export(const struct vkb_device *device, VkDeviceSize size,
+                       struct vkb_buffer *buffer, int *descriptor, struct vkb_error *error)
+{
+    const VkExternalMemoryHandleTypeFlagBits type = VK_EXTERNAL_MEMORY_HANDLE_TYPE_OPAQUE_FD_BIT;
+
+    if (!create(device, VKB_MEMORY_DEVICE, VKB_EXPORT_USAGE, size, type, buffer, error))
+        return false;
+    if (VK(error, device->vk.vkGetMemoryFdKHR(device->handle,
+                                              &(VkMemoryGetFdInfoKHR){
+                                                  .sType = VK_STRUCTURE_TYPE_MEMORY_GET_FD_INFO_KHR,
+                                                  .memory = buffer->memory,
+                                                  .handleType = type,
+                                              },
+                                              descriptor)))
+        return true;
+    vkb_buffer_destroy(device, buffer);
+    return false;
 }
 
 void vkb_buffer_destroy(const struct vkb_device *device, struct vkb_buffer *buffer)
 {
     device->vk.vkDestroyBuffer(device->handle, buffer->handle, NULL);
-    vkb_memory_free(device, buffer->memory);
+    free_memory(device, buffer->memory);
     *buffer = (struct vkb_buffer){0};
 }
 
@@ -222,20 +276,9 @@ bool vkb_buffer_import(const struct vkb_device *device, VkBufferUsageFlags usage
         return false;
     *offset = (uintptr_t)memory % align;
     buffer->size = (*offset + size + align - 1) / align * align;
-    if (!VK(&ignored,
-            device->vk.vkCreateBuffer(
-                device->handle,
-                &(VkBufferCreateInfo){
-                    .sType = VK_STRUCTURE_TYPE_BUFFER_CREATE_INFO,
-                    .pNext =
-                        &(VkExternalMemoryBufferCreateInfo){
-                            .sType = VK_STRUCTURE_TYPE_EXTERNAL_MEMORY_BUFFER_CREATE_INFO,
-                            .handleTypes = VK_EXTERNAL_MEMORY_HANDLE_TYPE_HOST_ALLOCATION_BIT_EXT,
-                        },
-                    .size = buffer->size,
-                    .usage = usage,
-                },
-                NULL, &buffer->handle))
+    if (!create_buffer(device, usage, buffer->size,
+                       VK_EXTERNAL_MEMORY_HANDLE_TYPE_HOST_ALLOCATION_BIT_EXT, &buffer->handle,
+                       &ignored)
         || !import_memory(device, (char *)memory - *offset, buffer, &ignored)) {
         vkb_buffer_destroy(device, buffer);
         return false;
@@ -277,65 +320,63 @@ static VkImageLayout initial_layout(bool mapped)
     return mapped ? VK_IMAGE_LAYOUT_PREINITIALIZED : VK_IMAGE_LAYOUT_UNDEFINED;
 }
 
+static VkFormat format_of(const struct vkb_image_spec *spec)
+{
+    return spec->other ? spec->other : vkb_formats[spec->format].vk;
+}
+
+// The types of views without layers have the same values.
+static VkImageType image_type(const struct vkb_image_spec *spec)
+{
+    return spec->dimensions ? (VkImageType)(spec->dimensions - 1) : VK_IMAGE_TYPE_2D;
+}
+
 static bool create_handle(const struct vkb_device *device, const struct vkb_image_spec *spec,
                           struct vkb_image *image, struct vkb_error *error)
 {
-    return VK(error, device->vk.vkCreateImage(device->handle,
-                                              &(VkImageCreateInfo){
-                                                  .sType = VK_STRUCTURE_TYPE_IMAGE_CREATE_INFO,
-                                                  .flags = spec->layers == 6 && !spec->array
-                                                             ? VK_IMAGE_CREATE_CUBE_COMPATIBLE_BIT
-                                                             : 0,
-                                                  .imageType = VK_IMAGE_TYPE_2D,
-                                                  .format = vkb_formats[spec->format].vk,
-                                                  .extent = {spec->width, spec->height, 1},
-                                                  .mipLevels = spec->levels,
-                                                  .arrayLayers = spec->layers,
-                                                  .samples = VK_SAMPLE_COUNT_1_BIT,
-                                                  .tiling = spec->mapped ? VK_IMAGE_TILING_LINEAR
-                                                                         : VK_IMAGE_TILING_OPTIMAL,
-                                                  .usage = spec->usage,
-                                                  .initialLayout = initial_layout(spec->mapped),
-                                              },
-                                              NULL, &image->handle));
+    return VK(
+        error,
+        device->vk.vkCreateImage(
+            device->handle,
+            &(VkImageCreateInfo){
+                .sType = VK_STRUCTURE_TYPE_IMAGE_CREATE_INFO,
+                .flags =
+                    image->layers == 6 && !spec->array ? VK_IMAGE_CREATE_CUBE_COMPATIBLE_BIT : 0,
+                .imageType = image_type(spec),
+                .format = format_of(spec),
+                .extent = {spec->width, spec->height, image->depth},
+                .mipLevels = image->levels,
+                .arrayLayers = image->layers,
+                .samples = VK_SAMPLE_COUNT_1_BIT,
+                .tiling = spec->mapped ? VK_IMAGE_TILING_LINEAR : VK_IMAGE_TILING_OPTIMAL,
+                .usage = spec->usage,
+                .initialLayout = initial_layout(spec->mapped),
+            },
+            NULL, &image->handle));
 }
 
-static VkImageSubresourceRange levels_of_image(const struct vkb_image *image, uint32_t levels)
+static VkImageSubresourceRange range_of_image(const struct vkb_image *image)
 {
     return (VkImageSubresourceRange){
         .aspectMask = vkb_formats[image->format].aspect,
-        .levelCount = levels,
+        .levelCount = image->levels,
         .layerCount = image->layers,
     };
 }
 
-static bool create_view(const struct vkb_device *device, const struct vkb_image *image,
-                        uint32_t levels, VkImageView *view, struct vkb_error *error)
+static bool create_view(const struct vkb_device *device, VkImageViewType type, VkFormat format,
+                        struct vkb_image *image, struct vkb_error *error)
 {
-    return VK(error, device->vk.vkCreateImageView(
-                         device->handle,
-                         &(VkImageViewCreateInfo){
-                             .sType = VK_STRUCTURE_TYPE_IMAGE_VIEW_CREATE_INFO,
-                             .image = image->handle,
-                             .viewType = image->array       ? VK_IMAGE_VIEW_TYPE_2D_ARRAY
-                                       : image->layers == 6 ? VK_IMAGE_VIEW_TYPE_CUBE
-                                                            : VK_IMAGE_VIEW_TYPE_2D,
-                             .format = vkb_formats[image->format].vk,
-                             .subresourceRange = levels_of_image(image, levels),
-                         },
-                         NULL, view));
-}
-
-bool vkb_image_view(const struct vkb_device *device, struct vkb_image *image, bool all_levels,
-                    VkImageView *view, struct vkb_error *error)
-{
-    const bool all = all_levels || image->levels == 1;
-    VkImageView *kept = all ? &image->view : &image->base_view;
-
-    if (!*kept && !create_view(device, image, all ? image->levels : 1, kept, error))
-        return false;
-    *view = *kept;
-    return true;
+    return VK(error,
+              device->vk.vkCreateImageView(device->handle,
+                                           &(VkImageViewCreateInfo){
+                                               .sType = VK_STRUCTURE_TYPE_IMAGE_VIEW_CREATE_INFO,
+                                               .image = image->handle,
+                                               .viewType = type,
+                                               .format = format,
+                                               .subresourceRange = range_of_image(image),
+                                           },
+                                           NULL, &image->view));
 }
 
 static bool create_linear_texels(const struct vkb_device *device, struct vkb_image *image,
@@ -419,8 +460,8 @@ static VkDeviceSize buffer_size(const struct vkb_image *image)
 }
 
 // The image's memory as a buffer.
-static bool create_buffer(const struct vkb_device *device, struct vkb_image *image,
-                          VkMemoryRequirements *requirements, struct vkb_error *error)
+static bool create_image_buffer(const struct vkb_device *device, struct vkb_image *image,
+                                VkMemoryRequirements *requirements, struct vkb_error *error)
 {
     VkSubresourceLayout layout;
     VkMemoryRequirements own;
@@ -429,15 +470,10 @@ static bool create_buffer(const struct vkb_device *device, struct vkb_image *ima
         device->handle, image->handle,
         &(VkImageSubresource){.aspectMask = vkb_formats[image->format].aspect}, &layout);
     image->row_pitch = (size_t)layout.rowPitch;
-    if (!VK(error, device->vk.vkCreateBuffer(device->handle,
-                                             &(VkBufferCreateInfo){
-                                                 .sType = VK_STRUCTURE_TYPE_BUFFER_CREATE_INFO,
-                                                 .size = buffer_size(image),
-                                                 .usage = VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT
-                                                        | VK_BUFFER_USAGE_STORAGE_BUFFER_BIT
-                                                        | VK_BUFFER_USAGE_TRANSFER_SRC_BIT,
-                                             },
-                                             NULL, &image->buffer)))
+    if (!create_buffer(device,
+                       VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT | VK_BUFFER_USAGE_STORAGE_BUFFER_BIT
+                           | VK_BUFFER_USAGE_TRANSFER_SRC_BIT,
+                       buffer_size(image), 0, &image->buffer, error))
         return false;
     device->vk.vkGetBufferMemoryRequirements(device->handle, image->buffer, &own);
     requirements->memoryTypeBits &= own.memoryTypeBits;
@@ -466,6 +502,9 @@ bool vkb_image_create(const struct vkb_device *device, const struct vkb_image_sp
                       struct vkb_image *image, struct vkb_error *error)
 {
     const struct VolkDeviceTable *vk = &device->vk;
+    const VkImageViewType type = spec->array       ? VK_IMAGE_VIEW_TYPE_2D_ARRAY
+                               : spec->layers == 6 ? VK_IMAGE_VIEW_TYPE_CUBE
+                                                   : (VkImageViewType)image_type(spec);
     VkMemoryRequirements requirements;
     VkMemoryPropertyFlags flags;
 
@@ -473,8 +512,9 @@ bool vkb_image_create(const struct vkb_device *device, const struct vkb_image_sp
         .format = spec->format,
         .width = spec->width,
         .height = spec->height,
-        .layers = spec->layers,
-        .levels = spec->levels,
+        .depth = spec->dimensions ? spec->depth : 1,
+        .layers = spec->layers ? spec->layers : 1,
+        .levels = spec->levels ? spec->levels : 1,
         .usage = spec->usage,
         .array = spec->array,
         .channels = vkb_formats[spec->format].channels,
@@ -482,13 +522,12 @@ bool vkb_image_create(const struct vkb_device *device, const struct vkb_image_sp
     if (!create_handle(device, spec, image, error))
         return false;
     vk->vkGetImageMemoryRequirements(device->handle, image->handle, &requirements);
-    if ((spec->mapped && !create_buffer(device, image, &requirements, error))
-        || !vkb_memory_allocate(device, spec->mapped ? VKB_MEMORY_SHARED : VKB_MEMORY_DEVICE,
-                                &requirements, NULL, &image->memory, &flags, error)
+    if ((spec->mapped && !create_image_buffer(device, image, &requirements, error))
+        || !allocate_kind(device, spec->mapped ? VKB_MEMORY_SHARED : VKB_MEMORY_DEVICE,
+                          &requirements, NULL, &image->memory, &flags, error)
         || !VK(error, vk->vkBindImageMemory(device->handle, image->handle, image->memory, 0))
         || (spec->mapped && !map_image(device, image, error))
-        || ((spec->layers == 1 || spec->array) && (spec->usage & VIEWED)
-            && !create_view(device, image, spec->levels, &image->view, error))) {
+        || ((spec->usage & VIEWED) && !create_view(device, type, format_of(spec), image, error))) {
         vkb_image_destroy(device, image);
         return false;
     }
@@ -500,9 +539,8 @@ void vkb_image_destroy(const struct vkb_device *device, struct vkb_image *image)
     device->vk.vkDestroyBufferView(device->handle, image->linear_texels, NULL);
     device->vk.vkDestroyBuffer(device->handle, image->buffer, NULL);
     device->vk.vkDestroyImageView(device->handle, image->view, NULL);
-    device->vk.vkDestroyImageView(device->handle, image->base_view, NULL);
     device->vk.vkDestroyImage(device->handle, image->handle, NULL);
-    vkb_memory_free(device, image->memory);
+    free_memory(device, image->memory);
     *image = (struct vkb_image){0};
 }
 
@@ -520,7 +558,7 @@ void vkb_image_transition(const struct vkb_device *device, VkCommandBuffer comma
         .oldLayout = vkb_image_layout(image, image->access),
         .newLayout = vkb_image_layout(image, access),
         .image = image->handle,
-        .subresourceRange = levels_of_image(image, image->levels),
+        .subresourceRange = range_of_image(image),
     };
 
     // A mapped image is also accessed as a buffer, and only a memory barrier covers these writes.
@@ -529,4 +567,17 @@ void vkb_image_transition(const struct vkb_device *device, VkCommandBuffer comma
                        !image->mapped || barrier.oldLayout != barrier.newLayout ? &barrier : NULL,
                        image->mapped, image->access, access);
     image->access = access;
+}
+
+void vkb_image_fill(const struct vkb_device *device, VkCommandBuffer commands,
+                    struct vkb_image *image, VkBuffer from, VkDeviceSize offset)
+{
+    vkb_image_transition(device, commands, image, VKB_ACCESS_COPY_TARGET);
+    device->vk.vkCmdCopyBufferToImage(
+        commands, from, image->handle, vkb_image_layout(image, VKB_ACCESS_COPY_TARGET), 1,
+        &(VkBufferImageCopy){
+            .bufferOffset = offset,
+            .imageSubresource = {VK_IMAGE_ASPECT_COLOR_BIT, 0, 0, 1},
+            .imageExtent = {image->width, image->height, image->depth},
+        });
 }

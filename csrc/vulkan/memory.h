@@ -27,9 +27,9 @@ struct vkb_buffer {
 struct vkb_image {
     VkImage handle;
     VkDeviceMemory memory;
-    VkImageView view, base_view;  // of all levels and of the first; of cubemaps see vkb_image_view
+    VkImageView view;  // of all levels
     enum vkb_format format;
-    uint32_t width, height, layers, levels;
+    uint32_t width, height, depth, layers, levels;
     VkImageUsageFlags usage;
     bool array;              // its view is of an array, also of six layers
     enum vkb_access access;  // the last access recorded
@@ -41,32 +41,33 @@ struct vkb_image {
     VkBufferView linear_texels;  // created at its first use
 };
 
-// Six layers make a cubemap, unless it is an array. A mapped image has one layer and one level, and
+// Without numbers of layers and levels there is one. Six layers make a cubemap, unless it is an
+// array. A mapped image has one layer and one level, and
 // its memory is also a buffer; this requires device->linear_texels.
 struct vkb_image_spec {
     enum vkb_format format;
     uint32_t width, height, layers, levels;
     VkImageUsageFlags usage;
     bool mapped, array;
+    // Of colour images of other formats, whose `format` is NONE: 1 to 3 dimensions, and the third.
+    VkFormat other;
+    uint32_t dimensions, depth;
 };
 
 // Advises the system to use large pages for memory that has not been written yet.
 void vkb_advise_large(void *memory, size_t size);
 
-// Memory of a kind that fits the requirements; *flags gets the properties of its type. `next`:
-// what extends VkMemoryAllocateInfo; NULL: nothing.
-bool vkb_memory_allocate(const struct vkb_device *device, enum vkb_memory_kind kind,
-                         const VkMemoryRequirements *requirements, const void *next,
-                         VkDeviceMemory *memory, VkMemoryPropertyFlags *flags,
-                         struct vkb_error *error);
-
-// What is null is not freed.
-void vkb_memory_free(const struct vkb_device *device, VkDeviceMemory memory);
-
 // On failure nothing leaks. Destroying a zeroed or half-created object is safe.
 bool vkb_buffer_create(const struct vkb_device *device, enum vkb_memory_kind kind,
                        VkBufferUsageFlags usage, VkDeviceSize size, struct vkb_buffer *buffer,
                        struct vkb_error *error);
+
+// Creates a buffer whose memory other interfaces of the same GPU can import. *descriptor is a new
+// descriptor of the memory, which belongs to the caller. buffer->size is that of the memory. Needs
+// device->exports.
+bool vkb_buffer_export(const struct vkb_device *device, VkDeviceSize size,
+                       struct vkb_buffer *buffer, int *descriptor, struct vkb_error *error);
+
 void vkb_buffer_destroy(const struct vkb_device *device, struct vkb_buffer *buffer);
 
 // Makes the buffer at least `size` bytes large. If it grows, its content is lost.
@@ -103,10 +104,6 @@ struct vkb_borrowed {
 bool vkb_image_borrow(const struct vkb_device *device, const struct vkb_borrowed *borrowed,
                       struct vkb_image *image);
 
-// Creates the view of a cubemap with all levels, or with the first one, if there is none.
-bool vkb_image_view(const struct vkb_device *device, struct vkb_image *image, bool all_levels,
-                    VkImageView *view, struct vkb_error *error);
-
 // Creates the view of a mapped image's linear texels if there is none. The image must be small
 // enough (see vkb_image_fits_linear_texels).
 bool vkb_image_linear_texels(const struct vkb_device *device, struct vkb_image *image,
@@ -121,6 +118,10 @@ bool vkb_image_fits_linear_texels(const struct vkb_device *device, enum vkb_form
 
 // The layout of the image for that access. A mapped image is always in the general layout.
 VkImageLayout vkb_image_layout(const struct vkb_image *image, enum vkb_access access);
+
+// Records the copy of all pixels, without gaps, to the only level of an image with one layer.
+void vkb_image_fill(const struct vkb_device *device, VkCommandBuffer commands,
+                    struct vkb_image *image, VkBuffer from, VkDeviceSize offset);
 
 // Records the barrier between the image's last access and `access`.
 void vkb_image_transition(const struct vkb_device *device, VkCommandBuffer commands,

@@ -27,21 +27,15 @@ struct work {
     uint32_t part_count;
 };
 
-struct worker {
-    struct vkb_workers *workers;
-    pthread_t thread;
-    pthread_cond_t wake;
-};
-
 struct vkb_workers {
     pthread_mutex_t lock;
+    pthread_cond_t wake;
     struct work *work;  // NULL: none
     uint64_t number;    // of works so far
     bool ending;
     atomic_uint busy;  // threads that may use the work
-    // By part, from 1 on; part 0 is the caller's.
-    struct worker parts[VKB_MAX_PARTS];
-    uint32_t started;  // the highest part with a thread
+    pthread_t threads[VKB_MAX_PARTS - 1];
+    uint32_t started, running;  // threads
 };
 
 uint32_t vkb_core_count(void)
@@ -76,13 +70,6 @@ static bool do_chunk(struct work *work, uint32_t part)
     return true;
 }
 
-// Each thread wakes two others, since to wake all one by one takes as long as a part of the work.
-static void wake_next(struct vkb_workers *workers, uint32_t part)
-{
-    for (uint32_t next = 2 * part + 1; next <= 2 * part + 2 && next <= workers->started; ++next)
-        pthread_cond_signal(&workers->parts[next].wake);
-}
-
 // Until the workers end, with the lock.
 static void work_on(struct vkb_workers *workers, uint32_t part)
 {
@@ -90,11 +77,10 @@ static void work_on(struct vkb_workers *workers, uint32_t part)
 
     while (!workers->ending) {
         if (workers->number == last) {
-            pthread_cond_wait(&workers->parts[part].wake, &workers->lock);
+            pthread_cond_wait(&workers->wake, &workers->lock);
             continue;
         }
         last = workers->number;
-        wake_next(workers, part);
         struct work *work = workers->work;
         if (!work || part >= work->part_count)
             continue;
@@ -109,11 +95,11 @@ static void work_on(struct vkb_workers *workers, uint32_t part)
 
 static void *do_parts(void *argument)
 {
-    struct worker *own = argument;
-    struct vkb_workers *workers = own->workers;
+    struct vkb_workers *workers = argument;
 
     pthread_mutex_lock(&workers->lock);
-    work_on(workers, (uint32_t)(own - workers->parts));
+    // Part 0 is the caller's.
+    work_on(workers, ++workers->running);
     pthread_mutex_unlock(&workers->lock);
     return NULL;
 }
@@ -168,17 +154,9 @@ static void start_workers(struct vkb_workers *workers, uint32_t part_count)
     // Threads inherit the mask. A signal handler of the application must not run in one of them.
     sigfillset(&all);
     pthread_sigmask(SIG_SETMASK, &all, &before);
-    while (workers->started + 1 < part_count) {
-        struct worker *next = &workers->parts[workers->started + 1];
-        next->workers = workers;
-        if (pthread_cond_init(&next->wake, NULL) != 0)
-            break;
-        if (pthread_create(&next->thread, NULL, do_parts, next) != 0) {
-            pthread_cond_destroy(&next->wake);
-            break;
-        }
+    while (workers->started + 1 < part_count
+           && pthread_create(&workers->threads[workers->started], NULL, do_parts, workers) == 0)
         ++workers->started;
-    }
     pthread_sigmask(SIG_SETMASK, &before, NULL);
 }
 
@@ -188,7 +166,7 @@ static void give(struct vkb_workers *workers, struct work *work)
     start_workers(workers, work->part_count);
     workers->work = work;
     ++workers->number;
-    wake_next(workers, 0);
+    pthread_cond_broadcast(&workers->wake);
     pthread_mutex_unlock(&workers->lock);
 }
 
@@ -207,10 +185,10 @@ struct vkb_workers *vkb_workers_create(struct vkb_error *error)
 {
     struct vkb_workers *workers = vkb_alloc(error, 1, sizeof *workers);
 
-    if (workers && pthread_mutex_init(&workers->lock, NULL) != 0) {
-        vkb_free(workers);
-        vkb_fail(error, VKB_ERROR_OUT_OF_MEMORY, "the system has no memory for a lock");
-        return NULL;
+    // Neither can fail on Linux and macOS.
+    if (workers) {
+        pthread_mutex_init(&workers->lock, NULL);
+        pthread_cond_init(&workers->wake, NULL);
     }
     return workers;
 }
@@ -221,13 +199,11 @@ void vkb_workers_destroy(struct vkb_workers *workers)
         return;
     pthread_mutex_lock(&workers->lock);
     workers->ending = true;
-    for (uint32_t part = 1; part <= workers->started; ++part)
-        pthread_cond_signal(&workers->parts[part].wake);
+    pthread_cond_broadcast(&workers->wake);
     pthread_mutex_unlock(&workers->lock);
-    for (uint32_t part = 1; part <= workers->started; ++part) {
-        pthread_join(workers->parts[part].thread, NULL);
-        pthread_cond_destroy(&workers->parts[part].wake);
-    }
+    for (uint32_t i = 0; i < workers->started; ++i)
+        pthread_join(workers->threads[i], NULL);
+    pthread_cond_destroy(&workers->wake);
     pthread_mutex_destroy(&workers->lock);
     vkb_free(workers);
 }

@@ -5,12 +5,10 @@
 #include <stdio.h>
 #include <string.h>
 #include <sys/utsname.h>
-#include <unistd.h>
 
 // One more in each child of a fork. Process ids do not tell a child from its parent in another
 // namespace of ids, as containers have: both may be 1.
 static atomic_long current = 1;
-static bool counts;  // whether a fork's child counts
 
 static void count(void)
 {
@@ -19,7 +17,8 @@ static void count(void)
 
 static void count_in_children(void)
 {
-    counts = pthread_atfork(NULL, NULL, count) == 0;
+    // It fails only without memory, at the start of a process.
+    (void)pthread_atfork(NULL, NULL, count);
 }
 
 long vkb_current_process(void)
@@ -27,7 +26,7 @@ long vkb_current_process(void)
     static pthread_once_t once = PTHREAD_ONCE_INIT;
 
     pthread_once(&once, count_in_children);
-    return counts ? atomic_load(&current) : (long)getpid();
+    return atomic_load(&current);
 }
 
 bool vkb_fork_leaves_pinned(void)

@@ -12,7 +12,7 @@ void vkb_timer_destroy(const struct vkb_device *device, struct vkb_timer *timer)
 bool vkb_timer_reserve(const struct vkb_device *device, uint32_t spans, struct vkb_timer *timer,
                        struct vkb_error *error)
 {
-    if (spans <= timer->capacity || device->timestamp_mask == 0)
+    if (spans <= timer->capacity || device->adapter.timestamp_mask == 0)
         return true;
     vkb_timer_destroy(device, timer);
     if (!(timer->stamps = vkb_alloc(error, (size_t)2 * spans, sizeof *timer->stamps))
@@ -78,6 +78,6 @@ double vkb_timer_seconds(const struct vkb_device *device, const struct vkb_timer
     if (!timer->queries)
         return NAN;
     uint64_t ticks =
-        (timer->stamps[2 * span + 1] - timer->stamps[2 * span]) & device->timestamp_mask;
+        (timer->stamps[2 * span + 1] - timer->stamps[2 * span]) & device->adapter.timestamp_mask;
     return (double)ticks * device->limits.timestampPeriod * 1e-9;
 }

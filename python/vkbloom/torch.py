@@ -65,13 +65,7 @@ def bloom(
     """
     settings = check_settings(settings, of_image=True)
     return _call(
-        image,
-        settings,
-        {},
-        mask=mask,
-        emission=emission,
-        renderer=renderer,
-        channels_first=channels_first,
+        image, settings, {}, mask=mask, emission=emission, renderer=renderer, first=channels_first
     )
 
 
@@ -145,15 +139,8 @@ class Bloom(torch.nn.Module):  # type: ignore[misc]
             # Comparing parameters waits for the device, which would end the capture.
             refuse_capture(image)
         values = dict(zip(self._names, self._values(), strict=True))
-        return _call(
-            image,
-            self._start,
-            values,
-            mask=mask,
-            emission=emission,
-            renderer=self._renderer,
-            channels_first=self._channels_first,
-        )
+        options: dict[str, Any] = {"renderer": self._renderer, "first": self._channels_first}
+        return _call(image, self._start, values, mask=mask, emission=emission, **options)
 
     def _parameter(self, name: str) -> Any:
         return self.learned[name.replace(".", "_")]
@@ -193,15 +180,15 @@ def _call(
     mask: Any,
     emission: Any,
     renderer: Renderer | None,
-    channels_first: bool,
+    first: bool,
 ) -> Any:
-    """Run the operator; `values` are tensors of fields."""
+    """Run the operator; `values` are tensors of fields, `first`: channels stand first."""
     for name, tensor in (("image", image), ("mask", mask), ("emission", emission)):
         if not isinstance(tensor, torch.Tensor) and (tensor is not None or name == "image"):
             raise TypeError(f"{name}: a tensor is needed, not {type(tensor).__name__}")
-    _check(image, mask, emission, channels_first)
+    _check(image, mask, emission, first)
     _check_renderer(renderer)
-    if channels_first:
+    if first:
         image = image.movedim(-3, -1)
         emission = None if emission is None else emission.movedim(-3, -1)
     final = torch.ops.vkbloom.bloom(
@@ -213,7 +200,7 @@ def _call(
         text_of(settings),
         number_of(renderer),
     )
-    return final.movedim(-1, -3) if channels_first else final
+    return final.movedim(-1, -3) if first else final
 
 
 def _check(image: Any, mask: Any, emission: Any, channels_first: bool) -> None:

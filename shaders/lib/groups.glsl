@@ -26,7 +26,7 @@ float group_luminance(vec4 value)
     return max(dot(value.rgb, LUMINANCE), 0.0);
 }
 
-float brightest_channel(vec4 value)
+float brightest(vec3 value)
 {
     return max(max(value.r, max(value.g, value.b)), 0.0);
 }
@@ -109,7 +109,7 @@ vec4 box_of(vec4 taps[4])
     vec4 sum = vec4(0.0);
     float shares = 0.0;
     [[unroll]] for (int corner = 0; corner < 4; ++corner) {
-        float share = 1.0 / (1.0 + brightest_channel(taps[corner]));
+        float share = 1.0 / (1.0 + brightest(taps[corner].rgb));
         sum += share * taps[corner];
         shares += share;
     }

@@ -5,11 +5,6 @@
 #include "lib/highlights.glsl"
 #include "lib/kino.glsl"
 
-float brightest(vec3 value)
-{
-    return max(max(value.r, max(value.g, value.b)), 0.0);
-}
-
 // Bevy's: 13 taps in groups that are weighted by brightness but not renormalized, a floor, then the
 // threshold (bevyengine/bevy v0.19.1, bloom.wgsl).
 vec4 bevy_prefiltered(Taps taps)
@@ -150,31 +145,6 @@ vec4 three_prefiltered(vec4 value)
 }
 
 // Not one expression: glslang 12 writes invalid SPIR-V for a condition of several constants.
-int group_count()
-{
-    if (GROUPS == GROUPS_BOX)
-        return 4;
-    if (GROUPS == GROUPS_FILAMENT)
-        return 4;
-    if (GROUPS == GROUPS_URP)
-        return 1;
-    if (GROUPS == GROUPS_POST_PROCESSING)
-        return 1;
-    if (GROUPS == GROUPS_UNREAL)
-        return 1;
-    if (GROUPS == GROUPS_DARKTABLE)
-        return 1;
-    if (GROUPS == GROUPS_THREE)
-        return 1;
-    if (GROUPS == GROUPS_BABYLON)
-        return 1;
-    if (GROUPS == GROUPS_HIGHLIGHTS)
-        return 1;
-    if (GROUPS == GROUPS_KINO)
-        return ANTI_FLICKER != 0 ? 5 : 1;
-    return 5;
-}
-
 bool are_of_thirteen()
 {
     if (GROUPS == GROUPS_PYGFX)
@@ -182,6 +152,25 @@ bool are_of_thirteen()
     if (GROUPS == GROUPS_PYGFX_KARIS)
         return true;
     return GROUPS == GROUPS_BEVY || GROUPS == GROUPS_PYRAMID;
+}
+
+// Whether each group is a tap of its own.
+bool has_own_taps()
+{
+    return GROUPS != GROUPS_BLENDER && !are_of_thirteen();
+}
+
+int group_count()
+{
+    if (!has_own_taps())
+        return 5;
+    if (GROUPS == GROUPS_BOX)
+        return 4;
+    if (GROUPS == GROUPS_FILAMENT)
+        return 4;
+    if (GROUPS == GROUPS_KINO)
+        return ANTI_FLICKER != 0 ? 5 : 1;
+    return GROUPS == GROUPS_HDRP ? 5 : 1;
 }
 
 // The place of a tap that is a group of its own, in texels.
@@ -195,16 +184,6 @@ vec2 place_of(int group, FilamentTaps pairs)
         return HDRP_OFFSETS[group];
     const vec2 cross[5] = vec2[](vec2(0, 0), vec2(-1, 0), vec2(1, 0), vec2(0, -1), vec2(0, 1));
     return cross[group];
-}
-
-// Whether each group is a tap of its own.
-bool has_own_taps()
-{
-    if (GROUPS == GROUPS_PYRAMID)
-        return false;
-    if (GROUPS == GROUPS_BLENDER)
-        return false;
-    return !are_of_thirteen();
 }
 
 // What the method makes of groups that are one tap each, and of Filament's shares.

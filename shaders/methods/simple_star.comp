@@ -6,12 +6,44 @@
 
 UNIFORM_BLOCK(STAR_BLOCK);
 #include "lib/storage.glsl"
-#include "lib/star_line.glsl"
 
 layout(local_size_x = ROW_INVOCATIONS) in;
 layout(set = 0, binding = 1) uniform sampler2D source;
 layout(set = 0, binding = 2) uniform sampler2D before;
 layout(set = 0, binding = 3) uniform writeonly image2D target;
+
+// The pixels of a line: the first one, the step to the next one, and their number; 0: there is no such
+// line.
+struct Line {
+    ivec2 first, towards;
+    int count;
+};
+
+// The first pixel of a line: on the side that it leaves, then at the bottom.
+ivec2 start_of(int line, ivec2 size)
+{
+    int side = params.step_x < 0 ? size.x - 1 : 0;
+    if (params.step_x == 0)
+        return ivec2(line, size.y - 1);
+    if (line < size.y)
+        return ivec2(side, line);
+    int along = line - size.y + 1;
+    return ivec2(params.step_x < 0 ? side - along : along, size.y - 1);
+}
+
+Line line_of(int number, ivec2 size)
+{
+    ivec2 towards = ivec2(params.step_x, params.step_y);
+    int lines = (towards.x != 0 ? size.y : 0) + (towards.y != 0 ? size.x : 0);
+    if (number >= lines - (towards.x != 0 && towards.y != 0 ? 1 : 0))
+        return Line(ivec2(0), ivec2(0), 0);
+    ivec2 first = start_of(number, size);
+    int across = towards.x > 0 ? size.x - first.x : towards.x < 0 ? first.x + 1 : size.y;
+    int count = towards.y != 0 ? min(across, first.y + 1) : across;
+    if (params.backwards != 0)
+        return Line(first + (count - 1) * towards, -towards, count);
+    return Line(first, towards, count);
+}
 
 vec4 fetch(Line line, int at)
 {

@@ -16,7 +16,6 @@ import vkbloom
 from tests.cli.calls import run
 from tests.io.parts import written
 from tests.io.profiles import store_png
-from vkbloom._cli import applied
 from vkbloom._io.image_reading import load
 
 oiio = pytest.importorskip("OpenImageIO")
@@ -95,7 +94,7 @@ def test_half_floats(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = stored(tmp_path / "a.png", 50, 41)
     made = []
     for limit, words in ((1 << 26, ()), (1 << 26, ("--half",)), (1, ())):
-        monkeypatch.setattr(applied, "_HALVED", limit)
+        monkeypatch.setattr("vkbloom._cli.apply._HALVED", limit)
         target = tmp_path / "b.exr"
         assert apply(path, target, "--exposure", -1, *words).exit_code == 0
         made.append(vkbloom.read(target))

@@ -11,7 +11,7 @@ import vkbloom
 from tests.core.builds import ROOT
 from tests.processes import python
 from vkbloom import Pyramid, Separable
-from vkbloom._cli.view import Live
+from vkbloom._cli.live import Live
 
 NAMES = ["glow", "blur_vertical", "bloom", "scene", "final"]
 

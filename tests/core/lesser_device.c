@@ -41,8 +41,8 @@
     FUNCTION(vkQueueWaitIdle) \
     FUNCTION(vkCreateSemaphore) \
     FUNCTION(vkDestroySemaphore) \
-    FUNCTION(vkSignalSemaphoreKHR) \
-    FUNCTION(vkWaitSemaphoresKHR)
+    FUNCTION(vkSignalSemaphore) \
+    FUNCTION(vkWaitSemaphores)
 
 // What is below. Of the first instance and its first device, and good for all: these functions go
 // by their handles.
@@ -559,23 +559,23 @@ struct shared_semaphore {
 
 static void signal_shared(void *handle, uint64_t semaphore, uint64_t value)
 {
-    below.vkSignalSemaphoreKHR(handle, &(VkSemaphoreSignalInfo){
-                                           .sType = VK_STRUCTURE_TYPE_SEMAPHORE_SIGNAL_INFO,
-                                           .semaphore = (VkSemaphore)semaphore,
-                                           .value = value,
-                                       });
+    below.vkSignalSemaphore(handle, &(VkSemaphoreSignalInfo){
+                                        .sType = VK_STRUCTURE_TYPE_SEMAPHORE_SIGNAL_INFO,
+                                        .semaphore = (VkSemaphore)semaphore,
+                                        .value = value,
+                                    });
 }
 
 static void wait_shared(void *handle, uint64_t semaphore, uint64_t value)
 {
-    below.vkWaitSemaphoresKHR(handle,
-                              &(VkSemaphoreWaitInfo){
-                                  .sType = VK_STRUCTURE_TYPE_SEMAPHORE_WAIT_INFO,
-                                  .semaphoreCount = 1,
-                                  .pSemaphores = &(VkSemaphore){(VkSemaphore)semaphore},
-                                  .pValues = &value,
-                              },
-                              UINT64_MAX);
+    below.vkWaitSemaphores(handle,
+                           &(VkSemaphoreWaitInfo){
+                               .sType = VK_STRUCTURE_TYPE_SEMAPHORE_WAIT_INFO,
+                               .semaphoreCount = 1,
+                               .pSemaphores = &(VkSemaphore){(VkSemaphore)semaphore},
+                               .pValues = &value,
+                           },
+                           UINT64_MAX);
 }
 
 static VKAPI_ATTR void VKAPI_CALL get_semaphores(VkPhysicalDevice physical,

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 import vkbloom
 from tests.images import picture
 from vkbloom import Renderer, load_method, psf, reference, testing
+from vkbloom._cli.live import Live
 from vkbloom._cli.program import program
-from vkbloom._cli.view import Live
 from vkbloom._explorer.controls import as_code
 from vkbloom._settings.registry import METHODS
 
@@ -221,7 +221,7 @@ def test_the_reference_needs_a_twin(kind: Any) -> None:
     [
         (["render", "--size", "32x24", "-o", "{out}.exr"], "{out}.exr"),
         (["apply", "{image}", "{out}.exr"], "{out}.exr"),
-        (["warm", "--type", "float16", "--size", "40x32"], "{image}"),
+        (["warm", "--size", "40x32"], "{image}"),
         (["grid", "{image}", "--axis", "spread=1:3:2", "--out", "{out}.zarr"], "{out}.zarr"),
     ],
 )

@@ -475,7 +475,7 @@ def errors(renderer: Any) -> None:
 
 def missing(renderer: Any) -> None:
     """With another UUID of the second GPU of the stand-in."""
-    part = "which is not among CUDA's GPUs: Stand-in 0 (uuid:eeeeeeee-"
+    part = "which is not among CUDA's 2 GPUs. Open a renderer with"
     raises(ValueError, part, lambda: renderer.apply(OnDevice(picture(24, 16))))
 
 

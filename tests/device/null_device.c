@@ -178,7 +178,6 @@ static const struct entry entries[] = {
     OWN(vkBindImageMemory, succeed),
     PAIR(BufferView),
     PAIR(ImageView),
-    PAIR(Framebuffer),
     PAIR(QueryPool),
     PAIR(Fence),
     OWN(vkGetQueryPoolResults, get_queries),

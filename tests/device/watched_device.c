@@ -11,7 +11,7 @@
     FUNCTION(vkCreateImage) \
     FUNCTION(vkDestroyImage) \
     FUNCTION(vkCreateImageView) \
-    FUNCTION(vkCreateFramebuffer) \
+    FUNCTION(vkCmdBeginRendering) \
     FUNCTION(vkUpdateDescriptorSets) \
     FUNCTION(vkCmdCopyImageToBuffer) \
     FUNCTION(vkCmdCopyBufferToImage) \
@@ -109,17 +109,14 @@ static VKAPI_ATTR VkResult VKAPI_CALL create_view(VkDevice device,
     return result;
 }
 
-static VKAPI_ATTR VkResult VKAPI_CALL create_framebuffer(VkDevice device,
-                                                         const VkFramebufferCreateInfo *info,
-                                                         const VkAllocationCallbacks *callbacks,
-                                                         VkFramebuffer *framebuffer)
+static VKAPI_ATTR void VKAPI_CALL begin_rendering(VkCommandBuffer commands,
+                                                  const VkRenderingInfo *info)
 {
-    const VkImageUsageFlags targets =
-        VK_IMAGE_USAGE_COLOR_ATTACHMENT_BIT | VK_IMAGE_USAGE_DEPTH_STENCIL_ATTACHMENT_BIT;
-
-    for (uint32_t i = 0; i < info->attachmentCount; ++i)
-        use_view(info->pAttachments[i], targets);
-    return below.vkCreateFramebuffer(device, info, callbacks, framebuffer);
+    for (uint32_t i = 0; i < info->colorAttachmentCount; ++i)
+        use_view(info->pColorAttachments[i].imageView, VK_IMAGE_USAGE_COLOR_ATTACHMENT_BIT);
+    if (info->pDepthAttachment)
+        use_view(info->pDepthAttachment->imageView, VK_IMAGE_USAGE_DEPTH_STENCIL_ATTACHMENT_BIT);
+    below.vkCmdBeginRendering(commands, info);
 }
 
 static VKAPI_ATTR void VKAPI_CALL update_sets(VkDevice device, uint32_t count,
@@ -240,7 +237,7 @@ static const struct entry entries[] = {
     ENTRY(vkCreateImage, create_image, true),
     ENTRY(vkDestroyImage, destroy_image, true),
     ENTRY(vkCreateImageView, create_view, true),
-    ENTRY(vkCreateFramebuffer, create_framebuffer, true),
+    ENTRY(vkCmdBeginRendering, begin_rendering, true),
     ENTRY(vkUpdateDescriptorSets, update_sets, true),
     ENTRY(vkCmdCopyImageToBuffer, copy_to_buffer, true),
     ENTRY(vkCmdCopyBufferToImage, copy_to_image, true),

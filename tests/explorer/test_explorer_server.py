@@ -277,7 +277,7 @@ def test_an_image_begins_as_in_apply(
             # Nothing is to be served.
             raise ValueError("recorded")
 
-    monkeypatch.setattr("vkbloom._cli.explore.Viewer", Recorded)
+    monkeypatch.setattr("vkbloom._cli.live.Viewer", Recorded)
     result = CliRunner().invoke(program, ["explore", "--no-open", *words])
     assert "recorded" in result.stderr
     ((image, settings),) = begun

@@ -14,7 +14,7 @@ import pytest
 import vkbloom
 from tests.exhaustive import some
 from vkbloom import DualKawase, Pyramid, Renderer, Separable, UrpBloom, psf, reference
-from vkbloom._cli import fields, translate
+from vkbloom._cli import fields, search
 from vkbloom._fit.translating import lights
 
 SIZE = (96, 64)
@@ -69,7 +69,7 @@ class TestTranslate:
         assert found.loss < 0.02
 
     def test_the_usual_size_is_the_same_everywhere(self) -> None:
-        (option,) = (one for one in translate.command.params if one.name == "size")
+        (option,) = (one for one in search.translate.params if one.name == "size")
         usual = inspect.signature(vkbloom.translate).parameters["size"].default
         assert fields.SIZE.convert(str(option.default), None, None) == usual == (640, 360)
 

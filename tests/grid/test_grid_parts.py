@@ -82,7 +82,7 @@ def laid_out(intensity: float) -> tuple[Grid, Layout]:
         reduce=None,
     )
     final = Variable(("y", "x", "channel"), (4, 4, 3), np.dtype(np.uint8), {})
-    return grid, Layout((0,), {"final": final}, {}, "adapter", "driver", "1.0")
+    return grid, Layout((0,), {"final": final}, "adapter", "driver", "1.0")
 
 
 @pytest.mark.parametrize("turn", range(4))

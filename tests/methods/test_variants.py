@@ -228,7 +228,7 @@ def test_a_cpu_enlarges_in_strips_that_have_each_rows_taps_once(renderer: Render
     plan = renderer.plan(np.zeros((18, 32, 3), np.float32), BevyBloom(max_mip_dimension=64))
     linear = has_linear_texels(renderer)
     (first,) = (one for one in plan.passes if one.name == "down_0")
-    assert first.shader.startswith("shrink_linear") == linear
+    assert first.shader.startswith("taps_linear") == linear
 
 
 def test_small_images_are_convolved_in_more_stages_of_smaller_pipelines(

@@ -18,7 +18,7 @@ import vkbloom
 from vkbloom import psf
 from vkbloom._cli.image_files import silenced
 from vkbloom._cli.program import given
-from vkbloom._cli.streams import as_file
+from vkbloom._cli.sequences import as_file
 from vkbloom._settings.fields import FieldInfo, Kind, fields_of
 from vkbloom._settings.glare import Glare
 from vkbloom._settings.registry import METHODS, STAGES, glares

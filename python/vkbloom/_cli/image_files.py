@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom._cli.program import given
-from vkbloom._cli.streams import as_file, shown
+from vkbloom._cli.sequences import as_file, shown
 from vkbloom._cli.terminal import note
 from vkbloom._io import image_reading
 from vkbloom._io.alpha import divided, hidden_notes

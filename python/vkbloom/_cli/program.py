@@ -40,7 +40,12 @@ COMMANDS: Final = {
 }
 
 # Modules of several commands.
-_MODULES: Final = dict.fromkeys(("presets", "glares", "psfs"), "listing")
+_MODULES: Final = {
+    **dict.fromkeys(("presets", "glares", "psfs"), "listing"),
+    **dict.fromkeys(("fit", "translate"), "search"),
+    **dict.fromkeys(("view", "explore"), "live"),
+    "adapters": "doctor",
+}
 
 _FAILURES: Final = (vkbloom.Error, OSError, ValueError, ImportError, MemoryError)
 

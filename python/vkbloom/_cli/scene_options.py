@@ -13,7 +13,7 @@ import click
 from vkbloom import Camera, Scene
 from vkbloom._cli import fields
 from vkbloom._cli.program import as_wrong_use
-from vkbloom._cli.streams import as_file
+from vkbloom._cli.sequences import as_file
 from vkbloom._scene import gltf, skybox
 
 _BUILT_IN: Final = "ufo"

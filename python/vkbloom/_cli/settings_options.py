@@ -14,7 +14,7 @@ import vkbloom
 from vkbloom._cli import fields
 from vkbloom._cli.image_files import is_photograph, silenced
 from vkbloom._cli.program import as_wrong_use
-from vkbloom._cli.streams import as_file
+from vkbloom._cli.sequences import as_file
 from vkbloom._io.expansion import PHOTO_EXPANSION
 from vkbloom._renderer.frame_files import facts_of
 from vkbloom._settings.fields import fields_of

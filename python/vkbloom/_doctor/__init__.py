@@ -66,7 +66,7 @@ def _adapters(listed: child.Answer, has_problem: bool) -> Finding:
     """Judge the list of adapters; `has_problem`: the loader or a driver has a problem."""
     if listed.value and listed.value["adapters"]:
         return Finding("adapters", "ok", drivers.names(listed.value["adapters"]))
-    reason = listed.failure or "no driver has a device with Vulkan 1.1"
+    reason = listed.failure or "no driver has a device with Vulkan 1.3"
     messages = drivers.complaints(listed.messages)
     said = f"; the loader says: {' / '.join(messages)}" if messages else ""
     is_above = has_problem or installation.memory()

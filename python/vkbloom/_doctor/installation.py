@@ -16,6 +16,13 @@ from vkbloom import _core
 from vkbloom._free_memory import ADVICE, address_space_left
 from vkbloom._io import disk_cache
 
+# Address space of a render of a small image on lavapipe, with the interpreter.
+_AMPLE: Final = 1 << 30
+# Of the project, and in no registry yet.
+_UNPUBLISHED: Final = ("vkbloom-lavapipe", "vkbloom-glslang")
+# Variables of the loader, Mesa and vkbloom that change the rendering or choose the device.
+_VARIABLES = re.compile(r"(VK|VKBLOOM|LP|MESA|__GL|GALLIVM|LIBGL|NODEVICE|(DIS|EN)ABLE_LAYER)_\w+")
+
 
 class Finding(NamedTuple):
     """The result of one check.
@@ -37,14 +44,6 @@ class Report(NamedTuple):
 
     findings: tuple[Finding, ...]
     can_render: bool
-
-
-# Address space of a render of a small image on lavapipe, with the interpreter.
-_AMPLE: Final = 1 << 30
-# Of the project, and in no registry yet.
-_UNPUBLISHED: Final = ("vkbloom-lavapipe", "vkbloom-glslang")
-# Variables of the loader, Mesa and vkbloom that change the rendering or choose the device.
-_VARIABLES = re.compile(r"(VK|VKBLOOM|LP|MESA|__GL|GALLIVM|LIBGL|NODEVICE|(DIS|EN)ABLE_LAYER)_\w+")
 
 
 def package() -> Finding:

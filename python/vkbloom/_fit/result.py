@@ -29,6 +29,7 @@ _CLIPPED: Final = 1e-3
 _PIXELS: Final = 2**16
 
 Array = NDArray[np.float64]
+_WIDTH = 300  # pixels of a picture
 
 
 def is_found(target: Array, residual: Array, plain: Array) -> bool:
@@ -114,8 +115,6 @@ def _other_encoding(target: Array, result: Array) -> str:
 
 # The smallest shares of the loss without bloom that a good and a fair fit explain.
 _GOOD, _FAIR = 0.95, 0.8
-
-_WIDTH = 300  # pixels of a picture
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

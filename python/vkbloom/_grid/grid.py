@@ -34,6 +34,12 @@ if TYPE_CHECKING:
 
     from vkbloom._scene import Scene
 
+#: Limits of a block: large enough for an efficient file, small enough to render again if lost.
+BLOCK_BYTES = 1 << 20
+BLOCK_POINTS = 1024
+# A grid may take all free memory but this part of its own size.
+_MARGIN = 10
+
 
 @checked
 def grid(
@@ -226,13 +232,6 @@ def _chunk(
         held = None if stored is None else chunk_in(stored, grid.shape)
         return chunk_of(grid, layout, parts) if held is None else held
     return tuple(min(int(chunks.get(axis.name, 1)), len(axis)) for axis in grid.axes)
-
-
-#: Limits of a block: large enough for an efficient file, small enough to render again if lost.
-BLOCK_BYTES = 1 << 20
-BLOCK_POINTS = 1024
-# A grid may take all free memory but this part of its own size.
-_MARGIN = 10
 
 
 def chunk_of(grid: Grid, layout: Layout, parts: int = 1) -> tuple[int, ...]:

@@ -110,12 +110,10 @@ class Layout:
     """The layout of a grid on a renderer.
 
     - `ranking`: The axes from the slowest to the fastest.
-    - `coordinates`: Coordinates of dimensions that are not axes.
     """
 
     ranking: tuple[int, ...]
     variables: Mapping[str, Variable]
-    coordinates: Mapping[str, tuple[NDArray[Any], Mapping[str, str]]]
     adapter: str
     driver: str
     version: str
@@ -169,11 +167,6 @@ def lay_out(
     """Determine the layout of a grid on a renderer before its points are rendered."""
     variables = _frame_variables(_survey(grid, renderer))
     check(variables)
-    coordinates: dict[str, tuple[NDArray[Any], Mapping[str, str]]] = {}
-    for variable in variables.values():
-        if len(variable.dims) == 3:
-            labels = np.array(_CHANNELS[: variable.shape[2]])
-            coordinates[variable.dims[2]] = (labels, {"long_name": "channel"})
     if grid.reduce:
         sample = _sample(grid, renderer)
         for name, reduction in grid.reduce.items():
@@ -181,9 +174,7 @@ def lay_out(
             dims = tuple(f"{name}_dim_{number}" for number in range(value.ndim))
             attributes = {"long_name": name, "units": "1"}
             variables[name] = Variable(dims, value.shape, value.dtype, attributes)
-    return Layout(
-        ranking=ranking(grid), variables=variables, coordinates=coordinates, **origin(renderer)
-    )
+    return Layout(ranking=ranking(grid), variables=variables, **origin(renderer))
 
 
 def origin(renderer: Renderer) -> dict[str, str]:
@@ -338,6 +329,12 @@ def made_dataset(grid: Grid, layout: Layout, arrays: Mapping[str, Any]) -> xarra
     xr = import_extra("xarray", "grid", "grid")
     dims = tuple(axis.name for axis in grid.axes)
     facts = {k: v for k, v in grid.source.description.items() if k not in ("images", "sha256")}
+    channels = {
+        dim: ((dim,), np.array(_CHANNELS[: variable.shape[2]]), {"long_name": "channel"})
+        for name, variable in layout.variables.items()
+        for dim in variable.dims[2:]
+        if name not in grid.reduce
+    }
     dataset: xarray.Dataset = xr.Dataset(
         {
             name: ((*dims, *variable.dims), arrays[name], dict(variable.attributes))
@@ -345,10 +342,7 @@ def made_dataset(grid: Grid, layout: Layout, arrays: Mapping[str, Any]) -> xarra
         },
         coords={
             **{axis.name: ((axis.name,), axis.coordinate, axis.attributes) for axis in grid.axes},
-            **{
-                name: ((name,), values, dict(attributes))
-                for name, (values, attributes) in layout.coordinates.items()
-            },
+            **channels,
         },
         attrs={
             "adapter": layout.adapter,

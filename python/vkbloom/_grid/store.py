@@ -35,6 +35,17 @@ from vkbloom._settings.fields import plain_value
 FORMAT: Final = 3
 
 _LONGEST: Final = 60  # characters of a value in a message
+DONE: Final = "done"
+METADATA: Final = "zarr.json"
+MISSING: Final = "missing"
+IDENTITY: Final = "vkbloom_grid"
+_PURPOSE: Final = "Grids on disk"
+# Level 1 is fast; on noisy pictures higher levels compress little better.
+_ZSTD_LEVEL: Final = 1
+# The separator "." puts all chunks of an array in one folder; "/" would nest a folder per axis.
+_KEYS: Final = {"name": "default", "separator": "."}
+# The end of the names of LocalStore's temporary files.
+_PARTIAL: Final = ".partial"
 
 
 def identity(grid: Grid, layout: Layout, chunk: Index) -> dict[str, Any]:
@@ -106,11 +117,6 @@ def short(value: Any) -> str:
     return f"{text[: _LONGEST - 20]} ... {text[-12:]}"
 
 
-DONE: Final = "done"
-METADATA: Final = "zarr.json"
-MISSING: Final = "missing"
-
-
 @dataclass
 class Chunks:
     """Reads and writes blocks; it can be sent to the process that renders them.
@@ -179,17 +185,6 @@ class Chunks:
         return None
 
 
-IDENTITY: Final = "vkbloom_grid"
-
-_PURPOSE: Final = "Grids on disk"
-# Level 1 is fast; on noisy pictures higher levels compress little better.
-_ZSTD_LEVEL: Final = 1
-# The separator "." puts all chunks of an array in one folder; "/" would nest a folder per axis.
-_KEYS: Final = {"name": "default", "separator": "."}
-# The end of the names of LocalStore's temporary files.
-_PARTIAL: Final = ".partial"
-
-
 def folder_of(store: object) -> Path:
     """Return the folder of a store, which need not exist."""
     if not isinstance(store, str | os.PathLike) or "://" in os.fspath(store):
@@ -250,9 +245,8 @@ def _put(folder: Path, key: str, content: bytes, *, replaces: bool) -> None:
     zarr = import_extra("zarr", "grid", _PURPOSE)
     store = zarr.storage.LocalStore(folder)
     put = store.set if replaces else store.set_if_not_exists
-    buffers = import_extra("zarr.buffer", "grid", _PURPOSE).default_buffer_prototype()
-    sync = import_extra("zarr.core.sync", "grid", _PURPOSE).sync
-    sync(put(key, buffers.buffer.from_bytes(content)))
+    buffers = zarr.core.buffer.default_buffer_prototype()
+    zarr.core.sync.sync(put(key, buffers.buffer.from_bytes(content)))
 
 
 @dataclass(frozen=True)

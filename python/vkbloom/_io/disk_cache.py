@@ -10,7 +10,6 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import os
-import sys
 from pathlib import Path
 
 from vkbloom._io.safe_writing import write_file
@@ -29,11 +28,6 @@ def folder() -> Path | None:
     if chosen is not None:
         return Path(chosen) if chosen else None
     with contextlib.suppress(RuntimeError):  # no home folder: no cache
-        if sys.platform == "win32":
-            local = os.environ.get("LOCALAPPDATA")
-            return (Path(local) if local else Path.home() / "AppData/Local") / "vkbloom"
-        if sys.platform == "darwin":
-            return Path.home() / "Library/Caches/vkbloom"
         cache = Path(os.environ.get("XDG_CACHE_HOME", ""))
         # The XDG Base Directory Specification says to ignore relative paths.
         return (cache if cache.is_absolute() else Path.home() / ".cache") / "vkbloom"

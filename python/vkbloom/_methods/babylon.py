@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from typing import ClassVar
+from typing import Any, ClassVar
 
-from vkbloom._settings.blocks import settings_block
-from vkbloom._settings.fields import choice_field, number_field
-from vkbloom._settings.settings import BloomFormat, Composite, Settings, no_knee
+from vkbloom._settings.fields import number_field
+from vkbloom._settings.settings import PublishedSettings
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class BabylonBloom(Settings):
+class BabylonBloom(PublishedSettings):
     """Bloom of Babylon.js' DefaultRenderingPipeline.
 
     Parameters
@@ -47,12 +46,8 @@ class BabylonBloom(Settings):
     """
 
     method: ClassVar[str] = "babylon"
-    published: ClassVar[bool] = True
 
     threshold: float | None = number_field("threshold", default=0.9, slider=(0, 4))
-    knee: float = no_knee("babylon")
-    composite: Composite = choice_field("composite", ("add",))
-    format: BloomFormat | None = "rgba16float"
     kernel: float = number_field(default=64.0, range=(1, 256), option="kernel-width")
     scale: float = number_field(default=0.5, range=(0.01, 1))
     weight: float = number_field(default=0.15, range=(0, 65504), slider=(0, 2))
@@ -79,12 +74,11 @@ class BabylonBloom(Settings):
             sides[:2] = 2 * share * pair, (1 - share) * pair
         return tuple(weight / total for weight in sides)
 
-    def _core_block(self) -> bytes:
-        """Return the settings with the core's names and units."""
-        values = {
+    def _core_values(self) -> dict[str, Any]:
+        """Return what the core names or counts otherwise."""
+        return {
             "kernel": None,
             "scale_x": self.scale,
             "weights": self.blur_weights,
             "intensity": self.intensity * self.weight,
         }
-        return settings_block(self.method, vars(self) | values)

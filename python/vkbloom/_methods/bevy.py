@@ -6,11 +6,11 @@ import dataclasses
 from typing import ClassVar
 
 from vkbloom._settings.fields import choice_field, number_field
-from vkbloom._settings.settings import BloomFormat, Composite, Settings
+from vkbloom._settings.settings import Composite, PublishedSettings
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class BevyBloom(Settings):
+class BevyBloom(PublishedSettings):
     """Bevy's bloom, by default its ``Bloom::NATURAL``.
 
     Parameters
@@ -57,11 +57,10 @@ class BevyBloom(Settings):
     """
 
     method: ClassVar[str] = "bevy"
-    published: ClassVar[bool] = True
 
+    knee: float = number_field("knee", fixed="")
     composite: Composite = choice_field("composite", ("mix", "add"))
     intensity: float = number_field("intensity", default=0.15, range=(0, 1))
-    format: BloomFormat | None = "rgba16float"
     low_frequency_boost: float = number_field("low_frequency_boost")
     low_frequency_boost_curvature: float = number_field("low_frequency_boost_curvature")
     high_pass_frequency: float = number_field("high_pass_frequency")

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom._methods.blender_kernels import kernel_of, kernel_sides
 from vkbloom._methods.convolution import PSFLike, read_psf
-from vkbloom._settings.blocks import settings_block
 from vkbloom._settings.fields import (
     choice_field,
     flag_field,
@@ -18,7 +17,7 @@ from vkbloom._settings.fields import (
     numbers_field,
     value_field,
 )
-from vkbloom._settings.settings import BloomFormat, Composite, Settings, no_knee
+from vkbloom._settings.settings import PublishedSettings
 from vkbloom.psf._core_kernels import WithKernel
 
 GlareType = Literal["bloom", "ghosts", "streaks", "fog_glow", "simple_star", "sun_beams", "kernel"]
@@ -27,7 +26,7 @@ Version = Literal["5.0", "5.2", "4.3"]
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class BlenderGlare(WithKernel, Settings):
+class BlenderGlare(WithKernel, PublishedSettings):
     """The Glare node of Blender 5.0, as its compositor runs it on a CPU.
 
     ``glow`` is the node's output Highlights, `intensity` times ``bloom`` its Glare, ``final`` its
@@ -128,15 +127,11 @@ class BlenderGlare(WithKernel, Settings):
 
     method: ClassVar[str] = "blender"
     shaping: ClassVar[tuple[str, ...]] = ("type", "quality", "version", "size", "kernel")
-    published: ClassVar[bool] = True
     #: `glow` is the node's output Highlights.
     glow_note: ClassVar[str] = ""
 
     threshold: float | None = 1.0
-    knee: float = no_knee("blender")
-    composite: Composite = choice_field("composite", ("add",))
     intensity: float = number_field("intensity", range=(0, 1))
-    format: BloomFormat | None = "rgba16float"
     # On the command line, --size is the size of a frame, --version the program's, and --streaks a
     # stage of glare.
     type: GlareType = choice_field("type", option="glare-type")
@@ -157,9 +152,9 @@ class BlenderGlare(WithKernel, Settings):
     kernel: PSFLike | None = value_field(None, kind="psf", read=read_psf)
     version: Version = choice_field("version", ("5.0", "5.2", "4.3"), option="blender-version")
 
-    def _core_block(self) -> bytes:
-        """Return the settings, with the version as the core has it."""
-        return settings_block(self.method, vars(self) | {"blender_5_2": self.version == "5.2"})
+    def _core_values(self) -> dict[str, Any]:
+        """Return what the core names or counts otherwise."""
+        return {"blender_5_2": self.version == "5.2"}
 
     def kernel_pixels(self, buffers: tuple[int, int]) -> NDArray[np.float64]:
         """Return the kernel of fog glow or of an image, (h, w, 3), with its point in the middle."""

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from typing import ClassVar
+from typing import Any, ClassVar
 
-from vkbloom._settings.blocks import settings_block
 from vkbloom._settings.fields import choice_field, number_field
-from vkbloom._settings.settings import BloomFormat, Composite, Settings, no_knee
+from vkbloom._settings.settings import Composite, PublishedSettings
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class DarktableBloom(Settings):
+class DarktableBloom(PublishedSettings):
     """Bloom of darktable, on the lightness of CIE Lab.
 
     Parameters
@@ -39,12 +38,9 @@ class DarktableBloom(Settings):
     """
 
     method: ClassVar[str] = "darktable"
-    published: ClassVar[bool] = True
 
     threshold: float | None = number_field(default=90.0, range=(0, 100))
-    knee: float = no_knee("darktable")
     composite: Composite = choice_field("composite", ("screen",))
-    format: BloomFormat | None = "rgba16float"
     blur_size: float = number_field(default=20.0, range=(0, 100))
     strength: float = number_field(default=25.0, range=(0, 100))
 
@@ -53,8 +49,7 @@ class DarktableBloom(Settings):
         """Pixels to each side of a box."""
         return min(256, math.floor(256 * min(100.0, self.blur_size + 1) / 100))
 
-    def _core_block(self) -> bytes:
-        """Return the settings with the core's names and units."""
+    def _core_values(self) -> dict[str, Any]:
+        """Return what the core names or counts otherwise."""
         gain = 2 ** (min(100.0, self.strength + 1) / 100)
-        values = {"size": self.box_radius / 256, "strength": gain}
-        return settings_block(self.method, vars(self) | values)
+        return {"size": self.box_radius / 256, "strength": gain}

@@ -5,12 +5,12 @@ from __future__ import annotations
 import dataclasses
 from typing import ClassVar
 
-from vkbloom._settings.fields import choice_field, number_field
-from vkbloom._settings.settings import BloomFormat, Composite, Settings, no_knee
+from vkbloom._settings.fields import number_field
+from vkbloom._settings.settings import PublishedSettings
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class FilamentBloom(Settings):
+class FilamentBloom(PublishedSettings):
     """Filament's bloom at its low quality, the default one.
 
     Parameters
@@ -49,13 +49,9 @@ class FilamentBloom(Settings):
     """
 
     method: ClassVar[str] = "filament"
-    published: ClassVar[bool] = True
 
     threshold: float | None = 1.0
-    knee: float = no_knee("filament")
-    composite: Composite = choice_field("composite", ("add",))
     intensity: float = number_field("intensity", default=0.1, range=(0, 1))
-    format: BloomFormat | None = "rgba16float"
     levels: int = number_field("levels", range=(1, 12))
     resolution: int = number_field("resolution", unit="pixel", slider=(16, 1024))
     highlight: float = number_field("highlight", slider=(10, 5000))

@@ -9,21 +9,22 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom._settings.settings import Settings
+from vkbloom._settings.settings import BloomFormat, PublishedSettings
 from vkbloom.psf._core_kernels import WithKernel
 
 Size = tuple[int, int]
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class GaussianSum(WithKernel, Settings):
+class GaussianSum(WithKernel, PublishedSettings):
     """Settings of a bloom that is a convolution with a sum of Gaussians.
 
     - `boundary`: What lies outside of the frame, a name of the core.
     """
 
-    published: ClassVar[bool] = True
     boundary: ClassVar[str]
+
+    format: BloomFormat | None = None
 
     def kernel(self, frame: Size, buffers: Size | None = None) -> NDArray[np.float64]:
         """Return the kernel for a frame in pixels of the bloom buffers, shape (h, w, 3)."""

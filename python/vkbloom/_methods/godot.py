@@ -3,27 +3,18 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
 from typing import ClassVar
 
-from vkbloom._checks import FLT_MAX, check_number
-from vkbloom._methods.mip_chain import check_level_weights
-from vkbloom._settings.fields import choice_field, flag_field, number_field, value_field
-from vkbloom._settings.settings import BloomFormat, Composite, Settings, no_knee
+from vkbloom._checks import FLT_MAX
+from vkbloom._settings.fields import choice_field, flag_field, number_field, numbers_field
+from vkbloom._settings.settings import Composite, PublishedSettings
 
 #: Number of levels that have a weight in Godot.
 GODOT_LEVELS = 7
 
 
-def _check_weights(values: Sequence[float]) -> tuple[float, ...]:
-    weights = check_level_weights(values, GODOT_LEVELS)
-    for weight in weights:
-        check_number("level_weights", weight, 0, FLT_MAX)
-    return weights
-
-
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class GodotBloom(Settings):
+class GodotBloom(PublishedSettings):
     """Godot's glow, by default that of 4.6.
 
     Parameters
@@ -75,21 +66,18 @@ class GodotBloom(Settings):
     """
 
     method: ClassVar[str] = "godot"
-    published: ClassVar[bool] = True
 
     threshold: float | None = 1.0
-    knee: float = no_knee("godot")
     composite: Composite = choice_field(
         "composite", ("screen", "soft_light", "add", "replace", "mix")
     )
     intensity: float = number_field("intensity", default=0.3)
-    format: BloomFormat | None = "rgba16float"
     threshold_scale: float = number_field("threshold_scale", slider=(0, 8))
     luminance_cap: float = number_field("luminance_cap", slider=(0, 48))
     glow_bloom: float = number_field("glow_bloom")
     strength: float = number_field("strength", slider=(0, 2))
-    level_weights: tuple[float, ...] = value_field(
-        (0.0, 0.8, 0.4, 0.1, 0.0, 0.0, 0.0), read=_check_weights
+    level_weights: tuple[float, ...] = numbers_field(
+        (0.0, 0.8, 0.4, 0.1, 0.0, 0.0, 0.0), high=FLT_MAX
     )
     bicubic: bool = flag_field("bicubic")
     white: float = number_field("white", slider=(1, 16))

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom._methods.gaussian_sum import GaussianSum, gaussian
-from vkbloom._settings.blocks import settings_block
 from vkbloom._settings.fields import choice_field, number_field, numbers_field, value_field
-from vkbloom._settings.settings import Composite, no_knee
+from vkbloom._settings.settings import Composite
 
 Channels = tuple[float, float, float]
 Size = tuple[int, int]
@@ -57,7 +56,6 @@ class Halation(GaussianSum):
     )
 
     threshold: float | None = value_field(None, fixed="film has no threshold")
-    knee: float = no_knee("halation")
     composite: Composite = choice_field("composite", ("mix",))
     intensity: float = number_field("intensity", default=1.0, range=(0, 1))
     strength: Channels = numbers_field((0.08, 0.005, 0.001), option="halation_strength")
@@ -99,10 +97,9 @@ class Halation(GaussianSum):
             planes.append((y[channel] * shares[:, np.newaxis]).T @ x[channel] / shares.sum())
         return np.stack(planes, axis=2)
 
-    def _core_block(self) -> bytes:
-        """Return the settings with the core's names and units."""
-        block = {"strength": None, "boundary": self.boundary}
-        return settings_block(self.method, vars(self) | block)
+    def _core_values(self) -> dict[str, Any]:
+        """Return what the core names or counts otherwise."""
+        return {"strength": None, "boundary": self.boundary}
 
 
 def _radius(deviation: float) -> int:

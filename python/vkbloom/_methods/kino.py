@@ -5,12 +5,12 @@ from __future__ import annotations
 import dataclasses
 from typing import ClassVar
 
-from vkbloom._settings.fields import choice_field, flag_field, number_field
-from vkbloom._settings.settings import BloomFormat, Composite, Settings
+from vkbloom._settings.fields import flag_field, number_field
+from vkbloom._settings.settings import PublishedSettings
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class KinoBloom(Settings):
+class KinoBloom(PublishedSettings):
     """Keijiro Takahashi's KinoBloom, version 2, in its high quality.
 
     Parameters
@@ -43,12 +43,9 @@ class KinoBloom(Settings):
     """
 
     method: ClassVar[str] = "kino"
-    published: ClassVar[bool] = True
 
     threshold: float | None = ((0.8 + 0.055) / 1.055) ** 2.4  # 0.8 in sRGB
-    composite: Composite = choice_field("composite", ("add",))
-    knee: float = number_field("knee", default=0.5)
+    knee: float = number_field("knee", fixed="", default=0.5)
     intensity: float = number_field("intensity", default=0.8)
-    format: BloomFormat | None = "rgba16float"
     radius: float = number_field("radius", default=2.5, range=(1, 7))
     anti_flicker: bool = flag_field("anti_flicker")

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import ClassVar
+from typing import Any, ClassVar
 
-from vkbloom._settings.blocks import settings_block
-from vkbloom._settings.fields import choice_field, number_field
-from vkbloom._settings.settings import BloomFormat, Composite, Settings, no_knee
+from vkbloom._settings.fields import number_field
+from vkbloom._settings.settings import PublishedSettings
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class PlayCanvasBloom(Settings):
+class PlayCanvasBloom(PublishedSettings):
     """Bloom of PlayCanvas' CameraFrame.
 
     Parameters
@@ -40,20 +39,15 @@ class PlayCanvasBloom(Settings):
     """
 
     method: ClassVar[str] = "playcanvas"
-    published: ClassVar[bool] = True
 
-    knee: float = no_knee("playcanvas")
-    composite: Composite = choice_field("composite", ("add",))
     intensity: float = number_field("intensity", default=0.01, slider=(0, 0.1))
-    format: BloomFormat | None = "rgba16float"
     blur_level: int = number_field(default=16, range=(1, 16))
 
-    def _core_block(self) -> bytes:
-        """Return the settings with the core's names and units."""
-        values = {
+    def _core_values(self) -> dict[str, Any]:
+        """Return what the core names or counts otherwise."""
+        return {
             "threshold": self.threshold or None,
             "knee": 0.5,
             "clamp_max": 65504.0,
             "levels": self.blur_level,
         }
-        return settings_block(self.method, vars(self) | values)

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import ClassVar
+from typing import Any, ClassVar
 
-from vkbloom._settings.blocks import settings_block
 from vkbloom._settings.fields import choice_field, number_field
-from vkbloom._settings.settings import BloomFormat, Composite, Settings, no_knee
+from vkbloom._settings.settings import Composite, PublishedSettings
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class PmndrsBloom(Settings):
+class PmndrsBloom(PublishedSettings):
     """BloomEffect of pmndrs/postprocessing with its blur of a mip chain.
 
     Parameters
@@ -43,20 +42,16 @@ class PmndrsBloom(Settings):
     """
 
     method: ClassVar[str] = "pmndrs"
-    published: ClassVar[bool] = True
 
     threshold: float | None = number_field("threshold", default=1.0, slider=(0, 4))
-    knee: float = no_knee("pmndrs")
     composite: Composite = choice_field("composite", ("screen", "add"))
-    format: BloomFormat | None = "rgba16float"
     radius: float = number_field("radius", default=0.85, range=(0, 1))
     levels: int = number_field("levels", default=8)
     smoothing: float = number_field(default=0.03, range=(0, 65504), slider=(0, 1))
 
-    def _core_block(self) -> bytes:
-        """Return the settings with the core's names and units."""
-        values = {
+    def _core_values(self) -> dict[str, Any]:
+        """Return what the core names or counts otherwise."""
+        return {
             "smooth_width": max(self.smoothing, 1e-4),
             "threshold": None if self.threshold == self.smoothing == 0 else self.threshold,
         }
-        return settings_block(self.method, vars(self) | values)

@@ -6,11 +6,11 @@ import dataclasses
 from typing import ClassVar
 
 from vkbloom._settings.fields import choice_field, flag_field, number_field, value_field
-from vkbloom._settings.settings import BloomFormat, Composite, Settings, no_knee
+from vkbloom._settings.settings import Composite, PublishedSettings
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class PygfxBloom(Settings):
+class PygfxBloom(PublishedSettings):
     """The PhysicalBasedBloomPass of pygfx.
 
     Parameters
@@ -44,13 +44,10 @@ class PygfxBloom(Settings):
     """
 
     method: ClassVar[str] = "pygfx"
-    published: ClassVar[bool] = True
 
     threshold: float | None = value_field(None, fixed="pygfx has no threshold")
-    knee: float = no_knee("pygfx")
     composite: Composite = choice_field("composite", ("mix",))
     intensity: float = number_field("intensity", default=0.04, range=(0, 1))
-    format: BloomFormat | None = "rgba16float"
     levels: int = number_field("levels", slider=(1, 10))
     filter_radius: float = number_field("filter_radius", slider=(0, 0.05))
     karis_average: bool = flag_field("karis_average")

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from typing import ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
-from vkbloom._settings.blocks import settings_block
 from vkbloom._settings.fields import (
     choice_field,
     flag_field,
@@ -14,7 +13,7 @@ from vkbloom._settings.fields import (
     numbers_field,
     value_field,
 )
-from vkbloom._settings.settings import BloomFormat, Composite, Settings, no_knee
+from vkbloom._settings.settings import Composite, PublishedSettings
 
 BlurFilter = Literal["gaussian", "kawase", "dual"]
 
@@ -27,7 +26,7 @@ def _linear(value: float) -> float:
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class UrpBloom(Settings):
+class UrpBloom(PublishedSettings):
     """Bloom of Unity's Universal Render Pipeline.
 
     Parameters
@@ -83,12 +82,9 @@ class UrpBloom(Settings):
     """
 
     method: ClassVar[str] = "urp"
-    published: ClassVar[bool] = True
 
     threshold: float | None = ((0.9 + 0.055) / 1.055) ** 2.4  # 0.9 in sRGB
-    composite: Composite = choice_field("composite", ("add",))
-    knee: float = number_field("knee", default=0.5)
-    format: BloomFormat | None = "rgba16float"
+    knee: float = number_field("knee", fixed="", default=0.5)
     filter: BlurFilter = choice_field("filter")
     scatter: float = number_field("scatter")
     iterations: int = number_field("iterations")
@@ -98,22 +94,21 @@ class UrpBloom(Settings):
     clamp: float = number_field("clamp_max", slider=(0, 100))
     version: Literal["17", "12"] = choice_field("version", ("17", "12"))
 
-    def _core_block(self) -> bytes:
-        """Return the settings with the core's names and units."""
+    def _core_values(self) -> dict[str, Any]:
+        """Return what the core names or counts otherwise."""
         colour = [_linear(channel) for channel in self.tint]
         grey = sum(map(math.prod, zip(colour, (0.2126729, 0.7151522, 0.0721750), strict=True)))
-        values = {
+        return {
             "quarter": self.downscale == "quarter",
             "high_quality_filtering": self.high_quality,
             "tint": [channel / grey for channel in colour] if grey else (1.0, 1.0, 1.0),
             "clamp_max": self.clamp,
             "urp_12": self.version == "12",
         }
-        return settings_block(self.method, vars(self) | values)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class HdrpBloom(Settings):
+class HdrpBloom(PublishedSettings):
     """Bloom of Unity's High Definition Render Pipeline, without a threshold, at half resolution.
 
     Parameters
@@ -154,22 +149,19 @@ class HdrpBloom(Settings):
     """
 
     method: ClassVar[str] = "hdrp"
-    published: ClassVar[bool] = True
 
     threshold: float | None = value_field(
         None, fixed="the composite that HDRP uses with a threshold is not supported"
     )
-    knee: float = no_knee("hdrp")
     composite: Composite = choice_field("composite", ("mix",))
     intensity: float = number_field("intensity", default=2**0.2 - 1, range=(0, 1))
-    format: BloomFormat | None = "rgba16float"
     scatter: float = number_field("scatter")
     high_quality_filtering: bool = flag_field("high_quality_filtering")
     anamorphism: float = number_field("anamorphism")
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class PostProcessingBloom(Settings):
+class PostProcessingBloom(PublishedSettings):
     """Bloom of Unity's Post Processing Stack v2.
 
     Parameters
@@ -211,24 +203,20 @@ class PostProcessingBloom(Settings):
     """
 
     method: ClassVar[str] = "post_processing"
-    published: ClassVar[bool] = True
 
     threshold: float | None = number_field("threshold", default=1.0, slider=(0, 4))
-    composite: Composite = choice_field("composite", ("add",))
-    knee: float = number_field("knee", default=0.5)
-    format: BloomFormat | None = "rgba16float"
+    knee: float = number_field("knee", fixed="", default=0.5)
     clamp: float = number_field("clamp_max", slider=(0, 100))
     diffusion: float = number_field("diffusion")
     anamorphic_ratio: float = number_field("anamorphism")
     fast: bool = flag_field("fast")
     color: tuple[float, float, float] = numbers_field((1.0, 1.0, 1.0))
 
-    def _core_block(self) -> bytes:
-        """Return the settings with the core's names and units."""
-        values = {
+    def _core_values(self) -> dict[str, Any]:
+        """Return what the core names or counts otherwise."""
+        return {
             "threshold": None if self.threshold is None else _linear(self.threshold),
             "clamp_max": min(65504.0, _linear(self.clamp)),
             "anamorphism": self.anamorphic_ratio,
             "tint": self.color,
         }
-        return settings_block(self.method, vars(self) | values)

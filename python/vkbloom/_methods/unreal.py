@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom._methods.gaussian_sum import GaussianSum, gaussian
-from vkbloom._settings.blocks import settings_block
-from vkbloom._settings.fields import choice_field, number_field, numbers_field
-from vkbloom._settings.settings import Composite, no_knee
+from vkbloom._settings.fields import number_field, numbers_field
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -51,8 +49,6 @@ class UnrealBloom(GaussianSum):
     shaping: ClassVar[tuple[str, ...]] = ("sizes", "tints", "size_scale")
 
     threshold: float | None = number_field(default=-1.0, range=(-1, 65504), slider=(-1, 4))
-    knee: float = no_knee("unreal")
-    composite: Composite = choice_field("composite", ("add",))
     intensity: float = number_field("intensity", default=0.675)
     sizes: tuple[float, ...] = numbers_field((0.3, 1.0, 2.0, 10.0, 30.0, 64.0))
     tints: tuple[float, ...] = numbers_field(
@@ -72,12 +68,10 @@ class UnrealBloom(GaussianSum):
         plane = (lines[0] * np.array(self.tints)[:, np.newaxis]).T @ lines[1]
         return np.repeat(plane[..., np.newaxis], 3, axis=2)
 
-    def _core_block(self) -> bytes:
-        """Return the settings with the core's names and units."""
+    def _core_values(self) -> dict[str, Any]:
+        """Return what the core names or counts otherwise."""
         threshold = None if self.threshold in {None, -1.0} else self.threshold + 1
-        return settings_block(
-            self.method, vars(self) | {"threshold": threshold, "boundary": self.boundary}
-        )
+        return {"threshold": threshold, "boundary": self.boundary}
 
 
 def _line(deviation: float, length: int) -> NDArray[np.float64]:

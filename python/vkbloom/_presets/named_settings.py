@@ -5,29 +5,24 @@
 
 from __future__ import annotations
 
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
-from vkbloom._settings.registry import METHODS
+from vkbloom._settings.settings import Settings
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from vkbloom._settings.settings import Settings
-
 
 class Preset(NamedTuple):
-    """A method and its fields, what they look like, and whose they are."""
+    """Settings as `Settings.from_dict` reads them, what they look like, and whose they are."""
 
-    method: str
+    fields: Mapping[str, Any]
     what: str
     whose: str
-    fields: Mapping[str, Any] = MappingProxyType({})
 
     def make(self) -> Settings:
         """Return the settings; only now is their method imported."""
-        settings: Settings = METHODS[self.method](**self.fields)
-        return settings
+        return Settings.from_dict(self.fields)
 
 
 #: Engines, how their presets were confirmed (docs/presets.md), and these. "frames": by pictures
@@ -57,200 +52,204 @@ _IRIS_6: Final = {"psf": "aperture", "mask": {"blades": 6}}
 #: The presets by name.
 PRESETS: Final[Mapping[str, Preset]] = {
     "tutorial": Preset(
-        "separable", "nine taps across and down, in small buffers", "the forward system"
+        {"method": "separable"}, "nine taps across and down, in small buffers", "the forward system"
     ),
     "outline": Preset(
-        "separable",
+        {"method": "separable", "first_tap": 0, "texel": "x"},
         "the same, with a loop that starts at the centre, and steps of a texel of the width",
         "the outline system",
-        {"first_tap": 0, "texel": "x"},
     ),
     "deferred": Preset(
-        "separable",
-        "nine weights with a sum below 1, in three loops",
-        "the deferred HDR system",
         {
+            "method": "separable",
             "weights": (0.175713, 0.121703, 0.065984, 0.028002, 0.0093),
             "loops": 3,
             "blur_scale": 1.1,
             "blur_strength": 1.5,
         },
+        "nine weights with a sum below 1, in three loops",
+        "the deferred HDR system",
     ),
     "jimenez2014": Preset(
-        "pyramid",
+        {
+            "method": "pyramid",
+            "levels": 6,
+            "radius": 1.0,
+            "firefly_filter": True,
+            "composite": "mix",
+            "intensity": 0.04,
+        },
         "six levels with a filter of fireflies, mixed in with 0.04",
         "Jimenez, SIGGRAPH 2014; levels of LearnOpenGL @ a545a703f958",
-        {"levels": 6, "radius": 1.0, "firefly_filter": True, "composite": "mix", "intensity": 0.04},
     ),
     # In KWin, the six strengths with four iterations have evenly spaced offsets, 3 to 8.
     "dual_kawase": Preset(
-        "dual_kawase",
+        {"method": "dual_kawase", "levels": 4, "offset": 3 + 5 / 6},
         "one wide blur of the complete picture",
         "Bjorge, SIGGRAPH 2015; KDE/kwin @ 00a2faf64fbf, the tenth strength",
-        {"levels": 4, "offset": 3 + 5 / 6},
     ),
     "bevy_natural": Preset(
-        "bevy",
+        {"method": "bevy"},
         "a soft glow of the complete picture, which keeps its energy",
         "Bevy 0.19, Bloom::NATURAL (bevyengine/bevy @ b56fc29d3016)",
     ),
     "kino": Preset(
-        "kino", "a wide glow above a soft threshold", "keijiro/KinoBloom @ 0a04c43fa47d"
+        {"method": "kino"}, "a wide glow above a soft threshold", "keijiro/KinoBloom @ 0a04c43fa47d"
     ),
     "filament": Preset(
-        "filament",
+        {"method": "filament"},
         "a faint, wide glow of what is above 1, at low quality",
         "google/filament, Options.h @ 2fac13e154fb",
     ),
     "unity_urp": Preset(
-        "urp",
+        {"method": "urp"},
         "a narrow glow above a soft threshold, with the intensity 1",
         "Unity URP 17, Bloom.cs @ a085de35f86e",
     ),
     "unity_hdrp": Preset(
-        "hdrp",
+        {"method": "hdrp"},
         "a glow of the complete picture, with Unity's intensity 0.2",
         "Unity HDRP, Bloom.cs @ 2084a9d19159",
     ),
     "threejs_unreal": Preset(
-        "three",
+        {"method": "three"},
         "five Gaussians of the complete picture, strength 1, threshold 0",
         "mrdoob/three.js, UnrealBloomPass since #31528 and #32517",
     ),
     "threejs_r187": Preset(
-        "three",
+        {"method": "three", "variant": "r187"},
         "the same with samples of two taps",
         "mrdoob/three.js r187, UnrealBloomPass since #34479",
-        {"variant": "r187"},
     ),
     "threejs_node": Preset(
-        "three",
+        {"method": "three", "variant": "node", "intensity": 1.0},
         "the same for WebGPU, without the factor 3",
         "mrdoob/three.js, BloomNode.js @ 07e4c12b3840",
-        {"variant": "node", "intensity": 1.0},
     ),
     "unity_urp_kawase": Preset(
-        "urp",
+        {"method": "urp", "filter": "kawase"},
         "a narrow glow at half of the size",
         "Unity URP 17, Bloom.shader, filter Kawase",
-        {"filter": "kawase"},
     ),
     "unity_urp_dual": Preset(
-        "urp",
+        {"method": "urp", "filter": "dual"},
         "the smallest level, enlarged",
         "Unity URP 17, Bloom.shader, filter Dual",
-        {"filter": "dual"},
     ),
     "unity_ppv2": Preset(
-        "post_processing",
+        {"method": "post_processing"},
         "a sum of levels of what is above 1",
         "Unity-Technologies/PostProcessing @ 32c3155207d3",
     ),
     "unreal": Preset(
-        "unreal",
+        {"method": "unreal"},
         "six Gaussians of the complete picture, up to wider than it",
         "Epic Games, Bloom (Unreal Engine 4.27), by its documentation",
     ),
     "halation": Preset(
-        "halation",
+        {"method": "halation"},
         "film: a red glow of the complete picture, and its softness",
         "andreavolpato/agx-emulsion @ 0e0baf2e3dd5",
     ),
     "pmndrs": Preset(
-        "pmndrs",
+        {"method": "pmndrs"},
         "eight levels of what is above 1, as a screen",
         "pmndrs/postprocessing @ 69c61a640078 (6.39.0)",
     ),
     "babylon": Preset(
-        "babylon",
+        {"method": "babylon"},
         "one Gaussian of what is above a hard threshold",
         "BabylonJS/Babylon.js, bloomEffect.ts @ 05c105649f04",
     ),
     "playcanvas": Preset(
-        "playcanvas",
+        {"method": "playcanvas"},
         "the sum of all levels of the complete picture",
         "playcanvas/engine 2.23, frame-pass-bloom.js @ 1f7213d06f78",
     ),
     "godot_4_5": Preset(
-        "godot",
-        "two levels of what is above 1, as soft light",
-        "Godot up to 4.5, copy.glsl @ 0a5efd02df51",
         {
+            "method": "godot",
             "level_weights": (0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0),
             "intensity": 0.8,
             "composite": "soft_light",
         },
+        "two levels of what is above 1, as soft light",
+        "Godot up to 4.5, copy.glsl @ 0a5efd02df51",
     ),
     "godot_4_6": Preset(
-        "godot", "three levels of what is above 1", "Godot from 4.6, copy.glsl @ 0a5efd02df51"
+        {"method": "godot"},
+        "three levels of what is above 1",
+        "Godot from 4.6, copy.glsl @ 0a5efd02df51",
     ),
     "blender_bloom": Preset(
-        "blender", "a wide, smooth glow of what is above 1", "Blender 5.0, Glare node, Bloom, High"
+        {"method": "blender"},
+        "a wide, smooth glow of what is above 1",
+        "Blender 5.0, Glare node, Bloom, High",
     ),
     "blender_ghosts": Preset(
-        "blender",
+        {"method": "blender", "type": "ghosts"},
         "reflections in a lens of what is above 1",
         "Blender 5.0, Glare node, Ghosts, High",
-        {"type": "ghosts"},
     ),
     "blender_streaks": Preset(
-        "blender",
+        {"method": "blender", "type": "streaks"},
         "stars of four streaks of what is above 1",
         "Blender 5.0, Glare node, Streaks, High",
-        {"type": "streaks"},
     ),
     "blender_simple_star": Preset(
-        "blender",
+        {"method": "blender", "type": "simple_star"},
         "small diagonal stars of what is above 1",
         "Blender 5.0, Glare node, Simple Star, High",
-        {"type": "simple_star"},
     ),
     "blender_sun_beams": Preset(
-        "blender",
+        {"method": "blender", "type": "sun_beams"},
         "beams from the centre of what is above 1",
         "Blender 5.0, Glare node, Sun Beams, High",
-        {"type": "sun_beams"},
     ),
     "pygfx": Preset(
-        "pygfx",
+        {"method": "pygfx"},
         "six levels of the complete picture, added up, mixed in with 0.04",
         "pygfx/pygfx, bloom.py @ f5f8f72c",
     ),
     "spencer_photopic": Preset(
-        "convolution",
+        {"method": "convolution", "composite": "mix"},
         "the glare of an eye by day",
         "Spencer et al., SIGGRAPH 1995",
-        {"composite": "mix"},
     ),
     "blender_fog_glow": Preset(
-        "blender",
+        {"method": "blender", "type": "fog_glow"},
         "a fog around what is above 1",
         "Blender 5.0, Glare node, Fog Glow, High",
-        {"type": "fog_glow"},
     ),
     # Not normalized, because the sums of the channels are the kernel's tint.
     "unreal_convolution": Preset(
-        "convolution",
+        {
+            "method": "convolution",
+            "psf": {"psf": "unreal", "image": _IRIS_6},
+            "normalize": False,
+            "composite": "mix",
+        },
         "a star of six rays whose centre keeps its energy",
         "Unreal Engine's convolution bloom; the kernel of iris_6",
-        {"psf": {"psf": "unreal", "image": _IRIS_6}, "normalize": False, "composite": "mix"},
     ),
     "camera_lens": Preset(
-        "convolution",
+        {
+            "method": "convolution",
+            "psf": {"psf": "harvey_shack"},
+            "composite": "mix",
+            "intensity": 0.025,
+        },
         "the 2.5 % of the light that a lens of 14 surfaces scatters",
         "Ritt, Sensors 20(21):6308, 2020",
-        {"psf": {"psf": "harvey_shack"}, "composite": "mix", "intensity": 0.025},
     ),
     "iris_6": Preset(
-        "convolution",
+        {"method": "convolution", "psf": _IRIS_6, "composite": "mix"},
         "diffraction at an iris of six blades at f/8",
         "physical optics",
-        {"psf": _IRIS_6, "composite": "mix"},
     ),
     "photo": Preset(
-        "bevy",
+        {"method": "bevy", "composite": "add", "threshold": 1.0, "knee": 0.5},
         "a soft glow of highlights that --expand makes brighter; nothing becomes darker",
         "vkbloom, for pictures without values above 1; Bevy's chain",
-        {"composite": "add", "threshold": 1.0, "knee": 0.5},
     ),
 }

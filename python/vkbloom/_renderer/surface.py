@@ -41,13 +41,6 @@ def _window_surface(renderer: Renderer, window: object) -> int:
     return handle.value
 
 
-def _copied(source: object, settings: Settings, framebuffer: str) -> str:
-    """Return what to copy: `scene`, where a scene's `final` would equal it, costs no pass."""
-    values = settings.tonemap, settings.encoding, settings.exposure, settings.dither
-    equal = not settings.bloom and values == ("none", "none", 0.0, False)
-    return "scene" if framebuffer == "final" and equal and not is_image(source) else framebuffer
-
-
 class Surface:
     """A window, or a display without one, on which a renderer presents framebuffers.
 
@@ -115,7 +108,7 @@ class Surface:
         else:
             given = scene_source(cast("Scene", source), size or (width, height), shading, time)
         core = self._renderer._core
-        plan = core.plan(given, settings, (_copied(source, settings, framebuffer),))
+        plan = core.plan(given, settings, (framebuffer,))
         ((_, shape, dtype),) = plan.outputs
         if len(shape) != 3:
             raise ValueError(f"framebuffer: {framebuffer!r} has no colours to show")

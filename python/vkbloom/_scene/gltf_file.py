@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import base64
 import binascii
+import dataclasses
 import json
 import os
 import re
@@ -61,18 +62,6 @@ class GltfFile:
         data = path.read_bytes()
         text, self._blob = self._split_glb(data) if data[:4] == b"glTF" else (data, None)
         self.root = self._parsed(text, pygltflib)
-        self._kinds: dict[str, type] = {
-            "accessors": pygltflib.Accessor,
-            "bufferViews": pygltflib.BufferView,
-            "buffers": pygltflib.Buffer,
-            "images": pygltflib.Image,
-            "materials": pygltflib.Material,
-            "meshes": pygltflib.Mesh,
-            "nodes": pygltflib.Node,
-            "samplers": pygltflib.Sampler,
-            "scenes": pygltflib.Scene,
-            "textures": pygltflib.Texture,
-        }
 
     def fail(self, what: str) -> NoReturn:
         """Raise a ValueError that names the file and what is wrong with it."""
@@ -172,7 +161,7 @@ class GltfFile:
         if not items:
             self.fail(f"{user}: index into {field} is {reprlib.repr(index)}; there are none")
         item = items[self.integer(index, f"{user}: index into {field}", 0, len(items) - 1)]
-        if not isinstance(item, self._kinds[field]):
+        if not dataclasses.is_dataclass(item):
             self.fail(f"{field}[{index}] is not an object")
         return item
 

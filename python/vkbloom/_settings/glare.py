@@ -26,12 +26,8 @@ class Glare(Record):
 
     _class_key: ClassVar[str] = "stage"
     _subject: ClassVar[str] = "glare"
+    _example: ClassVar[str] = "a stage, such as Streaks"
     stage: ClassVar[str]
-
-    def __post_init__(self) -> None:
-        if not hasattr(self, "stage"):
-            raise TypeError(f"{type(self).__name__} is abstract; use a stage, such as Streaks")
-        super().__post_init__()
 
     @classmethod
     def _classes(cls) -> Mapping[str, type[Glare]]:

@@ -132,6 +132,7 @@ class Settings(Record):
 
     _class_key: ClassVar[str] = "method"
     _subject: ClassVar[str] = "fields"
+    _example: ClassVar[str] = "a method, such as Separable"
     method: ClassVar[str]
     #: Whether the method starts from the complete frame: it reduces it and thresholds it itself.
     published: ClassVar[bool] = False
@@ -152,11 +153,6 @@ class Settings(Record):
     bloom_scale: float = number_field("bloom_scale", slider=(0.05, 1))
     format: BloomFormat | None = None
     glare: tuple[Glare, ...] = value_field((), kind="glare", read=_read_glare)
-
-    def __post_init__(self) -> None:
-        if type(self) is Settings:
-            raise TypeError("Settings is abstract; use a method, such as Separable")
-        super().__post_init__()
 
     @property
     def glow_note(self) -> str:
@@ -188,7 +184,11 @@ class Settings(Record):
 
     def _core_block(self) -> bytes:
         """Return the settings as the core reads them."""
-        return settings_block(self.method, vars(self))
+        return settings_block(self.method, vars(self) | self._core_values())
+
+    def _core_values(self) -> dict[str, Any]:
+        """Return what the core names or counts otherwise."""
+        return {}
 
     @property
     def _has_state(self) -> bool:
@@ -204,17 +204,23 @@ class Settings(Record):
         return METHODS
 
 
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class PublishedSettings(Settings):
+    """Base class of the settings of published methods, with what most of them have."""
+
+    published: ClassVar[bool] = True
+
+    knee: float = number_field("knee", fixed="the threshold of this method has no knee")
+    composite: Composite = choice_field("composite", ("add",))
+    format: BloomFormat | None = "rgba16float"
+
+
 def field_info(settings: Settings, name: str) -> FieldInfo:
     """Return the description of a field, or of a stage's field, such as "glare.0.intensity"."""
     if "." not in name:
         return fields_of(type(settings))[name]
     index, field = stage_field_of(settings.glare, name)
     return fields_of(type(settings.glare[index]))[field]
-
-
-def no_knee(method: str) -> Any:
-    """Declare the knee of a method whose threshold has none."""
-    return number_field("knee", fixed=f"the threshold of the method {method} has no knee")
 
 
 def check_shading(shading: str) -> Shading:

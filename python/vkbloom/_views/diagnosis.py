@@ -220,7 +220,7 @@ def _candidates(a: _Image, b: _Image) -> Iterator[_Candidate]:
                 name = "".join("rgb"[index] for index in order)
                 channels = (*order, *range(3, a.shape[2]))
                 text = f"the second image has the order {name}"
-                yield _Candidate("channels", name, text, partial(_reordered, channels))
+                yield _Candidate("channels", name, text, partial(np.take, indices=channels, axis=2))
     if a.shape[2] == 4:
         text = "the second image is multiplied by alpha"
         yield _Candidate("alpha", "premultiplied", text, _multiplied)
@@ -243,7 +243,7 @@ def _limits(a: _Image, b: _Image) -> Iterator[_Candidate]:
                     "clamp",
                     limit,
                     f"the {name} image is {text}",
-                    partial(_bounded, bound, limit),
+                    partial(bound, limit),
                     is_of_b=name == "first",
                 )
 
@@ -273,15 +273,6 @@ def _curves(a: _Image, b: _Image, colours: int) -> Iterator[_Candidate]:
         yield _Candidate(cause, value, text, curve)
         if a.shape[2] > colours:
             yield _Candidate(cause, value, text, partial(_of_colours, curve, colours))
-
-
-def _reordered(channels: tuple[int, ...], image: _Image) -> _Image:
-    return np.take(image, channels, axis=2)
-
-
-def _bounded(bound: np.ufunc, limit: float, image: _Image) -> _Image:
-    limited: _Image = bound(image, limit)
-    return limited
 
 
 def _to_the_power(exponent: float, image: _Image) -> _Image:

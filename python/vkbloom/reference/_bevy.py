@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ._image import BlurInput
-from ._levels import WIDEST_LEVEL, halved
+from ._levels import WIDEST_LEVEL
 from ._pyramid import downsample, groups
 from ._sampling import Array
 from ._threshold import luminance, masked, soften
-from ._upsampling import combine, flat_gain, tent
+from ._upsampling import combine, flat_gain, halvings, tent
 
 if TYPE_CHECKING:
     from vkbloom._methods.bevy import BevyBloom
@@ -39,10 +39,9 @@ def passes(source: BlurInput, settings: BevyBloom) -> dict[str, Array]:
     scale = (settings.scale_x, settings.scale_y)
     up = partial(tent, x_step=settings.scale_x, y_step=settings.scale_y)
     level = (min(max(1, math.floor(width * limit / height + 0.5)), WIDEST_LEVEL), limit)
-    downs = [source.store(masked(_prefilter(source.image, level, settings), source.mask))]
-    for _ in range(1, _level_count(settings)):
-        level = halved(level)
-        downs.append(source.store(downsample(downs[-1], level, scale=scale)))
+    first = source.store(masked(_prefilter(source.image, level, settings), source.mask))
+    shrink = partial(downsample, scale=scale)
+    downs = halvings(first, _level_count(settings), source.store, shrink)
     fine, coarse = _shares(settings)
     return combine(downs, source, fine=fine, coarse=coarse, upsample=up, last=up)
 
@@ -71,10 +70,7 @@ def _prefilter(image: Array, size: tuple[int, int], settings: BevyBloom) -> Arra
 
 
 def _threshold(rgb: Array, settings: BevyBloom) -> Array:
-    if settings.threshold is None:
-        return rgb
-    half_width = settings.threshold * settings.knee
-    return soften(rgb, settings.threshold, half_width, 4 * (half_width + 1e-5), 1e-5)
+    return soften(rgb, settings.threshold, settings.knee, added=4e-5, least=1e-5)
 
 
 def _shares(settings: BevyBloom) -> tuple[list[float], list[float]]:

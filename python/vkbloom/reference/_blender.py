@@ -18,7 +18,7 @@ from ._pyramid import GROUPS, downsample
 from ._sampling import Array, sample, weighted_mean
 from ._tape import value_of
 from ._threshold import brightest, masked
-from ._upsampling import combine, linear, tent_of_target
+from ._upsampling import combine, halvings, linear, tent_of_target
 
 if TYPE_CHECKING:
     from vkbloom._methods.blender import BlenderGlare
@@ -143,11 +143,9 @@ def _bloom(
     height, width, _ = bright.shape
     count = max(1, math.floor(math.log2(max(1.0, min(width, height) * settings.size))))
     downs = [bright]
-    level = (width, height)
-    for k in range(1, count):
-        level = halved(level)
-        shrink = _weighted_taps if k == 1 else downsample
-        downs.append(store(shrink(downs[-1], level)))
+    if count > 1:
+        second = store(_weighted_taps(bright, halved((width, height))))
+        downs += halvings(second, count - 1, store, downsample)
     levels = combine(
         downs,
         BlurInput(bright, (width, height), store),

@@ -17,7 +17,7 @@ from ._levels import WIDEST_LEVEL, halved
 from ._pyramid import downsample
 from ._sampling import Array, sample, weighted_mean
 from ._threshold import brightest, firefly_weight, masked
-from ._upsampling import combine, linear, tent_of_target
+from ._upsampling import combine, halvings, linear, tent_of_target
 
 if TYPE_CHECKING:
     from vkbloom._methods.filament import FilamentBloom
@@ -46,13 +46,15 @@ def passes(source: BlurInput, settings: FilamentBloom) -> dict[str, Array]:
         above = halved(above)
         image = source.store(masked(_reduce(image, above, threshold, settings.highlight), mask))
         threshold = mask = None
-    downs = [source.store(masked(_reduce(image, level, threshold, settings.highlight), mask))]
+    first = source.store(masked(_reduce(image, level, threshold, settings.highlight), mask))
     longer = math.floor(max(across, top))
     count = min(settings.levels, math.floor(math.log2(longer)) + 1)
-    for _ in range(1, count):
-        is_even = level[0] % 2 == 0 and level[1] % 2 == 0
-        level = halved(level)
-        downs.append(source.store((_nine_taps if is_even else downsample)(downs[-1], level)))
+
+    def shrink(larger: Array, size: tuple[int, int]) -> Array:
+        is_odd = larger.shape[0] % 2 or larger.shape[1] % 2
+        return (downsample if is_odd else _nine_taps)(larger, size)
+
+    downs = halvings(first, count, source.store, shrink)
     return combine(downs, source, upsample=tent_of_target, last=linear, gain=1 / count)
 
 

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from ._image import Storage, storage
-from ._levels import halved
 from ._pyramid import downsample
 from ._sampling import Array, sample
 from ._tape import Traced
+from ._upsampling import halvings
 
 
 def stage_format(format: str) -> str:
@@ -30,7 +30,7 @@ def stages(source: Array, glare: Sequence[Any], format: str) -> dict[str, Array]
         name = stage.stage
         number = f"_{seen[name]}" if counts[name] > 1 else ""
         seen[name] += 1
-        image = _reduced(source, stage.halvings, store)
+        image = halvings(source, 1 + stage.halvings, store, downsample)[-1]
         images[name + number] = store(_STAGES[name](image, stage, store))
     return images
 
@@ -58,13 +58,6 @@ def light(bloom: Array, intensity: float, images: Sequence[Array], glare: Sequen
 def _lights(glare: Sequence[Any]) -> list[Any]:
     """Return the stages that add light: all but dirt."""
     return [stage for stage in glare if stage.stage != "dirt"]
-
-
-def _reduced(image: Array, halvings: int, store: Storage) -> Array:
-    for _ in range(halvings):
-        size = halved((image.shape[1], image.shape[0]))
-        image = store(downsample(image, size))
-    return image
 
 
 def _above(image: Array, threshold: float) -> Array:

@@ -17,7 +17,7 @@ from ._image import BlurInput, Storage
 from ._sampling import Array, read_rows, sample, weighted_mean
 from ._tape import contiguous
 from ._threshold import firefly_weight, luminance, masked
-from ._upsampling import combine, cubic, spline_taps
+from ._upsampling import combine, cubic, cubic_rows
 
 if TYPE_CHECKING:
     from vkbloom._methods.unity import HdrpBloom
@@ -120,11 +120,6 @@ def _linear_rows(image: Array, count: int) -> Array:
 
 
 def _cubic_rows(image: Array, count: int) -> Array:
-    """Sample the cubic B-spline as two bilinear taps, neither beyond 1 - 1 / count."""
+    """Sample the cubic B-spline with no tap beyond 1 - 1 / count."""
     length = image.shape[0]
-    furthest = (1 - 1 / count) * length - 0.5
-    total = np.zeros((count, *image.shape[1:]))
-    for position, weight in spline_taps(_up_positions(length, count)):
-        rows = read_rows(image, np.minimum(position, furthest))
-        total += weight[:, np.newaxis, np.newaxis] * rows
-    return total
+    return cubic_rows(image, _up_positions(length, count), (1 - 1 / count) * length - 0.5)

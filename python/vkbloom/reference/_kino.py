@@ -15,7 +15,7 @@ from ._image import BlurInput
 from ._levels import halved
 from ._sampling import Array, sample, weighted_mean
 from ._threshold import brightest, firefly_weight, masked, soften
-from ._upsampling import combine, tent
+from ._upsampling import combine, halvings, tent
 
 if TYPE_CHECKING:
     from vkbloom._methods.kino import KinoBloom
@@ -32,11 +32,8 @@ def passes(source: BlurInput, settings: KinoBloom) -> dict[str, Array]:
     height, width, _ = source.image.shape
     count, step = _count_and_step(settings, height)
     bright = source.store(masked(_prefilter(source.image, settings), source.mask))
-    image, level, downs = bright, (width, height), []
-    for k in range(count):
-        level = halved(level)
-        image = source.store(_box(image, level, settings.anti_flicker and k == 0))
-        downs.append(image)
+    first = source.store(_box(bright, halved((width, height)), settings.anti_flicker))
+    downs = halvings(first, count, source.store, partial(_box, firefly_filter=False))
     up = partial(tent, x_step=step, y_step=step)
     ups = combine(downs, source, upsample=up, last=up)
     return {"bright": bright, **ups}
@@ -70,10 +67,7 @@ def _median(first: Array, second: Array, third: Array) -> Array:
 
 
 def _threshold(rgb: Array, settings: KinoBloom) -> Array:
-    if settings.threshold is None:
-        return rgb
-    half_width = settings.threshold * settings.knee + 1e-5
-    return soften(rgb, settings.threshold, half_width, 4 * half_width, 1e-5)
+    return soften(rgb, settings.threshold, settings.knee, wider=1e-5, least=1e-5)
 
 
 def _box(image: Array, size: tuple[int, int], firefly_filter: bool) -> Array:

@@ -16,7 +16,7 @@ from ._levels import halved
 from ._pyramid import downsample
 from ._sampling import Array, sample
 from ._threshold import masked, soften
-from ._upsampling import combine, linear, tent
+from ._upsampling import combine, halvings, linear, tent
 
 if TYPE_CHECKING:
     from vkbloom._methods.playcanvas import PlayCanvasBloom
@@ -32,14 +32,9 @@ def passes(source: BlurInput, settings: PlayCanvasBloom) -> dict[str, Array]:
     height, width, _ = source.image.shape
     level = halved((width, height))
     half = source.store(np.maximum(sample(source.image, level), 0))
-    image, downs = half, []
-    for k in range(_level_count(level, settings)):
-        level = halved(level)
-        image = downsample(image, level)
-        image = source.store(
-            masked(_thresholded(image, settings), source.mask) if k == 0 else image
-        )
-        downs.append(image)
+    bright = _thresholded(downsample(half, halved(level)), settings)
+    first = source.store(masked(bright, source.mask))
+    downs = halvings(first, _level_count(level, settings), source.store, downsample)
     return {"half": half, **combine(downs, source, upsample=tent, last=linear)}
 
 
@@ -54,7 +49,4 @@ def _level_count(half: tuple[int, int], settings: PlayCanvasBloom) -> int:
 
 
 def _thresholded(rgb: Array, settings: PlayCanvasBloom) -> Array:
-    if not settings.threshold:
-        return rgb
-    half_width = settings.threshold / 2
-    return soften(rgb, settings.threshold, half_width, 4 * half_width + 1e-4, 1e-4)
+    return soften(rgb, settings.threshold or None, 0.5, added=1e-4, least=1e-4)

@@ -12,11 +12,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ._image import BlurInput
-from ._levels import halved
 from ._pyramid import downsample
 from ._sampling import Array, sample
 from ._threshold import masked, soften, with_alpha
-from ._upsampling import combine, tent
+from ._upsampling import combine, halvings, tent
 
 if TYPE_CHECKING:
     from vkbloom._methods.unity import PostProcessingBloom
@@ -42,14 +41,9 @@ def passes(source: BlurInput, settings: PostProcessingBloom) -> dict[str, Array]
     def enlarged(image: Array, size: tuple[int, int]) -> Array:
         return _box(image, size, radius / 2) if settings.fast else tent(image, size, radius, radius)
 
-    level = first
-    bright = _prefilter(reduced(source.image, level), settings) * with_alpha(
-        settings.color, channels
-    )
-    downs = [source.store(masked(bright, source.mask))]
-    for _ in range(1, count):
-        level = halved(level)
-        downs.append(source.store(reduced(downs[-1], level)))
+    bright = _prefilter(reduced(source.image, first), settings)
+    bright = source.store(masked(bright * with_alpha(settings.color, channels), source.mask))
+    downs = halvings(bright, count, source.store, reduced)
     return combine(downs, source, upsample=enlarged, last=enlarged)
 
 
@@ -76,11 +70,8 @@ def _prefilter(rgb: Array, settings: PostProcessingBloom) -> Array:
     limit = min(65504.0, linear_light(settings.clamp))
     # The clamp is not applied to alpha.
     kept = np.concatenate([np.minimum(rgb[..., :3], limit), rgb[..., 3:]], axis=-1)
-    if settings.threshold is None:
-        return kept
-    threshold = linear_light(settings.threshold)
-    half_width = threshold * settings.knee + 1e-5
-    return soften(kept, threshold, half_width, 4 * half_width, 1e-4)
+    threshold = None if settings.threshold is None else linear_light(settings.threshold)
+    return soften(kept, threshold, settings.knee, wider=1e-5, least=1e-4)
 
 
 def linear_light(value: Any) -> Any:

@@ -15,7 +15,7 @@ from ._levels import halved
 from ._pyramid import downsample, groups
 from ._sampling import Array, weighted_mean
 from ._threshold import luminance, masked
-from ._upsampling import combine, linear, tent
+from ._upsampling import combine, halvings, linear, tent
 
 if TYPE_CHECKING:
     from vkbloom._methods.pygfx import PygfxBloom
@@ -30,13 +30,14 @@ def passes(source: BlurInput, settings: PygfxBloom) -> dict[str, Array]:
     both axes; the bloom is up_0, bilinear. The levels are clamped to at least 0.
     """
     height, width, _ = source.image.shape
-    image, level, downs = source.image, (width, height), []
-    for k in range(_level_count(settings, level)):
-        level = halved(level)
-        shrink = _averaged if settings.karis_average and k == 0 else downsample
-        image = np.maximum(shrink(image, level), 0)
-        image = source.store(masked(image, source.mask) if k == 0 else image)
-        downs.append(image)
+    shrink = _averaged if settings.karis_average else downsample
+    first = np.maximum(shrink(source.image, halved((width, height))), 0)
+    downs = halvings(
+        source.store(masked(first, source.mask)),
+        _level_count(settings, (width, height)),
+        source.store,
+        lambda image, size: np.maximum(downsample(image, size), 0),
+    )
     return combine(
         downs,
         source,

@@ -73,18 +73,27 @@ def apply_threshold(rgb: Array, threshold: float | None, knee: float) -> Array:
         return rgb
     if knee == 0:
         return np.where(luminance(rgb) > threshold, rgb, 0.0)
-    half_width = threshold * knee
-    return soften(rgb, threshold, half_width, 4 * half_width + 1e-5, 1e-5)
+    return soften(rgb, threshold, knee, added=1e-5, least=1e-5)
 
 
-def soften(rgb: Array, threshold: float, half_width: float, divisor: float, least: float) -> Array:
-    """Scale colours by max(q, b - threshold) / max(b, least).
+def soften(
+    rgb: Array,
+    threshold: float | None,
+    knee: float,
+    *,
+    wider: float = 0.0,
+    added: float = 0.0,
+    least: float,
+) -> Array:
+    """Scale colours by max(q, b - threshold) / max(b, least); None: they stay as they are.
 
-    b is the brightest channel, and q = clamp(b - threshold + half_width, 0, 2 half_width)^2 /
-    divisor.
+    b is the brightest channel, k = threshold * knee + wider, and
+    q = clamp(b - threshold + k, 0, 2 k)^2 / (4 k + added). Engines differ in the last three.
     """
-    brightness = brightest(rgb)
+    if threshold is None:
+        return rgb
+    brightness, half_width = brightest(rgb), threshold * knee + wider
     above = brightness - threshold
-    soft = np.clip(above + half_width, 0, 2 * half_width) ** 2 / divisor
+    soft = np.clip(above + half_width, 0, 2 * half_width) ** 2 / (4 * half_width + added)
     scale: Array = joined(above - soft, 0.0, soft, above) / np.maximum(brightness, least)
     return rgb * scale

@@ -1,4 +1,4 @@
-"""Upsampling of a chain of levels: filters that enlarge, and the combination of the levels."""
+"""Chains of levels: their halvings, filters that enlarge, and the combination of the levels."""
 
 from __future__ import annotations
 
@@ -7,10 +7,11 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from ._image import BlurInput
-from ._sampling import Array, sample
+from ._levels import halved
+from ._sampling import Array, read_rows, sample
 from ._tape import contiguous
 
-# (image, size of the result) -> the image enlarged
+# (image, size of the result) -> the image in this size
 Filter = Callable[[Array, tuple[int, int]], Array]
 
 
@@ -36,27 +37,14 @@ def cubic(image: Array, size: tuple[int, int]) -> Array:
     At the fraction f of the way between two texels, the four nearest weigh (1 - f)^3,
     4 - 6 f^2 + 3 f^3, 1 + 3 f + 3 f^2 - 3 f^3 and f^3, each divided by 6.
     """
-    rows = _cubic_rows(image, size[1])
-    columns = _cubic_rows(rows.swapaxes(0, 1), size[0])
-    return contiguous(columns.swapaxes(0, 1))
+    for count in size[::-1]:
+        length = image.shape[0]
+        image = cubic_rows(image, (np.arange(count) + 0.5) * length / count - 0.5).swapaxes(0, 1)
+    return contiguous(image)
 
 
-def _cubic_rows(image: Array, count: int) -> Array:
-    """Enlarge along the first axis."""
-    length = image.shape[0]
-    positions = (np.arange(count) + 0.5) * length / count - 0.5
-    lower = np.floor(positions)
-    f = (positions - lower)[:, np.newaxis, np.newaxis]
-    weights = ((1 - f) ** 3, 4 - 6 * f**2 + 3 * f**3, 1 + 3 * f + 3 * f**2 - 3 * f**3, f**3)
-    result = np.zeros((count, *image.shape[1:]))
-    for offset, weight in enumerate(weights, start=-1):
-        texels = np.clip(lower + offset, 0, length - 1).astype(np.intp)
-        result += weight / 6 * image[texels]
-    return result
-
-
-def spline_taps(positions: Array) -> list[tuple[Array, Array]]:
-    """Return the cubic B-spline as two bilinear taps: their positions and their weights.
+def cubic_rows(image: Array, positions: Array, furthest: float = np.inf) -> Array:
+    """Read the cubic B-spline along the first axis, as two bilinear taps up to a position.
 
     The four texels around a position weigh w_0 to w_3. A bilinear tap between the first two, at
     w_1 / (w_0 + w_1) of the way, has both their shares (Sigg and Hadwiger, "Fast Third-Order
@@ -65,11 +53,23 @@ def spline_taps(positions: Array) -> list[tuple[Array, Array]]:
     lower = np.floor(positions)
     f = positions - lower
     w = ((1 - f) ** 3 / 6, (4 - 6 * f**2 + 3 * f**3) / 6, (1 + 3 * f + 3 * f**2 - 3 * f**3) / 6)
-    right = w[2] + f**3 / 6
-    return [
-        (lower - 1 + w[1] / (w[0] + w[1]), w[0] + w[1]),
-        (lower + 1 + f**3 / 6 / right, right),
-    ]
+    left, right = w[0] + w[1], w[2] + f**3 / 6
+    total = np.zeros((len(positions), *image.shape[1:]))
+    for tap, weight in ((lower - 1 + w[1] / left, left), (lower + 1 + f**3 / 6 / right, right)):
+        rows = read_rows(image, np.minimum(tap, furthest))
+        total += weight[:, np.newaxis, np.newaxis] * rows
+    return total
+
+
+def halvings(
+    first: Array, count: int, store: Callable[[Array], Array], shrink: Filter
+) -> list[Array]:
+    """Return an image, and smaller ones that have half the size of the one before."""
+    downs = [first]
+    while len(downs) < count:
+        height, width, _ = downs[-1].shape
+        downs.append(store(shrink(downs[-1], halved((width, height)))))
+    return downs
 
 
 def combine(

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 import operator
 from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -22,7 +23,7 @@ from ._pyramid import downsample
 from ._sampling import Array, read_rows, sample
 from ._tape import contiguous
 from ._threshold import masked, soften, with_alpha
-from ._upsampling import combine, cubic, flat_gain, linear
+from ._upsampling import combine, cubic, flat_gain, halvings, linear
 
 if TYPE_CHECKING:
     from vkbloom._methods.unity import UrpBloom
@@ -47,16 +48,17 @@ def passes(source: BlurInput, settings: UrpBloom) -> dict[str, Array]:
         aspect = height / width if settings.version == "12" else 1.0
         reduced = source.store(downsample(source.image, level, scale=(0.5, 0.5 * aspect)))
     bright = _prefilter(reduced, settings) * with_alpha(_tint(settings), channels)
-    downs = [source.store(masked(bright, source.mask))]
-    count = _level_count(settings, level)
+    first, count = source.store(masked(bright, source.mask)), _level_count(settings, level)
     if settings.filter == "kawase":
-        return _kawase(source, settings, downs[0], count)
+        return _kawase(source, settings, first, count)
     if settings.filter == "dual":
-        return _dual(source, settings, downs, count)
-    for _ in range(1, count):
-        level = halved(level)
-        horizontal = source.store(_across(downs[-1], level, settings))
-        downs.append(source.store(sample(horizontal, level, y_taps=_taps(1.0))))
+        return _dual(source, settings, first, count)
+
+    def shrink(image: Array, size: tuple[int, int]) -> Array:
+        horizontal = source.store(_across(image, size, settings))
+        return sample(horizontal, size, y_taps=_taps(1.0))
+
+    downs = halvings(first, count, source.store, shrink)
     fine, coarse = _shares(settings, len(downs))
     kernel = _kernel(settings)
     return combine(downs, source, fine=fine, coarse=coarse, upsample=kernel, last=kernel)
@@ -89,13 +91,9 @@ def _kawase(source: BlurInput, settings: UrpBloom, first: Array, count: int) -> 
     return images | {"bloom": source.store.end(_kernel(settings)(image, source.size))}
 
 
-def _dual(
-    source: BlurInput, settings: UrpBloom, downs: list[Array], count: int
-) -> dict[str, Array]:
+def _dual(source: BlurInput, settings: UrpBloom, first: Array, count: int) -> dict[str, Array]:
     """Go down and up, and add no level on the way up."""
-    while len(downs) < count:
-        height, width, _ = downs[-1].shape
-        downs.append(source.store(dual_kawase.down(downs[-1], halved((width, height)), 1.0)))
+    downs = halvings(first, count, source.store, partial(dual_kawase.down, offset=1.0))
     image, ups = downs[-1], {}
     for level in range(count - 2, -1, -1):
         height, width, _ = downs[level].shape
@@ -143,9 +141,7 @@ def _shares(settings: UrpBloom, count: int) -> tuple[list[float], list[float]]:
 def _prefilter(rgb: Array, settings: UrpBloom) -> Array:
     # The clamp is not applied to alpha.
     kept = np.concatenate([np.minimum(rgb[..., :3], settings.clamp), rgb[..., 3:]], axis=-1)
-    if settings.threshold is not None:
-        half_width = settings.threshold * settings.knee
-        kept = soften(kept, settings.threshold, half_width, 4 * half_width + 1e-4, 1e-4)
+    kept = soften(kept, settings.threshold, settings.knee, added=1e-4, least=1e-4)
     positive: Array = np.maximum(kept, 0)
     return positive
 

@@ -1,0 +1,293 @@
+"""``vkbloom view``, ``explore``: an image or a scene with live controls."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import dataclasses
+import functools
+import signal
+import time
+import webbrowser
+from collections.abc import Callable, Iterator
+from typing import Any, Final
+
+import click
+from numpy.typing import NDArray
+
+import vkbloom
+from vkbloom._checks import import_extra
+from vkbloom._cli.fields import SIZE, Command
+from vkbloom._cli.image_files import expand_option, layer_option, read_picture, subimage_option
+from vkbloom._cli.interrupts import INTERRUPTED
+from vkbloom._cli.program import adapter_option, as_wrong_use, given
+from vkbloom._cli.scene_options import scene_options
+from vkbloom._cli.sequences import is_stream
+from vkbloom._cli.settings_options import STARTS, settings_options
+from vkbloom._cli.terminal import tell_device
+from vkbloom._explorer.viewer import GLOW, Viewer
+from vkbloom._renderer.surface import Surface
+from vkbloom._settings.settings import SHADINGS, Settings, Shading
+
+#: Options of a scene, by the names of their parameters.
+_OF_SCENE: Final = {"base": "--scene", "shading": "--shading", "size": "--size"}
+HELP: Final = """\
+B              bloom on, off
+1 ... 9        the framebuffer that is shown
+P              the next preset
+Space          pauses the animation
+Q, Escape      close\
+"""
+_TURN_SECONDS: Final = 8.0
+_LARGEST: Final = (1600, 900)  # size of a window for an image
+_TITLE_SECONDS: Final = 0.5  # between updates of the title
+_WAIT_SECONDS: Final = 0.1  # while the window is hidden
+_KEYS: Final = ("SPACE", "ESCAPE", *"BPQ", *"123456789")
+
+
+def _live_options(*, image_has_size: bool) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Add IMAGE and its options, and those of the device, the scene and the settings.
+
+    The command gets the pixels of IMAGE as `image`, which is None for a scene, and as `origin` the
+    arguments `file` and `expand` of a `Viewer`. `image_has_size`: ``--size`` may be given with an
+    IMAGE.
+    """
+
+    def add(command: Callable[..., Any]) -> Callable[..., Any]:
+        @click.argument("source", metavar="[IMAGE]", required=False, type=click.Path())
+        @subimage_option
+        @layer_option
+        @expand_option
+        @adapter_option
+        @scene_options
+        @settings_options
+        @functools.wraps(command)
+        def run(
+            *,
+            source: str | None,
+            subimage: int,
+            layer: str | None,
+            expand: float | None,
+            **arguments: Any,
+        ) -> Any:
+            if source is None:
+                if given("expand"):
+                    raise click.UsageError("--expand is only for an IMAGE")
+                return command(image=None, origin={}, **arguments)
+            for name, option in _OF_SCENE.items():
+                if given(name) and not (name == "size" and image_has_size):
+                    raise click.UsageError(
+                        f"{option} is only for scenes; leave it out with an IMAGE"
+                    )
+            picture = read_picture(source, subimage, None, layer=layer, expand=expand)
+            is_expanded = picture.numbers.startswith("uint") and expand not in (None, 1)
+            origin: dict[str, Any] = {"file": "" if is_stream(source) else source}
+            origin |= {"expand": expand} if is_expanded else {}
+            return command(image=picture.pixels, origin=origin, **arguments)
+
+        return run
+
+    return add
+
+
+@dataclasses.dataclass
+class Live:
+    """The state of a window.
+
+    - `shading`: Of a scene.
+    - `framebuffer`: Name of the framebuffer that is shown.
+    - `time`: Time of the animation, in periods.
+    """
+
+    settings: Settings
+    source: Any
+    shading: Shading = "forward"
+    framebuffer: str = "final"
+    time: float = 0.0
+    paused: bool = False
+    closed: bool = False
+
+    def press(self, key: str, names: list[str]) -> None:
+        """Do what a key stands for; `names` are the framebuffers that there are."""
+        if key in "bp":
+            # The next settings may lack the framebuffer.
+            self.framebuffer = "final"
+        if key == "b":
+            self.settings = self.settings.replace(bloom=not self.settings.bloom)
+        elif key in "123456789" and int(key) <= len(names):
+            self.framebuffer = names[int(key) - 1]
+        elif key == "p":
+            known = list(vkbloom.presets.values())
+            shown = known.index(self.settings) if self.settings in known else -1
+            self.settings = known[(shown + 1) % len(known)]
+        elif key == "space":
+            self.paused = not self.paused
+        elif key in ("q", "escape"):
+            self.closed = True
+
+    def advance(self, seconds: float) -> None:
+        """Let time pass."""
+        if not self.paused:
+            self.time = (self.time + seconds / _TURN_SECONDS) % 1.0
+
+    def title(self, seconds: float) -> str:
+        """Return the text of the title; `seconds` is the time of a frame."""
+        parts = [
+            f"{self.framebuffer}: {self.settings.method}",
+            *([] if self.settings.bloom else ["no bloom"]),
+            *(["paused"] if self.paused else []),
+            f"{seconds * 1e3:.1f} ms, {1 / seconds:.0f} frames/s",
+        ]
+        return " | ".join(parts)
+
+
+@click.command(cls=Command, epilog=f"\b\n{HELP}")
+@click.option("--size", type=SIZE, help="Of the window [default: 1280x720, or the image's size]")
+@click.option("--shading", type=click.Choice(SHADINGS), default="forward")
+@_live_options(image_has_size=True)
+def view(
+    *,
+    image: NDArray[Any] | None,
+    origin: dict[str, Any],
+    size: tuple[int, int] | None,
+    shading: Shading,
+    adapter: str,
+    scene: Callable[[], vkbloom.Scene],
+    settings: vkbloom.Settings,
+) -> None:
+    """Show the bloom of IMAGE, or of a scene, in a window with live controls."""
+    glfw = import_extra("glfw", "window", "view")
+    height, width = (720, 1280) if image is None else image.shape[:2]
+    loaded = scene() if image is None else image
+    with (
+        _opened(glfw, size or (min(width, _LARGEST[0]), min(height, _LARGEST[1]))) as window,
+        vkbloom.Renderer(adapter) as renderer,
+        Surface(renderer, window) as surface,
+    ):
+        source = loaded if isinstance(loaded, vkbloom.Scene) else renderer.upload(loaded)
+        live = Live(settings, source, shading)
+        _listen(glfw, window, renderer, live)
+        since = before = time.perf_counter()
+        shown = 0
+        while not (live.closed or glfw.window_should_close(window)):
+            options: dict[str, Any] = {"shading": live.shading, "time": live.time}
+            if surface.present(live.source, live.settings, framebuffer=live.framebuffer, **options):
+                shown += 1
+            else:
+                glfw.wait_events_timeout(_WAIT_SECONDS)
+            glfw.poll_events()
+            now = time.perf_counter()
+            live.advance(now - before)
+            before = now
+            if shown and now - since >= _TITLE_SECONDS:
+                glfw.set_window_title(window, live.title((now - since) / shown))
+                since, shown = now, 0
+
+
+@contextlib.contextmanager
+def _opened(glfw: Any, size: tuple[int, int]) -> Iterator[Any]:
+    """Open a window without an OpenGL context."""
+    glfw.ERROR_REPORTING = "ignore"  # The last error is asked for.
+    try:
+        window = None
+        if glfw.init():
+            glfw.window_hint(glfw.CLIENT_API, glfw.NO_API)
+            window = glfw.create_window(*size, "vkbloom", None, None)
+        if not window:
+            raise vkbloom.Error(f"no window was opened: {glfw.get_error()[1].decode()}")
+        yield window
+    finally:
+        glfw.terminate()
+
+
+def _listen(glfw: Any, window: Any, renderer: vkbloom.Renderer, live: Live) -> None:
+    """Connect keys to the state."""
+    keys = {getattr(glfw, f"KEY_{name}"): name.lower() for name in _KEYS}
+
+    def on_key(_: Any, key: int, code: int, action: int, mods: int) -> None:
+        if action != glfw.RELEASE and key in keys:
+            outputs = renderer.plan(live.source, live.settings, shading=live.shading).framebuffers
+            colours = [name for name, (shape, _) in outputs.items() if len(shape) == 3]
+            live.press(keys[key], colours)
+
+    glfw.set_key_callback(window, on_key)
+
+
+@click.command(cls=Command)
+@click.option(
+    "--port", type=click.IntRange(0, 65535), default=0, help="Of 127.0.0.1; 0: any free port."
+)
+@click.option("--open/--no-open", "opens", default=True, help="Whether to open a browser.")
+@click.option(
+    "--size", type=SIZE, default="1280x720", help="Of a scene's frame, which gives its aspect."
+)
+@click.option("--shading", type=click.Choice(SHADINGS), default="deferred")
+@_live_options(image_has_size=False)
+def explore(
+    *,
+    image: NDArray[Any] | None,
+    origin: dict[str, Any],
+    port: int,
+    opens: bool,
+    size: tuple[int, int],
+    shading: Shading,
+    adapter: str,
+    scene: Callable[[], vkbloom.Scene],
+    settings: vkbloom.Settings,
+) -> int:
+    """Explore the bloom of IMAGE, or of a scene, in a browser with controls for all settings.
+
+    The page is served on 127.0.0.1 until Ctrl-C, to every program that knows its address. IMAGE
+    is decoded as vkbloom apply decodes it. The built-in scene has lights 6 times as bright as
+    white, unless --glow-intensity says otherwise. Without options of settings, a scene in deferred
+    shading begins with the tone map "aces" and the encoding "srgb".
+    """
+    import_extra("tornado", "notebook", "explore")
+    looked_at: vkbloom.Scene | NDArray[Any]
+    begun: vkbloom.Settings | None = settings
+    if image is not None:
+        looked_at = image
+    else:
+        looked_at = scene()
+        if not any(given(name) for name in ("base", "glow", "glow_intensity")):
+            looked_at = dataclasses.replace(looked_at, glow_intensity=GLOW)
+        if settings == vkbloom.presets["tutorial"] and not any(given(name) for name in STARTS):
+            begun = None
+    with vkbloom.Renderer(adapter) as renderer:
+
+        def new_viewer() -> Viewer:
+            return Viewer(looked_at, begun, size=size, shading=shading, renderer=renderer, **origin)
+
+        with as_wrong_use():
+            # Checks the arguments, so that an error appears here and not on the page.
+            new_viewer()
+        tell_device(renderer)
+        try:
+            return asyncio.run(_serve(new_viewer, port, opens))
+        except KeyboardInterrupt:
+            return INTERRUPTED
+
+
+async def _serve(new_viewer: Callable[[], Viewer], port: int, opens: bool) -> int:
+    """Serve the page until a signal comes, and return the exit status."""
+    # Imported here because it needs tornado; `command` has checked that it is installed.
+    from vkbloom._explorer.server import Server  # noqa: PLC0415
+
+    server = Server(new_viewer, port)
+    stopped: asyncio.Future[int] = asyncio.get_running_loop().create_future()
+
+    def stop(status: int) -> None:
+        if not stopped.done():
+            stopped.set_result(status)
+
+    # Without a handler, KeyboardInterrupt could be raised inside the event loop's own code.
+    with contextlib.suppress(NotImplementedError):
+        for number, status in ((signal.SIGINT, INTERRUPTED), (signal.SIGTERM, 0)):
+            asyncio.get_running_loop().add_signal_handler(number, stop, status)
+    click.echo(f"{server.url}\nPress Ctrl-C to stop.")
+    if opens:
+        webbrowser.open(server.url)
+    try:
+        return await stopped
+    finally:
+        await server.stop()

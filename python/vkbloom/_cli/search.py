@@ -1,0 +1,219 @@
+"""``vkbloom fit``, ``translate``: search settings."""
+
+from __future__ import annotations
+
+import functools
+import json
+from collections.abc import Callable, Sequence
+from typing import Any, get_args
+
+import click
+from numpy.typing import NDArray
+from rich.console import Console
+
+import vkbloom
+from vkbloom._cli.fields import SIZE, Command, NameOf
+from vkbloom._cli.image_files import input_colour_option, is_photograph, read_picture
+from vkbloom._cli.program import adapter_option, as_wrong_use, given
+from vkbloom._cli.settings_options import (
+    PRESET_OF_IMAGES,
+    PRESET_OF_PHOTOS,
+    STARTS,
+    settings_options,
+)
+from vkbloom._cli.terminal import is_quiet, note
+from vkbloom._explorer.controls import as_code
+from vkbloom._fit.losses import LossName
+from vkbloom._io.expansion import PHOTO_EXPANSION
+from vkbloom._renderer.interruptible import opened_renderer
+from vkbloom._settings.registry import METHODS
+
+
+def _search_options(
+    *, vary: str | None, loss: LossName, max_calls: int
+) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Add the options of a search; the arguments are their defaults.
+
+    The command gets `search`, the keyword arguments of `vkbloom.fit` and `vkbloom.translate`, and
+    `show_results`, a function that prints results.
+    """
+
+    def add(command: Callable[..., Any]) -> Callable[..., Any]:
+        @click.option(
+            "--vary",
+            metavar="NAME,...",
+            default=vary,
+            help="The settings to find: numbers, switches and choices"
+            + ("." if vary else " [default: width and strength of the blur, threshold, intensity]"),
+        )
+        @click.option(
+            "--loss",
+            type=click.Choice(get_args(LossName)),
+            default=loss,
+            help="The figure to minimize. relative: norm of the difference divided by the norm of "
+            "the target; l2: root mean square of the difference; log: the same for logarithms; "
+            "flip: mean FLIP.",
+        )
+        @click.option(
+            "--max-calls",
+            metavar="N",
+            type=click.IntRange(min=1),
+            default=max_calls,
+            help="Limit of the renders of each search.",
+        )
+        @click.option("--json", "as_json", is_flag=True, help="Print one list, sorted by loss.")
+        @functools.wraps(command)
+        def run(*, vary: str | None, as_json: bool, **rest: Any) -> Any:
+            search = {name: rest.pop(name) for name in ("loss", "max_calls")}
+            search["progress"] = Console(stderr=True).is_terminal and not is_quiet()
+            if vary is not None:
+                names = (name.strip().replace("-", "_") for name in vary.split(","))
+                search["vary"] = [name for name in names if name]
+            show_results = functools.partial(_show_results, as_json=as_json)
+            return command(search=search, show_results=show_results, **rest)
+
+        return run
+
+    return add
+
+
+def _show_results(fits: Sequence[vkbloom.FitResult], *, as_json: bool) -> None:
+    """Print results, the best one first."""
+    if as_json:
+        click.echo(json.dumps([_object(item) for item in fits], indent=2))
+    else:
+        for item in fits:
+            click.echo(
+                f"{item.settings.method}: {item.loss_name} loss {item.loss:.4g}, from "
+                f"{item.start_loss:.4g}; {item.calls} renders"
+            )
+            click.echo(f"  {as_code(item.settings)}")
+            click.echo(f"  {item.words}")
+
+
+def _object(fit: vkbloom.FitResult) -> dict[str, Any]:
+    """Return the object of one result that --json prints."""
+    return {
+        "settings": fit.settings.to_dict(),
+        "varied": {name: getattr(fit.settings, name) for name in fit.vary},
+        "loss": fit.loss,
+        "start_loss": fit.start_loss,
+        "loss_name": fit.loss_name,
+        "explained": fit.explained,
+        "verdict": fit.verdict,
+        "cause": fit.cause,
+        "calls": fit.calls,
+    }
+
+
+@click.command(cls=Command)
+@click.argument("image", metavar="IMAGE", type=click.Path())
+@click.argument("target", metavar="TARGET", type=click.Path())
+@click.option(
+    "--preset",
+    "presets",
+    multiple=True,
+    type=NameOf("preset", vkbloom.presets, ("all",)),
+    help="Settings to start a search from; may be repeated. all: every preset, each with those of "
+    f"the varied settings that it has [default {PRESET_OF_IMAGES}]",
+)
+@click.option(
+    "--method",
+    "kinds",
+    multiple=True,
+    type=NameOf("method", METHODS),
+    help="A method whose defaults start a search; may be repeated.",
+)
+@_search_options(vary="threshold,intensity", loss="relative", max_calls=1000)
+@input_colour_option
+@adapter_option
+def fit(
+    *,
+    image: str,
+    target: str,
+    presets: tuple[str, ...],
+    kinds: tuple[str, ...],
+    search: dict[str, Any],
+    show_results: Callable[[Sequence[vkbloom.FitResult]], None],
+    input_colour: Any,
+    adapter: str,
+) -> None:
+    """Find the settings with which the bloom of IMAGE matches TARGET.
+
+    Both files have the same size. Their colours are decoded to linear light, as by vkbloom apply.
+    With a TARGET of 8 bits, such as a screenshot, blooms are clipped and rounded as it is. For the
+    preset photo, the highlights of an IMAGE of integers are also expanded.
+
+    There is one search for each preset and method, which starts from its settings. --vary names
+    the settings that may change. The results are printed as Python code, sorted by loss, with a
+    verdict (good, fair or poor) and the likely cause, such as a target without bloom.
+    """
+    pixels = read_picture(image, 0, input_colour).pixels
+    wanted = read_picture(target, 0, input_colour).pixels
+    searches = _searches(presets, kinds, pixels)
+    if is_photograph(image) and (photo := _photo_of(presets, search["vary"])):
+        bright = read_picture(image, 0, input_colour, expand=PHOTO_EXPANSION).pixels
+        searches.append((bright, [photo]))
+        note(f"{image}: its highlights are expanded to {PHOTO_EXPANSION:g} for the preset photo")
+    with opened_renderer(adapter) as renderer, as_wrong_use():
+        results = [
+            item
+            for image_of, begun in searches
+            for item in vkbloom.fit(image_of, wanted, begun, renderer=renderer, **search)
+        ]
+    show_results(sorted(results, key=lambda item: item.loss))
+
+
+def _searches(
+    presets: Sequence[str], kinds: Sequence[str], pixels: NDArray[Any]
+) -> list[tuple[NDArray[Any], Any]]:
+    """Return what `vkbloom.fit` gets of each search: the image, and the settings."""
+    begun = [METHODS[kind]() for kind in kinds]
+    if "all" in presets:
+        return [(pixels, "all"), *([(pixels, begun)] if begun else [])]
+    begun += [vkbloom.presets[name] for name in presets]
+    return [(pixels, begun or [vkbloom.presets[PRESET_OF_IMAGES]])]
+
+
+def _photo_of(presets: Sequence[str], vary: Sequence[str]) -> vkbloom.Settings | None:
+    """Return the preset for photographs if it is asked for and has the varied fields."""
+    photo = vkbloom.presets[PRESET_OF_PHOTOS]
+    is_asked = "all" in presets or PRESET_OF_PHOTOS in presets
+    return photo if is_asked and all(hasattr(photo, name) for name in vary) else None
+
+
+@click.command(cls=Command)
+@click.option(
+    "--to",
+    "target",
+    required=True,
+    type=NameOf("preset or method", vkbloom.presets, METHODS),
+    help="A preset or a method: where the search starts, and what does not vary.",
+)
+@click.option("--size", type=SIZE, default="640x360", help="Size of the picture.")
+@_search_options(vary=None, loss="log", max_calls=300)
+@adapter_option
+@settings_options
+def translate(
+    *,
+    target: str,
+    size: tuple[int, int],
+    search: dict[str, Any],
+    show_results: Callable[[Sequence[vkbloom.FitResult]], None],
+    adapter: str,
+    settings: vkbloom.Settings,
+) -> None:
+    """Find another method's parameters whose bloom comes closest.
+
+    --preset, --method or --settings, with further options, are the settings to translate; --to
+    names the other method. Both get a black picture with four small lights. The result is printed
+    as Python code, with its loss and a verdict.
+    """
+    if not any(given(name) for name in STARTS):
+        raise click.UsageError(
+            "give what to translate: --preset NAME, --method NAME or --settings FILE"
+        )
+    start = vkbloom.presets[target] if target in vkbloom.presets else METHODS[target]()
+    with opened_renderer(adapter) as renderer, as_wrong_use():
+        result = vkbloom.translate(settings, start, size=size, renderer=renderer, **search)
+    show_results([result])
