@@ -53,9 +53,11 @@ templates_path = ["templates"]
 def _make_accessible(*arguments: Any) -> None:
     """Give headings of the navigation a level, and let keys scroll code that is wider than a page.
 
-    Sphinx writes neither; axe-core finds both (tests/docs/test_first_page.py).
+    Sphinx writes neither; axe-core finds both (tests/docs/test_first_page.py). Paths in the last
+    column of a table may break, so that no table is wider than a page because of them.
     """
     context = arguments[3]
+    context["metatags"] += "<style>td:last-child { overflow-wrap: anywhere }</style>"
     for name in ("furo_navigation_tree", "body"):
         text = context.get(name, "")
         text = text.replace('role="heading">', 'role="heading" aria-level="2">')

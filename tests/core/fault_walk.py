@@ -16,7 +16,7 @@ import shutil
 import sys
 import tempfile
 import zlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -63,41 +63,42 @@ def method(settings: vkbloom.Settings) -> Work:
     return lambda renderer: renderer.apply(picture(*SIZE), settings)
 
 
-def accompanied(renderer: Renderer) -> Arrays:
-    """The same image with another mask, then with another emission."""
-    image, emission = picture(*SIZE), picture(*SIZE, seed=1)
-    mask = picture(*SIZE, 1, seed=2)[..., 0]
-    settings = vkbloom.Separable(layers=((1, 1), (2, 1)), composite="mix", alpha="blur")
-    frames = renderer.apply(image, settings, mask=mask)
-    masked = renderer.apply(image, settings, mask=mask[::-1])
-    both = renderer.apply(image, settings, mask=mask[::-1], emission=emission)
-    results = {"first": frames, "masked": masked, "both": both}
+def named(results: Mapping[Any, vkbloom.Frames]) -> Arrays:
     return {f"{key} {name}": one[name] for key, one in results.items() for name in one}
 
 
-def glared(renderer: Renderer) -> Arrays:
-    """All stages of glare, of another mask the second time."""
+def accompanied(renderer: Renderer) -> Arrays:
+    """The same image with another mask, then with another emission; all stages of glare."""
+    image, emission = picture(*SIZE), picture(*SIZE, seed=1)
+    mask = picture(*SIZE, 1, seed=2)[..., 0]
     streaks = vkbloom.Streaks(directions=2, base=2, iterations=2)
     stages = (streaks, vkbloom.Ghosts(), vkbloom.Halo(), vkbloom.Dirt(seed=1))
-    settings = vkbloom.Separable(glare=stages)
-    mask = picture(*SIZE, 1, seed=2)[..., 0]
-    frames = {
-        turn: renderer.apply(picture(*SIZE), settings, mask=mask)
-        for turn, mask in (("first", mask), ("second", mask[::-1]))
-    }
-    return {f"{turn} {name}": one[name] for turn, one in frames.items() for name in one}
+    settings = vkbloom.Separable(layers=((1, 1), (2, 1)), composite="mix", alpha="blur")
+    flaring = vkbloom.Separable(glare=stages)
+    return named(
+        {
+            "first": renderer.apply(image, settings, mask=mask),
+            "masked": renderer.apply(image, settings, mask=mask[::-1]),
+            "both": renderer.apply(image, settings, mask=mask[::-1], emission=emission),
+            "glare": renderer.apply(image, flaring, mask=mask),
+            "masked glare": renderer.apply(image, flaring, mask=mask[::-1]),
+        }
+    )
+
+
+def swept(renderer: Renderer, source: Any, settings: Iterable[Any], **more: Any) -> Arrays:
+    return named(dict(enumerate(renderer.sweep(source, settings, **more))))
 
 
 def batch(renderer: Renderer) -> Arrays:
-    settings = [vkbloom.Separable(exposure=step / 4, loops=1 + step // 5) for step in range(8)]
-    frames = renderer.sweep(picture(*SIZE), settings)
-    return {f"{i} {name}": array for i, one in enumerate(frames) for name, array in one.items()}
+    steps = range(8)
+    settings = (vkbloom.Separable(exposure=step / 4, loops=1 + step // 5) for step in steps)
+    return swept(renderer, picture(*SIZE), settings)
 
 
 def grid(renderer: Renderer) -> Arrays:
-    settings = [vkbloom.Pyramid(levels=2, radius=step / 2) for step in range(5)]
-    frames = renderer.sweep(UFO, settings, size=SIZE, framebuffers=("final", "bloom"))
-    return {f"{i} {name}": array for i, one in enumerate(frames) for name, array in one.items()}
+    settings = (vkbloom.Pyramid(levels=2, radius=step / 2) for step in range(5))
+    return swept(renderer, UFO, settings, size=SIZE, framebuffers=("final", "bloom"))
 
 
 def readback(renderer: Renderer) -> Arrays:
@@ -200,11 +201,6 @@ def own_settings() -> tuple[vkbloom.Settings, ...]:
     return tuple(vkbloom.load_method(folder / f"{name}.hook")() for name in ("karis", "compute"))
 
 
-def own_passes(renderer: Renderer) -> Arrays:
-    frames = renderer.sweep(picture(*SIZE), own_settings())
-    return {f"{i} {name}": array for i, one in enumerate(frames) for name, array in one.items()}
-
-
 def on_device(renderer: Any) -> Arrays:
     """Images of CUDA, over the stand-in for it: strided, a batch, results in memory used before.
 
@@ -241,8 +237,7 @@ PRESETS = {
 WORK: dict[str, Work] = {
     "render forward": lambda renderer: renderer.render(UFO, size=SIZE),
     "render deferred": lambda renderer: renderer.render(textured(), size=SIZE, shading="deferred"),
-    "mask and emission": accompanied,
-    "glare": glared,
+    "mask, emission, glare": accompanied,
     "batch": batch,
     "grid": grid,
     "grid to Zarr": stored_grid,
@@ -250,7 +245,7 @@ WORK: dict[str, Work] = {
     "handles": handles,
     "gradients": gradients,
     "present": presented,
-    "own passes": own_passes,
+    "own passes": lambda renderer: swept(renderer, picture(*SIZE), own_settings()),
     **({"arrays on the device": on_device} if "STAND_IN_UUID" in os.environ else {}),
     **{
         f"apply {preset} {variant}": method(settings)

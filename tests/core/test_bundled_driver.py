@@ -13,42 +13,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.core.builds import compiler, require_header
 from vkbloom import AdapterNotFoundError, Error, Pyramid, Renderer, adapters
 
 MANIFESTS = ("/usr/share/vulkan/icd.d", "/usr/local/share/vulkan/icd.d", "/etc/vulkan/icd.d")
-# Lists what Mesa does without a window system, and makes an instance of no extension alone.
-NO_WINDOWS = """
-#include <string.h>
-#include <vulkan/vulkan.h>
-static VkResult list(const char *layer, uint32_t *count, VkExtensionProperties *found)
-{
-    (void)layer;
-    *count = 1;
-    if (found)
-        strcpy(found->extensionName, "VK_EXT_headless_surface");
-    return VK_SUCCESS;
-}
-static VkResult make(const VkInstanceCreateInfo *info, const VkAllocationCallbacks *memory,
-                     VkInstance *made)
-{
-    (void)memory;
-    (void)made;
-    return info->enabledExtensionCount ? VK_ERROR_UNKNOWN : VK_ERROR_INITIALIZATION_FAILED;
-}
-VkResult vk_icdNegotiateLoaderICDInterfaceVersion(uint32_t *version)
-{
-    *version = 7;
-    return VK_SUCCESS;
-}
-PFN_vkVoidFunction vk_icdGetInstanceProcAddr(VkInstance instance, const char *name)
-{
-    (void)instance;
-    return strcmp(name, "vkCreateInstance") == 0 ? (PFN_vkVoidFunction)make
-         : strcmp(name, "vkEnumerateInstanceExtensionProperties") == 0 ? (PFN_vkVoidFunction)list
-                                                                        : NULL;
-}
-"""
 
 
 def library() -> str:
@@ -173,16 +140,3 @@ def test_no_system_driver_is_needed(driver: str, tmp_path: Path) -> None:
     assert answer == ([True], True)
     # A loader that opens single drivers validates it; another is named.
     assert refusal == "" or "VK_LUNARG_direct_driver_loading" in refusal
-
-
-def test_a_driver_without_windows_is_asked_for_no_surface(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    require_header("vulkan/vulkan.h")
-    (tmp_path / "driver.c").write_text(NO_WINDOWS)
-    built = str(tmp_path / "driver.so")
-    options = ("-shared", "-fPIC", "-DVK_NO_PROTOTYPES", str(tmp_path / "driver.c"), "-o", built)
-    subprocess.run([*compiler(), *options], check=True)
-    monkeypatch.setenv("VKBLOOM_DRIVER", built)
-    with pytest.raises(Error, match="VK_ERROR_INITIALIZATION_FAILED"):
-        Renderer("llvmpipe")

@@ -244,9 +244,7 @@ def test_a_variant_that_the_device_cannot_run_is_refused(
 def test_the_doctor_on_a_device_without_timestamps(layer: Path, name: str) -> None:
     done = run(layer, name, "timestamps,storage", ("-m", "vkbloom._cli", "doctor", "--json"))
     findings = {finding["topic"]: finding for finding in json.loads(done.stdout)["findings"]}
-    render = findings["test render"]
-    assert render["status"] == "ok"
-    assert findings["validation layer"]["status"] == "ok"
+    assert findings["test render"]["status"] == "ok"
 
 
 # Prints the exception if Ctrl-C and a validation message come in the same wait.

@@ -19,7 +19,6 @@ from vkbloom import (
     PygfxBloom,
     Pyramid,
     Renderer,
-    Scene,
     Separable,
     Settings,
     reference,
@@ -204,14 +203,6 @@ def test_of_a_published_method_the_bloom_is_not_rounded(renderer: Renderer) -> N
     }
     assert is_level["glow"] == is_level["down_0"] == is_level["up_0"] == 1
     assert is_level["bloom"] < 0.5
-
-
-@pytest.mark.parametrize("shading", ["forward", "deferred"])
-def test_scenes(renderer: Renderer, shading: Any) -> None:
-    settings = PygfxBloom(format=FORMAT)
-    frames = renderer.render(Scene.ufo(), settings, (96, 64), shading=shading)
-    assert frames["up_0"].dtype == np.float32
-    assert 0 < frames["up_0"].max() <= 1
 
 
 def test_all_variants_give_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
