@@ -70,13 +70,6 @@ static bool check_workgroup(const struct vkb_device *device, const struct vkb_pa
                   .needed = pass->shader->shared});
 }
 
-static bool check_pass(const struct vkb_device *device, const struct vkb_pass_row *pass,
-                       struct vkb_error *error)
-{
-    return check_bindings(device, pass, error)
-        && (pass->geometry != VKB_GEOMETRY_DISPATCH || check_workgroup(device, pass, error));
-}
-
 bool vkb_limits_check_image(const struct vkb_device *device, const struct vkb_image_row *row,
                             struct vkb_error *error)
 {
@@ -129,7 +122,9 @@ static bool check_passes(const struct vkb_device *device, const struct vkb_graph
                             device->adapter.name, pass->name);
         // Plans without a renderer know no limits.
         if (pass->block == VKB_BLOCK_custom && device->limits.maxPerStageResources
-            && !check_pass(device, pass, error))
+            && (!check_bindings(device, pass, error)
+                || (pass->geometry == VKB_GEOMETRY_DISPATCH
+                    && !check_workgroup(device, pass, error))))
             return false;
     }
     return true;

@@ -112,7 +112,6 @@ static bool describe(const struct vkb_instance *instance, VkPhysicalDevice physi
         .driver_id = driver.driverID,
         .nonconformant = driver.conformanceVersion.major == 0,
         .api_version = plain.apiVersion,
-        .driver_version = plain.driverVersion,
         .vendor = plain.vendorID,
         .bundled = instance->driver[0] != 0,
     };

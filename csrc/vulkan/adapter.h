@@ -20,7 +20,6 @@ struct vkb_adapter_info {
     VkDriverId driver_id;
     bool nonconformant;  // the driver says so
     uint32_t api_version;
-    uint32_t driver_version;
     uint8_t driver_uuid[VK_UUID_SIZE];
     uint8_t uuid[VK_UUID_SIZE];  // of the device
     uint32_t vendor;

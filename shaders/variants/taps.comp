@@ -58,16 +58,11 @@ Line line_of(float part)
     return line;
 }
 
-// The numbers of a group's tap along both axes.
+// The numbers of a group's tap along both axes. Filament's place depends on the position, its sign does not.
 ivec2 numbers_of(int group)
 {
-    const ivec2 cross[5] = ivec2[](ivec2(2, 2), ivec2(1, 2), ivec2(3, 2), ivec2(2, 1), ivec2(2, 3));
-    const ivec2 hdrp[5] = ivec2[](ivec2(2, 2), ivec2(4, 1), ivec2(0, 3), ivec2(3, 4), ivec2(1, 0));
-    if (GROUPS == GROUPS_BOX)
-        return 1 + 2 * ivec2(group & 1, group >> 1);
-    if (GROUPS == GROUPS_FILAMENT)
-        return 1 + 2 * ivec2(group & 1, group >> 1);
-    return GROUPS == GROUPS_HDRP ? hdrp[group] : cross[group];
+    vec2 place = place_of(group, filament_taps(vec2(0.0)));
+    return 2 + ivec2(sign(place)) * mix(ivec2(1), ivec2(2), equal(abs(place), vec2(HDRP_FAR)));
 }
 
 // Of each column: its texel, and its taps.

@@ -10,10 +10,20 @@ UNIFORM_BLOCK(THRESHOLD_BLOCK);
 #include "lib/storage.glsl"
 #include "variants/pixels.glsl"
 
-vec4 made(vec4 value)
+const int COLUMNS = TEXEL_COLUMNS(CHANNEL_BYTES), ROWS = TEXEL_ROWS, LOADED = COLUMNS;
+#define LOAD_CHANNELS SOURCE_CHANNELS
+#include "variants/runs.glsl"
+
+void write_row(int x, int y)
 {
-    return apply_threshold(finite_or_zero(value), THRESHOLD_MODE, params.threshold, params.knee);
+    uvec4 raw[COLUMNS];
+
+    load_run(x, y, raw);
+    [[unroll]] for (int i = 0; i < COLUMNS; ++i) {
+        vec4 value = finite_or_zero(value_of(raw[i]));
+        raw[i] = buffer_of(apply_threshold(value, THRESHOLD_MODE, params.threshold, params.knee));
+    }
+    store(x, y, raw);
 }
 
-#define LOAD_CHANNELS SOURCE_CHANNELS
-#include "variants/same_size.glsl"
+#include "variants/rows.glsl"

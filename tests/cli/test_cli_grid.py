@@ -80,9 +80,6 @@ class TestStores:
     def test_resumed_by_the_same_call(self, tmp_path: Path, image_file: Path) -> None:
         words = [image_file, "--axis", "exposure=0,1", "-o", tmp_path / "a.zarr"]
         done(*words)
-        again = run(*words, "--no-resume")
-        assert again.exit_code == 1
-        assert "resume it" in again.stderr
         done(*words)
         other = run(*words, "--intensity", "0.5")
         assert other.exit_code == 1

@@ -160,8 +160,8 @@ def test_a_later_process_compiles_nothing(tmp_path: Path) -> None:
     ours, drivers = tmp_path / "ours", tmp_path / "drivers"
     drivers.mkdir()
     cached = {"VKBLOOM_CACHE_DIR": str(ours), "MESA_SHADER_CACHE_DIR": str(drivers)}
-    words = ["-m", "vkbloom", "warm", "--preset", "kino", "--type", "float32", "--size", "32x24"]
-    assert "4 kinds of calls on" in output(*words, "--adapter", "software", **cached)
+    words = ["-m", "vkbloom", "warm", "--preset", "kino", "--size", "32x24"]
+    assert "12 kinds of calls on" in output(*words, "--adapter", "software", **cached)
     filled = {path: path.stat().st_size for path in warm_files(drivers)}
     assert filled
     assert warm_files(ours)

@@ -221,7 +221,7 @@ def test_the_reference_needs_a_twin(kind: Any) -> None:
     [
         (["render", "--size", "32x24", "-o", "{out}.exr"], "{out}.exr"),
         (["apply", "{image}", "{out}.exr"], "{out}.exr"),
-        (["warm", "--type", "float16", "--size", "40x32"], "{image}"),
+        (["warm", "--size", "40x32"], "{image}"),
         (["grid", "{image}", "--axis", "spread=1:3:2", "--out", "{out}.zarr"], "{out}.zarr"),
     ],
 )

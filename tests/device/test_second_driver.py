@@ -36,6 +36,27 @@ def test_a_part_of_all_workloads() -> None:
     assert result["wrong"] == {}
 
 
+# Prints the processor seconds of the first derivatives, by the image and by the exposure.
+DERIVATIVES = """
+import time
+import numpy as np
+import vkbloom
+image = np.ones((8, 8, 4), np.float32)
+with vkbloom.Renderer("software") as renderer:
+    for tonemap in ("reinhard", "aces"):
+        settings = vkbloom.Separable(tonemap=tonemap, knee=0.5)
+        pullback = vkbloom.vjp(image, settings, renderer=renderer)[1]
+        gradients = pullback({"final": image})
+        gradients["image"], gradients["exposure"]
+print(time.process_time())
+"""
+
+
+def test_derivatives_of_curves_are_compiled_in_seconds() -> None:
+    """The driver compiles branches that constants rule out: it took over 300 s for one shader."""
+    assert float(output("-c", DERIVATIVES, VKBLOOM_VARIANT="fragment", **VARIABLES)) < 30
+
+
 # Prints a pixel of half floats without a bloom.
 PIXEL = """
 import numpy as np

@@ -105,9 +105,9 @@ def test_a_store_is_created_at_once(tmp_path: Path, turn: int) -> None:
     assert said[0] == said[2] == "" or said[1] == said[3] == "", said
     refused = [text for text in said if "contains another grid; settings.intensity" in text]
     assert len(refused) == 2, said
-    own = next(grid for grid, text in zip(grids, said, strict=True) if not text)
-    for number in (1, 3) if own == 0.25 else (2, 4):
-        prepare(tmp_path / "alone", *laid_out(own), (1,), (number, 4), resume=True)
+    created = next(grid for grid, text in zip(grids, said, strict=True) if not text)
+    for number in (1, 3) if created == 0.25 else (2, 4):
+        prepare(tmp_path / "alone", *laid_out(created), (1,), (number, 4), resume=True)
     assert contents(tmp_path / "a.zarr") == contents(tmp_path / "alone")
 
 

@@ -41,9 +41,9 @@ def daemon(folder: Path, *command: str | Path) -> Iterator[None]:
 
 def free_port() -> int:
     """Return a TCP port that nothing listens on."""
-    with socket.socket() as found:
-        found.bind(("127.0.0.1", 0))
-        return int(found.getsockname()[1])
+    with socket.socket() as listener:
+        listener.bind(("127.0.0.1", 0))
+        return int(listener.getsockname()[1])
 
 
 def wait_until(condition: Callable[[], bool], what: str) -> None:
@@ -98,9 +98,9 @@ PartitionName=main Nodes=ALL Default=YES
     )
     os.environ |= {"SLURM_CONF": f"{folder}/slurm.conf", "VKBLOOM_INTERFACE": "lo"}
     with ExitStack() as stack:
-        own = (f"--{name}-file={folder}/munge.{name}" for name in ("pid", "log", "seed"))
-        places = (*own, f"--key-file={key}", f"--socket={munge}")
-        stack.enter_context(daemon(folder, "munged", "--foreground", "--force", *places))
+        files = [f"--{name}-file={folder}/munge.{name}" for name in ("pid", "log", "seed")]
+        files += [f"--key-file={key}", f"--socket={munge}"]
+        stack.enter_context(daemon(folder, "munged", "--foreground", "--force", *files))
         wait_until(munge.exists, "munged")
         stack.enter_context(daemon(folder, "slurmctld", "-D"))
         for name in NODES:
@@ -118,14 +118,14 @@ def timed(what: str, *command: str) -> None:
 
 def compare(store: str, whole: str) -> None:
     """Raise an error unless two stores have the same files with the same bytes."""
-    found, expected = (
+    actual, expected = (
         {path.relative_to(base): path.read_bytes() for path in base.rglob("*") if path.is_file()}
         for base in (Path(store), Path(whole))
     )
-    if found != expected:
-        other = sorted(map(str, dict(found.items() ^ expected.items())))
+    if actual != expected:
+        other = sorted(map(str, dict(actual.items() ^ expected.items())))
         raise RuntimeError(f"{store}: other bytes than in {whole}: {other}")
-    print(f"{store}: {len(found)} files, byte for byte those of {whole}", flush=True)
+    print(f"{store}: {len(actual)} files, byte for byte those of {whole}", flush=True)
 
 
 def main() -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import vkbloom
@@ -56,13 +56,10 @@ def examined() -> dict[str, Any]:
     return {"version": vkbloom.__version__, "can_render": can_render, "findings": entries}
 
 
-def lines_of(
-    report: Mapping[str, Any], styled: Callable[[str, str], str] = lambda text, status: text
-) -> Iterator[str]:
-    """Yield the findings as lines; `styled` colours a text by a status."""
+def lines_of(report: Mapping[str, Any]) -> Iterator[str]:
+    """Yield the findings as lines."""
     for finding in report["findings"]:
-        status = styled(f"{finding['status']:9}", finding["status"])
-        yield f"{status}{finding['topic']:30}  {finding['found']}"
+        yield f"{finding['status']:9}{finding['topic']:30}  {finding['found']}"
         if finding["advice"]:
             yield f"{'':41}-> {finding['advice']}"
     able = "can render" if report["can_render"] else "cannot render"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import time
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 import click
 from tqdm import tqdm
@@ -15,8 +15,6 @@ from vkbloom._cli import bare
 from vkbloom._cli.program import adapter_option
 from vkbloom._cli.terminal import hides_progress, say
 from vkbloom._doctor import self_test
-
-_COLOURS: Final = {"ok": "green", "note": "yellow", "problem": "red"}
 
 
 @click.command()
@@ -46,17 +44,14 @@ def command(compares: bool, adapter: str, as_json: str | None) -> int:
     text = json.dumps(result, indent=2)
     if as_json == "-":
         click.echo(text)
+    elif compares:
+        _show_groups(result)
     else:
-        (_show_groups if compares else _show_findings)(result)
+        click.echo("\n".join(bare.lines_of(result)))
     if as_json not in (None, "-"):
         Path(as_json).write_text(f"{text}\n", encoding="utf-8")
         say(f"wrote {as_json}")
     return 0 if result["passed" if compares else "can_render"] else 1
-
-
-def _show_findings(report: dict[str, Any]) -> None:
-    for line in bare.lines_of(report, lambda text, status: click.style(text, _COLOURS[status])):
-        click.echo(line)
 
 
 def _compared(adapter: str) -> dict[str, Any]:

@@ -35,7 +35,6 @@ _PRESETS: Final = fields.NameOf("preset", vkbloom.presets)
 @click.option("--shading", type=click.Choice(SHADINGS), default=SHADINGS[0])
 @click.option("--framebuffers", metavar="all|NAME,...", default="final")
 @click.option("--image-format", metavar="EXTENSION", default="png")
-@click.option("--resume/--no-resume", default=True, help="Continue a store that is there")
 @click.option("--part", metavar="I/N", help="Render part I of N, from 1, as above")
 @image_files.input_colour_option
 @image_files.subimage_option
@@ -90,14 +89,12 @@ def command(*, source: str | None, out: str, words: tuple[str, ...], **given: An
     with program.as_wrong_use():
         grid = layout.ask(looked_at, settings, axes, reduce=None, **shared)
     _note_no_bloom(grid, given["adapter"])
-    how: dict[str, Any]
     with opened_renderer(given["adapter"]) as renderer:
         if is_store:
-            how = {"resume": given["resume"] or part != order.WHOLE, "part": part}
-            how["progress"] = not terminal.is_quiet()
-            vkbloom.grid(looked_at, settings, axes, store=out, renderer=renderer, **shared, **how)
+            shared |= {"part": part, "progress": not terminal.is_quiet()}
+            vkbloom.grid(looked_at, settings, axes, store=out, renderer=renderer, **shared)
         else:
-            how = {"suffix": suffix, "picture": picture, "expand": expand}
+            how: dict[str, Any] = {"suffix": suffix, "picture": picture, "expand": expand}
             _write_images(grid, Path(out), renderer, part=part, **how)
     which = f"part {part[0]}/{part[1]} of " if given["part"] else ""
     terminal.say(f"wrote {out}, {which}{math.prod(grid.shape)} points")

@@ -33,16 +33,12 @@ _KEPT: Final[tuple[Any, ...]] = ("all", ("final",))
     "--method", "methods", type=NameOf("method", METHODS), multiple=True, help="Only this method."
 )
 @click.option(
-    "--type", "types", type=click.Choice(_TYPES), multiple=True, help="Only images of this type."
-)
-@click.option(
     "--size", "sizes", type=SIZE, multiple=True, help="Of the images to come [default: 1920x1080]"
 )
 @adapter_option
 def command(
     presets: tuple[str, ...],
     methods: tuple[str, ...],
-    types: tuple[str, ...],
     sizes: tuple[tuple[int, int], ...],
     adapter: str,
 ) -> None:
@@ -59,7 +55,7 @@ def command(
     everything = not presets and not methods
     warmed = [vkbloom.presets[name] for name in (vkbloom.presets if everything else presets)]
     warmed += [METHODS[name]() for name in methods]
-    calls = list(itertools.product(sizes or (_USUAL_SIZE,), types or _TYPES, (3, 4), warmed, _KEPT))
+    calls = list(itertools.product(sizes or (_USUAL_SIZE,), _TYPES, (3, 4), warmed, _KEPT))
     with vkbloom.Renderer(adapter) as renderer:
         if everything:
             scene = vkbloom.Scene.ufo()

@@ -19,6 +19,11 @@ from vkbloom.psf._base import PSF, functions
 # them.
 _FIRST: Final = ("bloom", "intensity", "threshold")
 _LAST: Final = ("exposure", "tonemap")
+# Numbers of methods that are rarely changed.
+_RARE: Final = {
+    *("clamp", "jitter", "low_frequency_boost_curvature", "luminance_cap", "max_mip_dimension"),
+    *("maximum", "saturation", "scale_x", "scale_y", "smoothness", "white"),
+}
 # Fields that keep their values on the page when another preset or method is selected.
 _LOOK: Final = ("bloom", "exposure", "tonemap", "encoding", "dither", "dither_seed")
 
@@ -86,7 +91,7 @@ def _fields_of_method(kind: type[Settings]) -> list[dict[str, Any]]:
     for control in result:
         # An integer with two values is more like a switch than a slider.
         slides = control["kind"] == "number" and control["from"] + control["step"] < control["to"]
-        is_of_method = control["name"] not in shared
+        is_of_method = control["name"] not in shared and control["name"] not in _RARE
         control["first"] = control["name"] in (*_FIRST, *_LAST) or (is_of_method and slides)
 
     def rank(control: dict[str, Any]) -> tuple[int, ...]:

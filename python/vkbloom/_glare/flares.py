@@ -6,7 +6,7 @@ import dataclasses
 from typing import ClassVar
 
 from vkbloom import _core
-from vkbloom._checks import check_floats, check_number
+from vkbloom._settings.fields import numbers_field
 from vkbloom._settings.glare import GlareLight, stage_field
 
 
@@ -53,8 +53,12 @@ class Ghosts(GlareLight):
 
     stage: ClassVar[str] = "ghosts"
 
-    scales: tuple[float, ...] = (-0.5, -1.0, -2.0, 3.0, 1.5)
-    tints: tuple[tuple[float, float, float], ...] = ((1.0, 1.0, 1.0),)
+    scales: tuple[float, ...] = numbers_field(
+        (-0.5, -1.0, -2.0, 3.0, 1.5), -16, 16, count=(1, _core.MAX_GHOSTS)
+    )
+    tints: tuple[tuple[float, float, float], ...] = numbers_field(
+        ((1.0, 1.0, 1.0),), count=(1, _core.MAX_GHOSTS)
+    )
     maximum: float = stage_field("maximum", slider=(0, 100))
     falloff: float = stage_field("falloff", default=2.0, slider=(0, 32))
     radius: float = stage_field("radius", default=0.75, slider=(0.001, 1.5))
@@ -63,27 +67,11 @@ class Ghosts(GlareLight):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        scales = check_floats("scales", self.scales)
-        if not 1 <= len(scales) <= _core.MAX_GHOSTS:
+        if len(self.tints) not in (1, len(self.scales)):
             raise ValueError(
-                f"scales: {len(scales)} scales are out of range, 1 to {_core.MAX_GHOSTS}"
+                f"tints: {self.tints!r} is not one (r, g, b) or {len(self.scales)} of them, one "
+                "for each scale"
             )
-        for scale in scales:
-            check_number("scales", scale, -16, 16)
-        try:
-            tints = tuple(check_floats("tints", tuple(tint)) for tint in self.tints)
-        except TypeError:
-            raise TypeError(f"tints: {self.tints!r} is not a sequence of (r, g, b)") from None
-        if len(tints) not in (1, len(scales)) or any(len(tint) != 3 for tint in tints):
-            raise ValueError(
-                f"tints: {self.tints!r} is not one (r, g, b) or {len(scales)} of them, one for "
-                "each scale"
-            )
-        for tint in tints:
-            for factor in tint:
-                check_number("tints", factor, 0, 65504)
-        object.__setattr__(self, "scales", scales)
-        object.__setattr__(self, "tints", tints)
 
     @property
     def ghosts(self) -> tuple[tuple[float, tuple[float, float, float]], ...]:

@@ -3,23 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
 from typing import ClassVar
 
-from vkbloom._checks import FLT_MAX, check_number
-from vkbloom._methods.mip_chain import check_level_weights
-from vkbloom._settings.fields import choice_field, flag_field, number_field, value_field
+from vkbloom._checks import FLT_MAX
+from vkbloom._settings.fields import choice_field, flag_field, number_field, numbers_field
 from vkbloom._settings.settings import Composite, PublishedSettings
 
 #: Number of levels that have a weight in Godot.
 GODOT_LEVELS = 7
-
-
-def _check_weights(values: Sequence[float]) -> tuple[float, ...]:
-    weights = check_level_weights(values, GODOT_LEVELS)
-    for weight in weights:
-        check_number("level_weights", weight, 0, FLT_MAX)
-    return weights
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -85,8 +76,8 @@ class GodotBloom(PublishedSettings):
     luminance_cap: float = number_field("luminance_cap", slider=(0, 48))
     glow_bloom: float = number_field("glow_bloom")
     strength: float = number_field("strength", slider=(0, 2))
-    level_weights: tuple[float, ...] = value_field(
-        (0.0, 0.8, 0.4, 0.1, 0.0, 0.0, 0.0), read=_check_weights
+    level_weights: tuple[float, ...] = numbers_field(
+        (0.0, 0.8, 0.4, 0.1, 0.0, 0.0, 0.0), high=FLT_MAX
     )
     bicubic: bool = flag_field("bicubic")
     white: float = number_field("white", slider=(1, 16))

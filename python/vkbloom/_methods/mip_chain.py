@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
 from typing import ClassVar
 
 from vkbloom._checks import check_floats
@@ -67,7 +66,12 @@ class Pyramid(Settings):
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.level_weights is not None:
-            weights = check_level_weights(self.level_weights, self.levels)
+            weights, count = check_floats("level_weights", self.level_weights), self.levels
+            if len(weights) != count:
+                raise ValueError(
+                    f"level_weights: {len(weights)} weights are out of range, {count}, one for "
+                    "each level"
+                )
             object.__setattr__(self, "level_weights", weights)
 
 
@@ -101,13 +105,3 @@ class DualKawase(Settings):
 
     levels: int = number_field("levels", default=4, slider=(1, 10))
     offset: float = number_field("offset", slider=(0, 8))
-
-
-def check_level_weights(weights: Sequence[float], count: int) -> tuple[float, ...]:
-    """Return the weights as floats; TypeError or ValueError unless they are `count` numbers."""
-    numbers = check_floats("level_weights", weights)
-    if len(numbers) != count:
-        raise ValueError(
-            f"level_weights: {len(numbers)} weights are out of range, {count}, one for each level"
-        )
-    return numbers

@@ -4,46 +4,18 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import operator
-from collections.abc import Sequence
 from typing import ClassVar, Literal
 
 from vkbloom import _core
 from vkbloom._argument_types import INTEGER, NUMBER, checked_as
-from vkbloom._checks import as_float, check_floats
-from vkbloom._settings.fields import choice_field, flag_field, number_field, value_field
+from vkbloom._checks import FLT_MAX, check_above, check_index
+from vkbloom._settings.fields import choice_field, flag_field, number_field, numbers_field
 from vkbloom._settings.settings import Settings
 
 Texel = Literal["own", "x"]
 
 #: The half-kernel of the forward system: w0 at the centre, w1..w4 to both sides.
 TUTORIAL: tuple[float, ...] = (0.227027, 0.1945946, 0.1216216, 0.054054, 0.016216)
-
-
-def _check_weights(values: Sequence[float]) -> tuple[float, ...]:
-    weights = check_floats("weights", values)
-    if not 1 <= len(weights) <= _core.MAX_WEIGHTS:
-        raise ValueError(
-            f"weights: {len(weights)} weights are out of range, 1 to {_core.MAX_WEIGHTS}"
-        )
-    return weights
-
-
-def _check_layers(values: Sequence[tuple[float, float]]) -> tuple[tuple[float, ...], ...]:
-    try:
-        pairs = tuple(tuple(layer) for layer in values)
-    except TypeError:
-        raise TypeError(
-            f"layers: {values!r} is not a sequence of pairs (scale, strength)"
-        ) from None
-    layers = tuple(check_floats("layers", layer) for layer in pairs)
-    if not 1 <= len(layers) <= _core.MAX_LAYERS:
-        raise ValueError(f"layers: {len(layers)} layers are out of range, 1 to {_core.MAX_LAYERS}")
-    if any(len(layer) != 2 for layer in layers):
-        raise ValueError(f"layers: {values!r} is not a sequence of pairs (scale, strength)")
-    if any(not 0 <= number <= 16 for layer in layers for number in layer):
-        raise ValueError(f"layers: {values!r} has a number out of range, 0 to 16")
-    return layers
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -88,9 +60,13 @@ class Separable(Settings):
 
     blur_scale: float = number_field("blur_scale", unit="texel", slider=(0.1, 2))
     blur_strength: float = number_field("blur_strength", slider=(0, 4))
-    weights: tuple[float, ...] = value_field(TUTORIAL, read=_check_weights)
+    weights: tuple[float, ...] = numbers_field(
+        TUTORIAL, -FLT_MAX, FLT_MAX, count=(1, _core.MAX_WEIGHTS)
+    )
     loops: int = number_field("loops", slider=(1, 8))
-    layers: tuple[tuple[float, float], ...] = value_field(((1.0, 1.0),), read=_check_layers)
+    layers: tuple[tuple[float, float], ...] = numbers_field(
+        ((1.0, 1.0),), 0, 16, count=(1, _core.MAX_LAYERS)
+    )
     first_tap: int = number_field("first_tap")
     texel: Texel = choice_field("texel")
     direct: bool = flag_field("direct")
@@ -114,17 +90,10 @@ def gaussian_weights(sigma: float, radius: int | None = None) -> tuple[float, ..
         w0 + 2 (w1 + ... + w_radius) = 1.
     """
     limit = _core.MAX_WEIGHTS - 1
-    deviation = as_float("sigma", sigma)
-    if not 0 < deviation < math.inf:
-        raise ValueError(f"sigma: {sigma!r} is out of range, above 0")
+    deviation = check_above("sigma", sigma)
     if radius is None:
         radius = math.ceil(min(3 * deviation, limit))
-    try:
-        radius = operator.index(radius)
-    except TypeError:
-        raise TypeError(f"radius: {radius!r} is not an integer") from None
-    if not 0 <= radius <= limit:
-        raise ValueError(f"radius: {radius!r} is out of range, 0 to {limit}")
+    radius = check_index("radius", radius, 0, limit)
     # A product becomes infinity where the operator ** would raise OverflowError.
     distances = [tap / deviation for tap in range(radius + 1)]
     weights = [math.exp(-0.5 * distance * distance) for distance in distances]

@@ -3,20 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import Any, ClassVar, Literal, cast
+from typing import Any, ClassVar, Literal
 
-from vkbloom._settings.fields import choice_field, number_field, read_numbers, value_field
+from vkbloom._settings.fields import choice_field, number_field, numbers_field
 from vkbloom._settings.settings import PublishedSettings
 
 Variant = Literal["r185", "r187", "node"]
 Tint = tuple[float, float, float]
-
-
-def _read_tints(tints: Any) -> tuple[Tint, ...]:
-    read = tuple(read_numbers("tints", tint, 3, 0.0, 65504.0) for tint in tints)
-    if len(read) != 5:
-        raise ValueError(f"tints: {tints!r} is not five colours, one for each level")
-    return cast("tuple[Tint, ...]", read)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -75,8 +68,8 @@ class ThreeBloom(PublishedSettings):
     radius: float = number_field("radius", default=0.0, range=(0, 1))
     smooth_width: float = number_field("smooth_width", slider=(0.01, 1))
     resolution_scale: float = number_field(default=0.5, range=(0.01, 1))
-    tints: tuple[Tint, ...] = value_field(
-        ((1.0, 1.0, 1.0),) * 5, kind="pairs", read=_read_tints, option="level-tints"
+    tints: tuple[Tint, ...] = numbers_field(
+        ((1.0, 1.0, 1.0),) * 5, kind="pairs", option="level-tints"
     )
 
     def _core_values(self) -> dict[str, Any]:

@@ -13,11 +13,18 @@ import inspect
 import math
 import types
 import typing
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any, ClassVar, Final, Literal, Self
 
 from vkbloom import _core
-from vkbloom._checks import check_above, check_floats, check_integer, check_number, check_size
+from vkbloom._checks import (
+    FLT_MAX,
+    check_above,
+    check_floats,
+    check_integer,
+    check_number,
+    check_size,
+)
 from vkbloom._suggestions import did_you_mean, lacking
 
 Kind = Literal[
@@ -57,7 +64,8 @@ class FieldInfo:
     - `unit`: "1" for numbers without a unit, "" for others.
     - `fixed`: Why the method takes only the default; "" for other fields.
     - `narrowed`: Whether the class has fewer choices than the annotation.
-    - `count`: How many numbers a tuple has, the least and the largest of them.
+    - `count`: The least and the largest number of entries of a tuple; `limits`: those of its
+      numbers; `columns`: how many numbers each entry has, if it is a tuple, too.
     - `read`: Checks a value of another kind and returns the value to store.
     - `text`: The help of a class without a docstring.
     """
@@ -74,7 +82,9 @@ class FieldInfo:
     option: str = ""
     fixed: str = ""
     narrowed: bool = False
-    count: tuple[int, float, float] | None = None
+    count: tuple[int, int] | None = None
+    limits: Range = (0.0, FLT_MAX)
+    columns: int = 0
     read: Callable[[Any], Any] | None = None
     text: str = ""
 
@@ -119,7 +129,7 @@ class FieldInfo:
         elif self.range is not None:
             checked = self._number(value, self.range)
         elif self.count is not None:
-            checked = read_numbers(self.name, value, *self.count)
+            checked = self._numbers(value, self.count)
         if self.fixed and checked != self.default:
             only = f"{self.default:g}" if isinstance(self.default, float) else self.default
             raise ValueError(f"{self.name}: {value!r} is not {only}; {self.fixed}")
@@ -133,6 +143,20 @@ class FieldInfo:
         if not self.is_bounded:
             return check_above(self.name, value, ends[0])
         return check_number(self.name, value, *ends)
+
+    def _numbers(self, value: Any, count: tuple[int, int]) -> tuple[Any, ...]:
+        numbers: tuple[Any, ...]
+        if self.columns == 0:
+            numbers = _row(self.name, value, self.limits)
+        elif isinstance(value, Iterable):
+            numbers = tuple(_row(self.name, row, self.limits, self.columns) for row in value)
+        else:
+            raise TypeError(f"{self.name}: {value!r} is not a sequence")
+        least, most = count
+        if not least <= len(numbers) <= most:
+            wanted = f"{least}" if least == most else f"{least} to {most}"
+            raise ValueError(f"{self.name}: the number of entries, {len(numbers)}, is not {wanted}")
+        return numbers
 
     def _choice(self, value: Any) -> Any:
         """Return a plain str, also for a subclass of str, such as an enum."""
@@ -182,21 +206,27 @@ def value_field(default: Any = dataclasses.MISSING, **declared: Any) -> Any:
 
 
 def numbers_field(
-    default: tuple[float, ...], low: float = 0.0, high: float = 65504.0, **declared: Any
+    default: tuple[Any, ...] | None,
+    low: float = 0.0,
+    high: float = 65504.0,
+    *,
+    count: tuple[int, int] | None = None,
+    **declared: Any,
 ) -> Any:
-    """Declare a field of as many numbers as its default has, such as the factors of a colour."""
-    return value_field(default, count=(len(default), low, high), **declared)
+    """Declare a field of numbers, or of rows of them; `count`: None: as many as by default."""
+    if default and isinstance(default[0], tuple):
+        declared["columns"] = len(default[0])
+    count = count or (len(default or ()),) * 2
+    return value_field(default, count=count, limits=(low, high), **declared)
 
 
-def read_numbers(
-    name: str, values: Sequence[float], count: int, low: float, high: float
-) -> tuple[float, ...]:
-    """Return so many numbers in a range."""
+def _row(name: str, values: Any, limits: Range, count: int = 0) -> tuple[float, ...]:
+    """Return numbers in a range; with a count so many."""
     numbers = check_floats(name, values)
-    if len(numbers) != count:
+    if count and len(numbers) != count:
         raise ValueError(f"{name}: {numbers!r} is not {count} numbers")
     for number in numbers:
-        check_number(name, number, low, high)
+        check_number(name, number, *limits)
     return numbers
 
 

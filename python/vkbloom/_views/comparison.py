@@ -10,7 +10,7 @@ from typing import Any, Final, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom._checks import check_number, import_extra, native_order
+from vkbloom._checks import import_extra, native_order
 from vkbloom._io.srgb import decode_srgb
 
 Metric = Literal["ssim", "psnr", "flip"]
@@ -95,10 +95,6 @@ def compare(
     of 7 x 7), FLIP is OpenImageIO's: LDR-FLIP of integers, HDR-FLIP of floats.
     Values that are not finite count as 0 in SSIM and FLIP only.
     """
-    check_number("threshold", threshold, 0.0, math.inf)
-    check_number("relative", relative, 0.0, float(np.finfo(np.float64).max))
-    if unknown := [name for name in metrics if name not in METRICS]:
-        raise ValueError(f"metrics: {unknown[0]!r} is not one of {', '.join(METRICS)}")
     a, b = checked_image("a", a), checked_image("b", b)
     mismatches = _mismatches(a, b)
     if mismatches:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vkbloom._settings.fields import number_field, value_field
-from vkbloom.psf._base import Array, check_wavelengths, in_grey
+from vkbloom._settings.fields import number_field, numbers_field
+from vkbloom.psf._base import Array, in_grey
 from vkbloom.psf._radial import RadialPSF
 
 State = Literal["photopic", "mesopic", "scotopic"]
@@ -20,13 +20,6 @@ _SHARES: dict[str, tuple[float, float, float, float]] = {
     "mesopic": (0.368, 0.478, 0.138, 0.016),
     "scotopic": (0.282, 0.478, 0.207, 0.033),
 }
-
-
-def _check_three(wavelengths: Any) -> tuple[float, ...]:
-    lengths = check_wavelengths(wavelengths)
-    if len(lengths) != 3:
-        raise ValueError(f"wavelengths: {wavelengths!r} is not (red, green, blue)")
-    return lengths
 
 
 @dataclasses.dataclass(frozen=True)
@@ -57,8 +50,8 @@ class spencer(RadialPSF):
     """
 
     state: State = "photopic"
-    wavelengths: tuple[float, float, float] = value_field(
-        (611.0, 549.0, 467.0), unit="nm", read=_check_three
+    wavelengths: tuple[float, float, float] = numbers_field(
+        (611.0, 549.0, 467.0), 380, 780, unit="nm"
     )
 
     def density(self, theta: ArrayLike) -> Array:

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vkbloom._array_cache import kept
-from vkbloom._checks import check_floats
-from vkbloom._settings.fields import number_field, value_field
+from vkbloom._checks import FLT_MAX
+from vkbloom._settings.fields import number_field, numbers_field, value_field
 from vkbloom.psf._base import PSF, Array, centred, in_grey
 from vkbloom.psf._resampling import box_resample
 from vkbloom.psf._sampled import SampledPSF, check_values, rgb
@@ -63,20 +63,6 @@ def _check_image(image: Any) -> SampledPSF | ArrayValue:
     return held
 
 
-def _check_center(center: Any) -> tuple[float, ...]:
-    shares = check_floats("center", center)
-    if len(shares) != 2 or not all(0 <= share <= 1 for share in shares):
-        raise ValueError(f"center: {shares!r} is not a pair of numbers of 0 to 1")
-    return shares
-
-
-def _check_prefilter(prefilter: Any) -> tuple[float, ...]:
-    numbers = check_floats("prefilter", prefilter)
-    if len(numbers) != 3 or min(numbers) < 0:
-        raise ValueError(f"prefilter: {prefilter!r} is not (min, max, mult) of at least 0")
-    return numbers
-
-
 @dataclasses.dataclass(frozen=True)
 class unreal(SampledPSF):
     """The kernel that Unreal Engine's convolution bloom makes from an image, defined in pixels.
@@ -110,9 +96,9 @@ class unreal(SampledPSF):
     """
 
     image: Any = value_field(read=_check_image)
-    center: tuple[float, float] | None = value_field(None, read=_check_center)
+    center: tuple[float, float] | None = numbers_field(None, 0, 1, count=(2, 2))
     size: float = number_field(default=1.0, range=(0.001, 4))
-    prefilter: tuple[float, float, float] = value_field((7.0, 15000.0, 15.0), read=_check_prefilter)
+    prefilter: tuple[float, float, float] = numbers_field((7.0, 15000.0, 15.0), high=FLT_MAX)
     scatter: float = number_field(default=1.0, range=(0, 1000))
 
     def native_array(self) -> Array:
