@@ -22,6 +22,7 @@ from tests.refusals import assert_refused, rows
 from tests.scene.gltf_documents import (
     BYTE,
     CHANGES,
+    DTYPES,
     FLOAT,
     INT,
     NORMALS,
@@ -210,6 +211,26 @@ def test_interleaved_attributes(tmp_path: Path) -> None:
     document.json["meshes"][0]["primitives"] = [{"attributes": {"POSITION": 0, "NORMAL": 1}}]
     vertices = document.load(tmp_path).vertices[:, :6] * (1, -1, 1, 1, -1, 1)
     np.testing.assert_allclose(vertices, np.hstack((POSITIONS, NORMALS)), atol=1e-7)
+
+
+@pytest.mark.parametrize("component", [BYTE, SHORT, INT])
+@pytest.mark.parametrize("with_base", [False, True])
+def test_sparse_accessors(tmp_path: Path, component: int, with_base: bool) -> None:
+    document = triangle()
+    accessor = document.json["accessors"][1]
+    assert accessor["type"] == "VEC3"
+    accessor["sparse"] = {
+        "count": 2,
+        "indices": {
+            "bufferView": document.view(np.array([0, 2], DTYPES[component]).tobytes()),
+            "componentType": component,
+        },
+        "values": {"bufferView": document.view(np.array([[5, 6, 7], [8, 9, 1]], "<f4").tobytes())},
+    }
+    if not with_base:
+        del accessor["bufferView"]
+    middle = POSITIONS[1] if with_base else [0, 0, 0]
+    assert corners(document.load(tmp_path))[0].tolist() == [[5, 6, 7], middle, [8, 9, 1]]
 
 
 def test_glb_and_outer_buffers_give_the_same_mesh(tmp_path: Path) -> None:
@@ -463,6 +484,14 @@ class Damage:
         document.primitive(indices=document.accessor(indices, BYTE))
         return document.load(self.folder)
 
+    def with_sparse(self, places: list[int]) -> Mesh:
+        document = triangle()
+        indices = {"bufferView": document.view(bytes(places)), "componentType": BYTE}
+        values = {"bufferView": document.view(bytes(24))}
+        sparse = {"count": 2, "indices": indices, "values": values}
+        document.json["accessors"][1]["sparse"] = sparse
+        return document.load(self.folder)
+
     def with_header(self, place: int) -> Mesh:
         content = bytearray(nested().as_glb())
         content[place : place + 4] = struct.pack("<I", 10**6)
@@ -525,6 +554,11 @@ def test_changed_bytes_load_or_are_refused(tmp_path: Path, changes: list[tuple[i
 
 def test_any_json_value_in_any_place_loads_or_is_refused(tmp_path: Path) -> None:
     document = nested()
+    document.json["accessors"][0]["sparse"] = {
+        "count": 1,
+        "indices": {"bufferView": document.view(b"\0"), "componentType": BYTE},
+        "values": {"bufferView": document.view(b"\0")},
+    }
     document.json["materials"][0]["extensions"] = {
         "KHR_materials_emissive_strength": {"emissiveStrength": 2.0}
     }

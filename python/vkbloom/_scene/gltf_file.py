@@ -35,8 +35,8 @@ INTEGERS: Final = (5121, 5123, 5125)
 EMISSIVE_STRENGTH: Final = "KHR_materials_emissive_strength"
 TEXTURE_TRANSFORM: Final = "KHR_texture_transform"
 FLOAT_MAX: Final = float(np.finfo(np.float32).max)
-# A limit, since a small file can need any amount of memory: several nodes can use one mesh, and an
-# accessor without a bufferView is zero. This many baked vertices take 0.6 GB.
+# A limit, since a small file can need any amount of memory: several nodes can use one mesh, and a
+# sparse accessor stores no zeros. This many baked vertices take 0.6 GB.
 MAX_VERTICES: Final = 2**24
 _COMPONENTS: Final = {5121: "<u1", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 _WIDTHS: Final = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
@@ -229,15 +229,53 @@ class GltfFile:
         dtype = np.dtype(_COMPONENTS[accessor.componentType])
         width = _WIDTHS[accessor.type]
         count = self.integer(accessor.count, f"{what}.count", 1, 3 * MAX_VERTICES)
-        if accessor.sparse is not None:
-            self.fail(
-                f"{what} is sparse, which is not supported; export it without sparse accessors"
-            )
         if accessor.bufferView is None:
-            return np.zeros((count, width), dtype)
-        return self._elements(
-            accessor.bufferView, accessor.byteOffset, count, width, dtype, what=what
+            elements: NDArray[Any] = np.zeros((count, width), dtype)
+        else:
+            elements = self._elements(
+                accessor.bufferView, accessor.byteOffset, count, width, dtype, what=what
+            )
+        if accessor.sparse is None:
+            return elements
+        return self._with_sparse(accessor.sparse, elements, what)
+
+    def _with_sparse(self, sparse: Parsed, elements: NDArray[Any], what: str) -> NDArray[Any]:
+        """Return `elements` with those replaced that the sparse part contains (3.6.2.3)."""
+        indices: Parsed = getattr(sparse, "indices", None)
+        values: Parsed = getattr(sparse, "values", None)
+        if not hasattr(indices, "componentType") or not hasattr(values, "bufferView"):
+            self.fail(f"damaged: {what}.sparse lacks its indices or its values")
+        count = self.integer(sparse.count, f"{what}.sparse.count", 1, len(elements))
+        if indices.componentType not in INTEGERS:
+            self.fail(
+                f"{what}.sparse.indices is of component type "
+                f"{reprlib.repr(indices.componentType)}; {INTEGERS} is possible"
+            )
+        kind = np.dtype(_COMPONENTS[indices.componentType])
+        where = (
+            self._elements(
+                indices.bufferView,
+                indices.byteOffset,
+                count,
+                1,
+                kind,
+                what=f"{what}.sparse.indices",
+            )
+            .ravel()
+            .astype(np.int64)
         )
+        if where.max() >= len(elements) or (np.diff(where) <= 0).any():
+            self.fail(f"damaged: {what}.sparse.indices do not ascend within {len(elements)}")
+        replaced = elements.copy()
+        replaced[where] = self._elements(
+            values.bufferView,
+            values.byteOffset,
+            count,
+            elements.shape[1],
+            elements.dtype,
+            what=f"{what}.sparse.values",
+        )
+        return replaced
 
     def _elements(
         self,
