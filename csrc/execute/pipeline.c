@@ -1,6 +1,7 @@
 #include "execute/pipeline.h"
 
 #include "scene/scene.h"
+#include "spirv/specialize.h"
 
 #include <string.h>
 
@@ -92,61 +93,55 @@ bool vkb_pipelines_save(const struct vkb_device *device, const struct vkb_pipeli
     return false;
 }
 
-// The driver copies the values.
-static VkSpecializationInfo specialization(const struct vkb_constants *constants)
-{
-    return (VkSpecializationInfo){
-        .mapEntryCount = VKB_CONSTANT_COUNT,
-        .pMapEntries = vkb_constant_rows,
-        .dataSize = sizeof *constants,
-        .pData = constants,
-    };
-}
-
 static VkPipelineShaderStageCreateInfo shader_stage(VkShaderStageFlagBits stage,
-                                                    VkShaderModule module,
-                                                    const VkSpecializationInfo *constants)
+                                                    VkShaderModule module)
 {
     return (VkPipelineShaderStageCreateInfo){
         .sType = VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO,
         .stage = stage,
         .module = module,
         .pName = "main",
-        .pSpecializationInfo = constants,
     };
 }
 
 static bool create_module(const struct vkb_device *device, const struct vkb_shader *shader,
-                          VkShaderModule *module, struct vkb_error *error)
+                          const struct vkb_constants *constants, VkShaderModule *module,
+                          struct vkb_error *error)
 {
-    return VK(error, device->vk.vkCreateShaderModule(
-                         device->handle,
-                         &(VkShaderModuleCreateInfo){
-                             .sType = VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO,
-                             .codeSize = shader->size,
-                             .pCode = shader->code,
-                         },
-                         NULL, module));
+    uint32_t *code;
+    size_t size;
+
+    if (!vkb_specialize(shader, constants, &code, &size, error))
+        return false;
+    const bool done =
+        VK(error,
+           device->vk.vkCreateShaderModule(device->handle,
+                                           &(VkShaderModuleCreateInfo){
+                                               .sType = VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO,
+                                               .codeSize = size,
+                                               .pCode = code,
+                                           },
+                                           NULL, module));
+    vkb_free(code);
+    return done;
 }
 
 bool vkb_compute_create(const struct vkb_device *device, VkPipelineCache cache,
                         const struct vkb_shader *shader, const struct vkb_constants *constants,
                         VkPipelineLayout layout, VkPipeline *pipeline, struct vkb_error *error)
 {
-    const VkSpecializationInfo special = specialization(constants);
     VkShaderModule module;
 
-    if (!create_module(device, shader, &module, error))
+    if (!create_module(device, shader, constants, &module, error))
         return false;
-    const bool done =
-        VK(error, device->vk.vkCreateComputePipelines(
-                      device->handle, cache, 1,
-                      &(VkComputePipelineCreateInfo){
-                          .sType = VK_STRUCTURE_TYPE_COMPUTE_PIPELINE_CREATE_INFO,
-                          .stage = shader_stage(VK_SHADER_STAGE_COMPUTE_BIT, module, &special),
-                          .layout = layout,
-                      },
-                      NULL, pipeline));
+    const bool done = VK(error, device->vk.vkCreateComputePipelines(
+                                    device->handle, cache, 1,
+                                    &(VkComputePipelineCreateInfo){
+                                        .sType = VK_STRUCTURE_TYPE_COMPUTE_PIPELINE_CREATE_INFO,
+                                        .stage = shader_stage(VK_SHADER_STAGE_COMPUTE_BIT, module),
+                                        .layout = layout,
+                                    },
+                                    NULL, pipeline));
     device->vk.vkDestroyShaderModule(device->handle, module, NULL);
     return done;
 }
@@ -240,7 +235,6 @@ static bool create_graphics(const struct vkb_device *device, const struct vkb_pi
                             struct vkb_error *error)
 {
     const struct geometry_state *state = &geometry_states[pass->geometry];
-    const VkSpecializationInfo special = specialization(&pass->constants);
     const VkPipelineVertexInputStateCreateInfo vertices = vertex_input(pass);
     const VkPipelineRasterizationStateCreateInfo raster = rasterization(state);
     const VkPipelineDepthStencilStateCreateInfo depth = depth_test(state);
@@ -267,8 +261,8 @@ static bool create_graphics(const struct vkb_device *device, const struct vkb_pi
                 .stageCount = 2,
                 .pStages =
                     (VkPipelineShaderStageCreateInfo[]){
-                        shader_stage(VK_SHADER_STAGE_VERTEX_BIT, modules[0], &special),
-                        shader_stage(VK_SHADER_STAGE_FRAGMENT_BIT, modules[1], &special),
+                        shader_stage(VK_SHADER_STAGE_VERTEX_BIT, modules[0]),
+                        shader_stage(VK_SHADER_STAGE_FRAGMENT_BIT, modules[1]),
                     },
                 .pVertexInputState = &vertices,
                 .pInputAssemblyState = &triangles,
@@ -299,8 +293,8 @@ static bool create_pipeline(const struct vkb_device *device, const struct vkb_pi
         return vkb_compute_create(device, pipelines->cache, pass->shader, &pass->constants,
                                   vkb_bindings_layouts(&pipelines->bindings, pass)->made.pipeline,
                                   pipeline, error);
-    const bool done = create_module(device, pass->vertex, &modules[0], error)
-                   && create_module(device, pass->shader, &modules[1], error)
+    const bool done = create_module(device, pass->vertex, &pass->constants, &modules[0], error)
+                   && create_module(device, pass->shader, &pass->constants, &modules[1], error)
                    && create_graphics(device, pipelines, key, pass, modules, pipeline, error);
     for (int i = 0; i < 2; ++i)
         device->vk.vkDestroyShaderModule(device->handle, modules[i], NULL);

@@ -76,8 +76,7 @@ void vkb_params_read(enum vkb_block block, const struct vkb_values *values,
     }
 }
 
-#define CONSTANT_ROW(id, name, member) \
-    {id, offsetof(struct vkb_constants, member), sizeof(int32_t)},
+#define CONSTANT_ROW(id, name, member) {id, offsetof(struct vkb_constants, member)},
 
-const VkSpecializationMapEntry vkb_constant_rows[VKB_CONSTANT_COUNT] = {
+const struct vkb_constant_row vkb_constant_rows[VKB_CONSTANT_COUNT] = {
     SPECIALIZATION_CONSTANTS(CONSTANT_ROW)};

@@ -8,8 +8,6 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include <vulkan/vulkan_core.h>
-
 // The alignment of an array of vec4 in std140.
 #define VKB_VEC4 _Alignas(16) float
 
@@ -114,7 +112,13 @@ struct vkb_constants {
 
 enum { VKB_CONSTANT_COUNT = sizeof(struct vkb_constants) / sizeof(int32_t) };
 
-extern const VkSpecializationMapEntry vkb_constant_rows[VKB_CONSTANT_COUNT];
+// For each constant, its id and its offset in the struct.
+struct vkb_constant_row {
+    uint32_t id;
+    uint32_t offset;
+};
+
+extern const struct vkb_constant_row vkb_constant_rows[VKB_CONSTANT_COUNT];
 
 #define VKB_NAME_ENUM(name, value, spelling) name = value,
 enum vkb_composite { COMPOSITE_NAMES(VKB_NAME_ENUM) };

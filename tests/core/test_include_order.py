@@ -12,6 +12,7 @@ SHADERS = CORE.parent / "shaders"
 LAYERS = (
     ("vulkan",),
     ("graph",),
+    ("spirv",),
     ("scene",),
     ("passes",),
     ("methods",),
