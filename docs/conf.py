@@ -57,7 +57,8 @@ def _make_accessible(*arguments: Any) -> None:
     column of a table may break, so that no table is wider than a page because of them.
     """
     context = arguments[3]
-    context["metatags"] += "<style>td:last-child { overflow-wrap: anywhere }</style>"
+    style = "<style>td:last-child { overflow-wrap: anywhere }</style>"
+    context["metatags"] = context.get("metatags", "") + style
     for name in ("furo_navigation_tree", "body"):
         text = context.get(name, "")
         text = text.replace('role="heading">', 'role="heading" aria-level="2">')
