@@ -10,8 +10,8 @@ cd "$(dirname "$0")/.."
 PYTHON=${PYTHON:-python3}
 if [ $# = 0 ]; then
     set -- tests/core tests/device tests/methods tests/custom tests/scene
-    for name in core/faults core/frames core/mutations methods/dither methods/hdr_images \
-        methods/properties methods/reference scene/assets scene/gltf scene/gltf_textures; do
+    for name in core/faults core/frames core/mutations methods/dither \
+        methods/properties methods/reference scene/gltf scene/gltf_textures; do
         set -- "$@" "--ignore=tests/${name%/*}/test_${name#*/}.py"
     done
 fi

@@ -13,7 +13,7 @@ if [ $# = 0 ]; then
         interruption lifetime pipeline_cache plans readback settings threads; do
         set -- "$@" "tests/core/test_$name.py"
     done
-    for name in apply_input dither level_weights matrix rg11b10 variants; do
+    for name in apply_input dither matrix rg11b10 variants; do
         set -- "$@" "tests/methods/test_$name.py"
     done
     set -- "$@" tests/methods/test_custom_passes.py tests/custom/test_rendering.py
