@@ -53,12 +53,14 @@ templates_path = ["templates"]
 def _make_accessible(*arguments: Any) -> None:
     """Give headings of the navigation a level, and let keys scroll code that is wider than a page.
 
-    Sphinx writes neither; axe-core finds both (tests/docs/test_first_page.py). Paths in the last
-    column of a table may break, so that no table is wider than a page because of them.
+    Sphinx writes neither; axe-core finds both (tests/docs/test_first_page.py). Paths in the
+    table of presets may break, so that it is no wider than the page.
     """
-    context = arguments[3]
-    style = "<style>td:last-child { overflow-wrap: anywhere }</style>"
-    context["metatags"] = context.get("metatags", "") + style
+    page, context = arguments[1], arguments[3]
+    if page == "presets":
+        cells = "td:nth-child(2):nth-last-child(2), td:nth-child(3):last-child"
+        style = f"<style>{cells} {{ overflow-wrap: anywhere; min-width: 15em }}</style>"
+        context["metatags"] = context.get("metatags", "") + style
     for name in ("furo_navigation_tree", "body"):
         text = context.get(name, "")
         text = text.replace('role="heading">', 'role="heading" aria-level="2">')
