@@ -88,15 +88,12 @@ uint32_t vkb_levels_add(struct vkb_levels *levels, const struct vkb_image_row *r
 uint32_t vkb_levels_target(struct vkb_levels *levels, const char *name, enum vkb_format format,
                            struct vkb_size size, bool framebuffer)
 {
-    struct vkb_image_row row = {
-        .format = format,
-        .width = size.width,
-        .height = size.height,
-        .framebuffer = framebuffer,
-    };
+    uint32_t image = levels->source->glow;
 
-    snprintf(row.name, sizeof row.name, "%s", name);
-    return vkb_levels_add(levels, &row);
+    levels->failed =
+        levels->failed
+        || !vkb_add_target(levels->graph, name, format, size, framebuffer, &image, levels->error);
+    return image;
 }
 
 static uint32_t add_image(struct vkb_levels *levels, const char *name, uint32_t number,

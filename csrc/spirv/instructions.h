@@ -11,9 +11,7 @@ enum {
     SPV_HEADER_WORDS = 5,
     SPV_BOUND = 3,  // the word of the header that all ids are below
     SPV_MAX_BOUND = 0x3fffff,
-    SPV_SPEC_ID = 1,      // a decoration
-    SPV_LOCAL_SIZE = 17,  // an execution mode
-    SPV_WORKGROUP = 4,    // a storage class
+    SPV_SPEC_ID = 1,  // a decoration
 };
 
 enum vkb_opcode {
@@ -21,7 +19,6 @@ enum vkb_opcode {
     SPV_LINE = 8,
     SPV_EXT_INST = 12,
     SPV_ENTRY_POINT = 15,
-    SPV_EXECUTION_MODE,
     SPV_TYPE_VOID = 19,
     SPV_TYPE_BOOL,
     SPV_TYPE_INT,
@@ -29,7 +26,6 @@ enum vkb_opcode {
     SPV_TYPE_VECTOR,
     SPV_TYPE_MATRIX,
     SPV_TYPE_ARRAY = 28,
-    SPV_TYPE_STRUCT = 30,
     SPV_TYPE_POINTER = 32,
     SPV_TYPE_FORWARD_POINTER = 39,
     SPV_CONSTANT_TRUE = 41,
