@@ -88,8 +88,8 @@ def command(*, source: str | None, out: str, words: tuple[str, ...], **given: An
     shared["framebuffers"] = "all" if names == ["all"] else names
     with program.as_wrong_use():
         grid = layout.ask(looked_at, settings, axes, reduce=None, **shared)
-    _note_no_bloom(grid, given["adapter"])
     with opened_renderer(given["adapter"]) as renderer:
+        _note_no_bloom(grid, renderer)
         if is_store:
             shared |= {"part": part, "progress": not terminal.is_quiet()}
             vkbloom.grid(looked_at, settings, axes, store=out, renderer=renderer, **shared)
@@ -143,13 +143,11 @@ def _values(word: str, kind: Any) -> Sequence[Any]:
         raise click.UsageError(f"--axis {word}: {error}{hint}") from error
 
 
-def _note_no_bloom(grid: layout.Grid, adapter: str) -> None:
+def _note_no_bloom(grid: layout.Grid, renderer: vkbloom.Renderer) -> None:
     """Print a note if the first and the last point of a grid have no bloom."""
     corners = {tuple(0 for _ in grid.shape), tuple(count - 1 for count in grid.shape)}
     lit = [point for point in map(grid.point, sorted(corners)) if point.settings.bloom]
-    # A renderer of its own, so that the passes of the grid are counted from the first.
-    with vkbloom.Renderer(adapter) as renderer:
-        frames = [frames for _, frames in sources.visit(renderer, grid.source, lit, ("bloom",))]
+    frames = [frames for _, frames in sources.visit(renderer, grid.source, lit, ("bloom",))]
     if lit and all(map(no_bloom.is_without, frames)):
         terminal.note(f"at the first and the last point, {no_bloom.reason(lit[-1].settings)}")
 
