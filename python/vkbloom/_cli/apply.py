@@ -38,7 +38,7 @@ from vkbloom._cli.settings_options import Start, start_options
 from vkbloom._cli.terminal import complain, hides_progress, note, say, tell_device
 from vkbloom._io import image_writing
 from vkbloom._io.array_files import premultiplied
-from vkbloom._io.displayed import PRIMARIES, Saved, check_saved
+from vkbloom._io.displayed import PRIMARIES, Saved
 from vkbloom._io.glows import alike, grey_mask
 from vkbloom._io.images import Colour, Picture, SavedColour
 from vkbloom._renderer.frame_files import settings_facts
@@ -332,31 +332,19 @@ def _planned(options: Options, sources: list[str], out: str) -> list[Pair]:
     check_input_colour(options.input_colour)
     work = pairs(sources, out)
     settings, _ = options.start.of(work[0][0])
-    _check_colours(settings, options.saved)
+    _check_colours(settings, options)
     check_targets(work, out, overwrite=options.overwrite)
     with as_wrong_use():
         for target in {Path(target).suffix: target for _, target in work}.values():
-            checked = of_format(target, options.pipe_format)
-            _check_writable(checked)
-            image_writing.check_quality(checked, options.quality)
-            image_writing.check_bits(checked, options.bits)
+            file = of_format(target, options.pipe_format)
+            image_writing.check_options(file, options.saved, options.quality, options.bits)
     return work
 
 
-def _check_writable(target: str) -> None:
-    """Raise ValueError that names the file if its extension is not that of a writable format."""
-    try:
-        image_writing.check_writable(target)
-    except ValueError as error:
-        reason = str(error).removeprefix("path: ")
-        raise ValueError(f"{target}: {reason}, such as .png or .exr") from None
-
-
-def _check_colours(settings: vkbloom.Settings, saved: Saved) -> None:
+def _check_colours(settings: vkbloom.Settings, options: Options) -> None:
     """Raise click.UsageError for options that do not go together."""
-    options = {"--output-colour": saved.curve, "--view": saved.view}
-    options["--primaries"] = None if saved.primaries == "rec709" else saved.primaries
-    used = [name for name, value in options.items() if value is not None]
+    names = ("output_colour", "view", "primaries")
+    used = [name for name in names if getattr(options, name) not in (None, "rec709")]
     if settings.encoding != "none" and settings.alpha != "keep":
         raise click.UsageError(
             f"--alpha {settings.alpha} needs linear colours; leave out --encoding: OUT is encoded "
@@ -364,10 +352,9 @@ def _check_colours(settings: vkbloom.Settings, saved: Saved) -> None:
         )
     if settings.encoding != "none" and used:
         raise click.UsageError(
-            f"--encoding {settings.encoding} already encodes the output; leave out {used[0]}"
+            f"--encoding {settings.encoding} already encodes the output; leave out "
+            f"--{used[0].replace('_', '-')}"
         )
-    with as_wrong_use():
-        check_saved(saved)
 
 
 def _arguments(sources: tuple[str, ...], out: str | None) -> tuple[list[str], str]:
