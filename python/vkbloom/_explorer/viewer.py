@@ -48,7 +48,7 @@ from vkbloom._explorer.controls import (
     described,
     settings_from,
 )
-from vkbloom._explorer.fast_pictures import picture_of, texts_of
+from vkbloom._explorer.fast_pictures import picture_of
 from vkbloom._io.array_files import read
 from vkbloom._io.expansion import PHOTO_EXPANSION
 from vkbloom._renderer.plans import Pass
@@ -374,7 +374,8 @@ def _probed(array: NDArray[Any], at: tuple[float, float]) -> dict[str, Any]:
     height, width = array.shape[:2]
     # A position of 1 is the far edge of the last pixel.
     x, y = min(int(at[0] * width), width - 1), min(int(at[1] * height), height - 1)
-    return {"x": x, "y": y, "values": texts_of(array[y, x])}
+    # NumPy's text of a number has the digits that tell it apart from others of its dtype.
+    return {"x": x, "y": y, "values": list(map(str, np.atleast_1d(array[y, x])))}
 
 
 class CustomFiles:
