@@ -25,12 +25,10 @@ from vkbloom._cli import no_bloom
 from vkbloom._cli.fields import Command
 from vkbloom._cli.image_files import (
     check_input_colour,
-    expand_option,
     finished,
     input_colour_option,
-    layer_option,
     read_picture,
-    subimage_option,
+    reading_options,
 )
 from vkbloom._cli.program import adapter_option, as_wrong_use, described
 from vkbloom._cli.sequences import PIPE, check_targets, is_stream, pairs
@@ -262,9 +260,7 @@ def _send(file: Path, target: str) -> None:
     help="Size of a number in OUT [default that of IN]",
 )
 @click.option("--overwrite", is_flag=True, help="OUT may be a file that is read as IN.")
-@expand_option
-@subimage_option
-@layer_option
+@reading_options
 @click.option(
     "--mask", metavar="FILE", type=click.Path(), help="A grey image: white glows, black does not."
 )

@@ -37,9 +37,7 @@ _PRESETS: Final = fields.NameOf("preset", vkbloom.presets)
 @click.option("--image-format", metavar="EXTENSION", default="png")
 @click.option("--part", metavar="I/N", help="Render part I of N, from 1, as above")
 @image_files.input_colour_option
-@image_files.subimage_option
-@image_files.layer_option
-@image_files.expand_option
+@image_files.reading_options
 @program.adapter_option
 @scene_options
 @settings_options

@@ -71,15 +71,10 @@ class Saved(NamedTuple):
     view: str | None = None
 
 
-def check_primaries(primaries: str) -> None:
-    """Raise ValueError for unknown primaries."""
-    if primaries not in PRIMARIES:
-        raise ValueError(f"primaries: {primaries!r} is not one of {', '.join(PRIMARIES)}")
-
-
 def check_saved(saved: Saved) -> None:
     """Raise ValueError for primaries and views that do not exist or do not go together."""
-    check_primaries(saved.primaries)
+    if saved.primaries not in PRIMARIES:
+        raise ValueError(f"primaries: {saved.primaries!r} is not one of {', '.join(PRIMARIES)}")
     if saved.view is None:
         return
     if saved != Saved(view=saved.view):

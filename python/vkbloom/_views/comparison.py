@@ -111,8 +111,8 @@ def compare(
         mismatches += (f"NaN or infinity in one image only, {_positions(unequal)}",)
     if common.any() and not allow_nan:
         mismatches += (f"NaN or infinity in both images, {_positions(common)}",)
-    low, high = min(0.0, pair.a.min(), pair.b.min()), max(1.0, pair.a.max(), pair.b.max())
-    data_range = 1.0 if pair.is_integer else float(high - low)
+    low, high = (float(function((pair.a, pair.b))) for function in (np.min, np.max))
+    data_range = 1.0 if pair.is_integer else max(1.0, high) - min(0.0, low)
     computed, not_computed = _metrics(pair, metrics, data_range)
     with np.errstate(over="ignore"):
         allowed = threshold + relative * np.abs(pair.a)
