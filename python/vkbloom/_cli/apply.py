@@ -7,7 +7,6 @@ import dataclasses
 import functools
 import itertools
 import shutil
-import sys
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
@@ -224,13 +223,9 @@ class Run:
 
 def _send(file: Path, target: str) -> None:
     """Write a file's content to a stream."""
-    with contextlib.ExitStack() as stack:
-        content = stack.enter_context(file.open("rb"))
-        if target == PIPE:
-            shutil.copyfileobj(content, sys.stdout.buffer)
-            sys.stdout.buffer.flush()
-        else:
-            shutil.copyfileobj(content, stack.enter_context(open(target, "wb")))
+    with file.open("rb") as content, click.open_file(target, "wb") as stream:
+        shutil.copyfileobj(content, stream)
+        stream.flush()
 
 
 @click.command(cls=Command)

@@ -56,8 +56,8 @@ def blocks(
     every = itertools.product(*(range(0, shape[axis], chunk[axis]) for axis in ranking))
     for starts in itertools.islice(every, *ends):
         start = _in_order(starts, ranking)
-        ends = zip(start, chunk, shape, strict=True)
-        yield Block(start, tuple(min(first + size, end) for first, size, end in ends))
+        sides = zip(start, chunk, shape, strict=True)
+        yield Block(start, tuple(min(first + size, end) for first, size, end in sides))
 
 
 def points(block: Block, ranking: Sequence[int]) -> Iterator[Index]:

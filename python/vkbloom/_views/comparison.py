@@ -111,8 +111,9 @@ def compare(
         mismatches += (f"NaN or infinity in one image only, {_positions(unequal)}",)
     if common.any() and not allow_nan:
         mismatches += (f"NaN or infinity in both images, {_positions(common)}",)
-    low, high = (float(function((pair.a, pair.b))) for function in (np.min, np.max))
-    data_range = 1.0 if pair.is_integer else max(1.0, high) - min(0.0, low)
+    low = min(0.0, float(pair.a.min()), float(pair.b.min()))
+    high = max(1.0, float(pair.a.max()), float(pair.b.max()))
+    data_range = 1.0 if pair.is_integer else high - low
     computed, not_computed = _metrics(pair, metrics, data_range)
     with np.errstate(over="ignore"):
         allowed = threshold + relative * np.abs(pair.a)
