@@ -13,8 +13,7 @@ from vkbloom._custom.expressions import ExpressionError, Values, evaluate, round
 from vkbloom._custom.file import CustomFile
 from vkbloom._custom.names import GLOW, HOOKED, LONGEST, RESIZING, STAGES
 from vkbloom._custom.passes import CustomPass
-from vkbloom._custom.resources import Resources
-from vkbloom._custom.rows import Row
+from vkbloom._custom.rows import Resources, Row
 from vkbloom._custom.shaders import BLACK, COPY, DIFFERENCE, Shaders, package_shader
 from vkbloom._custom.textures import Texture
 

@@ -119,14 +119,12 @@ def _settled(rgb: Array, saturation: float, rounding: float) -> Array:
 
 def _means(image: Array, factor: int) -> Array:
     """Return the means of factor x factor pixels, rows from below, with the last ones repeated."""
-    for axis, length in enumerate(image.shape[:2]):
-        count = -(-length // factor)
-        indices = np.minimum(np.arange(count * factor), length - 1)
-        if axis == 0:
-            indices = (length - 1 - indices)[::-1]
-        taps = image[indices] if axis == 0 else image[:, indices]
-        parts = [taps[i::factor] if axis == 0 else taps[:, i::factor] for i in range(factor)]
-        image = sum(parts[1:], parts[0]) / factor
+    for is_first in (True, False):
+        length = len(image)
+        indices = np.minimum(np.arange(-(-length // factor) * factor), length - 1)
+        taps = image[(length - 1 - indices)[::-1] if is_first else indices]
+        parts = [taps[i::factor] for i in range(factor)]
+        image = (sum(parts[1:], parts[0]) / factor).swapaxes(0, 1)
     return image
 
 
