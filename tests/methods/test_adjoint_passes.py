@@ -102,6 +102,20 @@ CASES: dict[str, Any] = {
     "high": KinoBloom(radius=1.0),
     "psf": vkbloom.Convolution(psf=KERNEL, threshold=0.3),
 }
+#: Methods whose derivatives are the reference's.
+RARE: tuple[Any, ...] = (
+    HdrpBloom(anamorphism=0.3),
+    GodotBloom(
+        level_weights=(0.5, 0, 0.3, 0, 0, 0, 0), composite="screen", intensity=0.7, threshold=None
+    ),
+    GodotBloom(threshold=0.3, threshold_scale=0.4, luminance_cap=1.2, strength=1.3, exposure=0.4),
+    GodotBloom(composite="soft_light", tonemap="reinhard", bicubic=False, threshold=None),
+    GodotBloom(composite="replace", encoding="srgb", threshold=0.2),
+    BlenderGlare(threshold=0.4, smoothness=0.3, saturation=1.7, tint=(1, 0.5, 0.2)),
+    BlenderGlare(quality="low", size=1.0, maximum=0.4, threshold=0.3, saturation=0.4),
+    BlenderGlare(type="streaks", threshold=0.3, streaks=3, streaks_angle=20),
+    BlenderGlare(type="fog_glow", threshold=0.3, quality="medium"),
+)
 
 
 def pulled(renderer: Any, image: Any, settings: Any, **given: Any) -> Any:
@@ -143,9 +157,7 @@ def test_passes_are_the_transposes_of_the_reference(renderer: Renderer, name: st
     "settings",
     [
         vkbloom.DarktableBloom(threshold=40.0, blur_size=2.0),
-        HdrpBloom(anamorphism=0.3),
-        GodotBloom(threshold=0.3, threshold_scale=0.4, luminance_cap=1.2),
-        BlenderGlare(threshold=0.4, smoothness=0.3, saturation=1.7, tint=(1, 0.5, 0.2)),
+        *RARE[::4],
         BlenderGlare(type="streaks", version="5.2", threshold=0.3, streaks=2),
         BlenderGlare(type="sun_beams", threshold=None),
         BlenderGlare(type="simple_star", threshold=None),
