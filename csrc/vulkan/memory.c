@@ -470,6 +470,10 @@ static bool create_image_buffer(const struct vkb_device *device, struct vkb_imag
         device->handle, image->handle,
         &(VkImageSubresource){.aspectMask = vkb_formats[image->format].aspect}, &layout);
     image->row_pitch = (size_t)layout.rowPitch;
+    // What variants store at once.
+    if (layout.offset || image->row_pitch % VKB_STORE_SIZE)
+        return vkb_fail(error, VKB_ERROR_GENERAL,
+                        "rows of images begin at no multiples of %d bytes", VKB_STORE_SIZE);
     if (!create_buffer(device,
                        VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT | VK_BUFFER_USAGE_STORAGE_BUFFER_BIT
                            | VK_BUFFER_USAGE_TRANSFER_SRC_BIT,
