@@ -401,30 +401,19 @@ bool vkb_image_linear_texels(const struct vkb_device *device, struct vkb_image *
         || create_linear_texels(device, image, 0, image->row_pitch * image->height, error);
 }
 
-bool vkb_image_borrow(const struct vkb_device *device, const struct vkb_borrowed *borrowed,
-                      struct vkb_image *image)
+bool vkb_image_borrow(const struct vkb_device *device, size_t row_size, struct vkb_image *image)
 {
-    const size_t size = borrowed->row_pitch * (borrowed->height - 1) + borrowed->row_size;
-    // Passes only read it.
-    void *memory = (void *)(uintptr_t)borrowed->memory;
+    const size_t size = image->row_pitch * (image->height - 1) + row_size;
     struct vkb_buffer buffer;
     struct vkb_error ignored;
     VkDeviceSize offset;
 
-    *image = (struct vkb_image){0};
-    if (!vkb_buffer_import(device, vkb_device_import_usage(device), memory, size, &buffer, &offset))
+    if (!vkb_buffer_import(device, vkb_device_import_usage(device), image->mapped, size, &buffer,
+                           &offset))
         return false;
-    *image = (struct vkb_image){
-        .memory = buffer.memory,
-        .format = borrowed->format,
-        .width = borrowed->width,
-        .height = borrowed->height,
-        .access = VKB_ACCESS_DISPATCH_LOADED,
-        .channels = borrowed->channels,
-        .mapped = memory,
-        .row_pitch = borrowed->row_pitch,
-        .buffer = buffer.handle,
-    };
+    image->memory = buffer.memory;
+    image->buffer = buffer.handle;
+    image->access = VKB_ACCESS_DISPATCH_LOADED;
     if (offset % device->limits.minTexelBufferOffsetAlignment == 0
         && create_linear_texels(device, image, offset, size, &ignored))
         return true;
