@@ -1,5 +1,3 @@
-#version 450
-#extension GL_GOOGLE_include_directive : require
 // The cotangents of the light at the end of Blender's glare (blender_end.frag), at the pixels of the
 // bloom.
 #include "lib/block.glsl"

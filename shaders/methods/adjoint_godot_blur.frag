@@ -1,5 +1,3 @@
-#version 450
-#extension GL_GOOGLE_include_directive : require
 // The cotangents of what Godot's blurs of the frame weight by brightness: before the horizontal one the
 // samples, after the vertical one the sum; or those of the mask.
 #include "lib/block.glsl"

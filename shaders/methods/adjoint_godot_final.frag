@@ -1,5 +1,3 @@
-#version 450
-#extension GL_GOOGLE_include_directive : require
 // The cotangents of Godot's composite (godot_final.frag): of the scene, of the bloom or of the mask.
 #include "lib/block.glsl"
 #include "lib/sampling.glsl"
