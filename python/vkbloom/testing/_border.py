@@ -51,9 +51,7 @@ class _Lights:
     ) -> tuple[Image, float]:
         """Return the bloom of a rectangle from a pixel on, less that of black, and its error."""
         if (corner, sides) not in self.made:
-            (x, y), (width, height) = corner, sides
-            image = self.probe.flat(0.0)
-            image[y : y + height, x : x + width] = self.probe.value
+            image = self.probe.point(corner, self.probe.value, sides)
             lit, error = self.probe.apply(self.bloom, image)
             self.made[corner, sides] = lit - self.dark, 2 * error
         return self.made[corner, sides]
@@ -96,7 +94,7 @@ def check_border(bloom: Bloom, probe: Probe, dark: Image, allowed: Mapping[str, 
     reasons += breaches(law, _at_the_border(lights, allowed, complete=complete))
     reasons += breaches(law, _flat(flat, dark, probe, allowed["flat"]))
     if reasons:
-        fail("assert_border", law, "; ".join(reasons))
+        fail(law, "; ".join(reasons))
     check_inside(share, probe.size, _OUTERMOST)
 
 
@@ -178,7 +176,7 @@ def _check_stale(bloom: Bloom, probe: Probe, dark: Image, allowed: float) -> Ima
         off = float(rise.max()) / probe.value
         y, x, _ = np.unravel_index(int(rise.argmax()), rise.shape)
         text = f"after a bright{name} image, a black one has {off:.3g} of its light at x {x}, y {y}"
-        judge("assert_border", law, ("stale", off, allowed, text))
+        judge(law, ("stale", off, allowed, text))
     return flat
 
 
@@ -225,7 +223,7 @@ def assert_views(bloom: Bloom, probe: Probe = _DEFAULT, *, limit: float = 1e-3) 
             f"the other view changes the {name} one by {share:.3g} of its largest value, most at "
             f"x {x}, y {y}: {limit:g} allowed"
         )
-        judge("assert_views", law, ("crosstalk", share, limit, text))
+        judge(law, ("crosstalk", share, limit, text))
 
 
 def takes(bloom: object, name: str) -> bool:
@@ -270,7 +268,8 @@ def _expected(lights: _Lights, at: tuple[int, int]) -> tuple[Image, float]:
     )
     spread = lights.spread((x, y))[0]
     energy = float(spread.sum())
-    _check_lit("assert_border", energy)
+    if not energy > 0:
+        fail("the bloom of a lit pixel is not black", f"its energy is {energy:.3g}")
     return _moved(spread, (x, y), at), energy
 
 
@@ -284,8 +283,3 @@ def _moved(spread: Image, start: tuple[int, int], to: tuple[int, int]) -> Image:
     )
     moved[rows[0], columns[0]] = spread[rows[1], columns[1]]
     return moved
-
-
-def _check_lit(assertion: str, energy: float) -> None:
-    if not energy > 0:
-        fail(assertion, "the bloom of a lit pixel is not black", f"its energy is {energy:.3g}")

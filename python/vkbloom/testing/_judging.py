@@ -45,9 +45,7 @@ class Verdict:
 
 
 def judge(
-    expected: Mapping[str, NDArray[Any]],
-    actual: Mapping[str, NDArray[Any]],
-    tolerances: Tolerances,
+    expected: Mapping[str, NDArray[Any]], actual: Mapping[str, NDArray[Any]], tolerances: Tolerances
 ) -> tuple[Verdict, ...]:
     """Compare framebuffers with those of a reference."""
     return tuple(

@@ -75,7 +75,7 @@ def assert_separable(bloom: Bloom, probe: Probe = _DEFAULT) -> None:
         `value` must be low enough that nothing is clamped.
     """
     spread, error = measured_spread(bloom, probe, None)
-    _check_lit("assert_separable", spread, error)
+    _check_lit(spread, error)
     product = np.empty_like(spread)
     shares = []
     for channel in range(spread.shape[2]):
@@ -84,15 +84,10 @@ def assert_separable(bloom: Bloom, probe: Probe = _DEFAULT) -> None:
         product[:, :, channel] = np.outer(plane[:, x], plane[y]) / plane[y, x]
         singular = np.linalg.svd(plane, compute_uv=False)
         shares.append(float(singular[1] / singular[0]) if len(singular) > 1 else 0.0)
-    compare_with_law(
-        "assert_separable",
-        "h(x, y) h(x0, y0) = h(x, y0) h(x0, y): the point spread is a row times a column",
-        spread,
-        product,
-        # The law has four values. None is larger than the divisor.
-        4 * error,
-        note=f"; the second singular value is {100 * max(shares):.3g} % of the first",
-    )
+    law = "h(x, y) h(x0, y0) = h(x, y0) h(x0, y): the point spread is a row times a column"
+    note = f"; the second singular value is {100 * max(shares):.3g} % of the first"
+    # The law has four values. None is larger than the divisor.
+    compare_with_law(law, spread, product, 4 * error, note)
 
 
 @checked
@@ -123,7 +118,7 @@ def assert_centroid_kept(
     """
     check_number("within", within, 0.0, math.inf)
     spread, error = measured_spread(bloom, probe, at)
-    _check_lit("assert_centroid_kept", spread, error)
+    _check_lit(spread, error)
     check_inside(max(map(border_share, np.moveaxis(spread, 2, 0))), probe.size)
     position = at or probe.centre
     for channel in range(spread.shape[2]):
@@ -137,7 +132,7 @@ def assert_centroid_kept(
                 f"{name} {position[axis]}, channel {channel}: {allowed:.3g} allowed"
             )
             law = "the centroid of the light of a pixel is that pixel"
-            judge("assert_centroid_kept", law, ("off", abs(off), allowed, text))
+            judge(law, ("off", abs(off), allowed, text))
 
 
 def measured_spread(
@@ -155,17 +150,13 @@ def measured_spread(
     return (lit - black) / probe.value, (lit_error + dark_error) / probe.value
 
 
-def _check_lit(assertion: str, spread: Image, error: float) -> None:
+def _check_lit(spread: Image, error: float) -> None:
     """Raise AssertionError if the point spread is black."""
     for channel in range(spread.shape[2]):
         largest = float(np.abs(spread[:, :, channel]).max())
         if largest <= error or not spread[:, :, channel].sum() > 0:
-            fail(
-                assertion,
-                "the bloom of a lit pixel is not black",
-                f"the largest value in channel {channel} is {largest:.3g}; more than {error:.3g} "
-                "is needed",
-            )
+            text = f"the largest value in channel {channel} is {largest:.3g}; more than "
+            fail("the bloom of a lit pixel is not black", f"{text}{error:.3g} is needed")
 
 
 def check_inside(share: float, size: tuple[int, int], allowed: float = _AT_THE_BORDER) -> None:

@@ -110,4 +110,4 @@ def _judge(law: str, off: Image, largest: float, limit: float, where: str) -> No
         f"{'bright' if off[position] > 0 else 'dark'} by {share:.3g} of the brightest value: "
         f"{limit:g} allowed"
     )
-    judge("assert_alpha", law, ("alpha", share, limit, text))
+    judge(law, ("alpha", share, limit, text))
