@@ -13,11 +13,10 @@ import numpy as np
 from vkbloom._argument_types import checked
 from vkbloom.testing._deviations import Measured, NotTaken, breaches, fail, figure, judge
 from vkbloom.testing._point_spread import border_share, check_inside
-from vkbloom.testing._probe import Bloom, Image, Probe, beside_multiple
+from vkbloom.testing._probe import DEFAULT, Bloom, Image, Probe, beside_multiple
 
 __tracebackhide__ = True
 
-_DEFAULT = Probe()
 #: Limits by figure. Where the outermost pixels are repeated, a light in them counts for what is
 #: beyond them, too: a Gaussian of 8 pixels reaches 1.6 at an edge and 2.7 in a corner.
 BORDER_LIMITS: Final = {
@@ -59,7 +58,7 @@ class _Lights:
 
 @checked
 def assert_border(
-    bloom: Bloom, probe: Probe = _DEFAULT, *, limits: Mapping[str, float] | None = None
+    bloom: Bloom, probe: Probe = DEFAULT, *, limits: Mapping[str, float] | None = None
 ) -> None:
     """Assert that a border neither adds light nor takes it away.
 
@@ -181,7 +180,7 @@ def _check_stale(bloom: Bloom, probe: Probe, dark: Image, allowed: float) -> Ima
 
 
 @checked
-def assert_views(bloom: Bloom, probe: Probe = _DEFAULT, *, limit: float = 1e-3) -> None:
+def assert_views(bloom: Bloom, probe: Probe = DEFAULT, *, limit: float = 1e-3) -> None:
     """Assert that no light crosses from one view of a picture to the other.
 
     The law: B(a, region=r) inside of r depends on the pixels inside of r alone. The picture has two

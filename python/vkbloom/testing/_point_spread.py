@@ -10,11 +10,10 @@ import numpy as np
 from vkbloom._argument_types import checked
 from vkbloom._checks import check_number
 from vkbloom.testing._deviations import compare_with_law, fail, judge
-from vkbloom.testing._probe import Bloom, Image, Probe
+from vkbloom.testing._probe import DEFAULT, Bloom, Image, Probe
 
 __tracebackhide__ = True
 
-_DEFAULT = Probe()
 # Allowed share of a point's light in the outermost pixels. Clamping to the edge at most doubles
 # that light, which moves a centroid by a thousandth of half the image.
 _AT_THE_BORDER: Final = 1e-3
@@ -22,7 +21,7 @@ _AT_THE_BORDER: Final = 1e-3
 
 @checked
 def point_spread(
-    bloom: Bloom, probe: Probe = _DEFAULT, *, at: tuple[int, int] | None = None
+    bloom: Bloom, probe: Probe = DEFAULT, *, at: tuple[int, int] | None = None
 ) -> Image:
     """Return the point-spread function of a bloom.
 
@@ -58,7 +57,7 @@ def point_spread(
 
 
 @checked
-def assert_separable(bloom: Bloom, probe: Probe = _DEFAULT) -> None:
+def assert_separable(bloom: Bloom, probe: Probe = DEFAULT) -> None:
     """Assert that the point spread is the product of a row and a column.
 
     The law: h(x, y) h(x0, y0) = h(x, y0) h(x0, y), where (x0, y0) is the position of the largest
@@ -93,7 +92,7 @@ def assert_separable(bloom: Bloom, probe: Probe = _DEFAULT) -> None:
 @checked
 def assert_centroid_kept(
     bloom: Bloom,
-    probe: Probe = _DEFAULT,
+    probe: Probe = DEFAULT,
     *,
     at: tuple[int, int] | None = None,
     within: float = 0.01,

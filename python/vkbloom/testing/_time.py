@@ -14,13 +14,12 @@ from vkbloom._checks import check_number
 from vkbloom.testing._border import takes
 from vkbloom.testing._deviations import fail, figure, is_within, judge
 from vkbloom.testing._moving_light import area_sampled
-from vkbloom.testing._probe import Bloom, Image, Probe, small_probe
+from vkbloom.testing._probe import DEFAULT, Bloom, Image, Probe, small_probe
 
 __tracebackhide__ = True
 
 __all__ = ["HISTORY_LIMITS", "JITTER_LIMITS", "assert_history", "assert_jitter", "halton"]
 
-_DEFAULT = Probe()
 #: Limits by figure: changes of the bloom's light as shares of its mean, and how many times as
 #: bright a pixel must be as a flat image to pass a threshold.
 JITTER_LIMITS: Final = {"flicker": 0.05, "resolved": 0.02, "threshold": 1.5}
@@ -61,7 +60,7 @@ def _inverse(index: int, base: int) -> float:
 @checked
 def assert_jitter(
     bloom: Bloom,
-    probe: Probe = _DEFAULT,
+    probe: Probe = DEFAULT,
     *,
     feedback: float = 0.9,
     limits: Mapping[str, float] | None = None,
@@ -215,7 +214,7 @@ def _threshold_ratio(bloom: Bloom, probe: Probe, limit: float) -> float:
 
 @checked
 def assert_history(
-    bloom: Bloom, probe: Probe = _DEFAULT, *, limits: Mapping[str, float] | None = None
+    bloom: Bloom, probe: Probe = DEFAULT, *, limits: Mapping[str, float] | None = None
 ) -> None:
     """Assert that a bloom shows the image of now, and nothing of the images before.
 
