@@ -35,9 +35,18 @@ DIRECTIVES: Final = {
 class Directive:
     """A line of a header: its name, and the rest of the line without blanks around it."""
 
+    source: Source
     name: str
     value: str
     line: int
+
+    def fault(self, cause: object) -> ValueError:
+        """Return the error of the line."""
+        return self.source.fault(self.line, f"{self.name}: {cause}")
+
+    def refused(self, cause: str) -> ValueError:
+        """Return the error of the value."""
+        return self.fault(f"{self.value!r} {cause}")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -49,6 +58,15 @@ class Block:
     body: str
     line: int
     body_line: int
+
+    @property
+    def head(self) -> Directive:
+        """The directive that names the block."""
+        return self.directives[0]
+
+    def fault(self, line: int, cause: str) -> ValueError:
+        """Return the error of a line, which begins with the block's kind and name."""
+        return self.head.source.fault(line, f"{self.kind} {self.head.value}: {cause}")
 
     def last(self, name: str) -> Directive | None:
         """Return the last directive of a name: of several, this one counts."""
@@ -109,7 +127,7 @@ def read_directive(source: Source, kind: str, content: str, line: int) -> Direct
     """Read a line of a header, without the mark."""
     for name in DIRECTIVES[kind]:
         if content.startswith(name):
-            return Directive(name, content.removeprefix(name).strip(), line)
+            return Directive(source, name, content.removeprefix(name).strip(), line)
     word = (re.findall(r"\w+", content) or [content])[0]
     block = "a pass" if kind == "PASS" else f"a block {kind}"
     begun = any(content.startswith(names[0]) for names in DIRECTIVES.values())

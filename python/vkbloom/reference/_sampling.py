@@ -44,6 +44,12 @@ def sample(
     return contiguous(columns.swapaxes(0, 1))
 
 
+def box(image: Array, size: tuple[int, int], distance: float = 1.0) -> Array:
+    """Return the mean of four samples at a distance along both axes, in texels of the image."""
+    taps = ((-distance, 0.5), (distance, 0.5))
+    return sample(image, size, taps, taps)
+
+
 def _filter_rows(image: Array, count: int, taps: Taps) -> Array:
     """Apply the taps along the first axis, for `count` rows of output."""
     values, offsets, shares = value_of(image), *zip(*taps, strict=True)

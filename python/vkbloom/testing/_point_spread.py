@@ -10,11 +10,10 @@ import numpy as np
 from vkbloom._argument_types import checked
 from vkbloom._checks import check_number
 from vkbloom.testing._deviations import compare_with_law, fail, judge
-from vkbloom.testing._probe import Bloom, Image, Probe
+from vkbloom.testing._probe import DEFAULT, Bloom, Image, Probe
 
 __tracebackhide__ = True
 
-_DEFAULT = Probe()
 # Allowed share of a point's light in the outermost pixels. Clamping to the edge at most doubles
 # that light, which moves a centroid by a thousandth of half the image.
 _AT_THE_BORDER: Final = 1e-3
@@ -22,7 +21,7 @@ _AT_THE_BORDER: Final = 1e-3
 
 @checked
 def point_spread(
-    bloom: Bloom, probe: Probe = _DEFAULT, *, at: tuple[int, int] | None = None
+    bloom: Bloom, probe: Probe = DEFAULT, *, at: tuple[int, int] | None = None
 ) -> Image:
     """Return the point-spread function of a bloom.
 
@@ -58,7 +57,7 @@ def point_spread(
 
 
 @checked
-def assert_separable(bloom: Bloom, probe: Probe = _DEFAULT) -> None:
+def assert_separable(bloom: Bloom, probe: Probe = DEFAULT) -> None:
     """Assert that the point spread is the product of a row and a column.
 
     The law: h(x, y) h(x0, y0) = h(x, y0) h(x0, y), where (x0, y0) is the position of the largest
@@ -75,7 +74,7 @@ def assert_separable(bloom: Bloom, probe: Probe = _DEFAULT) -> None:
         `value` must be low enough that nothing is clamped.
     """
     spread, error = measured_spread(bloom, probe, None)
-    _check_lit("assert_separable", spread, error)
+    _check_lit(spread, error)
     product = np.empty_like(spread)
     shares = []
     for channel in range(spread.shape[2]):
@@ -84,21 +83,16 @@ def assert_separable(bloom: Bloom, probe: Probe = _DEFAULT) -> None:
         product[:, :, channel] = np.outer(plane[:, x], plane[y]) / plane[y, x]
         singular = np.linalg.svd(plane, compute_uv=False)
         shares.append(float(singular[1] / singular[0]) if len(singular) > 1 else 0.0)
-    compare_with_law(
-        "assert_separable",
-        "h(x, y) h(x0, y0) = h(x, y0) h(x0, y): the point spread is a row times a column",
-        spread,
-        product,
-        # The law has four values. None is larger than the divisor.
-        4 * error,
-        note=f"; the second singular value is {100 * max(shares):.3g} % of the first",
-    )
+    law = "h(x, y) h(x0, y0) = h(x, y0) h(x0, y): the point spread is a row times a column"
+    note = f"; the second singular value is {100 * max(shares):.3g} % of the first"
+    # The law has four values. None is larger than the divisor.
+    compare_with_law(law, spread, product, 4 * error, note)
 
 
 @checked
 def assert_centroid_kept(
     bloom: Bloom,
-    probe: Probe = _DEFAULT,
+    probe: Probe = DEFAULT,
     *,
     at: tuple[int, int] | None = None,
     within: float = 0.01,
@@ -123,7 +117,7 @@ def assert_centroid_kept(
     """
     check_number("within", within, 0.0, math.inf)
     spread, error = measured_spread(bloom, probe, at)
-    _check_lit("assert_centroid_kept", spread, error)
+    _check_lit(spread, error)
     check_inside(max(map(border_share, np.moveaxis(spread, 2, 0))), probe.size)
     position = at or probe.centre
     for channel in range(spread.shape[2]):
@@ -137,7 +131,7 @@ def assert_centroid_kept(
                 f"{name} {position[axis]}, channel {channel}: {allowed:.3g} allowed"
             )
             law = "the centroid of the light of a pixel is that pixel"
-            judge("assert_centroid_kept", law, ("off", abs(off), allowed, text))
+            judge(law, ("off", abs(off), allowed, text))
 
 
 def measured_spread(
@@ -155,17 +149,13 @@ def measured_spread(
     return (lit - black) / probe.value, (lit_error + dark_error) / probe.value
 
 
-def _check_lit(assertion: str, spread: Image, error: float) -> None:
+def _check_lit(spread: Image, error: float) -> None:
     """Raise AssertionError if the point spread is black."""
     for channel in range(spread.shape[2]):
         largest = float(np.abs(spread[:, :, channel]).max())
         if largest <= error or not spread[:, :, channel].sum() > 0:
-            fail(
-                assertion,
-                "the bloom of a lit pixel is not black",
-                f"the largest value in channel {channel} is {largest:.3g}; more than {error:.3g} "
-                "is needed",
-            )
+            text = f"the largest value in channel {channel} is {largest:.3g}; more than "
+            fail("the bloom of a lit pixel is not black", f"{text}{error:.3g} is needed")
 
 
 def check_inside(share: float, size: tuple[int, int], allowed: float = _AT_THE_BORDER) -> None:

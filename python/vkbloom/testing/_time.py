@@ -14,13 +14,12 @@ from vkbloom._checks import check_number
 from vkbloom.testing._border import takes
 from vkbloom.testing._deviations import fail, figure, is_within, judge
 from vkbloom.testing._moving_light import area_sampled
-from vkbloom.testing._probe import Bloom, Image, Probe, small_probe
+from vkbloom.testing._probe import DEFAULT, Bloom, Image, Probe, small_probe
 
 __tracebackhide__ = True
 
 __all__ = ["HISTORY_LIMITS", "JITTER_LIMITS", "assert_history", "assert_jitter", "halton"]
 
-_DEFAULT = Probe()
 #: Limits by figure: changes of the bloom's light as shares of its mean, and how many times as
 #: bright a pixel must be as a flat image to pass a threshold.
 JITTER_LIMITS: Final = {"flicker": 0.05, "resolved": 0.02, "threshold": 1.5}
@@ -61,7 +60,7 @@ def _inverse(index: int, base: int) -> float:
 @checked
 def assert_jitter(
     bloom: Bloom,
-    probe: Probe = _DEFAULT,
+    probe: Probe = DEFAULT,
     *,
     feedback: float = 0.9,
     limits: Mapping[str, float] | None = None,
@@ -114,7 +113,7 @@ def assert_jitter(
             "threshold reads an average"
         )
     if reasons:
-        fail("assert_jitter", law, "; ".join(reasons))
+        fail(law, "; ".join(reasons))
 
 
 def _flickers(
@@ -160,17 +159,9 @@ def _line(probe: Probe, x: float, y: float) -> Image:
 def _angled(probe: Probe, x: float, y: float) -> Image:
     """Return a line at an angle, as squares whose centres are a quarter of a pixel apart."""
     steps = np.arange(-12, 12, 0.25)
-    squares = (
-        (probe.centre[0] + x + steps, probe.size[0], 0.25),
-        (probe.centre[1] + y + steps / 3, probe.size[1], 0.5),
-    )
-    columns, rows = (
-        np.diff(np.clip(np.arange(count + 1) - 0.5, at - side / 2, at + side / 2))
-        for positions, count, side in squares
-        for at in (positions[:, np.newaxis],)
-    )
-    total: Image = rows.T @ columns
-    return total
+    centres = zip(probe.centre[0] + x + steps, probe.centre[1] + y + steps / 3, strict=True)
+    squares = [area_sampled(probe.size, centre, (0.25, 0.5)) for centre in centres]
+    return np.asarray(np.sum(squares, axis=0))
 
 
 _SCENES: Final[dict[str, Callable[[Probe, float, float], Image]]] = {
@@ -223,7 +214,7 @@ def _threshold_ratio(bloom: Bloom, probe: Probe, limit: float) -> float:
 
 @checked
 def assert_history(
-    bloom: Bloom, probe: Probe = _DEFAULT, *, limits: Mapping[str, float] | None = None
+    bloom: Bloom, probe: Probe = DEFAULT, *, limits: Mapping[str, float] | None = None
 ) -> None:
     """Assert that a bloom shows the image of now, and nothing of the images before.
 
@@ -257,7 +248,8 @@ def assert_history(
 
     x, y = probe.centre
     before, after = (
-        _square(probe, (max(0, min(probe.size[0] - 3, x + step)), y)) for step in (-8, 8)
+        probe.point((max(0, min(probe.size[0] - 3, x + step)), y), probe.value, (3, 3))
+        for step in (-8, 8)
     )
     count = _FRAMES if takes(bloom, "time") else _FEW_FRAMES
     for _ in range(_FEW_FRAMES):
@@ -277,15 +269,7 @@ def assert_history(
         f"and {above} frames are above {allowed['stays']:g}"
     )
     judge(
-        "assert_history",
         law,
         ("steady", steady, allowed["steady"], changes),
         ("stays", left[0], allowed["stays"], stays),
     )
-
-
-def _square(probe: Probe, at: tuple[int, int]) -> Image:
-    """Return an image with 3 x 3 lit pixels."""
-    image = probe.flat(0.0)
-    image[at[1] : at[1] + 3, at[0] : at[0] + 3] = probe.value
-    return image
