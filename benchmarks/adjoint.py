@@ -42,7 +42,6 @@ SETTINGS: Final[dict[str, vkbloom.Settings]] = {
     "Pyramid, threshold, ACES": PYRAMID.replace(threshold=0.5, tonemap="aces"),
     "DualKawase": vkbloom.DualKawase(levels=LEVELS, threshold=0.5),
     "BevyBloom": vkbloom.presets["bevy_natural"],
-    "GodotBloom": vkbloom.GodotBloom(),
     "KinoBloom": vkbloom.KinoBloom(),
     "UrpBloom": vkbloom.presets["unity_urp"],
     "ThreeBloom": vkbloom.presets["threejs_unreal"],

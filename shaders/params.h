@@ -188,12 +188,10 @@
     INPUT(B, float, base) \
     INPUT(B, float, share)
 
-// The end of Blender's glare (blender_end.frag): one factor for each channel. Channels of its
-// adjoint are equal where they differ by no more than the rounding.
+// The end of Blender's glare (blender_end.frag): one factor for each channel.
 #define BLENDER_END_BLOCK(B, READS, INPUT, VEC4S) \
     SAMPLING_ROWS(B, INPUT) \
     READS(B, saturation) \
-    INPUT(B, float, rounding) \
     INPUT(B, int, reads_next) \
     VEC4S(B, factors, 1) \
     VEC4S(B, next, 1)
@@ -479,9 +477,9 @@
 #define ADJOINT_SIDE 4
 #define ADJOINT_ROWS 16
 
-// Taps of published methods that their adjoints read, too: the distance of Filament's in texels and
-// the share of the outer ones along an axis; the distances of those of HDRP's prefilter; the kernel
-// of its blur, a binomial of order 8; the half-kernel of Godot's.
+// Taps of published methods: the distance of Filament's in texels and the share of the outer ones
+// along an axis; the distances of those of HDRP's prefilter; the kernel of its blur, a binomial of
+// order 8; the half-kernel of Godot's.
 #define FILAMENT_OFFSET 1.761629
 #define FILAMENT_OUTER  (7.46602 / 32.0)
 #define HDRP_FAR        0.9

@@ -130,7 +130,6 @@ struct vkb_pass_row {
     // What the pass computes, whatever shader it has: the block, or its transpose.
     enum vkb_block block;
     bool transposed;
-    bool no_transpose;  // its samples are not on a grid, or found by rounding
     union vkb_params params;
 };
 

@@ -9,15 +9,29 @@
 // The transpose of a pass by its block.
 static vkb_transpose *const transposes[VKB_BLOCK_COUNT] = {
     [VKB_BLOCK_composite] = vkb_transpose_composite,
-    [VKB_BLOCK_godot_final] = vkb_transpose_godot_composite,
     [VKB_BLOCK_threshold] = vkb_transpose_threshold,
     [VKB_BLOCK_blur] = vkb_transpose_blur,
     [VKB_BLOCK_filter] = vkb_transpose_filter,
     [VKB_BLOCK_gather] = vkb_transpose_gather,
     [VKB_BLOCK_prefilter] = vkb_transpose_groups,
-    [VKB_BLOCK_blender_end] = vkb_transpose_blender_end,
     [VKB_BLOCK_streaks] = vkb_transpose_streaks,
 };
+
+// NULL: there is none, as for what a method does that is rarely differentiated.
+static vkb_transpose *find_transpose(const struct vkb_pass_row *pass)
+{
+    switch (pass->constants.groups) {
+    case GROUPS_BLENDER:
+    case GROUPS_DARKTABLE:
+    case GROUPS_GODOT_BLUR:
+    case GROUPS_HDRP:
+    case GROUPS_HDRP_BLUR:
+    case GROUPS_HIGHLIGHTS:
+        return NULL;
+    default:
+        return transposes[pass->block];
+    }
+}
 
 // The image of a framebuffer's cotangents, a level of the source.
 static bool add_cotangents(struct vkb_adjoint *adjoint, const struct vkb_source *source,
@@ -67,7 +81,7 @@ static bool add_passes(struct vkb_adjoint *adjoint, const struct vkb_settings *s
 {
     for (uint32_t i = adjoint->graph->pass_count; *possible && i-- > 0;) {
         const struct vkb_pass_row pass = adjoint->graph->passes[i];
-        vkb_transpose *transpose = pass.no_transpose ? NULL : transposes[pass.block];
+        vkb_transpose *transpose = find_transpose(&pass);
         if (pass.target_count != 1 || vkb_cotangent_of(adjoint, &pass) == VKB_NO_IMAGE)
             continue;
         // A prefilter of bright colours is left to the reference.

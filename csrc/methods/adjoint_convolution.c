@@ -33,8 +33,7 @@ static bool mirror_kernel(const struct vkb_kernel_data *kernel, struct vkb_graph
     return true;
 }
 
-// What is convolved: the glow, or highlights, in Blender's lower qualities and above Unreal's
-// threshold.
+// What is convolved: the glow, or highlights above Unreal's threshold.
 static uint32_t find_source(const struct vkb_graph *graph)
 {
     const uint32_t highlights = vkb_graph_find(graph, "highlights");

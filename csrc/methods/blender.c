@@ -332,16 +332,12 @@ static uint32_t add_end(struct vkb_levels *levels, uint32_t light, double gain)
 {
     const struct vkb_settings *settings = levels->settings;
     const float *tint = settings->tint;
-    const int type = settings->choices[VKB_CHOICE_type];
-    const bool convolved = type == TYPE_FOG_GLOW || type == TYPE_KERNEL;
     const uint32_t bloom = vkb_levels_bloom(levels);
     struct vkb_pass_row row = vkb_fetching_row(levels, &vkb_shader_blender_end_frag, light, bloom);
 
     row.block = VKB_BLOCK_blender_end;
     row.params.blender_end = (struct vkb_blender_end_params){
         .saturation = settings->values.saturation,
-        // Transforms round each channel differently (reference/blender.py).
-        .rounding = convolved ? 1e-6f : 0.0f,
         .factors = {{
             (float)(gain * tint[0]),
             (float)(gain * tint[1]),
@@ -355,8 +351,7 @@ static uint32_t add_end(struct vkb_levels *levels, uint32_t light, double gain)
         float *next = row.params.blender_end.next[0];
         next[0] = next_bits(from.width, to.width, 0.0f, 0.0);
         next[1] = next_bits(from.height, to.height, 0.0f, 0.0);
-        row.no_transpose = next[0] > 0.0f || next[1] > 0.0f;
-        row.params.blender_end.reads_next = row.no_transpose;
+        row.params.blender_end.reads_next = next[0] > 0.0f || next[1] > 0.0f;
     }
     vkb_levels_pass(levels, &row);
     return bloom;

@@ -92,8 +92,7 @@ void vkb_add_ray(struct vkb_levels *levels, const struct vkb_ray *ray)
     params->step_y = step_of(step * sin(ray->angle));
     params->threshold = ray->iteration == 0 ? values->threshold : 0.0f;
     params->limit = vkb_formats[levels->source->format].limit;
-    row.no_transpose = ray->next != NULL;
-    params->reads_next = row.no_transpose;
+    params->reads_next = ray->next != NULL;
     if (ray->next)
         memcpy(params->next, ray->next, sizeof params->next);
     vkb_levels_pass(levels, &row);

@@ -94,10 +94,8 @@ void vkb_filter_three(struct vkb_filter *filter, double distance, double side);
 void vkb_filter_thirteen(struct vkb_filter *filter, double step_x, double step_y);
 
 // The families of passes.
-vkb_transpose vkb_transpose_composite, vkb_transpose_godot_composite, vkb_transpose_threshold,
-    vkb_transpose_blender_end;
-vkb_transpose vkb_transpose_blur, vkb_transpose_filter, vkb_transpose_gather,
-    vkb_transpose_hdrp_blur, vkb_transpose_godot_blur;
+vkb_transpose vkb_transpose_composite, vkb_transpose_threshold;
+vkb_transpose vkb_transpose_blur, vkb_transpose_filter, vkb_transpose_gather;
 // Downsamplings that are not linear in groups of their taps.
 vkb_transpose vkb_transpose_groups;
 vkb_transpose vkb_transpose_streaks;

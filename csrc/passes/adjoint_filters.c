@@ -3,9 +3,6 @@
 #include "passes/blur.h"
 #include "passes/filter.h"
 
-#include <math.h>
-#include <string.h>
-
 static void set_line(const struct vkb_blur_params *params, int radius, double step, bool placed,
                      struct vkb_axis *axis)
 {
@@ -72,67 +69,6 @@ void vkb_filter_three(struct vkb_filter *filter, double distance, double side)
     filter->x.count = filter->y.count = 0;
     add_taps(&filter->x, 0, distance, side, 1.0 - 2.0 * side);
     add_taps(&filter->y, 0, distance, side, 1.0 - 2.0 * side);
-}
-
-// A kernel of nine taps, pixels of the target apart.
-static void set_nine(const double half[5], enum vkb_border border, struct vkb_axis *axis)
-{
-    axis->border = border;
-    axis->count = 0;
-    for (int tap = -4; tap <= 4; ++tap)
-        axis->taps[axis->count++] =
-            (struct vkb_tap){.offset = tap, .weights = {half[tap < 0 ? -tap : tap]}};
-}
-
-bool vkb_transpose_hdrp_blur(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
-                             struct vkb_error *error)
-{
-    static const double kernel[9] = {HDRP_KERNEL};
-    const bool rows = pass->constants.direction == DIRECTION_HORIZONTAL;
-    struct vkb_filter filter;
-
-    vkb_filter_begin(adjoint->graph, pass->reads[0], pass->targets[0], &filter);
-    set_nine(kernel + 4, pass->constants.first ? VKB_BORDER_FIRST_TWO : VKB_BORDER_LAST,
-             rows ? &filter.x : &filter.y);
-    return vkb_accumulate_filter(adjoint, &filter, vkb_cotangent_of(adjoint, pass), pass->reads[0],
-                                 error);
-}
-
-// Of the blurs of the frame: weights by brightness are before the horizontal one, at the pixels of
-// the target, and after the vertical one.
-static bool accumulate_first_blur(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
-                                  struct vkb_filter *blur, struct vkb_error *error)
-{
-    const uint32_t target = pass->targets[0], source = pass->reads[0];
-    const struct vkb_size size = {blur->x.to, blur->y.to};
-    const bool rows = pass->constants.direction == DIRECTION_HORIZONTAL;
-    uint32_t cotangents = vkb_cotangent_of(adjoint, pass);
-
-    if (rows && !vkb_filter_to_image(adjoint, blur, cotangents, size, &cotangents, error))
-        return false;
-    struct vkb_pass_row row = vkb_slope_row(adjoint, pass, &vkb_shader_adjoint_godot_blur_frag, 2);
-    row.reads[2] = cotangents;
-    return (rows ? vkb_accumulate_sampled(adjoint, &row, source, target, error)
-                 : vkb_accumulate_through(adjoint, &row, blur, source, target, error))
-        && vkb_accumulate_mask(adjoint, pass, &row, error);
-}
-
-bool vkb_transpose_godot_blur(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
-                              struct vkb_error *error)
-{
-    static const double half[5] = {GODOT_KERNEL};
-    const bool rows = pass->constants.direction == DIRECTION_HORIZONTAL;
-    const bool first = pass->constants.first;
-    const uint32_t target = pass->targets[0];
-    struct vkb_filter filter;
-
-    vkb_filter_begin(adjoint->graph, first ? target : pass->reads[0], target, &filter);
-    set_nine(half, VKB_BORDER_PAIRS, rows ? &filter.x : &filter.y);
-    if (first)
-        return accumulate_first_blur(adjoint, pass, &filter, error);
-    filter.gain = rows ? 1.0 : pass->params.prefilter.strength;
-    return vkb_accumulate_filter(adjoint, &filter, vkb_cotangent_of(adjoint, pass), pass->reads[0],
-                                 error);
 }
 
 static void set_taps(const float (*taps)[4], int32_t count, enum vkb_mode kind,

@@ -3,8 +3,6 @@
 // these those of the image by the group's linear filter.
 #include "passes/adjoint.h"
 
-#include <string.h>
-
 static struct vkb_tap tap_at(double offset, double weight)
 {
     return (struct vkb_tap){.offset = offset, .weights = {weight}};
@@ -18,59 +16,26 @@ static void set_pair(struct vkb_axis *axis, double first, double second)
     vkb_axis_set(axis, taps, 2);
 }
 
-// The places of groups that are one tap each.
-static bool find_place(enum vkb_mode groups, int group, double place[2])
-{
-    static const double cross[5][2] = {
-        {0.0, 0.0}, {-1.0, 0.0}, {1.0, 0.0}, {0.0, -1.0}, {0.0, 1.0}};
-    static const double star[5][2] = {{0.0, 0.0},
-                                      {HDRP_FAR, -HDRP_NEAR},
-                                      {-HDRP_FAR, HDRP_NEAR},
-                                      {HDRP_NEAR, HDRP_FAR},
-                                      {-HDRP_NEAR, -HDRP_FAR}};
-    const bool outer = groups == GROUPS_BLENDER && group < 9;
-    const int corner = groups == GROUPS_BLENDER ? group - 9 : group;
-
-    if (groups == GROUPS_BOX || groups == GROUPS_BLENDER) {
-        place[0] = outer ? 2.0 * (group % 3 - 1) : corner & 1 ? 1.0 : -1.0;
-        place[1] = outer ? 2.0 * (group / 3 - 1) : corner & 2 ? 1.0 : -1.0;
-    } else if (groups == GROUPS_KINO || groups == GROUPS_HDRP) {
-        memcpy(place, groups == GROUPS_KINO ? cross[group] : star[group], sizeof cross[0]);
-    } else {
-        return false;
-    }
-    return true;
-}
-
-// The mean of as many texels for each pixel, from the first ones on, or from the last ones back.
-static void set_means(struct vkb_axis *axis, int32_t count, bool backwards)
-{
-    axis->step = count;
-    axis->origin = backwards ? axis->from - 1.0 - axis->step * (axis->to - 1.0) : 0.0;
-    axis->count = 0;
-    for (int32_t i = 0; i < count; ++i)
-        axis->taps[axis->count++] = tap_at(backwards ? -i : i, 1.0 / count);
-}
-
 // The taps of a group: those of 13 taps are pairs along both axes.
 static void set_group(const struct vkb_pass_row *row, int group, struct vkb_filter *filter)
 {
+    static const double cross[5][2] = {
+        {0.0, 0.0}, {-1.0, 0.0}, {1.0, 0.0}, {0.0, -1.0}, {0.0, 1.0}};
     const enum vkb_mode groups = (enum vkb_mode)row->constants.groups;
     const double step_x = row->params.prefilter.step_x, step_y = row->params.prefilter.step_y;
     const int corner = group - 1;
-    double place[2];
 
-    if (find_place(groups, group, place)) {
-        filter->x.taps[0].offset = place[0];
-        filter->y.taps[0].offset = place[1];
+    if (groups == GROUPS_KINO) {
+        filter->x.taps[0].offset = cross[group][0];
+        filter->y.taps[0].offset = cross[group][1];
+    } else if (groups == GROUPS_BOX) {
+        filter->x.taps[0].offset = group & 1 ? 1.0 : -1.0;
+        filter->y.taps[0].offset = group & 2 ? 1.0 : -1.0;
     } else if (groups == GROUPS_FILAMENT && row->constants.thresholded) {
         filter->x.kind = group & 1 ? UPSAMPLE_RIGHT_PAIR : UPSAMPLE_LEFT_PAIR;
         filter->y.kind = group & 2 ? UPSAMPLE_RIGHT_PAIR : UPSAMPLE_LEFT_PAIR;
     } else if (groups == GROUPS_FILAMENT) {
         vkb_filter_three(filter, 1.0, 0.25);
-    } else if (groups == GROUPS_HIGHLIGHTS && row->constants.radius > 1) {
-        set_means(&filter->x, row->constants.radius, false);
-        set_means(&filter->y, row->constants.radius, true);
     } else if (groups == GROUPS_PYGFX) {
         vkb_filter_thirteen(filter, step_x, step_y);
     } else if (group > 0) {
@@ -89,21 +54,14 @@ static int count_of(enum vkb_mode groups, const struct vkb_pass_row *pass)
         return 4;
     case GROUPS_FILAMENT:
         return pass->constants.thresholded ? 4 : 1;
-    case GROUPS_URP:
-    case GROUPS_POST_PROCESSING:
-    case GROUPS_UNREAL:
-    case GROUPS_DARKTABLE:
-    case GROUPS_THREE:
-    case GROUPS_BABYLON:
-    case GROUPS_PYGFX:
-    case GROUPS_HIGHLIGHTS:
-        return 1;
-    case GROUPS_BLENDER:
-        return 13;
     case GROUPS_KINO:
         return pass->constants.anti_flicker ? 5 : 1;
-    default:
+    case GROUPS_PYRAMID:
+    case GROUPS_BEVY:
+    case GROUPS_PYGFX_KARIS:
         return 5;
+    default:
+        return 1;
     }
 }
 
@@ -131,8 +89,7 @@ static bool accumulate_stacked(struct vkb_adjoint *adjoint, const struct vkb_pas
     return true;
 }
 
-// Each group by a pass of its own: if there is one, or if an image of all would be too high, and
-// Blender's, since a driver takes long to compile one shader for its 13.
+// Each group by a pass of its own: if there is one, or if an image of all would be too high.
 static bool accumulate_each(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
                             const struct vkb_pass_row *given, int count, struct vkb_error *error)
 {
@@ -157,10 +114,6 @@ bool vkb_transpose_groups(struct vkb_adjoint *adjoint, const struct vkb_pass_row
     const int count = count_of(groups, pass);
     struct vkb_filter filter;
 
-    if (groups == GROUPS_HDRP_BLUR)
-        return vkb_transpose_hdrp_blur(adjoint, pass, error);
-    if (groups == GROUPS_GODOT_BLUR)
-        return vkb_transpose_godot_blur(adjoint, pass, error);
     // Without threshold and mask Filament's reduction is a filter.
     if (groups == GROUPS_FILAMENT && !pass->constants.thresholded && !pass->constants.masked) {
         vkb_filter_begin(adjoint->graph, pass->reads[0], pass->targets[0], &filter);
@@ -169,8 +122,7 @@ bool vkb_transpose_groups(struct vkb_adjoint *adjoint, const struct vkb_pass_row
                                      pass->reads[0], error);
     }
     const uint32_t height = adjoint->graph->images[pass->targets[0]].height;
-    const bool stacked =
-        count > 1 && groups != GROUPS_BLENDER && (uint64_t)count * height <= adjoint->max_side;
+    const bool stacked = count > 1 && (uint64_t)count * height <= adjoint->max_side;
     struct vkb_pass_row row = vkb_slope_row(adjoint, pass, &vkb_shader_adjoint_groups_frag, 2);
 
     row.constants.levels = 0;

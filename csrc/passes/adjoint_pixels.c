@@ -13,13 +13,14 @@ static struct vkb_size size_of(const struct vkb_adjoint *adjoint, uint32_t image
 
 // Whether the derivatives by images depend on the bloom. Otherwise it need not be rendered for
 // them.
-static bool depends_on_bloom(const struct vkb_constants *constants, float limit)
+static bool depends_on_bloom(const struct vkb_pass_row *row)
 {
+    const struct vkb_constants *constants = &row->constants;
+
     return constants->composite == COMPOSITE_SCREEN
-        || constants->composite == COMPOSITE_UNCLAMPED_SCREEN
-        || constants->composite == COMPOSITE_SOFT_LIGHT || constants->tonemap != TONEMAP_NONE
+        || constants->composite == COMPOSITE_UNCLAMPED_SCREEN || constants->tonemap != TONEMAP_NONE
         || constants->encoding != ENCODING_NONE || constants->alpha != ALPHA_KEEP
-        || limit < (float)SINGLE_LIMIT;
+        || row->params.composite.limit < (float)SINGLE_LIMIT;
 }
 
 // Whether the derivatives by the scene are a factor of all colours.
@@ -27,8 +28,7 @@ static bool scales_scene(const struct vkb_pass_row *row)
 {
     const int32_t composite = row->constants.composite;
 
-    return row->block == VKB_BLOCK_composite && !row->constants.masked
-        && !depends_on_bloom(&row->constants, row->params.composite.limit)
+    return !row->constants.masked && !depends_on_bloom(row)
         && (composite == COMPOSITE_ADD || composite == COMPOSITE_MIX);
 }
 
@@ -46,10 +46,8 @@ static bool accumulate_composite(struct vkb_adjoint *adjoint, struct vkb_pass_ro
 {
     const struct vkb_constants *constants = &row->constants;
     const uint32_t images[] = {row->reads[0], row->reads[1], row->reads[2]};
-    const float limit = row->block == VKB_BLOCK_composite ? row->params.composite.limit
-                                                          : row->params.godot_final.limit;
 
-    if (!depends_on_bloom(constants, limit))
+    if (!depends_on_bloom(row))
         row->reads[1] = row->reads[0];
     for (enum vkb_mode by = BY_SCENE; by <= BY_MASK; ++by) {
         row->constants.by = by;
@@ -106,17 +104,8 @@ bool vkb_transpose_composite(struct vkb_adjoint *adjoint, const struct vkb_pass_
     if (is_clamped(adjoint->graph))
         row.constants.groups = GROUPS_PYGFX;
     if (!vkb_add_sums(adjoint, &row, size_of(adjoint, pass->targets[0]), "by_composite", error)
-        || (is_sum(&row.constants) && depends_on_bloom(&row.constants, row.params.composite.limit)
-            && !add_curves(adjoint, &row, error)))
+        || (is_sum(&row.constants) && depends_on_bloom(&row) && !add_curves(adjoint, &row, error)))
         return false;
-    return accumulate_composite(adjoint, &row, error);
-}
-
-bool vkb_transpose_godot_composite(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
-                                   struct vkb_error *error)
-{
-    struct vkb_pass_row row = vkb_slope_row(adjoint, pass, &vkb_shader_adjoint_godot_final_frag, 3);
-
     return accumulate_composite(adjoint, &row, error);
 }
 
@@ -132,12 +121,4 @@ bool vkb_transpose_threshold(struct vkb_adjoint *adjoint, const struct vkb_pass_
     row.constants.by = BY_SCENE;
     return vkb_accumulate_sampled(adjoint, &row, pass->reads[0], target, error)
         && vkb_accumulate_mask(adjoint, pass, &row, error);
-}
-
-bool vkb_transpose_blender_end(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
-                               struct vkb_error *error)
-{
-    struct vkb_pass_row row = vkb_slope_row(adjoint, pass, &vkb_shader_adjoint_blender_end_frag, 1);
-
-    return vkb_accumulate_sampled(adjoint, &row, pass->reads[0], pass->targets[0], error);
 }

@@ -58,8 +58,7 @@ double vkb_axis_readers(const struct vkb_axis *axis)
         low = fmin(low, axis->taps[i].offset);
         high = fmax(high, axis->taps[i].offset);
     }
-    const double apart = axis->border != VKB_BORDER_NONE ? axis->step : 1.0;
-    return ((high - low) * apart + (axis->kind == UPSAMPLE_CUBIC ? 4.0 : 2.0)) / axis->step;
+    return (high - low + (axis->kind == UPSAMPLE_CUBIC ? 4.0 : 2.0)) / axis->step;
 }
 
 // The texels from `first` on that a pixel samples with a tap, and their shares.
@@ -69,22 +68,9 @@ struct sample {
     double shares[4];
 };
 
-// The pixel whose sample a tap reads at pixel `at`, which may be beyond the edges.
-static double at_border(const struct vkb_axis *axis, double at)
-{
-    const double last = axis->to - 1.0, odd = fmod(fabs(at), 2.0);
-    const double pair = fmin(fmax(at - odd, 0.0), fmax(axis->to - 2.0, 0.0));
-
-    if (axis->border == VKB_BORDER_PAIRS)
-        return fmin(pair + odd, last);
-    return fmin(axis->border == VKB_BORDER_FIRST_TWO && at < 0.0 ? odd : at, last);
-}
-
 static double position_of(const struct vkb_axis *axis, uint32_t pixel, double offset)
 {
-    const double position = axis->border != VKB_BORDER_NONE
-                              ? axis->origin + axis->step * at_border(axis, pixel + offset)
-                              : axis->origin + axis->step * pixel + offset;
+    const double position = axis->origin + axis->step * pixel + offset;
     // A texel's centre is met with roundings.
     const double nearest = floor(position + 0.5);
 

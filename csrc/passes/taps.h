@@ -19,23 +19,12 @@ struct vkb_tap {
     double offset, weights[VKB_MAX_KERNELS];
 };
 
-// What taps read beyond the first and the last pixel, where they are pixels of the target apart.
-enum vkb_border {
-    VKB_BORDER_NONE,  // they are texels apart
-    VKB_BORDER_LAST,  // the outermost texels
-    // The first two samples in turn, and the last one; or the last two in turn, too, where these
-    // are the ends of a pair (Godot).
-    VKB_BORDER_FIRST_TWO,
-    VKB_BORDER_PAIRS,
-};
-
 // How `to` pixels sample `from` texels. Pixel i is at the position origin + i step, in texels.
 struct vkb_axis {
     uint32_t from, to;
     double origin, step;
     enum vkb_mode kind;  // what a tap samples at its position: UPSAMPLE_*
-    enum vkb_border border;
-    uint32_t first;  // where pixel 0 is in the image that the transpose reads
+    uint32_t first;      // where pixel 0 is in the image that the transpose reads
     uint32_t count;
     struct vkb_tap taps[VKB_MAX_TAPS];
 };

@@ -42,21 +42,18 @@ static bool is_type(uint32_t code)
     return code >= SPV_TYPE_VOID && code < SPV_TYPE_FORWARD_POINTER;
 }
 
-bool vkb_has_result(uint32_t code)
-{
-    return code == SPV_LABEL || is_type(code) || code == SPV_EXT_INST || is_plain(code)
-        || (code >= SPV_CONSTANT_TRUE && code <= SPV_SPEC_CONSTANT_OP)
-        || (code >= SPV_FUNCTION && code <= SPV_VARIABLE && code != SPV_FUNCTION_END)
-        || (code >= SPV_ATOMIC_LOAD && code <= SPV_ATOMIC_XOR && code != SPV_ATOMIC_STORE);
-}
-
 uint32_t vkb_result(const uint32_t *at)
 {
     const uint32_t code = vkb_opcode(at);
 
     if (code == SPV_LABEL || is_type(code))
         return at[1];
-    return vkb_has_result(code) ? at[2] : 0;
+    return code == SPV_EXT_INST || is_plain(code)
+                || (code >= SPV_CONSTANT_TRUE && code <= SPV_SPEC_CONSTANT_OP)
+                || (code >= SPV_FUNCTION && code <= SPV_VARIABLE && code != SPV_FUNCTION_END)
+                || (code >= SPV_ATOMIC_LOAD && code <= SPV_ATOMIC_XOR && code != SPV_ATOMIC_STORE)
+             ? at[2]
+             : 0;
 }
 
 static bool set(uint32_t *value, uint32_t number)

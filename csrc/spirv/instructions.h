@@ -7,10 +7,8 @@
 #include <stdint.h>
 
 enum {
-    SPV_MAGIC = 0x07230203,
     SPV_HEADER_WORDS = 5,
-    SPV_BOUND = 3,  // the word of the header that all ids are below
-    SPV_MAX_BOUND = 0x3fffff,
+    SPV_BOUND = 3,    // the word of the header that all ids are below
     SPV_SPEC_ID = 1,  // a decoration
 };
 
@@ -22,11 +20,6 @@ enum vkb_opcode {
     SPV_TYPE_VOID = 19,
     SPV_TYPE_BOOL,
     SPV_TYPE_INT,
-    SPV_TYPE_FLOAT,
-    SPV_TYPE_VECTOR,
-    SPV_TYPE_MATRIX,
-    SPV_TYPE_ARRAY = 28,
-    SPV_TYPE_POINTER = 32,
     SPV_TYPE_FORWARD_POINTER = 39,
     SPV_CONSTANT_TRUE = 41,
     SPV_CONSTANT_FALSE,
@@ -121,9 +114,6 @@ bool vkb_ends_block(const uint32_t *at);
 
 // Number i of the blocks that may follow this end of a block; 0: there are no more.
 uint32_t vkb_target(const uint32_t *at, uint32_t i);
-
-// Whether vkb_result may read its words.
-bool vkb_has_result(uint32_t opcode);
 
 // The id that a type, a constant, a label or an instruction of a function defines; 0: none.
 uint32_t vkb_result(const uint32_t *at);

@@ -12,10 +12,9 @@ struct vkb_module {
     const uint32_t **at;                      // by id: what defines it; NULL: nothing
 };
 
-// Fails if the shader is not well-formed SPIR-V, so that what follows reads within it: instructions
-// have the words that their opcodes need, ids are below the bound and defined once, branches lead
-// to labels, and functions are made of blocks. An id that is used may have no definition, as those
-// of opcodes that vkb_result does not know. Either way the caller frees `module->at` with vkb_free.
+// Modules are what compilers make, and caches keep with a checksum: they are well-formed. An id may
+// have no definition, as those of opcodes that vkb_result does not know. The caller frees
+// `module->at` with vkb_free, also after a failure.
 bool vkb_read_module(const struct vkb_shader *shader, struct vkb_module *module,
                      struct vkb_error *error);
 

@@ -8,7 +8,7 @@
 #include "vulkan/error.h"
 
 // Makes `*code`, which the caller frees with vkb_free, and its `*size` in bytes. The module has no
-// specialization constants and no debug information. Fails if the shader is not SPIR-V.
+// specialization constants and no debug information.
 bool vkb_specialize(const struct vkb_shader *shader, const struct vkb_constants *constants,
                     uint32_t **code, size_t *size, struct vkb_error *error);
 

@@ -1,6 +1,3 @@
-#version 450
-#extension GL_GOOGLE_include_directive : require
-#extension GL_EXT_control_flow_attributes : require
 // The cotangents of the groups of taps from which a downsampling makes a pixel, where it is not linear
 // in these: of RADIX_1 groups from number LEVELS on, or of the mask.
 #include "lib/block.glsl"
@@ -40,9 +37,7 @@ float share_of(int group, Place place)
 float weight_of(vec4 mean, float share, out vec3 slope)
 {
     bool brightest = GROUPS == GROUPS_BOX || GROUPS == GROUPS_FILAMENT;
-    vec3 coefficients = brightest             ? shares_of_brightest(mean.rgb)
-                      : GROUPS == GROUPS_HDRP ? HDRP_LUMINANCE
-                                              : LUMINANCE;
+    vec3 coefficients = brightest ? shares_of_brightest(mean.rgb) : LUMINANCE;
     float brightness = brightest ? max(mean.r, max(mean.g, mean.b)) : dot(mean.rgb, coefficients);
     // pygfx' luminances may be negative.
     float counts =
@@ -187,56 +182,6 @@ vec4 back_kino(vec4 found[5], vec4 cotangent)
     return vec4(cotangent.rgb * larger(vec4(65000.0), found[own_group]).rgb, cotangent.a);
 }
 
-// The derivative of what a smooth transition subtracts or adds (highlights.glsl).
-float rounding_slope(float distance_to_end, float width)
-{
-    float h = width > 0.0 ? max(1.0 - abs(distance_to_end) / width, 0.0) : 0.0;
-    return -0.5 * h * sign(distance_to_end);
-}
-
-vec4 back_highlights(vec4 value, vec4 cotangent)
-{
-    if (THRESHOLDED == 0)
-        return cotangent;
-    float low = params.threshold, range = params.maximum, high = low + range;
-    float at_low = min(params.smoothness, min(low, range));
-    float at_high = min(params.smoothness, min(high, range));
-    float brightest = max(value.r, max(value.g, value.b)), above = brightest - low;
-    if (brightest <= 0.0)
-        return vec4(0.0);
-    float kept = max(above, 0.0) + rounding(above, at_low);
-    float slope = larger(vec4(range), vec4(kept)).x - rounding_slope(kept - range, at_high);
-    slope *= larger(vec4(above), vec4(0.0)).x + rounding_slope(above, at_low);
-    float factor = highlight(brightest) / brightest;
-    float by_brightest = dot(cotangent, value) * (slope - factor) / brightest;
-    return factor * cotangent + vec4(shares_of_brightest(value.rgb) * by_brightest, 0.0);
-}
-
-// Of one of Blender's 13 taps: of up to four groups, in each of which brighter taps weigh less.
-vec4 back_blender(Taps taps, vec4 cotangent)
-{
-    bool inner = own_group >= 9;
-    vec4 own = inner ? taps.inner[own_group - 9] : taps.outer[own_group];
-    float weight = weighted(own).weight;
-    vec4 slope = vec4(-weight * weight * shares_of_brightest(own.rgb), 0.0), total = vec4(0.0);
-    for (int group = 0; group < 5; ++group) {
-        vec4 sum = vec4(0.0);
-        float weights = 0.0;
-        bool belongs = false;
-        for (int i = 0; i < 4; ++i) {
-            int corner = (group - 1 & 1) + (i & 1) + 3 * ((group - 1 >> 1) + (i >> 1));
-            Weighted tap = weighted(group == 0 ? taps.inner[i] : taps.outer[corner]);
-            belongs = belongs || own_group == (group == 0 ? 9 + i : corner);
-            sum += tap.value;
-            weights += tap.weight;
-        }
-        if (belongs)
-            total += GROUP_SHARES[group]
-                   * (weight * cotangent + slope * dot(cotangent, own - sum / weights)) / weights;
-    }
-    return usual(total);
-}
-
 // The cotangents of the group, from those of what the method makes of all groups.
 vec4 back(vec4 found[5], vec4 cotangent, Place place)
 {
@@ -244,9 +189,7 @@ vec4 back(vec4 found[5], vec4 cotangent, Place place)
         return back_bevy(found, cotangent);
     if (GROUPS == GROUPS_KINO)
         return back_kino(found, cotangent);
-    if (GROUPS == GROUPS_URP)
-        return back_unity(found[0], cotangent);
-    if (GROUPS == GROUPS_POST_PROCESSING)
+    if (GROUPS == GROUPS_URP || GROUPS == GROUPS_POST_PROCESSING)
         return back_unity(found[0], cotangent);
     if (GROUPS == GROUPS_BABYLON)
         return babylon_factor(found[0]) * cotangent;
@@ -256,10 +199,6 @@ vec4 back(vec4 found[5], vec4 cotangent, Place place)
         return back_unreal(found[0], cotangent);
     if (GROUPS == GROUPS_PYGFX)
         return cotangent * larger(pygfx_mean(taps_of(place)), vec4(0.0));
-    if (GROUPS == GROUPS_HIGHLIGHTS)
-        return back_highlights(found[0], cotangent);
-    if (GROUPS == GROUPS_BLENDER)
-        return back_blender(taps_of(place), cotangent);
     // Without weights the reduction is linear, and this is no group but all of it.
     if (GROUPS == GROUPS_FILAMENT)
         return THRESHOLDED == 0 ? cotangent : back_weighted(found, cotangent, place);

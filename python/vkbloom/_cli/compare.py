@@ -16,7 +16,7 @@ from vkbloom._cli import fields
 from vkbloom._cli.image_files import check_part_is_given, read, subimage_option
 from vkbloom._cli.program import as_wrong_use
 from vkbloom._cli.terminal import is_quiet, note, say
-from vkbloom._io import image_writing
+from vkbloom._io import image_writing, safe_writing
 from vkbloom._io.images import Picture, StoredImage
 from vkbloom._views.comparison import Comparison, compare, difference
 from vkbloom._views.diagnosis import Diagnosis, diagnose
@@ -86,7 +86,7 @@ def command(
     with as_wrong_use():
         tolerances = tolerances_of(**limits)
         if diff is not None:
-            image_writing.check_writable(diff)
+            safe_writing.writer_of(diff)
     a, b = read(first, subimage), read(second, subimage)
     check_part_is_given(first, a)
     check_part_is_given(second, b)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from typing import Any, Final
 
@@ -52,6 +52,11 @@ input_colour_option: Final = click.option(
     "as ACEScg or 'Linear Rec.2020' [default linear for floats; for integers that of the file, "
     "or srgb if it names none]",
 )
+
+
+def reading_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Add the options of how an image is read for its bloom."""
+    return subimage_option(layer_option(expand_option(command)))
 
 
 def read(path: str, subimage: int, layer: str | None = None) -> StoredImage:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 import vkbloom
 from vkbloom._checks import import_extra
 from vkbloom._cli.fields import SIZE, Command
-from vkbloom._cli.image_files import expand_option, layer_option, read_picture, subimage_option
+from vkbloom._cli.image_files import read_picture, reading_options
 from vkbloom._cli.interrupts import INTERRUPTED
 from vkbloom._cli.program import adapter_option, as_wrong_use, given
 from vkbloom._cli.scene_options import scene_options
@@ -55,9 +55,7 @@ def _live_options(*, image_has_size: bool) -> Callable[[Callable[..., Any]], Cal
 
     def add(command: Callable[..., Any]) -> Callable[..., Any]:
         @click.argument("source", metavar="[IMAGE]", required=False, type=click.Path())
-        @subimage_option
-        @layer_option
-        @expand_option
+        @reading_options
         @adapter_option
         @scene_options
         @settings_options

@@ -113,8 +113,7 @@ class BlenderGlare(WithKernel, PublishedSettings):
     read from the image bilinearly, at their centres. Both texels between which a place u is are
     those of u and u + 1 in single floats. At u = -3e-8, which is a rounded 0 at widths of 41 and
     97, u + 1 is 1, so that the first column of the glare is its second one. The same is true for
-    texels 2^k, for rows from the bottom, and for the taps of "streaks" along an axis. Such settings
-    have no adjoint passes: the reference derives them.
+    texels 2^k, for rows from the bottom, and for the taps of "streaks" along an axis.
 
     The glare is enlarged bilinearly. Its saturation s = (max - min) / max becomes
     clamp(saturation * s, 0, 1), so that a negative channel becomes 0, and it is multiplied by the

@@ -13,11 +13,10 @@ import numpy as np
 from vkbloom._argument_types import checked
 from vkbloom.testing._deviations import Measured, NotTaken, breaches, fail, figure, judge
 from vkbloom.testing._point_spread import border_share, check_inside
-from vkbloom.testing._probe import Bloom, Image, Probe, beside_multiple
+from vkbloom.testing._probe import DEFAULT, Bloom, Image, Probe, beside_multiple
 
 __tracebackhide__ = True
 
-_DEFAULT = Probe()
 #: Limits by figure. Where the outermost pixels are repeated, a light in them counts for what is
 #: beyond them, too: a Gaussian of 8 pixels reaches 1.6 at an edge and 2.7 in a corner.
 BORDER_LIMITS: Final = {
@@ -51,9 +50,7 @@ class _Lights:
     ) -> tuple[Image, float]:
         """Return the bloom of a rectangle from a pixel on, less that of black, and its error."""
         if (corner, sides) not in self.made:
-            (x, y), (width, height) = corner, sides
-            image = self.probe.flat(0.0)
-            image[y : y + height, x : x + width] = self.probe.value
+            image = self.probe.point(corner, self.probe.value, sides)
             lit, error = self.probe.apply(self.bloom, image)
             self.made[corner, sides] = lit - self.dark, 2 * error
         return self.made[corner, sides]
@@ -61,7 +58,7 @@ class _Lights:
 
 @checked
 def assert_border(
-    bloom: Bloom, probe: Probe = _DEFAULT, *, limits: Mapping[str, float] | None = None
+    bloom: Bloom, probe: Probe = DEFAULT, *, limits: Mapping[str, float] | None = None
 ) -> None:
     """Assert that a border neither adds light nor takes it away.
 
@@ -96,7 +93,7 @@ def check_border(bloom: Bloom, probe: Probe, dark: Image, allowed: Mapping[str, 
     reasons += breaches(law, _at_the_border(lights, allowed, complete=complete))
     reasons += breaches(law, _flat(flat, dark, probe, allowed["flat"]))
     if reasons:
-        fail("assert_border", law, "; ".join(reasons))
+        fail(law, "; ".join(reasons))
     check_inside(share, probe.size, _OUTERMOST)
 
 
@@ -178,12 +175,12 @@ def _check_stale(bloom: Bloom, probe: Probe, dark: Image, allowed: float) -> Ima
         off = float(rise.max()) / probe.value
         y, x, _ = np.unravel_index(int(rise.argmax()), rise.shape)
         text = f"after a bright{name} image, a black one has {off:.3g} of its light at x {x}, y {y}"
-        judge("assert_border", law, ("stale", off, allowed, text))
+        judge(law, ("stale", off, allowed, text))
     return flat
 
 
 @checked
-def assert_views(bloom: Bloom, probe: Probe = _DEFAULT, *, limit: float = 1e-3) -> None:
+def assert_views(bloom: Bloom, probe: Probe = DEFAULT, *, limit: float = 1e-3) -> None:
     """Assert that no light crosses from one view of a picture to the other.
 
     The law: B(a, region=r) inside of r depends on the pixels inside of r alone. The picture has two
@@ -225,7 +222,7 @@ def assert_views(bloom: Bloom, probe: Probe = _DEFAULT, *, limit: float = 1e-3) 
             f"the other view changes the {name} one by {share:.3g} of its largest value, most at "
             f"x {x}, y {y}: {limit:g} allowed"
         )
-        judge("assert_views", law, ("crosstalk", share, limit, text))
+        judge(law, ("crosstalk", share, limit, text))
 
 
 def takes(bloom: object, name: str) -> bool:
@@ -270,22 +267,15 @@ def _expected(lights: _Lights, at: tuple[int, int]) -> tuple[Image, float]:
     )
     spread = lights.spread((x, y))[0]
     energy = float(spread.sum())
-    _check_lit("assert_border", energy)
+    if not energy > 0:
+        fail("the bloom of a lit pixel is not black", f"its energy is {energy:.3g}")
     return _moved(spread, (x, y), at), energy
 
 
 def _moved(spread: Image, start: tuple[int, int], to: tuple[int, int]) -> Image:
     """Return an image moved by whole pixels, with black where it has none."""
-    moved = np.zeros_like(spread)
-    (x, y), (height, width) = np.subtract(to, start), spread.shape[:2]
-    rows, columns = (
-        (slice(max(0, by), min(size, size + by)), slice(max(0, -by), min(size, size - by)))
-        for by, size in ((y, height), (x, width))
-    )
-    moved[rows[0], columns[0]] = spread[rows[1], columns[1]]
+    x, y = np.subtract(to, start)
+    moved = np.roll(spread, (y, x), (0, 1))
+    for lines, by in ((moved, y), (moved.swapaxes(0, 1), x)):
+        lines[slice(by, None) if by < 0 else slice(by)] = 0
     return moved
-
-
-def _check_lit(assertion: str, energy: float) -> None:
-    if not energy > 0:
-        fail(assertion, "the bloom of a lit pixel is not black", f"its energy is {energy:.3g}")

@@ -60,10 +60,10 @@ def breaches(law: str, measured: Iterable[Measured]) -> list[str]:
     return [text for name, off, limit, text in measured if not is_within(law, off, limit, name)]
 
 
-def judge(assertion: str, law: str, *measured: Measured) -> None:
+def judge(law: str, *measured: Measured) -> None:
     """Raise AssertionError with what is wrong with the deviations beyond their limits, if any."""
     if reasons := breaches(law, measured):
-        fail(assertion, law, "; ".join(reasons))
+        fail(law, "; ".join(reasons))
 
 
 def figure(name: str, value: float) -> None:
@@ -72,13 +72,7 @@ def figure(name: str, value: float) -> None:
 
 
 def compare_with_law(
-    assertion: str,
-    law: str,
-    actual: Image,
-    expected: Image,
-    allowed: float,
-    *,
-    note: str = "",
+    law: str, actual: Image, expected: Image, allowed: float, note: str = ""
 ) -> None:
     """Raise AssertionError with the deviation, its position and the law if a value is wrong."""
     difference = np.abs(actual - expected)
@@ -89,9 +83,9 @@ def compare_with_law(
         f"{actual[position]:.6g} instead of {expected[position]:.6g} at x {x}, y {y}, channel "
         f"{channel}: off by {off:.3g}, {allowed:.3g} allowed{note}"
     )
-    judge(assertion, law, ("off", off, allowed, text))
+    judge(law, ("off", off, allowed, text))
 
 
-def fail(assertion: str, law: str, figure: str) -> NoReturn:
+def fail(law: str, figure: str) -> NoReturn:
     """Raise AssertionError with the figure and the law."""
-    raise AssertionError(f"{assertion}: {figure}\n  law: {law}")
+    raise AssertionError(f"{figure}\n  law: {law}")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
@@ -253,7 +252,7 @@ def _row(law: Law, subject: Subject) -> LawRow:
         try:
             law.test(subject, law.limit)
         except AssertionError as error:
-            message, held = re.sub(r"\Aassert_\w+: ", "", str(error)), False
+            message, held = str(error), False
             if law.explain is not None:
                 why = law.explain(subject, why)
         except (TypeError, ValueError) as error:

@@ -56,7 +56,7 @@ def _unbiased(subject: Subject, promised: float) -> None:
     off = float(np.mean(gains)) / promised - 1
     text = f"the mean gain of {_VALUES} values is off by {100 * off:+.3g} %: {100 * _BIAS:.2g} % "
     law = "half floats are rounded, not truncated"
-    judge("assert_gain", law, ("bias", abs(off), _BIAS, f"{text}allowed"))
+    judge(law, ("bias", abs(off), _BIAS, f"{text}allowed"))
 
 
 def centroid_kept(subject: Subject, limit: float) -> None:
@@ -96,13 +96,9 @@ def unclamped(subject: Subject, limit: float) -> None:
     image = probe.noise(0, probe.value)
     small, small_error = probe.apply(bloom, image)
     large, large_error = probe.apply(bloom, factor * image)
-    compare_with_law(
-        "assert_unclamped",
-        f"B({factor:g} a) >= {factor:g} B(a): bright pixels are not clamped",
-        large,
-        np.maximum(large, factor * small),
-        large_error + factor * small_error,
-    )
+    law = f"B({factor:g} a) >= {factor:g} B(a): bright pixels are not clamped"
+    allowed = large_error + factor * small_error
+    compare_with_law(law, large, np.maximum(large, factor * small), allowed)
 
 
 def energy(subject: Subject, limit: float) -> None:
@@ -116,7 +112,7 @@ def energy(subject: Subject, limit: float) -> None:
     off, allowed = abs(energy - promised), limit * max(promised, energy)
     law = f"the bloom of a lit pixel has {promised:.4g} times the light of the pixel"
     text = f"{energy:.4g} instead of {promised:.4g}: off by {off:.3g}, {allowed:.3g} allowed"
-    judge("assert_energy", law, ("off", off, allowed, text))
+    judge(law, ("off", off, allowed, text))
 
 
 def _coloured(probe: Probe) -> None:
@@ -130,7 +126,7 @@ def colour(subject: Subject, limit: float) -> None:
     result, error = subject.probe.apply(subject.bloom, image)
     expected = image * (result.mean() / image.mean())
     law = "all channels of a flat coloured image get the same gain"
-    compare_with_law("assert_colour", law, result, expected, error)
+    compare_with_law(law, result, expected, error)
 
 
 def grey(subject: Subject, limit: float) -> None:
@@ -139,7 +135,7 @@ def grey(subject: Subject, limit: float) -> None:
     result, error = subject.probe.apply(subject.bloom, image)
     expected = np.broadcast_to(result.mean(axis=2, keepdims=True), result.shape)
     law = "the bloom of a grey image is grey: all channels spread alike"
-    compare_with_law("assert_grey", law, result, expected, 2 * error)
+    compare_with_law(law, result, expected, 2 * error)
 
 
 def channels(subject: Subject, limit: float) -> None:
@@ -151,7 +147,7 @@ def channels(subject: Subject, limit: float) -> None:
         result, error = probe.apply(subject.bloom, image)
         expected = np.where(np.arange(3) == channel, result, dark)
         law = f"the bloom of light in channel {channel} is in channel {channel}"
-        compare_with_law("assert_channels", law, result, expected, error + dark_error)
+        compare_with_law(law, result, expected, error + dark_error)
 
 
 def stability(subject: Subject, limit: Mapping[str, float]) -> None:
@@ -197,7 +193,7 @@ def finite(subject: Subject, limit: float) -> None:
             reached[y, x] = False
             count = int(reached.sum())
             text = f"{value} at x {x}, y {y} reaches {count} other pixels of the {name}: "
-            judge("assert_finite", law, (name, count, limit, f"{text}{limit:g} allowed"))
+            judge(law, (name, count, limit, f"{text}{limit:g} allowed"))
 
 
 def _not_finite(result: Any) -> NDArray[np.bool_]:
@@ -211,11 +207,7 @@ def reference(subject: Subject, limit: float) -> None:
     law = "each framebuffer is that of the reference"
     end = f"of its largest value, {limit:g} allowed"
     result = subject.reference.items()
-    judge(
-        "assert_reference",
-        law,
-        *((name, off, limit, f"{name} is off by {off:.3g} {end}") for name, off in result),
-    )
+    judge(law, *((name, off, limit, f"{name} is off by {off:.3g} {end}") for name, off in result))
 
 
 def shift_explained(subject: Subject, why: str) -> str:
@@ -224,8 +216,7 @@ def shift_explained(subject: Subject, why: str) -> str:
     # All positions of a period at once: a square whose side is a multiple of it.
     side = 2 ** int(math.log2(max(1, min(probe.size) // 4)))
     left, top = ((length - side) // 2 for length in probe.size)
-    square = probe.flat(0.0)
-    square[top : top + side, left : left + side] = probe.value
+    square = probe.point((left, top), probe.value, (side, side))
     lit = probe.apply(bloom, square)[0] - probe.apply(bloom, probe.flat(0.0))[0]
     mean = np.subtract(_centroid(lit), _centroid(square))
     parts = []

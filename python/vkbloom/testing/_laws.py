@@ -9,22 +9,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Literal
+from typing import Final, Literal
 
 import numpy as np
 
 from vkbloom._argument_types import FUNCTION, NAMES, checked, checked_as
 from vkbloom._checks import check_number
 from vkbloom.testing._deviations import compare_with_law
-from vkbloom.testing._probe import Bloom, Image, Probe
+from vkbloom.testing._probe import DEFAULT, Bloom, Image, Probe
 
 __tracebackhide__ = True
 
-_DEFAULT = Probe()
+_SWAPPED: Final = {"x": "left and right", "y": "top and bottom", "xy": "rows and columns"}
 
 
 @checked
-def assert_superposition(bloom: Bloom, probe: Probe = _DEFAULT) -> None:
+def assert_superposition(bloom: Bloom, probe: Probe = DEFAULT) -> None:
     """Assert that the bloom of a mixture of two images is the mixture of their blooms.
 
     The law: B(a / 2 + b / 4) = B(a) / 2 + B(b) / 4, for two images of noise. This is linearity:
@@ -36,13 +36,9 @@ def assert_superposition(bloom: Bloom, probe: Probe = _DEFAULT) -> None:
     whole, whole_error = probe.apply(bloom, a / 2 + b / 4)
     of_a, error_a = probe.apply(bloom, a)
     of_b, error_b = probe.apply(bloom, b)
-    compare_with_law(
-        "assert_superposition",
-        "B(a / 2 + b / 4) = B(a) / 2 + B(b) / 4",
-        whole,
-        of_a / 2 + of_b / 4,
-        whole_error + error_a / 2 + error_b / 4,
-    )
+    law = "B(a / 2 + b / 4) = B(a) / 2 + B(b) / 4"
+    allowed = whole_error + error_a / 2 + error_b / 4
+    compare_with_law(law, whole, of_a / 2 + of_b / 4, allowed)
 
 
 @checked_as(glow=FUNCTION)
@@ -50,7 +46,7 @@ def assert_additive(
     bloom: Bloom,
     glow: Bloom | None = None,
     intensity: float = 1.0,
-    probe: Probe = _DEFAULT,
+    probe: Probe = DEFAULT,
 ) -> None:
     """Assert that an image with bloom is the image plus the bloom.
 
@@ -75,26 +71,16 @@ def assert_additive(
     image = probe.noise(0, probe.value)
     picture, error = probe.apply(bloom, image)
     if glow is None:
-        compare_with_law(
-            "assert_additive",
-            "F(a) >= a: light is added, and none is removed",
-            picture,
-            np.maximum(picture, image),
-            error,
-        )
+        law = "F(a) >= a: light is added, and none is removed"
+        compare_with_law(law, picture, np.maximum(picture, image), error)
         return
     light, light_error = probe.apply(glow, image)
-    compare_with_law(
-        "assert_additive",
-        f"F(a) = a + {intensity:g} G(a)",
-        picture,
-        image + intensity * light,
-        error + intensity * light_error,
-    )
+    law = f"F(a) = a + {intensity:g} G(a)"
+    compare_with_law(law, picture, image + intensity * light, error + intensity * light_error)
 
 
 @checked
-def assert_gain(bloom: Bloom, gain: float, probe: Probe = _DEFAULT) -> None:
+def assert_gain(bloom: Bloom, gain: float, probe: Probe = DEFAULT) -> None:
     """Assert the gain of flat images.
 
     The law: B(v) = gain * v at every pixel, for flat images of v = `probe.value`, half and a
@@ -114,19 +100,14 @@ def assert_gain(bloom: Bloom, gain: float, probe: Probe = _DEFAULT) -> None:
     for part in (1.0, 0.5, 0.25):
         image = _divisible_by_four(probe, probe.flat(probe.value)) * part
         result, error = probe.apply(bloom, image)
-        compare_with_law(
-            "assert_gain",
-            f"B(v) = {gain:.6g} v, for a flat image of v = {image.flat[0]:.6g}",
-            result,
-            gain * image,
-            error,
-        )
+        law = f"B(v) = {gain:.6g} v, for a flat image of v = {image.flat[0]:.6g}"
+        compare_with_law(law, result, gain * image, error)
 
 
 @checked_as(axes=NAMES)
 def assert_symmetric(
     bloom: Bloom,
-    probe: Probe = _DEFAULT,
+    probe: Probe = DEFAULT,
     *,
     axes: Sequence[Literal["x", "y", "xy"]] = ("x", "y"),
 ) -> None:
@@ -146,21 +127,15 @@ def assert_symmetric(
     image = probe.noise(0, probe.value)
     result, error = probe.apply(bloom, image)
     for axis in axes:
-        if axis not in ("x", "y", "xy"):
-            raise ValueError(f"axes: {axis!r} is not one of x, y, xy")
+        if axis not in _SWAPPED:
+            raise ValueError(f"axes: {axis!r} is not one of {', '.join(_SWAPPED)}")
         mirrored, mirrored_error = probe.apply(bloom, _mirrored(image, axis))
-        law = {
-            "x": "left and right swapped before or after the bloom are the same",
-            "y": "top and bottom swapped before or after the bloom are the same",
-            "xy": "rows and columns swapped before or after the bloom are the same",
-        }[axis]
-        compare_with_law(
-            "assert_symmetric", law, _mirrored(mirrored, axis), result, error + mirrored_error
-        )
+        law = f"{_SWAPPED[axis]} swapped before or after the bloom are the same"
+        compare_with_law(law, _mirrored(mirrored, axis), result, error + mirrored_error)
 
 
 @checked
-def assert_no_ringing(bloom: Bloom, probe: Probe = _DEFAULT) -> None:
+def assert_no_ringing(bloom: Bloom, probe: Probe = DEFAULT) -> None:
     """Assert that the bloom of an edge has no dark or bright line beside the edge.
 
     The law: across a step from black to `probe.value`, along x and along y, values do not decrease.
@@ -176,36 +151,23 @@ def assert_no_ringing(bloom: Bloom, probe: Probe = _DEFAULT) -> None:
     """
     dark, dark_error = probe.apply(bloom, probe.flat(0.0))
     bright, bright_error = probe.apply(bloom, probe.flat(probe.value))
-    width, height = probe.size
-    for axis, across, lit in (
-        (1, "x", (slice(None), slice(width // 2, None))),
-        (0, "y", (slice(height // 2, None), slice(None))),
-    ):
-        step = probe.flat(0.0)
-        step[lit] = probe.value
+    x, y = probe.centre
+    for axis, across, first in ((1, "x", (x, 0)), (0, "y", (0, y))):
+        step = probe.point(first, probe.value, probe.size)
         result, error = probe.apply(bloom, step)
-        compare_with_law(
-            "assert_no_ringing",
-            f"a step along {across} stays between the bloom of black and of the flat image",
-            result,
-            np.clip(result, dark, bright),
-            error + max(dark_error, bright_error),
-        )
+        law = f"a step along {across} stays between the bloom of black and of the flat image"
+        allowed = error + max(dark_error, bright_error)
+        compare_with_law(law, result, np.clip(result, dark, bright), allowed)
         # The running maximum. No later value may be lower.
-        compare_with_law(
-            "assert_no_ringing",
-            f"along {across}, values only rise across a step from black to bright",
-            result,
-            np.maximum.accumulate(result, axis=axis),
-            2 * error,
-        )
+        law = f"along {across}, values only rise across a step from black to bright"
+        compare_with_law(law, result, np.maximum.accumulate(result, axis=axis), 2 * error)
 
 
 @checked
 def assert_bounded_fireflies(
     bloom: Bloom,
     limit: float = 1.0,
-    probe: Probe = _DEFAULT,
+    probe: Probe = DEFAULT,
     *,
     brightness: Sequence[float] = (10.0, 1e3, 6e4),
     period: int = 2,
@@ -243,14 +205,9 @@ def assert_bounded_fireflies(
         for position in ((left + x, top + y) for y in range(period) for x in range(period)):
             image = probe.point(position, light)
             result, error = probe.apply(bloom, image, exempt=position)
-            compare_with_law(
-                "assert_bounded_fireflies",
-                f"a pixel of {light:g} at x {position[0]}, y {position[1]} brightens others by "
-                f"{limit:g} at most",
-                result,
-                np.minimum(result, dark + limit),
-                error + dark_error,
-            )
+            place = f"a pixel of {light:g} at x {position[0]}, y {position[1]}"
+            law = f"{place} brightens others by {limit:g} at most"
+            compare_with_law(law, result, np.minimum(result, dark + limit), error + dark_error)
 
 
 def _divisible_by_four(probe: Probe, image: Image) -> Image:

@@ -18,11 +18,10 @@ from vkbloom._settings.settings import Settings
 from vkbloom._views.plain_values import plain
 from vkbloom.psf._sampled import samples
 from vkbloom.testing._law_report import LawReport
-from vkbloom.testing._point_spread import border_share
+from vkbloom.testing._point_spread import border_share, veiling_glare_index
 from vkbloom.testing._probe import Bloom, Probe
 from vkbloom.testing._programs import COARSE_ERROR, Program
 from vkbloom.testing._subject import Subject, fitting_probe
-from vkbloom.testing._veiling_glare import veiling_glare_index
 
 Array = NDArray[np.float64]
 
@@ -174,12 +173,14 @@ def spread_of(array: Array, probe: Probe) -> dict[str, Any]:
     radii = np.concatenate([[0.0], np.geomspace(1.0, max(probe.size), 33)])
     fine = np.arange(0.0, max(probe.size), 0.5)
     shares = psf.encircled_energy(fine).mean(axis=1) / energy if energy > 0 else np.zeros(len(fine))
-    within = {"r50": np.flatnonzero(shares >= 0.5), "r90": np.flatnonzero(shares >= 0.9)}
+
+    def radius(share: float) -> float:
+        inside = fine[shares >= share]
+        return float(inside[0]) if inside.size else math.nan
+
     of_psf = {
-        **{
-            name: float(fine[inside[0]]) if inside.size else math.nan
-            for name, inside in within.items()
-        },
+        "r50": radius(0.5),
+        "r90": radius(0.9),
         "peak": float(array.max()),
         "at_border": border_share(array),
         "radii": radii,

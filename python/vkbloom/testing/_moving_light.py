@@ -205,12 +205,8 @@ def assert_stable(
 def check_stable(figures: Stability, limits: Mapping[str, float], probe: Probe) -> None:
     """Raise AssertionError if a figure is above its limit, ValueError if light is cut off."""
     if not figures.energy.max() > 0:
-        fail(
-            "assert_stable",
-            "the bloom of a light is not black",
-            f"the largest sum of the bloom is {figures.energy.max():.3g}: only sums above 0 are "
-            "allowed",
-        )
+        text = f"the largest sum of the bloom is {figures.energy.max():.3g}: only sums above 0 are "
+        fail("the bloom of a light is not black", f"{text}allowed")
     check_inside(figures.at_border, probe.size)
     change = "changes by {:.3g} of its mean"
     shown = {
@@ -228,7 +224,7 @@ def check_stable(figures: Stability, limits: Mapping[str, float], probe: Probe) 
         text = f"the {what} of the bloom {how.format(off)}, {_extremes(figures, values)}"
         measured.append((name, off, limit, f"{text}: {limit:.3g} allowed"))
     law = "the bloom stays the same while a light smaller than a pixel moves"
-    judge("assert_stable", law, *measured)
+    judge(law, *measured)
 
 
 def area_sampled(

@@ -99,10 +99,13 @@ class Probe:
         """Return an image of one value."""
         return np.full((self.size[1], self.size[0], self.colours), value)
 
-    def point(self, position: tuple[int, int], value: float) -> Image:
-        """Return a black image with one lit pixel at (x, y)."""
+    def point(
+        self, position: tuple[int, int], value: float, sides: tuple[int, int] = (1, 1)
+    ) -> Image:
+        """Return a black image with one lit pixel at (x, y), or a rectangle from there on."""
+        (x, y), (width, height) = position, sides
         image = self.flat(0.0)
-        image[position[1], position[0]] = value
+        image[y : y + height, x : x + width] = value
         return image
 
     def noise(self, index: int, highest: float) -> Image:
@@ -175,6 +178,10 @@ class Probe:
     def _real(array: NDArray[Any]) -> Image:
         values: Image = array.astype(np.float64)
         return values / np.iinfo(array.dtype).max if array.dtype.kind == "u" else values
+
+
+#: The probe of assertions that are given none.
+DEFAULT: Final = Probe()
 
 
 def small_probe(probe: Probe) -> Probe:

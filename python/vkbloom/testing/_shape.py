@@ -11,14 +11,14 @@ import numpy as np
 
 from vkbloom._argument_types import checked
 from vkbloom._checks import check_number
+from vkbloom.reference._glare import texels_at
 from vkbloom.testing._deviations import NotTaken, fail, figure, is_within, judge
 from vkbloom.testing._moving_light import moments
 from vkbloom.testing._point_spread import border_share, check_inside, point_spread
-from vkbloom.testing._probe import Bloom, Image, Probe, beside_multiple
+from vkbloom.testing._probe import DEFAULT, Bloom, Image, Probe, beside_multiple
 
 __tracebackhide__ = True
 
-_DEFAULT = Probe()
 #: Shares of the peak whose contours are measured.
 LEVELS: Final = (0.5, 0.1, 0.01)
 #: Limits of the change from one size to the next: width and energy as shares, centroid in pixels.
@@ -52,9 +52,8 @@ def _contours(spread: Image) -> dict[float, float]:
     most = min(x, y, plane.shape[1] - 1 - x, plane.shape[0] - 1 - y)
     steps = np.arange(0.0, most, 0.125)
     angles = np.arange(_ANGLES) * (2 * math.pi / _ANGLES)
-    rays = _bilinear(
-        plane, x + np.outer(np.cos(angles), steps), y + np.outer(np.sin(angles), steps)
-    )
+    columns, rows = x + np.outer(np.cos(angles), steps), y + np.outer(np.sin(angles), steps)
+    rays = texels_at(plane[..., np.newaxis], columns, rows)[..., 0]
     results = {}
     for level in LEVELS:
         above = rays >= level * peak
@@ -69,7 +68,7 @@ def _contours(spread: Image) -> dict[float, float]:
 
 
 @checked
-def assert_round(bloom: Bloom, probe: Probe = _DEFAULT, *, limit: float = 1.35) -> None:
+def assert_round(bloom: Bloom, probe: Probe = DEFAULT, *, limit: float = 1.35) -> None:
     """Assert that the bloom of a pixel is round.
 
     The law: of the contours at 1/2, 1/10 and 1/100 of the peak, the greatest distance from the
@@ -93,21 +92,17 @@ def check_round(spread: Image, limit: float) -> None:
     if not ratios:
         raise NotTaken("probe: no contour is inside of the image and three pixels from the middle")
     law = "the contours of the bloom of a pixel are circles"
-    text = "of the peak, the contour is {:.3g} times as far in one direction as in another"
-    allowed = f": {limit:.3g} allowed"
-    judge(
-        "assert_round",
-        law,
-        *(
-            (f"round_{level:g}", ratio, limit, f"at {level:g} {text.format(ratio)}{allowed}")
-            for level, ratio in ratios.items()
-        ),
-    )
+    measured = []
+    for level, ratio in ratios.items():
+        text = f"at {level:g} of the peak, the contour is {ratio:.3g} times as far in one direction"
+        text += f" as in another: {limit:.3g} allowed"
+        measured.append((f"round_{level:g}", ratio, limit, text))
+    judge(law, *measured)
 
 
 @checked
 def assert_sizes(
-    bloom: Bloom, probe: Probe = _DEFAULT, *, limits: Mapping[str, float] | None = None
+    bloom: Bloom, probe: Probe = DEFAULT, *, limits: Mapping[str, float] | None = None
 ) -> None:
     """Assert that a bloom is nearly the same in images whose sizes differ by a few pixels.
 
@@ -148,7 +143,7 @@ def check_sizes(bloom: Bloom, probe: Probe, dark: float, allowed: Mapping[str, f
             break
     else:
         check_inside(share, side, _OUTERMOST)
-    fail("assert_sizes", _SIZES, "; ".join(reasons.values()))
+    fail(_SIZES, "; ".join(reasons.values()))
 
 
 def _compare_sizes(
@@ -205,29 +200,13 @@ def _square_figures(
     bloom: Bloom, probe: Probe, at: tuple[int, int], dark: float
 ) -> tuple[float, float, float, float, float]:
     """Return width, energy, shift along x and y, and share at the border of a square's bloom."""
-    image = probe.flat(0.0)
-    left, top = at
-    image[top : top + _SQUARE, left : left + _SQUARE] = probe.value
+    image = probe.point(at, probe.value, (_SQUARE, _SQUARE))
     lit = probe.apply(bloom, image)[0].mean(axis=2) - dark
     energy, position, variance = moments(lit)
     if not energy > 0:
-        fail("assert_sizes", "the bloom of a square is not black", f"its energy is {energy:.3g}")
+        fail("the bloom of a square is not black", f"its energy is {energy:.3g}")
     middle = (_SQUARE - 1) / 2
     squared = variance - 2 * (_SQUARE**2 - 1) / 12
     figure("squared_width", squared)
-    shift = np.subtract(position, (left, top)) - middle
+    shift = np.subtract(position, at) - middle
     return math.sqrt(max(squared, 0.0)), energy, shift[0], shift[1], border_share(lit)
-
-
-def _bilinear(plane: Image, x: Image, y: Image) -> Image:
-    """Return the values between pixels, for positions inside of the image."""
-    left, top = (np.floor(positions).astype(np.intp) for positions in (x, y))
-    right, below = (
-        np.minimum(first + 1, side - 1)
-        for first, side in zip((left, top), plane.shape[::-1], strict=True)
-    )
-    part, down = x - left, y - top
-    upper = plane[top, left] * (1 - part) + plane[top, right] * part
-    lower = plane[below, left] * (1 - part) + plane[below, right] * part
-    values: Image = upper * (1 - down) + lower * down
-    return values
