@@ -25,7 +25,7 @@ SOURCE = Path(__file__).with_name("lesser_device.c")
 pytestmark = [
     pytest.mark.skipif(
         "VKBLOOM_SANITIZED" in os.environ, reason="another process, whose core is not sanitized"
-    ),
+    )
 ]
 
 LESS_WORK = ("whole", "smaller", "pyramid", "gathered", "handles", "bands")

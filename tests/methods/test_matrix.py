@@ -14,14 +14,7 @@ from numpy.typing import NDArray
 from tests.conftest import SANITIZED
 from tests.exhaustive import EXHAUSTIVE, by_turns
 from tests.images import hdr_picture
-from tests.methods.cases import (
-    DTYPES,
-    GIVEN,
-    METHODS,
-    OTHERS,
-    WHOLE,
-    presets_of_low_levels,
-)
+from tests.methods.cases import DTYPES, GIVEN, METHODS, OTHERS, WHOLE, presets_of_low_levels
 from tests.tolerance import assert_matches_reference
 from vkbloom import (
     Convolution,

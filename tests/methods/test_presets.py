@@ -78,7 +78,7 @@ STAGES = (Streaks(directions=3, iterations=2), Ghosts(), Halo())
 
 @pytest.mark.parametrize(
     "settings",
-    [*(LOW[name] for name in PUBLISHED), *(Pyramid(glare=stage) for stage in STAGES)],
+    [*(LOW[name] for name in PUBLISHED), *(Pyramid(glare=(stage,)) for stage in STAGES)],
     ids=[*PUBLISHED, *(stage.stage for stage in STAGES)],
 )
 def test_nan_and_infinity_are_not_spread(renderer: Renderer, settings: Settings) -> None:
