@@ -1,6 +1,5 @@
 #include "vulkan/instance.h"
 
-#include "vulkan/driver.h"
 #include "vulkan/messages.h"
 #include "vulkan/parts.h"
 #include "vulkan/process.h"
@@ -8,6 +7,8 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+
+#include <dlfcn.h>
 
 #define VALIDATION_LAYER "VK_LAYER_KHRONOS_validation"
 
@@ -72,13 +73,47 @@ static bool check_created(VkResult result, bool direct, struct vkb_error *error)
     return false;
 }
 
+// Drivers keep the lowest version that was ever negotiated, and a loader opens a single driver
+// (VK_LUNARG_direct_driver_loading, for validation) of version 7 alone.
+enum { INTERFACE_VERSION = 7 };
+
+typedef VkResult(VKAPI_PTR *negotiate_function)(uint32_t *version);
+
+// The function that gives a driver's others, which is entered without the loader, by the interface
+// that the loader uses; NULL on failure. The library stays open.
+// Source: the Vulkan loader's documentation, LoaderDriverInterface.md.
+static PFN_vkGetInstanceProcAddr open_driver(const char *path, struct vkb_error *error)
+{
+    uint32_t version = INTERFACE_VERSION;
+    void *library = dlopen(path, RTLD_NOW | RTLD_LOCAL);
+
+    if (!library) {
+        const char *reason = dlerror();
+        vkb_fail(error, VKB_ERROR_ADAPTER_NOT_FOUND, "the driver %s does not open: %s", path,
+                 reason ? reason : "no reason is given");
+        return NULL;
+    }
+    negotiate_function negotiate =
+        (negotiate_function)dlsym(library, "vk_icdNegotiateLoaderICDInterfaceVersion");
+    PFN_vkGetInstanceProcAddr get =
+        (PFN_vkGetInstanceProcAddr)dlsym(library, "vk_icdGetInstanceProcAddr");
+    if (!negotiate || !get) {
+        vkb_fail(error, VKB_ERROR_ADAPTER_NOT_FOUND,
+                 "%s is no Vulkan driver: it lacks vk_icdGetInstanceProcAddr or "
+                 "vk_icdNegotiateLoaderICDInterfaceVersion",
+                 path);
+        return NULL;
+    }
+    return VK(error, negotiate(&version)) ? get : NULL;
+}
+
 // Finds the functions that need no instance: those of the loader, or without validation those of
 // the driver itself.
 static bool open_source(struct vkb_instance *instance, PFN_vkGetInstanceProcAddr *driver,
                         struct vkb_error *error)
 {
     *driver = NULL;
-    if (instance->driver[0] && !(*driver = vkb_driver_open(instance->driver, error)))
+    if (instance->driver[0] && !(*driver = open_driver(instance->driver, error)))
         return false;
     if (*driver && !instance->validation) {
         instance->get = *driver;

@@ -164,10 +164,10 @@ def test_a_worker_with_another_driver_or_version_is_refused(
 ) -> None:
     """As if the grid were laid out on another machine than the workers."""
     lay_out = cluster.lay_out_there
-    changes: Any = {what: other}
 
     def laid_out_elsewhere(*arguments: Any) -> Any:
-        return replace(lay_out(*arguments), **changes)
+        layout = lay_out(*arguments)
+        return replace(layout, origin={**layout.origin, what: other})
 
     monkeypatch.setattr(cluster, "lay_out_there", laid_out_elsewhere)
     software = next(one for one in vkbloom.adapters() if one.type == "cpu")

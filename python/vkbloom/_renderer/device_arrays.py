@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple, NoReturn
 import numpy as np
 
 from vkbloom import _core
-from vkbloom._checks import on_another_device
+from vkbloom._checks import device_kind, on_another_device
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -190,8 +190,8 @@ def merged(images: Iterable[DeviceArray]) -> list[DeviceArray]:
 
 
 def on_host(array: Any) -> NDArray[Any]:
-    """Return a framebuffer as an array of NumPy, copied if it is on the device."""
-    return array.numpy() if isinstance(array, DeviceArray) else array
+    """Return an array of NumPy, copied if it is on the device."""
+    return array.numpy() if isinstance(array, DeviceArray | ImportedArray) else array
 
 
 def place_of(array: object) -> Destination:
@@ -238,13 +238,7 @@ def placed(
 
 def on_cuda(image: object) -> bool:
     """Return whether an object is an array in the memory of a GPU with CUDA."""
-    if isinstance(image, np.ndarray):
-        return False
-    try:
-        kind = int(image.__dlpack_device__()[0])  # type: ignore[attr-defined]
-    except Exception:  # whatever a foreign object raises; a later use of it tells more
-        return False
-    return kind in (_CUDA, _CUDA_MANAGED)
+    return not isinstance(image, np.ndarray) and device_kind(image) in (_CUDA, _CUDA_MANAGED)
 
 
 def likeness(image: Any) -> NDArray[Any]:
