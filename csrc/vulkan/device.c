@@ -220,20 +220,28 @@ static bool stores_all(const struct vkb_device *device)
 // A thread of lavapipe with memory for its allocations, twice.
 enum { DEVICE_MIB = 192 };
 
-static bool open_adapter(struct vkb_device *device, uint32_t number, const char *driver,
-                         bool validation, struct vkb_error *error)
+static bool find_adapter(struct vkb_device *device, uint32_t number, struct vkb_error *error)
 {
     struct vkb_adapter_info adapters[VKB_MAX_ADAPTERS];
     uint32_t count;
 
-    if (!(device->instance = vkb_instance_open(driver, validation, error))
-        || !vkb_adapters_list(device->instance, adapters, &count, error))
+    if (!vkb_adapters_list(device->instance, adapters, &count, error))
         return false;
     if (number >= count)
         return vkb_fail(error, VKB_ERROR_ADAPTER_NOT_FOUND,
                         "no Vulkan adapter %u: there are %u. %s", number, count, vkb_install_hint);
     device->adapter = adapters[number];
     return true;
+}
+
+static bool open_adapter(struct vkb_device *device, uint32_t number, const char *driver,
+                         bool validation, struct vkb_error *error)
+{
+    if (!(device->instance = vkb_instance_open(driver, validation, error))
+        || !find_adapter(device, number, error))
+        return false;
+    return device->adapter.driver_id != VK_DRIVER_ID_MESA_LLVMPIPE
+        || (vkb_instance_claim(&device->instance, error) && find_adapter(device, number, error));
 }
 
 static bool create_handle(struct vkb_device *device, uint32_t adapter, const char *driver,
@@ -443,4 +451,39 @@ bool vkb_device_wait_idle(struct vkb_device *device, struct vkb_error *error)
     const bool done = device->idle_pending && finish_idle(device, error)
                    && VK(error, device->vk.vkQueueWaitIdle(device->queue));
     return remember_loss(device, done, error);
+}
+
+bool vkb_timeline_export(const struct vkb_device *device, VkSemaphore *semaphore, int *descriptor,
+                         struct vkb_error *error)
+{
+    const struct VolkDeviceTable *vk = &device->vk;
+    const VkExportSemaphoreCreateInfo exported = {
+        .sType = VK_STRUCTURE_TYPE_EXPORT_SEMAPHORE_CREATE_INFO,
+        .handleTypes = VK_EXTERNAL_SEMAPHORE_HANDLE_TYPE_OPAQUE_FD_BIT,
+    };
+    const VkSemaphoreTypeCreateInfo timeline = {
+        .sType = VK_STRUCTURE_TYPE_SEMAPHORE_TYPE_CREATE_INFO,
+        .pNext = &exported,
+        .semaphoreType = VK_SEMAPHORE_TYPE_TIMELINE,
+    };
+
+    *semaphore = VK_NULL_HANDLE;
+    if (VK(error, vk->vkCreateSemaphore(device->handle,
+                                        &(VkSemaphoreCreateInfo){
+                                            .sType = VK_STRUCTURE_TYPE_SEMAPHORE_CREATE_INFO,
+                                            .pNext = &timeline,
+                                        },
+                                        NULL, semaphore))
+        && VK(error, vk->vkGetSemaphoreFdKHR(
+                         device->handle,
+                         &(VkSemaphoreGetFdInfoKHR){
+                             .sType = VK_STRUCTURE_TYPE_SEMAPHORE_GET_FD_INFO_KHR,
+                             .semaphore = *semaphore,
+                             .handleType = VK_EXTERNAL_SEMAPHORE_HANDLE_TYPE_OPAQUE_FD_BIT,
+                         },
+                         descriptor)))
+        return true;
+    vk->vkDestroySemaphore(device->handle, *semaphore, NULL);
+    *semaphore = VK_NULL_HANDLE;
+    return false;
 }
