@@ -240,7 +240,7 @@ TRANSPOSED: tuple[tuple[str, Any, tuple[int, ...], str, tuple[str, ...]], ...] =
         DualKawase(levels=1, threshold=0.5, tonemap="aces"),
         (8, 32, 3),
         "f4",
-        (CURVED, TAPS),
+        (CURVED, TAPS, TAPS),
     ),
     ("cpu", Pyramid(levels=2, composite="mix", exposure=0.5), (35, 62, 3), "f4", (TAPS,) * 6),
 )
