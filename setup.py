@@ -35,6 +35,11 @@ SHIPPED = Path("spirv")
 # Beside the modules: the digest of their sources, and the programs' versions.
 MADE = "made.json"
 STAGES = (".vert", ".frag", ".comp")
+# What all shaders begin with.
+PREAMBLE = """#version 450
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_control_flow_attributes : require
+"""
 # Python without the GIL has no stable ABI: a core for that version alone.
 LIMITED = not sysconfig.get_config_var("Py_GIL_DISABLED")
 # A wheel without the core, for systems that it is not built for.
@@ -83,39 +88,51 @@ class Module(NamedTuple):
 def modules(shader: Path) -> list[Module]:
     """Return the modules that a shader is compiled to, with those for the images of a batch.
 
-    Adjoints and Fourier transforms run for one image. A shader that includes ended.glsl is
-    also compiled for the adjoint of what it ends with, in single floats.
+    With `#pragma compile WORD` it is also compiled with this word defined, under its name with the
+    word. Adjoints and Fourier transforms run for one image. A shader that includes ended.glsl, with
+    FINAL if it has that word, is also compiled for the adjoint of what it ends with, in single
+    floats.
     """
-    plain = list(plain_modules(shader))
-    adjoints = [
-        Module(name.replace(shader.stem, f"{shader.stem}_mixed"), shader, (*options, "-DMIXED"))
-        for name, _, options in plain
-        if '"lib/ended.glsl"' in shader.read_text()
-        and name.endswith(("_comp", "_linear_rgba32float"))
-    ]
-    if shader.stem.startswith(("adjoint", "fft")):
-        return plain
-    layered = [
-        Module(f"{module.name}_layers", shader, (*module.options, "-DLAYERS"))
-        for module in plain
-        if (shader.suffix == ".comp" or "-DDISPATCH" in module.options)
-        and "-DLINEAR_TEXELS" not in module.options
-    ]
-    return plain + layered + adjoints
+    text = shader.read_text()
+    words = re.findall(r"^#pragma compile ([A-Z]+)$", text, re.MULTILINE)
+    found: list[Module] = []
+    for word in ("", *words):
+        stem = f"{shader.stem}_{word.lower()}" if word else shader.stem
+        ends = '"lib/ended.glsl"' in text and (word == "FINAL" or "FINAL" not in words)
+        defined = (f"-D{word}",) if word else ()
+        plain = [
+            Module(name, shader, (*defined, *options))
+            for name, _, options in plain_modules(shader, stem, ends=ends)
+        ]
+        found += plain
+        if shader.stem.startswith(("adjoint", "fft")):
+            continue
+        found += [
+            Module(f"{module.name}_layers", shader, (*module.options, "-DLAYERS"))
+            for module in plain
+            if (shader.suffix == ".comp" or "-DDISPATCH" in module.options)
+            and "-DLINEAR_TEXELS" not in module.options
+        ]
+        found += [
+            Module(name.replace(stem, f"{stem}_mixed"), shader, (*options, "-DMIXED"))
+            for name, _, options in plain
+            if ends and name.endswith(("_comp", "_linear_rgba32float"))
+        ]
+    return found
 
 
-def plain_modules(shader: Path) -> list[Module]:
+def plain_modules(shader: Path, stem: str, *, ends: bool) -> list[Module]:
     """Return the modules of a shader for one image.
 
     A pass over all pixels has a compute form too. A shader that loads pixels without a sampler
     is compiled for linear texels of each format. Lines of it say more: with `#pragma compile
     floats` it is for single floats alone, with `#pragma compile images` also for storage images.
-    If it calls finished() or ended(), or has `#pragma compile packed`, it can make the caller's
+    If it ends a bloom, calls finished(), or has `#pragma compile packed`, it can make the caller's
     array, and is also compiled for a target of three channels. If it uses SOURCE_CHANNELS, it can
     read the caller's image, and is also compiled for an image of three single floats. If it uses
     TARGET_BYTES, it also loads single floats and stores words of each format.
     """
-    name = shader.name.replace(".", "_")
+    name = f"{stem}{shader.suffix.replace('.', '_')}"
     text = shader.read_text()
     if '#include "variants/pixels.glsl"' in text:
         marks = re.findall(r"^#pragma compile (\w+)$", text, re.MULTILINE)
@@ -133,15 +150,15 @@ def plain_modules(shader: Path) -> list[Module]:
                     "-DCHANNEL_BYTES=4",
                     f"-DTARGET_BYTES={CHANNEL_BYTES[ours]}",
                 )
-                found.append(Module(f"{shader.stem}_stored_linear_{ours}", shader, stored))
+                found.append(Module(f"{stem}_stored_linear_{ours}", shader, stored))
             kinds = [("", ())]
             if "SOURCE_CHANNELS" in text and ours == "rgba32float":
                 kinds.append(("rgb_", ("-DRGB",)))
             for kind, options in kinds:
-                found.append(Module(f"{shader.stem}_linear_{kind}{ours}", shader, linear + options))
-                if re.search(r"\b(finished|ended)\(", text) or "packed" in marks:
+                found.append(Module(f"{stem}_linear_{kind}{ours}", shader, linear + options))
+                if ends or "finished(" in text or "packed" in marks:
                     packed = (*linear, *options, "-DTARGET_CHANNELS=3")
-                    found.append(Module(f"{shader.stem}_packed_{kind}{ours}", shader, packed))
+                    found.append(Module(f"{stem}_packed_{kind}{ours}", shader, packed))
         return found
     if "SOURCE_FORMAT" in text:
         return [
@@ -149,8 +166,7 @@ def plain_modules(shader: Path) -> list[Module]:
             for ours, glsl in FORMATS.items()
         ]
     if '#include "lib/fullscreen.glsl"' in text:
-        dispatch = Module(f"{shader.stem}_dispatch", shader, ("-DDISPATCH", "-S", "comp"))
-        return [Module(name, shader), dispatch]
+        return [Module(name, shader), Module(f"{stem}_dispatch", shader, ("-DDISPATCH",))]
     return [Module(name, shader)]
 
 
@@ -162,10 +178,10 @@ def tool(*names: str, package: str) -> str:
     raise SystemExit(f"{names[0]} is missing; on Debian or Ubuntu: apt install {package}")
 
 
-def run_tool(what: object, *command: str) -> str:
+def run_tool(what: object, *command: str, given: str = "") -> str:
     """Return what a program prints about a shader; end with its output if it fails."""
     piped = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT}
-    result = subprocess.run(command, **piped, text=True, check=False)
+    result = subprocess.run(command, **piped, input=given, text=True, check=False)
     status = result.returncode
     if status == 0:
         return result.stdout
@@ -190,9 +206,11 @@ def optimizer() -> str:
 
 def compile_shader(module: Module, target: Path) -> None:
     """Compile one module, as glslang does, to a file."""
-    options = ["-V", "--target-env", "vulkan1.1", f"-I{SHADERS}", f"-I{LIBRARY}"]
-    files = ("-o", str(target), str(module.shader))
-    run_tool(module.shader, compiler(), *options, *module.options, *files)
+    options = ["-V", "--target-env", "vulkan1.1", f"-I{SHADERS}", f"-I{LIBRARY}", "--stdin"]
+    stage = "comp" if "-DDISPATCH" in module.options else module.shader.suffix.removeprefix(".")
+    text = f'{PREAMBLE}#include "{module.shader.relative_to(SHADERS).as_posix()}"\n'
+    command = (compiler(), *options, "-S", stage, *module.options, "-o", str(target))
+    run_tool(module.shader, *command, given=text)
 
 
 def decorate(target: Path) -> None:

@@ -10,9 +10,16 @@
 #include "graph/plan.h"
 #include "scene/scene.h"
 #include "share/strided_copy.h"
-#include "transfer/in_place.h"
 #include "transfer/resident.h"
 #include "transfer/screen.h"
+
+// Images that passes read where the caller has them, on devices that use the host's memory: without
+// a copy, and so without anything that the next image could be compared with.
+struct vkb_in_place {
+    struct vkb_cached_image cached;  // its image belongs to a submission
+    const void *memory;              // of the last such image; only its address is used
+    struct vkb_non_finite non_finite;
+};
 
 // Everything that is kept from frame to frame. Submissions share it. The device changes it in the
 // order of the submissions, the host only when no submission is pending.
@@ -22,7 +29,6 @@ struct vkb_frame {
     struct vkb_scene scene;
     struct vkb_upload uploads[VKB_INPUT_COUNT];  // by kind
     struct vkb_in_place in_place[VKB_INPUT_COUNT];
-    uint64_t exported[VKB_INPUT_COUNT];  // the serial of what the cached image has; 0: else
     struct vkb_strided_copies strided_copies;
     struct vkb_non_finite non_finite;  // of the inputs of the last submission
     struct vkb_buffer constants;       // staging memory of images that are filled once

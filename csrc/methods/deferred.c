@@ -63,7 +63,8 @@ static bool add_gbuffer(const struct vkb_scene_source *source, const struct vkb_
     row = vkb_scene_row("gbuffer", VKB_GEOMETRY_BODY, &vkb_shader_gbuffer_body_frag, 0, 0, &stored);
     row.constants.emitters = emitters;
     set_targets(gbuffer, &row);
-    if (!vkb_add_mesh(&row, source->body_textured, &vkb_shader_gbuffer_textured_frag, graph, error))
+    if (!vkb_add_mesh(&row, source->body_textured, &vkb_shader_gbuffer_body_textured_frag, graph,
+                      error))
         return false;
     if (glow == VKB_NO_IMAGE)
         return true;

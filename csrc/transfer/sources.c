@@ -1,6 +1,7 @@
 #include "transfer/sources.h"
 
 #include "share/exported_images.h"
+#include "transfer/readback.h"
 
 void vkb_run_set_image(struct vkb_run *run, uint32_t image, struct vkb_cached_image *cached)
 {
@@ -18,18 +19,17 @@ struct vkb_image_row vkb_run_row(const struct vkb_run *run, uint32_t image)
 
 bool vkb_run_resolve(struct vkb_run *run, uint32_t image, struct vkb_error *error)
 {
-    const struct vkb_image_row wanted = vkb_run_row(run, image), *row = &wanted;
+    const struct vkb_image_row row = vkb_run_row(run, image);
     struct vkb_image_cache *cache = &run->frame->cache;
-    struct vkb_cached_image *cached;
+    struct vkb_cached_image *cached = run->inputs[row.input].image;
 
-    if (run->inputs[row->input].image) {
-        vkb_run_set_image(run, image, run->inputs[row->input].image);
-        return true;
-    }
-    if ((vkb_image_cache_replaces(cache, row)
-         && !vkb_submissions_wait(run->device, &run->frame->submissions, error))
-        || !vkb_image_cache_resolve(run->device, cache, row, &cached, error))
+    if (!cached)
+        cached = vkb_image_cache_find(cache, &row);
+    if (!cached
+        && (!vkb_submissions_wait(run->device, &run->frame->submissions, error)
+            || !(cached = vkb_image_cache_add(run->device, cache, &row, error))))
         return false;
+    cached->used = cache->now;
     vkb_run_set_image(run, image, cached);
     return true;
 }
@@ -105,6 +105,70 @@ static void end_resident(const struct vkb_frame_source *source, struct vkb_stage
         staged->image->image.access = staged->access;
 }
 
+static size_t row_size(const struct vkb_input *input)
+{
+    return (size_t)input->width * input->channels * vkb_formats[input->format].channel_size;
+}
+
+// Whether the rows consist of whole words.
+static bool has_words(const struct vkb_device *device, const struct vkb_input *input)
+{
+    const size_t pitch = (size_t)input->row_stride;
+
+    return vkb_input_is_contiguous(input) && input->row_stride > 0 && pitch >= row_size(input)
+        && pitch % VKB_WORD_SIZE == 0 && row_size(input) % VKB_WORD_SIZE == 0
+        && pitch / VKB_WORD_SIZE * input->height <= device->limits.maxTexelBufferElements;
+}
+
+struct counting {
+    const struct vkb_input *input;
+    struct vkb_non_finite sums[VKB_MAX_PARTS];
+};
+
+static void count_part(void *context, uint32_t part, uint32_t first, uint32_t end)
+{
+    struct counting *counting = context;
+    const struct vkb_input *input = counting->input;
+
+    for (uint32_t y = first; y < end; ++y)
+        vkb_add_non_finite(&counting->sums[part],
+                           vkb_count_non_finite(input->format, vkb_input_row(input, y),
+                                                (size_t)input->width * input->channels));
+}
+
+// Makes place->cached an image over the input's memory, with a new version. The submission destroys
+// the image when the device has read it. False if passes cannot read words of this memory. Also
+// false for the array that was read last: it may have the same pixels again, so it is worth a copy,
+// with which it is compared from then on.
+static bool borrow(const struct vkb_device *device, struct vkb_in_place *place,
+                   const struct vkb_input *input, uint64_t *clock)
+{
+    const size_t size = row_size(input) * input->height;
+    struct counting counting = {.input = input};
+    struct vkb_image image = {
+        .format = input->format,
+        .width = input->width,
+        .height = input->height,
+        .channels = input->channels,
+        // Passes only read it.
+        .mapped = (void *)(uintptr_t)input->memory,
+        .row_pitch = (size_t)input->row_stride,
+    };
+
+    if (!device->linear_texels || size < VKB_IMPORTED_BYTES || input->memory == place->memory
+        || !has_words(device, input) || !vkb_image_borrow(device, row_size(input), &image))
+        return false;
+    vkb_in_parts(device->workers, count_part, NULL, &counting, 0, input->height, size);
+    place->non_finite = (struct vkb_non_finite){0};
+    for (int part = 0; part < VKB_MAX_PARTS; ++part)
+        vkb_add_non_finite(&place->non_finite, counting.sums[part]);
+    place->memory = input->memory;
+    place->cached.image = image;
+    place->cached.content.version = ++*clock;
+    place->cached.content.valid = true;
+    return true;
+}
+
 static bool stage_in_place(struct vkb_run *run, const struct pixels *pixels, bool *taken,
                            struct vkb_error *error)
 {
@@ -117,7 +181,7 @@ static bool stage_in_place(struct vkb_run *run, const struct pixels *pixels, boo
     for (uint32_t i = 0; i < pixels->request_count; ++i)
         if (!allows_in_place(&pixels->requests[i], pixels->image, input))
             return true;
-    *taken = vkb_in_place_stage(run->device, place, input, &run->frame->cache.clock);
+    *taken = borrow(run->device, place, input, &run->frame->cache.clock);
     if (!*taken)
         return true;
     run->inputs[pixels->kind].image = &place->cached;
@@ -131,7 +195,6 @@ static bool stage_exported(struct vkb_run *run, const struct pixels *pixels, boo
 {
     const struct vkb_input *input = pixels->source->inputs[pixels->kind];
     struct vkb_staged_input *staged = &run->inputs[pixels->kind];
-    uint64_t *held = &run->frame->exported[pixels->kind];
 
     *taken = input && input->exported;
     if (!*taken)
@@ -142,15 +205,12 @@ static bool stage_exported(struct vkb_run *run, const struct pixels *pixels, boo
     vkb_export_wait(input->exported, &run->sync.waits[VKB_EXTERNAL_CUDA]);
     staged->image = run->images[pixels->image];
     staged->input = input;
-    staged->send = *held != input->serial || !staged->image->content.valid;
+    staged->send =
+        !vkb_content_holds(&staged->image->content, &input->serial, sizeof input->serial);
     run->unknown_non_finite = true;
-    if (!staged->send)
-        return true;
-    // The image no longer has the pixels of the host with which the next ones would be compared.
-    vkb_upload_forget(&run->frame->uploads[pixels->kind]);
-    *held = input->serial;
-    return vkb_content_begin_writing(&staged->image->content, &run->frame->cache.clock, NULL, 0,
-                                     error);
+    return !staged->send
+        || vkb_content_begin_writing(&staged->image->content, &run->frame->cache.clock,
+                                     &input->serial, sizeof input->serial, error);
 }
 
 // Stages the image if the device does not have it yet.
@@ -164,17 +224,17 @@ static bool stage_upload(struct vkb_run *run, const struct pixels *pixels, bool 
     *taken = true;
     if (!vkb_run_resolve(run, pixels->image, error))
         return false;
-    run->frame->exported[pixels->kind] = 0;
     struct vkb_cached_image *image = run->images[pixels->image];
-    // If the last write did not reach the image, there is no content to compare with.
-    if (image->image.mapped && !image->content.valid)
+    // What an upload has written has no recipe. Otherwise there is no content to compare with.
+    const bool held = vkb_content_holds(&image->content, NULL, 0);
+    if (!held)
         vkb_upload_forget(upload);
     if (!vkb_upload_stage(run->device, upload, &run->frame->submissions, run->submission->number,
                           pixels->source->inputs[pixels->kind], &image->image, &changed, error))
         return false;
     staged->image = image;
     staged->upload = upload;
-    staged->send = changed || !image->content.valid;
+    staged->send = changed;
     vkb_add_non_finite(&run->frame->non_finite, upload->non_finite);
     return !staged->send
         || vkb_content_begin_writing(&image->content, &run->frame->cache.clock, NULL, 0, error);

@@ -88,34 +88,30 @@ static void read_linear_of_composite(const struct vkb_variant_choice *choice,
         memcpy(row, &fused, sizeof fused);
 }
 
-bool vkb_add_adjoint_linear(const struct vkb_variant_choice *choice,
-                            const struct vkb_pass_row *pass, bool *fits, struct vkb_error *error)
+bool vkb_add_adjoint_linear(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
 {
     const struct vkb_adjoint_filter_params *params = &pass->params.adjoint_filter;
     struct vkb_pass_row row;
 
-    *fits = pass->block == VKB_BLOCK_adjoint_filter
-         && pass->constants.levels * params->span_x <= MAX_LINEAR && vkb_are_floats(choice, pass);
-    if (!*fits)
-        return true;
+    if (!(pass->block == VKB_BLOCK_adjoint_filter
+          && pass->constants.levels * params->span_x <= MAX_LINEAR && vkb_are_floats(choice, pass)))
+        return false;
     memcpy(&row, pass, sizeof row);
     row.constants.radix_1 = params->span_x;
     row.constants.radix_2 = params->span_y;
     row.gains_if_finite = true;
     read_linear_of_composite(choice, &row);
     vkb_make_linear(&row, &vkb_shader_adjoint_taps_linear_rgba32float, ADJOINT_SIDE, ADJOINT_ROWS);
-    return vkb_graph_add_pass(choice->graph, &row, error);
+    return vkb_add_variant(choice, &row);
 }
 
 // An invocation for all groups of a pixel, which fragments would compute anew for each.
-bool vkb_add_adjoint_groups(const struct vkb_variant_choice *choice,
-                            const struct vkb_pass_row *pass, bool *fits, struct vkb_error *error)
+bool vkb_add_adjoint_groups(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
 {
     struct vkb_pass_row row;
 
-    *fits = vkb_transposes(pass, VKB_BLOCK_prefilter) && pass->constants.radix_1 > 1;
-    if (!*fits)
-        return true;
+    if (!(vkb_transposes(pass, VKB_BLOCK_prefilter) && pass->constants.radix_1 > 1))
+        return false;
     memcpy(&row, pass, sizeof row);
     vkb_make_dispatch(&row, pass->shader->dispatch, PIXEL_INVOCATIONS, PIXEL_INVOCATIONS);
     // Those of one picture, since llvmpipe also runs what an early end leaves out.
@@ -123,7 +119,7 @@ bool vkb_add_adjoint_groups(const struct vkb_variant_choice *choice,
     const uint32_t height = target->height / (uint32_t)row.constants.radix_1;
     row.groups_width = (target->width + PIXEL_INVOCATIONS - 1) / PIXEL_INVOCATIONS;
     row.groups_height = (height + PIXEL_INVOCATIONS - 1) / PIXEL_INVOCATIONS;
-    return vkb_graph_add_pass(choice->graph, &row, error);
+    return vkb_add_variant(choice, &row);
 }
 
 static uint32_t readers_of_image(const struct vkb_graph *graph, uint32_t image)
@@ -256,19 +252,16 @@ static bool make_tiles(const struct vkb_variant_choice *choice, const struct vkb
         && vkb_make_tiles(choice, &vkb_shader_adjoint_filter_tile_comp, source_rows, row);
 }
 
-bool vkb_add_adjoint_filter(const struct vkb_variant_choice *choice,
-                            const struct vkb_pass_row *pass, bool *fits, struct vkb_error *error)
+bool vkb_add_adjoint_filter(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
 {
     struct vkb_pass_row row, tiles;
 
-    *fits = pass->block == VKB_BLOCK_adjoint_filter;
-    if (!*fits)
-        return true;
+    if (pass->block != VKB_BLOCK_adjoint_filter)
+        return false;
     memcpy(&row, pass, sizeof row);
     row.gains_if_finite = true;
     memcpy(&tiles, &row, sizeof tiles);
     const bool fits_tiles = make_tiles(choice, pass, &tiles);
     read_composite(&choice->plain, fits_tiles ? &tiles : &row);
-    return fits_tiles ? vkb_graph_add_pass(choice->graph, &tiles, error)
-                      : vkb_add_fullscreen(choice, &row, error);
+    return fits_tiles ? vkb_add_variant(choice, &tiles) : vkb_add_fullscreen(choice, &row);
 }

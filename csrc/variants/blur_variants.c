@@ -53,28 +53,24 @@ static struct vkb_pass_row line_row(const struct vkb_variant_choice *choice,
     return row;
 }
 
-static bool add_line_row(struct vkb_graph *graph, const struct vkb_pass_row *row,
-                         struct vkb_error *error)
+static bool add_line_row(struct vkb_variant_choice *choice, const struct vkb_pass_row *row)
 {
-    if (!vkb_graph_add_pass(graph, row, error))
-        return false;
-    if (row->params.line.levels)
-        graph->passes[graph->pass_count - 1].constants.stored = STORED_SINGLE;
+    vkb_add_variant(choice, row);
+    if (row->params.line.levels && !choice->failed)
+        choice->graph->passes[choice->graph->pass_count - 1].constants.stored = STORED_SINGLE;
     return true;
 }
 
 // Adds a line blur if the source has the target's size.
-bool vkb_add_line(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
-                  bool *fits, struct vkb_error *error)
+bool vkb_add_line(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
 {
-    *fits = (vkb_is_line(pass, DIRECTION_VERTICAL, LINE_RADIUS)
-             || vkb_is_line(pass, DIRECTION_HORIZONTAL, LINE_RADIUS))
-         && vkb_same_size(&choice->plain, pass->reads[0], pass->targets[0])
-         && vkb_is_written_once(&choice->plain, pass->targets[0]);
-    if (!*fits)
-        return true;
+    if (!((vkb_is_line(pass, DIRECTION_VERTICAL, LINE_RADIUS)
+           || vkb_is_line(pass, DIRECTION_HORIZONTAL, LINE_RADIUS))
+          && vkb_same_size(&choice->plain, pass->reads[0], pass->targets[0])
+          && vkb_is_written_once(&choice->plain, pass->targets[0])))
+        return false;
     struct vkb_pass_row row = line_row(choice, pass, pass->targets[0], 0);
-    return add_line_row(choice->graph, &row, error);
+    return add_line_row(choice, &row);
 }
 
 // For a horizontal blur into a target of another size whose taps are integer texels apart. Such a
@@ -82,8 +78,7 @@ bool vkb_add_line(const struct vkb_variant_choice *choice, const struct vkb_pass
 // of the target takes one sample of the result instead of one for each tap. Without it
 // `Separable(bloom_scale=0.5)` takes 243 ms in place of 62, `threejs_unreal` 120 in place of 69
 // (processor time of 1920 x 1080 in float16, lavapipe of Mesa 22.3.6, 2026-11-27).
-bool vkb_add_enlarged(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
-                      bool *fits, struct vkb_error *error)
+bool vkb_add_enlarged(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
 {
     const struct vkb_image_row *source = &choice->plain.images[pass->reads[0]];
     const struct vkb_image_row *target = &choice->plain.images[pass->targets[0]];
@@ -91,21 +86,18 @@ bool vkb_add_enlarged(const struct vkb_variant_choice *choice, const struct vkb_
     const bool unorm = target->format == VKB_FORMAT_RGBA8_UNORM;
     const bool filters = vkb_device_supports(choice->device, VKB_FORMAT_RGBA32_FLOAT,
                                              VK_FORMAT_FEATURE_SAMPLED_IMAGE_FILTER_LINEAR_BIT);
-    uint32_t lines;
 
-    *fits = vkb_is_line(pass, DIRECTION_HORIZONTAL, LINE_RADIUS)
-         && !vkb_same_size(&choice->plain, pass->reads[0], pass->targets[0])
-         && vkb_is_written_once(&choice->plain, pass->targets[0])
-         && source->width + 2 <= choice->device->max_side && (filters || !unorm);
-    if (!*fits)
-        return true;
+    if (!(vkb_is_line(pass, DIRECTION_HORIZONTAL, LINE_RADIUS)
+          && !vkb_same_size(&choice->plain, pass->reads[0], pass->targets[0])
+          && vkb_is_written_once(&choice->plain, pass->targets[0])
+          && source->width + 2 <= choice->device->max_side && (filters || !unorm)))
+        return false;
     // The lines are floats, since rounding them would change the filtered values. The border has
     // the texels that the filter reads beyond the edges.
     const struct vkb_size size = {source->width + 2, source->height};
     char name[VKB_NAME_SIZE];
     snprintf(name, sizeof name, "%.24s_lines", pass->name);
-    if (!vkb_add_target(choice->graph, name, VKB_FORMAT_RGBA32_FLOAT, size, false, &lines, error))
-        return false;
+    const uint32_t lines = vkb_add_floats(choice, name, size);
     struct vkb_pass_row line = line_row(choice, pass, lines, -1);
     struct vkb_pass_row row =
         vkb_fullscreen_row(pass->name, &vkb_shader_enlarge_frag, pass->targets[0]);
@@ -116,7 +108,7 @@ bool vkb_add_enlarged(const struct vkb_variant_choice *choice, const struct vkb_
     row.block = VKB_BLOCK_threshold;
     // Not of `plain`: a new image may have moved these.
     VKB_SET_TARGET(&row, threshold, &choice->graph->images[pass->targets[0]]);
-    return add_line_row(choice->graph, &line, error) && vkb_add_fullscreen(choice, &row, error);
+    return add_line_row(choice, &line) && vkb_add_fullscreen(choice, &row);
 }
 
 // A composite of two lines of a threshold, all at the size of the image.
@@ -229,20 +221,18 @@ static void make_tiles(struct vkb_pass_row *row, const struct vkb_shader *shader
 }
 
 // Adds the composite, and after it the fused pass in strips or in tiles, which may replace it.
-bool vkb_add_fused(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
-                   bool *fits, struct vkb_error *error)
+bool vkb_add_fused(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
 {
     const bool gpu = choice->variants == VKB_VARIANTS_GPU;
     const enum vkb_format format = choice->plain.images[pass->targets[0]].format;
     struct nest nest;
 
-    *fits = find_nest(&choice->plain, pass, gpu ? TILE_RADIUS : STRIP_RADIUS,
-                      gpu && pass->transposed ? vkb_writer_of : vkb_threshold_of, &nest)
-         && (gpu ? fits_tiles(choice->device)
-                 : vkb_fits_linear(choice, pass)
-                       && (!pass->transposed || vkb_are_floats(choice, pass)));
-    if (!*fits)
-        return true;
+    if (!(find_nest(&choice->plain, pass, gpu ? TILE_RADIUS : STRIP_RADIUS,
+                    gpu && pass->transposed ? vkb_writer_of : vkb_threshold_of, &nest)
+          && (gpu ? fits_tiles(choice->device)
+                  : vkb_fits_linear(choice, pass)
+                        && (!pass->transposed || vkb_are_floats(choice, pass)))))
+        return false;
     struct vkb_pass_row row = fused_row(choice, &nest);
     // Strips below each other load the same rows at the same time. With four single floats this
     // takes 7 % less time, with three 5 to 11 % more, and with halves 13 % more.
@@ -255,8 +245,7 @@ bool vkb_add_fused(const struct vkb_variant_choice *choice, const struct vkb_pas
                                      : strip_shaders[format],
                     format == VKB_FORMAT_RGBA32_FLOAT
                         && vkb_graph_channels(&choice->plain, pass->reads[0]) == 4);
-    return vkb_add_fullscreen(choice, pass, error)
-        && vkb_graph_add_pass(choice->graph, &row, error);
+    return vkb_add_fullscreen(choice, pass) && vkb_add_variant(choice, &row);
 }
 
 // The pass that writes the cotangents of an image, if it has this block and nothing else adds
@@ -323,20 +312,18 @@ static struct vkb_pass_row adjoint_row(const struct vkb_variant_choice *choice,
     return row;
 }
 
-bool vkb_add_adjoint_fused(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
-                           bool *fits, struct vkb_error *error)
+bool vkb_add_adjoint_fused(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
 {
     const bool gpu = choice->variants == VKB_VARIANTS_GPU;
     struct nest nest;
 
-    *fits = find_adjoint_nest(&choice->plain, pass, gpu ? TILE_RADIUS : STRIP_RADIUS, &nest)
-         && (gpu ? fits_tiles(choice->device) : vkb_are_floats(choice, nest.composite));
-    if (!*fits)
-        return true;
+    if (!(find_adjoint_nest(&choice->plain, pass, gpu ? TILE_RADIUS : STRIP_RADIUS, &nest)
+          && (gpu ? fits_tiles(choice->device) : vkb_are_floats(choice, nest.composite))))
+        return false;
     struct vkb_pass_row row = adjoint_row(choice, pass, &nest);
     if (gpu)
         make_tiles(&row, &vkb_shader_adjoint_tile_comp, &nest);
     else
         make_strips(choice, &row, &vkb_shader_adjoint_strip_linear_rgba32float, false);
-    return vkb_graph_add_pass(choice->graph, &row, error);
+    return vkb_add_variant(choice, &row);
 }

@@ -177,18 +177,16 @@ static struct vkb_pass_row make_placing(const struct vkb_variant_choice *choice,
     return row;
 }
 
-bool vkb_add_lines(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
-                   bool *fits, struct vkb_error *error)
+bool vkb_add_lines(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
 {
     const struct vkb_pass_row *all = choice->plain.passes, *end = pass + 1;
     struct vkb_pass_row row;
 
-    *fits = (is_stage(pass) || pass->block == VKB_BLOCK_fft_kernel) && holds_lines(choice, pass);
-    if (!*fits)
-        return true;
+    if (!((is_stage(pass) || pass->block == VKB_BLOCK_fft_kernel) && holds_lines(choice, pass)))
+        return false;
     if (!is_stage(pass)) {
         row = make_placing(choice, pass);
-        return vkb_graph_add_pass(choice->graph, &row, error);
+        return vkb_add_variant(choice, &row);
     }
     // The first stage along an axis stands for all.
     if (pass > all && is_stage(pass - 1)
@@ -200,7 +198,7 @@ bool vkb_add_lines(const struct vkb_variant_choice *choice, const struct vkb_pas
     if (pass->constants.stage == STAGE_FIRST)
         hold_spectra(choice, pass);
     row = make_row(choice, pass, end);
-    return vkb_graph_add_pass(choice->graph, &row, error);
+    return vkb_add_variant(choice, &row);
 }
 
 static const struct vkb_shader *const stage_shaders[VKB_FORMAT_COUNT] = VKB_LINEAR_BY_FORMAT(fft);
@@ -214,20 +212,18 @@ static bool reaches(const struct vkb_device *device, const struct vkb_image_row 
         <= device->limits.maxStorageBufferRange;
 }
 
-bool vkb_add_transform(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
-                       bool *fits, struct vkb_error *error)
+bool vkb_add_transform(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
 {
     const struct vkb_image_row *from = &choice->graph->images[pass->reads[0]];
     const struct vkb_image_row *target = &choice->graph->images[pass->targets[0]];
     struct vkb_pass_row row;
 
-    *fits = pass->block == VKB_BLOCK_fft && vkb_fits_linear(choice, pass)
-         && reaches(choice->device, target);
-    if (!*fits)
-        return true;
+    if (!(pass->block == VKB_BLOCK_fft && vkb_fits_linear(choice, pass)
+          && reaches(choice->device, target)))
+        return false;
     memcpy(&row, pass, sizeof row);
     row.reading = VKB_READING_LINEAR_TEXELS;
     row.shader = pass->constants.stage == STAGE_LAST ? stored_shaders[target->format]
                                                      : stage_shaders[from->format];
-    return vkb_graph_add_pass(choice->graph, &row, error);
+    return vkb_add_variant(choice, &row);
 }

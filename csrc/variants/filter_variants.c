@@ -43,8 +43,8 @@ static bool fits_rows(const struct vkb_variant_choice *choice, const struct vkb_
 
 // Adds an image and the pass that filters a level along rows into it, at the positions of the
 // pixels of the target of `pass`.
-static bool add_rows(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
-                     uint32_t level, uint32_t *rows, struct vkb_error *error)
+static uint32_t add_rows(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
+                         uint32_t level)
 {
     const uint32_t from = pass->reads[level];
     const struct vkb_size size = rows_size(choice, pass, from);
@@ -53,20 +53,18 @@ static bool add_rows(const struct vkb_variant_choice *choice, const struct vkb_p
     struct vkb_pass_row row;
 
     snprintf(name, sizeof name, "%.14s_rows_%u", pass->name, level);
-    if (!vkb_add_target(choice->graph, name, VKB_FORMAT_RGBA32_FLOAT, size, false, rows, error))
-        return false;
     memcpy(&row, pass, sizeof row);
     row.constants.levels = 0;
     memset(&row.params, 0, sizeof row.params);
     row.reads[0] = from;
     vkb_drop_reads(&row, 1);
-    row.targets[0] = *rows;
+    row.targets[0] = vkb_add_floats(choice, name, size);
     vkb_make_linear(&row, rows_shaders[format], GATHER_COLUMNS, GATHER_ROWS);
-    return vkb_graph_add_pass(choice->graph, &row, error);
+    vkb_add_variant(choice, &row);
+    return row.targets[0];
 }
 
-bool vkb_add_gathered(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
-                      bool *fits, struct vkb_error *error)
+bool vkb_add_gathered(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
 {
     struct vkb_pass_row row;
     const uint32_t levels = (uint32_t)pass->constants.levels;
@@ -75,20 +73,18 @@ bool vkb_add_gathered(const struct vkb_variant_choice *choice, const struct vkb_
                   && vkb_same_size(&choice->plain, pass->reads[0], pass->targets[0])
                   && vkb_has_format_of(&choice->plain, pass->reads[0], pass->targets[0]);
 
-    *fits = pass->block == VKB_BLOCK_gather && fits_rows(choice, pass, levels);
-    if (!*fits)
-        return true;
+    if (!(pass->block == VKB_BLOCK_gather && fits_rows(choice, pass, levels)))
+        return false;
     memcpy(&row, pass, sizeof row);
     row.constants.add_own = own;
     row.constants.sampling = 0;
     for (uint32_t level = own; level < levels; ++level)
-        if (!add_rows(choice, pass, level, &row.reads[level], error))
-            return false;
+        row.reads[level] = add_rows(choice, pass, level);
     for (uint32_t level = levels; level < row.read_count; ++level)
         row.reads[level] = row.reads[0];
     vkb_make_linear(&row, gather_shaders[format], TEXEL_COLUMNS(vkb_formats[format].channel_size),
                     GATHER_ROWS);
-    return vkb_graph_add_pass(choice->graph, &row, error);
+    return vkb_add_variant(choice, &row);
 }
 
 // Whether the pass is a filter whose images have one format.
@@ -161,17 +157,14 @@ static bool make_filter(const struct vkb_variant_choice *choice, const struct vk
     return true;
 }
 
-bool vkb_add_filtered(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
-                      bool *fits, struct vkb_error *error)
+bool vkb_add_filtered(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
 {
     const struct filter_shaders shaders = {strip_shaders, &vkb_shader_filter_tile_comp};
     struct vkb_pass_row row;
 
     memcpy(&row, pass, sizeof row);
-    *fits = make_filter(choice, pass, shaders, &row);
-    return !*fits
-        || (vkb_graph_add_pass(choice->graph, &row, error)
-            && vkb_add_from_image(choice, pass, &row, error));
+    return make_filter(choice, pass, shaders, &row) && vkb_add_variant(choice, &row)
+        && vkb_add_from_image(choice, pass, &row);
 }
 
 #define TAKE_INPUT(B, type, name) params->name = up->params.filter.name;
@@ -219,8 +212,7 @@ struct vkb_pass_row vkb_nested_row(const struct vkb_variant_choice *choice,
 }
 
 // Adds the composite, and after it a fused pass that also filters the last level.
-bool vkb_add_filtered_final(const struct vkb_variant_choice *choice,
-                            const struct vkb_pass_row *pass, bool *fits, struct vkb_error *error)
+bool vkb_add_filtered_final(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
 {
     const struct vkb_pass_row *up = vkb_nested_filter(choice, pass);
     const struct filter_shaders shaders = {
@@ -230,14 +222,11 @@ bool vkb_add_filtered_final(const struct vkb_variant_choice *choice,
     };
     struct vkb_pass_row row;
 
-    *fits = up != NULL;
-    if (!*fits)
-        return true;
+    if (!up)
+        return false;
     row = vkb_nested_row(choice, pass, up);
-    *fits = make_filter(choice, up, shaders, &row)
-         && (choice->variants == VKB_VARIANTS_GPU || !pass->transposed
-             || vkb_are_floats(choice, pass));
-    return !*fits
-        || (vkb_add_fullscreen(choice, pass, error)
-            && vkb_graph_add_pass(choice->graph, &row, error));
+    return make_filter(choice, up, shaders, &row)
+        && (choice->variants == VKB_VARIANTS_GPU || !pass->transposed
+            || vkb_are_floats(choice, pass))
+        && vkb_add_fullscreen(choice, pass) && vkb_add_variant(choice, &row);
 }

@@ -41,18 +41,16 @@ static bool is_half(const struct vkb_graph *graph, const struct vkb_pass_row *pa
 }
 
 // Adds the pass as one of linear texels, which loads the texels of its first image.
-static bool add_linear(const struct vkb_variant_choice *choice, struct vkb_pass_row *row,
-                       const struct vkb_shader *shader, uint32_t columns, uint32_t rows,
-                       struct vkb_error *error)
+static bool add_linear(struct vkb_variant_choice *choice, struct vkb_pass_row *row,
+                       const struct vkb_shader *shader, uint32_t columns, uint32_t rows)
 {
     row->constants.sampling = 0;
     vkb_drop_reads(row, 1);
     vkb_make_linear(row, shader, columns, rows);
-    return vkb_graph_add_pass(choice->graph, row, error);
+    return vkb_add_variant(choice, row);
 }
 
-bool vkb_add_windowed(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
-                      bool *fits, struct vkb_error *error)
+bool vkb_add_windowed(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
 {
     const struct vkb_image_row *source = &choice->plain.images[pass->reads[0]];
     const struct vkb_image_row *target = &choice->plain.images[pass->targets[0]];
@@ -69,37 +67,36 @@ bool vkb_add_windowed(const struct vkb_variant_choice *choice, const struct vkb_
     row.constants.enlarged = source->height < target->height;
     row.constants.window = has_thirteen_taps(groups) ? 6 : 4;
     // A radius is that of a mean of other texels. HDRP's taps are in other texels at each position.
-    *fits = groups && !is_blur && !pass->constants.masked && pass->constants.radius <= 1
-         && pass->params.prefilter.step_x == 1.0f && pass->params.prefilter.step_y == 1.0f
-         && (row.constants.exact || groups != GROUPS_HDRP) && loads(choice, pass);
-    return !*fits
-        || (add_linear(choice, &row, taps_linear[source->format],
-                       row.constants.exact ? TAP_COLUMNS(size) : 4 / size, TAP_ROWS, error)
-            && vkb_add_from_image(choice, pass, &row, error));
+    return groups && !is_blur && !pass->constants.masked && pass->constants.radius <= 1
+        && pass->params.prefilter.step_x == 1.0f && pass->params.prefilter.step_y == 1.0f
+        && (row.constants.exact || groups != GROUPS_HDRP) && loads(choice, pass)
+        && add_linear(choice, &row, taps_linear[source->format],
+                      row.constants.exact ? TAP_COLUMNS(size) : 4 / size, TAP_ROWS)
+        && vkb_add_from_image(choice, pass, &row);
 }
 
 // HDRP's blurs of images of the same size, and of twice the size along the line; Godot's horizontal
 // one of an image of twice the size.
-bool vkb_add_nine(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
-                  bool *fits, struct vkb_error *error)
+bool vkb_add_nine(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
 {
     const struct vkb_image_row *target = &choice->plain.images[pass->targets[0]];
     const enum vkb_format format = choice->plain.images[pass->reads[0]].format;
     const bool rows = pass->constants.direction == DIRECTION_HORIZONTAL;
+    const bool fits = groups_of(pass) == GROUPS_HDRP_BLUR
+                        ? (pass->constants.first || pass->constants.sampling == SAMPLING_TEXEL)
+                              && loads(choice, pass)
+                        : groups_of(pass) == GROUPS_GODOT_BLUR && rows
+                              && is_half(&choice->plain, pass) && target->width % 2 == 0
+                              && target->format == VKB_FORMAT_RGBA32_FLOAT
+                              && vkb_fits_linear(choice, pass);
     struct vkb_pass_row row;
 
-    *fits = groups_of(pass) == GROUPS_HDRP_BLUR
-              ? (pass->constants.first || pass->constants.sampling == SAMPLING_TEXEL)
-                    && loads(choice, pass)
-              : groups_of(pass) == GROUPS_GODOT_BLUR && rows && is_half(&choice->plain, pass)
-                    && target->width % 2 == 0 && target->format == VKB_FORMAT_RGBA32_FLOAT
-                    && vkb_fits_linear(choice, pass);
-    if (!*fits)
-        return true;
+    if (!fits)
+        return false;
     memcpy(&row, pass, sizeof row);
     row.constants.exact =
         pass->constants.first && pass->constants.groups == GROUPS_HDRP_BLUR ? EXACT_SAME : 0;
-    return rows ? add_linear(choice, &row, rows_linear[format], NINE_OUTPUTS, GATHER_ROWS, error)
+    return rows ? add_linear(choice, &row, rows_linear[format], NINE_OUTPUTS, GATHER_ROWS)
                 : add_linear(choice, &row, columns_linear[format],
-                             4 / vkb_formats[format].channel_size, NINE_OUTPUTS, error);
+                             4 / vkb_formats[format].channel_size, NINE_OUTPUTS);
 }

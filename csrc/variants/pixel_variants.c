@@ -33,8 +33,7 @@ static void load_pixels(struct vkb_pass_row *row, const struct vkb_shader *shade
     vkb_drop_reads(row, read_count);
 }
 
-bool vkb_add_fullscreen(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
-                        struct vkb_error *error)
+bool vkb_add_fullscreen(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
 {
     const struct vkb_graph *graph = choice->graph;
     const enum vkb_format format = graph->images[pass->reads[0]].format;
@@ -47,7 +46,7 @@ bool vkb_add_fullscreen(const struct vkb_variant_choice *choice, const struct vk
         load_pixels(&row, blend_shaders[format], format, 2);
     else if (vkb_fits_linear(choice, pass) && loads_threshold(graph, pass))
         load_pixels(&row, threshold_shaders[format], format, 1);
-    return vkb_graph_add_pass(choice->graph, &row, error);
+    return vkb_add_variant(choice, &row);
 }
 
 // Whether the pass has a shader that can also read what the threshold pass reads: it removes NaN
@@ -58,18 +57,15 @@ static bool reads_images(const struct vkb_pass_row *pass)
         && !pass->constants.masked && pass->constants.sampling != SAMPLING_FILTER;
 }
 
-bool vkb_add_pixels(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
-                    bool *fits, struct vkb_error *error)
+bool vkb_add_pixels(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
 {
-    *fits = pass->geometry == VKB_GEOMETRY_FULLSCREEN && pass->shader->dispatch
-         && vkb_is_written_once(&choice->plain, pass->targets[0]);
-    if (!*fits)
-        return true;
-    if (!vkb_add_fullscreen(choice, pass, error))
+    if (!(pass->geometry == VKB_GEOMETRY_FULLSCREEN && pass->shader->dispatch
+          && vkb_is_written_once(&choice->plain, pass->targets[0])))
         return false;
-    if (choice->variants != VKB_VARIANTS_GPU || !reads_images(pass))
+    vkb_add_fullscreen(choice, pass);
+    if (choice->variants != VKB_VARIANTS_GPU || !reads_images(pass) || choice->failed)
         return true;
     struct vkb_pass_row row;
     memcpy(&row, &choice->graph->passes[choice->graph->pass_count - 1], sizeof row);
-    return vkb_add_from_image(choice, pass, &row, error);
+    return vkb_add_from_image(choice, pass, &row);
 }

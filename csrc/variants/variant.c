@@ -7,6 +7,22 @@ bool vkb_has_format_of(const struct vkb_graph *graph, uint32_t a, uint32_t b)
     return vkb_formats[graph->images[a].format].vk == vkb_formats[graph->images[b].format].vk;
 }
 
+bool vkb_add_variant(struct vkb_variant_choice *choice, const struct vkb_pass_row *row)
+{
+    choice->failed = choice->failed || !vkb_graph_add_pass(choice->graph, row, choice->error);
+    return true;
+}
+
+uint32_t vkb_add_floats(struct vkb_variant_choice *choice, const char *name, struct vkb_size size)
+{
+    uint32_t image = 0;
+
+    choice->failed = choice->failed
+                  || !vkb_add_target(choice->graph, name, VKB_FORMAT_RGBA32_FLOAT, size, false,
+                                     &image, choice->error);
+    return image;
+}
+
 bool vkb_is_written_once(const struct vkb_graph *graph, uint32_t image)
 {
     uint32_t writers = 0;
@@ -96,8 +112,8 @@ const struct vkb_pass_row *vkb_threshold_of(const struct vkb_graph *graph, uint3
              : NULL;
 }
 
-bool vkb_add_from_image(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
-                        const struct vkb_pass_row *variant, struct vkb_error *error)
+bool vkb_add_from_image(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
+                        const struct vkb_pass_row *variant)
 {
     const struct vkb_pass_row *threshold = vkb_threshold_of(&choice->plain, pass->reads[0]);
     const bool is_filter = pass->block == VKB_BLOCK_filter;
@@ -116,5 +132,5 @@ bool vkb_add_from_image(const struct vkb_variant_choice *choice, const struct vk
         row.constants.format = vkb_storage_mode(choice->plain.images[pass->reads[0]].format);
         VKB_TAKE_THRESHOLD(&row, filter, threshold);
     }
-    return vkb_graph_add_pass(choice->graph, &row, error);
+    return vkb_add_variant(choice, &row);
 }

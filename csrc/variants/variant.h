@@ -8,18 +8,24 @@
 #include "variants/variants.h"
 #include "vulkan/memory.h"
 
-// The choice of variants for one graph: from the passes of `plain` to those of `graph`.
+// The choice of variants for one graph: from the passes of `plain` to those of `graph`. It keeps
+// the first failure.
 struct vkb_variant_choice {
     enum vkb_variants variants;
     const struct vkb_device *device;
     struct vkb_graph plain;
     struct vkb_graph *graph;
+    struct vkb_error *error;
+    bool failed;
 };
 
-// Adds the variant of a pass to the graph. If the variant does not suit the pass, adds nothing and
-// sets *fits to false.
-typedef bool vkb_variant_add(const struct vkb_variant_choice *choice,
-                             const struct vkb_pass_row *pass, bool *fits, struct vkb_error *error);
+// Adds a pass to the graph. True, as every function that adds a variant.
+bool vkb_add_variant(struct vkb_variant_choice *choice, const struct vkb_pass_row *row);
+// Adds an image of single floats.
+uint32_t vkb_add_floats(struct vkb_variant_choice *choice, const char *name, struct vkb_size size);
+
+// Adds the variant of a pass to the graph. False: it does not suit the pass, and nothing is added.
+typedef bool vkb_variant_add(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass);
 
 // Lines and enlarged lines of a blur; fused passes for the complete bloom of an image, in strips
 // and in tiles.
@@ -59,8 +65,8 @@ const struct vkb_pass_row *vkb_threshold_of(const struct vkb_graph *graph, uint3
 // If a threshold pass writes what `pass` reads, adds a fused pass that reads the image itself and
 // may replace `variant`, that of `pass`. A pass that is no filter does so only if the threshold
 // pass just removes NaN and infinity, as that of a published method does.
-bool vkb_add_from_image(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
-                        const struct vkb_pass_row *variant, struct vkb_error *error);
+bool vkb_add_from_image(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
+                        const struct vkb_pass_row *variant);
 
 // The filter that makes the bloom which `pass` ends, if a fused pass may nest it; NULL: none. The
 // row of this pass, without a shader.
@@ -94,7 +100,6 @@ void vkb_make_linear(struct vkb_pass_row *row, const struct vkb_shader *shader, 
 bool vkb_fits_linear(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass);
 // A pass over all pixels of one target. On CPUs it is drawn if its texels cannot be loaded. On GPUs
 // it is a compute shader, since GPUs that are made for computing draw slowly.
-bool vkb_add_fullscreen(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
-                        struct vkb_error *error);
+bool vkb_add_fullscreen(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass);
 
 #endif

@@ -80,26 +80,20 @@ static void name_variant(struct vkb_graph *graph, uint32_t first, const char *na
     }
 }
 
-static bool add_variant(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
-                        struct vkb_error *error)
+static void add_variant(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
 {
     const struct vkb_image_row *target = &choice->plain.images[pass->targets[0]];
     const uint64_t pixels = (uint64_t)target->width * target->height;
 
     for (size_t i = 0; i < sizeof variants_table / sizeof variants_table[0]; ++i) {
         const uint32_t first = choice->graph->pass_count;
-        bool fits = false;
         if (variants_table[i].variants != choice->variants
-            || pixels < variants_table[i].least_pixels)
-            continue;
-        if (!variants_table[i].add(choice, pass, &fits, error))
-            return false;
-        if (!fits)
+            || pixels < variants_table[i].least_pixels || !variants_table[i].add(choice, pass))
             continue;
         name_variant(choice->graph, first, variants_table[i].name);
-        return true;
+        return;
     }
-    return vkb_graph_add_pass(choice->graph, pass, error);
+    vkb_add_variant(choice, pass);
 }
 
 bool vkb_variants_choose(enum vkb_variants variants, const struct vkb_device *device,
@@ -110,8 +104,8 @@ bool vkb_variants_choose(enum vkb_variants variants, const struct vkb_device *de
         .device = device,
         .plain = *graph,
         .graph = graph,
+        .error = error,
     };
-    bool done = true;
 
     if (variants == VKB_VARIANTS_FRAGMENT)
         return true;
@@ -119,11 +113,11 @@ bool vkb_variants_choose(enum vkb_variants variants, const struct vkb_device *de
     graph->passes = NULL;
     graph->pass_count = 0;
     graph->pass_capacity = 0;
-    for (uint32_t i = 0; done && i < choice.plain.pass_count; ++i) {
+    for (uint32_t i = 0; !choice.failed && i < choice.plain.pass_count; ++i) {
         // Adding an image may move the array.
         choice.plain.images = graph->images;
-        done = add_variant(&choice, &choice.plain.passes[i], error);
+        add_variant(&choice, &choice.plain.passes[i]);
     }
     vkb_free(choice.plain.passes);
-    return done;
+    return !choice.failed;
 }

@@ -176,11 +176,7 @@ def check_image(image: object, name: str = "image") -> NDArray[Any]:
             f"{name}: the mode {mode} is not RGB or RGBA; convert it: "
             f'{name}.convert("{_MODE_HINTS[mode]}")'
         )
-    array = image if isinstance(image, np.ndarray) else _viewed(image, name)
-    if type(array) is not np.ndarray and np.ma.is_masked(array):
-        raise ValueError(
-            f"{name}: some values are masked; fill them first, such as {name}.filled(0)"
-        )
+    array = _viewed(image, name)
     if array.dtype.name == "float64":  # in any byte order
         array = array.astype(np.float32)
     if array.dtype not in _DTYPES:
@@ -221,9 +217,7 @@ def check_mask(mask: object, size: tuple[int, int]) -> NDArray[np.float32]:
     """Return the mask as floats of 0 to 1, (H, W), if it has that height and width."""
     if _pil_mode(mask) == "P":
         raise ValueError('mask: the mode P is a palette; convert it: mask.convert("L")')
-    array = mask if isinstance(mask, np.ndarray) else _viewed(mask, "mask", ("y", "x"))
-    if type(array) is not np.ndarray and np.ma.is_masked(array):
-        raise ValueError("mask: some values are masked; fill them first, such as mask.filled(0)")
+    array = _viewed(mask, "mask", ("y", "x"))
     if array.dtype.name not in ("uint8", "bool", "float16", "float32", "float64"):
         hint = "; convert it: (mask / 65535).astype(np.float32)" * (array.dtype.name == "uint16")
         raise TypeError(
@@ -237,21 +231,21 @@ def check_mask(mask: object, size: tuple[int, int]) -> NDArray[np.float32]:
         return values / np.float32(255)
     # Not the other way round, so that NaN fails too.
     if array.dtype.kind == "f" and not (array.min() >= 0 and array.max() <= 1):
-        raise ValueError(
-            f"mask: {_outside(array)} is out of range, 0 to 1; clip it: mask.clip(0, 1)"
-        )
+        wrong = float(array[~((array >= 0) & (array <= 1))][0])
+        raise ValueError(f"mask: {wrong} is out of range, 0 to 1; clip it: mask.clip(0, 1)")
     return values
-
-
-def _outside(array: NDArray[Any]) -> float:
-    """Return the first value outside of 0 to 1."""
-    return float(array[~((array >= 0) & (array <= 1))][0])
 
 
 def _viewed(
     image: object, name: str, dimensions: tuple[str, ...] = ("y", "x", "channel")
 ) -> NDArray[Any]:
-    """Return an array view of an object, or raise TypeError."""
+    """Return an array view of an object, or raise TypeError or ValueError."""
+    if isinstance(image, np.ndarray):
+        if type(image) is not np.ndarray and np.ma.is_masked(image):
+            raise ValueError(
+                f"{name}: some values are masked; fill them first, such as {name}.filled(0)"
+            )
+        return image
     dims = getattr(image, "dims", None)
     if isinstance(dims, tuple) and hasattr(image, "transpose"):
         # A grid's channels are named after their framebuffer, such as "final_channel".
@@ -273,7 +267,7 @@ def _viewed(
             return np.asarray(image)
         return np.asarray(memoryview(image))  # type: ignore[arg-type]
     except (TypeError, ValueError, RuntimeError, BufferError) as error:
-        if _is_on_device(image):
+        if device_kind(image) not in (0, _DLPACK_CPU):
             raise TypeError(on_another_device(image, name)) from None
         raise TypeError(
             f"{name}: an array is needed, not {type(image).__name__}"
@@ -289,13 +283,12 @@ def on_another_device(image: object, name: str) -> str:
     )
 
 
-def _is_on_device(image: object) -> bool:
-    """Return whether an array that NumPy cannot view is in the memory of another device."""
+def device_kind(image: object) -> int:
+    """Return DLPack's type of the device that an array is on; 0 if the object has none."""
     try:
-        kind, _ = image.__dlpack_device__()  # type: ignore[attr-defined]
-    except Exception:  # whatever a foreign object raises
-        return False
-    return bool(kind != _DLPACK_CPU)
+        return int(image.__dlpack_device__()[0])  # type: ignore[attr-defined]
+    except Exception:  # whatever a foreign object raises; a later use of it tells more
+        return 0
 
 
 def _pil_mode(image: object) -> str:

@@ -1,5 +1,3 @@
-#version 450
-
 // The texels of an image's first row, as shaders read them.
 
 layout(local_size_x = 64) in;

@@ -1,6 +1,3 @@
-#version 450
-#extension GL_GOOGLE_include_directive : require
-
 // From an image to a dense buffer. An invocation stores 16 bytes.
 
 #include "device/strided_copy.glsl"

@@ -1,6 +1,3 @@
-#version 450
-#extension GL_GOOGLE_include_directive : require
-
 // From a buffer with any strides to an image, and how many elements are NaN or infinite. An
 // invocation moves a pixel: those of a group are a tile, since drivers keep the pixels of a tile
 // together.

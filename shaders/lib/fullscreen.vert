@@ -1,4 +1,3 @@
-#version 450
 // One triangle that covers the target, computed from the vertex index.
 
 void main()

@@ -1,5 +1,3 @@
-#version 450
-#extension GL_GOOGLE_include_directive : require
 // The cotangents of what a stage of glare reads, from those of what is above the stage's threshold.
 #include "lib/block.glsl"
 #include "lib/finite.glsl"

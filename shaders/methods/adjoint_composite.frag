@@ -1,5 +1,3 @@
-#version 450
-#extension GL_GOOGLE_include_directive : require
 // The cotangents of the composite: of the scene, of the bloom, of the mask, or of intensity, exposure
 // and reference white, whose sums are their derivatives.
 #include "lib/block.glsl"

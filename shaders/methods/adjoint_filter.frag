@@ -1,6 +1,3 @@
-#version 450
-#extension GL_GOOGLE_include_directive : require
-#extension GL_EXT_control_flow_attributes : require
 // The transpose of a filter: each texel gathers the cotangents of the pixels that read it, with the
 // weights from a table (csrc/passes/taps.h). With BY these are the cotangents of a composite without a
 // curve, from which those of the bloom follow by a factor where the scene is finite.

@@ -1,6 +1,3 @@
-#version 450
-#extension GL_GOOGLE_include_directive : require
-#extension GL_EXT_control_flow_attributes : require
 // The cotangents of the groups of taps from which a downsampling makes a pixel, where it is not linear
 // in these: of RADIX_1 groups from number LEVELS on, or of the mask.
 #include "lib/block.glsl"

@@ -1,5 +1,3 @@
-#version 450
-#extension GL_GOOGLE_include_directive : require
 // Adds up the pixels of an image, or their squares, in blocks of SUM_SIDE x SUM_SIDE, always in the same order.
 #include "lib/block.glsl"
 

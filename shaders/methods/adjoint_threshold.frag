@@ -1,5 +1,3 @@
-#version 450
-#extension GL_GOOGLE_include_directive : require
 // The cotangents of the threshold pass, at its pixels: of the reduced image, of the mask, or of
 // threshold and knee, whose sums are their derivatives.
 #include "lib/block.glsl"

@@ -1,6 +1,3 @@
-#version 450
-#extension GL_GOOGLE_include_directive : require
-#extension GL_EXT_control_flow_attributes : require
 // The end of Blender's glare: enlarged, with another saturation, tinted (formulas of the compositor of
 // Blender 5.0 and 5.2).
 #include "lib/block.glsl"

@@ -1,5 +1,3 @@
-#version 450
-#extension GL_GOOGLE_include_directive : require
 // A blur by a symmetric kernel, in one direction or, as one N x N pass, in both. The source may
 // have another size than the target.
 #include "lib/block.glsl"

@@ -1,5 +1,3 @@
-#version 450
-#extension GL_GOOGLE_include_directive : require
 // The mean of the pixels up to a radius away along a row or a column, of those inside of the image. Each
 // invocation follows a line with a running sum, which it corrects for what the additions round off.
 #include "lib/block.glsl"

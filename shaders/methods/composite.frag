@@ -1,5 +1,3 @@
-#version 450
-#extension GL_GOOGLE_include_directive : require
 // The finished picture: scene and bloom, exposure, tone map, encoding, dither.
 #include "lib/block.glsl"
 

@@ -1,5 +1,3 @@
-#version 450
-#extension GL_GOOGLE_include_directive : require
 // Dirt on the lens: the light of bloom and glare, multiplied by a picture.
 #include "lib/block.glsl"
 #include "lib/sampling.glsl"

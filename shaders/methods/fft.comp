@@ -1,6 +1,3 @@
-#version 450
-#extension GL_GOOGLE_include_directive : require
-#extension GL_EXT_control_flow_attributes : require
 #pragma compile images
 // One stage of a Fourier transform along one axis: a butterfly of RADIX_A * RADIX_B elements, `step`
 // apart, for each invocation. A texel is two complex numbers: red and green, blue and alpha. The way

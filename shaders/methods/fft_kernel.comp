@@ -1,5 +1,3 @@
-#version 450
-#extension GL_GOOGLE_include_directive : require
 // The kernel of a convolution at the places of the padded lines: its point at 0, what lies before it at
 // the end. Values whose light comes from the same place are added: beyond an edge all of them, with a
 // period those that are whole periods apart.

@@ -1,6 +1,3 @@
-#version 450
-#extension GL_GOOGLE_include_directive : require
-#extension GL_EXT_control_flow_attributes : require
 // A filter of an image of any size (lib/filter.glsl), and the share of an image of the target's size.
 #include "lib/block.glsl"
 #include "lib/sampling.glsl"

@@ -1,6 +1,3 @@
-#version 450
-#extension GL_GOOGLE_include_directive : require
-#extension GL_EXT_control_flow_attributes : require
 // Adds up levels of several sizes: each is enlarged and multiplied by its weight.
 #include "lib/block.glsl"
 #include "lib/sampling.glsl"

@@ -1,5 +1,3 @@
-#version 450
-#extension GL_GOOGLE_include_directive : require
 // Ghosts: the source scaled about its centre, added up with tints (Chapman, "Pseudo Lens Flare", 2013),
 // and added to others.
 #include "lib/block.glsl"

@@ -1,5 +1,3 @@
-#version 450
-#extension GL_GOOGLE_include_directive : require
 // The finished picture as Godot blends it: the exposure comes before the composite, soft light after
 // the tone map (godotengine/godot, tonemap.glsl @ 001c8c9c24dc).
 #include "lib/block.glsl"

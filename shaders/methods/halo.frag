@@ -1,5 +1,3 @@
-#version 450
-#extension GL_GOOGLE_include_directive : require
 // A halo: what lies a radius further towards the centre, in a ring of that radius (google/filament,
 // flare.mat @ 523a261b1052).
 #include "lib/block.glsl"

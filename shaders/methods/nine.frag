@@ -1,5 +1,3 @@
-#version 450
-#extension GL_GOOGLE_include_directive : require
 // The blurs of nine taps in one direction, pixels of the target apart.
 //
 // HDRP's binomial filter reduces the image along this direction (Unity-Technologies/Graphics,

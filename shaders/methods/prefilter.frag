@@ -1,6 +1,3 @@
-#version 450
-#extension GL_GOOGLE_include_directive : require
-#extension GL_EXT_control_flow_attributes : require
 // A downsampling that is not linear in groups of its taps, and the first pass of a published method: the
 // taps and what is made of them are by GROUPS (lib/prefilter_taps.glsl).
 #include "lib/block.glsl"

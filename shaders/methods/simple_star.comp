@@ -1,5 +1,3 @@
-#version 450
-#extension GL_GOOGLE_include_directive : require
 // Blender's recursive filter along rows, columns or diagonals: each pixel is mixed with one before it,
 // which is mixed already, and one after it (formulas of the compositor of Blender 5.0).
 #include "lib/block.glsl"

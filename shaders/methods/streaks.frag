@@ -1,5 +1,3 @@
-#version 450
-#extension GL_GOOGLE_include_directive : require
 // One iteration of a streak in one direction: taps at multiples of a step (Kawase, "Frame Buffer
 // Postprocessing Effects in DOUBLE-S.T.E.A.L", GDC 2003). The last one adds the streaks before.
 #include "lib/block.glsl"

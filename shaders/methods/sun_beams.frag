@@ -1,5 +1,3 @@
-#version 450
-#extension GL_GOOGLE_include_directive : require
 // Blender's sun beams: the weighted mean of the pixels between each pixel and the sun (formulas of the
 // compositor of Blender 5.0).
 #include "lib/block.glsl"

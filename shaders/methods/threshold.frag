@@ -1,5 +1,3 @@
-#version 450
-#extension GL_GOOGLE_include_directive : require
 // The threshold pass: reduces an image to the size of the bloom buffers, then applies the threshold.
 // NaN and infinity become 0 first, since the filter would spread them.
 #include "lib/block.glsl"

@@ -1,5 +1,4 @@
-#version 450
-#extension GL_GOOGLE_include_directive : require
-// Triangles of the body without textures, as what glows.
+#pragma compile TEXTURED
+// The body, as what glows.
 #define EMISSION
-#include "scene/glow_mesh.glsl"
+#include "scene/glow.frag"

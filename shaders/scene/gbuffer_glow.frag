@@ -1,5 +1,3 @@
-#version 450
-#extension GL_GOOGLE_include_directive : require
 // Adds the glow mesh's light to the brightness by blending. Adding 0 keeps the other attachments.
 #include "lib/block.glsl"
 #include "scene/gbuffer.glsl"

@@ -1,5 +1,3 @@
-#version 450
-#extension GL_GOOGLE_include_directive : require
 // The sky in the background. It is unlit and does not glow.
 #include "lib/block.glsl"
 #include "scene/gbuffer.glsl"

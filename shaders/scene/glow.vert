@@ -1,5 +1,4 @@
-#version 450
-#extension GL_GOOGLE_include_directive : require
-// Triangles of the glow mesh without textures.
+#pragma compile TEXTURED
+// The glow mesh.
 #define GLOW
-#include "scene/mesh.glsl"
+#include "scene/mesh.vert"

@@ -1,5 +1,3 @@
-#version 450
-#extension GL_GOOGLE_include_directive : require
 // Lights the G-buffer with the forward system's Phong model, and adds the emission.
 #include "lib/block.glsl"
 #include "scene/phong.glsl"

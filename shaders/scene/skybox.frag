@@ -1,5 +1,3 @@
-#version 450
-#extension GL_GOOGLE_include_directive : require
 // The sky, sampled in the direction of a point on the cube.
 #include "lib/block.glsl"
 

@@ -1,5 +1,3 @@
-#version 450
-#extension GL_GOOGLE_include_directive : require
 // The sky behind everything: one triangle that covers the target, with the direction of each point.
 #include "lib/block.glsl"
 

@@ -1,6 +1,3 @@
-#version 450
-#extension GL_GOOGLE_include_directive : require
-#extension GL_EXT_control_flow_attributes : require
 // The transpose of a filter (adjoint_filter.frag) in tiles: a filter of the cotangents whose windows are the pixels
 // that read a texel, by the table.
 #include "lib/block.glsl"

@@ -1,6 +1,3 @@
-#version 450
-#extension GL_GOOGLE_include_directive : require
-#extension GL_EXT_control_flow_attributes : require
 #pragma compile floats
 #pragma compile packed
 // The derivatives by an image of its complete bloom: the transpose of strip.comp, for a composite without

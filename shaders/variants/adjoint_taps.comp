@@ -1,6 +1,3 @@
-#version 450
-#extension GL_GOOGLE_include_directive : require
-#extension GL_EXT_control_flow_attributes : require
 #pragma compile floats
 // The transpose of a filter (see adjoint_filter.frag) in blocks: an invocation loads each pixel once that
 // texels next to each other are read by: RADIX_1 columns and RADIX_2 rows, with the weights of a block of

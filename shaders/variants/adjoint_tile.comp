@@ -1,6 +1,3 @@
-#version 450
-#extension GL_GOOGLE_include_directive : require
-#extension GL_EXT_control_flow_attributes : require
 // The derivatives by an image of its complete bloom, for GPUs: the transpose of tile.comp, for a composite
 // without a curve, which is a factor. The transpose of a blur whose taps beyond an edge read the edge has
 // the same symmetric kernel: there are no cotangents beyond the edges, and the texel at the edge also has

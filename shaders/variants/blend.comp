@@ -1,6 +1,3 @@
-#version 450
-#extension GL_GOOGLE_include_directive : require
-#extension GL_EXT_control_flow_attributes : require
 // The composite for a scene and a bloom that have the size and format of the result.
 #include "lib/block.glsl"
 

@@ -1,5 +1,3 @@
-#version 450
-#extension GL_GOOGLE_include_directive : require
 // Enlarges a blur that ran at the size of the bloom buffers: samples its lines, which have a border
 // of one texel, for every pixel of a target of another size.
 #include "lib/block.glsl"

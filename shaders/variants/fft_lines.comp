@@ -1,6 +1,3 @@
-#version 450
-#extension GL_GOOGLE_include_directive : require
-#extension GL_EXT_control_flow_attributes : require
 // A Fourier transform of complete lines, in shared memory: each workgroup has GROUP_WIDTH lines, and
 // each of its invocations the elements of one butterfly. Frequencies end in their natural order.
 //

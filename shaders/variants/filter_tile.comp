@@ -1,21 +1,16 @@
-#version 450
-#extension GL_GOOGLE_include_directive : require
-#extension GL_EXT_control_flow_attributes : require
-// A filter in tiles, and the share of an image of the target's size. With FROM_IMAGE it reads the image itself in
-// place of the threshold pass's result.
-#include "lib/block.glsl"
-#include "lib/finite.glsl"
-#include "lib/sampling.glsl"
-#include "lib/threshold.glsl"
-
-UNIFORM_BLOCK(FILTER_BLOCK);
-#include "lib/storage.glsl"
-#include "lib/filter.glsl"
-#include "variants/thresholded.glsl"
+#pragma compile FINAL
+// A filter in tiles (variants/nested.glsl).
+#include "variants/nested.glsl"
 
 layout(set = 0, binding = 1) uniform sampler2D source;
-layout(set = 0, binding = 2) uniform sampler2D level;
-layout(set = 0, binding = 3) uniform writeonly image2D target;
+layout(set = 0, binding = 2) uniform sampler2D own;
+#define ENDED_BINDING 3
+#ifdef FINAL
+#include "lib/ended.glsl"
+#else
+#define ENDED_TARGET ENDED_BINDING
+#endif
+layout(set = 0, binding = ENDED_TARGET) uniform writeonly image2D target;
 #include "variants/filter_tile.glsl"
 
 Window window_at(ivec2 pixel, bool along_x)
@@ -25,18 +20,26 @@ Window window_at(ivec2 pixel, bool along_x)
 
 vec4 texel_at(ivec2 texel)
 {
-    return thresholded(fetch_clamped(source, texel));
+    return seen(fetch_clamped(source, texel));
 }
 
 vec4 own_at(ivec2 pixel)
 {
-    return ADD_OWN != 0 ? texelFetch(level, pixel, 0) : vec4(0.0);
+#ifndef FINAL
+    if (ADD_OWN == 0)
+        return vec4(0.0);
+#endif
+    return texelFetch(own, pixel, 0);
 }
 
-vec4 shade(vec4 own, vec4 sum, ivec2 pixel)
+vec4 shade(vec4 own_pixel, vec4 sum, ivec2 pixel)
 {
     sum = params.coarse * (sum / params.divisor);
+#ifdef FINAL
+    return ended(own_pixel, as_stored(sum, FORMAT), pixel);
+#else
     if (ADD_OWN != 0)
-        sum += params.own * own;
+        sum += params.own * own_pixel;
     return stored(sum);
+#endif
 }

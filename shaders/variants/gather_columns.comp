@@ -1,6 +1,3 @@
-#version 450
-#extension GL_GOOGLE_include_directive : require
-#extension GL_EXT_control_flow_attributes : require
 // Adds up levels of several sizes that gather_rows.comp has filtered along rows: filters each along
 // columns and multiplies it by its weight. With ADD_OWN the first one has the target's size and needs
 // no filter. As one fragment shader `godot_4_5` takes 475 ms in place of 130 (processor time of 1920 x

@@ -1,6 +1,3 @@
-#version 450
-#extension GL_GOOGLE_include_directive : require
-#extension GL_EXT_control_flow_attributes : require
 // Filters a level that is gathered along rows, at the positions of the pixels of a target of another
 // width. The results are floats, in an image of the target's width and of the level's height.
 #include "lib/block.glsl"

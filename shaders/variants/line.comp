@@ -1,6 +1,3 @@
-#version 450
-#extension GL_GOOGLE_include_directive : require
-#extension GL_EXT_control_flow_attributes : require
 // A blur in one direction with all taps on integer texels. An invocation writes LINE_OUTPUTS pixels
 // along the line and loads each texel once for all of them.
 #include "lib/block.glsl"

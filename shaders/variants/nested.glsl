@@ -1,28 +1,32 @@
-// The images of a filter in strips, and what becomes of a filtered pixel: with FINAL the end of a bloom, otherwise
-// a level, to which the share of an image of the target's size is added. HAS_OWN: whether `own` is read.
-layout(local_size_x = ROW_INVOCATIONS) in;
-READ_IMAGE(1, source);
-READ_IMAGE(2, own);
+// The block of a filter, and how it changes the texels that it reads. With FINAL it makes the bloom, and is fused with
+// the composite, or with its MIXED cotangents. Otherwise it may add the share of an image of the target's size, and
+// with FROM_IMAGE it reads the image itself in place of the threshold pass's result.
+#include "lib/block.glsl"
+#include "lib/sampling.glsl"
 
 #ifdef FINAL
-#define ENDED_BINDING 3
-#include "lib/ended.glsl"
-WRITE_IMAGE(ENDED_TARGET);
+UNIFORM_BLOCK(FILTER_FINAL_BLOCK);
+#include "lib/storage.glsl"
+#include "lib/composite.glsl"
 
-#define HAS_OWN true
-
-uvec4 shade(uvec4 scene, vec4 sum, ivec2 pixel)
+vec4 seen(vec4 value)
 {
-    return ended(scene, as_stored(sum, FORMAT), pixel);
+    return value;
 }
 #else
-WRITE_IMAGE(3);
-#define HAS_OWN (ADD_OWN != 0)
+UNIFORM_BLOCK(FILTER_BLOCK);
+#include "lib/storage.glsl"
+#include "lib/finite.glsl"
+#include "lib/threshold.glsl"
 
-uvec4 shade(uvec4 level, vec4 sum, ivec2 pixel)
+vec4 seen(vec4 value)
 {
-    if (ADD_OWN != 0)
-        sum += params.own * value_of(level);
-    return buffer_of(sum);
+    if (FROM_IMAGE == 0)
+        return value;
+    vec4 kept =
+        apply_threshold(finite_or_zero(value), THRESHOLD_MODE, params.threshold, params.knee);
+    // Without a knee the value is the texel or 0, which needs no rounding.
+    return THRESHOLD_MODE == THRESHOLD_KNEE ? as_stored(kept, FORMAT) : kept;
 }
 #endif
+#include "lib/filter.glsl"

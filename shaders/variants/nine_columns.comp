@@ -1,6 +1,3 @@
-#version 450
-#extension GL_GOOGLE_include_directive : require
-#extension GL_EXT_control_flow_attributes : require
 // HDRP's vertical blur of an image of the target's size (FIRST) or of exactly twice its height, whose
 // samples are means of two texels. An invocation writes one word of some rows, and has each sample
 // once for all of them.

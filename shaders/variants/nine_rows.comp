@@ -1,6 +1,3 @@
-#version 450
-#extension GL_GOOGLE_include_directive : require
-#extension GL_EXT_control_flow_attributes : require
 // The horizontal blurs of nine taps: HDRP's, of an image of the target's size (FIRST) or of exactly twice its
 // width, whose samples are means of two texels; Godot's, of an image of twice the target's size, whose samples
 // are means of 2 x 2 texels, into single floats. An invocation has each sample once for all pixels. Without it

@@ -4,13 +4,9 @@
 //   COLUMNS  the pixels that store() writes (a constant)
 //   LOADED   the pixels of load_run() (a constant)
 //
-// and LOAD_FROM and LOAD_CHANNELS as for variants/load.glsl. INVOCATIONS are those of a workgroup,
-// ROW_INVOCATIONS by default.
+// and LOAD_FROM and LOAD_CHANNELS as for variants/load.glsl.
 
-#ifndef INVOCATIONS
-#define INVOCATIONS ROW_INVOCATIONS
-#endif
-layout(local_size_x = INVOCATIONS) in;
+layout(local_size_x = ROW_INVOCATIONS) in;
 READ_IMAGE(1, source);
 WRITE_IMAGE(2);
 

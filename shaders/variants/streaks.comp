@@ -1,6 +1,3 @@
-#version 450
-#extension GL_GOOGLE_include_directive : require
-#extension GL_EXT_control_flow_attributes : require
 // An iteration of a streak (streaks.frag). The taps of a pass have the same offset at all pixels. So
 // an invocation writes a strip from top to bottom, and filters each row of a tap along the row once,
 // for the two rows of the target that it is part of. Without it `blender_streaks` takes

@@ -1,6 +1,3 @@
-#version 450
-#extension GL_GOOGLE_include_directive : require
-#extension GL_EXT_control_flow_attributes : require
 // The complete bloom of an image for devices without fast shared memory.
 #include "variants/fused_bloom.glsl"
 #include "variants/pixels.glsl"

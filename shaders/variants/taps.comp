@@ -1,6 +1,3 @@
-#version 450
-#extension GL_GOOGLE_include_directive : require
-#extension GL_EXT_control_flow_attributes : require
 // Downsamplings that are not linear, and the first passes of published methods: their bilinear taps are in a
 // window of the source. An invocation writes a strip from top to bottom. It has each row's taps once, and keeps
 // those of the rows that a pixel needs. Where the sides of the images are in a simple ratio (EXACT), columns share

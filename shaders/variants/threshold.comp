@@ -1,6 +1,3 @@
-#version 450
-#extension GL_GOOGLE_include_directive : require
-#extension GL_EXT_control_flow_attributes : require
 // The threshold pass if the bloom buffers have the size of the image.
 #include "lib/block.glsl"
 #include "lib/finite.glsl"

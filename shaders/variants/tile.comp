@@ -1,5 +1,3 @@
-#version 450
-#extension GL_GOOGLE_include_directive : require
 // The complete bloom of an image for GPUs.
 #include "variants/fused_bloom.glsl"
 

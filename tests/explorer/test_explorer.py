@@ -22,7 +22,7 @@ from tests.framebuffers import decode, make
 from tests.images import noise
 from vkbloom import KinoBloom, Pyramid, Renderer, Scene, Separable, Settings, glares, presets
 from vkbloom._explorer.controls import as_code, controls, settings_from
-from vkbloom._explorer.fast_pictures import picture_of, texts_of
+from vkbloom._explorer.fast_pictures import picture_of
 from vkbloom._explorer.viewer import Viewer
 from vkbloom._settings.registry import METHODS
 from vkbloom._views.pictures import png, reduced
@@ -180,13 +180,6 @@ class TestShown:
         assert (
             decode(picture_of(array, "final", is_encoded=True, stops=-3), tmp_path)[0, 0, 0] == 128
         )
-
-    def test_numbers_have_the_digits_that_tell_them_apart(self) -> None:
-        pixel = np.array([0.0, 0.1, -1e-3, 1e-5, 999999, 1e6, np.nan, -np.inf], np.float32)
-        expected = ["0.0", "0.1", "-0.001", "1.0e-05", "999999.0", "1.0e+06", "nan", "-inf"]
-        assert texts_of(pixel) == expected
-        assert texts_of(pixel[:2].astype(np.float16)) == ["0.0", "0.1"]
-        assert texts_of(np.array([0, 255], np.uint8)) == ["0", "255"]
 
     def test_depth(self, tmp_path: Path) -> None:
         depth = np.array([[0.5, 1.0]], np.float32)

@@ -156,18 +156,17 @@ def test_a_worker_without_the_adapter(
 
 
 @pytest.mark.parametrize(
-    ("what", "other"),
-    [("adapter", "Radeon"), ("driver", "Mesa 1.2.3"), ("version", "0.0.1")],
+    ("what", "other"), [("adapter", "Radeon"), ("driver", "Mesa 1.2.3"), ("version", "0.0.1")]
 )
 def test_a_worker_with_another_driver_or_version_is_refused(
     client: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, what: str, other: str
 ) -> None:
     """As if the grid were laid out on another machine than the workers."""
     lay_out = cluster.lay_out_there
-    changes: Any = {what: other}
 
     def laid_out_elsewhere(*arguments: Any) -> Any:
-        return replace(lay_out(*arguments), **changes)
+        layout = lay_out(*arguments)
+        return replace(layout, origin={**layout.origin, what: other})
 
     monkeypatch.setattr(cluster, "lay_out_there", laid_out_elsewhere)
     software = next(one for one in vkbloom.adapters() if one.type == "cpu")

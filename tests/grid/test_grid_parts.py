@@ -82,7 +82,7 @@ def laid_out(intensity: float) -> tuple[Grid, Layout]:
         reduce=None,
     )
     final = Variable(("y", "x", "channel"), (4, 4, 3), np.dtype(np.uint8), {})
-    return grid, Layout((0,), {"final": final}, "adapter", "driver", "1.0")
+    return grid, Layout((0,), {"final": final}, {"adapter": "adapter", "version": "1.0"})
 
 
 # Threads share the filters of warnings, so that zarr's own filter may be gone.

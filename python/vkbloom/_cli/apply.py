@@ -7,7 +7,6 @@ import dataclasses
 import functools
 import itertools
 import shutil
-import sys
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
@@ -25,12 +24,10 @@ from vkbloom._cli import no_bloom
 from vkbloom._cli.fields import Command
 from vkbloom._cli.image_files import (
     check_input_colour,
-    expand_option,
     finished,
     input_colour_option,
-    layer_option,
     read_picture,
-    subimage_option,
+    reading_options,
 )
 from vkbloom._cli.program import adapter_option, as_wrong_use, described
 from vkbloom._cli.sequences import PIPE, check_targets, is_stream, pairs
@@ -38,7 +35,7 @@ from vkbloom._cli.settings_options import Start, start_options
 from vkbloom._cli.terminal import complain, hides_progress, note, say, tell_device
 from vkbloom._io import image_writing
 from vkbloom._io.array_files import premultiplied
-from vkbloom._io.displayed import PRIMARIES, Saved, check_saved
+from vkbloom._io.displayed import PRIMARIES, Saved
 from vkbloom._io.glows import alike, grey_mask
 from vkbloom._io.images import Colour, Picture, SavedColour
 from vkbloom._renderer.frame_files import settings_facts
@@ -150,14 +147,12 @@ class Run:
         if no_bloom.is_without(frames):
             brightest = no_bloom.brightest_of(picture.pixels)
             text = no_bloom.reason(frames.settings, brightest)
-        elif self._is_straight(picture, target):
+        elif image_writing.is_straight(
+            of_format(target, self.options.pipe_format), is_associated=picture.stored.associated
+        ):
             text = no_bloom.hidden(frames["final"], frames.settings)
         if text:
             note(f"{name}: {text}" if self.several else text)
-
-    def _is_straight(self, picture: Picture, target: str) -> bool:
-        file = of_format(target, self.options.pipe_format)
-        return image_writing.is_straight(file, is_associated=picture.stored.associated)
 
     def _read(self, source: str, expand: float | None, *, is_blended: bool) -> Picture:
         options = self.options
@@ -226,13 +221,9 @@ class Run:
 
 def _send(file: Path, target: str) -> None:
     """Write a file's content to a stream."""
-    with contextlib.ExitStack() as stack:
-        content = stack.enter_context(file.open("rb"))
-        if target == PIPE:
-            shutil.copyfileobj(content, sys.stdout.buffer)
-            sys.stdout.buffer.flush()
-        else:
-            shutil.copyfileobj(content, stack.enter_context(open(target, "wb")))
+    with file.open("rb") as content, click.open_file(target, "wb") as stream:
+        shutil.copyfileobj(content, stream)
+        stream.flush()
 
 
 @click.command(cls=Command)
@@ -262,9 +253,7 @@ def _send(file: Path, target: str) -> None:
     help="Size of a number in OUT [default that of IN]",
 )
 @click.option("--overwrite", is_flag=True, help="OUT may be a file that is read as IN.")
-@expand_option
-@subimage_option
-@layer_option
+@reading_options
 @click.option(
     "--mask", metavar="FILE", type=click.Path(), help="A grey image: white glows, black does not."
 )
@@ -332,31 +321,19 @@ def _planned(options: Options, sources: list[str], out: str) -> list[Pair]:
     check_input_colour(options.input_colour)
     work = pairs(sources, out)
     settings, _ = options.start.of(work[0][0])
-    _check_colours(settings, options.saved)
+    _check_colours(settings, options)
     check_targets(work, out, overwrite=options.overwrite)
     with as_wrong_use():
         for target in {Path(target).suffix: target for _, target in work}.values():
-            checked = of_format(target, options.pipe_format)
-            _check_writable(checked)
-            image_writing.check_quality(checked, options.quality)
-            image_writing.check_bits(checked, options.bits)
+            file = of_format(target, options.pipe_format)
+            image_writing.check_options(file, options.saved, options.quality, options.bits)
     return work
 
 
-def _check_writable(target: str) -> None:
-    """Raise ValueError that names the file if its extension is not that of a writable format."""
-    try:
-        image_writing.check_writable(target)
-    except ValueError as error:
-        reason = str(error).removeprefix("path: ")
-        raise ValueError(f"{target}: {reason}, such as .png or .exr") from None
-
-
-def _check_colours(settings: vkbloom.Settings, saved: Saved) -> None:
+def _check_colours(settings: vkbloom.Settings, options: Options) -> None:
     """Raise click.UsageError for options that do not go together."""
-    options = {"--output-colour": saved.curve, "--view": saved.view}
-    options["--primaries"] = None if saved.primaries == "rec709" else saved.primaries
-    used = [name for name, value in options.items() if value is not None]
+    names = ("output_colour", "view", "primaries")
+    used = [name for name in names if getattr(options, name) not in (None, "rec709")]
     if settings.encoding != "none" and settings.alpha != "keep":
         raise click.UsageError(
             f"--alpha {settings.alpha} needs linear colours; leave out --encoding: OUT is encoded "
@@ -364,10 +341,9 @@ def _check_colours(settings: vkbloom.Settings, saved: Saved) -> None:
         )
     if settings.encoding != "none" and used:
         raise click.UsageError(
-            f"--encoding {settings.encoding} already encodes the output; leave out {used[0]}"
+            f"--encoding {settings.encoding} already encodes the output; leave out "
+            f"--{used[0].replace('_', '-')}"
         )
-    with as_wrong_use():
-        check_saved(saved)
 
 
 def _arguments(sources: tuple[str, ...], out: str | None) -> tuple[list[str], str]:

@@ -141,13 +141,13 @@ def command(
         if file or program or against or given("preset") or given("method"):
             raise click.UsageError("--sequence judges files alone, without a bloom")
         return judge(sequence, how["fps"], how["degrees"], as_json=as_json)
-    _check_choice(file, program, reference, against, page)
+    params = click.get_current_context().params
+    _check_choice(params)
     console = Console(stderr=True, quiet=is_quiet())
     with opened_renderer(adapter) as renderer, console.status("") as bar:
         if reference is not None:
             _add_reference(settings, reference)
-        preset = click.get_current_context().params["preset"]
-        sources = {program or preset or settings.method: program or settings}
+        sources = {program or params["preset"] or settings.method: program or settings}
         if against is not None:
             sources[against if against not in sources else f"{against} (against)"] = _other(
                 against, settings
@@ -236,21 +236,17 @@ def _other(against: str, settings: vkbloom.Settings) -> str | vkbloom.Settings:
     return vkbloom.presets[against]
 
 
-def _check_choice(
-    file: str | None,
-    program: str | None,
-    reference: str | None,
-    against: str | None,
-    page: str | None,
-) -> None:
-    if file is not None:
-        raise click.UsageError(f"{file}: there is no such file")
-    if against is not None and page is not None:
+def _check_choice(params: Mapping[str, Any]) -> None:
+    """Raise click.UsageError for parameters that do not go together."""
+    program = params["program"]
+    if params["file"] is not None:
+        raise click.UsageError(f"{params['file']}: there is no such file")
+    if params["against"] is not None and params["page"] is not None:
         raise click.UsageError("--html shows one bloom; --against writes --markdown")
     chosen = [name for name in ("preset", "method") if given(name)]
     if program is not None and chosen:
         raise click.UsageError(f"--command cannot be combined with --{chosen[0]} or FILE")
-    if program is not None and reference is not None:
+    if program is not None and params["reference"] is not None:
         raise click.UsageError("--reference needs FILE; a program has one framebuffer")
     if program is None and not chosen:
         raise click.UsageError("give FILE, --preset NAME, --method NAME or --command PROGRAM")

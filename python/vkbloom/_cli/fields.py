@@ -342,9 +342,7 @@ class Command(click.Command):
 
 def _method_of(args: Sequence[str]) -> str | None:
     """Return the method that the words of a call name, by --method or --preset."""
-    for word, after in itertools.zip_longest(args, args[1:], fillvalue=""):
-        option, sign, value = word.partition("=")
-        value = value if sign else after
+    for option, value in itertools.pairwise(args):
         if option == "--method" and (name := nearest(value, METHODS)):
             return name
         if option == "--preset" and (name := nearest(value, vkbloom.presets)):

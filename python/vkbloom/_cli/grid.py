@@ -15,7 +15,7 @@ from vkbloom._cli import fields, image_files, no_bloom, program, terminal
 from vkbloom._cli.scene_options import scene_options
 from vkbloom._cli.settings_options import DEFAULT_PRESETS, settings_options
 from vkbloom._grid import filling, layout, order, sources
-from vkbloom._io import image_writing
+from vkbloom._io import image_writing, safe_writing
 from vkbloom._io.images import Picture
 from vkbloom._renderer.frame_files import settings_facts
 from vkbloom._renderer.interruptible import opened_renderer
@@ -37,9 +37,7 @@ _PRESETS: Final = fields.NameOf("preset", vkbloom.presets)
 @click.option("--image-format", metavar="EXTENSION", default="png")
 @click.option("--part", metavar="I/N", help="Render part I of N, from 1, as above")
 @image_files.input_colour_option
-@image_files.subimage_option
-@image_files.layer_option
-@image_files.expand_option
+@image_files.reading_options
 @program.adapter_option
 @scene_options
 @settings_options
@@ -60,7 +58,7 @@ def command(*, source: str | None, out: str, words: tuple[str, ...], **given: An
     """
     suffix = f".{given['image_format'].lstrip('.')}"
     with program.as_wrong_use():
-        image_writing.check_writable(f"image{suffix}")
+        safe_writing.writer_of(f"image{suffix}")
         part = order.read_part(given["part"])
     is_store = out.endswith(".zarr")
     if not is_store and Path(out).suffix and not Path(out).is_dir():

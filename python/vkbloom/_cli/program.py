@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import importlib
+import itertools
 import os
 import sys
 from collections.abc import Iterator, Sequence
@@ -144,22 +145,18 @@ class Program(click.Group):
 
 
 def with_methods(words: Sequence[str]) -> list[str]:
-    """Load the files of custom methods after --method or --to; put the names there."""
-    changed = list(words)
-    for index, word in enumerate(changed):
-        option, _, value = word.partition("=")
-        if option not in ("--method", "--to"):
-            continue
-        joined = bool(value)
-        if not joined and index + 1 < len(changed):
-            value = changed[index + 1]
-        if value in METHODS or not os.path.isfile(value):
-            continue
-        name = vkbloom.load_method(value).method
-        if joined:
-            changed[index] = f"{option}={name}"
-        else:
-            changed[index + 1] = name
+    """Load the files of custom methods after --method or --to; put the names there.
+
+    These options and their values are words of their own then.
+    """
+    changed: list[str] = []
+    for word in words:
+        option, sign, value = word.partition("=")
+        is_joined = sign and option in ("--method", "--to", "--preset")
+        changed += [option, value] if is_joined else [word]
+    for index, (option, value) in enumerate(itertools.pairwise(changed), 1):
+        if option in ("--method", "--to") and value not in METHODS and os.path.isfile(value):
+            changed[index] = vkbloom.load_method(value).method
     return changed
 
 

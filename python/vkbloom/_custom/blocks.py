@@ -35,9 +35,28 @@ DIRECTIVES: Final = {
 class Directive:
     """A line of a header: its name, and the rest of the line without blanks around it."""
 
+    source: Source
     name: str
     value: str
     line: int
+
+    def identifier(self) -> str:
+        """Return the value; raise ValueError if it is not a name in GLSL."""
+        if not self.value:
+            raise self.fault("the name is missing")
+        if not re.fullmatch(r"[A-Za-z_]\w*", self.value, re.ASCII):
+            raise self.refused("is not a name; it needs letters, digits and _")
+        if self.value.startswith("gl_") or "__" in self.value:
+            raise self.refused("is reserved in GLSL")
+        return self.value
+
+    def fault(self, cause: object) -> ValueError:
+        """Return the error of the line."""
+        return self.source.fault(self.line, f"{self.name}: {cause}")
+
+    def refused(self, cause: str) -> ValueError:
+        """Return the error of the value."""
+        return self.fault(f"{self.value!r} {cause}")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -49,6 +68,15 @@ class Block:
     body: str
     line: int
     body_line: int
+
+    @property
+    def head(self) -> Directive:
+        """The directive that names the block."""
+        return self.directives[0]
+
+    def fault(self, line: int, cause: str) -> ValueError:
+        """Return the error of a line, which begins with the block's kind and name."""
+        return self.head.source.fault(line, f"{self.kind} {self.head.value}: {cause}")
 
     def last(self, name: str) -> Directive | None:
         """Return the last directive of a name: of several, this one counts."""
@@ -88,7 +116,8 @@ def read_block(source: Source, start: int, line: int) -> tuple[Block, int]:
         content = text[position:end].strip()
         if not content.startswith(MARK):
             break
-        kind = kind or kind_of(content)
+        kinds = (kind for kind in DIRECTIVES if content.startswith(MARK + kind))
+        kind = kind or next(kinds, "PASS")
         directives.append(read_directive(source, kind, content.removeprefix(MARK), line))
         position = min(end + 1, len(text))
         line += end < len(text)
@@ -97,19 +126,11 @@ def read_block(source: Source, start: int, line: int) -> tuple[Block, int]:
     return Block(kind, tuple(directives), text[position:end], first, line), end
 
 
-def kind_of(content: str) -> str:
-    """Return the kind of the block that begins with this line."""
-    for kind in ("TEXTURE", "BUFFER", "PARAM"):
-        if content.startswith(MARK + kind):
-            return kind
-    return "PASS"
-
-
 def read_directive(source: Source, kind: str, content: str, line: int) -> Directive:
     """Read a line of a header, without the mark."""
     for name in DIRECTIVES[kind]:
         if content.startswith(name):
-            return Directive(name, content.removeprefix(name).strip(), line)
+            return Directive(source, name, content.removeprefix(name).strip(), line)
     word = (re.findall(r"\w+", content) or [content])[0]
     block = "a pass" if kind == "PASS" else f"a block {kind}"
     begun = any(content.startswith(names[0]) for names in DIRECTIVES.values())

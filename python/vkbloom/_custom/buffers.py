@@ -7,8 +7,6 @@ import re
 from typing import Final
 
 from vkbloom._custom.blocks import Block, Directive
-from vkbloom._custom.names import check_name
-from vkbloom._custom.source import Source
 from vkbloom._custom.textures import read_hex
 
 #: Rows and columns of each type; all numbers have 4 bytes.
@@ -63,38 +61,33 @@ def packed_size(variables: tuple[Variable, ...], storage: bool) -> int:
     return end
 
 
-def read_buffer(source: Source, block: Block) -> Buffer:
+def read_buffer(block: Block) -> Buffer:
     """Read a block BUFFER."""
-    head = block.directives[0]
-    name = check_name(source, head, "BUFFER")
+    name, line = block.head.identifier(), block.line
     storage = block.last("STORAGE") is not None
-    variables = tuple(read_variable(source, directive) for directive in block.all("VAR"))
+    variables = tuple(read_variable(directive) for directive in block.all("VAR"))
     if not variables:
-        raise source.fault(head.line, f"BUFFER {name}: the block has no //!VAR")
+        raise block.fault(line, "the block has no //!VAR")
     size = packed_size(variables, storage)
     largest = LARGEST_STORAGE if storage else LARGEST_UNIFORM
     if size > largest:
-        raise source.fault(head.line, f"BUFFER {name}: {size} bytes are more than {largest}")
-    data = read_hex(source, block)
+        raise block.fault(line, f"{size} bytes are more than {largest}")
+    data = read_hex(block)
     if len(data) != size and not (storage and not data):
-        raise source.fault(
-            block.body_line, f"BUFFER {name}: the data has {len(data)} bytes, not {size}"
-        )
-    return Buffer(name, variables, storage, size, data or None, head.line)
+        raise block.fault(block.body_line, f"the data has {len(data)} bytes, not {size}")
+    return Buffer(name, variables, storage, size, data or None, line)
 
 
-def read_variable(source: Source, directive: Directive) -> Variable:
+def read_variable(directive: Directive) -> Variable:
     """Read a directive VAR: a type, a name, and for an array its length."""
     match = re.fullmatch(r"(\S+)\s+([A-Za-z_]\w*)\s*(\[\s*(\S*?)\s*\])?", directive.value, re.ASCII)
     if not match:
-        raise source.fault(
-            directive.line, f"VAR: {directive.value!r} is not 'type name' or 'type name[count]'"
-        )
+        raise directive.refused("is not 'type name' or 'type name[count]'")
     kind, name, array, length = match.groups()
     if kind not in TYPES:
-        raise source.fault(directive.line, f"VAR: {kind!r} is not one of {', '.join(TYPES)}")
+        raise directive.fault(f"{kind!r} is not one of {', '.join(TYPES)}")
     if array is None:
         return Variable(kind, name, None)
     if not re.fullmatch(r"\d{1,9}", length or "", re.ASCII) or int(length) < 1:
-        raise source.fault(directive.line, f"VAR: {length!r} is not an array's length, 1 or more")
+        raise directive.fault(f"{length!r} is not an array's length, 1 or more")
     return Variable(kind, name, int(length))

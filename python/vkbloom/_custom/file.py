@@ -5,12 +5,12 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterator
 
-from vkbloom._custom.blocks import read_blocks
+from vkbloom._custom.blocks import Directive, read_blocks
 from vkbloom._custom.buffers import Buffer, read_buffer
 from vkbloom._custom.expressions import ExpressionError, Values, evaluate
 from vkbloom._custom.names import BLOOM, GLOW, HOOKED, STAGES, stage_of
 from vkbloom._custom.params import Param, read_param
-from vkbloom._custom.passes import CustomPass, Expression, read_pass
+from vkbloom._custom.passes import CustomPass, read_pass
 from vkbloom._custom.source import Source
 from vkbloom._custom.textures import Texture, read_texture
 
@@ -62,13 +62,13 @@ def read_file(source: Source) -> CustomFile:
     passes: list[CustomPass] = []
     for block in read_blocks(source):
         if block.kind == "PARAM":
-            params.append(read_param(source, block))
+            params.append(read_param(block))
         elif block.kind == "TEXTURE":
-            textures.append(read_texture(source, block))
+            textures.append(read_texture(block))
         elif block.kind == "BUFFER":
-            buffers.append(read_buffer(source, block))
+            buffers.append(read_buffer(block))
         else:
-            passes.append(read_pass(source, block))
+            passes.append(read_pass(block))
     if not passes:
         raise source.fault(1, "the file has no pass; a pass begins with //!HOOK")
     file = CustomFile(source, tuple(params), tuple(textures), tuple(buffers), tuple(passes))
@@ -100,14 +100,12 @@ def check_names(file: CustomFile) -> None:
         for binding in item.bindings:
             name = stage_of(binding.value)
             if name not in {*reached, *file.given, HOOKED, GLOW}:
-                raise file.source.fault(
-                    binding.line, unknown_texture(file, number, stage, binding.value)
-                )
+                raise binding.fault(unknown_texture(file, number, stage, binding.value))
         sizes = dict.fromkeys({*reached, *KNOWN_SIZES, "MAINPRESUB"}, (7, 5))
         if "MAIN" not in reached:
             del sizes["MAINPRESUB"]
         for expression in (item.when, item.width, item.height):
-            check_expression(file, expression, Values(sizes, words))
+            check_expression(expression, Values(sizes, words))
         if saved := item.saved_at(stage):
             known.add(saved)
 
@@ -116,22 +114,22 @@ def unknown_texture(file: CustomFile, index: int, stage: str, name: str) -> str:
     """Return why a texture is not known to a pass."""
     later = [item for at, item in list(file.runs())[index:] if item.saved_at(at) == stage_of(name)]
     if later:
-        return f"BIND: {name!r} is saved only by a later pass, in line {later[0].line}"
+        return f"{name!r} is saved only by a later pass, in line {later[0].line}"
     if stage_of(name) in STAGES:
-        return f"BIND: the stage {name} comes after the pass's own, {stage}"
+        return f"the stage {name} comes after the pass's own, {stage}"
     saved = [item.save.value for _, item in list(file.runs())[:index] if item.save]
     known = dict.fromkeys([HOOKED, GLOW, *saved, *file.given])
-    return f"BIND: {name!r} is not a texture here; known are {', '.join(known)} and the stages"
+    return f"{name!r} is not a texture here; known are {', '.join(known)} and the stages"
 
 
-def check_expression(file: CustomFile, expression: Expression | None, values: Values) -> None:
+def check_expression(expression: Directive | None, values: Values) -> None:
     """Check words and operands of an expression; its numbers are checked when it runs."""
     if expression is None:
         return
     try:
-        evaluate(expression.text, values, finite=False)
+        evaluate(expression.value, values, finite=False)
     except ExpressionError as error:
-        raise file.source.fault(expression.line, f"{expression.name}: {error}") from None
+        raise expression.fault(error) from None
 
 
 def check_picture(file: CustomFile) -> None:

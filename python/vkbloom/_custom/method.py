@@ -18,7 +18,7 @@ from vkbloom._argument_types import checked
 from vkbloom._custom.file import CustomFile, read_file
 from vkbloom._custom.params import RANGES, Param
 from vkbloom._custom.planning import Request, planned
-from vkbloom._custom.resources import made_resources
+from vkbloom._custom.rows import made_resources
 from vkbloom._custom.shaders import Shaders
 from vkbloom._custom.source import Source, read_source
 from vkbloom._settings.blocks import settings_block

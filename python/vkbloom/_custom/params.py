@@ -7,9 +7,7 @@ import math
 import re
 from typing import Final, Literal, get_args
 
-from vkbloom._custom.blocks import Block
-from vkbloom._custom.names import check_name
-from vkbloom._custom.source import Source
+from vkbloom._custom.blocks import Block, Directive
 
 Number = Literal["float", "int", "uint"]
 #: How GLSL sees the value: a member of the uniform block, a constant, or a macro.
@@ -51,38 +49,36 @@ class Param:
         return value
 
 
-def read_param(source: Source, block: Block) -> Param:
+def read_param(block: Block) -> Param:
     """Read a block PARAM."""
-    head = block.directives[0]
-    name = check_name(source, head, "PARAM")
-    number, use, is_enum = read_type(source, block)
+    name, first = block.head.identifier(), block.line
+    number, use, is_enum = read_type(block)
     described = block.last("DESC")
     description = described.value if described else ""
     line, text = body_line(block)
     if is_enum:
-        names = read_names(source, block)
-        return Param(name, description, "int", use, 0, len(names) - 1, 0, names, head.line)
+        names = read_names(block)
+        return Param(name, description, "int", use, 0, len(names) - 1, 0, names, first)
     low, high = RANGES[number]
     for limit in block.directives:
         if limit.name == "MINIMUM":
-            low = read_number(source, limit.line, "MINIMUM", limit.value, number)
+            low = read_number(limit, number)
         elif limit.name == "MAXIMUM":
-            high = read_number(source, limit.line, "MAXIMUM", limit.value, number)
+            high = read_number(limit, number)
     if not text:
-        raise source.fault(head.line, f"PARAM {name}: the block has no default value")
-    default = read_number(source, line, f"the default of {name}", text, number)
+        raise block.fault(first, "the block has no default value")
+    given = Directive(block.head.source, f"the default of {name}", text, line)
+    default = read_number(given, number)
     if not low <= default <= high:
-        raise source.fault(
-            line, f"the default of {name}: {default:g} is out of range, {low:g} to {high:g}"
-        )
-    return Param(name, description, number, use, low, high, default, (), head.line)
+        raise given.fault(f"{default:g} is out of range, {low:g} to {high:g}")
+    return Param(name, description, number, use, low, high, default, (), first)
 
 
-def read_type(source: Source, block: Block) -> tuple[Number, Use, bool]:
+def read_type(block: Block) -> tuple[Number, Use, bool]:
     """Return number and use of the parameter, and whether it is an ENUM."""
-    head, declared = block.directives[0], block.last("TYPE")
+    declared = block.last("TYPE")
     if declared is None:
-        raise source.fault(head.line, f"PARAM {head.value}: the block has no //!TYPE")
+        raise block.fault(block.line, "the block has no //!TYPE")
     words = declared.value.split()
     uses: dict[str, Use] = {"DYNAMIC": "uniform", "CONSTANT": "constant"}
     if words == ["DEFINE"]:
@@ -94,10 +90,9 @@ def read_type(source: Source, block: Block) -> tuple[Number, Use, bool]:
     for number in get_args(Number):
         if kinds == [number]:
             return number, use, False
-    raise source.fault(
-        declared.line,
-        f"TYPE: {declared.value!r} is not one of float, int, uint, DYNAMIC or CONSTANT with one of "
-        "these, DEFINE, ENUM int, ENUM DEFINE",
+    raise declared.refused(
+        "is not one of float, int, uint, DYNAMIC or CONSTANT with one of these, DEFINE, ENUM int, "
+        "ENUM DEFINE"
     )
 
 
@@ -108,21 +103,23 @@ def body_line(block: Block) -> tuple[int, str]:
     return block.body_line + skipped.count("\n"), text.rstrip()
 
 
-def read_number(source: Source, line: int, what: str, text: str, number: Number) -> float:
-    """Read a number, which must be all of the text."""
+def read_number(given: Directive, number: Number) -> float:
+    """Read a number, which must be all of the value."""
+    text = given.value
     if not NUMBERS[number].fullmatch(text):
         shown = text.partition("\n")[0]
-        raise source.fault(line, f"{what}: {shown!r} is not a number of type {number}")
+        raise given.fault(f"{shown!r} is not a number of type {number}")
     value = float(text) if number == "float" else int(text.partition(".")[0])
     low, high = RANGES[number]
     if not (low <= value <= high) or not math.isfinite(value):
-        raise source.fault(line, f"{what}: {text} is not a number of type {number}")
+        raise given.fault(f"{text} is not a number of type {number}")
     return value
 
 
-def read_names(source: Source, block: Block) -> tuple[str, ...]:
+def read_names(block: Block) -> tuple[str, ...]:
     """Read the names of an ENUM, one on each line."""
     names: list[str] = []
+    source = block.head.source
     for offset, text in enumerate(block.body.split("\n")):
         name, line = text.strip(), block.body_line + offset
         if not name:
@@ -133,6 +130,5 @@ def read_names(source: Source, block: Block) -> tuple[str, ...]:
             raise source.fault(line, f"ENUM: {name!r} is given twice")
         names.append(name)
     if not names:
-        head = block.directives[0]
-        raise source.fault(head.line, f"PARAM {head.value}: the ENUM has no names")
+        raise block.fault(block.line, "the ENUM has no names")
     return tuple(names)

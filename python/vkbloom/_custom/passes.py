@@ -8,23 +8,13 @@ from typing import Final
 
 from vkbloom._custom.blocks import Block, Directive
 from vkbloom._custom.expressions import ExpressionError, tokens
-from vkbloom._custom.names import GLOW, HOOKED, LONGEST, STAGES, check_name, stage_of
-from vkbloom._custom.source import Source
+from vkbloom._custom.names import GLOW, HOOKED, LONGEST, STAGES, stage_of
 
 MAX_STAGES: Final = 16
 MAX_BINDINGS: Final = 16
 #: Threads of a workgroup: what every device of Vulkan has.
 MAX_THREADS: Final = 1024
 LARGEST_BLOCK: Final = 16384
-
-
-@dataclasses.dataclass(frozen=True)
-class Expression:
-    """An expression with its line."""
-
-    text: str
-    line: int
-    name: str
 
 
 @dataclasses.dataclass(frozen=True)
@@ -43,9 +33,9 @@ class CustomPass:
     stages: tuple[str, ...]
     bindings: tuple[Directive, ...]
     save: Directive | None
-    width: Expression | None
-    height: Expression | None
-    when: Expression | None
+    width: Directive | None
+    height: Directive | None
+    when: Directive | None
     compute: Compute | None
     body: str
     body_line: int
@@ -58,56 +48,55 @@ class CustomPass:
         return stage_of(self.save.value)
 
 
-def read_pass(source: Source, block: Block) -> CustomPass:
+def read_pass(block: Block) -> CustomPass:
     """Read a pass."""
     save = block.last("SAVE")
     if save:
-        name = check_name(source, save, "SAVE")
+        name = save.identifier()
         if stage_of(name) == GLOW:
-            raise source.fault(save.line, "SAVE: GLOW is what glows; save under another name")
+            raise save.fault("GLOW is what glows; save under another name")
         if len(name) > LONGEST:
-            raise source.fault(save.line, f"SAVE: {name!r} is longer than {LONGEST} characters")
-    check_ignored(source, block)
+            raise save.refused(f"is longer than {LONGEST} characters")
+    check_ignored(block)
     bindings = block.all("BIND")
     if len(bindings) > MAX_BINDINGS:
-        raise source.fault(bindings[MAX_BINDINGS].line, f"BIND: a pass has at most {MAX_BINDINGS}")
+        raise bindings[MAX_BINDINGS].fault(f"a pass has at most {MAX_BINDINGS}")
     for binding in bindings:
-        check_name(source, binding, "BIND")
+        binding.identifier()
     title = block.last("DESC")
     return CustomPass(
         title.value if title else "",
-        read_stages(source, block),
+        read_stages(block),
         tuple(bindings),
         save,
-        read_expression(source, block, "WIDTH"),
-        read_expression(source, block, "HEIGHT"),
-        read_expression(source, block, "WHEN"),
-        read_compute(source, block),
+        read_expression(block, "WIDTH"),
+        read_expression(block, "HEIGHT"),
+        read_expression(block, "WHEN"),
+        read_compute(block),
         block.body,
         block.body_line,
         block.line,
     )
 
 
-def read_stages(source: Source, block: Block) -> tuple[str, ...]:
+def read_stages(block: Block) -> tuple[str, ...]:
     """Return the stages of a pass, in the order in which they run."""
     hooks = block.all("HOOK")
     if not hooks:
-        raise source.fault(block.line, "the pass has no //!HOOK, so it never runs")
+        raise block.head.source.fault(block.line, "the pass has no //!HOOK, so it never runs")
     if len(hooks) > MAX_STAGES:
-        raise source.fault(hooks[MAX_STAGES].line, f"HOOK: a pass has at most {MAX_STAGES}")
+        raise hooks[MAX_STAGES].fault(f"a pass has at most {MAX_STAGES}")
     for hook in hooks:
         if stage_of(hook.value) not in STAGES:
-            raise source.fault(
-                hook.line,
-                f"HOOK: the stage {hook.value} is never reached, since pictures are linear RGB; "
-                f"it is not one of {', '.join(STAGES)}",
+            raise hook.fault(
+                f"the stage {hook.value} is never reached, since pictures are linear RGB; it is "
+                f"not one of {', '.join(STAGES)}"
             )
     named = {stage_of(hook.value) for hook in hooks}
     return tuple(stage for stage in STAGES if stage in named)
 
 
-def read_expression(source: Source, block: Block, name: str) -> Expression | None:
+def read_expression(block: Block, name: str) -> Directive | None:
     """Read an expression; an empty one counts as none."""
     directive = block.last(name)
     if directive is None or not directive.value:
@@ -115,8 +104,8 @@ def read_expression(source: Source, block: Block, name: str) -> Expression | Non
     try:
         tokens(directive.value)
     except ExpressionError as error:
-        raise source.fault(directive.line, f"{name}: {error}") from None
-    return Expression(directive.value, directive.line, name)
+        raise directive.fault(error) from None
+    return directive
 
 
 def numbers(directive: Directive) -> list[int] | None:
@@ -127,45 +116,35 @@ def numbers(directive: Directive) -> list[int] | None:
     return [int(word) for word in words]
 
 
-def read_compute(source: Source, block: Block) -> Compute | None:
+def read_compute(block: Block) -> Compute | None:
     """Read //!COMPUTE: two or four numbers."""
     directive = block.last("COMPUTE")
     if directive is None:
         return None
     given = numbers(directive)
     if given is None or len(given) not in (2, 4):
-        raise source.fault(
-            directive.line, f"COMPUTE: {directive.value!r} is not two or four numbers"
-        )
+        raise directive.refused("is not two or four numbers")
     width, height = given[:2]
     threads = (given[-2], given[-1])
     if not (1 <= width <= LARGEST_BLOCK and 1 <= height <= LARGEST_BLOCK):
-        raise source.fault(
-            directive.line,
-            f"COMPUTE: {width} x {height} pixels are out of range, 1 to {LARGEST_BLOCK}",
-        )
+        cause = f"pixels are out of range, 1 to {LARGEST_BLOCK}"
+        raise directive.fault(f"{width} x {height} {cause}")
     if min(threads) < 1 or threads[0] * threads[1] > MAX_THREADS:
-        raise source.fault(
-            directive.line,
-            f"COMPUTE: {threads[0]} x {threads[1]} threads are out of range, 1 to {MAX_THREADS}",
-        )
+        cause = f"threads are out of range, 1 to {MAX_THREADS}"
+        raise directive.fault(f"{threads[0]} x {threads[1]} {cause}")
     return Compute((width, height), threads)
 
 
-def check_ignored(source: Source, block: Block) -> None:
+def check_ignored(block: Block) -> None:
     """Check the directives that change no pixel here: OFFSET and COMPONENTS."""
     for directive in block.all("COMPONENTS"):
         given = numbers(directive)
         if given is None or len(given) != 1 or not 1 <= given[0] <= 4:
-            raise source.fault(
-                directive.line, f"COMPONENTS: {directive.value!r} is not a number, 1 to 4"
-            )
+            raise directive.refused("is not a number, 1 to 4")
     for directive in block.all("OFFSET"):
         words = directive.value.split()
         number = r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?"
         if words != ["ALIGN"] and not (
             len(words) == 2 and all(re.fullmatch(number, word, re.ASCII) for word in words)
         ):
-            raise source.fault(
-                directive.line, f"OFFSET: {directive.value!r} is not two numbers or ALIGN"
-            )
+            raise directive.refused("is not two numbers or ALIGN")

@@ -7,13 +7,13 @@ import itertools
 from collections.abc import Mapping
 from typing import Final
 
+from vkbloom._custom.blocks import Directive
 from vkbloom._custom.buffers import Buffer
 from vkbloom._custom.expressions import ExpressionError, Values, evaluate, rounded
 from vkbloom._custom.file import CustomFile
 from vkbloom._custom.names import GLOW, HOOKED, LONGEST, RESIZING, STAGES
-from vkbloom._custom.passes import CustomPass, Expression
-from vkbloom._custom.resources import Resources
-from vkbloom._custom.rows import Row
+from vkbloom._custom.passes import CustomPass
+from vkbloom._custom.rows import Resources, Row
 from vkbloom._custom.shaders import BLACK, COPY, DIFFERENCE, Shaders, package_shader
 from vkbloom._custom.textures import Texture
 
@@ -74,22 +74,16 @@ class Planner:
         for stage in STAGES:
             self._saved.pop(stage, None)
             self._left[stage] = self._picture
-            for item in file.passes:
-                if stage in item.stages and self._holds(item.when, stage):
+            for item in (item for item in file.passes if stage in item.stages):
+                if item.when is None or self._value(item.when, stage) != 0:
                     self._run(stage, item)
         self._check_size()
-
-    def _holds(self, when: Expression | None, stage: str) -> bool:
-        return when is None or self._value(when, stage) != 0
 
     def _run(self, stage: str, item: CustomPass) -> None:
         images = self._images(stage)
         for binding in item.bindings:
             if binding.value not in images and binding.value not in self._file.given:
-                raise self._file.source.fault(
-                    binding.line,
-                    f"BIND: {binding.value!r} was not saved, since the WHEN of its pass is 0",
-                )
+                raise binding.refused("was not saved, since the WHEN of its pass is 0")
         size = (self._side(item.width, stage, 0), self._side(item.height, stage, 1))
         saved = item.saved_at(stage)
         if saved is None and stage not in RESIZING and size != self._picture.size:
@@ -113,25 +107,22 @@ class Planner:
             images["MAINPRESUB"] = images["MAIN"]
         return images
 
-    def _value(self, expression: Expression, stage: str) -> float:
+    def _value(self, expression: Directive, stage: str) -> float:
         """Return the value of an expression at this place."""
         sizes = {name: image.size for name, image in self._images(stage).items()}
         sizes["OUTPUT"] = sizes["NATIVE_CROPPED"] = self._request.frame
         try:
-            return evaluate(expression.text, Values(sizes, self._words))
+            return evaluate(expression.value, Values(sizes, self._words))
         except ExpressionError as error:
-            raise self._file.source.fault(expression.line, f"{expression.name}: {error}") from None
+            raise expression.fault(error) from None
 
-    def _side(self, expression: Expression | None, stage: str, axis: int) -> int:
+    def _side(self, expression: Directive | None, stage: str, axis: int) -> int:
         """Return a side of a pass's result."""
         if expression is None:
             return self._picture.size[axis]
         side = rounded(self._value(expression, stage))
         if not 1 <= side <= LARGEST_SIDE:
-            raise self._file.source.fault(
-                expression.line,
-                f"{expression.name}: a side of {side} pixels is out of range, 1 to {LARGEST_SIDE}",
-            )
+            raise expression.fault(f"a side of {side} pixels is out of range, 1 to {LARGEST_SIDE}")
         return side
 
     def _check_size(self) -> None:

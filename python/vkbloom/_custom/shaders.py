@@ -14,8 +14,7 @@ from vkbloom._custom.compiler import cached_code, compile_shader
 from vkbloom._custom.file import CustomFile, read_file
 from vkbloom._custom.glsl import Shader, write_shader
 from vkbloom._custom.passes import CustomPass
-from vkbloom._custom.resources import made_resources
-from vkbloom._custom.rows import CoreShader
+from vkbloom._custom.rows import CoreShader, made_resources
 from vkbloom._custom.source import Source
 from vkbloom._custom.spirv import shared_bytes
 

@@ -10,8 +10,6 @@ from typing import Final, Literal, TypeVar
 import numpy as np
 
 from vkbloom._custom.blocks import Block
-from vkbloom._custom.names import check_name
-from vkbloom._custom.source import Source
 
 Scalar = Literal["float", "int", "uint"]
 Filter = Literal["NEAREST", "LINEAR"]
@@ -29,7 +27,8 @@ LARGEST_SIDES: Final = {1: 4096, 2: 4096, 3: 256}
 class TextureFormat:
     """A format: its number in Vulkan, its name in GLSL, and how the file's data becomes texels.
 
-    `file_bytes` are those of a texel in the file.
+    `layout`: "" for a format that images of shaders cannot have.
+    `file_bytes`: Those of a texel in the file.
     """
 
     vulkan: int
@@ -38,7 +37,6 @@ class TextureFormat:
     channels: int
     file_bytes: int
     read: Callable[[bytes], np.ndarray]
-    stored: bool = True
 
 
 def as_channels(
@@ -99,12 +97,11 @@ def numbered(bits: int, kind: str, channels: int, file: str) -> TextureFormat:
     letter = {"": "u", "s": "i"}.get(kind, kind) + str(bits // 8)
     return TextureFormat(
         NUMBERS[bits, kind][index],
-        ("r", "rg", "rgba")[index] + str(bits) + LAYOUT_KINDS[kind],
+        f"{('r', 'rg', 'rgba')[index]}{bits}{LAYOUT_KINDS[kind]}" if channels != 3 else "",
         SCALARS.get(kind, "float"),
         channels,
         channels * int(file[1:]),
         as_channels(file, channels, letter),
-        channels != 3,
     )
 
 
@@ -122,10 +119,10 @@ def made_formats() -> dict[str, TextureFormat]:
         formats[f"{names}16f"] = numbered(16, "f", channels, "f4")
         formats[f"{names}16hf"] = numbered(16, "f", channels, "f2")
     formats["bgra8"] = dataclasses.replace(
-        formats["rgba8"], read=as_channels("u1", 4, "u1", "bgra"), stored=False
+        formats["rgba8"], layout="", read=as_channels("u1", 4, "u1", "bgra")
     )
-    formats["rgb565"] = TextureFormat(RGBA32_FLOAT, "", "float", 3, 2, packed_565, False)
-    formats["rgb10a2"] = TextureFormat(RGBA32_FLOAT, "", "float", 4, 4, packed_10, False)
+    formats["rgb565"] = TextureFormat(RGBA32_FLOAT, "", "float", 3, 2, packed_565)
+    formats["rgb10a2"] = TextureFormat(RGBA32_FLOAT, "", "float", 4, 4, packed_10)
     return formats
 
 
@@ -152,72 +149,58 @@ class Texture:
         return f"{prefix}{'image' if self.storage else 'sampler'}{len(self.sides)}D"
 
 
-def read_texture(source: Source, block: Block) -> Texture:
+def read_texture(block: Block) -> Texture:
     """Read a block TEXTURE."""
-    head = block.directives[0]
-    name = check_name(source, head, "TEXTURE")
+    name = block.head.identifier()
     storage = block.last("STORAGE") is not None
-    sides = read_sides(source, block)
+    sides = read_sides(block)
     directive = block.last("FORMAT")
     if directive is None:
-        raise source.fault(head.line, f"TEXTURE {name}: the block has no //!FORMAT")
+        raise block.fault(block.line, "the block has no //!FORMAT")
     if directive.value not in FORMATS:
-        raise source.fault(
-            directive.line, f"FORMAT: {directive.value!r} is not one of {', '.join(FORMATS)}"
-        )
+        raise directive.refused(f"is not one of {', '.join(FORMATS)}")
     texels = FORMATS[directive.value]
-    if storage and not texels.stored:
-        raise source.fault(
-            directive.line, f"FORMAT: {directive.value} has no STORAGE; use rgba8 or rgba32f"
-        )
-    filtering = read_word(source, block, "FILTER", FILTERS)
+    if storage and not texels.layout:
+        raise directive.fault(f"{directive.value} has no STORAGE; use rgba8 or rgba32f")
+    filtering = read_word(block, "FILTER", FILTERS)
     if filtering == "LINEAR" and texels.scalar != "float":
-        line = block.all("FILTER")[-1].line
-        raise source.fault(
-            line, f"FILTER: LINEAR is not possible with integers ({directive.value})"
-        )
-    data = read_hex(source, block)
+        wrong = block.all("FILTER")[-1]
+        raise wrong.fault(f"LINEAR is not possible with integers ({directive.value})")
+    data = read_hex(block)
     size = texels.file_bytes * int(np.prod(sides))
     if len(data) != size and not (storage and not data):
-        line = block.body_line
-        raise source.fault(
-            line,
-            f"TEXTURE {name}: the data has {len(data)} bytes, not {size}: "
-            f"{' x '.join(map(str, sides))} texels of {texels.file_bytes} ({directive.value})",
-        )
+        wanted = f"{' x '.join(map(str, sides))} texels of {texels.file_bytes} ({directive.value})"
+        cause = f"the data has {len(data)} bytes, not {size}: {wanted}"
+        raise block.fault(block.body_line, cause)
     return Texture(
         name,
         sides,
         texels,
         filtering,
-        read_word(source, block, "BORDER", BORDERS),
+        read_word(block, "BORDER", BORDERS),
         storage,
         texels.read(data).tobytes() if data else None,
-        head.line,
+        block.line,
     )
 
 
-def read_sides(source: Source, block: Block) -> tuple[int, ...]:
+def read_sides(block: Block) -> tuple[int, ...]:
     """Read //!SIZE: one to three numbers."""
     directive = block.last("SIZE")
     if directive is None:
         return (1, 1)
     words = directive.value.split()
     if not 1 <= len(words) <= 3 or not all(re.fullmatch(r"\d+", word, re.ASCII) for word in words):
-        raise source.fault(
-            directive.line, f"SIZE: {directive.value!r} is not one, two or three numbers"
-        )
+        raise directive.refused("is not one, two or three numbers")
     sides = tuple(int(word) for word in words)
     largest = LARGEST_SIDES[len(sides)]
     if not all(1 <= side <= largest for side in sides):
-        raise source.fault(
-            directive.line,
-            f"SIZE: {directive.value} is out of range, 1 to {largest} in {len(sides)} dimensions",
-        )
+        cause = f"is out of range, 1 to {largest} in {len(sides)} dimensions"
+        raise directive.fault(f"{directive.value} {cause}")
     return sides
 
 
-def read_word(source: Source, block: Block, name: str, words: tuple[Word, ...]) -> Word:
+def read_word(block: Block, name: str, words: tuple[Word, ...]) -> Word:
     """Read a directive whose value is one of some words; the first is the default."""
     directive = block.last(name)
     if directive is None:
@@ -225,23 +208,17 @@ def read_word(source: Source, block: Block, name: str, words: tuple[Word, ...]) 
     for word in words:
         if directive.value == word:
             return word
-    raise source.fault(
-        directive.line, f"{name}: {directive.value!r} is not one of {', '.join(words)}"
-    )
+    raise directive.refused(f"is not one of {', '.join(words)}")
 
 
-def read_hex(source: Source, block: Block) -> bytes:
+def read_hex(block: Block) -> bytes:
     """Read the body's data: hexadecimal digits, with blanks and line breaks anywhere."""
     wrong = re.search(r"[^0-9a-fA-F\s]", block.body)
-    what = f"{block.kind} {block.directives[0].value}"
     if wrong:
         line = block.body_line + block.body.count("\n", 0, wrong.start())
-        raise source.fault(
-            line, f"{what}: {wrong[0]!r} is not a hexadecimal digit; the body is data only"
-        )
+        raise block.fault(line, f"{wrong[0]!r} is not a hexadecimal digit; the body is data only")
     digits = "".join(block.body.split())
     if len(digits) % 2:
-        raise source.fault(
-            block.body_line, f"{what}: {len(digits)} hexadecimal digits are not full bytes"
-        )
+        cause = f"{len(digits)} hexadecimal digits are not full bytes"
+        raise block.fault(block.body_line, cause)
     return bytes.fromhex(digits)

@@ -1,4 +1,4 @@
-"""Framebuffers as PNG, optimized for speed (the sRGB curve is a table); pixels as text."""
+"""Framebuffers as PNG, optimized for speed: the sRGB curve is a table."""
 
 from __future__ import annotations
 
@@ -39,16 +39,3 @@ def _levels(stops: float, is_encoded: bool) -> NDArray[np.uint8]:
         colours = halves.repeat(3, axis=2)
         shown = pictures.picture(colours, encoded=is_encoded, stops=stops)
     return shown[0, :, 0]
-
-
-def texts_of(pixel: NDArray[Any]) -> list[str]:
-    """Return the numbers of a pixel with as many digits as identify each value of the dtype."""
-    return [_text(number) for number in np.atleast_1d(pixel)]
-
-
-def _text(number: Any) -> str:
-    if number.dtype.kind == "u" or not np.isfinite(number):
-        return str(number)
-    if number == 0 or 1e-4 <= abs(float(number)) < 1e6:
-        return np.format_float_positional(number, trim="0")
-    return np.format_float_scientific(number, trim="0")

@@ -82,16 +82,13 @@ class Server:
 
     def allows(self, request: HTTPServerRequest, token: str) -> bool:
         """Return whether a request names this server and knows the token."""
-        return request.host in self._hosts and hmac.compare_digest(
+        return request.host in self.hosts and hmac.compare_digest(
             token.encode(), self.token.encode()
         )
 
-    def is_origin(self, origin: str) -> bool:
-        """Return whether a page's origin is this server."""
-        return origin in {f"http://{host}" for host in self._hosts}
-
     @property
-    def _hosts(self) -> set[str]:
+    def hosts(self) -> set[str]:
+        """The names of this server in requests."""
         return {f"{_ADDRESS}:{self.port}", f"localhost:{self.port}"}
 
     async def stop(self) -> None:
@@ -143,7 +140,7 @@ class _Socket(WebSocketHandler):
         self._answers: asyncio.Future[None] | None = None
 
     def check_origin(self, origin: str) -> bool:
-        return self._server.is_origin(origin)
+        return origin in {f"http://{host}" for host in self._server.hosts}
 
     def prepare(self) -> None:
         # A browser always sends the origin. Tornado accepts sockets without one.

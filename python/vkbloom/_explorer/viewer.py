@@ -48,7 +48,7 @@ from vkbloom._explorer.controls import (
     described,
     settings_from,
 )
-from vkbloom._explorer.fast_pictures import picture_of, texts_of
+from vkbloom._explorer.fast_pictures import picture_of
 from vkbloom._io.array_files import read
 from vkbloom._io.expansion import PHOTO_EXPANSION
 from vkbloom._renderer.plans import Pass
@@ -224,12 +224,8 @@ class Viewer:
 
     def _save(self, message: Mapping[str, Any]) -> Answer:
         settings = settings_from(message.get("settings"))
-        stops = check_number("stops", message.get("stops", 0.0), -32, 32)
-        frames, *_ = self._render(settings, self._own_size, message)
-        (name,) = frames
-        is_encoded = settings.encoding != "none"
-        picture = picture_of(frames[name], name, is_encoded=is_encoded, stops=stops)
-        return {"framebuffer": name}, [picture]
+        frames, picture, *_ = self._render(settings, self._own_size, message)
+        return {"framebuffer": next(iter(frames))}, [picture]
 
     def _frame(self, message: Mapping[str, Any]) -> Answer:
         asked = message.get("sides")
@@ -238,7 +234,6 @@ class Viewer:
         size = message.get("size")
         size = self._own_size if size is None else check_size("size", size)
         size = (min(size[0], _LARGEST_SIDE), min(size[1], _LARGEST_SIDE))
-        stops = check_number("stops", message.get("stops", 0.0), -32, 32)
         self._looked_at(message)
         at = None if message.get("at") is None else _position(message["at"])
         arrays = self._arrays_of(message.get("view"))
@@ -249,16 +244,13 @@ class Viewer:
                 continue
             try:
                 settings = settings_from(asked[side])
-                frames, names, plan = self._render(settings, size, message)
-                (shown,) = frames
-                picture = picture_of(
-                    frames[shown], shown, is_encoded=settings.encoding != "none", stops=stops
-                )
+                frames, picture, names, plan = self._render(settings, size, message)
             except _FAILURES as error:
                 # The other side is still shown.
                 sides[side] = {"error": _described(error)}
                 continue
             self.settings[side], self.frames[side] = settings, frames
+            (shown,) = frames
             arrays[side] = frames[shown]
             sides[side] = {
                 "framebuffer": shown,
@@ -281,8 +273,8 @@ class Viewer:
         arrays = self._arrays_of(message.get("view"))
         return {"sides": {side: {"probe": _probed(arrays[side], at)} for side in arrays}}, []
 
-    def _looked_at(self, message: Mapping[str, Any]) -> tuple[float, Shading, float]:
-        """Return the time, shading and glow of a message; missing ones stay as they are."""
+    def _looked_at(self, message: Mapping[str, Any]) -> tuple[float, Shading, float, float]:
+        """Return time, shading, glow and stops of a message; missing ones stay as they are."""
         usual = 1.0 if self._scene is None else self._scene.glow_intensity
         time = check_number("time", message.get("time", 0.0), -1e9, 1e9)
         shading, glow = message.get("shading"), message.get("glow")
@@ -290,14 +282,15 @@ class Viewer:
             time,
             self._shading if shading is None else check_shading(shading),
             usual if glow is None else check_number("glow", glow, 0, _LARGEST_GLOW),
+            check_number("stops", message.get("stops", 0.0), -32, 32),
         )
 
     def _render(
         self, settings: Settings, size: tuple[int, int], message: Mapping[str, Any]
-    ) -> tuple[Frames, list[str], list[Pass]]:
-        """Return the named framebuffer, or `final`; the names of all; the planned passes."""
+    ) -> tuple[Frames, bytes, list[str], list[Pass]]:
+        """Return the named framebuffer, or `final`; its picture; all names; the planned passes."""
         name = message.get("framebuffer", "final")
-        time, self._shading, glow = self._looked_at(message)
+        time, self._shading, glow, stops = self._looked_at(message)
         source: Any = self._scene
         draw: Any = self.renderer.apply
         how: dict[str, Any] = {}
@@ -309,9 +302,13 @@ class Viewer:
             draw = partial(self.renderer.render, time=time)
             how = {"size": size, "shading": self._shading}
         names = list(self.renderer.plan(source, settings, **how).framebuffers)
-        how["framebuffers"] = [str(name) if name in names else "final"]
+        shown = str(name) if name in names else "final"
+        how["framebuffers"] = [shown]
         passes = self.renderer.plan(source, settings, **how).passes
-        return draw(source, settings, **how), names, list(passes)
+        frames = draw(source, settings, **how)
+        is_encoded = settings.encoding != "none"
+        picture = picture_of(frames[shown], shown, is_encoded=is_encoded, stops=stops)
+        return frames, picture, names, list(passes)
 
     def _image_of(self, size: tuple[int, int]) -> NDArray[Any]:
         """Return the image at the size at which it is shown."""
@@ -374,7 +371,10 @@ def _probed(array: NDArray[Any], at: tuple[float, float]) -> dict[str, Any]:
     height, width = array.shape[:2]
     # A position of 1 is the far edge of the last pixel.
     x, y = min(int(at[0] * width), width - 1), min(int(at[1] * height), height - 1)
-    return {"x": x, "y": y, "values": texts_of(array[y, x])}
+    number = int if array.dtype.kind == "u" else float
+    # NumPy's text of a value has the digits that tell it apart from others of its dtype.
+    values = [str(number(str(value))) for value in np.atleast_1d(array[y, x])]
+    return {"x": x, "y": y, "values": values}
 
 
 class CustomFiles:

@@ -71,10 +71,10 @@ class Descent(Search):
         self._derivatives = back
         self._random = np.random.default_rng(0)
 
-    def run(self, points: list[Point]) -> None:
+    def run(self) -> None:
         """Search from the start, and as without derivatives where that ends far from the target."""
         try:
-            self._follow(points[0])
+            self._follow(self._space.origin)
             if self.loss > self._close:
                 # Differences see over the kinks at which taps move from texel to texel.
                 self._descend(self.best, STEPS[0], most=3)
@@ -85,17 +85,10 @@ class Descent(Search):
         except SpentError:
             return
         if self.loss > self._close:
-            super().run(points)
+            super().run()
 
-    def refine(self, points: list[Point]) -> None:
-        """Search near the best of some points."""
-        try:
-            self._follow(self._best_of(points))
-        except SpentError:
-            return
-
-    def _best_of(self, points: list[Point]) -> Point:
-        return points[int(np.argmin([self._loss(point) for point in points]))]
+    def _settle(self) -> None:
+        self._follow(self.best)
 
     def _follow(self, point: Point, way: str = "trf") -> None:
         """Find the minimum near a point.

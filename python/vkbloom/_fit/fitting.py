@@ -167,24 +167,15 @@ def fit(
     if gradient:
         check_derivatives(spaces, measure.loss, pixels)
     renderer = renderer or default_renderer()
-    stages = _stages(renderer, image, pixels, measure)
+    stages = _stages(renderer, framebuffer, image, pixels, measure)
     # All of them before the first is searched: the most likely failures come at once.
-    spaces = [_effective(renderer, stages[-1], space, framebuffer, drop=is_all) for space in spaces]
+    spaces = [_effective(stages[-1], space, drop=is_all) for space in spaces]
     results = []
     for space in spaces:
         if not space.axes:
             continue
         with _bar(progress, space.start.method, max_calls) as on_loss:
-            fitted = _fitted(
-                renderer,
-                stages,
-                space,
-                framebuffer,
-                max_calls=max_calls,
-                on_loss=on_loss,
-                gradient=gradient,
-            )
-            results.append(fitted)
+            results.append(_fitted(stages, space, max_calls, on_loss, gradient=gradient))
     results.sort(key=lambda item: item.loss)
     return results[0] if isinstance(settings, Settings) else results
 
@@ -201,12 +192,20 @@ def _candidates(settings: Settings | Sequence[Settings] | str) -> list[Settings]
 
 @dataclasses.dataclass(frozen=True)
 class _Stage:
-    """One size of the image, on the device, and its target."""
+    """One size of the image, on the device, and the target of one of its framebuffers."""
 
+    renderer: Renderer
+    framebuffer: str
     image: Image
     pixels: NDArray[Any] | None
     measure: Measure
     factor: int
+
+    def rendered(self, settings: Settings) -> NDArray[np.float64]:
+        """Return the light of the framebuffer with settings for the image's own size."""
+        smaller, names = _smaller(settings, self.factor), [self.framebuffer]
+        frames = self.renderer.apply(self.image, smaller, framebuffers=names)
+        return light(frames[self.framebuffer])
 
 
 def _checked_names(vary: str | Sequence[str]) -> tuple[str, ...]:
@@ -219,7 +218,11 @@ def _checked_names(vary: str | Sequence[str]) -> tuple[str, ...]:
 
 
 def _stages(
-    renderer: Renderer, image: NDArray[Any] | Image, pixels: NDArray[Any] | None, measure: Measure
+    renderer: Renderer,
+    framebuffer: str,
+    image: NDArray[Any] | Image,
+    pixels: NDArray[Any] | None,
+    measure: Measure,
 ) -> list[_Stage]:
     """Return the image at its own size, and before it a smaller one where it is large."""
     handle = image if isinstance(image, Image) else renderer.upload(image)
@@ -229,26 +232,26 @@ def _stages(
             f"target: {target.shape[1]} x {target.shape[0]} is not the image's size, "
             f"{handle.shape[1]} x {handle.shape[0]}"
         )
-    stages = [_Stage(handle, pixels, measure, 1)]
+    stages = [_Stage(renderer, framebuffer, handle, pixels, measure, 1)]
     factor = 2 ** max(0, math.ceil(math.log2(max(target.shape) / _COARSE_SIDE)))
     if pixels is not None and factor > 1 and min(target.shape[:2]) >= 16 * factor:
-        small = reduced(pixels, factor)
-        stages.insert(0, _Stage(renderer.upload(small), small, measure.reduced(factor), factor))
+        small, target_of_small = reduced(pixels, factor), measure.reduced(factor)
+        on_device = renderer.upload(small)
+        stages.insert(0, _Stage(renderer, framebuffer, on_device, small, target_of_small, factor))
     return stages
 
 
-def _effective(
-    renderer: Renderer, stage: _Stage, space: Space, framebuffer: str, *, drop: bool
-) -> Space:
+def _effective(stage: _Stage, space: Space, *, drop: bool) -> Space:
     """Return the space of the fields that have an effect; others are refused, or dropped."""
-    plan = renderer.plan(stage.image, space.start, framebuffers=[framebuffer])
+    framebuffer = stage.framebuffer
+    plan = stage.renderer.plan(stage.image, space.start, framebuffers=[framebuffer])
     shape = plan.framebuffers[framebuffer][0]
     if len(shape) != 3 or shape[:2] != stage.image.shape[:2]:
         raise ValueError(
             f"framebuffer: {framebuffer} of the method {space.start.method} has the shape {shape}, "
             f"not the size of the target; it can be bloom or final"
         )
-    has_effect = [_has_effect(stage.image, space, i, framebuffer) for i in range(len(space.axes))]
+    has_effect = [_has_effect(stage, space, index) for index in range(len(space.axes))]
     for axis, is_effective in zip(space.axes, has_effect, strict=True):
         if not (is_effective or drop):
             raise ValueError(
@@ -258,15 +261,14 @@ def _effective(
     return dataclasses.replace(space, axes=tuple(itertools.compress(space.axes, has_effect)))
 
 
-def _has_effect(image: Image, space: Space, index: int, framebuffer: str) -> bool:
+def _has_effect(stage: _Stage, space: Space, index: int) -> bool:
     """Return whether passes run after a change of one varied field."""
-    steps = []
+    source, steps = image_source(stage.image), []
     # From several values: at one of them a field may be without effect.
     for coordinate in (space.origin[index], 0.02, 0.98, 0.3, 0.6):
         point = space.origin.copy()
         point[index] = coordinate
-        plan = _core.plan(image_source(image), space.settings(point), (framebuffer,))
-        steps.append((image_source(image), plan))
+        steps.append((source, _core.plan(source, space.settings(point), (stage.framebuffer,))))
     return any(_core.dry_run(tuple(steps))[1:])
 
 
@@ -287,62 +289,41 @@ def _one_thread() -> Iterator[None]:
 
 
 def _fitted(
-    renderer: Renderer,
     stages: list[_Stage],
     space: Space,
-    framebuffer: str,
-    *,
     max_calls: int,
     on_loss: Callable[[float], None],
+    *,
     gradient: bool,
 ) -> FitResult:
     """Return what is found from one start."""
     history: list[float] = []
-    points = [space.origin]
-    searches = []
-    for number, stage in enumerate(stages):
-        is_last = number == len(stages) - 1
-
-        def render(settings: Settings, stage: _Stage = stage) -> NDArray[np.float64]:
-            frames = renderer.apply(
-                stage.image, _smaller(settings, stage.factor), framebuffers=[framebuffer]
-            )
-            return light(frames[framebuffer])
-
-        kind: Any = Search
-        if gradient:
-            kind = partial(Descent, partial(_derivatives, renderer, stage, framebuffer))
+    best = None
+    for stage in stages:
+        is_last = stage is stages[-1]
+        kind: Any = partial(Descent, partial(_derivatives, stage)) if gradient else Search
         search = kind(
             space,
             stage.measure,
-            render,
+            stage.rendered,
             max_calls=max_calls - len(history) if is_last else round(_COARSE_CALLS * max_calls),
             on_loss=on_loss,
-            close=_close(stage, framebuffer),
+            close=_close(stage),
         )
         with _one_thread():
-            if number:
-                search.refine(points)
+            if best is None:
+                search.run()
             else:
-                search.run(points)
+                search.refine(best)
         history += search.history
-        points.append(search.best)
-        searches.append(search)
-    return _result(renderer, stages[-1], space, searches[-1], framebuffer, history=history)
+        best = search.best
+    return _result(stages[-1], space, search, history)
 
 
-def _result(
-    renderer: Renderer,
-    stage: _Stage,
-    space: Space,
-    last: Search,
-    framebuffer: str,
-    *,
-    history: list[float],
-) -> FitResult:
+def _result(stage: _Stage, space: Space, last: Search, history: list[float]) -> FitResult:
     """Return what a search found, judged at the image's own size."""
     settings = space.settings(last.best)
-    measure = stage.measure
+    renderer, framebuffer, measure = stage.renderer, stage.framebuffer, stage.measure
     frames = renderer.apply(stage.image, settings)
     plain = np.zeros_like(measure.target)
     if framebuffer == "final":
@@ -367,27 +348,25 @@ def _result(
     )
 
 
-def _close(stage: _Stage, framebuffer: str) -> float:
+def _close(stage: _Stage) -> float:
     """Return the loss below which a search only polishes, less for a faint bloom."""
-    if framebuffer != "final" or stage.pixels is None:
+    if stage.framebuffer != "final" or stage.pixels is None:
         return CLOSE
     with _one_thread():
         return float(np.clip(_FAINT * stage.measure(light(stage.pixels)), ENOUGH, CLOSE))
 
 
-def _derivatives(
-    renderer: Renderer, stage: _Stage, framebuffer: str, settings: Settings
-) -> Callable[[NDArray[np.float64]], Any]:
+def _derivatives(stage: _Stage, settings: Settings) -> Callable[[NDArray[np.float64]], Any]:
     """Return the function from a cotangent to the derivatives by each field."""
     assert stage.pixels is not None
-    pullback = pullback_of(renderer, Inputs(stage.pixels), _smaller(settings, stage.factor))
+    pullback = pullback_of(stage.renderer, Inputs(stage.pixels), _smaller(settings, stage.factor))
     # The shape of a framebuffer of four channels, such as "bloom", differs from the image's.
-    channels = stage.pixels.shape[2] if framebuffer == "final" else 4
+    channels = stage.pixels.shape[2] if stage.framebuffer == "final" else 4
 
     def back(cotangent: NDArray[np.float64]) -> Any:
         whole = np.zeros((*cotangent.shape[:2], channels))
         whole[..., :3] = cotangent
-        gradients = pullback({framebuffer: whole})
+        gradients = pullback({stage.framebuffer: whole})
         if stage.factor == 1 or "blur_scale" not in gradients:
             return gradients
         # `_smaller` has divided the scale.

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from vkbloom._fit.losses import Loss
 from vkbloom._renderer.frames import Frames
 from vkbloom._settings.settings import Settings
-from vkbloom._views import markup, pictures
+from vkbloom._views import pictures
 from vkbloom._views.markup import element
 
 NOTHING_FOUND: Final = "no bloom was found"
@@ -29,7 +29,6 @@ _CLIPPED: Final = 1e-3
 _PIXELS: Final = 2**16
 
 Array = NDArray[np.float64]
-_WIDTH = 300  # pixels of a picture
 
 
 def is_found(target: Array, residual: Array, plain: Array) -> bool:
@@ -202,27 +201,22 @@ class FitResult:
         fitted = self.target + self.residual
         peak = float(np.percentile(self.target.max(axis=2), 99.9)) or 1.0
         largest = float(np.abs(self.residual).max()) or 1.0
+        size = pictures.thumbnail_size(self.target)
         shown = (
-            (self.framebuffer, fitted / peak, f"1 is {peak:.3g}"),
-            ("target", self.target / peak, f"1 is {peak:.3g}"),
-            ("difference", np.abs(self.residual) / largest, f"1 is {largest:.3g}"),
+            (name, pictures.picture((values / unit).astype(np.float32), size=size), unit)
+            for name, values, unit in (
+                (self.framebuffer, fitted, peak),
+                ("target", self.target, peak),
+                ("difference", np.abs(self.residual), largest),
+            )
         )
-        parts = []
-        for name, values, note in shown:
-            height, width = values.shape[:2]
-            size = pictures.scaled(width, height, min(1.0, _WIDTH / max(width, height)))
-            data = pictures.png(pictures.picture(values.astype(np.float32), size=size))
-            style = f"width:{_WIDTH}px;max-width:100%;image-rendering:pixelated"
-            image = markup.image(data, name, style=style)
-            parts.append(markup.figure(image, element("b", name), f" {note}", style="margin:0"))
         summary = f", from a loss ({self.loss_name}) of {self.start_loss:.3g}"
-        code = "color:inherit;background:none;padding:0;white-space:pre-wrap"
         report = element(
             "div",
             element("div", element("b", repr(self)[1:-1]), summary),
             element("div", self.words),
-            element("div", *parts, style="display:flex;flex-wrap:wrap;gap:12px"),
-            element("code", repr(self.settings), style=code),
+            pictures.thumbnails((name, pixels, f"1 is {unit:.3g}") for name, pixels, unit in shown),
+            element("code", repr(self.settings), style=pictures.CODE),
             style="color:inherit;font-size:13px;max-width:68em",
         )
         return str(report)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable
 from typing import Any, Final
 
@@ -65,26 +66,24 @@ class Search:
         self.loss = np.inf
         self.history: list[float] = []
 
-    def run(self, points: list[Point]) -> None:
-        """Search from some points, the first of which is the start."""
-        try:
-            for point in points:
-                self._loss(point)
+    def run(self) -> None:
+        """Search all of the space."""
+        with contextlib.suppress(SpentError):
+            self._loss(self._space.origin)
             for turn in range(len(_GENERATIONS)):
                 if self.loss > (self._close if turn else ENOUGH):
                     self._evolve(turn)
                     self._polish()
-        except SpentError:
-            return
 
-    def refine(self, points: list[Point]) -> None:
-        """Search near the best of some points."""
-        try:
-            for point in points:
-                self._loss(point)
-            self._polish()
-        except SpentError:
-            return
+    def refine(self, point: Point) -> None:
+        """Search near the better one of a point and the start."""
+        with contextlib.suppress(SpentError):
+            self._loss(self._space.origin)
+            self._loss(point)
+            self._settle()
+
+    def _settle(self) -> None:
+        self._polish()
 
     def _polish(self) -> None:
         """Descend from the best point."""

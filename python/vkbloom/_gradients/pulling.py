@@ -14,7 +14,7 @@ from vkbloom._argument_types import checked
 from vkbloom._gradients.passes import DeviceGradients, Passes, check_finite
 from vkbloom._methods.separable import Separable
 from vkbloom._renderer.default import default_renderer
-from vkbloom._renderer.device_arrays import ImportedArray, on_cuda, place_of, placed, take
+from vkbloom._renderer.device_arrays import ImportedArray, on_cuda, on_host, place_of, placed, take
 from vkbloom._renderer.frames import Frames
 from vkbloom._renderer.image import Image
 from vkbloom._renderer.renderer import Renderer
@@ -136,8 +136,7 @@ def _checked(cotangents: Any, frames: Mapping[str, Any], core: Any) -> Checked:
             result[name] = part
         else:
             # Levels of bytes would be read as shares of 255.
-            part = part.numpy() if isinstance(part, ImportedArray) else part
-            result |= check_cotangents({name: part}, frames)
+            result |= check_cotangents({name: on_host(part)}, frames)
     return result
 
 
@@ -170,14 +169,14 @@ def _starter(
 ) -> Callable[[Checked], Callable[[], Derivatives]]:
     """Return a function that submits passes, and returns one that waits for the derivatives."""
     floats = settings.replace(format="rgba32float")
-    recorded = functools.cache(lambda: _recorded(inputs, settings))
+    recorded = functools.cache(lambda: reference_vjp(settings=settings, **inputs.on_host())[1])
     names = (*inputs.named(), *differentiable(settings))
     if settings.bloom and callable(getattr(settings, "kernel", None)):
         names += ("kernel",)
 
     def by_reference(cotangents: Checked) -> Gradients:
         check_finite(cotangents)
-        derivatives = recorded()({name: _on_host(part) for name, part in cotangents.items()})
+        derivatives = recorded()({name: on_host(part) for name, part in cotangents.items()})
         return Gradients((name, part.astype(np.float32)) for name, part in derivatives.items())
 
     def start(cotangents: Checked) -> Callable[[], Derivatives]:
@@ -194,15 +193,6 @@ def _starter(
         return end
 
     return start
-
-
-def _recorded(inputs: Inputs, settings: Settings) -> Any:
-    """Return the pullback of the reference."""
-    return reference_vjp(settings=settings, **inputs.on_host())[1]
-
-
-def _on_host(part: NDArray[Any] | ImportedArray) -> NDArray[Any]:
-    return part.numpy() if isinstance(part, ImportedArray) else part
 
 
 def _placed(

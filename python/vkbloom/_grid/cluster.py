@@ -9,13 +9,12 @@ from __future__ import annotations
 import math
 import pickle
 import warnings
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any, Final, TypeAlias
 
 from vkbloom._checks import import_extra
 from vkbloom._core import Error
-from vkbloom._grid.filling import Count, Filler
+from vkbloom._grid.filling import Filler, progress_bar
 from vkbloom._grid.layout import Grid, Layout, lay_out, origin
 from vkbloom._grid.order import Block
 from vkbloom._grid.store import Chunks, GridStore
@@ -34,16 +33,6 @@ _RUNS_A_WORKER: Final = 16
 _RETRIES: Final = 2
 
 
-@dataclass(frozen=True)
-class _Run:
-    """The arguments of a task other than the grid."""
-
-    layout: Layout
-    chunks: Chunks
-    blocks: tuple[Block, ...]
-    adapter: str
-
-
 def _unpickled(pickled: bytes) -> Grid:
     grid: Grid = pickle.loads(pickled)
     return grid
@@ -56,34 +45,27 @@ def _lay_out(grid: Grid, adapter: str) -> Layout:
 def _refusal(renderer: Renderer, layout: Layout) -> str:
     """Return why this worker's results may differ from the other workers'; "" if they cannot."""
     for what, here in origin(renderer).items():
-        if here != getattr(layout, what):
+        if here != layout.origin[what]:
             return (
-                f"{what}: the worker's {here} is not the grid's {getattr(layout, what)}; their "
+                f"{what}: the worker's {here} is not the grid's {layout.origin[what]}; their "
                 "pictures may differ, so all workers need the same adapter, driver and version"
             )
     return ""
 
 
-def _render(run: _Run, grid: Grid) -> int | str:
-    """Render and write a run's blocks; called in a worker. Text: why this worker may not."""
-    renderer = renderer_on(run.adapter)
+def _render(
+    blocks: tuple[Block, ...], grid: Grid, layout: Layout, chunks: Chunks, adapter: str
+) -> int | str:
+    """Render and write a run of blocks; called in a worker. Text: why this worker may not."""
+    renderer = renderer_on(adapter)
     # Returned and not raised, since Dask would repeat the task, perhaps on another worker.
-    if refusal := _refusal(renderer, run.layout):
+    if refusal := _refusal(renderer, layout):
         return refusal
-    Filler(grid, run.layout, renderer).store(run.blocks, run.chunks)
-    return sum(block.count for block in run.blocks)
+    Filler(grid, layout, renderer).store(blocks, chunks)
+    return sum(block.count for block in blocks)
 
 
-def check_client(client: Any) -> None:
-    """Raise TypeError unless the argument is a synchronous client."""
-    distributed = import_extra("distributed", "grid", _PURPOSE)
-    if not isinstance(client, distributed.Client):
-        raise TypeError(f"client: {client!r} is not a dask.distributed.Client")
-    if client.asynchronous:
-        raise TypeError("client: it is asynchronous; pass one made with asynchronous=False")
-
-
-def shared_grid(client: Client, grid: Grid) -> Future:
+def _shared_grid(client: Client, grid: Grid) -> Future:
     """Send a grid to a cluster, as the result of a task.
 
     Unlike scattered data, the result is computed again if the worker that holds it dies.
@@ -113,21 +95,32 @@ def _runs(todo: Iterable[Block], layout: Layout, points: int) -> Iterator[tuple[
         yield tuple(run)
 
 
-def run_there(client: Client, shared: Future, store: GridStore, adapter: str, count: Count) -> None:
-    """Render missing blocks on the workers of a cluster."""
+def fill_there(
+    client: Client,
+    grid: Grid,
+    prepared: Callable[[Layout], GridStore],
+    adapter: str,
+    progress: bool | None,
+) -> None:
+    """Let the workers of a cluster render the points of a store that are not done."""
     distributed = import_extra("distributed", "grid", _PURPOSE)
-    missing = sum(block.count for block in store.missing)
+    if not isinstance(client, distributed.Client):
+        raise TypeError(f"client: {client!r} is not a dask.distributed.Client")
+    if client.asynchronous:
+        raise TypeError("client: it is asynchronous; pass one made with asynchronous=False")
+    shared = _shared_grid(client, grid)
+    store = prepared(lay_out_there(client, shared, adapter))
+    missing = store.total - store.done
     points = math.ceil(missing / (max(1, len(client.nthreads())) * _RUNS_A_WORKER))
-    runs = [
-        _Run(store.layout, store.chunks, blocks, adapter)
-        for blocks in _runs(store.missing, store.layout, points)
-    ]
-    futures = client.map(_render, runs, grid=shared, pure=False, retries=_RETRIES)
+    runs = list(_runs(store.missing, store.layout, points))
+    given = {"grid": shared, "layout": store.layout, "chunks": store.chunks, "adapter": adapter}
+    futures = client.map(_render, runs, **given, pure=False, retries=_RETRIES)
     try:
-        for _, result in distributed.as_completed(futures, with_results=True):
-            if isinstance(result, str):
-                raise ValueError(result)
-            count(result)
+        with progress_bar(store.total, store.done, shown=progress) as count:
+            for _, result in distributed.as_completed(futures, with_results=True):
+                if isinstance(result, str):
+                    raise ValueError(result)
+                count(result)
     except distributed.KilledWorker as error:
         raise Error(f"client: too many workers died: {error}") from error
     finally:

@@ -181,7 +181,7 @@ def grid(
             return prepare(folder, asked, layout, chunk, numbers, resume=resume)
 
         if client is not None:
-            _fill_there(asked, prepared, client, adapter or "auto", progress)
+            cluster.fill_there(client, asked, prepared, adapter or "auto", progress)
         else:
             renderer = renderer or default_renderer()
             stored = prepared(lay_out(asked, renderer))
@@ -191,21 +191,6 @@ def grid(
     dataset: xarray.Dataset = xr.open_zarr(folder)
     dataset.attrs.pop(IDENTITY, None)
     return dataset
-
-
-def _fill_there(
-    asked: Grid,
-    prepared: Callable[[Layout], GridStore],
-    client: Client,
-    adapter: str,
-    progress: bool | None,
-) -> None:
-    """Let the workers of a cluster render the points of a store that are not done."""
-    cluster.check_client(client)
-    shared = cluster.shared_grid(client, asked)
-    store = prepared(cluster.lay_out_there(client, shared, adapter))
-    with progress_bar(store.total, store.done, shown=progress) as count:
-        cluster.run_there(client, shared, store, adapter, count)
 
 
 def _check_stored(grid: Grid, chunks: Mapping[str, int] | None, *, is_shared: bool) -> None:

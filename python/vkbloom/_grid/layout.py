@@ -110,13 +110,12 @@ class Layout:
     """The layout of a grid on a renderer.
 
     - `ranking`: The axes from the slowest to the fastest.
+    - `origin`: As the function of this name returns it.
     """
 
     ranking: tuple[int, ...]
     variables: Mapping[str, Variable]
-    adapter: str
-    driver: str
-    version: str
+    origin: Mapping[str, str]
 
     @property
     def point_size(self) -> int:
@@ -174,7 +173,7 @@ def lay_out(
             dims = tuple(f"{name}_dim_{number}" for number in range(value.ndim))
             attributes = {"long_name": name, "units": "1"}
             variables[name] = Variable(dims, value.shape, value.dtype, attributes)
-    return Layout(ranking=ranking(grid), variables=variables, **origin(renderer))
+    return Layout(ranking(grid), variables, origin(renderer))
 
 
 def origin(renderer: Renderer) -> dict[str, str]:
@@ -200,10 +199,10 @@ def ranking(grid: Grid) -> tuple[int, ...]:
         # blur while the bloom is off.
         for backwards in (False, True):
             steps = list(walk(grid.shape, backwards=backwards))
-            names = _core.dry_run(_planned(grid, [index for _, index in steps]))
-            for (stepped, _), ran in zip(steps, names, strict=True):
+            passes = _core.dry_run(_planned(grid, [index for _, index in steps]))
+            for (stepped, _), ran in zip(steps, passes, strict=True):
                 if stepped is not None:
-                    costs[stepped] += len(ran)
+                    costs[stepped] += len({name for name, *_ in ran})
     return ranking_of(costs, [axis.kind in ("settings", "preset") for axis in grid.axes])
 
 
@@ -345,9 +344,7 @@ def made_dataset(grid: Grid, layout: Layout, arrays: Mapping[str, Any]) -> xarra
             **channels,
         },
         attrs={
-            "adapter": layout.adapter,
-            "driver": layout.driver,
-            "version": layout.version,
+            **layout.origin,
             "axes": json.dumps(dims),
             "settings": json.dumps(grid.remaining_settings),
             "source": json.dumps(facts),

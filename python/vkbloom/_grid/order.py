@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import itertools
 import math
+import operator
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, TypeAlias
@@ -51,14 +53,11 @@ def blocks(
     """
     count = math.prod(-(-size // step) for size, step in zip(shape, chunk, strict=True))
     ends = (count * number // part[1] for number in (part[0] - 1, part[0]))
-    return itertools.islice(_all_blocks(shape, chunk, ranking), *ends)
-
-
-def _all_blocks(shape: Index, chunk: Index, ranking: Sequence[int]) -> Iterator[Block]:
-    for starts in itertools.product(*(range(0, shape[axis], chunk[axis]) for axis in ranking)):
+    every = itertools.product(*(range(0, shape[axis], chunk[axis]) for axis in ranking))
+    for starts in itertools.islice(every, *ends):
         start = _in_order(starts, ranking)
-        ends = zip(start, chunk, shape, strict=True)
-        yield Block(start, tuple(min(first + size, end) for first, size, end in ends))
+        sides = zip(start, chunk, shape, strict=True)
+        yield Block(start, tuple(min(first + size, end) for first, size, end in sides))
 
 
 def points(block: Block, ranking: Sequence[int]) -> Iterator[Index]:
@@ -106,17 +105,15 @@ def read_part(part: Any) -> Part:
     """
     if part is None:
         return WHOLE
-    given = part
     if isinstance(part, str):
-        words = part.split("/")
-        if len(words) != 2 or not all(word.isascii() and word.isdecimal() for word in words):
-            raise ValueError(f"part: {given!r} is not I/N, such as 3/16")
-        part = tuple(map(int, words))
+        if (numbers := re.fullmatch(r"([0-9]+)/([0-9]+)", part)) is None:
+            raise ValueError(f"part: {part!r} is not I/N, such as 3/16")
+        part = tuple(map(int, numbers.groups()))
     if not isinstance(part, tuple | list) or len(part) != 2:
-        raise TypeError(f"part: {given!r} is not a pair (i, n), such as (3, 16)")
+        raise TypeError(f"part: {part!r} is not a pair (i, n), such as (3, 16)")
     if any(isinstance(number, bool) or not hasattr(number, "__index__") for number in part):
-        raise TypeError(f"part: {given!r} is not a pair of integers")
-    number, count = (value.__index__() for value in part)
+        raise TypeError(f"part: {part!r} is not a pair of integers")
+    number, count = map(operator.index, part)
     if not 0 <= number <= count or count < 1:
         raise ValueError(f"part: {number} of {count} is not 1 to {max(count, 1)}")
     return number or count, count

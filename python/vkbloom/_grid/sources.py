@@ -22,6 +22,7 @@ from vkbloom._renderer.renderer import Renderer
 from vkbloom._renderer.requests import Request
 from vkbloom._renderer.sources import SCENE_SIZE, image_source, is_image, scene_source
 from vkbloom._scene import Scene
+from vkbloom._scene.arrays import Constructed
 from vkbloom._settings.settings import Settings, check_shading
 
 if TYPE_CHECKING:
@@ -60,7 +61,7 @@ def visit(
 
 
 @dataclass(eq=False)
-class ImageSource:
+class ImageSource(Constructed):
     """An image."""
 
     has_time: ClassVar = False
@@ -70,10 +71,6 @@ class ImageSource:
     _uploaded: tuple[_core.Renderer, _core.Source] | None = dataclasses.field(
         default=None, init=False
     )
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        # The device is not sent to other processes.
-        return type(self), (self.image,)
 
     def on(self, renderer: Renderer, time: float) -> _core.Source:
         """Return the image on a renderer's device, where it is kept."""
@@ -112,7 +109,7 @@ def _described(image: NDArray[Any] | Image) -> dict[str, Any]:
 
 
 @dataclass(eq=False)
-class SceneSource:
+class SceneSource(Constructed):
     """A scene, rendered at one size in one shading."""
 
     has_time: ClassVar = True
@@ -122,9 +119,6 @@ class SceneSource:
     shading: Shading
     time: float = 0.0
     _latest: tuple[float, _core.Source] | None = dataclasses.field(default=None, init=False)
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return type(self), (self.scene, self.size, self.shading, self.time)
 
     def on(self, renderer: Renderer, time: float) -> _core.Source:
         """Return the scene at a time. The renderer keeps its data on the device."""

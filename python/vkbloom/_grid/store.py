@@ -52,9 +52,7 @@ def identity(grid: Grid, layout: Layout, chunk: Index) -> dict[str, Any]:
     """Return everything that determines the contents of a grid's arrays, as JSON values."""
     facts = {
         "format": FORMAT,
-        "version": layout.version,
-        "adapter": layout.adapter,
-        "driver": layout.driver,
+        **layout.origin,
         "source": grid.source.description,
         "settings": grid.remaining_settings,
         "axes": {axis.name: [plain_value(value) for value in axis.values] for axis in grid.axes},
@@ -90,12 +88,8 @@ def _named(reduction: Any) -> str:
     return f"{kind.__module__}.{kind.__qualname__}"
 
 
-def differences(stored: Mapping[str, Any], asked: Mapping[str, Any]) -> list[str]:
-    """List the differences between the grid in a store and the requested one."""
-    return list(_differences("", stored, asked))
-
-
-def _differences(name: str, stored: Any, asked: Any) -> Iterator[str]:
+def differences(stored: Any, asked: Any, name: str = "") -> Iterator[str]:
+    """Yield the differences between the grid in a store and the requested one."""
     if isinstance(stored, Mapping) and isinstance(asked, Mapping):
         for key in dict.fromkeys((*stored, *asked)):
             inner = f"{name}.{key}" if name else key
@@ -104,7 +98,7 @@ def _differences(name: str, stored: Any, asked: Any) -> Iterator[str]:
             elif key not in asked:
                 yield f"{inner}: {short(stored[key])} in the store, not requested"
             else:
-                yield from _differences(inner, stored[key], asked[key])
+                yield from differences(stored[key], asked[key], inner)
     elif stored != asked:
         yield f"{name}: {short(stored)} in the store, {short(asked)} requested"
 
@@ -285,8 +279,7 @@ def prepare(
     if is_new:
         # Of processes that start at once, one decides which grid this is.
         _put(folder, METADATA, expected[METADATA], replaces=False)
-    changed = differences(checked_identity(folder), identity(grid, layout, chunk))
-    if changed:
+    if changed := [*differences(checked_identity(folder), identity(grid, layout, chunk))]:
         raise ValueError(f"{folder}: contains another grid; {'; '.join(changed)}")
     if part == WHOLE:
         # Of processes that were killed while writing.

@@ -222,7 +222,7 @@ def write(
     is_float = values.dtype.kind == "f"
     saved = Saved(encoding, primaries, view)
     _check_conversions(values, saved, bits)
-    safe_writing.check_extension(oiio, target.suffix)
+    safe_writing.writer_of(target)
     if values.shape[2] in (2, 4) and premultiplied is not is_exr(target):
         values = divided(values) if premultiplied else multiplied(values)
     numbers = PIXEL_TYPES[values.dtype.name]

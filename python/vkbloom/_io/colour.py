@@ -14,14 +14,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom._checks import import_extra
-from vkbloom._io.displayed import from_primaries, of_code_points
+from vkbloom._io.displayed import (
+    CHROMATICITIES,
+    CONFIGURATION,
+    between,
+    from_primaries,
+    of_code_points,
+)
 from vkbloom._io.hdr_curves import DECODERS
 from vkbloom._io.icc import Profile, from_lab, read_profile
 from vkbloom._io.images import SPACES, Colour, StoredImage
 from vkbloom._io.srgb import decode_srgb
 
-_CONFIGURATION: Final = "ocio://default"
-_LINEAR: Final = SPACES["linear"]
 # Spaces of an exponent. OpenColorIO's own powers are off by 2e-5.
 _EXPONENTS: Final[Mapping[str, float]] = {SPACES["gamma22"]: 2.2, "g18_rec709_scene": 1.8}
 # Spaces with the curves of code points.
@@ -32,14 +36,12 @@ LAB: Final = ("CIELAB", "ICCLAB")
 _OF_PNM: Final = "Rec709"
 # Half an 8-bit level, encoded. A profile that differs by less from sRGB counts as sRGB.
 _SAME: Final = 0.5 / 255
-# Red, green, blue, white.
-_REC_709: Final = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
 
 
 def check_space(name: str) -> None:
     """Raise ValueError if the built-in configuration has no colour space of this name."""
     oiio = import_extra("OpenImageIO", "images", "Converting colours")
-    config = oiio.ColorConfig(_CONFIGURATION)
+    config = oiio.ColorConfig(CONFIGURATION)
     if not config.resolve(name) or config.getColorSpaceIndex(name) < 0:
         raise ValueError(
             f"colour: {name!r} is not linear, srgb or a colour space of OpenColorIO's built-in "
@@ -157,7 +159,7 @@ def _notes_of_floats(stored: StoredImage) -> list[str]:
     elif stored.space not in ("", _OF_PNM, SPACES["linear"]):
         notes.append(f"the file says {stored.space} of its colours; values are taken as they are")
     _, primaries = stored.attributes.get("chromaticities", (None, None))
-    if primaries is not None and not np.allclose(primaries, _REC_709, atol=2e-3):
+    if primaries is not None and not np.allclose(primaries, CHROMATICITIES["rec709"], atol=2e-3):
         listed = ", ".join(f"{x:.4g} {y:.4g}" for x, y in zip(*[iter(primaries)] * 2, strict=True))
         notes.append(
             f"the file's chromaticities (red, green, blue, white: {listed}) are not those of Rec. "
@@ -212,24 +214,5 @@ def _to_light(colours: NDArray[Any], space: str, exponent: float | None) -> NDAr
         # Negative values are not changed, as OpenColorIO has it.
         made: NDArray[Any] = np.where(colours > 0, np.maximum(colours, 0) ** exponent, colours)
         return made
-    return _from_space(colours, space)
-
-
-def _from_space(colours: NDArray[np.float32], space: str) -> NDArray[np.float32]:
-    """Convert colours (H, W, 3) of a space of the built-in configuration to linear Rec. 709.
-
-    They are not clipped. Raises ValueError if there is no such space.
-    """
-    oiio = import_extra("OpenImageIO", "images", "Converting colours")
     check_space(space)
-    converted = oiio.ImageBufAlgo.colorconvert(
-        oiio.ImageBuf(np.ascontiguousarray(colours)),
-        space,
-        _LINEAR,
-        unpremult=False,
-        colorconfig=_CONFIGURATION,
-    )
-    if converted.has_error:
-        raise ValueError(" ".join(converted.geterror().split()))
-    pixels: NDArray[np.float32] = converted.get_pixels()
-    return pixels
+    return between(colours, space, SPACES["linear"])

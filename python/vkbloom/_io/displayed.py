@@ -19,7 +19,8 @@ from vkbloom._io.srgb import encode_srgb
 #: A file's attributes by OpenImageIO's names, each with its type and value.
 Attributes = Mapping[str, tuple[Any, Any]]
 
-_CONFIGURATION: Final = "ocio://default"
+#: OpenColorIO's built-in configuration.
+CONFIGURATION: Final = "ocio://default"
 #: Linear spaces of the built-in configuration.
 PRIMARIES: Final[Mapping[str, str]] = {
     "rec709": SPACES["linear"],
@@ -43,7 +44,7 @@ _PLAIN: Final = ("linear", "srgb", "gamma22", "none")
 # Curves whose values end at 1 in files of integers.
 _ENDING_AT_1: Final = ("linear", "srgb", "gamma22")
 # Red, green, blue, white, as x and y: Rec. ITU-R BT.709 and BT.2020, SMPTE EG 432-1.
-_CHROMATICITIES: Final = {
+CHROMATICITIES: Final = {
     "rec709": (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290),
     "rec2020": (0.708, 0.292, 0.170, 0.797, 0.131, 0.046, 0.3127, 0.3290),
     "p3": (0.680, 0.320, 0.265, 0.690, 0.150, 0.060, 0.3127, 0.3290),
@@ -71,15 +72,10 @@ class Saved(NamedTuple):
     view: str | None = None
 
 
-def check_primaries(primaries: str) -> None:
-    """Raise ValueError for unknown primaries."""
-    if primaries not in PRIMARIES:
-        raise ValueError(f"primaries: {primaries!r} is not one of {', '.join(PRIMARIES)}")
-
-
 def check_saved(saved: Saved) -> None:
     """Raise ValueError for primaries and views that do not exist or do not go together."""
-    check_primaries(saved.primaries)
+    if saved.primaries not in PRIMARIES:
+        raise ValueError(f"primaries: {saved.primaries!r} is not one of {', '.join(PRIMARIES)}")
     if saved.view is None:
         return
     if saved != Saved(view=saved.view):
@@ -106,12 +102,10 @@ def converted(
     """Return linear Rec. 709 floats (H, W, C) as a file has them, and what they are then."""
     if saved.view is not None:
         display, view = _display_of(oiio, saved.view)
-        made = oiio.ImageBufAlgo.ociodisplay(
-            _colours_of(oiio, values), display, view, *_FROM_LINEAR, colorconfig=_CONFIGURATION
-        )
-        return _with_colours(values, made), display
+        return _by_ocio(values, "ociodisplay", display, view, *_FROM_LINEAR), display
     if curve != "none" and saved.primaries != "rec709":
-        values = _between(oiio, values, "rec709", saved.primaries).astype(values.dtype)
+        ends = PRIMARIES["rec709"], PRIMARIES[saved.primaries]
+        values = between(values, *ends).astype(values.dtype)
     if is_integer and curve in _ENDING_AT_1:
         values = scaled_to_1(values)
     return encoded(values, curve), (saved.primaries, curve)
@@ -139,8 +133,7 @@ def from_primaries(colours: NDArray[Any], primaries: str) -> NDArray[np.float32]
     """Return linear colours (H, W, 3 or 4) of these primaries in those of Rec. 709."""
     if primaries == "rec709":
         return colours.astype(np.float32, copy=False)
-    oiio = import_extra("OpenImageIO", "images", "Converting colours")
-    return _between(oiio, colours, primaries, "rec709")
+    return between(colours, PRIMARIES[primaries], PRIMARIES["rec709"])
 
 
 def encoded(values: NDArray[Any], curve: str) -> NDArray[Any]:
@@ -174,7 +167,7 @@ def with_names(
     # A profile of the source would name other colours.
     kept = {name: value for name, value in attributes.items() if name != "ICCProfile"}
     if kind == "openexr" and curve in ("linear", "none"):
-        numbers = oiio.TypeDesc("float[8]"), _CHROMATICITIES[what[0]]
+        numbers = oiio.TypeDesc("float[8]"), CHROMATICITIES[what[0]]
         return False, {**kept, "chromaticities": numbers}
     if points is None:
         known = ", ".join(_DISPLAYS)
@@ -201,7 +194,7 @@ def of_code_points(points: Sequence[int]) -> tuple[str, str] | None:
 @functools.cache
 def _views(oiio: ModuleType) -> list[tuple[str, str]]:
     """Return all displays with their views; listing them takes 70 ms."""
-    config = oiio.ColorConfig(_CONFIGURATION)
+    config = oiio.ColorConfig(CONFIGURATION)
     return [
         (shown, view) for shown in config.getDisplayNames() for view in config.getViewNames(shown)
     ]
@@ -216,24 +209,18 @@ def _display_of(oiio: ModuleType, view: str) -> tuple[str, str]:
     raise ValueError(f"view: {view!r} is not a view of OpenColorIO's configuration: {listed}")
 
 
-def _between(oiio: ModuleType, values: NDArray[Any], old: str, new: str) -> NDArray[np.float32]:
-    made = oiio.ImageBufAlgo.colorconvert(
-        _colours_of(oiio, values),
-        PRIMARIES[old],
-        PRIMARIES[new],
-        False,
-        colorconfig=_CONFIGURATION,
-    )
-    return _with_colours(values, made)
+def between(values: NDArray[Any], old: str, new: str) -> NDArray[np.float32]:
+    """Return colours (H, W, 3 or 4), not clipped, of one space of OpenColorIO's in another."""
+    return _by_ocio(values, "colorconvert", old, new, False)
 
 
-def _colours_of(oiio: ModuleType, values: NDArray[Any]) -> Any:
-    return oiio.ImageBuf(np.ascontiguousarray(values[:, :, :3], np.float32))
-
-
-def _with_colours(values: NDArray[Any], colours: Any) -> NDArray[np.float32]:
-    if colours.has_error:
-        raise ValueError(" ".join(colours.geterror().split()))
+def _by_ocio(values: NDArray[Any], conversion: str, *how: Any) -> NDArray[np.float32]:
+    """Return an image whose colours a conversion of OpenImageIO's has made; alpha as it is."""
+    oiio = import_extra("OpenImageIO", "images", "Converting colours")
+    colours = oiio.ImageBuf(np.ascontiguousarray(values[:, :, :3], np.float32))
+    result = getattr(oiio.ImageBufAlgo, conversion)(colours, *how, colorconfig=CONFIGURATION)
+    if result.has_error:
+        raise ValueError(" ".join(result.geterror().split()))
     made = values.astype(np.float32)
-    made[:, :, :3] = colours.get_pixels()
+    made[:, :, :3] = result.get_pixels()
     return made

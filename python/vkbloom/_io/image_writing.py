@@ -55,21 +55,21 @@ class Part(NamedTuple):
     attributes: Mapping[str, str | int]
 
 
-def check_writable(path: str | os.PathLike[str]) -> None:
-    """Check that a file's extension belongs to a format that can be written."""
-    oiio = import_extra("OpenImageIO", "images", "Writing images")
-    safe_writing.check_extension(oiio, Path(path).suffix)
-
-
-def check_quality(path: str | os.PathLike[str], quality: int | None) -> None:
-    """Check that a file's format has a quality of compression, if one is given."""
-    if quality is None:
-        return
-    check_index("quality", quality, 1, 100)
-    oiio = import_extra("OpenImageIO", "images", "Writing images")
-    kind = oiio.ImageOutput.create(f"image{Path(path).suffix}").format_name()
-    if kind not in _LOSSY:
-        raise ValueError(f"quality: {kind} has no quality; {', '.join(_LOSSY)} have one")
+def check_options(
+    path: str | os.PathLike[str], saved: Saved, quality: int | None, bits: int | None = None
+) -> None:
+    """Raise ValueError for a file that cannot be written, or not as these options say."""
+    kind = safe_writing.writer_of(path).format_name()
+    displayed.check_saved(saved)
+    if quality is not None:
+        check_index("quality", quality, 1, 100)
+        if kind not in _LOSSY:
+            raise ValueError(f"quality: {kind} has no quality; {', '.join(_LOSSY)} have one")
+    if bits is not None:
+        oiio = import_extra("OpenImageIO", "images", "Writing images")
+        suffix = Path(path).suffix
+        if not any(safe_writing.holds(oiio, suffix, 3, numbers) for numbers in BITS[bits]):
+            raise ValueError(f"bits: {kind} has no numbers of {bits} bits; write another format")
 
 
 def is_straight(path: str | os.PathLike[str], *, is_associated: bool) -> bool:
@@ -77,21 +77,7 @@ def is_straight(path: str | os.PathLike[str], *, is_associated: bool) -> bool:
     file = Path(path)
     if is_exr(file) or (is_associated and file.suffix.lower() in (".tif", ".tiff")):
         return False
-    oiio = import_extra("OpenImageIO", "images", "Writing images")
-    return bool(oiio.ImageOutput.create(f"image{file.suffix}").supports("alpha"))
-
-
-def check_bits(path: str | os.PathLike[str], bits: int | None) -> None:
-    """Check that a file's format has numbers of a size, if one is given."""
-    if bits is None:
-        return
-    if bits not in BITS:
-        raise ValueError(f"bits: {bits!r} is not one of {', '.join(map(str, BITS))}")
-    oiio = import_extra("OpenImageIO", "images", "Writing images")
-    suffix = Path(path).suffix
-    if not any(safe_writing.holds(oiio, suffix, 3, numbers) for numbers in BITS[bits]):
-        kind = oiio.ImageOutput.create(f"image{suffix}").format_name()
-        raise ValueError(f"bits: {kind} has no numbers of {bits} bits; write another format")
+    return bool(safe_writing.writer_of(file).supports("alpha"))
 
 
 def save(
@@ -116,11 +102,9 @@ def save(
             f"colour: {saved.view or saved.curve or saved.primaries!r} needs a linear picture; "
             f"this one is {picture.encoding}"
         )
-    displayed.check_saved(saved)
+    check_options(path, saved, quality)
     oiio = import_extra("OpenImageIO", "images", "Writing images")
     target = Path(path)
-    safe_writing.check_extension(oiio, target.suffix)
-    check_quality(target, quality)
     added = {} if quality is None else {"CompressionQuality": quality}
     if saved.view is not None or saved.primaries != "rec709":
         picture = dataclasses.replace(picture, grey=False)
@@ -248,7 +232,7 @@ def chosen_layout(
     wanted = _DEEP if is_hdr else _PREFERENCES[picture.numbers]
     if bits is not None:
         wanted = BITS[bits]
-    writer = oiio.ImageOutput.create(f"image{target.suffix}")
+    writer = safe_writing.writer_of(target)
     for values in _layouts(picture, safe_writing.has_alpha(writer)):
         for numbers in wanted:
             if safe_writing.holds(oiio, target.suffix, values.shape[2], numbers):

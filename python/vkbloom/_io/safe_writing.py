@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, BinaryIO, Final
 
 import numpy as np
 
+from vkbloom._checks import import_extra
 from vkbloom._io.containers import padded
 from vkbloom._io.images import check_name, failure_of
 
@@ -43,17 +44,20 @@ _ZEROS: Final = 1 << 20  # bytes written at a time
 _unfinished: set[Path] = set()
 
 
-def check_extension(oiio: ModuleType, suffix: str) -> None:
-    """Check that an extension belongs to a format that can be written."""
-    writer = oiio.ImageOutput.create(f"image{suffix}")
+def writer_of(path: str | os.PathLike[str]) -> OpenImageIO.ImageOutput:
+    """Return a writer of the format that a file's extension names, or raise ValueError."""
+    oiio = import_extra("OpenImageIO", "images", "Writing images")
+    suffix = Path(path).suffix
+    writer: OpenImageIO.ImageOutput | None = oiio.ImageOutput.create(f"image{suffix}")
     if writer is None:
         oiio.geterror()
     if writer is None or writer.format_name() in _FORMATS_WITHOUT_A_FILE:
         reason = _MISSING.get(suffix.lower())
         raise ValueError(
-            f"path: {suffix!r} is not the extension of a writable image format"
-            + (f": this OpenImageIO is built without {reason}" if reason else "")
+            f"{os.fspath(path)}: {suffix!r} is not the extension of a writable image format, "
+            + (f"this OpenImageIO is built without {reason}" if reason else "such as .png or .exr")
         )
+    return writer
 
 
 def reserve(file: Path, size: int) -> Path:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple, NoReturn
 import numpy as np
 
 from vkbloom import _core
-from vkbloom._checks import on_another_device
+from vkbloom._checks import device_kind, on_another_device
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -91,7 +91,8 @@ class DeviceArray:
         if isinstance(self._memory, np.ndarray):
             return self._memory.copy()
         array = np.empty(self.shape, self.dtype)
-        self._memory.read(array, self._offset)
+        start = self._memory.address + self._offset
+        self._memory.copy_bytes(array.ctypes.data, start, array.nbytes)
         return array
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]:
@@ -190,8 +191,8 @@ def merged(images: Iterable[DeviceArray]) -> list[DeviceArray]:
 
 
 def on_host(array: Any) -> NDArray[Any]:
-    """Return a framebuffer as an array of NumPy, copied if it is on the device."""
-    return array.numpy() if isinstance(array, DeviceArray) else array
+    """Return an array of NumPy, copied if it is on the device."""
+    return array.numpy() if isinstance(array, DeviceArray | ImportedArray) else array
 
 
 def place_of(array: object) -> Destination:
@@ -232,19 +233,14 @@ def placed(
     memory: _core.Exported | NDArray[Any] = array
     if destination == "cuda":
         memory = memory_for(core, array.nbytes)
-        memory.write(np.ascontiguousarray(array))
+        dense = np.ascontiguousarray(array)
+        memory.copy_bytes(memory.address, dense.ctypes.data, dense.nbytes)
     return DeviceArray(memory, array.shape, array.dtype.name)
 
 
 def on_cuda(image: object) -> bool:
     """Return whether an object is an array in the memory of a GPU with CUDA."""
-    if isinstance(image, np.ndarray):
-        return False
-    try:
-        kind = int(image.__dlpack_device__()[0])  # type: ignore[attr-defined]
-    except Exception:  # whatever a foreign object raises; a later use of it tells more
-        return False
-    return kind in (_CUDA, _CUDA_MANAGED)
+    return not isinstance(image, np.ndarray) and device_kind(image) in (_CUDA, _CUDA_MANAGED)
 
 
 def likeness(image: Any) -> NDArray[Any]:
@@ -291,7 +287,8 @@ class ImportedArray(NamedTuple):
         """Return the array in the host's memory."""
         low, high = _span(self.shape, self.strides, self.dtype)
         span = np.empty(high - low, np.uint8)
-        self.memory.read(span, self.offset + low)
+        start = self.memory.address + self.offset + low
+        self.memory.copy_bytes(span.ctypes.data, start, span.nbytes)
         return np.ndarray(
             self.shape, self.dtype, buffer=span.data, offset=-low, strides=self.strides
         ).copy()
@@ -372,7 +369,8 @@ def fill(target: Any, name: str, made: DeviceArray, core: _core.Renderer) -> Non
         raise ValueError(f"{name} must be C-contiguous")
     if isinstance(made._memory, np.ndarray):
         raise TypeError(f"{name}: the framebuffer is on the host")
-    made._memory.copy_to(array.address, made.nbytes, made._offset)
+    start = made._memory.address + made._offset
+    made._memory.copy_bytes(array.address, start, made.nbytes)
 
 
 def take(

@@ -52,7 +52,7 @@ def save(frames: Frames, path: str | os.PathLike[str]) -> list[Path]:
         target.mkdir(parents=True, exist_ok=True)
         plan = {target / f"{name}.png": [name] for name in frames}
     else:
-        safe_writing.check_extension(oiio, target.suffix)
+        safe_writing.writer_of(target)
         if is_exr(target) or len(frames) == 1:
             plan = {target: list(frames)}
         else:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 from vkbloom import _core
 from vkbloom._checks import check_emission, check_image, check_mask, check_size, check_time
-from vkbloom._renderer.device_arrays import ImportedArray, on_cuda, take
+from vkbloom._renderer.device_arrays import ImportedArray, on_cuda, on_host, take
 from vkbloom._renderer.image import Image
 from vkbloom._settings.settings import check_shading
 
@@ -45,10 +45,7 @@ class Inputs(NamedTuple):
 
     def on_host(self) -> dict[str, NDArray[Any]]:
         """Return the arrays by name, in the host's memory."""
-        return {
-            name: part.numpy() if isinstance(part, ImportedArray) else part
-            for name, part in self.named().items()
-        }
+        return {name: on_host(part) for name, part in self.named().items()}
 
     def source(self, levels: tuple[NDArray[Any] | ImportedArray, ...] = ()) -> _core.Source:
         """Return the core's Source. The arrays must not change while it is used."""

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any, Final
+import dataclasses
+from typing import Any, ClassVar, Final
 
 from numpy.typing import NDArray
 
@@ -22,3 +23,16 @@ def read_only(array: NDArray[Any]) -> NDArray[Any]:
         array = array.copy(order="C")
         array.flags.writeable = False
     return array
+
+
+class Constructed:
+    """A dataclass that is pickled through its constructor, without what only this process has.
+
+    NumPy pickles do not keep arrays read-only.
+    """
+
+    __dataclass_fields__: ClassVar[dict[str, Any]]
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        given = (field.name for field in dataclasses.fields(self) if field.init)
+        return type(self), tuple(getattr(self, name) for name in given)

@@ -4,17 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom._scene.arrays import read_only
+from vkbloom._scene.arrays import Constructed, read_only
 from vkbloom._scene.textures import WHITE, Surface
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Mesh:
+class Mesh(Constructed):
     """Triangles with normals and colours, some of them with textures.
 
     - `vertices`: (N, 9) float32: position xyz (y points down), normal xyz and linear colour rgb.
@@ -44,11 +43,6 @@ class Mesh:
             raise ValueError(
                 f"indices: {self.indices.max()} is beyond the mesh's {len(self.vertices)} vertices"
             )
-
-    def __reduce__(self) -> tuple[type[Mesh], tuple[Any, ...]]:
-        # Through the constructor, because NumPy pickles do not keep arrays read-only.
-        arrays = (self.vertices, self.indices, self.emission, self.texcoords)
-        return Mesh, (*arrays, self.surfaces)
 
     def __repr__(self) -> str:
         return f"Mesh({self.summary})"

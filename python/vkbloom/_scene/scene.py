@@ -13,7 +13,7 @@ import sys
 import weakref
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from vkbloom._argument_types import PATH, checked_as
 from vkbloom._checks import check_above, check_floats, check_number
 from vkbloom._scene import gltf
 from vkbloom._scene import skybox as sky
+from vkbloom._scene.arrays import Constructed
 from vkbloom._scene.mesh import Mesh
 from vkbloom._scene.skybox import Cubemap, SkyboxSource
 
@@ -81,7 +82,7 @@ class Camera:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Scene:
+class Scene(Constructed):
     """A body, a glow mesh, a sky, and the camera.
 
     Parameters
@@ -131,10 +132,6 @@ class Scene:
     def contents_serial(self) -> int:
         """A number that only scenes with the same meshes and sky share, whatever their camera."""
         return self._contents.serial
-
-    def __reduce__(self) -> tuple[type[Scene], tuple[Any, ...]]:
-        # A copy gets its own serial, since another process may have used this one.
-        return Scene, (self.body, self.glow, self.skybox, self.camera, self.glow_intensity)
 
     @classmethod
     def ufo(cls) -> Scene:

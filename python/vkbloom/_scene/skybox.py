@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from vkbloom._io import image_reading
 from vkbloom._scene import ktx
-from vkbloom._scene.arrays import MAX_SIDE, read_only
+from vkbloom._scene.arrays import MAX_SIDE, Constructed, read_only
 from vkbloom._scene.textures import finite_floats, mip_levels, rounded_to
 
 FACES: Final = ("+x", "-x", "+y", "-y", "+z", "-z")
@@ -26,7 +26,7 @@ DTYPES: Final = (np.dtype(np.uint8), np.dtype(np.float16), np.dtype(np.float32))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Cubemap:
+class Cubemap(Constructed):
     """A cube texture with its mip levels.
 
     Parameters
@@ -42,10 +42,6 @@ class Cubemap:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "levels", tuple(map(read_only, self.levels)))
-
-    def __reduce__(self) -> tuple[type[Cubemap], tuple[tuple[NDArray[Any], ...]]]:
-        # Through the constructor, because NumPy pickles do not keep arrays read-only.
-        return Cubemap, (self.levels,)
 
     def __repr__(self) -> str:
         return f"Cubemap({self.size} x {self.size} {self.dtype}, levels: {len(self.levels)})"

@@ -8,7 +8,7 @@ from typing import Any, Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom._scene.arrays import read_only
+from vkbloom._scene.arrays import Constructed, read_only
 
 #: How a texture continues beyond its edge, and how texels are filtered: WebGPU's names.
 AddressMode = Literal["repeat", "mirror-repeat", "clamp-to-edge"]
@@ -16,7 +16,7 @@ Filter = Literal["nearest", "linear"]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Texture:
+class Texture(Constructed):
     """A picture with its mip levels, and how it is sampled.
 
     - `levels`: Arrays ``(h, w, 4)`` of float16, all finite: linear RGBA, top row first; sides
@@ -37,11 +37,6 @@ class Texture:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "levels", tuple(map(read_only, self.levels)))
-
-    def __reduce__(self) -> tuple[type[Texture], tuple[Any, ...]]:
-        # Through the constructor, because NumPy pickles do not keep arrays read-only.
-        fields = (self.address_mode, self.mag_filter, self.min_filter, self.mipmap_filter)
-        return Texture, (self.levels, *fields)
 
     def __repr__(self) -> str:
         height, width, _ = self.levels[0].shape

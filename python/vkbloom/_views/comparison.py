@@ -63,10 +63,11 @@ class Comparison:
 
 
 @dataclass(frozen=True, eq=False)
-class _Pair:
+class Pair:
     """Two images of one shape, as float64, with the values that are not finite set to 0.
 
-    Integers are scaled to 0..1; `error` is exact for them. `valid` is where both are finite.
+    Integers are scaled to 0..1; `error` is exact for them. `valid` is where both are finite,
+    `unequal` where one has NaN or infinity that the other has not.
     """
 
     a: NDArray[np.float64]
@@ -104,15 +105,19 @@ def compare(
             relative=relative,
             not_computed=dict.fromkeys(METRICS, "the images are no match"),
         )
-    pair = _pair(a, b)
+    pair = pair_of(a, b)
     unequal, common = pair.unequal, ~pair.valid & ~pair.unequal
     if unequal.any():
         mismatches += (f"NaN or infinity in one image only, {_positions(unequal)}",)
     if common.any() and not allow_nan:
         mismatches += (f"NaN or infinity in both images, {_positions(common)}",)
-    data_range = 1.0 if pair.is_integer else _span(pair)
+    low = min(0.0, float(pair.a.min()), float(pair.b.min()))
+    high = max(1.0, float(pair.a.max()), float(pair.b.max()))
+    data_range = 1.0 if pair.is_integer else high - low
     computed, not_computed = _metrics(pair, metrics, data_range)
-    over = _over(pair, threshold, relative)
+    with np.errstate(over="ignore"):
+        allowed = threshold + relative * np.abs(pair.a)
+    over = (pair.error > allowed) | unequal
     position, values = _largest(pair)
     is_any = bool(pair.valid.any())
     return Comparison(
@@ -132,16 +137,12 @@ def compare(
 
 def difference(a: NDArray[Any], b: NDArray[Any]) -> tuple[NDArray[np.float32], float]:
     """Make a picture of the differences of two images, and return it with its scale."""
-    a, b = checked_image("a", a), checked_image("b", b)
-    mismatches = _mismatches(a, b)
-    if mismatches:
-        raise ValueError(f"a, b: not comparable: {'; '.join(mismatches)}")
-    pair = _pair(a, b)
+    pair = _comparable(a, b)
     largest = min(float(pair.error.max()), float(np.finfo(np.float64).max))
     scale = 1.0 / largest if largest else 1.0
-    colours = 3 if a.shape[2] >= 3 else 1
+    colours = 3 if pair.a.shape[2] >= 3 else 1
     picture = np.repeat(pair.error[:, :, :colours], 3 // colours, axis=2)
-    if a.shape[2] > colours:
+    if pair.a.shape[2] > colours:
         others = pair.error[:, :, colours:].max(axis=2, keepdims=True)
         picture = np.maximum(picture, others)
     with np.errstate(over="ignore"):
@@ -176,33 +177,29 @@ def _mismatches(a: NDArray[Any], b: NDArray[Any]) -> tuple[str, ...]:
     return tuple(results)
 
 
-def _pair(a: NDArray[Any], b: NDArray[Any]) -> _Pair:
-    if a.dtype.kind == "u":
-        scale = max(np.iinfo(a.dtype).max, np.iinfo(b.dtype).max)
-        # 65535 = 257 * 255, so that 8-bit values convert to 16 bits exactly.
-        whole_a, whole_b = (
-            image.astype(np.int32) * (scale // np.iinfo(image.dtype).max) for image in (a, b)
-        )
-        everywhere = np.ones(a.shape, np.bool_)
-        error = np.abs(whole_a - whole_b) / scale
-        return _Pair(whole_a / scale, whole_b / scale, error, everywhere, ~everywhere, True)
-    finite_a, finite_b = np.isfinite(a), np.isfinite(b)
-    valid = finite_a & finite_b
-    same = (a == b) | (np.isnan(a) & np.isnan(b))
-    plain_a = np.where(valid, a, 0).astype(np.float64)
-    plain_b = np.where(valid, b, 0).astype(np.float64)
+def _comparable(a: NDArray[Any], b: NDArray[Any]) -> Pair:
+    """Return a pair, or raise ValueError for images that cannot be compared value by value."""
+    a, b = checked_image("a", a), checked_image("b", b)
+    if mismatches := _mismatches(a, b):
+        raise ValueError(f"a, b: not comparable: {'; '.join(mismatches)}")
+    return pair_of(a, b)
+
+
+def pair_of(a: NDArray[Any], b: NDArray[Any]) -> Pair:
+    """Return two images of one shape as a pair."""
+    whole = [np.iinfo(image.dtype).max if image.dtype.kind == "u" else 1 for image in (a, b)]
+    is_integer = min(whole) > 1
+    # 65535 = 257 * 255, so that 8-bit values convert to 16 bits exactly.
+    scale = max(whole) if is_integer else 1
+    a, b = (
+        each.astype(np.float64) * (scale / one) for each, one in zip((a, b), whole, strict=True)
+    )
+    valid = np.isfinite(a) & np.isfinite(b)
+    unequal = ~valid & (a != b) & ~(np.isnan(a) & np.isnan(b))
+    a, b = np.where(valid, a, 0.0), np.where(valid, b, 0.0)
     # The difference of two doubles of opposite signs may overflow.
     with np.errstate(over="ignore"):
-        error = np.abs(plain_a - plain_b)
-    return _Pair(plain_a, plain_b, error, valid, ~valid & ~same, False)
-
-
-def _over(pair: _Pair, threshold: float, relative: float) -> NDArray[np.bool_]:
-    """Return which values differ by more than the thresholds, or are finite in one image only."""
-    with np.errstate(over="ignore"):
-        allowed = threshold + relative * np.abs(pair.a)
-    over: NDArray[np.bool_] = (pair.error > allowed) | pair.unequal
-    return over
+        return Pair(a / scale, b / scale, np.abs(a - b) / scale, valid, unequal, is_integer)
 
 
 def _positions(where: NDArray[np.bool_]) -> str:
@@ -211,13 +208,7 @@ def _positions(where: NDArray[np.bool_]) -> str:
     return f"{int(where.sum())} values, the first at x {x}, y {y}, channel {channel}"
 
 
-def _span(pair: _Pair) -> float:
-    low = min(0.0, float(pair.a.min()), float(pair.b.min()))
-    high = max(1.0, float(pair.a.max()), float(pair.b.max()))
-    return high - low
-
-
-def _largest(pair: _Pair) -> tuple[tuple[int, int, int] | None, tuple[float, float] | None]:
+def _largest(pair: Pair) -> tuple[tuple[int, int, int] | None, tuple[float, float] | None]:
     """Return position (x, y, channel) and values of the largest error; None if there is none."""
     index = np.unravel_index(int(pair.error.argmax()), pair.error.shape)
     if not pair.error[index]:
@@ -227,13 +218,13 @@ def _largest(pair: _Pair) -> tuple[tuple[int, int, int] | None, tuple[float, flo
 
 
 def _metrics(
-    pair: _Pair, wanted: Collection[Metric], data_range: float
+    pair: Pair, wanted: Collection[Metric], data_range: float
 ) -> tuple[dict[str, float], dict[str, str]]:
     """Return the computed metrics, and the reasons for the others, by name."""
     measures: dict[Metric, Callable[[], float | str]] = {
         "ssim": lambda: _ssim(pair, data_range),
         "psnr": lambda: _psnr(pair, data_range),
-        "flip": lambda: _mean_flip(pair),
+        "flip": lambda: float(_flip(pair).mean(dtype=np.float64)),
     }
     computed: dict[str, float] = {}
     reasons: dict[str, str] = dict.fromkeys(set(METRICS) - set(wanted), "not asked for")
@@ -250,7 +241,7 @@ def _metrics(
     return computed, reasons
 
 
-def _ssim(pair: _Pair, data_range: float) -> float | str:
+def _ssim(pair: Pair, data_range: float) -> float | str:
     metrics = import_extra("skimage.metrics", "quality", "Comparing images")
     if min(pair.a.shape[:2]) < _SSIM_WINDOW:
         return f"a side is under the window's {_SSIM_WINDOW} pixels"
@@ -261,7 +252,7 @@ def _ssim(pair: _Pair, data_range: float) -> float | str:
     )
 
 
-def _psnr(pair: _Pair, data_range: float) -> float | str:
+def _psnr(pair: Pair, data_range: float) -> float | str:
     metrics = import_extra("skimage.metrics", "quality", "Comparing images")
     if not pair.valid.any():
         return "no values to compare"
@@ -271,24 +262,12 @@ def _psnr(pair: _Pair, data_range: float) -> float | str:
     return float(metrics.peak_signal_noise_ratio(a, b, data_range=data_range))
 
 
-def _mean_flip(pair: _Pair) -> float:
-    return float(_flip(pair).mean(dtype=np.float64))
-
-
 def flip_map(a: NDArray[Any], b: NDArray[Any]) -> NDArray[np.float32]:
     """Return FLIP of every pixel; its mean is the figure of `compare`."""
-    a, b = checked_image("a", a), checked_image("b", b)
-    mismatches = _mismatches(a, b)
-    if mismatches:
-        raise ValueError(f"a, b: not comparable: {'; '.join(mismatches)}")
-    return _flip(_pair(a, b))
+    return _flip(_comparable(a, b))
 
 
-def _oiio() -> Any:
-    return import_extra("OpenImageIO", "images", "Comparing images")
-
-
-def _linear(pair: _Pair) -> list[NDArray[np.float32]]:
+def _linear(pair: Pair) -> list[NDArray[np.float32]]:
     """Return both images as linear (H, W, 3) of float32."""
     colours = 3 if pair.a.shape[2] >= 3 else 1
     largest = np.finfo(np.float32).max
@@ -302,13 +281,13 @@ def _linear(pair: _Pair) -> list[NDArray[np.float32]]:
     return results
 
 
-def _flip(pair: _Pair) -> NDArray[np.float32]:
+def _flip(pair: Pair) -> NDArray[np.float32]:
     """Return OpenImageIO's FLIP of every pixel.
 
     Sources: Andersson et al., "FLIP: A Difference Evaluator for Alternating Images", HPG 2020;
     "Visualizing Errors in Rendered High Dynamic Range Images", Eurographics 2021.
     """
-    oiio = _oiio()
+    oiio = import_extra("OpenImageIO", "images", "Comparing images")
     first, second = _linear(pair)
     if np.array_equal(first, second):
         # With fused multiply-adds, as for aarch64, OpenImageIO subtracts a product that is rounded

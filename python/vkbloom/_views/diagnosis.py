@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom._io.srgb import decode_srgb, encode_srgb
-from vkbloom._views.comparison import checked_image
-from vkbloom._views.shifts import MIN_SHIFT, find_shift
+from vkbloom._views.comparison import checked_image, pair_of
+from vkbloom._views.shifts import MIN_SHIFT, find_shift, rms
 
 Cause = Literal[
     "equal",
@@ -120,18 +120,14 @@ def diagnose(a: NDArray[Any], b: NDArray[Any]) -> Diagnosis:
     a, b = checked_image("a", a), checked_image("b", b)
     if a.shape != b.shape:
         return _of_shapes(a, b)
-    real_a, real_b = _real(a), _real(b)
-    finite_a, finite_b = np.isfinite(real_a), np.isfinite(real_b)
-    same = (real_a == real_b) | (np.isnan(real_a) & np.isnan(real_b))
-    if same.all():
+    pair = pair_of(a, b)
+    if not (pair.error.any() or pair.unequal.any()):
         return Diagnosis(cause="equal", text="equal: all values are the same")
-    valid = finite_a & finite_b
+    plain_a, plain_b = pair.a, pair.b
     step = max(_step(a), _step(b))
     # The least difference of two halves.
     tiny = 2.0**-24 if np.float16 in (a.dtype, b.dtype) else 0.0
-    plain_a, plain_b = (np.where(valid, image, 0.0) for image in (real_a, real_b))
-    unequal = int((~valid & ~same).sum())
-    if unequal:
+    if unequal := int(pair.unequal.sum()):
         return _of_not_finite(plain_a, plain_b, unequal, step)
     # Large values of float64 would overflow when they are squared.
     scale = max(float(np.abs(plain_a).max()), float(np.abs(plain_b).max()))
@@ -148,7 +144,7 @@ def diagnose(a: NDArray[Any], b: NDArray[Any]) -> Diagnosis:
 
 def _none(a: _Image, b: _Image) -> Diagnosis:
     return Diagnosis(
-        cause=None, residual=_rms(b - a), text="no single known cause explains the difference"
+        cause=None, residual=rms(b - a), text="no single known cause explains the difference"
     )
 
 
@@ -158,8 +154,8 @@ def _of_shapes(a: NDArray[Any], b: NDArray[Any]) -> Diagnosis:
     height, width = a.shape[:2]
     rows = ((np.arange(height) + 0.5) * b.shape[0] / height).astype(np.intp)
     columns = ((np.arange(width) + 0.5) * b.shape[1] / width).astype(np.intp)
-    scaled = _real(b)[rows[:, np.newaxis], columns, :count]
-    residual = _rms(np.nan_to_num(scaled) - np.nan_to_num(_real(a)[:, :, :count]))
+    scaled = b[rows[:, np.newaxis], columns, :count]
+    residual = rms(pair_of(a[:, :, :count], scaled).error)
     if a.shape[:2] == b.shape[:2]:
         text = f"channels: {a.shape[2]} against {b.shape[2]}"
         value = (a.shape[2], b.shape[2])
@@ -177,7 +173,7 @@ def _of_not_finite(a: _Image, b: _Image, count: int, step: float) -> Diagnosis:
     return Diagnosis(
         cause="nan",
         value=count,
-        residual=_rms(b - a),
+        residual=rms(b - a),
         text=f"nan: {values} NaN or infinite in one image only",
     )
 
@@ -202,7 +198,7 @@ def _of_rounding(
             return Diagnosis(
                 cause="rounding",
                 value=name,
-                residual=_rms(error),
+                residual=rms(error),
                 text=f"rounding: {name}; the values differ by {float(error.max()):.3g} at most",
             )
     return None
@@ -299,12 +295,12 @@ def _judged(
         # The level of `a` that was rounded becomes larger where the map is steep.
         lower, upper = np.maximum(a - step / 2, 0), a + step / 2
         allowed += np.abs(candidate.of_a(upper) - candidate.of_a(lower))
-    if (np.abs(residual) > allowed).any() or _rms(residual) > _REMAINS * _rms(b - a):
+    if (np.abs(residual) > allowed).any() or rms(residual) > _REMAINS * rms(b - a):
         return None
     return Diagnosis(
         cause=candidate.cause,
         value=candidate.value,
-        residual=_rms(residual),
+        residual=rms(residual),
         text=f"{candidate.cause}: {candidate.text}",
     )
 
@@ -342,11 +338,6 @@ def _divided(image: _Image) -> _Image:
     return np.concatenate([colours, alpha], axis=2)
 
 
-def _real(image: NDArray[Any]) -> _Image:
-    values: _Image = image.astype(np.float64)
-    return values / np.iinfo(image.dtype).max if image.dtype.kind == "u" else values
-
-
 def _step(image: NDArray[Any]) -> float:
     return 1 / float(np.iinfo(image.dtype).max) if image.dtype.kind == "u" else 0.0
 
@@ -360,7 +351,3 @@ def _has_levels(image: _Image, largest: int) -> bool:
 def _is_half(image: _Image) -> bool:
     with np.errstate(over="ignore"):
         return bool((image.astype(np.float16) == image).all())
-
-
-def _rms(values: NDArray[Any]) -> float:
-    return float(np.sqrt(np.mean(np.square(values)))) if values.size else 0.0

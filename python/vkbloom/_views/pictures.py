@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import struct
 import zlib
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,7 +19,9 @@ from vkbloom._views.markup import element
 if TYPE_CHECKING:
     from vkbloom._renderer.frames import Frames
 
-_CODE = "color:inherit;background:none;padding:0;white-space:pre-wrap;overflow-wrap:anywhere"
+#: The style of settings as code.
+CODE = "color:inherit;background:none;padding:0;white-space:pre-wrap;overflow-wrap:anywhere"
+_COLUMNS = "display:grid;gap:12px;grid-template-columns:repeat(auto-fill,minmax(200px,1fr))"
 _THUMBNAIL_SIDE = 320  # pixels; keeps the page of a whole frame under about 1 MB
 
 
@@ -39,43 +42,47 @@ def contact_sheet_html(frames: Frames) -> str:
 
     Pictures are made as in `leading_png`, without alpha, and averaged to at most 320 pixels.
     """
-    thumbnails = []
-    for name, array in frames.items():
-        height, width = array.shape[:2]
-        shrink = min(1.0, _THUMBNAIL_SIDE / max(width, height))
-        shown = _picture(frames, name, scaled(width, height, shrink))[:, :, :3]
-        # Show the pixels of an enlarged pyramid level without smoothing.
-        rendering = "auto" if max(shown.shape[:2]) >= _THUMBNAIL_SIDE / 2 else "pixelated"
-        size = _described(array, _note(frames, name)) + _ranged(array)
-        style = "display:block;width:100%;height:auto;max-width:none;object-fit:contain;"
-        style += f"image-rendering:{rendering};background:rgba(128,128,128,.15)"
-        thumbnails.append(
-            markup.figure(
-                markup.image(png(shown), f"{name}, {size}", style=style),
-                element("b", name),
-                " ",
-                element("span", size, style="opacity:.7"),
-                style="margin:0",
-            )
-        )
-    columns = "display:grid;gap:12px;grid-template-columns:repeat(auto-fill,minmax(200px,1fr))"
+    shown = (
+        (name, _picture(frames, name, thumbnail_size(array))[:, :, :3], _facts(frames, name))
+        for name, array in frames.items()
+    )
     times = [(name, f"{1e3 * seconds:.3f} ms") for name, seconds in frames.timings.items()]
     head = ("pass", f"time on {frames.info.get('adapter', 'the device')}")
     facts = ", ".join(f"{key} {value}" for key, value in frames.info.items())
     sheet = element(
         "div",
-        element("div", *thumbnails, style=columns),
+        thumbnails(shown),
         *([markup.table(times, head)] if times else []),
         element(
             "div",
             facts,
             element("br"),
-            element("code", repr(frames.settings), style=_CODE),
+            element("code", repr(frames.settings), style=CODE),
             style="margin-top:10px;opacity:.8",
         ),
         style="color:inherit;color-scheme:light dark;font-size:13px;max-width:68em",
     )
     return str(sheet)
+
+
+def thumbnail_size(array: NDArray[Any]) -> tuple[int, int]:
+    """Return the size of a small picture of an image, at most its own."""
+    height, width = array.shape[:2]
+    return scaled(width, height, min(1.0, _THUMBNAIL_SIDE / max(width, height)))
+
+
+def thumbnails(shown: Iterable[tuple[str, NDArray[np.uint8], str]]) -> markup.Markup:
+    """Return small pictures with their names and notes, side by side."""
+    parts = []
+    for name, pixels, note in shown:
+        # Show the pixels of an enlarged pyramid level without smoothing.
+        rendering = "auto" if max(pixels.shape[:2]) >= _THUMBNAIL_SIDE / 2 else "pixelated"
+        style = "display:block;width:100%;height:auto;max-width:none;object-fit:contain;"
+        style += f"image-rendering:{rendering};background:rgba(128,128,128,.15)"
+        image = markup.image(png(pixels), f"{name}, {note}", style=style)
+        caption = (element("b", name), " ", element("span", note, style="opacity:.7"))
+        parts.append(markup.figure(image, *caption, style="margin:0"))
+    return element("div", *parts, style=_COLUMNS)
 
 
 def _picture(frames: Frames, name: str, size: tuple[int, int] | None = None) -> NDArray[np.uint8]:
@@ -116,26 +123,25 @@ def picture(
     return pixels
 
 
-def _ranged(array: NDArray[Any]) -> str:
+def _facts(frames: Frames, name: str) -> str:
+    """Return size and dtype of a framebuffer, what its name does not tell, and its range."""
+    array = frames[name]
+    note = frames.settings.glow_note if name == "glow" else ""
+    facts = (f"{array.shape[1]} x {array.shape[0]}", str(array.dtype), note, _range_of(array))
+    return ", ".join(filter(None, facts))
+
+
+def _range_of(array: NDArray[Any]) -> str:
     """Return the range of finite floats without alpha as text; "" for integers."""
     if array.dtype == np.uint8:
         return ""
     values = np.atleast_3d(array)[:, :, :3]
     finite = np.isfinite(values)
     if not finite.any():
-        return ", nothing finite"
+        return "nothing finite"
     low = values.min(where=finite, initial=np.inf)
     high = values.max(where=finite, initial=-np.inf)
-    return f", {low:.4g} to {high:.4g}" + ("" if finite.all() else ", some not finite")
-
-
-def _described(array: NDArray[Any], note: str = "") -> str:
-    return f"{array.shape[1]} x {array.shape[0]}, {array.dtype}" + (f", {note}" if note else "")
-
-
-def _note(frames: Frames, name: str) -> str:
-    """Return what a framebuffer shows where its name does not tell it."""
-    return frames.settings.glow_note if name == "glow" else ""
+    return f"{low:.4g} to {high:.4g}" + ("" if finite.all() else ", some not finite")
 
 
 def _clipped(values: NDArray[np.float32]) -> NDArray[np.float32]:

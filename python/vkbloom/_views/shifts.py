@@ -60,7 +60,7 @@ def _residual(a: _Image, b: _Image, shift: _Shift, step: float) -> float | None:
         images = [image[inner] for image in (moved, target, reference)]
         small = [_compressed(image) for image in images]
         if all(_is_explained(*three, share=share, step=step) for three in (images, small)):
-            residual = _rms((target - moved)[inner])
+            residual = rms((target - moved)[inner])
             best = residual if best is None else min(best, residual)
     return best
 
@@ -86,8 +86,8 @@ def _is_whole(shift: _Shift) -> bool:
 def _is_explained(
     moved: _Image, target: _Image, reference: _Image, *, share: float, step: float
 ) -> bool:
-    difference = _rms(target - reference)
-    return difference > 2 * step and _rms(target - moved) <= share * difference + step / 2
+    difference = rms(target - reference)
+    return difference > 2 * step and rms(target - moved) <= share * difference + step / 2
 
 
 def _compressed(image: _Image) -> _Image:
@@ -103,5 +103,6 @@ def _inner(shape: tuple[int, ...], shift: _Shift) -> tuple[slice, slice]:
     return slice(y, shape[0] - y), slice(x, shape[1] - x)
 
 
-def _rms(values: NDArray[Any]) -> float:
+def rms(values: NDArray[Any]) -> float:
+    """Return the root mean square of values."""
     return float(np.sqrt(np.mean(np.square(values)))) if values.size else 0.0

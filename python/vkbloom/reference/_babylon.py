@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ._image import BlurInput
-from ._sampling import Array, sample
+from ._sampling import Array, sample, scaled, size_of
 from ._threshold import luminance, masked
 
 if TYPE_CHECKING:
@@ -27,11 +27,7 @@ def passes(source: BlurInput, settings: BabylonBloom) -> dict[str, Array]:
     its luminance is at least threshold^(1 / 2.2). down_0 is "bright", blurred along x, then along
     y; each sample is two taps of a Gaussian. The bloom is down_0, bilinear.
     """
-    height, width, _ = source.image.shape
-    size = (
-        max(1, math.floor(width * settings.scale)),
-        max(1, math.floor(height * settings.scale)),
-    )
+    size = scaled(size_of(source.image), settings.scale)
     bright = source.store(masked(_prefilter(sample(source.image, size), settings), source.mask))
     taps = _taps(settings)
     horizontal = source.store(sample(bright, size, x_taps=taps))

@@ -13,11 +13,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ._image import BlurInput
-from ._levels import WIDEST_LEVEL
 from ._pyramid import downsample, groups
-from ._sampling import Array
+from ._sampling import WIDEST_LEVEL, Array
 from ._threshold import luminance, masked, soften
-from ._upsampling import combine, flat_gain, halvings, tent
+from ._upsampling import Shares, combine, flat_gain, halvings, tent
 
 if TYPE_CHECKING:
     from vkbloom._methods.bevy import BevyBloom
@@ -42,8 +41,7 @@ def passes(source: BlurInput, settings: BevyBloom) -> dict[str, Array]:
     first = source.store(masked(_prefilter(source.image, level, settings), source.mask))
     shrink = partial(downsample, scale=scale)
     downs = halvings(first, _level_count(settings), source.store, shrink)
-    fine, coarse = _shares(settings)
-    return combine(downs, source, fine=fine, coarse=coarse, upsample=up, last=up)
+    return combine(downs, source, shares=_shares(settings), upsample=up, last=up)
 
 
 def gain(settings: BevyBloom, size: tuple[int, int]) -> float:
@@ -52,7 +50,7 @@ def gain(settings: BevyBloom, size: tuple[int, int]) -> float:
     The groups' weights darken it to 0.5 / (1 + 0.5 / 4) + 4 * 0.125 / (1 + 0.125 / 4) = 0.929.
     """
     first = _threshold(np.full((1, 1, 3), 0.5 / 1.125 + 0.5 / 1.03125), settings)
-    return float(first[0, 0, 0]) * flat_gain(*_shares(settings), [1.0] * _level_count(settings))
+    return float(first[0, 0, 0]) * flat_gain(_shares(settings), [1.0] * _level_count(settings))
 
 
 def _level_count(settings: BevyBloom) -> int:
@@ -73,7 +71,7 @@ def _threshold(rgb: Array, settings: BevyBloom) -> Array:
     return soften(rgb, settings.threshold, settings.knee, added=4e-5, least=1e-5)
 
 
-def _shares(settings: BevyBloom) -> tuple[list[float], list[float]]:
+def _shares(settings: BevyBloom) -> Shares:
     """Return the shares of level k and of level k + 1 in up_k."""
     mixed = settings.composite == "mix"
     last = _level_count(settings) - 1

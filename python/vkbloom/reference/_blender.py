@@ -13,9 +13,8 @@ import numpy as np
 
 from ._blender_lights import FACTORS, GAINS, LIGHTS, reads_next
 from ._image import BlurInput, Storage, finite, storage
-from ._levels import halved
 from ._pyramid import GROUPS, downsample
-from ._sampling import Array, sample, weighted_mean
+from ._sampling import Array, halved, sample, size_of, weighted_mean
 from ._tape import value_of
 from ._threshold import brightest, masked
 from ._upsampling import combine, halvings, linear, tent_of_target
@@ -31,17 +30,17 @@ def passes(source: BlurInput, settings: BlenderGlare) -> dict[str, Array]:
     quarter of them, rounded up. It is enlarged bilinearly. Its saturation is multiplied, with a
     result of 0 to 1, then its channels by the tint.
     """
-    height, width, _ = source.image.shape
+    size = size_of(source.image)
     factor = FACTORS[settings.quality]
     reduced = _means(source.image, factor)
     bright = source.store(masked(_highlights(reduced, settings), source.mask))
     framebuffers = {"glow": bright}
     if factor > 1:
-        framebuffers = {"highlights": bright, "glow": source.store(sample(bright, (width, height)))}
+        framebuffers = {"highlights": bright, "glow": source.store(sample(bright, size))}
     # 8 bits and few bits of mantissa hold too little of what spreads over hundreds of pixels.
     exact = source.store.high > 65024
     store = source.store if exact or settings.type == "bloom" else storage("rgba16float")
-    images = _TYPES[settings.type](bright, settings, store, (width, height))
+    images = _TYPES[settings.type](bright, settings, store, size)
     light = _enlarged(images.pop("light"), source.size, settings.version)
     rounding = 1e-6 if settings.type in ("fog_glow", "kernel") else 1e-14
     rgb = np.multiply(_settled(light[..., :3], settings.saturation, rounding), settings.tint)
@@ -119,14 +118,12 @@ def _settled(rgb: Array, saturation: float, rounding: float) -> Array:
 
 def _means(image: Array, factor: int) -> Array:
     """Return the means of factor x factor pixels, rows from below, with the last ones repeated."""
-    for axis, length in enumerate(image.shape[:2]):
-        count = -(-length // factor)
-        indices = np.minimum(np.arange(count * factor), length - 1)
-        if axis == 0:
-            indices = (length - 1 - indices)[::-1]
-        taps = image[indices] if axis == 0 else image[:, indices]
-        parts = [taps[i::factor] if axis == 0 else taps[:, i::factor] for i in range(factor)]
-        image = sum(parts[1:], parts[0]) / factor
+    for is_first in (True, False):
+        length = len(image)
+        indices = np.minimum(np.arange(-(-length // factor) * factor), length - 1)
+        taps = image[(length - 1 - indices)[::-1] if is_first else indices]
+        parts = [taps[i::factor] for i in range(factor)]
+        image = (sum(parts[1:], parts[0]) / factor).swapaxes(0, 1)
     return image
 
 
@@ -140,15 +137,15 @@ def _bloom(
     each of their groups of four are weighted by 1 / (1 + brightest channel).
     up_k = down_k + tent(up_k+1) with a tent of one pixel of the larger level.
     """
-    height, width, _ = bright.shape
-    count = max(1, math.floor(math.log2(max(1.0, min(width, height) * settings.size))))
+    own = size_of(bright)
+    count = max(1, math.floor(math.log2(max(1.0, min(own) * settings.size))))
     downs = [bright]
     if count > 1:
-        second = store(_weighted_taps(bright, halved((width, height))))
+        second = store(_weighted_taps(bright, halved(own)))
         downs += halvings(second, count - 1, store, downsample)
     levels = combine(
         downs,
-        BlurInput(bright, (width, height), store),
+        BlurInput(bright, own, store),
         upsample=tent_of_target,
         last=linear,
         gain=1 / count,

@@ -7,6 +7,7 @@ node_composite_glare.cc (@ f92418fbe034: the same formulas). Blender counts rows
 from __future__ import annotations
 
 import math
+import operator
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -94,14 +95,10 @@ def _gaussian(image: Array, radius: float) -> Array:
     offsets = np.arange(-count, count + 1)
     weights = np.exp(-0.5 * (3 * offsets / radius) ** 2)
     weights /= weights.sum()
-    for axis in (0, 1):
-        length = image.shape[axis]
-        at = np.arange(length)
-        moved = [np.clip(at + offset, 0, length - 1) for offset in offsets]
-        image = sum(
-            weight * (image[rows] if axis == 0 else image[:, rows])
-            for weight, rows in zip(weights, moved, strict=True)
-        )
+    for _ in range(2):
+        at = np.arange(len(image))
+        moved = [image[np.clip(at + offset, 0, len(image) - 1)] for offset in offsets]
+        image = sum(map(operator.mul, weights, moved)).swapaxes(0, 1)
     return image
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ._image import BlurInput
-from ._sampling import Array, sample
+from ._sampling import Array, sample, size_of
 from ._tape import joined, operation, value_of
 from ._threshold import luminance
 
@@ -21,8 +21,8 @@ def passes(source: BlurInput, settings: Convolution) -> dict[str, Array]:
     Three channels are convolved with the channels of the kernel. A fourth channel is convolved with
     the mean of these, and so is every channel of an image with another number of channels.
     """
-    height, width, channels = source.image.shape
-    kernel = settings.kernel(source.size, (width, height))
+    channels = source.image.shape[2]
+    kernel = settings.kernel(source.size, size_of(source.image))
     mean = kernel.mean(axis=2, keepdims=True)
     colours = kernel if channels in (3, 4) else mean
     used = np.concatenate([colours, *[mean] * (channels - colours.shape[2])], axis=2)

@@ -111,7 +111,6 @@ def vjp(
         arrays.get("emission", arrays["image"]),
         traced,
         mask=arrays.get("mask"),
-        share=0.0 if emission is not None else arrays.get("mask", 1.0),
         format="rgba32float",
         dtype=np.asarray(image).dtype,
     )

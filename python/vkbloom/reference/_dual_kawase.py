@@ -5,11 +5,12 @@ From Bjorge, "Bandwidth-Efficient Rendering", SIGGRAPH 2015.
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING
 
 from ._image import BlurInput
-from ._levels import level_sizes
-from ._sampling import CENTRE, Array, Taps, sample
+from ._sampling import CENTRE, Array, box, level_sizes, sample, size_of
+from ._upsampling import combine, halvings
 
 if TYPE_CHECKING:
     from vkbloom._methods.mip_chain import DualKawase
@@ -17,18 +18,11 @@ if TYPE_CHECKING:
 
 def passes(source: BlurInput, settings: DualKawase) -> dict[str, Array]:
     """Return the framebuffers on the way down and up; nothing is added on the way up."""
-    height, width, _ = source.image.shape
-    sizes = level_sizes((width, height), settings.levels)
-    framebuffers: dict[str, Array] = {}
-    image = source.image
-    for k, level_size in enumerate(sizes):
-        image = source.store(down(image, level_size, settings.offset))
-        framebuffers[f"down_{k}"] = image
-    for k in range(len(sizes) - 2, -1, -1):
-        image = source.store(up(image, sizes[k], settings.offset))
-        framebuffers[f"up_{k}"] = image
-    framebuffers["bloom"] = source.store(up(image, source.size, settings.offset))
-    return framebuffers
+    count = len(level_sizes(size_of(source.image), settings.levels))
+    shrink, enlarge = (partial(filter, offset=settings.offset) for filter in (down, up))
+    downs = halvings(source.image, 1 + count, source.store, shrink)[1:]
+    shares = [0.0] * count, [1.0] * count
+    return combine(downs, source, shares, upsample=enlarge, last=enlarge, end=source.store)
 
 
 def gain(settings: DualKawase, size: tuple[int, int]) -> float:
@@ -38,17 +32,11 @@ def gain(settings: DualKawase, size: tuple[int, int]) -> float:
 
 def down(image: Array, size: tuple[int, int], offset: float) -> Array:
     """Return (4 centre + 4 diagonals at offset / 2 texels of `image`) / 8."""
-    diagonals = _pair(offset / 2)
-    return (4 * sample(image, size) + sample(image, size, diagonals, diagonals)) / 8
+    return (sample(image, size) + box(image, size, offset / 2)) / 2
 
 
 def up(image: Array, size: tuple[int, int], offset: float) -> Array:
     """Return (4 taps on the axes at offset texels + 2 * 4 diagonals at half of that) / 12."""
-    axial, diagonals = _pair(offset), _pair(offset / 2)
+    axial = ((-offset, 1.0), (offset, 1.0))
     axials = sample(image, size, axial, CENTRE) + sample(image, size, CENTRE, axial)
-    return (axials + 2 * sample(image, size, diagonals, diagonals)) / 12
-
-
-def _pair(distance: float) -> Taps:
-    """Return two taps of weight 1, one on each side of the centre."""
-    return ((-distance, 1.0), (distance, 1.0))
+    return (axials + 8 * box(image, size, offset / 2)) / 12

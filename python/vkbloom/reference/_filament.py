@@ -13,9 +13,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ._image import BlurInput
-from ._levels import WIDEST_LEVEL, halved
 from ._pyramid import downsample
-from ._sampling import Array, sample, weighted_mean
+from ._sampling import WIDEST_LEVEL, Array, halved, sample, size_of, weighted_mean
 from ._threshold import brightest, firefly_weight, masked
 from ._upsampling import combine, halvings, linear, tent_of_target
 
@@ -33,14 +32,9 @@ def passes(source: BlurInput, settings: FilamentBloom) -> dict[str, Array]:
     13 if a side of the level above is odd. up_k = down_k + tent(up_k+1) with a tent of one pixel of
     the larger level; the bloom is up_0, bilinear, divided by the number of levels.
     """
-    height, width, _ = source.image.shape
-    top = settings.resolution
-    across = min(top * width / height, WIDEST_LEVEL)
-    level = (
-        16 * max(1, math.floor(across / 16)),
-        16 * max(1, math.floor(top / 16)),
-    )
-    image, above = source.image, (width, height)
+    image, above, top = source.image, size_of(source.image), settings.resolution
+    across = min(top * above[0] / above[1], WIDEST_LEVEL)
+    level = 16 * max(1, math.floor(across / 16)), 16 * max(1, math.floor(top / 16))
     threshold, mask = settings.threshold, source.mask
     while level[0] * 2 < above[0] or level[1] * 2 < above[1]:
         above = halved(above)

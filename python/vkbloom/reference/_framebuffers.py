@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from vkbloom._argument_types import SETTINGS, checked_as
+from vkbloom._checks import check_emission
 from vkbloom._settings.registry import METHODS, Reference
 
 from . import _custom as custom
 from . import _glare as glare
 from ._compositing import composite_checked, strength_of
-from ._image import BlurInput, as_array, as_float, as_mask, finite, format_of, storage
-from ._sampling import Array, sample
+from ._image import BlurInput, as_float, as_mask, finite, format_of, storage
+from ._sampling import Array, sample, scaled, size_of
 from ._threshold import apply_threshold, masked
 
 if TYPE_CHECKING:
@@ -76,16 +76,8 @@ def apply(
         scene = as_float(image, "image", (3, 4))
         return custom.framebuffers(function, scene, settings, np.asarray(image).dtype)
     scene, source, weights, format = checked_image(image, settings, mask, emission)
-    share = 0.0 if emission is not None else 1.0 if weights is None else weights
-    return framebuffers(
-        scene,
-        source,
-        settings,
-        mask=weights,
-        share=share,
-        format=format,
-        dtype=np.asarray(image).dtype,
-    )
+    dtype = np.asarray(image).dtype
+    return framebuffers(scene, source, settings, mask=weights, format=format, dtype=dtype)
 
 
 def checked_image(
@@ -97,12 +89,14 @@ def checked_image(
     """Return scene, source of the bloom and mask in real units, and the bloom buffers' format."""
     _method(settings)
     scene = as_float(image, "image", (3, 4))
-    height, width, channels = scene.shape
     format = format_of(image, settings.format)
-    if settings.alpha != "keep" and (channels == 3 or format == "rg11b10ufloat"):
+    if settings.alpha != "keep" and (scene.shape[2] == 3 or format == "rg11b10ufloat"):
         raise ValueError(f'alpha: {settings.alpha!r} is not "keep"; there is no fourth channel')
-    source = scene if emission is None else _emission(image, emission)
-    return scene, source, None if mask is None else as_mask(mask, (width, height)), format
+    source = scene
+    if emission is not None:
+        source = as_float(emission, "emission", (3, 4))
+        check_emission(np.asarray(emission), np.asarray(image))
+    return scene, source, None if mask is None else as_mask(mask, size_of(scene)), format
 
 
 def framebuffers(
@@ -111,27 +105,27 @@ def framebuffers(
     settings: Settings,
     *,
     mask: Array | None,
-    share: float | Array,
     format: str,
     dtype: DTypeLike,
 ) -> dict[str, Array]:
-    """Return the framebuffers of `apply`.
-
-    `share` is the share of the scene that is the source of the bloom, (H, W, 1) or a number.
-    """
+    """Return the framebuffers of `apply`; without an emission, `source` is `scene`."""
     method = _method(settings)
-    height, width, _ = scene.shape
+    size = size_of(scene)
     if not settings.bloom:
         return {"final": composite_checked(scene, None, settings, dtype)}
     store = storage(format)
     channels = 4 if settings.alpha == "blur" else 3
-    reduced = sample(finite(source[..., :channels]), _bloom_size(settings, (width, height)))
-    if settings.published:
-        glow = store.first(reduced)
-    else:
-        glow = store(masked(apply_threshold(reduced, settings.threshold, settings.knee), mask))
-    blurred = method.passes(BlurInput(glow, (width, height), store, mask), settings)
-    stages = glare.stages(_glowing(glow, settings, mask), settings.glare, format)
+
+    def thresholded(colours: Array) -> Array:
+        return masked(apply_threshold(colours, settings.threshold, settings.knee), mask)
+
+    buffers = settings.bloom_size or scaled(size, settings.bloom_scale)
+    reduced = sample(finite(source[..., :channels]), buffers)
+    glow = store.first(reduced) if settings.published else store(thresholded(reduced))
+    blurred = method.passes(BlurInput(glow, size, store, mask), settings)
+    # Published methods do not threshold the glow.
+    seen = thresholded(glow) if settings.published else glow
+    stages = glare.stages(seen, settings.glare, format)
     results = _with_alphas({"glow": glow, **stages, **blurred})
     strength = strength_of(settings)
     if settings.glare:
@@ -139,15 +133,10 @@ def framebuffers(
         light = glare.light(results["bloom"], strength, images, settings.glare)
     else:
         light = results["bloom"] * strength
+    # The share of the scene that is the source of the bloom.
+    share = 0.0 if source is not scene else 1.0 if mask is None else mask
     results["final"] = composite_checked(scene, light, settings, dtype, share)
     return results
-
-
-def _glowing(glow: Array, settings: Settings, mask: Array | None) -> Array:
-    """Return the input of the stages of glare; published methods do not threshold the glow."""
-    if not settings.published:
-        return glow
-    return masked(apply_threshold(glow, settings.threshold, settings.knee), mask)
 
 
 @checked_as(settings=SETTINGS)
@@ -192,20 +181,18 @@ def passes(
     """
     method = _method(settings)
     values = finite(as_float(glow, "glow"))
-    height, width, channels = values.shape
+    channels = values.shape[2]
     if size is not None and min(size) < 1:
         raise ValueError(f"size: {size} is not (width, height) of at least 1")
     store = storage(format_of(glow, settings.format if format is None else format))
     has_alpha = channels == 4 and settings.alpha != "blur"
     colours = values[..., :3] if has_alpha else values
     colours = store.first(colours) if settings.published else store(colours)
-    size = size or (width, height)
+    size = size or size_of(values)
     weights = None if mask is None else as_mask(mask, size)
     given = BlurInput(colours, size, store, weights if settings.published else None)
     framebuffers: dict[str, Array] = method.passes(given, settings)
-    if not has_alpha:
-        return framebuffers
-    return _with_alphas(framebuffers)
+    return _with_alphas(framebuffers) if has_alpha else framebuffers
 
 
 @checked_as(settings=SETTINGS)
@@ -261,25 +248,6 @@ def _method(settings: Settings) -> Reference:
             f"method: {settings.method!r} has no reference in NumPy; give one when it is loaded, "
             "load_method(file, reference=function)"
         ) from None
-
-
-def _bloom_size(settings: Settings, frame: tuple[int, int]) -> tuple[int, int]:
-    """Return width and height of the bloom buffers of a frame."""
-    if settings.bloom_size is not None:
-        return settings.bloom_size
-    width, height = (max(1, math.floor(side * settings.bloom_scale)) for side in frame)
-    return width, height
-
-
-def _emission(image: NDArray[Any], emission: NDArray[Any]) -> Array:
-    """Return an emission in real units."""
-    values = as_float(emission, "emission", (3, 4))
-    kinds = [
-        (part.shape, part.dtype) for part in (np.asarray(image), as_array(emission, "emission"))
-    ]
-    if kinds[0] != kinds[1]:
-        raise ValueError(f"emission: shape and dtype {kinds[1]} are not the image's {kinds[0]}")
-    return values
 
 
 def _with_alphas(framebuffers: dict[str, Array]) -> dict[str, Array]:

@@ -14,10 +14,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ._image import BlurInput, Storage
-from ._sampling import Array, read_rows, sample, weighted_mean
+from ._sampling import Array, read_rows, sample, size_of, weighted_mean
 from ._tape import contiguous
 from ._threshold import firefly_weight, luminance, masked
-from ._upsampling import combine, cubic, cubic_rows
+from ._upsampling import combine, cubic, cubic_rows, mixed
 
 if TYPE_CHECKING:
     from vkbloom._methods.unity import HdrpBloom
@@ -44,7 +44,7 @@ def passes(source: BlurInput, settings: HdrpBloom) -> dict[str, Array]:
     pixel, all levels read the last sample. In up_k, no position is beyond the middle of the last
     two texels, and no tap of the cubic filter beyond 1 - 1 / size of the larger level.
     """
-    height, width, _ = source.image.shape
+    width, height = size_of(source.image)
     count = min(max(math.floor(math.log2(max(width, height)) - 2), 1), 16)
     reduced_width = width * (1 + min(settings.anamorphism, 0) / 2)
     reduced_height = height * (1 - max(settings.anamorphism, 0) / 2)
@@ -56,14 +56,12 @@ def passes(source: BlurInput, settings: HdrpBloom) -> dict[str, Array]:
     downs = [_along_both(reduced, sizes[0], _blur_rows, source.store)]
     for level in sizes[1:]:
         downs.append(_along_both(downs[-1], level, _shrink_rows, source.store))
-    share = 0.05 + (0.95 - 0.05) * settings.scatter
     is_cubic = settings.high_quality_filtering and width >= 800 and height >= 450
     rows = _cubic_rows if is_cubic else _linear_rows
     return combine(
         downs,
         source,
-        fine=[1 - share] * count,
-        coarse=[share] * count,
+        mixed(0.05 + (0.95 - 0.05) * settings.scatter, count),
         upsample=lambda image, larger: _along_both(image, larger, rows),
         last=cubic,
     )

@@ -87,18 +87,13 @@ class Storage:
     coarse: Literal["", "rg11b10", "srgb8"] = ""
 
     @property
-    def is_coarse(self) -> bool:
-        """Whether values are rounded."""
-        return self.coarse != ""
-
-    @property
     def holds_means(self) -> bool:
         """Whether sums of levels are stored as means, since they would be clamped."""
-        return self.high == 1 and not self.is_coarse
+        return self.high == 1 and not self.coarse
 
     def __call__(self, image: Array) -> Array:
         """Return the image as stored."""
-        if self.is_coarse:
+        if self.coarse:
             return _as_rg11b10(image) if self.coarse == "rg11b10" else _as_srgb8(image)
         return np.clip(image, self.low, self.high)
 
@@ -113,7 +108,7 @@ class Storage:
         formats, so that this format does not change them. The one with "rgba8unorm-srgb" reads the
         frame from it, too.
         """
-        return image if self.is_coarse else self(image)
+        return image if self.coarse else self(image)
 
 
 @dataclasses.dataclass(frozen=True)

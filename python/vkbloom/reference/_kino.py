@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ._image import BlurInput
-from ._levels import halved
-from ._sampling import Array, sample, weighted_mean
+from ._sampling import Array, halved, sample, size_of, weighted_mean
 from ._threshold import brightest, firefly_weight, masked, soften
 from ._upsampling import combine, halvings, tent
 
@@ -29,10 +28,10 @@ def passes(source: BlurInput, settings: KinoBloom) -> dict[str, Array]:
     down_k the mean of four taps one texel away, up_k = down_k + tent(up_k+1), and the bloom
     tent(up_0).
     """
-    height, width, _ = source.image.shape
-    count, step = _count_and_step(settings, height)
+    size = size_of(source.image)
+    count, step = _count_and_step(settings, size[1])
     bright = source.store(masked(_prefilter(source.image, settings), source.mask))
-    first = source.store(_box(bright, halved((width, height)), settings.anti_flicker))
+    first = source.store(_box(bright, halved(size), settings.anti_flicker))
     downs = halvings(first, count, source.store, partial(_box, firefly_filter=False))
     up = partial(tent, x_step=step, y_step=step)
     ups = combine(downs, source, upsample=up, last=up)

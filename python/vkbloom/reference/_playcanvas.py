@@ -12,9 +12,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ._image import BlurInput
-from ._levels import halved
 from ._pyramid import downsample
-from ._sampling import Array, sample
+from ._sampling import Array, halved, sample, size_of
 from ._threshold import masked, soften
 from ._upsampling import combine, halvings, linear, tent
 
@@ -29,8 +28,7 @@ def passes(source: BlurInput, settings: PlayCanvasBloom) -> dict[str, Array]:
     further level half of the one above, by 13 taps. The threshold is applied to down_0. up_k =
     down_k + tent(up_k+1); the bloom is up_0, bilinear.
     """
-    height, width, _ = source.image.shape
-    level = halved((width, height))
+    level = halved(size_of(source.image))
     half = source.store(np.maximum(sample(source.image, level), 0))
     bright = _thresholded(downsample(half, halved(level)), settings)
     first = source.store(masked(bright, source.mask))

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ._image import BlurInput
-from ._sampling import Array, sample
+from ._sampling import Array, halved, sample, size_of
 from ._threshold import luminance, masked, smooth_step
-from ._upsampling import combine, linear, tent
+from ._upsampling import combine, flat_gain, linear, mixed, tent
 
 if TYPE_CHECKING:
     from vkbloom._methods.pmndrs import PmndrsBloom
@@ -31,26 +31,16 @@ def passes(source: BlurInput, settings: PmndrsBloom) -> dict[str, Array]:
     down_k with the tent of up_k+1 by the radius; a single level is mixed with its own tent. The
     bloom is up_0, bilinear.
     """
-    height, width, _ = source.image.shape
     bright = source.store(masked(_prefilter(source.image, settings), source.mask))
     image, downs = bright, []
     for _ in range(settings.levels):
-        width, height = max(1, (width + 1) // 2), max(1, (height + 1) // 2)
-        image = source.store(_down(image, (width, height)))
+        image = source.store(_down(image, halved(size_of(image), 1)))
         downs.append(image)
-    share = settings.radius
     if settings.levels == 1:
         # The second level is the first one again.
         downs.append(downs[0])
-    count = len(downs)
-    framebuffers = combine(
-        downs,
-        source,
-        fine=[1 - share] * count,
-        coarse=[share] * count,
-        upsample=tent,
-        last=linear,
-    )
+    shares = mixed(settings.radius, len(downs))
+    framebuffers = combine(downs, source, shares, upsample=tent, last=linear)
     if settings.levels == 1:
         del framebuffers["down_1"]
     return {"bright": bright, **framebuffers}
@@ -63,10 +53,7 @@ def gain(settings: PmndrsBloom, size: tuple[int, int]) -> float:
     for _ in range(settings.levels):
         level *= sum(weight * len(offsets) ** 2 for weight, offsets in _DOWN)
         downs.append(level)
-    value = downs[-1]
-    for level in downs[:-1][::-1]:
-        value = (1 - settings.radius) * level + settings.radius * value
-    return value
+    return flat_gain(mixed(settings.radius, len(downs)), downs)
 
 
 def _prefilter(rgb: Array, settings: PmndrsBloom) -> Array:

@@ -13,7 +13,7 @@ import numpy as np
 
 from ._image import BlurInput
 from ._pyramid import downsample
-from ._sampling import Array, sample
+from ._sampling import Array, box, size_of
 from ._threshold import masked, soften, with_alpha
 from ._upsampling import combine, halvings, tent
 
@@ -30,16 +30,14 @@ def passes(source: BlurInput, settings: PostProcessingBloom) -> dict[str, Array]
     tent(up_0), whose radius is a texel times a factor of 0.5 to 1.5 that follows from `diffusion`
     and the size; with `fast` the tent is the mean of four samples.
     """
-    height, width, channels = source.image.shape
-    first, count, radius = _plan((width, height), settings)
+    channels = source.image.shape[2]
+    first, count, radius = _plan(size_of(source.image), settings)
 
     def reduced(image: Array, size: tuple[int, int]) -> Array:
-        return (
-            _box(image, size, 1.0) if settings.fast else downsample(image, size, scale=(0.5, 0.5))
-        )
+        return box(image, size) if settings.fast else downsample(image, size, scale=(0.5, 0.5))
 
     def enlarged(image: Array, size: tuple[int, int]) -> Array:
-        return _box(image, size, radius / 2) if settings.fast else tent(image, size, radius, radius)
+        return box(image, size, radius / 2) if settings.fast else tent(image, size, radius, radius)
 
     bright = _prefilter(reduced(source.image, first), settings)
     bright = source.store(masked(bright * with_alpha(settings.color, channels), source.mask))
@@ -79,9 +77,3 @@ def linear_light(value: Any) -> Any:
     if value > 1:
         return value**2.2
     return value / 12.92 if value <= 0.04045 else ((value + 0.055) / 1.055) ** 2.4
-
-
-def _box(image: Array, size: tuple[int, int], distance: float) -> Array:
-    """Return the mean of four samples at a distance along both axes, in texels of the image."""
-    taps = [(-distance, 0.5), (distance, 0.5)]
-    return sample(image, size, taps, taps)

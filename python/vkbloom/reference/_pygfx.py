@@ -11,9 +11,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ._image import BlurInput, finite
-from ._levels import halved
 from ._pyramid import downsample, groups
-from ._sampling import Array, weighted_mean
+from ._sampling import Array, halved, size_of, weighted_mean
 from ._threshold import luminance, masked
 from ._upsampling import combine, halvings, linear, tent
 
@@ -29,12 +28,12 @@ def passes(source: BlurInput, settings: PygfxBloom) -> dict[str, Array]:
     only. up_k = down_k + tent(up_k+1), whose taps are `filter_radius` of the width apart along
     both axes; the bloom is up_0, bilinear. The levels are clamped to at least 0.
     """
-    height, width, _ = source.image.shape
+    size = size_of(source.image)
     shrink = _averaged if settings.karis_average else downsample
-    first = np.maximum(shrink(source.image, halved((width, height))), 0)
+    first = np.maximum(shrink(source.image, halved(size)), 0)
     downs = halvings(
         source.store(masked(first, source.mask)),
-        _level_count(settings, (width, height)),
+        _level_count(settings, size),
         source.store,
         lambda image, size: np.maximum(downsample(image, size), 0),
     )

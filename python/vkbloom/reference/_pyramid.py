@@ -7,10 +7,9 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from ._image import BlurInput
-from ._levels import level_sizes
-from ._sampling import Array, sample, weighted_mean
+from ._sampling import Array, level_sizes, sample, size_of, weighted_mean
 from ._threshold import firefly_weight, luminance
-from ._upsampling import combine, tent
+from ._upsampling import combine, halvings, tent
 
 if TYPE_CHECKING:
     from vkbloom._methods.mip_chain import Pyramid
@@ -36,21 +35,17 @@ def passes(source: BlurInput, settings: Pyramid) -> dict[str, Array]:
     tent(up_0) / N. With level weights, up_N-1 = w_N-1 down_N-1, up_k = w_k down_k + tent(up_k+1),
     and the bloom is tent(up_0). The scale multiplies the distances of all taps.
     """
-    height, width, _ = source.image.shape
-    downs: list[Array] = []
-    image = source.image
     scale = (settings.scale_x, settings.scale_y)
-    for k, level in enumerate(level_sizes((width, height), settings.levels)):
-        image = source.store(downsample(image, level, settings.firefly_filter and k == 0, scale))
-        downs.append(image)
-    count, weights = len(downs), settings.level_weights
+    levels = level_sizes(size_of(source.image), settings.levels)
+    first = source.store(downsample(source.image, levels[0], settings.firefly_filter, scale))
+    count, weights = len(levels), settings.level_weights
+    downs = halvings(first, count, source.store, partial(downsample, scale=scale))
     up = partial(tent, x_step=settings.radius * scale[0], y_step=settings.radius * scale[1])
     shares = [1.0] * count if weights is None else list(weights[:count])
     return combine(
         downs,
         source,
-        fine=shares,
-        coarse=[1.0] * count,
+        (shares, [1.0] * count),
         upsample=up,
         last=up,
         smallest=shares[-1],

@@ -1,4 +1,4 @@
-"""Bilinear sampling of an image at a grid of positions, clamped to the edge.
+"""Sizes of images and of their levels, and bilinear sampling, clamped to the edge.
 
 All passes of the bloom methods read at positions that form a grid: the pixel centres of the
 image they write, moved by the offset of a tap. Bilinear interpolation and clamping are separable,
@@ -8,7 +8,9 @@ banded. They are built and applied in blocks of output rows.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +29,40 @@ CENTRE: Taps = ((0.0, 1.0),)
 _BLOCK = 32
 
 
+#: The widest level of a method that gives its levels a height and the aspect of the frame.
+WIDEST_LEVEL: Final = 16384
+
+
+def size_of(image: Any) -> tuple[int, int]:
+    """Return width and height of an image."""
+    return image.shape[1], image.shape[0]
+
+
+def halved(size: tuple[int, int], more: int = 0) -> tuple[int, int]:
+    """Return half of a size, each side floored but at least 1; `more`: 1 to round up."""
+    return max(1, (size[0] + more) // 2), max(1, (size[1] + more) // 2)
+
+
+def scaled(size: tuple[int, int], scale: float) -> tuple[int, int]:
+    """Return a size times a factor, each side floored but at least 1."""
+    return max(1, math.floor(size[0] * scale)), max(1, math.floor(size[1] * scale))
+
+
+def level_sizes(size: tuple[int, int], levels: int) -> list[tuple[int, int]]:
+    """Return the sizes of the levels below an image, largest first.
+
+    Each level has half the size of the one before (`halved`). The chain ends before a level of
+    1 x 1, except that it always has one level.
+    """
+    sizes: list[tuple[int, int]] = []
+    for _ in range(levels):
+        size = halved(size)
+        if sizes and size == (1, 1):
+            break
+        sizes.append(size)
+    return sizes
+
+
 def sample(
     image: Array, size: tuple[int, int], x_taps: Taps = CENTRE, y_taps: Taps = CENTRE
 ) -> Array:
@@ -42,6 +78,12 @@ def sample(
     rows = _filter_rows(image, height, y_taps)
     columns = _filter_rows(rows.swapaxes(0, 1), width, x_taps)
     return contiguous(columns.swapaxes(0, 1))
+
+
+def box(image: Array, size: tuple[int, int], distance: float = 1.0) -> Array:
+    """Return the mean of four samples at a distance along both axes, in texels of the image."""
+    taps = ((-distance, 0.5), (distance, 0.5))
+    return sample(image, size, taps, taps)
 
 
 def _filter_rows(image: Array, count: int, taps: Taps) -> Array:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ._image import BlurInput
-from ._sampling import Array, sample
+from ._sampling import Array, sample, size_of
 
 if TYPE_CHECKING:
     from vkbloom._methods.separable import Separable
@@ -26,7 +26,7 @@ def passes(source: BlurInput, settings: Separable) -> dict[str, Array]:
     With ``settings.direct``, a loop is one pass that reads N x N taps, weighted by the products of
     the kernel with itself, and there is no "blur_vertical".
     """
-    height, width, _ = source.image.shape
+    size = width, height = size_of(source.image)
     kernel = _kernel(settings)
     # With texel="x", the step along both axes is 1 / width in normalized coordinates.
     texel_y = height / width if settings.texel == "x" else 1.0
@@ -39,11 +39,11 @@ def passes(source: BlurInput, settings: Separable) -> dict[str, Array]:
         blurred = source.image
         for loop in range(settings.loops):
             is_last = loop == settings.loops - 1
-            target = source.size if is_last else (width, height)
+            target = source.size if is_last else size
             if settings.direct:
                 blurred = sample(blurred, target, x_taps=x_taps, y_taps=y_taps)
             else:
-                vertical = source.store(sample(blurred, (width, height), y_taps=y_taps))
+                vertical = source.store(sample(blurred, size, y_taps=y_taps))
                 framebuffers["blur_vertical"] = vertical
                 blurred = sample(vertical, target, x_taps=x_taps)
             if not is_last:

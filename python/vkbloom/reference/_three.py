@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ._image import BlurInput
-from ._sampling import Array, sample
+from ._sampling import Array, halved, sample, scaled, size_of
 from ._threshold import luminance, masked, smooth_step, with_alpha
 
 if TYPE_CHECKING:
@@ -36,8 +36,8 @@ def passes(source: BlurInput, settings: ThreeBloom) -> dict[str, Array]:
     the levels, enlarged bilinearly and multiplied by their factors and tints; the bloom is up_0,
     bilinear. In rgba8unorm buffers, up_0 is divided by the sum of the factors, 3.
     """
-    height, width, channels = source.image.shape
-    size = _first_size((width, height), settings)
+    channels = source.image.shape[2]
+    size = _first_size(size_of(source.image), settings)
     image = source.store(masked(_prefilter(sample(source.image, size), settings), source.mask))
     framebuffers = {"bright": image}
     total = np.zeros_like(image)
@@ -73,15 +73,12 @@ def _first_size(size: tuple[int, int], settings: ThreeBloom) -> tuple[int, int]:
     """Return the size of "bright" and of down_0."""
     if settings.variant != "node":
         return _halved(size, settings)
-    width, height = (max(1, math.floor(side * settings.resolution_scale)) for side in size)
-    return width, height
+    return scaled(size, settings.resolution_scale)
 
 
 def _halved(size: tuple[int, int], settings: ThreeBloom) -> tuple[int, int]:
     """Return half of a size, at least 1: rounded, ties up, or floored by BloomNode."""
-    more = 0 if settings.variant == "node" else 1
-    width, height = (max(1, (side + more) // 2) for side in size)
-    return width, height
+    return halved(size, 0 if settings.variant == "node" else 1)
 
 
 def _factors(radius: float) -> list[float]:

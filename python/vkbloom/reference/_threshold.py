@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ._sampling import Array, sample
+from ._sampling import Array, sample, size_of
 from ._tape import joined
 
 # Rec. 709 luma coefficients of linear rgb.
@@ -36,8 +36,7 @@ def masked(image: Array, mask: Array | None) -> Array:
     """Return the image times the mask, which is read bilinearly at the image's pixel centres."""
     if mask is None:
         return image
-    height, width, _ = image.shape
-    return image * sample(mask, (width, height))
+    return image * sample(mask, size_of(image))
 
 
 def firefly_weight(brightness: Array) -> Array:

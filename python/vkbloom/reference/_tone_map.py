@@ -3,16 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from types import MappingProxyType
 
 import numpy as np
 
 from ._sampling import Array
 from ._tape import joined
-
-
-def _none(rgb: Array) -> Array:
-    return rgb
 
 
 def _reinhard(rgb: Array) -> Array:
@@ -130,23 +125,19 @@ def _hlg(rgb: Array) -> Array:
 
 # By name in the settings. Each takes and returns finite rgb, (..., 3), of float64. The curves are
 # defined for values of at least 0; for negative values the formulas are used unchanged.
-TONE_MAPS: Mapping[str, Callable[[Array], Array]] = MappingProxyType(
-    {
-        "none": _none,
-        "reinhard": _reinhard,
-        "aces": _aces,
-        "exponential": _exponential,
-        "khronos_neutral": _khronos_neutral,
-        "agx": _agx,
-    }
-)
+TONE_MAPS: Mapping[str, Callable[[Array], Array]] = {
+    "none": lambda rgb: rgb,
+    "reinhard": _reinhard,
+    "aces": _aces,
+    "exponential": _exponential,
+    "khronos_neutral": _khronos_neutral,
+    "agx": _agx,
+}
 # With the luminance of a value of 1, which only "pq" reads.
-ENCODINGS: Mapping[str, Callable[[Array, float], Array]] = MappingProxyType(
-    {
-        "none": lambda rgb, _: rgb,
-        "gamma22": lambda rgb, _: _gamma22(rgb),
-        "srgb": lambda rgb, _: _srgb(rgb),
-        "pq": _pq,
-        "hlg": lambda rgb, _: _hlg(rgb),
-    }
-)
+ENCODINGS: Mapping[str, Callable[[Array, float], Array]] = {
+    "none": lambda rgb, _: rgb,
+    "gamma22": lambda rgb, _: _gamma22(rgb),
+    "srgb": lambda rgb, _: _srgb(rgb),
+    "pq": _pq,
+    "hlg": lambda rgb, _: _hlg(rgb),
+}

@@ -7,12 +7,13 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from ._image import BlurInput
-from ._levels import halved
-from ._sampling import Array, read_rows, sample
+from ._sampling import Array, halved, read_rows, sample, size_of
 from ._tape import contiguous
 
 # (image, size of the result) -> the image in this size
 Filter = Callable[[Array, tuple[int, int]], Array]
+# Of level k and of level k + 1 in up_k.
+Shares = tuple[Sequence[float], Sequence[float]]
 
 
 def linear(image: Array, size: tuple[int, int]) -> Array:
@@ -67,19 +68,17 @@ def halvings(
     """Return an image, and smaller ones that have half the size of the one before."""
     downs = [first]
     while len(downs) < count:
-        height, width, _ = downs[-1].shape
-        downs.append(store(shrink(downs[-1], halved((width, height)))))
+        downs.append(store(shrink(downs[-1], halved(size_of(downs[-1])))))
     return downs
 
 
 def combine(
     downs: Sequence[Array],
     source: BlurInput,
+    shares: Shares | None = None,
     *,
     upsample: Filter,
     last: Filter,
-    fine: Sequence[float] | None = None,
-    coarse: Sequence[float] | None = None,
     smallest: float = 1.0,
     gain: float = 1.0,
     end: Callable[[Array], Array] | None = None,
@@ -93,14 +92,12 @@ def combine(
     """
     size, store = source.size, source.store
     framebuffers = {f"down_{k}": down for k, down in enumerate(downs)}
-    fine = fine or [1.0] * len(downs)
-    coarse = coarse or [1.0] * len(downs)
+    fine, coarse = shares or ([1.0] * len(downs),) * 2
     # up_k is the stored image times the factor. The smallest level is stored without its factor.
     up, factor = downs[-1], smallest
     for k in range(len(downs) - 2, -1, -1):
-        height, width, _ = downs[k].shape
         below = coarse[k] * factor
-        total = fine[k] * downs[k] + below * upsample(up, (width, height))
+        total = fine[k] * downs[k] + below * upsample(up, size_of(downs[k]))
         factor = (abs(fine[k]) + abs(below) or 1.0) if store.holds_means else 1.0
         up = store(total / factor)
         framebuffers[f"up_{k}"] = up
@@ -108,9 +105,14 @@ def combine(
     return framebuffers
 
 
-def flat_gain(fine: Sequence[float], coarse: Sequence[float], levels: Sequence[float]) -> float:
+def mixed(share: float, count: int) -> Shares:
+    """Return the shares of a chain in which each level is mixed with the smaller one."""
+    return [1 - share] * count, [share] * count
+
+
+def flat_gain(shares: Shares, levels: Sequence[float]) -> float:
     """Return the bloom that `combine` computes from flat levels, for a gain of 1."""
-    value = levels[-1]
+    (fine, coarse), value = shares, levels[-1]
     for k in range(len(levels) - 2, -1, -1):
         value = fine[k] * levels[k] + coarse[k] * value
     return value

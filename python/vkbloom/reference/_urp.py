@@ -17,13 +17,12 @@ import numpy as np
 
 from . import _dual_kawase as dual_kawase
 from ._image import BlurInput
-from ._levels import halved
 from ._post_processing import linear_light
 from ._pyramid import downsample
-from ._sampling import Array, read_rows, sample
+from ._sampling import Array, box, halved, read_rows, sample, size_of
 from ._tape import contiguous
 from ._threshold import masked, soften, with_alpha
-from ._upsampling import combine, cubic, flat_gain, halvings, linear
+from ._upsampling import Shares, combine, cubic, flat_gain, halvings, linear, mixed
 
 if TYPE_CHECKING:
     from vkbloom._methods.unity import UrpBloom
@@ -59,9 +58,8 @@ def passes(source: BlurInput, settings: UrpBloom) -> dict[str, Array]:
         return sample(horizontal, size, y_taps=_taps(1.0))
 
     downs = halvings(first, count, source.store, shrink)
-    fine, coarse = _shares(settings, len(downs))
     kernel = _kernel(settings)
-    return combine(downs, source, fine=fine, coarse=coarse, upsample=kernel, last=kernel)
+    return combine(downs, source, _shares(settings, count), upsample=kernel, last=kernel)
 
 
 def _across(image: Array, size: tuple[int, int], settings: UrpBloom) -> Array:
@@ -78,14 +76,12 @@ def _across(image: Array, size: tuple[int, int], settings: UrpBloom) -> Array:
 
 def _kawase(source: BlurInput, settings: UrpBloom, first: Array, count: int) -> dict[str, Array]:
     """Mix the first level with the mean of four taps, again and again."""
-    height, width, _ = first.shape
     share = 1.0 if settings.scatter >= 0.999 else 0.05 + 0.9 * settings.scatter
     images = {"down_0": first}
     image = first
     for i in range(count):
         distance = 0.5 + (i - 1 if i > count // 2 else i)
-        sides = [(-distance, 0.5), (distance, 0.5)]
-        mean = sample(image, (width, height), sides, sides)
+        mean = box(image, size_of(image), distance)
         image = source.store((1 - share) * image + share * mean)
         images[f"kawase_{i}"] = image
     return images | {"bloom": source.store.end(_kernel(settings)(image, source.size))}
@@ -94,13 +90,9 @@ def _kawase(source: BlurInput, settings: UrpBloom, first: Array, count: int) -> 
 def _dual(source: BlurInput, settings: UrpBloom, first: Array, count: int) -> dict[str, Array]:
     """Go down and up, and add no level on the way up."""
     downs = halvings(first, count, source.store, partial(dual_kawase.down, offset=1.0))
-    image, ups = downs[-1], {}
-    for level in range(count - 2, -1, -1):
-        height, width, _ = downs[level].shape
-        image = source.store(dual_kawase.up(image, (width, height), 0.3 + settings.scatter))
-        ups[f"up_{level}"] = image
-    levels = {f"down_{level}": down for level, down in enumerate(downs)}
-    return levels | ups | {"bloom": source.store.end(_kernel(settings)(image, source.size))}
+    enlarge = partial(dual_kawase.up, offset=0.3 + settings.scatter)
+    shares = [0.0] * count, [1.0] * count
+    return combine(downs, source, shares, upsample=enlarge, last=_kernel(settings))
 
 
 def _kernel(settings: UrpBloom) -> Callable[[Array, tuple[int, int]], Array]:
@@ -124,7 +116,7 @@ def gain(settings: UrpBloom, size: tuple[int, int]) -> float | Array:
     count = _level_count(settings, _first_size(size, settings))
     first = float(_prefilter(np.ones((1, 1, 1)), settings)[0, 0, 0])
     kernel = _WEIGHTS[0] + 2 * sum(_WEIGHTS[1:]) if settings.filter == "gaussian" else 1.0
-    first *= flat_gain(*_shares(settings, count), [kernel ** (2 * k) for k in range(count)])
+    first *= flat_gain(_shares(settings, count), [kernel ** (2 * k) for k in range(count)])
     gains = first * _tint(settings)
     return gains if np.ptp(gains) else float(gains[0])
 
@@ -133,9 +125,8 @@ def _level_count(settings: UrpBloom, size: tuple[int, int]) -> int:
     return min(max(math.floor(math.log2(max(size)) - 1), 1), settings.iterations)
 
 
-def _shares(settings: UrpBloom, count: int) -> tuple[list[float], list[float]]:
-    share = 0.05 + (0.95 - 0.05) * settings.scatter
-    return [1 - share] * count, [share] * count
+def _shares(settings: UrpBloom, count: int) -> Shares:
+    return mixed(0.05 + (0.95 - 0.05) * settings.scatter, count)
 
 
 def _prefilter(rgb: Array, settings: UrpBloom) -> Array:

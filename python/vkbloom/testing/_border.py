@@ -13,11 +13,10 @@ import numpy as np
 from vkbloom._argument_types import checked
 from vkbloom.testing._deviations import Measured, NotTaken, breaches, fail, figure, judge
 from vkbloom.testing._point_spread import border_share, check_inside
-from vkbloom.testing._probe import Bloom, Image, Probe, beside_multiple
+from vkbloom.testing._probe import DEFAULT, Bloom, Image, Probe, beside_multiple
 
 __tracebackhide__ = True
 
-_DEFAULT = Probe()
 #: Limits by figure. Where the outermost pixels are repeated, a light in them counts for what is
 #: beyond them, too: a Gaussian of 8 pixels reaches 1.6 at an edge and 2.7 in a corner.
 BORDER_LIMITS: Final = {
@@ -59,7 +58,7 @@ class _Lights:
 
 @checked
 def assert_border(
-    bloom: Bloom, probe: Probe = _DEFAULT, *, limits: Mapping[str, float] | None = None
+    bloom: Bloom, probe: Probe = DEFAULT, *, limits: Mapping[str, float] | None = None
 ) -> None:
     """Assert that a border neither adds light nor takes it away.
 
@@ -181,7 +180,7 @@ def _check_stale(bloom: Bloom, probe: Probe, dark: Image, allowed: float) -> Ima
 
 
 @checked
-def assert_views(bloom: Bloom, probe: Probe = _DEFAULT, *, limit: float = 1e-3) -> None:
+def assert_views(bloom: Bloom, probe: Probe = DEFAULT, *, limit: float = 1e-3) -> None:
     """Assert that no light crosses from one view of a picture to the other.
 
     The law: B(a, region=r) inside of r depends on the pixels inside of r alone. The picture has two
@@ -275,11 +274,8 @@ def _expected(lights: _Lights, at: tuple[int, int]) -> tuple[Image, float]:
 
 def _moved(spread: Image, start: tuple[int, int], to: tuple[int, int]) -> Image:
     """Return an image moved by whole pixels, with black where it has none."""
-    moved = np.zeros_like(spread)
-    (x, y), (height, width) = np.subtract(to, start), spread.shape[:2]
-    rows, columns = (
-        (slice(max(0, by), min(size, size + by)), slice(max(0, -by), min(size, size - by)))
-        for by, size in ((y, height), (x, width))
-    )
-    moved[rows[0], columns[0]] = spread[rows[1], columns[1]]
+    x, y = np.subtract(to, start)
+    moved = np.roll(spread, (y, x), (0, 1))
+    for lines, by in ((moved, y), (moved.swapaxes(0, 1), x)):
+        lines[slice(by, None) if by < 0 else slice(by)] = 0
     return moved

@@ -133,25 +133,21 @@ def as_markdown(changes: Sequence[Change], names: tuple[str, str], device: str) 
     """Return the comparison for a pull request: what changed, then everything, folded."""
     old, new = (name.replace("|", "\\|").replace("`", "'") for name in names)
     head = f"| | `{old}` | `{new}` | |\n|---|---|---|---|"
-    rows = [
-        (
-            each.verdict,
-            f"| {each.name} | {each.words[0]} | {each.words[1]} | {_mark(each.verdict)} |",
-        )
-        for each in changes
-    ]
-    changed = "\n".join(row for verdict, row in rows if verdict != "same")
-    every = "\n".join(row for _, row in rows)
+
+    def rows(changes: Sequence[Change]) -> str:
+        marks = {"same": "", "broken": "**broken**"}
+        cells = [
+            (each.name, *each.words, marks.get(each.verdict, each.verdict)) for each in changes
+        ]
+        return "\n".join(f"| {' | '.join(row)} |" for row in cells)
+
+    changed = rows([each for each in changes if each.verdict != "same"])
     return (
         f"### `{new}` against `{old}`\n\n{summary(changes).capitalize()}. On {device}.\n\n"
         + (f"{head}\n{changed}\n\n" if changed else "")
-        + f"<details><summary>All laws, figures and times</summary>\n\n{head}\n{every}\n\n"
+        + f"<details><summary>All laws, figures and times</summary>\n\n{head}\n{rows(changes)}\n\n"
         "</details>\n"
     )
-
-
-def _mark(verdict: Verdict) -> str:
-    return "" if verdict == "same" else f"**{verdict}**" if verdict == "broken" else verdict
 
 
 def as_values(

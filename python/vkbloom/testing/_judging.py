@@ -49,7 +49,11 @@ def judge(
 ) -> tuple[Verdict, ...]:
     """Compare framebuffers with those of a reference."""
     return tuple(
-        _of_missing(name, is_expected=name in expected)
+        Verdict(
+            name=name,
+            failed_at="shape and dtype",
+            reasons=("it is missing" if name in expected else "the reference does not have it",),
+        )
         if name not in expected or name not in actual
         else _judge_image(name, expected[name], actual[name], tolerances)
         for name in _merged(list(expected), list(actual))
@@ -96,11 +100,6 @@ def _judge_image(
         comparison=comparison,
         diagnosis=diagnose(expected, actual) if failed else None,
     )
-
-
-def _of_missing(name: str, *, is_expected: bool) -> Verdict:
-    reason = "it is missing" if is_expected else "the reference does not have it"
-    return Verdict(name=name, failed_at="shape and dtype", reasons=(reason,))
 
 
 def _merged(expected: list[str], actual: list[str]) -> list[str]:

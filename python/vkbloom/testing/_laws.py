@@ -16,16 +16,15 @@ import numpy as np
 from vkbloom._argument_types import FUNCTION, NAMES, checked, checked_as
 from vkbloom._checks import check_number
 from vkbloom.testing._deviations import compare_with_law
-from vkbloom.testing._probe import Bloom, Image, Probe
+from vkbloom.testing._probe import DEFAULT, Bloom, Image, Probe
 
 __tracebackhide__ = True
 
-_DEFAULT = Probe()
 _SWAPPED: Final = {"x": "left and right", "y": "top and bottom", "xy": "rows and columns"}
 
 
 @checked
-def assert_superposition(bloom: Bloom, probe: Probe = _DEFAULT) -> None:
+def assert_superposition(bloom: Bloom, probe: Probe = DEFAULT) -> None:
     """Assert that the bloom of a mixture of two images is the mixture of their blooms.
 
     The law: B(a / 2 + b / 4) = B(a) / 2 + B(b) / 4, for two images of noise. This is linearity:
@@ -47,7 +46,7 @@ def assert_additive(
     bloom: Bloom,
     glow: Bloom | None = None,
     intensity: float = 1.0,
-    probe: Probe = _DEFAULT,
+    probe: Probe = DEFAULT,
 ) -> None:
     """Assert that an image with bloom is the image plus the bloom.
 
@@ -81,7 +80,7 @@ def assert_additive(
 
 
 @checked
-def assert_gain(bloom: Bloom, gain: float, probe: Probe = _DEFAULT) -> None:
+def assert_gain(bloom: Bloom, gain: float, probe: Probe = DEFAULT) -> None:
     """Assert the gain of flat images.
 
     The law: B(v) = gain * v at every pixel, for flat images of v = `probe.value`, half and a
@@ -108,7 +107,7 @@ def assert_gain(bloom: Bloom, gain: float, probe: Probe = _DEFAULT) -> None:
 @checked_as(axes=NAMES)
 def assert_symmetric(
     bloom: Bloom,
-    probe: Probe = _DEFAULT,
+    probe: Probe = DEFAULT,
     *,
     axes: Sequence[Literal["x", "y", "xy"]] = ("x", "y"),
 ) -> None:
@@ -136,7 +135,7 @@ def assert_symmetric(
 
 
 @checked
-def assert_no_ringing(bloom: Bloom, probe: Probe = _DEFAULT) -> None:
+def assert_no_ringing(bloom: Bloom, probe: Probe = DEFAULT) -> None:
     """Assert that the bloom of an edge has no dark or bright line beside the edge.
 
     The law: across a step from black to `probe.value`, along x and along y, values do not decrease.
@@ -168,7 +167,7 @@ def assert_no_ringing(bloom: Bloom, probe: Probe = _DEFAULT) -> None:
 def assert_bounded_fireflies(
     bloom: Bloom,
     limit: float = 1.0,
-    probe: Probe = _DEFAULT,
+    probe: Probe = DEFAULT,
     *,
     brightness: Sequence[float] = (10.0, 1e3, 6e4),
     period: int = 2,

@@ -1,4 +1,4 @@
-"""The point spread of a blur or bloom, and the laws of its shape."""
+"""The point spread of a blur or bloom, the laws of its shape, and its veiling glare."""
 
 from __future__ import annotations
 
@@ -8,13 +8,12 @@ from typing import Final
 import numpy as np
 
 from vkbloom._argument_types import checked
-from vkbloom._checks import check_number
+from vkbloom._checks import check_number, check_size
 from vkbloom.testing._deviations import compare_with_law, fail, judge
-from vkbloom.testing._probe import Bloom, Image, Probe
+from vkbloom.testing._probe import DEFAULT, Bloom, Image, Probe
 
 __tracebackhide__ = True
 
-_DEFAULT = Probe()
 # Allowed share of a point's light in the outermost pixels. Clamping to the edge at most doubles
 # that light, which moves a centroid by a thousandth of half the image.
 _AT_THE_BORDER: Final = 1e-3
@@ -22,7 +21,7 @@ _AT_THE_BORDER: Final = 1e-3
 
 @checked
 def point_spread(
-    bloom: Bloom, probe: Probe = _DEFAULT, *, at: tuple[int, int] | None = None
+    bloom: Bloom, probe: Probe = DEFAULT, *, at: tuple[int, int] | None = None
 ) -> Image:
     """Return the point-spread function of a bloom.
 
@@ -58,7 +57,7 @@ def point_spread(
 
 
 @checked
-def assert_separable(bloom: Bloom, probe: Probe = _DEFAULT) -> None:
+def assert_separable(bloom: Bloom, probe: Probe = DEFAULT) -> None:
     """Assert that the point spread is the product of a row and a column.
 
     The law: h(x, y) h(x0, y0) = h(x, y0) h(x0, y), where (x0, y0) is the position of the largest
@@ -93,7 +92,7 @@ def assert_separable(bloom: Bloom, probe: Probe = _DEFAULT) -> None:
 @checked
 def assert_centroid_kept(
     bloom: Bloom,
-    probe: Probe = _DEFAULT,
+    probe: Probe = DEFAULT,
     *,
     at: tuple[int, int] | None = None,
     within: float = 0.01,
@@ -133,6 +132,49 @@ def assert_centroid_kept(
             )
             law = "the centroid of the light of a pixel is that pixel"
             judge(law, ("off", abs(off), allowed, text))
+
+
+@checked
+def veiling_glare_index(
+    bloom: Bloom,
+    *,
+    size: tuple[int, int] = (256, 256),
+    patch: int | tuple[int, int] = 32,
+    value: float = 1.0,
+) -> float:
+    """Return the veiling glare index of a bloom in percent.
+
+    It is 100 times the mean of a black patch in the middle of a bright field, divided by the
+    field's value, as lenses are measured (ISO 9358, with a square in place of a disc).
+
+    Parameters
+    ----------
+    bloom : callable
+        Takes an image and returns one of the same height and width: the bloom alone, or the
+        picture with its bloom.
+    size : (int, int)
+        Width and height of the image in pixels.
+    patch : int or (int, int)
+        Side, or width and height, of the patch in pixels, less than the image's.
+    value : float
+        The field's value, above 0.
+
+    Returns
+    -------
+    float
+        0 without glare; the bloom's share of the light far from the patch is near 100 times its
+        gain.
+    """
+    probe = Probe(size=size)
+    width, height = check_size("patch", (patch, patch) if isinstance(patch, int) else patch)
+    if width >= probe.size[0] or height >= probe.size[1]:
+        raise ValueError(f"patch: {(width, height)} is not smaller than the size, {probe.size}")
+    check_number("value", value, math.ulp(0.0), float("3e38"))
+    left, top = (probe.size[0] - width) // 2, (probe.size[1] - height) // 2
+    inside = (slice(top, top + height), slice(left, left + width))
+    field = probe.flat(value)
+    field[inside] = 0.0
+    return 100 * float(probe.apply(bloom, field)[0][inside].mean()) / value
 
 
 def measured_spread(

@@ -180,6 +180,10 @@ class Probe:
         return values / np.iinfo(array.dtype).max if array.dtype.kind == "u" else values
 
 
+#: The probe of assertions that are given none.
+DEFAULT: Final = Probe()
+
+
 def small_probe(probe: Probe) -> Probe:
     """Return the probe with an image of at most 64 x 64 pixels, where the size does not matter."""
     width, height = probe.size

@@ -15,11 +15,10 @@ from vkbloom.reference._glare import texels_at
 from vkbloom.testing._deviations import NotTaken, fail, figure, is_within, judge
 from vkbloom.testing._moving_light import moments
 from vkbloom.testing._point_spread import border_share, check_inside, point_spread
-from vkbloom.testing._probe import Bloom, Image, Probe, beside_multiple
+from vkbloom.testing._probe import DEFAULT, Bloom, Image, Probe, beside_multiple
 
 __tracebackhide__ = True
 
-_DEFAULT = Probe()
 #: Shares of the peak whose contours are measured.
 LEVELS: Final = (0.5, 0.1, 0.01)
 #: Limits of the change from one size to the next: width and energy as shares, centroid in pixels.
@@ -69,7 +68,7 @@ def _contours(spread: Image) -> dict[float, float]:
 
 
 @checked
-def assert_round(bloom: Bloom, probe: Probe = _DEFAULT, *, limit: float = 1.35) -> None:
+def assert_round(bloom: Bloom, probe: Probe = DEFAULT, *, limit: float = 1.35) -> None:
     """Assert that the bloom of a pixel is round.
 
     The law: of the contours at 1/2, 1/10 and 1/100 of the peak, the greatest distance from the
@@ -103,7 +102,7 @@ def check_round(spread: Image, limit: float) -> None:
 
 @checked
 def assert_sizes(
-    bloom: Bloom, probe: Probe = _DEFAULT, *, limits: Mapping[str, float] | None = None
+    bloom: Bloom, probe: Probe = DEFAULT, *, limits: Mapping[str, float] | None = None
 ) -> None:
     """Assert that a bloom is nearly the same in images whose sizes differ by a few pixels.
 

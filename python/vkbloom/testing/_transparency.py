@@ -10,17 +10,16 @@ from numpy.typing import NDArray
 from vkbloom._argument_types import checked
 from vkbloom._checks import check_number
 from vkbloom.testing._deviations import NotTaken, judge
-from vkbloom.testing._probe import Bloom, Image, Probe, small_probe
+from vkbloom.testing._probe import DEFAULT, Bloom, Image, Probe, small_probe
 
 __tracebackhide__ = True
 
-_DEFAULT = Probe()
 # Below common thresholds, since a threshold is not linear.
 _BACKDROPS = (0.0, 0.25)
 
 
 @checked
-def assert_alpha(bloom: Bloom, probe: Probe = _DEFAULT, *, limit: float = 0.01) -> None:
+def assert_alpha(bloom: Bloom, probe: Probe = DEFAULT, *, limit: float = 0.01) -> None:
     """Assert that glow over transparent ground is the glow of the flattened picture.
 
     Images are premultiplied. With the picture F(a), its alpha A and a backdrop b, the law is
