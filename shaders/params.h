@@ -474,8 +474,8 @@
 // that is added up at once.
 #define TABLE_WIDTH 1024
 #define SUM_SIDE    8
-// Transposed filters in blocks: the texels along an axis whose weights are together in the table, and
-// the rows of an invocation that writes words.
+// Transposed filters in blocks: the texels along an axis whose weights are together in the table,
+// and the rows of an invocation that writes words.
 #define ADJOINT_SIDE 4
 #define ADJOINT_ROWS 16
 
