@@ -73,11 +73,7 @@ def gain(settings: BlenderGlare, size: tuple[int, int]) -> Any:
     The saturation of a grey is 0. Streaks and ghosts have colours.
     """
     bright = float(_highlights(np.ones((1, 1, 1)), settings)[0, 0, 0])
-    levels = (
-        bright * GAINS[settings.type](settings, size)
-        if settings.type in GAINS
-        else np.full(3, bright)
-    )
+    levels = bright * GAINS.get(settings.type, lambda *_: np.ones(3))(settings, size)
     tinted = saturated(levels, settings.saturation) * np.array(settings.tint)
     return float(tinted[0]) if (tinted == tinted[0]).all() else tinted
 
