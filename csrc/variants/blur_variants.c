@@ -164,8 +164,6 @@ static struct vkb_pass_row fused_row(const struct vkb_variant_choice *choice,
     VKB_TAKE_COMPOSITE(&row, fused_bloom, nest->composite);
     VKB_TAKE_THRESHOLD(&row, fused_bloom, nest->threshold);
     row.constants.format = vkb_storage_mode(format);
-    params->vertical_radius = nest->vertical->constants.radius;
-    params->horizontal_radius = nest->horizontal->constants.radius;
     memcpy(params->vertical, nest->vertical->params.blur.weights, sizeof params->vertical);
     memcpy(params->horizontal, nest->horizontal->params.blur.weights, sizeof params->horizontal);
     return row;
