@@ -37,7 +37,15 @@ def pytest_configure(config: pytest.Config) -> None:
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
     # A slow machine must not fail a test. Where more examples find more, a test asks for them.
-    hypothesis.settings.register_profile("untimed", deadline=None, max_examples=30)
+    hypothesis.settings.register_profile(
+        "untimed",
+        deadline=None,
+        max_examples=30,
+        suppress_health_check=[
+            hypothesis.HealthCheck.too_slow,
+            hypothesis.HealthCheck.function_scoped_fixture,
+        ],
+    )
     hypothesis.settings.load_profile("untimed")
     config.pluginmanager.register(TimeBudget(), "time-budget")
     config.addinivalue_line("markers", "slow: takes more than ten seconds, or needs a plain heap")

@@ -6,16 +6,13 @@
 from __future__ import annotations
 
 import ast
-import io
 import re
 import subprocess
 import sys
-import tokenize
 from collections import Counter
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
-LAYOUT = {tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT, tokenize.COMMENT}
 C_COMMENT = re.compile(r"/\*.*?\*/|//[^\n]*|(\"(?:\\.|[^\"\\\n])*\")", re.DOTALL)
 DOCUMENTED = ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef
 C_SUFFIXES = (".c", ".h", ".comp", ".frag", ".vert", ".glsl", ".inc")
@@ -24,17 +21,16 @@ C_SUFFIXES = (".c", ".h", ".comp", ".frag", ".vert", ".glsl", ".inc")
 def python_counts(text: str) -> tuple[int, int]:
     """Return lines of code and of docstrings."""
     documented: set[int] = set()
+    quoted: set[int] = set()
     for node in ast.walk(ast.parse(text)):
         if isinstance(node, DOCUMENTED) and ast.get_docstring(node, clean=False) is not None:
             documented.update(range(node.body[0].lineno, (node.body[0].end_lineno or 0) + 1))
-    written = {
-        line
-        for token in tokenize.generate_tokens(io.StringIO(text).readline)
-        if token.type not in LAYOUT
-        for line in range(token.start[0], token.end[0] + 1)
-    }
-    filled = {number for number, line in enumerate(text.splitlines(), 1) if line.strip()}
-    return len((written & filled) - documented), len(documented & filled)
+        elif isinstance(node, ast.Constant | ast.JoinedStr) and node.end_lineno != node.lineno:
+            quoted.update(range(node.lineno, (node.end_lineno or 0) + 1))
+    lines = [(number, line.strip()) for number, line in enumerate(text.splitlines(), 1)]
+    filled = {number for number, line in lines if line}
+    comments = {number for number, line in lines if line.startswith("#")} - quoted
+    return len(filled - documented - comments), len(documented & filled)
 
 
 def c_counts(text: str) -> tuple[int, int]:

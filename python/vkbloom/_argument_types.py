@@ -101,7 +101,7 @@ _KINDS: dict[str, Kind] = {
     **dict.fromkeys(("quality", "settle", "subimage", "texel", "width"), INTEGER),
     **dict.fromkeys(("expand", "flicker", "gain", "glow_intensity", "growth", "radius"), NUMBER),
     **dict.fromkeys(("intensity", "jitter", "light", "limit", "peak", "ripple", "rtol"), NUMBER),
-    **dict.fromkeys(("degrees", "feedback", "fps", "pixels_per_degree", "steps"), NUMBER),
+    **dict.fromkeys(("degrees", "fps", "pixels_per_degree", "steps"), NUMBER),
     **dict.fromkeys(("time", "timeout", "value", "within"), NUMBER),
     **dict.fromkeys(("adapter", "axis", "columns", "framebuffer", "layer", "lines", "name"), TEXT),
     **dict.fromkeys(("device", "encoding", "format", "parameter", "primaries", "rows"), TEXT),

@@ -231,15 +231,9 @@ def check_mask(mask: object, size: tuple[int, int]) -> NDArray[np.float32]:
         return values / np.float32(255)
     # Not the other way round, so that NaN fails too.
     if array.dtype.kind == "f" and not (array.min() >= 0 and array.max() <= 1):
-        raise ValueError(
-            f"mask: {_outside(array)} is out of range, 0 to 1; clip it: mask.clip(0, 1)"
-        )
+        wrong = float(array[~((array >= 0) & (array <= 1))][0])
+        raise ValueError(f"mask: {wrong} is out of range, 0 to 1; clip it: mask.clip(0, 1)")
     return values
-
-
-def _outside(array: NDArray[Any]) -> float:
-    """Return the first value outside of 0 to 1."""
-    return float(array[~((array >= 0) & (array <= 1))][0])
 
 
 def _viewed(

@@ -11,7 +11,7 @@ import pytest
 
 import vkbloom
 from tests.images import picture
-from tests.processes import output
+from tests.processes import LONGEST, output
 
 IMAGE = picture(24, 16)
 
@@ -132,7 +132,7 @@ vkbloom.apply(np.ones((8, 8, 3), np.float32))
 vkbloom.default_renderer().close()
 os.environ["VKBLOOM_TIMEOUT"] = "1e-6"
 try:
-    vkbloom.apply(np.ones((2048, 2048, 3), np.float32))
+    vkbloom.apply(np.ones((512, 512, 3), np.float32))
 except vkbloom.DeviceLostError as error:
     print("VKBLOOM_TIMEOUT" in str(error))
 del os.environ["VKBLOOM_TIMEOUT"]
@@ -164,10 +164,14 @@ def test_workers_of_xdist(tmp_path: Path) -> None:
     assert "6 passed" in printed
 
 
-def test_a_kernel_that_restarts() -> None:
+def test_a_kernel_that_restarts(tmp_path: Path) -> None:
     manager = pytest.importorskip("jupyter_client.manager")
     pytest.importorskip("ipykernel")
-    kernel, client = manager.start_new_kernel()
+    # Numbers of ports, which are chosen before they are used, may be taken by another process.
+    kernel = manager.KernelManager(transport="ipc", connection_file=str(tmp_path / "kernel.json"))
+    kernel.start_kernel()
+    client = kernel.client()
+    client.start_channels()
     printed: list[str] = []
 
     def keep(message: dict[str, Any]) -> None:
@@ -177,10 +181,10 @@ def test_a_kernel_that_restarts() -> None:
     code = "import numpy, vkbloom\nprint(vkbloom.apply(numpy.ones((8, 8, 3), 'f4'))['final'].shape)"
     try:
         for _ in range(2):
-            reply = client.execute_interactive(code, output_hook=keep, timeout=60)
+            client.wait_for_ready(timeout=LONGEST)
+            reply = client.execute_interactive(code, output_hook=keep, timeout=LONGEST)
             assert reply["content"]["status"] == "ok"
             kernel.restart_kernel(now=True)
-            client.wait_for_ready(timeout=60)
     finally:
         client.stop_channels()
         kernel.shutdown_kernel(now=True)

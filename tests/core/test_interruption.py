@@ -83,14 +83,18 @@ class Long(NamedTuple):
 def long() -> Long:
     """No longer than necessary, since all of these tests wait for it several times."""
     with Renderer() as renderer:
+        # Of a CPU, the seconds that it takes without other work on the machine.
+        is_cpu = renderer.info.type == "cpu"
+        clock = time.process_time if is_cpu else time.perf_counter
+        threads = int(os.environ.get("LP_NUM_THREADS") or os.cpu_count() or 1) if is_cpu else 1
         side, radius = 256, 4
         while side <= 4096:
             work = Long(picture(side, side), radius)
             # Another image of this size first, so that the next call does not compile shaders.
             work._replace(image=work.image[::-1]).run(renderer)
-            begin = time.perf_counter()
+            begin = clock()
             work.run(renderer)
-            seconds = time.perf_counter() - begin
+            seconds = (clock() - begin) / threads
             if seconds > 0.3:
                 return work
             growth = math.sqrt(min(4.0, max(1.2, 0.36 / seconds)))
@@ -365,7 +369,7 @@ def test_a_device_that_takes_too_long(
 # Collects a renderer while its device is at work; prints how it ended, and after how many seconds
 # from the collection, or from Ctrl-C in it.
 COLLECT = """
-import gc, signal, sys, threading, time
+import gc, os, signal, sys, threading, time
 import numpy as np
 import vkbloom
 
@@ -399,6 +403,8 @@ try:
         timer.join()
 except KeyboardInterrupt:
     print("interrupted", time.perf_counter() - begin, flush=True)
+# The device is left at work.
+os._exit(0)
 """
 
 
@@ -409,12 +415,14 @@ except KeyboardInterrupt:
 )
 def test_collecting_a_renderer_at_work(long: Long, how: str, limit: str, words: str) -> None:
     """Regression: this wait had no limit, and Ctrl-C did not end it."""
-    # Twice the side: four times as long.
-    sizes = (str(2 * len(long.image)), str(long.radius))
+    # The side of an image on a GPU is large already.
+    factor = 4 if len(long.image) <= 1024 else 2
+    sizes = (str(factor * len(long.image)), str(long.radius))
     printed = output("-c", COLLECT, *sizes, how, VKBLOOM_TIMEOUT=limit)
     ending, seconds = printed.split()
     assert ending == words
-    assert float(seconds) < 1.0
+    # A device that is waited for takes longer, above all on a busy machine.
+    assert float(seconds) < 0.25 * factor**2
 
 
 # Forks

@@ -175,14 +175,13 @@ def test_planning_waits_for_no_other_call(new_renderer: Callable[[], Renderer]) 
     # A GPU may be done with a small image before anything is planned.
     for side in (64, 256, 1024, 4096):
         thread = threading.Thread(target=renderer.apply, args=(picture(side, side), slow))
-        begin = time.perf_counter()
         thread.start()
         time.sleep(0.05)
         for _ in range(3):
             renderer.plan(image)
         did_not_wait = thread.is_alive()
         thread.join()
-        if did_not_wait or time.perf_counter() - begin > 1.0:
+        if did_not_wait:
             break
     assert did_not_wait
 

@@ -48,6 +48,7 @@ def shown(page: Page, url: str) -> Iterator[None]:
     def note(said: Any) -> None:
         complaints.append(str(getattr(said, "text", said)))
 
+    page.set_default_timeout(1000 * PATIENCE)
     page.on("console", note)
     page.on("pageerror", note)
     page.set_viewport_size({"width": 980, "height": 640})
@@ -56,7 +57,7 @@ def shown(page: Page, url: str) -> Iterator[None]:
     # An address that differs after its # alone would not load the page again.
     page.goto("about:blank")
     page.goto(url)
-    page.locator(".vkb-status", has_text="until shown").wait_for(timeout=1000 * PATIENCE)
+    page.locator(".vkb-status", has_text="until shown").wait_for()
     yield
     page.remove_listener("console", note)
     page.remove_listener("pageerror", note)
@@ -304,9 +305,7 @@ def test_the_pointer_reads_values(
         page.locator(".vkb-status", has_text=str(expected[name].dtype)).wait_for()
         page.locator("canvas").hover(position={"x": 123, "y": 45})
         values = "  ".join(str(value) for value in np.atleast_1d(expected[name][45, 123]))
-        page.get_by_text(f"{name}[45, 123] = {values}", exact=True).wait_for(
-            timeout=1000 * PATIENCE
-        )
+        page.get_by_text(f"{name}[45, 123] = {values}", exact=True).wait_for()
     page.mouse.move(1, 1)
     page.get_by_text("Point at the picture").wait_for()
     # It comes to the picture while another framebuffer is on its way, which takes long.
@@ -323,7 +322,7 @@ def test_the_pointer_reads_values(
     page.locator("canvas").hover(position={"x": 123, "y": 45})
     page.locator(".vkb-status", has_text="uint8").wait_for()
     values = "  ".join(str(value) for value in expected["final"][45, 123])
-    page.get_by_text(f"final[45, 123] = {values}", exact=True).wait_for(timeout=1000 * PATIENCE)
+    page.get_by_text(f"final[45, 123] = {values}", exact=True).wait_for()
 
 
 def test_time_plays_and_pauses(
@@ -332,7 +331,7 @@ def test_time_plays_and_pauses(
     still = see(page, tmp_path)
     slider = page.get_by_label("time, in turns")
     page.get_by_role("button", name="Play").click()
-    page.wait_for_timeout(600)
+    page.wait_for_function("document.querySelector('[aria-label=\"time, in turns\"]').value > 0")
     page.get_by_role("button", name="Pause").click()
     moment = float(slider.input_value())
     assert 0 < moment < 0.9

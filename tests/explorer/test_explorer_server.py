@@ -32,7 +32,7 @@ from tornado.httpclient import (  # noqa: E402
 )
 from tornado.websocket import WebSocketClientConnection, websocket_connect  # noqa: E402
 
-from vkbloom._explorer.server import Server  # noqa: E402
+from vkbloom._explorer.server import Server, _Socket  # noqa: E402
 
 #: Connections of the running test, which it leaves open.
 OPENED: list[WebSocketClientConnection] = []
@@ -180,19 +180,34 @@ def test_frames_come_with_their_pictures(serve: Any) -> None:
     serve(talk)
 
 
-def test_the_newest_wins(serve: Any) -> None:
+def test_the_newest_wins(serve: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    received: list[Any] = []
+    take = _Socket.on_message
+
+    def noted(socket: _Socket, message: str | bytes) -> None:
+        take(socket, message)
+        received.append(message)
+
+    monkeypatch.setattr(_Socket, "on_message", noted)
+
+    async def arrived(count: int) -> None:
+        while len(received) < count:
+            await asyncio.sleep(0.01)
+        # And the first of them is given to the thread.
+        await asyncio.sleep(0.01)
+
     async def talk(server: Server) -> None:
         page = await connect(server)
         held = threading.Event()
-        server._worker.submit(held.wait, 30)
+        server._worker.submit(held.wait)
         await page.write_message(asked(1, "a", "b"))
         # The first is being answered when the others come.
-        await asyncio.sleep(0.1)
+        await arrived(1)
         await page.write_message(asked(2, "b"))
         for number in range(3, 50):
             await page.write_message(asked(number, "a"))
         await page.write_message(json.dumps({"kind": "probe", "id": 50, "at": [0, 0]}))
-        await asyncio.sleep(0.2)
+        await arrived(50)
         held.set()
         answers = [(await answer(page))[0] for _ in range(3)]
         assert [(header["kind"], header["id"]) for header in answers] == [

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 import vkbloom
 from tests.refusals import assert_refused, rows
 from vkbloom import psf
-from vkbloom.psf._bessel import bessel
 from vkbloom.psf._eye import cie_general, cie_total
+from vkbloom.psf._radial import bessel
 from vkbloom.psf._resampling import box_resample
 
 KERNEL = np.pad(np.full((3, 5), 0.125, np.float32), 2)

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from hypothesis import HealthCheck, settings, strategies
+from hypothesis import settings, strategies
 
 from tests.exhaustive import examples
 from vkbloom._scene import Mesh
@@ -20,7 +20,7 @@ from vkbloom._scene.gltf import load_mesh
 
 FLOAT, BYTE, SHORT, INT = 5126, 5121, 5123, 5125
 DTYPES = {FLOAT: "<f4", BYTE: "<u1", SHORT: "<u2", INT: "<u4"}
-TYPES = {1: "SCALAR", 3: "VEC3", 4: "VEC4"}
+TYPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}
 
 POSITIONS = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
 NORMALS = [[0.6, 0.8, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]
@@ -174,8 +174,4 @@ CHANGES = strategies.lists(
     strategies.tuples(strategies.integers(0), strategies.integers(0, 255)), min_size=1, max_size=4
 )
 #: Files are small, so there can be many examples.
-many = settings(
-    max_examples=examples(250),
-    deadline=None,
-    suppress_health_check=[HealthCheck.function_scoped_fixture],
-)
+many = settings(max_examples=examples(250))

@@ -25,7 +25,6 @@ from tests.scene.gltf_documents import (
     BYTE,
     FLOAT,
     SHORT,
-    TYPES,
     Document,
     at,
     load_or_refuse,
@@ -42,7 +41,6 @@ from vkbloom._scene.textures import WHITE, Texture
 Array = NDArray[Any]
 HALF = 2.0**-11  # half of the last bit of a half float, relative
 
-TYPES[2] = "VEC2"
 CORNERS = [[-1.0, 1.0, 0.0], [-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0]]
 PLACES = [[0.0, 0.0], [0.0, 1.0], [1.0, 1.0], [1.0, 0.0]]
 FRONT = [0, 1, 2, 0, 2, 3]

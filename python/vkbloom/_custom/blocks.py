@@ -40,6 +40,16 @@ class Directive:
     value: str
     line: int
 
+    def identifier(self) -> str:
+        """Return the value; raise ValueError if it is not a name in GLSL."""
+        if not self.value:
+            raise self.fault("the name is missing")
+        if not re.fullmatch(r"[A-Za-z_]\w*", self.value, re.ASCII):
+            raise self.refused("is not a name; it needs letters, digits and _")
+        if self.value.startswith("gl_") or "__" in self.value:
+            raise self.refused("is reserved in GLSL")
+        return self.value
+
     def fault(self, cause: object) -> ValueError:
         """Return the error of the line."""
         return self.source.fault(self.line, f"{self.name}: {cause}")
@@ -106,21 +116,14 @@ def read_block(source: Source, start: int, line: int) -> tuple[Block, int]:
         content = text[position:end].strip()
         if not content.startswith(MARK):
             break
-        kind = kind or kind_of(content)
+        kinds = (kind for kind in DIRECTIVES if content.startswith(MARK + kind))
+        kind = kind or next(kinds, "PASS")
         directives.append(read_directive(source, kind, content.removeprefix(MARK), line))
         position = min(end + 1, len(text))
         line += end < len(text)
     end = text.find(MARK, position)
     end = len(text) if end < 0 else end
     return Block(kind, tuple(directives), text[position:end], first, line), end
-
-
-def kind_of(content: str) -> str:
-    """Return the kind of the block that begins with this line."""
-    for kind in ("TEXTURE", "BUFFER", "PARAM"):
-        if content.startswith(MARK + kind):
-            return kind
-    return "PASS"
 
 
 def read_directive(source: Source, kind: str, content: str, line: int) -> Directive:

@@ -7,7 +7,6 @@ import re
 from typing import Final
 
 from vkbloom._custom.blocks import Block, Directive
-from vkbloom._custom.names import check_name
 from vkbloom._custom.textures import read_hex
 
 #: Rows and columns of each type; all numbers have 4 bytes.
@@ -64,7 +63,7 @@ def packed_size(variables: tuple[Variable, ...], storage: bool) -> int:
 
 def read_buffer(block: Block) -> Buffer:
     """Read a block BUFFER."""
-    name, line = check_name(block.head), block.line
+    name, line = block.head.identifier(), block.line
     storage = block.last("STORAGE") is not None
     variables = tuple(read_variable(directive) for directive in block.all("VAR"))
     if not variables:

@@ -85,11 +85,6 @@ class Shader:
         )
 
 
-def without_remarks(text: str) -> str:
-    """Return GLSL without its comments."""
-    return re.sub(r"//[^\n]*|/\*.*?\*/", " ", text, flags=re.DOTALL)
-
-
 def names_of(image: str, stage: str, bound: set[str]) -> list[str]:
     """Return the names under which a body finds an image: HOOKED also has the stage's name."""
     names = [image]
@@ -178,7 +173,8 @@ def write_shader(
         if binding.value not in file.given
     )
     images = [(image, names_of(image, stage, bound)) for image in names_bound]
-    members = block_members(file, without_remarks(item.body), images)
+    without_remarks = re.sub(r"//[^\n]*|/\*.*?\*/", " ", item.body, flags=re.DOTALL)
+    members = block_members(file, without_remarks, images)
     compute = item.compute is not None
     lines = ["#version 450", "#extension GL_GOOGLE_include_directive : enable"]
     if members:

@@ -8,7 +8,6 @@ import re
 from typing import Final, Literal, get_args
 
 from vkbloom._custom.blocks import Block, Directive
-from vkbloom._custom.names import check_name
 
 Number = Literal["float", "int", "uint"]
 #: How GLSL sees the value: a member of the uniform block, a constant, or a macro.
@@ -52,7 +51,7 @@ class Param:
 
 def read_param(block: Block) -> Param:
     """Read a block PARAM."""
-    name, first = check_name(block.head), block.line
+    name, first = block.head.identifier(), block.line
     number, use, is_enum = read_type(block)
     described = block.last("DESC")
     description = described.value if described else ""

@@ -8,7 +8,7 @@ from typing import Final
 
 from vkbloom._custom.blocks import Block, Directive
 from vkbloom._custom.expressions import ExpressionError, tokens
-from vkbloom._custom.names import GLOW, HOOKED, LONGEST, STAGES, check_name, stage_of
+from vkbloom._custom.names import GLOW, HOOKED, LONGEST, STAGES, stage_of
 
 MAX_STAGES: Final = 16
 MAX_BINDINGS: Final = 16
@@ -52,7 +52,7 @@ def read_pass(block: Block) -> CustomPass:
     """Read a pass."""
     save = block.last("SAVE")
     if save:
-        name = check_name(save)
+        name = save.identifier()
         if stage_of(name) == GLOW:
             raise save.fault("GLOW is what glows; save under another name")
         if len(name) > LONGEST:
@@ -62,7 +62,7 @@ def read_pass(block: Block) -> CustomPass:
     if len(bindings) > MAX_BINDINGS:
         raise bindings[MAX_BINDINGS].fault(f"a pass has at most {MAX_BINDINGS}")
     for binding in bindings:
-        check_name(binding)
+        binding.identifier()
     title = block.last("DESC")
     return CustomPass(
         title.value if title else "",

@@ -74,13 +74,10 @@ class Planner:
         for stage in STAGES:
             self._saved.pop(stage, None)
             self._left[stage] = self._picture
-            for item in file.passes:
-                if stage in item.stages and self._holds(item.when, stage):
+            for item in (item for item in file.passes if stage in item.stages):
+                if item.when is None or self._value(item.when, stage) != 0:
                     self._run(stage, item)
         self._check_size()
-
-    def _holds(self, when: Directive | None, stage: str) -> bool:
-        return when is None or self._value(when, stage) != 0
 
     def _run(self, stage: str, item: CustomPass) -> None:
         images = self._images(stage)

@@ -10,7 +10,6 @@ from typing import Final, Literal, TypeVar
 import numpy as np
 
 from vkbloom._custom.blocks import Block
-from vkbloom._custom.names import check_name
 
 Scalar = Literal["float", "int", "uint"]
 Filter = Literal["NEAREST", "LINEAR"]
@@ -28,7 +27,8 @@ LARGEST_SIDES: Final = {1: 4096, 2: 4096, 3: 256}
 class TextureFormat:
     """A format: its number in Vulkan, its name in GLSL, and how the file's data becomes texels.
 
-    `file_bytes` are those of a texel in the file.
+    `layout`: "" for a format that images of shaders cannot have.
+    `file_bytes`: Those of a texel in the file.
     """
 
     vulkan: int
@@ -37,7 +37,6 @@ class TextureFormat:
     channels: int
     file_bytes: int
     read: Callable[[bytes], np.ndarray]
-    stored: bool = True
 
 
 def as_channels(
@@ -98,12 +97,11 @@ def numbered(bits: int, kind: str, channels: int, file: str) -> TextureFormat:
     letter = {"": "u", "s": "i"}.get(kind, kind) + str(bits // 8)
     return TextureFormat(
         NUMBERS[bits, kind][index],
-        ("r", "rg", "rgba")[index] + str(bits) + LAYOUT_KINDS[kind],
+        f"{('r', 'rg', 'rgba')[index]}{bits}{LAYOUT_KINDS[kind]}" if channels != 3 else "",
         SCALARS.get(kind, "float"),
         channels,
         channels * int(file[1:]),
         as_channels(file, channels, letter),
-        channels != 3,
     )
 
 
@@ -121,10 +119,10 @@ def made_formats() -> dict[str, TextureFormat]:
         formats[f"{names}16f"] = numbered(16, "f", channels, "f4")
         formats[f"{names}16hf"] = numbered(16, "f", channels, "f2")
     formats["bgra8"] = dataclasses.replace(
-        formats["rgba8"], read=as_channels("u1", 4, "u1", "bgra"), stored=False
+        formats["rgba8"], layout="", read=as_channels("u1", 4, "u1", "bgra")
     )
-    formats["rgb565"] = TextureFormat(RGBA32_FLOAT, "", "float", 3, 2, packed_565, False)
-    formats["rgb10a2"] = TextureFormat(RGBA32_FLOAT, "", "float", 4, 4, packed_10, False)
+    formats["rgb565"] = TextureFormat(RGBA32_FLOAT, "", "float", 3, 2, packed_565)
+    formats["rgb10a2"] = TextureFormat(RGBA32_FLOAT, "", "float", 4, 4, packed_10)
     return formats
 
 
@@ -153,7 +151,7 @@ class Texture:
 
 def read_texture(block: Block) -> Texture:
     """Read a block TEXTURE."""
-    name = check_name(block.head)
+    name = block.head.identifier()
     storage = block.last("STORAGE") is not None
     sides = read_sides(block)
     directive = block.last("FORMAT")
@@ -162,7 +160,7 @@ def read_texture(block: Block) -> Texture:
     if directive.value not in FORMATS:
         raise directive.refused(f"is not one of {', '.join(FORMATS)}")
     texels = FORMATS[directive.value]
-    if storage and not texels.stored:
+    if storage and not texels.layout:
         raise directive.fault(f"{directive.value} has no STORAGE; use rgba8 or rgba32f")
     filtering = read_word(block, "FILTER", FILTERS)
     if filtering == "LINEAR" and texels.scalar != "float":

@@ -235,7 +235,7 @@ def _bloom(*given: Any) -> Any:
     refuse_capture(image)
     if call.on_device:
         return _on_device(call)
-    final = np.empty(image.shape, _dtype(image))
+    final = torch.empty(image.shape, dtype=image.dtype).numpy()
     for index, arrays, chosen in call.each():
         pixels = arrays.pop("image")
         if pixels.dtype == np.float64:
@@ -272,10 +272,6 @@ def _on_device(call: _Call) -> Any:
     # The images of a batch are in the same memory.
     batches = merged([cast("DeviceArray", tensor["final"]) for tensor in frames])
     return _joined([torch.from_dlpack(tensor) for tensor in batches], call.image, torch.cat)
-
-
-def _dtype(tensor: Any) -> Any:
-    return torch.empty(0, dtype=tensor.dtype).numpy().dtype
 
 
 @_bloom.register_fake  # type: ignore[untyped-decorator]

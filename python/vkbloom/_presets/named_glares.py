@@ -67,11 +67,7 @@ def _blender_streaks() -> tuple[Glare, ...]:
     return (Streaks(threshold=1, intensity=gain, halvings=1, **look),)
 
 
-def _anamorphic() -> tuple[Glare, ...]:
-    taps: Any = {"fade": 0.97, "base": 6, "iterations": 3}
-    return (Streaks(directions=1, threshold=1, intensity=0.3, halvings=1, **taps),)
-
-
+_LONG_TAPS: Any = {"fade": 0.97, "base": 6, "iterations": 3}
 _URP_SCALE = 1.25**1.5
 
 
@@ -116,7 +112,7 @@ GLARES: Final[Mapping[str, NamedGlare]] = {
         "Blender 5, Glare node, Streaks (formulas)",
     ),
     "anamorphic": NamedGlare(
-        _anamorphic(),
+        (Streaks(directions=1, threshold=1, intensity=0.3, halvings=1, **_LONG_TAPS),),
         "a long horizontal streak of what is above 1",
         "vkbloom, after anamorphic lenses",
     ),

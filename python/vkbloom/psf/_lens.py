@@ -11,8 +11,7 @@ from numpy.typing import ArrayLike
 from vkbloom._checks import check_size
 from vkbloom._settings.fields import number_field
 from vkbloom.psf._base import PSF, Array, check_radii, in_grey
-from vkbloom.psf._bessel import bessel
-from vkbloom.psf._radial import RadialPSF, integrate_pixels
+from vkbloom.psf._radial import RadialPSF, bessel, integrate_pixels
 
 
 @dataclasses.dataclass(frozen=True)

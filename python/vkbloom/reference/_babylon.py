@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ._image import BlurInput
-from ._levels import scaled, size_of
-from ._sampling import Array, sample
+from ._sampling import Array, sample, scaled, size_of
 from ._threshold import luminance, masked
 
 if TYPE_CHECKING:

@@ -13,9 +13,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ._image import BlurInput
-from ._levels import WIDEST_LEVEL
 from ._pyramid import downsample, groups
-from ._sampling import Array
+from ._sampling import WIDEST_LEVEL, Array
 from ._threshold import luminance, masked, soften
 from ._upsampling import Shares, combine, flat_gain, halvings, tent
 

@@ -13,9 +13,8 @@ import numpy as np
 
 from ._blender_lights import FACTORS, GAINS, LIGHTS, reads_next
 from ._image import BlurInput, Storage, finite, storage
-from ._levels import halved, size_of
 from ._pyramid import GROUPS, downsample
-from ._sampling import Array, sample, weighted_mean
+from ._sampling import Array, halved, sample, size_of, weighted_mean
 from ._tape import value_of
 from ._threshold import brightest, masked
 from ._upsampling import combine, halvings, linear, tent_of_target

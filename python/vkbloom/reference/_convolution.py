@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ._image import BlurInput
-from ._levels import size_of
-from ._sampling import Array, sample
+from ._sampling import Array, sample, size_of
 from ._tape import joined, operation, value_of
 from ._threshold import luminance
 

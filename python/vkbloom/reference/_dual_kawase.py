@@ -9,8 +9,7 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from ._image import BlurInput
-from ._levels import level_sizes, size_of
-from ._sampling import CENTRE, Array, box, sample
+from ._sampling import CENTRE, Array, box, level_sizes, sample, size_of
 from ._upsampling import combine, halvings
 
 if TYPE_CHECKING:

@@ -13,9 +13,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ._image import BlurInput
-from ._levels import WIDEST_LEVEL, halved, size_of
 from ._pyramid import downsample
-from ._sampling import Array, sample, weighted_mean
+from ._sampling import WIDEST_LEVEL, Array, halved, sample, size_of, weighted_mean
 from ._threshold import brightest, firefly_weight, masked
 from ._upsampling import combine, halvings, linear, tent_of_target
 

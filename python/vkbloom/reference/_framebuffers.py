@@ -15,8 +15,7 @@ from . import _custom as custom
 from . import _glare as glare
 from ._compositing import composite_checked, strength_of
 from ._image import BlurInput, as_float, as_mask, finite, format_of, storage
-from ._levels import scaled, size_of
-from ._sampling import Array, sample
+from ._sampling import Array, sample, scaled, size_of
 from ._threshold import apply_threshold, masked
 
 if TYPE_CHECKING:

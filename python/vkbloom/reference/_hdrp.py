@@ -14,8 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ._image import BlurInput, Storage
-from ._levels import size_of
-from ._sampling import Array, read_rows, sample, weighted_mean
+from ._sampling import Array, read_rows, sample, size_of, weighted_mean
 from ._tape import contiguous
 from ._threshold import firefly_weight, luminance, masked
 from ._upsampling import combine, cubic, cubic_rows, mixed

@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ._image import BlurInput
-from ._levels import halved, size_of
-from ._sampling import Array, sample, weighted_mean
+from ._sampling import Array, halved, sample, size_of, weighted_mean
 from ._threshold import brightest, firefly_weight, masked, soften
 from ._upsampling import combine, halvings, tent
 

@@ -12,9 +12,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ._image import BlurInput
-from ._levels import halved, size_of
 from ._pyramid import downsample
-from ._sampling import Array, sample
+from ._sampling import Array, halved, sample, size_of
 from ._threshold import masked, soften
 from ._upsampling import combine, halvings, linear, tent
 

@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ._image import BlurInput
-from ._levels import halved, size_of
-from ._sampling import Array, sample
+from ._sampling import Array, halved, sample, size_of
 from ._threshold import luminance, masked, smooth_step
 from ._upsampling import combine, flat_gain, linear, mixed, tent
 

@@ -12,9 +12,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ._image import BlurInput
-from ._levels import size_of
 from ._pyramid import downsample
-from ._sampling import Array, box
+from ._sampling import Array, box, size_of
 from ._threshold import masked, soften, with_alpha
 from ._upsampling import combine, halvings, tent
 

@@ -11,9 +11,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ._image import BlurInput, finite
-from ._levels import halved, size_of
 from ._pyramid import downsample, groups
-from ._sampling import Array, weighted_mean
+from ._sampling import Array, halved, size_of, weighted_mean
 from ._threshold import luminance, masked
 from ._upsampling import combine, halvings, linear, tent
 

@@ -7,8 +7,7 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from ._image import BlurInput
-from ._levels import level_sizes, size_of
-from ._sampling import Array, sample, weighted_mean
+from ._sampling import Array, level_sizes, sample, size_of, weighted_mean
 from ._threshold import firefly_weight, luminance
 from ._upsampling import combine, halvings, tent
 

@@ -1,4 +1,4 @@
-"""Bilinear sampling of an image at a grid of positions, clamped to the edge.
+"""Sizes of images and of their levels, and bilinear sampling, clamped to the edge.
 
 All passes of the bloom methods read at positions that form a grid: the pixel centres of the
 image they write, moved by the offset of a tap. Bilinear interpolation and clamping are separable,
@@ -8,7 +8,9 @@ banded. They are built and applied in blocks of output rows.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +27,40 @@ CENTRE: Taps = ((0.0, 1.0),)
 # Output rows per block: enough for fast matrix products, and few enough that a block of a large
 # image has few zeros beside its band.
 _BLOCK = 32
+
+
+#: The widest level of a method that gives its levels a height and the aspect of the frame.
+WIDEST_LEVEL: Final = 16384
+
+
+def size_of(image: Any) -> tuple[int, int]:
+    """Return width and height of an image."""
+    return image.shape[1], image.shape[0]
+
+
+def halved(size: tuple[int, int], more: int = 0) -> tuple[int, int]:
+    """Return half of a size, each side floored but at least 1; `more`: 1 to round up."""
+    return max(1, (size[0] + more) // 2), max(1, (size[1] + more) // 2)
+
+
+def scaled(size: tuple[int, int], scale: float) -> tuple[int, int]:
+    """Return a size times a factor, each side floored but at least 1."""
+    return max(1, math.floor(size[0] * scale)), max(1, math.floor(size[1] * scale))
+
+
+def level_sizes(size: tuple[int, int], levels: int) -> list[tuple[int, int]]:
+    """Return the sizes of the levels below an image, largest first.
+
+    Each level has half the size of the one before (`halved`). The chain ends before a level of
+    1 x 1, except that it always has one level.
+    """
+    sizes: list[tuple[int, int]] = []
+    for _ in range(levels):
+        size = halved(size)
+        if sizes and size == (1, 1):
+            break
+        sizes.append(size)
+    return sizes
 
 
 def sample(

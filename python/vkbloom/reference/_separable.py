@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ._image import BlurInput
-from ._levels import size_of
-from ._sampling import Array, sample
+from ._sampling import Array, sample, size_of
 
 if TYPE_CHECKING:
     from vkbloom._methods.separable import Separable

@@ -14,8 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ._image import BlurInput
-from ._levels import halved, scaled, size_of
-from ._sampling import Array, sample
+from ._sampling import Array, halved, sample, scaled, size_of
 from ._threshold import luminance, masked, smooth_step, with_alpha
 
 if TYPE_CHECKING:

@@ -6,8 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ._levels import size_of
-from ._sampling import Array, sample
+from ._sampling import Array, sample, size_of
 from ._tape import joined
 
 # Rec. 709 luma coefficients of linear rgb.

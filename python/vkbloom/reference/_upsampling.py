@@ -7,8 +7,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from ._image import BlurInput
-from ._levels import halved, size_of
-from ._sampling import Array, read_rows, sample
+from ._sampling import Array, halved, read_rows, sample, size_of
 from ._tape import contiguous
 
 # (image, size of the result) -> the image in this size

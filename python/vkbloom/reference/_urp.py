@@ -17,10 +17,9 @@ import numpy as np
 
 from . import _dual_kawase as dual_kawase
 from ._image import BlurInput
-from ._levels import halved, size_of
 from ._post_processing import linear_light
 from ._pyramid import downsample
-from ._sampling import Array, box, read_rows, sample
+from ._sampling import Array, box, halved, read_rows, sample, size_of
 from ._tape import contiguous
 from ._threshold import masked, soften, with_alpha
 from ._upsampling import Shares, combine, cubic, flat_gain, halvings, linear, mixed

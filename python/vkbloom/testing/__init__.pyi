@@ -15,6 +15,7 @@ from ._point_spread import (
     assert_centroid_kept,
     assert_separable,
     point_spread,
+    veiling_glare_index,
 )
 from ._probe import Probe
 from ._programs import command
@@ -28,7 +29,6 @@ from ._sequences import Flash, Flicker, flash, flicker
 from ._shape import assert_round, assert_sizes
 from ._time import assert_history, assert_jitter
 from ._transparency import assert_alpha
-from ._veiling_glare import veiling_glare_index
 
 __all__ = [
     "Diagnosis",

@@ -274,11 +274,8 @@ def _expected(lights: _Lights, at: tuple[int, int]) -> tuple[Image, float]:
 
 def _moved(spread: Image, start: tuple[int, int], to: tuple[int, int]) -> Image:
     """Return an image moved by whole pixels, with black where it has none."""
-    moved = np.zeros_like(spread)
-    (x, y), (height, width) = np.subtract(to, start), spread.shape[:2]
-    rows, columns = (
-        (slice(max(0, by), min(size, size + by)), slice(max(0, -by), min(size, size - by)))
-        for by, size in ((y, height), (x, width))
-    )
-    moved[rows[0], columns[0]] = spread[rows[1], columns[1]]
+    x, y = np.subtract(to, start)
+    moved = np.roll(spread, (y, x), (0, 1))
+    for lines, by in ((moved, y), (moved.swapaxes(0, 1), x)):
+        lines[slice(by, None) if by < 0 else slice(by)] = 0
     return moved

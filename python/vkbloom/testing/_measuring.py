@@ -18,11 +18,10 @@ from vkbloom._settings.settings import Settings
 from vkbloom._views.plain_values import plain
 from vkbloom.psf._sampled import samples
 from vkbloom.testing._law_report import LawReport
-from vkbloom.testing._point_spread import border_share
+from vkbloom.testing._point_spread import border_share, veiling_glare_index
 from vkbloom.testing._probe import Bloom, Probe
 from vkbloom.testing._programs import COARSE_ERROR, Program
 from vkbloom.testing._subject import Subject, fitting_probe
-from vkbloom.testing._veiling_glare import veiling_glare_index
 
 Array = NDArray[np.float64]
 

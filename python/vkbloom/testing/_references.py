@@ -51,7 +51,7 @@ class Origin:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Reference:
-    """Reference images, and their origin.
+    """Images, of a reference or of a check, and their origin.
 
     `images`: Images by framebuffer, in the order of the data flow.
     """

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypedDict, Unpack
 
@@ -32,16 +31,6 @@ class Limits(TypedDict, total=False):
     ssim: float | None
     flip: float | None
     allow_nan: bool
-
-
-@dataclass(frozen=True, eq=False)
-class _Given:
-    """The arguments of a check."""
-
-    name: str
-    images: Mapping[str, NDArray[Any]]
-    origin: Origin
-    tolerances: Tolerances
 
 
 class FrameRegression:
@@ -101,28 +90,27 @@ class FrameRegression:
             decide.
         """
         tolerances = Tolerances(**limits)
-        given = _Given(
-            self._chosen_name(name), _images("frames", frames), _origin(frames, info), tolerances
-        )
-        file = self._folder.file(given.name)
-        reference = self._folder.load(given.name)
+        name = self._chosen_name(name)
+        given = Reference(images=_images("frames", frames), origin=_origin(frames, info))
+        file = self._folder.file(name)
+        reference = self._folder.load(name)
         if reference is None and not self._update:
             raise AssertionError(
-                f"{given.name}: there is no reference {file}. Create it with --bloom-update, view "
+                f"{name}: there is no reference {file}. Create it with --bloom-update, view "
                 "it, and commit it with the tests"
             )
         if reference is not None:
             verdicts = judge(reference.images, given.images, tolerances)
             if not (self._update and first_failure(verdicts)):
-                self._conclude(given, reference, verdicts)
+                self._conclude(name, given, reference, verdicts)
                 return
         for framebuffer, image in given.images.items():
             if not tolerances.allow_nan and not np.isfinite(image).all():
                 raise ValueError(
-                    f"{given.name}: {framebuffer} has NaN or infinity; set allow_nan=True to store "
+                    f"{name}: {framebuffer} has NaN or infinity; set allow_nan=True to store "
                     "it as a reference"
                 )
-        self._folder.write(given.name, given.images, given.origin)
+        self._folder.write(name, given.images, given.origin)
         self._written.append(file)
 
     def compare(
@@ -152,13 +140,12 @@ class FrameRegression:
         tolerances = Tolerances(**limits)
         if name is not None:
             check_name(name)
-        given = _Given(
-            name or self._name, _images("actual", actual), _origin(actual, info), tolerances
-        )
+        given = Reference(images=_images("actual", actual), origin=_origin(actual, info))
         reference = Reference(
             images=_images("expected", expected), origin=_origin(expected, expected_info)
         )
-        self._conclude(given, reference, judge(reference.images, given.images, tolerances))
+        verdicts = judge(reference.images, given.images, tolerances)
+        self._conclude(name or self._name, given, reference, verdicts)
 
     def _chosen_name(self, name: str | None) -> str:
         if name is not None:
@@ -171,26 +158,25 @@ class FrameRegression:
         self._has_used_name = True
         return self._name
 
-    def _conclude(self, given: _Given, reference: Reference, verdicts: tuple[Verdict, ...]) -> None:
+    def _conclude(
+        self, name: str, given: Reference, reference: Reference, verdicts: tuple[Verdict, ...]
+    ) -> None:
         """Raise AssertionError if a framebuffer failed."""
         if first_failure(verdicts) is None:
             return
-        message = _message(given, verdicts, reference)
+        message = _message(name, given, verdicts, reference)
         try:
-            self._write_images(given, reference)
+            self._write_images(name, given, reference)
         except ValueError as error:
             message += f"\n  the images are not saved: {error}"
         raise AssertionError(message)
 
-    def _write_images(self, given: _Given, reference: Reference) -> None:
+    def _write_images(self, name: str, given: Reference, reference: Reference) -> None:
         if self._save is None:
             return
-        for kind, images, origin in (
-            ("expected", reference.images, reference.origin),
-            ("actual", given.images, given.origin),
-        ):
+        for kind, made in (("expected", reference), ("actual", given)):
             folder = ReferenceFolder(self._save / kind / self._folder.path.name)
-            folder.write(given.name, images, origin)
+            folder.write(name, made.images, made.origin)
 
 
 def name_of_test(test: str) -> str:
@@ -230,14 +216,16 @@ def _origin(frames: object, info: Mapping[str, Any] | None) -> Origin:
     )
 
 
-def _message(given: _Given, verdicts: tuple[Verdict, ...], reference: Reference) -> str:
+def _message(
+    name: str, given: Reference, verdicts: tuple[Verdict, ...], reference: Reference
+) -> str:
     before: list[str] = []
     for verdict in verdicts:
         if not verdict.passed:
             break
         before.append(verdict.name)
     lines = [
-        f"{given.name}: the first framebuffer that differs is {verdicts[len(before)].name}"
+        f"{name}: the first framebuffer that differs is {verdicts[len(before)].name}"
         + (f" ({', '.join(before)}: right)" if before else "")
     ]
     for verdict in verdicts:

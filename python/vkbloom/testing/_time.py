@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom._argument_types import checked
-from vkbloom._checks import check_number
 from vkbloom.testing._border import takes
 from vkbloom.testing._deviations import fail, figure, is_within, judge
 from vkbloom.testing._moving_light import area_sampled
@@ -30,6 +29,8 @@ HISTORY_LIMITS: Final = {"stays": 0.01, "steady": 0.01}
 # share of the limit: in all presets, 16 positions have at most 2.2 and 1.2 times as much.
 _ORDER: Final = (0, 6, 7, 11, 3, 8, 13, 15, 1, 2, 4, 5, 9, 10, 12, 14)
 _STEADY: Final = {4: 0.25, 8: 0.5}
+# Share of the frames before in a reference TAA.
+_FEEDBACK: Final = 0.9
 # Frames a second, by which a bloom is given the time.
 _RATE: Final = 60.0
 # Frames after a jump: of a bloom that is given the time, and of any other.
@@ -62,7 +63,6 @@ def assert_jitter(
     bloom: Bloom,
     probe: Probe = DEFAULT,
     *,
-    feedback: float = 0.9,
     limits: Mapping[str, float] | None = None,
 ) -> None:
     """Assert that the jitter of a camera does not make a bloom flicker.
@@ -71,7 +71,7 @@ def assert_jitter(
     are seen by a camera that follows a Halton path of 16 positions. The law: the light of the bloom
     is the same in each frame. "flicker" is (largest - smallest) / mean of its sum; 4 or 8 positions
     that differ most are enough if the figure is far from the limit. "resolved" is the same of a
-    reference TAA, whose result blooms: s_t = feedback s_t-1 + (1 - feedback) a_t. Of lines it is
+    reference TAA, whose result blooms: s_t = 0.9 s_t-1 + 0.1 a_t. Of lines it is
     measured only if they flicker by more than a quarter of its limit, though not beyond the other
     limit. The first light that breaks the law decides. And a
     lit pixel blooms from the same value on as a flat image: "threshold" is the first divided by the
@@ -83,8 +83,6 @@ def assert_jitter(
         Takes an image and returns one of the same height and width: the bloom alone.
     probe : Probe
         Its value must be far above a threshold.
-    feedback : float
-        Share of the frames before, 0 to 1.
     limits : mapping of str to float, optional
         Limits by figure; by default 0.05, 0.02, 1.5.
 
@@ -93,7 +91,6 @@ def assert_jitter(
     AssertionError
         The law does not hold, or a result is not finite.
     """
-    check_number("feedback", feedback, 0.0, 1.0)
     allowed = JITTER_LIMITS | dict(limits or {})
     law = "the light of a bloom does not change with the jitter of the camera"
     small = small_probe(probe)
@@ -101,7 +98,7 @@ def assert_jitter(
     for name, scene in _SCENES.items():
         if reasons:
             break
-        for label, kind, off in _flickers(bloom, small, scene, allowed, feedback):
+        for label, kind, off in _flickers(bloom, small, scene, allowed):
             figure(f"{name}, {label}", off)
             if not is_within(law, off, allowed[kind], kind):
                 words = f"changes by {off:.3g} of its mean" if off < math.inf else "is black"
@@ -121,7 +118,6 @@ def _flickers(
     probe: Probe,
     scene: Callable[[Probe, float, float], Image],
     allowed: Mapping[str, float],
-    feedback: float,
 ) -> Iterator[tuple[str, str, float]]:
     """Yield the positions, the kind and the value of each figure of a scene."""
     frames = [scene(probe, x, y) for x, y in halton(len(_ORDER))]
@@ -137,7 +133,7 @@ def _flickers(
     # The light of a linear bloom changes less after TAA. The point shows whether it is linear.
     least = 0.0 if scene is _point else allowed["resolved"] / 4
     if least <= off <= allowed["flicker"]:
-        resolved = list(_taa(frames, feedback))[:: len(frames) // 2]
+        resolved = list(_taa(frames))[:: len(frames) // 2]
         lights = [_light(bloom, probe, frame) for frame in resolved]
         yield f"{len(frames)} positions, after TAA", "resolved", _flicker(lights)
 
@@ -171,11 +167,11 @@ _SCENES: Final[dict[str, Callable[[Probe, float, float], Image]]] = {
 }
 
 
-def _taa(frames: list[Image], feedback: float) -> Iterator[Image]:
+def _taa(frames: list[Image]) -> Iterator[Image]:
     """Yield the resolved frames of a second round, which starts from the mean of the first."""
     resolved: Image = np.mean(frames, axis=0)
     for frame in frames:
-        resolved = feedback * resolved + (1 - feedback) * frame
+        resolved = _FEEDBACK * resolved + (1 - _FEEDBACK) * frame
         yield resolved
 
 
