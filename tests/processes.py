@@ -12,9 +12,7 @@ LONGEST: Final = 600  # seconds, after which a process that hangs is ended
 
 
 def python(
-    *arguments: str | Path,
-    cwd: Path | str | None = None,
-    **environment: str,
+    *arguments: str | Path, cwd: Path | str | None = None, **environment: str
 ) -> subprocess.CompletedProcess[str]:
     """Run the interpreter with these arguments and additional environment variables."""
     return subprocess.run(
@@ -28,11 +26,7 @@ def python(
     )
 
 
-def output(
-    *arguments: str | Path,
-    cwd: Path | str | None = None,
-    **environment: str,
-) -> str:
+def output(*arguments: str | Path, cwd: Path | str | None = None, **environment: str) -> str:
     """Return what `python` prints, after a run without an error."""
     done = python(*arguments, cwd=cwd, **environment)
     assert done.returncode == 0, done.stdout + done.stderr

@@ -343,23 +343,6 @@ bool vkb_frame_submit(struct vkb_device *device, struct vkb_frame *frame,
     return done;
 }
 
-// Adds up timings with the same name: they are steps of one pass.
-static void merge_timings(struct vkb_request *request)
-{
-    uint32_t count = 0;
-
-    for (uint32_t i = 0; i < request->timing_count; ++i) {
-        uint32_t at = 0;
-        while (at < count && strcmp(request->timings[at].name, request->timings[i].name) != 0)
-            ++at;
-        if (at < count)
-            request->timings[at].seconds += request->timings[i].seconds;
-        else
-            request->timings[count++] = request->timings[i];
-    }
-    request->timing_count = count;
-}
-
 // Reads timings and outputs of a submission that the device has finished.
 static void fetch(const struct vkb_device *device, const struct vkb_submission *submission)
 {
@@ -376,7 +359,6 @@ static void fetch(const struct vkb_device *device, const struct vkb_submission *
         for (uint32_t timing = 0; timing < request->timing_count; ++timing)
             request->timings[timing].seconds =
                 vkb_timer_seconds(device, &submission->timer, request->first_span + timing);
-        merge_timings(request);
         for (uint32_t output = 0; output < request->plan->output_count; ++output)
             vkb_readback_fetch(&submission->readback, &request->outputs[output]);
     }

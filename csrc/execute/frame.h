@@ -22,7 +22,6 @@ struct vkb_frame {
     struct vkb_scene scene;
     struct vkb_upload uploads[VKB_INPUT_COUNT];  // by kind
     struct vkb_in_place in_place[VKB_INPUT_COUNT];
-    uint64_t exported[VKB_INPUT_COUNT];  // the serial of what the cached image has; 0: else
     struct vkb_strided_copies strided_copies;
     struct vkb_non_finite non_finite;  // of the inputs of the last submission
     struct vkb_buffer constants;       // staging memory of images that are filled once

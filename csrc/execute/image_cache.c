@@ -112,13 +112,6 @@ bool vkb_image_fits(const struct vkb_image *image, const struct vkb_image_row *r
     return is_alike(image, row) && (row->usage & ~image->usage) == 0;
 }
 
-bool vkb_image_cache_replaces(const struct vkb_image_cache *cache, const struct vkb_image_row *row)
-{
-    const struct vkb_cached_image *cached = find_cached(cache, row);
-
-    return cached && cached->image.handle && !vkb_image_fits(&cached->image, row);
-}
-
 struct vkb_cached_image *vkb_image_cache_find(const struct vkb_image_cache *cache,
                                               const struct vkb_image_row *row)
 {
@@ -127,26 +120,23 @@ struct vkb_cached_image *vkb_image_cache_find(const struct vkb_image_cache *cach
     return cached && vkb_image_fits(&cached->image, row) ? cached : NULL;
 }
 
-bool vkb_image_cache_resolve(const struct vkb_device *device, struct vkb_image_cache *cache,
-                             const struct vkb_image_row *row, struct vkb_cached_image **resolved,
-                             struct vkb_error *error)
+struct vkb_cached_image *vkb_image_cache_add(const struct vkb_device *device,
+                                             struct vkb_image_cache *cache,
+                                             const struct vkb_image_row *row,
+                                             struct vkb_error *error)
 {
     struct vkb_cached_image *cached = find_cached(cache, row);
+    struct vkb_image_row both = *row;
 
     if (!cached && !(cached = add_cached(cache, row, error)))
-        return false;
-    *resolved = cached;
-    cached->used = cache->now;
-    if (vkb_image_fits(&cached->image, row))
-        return true;
+        return NULL;
     // Also for the plans that it has been for: they may come by turns.
-    struct vkb_image_row both = *row;
     both.usage |= is_alike(&cached->image, row) ? cached->image.usage : 0;
     destroy_image(device, cached);
     if (!vkb_image_create_row(device, &both, &cached->image, error))
-        return false;
+        return NULL;
     vkb_label_object(device, VK_OBJECT_TYPE_IMAGE, (uint64_t)cached->image.handle, row->name);
     if (cached->image.buffer)
         vkb_label_object(device, VK_OBJECT_TYPE_BUFFER, (uint64_t)cached->image.buffer, row->name);
-    return true;
+    return cached;
 }

@@ -44,13 +44,11 @@ bool vkb_image_create_row(const struct vkb_device *device, const struct vkb_imag
 struct vkb_cached_image *vkb_image_cache_find(const struct vkb_image_cache *cache,
                                               const struct vkb_image_row *row);
 
-// Whether vkb_image_cache_resolve would replace an image of another size, format or usage. Pending
-// commands must not use the replaced image.
-bool vkb_image_cache_replaces(const struct vkb_image_cache *cache, const struct vkb_image_row *row);
-
-// Finds or creates the cached image of a row.
-bool vkb_image_cache_resolve(const struct vkb_device *device, struct vkb_image_cache *cache,
-                             const struct vkb_image_row *row, struct vkb_cached_image **cached,
-                             struct vkb_error *error);
+// Creates the cached image of a row that was not found. Pending commands must not use one of
+// another size, format or usage, which is replaced. NULL and a filled error on failure.
+struct vkb_cached_image *vkb_image_cache_add(const struct vkb_device *device,
+                                             struct vkb_image_cache *cache,
+                                             const struct vkb_image_row *row,
+                                             struct vkb_error *error);
 
 #endif

@@ -20,54 +20,43 @@ static bool check(const struct vkb_device *device, const struct vkb_pass_row *pa
     return true;
 }
 
-#define CHECK(...) \
-    check(device, pass, (const struct need[]){__VA_ARGS__}, \
-          sizeof((const struct need[]){__VA_ARGS__}) / sizeof(struct need), error)
+enum { DRAW_NEEDS = 7 };  // the others are of dispatches
+
 #define LIMIT(name) #name, .allowed = device->limits.name
 
-static bool check_bindings(const struct vkb_device *device, const struct vkb_pass_row *pass,
-                           struct vkb_error *error)
+static bool check_needs(const struct vkb_device *device, const struct vkb_pass_row *pass,
+                        struct vkb_error *error)
 {
     const bool dispatch = pass->geometry == VKB_GEOMETRY_DISPATCH;
+    const uint32_t targets = dispatch ? 0 : pass->target_count;
+    const uint32_t *threads = pass->shader->threads, *size = device->limits.maxComputeWorkGroupSize;
     uint32_t counts[VKB_RESOURCE_KINDS] = {
         [VKB_RESOURCE_TEXTURE] = pass->read_count,
         [VKB_RESOURCE_IMAGE] = dispatch,  // the target
         [VKB_RESOURCE_UNIFORM] = 1,       // the parameters
     };
-
     for (uint32_t i = 0; i < pass->resource_count; ++i)
         ++counts[pass->resources[i]->kind];
-    const uint32_t targets = dispatch ? 0 : pass->target_count;
-    const uint32_t every = counts[VKB_RESOURCE_TEXTURE] + counts[VKB_RESOURCE_IMAGE]
-                         + counts[VKB_RESOURCE_UNIFORM] + counts[VKB_RESOURCE_STORAGE] + targets;
-    return CHECK(
-        {"textures", LIMIT(maxPerStageDescriptorSampledImages),
-         .needed = counts[VKB_RESOURCE_TEXTURE]},
-        {"textures", LIMIT(maxPerStageDescriptorSamplers), .needed = counts[VKB_RESOURCE_TEXTURE]},
-        {"storage images", LIMIT(maxPerStageDescriptorStorageImages),
-         .needed = counts[VKB_RESOURCE_IMAGE]},
-        {"uniform buffers", LIMIT(maxPerStageDescriptorUniformBuffers),
-         .needed = counts[VKB_RESOURCE_UNIFORM]},
-        {"storage buffers", LIMIT(maxPerStageDescriptorStorageBuffers),
-         .needed = counts[VKB_RESOURCE_STORAGE]},
+    const uint32_t textures = counts[VKB_RESOURCE_TEXTURE], images = counts[VKB_RESOURCE_IMAGE];
+    const uint32_t uniforms = counts[VKB_RESOURCE_UNIFORM], storage = counts[VKB_RESOURCE_STORAGE];
+    const struct need needs[] = {
+        {"textures", LIMIT(maxPerStageDescriptorSampledImages), .needed = textures},
+        {"textures", LIMIT(maxPerStageDescriptorSamplers), .needed = textures},
+        {"storage images", LIMIT(maxPerStageDescriptorStorageImages), .needed = images},
+        {"uniform buffers", LIMIT(maxPerStageDescriptorUniformBuffers), .needed = uniforms},
+        {"storage buffers", LIMIT(maxPerStageDescriptorStorageBuffers), .needed = storage},
         {"outputs", LIMIT(maxFragmentCombinedOutputResources),
-         .needed =
-             dispatch ? 0 : counts[VKB_RESOURCE_IMAGE] + counts[VKB_RESOURCE_STORAGE] + targets},
-        {"bindings", LIMIT(maxPerStageResources), .needed = every});
-}
-
-static bool check_workgroup(const struct vkb_device *device, const struct vkb_pass_row *pass,
-                            struct vkb_error *error)
-{
-    const uint32_t *threads = pass->shader->threads;
-    const uint32_t *allowed = device->limits.maxComputeWorkGroupSize;
-
-    return CHECK({"threads of a workgroup", LIMIT(maxComputeWorkGroupInvocations),
-                  .needed = (uint64_t)threads[0] * threads[1]},
-                 {"threads along x", "maxComputeWorkGroupSize", threads[0], allowed[0]},
-                 {"threads along y", "maxComputeWorkGroupSize", threads[1], allowed[1]},
-                 {"bytes of shared memory", LIMIT(maxComputeSharedMemorySize),
-                  .needed = pass->shader->shared});
+         .needed = dispatch ? 0 : images + storage + targets},
+        {"bindings", LIMIT(maxPerStageResources),
+         .needed = textures + images + uniforms + storage + targets},
+        {"threads of a workgroup", LIMIT(maxComputeWorkGroupInvocations),
+         .needed = (uint64_t)threads[0] * threads[1]},
+        {"threads along x", "maxComputeWorkGroupSize", threads[0], size[0]},
+        {"threads along y", "maxComputeWorkGroupSize", threads[1], size[1]},
+        {"bytes of shared memory", LIMIT(maxComputeSharedMemorySize),
+         .needed = pass->shader->shared},
+    };
+    return check(device, pass, needs, dispatch ? sizeof needs / sizeof *needs : DRAW_NEEDS, error);
 }
 
 bool vkb_limits_check_image(const struct vkb_device *device, const struct vkb_image_row *row,
@@ -122,9 +111,7 @@ static bool check_passes(const struct vkb_device *device, const struct vkb_graph
                             device->adapter.name, pass->name);
         // Plans without a renderer know no limits.
         if (pass->block == VKB_BLOCK_custom && device->limits.maxPerStageResources
-            && (!check_bindings(device, pass, error)
-                || (pass->geometry == VKB_GEOMETRY_DISPATCH
-                    && !check_workgroup(device, pass, error))))
+            && !check_needs(device, pass, error))
             return false;
     }
     return true;

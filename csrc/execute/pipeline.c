@@ -146,16 +146,6 @@ bool vkb_compute_create(const struct vkb_device *device, VkPipelineCache cache,
     return done;
 }
 
-static const struct geometry_state {
-    VkCullModeFlags cull;
-    bool depth_test, depth_write;
-} geometry_states[] = {
-    [VKB_GEOMETRY_FULLSCREEN] = {VK_CULL_MODE_NONE, false, false},
-    [VKB_GEOMETRY_SKYBOX] = {VK_CULL_MODE_NONE, true, false},
-    [VKB_GEOMETRY_BODY] = {VK_CULL_MODE_BACK_BIT, true, true},
-    [VKB_GEOMETRY_GLOW] = {VK_CULL_MODE_BACK_BIT, true, true},
-};
-
 // The states of a graphics pipeline that are the same for all passes.
 static const VkPipelineInputAssemblyStateCreateInfo triangles = {
     .sType = VK_STRUCTURE_TYPE_PIPELINE_INPUT_ASSEMBLY_STATE_CREATE_INFO,
@@ -190,23 +180,23 @@ static VkPipelineVertexInputStateCreateInfo vertex_input(const struct vkb_pass_r
     };
 }
 
-static VkPipelineRasterizationStateCreateInfo rasterization(const struct geometry_state *state)
+static VkPipelineRasterizationStateCreateInfo rasterization(enum vkb_geometry geometry)
 {
     return (VkPipelineRasterizationStateCreateInfo){
         .sType = VK_STRUCTURE_TYPE_PIPELINE_RASTERIZATION_STATE_CREATE_INFO,
         .polygonMode = VK_POLYGON_MODE_FILL,
-        .cullMode = state->cull,
+        .cullMode = vkb_is_mesh(geometry) ? VK_CULL_MODE_BACK_BIT : VK_CULL_MODE_NONE,
         .frontFace = VK_FRONT_FACE_COUNTER_CLOCKWISE,
         .lineWidth = 1.0f,
     };
 }
 
-static VkPipelineDepthStencilStateCreateInfo depth_test(const struct geometry_state *state)
+static VkPipelineDepthStencilStateCreateInfo depth_test(enum vkb_geometry geometry)
 {
     return (VkPipelineDepthStencilStateCreateInfo){
         .sType = VK_STRUCTURE_TYPE_PIPELINE_DEPTH_STENCIL_STATE_CREATE_INFO,
-        .depthTestEnable = state->depth_test,
-        .depthWriteEnable = state->depth_write,
+        .depthTestEnable = geometry != VKB_GEOMETRY_FULLSCREEN,
+        .depthWriteEnable = vkb_is_mesh(geometry),
         .depthCompareOp = VK_COMPARE_OP_LESS_OR_EQUAL,
     };
 }
@@ -234,10 +224,9 @@ static bool create_graphics(const struct vkb_device *device, const struct vkb_pi
                             const VkShaderModule modules[2], VkPipeline *pipeline,
                             struct vkb_error *error)
 {
-    const struct geometry_state *state = &geometry_states[pass->geometry];
     const VkPipelineVertexInputStateCreateInfo vertices = vertex_input(pass);
-    const VkPipelineRasterizationStateCreateInfo raster = rasterization(state);
-    const VkPipelineDepthStencilStateCreateInfo depth = depth_test(state);
+    const VkPipelineRasterizationStateCreateInfo raster = rasterization(pass->geometry);
+    const VkPipelineDepthStencilStateCreateInfo depth = depth_test(pass->geometry);
     VkPipelineColorBlendAttachmentState blends[VKB_MAX_TARGETS];
     VkFormat formats[VKB_MAX_TARGETS];
 

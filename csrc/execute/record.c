@@ -64,7 +64,8 @@ static void write_resource(const struct vkb_run *run, const struct vkb_resource 
                            VkDescriptorImageInfo *image, VkDescriptorBufferInfo *buffer,
                            VkWriteDescriptorSet *write)
 {
-    const struct vkb_resource_entry *entry = vkb_resources_find(&run->frame->resources, resource);
+    const struct vkb_resource_entry *entry =
+        vkb_resources_find(&run->frame->resources, resource->serial);
 
     *image = (VkDescriptorImageInfo){entry->sampler, entry->image.view, VK_IMAGE_LAYOUT_GENERAL};
     *buffer = (VkDescriptorBufferInfo){.buffer = entry->buffer.handle, .range = VK_WHOLE_SIZE};

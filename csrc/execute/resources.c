@@ -111,7 +111,8 @@ static void record_fill(const struct vkb_device *device, VkCommandBuffer command
     }
 }
 
-static struct vkb_resource_entry *find(const struct vkb_resources *resources, uint64_t serial)
+struct vkb_resource_entry *vkb_resources_find(const struct vkb_resources *resources,
+                                              uint64_t serial)
 {
     for (size_t i = 0; i < resources->count; ++i)
         if (resources->entries[i]->serial == serial)
@@ -125,7 +126,7 @@ bool vkb_resources_load(const struct vkb_device *device, VkCommandBuffer command
 {
     for (uint32_t i = 0; i < pass->resource_count; ++i) {
         const struct vkb_resource *resource = pass->resources[i];
-        struct vkb_resource_entry *entry = find(resources, resource->serial);
+        struct vkb_resource_entry *entry = vkb_resources_find(resources, resource->serial);
         if (!entry) {
             entry = vkb_append(error, &resources->entries, &resources->count, &resources->capacity,
                                sizeof *entry);
@@ -140,10 +141,4 @@ bool vkb_resources_load(const struct vkb_device *device, VkCommandBuffer command
         entry->used = now;
     }
     return true;
-}
-
-const struct vkb_resource_entry *vkb_resources_find(const struct vkb_resources *resources,
-                                                    const struct vkb_resource *resource)
-{
-    return find(resources, resource->serial);
 }

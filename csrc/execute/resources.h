@@ -32,8 +32,8 @@ bool vkb_resources_load(const struct vkb_device *device, VkCommandBuffer command
                         const struct vkb_pass_row *pass, struct vkb_resources *resources,
                         struct vkb_error *error);
 
-// The entry of a loaded resource.
-const struct vkb_resource_entry *vkb_resources_find(const struct vkb_resources *resources,
-                                                    const struct vkb_resource *resource);
+// The entry of a resource; NULL: it is not loaded.
+struct vkb_resource_entry *vkb_resources_find(const struct vkb_resources *resources,
+                                              uint64_t serial);
 
 #endif

@@ -84,10 +84,10 @@ static bool is_current(const struct vkb_planner *planner, const struct vkb_plan_
     return current && step->contents[image];
 }
 
-static bool holds_recipe(const struct vkb_planner *planner, const struct vkb_content *content)
+bool vkb_content_holds(const struct vkb_content *content, const void *recipe, size_t size)
 {
-    return content && content->valid && content->recipe_size == planner->recipe_size
-        && memcmp(content->recipe, planner->recipe, planner->recipe_size) == 0;
+    return content && content->valid && content->recipe_size == size
+        && (size == 0 || memcmp(content->recipe, recipe, size) == 0);
 }
 
 // Sets *same if the targets of passes first..end-1 already hold the result of these passes. The
@@ -102,7 +102,9 @@ static bool compare_recipe(struct vkb_planner *planner, const struct vkb_plan_st
         return false;
     *same = true;
     for (uint32_t i = 0; i < count; ++i)
-        *same = *same && holds_recipe(planner, step->contents[targets[i]]);
+        *same =
+            *same
+            && vkb_content_holds(step->contents[targets[i]], planner->recipe, planner->recipe_size);
     return true;
 }
 

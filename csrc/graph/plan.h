@@ -27,6 +27,9 @@ struct vkb_content {
 bool vkb_content_begin_writing(struct vkb_content *content, uint64_t *clock, const void *recipe,
                                size_t size, struct vkb_error *error);
 
+// Whether it is valid, and made by that recipe. `content` may be NULL.
+bool vkb_content_holds(const struct vkb_content *content, const void *recipe, size_t size);
+
 // A plan within the sequence of plans that a renderer runs.
 struct vkb_plan_step {
     const struct vkb_plan *plan;

@@ -57,45 +57,13 @@ bool vkb_source_sizes(const struct vkb_source *source, const struct vkb_settings
     return true;
 }
 
-static bool levels_fit(const struct vkb_image_source *planned, const struct vkb_image_source *given)
-{
-    bool fits = planned->level_count == given->level_count;
-
-    for (uint32_t i = 0; fits && i < planned->level_count; ++i)
-        fits = planned->levels[i].format == given->levels[i].format
-            && planned->levels[i].size.width == given->levels[i].size.width
-            && planned->levels[i].size.height == given->levels[i].size.height;
-    return fits;
-}
-
-static bool image_fits(const struct vkb_image_source *planned, const struct vkb_image_source *given)
-{
-    return planned->format == given->format && planned->channels == given->channels
-        && planned->layers == given->layers && planned->size.width == given->size.width
-        && planned->size.height == given->size.height
-        && planned->has_emission == given->has_emission && planned->has_mask == given->has_mask
-        && levels_fit(planned, given);
-}
-
-static bool scene_fits(const struct vkb_scene_source *planned, const struct vkb_scene_source *given)
-{
-    return planned->has_sky == given->has_sky && planned->has_glow == given->has_glow
-        && planned->has_emission == given->has_emission
-        && planned->body_textured == given->body_textured
-        && planned->glow_textured == given->glow_textured;
-}
-
 bool vkb_source_fits(const struct vkb_source *planned, const struct vkb_source *given)
 {
-    if (planned->kind != given->kind)
-        return false;
-    switch (given->kind) {
-    case VKB_SOURCE_NONE:
-        break;
-    case VKB_SOURCE_SCENE:
-        return scene_fits(&planned->scene, &given->scene);
-    case VKB_SOURCE_IMAGE:
-        return image_fits(&planned->image, &given->image);
-    }
-    return false;
+    const struct vkb_image_source *one = &planned->image, *other = &given->image;
+
+    return planned->kind == VKB_SOURCE_IMAGE && given->kind == VKB_SOURCE_IMAGE
+        && one->format == other->format && one->channels == other->channels
+        && one->layers == other->layers && one->size.width == other->size.width
+        && one->size.height == other->size.height && one->has_emission == other->has_emission
+        && one->has_mask == other->has_mask && one->level_count + other->level_count == 0;
 }

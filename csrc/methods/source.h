@@ -27,9 +27,8 @@ bool vkb_source_sizes(const struct vkb_source *source, const struct vkb_settings
                       uint32_t max_side, struct vkb_size *frame, struct vkb_size *buffers,
                       struct vkb_error *error);
 
-// Whether a graph of `planned` can run with the data of `given`: both need the same kind and the
-// same optional parts, images also the same size and format. Camera and time may differ, since the
-// graph has them as parameters.
+// Whether a graph of the image `planned` can run with the data of `given`: both need the same size
+// and format, and the same optional parts. A graph of a scene depends on its camera.
 bool vkb_source_fits(const struct vkb_source *planned, const struct vkb_source *given);
 
 #endif

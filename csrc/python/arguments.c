@@ -46,12 +46,9 @@ static const struct member stage_members[] = {
 static bool add_member(PyObject *table, const struct member *member)
 {
     const size_t size = *member->code ? (size_t)(member->code[1] - '0') : 1;
-    PyObject *entry = Py_BuildValue("(nsn)", (Py_ssize_t)member->offset, member->code,
-                                    (Py_ssize_t)(member->size / size));
-    const bool done = entry && PyDict_SetItemString(table, member->name, entry) == 0;
-
-    Py_XDECREF(entry);
-    return done;
+    return vkb_set_entry(table, member->name,
+                         Py_BuildValue("(nsn)", (Py_ssize_t)member->offset, member->code,
+                                       (Py_ssize_t)(member->size / size)));
 }
 
 // {name: (offset, code, number of elements)}; under "" the size of the struct.

@@ -61,10 +61,9 @@ static PyMethodDef functions[] = {
      "those variants would do; by default it draws every pass as its method defines it."},
     {"read_dlpack", vkb_read_dlpack, METH_O,
      "read_dlpack(capsule) -> (address, device, dtype, shape, strides). Does not consume it."},
-    {"dry_run", vkb_dry_run_names, METH_O,
-     "dry_run(((source, plan), ...)) -> [[name, ...], ...]. The passes that a renderer that has "
-     "run "
-     "nothing would run for each plan after those before it."},
+    {"dry_run", vkb_dry_run_steps, METH_O,
+     "dry_run(((source, plan), ...)) -> [[pass, ...], ...]. Of each plan the passes (Plan.passes) "
+     "that run after those before it, on a renderer that has run nothing."},
 #ifdef VKBLOOM_FAULTS
     {"arm_fault", vkb_fault_arm, METH_VARARGS,
      "arm_fault(n, result, names): the n-th call of those names (\"\": of all) answers result."},
@@ -90,13 +89,12 @@ static PyObject *value_table(const struct vkb_value_row *rows, size_t count)
 
     for (size_t i = 0; table && i < count; ++i) {
         const struct vkb_value_row *row = &rows[i];
-        PyObject *entry =
-            row->type == VKB_VALUE_INT
-                ? Py_BuildValue("(iii)", (int)row->initial, (int)row->low, (int)row->high)
-                : Py_BuildValue("(ddd)", row->initial, row->low, row->high);
-        if (!entry || PyDict_SetItemString(table, row->name, entry) < 0)
+        if (!vkb_set_entry(
+                table, row->name,
+                row->type == VKB_VALUE_INT
+                    ? Py_BuildValue("(iii)", (int)row->initial, (int)row->low, (int)row->high)
+                    : Py_BuildValue("(ddd)", row->initial, row->low, row->high)))
             Py_CLEAR(table);
-        Py_XDECREF(entry);
     }
     return table;
 }
@@ -132,10 +130,8 @@ static PyObject *choice_table(void)
 
     for (size_t i = 0; table && i < VKB_CHOICE_COUNT; ++i) {
         const struct vkb_choice_row *row = &vkb_choice_rows[i];
-        PyObject *names = name_tuple(row->spellings, row->count);
-        if (!names || PyDict_SetItemString(table, row->name, names) < 0)
+        if (!vkb_set_entry(table, row->name, name_tuple(row->spellings, row->count)))
             Py_CLEAR(table);
-        Py_XDECREF(names);
     }
     return table;
 }

@@ -12,12 +12,11 @@ PyObject *vkb_image_source(PyObject *module, PyObject *arguments);
 PyObject *vkb_scene_source(PyObject *module, PyObject *arguments);
 PyObject *vkb_read_dlpack(PyObject *module, PyObject *capsule);
 PyObject *vkb_any_plan(PyObject *module, PyObject *arguments);
-PyObject *vkb_dry_run_names(PyObject *module, PyObject *steps);
+PyObject *vkb_dry_run_steps(PyObject *module, PyObject *steps);
 
 // Methods of the Renderer.
 PyObject *vkb_renderer_plan(PyObject *renderer, PyObject *arguments);
 PyObject *vkb_renderer_run(PyObject *renderer, PyObject *arguments);
-PyObject *vkb_renderer_show(PyObject *renderer, PyObject *arguments);
 PyObject *vkb_open_screen(PyObject *renderer, PyObject *arguments);
 PyObject *vkb_close_screen(PyObject *renderer, PyObject *screen);
 PyObject *vkb_new_pages(PyObject *renderer, PyObject *size);

@@ -50,6 +50,13 @@ bool vkb_set_item(PyObject *tuple, Py_ssize_t index, PyObject *item)
     return item && PyTuple_SetItem(tuple, index, item) == 0;
 }
 
+bool vkb_set_entry(PyObject *dict, const char *name, PyObject *entry)
+{
+    const bool done = entry && PyDict_SetItemString(dict, name, entry) == 0;
+    Py_XDECREF(entry);
+    return done;
+}
+
 bool vkb_append_item(PyObject *list, PyObject *item)
 {
     const bool done = item && PyList_Append(list, item) == 0;

@@ -29,6 +29,8 @@ void vkb_dealloc(PyObject *object);
 
 // Sets an item of a new tuple, whose reference the tuple gets; false if it is NULL.
 bool vkb_set_item(PyObject *tuple, Py_ssize_t index, PyObject *item);
+// Sets an entry of a dictionary and releases it; false if it is NULL.
+bool vkb_set_entry(PyObject *dict, const char *name, PyObject *entry);
 // Appends an item to a list and releases it; false if it is NULL.
 bool vkb_append_item(PyObject *list, PyObject *item);
 

@@ -286,51 +286,17 @@ PyObject *vkb_any_plan(PyObject *module, PyObject *arguments)
     return new_plan(state, &device, variants, source, settings_object, &settings, NULL, names);
 }
 
-// The images that the pass reads, each once; returns how many.
-static uint32_t read_images(const struct vkb_pass_row *pass, uint32_t *images)
-{
-    uint32_t count = 0;
-
-    for (uint32_t i = 0; i < pass->read_count; ++i) {
-        uint32_t seen = 0;
-        while (seen < count && images[seen] != pass->reads[i])
-            ++seen;
-        if (seen == count)
-            images[count++] = pass->reads[i];
-    }
-    return count;
-}
-
 static PyObject *describe_pass(const struct vkb_graph *graph, const char *name, uint32_t index,
                                uint32_t group)
 {
     const struct vkb_pass_row *pass = &graph->passes[index];
-    uint32_t reads[VKB_MAX_READS], targets[VKB_MAX_TARGETS + 1];
-    const uint32_t read_count = read_images(pass, reads);
+    uint32_t targets[VKB_MAX_TARGETS + 1];
     const uint32_t target_count = vkb_pass_targets(pass, targets);
 
     return Py_BuildValue("(ssNNsI)", name, pass->shader->name,
-                         image_names(graph, reads, read_count),
+                         image_names(graph, pass->reads, pass->read_count),
                          image_names(graph, targets, target_count),
                          pass->variant ? pass->variant : "fragment", group);
-}
-
-// By pass, whether a group of passes that starts with it runs where nothing has run before; freed
-// by the caller. NULL with an exception set.
-static bool *mark_alone(PyObject *object)
-{
-    const struct vkb_plan *plan = &((struct vkb_plan_object *)object)->plan;
-    struct vkb_dry_run dry_run = {0};
-    struct vkb_error error = {0};
-    bool *ran = vkb_alloc(&error, plan->graph.pass_count, sizeof *ran);
-
-    if (!ran || !vkb_dry_run_step(&dry_run, plan, 0, ran, &error)) {
-        vkb_free(ran);
-        ran = NULL;
-        vkb_raise(PyType_GetModuleState(Py_TYPE(object)), &error);
-    }
-    vkb_dry_run_destroy(&dry_run);
-    return ran;
 }
 
 static bool add_group(PyObject *list, const struct vkb_graph *graph, uint32_t first, uint32_t end,
@@ -344,20 +310,33 @@ static bool add_group(PyObject *list, const struct vkb_graph *graph, uint32_t fi
     return done;
 }
 
-static PyObject *get_passes(PyObject *object, void *unused)
+PyObject *vkb_passes_that_run(const struct vkb_module_state *state, struct vkb_dry_run *dry_run,
+                              const struct vkb_plan *plan, uint64_t source)
 {
-    const struct vkb_graph *graph = &((struct vkb_plan_object *)object)->plan.graph;
-    bool *ran = mark_alone(object);
-    PyObject *list = ran ? PyList_New(0) : NULL;
+    const struct vkb_graph *graph = &plan->graph;
+    struct vkb_error error = {0};
+    bool *ran = vkb_alloc(&error, graph->pass_count, sizeof *ran);
+    const bool done = ran && vkb_dry_run_step(dry_run, plan, source, ran, &error);
+    PyObject *list = done ? PyList_New(0) : vkb_raise(state, &error);
     uint32_t group = 0;
 
-    (void)unused;
     for (uint32_t first = 0, end; list && first < graph->pass_count; first = end) {
         end = vkb_graph_group_end(graph, first);
         if (ran[first] && !add_group(list, graph, first, end, group++))
             Py_CLEAR(list);
     }
     vkb_free(ran);
+    return list;
+}
+
+static PyObject *get_passes(PyObject *object, void *unused)
+{
+    struct vkb_dry_run dry_run = {0};
+
+    (void)unused;
+    PyObject *list = vkb_passes_that_run(PyType_GetModuleState(Py_TYPE(object)), &dry_run,
+                                         &((struct vkb_plan_object *)object)->plan, 0);
+    vkb_dry_run_destroy(&dry_run);
     return list;
 }
 
@@ -382,10 +361,8 @@ static PyObject *shares_images(PyObject *object, PyObject *other)
 
 static PyObject *is_of_image(PyObject *object, PyObject *other)
 {
-    const struct vkb_source *source = &((struct vkb_source_object *)other)->source;
-
-    return PyBool_FromLong(source->kind == VKB_SOURCE_IMAGE
-                           && vkb_source_fits(&((struct vkb_plan_object *)object)->source, source));
+    return PyBool_FromLong(vkb_source_fits(&((struct vkb_plan_object *)object)->source,
+                                           &((struct vkb_source_object *)other)->source));
 }
 
 static int traverse(PyObject *object, visitproc visit, void *arg)

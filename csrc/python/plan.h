@@ -2,6 +2,7 @@
 #ifndef VKB_PYTHON_PLAN_H
 #define VKB_PYTHON_PLAN_H
 
+#include "graph/dry_run.h"
 #include "python/arguments.h"
 #include "python/renderer.h"
 
@@ -27,6 +28,11 @@ struct vkb_plan_object {
     Py_buffer kernel, dirt;
     struct vkb_held_passes passes;
 };
+
+// A list of (name, shader, reads, writes, variant, number of its render pass) of the passes that
+// the next step of a sequence runs.
+PyObject *vkb_passes_that_run(const struct vkb_module_state *state, struct vkb_dry_run *dry_run,
+                              const struct vkb_plan *plan, uint64_t source);
 
 // Size in bytes of an output in the caller's array.
 size_t vkb_output_size(const struct vkb_plan *plan, uint32_t output);

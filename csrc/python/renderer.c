@@ -283,10 +283,11 @@ static PyMethodDef methods[] = {
      "are the source's levels: of the derivatives by images or, with `sums`, by fields "
      "(methods/adjoint.h); None if a pass has no adjoint."},
     {"run", vkb_renderer_run, METH_VARARGS,
-     "run(source, plans, arrays, in_place=False) -> Submission. Submits plans with the same "
-     "images; arrays has a tuple for each plan, in the order of its outputs. `in_place`: the "
+     "run(source, plans, arrays, in_place=False, show=...) -> Submission. Submits plans with the "
+     "same images; arrays has a tuple for each plan, in the order of its outputs. `in_place`: the "
      "source does not change before the end of the wait, so that the device may read it where it "
-     "is."},
+     "is. `show`: (screen, width, height, linear) presents the only output on a screen, of that "
+     "size if it has none of its own; `linear`: encoded as sRGB. None: the surface has no image."},
     {"upload", vkb_renderer_upload, METH_VARARGS,
      "upload(source, spare, recycled) -> Source. A copy of an image on the device. "
      "`spare`: None, or such a source that nobody needs any more, whose memory it takes; "
@@ -296,10 +297,6 @@ static PyMethodDef methods[] = {
      "a window."},
     {"close_screen", vkb_close_screen, METH_O,
      "close_screen(screen). Waits for the device and destroys the surface, if it is still there."},
-    {"show", vkb_renderer_show, METH_VARARGS,
-     "show(source, plan, screen, width, height, linear) -> Submission, or None: the surface has no "
-     "image. Presents the plan's only output on a screen, of that size if it has none of its own; "
-     "`linear`: encoded as sRGB."},
     {"pages", vkb_new_pages, METH_O,
      "pages(size) -> Pages. Memory for an array; reused when the array is gone."},
     {"cuda", vkb_renderer_cuda, METH_NOARGS,

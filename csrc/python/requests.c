@@ -157,70 +157,49 @@ static bool submit(struct vkb_renderer *renderer, const struct vkb_source_object
     return done;
 }
 
-static PyObject *run(struct vkb_renderer *renderer, PyObject *source, PyObject *plans,
-                     PyObject *arrays, bool in_place, struct vkb_show *show)
-{
-    struct vkb_source_object *given = (struct vkb_source_object *)source;
-    struct vkb_error error = {0};
-
-    if (!vkb_check_source(renderer, given))
-        return NULL;
-    struct submission *self = new_submission(renderer, source, plans, arrays);
-    if (self && !submit(renderer, given, self->pending, in_place, show, &error)) {
-        vkb_raise(state_of((PyObject *)renderer), &error);
-        Py_CLEAR(self);
-    }
-    return (PyObject *)self;
-}
-
 PyObject *vkb_renderer_run(PyObject *object, PyObject *arguments)
 {
     struct vkb_renderer *renderer = (struct vkb_renderer *)object;
     struct vkb_module_state *state = state_of(object);
+    const bool shows = PyTuple_Size(arguments) > 4;
     PyObject *source, *plans, *arrays;
-    int in_place = false;
-
-    if (!PyArg_ParseTuple(arguments, "O!O!O!|p:run", state->source_type, &source, &PyTuple_Type,
-                          &plans, &PyTuple_Type, &arrays, &in_place))
-        return NULL;
-    return run(renderer, source, plans, arrays, in_place, NULL);
-}
-
-PyObject *vkb_renderer_show(PyObject *object, PyObject *arguments)
-{
-    struct vkb_renderer *renderer = (struct vkb_renderer *)object;
-    struct vkb_module_state *state = state_of(object);
-    PyObject *source, *plan;
-    unsigned long long screen;
+    unsigned long long screen = 0;
+    int in_place = false, linear = false;
     struct vkb_show show = {0};
-    int linear;
+    struct vkb_error error = {0};
 
-    if (!PyArg_ParseTuple(arguments, "O!O!KIIp:show", state->source_type, &source, state->plan_type,
-                          &plan, &screen, &show.extent.width, &show.extent.height, &linear))
+    if (!PyArg_ParseTuple(arguments, "O!O!O!|p(KIIp):run", state->source_type, &source,
+                          &PyTuple_Type, &plans, &PyTuple_Type, &arrays, &in_place, &screen,
+                          &show.extent.width, &show.extent.height, &linear))
         return NULL;
     show.screen = (struct vkb_screen *)(uintptr_t)screen;
     show.linear = linear;
-    PyObject *plans = PyTuple_Pack(1, plan);
-    PyObject *arrays = Py_BuildValue("((O))", Py_None);
-    PyObject *submission =
-        plans && arrays ? run(renderer, source, plans, arrays, false, &show) : NULL;
-    Py_XDECREF(plans);
-    Py_XDECREF(arrays);
-    if (!submission || show.acquired)
-        return submission;
-    Py_DECREF(submission);
-    Py_RETURN_NONE;
+    struct vkb_source_object *given = (struct vkb_source_object *)source;
+    if (!vkb_check_source(renderer, given))
+        return NULL;
+    struct submission *self = new_submission(renderer, source, plans, arrays);
+    if (!self)
+        return NULL;
+    const bool done =
+        submit(renderer, given, self->pending, in_place, shows ? &show : NULL, &error);
+    if (done && (!shows || show.acquired))
+        return (PyObject *)self;
+    Py_DECREF(self);
+    return done ? Py_NewRef(Py_None) : vkb_raise(state, &error);
 }
 
+// Timings with the same name are steps of one pass.
 static PyObject *timing_dict(const struct vkb_request *request)
 {
     PyObject *dict = PyDict_New();
 
     for (uint32_t i = 0; dict && i < request->timing_count; ++i) {
-        PyObject *number = PyFloat_FromDouble(request->timings[i].seconds);
-        if (!number || PyDict_SetItemString(dict, request->timings[i].name, number) < 0)
+        const struct vkb_timing *timing = &request->timings[i];
+        PyObject *before = PyDict_GetItemString(dict, timing->name);
+        if (!vkb_set_entry(
+                dict, timing->name,
+                PyFloat_FromDouble(timing->seconds + (before ? PyFloat_AsDouble(before) : 0.0))))
             Py_CLEAR(dict);
-        Py_XDECREF(number);
     }
     return dict;
 }

@@ -87,6 +87,26 @@ static bool load_mesh(const struct vkb_device *device, VkCommandBuffer commands,
         && load_surfaces(device, commands, staging, data, mesh, error);
 }
 
+static bool load_texture(const struct vkb_device *device, VkCommandBuffer commands,
+                         struct vkb_staging *staging, const struct vkb_texture_data *data,
+                         struct vkb_texture *texture, struct vkb_error *error)
+{
+    return VK(error, device->vk.vkCreateSampler(device->handle,
+                                                &(VkSamplerCreateInfo){
+                                                    .sType = VK_STRUCTURE_TYPE_SAMPLER_CREATE_INFO,
+                                                    .magFilter = data->mag_filter,
+                                                    .minFilter = data->min_filter,
+                                                    .mipmapMode = data->mipmap_filter,
+                                                    .addressModeU = data->address_modes[0],
+                                                    .addressModeV = data->address_modes[1],
+                                                    .addressModeW = VK_SAMPLER_ADDRESS_MODE_REPEAT,
+                                                    .maxLod = VK_LOD_CLAMP_NONE,
+                                                },
+                                                NULL, &texture->sampler))
+        && vkb_staging_load_picture(device, commands, staging, "texture", &data->picture,
+                                    &texture->image, error);
+}
+
 static bool load_textures(const struct vkb_device *device, VkCommandBuffer commands,
                           struct vkb_staging *staging, const struct vkb_scene_data *data,
                           struct vkb_scene *scene, struct vkb_error *error)
@@ -98,8 +118,8 @@ static bool load_textures(const struct vkb_device *device, VkCommandBuffer comma
         return false;
     scene->texture_count = data->texture_count;
     for (uint32_t i = 0; i < data->texture_count; ++i)
-        if (!vkb_texture_load(device, commands, staging, &data->textures[i], &scene->textures[i],
-                              error))
+        if (!load_texture(device, commands, staging, &data->textures[i], &scene->textures[i],
+                          error))
             return false;
     return true;
 }
@@ -144,6 +164,12 @@ static void destroy_mesh(const struct vkb_device *device, struct vkb_mesh *mesh)
     vkb_free(mesh->surfaces);
 }
 
+static void destroy_texture(const struct vkb_device *device, struct vkb_texture *texture)
+{
+    device->vk.vkDestroySampler(device->handle, texture->sampler, NULL);
+    vkb_image_destroy(device, &texture->image);
+}
+
 void vkb_scene_destroy(const struct vkb_device *device, struct vkb_scene *scene)
 {
     vkb_buffer_destroy(device, &scene->staging.buffer);
@@ -151,7 +177,7 @@ void vkb_scene_destroy(const struct vkb_device *device, struct vkb_scene *scene)
     destroy_mesh(device, &scene->glow);
     vkb_image_destroy(device, &scene->sky);
     for (uint32_t i = 0; i < scene->texture_count; ++i)
-        vkb_texture_destroy(device, &scene->textures[i]);
+        destroy_texture(device, &scene->textures[i]);
     vkb_free(scene->textures);
     *scene = (struct vkb_scene){0};
 }

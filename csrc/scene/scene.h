@@ -3,8 +3,8 @@
 #define VKB_SCENE_H
 
 #include "graph/params.h"
-#include "scene/texture.h"
 #include "vulkan/commands.h"
+#include "vulkan/staging.h"
 
 // The vertex layout on the device, tightly packed. The fourth numbers are the emission.
 struct vkb_vertex {
@@ -36,6 +36,19 @@ struct vkb_mesh_data {
     const uint32_t *indices;
     const struct vkb_surface *surfaces;
     uint32_t vertex_count, index_count, surface_count;
+};
+
+// Textures of meshes, each with its own sampler.
+struct vkb_texture_data {
+    struct vkb_picture_data picture;
+    VkSamplerAddressMode address_modes[2];  // horizontal, vertical
+    VkFilter mag_filter, min_filter;
+    VkSamplerMipmapMode mipmap_filter;
+};
+
+struct vkb_texture {
+    struct vkb_image image;
+    VkSampler sampler;
 };
 
 struct vkb_scene_data {

@@ -402,9 +402,14 @@ static bool copy(struct vkb_cuda *cuda, vkb_cuda_address to, vkb_cuda_address fr
 bool vkb_cuda_copy(struct vkb_cuda *cuda, vkb_cuda_address to, vkb_cuda_address from, size_t size,
                    struct vkb_error *error)
 {
-    return enter_streams(cuda, NULL, error)
-        && leave(cuda, copy(cuda, to, from, size, error)
-                           && CU(error, cuda->cuStreamSynchronize(cuda->stream)));
+    if (!enter_streams(cuda, NULL, error))
+        return false;
+    const bool begun = copy(cuda, to, from, size, error);
+    const bool done = begun && CU(error, cuda->cuStreamSynchronize(cuda->stream));
+    // The first wait may have failed for lack of memory. The caller frees the host's memory now.
+    if (begun && !done)
+        cuda->cuStreamSynchronize(cuda->stream);
+    return leave(cuda, done);
 }
 
 bool vkb_cuda_begin_copy(struct vkb_cuda *cuda, struct vkb_cuda_memory *to, vkb_cuda_address from,

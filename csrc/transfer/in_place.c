@@ -38,24 +38,25 @@ bool vkb_in_place_stage(const struct vkb_device *device, struct vkb_in_place *pl
 {
     const size_t size = row_size(input) * input->height;
     struct counting counting = {.input = input};
-    const struct vkb_borrowed borrowed = {
+    struct vkb_image image = {
         .format = input->format,
         .width = input->width,
         .height = input->height,
         .channels = input->channels,
-        .memory = input->memory,
-        .row_size = row_size(input),
+        // Passes only read it.
+        .mapped = (void *)(uintptr_t)input->memory,
         .row_pitch = (size_t)input->row_stride,
     };
 
     if (!device->linear_texels || size < VKB_IMPORTED_BYTES || input->memory == place->memory
-        || !has_words(device, input) || !vkb_image_borrow(device, &borrowed, &place->cached.image))
+        || !has_words(device, input) || !vkb_image_borrow(device, row_size(input), &image))
         return false;
     vkb_in_parts(device->workers, count_part, NULL, &counting, 0, input->height, size);
     place->non_finite = (struct vkb_non_finite){0};
     for (int part = 0; part < VKB_MAX_PARTS; ++part)
         vkb_add_non_finite(&place->non_finite, counting.sums[part]);
     place->memory = input->memory;
+    place->cached.image = image;
     place->cached.content.version = ++*clock;
     place->cached.content.valid = true;
     return true;

@@ -18,18 +18,17 @@ struct vkb_image_row vkb_run_row(const struct vkb_run *run, uint32_t image)
 
 bool vkb_run_resolve(struct vkb_run *run, uint32_t image, struct vkb_error *error)
 {
-    const struct vkb_image_row wanted = vkb_run_row(run, image), *row = &wanted;
+    const struct vkb_image_row row = vkb_run_row(run, image);
     struct vkb_image_cache *cache = &run->frame->cache;
-    struct vkb_cached_image *cached;
+    struct vkb_cached_image *cached = run->inputs[row.input].image;
 
-    if (run->inputs[row->input].image) {
-        vkb_run_set_image(run, image, run->inputs[row->input].image);
-        return true;
-    }
-    if ((vkb_image_cache_replaces(cache, row)
-         && !vkb_submissions_wait(run->device, &run->frame->submissions, error))
-        || !vkb_image_cache_resolve(run->device, cache, row, &cached, error))
+    if (!cached)
+        cached = vkb_image_cache_find(cache, &row);
+    if (!cached
+        && (!vkb_submissions_wait(run->device, &run->frame->submissions, error)
+            || !(cached = vkb_image_cache_add(run->device, cache, &row, error))))
         return false;
+    cached->used = cache->now;
     vkb_run_set_image(run, image, cached);
     return true;
 }
@@ -131,7 +130,6 @@ static bool stage_exported(struct vkb_run *run, const struct pixels *pixels, boo
 {
     const struct vkb_input *input = pixels->source->inputs[pixels->kind];
     struct vkb_staged_input *staged = &run->inputs[pixels->kind];
-    uint64_t *held = &run->frame->exported[pixels->kind];
 
     *taken = input && input->exported;
     if (!*taken)
@@ -142,15 +140,12 @@ static bool stage_exported(struct vkb_run *run, const struct pixels *pixels, boo
     vkb_export_wait(input->exported, &run->sync.waits[VKB_EXTERNAL_CUDA]);
     staged->image = run->images[pixels->image];
     staged->input = input;
-    staged->send = *held != input->serial || !staged->image->content.valid;
+    staged->send =
+        !vkb_content_holds(&staged->image->content, &input->serial, sizeof input->serial);
     run->unknown_non_finite = true;
-    if (!staged->send)
-        return true;
-    // The image no longer has the pixels of the host with which the next ones would be compared.
-    vkb_upload_forget(&run->frame->uploads[pixels->kind]);
-    *held = input->serial;
-    return vkb_content_begin_writing(&staged->image->content, &run->frame->cache.clock, NULL, 0,
-                                     error);
+    return !staged->send
+        || vkb_content_begin_writing(&staged->image->content, &run->frame->cache.clock,
+                                     &input->serial, sizeof input->serial, error);
 }
 
 // Stages the image if the device does not have it yet.
@@ -164,17 +159,17 @@ static bool stage_upload(struct vkb_run *run, const struct pixels *pixels, bool 
     *taken = true;
     if (!vkb_run_resolve(run, pixels->image, error))
         return false;
-    run->frame->exported[pixels->kind] = 0;
     struct vkb_cached_image *image = run->images[pixels->image];
-    // If the last write did not reach the image, there is no content to compare with.
-    if (image->image.mapped && !image->content.valid)
+    // What an upload has written has no recipe. Otherwise there is no content to compare with.
+    const bool held = vkb_content_holds(&image->content, NULL, 0);
+    if (!held)
         vkb_upload_forget(upload);
     if (!vkb_upload_stage(run->device, upload, &run->frame->submissions, run->submission->number,
                           pixels->source->inputs[pixels->kind], &image->image, &changed, error))
         return false;
     staged->image = image;
     staged->upload = upload;
-    staged->send = changed || !image->content.valid;
+    staged->send = changed;
     vkb_add_non_finite(&run->frame->non_finite, upload->non_finite);
     return !staged->send
         || vkb_content_begin_writing(&image->content, &run->frame->cache.clock, NULL, 0, error);

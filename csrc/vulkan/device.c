@@ -136,9 +136,11 @@ static bool create_logical(struct vkb_device *device, struct vkb_error *error)
         return false;
     vk->vkGetPhysicalDeviceFeatures2(device->adapter.physical, &available2);
     device->dispatch = available->shaderStorageImageWriteWithoutFormat;
+    // Of the drivers for CPUs, llvmpipe alone does with linear tiling all that it does with optimal
+    // tiling.
     device->linear_texels = device->adapter.device_type == VK_PHYSICAL_DEVICE_TYPE_CPU
-                         && device->dispatch && available->shaderInt64
-                         && available12.scalarBlockLayout;
+                         && device->adapter.driver_id == VK_DRIVER_ID_MESA_LLVMPIPE
+                         && available->shaderInt64 && available12.scalarBlockLayout;
     VkPhysicalDeviceVulkan13Features vulkan13 = {
         .sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_3_FEATURES,
         .dynamicRendering = VK_TRUE,
@@ -204,72 +206,6 @@ static void read_properties(struct vkb_device *device)
     }
 }
 
-// Whether images of the format can do with linear tiling all that they can do with optimal tiling.
-static bool is_linear(const struct vkb_device *device, VkFormat format)
-{
-    const VkFormatFeatureFlags used =
-        VK_FORMAT_FEATURE_SAMPLED_IMAGE_BIT | VK_FORMAT_FEATURE_SAMPLED_IMAGE_FILTER_LINEAR_BIT
-        | VK_FORMAT_FEATURE_STORAGE_IMAGE_BIT | VK_FORMAT_FEATURE_COLOR_ATTACHMENT_BIT
-        | VK_FORMAT_FEATURE_COLOR_ATTACHMENT_BLEND_BIT;
-    const VkImageUsageFlags usage = VK_IMAGE_USAGE_TRANSFER_SRC_BIT
-                                  | VK_IMAGE_USAGE_TRANSFER_DST_BIT | VK_IMAGE_USAGE_SAMPLED_BIT
-                                  | VK_IMAGE_USAGE_COLOR_ATTACHMENT_BIT
-                                  | VK_IMAGE_USAGE_STORAGE_BIT;
-    const struct vkb_instance_table *vk = &device->instance->vk;
-    VkFormatProperties properties;
-    VkImageFormatProperties limits;
-
-    vk->vkGetPhysicalDeviceFormatProperties(device->adapter.physical, format, &properties);
-    return (properties.linearTilingFeatures & used) == (properties.optimalTilingFeatures & used)
-        && VK_RESULT(vk->vkGetPhysicalDeviceImageFormatProperties(
-               device->adapter.physical, format, VK_IMAGE_TYPE_2D, VK_IMAGE_TILING_LINEAR, usage, 0,
-               &limits))
-               == VK_SUCCESS
-        && limits.maxExtent.width >= device->max_side
-        && limits.maxExtent.height >= device->max_side;
-}
-
-// Whether the row pitch of linear images is a multiple of what variants store at once.
-static bool has_whole_words(const struct vkb_device *device)
-{
-    VkSubresourceLayout layout;
-    VkImage image;
-
-    if (VK_RESULT(device->vk.vkCreateImage(device->handle,
-                                           &(VkImageCreateInfo){
-                                               .sType = VK_STRUCTURE_TYPE_IMAGE_CREATE_INFO,
-                                               .imageType = VK_IMAGE_TYPE_2D,
-                                               .format = vkb_formats[VKB_FORMAT_RGBA8_UNORM].vk,
-                                               .extent = {1, 1, 1},
-                                               .mipLevels = 1,
-                                               .arrayLayers = 1,
-                                               .samples = VK_SAMPLE_COUNT_1_BIT,
-                                               .tiling = VK_IMAGE_TILING_LINEAR,
-                                               .usage = VK_IMAGE_USAGE_STORAGE_BIT,
-                                           },
-                                           NULL, &image))
-        != VK_SUCCESS)
-        return false;
-    device->vk.vkGetImageSubresourceLayout(
-        device->handle, image, &(VkImageSubresource){.aspectMask = VK_IMAGE_ASPECT_COLOR_BIT},
-        &layout);
-    device->vk.vkDestroyImage(device->handle, image, NULL);
-    return layout.offset == 0 && layout.rowPitch % VKB_STORE_SIZE == 0;
-}
-
-static bool has_linear_texels(const struct vkb_device *device)
-{
-    VkFormatProperties properties;
-
-    for (int format = VKB_FORMAT_NONE + 1; format < VKB_FORMAT_COUNT; ++format)
-        if (format != VKB_FORMAT_DEPTH32_FLOAT && !is_linear(device, vkb_formats[format].vk))
-            return false;
-    device->instance->vk.vkGetPhysicalDeviceFormatProperties(device->adapter.physical,
-                                                             VKB_WORD_FORMAT, &properties);
-    return (properties.bufferFeatures & VK_FORMAT_FEATURE_UNIFORM_TEXEL_BUFFER_BIT)
-        && has_whole_words(device);
-}
-
 // Whether compute shaders can write images of every format. (Drawing must do elsewhere.)
 static bool stores_all(const struct vkb_device *device)
 {
@@ -284,20 +220,28 @@ static bool stores_all(const struct vkb_device *device)
 // A thread of lavapipe with memory for its allocations, twice.
 enum { DEVICE_MIB = 192 };
 
-static bool open_adapter(struct vkb_device *device, uint32_t number, const char *driver,
-                         bool validation, struct vkb_error *error)
+static bool find_adapter(struct vkb_device *device, uint32_t number, struct vkb_error *error)
 {
     struct vkb_adapter_info adapters[VKB_MAX_ADAPTERS];
     uint32_t count;
 
-    if (!(device->instance = vkb_instance_open(driver, validation, error))
-        || !vkb_adapters_list(device->instance, adapters, &count, error))
+    if (!vkb_adapters_list(device->instance, adapters, &count, error))
         return false;
     if (number >= count)
         return vkb_fail(error, VKB_ERROR_ADAPTER_NOT_FOUND,
                         "no Vulkan adapter %u: there are %u. %s", number, count, vkb_install_hint);
     device->adapter = adapters[number];
     return true;
+}
+
+static bool open_adapter(struct vkb_device *device, uint32_t number, const char *driver,
+                         bool validation, struct vkb_error *error)
+{
+    if (!(device->instance = vkb_instance_open(driver, validation, error))
+        || !find_adapter(device, number, error))
+        return false;
+    return device->adapter.driver_id != VK_DRIVER_ID_MESA_LLVMPIPE
+        || (vkb_instance_claim(&device->instance, error) && find_adapter(device, number, error));
 }
 
 static bool create_handle(struct vkb_device *device, uint32_t adapter, const char *driver,
@@ -315,7 +259,7 @@ static bool create_handle(struct vkb_device *device, uint32_t adapter, const cha
     device->vk.vkGetDeviceQueue(device->handle, device->adapter.queue_family, 0, &device->queue);
     read_properties(device);
     device->dispatch = device->dispatch && stores_all(device);
-    device->linear_texels = device->linear_texels && device->dispatch && has_linear_texels(device);
+    device->linear_texels = device->linear_texels && device->dispatch;
     return true;
 }
 

@@ -1,6 +1,5 @@
 #include "vulkan/instance.h"
 
-#include "vulkan/driver.h"
 #include "vulkan/messages.h"
 #include "vulkan/parts.h"
 #include "vulkan/process.h"
@@ -9,14 +8,14 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include <dlfcn.h>
+
 #define VALIDATION_LAYER "VK_LAYER_KHRONOS_validation"
 
 const char vkb_install_hint[] =
     "For a driver that runs on any CPU, install the package vkbloom-lavapipe, or on Debian or "
     "Ubuntu: apt install libvulkan1 mesa-vulkan-drivers; for a GPU, install its vendor's Vulkan "
     "driver. `vkbloom doctor` tells more.";
-
-enum { MAX_INSTANCES = 8 };
 
 // Of address space. The loader loads the libraries of all drivers; lavapipe's, with LLVM, takes
 // 400 MiB.
@@ -34,7 +33,7 @@ static size_t driver_mib(bool lavapipe)
 }
 
 static struct vkb_lock lock;  // protects the instances and volk's globals
-static struct vkb_instance instances[MAX_INSTANCES];
+static struct vkb_instance *instances;
 static bool loader_open;
 // Whether this process was forked from one with an instance. At exit Mesa (22.3.6) waits for the
 // driver threads of the parent, which do not exist here. It mistakes threads of the child for them
@@ -74,13 +73,47 @@ static bool check_created(VkResult result, bool direct, struct vkb_error *error)
     return false;
 }
 
+// Drivers keep the lowest version that was ever negotiated, and a loader opens a single driver
+// (VK_LUNARG_direct_driver_loading, for validation) of version 7 alone.
+enum { INTERFACE_VERSION = 7 };
+
+typedef VkResult(VKAPI_PTR *negotiate_function)(uint32_t *version);
+
+// The function that gives a driver's others, which is entered without the loader, by the interface
+// that the loader uses; NULL on failure. The library stays open.
+// Source: the Vulkan loader's documentation, LoaderDriverInterface.md.
+static PFN_vkGetInstanceProcAddr open_driver(const char *path, struct vkb_error *error)
+{
+    uint32_t version = INTERFACE_VERSION;
+    void *library = dlopen(path, RTLD_NOW | RTLD_LOCAL);
+
+    if (!library) {
+        const char *reason = dlerror();
+        vkb_fail(error, VKB_ERROR_ADAPTER_NOT_FOUND, "the driver %s does not open: %s", path,
+                 reason ? reason : "no reason is given");
+        return NULL;
+    }
+    negotiate_function negotiate =
+        (negotiate_function)dlsym(library, "vk_icdNegotiateLoaderICDInterfaceVersion");
+    PFN_vkGetInstanceProcAddr get =
+        (PFN_vkGetInstanceProcAddr)dlsym(library, "vk_icdGetInstanceProcAddr");
+    if (!negotiate || !get) {
+        vkb_fail(error, VKB_ERROR_ADAPTER_NOT_FOUND,
+                 "%s is no Vulkan driver: it lacks vk_icdGetInstanceProcAddr or "
+                 "vk_icdNegotiateLoaderICDInterfaceVersion",
+                 path);
+        return NULL;
+    }
+    return VK(error, negotiate(&version)) ? get : NULL;
+}
+
 // Finds the functions that need no instance: those of the loader, or without validation those of
 // the driver itself.
 static bool open_source(struct vkb_instance *instance, PFN_vkGetInstanceProcAddr *driver,
                         struct vkb_error *error)
 {
     *driver = NULL;
-    if (instance->driver[0] && !(*driver = vkb_driver_open(instance->driver, error)))
+    if (instance->driver[0] && !(*driver = open_driver(instance->driver, error)))
         return false;
     if (*driver && !instance->validation) {
         instance->get = *driver;
@@ -229,7 +262,8 @@ static void destroy_instance(struct vkb_instance *instance)
         instance->vk.vkDestroyDebugUtilsMessengerEXT(instance->handle, instance->messenger, NULL);
     if (instance->handle)
         instance->vk.vkDestroyInstance(instance->handle, NULL);
-    *instance = (struct vkb_instance){0};
+    instance->messenger = VK_NULL_HANDLE;
+    instance->handle = VK_NULL_HANDLE;
 }
 
 static bool create_instance(struct vkb_instance *instance, const char *driver, bool validation,
@@ -248,6 +282,7 @@ static bool create_instance(struct vkb_instance *instance, const char *driver, b
     *instance = (struct vkb_instance){
         .validation = validation,
         .process = vkb_current_process(),
+        .next = instance->next,
     };
     if (strlen(driver) >= sizeof instance->driver)
         return vkb_fail(error, VKB_ERROR_GENERAL, "the driver's path is longer than %zu bytes",
@@ -268,47 +303,74 @@ static bool create_instance(struct vkb_instance *instance, const char *driver, b
     return false;
 }
 
-// The instance of that kind, or a free place for it; NULL where all are taken.
-static struct vkb_instance *find_instance(const char *driver, bool validation)
+// Finds or creates an instance of this process. Handles of another process, and those of failed
+// calls, are 0. Called with the lock.
+static struct vkb_instance *get_instance(const char *driver, bool validation, bool unclaimed,
+                                         struct vkb_error *error)
 {
-    struct vkb_instance *free = NULL;
+    const long process = vkb_current_process();
+    struct vkb_instance *empty = NULL;
 
-    for (size_t i = 0; i < MAX_INSTANCES; ++i) {
-        struct vkb_instance *instance = &instances[i];
+    for (struct vkb_instance *instance = instances; instance; instance = instance->next) {
+        forked |= instance->process != process;
+        if (instance->process != process)
+            continue;
         if (!instance->handle)
-            free = instance;
-        else if (instance->validation == validation && strcmp(instance->driver, driver) == 0)
+            empty = instance;
+        else if (instance->validation == validation && strcmp(instance->driver, driver) == 0
+                 && !(unclaimed && instance->claimed))
             return instance;
     }
-    return free;
+    if (!empty) {
+        if (!(empty = vkb_alloc(error, 1, sizeof *empty)))
+            return NULL;
+        empty->process = process;
+        empty->next = instances;
+        instances = empty;
+    }
+    return create_instance(empty, driver, validation, error) ? empty : NULL;
 }
 
 struct vkb_instance *vkb_instance_open(const char *driver, bool validation, struct vkb_error *error)
 {
-    const long process = vkb_current_process();
-
     vkb_lock_acquire(&lock);
-    for (size_t i = 0; i < MAX_INSTANCES; ++i)
-        if (instances[i].handle && instances[i].process != process) {
-            instances[i] = (struct vkb_instance){0};
-            forked = true;
-        }
-    struct vkb_instance *instance = find_instance(driver, validation);
-    const bool done = instance
-                        ? instance->handle || create_instance(instance, driver, validation, error)
-                        : vkb_fail(error, VKB_ERROR_GENERAL,
-                                   "%s: this process has opened too many drivers", driver);
-    if (done)
+    struct vkb_instance *instance = get_instance(driver, validation, false, error);
+    if (instance)
         ++instance->users;
     vkb_lock_release(&lock);
-    return done ? instance : NULL;
+    return instance;
+}
+
+static void leave_instance(struct vkb_instance *instance)
+{
+    if (--instance->users > 0)
+        return;
+    instance->claimed = false;
+    if (forked)
+        destroy_instance(instance);
+}
+
+bool vkb_instance_claim(struct vkb_instance **instance, struct vkb_error *error)
+{
+    struct vkb_instance *shared = *instance;
+
+    vkb_lock_acquire(&lock);
+    struct vkb_instance *own = shared;
+    if (shared->claimed && (own = get_instance(shared->driver, shared->validation, true, error))) {
+        ++own->users;
+        leave_instance(shared);
+        *instance = own;
+    }
+    if (own)
+        own->claimed = true;
+    vkb_lock_release(&lock);
+    return own != NULL;
 }
 
 void vkb_instance_close(struct vkb_instance *instance)
 {
     vkb_lock_acquire(&lock);
-    if (--instance->users == 0 && forked)
-        destroy_instance(instance);
+    leave_instance(instance);
     vkb_lock_release(&lock);
 }
 
@@ -320,11 +382,12 @@ bool vkb_instance_require_room(const struct vkb_instance *instance, bool lavapip
 
 void vkb_instance_explain(struct vkb_error *error)
 {
+    const long process = vkb_current_process();
     size_t users = 0;
 
     vkb_lock_acquire(&lock);
-    for (size_t i = 0; i < MAX_INSTANCES; ++i)
-        users += instances[i].handle ? instances[i].users : 0;
+    for (const struct vkb_instance *instance = instances; instance; instance = instance->next)
+        users += instance->handle && instance->process == process ? instance->users : 0;
     if (strcmp(error->call, "vkCreateDevice") == 0)
         vkb_add_words(error,
                       ". Renderers open in this process: %zu. Drivers limit their number (NVIDIA's "
@@ -352,8 +415,12 @@ void vkb_instance_load_device(const struct vkb_instance *instance, VkDevice devi
 void vkb_fault_forget_instances(void)
 {
     vkb_lock_acquire(&lock);
-    for (size_t i = 0; i < MAX_INSTANCES; ++i)
-        destroy_instance(&instances[i]);
+    while (instances) {
+        struct vkb_instance *instance = instances;
+        instances = instance->next;
+        destroy_instance(instance);
+        vkb_free(instance);
+    }
     loader_open = false;
     vkb_lock_release(&lock);
 }

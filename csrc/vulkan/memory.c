@@ -401,30 +401,19 @@ bool vkb_image_linear_texels(const struct vkb_device *device, struct vkb_image *
         || create_linear_texels(device, image, 0, image->row_pitch * image->height, error);
 }
 
-bool vkb_image_borrow(const struct vkb_device *device, const struct vkb_borrowed *borrowed,
-                      struct vkb_image *image)
+bool vkb_image_borrow(const struct vkb_device *device, size_t row_size, struct vkb_image *image)
 {
-    const size_t size = borrowed->row_pitch * (borrowed->height - 1) + borrowed->row_size;
-    // Passes only read it.
-    void *memory = (void *)(uintptr_t)borrowed->memory;
+    const size_t size = image->row_pitch * (image->height - 1) + row_size;
     struct vkb_buffer buffer;
     struct vkb_error ignored;
     VkDeviceSize offset;
 
-    *image = (struct vkb_image){0};
-    if (!vkb_buffer_import(device, vkb_device_import_usage(device), memory, size, &buffer, &offset))
+    if (!vkb_buffer_import(device, vkb_device_import_usage(device), image->mapped, size, &buffer,
+                           &offset))
         return false;
-    *image = (struct vkb_image){
-        .memory = buffer.memory,
-        .format = borrowed->format,
-        .width = borrowed->width,
-        .height = borrowed->height,
-        .access = VKB_ACCESS_DISPATCH_LOADED,
-        .channels = borrowed->channels,
-        .mapped = memory,
-        .row_pitch = borrowed->row_pitch,
-        .buffer = buffer.handle,
-    };
+    image->memory = buffer.memory;
+    image->buffer = buffer.handle;
+    image->access = VKB_ACCESS_DISPATCH_LOADED;
     if (offset % device->limits.minTexelBufferOffsetAlignment == 0
         && create_linear_texels(device, image, offset, size, &ignored))
         return true;
@@ -470,6 +459,10 @@ static bool create_image_buffer(const struct vkb_device *device, struct vkb_imag
         device->handle, image->handle,
         &(VkImageSubresource){.aspectMask = vkb_formats[image->format].aspect}, &layout);
     image->row_pitch = (size_t)layout.rowPitch;
+    // What variants store at once.
+    if (layout.offset || image->row_pitch % VKB_STORE_SIZE)
+        return vkb_fail(error, VKB_ERROR_GENERAL,
+                        "rows of images begin at no multiples of %d bytes", VKB_STORE_SIZE);
     if (!create_buffer(device,
                        VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT | VK_BUFFER_USAGE_STORAGE_BUFFER_BIT
                            | VK_BUFFER_USAGE_TRANSFER_SRC_BIT,

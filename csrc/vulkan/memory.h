@@ -91,18 +91,10 @@ bool vkb_image_create(const struct vkb_device *device, const struct vkb_image_sp
                       struct vkb_image *image, struct vkb_error *error);
 void vkb_image_destroy(const struct vkb_device *device, struct vkb_image *image);
 
-// Pixels of the caller, row by row.
-struct vkb_borrowed {
-    enum vkb_format format;
-    uint32_t width, height, channels;
-    size_t row_size, row_pitch;  // multiples of VKB_WORD_SIZE
-    const void *memory;
-};
-
-// Creates a mapped image over the caller's memory, whose words passes can read, and nothing else.
-// False without an error if the device cannot do this.
-bool vkb_image_borrow(const struct vkb_device *device, const struct vkb_borrowed *borrowed,
-                      struct vkb_image *image);
+// Makes a mapped image over the caller's memory, whose words passes can read, and nothing else. The
+// image has its format, size, channels, row pitch and memory; its rows have `row_size` bytes. Both
+// are multiples of VKB_WORD_SIZE. False without an error if the device cannot do this.
+bool vkb_image_borrow(const struct vkb_device *device, size_t row_size, struct vkb_image *image);
 
 // Creates the view of a mapped image's linear texels if there is none. The image must be small
 // enough (see vkb_image_fits_linear_texels).

@@ -48,7 +48,7 @@ def plan(
 def read_dlpack(
     capsule: object, /
 ) -> tuple[int, tuple[int, int], tuple[int, int, int], tuple[int, ...], tuple[int, ...] | None]: ...
-def dry_run(steps: tuple[tuple[Source, Plan], ...], /) -> list[list[str]]: ...
+def dry_run(steps: tuple[tuple[Source, Plan], ...], /) -> list[list[_Pass]]: ...
 
 @final
 class Renderer:
@@ -86,6 +86,7 @@ class Renderer:
         sums: bool,
         /,
     ) -> Plan | None: ...
+    @overload
     def run(
         self,
         source: Source,
@@ -94,21 +95,21 @@ class Renderer:
         in_place: bool = False,
         /,
     ) -> Submission: ...
+    @overload
+    def run(
+        self,
+        source: Source,
+        plans: tuple[Plan],
+        arrays: tuple[tuple[None]],
+        in_place: bool,
+        show: tuple[int, int, int, bool],
+        /,
+    ) -> Submission | None: ...
     def upload(self, source: Source, spare: Source | None, recycled: bool, /) -> Source: ...
     @property
     def instance(self) -> int: ...
     def open_screen(self, surface: int, /) -> int: ...
     def close_screen(self, screen: int, /) -> None: ...
-    def show(
-        self,
-        source: Source,
-        plan: Plan,
-        screen: int,
-        width: int,
-        height: int,
-        linear: bool,
-        /,
-    ) -> Submission | None: ...
     def pages(self, size: int, /) -> Pages: ...
     def cuda(self) -> tuple[int, int]: ...
     def cuda_name(self, ordinal: int, /) -> str: ...

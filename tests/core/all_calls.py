@@ -202,7 +202,7 @@ def show(renderer: Renderer, which: int, size: int) -> Any:
     except _core.Error as error:
         assert "VK_EXT_headless_surface" in str(error)  # noqa: PT017  Mesa 22.3 has none
         return []
-    submission = core.show(source, plan, screen, 32, 16, False)
+    submission = core.run(source, (plan,), ((None,),), False, (screen, 32, 16, False))
     if submission:
         submission.wait()
     core.close_screen(screen)

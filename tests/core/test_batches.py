@@ -310,8 +310,7 @@ def test_an_error_of_the_sequence_comes_in_its_turn(renderer: Renderer, place: i
 
 
 @pytest.mark.parametrize(
-    "kind",
-    [_core.OutOfMemoryError, _core.ValidationError, _core.DeviceLostError, ValueError],
+    "kind", [_core.OutOfMemoryError, _core.ValidationError, _core.DeviceLostError, ValueError]
 )
 def test_an_error_of_the_device_loses_the_frames_of_its_submission(
     renderer: Renderer, kind: type[Exception], monkeypatch: pytest.MonkeyPatch

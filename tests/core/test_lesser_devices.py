@@ -25,7 +25,7 @@ SOURCE = Path(__file__).with_name("lesser_device.c")
 pytestmark = [
     pytest.mark.skipif(
         "VKBLOOM_SANITIZED" in os.environ, reason="another process, whose core is not sanitized"
-    ),
+    )
 ]
 
 LESS_WORK = ("whole", "smaller", "pyramid", "gathered", "handles", "bands")
@@ -225,20 +225,26 @@ def test_images_of_too_much_memory(layer: Path, name: str) -> None:
     print(image, fits)
 
 
-def test_a_variant_that_is_none_is_refused_where_there_is_but_one(layer: Path, name: str) -> None:
-    done = run(layer, name, "storage", (*WORK, "whole"), VKBLOOM_VARIANT="tiles")
-    assert "ValueError: VKBLOOM_VARIANT: tiles is not one of auto" in done.stderr
+# Prints why each variant is refused.
+VARIANTS = """
+import os
+import vkbloom
+
+for variant in ("tiles", "cpu", "gpu"):
+    os.environ["VKBLOOM_VARIANT"] = variant
+    try:
+        vkbloom.Renderer(os.environ["VKBLOOM_TEST_NAME"])
+    except ValueError as error:
+        print(error)
+"""
 
 
-@pytest.mark.parametrize("variant", ["cpu", "gpu"])
-def test_a_variant_that_the_device_cannot_run_is_refused(
-    layer: Path, name: str, variant: str
-) -> None:
-    done = run(layer, name, "storage", (*WORK, "whole"), VKBLOOM_VARIANT=variant)
-    words = (
-        f"ValueError: VKBLOOM_VARIANT: the compute shaders of .* cannot write .* {variant} needs"
-    )
-    assert re.search(words, done.stderr), done.stderr
+def test_variants_that_are_none_or_that_the_device_cannot_run(layer: Path, name: str) -> None:
+    none, *others = run(layer, name, "storage", ("-c", VARIANTS)).stdout.splitlines()
+    assert none.startswith("VKBLOOM_VARIANT: tiles is not one of auto")
+    for variant, words in zip(("cpu", "gpu"), others, strict=True):
+        needs = f"VKBLOOM_VARIANT: the compute shaders of .* cannot write .* {variant} needs"
+        assert re.match(needs, words), words
 
 
 def test_the_doctor_on_a_device_without_timestamps(layer: Path, name: str) -> None:
@@ -381,73 +387,67 @@ def test_validation_sees_the_lesser_device(layer: Path, name: str) -> None:
     assert "maxPerStageDescriptorStorageImages limit (0)" in done.stdout
 
 
-# Prints which of several equal GPUs each choice opens, or its error.
+# Prints which of several equal GPUs each choice opens, or its error, where CUDA sees some of them.
 CHOICES = """
 import json, os, vkbloom
-def opened(choice):
+def opened(visible, choice):
+    os.environ["CUDA_VISIBLE_DEVICES"] = visible or ""
+    if visible is None:
+        del os.environ["CUDA_VISIBLE_DEVICES"]
     try:
         with vkbloom.Renderer(choice) as renderer:
             return f"{renderer.info.uuid[:2]} {renderer.info.pci} {renderer.info.type}"
     except (ValueError, vkbloom.Error) as error:
         return type(error).__name__ + ": " + str(error)
-print(json.dumps([opened(choice) for choice in json.loads(os.environ["CHOICES"])]))
+print(json.dumps([opened(*one) for one in json.loads(os.environ["CHOICES"])]))
 """
 FIRST, SECOND = "a0 0000:3f:00.0", "a1 0000:3e:00.0"
 
 
-@pytest.mark.parametrize(
-    ("visible", "choices"),
-    [
-        (
-            None,
-            {
-                "auto": FIRST,
-                "hardware": FIRST,
-                "uuid:GPU-A1a1a1a1-a1a1-a1a1": SECOND,
-                "uuid:a0": FIRST,
-                "pci:00000000:3E:00.0": SECOND,
-                "pci:3f:00.0": FIRST,
-                "uuid:ff": "AdapterNotFoundError: .*uuid:a1a1a1a1-a1a1-a1a1-a1a1-a1a1a1a1a1a1, ",
-                "pci:3f:00": "AdapterNotFoundError: .*0000:3e:00.0",
-                "uuid:": "AdapterNotFoundError: ",
-                "llvmpipe": 'ValueError: adapter: "llvmpipe" fits several .*a0a0.*a1a1.*"uuid:a0a0',
-            },
-        ),
+NONE = "AdapterNotFoundError: "
+#: What is taken away: what CUDA sees, a choice, and what it opens, or its error.
+EQUAL: dict[str, list[tuple[str | None, str, str]]] = {
+    "gpus": [
+        (None, "auto", FIRST),
+        (None, "hardware", FIRST),
+        (None, "uuid:GPU-A1a1a1a1-a1a1-a1a1", SECOND),
+        (None, "uuid:a0", FIRST),
+        (None, "pci:00000000:3E:00.0", SECOND),
+        (None, "pci:3f:00.0", FIRST),
+        (None, "uuid:ff", f"{NONE}.*uuid:a1a1a1a1-a1a1-a1a1-a1a1-a1a1a1a1a1a1, "),
+        (None, "pci:3f:00", f"{NONE}.*0000:3e:00.0"),
+        (None, "uuid:", NONE),
+        (None, "llvmpipe", '.*: "llvmpipe" fits several .*a0a0.*a1a1.*"uuid:a0a0'),
         # By address, since the GPUs have one name.
-        ("0", {"auto": SECOND, "hardware": SECOND, "llvmpipe": SECOND, "uuid:a0": FIRST}),
-        ("1,0", {"auto": FIRST, "llvmpipe": FIRST}),
-        ("GPU-a1a1a1", {"auto": SECOND, "hardware": SECOND}),
-        ("7", {"hardware": "AdapterNotFoundError: .*CUDA_VISIBLE_DEVICES names; found: .*a1a1"}),
-        ("", {"hardware": "AdapterNotFoundError: .*CUDA_VISIBLE_DEVICES"}),
-        ("-1", {"hardware": "AdapterNotFoundError: .*CUDA_VISIBLE_DEVICES"}),
+        *(("0", choice, SECOND) for choice in ("auto", "hardware", "llvmpipe")),
+        ("0", "uuid:a0", FIRST),
+        ("1,0", "auto", FIRST),
+        ("1,0", "llvmpipe", FIRST),
+        ("GPU-a1a1a1", "auto", SECOND),
+        ("GPU-a1a1a1", "hardware", SECOND),
+        ("7", "hardware", f"{NONE}.*CUDA_VISIBLE_DEVICES names; found: .*a1a1"),
+        ("", "hardware", f"{NONE}.*CUDA_VISIBLE_DEVICES"),
+        ("-1", "hardware", f"{NONE}.*CUDA_VISIBLE_DEVICES"),
     ],
-)
-def test_equal_gpus(
-    layer: Path, tmp_path: Path, visible: str | None, choices: dict[str, str]
-) -> None:
-    check_choices(layer, tmp_path, "gpus", choices, visible)
+    # An adapter whose query fails hides no other. Its address is not known, and it does not open.
+    "gpus,query": [
+        (None, "uuid:a1", SECOND),
+        (None, "pci:3e:00.0", SECOND),
+        (None, "pci:3f:00.0", f"{NONE}.*a0a0.*a1a1"),
+        (None, "uuid:a0", "OutOfMemoryError: vkEnumerateDeviceExtensionProperties failed"),
+    ],
+    # A driver that is not conformant comes last.
+    "conformance": [
+        (None, "auto", ".* cpu"),
+        (None, "software", ".* cpu"),
+        (None, "hardware", ".* discrete"),
+    ],
+}
 
 
-def test_an_adapter_whose_query_fails_hides_no_other(layer: Path, tmp_path: Path) -> None:
-    choices = {
-        "uuid:a1": SECOND,
-        "pci:3e:00.0": SECOND,
-        # Its address is not known, and it does not open.
-        "pci:3f:00.0": "AdapterNotFoundError: .*a0a0.*a1a1",
-        "uuid:a0": "OutOfMemoryError: vkEnumerateDeviceExtensionProperties failed",
-    }
-    check_choices(layer, tmp_path, "gpus,query", choices)
-
-
-def test_a_driver_that_is_not_conformant_comes_last(layer: Path, tmp_path: Path) -> None:
-    choices = {"auto": ".* cpu", "software": ".* cpu", "hardware": ".* discrete"}
-    check_choices(layer, tmp_path, "conformance", choices)
-
-
-def check_choices(
-    layer: Path, tmp_path: Path, lesser: str, choices: dict[str, str], visible: str | None = None
-) -> None:
-    """Check what each choice opens of the software adapter twice, as two devices."""
+@pytest.mark.parametrize("lesser", EQUAL)
+def test_equal_gpus(layer: Path, tmp_path: Path, lesser: str) -> None:
+    """The software adapter twice, as two devices."""
     manifests = lavapipes()
     second = tmp_path / "second.json"
     second.write_text(manifests[0].read_text())
@@ -457,12 +457,10 @@ def check_choices(
         "VK_ICD_FILENAMES": drivers,
         "VKBLOOM_DRIVER": "system",
         "VKBLOOM_ADAPTER": "",
-        "CHOICES": json.dumps(list(choices)),
+        "CHOICES": json.dumps([row[:2] for row in EQUAL[lesser]]),
         "VK_INSTANCE_LAYERS": "VK_LAYER_VKBLOOM_lesser_device",
     }
-    if visible is not None:
-        variables["CUDA_VISIBLE_DEVICES"] = visible
     done = run(layer, "", lesser, ("-c", CHOICES), **variables)
     assert done.returncode == 0, done.stderr
-    for expected, found in zip(choices.values(), json.loads(done.stdout), strict=True):
-        assert re.match(expected, found), (expected, found)
+    for row, found in zip(EQUAL[lesser], json.loads(done.stdout), strict=True):
+        assert re.match(row[2], found), (row, found)

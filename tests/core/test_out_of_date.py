@@ -255,7 +255,4 @@ def test_a_walk_through_many_settings(opened: Renderer, scene: Scene) -> None:
         wanted = pick(["all", "all", "final", "scene", "depth"])
         frames = opened.render(scene, settings, size, time=time, framebuffers=wanted)
         if step % 8 == 0:
-            assert_same(
-                frames,
-                fresh(scene, settings, size, time=time, framebuffers=wanted),
-            )
+            assert_same(frames, fresh(scene, settings, size, time=time, framebuffers=wanted))

@@ -76,13 +76,7 @@ def test_saved_textures_are_framebuffers_and_a_param_runs_only_its_passes(
 ) -> None:
     settings = load_method(EXAMPLES / "forty_lines.hook")()
     image = picture(64, 48, highest=2)
-    assert list(renderer.apply(image, settings)) == [
-        "glow",
-        "half",
-        "rows",
-        "bloom",
-        "final",
-    ]
+    assert list(renderer.apply(image, settings)) == ["glow", "half", "rows", "bloom", "final"]
     again = renderer.apply(image, settings.replace(spread=3.5))
     assert list(again.timings) == ["rows", "bloom_own", "bloom", "final"]
     again = renderer.apply(image, settings.replace(spread=3.5, exposure=1.0))

@@ -434,8 +434,7 @@ def gradient_places(renderer: Any) -> None:
     # NaN of the image is not the cotangent's.
     spoilt = vjp(wrong, settings, renderer=renderer)[1]({"final": image})
     equal_gradients(
-        vjp(OnDevice(wrong), settings, renderer=renderer)[1]({"final": OnDevice(image)}),
-        spoilt,
+        vjp(OnDevice(wrong), settings, renderer=renderer)[1]({"final": OnDevice(image)}), spoilt
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -22,18 +23,22 @@ from vkbloom._doctor.deviations import deviation
 CASES = {f"{case.group}: {case.name}": case for case in cases()}
 
 
+@pytest.fixture(scope="module")
+def fragment() -> Iterator[Renderer]:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("VKBLOOM_VARIANT", "fragment")
+        renderer = Renderer(validation=True)
+    with renderer:
+        yield renderer
+
+
 @pytest.mark.parametrize("name", CASES)
 def test_cases(request: pytest.FixtureRequest, name: str) -> None:
     case = CASES[name]
     if reason := reason_against(name):
         pytest.xfail(reason)
-    if case.variant == "auto":
-        assert self_test.judge(case, request.getfixturevalue("renderer"))["wrong"] == ""
-        return
-    monkeypatch = request.getfixturevalue("monkeypatch")
-    monkeypatch.setenv("VKBLOOM_VARIANT", case.variant)
-    with Renderer(validation=True) as renderer:
-        assert self_test.judge(case, renderer)["wrong"] == ""
+    renderer = request.getfixturevalue("renderer" if case.variant == "auto" else case.variant)
+    assert self_test.judge(case, renderer)["wrong"] == ""
 
 
 def test_there_are_about_200() -> None:

@@ -24,12 +24,7 @@ from vkbloom._explorer.viewer import Viewer
 
 tornado = pytest.importorskip("tornado")
 
-from tornado.httpclient import (  # noqa: E402
-    AsyncHTTPClient,
-    HTTPClientError,
-    HTTPRequest,
-    HTTPResponse,
-)
+from tornado.httpclient import AsyncHTTPClient, HTTPClientError, HTTPRequest, HTTPResponse  # noqa: E402
 from tornado.websocket import WebSocketClientConnection, websocket_connect  # noqa: E402
 
 from vkbloom._explorer.server import Server, _Socket  # noqa: E402

@@ -18,14 +18,7 @@ from hypothesis import strategies as st
 import vkbloom
 from tests.images import noise
 from tests.refusals import assert_refused, rows
-from vkbloom import (
-    Frames,
-    Pyramid,
-    Renderer,
-    Scene,
-    Separable,
-    Settings,
-)
+from vkbloom import Frames, Pyramid, Renderer, Scene, Separable, Settings
 from vkbloom._grid.filling import progress_bar
 from vkbloom._grid.layout import Grid, ask, lay_out
 from vkbloom._grid.order import blocks, default_chunk, points, read_part
@@ -193,9 +186,7 @@ class TestWholeSettings:
     def test_settings(self, renderer: Renderer, filled: Call, image: Any) -> None:
         many = [Separable(threshold=0.5), Pyramid(levels=2, format="rgba32float")]
         grid = filled(
-            image,
-            axes={"settings": many, "intensity": [0.5, 1.0]},
-            framebuffers=("final", "bloom"),
+            image, axes={"settings": many, "intensity": [0.5, 1.0]}, framebuffers=("final", "bloom")
         )
         for place, one in enumerate(many):
             frames = renderer.apply(image, one.replace(intensity=0.5))

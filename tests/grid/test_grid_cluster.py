@@ -156,8 +156,7 @@ def test_a_worker_without_the_adapter(
 
 
 @pytest.mark.parametrize(
-    ("what", "other"),
-    [("adapter", "Radeon"), ("driver", "Mesa 1.2.3"), ("version", "0.0.1")],
+    ("what", "other"), [("adapter", "Radeon"), ("driver", "Mesa 1.2.3"), ("version", "0.0.1")]
 )
 def test_a_worker_with_another_driver_or_version_is_refused(
     client: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, what: str, other: str

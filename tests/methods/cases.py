@@ -98,10 +98,7 @@ GIVEN: dict[str, tuple[Settings, tuple[str, ...]]] = {
     "darktable-mask": (DarktableBloom(threshold=60.0, alpha="blur"), MASK),
     "playcanvas-emission": (PlayCanvasBloom(), EMISSION),
     "darktable-emission": (DarktableBloom(blur_size=1.0, format="rgba32float"), EMISSION),
-    "godot-mask": (
-        GodotBloom(threshold=0.3, exposure=0.5, composite="mix", alpha="blur"),
-        MASK,
-    ),
+    "godot-mask": (GodotBloom(threshold=0.3, exposure=0.5, composite="mix", alpha="blur"), MASK),
     "godot-emission": (GodotBloom(composite="mix", alpha="max"), EMISSION),
     "blender-mask": (BlenderGlare(threshold=0.5, alpha="blur"), MASK),
     "pygfx-mask": (PygfxBloom(karis_average=True, alpha="blur", composite="mix"), BOTH),

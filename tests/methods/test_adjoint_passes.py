@@ -217,13 +217,7 @@ TRANSPOSED: tuple[tuple[str, Any, tuple[int, ...], str, tuple[str, ...]], ...] =
     # Several strips, less than one, and less than a kernel.
     ("cpu", Separable(threshold=0.5, knee=0.5), (35, 261, 3), "f4", STRIPS[1:]),
     ("cpu", Separable(threshold=0.5, intensity=0.7, exposure=0.5), (70, 50, 4), "f4", STRIPS[1:]),
-    (
-        "cpu",
-        Separable(threshold=0.5, tonemap="reinhard", exposure=0.5),
-        (70, 50, 4),
-        "f4",
-        STRIPS,
-    ),
+    ("cpu", Separable(threshold=0.5, tonemap="reinhard", exposure=0.5), (70, 50, 4), "f4", STRIPS),
     ("cpu", Separable(composite="mix", intensity=0.4), (3, 9, 3), "f4", STRIPS[1:]),
     ("cpu", Separable(composite="mix", intensity=0.4, tonemap="aces"), (3, 9, 3), "f4", STRIPS),
     ("cpu", Separable(threshold=0.2, knee=0.3), (1, 70, 4), "f4", STRIPS[1:]),
@@ -235,13 +229,7 @@ TRANSPOSED: tuple[tuple[str, Any, tuple[int, ...], str, tuple[str, ...]], ...] =
         "f4",
         (CURVED, *(TAPS,) * 3),
     ),
-    (
-        "cpu",
-        DualKawase(levels=1, threshold=0.5, tonemap="aces"),
-        (8, 32, 3),
-        "f4",
-        (CURVED, TAPS),
-    ),
+    ("cpu", DualKawase(levels=1, threshold=0.5, tonemap="aces"), (8, 32, 3), "f4", (CURVED, TAPS)),
     ("cpu", Pyramid(levels=2, composite="mix", exposure=0.5), (35, 62, 3), "f4", (TAPS,) * 6),
 )
 

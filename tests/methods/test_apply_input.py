@@ -18,14 +18,7 @@ from tests.framebuffers import assert_same
 from tests.images import picture
 from tests.methods.cases import DTYPES
 from tests.tolerance import assert_close, assert_matches_reference, tolerance
-from vkbloom import (
-    DualKawase,
-    Pyramid,
-    Renderer,
-    Separable,
-    Settings,
-    reference,
-)
+from vkbloom import DualKawase, Pyramid, Renderer, Separable, Settings, reference
 
 Image = NDArray[Any]
 

@@ -52,11 +52,7 @@ def assert_close(renderer: Renderer, image: NDArray[Any], settings: Settings) ->
     ids=str,
 )
 def test_convolution(
-    renderer: Renderer,
-    boundary: Any,
-    size: tuple[int, int],
-    kernel: tuple[int, int],
-    channels: int,
+    renderer: Renderer, boundary: Any, size: tuple[int, int], kernel: tuple[int, int], channels: int
 ) -> None:
     """Odd sizes, kernels larger than the image, colour and grey."""
     settings = Convolution(kernel_of(*kernel, channels), boundary=boundary)

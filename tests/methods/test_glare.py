@@ -18,7 +18,6 @@ from vkbloom import (
     Dirt,
     FilamentBloom,
     Ghosts,
-    Glare,
     GodotBloom,
     Halo,
     Pyramid,
@@ -169,45 +168,6 @@ def test_stages(renderer: Renderer, name: str) -> None:
             frames[framebuffer].dtype, expected[framebuffer], stages_of_8_bits=2, stages=8
         )
         assert_close(framebuffer, frames[framebuffer], expected[framebuffer], limit)
-
-
-@pytest.mark.parametrize(
-    "settings",
-    [
-        Separable(glare=(Ghosts(aberration=0.02), Halo(), Dirt(image=DIRT))),
-        Pyramid(
-            levels=2,
-            alpha="blur",
-            glare=(Streaks(angle=20, base=3, iterations=2, threshold=0.1, halvings=1),),
-        ),
-    ],
-    ids=["flares", "streaks"],
-)
-def test_variants(monkeypatch: pytest.MonkeyPatch, settings: Settings) -> None:
-    """All variants give the same bits, and `final` alone is the `final` of all framebuffers."""
-    image = np.abs(hdr_picture(96, 61, 4, "float16"))
-    found = {}
-    for form in ("fragment", "cpu", "gpu"):
-        monkeypatch.setenv("VKBLOOM_VARIANT", form)
-        with Renderer("software", validation=True) as own:
-            alone = own.apply(image, settings, framebuffers="final")["final"]
-            own.apply(image[::-1], settings, framebuffers="final")
-            found[form] = dict(own.apply(image, settings))
-        np.testing.assert_array_equal(alone, found[form]["final"])
-    for name, array in found["fragment"].items():
-        np.testing.assert_array_equal(found["cpu"][name], array, name)
-        np.testing.assert_array_equal(found["gpu"][name], array, name)
-
-
-@pytest.mark.parametrize("stage", [SHORT, Ghosts(), Halo()], ids=lambda stage: stage.stage)
-def test_nan_and_infinity(renderer: Renderer, stage: Glare) -> None:
-    """They count as 0 in the light, and stay in their pixels of the picture."""
-    image = hdr_picture(33, 21, 3, "float32")
-    image[4, 5], image[9, 9, 1] = np.nan, np.inf
-    frames = renderer.apply(image, Pyramid(glare=(stage,)))
-    clean = renderer.apply(np.where(np.isfinite(image), image, 0), Pyramid(glare=(stage,)))
-    np.testing.assert_array_equal(frames[stage.stage], clean[stage.stage])
-    np.testing.assert_array_equal(np.isfinite(frames["final"]), np.isfinite(image))
 
 
 def test_change_of_glare_runs_only_dependent_passes(new_renderer: Callable[[], Renderer]) -> None:

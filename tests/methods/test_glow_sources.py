@@ -12,12 +12,7 @@ from numpy.typing import NDArray
 from tests.images import hdr_picture, picture
 from tests.methods.cases import GIVEN
 from tests.tolerance import assert_matches_reference
-from vkbloom import (
-    Pyramid,
-    Renderer,
-    Scene,
-    Separable,
-)
+from vkbloom import Pyramid, Renderer, Scene, Separable
 
 Image = NDArray[Any]
 

@@ -14,21 +14,20 @@ from numpy.typing import NDArray
 from tests.conftest import SANITIZED
 from tests.exhaustive import EXHAUSTIVE, by_turns
 from tests.images import hdr_picture
-from tests.methods.cases import (
-    DTYPES,
-    GIVEN,
-    METHODS,
-    OTHERS,
-    WHOLE,
-    presets_of_low_levels,
-)
+from tests.methods.cases import DTYPES, GIVEN, METHODS, OTHERS, WHOLE, presets_of_low_levels
 from tests.tolerance import assert_matches_reference
 from vkbloom import (
     Convolution,
+    Dirt,
+    Ghosts,
     Halation,
+    Halo,
+    PygfxBloom,
+    Pyramid,
     Renderer,
     Separable,
     Settings,
+    Streaks,
     ThreeBloom,
     UnrealBloom,
     UrpBloom,
@@ -43,8 +42,18 @@ PRESETS = {
     for name, one in presets_of_low_levels(64).items()
     if name == "camera_lens" or not isinstance(one, Convolution)
 }
+# Of these the bits are compared alone: test_glare.py and test_rg11b10.py have references.
+STREAKS = Streaks(angle=20, base=3, iterations=2, threshold=0.1, halvings=1)
+DIRT = Dirt(image=np.random.default_rng(5).random((9, 12, 3)))
+BITS: dict[str, Settings] = {
+    "flares": Separable(glare=(Ghosts(aberration=0.02), Halo(), DIRT)),
+    "streaks": Pyramid(levels=2, alpha="blur", glare=(STREAKS,)),
+    "encoded": PygfxBloom(format="rgba8unorm-srgb"),
+    # (Dithering makes two levels of a value that differs in its last bit.)
+    "dithered": WHOLE["dithered"],
+}
 CASES: dict[str, tuple[Settings, tuple[str, ...]]] = {
-    **{name: (one, ()) for name, one in (METHODS | WHOLE | OTHERS | PRESETS).items()},
+    **{name: (one, ()) for name, one in (METHODS | WHOLE | OTHERS | PRESETS | BITS).items()},
     **GIVEN,
 }
 # Sides that are multiples of the variants' strips and tiles, and some that are not; levels of
@@ -52,7 +61,7 @@ CASES: dict[str, tuple[Settings, tuple[str, ...]]] = {
 SIZES = ((97, 61), (72, 64), (1, 1), (64, 48), (7, 1), (260, 24), (1, 9), (13, 7))
 # These have all three variants, the others two by turns; so have all under the sanitizers, since a
 # method's plans in the two others differ in few rows.
-COMPLETE = set() if SANITIZED else {*METHODS, *WHOLE, *PRESETS, *itertools.islice(GIVEN, 4)}
+COMPLETE = set() if SANITIZED else {*METHODS, *WHOLE, *PRESETS, *BITS, *itertools.islice(GIVEN, 4)}
 
 
 def has_equal_bits(settings: Settings) -> bool:
@@ -125,8 +134,7 @@ def test_every_variant(
     image = image_of(size, dtype, settings, 3 + number // 2 % 2)
     given = given_of(names, image)
     expected = opened["fragment"].apply(image, settings, **given)
-    if not settings.dither:
-        # (It makes two levels of a value that differs in its last bit.)
+    if name not in BITS:
         assert_matches_reference(expected, image, settings, **given)
     chosen = VARIANTS if name in COMPLETE else ("fragment", VARIANTS[1 + number % 2])
     for variant in chosen if number < len(ROWS) else (VARIANTS[number % 3],):

@@ -20,7 +20,9 @@ from vkbloom import (
     Convolution,
     DualKawase,
     FilamentBloom,
+    Ghosts,
     GodotBloom,
+    Halo,
     HdrpBloom,
     KinoBloom,
     Pyramid,
@@ -28,6 +30,7 @@ from vkbloom import (
     Scene,
     Separable,
     Settings,
+    Streaks,
     UrpBloom,
     presets,
     psf,
@@ -70,13 +73,20 @@ def test_a_flat_image_gets_the_gain(renderer: Renderer, name: str) -> None:
     assert_allclose(reference.blur(image, settings), gain, rtol=1e-9, atol=1e-15)
 
 
-@pytest.mark.parametrize("name", PUBLISHED)
-def test_nan_and_infinity_are_not_spread(renderer: Renderer, name: str) -> None:
+STAGES = (Streaks(directions=3, iterations=2), Ghosts(), Halo())
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [*(LOW[name] for name in PUBLISHED), *(Pyramid(glare=(stage,)) for stage in STAGES)],
+    ids=[*PUBLISHED, *(stage.stage for stage in STAGES)],
+)
+def test_nan_and_infinity_are_not_spread(renderer: Renderer, settings: Settings) -> None:
     image = lights(33, 21)
     image[4, 5, 0], image[10, 20, 1], image[20, 0, 2] = np.nan, np.inf, -np.inf
-    frames = renderer.apply(image, LOW[name])
+    frames = renderer.apply(image, settings)
     clean = np.where(np.isfinite(image), image, 0).astype(np.float32)
-    expected = renderer.apply(clean, LOW[name])
+    expected = renderer.apply(clean, settings)
     for framebuffer in set(frames) - {"final"}:
         assert np.array_equal(frames[framebuffer], expected[framebuffer]), framebuffer
     assert np.array_equal(np.isfinite(frames["final"]), np.isfinite(image))

@@ -203,14 +203,3 @@ def test_of_a_published_method_the_bloom_is_not_rounded(renderer: Renderer) -> N
     }
     assert is_level["glow"] == is_level["down_0"] == is_level["up_0"] == 1
     assert is_level["bloom"] < 0.5
-
-
-def test_all_variants_give_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
-    results = []
-    for variant in ("fragment", "cpu", "gpu"):
-        monkeypatch.setenv("VKBLOOM_VARIANT", variant)
-        with Renderer(validation=True) as renderer:
-            results.append(renderer.apply(lights(75, 46, highest=2.0), PygfxBloom(format=FORMAT)))
-    for name, values in results[0].items():
-        for other in results[1:]:
-            np.testing.assert_array_equal(other[name], values, err_msg=name)

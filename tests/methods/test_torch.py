@@ -299,10 +299,7 @@ def test_a_graph_of_cuda_is_refused(renderer: Renderer) -> None:
         loss = expected.sum()
         loss.backward(retain_graph=True)
         gradient = image.grad.clone()
-    steps: tuple[Any, ...] = (
-        lambda: module(image),
-        lambda: loss.backward(retain_graph=True),
-    )
+    steps: tuple[Any, ...] = (lambda: module(image), lambda: loss.backward(retain_graph=True))
     for step in steps:
         torch.cuda.synchronize()
         with (

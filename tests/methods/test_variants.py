@@ -15,16 +15,7 @@ from tests.framebuffers import assert_same
 from tests.images import hdr_picture
 from tests.methods.cases import OTHERS, WHOLE
 from tests.tolerance import assert_matches_reference, tolerance
-from vkbloom import (
-    BevyBloom,
-    Convolution,
-    Frames,
-    Pyramid,
-    Renderer,
-    Scene,
-    Separable,
-    presets,
-)
+from vkbloom import BevyBloom, Convolution, Frames, Pyramid, Renderer, Scene, Separable, presets
 from vkbloom.psf import gaussian
 from vkbloom.reference import apply as reference_apply
 
@@ -231,9 +222,7 @@ def test_a_cpu_enlarges_in_strips_that_have_each_rows_taps_once(renderer: Render
     assert first.shader.startswith("taps_linear") == linear
 
 
-def test_small_images_are_convolved_in_more_stages_of_smaller_pipelines(
-    renderer: Renderer,
-) -> None:
+def test_small_images_are_convolved_in_more_stages_of_smaller_pipelines(renderer: Renderer) -> None:
     def stages(size: tuple[int, int]) -> int:
         image = np.zeros((size[1], size[0], 3), np.float32)
         plan = renderer.plan(image, Convolution(gaussian(2), kernel_size=(9, 9)))

@@ -105,8 +105,7 @@ double all(double x) { return exp(x) + exp2(x) + log(x) + log2(x) + pow(x, x); }
 
 
 @pytest.mark.skipif(
-    platform.libc_ver()[0] != "glibc" or shutil.which("nm") is None,
-    reason="needs glibc and nm",
+    platform.libc_ver()[0] != "glibc" or shutil.which("nm") is None, reason="needs glibc and nm"
 )
 @pytest.mark.parametrize("included", [False, True])
 def test_old_versions_of_mathematical_functions(included: bool, tmp_path: Path) -> None:

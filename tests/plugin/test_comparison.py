@@ -281,11 +281,7 @@ class TestTolerances:
 
     @pytest.mark.parametrize(
         ("figure", "limit", "towards"),
-        [
-            ("max_error", "max_error", -1),
-            ("ssim", "min_ssim", 1),
-            ("flip", "max_flip", -1),
-        ],
+        [("max_error", "max_error", -1), ("ssim", "min_ssim", 1), ("flip", "max_flip", -1)],
     )
     def test_each_to_both_sides(self, figure: str, limit: str, towards: int) -> None:
         a, b = noise_image(20, 20, 3), np.clip(noise_image(20, 20, 3) * np.float32(0.9), 0, 1)

@@ -75,11 +75,7 @@ PLANTED: dict[str, tuple[Callable[[Image], Image], Any, str]] = {
         "channels: the second image has the order bgr",
     ),
     "flip": (lambda image: image[::-1], "y", "flip: top and bottom are swapped"),
-    "clamp": (
-        lambda image: np.minimum(image, 1),
-        1.0,
-        "clamp: the second image is clamped at 1",
-    ),
+    "clamp": (lambda image: np.minimum(image, 1), 1.0, "clamp: the second image is clamped at 1"),
     "nan": (with_nan, 4, "nan: 4 values are NaN or infinite in one image only"),
     "size": (lambda image: image[::2, ::2], (32, 24), "size: 64 x 48 against 32 x 24"),
     "rounding": (

@@ -142,10 +142,7 @@ def test_right_blurs_are_not_blamed(sigma: float) -> None:
             lambda a: np.roll(box_chain(a), (2, 2), (0, 1)),
             "+2 pixels along x and +2 pixels along y, on average",
         ),
-        (
-            lambda a: np.roll(box_chain(a), -3, 0),
-            "-3 pixels along y, on average",
-        ),
+        (lambda a: np.roll(box_chain(a), -3, 0), "-3 pixels along y, on average"),
         (
             lambda a: ndimage.uniform_filter(a, (2, 1, 1), mode="nearest"),
             "+0.5 pixels along y, on average",

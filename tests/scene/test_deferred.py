@@ -12,16 +12,7 @@ import pytest
 from numpy.typing import NDArray
 
 from tests.scene.gltf_documents import Document
-from tests.screens import (
-    DISTANCE,
-    GBUFFER,
-    NOTHING,
-    SIZE,
-    deferred,
-    noise,
-    rgb,
-    screen,
-)
+from tests.screens import DISTANCE, GBUFFER, NOTHING, SIZE, deferred, noise, rgb, screen
 from tests.tolerance import assert_close, tolerance
 from vkbloom import (
     Camera,

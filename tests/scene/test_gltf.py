@@ -163,10 +163,7 @@ STRIP_POSITIONS = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0], [0, 2, 0]]
 @pytest.mark.parametrize("indexed", [False, True])
 @pytest.mark.parametrize(
     ("mode", "expected"),
-    [
-        (5, [[0, 1, 2], [1, 3, 2], [2, 3, 4]]),
-        (6, [[1, 2, 0], [2, 3, 0], [3, 4, 0]]),
-    ],
+    [(5, [[0, 1, 2], [1, 3, 2], [2, 3, 4]]), (6, [[1, 2, 0], [2, 3, 0], [3, 4, 0]])],
 )
 def test_strips_and_fans(
     tmp_path: Path, mode: int, expected: list[list[int]], indexed: bool

@@ -72,12 +72,7 @@ def test_the_originals_frames(originals: vkbloom.Frames, shared_data: Path, name
 @pytest.mark.parametrize("shading", ["forward", "deferred"])
 @pytest.mark.parametrize(
     ("format", "dtype"),
-    [
-        (None, None),
-        ("rgba8unorm", "uint8"),
-        ("rgba16float", "float16"),
-        ("rgba32float", "float32"),
-    ],
+    [(None, None), ("rgba8unorm", "uint8"), ("rgba16float", "float16"), ("rgba32float", "float32")],
 )
 def test_names_shapes_and_dtypes(
     renderer: Renderer, scene: Scene, format: Any, dtype: Any, shading: Any

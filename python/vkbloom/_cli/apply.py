@@ -147,14 +147,12 @@ class Run:
         if no_bloom.is_without(frames):
             brightest = no_bloom.brightest_of(picture.pixels)
             text = no_bloom.reason(frames.settings, brightest)
-        elif self._is_straight(picture, target):
+        elif image_writing.is_straight(
+            of_format(target, self.options.pipe_format), is_associated=picture.stored.associated
+        ):
             text = no_bloom.hidden(frames["final"], frames.settings)
         if text:
             note(f"{name}: {text}" if self.several else text)
-
-    def _is_straight(self, picture: Picture, target: str) -> bool:
-        file = of_format(target, self.options.pipe_format)
-        return image_writing.is_straight(file, is_associated=picture.stored.associated)
 
     def _read(self, source: str, expand: float | None, *, is_blended: bool) -> Picture:
         options = self.options

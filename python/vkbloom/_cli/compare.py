@@ -13,7 +13,7 @@ from rich.console import Console
 
 from vkbloom._checks import check_number
 from vkbloom._cli import fields
-from vkbloom._cli.image_files import check_part_is_given, read, subimage_option
+from vkbloom._cli.image_files import other_parts, read, subimage_option
 from vkbloom._cli.program import as_wrong_use
 from vkbloom._cli.terminal import is_quiet, note, say
 from vkbloom._io import image_writing, safe_writing
@@ -88,8 +88,10 @@ def command(
         if diff is not None:
             safe_writing.writer_of(diff)
     a, b = read(first, subimage), read(second, subimage)
-    check_part_is_given(first, a)
-    check_part_is_given(second, b)
+    for file, stored in ((first, a), (second, b)):
+        if parts := other_parts(stored):
+            told = f"{file}: has several parts; choose one with --subimage: {parts}"
+            raise click.UsageError(told)
     # FLIP of a large picture of floats takes half a minute.
     with as_wrong_use(), Console(stderr=True, quiet=is_quiet()).status("Comparing"):
         result = compare(a.pixels, b.pixels, allow_nan=allow_nan)

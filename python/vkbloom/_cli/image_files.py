@@ -65,11 +65,10 @@ def read(path: str, subimage: int, layer: str | None = None) -> StoredImage:
         return image_reading.load(file, subimage, layer)
 
 
-def check_part_is_given(path: str, stored: StoredImage) -> None:
-    """Raise click.UsageError if a file has several parts and --subimage is not given."""
-    if len(stored.parts) > 1 and not given("subimage"):
-        parts = image_reading.listed_parts(stored)
-        raise click.UsageError(f"{path}: has several parts; choose one with --subimage: {parts}")
+def other_parts(stored: StoredImage) -> str:
+    """Return the parts of a file of several if --subimage chooses none, else ""."""
+    is_open = len(stored.parts) > 1 and not given("subimage")
+    return image_reading.listed_parts(stored) if is_open else ""
 
 
 def check_input_colour(colour: Colour | None) -> None:
@@ -96,8 +95,8 @@ def read_picture(
     stored = read(source, subimage, layer)
     source = shown(source)
     picture = image_reading.decode_file(stored, source, colour, expand=expand)
-    for text in part_notes(stored, layer):
-        note(f"{source}: {text}")
+    if layer is None and (parts := other_parts(stored)):
+        note(f"{source}: read the first of its {parts}; --subimage reads another")
     counts = (int(test(picture.values).sum()) for test in (np.isnan, np.isinf))
     if (not_finite := image_reading.non_finite_note(*counts)) is not None:
         note(f"{source} {not_finite}")
@@ -120,14 +119,6 @@ def is_photograph(source: str) -> bool:
     ):
         return image_reading.is_photograph(reader)
     return False
-
-
-def part_notes(stored: StoredImage, layer: str | None) -> list[str]:
-    """Return a text if the first of several parts is read without --subimage."""
-    if len(stored.parts) <= 1 or layer is not None or given("subimage"):
-        return []
-    parts = image_reading.listed_parts(stored)
-    return [f"read the first of its {parts}; --subimage reads another"]
 
 
 def finished(picture: Picture, final: NDArray[Any], settings: Settings) -> Picture:

@@ -30,7 +30,7 @@ from vkbloom._renderer.surface import Surface
 from vkbloom._settings.settings import SHADINGS, Settings, Shading
 
 #: Options of a scene, by the names of their parameters.
-_OF_SCENE: Final = {"base": "--scene", "shading": "--shading", "size": "--size"}
+_OF_SCENE: Final = {"base": "--scene", "shading": "--shading"}
 HELP: Final = """\
 B              bloom on, off
 1 ... 9        the framebuffer that is shown
@@ -45,47 +45,45 @@ _WAIT_SECONDS: Final = 0.1  # while the window is hidden
 _KEYS: Final = ("SPACE", "ESCAPE", *"BPQ", *"123456789")
 
 
-def _live_options(*, image_has_size: bool) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+def _live_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """Add IMAGE and its options, and those of the device, the scene and the settings.
 
     The command gets the pixels of IMAGE as `image`, which is None for a scene, and as `origin` the
-    arguments `file` and `expand` of a `Viewer`. `image_has_size`: ``--size`` may be given with an
-    IMAGE.
+    arguments `file` and `expand` of a `Viewer`.
     """
 
-    def add(command: Callable[..., Any]) -> Callable[..., Any]:
-        @click.argument("source", metavar="[IMAGE]", required=False, type=click.Path())
-        @reading_options
-        @adapter_option
-        @scene_options
-        @settings_options
-        @functools.wraps(command)
-        def run(
-            *,
-            source: str | None,
-            subimage: int,
-            layer: str | None,
-            expand: float | None,
-            **arguments: Any,
-        ) -> Any:
-            if source is None:
-                if given("expand"):
-                    raise click.UsageError("--expand is only for an IMAGE")
-                return command(image=None, origin={}, **arguments)
-            for name, option in _OF_SCENE.items():
-                if given(name) and not (name == "size" and image_has_size):
-                    raise click.UsageError(
-                        f"{option} is only for scenes; leave it out with an IMAGE"
-                    )
-            picture = read_picture(source, subimage, None, layer=layer, expand=expand)
-            is_expanded = picture.numbers.startswith("uint") and expand not in (None, 1)
-            origin: dict[str, Any] = {"file": "" if is_stream(source) else source}
-            origin |= {"expand": expand} if is_expanded else {}
-            return command(image=picture.pixels, origin=origin, **arguments)
+    @click.argument("source", metavar="[IMAGE]", required=False, type=click.Path())
+    @reading_options
+    @adapter_option
+    @scene_options
+    @settings_options
+    @functools.wraps(command)
+    def run(
+        *,
+        source: str | None,
+        subimage: int,
+        layer: str | None,
+        expand: float | None,
+        **arguments: Any,
+    ) -> Any:
+        if source is None:
+            if given("expand"):
+                raise click.UsageError("--expand is only for an IMAGE")
+            return command(image=None, origin={}, **arguments)
+        for name, option in _OF_SCENE.items():
+            _check_is_scene(name, option)
+        picture = read_picture(source, subimage, None, layer=layer, expand=expand)
+        is_expanded = picture.numbers.startswith("uint") and expand not in (None, 1)
+        origin: dict[str, Any] = {"file": "" if is_stream(source) else source}
+        origin |= {"expand": expand} if is_expanded else {}
+        return command(image=picture.pixels, origin=origin, **arguments)
 
-        return run
+    return run
 
-    return add
+
+def _check_is_scene(name: str, option: str) -> None:
+    if given(name):
+        raise click.UsageError(f"{option} is only for scenes; leave it out with an IMAGE")
 
 
 @dataclasses.dataclass
@@ -142,7 +140,7 @@ class Live:
 @click.command(cls=Command, epilog=f"\b\n{HELP}")
 @click.option("--size", type=SIZE, help="Of the window [default: 1280x720, or the image's size]")
 @click.option("--shading", type=click.Choice(SHADINGS), default="forward")
-@_live_options(image_has_size=True)
+@_live_options
 def view(
     *,
     image: NDArray[Any] | None,
@@ -220,7 +218,7 @@ def _listen(glfw: Any, window: Any, renderer: vkbloom.Renderer, live: Live) -> N
     "--size", type=SIZE, default="1280x720", help="Of a scene's frame, which gives its aspect."
 )
 @click.option("--shading", type=click.Choice(SHADINGS), default="deferred")
-@_live_options(image_has_size=False)
+@_live_options
 def explore(
     *,
     image: NDArray[Any] | None,
@@ -244,6 +242,7 @@ def explore(
     looked_at: vkbloom.Scene | NDArray[Any]
     begun: vkbloom.Settings | None = settings
     if image is not None:
+        _check_is_scene("size", "--size")
         looked_at = image
     else:
         looked_at = scene()

@@ -35,7 +35,7 @@ def _search_options(
     """Add the options of a search; the arguments are their defaults.
 
     The command gets `search`, the keyword arguments of `vkbloom.fit` and `vkbloom.translate`, and
-    `show_results`, a function that prints results.
+    returns results, which are printed.
     """
 
     def add(command: Callable[..., Any]) -> Callable[..., Any]:
@@ -63,14 +63,13 @@ def _search_options(
         )
         @click.option("--json", "as_json", is_flag=True, help="Print one list, sorted by loss.")
         @functools.wraps(command)
-        def run(*, vary: str | None, as_json: bool, **rest: Any) -> Any:
+        def run(*, vary: str | None, as_json: bool, **rest: Any) -> None:
             search = {name: rest.pop(name) for name in ("loss", "max_calls")}
             search["progress"] = Console(stderr=True).is_terminal and not is_quiet()
             if vary is not None:
                 names = (name.strip().replace("-", "_") for name in vary.split(","))
                 search["vary"] = [name for name in names if name]
-            show_results = functools.partial(_show_results, as_json=as_json)
-            return command(search=search, show_results=show_results, **rest)
+            _show_results(command(search=search, **rest), as_json=as_json)
 
         return run
 
@@ -134,10 +133,9 @@ def fit(
     presets: tuple[str, ...],
     kinds: tuple[str, ...],
     search: dict[str, Any],
-    show_results: Callable[[Sequence[vkbloom.FitResult]], None],
     input_colour: Any,
     adapter: str,
-) -> None:
+) -> list[vkbloom.FitResult]:
     """Find the settings with which the bloom of IMAGE matches TARGET.
 
     Both files have the same size. Their colours are decoded to linear light, as by vkbloom apply.
@@ -161,7 +159,7 @@ def fit(
             for image_of, begun in searches
             for item in vkbloom.fit(image_of, wanted, begun, renderer=renderer, **search)
         ]
-    show_results(sorted(results, key=lambda item: item.loss))
+    return sorted(results, key=lambda item: item.loss)
 
 
 def _searches(
@@ -199,10 +197,9 @@ def translate(
     target: str,
     size: tuple[int, int],
     search: dict[str, Any],
-    show_results: Callable[[Sequence[vkbloom.FitResult]], None],
     adapter: str,
     settings: vkbloom.Settings,
-) -> None:
+) -> list[vkbloom.FitResult]:
     """Find another method's parameters whose bloom comes closest.
 
     --preset, --method or --settings, with further options, are the settings to translate; --to
@@ -215,5 +212,4 @@ def translate(
         )
     start = vkbloom.presets[target] if target in vkbloom.presets else METHODS[target]()
     with opened_renderer(adapter) as renderer, as_wrong_use():
-        result = vkbloom.translate(settings, start, size=size, renderer=renderer, **search)
-    show_results([result])
+        return [vkbloom.translate(settings, start, size=size, renderer=renderer, **search)]

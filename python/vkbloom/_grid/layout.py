@@ -199,10 +199,10 @@ def ranking(grid: Grid) -> tuple[int, ...]:
         # blur while the bloom is off.
         for backwards in (False, True):
             steps = list(walk(grid.shape, backwards=backwards))
-            names = _core.dry_run(_planned(grid, [index for _, index in steps]))
-            for (stepped, _), ran in zip(steps, names, strict=True):
+            passes = _core.dry_run(_planned(grid, [index for _, index in steps]))
+            for (stepped, _), ran in zip(steps, passes, strict=True):
                 if stepped is not None:
-                    costs[stepped] += len(ran)
+                    costs[stepped] += len({name for name, *_ in ran})
     return ranking_of(costs, [axis.kind in ("settings", "preset") for axis in grid.axes])
 
 

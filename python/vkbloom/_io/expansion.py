@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom._checks import as_float
+from vkbloom._checks import check_number
 
 #: Values up to this one stay as they are: 0.91 of an 8-bit file in sRGB, the level 231.
 KNEE: Final = 0.8
@@ -19,12 +18,7 @@ _LARGEST: Final = 1024.0
 
 def check_expansion(expand: float | None) -> float:
     """Return the value that 1 becomes; None is 1."""
-    if expand is None:
-        return 1.0
-    value = as_float("expand", expand)
-    if not 1 <= value <= _LARGEST or math.isnan(value):
-        raise ValueError(f"expand: {expand!r} is out of range, 1 to {_LARGEST:g}")
-    return value
+    return 1.0 if expand is None else check_number("expand", expand, 1, _LARGEST)
 
 
 def expanded(image: NDArray[Any], expand: float | None) -> NDArray[Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 import re
 from collections.abc import Iterator
@@ -178,7 +179,8 @@ def _read(
         notes=tuple(notes),
     )
     # Last, since the reader goes to other parts.
-    return replace(stored, parts=tuple(_parts(reader)))
+    parts = itertools.islice(_parts(reader), _MAX_PARTS)
+    return replace(stored, parts=tuple(map(_name_of, parts)))
 
 
 def _chosen_part(
@@ -188,9 +190,7 @@ def _chosen_part(
     if layer is not None:
         subimage = _part_with(reader, name, subimage, layer)
     if subimage < 0 or not _seek(reader, subimage):
-        count = 0
-        while _seek(reader, count):
-            count += 1
+        count = sum(1 for _ in _parts(reader))
         raise ValueError(f"{name}: subimage {subimage} is not in 0..{count - 1}")
     spec = reader.spec()
     if spec.width < 1 or spec.height < 1:
@@ -269,17 +269,20 @@ def _stated_curve(
 
 def _layers(spec: OpenImageIO.ImageSpec) -> list[str]:
     """Return the layer of each channel: the prefix of its name, or else the name of the part."""
-    part = spec.get_string_attribute("oiio:subimagename")
-    return [name.rpartition(".")[0] or part for name in spec.channelnames]
+    return [name.rpartition(".")[0] or _name_of(spec) for name in spec.channelnames]
+
+
+def _name_of(spec: OpenImageIO.ImageSpec) -> str:
+    name: str = spec.get_string_attribute("oiio:subimagename")
+    return name
 
 
 def _part_with(reader: OpenImageIO.ImageInput, name: str, subimage: int, layer: str) -> int:
     """Return the first part, from `subimage` on, that has a layer."""
     known: dict[str, None] = {}
-    for index in range(max(subimage, 0), subimage + _MAX_PARTS):
-        if not _seek(reader, index):
-            break
-        layers = _layers(reader.spec())
+    first = max(subimage, 0)
+    for index, spec in enumerate(itertools.islice(_parts(reader, first), _MAX_PARTS), first):
+        layers = _layers(spec)
         if layer in layers:
             return index
         known.update(dict.fromkeys(filter(None, layers)))
@@ -287,11 +290,12 @@ def _part_with(reader: OpenImageIO.ImageInput, name: str, subimage: int, layer: 
     raise ValueError(f"{name}: there is no layer {layer!r}; {listed}")
 
 
-def _parts(reader: OpenImageIO.ImageInput) -> Iterator[str]:
-    for index in range(_MAX_PARTS):
+def _parts(reader: OpenImageIO.ImageInput, first: int = 0) -> Iterator[OpenImageIO.ImageSpec]:
+    """Make each part the current one, and yield what it is."""
+    for index in itertools.count(first):
         if not _seek(reader, index):
             return
-        yield reader.spec().get_string_attribute("oiio:subimagename")
+        yield reader.spec()
 
 
 def listed_parts(stored: StoredImage) -> str:

@@ -642,7 +642,10 @@ class Renderer:
         else:
             width, height = check_size("size", SCENE_SIZE if size is None else size)
         plan = self._core.plan(planned, settings, names)
-        passes = tuple(Pass(*row[:-1]) for row in plan.passes)
+        passes = tuple(
+            Pass(name, shader, tuple(dict.fromkeys(reads)), writes, variant)
+            for name, shader, reads, writes, variant, _ in plan.passes
+        )
         return Plan(
             kind,
             (width, height),

@@ -115,7 +115,8 @@ class Surface:
         linear = dtype != "uint8" and not (framebuffer == "final" and settings.encoding != "none")
         if len(self._pending) == _FRAMES_IN_FLIGHT:
             self._pending.popleft().wait()
-        submission = core.show(given, plan, self._screen, width, height, linear)
+        shown = self._screen, width, height, linear
+        submission = core.run(given, (plan,), ((None,),), False, shown)
         if submission:
             self._pending.append(submission)
         return submission is not None

@@ -160,28 +160,25 @@ class _Loader:
                 self._file.fail(
                     f"damaged: {what} has both a matrix and a translation, rotation or scale"
                 )
-            matrix = self._file.floats(node.matrix, f"{what}.matrix", 16).reshape(4, 4).T
+            matrix = self._file.floats(node.matrix, f"{what}.matrix", range(16)).reshape(4, 4).T
             affine_row = (0.0, 0.0, 0.0, 1.0)
             # A tolerance, since exporters multiply in single precision.
             if not np.allclose(matrix[3], affine_row, rtol=0.0, atol=1e-5):
                 self._file.fail(f"damaged: {what}.matrix is not affine")
             matrix[3] = affine_row
             return matrix
-        if node.rotation is not None:
-            rotation = self._file.floats(node.rotation, f"{what}.rotation", 4)
-            length = np.linalg.norm(rotation)
-            if length == 0.0:
-                self._file.fail(f"damaged: {what}.rotation has no length")
-            x, y, z, w = rotation / length
-            matrix[:3, :3] = (
-                (1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)),
-                (2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)),
-                (2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)),
-            )
-        if node.scale is not None:
-            matrix[:3, :3] *= self._file.floats(node.scale, f"{what}.scale", 3)
-        if node.translation is not None:
-            matrix[:3, 3] = self._file.floats(node.translation, f"{what}.translation", 3)
+        rotation = self._file.floats(node.rotation, f"{what}.rotation", (0, 0, 0, 1))
+        length = np.linalg.norm(rotation)
+        if length == 0.0:
+            self._file.fail(f"damaged: {what}.rotation has no length")
+        x, y, z, w = rotation / length
+        matrix[:3, :3] = (
+            (1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)),
+            (2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)),
+            (2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)),
+        )
+        matrix[:3, :3] *= self._file.floats(node.scale, f"{what}.scale", (1, 1, 1))
+        matrix[:3, 3] = self._file.floats(node.translation, f"{what}.translation", (0, 0, 0))
         return matrix
 
     # Meshes
@@ -363,14 +360,10 @@ class _Loader:
         base_texture = None
         metal = material.pbrMetallicRoughness
         if metal is not None:
-            if metal.baseColorFactor is not None:
-                factor = self._file.floats(
-                    metal.baseColorFactor, f"{what}.baseColorFactor", 4, low=0.0
-                )[:3]
-            if metal.baseColorTexture is not None:
-                base_texture = self._textures.use(
-                    metal.baseColorTexture, f"{what}.baseColorTexture"
-                )
+            factor = self._file.floats(
+                metal.baseColorFactor, f"{what}.baseColorFactor", (1, 1, 1, 1), low=0.0
+            )[:3]
+            base_texture = self._textures.use(metal.baseColorTexture, f"{what}.baseColorTexture")
             if metal.metallicRoughnessTexture is not None:
                 self._file.leave_out("metallic-roughness textures")
         if material.normalTexture is not None:
@@ -381,7 +374,7 @@ class _Loader:
             self._file.leave_out(f"alpha mode {reprlib.repr(material.alphaMode)}")
         emission = self._emission(material, what)
         emission_texture = None
-        if material.emissiveTexture is not None and emission.any():
+        if emission.any():
             emission_texture = self._textures.use(
                 material.emissiveTexture, f"{what}.emissiveTexture"
             )
@@ -389,20 +382,16 @@ class _Loader:
 
     def _emission(self, material: Parsed, what: str) -> Floats:
         """Return the emissive factor times its strength."""
-        emission = np.zeros(3)
-        if material.emissiveFactor is not None:
-            emission = self._file.floats(
-                material.emissiveFactor, f"{what}.emissiveFactor", 3, low=0.0
-            )
+        emission = self._file.floats(
+            material.emissiveFactor, f"{what}.emissiveFactor", (0, 0, 0), low=0.0
+        )
         extensions = material.extensions
         if isinstance(extensions, dict) and EMISSIVE_STRENGTH in extensions:
             extension = extensions[EMISSIVE_STRENGTH]
             if not isinstance(extension, dict):
                 self._file.fail(f"{what}.{EMISSIVE_STRENGTH} is not an object")
-            strength = extension.get("emissiveStrength", 1.0)
-            emission = emission * self._file.floats(
-                [strength], f"{what}.emissiveStrength", 1, low=0.0
-            )
+            strength = [extension.get("emissiveStrength", 1.0)]
+            emission *= self._file.floats(strength, f"{what}.emissiveStrength", (1,), low=0.0)
             if emission.max() > FLOAT_MAX:
                 self._file.fail(f"{what} emits more than float32 can hold")
         return emission

@@ -17,6 +17,7 @@ import os
 import re
 import reprlib
 import struct
+from collections.abc import Sequence
 from pathlib import Path, PureWindowsPath
 from typing import Any, Final, NoReturn, TypeAlias
 from urllib.parse import unquote
@@ -174,10 +175,13 @@ class GltfFile:
             self.fail(f"{what} is {reprlib.repr(value)}; {low}..{high} is possible")
         return value
 
-    def floats(self, value: object, what: str, size: int, *, low: float = -FLOAT_MAX) -> Floats:
-        """Return a list as an array if it has `size` finite numbers of at least `low`."""
-        if not isinstance(value, list) or len(value) != size:
-            self.fail(f"{what} is {reprlib.repr(value)}; {size} numbers are needed")
+    def floats(
+        self, value: object, what: str, usual: Sequence[float], *, low: float = -FLOAT_MAX
+    ) -> Floats:
+        """Return a list as an array if it has as many finite numbers as what None stands for."""
+        value = list(usual) if value is None else value
+        if not isinstance(value, list) or len(value) != len(usual):
+            self.fail(f"{what} is {reprlib.repr(value)}; {len(usual)} numbers are needed")
         for number in value:
             if isinstance(number, bool) or not isinstance(number, (int, float)):
                 self.fail(f"{what} holds {reprlib.repr(number)}; a number is needed")

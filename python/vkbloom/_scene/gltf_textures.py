@@ -68,7 +68,9 @@ class TextureReader:
         self._texels = 0
 
     def use(self, info: Parsed, what: str) -> TextureUse | None:
-        """Read the texture of a material's textureInfo; None if it has no supported image."""
+        """Read the texture of a material's textureInfo, if there is one with a supported image."""
+        if info is None:
+            return None
         texture = self._file.item("textures", info.index, what)
         user = f"textures[{info.index}]"
         if texture.source is None:
@@ -96,9 +98,9 @@ class TextureReader:
         extension's specification.
         """
         what = f"{what}.{TEXTURE_TRANSFORM}"
-        offset = self._file.floats(given.get("offset", [0.0, 0.0]), f"{what}.offset", 2)
-        scale = self._file.floats(given.get("scale", [1.0, 1.0]), f"{what}.scale", 2)
-        (angle,) = self._file.floats([given.get("rotation", 0.0)], f"{what}.rotation", 1)
+        offset = self._file.floats(given.get("offset"), f"{what}.offset", (0, 0))
+        scale = self._file.floats(given.get("scale"), f"{what}.scale", (1, 1))
+        (angle,) = self._file.floats([given.get("rotation", 0.0)], f"{what}.rotation", (0,))
         cosine, sine = math.cos(angle), math.sin(angle)
         return np.column_stack((np.array([[cosine, sine], [-sine, cosine]]) * scale, offset))
 

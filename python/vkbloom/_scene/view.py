@@ -12,29 +12,24 @@ from numpy.typing import NDArray
 if TYPE_CHECKING:
     from vkbloom._scene.scene import Camera
 
-#: Column by column.
-Matrix = list[list[float]]
 _DEGREE: Final = math.pi / 180.0
 _TURN: Final = 2.0 * math.pi
 
 
-def _identity() -> Matrix:
-    return [[float(row == column) for row in range(4)] for column in range(4)]
+def _moved(offset: Sequence[float]) -> NDArray[np.float64]:
+    """Return the matrix of a translation."""
+    matrix = np.eye(4)
+    matrix[:3, 3] = offset
+    return matrix
 
 
-def _translate(matrix: Matrix, offset: Sequence[float]) -> None:
-    """Multiply a matrix by a translation."""
-    x, y, z = offset
-    for row in range(4):
-        matrix[3][row] += matrix[0][row] * x + matrix[1][row] * y + matrix[2][row] * z
-
-
-def _rotate(matrix: Matrix, axis: int, angle: float) -> None:
-    """Multiply a matrix by a rotation by an angle in radians around an axis."""
-    a, b = matrix[(axis + 1) % 3], matrix[(axis + 2) % 3]
-    cosine, sine = math.cos(angle), math.sin(angle)
-    for row in range(4):
-        a[row], b[row] = cosine * a[row] + sine * b[row], cosine * b[row] - sine * a[row]
+def _turned(axis: int, angle: float) -> NDArray[np.float64]:
+    """Return the matrix of a rotation by an angle in radians around an axis."""
+    a, b = (axis + 1) % 3, (axis + 2) % 3
+    matrix = np.eye(4)
+    matrix[a, a] = matrix[b, b] = math.cos(angle)
+    matrix[b, a], matrix[a, b] = math.sin(angle), -math.sin(angle)
+    return matrix
 
 
 def matrices(camera: Camera, turns: float, aspect: float) -> NDArray[np.float32]:
@@ -50,24 +45,19 @@ def matrices(camera: Camera, turns: float, aspect: float) -> NDArray[np.float32]
     tangent = math.tan(camera.fov * _DEGREE / 2.0)
     focal = 1.0 / tangent if tangent else math.inf
     depth = camera.near - camera.far
-    rows = [[focal / aspect, focal, camera.far / depth, camera.near * camera.far / depth]]
-
-    view = _identity()
-    _translate(view, camera.position)
+    view = _moved(camera.position)
     for axis, angle in enumerate(camera.rotation):
-        _rotate(view, axis, angle * _DEGREE)
-    model = _identity()
+        view = view @ _turned(axis, angle * _DEGREE)
     angle = _TURN * turns
-    _translate(model, (0.25 * math.sin(angle), -1.0, 0.25 * math.cos(angle)))
-    _rotate(model, 0, -0.15 * math.sin(angle))
-    _rotate(model, 1, angle)
-    for row in range(3):
-        x, y, z, w = (column[row] for column in view)
-        rows.append([x * m[0] + y * m[1] + z * m[2] + w * m[3] for m in model])
+    place = (0.25 * math.sin(angle), -1.0, 0.25 * math.cos(angle))
+    model = _moved(place) @ _turned(0, -0.15 * math.sin(angle)) @ _turned(1, angle)
+    rows = np.zeros((7, 4))
+    rows[0] = focal / aspect, focal, camera.far / depth, camera.near * camera.far / depth
+    rows[1:4] = (view @ model)[:3]
     # The inverse of a rotation is its transpose.
-    rows.append([*(-view[axis][2] for axis in range(3)), 0.0])
-    rows.append([*(view[axis][0] * aspect / focal for axis in range(3)), 0.0])
-    rows.append([*(view[axis][1] / focal for axis in range(3)), 0.0])
+    rows[4, :3], rows[5, :3], rows[6, :3] = -view[2, :3], view[0, :3], view[1, :3]
+    rows[5] *= aspect / focal
+    rows[6] /= focal
     # What single floats cannot hold is infinite.
     with np.errstate(over="ignore"):
-        return np.array(rows).astype(np.float32)
+        return rows.astype(np.float32)

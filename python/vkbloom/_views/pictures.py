@@ -43,11 +43,7 @@ def contact_sheet_html(frames: Frames) -> str:
     Pictures are made as in `leading_png`, without alpha, and averaged to at most 320 pixels.
     """
     shown = (
-        (
-            name,
-            _picture(frames, name, thumbnail_size(array))[:, :, :3],
-            _described(array, _note(frames, name)) + _ranged(array),
-        )
+        (name, _picture(frames, name, thumbnail_size(array))[:, :, :3], _facts(frames, name))
         for name, array in frames.items()
     )
     times = [(name, f"{1e3 * seconds:.3f} ms") for name, seconds in frames.timings.items()]
@@ -127,26 +123,25 @@ def picture(
     return pixels
 
 
-def _ranged(array: NDArray[Any]) -> str:
+def _facts(frames: Frames, name: str) -> str:
+    """Return size and dtype of a framebuffer, what its name does not tell, and its range."""
+    array = frames[name]
+    note = frames.settings.glow_note if name == "glow" else ""
+    facts = (f"{array.shape[1]} x {array.shape[0]}", str(array.dtype), note, _range_of(array))
+    return ", ".join(filter(None, facts))
+
+
+def _range_of(array: NDArray[Any]) -> str:
     """Return the range of finite floats without alpha as text; "" for integers."""
     if array.dtype == np.uint8:
         return ""
     values = np.atleast_3d(array)[:, :, :3]
     finite = np.isfinite(values)
     if not finite.any():
-        return ", nothing finite"
+        return "nothing finite"
     low = values.min(where=finite, initial=np.inf)
     high = values.max(where=finite, initial=-np.inf)
-    return f", {low:.4g} to {high:.4g}" + ("" if finite.all() else ", some not finite")
-
-
-def _described(array: NDArray[Any], note: str = "") -> str:
-    return f"{array.shape[1]} x {array.shape[0]}, {array.dtype}" + (f", {note}" if note else "")
-
-
-def _note(frames: Frames, name: str) -> str:
-    """Return what a framebuffer shows where its name does not tell it."""
-    return frames.settings.glow_note if name == "glow" else ""
+    return f"{low:.4g} to {high:.4g}" + ("" if finite.all() else ", some not finite")
 
 
 def _clipped(values: NDArray[np.float32]) -> NDArray[np.float32]:
