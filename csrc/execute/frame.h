@@ -10,9 +10,16 @@
 #include "graph/plan.h"
 #include "scene/scene.h"
 #include "share/strided_copy.h"
-#include "transfer/in_place.h"
 #include "transfer/resident.h"
 #include "transfer/screen.h"
+
+// Images that passes read where the caller has them, on devices that use the host's memory: without
+// a copy, and so without anything that the next image could be compared with.
+struct vkb_in_place {
+    struct vkb_cached_image cached;  // its image belongs to a submission
+    const void *memory;              // of the last such image; only its address is used
+    struct vkb_non_finite non_finite;
+};
 
 // Everything that is kept from frame to frame. Submissions share it. The device changes it in the
 // order of the submissions, the host only when no submission is pending.

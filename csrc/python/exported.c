@@ -292,45 +292,15 @@ static bool copy_bytes(const struct exported_object *self, vkb_cuda_address to,
     return done;
 }
 
-static PyObject *read_bytes(PyObject *object, PyObject *arguments)
+static PyObject *copy_between(PyObject *object, PyObject *arguments)
 {
-    const struct exported_object *self = exported_of(object);
     struct vkb_error error = {0};
-    Py_buffer view;
-    Py_ssize_t offset;
+    unsigned long long to, from;
+    Py_ssize_t size;
 
-    if (!PyArg_ParseTuple(arguments, "w*n:read", &view, &offset))
+    if (!PyArg_ParseTuple(arguments, "KKn:copy_bytes", &to, &from, &size))
         return NULL;
-    const bool done =
-        copy_bytes(self, (uintptr_t)view.buf, address_of(self, offset), view.len, &error);
-    PyBuffer_Release(&view);
-    return finish(object, done, &error);
-}
-
-static PyObject *write_bytes(PyObject *object, PyObject *arguments)
-{
-    const struct exported_object *self = exported_of(object);
-    struct vkb_error error = {0};
-    Py_buffer view;
-
-    if (!PyArg_ParseTuple(arguments, "y*:write", &view))
-        return NULL;
-    const bool done = copy_bytes(self, address_of(self, 0), (uintptr_t)view.buf, view.len, &error);
-    PyBuffer_Release(&view);
-    return finish(object, done, &error);
-}
-
-static PyObject *copy_to(PyObject *object, PyObject *arguments)
-{
-    const struct exported_object *self = exported_of(object);
-    struct vkb_error error = {0};
-    unsigned long long address;
-    Py_ssize_t size, offset;
-
-    if (!PyArg_ParseTuple(arguments, "Knn:copy_to", &address, &size, &offset))
-        return NULL;
-    return finish(object, copy_bytes(self, address, address_of(self, offset), size, &error),
-                  &error);
+    return finish(object, copy_bytes(exported_of(object), to, from, size, &error), &error);
 }
 
 static PyObject *clone_export(PyObject *object, PyObject *arguments)
@@ -373,12 +343,12 @@ static PyMethodDef methods[] = {
      "capsule(shape, code, bits, versioned, offset, stream) -> a capsule of DLPack. The stream "
      "waits for the device; 0: the renderer's."},
     {"complete", complete, METH_NOARGS, "complete(). Waits until the device has drawn to it."},
-    {"read", read_bytes, METH_VARARGS, "read(array, offset). Fills an array of the host."},
-    {"write", write_bytes, METH_VARARGS, "write(array). Copies an array of the host there."},
+    {"copy_bytes", copy_between, METH_VARARGS,
+     "copy_bytes(to, from, size). Between addresses of this memory and of the host or the GPU, "
+     "after "
+     "what the device draws to it; waits."},
     {"clone", clone_export, METH_VARARGS,
      "clone(size, offset) -> Exported. A copy of so many bytes."},
-    {"copy_to", copy_to, METH_VARARGS,
-     "copy_to(address, size, offset). To other memory of the GPU."},
     {0},
 };
 

@@ -6,7 +6,6 @@
 
 #include "share/cuda.h"
 #include "vulkan/memory.h"
-#include "vulkan/timeline.h"
 
 struct vkb_export {
     struct vkb_export *previous, *next;  // in the list of taken or idle ones

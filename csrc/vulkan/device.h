@@ -6,7 +6,6 @@
 #include "vulkan/format.h"
 #include "vulkan/messages.h"
 #include "vulkan/parts.h"
-#include "vulkan/timeline.h"
 
 #include <stdatomic.h>
 
@@ -14,6 +13,18 @@
 // the float nearest to 1 / 255. Other ones, or half floats that are not theirs, have no fused
 // passes.
 enum vkb_texels { VKB_TEXELS_UNKNOWN, VKB_TEXELS_DIVIDED, VKB_TEXELS_SCALED, VKB_TEXELS_OTHER };
+
+// The points on semaphores that submissions wait for and signal.
+struct vkb_sync_point {
+    VkSemaphore semaphore;  // VK_NULL_HANDLE: none
+    uint64_t value;         // 0: the semaphore is binary
+};
+
+// Between a submission and others: a screen, and CUDA.
+enum vkb_external_access { VKB_EXTERNAL_SCREEN, VKB_EXTERNAL_CUDA, VKB_EXTERNAL_COUNT };
+struct vkb_sync {
+    struct vkb_sync_point waits[VKB_EXTERNAL_COUNT], signals[VKB_EXTERNAL_COUNT];
+};
 
 struct vkb_device {
     struct vkb_instance *instance;
@@ -80,5 +91,10 @@ bool vkb_device_wait(struct vkb_device *device, VkFence fence, uint32_t frames,
 // Waits until the queue has done everything, as long as a frame may take after the submissions,
 // which must be over.
 bool vkb_device_wait_idle(struct vkb_device *device, struct vkb_error *error);
+
+// Creates a timeline semaphore at 0, which other interfaces of the same GPU can import. *descriptor
+// is a new descriptor of it, which belongs to the caller. Needs device->timelines.
+bool vkb_timeline_export(const struct vkb_device *device, VkSemaphore *semaphore, int *descriptor,
+                         struct vkb_error *error);
 
 #endif

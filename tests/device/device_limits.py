@@ -152,7 +152,8 @@ def callbacks(renderer: Any) -> None:
         memory = snapshot(core)
         memory.complete()
         memory = memory.clone(image.size, 0)
-        memory.read(np.empty(image.size, np.uint8), 0)
+        read = np.empty(image.size, np.uint8)
+        memory.copy_bytes(read.ctypes.data, memory.address, read.nbytes)
         other: Any = Renderer(ADAPTER, validation=VALIDATION)
         with other:
             memory = snapshot(other._core)

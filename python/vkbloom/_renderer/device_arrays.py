@@ -91,7 +91,8 @@ class DeviceArray:
         if isinstance(self._memory, np.ndarray):
             return self._memory.copy()
         array = np.empty(self.shape, self.dtype)
-        self._memory.read(array, self._offset)
+        start = self._memory.address + self._offset
+        self._memory.copy_bytes(array.ctypes.data, start, array.nbytes)
         return array
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]:
@@ -232,7 +233,8 @@ def placed(
     memory: _core.Exported | NDArray[Any] = array
     if destination == "cuda":
         memory = memory_for(core, array.nbytes)
-        memory.write(np.ascontiguousarray(array))
+        dense = np.ascontiguousarray(array)
+        memory.copy_bytes(memory.address, dense.ctypes.data, dense.nbytes)
     return DeviceArray(memory, array.shape, array.dtype.name)
 
 
@@ -285,7 +287,8 @@ class ImportedArray(NamedTuple):
         """Return the array in the host's memory."""
         low, high = _span(self.shape, self.strides, self.dtype)
         span = np.empty(high - low, np.uint8)
-        self.memory.read(span, self.offset + low)
+        start = self.memory.address + self.offset + low
+        self.memory.copy_bytes(span.ctypes.data, start, span.nbytes)
         return np.ndarray(
             self.shape, self.dtype, buffer=span.data, offset=-low, strides=self.strides
         ).copy()
@@ -366,7 +369,8 @@ def fill(target: Any, name: str, made: DeviceArray, core: _core.Renderer) -> Non
         raise ValueError(f"{name} must be C-contiguous")
     if isinstance(made._memory, np.ndarray):
         raise TypeError(f"{name}: the framebuffer is on the host")
-    made._memory.copy_to(array.address, made.nbytes, made._offset)
+    start = made._memory.address + made._offset
+    made._memory.copy_bytes(array.address, start, made.nbytes)
 
 
 def take(

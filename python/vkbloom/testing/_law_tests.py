@@ -19,7 +19,7 @@ from vkbloom.testing import _moving_light as moving_light
 from vkbloom.testing import _point_spread as point_spread
 from vkbloom.testing import _scaled_scene as scaled_scene
 from vkbloom.testing._deviations import compare_with_law, figure, judge
-from vkbloom.testing._probe import Bloom, Image, Probe
+from vkbloom.testing._probe import Bloom, Probe
 from vkbloom.testing._subject import TEXEL, Subject
 
 # A mean shift that is named, in pixels.
@@ -218,7 +218,8 @@ def shift_explained(subject: Subject, why: str) -> str:
     left, top = ((length - side) // 2 for length in probe.size)
     square = probe.point((left, top), probe.value, (side, side))
     lit = probe.apply(bloom, square)[0] - probe.apply(bloom, probe.flat(0.0))[0]
-    mean = np.subtract(_centroid(lit), _centroid(square))
+    to, start = (moving_light.moments(light.mean(axis=2))[1] for light in (lit, square))
+    mean = np.subtract(to, start)
     parts = []
     for axis, shift in zip("xy", mean, strict=True):
         figure(f"shift_{axis}", float(shift))
@@ -231,9 +232,3 @@ def shift_explained(subject: Subject, why: str) -> str:
         "halved images moves light by nothing on average: a shift of half a texel comes from a "
         "pass that reads the corner of a pixel in place of its middle."
     )
-
-
-def _centroid(image: Image) -> tuple[float, float]:
-    """Return x and y of the centroid; NaN without light."""
-    total, centroid, _ = moving_light.moments(image.mean(axis=2))
-    return centroid if total > 0 else (math.nan, math.nan)
