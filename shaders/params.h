@@ -399,8 +399,8 @@
 #define OFFSET_VEC4S 3
 #define MAX_LAYERS   8
 
-// Of glare: the most stages (the bloom and a picture of dirt are added up with them) and ghosts, the
-// taps of an iteration of a streak, and how often the size of the bloom buffers is halved.
+// Of glare: the most stages (the bloom and a picture of dirt are added up with them) and ghosts,
+// the taps of an iteration of a streak, and how often the size of the bloom buffers is halved.
 #define MAX_STAGES   (GATHERED_LEVELS - 2)
 #define MAX_GHOSTS   16
 #define MAX_TAPS     8
