@@ -65,8 +65,8 @@ def test_a_filter_with_too_many_places_fails(
     source, library = tmp_path / "filter.c", tmp_path / "filter.so"
     source.write_text(FILTER)
     options = ("-DVK_NO_PROTOTYPES", "-Icsrc", "-I.", "-Ibuild/spirv", "-shared", "-fPIC")
-    files = (*(tree / "build").rglob("*.o"), source, "-o", library)
-    command: list[str | Path] = [*compiler(), *options, *files, "-lm", "-ldl"]
+    objects = map(str, (tree / "build").rglob("*.o"))
+    command = [*compiler(), *options, str(source), *objects, "-o", str(library), "-lm", "-ldl"]
     subprocess.run(command, cwd=tree, check=True)
     add_filter = ctypes.CDLL(str(library)).add_filter
     add_filter.restype = ctypes.c_char_p
