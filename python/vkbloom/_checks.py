@@ -213,7 +213,7 @@ def check_emission(emission: Any, image: Any) -> Any:
     return emission
 
 
-def check_mask(mask: object, size: tuple[int, int]) -> NDArray[np.float32]:
+def check_mask(mask: object, size: tuple[int, int], dtype: Any = np.float32) -> NDArray[Any]:
     """Return the mask as floats of 0 to 1, (H, W), if it has that height and width."""
     if _pil_mode(mask) == "P":
         raise ValueError('mask: the mode P is a palette; convert it: mask.convert("L")')
@@ -226,11 +226,11 @@ def check_mask(mask: object, size: tuple[int, int]) -> NDArray[np.float32]:
     if array.shape != size:
         hint = "; take one channel: mask[..., 0]" * (array.ndim == 3 and array.shape[:2] == size)
         raise ValueError(f"mask: shape {array.shape} is not the image's, {size}{hint}")
-    values = array.astype(np.float32, copy=False)
+    values = array.astype(dtype, copy=False)
     if array.dtype.name == "uint8":
-        return values / np.float32(255)
+        values = values / 255
     # Not the other way round, so that NaN fails too.
-    if array.dtype.kind == "f" and not (array.min() >= 0 and array.max() <= 1):
+    elif array.dtype.kind == "f" and not (array.min() >= 0 and array.max() <= 1):
         wrong = float(array[~((array >= 0) & (array <= 1))][0])
         raise ValueError(f"mask: {wrong} is out of range, 0 to 1; clip it: mask.clip(0, 1)")
     return values

@@ -194,19 +194,8 @@ class TestSettingsOfFiles:
         words = ("--settings", "settings.json", "--intensity", "0.25", "--bits", "32")
         assert apply("a.png", "b.exr", *words).exit_code == 0
         assert json.loads(facts_of("b.exr")["settings"])["intensity"] == 0.25
-        drawn = run(
-            *[
-                "render",
-                "-o",
-                "r.exr",
-                "--size",
-                "16x16",
-                "--settings",
-                "b.exr",
-                "--bloom-size",
-                "8x8",
-            ]
-        )
+        words = ("--size", "16x16", "--bloom-size", "8x8", "--settings", "b.exr")
+        drawn = run("render", "-o", "r.exr", *words)
         assert drawn.exit_code == 0, drawn.stderr
         assert json.loads(facts_of("r.exr")["settings"])["intensity"] == 0.25
 

@@ -54,15 +54,11 @@ def test_the_bloom_of_a_dark_frame(name: str) -> None:
 
 @pytest.mark.parametrize("name", presets)
 def test_negative_parts(name: str) -> None:
+    """A value at the poles of the sources' weights makes no infinity."""
     made = bloom(settings_of(name), COLOURED)
     assert made[..., 0].max() > 0
     # (Blender's saturation is a difference, which is rounded.)
     assert {"kept": made.min() < -1e-3, "removed": made.min() >= -1e-15}[ROWS[name][1]]
-
-
-@pytest.mark.parametrize("name", presets)
-def test_weights_of_negative_values_are_limited(name: str) -> None:
-    """A value at the poles of the sources' weights makes no infinity."""
     for value in (-1.0, -4.0, -12.0):
         image = COLOURED.copy()
         image[::2, ::2] = value

@@ -76,6 +76,12 @@ def base(mesh: Mesh) -> Texture:
     return surface.base
 
 
+def places_of(mesh: Mesh) -> Array:
+    """Return the texture coordinates of the base colour."""
+    assert mesh.texcoords is not None
+    return mesh.texcoords[:, :2]
+
+
 @pytest.fixture
 def load(tmp_path: Path) -> Callable[[Document], Mesh]:
     """Loads a document as a file without a warning; "a.png" beside it is an image of 4 x 3."""
@@ -182,10 +188,9 @@ def test_factor_times_vertex_colour_times_texture(
     attributes["POSITION"] = document.accessor(positions)
     attributes["COLOR_0"] = document.accessor([[0.5, 1.0, 0.25]] * 4)
     attributes["NORMAL"] = document.accessor([[0, 0, 1]] * 4)
-    assert wall.texcoords is not None
-    attributes["TEXCOORD_0"] = document.accessor(wall.texcoords[:, :2])
+    attributes["TEXCOORD_0"] = document.accessor(places_of(wall))
     # Its own texture coordinates: upside down.
-    attributes["TEXCOORD_1"] = document.accessor(wall.texcoords[:, :2] * (1, -1))
+    attributes["TEXCOORD_1"] = document.accessor(places_of(wall) * (1, -1))
     primitive["indices"] = document.accessor(wall.indices, SHORT)
     document.json["samplers"] = [{"magFilter": 9728, "minFilter": 9728}]
     document.json["textures"].append({"source": 1, "sampler": 0})
@@ -222,10 +227,9 @@ def test_triangles_without_a_texture_come_first(load: Load) -> None:
 
 def test_flat_normals_take_the_texture_coordinates_with_them(load: Load) -> None:
     mesh = load(textured())
-    assert mesh.texcoords is not None
-    np.testing.assert_array_equal(mesh.texcoords[:, :2], np.array(PLACES)[FRONT])
+    np.testing.assert_array_equal(places_of(mesh), np.array(PLACES)[FRONT])
     # x = -1 is the left, y = 1 the top, which the mesh has at -1.
-    np.testing.assert_array_equal(mesh.vertices[:, :2] / 2 + 0.5, mesh.texcoords[:, :2])
+    np.testing.assert_array_equal(mesh.vertices[:, :2] / 2 + 0.5, places_of(mesh))
 
 
 @pytest.mark.parametrize("factor", [None, [0.0, 0.0, 0.0]])
@@ -280,9 +284,7 @@ def test_normalized_integers(load: Load, component: int, full: int) -> None:
     attributes = document.json["meshes"][0]["primitives"][0]["attributes"]
     places = np.array([[0, 0], [0, full], [full, full], [full // 3, 0]])
     attributes["TEXCOORD_0"] = document.accessor(places, component, normalized=True)
-    mesh = load(document)
-    assert mesh.texcoords is not None
-    np.testing.assert_allclose(mesh.texcoords[:, :2], (places / full)[FRONT], atol=1e-7)
+    np.testing.assert_allclose(places_of(load(document)), (places / full)[FRONT], atol=1e-7)
     document.json["accessors"][-1]["normalized"] = False
     with pytest.raises(ValueError, match=r"mesh\.gltf.*TEXCOORD_0.*not normalized"):
         load(document)
@@ -319,9 +321,7 @@ def test_texture_transforms(load: Load, given: dict[str, Any], expected: Any) ->
     info["extensions"] = {"KHR_texture_transform": given}
     document.json["extensionsUsed"] = ["KHR_texture_transform"]
     document.json["extensionsRequired"] = ["KHR_texture_transform"]
-    mesh = load(document)
-    assert mesh.texcoords is not None
-    np.testing.assert_allclose(mesh.texcoords[:, :2], np.array(expected)[FRONT], atol=1e-6)
+    np.testing.assert_allclose(places_of(load(document)), np.array(expected)[FRONT], atol=1e-6)
 
 
 @pytest.mark.parametrize("place", [1, 3])
@@ -332,15 +332,11 @@ def test_other_sets_of_texture_coordinates(load: Load, place: int) -> None:
     others = np.array(PLACES) * 0.5
     attributes = document.json["meshes"][0]["primitives"][0]["attributes"]
     attributes[f"TEXCOORD_{place}"] = document.accessor(others)
-    mesh = load(document)
-    assert mesh.texcoords is not None
-    np.testing.assert_allclose(mesh.texcoords[:, :2], others[FRONT])
+    np.testing.assert_allclose(places_of(load(document)), others[FRONT])
     # The transform's own number goes before it.
     info["extensions"] = {"KHR_texture_transform": {"texCoord": 0}}
     document.json["extensionsUsed"] = ["KHR_texture_transform"]
-    mesh = load(document)
-    assert mesh.texcoords is not None
-    np.testing.assert_allclose(mesh.texcoords[:, :2], np.array(PLACES)[FRONT])
+    np.testing.assert_allclose(places_of(load(document)), np.array(PLACES)[FRONT])
 
 
 # What is left out, and what is wrong

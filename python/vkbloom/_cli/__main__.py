@@ -1,4 +1,4 @@
-"""``python -m vkbloom.cli``: the command line if the installed script is not on the path."""
+"""``python -m vkbloom._cli``: the command line for the tests."""
 
 from vkbloom._cli import main
 

@@ -145,7 +145,8 @@ class Run:
         name, target = pair
         text = ""
         if no_bloom.is_without(frames):
-            brightest = no_bloom.brightest_of(picture.pixels)
+            colours = picture.pixels[:, :, :3]
+            brightest = float(np.max(colours, initial=0, where=np.isfinite(colours)))
             text = no_bloom.reason(frames.settings, brightest)
         elif image_writing.is_straight(
             of_format(target, self.options.pipe_format), is_associated=picture.stored.associated

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom._renderer.frames import Frames
@@ -37,12 +36,6 @@ def only(frames: Frames, names: str | Sequence[str]) -> Frames:
 def is_without(frames: Frames) -> bool:
     """Whether the frames have a bloom that is zero everywhere."""
     return "bloom" in frames and not frames["bloom"][:, :, :3].any()
-
-
-def brightest_of(pixels: NDArray[Any]) -> float:
-    """Return the largest finite value of an image of floats."""
-    colours = pixels[:, :, :3]
-    return float(np.max(colours, initial=0, where=np.isfinite(colours)))
 
 
 def hidden(final: NDArray[Any], settings: Settings) -> str:

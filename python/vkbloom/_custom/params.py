@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import re
-from typing import Final, Literal, get_args
+from typing import Any, Final, Literal, get_args
 
 from vkbloom._custom.blocks import Block, Directive
 
@@ -40,13 +40,9 @@ class Param:
     names: tuple[str, ...]
     line: int
 
-    def plain(self, value: object) -> float:
-        """Return the number of a field's value, which for an ENUM can be a name."""
-        if self.names and isinstance(value, str):
-            return self.names.index(value)
-        if not isinstance(value, int | float):
-            raise TypeError(f"{self.name}: {value!r} is not a number")
-        return value
+    def plain(self, value: Any) -> float:
+        """Return the number of a field's value, which is a name for an ENUM."""
+        return self.names.index(value) if self.names else float(value)
 
 
 def read_param(block: Block) -> Param:

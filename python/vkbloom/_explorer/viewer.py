@@ -84,8 +84,8 @@ Answer = tuple[dict[str, Any], list[bytes]]
 class Viewer:
     """A source and the settings of both sides.
 
-    Arguments are those of `vkbloom.explore`, the adapter of a new renderer, the file of an image,
-    and what its highlights were expanded up to.
+    Arguments are those of `vkbloom.explore`, the file of an image, and what its highlights were
+    expanded up to.
 
     - `settings`, `frames`: The latest ones of the sides "a" and "b".
     """
@@ -99,7 +99,6 @@ class Viewer:
         size: tuple[int, int] = (1280, 720),
         shading: Shading = "deferred",
         renderer: Renderer | None = None,
-        adapter: str = "auto",
         file: str = "",
         expand: float | None = None,
     ) -> None:
@@ -119,7 +118,7 @@ class Viewer:
             self._show_image(source)
         if renderer is not None and renderer.closed:
             raise ValueError("renderer: it is closed")
-        self.renderer = Renderer(adapter) if renderer is None else renderer
+        self.renderer = Renderer() if renderer is None else renderer
         self._owned = renderer is None
         self.frames: dict[str, Frames] = {}
         self._shown: dict[object, dict[str, NDArray[Any]]] = {}

@@ -13,12 +13,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom._argument_types import FLAG, checked, checked_as
-from vkbloom._checks import check_index, import_extra, native_order
+from vkbloom._checks import check_index, import_extra
 from vkbloom._io import image_reading, image_writing, safe_writing
 from vkbloom._io.alpha import divided, hidden_notes, multiplied
 from vkbloom._io.displayed import Saved, check_saved
 from vkbloom._io.expansion import check_expansion
-from vkbloom._io.images import PIXEL_TYPES, Picture, SavedColour, check_name, is_exr
+from vkbloom._io.images import (
+    PIXEL_TYPES,
+    Picture,
+    SavedColour,
+    check_name,
+    checked_pixels,
+    is_exr,
+)
 
 FileEncoding = Literal["none", "linear", "srgb", "gamma22", "pq", "hlg"]
 
@@ -228,9 +235,8 @@ def write(
     numbers = PIXEL_TYPES[values.dtype.name]
     encoded: SavedColour | None = "linear" if is_float else None
     picture = Picture.of_values(values, numbers, encoded, _typed(oiio, metadata or {}))
-    layout = image_writing.chosen_layout(
-        oiio, picture, target, is_hdr=False, bits=bits if is_float else None
-    )
+    bits = bits if is_float else None
+    layout = image_writing.chosen_layout(picture, target, is_hdr=False, bits=bits)
     if (channels := layout[0].shape[2]) != values.shape[2]:
         raise ValueError(f"{target}: its format has no alpha; write array[..., :{channels}]")
     if not is_float and layout[1] != numbers:
@@ -248,17 +254,10 @@ def _checked(array: NDArray[Any]) -> NDArray[Any]:
         values = np.asarray(array)
     except (TypeError, ValueError) as error:
         raise TypeError(f"array: an array is needed; NumPy: {error}") from None
-    if values.dtype.name not in (*PIXEL_TYPES, "float64"):
-        raise TypeError(
-            f"array: dtype {values.dtype} is not one of uint8, uint16, float16, float32, float64"
-        )
-    if values.ndim == 2:
-        values = values[:, :, None]
-    if values.ndim != 3 or not 1 <= values.shape[2] <= 4 or 0 in values.shape:
-        raise ValueError(
-            f"array: shape {np.shape(array)} is not (H, W) or (H, W, C) with 1 to 4 channels"
-        )
-    return values.astype(np.float32) if values.dtype.name == "float64" else native_order(values)
+    values = checked_pixels("array", values)
+    if values.shape[2] > 4:
+        raise ValueError(f"array: {values.shape[2]} channels are not 1 to 4")
+    return values.astype(np.float32) if values.dtype.name == "float64" else values
 
 
 def has_straight(picture: Picture) -> bool:

@@ -66,9 +66,8 @@ def check_options(
         if kind not in _LOSSY:
             raise ValueError(f"quality: {kind} has no quality; {', '.join(_LOSSY)} have one")
     if bits is not None:
-        oiio = import_extra("OpenImageIO", "images", "Writing images")
         suffix = Path(path).suffix
-        if not any(safe_writing.holds(oiio, suffix, 3, numbers) for numbers in BITS[bits]):
+        if not any(safe_writing.holds(suffix, 3, numbers) for numbers in BITS[bits]):
             raise ValueError(f"bits: {kind} has no numbers of {bits} bits; write another format")
 
 
@@ -109,8 +108,7 @@ def save(
     if saved.view is not None or saved.primaries != "rec709":
         picture = dataclasses.replace(picture, grey=False)
     if layout is None:
-        is_hdr = displayed.is_hdr(saved)
-        layout = chosen_layout(oiio, picture, target, is_hdr=is_hdr, bits=bits)
+        layout = chosen_layout(picture, target, is_hdr=displayed.is_hdr(saved), bits=bits)
     values, described, notes = _prepared(oiio, picture, layout, saved, target)
     part = Part(values, described, {**(attributes or {}), **added})
     with safe_writing.replacing(oiio, {target: values.nbytes}) as (temporary,):
@@ -225,9 +223,7 @@ def _spec_of(
     return spec
 
 
-def chosen_layout(
-    oiio: ModuleType, picture: Picture, target: Path, *, is_hdr: bool, bits: int | None
-) -> Layout:
+def chosen_layout(picture: Picture, target: Path, *, is_hdr: bool, bits: int | None) -> Layout:
     """Return the closest channels and number type that the format supports."""
     wanted = _DEEP if is_hdr else _PREFERENCES[picture.numbers]
     if bits is not None:
@@ -235,7 +231,7 @@ def chosen_layout(
     writer = safe_writing.writer_of(target)
     for values in _layouts(picture, safe_writing.has_alpha(writer)):
         for numbers in wanted:
-            if safe_writing.holds(oiio, target.suffix, values.shape[2], numbers):
+            if safe_writing.holds(target.suffix, values.shape[2], numbers):
                 return values, numbers
     raise ValueError(
         f"{target}: {writer.format_name()} cannot hold {picture.pixels.shape[2]} channels of "

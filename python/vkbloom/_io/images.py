@@ -25,6 +25,8 @@ from typing import Any, Final, Literal, Self, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from vkbloom._checks import native_order
+
 #: "linear", "srgb" or the name of a colour space of OpenColorIO.
 Colour: TypeAlias = str
 #: The colour encoding of a file to write.
@@ -180,6 +182,19 @@ class Picture:
     def values(self) -> NDArray[Any]:
         """The pixels; a grey image has one colour channel here instead of three equal ones."""
         return self.pixels[:, :, [0, *range(3, self.pixels.shape[2])] if self.grey else slice(None)]
+
+
+def checked_pixels(name: str, image: NDArray[Any]) -> NDArray[Any]:
+    """Return an array of an image file's values as (H, W, C)."""
+    if not isinstance(image, np.ndarray):
+        raise TypeError(f"{name}: an array is needed, not {type(image).__name__}")
+    if image.dtype.name not in (kinds := (*PIXEL_TYPES, "float64")):
+        raise TypeError(f"{name}: dtype {image.dtype} is not one of {', '.join(kinds)}")
+    if image.ndim not in (2, 3) or image.size == 0:
+        raise ValueError(
+            f"{name}: shape {image.shape} is not (H, W) or (H, W, C) with sides of at least 1"
+        )
+    return np.atleast_3d(native_order(image))
 
 
 def check_name(path: str | os.PathLike[str]) -> str:

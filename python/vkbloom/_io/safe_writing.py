@@ -75,11 +75,12 @@ def has_alpha(writer: OpenImageIO.ImageOutput) -> bool:
 
 
 @functools.lru_cache
-def holds(oiio: ModuleType, suffix: str, channels: int, numbers: str) -> bool:
+def holds(suffix: str, channels: int, numbers: str) -> bool:
     """Return whether a format supports a number of channels and a number type.
 
     OpenImageIO knows this only for a complete file: a small one is written and opened again.
     """
+    oiio = import_extra("OpenImageIO", "images", "Writing images")
     with tempfile.TemporaryDirectory(prefix="vkbloom-") as folder:
         name = f"{folder}/image{suffix}"
         spec = oiio.ImageSpec(_TRIED, _TRIED, channels, numbers)

@@ -30,10 +30,6 @@ class GaussianSum(WithKernel, PublishedSettings):
         """Return the kernel for a frame in pixels of the bloom buffers, shape (h, w, 3)."""
         return self._kernel(frame, buffers or frame)
 
-    def core_kernel_size(self, frame: Size, buffers: Size) -> Size:
-        """Return the kernel's width and height, without the kernel."""
-        raise NotImplementedError
-
 
 def gaussian(deviation: float, radius: int) -> NDArray[np.float64]:
     """Return a Gaussian of 2 radius + 1 pixels whose sum is 1."""

@@ -203,7 +203,7 @@ def _image_part(oiio: ModuleType, frames: Frames, name: str, file: Path) -> Part
             return None
         pixels = pixels[:, :, :3]
     numbers = PIXEL_TYPES[pixels.dtype.name]
-    if not safe_writing.holds(oiio, file.suffix, pixels.shape[2], numbers):
+    if not safe_writing.holds(file.suffix, pixels.shape[2], numbers):
         return None
     picture = Picture.of_values(pixels, numbers)
     encoding = frames.settings.encoding

@@ -10,12 +10,12 @@ from typing import Any, Final, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom._checks import import_extra, native_order
+from vkbloom._checks import import_extra
+from vkbloom._io.images import checked_pixels
 from vkbloom._io.srgb import decode_srgb
 
 Metric = Literal["ssim", "psnr", "flip"]
 
-_DTYPES: Final = ("uint8", "uint16", "float16", "float32", "float64")
 # Side of scikit-image's default window in pixels.
 _SSIM_WINDOW: Final = 7
 #: Names of the metrics.
@@ -96,7 +96,7 @@ def compare(
     of 7 x 7), FLIP is OpenImageIO's: LDR-FLIP of integers, HDR-FLIP of floats.
     Values that are not finite count as 0 in SSIM and FLIP only.
     """
-    a, b = checked_image("a", a), checked_image("b", b)
+    a, b = checked_pixels("a", a), checked_pixels("b", b)
     mismatches = _mismatches(a, b)
     if mismatches:
         return Comparison(
@@ -151,19 +151,6 @@ def difference(a: NDArray[Any], b: NDArray[Any]) -> tuple[NDArray[np.float32], f
     return picture.astype(np.float32), scale
 
 
-def checked_image(name: str, image: NDArray[Any]) -> NDArray[Any]:
-    """Return an image as (H, W, C)."""
-    if not isinstance(image, np.ndarray):
-        raise TypeError(f"{name}: an array is needed, not {type(image).__name__}")
-    if image.dtype.name not in _DTYPES:
-        raise TypeError(f"{name}: dtype {image.dtype} is not one of {', '.join(_DTYPES)}")
-    if image.ndim not in (2, 3) or image.size == 0:
-        raise ValueError(
-            f"{name}: shape {image.shape} is not (H, W) or (H, W, C) with sides of at least 1"
-        )
-    return np.atleast_3d(native_order(image))
-
-
 def _mismatches(a: NDArray[Any], b: NDArray[Any]) -> tuple[str, ...]:
     """Return the reasons why two images cannot be compared value by value."""
     results: list[str] = []
@@ -179,7 +166,7 @@ def _mismatches(a: NDArray[Any], b: NDArray[Any]) -> tuple[str, ...]:
 
 def _comparable(a: NDArray[Any], b: NDArray[Any]) -> Pair:
     """Return a pair, or raise ValueError for images that cannot be compared value by value."""
-    a, b = checked_image("a", a), checked_image("b", b)
+    a, b = checked_pixels("a", a), checked_pixels("b", b)
     if mismatches := _mismatches(a, b):
         raise ValueError(f"a, b: not comparable: {'; '.join(mismatches)}")
     return pair_of(a, b)

@@ -11,8 +11,9 @@ from typing import Any, Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from vkbloom._io.images import checked_pixels
 from vkbloom._io.srgb import decode_srgb, encode_srgb
-from vkbloom._views.comparison import checked_image, pair_of
+from vkbloom._views.comparison import pair_of
 from vkbloom._views.shifts import MIN_SHIFT, find_shift, rms
 
 Cause = Literal[
@@ -117,7 +118,7 @@ def diagnose(a: NDArray[Any], b: NDArray[Any]) -> Diagnosis:
     >>> testing.diagnose(image, np.roll(image, 3, 1)).value
     (3.0, 0.0)
     """
-    a, b = checked_image("a", a), checked_image("b", b)
+    a, b = checked_pixels("a", a), checked_pixels("b", b)
     if a.shape != b.shape:
         return _of_shapes(a, b)
     pair = pair_of(a, b)

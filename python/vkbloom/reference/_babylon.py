@@ -48,18 +48,12 @@ def _prefilter(rgb: Array, settings: BabylonBloom) -> Array:
     return np.where(luminance(rgb) >= settings.threshold ** (1 / 2.2), rgb, 0.0)
 
 
-def _tap_count(settings: BabylonBloom) -> int:
-    """Return the number of weights: the nearest to the kernel's size that is 1 modulo 4."""
-    wanted = math.floor(max(settings.kernel * settings.scale, 1) + 0.5)
-    for step in (0, -1, 1, -2, 2):
-        if wanted + step > 0 and (wanted + step) % 4 == 1:
-            return max(wanted + step, 3)
-    return max(wanted, 3)
-
-
 def _taps(settings: BabylonBloom) -> list[tuple[float, float]]:
     """Return offset and weight of each sample, in pixels."""
-    count = _tap_count(settings)
+    # The nearest number to the kernel's size that is 1 modulo 4.
+    wanted = math.floor(max(settings.kernel * settings.scale, 1) + 0.5)
+    near = [n for n in range(max(wanted - 2, 1), wanted + 3) if n % 4 == 1]
+    count = max(min(near, key=lambda n: abs(n - wanted)), 3)
     middle = (count - 1) // 2
     weights = np.exp(-4.5 * (2 * np.arange(count) / (count - 1) - 1) ** 2)
     weights /= weights.sum()

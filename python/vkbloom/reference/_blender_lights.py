@@ -152,11 +152,6 @@ def _convolved(
     return {"kernel": kernel, "light": store(convolve(bright, used, "zero"))}
 
 
-def _kernel_gain(settings: BlenderGlare, size: tuple[int, int]) -> Array:
-    sums: Array = settings.kernel_pixels(size).sum(axis=(0, 1))
-    return sums
-
-
 def _recursed(lines: Array, inside: Array, settings: BlenderGlare, store: Storage) -> Array:
     """Filter along the first axis, forwards and backwards, with results of earlier pixels.
 
@@ -261,6 +256,6 @@ LIGHTS: Final[dict[str, Any]] = {
 GAINS: Final[dict[str, Any]] = {
     "streaks": _streaks_gain,
     "ghosts": _ghosts_gain,
-    "fog_glow": _kernel_gain,
+    "fog_glow": lambda settings, size: settings.kernel_pixels(size).sum(axis=(0, 1)),
     "simple_star": lambda settings, size: np.full(3, 2.0),
 }

@@ -118,12 +118,9 @@ def vjp(
 
     def pullback(cotangents: Mapping[str, NDArray[Any]]) -> Gradients:
         given = check_cotangents(cotangents, values)
-        given = {
-            name: part for name, part in given.items() if isinstance(results_by_name[name], Traced)
-        }
-        derivatives = gradients(
-            [(results_by_name[name], part) for name, part in given.items()], [*inputs.values()]
-        )
+        pairs = [(results_by_name[name], part) for name, part in given.items()]
+        traced_pairs = [pair for pair in pairs if isinstance(pair[0], Traced)]
+        derivatives = gradients(traced_pairs, [*inputs.values()])
         results = Gradients(zip(inputs, derivatives, strict=True))
         for name, pixels in (("image", scene), ("emission", source)):
             if name in results:

@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from vkbloom._argument_types import SETTINGS, checked_as
-from vkbloom._checks import check_emission
+from vkbloom._checks import check_emission, check_mask
 from vkbloom._settings.registry import METHODS, Reference
 
 from . import _custom as custom
 from . import _glare as glare
 from ._compositing import composite_checked, strength_of
-from ._image import BlurInput, as_float, as_mask, finite, format_of, storage
+from ._image import BlurInput, as_float, finite, format_of, storage
 from ._sampling import Array, sample, scaled, size_of
 from ._threshold import apply_threshold, masked
 
@@ -96,7 +96,7 @@ def checked_image(
     if emission is not None:
         source = as_float(emission, "emission", (3, 4))
         check_emission(np.asarray(emission), np.asarray(image))
-    return scene, source, None if mask is None else as_mask(mask, size_of(scene)), format
+    return scene, source, _weights(mask, size_of(scene)), format
 
 
 def framebuffers(
@@ -189,7 +189,7 @@ def passes(
     colours = values[..., :3] if has_alpha else values
     colours = store.first(colours) if settings.published else store(colours)
     size = size or size_of(values)
-    weights = None if mask is None else as_mask(mask, size)
+    weights = _weights(mask, size)
     given = BlurInput(colours, size, store, weights if settings.published else None)
     framebuffers: dict[str, Array] = method.passes(given, settings)
     return _with_alphas(framebuffers) if has_alpha else framebuffers
@@ -250,15 +250,16 @@ def _method(settings: Settings) -> Reference:
         ) from None
 
 
+def _weights(mask: NDArray[Any] | None, size: tuple[int, int]) -> Array | None:
+    """Return a mask as values of 0 to 1, (H, W, 1)."""
+    return None if mask is None else check_mask(mask, size[::-1], np.float64)[..., np.newaxis]
+
+
 def _with_alphas(framebuffers: dict[str, Array]) -> dict[str, Array]:
-    """Return the images with a fourth channel; a kernel has three."""
+    """Return the images with a fourth channel, by default of 1; a kernel has three."""
     return {
-        name: part if name == "kernel" else _with_alpha(part) for name, part in framebuffers.items()
+        name: part
+        if name == "kernel" or part.shape[2] == 4
+        else np.concatenate([part, np.ones((*part.shape[:2], 1))], axis=-1)
+        for name, part in framebuffers.items()
     }
-
-
-def _with_alpha(image: Array) -> Array:
-    """Return rgb with a fourth channel of 1. Four channels are returned unchanged."""
-    if image.shape[2] == 4:
-        return image
-    return np.concatenate([image, np.ones((*image.shape[:2], 1))], axis=-1)

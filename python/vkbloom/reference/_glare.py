@@ -15,14 +15,9 @@ from ._tape import Traced
 from ._upsampling import halvings
 
 
-def stage_format(format: str) -> str:
-    """Return the format of the stages' images, for bloom buffers of a format."""
-    return "rgba32float" if format == "rgba32float" else "rgba16float"
-
-
 def stages(source: Array, glare: Sequence[Any], format: str) -> dict[str, Array]:
-    """Return the framebuffer of each stage."""
-    store = storage(stage_format(format))
+    """Return the framebuffer of each stage; `format` is that of the bloom buffers."""
+    store = storage("rgba32float" if format == "rgba32float" else "rgba16float")
     counts = Counter(stage.stage for stage in glare)
     seen: Counter[str] = Counter()
     images = {}

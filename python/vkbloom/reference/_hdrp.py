@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -58,13 +59,9 @@ def passes(source: BlurInput, settings: HdrpBloom) -> dict[str, Array]:
         downs.append(_along_both(downs[-1], level, _shrink_rows, source.store))
     is_cubic = settings.high_quality_filtering and width >= 800 and height >= 450
     rows = _cubic_rows if is_cubic else _linear_rows
-    return combine(
-        downs,
-        source,
-        mixed(0.05 + (0.95 - 0.05) * settings.scatter, count),
-        upsample=lambda image, larger: _along_both(image, larger, rows),
-        last=cubic,
-    )
+    shares = mixed(0.05 + (0.95 - 0.05) * settings.scatter, count)
+    up = partial(_along_both, rows=rows)
+    return combine(downs, source, shares, upsample=up, last=cubic)
 
 
 def gain(settings: HdrpBloom, size: tuple[int, int]) -> float:

@@ -23,7 +23,10 @@ _FORMATS = {
 
 def as_float(image: NDArray[Any], name: str, channels: Collection[int] | None = None) -> Array:
     """Return an image in real units."""
-    array = as_array(image, name)
+    try:
+        array = np.asarray(image)
+    except (TypeError, ValueError) as error:
+        raise type(error)(f"{name}: not an array; NumPy: {error}") from None
     if array.dtype.name not in _FORMATS:
         raise TypeError(
             f"{name}: {array.dtype} is not uint8, float16, float32 or float64"
@@ -36,27 +39,6 @@ def as_float(image: NDArray[Any], name: str, channels: Collection[int] | None = 
         raise ValueError(f"{name}: {array.shape[2]} channels are not {wanted}")
     real = array.astype(np.float64)
     return real / 255 if array.dtype == np.uint8 else real
-
-
-def as_array(values: object, name: str) -> NDArray[Any]:
-    """Return an array view, or raise an error that names the argument."""
-    try:
-        return np.asarray(values)
-    except (TypeError, ValueError) as error:
-        raise type(error)(f"{name}: not an array; NumPy: {error}") from None
-
-
-def as_mask(mask: NDArray[Any], size: tuple[int, int]) -> Array:
-    """Return a mask as values of 0 to 1."""
-    array = as_array(mask, "mask")
-    if array.dtype.kind not in "buf":
-        raise TypeError(f"mask: {array.dtype} is not a dtype of numbers")
-    if array.shape != size[::-1]:
-        raise ValueError(f"mask: shape {array.shape} is not the image's {size[::-1]}")
-    values = array.astype(np.float64) / (255 if array.dtype == np.uint8 else 1)
-    if not ((values >= 0) & (values <= 1)).all():
-        raise ValueError("mask: its values are not in 0..1")
-    return values[..., np.newaxis]
 
 
 def finite(image: Array) -> Array:

@@ -6,6 +6,7 @@ From pygfx/pygfx, pygfx/renderers/wgpu/engine/bloom.py @ f5f8f72c.
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -37,12 +38,8 @@ def passes(source: BlurInput, settings: PygfxBloom) -> dict[str, Array]:
         source.store,
         lambda image, size: np.maximum(downsample(image, size), 0),
     )
-    return combine(
-        downs,
-        source,
-        upsample=lambda image, larger: _tent(image, larger, settings.filter_radius),
-        last=linear,
-    )
+    up = partial(_tent, radius=settings.filter_radius)
+    return combine(downs, source, upsample=up, last=linear)
 
 
 def gain(settings: PygfxBloom, size: tuple[int, int]) -> float:

@@ -36,14 +36,15 @@ def passes(source: BlurInput, settings: ThreeBloom) -> dict[str, Array]:
     the levels, enlarged bilinearly and multiplied by their factors and tints; the bloom is up_0,
     bilinear. In rgba8unorm buffers, up_0 is divided by the sum of the factors, 3.
     """
-    channels = source.image.shape[2]
-    size = _first_size(size_of(source.image), settings)
+    channels, is_node = source.image.shape[2], settings.variant == "node"
+    frame = size_of(source.image)
+    size = scaled(frame, settings.resolution_scale) if is_node else halved(frame, 1)
     image = source.store(masked(_prefilter(sample(source.image, size), settings), source.mask))
     framebuffers = {"bright": image}
     total = np.zeros_like(image)
     level = size
     for k, factor in enumerate(_factors(settings.radius)):
-        level = _halved(level, settings) if k else size
+        level = halved(level, 0 if is_node else 1) if k else size
         ratio = image.shape[1] / level[0]
         taps = _taps(k, settings)
         x_taps = [(offset * ratio, weight) for offset, weight in taps]
@@ -67,18 +68,6 @@ def gain(settings: ThreeBloom, size: tuple[int, int]) -> float | Array:
         value *= sum(weight for _, weight in _taps(k, settings)) ** 2
         total = total + factor * value * np.asarray(settings.tints[k])
     return total if np.ptp(total) else float(total[0])
-
-
-def _first_size(size: tuple[int, int], settings: ThreeBloom) -> tuple[int, int]:
-    """Return the size of "bright" and of down_0."""
-    if settings.variant != "node":
-        return _halved(size, settings)
-    return scaled(size, settings.resolution_scale)
-
-
-def _halved(size: tuple[int, int], settings: ThreeBloom) -> tuple[int, int]:
-    """Return half of a size, at least 1: rounded, ties up, or floored by BloomNode."""
-    return halved(size, 0 if settings.variant == "node" else 1)
 
 
 def _factors(radius: float) -> list[float]:

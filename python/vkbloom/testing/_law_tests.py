@@ -9,17 +9,16 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Mapping
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vkbloom.testing import _laws as laws
 from vkbloom.testing import _moving_light as moving_light
 from vkbloom.testing import _point_spread as point_spread
 from vkbloom.testing import _scaled_scene as scaled_scene
 from vkbloom.testing._deviations import compare_with_law, figure, judge
-from vkbloom.testing._probe import Bloom, Image, Probe
+from vkbloom.testing._probe import Bloom, Probe
 from vkbloom.testing._subject import TEXEL, Subject
 
 # A mean shift that is named, in pixels.
@@ -189,16 +188,12 @@ def finite(subject: Subject, limit: float) -> None:
         image = probe.noise(0, probe.value)
         image[y, x] = value
         for name, bloom in blooms.items():
-            reached = _not_finite(bloom(probe.given(image)))
+            result = np.asarray(bloom(probe.given(image)))
+            reached = ~np.isfinite(result.reshape(*result.shape[:2], -1)).all(axis=2)
             reached[y, x] = False
             count = int(reached.sum())
             text = f"{value} at x {x}, y {y} reaches {count} other pixels of the {name}: "
             judge(law, (name, count, limit, f"{text}{limit:g} allowed"))
-
-
-def _not_finite(result: Any) -> NDArray[np.bool_]:
-    array = np.asarray(result)
-    return np.asarray(~np.isfinite(array.reshape(*array.shape[:2], -1)).all(axis=2))
 
 
 def reference(subject: Subject, limit: float) -> None:
@@ -218,7 +213,8 @@ def shift_explained(subject: Subject, why: str) -> str:
     left, top = ((length - side) // 2 for length in probe.size)
     square = probe.point((left, top), probe.value, (side, side))
     lit = probe.apply(bloom, square)[0] - probe.apply(bloom, probe.flat(0.0))[0]
-    mean = np.subtract(_centroid(lit), _centroid(square))
+    to, start = (moving_light.moments(light.mean(axis=2))[1] for light in (lit, square))
+    mean = np.subtract(to, start)
     parts = []
     for axis, shift in zip("xy", mean, strict=True):
         figure(f"shift_{axis}", float(shift))
@@ -231,9 +227,3 @@ def shift_explained(subject: Subject, why: str) -> str:
         "halved images moves light by nothing on average: a shift of half a texel comes from a "
         "pass that reads the corner of a pixel in place of its middle."
     )
-
-
-def _centroid(image: Image) -> tuple[float, float]:
-    """Return x and y of the centroid; NaN without light."""
-    total, centroid, _ = moving_light.moments(image.mean(axis=2))
-    return centroid if total > 0 else (math.nan, math.nan)
