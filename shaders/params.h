@@ -230,6 +230,8 @@
 #define ADJOINT_FILTER_BLOCK(B, READS, INPUT, VEC4S) \
     INPUT(B, int, start_x) \
     INPUT(B, int, start_y) \
+    INPUT(B, int, span_x) \
+    INPUT(B, int, span_y) \
     INPUT(B, float, gain) \
     INPUT(B, float, share) \
     INPUT(B, float, limit)
@@ -465,8 +467,8 @@
 // that is added up at once.
 #define TABLE_WIDTH 1024
 #define SUM_SIDE    8
-// Transposed filters in blocks: the texels of an entry of the table along an axis, and the rows of
-// an invocation that writes words.
+// Transposed filters in blocks: the texels along an axis whose weights are together in the table,
+// and the rows of an invocation that writes words.
 #define ADJOINT_SIDE 4
 #define ADJOINT_ROWS 16
 

@@ -115,36 +115,46 @@ bool vkb_accumulate_cotangent(struct vkb_adjoint *adjoint, const struct vkb_pass
     return vkb_add_adjoint_row(adjoint, &row, size, cotangent, error);
 }
 
-static struct vkb_pass_row filter_row(const struct vkb_adjoint *adjoint,
-                                      const struct vkb_filter *filter, enum vkb_mode direction,
-                                      uint32_t cotangents)
+bool vkb_add_adjoint_image(struct vkb_adjoint *adjoint, const struct vkb_pass_row *given,
+                           struct vkb_size size, uint32_t *image, struct vkb_error *error)
+{
+    struct vkb_pass_row row = *given;
+
+    read_nothing(&row);
+    return vkb_add_adjoint_row(adjoint, &row, size, image, error);
+}
+
+// A row along one axis, or both, with their tables.
+static bool make_filter_row(struct vkb_adjoint *adjoint, const struct vkb_filter *filter,
+                            enum vkb_mode direction, uint32_t cotangents, struct vkb_pass_row *row,
+                            struct vkb_error *error)
 {
     // In place of the scene of a composite, the cotangents again.
     const uint32_t reads[] = {cotangents, adjoint->table_image, cotangents};
-    struct vkb_pass_row row = vkb_adjoint_row(&vkb_shader_adjoint_filter_frag, reads, 3);
+    struct vkb_adjoint_filter_params *params = &row->params.adjoint_filter;
 
-    row.constants.direction = direction;
-    // Of one axis, the weights are packed.
-    row.constants.levels = direction == DIRECTION_BOTH ? (int32_t)filter->kernels : 0;
-    row.block = VKB_BLOCK_adjoint_filter;
-    row.params.adjoint_filter.gain = (float)filter->gain;
-    row.params.adjoint_filter.share = 1.0f;
-    return row;
+    *row = vkb_adjoint_row(&vkb_shader_adjoint_filter_frag, reads, 3);
+    row->constants.direction = direction;
+    row->constants.levels = (int32_t)filter->kernels;
+    row->block = VKB_BLOCK_adjoint_filter;
+    params->gain = (float)filter->gain;
+    params->share = 1.0f;
+    return (direction == DIRECTION_VERTICAL
+            || vkb_axis_transpose(&filter->x, filter->kernels, &adjoint->table, &params->start_x,
+                                  &params->span_x, error))
+        && (direction == DIRECTION_HORIZONTAL
+            || vkb_axis_transpose(&filter->y, filter->kernels, &adjoint->table, &params->start_y,
+                                  &params->span_y, error));
 }
 
 static bool accumulate_along(struct vkb_adjoint *adjoint, const struct vkb_filter *filter,
-                             bool rows, uint32_t cotangents, uint32_t image,
+                             enum vkb_mode direction, uint32_t cotangents, uint32_t image,
                              struct vkb_error *error)
 {
-    struct vkb_pass_row row =
-        filter_row(adjoint, filter, rows ? DIRECTION_HORIZONTAL : DIRECTION_VERTICAL, cotangents);
-    struct vkb_adjoint_filter_params *params = &row.params.adjoint_filter;
-    uint32_t start;
+    struct vkb_pass_row row;
 
-    if (!vkb_axis_transpose(rows ? &filter->x : &filter->y, false, &adjoint->table, &start, error))
-        return false;
-    *(rows ? &params->start_x : &params->start_y) = (int)start;
-    return vkb_accumulate_cotangent(adjoint, &row, image, error);
+    return make_filter_row(adjoint, filter, direction, cotangents, &row, error)
+        && vkb_accumulate_cotangent(adjoint, &row, image, error);
 }
 
 // Along one axis to an image between, then along the other one.
@@ -155,34 +165,16 @@ static bool accumulate_twice(struct vkb_adjoint *adjoint, const struct vkb_filte
     // Only the table of columns knows where the first row is.
     const bool rows = y->first == 0 && (uint64_t)x->from * y->to <= (uint64_t)x->to * y->from;
     const struct vkb_size size = {rows ? x->from : x->to, rows ? y->to : y->from};
-    struct vkb_filter first = *filter;
-    uint32_t start, between;
+    struct vkb_pass_row row;
+    uint32_t between;
 
-    first.gain = 1.0;
-    struct vkb_pass_row row =
-        filter_row(adjoint, &first, rows ? DIRECTION_HORIZONTAL : DIRECTION_VERTICAL, cotangents);
-    struct vkb_adjoint_filter_params *params = &row.params.adjoint_filter;
-    read_nothing(&row);
-    if (!vkb_axis_transpose(rows ? x : y, false, &adjoint->table, &start, error))
+    if (!make_filter_row(adjoint, filter, rows ? DIRECTION_HORIZONTAL : DIRECTION_VERTICAL,
+                         cotangents, &row, error))
         return false;
-    *(rows ? &params->start_x : &params->start_y) = (int)start;
-    return vkb_add_adjoint_row(adjoint, &row, size, &between, error)
-        && accumulate_along(adjoint, filter, !rows, between, image, error);
-}
-
-// The row of both axes at once.
-static bool make_row_of_both(struct vkb_adjoint *adjoint, const struct vkb_filter *filter,
-                             uint32_t cotangents, struct vkb_pass_row *row, struct vkb_error *error)
-{
-    uint32_t x, y;
-
-    *row = filter_row(adjoint, filter, DIRECTION_BOTH, cotangents);
-    if (!vkb_axis_transpose(&filter->x, true, &adjoint->table, &x, error)
-        || !vkb_axis_transpose(&filter->y, true, &adjoint->table, &y, error))
-        return false;
-    row->params.adjoint_filter.start_x = (int)x;
-    row->params.adjoint_filter.start_y = (int)y;
-    return true;
+    row.params.adjoint_filter.gain = 1.0f;
+    return vkb_add_adjoint_image(adjoint, &row, size, &between, error)
+        && accumulate_along(adjoint, filter, rows ? DIRECTION_VERTICAL : DIRECTION_HORIZONTAL,
+                            between, image, error);
 }
 
 // Whether the filter leaves the cotangents as they are, and nothing is added to them.
@@ -201,27 +193,17 @@ bool vkb_accumulate_filter(struct vkb_adjoint *adjoint, const struct vkb_filter 
         adjoint->cotangents[image] = cotangents;
         return true;
     }
-    struct vkb_pass_row row;
+    enum vkb_mode direction = DIRECTION_BOTH;
 
     if (filter->kernels == 1) {
         if (vkb_axis_is_identity(&filter->y))
-            return accumulate_along(adjoint, filter, true, cotangents, image, error);
-        if (vkb_axis_is_identity(&filter->x))
-            return accumulate_along(adjoint, filter, false, cotangents, image, error);
-        if (vkb_axis_readers(&filter->x) * vkb_axis_readers(&filter->y) > MAX_IN_ONE_PASS)
+            direction = DIRECTION_HORIZONTAL;
+        else if (vkb_axis_is_identity(&filter->x))
+            direction = DIRECTION_VERTICAL;
+        else if (vkb_axis_readers(&filter->x) * vkb_axis_readers(&filter->y) > MAX_IN_ONE_PASS)
             return accumulate_twice(adjoint, filter, cotangents, image, error);
     }
-    return make_row_of_both(adjoint, filter, cotangents, &row, error)
-        && vkb_accumulate_cotangent(adjoint, &row, image, error);
-}
-
-bool vkb_add_adjoint_image(struct vkb_adjoint *adjoint, const struct vkb_pass_row *given,
-                           struct vkb_size size, uint32_t *image, struct vkb_error *error)
-{
-    struct vkb_pass_row row = *given;
-
-    read_nothing(&row);
-    return vkb_add_adjoint_row(adjoint, &row, size, image, error);
+    return accumulate_along(adjoint, filter, direction, cotangents, image, error);
 }
 
 bool vkb_filter_to_image(struct vkb_adjoint *adjoint, const struct vkb_filter *filter,
@@ -230,7 +212,7 @@ bool vkb_filter_to_image(struct vkb_adjoint *adjoint, const struct vkb_filter *f
 {
     struct vkb_pass_row row;
 
-    return make_row_of_both(adjoint, filter, cotangents, &row, error)
+    return make_filter_row(adjoint, filter, DIRECTION_BOTH, cotangents, &row, error)
         && vkb_add_adjoint_image(adjoint, &row, size, image, error);
 }
 

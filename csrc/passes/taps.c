@@ -3,9 +3,6 @@
 #include <math.h>
 #include <string.h>
 
-// Lists of weights that are compared with the next one. Sizes in a simple ratio have as many.
-enum { RECENT = 8 };
-
 // Floats count up to this number.
 enum { MAX_TEXELS = 1 << 24 };
 
@@ -189,72 +186,96 @@ static void add_weights(const struct vkb_axis *axis, const struct readers *reade
         }
 }
 
-// Lists of weights in a table.
-struct list {
-    size_t place, count;
-};
-
-// Where the list at the end of the table is already; its own place if it is new.
-static size_t place_list(struct vkb_table *table, size_t count, struct list lists[RECENT],
-                         uint32_t *next)
+// The pixels that read the texels of a block. Those of an axis that is mirrored come in the
+// opposite order.
+static struct readers readers_of_block(const struct vkb_axis *axis, const struct readers *readers,
+                                       uint32_t block)
 {
-    const size_t size = count * sizeof *table->texels;
+    struct readers all = readers[block];
 
-    for (int i = 0; i < RECENT; ++i)
-        if (lists[i].count == count
-            && memcmp(table->texels[lists[i].place], table->texels[table->count], size) == 0)
-            return lists[i].place;
-    lists[(*next)++ % RECENT] = (struct list){table->count, count};
-    table->count += count;
-    return table->count - count;
+    for (uint32_t texel = block; texel < block + ADJOINT_SIDE && texel < axis->from; ++texel) {
+        all.first = readers[texel].first < all.first ? readers[texel].first : all.first;
+        all.end = readers[texel].end > all.end ? readers[texel].end : all.end;
+    }
+    return all;
 }
 
-static bool write_table(const struct vkb_axis *axis, bool kernels, const struct readers *readers,
-                        double (*weights)[VKB_MAX_KERNELS], struct vkb_table *table,
-                        struct vkb_error *error)
+static uint32_t most_of_blocks(const struct vkb_axis *axis, const struct readers *readers)
 {
-    const size_t start = table->count;
-    struct list lists[RECENT] = {0};
-    uint32_t next = 0;
+    uint32_t most = 1;
 
-    if (!vkb_grow(error, &table->texels, &table->capacity, start + axis->from,
-                  sizeof *table->texels))
-        return false;
+    for (uint32_t block = 0; block < axis->from; block += ADJOINT_SIDE) {
+        const struct readers all = readers_of_block(axis, readers, block);
+        most = all.end - all.first > most ? all.end - all.first : most;
+    }
+    return most;
+}
+
+// Writes the weights of a block: of pixels from `first` on.
+static void write_weights(const struct vkb_axis *axis, uint32_t block, uint32_t first,
+                          uint32_t kernels, const struct readers *readers,
+                          double (*weights)[VKB_MAX_KERNELS], float (*to)[4])
+{
+    for (uint32_t i = 0; i < ADJOINT_SIDE && block + i < axis->from; ++i) {
+        const struct readers *texel = &readers[block + i];
+        for (uint32_t pixel = texel->first; pixel < texel->end; ++pixel) {
+            const double *found = weights[texel->start + pixel - texel->first];
+            const uint32_t place = pixel - first;
+            if (kernels == 1)
+                to[place][i] = (float)found[0];
+            for (uint32_t kernel = 0; kernels > 1 && kernel < kernels; ++kernel)
+                to[ADJOINT_SIDE * place + i][kernel] = (float)found[kernel];
+        }
+    }
+}
+
+// Adds entries, and a list of weights for each block that differs from the one before.
+static bool write_table(const struct vkb_axis *axis, uint32_t kernels, uint32_t span,
+                        const struct readers *readers, double (*weights)[VKB_MAX_KERNELS],
+                        struct vkb_table *table, struct vkb_error *error)
+{
+    const size_t start = table->count, size = (size_t)span * (kernels == 1 ? 1 : ADJOINT_SIDE);
+    size_t place = 0;
+
     table->count += axis->from;
-    for (uint32_t texel = 0; texel < axis->from; ++texel) {
-        const struct readers *row = &readers[texel];
-        const uint32_t count = row->end - row->first, size = kernels ? count : (count + 3) / 4;
+    for (uint32_t block = 0; block < axis->from; block += ADJOINT_SIDE) {
+        const uint32_t first = readers_of_block(axis, readers, block).first;
         if (!vkb_grow(error, &table->texels, &table->capacity, table->count + size,
                       sizeof *table->texels))
             return false;
-        float *to = table->count < table->capacity ? table->texels[table->count] : NULL;
-        for (uint32_t i = 0; i < 4 * size; ++i) {
-            const uint32_t reader = kernels ? i / 4 : i, kernel = kernels ? i % 4 : 0;
-            to[i] = reader < count ? (float)weights[row->start + reader][kernel] : 0.0f;
+        float (*list)[4] = table->texels + table->count;
+        memset(list, 0, size * sizeof *list);
+        write_weights(axis, block, first, kernels, readers, weights, list);
+        if (!place || memcmp(table->texels[place], list, size * sizeof *list) != 0) {
+            place = table->count;
+            table->count += size;
         }
-        const size_t place = place_list(table, size, lists, &next);
-        table->texels[start + texel][0] = (float)(axis->first + row->first);
-        table->texels[start + texel][1] = (float)count;
-        table->texels[start + texel][2] = (float)place;
-        table->texels[start + texel][3] = 0.0f;
+        for (uint32_t texel = block; texel < block + ADJOINT_SIDE && texel < axis->from; ++texel) {
+            float *entry = table->texels[start + texel];
+            entry[0] = (float)(axis->first + readers[texel].first);
+            entry[1] = (float)(readers[texel].end - readers[texel].first);
+            entry[2] = (float)place;
+            entry[3] = (float)(axis->first + first);
+        }
     }
     return table->count <= MAX_TEXELS
         || vkb_fail(error, VKB_ERROR_VALUE, "derivatives: filters need %zu weights, more than %d",
                     table->count, MAX_TEXELS);
 }
 
-bool vkb_axis_transpose(const struct vkb_axis *axis, bool kernels, struct vkb_table *table,
-                        uint32_t *start, struct vkb_error *error)
+bool vkb_axis_transpose(const struct vkb_axis *axis, uint32_t kernels, struct vkb_table *table,
+                        int *start, int *span, struct vkb_error *error)
 {
     struct readers *readers = vkb_alloc(error, axis->from, sizeof *readers);
     double (*weights)[VKB_MAX_KERNELS] =
         readers ? vkb_alloc(error, find_readers(axis, readers), sizeof *weights) : NULL;
     bool done = weights != NULL;
 
-    *start = (uint32_t)table->count;
+    *start = (int)table->count;
     if (done) {
         add_weights(axis, readers, weights);
-        done = write_table(axis, kernels, readers, weights, table, error);
+        *span = (int)most_of_blocks(axis, readers);
+        done = write_table(axis, kernels, (uint32_t)*span, readers, weights, table, error);
     }
     vkb_free(weights);
     vkb_free(readers);
@@ -287,7 +308,6 @@ bool vkb_table_end(struct vkb_table *table, struct vkb_graph *graph, uint32_t im
         table->count = texels;
         row->height = (uint32_t)rows;
         row->serial = hash_of(table);
-        vkb_free(graph->owned[0]);
         row->pixels = graph->owned[0] = table->texels;
     } else {
         vkb_free(table->texels);

@@ -1,9 +1,12 @@
 // A filter as taps along both axes, and its transpose as tables. The forward row of a family has
 // the same taps as parameters; the functions that return a filter read them from there.
 //
-// The table of an axis has a texel (first, count, place) for each texel that the filter reads: the
-// pixels that read it, and where their weights are. Edges fold back: a pixel whose taps are beyond
-// the first or the last texel reads that one. Equal weights of several texels are there once.
+// The table of an axis has a texel (first, count, place, first of all) for each texel that the
+// filter reads: the pixels that read it, where the weights of its block of ADJOINT_SIDE texels are,
+// and the first pixel that reads one of these. A texel of weights is that of a pixel for each texel
+// of the block; of several kernels, a pixel has such a texel for each texel of the block. Edges
+// fold back: a pixel whose taps are beyond the first or the last texel reads that one. Equal
+// weights of adjacent blocks are there once.
 #ifndef VKB_TAPS_H
 #define VKB_TAPS_H
 
@@ -51,7 +54,7 @@ struct vkb_table {
 };
 
 // Fills the rest of the last row of the table, and gives its texels to the graph as the pixels of
-// the image, in place of earlier ones. On failure they are freed.
+// the image. On failure they are freed.
 bool vkb_table_end(struct vkb_table *table, struct vkb_graph *graph, uint32_t image,
                    struct vkb_error *error);
 
@@ -61,9 +64,9 @@ bool vkb_axis_is_identity(const struct vkb_axis *axis);
 // About how many pixels read a texel.
 double vkb_axis_readers(const struct vkb_axis *axis);
 
-// Adds the transpose of an axis to the table. A texel of weights has those of four pixels, of one
-// kernel; with `kernels` it has those of one pixel, of all kernels.
-bool vkb_axis_transpose(const struct vkb_axis *axis, bool kernels, struct vkb_table *table,
-                        uint32_t *start, struct vkb_error *error);
+// Adds the transpose of an axis to the table. `*span` is the number of pixels whose weights a block
+// has.
+bool vkb_axis_transpose(const struct vkb_axis *axis, uint32_t kernels, struct vkb_table *table,
+                        int *start, int *span, struct vkb_error *error);
 
 #endif

@@ -6,12 +6,10 @@
 #include <math.h>
 #include <string.h>
 
-// An axis in the table of weights (passes/taps.h): its entries, and the kernels of a texel of
-// weights, 0 for one whose weights are packed.
+// The entries of an axis in the table of weights (passes/taps.h).
 struct axis {
-    const float (*texels)[4];
-    uint32_t start, size;
-    int32_t kernels;
+    const float (*entries)[4];
+    uint32_t size;
 };
 
 static struct axis axis_of(const struct vkb_graph *graph, const struct vkb_pass_row *pass,
@@ -19,12 +17,11 @@ static struct axis axis_of(const struct vkb_graph *graph, const struct vkb_pass_
 {
     const struct vkb_adjoint_filter_params *params = &pass->params.adjoint_filter;
     const struct vkb_image_row *target = &graph->images[pass->targets[0]];
+    const float (*texels)[4] = graph->images[pass->reads[1]].pixels;
 
     return (struct axis){
-        .texels = graph->images[pass->reads[1]].pixels,
-        .start = (uint32_t)(vertical ? params->start_y : params->start_x),
+        .entries = texels + (vertical ? params->start_y : params->start_x),
         .size = vertical ? target->height : target->width,
-        .kernels = pass->constants.levels,
     };
 }
 
@@ -32,128 +29,11 @@ static const float *entry_of(const struct axis *axis, uint32_t texel)
 {
     const uint32_t last = axis->size - 1;
 
-    return axis->texels[axis->start + (texel < last ? texel : last)];
+    return axis->entries[texel < last ? texel : last];
 }
 
-static float weight_of(const struct axis *axis, uint32_t texel, uint32_t pixel, uint32_t kernel)
-{
-    const float *entry = entry_of(axis, texel);
-    const uint32_t first = (uint32_t)entry[0], place = (uint32_t)entry[2];
-    const uint32_t reader = pixel - first;
-
-    if (texel >= axis->size || pixel < first || reader >= (uint32_t)entry[1])
-        return 0.0f;
-    return axis->kernels ? axis->texels[place + reader][kernel]
-                         : axis->texels[place + reader / 4][reader % 4];
-}
-
-// The number of pixels that read the texels of a block, of which *first is the first one. Those of
-// an axis that is mirrored come in the opposite order.
-static uint32_t readers_of(const struct axis *axis, uint32_t texel, uint32_t *first)
-{
-    float low = entry_of(axis, texel)[0], high = 0.0f;
-
-    for (uint32_t i = 0; i < ADJOINT_SIDE; ++i) {
-        const float *entry = entry_of(axis, texel + i);
-        low = fminf(low, entry[0]);
-        high = fmaxf(high, entry[0] + entry[1]);
-    }
-    *first = (uint32_t)low;
-    return (uint32_t)(high - low);
-}
-
-// The most pixels that read a block of texels.
-static uint32_t span_of(const struct axis *axis)
-{
-    uint32_t most = 1, first;
-
-    for (uint32_t texel = 0; texel < axis->size; texel += ADJOINT_SIDE) {
-        const uint32_t span = readers_of(axis, texel, &first);
-        most = span > most ? span : most;
-    }
-    return most;
-}
-
-// Adds the entries of an axis, and a list of weights for each that differs from the one before.
-static bool add_blocks(const struct axis *axis, uint32_t span, struct vkb_table *to,
-                       uint32_t *start, struct vkb_error *error)
-{
-    const uint32_t blocks = (axis->size + ADJOINT_SIDE - 1) / ADJOINT_SIDE;
-    const uint32_t kernels = axis->kernels ? (uint32_t)axis->kernels : 1, list = span * kernels;
-    size_t before = 0;
-
-    *start = (uint32_t)to->count;
-    if (!vkb_grow(error, &to->texels, &to->capacity, to->count + blocks, sizeof *to->texels))
-        return false;
-    to->count += blocks;
-    for (uint32_t block = 0; block < blocks; ++block) {
-        uint32_t first;
-        readers_of(axis, block * ADJOINT_SIDE, &first);
-        if (!vkb_grow(error, &to->texels, &to->capacity, to->count + list, sizeof *to->texels))
-            return false;
-        for (uint32_t i = 0; i < list; ++i)
-            for (uint32_t k = 0; k < ADJOINT_SIDE; ++k)
-                to->texels[to->count + i][k] =
-                    weight_of(axis, block * ADJOINT_SIDE + k, first + i / kernels, i % kernels);
-        const bool same =
-            before
-            && memcmp(to->texels[before], to->texels[to->count], list * sizeof *to->texels) == 0;
-        before = same ? before : to->count;
-        to->count += same ? 0 : list;
-        const float entry[4] = {(float)first, 0.0f, (float)before, 0.0f};
-        memcpy(to->texels[*start + block], entry, sizeof entry);
-    }
-    return true;
-}
-
-// Adds tables of blocks for the axes of a filter.
-static bool add_tables(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
-                       struct vkb_pass_row *row, struct vkb_error *error)
-{
-    struct vkb_graph *graph = choice->graph;
-    const struct vkb_image_row *image = &graph->images[pass->reads[1]];
-    const struct axis x = axis_of(graph, pass, false), y = axis_of(graph, pass, true);
-    const size_t texels = (size_t)image->width * image->height;
-    const enum vkb_mode direction = (enum vkb_mode)pass->constants.direction;
-    struct vkb_table table = {0};
-    uint32_t start_x = 0, start_y = 0;
-
-    bool done = vkb_grow(error, &table.texels, &table.capacity, texels, sizeof *table.texels);
-    if (done)
-        memcpy(table.texels, image->pixels, texels * sizeof *table.texels);
-    table.count = texels;
-    if (done && direction != DIRECTION_VERTICAL) {
-        const uint32_t span = span_of(&x);
-        row->constants.radix_1 = (int32_t)span - 1;
-        done = add_blocks(&x, span, &table, &start_x, error);
-    }
-    if (done && direction != DIRECTION_HORIZONTAL) {
-        const uint32_t span = span_of(&y);
-        row->constants.radix_2 = (int32_t)span - 1;
-        done = add_blocks(&y, span, &table, &start_y, error);
-    }
-    if (!done) {
-        vkb_free(table.texels);
-        return false;
-    }
-    row->params.adjoint_filter.start_x = (int32_t)start_x;
-    row->params.adjoint_filter.start_y = (int32_t)start_y;
-    return vkb_table_end(&table, graph, pass->reads[1], error);
-}
-
-// The most weights that an invocation keeps along an axis, in vec4s. More than there are registers
-// for LLVM would be slower than the plain pass.
-enum { MAX_LINEAR = 24 };
-
-static bool fits_lists(const struct vkb_graph *graph, const struct vkb_pass_row *pass)
-{
-    const struct axis x = axis_of(graph, pass, false), y = axis_of(graph, pass, true);
-    const enum vkb_mode direction = (enum vkb_mode)pass->constants.direction;
-    const uint32_t kernels = x.kernels ? (uint32_t)x.kernels : 1;
-
-    return (direction == DIRECTION_VERTICAL || kernels * span_of(&x) <= MAX_LINEAR)
-        && (direction == DIRECTION_HORIZONTAL || kernels * span_of(&y) <= MAX_LINEAR);
-}
+// The most weights of columns that an invocation keeps: the driver compiles a load of each.
+enum { MAX_LINEAR = 128 };
 
 bool vkb_are_floats(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
 {
@@ -210,16 +90,18 @@ static void read_linear_of_composite(const struct vkb_variant_choice *choice,
 
 bool vkb_add_adjoint_linear(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
 {
+    const struct vkb_adjoint_filter_params *params = &pass->params.adjoint_filter;
     struct vkb_pass_row row;
 
-    if (!(pass->block == VKB_BLOCK_adjoint_filter && fits_lists(choice->graph, pass)
-          && vkb_are_floats(choice, pass)))
+    if (!(pass->block == VKB_BLOCK_adjoint_filter
+          && pass->constants.levels * params->span_x <= MAX_LINEAR && vkb_are_floats(choice, pass)))
         return false;
     memcpy(&row, pass, sizeof row);
+    row.constants.radix_1 = params->span_x;
+    row.constants.radix_2 = params->span_y;
     row.gains_if_finite = true;
     read_linear_of_composite(choice, &row);
     vkb_make_linear(&row, &vkb_shader_adjoint_taps_linear_rgba32float, ADJOINT_SIDE, ADJOINT_ROWS);
-    choice->failed = choice->failed || !add_tables(choice, pass, &row, choice->error);
     return vkb_add_variant(choice, &row);
 }
 
@@ -352,11 +234,13 @@ static bool make_tiles(const struct vkb_variant_choice *choice, const struct vkb
     const struct axis y = axis_of(graph, other && !vertical ? other : pass, true);
     if (other)
         replace_read(row, pass->reads[0], other->reads[0]);
-    row->params.adjoint_filter.start_x = (int32_t)x.start;
-    row->params.adjoint_filter.start_y = (int32_t)y.start;
+    if (other && vertical)
+        row->params.adjoint_filter.start_x = other->params.adjoint_filter.start_x;
+    else if (other)
+        row->params.adjoint_filter.start_y = other->params.adjoint_filter.start_y;
     row->params.adjoint_filter.gain *= other ? other->params.adjoint_filter.gain : 1.0f;
     row->constants.direction = 0;
-    row->constants.kernels = pass->constants.levels ? pass->constants.levels : 1;
+    row->constants.kernels = pass->constants.levels;
     const struct vkb_image_row *source = &graph->images[row->reads[0]];
     const int32_t ratio_x = vkb_ratio_of(source->width, x.size);
     const int32_t ratio_y = vkb_ratio_of(source->height, y.size);

@@ -26,48 +26,36 @@ vec4 cotangent_at(ivec2 place)
     return BY == BY_BLOOM ? vec4(where_finite(value, texelFetch(scene, place, 0)).rgb, 0.0) : value;
 }
 
-// The pixels that read a texel: the first one, their number, and where their weights are.
+// The texels of weights of a pixel.
+const int STRIDE = LEVELS == 1 ? 1 : ADJOINT_SIDE;
+
+// The pixels that read a texel: the first one, their number, and where its weights are.
 ivec3 readers(int start, int texel)
 {
-    return ivec3(entry(start + texel).xyz);
+    ivec4 row = ivec4(entry(start + texel));
+    return ivec3(row.xy, row.z + STRIDE * (row.x - row.w));
 }
 
-// One kernel: an entry has the weights of four pixels.
-vec4 along(int start, ivec2 pixel, bool vertical)
+// The weights of a texel in all kernels.
+vec4 weights_at(int place, int texel)
 {
-    ivec2 last = textureSize(cotangents, 0) - 1;
-    ivec3 row = readers(start, vertical ? pixel.y : pixel.x);
-    vec4 sum = vec4(0.0);
-    for (int i = 0; i < row.y; i += 4) {
-        vec4 weights = entry(row.z + i / 4);
-        [[unroll]] for (int k = 0; k < 4; ++k) {
-            int at = row.x + i + k;
-            ivec2 place = vertical ? ivec2(pixel.x, at) : ivec2(at, pixel.y);
-            sum += weights[k] * cotangent_at(min(place, last));
-        }
-    }
-    return sum;
+    int number = texel % ADJOINT_SIDE;
+    return LEVELS == 1 ? vec4(entry(place)[number], 0.0, 0.0, 0.0) : entry(place + number);
 }
 
-// Up to four kernels, whose weights an entry has: those of rows times those of columns, added up.
-vec4 across(ivec2 pixel)
-{
-    ivec3 columns = readers(params.start_x, pixel.x), rows = readers(params.start_y, pixel.y);
-    vec4 sum = vec4(0.0);
-    for (int y = 0; y < rows.y; ++y) {
-        vec4 shares = entry(rows.z + y);
-        for (int x = 0; x < columns.y; ++x)
-            sum += dot(shares, entry(columns.z + x))
-                 * cotangent_at(ivec2(columns.x + x, rows.x + y));
-    }
-    return sum;
-}
-
+// Of each kernel the weights of rows times those of columns, added up.
 vec4 shade()
 {
-    vec4 sum = DIRECTION == DIRECTION_BOTH ? across(PIXEL)
-             : DIRECTION == DIRECTION_VERTICAL
-                 ? along(params.start_y, PIXEL, true)
-                 : along(params.start_x, PIXEL, false);
+    const bool one_row = DIRECTION == DIRECTION_HORIZONTAL, one_column = DIRECTION == DIRECTION_VERTICAL;
+    ivec3 columns = one_column ? ivec3(PIXEL.x, 1, 0) : readers(params.start_x, PIXEL.x);
+    ivec3 rows = one_row ? ivec3(PIXEL.y, 1, 0) : readers(params.start_y, PIXEL.y);
+    vec4 sum = vec4(0.0);
+    for (int y = 0; y < rows.y; ++y) {
+        vec4 shares = one_row ? vec4(1.0) : weights_at(rows.z + STRIDE * y, PIXEL.y);
+        for (int x = 0; x < columns.y; ++x) {
+            vec4 weights = one_column ? vec4(1.0) : weights_at(columns.z + STRIDE * x, PIXEL.x);
+            sum += dot(shares, weights) * cotangent_at(ivec2(columns.x + x, rows.x + y));
+        }
+    }
     return gathered(params.gain * sum);
 }

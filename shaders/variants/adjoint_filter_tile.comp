@@ -25,15 +25,17 @@ vec4 entry(int place)
 Window window_at(ivec2 pixel, bool along_x)
 {
     ivec2 within = min(pixel, imageSize(target) - 1);
-    ivec3 readers = ivec3(entry(along_x ? params.start_x + within.x : params.start_y + within.y).xyz);
+    int at_texel = along_x ? within.x : within.y;
+    ivec4 readers = ivec4(entry(at_texel + (along_x ? params.start_x : params.start_y)));
     Window window;
     int exact = along_x ? EXACT : EXACT_ROWS, at_pixel = along_x ? pixel.x : pixel.y;
     window.first = exact != 0 ? exact_first(exact, at_pixel) : readers.x;
     [[unroll]] for (int i = 0; i < WINDOW; ++i) {
-        int at = window.first + i - readers.x;
-        int place = readers.z + (LEVELS == 0 ? at / 4 : at);
-        vec4 weights = at >= 0 && at < readers.y ? entry(place) : vec4(0.0);
-        window.weights[i] = LEVELS == 0 ? vec3(weights[at & 3]) : weights.xyz;
+        int at = window.first + i, number = at_texel % ADJOINT_SIDE;
+        window.weights[i] = vec3(0.0);
+        if (at >= readers.x && at < readers.x + readers.y)
+            window.weights[i] = LEVELS == 1 ? vec3(entry(readers.z + at - readers.w)[number])
+                                            : entry(readers.z + ADJOINT_SIDE * (at - readers.w) + number).xyz;
     }
     return window;
 }

@@ -1,9 +1,7 @@
 #pragma compile floats
 // The transpose of a filter (see adjoint_filter.frag) in blocks: an invocation loads each pixel once that
-// texels next to each other are read by. The table has an entry for
-// each block of four texels: the first column or row of pixels that read these, and where their weights
-// are, a texel for each, with those of the four. After the first there are RADIX_1 columns and RADIX_2
-// rows more. LEVELS is the number of kernels. BY is as there. In the tiles of GPUs `Pyramid` takes 102 ms
+// texels next to each other are read by: RADIX_1 columns and RADIX_2 rows, with the weights of a block of
+// texels. LEVELS is the number of kernels. BY is as there. In the tiles of GPUs `Pyramid` takes 102 ms
 // backwards in place of 32, `BevyBloom` 621 in place of 244 (processor time of 960 x 544 in float32, lavapipe of
 // Mesa 22.3.6, 2026-11-27).
 #include "lib/block.glsl"
@@ -14,7 +12,7 @@ UNIFORM_BLOCK(ADJOINT_FILTER_BLOCK);
 #include "lib/where_finite.glsl"
 #include "variants/pixels.glsl"
 
-const int COLUMNS = ADJOINT_SIDE, ROWS = ADJOINT_ROWS, SPAN_X = RADIX_1 + 1, SPAN_Y = RADIX_2 + 1;
+const int COLUMNS = ADJOINT_SIDE, ROWS = ADJOINT_ROWS, SPAN_X = RADIX_1, SPAN_Y = RADIX_2;
 
 layout(local_size_x = ROW_INVOCATIONS) in;
 READ_IMAGE(1, cotangents);
@@ -31,6 +29,16 @@ WRITE_IMAGE(6);
 vec4 entry(int place)
 {
     return FETCH(table, 2, place % TABLE_WIDTH, place / TABLE_WIDTH);
+}
+
+// The weights of pixel `at` for the texels of a block.
+vec4 weights_at(vec4 place, int at, int kernel)
+{
+    int first = int(place.z) + (LEVELS == 1 ? at : ADJOINT_SIDE * at);
+    if (LEVELS == 1)
+        return entry(first);
+    return vec4(entry(first)[kernel], entry(first + 1)[kernel], entry(first + 2)[kernel],
+                entry(first + 3)[kernel]);
 }
 
 vec4 cotangent_at(int x, int y)
@@ -60,16 +68,16 @@ void store_gathered(int first, int row, float share, vec4 found[COLUMNS])
 
 void along_rows(ivec2 first, int end, int start, float gain, float share)
 {
-    vec4 place = entry(start + first.x / ADJOINT_SIDE), weights[SPAN_X];
+    vec4 place = entry(start + first.x), weights[SPAN_X + 1];
 
     [[unroll]] for (int i = 0; i < SPAN_X; ++i)
-        weights[i] = gain * entry(int(place.z) + i);
+        weights[i] = gain * weights_at(place, i, 0);
     for (int y = first.y; y < end; ++y) {
         vec4 sums[COLUMNS];
         [[unroll]] for (int i = 0; i < COLUMNS; ++i)
             sums[i] = vec4(0.0);
         [[unroll]] for (int at = 0; at < SPAN_X; ++at) {
-            vec4 value = cotangent_at(int(place.x) + at, y);
+            vec4 value = cotangent_at(int(place.w) + at, y);
             [[unroll]] for (int i = 0; i < COLUMNS; ++i)
                 sums[i] += weights[at][i] * value;
         }
@@ -80,13 +88,13 @@ void along_rows(ivec2 first, int end, int start, float gain, float share)
 void along_columns(ivec2 first, int end, int start, float gain, float share)
 {
     for (int y = first.y; y < end; y += ADJOINT_SIDE) {
-        vec4 place = entry(start + y / ADJOINT_SIDE), sums[ADJOINT_SIDE * COLUMNS];
+        vec4 place = entry(start + y), sums[ADJOINT_SIDE * COLUMNS];
         [[unroll]] for (int i = 0; i < ADJOINT_SIDE * COLUMNS; ++i)
             sums[i] = vec4(0.0);
-        [[unroll]] for (int at = 0; at < SPAN_Y; ++at) {
-            vec4 weights = gain * entry(int(place.z) + at);
+        for (int at = 0; at < SPAN_Y; ++at) {
+            vec4 weights = gain * weights_at(place, at, 0);
             [[unroll]] for (int column = 0; column < COLUMNS; ++column) {
-                vec4 value = cotangent_at(first.x + column, int(place.x) + at);
+                vec4 value = cotangent_at(first.x + column, int(place.w) + at);
                 [[unroll]] for (int row = 0; row < ADJOINT_SIDE; ++row)
                     sums[row * COLUMNS + column] += weights[row] * value;
             }
@@ -103,20 +111,20 @@ void along_columns(ivec2 first, int end, int start, float gain, float share)
 
 void across(ivec2 first, int end, ivec2 start, float gain, float share)
 {
-    vec4 place_x = entry(start.x + first.x / ADJOINT_SIDE), weights[SPAN_X * (LEVELS + 1)];
+    vec4 place_x = entry(start.x + first.x), weights[SPAN_X * LEVELS + 1];
 
     [[unroll]] for (int i = 0; i < SPAN_X * LEVELS; ++i)
-        weights[i] = gain * entry(int(place_x.z) + i);
+        weights[i] = gain * weights_at(place_x, i / LEVELS, i % LEVELS);
     for (int y = first.y; y < end; y += ADJOINT_SIDE) {
-        vec4 place_y = entry(start.y + y / ADJOINT_SIDE), sums[ADJOINT_SIDE * COLUMNS];
+        vec4 place_y = entry(start.y + y), sums[ADJOINT_SIDE * COLUMNS];
         [[unroll]] for (int i = 0; i < ADJOINT_SIDE * COLUMNS; ++i)
             sums[i] = vec4(0.0);
         for (int number = 0; number < SPAN_Y; ++number) {
-            vec4 values[SPAN_X];
+            vec4 values[SPAN_X + 1];
             [[unroll]] for (int i = 0; i < SPAN_X; ++i)
-                values[i] = cotangent_at(int(place_x.x) + i, int(place_y.x) + number);
+                values[i] = cotangent_at(int(place_x.w) + i, int(place_y.w) + number);
             [[unroll]] for (int kernel = 0; kernel < LEVELS; ++kernel) {
-                vec4 shares = entry(int(place_y.z) + number * LEVELS + kernel);
+                vec4 shares = weights_at(place_y, number, kernel);
                 [[unroll]] for (int column = 0; column < COLUMNS; ++column) {
                     vec4 sum = vec4(0.0);
                     [[unroll]] for (int i = 0; i < SPAN_X; ++i)

@@ -229,7 +229,13 @@ TRANSPOSED: tuple[tuple[str, Any, tuple[int, ...], str, tuple[str, ...]], ...] =
         "f4",
         (CURVED, *(TAPS,) * 3),
     ),
-    ("cpu", DualKawase(levels=1, threshold=0.5, tonemap="aces"), (8, 32, 3), "f4", (CURVED, TAPS)),
+    (
+        "cpu",
+        DualKawase(levels=1, threshold=0.5, tonemap="aces"),
+        (8, 32, 3),
+        "f4",
+        (CURVED, TAPS, TAPS),
+    ),
     ("cpu", Pyramid(levels=2, composite="mix", exposure=0.5), (35, 62, 3), "f4", (TAPS,) * 6),
 )
 

@@ -236,9 +236,7 @@ class GltfFile:
         if accessor.bufferView is None:
             elements: NDArray[Any] = np.zeros((count, width), dtype)
         else:
-            elements = self._elements(
-                accessor.bufferView, accessor.byteOffset, count, width, dtype, what=what
-            )
+            elements = self._elements(accessor, count, width, dtype, what)
         if accessor.sparse is None:
             return elements
         return self._with_sparse(accessor.sparse, elements, what)
@@ -256,48 +254,26 @@ class GltfFile:
                 f"{reprlib.repr(indices.componentType)}; {INTEGERS} is possible"
             )
         kind = np.dtype(_COMPONENTS[indices.componentType])
-        where = (
-            self._elements(
-                indices.bufferView,
-                indices.byteOffset,
-                count,
-                1,
-                kind,
-                what=f"{what}.sparse.indices",
-            )
-            .ravel()
-            .astype(np.int64)
-        )
+        found = self._elements(indices, count, 1, kind, f"{what}.sparse.indices")
+        where = found.ravel().astype(np.int64)
         if where.max() >= len(elements) or (np.diff(where) <= 0).any():
             self.fail(f"damaged: {what}.sparse.indices do not ascend within {len(elements)}")
         replaced = elements.copy()
-        replaced[where] = self._elements(
-            values.bufferView,
-            values.byteOffset,
-            count,
-            elements.shape[1],
-            elements.dtype,
-            what=f"{what}.sparse.values",
-        )
+        width, what = elements.shape[1], f"{what}.sparse.values"
+        replaced[where] = self._elements(values, count, width, elements.dtype, what)
         return replaced
 
     def _elements(
-        self,
-        view_index: object,
-        offset: object,
-        count: int,
-        width: int,
-        dtype: np.dtype[Any],
-        *,
-        what: str,
+        self, part: Parsed, count: int, width: int, dtype: np.dtype[Any], what: str
     ) -> NDArray[Any]:
-        """Return a view ``(count, width)`` of a bufferView, after a check of its bounds."""
-        view = self.item("bufferViews", view_index, what)
-        user = f"bufferViews[{view_index}]"
+        """Return a view ``(count, width)`` of a part's bufferView, after a check of its bounds."""
+        view = self.item("bufferViews", part.bufferView, what)
+        user = f"bufferViews[{part.bufferView}]"
         data = self._buffer(view.buffer, user)
         start = self.integer(view.byteOffset or 0, f"{user}.byteOffset", 0, len(data))
         length = self.integer(view.byteLength, f"{user}.byteLength", 1, len(data) - start)
-        inside = self.integer(offset or 0, f"{what}.byteOffset", 0, length)
+        offset = getattr(part, "byteOffset", None) or 0
+        inside = self.integer(offset, f"{what}.byteOffset", 0, length)
         size = width * dtype.itemsize
         stride = size
         if view.byteStride is not None:
@@ -324,12 +300,8 @@ class GltfFile:
             if index != 0 or self._blob is None:
                 self.fail(f"damaged: {what} has no URI, and there is no binary chunk for it")
             data = self._blob
-        elif not isinstance(buffer.uri, str):
-            self.fail(f"{what}.uri is not a string")
-        elif buffer.uri[:5].lower() == "data:":
-            data = self._data_uri(buffer.uri, what)
         else:
-            data = self._outer_file(buffer.uri, length, what)
+            data = self._resource(buffer.uri, length, what)
         if len(data) < length:
             self.fail(f"damaged: {what} has {len(data)} bytes of {length}")
         self._buffers[index] = data[:length]
@@ -346,12 +318,16 @@ class GltfFile:
             length = self.integer(
                 view.byteLength, f"bufferViews[{image.bufferView}].byteLength", 1, 2**63 - 1
             )
-            return self._elements(
-                image.bufferView, 0, length, 1, np.dtype(np.uint8), what=what
-            ).tobytes()
-        if image.uri[:5].lower() == "data:":
-            return self._data_uri(image.uri, what)
-        return self._outer_file(image.uri, None, what)
+            return self._elements(image, length, 1, np.dtype(np.uint8), what).tobytes()
+        return self._resource(image.uri, None, what)
+
+    def _resource(self, uri: object, length: int | None, what: str) -> bytes:
+        """Return the bytes in a data URI, or `length` (None: all) of those of a file."""
+        if not isinstance(uri, str):
+            self.fail(f"{what}.uri is not a string")
+        if uri[:5].lower() == "data:":
+            return self._data_uri(uri, what)
+        return self._outer_file(uri, length, what)
 
     def _data_uri(self, uri: str, what: str) -> bytes:
         header, comma, payload = uri.partition(",")

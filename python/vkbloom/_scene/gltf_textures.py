@@ -105,35 +105,25 @@ class TextureReader:
         return np.column_stack((np.array([[cosine, sine], [-sine, cosine]]) * scale, offset))
 
     def _texture(self, texture: Parsed, user: str) -> Texture:
-        address_mode: list[AddressMode] = ["repeat", "repeat"]
-        mag_filter: Filter = "linear"
-        # The default is the filter with the least aliasing.
-        min_filter: Filter = "linear"
-        mipmap_filter: Filter | None = "linear"
+        sampler, file = None, self._file
         if texture.sampler is not None:
-            sampler = self._file.item("samplers", texture.sampler, user)
-            what = f"samplers[{texture.sampler}]"
-            for axis, name in enumerate(("wrapS", "wrapT")):
-                if getattr(sampler, name) is not None:
-                    address_mode[axis] = self._named(sampler, name, _ADDRESS_MODES, what)
-            if sampler.magFilter is not None:
-                mag_filter = self._named(sampler, "magFilter", _MAG_FILTERS, what)
-            if sampler.minFilter is not None:
-                min_filter, mipmap_filter = self._named(sampler, "minFilter", _MIN_FILTERS, what)
-        picture = self._picture(texture.source, user)
-        return Texture(
-            (picture,) if mipmap_filter is None else mip_levels(picture),
-            (address_mode[0], address_mode[1]),
-            mag_filter,
-            min_filter,
-            mipmap_filter or "nearest",
-        )
+            sampler = file.item("samplers", texture.sampler, user)
 
-    def _named(self, sampler: Parsed, name: str, names: dict[int, Any], what: str) -> Any:
-        value = self._file.integer(getattr(sampler, name), f"{what}.{name}", 0, 2**31 - 1)
-        if value not in names:
-            self._file.fail(f"{what}.{name} is {value}; {', '.join(map(str, names))} are possible")
-        return names[value]
+        def named(name: str, names: dict[int, Any], usual: int) -> Any:
+            what = f"samplers[{texture.sampler}].{name}"
+            value = getattr(sampler, name, None)
+            value = file.integer(usual if value is None else value, what, 0, 2**31 - 1)
+            if value not in names:
+                file.fail(f"{what} is {value}; {', '.join(map(str, names))} are possible")
+            return names[value]
+
+        wraps = (named("wrapS", _ADDRESS_MODES, 10497), named("wrapT", _ADDRESS_MODES, 10497))
+        mag_filter = named("magFilter", _MAG_FILTERS, 9729)
+        # The default is the filter with the least aliasing.
+        min_filter, mipmap_filter = named("minFilter", _MIN_FILTERS, 9987)
+        picture = self._picture(texture.source, user)
+        levels = (picture,) if mipmap_filter is None else mip_levels(picture)
+        return Texture(levels, wraps, mag_filter, min_filter, mipmap_filter or "nearest")
 
     def _picture(self, index: object, user: str) -> NDArray[np.float16]:
         """Read an image as linear rgb, with an alpha of 1.

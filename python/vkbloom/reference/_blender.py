@@ -45,11 +45,8 @@ def passes(source: BlurInput, settings: BlenderGlare) -> dict[str, Array]:
     rounding = 1e-6 if settings.type in ("fog_glow", "kernel") else 1e-14
     rgb = np.multiply(_settled(light[..., :3], settings.saturation, rounding), settings.tint)
     alpha = light[..., 3:] * (sum(settings.tint[i] for i in range(3)) / 3)
-    return {
-        **framebuffers,
-        **images,
-        "bloom": source.store.end(np.concatenate([rgb, alpha], axis=2)),
-    }
+    bloom = source.store.end(np.concatenate([rgb, alpha], axis=2))
+    return {**framebuffers, **images, "bloom": bloom}
 
 
 def _enlarged(light: Array, size: tuple[int, int], version: str) -> Array:
@@ -73,11 +70,7 @@ def gain(settings: BlenderGlare, size: tuple[int, int]) -> Any:
     The saturation of a grey is 0. Streaks and ghosts have colours.
     """
     bright = float(_highlights(np.ones((1, 1, 1)), settings)[0, 0, 0])
-    levels = (
-        bright * GAINS[settings.type](settings, size)
-        if settings.type in GAINS
-        else np.full(3, bright)
-    )
+    levels = bright * GAINS.get(settings.type, lambda *_: np.ones(3))(settings, size)
     tinted = saturated(levels, settings.saturation) * np.array(settings.tint)
     return float(tinted[0]) if (tinted == tinted[0]).all() else tinted
 
@@ -143,13 +136,9 @@ def _bloom(
     if count > 1:
         second = store(_weighted_taps(bright, halved(own)))
         downs += halvings(second, count - 1, store, downsample)
+    given, up = BlurInput(bright, own, store), tent_of_target
     levels = combine(
-        downs,
-        BlurInput(bright, own, store),
-        upsample=tent_of_target,
-        last=linear,
-        gain=1 / count,
-        end=lambda image: image,
+        downs, given, upsample=up, last=linear, gain=1 / count, end=lambda image: image
     )
     del levels["down_0"]
     return {**levels, "light": levels.pop("bloom")}

@@ -7,6 +7,7 @@ PostProcessing/Shaders/Sampling.hlsl, PostProcessing/Runtime/Effects/Bloom.cs.
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,7 +16,7 @@ from ._image import BlurInput
 from ._pyramid import downsample
 from ._sampling import Array, box, size_of
 from ._threshold import masked, soften, with_alpha
-from ._upsampling import combine, halvings, tent
+from ._upsampling import Filter, combine, halvings, tent
 
 if TYPE_CHECKING:
     from vkbloom._methods.unity import PostProcessingBloom
@@ -33,12 +34,10 @@ def passes(source: BlurInput, settings: PostProcessingBloom) -> dict[str, Array]
     channels = source.image.shape[2]
     first, count, radius = _plan(size_of(source.image), settings)
 
-    def reduced(image: Array, size: tuple[int, int]) -> Array:
-        return box(image, size) if settings.fast else downsample(image, size, scale=(0.5, 0.5))
-
-    def enlarged(image: Array, size: tuple[int, int]) -> Array:
-        return box(image, size, radius / 2) if settings.fast else tent(image, size, radius, radius)
-
+    reduced: Filter = partial(downsample, scale=(0.5, 0.5))
+    enlarged: Filter = partial(tent, x_step=radius, y_step=radius)
+    if settings.fast:
+        reduced, enlarged = box, partial(box, distance=radius / 2)
     bright = _prefilter(reduced(source.image, first), settings)
     bright = source.store(masked(bright * with_alpha(settings.color, channels), source.mask))
     downs = halvings(bright, count, source.store, reduced)

@@ -137,7 +137,8 @@ def _at_the_border(
     lights: _Lights, allowed: Mapping[str, float], *, complete: bool
 ) -> Iterator[Measured]:
     """Measure lights in the outermost pixels."""
-    for name, at in _positions(lights.probe).items():
+    x, y = lights.probe.centre
+    for name, at in {"left": (0, y), "top": (x, 0), "corner": (0, 0)}.items():
         expected, energy = _expected(lights, at)
         share = float(lights.spread(at)[0].sum()) / energy
         inside = float(expected.sum()) / energy
@@ -148,7 +149,7 @@ def _at_the_border(
             yield "lost", max(0.0, inside - share), allowed["lost"], f"{text}frame"
         text = f"a light at the {name} swells to {share:.3g} times its energy"
         yield kind, share, allowed[kind], text
-    x, height = _PERIOD * round(lights.probe.centre[0] / _PERIOD), lights.probe.size[1]
+    x, height = _PERIOD * round(x / _PERIOD), lights.probe.size[1]
     outermost = float(lights.spread((0, 0), sides=(1, height))[0].sum())
     # Of a linear bloom. A line in the middle decides only if the outermost one has too little.
     inner = _expected(lights, lights.probe.centre)[1] * height / _LIGHT**2
@@ -235,11 +236,6 @@ def takes(bloom: object, name: str) -> bool:
         parameter.name == name or parameter.kind is parameter.VAR_KEYWORD
         for parameter in parameters
     )
-
-
-def _positions(probe: Probe) -> dict[str, tuple[int, int]]:
-    x, y = probe.centre
-    return {"left": (0, y), "top": (x, 0), "corner": (0, 0)}
 
 
 def _near(lights: _Lights) -> dict[str, tuple[int, int]]:

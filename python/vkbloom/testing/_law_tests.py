@@ -9,10 +9,9 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Mapping
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vkbloom.testing import _laws as laws
 from vkbloom.testing import _moving_light as moving_light
@@ -189,16 +188,12 @@ def finite(subject: Subject, limit: float) -> None:
         image = probe.noise(0, probe.value)
         image[y, x] = value
         for name, bloom in blooms.items():
-            reached = _not_finite(bloom(probe.given(image)))
+            result = np.asarray(bloom(probe.given(image)))
+            reached = ~np.isfinite(result.reshape(*result.shape[:2], -1)).all(axis=2)
             reached[y, x] = False
             count = int(reached.sum())
             text = f"{value} at x {x}, y {y} reaches {count} other pixels of the {name}: "
             judge(law, (name, count, limit, f"{text}{limit:g} allowed"))
-
-
-def _not_finite(result: Any) -> NDArray[np.bool_]:
-    array = np.asarray(result)
-    return np.asarray(~np.isfinite(array.reshape(*array.shape[:2], -1)).all(axis=2))
 
 
 def reference(subject: Subject, limit: float) -> None:

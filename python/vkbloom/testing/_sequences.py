@@ -145,9 +145,7 @@ def flash(frames: Iterable[NDArray[Any]], fps: float, *, degrees: float) -> Flas
 
 def _at(planes: list[NDArray[np.bool_]], index: NDArray[np.intp]) -> NDArray[np.bool_]:
     """Return of each pixel the value in its own frame."""
-    stacked = np.stack(planes)
-    rows, columns = np.indices(index.shape)
-    return np.asarray(stacked[index, rows, columns])
+    return np.asarray(np.take_along_axis(np.stack(planes), index[np.newaxis], axis=0)[0])
 
 
 def _flashes(

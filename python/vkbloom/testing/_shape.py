@@ -131,18 +131,15 @@ def check_sizes(bloom: Bloom, probe: Probe, dark: float, allowed: Mapping[str, f
     reasons: dict[str, str] = {}
     for most in (_SMALL, max(probe.size)):
         is_small = most < max(probe.size)
-        side = (
-            beside_multiple(min(probe.size[0], most)),
-            beside_multiple(min(probe.size[1], most)),
-        )
-        sized = dataclasses.replace(probe, size=side)
+        width, height = (beside_multiple(min(side, most)) for side in probe.size)
+        sized = dataclasses.replace(probe, size=(width, height))
         reasons, share = _compare_sizes(bloom, sized, dark, allowed, is_small=is_small)
         if not reasons:
             return
         if "flat" in reasons or share <= _OUTERMOST:
             break
     else:
-        check_inside(share, side, _OUTERMOST)
+        check_inside(share, sized.size, _OUTERMOST)
     fail(_SIZES, "; ".join(reasons.values()))
 
 
