@@ -97,8 +97,6 @@
 #define FUSED_BLOOM_BLOCK(B, READS, INPUT, VEC4S) \
     THRESHOLD_ROWS(B, READS) \
     COMPOSITE_ROWS(B, READS, INPUT) \
-    INPUT(B, int, vertical_radius) \
-    INPUT(B, int, horizontal_radius) \
     INPUT(B, int, columns) \
     VEC4S(B, vertical, FUSED_VEC4S) \
     VEC4S(B, horizontal, FUSED_VEC4S)
@@ -395,7 +393,6 @@
 #define SINGLE_LIMIT 3.402823466e38
 // The largest float of 11 bits; that of 10 bits is less.
 #define UFLOAT11_LIMIT 65024.0
-#define UFLOAT10_LIMIT 64512.0
 
 // The longest half-kernel (w0..w64) and the most layers of one blur.
 #define MAX_WEIGHTS 65
@@ -403,15 +400,11 @@
 // Taps of a half-kernel whose offsets are given, where TAP_COUNT is set.
 #define OFFSET_VEC4S 3
 #define MAX_LAYERS   8
-// The largest scale and strength of a layer; the smallest is 0.
-#define LAYER_LIMIT 16.0
 
-// Of glare: the most stages (the bloom and a picture of dirt are added up with them), ghosts and
-// the size of their scales, the taps of an iteration of a streak, and how often the size of the
-// bloom buffers is halved.
+// Of glare: the most stages (the bloom and a picture of dirt are added up with them) and ghosts,
+// the taps of an iteration of a streak, and how often the size of the bloom buffers is halved.
 #define MAX_STAGES   (GATHERED_LEVELS - 2)
 #define MAX_GHOSTS   16
-#define GHOST_LIMIT  16.0
 #define MAX_TAPS     8
 #define MAX_HALVINGS 4
 

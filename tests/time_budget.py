@@ -1,8 +1,9 @@
 """Prints the processor time of the test files that take the most, and warns of long ones.
 
-The seconds are those of the test's process and of its children, so that other work on the machine
-hardly changes them. It is a warning and no failure, because machines differ: make a file's tests
-smaller.
+The seconds are those of the test's process and of its children. Other work on the machine changes
+them less than the time on the clock: by up to a third where it shares cores. Mesa keeps compiled
+shaders (`MESA_SHADER_CACHE_DIR`), so a first run takes several times as long: compare second ones.
+It is a warning and no failure, because machines differ: make a file's tests smaller.
 """
 
 from __future__ import annotations

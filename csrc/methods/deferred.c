@@ -14,8 +14,7 @@ struct gbuffer {
     uint32_t depth;
 };
 
-static bool add_images(struct vkb_size size, struct vkb_graph *graph, struct gbuffer *gbuffer,
-                       struct vkb_error *error)
+static struct gbuffer add_images(struct vkb_levels *levels, struct vkb_size size)
 {
     static const char *const names[GBUFFER_COLOURS] = {
         [ALBEDO] = "albedo",
@@ -23,12 +22,12 @@ static bool add_images(struct vkb_size size, struct vkb_graph *graph, struct gbu
         [POSITION] = "position",
         [BRIGHTNESS] = "brightness",
     };
+    struct gbuffer gbuffer;
 
     for (int i = 0; i < GBUFFER_COLOURS; ++i)
-        if (!vkb_add_target(graph, names[i], HDR, size, true, &gbuffer->colours[i], error))
-            return false;
-    return vkb_add_target(graph, "depth", VKB_FORMAT_DEPTH32_FLOAT, size, true, &gbuffer->depth,
-                          error);
+        gbuffer.colours[i] = vkb_levels_target(levels, names[i], HDR, size, true);
+    gbuffer.depth = vkb_levels_target(levels, "depth", VKB_FORMAT_DEPTH32_FLOAT, size, true);
+    return gbuffer;
 }
 
 // Sets all images of the G-buffer as targets of the row.
@@ -42,45 +41,41 @@ static void set_targets(const struct gbuffer *gbuffer, struct vkb_pass_row *row)
 
 // `glow` (VKB_NO_IMAGE: none) gets only the glow mesh, as in the forward system. It has its own
 // depth: a glow mesh repeats surfaces of the body, which would flicker in a common depth buffer.
-static bool add_gbuffer(const struct vkb_scene_source *source, const struct vkb_mesh_params *params,
-                        uint32_t glow, struct gbuffer *gbuffer, struct vkb_graph *graph,
-                        struct vkb_error *error)
+static struct gbuffer add_gbuffer(struct vkb_levels *levels, const struct vkb_scene_source *source,
+                                  const struct vkb_mesh_params *params, uint32_t glow)
 {
     const int emitters = source->has_emission && glow != VKB_NO_IMAGE ? 2 : 1;
+    const struct gbuffer gbuffer = add_images(levels, source->size);
     struct vkb_mesh_params stored = *params;
     struct vkb_pass_row row;
 
     stored.limit = vkb_formats[HDR].limit;
-    if (!add_images(source->size, graph, gbuffer, error))
-        return false;
     if (source->has_sky) {
         row = vkb_scene_row("skybox", VKB_GEOMETRY_SKYBOX, &vkb_shader_gbuffer_sky_frag, 0, 0,
                             &stored);
-        set_targets(gbuffer, &row);
-        if (!vkb_graph_add_pass(graph, &row, error))
-            return false;
+        set_targets(&gbuffer, &row);
+        vkb_levels_pass(levels, &row);
     }
     row = vkb_scene_row("gbuffer", VKB_GEOMETRY_BODY, &vkb_shader_gbuffer_body_frag, 0, 0, &stored);
     row.constants.emitters = emitters;
-    set_targets(gbuffer, &row);
-    if (!vkb_add_mesh(&row, source->body_textured, &vkb_shader_gbuffer_body_textured_frag, graph,
-                      error))
-        return false;
+    set_targets(&gbuffer, &row);
+    vkb_add_mesh(levels, &row, source->body_textured, &vkb_shader_gbuffer_body_textured_frag);
     if (glow == VKB_NO_IMAGE)
-        return true;
+        return gbuffer;
     row = vkb_fullscreen_row("glow_light", &vkb_shader_gbuffer_glow_frag, 0);
     row.constants.emitters = emitters;
     row.reads[0] = glow;
     row.read_count = 1;
     row.blend = VKB_BLEND_ADD;
-    set_targets(gbuffer, &row);
-    return vkb_graph_add_pass(graph, &row, error);
+    set_targets(&gbuffer, &row);
+    vkb_levels_pass(levels, &row);
+    return gbuffer;
 }
 
-static bool add_bloom(const struct vkb_settings *settings, struct vkb_size size, uint32_t scene,
-                      uint32_t brightness, struct vkb_graph *graph, uint32_t *bloom,
-                      struct vkb_error *error)
+static uint32_t add_bloom(struct vkb_levels *levels, struct vkb_size size, uint32_t scene,
+                          uint32_t brightness)
 {
+    const struct vkb_settings *settings = levels->settings;
     struct vkb_bloom_source source = {
         .scene = scene,
         .glow = brightness,
@@ -93,33 +88,32 @@ static bool add_bloom(const struct vkb_settings *settings, struct vkb_size size,
     const bool as_it_is = source.buffers.width == size.width && source.buffers.height == size.height
                        && extracted == HDR && vkb_threshold_mode(settings) == THRESHOLD_NONE;
 
-    if (!as_it_is
-        && (!vkb_add_target(graph, "extracted", extracted, source.buffers, false, &source.glow,
-                            error)
-            || !vkb_add_threshold(settings, brightness, VKB_NO_IMAGE, source.glow, graph, error)))
-        return false;
-    return vkb_add_bloom(settings, &source, graph, bloom, error);
+    if (!as_it_is) {
+        source.glow = vkb_levels_target(levels, "extracted", extracted, source.buffers, false);
+        vkb_add_threshold(levels, brightness, VKB_NO_IMAGE, source.glow);
+    }
+    return vkb_add_bloom(levels, &source);
 }
 
-static bool add_lighting(const struct gbuffer *gbuffer, struct vkb_size size,
-                         struct vkb_graph *graph, uint32_t *scene, struct vkb_error *error)
+static uint32_t add_lighting(struct vkb_levels *levels, const struct gbuffer *gbuffer,
+                             struct vkb_size size)
 {
-    if (!vkb_add_target(graph, "scene", HDR, size, true, scene, error))
-        return false;
-    struct vkb_pass_row row = vkb_fullscreen_row("scene", &vkb_shader_lighting_frag, *scene);
+    const uint32_t scene = vkb_levels_target(levels, "scene", HDR, size, true);
+    struct vkb_pass_row row = vkb_fullscreen_row("scene", &vkb_shader_lighting_frag, scene);
+
     for (int i = 0; i < GBUFFER_COLOURS; ++i)
         row.reads[i] = gbuffer->colours[i];
     row.read_count = GBUFFER_COLOURS;
     row.block = VKB_BLOCK_lighting;
     row.params.lighting.limit = vkb_formats[HDR].limit;
-    return vkb_graph_add_pass(graph, &row, error);
+    vkb_levels_pass(levels, &row);
+    return scene;
 }
 
-bool vkb_build_deferred(const struct vkb_settings *settings, const struct vkb_scene_source *source,
-                        struct vkb_graph *graph, struct vkb_error *error)
+void vkb_build_deferred(struct vkb_levels *levels, const struct vkb_scene_source *source)
 {
-    struct vkb_mesh_params params = vkb_scene_params(source);
-    struct gbuffer gbuffer;
+    const struct vkb_settings *settings = levels->settings;
+    const struct vkb_mesh_params params = vkb_scene_params(source);
     struct vkb_composite_source composite = {
         .scene = VKB_NO_IMAGE,
         .bloom = VKB_NO_IMAGE,
@@ -133,15 +127,15 @@ bool vkb_build_deferred(const struct vkb_settings *settings, const struct vkb_sc
     if (settings->values.bloom && source->has_glow) {
         struct vkb_mesh_params lamp = params;
         lamp.glow_intensity = (float)fmin(source->glow_intensity, FLT_MAX);
-        if (!vkb_add_glow(settings, source, &lamp, HDR, source->size, false, THRESHOLD_NONE, graph,
-                          &glow, error))
-            return false;
+        glow = vkb_add_glow(levels, source, &lamp, HDR, source->size, false, THRESHOLD_NONE);
     }
-    return add_gbuffer(source, &params, glow, &gbuffer, graph, error)
-        && (!scene_first || add_lighting(&gbuffer, source->size, graph, &composite.scene, error))
-        && (!settings->values.bloom
-            || add_bloom(settings, source->size, composite.scene, gbuffer.colours[BRIGHTNESS],
-                         graph, &composite.bloom, error))
-        && (scene_first || add_lighting(&gbuffer, source->size, graph, &composite.scene, error))
-        && vkb_add_composite(settings, &composite, VKB_FORMAT_RGBA8_UNORM, graph, error);
+    const struct gbuffer gbuffer = add_gbuffer(levels, source, &params, glow);
+    if (scene_first)
+        composite.scene = add_lighting(levels, &gbuffer, source->size);
+    if (settings->values.bloom)
+        composite.bloom =
+            add_bloom(levels, source->size, composite.scene, gbuffer.colours[BRIGHTNESS]);
+    if (!scene_first)
+        composite.scene = add_lighting(levels, &gbuffer, source->size);
+    vkb_add_composite(levels, &composite, VKB_FORMAT_RGBA8_UNORM);
 }

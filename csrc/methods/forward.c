@@ -14,33 +14,31 @@ struct vkb_size vkb_forward_buffers(const struct vkb_settings *settings, struct 
     return vkb_bloom_size(settings, frame);
 }
 
-static bool add_scene(const struct vkb_scene_source *source, const struct vkb_mesh_params *params,
-                      struct vkb_graph *graph, uint32_t *scene, struct vkb_error *error)
+static uint32_t add_scene(struct vkb_levels *levels, const struct vkb_scene_source *source,
+                          const struct vkb_mesh_params *params)
 {
     struct vkb_mesh_params stored = *params;
-    uint32_t depth;
+    const uint32_t scene =
+        vkb_levels_target(levels, "scene", VKB_FORMAT_RGBA8_UNORM, source->size, true);
+    const uint32_t depth =
+        vkb_levels_target(levels, "depth", VKB_FORMAT_DEPTH32_FLOAT, source->size, true);
 
     stored.limit = vkb_formats[VKB_FORMAT_RGBA8_UNORM].limit;
-    if (!vkb_add_target(graph, "scene", VKB_FORMAT_RGBA8_UNORM, source->size, true, scene, error)
-        || !vkb_add_target(graph, "depth", VKB_FORMAT_DEPTH32_FLOAT, source->size, true, &depth,
-                           error))
-        return false;
     if (source->has_sky) {
-        struct vkb_pass_row sky = vkb_scene_row("skybox", VKB_GEOMETRY_SKYBOX,
-                                                &vkb_shader_skybox_frag, *scene, depth, &stored);
-        if (!vkb_graph_add_pass(graph, &sky, error))
-            return false;
+        const struct vkb_pass_row sky = vkb_scene_row(
+            "skybox", VKB_GEOMETRY_SKYBOX, &vkb_shader_skybox_frag, scene, depth, &stored);
+        vkb_levels_pass(levels, &sky);
     }
     struct vkb_pass_row body =
-        vkb_scene_row("scene", VKB_GEOMETRY_BODY, &vkb_shader_phong_frag, *scene, depth, &stored);
+        vkb_scene_row("scene", VKB_GEOMETRY_BODY, &vkb_shader_phong_frag, scene, depth, &stored);
     body.constants.emitters = vkb_body_glows(source);
-    return vkb_add_mesh(&body, source->body_textured, &vkb_shader_phong_textured_frag, graph,
-                        error);
+    vkb_add_mesh(levels, &body, source->body_textured, &vkb_shader_phong_textured_frag);
+    return scene;
 }
 
-bool vkb_build_forward(const struct vkb_settings *settings, const struct vkb_scene_source *source,
-                       struct vkb_graph *graph, struct vkb_error *error)
+void vkb_build_forward(struct vkb_levels *levels, const struct vkb_scene_source *source)
 {
+    const struct vkb_settings *settings = levels->settings;
     const struct vkb_mesh_params params = vkb_scene_params(source);
     struct vkb_composite_source composite = {
         .scene = VKB_NO_IMAGE,
@@ -52,8 +50,8 @@ bool vkb_build_forward(const struct vkb_settings *settings, const struct vkb_sce
     // Passes that were given at run time may read the scene.
     const bool scene_first = settings->method == VKB_METHOD_CUSTOM;
 
-    if (scene_first && !add_scene(source, &params, graph, &composite.scene, error))
-        return false;
+    if (scene_first)
+        composite.scene = add_scene(levels, source, &params);
     if (settings->values.bloom) {
         struct vkb_bloom_source glow = {
             .scene = composite.scene,
@@ -65,13 +63,11 @@ bool vkb_build_forward(const struct vkb_settings *settings, const struct vkb_sce
         struct vkb_mesh_params lamp = params;
         // The intensity applies to the deferred system only: 8 bits cannot hold radiance.
         lamp.glow_intensity = 1.0f;
-        if (!vkb_add_glow(settings, source, &lamp, vkb_first_format(settings, glow.format),
-                          glow.buffers, true, vkb_threshold_mode(settings), graph, &glow.glow,
-                          error)
-            || !vkb_add_bloom(settings, &glow, graph, &composite.bloom, error))
-            return false;
+        glow.glow = vkb_add_glow(levels, source, &lamp, vkb_first_format(settings, glow.format),
+                                 glow.buffers, true, vkb_threshold_mode(settings));
+        composite.bloom = vkb_add_bloom(levels, &glow);
     }
-    return (scene_first || add_scene(source, &params, graph, &composite.scene, error))
-        && vkb_add_composite(settings, &composite, graph->images[composite.scene].format, graph,
-                             error);
+    if (!scene_first)
+        composite.scene = add_scene(levels, source, &params);
+    vkb_add_composite(levels, &composite, VKB_FORMAT_RGBA8_UNORM);
 }

@@ -194,9 +194,7 @@ static uint32_t add_source(struct vkb_levels *levels)
     if (!vkb_is_published(settings) || (mode == THRESHOLD_NONE && source->mask == VKB_NO_IMAGE))
         return source->glow;
     const uint32_t image = vkb_levels_step(levels, "glare_source", 0, source->buffers);
-    levels->failed = levels->failed
-                  || !vkb_add_threshold_in(mode, settings, source->glow, source->mask, image,
-                                           levels->graph, levels->error);
+    vkb_add_threshold_in(levels, mode, source->glow, source->mask, image);
     return image;
 }
 

@@ -5,12 +5,8 @@
 
 #include <stdio.h>
 
-struct inputs {
-    uint32_t image, emission, mask;  // VKB_NO_IMAGE: none
-};
-
-static bool add_input(const struct vkb_image_source *image, enum vkb_input_kind kind,
-                      struct vkb_graph *graph, uint32_t *index, struct vkb_error *error)
+static uint32_t add_input(struct vkb_levels *levels, const struct vkb_image_source *image,
+                          enum vkb_input_kind kind)
 {
     static const char *const names[VKB_INPUT_COUNT] = {
         [VKB_INPUT_IMAGE] = "image",
@@ -26,17 +22,7 @@ static bool add_input(const struct vkb_image_source *image, enum vkb_input_kind 
     };
 
     snprintf(row.name, sizeof row.name, "%s", names[kind]);
-    return vkb_graph_add_image(graph, &row, index, error);
-}
-
-static bool add_inputs(const struct vkb_image_source *image, struct vkb_graph *graph,
-                       struct inputs *inputs, struct vkb_error *error)
-{
-    *inputs = (struct inputs){VKB_NO_IMAGE, VKB_NO_IMAGE, VKB_NO_IMAGE};
-    return add_input(image, VKB_INPUT_IMAGE, graph, &inputs->image, error)
-        && (!image->has_emission
-            || add_input(image, VKB_INPUT_EMISSION, graph, &inputs->emission, error))
-        && (!image->has_mask || add_input(image, VKB_INPUT_MASK, graph, &inputs->mask, error));
+    return vkb_levels_add(levels, &row);
 }
 
 static bool check_alpha(const struct vkb_settings *settings, const struct vkb_image_source *image,
@@ -59,46 +45,48 @@ static bool check_alpha(const struct vkb_settings *settings, const struct vkb_im
     return true;
 }
 
-static bool add_bloom(const struct vkb_settings *settings, const struct vkb_image_source *image,
-                      const struct inputs *inputs, struct vkb_graph *graph, uint32_t *bloom,
-                      struct vkb_error *error)
+// `from` is what glows: the image, or its emission.
+static uint32_t add_bloom(struct vkb_levels *levels, const struct vkb_image_source *image,
+                          uint32_t scene, uint32_t from, uint32_t mask)
 {
-    const uint32_t from = image->has_emission ? inputs->emission : inputs->image;
+    const struct vkb_settings *settings = levels->settings;
+    struct vkb_graph *graph = levels->graph;
     struct vkb_bloom_source source = {
-        .scene = inputs->image,
-        .mask = inputs->mask,
+        .scene = scene,
+        .mask = mask,
         .blurs_alpha = settings->choices[VKB_CHOICE_alpha] == ALPHA_BLUR,
         .buffers = vkb_bloom_size(settings, image->size),
         .final = image->size,
         .format = settings->format ? settings->format : image->format,
     };
 
-    if (!vkb_add_first(settings, graph, vkb_first_format(settings, source.format), source.buffers,
-                       true, &source.glow, error)
-        || !vkb_add_threshold(settings, from, inputs->mask, source.glow, graph, error)
-        || !vkb_add_bloom(settings, &source, graph, bloom, error))
-        return false;
+    source.glow =
+        vkb_add_first(levels, vkb_first_format(settings, source.format), source.buffers, true);
+    vkb_add_threshold(levels, from, mask, source.glow);
+    const uint32_t bloom = vkb_add_bloom(levels, &source);
     for (uint32_t i = 0; source.blurs_alpha && i < graph->pass_count; ++i)
         graph->passes[i].constants.alpha = ALPHA_BLUR;
-    return true;
+    return bloom;
 }
 
-bool vkb_build_image(const struct vkb_settings *settings, const struct vkb_image_source *image,
-                     struct vkb_graph *graph, struct vkb_error *error)
+void vkb_build_image(struct vkb_levels *levels, const struct vkb_image_source *image)
 {
+    const struct vkb_settings *settings = levels->settings;
     struct vkb_composite_source source = {
         .bloom = VKB_NO_IMAGE,
+        .mask = VKB_NO_IMAGE,
         .apart = image->has_emission,
         .lit = vkb_has_glare(settings),
         .alpha = (enum vkb_alpha)settings->choices[VKB_CHOICE_alpha],
     };
-    struct inputs inputs;
 
-    if (!check_alpha(settings, image, error) || !add_inputs(image, graph, &inputs, error)
-        || (settings->values.bloom
-            && !add_bloom(settings, image, &inputs, graph, &source.bloom, error)))
-        return false;
-    source.scene = inputs.image;
-    source.mask = inputs.mask;
-    return vkb_add_composite(settings, &source, image->format, graph, error);
+    levels->failed = !check_alpha(settings, image, levels->error);
+    uint32_t glow = source.scene = add_input(levels, image, VKB_INPUT_IMAGE);
+    if (image->has_emission)
+        glow = add_input(levels, image, VKB_INPUT_EMISSION);
+    if (image->has_mask)
+        source.mask = add_input(levels, image, VKB_INPUT_MASK);
+    if (settings->values.bloom)
+        source.bloom = add_bloom(levels, image, source.scene, glow, source.mask);
+    vkb_add_composite(levels, &source, image->format);
 }

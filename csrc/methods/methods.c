@@ -9,19 +9,17 @@ static uint32_t (*const methods[VKB_METHOD_COUNT])(struct vkb_levels *) = {
 #undef METHOD_ROW
 };
 
-bool vkb_add_bloom(const struct vkb_settings *settings, const struct vkb_bloom_source *source,
-                   struct vkb_graph *graph, uint32_t *bloom, struct vkb_error *error)
+uint32_t vkb_add_bloom(struct vkb_levels *levels, const struct vkb_bloom_source *source)
 {
-    struct vkb_levels levels = {
-        .settings = settings, .source = source, .graph = graph, .error = error};
     uint32_t stages[MAX_STAGES];
 
-    if (vkb_has_glare(settings))
-        vkb_add_stages(&levels, stages);
-    *bloom = methods[settings->method](&levels);
-    if (vkb_has_glare(settings))
-        *bloom = vkb_add_light(&levels, stages, *bloom);
-    return !levels.failed;
+    if (levels->failed)
+        return VKB_NO_IMAGE;
+    levels->source = source;
+    if (vkb_has_glare(levels->settings))
+        vkb_add_stages(levels, stages);
+    const uint32_t bloom = methods[levels->settings->method](levels);
+    return vkb_has_glare(levels->settings) ? vkb_add_light(levels, stages, bloom) : bloom;
 }
 
 bool vkb_check_sizes(const struct vkb_settings *settings, const char *name, struct vkb_size frame,

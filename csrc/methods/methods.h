@@ -28,20 +28,14 @@ bool vkb_check_sizes(const struct vkb_settings *settings, const char *name, stru
                      uint32_t max_side, struct vkb_error *error);
 
 // The graph of each kind of source.
-bool vkb_build_forward(const struct vkb_settings *settings, const struct vkb_scene_source *source,
-                       struct vkb_graph *graph, struct vkb_error *error);
+void vkb_build_forward(struct vkb_levels *levels, const struct vkb_scene_source *source);
+void vkb_build_deferred(struct vkb_levels *levels, const struct vkb_scene_source *source);
+void vkb_build_image(struct vkb_levels *levels, const struct vkb_image_source *image);
 // The size of the bloom buffers of a forward scene.
 struct vkb_size vkb_forward_buffers(const struct vkb_settings *settings, struct vkb_size frame);
-bool vkb_build_deferred(const struct vkb_settings *settings, const struct vkb_scene_source *source,
-                        struct vkb_graph *graph, struct vkb_error *error);
-
-bool vkb_build_image(const struct vkb_settings *settings, const struct vkb_image_source *image,
-                     struct vkb_graph *graph, struct vkb_error *error);
 
 // Whether the settings have glare that is added to the bloom.
 bool vkb_has_glare(const struct vkb_settings *settings);
-
-struct vkb_levels;
 
 // Adds the rows of the stages of glare to the graph; `stages` gets the image of each.
 void vkb_add_stages(struct vkb_levels *levels, uint32_t *stages);
@@ -69,9 +63,8 @@ void vkb_add_ray(struct vkb_levels *levels, const struct vkb_ray *ray);
 void vkb_add_flare(struct vkb_levels *levels, const struct vkb_stage *stage, uint32_t from,
                    uint32_t before, uint32_t to);
 
-// Adds the rows of the method that the settings name, and those of glare; *bloom is the last image.
-bool vkb_add_bloom(const struct vkb_settings *settings, const struct vkb_bloom_source *source,
-                   struct vkb_graph *graph, uint32_t *bloom, struct vkb_error *error);
+// Adds the rows of the method that the settings name, and those of glare. Returns the last image.
+uint32_t vkb_add_bloom(struct vkb_levels *levels, const struct vkb_bloom_source *source);
 // Each method adds its rows, and returns the last image.
 #define VKB_METHOD_FUNCTION(constant, name, published) \
     uint32_t vkb_add_##name(struct vkb_levels *levels);

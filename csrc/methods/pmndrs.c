@@ -6,14 +6,13 @@
 // The weights of the source are rounded: they add up to 1.00004.
 static void add_down(struct vkb_levels *levels, uint32_t level, uint32_t from)
 {
-    const struct vkb_side_taps corners = {1.0, 1.0, 0.0}, grid = {2.0, 1.0, 1.0};
-    const uint32_t to = vkb_levels_down(levels, level);
-    struct vkb_pass_row row = vkb_filter_row(levels, from, to, 1.0);
+    const struct vkb_taps taps = {
+        {{{1.0, 0.125, 0.0}, {1.0, 1.0, 0.0}}, {{2.0, 0.05556, 0.05556}, {2.0, 1.0, 1.0}}},
+        .upsample = UPSAMPLE_INSIDE,
+        .gain = 1.0,
+    };
 
-    vkb_filter_add(&row, 0, (struct vkb_side_taps){1.0, 0.125, 0.0}, corners);
-    vkb_filter_add(&row, 1, (struct vkb_side_taps){2.0, 0.05556, 0.05556}, grid);
-    row.constants.upsample = UPSAMPLE_INSIDE;
-    vkb_filter_end(levels, &row);
+    vkb_add_filter(levels, &taps, from, vkb_levels_down(levels, level));
 }
 
 uint32_t vkb_add_pmndrs(struct vkb_levels *levels)

@@ -4,36 +4,40 @@
 
 static const struct shading {
     const char *name;
-    bool (*build)(const struct vkb_settings *, const struct vkb_scene_source *, struct vkb_graph *,
-                  struct vkb_error *);
+    void (*build)(struct vkb_levels *, const struct vkb_scene_source *);
 } shadings[] = {
     {"forward", vkb_build_forward},
     {"deferred", vkb_build_deferred},
 };
 
-static bool build_scene(const char *shading, const struct vkb_settings *settings,
-                        const struct vkb_scene_source *source, struct vkb_graph *graph,
-                        struct vkb_error *error)
+static bool build_scene(struct vkb_levels *levels, const char *shading,
+                        const struct vkb_scene_source *source)
 {
     for (size_t i = 0; i < sizeof shadings / sizeof shadings[0]; ++i)
-        if (strcmp(shadings[i].name, shading) == 0)
-            return shadings[i].build(settings, source, graph, error);
-    return vkb_fail(error, VKB_ERROR_VALUE, "shading: there is no %s", shading);
+        if (strcmp(shadings[i].name, shading) == 0) {
+            shadings[i].build(levels, source);
+            return !levels->failed;
+        }
+    return vkb_fail(levels->error, VKB_ERROR_VALUE, "shading: there is no %s", shading);
 }
 
 bool vkb_source_build(const struct vkb_source *source, const struct vkb_settings *settings,
                       uint32_t max_side, struct vkb_graph *graph, struct vkb_error *error)
 {
+    struct vkb_levels levels = {.settings = settings, .graph = graph, .error = error};
+
     switch (source->kind) {
     case VKB_SOURCE_NONE:
         break;
     case VKB_SOURCE_SCENE:
         return vkb_check_sizes(settings, "size", source->scene.size, max_side, error)
-            && build_scene(source->shading, settings, &source->scene, graph, error);
+            && build_scene(&levels, source->shading, &source->scene);
     case VKB_SOURCE_IMAGE:
         graph->layers = source->image.layers;
-        return vkb_check_sizes(settings, "image", source->image.size, max_side, error)
-            && vkb_build_image(settings, &source->image, graph, error);
+        if (!vkb_check_sizes(settings, "image", source->image.size, max_side, error))
+            return false;
+        vkb_build_image(&levels, &source->image);
+        return !levels.failed;
     }
     return vkb_fail(error, VKB_ERROR_GENERAL, "source: there is nothing in it");
 }

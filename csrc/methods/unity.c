@@ -58,17 +58,17 @@ static uint32_t add_kawase(struct vkb_levels *levels)
 {
     const double scatter = levels->settings->values.scatter;
     const double share = scatter >= 0.999 ? 1.0 : 0.05 + 0.9 * scatter;
-    const struct vkb_side_taps own = {0.0, 0.0, 1.0 - share}, centre = {0.0, 0.0, 1.0};
     uint32_t from = levels->downs[0], to;
 
     for (uint32_t i = 0; i < levels->count; ++i, from = to) {
         const double distance = 0.5 + (i > levels->count / 2 ? i - 1 : i);
         to = vkb_levels_image(levels, "kawase_%u", i, levels->sizes[0]);
-        struct vkb_pass_row row = vkb_filter_row(levels, from, to, 1.0);
-        vkb_filter_add(&row, 0, own, centre);
-        vkb_filter_add(&row, 1, (struct vkb_side_taps){distance, 0.5 * share, 0.0},
-                       (struct vkb_side_taps){distance, 0.5, 0.0});
-        vkb_filter_end(levels, &row);
+        const struct vkb_taps taps = {
+            {{{0.0, 0.0, 1.0 - share}, {0.0, 0.0, 1.0}},
+             {{distance, 0.5 * share, 0.0}, {distance, 0.5, 0.0}}},
+            .gain = 1.0,
+        };
+        vkb_add_filter(levels, &taps, from, to);
     }
     return vkb_levels_enlarge(levels, urp_kernel(levels), from, 1.0);
 }

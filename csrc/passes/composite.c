@@ -49,13 +49,15 @@ static struct vkb_composite_source composited(const struct vkb_settings *setting
                                                                   .mask = VKB_NO_IMAGE};
 }
 
-bool vkb_add_composite(const struct vkb_settings *settings,
-                       const struct vkb_composite_source *given, enum vkb_format format,
-                       struct vkb_graph *graph, struct vkb_error *error)
+void vkb_add_composite(struct vkb_levels *levels, const struct vkb_composite_source *given,
+                       enum vkb_format format)
 {
+    const struct vkb_settings *settings = levels->settings;
+    const struct vkb_graph *graph = levels->graph;
+    if (levels->failed)
+        return;
     const struct vkb_composite_source own = composited(settings, given, graph), *source = &own;
     const struct vkb_image_row *scene = &graph->images[given->scene];
-    uint32_t final;
     struct vkb_image_row image = {
         .name = "final",
         .format = format,
@@ -65,8 +67,7 @@ bool vkb_add_composite(const struct vkb_settings *settings,
         .framebuffer = true,
     };
 
-    if (!vkb_graph_add_image(graph, &image, &final, error))
-        return false;
+    const uint32_t final = vkb_levels_add(levels, &image);
     struct vkb_pass_row row = vkb_fullscreen_row("final", &vkb_shader_composite_frag, final);
     const bool off = source->bloom == VKB_NO_IMAGE;
     // Float formats have no quantization levels to dither.
@@ -89,7 +90,7 @@ bool vkb_add_composite(const struct vkb_settings *settings,
     row.params.composite.noise_seed = dither ? settings->values.dither_seed : 0;
     if (settings->method == VKB_METHOD_GODOT && !off)
         row = godots(settings, &row);
-    return vkb_graph_add_pass(graph, &row, error);
+    vkb_levels_pass(levels, &row);
 }
 
 bool vkb_is_composite(const struct vkb_pass_row *pass)

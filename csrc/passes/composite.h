@@ -19,9 +19,8 @@ struct vkb_composite_source {
 #define VKB_CUSTOM_PICTURE "main"
 
 // Adds the last pass. It writes the framebuffer "final" in this format, with the scene's channels.
-bool vkb_add_composite(const struct vkb_settings *settings,
-                       const struct vkb_composite_source *source, enum vkb_format format,
-                       struct vkb_graph *graph, struct vkb_error *error);
+void vkb_add_composite(struct vkb_levels *levels, const struct vkb_composite_source *source,
+                       enum vkb_format format);
 
 // Whether the row is a composite that adds a bloom.
 bool vkb_is_composite(const struct vkb_pass_row *pass);

@@ -1,6 +1,7 @@
 #include "passes/filter.h"
 
 #include <math.h>
+#include <string.h>
 
 struct vkb_pass_row vkb_fetching_row(const struct vkb_levels *levels,
                                      const struct vkb_shader *fragment, uint32_t from, uint32_t to)
@@ -30,22 +31,6 @@ struct vkb_pass_row vkb_row_of_lines(const struct vkb_levels *levels,
     return row;
 }
 
-struct vkb_pass_row vkb_filter_row(const struct vkb_levels *levels, uint32_t from, uint32_t to,
-                                   double gain)
-{
-    struct vkb_pass_row row = vkb_fetching_row(levels, &vkb_shader_filter_frag, from, to);
-
-    row.block = VKB_BLOCK_filter;
-    VKB_SET_TARGET(&row, filter, &levels->graph->images[to]);
-    row.params.filter.coarse = (float)gain;
-    row.params.filter.divisor = 1.0f;
-    row.constants.upsample = UPSAMPLE_LINEAR;
-    // Every binding of the shader must be filled, also one that this variant does not read.
-    row.reads[1] = from;
-    row.read_count = 2;
-    return row;
-}
-
 // Of taps at the same place there is one.
 static uint32_t add_tap(float (*taps)[4], uint32_t count, int kernel, double offset, double weight)
 {
@@ -60,42 +45,24 @@ static uint32_t add_tap(float (*taps)[4], uint32_t count, int kernel, double off
     return at < count ? count : count + 1;
 }
 
-static uint32_t add_taps(float (*taps)[4], uint32_t count, int kernel, struct vkb_side_taps added)
+// Fills the table of an axis, and counts the kernels. Returns the number of taps, of which the
+// table holds MAX_FILTER_TAPS.
+static uint32_t fill_taps(const struct vkb_taps *filter, int axis, float table[MAX_FILTER_TAPS][4],
+                          int32_t *kernels)
 {
-    count = add_tap(taps, count, kernel, -added.distance, added.side);
-    count = add_tap(taps, count, kernel, 0.0, added.middle);
-    return add_tap(taps, count, kernel, added.distance, added.side);
-}
+    float taps[3 * MAX_KERNELS][4] = {{0.0f}};
+    uint32_t count = 0;
 
-// The taps so far; those beyond have no weight.
-static uint32_t count_taps(float (*taps)[4])
-{
-    uint32_t count = MAX_FILTER_TAPS;
-
-    while (count > 0 && taps[count - 1][1] == 0.0f && taps[count - 1][2] == 0.0f
-           && taps[count - 1][3] == 0.0f)
-        --count;
+    for (int kernel = 0; kernel < MAX_KERNELS; ++kernel) {
+        const struct vkb_side_taps *added = &filter->kernels[kernel][axis];
+        count = add_tap(taps, count, kernel, -added->distance, added->side);
+        count = add_tap(taps, count, kernel, 0.0, added->middle);
+        count = add_tap(taps, count, kernel, added->distance, added->side);
+        if (added->side != 0.0 || added->middle != 0.0)
+            *kernels = kernel + 1;
+    }
+    memcpy(table, taps, MAX_FILTER_TAPS * sizeof *table);
     return count;
-}
-
-void vkb_filter_add(struct vkb_pass_row *row, int kernel, struct vkb_side_taps x,
-                    struct vkb_side_taps y)
-{
-    struct vkb_filter_params *params = &row->params.filter;
-    const uint32_t columns = add_taps(params->taps_x, count_taps(params->taps_x), kernel, x);
-    const uint32_t rows = add_taps(params->taps_y, count_taps(params->taps_y), kernel, y);
-
-    row->constants.taps = (int32_t)(columns > rows ? columns : rows);
-    row->constants.kernels = kernel + 1;
-}
-
-void vkb_filter_add_own(struct vkb_pass_row *row, uint32_t own, double share)
-{
-    if (own == VKB_NO_IMAGE)
-        return;
-    row->reads[1] = own;
-    row->constants.add_own = true;
-    row->params.filter.own = (float)share;
 }
 
 static double furthest(float (*taps)[4])
@@ -135,33 +102,52 @@ static int32_t taken(float (*taps)[4], int32_t window, uint32_t source, uint32_t
     return bits;
 }
 
-void vkb_filter_end(struct vkb_levels *levels, struct vkb_pass_row *row)
+void vkb_add_filter(struct vkb_levels *levels, const struct vkb_taps *filter, uint32_t from,
+                    uint32_t to)
 {
-    struct vkb_filter_params *params = &row->params.filter;
-    const double rows = furthest(params->taps_y);
-    const int32_t window = 2 * (int32_t)ceil(fmax(furthest(params->taps_x), rows)) + 2;
+    struct vkb_pass_row row = vkb_fetching_row(levels, &vkb_shader_filter_frag, from, to);
+    struct vkb_filter_params *params = &row.params.filter;
+    struct vkb_constants *constants = &row.constants;
+    const uint32_t columns = fill_taps(filter, 0, params->taps_x, &constants->kernels);
+    const uint32_t rows = fill_taps(filter, 1, params->taps_y, &constants->kernels);
+    const struct vkb_image_row *source = &levels->graph->images[from];
+    const struct vkb_image_row *target = &levels->graph->images[to];
+    const double distance = fmax(furthest(params->taps_x), furthest(params->taps_y));
+    const int32_t window = 2 * (int32_t)ceil(distance) + 2;
 
-    row->constants.window = row->constants.upsample == UPSAMPLE_CUBIC ? 4
-                          : window <= MAX_WINDOW                      ? window
-                                                                      : 0;
-    if (row->constants.upsample == UPSAMPLE_LINEAR && row->constants.window) {
-        const struct vkb_image_row *source = &levels->graph->images[row->reads[0]];
-        const struct vkb_image_row *target = &levels->graph->images[row->targets[0]];
-        row->constants.taken_x = taken(params->taps_x, window, source->width, target->width);
-        row->constants.taken_y = taken(params->taps_y, window, source->height, target->height);
+    if (columns > MAX_FILTER_TAPS || rows > MAX_FILTER_TAPS)
+        levels->failed = levels->failed
+                      || !vkb_fail(levels->error, VKB_ERROR_GENERAL,
+                                   "filter: %s has %u x %u places of taps, more than %d", row.name,
+                                   columns, rows, MAX_FILTER_TAPS);
+    row.block = VKB_BLOCK_filter;
+    VKB_SET_TARGET(&row, filter, target);
+    params->coarse = (float)filter->gain;
+    params->divisor = filter->divisor != 0.0 ? (float)filter->divisor : 1.0f;
+    params->own = (float)filter->own_share;
+    constants->taps = (int32_t)(columns > rows ? columns : rows);
+    constants->upsample = filter->upsample ? filter->upsample : UPSAMPLE_LINEAR;
+    constants->add_own = filter->adds_own;
+    // Taps that are too far apart have no window.
+    constants->window = constants->upsample == UPSAMPLE_CUBIC ? 4
+                      : window <= MAX_WINDOW                  ? window
+                                                              : 0;
+    if (constants->upsample == UPSAMPLE_LINEAR && constants->window) {
+        constants->taken_x = taken(params->taps_x, window, source->width, target->width);
+        constants->taken_y = taken(params->taps_y, window, source->height, target->height);
     }
-    vkb_levels_pass(levels, row);
+    // Every binding of the shader must be filled, also one that this variant does not read.
+    row.reads[1] = filter->adds_own ? filter->own : from;
+    row.read_count = 2;
+    vkb_levels_pass(levels, &row);
 }
 
 void vkb_kawase_down(struct vkb_levels *levels, double offset, uint32_t from, uint32_t to)
 {
-    const struct vkb_side_taps centre = {0.0, 0.0, 1.0};
-    const struct vkb_side_taps sides = {0.5 * offset, 0.5, 0.0};
-    struct vkb_pass_row row = vkb_filter_row(levels, from, to, 0.5);
+    const struct vkb_side_taps centre = {0.0, 0.0, 1.0}, sides = {0.5 * offset, 0.5, 0.0};
+    const struct vkb_taps taps = {{{centre, centre}, {sides, sides}}, .gain = 0.5};
 
-    vkb_filter_add(&row, 0, centre, centre);
-    vkb_filter_add(&row, 1, sides, sides);
-    vkb_filter_end(levels, &row);
+    vkb_add_filter(levels, &taps, from, to);
 }
 
 void vkb_kawase_up(struct vkb_levels *levels, double offset, uint32_t from, uint32_t to)
@@ -169,14 +155,14 @@ void vkb_kawase_up(struct vkb_levels *levels, double offset, uint32_t from, uint
     const struct vkb_side_taps centre = {0.0, 0.0, 1.0}, axial = {offset, 1.0, 0.0};
     const struct vkb_side_taps diagonal = {0.5 * offset, 1.0, 0.0};
     const struct vkb_side_taps twice = {0.5 * offset, 2.0, 0.0};
-    struct vkb_pass_row row = vkb_filter_row(levels, from, to, 1.0);
+    const struct vkb_taps taps = {
+        {{axial, centre}, {centre, axial}, {diagonal, twice}},
+        .gain = 1.0,
+        // Its inverse is no float.
+        .divisor = 12.0,
+    };
 
-    vkb_filter_add(&row, 0, axial, centre);
-    vkb_filter_add(&row, 1, centre, axial);
-    vkb_filter_add(&row, 2, diagonal, twice);
-    // Its inverse is no float.
-    row.params.filter.divisor = 12.0f;
-    vkb_filter_end(levels, &row);
+    vkb_add_filter(levels, &taps, from, to);
 }
 
 uint32_t vkb_kawase_rise(struct vkb_levels *levels, double offset)

@@ -11,19 +11,20 @@ struct vkb_side_taps {
     double distance, side, middle;
 };
 
-// A row without taps, for the share `gain` of the filtered image.
-struct vkb_pass_row vkb_filter_row(const struct vkb_levels *levels, uint32_t from, uint32_t to,
-                                   double gain);
+// A filter: the sum of its kernels, each along x and along y. All kernels together have at most
+// MAX_FILTER_TAPS places along an axis.
+struct vkb_taps {
+    struct vkb_side_taps kernels[MAX_KERNELS][2];
+    enum vkb_mode upsample;  // what a tap samples, of UPSAMPLE_*; 0: UPSAMPLE_LINEAR
+    double gain, divisor;    // of the sum; a divisor of 0 is 1
+    bool adds_own;           // adds the share of an image of the target's size
+    uint32_t own;
+    double own_share;
+};
 
-// Adds the taps of a kernel.
-void vkb_filter_add(struct vkb_pass_row *row, int kernel, struct vkb_side_taps x,
-                    struct vkb_side_taps y);
-
-// Adds the share of an image of the target's size; VKB_NO_IMAGE: of none.
-void vkb_filter_add_own(struct vkb_pass_row *row, uint32_t own, double share);
-
-// Adds the pass to the graph.
-void vkb_filter_end(struct vkb_levels *levels, struct vkb_pass_row *row);
+// Adds the pass that filters `from` into `to`.
+void vkb_add_filter(struct vkb_levels *levels, const struct vkb_taps *filter, uint32_t from,
+                    uint32_t to);
 
 // Passes of dual Kawase (Bjorge, "Bandwidth-Efficient Rendering", SIGGRAPH 2015). Down: four times
 // the centre, and four diagonal taps at a distance of half a texel times the offset. Up: four axial

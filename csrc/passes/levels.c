@@ -71,23 +71,21 @@ void vkb_set_steps(struct vkb_pass_row *row, double step_x, double step_y)
 
 void vkb_levels_box(struct vkb_levels *levels, uint32_t from, uint32_t to)
 {
-    const struct vkb_side_taps corners = {1.0, 0.5, 0.0};
-    struct vkb_pass_row row = vkb_filter_row(levels, from, to, 1.0);
+    const struct vkb_taps taps = {{{{1.0, 0.5, 0.0}, {1.0, 0.5, 0.0}}}, .gain = 1.0};
 
-    vkb_filter_add(&row, 0, corners, corners);
-    vkb_filter_end(levels, &row);
+    vkb_add_filter(levels, &taps, from, to);
 }
 
 void vkb_levels_reduce(struct vkb_levels *levels, double step_x, double step_y, uint32_t from,
                        uint32_t to)
 {
-    struct vkb_pass_row row = vkb_filter_row(levels, from, to, 0.5);
+    const struct vkb_taps taps = {
+        {{{2.0 * step_x, 0.25, 0.5}, {2.0 * step_y, 0.25, 0.5}},
+         {{step_x, 0.5, 0.0}, {step_y, 0.5, 0.0}}},
+        .gain = 0.5,
+    };
 
-    vkb_filter_add(&row, 0, (struct vkb_side_taps){2.0 * step_x, 0.25, 0.5},
-                   (struct vkb_side_taps){2.0 * step_y, 0.25, 0.5});
-    vkb_filter_add(&row, 1, (struct vkb_side_taps){step_x, 0.5, 0.0},
-                   (struct vkb_side_taps){step_y, 0.5, 0.0});
-    vkb_filter_end(levels, &row);
+    vkb_add_filter(levels, &taps, from, to);
 }
 
 void vkb_levels_reduce_rest(struct vkb_levels *levels, double step_x, double step_y)
@@ -167,24 +165,18 @@ void vkb_levels_blur(struct vkb_levels *levels, uint32_t level, uint32_t from,
 
 // How UPSAMPLE_TENT and the others sample a smaller level, with the distances of the taps of a
 // tent, or of its corners alone, in its texels.
-static void set_kernel(struct vkb_pass_row *row, enum vkb_mode kernel, double radius_x,
-                       double radius_y)
+static struct vkb_taps taps_of(enum vkb_mode kernel, double radius_x, double radius_y)
 {
-    struct vkb_side_taps x = {0.0, 0.0, 1.0}, y = x;
-
-    row->constants.upsample = kernel;
-    if (kernel == UPSAMPLE_TENT) {
-        row->constants.upsample = UPSAMPLE_LINEAR;
-        x = (struct vkb_side_taps){radius_x, 0.25, 0.5};
-        y = (struct vkb_side_taps){radius_y, 0.25, 0.5};
-    } else if (kernel == UPSAMPLE_CORNERS) {
-        row->constants.upsample = UPSAMPLE_LINEAR;
-        x = (struct vkb_side_taps){radius_x, 0.5, 0.0};
-        y = (struct vkb_side_taps){radius_y, 0.5, 0.0};
-    } else if (kernel == UPSAMPLE_INSET_CUBIC) {
-        x = y = (struct vkb_side_taps){1.0, 1.0, 0.0};
+    switch (kernel) {
+    case UPSAMPLE_TENT:
+        return (struct vkb_taps){.kernels = {{{radius_x, 0.25, 0.5}, {radius_y, 0.25, 0.5}}}};
+    case UPSAMPLE_CORNERS:
+        return (struct vkb_taps){.kernels = {{{radius_x, 0.5, 0.0}, {radius_y, 0.5, 0.0}}}};
+    case UPSAMPLE_INSET_CUBIC:
+        return (struct vkb_taps){{{{1.0, 1.0, 0.0}, {1.0, 1.0, 0.0}}}, .upsample = kernel};
+    default:
+        return (struct vkb_taps){{{{0.0, 0.0, 1.0}, {0.0, 0.0, 1.0}}}, .upsample = kernel};
     }
-    vkb_filter_add(row, 0, x, y);
 }
 
 // Upsamples the smaller level `from` to `to`, and adds the level `own`, if there is one.
@@ -192,7 +184,6 @@ static void add_up(struct vkb_levels *levels, const struct vkb_combination *comb
                    enum vkb_mode kernel, uint32_t from, uint32_t to, uint32_t own, double own_share,
                    double coarse_share)
 {
-    struct vkb_pass_row row = vkb_filter_row(levels, from, to, coarse_share);
     const struct vkb_image_row *smaller = &levels->graph->images[from];
     const struct vkb_image_row *larger = &levels->graph->images[to];
     const double unit = combination->width_step ? smaller->width : 1;
@@ -202,9 +193,12 @@ static void add_up(struct vkb_levels *levels, const struct vkb_combination *comb
         x = (double)smaller->width / larger->width;
         y = (double)smaller->height / larger->height;
     }
-    vkb_filter_add_own(&row, own, own_share);
-    set_kernel(&row, kernel, x, y);
-    vkb_filter_end(levels, &row);
+    struct vkb_taps taps = taps_of(kernel, x, y);
+    taps.gain = coarse_share;
+    taps.adds_own = own != VKB_NO_IMAGE;
+    taps.own = own;
+    taps.own_share = own_share;
+    vkb_add_filter(levels, &taps, from, to);
 }
 
 // Adds up levels. In rgba8unorm, whose largest value is 1, each image holds its sum divided by the

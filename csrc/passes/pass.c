@@ -55,14 +55,12 @@ bool vkb_add_target(struct vkb_graph *graph, const char *name, enum vkb_format f
     return vkb_graph_add_image(graph, &row, index, error);
 }
 
-bool vkb_add_first(const struct vkb_settings *settings, struct vkb_graph *graph,
-                   enum vkb_format format, struct vkb_size size, bool framebuffer, uint32_t *index,
-                   struct vkb_error *error)
+uint32_t vkb_add_first(struct vkb_levels *levels, enum vkb_format format, struct vkb_size size,
+                       bool framebuffer)
 {
-    const bool glows = settings->method != VKB_METHOD_BLENDER;
+    const bool glows = levels->settings->method != VKB_METHOD_BLENDER;
 
-    return vkb_add_target(graph, glows ? "glow" : "frame", format, size, framebuffer && glows,
-                          index, error);
+    return vkb_levels_target(levels, glows ? "glow" : "frame", format, size, framebuffer && glows);
 }
 
 enum vkb_format vkb_first_format(const struct vkb_settings *settings, enum vkb_format buffers)
@@ -78,7 +76,7 @@ enum vkb_format vkb_end_format(const struct vkb_settings *settings, enum vkb_for
 
 uint32_t vkb_levels_add(struct vkb_levels *levels, const struct vkb_image_row *row)
 {
-    uint32_t image = levels->source->glow;
+    uint32_t image = 0;
 
     levels->failed =
         levels->failed || !vkb_graph_add_image(levels->graph, row, &image, levels->error);
@@ -88,7 +86,7 @@ uint32_t vkb_levels_add(struct vkb_levels *levels, const struct vkb_image_row *r
 uint32_t vkb_levels_target(struct vkb_levels *levels, const char *name, enum vkb_format format,
                            struct vkb_size size, bool framebuffer)
 {
-    uint32_t image = levels->source->glow;
+    uint32_t image = 0;
 
     levels->failed =
         levels->failed

@@ -40,12 +40,6 @@ bool vkb_add_target(struct vkb_graph *graph, const char *name, enum vkb_format f
 enum vkb_format vkb_first_format(const struct vkb_settings *settings, enum vkb_format buffers);
 enum vkb_format vkb_end_format(const struct vkb_settings *settings, enum vkb_format buffers);
 
-// Adds the first image of the bloom, the framebuffer "glow"; for Blender's glare, whose glow are
-// its highlights, an image "frame" that is none.
-bool vkb_add_first(const struct vkb_settings *settings, struct vkb_graph *graph,
-                   enum vkb_format format, struct vkb_size size, bool framebuffer, uint32_t *index,
-                   struct vkb_error *error);
-
 // Sets what block B has of SAMPLING_ROWS for a pass that writes `image`.
 #define VKB_SET_TARGET(row, B, image) \
     do { \
@@ -67,8 +61,8 @@ void vkb_apply_mask(struct vkb_pass_row *row, uint32_t mask);
 // Removes all images after the first `read_count` from the images that the pass reads.
 void vkb_drop_reads(struct vkb_pass_row *row, uint32_t read_count);
 
-// What a method builds its graph with. After a failure all functions of it do nothing, and an image
-// that they return is the glow.
+// What a graph is built with. After a failure all functions of it do nothing, and an image that
+// they return is the first one. The source is there while a method adds its rows.
 struct vkb_levels {
     const struct vkb_settings *settings;
     const struct vkb_bloom_source *source;
@@ -84,6 +78,11 @@ struct vkb_levels {
 uint32_t vkb_levels_add(struct vkb_levels *levels, const struct vkb_image_row *row);
 uint32_t vkb_levels_target(struct vkb_levels *levels, const char *name, enum vkb_format format,
                            struct vkb_size size, bool framebuffer);
+
+// Adds the first image of the bloom, the framebuffer "glow"; for Blender's glare, whose glow are
+// its highlights, an image "frame" that is none.
+uint32_t vkb_add_first(struct vkb_levels *levels, enum vkb_format format, struct vkb_size size,
+                       bool framebuffer);
 
 // Adds a framebuffer in the format of the bloom buffers. `number` replaces a %u in the name.
 uint32_t vkb_levels_image(struct vkb_levels *levels, const char *name, uint32_t number,

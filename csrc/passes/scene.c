@@ -30,45 +30,39 @@ struct vkb_pass_row vkb_scene_row(const char *name, enum vkb_geometry geometry,
     return row;
 }
 
-bool vkb_add_mesh(const struct vkb_pass_row *row, bool has_textures,
-                  const struct vkb_shader *textured, struct vkb_graph *graph,
-                  struct vkb_error *error)
+void vkb_add_mesh(struct vkb_levels *levels, const struct vkb_pass_row *row, bool has_textures,
+                  const struct vkb_shader *textured)
 {
     struct vkb_pass_row second;
 
-    if (!vkb_graph_add_pass(graph, row, error))
-        return false;
+    vkb_levels_pass(levels, row);
     if (!has_textures)
-        return true;
+        return;
     memcpy(&second, row, sizeof second);
     snprintf(second.name, sizeof second.name, "%.16s_textured", row->name);
     second.textured = true;
     second.vertex = row->geometry == VKB_GEOMETRY_GLOW ? &vkb_shader_glow_textured_vert
                                                        : &vkb_shader_mesh_textured_vert;
     second.shader = textured;
-    return vkb_graph_add_pass(graph, &second, error);
+    vkb_levels_pass(levels, &second);
 }
 
-bool vkb_add_glow(const struct vkb_settings *settings, const struct vkb_scene_source *source,
-                  const struct vkb_mesh_params *params, enum vkb_format format,
-                  struct vkb_size size, bool framebuffer, enum vkb_mode threshold,
-                  struct vkb_graph *graph, uint32_t *glow, struct vkb_error *error)
+uint32_t vkb_add_glow(struct vkb_levels *levels, const struct vkb_scene_source *source,
+                      const struct vkb_mesh_params *params, enum vkb_format format,
+                      struct vkb_size size, bool framebuffer, enum vkb_mode threshold)
 {
     const bool own = vkb_body_glows(source);
-    uint32_t depth;
-
-    if (!vkb_add_first(settings, graph, format, size, framebuffer, glow, error)
-        || !vkb_add_target(graph, "glow_depth", VKB_FORMAT_DEPTH32_FLOAT, size, framebuffer, &depth,
-                           error))
-        return false;
-    struct vkb_pass_row row = vkb_scene_row("glow", own ? VKB_GEOMETRY_BODY : VKB_GEOMETRY_GLOW,
-                                            own ? &vkb_shader_emission_frag : &vkb_shader_glow_frag,
-                                            *glow, depth, params);
+    const uint32_t glow = vkb_add_first(levels, format, size, framebuffer);
+    const uint32_t depth =
+        vkb_levels_target(levels, "glow_depth", VKB_FORMAT_DEPTH32_FLOAT, size, framebuffer);
+    struct vkb_pass_row row =
+        vkb_scene_row("glow", own ? VKB_GEOMETRY_BODY : VKB_GEOMETRY_GLOW,
+                      own ? &vkb_shader_emission_frag : &vkb_shader_glow_frag, glow, depth, params);
     row.constants.threshold_mode = threshold;
     row.params.mesh.limit = vkb_formats[format].limit;
     if (threshold != THRESHOLD_NONE)
-        vkb_params_read(row.block, &settings->values, &row.params);
-    return vkb_add_mesh(&row, own ? source->body_textured : source->glow_textured,
-                        own ? &vkb_shader_emission_textured_frag : &vkb_shader_glow_textured_frag,
-                        graph, error);
+        vkb_params_read(row.block, &levels->settings->values, &row.params);
+    vkb_add_mesh(levels, &row, own ? source->body_textured : source->glow_textured,
+                 own ? &vkb_shader_emission_textured_frag : &vkb_shader_glow_textured_frag);
+    return glow;
 }

@@ -24,18 +24,19 @@ static float between_levels(float threshold)
     return (float)((floor(threshold * steps + 0.1) + 0.5) / steps);
 }
 
-bool vkb_add_threshold(const struct vkb_settings *settings, uint32_t image, uint32_t mask,
-                       uint32_t glow, struct vkb_graph *graph, struct vkb_error *error)
+void vkb_add_threshold(struct vkb_levels *levels, uint32_t image, uint32_t mask, uint32_t glow)
 {
-    return vkb_add_threshold_in(vkb_threshold_mode(settings), settings, image,
-                                vkb_is_published(settings) ? VKB_NO_IMAGE : mask, glow, graph,
-                                error);
+    vkb_add_threshold_in(levels, vkb_threshold_mode(levels->settings), image,
+                         vkb_is_published(levels->settings) ? VKB_NO_IMAGE : mask, glow);
 }
 
-bool vkb_add_threshold_in(enum vkb_mode mode, const struct vkb_settings *settings, uint32_t image,
-                          uint32_t mask, uint32_t glow, struct vkb_graph *graph,
-                          struct vkb_error *error)
+void vkb_add_threshold_in(struct vkb_levels *levels, enum vkb_mode mode, uint32_t image,
+                          uint32_t mask, uint32_t glow)
 {
+    const struct vkb_graph *graph = levels->graph;
+
+    if (levels->failed)
+        return;
     struct vkb_pass_row row =
         vkb_fullscreen_row(graph->images[glow].name, &vkb_shader_threshold_frag, glow);
 
@@ -50,11 +51,11 @@ bool vkb_add_threshold_in(enum vkb_mode mode, const struct vkb_settings *setting
     row.block = VKB_BLOCK_threshold;
     // Without a threshold its settings stay 0, so that the pass does not depend on them.
     if (mode != THRESHOLD_NONE)
-        vkb_params_read(row.block, &settings->values, &row.params);
+        vkb_params_read(row.block, &levels->settings->values, &row.params);
     if (mode == THRESHOLD_HARD && graph->images[image].format == VKB_FORMAT_RGBA8_UNORM)
         row.params.threshold.threshold = between_levels(row.params.threshold.threshold);
     VKB_SET_TARGET(&row, threshold, &graph->images[glow]);
-    return vkb_graph_add_pass(graph, &row, error);
+    vkb_levels_pass(levels, &row);
 }
 
 bool vkb_is_threshold(const struct vkb_pass_row *pass)

@@ -11,13 +11,11 @@ enum vkb_mode vkb_own_threshold_mode(const struct vkb_settings *settings);
 
 // Adds a pass that reduces `image` to the size of `glow`, applies the threshold, and multiplies by
 // the mask (VKB_NO_IMAGE: none). Published methods apply their threshold and the mask later.
-bool vkb_add_threshold(const struct vkb_settings *settings, uint32_t image, uint32_t mask,
-                       uint32_t glow, struct vkb_graph *graph, struct vkb_error *error);
+void vkb_add_threshold(struct vkb_levels *levels, uint32_t image, uint32_t mask, uint32_t glow);
 
 // The same in a mode, with this mask.
-bool vkb_add_threshold_in(enum vkb_mode mode, const struct vkb_settings *settings, uint32_t image,
-                          uint32_t mask, uint32_t glow, struct vkb_graph *graph,
-                          struct vkb_error *error);
+void vkb_add_threshold_in(struct vkb_levels *levels, enum vkb_mode mode, uint32_t image,
+                          uint32_t mask, uint32_t glow);
 
 // Whether the row is a threshold pass that reads only the texel at each pixel's own position.
 bool vkb_is_threshold(const struct vkb_pass_row *pass);

@@ -77,7 +77,8 @@ bool vkb_add_line(struct vkb_variant_choice *choice, const struct vkb_pass_row *
 // blur commutes with the filter between the sizes. So it runs at the source's size, and each pixel
 // of the target takes one sample of the result instead of one for each tap. Without it
 // `Separable(bloom_scale=0.5)` takes 243 ms in place of 62, `threejs_unreal` 120 in place of 69
-// (processor time of 1920 x 1080 in float16, lavapipe of Mesa 22.3.6, 2026-11-27).
+// (processor time of 1920 x 1080 in float16, lavapipe of Mesa 22.3.6, 2026-11-27), the first at
+// 3840 x 2160 on an H200 0.47 ms in place of 0.30.
 bool vkb_add_enlarged(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
 {
     const struct vkb_image_row *source = &choice->plain.images[pass->reads[0]];
@@ -164,8 +165,6 @@ static struct vkb_pass_row fused_row(const struct vkb_variant_choice *choice,
     VKB_TAKE_COMPOSITE(&row, fused_bloom, nest->composite);
     VKB_TAKE_THRESHOLD(&row, fused_bloom, nest->threshold);
     row.constants.format = vkb_storage_mode(format);
-    params->vertical_radius = nest->vertical->constants.radius;
-    params->horizontal_radius = nest->horizontal->constants.radius;
     memcpy(params->vertical, nest->vertical->params.blur.weights, sizeof params->vertical);
     memcpy(params->horizontal, nest->horizontal->params.blur.weights, sizeof params->horizontal);
     return row;

@@ -58,29 +58,6 @@ uint next_word()
     return word | next_element() << 24;
 }
 
-// Of pixels of four channels; their content behind the last one is of no account.
-uvec4 complete_pixels()
-{
-    uvec4 words;
-
-    if (layout_.size == 4)
-        return floatBitsToUint(texel);
-    if (layout_.size == 2) {
-        words.xy = uvec2(packHalf2x16(texel.xy), packHalf2x16(texel.zw));
-        leave_pixel();
-        words.zw = uvec2(packHalf2x16(texel.xy), packHalf2x16(texel.zw));
-        return words;
-    }
-    words.x = packUnorm4x8(texel);
-    leave_pixel();
-    words.y = packUnorm4x8(texel);
-    leave_pixel();
-    words.z = packUnorm4x8(texel);
-    leave_pixel();
-    words.w = packUnorm4x8(texel);
-    return words;
-}
-
 uvec4 next_words()
 {
     uvec4 words;
@@ -103,6 +80,5 @@ void main()
     at = ivec2(pixel % layout_.width, pixel / layout_.width);
     channel = index % layout_.channels;
     texel = texelFetch(from_image, at, 0);
-    to_words[invocation + gl_WorkGroupID.z * (uint(layout_.layer_stride) >> 4)] =
-        layout_.channels == 4 ? complete_pixels() : next_words();
+    to_words[invocation + gl_WorkGroupID.z * (uint(layout_.layer_stride) >> 4)] = next_words();
 }

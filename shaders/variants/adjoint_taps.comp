@@ -21,7 +21,6 @@ READ_IMAGE(3, scene);
 READ_IMAGE(4, added);
 READ_IMAGE(5, differentiated);
 WRITE_IMAGE(6);
-#define STORE_COUNT COLUMNS
 #include "variants/store.glsl"
 
 // A pixel of the image at a binding.

@@ -24,7 +24,6 @@ WRITE_IMAGE(3);
 #define LOAD_NUMBER 2
 #include "variants/load.glsl"
 
-#define STORE_COUNT COLUMNS
 #include "variants/store.glsl"
 
 void write_row(int x, int y)

@@ -22,8 +22,6 @@ READ_IMAGE(2, own);
 // The texels of a row are a run where the ratio of widths is simple. The compiler removes loads that no window needs.
 const int BEFORE = MAX_WINDOW / 2, LOADED = 2 * COLUMNS + MAX_WINDOW;
 #define LOAD load_run
-#define LOAD_IMAGE source
-#define LOAD_NUMBER 1
 #define LOAD_FROM (-MAX_WINDOW / 2)
 #define LOAD_COUNT LOADED
 #include "variants/load.glsl"
@@ -37,7 +35,6 @@ WRITE_IMAGE(ENDED_TARGET);
 WRITE_IMAGE(3);
 #define HAS_OWN (ADD_OWN != 0)
 #endif
-#define STORE_COUNT COLUMNS
 #include "variants/store.glsl"
 
 // What becomes of a filtered pixel.

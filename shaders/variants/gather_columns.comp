@@ -27,7 +27,6 @@ WRITE_IMAGE(8);
 #define LOAD_NUMBER 1
 #include "variants/load.glsl"
 
-#define STORE_COUNT COLUMNS
 #include "variants/store.glsl"
 
 // The position of a row of the target in an image of this size.

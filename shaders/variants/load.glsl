@@ -1,12 +1,16 @@
 // Defines a function that loads a run of pixels of one row. Define before each inclusion:
 //
 //   LOAD           its name
-//   LOAD_IMAGE     the image, and LOAD_NUMBER its binding
+//   LOAD_IMAGE     the image, and LOAD_NUMBER its binding; default: `source`, 1
 //   LOAD_CHANNELS  the channels of its pixels in memory, 3 or 4 (default)
 //   LOAD_FROM      the offset of the run from `first` in pixels, 0 (default) or less
 //   LOAD_COUNT     the number of pixels in the run; default: COLUMNS
 //
 // `first` is at a multiple of 16 bytes. Outside of the image, the outermost pixels are repeated.
+#ifndef LOAD_IMAGE
+#define LOAD_IMAGE source
+#define LOAD_NUMBER 1
+#endif
 #ifndef LOAD_CHANNELS
 #define LOAD_CHANNELS 4
 #endif

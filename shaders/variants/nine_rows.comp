@@ -20,20 +20,15 @@ READ_IMAGE(1, source);
 WRITE_IMAGE(2);
 
 #define LOAD load_same
-#define LOAD_IMAGE source
-#define LOAD_NUMBER 1
 #define LOAD_FROM (-HDRP_RADIUS)
 #define LOAD_COUNT SAMPLES
 #include "variants/load.glsl"
 
 #define LOAD load_double
-#define LOAD_IMAGE source
-#define LOAD_NUMBER 1
 #define LOAD_FROM (-2 * HDRP_RADIUS)
 #define LOAD_COUNT (2 * SAMPLES)
 #include "variants/load.glsl"
 
-#define STORE_COUNT COLUMNS
 #include "variants/store.glsl"
 #include "variants/store_float.glsl"
 

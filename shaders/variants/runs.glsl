@@ -11,10 +11,7 @@ READ_IMAGE(1, source);
 WRITE_IMAGE(2);
 
 #define LOAD load_run
-#define LOAD_IMAGE source
-#define LOAD_NUMBER 1
 #define LOAD_COUNT LOADED
 #include "variants/load.glsl"
 
-#define STORE_COUNT COLUMNS
 #include "variants/store.glsl"

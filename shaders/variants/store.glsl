@@ -1,6 +1,10 @@
-// Defines the function that stores STORE_COUNT pixels to a row of the target. Pixels have
+// Defines the function that stores STORE_COUNT pixels (by default COLUMNS) to a row of the target. Pixels have
 // TARGET_CHANNELS channels. With four channels the pixels are a multiple of 16
 // bytes, with three of 24.
+
+#ifndef STORE_COUNT
+#define STORE_COUNT COLUMNS
+#endif
 
 // Four bytes of the run in memory, from 4 * number on.
 uint quarter_of(uvec4 raw[STORE_COUNT], int number)

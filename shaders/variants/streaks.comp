@@ -21,8 +21,6 @@ READ_IMAGE(2, before);
 WRITE_IMAGE(3);
 
 #define LOAD load_own
-#define LOAD_IMAGE source
-#define LOAD_NUMBER 1
 #include "variants/load.glsl"
 
 #define LOAD load_before
@@ -30,7 +28,6 @@ WRITE_IMAGE(3);
 #define LOAD_NUMBER 2
 #include "variants/load.glsl"
 
-#define STORE_COUNT COLUMNS
 #include "variants/store.glsl"
 
 vec4 seen(uvec4 raw)

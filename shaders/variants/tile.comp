@@ -8,7 +8,8 @@ layout(set = 0, binding = ENDED_TARGET) uniform writeonly image2D target;
 #include "variants/tile.glsl"
 
 // The vertical sums, packed in the format of their image. They are stored in planes of words, so
-// that neighbours are in neighbouring banks.
+// that neighbours are in neighbouring banks. With floats `Separable` takes 0.170 ms in place of 0.111
+// (3840 x 2160 in float16, H200, 2026-11-27).
 const int WORDS = FORMAT == STORED_SINGLE ? 3 : FORMAT == STORED_HALF ? 2 : 1;
 shared uint sums[WORDS][TILE_ROWS][TILE_LOADED];
 
