@@ -10,8 +10,8 @@
 #include <stdio.h>
 #include <string.h>
 
-// Makes the glare from the highlights, which are the first level; *gain is that of the result.
-typedef uint32_t add_type(struct vkb_levels *levels, double *gain);
+// Makes the glare from the highlights, which are the first level.
+typedef uint32_t add_type(struct vkb_levels *levels);
 
 static uint32_t add_step(struct vkb_levels *levels, const char *name, uint32_t number)
 {
@@ -27,10 +27,9 @@ static uint32_t level_count(const struct vkb_levels *levels)
     return (uint32_t)fmin(fmax(count, 1.0), MAX_LEVELS);
 }
 
-static uint32_t add_bloom(struct vkb_levels *levels, double *gain)
+static uint32_t add_bloom(struct vkb_levels *levels)
 {
     struct vkb_combination combination = vkb_combine(UPSAMPLE_TENT, 1.0, 1.0);
-    double below;
 
     levels->count = level_count(levels);
     for (uint32_t level = 1; level < levels->count; ++level)
@@ -44,9 +43,7 @@ static uint32_t add_bloom(struct vkb_levels *levels, double *gain)
             vkb_levels_reduce(levels, 1.0, 1.0, from, to);
     }
     combination.target_step = true;
-    const uint32_t light = vkb_levels_add_up(levels, &combination, &below);
-    *gain = below / levels->count;
-    return light;
+    return vkb_levels_add_up(levels, &combination);
 }
 
 // The sum of the weights that Blender gives the taps of an iteration.
@@ -96,7 +93,7 @@ static bool set_next(struct vkb_size size, float angle, int iteration, float nex
     return found;
 }
 
-static uint32_t add_streaks(struct vkb_levels *levels, double *gain)
+static uint32_t add_streaks(struct vkb_levels *levels)
 {
     const struct vkb_values *values = &levels->settings->values;
     const struct vkb_glare_values numbers = {
@@ -107,7 +104,6 @@ static uint32_t add_streaks(struct vkb_levels *levels, double *gain)
     };
     uint32_t before = VKB_NO_IMAGE, light = VKB_NO_IMAGE;
 
-    (void)gain;
     for (int i = 0; i < values->streaks; ++i, before = light) {
         // Blender reads in the direction of the angle.
         const double angle =
@@ -183,7 +179,7 @@ static void set_ghosts(const struct vkb_values *values, int iteration, struct vk
     }
 }
 
-static uint32_t add_ghosts(struct vkb_levels *levels, double *gain)
+static uint32_t add_ghosts(struct vkb_levels *levels)
 {
     static const float scales[2] = {2.13f, -0.97f};
     const struct vkb_values *values = &levels->settings->values;
@@ -196,7 +192,6 @@ static uint32_t add_ghosts(struct vkb_levels *levels, double *gain)
     };
     uint32_t from, light = VKB_NO_IMAGE, before = VKB_NO_IMAGE;
 
-    (void)gain;
     for (uint32_t i = 0; i < 2; ++i, before = light) {
         stage.ghosts[0][3] = scales[i];
         from = add_blurred(levels, radius << i);
@@ -213,13 +208,12 @@ static uint32_t add_ghosts(struct vkb_levels *levels, double *gain)
     return light;
 }
 
-static uint32_t add_convolution(struct vkb_levels *levels, double *gain)
+static uint32_t add_convolution(struct vkb_levels *levels)
 {
     const struct vkb_image_row result = {.name = "convolved", .format = VKB_FORMAT_RGBA32_FLOAT};
     const struct vkb_bloom_source *source = levels->source;
     struct vkb_bloom_source highlights = *source;
 
-    (void)gain;
     highlights.glow = levels->downs[0];
     highlights.buffers = levels->sizes[0];
     levels->source = &highlights;
@@ -262,22 +256,20 @@ static uint32_t add_line(struct vkb_levels *levels, int direction, int step_x, i
     return from;
 }
 
-static uint32_t add_simple_star(struct vkb_levels *levels, double *gain)
+static uint32_t add_simple_star(struct vkb_levels *levels)
 {
     const bool diagonal = levels->settings->values.diagonal;
     const uint32_t before = add_line(levels, 0, 1, diagonal ? -1 : 0, VKB_NO_IMAGE);
 
-    (void)gain;
     return add_line(levels, 1, diagonal ? -1 : 0, -1, before);
 }
 
-static uint32_t add_sun_beams(struct vkb_levels *levels, double *gain)
+static uint32_t add_sun_beams(struct vkb_levels *levels)
 {
     const struct vkb_settings *settings = levels->settings;
     const struct vkb_size size = levels->sizes[0];
     const int most = (int)(settings->values.size * floor(hypot(size.width, size.height)));
 
-    (void)gain;
     if (most == 0)
         return levels->downs[0];
     const uint32_t light = add_step(levels, "beams", 0);
@@ -362,7 +354,6 @@ uint32_t vkb_add_blender(struct vkb_levels *levels)
     const int type = levels->settings->choices[VKB_CHOICE_type];
     const struct vkb_bloom_source *source = levels->source;
     struct vkb_bloom_source floats = *source;
-    double gain = 1.0;
 
     // What spreads over hundreds of pixels is too little for 8 bits and for 6 bits of mantissa.
     if (source->format != VKB_FORMAT_RGBA32_FLOAT)
@@ -370,7 +361,7 @@ uint32_t vkb_add_blender(struct vkb_levels *levels)
     add_highlights(levels);
     if (type != TYPE_BLOOM)
         levels->source = &floats;
-    const uint32_t light = types[type](levels, &gain);
+    const uint32_t light = types[type](levels);
     levels->source = source;
-    return add_end(levels, light, gain);
+    return add_end(levels, light, type == TYPE_BLOOM ? levels->below / levels->count : 1.0);
 }

@@ -204,33 +204,32 @@ static void add_up(struct vkb_levels *levels, const struct vkb_combination *comb
 // Adds up levels. In rgba8unorm, whose largest value is 1, each image holds its sum divided by the
 // sum for a constant image of 1 (`flat`; negative shares count as positive), and the bloom is
 // multiplied by this.
-uint32_t vkb_levels_add_up(struct vkb_levels *levels, const struct vkb_combination *combination,
-                           double *below)
+uint32_t vkb_levels_add_up(struct vkb_levels *levels, const struct vkb_combination *combination)
 {
     const bool means = vkb_stores_means(levels->source->format);
     uint32_t top = levels->downs[levels->count - 1];
 
-    *below = combination->smallest;
+    levels->below = combination->smallest;
     for (uint32_t level = levels->count - 1; level-- > 0;) {
         const uint32_t from = top;
-        const double own = combination->own[level], coarse = combination->coarse[level] * *below;
+        const double own = combination->own[level],
+                     coarse = combination->coarse[level] * levels->below;
         const double sum = fabs(own) + fabs(coarse), flat = means && sum > 0.0 ? sum : 1.0;
         top = vkb_levels_image(levels, "up_%u", level, levels->sizes[level]);
         add_up(levels, combination, combination->kernel, from, top, levels->downs[level],
                own / flat, coarse / flat);
-        *below = flat;
+        levels->below = flat;
     }
     return top;
 }
 
 uint32_t vkb_levels_combine(struct vkb_levels *levels, const struct vkb_combination *combination)
 {
-    double below;
-    const uint32_t top = vkb_levels_add_up(levels, combination, &below);
+    const uint32_t top = vkb_levels_add_up(levels, combination);
     const uint32_t bloom = vkb_levels_bloom(levels);
 
     add_up(levels, combination, combination->last_kernel, top, bloom, VKB_NO_IMAGE, 0.0,
-           combination->gain * below);
+           combination->gain * levels->below);
     return bloom;
 }
 

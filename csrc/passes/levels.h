@@ -95,9 +95,9 @@ void vkb_levels_resize(struct vkb_levels *levels, uint32_t from, double gain, ui
 uint32_t vkb_levels_enlarge(struct vkb_levels *levels, enum vkb_mode kernel, uint32_t from,
                             double gain);
 
-// The passes up_N-2 ... up_0, without `last_kernel` and `gain`; the last image.
-uint32_t vkb_levels_add_up(struct vkb_levels *levels, const struct vkb_combination *combination,
-                           double *below);
+// The passes up_N-2 ... up_0, without `last_kernel` and `gain`; the last image, which has to be
+// multiplied by `levels->below`.
+uint32_t vkb_levels_add_up(struct vkb_levels *levels, const struct vkb_combination *combination);
 
 // The passes up_N-2 ... up_0 and "bloom".
 uint32_t vkb_levels_combine(struct vkb_levels *levels, const struct vkb_combination *combination);

@@ -72,6 +72,7 @@ struct vkb_levels {
     struct vkb_size sizes[MAX_LEVELS];
     uint32_t downs[MAX_LEVELS];
     uint32_t count;
+    double below;  // the factor of the smaller level while levels are added up
 };
 
 // Adds an image that has pixels; an image that passes write.

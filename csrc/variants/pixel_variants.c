@@ -49,24 +49,9 @@ bool vkb_add_fullscreen(struct vkb_variant_choice *choice, const struct vkb_pass
     return vkb_add_variant(choice, &row);
 }
 
-// Whether the pass has a shader that can also read what the threshold pass reads: it removes NaN
-// and infinity from each texel, which filters of the hardware would not. Without it `bevy_natural`
-// takes 0.41 ms in place of 0.33 (3840 x 2160 in float16, H200, 2026-11-27).
-static bool reads_images(const struct vkb_pass_row *pass)
-{
-    return vkb_computes(pass, VKB_BLOCK_prefilter) && pass->constants.groups == GROUPS_BEVY
-        && !pass->constants.masked && pass->constants.sampling != SAMPLING_FILTER;
-}
-
 bool vkb_add_pixels(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
 {
-    if (!(pass->geometry == VKB_GEOMETRY_FULLSCREEN && pass->shader->dispatch
-          && vkb_is_written_once(&choice->plain, pass->targets[0])))
-        return false;
-    vkb_add_fullscreen(choice, pass);
-    if (choice->variants != VKB_VARIANTS_GPU || !reads_images(pass) || choice->failed)
-        return true;
-    struct vkb_pass_row row;
-    memcpy(&row, &choice->graph->passes[choice->graph->pass_count - 1], sizeof row);
-    return vkb_add_from_image(choice, pass, &row);
+    return pass->geometry == VKB_GEOMETRY_FULLSCREEN && pass->shader->dispatch
+        && vkb_is_written_once(&choice->plain, pass->targets[0])
+        && vkb_add_fullscreen(choice, pass);
 }

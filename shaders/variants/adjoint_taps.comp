@@ -91,10 +91,10 @@ void along_columns(ivec2 first, int end, int start, float gain, float share)
         vec4 place = entry(start + y), sums[ADJOINT_SIDE * COLUMNS];
         [[unroll]] for (int i = 0; i < ADJOINT_SIDE * COLUMNS; ++i)
             sums[i] = vec4(0.0);
-        for (int at = 0; at < SPAN_Y; ++at) {
-            vec4 weights = gain * weights_at(place, at, 0);
+        for (int number = 0; number < SPAN_Y; ++number) {
+            vec4 weights = gain * weights_at(place, number, 0);
             [[unroll]] for (int column = 0; column < COLUMNS; ++column) {
-                vec4 value = cotangent_at(first.x + column, int(place.w) + at);
+                vec4 value = cotangent_at(first.x + column, int(place.w) + number);
                 [[unroll]] for (int row = 0; row < ADJOINT_SIDE; ++row)
                     sums[row * COLUMNS + column] += weights[row] * value;
             }

@@ -132,11 +132,11 @@ vkbloom.apply(np.ones((8, 8, 3), np.float32))
 vkbloom.default_renderer().close()
 os.environ["VKBLOOM_TIMEOUT"] = "1e-6"
 try:
-    vkbloom.apply(np.ones((512, 512, 3), np.float32))
+    vkbloom.apply(np.ones((2048, 2048, 3), np.float32))
 except vkbloom.DeviceLostError as error:
     print("VKBLOOM_TIMEOUT" in str(error))
 del os.environ["VKBLOOM_TIMEOUT"]
-time.sleep(1)  # The device finishes, so that its objects can be destroyed.
+time.sleep(4)  # The device finishes, so that its objects can be destroyed.
 print(vkbloom.apply(np.ones((8, 8, 3), np.float32))["final"].shape)
 """
 
