@@ -10,9 +10,6 @@
 #include <stdio.h>
 #include <string.h>
 
-// Makes the glare from the highlights, which are the first level.
-typedef uint32_t add_type(struct vkb_levels *levels);
-
 static uint32_t add_step(struct vkb_levels *levels, const char *name, uint32_t number)
 {
     return vkb_levels_step(levels, name, number, levels->sizes[0]);
@@ -287,7 +284,8 @@ static uint32_t add_sun_beams(struct vkb_levels *levels)
     return light;
 }
 
-static add_type *const types[] = {
+// Each makes the glare from the highlights, which are the first level.
+static uint32_t (*const types[])(struct vkb_levels *) = {
     [TYPE_BLOOM] = add_bloom,
     [TYPE_GHOSTS] = add_ghosts,
     [TYPE_STREAKS] = add_streaks,

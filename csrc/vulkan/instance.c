@@ -355,14 +355,14 @@ bool vkb_instance_claim(struct vkb_instance **instance, struct vkb_error *error)
     struct vkb_instance *shared = *instance;
 
     vkb_lock_acquire(&lock);
-    struct vkb_instance *own = shared;
-    if (shared->claimed && (own = get_instance(shared->driver, shared->validation, true, error))) {
+    struct vkb_instance *own =
+        shared->claimed ? get_instance(shared->driver, shared->validation, true, error) : shared;
+    if (own) {
+        own->claimed = true;
         ++own->users;
         leave_instance(shared);
         *instance = own;
     }
-    if (own)
-        own->claimed = true;
     vkb_lock_release(&lock);
     return own != NULL;
 }

@@ -114,7 +114,7 @@ Measured = dict[str, dict[str, float]]  # what tools/renderer_memory.py prints
 
 
 @pytest.fixture(scope="module")
-def grown() -> Measured:
+def grown(software: AdapterInfo) -> Measured:
     """What 100 renderers and 200 frames of one leave behind."""
     if os.environ.get("VKBLOOM_SANITIZED"):
         pytest.skip("a sanitizer's own heap is not what is measured")
