@@ -382,12 +382,11 @@ bool vkb_instance_require_room(const struct vkb_instance *instance, bool lavapip
 
 void vkb_instance_explain(struct vkb_error *error)
 {
-    const long process = vkb_current_process();
     size_t users = 0;
 
     vkb_lock_acquire(&lock);
     for (const struct vkb_instance *instance = instances; instance; instance = instance->next)
-        users += instance->handle && instance->process == process ? instance->users : 0;
+        users += instance->process == vkb_current_process() ? instance->users : 0;
     if (strcmp(error->call, "vkCreateDevice") == 0)
         vkb_add_words(error,
                       ". Renderers open in this process: %zu. Drivers limit their number (NVIDIA's "
