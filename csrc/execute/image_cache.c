@@ -138,5 +138,6 @@ struct vkb_cached_image *vkb_image_cache_add(const struct vkb_device *device,
     vkb_label_object(device, VK_OBJECT_TYPE_IMAGE, (uint64_t)cached->image.handle, row->name);
     if (cached->image.buffer)
         vkb_label_object(device, VK_OBJECT_TYPE_BUFFER, (uint64_t)cached->image.buffer, row->name);
+    cached->used = cache->now;
     return cached;
 }

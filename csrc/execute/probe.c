@@ -47,33 +47,33 @@ static bool fetch(struct vkb_run *run, enum vkb_format format, const void *value
     struct vkb_submission *submission = run->submission;
     struct vkb_buffer *given = &run->frame->constants, *counts = &submission->readback.counts;
     const size_t size = TEXELS * vkb_pixel_size(format);
-    const struct vkb_image_spec spec = {
+    const struct vkb_image_row row = {
+        .name = "probed texels",
         .format = format,
         .width = TEXELS,
         .height = 1,
         .usage = vkb_access_usage(VKB_ACCESS_COPY_TARGET)
                | vkb_access_usage(VKB_ACCESS_DISPATCH_SAMPLED),
     };
-    struct vkb_image image = {0};
+    // In the cache, since the device may still use what an interrupted wait was for.
+    struct vkb_cached_image *cached = NULL;
     bool done = vkb_submissions_wait(device, &run->frame->submissions, error)
              && vkb_buffer_reserve(device, VKB_MEMORY_UPLOAD, VK_BUFFER_USAGE_TRANSFER_SRC_BIT,
                                    size, given, error)
              && vkb_buffer_reserve(device, VKB_MEMORY_READBACK, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT,
                                    VALUES * sizeof(float) + VKB_COUNTS_SIZE, counts, error)
-             && vkb_image_create(device, &spec, &image, error);
+             && (cached = vkb_image_cache_add(device, &run->frame->cache, &row, error));
 
     if (done)
         memcpy(given->mapped, values, size);
     done = done && vkb_buffer_flush(device, given, error)
-        && vkb_commands_begin(device, &submission->commands, error) && record(run, &image, error)
+        && vkb_commands_begin(device, &submission->commands, error)
+        && record(run, &cached->image, error)
         && vkb_submission_submit(device, submission, NULL, error)
         && vkb_submission_wait(device, &run->frame->submissions, submission, error)
         && vkb_buffer_invalidate(device, counts, error);
     if (done)
         memcpy(fetched, counts->mapped, VALUES * sizeof *fetched);
-    // The device may still use what an interrupted wait was for.
-    if (!submission->pending)
-        vkb_image_destroy(device, &image);
     return done;
 }
 

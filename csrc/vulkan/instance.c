@@ -343,10 +343,8 @@ struct vkb_instance *vkb_instance_open(const char *driver, bool validation, stru
 
 static void leave_instance(struct vkb_instance *instance)
 {
-    if (--instance->users > 0)
-        return;
-    instance->claimed = false;
-    if (forked)
+    instance->claimed = --instance->users > 0 && instance->claimed;
+    if (instance->users == 0 && forked)
         destroy_instance(instance);
 }
 

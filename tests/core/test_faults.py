@@ -134,6 +134,21 @@ def test_instances_are_kept_for_the_next_device(
     assert 2 <= int(output("-c", INSTANCES, **faulty)) <= 2 * devices
 
 
+# The first waits of a renderer are for probes of texels. What a failed one was for is still in use.
+WAITS = """
+from tests.core.fault_walk import OUT_OF_DEVICE_MEMORY, WORK, Walk, open_renderer
+
+with open_renderer() as renderer:
+    right = {name: array.copy() for name, array in WORK["grid"](renderer).items()}
+walk = Walk("grid", WORK["grid"])
+print([walk.work_at(n, right, OUT_OF_DEVICE_MEMORY, "vkWaitForFences") for n in (1, 2, 3)])
+"""
+
+
+def test_what_a_failed_wait_was_for_is_destroyed_later(faulty: dict[str, str]) -> None:
+    assert output("-c", WAITS, **faulty) == "[True, True, True]\n"
+
+
 # Opens renderers until a device is refused.
 MANY = """
 import vkbloom
