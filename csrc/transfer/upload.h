@@ -42,7 +42,7 @@ struct vkb_upload {
     uint32_t width, height, channels;
     struct vkb_non_finite *rows;       // in each row of the image
     struct vkb_non_finite non_finite;  // in the complete image
-    unsigned char *packed;             // a row of each part, before it is compared or kept
+    unsigned char *packed;             // a row of each part, before it is compared
     size_t row_capacity, packed_capacity;
     uint32_t sent;  // rows whose copy was submitted since the last vkb_upload_record
 };

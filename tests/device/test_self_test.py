@@ -14,6 +14,7 @@ from click.testing import CliRunner
 
 import vkbloom
 from tests.device.exceptions import reason_against
+from tests.variants import opened
 from vkbloom import Renderer
 from vkbloom._cli.program import program
 from vkbloom._doctor import self_test
@@ -25,10 +26,7 @@ CASES = {f"{case.group}: {case.name}": case for case in cases()}
 
 @pytest.fixture(scope="module")
 def fragment() -> Iterator[Renderer]:
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("VKBLOOM_VARIANT", "fragment")
-        renderer = Renderer(validation=True)
-    with renderer:
+    with opened("fragment") as renderer:
         yield renderer
 
 

@@ -11,6 +11,7 @@ import pytest
 import vkbloom
 from tests.device.abilities import has_linear_texels
 from tests.images import random_image
+from tests.variants import opened
 from vkbloom import (
     BevyBloom,
     BlenderGlare,
@@ -242,11 +243,9 @@ TRANSPOSED: tuple[tuple[str, Any, tuple[int, ...], str, tuple[str, ...]], ...] =
 
 @pytest.fixture(scope="module")
 def varied(software: Any) -> Iterator[dict[str, Renderer]]:
-    renderers = {}
-    with pytest.MonkeyPatch.context() as patch:
-        for variant in ("cpu", "gpu"):
-            patch.setenv("VKBLOOM_VARIANT", variant)
-            renderers[variant] = Renderer("software")
+    renderers = {
+        variant: opened(variant, "software", validation=False) for variant in ("cpu", "gpu")
+    }
     yield renderers
     for renderer in renderers.values():
         renderer.close()

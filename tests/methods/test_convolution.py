@@ -10,6 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from tests.exhaustive import some
+from tests.variants import opened
 from vkbloom import Convolution, Renderer, Settings, psf, reference
 from vkbloom.reference._convolution import prefiltered
 
@@ -69,11 +70,8 @@ def test_long_lines(renderer: Renderer) -> None:
 @pytest.fixture(scope="module")
 def gpu() -> Iterator[Renderer]:
     """A renderer with the variants of GPUs, which transform complete lines."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("VKBLOOM_VARIANT", "gpu")
-        opened = Renderer(validation=True)
-    with opened:
-        yield opened
+    with opened("gpu") as renderer:
+        yield renderer
 
 
 def test_complete_lines(gpu: Renderer) -> None:

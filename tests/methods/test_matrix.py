@@ -11,11 +11,13 @@ import pytest
 from numpy.testing import assert_array_equal
 from numpy.typing import NDArray
 
+from tests import variants
 from tests.conftest import SANITIZED
 from tests.exhaustive import EXHAUSTIVE, by_turns
 from tests.images import hdr_picture
 from tests.methods.cases import DTYPES, GIVEN, METHODS, OTHERS, WHOLE, presets_of_low_levels
 from tests.tolerance import assert_matches_reference
+from tests.variants import VARIANTS
 from vkbloom import (
     Convolution,
     Dirt,
@@ -35,7 +37,6 @@ from vkbloom import (
 
 Image = NDArray[Any]
 
-VARIANTS = ("fragment", "cpu", "gpu")
 # Of the convolutions one: they have the same passes.
 PRESETS = {
     name: one
@@ -100,11 +101,7 @@ def given_of(names: tuple[str, ...], image: Image) -> dict[str, Any]:
 @pytest.fixture(scope="module")
 def opened() -> Iterator[dict[str, Renderer]]:
     """A renderer for each column of the table of variants."""
-    renderers = {}
-    with pytest.MonkeyPatch.context() as patch:
-        for variant in VARIANTS:
-            patch.setenv("VKBLOOM_VARIANT", variant)
-            renderers[variant] = Renderer(validation=not SANITIZED)
+    renderers = {variant: variants.opened(variant) for variant in VARIANTS}
     yield renderers
     for renderer in renderers.values():
         renderer.close()

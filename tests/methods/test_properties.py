@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 import vkbloom
 from tests.exhaustive import EXHAUSTIVE, by_turns, examples
 from tests.methods.cases import METHODS
-from tests.methods.test_variants import VARIANTS, opened
+from tests.variants import VARIANTS, opened
 from vkbloom import (
     DualKawase,
     FilamentBloom,

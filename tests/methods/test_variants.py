@@ -8,24 +8,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.conftest import SANITIZED
 from tests.device.abilities import has_linear_texels, infinities
 from tests.exhaustive import EXHAUSTIVE
 from tests.framebuffers import assert_same
 from tests.images import hdr_picture
 from tests.methods.cases import OTHERS, WHOLE
 from tests.tolerance import assert_matches_reference, tolerance
+from tests.variants import VARIANTS, opened
 from vkbloom import BevyBloom, Convolution, Frames, Pyramid, Renderer, Scene, Separable, presets
 from vkbloom.psf import gaussian
 from vkbloom.reference import apply as reference_apply
-
-VARIANTS = ("fragment", "cpu", "gpu")
-
-
-def opened(variant: str) -> Renderer:
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("VKBLOOM_VARIANT", variant)
-        return Renderer(validation=not SANITIZED)
 
 
 @pytest.fixture(scope="module", params=VARIANTS)
