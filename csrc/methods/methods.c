@@ -19,7 +19,10 @@ uint32_t vkb_add_bloom(struct vkb_levels *levels, const struct vkb_bloom_source 
     if (vkb_has_glare(levels->settings))
         vkb_add_stages(levels, stages);
     const uint32_t bloom = methods[levels->settings->method](levels);
-    return vkb_has_glare(levels->settings) ? vkb_add_light(levels, stages, bloom) : bloom;
+    const uint32_t light =
+        vkb_has_glare(levels->settings) ? vkb_add_light(levels, stages, bloom) : bloom;
+    levels->source = NULL;  // the caller's
+    return light;
 }
 
 bool vkb_check_sizes(const struct vkb_settings *settings, const char *name, struct vkb_size frame,

@@ -35,8 +35,7 @@ bool vkb_input_is_contiguous(const struct vkb_input *input);
 
 struct vkb_upload {
     struct vkb_buffer staging;
-    unsigned char
-        *pixels;  // the packed image that it holds: in staging memory or in the mapped image
+    unsigned char *pixels;  // the packed image that it holds: in staging memory, or mapped
     size_t row_pitch;
     enum vkb_format format;  // of the image that it holds; NONE: no image
     uint32_t width, height, channels;

@@ -324,7 +324,6 @@ static struct vkb_instance *get_instance(const char *driver, bool validation, bo
     if (!empty) {
         if (!(empty = vkb_alloc(error, 1, sizeof *empty)))
             return NULL;
-        empty->process = process;
         empty->next = instances;
         instances = empty;
     }
