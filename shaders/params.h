@@ -442,9 +442,14 @@
 #define TILE_ROWS               32
 #define TILE_RUNS               4
 #define TILE_RADIUS             16
-// Tiles of filters: their rows, and those that an invocation adds up.
-#define FILTER_TILE_ROWS 16
-#define FILTER_TILE_RUN  4
+// Tiles of filters in these ratios, in which an invocation adds up FILTER_RUN rows of a column; the first texel of a
+// pixel's window, from that of the first pixel's; texels along an axis.
+#define FILTER_COLUMNS                    32
+#define FILTER_RUNS                       2
+#define FILTER_RUN(ratio)                 ((ratio) == 0 ? 8 : 4)
+#define FILTER_OFFSET(ratio, pixel) \
+    ((ratio) == EXACT_HALF ? 2 * (pixel) : (ratio) == EXACT_SAME ? (pixel) : ((pixel) + 1) / 2)
+#define FILTER_TEXELS(ratio, pixels, window) (FILTER_OFFSET(ratio, (pixels) - 1) + (window))
 #define FUSED_VEC4S      5
 
 // Fourier transforms. FFT_INVOCATIONS is the size of a workgroup. In a transform of columns,
@@ -497,7 +502,7 @@
 // that a fused pass keeps are rounded (STORED_*). RADIUS is 0 for a line whose kernel is too
 // long to unroll its loops; with ROLLED the loop over a line's pixels stays one. With FINITE the
 // source is known to have no NaN and no infinity. TAP_COUNT, KERNELS and WINDOW are of filters
-// (lib/filter.glsl), and SOURCE_ROWS of their tiles. TAKEN_X and TAKEN_Y have a bit for each texel
+// (lib/filter.glsl). TAKEN_X and TAKEN_Y have a bit for each texel
 // of a window and each kernel that may have a weight; 0: all may. EXACT says that their images are
 // in this ratio, or for strips and tiles the widths of these; EXACT_ROWS says so of the heights.
 // With FROM_IMAGE, a downsampling to half the size reads the image itself and applies the
@@ -555,7 +560,6 @@
     CONSTANT(44, TAP_COUNT, taps) \
     CONSTANT(45, KERNELS, kernels) \
     CONSTANT(46, WINDOW, window) \
-    CONSTANT(47, SOURCE_ROWS, source_rows) \
     CONSTANT(48, EXACT_ROWS, exact_rows) \
     CONSTANT(49, TAKEN_X, taken_x) \
     CONSTANT(50, TAKEN_Y, taken_y)

@@ -150,7 +150,7 @@ static const struct vkb_pass_row *other_axis(const struct vkb_graph *graph,
 // The texel of the source at or before the position of a texel of the target.
 static int32_t texel_before(int32_t ratio, int32_t texel)
 {
-    return ratio == EXACT_HALF ? 2 * texel : ratio == EXACT_SAME ? texel : (texel + 1) / 2 - 1;
+    return FILTER_OFFSET(ratio, texel) - (ratio == EXACT_DOUBLE);
 }
 
 // The most readers of a texel.
@@ -199,23 +199,13 @@ static void set_windows(const struct axis *x, const struct axis *y, int32_t rati
         constants->taken_x |= ((1 << of_columns) - 1) << MAX_WINDOW * kernel;
 }
 
-// The most rows that a tile reads; 0: the readers of a row begin above those of the row before.
-static uint32_t tile_rows(const struct axis *y, const struct vkb_constants *constants)
+// Whether the readers of no row begin above those of the row before.
+static bool begins_in_order(const struct axis *y)
 {
-    const int32_t ratio = constants->exact_rows;
-    int32_t most = 0;
-
-    for (uint32_t texel = 0; texel + 1 < y->size && !ratio; ++texel)
+    for (uint32_t texel = 0; texel + 1 < y->size; ++texel)
         if (entry_of(y, texel)[0] > entry_of(y, texel + 1)[0])
-            return 0;
-    for (uint32_t texel = 0; texel < y->size; texel += FILTER_TILE_ROWS) {
-        const uint32_t last = texel + FILTER_TILE_ROWS - 1;
-        const int32_t rows =
-            ratio ? texel_before(ratio, (int32_t)last) - texel_before(ratio, (int32_t)texel)
-                  : (int32_t)(entry_of(y, last)[0] - entry_of(y, texel)[0]);
-        most = rows > most ? rows : most;
-    }
-    return (uint32_t)(most + constants->window);
+            return false;
+    return true;
 }
 
 // Makes `row` tiles along both axes at once, also where the plain passes are one for each axis, of
@@ -247,9 +237,8 @@ static bool make_tiles(const struct vkb_variant_choice *choice, const struct vkb
     if (!other && !ratio_y && pass->constants.levels < 2)
         return false;
     set_windows(&x, &y, ratio_x, ratio_y, row);
-    const uint32_t source_rows = tile_rows(&y, &row->constants);
-    return row->constants.window <= MAX_WINDOW && source_rows > 0
-        && vkb_make_tiles(choice, &vkb_shader_adjoint_filter_tile_comp, source_rows, row);
+    vkb_make_tiles(choice, &vkb_shader_adjoint_filter_tile_comp, row);
+    return row->constants.window <= MAX_WINDOW && (row->constants.exact || begins_in_order(&y));
 }
 
 bool vkb_add_adjoint_filter(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)

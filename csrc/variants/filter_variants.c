@@ -121,16 +121,6 @@ static void take_filter(const struct vkb_variant_choice *choice, const struct vk
     row->constants.exact_rows = has_phases(pass) ? vkb_ratio_of(source->height, target->height) : 0;
 }
 
-// The most rows of its source that a tile of a filter reads.
-static uint32_t tile_rows(const struct vkb_graph *graph, const struct vkb_pass_row *pass)
-{
-    const uint64_t source = graph->images[pass->reads[0]].height;
-    const uint64_t target = graph->images[pass->targets[0]].height;
-
-    return (uint32_t)(((FILTER_TILE_ROWS - 1) * source + target - 1) / target) + 1
-         + (uint32_t)pass->constants.window;
-}
-
 // The shaders of a filter: strips by format, and tiles.
 struct filter_shaders {
     const struct vkb_shader *const *strips, *tiles;
@@ -147,8 +137,10 @@ static bool make_filter(const struct vkb_variant_choice *choice, const struct vk
     if (!vkb_is_filter(pass) || pass->constants.window == 0)
         return false;
     take_filter(choice, pass, row);
-    if (choice->variants == VKB_VARIANTS_GPU)
-        return vkb_make_tiles(choice, shaders.tiles, tile_rows(&choice->plain, pass), row);
+    if (choice->variants == VKB_VARIANTS_GPU) {
+        vkb_make_tiles(choice, shaders.tiles, row);
+        return true;
+    }
     if (!fits_strips(&choice->plain, pass) || !vkb_fits_linear(choice, row))
         return false;
     row->constants.enlarged = source->height <= target->height;

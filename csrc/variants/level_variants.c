@@ -40,14 +40,13 @@ static bool is_half(const struct vkb_graph *graph, const struct vkb_pass_row *pa
     return source->width == 2 * target->width && source->height == 2 * target->height;
 }
 
-// Adds the pass as one of linear texels, which loads the texels of its first image.
-static bool add_linear(struct vkb_variant_choice *choice, struct vkb_pass_row *row,
-                       const struct vkb_shader *shader, uint32_t columns, uint32_t rows)
+// Makes the pass one of linear texels, which loads the texels of its first image.
+static void make_linear(struct vkb_pass_row *row, const struct vkb_shader *shader,
+                        uint32_t columns, uint32_t rows)
 {
     row->constants.sampling = 0;
     vkb_drop_reads(row, 1);
     vkb_make_linear(row, shader, columns, rows);
-    return vkb_add_variant(choice, row);
 }
 
 bool vkb_add_windowed(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
@@ -67,12 +66,18 @@ bool vkb_add_windowed(struct vkb_variant_choice *choice, const struct vkb_pass_r
     row.constants.enlarged = source->height < target->height;
     row.constants.window = has_thirteen_taps(groups) ? 6 : 4;
     // A radius is that of a mean of other texels. HDRP's taps are in other texels at each position.
-    return groups && !is_blur && !pass->constants.masked && pass->constants.radius <= 1
-        && pass->params.prefilter.step_x == 1.0f && pass->params.prefilter.step_y == 1.0f
-        && (row.constants.exact || groups != GROUPS_HDRP) && loads(choice, pass)
-        && add_linear(choice, &row, taps_linear[source->format],
-                      row.constants.exact ? TAP_COLUMNS(size) : 4 / size, TAP_ROWS)
-        && vkb_add_from_image(choice, pass, &row);
+    if (!groups || is_blur || pass->constants.masked || pass->constants.radius > 1
+        || pass->params.prefilter.step_x != 1.0f || pass->params.prefilter.step_y != 1.0f
+        || (!row.constants.exact && groups == GROUPS_HDRP))
+        return false;
+    if (choice->variants == VKB_VARIANTS_GPU)
+        vkb_make_dispatch(&row, pass->shader->dispatch, PIXEL_INVOCATIONS, PIXEL_INVOCATIONS);
+    else if (loads(choice, pass))
+        make_linear(&row, taps_linear[source->format],
+                    row.constants.exact ? TAP_COLUMNS(size) : 4 / size, TAP_ROWS);
+    else
+        return false;
+    return vkb_add_variant(choice, &row) && vkb_add_from_image(choice, pass, &row);
 }
 
 // HDRP's blurs of images of the same size, and of twice the size along the line; Godot's horizontal
@@ -96,7 +101,10 @@ bool vkb_add_nine(struct vkb_variant_choice *choice, const struct vkb_pass_row *
     memcpy(&row, pass, sizeof row);
     row.constants.exact =
         pass->constants.first && pass->constants.groups == GROUPS_HDRP_BLUR ? EXACT_SAME : 0;
-    return rows ? add_linear(choice, &row, rows_linear[format], NINE_OUTPUTS, GATHER_ROWS)
-                : add_linear(choice, &row, columns_linear[format],
-                             4 / vkb_formats[format].channel_size, NINE_OUTPUTS);
+    if (rows)
+        make_linear(&row, rows_linear[format], NINE_OUTPUTS, GATHER_ROWS);
+    else
+        make_linear(&row, columns_linear[format], 4 / vkb_formats[format].channel_size,
+                    NINE_OUTPUTS);
+    return vkb_add_variant(choice, &row);
 }

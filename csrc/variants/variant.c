@@ -58,26 +58,21 @@ int32_t vkb_ratio_of(uint32_t source, uint32_t target)
                                 : 0;
 }
 
-bool vkb_make_tiles(const struct vkb_variant_choice *choice, const struct vkb_shader *shader,
-                    uint32_t source_rows, struct vkb_pass_row *row)
+void vkb_make_tiles(const struct vkb_variant_choice *choice, const struct vkb_shader *shader,
+                    struct vkb_pass_row *row)
 {
-    // Wide tiles compute fewer weights, but a workgroup of more than 24 KiB leaves processors idle.
-    enum { WIDEST = 32, NARROWEST = 16, FASTEST = 24 << 10, VEC4 = 4 * sizeof(float) };
-    const uint32_t limit = choice->device->limits.maxComputeSharedMemorySize;
-    const uint32_t window = (uint32_t)row->constants.window;
-    const uint32_t sums = (uint32_t)row->constants.kernels * source_rows;
-    uint32_t columns = WIDEST;
+    struct vkb_constants *constants = &row->constants;
+    const int32_t exact = constants->exact, exact_rows = constants->exact_rows;
+    const int32_t window = constants->window, most = FILTER_RUNS * FILTER_RUN(exact);
+    const int32_t texels = FILTER_TEXELS(exact, FILTER_COLUMNS, window)
+                         * FILTER_TEXELS(exact_rows, most, window);
+    const int32_t weights = (window + 2) * (FILTER_COLUMNS + most);
 
-    while (columns >= NARROWEST
-           && VEC4 * ((window + 2) * (columns + FILTER_TILE_ROWS) + (sums + 1) * (columns + 1))
-                  > (limit < FASTEST ? limit : FASTEST))
-        columns /= 2;
-    if (columns < NARROWEST)
-        return false;
-    row->constants.source_rows = (int32_t)source_rows;
-    row->constants.group_width = (int32_t)columns;
-    vkb_make_dispatch(row, shader, columns, FILTER_TILE_ROWS);
-    return true;
+    if (!exact || !exact_rows
+        || 4 * sizeof(float) * (size_t)(texels + weights)
+               > choice->device->limits.maxComputeSharedMemorySize)
+        constants->exact = constants->exact_rows = 0;
+    vkb_make_dispatch(row, shader, FILTER_COLUMNS, FILTER_RUNS * FILTER_RUN(constants->exact));
 }
 
 bool vkb_fits_linear(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)

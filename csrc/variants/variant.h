@@ -87,10 +87,9 @@ void vkb_make_dispatch(struct vkb_pass_row *row, const struct vkb_shader *shader
 // Whether sides are in a simple ratio: EXACT_*; 0: they are not.
 int32_t vkb_ratio_of(uint32_t source, uint32_t target);
 
-// Turns a pass with the constants of a filter into its tiles, which read at most `source_rows`
-// rows. False: no tile fits.
-bool vkb_make_tiles(const struct vkb_variant_choice *choice, const struct vkb_shader *shader,
-                    uint32_t source_rows, struct vkb_pass_row *row);
+// Turns a pass with the constants of a filter into its tiles.
+void vkb_make_tiles(const struct vkb_variant_choice *choice, const struct vkb_shader *shader,
+                    struct vkb_pass_row *row);
 
 // Turns a pass into a dispatch that accesses its images with linear texels. Each of the
 // ROW_INVOCATIONS invocations of a workgroup writes a block of `columns` x `rows` pixels.

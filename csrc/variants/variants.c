@@ -58,6 +58,7 @@ static const struct variant variants_table[] = {
     {VKB_VARIANTS_CPU, "linear", vkb_add_adjoint_linear, 0},
     {VKB_VARIANTS_CPU, "pixels", vkb_add_adjoint_groups, 0},
     {VKB_VARIANTS_CPU, "pixels", vkb_add_pixels, 0},
+    {VKB_VARIANTS_GPU, "pixels", vkb_add_windowed, 0},
     {VKB_VARIANTS_GPU, "enlarged", vkb_add_enlarged, 0},
     {VKB_VARIANTS_GPU, "tiles", vkb_add_fused, 0},
     {VKB_VARIANTS_GPU, "tiles", vkb_add_adjoint_fused, 0},

@@ -6,7 +6,7 @@
 
 Taps taps_of(Place place)
 {
-    return thirteen_taps(place, vec2(params.step_x, params.step_y));
+    return thirteen_taps(place, EXACT == EXACT_HALF ? vec2(1.0) : vec2(params.step_x, params.step_y));
 }
 
 vec4[5] means(Place place)

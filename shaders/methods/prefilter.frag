@@ -21,6 +21,6 @@ layout(set = 0, binding = 1) uniform sampler2D source;
 
 vec4 shade()
 {
-    Place place = PLACE_IN(source);
+    Place place = EXACT == EXACT_HALF ? Place(2 * PIXEL, vec2(0.5)) : PLACE_IN(source);
     return stored(mask_value() * prefiltered(means(place), place));
 }
