@@ -442,14 +442,10 @@
 #define TILE_ROWS               32
 #define TILE_RUNS               4
 #define TILE_RADIUS             16
-// Tiles of filters in these ratios, in which an invocation adds up FILTER_RUN rows of a column; the first texel of a
-// pixel's window, from that of the first pixel's; texels along an axis.
-#define FILTER_COLUMNS                    32
-#define FILTER_RUNS                       2
-#define FILTER_RUN(ratio)                 ((ratio) == 0 ? 8 : 4)
-#define FILTER_OFFSET(ratio, pixel) \
-    ((ratio) == EXACT_HALF ? 2 * (pixel) : (ratio) == EXACT_SAME ? (pixel) : ((pixel) + 1) / 2)
-#define FILTER_TEXELS(ratio, pixels, window) (FILTER_OFFSET(ratio, (pixels) - 1) + (window))
+// Tiles of filters, whose images' heights are in this ratio: an invocation adds up FILTER_RUN rows of a column.
+#define FILTER_COLUMNS    32
+#define FILTER_RUNS       4
+#define FILTER_RUN(ratio) ((ratio) == EXACT_DOUBLE ? 8 : 4)
 #define FUSED_VEC4S      5
 
 // Fourier transforms. FFT_INVOCATIONS is the size of a workgroup. In a transform of columns,

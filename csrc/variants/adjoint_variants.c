@@ -150,7 +150,7 @@ static const struct vkb_pass_row *other_axis(const struct vkb_graph *graph,
 // The texel of the source at or before the position of a texel of the target.
 static int32_t texel_before(int32_t ratio, int32_t texel)
 {
-    return FILTER_OFFSET(ratio, texel) - (ratio == EXACT_DOUBLE);
+    return ratio == EXACT_HALF ? 2 * texel : ratio == EXACT_SAME ? texel : (texel + 1) / 2 - 1;
 }
 
 // The most readers of a texel.
@@ -237,7 +237,7 @@ static bool make_tiles(const struct vkb_variant_choice *choice, const struct vkb
     if (!other && !ratio_y && pass->constants.levels < 2)
         return false;
     set_windows(&x, &y, ratio_x, ratio_y, row);
-    vkb_make_tiles(choice, &vkb_shader_adjoint_filter_tile_comp, row);
+    vkb_make_tiles(row, &vkb_shader_adjoint_filter_tile_comp);
     return row->constants.window <= MAX_WINDOW && (row->constants.exact || begins_in_order(&y));
 }
 

@@ -58,21 +58,14 @@ int32_t vkb_ratio_of(uint32_t source, uint32_t target)
                                 : 0;
 }
 
-void vkb_make_tiles(const struct vkb_variant_choice *choice, const struct vkb_shader *shader,
-                    struct vkb_pass_row *row)
+void vkb_make_tiles(struct vkb_pass_row *row, const struct vkb_shader *shader)
 {
     struct vkb_constants *constants = &row->constants;
-    const int32_t exact = constants->exact, exact_rows = constants->exact_rows;
-    const int32_t window = constants->window, most = FILTER_RUNS * FILTER_RUN(exact);
-    const int32_t texels = FILTER_TEXELS(exact, FILTER_COLUMNS, window)
-                         * FILTER_TEXELS(exact_rows, most, window);
-    const int32_t weights = (window + 2) * (FILTER_COLUMNS + most);
 
-    if (!exact || !exact_rows
-        || 4 * sizeof(float) * (size_t)(texels + weights)
-               > choice->device->limits.maxComputeSharedMemorySize)
+    // Tiles have one way for windows in a simple ratio along both axes, and one for all others.
+    if (!constants->exact || !constants->exact_rows)
         constants->exact = constants->exact_rows = 0;
-    vkb_make_dispatch(row, shader, FILTER_COLUMNS, FILTER_RUNS * FILTER_RUN(constants->exact));
+    vkb_make_dispatch(row, shader, FILTER_COLUMNS, FILTER_RUNS * FILTER_RUN(constants->exact_rows));
 }
 
 bool vkb_fits_linear(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)

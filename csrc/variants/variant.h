@@ -88,8 +88,7 @@ void vkb_make_dispatch(struct vkb_pass_row *row, const struct vkb_shader *shader
 int32_t vkb_ratio_of(uint32_t source, uint32_t target);
 
 // Turns a pass with the constants of a filter into its tiles.
-void vkb_make_tiles(const struct vkb_variant_choice *choice, const struct vkb_shader *shader,
-                    struct vkb_pass_row *row);
+void vkb_make_tiles(struct vkb_pass_row *row, const struct vkb_shader *shader);
 
 // Turns a pass into a dispatch that accesses its images with linear texels. Each of the
 // ROW_INVOCATIONS invocations of a workgroup writes a block of `columns` x `rows` pixels.

@@ -1,10 +1,8 @@
-// A filter for GPUs, or its transpose. A workgroup computes the weights of its columns and rows once, and loads the
-// texels that they need once where both sides are in a simple ratio (EXACT). An invocation adds up some rows of a
-// column: each row of texels along x once, then these sums along y. The including shader declares `target`, includes
-// lib/window.glsl, and defines the functions below.
+// A filter for GPUs, or its transpose. A workgroup computes the weights of its columns and rows once. An invocation
+// adds up some rows of a column: each row of texels along x once, then these sums along y. The including shader
+// declares `target`, includes lib/window.glsl, and defines the functions below.
 
-const int COLUMNS = FILTER_COLUMNS, RUN = FILTER_RUN(EXACT), ROWS = FILTER_RUNS * RUN;
-const int INVOCATIONS = FILTER_COLUMNS * FILTER_RUNS;
+const int COLUMNS = FILTER_COLUMNS, RUN = FILTER_RUN(EXACT_ROWS), ROWS = FILTER_RUNS * RUN;
 
 layout(local_size_x = FILTER_COLUMNS, local_size_y = FILTER_RUNS) in;
 
@@ -15,21 +13,18 @@ vec4 texel_at(ivec2 texel);
 vec4 own_at(ivec2 pixel);
 vec4 shade(vec4 own, vec4 sum, ivec2 pixel);
 
-// In simple ratios the weights of every RUN columns and rows of a filter are the same. Those of a transposed filter are
-// others at the edges.
+// Where both sides are in a simple ratio (EXACT, EXACT_ROWS), the weights of every RUN columns and rows of a filter are
+// the same. Those of a transposed filter are others at the edges.
 #ifndef IS_TRANSPOSED
 #define IS_TRANSPOSED false
 #endif
 const bool PHASES = EXACT != 0 && !IS_TRANSPOSED;
 const int WEIGHT_COLUMNS = PHASES ? RUN : COLUMNS, WEIGHT_ROWS = PHASES ? RUN : ROWS;
-const int LOADED_COLUMNS = EXACT == 0 ? 1 : FILTER_TEXELS(EXACT, COLUMNS, WINDOW);
-const int LOADED_ROWS = EXACT == 0 ? 1 : FILTER_TEXELS(EXACT_ROWS, ROWS, WINDOW);
 
 // Of columns, then of rows: the first texel of the window, and the weights. A constant's default is 0, which is
 // no size of an array.
 shared int firsts[WEIGHT_COLUMNS + WEIGHT_ROWS];
 shared vec3 weights[WINDOW + 1][WEIGHT_COLUMNS + WEIGHT_ROWS];
-shared vec4 texels[LOADED_ROWS][LOADED_COLUMNS];
 
 void keep_window(int number, ivec2 first)
 {
@@ -40,23 +35,28 @@ void keep_window(int number, ivec2 first)
         weights[i][number] = window.weights[i];
 }
 
-// The first texel of a pixel's window in a simple ratio.
-int exact_first(int exact, int pixel)
+// How far the window of a pixel is from that of the first one, if sides are in this simple ratio.
+int offset_of(int exact, int pixel)
 {
-    return FILTER_OFFSET(exact, pixel) - WINDOW / 2 + (exact == EXACT_DOUBLE ? 0 : 1);
+    return exact == EXACT_HALF ? 2 * pixel : exact == EXACT_SAME ? pixel : (pixel + 1) / 2;
 }
 
-// The first texel of a row's window, from that of the row `top` of the tile on.
+// The first texel of the window of a pixel, if sides are in this simple ratio.
+int exact_first(int exact, int pixel)
+{
+    return offset_of(exact, pixel) - WINDOW / 2 + (exact == EXACT_DOUBLE ? 0 : 1);
+}
+
+// How far the window of a row is from that of the row `top` of the tile.
 int row_offset(int top, int row)
 {
-    return EXACT != 0 ? FILTER_OFFSET(EXACT_ROWS, row) : firsts[WEIGHT_COLUMNS + top + row] - firsts[WEIGHT_COLUMNS + top];
+    return EXACT != 0 ? offset_of(EXACT_ROWS, row) : firsts[WEIGHT_COLUMNS + top + row] - firsts[WEIGHT_COLUMNS + top];
 }
 
 void main()
 {
     ivec2 tile = ivec2(COLUMNS, ROWS) * ivec2(gl_WorkGroupID.xy), size = imageSize(target);
-    ivec2 loaded = ivec2(exact_first(EXACT, tile.x), exact_first(EXACT_ROWS, tile.y));
-    int index = int(gl_LocalInvocationIndex), column = int(gl_LocalInvocationID.x);
+    int number = int(gl_LocalInvocationIndex), column = int(gl_LocalInvocationID.x);
     int top = RUN * int(gl_LocalInvocationID.y);
     vec4 own[RUN], of_kernels[RUN][3];
     vec3 of_column[WINDOW + 1];
@@ -66,23 +66,18 @@ void main()
         own[i] = own_at(min(tile + ivec2(column, top + i), size - 1));
         of_kernels[i] = vec4[](vec4(0.0), vec4(0.0), vec4(0.0));
     }
-    if (EXACT != 0)
-        [[unroll]] for (int i = index; i < LOADED_COLUMNS * LOADED_ROWS; i += INVOCATIONS)
-            texels[i / LOADED_COLUMNS][i % LOADED_COLUMNS] =
-                texel_at(loaded + ivec2(i % LOADED_COLUMNS, i / LOADED_COLUMNS));
-    [[unroll]] for (int i = index; i < WEIGHT_COLUMNS + WEIGHT_ROWS; i += INVOCATIONS)
-        keep_window(i, tile);
+    if (number < WEIGHT_COLUMNS + WEIGHT_ROWS)
+        keep_window(number, tile);
     barrier();
     [[unroll]] for (int at = 0; at < WINDOW; ++at)
         of_column[at] = weights[at][PHASES ? column % RUN : column];
-    ivec2 first = EXACT != 0 ? ivec2(FILTER_OFFSET(EXACT, column), FILTER_OFFSET(EXACT_ROWS, top))
+    ivec2 first = EXACT != 0 ? ivec2(exact_first(EXACT, tile.x + column), exact_first(EXACT_ROWS, tile.y + top))
                              : ivec2(firsts[column], firsts[WEIGHT_COLUMNS + top]);
     int rows = row_offset(top, RUN - 1) + WINDOW;
     [[unroll]] for (int row = 0; row < rows; ++row) {
         vec4 sums[3] = vec4[](vec4(0.0), vec4(0.0), vec4(0.0));
         [[unroll]] for (int at = 0; at < WINDOW; ++at) {
-            ivec2 texel = first + ivec2(at, row);
-            vec4 value = EXACT != 0 ? texels[texel.y][texel.x] : texel_at(texel);
+            vec4 value = texel_at(first + ivec2(at, row));
             [[unroll]] for (int kernel = 0; kernel < KERNELS; ++kernel)
                 if (has_weight(TAKEN_X, at, kernel))
                     sums[kernel] += of_column[at][kernel] * value;
