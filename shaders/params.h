@@ -41,8 +41,8 @@
     INPUT(B, int, target_width) \
     INPUT(B, int, target_height)
 
-// For passes with a threshold, and for passes that write the finished picture, with the largest value
-// of its format.
+// For passes with a threshold, and for passes that write the finished picture, with the largest
+// value of its format.
 #define THRESHOLD_ROWS(B, READS) \
     READS(B, threshold) \
     READS(B, knee)
@@ -53,11 +53,11 @@
     INPUT(B, float, limit) \
     INPUT(B, int, noise_seed)
 
-// The matrices of a mesh or skybox draw. Only what is not constant is passed, in a form that is ready for the vertex shader: llvmpipe compiles a test
-// of the bounds for each number that a shader loads. `projection` has the scales of x, y and z and
-// the offset of z, `model_view` three rows. `sky` has the direction of the picture's centre and its
-// changes from there to the right and to the lower edge. The glow mesh's colours are multiplied by
-// the intensity before the threshold.
+// The matrices of a mesh or skybox draw. Only what is not constant is passed, in a form that is
+// ready for the vertex shader: llvmpipe compiles a test of the bounds for each number that a shader
+// loads. `projection` has the scales of x, y and z and the offset of z, `model_view` three rows.
+// `sky` has the direction of the picture's centre and its changes from there to the right and to
+// the lower edge. The glow mesh's colours are multiplied by the intensity before the threshold.
 #define MESH_BLOCK(B, READS, INPUT, VEC4S) \
     VEC4S(B, projection, 1) \
     VEC4S(B, model_view, 3) \
@@ -485,13 +485,14 @@
 // in this ratio, or for strips and tiles the widths of these; EXACT_ROWS says so of the heights.
 // With FROM_IMAGE, a downsampling to half the size reads the image itself and applies the
 // threshold, and an adjoint pass writes the cotangents of a source's image. BY is what these are
-// of. EMITTERS is how many passes add up in the target by blending. With ENLARGED the target has more rows than the source. STORED is the format of the target
-// (STORED_*). FIRST marks an engine's first level. LEVELS is the number of levels that a pass adds
-// up. GROUPS is what a downsampling makes of its taps. RADIX_A to STAGE are of Fourier transforms
-// (fft.comp), whose workgroups have GROUP_WIDTH x GROUP_HEIGHT invocations. BOUNDARY is of those
-// that are PADDED, and a first stage that is PREFILTERED has the filter of bright colours. Of
-// complete lines (fft_lines.comp) RADIX_1 to RADIX_4 are the radices of the stages; a workgroup has
-// GROUP_HEIGHT invocations for each of GROUP_WIDTH lines.
+// of. EMITTERS is how many passes add up in the target by blending. With ENLARGED the target has
+// more rows than the source. STORED is the format of the target (STORED_*). FIRST marks an engine's
+// first level. LEVELS is the number of levels that a pass adds up. GROUPS is what a downsampling
+// makes of its taps. RADIX_A to STAGE are of Fourier transforms (fft.comp), whose workgroups have
+// GROUP_WIDTH x GROUP_HEIGHT invocations. BOUNDARY is of those that are PADDED, and a first stage
+// that is PREFILTERED has the filter of bright colours. Of complete lines (fft_lines.comp) RADIX_1
+// to RADIX_4 are the radices of the stages; a workgroup has GROUP_HEIGHT invocations for each of
+// GROUP_WIDTH lines.
 #define SPECIALIZATION_CONSTANTS(CONSTANT) \
     CONSTANT(0, SAMPLING, sampling) \
     CONSTANT(1, COMPOSITE, composite) \
