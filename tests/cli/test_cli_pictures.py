@@ -6,13 +6,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner, Result
+from click.testing import Result
 
 import vkbloom
+from tests.cli import calls
 from tests.framebuffers import names_in
 from tests.io.profiles import store_png
 from tests.processes import python
-from vkbloom._cli.program import program
 
 pytestmark = pytest.mark.usefixtures("kept_renderers")
 
@@ -21,11 +21,7 @@ IMAGE = np.random.default_rng(3).integers(0, 200, (12, 16, 3), dtype=np.uint8)
 
 
 def run(*words: object) -> Result:
-    given = [*map(str, words)]
-    if not {"--preset", "--method", "--help"} & {*given}:
-        # Files of integers start from the preset photo: see test_cli_photo.py.
-        given += ["--preset", "bevy_natural", "--composite", "add"]
-    return CliRunner().invoke(program, ["apply", *given])
+    return calls.apply(*words, "--composite", "add")
 
 
 @pytest.fixture
@@ -108,7 +104,7 @@ class TestSequences:
             source = Path("x.exr" if kind == "e" else "y.png")
             (frames / f"in/{place}{source.suffix}").write_bytes(source.read_bytes())
         for words in (("in", "out"), ("x.exr", "alone.exr"), ("y.png", "alone.png")):
-            assert CliRunner().invoke(program, ["apply", *words]).exit_code == 0
+            assert calls.run("apply", *words).exit_code == 0
         for file in (frames / "out").iterdir():
             alone = vkbloom.read(f"alone{file.suffix}")
             np.testing.assert_array_equal(vkbloom.read(file), alone)

@@ -13,10 +13,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
 import vkbloom
-from vkbloom._cli.program import program
+from tests.cli.calls import run
 
 VKBLOOM = f"'{sys.executable}' -m vkbloom"
 LONGEST = 120  # seconds
@@ -86,15 +85,15 @@ def stream_of(file: str, kind: str) -> Iterator[str]:
 @pytest.mark.parametrize("kind", ["standard input", "named pipe", "substitution"])
 @pytest.mark.usefixtures("kept_renderers")
 def test_streams_are_read_like_files(folder: Path, line: str, file: str, kind: str) -> None:
-    asked = CliRunner().invoke(program, line.replace("out", "asked").format(file).split())
+    asked = run(*line.replace("out", "asked").format(file).split())
     if kind == "standard input":
         if "--psf" in line:
             pytest.skip("its word may be a name")
         content = Path(file).read_bytes()
-        done = CliRunner().invoke(program, line.format("-").split(), input=content)
+        done = run(*line.format("-").split(), input=content)
     else:
         with stream_of(file, kind) as name:
-            done = CliRunner().invoke(program, line.format(name).split())
+            done = run(*line.format(name).split())
     assert done.exit_code == asked.exit_code == int(line.startswith("compare")), done.stderr
     for name in ("out.exr", "out/000.exr"):
         expected = folder / name.replace("out", "asked")

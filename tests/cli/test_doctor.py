@@ -15,11 +15,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
 import vkbloom
+from tests.cli.calls import run
 from vkbloom import _doctor as doctor
-from vkbloom._cli.program import program
 from vkbloom._doctor import child, drivers, installation, probe
 from vkbloom._doctor.installation import Finding
 
@@ -44,7 +43,7 @@ def renders_of(findings: Iterable[Finding]) -> list[Finding]:
 
 def examined(**changes: str) -> tuple[int, dict[str, Any], list[Finding]]:
     """Run ``vkbloom doctor --json``; return its status, its answer and its findings."""
-    ended = CliRunner().invoke(program, ["doctor", "--json"], env=changes)
+    ended = run("doctor", "--json", env=changes)
     assert ended.stderr == ""
     answer = json.loads(ended.stdout)
     return ended.exit_code, answer, [Finding(**entry) for entry in answer["findings"]]
@@ -117,7 +116,7 @@ def test_finding_that_is_not_ok_has_advice_or_an_explanation() -> None:
 
 @pytest.mark.usefixtures("remembered")
 def test_the_table_has_a_line_for_each_finding() -> None:
-    ended = CliRunner().invoke(program, ["doctor"], env=PROBLEMS)
+    ended = run("doctor", env=PROBLEMS)
     assert (ended.exit_code, ended.stderr) == (0, "")
     lines = ended.stdout.splitlines()
     chosen = next(index for index, line in enumerate(lines) if "chosen adapter" in line)
@@ -139,7 +138,7 @@ def test_no_driver() -> None:
     assert by_topic(findings, "adapters").advice == "Solve the problems above first."
     assert f"VK_DRIVER_FILES={ABSENT}" in by_topic(findings, "environment").found
     assert "test render" not in {finding.topic for finding in findings}
-    ended = CliRunner().invoke(program, ["doctor"], env={"VK_DRIVER_FILES": ABSENT})
+    ended = run("doctor", env={"VK_DRIVER_FILES": ABSENT})
     assert (ended.exit_code, ended.stderr) == (1, "")
     assert ended.stdout.endswith("\nThis machine cannot render. Problems found: 2.\n")
 

@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from click.testing import CliRunner, Result
+from click.testing import Result
 
 import vkbloom
+from tests.cli.calls import run
 from vkbloom import Renderer, testing
-from vkbloom._cli.program import program
 from vkbloom.testing import _measuring as measuring
 from vkbloom.testing._law_report import law_report
 from vkbloom.testing._law_table import LAWS
@@ -58,7 +58,7 @@ HELD = [
 
 def checked(*words: str) -> tuple[Result, dict[str, Any]]:
     """Return the result of the command, and its values, which fit the published schema."""
-    done = CliRunner().invoke(program, ["check", *words, "--json"])
+    done = run("check", *words, "--json")
     assert done.exit_code in {0, 1}, done.output
     found = json.loads(done.stdout)
     schema = importlib.resources.files("vkbloom.testing").joinpath("check.schema.json")
@@ -207,7 +207,7 @@ def test_required_laws_have_another_colour(
     monkeypatch.setattr(Program, "__call__", lambda _, image: 0.9 * np.roll(image, 1, 1))
     page = tmp_path / "page.html"
     words = ["--command", "a {input} {output}", *SMALL, "--require", require, "--html", str(page)]
-    text = CliRunner().invoke(program, ["check", *words], color=True).output
+    text = run("check", *words, color=True).output
     for law in ("symmetric", "energy"):
         assert f"\x1b[{colour}m{law}" in text
     assert ("color:#c33" in page.read_text()) == bool(require)
@@ -273,7 +273,7 @@ def test_a_program_of_8_bits_is_noted() -> None:
 
 
 def test_a_program_that_fails_is_one_line() -> None:
-    done = CliRunner().invoke(program, ["check", "--command", "false {input} {output}"])
+    done = run("check", "--command", "false {input} {output}")
     assert done.exit_code == 1
     assert (
         done.output == "vkbloom: command 'false': it failed with exit status 1; it said: nothing\n"
@@ -326,17 +326,17 @@ def test_a_change_of_a_file(
 def test_changes_of_presets_and_commands(tmp_path: Path) -> None:
     page = tmp_path / "page.md"
     words = ["--preset", "dual_kawase", "--against", COPYING, *SMALL, "--markdown", str(page)]
-    done = CliRunner().invoke(program, ["check", *words, "--require", "finite"])
+    done = run("check", *words, "--require", "finite")
     assert (done.exit_code, "broken: " in done.stdout) == (0, True), done.output
     # A law that both break is not newly broken.
     words = ["--preset", "tutorial", "--against", "tutorial", *SMALL, "--require", "resolution"]
     done, found = checked(*words)
     assert (done.exit_code, found["newly_broken"]) == (0, [])
     assert {one["verdict"] for one in found["changes"] if one["name"] != "together"} == {"same"}
-    alone = CliRunner().invoke(program, ["check", *words[:2], *SMALL, "--markdown", str(page)])
+    alone = run("check", *words[:2], *SMALL, "--markdown", page)
     assert alone.exit_code == 0, alone.output
     assert "| symmetric | yes | " in page.read_text()
-    refused = CliRunner().invoke(program, ["check", *words[:2], "--against", "tutoral"])
+    refused = run("check", *words[:2], "--against", "tutoral")
     assert (refused.exit_code, "tutorial" in refused.stderr) == (2, True)
 
 

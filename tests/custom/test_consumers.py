@@ -7,14 +7,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 from numpy.typing import NDArray
 
 import vkbloom
+from tests.cli.calls import run
 from tests.images import picture
 from vkbloom import Renderer, load_method, psf, reference, testing
 from vkbloom._cli.live import Live
-from vkbloom._cli.program import program
 from vkbloom._explorer.controls import as_code
 from vkbloom._settings.registry import METHODS
 
@@ -232,7 +231,7 @@ def test_commands(tmp_path: Path, words: list[str], result: str) -> None:
     words = [word.format(**places) for word in words]
     method = ["--method", str(tmp_path / "soft.hook"), "--spread", "2.5", "--shape", "box"]
     given = method[:2] if words[0] in ("grid", "warm") else method
-    done = CliRunner().invoke(program, [*words, *given])
+    done = run(*words, *given)
     assert done.exit_code == 0, done.output
     assert Path(result.format(**places)).exists()
     METHODS.unregister("soft")

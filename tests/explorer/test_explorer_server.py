@@ -14,12 +14,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
 import vkbloom
+from tests.cli.calls import run
 from tests.images import noise
 from vkbloom import Renderer, Separable
-from vkbloom._cli.program import program
 from vkbloom._explorer.viewer import Viewer
 
 tornado = pytest.importorskip("tornado")
@@ -259,7 +258,7 @@ def test_port_in_use_is_an_error(serve: Any) -> None:
 
 def test_without_tornado(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "tornado", None)
-    result = CliRunner().invoke(program, ["explore", "--no-open"])
+    result = run("explore", "--no-open")
     assert result.exit_code == 1
     assert "pip install vkbloom[notebook]" in result.stderr
 
@@ -288,7 +287,7 @@ def test_an_image_begins_as_in_apply(
             raise ValueError("recorded")
 
     monkeypatch.setattr("vkbloom._cli.live.Viewer", Recorded)
-    result = CliRunner().invoke(program, ["explore", "--no-open", *words])
+    result = run("explore", "--no-open", *words)
     assert "recorded" in result.stderr
     ((image, settings),) = begun
     assert settings == vkbloom.presets[preset]

@@ -9,12 +9,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 from numpy.typing import NDArray
 
+from tests.cli.calls import run
 from tests.exhaustive import EXHAUSTIVE
 from vkbloom import write
-from vkbloom._cli.program import program
 from vkbloom._io.srgb import encode_srgb
 from vkbloom.testing import flash, flicker
 
@@ -113,12 +112,12 @@ def test_check_judges_files(tmp_path: Path) -> None:
     for number, light in enumerate(flashing(10, 0.4, seconds=0.5)):
         write(tmp_path / f"f.{number:04d}.exr", np.full((4, 6, 3), light, np.float32))
     words = ["check", "--sequence", str(tmp_path / "f.%04d.exr"), "--fps", str(FPS)]
-    done = CliRunner().invoke(program, [*words, "--json"])
+    done = run(*words, "--json")
     assert done.exit_code == 1, done.output
     found = json.loads(done.stdout)
     schema = importlib.resources.files("vkbloom.testing").joinpath("check.schema.json")
     pytest.importorskip("jsonschema").validate(found, json.loads(schema.read_text()))
     assert (found["frames"], found["flash"]["general"], found["flash"]["red"]) == (120, True, False)
-    assert "general flashes: fails" in CliRunner().invoke(program, words).stdout
-    refused = CliRunner().invoke(program, [*words, "--preset", "kino"])
+    assert "general flashes: fails" in run(*words).stdout
+    refused = run(*words, "--preset", "kino")
     assert (refused.exit_code, "without a bloom" in refused.stderr) == (2, True)
