@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 import vkbloom
 from tests.cli.calls import run
 from tests.images import picture
-from vkbloom import Renderer, load_method, psf, reference, testing
+from vkbloom import Renderer, load_method, psf, testing
 from vkbloom._cli.live import Live
 from vkbloom._explorer.controls import as_code
 from vkbloom._settings.registry import METHODS
@@ -193,26 +193,6 @@ def test_stored_frames(renderer: Renderer, kind: Any, tmp_path: Path) -> None:
     assert loaded.settings == kind(spread=3)
     assert frames.to_xarray()["rows"].attrs or frames.to_xarray().attrs
     assert "rows" in frames._repr_html_()
-
-
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"spread": 9}, "spread: 9"),
-        ({"shape": "disc"}, "shape: 'disc' is not one of gauss, box"),
-        ({"width": 1}, "width"),
-        ({"method": "pyramid"}, "pyramid"),
-    ],
-)
-def test_values_that_from_dict_refuses(kind: Any, change: dict[str, Any], message: str) -> None:
-    stored = {**kind().to_dict(), **change}
-    with pytest.raises(ValueError, match=message):
-        kind.from_dict(stored)
-
-
-def test_the_reference_needs_a_twin(kind: Any) -> None:
-    with pytest.raises(ValueError, match="reference="):
-        reference.apply(photo(), kind())
 
 
 @pytest.mark.parametrize(
