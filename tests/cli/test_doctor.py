@@ -228,14 +228,18 @@ def test_manifest_that_does_not_work_is_a_problem(
     assert reason.replace("{tmp}", str(tmp_path)) in finding.found
 
 
+def finding_of(folder: Path, **icd: str) -> Finding:
+    """Return the finding about a manifest of a driver."""
+    manifest = folder / "driver.json"
+    icd["api_version"] = "1.3.0"
+    manifest.write_text(json.dumps({"file_format_version": "1.0.1", "ICD": icd}))
+    return drivers.manifest(str(manifest))
+
+
 @linux_only
 def test_manifest_of_another_architecture_is_a_note(tmp_path: Path) -> None:
-    manifest = tmp_path / "driver.json"
     bits = 32 if sys.maxsize > 2**32 else 64
-    library = {"library_path": str(tmp_path / "none.so"), "library_arch": str(bits)}
-    icd = {"api_version": "1.3.0", **library}
-    manifest.write_text(json.dumps({"file_format_version": "1.0.1", "ICD": icd}))
-    finding = drivers.manifest(str(manifest))
+    finding = finding_of(tmp_path, library_path=f"{tmp_path}/none.so", library_arch=str(bits))
     assert finding.status == "note"
     assert "of another architecture" in finding.found
 
@@ -324,11 +328,8 @@ def test_a_driver_that_fails_is_named(
     # All symbols are looked up as the library opens, as Mesa's build asks for.
     command = [compiler, "-shared", "-fPIC", "-Wl,-z,now", str(source), "-o", str(library)]
     subprocess.run(command, check=True)
-    manifest = tmp_path / "driver.json"
-    icd = {"library_path": str(library), "api_version": "1.3.0"}
-    manifest.write_text(json.dumps({"file_format_version": "1.0.0", "ICD": icd}))
     monkeypatch.setattr(child, "TIMEOUT", 3.0)
-    finding = drivers.manifest(str(manifest))
+    finding = finding_of(tmp_path, library_path=str(library))
     assert finding.status == "problem"
     assert reason in finding.found
 
