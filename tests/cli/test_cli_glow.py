@@ -14,8 +14,6 @@ from tests.images import picture
 
 pytestmark = pytest.mark.usefixtures("kept_renderers")
 
-xr = pytest.importorskip("xarray")
-
 PYRAMID = ("--method", "pyramid", "--levels", "2", "--composite", "mix")
 SETTINGS = vkbloom.Pyramid(levels=2, composite="mix")
 

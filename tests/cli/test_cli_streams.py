@@ -50,22 +50,21 @@ def bash(line: str) -> subprocess.CompletedProcess[str]:
 def stream_of(file: str, kind: str) -> Iterator[str]:
     """Yield the name of a pipe with the content of a file."""
     content = Path(file).read_bytes()
-    if kind == "named pipe":
-        writer = threading.Thread(target=lambda: Path("in").write_bytes(content), daemon=True)
-        writer.start()
-        yield "in"
-        writer.join(LONGEST)
-    else:
-        reading, writing = os.pipe()
+    name: str = "in"
+    target: str | int = name
+    if kind == "substitution":
+        reading, target = os.pipe()
+        name = f"/dev/fd/{reading}"
 
-        def write() -> None:
-            with os.fdopen(writing, "wb") as stream:
-                stream.write(content)
+    def write() -> None:
+        with open(target, "wb") as stream:
+            stream.write(content)
 
-        writer = threading.Thread(target=write, daemon=True)
-        writer.start()
-        yield f"/dev/fd/{reading}"
-        writer.join(LONGEST)
+    writer = threading.Thread(target=write, daemon=True)
+    writer.start()
+    yield name
+    writer.join(LONGEST)
+    if kind == "substitution":
         os.close(reading)
 
 

@@ -396,10 +396,6 @@ def test_a_wrong_framebuffer_is_found(frames: vkbloom.Frames, wrong: str) -> Non
 # The installation
 
 
-def cache() -> Finding:
-    return by_topic(installation.caches(), "cache VKBLOOM_CACHE_DIR")
-
-
 def test_extras_are_those_of_the_package(monkeypatch: pytest.MonkeyPatch) -> None:
     # The others are for work on the package, or stand for several.
     declared = metadata.metadata("vkbloom").get_all("Provides-Extra", [])

@@ -27,7 +27,6 @@ from tests.io.profiles import (
 from vkbloom._io.containers import orientation_of
 from vkbloom._io.srgb import decode_srgb, encode_srgb
 
-oiio = pytest.importorskip("OpenImageIO")
 image = pytest.importorskip("PIL.Image")
 ops = pytest.importorskip("PIL.ImageOps")
 tifffile = pytest.importorskip("tifffile")

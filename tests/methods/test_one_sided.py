@@ -138,11 +138,6 @@ def slope(
     return (found[0] if np.ptp(found) <= 1e-5 * size else None), size
 
 
-def has_a_median(settings: Any) -> bool:
-    """Whether equal pixels have no derivative: that of a median is the median of the changes."""
-    return bool(getattr(settings, "anti_flicker", False))
-
-
 def check_points(number: int, count: int) -> int:
     """Check derivatives at points of some settings; return how many there were."""
     random = np.random.default_rng(number)
@@ -150,7 +145,8 @@ def check_points(number: int, count: int) -> int:
     seen = 0
     for _ in range(count):
         image = point(random, 3 if settings.alpha == "keep" else 4)
-        if has_a_median(settings):
+        # Equal pixels have no derivative: that of a median is the median of the changes.
+        if getattr(settings, "anti_flicker", False):
             image = image + random.random(image.shape) / 8
         image = image.astype(np.float32).astype(np.float64)
         frames, pullback = reference.vjp(image, settings)

@@ -58,15 +58,10 @@ STORED = [
 ]
 
 
-def steps() -> tuple[Array, Array]:
-    """Return an image of one row and what its bloom buffers hold."""
-    values = np.array(STORED)
-    image = np.repeat(values[:, :1], 3, axis=1)[np.newaxis].astype(np.float32)
-    return image, values[np.newaxis][..., [1, 1, 2]]
-
-
 def test_values_are_rounded_to_the_nearest(renderer: Renderer) -> None:
-    image, expected = steps()
+    """Of an image of one row."""
+    values = np.array(STORED)[np.newaxis]
+    image, expected = values[..., [0, 0, 0]].astype(np.float32), values[..., [1, 1, 2]]
     frames = renderer.apply(image, NONE)
     for name in ("glow", "blur_vertical", "bloom"):
         assert frames[name].dtype == np.float32
