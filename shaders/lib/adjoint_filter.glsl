@@ -13,6 +13,9 @@
 #define READ_SIZE(name, number) textureSize(name, 0)
 #endif
 
+// Copies of parameters (see pixels.glsl).
+float gain = params.gain, share = params.share;
+
 READ_IMAGE(1, cotangents);
 READ_IMAGE(2, table);
 READ_IMAGE(3, scene);
@@ -36,12 +39,12 @@ vec4 texel_at(ivec2 texel)
 // What other readers of the image have accumulated.
 vec4 own_at(ivec2 pixel)
 {
-    return ADD_OWN != 0 ? vec4(vec3(params.share), 1.0) * FETCH(added, 4, pixel) : vec4(0.0);
+    return ADD_OWN != 0 ? vec4(vec3(share), 1.0) * FETCH(added, 4, pixel) : vec4(0.0);
 }
 
 // The cotangents of a texel. The image of a source has none at NaN and infinity.
 vec4 shade(vec4 own, vec4 sum, ivec2 pixel)
 {
-    sum = params.gain * sum + own;
+    sum = gain * sum + own;
     return FROM_IMAGE != 0 ? where_finite(sum, FETCH(differentiated, 5, pixel)) : sum;
 }
