@@ -1,8 +1,8 @@
 // Shared by the variants of a transposed filter: each texel gathers the cotangents of the pixels that read it, with
 // the weights from a table (csrc/passes/taps.h). With BY these are the cotangents of a composite without a curve, from
-// which those of the bloom follow by a factor where the scene is finite. Include block.glsl and, for linear texels,
-// pixels.glsl before this file.
-#include "lib/finite.glsl"
+// which those of the bloom follow by a factor where the scene is finite. For linear texels, include pixels.glsl before
+// this file.
+UNIFORM_BLOCK(ADJOINT_FILTER_BLOCK);
 #include "lib/where_finite.glsl"
 
 #ifdef LINEAR_TEXELS

@@ -1,7 +1,4 @@
 // The transpose of a filter.
-#include "lib/block.glsl"
-
-UNIFORM_BLOCK(ADJOINT_FILTER_BLOCK);
 
 #define TARGET_BINDING 6
 #include "lib/fullscreen.glsl"

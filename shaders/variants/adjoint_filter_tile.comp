@@ -1,8 +1,5 @@
 // The transpose of a filter in tiles: a filter of the cotangents whose windows are the pixels that read a texel, by
 // the table.
-#include "lib/block.glsl"
-
-UNIFORM_BLOCK(ADJOINT_FILTER_BLOCK);
 #include "lib/window.glsl"
 #include "lib/adjoint_filter.glsl"
 

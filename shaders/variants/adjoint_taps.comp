@@ -3,10 +3,6 @@
 // by: RADIX_1 columns and RADIX_2 rows, with the weights of a block of texels. LEVELS is the number of kernels. In the
 // tiles of GPUs `Pyramid` takes 102 ms backwards in place of 32, `BevyBloom` 621 in place of 244 (processor time of
 // 960 x 544 in float32, lavapipe of Mesa 22.3.6, 2026-11-27).
-#include "lib/block.glsl"
-
-UNIFORM_BLOCK(ADJOINT_FILTER_BLOCK);
-#include "lib/storage.glsl"
 #include "variants/pixels.glsl"
 #include "lib/adjoint_filter.glsl"
 
