@@ -8,6 +8,7 @@
 
 UNIFORM_BLOCK(STREAKS_BLOCK);
 #include "lib/storage.glsl"
+#include "lib/threshold.glsl"
 #include "lib/above.glsl"
 #include "variants/pixels.glsl"
 
