@@ -1,6 +1,4 @@
 // The cotangents of what a stage of glare reads, from those of what is above the stage's threshold.
-#include "lib/block.glsl"
-#include "lib/finite.glsl"
 #include "lib/threshold.glsl"
 
 UNIFORM_BLOCK(STREAKS_BLOCK);

@@ -1,8 +1,6 @@
 // The transpose of a filter: each texel gathers the cotangents of the pixels that read it, with the
 // weights from a table (csrc/passes/taps.h). With BY these are the cotangents of a composite without a
 // curve, from which those of the bloom follow by a factor where the scene is finite.
-#include "lib/block.glsl"
-#include "lib/finite.glsl"
 
 UNIFORM_BLOCK(ADJOINT_FILTER_BLOCK);
 

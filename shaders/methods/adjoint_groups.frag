@@ -1,7 +1,5 @@
 // The cotangents of the groups of taps from which a downsampling makes a pixel, where it is not linear
 // in these: of RADIX_1 groups from number LEVELS on, or of the mask.
-#include "lib/block.glsl"
-#include "lib/finite.glsl"
 #include "lib/sampling.glsl"
 #include "lib/threshold.glsl"
 

@@ -1,7 +1,5 @@
 // The transpose of a filter (adjoint_filter.frag) in tiles: a filter of the cotangents whose windows are the pixels
 // that read a texel, by the table.
-#include "lib/block.glsl"
-#include "lib/finite.glsl"
 
 UNIFORM_BLOCK(ADJOINT_FILTER_BLOCK);
 #include "lib/where_finite.glsl"

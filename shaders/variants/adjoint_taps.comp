@@ -4,11 +4,8 @@
 // texels. LEVELS is the number of kernels. BY is as there. In the tiles of GPUs `Pyramid` takes 102 ms
 // backwards in place of 32, `BevyBloom` 621 in place of 244 (processor time of 960 x 544 in float32, lavapipe of
 // Mesa 22.3.6, 2026-11-27).
-#include "lib/block.glsl"
-#include "lib/finite.glsl"
 
 UNIFORM_BLOCK(ADJOINT_FILTER_BLOCK);
-#include "lib/storage.glsl"
 #include "lib/where_finite.glsl"
 #include "variants/pixels.glsl"
 

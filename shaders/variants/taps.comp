@@ -3,12 +3,10 @@
 // those of the rows that a pixel needs. Where the sides of the images are in a simple ratio (EXACT), columns share
 // texels and taps. Without it `kino` takes 157 ms in place of 43, `bevy_natural` 89 in place of 54 (processor time of
 // 1920 x 1080 in float16, lavapipe of Mesa 22.3.6, 2026-11-27).
-#include "lib/block.glsl"
 #include "lib/sampling.glsl"
 #include "lib/threshold.glsl"
 
 UNIFORM_BLOCK(PREFILTER_BLOCK);
-#include "lib/storage.glsl"
 #include "lib/prefilters.glsl"
 #include "variants/pixels.glsl"
 
