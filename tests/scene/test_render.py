@@ -24,7 +24,7 @@ SIZE = (320, 180)
 FORWARD = ["glow", "glow_depth", "blur_vertical", "bloom", "scene", "depth", "final"]
 
 
-def levels_apart(image: NDArray[np.uint8], expected: NDArray[Any]) -> int:
+def levels_apart(image: NDArray[Any], expected: NDArray[Any]) -> int:
     """Return the largest difference, in levels, of an 8-bit image from another."""
     return int(np.abs(image.astype(int) - expected.astype(int)).max())
 
