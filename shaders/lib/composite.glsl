@@ -1,8 +1,7 @@
 // Combines scene and bloom, then applies exposure, tone map, encoding and dither. The including
-// shader needs storage.glsl, and the parameters intensity, exposure and noise_seed.
+// shader's block has the parameters intensity, exposure and noise_seed.
 
 #include "lib/dither.glsl"
-#include "lib/finite.glsl"
 #include "lib/lab.glsl"
 #include "lib/tonemap.glsl"
 

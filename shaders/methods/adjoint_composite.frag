@@ -1,10 +1,8 @@
 // The cotangents of the composite: of the scene, of the bloom, of the mask, or of intensity, exposure
 // and reference white, whose sums are their derivatives.
-#include "lib/block.glsl"
 #include "lib/sampling.glsl"
 
 UNIFORM_BLOCK(COMPOSITE_BLOCK);
-#include "lib/storage.glsl"
 #include "lib/composite.glsl"
 
 layout(set = 0, binding = 1) uniform sampler2D scene;

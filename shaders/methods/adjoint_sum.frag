@@ -1,5 +1,4 @@
 // Adds up the pixels of an image, or their squares, in blocks of SUM_SIDE x SUM_SIDE, always in the same order.
-#include "lib/block.glsl"
 
 layout(set = 0, binding = 1) uniform sampler2D source;
 

@@ -1,8 +1,6 @@
 // The finished picture: scene and bloom, exposure, tone map, encoding, dither.
-#include "lib/block.glsl"
 
 UNIFORM_BLOCK(COMPOSITE_BLOCK);
-#include "lib/storage.glsl"
 #include "lib/composite.glsl"
 
 layout(set = 0, binding = 1) uniform sampler2D scene;

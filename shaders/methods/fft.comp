@@ -7,11 +7,8 @@
 // STAGE_FIRST reads the glow, STAGE_LAST stores to an image of the bloom's format. STAGE_GREY and
 // STAGE_COLOURS are the last stage forth along columns, the product with the kernel's spectrum and the
 // first stage back. PADDED reads what lies beyond the source's edges by the boundary.
-#include "lib/block.glsl"
-#include "lib/finite.glsl"
 
 UNIFORM_BLOCK(FFT_BLOCK);
-#include "lib/storage.glsl"
 #ifndef TARGET_BYTES
 #define TARGET_BYTES 4
 #endif

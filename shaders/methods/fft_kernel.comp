@@ -1,7 +1,6 @@
 // The kernel of a convolution at the places of the padded lines: its point at 0, what lies before it at
 // the end. Values whose light comes from the same place are added: beyond an edge all of them, with a
 // period those that are whole periods apart.
-#include "lib/block.glsl"
 
 UNIFORM_BLOCK(FFT_KERNEL_BLOCK);
 

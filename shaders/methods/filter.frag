@@ -1,9 +1,7 @@
 // A filter of an image of any size (lib/filter.glsl), and the share of an image of the target's size.
-#include "lib/block.glsl"
 #include "lib/sampling.glsl"
 
 UNIFORM_BLOCK(FILTER_BLOCK);
-#include "lib/storage.glsl"
 
 layout(set = 0, binding = 1) uniform sampler2D source;
 layout(set = 0, binding = 2) uniform sampler2D own;

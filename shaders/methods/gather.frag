@@ -1,9 +1,7 @@
 // Adds up levels of several sizes: each is enlarged and multiplied by its weight.
-#include "lib/block.glsl"
 #include "lib/sampling.glsl"
 
 UNIFORM_BLOCK(GATHER_BLOCK);
-#include "lib/storage.glsl"
 
 layout(set = 0, binding = 1) uniform sampler2D level_0;
 layout(set = 0, binding = 2) uniform sampler2D level_1;

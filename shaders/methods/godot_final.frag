@@ -1,10 +1,8 @@
 // The finished picture as Godot blends it: the exposure comes before the composite, soft light after
 // the tone map (godotengine/godot, tonemap.glsl @ 001c8c9c24dc).
-#include "lib/block.glsl"
 #include "lib/sampling.glsl"
 
 UNIFORM_BLOCK(GODOT_FINAL_BLOCK);
-#include "lib/storage.glsl"
 #include "lib/composite.glsl"
 
 layout(set = 0, binding = 1) uniform sampler2D scene;

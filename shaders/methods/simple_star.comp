@@ -1,9 +1,7 @@
 // Blender's recursive filter along rows, columns or diagonals: each pixel is mixed with one before it,
 // which is mixed already, and one after it (formulas of the compositor of Blender 5.0).
-#include "lib/block.glsl"
 
 UNIFORM_BLOCK(STAR_BLOCK);
-#include "lib/storage.glsl"
 
 layout(local_size_x = ROW_INVOCATIONS) in;
 layout(set = 0, binding = 1) uniform sampler2D source;

@@ -1,9 +1,5 @@
 // Lights the G-buffer with the forward system's Phong model, and adds the emission.
-#include "lib/block.glsl"
 #include "scene/phong.glsl"
-
-UNIFORM_BLOCK(LIGHTING_BLOCK);
-#include "lib/storage.glsl"
 
 layout(set = 0, binding = 1) uniform sampler2D albedo;
 layout(set = 0, binding = 2) uniform sampler2D normal;

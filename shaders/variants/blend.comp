@@ -1,8 +1,6 @@
 // The composite for a scene and a bloom that have the size and format of the result.
-#include "lib/block.glsl"
 
 UNIFORM_BLOCK(COMPOSITE_BLOCK);
-#include "lib/storage.glsl"
 #include "lib/composite.glsl"
 #include "variants/pixels.glsl"
 

@@ -9,11 +9,8 @@
 // STAGE is FIRST (rows of the glow) or PLAIN (the kernel), GREY or COLOURS (columns of the glow forth,
 // times the kernel's spectrum, and back), or LAST (rows back, to an image of the bloom's format).
 // PADDED reads what lies beyond the source's edges by the boundary.
-#include "lib/block.glsl"
-#include "lib/finite.glsl"
 
 UNIFORM_BLOCK(FFT_BLOCK);
-#include "lib/storage.glsl"
 #define FFT_HELD FFT_MAX_GROUP_RADIX
 #include "lib/fourier.glsl"
 

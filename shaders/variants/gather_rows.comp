@@ -1,10 +1,8 @@
 // Filters a level that is gathered along rows, at the positions of the pixels of a target of another
 // width. The results are floats, in an image of the target's width and of the level's height.
-#include "lib/block.glsl"
 #include "lib/sampling.glsl"
 
 UNIFORM_BLOCK(GATHER_BLOCK);
-#include "lib/storage.glsl"
 #include "variants/pixels.glsl"
 
 layout(local_size_x = ROW_INVOCATIONS) in;

@@ -3,10 +3,8 @@
 // are means of 2 x 2 texels, into single floats. An invocation has each sample once for all pixels. Without it
 // (and nine_columns.comp) `unity_hdrp` takes 104 ms in place of 67, `godot_4_5` 218 in place of 130 (processor
 // time of 1920 x 1080 in float16, lavapipe of Mesa 25.0.7, 2026-11-26).
-#include "lib/block.glsl"
 
 UNIFORM_BLOCK(PREFILTER_BLOCK);
-#include "lib/storage.glsl"
 #include "lib/godot.glsl"
 #include "lib/hdrp.glsl"
 #include "variants/pixels.glsl"

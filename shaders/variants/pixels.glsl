@@ -1,6 +1,5 @@
 // How variants load and store runs of pixels. With LINEAR_TEXELS (on CPUs) an image is a buffer of 16-byte
 // words, since llvmpipe loads a word nearly as fast as one channel. Otherwise it is a storage image.
-// Include storage.glsl before this file.
 //
 // What llvmpipe does, and what follows (Mesa 22.3.6 and 25.0.7; benchmarks/image.py shows the effect):
 // - Mesa 25 does not unroll a loop without [[unroll]], and arrays indexed by its counter are then memory: it

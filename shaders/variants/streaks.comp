@@ -3,11 +3,10 @@
 // for the two rows of the target that it is part of. Without it `blender_streaks` takes
 // 2,660 ms in place of 240 (processor time of 1920 x
 // 1080 in float16, lavapipe of Mesa 25.0.7, 2026-11-26).
-#include "lib/block.glsl"
 #include "lib/sampling.glsl"
 
 UNIFORM_BLOCK(STREAKS_BLOCK);
-#include "lib/storage.glsl"
+#include "lib/threshold.glsl"
 #include "lib/above.glsl"
 #include "variants/pixels.glsl"
 

@@ -3,12 +3,10 @@
 // those of the rows that a pixel needs. Where the sides of the images are in a simple ratio (EXACT), columns share
 // texels and taps. Without it `kino` takes 157 ms in place of 43, `bevy_natural` 89 in place of 54 (processor time of
 // 1920 x 1080 in float16, lavapipe of Mesa 22.3.6, 2026-11-27).
-#include "lib/block.glsl"
 #include "lib/sampling.glsl"
 #include "lib/threshold.glsl"
 
 UNIFORM_BLOCK(PREFILTER_BLOCK);
-#include "lib/storage.glsl"
 #include "lib/prefilters.glsl"
 #include "variants/pixels.glsl"
 
@@ -113,7 +111,7 @@ vec4 tap_at(int column, Line line, ivec2 numbers)
     return blend(rows[row][at], rows[row + 1][at], line.parts[numbers.y]);
 }
 
-vec4 prefiltered(int column, Line line, vec4 shares)
+vec4 prefiltered(int column, Line line, vec2 part)
 {
     vec4 found[5] = vec4[](vec4(0.0), vec4(0.0), vec4(0.0), vec4(0.0), vec4(0.0));
     Taps taps;
@@ -122,13 +120,13 @@ vec4 prefiltered(int column, Line line, vec4 shares)
         [[unroll]] for (int group = 0; group < 5; ++group)
             if (group < group_count())
                 found[group] = tap_at(column, line, numbers_of(group));
-        return made(found, shares);
+        return made(found, part);
     }
     [[unroll]] for (int i = 0; i < 9; ++i)
         taps.outer[i] = tap_at(column, line, 2 * ivec2(i % 3, i / 3));
     [[unroll]] for (int i = 0; i < 4; ++i)
         taps.inner[i] = tap_at(column, line, 1 + 2 * ivec2(i % 2, i / 2));
-    return GROUPS == GROUPS_BEVY ? bevy_prefiltered(taps) : combined(taps);
+    return GROUPS == GROUPS_BLENDER ? blender_groups(taps) : made(group_means(taps), part);
 }
 
 void main()
@@ -172,10 +170,8 @@ void main()
             continue;
         float down = EXACT != 0 ? PART : float(rest) / float(divisor);
         Line line = line_of(down);
-        [[unroll]] for (int i = 0; i < COLUMNS; ++i) {
-            vec4 shares = filament_taps(vec2(across[i], down)).shares;
-            pixels[i] = buffer_of(prefiltered(i, line, shares));
-        }
+        [[unroll]] for (int i = 0; i < COLUMNS; ++i)
+            pixels[i] = buffer_of(prefiltered(i, line, vec2(across[i], down)));
         store(first.x, y, pixels);
         rest += 2u * height;
     }
