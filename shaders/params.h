@@ -425,10 +425,10 @@
 #define TILE_ROWS               32
 #define TILE_RUNS               4
 #define TILE_RADIUS             16
-// Tiles of filters, whose images' heights are in this ratio: an invocation adds up FILTER_RUN rows of a column.
-#define FILTER_COLUMNS    32
-#define FILTER_RUNS       4
-#define FILTER_RUN(ratio) ((ratio) == EXACT_DOUBLE ? 8 : 4)
+// Tiles of filters: their size, and the rows of a column that an invocation adds up.
+#define FILTER_COLUMNS  32
+#define FILTER_ROWS     16
+#define FILTER_RUN      4
 #define FUSED_VEC4S      5
 
 // Fourier transforms. FFT_INVOCATIONS is the size of a workgroup. In a transform of columns,

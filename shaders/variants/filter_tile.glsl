@@ -2,9 +2,9 @@
 // adds up some rows of a column: each row of texels along x once, then these sums along y. The including shader
 // declares `target`, includes lib/window.glsl, and defines the functions below.
 
-const int COLUMNS = FILTER_COLUMNS, RUN = FILTER_RUN(EXACT_ROWS), ROWS = FILTER_RUNS * RUN;
+const int COLUMNS = FILTER_COLUMNS, ROWS = FILTER_ROWS, RUN = FILTER_RUN;
 
-layout(local_size_x = FILTER_COLUMNS, local_size_y = FILTER_RUNS) in;
+layout(local_size_x = FILTER_COLUMNS, local_size_y = FILTER_ROWS / FILTER_RUN) in;
 
 // Defined by the including shader: the texels of the source that a pixel adds up, a texel there or the nearest one in
 // the image, what is added to a pixel, and the pixel that is stored.
@@ -13,13 +13,8 @@ vec4 texel_at(ivec2 texel);
 vec4 own_at(ivec2 pixel);
 vec4 shade(vec4 own, vec4 sum, ivec2 pixel);
 
-// Where both sides are in a simple ratio (EXACT, EXACT_ROWS), the weights of every RUN columns and rows of a filter are
-// the same. Those of a transposed filter are others at the edges.
-#ifndef IS_TRANSPOSED
-#define IS_TRANSPOSED false
-#endif
-const bool PHASES = EXACT != 0 && !IS_TRANSPOSED;
-const int WEIGHT_COLUMNS = PHASES ? RUN : COLUMNS, WEIGHT_ROWS = PHASES ? RUN : ROWS;
+// Where both sides are in a simple ratio (EXACT, EXACT_ROWS), the weights of every RUN columns and rows are the same.
+const int WEIGHT_COLUMNS = EXACT != 0 ? RUN : COLUMNS, WEIGHT_ROWS = EXACT != 0 ? RUN : ROWS;
 
 // Of columns, then of rows: the first texel of the window, and the weights. A constant's default is 0, which is
 // no size of an array.
@@ -70,7 +65,7 @@ void main()
         keep_window(number, tile);
     barrier();
     [[unroll]] for (int at = 0; at < WINDOW; ++at)
-        of_column[at] = weights[at][PHASES ? column % RUN : column];
+        of_column[at] = weights[at][EXACT != 0 ? column % RUN : column];
     ivec2 first = EXACT != 0 ? ivec2(exact_first(EXACT, tile.x + column), exact_first(EXACT_ROWS, tile.y + top))
                              : ivec2(firsts[column], firsts[WEIGHT_COLUMNS + top]);
     int rows = row_offset(top, RUN - 1) + WINDOW;
@@ -86,7 +81,7 @@ void main()
             int at = row - row_offset(top, i);
             if (at < 0 || at >= WINDOW)
                 continue;
-            vec3 of_row = weights[at][WEIGHT_COLUMNS + (PHASES ? i : top + i)];
+            vec3 of_row = weights[at][WEIGHT_COLUMNS + (EXACT != 0 ? i : top + i)];
             [[unroll]] for (int kernel = 0; kernel < KERNELS; ++kernel)
                 if (has_weight(TAKEN_Y, at, kernel))
                     of_kernels[i][kernel] += of_row[kernel] * sums[kernel];
