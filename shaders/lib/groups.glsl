@@ -21,6 +21,9 @@ vec4[5] group_means(Taps taps)
 
 const vec3 LUMINANCE = vec3(0.2126, 0.7152, 0.0722);
 
+// Of sRGB's primaries with more digits.
+const vec3 LONG_LUMINANCE = vec3(0.2126729, 0.7151522, 0.0721750);
+
 float group_luminance(vec4 value)
 {
     return max(dot(value.rgb, LUMINANCE), 0.0);
@@ -31,18 +34,40 @@ float brightest(vec3 value)
     return max(max(value.r, max(value.g, value.b)), 0.0);
 }
 
-// The pyramid's firefly filter: brighter groups weigh less (Karis 2013).
-vec4 pyramid_groups(Taps taps)
+// The brightness by which a group weighs less, against fireflies (Karis 2013).
+float brightness_of(vec4 mean)
 {
-    vec4 means[5] = group_means(taps);
+    if (GROUPS == GROUPS_PYGFX)
+        return 0.0;
+    // Its weights of negative luminances are above 1, and beyond -1 negative.
+    if (GROUPS == GROUPS_PYGFX_KARIS)
+        return dot(mean.rgb, LUMINANCE);
+    if (GROUPS == GROUPS_FILAMENT)
+        return THRESHOLDED != 0 ? brightest(mean.rgb) : 0.0;
+    if (GROUPS == GROUPS_BOX)
+        return brightest(mean.rgb);
+    return max(dot(mean.rgb, GROUPS == GROUPS_HDRP ? LONG_LUMINANCE : LUMINANCE), 0.0);
+}
+
+// A group's share without its brightness; `shares` are those of Filament's four.
+float share_of(int group, vec4 shares)
+{
+    if (GROUPS == GROUPS_PYRAMID || GROUPS == GROUPS_PYGFX)
+        return GROUP_SHARES[group];
+    return GROUPS == GROUPS_FILAMENT ? shares[min(group, 3)] : 1.0;
+}
+
+vec4 weighted_mean(vec4 means[5], int count, vec4 shares)
+{
     vec4 sum = vec4(0.0);
-    float shares = 0.0;
-    [[unroll]] for (int group = 0; group < 5; ++group) {
-        float share = GROUP_SHARES[group] / (1.0 + group_luminance(means[group]));
-        sum += share * means[group];
-        shares += share;
-    }
-    return sum / shares;
+    float total = 0.0;
+    [[unroll]] for (int group = 0; group < 5; ++group)
+        if (group < count) {
+            float share = share_of(group, shares) / (1.0 + brightness_of(means[group]));
+            sum += share * means[group];
+            total += share;
+        }
+    return sum / total;
 }
 
 // What is not finite is 0.
@@ -50,26 +75,6 @@ vec4 usual(vec4 value)
 {
     return mix(vec4(0.0), value,
                notEqual(floatBitsToUint(value) & 0x7f800000u, uvec4(0x7f800000u)));
-}
-
-// pygfx' weights of negative luminances are above 1, and beyond -1 negative. What is not finite is 0.
-vec4 pygfx_mean(Taps taps)
-{
-    vec4 means[5] = group_means(taps);
-    vec4 sum = vec4(0.0);
-    float shares = 0.0;
-    [[unroll]] for (int group = 0; group < 5; ++group) {
-        float luminance = dot(means[group].rgb, LUMINANCE);
-        float share = GROUPS == GROUPS_PYGFX_KARIS ? 1.0 / (1.0 + luminance) : GROUP_SHARES[group];
-        sum += share * means[group];
-        shares += share;
-    }
-    return usual(sum / shares);
-}
-
-vec4 pygfx_groups(Taps taps)
-{
-    return max(pygfx_mean(taps), vec4(0.0));
 }
 
 // A tap multiplied by its weight, and the weight.
@@ -102,25 +107,11 @@ vec4 blender_groups(Taps taps)
     return usual(0.5 * inner + 0.125 * outer);
 }
 
-// A box of 4 x 4 texels as four taps, weighted by brightness and renormalized
-// (Karis 2013; keijiro/KinoBloom @ 0a04c43fa47d, Bloom.cginc).
-vec4 box_of(vec4 taps[4])
-{
-    vec4 sum = vec4(0.0);
-    float shares = 0.0;
-    [[unroll]] for (int corner = 0; corner < 4; ++corner) {
-        float share = 1.0 / (1.0 + brightest(taps[corner].rgb));
-        sum += share * taps[corner];
-        shares += share;
-    }
-    return sum / shares;
-}
-
 vec4 combined(Taps taps)
 {
-    if (GROUPS == GROUPS_PYGFX || GROUPS == GROUPS_PYGFX_KARIS)
-        return pygfx_groups(taps);
     if (GROUPS == GROUPS_BLENDER)
         return blender_groups(taps);
-    return GROUPS == GROUPS_BOX ? box_of(taps.inner) : pyramid_groups(taps);
+    vec4 mean = weighted_mean(group_means(taps), 5, vec4(0.0));
+    bool clamps = GROUPS == GROUPS_PYGFX || GROUPS == GROUPS_PYGFX_KARIS;
+    return clamps ? max(usual(mean), vec4(0.0)) : mean;
 }

@@ -2,8 +2,6 @@
 // by GROUPS.
 #include "lib/groups.glsl"
 #include "lib/lab.glsl"
-#include "lib/highlights.glsl"
-#include "lib/kino.glsl"
 
 // Bevy's: 13 taps in groups that are weighted by brightness but not renormalized, a floor, then the
 // threshold (bevyengine/bevy v0.19.1, bloom.wgsl).
@@ -14,8 +12,7 @@ vec4 bevy_prefiltered(Taps taps)
     [[unroll]] for (int group = 0; group < 5; ++group) {
         vec4 part = GROUP_SHARES[group] * means[group];
         // Bevy's buffers hold no negative values. These do, and the divisor must not become 0.
-        float luminance = max(dot(part.rgb, vec3(0.2126, 0.7152, 0.0722)), 0.0);
-        sum += part / (1.0 + 0.25 * luminance);
+        sum += part / (1.0 + 0.25 * group_luminance(part));
     }
     sum.rgb = max(sum.rgb, vec3(1e-4));
     if (THRESHOLDED != 0) {
@@ -42,20 +39,10 @@ FilamentTaps filament_taps(vec2 part)
                         1.0 + part / (1.0 + 2.0 * part) - part);
 }
 
-// Filament's: four taps with these shares. With the threshold it also has a firefly filter, which
-// weights the taps by brightness (google/filament, bloomDownsample2x.mat @ 9f62dc2f2f53).
-vec4 filament_prefiltered(vec4 taps[4], vec4 shares)
+// What Filament makes of the mean of four taps with these shares (google/filament,
+// bloomDownsample2x.mat @ 9f62dc2f2f53).
+vec4 filament_prefiltered(vec4 sum)
 {
-    vec4 sum = vec4(0.0);
-    float total = 0.0;
-    [[unroll]] for (int i = 0; i < 4; ++i) {
-        float share = shares[i];
-        if (THRESHOLDED != 0)
-            share /= 1.0 + brightest(taps[i].rgb);
-        sum += share * taps[i];
-        total += share;
-    }
-    sum /= total;
     if (THRESHOLDED != 0) {
         vec3 kept = max(sum.rgb - params.threshold, vec3(0.0));
         kept /= 1.0 + brightest(kept) / params.highlight;
@@ -67,26 +54,12 @@ vec4 filament_prefiltered(vec4 taps[4], vec4 shares)
     return sum;
 }
 
-// HDRP's: the centre and four diagonal taps, at these distances in texels, weighted against fireflies
-// (Karis 2013; Unity-Technologies/Graphics, com.unity.render-pipelines.high-definition,
-// BloomPrefilter.compute @ 2309d2c2fde8).
+// HDRP's: the centre and four diagonal taps, at these distances in texels
+// (Unity-Technologies/Graphics, com.unity.render-pipelines.high-definition, BloomPrefilter.compute
+// @ 2309d2c2fde8).
 const vec2 HDRP_OFFSETS[5] =
     vec2[](vec2(0.0, 0.0), vec2(HDRP_FAR, -HDRP_NEAR), vec2(-HDRP_FAR, HDRP_NEAR),
            vec2(HDRP_NEAR, HDRP_FAR), vec2(-HDRP_NEAR, -HDRP_FAR));
-
-const vec3 HDRP_LUMINANCE = vec3(0.2126729, 0.7151522, 0.0721750);
-
-vec4 hdrp_prefiltered(vec4 taps[5])
-{
-    vec4 sum = vec4(0.0);
-    float shares = 0.0;
-    [[unroll]] for (int i = 0; i < 5; ++i) {
-        float share = 1.0 / (1.0 + max(dot(taps[i].rgb, HDRP_LUMINANCE), 0.0));
-        sum += share * taps[i];
-        shares += share;
-    }
-    return sum / shares;
-}
 
 // Unity's: a clamp, the soft threshold, a tint. URP has no negative colours
 // (Unity-Technologies/Graphics, com.unity.render-pipelines.universal, Bloom.shader @ 00d472fae509);
@@ -138,10 +111,66 @@ vec4 three_prefiltered(vec4 value)
     if (THRESHOLDED == 0)
         return value;
     // BloomNode's luminance is that of three.js' colour management.
-    const vec3 weights = NODE != 0 ? vec3(0.2126, 0.7152, 0.0722)
-                                   : vec3(0.2126729, 0.7151522, 0.0721750);
-    float luminance = dot(value.rgb, weights);
+    float luminance = dot(value.rgb, NODE != 0 ? LUMINANCE : LONG_LUMINANCE);
     return value * smoothstep(params.threshold, params.threshold + params.smooth_width, luminance);
+}
+
+// KinoBloom's prefilter: the median of a texel and its neighbours, along both axes, and the soft
+// threshold.
+
+// Selects with minimum and maximum only, since arithmetic would round.
+vec4 middle(vec4 a, vec4 b, vec4 c)
+{
+    return max(min(a, b), min(max(a, b), c));
+}
+
+vec4 kino_limited(vec4 value)
+{
+    return vec4(min(value.rgb, vec3(65000.0)), value.a);
+}
+
+vec4 kino_bright(vec4 centre, vec4 left, vec4 right, vec4 up, vec4 down)
+{
+    vec4 kept = kino_limited(centre);
+    if (ANTI_FLICKER != 0) {
+        kept = middle(kept, kino_limited(left), kino_limited(right));
+        kept = middle(kept, kino_limited(up), kino_limited(down));
+    }
+    if (THRESHOLDED != 0) {
+        float width = params.threshold * params.knee + 1e-5;
+        kept = soft_threshold(kept, params.threshold, width, 4.0 * width, 1e-5);
+    }
+    return kept;
+}
+
+// The highlights of Blender's Glare node (formulas of the compositor of Blender 4.5).
+
+// The value that a smooth transition of this width subtracts (minimum) or adds (maximum) at a
+// distance from it (Quilez, "Smooth minimum").
+float rounding(float distance_to_end, float width)
+{
+    float h = width > 0.0 ? max(1.0 - abs(distance_to_end) / width, 0.0) : 0.0;
+    return 0.25 * h * h * width;
+}
+
+// The brightness above the threshold.
+float highlight(float value)
+{
+    float low = params.threshold, range = params.maximum, high = low + range;
+    // The widths are limited, so that the transitions stay between 0 and the other end.
+    float at_low = min(params.smoothness, min(low, range));
+    float at_high = min(params.smoothness, min(high, range));
+    float above = value - low;
+    float kept = max(above, 0.0) + rounding(above, at_low);
+    return min(kept, range) - rounding(kept - range, at_high);
+}
+
+vec4 highlights(vec4 value)
+{
+    if (THRESHOLDED == 0)
+        return value;
+    float brightest = max(value.r, max(value.g, value.b));
+    return brightest > 0.0 ? value * (highlight(brightest) / brightest) : vec4(0.0);
 }
 
 // Not one expression: glslang 12 writes invalid SPIR-V for a condition of several constants.
@@ -186,18 +215,18 @@ vec2 place_of(int group, FilamentTaps pairs)
     return cross[group];
 }
 
-// What the method makes of groups that are one tap each, and of Filament's shares.
+// What the method makes of groups that are one tap each, and of Filament's shares. BOX is a box of 4 x 4 texels as
+// four taps (keijiro/KinoBloom @ 0a04c43fa47d, Bloom.cginc).
 vec4 made(vec4 found[5], vec4 shares)
 {
-    vec4 four[4] = vec4[](found[0], found[1], found[2], found[3]);
     if (GROUPS == GROUPS_BOX)
-        return box_of(four);
+        return weighted_mean(found, group_count(), shares);
+    if (GROUPS == GROUPS_HDRP)
+        return weighted_mean(found, group_count(), shares);
+    if (GROUPS == GROUPS_FILAMENT)
+        return filament_prefiltered(weighted_mean(found, group_count(), shares));
     if (GROUPS == GROUPS_KINO)
         return kino_bright(found[0], found[1], found[2], found[3], found[4]);
-    if (GROUPS == GROUPS_FILAMENT)
-        return filament_prefiltered(four, shares);
-    if (GROUPS == GROUPS_HDRP)
-        return hdrp_prefiltered(found);
     if (GROUPS == GROUPS_HIGHLIGHTS)
         return highlights(found[0]);
     if (GROUPS == GROUPS_BABYLON)

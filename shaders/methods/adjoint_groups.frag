@@ -23,14 +23,6 @@ int own_group;
 Place place;
 vec4 found[5], cotangent;
 
-// A group's share without the weight by brightness.
-float share_of(int group, Place place)
-{
-    if (GROUPS == GROUPS_PYRAMID)
-        return GROUP_SHARES[group];
-    return GROUPS == GROUPS_FILAMENT ? filament_taps(place.part).shares[group] : 1.0;
-}
-
 // A group's weight by brightness, and its derivative by the colour.
 float weight_of(vec4 mean, float share, out vec3 slope)
 {
@@ -74,13 +66,13 @@ vec4 back_end(vec4 mean, vec4 cotangent)
 vec4 back_weighted(vec4 found[5], vec4 cotangent, Place place)
 {
     vec3 slope, own_slope = vec3(0.0);
-    vec4 sum = vec4(0.0), own = vec4(0.0);
+    vec4 sum = vec4(0.0), own = vec4(0.0), shares = filament_taps(place.part).shares;
     float total = 0.0, own_weight = 0.0;
     // Not in the loop's condition: lavapipe 22.3.6 ends a loop early whose condition has branches by
     // specialization constants.
     int count = group_count();
     for (int group = 0; group < count; ++group) {
-        float weight = weight_of(found[group], share_of(group, place), slope);
+        float weight = weight_of(found[group], share_of(group, shares), slope);
         sum += weight * found[group];
         total += weight;
         if (group == own_group) {
@@ -134,8 +126,7 @@ vec4 back_three(vec4 value, vec4 cotangent)
 {
     if (THRESHOLDED == 0)
         return cotangent;
-    const vec3 weights = NODE != 0 ? vec3(0.2126, 0.7152, 0.0722)
-                                   : vec3(0.2126729, 0.7151522, 0.0721750);
+    const vec3 weights = NODE != 0 ? LUMINANCE : LONG_LUMINANCE;
     float place = (dot(value.rgb, weights) - params.threshold) / params.smooth_width;
     float t = clamp(place, 0.0, 1.0);
     float slope = t == place ? 6.0 * t * (1.0 - t) / params.smooth_width : 0.0;
@@ -196,7 +187,7 @@ vec4 back(vec4 found[5], vec4 cotangent, Place place)
     if (GROUPS == GROUPS_UNREAL)
         return back_unreal(found[0], cotangent);
     if (GROUPS == GROUPS_PYGFX)
-        return cotangent * larger(pygfx_mean(taps_of(place)), vec4(0.0));
+        return cotangent * larger(usual(weighted_mean(found, 5, vec4(0.0))), vec4(0.0));
     // Without weights the reduction is linear, and this is no group but all of it.
     if (GROUPS == GROUPS_FILAMENT)
         return THRESHOLDED == 0 ? cotangent : back_weighted(found, cotangent, place);
@@ -212,9 +203,9 @@ void start()
         cotangent.a = 0.0;
 }
 
-vec4 shade(int number)
+vec4 shade()
 {
-    own_group = LEVELS + number;
+    own_group = LEVELS + picture;
     if (BY == BY_MASK)
         return gathered(vec4(dot(prefiltered(found, place), cotangent), 0.0, 0.0, 0.0));
     return gathered(back(found, mask_value() * cotangent, place));
