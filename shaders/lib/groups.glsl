@@ -1,4 +1,4 @@
-// What downsamplings make of 13 taps, or of the four inner ones. Some weight them by brightness,
+// What downsamplings make of 13 taps, or of a few taps of their own. Some weight them by brightness,
 // against fireflies.
 
 // The outer taps in three rows, and the inner ones in two.
@@ -19,55 +19,93 @@ vec4[5] group_means(Taps taps)
                   0.25 * (d + e + g + h), 0.25 * (e + f + h + i));
 }
 
-const vec3 LUMINANCE = vec3(0.2126, 0.7152, 0.0722);
-
-// Of sRGB's primaries with more digits.
-const vec3 LONG_LUMINANCE = vec3(0.2126729, 0.7151522, 0.0721750);
-
-float group_luminance(vec4 value)
-{
-    return max(dot(value.rgb, LUMINANCE), 0.0);
-}
-
-float brightest(vec3 value)
-{
-    return max(max(value.r, max(value.g, value.b)), 0.0);
-}
-
-// The brightness by which a group weighs less, against fireflies (Karis 2013).
-float brightness_of(vec4 mean)
+// Not one expression: glslang 12 writes invalid SPIR-V for a condition of several constants.
+bool are_of_thirteen()
 {
     if (GROUPS == GROUPS_PYGFX)
-        return 0.0;
-    // Its weights of negative luminances are above 1, and beyond -1 negative.
+        return true;
     if (GROUPS == GROUPS_PYGFX_KARIS)
-        return dot(mean.rgb, LUMINANCE);
-    if (GROUPS == GROUPS_FILAMENT)
-        return THRESHOLDED != 0 ? brightest(mean.rgb) : 0.0;
+        return true;
+    return GROUPS == GROUPS_BEVY || GROUPS == GROUPS_PYRAMID;
+}
+
+// Whether each group is a tap of its own.
+bool has_own_taps()
+{
+    return GROUPS != GROUPS_BLENDER && !are_of_thirteen();
+}
+
+// Of those that have one weight each. Blender's weights are those of the four taps of a group.
+int group_count()
+{
+    if (are_of_thirteen())
+        return 5;
     if (GROUPS == GROUPS_BOX)
-        return brightest(mean.rgb);
-    return max(dot(mean.rgb, GROUPS == GROUPS_HDRP ? LONG_LUMINANCE : LUMINANCE), 0.0);
+        return 4;
+    if (GROUPS == GROUPS_FILAMENT)
+        return 4;
+    if (GROUPS == GROUPS_BLENDER)
+        return 4;
+    if (GROUPS == GROUPS_KINO)
+        return ANTI_FLICKER != 0 ? 5 : 1;
+    return GROUPS == GROUPS_HDRP ? 5 : 1;
 }
 
-// A group's share without its brightness; `shares` are those of Filament's four.
-float share_of(int group, vec4 shares)
+// A group's weight, and its derivatives by the channels.
+struct Weight {
+    float value;
+    vec3 slope;
+};
+
+// Brighter groups weigh less (Karis 2013).
+Weight weight_of(vec4 group, float share)
 {
-    if (GROUPS == GROUPS_PYRAMID || GROUPS == GROUPS_PYGFX)
-        return GROUP_SHARES[group];
-    return GROUPS == GROUPS_FILAMENT ? shares[min(group, 3)] : 1.0;
+    bool by_brightest = GROUPS == GROUPS_BOX || GROUPS == GROUPS_FILAMENT;
+    float gain = 1.0, brightness;
+    vec3 slope = LUMINANCE;
+    if (GROUPS == GROUPS_PYGFX)
+        return Weight(share, vec3(0.0));
+    if (GROUPS == GROUPS_FILAMENT && THRESHOLDED == 0)
+        return Weight(share, vec3(0.0));
+    if (GROUPS == GROUPS_HDRP)
+        slope = vec3(0.2126729, 0.7151522, 0.0721750);
+    // That of a group which has been multiplied by its share.
+    if (GROUPS == GROUPS_BEVY)
+        gain = 0.25 * share;
+    if (by_brightest || GROUPS == GROUPS_BLENDER) {
+        slope = shares_of_brightest(group.rgb);
+        brightness = largest(group.rgb);
+    } else {
+        brightness = dot(group.rgb, slope);
+    }
+    // These two count negative brightness: beyond -1 weights are negative.
+    if (GROUPS != GROUPS_PYGFX_KARIS && GROUPS != GROUPS_BLENDER) {
+        slope *= larger(brightness, 0.0);
+        brightness = max(brightness, 0.0);
+    }
+    float divisor = 1.0 + gain * brightness;
+    return Weight(share / divisor, -gain * share / (divisor * divisor) * slope);
 }
 
-vec4 weighted_mean(vec4 means[5], int count, vec4 shares)
+// The sum of groups with their weights, and the sum of the weights.
+struct Sum {
+    vec4 value;
+    float weights;
+};
+
+Sum sum_of(vec4 groups[5], float shares[5])
 {
-    vec4 sum = vec4(0.0);
-    float total = 0.0;
+    Sum sum = Sum(vec4(0.0), 0.0);
     [[unroll]] for (int group = 0; group < 5; ++group)
-        if (group < count) {
-            float share = share_of(group, shares) / (1.0 + brightness_of(means[group]));
-            sum += share * means[group];
-            total += share;
+        if (group < group_count()) {
+            float weight = weight_of(groups[group], shares[group]).value;
+            sum.value += weight * groups[group];
+            sum.weights += weight;
         }
-    return sum / total;
+    // Bevy's is not renormalized.
+    if (GROUPS == GROUPS_BEVY)
+        sum.weights = 1.0;
+    return sum;
 }
 
 // What is not finite is 0.
@@ -77,41 +115,23 @@ vec4 usual(vec4 value)
                notEqual(floatBitsToUint(value) & 0x7f800000u, uvec4(0x7f800000u)));
 }
 
-// A tap multiplied by its weight, and the weight.
-struct Weighted {
-    vec4 value;
-    float weight;
-};
+const float ONES[5] = float[](1.0, 1.0, 1.0, 1.0, 1.0);
 
-Weighted weighted(vec4 value)
+vec4 weighted_mean(vec4 a, vec4 b, vec4 c, vec4 d)
 {
-    float weight = 1.0 / (1.0 + max(value.r, max(value.g, value.b)));
-    return Weighted(weight * value, weight);
-}
-
-vec4 mean(Weighted a, Weighted b, Weighted c, Weighted d)
-{
-    return (a.value + b.value + c.value + d.value) / (a.weight + b.weight + c.weight + d.weight);
+    Sum sum = sum_of(vec4[](a, b, c, d, vec4(0.0)), ONES);
+    return sum.value / sum.weights;
 }
 
 // Blender's: within a group, brighter taps weigh less (formulas of the compositor of Blender 5.0). Taps
 // between texels with negative channels may have a negative brightness.
 vec4 blender_groups(Taps taps)
 {
-    Weighted a = weighted(taps.outer[0]), b = weighted(taps.outer[1]), c = weighted(taps.outer[2]);
-    Weighted d = weighted(taps.outer[3]), e = weighted(taps.outer[4]), f = weighted(taps.outer[5]);
-    Weighted g = weighted(taps.outer[6]), h = weighted(taps.outer[7]), i = weighted(taps.outer[8]);
-    vec4 inner = mean(weighted(taps.inner[0]), weighted(taps.inner[1]), weighted(taps.inner[2]),
-                      weighted(taps.inner[3]));
-    vec4 outer = mean(a, b, d, e) + mean(b, c, e, f) + mean(d, e, g, h) + mean(e, f, h, i);
+    vec4 a = taps.outer[0], b = taps.outer[1], c = taps.outer[2];
+    vec4 d = taps.outer[3], e = taps.outer[4], f = taps.outer[5];
+    vec4 g = taps.outer[6], h = taps.outer[7], i = taps.outer[8];
+    vec4 inner = weighted_mean(taps.inner[0], taps.inner[1], taps.inner[2], taps.inner[3]);
+    vec4 outer = weighted_mean(a, b, d, e) + weighted_mean(b, c, e, f) + weighted_mean(d, e, g, h)
+               + weighted_mean(e, f, h, i);
     return usual(0.5 * inner + 0.125 * outer);
-}
-
-vec4 combined(Taps taps)
-{
-    if (GROUPS == GROUPS_BLENDER)
-        return blender_groups(taps);
-    vec4 mean = weighted_mean(group_means(taps), 5, vec4(0.0));
-    bool clamps = GROUPS == GROUPS_PYGFX || GROUPS == GROUPS_PYGFX_KARIS;
-    return clamps ? max(usual(mean), vec4(0.0)) : mean;
 }

@@ -56,7 +56,5 @@ vec4[5] means(Place place)
 
 vec4 prefiltered(vec4 found[5], Place place)
 {
-    if (GROUPS == GROUPS_BEVY)
-        return bevy_prefiltered(taps_of(place));
-    return has_own_taps() ? made(found, filament_taps(place.part).shares) : combined(taps_of(place));
+    return GROUPS == GROUPS_BLENDER ? blender_groups(taps_of(place)) : made(found, place.part);
 }

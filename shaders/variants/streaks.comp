@@ -6,6 +6,7 @@
 #include "lib/sampling.glsl"
 
 UNIFORM_BLOCK(STREAKS_BLOCK);
+#include "lib/threshold.glsl"
 #include "lib/above.glsl"
 #include "variants/pixels.glsl"
 

@@ -111,7 +111,7 @@ vec4 tap_at(int column, Line line, ivec2 numbers)
     return blend(rows[row][at], rows[row + 1][at], line.parts[numbers.y]);
 }
 
-vec4 prefiltered(int column, Line line, vec4 shares)
+vec4 prefiltered(int column, Line line, vec2 part)
 {
     vec4 found[5] = vec4[](vec4(0.0), vec4(0.0), vec4(0.0), vec4(0.0), vec4(0.0));
     Taps taps;
@@ -120,13 +120,13 @@ vec4 prefiltered(int column, Line line, vec4 shares)
         [[unroll]] for (int group = 0; group < 5; ++group)
             if (group < group_count())
                 found[group] = tap_at(column, line, numbers_of(group));
-        return made(found, shares);
+        return made(found, part);
     }
     [[unroll]] for (int i = 0; i < 9; ++i)
         taps.outer[i] = tap_at(column, line, 2 * ivec2(i % 3, i / 3));
     [[unroll]] for (int i = 0; i < 4; ++i)
         taps.inner[i] = tap_at(column, line, 1 + 2 * ivec2(i % 2, i / 2));
-    return GROUPS == GROUPS_BEVY ? bevy_prefiltered(taps) : combined(taps);
+    return GROUPS == GROUPS_BLENDER ? blender_groups(taps) : made(group_means(taps), part);
 }
 
 void main()
@@ -170,10 +170,8 @@ void main()
             continue;
         float down = EXACT != 0 ? PART : float(rest) / float(divisor);
         Line line = line_of(down);
-        [[unroll]] for (int i = 0; i < COLUMNS; ++i) {
-            vec4 shares = filament_taps(vec2(across[i], down)).shares;
-            pixels[i] = buffer_of(prefiltered(i, line, shares));
-        }
+        [[unroll]] for (int i = 0; i < COLUMNS; ++i)
+            pixels[i] = buffer_of(prefiltered(i, line, vec2(across[i], down)));
         store(first.x, y, pixels);
         rest += 2u * height;
     }

@@ -127,13 +127,6 @@ def test_the_size_of_the_bloom_buffers(
     assert frames["bloom"].shape[1::-1] == SIZE
 
 
-def test_the_default_is_the_tutorial_at_1280_x_720(renderer: Renderer, scene: Scene) -> None:
-    frames = renderer.render(scene)
-    assert list(frames) == FORWARD
-    assert frames["final"].shape == (720, 1280, 4)
-    assert frames.settings == Separable() == vkbloom.presets["tutorial"]
-
-
 def test_without_bloom(renderer: Renderer, scene: Scene) -> None:
     with_bloom = renderer.render(scene, None, SIZE)
     frames = renderer.render(scene, Separable(bloom=False), SIZE)
