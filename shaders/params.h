@@ -386,6 +386,9 @@
 #define MAX_TAPS     8
 #define MAX_HALVINGS 4
 
+// The binding of the target of a compute shader: after those that images and resources may have.
+#define TARGET_BINDING 33
+
 // Invocations of a workgroup: in a row, for shaders in which each invocation writes several pixels;
 // on each side, for shaders in which it writes one.
 #define ROW_INVOCATIONS   8

@@ -1,6 +1,6 @@
 // A pass over every pixel of one target, in two variants: a fragment shader or, with DISPATCH, a
 // compute shader with one invocation for each pixel. The including shader defines shade(), which
-// returns the colour of PIXEL, and TARGET_BINDING, the binding after its images.
+// returns the colour of PIXEL.
 //
 // With STACKED the target has that number of pictures below each other, each of STACKED_HEIGHT rows. PIXEL
 // is a place in each, shade() is of `picture`, and start() comes before it.

@@ -10,7 +10,6 @@
 
 // The source has the cotangents.
 #define STRIP_CHANNELS 4
-#define STRIP_TARGET 3
 #include "variants/strip.glsl"
 READ_IMAGE(2, image);
 

@@ -15,7 +15,6 @@ const bool IS_GODOT = GROUPS == GROUPS_GODOT;
 
 layout(local_size_x = ROW_INVOCATIONS) in;
 READ_IMAGE(1, source);
-WRITE_IMAGE(2);
 
 #define LOAD load_same
 #define LOAD_FROM (-HDRP_RADIUS)
