@@ -1,7 +1,6 @@
 // Ends a pass that writes the cotangents of an image. The including shader defines TARGET_BINDING; its
 // last two images are what other readers of the image have accumulated, and the image itself. ADDED_SHARE
 // is a factor of the colours of the former.
-#include "lib/where_finite.glsl"
 
 #ifndef ADDED_SHARE
 #define ADDED_SHARE 1.0

@@ -2,7 +2,6 @@
 // that read a texel, by the table.
 
 UNIFORM_BLOCK(ADJOINT_FILTER_BLOCK);
-#include "lib/where_finite.glsl"
 #include "lib/window.glsl"
 
 layout(set = 0, binding = 1) uniform sampler2D cotangents;

@@ -6,7 +6,6 @@
 // Mesa 22.3.6, 2026-11-27).
 
 UNIFORM_BLOCK(ADJOINT_FILTER_BLOCK);
-#include "lib/where_finite.glsl"
 #include "variants/pixels.glsl"
 
 const int COLUMNS = ADJOINT_SIDE, ROWS = ADJOINT_ROWS, SPAN_X = RADIX_1, SPAN_Y = RADIX_2;
