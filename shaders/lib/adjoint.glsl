@@ -1,10 +1,5 @@
 // Ends a pass that writes the cotangents of an image. The including shader defines TARGET_BINDING; its
-// last two images are what other readers of the image have accumulated, and the image itself. ADDED_SHARE
-// is a factor of the colours of the former.
-
-#ifndef ADDED_SHARE
-#define ADDED_SHARE 1.0
-#endif
+// last two images are what other readers of the image have accumulated, and the image itself.
 
 #define ADDED_BINDING (TARGET_BINDING - 2)
 #define IMAGE_BINDING (TARGET_BINDING - 1)
@@ -15,7 +10,7 @@ layout(set = 0, binding = IMAGE_BINDING) uniform sampler2D differentiated;
 vec4 gathered(vec4 cotangent)
 {
     if (ADD_OWN != 0)
-        cotangent += vec4(vec3(ADDED_SHARE), 1.0) * texelFetch(added, PIXEL, 0);
+        cotangent += texelFetch(added, PIXEL, 0);
     return FROM_IMAGE != 0 ? where_finite(cotangent, texelFetch(differentiated, PIXEL, 0))
                            : cotangent;
 }
