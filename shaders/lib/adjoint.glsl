@@ -1,6 +1,5 @@
 // Ends a pass that writes the cotangents of an image. The including shader defines ADDED_BINDING:
 // there is what other readers of the image have accumulated, and after it the image itself.
-#include "lib/where_finite.glsl"
 
 layout(set = 0, binding = ADDED_BINDING) uniform sampler2D added;
 layout(set = 0, binding = ADDED_BINDING + 1) uniform sampler2D differentiated;

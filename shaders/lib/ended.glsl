@@ -1,7 +1,6 @@
 // How a fused pass ends a bloom: with the finished picture; with MIXED, with the cotangents of the picture
 // before exposure and curves, from those of the finished one, the image at ENDED_BINDING.  The including shader has composite.glsl and, for linear texels, pixels.glsl.
 #ifdef MIXED
-#include "lib/where_finite.glsl"
 #include "lib/adjoint_composite.glsl"
 #ifdef LINEAR_TEXELS
 READ_IMAGE(ENDED_BINDING, cotangents);
