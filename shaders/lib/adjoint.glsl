@@ -1,6 +1,5 @@
 // Ends a pass that writes the cotangents of an image. The including shader defines TARGET_BINDING; its
 // last two images are what other readers of the image have accumulated, and the image itself.
-#include "lib/where_finite.glsl"
 
 #define ADDED_BINDING (TARGET_BINDING - 2)
 #define IMAGE_BINDING (TARGET_BINDING - 1)

@@ -2,7 +2,6 @@
 // before exposure and curves, from those of the finished one, the image at ENDED_BINDING. ENDED_TARGET is the
 // binding of the target. The including shader has composite.glsl and, for linear texels, pixels.glsl.
 #ifdef MIXED
-#include "lib/where_finite.glsl"
 #include "lib/adjoint_composite.glsl"
 #define ENDED_TARGET (ENDED_BINDING + 1)
 #ifdef LINEAR_TEXELS
