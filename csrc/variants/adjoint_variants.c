@@ -147,12 +147,6 @@ static const struct vkb_pass_row *other_axis(const struct vkb_graph *graph,
              : NULL;
 }
 
-// The texel of the source at or before the position of a texel of the target.
-static int32_t texel_before(int32_t ratio, int32_t texel)
-{
-    return ratio == EXACT_HALF ? 2 * texel : ratio == EXACT_SAME ? texel : (texel + 1) / 2 - 1;
-}
-
 // The most readers of a texel.
 static int32_t most_readers(const struct axis *axis)
 {
@@ -163,40 +157,16 @@ static int32_t most_readers(const struct axis *axis)
     return most;
 }
 
-// The most readers before or after the middle of the window that a filter in this ratio has.
-static int32_t most_beside(const struct axis *axis, int32_t ratio)
-{
-    int32_t most = 1;
-
-    for (uint32_t texel = 0; texel < axis->size; ++texel) {
-        const float *entry = entry_of(axis, texel);
-        const int32_t before = texel_before(ratio, (int32_t)texel) - (int32_t)entry[0] + 1;
-        const int32_t after = (int32_t)entry[1] - before;
-        most = most > before ? most : before;
-        most = most > after ? most : after;
-    }
-    return most;
-}
-
-// Gives `row` the windows of both axes, which begin at the first reader or, where the ratio is
-// simple, as those of a filter. Columns share texels if both ratios are simple.
-static void set_windows(const struct axis *x, const struct axis *y, int32_t ratio_x,
-                        int32_t ratio_y, struct vkb_pass_row *row)
+// Gives `row` the windows of both axes, which begin at the first reader.
+static void set_windows(const struct axis *x, const struct axis *y, struct vkb_pass_row *row)
 {
     struct vkb_constants *constants = &row->constants;
-    const int32_t rows = ratio_y ? 2 * most_beside(y, ratio_y) : MAX_WINDOW + 1;
-    const int32_t columns = ratio_x ? 2 * most_beside(x, ratio_x) : MAX_WINDOW + 1;
+    const int32_t rows = most_readers(y), columns = most_readers(x);
 
-    constants->exact_rows = rows <= MAX_WINDOW ? ratio_y : 0;
-    constants->exact = constants->exact_rows && columns <= MAX_WINDOW ? ratio_x : 0;
-    const int32_t of_rows = constants->exact_rows ? rows : most_readers(y);
-    const int32_t of_columns = constants->exact ? columns : most_readers(x);
-    constants->window = of_columns > of_rows ? of_columns : of_rows;
-    constants->taken_x = constants->taken_y = 0;
-    for (int32_t kernel = 0;
-         !constants->exact && of_columns < constants->window && kernel < constants->kernels;
-         ++kernel)
-        constants->taken_x |= ((1 << of_columns) - 1) << MAX_WINDOW * kernel;
+    constants->window = columns > rows ? columns : rows;
+    constants->exact = constants->exact_rows = constants->taken_x = constants->taken_y = 0;
+    for (int32_t kernel = 0; columns < constants->window && kernel < constants->kernels; ++kernel)
+        constants->taken_x |= ((1 << columns) - 1) << MAX_WINDOW * kernel;
 }
 
 // Whether the readers of no row begin above those of the row before.
@@ -231,14 +201,12 @@ static bool make_tiles(const struct vkb_variant_choice *choice, const struct vkb
     row->params.adjoint_filter.gain *= other ? other->params.adjoint_filter.gain : 1.0f;
     row->constants.direction = 0;
     row->constants.kernels = pass->constants.levels;
-    const struct vkb_image_row *source = &graph->images[row->reads[0]];
-    const int32_t ratio_x = vkb_ratio_of(source->width, x.size);
-    const int32_t ratio_y = vkb_ratio_of(source->height, y.size);
-    if (!other && !ratio_y && pass->constants.levels < 2)
+    if (!other && pass->constants.levels < 2
+        && !vkb_ratio_of(graph->images[row->reads[0]].height, y.size))
         return false;
-    set_windows(&x, &y, ratio_x, ratio_y, row);
+    set_windows(&x, &y, row);
     vkb_make_tiles(row, &vkb_shader_adjoint_filter_tile_comp);
-    return row->constants.window <= MAX_WINDOW && (row->constants.exact || begins_in_order(&y));
+    return row->constants.window <= MAX_WINDOW && begins_in_order(&y);
 }
 
 bool vkb_add_adjoint_filter(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
