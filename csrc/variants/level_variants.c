@@ -41,8 +41,8 @@ static bool is_half(const struct vkb_graph *graph, const struct vkb_pass_row *pa
 }
 
 // Makes the pass one of linear texels, which loads the texels of its first image.
-static void make_linear(struct vkb_pass_row *row, const struct vkb_shader *shader,
-                        uint32_t columns, uint32_t rows)
+static void make_linear(struct vkb_pass_row *row, const struct vkb_shader *shader, uint32_t columns,
+                        uint32_t rows)
 {
     row->constants.sampling = 0;
     vkb_drop_reads(row, 1);

@@ -65,7 +65,7 @@ void vkb_make_tiles(struct vkb_pass_row *row, const struct vkb_shader *shader)
     // Tiles have one way for windows in a simple ratio along both axes, and one for all others.
     if (!constants->exact || !constants->exact_rows)
         constants->exact = constants->exact_rows = 0;
-    vkb_make_dispatch(row, shader, FILTER_COLUMNS, FILTER_ROWS);
+    vkb_make_dispatch(row, shader, FILTER_TILE_COLUMNS, FILTER_TILE_ROWS);
 }
 
 bool vkb_fits_linear(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)

@@ -2,9 +2,9 @@
 // adds up some rows of a column: each row of texels along x once, then these sums along y. The including shader
 // declares `target`, includes lib/window.glsl, and defines the functions below.
 
-const int COLUMNS = FILTER_COLUMNS, ROWS = FILTER_ROWS, RUN = FILTER_RUN;
+const int COLUMNS = FILTER_TILE_COLUMNS, ROWS = FILTER_TILE_ROWS, RUN = FILTER_TILE_RUN;
 
-layout(local_size_x = FILTER_COLUMNS, local_size_y = FILTER_ROWS / FILTER_RUN) in;
+layout(local_size_x = FILTER_TILE_COLUMNS, local_size_y = FILTER_TILE_ROWS / FILTER_TILE_RUN) in;
 
 // Defined by the including shader: the texels of the source that a pixel adds up, a texel there or the nearest one in
 // the image, what is added to a pixel, and the pixel that is stored.
@@ -30,16 +30,10 @@ void keep_window(int number, ivec2 first)
         weights[i][number] = window.weights[i];
 }
 
-// How far the window of a pixel is from that of the first one, if sides are in this simple ratio.
+// How far the window of a pixel is from that of an even one before it, if sides are in this simple ratio.
 int offset_of(int exact, int pixel)
 {
     return exact == EXACT_HALF ? 2 * pixel : exact == EXACT_SAME ? pixel : (pixel + 1) / 2;
-}
-
-// The first texel of the window of a pixel, if sides are in this simple ratio.
-int exact_first(int exact, int pixel)
-{
-    return offset_of(exact, pixel) - WINDOW / 2 + (exact == EXACT_DOUBLE ? 0 : 1);
 }
 
 // How far the window of a row is from that of the row `top` of the tile.
@@ -66,8 +60,9 @@ void main()
     barrier();
     [[unroll]] for (int at = 0; at < WINDOW; ++at)
         of_column[at] = weights[at][EXACT != 0 ? column % RUN : column];
-    ivec2 first = EXACT != 0 ? ivec2(exact_first(EXACT, tile.x + column), exact_first(EXACT_ROWS, tile.y + top))
-                             : ivec2(firsts[column], firsts[WEIGHT_COLUMNS + top]);
+    ivec2 first = EXACT != 0
+                    ? ivec2(firsts[0] + offset_of(EXACT, column), firsts[WEIGHT_COLUMNS] + offset_of(EXACT_ROWS, top))
+                    : ivec2(firsts[column], firsts[WEIGHT_COLUMNS + top]);
     int rows = row_offset(top, RUN - 1) + WINDOW;
     [[unroll]] for (int row = 0; row < rows; ++row) {
         vec4 sums[3] = vec4[](vec4(0.0), vec4(0.0), vec4(0.0));
