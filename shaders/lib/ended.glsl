@@ -1,15 +1,12 @@
 // How a fused pass ends a bloom: with the finished picture; with MIXED, with the cotangents of the picture before
 // exposure and curves, from those of the finished one; with TRANSPOSED, with the derivatives by the image, from the
 // cotangents of a composite without a curve, which is a factor, and their transposed blur. The image at ENDED_BINDING
-// is then these cotangents or the image. ENDED_TARGET is the binding of the target. The including shader has
-// composite.glsl and, for linear texels, pixels.glsl.
+// is then these cotangents or the image. The including shader has composite.glsl and, for linear texels, pixels.glsl.
 #ifndef TRANSPOSED
 #define TRANSPOSED 0
 #endif
 
 #if defined(MIXED) || TRANSPOSED
-#include "lib/where_finite.glsl"
-#define ENDED_TARGET (ENDED_BINDING + 1)
 #ifdef LINEAR_TEXELS
 READ_IMAGE(ENDED_BINDING, other);
 vec4 other_at(ivec2 pixel)
@@ -24,8 +21,6 @@ vec4 other_at(ivec2 pixel)
     return texelFetch(other, pixel, 0);
 }
 #endif
-#else
-#define ENDED_TARGET ENDED_BINDING
 #endif
 
 #ifdef MIXED

@@ -9,7 +9,6 @@ const int COLUMNS = TEXEL_COLUMNS(CHANNEL_BYTES), ROWS = TEXEL_ROWS;
 layout(local_size_x = ROW_INVOCATIONS) in;
 READ_IMAGE(1, scene);
 READ_IMAGE(2, bloom);
-WRITE_IMAGE(3);
 
 #define LOAD load_scene
 #define LOAD_IMAGE scene

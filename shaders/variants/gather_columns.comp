@@ -18,7 +18,6 @@ READ_IMAGE(4, level_3);
 READ_IMAGE(5, level_4);
 READ_IMAGE(6, level_5);
 READ_IMAGE(7, level_6);
-WRITE_IMAGE(8);
 
 #define LOAD load_own
 #define LOAD_IMAGE level_0

@@ -7,7 +7,6 @@ UNIFORM_BLOCK(GATHER_BLOCK);
 
 layout(local_size_x = ROW_INVOCATIONS) in;
 READ_IMAGE(1, source);
-WRITE_IMAGE(2);
 
 #include "lib/gathered.glsl"
 #include "variants/store_float.glsl"

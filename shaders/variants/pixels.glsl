@@ -44,8 +44,11 @@
 // other. Runs of 24 and 32 bytes need less of its work for each byte than words.
 #extension GL_ARB_gpu_shader_int64 : require
 #extension GL_EXT_scalar_block_layout : require
-#define RUNS(number, type, name) \
-    layout(set = 0, binding = number, scalar) writeonly buffer type##_runs { type runs[]; } name
+#define RUNS(type, name) \
+    layout(set = 0, binding = TARGET_BINDING, scalar) writeonly buffer type##_runs { type runs[]; } name
+RUNS(u64vec2, runs_of_target);
+RUNS(u64vec3, triples_of_target);
+RUNS(u64vec4, pairs_of_target);
 
 layout(push_constant) uniform Shapes {
     ivec4 target;    // width, height, words in a row, first row of the bound buffer
@@ -73,10 +76,6 @@ uint64_t eighth(uvec2 value)
 }
 
 #define READ_IMAGE(number, name) layout(set = 0, binding = number) uniform usamplerBuffer name
-#define WRITE_IMAGE(number) \
-    RUNS(number, u64vec2, runs_of_target); \
-    RUNS(number, u64vec3, triples_of_target); \
-    RUNS(number, u64vec4, pairs_of_target)
 #define READ_SIZE(name, number) (read_shapes[number - 1].xy)
 #define TARGET_SIZE() (target_shape.xy)
 

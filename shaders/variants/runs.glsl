@@ -8,7 +8,6 @@
 
 layout(local_size_x = ROW_INVOCATIONS) in;
 READ_IMAGE(1, source);
-WRITE_IMAGE(2);
 
 #define LOAD load_run
 #define LOAD_COUNT LOADED

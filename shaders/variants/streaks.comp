@@ -17,7 +17,6 @@ const int TAPS = LEVELS > 2 ? LEVELS : 2, FILTERED = TAPS - 1;
 layout(local_size_x = ROW_INVOCATIONS) in;
 READ_IMAGE(1, source);
 READ_IMAGE(2, before);
-WRITE_IMAGE(3);
 
 #define LOAD load_own
 #include "variants/load.glsl"

@@ -24,7 +24,6 @@ const int AHEAD = CHANNEL_BYTES == 4 ? 1 : 2;
 
 layout(local_size_x = ROW_INVOCATIONS) in;
 READ_IMAGE(1, source);
-WRITE_IMAGE(ENDED_TARGET);
 #define STORE_COUNT STEP
 #include "variants/store.glsl"
 

@@ -7,7 +7,7 @@ const int RUN = TILE_ROWS / TILE_RUNS;
 
 layout(local_size_x = TILE_LOADED, local_size_y = TILE_RUNS) in;
 layout(set = 0, binding = 1) uniform sampler2D source;
-layout(set = 0, binding = ENDED_TARGET) uniform writeonly image2D target;
+layout(set = 0, binding = TARGET_BINDING) uniform writeonly image2D target;
 
 // The vertical sums, packed in the format of their image. They are stored in planes of words, so
 // that neighbours are in neighbouring banks. With floats `Separable` takes 0.170 ms in place of 0.111

@@ -147,16 +147,6 @@ def test_nothing_at_all_is_black(renderer: Renderer) -> None:
 # Brightness
 
 
-def test_brightness_is_the_glow_mesh_as_the_forward_system_draws_it(
-    renderer: Renderer, scene: Scene
-) -> None:
-    settings = Separable(format="rgba16float", bloom_size=SIZE)
-    glow = renderer.render(scene, settings, SIZE, time=0.3)["glow"]
-    shown = deferred(renderer, scene, time=0.3)
-    assert rgb(glow).max() == 1
-    np.testing.assert_array_equal(shown["brightness"], glow)
-
-
 def test_brightness_is_rounded_to_the_nearest(renderer: Renderer) -> None:
     colours = noise((16, 9))
     shown = deferred(
