@@ -39,6 +39,7 @@ STAGES = (".vert", ".frag", ".comp")
 PREAMBLE = """#version 450
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
+#include "lib/block.glsl"
 """
 # Python without the GIL has no stable ABI: a core for that version alone.
 LIMITED = not sysconfig.get_config_var("Py_GIL_DISABLED")

@@ -220,11 +220,8 @@ static void write_weights(const struct vkb_axis *axis, uint32_t block, uint32_t 
         const struct readers *texel = &readers[block + i];
         for (uint32_t pixel = texel->first; pixel < texel->end; ++pixel) {
             const double *found = weights[texel->start + pixel - texel->first];
-            const uint32_t place = pixel - first;
-            if (kernels == 1)
-                to[place][i] = (float)found[0];
-            for (uint32_t kernel = 0; kernels > 1 && kernel < kernels; ++kernel)
-                to[ADJOINT_SIDE * place + i][kernel] = (float)found[kernel];
+            for (uint32_t kernel = 0; kernel < kernels; ++kernel)
+                to[kernels * (pixel - first) + kernel][i] = (float)found[kernel];
         }
     }
 }
@@ -234,7 +231,7 @@ static bool write_table(const struct vkb_axis *axis, uint32_t kernels, uint32_t 
                         const struct readers *readers, double (*weights)[VKB_MAX_KERNELS],
                         struct vkb_table *table, struct vkb_error *error)
 {
-    const size_t start = table->count, size = (size_t)span * (kernels == 1 ? 1 : ADJOINT_SIDE);
+    const size_t start = table->count, size = (size_t)span * kernels;
     size_t place = 0;
 
     table->count += axis->from;

@@ -44,7 +44,6 @@ static struct vkb_pass_row line_row(const struct vkb_variant_choice *choice,
     row.params.line.origin = origin;
     row.params.line.vertical = vertical;
     row.params.line.levels = row.constants.rolled && image->format == VKB_FORMAT_RGBA8_UNORM;
-    row.params.line.limit = vkb_formats[image->format].limit;
     for (int tap = 0; tap <= 2 * radius; ++tap) {
         const int weight = abs(tap - radius);
         row.params.line.kernel[tap / 4][tap % 4] =

@@ -1,10 +1,7 @@
 // How a fused pass ends a bloom: with the finished picture; with MIXED, with the cotangents of the picture
-// before exposure and curves, from those of the finished one, the image at ENDED_BINDING. ENDED_TARGET is the
-// binding of the target. The including shader has composite.glsl and, for linear texels, pixels.glsl.
+// before exposure and curves, from those of the finished one, the image at ENDED_BINDING.  The including shader has composite.glsl and, for linear texels, pixels.glsl.
 #ifdef MIXED
-#include "lib/where_finite.glsl"
 #include "lib/adjoint_composite.glsl"
-#define ENDED_TARGET (ENDED_BINDING + 1)
 #ifdef LINEAR_TEXELS
 READ_IMAGE(ENDED_BINDING, cotangents);
 vec4 cotangent_at(ivec2 pixel)
@@ -19,8 +16,6 @@ vec4 cotangent_at(ivec2 pixel)
     return texelFetch(cotangents, pixel, 0);
 }
 #endif
-#else
-#define ENDED_TARGET ENDED_BINDING
 #endif
 
 vec4 ended(vec4 scene, vec4 bloom, ivec2 pixel)

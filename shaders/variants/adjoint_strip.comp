@@ -5,13 +5,10 @@
 // what the taps beyond it have read. `Separable` takes 10 ms backward, and 23 with a pass for each axis and
 // the threshold (processor time of 960 x 544 in float32, lavapipe of Mesa 22.3.6, 2026-11-26).
 #include "variants/fused_bloom.glsl"
-#include "lib/threshold_slope.glsl"
-#include "lib/where_finite.glsl"
 #include "variants/pixels.glsl"
 
 // The source has the cotangents.
 #define STRIP_CHANNELS 4
-#define STRIP_TARGET 3
 #include "variants/strip.glsl"
 READ_IMAGE(2, image);
 

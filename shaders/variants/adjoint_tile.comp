@@ -3,12 +3,10 @@
 // the same symmetric kernel: there are no cotangents beyond the edges, and the texel at the edge also has
 // what the taps beyond it have read. Both axes commute.
 #include "variants/fused_bloom.glsl"
-#include "lib/threshold_slope.glsl"
-#include "lib/where_finite.glsl"
 
 layout(set = 0, binding = 1) uniform sampler2D cotangents;
 layout(set = 0, binding = 2) uniform sampler2D image;
-layout(set = 0, binding = 3) uniform writeonly image2D target;
+layout(set = 0, binding = TARGET_BINDING) uniform writeonly image2D target;
 #include "variants/tile.glsl"
 
 // In planes, so that neighbours are in neighbouring banks.

@@ -1,8 +1,6 @@
 // The composite for a scene and a bloom that have the size and format of the result.
-#include "lib/block.glsl"
 
 UNIFORM_BLOCK(COMPOSITE_BLOCK);
-#include "lib/storage.glsl"
 #include "lib/composite.glsl"
 #include "variants/pixels.glsl"
 
@@ -10,7 +8,6 @@ const int COLUMNS = TEXEL_COLUMNS(CHANNEL_BYTES), ROWS = TEXEL_ROWS;
 
 READ_IMAGE(1, scene);
 READ_IMAGE(2, bloom);
-WRITE_IMAGE(3);
 
 #define LOAD load_scene
 #define LOAD_IMAGE scene

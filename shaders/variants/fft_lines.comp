@@ -9,18 +9,15 @@
 // STAGE is FIRST (rows of the glow) or PLAIN (the kernel), GREY or COLOURS (columns of the glow forth,
 // times the kernel's spectrum, and back), or LAST (rows back, to an image of the bloom's format).
 // PADDED reads what lies beyond the source's edges by the boundary.
-#include "lib/block.glsl"
-#include "lib/finite.glsl"
 
 UNIFORM_BLOCK(FFT_BLOCK);
-#include "lib/storage.glsl"
 #define FFT_HELD FFT_MAX_GROUP_RADIX
 #include "lib/fourier.glsl"
 
 layout(local_size_x_id = 34, local_size_y_id = 35) in;
 layout(set = 0, binding = 1, SOURCE_FORMAT) uniform readonly image2D source;
 layout(set = 0, binding = 2, SOURCE_FORMAT) uniform readonly image2D factor;
-layout(set = 0, binding = 3) uniform writeonly image2D target;
+layout(set = 0, binding = TARGET_BINDING) uniform writeonly image2D target;
 
 const int LENGTH = RADIX_1 * RADIX_2 * RADIX_3 * RADIX_4;
 // One float of padding after each 32, so that invocations use different banks of the shared memory.

@@ -23,10 +23,8 @@ const int BEFORE = MAX_WINDOW / 2, LOADED = 2 * COLUMNS + MAX_WINDOW;
 #ifdef FINAL
 #define ENDED_BINDING 3
 #include "lib/ended.glsl"
-WRITE_IMAGE(ENDED_TARGET);
 #define HAS_OWN true
 #else
-WRITE_IMAGE(3);
 #define HAS_OWN (ADD_OWN != 0)
 #endif
 #include "variants/store.glsl"

@@ -1,10 +1,8 @@
 // Shared by the fused passes for the complete bloom of an image: parameters, threshold, kernels. They
 // add in the same order as the passes that they replace, and round where those store to an image.
-#include "lib/block.glsl"
 #include "lib/threshold.glsl"
 
 UNIFORM_BLOCK(FUSED_BLOOM_BLOCK);
-#include "lib/storage.glsl"
 #include "lib/composite.glsl"
 
 // The result of the threshold pass. Without a knee it needs no rounding: it is the texel or 0, and

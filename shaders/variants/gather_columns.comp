@@ -2,12 +2,10 @@
 // columns and multiplies it by its weight. With ADD_OWN the first one has the target's size and needs
 // no filter. As one fragment shader `godot_4_5` takes 475 ms in place of 130 (processor time of 1920 x
 // 1080 in float16, lavapipe of Mesa 25.0.7, 2026-11-26).
-#include "lib/block.glsl"
 #include "lib/sampling.glsl"
 
 UNIFORM_BLOCK(GATHER_BLOCK);
 #include "lib/gathered.glsl"
-#include "lib/storage.glsl"
 #include "variants/pixels.glsl"
 
 const int COLUMNS = TEXEL_COLUMNS(CHANNEL_BYTES), ROWS = GATHER_ROWS;
@@ -19,7 +17,6 @@ READ_IMAGE(4, level_3);
 READ_IMAGE(5, level_4);
 READ_IMAGE(6, level_5);
 READ_IMAGE(7, level_6);
-WRITE_IMAGE(8);
 
 #include "variants/store.glsl"
 

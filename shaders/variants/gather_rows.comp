@@ -1,16 +1,13 @@
 // Filters a level that is gathered along rows, at the positions of the pixels of a target of another
 // width. The results are floats, in an image of the target's width and of the level's height.
-#include "lib/block.glsl"
 #include "lib/sampling.glsl"
 
 UNIFORM_BLOCK(GATHER_BLOCK);
-#include "lib/storage.glsl"
 #include "variants/pixels.glsl"
 
 const int COLUMNS = GATHER_COLUMNS, ROWS = GATHER_ROWS;
 
 READ_IMAGE(1, source);
-WRITE_IMAGE(2);
 
 #include "lib/gathered.glsl"
 #include "variants/store_float.glsl"

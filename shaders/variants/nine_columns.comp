@@ -1,10 +1,8 @@
 // HDRP's vertical blur of an image of the target's size (FIRST) or of exactly twice its height, whose
 // samples are means of two texels. An invocation writes one word of some rows, and has each sample
 // once for all of them.
-#include "lib/block.glsl"
 
 UNIFORM_BLOCK(PREFILTER_BLOCK);
-#include "lib/storage.glsl"
 #include "lib/hdrp.glsl"
 #include "variants/pixels.glsl"
 

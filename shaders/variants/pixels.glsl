@@ -1,6 +1,5 @@
 // How variants load and store runs of pixels. With LINEAR_TEXELS (on CPUs) an image is a buffer of 16-byte
 // words, since llvmpipe loads a word nearly as fast as one channel. Otherwise it is a storage image.
-// Include storage.glsl before this file.
 //
 // What llvmpipe does, and what follows (Mesa 22.3.6 and 25.0.7; benchmarks/image.py shows the effect):
 // - Mesa 25 does not unroll a loop without [[unroll]], and arrays indexed by its counter are then memory: it
@@ -45,8 +44,11 @@
 // other. Runs of 24 and 32 bytes need less of its work for each byte than words.
 #extension GL_ARB_gpu_shader_int64 : require
 #extension GL_EXT_scalar_block_layout : require
-#define RUNS(number, type, name) \
-    layout(set = 0, binding = number, scalar) writeonly buffer type##_runs { type runs[]; } name
+#define RUNS(type, name) \
+    layout(set = 0, binding = TARGET_BINDING, scalar) writeonly buffer type##_runs { type runs[]; } name
+RUNS(u64vec2, runs_of_target);
+RUNS(u64vec3, triples_of_target);
+RUNS(u64vec4, pairs_of_target);
 
 layout(push_constant) uniform Shapes {
     ivec4 target;    // width, height, words in a row, first row of the bound buffer
@@ -74,10 +76,6 @@ uint64_t eighth(uvec2 value)
 }
 
 #define READ_IMAGE(number, name) layout(set = 0, binding = number) uniform usamplerBuffer name
-#define WRITE_IMAGE(number) \
-    RUNS(number, u64vec2, runs_of_target); \
-    RUNS(number, u64vec3, triples_of_target); \
-    RUNS(number, u64vec4, pairs_of_target)
 #define READ_SIZE(name, number) (read_shapes[number - 1].xy)
 #define TARGET_SIZE() (target_shape.xy)
 

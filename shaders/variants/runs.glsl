@@ -7,7 +7,6 @@
 // and LOAD_FROM and LOAD_CHANNELS as for variants/load.glsl.
 
 READ_IMAGE(1, source);
-WRITE_IMAGE(2);
 
 #define LOAD load_run
 #define LOAD_COUNT LOADED

@@ -2,11 +2,10 @@
 // an invocation writes a strip from top to bottom, and filters each row of a tap along the row once,
 // for the two rows of the target that it is part of. Without it `blender_streaks` takes
 // 2,660 ms in place of 240 (processor time of 1920 x 1080 in float16, lavapipe of Mesa 25.0.7, 2026-11-26).
-#include "lib/block.glsl"
 #include "lib/sampling.glsl"
 
 UNIFORM_BLOCK(STREAKS_BLOCK);
-#include "lib/storage.glsl"
+#include "lib/threshold.glsl"
 #include "lib/above.glsl"
 #include "variants/pixels.glsl"
 
@@ -16,7 +15,6 @@ const int TAPS = LEVELS > 2 ? LEVELS : 2, FILTERED = TAPS - 1;
 
 READ_IMAGE(1, source);
 READ_IMAGE(2, before);
-WRITE_IMAGE(3);
 
 #include "variants/store.glsl"
 

@@ -3,7 +3,6 @@
 #include "variants/pixels.glsl"
 
 #define STRIP_CHANNELS SOURCE_CHANNELS
-#define STRIP_TARGET ENDED_TARGET
 #define ENDED_BINDING 2
 #include "lib/ended.glsl"
 #include "variants/strip.glsl"

@@ -1,7 +1,7 @@
 // A symmetric kernel along columns and rows, in strips: an invocation writes some rows from left to right.
 // It adds up the columns of a run for all rows, adds these sums to the pixels near them, which it keeps in
 // registers, and stores the pixels of two runs at once. The including shader defines STRIP_CHANNELS, the
-// channels of the source in memory, STRIP_TARGET, the binding of the target, and the functions below.
+// channels of the source in memory, and the functions below.
 
 // A run of a row: a word, or three words with the pixels of three channels.
 #if STRIP_CHANNELS == 3
@@ -20,7 +20,6 @@ const int AHEAD = CHANNEL_BYTES == 4 ? 1 : 2;
 
 layout(local_size_x = ROW_INVOCATIONS) in;
 READ_IMAGE(1, source);
-WRITE_IMAGE(STRIP_TARGET);
 #define STORE_COUNT STEP
 #include "variants/store.glsl"
 

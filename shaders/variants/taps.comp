@@ -2,12 +2,10 @@
 // window of the source (variants/kept_rows.glsl). Where the sides of the images are in a simple ratio (EXACT), columns
 // share texels and taps. Without this `kino` takes 105 ms in place of 65, as fragment shaders 172 (processor time of
 // 1920 x 1080 in float16, lavapipe of Mesa 22.3.6, 2026-11-27).
-#include "lib/block.glsl"
 #include "lib/sampling.glsl"
 #include "lib/threshold.glsl"
 
 UNIFORM_BLOCK(PREFILTER_BLOCK);
-#include "lib/storage.glsl"
 #include "lib/prefilters.glsl"
 #include "variants/pixels.glsl"
 
@@ -104,7 +102,7 @@ vec4 tap_at(int column, float parts[TAPS], ivec2 numbers)
     return blend(rows[row][at], rows[row + 1][at], parts[numbers.y]);
 }
 
-vec4 prefiltered(int column, float parts[TAPS], vec4 shares)
+vec4 prefiltered(int column, float parts[TAPS], vec2 part)
 {
     vec4 found[5] = vec4[](vec4(0.0), vec4(0.0), vec4(0.0), vec4(0.0), vec4(0.0));
     Taps taps;
@@ -113,13 +111,13 @@ vec4 prefiltered(int column, float parts[TAPS], vec4 shares)
         [[unroll]] for (int group = 0; group < 5; ++group)
             if (group < group_count())
                 found[group] = tap_at(column, parts, numbers_of(group));
-        return made(found, shares);
+        return made(found, part);
     }
     [[unroll]] for (int i = 0; i < 9; ++i)
         taps.outer[i] = tap_at(column, parts, 2 * ivec2(i % 3, i / 3));
     [[unroll]] for (int i = 0; i < 4; ++i)
         taps.inner[i] = tap_at(column, parts, 1 + 2 * ivec2(i % 2, i / 2));
-    return GROUPS == GROUPS_BEVY ? bevy_prefiltered(taps) : combined(taps);
+    return GROUPS == GROUPS_BLENDER ? blender_groups(taps) : made(group_means(taps), part);
 }
 
 void start_columns(ivec2 first)
@@ -140,10 +138,8 @@ void write_row(int first, int y, int texel, float part, int phase)
     float parts[TAPS] = parts_of(part);
     uvec4 pixels[COLUMNS];
 
-    [[unroll]] for (int i = 0; i < COLUMNS; ++i) {
-        vec4 shares = filament_taps(vec2(across[i], part)).shares;
-        pixels[i] = buffer_of(prefiltered(i, parts, shares));
-    }
+    [[unroll]] for (int i = 0; i < COLUMNS; ++i)
+        pixels[i] = buffer_of(prefiltered(i, parts, vec2(across[i], part)));
     store(first, y, pixels);
 }
 

@@ -4,7 +4,7 @@
 layout(set = 0, binding = 1) uniform sampler2D image;
 #define ENDED_BINDING 2
 #include "lib/ended.glsl"
-layout(set = 0, binding = ENDED_TARGET) uniform writeonly image2D target;
+layout(set = 0, binding = TARGET_BINDING) uniform writeonly image2D target;
 #include "variants/tile.glsl"
 
 // The vertical sums, packed in the format of their image. They are stored in planes of words, so
