@@ -50,6 +50,7 @@
     READS(B, intensity) \
     READS(B, exposure) \
     READS(B, reference_white) \
+    READS(B, white) \
     INPUT(B, float, limit) \
     INPUT(B, int, noise_seed)
 
@@ -221,11 +222,6 @@
     INPUT(B, float, gain) \
     INPUT(B, float, share)
 
-// The composite of Godot.
-#define GODOT_FINAL_BLOCK(B, READS, INPUT, VEC4S) \
-    COMPOSITE_ROWS(B, READS, INPUT) \
-    READS(B, white)
-
 // A stage of a Fourier transform along one axis (fft.comp). There are `across` lines of `padded`
 // elements, with `count` butterflies in each line. The elements of a butterfly are `step` apart.
 // Elements from `kept` on are not stored. The first stage pads the line: its first `extent`
@@ -298,8 +294,7 @@
     BLOCK(fft, FFT_BLOCK) \
     BLOCK(fft_kernel, FFT_KERNEL_BLOCK) \
     BLOCK(composite, COMPOSITE_BLOCK) \
-    BLOCK(adjoint_filter, ADJOINT_FILTER_BLOCK) \
-    BLOCK(godot_final, GODOT_FINAL_BLOCK)
+    BLOCK(adjoint_filter, ADJOINT_FILTER_BLOCK)
 
 // Settings that no shader reads, because they shape the graph. Integers: COUNT(name, default, min,
 // max); a flag is one of 0 and 1.
@@ -390,6 +385,9 @@
 #define MAX_GHOSTS   16
 #define MAX_TAPS     8
 #define MAX_HALVINGS 4
+
+// The binding of the target of a compute shader: after those that images and resources may have.
+#define TARGET_BINDING 33
 
 // Invocations of a workgroup: in a row, for shaders in which each invocation writes several pixels;
 // on each side, for shaders in which it writes one.
@@ -662,7 +660,7 @@
     NAME(GROUPS_THREE, 8, three) \
     NAME(GROUPS_BEVY, 9, bevy) \
     NAME(GROUPS_KINO, 11, kino) \
-    NAME(GROUPS_GODOT_BLUR, 13, godot_blur) \
+    NAME(GROUPS_GODOT, 13, godot) \
     NAME(GROUPS_HDRP_BLUR, 14, hdrp_blur) \
     NAME(GROUPS_HIGHLIGHTS, 12, highlights) \
     NAME(GROUPS_BABYLON, 15, babylon) \

@@ -1,11 +1,8 @@
-// Ends a pass that writes the cotangents of an image. The including shader defines TARGET_BINDING; its
-// last two images are what other readers of the image have accumulated, and the image itself.
-#include "lib/where_finite.glsl"
+// Ends a pass that writes the cotangents of an image. The including shader defines ADDED_BINDING:
+// there is what other readers of the image have accumulated, and after it the image itself.
 
-#define ADDED_BINDING (TARGET_BINDING - 2)
-#define IMAGE_BINDING (TARGET_BINDING - 1)
 layout(set = 0, binding = ADDED_BINDING) uniform sampler2D added;
-layout(set = 0, binding = IMAGE_BINDING) uniform sampler2D differentiated;
+layout(set = 0, binding = ADDED_BINDING + 1) uniform sampler2D differentiated;
 
 // The cotangents of this pixel. The image of a source has none at NaN and infinity.
 vec4 gathered(vec4 cotangent)

@@ -3,7 +3,6 @@
 // which those of the bloom follow by a factor where the scene is finite. For linear texels, include pixels.glsl before
 // this file.
 UNIFORM_BLOCK(ADJOINT_FILTER_BLOCK);
-#include "lib/where_finite.glsl"
 
 #ifdef LINEAR_TEXELS
 #define FETCH(name, number, texel) load_floats(name, read_shapes[number - 1], (texel).x, (texel).y)

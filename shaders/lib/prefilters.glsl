@@ -3,7 +3,6 @@
 #include "lib/groups.glsl"
 #include "lib/above.glsl"
 #include "lib/lab.glsl"
-#include "lib/highlights.glsl"
 
 // The shares of Filament's four taps, and the distances of the first and the last of them. Along an
 // axis the texels at -1 .. 2 have the weights (1 - f, 2 - f, 1 + f, f) / 4. Two bilinear taps, each
@@ -38,6 +37,36 @@ float[5] shares_of(vec2 part)
 const vec2 HDRP_OFFSETS[5] =
     vec2[](vec2(0.0, 0.0), vec2(HDRP_FAR, -HDRP_NEAR), vec2(-HDRP_FAR, HDRP_NEAR),
            vec2(HDRP_NEAR, HDRP_FAR), vec2(-HDRP_NEAR, -HDRP_FAR));
+
+// The highlights of Blender's Glare node (formulas of the compositor of Blender 4.5).
+
+// The value that a smooth transition of this width subtracts (minimum) or adds (maximum) at a
+// distance from it (Quilez, "Smooth minimum").
+float rounding(float distance_to_end, float width)
+{
+    float h = width > 0.0 ? max(1.0 - abs(distance_to_end) / width, 0.0) : 0.0;
+    return 0.25 * h * h * width;
+}
+
+// The brightness above the threshold.
+float highlight(float value)
+{
+    float low = params.threshold, range = params.maximum, high = low + range;
+    // The widths are limited, so that the transitions stay between 0 and the other end.
+    float at_low = min(params.smoothness, min(low, range));
+    float at_high = min(params.smoothness, min(high, range));
+    float above = value - low;
+    float kept = max(above, 0.0) + rounding(above, at_low);
+    return min(kept, range) - rounding(kept - range, at_high);
+}
+
+vec4 highlights(vec4 value)
+{
+    if (THRESHOLDED == 0)
+        return value;
+    float brightest = max(value.r, max(value.g, value.b));
+    return brightest > 0.0 ? value * (highlight(brightest) / brightest) : vec4(0.0);
+}
 
 // darktable's: a step of the lightness (darktable 4.2.1, src/iop/bloom.c).
 vec4 darktable_prefiltered(vec4 value)

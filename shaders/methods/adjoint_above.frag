@@ -7,7 +7,7 @@ UNIFORM_BLOCK(STREAKS_BLOCK);
 layout(set = 0, binding = 1) uniform sampler2D source;
 layout(set = 0, binding = 2) uniform sampler2D cotangents;
 
-#define TARGET_BINDING 5
+#define ADDED_BINDING 3
 #include "lib/fullscreen.glsl"
 #include "lib/adjoint.glsl"
 

@@ -10,7 +10,7 @@ layout(set = 0, binding = 2) uniform sampler2D bloom;
 layout(set = 0, binding = 3) uniform sampler2D mask;
 layout(set = 0, binding = 4) uniform sampler2D cotangents;
 
-#define TARGET_BINDING 7
+#define ADDED_BINDING 5
 #include "lib/fullscreen.glsl"
 #include "lib/adjoint.glsl"
 #include "lib/adjoint_composite.glsl"

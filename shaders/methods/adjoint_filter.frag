@@ -1,6 +1,5 @@
 // The transpose of a filter.
 
-#define TARGET_BINDING 6
 #include "lib/fullscreen.glsl"
 #include "lib/adjoint_filter.glsl"
 

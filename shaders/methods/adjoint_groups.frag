@@ -9,7 +9,7 @@ UNIFORM_BLOCK(PREFILTER_BLOCK);
 layout(set = 0, binding = 1) uniform sampler2D source;
 layout(set = 0, binding = 3) uniform sampler2D cotangents;
 
-#define TARGET_BINDING 6
+#define ADDED_BINDING 4
 #define STACKED RADIX_1
 #define STACKED_HEIGHT params.target_height
 #include "lib/fullscreen.glsl"
@@ -104,9 +104,9 @@ void start()
         cotangent.a = 0.0;
 }
 
-vec4 shade(int number)
+vec4 shade()
 {
-    own_group = LEVELS + number;
+    own_group = LEVELS + picture;
     if (BY == BY_MASK)
         return gathered(vec4(dot(prefiltered(found, place), cotangent), 0.0, 0.0, 0.0));
     return gathered(back(mask_value() * cotangent));

@@ -2,7 +2,6 @@
 
 layout(set = 0, binding = 1) uniform sampler2D source;
 
-#define TARGET_BINDING 2
 #include "lib/fullscreen.glsl"
 
 vec4 shade()

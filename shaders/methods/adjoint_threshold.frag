@@ -10,7 +10,7 @@ UNIFORM_BLOCK(THRESHOLD_BLOCK);
 layout(set = 0, binding = 1) uniform sampler2D image;
 layout(set = 0, binding = 3) uniform sampler2D cotangents;
 
-#define TARGET_BINDING 6
+#define ADDED_BINDING 4
 #include "lib/fullscreen.glsl"
 #include "lib/adjoint.glsl"
 #include "lib/mask.glsl"

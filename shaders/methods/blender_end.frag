@@ -6,7 +6,6 @@ UNIFORM_BLOCK(BLENDER_END_BLOCK);
 
 layout(set = 0, binding = 1) uniform sampler2D source;
 
-#define TARGET_BINDING 2
 #include "lib/fullscreen.glsl"
 
 // The saturation (max - min) / max is multiplied, and is then 0 to 1.

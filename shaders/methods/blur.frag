@@ -6,7 +6,6 @@ UNIFORM_BLOCK(BLUR_BLOCK);
 
 layout(set = 0, binding = 1) uniform sampler2D source;
 
-#define TARGET_BINDING 2
 #include "lib/fullscreen.glsl"
 
 float weight(int tap)

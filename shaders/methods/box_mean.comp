@@ -5,7 +5,7 @@ UNIFORM_BLOCK(BOX_BLOCK);
 
 layout(local_size_x = ROW_INVOCATIONS) in;
 layout(set = 0, binding = 1) uniform sampler2D source;
-layout(set = 0, binding = 2) uniform writeonly image2D target;
+layout(set = 0, binding = TARGET_BINDING) uniform writeonly image2D target;
 
 vec4 sum = vec4(0.0), rest = vec4(0.0);
 

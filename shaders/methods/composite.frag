@@ -7,7 +7,6 @@ layout(set = 0, binding = 1) uniform sampler2D scene;
 layout(set = 0, binding = 2) uniform sampler2D bloom;
 layout(set = 0, binding = 3) uniform sampler2D mask;
 
-#define TARGET_BINDING 4
 #include "lib/fullscreen.glsl"
 
 vec4 shade()

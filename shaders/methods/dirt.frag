@@ -6,7 +6,6 @@ UNIFORM_BLOCK(DIRT_BLOCK);
 layout(set = 0, binding = 1) uniform sampler2D light;
 layout(set = 0, binding = 2) uniform sampler2D dirt;
 
-#define TARGET_BINDING 3
 #include "lib/fullscreen.glsl"
 
 vec4 shade()

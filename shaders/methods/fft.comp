@@ -24,13 +24,13 @@ layout(local_size_x_id = 34, local_size_y_id = 35) in;
 READ_IMAGE(1, source);
 READ_IMAGE(2, factor);
 #ifndef LINEAR_TEXELS
-layout(set = 0, binding = 3) uniform writeonly image2D target;
+layout(set = 0, binding = TARGET_BINDING) uniform writeonly image2D target;
 #elif TARGET_BYTES == 4
-layout(set = 0, binding = 3, std430) writeonly buffer Target { uvec4 texels[]; } target;
+layout(set = 0, binding = TARGET_BINDING, std430) writeonly buffer Target { uvec4 texels[]; } target;
 #elif TARGET_BYTES == 2
-layout(set = 0, binding = 3, std430) writeonly buffer Target { uvec2 texels[]; } target;
+layout(set = 0, binding = TARGET_BINDING, std430) writeonly buffer Target { uvec2 texels[]; } target;
 #else
-layout(set = 0, binding = 3, std430) writeonly buffer Target { uint texels[]; } target;
+layout(set = 0, binding = TARGET_BINDING, std430) writeonly buffer Target { uint texels[]; } target;
 #endif
 
 const int RADIX = RADIX_A * RADIX_B;

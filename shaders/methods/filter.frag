@@ -6,7 +6,6 @@ UNIFORM_BLOCK(FILTER_BLOCK);
 layout(set = 0, binding = 1) uniform sampler2D source;
 layout(set = 0, binding = 2) uniform sampler2D own;
 
-#define TARGET_BINDING 3
 #include "lib/fullscreen.glsl"
 #include "lib/filter.glsl"
 #include "lib/filter_image.glsl"

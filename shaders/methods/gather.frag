@@ -11,7 +11,6 @@ layout(set = 0, binding = 5) uniform sampler2D level_4;
 layout(set = 0, binding = 6) uniform sampler2D level_5;
 layout(set = 0, binding = 7) uniform sampler2D level_6;
 
-#define TARGET_BINDING 8
 #include "lib/fullscreen.glsl"
 #include "lib/gathered.glsl"
 #include "lib/filter_image.glsl"

@@ -8,7 +8,6 @@ UNIFORM_BLOCK(FLARE_BLOCK);
 
 layout(set = 0, binding = 2) uniform sampler2D before;
 
-#define TARGET_BINDING 3
 #include "lib/fullscreen.glsl"
 
 vec4 shade()

@@ -6,7 +6,6 @@ UNIFORM_BLOCK(FLARE_BLOCK);
 #include "lib/glare.glsl"
 #include "lib/flare.glsl"
 
-#define TARGET_BINDING 2
 #include "lib/fullscreen.glsl"
 
 vec4 shade()

@@ -13,7 +13,6 @@ UNIFORM_BLOCK(PREFILTER_BLOCK);
 
 layout(set = 0, binding = 1) uniform sampler2D source;
 
-#define TARGET_BINDING 3
 #include "lib/fullscreen.glsl"
 #include "lib/mask.glsl"
 #include "lib/godot.glsl"

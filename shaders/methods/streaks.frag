@@ -8,7 +8,6 @@ UNIFORM_BLOCK(STREAKS_BLOCK);
 layout(set = 0, binding = 1) uniform sampler2D source;
 layout(set = 0, binding = 2) uniform sampler2D before;
 
-#define TARGET_BINDING 3
 #include "lib/fullscreen.glsl"
 
 vec4 fetch(ivec2 texel)

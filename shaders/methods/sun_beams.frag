@@ -6,7 +6,6 @@ UNIFORM_BLOCK(SUN_BEAMS_BLOCK);
 
 layout(set = 0, binding = 1) uniform sampler2D source;
 
-#define TARGET_BINDING 2
 #include "lib/fullscreen.glsl"
 #include "lib/fetch_inside.glsl"
 

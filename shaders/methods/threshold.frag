@@ -9,7 +9,6 @@ UNIFORM_BLOCK(THRESHOLD_BLOCK);
 
 layout(set = 0, binding = 1) uniform sampler2D image;
 
-#define TARGET_BINDING 3
 #include "lib/fullscreen.glsl"
 #include "lib/mask.glsl"
 

@@ -2,7 +2,6 @@
 // The mesh that is lit later, in view space, with the emission of its material.
 #include "scene/gbuffer.glsl"
 
-UNIFORM_BLOCK(MESH_BLOCK);
 #include "scene/surface.glsl"
 
 void main()

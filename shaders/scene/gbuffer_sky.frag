@@ -1,8 +1,6 @@
 // The sky in the background. It is unlit and does not glow.
 #include "scene/gbuffer.glsl"
 
-UNIFORM_BLOCK(MESH_BLOCK);
-
 layout(set = 0, binding = 1) uniform samplerCube sky;
 
 layout(location = 0) in vec3 direction;

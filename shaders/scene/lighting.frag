@@ -6,7 +6,6 @@ layout(set = 0, binding = 2) uniform sampler2D normal;
 layout(set = 0, binding = 3) uniform sampler2D position;
 layout(set = 0, binding = 4) uniform sampler2D brightness;
 
-#define TARGET_BINDING 5
 #include "lib/fullscreen.glsl"
 
 vec4 shade()

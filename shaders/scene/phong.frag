@@ -3,8 +3,6 @@
 #include "scene/phong.glsl"
 #include "scene/surface.glsl"
 
-UNIFORM_BLOCK(MESH_BLOCK);
-
 layout(location = 0) out vec4 colour;
 
 void main()

@@ -1,7 +1,5 @@
 // The sky, sampled in the direction of a point on the cube.
 
-UNIFORM_BLOCK(MESH_BLOCK);
-
 layout(set = 0, binding = 1) uniform samplerCube sky;
 
 layout(location = 0) in vec3 direction;

@@ -3,7 +3,7 @@
 #include "lib/window.glsl"
 #include "lib/adjoint_filter.glsl"
 
-layout(set = 0, binding = 6) uniform writeonly image2D target;
+layout(set = 0, binding = TARGET_BINDING) uniform writeonly image2D target;
 #define IS_TRANSPOSED true
 #include "variants/filter_tile.glsl"
 

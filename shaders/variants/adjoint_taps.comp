@@ -11,7 +11,6 @@ const int COLUMNS = ADJOINT_SIDE, ROWS = ALONG_Y ? ADJOINT_SIDE : 1;
 const int SPAN_X = ALONG_X ? RADIX_1 : COLUMNS, SPAN_Y = ALONG_Y ? RADIX_2 : 1;
 
 layout(local_size_x = ROW_INVOCATIONS) in;
-WRITE_IMAGE(6);
 #include "variants/store.glsl"
 
 // The weights of columns in all kernels.

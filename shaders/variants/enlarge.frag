@@ -6,7 +6,6 @@ UNIFORM_BLOCK(THRESHOLD_BLOCK);
 
 layout(set = 0, binding = 1) uniform sampler2D lines;
 
-#define TARGET_BINDING 2
 #include "lib/fullscreen.glsl"
 
 vec4 shade()

@@ -17,7 +17,7 @@ UNIFORM_BLOCK(FFT_BLOCK);
 layout(local_size_x_id = 34, local_size_y_id = 35) in;
 layout(set = 0, binding = 1, SOURCE_FORMAT) uniform readonly image2D source;
 layout(set = 0, binding = 2, SOURCE_FORMAT) uniform readonly image2D factor;
-layout(set = 0, binding = 3) uniform writeonly image2D target;
+layout(set = 0, binding = TARGET_BINDING) uniform writeonly image2D target;
 
 const int LENGTH = RADIX_1 * RADIX_2 * RADIX_3 * RADIX_4;
 // One float of padding after each 32, so that invocations use different banks of the shared memory.

@@ -11,11 +11,9 @@ UNIFORM_BLOCK(PREFILTER_BLOCK);
 
 const int COLUMNS = NINE_OUTPUTS, ROWS = GATHER_ROWS, TAPS = 2 * HDRP_RADIUS + 1;
 const int SAMPLES = COLUMNS + 2 * HDRP_RADIUS;
-const bool IS_GODOT = GROUPS == GROUPS_GODOT_BLUR;
+const bool IS_GODOT = GROUPS == GROUPS_GODOT;
 
-layout(local_size_x = ROW_INVOCATIONS) in;
 READ_IMAGE(1, source);
-WRITE_IMAGE(2);
 
 #define LOAD load_same
 #define LOAD_FROM (-HDRP_RADIUS)

@@ -323,7 +323,8 @@ def test_a_change_of_a_file(
     assert written.startswith(f"### `planted` against `{before}`")
 
 
-def test_changes_of_presets_and_commands() -> None:
+def test_changes_of_presets_and_commands(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Program, "__call__", lambda _, image: image)
     words = ["--preset", "dual_kawase", "--against", COPYING, *SMALL]
     done = run("check", *words, "--require", "finite")
     assert (done.exit_code, "broken: " in done.stdout) == (0, True), done.output
