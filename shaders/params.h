@@ -424,10 +424,10 @@
 #define TILE_RUNS               4
 #define TILE_RADIUS             16
 // Tiles of filters: their size, and the rows of a column that an invocation adds up.
-#define FILTER_TILE_COLUMNS     32
-#define FILTER_TILE_ROWS        16
-#define FILTER_TILE_RUN         4
-#define FUSED_VEC4S             5
+#define FILTER_TILE_COLUMNS 32
+#define FILTER_TILE_ROWS    16
+#define FILTER_TILE_RUN     4
+#define FUSED_VEC4S         5
 
 // Fourier transforms. FFT_INVOCATIONS is the size of a workgroup. In a transform of columns,
 // FFT_ROW_COLUMNS of them are in one row. FFT_MAX_RADIX is the largest number of elements of a
