@@ -1,5 +1,5 @@
 // What all shaders begin with (setup.py): the rows of params.h as a uniform block, specialization constants and
-// named constants, and the functions for values that are read and stored.
+// named constants, and the functions for values that are read and stored, and for thresholds.
 #include "params.h"
 #include "lib/layers.glsl"
 
@@ -25,3 +25,4 @@ SPECIALIZATION_CONSTANTS(SPECIALIZATION_CONSTANT)
 
 #include "lib/finite.glsl"
 #include "lib/storage.glsl"
+#include "lib/threshold.glsl"

@@ -27,7 +27,9 @@ vec4 colours_from_centre(vec2 offset)
 // The same above the threshold and up to the maximum.
 vec4 seen_from_centre(vec2 offset)
 {
-    vec4 above = above_threshold(colours_from_centre(offset));
+    vec4 above = colours_from_centre(offset);
+    if (params.threshold > 0.0)
+        above = part_above(above, params.threshold);
     return vec4(min(above.rgb, vec3(params.maximum)), above.a);
 }
 

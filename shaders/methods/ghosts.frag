@@ -3,7 +3,7 @@
 #include "lib/sampling.glsl"
 
 UNIFORM_BLOCK(FLARE_BLOCK);
-#include "lib/glare.glsl"
+#include "lib/fetch_inside.glsl"
 #include "lib/flare.glsl"
 
 layout(set = 0, binding = 2) uniform sampler2D before;
