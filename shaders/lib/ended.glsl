@@ -23,7 +23,7 @@ vec4 ended(vec4 scene, vec4 bloom, ivec2 pixel)
 #ifdef MIXED
     return back_composite(scene, bloom, 1.0, cotangent_at(pixel), BY_MIXED);
 #else
-    return finish(scene, bloom, pixel);
+    return finish(scene, bloom, 1.0, pixel);
 #endif
 }
 

@@ -22,7 +22,7 @@ int top;
 void start_weights(ivec2 first, ivec2 size)
 {
     float exposed = exp2(params.exposure), mixed = COMPOSITE == COMPOSITE_MIX ? params.intensity : 0.0;
-    float gain = exposed * (BLOOM == BLOOM_LIT ? 1.0 : params.intensity);
+    float gain = exposed * (LIT != 0 ? 1.0 : params.intensity);
     float across[STRIP_RADIUS + 1], across_beyond[STRIP_RADIUS + 1];
 
     threshold = params.threshold;

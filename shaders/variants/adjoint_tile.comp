@@ -80,7 +80,7 @@ void end_row(int row, int column, bool starts, bool ends, inout vec3 sum)
 vec4 shade(ivec2 pixel, vec3 sum)
 {
     float exposed = exp2(params.exposure);
-    float gain = exposed * (BLOOM == BLOOM_LIT ? 1.0 : params.intensity);
+    float gain = exposed * (LIT != 0 ? 1.0 : params.intensity);
     float share = exposed * (COMPOSITE == COMPOSITE_MIX ? 1.0 - params.intensity : 1.0);
     vec4 scene = texelFetch(image, pixel, 0);
     vec4 found = back_through_threshold(finite_or_zero(scene), vec4(gain * sum, 0.0), THRESHOLD_MODE,

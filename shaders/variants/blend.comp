@@ -30,7 +30,7 @@ void write_row(int x, int y)
     load_scene(x, y, raw);
     load_bloom(x, y, light);
     [[unroll]] for (int i = 0; i < COLUMNS; ++i) {
-        vec4 sum = finish(value_of(raw[i]), value_of(light[i]), ivec2(x + i, y));
+        vec4 sum = finish(value_of(raw[i]), value_of(light[i]), 1.0, ivec2(x + i, y));
         raw[i] = finished(raw[i], sum);
     }
     store(x, y, raw);
