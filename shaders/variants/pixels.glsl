@@ -6,7 +6,7 @@
 //   stands before every loop but the outermost one. An inner loop needs constant ends: one whose ends depend
 //   on an outer counter is not unrolled by Mesa 22.3, and makes the pass five times slower.
 // - Variables that live over an iteration are loaded, masked and stored once for each vector. So a blur goes
-//   along rows (strip.glsl): it keeps 8 sums for each row there, and down columns 8 for each pixel.
+//   along rows (strip.comp): it keeps 8 sums for each row there, and down columns 8 for each pixel.
 // - A load of a word is a call of 60 to 80 instructions for 8 invocations, before which registers move to
 //   memory: the loads of an iteration come first, and a word that is needed again is kept.
 // - A store is a loop over the invocations, in which each integer is one move. So runs are of 64-bit integers,

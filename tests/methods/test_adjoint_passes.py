@@ -183,8 +183,8 @@ def test_the_reference_derives_what_has_no_transpose(renderer: Renderer, setting
 
 
 SINGLE: Any = {"format": "rgba32float"}
-TILES = ("tile_mixed_comp", "adjoint_tile_comp")
-STRIPS = ("strip_mixed_linear_rgba32float", "adjoint_strip_linear_rgba32float")
+TILES = ("tile_mixed_comp", "tile_transposed_comp")
+STRIPS = ("strip_mixed_linear_rgba32float", "strip_transposed_linear_rgba32float")
 CURVED = "filter_final_mixed_linear_rgba32float"
 LEVELS = "adjoint_filter_tile_comp"
 TAPS = "adjoint_taps_linear_rgba32float"
