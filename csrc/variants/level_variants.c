@@ -64,6 +64,7 @@ bool vkb_add_windowed(struct vkb_variant_choice *choice, const struct vkb_pass_r
                             ? EXACT_SAME
                         : is_half(&choice->plain, pass) ? EXACT_HALF
                                                         : 0;
+    row.constants.exact_rows = row.constants.exact;
     row.constants.enlarged = source->height < target->height;
     row.constants.window = has_thirteen_taps(groups) ? 6 : 4;
     // A radius is that of a mean of other texels. HDRP's taps are in other texels at each position.

@@ -6,7 +6,6 @@ UNIFORM_BLOCK(COMPOSITE_BLOCK);
 
 const int COLUMNS = TEXEL_COLUMNS(CHANNEL_BYTES), ROWS = TEXEL_ROWS;
 
-layout(local_size_x = ROW_INVOCATIONS) in;
 READ_IMAGE(1, scene);
 READ_IMAGE(2, bloom);
 
@@ -16,21 +15,16 @@ READ_IMAGE(2, bloom);
 #define LOAD_CHANNELS SOURCE_CHANNELS
 #include "variants/load.glsl"
 
-#define LOAD load_bloom
-#define LOAD_IMAGE bloom
-#define LOAD_NUMBER 2
-#include "variants/load.glsl"
-
 #include "variants/store.glsl"
 
 void write_row(int x, int y)
 {
-    uvec4 raw[COLUMNS], light[COLUMNS];
+    uvec4 raw[COLUMNS];
 
     load_scene(x, y, raw);
-    load_bloom(x, y, light);
     [[unroll]] for (int i = 0; i < COLUMNS; ++i) {
-        vec4 sum = finish(value_of(raw[i]), value_of(light[i]), 1.0, ivec2(x + i, y));
+        vec4 light = value_of(raw_in_run(bloom, read_shapes[1], x, i, y));
+        vec4 sum = finish(value_of(raw[i]), light, 1.0, ivec2(x + i, y));
         raw[i] = finished(raw[i], sum);
     }
     store(x, y, raw);

@@ -10,7 +10,6 @@ UNIFORM_BLOCK(GATHER_BLOCK);
 
 const int COLUMNS = TEXEL_COLUMNS(CHANNEL_BYTES), ROWS = GATHER_ROWS;
 
-layout(local_size_x = ROW_INVOCATIONS) in;
 READ_IMAGE(1, level_0);
 READ_IMAGE(2, level_1);
 READ_IMAGE(3, level_2);
@@ -18,11 +17,6 @@ READ_IMAGE(4, level_3);
 READ_IMAGE(5, level_4);
 READ_IMAGE(6, level_5);
 READ_IMAGE(7, level_6);
-
-#define LOAD load_own
-#define LOAD_IMAGE level_0
-#define LOAD_NUMBER 1
-#include "variants/load.glsl"
 
 #include "variants/store.glsl"
 
@@ -37,11 +31,8 @@ vec4 sums[COLUMNS];
 
 void add_own(int first, int y)
 {
-    uvec4 raw[COLUMNS];
-
-    load_own(first, y, raw);
     [[unroll]] for (int i = 0; i < COLUMNS; ++i)
-        sums[i] += params.shares[0][0] * value_of(raw[i]);
+        sums[i] += params.shares[0][0] * value_of(raw_in_run(level_0, read_shapes[0], first, i, y));
 }
 
 void add(usamplerBuffer image, int level, int first, int y)

@@ -12,7 +12,6 @@ const int COLUMNS = NINE_OUTPUTS, ROWS = GATHER_ROWS, TAPS = 2 * NINE_RADIUS + 1
 const int SAMPLES = COLUMNS + 2 * NINE_RADIUS;
 const bool IS_GODOT = GROUPS == GROUPS_GODOT;
 
-layout(local_size_x = ROW_INVOCATIONS) in;
 READ_IMAGE(1, source);
 
 #define LOAD load_same

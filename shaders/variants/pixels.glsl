@@ -114,17 +114,18 @@ uvec4 raw_of(vec4 value)
 #endif
 }
 
+#if CHANNEL_BYTES == 1
+const uvec4 ALPHA_BITS = uvec4(0xff000000u, 0, 0, 0), OPAQUE = ALPHA_BITS;
+#elif CHANNEL_BYTES == 2
+const uvec4 ALPHA_BITS = uvec4(0, 0xffff0000u, 0, 0), OPAQUE = uvec4(0, 0x3c000000u, 0, 0);
+#else
+const uvec4 ALPHA_BITS = uvec4(0, 0, 0, 0xffffffffu), OPAQUE = uvec4(0, 0, 0, 0x3f800000u);
+#endif
+
 // The value, with the alpha bits of `own`.
 uvec4 with_alpha_of(uvec4 own, vec4 value)
 {
-#if CHANNEL_BYTES == 1
-    return uvec4((raw_of(value).x & 0xffffffu) | (own.x & 0xff000000u), 0, 0, 0);
-#elif CHANNEL_BYTES == 2
-    uvec3 colour = nearest_half_bits(value.rgb);
-    return uvec4(colour.r | colour.g << 16, colour.b | (own.y & 0xffff0000u), 0, 0);
-#else
-    return uvec4(floatBitsToUint(value.rgb), own.a);
-#endif
+    return (raw_of(value) & ~ALPHA_BITS) | (own & ALPHA_BITS);
 }
 
 // All bits of the half floats that are NaN or infinity.
@@ -149,14 +150,7 @@ uvec4 finite_bits(uvec4 raw)
 // A pixel of a bloom buffer. Its alpha is 1, unless alpha is blurred like a colour.
 uvec4 buffer_of(vec4 value)
 {
-#if CHANNEL_BYTES == 1
-    const uvec4 one = uvec4(0xff000000u, 0, 0, 0);
-#elif CHANNEL_BYTES == 2
-    const uvec4 one = uvec4(0, 0x3c000000u, 0, 0);
-#else
-    const uvec4 one = uvec4(0, 0, 0, 0x3f800000u);
-#endif
-    return ALPHA == ALPHA_BLUR ? raw_of(stored(value)) : with_alpha_of(one, stored(value));
+    return ALPHA == ALPHA_BLUR ? raw_of(stored(value)) : with_alpha_of(OPAQUE, stored(value));
 }
 
 // A pixel of the finished picture: by its own alpha, NaN and infinity, and what the composite made of
@@ -186,6 +180,13 @@ uvec4 pixel_of(uvec4 word, int at)
 #else
     return word;
 #endif
+}
+
+// The pixel with this number of a run that begins at a multiple of 16 bytes. Pixels of one word are loaded once.
+uvec4 raw_in_run(usamplerBuffer image, ivec4 shape, int first, int number, int row)
+{
+    int word = row * shape.z + first * CHANNEL_BYTES / 4 + number * CHANNEL_BYTES / 4;
+    return pixel_of(texelFetch(image, word), number);
 }
 
 // A pixel anywhere in an image of this shape (see Shapes).

@@ -6,7 +6,6 @@
 //
 // and LOAD_FROM and LOAD_CHANNELS as for variants/load.glsl.
 
-layout(local_size_x = ROW_INVOCATIONS) in;
 READ_IMAGE(1, source);
 
 #define LOAD load_run
