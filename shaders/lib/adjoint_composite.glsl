@@ -86,7 +86,7 @@ vec4 by_scene(Pixel p)
 
 vec4 by_bloom(Pixel p)
 {
-    float gain = BLOOM == BLOOM_LIT ? 1.0 : params.intensity;
+    float gain = LIT != 0 ? 1.0 : params.intensity;
     return gain * (vec4(by_light(p), 0.0) + by_alpha_light(p));
 }
 

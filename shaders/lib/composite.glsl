@@ -8,14 +8,14 @@
 // The light of the bloom, or with glare of both, which the image then has the sum of.
 vec3 light_of(vec3 b)
 {
-    return BLOOM == BLOOM_LIT ? b : params.intensity * b;
+    return LIT != 0 ? b : params.intensity * b;
 }
 
 // `share` is the part of the scene from which the bloom was made.
 vec3 composite(vec3 s, vec3 b, float share)
 {
     if (COMPOSITE == COMPOSITE_MIX)
-        return BLOOM == BLOOM_LIT ? s + (b - params.intensity * share * s)
+        return LIT != 0 ? s + (b - params.intensity * share * s)
                                   : s + (b - share * s) * params.intensity;
     if (COMPOSITE == COMPOSITE_SCREEN) {
         // 1 - (1 - s)(1 - b), expanded: differences from 1 lose the precision of dark values. Godot
@@ -92,9 +92,4 @@ vec4 finish(vec4 scene, vec4 bloom, float share, ivec2 pixel)
     if (GROUPS != GROUPS_GODOT)
         result *= exposure;
     return encoded(scene, bloom, apply_tonemap(result, TONEMAP), pixel);
-}
-
-vec4 finish(vec4 scene, vec4 bloom, ivec2 pixel)
-{
-    return finish(scene, bloom, 1.0, pixel);
 }
