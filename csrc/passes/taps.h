@@ -11,14 +11,11 @@
 
 #include "graph/graph.h"
 
-enum {
-    VKB_MAX_TAPS = 2 * MAX_WEIGHTS,
-    VKB_MAX_KERNELS = 4,
-};
+enum { VKB_MAX_TAPS = 2 * MAX_WEIGHTS };
 
 // A sample at a distance from the position of a pixel, in texels, with a weight for each kernel.
 struct vkb_tap {
-    double offset, weights[VKB_MAX_KERNELS];
+    double offset, weights[MAX_KERNELS];
 };
 
 // How `to` pixels sample `from` texels. Pixel i is at the position origin + i step, in texels.

@@ -4,12 +4,15 @@
 // this file.
 UNIFORM_BLOCK(ADJOINT_FILTER_BLOCK);
 
+// A texel of an image at a binding, and the nearest place in the image of cotangents. (Linear texels repeat the rows
+// themselves, and no column is before the first.)
 #ifdef LINEAR_TEXELS
 #define FETCH(name, number, texel) load_floats(name, read_shapes[number - 1], (texel).x, (texel).y)
+#define NEAREST(texel) ivec2(min((texel).x, read_shapes[0].x - 1), (texel).y)
 #else
 #define FETCH(name, number, texel) texelFetch(name, texel, 0)
 #define READ_IMAGE(number, name) layout(set = 0, binding = number) uniform sampler2D name
-#define READ_SIZE(name, number) textureSize(name, 0)
+#define NEAREST(texel) clamp(texel, ivec2(0), textureSize(cotangents, 0) - 1)
 #endif
 
 // Copies of parameters (see pixels.glsl).
@@ -30,7 +33,7 @@ vec4 entry(int place)
 // The cotangents of this pixel, or of the nearest one in the image.
 vec4 texel_at(ivec2 texel)
 {
-    ivec2 within = clamp(texel, ivec2(0), READ_SIZE(cotangents, 1) - 1);
+    ivec2 within = NEAREST(texel);
     vec4 value = FETCH(cotangents, 1, within);
     return BY == BY_BLOOM ? vec4(where_finite(value, FETCH(scene, 3, within)).rgb, 0.0) : value;
 }

@@ -12,7 +12,6 @@ import pytest
 from tests.core.builds import build_layer, compiler
 from tests.core.test_lesser_devices import SOURCE as LESSER
 from tests.core.test_lesser_devices import run
-from tests.device import stand_in
 from vkbloom import AdapterInfo
 
 SOURCE = Path(__file__).with_name("watched_device.c")
@@ -94,16 +93,6 @@ def test_no_image_has_a_usage_that_no_pass_needs(
     }
     assert len(lines) > 60
     assert {row for row in needless if not re.fullmatch(LEFT[variant], row[0])} == set()
-
-
-@pytest.mark.parametrize("lesser", ["", "cpu"])
-def test_buffers_are_released_to_cuda_before_they_are_acquired(
-    layer: Path, tmp_path: Path, software: AdapterInfo, lesser: str
-) -> None:
-    """An image that is given again, and a framebuffer that is given as an image."""
-    program = ("-m", "tests.device.device_work", "validated", "layouts", "places", "gradients")
-    environment = stand_in.variables(stand_in.build(tmp_path), software)
-    assert watched(layer, software, lesser, program, environment) == "{}\n"
 
 
 OLD_LINUX = """

@@ -1,6 +1,6 @@
 // A Vulkan layer for tests: it writes how images may be used and are,
 // and which buffers are of the host's memory, and objects to acquires of
-// buffers from CUDA that nothing has released. test_watched_device.py uses it.
+// buffers from CUDA that nothing has released. test_watched_device.py and test_cuda_path.py use it.
 #define _GNU_SOURCE
 #include "../core/layer.h"
 
