@@ -30,12 +30,6 @@ void keep_window(int number, ivec2 first)
         weights[i][number] = window.weights[i];
 }
 
-// How far the window of a pixel is from that of an even one before it, if sides are in this simple ratio.
-int offset_of(int exact, int pixel)
-{
-    return exact == EXACT_HALF ? 2 * pixel : exact == EXACT_SAME ? pixel : (pixel + 1) / 2;
-}
-
 // How far the window of a row is from that of the row `top` of the tile.
 int row_offset(int top, int row)
 {
