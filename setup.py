@@ -39,6 +39,7 @@ STAGES = (".vert", ".frag", ".comp")
 PREAMBLE = """#version 450
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
+#include "lib/block.glsl"
 """
 # Python without the GIL has no stable ABI: a core for that version alone.
 LIMITED = not sysconfig.get_config_var("Py_GIL_DISABLED")
@@ -91,14 +92,15 @@ def modules(shader: Path) -> list[Module]:
     With `#pragma compile WORD` it is also compiled with this word defined, under its name with the
     word. Adjoints and Fourier transforms run for one image. A shader that includes ended.glsl, with
     FINAL if it has that word, is also compiled for the adjoint of what it ends with, in single
-    floats.
+    floats; one that includes fused_bloom.glsl, which does so, for its transpose.
     """
     text = shader.read_text()
     words = re.findall(r"^#pragma compile ([A-Z]+)$", text, re.MULTILINE)
     found: list[Module] = []
     for word in ("", *words):
         stem = f"{shader.stem}_{word.lower()}" if word else shader.stem
-        ends = '"lib/ended.glsl"' in text and (word == "FINAL" or "FINAL" not in words)
+        fused = '"variants/fused_bloom.glsl"' in text
+        ends = fused or ('"lib/ended.glsl"' in text and (word == "FINAL" or "FINAL" not in words))
         defined = (f"-D{word}",) if word else ()
         plain = [
             Module(name, shader, (*defined, *options))
@@ -113,10 +115,12 @@ def modules(shader: Path) -> list[Module]:
             if (shader.suffix == ".comp" or "-DDISPATCH" in module.options)
             and "-DLINEAR_TEXELS" not in module.options
         ]
+        floats = ("_comp", "_linear_rgba32float", "_packed_rgba32float")
         found += [
-            Module(name.replace(stem, f"{stem}_mixed"), shader, (*options, "-DMIXED"))
+            Module(name.replace(stem, f"{stem}_{kind.lower()}"), shader, (*options, f"-D{kind}=1"))
+            for kind, endings in (("MIXED", floats[:2]), ("TRANSPOSED", floats))
             for name, _, options in plain
-            if ends and name.endswith(("_comp", "_linear_rgba32float"))
+            if (fused if kind == "TRANSPOSED" else ends) and name.endswith(endings)
         ]
     return found
 

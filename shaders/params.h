@@ -36,16 +36,13 @@
     SETTING(exposure, 0.0, -32.0, 32.0) \
     SETTING(reference_white, 203.0, 1.0, 10000.0)
 
-// For a pass that reads an image of another size: the size of its target, and the largest value of
-// the target's format.
+// For a pass that reads an image of another size: the size of its target.
 #define SAMPLING_ROWS(B, INPUT) \
-    PLACE_ROWS(B, INPUT) \
-    INPUT(B, float, limit)
-#define PLACE_ROWS(B, INPUT) \
     INPUT(B, int, target_width) \
     INPUT(B, int, target_height)
 
-// For passes with a threshold, and for passes that write the finished picture.
+// For passes with a threshold, and for passes that write the finished picture, with the largest
+// value of its format.
 #define THRESHOLD_ROWS(B, READS) \
     READS(B, threshold) \
     READS(B, knee)
@@ -53,20 +50,19 @@
     READS(B, intensity) \
     READS(B, exposure) \
     READS(B, reference_white) \
+    READS(B, white) \
     INPUT(B, float, limit) \
     INPUT(B, int, noise_seed)
 
-// The matrices of a mesh or skybox draw, and the largest value of the colour targets. Only what is
-// not constant is passed, in a form that is ready for the vertex shader: llvmpipe compiles a test
-// of the bounds for each number that a shader loads. `projection` has the scales of x, y and z and
-// the offset of z, `model_view` three rows. `sky` has the direction of the picture's centre and its
-// changes from there to the right and to the lower edge. The glow mesh's colours are multiplied by
-// the intensity before the threshold.
+// The matrices of a mesh or skybox draw. Only what is not constant is passed, in a form that is
+// ready for the vertex shader: llvmpipe compiles a test of the bounds for each number that a shader
+// loads. `projection` has the scales of x, y and z and the offset of z, `model_view` three rows.
+// `sky` has the direction of the picture's centre and its changes from there to the right and to
+// the lower edge. The glow mesh's colours are multiplied by the intensity before the threshold.
 #define MESH_BLOCK(B, READS, INPUT, VEC4S) \
     VEC4S(B, projection, 1) \
     VEC4S(B, model_view, 3) \
     VEC4S(B, sky, 3) \
-    INPUT(B, float, limit) \
     INPUT(B, float, glow_intensity) \
     THRESHOLD_ROWS(B, READS)
 
@@ -89,7 +85,6 @@
     INPUT(B, int, origin) \
     INPUT(B, int, vertical) \
     INPUT(B, int, levels) \
-    INPUT(B, float, limit) \
     VEC4S(B, kernel, LINE_VEC4S)
 
 // The complete bloom of an image in one fused pass: threshold, both blurs, composite. Kernels as in
@@ -124,7 +119,7 @@
 
 // A filter that makes the bloom, fused with the composite.
 #define FILTER_FINAL_BLOCK(B, READS, INPUT, VEC4S) \
-    PLACE_ROWS(B, INPUT) \
+    SAMPLING_ROWS(B, INPUT) \
     FILTER_ROWS(B, INPUT, VEC4S) \
     COMPOSITE_ROWS(B, READS, INPUT)
 
@@ -158,7 +153,6 @@
 // `next` has the bits of next_texel() for each tap.
 #define STREAKS_BLOCK(B, READS, INPUT, VEC4S) \
     INPUT(B, float, threshold) \
-    INPUT(B, float, limit) \
     INPUT(B, float, step_x) \
     INPUT(B, float, step_y) \
     INPUT(B, int, count) \
@@ -170,7 +164,6 @@
 // ghosts.
 #define FLARE_BLOCK(B, READS, INPUT, VEC4S) \
     INPUT(B, float, threshold) \
-    INPUT(B, float, limit) \
     INPUT(B, float, maximum) \
     INPUT(B, float, aberration) \
     INPUT(B, float, radius) \
@@ -202,14 +195,12 @@
     INPUT(B, int, step_y) \
     INPUT(B, int, backwards) \
     INPUT(B, int, distance) \
-    INPUT(B, float, fade) \
-    INPUT(B, float, limit)
+    INPUT(B, float, fade)
 
 // A mean of pixels along rows or columns (box_mean.comp).
 #define BOX_BLOCK(B, READS, INPUT, VEC4S) \
     INPUT(B, int, across) \
-    INPUT(B, int, radius) \
-    INPUT(B, float, limit)
+    INPUT(B, int, radius)
 
 // Blender's sun beams (sun_beams.frag): the most steps; the sun from the upper left, as shares of
 // the sides; the share of the samples that jitter leaves.
@@ -217,11 +208,7 @@
     INPUT(B, int, most) \
     INPUT(B, float, sun_x) \
     INPUT(B, float, sun_y) \
-    INPUT(B, float, left) \
-    INPUT(B, float, limit)
-
-// The light of the deferred system.
-#define LIGHTING_BLOCK(B, READS, INPUT, VEC4S) INPUT(B, float, limit)
+    INPUT(B, float, left)
 
 #define COMPOSITE_BLOCK(B, READS, INPUT, VEC4S) COMPOSITE_ROWS(B, READS, INPUT)
 
@@ -233,13 +220,7 @@
     INPUT(B, int, span_x) \
     INPUT(B, int, span_y) \
     INPUT(B, float, gain) \
-    INPUT(B, float, share) \
-    INPUT(B, float, limit)
-
-// The composite of Godot.
-#define GODOT_FINAL_BLOCK(B, READS, INPUT, VEC4S) \
-    COMPOSITE_ROWS(B, READS, INPUT) \
-    READS(B, white)
+    INPUT(B, float, share)
 
 // A stage of a Fourier transform along one axis (fft.comp). There are `across` lines of `padded`
 // elements, with `count` butterflies in each line. The elements of a butterfly are `step` apart.
@@ -265,7 +246,6 @@
     INPUT(B, int, block_a) \
     INPUT(B, int, block_b) \
     INPUT(B, int, block_c) \
-    INPUT(B, float, limit) \
     INPUT(B, float, prefilter_min) \
     INPUT(B, float, prefilter_max) \
     INPUT(B, float, prefilter_factor)
@@ -311,10 +291,8 @@
     BLOCK(sun_beams, SUN_BEAMS_BLOCK) \
     BLOCK(fft, FFT_BLOCK) \
     BLOCK(fft_kernel, FFT_KERNEL_BLOCK) \
-    BLOCK(lighting, LIGHTING_BLOCK) \
     BLOCK(composite, COMPOSITE_BLOCK) \
-    BLOCK(adjoint_filter, ADJOINT_FILTER_BLOCK) \
-    BLOCK(godot_final, GODOT_FINAL_BLOCK)
+    BLOCK(adjoint_filter, ADJOINT_FILTER_BLOCK)
 
 // Settings that no shader reads, because they shape the graph. Integers: COUNT(name, default, min,
 // max); a flag is one of 0 and 1.
@@ -405,6 +383,9 @@
 #define MAX_GHOSTS   16
 #define MAX_TAPS     8
 #define MAX_HALVINGS 4
+
+// The binding of the target of a compute shader: after those that images and resources may have.
+#define TARGET_BINDING 33
 
 // Invocations of a workgroup: in a row, for shaders in which each invocation writes several pixels;
 // on each side, for shaders in which it writes one.
@@ -500,12 +481,13 @@
 // in this ratio, or for strips and tiles the widths of these; EXACT_ROWS says so of the heights.
 // With FROM_IMAGE, a downsampling to half the size reads the image itself and applies the
 // threshold, and an adjoint pass writes the cotangents of a source's image. BY is what these are
-// of. With ENLARGED the target has more rows than the source. STORED is the format of the target
-// (STORED_*). FIRST marks an engine's first level. LEVELS is the number of levels that a pass adds
-// up. GROUPS is what a downsampling makes of its taps. INVERSE to GROUP_HEIGHT are of Fourier
-// transforms (fft.comp), whose workgroups have GROUP_WIDTH x GROUP_HEIGHT invocations: of a stage
-// of RADIX_1 elements, or with complete lines of stages of RADIX_1 to RADIX_4. BOUNDARY is of those
-// that are PADDED, and a first stage that is PREFILTERED has the filter of bright colours.
+// of. EMITTERS is how many passes add up in the target by blending. With ENLARGED the target has
+// more rows than the source. STORED is the format of the target (STORED_*). FIRST marks an engine's
+// first level. LEVELS is the number of levels that a pass adds up. GROUPS is what a downsampling
+// makes of its taps. INVERSE to GROUP_HEIGHT are of Fourier transforms (fft.comp), whose workgroups
+// have GROUP_WIDTH x GROUP_HEIGHT invocations: of a stage of RADIX_1 elements, or with complete
+// lines of stages of RADIX_1 to RADIX_4. BOUNDARY is of those that are PADDED, and a first stage
+// that is PREFILTERED has the filter of bright colours.
 #define SPECIALIZATION_CONSTANTS(CONSTANT) \
     CONSTANT(0, SAMPLING, sampling) \
     CONSTANT(1, COMPOSITE, composite) \
@@ -673,7 +655,7 @@
     NAME(GROUPS_THREE, 8, three) \
     NAME(GROUPS_BEVY, 9, bevy) \
     NAME(GROUPS_KINO, 11, kino) \
-    NAME(GROUPS_GODOT_BLUR, 13, godot_blur) \
+    NAME(GROUPS_GODOT, 13, godot) \
     NAME(GROUPS_HDRP_BLUR, 14, hdrp_blur) \
     NAME(GROUPS_HIGHLIGHTS, 12, highlights) \
     NAME(GROUPS_BABYLON, 15, babylon) \

@@ -12,7 +12,7 @@ import OpenImageIO as oiio
 from numpy.typing import NDArray
 
 from tests.images import noise
-from tests.io.parts import written
+from tests.io.parts import reread, written
 from vkbloom import Separable, Settings
 from vkbloom._renderer.frames import Frames
 
@@ -60,23 +60,13 @@ class Part:
 
 def read(file: Path) -> dict[str, Part]:
     """Read every part of a file with its stored values, alpha not multiplied in."""
-    config = oiio.ImageSpec()
-    config.attribute("oiio:UnassociatedAlpha", 1)
-    reader = oiio.ImageInput.open(str(file), config)
-    assert reader is not None, oiio.geterror()
     parts = {}
-    index = 0
-    while reader.seek_subimage(index, 0):
-        spec = reader.spec()
-        pixels = reader.read_image(index, 0, 0, spec.nchannels, spec.format)
-        assert pixels is not None, reader.geterror()
-        parts[spec.getattribute("oiio:subimagename") or ""] = Part(
-            pixels,
-            tuple(spec.channelnames),
-            {attribute.name: attribute.value for attribute in spec.extra_attribs},
-        )
-        index += 1
-    reader.close()
+    # (Of TIFF, OpenImageIO does not count them.)
+    for index in range(oiio.ImageBuf(str(file)).nsubimages or 1):
+        spec, pixels = reread(file, index)
+        attributes = {attribute.name: attribute.value for attribute in spec.extra_attribs}
+        name = spec.getattribute("oiio:subimagename") or ""
+        parts[name] = Part(pixels, tuple(spec.channelnames), attributes)
     return parts
 
 

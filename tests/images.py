@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -40,6 +41,23 @@ def hdr_picture(width: int, height: int, channels: int, dtype: str, seed: int = 
         return np.rint(255 * values).astype(np.uint8)
     # Beyond what 8 bits hold, and below 0.
     return (8 * values - 0.5).astype(dtype)
+
+
+def cut_out(width: int, height: int, dtype: str, seed: int = 0) -> NDArray[Any]:
+    """Return a picture whose alpha is 0 to 1, and whose right quarter is transparent black."""
+    image = hdr_picture(width, height, 4, dtype, seed)
+    if dtype != "uint8":
+        image[..., 3] = np.clip(image[..., 3] / 8, 0, 1)
+    image[:, width - width // 4 :] = 0
+    return image
+
+
+def given_of(names: Iterable[str], image: NDArray[Any]) -> dict[str, Any]:
+    """Return a mask and an emission for an image, those that are named."""
+    mask = np.random.default_rng(3).random(image.shape[:2], np.float32)
+    mask[:9, :9] = 0
+    every = {"mask": mask, "emission": image[::-1].copy()}
+    return {name: every[name] for name in names}
 
 
 def lights(

@@ -102,7 +102,6 @@ def noise(size: tuple[int, int], highest: float = 1.0) -> NDArray[np.float64]:
 SIZE = (320, 180)
 GBUFFER = ["albedo", "normal", "position", "brightness", "depth"]
 BLURRED = ["blur_vertical", "bloom"]
-LIT = ["scene", "final"]
 
 
 def deferred(

@@ -17,7 +17,7 @@ if [ $# = 0 ]; then
         set -- "$@" "tests/methods/test_$name.py"
     done
     set -- "$@" tests/methods/test_custom_passes.py tests/custom/test_rendering.py
-    for name in deferred deferred_passes render textures; do
+    for name in deferred render textures; do
         set -- "$@" "tests/scene/test_$name.py"
     done
     for name in apply_input.py::test_longest_sides rg11b10.py::test_every_method \

@@ -71,13 +71,15 @@ static bool create_layouts(const struct vkb_device *device, struct vkb_pass_layo
         },
     };
 
-    for (uint32_t i = 0; i < layouts->count; ++i)
+    for (uint32_t i = 0; i < layouts->count; ++i) {
+        const uint32_t number = layouts->draw || i + 1 < layouts->count ? i + 1 : TARGET_BINDING;
         rows[i + 1] = (VkDescriptorSetLayoutBinding){
-            .binding = i + 1,
-            .descriptorType = layouts->descriptors[i],
+            .binding = number,
+            .descriptorType = layouts->descriptors[number - 1],
             .descriptorCount = 1,
             .stageFlags = stages,
         };
+    }
     const uint32_t constants =
         layouts->reading == VKB_READING_LINEAR_TEXELS ? sizeof(struct vkb_linear_texels) : 0;
     return vkb_layouts_create(device, rows, layouts->count + 1, constants, &layouts->made, error);
@@ -145,8 +147,10 @@ static struct vkb_pass_layouts described(const struct vkb_pass_row *pass)
         layouts.descriptors[layouts.count++] = types[pass->reading][0];
     for (uint32_t i = 0; i < pass->resource_count; ++i)
         layouts.descriptors[layouts.count++] = resource_types[pass->resources[i]->kind];
-    if (!layouts.draw)
-        layouts.descriptors[layouts.count++] = types[pass->reading][1];
+    if (!layouts.draw) {
+        layouts.descriptors[TARGET_BINDING - 1] = types[pass->reading][1];
+        ++layouts.count;
+    }
     return layouts;
 }
 

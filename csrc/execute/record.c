@@ -127,7 +127,7 @@ static bool write_descriptors(struct vkb_run *run, const struct binding *binding
             .imageLayout = vkb_image_layout(target, VKB_ACCESS_DISPATCH_STORED),
         };
         writes[write_count++] = (VkWriteDescriptorSet){
-            .dstBinding = last + 1,
+            .dstBinding = TARGET_BINDING,
             .pImageInfo = &images[last],
             .pBufferInfo = binding->band ? &binding->band->buffer : NULL,
         };

@@ -23,7 +23,7 @@ static vkb_transpose *find_transpose(const struct vkb_pass_row *pass)
     switch (pass->constants.groups) {
     case GROUPS_BLENDER:
     case GROUPS_DARKTABLE:
-    case GROUPS_GODOT_BLUR:
+    case GROUPS_GODOT:
     case GROUPS_HDRP:
     case GROUPS_HDRP_BLUR:
     case GROUPS_HIGHLIGHTS:

@@ -245,7 +245,6 @@ static uint32_t add_line(struct vkb_levels *levels, int direction, int step_x, i
             .backwards = i % 2,
             .distance = i / 2 + 1,
             .fade = (float)values->fade,
-            .limit = vkb_formats[levels->source->format].limit,
         };
         vkb_levels_pass(levels, &row);
         from = to;
@@ -278,7 +277,6 @@ static uint32_t add_sun_beams(struct vkb_levels *levels)
         .sun_x = settings->sun_position[0],
         .sun_y = 1.0f - settings->sun_position[1],
         .left = 1.0f - (float)settings->values.jitter,
-        .limit = vkb_formats[levels->source->format].limit,
     };
     vkb_levels_pass(levels, &row);
     return light;

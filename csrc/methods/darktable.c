@@ -19,7 +19,6 @@ static uint32_t add_box(struct vkb_levels *levels, uint32_t number, uint32_t fro
     row.params.box = (struct vkb_box_params){
         .across = across,
         .radius = (int)floor(MAX_RADIUS * levels->settings->values.size + 0.5),
-        .limit = vkb_formats[levels->source->format].limit,
     };
     vkb_levels_pass(levels, &row);
     return to;

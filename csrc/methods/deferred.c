@@ -46,17 +46,15 @@ static struct gbuffer add_gbuffer(struct vkb_levels *levels, const struct vkb_sc
 {
     const int emitters = source->has_emission && glow != VKB_NO_IMAGE ? 2 : 1;
     const struct gbuffer gbuffer = add_images(levels, source->size);
-    struct vkb_mesh_params stored = *params;
     struct vkb_pass_row row;
 
-    stored.limit = vkb_formats[HDR].limit;
     if (source->has_sky) {
         row = vkb_scene_row("skybox", VKB_GEOMETRY_SKYBOX, &vkb_shader_gbuffer_sky_frag, 0, 0,
-                            &stored);
+                            params);
         set_targets(&gbuffer, &row);
         vkb_levels_pass(levels, &row);
     }
-    row = vkb_scene_row("gbuffer", VKB_GEOMETRY_BODY, &vkb_shader_gbuffer_body_frag, 0, 0, &stored);
+    row = vkb_scene_row("gbuffer", VKB_GEOMETRY_BODY, &vkb_shader_gbuffer_body_frag, 0, 0, params);
     row.constants.emitters = emitters;
     set_targets(&gbuffer, &row);
     vkb_add_mesh(levels, &row, source->body_textured, &vkb_shader_gbuffer_body_textured_frag);
@@ -104,8 +102,6 @@ static uint32_t add_lighting(struct vkb_levels *levels, const struct gbuffer *gb
     for (int i = 0; i < GBUFFER_COLOURS; ++i)
         row.reads[i] = gbuffer->colours[i];
     row.read_count = GBUFFER_COLOURS;
-    row.block = VKB_BLOCK_lighting;
-    row.params.lighting.limit = vkb_formats[HDR].limit;
     vkb_levels_pass(levels, &row);
     return scene;
 }

@@ -17,20 +17,18 @@ struct vkb_size vkb_forward_buffers(const struct vkb_settings *settings, struct 
 static uint32_t add_scene(struct vkb_levels *levels, const struct vkb_scene_source *source,
                           const struct vkb_mesh_params *params)
 {
-    struct vkb_mesh_params stored = *params;
     const uint32_t scene =
         vkb_levels_target(levels, "scene", VKB_FORMAT_RGBA8_UNORM, source->size, true);
     const uint32_t depth =
         vkb_levels_target(levels, "depth", VKB_FORMAT_DEPTH32_FLOAT, source->size, true);
 
-    stored.limit = vkb_formats[VKB_FORMAT_RGBA8_UNORM].limit;
     if (source->has_sky) {
         const struct vkb_pass_row sky = vkb_scene_row(
-            "skybox", VKB_GEOMETRY_SKYBOX, &vkb_shader_skybox_frag, scene, depth, &stored);
+            "skybox", VKB_GEOMETRY_SKYBOX, &vkb_shader_skybox_frag, scene, depth, params);
         vkb_levels_pass(levels, &sky);
     }
     struct vkb_pass_row body =
-        vkb_scene_row("scene", VKB_GEOMETRY_BODY, &vkb_shader_phong_frag, scene, depth, &stored);
+        vkb_scene_row("scene", VKB_GEOMETRY_BODY, &vkb_shader_phong_frag, scene, depth, params);
     body.constants.emitters = vkb_body_glows(source);
     vkb_add_mesh(levels, &body, source->body_textured, &vkb_shader_phong_textured_frag);
     return scene;

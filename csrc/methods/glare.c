@@ -91,7 +91,6 @@ void vkb_add_ray(struct vkb_levels *levels, const struct vkb_ray *ray)
     params->step_x = step_of(-step * cos(ray->angle));
     params->step_y = step_of(step * sin(ray->angle));
     params->threshold = ray->iteration == 0 ? values->threshold : 0.0f;
-    params->limit = vkb_formats[levels->source->format].limit;
     params->reads_next = ray->next != NULL;
     if (ray->next)
         memcpy(params->next, ray->next, sizeof params->next);
@@ -149,7 +148,6 @@ void vkb_add_flare(struct vkb_levels *levels, const struct vkb_stage *stage, uin
     row.block = VKB_BLOCK_flare;
     row.params.flare = (struct vkb_flare_params){
         .threshold = values->threshold,
-        .limit = vkb_formats[levels->source->format].limit,
         .maximum = values->maximum,
         .aberration = values->aberration,
         .radius = values->radius,

@@ -13,7 +13,7 @@ static void add_blur(struct vkb_levels *levels, enum vkb_mode direction, bool fi
 {
     struct vkb_pass_row row = vkb_prefilter_row(levels, &vkb_shader_nine_frag, from, to);
 
-    row.constants.groups = GROUPS_GODOT_BLUR;
+    row.constants.groups = GROUPS_GODOT;
     row.constants.direction = direction;
     row.constants.first = first;
     if (first && direction == DIRECTION_VERTICAL)

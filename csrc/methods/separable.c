@@ -112,7 +112,7 @@ uint32_t vkb_add_separable(struct vkb_levels *levels)
         // Blending does not clamp, and sums of the largest single floats must not overflow. (Half
         // floats have their complete range: the composite clamps a sum that overflows.)
         if (format == VKB_FORMAT_RGBA32_FLOAT)
-            row.params.blur.limit /= (float)settings->layer_count;
+            row.constants.emitters = (int)settings->layer_count;
         row.blend = layer == 0          ? VKB_BLEND_NONE
                   : source->blurs_alpha ? VKB_BLEND_ADD_RGBA
                                         : VKB_BLEND_ADD;

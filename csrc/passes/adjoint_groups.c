@@ -31,11 +31,9 @@ static void set_group(const struct vkb_pass_row *row, int group, struct vkb_filt
     } else if (groups == GROUPS_BOX) {
         filter->x.taps[0].offset = group & 1 ? 1.0 : -1.0;
         filter->y.taps[0].offset = group & 2 ? 1.0 : -1.0;
-    } else if (groups == GROUPS_FILAMENT && row->constants.thresholded) {
+    } else if (groups == GROUPS_FILAMENT) {
         filter->x.kind = group & 1 ? UPSAMPLE_RIGHT_PAIR : UPSAMPLE_LEFT_PAIR;
         filter->y.kind = group & 2 ? UPSAMPLE_RIGHT_PAIR : UPSAMPLE_LEFT_PAIR;
-    } else if (groups == GROUPS_FILAMENT) {
-        vkb_filter_three(filter, 1.0, 0.25);
     } else if (groups == GROUPS_PYGFX) {
         vkb_filter_thirteen(filter, step_x, step_y);
     } else if (group > 0) {
@@ -51,9 +49,8 @@ static int count_of(enum vkb_mode groups, const struct vkb_pass_row *pass)
 {
     switch (groups) {
     case GROUPS_BOX:
-        return 4;
     case GROUPS_FILAMENT:
-        return pass->constants.thresholded ? 4 : 1;
+        return 4;
     case GROUPS_KINO:
         return pass->constants.anti_flicker ? 5 : 1;
     case GROUPS_PYRAMID:

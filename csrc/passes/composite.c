@@ -1,21 +1,5 @@
 #include "passes/composite.h"
 
-#include <string.h>
-
-// The composite with Godot's blend modes. It has no other variant.
-static struct vkb_pass_row godots(const struct vkb_settings *settings,
-                                  const struct vkb_pass_row *composite)
-{
-    struct vkb_pass_row row = *composite;
-
-    memset(&row.params, 0, sizeof row.params);
-    row.shader = &vkb_shader_godot_final_frag;
-    row.block = VKB_BLOCK_godot_final;
-    VKB_TAKE_COMPOSITE(&row, godot_final, composite);
-    row.params.godot_final.white = settings->values.white;
-    return row;
-}
-
 // The formula of the composite. The light of a bloom from another image is not in the scene, so the
 // scene does not lose it.
 static int composite_of(const struct vkb_settings *settings,
@@ -79,6 +63,8 @@ void vkb_add_composite(struct vkb_levels *levels, const struct vkb_composite_sou
     row.constants.alpha = off ? ALPHA_KEEP : source->alpha;
     row.constants.masked = row.constants.composite == COMPOSITE_MIX && source->mask != VKB_NO_IMAGE;
     row.constants.bloom = source->lit ? BLOOM_LIT : BLOOM_OWN;
+    if (settings->method == VKB_METHOD_GODOT && !off)
+        row.constants.groups = GROUPS_GODOT;
     row.reads[0] = source->scene;
     // Every binding of the shader must be filled, also one that this variant does not read.
     row.reads[1] = off ? source->scene : source->bloom;
@@ -88,8 +74,6 @@ void vkb_add_composite(struct vkb_levels *levels, const struct vkb_composite_sou
     vkb_params_read(row.block, &settings->values, &row.params);
     row.params.composite.limit = vkb_formats[image.format].limit;
     row.params.composite.noise_seed = dither ? settings->values.dither_seed : 0;
-    if (settings->method == VKB_METHOD_GODOT && !off)
-        row = godots(settings, &row);
     vkb_levels_pass(levels, &row);
 }
 

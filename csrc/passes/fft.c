@@ -140,7 +140,6 @@ struct vkb_pass_row vkb_fft_row(const struct vkb_graph *graph, const struct vkb_
     params->padded = (int)axis->line.length;
     params->extent = (int)axis->extent;
     params->turn = (int)(axis->extent + axis->before);
-    params->limit = vkb_formats[target->format].limit;
     return row;
 }
 

@@ -46,7 +46,6 @@ enum vkb_format vkb_end_format(const struct vkb_settings *settings, enum vkb_for
         const struct vkb_image_row *const set_target = (image); \
         (row)->params.B.target_width = (int)set_target->width; \
         (row)->params.B.target_height = (int)set_target->height; \
-        (row)->params.B.limit = vkb_formats[set_target->format].limit; \
     } while (0)
 
 bool vkb_same_size(const struct vkb_graph *graph, uint32_t a, uint32_t b);

@@ -59,7 +59,6 @@ uint32_t vkb_add_glow(struct vkb_levels *levels, const struct vkb_scene_source *
         vkb_scene_row("glow", own ? VKB_GEOMETRY_BODY : VKB_GEOMETRY_GLOW,
                       own ? &vkb_shader_emission_frag : &vkb_shader_glow_frag, glow, depth, params);
     row.constants.threshold_mode = threshold;
-    row.params.mesh.limit = vkb_formats[format].limit;
     if (threshold != THRESHOLD_NONE)
         vkb_params_read(row.block, &levels->settings->values, &row.params);
     vkb_add_mesh(levels, &row, own ? source->body_textured : source->glow_textured,

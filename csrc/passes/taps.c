@@ -172,7 +172,7 @@ static size_t find_readers(const struct vkb_axis *axis, struct readers *readers)
 }
 
 static void add_weights(const struct vkb_axis *axis, const struct readers *readers,
-                        double (*weights)[VKB_MAX_KERNELS])
+                        double (*weights)[MAX_KERNELS])
 {
     for (uint32_t pixel = 0; pixel < axis->to; ++pixel)
         for (uint32_t tap = 0; tap < axis->count; ++tap) {
@@ -180,7 +180,7 @@ static void add_weights(const struct vkb_axis *axis, const struct readers *reade
             for (uint32_t i = 0; i < sample.count; ++i) {
                 const struct readers *texel = &readers[read_texel(axis, sample.first + i)];
                 double *sums = weights[texel->start + pixel - texel->first];
-                for (int kernel = 0; kernel < VKB_MAX_KERNELS; ++kernel)
+                for (int kernel = 0; kernel < MAX_KERNELS; ++kernel)
                     sums[kernel] += sample.shares[i] * axis->taps[tap].weights[kernel];
             }
         }
@@ -214,27 +214,24 @@ static uint32_t most_of_blocks(const struct vkb_axis *axis, const struct readers
 // Writes the weights of a block: of pixels from `first` on.
 static void write_weights(const struct vkb_axis *axis, uint32_t block, uint32_t first,
                           uint32_t kernels, const struct readers *readers,
-                          double (*weights)[VKB_MAX_KERNELS], float (*to)[4])
+                          double (*weights)[MAX_KERNELS], float (*to)[4])
 {
     for (uint32_t i = 0; i < ADJOINT_SIDE && block + i < axis->from; ++i) {
         const struct readers *texel = &readers[block + i];
         for (uint32_t pixel = texel->first; pixel < texel->end; ++pixel) {
             const double *found = weights[texel->start + pixel - texel->first];
-            const uint32_t place = pixel - first;
-            if (kernels == 1)
-                to[place][i] = (float)found[0];
-            for (uint32_t kernel = 0; kernels > 1 && kernel < kernels; ++kernel)
-                to[ADJOINT_SIDE * place + i][kernel] = (float)found[kernel];
+            for (uint32_t kernel = 0; kernel < kernels; ++kernel)
+                to[kernels * (pixel - first) + kernel][i] = (float)found[kernel];
         }
     }
 }
 
 // Adds entries, and a list of weights for each block that differs from the one before.
 static bool write_table(const struct vkb_axis *axis, uint32_t kernels, uint32_t span,
-                        const struct readers *readers, double (*weights)[VKB_MAX_KERNELS],
+                        const struct readers *readers, double (*weights)[MAX_KERNELS],
                         struct vkb_table *table, struct vkb_error *error)
 {
-    const size_t start = table->count, size = (size_t)span * (kernels == 1 ? 1 : ADJOINT_SIDE);
+    const size_t start = table->count, size = (size_t)span * kernels;
     size_t place = 0;
 
     table->count += axis->from;
@@ -267,7 +264,7 @@ bool vkb_axis_transpose(const struct vkb_axis *axis, uint32_t kernels, struct vk
                         int *start, int *span, struct vkb_error *error)
 {
     struct readers *readers = vkb_alloc(error, axis->from, sizeof *readers);
-    double (*weights)[VKB_MAX_KERNELS] =
+    double (*weights)[MAX_KERNELS] =
         readers ? vkb_alloc(error, find_readers(axis, readers), sizeof *weights) : NULL;
     bool done = weights != NULL;
 

@@ -3,23 +3,19 @@
 //
 // The table of an axis has a texel (first, count, place, first of all) for each texel that the
 // filter reads: the pixels that read it, where the weights of its block of ADJOINT_SIDE texels are,
-// and the first pixel that reads one of these. A texel of weights is that of a pixel for each texel
-// of the block; of several kernels, a pixel has such a texel for each texel of the block. Edges
-// fold back: a pixel whose taps are beyond the first or the last texel reads that one. Equal
-// weights of adjacent blocks are there once.
+// and the first pixel that reads one of these. A pixel has a texel of weights in each kernel, with
+// one for each texel of the block. Edges fold back: a pixel whose taps are beyond the first or the
+// last texel reads that one. Equal weights of adjacent blocks are there once.
 #ifndef VKB_TAPS_H
 #define VKB_TAPS_H
 
 #include "graph/graph.h"
 
-enum {
-    VKB_MAX_TAPS = 2 * MAX_WEIGHTS,
-    VKB_MAX_KERNELS = 4,
-};
+enum { VKB_MAX_TAPS = 2 * MAX_WEIGHTS };
 
 // A sample at a distance from the position of a pixel, in texels, with a weight for each kernel.
 struct vkb_tap {
-    double offset, weights[VKB_MAX_KERNELS];
+    double offset, weights[MAX_KERNELS];
 };
 
 // How `to` pixels sample `from` texels. Pixel i is at the position origin + i step, in texels.

@@ -44,7 +44,6 @@ static struct vkb_pass_row line_row(const struct vkb_variant_choice *choice,
     row.params.line.origin = origin;
     row.params.line.vertical = vertical;
     row.params.line.levels = row.constants.rolled && image->format == VKB_FORMAT_RGBA8_UNORM;
-    row.params.line.limit = vkb_formats[image->format].limit;
     for (int tap = 0; tap <= 2 * radius; ++tap) {
         const int weight = abs(tap - radius);
         row.params.line.kernel[tap / 4][tap % 4] =
@@ -305,6 +304,7 @@ static struct vkb_pass_row adjoint_row(const struct vkb_variant_choice *choice,
     row.reads[0] = nest->composite->reads[3];
     row.reads[1] = nest->composite->reads[0];
     row.targets[0] = pass->targets[0];
+    row.constants.format = STORED_SINGLE;
     // Its sums have another order, so it is taken always: all runs have the same bits.
     row.fused = false;
     row.gains_if_finite = true;
@@ -321,8 +321,8 @@ bool vkb_add_adjoint_fused(struct vkb_variant_choice *choice, const struct vkb_p
         return false;
     struct vkb_pass_row row = adjoint_row(choice, pass, &nest);
     if (gpu)
-        make_tiles(&row, &vkb_shader_adjoint_tile_comp, &nest);
+        make_tiles(&row, &vkb_shader_tile_transposed_comp, &nest);
     else
-        make_strips(choice, &row, &vkb_shader_adjoint_strip_linear_rgba32float, false);
+        make_strips(choice, &row, &vkb_shader_strip_transposed_linear_rgba32float, false);
     return vkb_add_variant(choice, &row);
 }

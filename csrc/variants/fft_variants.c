@@ -126,7 +126,6 @@ static struct vkb_pass_row make_row(const struct vkb_variant_choice *choice,
             row.reads[1] = pass->reads[1];
         }
     row.constants.rotated = 0;
-    row.params.fft.limit = last->params.fft.limit;
     row.params.fft.padded = (int)length;
     const struct vkb_image_row *spectra =
         &graph->images[first->constants.inverse ? row.reads[0] : row.targets[0]];

@@ -204,7 +204,7 @@ struct vkb_pass_row vkb_nested_row(const struct vkb_variant_choice *choice,
     row.reads[2] = pass->reads[3];
     vkb_drop_reads(&row, pass->transposed ? 3 : 2);
     row.block = VKB_BLOCK_filter_final;
-    PLACE_ROWS(filter_final, TAKE_INPUT)
+    SAMPLING_ROWS(filter_final, TAKE_INPUT)
     FILTER_ROWS(filter_final, TAKE_INPUT, TAKE_VEC4S)
     VKB_TAKE_COMPOSITE(&row, filter_final, pass);
     row.constants.format = vkb_storage_mode(format);

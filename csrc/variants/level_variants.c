@@ -56,7 +56,7 @@ bool vkb_add_windowed(struct vkb_variant_choice *choice, const struct vkb_pass_r
     const struct vkb_image_row *target = &choice->plain.images[pass->targets[0]];
     const uint32_t size = vkb_formats[source->format].channel_size;
     const enum vkb_mode groups = groups_of(pass);
-    const bool is_blur = groups == GROUPS_HDRP_BLUR || groups == GROUPS_GODOT_BLUR;
+    const bool is_blur = groups == GROUPS_HDRP_BLUR || groups == GROUPS_GODOT;
     struct vkb_pass_row row;
 
     memcpy(&row, pass, sizeof row);
@@ -64,6 +64,7 @@ bool vkb_add_windowed(struct vkb_variant_choice *choice, const struct vkb_pass_r
                             ? EXACT_SAME
                         : is_half(&choice->plain, pass) ? EXACT_HALF
                                                         : 0;
+    row.constants.exact_rows = row.constants.exact;
     row.constants.enlarged = source->height < target->height;
     row.constants.window = has_thirteen_taps(groups) ? 6 : 4;
     // A radius is that of a mean of other texels. HDRP's taps are in other texels at each position.
@@ -85,9 +86,8 @@ bool vkb_add_nine(struct vkb_variant_choice *choice, const struct vkb_pass_row *
     const bool fits = groups_of(pass) == GROUPS_HDRP_BLUR
                         ? (pass->constants.first || pass->constants.sampling == SAMPLING_TEXEL)
                               && loads(choice, pass)
-                        : groups_of(pass) == GROUPS_GODOT_BLUR && rows
-                              && is_half(&choice->plain, pass) && target->width % 2 == 0
-                              && target->format == VKB_FORMAT_RGBA32_FLOAT
+                        : groups_of(pass) == GROUPS_GODOT && rows && is_half(&choice->plain, pass)
+                              && target->width % 2 == 0 && target->format == VKB_FORMAT_RGBA32_FLOAT
                               && vkb_fits_linear(choice, pass);
     struct vkb_pass_row row;
 

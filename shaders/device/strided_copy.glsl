@@ -1,8 +1,6 @@
 // Pixels between an image and a buffer with another layout. With LAYERS for each image of a batch,
 // whose number is that of the group along z.
 
-#include "lib/layers.glsl"
-
 layout(local_size_x = 128) in;
 
 // struct vkb_strided_copy_layout, of the buffer; offsets and strides in bytes.

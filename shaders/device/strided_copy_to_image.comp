@@ -84,10 +84,10 @@ void move()
 
 void main()
 {
-    if (gl_LocalInvocationIndex == 0) {
-        sums[0] = 0;
-        sums[1] = 0;
-    }
+    uint kind = gl_LocalInvocationIndex;
+
+    if (kind < 2)
+        sums[kind] = 0;
     barrier();
     move();
     if (nan + infinite > 0) {
@@ -95,8 +95,6 @@ void main()
         atomicAdd(sums[1], infinite);
     }
     barrier();
-    if (gl_LocalInvocationIndex == 0 && sums[0] + sums[1] > 0) {
-        atomicAdd(counts[COUNTS_WORDS * gl_WorkGroupID.z], sums[0]);
-        atomicAdd(counts[COUNTS_WORDS * gl_WorkGroupID.z + 1], sums[1]);
-    }
+    if (kind < 2 && sums[kind] > 0)
+        atomicAdd(counts[COUNTS_WORDS * gl_WorkGroupID.z + kind], sums[kind]);
 }

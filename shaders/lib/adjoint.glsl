@@ -1,22 +1,14 @@
-// Ends a pass that writes the cotangents of an image. The including shader defines TARGET_BINDING; its
-// last two images are what other readers of the image have accumulated, and the image itself. ADDED_SHARE
-// is a factor of the colours of the former. Include finite.glsl before this file.
-#include "lib/where_finite.glsl"
+// Ends a pass that writes the cotangents of an image. The including shader defines ADDED_BINDING:
+// there is what other readers of the image have accumulated, and after it the image itself.
 
-#ifndef ADDED_SHARE
-#define ADDED_SHARE 1.0
-#endif
-
-#define ADDED_BINDING (TARGET_BINDING - 2)
-#define IMAGE_BINDING (TARGET_BINDING - 1)
 layout(set = 0, binding = ADDED_BINDING) uniform sampler2D added;
-layout(set = 0, binding = IMAGE_BINDING) uniform sampler2D differentiated;
+layout(set = 0, binding = ADDED_BINDING + 1) uniform sampler2D differentiated;
 
 // The cotangents of this pixel. The image of a source has none at NaN and infinity.
 vec4 gathered(vec4 cotangent)
 {
     if (ADD_OWN != 0)
-        cotangent += vec4(vec3(ADDED_SHARE), 1.0) * texelFetch(added, PIXEL, 0);
+        cotangent += texelFetch(added, PIXEL, 0);
     return FROM_IMAGE != 0 ? where_finite(cotangent, texelFetch(differentiated, PIXEL, 0))
                            : cotangent;
 }

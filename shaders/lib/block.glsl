@@ -1,4 +1,5 @@
-// Expands the rows of params.h into a uniform block, specialization constants and named constants.
+// What all shaders begin with (setup.py): the rows of params.h as a uniform block, specialization constants and
+// named constants, and the functions for values that are read and stored.
 #include "params.h"
 #include "lib/layers.glsl"
 
@@ -21,3 +22,6 @@ MODE_NAMES(CONSTANT_NAME)
 
 #define SPECIALIZATION_CONSTANT(id, name, member) layout(constant_id = id) const int name = 0;
 SPECIALIZATION_CONSTANTS(SPECIALIZATION_CONSTANT)
+
+#include "lib/finite.glsl"
+#include "lib/storage.glsl"

@@ -1,8 +1,7 @@
 // Combines scene and bloom, then applies exposure, tone map, encoding and dither. The including
-// shader needs storage.glsl, and the parameters intensity, exposure and noise_seed.
+// shader's block has the parameters intensity, exposure and noise_seed.
 
 #include "lib/dither.glsl"
-#include "lib/finite.glsl"
 #include "lib/lab.glsl"
 #include "lib/tonemap.glsl"
 
@@ -12,22 +11,21 @@ vec3 light_of(vec3 b)
     return BLOOM == BLOOM_LIT ? b : params.intensity * b;
 }
 
-vec3 mixed(vec3 s, vec3 b, float share)
-{
-    return BLOOM == BLOOM_LIT ? s + (b - params.intensity * share * s)
-                              : s + (b - share * s) * params.intensity;
-}
-
 // `share` is the part of the scene from which the bloom was made.
 vec3 composite(vec3 s, vec3 b, float share)
 {
     if (COMPOSITE == COMPOSITE_MIX)
-        return mixed(s, b, share);
+        return BLOOM == BLOOM_LIT ? s + (b - params.intensity * share * s)
+                                  : s + (b - share * s) * params.intensity;
     if (COMPOSITE == COMPOSITE_SCREEN) {
-        // 1 - (1 - s)(1 - b), expanded: differences from 1 lose the precision of dark values.
-        s = clamp(s, 0.0, 1.0);
-        return s + (1.0 - s) * clamp(light_of(b), 0.0, 1.0);
+        // 1 - (1 - s)(1 - b), expanded: differences from 1 lose the precision of dark values. Godot
+        // has a white in place of 1, and scenes above it.
+        if (GROUPS != GROUPS_GODOT)
+            s = clamp(s, 0.0, 1.0);
+        return s + (params.white - s) * clamp(light_of(b) / params.white, 0.0, 1.0);
     }
+    if (COMPOSITE == COMPOSITE_REPLACE)
+        return light_of(b);
     // Of pmndrs/postprocessing: above 1 it adds, less 1.
     if (COMPOSITE == COMPOSITE_UNCLAMPED_SCREEN)
         return s + light_of(b) - min(s * light_of(b), vec3(1.0));
@@ -38,6 +36,14 @@ vec3 composite(vec3 s, vec3 b, float share)
     if (COMPOSITE == COMPOSITE_ADD)
         return s + light_of(b);
     return s;
+}
+
+vec3 soft_light(vec3 s, vec3 light)
+{
+    // What the brightest light makes of it. Limited from below, since infinity times 0 is NaN.
+    vec3 low = max(s, -1e6), dark = ((16.0 * low - 12.0) * low + 4.0) * low;
+    vec3 full = mix(sqrt(max(s, 0.0)), dark, lessThanEqual(s, vec3(0.25)));
+    return mix(s + clamp(light, 0.0, 1.0) * (full - s), s, greaterThan(s, vec3(1.0)));
 }
 
 // The alpha of the finished picture (the setting `alpha`).
@@ -67,8 +73,20 @@ vec4 encoded(vec4 scene, vec4 bloom, vec3 toned, ivec2 pixel)
 
 vec4 finish(vec4 scene, vec4 bloom, float share, ivec2 pixel)
 {
-    vec3 result = composite(finite_or_zero(scene.rgb), bloom.rgb, share);
-    return encoded(scene, bloom, apply_tonemap(result * exp2(params.exposure), TONEMAP), pixel);
+    float exposure = exp2(params.exposure);
+    vec3 colour = finite_or_zero(scene.rgb), light = bloom.rgb;
+    // Godot's exposure comes before the composite, its soft light after the tone map (godotengine/godot,
+    // tonemap.glsl @ 001c8c9c24dc).
+    if (GROUPS == GROUPS_GODOT)
+        colour *= exposure;
+    if (COMPOSITE == COMPOSITE_SOFT_LIGHT) {
+        vec3 toned = apply_tonemap(colour, TONEMAP);
+        return encoded(scene, bloom, soft_light(toned, apply_tonemap(light_of(light), TONEMAP)), pixel);
+    }
+    vec3 result = composite(colour, light, share);
+    if (GROUPS != GROUPS_GODOT)
+        result *= exposure;
+    return encoded(scene, bloom, apply_tonemap(result, TONEMAP), pixel);
 }
 
 vec4 finish(vec4 scene, vec4 bloom, ivec2 pixel)

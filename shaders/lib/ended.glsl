@@ -1,42 +1,59 @@
-// How a fused pass ends a bloom: with the finished picture; with MIXED, with the cotangents of the picture
-// before exposure and curves, from those of the finished one, the image at ENDED_BINDING. ENDED_TARGET is the
-// binding of the target. The including shader has composite.glsl and, for linear texels, pixels.glsl.
-#ifdef MIXED
-#include "lib/where_finite.glsl"
-#include "lib/adjoint_composite.glsl"
-#define ENDED_TARGET (ENDED_BINDING + 1)
+// How a fused pass ends a bloom: with the finished picture; with MIXED, with the cotangents of the picture before
+// exposure and curves, from those of the finished one; with TRANSPOSED, with the derivatives by the image, from the
+// cotangents of a composite without a curve, which is a factor, and their transposed blur. The image at ENDED_BINDING
+// is then these cotangents or the image. The including shader has composite.glsl and, for linear texels, pixels.glsl.
+#ifndef TRANSPOSED
+#define TRANSPOSED 0
+#endif
+
+#if defined(MIXED) || TRANSPOSED
 #ifdef LINEAR_TEXELS
-READ_IMAGE(ENDED_BINDING, cotangents);
-vec4 cotangent_at(ivec2 pixel)
+READ_IMAGE(ENDED_BINDING, other);
+vec4 other_at(ivec2 pixel)
 {
     ivec4 shape = read_shapes[ENDED_BINDING - 1];
-    return load_floats(cotangents, shape, clamp(pixel.x, 0, shape.x - 1), pixel.y);
+    return load_floats(other, shape, clamp(pixel.x, 0, shape.x - 1), pixel.y);
 }
 #else
-layout(set = 0, binding = ENDED_BINDING) uniform sampler2D cotangents;
-vec4 cotangent_at(ivec2 pixel)
+layout(set = 0, binding = ENDED_BINDING) uniform sampler2D other;
+vec4 other_at(ivec2 pixel)
 {
-    return texelFetch(cotangents, pixel, 0);
+    return texelFetch(other, pixel, 0);
 }
 #endif
-#else
-#define ENDED_TARGET ENDED_BINDING
 #endif
+
+#ifdef MIXED
+#include "lib/adjoint_composite.glsl"
 
 vec4 ended(vec4 scene, vec4 bloom, ivec2 pixel)
 {
-#ifdef MIXED
-    return back_composite(scene, bloom, 1.0, cotangent_at(pixel), BY_MIXED);
-#else
-    return finish(scene, bloom, pixel);
-#endif
+    return back_composite(scene, bloom, 1.0, other_at(pixel), BY_MIXED);
 }
+#elif TRANSPOSED
+// Copies of parameters and of factors (see pixels.glsl).
+float exposed = exp2(params.exposure), gain = exposed * (BLOOM == BLOOM_LIT ? 1.0 : params.intensity);
+float share = exposed * (COMPOSITE == COMPOSITE_MIX ? 1.0 - params.intensity : 1.0);
+float threshold = params.threshold, knee = params.knee;
+
+vec4 ended(vec4 own, vec4 blurred, ivec2 pixel)
+{
+    vec4 scene = other_at(pixel), found = vec4(gain * blurred.rgb, 0.0);
+    found = back_through_threshold(finite_or_zero(scene), found, THRESHOLD_MODE, threshold, knee);
+    return where_finite(found + vec4(vec3(share), 1.0) * own, scene);
+}
+#else
+vec4 ended(vec4 scene, vec4 bloom, ivec2 pixel)
+{
+    return finish(scene, bloom, pixel);
+}
+#endif
 
 #ifdef LINEAR_TEXELS
 uvec4 ended(uvec4 own, vec4 bloom, ivec2 pixel)
 {
     vec4 value = ended(value_of(own), bloom, pixel);
-#ifdef MIXED
+#if defined(MIXED) || TRANSPOSED
     return raw_of(value);
 #else
     return finished(own, value);

@@ -19,3 +19,10 @@ vec4 finite_or_zero(vec4 value)
 {
     return vec4(finite_or_zero(value.rgb), finite_or_zero(value.aaa).r);
 }
+
+// The cotangents of a value, which has none at NaN and infinity.
+vec4 where_finite(vec4 cotangent, vec4 value)
+{
+    return vec4(mix(vec3(0.0), cotangent.rgb, is_finite(value.rgb)),
+                is_finite(value.aaa).r ? cotangent.a : 0.0);
+}

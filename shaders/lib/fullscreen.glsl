@@ -1,17 +1,20 @@
 // A pass over every pixel of one target, in two variants: a fragment shader or, with DISPATCH, a
 // compute shader with one invocation for each pixel. The including shader defines shade(), which
-// returns the colour of PIXEL, and TARGET_BINDING, the binding after its images.
-
+// returns the colour of PIXEL.
 //
 // With STACKED the target has that number of pictures below each other, each of STACKED_HEIGHT rows. PIXEL
-// is a place in each. Then shade() has the picture's number, and start() comes before it.
-
+// is a place in each, shade() is of `picture`, and start() comes before it.
 #ifdef STACKED
 void start();
-vec4 shade(int number);
 #else
-vec4 shade();
+#define STACKED 1
+#define STACKED_HEIGHT 1
+void start() {}
 #endif
+
+vec4 shade();
+
+int picture = 0;
 
 #ifdef DISPATCH
 
@@ -22,37 +25,25 @@ layout(set = 0, binding = TARGET_BINDING) uniform writeonly image2D target;
 
 void main()
 {
-#ifdef STACKED
-    if (any(greaterThanEqual(PIXEL, ivec2(imageSize(target).x, STACKED_HEIGHT))))
+    if (any(greaterThanEqual(PIXEL, imageSize(target) / ivec2(1, STACKED))))
         return;
     start();
-    [[unroll]] for (int i = 0; i < STACKED; ++i)
-        imageStore(target, PIXEL + ivec2(0, i * STACKED_HEIGHT), shade(i));
-#else
-    if (all(lessThan(PIXEL, imageSize(target))))
-        imageStore(target, PIXEL, shade());
-#endif
+    [[unroll]] for (; picture < STACKED; ++picture)
+        imageStore(target, PIXEL + ivec2(0, picture * STACKED_HEIGHT), shade());
 }
 
 #else
 
 layout(location = 0) out vec4 colour;
 
-#ifdef STACKED
-#define PIXEL ivec2(gl_FragCoord.x, int(gl_FragCoord.y) % STACKED_HEIGHT)
+#define PIXEL (ivec2(gl_FragCoord.xy) - ivec2(0, picture * STACKED_HEIGHT))
 
 void main()
 {
+    if (STACKED > 1)
+        picture = int(gl_FragCoord.y) / STACKED_HEIGHT;
     start();
-    colour = shade(int(gl_FragCoord.y) / STACKED_HEIGHT);
-}
-#else
-#define PIXEL ivec2(gl_FragCoord.xy)
-
-void main()
-{
     colour = shade();
 }
-#endif
 
 #endif

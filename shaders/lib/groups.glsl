@@ -1,4 +1,4 @@
-// What downsamplings make of 13 taps, or of the four inner ones. Some weight them by brightness,
+// What downsamplings make of 13 taps, or of a few taps of their own. Some weight them by brightness,
 // against fireflies.
 
 // The outer taps in three rows, and the inner ones in two.
@@ -19,30 +19,93 @@ vec4[5] group_means(Taps taps)
                   0.25 * (d + e + g + h), 0.25 * (e + f + h + i));
 }
 
-const vec3 LUMINANCE = vec3(0.2126, 0.7152, 0.0722);
-
-float group_luminance(vec4 value)
+// Not one expression: glslang 12 writes invalid SPIR-V for a condition of several constants.
+bool are_of_thirteen()
 {
-    return max(dot(value.rgb, LUMINANCE), 0.0);
+    if (GROUPS == GROUPS_PYGFX)
+        return true;
+    if (GROUPS == GROUPS_PYGFX_KARIS)
+        return true;
+    return GROUPS == GROUPS_BEVY || GROUPS == GROUPS_PYRAMID;
 }
 
-float brightest(vec3 value)
+// Whether each group is a tap of its own.
+bool has_own_taps()
 {
-    return max(max(value.r, max(value.g, value.b)), 0.0);
+    return GROUPS != GROUPS_BLENDER && !are_of_thirteen();
 }
 
-// The pyramid's firefly filter: brighter groups weigh less (Karis 2013).
-vec4 pyramid_groups(Taps taps)
+// Of those that have one weight each. Blender's weights are those of the four taps of a group.
+int group_count()
 {
-    vec4 means[5] = group_means(taps);
-    vec4 sum = vec4(0.0);
-    float shares = 0.0;
-    [[unroll]] for (int group = 0; group < 5; ++group) {
-        float share = GROUP_SHARES[group] / (1.0 + group_luminance(means[group]));
-        sum += share * means[group];
-        shares += share;
+    if (are_of_thirteen())
+        return 5;
+    if (GROUPS == GROUPS_BOX)
+        return 4;
+    if (GROUPS == GROUPS_FILAMENT)
+        return 4;
+    if (GROUPS == GROUPS_BLENDER)
+        return 4;
+    if (GROUPS == GROUPS_KINO)
+        return ANTI_FLICKER != 0 ? 5 : 1;
+    return GROUPS == GROUPS_HDRP ? 5 : 1;
+}
+
+// A group's weight, and its derivatives by the channels.
+struct Weight {
+    float value;
+    vec3 slope;
+};
+
+// Brighter groups weigh less (Karis 2013).
+Weight weight_of(vec4 group, float share)
+{
+    bool by_brightest = GROUPS == GROUPS_BOX || GROUPS == GROUPS_FILAMENT;
+    float gain = 1.0, brightness;
+    vec3 slope = LUMINANCE;
+    if (GROUPS == GROUPS_PYGFX)
+        return Weight(share, vec3(0.0));
+    if (GROUPS == GROUPS_FILAMENT && THRESHOLDED == 0)
+        return Weight(share, vec3(0.0));
+    if (GROUPS == GROUPS_HDRP)
+        slope = vec3(0.2126729, 0.7151522, 0.0721750);
+    // That of a group which has been multiplied by its share.
+    if (GROUPS == GROUPS_BEVY)
+        gain = 0.25 * share;
+    if (by_brightest || GROUPS == GROUPS_BLENDER) {
+        slope = shares_of_brightest(group.rgb);
+        brightness = largest(group.rgb);
+    } else {
+        brightness = dot(group.rgb, slope);
     }
-    return sum / shares;
+    // These two count negative brightness: beyond -1 weights are negative.
+    if (GROUPS != GROUPS_PYGFX_KARIS && GROUPS != GROUPS_BLENDER) {
+        slope *= larger(brightness, 0.0);
+        brightness = max(brightness, 0.0);
+    }
+    float divisor = 1.0 + gain * brightness;
+    return Weight(share / divisor, -gain * share / (divisor * divisor) * slope);
+}
+
+// The sum of groups with their weights, and the sum of the weights.
+struct Sum {
+    vec4 value;
+    float weights;
+};
+
+Sum sum_of(vec4 groups[5], float shares[5])
+{
+    Sum sum = Sum(vec4(0.0), 0.0);
+    [[unroll]] for (int group = 0; group < 5; ++group)
+        if (group < group_count()) {
+            float weight = weight_of(groups[group], shares[group]).value;
+            sum.value += weight * groups[group];
+            sum.weights += weight;
+        }
+    // Bevy's is not renormalized.
+    if (GROUPS == GROUPS_BEVY)
+        sum.weights = 1.0;
+    return sum;
 }
 
 // What is not finite is 0.
@@ -52,75 +115,23 @@ vec4 usual(vec4 value)
                notEqual(floatBitsToUint(value) & 0x7f800000u, uvec4(0x7f800000u)));
 }
 
-// pygfx' weights of negative luminances are above 1, and beyond -1 negative. What is not finite is 0.
-vec4 pygfx_mean(Taps taps)
-{
-    vec4 means[5] = group_means(taps);
-    vec4 sum = vec4(0.0);
-    float shares = 0.0;
-    [[unroll]] for (int group = 0; group < 5; ++group) {
-        float luminance = dot(means[group].rgb, LUMINANCE);
-        float share = GROUPS == GROUPS_PYGFX_KARIS ? 1.0 / (1.0 + luminance) : GROUP_SHARES[group];
-        sum += share * means[group];
-        shares += share;
-    }
-    return usual(sum / shares);
-}
+const float ONES[5] = float[](1.0, 1.0, 1.0, 1.0, 1.0);
 
-vec4 pygfx_groups(Taps taps)
+vec4 weighted_mean(vec4 a, vec4 b, vec4 c, vec4 d)
 {
-    return max(pygfx_mean(taps), vec4(0.0));
-}
-
-// A tap multiplied by its weight, and the weight.
-struct Weighted {
-    vec4 value;
-    float weight;
-};
-
-Weighted weighted(vec4 value)
-{
-    float weight = 1.0 / (1.0 + max(value.r, max(value.g, value.b)));
-    return Weighted(weight * value, weight);
-}
-
-vec4 mean(Weighted a, Weighted b, Weighted c, Weighted d)
-{
-    return (a.value + b.value + c.value + d.value) / (a.weight + b.weight + c.weight + d.weight);
+    Sum sum = sum_of(vec4[](a, b, c, d, vec4(0.0)), ONES);
+    return sum.value / sum.weights;
 }
 
 // Blender's: within a group, brighter taps weigh less (formulas of the compositor of Blender 5.0). Taps
 // between texels with negative channels may have a negative brightness.
 vec4 blender_groups(Taps taps)
 {
-    Weighted a = weighted(taps.outer[0]), b = weighted(taps.outer[1]), c = weighted(taps.outer[2]);
-    Weighted d = weighted(taps.outer[3]), e = weighted(taps.outer[4]), f = weighted(taps.outer[5]);
-    Weighted g = weighted(taps.outer[6]), h = weighted(taps.outer[7]), i = weighted(taps.outer[8]);
-    vec4 inner = mean(weighted(taps.inner[0]), weighted(taps.inner[1]), weighted(taps.inner[2]),
-                      weighted(taps.inner[3]));
-    vec4 outer = mean(a, b, d, e) + mean(b, c, e, f) + mean(d, e, g, h) + mean(e, f, h, i);
+    vec4 a = taps.outer[0], b = taps.outer[1], c = taps.outer[2];
+    vec4 d = taps.outer[3], e = taps.outer[4], f = taps.outer[5];
+    vec4 g = taps.outer[6], h = taps.outer[7], i = taps.outer[8];
+    vec4 inner = weighted_mean(taps.inner[0], taps.inner[1], taps.inner[2], taps.inner[3]);
+    vec4 outer = weighted_mean(a, b, d, e) + weighted_mean(b, c, e, f) + weighted_mean(d, e, g, h)
+               + weighted_mean(e, f, h, i);
     return usual(0.5 * inner + 0.125 * outer);
-}
-
-// A box of 4 x 4 texels as four taps, weighted by brightness and renormalized
-// (Karis 2013; keijiro/KinoBloom @ 0a04c43fa47d, Bloom.cginc).
-vec4 box_of(vec4 taps[4])
-{
-    vec4 sum = vec4(0.0);
-    float shares = 0.0;
-    [[unroll]] for (int corner = 0; corner < 4; ++corner) {
-        float share = 1.0 / (1.0 + brightest(taps[corner].rgb));
-        sum += share * taps[corner];
-        shares += share;
-    }
-    return sum / shares;
-}
-
-vec4 combined(Taps taps)
-{
-    if (GROUPS == GROUPS_PYGFX || GROUPS == GROUPS_PYGFX_KARIS)
-        return pygfx_groups(taps);
-    if (GROUPS == GROUPS_BLENDER)
-        return blender_groups(taps);
-    return GROUPS == GROUPS_BOX ? box_of(taps.inner) : pyramid_groups(taps);
 }

@@ -1,29 +1,8 @@
 // What downsamplings that are not linear, and the first passes of published methods, make of their bilinear taps,
 // by GROUPS.
 #include "lib/groups.glsl"
+#include "lib/above.glsl"
 #include "lib/lab.glsl"
-#include "lib/highlights.glsl"
-#include "lib/kino.glsl"
-
-// Bevy's: 13 taps in groups that are weighted by brightness but not renormalized, a floor, then the
-// threshold (bevyengine/bevy v0.19.1, bloom.wgsl).
-vec4 bevy_prefiltered(Taps taps)
-{
-    vec4 means[5] = group_means(taps);
-    vec4 sum = vec4(0.0);
-    [[unroll]] for (int group = 0; group < 5; ++group) {
-        vec4 part = GROUP_SHARES[group] * means[group];
-        // Bevy's buffers hold no negative values. These do, and the divisor must not become 0.
-        float luminance = max(dot(part.rgb, vec3(0.2126, 0.7152, 0.0722)), 0.0);
-        sum += part / (1.0 + 0.25 * luminance);
-    }
-    sum.rgb = max(sum.rgb, vec3(1e-4));
-    if (THRESHOLDED != 0) {
-        float width = params.threshold * params.knee;
-        sum = soft_threshold(sum, params.threshold, width, 4.0 * (width + 1e-5), 1e-5);
-    }
-    return sum;
-}
 
 // The shares of Filament's four taps, and the distances of the first and the last of them. Along an
 // axis the texels at -1 .. 2 have the weights (1 - f, 2 - f, 1 + f, f) / 4. Two bilinear taps, each
@@ -42,29 +21,14 @@ FilamentTaps filament_taps(vec2 part)
                         1.0 + part / (1.0 + 2.0 * part) - part);
 }
 
-// Filament's: four taps with these shares. With the threshold it also has a firefly filter, which
-// weights the taps by brightness (google/filament, bloomDownsample2x.mat @ 9f62dc2f2f53).
-vec4 filament_prefiltered(vec4 taps[4], vec4 shares)
+// Of each group.
+float[5] shares_of(vec2 part)
 {
-    vec4 sum = vec4(0.0);
-    float total = 0.0;
-    [[unroll]] for (int i = 0; i < 4; ++i) {
-        float share = shares[i];
-        if (THRESHOLDED != 0)
-            share /= 1.0 + brightest(taps[i].rgb);
-        sum += share * taps[i];
-        total += share;
+    if (GROUPS == GROUPS_FILAMENT) {
+        vec4 shares = filament_taps(part).shares;
+        return float[](shares.x, shares.y, shares.z, shares.w, 0.0);
     }
-    sum /= total;
-    if (THRESHOLDED != 0) {
-        vec3 kept = max(sum.rgb - params.threshold, vec3(0.0));
-        kept /= 1.0 + brightest(kept) / params.highlight;
-        // The threshold subtracts from colours. The alpha is multiplied by the factor of the
-        // brightest channel.
-        float value = brightest(sum.rgb);
-        sum = vec4(kept, value > 0.0 ? sum.a * (brightest(kept) / value) : 0.0);
-    }
-    return sum;
+    return are_of_thirteen() && GROUPS != GROUPS_PYGFX_KARIS ? GROUP_SHARES : ONES;
 }
 
 // HDRP's: the centre and four diagonal taps, at these distances in texels, weighted against fireflies
@@ -74,53 +38,34 @@ const vec2 HDRP_OFFSETS[5] =
     vec2[](vec2(0.0, 0.0), vec2(HDRP_FAR, -HDRP_NEAR), vec2(-HDRP_FAR, HDRP_NEAR),
            vec2(HDRP_NEAR, HDRP_FAR), vec2(-HDRP_NEAR, -HDRP_FAR));
 
-const vec3 HDRP_LUMINANCE = vec3(0.2126729, 0.7151522, 0.0721750);
+// The highlights of Blender's Glare node (formulas of the compositor of Blender 4.5).
 
-vec4 hdrp_prefiltered(vec4 taps[5])
+// The value that a smooth transition of this width subtracts (minimum) or adds (maximum) at a
+// distance from it (Quilez, "Smooth minimum").
+float rounding(float distance_to_end, float width)
 {
-    vec4 sum = vec4(0.0);
-    float shares = 0.0;
-    [[unroll]] for (int i = 0; i < 5; ++i) {
-        float share = 1.0 / (1.0 + max(dot(taps[i].rgb, HDRP_LUMINANCE), 0.0));
-        sum += share * taps[i];
-        shares += share;
-    }
-    return sum / shares;
+    float h = width > 0.0 ? max(1.0 - abs(distance_to_end) / width, 0.0) : 0.0;
+    return 0.25 * h * h * width;
 }
 
-// Unity's: a clamp, the soft threshold, a tint. URP has no negative colours
-// (Unity-Technologies/Graphics, com.unity.render-pipelines.universal, Bloom.shader @ 00d472fae509);
-// Post Processing v2 has another width (Unity-Technologies/PostProcessing @ 32c3155207d3,
-// Bloom.shader).
-float unity_width()
+// The brightness above the threshold.
+float highlight(float value)
 {
-    return params.threshold * params.knee + (GROUPS == GROUPS_URP ? 0.0 : 1e-5);
+    float low = params.threshold, range = params.maximum, high = low + range;
+    // The widths are limited, so that the transitions stay between 0 and the other end.
+    float at_low = min(params.smoothness, min(low, range));
+    float at_high = min(params.smoothness, min(high, range));
+    float above = value - low;
+    float kept = max(above, 0.0) + rounding(above, at_low);
+    return min(kept, range) - rounding(kept - range, at_high);
 }
 
-float unity_divisor()
+vec4 highlights(vec4 value)
 {
-    return 4.0 * unity_width() + (GROUPS == GROUPS_URP ? 1e-4 : 0.0);
-}
-
-vec4 unity_prefiltered(vec4 value)
-{
-    vec4 kept = vec4(min(value.rgb, vec3(params.clamp_max)), value.a);
-    if (THRESHOLDED != 0)
-        kept = soft_threshold(kept, params.threshold, unity_width(), unity_divisor(), 1e-4);
-    return params.tint[0] * (GROUPS == GROUPS_URP ? max(kept, vec4(0.0)) : kept);
-}
-
-// Babylon's: a step at the luminance threshold^(1 / 2.2) (BabylonJS/Babylon.js,
-// extractHighlights.fragment.fx @ bc81a5f32960).
-float babylon_factor(vec4 value)
-{
-    return THRESHOLDED == 0 || dot(value.rgb, LUMINANCE) >= pow(params.threshold, 1.0 / 2.2) ? 1.0 : 0.0;
-}
-
-// Unreal's: the luminance above the threshold, of which 1 more is stored (Epic Games, "Bloom").
-float unreal_share(vec4 value)
-{
-    return THRESHOLDED == 0 ? 1.0 : dot(value.rgb, LUMINANCE) + 1.0 - params.threshold;
+    if (THRESHOLDED == 0)
+        return value;
+    float brightest = max(value.r, max(value.g, value.b));
+    return brightest > 0.0 ? value * (highlight(brightest) / brightest) : vec4(0.0);
 }
 
 // darktable's: a step of the lightness (darktable 4.2.1, src/iop/bloom.c).
@@ -129,48 +74,6 @@ vec4 darktable_prefiltered(vec4 value)
     float light = params.strength * lightness_of(value.rgb);
     bool bright = THRESHOLDED == 0 || light > params.threshold;
     return bright ? vec4(vec3(light / 100.0), value.a) : vec4(0.0);
-}
-
-// three.js' high pass: a smooth step of the luminance (mrdoob/three.js,
-// examples/jsm/shaders/LuminosityHighPassShader.js @ 0255e15dd1d4).
-vec4 three_prefiltered(vec4 value)
-{
-    if (THRESHOLDED == 0)
-        return value;
-    // BloomNode's luminance is that of three.js' colour management.
-    const vec3 weights = NODE != 0 ? vec3(0.2126, 0.7152, 0.0722)
-                                   : vec3(0.2126729, 0.7151522, 0.0721750);
-    float luminance = dot(value.rgb, weights);
-    return value * smoothstep(params.threshold, params.threshold + params.smooth_width, luminance);
-}
-
-// Not one expression: glslang 12 writes invalid SPIR-V for a condition of several constants.
-bool are_of_thirteen()
-{
-    if (GROUPS == GROUPS_PYGFX)
-        return true;
-    if (GROUPS == GROUPS_PYGFX_KARIS)
-        return true;
-    return GROUPS == GROUPS_BEVY || GROUPS == GROUPS_PYRAMID;
-}
-
-// Whether each group is a tap of its own.
-bool has_own_taps()
-{
-    return GROUPS != GROUPS_BLENDER && !are_of_thirteen();
-}
-
-int group_count()
-{
-    if (!has_own_taps())
-        return 5;
-    if (GROUPS == GROUPS_BOX)
-        return 4;
-    if (GROUPS == GROUPS_FILAMENT)
-        return 4;
-    if (GROUPS == GROUPS_KINO)
-        return ANTI_FLICKER != 0 ? 5 : 1;
-    return GROUPS == GROUPS_HDRP ? 5 : 1;
 }
 
 // The place of a tap that is a group of its own, in texels.
@@ -186,27 +89,121 @@ vec2 place_of(int group, FilamentTaps pairs)
     return cross[group];
 }
 
-// What the method makes of groups that are one tap each, and of Filament's shares.
-vec4 made(vec4 found[5], vec4 shares)
+// Whether texels have an upper bound.
+bool is_capped()
 {
-    vec4 four[4] = vec4[](found[0], found[1], found[2], found[3]);
-    if (GROUPS == GROUPS_BOX)
-        return box_of(four);
     if (GROUPS == GROUPS_KINO)
-        return kino_bright(found[0], found[1], found[2], found[3], found[4]);
-    if (GROUPS == GROUPS_FILAMENT)
-        return filament_prefiltered(four, shares);
-    if (GROUPS == GROUPS_HDRP)
-        return hdrp_prefiltered(found);
-    if (GROUPS == GROUPS_HIGHLIGHTS)
-        return highlights(found[0]);
+        return true;
+    return GROUPS == GROUPS_URP || GROUPS == GROUPS_POST_PROCESSING;
+}
+
+float cap()
+{
+    return GROUPS == GROUPS_KINO ? 65000.0 : params.clamp_max;
+}
+
+vec4 capped(vec4 value)
+{
+    return vec4(min(value.rgb, vec3(cap())), value.a);
+}
+
+// Selects with minimum and maximum only, since arithmetic would round.
+vec4 middle(vec4 a, vec4 b, vec4 c)
+{
+    return max(min(a, b), min(max(a, b), c));
+}
+
+// Kino's is the median of a texel and its neighbours, along both axes (keijiro/KinoBloom @ 0a04c43fa47d,
+// Bloom.cginc).
+vec4 combined(vec4 groups[5], vec2 part)
+{
+    if (is_capped())
+        [[unroll]] for (int group = 0; group < 5; ++group)
+            groups[group] = capped(groups[group]);
+    if (group_count() == 1)
+        return groups[0];
+    if (GROUPS == GROUPS_KINO)
+        return middle(middle(groups[0], groups[1], groups[2]), groups[3], groups[4]);
+    Sum sum = sum_of(groups, shares_of(part));
+    return sum.value / sum.weights;
+}
+
+// three.js' high pass: a smooth step of the luminance (mrdoob/three.js,
+// examples/jsm/shaders/LuminosityHighPassShader.js @ 0255e15dd1d4).
+vec4 three_factor(vec3 colour)
+{
+    // BloomNode's luminance is that of three.js' colour management.
+    const vec3 weights = NODE != 0 ? LUMINANCE : vec3(0.2126729, 0.7151522, 0.0721750);
+    float luminance = dot(colour, weights);
+    float place = (luminance - params.threshold) / params.smooth_width, t = clamp(place, 0.0, 1.0);
+    float slope = t == place ? 6.0 * t * (1.0 - t) / params.smooth_width : 0.0;
+    return vec4(slope * weights,
+                smoothstep(params.threshold, params.threshold + params.smooth_width, luminance));
+}
+
+// Unreal's: the luminance above the threshold, of which 1 more is stored (Epic Games, "Bloom").
+vec4 unreal_factor(vec3 colour)
+{
+    float share = dot(colour, LUMINANCE) + 1.0 - params.threshold;
+    return vec4(larger(share, 0.0) * larger(1.0, share) * LUMINANCE, clamp(share, 0.0, 1.0));
+}
+
+// The factor of a colour by its brightness, in alpha, and its derivatives by the channels. Unity's of Post
+// Processing v2 has another width (Unity-Technologies/PostProcessing @ 32c3155207d3, Bloom.shader), Babylon's
+// is a step at the luminance threshold^(1 / 2.2) (BabylonJS/Babylon.js, extractHighlights.fragment.fx
+// @ bc81a5f32960).
+vec4 factor_of(vec3 colour)
+{
+    float width = params.threshold * params.knee, wider = width + 1e-5;
+    bool is_unity = GROUPS == GROUPS_URP || GROUPS == GROUPS_POST_PROCESSING;
+    bool is_wider = GROUPS == GROUPS_KINO || GROUPS == GROUPS_POST_PROCESSING;
+    float divisor = GROUPS == GROUPS_URP ? 4.0 * width + 1e-4 : 4.0 * wider;
     if (GROUPS == GROUPS_BABYLON)
-        return babylon_factor(found[0]) * found[0];
+        return vec4(vec3(0.0), float(dot(colour, LUMINANCE) >= pow(params.threshold, 1.0 / 2.2)));
     if (GROUPS == GROUPS_THREE)
-        return three_prefiltered(found[0]);
+        return three_factor(colour);
     if (GROUPS == GROUPS_UNREAL)
-        return clamp(unreal_share(found[0]), 0.0, 1.0) * found[0];
+        return unreal_factor(colour);
+    return soft_factor(colour, params.threshold, is_wider ? wider : width, divisor,
+                       is_unity ? 1e-4 : 1e-5);
+}
+
+// Whether the combined groups are the result.
+bool is_plain()
+{
+    if (GROUPS == GROUPS_PYRAMID)
+        return true;
+    return GROUPS == GROUPS_BOX || GROUPS == GROUPS_HDRP;
+}
+
+// What a method makes of the combined groups. Bevy's has a floor before the threshold (bevyengine/bevy
+// v0.19.1, bloom.wgsl). Filament's threshold subtracts (google/filament, bloomDownsample2x.mat
+// @ 9f62dc2f2f53). URP has no negative colours (Unity-Technologies/Graphics,
+// com.unity.render-pipelines.universal, Bloom.shader @ 00d472fae509).
+vec4 bright_part(vec4 value)
+{
+    if (is_plain())
+        return value;
+    if (GROUPS == GROUPS_PYGFX || GROUPS == GROUPS_PYGFX_KARIS)
+        return max(usual(value), vec4(0.0));
+    if (GROUPS == GROUPS_BEVY)
+        value.rgb = max(value.rgb, vec3(1e-4));
+    if (THRESHOLDED != 0 && GROUPS == GROUPS_FILAMENT) {
+        value = part_above(value);
+        return value / (1.0 + largest(value.rgb) / params.highlight);
+    }
+    if (THRESHOLDED != 0)
+        value *= factor_of(value.rgb).a;
+    if (GROUPS == GROUPS_URP)
+        value = max(value, vec4(0.0));
+    return params.tint[0] * value;
+}
+
+vec4 made(vec4 groups[5], vec2 part)
+{
+    if (GROUPS == GROUPS_HIGHLIGHTS)
+        return highlights(groups[0]);
     if (GROUPS == GROUPS_DARKTABLE)
-        return darktable_prefiltered(found[0]);
-    return unity_prefiltered(found[0]);
+        return darktable_prefiltered(groups[0]);
+    return bright_part(combined(groups, part));
 }

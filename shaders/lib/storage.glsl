@@ -25,33 +25,6 @@ vec3 from_level(vec3 level, int format)
     return level * (257.0 / 65536.0) + level * (SHARE / 65536.0);
 }
 
-vec3 storable(vec3 value)
-{
-#if defined(LINEAR_TEXELS) && CHANNEL_BYTES < 4
-    // pixels.glsl rounds where it packs.
-    return value;
-#else
-    if (STORED == STORED_UFLOAT)
-        return nearest_ufloat(value);
-    if (STORED == STORED_SRGB8)
-        return nearest_srgb(value);
-    // The device converts it back, so the error of one bit does not matter.
-    if (STORED == STORED_UNORM8)
-        return nearest_level(value) * (1.0 / 255.0);
-    return STORED == STORED_HALF ? nearest_half(value) : limited(value, params.limit);
-#endif
-}
-
-// A value of a bloom buffer. Its alpha is 1, unless alpha is blurred like a colour. sRGB has a linear
-// alpha.
-vec4 stored(vec4 value)
-{
-    if (ALPHA != ALPHA_BLUR)
-        return vec4(storable(value.rgb), 1.0);
-    float alpha = STORED == STORED_SRGB8 ? nearest_level(value.aaa).r / 255.0 : storable(value.aaa).r;
-    return vec4(storable(value.rgb), alpha);
-}
-
 // The value that an image of that format returns after a store. Fused passes use it, so that their
 // result equals that of the passes that they replace.
 vec3 as_stored(vec3 value, int format)
@@ -64,7 +37,31 @@ vec3 as_stored(vec3 value, int format)
         return nearest_ufloat(value);
     if (format == STORED_SRGB8)
         return nearest_srgb(value);
-    return limited(value, SINGLE_LIMIT);
+    // Blending does not clamp, and a sum of the largest values must not overflow.
+    return limited(value, SINGLE_LIMIT / float(max(EMITTERS, 1)));
+}
+
+vec3 storable(vec3 value)
+{
+#if defined(LINEAR_TEXELS) && CHANNEL_BYTES < 4
+    // pixels.glsl rounds where it packs.
+    return value;
+#else
+    // The device converts it back, so the error of one bit does not matter.
+    if (STORED == STORED_UNORM8)
+        return nearest_level(value) * (1.0 / 255.0);
+    return as_stored(value, STORED);
+#endif
+}
+
+// A value of a bloom buffer. Its alpha is 1, unless alpha is blurred like a colour. sRGB has a linear
+// alpha.
+vec4 stored(vec4 value)
+{
+    if (ALPHA != ALPHA_BLUR)
+        return vec4(storable(value.rgb), 1.0);
+    float alpha = STORED == STORED_SRGB8 ? nearest_level(value.aaa).r / 255.0 : storable(value.aaa).r;
+    return vec4(storable(value.rgb), alpha);
 }
 
 vec4 as_stored(vec4 value, int format)

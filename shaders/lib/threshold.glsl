@@ -1,38 +1,93 @@
-// The part of a colour that goes into the bloom, by its brightness.
+// The part of a colour that goes into the bloom, by its brightness, and cotangents through it.
 
-// Hard: the colour if its Rec. 709 luminance is above the threshold, else black.
-vec4 threshold_hard(vec4 colour, float threshold)
+// Rec. 709.
+const vec3 LUMINANCE = vec3(0.2126, 0.7152, 0.0722);
+
+// The slope of a maximum with b by a: 1 where a is larger, a half where both are equal.
+vec4 larger(vec4 a, vec4 b)
 {
-    return dot(colour.rgb, vec3(0.2126, 0.7152, 0.0722)) > threshold ? colour : vec4(0.0);
+    return vec4(greaterThan(a, b)) + 0.5 * vec4(equal(a, b));
 }
 
-// Soft: a quadratic of half-width `width` around the threshold. Sources differ in the divisor, which
-// is about 4 * width, and in the lower bound of the brightness that they divide by.
-vec4 soft_threshold(vec4 colour, float threshold, float width, float divisor, float least)
+float larger(float a, float b)
 {
-    float brightness = max(colour.r, max(colour.g, colour.b));
-    float soft = clamp(brightness - threshold + width, 0.0, 2.0 * width);
-    soft = soft * soft / divisor;
-    return colour * (max(soft, brightness - threshold) / max(brightness, least));
+    return larger(vec4(a), vec4(b)).x;
 }
 
-// The soft threshold of the setting `knee`.
-vec4 threshold_knee(vec4 colour, float threshold, float knee)
+float largest(vec3 value)
+{
+    return max(value.r, max(value.g, value.b));
+}
+
+// The slope of the largest channel: equal ones have equal shares.
+vec3 shares_of_brightest(vec3 colour)
+{
+    vec3 share = vec3(equal(colour, vec3(largest(colour))));
+    return share / (share.r + share.g + share.b);
+}
+
+// A soft threshold's factor of a colour, and its derivatives by brightness, threshold and width.
+struct Soft {
+    float factor, by_brightness, by_threshold, by_width;
+};
+
+// A quadratic of half-width `width` around the threshold. Sources differ in the divisor, which is
+// about 4 * width, and in the lower bound of the brightness that they divide by.
+Soft soft_threshold(float brightness, float threshold, float width, float divisor, float least)
+{
+    float above = brightness - threshold, moved = above + width, held = max(brightness, least);
+    float soft = clamp(moved, 0.0, 2.0 * width), square = soft * soft / divisor;
+    float factor = max(square, above) / held, by_soft = 2.0 * soft / divisor;
+    // By what is above the threshold, and by the width.
+    vec2 by_square = moved < 0.0         ? vec2(0.0)
+                   : moved > 2.0 * width ? vec2(0.0, 2.0 * by_soft)
+                                         : vec2(by_soft);
+    by_square.y -= 4.0 * square / divisor;
+    vec2 by_top = mix(by_square, vec2(1.0, 0.0), larger(above, square));
+    return Soft(factor, (by_top.x - larger(brightness, least) * factor) / held, -by_top.x / held,
+                by_top.y / held);
+}
+
+// The factor, in alpha, and its derivatives by the channels.
+vec4 soft_factor(vec3 colour, float threshold, float width, float divisor, float least)
+{
+    Soft soft = soft_threshold(largest(colour), threshold, width, divisor, least);
+    return vec4(soft.by_brightness * shares_of_brightest(colour), soft.factor);
+}
+
+// The same of the setting `knee`.
+vec4 knee_factor(vec3 colour, float threshold, float knee)
 {
     float width = threshold * knee;
-    return soft_threshold(colour, threshold, width, 4.0 * width + 1e-5, 1e-5);
+    return soft_factor(colour, threshold, width, 4.0 * width + 1e-5, 1e-5);
 }
 
+// Hard: the colour if its luminance is above the threshold, else black.
 vec4 apply_threshold(vec4 colour, int mode, float threshold, float knee)
 {
     if (mode == THRESHOLD_HARD)
-        return threshold_hard(colour, threshold);
+        return dot(colour.rgb, LUMINANCE) > threshold ? colour : vec4(0.0);
     if (mode == THRESHOLD_KNEE)
-        return threshold_knee(colour, threshold, knee);
+        return colour * knee_factor(colour.rgb, threshold, knee).a;
     return colour;
 }
 
 vec3 apply_threshold(vec3 colour, int mode, float threshold, float knee)
 {
     return apply_threshold(vec4(colour, 1.0), mode, threshold, knee).rgb;
+}
+
+// Through a product with a factor.
+vec4 back_through_factor(vec4 colour, vec4 factor, vec4 cotangent)
+{
+    return factor.a * cotangent + vec4(factor.rgb * dot(cotangent, colour), 0.0);
+}
+
+vec4 back_through_threshold(vec4 colour, vec4 cotangent, int mode, float threshold, float knee)
+{
+    if (mode == THRESHOLD_HARD)
+        return dot(colour.rgb, LUMINANCE) > threshold ? cotangent : vec4(0.0);
+    if (mode == THRESHOLD_KNEE)
+        return back_through_factor(colour, knee_factor(colour.rgb, threshold, knee), cotangent);
+    return cotangent;
 }

@@ -1,10 +1,8 @@
 // The cotangents of the composite: of the scene, of the bloom, of the mask, or of intensity, exposure
 // and reference white, whose sums are their derivatives.
-#include "lib/block.glsl"
 #include "lib/sampling.glsl"
 
 UNIFORM_BLOCK(COMPOSITE_BLOCK);
-#include "lib/storage.glsl"
 #include "lib/composite.glsl"
 
 layout(set = 0, binding = 1) uniform sampler2D scene;
@@ -12,7 +10,7 @@ layout(set = 0, binding = 2) uniform sampler2D bloom;
 layout(set = 0, binding = 3) uniform sampler2D mask;
 layout(set = 0, binding = 4) uniform sampler2D cotangents;
 
-#define TARGET_BINDING 7
+#define ADDED_BINDING 5
 #include "lib/fullscreen.glsl"
 #include "lib/adjoint.glsl"
 #include "lib/adjoint_composite.glsl"

@@ -1,14 +1,11 @@
 // The end of Blender's glare: enlarged, with another saturation, tinted (formulas of the compositor of
 // Blender 5.0 and 5.2).
-#include "lib/block.glsl"
 #include "lib/sampling.glsl"
 
 UNIFORM_BLOCK(BLENDER_END_BLOCK);
-#include "lib/storage.glsl"
 
 layout(set = 0, binding = 1) uniform sampler2D source;
 
-#define TARGET_BINDING 2
 #include "lib/fullscreen.glsl"
 
 // The saturation (max - min) / max is multiplied, and is then 0 to 1.

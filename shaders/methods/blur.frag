@@ -1,14 +1,11 @@
 // A blur by a symmetric kernel, in one direction or, as one N x N pass, in both. The source may
 // have another size than the target.
-#include "lib/block.glsl"
 #include "lib/sampling.glsl"
 
 UNIFORM_BLOCK(BLUR_BLOCK);
-#include "lib/storage.glsl"
 
 layout(set = 0, binding = 1) uniform sampler2D source;
 
-#define TARGET_BINDING 2
 #include "lib/fullscreen.glsl"
 
 float weight(int tap)

@@ -1,13 +1,11 @@
 // The mean of the pixels up to a radius away along a row or a column, of those inside of the image. Each
 // invocation follows a line with a running sum, which it corrects for what the additions round off.
-#include "lib/block.glsl"
 
 UNIFORM_BLOCK(BOX_BLOCK);
-#include "lib/storage.glsl"
 
 layout(local_size_x = ROW_INVOCATIONS) in;
 layout(set = 0, binding = 1) uniform sampler2D source;
-layout(set = 0, binding = 2) uniform writeonly image2D target;
+layout(set = 0, binding = TARGET_BINDING) uniform writeonly image2D target;
 
 vec4 sum = vec4(0.0), rest = vec4(0.0);
 

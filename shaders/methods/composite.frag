@@ -1,15 +1,12 @@
 // The finished picture: scene and bloom, exposure, tone map, encoding, dither.
-#include "lib/block.glsl"
 
 UNIFORM_BLOCK(COMPOSITE_BLOCK);
-#include "lib/storage.glsl"
 #include "lib/composite.glsl"
 
 layout(set = 0, binding = 1) uniform sampler2D scene;
 layout(set = 0, binding = 2) uniform sampler2D bloom;
 layout(set = 0, binding = 3) uniform sampler2D mask;
 
-#define TARGET_BINDING 4
 #include "lib/fullscreen.glsl"
 
 vec4 shade()

@@ -15,11 +15,8 @@
 // STAGE_FIRST reads the glow, STAGE_LAST stores to an image of the bloom's format. STAGE_PRODUCT is the
 // last stage forth along columns, the product with the kernel's spectrum and the first stage back.
 // PADDED reads what lies beyond the source's edges by the boundary.
-#include "lib/block.glsl"
-#include "lib/finite.glsl"
 
 UNIFORM_BLOCK(FFT_BLOCK);
-#include "lib/storage.glsl"
 #ifndef TARGET_BYTES
 #define TARGET_BYTES 4
 #endif
@@ -35,13 +32,13 @@ layout(local_size_x_id = 34, local_size_y_id = 35) in;
 READ_IMAGE(1, source);
 READ_IMAGE(2, factor);
 #ifndef LINEAR_TEXELS
-layout(set = 0, binding = 3) uniform writeonly image2D target;
+layout(set = 0, binding = TARGET_BINDING) uniform writeonly image2D target;
 #elif TARGET_BYTES == 4
-layout(set = 0, binding = 3, std430) writeonly buffer Target { uvec4 texels[]; } target;
+layout(set = 0, binding = TARGET_BINDING, std430) writeonly buffer Target { uvec4 texels[]; } target;
 #elif TARGET_BYTES == 2
-layout(set = 0, binding = 3, std430) writeonly buffer Target { uvec2 texels[]; } target;
+layout(set = 0, binding = TARGET_BINDING, std430) writeonly buffer Target { uvec2 texels[]; } target;
 #else
-layout(set = 0, binding = 3, std430) writeonly buffer Target { uint texels[]; } target;
+layout(set = 0, binding = TARGET_BINDING, std430) writeonly buffer Target { uint texels[]; } target;
 #endif
 
 #ifdef LINEAR_TEXELS

@@ -1,13 +1,12 @@
 // The kernel of a convolution at the places of the padded lines: its point at 0, what lies before it at
 // the end. Values whose light comes from the same place are added: beyond an edge all of them, with a
 // period those that are whole periods apart.
-#include "lib/block.glsl"
 
 UNIFORM_BLOCK(FFT_KERNEL_BLOCK);
 
 layout(local_size_x = PIXEL_INVOCATIONS, local_size_y = PIXEL_INVOCATIONS) in;
 layout(set = 0, binding = 1) uniform sampler2D kernel;
-layout(set = 0, binding = 2) uniform writeonly image2D target;
+layout(set = 0, binding = TARGET_BINDING) uniform writeonly image2D target;
 
 // First, last and step of the kernel's places along one axis.
 ivec3 places(int along, int padded, int boundary, int extent, int period, int before, int after)

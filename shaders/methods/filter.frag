@@ -1,14 +1,11 @@
 // A filter of an image of any size (lib/filter.glsl), and the share of an image of the target's size.
-#include "lib/block.glsl"
 #include "lib/sampling.glsl"
 
 UNIFORM_BLOCK(FILTER_BLOCK);
-#include "lib/storage.glsl"
 
 layout(set = 0, binding = 1) uniform sampler2D source;
 layout(set = 0, binding = 2) uniform sampler2D own;
 
-#define TARGET_BINDING 3
 #include "lib/fullscreen.glsl"
 #include "lib/filter.glsl"
 #include "lib/filter_image.glsl"

@@ -1,9 +1,7 @@
 // Adds up levels of several sizes: each is enlarged and multiplied by its weight.
-#include "lib/block.glsl"
 #include "lib/sampling.glsl"
 
 UNIFORM_BLOCK(GATHER_BLOCK);
-#include "lib/storage.glsl"
 
 layout(set = 0, binding = 1) uniform sampler2D level_0;
 layout(set = 0, binding = 2) uniform sampler2D level_1;
@@ -13,7 +11,6 @@ layout(set = 0, binding = 5) uniform sampler2D level_4;
 layout(set = 0, binding = 6) uniform sampler2D level_5;
 layout(set = 0, binding = 7) uniform sampler2D level_6;
 
-#define TARGET_BINDING 8
 #include "lib/fullscreen.glsl"
 #include "lib/gathered.glsl"
 #include "lib/filter_image.glsl"

@@ -1,16 +1,13 @@
 // Ghosts: the source scaled about its centre, added up with tints (Chapman, "Pseudo Lens Flare", 2013),
 // and added to others.
-#include "lib/block.glsl"
 #include "lib/sampling.glsl"
 
 UNIFORM_BLOCK(FLARE_BLOCK);
-#include "lib/storage.glsl"
 #include "lib/glare.glsl"
 #include "lib/flare.glsl"
 
 layout(set = 0, binding = 2) uniform sampler2D before;
 
-#define TARGET_BINDING 3
 #include "lib/fullscreen.glsl"
 
 vec4 shade()

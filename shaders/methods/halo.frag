@@ -1,14 +1,11 @@
 // A halo: what lies a radius further towards the centre, in a ring of that radius (google/filament,
 // flare.mat @ 523a261b1052).
-#include "lib/block.glsl"
 #include "lib/sampling.glsl"
 
 UNIFORM_BLOCK(FLARE_BLOCK);
-#include "lib/storage.glsl"
 #include "lib/glare.glsl"
 #include "lib/flare.glsl"
 
-#define TARGET_BINDING 2
 #include "lib/fullscreen.glsl"
 
 vec4 shade()

@@ -7,15 +7,12 @@
 //
 // Of Godot's, the horizontal one samples the larger image at the level's pixels; the vertical one completes the
 // level (godotengine/godot, copy.glsl @ 0a5efd02df51).
-#include "lib/block.glsl"
 #include "lib/sampling.glsl"
 
 UNIFORM_BLOCK(PREFILTER_BLOCK);
-#include "lib/storage.glsl"
 
 layout(set = 0, binding = 1) uniform sampler2D source;
 
-#define TARGET_BINDING 3
 #include "lib/fullscreen.glsl"
 #include "lib/mask.glsl"
 #include "lib/godot.glsl"

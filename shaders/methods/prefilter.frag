@@ -1,7 +1,5 @@
 // A downsampling that is not linear in groups of its taps, and the first pass of a published method: the
 // taps and what is made of them are by GROUPS (lib/prefilter_taps.glsl).
-#include "lib/block.glsl"
-#include "lib/finite.glsl"
 
 // Where the pass reads the image itself, as the threshold pass does.
 #define TEXEL(value) (FROM_IMAGE != 0 ? finite_or_zero(value) : (value))
@@ -9,12 +7,10 @@
 #include "lib/threshold.glsl"
 
 UNIFORM_BLOCK(PREFILTER_BLOCK);
-#include "lib/storage.glsl"
 #include "lib/prefilters.glsl"
 
 layout(set = 0, binding = 1) uniform sampler2D source;
 
-#define TARGET_BINDING 3
 #include "lib/fullscreen.glsl"
 #include "lib/mask.glsl"
 #include "lib/prefilter_taps.glsl"

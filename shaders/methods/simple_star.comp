@@ -1,14 +1,12 @@
 // Blender's recursive filter along rows, columns or diagonals: each pixel is mixed with one before it,
 // which is mixed already, and one after it (formulas of the compositor of Blender 5.0).
-#include "lib/block.glsl"
 
 UNIFORM_BLOCK(STAR_BLOCK);
-#include "lib/storage.glsl"
 
 layout(local_size_x = ROW_INVOCATIONS) in;
 layout(set = 0, binding = 1) uniform sampler2D source;
 layout(set = 0, binding = 2) uniform sampler2D before;
-layout(set = 0, binding = 3) uniform writeonly image2D target;
+layout(set = 0, binding = TARGET_BINDING) uniform writeonly image2D target;
 
 // The pixels of a line: the first one, the step to the next one, and their number; 0: there is no such
 // line.

@@ -1,16 +1,13 @@
 // One iteration of a streak in one direction: taps at multiples of a step (Kawase, "Frame Buffer
 // Postprocessing Effects in DOUBLE-S.T.E.A.L", GDC 2003). The last one adds the streaks before.
-#include "lib/block.glsl"
 #include "lib/sampling.glsl"
 
 UNIFORM_BLOCK(STREAKS_BLOCK);
-#include "lib/storage.glsl"
 #include "lib/glare.glsl"
 
 layout(set = 0, binding = 1) uniform sampler2D source;
 layout(set = 0, binding = 2) uniform sampler2D before;
 
-#define TARGET_BINDING 3
 #include "lib/fullscreen.glsl"
 
 vec4 fetch(ivec2 texel)

@@ -1,14 +1,11 @@
 // Blender's sun beams: the weighted mean of the pixels between each pixel and the sun (formulas of the
 // compositor of Blender 5.0).
-#include "lib/block.glsl"
 #include "lib/sampling.glsl"
 
 UNIFORM_BLOCK(SUN_BEAMS_BLOCK);
-#include "lib/storage.glsl"
 
 layout(set = 0, binding = 1) uniform sampler2D source;
 
-#define TARGET_BINDING 2
 #include "lib/fullscreen.glsl"
 #include "lib/fetch_inside.glsl"
 

@@ -1,18 +1,14 @@
 // The threshold pass: reduces an image to the size of the bloom buffers, then applies the threshold.
 // NaN and infinity become 0 first, since the filter would spread them.
-#include "lib/block.glsl"
-#include "lib/finite.glsl"
 #include "lib/threshold.glsl"
 
 #define TEXEL(value) finite_or_zero(value)
 #include "lib/sampling.glsl"
 
 UNIFORM_BLOCK(THRESHOLD_BLOCK);
-#include "lib/storage.glsl"
 
 layout(set = 0, binding = 1) uniform sampler2D image;
 
-#define TARGET_BINDING 3
 #include "lib/fullscreen.glsl"
 #include "lib/mask.glsl"
 

@@ -1,10 +1,7 @@
 #pragma compile TEXTURED
 // The mesh that is lit later, in view space, with the emission of its material.
-#include "lib/block.glsl"
 #include "scene/gbuffer.glsl"
 
-UNIFORM_BLOCK(MESH_BLOCK);
-#include "lib/storage.glsl"
 #include "scene/surface.glsl"
 
 void main()

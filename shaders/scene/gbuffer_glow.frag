@@ -1,5 +1,4 @@
 // Adds the glow mesh's light to the brightness by blending. Adding 0 keeps the other attachments.
-#include "lib/block.glsl"
 #include "scene/gbuffer.glsl"
 
 layout(set = 0, binding = 1) uniform sampler2D glow;

@@ -1,9 +1,5 @@
 // The sky in the background. It is unlit and does not glow.
-#include "lib/block.glsl"
 #include "scene/gbuffer.glsl"
-
-UNIFORM_BLOCK(MESH_BLOCK);
-#include "lib/storage.glsl"
 
 layout(set = 0, binding = 1) uniform samplerCube sky;
 

@@ -4,12 +4,10 @@
 #ifndef EMISSION
 #define GLOW
 #endif
-#include "lib/block.glsl"
 #include "scene/surface.glsl"
 #include "lib/threshold.glsl"
 
 UNIFORM_BLOCK(MESH_BLOCK);
-#include "lib/storage.glsl"
 
 layout(location = 0) out vec4 colour;
 

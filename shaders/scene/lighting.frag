@@ -1,16 +1,11 @@
 // Lights the G-buffer with the forward system's Phong model, and adds the emission.
-#include "lib/block.glsl"
 #include "scene/phong.glsl"
-
-UNIFORM_BLOCK(LIGHTING_BLOCK);
-#include "lib/storage.glsl"
 
 layout(set = 0, binding = 1) uniform sampler2D albedo;
 layout(set = 0, binding = 2) uniform sampler2D normal;
 layout(set = 0, binding = 3) uniform sampler2D position;
 layout(set = 0, binding = 4) uniform sampler2D brightness;
 
-#define TARGET_BINDING 5
 #include "lib/fullscreen.glsl"
 
 vec4 shade()

@@ -1,6 +1,5 @@
 #pragma compile TEXTURED
 // A mesh in view space, for the glow (GLOW), the Phong and the G-buffer passes.
-#include "lib/block.glsl"
 
 UNIFORM_BLOCK(MESH_BLOCK);
 

@@ -1,11 +1,7 @@
 #pragma compile TEXTURED
 // The lit mesh of the forward system, with its emission if EMITTERS is not 0.
-#include "lib/block.glsl"
 #include "scene/phong.glsl"
 #include "scene/surface.glsl"
-
-UNIFORM_BLOCK(MESH_BLOCK);
-#include "lib/storage.glsl"
 
 layout(location = 0) out vec4 colour;
 

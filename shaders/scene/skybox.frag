@@ -1,8 +1,4 @@
 // The sky, sampled in the direction of a point on the cube.
-#include "lib/block.glsl"
-
-UNIFORM_BLOCK(MESH_BLOCK);
-#include "lib/storage.glsl"
 
 layout(set = 0, binding = 1) uniform samplerCube sky;
 

@@ -1,5 +1,4 @@
 // The sky behind everything: one triangle that covers the target, with the direction of each point.
-#include "lib/block.glsl"
 
 UNIFORM_BLOCK(MESH_BLOCK);
 

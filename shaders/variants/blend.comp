@@ -1,17 +1,13 @@
 // The composite for a scene and a bloom that have the size and format of the result.
-#include "lib/block.glsl"
 
 UNIFORM_BLOCK(COMPOSITE_BLOCK);
-#include "lib/storage.glsl"
 #include "lib/composite.glsl"
 #include "variants/pixels.glsl"
 
 const int COLUMNS = TEXEL_COLUMNS(CHANNEL_BYTES), ROWS = TEXEL_ROWS;
 
-layout(local_size_x = ROW_INVOCATIONS) in;
 READ_IMAGE(1, scene);
 READ_IMAGE(2, bloom);
-WRITE_IMAGE(3);
 
 #define LOAD load_scene
 #define LOAD_IMAGE scene
@@ -19,21 +15,16 @@ WRITE_IMAGE(3);
 #define LOAD_CHANNELS SOURCE_CHANNELS
 #include "variants/load.glsl"
 
-#define LOAD load_bloom
-#define LOAD_IMAGE bloom
-#define LOAD_NUMBER 2
-#include "variants/load.glsl"
-
 #include "variants/store.glsl"
 
 void write_row(int x, int y)
 {
-    uvec4 raw[COLUMNS], light[COLUMNS];
+    uvec4 raw[COLUMNS];
 
     load_scene(x, y, raw);
-    load_bloom(x, y, light);
     [[unroll]] for (int i = 0; i < COLUMNS; ++i) {
-        vec4 sum = finish(value_of(raw[i]), value_of(light[i]), ivec2(x + i, y));
+        vec4 light = value_of(raw_in_run(bloom, read_shapes[1], x, i, y));
+        vec4 sum = finish(value_of(raw[i]), light, ivec2(x + i, y));
         raw[i] = finished(raw[i], sum);
     }
     store(x, y, raw);

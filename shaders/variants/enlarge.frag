@@ -1,14 +1,11 @@
 // Enlarges a blur that ran at the size of the bloom buffers: samples its lines, which have a border
 // of one texel, for every pixel of a target of another size.
-#include "lib/block.glsl"
 #include "lib/sampling.glsl"
 
 UNIFORM_BLOCK(THRESHOLD_BLOCK);
-#include "lib/storage.glsl"
 
 layout(set = 0, binding = 1) uniform sampler2D lines;
 
-#define TARGET_BINDING 2
 #include "lib/fullscreen.glsl"
 
 vec4 shade()

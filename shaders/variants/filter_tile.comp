@@ -7,10 +7,8 @@ layout(set = 0, binding = 2) uniform sampler2D own;
 #define ENDED_BINDING 3
 #ifdef FINAL
 #include "lib/ended.glsl"
-#else
-#define ENDED_TARGET ENDED_BINDING
 #endif
-layout(set = 0, binding = ENDED_TARGET) uniform writeonly image2D target;
+layout(set = 0, binding = TARGET_BINDING) uniform writeonly image2D target;
 #include "variants/filter_tile.glsl"
 
 Window window_at(ivec2 pixel, bool along_x)

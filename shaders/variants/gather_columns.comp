@@ -2,17 +2,14 @@
 // columns and multiplies it by its weight. With ADD_OWN the first one has the target's size and needs
 // no filter. As one fragment shader `godot_4_5` takes 475 ms in place of 130 (processor time of 1920 x
 // 1080 in float16, lavapipe of Mesa 25.0.7, 2026-11-26).
-#include "lib/block.glsl"
 #include "lib/sampling.glsl"
 
 UNIFORM_BLOCK(GATHER_BLOCK);
 #include "lib/gathered.glsl"
-#include "lib/storage.glsl"
 #include "variants/pixels.glsl"
 
 const int COLUMNS = TEXEL_COLUMNS(CHANNEL_BYTES), ROWS = GATHER_ROWS;
 
-layout(local_size_x = ROW_INVOCATIONS) in;
 READ_IMAGE(1, level_0);
 READ_IMAGE(2, level_1);
 READ_IMAGE(3, level_2);
@@ -20,12 +17,6 @@ READ_IMAGE(4, level_3);
 READ_IMAGE(5, level_4);
 READ_IMAGE(6, level_5);
 READ_IMAGE(7, level_6);
-WRITE_IMAGE(8);
-
-#define LOAD load_own
-#define LOAD_IMAGE level_0
-#define LOAD_NUMBER 1
-#include "variants/load.glsl"
 
 #include "variants/store.glsl"
 
@@ -40,11 +31,8 @@ vec4 sums[COLUMNS];
 
 void add_own(int first, int y)
 {
-    uvec4 raw[COLUMNS];
-
-    load_own(first, y, raw);
     [[unroll]] for (int i = 0; i < COLUMNS; ++i)
-        sums[i] += params.shares[0][0] * value_of(raw[i]);
+        sums[i] += params.shares[0][0] * value_of(raw_in_run(level_0, read_shapes[0], first, i, y));
 }
 
 void add(usamplerBuffer image, int level, int first, int y)

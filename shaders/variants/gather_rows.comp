@@ -1,15 +1,13 @@
 // Filters a level that is gathered along rows, at the positions of the pixels of a target of another
 // width. The results are floats, in an image of the target's width and of the level's height.
-#include "lib/block.glsl"
 #include "lib/sampling.glsl"
 
 UNIFORM_BLOCK(GATHER_BLOCK);
-#include "lib/storage.glsl"
 #include "variants/pixels.glsl"
 
-layout(local_size_x = ROW_INVOCATIONS) in;
+const int COLUMNS = GATHER_COLUMNS, ROWS = GATHER_ROWS;
+
 READ_IMAGE(1, source);
-WRITE_IMAGE(2);
 
 #include "lib/gathered.glsl"
 #include "variants/store_float.glsl"
@@ -24,25 +22,22 @@ vec4 filter_row(Window window, int line)
     return sum;
 }
 
-void main()
+void write_block(ivec2 first, int end)
 {
-    copy_shapes();
-    ivec2 source_size = READ_SIZE(source, 1), size = TARGET_SIZE();
-    ivec2 first = first_pixel(ivec2(GATHER_COLUMNS, GATHER_ROWS));
-    int end = min(first.y + GATHER_ROWS, size.y);
-    Window windows[GATHER_COLUMNS];
+    ivec2 source_size = READ_SIZE(source, 1);
+    Window windows[COLUMNS];
 
-    if (any(greaterThanEqual(first, size)))
-        return;
-    [[unroll]] for (int i = 0; i < GATHER_COLUMNS; ++i) {
-        Place place = place_in_size(source_size, ivec2(first.x + i, 0), size);
+    [[unroll]] for (int i = 0; i < COLUMNS; ++i) {
+        Place place = place_in_size(source_size, ivec2(first.x + i, 0), TARGET_SIZE());
         windows[i] = window_of(axis_x(place, source_size, vec2(1.0)), WINDOW, true);
     }
     for (int y = first.y; y < end; ++y) {
-        vec4 sums[GATHER_COLUMNS];
-        [[unroll]] for (int i = 0; i < GATHER_COLUMNS; ++i)
+        vec4 sums[COLUMNS];
+        [[unroll]] for (int i = 0; i < COLUMNS; ++i)
             sums[i] = filter_row(windows[i], y);
-        [[unroll]] for (int i = 0; i < GATHER_COLUMNS; ++i)
+        [[unroll]] for (int i = 0; i < COLUMNS; ++i)
             store_float(first.x + i, y, sums[i]);
     }
 }
+
+#include "variants/blocks.glsl"

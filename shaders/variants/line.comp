@@ -1,13 +1,11 @@
 // A blur in one direction with all taps on integer texels. An invocation writes LINE_OUTPUTS pixels
 // along the line and loads each texel once for all of them.
-#include "lib/block.glsl"
 
 UNIFORM_BLOCK(LINE_BLOCK);
-#include "lib/storage.glsl"
 
 layout(local_size_x = ROW_INVOCATIONS) in;
 layout(set = 0, binding = 1, SOURCE_FORMAT) uniform readonly image2D source;
-layout(set = 0, binding = 2) uniform writeonly image2D target;
+layout(set = 0, binding = TARGET_BINDING) uniform writeonly image2D target;
 
 const int LOADED = LINE_OUTPUTS + 2 * RADIUS;
 
@@ -59,11 +57,11 @@ void write(ivec2 pixel, vec4 sum)
 }
 
 // With `levels` STORED is that of floats.
-vec3 stored_rolled(vec3 sum, bool levels, float limit)
+vec3 stored_rolled(vec3 sum, bool levels)
 {
     if (STORED != STORED_SINGLE)
         return storable(sum);
-    return levels ? nearest_level(sum) * (1.0 / 255.0) : limited(sum, limit);
+    return levels ? nearest_level(sum) * (1.0 / 255.0) : storable(sum);
 }
 
 // The same as with add_short, where a compiler takes longer than the pass: it has one load and one
@@ -81,7 +79,6 @@ void blur_rolled()
     ivec2 pixel = first - 2 * RADIUS * direction;
     int number = 0, count = ROLLED_OUTPUTS + 2 * params.radius;
     bool levels = params.levels != 0;
-    float limit = params.limit;
     float weights[2 * RADIUS + 1];
     // Alpha apart: compilers do not remove a part of a vector that lives over an iteration.
     vec3 sums[2 * RADIUS + 1];
@@ -103,8 +100,8 @@ void blur_rolled()
         sums[0] = weights[0] * value.rgb;
         alphas[0] = weights[0] * value.a;
         if (number >= 2 * RADIUS && all(lessThan(pixel, size))) {
-            vec3 colour = stored_rolled(sums[2 * RADIUS], levels, limit);
-            float alpha = stored_rolled(vec3(alphas[2 * RADIUS]), levels, limit).r;
+            vec3 colour = stored_rolled(sums[2 * RADIUS], levels);
+            float alpha = stored_rolled(vec3(alphas[2 * RADIUS]), levels).r;
             imageStore(target, pixel, vec4(colour, ALPHA == ALPHA_BLUR ? alpha : 1.0));
         }
         texel += direction;

@@ -1,12 +1,10 @@
 // The block of a filter, and how it changes the texels that it reads. With FINAL it makes the bloom, and is fused with
 // the composite, or with its MIXED cotangents. Otherwise it may add the share of an image of the target's size, and
 // with FROM_IMAGE it reads the image itself in place of the threshold pass's result.
-#include "lib/block.glsl"
 #include "lib/sampling.glsl"
 
 #ifdef FINAL
 UNIFORM_BLOCK(FILTER_FINAL_BLOCK);
-#include "lib/storage.glsl"
 #include "lib/composite.glsl"
 
 vec4 seen(vec4 value)
@@ -15,8 +13,6 @@ vec4 seen(vec4 value)
 }
 #else
 UNIFORM_BLOCK(FILTER_BLOCK);
-#include "lib/storage.glsl"
-#include "lib/finite.glsl"
 #include "lib/threshold.glsl"
 
 vec4 seen(vec4 value)

@@ -1,10 +1,8 @@
 // HDRP's vertical blur of an image of the target's size (FIRST) or of exactly twice its height, whose
 // samples are means of two texels. An invocation writes one word of some rows, and has each sample
 // once for all of them.
-#include "lib/block.glsl"
 
 UNIFORM_BLOCK(PREFILTER_BLOCK);
-#include "lib/storage.glsl"
 #include "lib/hdrp.glsl"
 #include "variants/pixels.glsl"
 
@@ -27,15 +25,10 @@ void take_sample(int x, int y, out vec4 taken[COLUMNS])
         taken[i] = FIRST != 0 ? value_of(raw[i]) : 0.5 * value_of(raw[i]) + 0.5 * value_of(next[i]);
 }
 
-void main()
+void write_block(ivec2 first, int end)
 {
-    copy_shapes();
-    ivec2 size = TARGET_SIZE();
-    ivec2 first = first_pixel(ivec2(COLUMNS, ROWS));
     vec4 sums[ROWS][COLUMNS];
 
-    if (any(greaterThanEqual(first, size)))
-        return;
     [[unroll]] for (int row = 0; row < ROWS; ++row)
         [[unroll]] for (int i = 0; i < COLUMNS; ++i)
             sums[row][i] = vec4(0.0);
@@ -51,7 +44,9 @@ void main()
         uvec4 pixels[COLUMNS];
         [[unroll]] for (int i = 0; i < COLUMNS; ++i)
             pixels[i] = buffer_of(sums[row][i]);
-        if (first.y + row < size.y)
+        if (first.y + row < end)
             store(first.x, first.y + row, pixels);
     }
 }
+
+#include "variants/blocks.glsl"

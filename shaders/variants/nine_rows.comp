@@ -3,21 +3,17 @@
 // are means of 2 x 2 texels, into single floats. An invocation has each sample once for all pixels. Without it
 // (and nine_columns.comp) `unity_hdrp` takes 104 ms in place of 67, `godot_4_5` 218 in place of 130 (processor
 // time of 1920 x 1080 in float16, lavapipe of Mesa 25.0.7, 2026-11-26).
-#include "lib/block.glsl"
 
 UNIFORM_BLOCK(PREFILTER_BLOCK);
-#include "lib/storage.glsl"
 #include "lib/godot.glsl"
 #include "lib/hdrp.glsl"
 #include "variants/pixels.glsl"
 
 const int COLUMNS = NINE_OUTPUTS, ROWS = GATHER_ROWS, TAPS = 2 * HDRP_RADIUS + 1;
 const int SAMPLES = COLUMNS + 2 * HDRP_RADIUS;
-const bool IS_GODOT = GROUPS == GROUPS_GODOT_BLUR;
+const bool IS_GODOT = GROUPS == GROUPS_GODOT;
 
-layout(local_size_x = ROW_INVOCATIONS) in;
 READ_IMAGE(1, source);
-WRITE_IMAGE(2);
 
 #define LOAD load_same
 #define LOAD_FROM (-HDRP_RADIUS)

@@ -1,13 +1,12 @@
 // How variants load and store runs of pixels. With LINEAR_TEXELS (on CPUs) an image is a buffer of 16-byte
 // words, since llvmpipe loads a word nearly as fast as one channel. Otherwise it is a storage image.
-// Include storage.glsl before this file.
 //
 // What llvmpipe does, and what follows (Mesa 22.3.6 and 25.0.7; benchmarks/image.py shows the effect):
 // - Mesa 25 does not unroll a loop without [[unroll]], and arrays indexed by its counter are then memory: it
 //   stands before every loop but the outermost one. An inner loop needs constant ends: one whose ends depend
 //   on an outer counter is not unrolled by Mesa 22.3, and makes the pass five times slower.
 // - Variables that live over an iteration are loaded, masked and stored once for each vector. So a blur goes
-//   along rows (strip.glsl): it keeps 8 sums for each row there, and down columns 8 for each pixel.
+//   along rows (strip.comp): it keeps 8 sums for each row there, and down columns 8 for each pixel.
 // - A load of a word is a call of 60 to 80 instructions for 8 invocations, before which registers move to
 //   memory: the loads of an iteration come first, and a word that is needed again is kept.
 // - A store is a loop over the invocations, in which each integer is one move. So runs are of 64-bit integers,
@@ -45,8 +44,11 @@
 // other. Runs of 24 and 32 bytes need less of its work for each byte than words.
 #extension GL_ARB_gpu_shader_int64 : require
 #extension GL_EXT_scalar_block_layout : require
-#define RUNS(number, type, name) \
-    layout(set = 0, binding = number, scalar) writeonly buffer type##_runs { type runs[]; } name
+#define RUNS(type, name) \
+    layout(set = 0, binding = TARGET_BINDING, scalar) writeonly buffer type##_runs { type runs[]; } name
+RUNS(u64vec2, runs_of_target);
+RUNS(u64vec3, triples_of_target);
+RUNS(u64vec4, pairs_of_target);
 
 layout(push_constant) uniform Shapes {
     ivec4 target;    // width, height, words in a row, first row of the bound buffer
@@ -74,10 +76,6 @@ uint64_t eighth(uvec2 value)
 }
 
 #define READ_IMAGE(number, name) layout(set = 0, binding = number) uniform usamplerBuffer name
-#define WRITE_IMAGE(number) \
-    RUNS(number, u64vec2, runs_of_target); \
-    RUNS(number, u64vec3, triples_of_target); \
-    RUNS(number, u64vec4, pairs_of_target)
 #define READ_SIZE(name, number) (read_shapes[number - 1].xy)
 #define TARGET_SIZE() (target_shape.xy)
 
@@ -116,17 +114,18 @@ uvec4 raw_of(vec4 value)
 #endif
 }
 
+#if CHANNEL_BYTES == 1
+const uvec4 ALPHA_BITS = uvec4(0xff000000u, 0, 0, 0), OPAQUE = ALPHA_BITS;
+#elif CHANNEL_BYTES == 2
+const uvec4 ALPHA_BITS = uvec4(0, 0xffff0000u, 0, 0), OPAQUE = uvec4(0, 0x3c000000u, 0, 0);
+#else
+const uvec4 ALPHA_BITS = uvec4(0, 0, 0, 0xffffffffu), OPAQUE = uvec4(0, 0, 0, 0x3f800000u);
+#endif
+
 // The value, with the alpha bits of `own`.
 uvec4 with_alpha_of(uvec4 own, vec4 value)
 {
-#if CHANNEL_BYTES == 1
-    return uvec4((raw_of(value).x & 0xffffffu) | (own.x & 0xff000000u), 0, 0, 0);
-#elif CHANNEL_BYTES == 2
-    uvec3 colour = nearest_half_bits(value.rgb);
-    return uvec4(colour.r | colour.g << 16, colour.b | (own.y & 0xffff0000u), 0, 0);
-#else
-    return uvec4(floatBitsToUint(value.rgb), own.a);
-#endif
+    return (raw_of(value) & ~ALPHA_BITS) | (own & ALPHA_BITS);
 }
 
 // All bits of the half floats that are NaN or infinity.
@@ -151,14 +150,7 @@ uvec4 finite_bits(uvec4 raw)
 // A pixel of a bloom buffer. Its alpha is 1, unless alpha is blurred like a colour.
 uvec4 buffer_of(vec4 value)
 {
-#if CHANNEL_BYTES == 1
-    const uvec4 one = uvec4(0xff000000u, 0, 0, 0);
-#elif CHANNEL_BYTES == 2
-    const uvec4 one = uvec4(0, 0x3c000000u, 0, 0);
-#else
-    const uvec4 one = uvec4(0, 0, 0, 0x3f800000u);
-#endif
-    return ALPHA == ALPHA_BLUR ? raw_of(stored(value)) : with_alpha_of(one, stored(value));
+    return ALPHA == ALPHA_BLUR ? raw_of(stored(value)) : with_alpha_of(OPAQUE, stored(value));
 }
 
 // A pixel of the finished picture: by its own alpha, NaN and infinity, and what the composite made of
@@ -188,6 +180,13 @@ uvec4 pixel_of(uvec4 word, int at)
 #else
     return word;
 #endif
+}
+
+// The pixel with this number of a run that begins at a multiple of 16 bytes. Pixels of one word are loaded once.
+uvec4 raw_in_run(usamplerBuffer image, ivec4 shape, int first, int number, int row)
+{
+    int word = row * shape.z + first * CHANNEL_BYTES / 4 + number * CHANNEL_BYTES / 4;
+    return pixel_of(texelFetch(image, word), number);
 }
 
 // A pixel anywhere in an image of this shape (see Shapes).

@@ -6,9 +6,7 @@
 //
 // and LOAD_FROM and LOAD_CHANNELS as for variants/load.glsl.
 
-layout(local_size_x = ROW_INVOCATIONS) in;
 READ_IMAGE(1, source);
-WRITE_IMAGE(2);
 
 #define LOAD load_run
 #define LOAD_COUNT LOADED

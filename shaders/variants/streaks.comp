@@ -1,13 +1,11 @@
 // An iteration of a streak (streaks.frag). The taps of a pass have the same offset at all pixels. So
 // an invocation writes a strip from top to bottom, and filters each row of a tap along the row once,
 // for the two rows of the target that it is part of. Without it `blender_streaks` takes
-// 2,660 ms in place of 240 (processor time of 1920 x
-// 1080 in float16, lavapipe of Mesa 25.0.7, 2026-11-26).
-#include "lib/block.glsl"
+// 2,660 ms in place of 240 (processor time of 1920 x 1080 in float16, lavapipe of Mesa 25.0.7, 2026-11-26).
 #include "lib/sampling.glsl"
 
 UNIFORM_BLOCK(STREAKS_BLOCK);
-#include "lib/storage.glsl"
+#include "lib/threshold.glsl"
 #include "lib/above.glsl"
 #include "variants/pixels.glsl"
 
@@ -15,18 +13,8 @@ const int COLUMNS = STREAK_COLUMNS, ROWS = STREAK_ROWS;
 // The texels at tap 0 are those of the strip. The others are filtered.
 const int TAPS = LEVELS > 2 ? LEVELS : 2, FILTERED = TAPS - 1;
 
-layout(local_size_x = ROW_INVOCATIONS) in;
 READ_IMAGE(1, source);
 READ_IMAGE(2, before);
-WRITE_IMAGE(3);
-
-#define LOAD load_own
-#include "variants/load.glsl"
-
-#define LOAD load_before
-#define LOAD_IMAGE before
-#define LOAD_NUMBER 2
-#include "variants/load.glsl"
 
 #include "variants/store.glsl"
 
@@ -36,45 +24,23 @@ vec4 seen(uvec4 raw)
     return FIRST != 0 ? above_threshold(value) : value;
 }
 
-// The raw pixels of a row from any place on, 0 outside of the image.
+// The pixels of a row from any place on, 0 outside of the image.
 void load_moved(int first, int row, out uvec4 raw[COLUMNS + 1])
 {
     ivec4 shape = read_shapes[0];
-    int start = clamp(row, 0, shape.y - 1) * shape.z;
-    bool is_row = row >= 0 && row < shape.y;
-#if CHANNEL_BYTES == 2
-    // Two pixels are a word, and the first may be the second one of its word.
-    const int COUNT = COLUMNS / 2 + 1;
-    uvec2 pixels[2 * COUNT];
-    int last = (shape.x - 1) / 2;
-    [[unroll]] for (int i = 0; i < COUNT; ++i) {
-        uvec4 word = texelFetch(source, start + clamp((first >> 1) + i, 0, last));
-        pixels[2 * i] = word.xy;
-        pixels[2 * i + 1] = word.zw;
-    }
-    bool odd = (first & 1) != 0;
+    ivec2 last = shape.xy - 1;
     [[unroll]] for (int i = 0; i <= COLUMNS; ++i)
-        raw[i] = uvec4(odd ? pixels[i + 1] : pixels[i], 0, 0);
-#else
+        raw[i] = raw_pixel(source, shape, clamp(first + i, 0, last.x), clamp(row, 0, last.y));
     [[unroll]] for (int i = 0; i <= COLUMNS; ++i)
-        raw[i] = texelFetch(source, start + clamp(first + i, 0, shape.x - 1));
-#endif
-    [[unroll]] for (int i = 0; i <= COLUMNS; ++i)
-        raw[i] = is_row && first + i >= 0 && first + i < shape.x ? raw[i] : uvec4(0);
+        raw[i] = clamp(ivec2(first + i, row), ivec2(0), last) == ivec2(first + i, row) ? raw[i] : uvec4(0);
 }
 
-void main()
+void write_block(ivec2 first, int end)
 {
-    copy_shapes();
-    ivec2 size = TARGET_SIZE();
-    ivec2 first = first_pixel(ivec2(COLUMNS, ROWS));
-    int end = min(first.y + ROWS, size.y);
     ivec2 texels[FILTERED];
     vec2 parts[FILTERED];
     vec4 weights[TAPS], rows[FILTERED][COLUMNS];
 
-    if (any(greaterThanEqual(first, size)))
-        return;
     [[unroll]] for (int tap = 0; tap < TAPS; ++tap)
         weights[tap] = params.weights[tap];
     [[unroll]] for (int tap = 0; tap < FILTERED; ++tap) {
@@ -88,12 +54,12 @@ void main()
     for (int y = first.y - 1; y < end; ++y) {
         uvec4 raw[COLUMNS], moved[COLUMNS + 1];
         vec4 sums[COLUMNS];
-        load_before(first.x, max(y, 0), raw);
-        [[unroll]] for (int i = 0; i < COLUMNS; ++i)
-            sums[i] = ADD_OWN != 0 ? value_of(raw[i]) : vec4(0.0);
-        load_own(first.x, max(y, 0), raw);
-        [[unroll]] for (int i = 0; i < COLUMNS; ++i)
-            sums[i] += weights[0] * seen(raw[i]);
+        [[unroll]] for (int i = 0; i < COLUMNS; ++i) {
+            sums[i] = vec4(0.0);
+            if (ADD_OWN != 0)
+                sums[i] = value_of(raw_in_run(before, read_shapes[1], first.x, i, max(y, 0)));
+            sums[i] += weights[0] * seen(raw_in_run(source, read_shapes[0], first.x, i, max(y, 0)));
+        }
         [[unroll]] for (int tap = 0; tap < FILTERED; ++tap) {
             load_moved(texels[tap].x, texels[tap].y + y - first.y + 1, moved);
             vec4 left = seen(moved[0]);
@@ -111,3 +77,5 @@ void main()
             store(first.x, y, raw);
     }
 }
+
+#include "variants/blocks.glsl"

@@ -1,10 +1,7 @@
 // The threshold pass if the bloom buffers have the size of the image.
-#include "lib/block.glsl"
-#include "lib/finite.glsl"
 #include "lib/threshold.glsl"
 
 UNIFORM_BLOCK(THRESHOLD_BLOCK);
-#include "lib/storage.glsl"
 #include "variants/pixels.glsl"
 
 const int COLUMNS = TEXEL_COLUMNS(CHANNEL_BYTES), ROWS = TEXEL_ROWS, LOADED = COLUMNS;

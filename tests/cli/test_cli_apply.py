@@ -8,13 +8,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from click.testing import CliRunner, Result
+from click.testing import Result
 from numpy.typing import NDArray
 
 import vkbloom
+from tests.cli.calls import NATURAL, applied
+from tests.cli.calls import apply as run
 from tests.images import lights
 from tests.io.profiles import store_png as png
-from vkbloom._cli.program import program
 from vkbloom._io.image_reading import load
 from vkbloom._io.srgb import decode_srgb, encode_srgb
 from vkbloom._methods.mip_chain import Pyramid
@@ -22,16 +23,6 @@ from vkbloom._methods.mip_chain import Pyramid
 oiio = pytest.importorskip("OpenImageIO")
 
 pytestmark = pytest.mark.usefixtures("kept_renderers")
-
-NATURAL = vkbloom.presets["bevy_natural"]
-
-
-def run(*arguments: str | Path) -> Result:
-    words = ["apply", *map(str, arguments)]
-    if not {"--preset", "--method"} & set(words):
-        # Files of integers start from the preset photo: see test_cli_photo.py.
-        words += ["--preset", "bevy_natural"]
-    return CliRunner().invoke(program, words)
 
 
 def done(*arguments: str | Path) -> Result:
@@ -46,12 +37,6 @@ def done(*arguments: str | Path) -> Result:
 
 def pixels(path: Path) -> NDArray[Any]:
     return load(path).pixels
-
-
-def applied(image: NDArray[Any], settings: vkbloom.Settings | None = None) -> NDArray[Any]:
-    with vkbloom.Renderer() as renderer:
-        chosen = settings or NATURAL
-        return renderer.apply(image, chosen, framebuffers="final")["final"]
 
 
 def linear(levels: NDArray[Any]) -> NDArray[np.float32]:

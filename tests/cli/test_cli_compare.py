@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 import vkbloom
 from tests.cli import calls
+from tests.framebuffers import make, write_image
 from tests.images import changed, noise_image
-from vkbloom import Frames, Separable
 from vkbloom._views.comparison import Comparison
 
 oiio = pytest.importorskip("OpenImageIO")
@@ -80,13 +80,7 @@ class TestCommand:
         assert run(files["nan.exr"], files["float.exr"], "--allow-nan").exit_code == 1
 
     def test_windows_differ(self, files: dict[str, Path], tmp_path: Path) -> None:
-        moved = tmp_path / "moved.exr"
-        spec = oiio.ImageSpec(24, 16, 3, "float")
-        spec.x, spec.full_x = 5, 5
-        writer = oiio.ImageOutput.create(str(moved))
-        assert writer.open(str(moved), spec)
-        assert writer.write_image(noise_image(16, 24, 3))
-        assert writer.close()
+        moved = write_image(tmp_path / "moved.exr", noise_image(16, 24, 3), x=5, full_x=5)
         result = run(files["float.exr"], moved)
         assert result.exit_code == 1
         assert (
@@ -106,9 +100,7 @@ class TestCommand:
         """Files whose first parts are equal are not thereby equal."""
         values = np.random.default_rng(0).random((8, 9, 3)).astype(np.float32)
         for name, final in (("a.exr", values), ("b.exr", values / 2)):
-            arrays = {"glow": values, "final": final}
-            frames = Frames(arrays, timings={}, settings=Separable(), info={})
-            frames.save(tmp_path / name)
+            make({"glow": values, "final": final}).save(tmp_path / name)
         paths = (tmp_path / "a.exr", tmp_path / "b.exr")
         result = run(*paths)
         assert (result.exit_code, result.stdout) == (2, "")

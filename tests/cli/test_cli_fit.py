@@ -7,10 +7,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
 import vkbloom
-from vkbloom._cli.program import program
+from tests.cli.calls import run
 from vkbloom._fit import fitting
 
 pytestmark = pytest.mark.usefixtures("kept_renderers")
@@ -31,7 +30,7 @@ def files(tmp_path: Path) -> tuple[str, str]:
 def test_best_first(files: tuple[str, str]) -> None:
     words = ["--method", "dual_kawase", "--method", "separable", "--vary", "threshold,intensity"]
     # Without a knee, as in the defaults, the fit is near and not exact.
-    done = CliRunner().invoke(program, ["fit", *files, *words, "--max-calls", "60"])
+    done = run("fit", *files, *words, "--max-calls", 60)
     assert done.exit_code == 0, done.output
     lines = done.output.splitlines()
     assert lines[0].startswith("separable: relative loss 0.")
@@ -42,11 +41,9 @@ def test_best_first(files: tuple[str, str]) -> None:
 
 def test_a_poor_fit_says_so(files: tuple[str, str]) -> None:
     words = ["--preset", "tutorial", "--vary", "intensity", "--max-calls", "4"]
-    wrong = [files[1], files[0]]
-    done = CliRunner().invoke(program, ["fit", *wrong, *words])
+    done = run("fit", *reversed(files), *words)
     assert done.exit_code == 0
-    verdict = done.stdout.splitlines()[2]
-    assert verdict == "  poor: no bloom was found"
+    assert done.stdout.splitlines()[2] == "  poor: no bloom was found"
 
 
 def test_screenshots(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -59,16 +56,14 @@ def test_screenshots(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     names = [str(tmp_path / name) for name in ("image.png", "target.png")]
     image = (np.random.default_rng(0).random((24, 32, 3)) ** 4).astype(np.float32)
     vkbloom.write(names[0], image)
-    words = ["apply", *names, "--preset", "unity_urp", "--threshold", "0.4", "--intensity", "0.5"]
-    assert CliRunner().invoke(program, words).exit_code == 0
-    words = ["fit", *names, "--preset", "all", "--max-calls", "3"]
-    done = CliRunner().invoke(program, words)
+    words = ["--preset", "unity_urp", "--threshold", "0.4", "--intensity", "0.5"]
+    assert run("apply", *names, *words).exit_code == 0
+    done = run("fit", *names, "--preset", "all", "--max-calls", 3)
     assert done.exit_code == 0, done.output
     methods = [line.split(":")[0] for line in done.stdout.splitlines() if " loss " in line]
     searched = [preset.method for preset in few.values()]
     assert sorted(methods) == sorted([*searched, vkbloom.presets["photo"].method])
-    words = ["fit", *names, "--preset", "unity_urp", "--json"]
-    (found,) = json.loads(CliRunner().invoke(program, words).stdout)
+    (found,) = json.loads(run("fit", *names, "--preset", "unity_urp", "--json").stdout)
     assert found["verdict"] == "good"
     assert found["loss"] <= found["start_loss"]
     assert found["varied"] == pytest.approx({"threshold": 0.4, "intensity": 0.5}, rel=0.1)
@@ -76,7 +71,7 @@ def test_screenshots(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_translate(renderer: vkbloom.Renderer) -> None:
     words = ("--preset", "Kino", "--intensity", "0.5", "--size", "64x48", "--max-calls", "12")
-    result = CliRunner().invoke(program, ["translate", *words, "--to", "Pyramid", "--json"])
+    result = run("translate", *words, "--to", "Pyramid", "--json")
     assert result.exit_code == 0, result.stderr
     (found,) = json.loads(result.stdout)
     settings = vkbloom.presets["kino"].replace(intensity=0.5)

@@ -56,17 +56,6 @@ def test_colours_under_alpha_0_are_told(tmp_path: Path, under: int) -> None:
     assert np.abs(shown.astype(int) - (200, 40, 40, 255)).max() <= 2
 
 
-def test_ultra_hdr_starts_from_photo(tmp_path: Path, renderer: vkbloom.Renderer) -> None:
-    spec = oiio.ImageSpec(64, 64, 3, "half")
-    spec.attribute("jpeg:ultrahdr", 1)
-    spec.attribute("oiio:ColorSpace", "lin_p3d65_scene")
-    written(tmp_path / "a.jpg", spec, np.full((64, 64, 3), (0.6, 0.1, 2), np.float16))
-    assert apply(tmp_path / "a.jpg", tmp_path / "b.exr").exit_code == 0
-    image = vkbloom.read(tmp_path / "a.jpg")
-    expected = renderer.apply(image, vkbloom.presets["photo"])["final"]
-    assert np.array_equal(vkbloom.read(tmp_path / "b.exr"), expected)
-
-
 @pytest.mark.parametrize("suffix", ["png", "exr"])
 def test_a_signal_leaves_no_file(tmp_path: Path, suffix: str) -> None:
     store_png(tmp_path / "a.png", np.zeros((16, 16, 3), np.uint8))

@@ -3,54 +3,34 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
-from click.testing import Result
 from numpy.testing import assert_array_equal
-from numpy.typing import NDArray
 
 import vkbloom
-from tests.cli.calls import run
+from tests.cli.calls import applied, done
 from tests.images import picture
 
 pytestmark = pytest.mark.usefixtures("kept_renderers")
-
-xr = pytest.importorskip("xarray")
 
 PYRAMID = ("--method", "pyramid", "--levels", "2", "--composite", "mix")
 SETTINGS = vkbloom.Pyramid(levels=2, composite="mix")
 
 
-def done(*words: object) -> Result:
-    result = run(*words)
-    assert (result.exit_code, result.stderr) == (0, "")
-    return result
-
-
-def stored(path: Path, array: NDArray[Any]) -> Path:
-    return vkbloom.write(path, array)
-
-
-def expected(image: NDArray[Any], settings: vkbloom.Settings, **given: Any) -> NDArray[Any]:
-    with vkbloom.Renderer() as renderer:
-        return renderer.apply(image, settings, framebuffers="final", **given)["final"]
-
-
 def test_apply_with_a_mask_and_an_emission(tmp_path: Path) -> None:
     image, emission = picture(24, 16, 3), picture(24, 16, 3, seed=1)
     levels = np.arange(16 * 24, dtype=np.uint8).reshape(16, 24)
-    source = stored(tmp_path / "a.exr", image)
+    source = vkbloom.write(tmp_path / "a.exr", image)
     # 128 is one half: masks are not decoded from sRGB. A file with three equal channels is also
     # grey.
-    mask = stored(tmp_path / "mask.png", np.repeat(levels[..., None], 3, axis=2))
-    glow = stored(tmp_path / "glow.exr", emission)
+    mask = vkbloom.write(tmp_path / "mask.png", np.repeat(levels[..., None], 3, axis=2))
+    glow = vkbloom.write(tmp_path / "glow.exr", emission)
     out = tmp_path / "out.exr"
     done("apply", source, out, *PYRAMID, "--mask", mask)
-    assert_array_equal(vkbloom.read(out), expected(image, SETTINGS, mask=levels))
+    assert_array_equal(vkbloom.read(out), applied(image, SETTINGS, mask=levels))
     done("apply", source, out, *PYRAMID, "--mask", mask, "--emission", glow)
-    both = expected(image, SETTINGS, mask=levels, emission=emission)
+    both = applied(image, SETTINGS, mask=levels, emission=emission)
     assert_array_equal(vkbloom.read(out), both)
 
 
@@ -61,22 +41,22 @@ def test_apply_to_several_images_with_one_emission(tmp_path: Path) -> None:
     sources = [tmp_path / f"f{i}.exr" for i in range(2)]
     for source, image in zip(sources, images, strict=True):
         vkbloom.write(source, image, premultiplied=True)
-    glow = stored(tmp_path / "glow.exr", emission)
+    glow = vkbloom.write(tmp_path / "glow.exr", emission)
     done("apply", *sources, tmp_path / "out", *PYRAMID, "--alpha", "max", "--emission", glow)
     alike = np.concatenate([emission, np.ones((16, 24, 1))], axis=2).astype(np.float32)
     for source, image in zip(sources, images, strict=True):
         found = vkbloom.read(tmp_path / "out" / source.name, premultiplied=True)
-        wanted = expected(image, SETTINGS.replace(alpha="max"), emission=alike)
+        wanted = applied(image, SETTINGS.replace(alpha="max"), emission=alike)
         assert_array_equal(found, wanted)
 
 
 def test_straight_colours_are_multiplied_and_divided(tmp_path: Path) -> None:
     levels = picture(24, 16, 4, "uint8")
     levels[:, :12, 3] = 0
-    source, out = stored(tmp_path / "a.png", levels), tmp_path / "out.png"
+    source, out = vkbloom.write(tmp_path / "a.png", levels), tmp_path / "out.png"
     done("apply", source, out, *PYRAMID, "--alpha", "blur")
     image = vkbloom.read(source, premultiplied=True)
-    final = expected(image, SETTINGS.replace(alpha="blur"))
+    final = applied(image, SETTINGS.replace(alpha="blur"))
     vkbloom.write(tmp_path / "own.png", final, premultiplied=True)
     difference = vkbloom.read(out) - vkbloom.read(tmp_path / "own.png")
     assert np.abs(difference).max() <= 0.01

@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from click.testing import CliRunner, Result
+from click.testing import Result
 
 import vkbloom
+from tests.cli import calls
 from tests.images import noise
 from vkbloom import Renderer, Separable
 from vkbloom._cli.grid import axis_values
-from vkbloom._cli.program import program
 from vkbloom._io.image_reading import load
 from vkbloom._io.image_writing import save
 from vkbloom._io.images import Picture
@@ -25,8 +25,8 @@ xr = pytest.importorskip("xarray")
 
 
 def run(*arguments: Any) -> Result:
-    words = ["grid", *(word for argument in arguments for word in str(argument).split())]
-    return CliRunner().invoke(program, words)
+    words = (word for argument in arguments for word in str(argument).split())
+    return calls.run("grid", *words)
 
 
 def done(*arguments: Any) -> str:
@@ -104,9 +104,8 @@ class TestImageFiles:
             for j in (0, 1)
             for name in ("final.png", "bloom.exr")
         )
-        one = str(tmp_path / "one.png")
-        words = "--exposure -1 --intensity 1"
-        CliRunner().invoke(program, ["apply", str(image_file), one, *words.split()])
+        one = tmp_path / "one.png"
+        calls.run("apply", image_file, one, "--exposure", -1, "--intensity", 1)
         np.testing.assert_array_equal(load(out / "001_000_final.png").pixels, load(one).pixels)
 
     @pytest.mark.parametrize(
@@ -126,7 +125,7 @@ class TestImageFiles:
         assert run(photo, "--axis", axis, "-o", tmp_path / "files").exit_code == 0
         for index, words in enumerate(points):
             one = tmp_path / "one.png"
-            CliRunner().invoke(program, ["apply", str(photo), str(one), *words])
+            calls.run("apply", photo, one, *words)
             found = load(tmp_path / "files" / f"00{index}_final.png").pixels
             np.testing.assert_array_equal(found, load(one).pixels)
 

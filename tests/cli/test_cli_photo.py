@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 import vkbloom
 from tests.cli.calls import run
+from tests.io.parts import store_ultra_hdr
 from vkbloom._io.expansion import KNEE
 from vkbloom._io.image_reading import load
 from vkbloom._io.srgb import decode_srgb
@@ -146,13 +147,17 @@ class TestRead:
         np.testing.assert_array_equal(vkbloom.read(path, expand=4), image)
 
 
-def test_files_of_floats_start_from_bevy_natural(
-    tmp_path: Path, renderer: vkbloom.Renderer
+@pytest.mark.parametrize(
+    ("name", "store", "preset"),
+    [("a.exr", vkbloom.write, "bevy_natural"), ("a.jpg", store_ultra_hdr, "photo")],
+)
+def test_where_files_of_floats_start(
+    tmp_path: Path, renderer: vkbloom.Renderer, name: str, store: Any, preset: str
 ) -> None:
-    image = np.random.default_rng(0).random((24, 32, 3), np.float32) * 2
-    path = vkbloom.write(tmp_path / "a.exr", image)
+    path = tmp_path / name
+    store(path, (np.random.default_rng(0).random((64, 64, 3)) * 2).astype(np.float16))
     assert apply(path, tmp_path / "b.exr").exit_code == 0
-    expected = renderer.apply(image, vkbloom.presets["bevy_natural"])["final"]
+    expected = renderer.apply(vkbloom.read(path), vkbloom.presets[preset])["final"]
     np.testing.assert_array_equal(vkbloom.read(tmp_path / "b.exr"), expected)
 
 

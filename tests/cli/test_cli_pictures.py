@@ -6,13 +6,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner, Result
+from click.testing import Result
 
 import vkbloom
+from tests.cli import calls
 from tests.framebuffers import names_in
 from tests.io.profiles import store_png
 from tests.processes import python
-from vkbloom._cli.program import program
 
 pytestmark = pytest.mark.usefixtures("kept_renderers")
 
@@ -21,11 +21,7 @@ IMAGE = np.random.default_rng(3).integers(0, 200, (12, 16, 3), dtype=np.uint8)
 
 
 def run(*words: object) -> Result:
-    given = [*map(str, words)]
-    if not {"--preset", "--method", "--help"} & {*given}:
-        # Files of integers start from the preset photo: see test_cli_photo.py.
-        given += ["--preset", "bevy_natural", "--composite", "add"]
-    return CliRunner().invoke(program, ["apply", *given])
+    return calls.apply(*words, "--composite", "add")
 
 
 @pytest.fixture
@@ -108,7 +104,7 @@ class TestSequences:
             source = Path("x.exr" if kind == "e" else "y.png")
             (frames / f"in/{place}{source.suffix}").write_bytes(source.read_bytes())
         for words in (("in", "out"), ("x.exr", "alone.exr"), ("y.png", "alone.png")):
-            assert CliRunner().invoke(program, ["apply", *words]).exit_code == 0
+            assert calls.run("apply", *words).exit_code == 0
         for file in (frames / "out").iterdir():
             alone = vkbloom.read(f"alone{file.suffix}")
             np.testing.assert_array_equal(vkbloom.read(file), alone)
@@ -204,17 +200,25 @@ class TestJpeg:
         with image.open(tmp_path / "c.jpg") as made:
             assert plugin.get_sampling(made) == 0, named
 
-    def test_exif_and_dpi_are_kept(self, tmp_path: Path) -> None:
+    @pytest.mark.parametrize("way", ["command", "python"])
+    def test_exif_and_dpi_are_kept(self, tmp_path: Path, way: str) -> None:
         image = pytest.importorskip("PIL.Image")
+        rational = pytest.importorskip("PIL.TiffImagePlugin").IFDRational
         picture = image.fromarray(IMAGE)
         exif = picture.getexif()
-        maker, orientation, inner, taken, iso = 271, 274, 0x8769, 0x9003, 0x8827
+        maker, orientation, inner, taken, iso, seconds = 271, 274, 0x8769, 0x9003, 0x8827, 0x829A
         exif[maker], exif[orientation] = "Maker", 6
         exif.get_ifd(inner)[taken] = "2020:01:02 03:04:05"
         exif.get_ifd(inner)[iso] = 400
-        picture.save(tmp_path / "a.jpg", exif=exif, dpi=(240, 240))
-        assert run(tmp_path / "a.jpg", tmp_path / "b.jpg", "--quality", 90).exit_code == 0
-        with image.open(tmp_path / "b.jpg") as made:
+        exif.get_ifd(inner)[seconds] = rational(1, 2)
+        source, target = tmp_path / "a.jpg", tmp_path / "b.jpg"
+        picture.save(source, exif=exif, dpi=(240, 240))
+        if way == "command":
+            assert run(source, target, "--quality", 90).exit_code == 0
+        else:
+            pixels, facts = vkbloom.read(source, metadata=True)
+            vkbloom.write(target, pixels, metadata=facts)
+        with image.open(target) as made:
             assert made.info["dpi"] == (240, 240)
             # The pixels are rotated, so the orientation must be removed.
             assert made.size == picture.size[::-1]
@@ -222,6 +226,7 @@ class TestJpeg:
             assert (found[maker], found.get(orientation, 1)) == ("Maker", 1)
             assert found.get_ifd(inner)[taken] == "2020:01:02 03:04:05"
             assert found.get_ifd(inner)[iso] == 400
+            assert float(found.get_ifd(inner)[seconds]) == 0.5
 
 
 def test_input_colour_is_a_space(tmp_path: Path) -> None:

@@ -13,10 +13,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
 import vkbloom
-from vkbloom._cli.program import program
+from tests.cli.calls import run
 
 VKBLOOM = f"'{sys.executable}' -m vkbloom"
 LONGEST = 120  # seconds
@@ -51,22 +50,21 @@ def bash(line: str) -> subprocess.CompletedProcess[str]:
 def stream_of(file: str, kind: str) -> Iterator[str]:
     """Yield the name of a pipe with the content of a file."""
     content = Path(file).read_bytes()
-    if kind == "named pipe":
-        writer = threading.Thread(target=lambda: Path("in").write_bytes(content), daemon=True)
-        writer.start()
-        yield "in"
-        writer.join(LONGEST)
-    else:
-        reading, writing = os.pipe()
+    name: str = "in"
+    target: str | int = name
+    if kind == "substitution":
+        reading, target = os.pipe()
+        name = f"/dev/fd/{reading}"
 
-        def write() -> None:
-            with os.fdopen(writing, "wb") as stream:
-                stream.write(content)
+    def write() -> None:
+        with open(target, "wb") as stream:
+            stream.write(content)
 
-        writer = threading.Thread(target=write, daemon=True)
-        writer.start()
-        yield f"/dev/fd/{reading}"
-        writer.join(LONGEST)
+    writer = threading.Thread(target=write, daemon=True)
+    writer.start()
+    yield name
+    writer.join(LONGEST)
+    if kind == "substitution":
         os.close(reading)
 
 
@@ -86,15 +84,15 @@ def stream_of(file: str, kind: str) -> Iterator[str]:
 @pytest.mark.parametrize("kind", ["standard input", "named pipe", "substitution"])
 @pytest.mark.usefixtures("kept_renderers")
 def test_streams_are_read_like_files(folder: Path, line: str, file: str, kind: str) -> None:
-    asked = CliRunner().invoke(program, line.replace("out", "asked").format(file).split())
+    asked = run(*line.replace("out", "asked").format(file).split())
     if kind == "standard input":
         if "--psf" in line:
             pytest.skip("its word may be a name")
         content = Path(file).read_bytes()
-        done = CliRunner().invoke(program, line.format("-").split(), input=content)
+        done = run(*line.format("-").split(), input=content)
     else:
         with stream_of(file, kind) as name:
-            done = CliRunner().invoke(program, line.format(name).split())
+            done = run(*line.format(name).split())
     assert done.exit_code == asked.exit_code == int(line.startswith("compare")), done.stderr
     for name in ("out.exr", "out/000.exr"):
         expected = folder / name.replace("out", "asked")

@@ -15,11 +15,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
 import vkbloom
+from tests.cli.calls import run
 from vkbloom import _doctor as doctor
-from vkbloom._cli.program import program
 from vkbloom._doctor import child, drivers, installation, probe
 from vkbloom._doctor.installation import Finding
 
@@ -44,7 +43,7 @@ def renders_of(findings: Iterable[Finding]) -> list[Finding]:
 
 def examined(**changes: str) -> tuple[int, dict[str, Any], list[Finding]]:
     """Run ``vkbloom doctor --json``; return its status, its answer and its findings."""
-    ended = CliRunner().invoke(program, ["doctor", "--json"], env=changes)
+    ended = run("doctor", "--json", env=changes)
     assert ended.stderr == ""
     answer = json.loads(ended.stdout)
     return ended.exit_code, answer, [Finding(**entry) for entry in answer["findings"]]
@@ -117,7 +116,7 @@ def test_finding_that_is_not_ok_has_advice_or_an_explanation() -> None:
 
 @pytest.mark.usefixtures("remembered")
 def test_the_table_has_a_line_for_each_finding() -> None:
-    ended = CliRunner().invoke(program, ["doctor"], env=PROBLEMS)
+    ended = run("doctor", env=PROBLEMS)
     assert (ended.exit_code, ended.stderr) == (0, "")
     lines = ended.stdout.splitlines()
     chosen = next(index for index, line in enumerate(lines) if "chosen adapter" in line)
@@ -139,7 +138,7 @@ def test_no_driver() -> None:
     assert by_topic(findings, "adapters").advice == "Solve the problems above first."
     assert f"VK_DRIVER_FILES={ABSENT}" in by_topic(findings, "environment").found
     assert "test render" not in {finding.topic for finding in findings}
-    ended = CliRunner().invoke(program, ["doctor"], env={"VK_DRIVER_FILES": ABSENT})
+    ended = run("doctor", env={"VK_DRIVER_FILES": ABSENT})
     assert (ended.exit_code, ended.stderr) == (1, "")
     assert ended.stdout.endswith("\nThis machine cannot render. Problems found: 2.\n")
 
@@ -229,14 +228,18 @@ def test_manifest_that_does_not_work_is_a_problem(
     assert reason.replace("{tmp}", str(tmp_path)) in finding.found
 
 
+def finding_of(folder: Path, **icd: str) -> Finding:
+    """Return the finding about a manifest of a driver."""
+    manifest = folder / "driver.json"
+    icd["api_version"] = "1.3.0"
+    manifest.write_text(json.dumps({"file_format_version": "1.0.1", "ICD": icd}))
+    return drivers.manifest(str(manifest))
+
+
 @linux_only
 def test_manifest_of_another_architecture_is_a_note(tmp_path: Path) -> None:
-    manifest = tmp_path / "driver.json"
     bits = 32 if sys.maxsize > 2**32 else 64
-    library = {"library_path": str(tmp_path / "none.so"), "library_arch": str(bits)}
-    icd = {"api_version": "1.3.0", **library}
-    manifest.write_text(json.dumps({"file_format_version": "1.0.1", "ICD": icd}))
-    finding = drivers.manifest(str(manifest))
+    finding = finding_of(tmp_path, library_path=f"{tmp_path}/none.so", library_arch=str(bits))
     assert finding.status == "note"
     assert "of another architecture" in finding.found
 
@@ -325,11 +328,8 @@ def test_a_driver_that_fails_is_named(
     # All symbols are looked up as the library opens, as Mesa's build asks for.
     command = [compiler, "-shared", "-fPIC", "-Wl,-z,now", str(source), "-o", str(library)]
     subprocess.run(command, check=True)
-    manifest = tmp_path / "driver.json"
-    icd = {"library_path": str(library), "api_version": "1.3.0"}
-    manifest.write_text(json.dumps({"file_format_version": "1.0.0", "ICD": icd}))
     monkeypatch.setattr(child, "TIMEOUT", 3.0)
-    finding = drivers.manifest(str(manifest))
+    finding = finding_of(tmp_path, library_path=str(library))
     assert finding.status == "problem"
     assert reason in finding.found
 
@@ -394,10 +394,6 @@ def test_a_wrong_framebuffer_is_found(frames: vkbloom.Frames, wrong: str) -> Non
 
 
 # The installation
-
-
-def cache() -> Finding:
-    return by_topic(installation.caches(), "cache VKBLOOM_CACHE_DIR")
 
 
 def test_extras_are_those_of_the_package(monkeypatch: pytest.MonkeyPatch) -> None:

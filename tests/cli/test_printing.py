@@ -14,9 +14,9 @@ from rich.console import Console
 
 import vkbloom
 from tests.cli.calls import one_line, run
+from tests.framebuffers import write_image
 from tests.grid.stores import contents
 from tests.images import noise_image
-from tests.io.parts import written
 from tests.refusals import assert_matches, rows
 from vkbloom._cli import listing
 from vkbloom._cli.program import program
@@ -84,9 +84,6 @@ def test_completion(words: list[str], offered: set[str]) -> None:
 # Wrong use and failures of all commands: one line on standard error, a status, and no file.
 
 
-oiio = pytest.importorskip("OpenImageIO")
-
-
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with pictures, damaged files and settings."""
@@ -98,9 +95,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     vkbloom.write(made / "small.png", levels[:6, :, :1])
     vkbloom.write(made / "alpha.png", np.dstack([levels, levels[..., :1]]))
     vkbloom.write(made / "a.exr", noise_image(16, 24, 3))
-    spec = oiio.ImageSpec(2, 2, 3, "float")
-    spec.channelnames = ("X", "Y", "Z")
-    written(made / "xyz.exr", spec, noise_image(2, 2, 3))
+    write_image(made / "xyz.exr", noise_image(2, 2, 3), channelnames=("X", "Y", "Z"))
     files = {"{}": b"{}", "half.json": b"", "bad.gltf": b"{broken"}
     files["x.json"] = b'{"method": "kino", "x": 1}'
     files["kino.json"] = b'{"method": "kino"}'

@@ -10,44 +10,46 @@
 #include <sys/mman.h>
 #include <unistd.h>
 
+// Functions of Vulkan, and what the layer has in their place. NULL: the layer calls them alone.
 #define INSTANCE_FUNCTIONS(FUNCTION) \
-    FUNCTION(vkGetPhysicalDeviceProperties) \
-    FUNCTION(vkGetPhysicalDeviceProperties2) \
-    FUNCTION(vkGetPhysicalDeviceFeatures) \
-    FUNCTION(vkGetPhysicalDeviceFeatures2) \
-    FUNCTION(vkGetPhysicalDeviceFormatProperties) \
-    FUNCTION(vkGetPhysicalDeviceFormatProperties2) \
-    FUNCTION(vkGetPhysicalDeviceQueueFamilyProperties) \
-    FUNCTION(vkGetPhysicalDeviceQueueFamilyProperties2) \
-    FUNCTION(vkGetPhysicalDeviceMemoryProperties) \
-    FUNCTION(vkGetPhysicalDeviceMemoryProperties2) \
-    FUNCTION(vkGetPhysicalDeviceSurfaceCapabilitiesKHR) \
-    FUNCTION(vkEnumerateDeviceExtensionProperties) \
-    FUNCTION(vkGetPhysicalDeviceExternalSemaphoreProperties)
+    FUNCTION(vkGetPhysicalDeviceProperties, get_properties) \
+    FUNCTION(vkGetPhysicalDeviceProperties2, get_properties2) \
+    FUNCTION(vkGetPhysicalDeviceFeatures2, get_features) \
+    FUNCTION(vkGetPhysicalDeviceFormatProperties, get_format) \
+    FUNCTION(vkGetPhysicalDeviceFormatProperties2, get_format2) \
+    FUNCTION(vkGetPhysicalDeviceQueueFamilyProperties, get_families) \
+    FUNCTION(vkGetPhysicalDeviceQueueFamilyProperties2, get_families2) \
+    FUNCTION(vkGetPhysicalDeviceMemoryProperties, get_memory) \
+    FUNCTION(vkGetPhysicalDeviceSurfaceCapabilitiesKHR, get_surface) \
+    FUNCTION(vkEnumerateDeviceExtensionProperties, get_extensions) \
+    FUNCTION(vkGetPhysicalDeviceExternalSemaphoreProperties, get_semaphores)
 
 #define DEVICE_FUNCTIONS(FUNCTION) \
-    FUNCTION(vkGetBufferMemoryRequirements) \
-    FUNCTION(vkGetImageMemoryRequirements) \
-    FUNCTION(vkGetMemoryHostPointerPropertiesEXT) \
-    FUNCTION(vkAllocateMemory) \
-    FUNCTION(vkMapMemory) \
-    FUNCTION(vkFreeMemory) \
-    FUNCTION(vkCmdClearColorImage) \
-    FUNCTION(vkCmdCopyBufferToImage) \
-    FUNCTION(vkQueueSubmit) \
-    FUNCTION(vkWaitForFences) \
-    FUNCTION(vkAcquireNextImageKHR) \
-    FUNCTION(vkQueuePresentKHR) \
-    FUNCTION(vkQueueWaitIdle) \
-    FUNCTION(vkCreateSemaphore) \
-    FUNCTION(vkDestroySemaphore) \
-    FUNCTION(vkSignalSemaphore) \
-    FUNCTION(vkWaitSemaphores)
+    FUNCTION(vkGetBufferMemoryRequirements, get_buffer_requirements) \
+    FUNCTION(vkGetImageMemoryRequirements, get_image_requirements) \
+    FUNCTION(vkGetMemoryHostPointerPropertiesEXT, get_host_pointer) \
+    FUNCTION(vkAllocateMemory, allocate) \
+    FUNCTION(vkMapMemory, map_memory) \
+    FUNCTION(vkFlushMappedMemoryRanges, flush) \
+    FUNCTION(vkInvalidateMappedMemoryRanges, invalidate) \
+    FUNCTION(vkFreeMemory, free_memory) \
+    FUNCTION(vkCmdCopyBufferToImage, copy_to_image) \
+    FUNCTION(vkQueueSubmit, submit) \
+    FUNCTION(vkWaitForFences, wait) \
+    FUNCTION(vkAcquireNextImageKHR, acquire) \
+    FUNCTION(vkQueuePresentKHR, present) \
+    FUNCTION(vkQueueWaitIdle, wait_idle) \
+    FUNCTION(vkCreateSemaphore, create_semaphore) \
+    FUNCTION(vkGetSemaphoreFdKHR, get_semaphore_file) \
+    FUNCTION(vkDestroySemaphore, destroy_semaphore) \
+    FUNCTION(vkCmdClearColorImage, NULL) \
+    FUNCTION(vkSignalSemaphore, NULL) \
+    FUNCTION(vkWaitSemaphores, NULL)
 
 // What is below. Of the first instance and its first device, and good for all: these functions go
 // by their handles.
 static struct {
-#define MEMBER(name) PFN_##name name;
+#define MEMBER(name, function) PFN_##name name;
     INSTANCE_FUNCTIONS(MEMBER)
     DEVICE_FUNCTIONS(MEMBER)
 #undef MEMBER
@@ -213,24 +215,12 @@ static VKAPI_ATTR void VKAPI_CALL get_properties2(VkPhysicalDevice physical,
                      65536);
 }
 
-static void change_features(VkPhysicalDeviceFeatures *features)
-{
-    if (lacks("storage"))
-        features->shaderStorageImageWriteWithoutFormat = VK_FALSE;
-}
-
 static VKAPI_ATTR void VKAPI_CALL get_features(VkPhysicalDevice physical,
-                                               VkPhysicalDeviceFeatures *features)
-{
-    below.vkGetPhysicalDeviceFeatures(physical, features);
-    change_features(features);
-}
-
-static VKAPI_ATTR void VKAPI_CALL get_features2(VkPhysicalDevice physical,
-                                                VkPhysicalDeviceFeatures2 *features)
+                                               VkPhysicalDeviceFeatures2 *features)
 {
     below.vkGetPhysicalDeviceFeatures2(physical, features);
-    change_features(&features->features);
+    if (lacks("storage"))
+        features->features.shaderStorageImageWriteWithoutFormat = VK_FALSE;
 }
 
 static void change_format(VkFormat format, VkFormatProperties *properties)
@@ -322,7 +312,8 @@ static VKAPI_ATTR VkResult VKAPI_CALL get_extensions(VkPhysicalDevice physical, 
 // coherent: all of them the one type below.
 enum { DEVICE_TYPE, COHERENT_TYPE, CACHED_TYPE, TYPE_COUNT };
 
-static void change_memory(VkPhysicalDeviceMemoryProperties *memory)
+static VKAPI_ATTR void VKAPI_CALL get_memory(VkPhysicalDevice physical,
+                                             VkPhysicalDeviceMemoryProperties *memory)
 {
     static const VkMemoryPropertyFlags flags[TYPE_COUNT] = {
         [DEVICE_TYPE] = VK_MEMORY_PROPERTY_DEVICE_LOCAL_BIT,
@@ -331,6 +322,7 @@ static void change_memory(VkPhysicalDeviceMemoryProperties *memory)
         [CACHED_TYPE] = VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT | VK_MEMORY_PROPERTY_HOST_CACHED_BIT,
     };
 
+    below.vkGetPhysicalDeviceMemoryProperties(physical, memory);
     for (uint32_t i = 0; lacks("heap") && i < memory->memoryHeapCount; ++i)
         memory->memoryHeaps[i].size = 256 << 20;
     if (!lacks("memory"))
@@ -341,20 +333,6 @@ static void change_memory(VkPhysicalDeviceMemoryProperties *memory)
     memory->memoryHeaps[0].size /= 2;
     for (int i = 0; i < TYPE_COUNT; ++i)
         memory->memoryTypes[i] = (VkMemoryType){flags[i], i != DEVICE_TYPE};
-}
-
-static VKAPI_ATTR void VKAPI_CALL get_memory(VkPhysicalDevice physical,
-                                             VkPhysicalDeviceMemoryProperties *memory)
-{
-    below.vkGetPhysicalDeviceMemoryProperties(physical, memory);
-    change_memory(memory);
-}
-
-static VKAPI_ATTR void VKAPI_CALL get_memory2(VkPhysicalDevice physical,
-                                              VkPhysicalDeviceMemoryProperties2 *memory)
-{
-    below.vkGetPhysicalDeviceMemoryProperties2(physical, memory);
-    change_memory(&memory->memoryProperties);
 }
 
 static void change_requirements(VkMemoryRequirements *requirements)
@@ -651,7 +629,7 @@ static VKAPI_ATTR VkResult VKAPI_CALL create_instance(const VkInstanceCreateInfo
                                                       VkInstance *created)
 {
     const VkResult result = begin_instance(info, callbacks, created);
-#define FETCH(name) below.name = (PFN_##name)chain.instance_proc(*created, #name);
+#define FETCH(name, function) below.name = (PFN_##name)chain.instance_proc(*created, #name);
     if (result == VK_SUCCESS && !below.vkGetPhysicalDeviceProperties) {
         INSTANCE_FUNCTIONS(FETCH)
     }
@@ -680,7 +658,7 @@ static VKAPI_ATTR VkResult VKAPI_CALL create_device(VkPhysicalDevice physical,
     if (lacks("portability") && changed.enabledExtensionCount == info->enabledExtensionCount)
         return VK_ERROR_INITIALIZATION_FAILED;
     const VkResult result = begin_device(physical, &changed, callbacks, created);
-#define FETCH(name) below.name = (PFN_##name)chain.device_proc(*created, #name);
+#define FETCH(name, function) below.name = (PFN_##name)chain.device_proc(*created, #name);
     if (result == VK_SUCCESS && !below.vkAllocateMemory) {
         DEVICE_FUNCTIONS(FETCH)
     }
@@ -688,42 +666,13 @@ static VKAPI_ATTR VkResult VKAPI_CALL create_device(VkPhysicalDevice physical,
     return result;
 }
 
-static const struct entry entries[] = {
-    ENTRY(vkGetInstanceProcAddr, get_instance_proc, false),
-    ENTRY(vkCreateInstance, create_instance, false),
-    ENTRY(vkCreateDevice, create_device, false),
-    ENTRY(vkGetPhysicalDeviceProperties, get_properties, false),
-    ENTRY(vkGetPhysicalDeviceProperties2, get_properties2, false),
-    ENTRY(vkGetPhysicalDeviceFeatures, get_features, false),
-    ENTRY(vkGetPhysicalDeviceFeatures2, get_features2, false),
-    ENTRY(vkGetPhysicalDeviceFormatProperties, get_format, false),
-    ENTRY(vkGetPhysicalDeviceFormatProperties2, get_format2, false),
-    ENTRY(vkGetPhysicalDeviceQueueFamilyProperties, get_families, false),
-    ENTRY(vkGetPhysicalDeviceQueueFamilyProperties2, get_families2, false),
-    ENTRY(vkGetPhysicalDeviceMemoryProperties, get_memory, false),
-    ENTRY(vkGetPhysicalDeviceMemoryProperties2, get_memory2, false),
-    ENTRY(vkGetPhysicalDeviceSurfaceCapabilitiesKHR, get_surface, false),
-    ENTRY(vkEnumerateDeviceExtensionProperties, get_extensions, false),
-    ENTRY(vkGetPhysicalDeviceExternalSemaphoreProperties, get_semaphores, false),
-    ENTRY(vkGetDeviceProcAddr, get_device_proc, true),
-    ENTRY(vkGetBufferMemoryRequirements, get_buffer_requirements, true),
-    ENTRY(vkGetImageMemoryRequirements, get_image_requirements, true),
-    ENTRY(vkGetMemoryHostPointerPropertiesEXT, get_host_pointer, true),
-    ENTRY(vkAllocateMemory, allocate, true),
-    ENTRY(vkMapMemory, map_memory, true),
-    ENTRY(vkFlushMappedMemoryRanges, flush, true),
-    ENTRY(vkInvalidateMappedMemoryRanges, invalidate, true),
-    ENTRY(vkFreeMemory, free_memory, true),
-    ENTRY(vkCmdCopyBufferToImage, copy_to_image, true),
-    ENTRY(vkQueueSubmit, submit, true),
-    ENTRY(vkWaitForFences, wait, true),
-    ENTRY(vkAcquireNextImageKHR, acquire, true),
-    ENTRY(vkQueuePresentKHR, present, true),
-    ENTRY(vkQueueWaitIdle, wait_idle, true),
-    ENTRY(vkCreateSemaphore, create_semaphore, true),
-    ENTRY(vkGetSemaphoreFdKHR, get_semaphore_file, true),
-    ENTRY(vkDestroySemaphore, destroy_semaphore, true),
-};
+#define OF_INSTANCE(name, function) ENTRY(name, function, false),
+#define OF_DEVICE(name, function)   ENTRY(name, function, true),
+static const struct entry entries[] = {ENTRY(vkGetInstanceProcAddr, get_instance_proc, false),
+                                       ENTRY(vkCreateInstance, create_instance, false),
+                                       ENTRY(vkCreateDevice, create_device, false),
+                                       ENTRY(vkGetDeviceProcAddr, get_device_proc, true),
+                                       INSTANCE_FUNCTIONS(OF_INSTANCE) DEVICE_FUNCTIONS(OF_DEVICE)};
 
 static PFN_vkVoidFunction find_own(const char *name, bool of_device)
 {

@@ -68,6 +68,9 @@ CUSTOM = {
 }
 
 
+#: What the device lacks.
+TAKEN = {*os.environ["VKBLOOM_LESSER"].split(",")}
+
 #: Passes of a frame of `final` alone, by method.
 PASSES: dict[str, int] = {}
 
@@ -154,7 +157,8 @@ def try_all(renderer: Renderer) -> dict[str, str]:
         sky = skybox.load(picture(4, 24, 4, dtype).reshape(6, 4, 4, 4))
         with_sky = dataclasses.replace(scene, skybox=sky)
         attempt(f"sky {dtype}", lambda: renderer.render(with_sky, None, (40, 30)))  # noqa: B023
-    for method in (vkbloom.BevyBloom(max_mip_dimension=16), vkbloom.FilamentBloom(resolution=16)):
+    methods = (vkbloom.BevyBloom(max_mip_dimension=16), vkbloom.FilamentBloom(resolution=16))
+    for method in methods if {"limits", "wide", "high"} & TAKEN else ():
         attempt("wide", lambda: apply_wide(renderer, method))  # noqa: B023  called here
     for label, text in CUSTOM.items() if "custom" in sys.argv else ():
         loaded = vkbloom.load_method(text, name=label)

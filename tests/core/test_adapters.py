@@ -61,11 +61,6 @@ def test_info_and_repr() -> None:
     assert renderer.info == info
 
 
-def test_software_is_a_cpu(software: AdapterInfo) -> None:
-    with Renderer("software") as renderer:
-        assert renderer.info == software
-
-
 @pytest.mark.parametrize("change", [str, str.upper, str.lower, lambda name: name[2:7]])
 def test_a_part_of_a_name_in_any_case(change: Any) -> None:
     name = adapters()[-1].name

@@ -78,7 +78,7 @@ def test_scenes_one_by_one_and_many(
 
 
 class CountingCore:
-    """A renderer's core that records the number of plans in each submission, and their bytes.
+    """A renderer's core that records the number of plans in each submission.
 
     `failing`: the exceptions of submissions, `at5` that of the sixth.
     """
@@ -87,7 +87,6 @@ class CountingCore:
         self.core = core
         self.failing = failing
         self.counts: list[int] = []
-        self.sizes: list[int] = []
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self.core, name)
@@ -96,34 +95,18 @@ class CountingCore:
         if error := self.failing.get(f"at{len(self.counts)}"):
             raise error
         self.counts.append(len(plans))
-        outputs = [output for plan in plans for output in plan.outputs]
-        self.sizes.append(sum(requests.array_bytes(shape, dtype) for _, shape, dtype in outputs))
         return self.core.run(source, plans, arrays)
 
 
-@pytest.mark.parametrize("frames", [1, 2, 5])
-def test_frames_that_fill_a_submission_alone(
-    renderer: Renderer, monkeypatch: pytest.MonkeyPatch, frames: int
+@pytest.mark.parametrize(
+    ("frames", "seconds", "most"),
+    [(1, 1e6, 1), (2, 1e6, 2), (5, 1e6, 5), (100, 1e-9, 1), (100, 1e6, requests.MAX_REQUESTS)],
+)
+def test_a_submission_has_a_limit_of_bytes_and_of_time(
+    renderer: Renderer, monkeypatch: pytest.MonkeyPatch, frames: int, seconds: float, most: int
 ) -> None:
     image = picture(33, 21, 4, seed=2)
     monkeypatch.setattr(requests, "MAX_BYTES", frames * image.nbytes)
-    monkeypatch.setattr(requests, "MAX_SECONDS", 1e6)
-    counting: Any = CountingCore(renderer._core)
-    settings = [Separable(exposure=exposure / 8) for exposure in range(20)]
-    source = _core.image_source(image)
-    work = [requests.Request(source, one) for one in settings]
-    results = list(requests.run(work, counting, ("final",)))
-    assert len(results) == 20
-    assert max(counting.sizes) == frames * image.nbytes
-    for one, arrays, _ in results:
-        np.testing.assert_array_equal(arrays["final"], renderer.apply(image, one)["final"])
-
-
-@pytest.mark.parametrize(("seconds", "most"), [(1e-9, 1), (1e6, requests.MAX_REQUESTS)])
-def test_a_submission_is_as_long_as_a_wait_may_be(
-    renderer: Renderer, monkeypatch: pytest.MonkeyPatch, seconds: float, most: int
-) -> None:
-    image = picture(33, 21, 4, seed=2)
     monkeypatch.setattr(requests, "MAX_SECONDS", seconds)
     counting: Any = CountingCore(renderer._core)
     settings = [Separable(exposure=step / 8) for step in range(100)]
@@ -133,6 +116,8 @@ def test_a_submission_is_as_long_as_a_wait_may_be(
     assert [one for one, *_ in results] == settings
     assert max(counting.counts) == most
     assert sum(counting.counts) == len(settings)
+    for one, arrays, _ in results[::20]:
+        np.testing.assert_array_equal(arrays["final"], renderer.apply(image, one)["final"])
 
 
 def test_arrays_are_the_takers(renderer: Renderer) -> None:
@@ -292,20 +277,6 @@ def test_an_error_comes_in_its_turn(
         next(frames)
 
 
-@pytest.mark.parametrize("place", [0, 1, 5])
-def test_an_error_of_the_sequence_comes_in_its_turn(renderer: Renderer, place: int) -> None:
-    def broken() -> Iterator[Settings]:
-        for exposure in range(place):
-            yield Separable(exposure=exposure)
-        raise KeyError("mine")
-
-    frames = renderer.sweep(picture(4, 4, 3, seed=18), broken())
-    for _ in range(place):
-        next(frames)
-    with pytest.raises(KeyError, match="mine"):
-        next(frames)
-
-
 # The core's errors
 
 
@@ -330,15 +301,6 @@ def test_an_error_of_the_device_loses_the_frames_of_its_submission(
 # The core's own types
 
 
-def submitted(
-    renderer: Renderer, source: _core.Source, settings: Sequence[Settings]
-) -> tuple[_core.Submission, tuple[Any, ...]]:
-    core = renderer._core
-    plans = tuple(core.plan(source, one, None) for one in settings)
-    arrays = tuple(new_arrays(core, plan) for plan in plans)
-    return core.run(source, plans, arrays), arrays
-
-
 def test_a_plan_runs_as_often_as_it_is_wanted(renderer: Renderer) -> None:
     image = picture(8, 8, 4, seed=22)
     source, core = _core.image_source(image), renderer._core
@@ -356,7 +318,7 @@ def test_a_submission_of_a_closed_renderer() -> None:
     core, source = renderer._core, _core.image_source(picture(8, 8, 4, seed=21))
     plan = core.plan(source, Separable(), None)
     arrays = new_arrays(core, plan)
-    submission, _ = submitted(renderer, source, [Separable()])
+    submission = core.run(source, (plan,), (arrays,))
     renderer.close()
     with pytest.raises(ValueError, match="closed"):
         submission.wait()

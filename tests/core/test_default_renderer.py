@@ -11,7 +11,7 @@ import pytest
 
 import vkbloom
 from tests.images import picture
-from tests.processes import LONGEST, output
+from tests.processes import output
 
 IMAGE = picture(24, 16)
 
@@ -143,49 +143,3 @@ print(vkbloom.apply(np.ones((8, 8, 3), np.float32))["final"].shape)
 
 def test_a_lost_device_is_replaced_after_its_error() -> None:
     assert output("-c", LOST).splitlines() == ["True", "(8, 8, 3)"]
-
-
-WORKERS = """
-import numpy as np
-import pytest
-import vkbloom
-
-@pytest.mark.parametrize("number", range(6))
-def test_one(number):
-    assert vkbloom.apply(np.ones((8, 8, 3), np.float32))["final"].shape == (8, 8, 3)
-"""
-
-
-def test_workers_of_xdist(tmp_path: Path) -> None:
-    pytest.importorskip("xdist")
-    file = tmp_path / "test_it.py"
-    file.write_text(WORKERS)
-    printed = output("-m", "pytest", "-q", "-n", "2", "-p", "no:cacheprovider", file, cwd=tmp_path)
-    assert "6 passed" in printed
-
-
-def test_a_kernel_that_restarts(tmp_path: Path) -> None:
-    manager = pytest.importorskip("jupyter_client.manager")
-    pytest.importorskip("ipykernel")
-    # Numbers of ports, which are chosen before they are used, may be taken by another process.
-    kernel = manager.KernelManager(transport="ipc", connection_file=str(tmp_path / "kernel.json"))
-    kernel.start_kernel()
-    client = kernel.client()
-    client.start_channels()
-    printed: list[str] = []
-
-    def keep(message: dict[str, Any]) -> None:
-        if message["msg_type"] == "stream":
-            printed.append(message["content"]["text"].strip())
-
-    code = "import numpy, vkbloom\nprint(vkbloom.apply(numpy.ones((8, 8, 3), 'f4'))['final'].shape)"
-    try:
-        for _ in range(2):
-            client.wait_for_ready(timeout=LONGEST)
-            reply = client.execute_interactive(code, output_hook=keep, timeout=LONGEST)
-            assert reply["content"]["status"] == "ok"
-            kernel.restart_kernel(now=True)
-    finally:
-        client.stop_channels()
-        kernel.shutdown_kernel(now=True)
-    assert printed == ["(8, 8, 3)"] * 2

@@ -248,37 +248,24 @@ def test_an_interrupted_store_is_completed(
 
     monkeypatch.setattr(Renderer, "close", noted_close)
 
-    def to_store(stopper: Stopper) -> xarray.Dataset:
-        return vkbloom.grid(
-            case.long.half,
-            case.long.settings,
-            STRENGTHS,
-            store=tmp_path / "grid",
-            chunks={"blur_strength": 2},
-            reduce={"mean": stopper},
-            adapter="auto",
-            progress=False,
-        )
+    def made(stopper: Stopper, **more: Any) -> xarray.Dataset:
+        reduce = {"mean": stopper}
+        source, settings = case.long.half, case.long.settings
+        return vkbloom.grid(source, settings, STRENGTHS, reduce=reduce, progress=False, **more)
 
+    stored: dict[str, Any] = {"store": tmp_path / "grid", "chunks": {"blur_strength": 2}}
     first, second = Stopper(case.alarm), Stopper(None)
     with pytest.raises(Alarm):
-        to_store(first)
+        made(first, adapter="auto", **stored)
     # The caller does not wait for pending submissions after an interruption.
     assert threading.main_thread() not in closers
     done = int(xarray.open_zarr(tmp_path / "grid")["done"].sum())
     assert 2 <= done <= first.points < POINTS
-    got = to_store(second)
+    got = made(second, adapter="auto", **stored)
     assert closers[1:] == [threading.main_thread()]
     # And the first point, for its shape. A block may be complete without a mark.
     assert second.points <= POINTS - done + 1
-    right = vkbloom.grid(
-        case.long.half,
-        case.long.settings,
-        STRENGTHS,
-        reduce={"mean": Stopper(None)},
-        progress=False,
-        renderer=case.renderer,
-    )
+    right = made(Stopper(None), renderer=case.renderer)
     assert bool(got["done"].all())
     for name in ("final", "mean"):
         np.testing.assert_array_equal(got[name], right[name])

@@ -81,30 +81,6 @@ def test_what_is_collected_or_fails_leaves_nothing() -> None:
     output("-c", COUNTED)
 
 
-# Prints the exception of a renderer if there is a validation message.
-OBJECTION = """
-import vkbloom
-from tests.processes import output
-try:
-    with vkbloom.Renderer(validation=True) as renderer:
-        renderer.render(vkbloom.Scene.ufo(), size=(8, 8))
-except vkbloom.ValidationError as error:
-    print("raised", error)
-with vkbloom.Renderer() as renderer:
-    print("without", renderer.render(vkbloom.Scene.ufo(), size=(8, 8))["final"].shape)
-"""
-
-
-def test_a_message_of_the_validation_layer_is_an_error() -> None:
-    # All other tests pass where the layer is silent. With its checks of best practices, which the
-    # environment turns on, it is not: it warns of the extension that its messages come through.
-    more = {"VK_LAYER_ENABLES": "VK_VALIDATION_FEATURE_ENABLE_BEST_PRACTICES_EXT"}
-    raised, without = output("-c", OBJECTION, **more).strip().splitlines()
-    assert raised.startswith("raised Validation")
-    assert "BestPractices" in raised
-    assert without == "without (8, 8, 4)"
-
-
 # Many renderers
 
 

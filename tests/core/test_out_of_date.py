@@ -223,17 +223,6 @@ def test_bloom_off_and_on(opened: Renderer, scene: Scene, alone: Alone) -> None:
     assert_same(frames, right)
 
 
-def test_a_failed_call_leaves_nothing_half_done(
-    opened: Renderer, scene: Scene, alone: Alone
-) -> None:
-    settings = Separable(blur_strength=0.2)
-    with pytest.raises(ValueError, match="out"):
-        opened.render(scene, settings, SIZE, out={"final": np.empty(1, np.uint8)})
-    frames = opened.render(scene, settings, SIZE)
-    assert list(frames.timings) == BLUR
-    assert_same(frames, alone(scene, settings, SIZE))
-
-
 def test_a_walk_through_many_settings(opened: Renderer, scene: Scene) -> None:
     """Random changes of everything at once, each picture against a renderer that saw only it."""
     generator = np.random.default_rng(5)

@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from click.testing import CliRunner, Result
+from click.testing import Result
 
 import vkbloom
+from tests.cli.calls import run
 from vkbloom import Renderer, testing
-from vkbloom._cli.program import program
 from vkbloom.testing import _measuring as measuring
 from vkbloom.testing._law_report import law_report
 from vkbloom.testing._law_table import LAWS
@@ -58,7 +58,7 @@ HELD = [
 
 def checked(*words: str) -> tuple[Result, dict[str, Any]]:
     """Return the result of the command, and its values, which fit the published schema."""
-    done = CliRunner().invoke(program, ["check", *words, "--json"])
+    done = run("check", *words, "--json")
     assert done.exit_code in {0, 1}, done.output
     found = json.loads(done.stdout)
     schema = importlib.resources.files("vkbloom.testing").joinpath("check.schema.json")
@@ -105,9 +105,12 @@ def test_a_page_and_parameters(tmp_path: Path) -> None:
     assert "bloom is off by" in found["laws"]["reference"]["message"]
 
 
-def test_a_preset() -> None:
-    done, found = checked("--preset", "dual_kawase", *SMALL, "--require", "symmetric,reference")
+def test_a_preset(tmp_path: Path) -> None:
+    page = tmp_path / "page.md"
+    words = ["--preset", "dual_kawase", *SMALL, "--markdown", str(page)]
+    done, found = checked(*words, "--require", "symmetric,reference")
     assert done.exit_code == 0, done.output
+    assert "| symmetric | yes | " in page.read_text()
     assert found["laws"]["bounded_fireflies"]["held"] is False
     assert found["nearest_preset"]["name"] == "unity_urp_dual"
 
@@ -207,7 +210,7 @@ def test_required_laws_have_another_colour(
     monkeypatch.setattr(Program, "__call__", lambda _, image: 0.9 * np.roll(image, 1, 1))
     page = tmp_path / "page.html"
     words = ["--command", "a {input} {output}", *SMALL, "--require", require, "--html", str(page)]
-    text = CliRunner().invoke(program, ["check", *words], color=True).output
+    text = run("check", *words, color=True).output
     for law in ("symmetric", "energy"):
         assert f"\x1b[{colour}m{law}" in text
     assert ("color:#c33" in page.read_text()) == bool(require)
@@ -217,8 +220,10 @@ def test_required_laws_have_another_colour(
 def test_a_program() -> None:
     """A required law that cannot be tested, as that of a reference, is not held."""
     require = "superposition,gain,symmetric,reference"
-    done, found = checked("--command", COPYING, *SMALL, "--require", require)
+    words = ["--command", COPYING, "--suffix", ".png", *SMALL, "--require", require]
+    done, found = checked(*words)
     assert done.exit_code == 1
+    assert "it writes 8 bits" in done.stderr
     held = {name: found["laws"][name]["held"] for name in require.split(",")}
     assert held == {"superposition": True, "gain": True, "symmetric": True, "reference": None}
     assert found["psf"]["r90"] == 0
@@ -266,18 +271,13 @@ def test_a_program_of_8_bits_is_noted() -> None:
     bloom = testing.command(COPYING.split(), suffix=".png")
     with pytest.warns(UserWarning, match="8 bits"):
         bloom(np.full((8, 8, 3), 0.5, np.float32))
-    done, found = checked("--command", COPYING, "--suffix", ".png", *SMALL)
-    assert "it writes 8 bits" in done.stderr
-    assert found["laws"]["symmetric"]["held"]
-    assert found["laws"]["gain"]["held"]
 
 
 def test_a_program_that_fails_is_one_line() -> None:
-    done = CliRunner().invoke(program, ["check", "--command", "false {input} {output}"])
+    done = run("check", "--command", "false {input} {output}")
     assert done.exit_code == 1
-    assert (
-        done.output == "vkbloom: command 'false': it failed with exit status 1; it said: nothing\n"
-    )
+    told = "command 'false': it failed with exit status 1; it said: nothing"
+    assert done.output == f"vkbloom: {told}\n"
 
 
 def test_veiling_glare_of_a_flat_share() -> None:
@@ -323,20 +323,17 @@ def test_a_change_of_a_file(
     assert written.startswith(f"### `planted` against `{before}`")
 
 
-def test_changes_of_presets_and_commands(tmp_path: Path) -> None:
-    page = tmp_path / "page.md"
-    words = ["--preset", "dual_kawase", "--against", COPYING, *SMALL, "--markdown", str(page)]
-    done = CliRunner().invoke(program, ["check", *words, "--require", "finite"])
+def test_changes_of_presets_and_commands(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Program, "__call__", lambda _, image: image)
+    words = ["--preset", "dual_kawase", "--against", COPYING, *SMALL]
+    done = run("check", *words, "--require", "finite")
     assert (done.exit_code, "broken: " in done.stdout) == (0, True), done.output
     # A law that both break is not newly broken.
     words = ["--preset", "tutorial", "--against", "tutorial", *SMALL, "--require", "resolution"]
     done, found = checked(*words)
     assert (done.exit_code, found["newly_broken"]) == (0, [])
     assert {one["verdict"] for one in found["changes"] if one["name"] != "together"} == {"same"}
-    alone = CliRunner().invoke(program, ["check", *words[:2], *SMALL, "--markdown", str(page)])
-    assert alone.exit_code == 0, alone.output
-    assert "| symmetric | yes | " in page.read_text()
-    refused = CliRunner().invoke(program, ["check", *words[:2], "--against", "tutoral"])
+    refused = run("check", *words[:2], "--against", "tutoral")
     assert (refused.exit_code, "tutorial" in refused.stderr) == (2, True)
 
 

@@ -7,14 +7,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 from numpy.typing import NDArray
 
 import vkbloom
+from tests.cli.calls import run
 from tests.images import picture
-from vkbloom import Renderer, load_method, psf, reference, testing
+from vkbloom import Renderer, load_method, psf, testing
 from vkbloom._cli.live import Live
-from vkbloom._cli.program import program
 from vkbloom._explorer.controls import as_code
 from vkbloom._settings.registry import METHODS
 
@@ -197,26 +196,6 @@ def test_stored_frames(renderer: Renderer, kind: Any, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"spread": 9}, "spread: 9"),
-        ({"shape": "disc"}, "shape: 'disc' is not one of gauss, box"),
-        ({"width": 1}, "width"),
-        ({"method": "pyramid"}, "pyramid"),
-    ],
-)
-def test_values_that_from_dict_refuses(kind: Any, change: dict[str, Any], message: str) -> None:
-    stored = {**kind().to_dict(), **change}
-    with pytest.raises(ValueError, match=message):
-        kind.from_dict(stored)
-
-
-def test_the_reference_needs_a_twin(kind: Any) -> None:
-    with pytest.raises(ValueError, match="reference="):
-        reference.apply(photo(), kind())
-
-
-@pytest.mark.parametrize(
     ("words", "result"),
     [
         (["render", "--size", "32x24", "-o", "{out}.exr"], "{out}.exr"),
@@ -232,7 +211,7 @@ def test_commands(tmp_path: Path, words: list[str], result: str) -> None:
     words = [word.format(**places) for word in words]
     method = ["--method", str(tmp_path / "soft.hook"), "--spread", "2.5", "--shape", "box"]
     given = method[:2] if words[0] in ("grid", "warm") else method
-    done = CliRunner().invoke(program, [*words, *given])
+    done = run(*words, *given)
     assert done.exit_code == 0, done.output
     assert Path(result.format(**places)).exists()
     METHODS.unregister("soft")

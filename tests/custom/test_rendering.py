@@ -184,10 +184,12 @@ def test_a_wrong_value_is_refused(renderer: Renderer, call: str, error: str) -> 
     def applied(text: str) -> vkbloom.Frames:
         return renderer.apply(picture(24, 16), own(text))
 
+    parametrized = load_method(PARAMETERS + COPY, name="tried")
     names = {
         "applied": applied,
         "headed": lambda line: applied(COPY.replace("vec4 hook", f"{line}\nvec4 hook")),
-        "parametrized": load_method(PARAMETERS + COPY, name="tried"),
+        "parametrized": parametrized,
+        "STORED": parametrized().to_dict(),
     }
     assert_refused(call, error, {**globals(), **names})
 

@@ -7,19 +7,17 @@ under validation. The driver compiles for most of the time; `make test-devices` 
 from __future__ import annotations
 
 import json
-import os
 from functools import partial
 
 from tests.device.exceptions import reason_against
 from tests.exhaustive import EXHAUSTIVE
 from tests.images import picture
 from tests.screens import CAMERA, panel
-from vkbloom import Renderer, Scene
+from tests.variants import VARIANTS, opened
+from vkbloom import Scene
 from vkbloom._doctor.cases import FRAME, Case, cases, compare_scene
 from vkbloom._doctor.self_test import judge
 from vkbloom._scene.textures import Texture
-
-VARIANTS = ("fragment", "cpu", "gpu")
 
 
 def scenes() -> list[Case]:
@@ -41,8 +39,7 @@ def main() -> None:
     wrong: dict[str, str] = {}
     every = [*(case for case in cases() if case.variant == "auto"), *scenes()]
     for turn, variant in enumerate(VARIANTS):
-        os.environ["VKBLOOM_VARIANT"] = variant
-        with Renderer("software", validation=True) as renderer:
+        with opened(variant, "software", validation=True) as renderer:
             for case in every if EXHAUSTIVE else every[turn :: 4 * len(VARIANTS)]:
                 name = f"{case.group}: {case.name}"
                 found = judge(case, renderer)["wrong"]

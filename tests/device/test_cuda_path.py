@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.core.test_lesser_devices import layer, run  # noqa: F401  a fixture
 from tests.device import stand_in
+from tests.device.test_watched_device import layer, watched  # noqa: F401  a fixture
 from vkbloom import AdapterInfo
 
 
@@ -51,9 +51,9 @@ def test_arrays_on_the_device(
     variables = stand_in.variables(folder, software) | {"MALLOC_PERTURB_": "165"}
     if "missing" in words:
         variables["STAND_IN_UUID"] = "11" * 16
-    done = run(layer, software.name, lesser, ("-m", program, *words.split()), **variables)
-    assert done.returncode == 0, done.stderr
-    assert json.loads(done.stdout) == {}
+    # The layer objects to buffers that are acquired from CUDA before they are released to it.
+    said = watched(layer, software, lesser, ("-m", program, *words.split()), variables)
+    assert json.loads(said) == {}
     left = (folder / "left").read_text().split()
     # Contexts, streams, events, memories, mappings, contexts that are current.
     assert left[:6] == ["0"] * 6, left

@@ -9,14 +9,13 @@ from pathlib import Path
 
 import pytest
 
-from tests.core.builds import ROOT, build_layer, compiler, layer_variables
+from tests.core.builds import build_layer, compiler
 from tests.core.test_lesser_devices import SOURCE as LESSER
-from tests.device import stand_in
-from tests.processes import output, python
+from tests.core.test_lesser_devices import run
 from vkbloom import AdapterInfo
 
 SOURCE = Path(__file__).with_name("watched_device.c")
-WATCHED = "VK_LAYER_VKBLOOM_watched_device"
+LAYERS = ("KHRONOS_validation", "VKBLOOM_watched_device", "VKBLOOM_lesser_device")
 
 pytestmark = pytest.mark.skipif(
     "VKBLOOM_SANITIZED" in os.environ, reason="another process, whose core is not sanitized"
@@ -27,6 +26,20 @@ pytestmark = pytest.mark.skipif(
 def layer(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Build the layer, and that of lesser devices; return the folder of the manifests."""
     return build_layer(SOURCE, build_layer(LESSER, tmp_path_factory.mktemp("layer")))
+
+
+def watched(
+    layer: Path,
+    software: AdapterInfo,
+    lesser: str,
+    program: tuple[str, ...],
+    environment: dict[str, str],
+) -> str:
+    """Return what a program prints, with both layers below the validation layer."""
+    layers = os.pathsep.join(f"VK_LAYER_{name}" for name in LAYERS)
+    done = run(layer, software.name, lesser, program, VK_INSTANCE_LAYERS=layers, **environment)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
 
 
 # Methods at sizes of their own, so that none shares an image; with all framebuffers, then with the
@@ -70,16 +83,8 @@ def test_no_image_has_a_usage_that_no_pass_needs(
 ) -> None:
     """On several GPUs, images that shaders may store to are not compressed."""
     listed = tmp_path / "usages"
-    done = python(
-        *("-c", PROGRAM, str(turn)),
-        cwd=ROOT,
-        **layer_variables(layer, WATCHED),
-        VKBLOOM_USAGES=str(listed),
-        VKBLOOM_TEST_NAME=software.name,
-        VKBLOOM_CACHE_DIR="",
-        VKBLOOM_VARIANT=variant,
-    )
-    assert done.returncode == 0, done.stderr
+    environment = {"VKBLOOM_USAGES": str(listed), "VKBLOOM_VARIANT": variant}
+    watched(layer, software, "", ("-c", PROGRAM, str(turn)), environment)
     lines = [line.split() for line in listed.read_text().splitlines()]
     needless = {
         (name, usage, used)
@@ -88,25 +93,6 @@ def test_no_image_has_a_usage_that_no_pass_needs(
     }
     assert len(lines) > 60
     assert {row for row in needless if not re.fullmatch(LEFT[variant], row[0])} == set()
-
-
-@pytest.mark.parametrize("lesser", ["", "cpu"])
-def test_buffers_are_released_to_cuda_before_they_are_acquired(
-    layer: Path, tmp_path: Path, software: AdapterInfo, lesser: str
-) -> None:
-    """An image that is given again, and a framebuffer that is given as an image."""
-    layers = layer_variables(layer, WATCHED)
-    layers["VK_INSTANCE_LAYERS"] += f"{os.pathsep}VK_LAYER_VKBLOOM_lesser_device"
-    said = output(
-        *("-m", "tests.device.device_work", "validated", "layouts", "places", "gradients"),
-        cwd=ROOT,
-        **stand_in.variables(stand_in.build(tmp_path), software),
-        **layers,
-        VKBLOOM_LESSER=lesser,
-        VKBLOOM_TEST_NAME=software.name,
-        VKBLOOM_CACHE_DIR="",
-    )
-    assert said == "{}\n"
 
 
 OLD_LINUX = """
@@ -140,15 +126,8 @@ def test_a_gpu_imports_no_memory_that_a_fork_takes_away(
     command = [*compiler(), "-shared", "-fPIC", "-x", "c", "-", "-o", str(library)]
     subprocess.run(command, input=OLD_LINUX, text=True, check=True)
     listed.touch()
-    layers = layer_variables(layer, WATCHED)
-    layers["VK_INSTANCE_LAYERS"] += f"{os.pathsep}VK_LAYER_VKBLOOM_lesser_device"
-    output(
-        *("-c", LARGE),
-        **layers,
-        **({"LD_PRELOAD": str(library)} if linux == "old" else {}),
-        VKBLOOM_USAGES=str(listed),
-        VKBLOOM_LESSER=lesser,
-        VKBLOOM_TEST_NAME=software.name,
-        VKBLOOM_CACHE_DIR="",
-    )
+    environment = {"VKBLOOM_USAGES": str(listed)}
+    if linux == "old":
+        environment["LD_PRELOAD"] = str(library)
+    watched(layer, software, lesser, ("-c", LARGE), environment)
     assert ("imported" in listed.read_text()) == ((lesser, linux) != ("cpu", "old"))

@@ -1,6 +1,6 @@
 // A Vulkan layer for tests: it writes how images may be used and are,
 // and which buffers are of the host's memory, and objects to acquires of
-// buffers from CUDA that nothing has released. test_watched_device.py uses it.
+// buffers from CUDA that nothing has released. test_watched_device.py and test_cuda_path.py use it.
 #define _GNU_SOURCE
 #include "../core/layer.h"
 
@@ -8,20 +8,20 @@
 #include <stdlib.h>
 
 #define DEVICE_FUNCTIONS(FUNCTION) \
-    FUNCTION(vkCreateImage) \
-    FUNCTION(vkDestroyImage) \
-    FUNCTION(vkCreateImageView) \
-    FUNCTION(vkCmdBeginRendering) \
-    FUNCTION(vkUpdateDescriptorSets) \
-    FUNCTION(vkCmdCopyImageToBuffer) \
-    FUNCTION(vkCmdCopyBufferToImage) \
-    FUNCTION(vkCmdPipelineBarrier) \
-    FUNCTION(vkCreateBuffer)
+    FUNCTION(vkCreateImage, create_image) \
+    FUNCTION(vkDestroyImage, destroy_image) \
+    FUNCTION(vkCreateImageView, create_view) \
+    FUNCTION(vkCmdBeginRendering, begin_rendering) \
+    FUNCTION(vkUpdateDescriptorSets, update_sets) \
+    FUNCTION(vkCmdCopyImageToBuffer, copy_to_buffer) \
+    FUNCTION(vkCmdCopyBufferToImage, copy_to_image) \
+    FUNCTION(vkCmdPipelineBarrier, barrier) \
+    FUNCTION(vkCreateBuffer, create_buffer) \
+    FUNCTION(vkSetDebugUtilsObjectNameEXT, set_name)
 
 // Of the first device, and good for all.
 static struct {
-    PFN_vkSetDebugUtilsObjectNameEXT set_name;
-#define MEMBER(name) PFN_##name name;
+#define MEMBER(name, function) PFN_##name name;
     DEVICE_FUNCTIONS(MEMBER)
 #undef MEMBER
 } below;
@@ -153,7 +153,8 @@ static VKAPI_ATTR VkResult VKAPI_CALL set_name(VkDevice device,
 {
     if (info->objectType == VK_OBJECT_TYPE_IMAGE)
         snprintf(find_image((VkImage)info->objectHandle)->name, 64, "%s", info->pObjectName);
-    return below.set_name ? below.set_name(device, info) : VK_SUCCESS;
+    return below.vkSetDebugUtilsObjectNameEXT ? below.vkSetDebugUtilsObjectNameEXT(device, info)
+                                              : VK_SUCCESS;
 }
 
 static VKAPI_ATTR VkResult VKAPI_CALL create_buffer(VkDevice device, const VkBufferCreateInfo *info,
@@ -203,25 +204,13 @@ static VKAPI_ATTR void VKAPI_CALL barrier(VkCommandBuffer commands, VkPipelineSt
                                image_barriers, of_images);
 }
 
-static VKAPI_ATTR VkResult VKAPI_CALL create_instance(const VkInstanceCreateInfo *info,
-                                                      const VkAllocationCallbacks *callbacks,
-                                                      VkInstance *created)
-{
-    const VkResult result = begin_instance(info, callbacks, created);
-
-    if (result == VK_SUCCESS)
-        below.set_name = (PFN_vkSetDebugUtilsObjectNameEXT)chain.instance_proc(
-            *created, "vkSetDebugUtilsObjectNameEXT");
-    return result;
-}
-
 static VKAPI_ATTR VkResult VKAPI_CALL create_device(VkPhysicalDevice physical,
                                                     const VkDeviceCreateInfo *info,
                                                     const VkAllocationCallbacks *callbacks,
                                                     VkDevice *created)
 {
     const VkResult result = begin_device(physical, info, callbacks, created);
-#define FETCH(name) below.name = (PFN_##name)chain.device_proc(*created, #name);
+#define FETCH(name, function) below.name = (PFN_##name)chain.device_proc(*created, #name);
     if (result == VK_SUCCESS) {
         DEVICE_FUNCTIONS(FETCH)
     }
@@ -229,22 +218,11 @@ static VKAPI_ATTR VkResult VKAPI_CALL create_device(VkPhysicalDevice physical,
     return result;
 }
 
+#define OF_DEVICE(name, function) ENTRY(name, function, true),
 static const struct entry entries[] = {
     ENTRY(vkGetInstanceProcAddr, get_instance_proc, false),
-    ENTRY(vkCreateInstance, create_instance, false),
-    ENTRY(vkCreateDevice, create_device, false),
-    ENTRY(vkGetDeviceProcAddr, get_device_proc, true),
-    ENTRY(vkCreateImage, create_image, true),
-    ENTRY(vkDestroyImage, destroy_image, true),
-    ENTRY(vkCreateImageView, create_view, true),
-    ENTRY(vkCmdBeginRendering, begin_rendering, true),
-    ENTRY(vkUpdateDescriptorSets, update_sets, true),
-    ENTRY(vkCmdCopyImageToBuffer, copy_to_buffer, true),
-    ENTRY(vkCmdCopyBufferToImage, copy_to_image, true),
-    ENTRY(vkCmdPipelineBarrier, barrier, true),
-    ENTRY(vkSetDebugUtilsObjectNameEXT, set_name, true),
-    ENTRY(vkCreateBuffer, create_buffer, true),
-};
+    ENTRY(vkCreateInstance, begin_instance, false), ENTRY(vkCreateDevice, create_device, false),
+    ENTRY(vkGetDeviceProcAddr, get_device_proc, true), DEVICE_FUNCTIONS(OF_DEVICE)};
 
 static PFN_vkVoidFunction find_own(const char *name, bool of_device)
 {

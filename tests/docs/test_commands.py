@@ -5,7 +5,6 @@ What bash hands to `vkbloom` then runs in this process, where commands share the
 
 from __future__ import annotations
 
-import os
 import re
 import subprocess
 from collections.abc import Iterator
@@ -61,22 +60,12 @@ def lines() -> Iterator[Any]:
                     yield pytest.param(line, id=f"{name}: {line.split('#')[0].strip()}")
 
 
-def bash(text: str, folder: Path, **environment: str) -> str:
-    done = subprocess.run(
-        ["bash", "--norc", "-c", text],
-        cwd=folder,
-        env={**os.environ, **environment},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert (done.returncode, done.stderr) == (0, ""), done.stdout + done.stderr
-    return done.stdout
-
-
 def words_of(line: str, folder: Path) -> list[str]:
     """Return a program and its arguments, as bash hands them over."""
-    return bash(f"{PRELUDE}\n{line}", folder).split("\0")[:-1]
+    command = ["bash", "--norc", "-c", f"{PRELUDE}\n{line}"]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, ""), done.stdout + done.stderr
+    return done.stdout.split("\0")[:-1]
 
 
 def parse(words: list[str]) -> None:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Iterator
 from typing import Any
 
 import pytest
 
 from tests.docs.pages import ROOT
+from tests.explorer.explorer_hosts import CHROMIUM
+
+pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not installed")
 
 DOCS = ROOT / "build" / "docs"
 
@@ -17,12 +19,9 @@ DOCS = ROOT / "build" / "docs"
 def page(request: pytest.FixtureRequest) -> Iterator[Any]:
     if not DOCS.joinpath("index.html").exists():
         pytest.skip("build/docs does not exist: run make docs")
-    chromium = shutil.which("chromium") or shutil.which("chromium-browser")
-    if chromium is None:
-        pytest.skip("Chromium is not installed")
     api = pytest.importorskip("playwright.sync_api")
     with api.sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
         page = browser.new_page(color_scheme=request.param)
         page.goto(DOCS.joinpath("index.html").as_uri())
         yield page

@@ -20,6 +20,7 @@ from tests.device.abilities import infinities
 from tests.exhaustive import some
 from tests.framebuffers import decode, make
 from tests.images import noise
+from tests.refusals import assert_refused, rows
 from vkbloom import KinoBloom, Pyramid, Renderer, Scene, Separable, Settings, glares, presets
 from vkbloom._explorer.controls import as_code, controls, settings_from
 from vkbloom._explorer.fast_pictures import picture_of
@@ -174,12 +175,9 @@ class TestShown:
 
     def test_stops(self, tmp_path: Path) -> None:
         array = np.full((1, 1, 3), 4, np.float32)
-        assert (
-            decode(picture_of(array, "bloom", is_encoded=False, stops=-3), tmp_path)[0, 0, 0] == 188
-        )
-        assert (
-            decode(picture_of(array, "final", is_encoded=True, stops=-3), tmp_path)[0, 0, 0] == 128
-        )
+        for name, is_encoded, level in (("bloom", False, 188), ("final", True, 128)):
+            shown = decode(picture_of(array, name, is_encoded=is_encoded, stops=-3), tmp_path)
+            assert shown[0, 0, 0] == level
 
     def test_depth(self, tmp_path: Path) -> None:
         depth = np.array([[0.5, 1.0]], np.float32)
@@ -381,17 +379,12 @@ class TestViewer:
         assert (answer["kind"], buffers) == ("error", [])
         assert answer["error"]
 
-    def test_arguments(self, scene: Scene, renderer: Renderer, image: Any) -> None:
-        for arguments, kind, message in (
-            (("photo.png",), TypeError, "image"),
-            ((image[0],), ValueError, "shape"),
-            ((scene, 3), TypeError, "settings"),
-        ):
-            with pytest.raises(kind, match=message):
-                Viewer(*arguments, renderer=renderer)
-        for options, message in (({"shading": "x"}, "shading"), ({"size": (0, 1)}, "size")):
-            with pytest.raises(ValueError, match=message):
-                Viewer(scene, renderer=renderer, **options)
+    @pytest.mark.parametrize(("call", "error"), rows(__file__, "arguments"))
+    def test_arguments(
+        self, scene: Scene, renderer: Renderer, image: Any, call: str, error: str
+    ) -> None:
+        names = {"scene": scene, "renderer": renderer, "image": image}
+        assert_refused(call, error, {**globals(), **names})
 
     def test_the_renderer(
         self, scene: Scene, renderer: Renderer, new_renderer: Callable[[], Renderer]

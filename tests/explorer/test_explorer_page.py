@@ -6,7 +6,6 @@ The shown pixels are compared with those of the renderer.
 from __future__ import annotations
 
 import dataclasses
-import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -18,7 +17,7 @@ from numpy.typing import NDArray
 
 import vkbloom
 from tests.exhaustive import by_turns
-from tests.explorer.explorer_hosts import CHROMIUM, PATIENCE
+from tests.explorer.explorer_hosts import CHROMIUM, PATIENCE, wait_until
 from tests.framebuffers import decode
 from vkbloom import KinoBloom, Pyramid, Renderer, Scene, Separable, presets
 from vkbloom._explorer.fast_pictures import picture_of
@@ -155,10 +154,8 @@ def test_the_controls_on_its_own_page(
     left = round(0.52 * box[0])
     expected = renderer.render(scene, settings, box)["final"][:, :, :3].copy()
     expected[:, left:] = renderer.render(scene, Separable(bloom=False), box)["final"][:, left:, :3]
-    deadline = time.monotonic() + PATIENCE
-    while not np.array_equal(shown(), expected):
-        # B's picture comes on its own.
-        assert time.monotonic() < deadline
+    # B's picture comes on its own.
+    wait_until(lambda: np.array_equal(shown(), expected))
     page.get_by_label("wipe A | B").uncheck()
     assert_shows(shown(), renderer, scene, settings)
 
@@ -166,9 +163,7 @@ def test_the_controls_on_its_own_page(
 def test_presets_and_methods(page: Page, renderer: Renderer, scene: Scene, tmp_path: Path) -> None:
     page.get_by_label("preset").select_option("outline")
     wait_for_code(page, 'vkbloom.presets["outline"]')
-    shown = see(page, tmp_path)
-    expected = renderer.render(scene, presets["outline"], size_of(shown))["final"]
-    assert np.array_equal(shown, expected[:, :, :3])
+    assert_shows(see(page, tmp_path), renderer, scene, presets["outline"])
     # The picture is developed as before when the method changes.
     field(page, "exposure").fill("2")
     page.get_by_label("method").select_option("kino")
@@ -343,9 +338,7 @@ def test_time_plays_and_pauses(
     assert not np.array_equal(see(page, tmp_path), still)
     slider.fill("0.25")
     expected = renderer.render(scene, None, size_of(still), time=0.25)["final"]
-    deadline = time.monotonic() + PATIENCE
-    while not np.array_equal(see(page, tmp_path), expected[:, :, :3]):
-        assert time.monotonic() < deadline
+    wait_until(lambda: np.array_equal(see(page, tmp_path), expected[:, :, :3]))
 
 
 def test_code_is_copied(browser: Browser, scene_url: str) -> None:
@@ -417,10 +410,8 @@ def test_an_image(tab: Page, serve: Any, renderer: Renderer, tmp_path: Path) -> 
         assert np.array_equal(np.array(values, np.float32), expected[33, 7])
         dark = see(page, tmp_path).mean()
         page.get_by_label("view exposure").fill("3")
-        deadline = time.monotonic() + PATIENCE
         # (Colours above 1 keep their hue, so that few pixels become white.)
-        while see(page, tmp_path).mean() < 1.05 * dark:
-            assert time.monotonic() < deadline
+        wait_until(lambda: see(page, tmp_path).mean() >= 1.05 * dark)
 
 
 def test_a_server_that_stops_is_noticed(tab: Page, serve: Any, renderer: Renderer) -> None:

@@ -8,18 +8,17 @@ import socket
 import struct
 import sys
 import threading
-from collections.abc import Awaitable, Callable
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
 import vkbloom
+from tests.cli.calls import run
 from tests.images import noise
 from vkbloom import Renderer, Separable
-from vkbloom._cli.program import program
 from vkbloom._explorer.viewer import Viewer
 
 tornado = pytest.importorskip("tornado")
@@ -34,23 +33,27 @@ OPENED: list[WebSocketClientConnection] = []
 
 
 @pytest.fixture
-def serve(renderer: Renderer) -> Callable[[Callable[[Server], Awaitable[None]]], None]:
-    """Runs a coroutine function beside a server."""
+def loop() -> Iterator[asyncio.Runner]:
+    with asyncio.Runner() as runner:
+        yield runner
+
+
+@pytest.fixture
+def server(loop: asyncio.Runner, renderer: Renderer) -> Iterator[Server]:
     image = noise(20, 30, 3, dtype="uint8")
 
-    def run(talk: Callable[[Server], Awaitable[None]]) -> None:
-        async def both() -> None:
-            server = Server(lambda: Viewer(image, renderer=renderer))
-            try:
-                await talk(server)
-            finally:
-                while OPENED:
-                    OPENED.pop().close()
-                await server.stop()
+    async def opened() -> Server:
+        return Server(lambda: Viewer(image, renderer=renderer))
 
-        asyncio.run(both())
+    started = loop.run(opened())
 
-    return run
+    async def stop() -> None:
+        while OPENED:
+            OPENED.pop().close()
+        await started.stop()
+
+    yield started
+    loop.run(stop())
 
 
 async def get(url: str, **headers: str) -> HTTPResponse:
@@ -82,100 +85,85 @@ def asked(number: int, *sides: str) -> str:
     return json.dumps({"kind": "frame", "id": number, "sides": dict.fromkeys(sides, settings)})
 
 
-def test_the_page_and_its_files(serve: Any) -> None:
-    async def talk(server: Server) -> None:
-        for name, kind in {
-            "": "text/html",
-            "page.js": "text/javascript",
-            "start.js": "text/javascript",
-            "page.css": "text/css",
-        }.items():
-            response = await get(server.url + name)
-            assert response.code == 200
-            assert response.headers["Content-Type"].startswith(kind)
-            assert "default-src 'none'" in response.headers["Content-Security-Policy"]
-            assert "frame-ancestors 'none'" in response.headers["Content-Security-Policy"]
-            assert response.headers["Cache-Control"] == "no-store"
-            # Nothing is loaded from elsewhere.
-            assert b"https://" not in response.body
-            assert b"http://" not in response.body
-        for name in ("other.js", "viewer.py", "../server.py", "..%2fserver.py"):
-            assert (await get(server.url + name)).code in (403, 404)
-
-    serve(talk)
+async def test_the_page_and_its_files(server: Server) -> None:
+    for name, kind in {
+        "": "text/html",
+        "page.js": "text/javascript",
+        "start.js": "text/javascript",
+        "page.css": "text/css",
+    }.items():
+        response = await get(server.url + name)
+        assert response.code == 200
+        assert response.headers["Content-Type"].startswith(kind)
+        assert "default-src 'none'" in response.headers["Content-Security-Policy"]
+        assert "frame-ancestors 'none'" in response.headers["Content-Security-Policy"]
+        assert response.headers["Cache-Control"] == "no-store"
+        # Nothing is loaded from elsewhere.
+        assert b"https://" not in response.body
+        assert b"http://" not in response.body
+    for name in ("other.js", "viewer.py", "../server.py", "..%2fserver.py"):
+        assert (await get(server.url + name)).code in (403, 404)
 
 
-def test_only_this_machine_is_listened_to(serve: Any) -> None:
-    async def talk(server: Server) -> None:
-        # All of 127.0.0.0/8 is this machine, so that whoever listens everywhere listens there too.
-        for address, listens in (("127.0.0.1", True), ("127.0.0.2", False)):
-            with socket.socket() as attempt:
-                attempt.settimeout(5)
-                assert (attempt.connect_ex((address, server.port)) == 0) == listens, address
-
-    serve(talk)
+async def test_only_this_machine_is_listened_to(server: Server) -> None:
+    # All of 127.0.0.0/8 is this machine, so that whoever listens everywhere listens there too.
+    for address, listens in (("127.0.0.1", True), ("127.0.0.2", False)):
+        with socket.socket() as attempt:
+            attempt.settimeout(5)
+            assert (attempt.connect_ex((address, server.port)) == 0) == listens, address
 
 
-def test_the_token_and_the_host_are_needed(serve: Any) -> None:
-    async def talk(server: Server) -> None:
-        root = f"http://127.0.0.1:{server.port}/"
-        for path in ("", "x/", server.token[:-1] + "/", server.token + "x/page.js", "x/socket"):
-            assert (await get(root + path)).code in (403, 404), path
-        # The page says what to do.
-        refused = await get(root + "x/")
-        assert refused.code == 403
-        assert refused.headers["Content-Type"].startswith("text/html")
-        assert b"start <code>vkbloom explore" in refused.body
-        # A foreign name that was made to point here.
-        for host in ("example.org", f"example.org:{server.port}", "127.0.0.1", "127.0.0.1:1"):
-            assert (await get(server.url, Host=host)).code == 403, host
-        assert (await get(server.url, Host=f"localhost:{server.port}")).code == 200
-        # Each server has a token of its own.
-        other = Server(lambda: pytest.fail("nobody asked"))
-        assert other.token != server.token
-        assert len(other.token) >= 32
-        await other.stop()
-
-    serve(talk)
+async def test_the_token_and_the_host_are_needed(server: Server) -> None:
+    root = f"http://127.0.0.1:{server.port}/"
+    for path in ("", "x/", server.token[:-1] + "/", server.token + "x/page.js", "x/socket"):
+        assert (await get(root + path)).code in (403, 404), path
+    # The page says what to do.
+    refused = await get(root + "x/")
+    assert refused.code == 403
+    assert refused.headers["Content-Type"].startswith("text/html")
+    assert b"start <code>vkbloom explore" in refused.body
+    # A foreign name that was made to point here.
+    for host in ("example.org", f"example.org:{server.port}", "127.0.0.1", "127.0.0.1:1"):
+        assert (await get(server.url, Host=host)).code == 403, host
+    assert (await get(server.url, Host=f"localhost:{server.port}")).code == 200
+    # Each server has a token of its own.
+    other = Server(lambda: pytest.fail("nobody asked"))
+    assert other.token != server.token
+    assert len(other.token) >= 32
+    await other.stop()
 
 
 @pytest.mark.parametrize(
     "origin", ["http://example.org", "null", "", "http://127.0.0.1", "https://127.0.0.1:{port}"]
 )
-def test_the_socket_is_for_the_page_itself(serve: Any, origin: str) -> None:
-    async def talk(server: Server) -> None:
-        with pytest.raises(HTTPClientError) as caught:
-            await connect(server, Origin=origin.format(port=server.port))
-        assert caught.value.code == 403
-        with pytest.raises(HTTPClientError):
-            await connect(server, Host="example.org")
-        (await connect(server)).close()
-
-    serve(talk)
+async def test_the_socket_is_for_the_page_itself(server: Server, origin: str) -> None:
+    with pytest.raises(HTTPClientError) as caught:
+        await connect(server, Origin=origin.format(port=server.port))
+    assert caught.value.code == 403
+    with pytest.raises(HTTPClientError):
+        await connect(server, Host="example.org")
+    (await connect(server)).close()
 
 
-def test_frames_come_with_their_pictures(serve: Any) -> None:
-    async def talk(server: Server) -> None:
-        page = await connect(server)
-        await page.write_message(json.dumps({"kind": "setup"}))
-        header, buffers = await answer(page)
-        assert (header["kind"], header["own_size"], buffers) == ("setup", [30, 20], [])
-        await page.write_message(asked(1, "a", "b"))
-        header, buffers = await answer(page)
-        assert header["id"] == 1
-        assert [side["picture"] for side in header["sides"].values()] == [0, 1]
-        assert all(buffer.startswith(b"\x89PNG") for buffer in buffers)
-        # Each page has its own viewer.
-        other = await connect(server)
-        await other.write_message(json.dumps({"kind": "setup"}))
-        assert (await answer(other))[0]["sides"]["a"]["intensity"] == 0.15
-        await other.write_message(json.dumps({"kind": "nonsense"}))
-        assert (await answer(other))[0]["kind"] == "error"
-
-    serve(talk)
+async def test_frames_come_with_their_pictures(server: Server) -> None:
+    page = await connect(server)
+    await page.write_message(json.dumps({"kind": "setup"}))
+    header, buffers = await answer(page)
+    assert (header["kind"], header["own_size"], buffers) == ("setup", [30, 20], [])
+    await page.write_message(asked(1, "a", "b"))
+    header, buffers = await answer(page)
+    assert header["id"] == 1
+    assert [side["picture"] for side in header["sides"].values()] == [0, 1]
+    assert all(buffer.startswith(b"\x89PNG") for buffer in buffers)
+    # Each page has its own viewer.
+    other = await connect(server)
+    await other.write_message(json.dumps({"kind": "setup"}))
+    assert (await answer(other))[0]["sides"]["a"]["intensity"] == 0.15
+    await other.write_message(json.dumps({"kind": "nonsense"}))
+    assert (await answer(other))[0]["kind"] == "error"
 
 
-def test_the_newest_wins(serve: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_the_newest_wins(server: Server, monkeypatch: pytest.MonkeyPatch) -> None:
     received: list[Any] = []
     take = _Socket.on_message
 
@@ -191,45 +179,39 @@ def test_the_newest_wins(serve: Any, monkeypatch: pytest.MonkeyPatch) -> None:
         # And the first of them is given to the thread.
         await asyncio.sleep(0.01)
 
-    async def talk(server: Server) -> None:
-        page = await connect(server)
-        held = threading.Event()
-        server._worker.submit(held.wait)
-        await page.write_message(asked(1, "a", "b"))
-        # The first is being answered when the others come.
-        await arrived(1)
-        await page.write_message(asked(2, "b"))
-        for number in range(3, 50):
-            await page.write_message(asked(number, "a"))
-        await page.write_message(json.dumps({"kind": "probe", "id": 50, "at": [0, 0]}))
-        await arrived(50)
-        held.set()
-        answers = [(await answer(page))[0] for _ in range(3)]
-        assert [(header["kind"], header["id"]) for header in answers] == [
-            ("frame", 1),
-            ("frame", 49),
-            ("probe", 50),
-        ]
-        # What only an older message asked for has not been lost.
-        assert answers[1]["sides"]["a"]["code"] == "vkbloom.Separable(intensity=49.0)"
-        assert answers[1]["sides"]["b"]["code"] == "vkbloom.Separable(intensity=2.0)"
-
-    serve(talk)
+    page = await connect(server)
+    held = threading.Event()
+    server._worker.submit(held.wait)
+    await page.write_message(asked(1, "a", "b"))
+    # The first is being answered when the others come.
+    await arrived(1)
+    await page.write_message(asked(2, "b"))
+    for number in range(3, 50):
+        await page.write_message(asked(number, "a"))
+    await page.write_message(json.dumps({"kind": "probe", "id": 50, "at": [0, 0]}))
+    await arrived(50)
+    held.set()
+    answers = [(await answer(page))[0] for _ in range(3)]
+    assert [(header["kind"], header["id"]) for header in answers] == [
+        ("frame", 1),
+        ("frame", 49),
+        ("probe", 50),
+    ]
+    # What only an older message asked for has not been lost.
+    assert answers[1]["sides"]["a"]["code"] == "vkbloom.Separable(intensity=49.0)"
+    assert answers[1]["sides"]["b"]["code"] == "vkbloom.Separable(intensity=2.0)"
 
 
-def test_a_file_comes_as_bytes(serve: Any, tmp_path: Any) -> None:
+async def test_a_file_comes_as_bytes(server: Server, tmp_path: Any) -> None:
     path = vkbloom.write(tmp_path / "a.png", noise(8, 9, 3, dtype="uint8"))
     header = json.dumps({"kind": "open", "name": "a.png"}).encode()
     message = struct.pack("<I", len(header)) + header + path.read_bytes()
     assert len(message) > 100
 
-    async def talk(server: Server) -> None:
-        page = await connect(server)
-        await page.write_message(message, binary=True)
-        source, _ = await answer(page)
-        assert (source["kind"], source["own_size"]) == ("open", [9, 8])
-
-    serve(talk)
+    page = await connect(server)
+    await page.write_message(message, binary=True)
+    source, _ = await answer(page)
+    assert (source["kind"], source["own_size"]) == ("open", [9, 8])
 
 
 @pytest.mark.parametrize(
@@ -239,27 +221,21 @@ def test_a_file_comes_as_bytes(serve: Any, tmp_path: Any) -> None:
         (json.dumps({"kind": "frame", "sides": "x" * 100_000}), 1009),
     ],
 )
-def test_wrong_messages_are_refused(serve: Any, message: str | bytes, code: int) -> None:
-    async def talk(server: Server) -> None:
-        page = await connect(server)
-        await page.write_message(message, binary=isinstance(message, bytes))
-        assert await page.read_message() is None
-        assert page.close_code == code
-
-    serve(talk)
+async def test_wrong_messages_are_refused(server: Server, message: str | bytes, code: int) -> None:
+    page = await connect(server)
+    await page.write_message(message, binary=isinstance(message, bytes))
+    assert await page.read_message() is None
+    assert page.close_code == code
 
 
-def test_port_in_use_is_an_error(serve: Any) -> None:
-    async def talk(server: Server) -> None:
-        with pytest.raises(OSError, match="in use"):
-            Server(lambda: pytest.fail("nobody asked"), server.port)
-
-    serve(talk)
+async def test_port_in_use_is_an_error(server: Server) -> None:
+    with pytest.raises(OSError, match="in use"):
+        Server(lambda: pytest.fail("nobody asked"), server.port)
 
 
 def test_without_tornado(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "tornado", None)
-    result = CliRunner().invoke(program, ["explore", "--no-open"])
+    result = run("explore", "--no-open")
     assert result.exit_code == 1
     assert "pip install vkbloom[notebook]" in result.stderr
 
@@ -288,7 +264,7 @@ def test_an_image_begins_as_in_apply(
             raise ValueError("recorded")
 
     monkeypatch.setattr("vkbloom._cli.live.Viewer", Recorded)
-    result = CliRunner().invoke(program, ["explore", "--no-open", *words])
+    result = run("explore", "--no-open", *words)
     assert "recorded" in result.stderr
     ((image, settings),) = begun
     assert settings == vkbloom.presets[preset]

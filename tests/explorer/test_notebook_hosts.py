@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import base64
-import time
 from importlib import resources
 from typing import TYPE_CHECKING, Any
 
 import pytest
 
 import vkbloom
-from tests.explorer.explorer_hosts import CHROMIUM, PATIENCE
+from tests.explorer.explorer_hosts import CHROMIUM, PATIENCE, wait_until
 from tests.explorer.test_explorer_page import assert_theme
 from vkbloom import Renderer, Scene
 
@@ -77,9 +76,7 @@ def test_pictures_come_as_text_where_buffers_are_lost(
     before = wait_for_picture(page)
     page.get_by_label("method").select_option("dual_kawase")
     page.wait_for_function("window.traits.settings.method === 'dual_kawase'")
-    deadline = time.monotonic() + PATIENCE
-    while wait_for_picture(page) == before:
-        assert time.monotonic() < deadline
+    wait_until(lambda: wait_for_picture(page) != before)
     assert explorer.settings == vkbloom.DualKawase().replace(
         **{name: getattr(explorer.settings, name) for name in ("tonemap", "encoding", "exposure")}
     )

@@ -1,8 +1,47 @@
-"""The content of a grid's folder."""
+"""A grid of images in a store, and the content of its folder."""
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
+
+import vkbloom
+from tests.images import noise
+from vkbloom import Frames, Separable
+
+
+def mean(frames: Frames) -> float:
+    return float(frames["final"].mean())
+
+
+def colour(frames: Frames) -> Any:
+    return frames["bloom"].mean(axis=(0, 1))[:2]
+
+
+AXES: dict[str, list[Any]] = {
+    "exposure": [0.0, 1.0, 2.0],
+    "threshold": [None, 0.5],
+    "blur_scale": [0.5, 1.0, 1.5, 2.0],
+}
+CHUNKS = {"exposure": 3, "blur_scale": 2}
+REDUCE = {"mean": mean, "colour": colour}
+POINTS = 3 * 2 * 4
+
+
+def source() -> Any:
+    return noise(16, 21, 3, dtype="float32")
+
+
+def make(store: Any, **changes: Any) -> Any:
+    arguments: dict[str, Any] = {
+        "chunks": CHUNKS,
+        "reduce": REDUCE,
+        "framebuffers": ("final", "bloom"),
+        **changes,
+    }
+    settings = arguments.pop("settings", Separable())
+    axes = arguments.pop("axes", AXES)
+    return vkbloom.grid(arguments.pop("source", source()), settings, axes, store=store, **arguments)
 
 
 def contents(store: Path) -> dict[str, bytes]:

@@ -16,40 +16,18 @@ import numpy as np
 import pytest
 
 import vkbloom
-from tests.grid.stores import contents
-from tests.images import noise
-from vkbloom import Frames, Separable, check_grid
+from tests.grid.stores import contents, make
+from vkbloom import Frames, check_grid
 from vkbloom._grid import cluster
 
 distributed = pytest.importorskip("distributed")
 xr = pytest.importorskip("xarray")
-
-AXES: dict[str, Any] = {
-    "exposure": np.linspace(-1, 1, 4),
-    "blur_scale": np.linspace(0.5, 2, 6),
-    "threshold": [None, 0.2],
-}
-REDUCE = {"peak": lambda frames: float(frames["final"].max())}
 
 # Of sockets and event loops that Dask leaves to the garbage collector.
 pytestmark = [
     pytest.mark.filterwarnings("ignore::ResourceWarning"),
     pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning"),
 ]
-
-
-def source() -> Any:
-    return noise(14, 18, 3, dtype="float32")
-
-
-def make(store: Path, client: Any = None, **changes: Any) -> Any:
-    arguments: dict[str, Any] = {
-        "chunks": {"exposure": 4},
-        "reduce": REDUCE,
-        "progress": False,
-        **changes,
-    }
-    return vkbloom.grid(source(), Separable(), AXES, store=store, client=client, **arguments)
 
 
 @pytest.fixture(scope="module")
@@ -68,15 +46,8 @@ def client(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
         yield opened
 
 
-@pytest.fixture(scope="module")
-def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    store = tmp_path_factory.mktemp("grid") / "whole.zarr"
-    make(store)
-    return store
-
-
 def slow_mean(frames: Frames) -> float:
-    time.sleep(0.02)
+    time.sleep(0.04)
     return float(frames["final"].mean())
 
 
@@ -86,7 +57,7 @@ slow_mean.framebuffers = ("final",)  # type: ignore[attr-defined]
 def test_workers_write_what_one_process_writes(
     client: Any, tmp_path: Path, undisturbed: Path
 ) -> None:
-    made = make(tmp_path / "a.zarr", client)
+    made = make(tmp_path / "a.zarr", client=client)
     assert contents(tmp_path / "a.zarr") == contents(undisturbed)
     assert made["done"].values.all()
 
@@ -104,7 +75,7 @@ def test_killed_worker_is_replaced(client: Any, tmp_path: Path, undisturbed: Pat
     killer = threading.Thread(target=kill)
     killer.start()
     plain: dict[str, Any] = {"reduce": {"mean": slow_mean}, "framebuffers": ("final",)}
-    made = make(tmp_path / "a.zarr", client, **plain)
+    made = make(tmp_path / "a.zarr", client=client, chunks={"exposure": 3}, **plain)
     killer.join()
     assert killed.is_set()
     assert made["done"].values.all()
@@ -131,27 +102,27 @@ class Failing:
 
 def test_failed_run_is_repeated(client: Any, tmp_path: Path) -> None:
     reduce = {"n": Failing(tmp_path / "tried", mends=True)}
-    made = make(tmp_path / "a.zarr", client, reduce=reduce, framebuffers=())
+    made = make(tmp_path / "a.zarr", client=client, reduce=reduce, framebuffers=())
     assert made["done"].values.all()
 
 
 def test_repeated_failure_keeps_completed_blocks(client: Any, tmp_path: Path) -> None:
     reduce = {"n": Failing(tmp_path / "mended", mends=False)}
-    changes: dict[str, Any] = {"reduce": reduce, "framebuffers": (), "chunks": {"blur_scale": 6}}
+    changes: dict[str, Any] = {"reduce": reduce, "framebuffers": (), "chunks": {"blur_scale": 4}}
     with pytest.raises(ZeroDivisionError, match="this point"):
-        make(tmp_path / "a.zarr", client, **changes)
+        make(tmp_path / "a.zarr", client=client, **changes)
     report = check_grid(tmp_path / "a.zarr")
     assert 0 < report.done < report.points
     assert not report.problems
     (tmp_path / "mended").touch()
-    assert make(tmp_path / "a.zarr", client, **changes)["done"].values.all()
+    assert make(tmp_path / "a.zarr", client=client, **changes)["done"].values.all()
 
 
 def test_a_worker_without_the_adapter(
     client: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with pytest.raises(vkbloom.AdapterNotFoundError):
-        make(tmp_path / "a.zarr", client, adapter="no such")
+        make(tmp_path / "a.zarr", client=client, adapter="no such")
     assert not (tmp_path / "a.zarr").exists()
 
 
@@ -174,10 +145,10 @@ def test_a_worker_with_another_driver_or_version_is_refused(
     own = {"adapter": software.name, "driver": driver, "version": vkbloom.__version__}[what]
     words = f"{what}: the worker's {re.escape(own)}.* is not the grid's {other}"
     with pytest.raises(ValueError, match=words):
-        make(tmp_path / "a.zarr", client)
+        make(tmp_path / "a.zarr", client=client)
     assert check_grid(tmp_path / "a.zarr").done == 0
 
 
 def test_what_is_no_client_is_refused() -> None:
     with pytest.raises(TypeError, match="client"):
-        make(Path("a.zarr"), 3)
+        make(Path("a.zarr"), client=3)

@@ -17,7 +17,7 @@ import pytest
 
 import vkbloom
 from tests.exhaustive import by_turns
-from tests.grid.stores import contents
+from tests.grid.stores import AXES, POINTS, REDUCE, contents, make, source
 from tests.images import noise
 from vkbloom import Frames, Pyramid, Renderer, Separable, check_grid, psf
 from vkbloom._grid.filling import Filler
@@ -29,51 +29,11 @@ google_crc32c = pytest.importorskip("google_crc32c")
 zstd = pytest.importorskip("numcodecs.zstd")
 
 
-def mean(frames: Frames) -> float:
-    return float(frames["final"].mean())
-
-
-def colour(frames: Frames) -> Any:
-    return frames["bloom"].mean(axis=(0, 1))[:2]
-
-
 def count_frames(frames: Frames) -> int:
     return len(frames)
 
 
-AXES: dict[str, list[Any]] = {
-    "exposure": [0.0, 1.0, 2.0],
-    "threshold": [None, 0.5],
-    "blur_scale": [0.5, 1.0, 1.5, 2.0],
-}
-CHUNKS = {"exposure": 3, "blur_scale": 2}
-REDUCE = {"mean": mean, "colour": colour}
-POINTS = 3 * 2 * 4
-
 pytestmark = pytest.mark.usefixtures("kept_renderers")
-
-
-def source() -> Any:
-    return noise(16, 21, 3, dtype="float32")
-
-
-def make(store: Any, **changes: Any) -> Any:
-    arguments: dict[str, Any] = {
-        "chunks": CHUNKS,
-        "reduce": REDUCE,
-        "framebuffers": ("final", "bloom"),
-        **changes,
-    }
-    settings = arguments.pop("settings", Separable())
-    axes = arguments.pop("axes", AXES)
-    return vkbloom.grid(arguments.pop("source", source()), settings, axes, store=store, **arguments)
-
-
-@pytest.fixture(scope="module")
-def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    store = tmp_path_factory.mktemp("grid") / "whole.zarr"
-    make(store)
-    return store
 
 
 @pytest.fixture

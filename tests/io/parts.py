@@ -22,6 +22,24 @@ def written(path: Path, spec: Any, pixels: NDArray[Any]) -> Path:
     return path
 
 
+def reread(path: Path, part: int = 0) -> tuple[Any, NDArray[Any]]:
+    """Return the specification of a part and its stored values, alpha not multiplied in."""
+    plain = oiio.ImageSpec()
+    plain.attribute("oiio:UnassociatedAlpha", 1)
+    buffer = oiio.ImageBuf(str(path), part, 0, plain)
+    assert not buffer.has_error, buffer.geterror()
+    pixels: Any = buffer.get_pixels(buffer.spec().format)
+    return buffer.spec(), pixels
+
+
+def store_ultra_hdr(path: Path, pixels: NDArray[Any]) -> None:
+    """Write half floats of linear P3 as a JPEG with a map of gains."""
+    spec = oiio.ImageSpec(pixels.shape[1], pixels.shape[0], 3, "half")
+    spec.attribute("jpeg:ultrahdr", 1)
+    spec.attribute("oiio:ColorSpace", "lin_p3d65_scene")
+    written(path, spec, pixels)
+
+
 def store_parts(path: Path, parts: Mapping[str, NDArray[Any]]) -> None:
     """Write half floats of shape (H, W, C) as parts, by name."""
     specs = []

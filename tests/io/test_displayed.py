@@ -103,6 +103,9 @@ class TestHdr:
             assert chunk(file, b"cICP") == bytes([point, code, 0, 1])
             spec = oiio.ImageInput.open(str(file)).spec()
             assert tuple(spec.getattribute("CICP")) == (point, code, 0, 1)
+            # Nothing else names colours.
+            others = (b"sRGB", b"gAMA", b"cHRM", b"iCCP")
+            assert not any(name in file.read_bytes() for name in others)
         again, facts = vkbloom.read(file, metadata=True)
         assert facts["notes"] == () or curve in facts["colour"]
         encode = tone_map.ENCODINGS[curve]

@@ -291,14 +291,38 @@ class TestWriteErrors:
             frames.save(tmp_path / ("x" * 300 + ".exr"))
         assert names_in(tmp_path) == []
 
-    @pytest.mark.parametrize("extension", ["exr", "png", "tif", "tga", "bmp", "jpg", "webp"])
-    def test_disk_is_full(self, extension: str, tmp_path: Path) -> None:
+    # While JPEG and WebP are written, their writers would end the process or never return.
+    @pytest.mark.parametrize(
+        ("extension", "before"),
+        [
+            *((one, True) for one in ("exr", "png", "tif", "tga", "bmp", "jpg", "webp")),
+            *((one, False) for one in ("exr", "png", "tif", "tga", "bmp")),
+        ],
+    )
+    def test_disk_is_full(
+        self, extension: str, before: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        """Before the space is reserved, or during the writing."""
         frames = make({"final": noise(256, 256, 3, dtype="uint8")})
         file = tmp_path / f"out.{extension}"
         file.write_text("the one before")
-        with small_files_only(), pytest.raises(OSError, match=re.escape(str(file))) as caught:
-            frames.save(file)
-        assert (caught.value.errno, caught.value.filename) == (errno.EFBIG, str(file))
+        with contextlib.ExitStack() as stack:
+
+            def reserve(*arguments: Any) -> Path:
+                reserved: Path = original(*arguments)
+                stack.enter_context(small_files_only())
+                return reserved
+
+            original = safe_writing.reserve
+            if before:
+                stack.enter_context(small_files_only())
+            else:
+                monkeypatch.setattr(safe_writing, "reserve", reserve)
+            with pytest.raises(OSError, match=re.escape(str(file))) as caught:
+                frames.save(file)
+        assert caught.value.filename == str(file)
+        assert not before or caught.value.errno == errno.EFBIG
+        assert ".vkbloom-" not in str(caught.value)
         assert names_in(tmp_path) == [file.name]
         assert file.read_text() == "the one before"
 
@@ -355,30 +379,6 @@ class TestWriteErrors:
             safe_writing.reserve(file, size)
         assert (caught.value.errno, caught.value.filename) == (errno.EFBIG, str(file))
         assert len(names_in(tmp_path)) == 1
-
-    # Without JPEG and WebP, whose writers would end the process or never return.
-    @pytest.mark.parametrize("extension", ["exr", "png", "tif", "tga", "bmp"])
-    def test_disk_fills_up_during_the_writing(
-        self, extension: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
-        frames = make({"final": noise(256, 256, 3, dtype="uint8")})
-        file = tmp_path / f"out.{extension}"
-        file.write_text("the one before")
-        with contextlib.ExitStack() as stack:
-
-            def reserve(*arguments: Any) -> Path:
-                reserved: Path = original(*arguments)
-                stack.enter_context(small_files_only())
-                return reserved
-
-            original = safe_writing.reserve
-            monkeypatch.setattr(safe_writing, "reserve", reserve)
-            with pytest.raises(OSError, match=re.escape(str(file))) as caught:
-                frames.save(file)
-        assert caught.value.filename == str(file)
-        assert ".vkbloom-" not in str(caught.value)
-        assert names_in(tmp_path) == [file.name]
-        assert file.read_text() == "the one before"
 
     def test_of_several_files_none_is_written(self, tmp_path: Path) -> None:
         frames = make(

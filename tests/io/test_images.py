@@ -16,12 +16,12 @@ from numpy.typing import NDArray
 from tests import images
 from tests.framebuffers import names_in
 from tests.framebuffers import write_image as store
-from tests.io.parts import written
+from tests.io.parts import reread, written
 from vkbloom._io import safe_writing
 from vkbloom._io.displayed import Saved
 from vkbloom._io.image_reading import decode_file, load
 from vkbloom._io.image_writing import save
-from vkbloom._io.images import Picture, SavedColour, StoredImage, Window
+from vkbloom._io.images import Picture, StoredImage, Window
 from vkbloom._io.srgb import decode_srgb, encode_srgb
 
 oiio = pytest.importorskip("OpenImageIO")
@@ -36,18 +36,6 @@ def decode(stored: StoredImage, colour: str | None = None) -> Picture:
 def noise(*shape: int, numbers: str, seed: int = 3) -> NDArray[Any]:
     """Return values that each type holds; floats also under 0 and far above 1."""
     return images.noise(*shape, dtype=DTYPES[numbers], seed=seed, spread=20)
-
-
-def reread(path: Path) -> tuple[Any, NDArray[Any]]:
-    """Read a file without the package's own code."""
-    plain = oiio.ImageSpec()
-    plain.attribute("oiio:UnassociatedAlpha", 1)
-    reader = oiio.ImageInput.open(str(path), plain)
-    assert reader is not None, oiio.geterror()
-    spec = reader.spec()
-    pixels = reader.read_image(0, 0, 0, spec.nchannels, spec.format)
-    reader.close()
-    return spec, pixels
 
 
 def linear_picture(pixels: NDArray[Any], numbers: str, **changes: Any) -> Picture:
@@ -302,29 +290,6 @@ class TestSave:
             assert abs(written[..., :3].mean() / np.iinfo(stored_as).max - 0.68) < 0.02
         else:
             assert abs(written[..., :3].mean() - 0.5) < 0.02
-
-    @pytest.mark.parametrize(
-        ("name", "colour", "expected"),
-        [
-            ("b.png", None, 188),
-            ("b.png", "srgb", 188),
-            ("b.png", "linear", 128),
-            ("b.exr", None, 0.5),
-            ("b.exr", "linear", 0.5),
-            ("b.exr", "srgb", 0.735357),
-            ("b.hdr", None, 0.5),
-        ],
-    )
-    def test_colours(
-        self, tmp_path: Path, name: str, colour: SavedColour | None, expected: float
-    ) -> None:
-        pixels = np.full((4, 4, 3), 0.5, np.float32)
-        save(linear_picture(pixels, "float"), tmp_path / name, Saved(colour))
-        _, written = reread(tmp_path / name)
-        assert np.allclose(written, expected, rtol=1e-6, atol=0)
-        # And it says so: reading gives the light again.
-        again = decode(load(tmp_path / name), None if name == "b.png" else colour)
-        assert np.allclose(again.pixels, 0.5, atol=1 / 255)
 
     @pytest.mark.parametrize("encoding", ["srgb", "gamma22", None])
     def test_encoded_values_are_left_alone(self, tmp_path: Path, encoding: Any) -> None:

@@ -46,14 +46,6 @@ def test_no_settings_are_bevys(renderer: Renderer) -> None:
 # --- Composite, exposure, tone map, encoding ---
 
 
-def assert_composite(renderer: Renderer, image: Image, settings: Settings) -> None:
-    """Compare final with what the reference makes of the renderer's own bloom."""
-    frames = renderer.apply(image, settings, framebuffers=("bloom", "final"))
-    expected = reference.composite(image, frames["bloom"], settings)
-    limit = tolerance(image.dtype, expected)
-    assert_close("final", frames["final"], expected, limit)
-
-
 # Away from black, where the encodings are so steep that half a level of bloom, which may or may
 # not be rounded before the composite, is several levels of final.
 def bright(dtype: str) -> Image:
@@ -66,8 +58,11 @@ def bright(dtype: str) -> Image:
     by_turns(TONEMAPS, [-32.0, -3.5, 0.0, 1.0, 8.0, 32.0], turns=DTYPES),
 )
 def test_exposure(renderer: Renderer, dtype: str, tonemap: Any, exposure: float) -> None:
-    settings = Separable(tonemap=tonemap, exposure=exposure, intensity=0.5)
-    assert_composite(renderer, bright(dtype), settings)
+    """Compare final with what the reference makes of the renderer's own bloom."""
+    settings, image = Separable(tonemap=tonemap, exposure=exposure, intensity=0.5), bright(dtype)
+    frames = renderer.apply(image, settings, framebuffers=("bloom", "final"))
+    expected = reference.composite(image, frames["bloom"], settings)
+    assert_close("final", frames["final"], expected, tolerance(image.dtype, expected))
 
 
 @pytest.mark.parametrize(

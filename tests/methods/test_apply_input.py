@@ -19,6 +19,7 @@ from tests.images import picture
 from tests.methods.cases import DTYPES
 from tests.tolerance import assert_close, assert_matches_reference, tolerance
 from vkbloom import DualKawase, Pyramid, Renderer, Separable, Settings, reference
+from vkbloom._doctor.cases import COMPOSITES, TONEMAPS
 
 Image = NDArray[Any]
 
@@ -30,7 +31,6 @@ METHODS: dict[str, Settings] = {
     "firefly": Pyramid(firefly_filter=True),
     "dual-kawase": DualKawase(),
 }
-COMPOSITES = ("add", "mix", "screen")
 OFF = Separable(bloom=False)
 
 
@@ -142,7 +142,7 @@ def with_specials(
 @pytest.mark.parametrize(
     ("tonemap", "encoding", "other"),
     by_turns(
-        ["none", "reinhard", "aces", "exponential", "khronos_neutral", "agx"],
+        TONEMAPS,
         ["none", "gamma22", "srgb"],
         turns=itertools.product(["float16", "float32"], COMPOSITES),
     ),

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 from tests.images import picture
+from tests.refusals import assert_refused, rows
 from vkbloom import Renderer, _core
 from vkbloom._custom.rows import CoreShader, Resource, Row
 from vkbloom._settings.blocks import settings_block
@@ -87,24 +88,9 @@ def test_another_shader_runs_its_pass_again_and_an_equal_one_does_not(
     np.testing.assert_allclose(frames["bloom"][..., :3], IMAGE[..., :3] + 1, rtol=1e-6)
 
 
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"name": "glow"}, "two images named glow"),
-        ({"name": "other"}, "none writes bloom or main"),
-        ({"name": "main", "size": (5, 5)}, "5 x 5, which is not the frame's size, 32 x 20"),
-        ({"size": (0, 5)}, "a size of 0 x 5"),
-        ({"size": (1 << 20, 5)}, "out of this adapter's range"),
-        ({"reads": ("bloom",)}, "bloom reads bloom, which no pass before it writes"),
-        ({"reads": ("later",)}, "reads later"),
-        ({"reads": ("MAIN",) * 17}, "17 images read are more than 16"),
-        ({"params": bytes(1025)}, "1025 bytes of parameters are more than 1024"),
-        ({"resources": (Resource(b"", None),)}, "a block of 48 bytes is needed, not of 0"),
-        ({"resources": (Resource(bytes(48), None),) * 17}, "17 textures and buffers"),
-    ],
-)
-def test_faulty_pass_is_refused(
-    renderer: Renderer, spirv: bytes, change: dict[str, Any], message: str
-) -> None:
-    with pytest.raises(ValueError, match=message):
-        run(renderer, Own(row(spirv)._replace(**change)))
+@pytest.mark.parametrize(("call", "error"), rows(__file__, "passes"))
+def test_faulty_pass_is_refused(renderer: Renderer, spirv: bytes, call: str, error: str) -> None:
+    def changed(**fields: Any) -> None:
+        run(renderer, Own(row(spirv)._replace(**fields)))
+
+    assert_refused(call, error, {"changed": changed, "Resource": Resource})

@@ -57,10 +57,6 @@ CURVED: dict[str, Any] = {
 }
 
 
-def channels_of(settings: Any) -> int:
-    return 3 if settings.alpha == "keep" else 4
-
-
 def product(one: Any, other: Any) -> float:
     return float((np.asarray(one) * np.asarray(other)).sum())
 
@@ -91,7 +87,7 @@ def as_field(value: Any) -> Any:
 def test_derivatives_are_those_of_central_differences(name: str) -> None:
     settings = CURVED[name].replace(format="rgba32float")
     random = np.random.default_rng(1)
-    shape = (11, 14, channels_of(settings))
+    shape = (11, 14, 3 if settings.alpha == "keep" else 4)
     image, emission = random.random(shape) * 2, random.random(shape) * 2
     mask = random.random((11, 14)) * 0.8 + 0.1
     given = {"mask": mask, "emission": emission} if name != "knee" else {}

@@ -4,20 +4,15 @@ gradient."""
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from tests.images import picture
 from tests.screens import CAMERA, panel
 from tests.tolerance import assert_close
 from vkbloom import Frames, Pyramid, Renderer, Scene, Separable, Settings, ThreeBloom, reference
 from vkbloom._scene.textures import Texture
-
-Array = NDArray[Any]
-
 
 # What it leaves alone
 

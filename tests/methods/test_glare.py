@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 import vkbloom
-from tests.images import hdr_picture, picture
+from tests.images import given_of, hdr_picture, picture
 from tests.tolerance import assert_close, tolerance
 from vkbloom import (
     BevyBloom,
@@ -145,18 +145,12 @@ def source_of(case: Case) -> Image:
     return np.concatenate([image, picture(width, height, 1, case.dtype, seed=7)], axis=2)
 
 
-def given_of(case: Case, image: Image) -> dict[str, Any]:
-    mask = np.random.default_rng(3).random(image.shape[:2]).astype(np.float32)
-    every = {"mask": mask, "emission": image[::-1].copy()}
-    return {name: every[name] for name in case.given}
-
-
 @pytest.mark.parametrize("name", CASES)
 def test_stages(renderer: Renderer, name: str) -> None:
     """All framebuffers agree with the reference."""
     case = CASES[name]
     image = source_of(case)
-    given = given_of(case, image)
+    given = given_of(case.given, image)
     frames = renderer.apply(image, case.settings, **given)
     expected = reference.apply(image, case.settings, **given)
     assert list(frames) == list(expected)

@@ -9,21 +9,12 @@ import pytest
 from numpy.testing import assert_array_equal
 from numpy.typing import NDArray
 
-from tests.images import hdr_picture, picture
+from tests.images import cut_out, picture
 from tests.methods.cases import GIVEN
 from tests.tolerance import assert_matches_reference
 from vkbloom import Pyramid, Renderer, Scene, Separable
 
 Image = NDArray[Any]
-
-
-def image_of(size: tuple[int, int], dtype: str, seed: int = 0) -> Image:
-    """Return a picture whose alpha is 0 to 1, and whose right quarter is transparent black."""
-    image = hdr_picture(*size, 4, dtype, seed)
-    if dtype != "uint8":
-        image[..., 3] = np.clip(image[..., 3] / 8, 0, 1)
-    image[:, 3 * size[0] // 4 :] = 0
-    return image
 
 
 # One of each method.
@@ -32,7 +23,7 @@ def test_a_mask_of_one_changes_no_bit_and_one_of_zero_leaves_no_bloom(
     renderer: Renderer, name: str
 ) -> None:
     settings, _ = GIVEN[name]
-    image = image_of((61, 47), "float32")
+    image = cut_out(61, 47, "float32")
     ones = np.ones(image.shape[:2], bool)
     plain, full = renderer.apply(image, settings), renderer.apply(image, settings, mask=ones)
     for framebuffer in plain:

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
-from numpy.typing import NDArray
 
 from tests import variants
 from tests.conftest import SANITIZED
 from tests.exhaustive import EXHAUSTIVE, by_turns
-from tests.images import hdr_picture
+from tests.images import cut_out, given_of, hdr_picture
 from tests.methods.cases import DTYPES, GIVEN, METHODS, OTHERS, WHOLE, presets_of_low_levels
 from tests.tolerance import assert_matches_reference
 from tests.variants import VARIANTS
@@ -34,8 +32,6 @@ from vkbloom import (
     UnrealBloom,
     UrpBloom,
 )
-
-Image = NDArray[Any]
 
 # Of the convolutions one: they have the same passes.
 PRESETS = {
@@ -80,24 +76,6 @@ def has_equal_bits(settings: Settings) -> bool:
     return not is_transformed and not isinstance(settings, UrpBloom | ThreeBloom)
 
 
-def image_of(size: tuple[int, int], dtype: str, settings: Settings, channels: int) -> Image:
-    """Return a picture; if its alpha counts, a part of it is transparent black."""
-    if settings.alpha == "keep":
-        return hdr_picture(*size, channels, dtype)
-    image = hdr_picture(*size, 4, dtype)
-    if dtype != "uint8":
-        image[..., 3] = np.clip(image[..., 3] / 8, 0, 1)
-    image[:, size[0] - size[0] // 4 :] = 0
-    return image
-
-
-def given_of(names: tuple[str, ...], image: Image) -> dict[str, Any]:
-    mask = np.random.default_rng(3).random(image.shape[:2], np.float32)
-    mask[:9, :9] = 0
-    every = {"mask": mask, "emission": image[::-1].copy()}
-    return {name: every[name] for name in names}
-
-
 @pytest.fixture(scope="module")
 def opened() -> Iterator[dict[str, Renderer]]:
     """A renderer for each column of the table of variants."""
@@ -131,7 +109,9 @@ def test_every_variant(
 ) -> None:
     """Against the reference and the bits of the others; `final` alone is the `final` of all."""
     settings, names = CASES[name]
-    image = image_of(size, dtype, settings, 3 + number // 2 % 2)
+    image = cut_out(*size, dtype)
+    if settings.alpha == "keep":
+        image = hdr_picture(*size, 3 + number // 2 % 2, dtype)
     given = given_of(names, image)
     expected = opened["fragment"].apply(image, settings, **given)
     if name not in BITS:

@@ -8,7 +8,6 @@ from unittest import mock
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from numpy.typing import NDArray
 
 from tests.device.abilities import max_side
 from tests.images import hdr_picture, lights
@@ -37,8 +36,6 @@ from vkbloom import (
     reference,
 )
 from vkbloom._settings.fields import fields_of
-
-Array = NDArray[Any]
 
 CONVOLUTIONS = [name for name in presets if isinstance(presets[name], Convolution)]
 LOW = presets_of_low_levels(64)

@@ -27,7 +27,6 @@ from vkbloom import (
     testing,
 )
 from vkbloom.testing import Probe
-from vkbloom.testing._probe import Bloom
 
 Image = NDArray[Any]
 Array = NDArray[np.float64]
@@ -53,10 +52,6 @@ def bloom_of(renderer: Renderer, image: Image, settings: Settings) -> Array:
     return bloom[..., :3]
 
 
-def law_of(renderer: Renderer, settings: Settings) -> Bloom:
-    return lambda image: bloom_of(renderer, image, settings)
-
-
 def noise(height: int, width: int, seed: int) -> Image:
     """Multiples of 1/256 from 1/4 to 1: sums of two are exact in all floats."""
     levels = np.random.default_rng(seed).integers(64, 257, (height, width, 3))
@@ -66,11 +61,6 @@ def noise(height: int, width: int, seed: int) -> Image:
 sides = st.integers(1, 24)
 seeds = st.integers(0, 2**32 - 1)
 pictures = st.builds(noise, sides, sides, seeds)
-
-
-def in_dtype(image: Image, dtype: str) -> Image:
-    """Return what `noise` made, nothing of which is lost in another float."""
-    return (image * 255).astype(dtype) if dtype == "uint8" else image.astype(dtype)
 
 
 # --- The laws of vkbloom.testing ---
@@ -83,7 +73,9 @@ def in_dtype(image: Image, dtype: str) -> Image:
 def test_linear_blurs_obey_the_laws_of_filters(
     renderer: Renderer, method: str, dtype: str, size: tuple[int, int], seed: int
 ) -> None:
-    bloom = law_of(renderer, METHODS[method])
+    def bloom(image: Image) -> Array:
+        return bloom_of(renderer, image, METHODS[method])
+
     probe = Probe(size=size, dtype=dtype, seed=seed, rtol=ERRORS[dtype])
     testing.assert_superposition(bloom, probe)
     testing.assert_gain(bloom, reference.gain(METHODS[method]), probe)
@@ -99,7 +91,8 @@ def test_linear_blurs_obey_the_laws_of_filters(
 def test_powers_of_two_scale_the_bloom_exactly(
     renderer: Renderer, method: str, dtype: str, picture: Image, power: int
 ) -> None:
-    image, factor = in_dtype(picture, dtype), 2.0**power
+    # Nothing of `noise` is lost in another float.
+    image, factor = picture.astype(dtype), 2.0**power
     plain = scaled = METHODS.get(method, Separable(threshold=0.5))
     if plain.threshold is not None:
         scaled = plain.replace(threshold=plain.threshold * factor)

@@ -11,6 +11,7 @@ import pytest
 import vkbloom
 from tests.conftest import ADAPTER
 from tests.processes import output
+from tests.refusals import assert_refused, rows
 from vkbloom import Renderer
 
 torch = pytest.importorskip("torch", reason="PyTorch is not installed")
@@ -149,30 +150,10 @@ def test_parameters_return_to_their_ranges(renderer: Renderer) -> None:
     assert module.settings.knee == 0
 
 
-def test_wrong_arguments_are_named(renderer: Renderer) -> None:
-    image = tensor(6, 5, 3)
-    with pytest.raises(ValueError, match="learn: 'levels' of the method pyramid has no derivative"):
-        vkbloom_torch.Bloom(SETTINGS, learn=("levels",))
-    with pytest.raises(ValueError, match=r"image: the shape \(6, 5, 3\) is not \(..., C, H, W\)"):
-        vkbloom_torch.bloom(image, SETTINGS, channels_first=True)
-    for shape, first in (((3, 6, 5), False), ((2, 4, 6, 5), False), ((6, 5, 3), True)):
-        with pytest.raises(ValueError, match=f"; give channels_first={not first}"):
-            vkbloom_torch.bloom(tensor(*shape), SETTINGS, channels_first=first)
-    with pytest.raises(ValueError, match=r"mask: the shape \(5, 6\) is not \(6, 5\)"):
-        vkbloom_torch.bloom(image, SETTINGS, mask=tensor(5, 6))
-    for wrong, kind in (([0.5], "list"), (None, "NoneType")):
-        with pytest.raises(TypeError, match=f"image: a tensor is needed, not {kind}"):
-            vkbloom_torch.bloom(wrong, SETTINGS)
-    named: Any = "software"
-    with pytest.raises(TypeError, match="renderer: 'software' is not a Renderer; give an open one"):
-        vkbloom_torch.bloom(image, SETTINGS, renderer=named)
-    with pytest.raises(TypeError, match="renderer: 'software' is not a Renderer; give an open one"):
-        vkbloom_torch.Bloom(SETTINGS, renderer=named)
-    for shape in ((0, 5, 3), (2, 6, 0, 3)):
-        with pytest.raises(ValueError, match=r"image: .* with sides of at least 1"):
-            vkbloom_torch.bloom(tensor(*shape), SETTINGS)
-    with pytest.raises(ValueError, match=r"emission: .* is not the image's"):
-        vkbloom_torch.bloom(image, SETTINGS, emission=tensor(6, 5, 4))
+@pytest.mark.parametrize(("call", "error"), rows(__file__, "tensors"))
+def test_wrong_arguments_are_named(call: str, error: str) -> None:
+    names = {"bloom": vkbloom_torch.bloom, "IMAGE": tensor(6, 5, 3)}
+    assert_refused(call, error, {**globals(), **names})
 
 
 def test_an_empty_batch_is_empty(renderer: Renderer) -> None:

@@ -15,7 +15,17 @@ from tests.images import hdr_picture
 from tests.methods.cases import OTHERS, WHOLE
 from tests.tolerance import assert_matches_reference, tolerance
 from tests.variants import VARIANTS, opened
-from vkbloom import BevyBloom, Convolution, Frames, Pyramid, Renderer, Scene, Separable, presets
+from vkbloom import (
+    BevyBloom,
+    Convolution,
+    Frames,
+    Pyramid,
+    Renderer,
+    Scene,
+    Separable,
+    Settings,
+    presets,
+)
 from vkbloom.psf import gaussian
 from vkbloom.reference import apply as reference_apply
 
@@ -80,25 +90,16 @@ def test_the_largest_halves_stay_finite(varied: Renderer, threshold: float | Non
         np.testing.assert_array_equal(alone, image)
 
 
-def test_lines_of_a_large_image(monkeypatch: pytest.MonkeyPatch, unfused: Renderer) -> None:
-    # On a CPU, lines are unrolled only for more than 2^18 pixels.
-    monkeypatch.setenv("VKBLOOM_VARIANT", "cpu")
-    image = hdr_picture(257, 1028, 4, "uint8")
-    with Renderer(validation=True) as renderer:
-        frames = renderer.apply(image, Separable(), framebuffers=("blur_vertical", "bloom"))
-    expected = unfused.apply(image, Separable(), framebuffers=("blur_vertical", "bloom"))
-    for framebuffer in expected:
-        np.testing.assert_array_equal(frames[framebuffer], expected[framebuffer], framebuffer)
-
-
-def test_large_images_in_the_variant_of_gpus(
-    monkeypatch: pytest.MonkeyPatch, unfused: Renderer
+@pytest.mark.parametrize(
+    ("name", "size", "settings"),
+    [("cpu", (257, 1028), Separable()), ("gpu", (1028, 772), Pyramid(levels=2))],
+)
+def test_large_images(
+    unfused: Renderer, name: str, size: tuple[int, int], settings: Settings
 ) -> None:
-    # Tiles within the levels, and at all their edges.
-    monkeypatch.setenv("VKBLOOM_VARIANT", "gpu")
-    image = hdr_picture(1028, 772, 4, "uint8")
-    settings = Pyramid(levels=2)
-    with Renderer(validation=True) as renderer:
+    """Strips, and tiles within the levels and at all their edges."""
+    image = hdr_picture(*size, 4, "uint8")
+    with opened(name) as renderer:
         alone = renderer.apply(image, settings, framebuffers=("final",))
         renderer.apply(image[::-1], settings)
         frames = renderer.apply(image, settings)
@@ -113,17 +114,6 @@ def is_fused(variant: str, renderer: Renderer) -> bool:
     """Return whether one pass makes the final picture of an image. The fused pass of CPUs stores
     linear texels, for which the image must be in the host's memory."""
     return variant == "gpu" or (variant == "cpu" and has_linear_texels(renderer))
-
-
-def test_one_pass_stands_for_all_of_a_final(variant: str, varied: Renderer) -> None:
-    image = hdr_picture(33, 44, 4, "float32", seed=5)
-    ran = list(varied.apply(image, Separable(), framebuffers=("final",)).timings)
-    assert ran == (
-        ["final"] if is_fused(variant, varied) else ["glow", "blur_vertical", "bloom", "final"]
-    )
-    # The same again: nothing.
-    again = varied.apply(image, Separable(), framebuffers=("final",))
-    assert list(again.timings) == []
 
 
 def test_cached_framebuffers_run_no_pass(varied: Renderer) -> None:
@@ -153,10 +143,13 @@ def test_sequence_runs_shared_passes_once(variant: str, varied: Renderer) -> Non
     for settings, one in zip(exposures, frames, strict=True):
         expected = reference_apply(image, settings)["final"]
         assert np.abs(one["final"] - expected).max() <= tolerance(image.dtype, expected)
-    # Single calls are planned without later ones.
+    # Single calls are planned without later ones. The same again runs nothing.
     image = image[::-1]
-    singly = [varied.apply(image, settings, framebuffers=("final",)) for settings in exposures]
-    assert ran(singly) == [alone, rest, ["final"], ["final"]]
+    singly = [
+        varied.apply(image, settings, framebuffers=("final",))
+        for settings in (exposures[0], *exposures)
+    ]
+    assert ran(singly) == [alone, [], rest, ["final"], ["final"]]
 
 
 def test_sequence_runs_no_pass_of_other_settings(variant: str, varied: Renderer) -> None:

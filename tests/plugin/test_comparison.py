@@ -349,6 +349,3 @@ class TestDifference:
         picture, scale = difference(a, a)
         assert scale == 1
         assert not picture.any()
-
-
-# The command

@@ -9,12 +9,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 from numpy.typing import NDArray
 
+from tests.cli.calls import run
 from tests.exhaustive import EXHAUSTIVE
 from vkbloom import Separable, reference, write
-from vkbloom._cli.program import program
 from vkbloom._io.srgb import encode_srgb
 from vkbloom._views.tolerances import Tolerances
 from vkbloom.testing import FrameRegression, diagnose
@@ -124,13 +123,12 @@ class TestPlanted:
     @pytest.mark.parametrize("cause", ["gain", "nan", "size"])
     def test_on_the_command_line(self, cause: str, tmp_path: Path) -> None:
         files = [
-            str(write(tmp_path / f"{name}.exr", image.astype(np.float32), premultiplied=True))
+            write(tmp_path / f"{name}.exr", image.astype(np.float32), premultiplied=True)
             for name, image in zip("ab", planted(cause), strict=True)
         ]
-        printed = CliRunner().invoke(program, ["compare", *files])
         _, value, text = PLANTED[cause]
-        assert f"cause      {text}" in printed.output
-        stored = json.loads(CliRunner().invoke(program, ["compare", "--json", *files]).output)
+        assert f"cause      {text}" in run("compare", *files).output
+        stored = json.loads(run("compare", "--json", *files).output)
         assert stored["diagnosis"]["cause"] == cause
         if isinstance(value, float):
             assert stored["diagnosis"]["value"] == pytest.approx(value, rel=1e-3)

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import importlib.resources
-import json
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 from numpy.typing import NDArray
 
+from tests.cli.calls import run
+from tests.custom.test_check import checked
 from tests.exhaustive import EXHAUSTIVE
 from vkbloom import write
-from vkbloom._cli.program import program
 from vkbloom._io.srgb import encode_srgb
 from vkbloom.testing import flash, flicker
 
@@ -37,12 +35,11 @@ def frames(light: NDArray[np.float64], colour: tuple[float, float, float] = (1, 
 @pytest.mark.parametrize("shape", ["sine", "square"])
 @pytest.mark.parametrize("hertz", range(4, 16) if EXHAUSTIVE else (4, 9, 15))
 def test_the_general_threshold_is_a_tenth(hertz: float, shape: str) -> None:
-    low, high = 0.05, 0.2
-    while high - low > 1e-3:
-        middle = (low + high) / 2
-        failed = flash(frames(flashing(hertz, middle, shape)), FPS, degrees=40).general
-        low, high = (low, middle) if failed else (middle, high)
-    assert high == pytest.approx(0.1, rel=0.01)
+    def fails(change: float) -> bool:
+        return flash(frames(flashing(hertz, change, shape)), FPS, degrees=40).general
+
+    # Of the threshold, a hundredth.
+    assert (fails(0.099), fails(0.101)) == (False, True)
 
 
 @pytest.mark.parametrize("shape", ["sine", "square"])
@@ -74,12 +71,9 @@ def test_red_flashes() -> None:
 
 def test_the_threshold_of_red_flashes() -> None:
     """20 / 320 of the largest change of max(0, R - G - B)."""
-    low, high = 0.01, 0.2
-    while high - low > 1e-4:
-        middle = (low + high) / 2
-        failed = flash(frames(flashing(7, middle), (1, 0, 0)), FPS, degrees=40).red
-        low, high = (low, middle) if failed else (middle, high)
-    assert high == pytest.approx(20 / 320, rel=0.01)
+    for share in (0.99, 1.01):
+        light = flashing(7, share * 20 / 320)
+        assert flash(frames(light, (1, 0, 0)), FPS, degrees=40).red == (share > 1)
 
 
 @pytest.mark.parametrize(("share", "failed"), [(0.2, False), (0.3, True)])
@@ -113,12 +107,9 @@ def test_check_judges_files(tmp_path: Path) -> None:
     for number, light in enumerate(flashing(10, 0.4, seconds=0.5)):
         write(tmp_path / f"f.{number:04d}.exr", np.full((4, 6, 3), light, np.float32))
     words = ["check", "--sequence", str(tmp_path / "f.%04d.exr"), "--fps", str(FPS)]
-    done = CliRunner().invoke(program, [*words, "--json"])
-    assert done.exit_code == 1, done.output
-    found = json.loads(done.stdout)
-    schema = importlib.resources.files("vkbloom.testing").joinpath("check.schema.json")
-    pytest.importorskip("jsonschema").validate(found, json.loads(schema.read_text()))
+    done, found = checked(*words[1:])
+    assert done.exit_code == 1
     assert (found["frames"], found["flash"]["general"], found["flash"]["red"]) == (120, True, False)
-    assert "general flashes: fails" in CliRunner().invoke(program, words).stdout
-    refused = CliRunner().invoke(program, [*words, "--preset", "kino"])
+    assert "general flashes: fails" in run(*words).stdout
+    refused = run(*words, "--preset", "kino")
     assert (refused.exit_code, "without a bloom" in refused.stderr) == (2, True)

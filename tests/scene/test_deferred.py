@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from pathlib import Path
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from tests.scene.gltf_documents import Document
-from tests.screens import DISTANCE, GBUFFER, NOTHING, SIZE, deferred, noise, rgb, screen
+from tests.screens import BLURRED, DISTANCE, GBUFFER, NOTHING, SIZE, deferred, noise, rgb, screen
 from tests.tolerance import assert_close, tolerance
 from vkbloom import (
     Camera,
@@ -45,15 +44,6 @@ def lamps(scene: Scene) -> Scene:
 @pytest.fixture(scope="module")
 def frames(renderer: Renderer, scene: Scene) -> Frames:
     return deferred(renderer, scene)
-
-
-# Names, shapes, formats
-
-
-def test_bloom_buffers_have_the_frames_size(renderer: Renderer, scene: Scene) -> None:
-    assert deferred(renderer, scene)["blur_vertical"].shape[1::-1] == SIZE
-    half = deferred(renderer, scene, Separable(bloom_scale=0.5))
-    assert half["blur_vertical"].shape[1::-1] == (160, 90)
 
 
 # The G-buffer
@@ -157,50 +147,12 @@ def test_nothing_at_all_is_black(renderer: Renderer) -> None:
 # Brightness
 
 
-def test_brightness_is_the_glow_mesh_as_the_forward_system_draws_it(
-    renderer: Renderer, scene: Scene
-) -> None:
-    settings = Separable(format="rgba16float", bloom_size=SIZE)
-    glow = renderer.render(scene, settings, SIZE, time=0.3)["glow"]
-    shown = deferred(renderer, scene, time=0.3)
-    assert rgb(glow).max() == 1
-    np.testing.assert_array_equal(shown["brightness"], glow)
-
-
 def test_brightness_is_rounded_to_the_nearest(renderer: Renderer) -> None:
     colours = noise((16, 9))
     shown = deferred(
         renderer, dataclasses.replace(screen(colours, (16, 9)), glow_intensity=5), size=(16, 9)
     )
     np.testing.assert_allclose(rgb(shown["brightness"]), 5 * colours, rtol=1.01 * HALF, atol=1e-7)
-
-
-def test_materials_that_emit(renderer: Renderer, tmp_path: Path) -> None:
-    document = Document()
-    triangle = [[-2.0, -1.0, 0.0], [2.0, -1.0, 0.0], [0.0, 3.0, 0.0]]
-    document.primitive(triangle, material=0)
-    document.json["extensionsUsed"] = ["KHR_materials_emissive_strength"]
-    document.json["materials"] = [
-        {
-            "pbrMetallicRoughness": {"baseColorFactor": [0.5, 0.25, 0.125, 1.0]},
-            "emissiveFactor": [1.0, 0.5, 0.0],
-            "extensions": {"KHR_materials_emissive_strength": {"emissiveStrength": 8.0}},
-        }
-    ]
-    (tmp_path / "lamp.gltf").write_bytes(document.as_gltf())
-    camera = Camera(rotation=(0, 0, 0))
-    shown = deferred(renderer, Scene.from_gltf(tmp_path / "lamp.gltf", camera=camera))
-    body = shown["depth"] < 1
-    assert 0.01 < body.mean() < 0.9
-    np.testing.assert_array_equal(rgb(shown["brightness"]), body[..., np.newaxis] * (8.0, 4.0, 0.0))
-    np.testing.assert_array_equal(rgb(shown["albedo"]), body[..., np.newaxis] * (0.5, 0.25, 0.125))
-    for name in ("tutorial", "bevy_natural", "camera_lens"):
-        lamp = Scene.from_gltf(tmp_path / "lamp.gltf", camera=camera)
-        frames = renderer.render(lamp, presets[name], SIZE)
-        assert (rgb(frames["scene"])[body] >= (255, 255, 0)).all()
-        assert rgb(frames["glow"]).max() >= 1.0
-        # Beyond the body, too.
-        assert rgb(frames["final"])[~body].any()
 
 
 def test_the_glow_mesh_changes_nothing_but_the_brightness(
@@ -338,3 +290,39 @@ def test_a_lamp_is_one_in_both_systems(renderer: Renderer) -> None:
     forward = rgb(renderer.render(scene, None, (3, 3))["scene"]) / 255
     # Half a level, and what half floats round.
     np.testing.assert_allclose(np.clip(rgb(shown["scene"]), 0, 1), forward, atol=1 / 255)
+
+
+# Passes
+
+
+def test_weights_change_without_a_new_pipeline(
+    new_renderer: Callable[[], Renderer], scene: Scene
+) -> None:
+    renderer = new_renderer()
+    settings = presets["deferred"]
+    assert isinstance(settings, Separable)
+    before = deferred(renderer, scene, settings)
+    count = renderer._core.pipeline_count
+    weights = tuple(reversed(settings.weights))
+    after = deferred(renderer, scene, settings.replace(weights=weights))
+    assert renderer._core.pipeline_count == count > 0
+    assert np.abs(rgb(after["bloom"]) - rgb(before["bloom"])).max() > 0.01
+    blurs = [f"blur_{way}_0_{loop}" for loop in range(2) for way in ("vertical", "horizontal")]
+    assert list(after.timings) == [*blurs, *BLURRED, "final"]
+
+
+CHANGES: list[tuple[dict[str, Any], list[str]]] = [
+    ({"exposure": 1.0}, ["final"]),
+    ({"tonemap": "aces"}, ["final"]),
+    ({"blur_strength": 0.7}, [*BLURRED, "final"]),
+    ({"threshold": 0.5}, ["extracted", *BLURRED, "final"]),
+    ({"bloom": False}, ["albedo", "scene", "final"]),
+]
+
+
+@pytest.mark.parametrize(("changes", "ran"), CHANGES)
+def test_change_runs_only_dependent_passes(
+    renderer: Renderer, scene: Scene, changes: dict[str, Any], ran: list[str]
+) -> None:
+    deferred(renderer, scene)
+    assert list(deferred(renderer, scene, Separable(**changes)).timings) == ran

@@ -17,7 +17,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 
-from tests.exhaustive import EXHAUSTIVE
 from tests.refusals import assert_refused, rows
 from tests.scene.gltf_documents import (
     BYTE,
@@ -34,7 +33,6 @@ from tests.scene.gltf_documents import (
     many,
     nested,
     places,
-    refusals,
     triangle,
 )
 from vkbloom._scene import Mesh, gltf_file
@@ -547,24 +545,3 @@ def test_changed_bytes_load_or_are_refused(tmp_path: Path, changes: list[tuple[i
     mesh = load_or_refuse(tmp_path / "mesh.glb", bytes(content))
     if mesh is not None:
         assert np.isfinite(mesh.vertices).all()
-
-
-def test_any_json_value_in_any_place_loads_or_is_refused(tmp_path: Path) -> None:
-    document = nested()
-    document.json["accessors"][0]["sparse"] = {
-        "count": 1,
-        "indices": {"bufferView": document.view(b"\0"), "componentType": BYTE},
-        "values": {"bufferView": document.view(b"\0")},
-    }
-    document.json["materials"][0]["extensions"] = {
-        "KHR_materials_emissive_strength": {"emissiveStrength": 2.0}
-    }
-    document.json["materials"][0]["emissiveFactor"] = [1.0, 1.0, 1.0]
-    document.json["extensionsUsed"] = ["KHR_materials_emissive_strength"]
-    document.json["nodes"].append({"matrix": np.eye(4).ravel().tolist(), "children": []})
-    original = json.loads(document.as_gltf())
-    path = tmp_path / "mesh.gltf"
-    assert load_or_refuse(path, json.dumps(original).encode()) is not None
-    # Most of them break something; were all let through, the checks would be off.
-    step, least = (1, 1200) if EXHAUSTIVE else (12, 100)
-    assert refusals(path, original, places(original), step=step) > least

@@ -14,7 +14,7 @@ import pytest
 from numpy.typing import NDArray
 
 import vkbloom
-from tests.screens import GBUFFER, noise, screen
+from tests.screens import GBUFFER, noise, rgb, screen
 from tests.tolerance import real
 from vkbloom import Camera, Renderer, Scene, Separable, reference
 from vkbloom._scene import Mesh
@@ -24,13 +24,9 @@ SIZE = (320, 180)
 FORWARD = ["glow", "glow_depth", "blur_vertical", "bloom", "scene", "depth", "final"]
 
 
-def levels_apart(image: NDArray[np.uint8], expected: NDArray[Any]) -> int:
+def levels_apart(image: NDArray[Any], expected: NDArray[Any]) -> int:
     """Return the largest difference, in levels, of an 8-bit image from another."""
     return int(np.abs(image.astype(int) - expected.astype(int)).max())
-
-
-def rgb(image: NDArray[Any]) -> NDArray[Any]:
-    return image[..., :3]
 
 
 # The original's frames
@@ -125,13 +121,6 @@ def test_the_size_of_the_bloom_buffers(
     for name in ("glow", "glow_depth", "blur_vertical"):
         assert frames[name].shape[1::-1] == bloom_size
     assert frames["bloom"].shape[1::-1] == SIZE
-
-
-def test_the_default_is_the_tutorial_at_1280_x_720(renderer: Renderer, scene: Scene) -> None:
-    frames = renderer.render(scene)
-    assert list(frames) == FORWARD
-    assert frames["final"].shape == (720, 1280, 4)
-    assert frames.settings == Separable() == vkbloom.presets["tutorial"]
 
 
 def test_without_bloom(renderer: Renderer, scene: Scene) -> None:

@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-import OpenImageIO as oiio
 import pytest
 from hypothesis import given
 from numpy.typing import NDArray
@@ -225,14 +224,6 @@ def test_a_wrong_value_is_refused(tmp_path: Path, call: str, error: str) -> None
     assert_refused(call, error, {**globals(), **levels, "ktx_with": ktx_with})
 
 
-@pytest.mark.parametrize("content", [b"", b"\xabKTX", b"\xabKTX 20\xbb\r\n\x1a\n", b"PNG"])
-def test_file_that_is_not_ktx_is_refused(tmp_path: Path, content: bytes) -> None:
-    path = tmp_path / "sky.ktx"
-    path.write_bytes(content)
-    with pytest.raises(ValueError, match=r"sky\.ktx: "):
-        skybox.load(path)
-
-
 def test_a_ktx_cut_anywhere_is_refused(tmp_path: Path) -> None:
     whole = ktx_bytes([faces_of(2), faces_of(1)])
     path = tmp_path / "sky.ktx"
@@ -314,17 +305,18 @@ def test_face_images_that_do_not_fit(tmp_path: Path) -> None:
             skybox.load([good] * 5 + [bad])
 
 
-def test_a_panorama_cut_anywhere_is_refused_or_read(tmp_path: Path) -> None:
+@pytest.mark.parametrize("suffix", ["png", "jpg"])
+def test_a_panorama_cut_anywhere_is_refused_or_read(tmp_path: Path, suffix: str) -> None:
     values = np.random.default_rng(1).integers(0, 256, (16, 32, 3), np.uint8)
-    whole = write_image(tmp_path / "whole.png", values, "uint8").read_bytes()
-    path = tmp_path / "sky.png"
+    whole = write_image(tmp_path / f"whole.{suffix}", values, "uint8").read_bytes()
+    path = tmp_path / f"sky.{suffix}"
     refused = 0
     for size in range(0, len(whole), 7):
         path.write_bytes(whole[:size])
         # A cut after the texels is no damage.
         message = refusal(path)
         if message is not None:
-            assert "sky.png" in message
+            assert path.name in message
             refused += 1
     assert refused > len(whole) // 7 // 2
 
@@ -358,21 +350,6 @@ def test_a_panorama_ends_up_in_the_directions_it_shows() -> None:
         # A texel of a face spans up to 2/64, of which its centre is at most 0.7 away.
         found = look_up(faces, tuple(unit))
         assert np.linalg.norm(found - unit) < 0.7 * 2 / 64 + 0.01
-
-
-def test_a_panorama_is_upright_and_unmirrored_in_a_frame() -> None:
-    """Seen by a camera without rotation, whose frame has -y at its top and +x at its right."""
-    panorama = np.zeros((64, 128, 3), np.uint8)
-    panorama[:32, 32:64] = (255, 0, 0)  # up, left of the centre
-    panorama[:32, 64:96] = (0, 255, 0)  # up, right
-    panorama[32:, 32:64] = (0, 0, 255)  # down, left
-    panorama[32:, 64:96] = (255, 255, 255)  # down, right
-    faces = skybox.project_equirectangular(panorama, 32)
-    assert look_up(faces, (-0.5, -0.5, -1)).tolist() == [255, 0, 0]
-    assert look_up(faces, (0.5, -0.5, -1)).tolist() == [0, 255, 0]
-    assert look_up(faces, (-0.5, 0.5, -1)).tolist() == [0, 0, 255]
-    assert look_up(faces, (0.5, 0.5, -1)).tolist() == [255, 255, 255]
-    assert look_up(faces, (0.5, 0.5, 1)).tolist() == [0, 0, 0]
 
 
 def test_a_panorama_wraps_around() -> None:
@@ -409,13 +386,3 @@ def test_a_panorama_must_be_twice_as_wide_as_high(tmp_path: Path) -> None:
     path = write_image(tmp_path / "sky.png", np.zeros((8, 17, 3), np.uint8), "uint8")
     with pytest.raises(ValueError, match=r"sky\.png: 17 x 8; .*twice as wide"):
         skybox.load(path)
-
-
-def test_a_face_that_ends_early_is_refused(tmp_path: Path) -> None:
-    panorama = tmp_path / "panorama.jpg"
-    noise = np.random.default_rng(0).integers(0, 256, (64, 128, 3), dtype=np.uint8)
-    assert oiio.ImageBuf(noise).write(str(panorama))
-    content = panorama.read_bytes()
-    panorama.write_bytes(content[: len(content) // 2])
-    with pytest.raises(ValueError, match=r"panorama\.jpg"):
-        skybox.load(panorama)

@@ -24,6 +24,9 @@ from vkbloom._custom.textures import Texture
 BODY: Final = 1
 REST: Final = 2
 
+#: TARGET_BINDING of shaders/params.h.
+TARGET: Final = 33
+
 ROUNDING_NAMES: Final = (
     "half_magic",
     "half_size",
@@ -194,7 +197,7 @@ def write_shader(
     if item.compute:
         width, height = item.compute.threads
         lines.append(f"layout(local_size_x = {width}, local_size_y = {height}) in;")
-        lines.append(f"layout(binding = {binding}) uniform writeonly image2D out_image;")
+        lines.append(f"layout(binding = {TARGET}) uniform writeonly image2D out_image;")
     lines += [
         "#define tex_offset vec2(0.0)",
         "#define linearize(c) (c)",

@@ -1,0 +1,52 @@
+// Shared by the variants of a transposed filter: each texel gathers the cotangents of the pixels that read it, with
+// the weights from a table (csrc/passes/taps.h). With BY these are the cotangents of a composite without a curve, from
+// which those of the bloom follow by a factor where the scene is finite. For linear texels, include pixels.glsl before
+// this file.
+UNIFORM_BLOCK(ADJOINT_FILTER_BLOCK);
+
+// A texel of an image at a binding, and the nearest place in the image of cotangents. (Linear texels repeat the rows
+// themselves, and no column is before the first.)
+#ifdef LINEAR_TEXELS
+#define FETCH(name, number, texel) load_floats(name, read_shapes[number - 1], (texel).x, (texel).y)
+#define NEAREST(texel) ivec2(min((texel).x, read_shapes[0].x - 1), (texel).y)
+#else
+#define FETCH(name, number, texel) texelFetch(name, texel, 0)
+#define READ_IMAGE(number, name) layout(set = 0, binding = number) uniform sampler2D name
+#define NEAREST(texel) clamp(texel, ivec2(0), textureSize(cotangents, 0) - 1)
+#endif
+
+// Copies of parameters (see pixels.glsl).
+float gain = params.gain, share = params.share;
+
+READ_IMAGE(1, cotangents);
+READ_IMAGE(2, table);
+READ_IMAGE(3, scene);
+READ_IMAGE(4, added);
+READ_IMAGE(5, differentiated);
+
+// The pixels that read a texel, or the weights of a pixel in a kernel for the texels of a block.
+vec4 entry(int place)
+{
+    return FETCH(table, 2, ivec2(place % TABLE_WIDTH, place / TABLE_WIDTH));
+}
+
+// The cotangents of this pixel, or of the nearest one in the image.
+vec4 texel_at(ivec2 texel)
+{
+    ivec2 within = NEAREST(texel);
+    vec4 value = FETCH(cotangents, 1, within);
+    return BY == BY_BLOOM ? vec4(where_finite(value, FETCH(scene, 3, within)).rgb, 0.0) : value;
+}
+
+// What other readers of the image have accumulated.
+vec4 own_at(ivec2 pixel)
+{
+    return ADD_OWN != 0 ? vec4(vec3(share), 1.0) * FETCH(added, 4, pixel) : vec4(0.0);
+}
+
+// The cotangents of a texel. The image of a source has none at NaN and infinity.
+vec4 shade(vec4 own, vec4 sum, ivec2 pixel)
+{
+    sum = gain * sum + own;
+    return FROM_IMAGE != 0 ? where_finite(sum, FETCH(differentiated, 5, pixel)) : sum;
+}
