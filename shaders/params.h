@@ -67,14 +67,15 @@
     THRESHOLD_ROWS(B, READS)
 
 // A blur pass: the distances of its taps in texels of the source, and its half-kernel w0.., four
-// weights in a vec4. `gain` is for a blur in both directions.
+// weights in a vec4. Where TAP_COUNT is set, the distances are `offsets` of the steps. `gain` is
+// for a blur in both directions.
 #define BLUR_BLOCK(B, READS, INPUT, VEC4S) \
     INPUT(B, float, step_x) \
     INPUT(B, float, step_y) \
     INPUT(B, float, gain) \
     SAMPLING_ROWS(B, INPUT) \
-    VEC4S(B, weights, BLUR_VEC4S) \
-    VEC4S(B, offsets, OFFSET_VEC4S)
+    VEC4S(B, weights, (MAX_WEIGHTS + 3) / 4) \
+    VEC4S(B, offsets, 3)
 
 // The same blur on integer texels: a symmetric kernel from the first tap to the last, then zeros.
 // `origin` is the position of the target's first pixel in the source, along the line. For ROLLED,
@@ -85,7 +86,7 @@
     INPUT(B, int, origin) \
     INPUT(B, int, vertical) \
     INPUT(B, int, levels) \
-    VEC4S(B, kernel, LINE_VEC4S)
+    VEC4S(B, kernel, (2 * LINE_RADIUS + LINE_OUTPUTS) / 4)
 
 // The complete bloom of an image in one fused pass: threshold, both blurs, composite. Kernels as in
 // LINE_BLOCK. `columns` are those that an invocation of strip.comp writes.
@@ -93,8 +94,8 @@
     THRESHOLD_ROWS(B, READS) \
     COMPOSITE_ROWS(B, READS, INPUT) \
     INPUT(B, int, columns) \
-    VEC4S(B, vertical, FUSED_VEC4S) \
-    VEC4S(B, horizontal, FUSED_VEC4S)
+    VEC4S(B, vertical, TILE_RADIUS / 4 + 1) \
+    VEC4S(B, horizontal, TILE_RADIUS / 4 + 1)
 
 // The threshold pass, which also reduces an image to the size of the bloom buffers.
 #define THRESHOLD_BLOCK(B, READS, INPUT, VEC4S) \
@@ -226,7 +227,7 @@
 // elements, with `count` butterflies in each line. The elements of a butterfly are `step` apart.
 // Elements from `kept` on are not stored. The first stage pads the line: its first `extent`
 // elements are texels, and elements from `turn` on are positions before the first texel. The
-// product with a kernel with colours reads the frequency of the opposite sign. To find it, it needs
+// product with a kernel reads the frequency of the opposite sign. To find it, it needs
 // the radices of the rows' stages (`row_a` to `row_d`; `row_last` is the last one that is used),
 // the rows' number of elements, and the radices of the columns' stages without the last one.
 #define FFT_BLOCK(B, READS, INPUT, VEC4S) \
@@ -251,8 +252,7 @@
     INPUT(B, float, prefilter_factor)
 
 // Writes the kernel into padded lines (fft_kernel.comp). For each axis: the kernel's number of
-// texels, how many of them before and after its centre count, and the period of the line. `grey`:
-// all channels are equal.
+// texels, how many of them before and after its centre count, and the period of the line.
 #define FFT_KERNEL_BLOCK(B, READS, INPUT, VEC4S) \
     INPUT(B, int, padded_x) \
     INPUT(B, int, boundary_x) \
@@ -266,12 +266,10 @@
     INPUT(B, int, period_y) \
     INPUT(B, int, before_y) \
     INPUT(B, int, after_y) \
-    INPUT(B, int, grey) \
     INPUT(B, float, gain)
 
 // Of a pass that was given at run time: bytes whose layout only its shader knows.
-#define CUSTOM_BLOCK(B, READS, INPUT, VEC4S) VEC4S(B, values, CUSTOM_VEC4S)
-#define CUSTOM_VEC4S                         64
+#define CUSTOM_BLOCK(B, READS, INPUT, VEC4S) VEC4S(B, values, 64)
 
 #define PARAMETER_BLOCKS(BLOCK) \
     BLOCK(custom, CUSTOM_BLOCK) \
@@ -365,19 +363,13 @@
     COUNT(lerp, 0, 0, 1) \
     COUNT(seed, 0, 0, 65535)
 
-// The largest values of 8 bits, of half floats and of floats.
-#define UNORM_LIMIT  1.0
+// The largest values of half floats and of floats.
 #define HALF_LIMIT   65504.0
 #define SINGLE_LIMIT 3.402823466e38
-// The largest float of 11 bits; that of 10 bits is less.
-#define UFLOAT11_LIMIT 65024.0
 
 // The longest half-kernel (w0..w64) and the most layers of one blur.
 #define MAX_WEIGHTS 65
-#define BLUR_VEC4S  17
-// Taps of a half-kernel whose offsets are given, where TAP_COUNT is set.
-#define OFFSET_VEC4S 3
-#define MAX_LAYERS   8
+#define MAX_LAYERS  8
 
 // Of glare: the most stages (the bloom and a picture of dirt are added up with them) and ghosts,
 // the taps of an iteration of a streak, and how often the size of the bloom buffers is halved.
@@ -402,7 +394,6 @@
 #define LINE_OUTPUTS        8
 #define ROLLED_PIXELS       0x40000
 #define ROLLED_OUTPUTS      32
-#define LINE_VEC4S          34
 #define STRIP_RADIUS        4
 #define STRIP_COLUMNS       240
 #define STRIP_ROWS(CHANNEL) ((CHANNEL) == 1 ? 4 : 8)
@@ -426,7 +417,6 @@
 // Tiles of filters: their rows, and those that an invocation adds up.
 #define FILTER_TILE_ROWS 16
 #define FILTER_TILE_RUN  4
-#define FUSED_VEC4S      5
 
 // Fourier transforms. FFT_INVOCATIONS is the size of a workgroup. In a transform of columns,
 // FFT_ROW_COLUMNS of them are in one row. FFT_MAX_RADIX is the largest number of elements of a
@@ -454,15 +444,11 @@
 #define ADJOINT_ROWS 16
 
 // Taps of published methods: the distance of Filament's in texels and the share of the outer ones
-// along an axis; the distances of those of HDRP's prefilter; the kernel of its blur, a binomial of
-// order 8; the half-kernel of Godot's.
+// along an axis; the distances of those of HDRP's prefilter.
 #define FILAMENT_OFFSET 1.761629
 #define FILAMENT_OUTER  (7.46602 / 32.0)
 #define HDRP_FAR        0.9
 #define HDRP_NEAR       0.4
-#define HDRP_KERNEL \
-    0.00390625, 0.03125, 0.109375, 0.21875, 0.2734375, 0.21875, 0.109375, 0.03125, 0.00390625
-#define GODOT_KERNEL 0.2024, 0.1790, 0.1240, 0.0672, 0.0285
 
 // Of a filter: the most taps along an axis, kernels, and texels of a window.
 #define MAX_FILTER_TAPS 5
@@ -486,18 +472,17 @@
 // of. EMITTERS is how many passes add up in the target by blending. With ENLARGED the target has
 // more rows than the source. STORED is the format of the target (STORED_*). FIRST marks an engine's
 // first level. LEVELS is the number of levels that a pass adds up. GROUPS is what a downsampling
-// makes of its taps. RADIX_A to STAGE are of Fourier transforms (fft.comp), whose workgroups have
-// GROUP_WIDTH x GROUP_HEIGHT invocations. BOUNDARY is of those that are PADDED, and a first stage
-// that is PREFILTERED has the filter of bright colours. Of complete lines (fft_lines.comp) RADIX_1
-// to RADIX_4 are the radices of the stages; a workgroup has GROUP_HEIGHT invocations for each of
-// GROUP_WIDTH lines.
+// makes of its taps. INVERSE to GROUP_HEIGHT are of Fourier transforms (fft.comp), whose workgroups
+// have GROUP_WIDTH x GROUP_HEIGHT invocations: of a stage of RADIX_1 elements, or with complete
+// lines of stages of RADIX_1 to RADIX_4. BOUNDARY is of those that are PADDED, and a first stage
+// that is PREFILTERED has the filter of bright colours.
 #define SPECIALIZATION_CONSTANTS(CONSTANT) \
     CONSTANT(0, SAMPLING, sampling) \
     CONSTANT(1, COMPOSITE, composite) \
     CONSTANT(2, TONEMAP, tonemap) \
     CONSTANT(3, ENCODING, encoding) \
     CONSTANT(4, DITHER, dither) \
-    CONSTANT(5, BLOOM, bloom) \
+    CONSTANT(5, LIT, lit) \
     CONSTANT(6, FORMAT, format) \
     CONSTANT(7, THRESHOLD_MODE, threshold_mode) \
     CONSTANT(8, THRESHOLDED, thresholded) \
@@ -515,8 +500,6 @@
     CONSTANT(21, ALPHA, alpha) \
     CONSTANT(22, MASKED, masked) \
     CONSTANT(23, STORED, stored) \
-    CONSTANT(24, RADIX_A, radix_a) \
-    CONSTANT(25, RADIX_B, radix_b) \
     CONSTANT(26, INVERSE, inverse) \
     CONSTANT(27, ROTATED, rotated) \
     CONSTANT(28, PADDED, padded) \
@@ -638,8 +621,6 @@
     NAME(STORED_UNORM8_SCALED, 3, unorm8_scaled) \
     NAME(STORED_UFLOAT, 4, ufloat) \
     NAME(STORED_SRGB8, 5, srgb8) \
-    NAME(BLOOM_OWN, 0, own_image) \
-    NAME(BLOOM_LIT, 2, lit) \
     NAME(UPSAMPLE_TENT, 0, tent) \
     NAME(UPSAMPLE_LINEAR, 1, linear) \
     NAME(UPSAMPLE_CUBIC, 2, cubic) \
@@ -676,8 +657,6 @@
     NAME(BY_VALUES, 3, by_values) \
     NAME(BY_SQUARES, 4, by_squares) \
     NAME(BY_MIXED, 5, by_mixed) \
-    NAME(STAGE_PLAIN, 0, plain) \
     NAME(STAGE_FIRST, 1, first_stage) \
-    NAME(STAGE_GREY, 2, grey) \
-    NAME(STAGE_COLOURS, 3, colours) \
-    NAME(STAGE_LAST, 4, last_stage)
+    NAME(STAGE_PRODUCT, 2, product) \
+    NAME(STAGE_LAST, 3, last_stage)

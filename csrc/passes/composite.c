@@ -62,7 +62,7 @@ void vkb_add_composite(struct vkb_levels *levels, const struct vkb_composite_sou
     row.constants.dither = dither;
     row.constants.alpha = off ? ALPHA_KEEP : source->alpha;
     row.constants.masked = row.constants.composite == COMPOSITE_MIX && source->mask != VKB_NO_IMAGE;
-    row.constants.bloom = source->lit ? BLOOM_LIT : BLOOM_OWN;
+    row.constants.lit = source->lit;
     if (settings->method == VKB_METHOD_GODOT && !off)
         row.constants.groups = GROUPS_GODOT;
     row.reads[0] = source->scene;

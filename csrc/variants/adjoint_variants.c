@@ -69,7 +69,7 @@ static void read_composite(const struct vkb_graph *graph, struct vkb_pass_row *r
     if (!pass || !vkb_is_factor(pass))
         return;
     const struct vkb_composite_params *params = &pass->params.composite;
-    const float intensity = pass->constants.bloom == BLOOM_LIT ? 1.0f : params->intensity;
+    const float intensity = pass->constants.lit ? 1.0f : params->intensity;
     row->params.adjoint_filter.gain *= intensity * exp2f(params->exposure);
     row->constants.by = BY_BLOOM;
     replace_read(row, by_bloom, pass->reads[3]);

@@ -31,13 +31,14 @@ static bool has_thirteen_taps(enum vkb_mode groups)
         || groups == GROUPS_BLENDER || groups == GROUPS_BEVY;
 }
 
-// Whether the target has exactly half of the size of the image that the pass reads.
-static bool is_half(const struct vkb_graph *graph, const struct vkb_pass_row *pass)
+// The simple ratio of both sides of the source and the target, of EXACT_*; 0: they have none.
+static int32_t ratio_of(const struct vkb_graph *graph, const struct vkb_pass_row *pass)
 {
     const struct vkb_image_row *source = &graph->images[pass->reads[0]];
     const struct vkb_image_row *target = &graph->images[pass->targets[0]];
+    const int32_t ratio = vkb_ratio_of(source->height, target->height);
 
-    return source->width == 2 * target->width && source->height == 2 * target->height;
+    return ratio == vkb_ratio_of(source->width, target->width) ? ratio : 0;
 }
 
 // Adds the pass as one of linear texels, which loads the texels of its first image.
@@ -55,15 +56,13 @@ bool vkb_add_windowed(struct vkb_variant_choice *choice, const struct vkb_pass_r
     const struct vkb_image_row *source = &choice->plain.images[pass->reads[0]];
     const struct vkb_image_row *target = &choice->plain.images[pass->targets[0]];
     const uint32_t size = vkb_formats[source->format].channel_size;
+    const int32_t ratio = ratio_of(&choice->plain, pass);
     const enum vkb_mode groups = groups_of(pass);
     const bool is_blur = groups == GROUPS_HDRP_BLUR || groups == GROUPS_GODOT;
     struct vkb_pass_row row;
 
     memcpy(&row, pass, sizeof row);
-    row.constants.exact = vkb_same_size(&choice->plain, pass->reads[0], pass->targets[0])
-                            ? EXACT_SAME
-                        : is_half(&choice->plain, pass) ? EXACT_HALF
-                                                        : 0;
+    row.constants.exact = ratio == EXACT_DOUBLE ? 0 : ratio;
     row.constants.exact_rows = row.constants.exact;
     row.constants.enlarged = source->height < target->height;
     row.constants.window = has_thirteen_taps(groups) ? 6 : 4;
@@ -86,7 +85,8 @@ bool vkb_add_nine(struct vkb_variant_choice *choice, const struct vkb_pass_row *
     const bool fits = groups_of(pass) == GROUPS_HDRP_BLUR
                         ? (pass->constants.first || pass->constants.sampling == SAMPLING_TEXEL)
                               && loads(choice, pass)
-                        : groups_of(pass) == GROUPS_GODOT && rows && is_half(&choice->plain, pass)
+                        : groups_of(pass) == GROUPS_GODOT && rows
+                              && ratio_of(&choice->plain, pass) == EXACT_HALF
                               && target->width % 2 == 0 && target->format == VKB_FORMAT_RGBA32_FLOAT
                               && vkb_fits_linear(choice, pass);
     struct vkb_pass_row row;

@@ -23,7 +23,10 @@ uint next_element()
         if (at.y < int(layout_.height))
             texel = texelFetch(from_image, at, 0);
     }
-    float value = texel[channel];
+    float value = channel == 0 ? texel.r
+                : channel == 1 ? texel.g
+                : channel == 2 ? texel.b
+                               : texel.a;
     ++channel;
     return layout_.size == 4 ? floatBitsToUint(value)
          : layout_.size == 2 ? packHalf2x16(vec2(value, 0))

@@ -16,27 +16,6 @@ vec3 is_stored(vec3 value)
     return inside(value, params.limit == 1.0 ? 0.0 : -params.limit, params.limit);
 }
 
-bool shows_light()
-{
-    return ALPHA != ALPHA_KEEP && COMPOSITE != COMPOSITE_OFF;
-}
-
-// The light that the alpha shows.
-float alpha_light(vec4 bloom)
-{
-    float light = ALPHA == ALPHA_MAX ? max(bloom.r, max(bloom.g, bloom.b)) : bloom.a;
-    return light_of(vec3(light)).r;
-}
-
-// The picture's alpha before it is stored.
-float mixed_alpha(vec4 scene, vec4 bloom)
-{
-    float light = clamp(alpha_light(bloom), 0.0, 1.0);
-    if (!shows_light())
-        return scene.a;
-    return ALPHA == ALPHA_MAX ? max(scene.a, light) : scene.a + (1.0 - scene.a) * light;
-}
-
 Pixel pixel_of(vec4 given, vec4 bloom, float share, vec4 cotangent)
 {
     Pixel p;
@@ -44,7 +23,7 @@ Pixel pixel_of(vec4 given, vec4 bloom, float share, vec4 cotangent)
     p.bloom = bloom;
     p.share = share;
     cotangent = where_finite(cotangent, given);
-    p.by_alpha = cotangent.a * is_stored(vec3(mixed_alpha(p.scene, bloom))).x;
+    p.by_alpha = cotangent.a * is_stored(vec3(mixed_alpha(p.scene.a, bloom))).x;
     vec3 mixed = composite(p.scene.rgb, p.bloom.rgb, p.share);
     // Encodings would magnify the rounding of a difference near 0.
     if (COMPOSITE == COMPOSITE_MIX)
@@ -78,19 +57,19 @@ vec3 by_light(Pixel p)
 vec4 by_alpha_light(Pixel p)
 {
     float light = alpha_light(p.bloom), by = p.by_alpha * inside(vec3(light), 0.0, 1.0).x;
-    if (!shows_light())
+    if (ALPHA == ALPHA_KEEP || COMPOSITE == COMPOSITE_OFF)
         return vec4(0.0);
     if (ALPHA == ALPHA_BLUR)
         return vec4(0.0, 0.0, 0.0, by * (1.0 - p.scene.a));
     by *= above(vec3(clamp(light, 0.0, 1.0)), p.scene.a).x;
-    return vec4(by * equal_shares(p.bloom.rgb, max(p.bloom.r, max(p.bloom.g, p.bloom.b))), 0.0);
+    return vec4(by * shares_of_brightest(p.bloom.rgb), 0.0);
 }
 
 // Of the picture's alpha by that of the scene.
 float alpha_slope(Pixel p)
 {
     float light = clamp(alpha_light(p.bloom), 0.0, 1.0);
-    if (!shows_light())
+    if (ALPHA == ALPHA_KEEP || COMPOSITE == COMPOSITE_OFF)
         return 1.0;
     return ALPHA == ALPHA_BLUR ? 1.0 - light : above(vec3(p.scene.a), light).x;
 }
@@ -107,7 +86,7 @@ vec4 by_scene(Pixel p)
 
 vec4 by_bloom(Pixel p)
 {
-    float gain = BLOOM == BLOOM_LIT ? 1.0 : params.intensity;
+    float gain = LIT != 0 ? 1.0 : params.intensity;
     return gain * (vec4(by_light(p), 0.0) + by_alpha_light(p));
 }
 

@@ -1,5 +1,5 @@
 // What all shaders begin with (setup.py): the rows of params.h as a uniform block, specialization constants and
-// named constants, and the functions for values that are read and stored.
+// named constants, and the functions for values that are read and stored, and for thresholds.
 #include "params.h"
 #include "lib/layers.glsl"
 
@@ -12,12 +12,8 @@
     } params
 
 #define CONSTANT_NAME(name, value, spelling) const int name = value;
-COMPOSITE_NAMES(CONSTANT_NAME)
-TONEMAP_NAMES(CONSTANT_NAME)
-ENCODING_NAMES(CONSTANT_NAME)
-ALPHA_NAMES(CONSTANT_NAME)
-TEXEL_NAMES(CONSTANT_NAME)
-BOUNDARY_NAMES(CONSTANT_NAME)
+#define CHOICE_CONSTANTS(choice, NAMES) NAMES(CONSTANT_NAME)
+CHOICES(CHOICE_CONSTANTS)
 MODE_NAMES(CONSTANT_NAME)
 
 #define SPECIALIZATION_CONSTANT(id, name, member) layout(constant_id = id) const int name = 0;
@@ -25,3 +21,4 @@ SPECIALIZATION_CONSTANTS(SPECIALIZATION_CONSTANT)
 
 #include "lib/finite.glsl"
 #include "lib/storage.glsl"
+#include "lib/threshold.glsl"

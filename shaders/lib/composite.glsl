@@ -8,14 +8,14 @@
 // The light of the bloom, or with glare of both, which the image then has the sum of.
 vec3 light_of(vec3 b)
 {
-    return BLOOM == BLOOM_LIT ? b : params.intensity * b;
+    return LIT != 0 ? b : params.intensity * b;
 }
 
 // `share` is the part of the scene from which the bloom was made.
 vec3 composite(vec3 s, vec3 b, float share)
 {
     if (COMPOSITE == COMPOSITE_MIX)
-        return BLOOM == BLOOM_LIT ? s + (b - params.intensity * share * s)
+        return LIT != 0 ? s + (b - params.intensity * share * s)
                                   : s + (b - share * s) * params.intensity;
     if (COMPOSITE == COMPOSITE_SCREEN) {
         // 1 - (1 - s)(1 - b), expanded: differences from 1 lose the precision of dark values. Godot
@@ -46,15 +46,19 @@ vec3 soft_light(vec3 s, vec3 light)
     return mix(s + clamp(light, 0.0, 1.0) * (full - s), s, greaterThan(s, vec3(1.0)));
 }
 
-// The alpha of the finished picture (the setting `alpha`).
-float blend_alpha(float alpha, vec4 bloom)
+// The light that the alpha shows (the setting `alpha`).
+float alpha_light(vec4 bloom)
 {
+    return light_of(vec3(ALPHA == ALPHA_MAX ? largest(bloom.rgb) : bloom.a)).r;
+}
+
+// The alpha of the finished picture before it is stored.
+float mixed_alpha(float alpha, vec4 bloom)
+{
+    float light = clamp(alpha_light(bloom), 0.0, 1.0);
     if (ALPHA == ALPHA_KEEP)
         return alpha;
-    float light = ALPHA == ALPHA_MAX ? max(bloom.r, max(bloom.g, bloom.b)) : bloom.a;
-    light = clamp(light_of(vec3(light)).r, 0.0, 1.0);
-    float blended = ALPHA == ALPHA_MAX ? max(alpha, light) : alpha + (1.0 - alpha) * light;
-    return is_finite(vec3(alpha)).r ? storable(vec3(blended)).r : alpha;
+    return ALPHA == ALPHA_MAX ? max(alpha, light) : alpha + (1.0 - alpha) * light;
 }
 
 // NaN and infinity of the scene stay in their own pixels and channels: some curves would change
@@ -68,7 +72,8 @@ vec4 encoded(vec4 scene, vec4 bloom, vec3 toned, ivec2 pixel)
 #ifndef LINEAR_TEXELS
     result = mix(scene.rgb, result, is_finite(scene.rgb));
 #endif
-    return vec4(result, blend_alpha(scene.a, bloom));
+    float alpha = storable(vec3(mixed_alpha(scene.a, bloom))).r;
+    return vec4(result, ALPHA != ALPHA_KEEP && is_finite(scene.aaa).r ? alpha : scene.a);
 }
 
 vec4 finish(vec4 scene, vec4 bloom, float share, ivec2 pixel)
@@ -87,9 +92,4 @@ vec4 finish(vec4 scene, vec4 bloom, float share, ivec2 pixel)
     if (GROUPS != GROUPS_GODOT)
         result *= exposure;
     return encoded(scene, bloom, apply_tonemap(result, TONEMAP), pixel);
-}
-
-vec4 finish(vec4 scene, vec4 bloom, ivec2 pixel)
-{
-    return finish(scene, bloom, 1.0, pixel);
 }

@@ -32,7 +32,7 @@ vec4 ended(vec4 scene, vec4 bloom, ivec2 pixel)
 }
 #elif TRANSPOSED
 // Copies of parameters and of factors (see pixels.glsl).
-float exposed = exp2(params.exposure), gain = exposed * (BLOOM == BLOOM_LIT ? 1.0 : params.intensity);
+float exposed = exp2(params.exposure), gain = exposed * (LIT != 0 ? 1.0 : params.intensity);
 float share = exposed * (COMPOSITE == COMPOSITE_MIX ? 1.0 - params.intensity : 1.0);
 float threshold = params.threshold, knee = params.knee;
 
@@ -45,7 +45,7 @@ vec4 ended(vec4 own, vec4 blurred, ivec2 pixel)
 #else
 vec4 ended(vec4 scene, vec4 bloom, ivec2 pixel)
 {
-    return finish(scene, bloom, pixel);
+    return finish(scene, bloom, 1.0, pixel);
 }
 #endif
 

@@ -23,14 +23,10 @@ struct Axis {
     float ratio;
 };
 
-Axis axis_x(Place place, ivec2 size, vec2 ratio)
+// Along x for 0, along y for 1.
+Axis axis_of(Place place, ivec2 size, vec2 ratio, int along)
 {
-    return Axis(place.texel.x, place.part.x, size.x, ratio.x);
-}
-
-Axis axis_y(Place place, ivec2 size, vec2 ratio)
-{
-    return Axis(place.texel.y, place.part.y, size.y, ratio.y);
+    return Axis(place.texel[along], place.part[along], size[along], ratio[along]);
 }
 
 const bool IS_INSET = UPSAMPLE == UPSAMPLE_INSET_LINEAR || UPSAMPLE == UPSAMPLE_INSET_CUBIC;
@@ -120,8 +116,6 @@ Window window_in(ivec2 size, ivec2 pixel, bool along_x)
     ivec2 target_size = ivec2(params.target_width, params.target_height);
     Place place = place_in_size(size, pixel, target_size);
     vec2 ratio = vec2(size) / vec2(target_size);
-    Axis axis = axis_x(place, size, ratio);
-    if (!along_x)
-        axis = axis_y(place, size, ratio);
+    Axis axis = axis_of(place, size, ratio, along_x ? 0 : 1);
     return window_of(settled(axis), WINDOW, along_x);
 }

@@ -38,7 +38,7 @@ vec4 filtered(sampler2D image)
     Place place = PLACE_IN(image);
     ivec2 size = textureSize(image, 0);
     vec2 ratio = vec2(size) / vec2(params.target_width, params.target_height);
-    Axis row = settled(axis_x(place, size, ratio)), column = settled(axis_y(place, size, ratio));
+    Axis row = settled(axis_of(place, size, ratio, 0)), column = settled(axis_of(place, size, ratio, 1));
     if (WINDOW == 0)
         return sparse(image, row, column);
     Window x = window_of(row, WINDOW, true), y = window_of(column, WINDOW, false);

@@ -27,40 +27,11 @@ vec4 colours_from_centre(vec2 offset)
 // The same above the threshold and up to the maximum.
 vec4 seen_from_centre(vec2 offset)
 {
-    vec4 above = above_threshold(colours_from_centre(offset));
+    vec4 above = colours_from_centre(offset);
+    if (params.threshold > 0.0)
+        above = part_above(above, params.threshold);
     return vec4(min(above.rgb, vec3(params.maximum)), above.a);
 }
 
 // The place of this pixel, from the centre, in texels.
 #define FROM_CENTRE (vec2(PIXEL) + 0.5 - 0.5 * vec2(textureSize(source, 0)))
-
-// What a halo samples for a place, and what it shows of it. The direction must be exact, since red and
-// blue are moved along it also where the sample is near the centre.
-vec2 halo_offset(vec2 place)
-{
-    float distance = length(place), radius = params.radius * float(textureSize(source, 0).y);
-    return distance > 0.0 ? (distance - radius) / distance * place : vec2(0.0);
-}
-
-float halo_factor(vec2 place)
-{
-    float distance = length(place) / float(textureSize(source, 0).y);
-    return 1.0 - smoothstep(0.0, 1.0, abs(distance - params.radius) / params.width);
-}
-
-// What a ghost shows of its sample for a place: its tints, less towards the border.
-vec4 ghost_factor(int ghost, vec2 place)
-{
-    vec3 tint = params.ghosts[ghost].rgb;
-    vec2 share = params.ghosts[ghost].w * place / vec2(textureSize(source, 0));
-    float left = max(1.0 - length(share) / params.radius, 0.0);
-    float weight = params.falloff > 0.0 ? pow(left, params.falloff) : 1.0;
-    return weight * vec4(tint, (tint.r + tint.g + tint.b) / 3.0);
-}
-
-float vignette(vec2 place)
-{
-    vec2 corner = 2.0 * place / vec2(textureSize(source, 0));
-    float squared = dot(corner, corner);
-    return mix(1.0, min(squared * squared, 1.0), params.vignette);
-}

@@ -8,15 +8,39 @@ struct Taps {
 
 const float GROUP_SHARES[5] = float[](0.5, 0.125, 0.125, 0.125, 0.125);
 
+// The taps of a group: the inner ones, or those at a corner.
+vec4[4] taps_of_group(Taps taps, int group)
+{
+    int first = group < 3 ? group - 1 : group;
+    if (group == 0)
+        return taps.inner;
+    return vec4[](taps.outer[first], taps.outer[first + 1], taps.outer[first + 3], taps.outer[first + 4]);
+}
+
+// Blender's: within a group, brighter taps weigh less (formulas of the compositor of Blender 5.0). Taps
+// between texels with negative channels may have a negative brightness.
+vec4 blender_mean(vec4 taps[4])
+{
+    vec4 sum = vec4(0.0);
+    float weights = 0.0;
+    [[unroll]] for (int i = 0; i < 4; ++i) {
+        float weight = 1.0 / (1.0 + largest(taps[i].rgb));
+        sum += weight * taps[i];
+        weights += weight;
+    }
+    return sum / weights;
+}
+
 // The taps as five groups of four; the middle one has half of the weight.
 vec4[5] group_means(Taps taps)
 {
-    vec4 a = taps.outer[0], b = taps.outer[1], c = taps.outer[2];
-    vec4 d = taps.outer[3], e = taps.outer[4], f = taps.outer[5];
-    vec4 g = taps.outer[6], h = taps.outer[7], i = taps.outer[8];
-    vec4 inner = taps.inner[0] + taps.inner[1] + taps.inner[2] + taps.inner[3];
-    return vec4[](0.25 * inner, 0.25 * (a + b + d + e), 0.25 * (b + c + e + f),
-                  0.25 * (d + e + g + h), 0.25 * (e + f + h + i));
+    vec4 means[5];
+    [[unroll]] for (int group = 0; group < 5; ++group) {
+        vec4 four[4] = taps_of_group(taps, group);
+        means[group] = GROUPS == GROUPS_BLENDER ? blender_mean(four)
+                                                : 0.25 * (four[0] + four[1] + four[2] + four[3]);
+    }
+    return means;
 }
 
 // Not one expression: glslang 12 writes invalid SPIR-V for a condition of several constants.
@@ -26,16 +50,11 @@ bool are_of_thirteen()
         return true;
     if (GROUPS == GROUPS_PYGFX_KARIS)
         return true;
+    if (GROUPS == GROUPS_BLENDER)
+        return true;
     return GROUPS == GROUPS_BEVY || GROUPS == GROUPS_PYRAMID;
 }
 
-// Whether each group is a tap of its own.
-bool has_own_taps()
-{
-    return GROUPS != GROUPS_BLENDER && !are_of_thirteen();
-}
-
-// Of those that have one weight each. Blender's weights are those of the four taps of a group.
 int group_count()
 {
     if (are_of_thirteen())
@@ -43,8 +62,6 @@ int group_count()
     if (GROUPS == GROUPS_BOX)
         return 4;
     if (GROUPS == GROUPS_FILAMENT)
-        return 4;
-    if (GROUPS == GROUPS_BLENDER)
         return 4;
     if (GROUPS == GROUPS_KINO)
         return ANTI_FLICKER != 0 ? 5 : 1;
@@ -60,10 +77,9 @@ struct Weight {
 // Brighter groups weigh less (Karis 2013).
 Weight weight_of(vec4 group, float share)
 {
-    bool by_brightest = GROUPS == GROUPS_BOX || GROUPS == GROUPS_FILAMENT;
     float gain = 1.0, brightness;
     vec3 slope = LUMINANCE;
-    if (GROUPS == GROUPS_PYGFX)
+    if (GROUPS == GROUPS_PYGFX || GROUPS == GROUPS_BLENDER)
         return Weight(share, vec3(0.0));
     if (GROUPS == GROUPS_FILAMENT && THRESHOLDED == 0)
         return Weight(share, vec3(0.0));
@@ -72,14 +88,14 @@ Weight weight_of(vec4 group, float share)
     // That of a group which has been multiplied by its share.
     if (GROUPS == GROUPS_BEVY)
         gain = 0.25 * share;
-    if (by_brightest || GROUPS == GROUPS_BLENDER) {
+    if (GROUPS == GROUPS_BOX || GROUPS == GROUPS_FILAMENT) {
         slope = shares_of_brightest(group.rgb);
         brightness = largest(group.rgb);
     } else {
         brightness = dot(group.rgb, slope);
     }
-    // These two count negative brightness: beyond -1 weights are negative.
-    if (GROUPS != GROUPS_PYGFX_KARIS && GROUPS != GROUPS_BLENDER) {
+    // pygfx counts negative brightness: beyond -1 weights are negative.
+    if (GROUPS != GROUPS_PYGFX_KARIS) {
         slope *= larger(brightness, 0.0);
         brightness = max(brightness, 0.0);
     }
@@ -116,22 +132,3 @@ vec4 usual(vec4 value)
 }
 
 const float ONES[5] = float[](1.0, 1.0, 1.0, 1.0, 1.0);
-
-vec4 weighted_mean(vec4 a, vec4 b, vec4 c, vec4 d)
-{
-    Sum sum = sum_of(vec4[](a, b, c, d, vec4(0.0)), ONES);
-    return sum.value / sum.weights;
-}
-
-// Blender's: within a group, brighter taps weigh less (formulas of the compositor of Blender 5.0). Taps
-// between texels with negative channels may have a negative brightness.
-vec4 blender_groups(Taps taps)
-{
-    vec4 a = taps.outer[0], b = taps.outer[1], c = taps.outer[2];
-    vec4 d = taps.outer[3], e = taps.outer[4], f = taps.outer[5];
-    vec4 g = taps.outer[6], h = taps.outer[7], i = taps.outer[8];
-    vec4 inner = weighted_mean(taps.inner[0], taps.inner[1], taps.inner[2], taps.inner[3]);
-    vec4 outer = weighted_mean(a, b, d, e) + weighted_mean(b, c, e, f) + weighted_mean(d, e, g, h)
-               + weighted_mean(e, f, h, i);
-    return usual(0.5 * inner + 0.125 * outer);
-}

@@ -2,24 +2,17 @@
 // method, and what it makes of them. The including shader has PREFILTER_BLOCK and `source`, and
 // includes fullscreen.glsl and prefilters.glsl before this file.
 
-vec4 tap(Place place, float x, float y)
-{
-    return sample_at(source, place, vec2(x, y), SAMPLING);
-}
-
 // The 13 taps: nine in three rows, and four around the centre (Jimenez, "Next Generation Post Processing in Call of
 // Duty: Advanced Warfare", SIGGRAPH 2014).
 Taps taps_of(Place place)
 {
     // The distance of the inner taps from the centre, in texels of the source.
     vec2 apart = vec2(params.step_x, params.step_y);
-    float x = 2.0 * apart.x, y = 2.0 * apart.y;
     Taps taps;
-    taps.outer = vec4[](tap(place, -x, -y), tap(place, 0.0, -y), tap(place, x, -y),
-                        tap(place, -x, 0.0), tap(place, 0.0, 0.0), tap(place, x, 0.0),
-                        tap(place, -x, y), tap(place, 0.0, y), tap(place, x, y));
-    taps.inner = vec4[](tap(place, -apart.x, -apart.y), tap(place, apart.x, -apart.y),
-                        tap(place, -apart.x, apart.y), tap(place, apart.x, apart.y));
+    [[unroll]] for (int i = 0; i < 9; ++i)
+        taps.outer[i] = sample_at(source, place, 2.0 * apart * (vec2(i % 3, i / 3) - 1.0), SAMPLING);
+    [[unroll]] for (int i = 0; i < 4; ++i)
+        taps.inner[i] = sample_at(source, place, apart * (2.0 * vec2(i % 2, i / 2) - 1.0), SAMPLING);
     return taps;
 }
 
@@ -42,9 +35,6 @@ vec4[5] means(Place place)
         return group_means(taps_of(place));
     FilamentTaps pairs = filament_taps(place.part);
     vec4 found[5] = vec4[](vec4(0.0), vec4(0.0), vec4(0.0), vec4(0.0), vec4(0.0));
-    // Its groups share their taps.
-    if (GROUPS == GROUPS_BLENDER)
-        return found;
     [[unroll]] for (int group = 0; group < 5; ++group)
         if (group < group_count())
             found[group] = sample_at(source, place, place_of(group, pairs), SAMPLING);
@@ -52,9 +42,4 @@ vec4[5] means(Place place)
     if (RADIUS > 1)
         found[0] = mean_of_texels(source, PIXEL, params.target_height, RADIUS);
     return found;
-}
-
-vec4 prefiltered(vec4 found[5], Place place)
-{
-    return GROUPS == GROUPS_BLENDER ? blender_groups(taps_of(place)) : made(found, place.part);
 }

@@ -1,7 +1,6 @@
 // What downsamplings that are not linear, and the first passes of published methods, make of their bilinear taps,
 // by GROUPS.
 #include "lib/groups.glsl"
-#include "lib/above.glsl"
 #include "lib/lab.glsl"
 
 // The shares of Filament's four taps, and the distances of the first and the last of them. Along an
@@ -64,7 +63,7 @@ vec4 highlights(vec4 value)
 {
     if (THRESHOLDED == 0)
         return value;
-    float brightest = max(value.r, max(value.g, value.b));
+    float brightest = largest(value.rgb);
     return brightest > 0.0 ? value * (highlight(brightest) / brightest) : vec4(0.0);
 }
 
@@ -184,12 +183,14 @@ vec4 bright_part(vec4 value)
 {
     if (is_plain())
         return value;
+    if (GROUPS == GROUPS_BLENDER)
+        return usual(value);
     if (GROUPS == GROUPS_PYGFX || GROUPS == GROUPS_PYGFX_KARIS)
         return max(usual(value), vec4(0.0));
     if (GROUPS == GROUPS_BEVY)
         value.rgb = max(value.rgb, vec3(1e-4));
     if (THRESHOLDED != 0 && GROUPS == GROUPS_FILAMENT) {
-        value = part_above(value);
+        value = part_above(value, params.threshold);
         return value / (1.0 + largest(value.rgb) / params.highlight);
     }
     if (THRESHOLDED != 0)

@@ -91,3 +91,20 @@ vec4 back_through_threshold(vec4 colour, vec4 cotangent, int mode, float thresho
         return back_through_factor(colour, knee_factor(colour.rgb, threshold, knee), cotangent);
     return cotangent;
 }
+
+// The channels above a threshold. Alpha is multiplied by the factor of the brightest channel.
+vec4 part_above(vec4 value, float threshold)
+{
+    vec3 above = max(value.rgb - threshold, vec3(0.0));
+    return vec4(above, value.a * (largest(above) / max(largest(value.rgb), 1e-30)));
+}
+
+vec4 back_part_above(vec4 value, vec4 cotangent, float threshold)
+{
+    float brightest = largest(value.rgb), held = max(brightest, 1e-30);
+    float by_brightest =
+        cotangent.a * value.a * larger(brightest, threshold) * threshold / (held * held);
+    return vec4(cotangent.rgb * larger(value, vec4(threshold)).rgb
+                    + by_brightest * shares_of_brightest(value.rgb),
+                cotangent.a * max(brightest - threshold, 0.0) / held);
+}

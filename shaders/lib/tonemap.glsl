@@ -21,13 +21,6 @@ vec3 inside(vec3 value, float low, float high)
     return above(value, low) * below(value, high);
 }
 
-// Equal channels have equal shares of an extreme.
-vec3 equal_shares(vec3 value, float extreme)
-{
-    vec3 share = vec3(equal(value, vec3(extreme)));
-    return share / (share.r + share.g + share.b);
-}
-
 // The derivative of the power, 0 at a base of 0.
 vec3 power_slope(vec3 base, float exponent)
 {
@@ -66,11 +59,11 @@ vec3 tonemap_khronos_neutral(vec3 c, inout vec3 by)
 {
     const float F90 = 0.04, START = 0.8 - F90, ROOM = 1.0 - START, DESATURATION = 0.15;
     // Lower values give the same result, 1, and their square would overflow.
-    float least = min(c.r, min(c.g, c.b)), low = max(least, -1e15);
+    float low = max(min(c.r, min(c.g, c.b)), -1e15);
     bool dark = low < 2.0 * F90;
     // Encodings would magnify the rounding of an offset, low - low^2 / (4 F90).
     vec3 colour = dark ? c - low + low * low / (4.0 * F90) : c - F90, value = colour;
-    float peak = max(colour.r, max(colour.g, colour.b));
+    float peak = largest(colour);
     if (peak >= START) {
         float apart = peak + ROOM - START, top = 1.0 - ROOM * ROOM / apart, ratio = top / peak;
         float kept = 1.0 / (DESATURATION * (peak - top) + 1.0);
@@ -79,10 +72,10 @@ vec3 tonemap_khronos_neutral(vec3 c, inout vec3 by)
         float by_kept = -kept * kept * DESATURATION * (1.0 - by_top);
         float by_peak = dot(by, colour) * (by_ratio * kept + ratio * by_kept)
                       + dot(by, vec3(1.0)) * (by_top * (1.0 - kept) - top * by_kept);
-        by = ratio * kept * by + equal_shares(colour, peak) * by_peak;
+        by = ratio * kept * by + shares_of_brightest(colour) * by_peak;
     }
     if (dark)
-        by -= equal_shares(c, least) * ((1.0 - low / (2.0 * F90)) * dot(by, vec3(1.0)));
+        by -= shares_of_brightest(-c) * ((1.0 - low / (2.0 * F90)) * dot(by, vec3(1.0)));
     return value;
 }
 

@@ -1,8 +1,6 @@
 // The cotangents of what a stage of glare reads, from those of what is above the stage's threshold.
-#include "lib/threshold.glsl"
 
 UNIFORM_BLOCK(STREAKS_BLOCK);
-#include "lib/above.glsl"
 
 layout(set = 0, binding = 1) uniform sampler2D source;
 layout(set = 0, binding = 2) uniform sampler2D cotangents;
@@ -16,7 +14,5 @@ vec4 shade()
     vec4 cotangent = texelFetch(cotangents, PIXEL, 0);
     if (ALPHA != ALPHA_BLUR)
         cotangent.a = 0.0;
-    if (params.threshold > 0.0)
-        cotangent = back_part_above(texelFetch(source, PIXEL, 0), cotangent);
-    return gathered(cotangent);
+    return gathered(back_part_above(texelFetch(source, PIXEL, 0), cotangent, params.threshold));
 }

@@ -1,7 +1,6 @@
 // The cotangents of the groups of taps from which a downsampling makes a pixel, where it is not linear
 // in these: of RADIX_1 groups from number LEVELS on, or of the mask.
 #include "lib/sampling.glsl"
-#include "lib/threshold.glsl"
 
 UNIFORM_BLOCK(PREFILTER_BLOCK);
 #include "lib/prefilters.glsl"
@@ -30,10 +29,11 @@ vec4 back_bright_part(vec4 value, vec4 cotangent)
     if (GROUPS == GROUPS_PYGFX || GROUPS == GROUPS_PYGFX_KARIS)
         return cotangent * larger(usual(value), vec4(0.0));
     if (THRESHOLDED != 0 && GROUPS == GROUPS_FILAMENT) {
-        vec4 above = part_above(value);
+        vec4 above = part_above(value, params.threshold);
         float divisor = 1.0 + largest(above.rgb) / params.highlight;
         vec3 slope = shares_of_brightest(above.rgb) / (-params.highlight * divisor * divisor);
-        return back_part_above(value, back_through_factor(above, vec4(slope, 1.0 / divisor), cotangent));
+        return back_part_above(
+            value, back_through_factor(above, vec4(slope, 1.0 / divisor), cotangent), params.threshold);
     }
     vec4 held = GROUPS == GROUPS_BEVY ? vec4(max(value.rgb, vec3(1e-4)), value.a) : value;
     cotangent *= params.tint[0];
@@ -108,6 +108,6 @@ vec4 shade()
 {
     own_group = LEVELS + picture;
     if (BY == BY_MASK)
-        return gathered(vec4(dot(prefiltered(found, place), cotangent), 0.0, 0.0, 0.0));
+        return gathered(vec4(dot(made(found, place.part), cotangent), 0.0, 0.0, 0.0));
     return gathered(back(mask_value() * cotangent));
 }

@@ -1,6 +1,5 @@
 // The cotangents of the threshold pass, at its pixels: of the reduced image, of the mask, or of
 // threshold and knee, whose sums are their derivatives.
-#include "lib/threshold.glsl"
 
 #define TEXEL(value) finite_or_zero(value)
 #include "lib/sampling.glsl"

@@ -15,8 +15,7 @@ layout(set = 0, binding = 1) uniform sampler2D source;
 
 #include "lib/fullscreen.glsl"
 #include "lib/mask.glsl"
-#include "lib/godot.glsl"
-#include "lib/hdrp.glsl"
+#include "lib/nine.glsl"
 
 const ivec2 along = DIRECTION == DIRECTION_HORIZONTAL ? ivec2(1, 0) : ivec2(0, 1);
 
@@ -55,10 +54,10 @@ vec4 shade()
 {
     ivec2 size = ivec2(params.target_width, params.target_height);
     vec4 sum = vec4(0.0);
-    for (int tap = -HDRP_RADIUS; tap <= HDRP_RADIUS; ++tap)
-        sum += GROUPS == GROUPS_HDRP_BLUR
-                 ? HDRP_WEIGHTS[tap + HDRP_RADIUS] * hdrp_sample(PIXEL + tap * along, size)
-                 : GODOT_WEIGHTS[abs(tap)] * godot_sample(PIXEL + tap * along, size);
+    for (int tap = -NINE_RADIUS; tap <= NINE_RADIUS; ++tap)
+        sum += nine_weight(tap)
+             * (GROUPS == GROUPS_GODOT ? godot_sample(PIXEL + tap * along, size)
+                                       : hdrp_sample(PIXEL + tap * along, size));
     if (GROUPS == GROUPS_HDRP_BLUR || DIRECTION == DIRECTION_HORIZONTAL)
         return stored(sum);
     return stored(FIRST == 0 ? params.strength * sum : mask_value() * glowing(sum));

@@ -4,7 +4,6 @@
 // Where the pass reads the image itself, as the threshold pass does.
 #define TEXEL(value) (FROM_IMAGE != 0 ? finite_or_zero(value) : (value))
 #include "lib/sampling.glsl"
-#include "lib/threshold.glsl"
 
 UNIFORM_BLOCK(PREFILTER_BLOCK);
 #include "lib/prefilters.glsl"
@@ -18,5 +17,5 @@ layout(set = 0, binding = 1) uniform sampler2D source;
 vec4 shade()
 {
     Place place = PLACE_IN(source);
-    return stored(mask_value() * prefiltered(means(place), place));
+    return stored(mask_value() * made(means(place), place.part));
 }

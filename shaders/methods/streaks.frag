@@ -3,7 +3,7 @@
 #include "lib/sampling.glsl"
 
 UNIFORM_BLOCK(STREAKS_BLOCK);
-#include "lib/glare.glsl"
+#include "lib/fetch_inside.glsl"
 
 layout(set = 0, binding = 1) uniform sampler2D source;
 layout(set = 0, binding = 2) uniform sampler2D before;
@@ -13,7 +13,7 @@ layout(set = 0, binding = 2) uniform sampler2D before;
 vec4 fetch(ivec2 texel)
 {
     vec4 value = fetch_inside(source, texel);
-    return FIRST != 0 ? above_threshold(value) : value;
+    return FIRST != 0 ? part_above(value, params.threshold) : value;
 }
 
 vec4 fetch_in_row(ivec2 texel, float part)

@@ -17,16 +17,13 @@ uint turned(uint value, int count)
 // A number of 0 to 1 from two integers: the end of Bob Jenkins' lookup3.
 float hashed(uvec2 key)
 {
-    const uint START = 0xdeadbeefu + 8u + 13u;
-    uint a = START + key.x, b = START + key.y, c = START;
-    c = (c ^ b) - turned(b, 14);
-    a = (a ^ c) - turned(c, 11);
-    b = (b ^ a) - turned(a, 25);
-    c = (c ^ b) - turned(b, 16);
-    a = (a ^ c) - turned(c, 4);
-    b = (b ^ a) - turned(a, 14);
-    c = (c ^ b) - turned(b, 24);
-    return float(c) / 4294967295.0;
+    const int COUNTS[7] = int[](14, 11, 25, 16, 4, 14, 24);
+    uvec3 mixed = 0xdeadbeefu + 8u + 13u + uvec3(0, key.yx);
+    for (int i = 0; i < 7; ++i) {
+        mixed.x = (mixed.x ^ mixed.y) - turned(mixed.y, COUNTS[i]);
+        mixed = mixed.zxy;
+    }
+    return float(mixed.y) / 4294967295.0;
 }
 
 // The source at a share of its sides, with 0 outside of it.

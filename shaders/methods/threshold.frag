@@ -1,6 +1,5 @@
 // The threshold pass: reduces an image to the size of the bloom buffers, then applies the threshold.
 // NaN and infinity become 0 first, since the filter would spread them.
-#include "lib/threshold.glsl"
 
 #define TEXEL(value) finite_or_zero(value)
 #include "lib/sampling.glsl"

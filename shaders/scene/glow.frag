@@ -5,7 +5,6 @@
 #define GLOW
 #endif
 #include "scene/surface.glsl"
-#include "lib/threshold.glsl"
 
 UNIFORM_BLOCK(MESH_BLOCK);
 

@@ -15,7 +15,7 @@ Window window_at(ivec2 pixel, bool along_x)
     ivec4 readers = ivec4(entry(at_texel + (along_x ? params.start_x : params.start_y)));
     Window window;
     int exact = along_x ? EXACT : EXACT_ROWS, at_pixel = along_x ? pixel.x : pixel.y;
-    window.first = exact != 0 ? exact_first(exact, at_pixel) : readers.x;
+    window.first = exact != 0 ? exact_first(exact, at_pixel, WINDOW) : readers.x;
     [[unroll]] for (int i = 0; i < WINDOW; ++i) {
         int at = window.first + i;
         window.weights[i] = vec3(0.0);

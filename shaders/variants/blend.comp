@@ -24,7 +24,7 @@ void write_row(int x, int y)
     load_scene(x, y, raw);
     [[unroll]] for (int i = 0; i < COLUMNS; ++i) {
         vec4 light = value_of(raw_in_run(bloom, read_shapes[1], x, i, y));
-        vec4 sum = finish(value_of(raw[i]), light, ivec2(x + i, y));
+        vec4 sum = finish(value_of(raw[i]), light, 1.0, ivec2(x + i, y));
         raw[i] = finished(raw[i], sum);
     }
     store(x, y, raw);

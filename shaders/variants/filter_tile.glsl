@@ -41,26 +41,14 @@ void keep_window(int number, ivec2 first)
         weights[i][number] = window.weights[i];
 }
 
-// How far the window of a pixel is from that of the first one, if sides are in this simple ratio.
-int offset_of(int exact, int pixel)
-{
-    return exact == EXACT_HALF ? 2 * pixel : exact == EXACT_SAME ? pixel : (pixel + 1) / 2;
-}
-
-// The first texel of the window of a pixel, if sides are in this simple ratio.
-int exact_first(int exact, int pixel)
-{
-    return offset_of(exact, pixel) - WINDOW / 2 + (exact == EXACT_DOUBLE ? 0 : 1);
-}
-
 int first_column(ivec2 first, int column)
 {
-    return SIMPLE ? exact_first(EXACT, first.x + column) : firsts[column];
+    return SIMPLE ? exact_first(EXACT, first.x + column, WINDOW) : firsts[column];
 }
 
 int first_row(ivec2 first, int row)
 {
-    return EXACT_ROWS != 0 ? exact_first(EXACT_ROWS, first.y + row) : firsts[WEIGHT_COLUMNS + row];
+    return EXACT_ROWS != 0 ? exact_first(EXACT_ROWS, first.y + row, WINDOW) : firsts[WEIGHT_COLUMNS + row];
 }
 
 // Adds up a row of the tile along x, and each of `step` rows from it on, at this column and those beside it.

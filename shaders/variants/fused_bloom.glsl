@@ -1,6 +1,5 @@
 // Shared by the fused passes for the complete bloom of an image: parameters, threshold, kernels. They
 // add in the same order as the passes that they replace, and round where those store to an image.
-#include "lib/threshold.glsl"
 
 UNIFORM_BLOCK(FUSED_BLOOM_BLOCK);
 #include "lib/composite.glsl"

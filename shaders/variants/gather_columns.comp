@@ -24,7 +24,7 @@ READ_IMAGE(7, level_6);
 Axis row_axis(ivec2 size, int y)
 {
     ivec2 target_size = ivec2(params.target_width, params.target_height);
-    return axis_y(place_in_size(size, ivec2(0, y), target_size), size, vec2(1.0));
+    return axis_of(place_in_size(size, ivec2(0, y), target_size), size, vec2(1.0), 1);
 }
 
 vec4 sums[COLUMNS];

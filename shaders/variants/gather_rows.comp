@@ -29,7 +29,7 @@ void write_block(ivec2 first, int end)
 
     [[unroll]] for (int i = 0; i < COLUMNS; ++i) {
         Place place = place_in_size(source_size, ivec2(first.x + i, 0), TARGET_SIZE());
-        windows[i] = window_of(axis_x(place, source_size, vec2(1.0)), WINDOW, true);
+        windows[i] = window_of(axis_of(place, source_size, vec2(1.0), 0), WINDOW, true);
     }
     for (int y = first.y; y < end; ++y) {
         vec4 sums[COLUMNS];

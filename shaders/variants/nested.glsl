@@ -13,7 +13,6 @@ vec4 seen(vec4 value)
 }
 #else
 UNIFORM_BLOCK(FILTER_BLOCK);
-#include "lib/threshold.glsl"
 
 vec4 seen(vec4 value)
 {

@@ -3,7 +3,7 @@
 // once for all of them.
 
 UNIFORM_BLOCK(PREFILTER_BLOCK);
-#include "lib/hdrp.glsl"
+#include "lib/nine.glsl"
 #include "variants/pixels.glsl"
 
 const int COLUMNS = 4 / CHANNEL_BYTES, ROWS = NINE_OUTPUTS;  // COLUMNS: of a word
@@ -32,13 +32,13 @@ void write_block(ivec2 first, int end)
     [[unroll]] for (int row = 0; row < ROWS; ++row)
         [[unroll]] for (int i = 0; i < COLUMNS; ++i)
             sums[row][i] = vec4(0.0);
-    [[unroll]] for (int at = 0; at < ROWS + 2 * HDRP_RADIUS; ++at) {
+    [[unroll]] for (int at = 0; at < ROWS + 2 * NINE_RADIUS; ++at) {
         vec4 taken[COLUMNS];
-        take_sample(first.x, first.y - HDRP_RADIUS + at, taken);
+        take_sample(first.x, first.y - NINE_RADIUS + at, taken);
         [[unroll]] for (int row = 0; row < ROWS; ++row)
-            if (row <= at && at <= row + 2 * HDRP_RADIUS)
+            if (row <= at && at <= row + 2 * NINE_RADIUS)
                 [[unroll]] for (int i = 0; i < COLUMNS; ++i)
-                    sums[row][i] += HDRP_WEIGHTS[at - row] * taken[i];
+                    sums[row][i] += nine_weight(at - row - NINE_RADIUS) * taken[i];
     }
     [[unroll]] for (int row = 0; row < ROWS; ++row) {
         uvec4 pixels[COLUMNS];

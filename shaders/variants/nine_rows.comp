@@ -5,23 +5,22 @@
 // time of 1920 x 1080 in float16, lavapipe of Mesa 25.0.7, 2026-11-26).
 
 UNIFORM_BLOCK(PREFILTER_BLOCK);
-#include "lib/godot.glsl"
-#include "lib/hdrp.glsl"
+#include "lib/nine.glsl"
 #include "variants/pixels.glsl"
 
-const int COLUMNS = NINE_OUTPUTS, ROWS = GATHER_ROWS, TAPS = 2 * HDRP_RADIUS + 1;
-const int SAMPLES = COLUMNS + 2 * HDRP_RADIUS;
+const int COLUMNS = NINE_OUTPUTS, ROWS = GATHER_ROWS, TAPS = 2 * NINE_RADIUS + 1;
+const int SAMPLES = COLUMNS + 2 * NINE_RADIUS;
 const bool IS_GODOT = GROUPS == GROUPS_GODOT;
 
 READ_IMAGE(1, source);
 
 #define LOAD load_same
-#define LOAD_FROM (-HDRP_RADIUS)
+#define LOAD_FROM (-NINE_RADIUS)
 #define LOAD_COUNT SAMPLES
 #include "variants/load.glsl"
 
 #define LOAD load_double
-#define LOAD_FROM (-2 * HDRP_RADIUS)
+#define LOAD_FROM (-2 * NINE_RADIUS)
 #define LOAD_COUNT (2 * SAMPLES)
 #include "variants/load.glsl"
 
@@ -33,7 +32,7 @@ vec4 middle(vec4 a, vec4 b)
     return 0.5 * a + 0.5 * b;
 }
 
-// The samples of a row, from the one HDRP_RADIUS before the first pixel on.
+// The samples of a row, from the one NINE_RADIUS before the first pixel on.
 void take_samples(int first, int y, out vec4 samples[SAMPLES])
 {
     uvec4 same[SAMPLES], upper[2 * SAMPLES], lower[2 * SAMPLES];
@@ -55,11 +54,11 @@ void take_samples(int first, int y, out vec4 samples[SAMPLES])
     // Beyond the edges the outermost two samples alternate, of HDRP only before the first level. Otherwise the
     // first texel and the last sample are repeated. (The target's width is even for Godot.)
     if (IS_GODOT || EXACT == EXACT_SAME)
-        [[unroll]] for (int i = 0; i < HDRP_RADIUS; ++i)
-            samples[i] = first == 0 ? samples[HDRP_RADIUS + (i & 1)] : samples[i];
+        [[unroll]] for (int i = 0; i < NINE_RADIUS; ++i)
+            samples[i] = first == 0 ? samples[NINE_RADIUS + (i & 1)] : samples[i];
     const int back = IS_GODOT ? 2 : 1;
     [[unroll]] for (int i = 2; i < SAMPLES; ++i)
-        samples[i] = first - HDRP_RADIUS + i >= target_shape.x ? samples[i - back] : samples[i];
+        samples[i] = first - NINE_RADIUS + i >= target_shape.x ? samples[i - back] : samples[i];
 }
 
 void write_row(int x, int y)
@@ -71,8 +70,7 @@ void write_row(int x, int y)
     [[unroll]] for (int i = 0; i < COLUMNS; ++i) {
         vec4 sum = vec4(0.0);
         [[unroll]] for (int tap = 0; tap < TAPS; ++tap)
-            sum += (IS_GODOT ? GODOT_WEIGHTS[abs(tap - HDRP_RADIUS)] : HDRP_WEIGHTS[tap])
-                 * samples[i + tap];
+            sum += nine_weight(tap - NINE_RADIUS) * samples[i + tap];
         pixels[i] = buffer_of(sum);
         if (IS_GODOT)
             store_float(x + i, y, stored(sum));

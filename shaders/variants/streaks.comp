@@ -5,8 +5,6 @@
 #include "lib/sampling.glsl"
 
 UNIFORM_BLOCK(STREAKS_BLOCK);
-#include "lib/threshold.glsl"
-#include "lib/above.glsl"
 #include "variants/pixels.glsl"
 
 const int COLUMNS = STREAK_COLUMNS, ROWS = STREAK_ROWS;
@@ -21,7 +19,7 @@ READ_IMAGE(2, before);
 vec4 seen(uvec4 raw)
 {
     vec4 value = value_of(raw);
-    return FIRST != 0 ? above_threshold(value) : value;
+    return FIRST != 0 ? part_above(value, params.threshold) : value;
 }
 
 // The pixels of a row from any place on, 0 outside of the image.

@@ -3,7 +3,6 @@
 // share texels and taps. Without this `kino` takes 105 ms in place of 65, as fragment shaders 172 (processor time of
 // 1920 x 1080 in float16, lavapipe of Mesa 22.3.6, 2026-11-27).
 #include "lib/sampling.glsl"
-#include "lib/threshold.glsl"
 
 UNIFORM_BLOCK(PREFILTER_BLOCK);
 #include "lib/prefilters.glsl"
@@ -107,7 +106,7 @@ vec4 prefiltered(int column, float parts[TAPS], vec2 part)
     vec4 found[5] = vec4[](vec4(0.0), vec4(0.0), vec4(0.0), vec4(0.0), vec4(0.0));
     Taps taps;
 
-    if (has_own_taps()) {
+    if (!are_of_thirteen()) {
         [[unroll]] for (int group = 0; group < 5; ++group)
             if (group < group_count())
                 found[group] = tap_at(column, parts, numbers_of(group));
@@ -117,7 +116,7 @@ vec4 prefiltered(int column, float parts[TAPS], vec2 part)
         taps.outer[i] = tap_at(column, parts, 2 * ivec2(i % 3, i / 3));
     [[unroll]] for (int i = 0; i < 4; ++i)
         taps.inner[i] = tap_at(column, parts, 1 + 2 * ivec2(i % 2, i / 2));
-    return GROUPS == GROUPS_BLENDER ? blender_groups(taps) : made(group_means(taps), part);
+    return made(group_means(taps), part);
 }
 
 void start_columns(ivec2 first)

@@ -1,5 +1,4 @@
 // The threshold pass if the bloom buffers have the size of the image.
-#include "lib/threshold.glsl"
 
 UNIFORM_BLOCK(THRESHOLD_BLOCK);
 #include "variants/pixels.glsl"
