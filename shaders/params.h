@@ -227,7 +227,7 @@
 // elements, with `count` butterflies in each line. The elements of a butterfly are `step` apart.
 // Elements from `kept` on are not stored. The first stage pads the line: its first `extent`
 // elements are texels, and elements from `turn` on are positions before the first texel. The
-// product with a kernel with colours reads the frequency of the opposite sign. To find it, it needs
+// product with a kernel reads the frequency of the opposite sign. To find it, it needs
 // the radices of the rows' stages (`row_a` to `row_d`; `row_last` is the last one that is used),
 // the rows' number of elements, and the radices of the columns' stages without the last one.
 #define FFT_BLOCK(B, READS, INPUT, VEC4S) \
@@ -252,8 +252,7 @@
     INPUT(B, float, prefilter_factor)
 
 // Writes the kernel into padded lines (fft_kernel.comp). For each axis: the kernel's number of
-// texels, how many of them before and after its centre count, and the period of the line. `grey`:
-// all channels are equal.
+// texels, how many of them before and after its centre count, and the period of the line.
 #define FFT_KERNEL_BLOCK(B, READS, INPUT, VEC4S) \
     INPUT(B, int, padded_x) \
     INPUT(B, int, boundary_x) \
@@ -267,7 +266,6 @@
     INPUT(B, int, period_y) \
     INPUT(B, int, before_y) \
     INPUT(B, int, after_y) \
-    INPUT(B, int, grey) \
     INPUT(B, float, gain)
 
 // Of a pass that was given at run time: bytes whose layout only its shader knows.
@@ -475,11 +473,10 @@
 // of. EMITTERS is how many passes add up in the target by blending. With ENLARGED the target has
 // more rows than the source. STORED is the format of the target (STORED_*). FIRST marks an engine's
 // first level. LEVELS is the number of levels that a pass adds up. GROUPS is what a downsampling
-// makes of its taps. RADIX_A to STAGE are of Fourier transforms (fft.comp), whose workgroups have
-// GROUP_WIDTH x GROUP_HEIGHT invocations. BOUNDARY is of those that are PADDED, and a first stage
-// that is PREFILTERED has the filter of bright colours. Of complete lines (fft_lines.comp) RADIX_1
-// to RADIX_4 are the radices of the stages; a workgroup has GROUP_HEIGHT invocations for each of
-// GROUP_WIDTH lines.
+// makes of its taps. INVERSE to GROUP_HEIGHT are of Fourier transforms (fft.comp), whose workgroups
+// have GROUP_WIDTH x GROUP_HEIGHT invocations: of a stage of RADIX_1 elements, or with complete
+// lines of stages of RADIX_1 to RADIX_4. BOUNDARY is of those that are PADDED, and a first stage
+// that is PREFILTERED has the filter of bright colours.
 #define SPECIALIZATION_CONSTANTS(CONSTANT) \
     CONSTANT(0, SAMPLING, sampling) \
     CONSTANT(1, COMPOSITE, composite) \
@@ -504,8 +501,6 @@
     CONSTANT(21, ALPHA, alpha) \
     CONSTANT(22, MASKED, masked) \
     CONSTANT(23, STORED, stored) \
-    CONSTANT(24, RADIX_A, radix_a) \
-    CONSTANT(25, RADIX_B, radix_b) \
     CONSTANT(26, INVERSE, inverse) \
     CONSTANT(27, ROTATED, rotated) \
     CONSTANT(28, PADDED, padded) \
@@ -663,6 +658,5 @@
     NAME(BY_SQUARES, 4, by_squares) \
     NAME(BY_MIXED, 5, by_mixed) \
     NAME(STAGE_FIRST, 1, first_stage) \
-    NAME(STAGE_GREY, 2, grey) \
-    NAME(STAGE_COLOURS, 3, colours) \
-    NAME(STAGE_LAST, 4, last_stage)
+    NAME(STAGE_PRODUCT, 2, product) \
+    NAME(STAGE_LAST, 3, last_stage)

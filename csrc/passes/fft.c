@@ -2,20 +2,10 @@
 
 #include <string.h>
 
-// The radices of a stage as products of two.
-static const struct radix {
-    uint32_t a, b;
-} radices[] = {
-    {8, 8}, {5, 8}, {4, 8}, {5, 5}, {3, 8}, {4, 5}, {4, 4}, {3, 5}, {3, 4},
-    {2, 5}, {3, 3}, {8, 1}, {2, 3}, {5, 1}, {4, 1}, {3, 1}, {2, 1}, {1, 1},
-};
+// The radices of a stage: products of two that the shader has.
+static const uint32_t radices[] = {64, 40, 32, 25, 24, 20, 16, 15, 12, 10, 9, 8, 6, 5, 4, 3, 2, 1};
 
 enum { RADIX_COUNT = sizeof radices / sizeof radices[0] };
-
-static uint32_t radix_of(uint32_t i)
-{
-    return radices[i].a * radices[i].b;
-}
 
 static bool is_smooth(uint32_t length)
 {
@@ -40,7 +30,7 @@ static bool split(uint32_t length, uint32_t first, uint32_t stages, uint32_t *fo
     uint32_t least = UINT32_MAX, rest[VKB_FFT_STAGES];
 
     for (uint32_t i = first; i < RADIX_COUNT; ++i) {
-        uint32_t sum = radix_of(i);
+        uint32_t sum = radices[i];
         if (length % sum != 0)
             continue;
         if (stages == 1 ? sum != length : !split(length / sum, i, stages - 1, rest))
@@ -50,7 +40,7 @@ static bool split(uint32_t length, uint32_t first, uint32_t stages, uint32_t *fo
         if (sum >= least)
             continue;
         least = sum;
-        found[0] = radix_of(i);
+        found[0] = radices[i];
         memcpy(found + 1, rest, (stages - 1) * sizeof *found);
     }
     return least != UINT32_MAX;
@@ -66,7 +56,7 @@ struct vkb_fft_line vkb_fft_line(uint32_t least, uint32_t most)
         struct vkb_fft_line line = {.length = length, .radices = {1, 1, 1, 1}};
         uint32_t first = 0;
         bool found = false;
-        while (radix_of(first) > most || radix_of(first) > most_radix(length))
+        while (radices[first] > most || radices[first] > most_radix(length))
             ++first;
         while (is_smooth(length) && !found && line.stage_count < VKB_FFT_STAGES)
             found = split(length, first, ++line.stage_count, line.radices);
@@ -87,7 +77,7 @@ static bool split_group(uint32_t length, uint32_t most, uint32_t *found)
 
     for (uint32_t i = 0; i < VKB_FFT_STAGES; ++i)
         found[i] = 1;
-    while (radix_of(first) > most)
+    while (radices[first] > most)
         ++first;
     for (uint32_t stages = 1; stages <= VKB_FFT_STAGES; ++stages)
         if (split(length, first, stages, found))
@@ -107,15 +97,6 @@ static const struct vkb_shader *const shaders[VKB_FORMAT_COUNT] = VKB_BY_FORMAT(
 static uint32_t groups(uint32_t invocations, uint32_t side)
 {
     return (invocations + side - 1) / side;
-}
-
-static void set_radix(uint32_t radix, struct vkb_pass_row *row)
-{
-    for (uint32_t i = 0; i < RADIX_COUNT; ++i)
-        if (radix_of(i) == radix) {
-            row->constants.radix_a = (int32_t)radices[i].a;
-            row->constants.radix_b = (int32_t)radices[i].b;
-        }
 }
 
 struct vkb_pass_row vkb_fft_row(const struct vkb_graph *graph, const struct vkb_fft_stage *stage)
@@ -147,7 +128,7 @@ struct vkb_pass_row vkb_fft_row(const struct vkb_graph *graph, const struct vkb_
     row.constants.inverse = stage->inverse;
     row.constants.padded = stage->padded;
     row.constants.boundary = stage->padded ? (int32_t)axis->boundary : 0;
-    set_radix(radix, &row);
+    row.constants.radix_1 = (int32_t)radix;
     row.block = VKB_BLOCK_fft;
     params->count = (int)count;
     params->across = (int)stage->lines;
@@ -163,7 +144,7 @@ struct vkb_pass_row vkb_fft_row(const struct vkb_graph *graph, const struct vkb_
 }
 
 void vkb_fft_multiply(const struct vkb_fft_axis *rows, const struct vkb_fft_axis *columns,
-                      uint32_t spectrum, bool grey, struct vkb_pass_row *row)
+                      uint32_t spectrum, struct vkb_pass_row *row)
 {
     const uint32_t *row_radices = rows->line.radices;
     const uint32_t last = row_radices[rows->line.stage_count - 1];
@@ -172,7 +153,7 @@ void vkb_fft_multiply(const struct vkb_fft_axis *rows, const struct vkb_fft_axis
     memcpy(blocks, columns->line.radices, sizeof blocks);
     blocks[columns->line.stage_count - 1] = 1;
     row->reads[1] = spectrum;
-    row->constants.stage = grey ? STAGE_GREY : STAGE_COLOURS;
+    row->constants.stage = STAGE_PRODUCT;
     row->params.fft.row_length = (int)rows->line.length;
     row->params.fft.row_a = (int)row_radices[0];
     row->params.fft.row_b = (int)row_radices[1];
@@ -182,8 +163,6 @@ void vkb_fft_multiply(const struct vkb_fft_axis *rows, const struct vkb_fft_axis
     row->params.fft.block_a = (int)blocks[0];
     row->params.fft.block_b = (int)blocks[1];
     row->params.fft.block_c = (int)blocks[2];
-    if (grey)
-        return;
     // Columns with frequencies of up to half the rows' length, which have the others in hand.
     row->params.fft.across = (int)(rows->line.length / last * (last / 2 + 1));
     row->groups_width =

@@ -20,15 +20,14 @@ enum {
     MAX_INVOCATIONS = 640,
 };
 
-static const struct vkb_shader *const shaders[VKB_FORMAT_COUNT] = VKB_BY_FORMAT(fft_lines_comp);
-
 static bool group_fits(const struct vkb_device *device, const struct group *group, uint32_t length)
 {
     const VkPhysicalDeviceLimits *limits = &device->limits;
     const uint64_t floats = (uint64_t)group->lines * (length + length / 32) + group->size + 1;
 
-    return group->size <= limits->maxComputeWorkGroupSize[1]
-        && group->lines <= limits->maxComputeWorkGroupSize[0]
+    // Any device has MAX_LINES along an axis.
+    return group->size <= limits->maxComputeWorkGroupSize[0]
+        && group->size <= limits->maxComputeWorkGroupSize[1]
         && group->size * group->lines <= limits->maxComputeWorkGroupInvocations
         && floats * sizeof(float) <= limits->maxComputeSharedMemorySize;
 }
@@ -100,11 +99,6 @@ static bool holds_lines(const struct vkb_variant_choice *choice, const struct vk
         && make_group(choice->device, line_length(choice, pass, DIRECTION_VERTICAL), &group);
 }
 
-static bool multiplies(const struct vkb_pass_row *pass)
-{
-    return pass->constants.stage == STAGE_GREY || pass->constants.stage == STAGE_COLOURS;
-}
-
 // The row for all stages along an axis, from `first` to before `end`.
 static struct vkb_pass_row make_row(const struct vkb_variant_choice *choice,
                                     const struct vkb_pass_row *first,
@@ -124,16 +118,14 @@ static struct vkb_pass_row make_row(const struct vkb_variant_choice *choice,
     row.targets[0] = first->constants.inverse ? last->targets[0]
                    : horizontal               ? first->targets[0]
                                               : row.reads[0];
-    row.shader = shaders[graph->images[row.reads[0]].format];
-    row.constants.rotated = row.constants.radix_a = row.constants.radix_b = 0;
     if (first->constants.inverse)
         row.constants.stage = STAGE_LAST;
     for (const struct vkb_pass_row *pass = first; pass < end; ++pass)
-        if (multiplies(pass)) {
-            row.constants.stage = pass->constants.stage;
+        if (pass->constants.stage == STAGE_PRODUCT) {
+            row.constants.stage = STAGE_PRODUCT;
             row.reads[1] = pass->reads[1];
-            row.params.fft.row_length = (int)line_length(choice, first, DIRECTION_HORIZONTAL);
         }
+    row.constants.rotated = 0;
     row.params.fft.padded = (int)length;
     const struct vkb_image_row *spectra =
         &graph->images[first->constants.inverse ? row.reads[0] : row.targets[0]];
@@ -144,10 +136,11 @@ static struct vkb_pass_row make_row(const struct vkb_variant_choice *choice,
     row.constants.radix_2 = (int32_t)group.radices[1];
     row.constants.radix_3 = (int32_t)group.radices[2];
     row.constants.radix_4 = (int32_t)group.radices[3];
-    row.constants.group_width = (int32_t)group.lines;
-    row.constants.group_height = (int32_t)group.size;
-    row.groups_width = ((uint32_t)row.params.fft.across + group.lines - 1) / group.lines;
-    row.groups_height = 1;
+    const uint32_t groups = ((uint32_t)row.params.fft.across + group.lines - 1) / group.lines;
+    row.constants.group_width = (int32_t)(horizontal ? group.size : group.lines);
+    row.constants.group_height = (int32_t)(horizontal ? group.lines : group.size);
+    row.groups_width = horizontal ? 1 : groups;
+    row.groups_height = horizontal ? groups : 1;
     return row;
 }
 
@@ -167,7 +160,6 @@ static struct vkb_pass_row make_placing(const struct vkb_variant_choice *choice,
     struct vkb_pass_row row;
 
     memcpy(&row, pass, sizeof row);
-    row.params.fft_kernel.grey = 0;
     row.params.fft_kernel.padded_x = (int)x;
     row.params.fft_kernel.padded_y = (int)y;
     row.params.fft_kernel.gain = (float)(1.0 / ((double)x * y));

@@ -1,9 +1,6 @@
 // Discrete Fourier transforms of up to FFT_MAX_RADIX elements in named registers: of `held`, whose
 // elements are two complex numbers each. All loops are unrolled, so that no index is known only at run
 // time.
-#ifndef FFT_HELD
-#define FFT_HELD FFT_MAX_RADIX
-#endif
 
 vec2 conjugate(vec2 value)
 {
@@ -101,7 +98,7 @@ void transform_8(inout vec4 v[8], bool inverse)
     }
 }
 
-vec4 held[FFT_HELD];
+vec4 held[FFT_MAX_RADIX];
 
 // Transforms `count` elements that are `step` apart.
 void transform_few(int count, int first, int step, bool inverse)
@@ -125,20 +122,33 @@ void transform_few(int count, int first, int step, bool inverse)
             held[first + i * step] = v[i];
 }
 
-// The transform of the first a * b elements (constants) leaves element q at held[place_of(q, a, b)].
-int place_of(int q, int a, int b)
+// A radix is the product of two that transform_few has.
+int second_factor(int radix)
 {
+    return radix == 16     ? 4
+         : radix % 8 == 0 ? 8
+         : radix % 5 == 0 ? 5
+         : radix % 4 == 0 ? 4
+         : radix % 3 == 0 ? 3
+                          : radix;
+}
+
+// The transform of the first `radix` elements (a constant) leaves element q at held[place_of(q, radix)].
+int place_of(int q, int radix)
+{
+    int b = second_factor(radix), a = radix / b;
     return b * (q % a) + q / a;
 }
 
-void transform_held(int a, int b, bool inverse)
+void transform_held(int radix, bool inverse)
 {
+    int b = second_factor(radix), a = radix / b;
     [[unroll]] for (int j = 0; j < b; ++j)
         transform_few(a, j, b, inverse);
     [[unroll]] for (int q = 1; q < a; ++q) {
         [[unroll]] for (int j = 1; j < b; ++j) {
             // All operands are constants, so that the driver computes the angle once.
-            vec2 angle = turn(q * j, a * b);
+            vec2 angle = turn(q * j, radix);
             held[b * q + j] = rotated(held[b * q + j], inverse ? conjugate(angle) : angle);
         }
     }

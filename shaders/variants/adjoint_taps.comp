@@ -8,7 +8,7 @@
 
 const bool ALONG_X = DIRECTION != DIRECTION_VERTICAL, ALONG_Y = DIRECTION != DIRECTION_HORIZONTAL;
 const int COLUMNS = ADJOINT_SIDE, ROWS = ALONG_Y ? ADJOINT_SIDE : 1;
-const int SPAN_X = ALONG_X ? RADIX_1 : COLUMNS, SPAN_Y = ALONG_Y ? RADIX_2 : 1;
+const int SPAN_X = ALONG_X ? RADIX_1 : COLUMNS;
 
 layout(local_size_x = ROW_INVOCATIONS) in;
 #include "variants/store.glsl"
@@ -24,7 +24,7 @@ void add_row(ivec2 first, int place, inout vec4 sums[ROWS][COLUMNS])
     [[unroll]] for (int i = 0; i < SPAN_X; ++i)
         values[i] = texel_at(first + ivec2(i, 0));
     [[unroll]] for (int kernel = 0; kernel < LEVELS; ++kernel) {
-        vec4 shares = ALONG_Y ? entry(place + kernel) : vec4(1.0);
+        vec4 shares = entry(place + kernel);
         [[unroll]] for (int column = 0; column < COLUMNS; ++column) {
             vec4 sum = ALONG_X ? vec4(0.0) : values[column];
             [[unroll]] for (int i = 0; i < (ALONG_X ? SPAN_X : 0); ++i)
@@ -32,6 +32,16 @@ void add_row(ivec2 first, int place, inout vec4 sums[ROWS][COLUMNS])
             [[unroll]] for (int row = 0; row < ROWS; ++row)
                 sums[row][column] += shares[row] * sum;
         }
+    }
+}
+
+// The same along rows alone. They may have many weights, so no value is kept.
+void add_line(ivec2 first, inout vec4 sums[COLUMNS])
+{
+    [[unroll]] for (int i = 0; i < SPAN_X; ++i) {
+        vec4 value = texel_at(first + ivec2(i, 0));
+        [[unroll]] for (int column = 0; column < COLUMNS; ++column)
+            sums[column] += weights[i][column] * value;
     }
 }
 
@@ -63,8 +73,12 @@ void main()
         [[unroll]] for (int row = 0; row < ROWS; ++row)
             [[unroll]] for (int i = 0; i < COLUMNS; ++i)
                 sums[row][i] = vec4(0.0);
-        for (int number = 0; number < SPAN_Y; ++number)
-            add_row(ivec2(int(columns.w), int(rows.w) + number), int(rows.z) + LEVELS * number, sums);
+        // (llvmpipe would run a loop of one round twice.)
+        if (ALONG_Y)
+            for (int number = 0; number < RADIX_2; ++number)
+                add_row(ivec2(int(columns.w), int(rows.w) + number), int(rows.z) + LEVELS * number, sums);
+        else
+            add_line(ivec2(int(columns.w), y), sums[0]);
         [[unroll]] for (int row = 0; row < ROWS; ++row)
             if (y + row < end)
                 store_row(ivec2(first.x, y + row), sums[row]);
