@@ -18,13 +18,17 @@ vec4 shade()
     ivec3 rows = one_row ? ivec3(PIXEL.y, 1, 0) : readers(params.start_y, PIXEL.y);
     ivec2 number = PIXEL % ADJOINT_SIDE;
     vec4 sum = vec4(0.0);
-    for (int y = 0; y < rows.y; ++y)
+    for (int y = 0; y < rows.y; ++y) {
+        float shares[MAX_KERNELS];
+        [[unroll]] for (int kernel = 0; kernel < LEVELS; ++kernel)
+            shares[kernel] = one_row ? 1.0 : entry(rows.z + LEVELS * y + kernel)[number.y];
         for (int x = 0; x < columns.y; ++x) {
             float weight = 0.0;
-            for (int kernel = 0; kernel < LEVELS; ++kernel)
-                weight += (one_row ? 1.0 : entry(rows.z + LEVELS * y + kernel)[number.y])
+            [[unroll]] for (int kernel = 0; kernel < LEVELS; ++kernel)
+                weight += shares[kernel]
                         * (one_column ? 1.0 : entry(columns.z + LEVELS * x + kernel)[number.x]);
             sum += weight * texel_at(ivec2(columns.x + x, rows.x + y));
         }
+    }
     return shade(own_at(PIXEL), sum, PIXEL);
 }
