@@ -30,12 +30,16 @@ vec4 entry(int place)
     return FETCH(table, 2, ivec2(place % TABLE_WIDTH, place / TABLE_WIDTH));
 }
 
+vec4 cotangent_at(ivec2 pixel)
+{
+    vec4 value = FETCH(cotangents, 1, pixel);
+    return BY == BY_BLOOM ? vec4(where_finite(value, FETCH(scene, 3, pixel)).rgb, 0.0) : value;
+}
+
 // The cotangents of this pixel, or of the nearest one in the image.
 vec4 texel_at(ivec2 texel)
 {
-    ivec2 within = NEAREST(texel);
-    vec4 value = FETCH(cotangents, 1, within);
-    return BY == BY_BLOOM ? vec4(where_finite(value, FETCH(scene, 3, within)).rgb, 0.0) : value;
+    return cotangent_at(NEAREST(texel));
 }
 
 // What other readers of the image have accumulated.

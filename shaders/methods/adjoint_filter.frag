@@ -27,7 +27,7 @@ vec4 shade()
             [[unroll]] for (int kernel = 0; kernel < LEVELS; ++kernel)
                 weight += shares[kernel]
                         * (one_column ? 1.0 : entry(columns.z + LEVELS * x + kernel)[number.x]);
-            sum += weight * texel_at(ivec2(columns.x + x, rows.x + y));
+            sum += weight * cotangent_at(ivec2(columns.x + x, rows.x + y));
         }
     }
     return shade(own_at(PIXEL), sum, PIXEL);
