@@ -227,7 +227,7 @@
 // elements, with `count` butterflies in each line. The elements of a butterfly are `step` apart.
 // Elements from `kept` on are not stored. The first stage pads the line: its first `extent`
 // elements are texels, and elements from `turn` on are positions before the first texel. The
-// product with a kernel reads the frequency of the opposite sign. To find it, it needs
+// product with a kernel with colours reads the frequency of the opposite sign. To find it, it needs
 // the radices of the rows' stages (`row_a` to `row_d`; `row_last` is the last one that is used),
 // the rows' number of elements, and the radices of the columns' stages without the last one.
 #define FFT_BLOCK(B, READS, INPUT, VEC4S) \
@@ -252,7 +252,8 @@
     INPUT(B, float, prefilter_factor)
 
 // Writes the kernel into padded lines (fft_kernel.comp). For each axis: the kernel's number of
-// texels, how many of them before and after its centre count, and the period of the line.
+// texels, how many of them before and after its centre count, and the period of the line. `grey`:
+// all channels are equal.
 #define FFT_KERNEL_BLOCK(B, READS, INPUT, VEC4S) \
     INPUT(B, int, padded_x) \
     INPUT(B, int, boundary_x) \
@@ -266,6 +267,7 @@
     INPUT(B, int, period_y) \
     INPUT(B, int, before_y) \
     INPUT(B, int, after_y) \
+    INPUT(B, int, grey) \
     INPUT(B, float, gain)
 
 // Of a pass that was given at run time: bytes whose layout only its shader knows.
@@ -659,4 +661,5 @@
     NAME(BY_MIXED, 5, by_mixed) \
     NAME(STAGE_FIRST, 1, first_stage) \
     NAME(STAGE_PRODUCT, 2, product) \
-    NAME(STAGE_LAST, 3, last_stage)
+    NAME(STAGE_LAST, 3, last_stage) \
+    NAME(STAGE_GREY, 4, grey)

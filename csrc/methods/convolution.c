@@ -116,6 +116,7 @@ static void add_placing(const struct convolution *convolution, uint32_t kernel, 
         .period_y = (int)y->extent,
         .before_y = (int)convolution->reach_y.before,
         .after_y = (int)convolution->reach_y.after,
+        .grey = convolution->levels->settings->kernel.grey,
         // That of the way back.
         .gain = (float)(1.0 / ((double)x->line.length * y->line.length)),
     };
@@ -197,7 +198,8 @@ static void add_columns(const struct convolution *convolution, uint32_t rows, ui
     for (; stage.number <= last; ++stage.number) {
         struct vkb_pass_row row = stage_row(convolution, &stage);
         if (stage.number == last)
-            vkb_fft_multiply(&convolution->x, &convolution->y, spectrum, &row);
+            vkb_fft_multiply(&convolution->x, &convolution->y, spectrum,
+                             convolution->levels->settings->kernel.grey, &row);
         vkb_levels_pass(convolution->levels, &row);
         stage.padded = false;
         stage.from = columns;

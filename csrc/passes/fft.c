@@ -144,7 +144,7 @@ struct vkb_pass_row vkb_fft_row(const struct vkb_graph *graph, const struct vkb_
 }
 
 void vkb_fft_multiply(const struct vkb_fft_axis *rows, const struct vkb_fft_axis *columns,
-                      uint32_t spectrum, struct vkb_pass_row *row)
+                      uint32_t spectrum, bool grey, struct vkb_pass_row *row)
 {
     const uint32_t *row_radices = rows->line.radices;
     const uint32_t last = row_radices[rows->line.stage_count - 1];
@@ -153,7 +153,9 @@ void vkb_fft_multiply(const struct vkb_fft_axis *rows, const struct vkb_fft_axis
     memcpy(blocks, columns->line.radices, sizeof blocks);
     blocks[columns->line.stage_count - 1] = 1;
     row->reads[1] = spectrum;
-    row->constants.stage = STAGE_PRODUCT;
+    row->constants.stage = grey ? STAGE_GREY : STAGE_PRODUCT;
+    if (grey)
+        return;
     row->params.fft.row_length = (int)rows->line.length;
     row->params.fft.row_a = (int)row_radices[0];
     row->params.fft.row_b = (int)row_radices[1];

@@ -47,6 +47,6 @@ struct vkb_pass_row vkb_fft_row(const struct vkb_graph *graph, const struct vkb_
 // Makes a product with the spectrum of a kernel of the last stage along columns, and of the first
 // stage back.
 void vkb_fft_multiply(const struct vkb_fft_axis *rows, const struct vkb_fft_axis *columns,
-                      uint32_t spectrum, struct vkb_pass_row *row);
+                      uint32_t spectrum, bool grey, struct vkb_pass_row *row);
 
 #endif

@@ -46,6 +46,7 @@ struct vkb_kernel_data {
     const float *pixels;
     uint32_t width, height;
     uint64_t serial;     // equal only for equal pixels
+    bool grey;           // all channels are equal
     float prefilter[3];  // min, max, factor; min above max: none
 };
 

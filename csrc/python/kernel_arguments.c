@@ -1,20 +1,22 @@
 // The kernels of convolutions and the picture of dirt, which are Python's arrays.
 #include "python/arguments.h"
 
-// (array (h, w, 4) of float32, serial, (min, max, factor))
+// (array (h, w, 4) of float32, serial, whether it is grey, (min, max, factor))
 static bool read_kernel_tuple(PyObject *tuple, Py_buffer *view, struct vkb_kernel_data *kernel)
 {
     PyObject *pixels;
     unsigned long long serial;
+    int grey;
 
-    if (!PyArg_ParseTuple(tuple, "OK(fff):core_kernel", &pixels, &serial, &kernel->prefilter[0],
-                          &kernel->prefilter[1], &kernel->prefilter[2])
+    if (!PyArg_ParseTuple(tuple, "OKp(fff):core_kernel", &pixels, &serial, &grey,
+                          &kernel->prefilter[0], &kernel->prefilter[1], &kernel->prefilter[2])
         || PyObject_GetBuffer(pixels, view, PyBUF_C_CONTIGUOUS) < 0)
         return false;
     kernel->serial = serial;
     kernel->pixels = view->buf;
     kernel->height = (uint32_t)view->shape[0];
     kernel->width = (uint32_t)view->shape[1];
+    kernel->grey = grey;
     return true;
 }
 

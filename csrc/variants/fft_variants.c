@@ -121,7 +121,7 @@ static struct vkb_pass_row make_row(const struct vkb_variant_choice *choice,
     if (first->constants.inverse)
         row.constants.stage = STAGE_LAST;
     for (const struct vkb_pass_row *pass = first; pass < end; ++pass)
-        if (pass->constants.stage == STAGE_PRODUCT) {
+        if (pass->constants.stage == STAGE_PRODUCT || pass->constants.stage == STAGE_GREY) {
             row.constants.stage = STAGE_PRODUCT;
             row.reads[1] = pass->reads[1];
         }
@@ -160,6 +160,7 @@ static struct vkb_pass_row make_placing(const struct vkb_variant_choice *choice,
     struct vkb_pass_row row;
 
     memcpy(&row, pass, sizeof row);
+    row.params.fft_kernel.grey = 0;
     row.params.fft_kernel.padded_x = (int)x;
     row.params.fft_kernel.padded_y = (int)y;
     row.params.fft_kernel.gain = (float)(1.0 / ((double)x * y));

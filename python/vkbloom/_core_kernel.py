@@ -15,11 +15,13 @@ class CoreKernel(NamedTuple):
     - `pixels`: ndarray of float32, shape (h, w, 4); Linear RGB, and the mean of the three channels
       for alpha.
     - `serial`: A hash of the pixels, so that a kernel that is made again is known to the device.
+    - `is_grey`: Whether all channels are equal.
     - `prefilter`: min, max and mult of Unreal Engine's prefilter; no prefilter if min is above max.
     """
 
     pixels: NDArray[np.float32]
     serial: int
+    is_grey: bool = False
     prefilter: tuple[float, float, float] = (1.0, 0.0, 1.0)
 
     @property
@@ -36,4 +38,4 @@ def core_kernel(values: NDArray[Any]) -> CoreKernel:
     digest = hashlib.blake2b(pixels.data, digest_size=8, key=repr(pixels.shape).encode()).digest()
     # 0 and the largest number are reserved.
     serial = min(max(int.from_bytes(digest, "little"), 1), 2**64 - 2)
-    return CoreKernel(pixels, serial)
+    return CoreKernel(pixels, serial, bool((pixels == pixels[..., :1]).all()))

@@ -13,7 +13,8 @@
 // kernel of 1024) to 3.4 times as fast as in stages (1920 x 1080, one of 3839 x 2159).
 //
 // STAGE_FIRST reads the glow, STAGE_LAST stores to an image of the bloom's format. STAGE_PRODUCT is the
-// last stage forth along columns, the product with the kernel's spectrum and the first stage back.
+// last stage forth along columns, the product with the kernel's spectrum and the first stage back; so is
+// STAGE_GREY in stages.
 // PADDED reads what lies beyond the source's edges by the boundary.
 
 UNIFORM_BLOCK(FFT_BLOCK);
@@ -263,7 +264,9 @@ void store_separated(int number, int across)
     }
 }
 
-void multiply_separated(int number, int across)
+// A product of both complex numbers at a frequency with a kernel's: of separated channels, or of a grey kernel. Without
+// the latter a convolution of 1920 x 1080 takes 1.15 of the time (Mesa 22.3.6, 2026-11-27).
+void multiply_each(int number, int across)
 {
     vec4 values[FFT_MAX_RADIX];
     [[unroll]] for (int i = 0; i < LAST_RADIX; ++i) {
@@ -358,14 +361,14 @@ void multiply(int block, int index)
 
 void main()
 {
-    const bool MULTIPLIES = STAGE == STAGE_PRODUCT, RETURNS = INVERSE != 0 || MULTIPLIES;
+    const bool MULTIPLIES = STAGE == STAGE_PRODUCT || STAGE == STAGE_GREY, RETURNS = INVERSE != 0 || MULTIPLIES;
     ivec2 id = ivec2(gl_GlobalInvocationID.xy);
     int number = IS_ROW ? id.x : id.y, across = IS_ROW ? id.y : id.x;
     idle = across >= params.across || (!COMPLETE && number >= params.count);
     if (!COMPLETE && idle)
         return;
     across = min(across, params.across - 1);
-    if (!COMPLETE && MULTIPLIES) {
+    if (!COMPLETE && STAGE == STAGE_PRODUCT) {
         multiply(number, across);
         return;
     }
@@ -373,7 +376,7 @@ void main()
     if (INVERSE == 0)
         transform_forth(number);
     if (MULTIPLIES)
-        multiply_separated(number, across);
+        multiply_each(number, across);
     if (RETURNS)
         transform_back(number);
     if (COMPLETE && IS_ROW && !RETURNS)

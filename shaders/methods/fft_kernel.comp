@@ -37,5 +37,7 @@ void main()
     for (int j = y.x; j <= y.y; j += y.z)
         for (int i = x.x; i <= x.y; i += x.z)
             sum += texelFetch(kernel, ivec2(i, j), 0);
+    // A grey kernel is the same complex number for both pairs of channels.
+    sum = params.grey != 0 ? vec4(sum.r, 0.0, sum.r, 0.0) : sum;
     imageStore(target, at, params.gain * sum);
 }

@@ -120,8 +120,7 @@ def _pack(kernel: CoreKernel) -> bytes:
     height, width = kernel.pixels.shape[:2]
     filled = np.asarray(kernel.pixels.any(axis=2))
     rows, columns = _extent(filled, 1), _extent(filled, 0)
-    grey = bool((kernel.pixels == kernel.pixels[..., :1]).all())
-    part = kernel.pixels[rows, columns, : 1 if grey else 4]
+    part = kernel.pixels[rows, columns, : 1 if kernel.is_grey else 4]
     sides = width, height, columns.start, rows.start, part.shape[1], part.shape[0], part.shape[2]
     return _HEADER.pack(kernel.serial, *sides) + part.tobytes()
 
@@ -138,4 +137,4 @@ def _unpack(data: bytes) -> CoreKernel:
     pixels = np.zeros((height, width, 4), np.float32)
     values: NDArray[np.float32] = np.frombuffer(data, np.float32, offset=_HEADER.size)
     pixels[top : top + down, left : left + across] = values.reshape(down, across, channels)
-    return CoreKernel(pixels, serial)
+    return CoreKernel(pixels, serial, channels == 1)
