@@ -197,14 +197,6 @@ static void make_strips(const struct vkb_variant_choice *choice, struct vkb_pass
     }
 }
 
-static bool fits_tiles(const struct vkb_device *device)
-{
-    const size_t shared = 3 * sizeof(float) * TILE_ROWS * TILE_LOADED;
-
-    return device->limits.maxComputeSharedMemorySize >= shared
-        && device->limits.maxComputeWorkGroupInvocations >= TILE_LOADED * TILE_RUNS;
-}
-
 // For kernels of up to TILE_RADIUS in three steps.
 static void make_tiles(struct vkb_pass_row *row, const struct vkb_shader *shader,
                        const struct nest *nest)
@@ -227,9 +219,9 @@ bool vkb_add_fused(struct vkb_variant_choice *choice, const struct vkb_pass_row 
 
     if (!(find_nest(&choice->plain, pass, gpu ? TILE_RADIUS : STRIP_RADIUS,
                     gpu && pass->transposed ? vkb_writer_of : vkb_threshold_of, &nest)
-          && (gpu ? fits_tiles(choice->device)
-                  : vkb_fits_linear(choice, pass)
-                        && (!pass->transposed || vkb_are_floats(choice, pass)))))
+          && (gpu
+              || (vkb_fits_linear(choice, pass)
+                  && (!pass->transposed || vkb_are_floats(choice, pass))))))
         return false;
     struct vkb_pass_row row = fused_row(choice, &nest);
     // Strips below each other load the same rows at the same time. With four single floats this
@@ -317,7 +309,7 @@ bool vkb_add_adjoint_fused(struct vkb_variant_choice *choice, const struct vkb_p
     struct nest nest;
 
     if (!(find_adjoint_nest(&choice->plain, pass, gpu ? TILE_RADIUS : STRIP_RADIUS, &nest)
-          && (gpu ? fits_tiles(choice->device) : vkb_are_floats(choice, nest.composite))))
+          && (gpu || vkb_are_floats(choice, nest.composite))))
         return false;
     struct vkb_pass_row row = adjoint_row(choice, pass, &nest);
     if (gpu)
