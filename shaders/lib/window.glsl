@@ -12,12 +12,6 @@ int offset_of(int exact, int pixel)
     return exact == EXACT_HALF ? 2 * pixel : exact == EXACT_SAME ? pixel : (pixel + 1) / 2;
 }
 
-// The first of the `count` texels of the window of a pixel, if sides are in this simple ratio.
-int exact_first(int exact, int pixel, int count)
-{
-    return offset_of(exact, pixel) - count / 2 + (exact == EXACT_DOUBLE ? 0 : 1);
-}
-
 // Whether a texel of a window may have a weight in a kernel, by TAKEN_X or TAKEN_Y.
 bool has_weight(int taken, int at, int kernel)
 {

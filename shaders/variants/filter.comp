@@ -51,6 +51,12 @@ float coarse, shares;
 // (A constant that is given at random may be 0, an array's length not.)
 vec4 rows[KEPT * KERNELS > 0 ? KEPT * KERNELS : 1][COLUMNS];
 
+// The first texel of a column's window, from the first column's position on.
+int first_in_run(int column)
+{
+    return offset_of(EXACT, column) - KEPT / 2 + (EXACT == EXACT_DOUBLE ? 0 : 1);
+}
+
 void keep_row(int first, int row)
 {
     ivec2 last = READ_SIZE(source, 1) - 1;
@@ -65,7 +71,7 @@ void keep_row(int first, int row)
     [[unroll]] for (int i = 0; i < COLUMNS; ++i) {
         vec4 sums[3] = vec4[](vec4(0.0), vec4(0.0), vec4(0.0));
         [[unroll]] for (int at = 0; at < KEPT; ++at) {
-            uvec4 texel = EXACT != 0 ? raw[BEFORE + exact_first(EXACT, i, KEPT) + at]
+            uvec4 texel = EXACT != 0 ? raw[BEFORE + first_in_run(i) + at]
                                       : raw_pixel(source, read_shapes[0], clamp(windows[i % PHASES].first + at, 0, last.x),
                                                   line);
             [[unroll]] for (int kernel = 0; kernel < KERNELS; ++kernel)
