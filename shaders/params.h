@@ -214,14 +214,17 @@
 #define COMPOSITE_BLOCK(B, READS, INPUT, VEC4S) COMPOSITE_ROWS(B, READS, INPUT)
 
 // The transpose of a filter (adjoint_filter.frag): where the tables of both axes start, in texels;
-// the factor of the colours of what is added.
+// the factor of the colours of what is added; for tiles in a simple ratio the weights of texels
+// that are not near an edge, of even ones, then of odd ones.
 #define ADJOINT_FILTER_BLOCK(B, READS, INPUT, VEC4S) \
     INPUT(B, int, start_x) \
     INPUT(B, int, start_y) \
     INPUT(B, int, span_x) \
     INPUT(B, int, span_y) \
     INPUT(B, float, gain) \
-    INPUT(B, float, share)
+    INPUT(B, float, share) \
+    VEC4S(B, inner_x, FILTER_TILE_WINDOW / 2) \
+    VEC4S(B, inner_y, FILTER_TILE_WINDOW / 2)
 
 // A stage of a Fourier transform along one axis (fft.comp). There are `across` lines of `padded`
 // elements, with `count` butterflies in each line. The elements of a butterfly are `step` apart.
@@ -419,10 +422,26 @@
 #define TILE_ROWS   8
 #define TILE_RUNS   2
 #define TILE_RADIUS 16
-// Tiles of filters: their size, and the rows of a column that an invocation adds up.
-#define FILTER_TILE_COLUMNS 32
-#define FILTER_TILE_ROWS    16
-#define FILTER_TILE_RUN     4
+// Tiles of filters have RUNS runs of rows; an invocation adds up a column of a run. A tile KEEPS the
+// sums of rows of the source, of LINES of these if it has twice the tile's rows: windows of up to
+// WINDOW texels of one kernel, in a simple ratio. An invocation keeps those of CHUNK columns.
+// WINDOW_SPAN is the number of texels that the windows of `count` adjacent pixels have.
+#define FILTER_TILE_COLUMNS      32
+#define FILTER_TILE_RUN          4
+#define FILTER_TILE_RUNS         4
+#define FILTER_TILE_LINES        32
+#define FILTER_TILE_WINDOW       8
+#define FILTER_TILE_CHUNK(exact) ((exact) == EXACT_DOUBLE ? 4 : 8)
+#define FILTER_TILE_KEEPS(exact, kernels, width, height) \
+    ((exact) != 0 && (kernels) == 1 && (width) > 1 && (height) > 1 \
+     && (width) <= FILTER_TILE_WINDOW && (height) <= FILTER_TILE_WINDOW)
+#define FILTER_TILE_ROWS(keeps, exact, window) \
+    ((keeps) && (exact) == EXACT_HALF ? (FILTER_TILE_LINES - (window)) / 2 + 1 \
+                                      : FILTER_TILE_RUN * FILTER_TILE_RUNS)
+#define WINDOW_SPAN(exact, count, window) \
+    ((exact) == EXACT_HALF   ? 2 * (count) - 2 + (window) \
+     : (exact) == EXACT_SAME ? (count) - 1 + (window) \
+                             : (count) / 2 + (window))
 
 // Fourier transforms. FFT_INVOCATIONS is the size of a workgroup. In a transform of columns,
 // FFT_ROW_COLUMNS of them are in one row. FFT_MAX_RADIX is the largest number of elements of a
@@ -456,10 +475,12 @@
 #define HDRP_FAR        0.9
 #define HDRP_NEAR       0.4
 
-// Of a filter: the most taps along an axis, kernels, and texels of a window.
+// Of a filter: the most taps along an axis, kernels, and texels of a window. The most pixels along
+// an axis that read a texel in the tiles of a transpose.
 #define MAX_FILTER_TAPS 5
 #define MAX_KERNELS     3
 #define MAX_WINDOW      10
+#define MAX_READERS     24
 
 // The most levels that one pass adds up, and the most levels of a chain.
 #define GATHERED_LEVELS 7
@@ -476,11 +497,11 @@
 // With FROM_IMAGE, a downsampling to half the size reads the image itself and applies the
 // threshold, and an adjoint pass writes the cotangents of a source's image. BY is what these are
 // of. EMITTERS is how many passes add up in the target by blending. With ENLARGED the target has
-// more rows than the source. STORED is the format of the target (STORED_*). FIRST marks an engine's
+// more rows than the source, and a composite samples the lines of its bloom. STORED is the format of the target (STORED_*). FIRST marks an engine's
 // first level. LEVELS is the number of levels that a pass adds up. GROUPS is what a downsampling
 // makes of its taps. INVERSE to GROUP_HEIGHT are of Fourier transforms (fft.comp), whose workgroups
 // have GROUP_WIDTH x GROUP_HEIGHT invocations: of a stage of RADIX_1 elements, or with complete
-// lines of stages of RADIX_1 to RADIX_4. BOUNDARY is of those that are PADDED, and a first stage
+// lines of stages of RADIX_1 to RADIX_4. (Windows of filters in tiles are RADIX_1 x RADIX_2 texels.) BOUNDARY is of those that are PADDED, and a first stage
 // that is PREFILTERED has the filter of bright colours.
 #define SPECIALIZATION_CONSTANTS(CONSTANT) \
     CONSTANT(0, SAMPLING, sampling) \

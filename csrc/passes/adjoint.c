@@ -163,7 +163,7 @@ static bool accumulate_twice(struct vkb_adjoint *adjoint, const struct vkb_filte
 {
     const struct vkb_axis *x = &filter->x, *y = &filter->y;
     // Only the table of columns knows where the first row is.
-    const bool rows = y->first == 0 && (uint64_t)x->from * y->to <= (uint64_t)x->to * y->from;
+    const bool rows = y->first == 0 && (uint64_t)x->from * y->to < (uint64_t)x->to * y->from;
     const struct vkb_size size = {rows ? x->from : x->to, rows ? y->to : y->from};
     struct vkb_pass_row row;
     uint32_t between;

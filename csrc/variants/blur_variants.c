@@ -78,23 +78,32 @@ bool vkb_add_line(struct vkb_variant_choice *choice, const struct vkb_pass_row *
 // `Separable(bloom_scale=0.5)` takes 243 ms in place of 62, `threejs_unreal` 120 in place of 69
 // (processor time of 1920 x 1080 in float16, lavapipe of Mesa 22.3.6, 2026-11-27), the first at
 // 3840 x 2160 on an H200 0.47 ms in place of 0.30.
+static bool is_enlarged(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
+{
+    const struct vkb_image_row *source = &choice->plain.images[pass->reads[0]];
+    const struct vkb_image_row *target = &choice->plain.images[pass->targets[0]];
+
+    return vkb_is_line(pass, DIRECTION_HORIZONTAL, LINE_RADIUS)
+        && !vkb_same_size(&choice->plain, pass->reads[0], pass->targets[0])
+        && vkb_is_written_once(&choice->plain, pass->targets[0])
+        && source->width + 2 <= choice->device->max_side
+        && (target->format != VKB_FORMAT_RGBA8_UNORM
+            || vkb_device_supports(choice->device, VKB_FORMAT_RGBA32_FLOAT,
+                                   VK_FORMAT_FEATURE_SAMPLED_IMAGE_FILTER_LINEAR_BIT));
+}
+
 bool vkb_add_enlarged(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
 {
     const struct vkb_image_row *source = &choice->plain.images[pass->reads[0]];
     const struct vkb_image_row *target = &choice->plain.images[pass->targets[0]];
-    // In 8 bits the sampler filters the float lines, if the device supports that.
-    const bool unorm = target->format == VKB_FORMAT_RGBA8_UNORM;
-    const bool filters = vkb_device_supports(choice->device, VKB_FORMAT_RGBA32_FLOAT,
-                                             VK_FORMAT_FEATURE_SAMPLED_IMAGE_FILTER_LINEAR_BIT);
 
-    if (!(vkb_is_line(pass, DIRECTION_HORIZONTAL, LINE_RADIUS)
-          && !vkb_same_size(&choice->plain, pass->reads[0], pass->targets[0])
-          && vkb_is_written_once(&choice->plain, pass->targets[0])
-          && source->width + 2 <= choice->device->max_side && (filters || !unorm)))
+    if (!is_enlarged(choice, pass))
         return false;
     // The lines are floats, since rounding them would change the filtered values. The border has
     // the texels that the filter reads beyond the edges.
     const struct vkb_size size = {source->width + 2, source->height};
+    // In 8 bits the sampler filters the float lines.
+    const bool unorm = target->format == VKB_FORMAT_RGBA8_UNORM;
     char name[VKB_NAME_SIZE];
     snprintf(name, sizeof name, "%.24s_lines", pass->name);
     const uint32_t lines = vkb_add_floats(choice, name, size);
@@ -109,6 +118,25 @@ bool vkb_add_enlarged(struct vkb_variant_choice *choice, const struct vkb_pass_r
     // Not of `plain`: a new image may have moved these.
     VKB_SET_TARGET(&row, threshold, &choice->graph->images[pass->targets[0]]);
     return add_line_row(choice, &line) && vkb_add_fullscreen(choice, &row);
+}
+
+// Adds the composite, and after it a fused pass that samples the lines of the bloom.
+bool vkb_add_enlarged_final(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
+{
+    const struct vkb_pass_row *blur =
+        vkb_is_composite(pass) ? vkb_writer_of(&choice->plain, pass->reads[1]) : NULL;
+    struct vkb_pass_row row;
+
+    if (!blur || !is_enlarged(choice, blur))
+        return false;
+    const struct vkb_pass_row *enlarging = vkb_writer_of(choice->graph, pass->reads[1]);
+    memcpy(&row, pass, sizeof row);
+    row.fused = true;
+    row.reads[1] = enlarging->reads[0];
+    row.constants.enlarged = true;
+    row.constants.sampling = enlarging->constants.sampling;
+    row.constants.format = vkb_storage_mode(choice->plain.images[pass->reads[1]].format);
+    return vkb_add_fullscreen(choice, pass) && vkb_add_fullscreen(choice, &row);
 }
 
 // A composite of two lines of a threshold, all at the size of the image.

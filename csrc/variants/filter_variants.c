@@ -138,7 +138,7 @@ static bool make_filter(const struct vkb_variant_choice *choice, const struct vk
         return false;
     take_filter(choice, pass, row);
     if (choice->variants == VKB_VARIANTS_GPU) {
-        vkb_make_tiles(row, shaders.tiles);
+        vkb_make_tiles(row, shaders.tiles, pass->constants.window, pass->constants.window);
         return true;
     }
     if (!fits_strips(&choice->plain, pass) || !vkb_fits_linear(choice, row))

@@ -58,14 +58,19 @@ int32_t vkb_ratio_of(uint32_t source, uint32_t target)
                                 : 0;
 }
 
-void vkb_make_tiles(struct vkb_pass_row *row, const struct vkb_shader *shader)
+void vkb_make_tiles(struct vkb_pass_row *row, const struct vkb_shader *shader, int32_t width,
+                    int32_t height)
 {
     struct vkb_constants *constants = &row->constants;
 
     // Tiles have one way for windows in a simple ratio along both axes, and one for all others.
     if (!constants->exact || !constants->exact_rows)
         constants->exact = constants->exact_rows = 0;
-    vkb_make_dispatch(row, shader, FILTER_TILE_COLUMNS, FILTER_TILE_ROWS);
+    constants->radix_1 = width;
+    constants->radix_2 = height;
+    const bool keeps = FILTER_TILE_KEEPS(constants->exact, constants->kernels, width, height);
+    vkb_make_dispatch(row, shader, FILTER_TILE_COLUMNS,
+                      (uint32_t)FILTER_TILE_ROWS(keeps, constants->exact_rows, height));
 }
 
 bool vkb_fits_linear(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
@@ -114,7 +119,7 @@ bool vkb_add_from_image(struct vkb_variant_choice *choice, const struct vkb_pass
     for (uint32_t i = 0; i < row.read_count; ++i)
         if (row.reads[i] == pass->reads[0])
             row.reads[i] = threshold->reads[0];
-    row.fused = true;
+    row.fused = row.gains_if_finite = true;
     row.constants.from_image = true;
     if (is_filter) {
         row.constants.format = vkb_storage_mode(choice->plain.images[pass->reads[0]].format);

@@ -27,9 +27,9 @@ uint32_t vkb_add_floats(struct vkb_variant_choice *choice, const char *name, str
 // Adds the variant of a pass to the graph. False: it does not suit the pass, and nothing is added.
 typedef bool vkb_variant_add(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass);
 
-// Lines and enlarged lines of a blur; fused passes for the complete bloom of an image, in strips
-// and in tiles.
-vkb_variant_add vkb_add_line, vkb_add_enlarged, vkb_add_fused;
+// Lines and enlarged lines of a blur, these also fused with the composite; fused passes for the
+// complete bloom of an image, in strips and in tiles.
+vkb_variant_add vkb_add_line, vkb_add_enlarged, vkb_add_enlarged_final, vkb_add_fused;
 // For derivatives of these by the image.
 vkb_variant_add vkb_add_adjoint_fused;
 // Downsamplings that are not linear, and first passes of published methods.
@@ -87,8 +87,10 @@ void vkb_make_dispatch(struct vkb_pass_row *row, const struct vkb_shader *shader
 // Whether sides are in a simple ratio: EXACT_*; 0: they are not.
 int32_t vkb_ratio_of(uint32_t source, uint32_t target);
 
-// Turns a pass with the constants of a filter into its tiles.
-void vkb_make_tiles(struct vkb_pass_row *row, const struct vkb_shader *shader);
+// Turns a pass with the constants of a filter into its tiles, whose pixels add up windows of
+// `width` x `height` texels.
+void vkb_make_tiles(struct vkb_pass_row *row, const struct vkb_shader *shader, int32_t width,
+                    int32_t height);
 
 // Turns a pass into a dispatch that accesses its images with linear texels. Each of the
 // ROW_INVOCATIONS invocations of a workgroup writes a block of `columns` x `rows` pixels.

@@ -9,11 +9,12 @@ layout(set = 0, binding = 2) uniform sampler2D own;
 #include "lib/ended.glsl"
 #endif
 layout(set = 0, binding = TARGET_BINDING) uniform writeonly image2D target;
+const bool TURNED = false, REPEATS = EXACT != 0;
 #include "variants/filter_tile.glsl"
 
-Window window_at(ivec2 pixel, bool along_x)
+Window window_at(int pixel, bool along_x)
 {
-    return window_in(textureSize(source, 0), pixel, along_x);
+    return window_in(textureSize(source, 0), ivec2(pixel), along_x);
 }
 
 vec4 texel_at(ivec2 texel)

@@ -18,7 +18,9 @@ from tests.variants import VARIANTS, opened
 from vkbloom import (
     BevyBloom,
     Convolution,
+    DualKawase,
     Frames,
+    KinoBloom,
     Pyramid,
     Renderer,
     Scene,
@@ -28,6 +30,16 @@ from vkbloom import (
 )
 from vkbloom.psf import gaussian
 from vkbloom.reference import apply as reference_apply
+
+#: Filters of one kernel and of several, which enlarge, reduce and keep the size.
+TILED = (
+    Pyramid(levels=2, threshold=0.5, knee=0.5),
+    Pyramid(levels=2, radius=0.5, level_weights=(0.3, 0.9)),
+    DualKawase(levels=2),
+    KinoBloom(),
+    presets["unity_urp"],
+    presets["pygfx"],
+)
 
 
 @pytest.fixture(scope="module", params=VARIANTS)
@@ -105,6 +117,20 @@ def test_large_images(
         frames = renderer.apply(image, settings)
     np.testing.assert_array_equal(alone["final"], frames["final"])
     assert_same(frames, unfused.apply(image, settings))
+
+
+@pytest.mark.parametrize("size", [(258, 260), (261, 133), (5, 16001)])
+def test_tiles(unfused: Renderer, size: tuple[int, int]) -> None:
+    """Several tiles and parts of them, in simple ratios and others; small levels have none."""
+    image = hdr_picture(*size, 3, "float16")
+    bevy = BevyBloom(max_mip_dimension=max(min(size), 4))
+    with opened("gpu") as renderer:
+        for settings in (*TILED, bevy):
+            alone = renderer.apply(image, settings, framebuffers=("final",))
+            frames = renderer.apply(image, settings.replace(exposure=0.5))
+            frames = renderer.apply(image, settings)
+            np.testing.assert_array_equal(alone["final"], frames["final"])
+            assert_same(frames, unfused.apply(image, settings))
 
 
 # What runs
