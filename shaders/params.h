@@ -214,8 +214,8 @@
 #define COMPOSITE_BLOCK(B, READS, INPUT, VEC4S) COMPOSITE_ROWS(B, READS, INPUT)
 
 // The transpose of a filter (adjoint_filter.frag): where the tables of both axes start, in texels;
-// the factor of the colours of what is added; for tiles in a simple ratio the weights of texels
-// that are not near an edge, of even ones, then of odd ones.
+// the factor of the colours of what is added. For tiles: where the tables of each picture start;
+// in a simple ratio the weights of texels that are not near an edge, of even ones, then of odd ones.
 #define ADJOINT_FILTER_BLOCK(B, READS, INPUT, VEC4S) \
     INPUT(B, int, start_x) \
     INPUT(B, int, start_y) \
@@ -223,6 +223,7 @@
     INPUT(B, int, span_y) \
     INPUT(B, float, gain) \
     INPUT(B, float, share) \
+    VEC4S(B, pictures, MAX_PICTURES) \
     VEC4S(B, inner_x, FILTER_TILE_WINDOW / 2) \
     VEC4S(B, inner_y, FILTER_TILE_WINDOW / 2)
 
@@ -424,13 +425,15 @@
 #define TILE_RADIUS 16
 // Tiles of filters have RUNS runs of rows; an invocation adds up a column of a run. A tile KEEPS the
 // sums of rows of the source, of LINES of these if it has twice the tile's rows: windows of up to
-// WINDOW texels of one kernel, in a simple ratio. An invocation keeps those of CHUNK columns.
+// WINDOW texels of one kernel, in a simple ratio, where devices have SHARED bytes. An invocation
+// keeps those of CHUNK columns.
 // WINDOW_SPAN is the number of texels that the windows of `count` adjacent pixels have.
 #define FILTER_TILE_COLUMNS      32
 #define FILTER_TILE_RUN          4
 #define FILTER_TILE_RUNS         4
 #define FILTER_TILE_LINES        32
 #define FILTER_TILE_WINDOW       8
+#define FILTER_TILE_SHARED       19000
 #define FILTER_TILE_CHUNK(exact) ((exact) == EXACT_DOUBLE ? 4 : 8)
 #define FILTER_TILE_KEEPS(exact, kernels, width, height) \
     ((exact) != 0 && (kernels) == 1 && (width) > 1 && (height) > 1 \
@@ -476,11 +479,12 @@
 #define HDRP_NEAR       0.4
 
 // Of a filter: the most taps along an axis, kernels, and texels of a window. The most pixels along
-// an axis that read a texel in the tiles of a transpose.
+// an axis that read a texel in the tiles of a transpose, and pictures that these add up.
 #define MAX_FILTER_TAPS 5
 #define MAX_KERNELS     3
 #define MAX_WINDOW      10
 #define MAX_READERS     24
+#define MAX_PICTURES    5
 
 // The most levels that one pass adds up, and the most levels of a chain.
 #define GATHERED_LEVELS 7
@@ -501,7 +505,8 @@
 // first level. LEVELS is the number of levels that a pass adds up. GROUPS is what a downsampling
 // makes of its taps. INVERSE to GROUP_HEIGHT are of Fourier transforms (fft.comp), whose workgroups
 // have GROUP_WIDTH x GROUP_HEIGHT invocations: of a stage of RADIX_1 elements, or with complete
-// lines of stages of RADIX_1 to RADIX_4. (Windows of filters in tiles are RADIX_1 x RADIX_2 texels.) BOUNDARY is of those that are PADDED, and a first stage
+// lines of stages of RADIX_1 to RADIX_4. (Windows of filters in tiles are RADIX_1 x RADIX_2
+// texels, in transposes of RADIX_3 pictures below each other.) BOUNDARY is of those that are PADDED, and a first stage
 // that is PREFILTERED has the filter of bright colours.
 #define SPECIALIZATION_CONSTANTS(CONSTANT) \
     CONSTANT(0, SAMPLING, sampling) \

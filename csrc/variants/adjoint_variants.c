@@ -6,10 +6,11 @@
 #include <math.h>
 #include <string.h>
 
-// The entries of an axis in the table of weights (passes/taps.h).
+// The entries of an axis in the table of weights (passes/taps.h) begin at `start`; below 0: the
+// pass keeps the axis.
 struct axis {
     const float (*texels)[4];
-    const float (*entries)[4];
+    int32_t start;
     uint32_t size;
 };
 
@@ -18,11 +19,13 @@ static struct axis axis_of(const struct vkb_graph *graph, const struct vkb_pass_
 {
     const struct vkb_adjoint_filter_params *params = &pass->params.adjoint_filter;
     const struct vkb_image_row *target = &graph->images[pass->targets[0]];
-    const float (*texels)[4] = graph->images[pass->reads[1]].pixels;
+    const int32_t kept = vertical ? DIRECTION_HORIZONTAL : DIRECTION_VERTICAL;
 
     return (struct axis){
-        .texels = texels,
-        .entries = texels + (vertical ? params->start_y : params->start_x),
+        .texels = graph->images[pass->reads[1]].pixels,
+        .start = pass->constants.direction == kept ? -1
+               : vertical                          ? params->start_y
+                                                   : params->start_x,
         .size = vertical ? target->height : target->width,
     };
 }
@@ -31,7 +34,7 @@ static const float *entry_of(const struct axis *axis, uint32_t texel)
 {
     const uint32_t last = axis->size - 1;
 
-    return axis->entries[texel < last ? texel : last];
+    return axis->texels[(uint32_t)axis->start + (texel < last ? texel : last)];
 }
 
 // The most weights of columns that an invocation keeps: the driver compiles a load of each.
@@ -124,6 +127,20 @@ bool vkb_add_adjoint_groups(struct vkb_variant_choice *choice, const struct vkb_
     return vkb_add_variant(choice, &row);
 }
 
+// The most readers of a texel; too many for tiles where those of the next one begin before.
+static int32_t most_readers(const struct axis *axis)
+{
+    int32_t most = 1;
+
+    for (uint32_t texel = 0; axis->start >= 0 && texel < axis->size; ++texel) {
+        const float *entry = entry_of(axis, texel);
+        if (entry_of(axis, texel + 1)[0] < entry[0])
+            return MAX_READERS + 1;
+        most = (int32_t)fmaxf((float)most, entry[1]);
+    }
+    return most;
+}
+
 static uint32_t readers_of_image(const struct vkb_graph *graph, uint32_t image)
 {
     uint32_t readers = 0;
@@ -134,38 +151,23 @@ static uint32_t readers_of_image(const struct vkb_graph *graph, uint32_t image)
     return readers;
 }
 
-// The pass along the other axis that only this one reads; NULL: there is none.
-static const struct vkb_pass_row *other_axis(const struct vkb_graph *graph,
+// The pass along the other axis that only this one reads, with few readers; NULL: there is none.
+static const struct vkb_pass_row *other_axis(const struct vkb_variant_choice *choice,
                                              const struct vkb_pass_row *pass)
 {
+    const struct vkb_graph *graph = &choice->plain;
     const struct vkb_pass_row *first = vkb_writer_of(graph, pass->reads[0]);
 
-    return pass->constants.direction != DIRECTION_BOTH && first
-                && first->block == VKB_BLOCK_adjoint_filter && !first->constants.add_own
-                && !first->constants.from_image
-                && first->constants.direction == !pass->constants.direction
-                && readers_of_image(graph, pass->reads[0]) == 1
-             ? first
-             : NULL;
-}
-
-// The most readers of a texel; 1 where the pass keeps the axis.
-static int32_t most_readers(const struct axis *axis)
-{
-    int32_t most = 1;
-
-    for (uint32_t texel = 0; axis->entries && texel < axis->size; ++texel)
-        most = (int32_t)fmaxf((float)most, entry_of(axis, texel)[1]);
-    return most;
-}
-
-// Whether the readers of no row begin above those of the row before.
-static bool begins_in_order(const struct axis *y)
-{
-    for (uint32_t texel = 0; y->entries && texel + 1 < y->size; ++texel)
-        if (entry_of(y, texel)[0] > entry_of(y, texel + 1)[0])
-            return false;
-    return true;
+    if (!(pass->constants.direction != DIRECTION_BOTH && first
+          && first->block == VKB_BLOCK_adjoint_filter && !first->constants.add_own
+          && !first->constants.from_image
+          && first->constants.direction == !pass->constants.direction
+          && readers_of_image(graph, pass->reads[0]) == 1))
+        return NULL;
+    const bool vertical = pass->constants.direction == DIRECTION_VERTICAL;
+    const struct axis along = axis_of(choice->graph, pass, vertical);
+    const struct axis across = axis_of(choice->graph, first, !vertical);
+    return most_readers(&along) <= MAX_WINDOW && most_readers(&across) <= MAX_WINDOW ? first : NULL;
 }
 
 // The first pixel of the window of a texel in a simple ratio (lib/window.glsl).
@@ -185,7 +187,7 @@ static bool has_exact_windows(const struct axis *axis, int32_t exact, int32_t *w
     const int32_t size = exact == EXACT_SAME ? *window : *window + *window % 2;
     bool fits = exact != 0;
 
-    for (uint32_t texel = 0; fits && axis->entries && texel < axis->size; ++texel) {
+    for (uint32_t texel = 0; fits && axis->start >= 0 && texel < axis->size; ++texel) {
         const float *entry = entry_of(axis, texel);
         const int32_t first = first_reader(exact, texel, size), reader = (int32_t)entry[0];
         fits = reader >= first && reader + (int32_t)entry[1] <= first + size;
@@ -219,66 +221,103 @@ static bool make_tiles(const struct vkb_variant_choice *choice, const struct vkb
                        struct vkb_pass_row *row)
 {
     const struct vkb_graph *graph = choice->graph;
-    const struct vkb_pass_row *other = other_axis(&choice->plain, pass);
+    const struct vkb_pass_row *other = other_axis(choice, pass);
     const bool vertical = pass->constants.direction == DIRECTION_VERTICAL;
-    struct axis x = axis_of(graph, other && vertical ? other : pass, false);
-    struct axis y = axis_of(graph, other && !vertical ? other : pass, true);
+    const struct axis x = axis_of(graph, other && vertical ? other : pass, false);
+    const struct axis y = axis_of(graph, other && !vertical ? other : pass, true);
+    struct vkb_adjoint_filter_params *params = &row->params.adjoint_filter;
     struct vkb_constants *constants = &row->constants;
-
-    if (other && most_readers(&x) <= MAX_WINDOW && most_readers(&y) <= MAX_WINDOW) {
-        replace_read(row, pass->reads[0], other->reads[0]);
-        if (vertical)
-            row->params.adjoint_filter.start_x = other->params.adjoint_filter.start_x;
-        else
-            row->params.adjoint_filter.start_y = other->params.adjoint_filter.start_y;
-        row->params.adjoint_filter.gain *= other->params.adjoint_filter.gain;
-        constants->direction = DIRECTION_BOTH;
-    }
-    if (constants->direction == DIRECTION_VERTICAL)
-        x.entries = NULL;
-    if (constants->direction == DIRECTION_HORIZONTAL)
-        y.entries = NULL;
-    const struct vkb_image_row *source = &graph->images[row->reads[0]];
     int32_t width = most_readers(&x), height = most_readers(&y);
-    constants->kernels = pass->constants.levels;
-    constants->exact = vkb_ratio_of(source->width, x.size);
-    constants->exact_rows = vkb_ratio_of(source->height, y.size);
-    const bool few_readers =
-        constants->kernels == 1 && !constants->exact_rows && constants->direction == DIRECTION_BOTH;
-    if (few_readers || width > MAX_READERS || height > MAX_READERS || !begins_in_order(&y))
+
+    const struct vkb_image_row *source = &graph->images[(other ? other : pass)->reads[0]];
+    int32_t exact_x = vkb_ratio_of(source->width, x.size);
+    int32_t exact_y = vkb_ratio_of(source->height, y.size);
+    if (width > MAX_READERS || height > MAX_READERS
+        || (pass->constants.levels == 1 && !exact_y && x.start >= 0 && y.start >= 0))
         return false;
-    if (constants->kernels > 1 || !has_exact_windows(&x, constants->exact, &width)
-        || !has_exact_windows(&y, constants->exact_rows, &height))
-        constants->exact = constants->exact_rows = 0;
-    if (!FILTER_TILE_KEEPS(constants->exact, constants->kernels, width, height)) {
-        // Loops of constant length are slower where they are long: 960 x 540 pixels that 20 x 2
-        // ones read 0.123 ms, 0.094 otherwise (H100, 2026-11-27).
-        constants->exact = width == 1 || height == 1 ? constants->exact : 0;
-        vkb_make_tiles(row, &vkb_shader_adjoint_filter_tile_comp, width, height);
-        return true;
+    if (other) {
+        replace_read(row, pass->reads[0], other->reads[0]);
+        params->gain *= other->params.adjoint_filter.gain;
     }
-    take_inner(&x, constants->exact, width, row->params.adjoint_filter.inner_x);
-    take_inner(&y, constants->exact_rows, height, row->params.adjoint_filter.inner_y);
-    // Turned: loaded along columns, x and y change places.
-    const int32_t exact = constants->exact;
-    constants->exact = constants->exact_rows;
-    constants->exact_rows = exact;
-    vkb_make_tiles(row, &vkb_shader_adjoint_filter_tile_comp, height, width);
+    params->pictures[0][0] = (float)x.start;
+    params->pictures[0][1] = (float)y.start;
+    constants->kernels = pass->constants.levels;
+    if (constants->kernels > 1
+        || choice->device->limits.maxComputeSharedMemorySize < FILTER_TILE_SHARED
+        || !has_exact_windows(&x, exact_x, &width) || !has_exact_windows(&y, exact_y, &height))
+        exact_x = exact_y = 0;
+    // Such tiles are turned: they load columns, and x and y change places.
+    const bool keeps = FILTER_TILE_KEEPS(exact_x, constants->kernels, width, height);
+    // Loops of constant length are slower where they are long: 960 x 540 pixels that 20 x 2 ones
+    // read 0.123 ms, 0.094 otherwise (H100, 2026-11-27).
+    if (!keeps && width > 1 && height > 1)
+        exact_x = exact_y = 0;
+    constants->exact = keeps ? exact_y : exact_x;
+    constants->exact_rows = keeps ? exact_x : exact_y;
+    vkb_make_tiles(choice, row, &vkb_shader_adjoint_filter_tile_comp, keeps ? height : width,
+                   keeps ? width : height);
+    if (!keeps)
+        return true;
     row->block_width = row->block_height;
     row->block_height = FILTER_TILE_COLUMNS;
+    take_inner(&x, exact_x, width, params->inner_x);
+    take_inner(&y, exact_y, height, params->inner_y);
     return true;
+}
+
+// Whether `next` adds the filter of another picture of the same image.
+static bool continues(const struct vkb_pass_row *pass, const struct vkb_pass_row *next)
+{
+    return pass->block == VKB_BLOCK_adjoint_filter && next->block == pass->block
+        && pass->constants.levels == 1 && next->constants.levels == 1
+        && next->reads[0] == pass->reads[0] && next->constants.add_own
+        && next->reads[3] == pass->targets[0]
+        && next->params.adjoint_filter.gain == pass->params.adjoint_filter.gain;
+}
+
+// After the last one of several passes that add up the pictures of one image, adds a fused pass.
+static bool add_pictures(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
+{
+    const struct vkb_graph *plain = &choice->plain;
+    const struct vkb_pass_row *first = pass, *end = plain->passes + plain->pass_count;
+    struct vkb_pass_row row;
+    int32_t width = 1, height = 1;
+
+    if (pass + 1 < end && continues(pass, pass + 1))
+        return true;
+    while (first > plain->passes && pass - first < MAX_PICTURES - 1 && continues(first - 1, first))
+        --first;
+    memcpy(&row, pass, sizeof row);
+    row.fused = row.gains_if_finite = true;
+    row.reads[3] = first->reads[3];
+    row.constants.add_own = first->constants.add_own;
+    row.params.adjoint_filter.share = first->params.adjoint_filter.share;
+    for (const struct vkb_pass_row *each = first; each <= pass; ++each) {
+        const struct axis x = axis_of(choice->graph, each, false);
+        const struct axis y = axis_of(choice->graph, each, true);
+        float *picture = row.params.adjoint_filter.pictures[each - first];
+        width = (int32_t)fmaxf((float)width, (float)most_readers(&x));
+        height = (int32_t)fmaxf((float)height, (float)most_readers(&y));
+        picture[0] = (float)x.start;
+        picture[1] = (float)y.start;
+    }
+    row.constants.kernels = 1;
+    row.constants.radix_3 = (int32_t)(pass - first) + 1;
+    vkb_make_tiles(choice, &row, &vkb_shader_adjoint_filter_tile_comp, width, height);
+    return first == pass || width > MAX_WINDOW || height > MAX_WINDOW
+        || vkb_add_variant(choice, &row);
 }
 
 bool vkb_add_adjoint_filter(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
 {
-    struct vkb_pass_row row, tiles;
+    struct vkb_pass_row row;
 
     if (pass->block != VKB_BLOCK_adjoint_filter)
         return false;
     memcpy(&row, pass, sizeof row);
     row.gains_if_finite = true;
-    memcpy(&tiles, &row, sizeof tiles);
-    const bool fits_tiles = make_tiles(choice, pass, &tiles);
-    read_composite(&choice->plain, fits_tiles ? &tiles : &row);
-    return fits_tiles ? vkb_add_variant(choice, &tiles) : vkb_add_fullscreen(choice, &row);
+    const bool fits_tiles = make_tiles(choice, pass, &row);
+    read_composite(&choice->plain, &row);
+    return (fits_tiles ? vkb_add_variant(choice, &row) : vkb_add_fullscreen(choice, &row))
+        && add_pictures(choice, pass);
 }

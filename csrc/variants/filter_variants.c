@@ -87,38 +87,25 @@ bool vkb_add_gathered(struct vkb_variant_choice *choice, const struct vkb_pass_r
     return vkb_add_variant(choice, &row);
 }
 
-// Whether the pass is a filter whose images have one format.
-static bool fits_strips(const struct vkb_graph *graph, const struct vkb_pass_row *pass)
-{
-    return vkb_has_format_of(graph, pass->reads[0], pass->targets[0])
-        && (!pass->constants.add_own || vkb_has_format_of(graph, pass->reads[1], pass->targets[0]));
-}
-
-// Whether the weights of a position depend on the ratio of sizes alone, not on how far away the
-// edges are.
-static bool has_phases(const struct vkb_pass_row *pass)
-{
-    const int32_t upsample = pass->constants.upsample;
-
-    return upsample == UPSAMPLE_LINEAR || upsample == UPSAMPLE_CUBIC;
-}
-
 // Gives `row` the constants of the filter `pass`.
 static void take_filter(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
                         struct vkb_pass_row *row)
 {
     const struct vkb_image_row *source = &choice->plain.images[pass->reads[0]];
     const struct vkb_image_row *target = &choice->plain.images[pass->targets[0]];
+    const int32_t upsample = pass->constants.upsample;
 
     row->constants.sampling = 0;
-    row->constants.upsample = pass->constants.upsample;
+    row->constants.upsample = upsample;
     row->constants.taps = pass->constants.taps;
     row->constants.kernels = pass->constants.kernels;
     row->constants.window = pass->constants.window;
     row->constants.taken_x = pass->constants.taken_x;
     row->constants.taken_y = pass->constants.taken_y;
     row->constants.exact = vkb_ratio_of(source->width, target->width);
-    row->constants.exact_rows = has_phases(pass) ? vkb_ratio_of(source->height, target->height) : 0;
+    // The weights of others depend on how far away the edges are, too.
+    if (upsample == UPSAMPLE_LINEAR || upsample == UPSAMPLE_CUBIC)
+        row->constants.exact_rows = vkb_ratio_of(source->height, target->height);
 }
 
 // The shaders of a filter: strips by format, and tiles.
@@ -138,10 +125,14 @@ static bool make_filter(const struct vkb_variant_choice *choice, const struct vk
         return false;
     take_filter(choice, pass, row);
     if (choice->variants == VKB_VARIANTS_GPU) {
-        vkb_make_tiles(row, shaders.tiles, pass->constants.window, pass->constants.window);
+        vkb_make_tiles(choice, row, shaders.tiles, pass->constants.window, pass->constants.window);
         return true;
     }
-    if (!fits_strips(&choice->plain, pass) || !vkb_fits_linear(choice, row))
+    // Of images with one format.
+    if (!vkb_has_format_of(&choice->plain, pass->reads[0], pass->targets[0])
+        || (pass->constants.add_own
+            && !vkb_has_format_of(&choice->plain, pass->reads[1], pass->targets[0]))
+        || !vkb_fits_linear(choice, row))
         return false;
     row->constants.enlarged = source->height <= target->height;
     vkb_make_linear(row, shaders.strips[target->format],

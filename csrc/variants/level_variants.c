@@ -25,12 +25,6 @@ static enum vkb_mode groups_of(const struct vkb_pass_row *pass)
     return vkb_computes(pass, VKB_BLOCK_prefilter) ? (enum vkb_mode)pass->constants.groups : 0;
 }
 
-static bool has_thirteen_taps(enum vkb_mode groups)
-{
-    return groups == GROUPS_PYRAMID || groups == GROUPS_PYGFX || groups == GROUPS_PYGFX_KARIS
-        || groups == GROUPS_BLENDER || groups == GROUPS_BEVY;
-}
-
 // The simple ratio of both sides of the source and the target, of EXACT_*; 0: they have none.
 static int32_t ratio_of(const struct vkb_graph *graph, const struct vkb_pass_row *pass)
 {
@@ -58,13 +52,16 @@ bool vkb_add_windowed(struct vkb_variant_choice *choice, const struct vkb_pass_r
     const int32_t ratio = ratio_of(&choice->plain, pass);
     const enum vkb_mode groups = groups_of(pass);
     const bool is_blur = groups == GROUPS_HDRP_BLUR || groups == GROUPS_GODOT;
+    const bool has_thirteen_taps = groups == GROUPS_PYRAMID || groups == GROUPS_PYGFX
+                                || groups == GROUPS_PYGFX_KARIS || groups == GROUPS_BLENDER
+                                || groups == GROUPS_BEVY;
     struct vkb_pass_row row;
 
     memcpy(&row, pass, sizeof row);
     row.constants.exact = ratio == EXACT_DOUBLE ? 0 : ratio;
     row.constants.exact_rows = row.constants.exact;
     row.constants.enlarged = source->height < target->height;
-    row.constants.window = has_thirteen_taps(groups) ? 6 : 4;
+    row.constants.window = has_thirteen_taps ? 6 : 4;
     // A radius is that of a mean of other texels. HDRP's taps are in other texels at each position.
     if (!groups || is_blur || pass->constants.masked || pass->constants.radius > 1
         || pass->params.prefilter.step_x != 1.0f || pass->params.prefilter.step_y != 1.0f

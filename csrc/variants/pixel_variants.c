@@ -18,12 +18,6 @@ static bool blends(const struct vkb_graph *graph, const struct vkb_pass_row *pas
         && vkb_has_format_of(graph, pass->reads[0], pass->targets[0]);
 }
 
-// Whether the pass is a threshold pass between images of the same format.
-static bool loads_threshold(const struct vkb_graph *graph, const struct vkb_pass_row *pass)
-{
-    return vkb_is_threshold(pass) && vkb_has_format_of(graph, pass->reads[0], pass->targets[0]);
-}
-
 // Turns a pass that reads only the pixel at its own position into one that loads it, from the first
 // `read_count` images.
 static void load_pixels(struct vkb_pass_row *row, const struct vkb_shader *shader,
@@ -44,7 +38,8 @@ bool vkb_add_fullscreen(struct vkb_variant_choice *choice, const struct vkb_pass
         vkb_make_dispatch(&row, pass->shader->dispatch, PIXEL_INVOCATIONS, PIXEL_INVOCATIONS);
     else if (vkb_fits_linear(choice, pass) && blends(graph, pass))
         load_pixels(&row, blend_shaders[format], format, 2);
-    else if (vkb_fits_linear(choice, pass) && loads_threshold(graph, pass))
+    else if (vkb_fits_linear(choice, pass) && vkb_is_threshold(pass)
+             && vkb_has_format_of(graph, pass->reads[0], pass->targets[0]))
         load_pixels(&row, threshold_shaders[format], format, 1);
     return vkb_add_variant(choice, &row);
 }

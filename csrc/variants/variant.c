@@ -58,17 +58,19 @@ int32_t vkb_ratio_of(uint32_t source, uint32_t target)
                                 : 0;
 }
 
-void vkb_make_tiles(struct vkb_pass_row *row, const struct vkb_shader *shader, int32_t width,
-                    int32_t height)
+void vkb_make_tiles(const struct vkb_variant_choice *choice, struct vkb_pass_row *row,
+                    const struct vkb_shader *shader, int32_t width, int32_t height)
 {
     struct vkb_constants *constants = &row->constants;
 
-    // Tiles have one way for windows in a simple ratio along both axes, and one for all others.
-    if (!constants->exact || !constants->exact_rows)
+    // Tiles have one way for windows in a simple ratio along both axes, and one for all others
+    // and for devices with little shared memory.
+    if (!constants->exact || !constants->exact_rows
+        || choice->device->limits.maxComputeSharedMemorySize < FILTER_TILE_SHARED)
         constants->exact = constants->exact_rows = 0;
+    const bool keeps = FILTER_TILE_KEEPS(constants->exact, constants->kernels, width, height);
     constants->radix_1 = width;
     constants->radix_2 = height;
-    const bool keeps = FILTER_TILE_KEEPS(constants->exact, constants->kernels, width, height);
     vkb_make_dispatch(row, shader, FILTER_TILE_COLUMNS,
                       (uint32_t)FILTER_TILE_ROWS(keeps, constants->exact_rows, height));
 }

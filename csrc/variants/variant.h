@@ -89,8 +89,8 @@ int32_t vkb_ratio_of(uint32_t source, uint32_t target);
 
 // Turns a pass with the constants of a filter into its tiles, whose pixels add up windows of
 // `width` x `height` texels.
-void vkb_make_tiles(struct vkb_pass_row *row, const struct vkb_shader *shader, int32_t width,
-                    int32_t height);
+void vkb_make_tiles(const struct vkb_variant_choice *choice, struct vkb_pass_row *row,
+                    const struct vkb_shader *shader, int32_t width, int32_t height);
 
 // Turns a pass into a dispatch that accesses its images with linear texels. Each of the
 // ROW_INVOCATIONS invocations of a workgroup writes a block of `columns` x `rows` pixels.

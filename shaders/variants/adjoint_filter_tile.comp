@@ -7,6 +7,7 @@
 layout(set = 0, binding = TARGET_BINDING) uniform writeonly image2D target;
 // Turned, an invocation loads a column, and those of a workgroup rows. Weights at the edges differ.
 const bool TURNED = FILTER_TILE_KEEPS(EXACT, KERNELS, RADIX_1, RADIX_2), REPEATS = false;
+const int PICTURES = RADIX_3;
 #include "variants/filter_tile.glsl"
 
 Window window_at(int pixel, bool along_x)
@@ -14,10 +15,12 @@ Window window_at(int pixel, bool along_x)
     bool horizontal = along_x != TURNED;
     int at_texel = min(pixel, imageSize(target)[horizontal ? 0 : 1] - 1);
     Window window;
+    int start = int(params.pictures[picture][horizontal ? 0 : 1]);
+    [[unroll]] for (int i = 0; i < MAX_SIDE; ++i)
+        window.weights[i] = vec3(i == 0 ? 1.0 : 0.0);
+    // An axis that is kept.
     window.first = at_texel;
-    window.weights[0] = vec3(1.0);
-    // A pass along one axis keeps the other.
-    if (DIRECTION == (horizontal ? DIRECTION_VERTICAL : DIRECTION_HORIZONTAL))
+    if (start < 0)
         return window;
     int count = along_x ? WIDTH : HEIGHT;
     window.first = first_texel(along_x ? EXACT : EXACT_ROWS, at_texel, count);
@@ -30,7 +33,7 @@ Window window_at(int pixel, bool along_x)
         }
         return window;
     }
-    ivec4 readers = ivec4(entry(at_texel + (horizontal ? params.start_x : params.start_y)));
+    ivec4 readers = ivec4(entry(at_texel + start));
     if (EXACT == 0)
         window.first = readers.x;
     [[unroll]] for (int i = 0; i < MAX_SIDE; ++i) {

@@ -10,6 +10,7 @@ layout(set = 0, binding = 2) uniform sampler2D own;
 #endif
 layout(set = 0, binding = TARGET_BINDING) uniform writeonly image2D target;
 const bool TURNED = false, REPEATS = EXACT != 0;
+const int PICTURES = 1;
 #include "variants/filter_tile.glsl"
 
 Window window_at(int pixel, bool along_x)

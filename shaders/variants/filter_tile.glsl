@@ -1,7 +1,7 @@
 // A filter for GPUs, or its transpose. A workgroup computes the weights of its columns and rows once, and an invocation
 // adds up RUN rows of a column: each row of texels along x, then these sums along y. With TURNED x and y have changed
-// places in all that is here. The including shader declares `target`, includes lib/window.glsl, and defines TURNED,
-// REPEATS and the functions below.
+// places in all that is here. The results of several PICTURES are added up. The including shader declares `target`,
+// includes lib/window.glsl, and defines TURNED, REPEATS, PICTURES and the functions below.
 
 // The texels along x and along y that a pixel adds up.
 const int WIDTH = RADIX_1, HEIGHT = RADIX_2, MAX_SIDE = WIDTH > HEIGHT ? WIDTH : HEIGHT;
@@ -12,7 +12,9 @@ const int ROWS = FILTER_TILE_ROWS(KEEPS, EXACT_ROWS, HEIGHT);
 
 layout(local_size_x = FILTER_TILE_COLUMNS, local_size_y = FILTER_TILE_RUNS) in;
 
-// Defined by the including shader: the texels of the source that a pixel adds up, a texel there or the nearest one in
+int picture = 0;
+
+// Defined by the including shader: the texels of the picture that a pixel adds up, a texel there or the nearest one in
 // the image, what is added to a pixel, and the pixel that is stored.
 Window window_at(int pixel, bool along_x);
 vec4 texel_at(ivec2 texel);
@@ -71,6 +73,7 @@ void keep_sums(int line, int left)
 }
 
 float of_column[3][MAX_SIDE + 1];
+vec4 of_rows[RUN][3];
 
 vec4[3] sums_along_x(ivec2 first)
 {
@@ -90,34 +93,25 @@ int row_offset(int top, int row)
     return EXACT != 0 ? offset_of(EXACT_ROWS, row) : firsts[WINDOWS_X + top + row] - firsts[WINDOWS_X + top];
 }
 
-void main()
+void sum_up(ivec2 tile, ivec2 first)
 {
-    ivec2 tile = ivec2(COLUMNS, ROWS) * turned(ivec2(gl_WorkGroupID.xy)), size = imageSize(target);
-    ivec2 first = ivec2(first_texel(EXACT, tile.x, WIDTH), first_texel(EXACT_ROWS, tile.y, HEIGHT));
     int number = int(gl_LocalInvocationIndex), column = int(gl_LocalInvocationID.x);
     int top = RUN * int(gl_LocalInvocationID.y);
     int line = number % LINES, left = CHUNK * (number / LINES);
-    ivec2 pixels[RUN];
-    vec4 own[RUN], of_rows[RUN][3];
 
-    // First, since they take as long as the rest.
-    [[unroll]] for (int i = 0; i < RUN; ++i) {
-        pixels[i] = turned(tile + ivec2(column, top + i));
-        own[i] = own_at(min(pixels[i], size - 1));
-        of_rows[i] = vec4[](vec4(0.0), vec4(0.0), vec4(0.0));
-    }
+    // Before the windows, which take as long.
     [[unroll]] for (int i = 0; i < (KEEPS ? SPAN : 0); ++i)
         texels[i] = texel_at(turned(first + ivec2(offset_of(EXACT, left) + i, line)));
     if (number < WINDOWS_X + WINDOWS_Y)
         keep_window(number, tile);
     barrier();
+    ivec2 texel = EXACT != 0 ? first + ivec2(offset_of(EXACT, column), offset_of(EXACT_ROWS, top))
+                             : ivec2(firsts[column], firsts[WINDOWS_X + top]);
     if (KEEPS) {
         if (left < COLUMNS)
             keep_sums(line, left);
         barrier();
     } else {
-        first = EXACT != 0 ? first + ivec2(offset_of(EXACT, column), offset_of(EXACT_ROWS, top))
-                           : ivec2(firsts[column], firsts[WINDOWS_X + top]);
         [[unroll]] for (int kernel = 0; kernel < KERNELS; ++kernel)
             [[unroll]] for (int at = 0; at < WIDTH; ++at)
                 of_column[kernel][at] = column_weight(kernel, at, column);
@@ -126,9 +120,9 @@ void main()
     [[unroll]] for (int row = 0; row < rows; ++row) {
         vec4 sums[3];
         if (KEEPS)
-            sums[0] = kept[min(offset_of(EXACT_ROWS, top) + row, LINES - 1)][column];
+            sums[0] = kept[min(texel.y - first.y + row, LINES - 1)][column];
         else
-            sums = sums_along_x(first + ivec2(0, row));
+            sums = sums_along_x(texel + ivec2(0, row));
         [[unroll]] for (int i = 0; i < RUN; ++i) {
             int at = row - row_offset(top, i);
             if (at < 0 || at >= HEIGHT)
@@ -138,7 +132,28 @@ void main()
                     of_rows[i][kernel] += row_weight(kernel, at, top, i) * sums[kernel];
         }
     }
+}
+
+void main()
+{
+    ivec2 tile = ivec2(COLUMNS, ROWS) * turned(ivec2(gl_WorkGroupID.xy)), size = imageSize(target);
+    ivec2 first = ivec2(first_texel(EXACT, tile.x, WIDTH), first_texel(EXACT_ROWS, tile.y, HEIGHT));
+    ivec2 at = ivec2(1, RUN) * ivec2(gl_LocalInvocationID.xy);
+    ivec2 pixels[RUN];
+    vec4 own[RUN];
+
+    // First, since they take as long as the rest.
+    [[unroll]] for (int i = 0; i < RUN; ++i) {
+        pixels[i] = turned(tile + at + ivec2(0, i));
+        own[i] = own_at(min(pixels[i], size - 1));
+        of_rows[i] = vec4[](vec4(0.0), vec4(0.0), vec4(0.0));
+    }
+    sum_up(tile, first);
+    while (++picture < PICTURES) {
+        barrier();
+        sum_up(tile, first);
+    }
     [[unroll]] for (int i = 0; i < RUN; ++i)
-        if (top + i < ROWS && all(lessThan(pixels[i], size)))
+        if (at.y + i < ROWS && all(lessThan(pixels[i], size)))
             imageStore(target, pixels[i], shade(own[i], sum_of(of_rows[i]), pixels[i]));
 }

@@ -219,6 +219,10 @@ TRANSPOSED: tuple[tuple[str, Any, tuple[int, ...], str, tuple[str, ...]], ...] =
     ("gpu", Separable(bloom_scale=0.5), (66, 134, 3), "f4", (LEVELS,) * 4),
     ("gpu", Separable(bloom_scale=0.25, blur_scale=2), (66, 135, 3), "f4", (LEVELS,)),
     ("gpu", ThreeBloom(), (72, 140, 4), "f4", (LEVELS,) * 18),
+    # Pictures of groups of taps, in one pass.
+    ("gpu", Pyramid(levels=1, firefly_filter=True), (34, 70, 3), "f4", (LEVELS,) * 2),
+    ("gpu", KinoBloom(radius=1.0), (20, 36, 3), "f4", (LEVELS,) * 3),
+    ("gpu", BevyBloom(max_mip_dimension=16), (33, 67, 4), "f4", (LEVELS,) * 8),
     # Several strips, less than one, and less than a kernel.
     ("cpu", Separable(threshold=0.5, knee=0.5), (35, 261, 3), "f4", STRIPS[1:]),
     ("cpu", Separable(threshold=0.5, intensity=0.7, exposure=0.5), (70, 50, 4), "f4", STRIPS[1:]),
