@@ -100,17 +100,16 @@ bool vkb_add_enlarged(struct vkb_variant_choice *choice, const struct vkb_pass_r
     if (!is_enlarged(choice, pass))
         return false;
     // The lines are floats, since rounding them would change the filtered values. The border has
-    // the texels that the filter reads beyond the edges.
+    // the texels that the filter reads beyond the edges. In 8 bits the sampler filters the lines.
     const struct vkb_size size = {source->width + 2, source->height};
+    const bool unorm = target->format == VKB_FORMAT_RGBA8_UNORM;
     char name[VKB_NAME_SIZE];
     snprintf(name, sizeof name, "%.24s_lines", pass->name);
     const uint32_t lines = vkb_add_floats(choice, name, size);
     struct vkb_pass_row line = line_row(choice, pass, lines, -1);
     struct vkb_pass_row row =
         vkb_fullscreen_row(pass->name, &vkb_shader_enlarge_frag, pass->targets[0]);
-    // In 8 bits the sampler filters the float lines.
-    row.constants.sampling =
-        target->format == VKB_FORMAT_RGBA8_UNORM ? SAMPLING_FILTER : SAMPLING_FETCH;
+    row.constants.sampling = unorm ? SAMPLING_FILTER : SAMPLING_FETCH;
     row.constants.alpha = pass->constants.alpha;
     row.reads[0] = lines;
     row.read_count = 1;
