@@ -44,7 +44,7 @@ vkb_variant_add vkb_add_streaks;
 // Transforms: of complete lines in shared memory; stages of images with linear texels.
 vkb_variant_add vkb_add_lines, vkb_add_transform;
 // Adjoint passes: of images with linear texels; of groups of taps; transposed filters in tiles,
-// fused with the composite's.
+// fused with the composite's, and with those of the other pictures of an image.
 vkb_variant_add vkb_add_adjoint_linear, vkb_add_adjoint_groups, vkb_add_adjoint_filter;
 // Passes that load the pixel at their own position; any other pass as a compute shader.
 vkb_variant_add vkb_add_pixels;

@@ -72,6 +72,8 @@ void keep_sums(int line, int left)
     }
 }
 
+// No arguments: of an array whose size depends on a specialization constant, glslang copies as many elements as the
+// constant's default says.
 float of_column[3][MAX_SIDE + 1];
 vec4 of_rows[RUN][3];
 
@@ -93,6 +95,7 @@ int row_offset(int top, int row)
     return EXACT != 0 ? offset_of(EXACT_ROWS, row) : firsts[WINDOWS_X + top + row] - firsts[WINDOWS_X + top];
 }
 
+// Adds the sums of a picture.
 void sum_up(ivec2 tile, ivec2 first)
 {
     int number = int(gl_LocalInvocationIndex), column = int(gl_LocalInvocationID.x);
