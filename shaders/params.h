@@ -215,7 +215,8 @@
 
 // The transpose of a filter (adjoint_filter.frag): where the tables of both axes start, in texels;
 // the factor of the colours of what is added. For tiles: where the tables of each picture start;
-// in a simple ratio the weights of texels that are not near an edge, of even ones, then of odd ones.
+// in a simple ratio the weights of texels that are not near an edge, of even ones, then of odd
+// ones.
 #define ADJOINT_FILTER_BLOCK(B, READS, INPUT, VEC4S) \
     INPUT(B, int, start_x) \
     INPUT(B, int, start_y) \
@@ -423,18 +424,19 @@
 #define TILE_ROWS   8
 #define TILE_RUNS   2
 #define TILE_RADIUS 16
-// Tiles of filters have RUNS runs of rows; an invocation adds up a column of a run. A tile KEEPS the
-// sums of rows of the source, of LINES of these if it has twice the tile's rows: windows of up to
-// WINDOW texels of one kernel, in a simple ratio, where devices have SHARED bytes. An invocation
-// keeps those of CHUNK columns.
+// Tiles of filters have RUNS runs of rows; an invocation adds up a column of a run. A tile KEEPS
+// the sums of rows of the source, of LINES of these if it has twice the tile's rows: windows of up
+// to WINDOW texels of one kernel, in a simple ratio, where devices have SHARED bytes. An invocation
+// keeps those of CHUNK columns, so that there are enough invocations for all.
 // WINDOW_SPAN is the number of texels that the windows of `count` adjacent pixels have.
-#define FILTER_TILE_COLUMNS      32
-#define FILTER_TILE_RUN          4
-#define FILTER_TILE_RUNS         4
-#define FILTER_TILE_LINES        32
-#define FILTER_TILE_WINDOW       8
-#define FILTER_TILE_SHARED       19000
-#define FILTER_TILE_CHUNK(exact) ((exact) == EXACT_DOUBLE ? 4 : 8)
+#define FILTER_TILE_COLUMNS 32
+#define FILTER_TILE_RUN     4
+#define FILTER_TILE_RUNS    4
+#define FILTER_TILE_LINES   32
+#define FILTER_TILE_WINDOW  8
+#define FILTER_TILE_SHARED  19000
+#define FILTER_TILE_CHUNK(exact, exact_rows) \
+    ((exact) == EXACT_DOUBLE && (exact_rows) == EXACT_DOUBLE ? 4 : 8)
 #define FILTER_TILE_KEEPS(exact, kernels, width, height) \
     ((exact) != 0 && (kernels) == 1 && (width) > 1 && (height) > 1 \
      && (width) <= FILTER_TILE_WINDOW && (height) <= FILTER_TILE_WINDOW)
@@ -501,13 +503,14 @@
 // With FROM_IMAGE, a downsampling to half the size reads the image itself and applies the
 // threshold, and an adjoint pass writes the cotangents of a source's image. BY is what these are
 // of. EMITTERS is how many passes add up in the target by blending. With ENLARGED the target has
-// more rows than the source, and a composite samples the lines of its bloom. STORED is the format of the target (STORED_*). FIRST marks an engine's
-// first level. LEVELS is the number of levels that a pass adds up. GROUPS is what a downsampling
-// makes of its taps. INVERSE to GROUP_HEIGHT are of Fourier transforms (fft.comp), whose workgroups
-// have GROUP_WIDTH x GROUP_HEIGHT invocations: of a stage of RADIX_1 elements, or with complete
-// lines of stages of RADIX_1 to RADIX_4. (Windows of filters in tiles are RADIX_1 x RADIX_2
-// texels, in transposes of RADIX_3 pictures below each other.) BOUNDARY is of those that are PADDED, and a first stage
-// that is PREFILTERED has the filter of bright colours.
+// more rows than the source, and a composite samples the lines of its bloom. STORED is the format
+// of the target (STORED_*). FIRST marks an engine's first level. LEVELS is the number of levels
+// that a pass adds up. GROUPS is what a downsampling makes of its taps. INVERSE to GROUP_HEIGHT are
+// of Fourier transforms (fft.comp), whose workgroups have GROUP_WIDTH x GROUP_HEIGHT invocations:
+// of a stage of RADIX_1 elements, or with complete lines of stages of RADIX_1 to RADIX_4. (Windows
+// of filters in tiles are RADIX_1 x RADIX_2 texels, in transposes of RADIX_3 pictures below each
+// other.) BOUNDARY is of those that are PADDED, and a first stage that is PREFILTERED has the
+// filter of bright colours.
 #define SPECIALIZATION_CONSTANTS(CONSTANT) \
     CONSTANT(0, SAMPLING, sampling) \
     CONSTANT(1, COMPOSITE, composite) \

@@ -119,7 +119,7 @@ def test_large_images(
     assert_same(frames, unfused.apply(image, settings))
 
 
-@pytest.mark.parametrize("size", [(258, 260), (261, 133), (5, 16001)])
+@pytest.mark.parametrize("size", [(258, 260), (261, 133), (5, 16001), (1, 300), (300, 1)])
 def test_tiles(unfused: Renderer, size: tuple[int, int]) -> None:
     """Several tiles and parts of them, in simple ratios and others; small levels have none."""
     image = hdr_picture(*size, 3, "float16")
