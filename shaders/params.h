@@ -428,7 +428,6 @@
 // the sums of rows of the source, of LINES of these if it has twice the tile's rows: windows of up
 // to WINDOW texels of one kernel, in a simple ratio, where devices have SHARED bytes. An invocation
 // keeps those of CHUNK columns, so that there are enough invocations for all.
-// WINDOW_SPAN is the number of texels that the windows of `count` adjacent pixels have.
 #define FILTER_TILE_COLUMNS 32
 #define FILTER_TILE_RUN     4
 #define FILTER_TILE_RUNS    4
@@ -443,10 +442,15 @@
 #define FILTER_TILE_ROWS(keeps, exact, window) \
     ((keeps) && (exact) == EXACT_HALF ? (FILTER_TILE_LINES - (window)) / 2 + 1 \
                                       : FILTER_TILE_RUN * FILTER_TILE_RUNS)
-#define WINDOW_SPAN(exact, count, window) \
-    ((exact) == EXACT_HALF   ? 2 * (count) - 2 + (window) \
-     : (exact) == EXACT_SAME ? (count) - 1 + (window) \
-                             : (count) / 2 + (window))
+
+// Windows of the pixels of a target whose side is in a simple ratio to the source's: how far one is
+// from that of the first pixel; its first texel, where it has an even number of texels if the sides
+// differ; the texels of `count` adjacent ones.
+#define WINDOW_OFFSET(exact, pixel) \
+    ((exact) == EXACT_HALF ? 2 * (pixel) : (exact) == EXACT_SAME ? (pixel) : ((pixel) + 1) / 2)
+#define WINDOW_FIRST(exact, pixel, window) \
+    (WINDOW_OFFSET(exact, pixel) - ((exact) == EXACT_DOUBLE ? (window) : (window) - 1) / 2)
+#define WINDOW_SPAN(exact, count, window) (WINDOW_OFFSET(exact, (count) - 1) + (window))
 
 // Fourier transforms. FFT_INVOCATIONS is the size of a workgroup. In a transform of columns,
 // FFT_ROW_COLUMNS of them are in one row. FFT_MAX_RADIX is the largest number of elements of a

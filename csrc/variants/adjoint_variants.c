@@ -170,16 +170,6 @@ static const struct vkb_pass_row *other_axis(const struct vkb_variant_choice *ch
     return most_readers(&along) <= MAX_WINDOW && most_readers(&across) <= MAX_WINDOW ? first : NULL;
 }
 
-// The first pixel of the window of a texel in a simple ratio (lib/window.glsl).
-static int32_t first_reader(int32_t exact, uint32_t texel, int32_t window)
-{
-    const int32_t at = (int32_t)texel;
-
-    return exact == EXACT_HALF ? 2 * at - (window - 1) / 2
-         : exact == EXACT_SAME ? at - (window - 1) / 2
-                               : (at + 1) / 2 - window / 2;
-}
-
 // Whether the readers of all texels are in the windows that the ratio of sides gives, and the size
 // of these.
 static bool has_exact_windows(const struct axis *axis, int32_t exact, int32_t *window)
@@ -189,7 +179,7 @@ static bool has_exact_windows(const struct axis *axis, int32_t exact, int32_t *w
 
     for (uint32_t texel = 0; fits && axis->start >= 0 && texel < axis->size; ++texel) {
         const float *entry = entry_of(axis, texel);
-        const int32_t first = first_reader(exact, texel, size), reader = (int32_t)entry[0];
+        const int32_t first = WINDOW_FIRST(exact, (int32_t)texel, size), reader = (int32_t)entry[0];
         fits = reader >= first && reader + (int32_t)entry[1] <= first + size;
     }
     *window = fits ? size : *window;
@@ -206,7 +196,7 @@ static void take_inner(const struct axis *axis, int32_t exact, int32_t window, f
         const float (*list)[4] = axis->texels + (uint32_t)entry[2];
         const int32_t first = (int32_t)entry[0], end = first + (int32_t)entry[1];
         for (int32_t i = 0; i < window; ++i) {
-            const int32_t reader = first_reader(exact, texel, window) + i;
+            const int32_t reader = WINDOW_FIRST(exact, (int32_t)texel, window) + i;
             const bool reads = reader >= first && reader < end;
             inner[(texel & 1) * 2 + i / 4][i % 4] =
                 reads ? list[reader - (int32_t)entry[3]][texel % ADJOINT_SIDE] : 0.0f;
@@ -283,10 +273,10 @@ static bool add_pictures(struct vkb_variant_choice *choice, const struct vkb_pas
     struct vkb_pass_row row;
     int32_t width = 1, height = 1;
 
-    if (pass + 1 < end && continues(pass, pass + 1))
-        return true;
     while (first > plain->passes && pass - first < MAX_PICTURES - 1 && continues(first - 1, first))
         --first;
+    if (first == pass || (pass + 1 < end && continues(pass, pass + 1)))
+        return true;
     memcpy(&row, pass, sizeof row);
     row.fused = row.gains_if_finite = true;
     row.reads[3] = first->reads[3];
@@ -304,8 +294,7 @@ static bool add_pictures(struct vkb_variant_choice *choice, const struct vkb_pas
     row.constants.kernels = 1;
     row.constants.radix_3 = (int32_t)(pass - first) + 1;
     vkb_make_tiles(choice, &row, &vkb_shader_adjoint_filter_tile_comp, width, height);
-    return first == pass || width > MAX_WINDOW || height > MAX_WINDOW
-        || vkb_add_variant(choice, &row);
+    return width > MAX_WINDOW || height > MAX_WINDOW || vkb_add_variant(choice, &row);
 }
 
 bool vkb_add_adjoint_filter(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)

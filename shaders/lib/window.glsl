@@ -10,18 +10,6 @@ struct Window {
     vec3 weights[WINDOW_WEIGHTS];
 };
 
-// How far the window of a pixel is from that of the first one, if sides are in this simple ratio.
-int offset_of(int exact, int pixel)
-{
-    return exact == EXACT_HALF ? 2 * pixel : exact == EXACT_SAME ? pixel : (pixel + 1) / 2;
-}
-
-// The first texel of the window of a pixel, which has an even number of texels if the sides are not the same.
-int first_texel(int exact, int pixel, int window)
-{
-    return offset_of(exact, pixel) - (exact == EXACT_DOUBLE ? window : window - 1) / 2;
-}
-
 // Whether a texel of a window may have a weight in a kernel, by TAKEN_X or TAKEN_Y.
 bool has_weight(int taken, int at, int kernel)
 {

@@ -23,7 +23,7 @@ Window window_at(int pixel, bool along_x)
     if (start < 0)
         return window;
     int count = along_x ? WIDTH : HEIGHT;
-    window.first = first_texel(along_x ? EXACT : EXACT_ROWS, at_texel, count);
+    window.first = WINDOW_FIRST(along_x ? EXACT : EXACT_ROWS, at_texel, count);
     // Filters change their weights less than a window from an edge. Elsewhere no table is waited for, for which a
     // transposed doubling takes 0.100 ms in place of 0.078 (3840 x 2160 in float32, H100, 2026-11-27).
     if (KEEPS && window.first >= count && window.first + 2 * count <= textureSize(cotangents, 0)[horizontal ? 0 : 1]) {

@@ -54,7 +54,7 @@ vec4 rows[KEPT * KERNELS > 0 ? KEPT * KERNELS : 1][COLUMNS];
 // The first texel of a column's window, from the first column's position on.
 int first_in_run(int column)
 {
-    return offset_of(EXACT, column) - KEPT / 2 + (EXACT == EXACT_DOUBLE ? 0 : 1);
+    return WINDOW_OFFSET(EXACT, column) - KEPT / 2 + (EXACT == EXACT_DOUBLE ? 0 : 1);
 }
 
 void keep_row(int first, int row)
@@ -67,7 +67,7 @@ void keep_row(int first, int row)
         [[unroll]] for (int i = 0; i < COLUMNS; ++i)
             rows[kept - KERNELS][i] = rows[kept][i];
     if (EXACT != 0)
-        load_run(offset_of(EXACT, first), line, raw);
+        load_run(WINDOW_OFFSET(EXACT, first), line, raw);
     [[unroll]] for (int i = 0; i < COLUMNS; ++i) {
         vec4 sums[3] = vec4[](vec4(0.0), vec4(0.0), vec4(0.0));
         [[unroll]] for (int at = 0; at < KEPT; ++at) {

@@ -67,7 +67,8 @@ void keep_sums(int line, int left)
         vec4 sum = vec4(0.0);
         [[unroll]] for (int at = 0; at < WIDTH; ++at)
             if (has_weight(TAKEN_X, at, 0))
-                sum += column_weight(0, at, REPEATS ? column : left + column) * texels[offset_of(EXACT, column) + at];
+                sum += column_weight(0, at, REPEATS ? column : left + column)
+                     * texels[WINDOW_OFFSET(EXACT, column) + at];
         kept[line][left + column] = sum;
     }
 }
@@ -92,7 +93,7 @@ vec4[3] sums_along_x(ivec2 first)
 // How far the window of a row is from that of the row `top` of the tile.
 int row_offset(int top, int row)
 {
-    return EXACT != 0 ? offset_of(EXACT_ROWS, row) : firsts[WINDOWS_X + top + row] - firsts[WINDOWS_X + top];
+    return EXACT != 0 ? WINDOW_OFFSET(EXACT_ROWS, row) : firsts[WINDOWS_X + top + row] - firsts[WINDOWS_X + top];
 }
 
 // Adds the sums of a picture.
@@ -104,11 +105,11 @@ void sum_up(ivec2 tile, ivec2 first)
 
     // Before the windows, which take as long.
     [[unroll]] for (int i = 0; i < (KEEPS ? SPAN : 0); ++i)
-        texels[i] = texel_at(turned(first + ivec2(offset_of(EXACT, left) + i, line)));
+        texels[i] = texel_at(turned(first + ivec2(WINDOW_OFFSET(EXACT, left) + i, line)));
     if (number < WINDOWS_X + WINDOWS_Y)
         keep_window(number, tile);
     barrier();
-    ivec2 texel = EXACT != 0 ? first + ivec2(offset_of(EXACT, column), offset_of(EXACT_ROWS, top))
+    ivec2 texel = EXACT != 0 ? first + ivec2(WINDOW_OFFSET(EXACT, column), WINDOW_OFFSET(EXACT_ROWS, top))
                              : ivec2(firsts[column], firsts[WINDOWS_X + top]);
     if (KEEPS) {
         if (left < COLUMNS)
@@ -140,7 +141,7 @@ void sum_up(ivec2 tile, ivec2 first)
 void main()
 {
     ivec2 tile = ivec2(COLUMNS, ROWS) * turned(ivec2(gl_WorkGroupID.xy)), size = imageSize(target);
-    ivec2 first = ivec2(first_texel(EXACT, tile.x, WIDTH), first_texel(EXACT_ROWS, tile.y, HEIGHT));
+    ivec2 first = ivec2(WINDOW_FIRST(EXACT, tile.x, WIDTH), WINDOW_FIRST(EXACT_ROWS, tile.y, HEIGHT));
     ivec2 at = ivec2(1, RUN) * ivec2(gl_LocalInvocationID.xy);
     ivec2 pixels[RUN];
     vec4 own[RUN];
