@@ -86,6 +86,8 @@ check() {
             want chromium has_chromium
             want xvfb command -v Xvfb
             want twm command -v twm
+            want libjxl-tools command -v cjxl
+            want libtiff-tools command -v tiffcp
             ;;
         esac
     done

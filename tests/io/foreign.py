@@ -6,6 +6,7 @@ import struct
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
 
 BGRA = (0xFF0000, 0xFF00, 0xFF, 0xFF000000)
@@ -49,7 +50,7 @@ def dds(path: Path, pixels: NDArray[Any], mode: int) -> None:
     path.write_bytes(head + struct.pack("<5I", 28, 3, 0, 1, mode) + pixels.tobytes())
 
 
-def radiance(path: Path, pixels: NDArray[Any], axes: str) -> None:
+def radiance(path: Path, pixels: NDArray[Any], axes: str, lines: str = "") -> None:
     """Write a Radiance file from upright (H, W, 4) of RGBE, along axes such as "+X-Y"."""
     if axes[1] == "X":
         pixels = pixels.swapaxes(0, 1)
@@ -57,7 +58,7 @@ def radiance(path: Path, pixels: NDArray[Any], axes: str) -> None:
     signs = [1 if axis in ("+X", "-Y") else -1 for axis in (axes[:2], axes[2:])]
     pixels = pixels[:: signs[0], :: signs[1]]
     line = f"{axes[:2]} {pixels.shape[0]} {axes[2:]} {pixels.shape[1]}"
-    head = f"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n{line}\n"
+    head = f"#?RADIANCE\n{lines}FORMAT=32-bit_rle_rgbe\n\n{line}\n"
     path.write_bytes(head.encode() + pixels.tobytes())
 
 
@@ -71,3 +72,49 @@ def xmp(orientation: int, *, is_element: bool = False) -> str:
         '<rdf:Description rdf:about="" xmlns:tiff="http://ns.adobe.com/tiff/1.0/"'
         f"{message[0]}</rdf:Description></rdf:RDF></x:xmpmeta>"
     )
+
+
+def fits(path: Path, pixels: NDArray[Any], **cards: object) -> None:
+    """Write a FITS file of (H, W) or planes (C, H, W), bottom row first, with further lines."""
+    bits = {"u1": 8, "i2": 16, "i4": 32, "f4": -32}[pixels.dtype.str[1:]]
+    sides = {f"NAXIS{axis}": side for axis, side in enumerate(pixels.shape[::-1], 1)}
+    listed = {"SIMPLE": "T", "BITPIX": bits, "NAXIS": pixels.ndim, **sides, **cards}
+    lines = [f"{name:8}= {value!s:>20}" for name, value in listed.items()]
+    head = "".join(line.ljust(80) for line in (*lines, "END"))
+    body = pixels.astype(pixels.dtype.newbyteorder(">")).tobytes()
+    path.write_bytes(_blocks(head.encode(), b" ") + _blocks(body, b"\0"))
+
+
+def _blocks(content: bytes, fill: bytes) -> bytes:
+    return content.ljust(-(-len(content) // 2880) * 2880, fill)
+
+
+def grey_psd(path: Path, picture: NDArray[Any], layer: NDArray[Any]) -> None:
+    """Write a Photoshop file of grey and alpha, (H, W, 2), with a layer at x = 2, y = 1."""
+    bits = 8 * picture.dtype.itemsize
+    height, width = picture.shape[:2]
+    planes = [
+        struct.pack(">H", 0) + layer[..., channel].astype(f">u{bits // 8}").tobytes()
+        for channel in (0, 1)
+    ]
+    # Channel -1 is alpha. A count below 0: the picture has the alpha of all layers.
+    rows, columns = layer.shape[:2]
+    info = struct.pack(">hiiiiH", -1, 1, 2, 1 + rows, 2 + columns, 2)
+    info += struct.pack(">hIhI", 0, len(planes[0]), -1, len(planes[1]))
+    info += b"8BIMnorm\xff\0\0\0" + struct.pack(">III4s", 12, 0, 0, b"\2L1\0") + b"".join(planes)
+    info += bytes(len(info) % 2)
+    section = struct.pack(">I", len(info)) + info + bytes(4)
+    merged = np.moveaxis(picture, -1, 0).astype(f">u{bits // 8}").tobytes()
+    path.write_bytes(
+        struct.pack(">4sH6xHIIHH", b"8BPS", 1, 2, height, width, bits, 1)
+        + bytes(8)
+        + struct.pack(">I", len(section))
+        + section
+        + bytes(2)
+        + merged
+    )
+
+
+def jpeg_xl_box(kind: bytes, content: bytes) -> bytes:
+    """Return a box of a JPEG XL container."""
+    return struct.pack(">I4s", 8 + len(content), kind) + content

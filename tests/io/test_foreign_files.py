@@ -26,6 +26,7 @@ from tests.io.profiles import (
 )
 from vkbloom._io.containers import orientation_of
 from vkbloom._io.srgb import decode_srgb, encode_srgb
+from vkbloom._io.tiff import is_raw, reduced_parts
 
 image = pytest.importorskip("PIL.Image")
 ops = pytest.importorskip("PIL.ImageOps")
@@ -210,6 +211,201 @@ def test_lab(tmp_path: Path, photometric: str, dtype: str) -> None:
     # Orange and blue: signs of a* and b*.
     assert made[0, 5, 0] > 1.5 * made[0, 5, 2]
     assert made[0, 6, 2] > 1.5 * made[0, 6, 0]
+
+
+# Primaries
+
+ADOBE_RGB = ((0.64, 0.33), (0.21, 0.71), (0.15, 0.06))
+GREEN = np.full((16, 16, 3), (0, 200, 0), np.uint8)
+# The Exif of a camera's file, what it means: primaries, and a curve's exponent if it is not sRGB's.
+EXIFS: dict[str, tuple[dict[int, Any], Any, float | None]] = {
+    "R03": ({40961: 65535, 40965: {1: "R03", 2: b"0100"}}, ADOBE_RGB, 563 / 256),
+    "2": ({40961: 2}, ADOBE_RGB, 563 / 256),
+    "R98": ({40961: 65535, 40965: {1: "R98"}}, REC_709, None),
+    "sRGB": ({40961: 1, 42240: 2.2, 318: ADOBE_RGB}, REC_709, None),
+    "primaries": ({40961: 65535, 318: DISPLAY_P3}, DISPLAY_P3, None),
+    "primaries, gamma": ({42240: 1.8, 318: DISPLAY_P3}, DISPLAY_P3, 1.8),
+    "primaries of sRGB": ({318: REC_709}, REC_709, None),
+    "no primaries": ({318: ((0, 0), (0, 0), (0, 0))}, REC_709, None),
+    "nothing": ({}, REC_709, None),
+}
+
+
+def exif_of(tags: dict[int, Any]) -> Any:
+    exif = image.Exif()
+    # Without one of its own fields, Pillow leaves out the others.
+    exif[305] = "camera"
+    for tag, value in tags.items():
+        if tag == 318:
+            exif[319] = tuple(number for pair in value for number in pair)
+            exif[318] = (0.3127, 0.3290)
+        else:
+            exif.get_ifd(34665)[tag] = value
+    return exif
+
+
+def light_of(codes: NDArray[Any], primaries: Any, gamma: float | None) -> NDArray[Any]:
+    light = decode_srgb(codes / 255) if gamma is None else (codes / 255) ** gamma
+    return np.asarray(light @ (np.linalg.inv(to_xyz(REC_709)) @ to_xyz(primaries)).T)
+
+
+@pytest.mark.parametrize("name", EXIFS)
+@pytest.mark.parametrize("suffix", ["jpg", "png", "webp"])
+def test_colours_of_exif(tmp_path: Path, suffix: str, name: str) -> None:
+    tags, primaries, gamma = EXIFS[name]
+    path = tmp_path / f"a.{suffix}"
+    more = {"quality": 100, "subsampling": 0} if suffix == "jpg" else {"lossless": True}
+    image.fromarray(GREEN).save(path, exif=exif_of(tags), **more)
+    made, facts = vkbloom.read(path, metadata=True)
+    assert np.allclose(made, light_of(GREEN, primaries, gamma), atol=2e-4)
+    assert (facts["notes"] == ()) is (primaries == REC_709)
+    assert "Exif:Gamma" not in facts
+    assert (facts["colour"] == "Adobe RGB") is (primaries == ADOBE_RGB)
+
+
+def test_a_profile_goes_before_exif(tmp_path: Path) -> None:
+    p3 = profile("Display P3", DISPLAY_P3)
+    exif = exif_of(EXIFS["R03"][0])
+    image.fromarray(GREEN).save(tmp_path / "a.png", exif=exif, icc_profile=p3)
+    assert vkbloom.read(tmp_path / "a.png", metadata=True)[1]["colour"] == "Display P3"
+
+
+@pytest.mark.parametrize("kind", ["exif", "fields"])
+@pytest.mark.parametrize("byte_order", ["<", ">"])
+def test_colours_of_tiff(tmp_path: Path, kind: str, byte_order: Any) -> None:
+    path = tmp_path / "a.tif"
+    numbers = [round(1000 * number) for pair in DISPLAY_P3 for number in pair]
+    fields = [(319, 5, 6, [part for number in numbers for part in (number, 1000)], True)]
+    # tifffile writes no directory of Exif: another field becomes its pointer.
+    tags = fields if kind == "fields" else [(60000, 4, 1, 77, True)]
+    tifffile.imwrite(path, GREEN, photometric="rgb", byteorder=byte_order, extratags=tags)
+    if kind == "exif":
+        content = path.read_bytes()
+        start, form = len(content), byte_order
+        index = struct.pack(f"{form}HHHI4s", 1, 1, 2, 4, b"R03\0")
+        exif = struct.pack(f"{form}HHHIHH", 2, 40961, 3, 1, 65535, 0)
+        exif += struct.pack(f"{form}HHII", 40965, 4, 1, start + 30) + bytes(4)
+        entry = struct.pack(f"{form}HHII", 60000, 4, 1, 77)
+        content = content.replace(entry, struct.pack(f"{form}HHII", 34665, 4, 1, start))
+        path.write_bytes(content + exif + index + bytes(4))
+    expected = light_of(GREEN, *((DISPLAY_P3, None) if kind == "fields" else EXIFS["R03"][1:]))
+    assert np.allclose(vkbloom.read(path), expected, atol=3e-3)
+
+
+@pytest.mark.parametrize("is_srgb", [False, True])
+@pytest.mark.parametrize("primaries", [DISPLAY_P3, REC_709, ((0, 0), (0, 0), (0, 0))])
+def test_primaries_of_png(tmp_path: Path, primaries: Any, is_srgb: bool) -> None:
+    numbers = [0.3127, 0.3290, *(number for pair in primaries for number in pair)]
+    chunks = png_chunk(b"cHRM", struct.pack(">8I", *(round(1e5 * number) for number in numbers)))
+    chunks += png_chunk(b"gAMA", struct.pack(">I", 50000))
+    chunks += png_chunk(b"sRGB", b"\0") if is_srgb else b""
+    made = vkbloom.read(store_png(tmp_path / "a.png", GREEN, chunks))
+    meant = (REC_709, None) if is_srgb else (primaries if primaries[0][0] else REC_709, 2.0)
+    assert np.allclose(made, light_of(GREEN, *meant), atol=2e-4)
+
+
+@pytest.mark.parametrize(
+    ("line", "is_converted", "note"),
+    [
+        ("PRIMARIES= .680 .320 .265 .690 .150 .060 .3127 .3290", True, "converted to linear"),
+        ("PRIMARIES= .640 .330 .300 .600 .150 .060 .3127 .3290", False, None),
+        ("PRIMARIES= nan 0 x", False, None),
+        ("PRIMARIES= 0 0 0 0 0 0 0 0", False, None),
+        ("EXPOSURE=2.5", False, "says EXPOSURE=2.5 of its values, which are taken as they are"),
+        ("COLORCORR= 1 1.5 1", False, "says COLORCORR=1 1.5 1 of its values"),
+        ("EXPOSURE=1", False, None),
+    ],
+)
+@pytest.mark.parametrize("end", ["\n", "\r\n"])
+def test_lines_of_radiance(
+    tmp_path: Path, line: str, is_converted: bool, note: str | None, end: str
+) -> None:
+    pixels = np.full((16, 16, 4), (20, 200, 40, 129), np.uint8)
+    foreign.radiance(tmp_path / "a.hdr", pixels, "-Y+X", line + end)
+    made, facts = vkbloom.read(tmp_path / "a.hdr", metadata=True)
+    light = pixels[..., :3] / 128
+    assert np.allclose(made, light @ MATRICES[12].T if is_converted else light, atol=1e-4)
+    assert [note is not None and note in one for one in facts["notes"]] == [True] * bool(note)
+
+
+# Raw and reduced pictures
+
+LARGE, SMALL = (np.full((*size, 3), 90, np.uint8) for size in ((64, 96), (16, 24)))
+DNG = [(50706, 1, 4, b"\1\4\0\0", True)]
+# How a TIFF file's directories are written: the pixels, what they are, and more of tifffile's
+# options; whether the second one is a directory of the first one.
+RAWS: dict[str, tuple[list[tuple[NDArray[Any], int, dict[str, Any]]], bool]] = {
+    "mosaic": ([(LARGE[..., 0], 32803, {})], False),
+    "linear": ([(LARGE, 34892, {})], False),
+    "preview, mosaic": ([(SMALL, 2, {"subfiletype": 1}), (LARGE[..., 0], 32803, {})], True),
+    "preview, linear": ([(SMALL, 2, {}), (LARGE, 34892, {})], True),
+    "preview, next": ([(SMALL, 2, {}), (LARGE[..., 0], 32803, {})], False),
+    "version": ([(SMALL, 2, {"extratags": DNG})], False),
+}
+# How other raw files begin.
+HEADS = {
+    "cr2": b"II*\0\x10\0\0\0CR\x02\0",
+    "cr3": b"\0\0\0\x18ftypcrx ",
+    "orf": b"IIRO\x08\0\0\0",
+    "raf": b"FUJIFILMCCD-RAW 0201",
+    "rw2": b"IIU\0\x18\0\0\0",
+}
+
+
+@pytest.mark.parametrize("name", [*RAWS, *HEADS])
+@pytest.mark.parametrize("is_big", [False, True])
+def test_raw_files_are_refused(tmp_path: Path, name: str, is_big: bool) -> None:
+    path = tmp_path / (f"a.{name}" if name in HEADS else "a.dng")
+    if name in HEADS:
+        path.write_bytes(HEADS[name] + bytes(200))
+    else:
+        directories, is_below = RAWS[name]
+        with tifffile.TiffWriter(path, bigtiff=is_big, byteorder=">" if is_big else "<") as file:
+            for index, (pixels, photometric, more) in enumerate(directories):
+                below = {"subifds": 1} if is_below and not index else {}
+                file.write(pixels, photometric=photometric, **more, **below)
+    with pytest.raises(ValueError, match=r"is a camera's raw file; develop it first, .*darktable"):
+        vkbloom.read(path)
+
+
+@pytest.mark.parametrize(
+    ("reduced", "is_below", "shape", "note"),
+    [
+        ((1, 0), False, (64, 96, 3), "part 0 is a reduced picture, as the file says; read part 1"),
+        ((1, 0), True, (16, 24, 3), "the picture is a reduced one, as the file says"),
+        ((1, 1), False, (16, 24, 3), "the picture is a reduced one, as the file says"),
+        ((0, 1), True, (16, 24, 3), None),
+        ((0, 0), False, (16, 24, 3), None),
+    ],
+)
+def test_reduced_pictures(
+    tmp_path: Path,
+    reduced: tuple[int, int],
+    is_below: bool,
+    shape: tuple[int, ...],
+    note: str | None,
+) -> None:
+    with tifffile.TiffWriter(tmp_path / "a.tif") as file:
+        below = {"subifds": 1} if is_below else {}
+        file.write(SMALL, photometric="rgb", subfiletype=reduced[0], **below)
+        file.write(LARGE, photometric="rgb", subfiletype=reduced[1])
+    made, facts = vkbloom.read(tmp_path / "a.tif", metadata=True)
+    assert made.shape == shape
+    assert [note is not None and note in one for one in facts["notes"]] == [True] * bool(note)
+    if not is_below:
+        assert vkbloom.read(tmp_path / "a.tif", subimage=1).shape == (64, 96, 3)
+
+
+def test_directories_in_a_circle(tmp_path: Path) -> None:
+    path = tmp_path / "a.tif"
+    tifffile.imwrite(path, SMALL, photometric="rgb", extratags=[(330, 4, 1, 8, True)])
+    content = bytearray(path.read_bytes())
+    (start,) = struct.unpack_from("<I", content, 4)
+    (count,) = struct.unpack_from("<H", content, start)
+    struct.pack_into("<I", content, start + 2 + 12 * count, start)
+    path.write_bytes(content)
+    assert not is_raw(path)
+    assert len(reduced_parts(path)) <= 100
 
 
 @pytest.mark.parametrize("is_progressive", [False, True])

@@ -22,7 +22,7 @@ LINUX = pytest.mark.skipif(sys.platform != "linux", reason="limits the address s
 @pytest.mark.skipif("VKBLOOM_SANITIZED" in os.environ, reason="a sanitizer needs the address space")
 def test_a_short_run(tmp_path: Path) -> None:
     # In one process, since most of a short run would be imports.
-    names = ["gltf", "ktx", "faces", "equirectangular", "pipelines"]
+    names = ["gltf", "ktx", "faces", "equirectangular", "headers", "pipelines"]
     # tests/custom tests mutations of custom methods without the compiler, which takes longest.
     names += ["own"] if EXHAUSTIVE and GLSLANG else []
     amount = ["--seconds", "2"] if EXHAUSTIVE else ["--seconds", "0.2", "--inputs", "10"]

@@ -20,7 +20,9 @@ import numpy as np
 import OpenImageIO
 
 import vkbloom
-from vkbloom._io import disk_cache
+from vkbloom._io import containers, disk_cache, jpeg_xl, tiff
+from vkbloom._io.stated_colours import stated_colours
+from vkbloom._io.stored_values import corrected
 from vkbloom._scene import ktx, skybox
 from vkbloom._scene.gltf import load_mesh
 
@@ -157,6 +159,42 @@ def _image_seeds(shape: tuple[int, int, int]) -> list[bytes]:
     ]
 
 
+def _headers(data: bytes) -> None:
+    """Run all readers of headers, whatever the format is."""
+    path = _file("input", data)
+    spec = OpenImageIO.ImageSpec(1, 1, 3, "uint8")
+    jpeg_xl.header_of(path)
+    tiff.is_raw(path)
+    tiff.reduced_parts(path)
+    for part in range(2):
+        containers.fits_scale(path, part)
+    for kind in ("hdr", "jpeg", "png", "tiff", "webp"):
+        containers.orientation_of(path, kind, None)
+        stated_colours(spec, kind, path, has_points=False)
+    for kind in ("bmp", "jpeg2000"):
+        corrected(np.zeros((1, 1, 4), np.uint8), spec, kind, path)
+
+
+def _header_seeds() -> list[bytes]:
+    values = np.full((40, 40, 4), 200, np.uint8)
+    # TIFF: primaries; a directory of Exif with its colour space and, below, its index.
+    exif = struct.pack("<HHHII", 3, 319, 5, 6, 200) + struct.pack("<HHII", 330, 4, 1, 8)
+    exif += struct.pack("<HHIII", 34665, 4, 1, 50, 0)
+    exif += struct.pack("<HHHIHHHHIII", 2, 40961, 3, 1, 65535, 0, 40965, 4, 1, 80, 0)
+    exif += struct.pack("<HHHI4sI", 1, 1, 2, 4, b"R03", 0)
+    fields = b"II*\0\x08\0\0\0" + exif
+    fields = fields.ljust(200, b"\0") + struct.pack("<12I", *[640, 1000] * 6)
+    segment = b"Exif\0\0" + fields
+    jpeg = b"\xff\xd8\xff\xe1" + struct.pack(">H", 2 + len(segment)) + segment
+    webp = b"RIFF\0\0\0\0WEBPEXIF" + struct.pack("<I", len(fields)) + fields
+    fits = "".join(
+        f"{line:80}" for line in ("SIMPLE  = T", "BSCALE  = 1.5E0", "BZERO   = 2", "END")
+    )
+    hdr = b"#?RADIANCE\nPRIMARIES= .7 .3 .2 .7 .1 .1 .3 .3\nEXPOSURE=2\n\n-Y 4 +X 4\n"
+    images = [_image(suffix, values) for suffix in (".jxl", ".jp2", ".png", ".bmp")]
+    return [fields, jpeg, webp, fits.ljust(2880).encode(), hdr, *images]
+
+
 def _pipelines(data: bytes) -> None:
     os.environ["VKBLOOM_CACHE_DIR"] = str(FOLDER / "cache")
     cache = disk_cache.DiskCache("pipelines")
@@ -242,6 +280,7 @@ TARGETS = {
     "ktx": Target(_ktx, _ktx_seeds),
     "faces": Target(_faces, lambda: _image_seeds((4, 4, 3))),
     "equirectangular": Target(_equirectangular, lambda: _image_seeds((4, 8, 3))),
+    "headers": Target(_headers, _header_seeds),
     "pipelines": Target(_pipelines, _pipeline_seeds),
     "own": Target(_own, _own_seeds),
 }

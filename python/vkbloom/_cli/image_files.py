@@ -66,8 +66,8 @@ def read(path: str, subimage: int, layer: str | None = None) -> StoredImage:
 
 
 def other_parts(stored: StoredImage) -> str:
-    """Return the parts of a file of several if --subimage chooses none, else ""."""
-    is_open = len(stored.parts) > 1 and not given("subimage")
+    """Return the parts of a file of several if neither --subimage nor the file chooses one."""
+    is_open = len(stored.parts) > 1 and not given("subimage") and not stored.part
     return image_reading.listed_parts(stored) if is_open else ""
 
 

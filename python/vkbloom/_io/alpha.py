@@ -23,6 +23,10 @@ DDS with an alpha mode         as stored                    1: straight; 2: enco
                                                             alpha; 3, 4: no alpha
 JPEG 2000, channel definition  as stored                    0, 1: straight; 2: encoded colours
                                                             times alpha
+JPEG XL, alpha channel         as stored                    straight, or encoded colours times alpha
+PSD of grey, all layers        as stored                    colours over white; without its share,
+                                                            encoded colours times alpha
+PSD of RGB, all layers         straight colours             the same
 JPEG (Ultra HDR)               1                            no alpha
 all others                     as stored                    straight colours
 ============================== ============================ ======================================
@@ -39,8 +43,9 @@ from typing import TYPE_CHECKING, Any, BinaryIO, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom._io.containers import tiff_field
 from vkbloom._io.images import failure_of
+from vkbloom._io.jpeg_xl import header_of
+from vkbloom._io.tiff import tiff_field
 
 if TYPE_CHECKING:
     import OpenImageIO
@@ -76,6 +81,8 @@ def channels_of(spec: OpenImageIO.ImageSpec, kind: str) -> tuple[str, ...]:
         alpha = spec.alpha_channel
         more = range(1, len(names))
         return "Y", *("A" if index == alpha else f"channel{index}" for index in more)
+    if kind == "psd" and names[0] == "I":
+        return "Y", *names[1:]
     return ("Y", "A") if names[:2] == ("R", "G") == names and kind in _GREY_AND_ALPHA else names
 
 
@@ -107,6 +114,9 @@ def meaning_of(
                 stated = _of_dds(stream)
             case "jpeg2000":
                 stated = _of_jpeg_2000(stream)
+            case "jpegxl":
+                is_multiplied = header_of(path).is_multiplied
+                stated = Meaning.MULTIPLIED if is_multiplied else Meaning.STRAIGHT
             case "ico":
                 stated = None
     if stated is None:
@@ -178,24 +188,6 @@ def bmp_masks(path: str | os.PathLike[str]) -> tuple[int, ...] | None:
         int.from_bytes(head[at : at + 4], "little") for at in range(54, 54 + 4 * count, 4)
     )
     return (*masks, 0)[:4] if all(masks[:3]) else None
-
-
-def in_order(pixels: NDArray[Any], kind: str, path: str | os.PathLike[str]) -> NDArray[Any]:
-    """Return pixels with the channels that a BMP file's masks name; others as they are.
-
-    OpenImageIO takes four bytes for blue, green, red and alpha, whatever the masks are.
-    """
-    if kind != "bmp" or pixels.shape[2] != 4 or (masks := bmp_masks(path)) is None:
-        return pixels
-    words = pixels[:, :, [2, 1, 0, 3]].copy().view("<u4")[:, :, 0]
-    made = np.zeros_like(pixels)
-    for channel, mask in enumerate(masks):
-        if mask:
-            shift = (mask & -mask).bit_length() - 1
-            largest = mask >> shift
-            values = ((words & np.uint32(mask)) >> np.uint32(shift)).astype(np.float64)
-            made[:, :, channel] = np.rint(values * (255 / largest))
-    return made
 
 
 def multiplied(values: NDArray[Any]) -> NDArray[Any]:

@@ -93,9 +93,10 @@ def read(
     array : ndarray, shape (H, W, 3) or (H, W, 4)
         Top row first and upright; a grey image has three equal colours. Files of 8 and 16 bit
         integers become float32 of linear Rec. 709 colours. They are decoded as the file states (by
-        a cICP chunk, an ICC profile or a gamma), otherwise from sRGB. They are not clipped: colours
-        outside of Rec. 709 have negative components. Half becomes float16 and float becomes
-        float32, with unchanged values.
+        a cICP chunk, an ICC profile, a gamma with or without primaries, or Exif), otherwise from
+        sRGB. They are not clipped: colours outside of Rec. 709 have negative components. Half
+        becomes float16 and float becomes float32, with unchanged values, but for the floats of JPEG
+        XL, which are decoded, those of Radiance files with other primaries, and the scale of FITS.
     metadata : dict
         Only with ``metadata=True``. The file's attributes by OpenImageIO's names ("chromaticities",
         "XResolution", "Exif:LensModel", ...), which `write` accepts; "numbers" (the number type in

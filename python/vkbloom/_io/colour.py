@@ -22,9 +22,10 @@ from vkbloom._io.displayed import (
     of_code_points,
 )
 from vkbloom._io.hdr_curves import DECODERS
-from vkbloom._io.icc import Profile, from_lab, read_profile
-from vkbloom._io.images import SPACES, Colour, StoredImage
+from vkbloom._io.icc import Profile, from_chromaticities, from_lab, read_profile
+from vkbloom._io.images import SPACES, Chromaticities, Colour, StoredImage
 from vkbloom._io.srgb import decode_srgb
+from vkbloom._io.stated_colours import name_of
 
 # Spaces of an exponent. OpenColorIO's own powers are off by 2e-5.
 _EXPONENTS: Final[Mapping[str, float]] = {SPACES["gamma22"]: 2.2, "g18_rec709_scene": 1.8}
@@ -61,19 +62,21 @@ def linear(
         if colour not in ("linear", "srgb"):
             check_space(colour)
         return colour, _decoded(values, colour), []
+    is_encoded = values.dtype.kind == "u" or stored.is_encoded
     if stored.is_ultra_hdr:
         return _of_ultra_hdr(values, stored)
-    if values.dtype.kind == "f":
-        return "linear", values, _notes_of_floats(stored)
-    if stored.profile is not None and stored.code_points is None:
-        return _by_profile(values, stored, stored.profile)
-    return _by_space(values, stored)
+    if stored.code_points is None:
+        if stored.profile is not None and is_encoded:
+            return _by_profile(values, stored, stored.profile)
+        if stored.primaries is not None:
+            return _by_primaries(values, stored, stored.primaries, is_encoded=is_encoded)
+    return _by_space(values, stored) if is_encoded else ("linear", values, _notes_of_floats(stored))
 
 
 def _by_profile(
     values: NDArray[Any], stored: StoredImage, content: bytes
 ) -> tuple[str, NDArray[Any], list[str]]:
-    """As `linear`, of an image of integers with a profile."""
+    """As `linear`, of an image of encoded colours with a profile."""
     said = f"its ICC profile {stored.profile_name!r}"
     try:
         profile = read_profile(content)
@@ -103,7 +106,7 @@ def _of_ultra_hdr(values: NDArray[Any], stored: StoredImage) -> tuple[str, NDArr
 
 
 def _by_space(values: NDArray[Any], stored: StoredImage) -> tuple[str, NDArray[Any], list[str]]:
-    """As `linear`, of an image of integers without a profile."""
+    """As `linear`, of an image of encoded colours without a profile."""
     if stored.code_points is not None and (known := of_code_points(stored.code_points)):
         return _by_code_points(values, stored, *known)
     if stored.gamma is not None and stored.code_points is None:
@@ -124,6 +127,19 @@ def _by_space(values: NDArray[Any], stored: StoredImage) -> tuple[str, NDArray[A
     except ValueError:
         return "srgb", _decoded(values, "srgb"), [f"{said}, which is not known; taken as srgb"]
     return stored.space, made, [f"{said}; converted to linear Rec. 709"]
+
+
+def _by_primaries(
+    values: NDArray[Any], stored: StoredImage, primaries: Chromaticities, *, is_encoded: bool
+) -> tuple[str, NDArray[Any], list[str]]:
+    """As `linear`, of chromaticities that a file states, with its exponent or the sRGB curve."""
+    space = name_of(primaries, stored.gamma if is_encoded else 1)
+    curve = "srgb" if stored.gamma is None else ""
+    made = _decoded(values, curve if is_encoded else "linear", stored.gamma).astype(np.float32)
+    made[:, :, :3] = made[:, :, :3] @ from_chromaticities(primaries).T.astype(np.float32)
+    made = made.astype(values.dtype if values.dtype.kind == "f" else np.float32, copy=False)
+    said = f"the file says {space} of its colours; converted to linear Rec. 709"
+    return space, made, [said, *(() if is_encoded else _notes_of_floats(stored))]
 
 
 def _by_code_points(
@@ -195,10 +211,12 @@ def _decoded(
     return made
 
 
-def _scaled(values: NDArray[Any]) -> NDArray[np.float32]:
-    """Return integers as floats of 0..1."""
+def _scaled(values: NDArray[Any]) -> NDArray[Any]:
+    """Return integers as floats of 0..1; floats as they are."""
+    if values.dtype.kind == "f":
+        return values.copy()
     scale = np.iinfo(values.dtype).max
-    made: NDArray[np.float32] = (np.arange(scale + 1) / scale).astype(np.float32)[values]
+    made: NDArray[Any] = (np.arange(scale + 1) / scale).astype(np.float32)[values]
     return made
 
 
@@ -209,7 +227,8 @@ def _to_light(colours: NDArray[Any], space: str, exponent: float | None) -> NDAr
     if space == "srgb":
         return decode_srgb(colours)
     if space in DECODERS:
-        return DECODERS[space](colours)
+        # Floats may be negative.
+        return DECODERS[space](np.maximum(colours, 0))
     if exponent is not None:
         # Negative values are not changed, as OpenColorIO has it.
         made: NDArray[Any] = np.where(colours > 0, np.maximum(colours, 0) ** exponent, colours)

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import os
 import re
-import struct
-import tempfile
 import zlib
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
 from io import BytesIO
 from typing import Any, BinaryIO, Final
 
-import numpy as np
 from numpy.typing import NDArray
+
+from vkbloom._io.tiff import tiff_field
 
 #: What to do with AVIF and HEIF.
 HEIF_ADVICE: Final = (
@@ -23,20 +21,22 @@ HEIF_ADVICE: Final = (
 # Brands of ISO base media files: of ISO/IEC 23008-12 and of AVIF.
 _HEIF_BRANDS: Final = b"avif avis heic heix hevc heim heis hevx mif1 msf1".split()
 
-# A codestream or a container (ISO/IEC 18181-2).
-_JPEG_XL: Final = (b"\xff\x0a", b"\0\0\0\x0cJXL \r\n\x87\n")
-_JPEG_XL_BYTES: Final = 128
 _PNG_SIGNATURE: Final = b"\x89PNG\r\n\x1a\n"
 # The largest four-byte integer of PNG.
 _LARGEST_CHUNK: Final = 2**31 - 1
-# A gAMA chunk holds the exponent of the encoding times this number; 0 is no exponent.
-_GAMMA_SCALE: Final = 100_000
 # Metadata in bytes: a damaged file may claim more.
 _LARGEST_PACKET: Final = 1 << 24
-# The field types of TIFF 6.0 that are read: bytes, text, SHORT, LONG and undefined bytes.
-_TIFF_TYPES: Final[Mapping[int, str]] = {1: "u1", 2: "u1", 3: "u2", 4: "u4", 7: "u1"}
+# A FITS file consists of blocks of lines, and its images begin with one of these (FITS 4.0, 4.4.1).
+_FITS_BLOCK, _FITS_CARD = 2880, 80
+_FITS_IMAGES: Final = (b"SIMPLE", b"XTENSION= 'IMAGE   '")
+_FITS_SCALE: Final = re.compile(
+    rb"(BSCALE  |BZERO   )= *([-+]?(?:\d+\.?\d*|\.\d+)(?:[ED][-+]?\d+)?) *(?:/|\Z)", re.IGNORECASE
+)
+# Larger ones are no floats of 32 bits.
+_MAX_FLOAT: Final = 3e38
 _ORIENTATION: Final = 274
 _XMP: Final = 700
+_EXIF_OF_JPEG: Final = b"Exif\0\0"
 _XMP_OF_JPEG: Final = b"http://ns.adobe.com/xap/1.0/\0"
 _XMP_OF_PNG: Final = b"XML:com.adobe.xmp\0"
 # Of an attribute or an element (XMP specification part 1, 7).
@@ -71,22 +71,6 @@ def upright(pixels: NDArray[Any], orientation: int) -> NDArray[Any]:
     return pixels
 
 
-@contextmanager
-def padded(path: str | os.PathLike[str]) -> Iterator[str]:
-    """Yield a file to open in place of a file: OpenImageIO needs 128 bytes of JPEG XL."""
-    name, content = os.fspath(path), b""
-    if os.path.isfile(name) and os.path.getsize(name) < _JPEG_XL_BYTES:
-        with open(name, "rb") as stream:
-            content = stream.read()
-    if not content.startswith(_JPEG_XL):
-        yield name
-        return
-    with tempfile.NamedTemporaryFile(suffix=".jxl") as file:
-        file.write(content.ljust(_JPEG_XL_BYTES, b"\0"))
-        file.flush()
-        yield file.name
-
-
 def png_chunks(stream: BinaryIO, wanted: tuple[bytes, ...]) -> Iterator[tuple[bytes, bytes | None]]:
     """Yield the name of each chunk, with the content of undamaged chunks of the wanted names."""
     if stream.read(8) != _PNG_SIGNATURE:
@@ -102,66 +86,6 @@ def png_chunks(stream: BinaryIO, wanted: tuple[bytes, ...]) -> Iterator[tuple[by
         content = stream.read(size)
         is_whole = stream.read(4) == zlib.crc32(kind + content).to_bytes(4, "big")
         yield kind, content if is_whole else None
-
-
-def png_gamma(path: str | os.PathLike[str]) -> float | None:
-    """Return the exponent that decodes a PNG file's colours to light; None if none is stated.
-
-    OpenImageIO rounds it to one decimal place.
-
-    An sRGB chunk has precedence over a gAMA chunk (PNG, third edition, 4.3). Chunks that are
-    damaged, or that follow the palette or the pixels, are ignored.
-    """
-    stated = None
-    with open(path, "rb") as stream:
-        for kind, content in png_chunks(stream, (b"gAMA", b"sRGB")):
-            if kind in (b"PLTE", b"IDAT"):
-                break
-            if kind == b"sRGB" and content is not None:
-                return None
-            value = int.from_bytes(content or b"", "big")
-            if stated is None and len(content or b"") == 4 and 0 < value <= _LARGEST_CHUNK:
-                stated = _GAMMA_SCALE / value
-    return stated
-
-
-def tiff_field(stream: BinaryIO, tag: int, part: int = 0) -> NDArray[Any] | None:
-    """Return the numbers of a field of a TIFF directory; None: it is missing or damaged."""
-    try:
-        return _tiff_field(stream, tag, part)
-    except (struct.error, KeyError, OverflowError, ValueError):
-        return None
-
-
-def _tiff_field(stream: BinaryIO, tag: int, part: int) -> NDArray[Any] | None:
-    def numbers(form: str) -> tuple[int, ...]:
-        return struct.unpack(order + form, stream.read(struct.calcsize(order + form)))
-
-    stream.seek(0)
-    order = {b"II": "<", b"MM": ">"}[stream.read(2)]
-    (version,) = numbers("H")
-    # BigTIFF has 8 bytes where TIFF has 4.
-    count_form, offset_form = ("Q", "Q") if version == 43 else ("H", "I")
-    if version == 43:
-        stream.seek(8)
-    size = struct.calcsize(offset_form)
-    for remaining in range(part, -1, -1):
-        (start,) = numbers(offset_form)
-        stream.seek(start)
-        (count,) = numbers(count_form)
-        if remaining or not start:
-            stream.seek(count * (4 + 2 * size), os.SEEK_CUR)
-    for _ in range(count):
-        field_tag, kind, length = numbers("HH" + offset_form)
-        value = stream.read(size)
-        if field_tag != tag:
-            continue
-        dtype = np.dtype(order + _TIFF_TYPES[kind])
-        if length * dtype.itemsize > size:
-            stream.seek(struct.unpack(order + offset_form, value)[0])
-            value = stream.read(min(length * dtype.itemsize, _LARGEST_PACKET))
-        return np.frombuffer(value, dtype, length)
-    return None
 
 
 def _of_tiff(stream: BinaryIO) -> int | None:
@@ -197,6 +121,25 @@ def _of_png(stream: BinaryIO) -> int | None:
     return by_xmp
 
 
+def fits_scale(path: str | os.PathLike[str], part: int) -> tuple[float, float]:
+    """Return BSCALE and BZERO of a part of a FITS file, 1 and 0 if it has none."""
+    found: dict[bytes, float] = {}
+    index = -1
+    with open(path, "rb") as stream:
+        while len(block := stream.read(_FITS_BLOCK)) == _FITS_BLOCK:
+            index += block.startswith(_FITS_IMAGES)
+            if index != part:
+                continue
+            cards = [block[at : at + _FITS_CARD] for at in range(0, _FITS_BLOCK, _FITS_CARD)]
+            for match in filter(None, map(_FITS_SCALE.match, cards)):
+                value = float(match[2].upper().replace(b"D", b"E"))
+                if abs(value) < _MAX_FLOAT:
+                    found.setdefault(match[1].upper().strip(), value)
+            if any(card.startswith(b"END ") for card in cards):
+                break
+    return found.get(b"BSCALE", 1.0), found.get(b"BZERO", 0.0)
+
+
 def is_heif(path: str | os.PathLike[str]) -> bool:
     """Return whether a file is AVIF or HEIF."""
     with open(path, "rb") as stream:
@@ -204,23 +147,53 @@ def is_heif(path: str | os.PathLike[str]) -> bool:
     return head[4:8] == b"ftyp" and head[8:] in _HEIF_BRANDS
 
 
-def _of_jpeg(stream: BinaryIO) -> int | None:
+def _jpeg_segments(stream: BinaryIO, marker: int) -> Iterator[bytes]:
+    """Yield the segments of a marker before the pixels of a JPEG file."""
     stream.read(2)
     while len(head := stream.read(4)) == 4 and head[0] == 0xFF and head[1] != 0xDA:
         content = stream.read(max(int.from_bytes(head[2:], "big") - 2, 0))
-        if head[1] == 0xE1 and content.startswith(_XMP_OF_JPEG):
+        if head[1] == marker:
+            yield content
+
+
+def _of_jpeg(stream: BinaryIO) -> int | None:
+    for content in _jpeg_segments(stream, 0xE1):
+        if content.startswith(_XMP_OF_JPEG):
             return _of_xmp(content)
     return None
 
 
-def _of_webp(stream: BinaryIO) -> int | None:
+def _webp_chunk(stream: BinaryIO, wanted: bytes) -> bytes | None:
     stream.read(12)
     while len(head := stream.read(8)) == 8:
         size = int.from_bytes(head[4:], "little")
-        if head[:4] == b"XMP ":
-            return _of_xmp(stream.read(min(size, _LARGEST_PACKET)))
+        if head[:4] == wanted:
+            return stream.read(min(size, _LARGEST_PACKET))
         stream.seek(size + size % 2, os.SEEK_CUR)
     return None
+
+
+def _of_webp(stream: BinaryIO) -> int | None:
+    packet = _webp_chunk(stream, b"XMP ")
+    return None if packet is None else _of_xmp(packet)
+
+
+def exif_of(stream: BinaryIO, kind: str) -> BinaryIO | None:
+    """Return the Exif of a JPEG, PNG, TIFF or WebP file, a TIFF stream; None: there is none."""
+    content = None
+    match kind:
+        case "tiff":
+            return stream
+        case "jpeg":
+            exif = filter(lambda one: one.startswith(_EXIF_OF_JPEG), _jpeg_segments(stream, 0xE1))
+            content = next(exif, b"")[len(_EXIF_OF_JPEG) :]
+        case "png":
+            chunks = png_chunks(stream, (b"eXIf",))
+            content = next((content for name, content in chunks if name == b"eXIf"), None)
+        case "webp":
+            # Some programs write the signature of JPEG.
+            content = (_webp_chunk(stream, b"EXIF") or b"").removeprefix(_EXIF_OF_JPEG)
+    return BytesIO(content) if content else None
 
 
 def _of_radiance(stream: BinaryIO) -> int | None:

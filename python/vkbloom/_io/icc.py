@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable
-from typing import Final, NamedTuple
+from collections.abc import Callable, Sequence
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-#: A curve for values of 0..1.
+#: A curve for values of 0..1, and for floats above 1.
 Curve = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 
 _COLOURS: Final = ("r", "g", "b")
@@ -46,13 +46,23 @@ class Profile(NamedTuple):
     curves: tuple[Curve, Curve, Curve]
     matrix: NDArray[np.float64]
 
-    def decode(self, colours: NDArray[np.unsignedinteger]) -> NDArray[np.float32]:
-        """Return linear Rec. 709, not clipped, from integers (H, W, 3)."""
+    def decode(self, colours: NDArray[Any]) -> NDArray[np.float32]:
+        """Return linear Rec. 709, not clipped, from integers or floats (H, W, 3)."""
+        if colours.dtype.kind == "f":
+            light = np.stack(
+                [
+                    curve(colours[:, :, index].astype(float))
+                    for index, curve in enumerate(self.curves)
+                ],
+                axis=-1,
+            )
+            return (light @ self.matrix.T).astype(np.float32)
         scale = np.iinfo(colours.dtype).max
         levels = np.arange(scale + 1) / scale
         linear = np.empty(colours.shape, np.float32)
         for channel, curve in enumerate(self.curves):
-            linear[:, :, channel] = curve(levels).astype(np.float32)[colours[:, :, channel]]
+            table = np.clip(curve(levels), 0, 1).astype(np.float32)
+            linear[:, :, channel] = table[colours[:, :, channel]]
         made: NDArray[np.float32] = linear @ self.matrix.T.astype(np.float32)
         return made
 
@@ -68,14 +78,25 @@ def read_profile(content: bytes) -> Profile:
     except (KeyError, struct.error, ZeroDivisionError) as error:
         raise ValueError("the profile is damaged or has no matrix and curves") from error
     red, green, blue = curves
-    return Profile((red, green, blue), _from_d50() @ np.stack(columns, axis=1))
+    return Profile((red, green, blue), _to_rec_709(_D50) @ np.stack(columns, axis=1))
 
 
-def _from_d50() -> NDArray[np.float64]:
-    """Return the matrix from XYZ of profiles to linear Rec. 709."""
-    white = _REC_709.sum(axis=1)
-    adapt = np.diag((_BRADFORD @ white) / (_BRADFORD @ _D50)) @ _BRADFORD
+def _to_rec_709(white: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the matrix from XYZ of a white to linear Rec. 709."""
+    adapt = np.diag((_BRADFORD @ _REC_709.sum(axis=1)) / (_BRADFORD @ white)) @ _BRADFORD
     made: NDArray[np.float64] = np.linalg.inv(_REC_709) @ np.linalg.inv(_BRADFORD) @ adapt
+    return made
+
+
+def from_chromaticities(chromaticities: Sequence[float]) -> NDArray[np.float64]:
+    """Return the matrix from linear colours of x and y of red, green, blue, white to Rec. 709.
+
+    White becomes white, by the Bradford adaptation.
+    """
+    x, y = np.reshape(chromaticities, (4, 2)).T
+    xyz = np.stack([x / y, np.ones(4), (1 - x - y) / y])
+    columns = xyz[:, :3] * np.linalg.solve(xyz[:, :3], xyz[:, 3])
+    made: NDArray[np.float64] = _to_rec_709(xyz[:, 3]) @ columns
     return made
 
 
@@ -98,7 +119,7 @@ def from_lab(values: NDArray[np.unsignedinteger], space: str) -> NDArray[np.floa
     roots = np.stack([y + ab[:, :, 0] / 500, y, y - ab[:, :, 1] / 200], -1)
     # CIE 15:2018, 8.2.1.1.
     xyz = np.where(roots > 6 / 29, roots**3, (roots - 4 / 29) * 3 * (6 / 29) ** 2) * _D50
-    made: NDArray[np.float32] = (xyz @ _from_d50().T).astype(np.float32)
+    made: NDArray[np.float32] = (xyz @ _to_rec_709(_D50).T).astype(np.float32)
     return made
 
 
@@ -145,6 +166,6 @@ def _parametric(seven: tuple[float, ...]) -> Curve:
     def curve(x: NDArray[np.float64]) -> NDArray[np.float64]:
         with np.errstate(divide="ignore", over="ignore"):
             power = np.maximum(a * x + b, 0) ** g + e
-        return np.clip(np.where(x >= d, power, c * x + f), 0, 1)
+        return np.where(x >= d, power, c * x + f)
 
     return curve

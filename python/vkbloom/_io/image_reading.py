@@ -11,32 +11,32 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vkbloom._checks import import_extra
-from vkbloom._io.alpha import Meaning, channels_of, divided, in_order, light_of, meaning_of
+from vkbloom._io.alpha import Meaning, channels_of, divided, light_of, meaning_of
 from vkbloom._io.colour import LAB, linear
-from vkbloom._io.containers import (
-    HEIF_ADVICE,
-    is_heif,
-    orientation_of,
-    padded,
-    png_gamma,
-    upright,
-)
+from vkbloom._io.containers import HEIF_ADVICE, fits_scale, is_heif, orientation_of, upright
 from vkbloom._io.displayed import has_hdr_curve, of_code_points
 from vkbloom._io.expansion import expanded
 from vkbloom._io.images import (
     DTYPES,
-    SPACES,
+    PIXEL_TYPES,
+    WITH_WINDOWS,
     Colour,
     Picture,
     StoredImage,
+    Window,
     check_name,
     complete,
     failure_of,
     is_kept,
     warnings_of,
 )
+from vkbloom._io.jpeg_xl import header_of, readable
+from vkbloom._io.stated_colours import stated_colours
+from vkbloom._io.stored_values import SIGNED, corrected, scale_of, without_white
+from vkbloom._io.tiff import RAW_ADVICE, is_raw, reduced_parts
 
 if TYPE_CHECKING:
     import OpenImageIO
@@ -72,13 +72,19 @@ def opened(path: str | os.PathLike[str], purpose: str) -> Iterator[OpenImageIO.I
     # Otherwise OpenImageIO multiplies straight colours by alpha.
     plain = oiio.ImageSpec()
     plain.attribute("oiio:UnassociatedAlpha", 1)
-    with padded(name) as file:
+    with readable(name) as file:
         reader = oiio.ImageInput.open(file, plain)
     reason = failure_of(oiio) if reader is None else ""
-    if _is_lab(reader, reason):
-        # libtiff converts to 8 bits without adapting the white of D50, or does not convert.
+    if _is_lab(reader, reason) or _is_grey_photoshop(reader, name):
+        # libtiff converts L*a*b* to 8 bits without adapting the white of D50, or does not convert.
+        # OpenImageIO takes the layers of a grey Photoshop file for RGB.
         plain.attribute("oiio:RawColor", 1)
         reader = oiio.ImageInput.open(name, plain)
+    if (reader is None or reader.format_name() == "tiff") and is_raw(name):
+        # A TIFF reader takes the preview for the picture.
+        if reader is not None:
+            reader.close()
+        raise ValueError(f"{name}: is {RAW_ADVICE}")
     if reader is None:
         reason = HEIF_ADVICE if is_heif(name) else reason or "unknown format"
         raise ValueError(f"{name}: is not a readable image: {reason}")
@@ -94,6 +100,15 @@ def _is_lab(reader: OpenImageIO.ImageInput | None, reason: str) -> bool:
     if reader is None:
         return "PhotometricInterpretation" in reason
     return reader.spec().get_string_attribute("tiff:ColorSpace") in LAB
+
+
+def _is_grey_photoshop(reader: OpenImageIO.ImageInput | None, name: str) -> bool:
+    """Whether a file is a Photoshop file of grey."""
+    if reader is None or reader.format_name() != "psd":
+        return False
+    with open(name, "rb") as stream:
+        # The colour mode.
+        return stream.read(26)[24:] == b"\0\1"
 
 
 def readable_extensions() -> set[str]:
@@ -125,49 +140,39 @@ def load(path: str | os.PathLike[str], subimage: int = 0, layer: str | None = No
 def _read(
     reader: OpenImageIO.ImageInput, name: str, subimage: int, layer: str | None
 ) -> StoredImage:
-    subimage, spec = _chosen_part(reader, name, subimage, layer)
-    display = (spec.full_x, spec.full_y, spec.full_width, spec.full_height)
-    left, top = min(spec.x, display[0]), min(spec.y, display[1])
-    width, height = _covered(spec)
-    dtype = DTYPES[str(spec.format)]
-    wanted = str(spec.format) if str(spec.format) != "double" else "float"
-    data = reader.read_image(subimage, 0, 0, spec.nchannels, wanted)
-    notes = warnings_of(reader, name)
-    pixels = np.asarray(complete(data, reader, name), dtype).reshape(
-        spec.height, spec.width, spec.nchannels
-    )
-    pixels = in_order(pixels, reader.format_name(), name)
-    if pixels.shape[:2] != (height, width):
-        row, column = spec.y - top, spec.x - left
-        whole = np.zeros((height, width, spec.nchannels), dtype)
-        whole[row : row + spec.height, column : column + spec.width] = pixels
-        pixels = whole
-    orientation = spec.get_int_attribute("Orientation", 1)
-    if orientation != 1:
-        x, y = display[0] - left, display[1] - top
-        pixels = upright(pixels[y : y + display[3], x : x + display[2]], orientation)
-        left, top = 0, 0
-        display = (0, 0, pixels.shape[1], pixels.shape[0])
+    subimage, spec, notes = _chosen_part(reader, name, subimage, layer)
+    kind = reader.format_name()
+    pixels, said = _pixels(reader, spec, name, subimage)
+    notes += said
+    meaning = meaning_of(reader, spec, name)
+    if kind == "psd" and not subimage and channels_of(spec, kind) == ("Y", "A"):
+        over_white = without_white(pixels)
+        if over_white is not None:
+            pixels, meaning = over_white, Meaning.MULTIPLIED
+    pixels, origin, display = _placed(pixels, spec, kind)
     kept = [index for index, part in enumerate(_layers(spec)) if layer in (None, part)]
-    space, gamma = _stated_curve(reader, spec, name)
-    kind, meaning = reader.format_name(), meaning_of(reader, spec, name)
     names = [
         "" if channel == "A" and meaning is Meaning.NONE else channel
         for channel in channels_of(spec, kind)
     ]
     points, known = spec.getattribute("CICP"), points_of(spec)
+    stated = stated_colours(spec, kind, name, has_points=known is not None)
+    notes += [
+        f"the file says {said} of its values, which are taken as they are" for said in stated.said
+    ]
     if points is not None and known is None and points[1] != _UNSPECIFIED:
         listed = " ".join(map(str, points))
         notes.insert(0, f"the code points {listed} of its colours are not known, and are ignored")
     stored = StoredImage(
         pixels=np.ascontiguousarray(pixels if layer is None else pixels[:, :, kept]),
         channels=tuple(names if layer is None else (names[i].rpartition(".")[2] for i in kept)),
-        numbers=tuple(str(spec.channelformat(index)) for index in kept),
-        origin=(left, top),
+        numbers=tuple(_numbers(pixels, spec, kind)[index] for index in kept),
+        origin=origin,
         display=display,
         associated=meaning is Meaning.MULTIPLIED,
-        space=space,
-        gamma=gamma,
+        space=stated.space,
+        gamma=stated.gamma,
+        primaries=stated.primaries,
         attributes={
             attribute.name: (attribute.type, attribute.value)
             for attribute in spec.extra_attribs
@@ -176,6 +181,8 @@ def _read(
         profile_name=spec.get_string_attribute("ICCProfile:profile_description"),
         code_points=known,
         is_ultra_hdr=_is_ultra_hdr(reader, spec),
+        is_encoded=kind == "jpegxl",
+        part=subimage,
         notes=tuple(notes),
     )
     # Last, since the reader goes to other parts.
@@ -183,12 +190,76 @@ def _read(
     return replace(stored, parts=tuple(map(_name_of, parts)))
 
 
+def _pixels(
+    reader: OpenImageIO.ImageInput, spec: OpenImageIO.ImageSpec, name: str, subimage: int
+) -> tuple[NDArray[Any], list[str]]:
+    """Return the values (H, W, C) of a part of a file, and notes."""
+    wanted = str(spec.format) if str(spec.format) != "double" else "float"
+    data = reader.read_image(subimage, 0, 0, spec.nchannels, wanted)
+    notes = warnings_of(reader, name)
+    dtype = {**DTYPES, **SIGNED}[str(spec.format)]
+    pixels = np.asarray(complete(data, reader, name), dtype).reshape(
+        spec.height, spec.width, spec.nchannels
+    )
+    pixels, said = corrected(pixels, spec, reader.format_name(), name)
+    if reader.format_name() == "jpegxl" and header_of(name).has_coarse_light:
+        said = [
+            "its colours are stored in another space than that of its ICC profile, and are decoded "
+            "to linear Rec. 709; colours outside of it are clipped"
+        ]
+    return pixels, [*notes, *said]
+
+
+def _placed(
+    pixels: NDArray[Any], spec: OpenImageIO.ImageSpec, kind: str
+) -> tuple[NDArray[Any], tuple[int, int], Window]:
+    """Return the pixels upright, the origin and the display window.
+
+    The pixels of OpenEXR cover both windows. Positions of other formats are those on a page, which
+    do not move the picture.
+    """
+    origin, display = (0, 0), (0, 0, pixels.shape[1], pixels.shape[0])
+    if kind in WITH_WINDOWS:
+        pixels, origin, display = _in_windows(pixels, spec)
+    orientation = spec.get_int_attribute("Orientation", 1)
+    if orientation == 1:
+        return pixels, origin, display
+    x, y = display[0] - origin[0], display[1] - origin[1]
+    pixels = upright(pixels[y : y + display[3], x : x + display[2]], orientation)
+    return pixels, (0, 0), (0, 0, pixels.shape[1], pixels.shape[0])
+
+
+def _in_windows(
+    pixels: NDArray[Any], spec: OpenImageIO.ImageSpec
+) -> tuple[NDArray[Any], tuple[int, int], Window]:
+    """Return the pixels of the data window and the display window, the origin, and the latter."""
+    display = (spec.full_x, spec.full_y, spec.full_width, spec.full_height)
+    left, top = min(spec.x, display[0]), min(spec.y, display[1])
+    width, height = _covered(spec)
+    if pixels.shape[:2] != (height, width):
+        row, column = spec.y - top, spec.x - left
+        whole = np.zeros((height, width, spec.nchannels), pixels.dtype)
+        whole[row : row + spec.height, column : column + spec.width] = pixels
+        pixels = whole
+    return pixels, (left, top), display
+
+
+def _numbers(pixels: NDArray[Any], spec: OpenImageIO.ImageSpec, kind: str) -> list[str]:
+    """Return OpenImageIO's name of each channel's number type."""
+    if kind == "fits" and scale_of(spec) != (1, 0):
+        return [PIXEL_TYPES[pixels.dtype.name]] * spec.nchannels
+    return [str(spec.channelformat(index)) for index in range(spec.nchannels)]
+
+
 def _chosen_part(
     reader: OpenImageIO.ImageInput, name: str, subimage: int, layer: str | None
-) -> tuple[int, OpenImageIO.ImageSpec]:
-    """Make the part to read the current one, and return its number and what it is."""
+) -> tuple[int, OpenImageIO.ImageSpec, list[str]]:
+    """Make the part to read the current one, and return its number, what it is, and notes."""
+    notes: list[str] = []
     if layer is not None:
         subimage = _part_with(reader, name, subimage, layer)
+    elif subimage == 0 and reader.format_name() == "tiff":
+        subimage, notes = _full_picture(name)
     if subimage < 0 or not _seek(reader, subimage):
         count = sum(1 for _ in _parts(reader))
         raise ValueError(f"{name}: subimage {subimage} is not in 0..{count - 1}")
@@ -200,21 +271,41 @@ def _chosen_part(
         "Orientation",
         orientation_of(name, reader.format_name(), spec.getattribute("Orientation")),
     )
+    if reader.format_name() == "fits":
+        # OpenImageIO does not know Fortran's exponents.
+        for field, value in zip(("Bscale", "Bzero"), fits_scale(name, subimage), strict=True):
+            spec.attribute(field, value)
     if spec.deep or spec.depth > 1:
         raise ValueError(f"{name}: a deep image or a volume is not supported; use a flat image")
-    if str(spec.format) not in DTYPES:
+    is_scaled = reader.format_name() == "fits" and scale_of(spec) != (1, 0)
+    if str(spec.format) not in DTYPES and not (is_scaled and str(spec.format) in SIGNED):
         raise ValueError(
             f"{name}: numbers of {spec.format} are not supported; use unsigned integers of 8 or 16 "
             "bits, or floats"
         )
-    width, height = _covered(spec)
+    if reader.format_name() == "tiff" and str(spec.format) == "double" and spec.tile_width:
+        # OpenImageIO 3.2 returns memory that it has not written.
+        raise ValueError(f"{name}: tiles of doubles are not supported; use strips, or floats")
+    has_windows = reader.format_name() in WITH_WINDOWS
+    width, height = _covered(spec) if has_windows else (spec.width, spec.height)
     if max(width, height) > _LARGEST_SIDE or width * height > _LARGEST_AREA:
         raise ValueError(
             f"{name}: {width} x {height} is larger than {_LARGEST_SIDE} pixels on a side or "
             f"{_LARGEST_AREA} in all"
         )
     check_plausible(spec, name)
-    return subimage, spec
+    return subimage, spec, notes
+
+
+def _full_picture(name: str) -> tuple[int, list[str]]:
+    """Return the first part of a TIFF file that is no reduced picture, and a note about it."""
+    reduced = reduced_parts(name)
+    if not any(reduced[:1]):
+        return 0, []
+    if all(reduced):
+        return 0, ["the picture is a reduced one, as the file says; the full one cannot be read"]
+    part = reduced.index(False)
+    return part, [f"part 0 is a reduced picture, as the file says; read part {part}"]
 
 
 def _covered(spec: OpenImageIO.ImageSpec) -> tuple[int, int]:
@@ -252,19 +343,6 @@ def _seek(reader: OpenImageIO.ImageInput, subimage: int) -> bool:
         # Some readers leave an error, which would be taken for damaged pixels.
         failure_of(reader)
     return is_there
-
-
-def _stated_curve(
-    reader: OpenImageIO.ImageInput, spec: OpenImageIO.ImageSpec, name: str
-) -> tuple[str, float | None]:
-    """Return a file's colour space and exponent, if it states them."""
-    space = spec.get_string_attribute("oiio:ColorSpace")
-    if reader.format_name() != "png":
-        return space, spec.get_float_attribute("oiio:Gamma", 0.0) or None
-    gamma = png_gamma(name)
-    # OpenImageIO takes an exponent of 0, which PNG does not allow, as linear.
-    is_stated = gamma is not None or points_of(spec) is not None
-    return space if is_stated else SPACES["srgb"], gamma
 
 
 def _layers(spec: OpenImageIO.ImageSpec) -> list[str]:
@@ -329,10 +407,12 @@ def _decoded(stored: StoredImage, colour: Colour | None, expand: float | None) -
     if grey:
         values = values[:, :, [0, 0, 0, *range(1, len(chosen))]]
     has_alpha = values.shape[2] == 4
-    if stored.associated and has_alpha and values.dtype.kind == "u":
-        # 16 bits hold the quotients of 8 bits.
-        scale = 65535 // np.iinfo(values.dtype).max
-        values = divided(values.astype(np.uint16) * np.uint16(scale))
+    if stored.associated and has_alpha and (values.dtype.kind == "u" or stored.is_encoded):
+        if values.dtype.kind == "u":
+            # 16 bits hold the quotients of 8 bits.
+            scale = 65535 // np.iinfo(values.dtype).max
+            values = values.astype(np.uint16) * np.uint16(scale)
+        values = divided(values)
         stored = replace(stored, associated=False)
     taken_as, values, said = linear(values, stored, colour)
     notes += said

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from vkbloom._checks import check_index, import_extra, native_order
 from vkbloom._io import displayed, safe_writing
 from vkbloom._io.displayed import Saved
-from vkbloom._io.images import DTYPES, PIXEL_TYPES, SPACES, Picture, is_exr
+from vkbloom._io.images import DTYPES, PIXEL_TYPES, SPACES, WITH_WINDOWS, Picture, is_exr
 
 if TYPE_CHECKING:
     import OpenImageIO
@@ -92,7 +92,7 @@ def save(
     """Write a picture to a file, with its own number type or the closest one of the format.
 
     Grey pictures are written with one channel if the format supports it, else as RGB. Data and
-    display windows are kept if the format has them, else pixels outside the display window are cut
+    display windows are kept in OpenEXR, else pixels outside the display window are cut
     off. Integer files cover 0..1: NaN becomes 0 and infinity becomes 1. Alpha is not changed.
     """
     saved = saved or Saved()
@@ -169,7 +169,7 @@ def described_as(
 def put(oiio: ModuleType, parts: Sequence[Part], temporary: Path, target: Path) -> None:
     """Write the parts of a file to its temporary file; only OpenEXR has more than one."""
     writer = oiio.ImageOutput.create(str(temporary))
-    if not writer.supports("displaywindow"):
+    if writer.format_name() not in WITH_WINDOWS:
         parts = [part._replace(values=_displayed(part)) for part in parts]
     specs = [_spec_of(oiio, writer, part, target) for part in parts]
     is_written = True
@@ -214,7 +214,7 @@ def _spec_of(
         has_alpha = channels == 2
         spec.channelnames = ("Y", "A")[:channels]
         spec.alpha_channel = 1 if has_alpha else -1
-    if writer.supports("displaywindow"):
+    if writer.format_name() in WITH_WINDOWS:
         spec.x, spec.y = stored.origin
         spec.full_x, spec.full_y, spec.full_width, spec.full_height = stored.display
     _describe(spec, part.picture, writer.format_name(), target)

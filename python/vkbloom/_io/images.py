@@ -7,9 +7,10 @@ integers.
 numbers in the file  taken as                  written as
 ==================== ========================= =====================================
 8 or 16 bit integers what the file says (ICC   sRGB
-                     profile, gamma, cICP),
-                     else sRGB
-half, float          linear                    linear
+                     profile, gamma, cICP,
+                     Exif), else sRGB
+half, float          linear (but JPEG XL: what linear
+                     the file says)
 ==================== ========================= =====================================
 """
 
@@ -31,6 +32,8 @@ from vkbloom._checks import native_order
 Colour: TypeAlias = str
 #: The colour encoding of a file to write.
 SavedColour = Literal["linear", "srgb", "gamma22", "pq", "hlg"]
+#: x and y of red, green, blue and white.
+Chromaticities: TypeAlias = tuple[float, ...]
 #: x, y, width, height in pixels.
 Window: TypeAlias = tuple[int, int, int, int]
 
@@ -51,6 +54,8 @@ PIXEL_TYPES: Final[Mapping[str, str]] = {
     "float32": "float",
 }
 
+#: Formats with a data window and a display window. Positions of others, such as DPX, move nothing.
+WITH_WINDOWS: Final = ("openexr",)
 # OpenImageIO's names of colour spaces.
 SPACES: Final[Mapping[str, str]] = {
     "linear": "lin_rec709_scene",
@@ -76,7 +81,7 @@ _EXTRA_BYTES: Final = re.compile(
 )
 # Attributes that a conversion or rotation makes wrong.
 _LOST_ATTRIBUTES: Final = frozenset(
-    ("Exif:ColorSpace", "Exif:PixelXDimension", "Exif:PixelYDimension")
+    ("Exif:ColorSpace", "Exif:Gamma", "Exif:PixelXDimension", "Exif:PixelYDimension")
 )
 
 
@@ -91,8 +96,8 @@ class StoredImage:
       meaning.
     - `numbers`: OpenImageIO's name of each channel's number type: "uint8", "uint16", "half",
       "float" or "double".
-    - `origin`: Position of the first pixel in the file's coordinates.
-    - `display`: The display window (x, y, width, height), in the file's coordinates.
+    - `origin`: Position of the first pixel in an OpenEXR file's coordinates, else (0, 0).
+    - `display`: The display window (x, y, width, height), in the same coordinates.
     - `associated`: Whether colours are multiplied by alpha: encoded ones in files of integers.
     - `space`: OpenImageIO's name of the file's colour space; "" if the file has none.
     - `gamma`: The exponent that decodes colours to light, if the file states one. It is more exact
@@ -104,7 +109,11 @@ class StoredImage:
     - `code_points`: Those of the file's colours (Rec. ITU-T H.273), as in a cICP chunk, which has
       precedence over a profile (PNG, third edition): primaries, curve, matrix, range. None: there
       are none, or they are not known.
+    - `primaries`: The chromaticities that the file states without a profile, if they are others
+      than those of Rec. 709. Colours are converted from them.
     - `is_ultra_hdr`: Whether floats were made of integers: light with the profile's primaries.
+    - `is_encoded`: Whether floats are on the curve that the file states, as in JPEG XL.
+    - `part`: The number of the part that was read.
     - `notes`: Notes for the user about how the file was read.
     """
 
@@ -120,7 +129,10 @@ class StoredImage:
     profile_name: str = ""
     code_points: tuple[int, ...] | None = None
     gamma: float | None = None
+    primaries: Chromaticities | None = None
     is_ultra_hdr: bool = False
+    is_encoded: bool = False
+    part: int = 0
     notes: tuple[str, ...] = ()
 
     @property

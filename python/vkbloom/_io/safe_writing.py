@@ -21,8 +21,8 @@ from typing import TYPE_CHECKING, BinaryIO, Final
 import numpy as np
 
 from vkbloom._checks import import_extra
-from vkbloom._io.containers import padded
 from vkbloom._io.images import check_name, failure_of
+from vkbloom._io.jpeg_xl import readable
 
 if TYPE_CHECKING:
     import OpenImageIO
@@ -239,7 +239,7 @@ def _link_target(file: Path) -> Path:
 
 def _unreadable(oiio: ModuleType, file: Path) -> str | None:
     """Return why a file cannot be read; None: it can."""
-    with padded(file) as name:
+    with readable(file) as name:
         reader = oiio.ImageInput.open(name)
     if reader is None:
         return failure_of(oiio) or "unknown format"
