@@ -127,7 +127,7 @@ def _pulled(
     assert plan is not None
     arrays = requests.new_arrays(core, plan)
     (timings,), _ = core.run(source, (plan,), (arrays,)).wait()
-    return requests.named(plan, arrays)["by_image"], sum(timings.values())
+    return requests.named(plan, arrays)[".by_image"], sum(timings.values())
 
 
 def _beside_torch(

@@ -108,7 +108,7 @@ static bool check_passes(const struct vkb_device *device, const struct vkb_graph
             return vkb_fail(error, VKB_ERROR_GENERAL,
                             "the compute shaders of %s cannot write images, which the pass %s "
                             "needs",
-                            device->adapter.name, pass->name);
+                            device->adapter.name, vkb_graph_label(graph, pass->name));
         // Plans without a renderer know no limits.
         if (pass->block == VKB_BLOCK_custom && device->limits.maxPerStageResources
             && !check_needs(device, pass, error))

@@ -48,7 +48,7 @@ static bool fetch(struct vkb_run *run, enum vkb_format format, const void *value
     struct vkb_buffer *given = &run->frame->constants, *counts = &submission->readback.counts;
     const size_t size = TEXELS * vkb_pixel_size(format);
     const struct vkb_image_row row = {
-        .name = "probed_texels",
+        .name = ".probed_texels",
         .format = format,
         .width = TEXELS,
         .height = 1,

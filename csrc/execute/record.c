@@ -2,6 +2,7 @@
 
 #include "vulkan/labels.h"
 
+#include <stdio.h>
 #include <string.h>
 
 // Copies the pass's parameters to the uniform buffer; returns their offset.
@@ -481,7 +482,7 @@ static bool record_passes(struct vkb_run *run, uint32_t first, uint32_t end,
     if (draws)
         device->vk.vkCmdEndRendering(commands);
     vkb_timer_stop(device, commands, timer);
-    memcpy(timing->name, vkb_graph_timed_as(run->graph, first), sizeof timing->name);
+    snprintf(timing->name, sizeof timing->name, "%s", vkb_graph_timed_as(run->graph, first));
     return true;
 }
 

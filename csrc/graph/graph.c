@@ -1,5 +1,6 @@
 #include "graph/graph.h"
 
+#include <stdio.h>
 #include <string.h>
 
 void vkb_graph_destroy(struct vkb_graph *graph)
@@ -11,17 +12,50 @@ void vkb_graph_destroy(struct vkb_graph *graph)
     *graph = (struct vkb_graph){0};
 }
 
+// Whether the image keeps its name as it is: a framebuffer, and what a source gives. Custom methods
+// cannot give their framebuffers the names of these (methods/custom.c).
+static bool is_named_by_itself(const struct vkb_image_row *row)
+{
+    return row->framebuffer || (row->input && row->input < VKB_INPUT_LEVEL)
+        || row->name[0] == VKB_INTERNAL_NAME;
+}
+
+// Caches and plans find an image by its name.
+static bool name_image(struct vkb_graph *graph, uint32_t image, const char *name,
+                       struct vkb_error *error)
+{
+    const uint32_t named = vkb_graph_find(graph, name);
+
+    if (named != VKB_NO_IMAGE && named != image)
+        return vkb_fail(error, VKB_ERROR_GENERAL, "graph: there are two images named %s", name);
+    snprintf(graph->images[image].name, sizeof graph->images[image].name, "%s", name);
+    return true;
+}
+
 bool vkb_graph_add_image(struct vkb_graph *graph, const struct vkb_image_row *row, uint32_t *index,
                          struct vkb_error *error)
 {
+    vkb_image_name name = {VKB_INTERNAL_NAME};
+    const size_t prefix = is_named_by_itself(row) ? 0 : 1;
+
+    snprintf(name + prefix, sizeof name - prefix, "%s", row->name);
     if (!vkb_grow(error, &graph->images, &graph->image_capacity, graph->image_count + 1,
                   sizeof *graph->images))
         return false;
     graph->images[graph->image_count] = *row;
+    if (!name_image(graph, graph->image_count, name, error))
+        return false;
     if (index)
         *index = graph->image_count;
     ++graph->image_count;
     return true;
+}
+
+bool vkb_graph_show_image(struct vkb_graph *graph, uint32_t image, const char *name,
+                          struct vkb_error *error)
+{
+    graph->images[image].framebuffer = true;
+    return name_image(graph, image, name, error);
 }
 
 bool vkb_graph_add_pass(struct vkb_graph *graph, const struct vkb_pass_row *row,
@@ -188,12 +222,20 @@ uint32_t vkb_pass_targets(const struct vkb_pass_row *pass, uint32_t *targets)
     return count;
 }
 
+const char *vkb_graph_label(const struct vkb_graph *graph, const char *name)
+{
+    const bool is_internal = name[0] == VKB_INTERNAL_NAME;
+
+    return is_internal && vkb_graph_find(graph, name + 1) == VKB_NO_IMAGE ? name + 1 : name;
+}
+
 const char *vkb_graph_timed_as(const struct vkb_graph *graph, uint32_t first)
 {
     const struct vkb_pass_row *pass = &graph->passes[first];
 
-    return pass->geometry == VKB_GEOMETRY_DISPATCH ? pass->name
-                                                   : graph->images[pass->targets[0]].name;
+    return vkb_graph_label(graph, pass->geometry == VKB_GEOMETRY_DISPATCH
+                                      ? pass->name
+                                      : graph->images[pass->targets[0]].name);
 }
 
 bool vkb_graph_blends(const struct vkb_graph *graph, uint32_t image)
@@ -269,8 +311,8 @@ bool vkb_graph_check_sizes(const struct vkb_graph *graph, uint32_t max_side,
                            struct vkb_error *error)
 {
     for (uint32_t i = 0; i < graph->image_count; ++i)
-        if (!vkb_check_size(graph->images[i].name, graph->images[i].width, graph->images[i].height,
-                            max_side, error))
+        if (!vkb_check_size(vkb_graph_label(graph, graph->images[i].name), graph->images[i].width,
+                            graph->images[i].height, max_side, error))
             return false;
     return true;
 }

@@ -26,6 +26,10 @@ enum {
 
 typedef char vkb_image_name[VKB_NAME_SIZE];
 
+// The name of an image that is no framebuffer begins with this. Framebuffers of custom methods are
+// named by users, who cannot write it.
+#define VKB_INTERNAL_NAME '.'
+
 // Which of its data the host writes to an image: the image of a source, its emission, its mask, or
 // an image that another part of the graph has made.
 enum vkb_input_kind {
@@ -156,9 +160,15 @@ struct vkb_graph {
 
 void vkb_graph_destroy(struct vkb_graph *graph);
 
-// Adds a copy of the row; *index (may be NULL) gets its index.
+// Adds a copy of the row; *index (may be NULL) gets its index. Puts VKB_INTERNAL_NAME before the
+// name of an image that neither is a framebuffer nor comes from the source. Fails if there is an
+// image of that name: caches find images by their names.
 bool vkb_graph_add_image(struct vkb_graph *graph, const struct vkb_image_row *row, uint32_t *index,
                          struct vkb_error *error);
+// Makes an image a framebuffer of that name.
+bool vkb_graph_show_image(struct vkb_graph *graph, uint32_t image, const char *name,
+                          struct vkb_error *error);
+
 // The copy's constant `stored` is that of its first target.
 bool vkb_graph_add_pass(struct vkb_graph *graph, const struct vkb_pass_row *row,
                         struct vkb_error *error);
@@ -207,6 +217,10 @@ bool vkb_pass_writes(const struct vkb_pass_row *pass, uint32_t image);
 // The images that a pass writes, the depth last, into an array of VKB_MAX_TARGETS + 1. Returns
 // their number.
 uint32_t vkb_pass_targets(const struct vkb_pass_row *pass, uint32_t *targets);
+
+// How users see the name of an image or of a pass: without VKB_INTERNAL_NAME, where no image of the
+// graph has that name.
+const char *vkb_graph_label(const struct vkb_graph *graph, const char *name);
 
 // The name under which the group of passes from `first` on is timed: for a render pass the first
 // image that it writes, for a dispatch its own name.

@@ -111,25 +111,27 @@ static void find_glow(struct vkb_adjoint *adjoint, const struct vkb_cotangents *
         }
 }
 
-// Makes the cotangents of the source's images framebuffers.
-static void show_results(struct vkb_adjoint *adjoint, uint32_t image_count)
+// Makes the cotangents of the source's images framebuffers. A custom method may have framebuffers
+// of these names, too.
+static bool show_results(struct vkb_adjoint *adjoint, uint32_t image_count, struct vkb_error *error)
 {
     static const char *const names[VKB_INPUT_COUNT] = {
-        [VKB_INPUT_IMAGE] = "by_image",
-        [VKB_INPUT_EMISSION] = "by_emission",
-        [VKB_INPUT_MASK] = "by_mask",
+        [VKB_INPUT_IMAGE] = ".by_image",
+        [VKB_INPUT_EMISSION] = ".by_emission",
+        [VKB_INPUT_MASK] = ".by_mask",
     };
+    bool done = true;
 
-    for (uint32_t i = 0; i < image_count; ++i) {
+    for (uint32_t i = 0; done && i < image_count; ++i) {
         const struct vkb_image_row *forward = &adjoint->graph->images[i];
         const uint32_t cotangents = adjoint->cotangents[i];
         if (forward->input == VKB_INPUT_NONE || cotangents == VKB_NO_IMAGE)
             continue;
-        struct vkb_image_row *row = &adjoint->graph->images[cotangents];
-        snprintf(row->name, sizeof row->name, "%s", names[forward->input]);
-        row->framebuffer = true;
-        row->channels = forward->input == VKB_INPUT_MASK ? 1 : forward->channels;
+        adjoint->graph->images[cotangents].channels =
+            forward->input == VKB_INPUT_MASK ? 1 : forward->channels;
+        done = vkb_graph_show_image(adjoint->graph, cotangents, names[forward->input], error);
     }
+    return done;
 }
 
 bool vkb_build_adjoint(const struct vkb_source *source, const struct vkb_settings *settings,
@@ -158,9 +160,8 @@ bool vkb_build_adjoint(const struct vkb_source *source, const struct vkb_setting
         done = add_cotangents(&adjoint, source, cotangents, i, error);
     *possible = true;
     done = done && add_passes(&adjoint, settings, possible, error)
-        && vkb_table_end(&adjoint.table, graph, adjoint.table_image, error);
-    if (done && !cotangents->sums)
-        show_results(&adjoint, image_count);
+        && vkb_table_end(&adjoint.table, graph, adjoint.table_image, error)
+        && (cotangents->sums || show_results(&adjoint, image_count, error));
     vkb_free(adjoint.table.texels);
     vkb_free(adjoint.cotangents);
     return done;

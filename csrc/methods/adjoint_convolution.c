@@ -33,12 +33,15 @@ static bool mirror_kernel(const struct vkb_kernel_data *kernel, struct vkb_graph
     return true;
 }
 
-// What is convolved: the glow, or highlights above Unreal's threshold.
+// What is convolved: what the first stage of the transform reads.
 static uint32_t find_source(const struct vkb_graph *graph)
 {
-    const uint32_t highlights = vkb_graph_find(graph, "highlights");
+    uint32_t pass = 0;
 
-    return highlights != VKB_NO_IMAGE ? highlights : vkb_graph_find(graph, "glow");
+    while (!vkb_computes(&graph->passes[pass], VKB_BLOCK_fft)
+           || graph->passes[pass].constants.stage != STAGE_FIRST)
+        ++pass;
+    return graph->passes[pass].reads[0];
 }
 
 bool vkb_transpose_convolution(struct vkb_adjoint *adjoint, const struct vkb_settings *settings,

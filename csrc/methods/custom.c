@@ -4,38 +4,80 @@
 #include "passes/levels.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 
-static const char BLOOM[] = "bloom";
+// The results that the core uses: the bloom, and the picture, which takes the place of the scene.
+static const char BLOOM[] = "bloom", PICTURE[] = "main";
 
 // Keeps the first failure.
 #define FAIL(levels, ...) \
     ((levels)->failed = \
          (levels)->failed || !vkb_fail((levels)->error, VKB_ERROR_VALUE, __VA_ARGS__))
 
-static uint32_t find_read(const struct vkb_bloom_source *source, const struct vkb_graph *graph,
-                          const char *name)
+// The number of the first passes whose result has that name; `count` if none has it.
+static uint32_t find_pass(const struct vkb_settings *settings, uint32_t count, const char *name)
 {
-    return strcmp(name, "MAIN") == 0 ? source->scene
-         : strcmp(name, "GLOW") == 0 ? source->glow
-                                     : vkb_graph_find(graph, name);
+    uint32_t pass = 0;
+
+    while (pass < count && strcmp(settings->passes[pass].name, name) != 0)
+        ++pass;
+    return pass;
 }
 
-static uint32_t add_pass(struct vkb_levels *levels, const struct vkb_custom_pass *pass,
-                         const char *name)
+// The image of a name that pass `number` reads. Of others in the graph passes know no names.
+static uint32_t find_read(const struct vkb_levels *levels, const uint32_t *images, uint32_t number,
+                          const char *name)
 {
-    const struct vkb_size size = {pass->width, pass->height};
-    struct vkb_graph *graph = levels->graph;
+    const uint32_t pass = find_pass(levels->settings, number, name);
 
-    if (vkb_graph_find(graph, name) != VKB_NO_IMAGE)
-        FAIL(levels, "passes: there are two images named %s", name);
-    const uint32_t image = vkb_levels_target(levels, name, levels->source->format, size,
-                                             pass->framebuffer && name == pass->name);
-    struct vkb_pass_row row = vkb_fullscreen_row(pass->name, pass->shader, image);
+    return strcmp(name, "MAIN") == 0 ? levels->source->scene
+         : strcmp(name, "GLOW") == 0 ? levels->source->glow
+         : pass < number             ? images[pass]
+                                     : VKB_NO_IMAGE;
+}
+
+static bool is_free(const struct vkb_levels *levels, const char *name)
+{
+    const struct vkb_settings *settings = levels->settings;
+
+    return vkb_graph_find(levels->graph, name) == VKB_NO_IMAGE
+        && find_pass(settings, settings->pass_count, name) == settings->pass_count;
+}
+
+// Names the image of a pass. Where the graph has a framebuffer of that name, it is saved_NAME;
+// where the method saves that, too, saved__NAME, which is no name of a texture.
+static void name_image(const struct vkb_levels *levels, const struct vkb_custom_pass *pass,
+                       vkb_image_name name)
+{
+    snprintf(name, VKB_NAME_SIZE, "%s", pass->name);
+    if (!pass->framebuffer || vkb_graph_find(levels->graph, name) == VKB_NO_IMAGE)
+        return;
+    snprintf(name, VKB_NAME_SIZE, "saved_%.25s", pass->name);
+    if (!is_free(levels, name))
+        snprintf(name, VKB_NAME_SIZE, "saved__%.24s", pass->name);
+}
+
+// Adds pass `number`. `images` has those of the passes before. A bloom that is enlarged afterwards
+// is no framebuffer.
+static uint32_t add_pass(struct vkb_levels *levels, const uint32_t *images, uint32_t number,
+                         bool is_enlarged)
+{
+    const struct vkb_custom_pass *pass = &levels->settings->passes[number];
+    const struct vkb_size size = {pass->width, pass->height};
+    vkb_image_name name;
+
+    if (find_pass(levels->settings, number, pass->name) < number)
+        FAIL(levels, "passes: there are two images named %s", pass->name);
+    name_image(levels, pass, name);
+    const uint32_t image =
+        vkb_levels_target(levels, is_enlarged ? "bloom_own" : name, levels->source->format, size,
+                          pass->framebuffer && !is_enlarged);
+    struct vkb_pass_row row = vkb_fullscreen_row(name, pass->shader, image);
     for (; row.read_count < pass->read_count; ++row.read_count) {
         const char *read = pass->reads[row.read_count];
-        const uint32_t found = find_read(levels->source, graph, read);
-        if (found == VKB_NO_IMAGE || found == image)
+        const uint32_t found = find_read(levels, images, number, read);
+        if (found == VKB_NO_IMAGE)
             FAIL(levels, "passes: %s reads %s, which no pass before it writes", pass->name, read);
         row.reads[row.read_count] = found;
     }
@@ -59,7 +101,8 @@ static bool has_size(const struct vkb_custom_pass *pass, struct vkb_size size)
     return pass->width == size.width && pass->height == size.height;
 }
 
-uint32_t vkb_add_custom(struct vkb_levels *levels)
+// Adds all passes. Returns the bloom, if there is one.
+static uint32_t add_passes(struct vkb_levels *levels, uint32_t *images)
 {
     const struct vkb_settings *settings = levels->settings;
     const struct vkb_size final = levels->source->final;
@@ -68,14 +111,27 @@ uint32_t vkb_add_custom(struct vkb_levels *levels)
     for (uint32_t i = 0; i < settings->pass_count; ++i) {
         const struct vkb_custom_pass *pass = &settings->passes[i];
         const bool is_bloom = strcmp(pass->name, BLOOM) == 0, fits = has_size(pass, final);
-        const uint32_t image = add_pass(levels, pass, is_bloom && !fits ? "bloom_own" : pass->name);
+        const bool is_picture = strcmp(pass->name, PICTURE) == 0;
+        images[i] = add_pass(levels, images, i, is_bloom && !fits);
         if (is_bloom)
-            bloom = fits ? image : vkb_levels_enlarge(levels, UPSAMPLE_LINEAR, image, 1.0);
-        else if (strcmp(pass->name, VKB_CUSTOM_PICTURE) == 0 && !fits)
-            FAIL(levels, "passes: %s is %u x %u, which is not the frame's size, %u x %u",
-                 VKB_CUSTOM_PICTURE, pass->width, pass->height, final.width, final.height);
+            bloom = fits ? images[i] : vkb_levels_enlarge(levels, UPSAMPLE_LINEAR, images[i], 1.0);
+        if (is_picture)
+            levels->picture = images[i];
+        if (is_picture && !fits)
+            FAIL(levels, "passes: %s is %u x %u, which is not the frame's size, %u x %u", PICTURE,
+                 pass->width, pass->height, final.width, final.height);
     }
-    if (bloom == VKB_NO_IMAGE && vkb_graph_find(levels->graph, VKB_CUSTOM_PICTURE) == VKB_NO_IMAGE)
-        FAIL(levels, "passes: none writes %s or %s", BLOOM, VKB_CUSTOM_PICTURE);
+    if (bloom == VKB_NO_IMAGE && !levels->picture)
+        FAIL(levels, "passes: none writes %s or %s", BLOOM, PICTURE);
+    return bloom;
+}
+
+uint32_t vkb_add_custom(struct vkb_levels *levels)
+{
+    uint32_t *images = vkb_alloc(levels->error, levels->settings->pass_count + 1, sizeof *images);
+    const uint32_t bloom = images ? add_passes(levels, images) : VKB_NO_IMAGE;
+
+    levels->failed = levels->failed || !images;
+    vkb_free(images);
     return bloom;
 }

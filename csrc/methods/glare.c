@@ -283,15 +283,18 @@ uint32_t vkb_add_light(struct vkb_levels *method, const uint32_t *stages, uint32
     const struct vkb_settings *settings = method->settings;
     struct vkb_bloom_source floats = *method->source;
     struct vkb_levels levels = *method;
-    double shares[MAX_STAGES + 1] = {settings->values.intensity};
+    double shares[MAX_STAGES + 1] = {0.0};
     const struct vkb_glare_values *dirt = NULL;
 
     // Not rounded where the bloom's buffers are coarse: the composite rounds.
     if (vkb_end_format(settings, floats.format) != VKB_FORMAT_RGBA16_FLOAT)
         floats.format = VKB_FORMAT_RGBA32_FLOAT;
     levels.source = &floats;
-    levels.downs[0] = bloom;
-    levels.count = 1;
+    levels.count = 0;
+    if (bloom != VKB_NO_IMAGE) {
+        shares[0] = settings->values.intensity;
+        levels.downs[levels.count++] = bloom;
+    }
     for (uint32_t i = 0; i < settings->stage_count; ++i) {
         if (settings->stages[i].kind == VKB_STAGE_DIRT) {
             dirt = &settings->stages[i].values;
@@ -299,6 +302,13 @@ uint32_t vkb_add_light(struct vkb_levels *method, const uint32_t *stages, uint32
         }
         shares[levels.count] = settings->stages[i].values.intensity;
         levels.downs[levels.count++] = stages[i];
+    }
+    if (levels.count == 0) {
+        method->failed = method->failed
+                      || !vkb_fail(levels.error, VKB_ERROR_VALUE,
+                                   "glare: dirt has no light that it multiplies; add a stage that "
+                                   "gives light, or save a bloom");
+        return VKB_NO_IMAGE;
     }
     uint32_t light = vkb_levels_step(&levels, "light", 0, floats.final);
     vkb_levels_gather(&levels, shares, UPSAMPLE_LINEAR, light);

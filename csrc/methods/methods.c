@@ -19,8 +19,9 @@ uint32_t vkb_add_bloom(struct vkb_levels *levels, const struct vkb_bloom_source 
     if (vkb_has_glare(levels->settings))
         vkb_add_stages(levels, stages);
     const uint32_t bloom = methods[levels->settings->method](levels);
-    const uint32_t light =
-        vkb_has_glare(levels->settings) ? vkb_add_light(levels, stages, bloom) : bloom;
+    const uint32_t light = vkb_has_glare(levels->settings)
+                             ? vkb_add_light(levels, stages, levels->picture ? VKB_NO_IMAGE : bloom)
+                             : bloom;
     levels->source = NULL;  // the caller's
     return light;
 }

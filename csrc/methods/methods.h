@@ -39,7 +39,8 @@ bool vkb_has_glare(const struct vkb_settings *settings);
 
 // Adds the rows of the stages of glare to the graph; `stages` gets the image of each.
 void vkb_add_stages(struct vkb_levels *levels, uint32_t *stages);
-// Adds the sum of the bloom and the stages, each times its intensity. Returns this image.
+// Adds the sum of the bloom (VKB_NO_IMAGE: none) and the stages, each times its intensity. Returns
+// this image.
 uint32_t vkb_add_light(struct vkb_levels *method, const uint32_t *stages, uint32_t bloom);
 
 // Adds the convolution of the source's glow with the kernel of the settings. `result` has the name

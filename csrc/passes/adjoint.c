@@ -269,9 +269,7 @@ static bool add_sums(struct vkb_adjoint *adjoint, uint32_t image, struct vkb_siz
         if (!vkb_add_adjoint_row(adjoint, &row, size, &image, error))
             return false;
     } while (size.width > 1 || size.height > 1);
-    snprintf(adjoint->graph->images[image].name, VKB_NAME_SIZE, "%s", name);
-    adjoint->graph->images[image].framebuffer = true;
-    return true;
+    return vkb_graph_show_image(adjoint->graph, image, name, error);
 }
 
 bool vkb_add_sums(struct vkb_adjoint *adjoint, const struct vkb_pass_row *given,

@@ -19,18 +19,18 @@ static int composite_of(const struct vkb_settings *settings,
                                                        : composite;
 }
 
-static struct vkb_composite_source composited(const struct vkb_settings *settings,
-                                              const struct vkb_composite_source *source,
-                                              const struct vkb_graph *graph)
+// A picture that a custom method has written takes the place of the scene, and contains the bloom:
+// only glare is added to it.
+static struct vkb_composite_source composited(const struct vkb_levels *levels,
+                                              const struct vkb_composite_source *source)
 {
-    const uint32_t custom = settings->method == VKB_METHOD_CUSTOM
-                              ? vkb_graph_find(graph, VKB_CUSTOM_PICTURE)
-                              : VKB_NO_IMAGE;
-
-    return custom == VKB_NO_IMAGE ? *source
-                                  : (struct vkb_composite_source){.scene = custom,
-                                                                  .bloom = VKB_NO_IMAGE,
-                                                                  .mask = VKB_NO_IMAGE};
+    return levels->picture ? (struct vkb_composite_source){
+        .scene = levels->picture,
+        .bloom = source->lit ? source->bloom : VKB_NO_IMAGE,
+        .mask = VKB_NO_IMAGE,
+        .lit = source->lit,
+        .alpha = source->alpha,
+    } : *source;
 }
 
 void vkb_add_composite(struct vkb_levels *levels, const struct vkb_composite_source *given,
@@ -40,7 +40,7 @@ void vkb_add_composite(struct vkb_levels *levels, const struct vkb_composite_sou
     const struct vkb_graph *graph = levels->graph;
     if (levels->failed)
         return;
-    const struct vkb_composite_source own = composited(settings, given, graph), *source = &own;
+    const struct vkb_composite_source own = composited(levels, given), *source = &own;
     const struct vkb_image_row *scene = &graph->images[given->scene];
     struct vkb_image_row image = {
         .name = "final",

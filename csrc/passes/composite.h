@@ -14,10 +14,6 @@ struct vkb_composite_source {
     enum vkb_alpha alpha;
 };
 
-// The picture that a custom method may write: the composite then finishes it in place of the
-// scene, and adds nothing.
-#define VKB_CUSTOM_PICTURE "main"
-
 // Adds the last pass. It writes the framebuffer "final" in this format, with the scene's channels.
 void vkb_add_composite(struct vkb_levels *levels, const struct vkb_composite_source *source,
                        enum vkb_format format);

@@ -116,10 +116,11 @@ void vkb_add_filter(struct vkb_levels *levels, const struct vkb_taps *filter, ui
     const int32_t window = 2 * (int32_t)ceil(distance) + 2;
 
     if (columns > MAX_FILTER_TAPS || rows > MAX_FILTER_TAPS)
-        levels->failed = levels->failed
-                      || !vkb_fail(levels->error, VKB_ERROR_GENERAL,
-                                   "filter: %s has %u x %u places of taps, more than %d", row.name,
-                                   columns, rows, MAX_FILTER_TAPS);
+        levels->failed =
+            levels->failed
+            || !vkb_fail(levels->error, VKB_ERROR_GENERAL,
+                         "filter: %s has %u x %u places of taps, more than %d",
+                         vkb_graph_label(levels->graph, row.name), columns, rows, MAX_FILTER_TAPS);
     row.block = VKB_BLOCK_filter;
     VKB_SET_TARGET(&row, filter, target);
     params->coarse = (float)filter->gain;

@@ -71,6 +71,8 @@ struct vkb_levels {
     struct vkb_size sizes[MAX_LEVELS];
     uint32_t downs[MAX_LEVELS];
     uint32_t count;
+    uint32_t
+        picture;   // that a custom method has written; 0: none, since that image is the source's
     double below;  // the factor of the smaller level while levels are added up
 };
 

@@ -45,7 +45,9 @@ static PyObject *image_names(const struct vkb_graph *graph, const uint32_t *imag
     PyObject *tuple = PyTuple_New(count);
 
     for (uint32_t i = 0; tuple && i < count; ++i)
-        if (!vkb_set_item(tuple, i, PyUnicode_FromString(graph->images[images[i]].name)))
+        if (!vkb_set_item(
+                tuple, i,
+                PyUnicode_FromString(vkb_graph_label(graph, graph->images[images[i]].name))))
             Py_CLEAR(tuple);
     return tuple;
 }

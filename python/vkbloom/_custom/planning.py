@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
+from collections import Counter
 from collections.abc import Mapping
 from typing import Final
 
@@ -11,7 +12,7 @@ from vkbloom._custom.blocks import Directive
 from vkbloom._custom.buffers import Buffer
 from vkbloom._custom.expressions import ExpressionError, Values, evaluate, rounded
 from vkbloom._custom.file import CustomFile
-from vkbloom._custom.names import GLOW, HOOKED, LONGEST, RESIZING, STAGES
+from vkbloom._custom.names import BLOOM, GLOW, HOOKED, LONGEST, RESIZING, STAGES
 from vkbloom._custom.passes import CustomPass
 from vkbloom._custom.rows import Resources, Row
 from vkbloom._custom.shaders import BLACK, COPY, DIFFERENCE, Shaders, package_shader
@@ -24,8 +25,12 @@ TURNS: Final = itertools.count(1)
 PICTURE: Final = "main"
 BLOOM_IMAGE: Final = "bloom"
 LARGEST_SIDE: Final = 16384
-#: Names of the package's own images.
-TAKEN: Final = {"image", "emission", "mask", "glow", "final", "scene", "hdr", "depth", PICTURE}
+#: Names that no saved texture has: of images of the package, whether the frame has them or not. The
+#: core renames those of its other images, in the same way.
+TAKEN: Final = {
+    *("image", "emission", "mask", "glow", "final", "scene", "hdr", "depth"),
+    *(PICTURE, BLOOM_IMAGE),
+}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -184,12 +189,28 @@ def framebuffers(file: CustomFile, steps: list[Step]) -> dict[str, str]:
 
     If several passes save the same name, the last one is the framebuffer.
     """
-    last = {(step.saved or "").lower(): step.image.name for step in steps}
-    picture = last.pop("", None)
-    names = {image: f"saved_{saved}" if saved in TAKEN else saved for saved, image in last.items()}
+    last = {step.saved: step.image.name for step in steps}
+    picture = last.pop(None, None)
+    labels = labels_of({saved for stage, item in file.runs() if (saved := item.saved_at(stage))})
+    names = {image: labels[saved] for saved, image in last.items() if saved}
     if picture is not None and not file.saves_bloom:
         names[picture] = PICTURE
     return names
+
+
+def labels_of(saved: set[str]) -> dict[str, str]:
+    """Return the names of framebuffers, by those of the saved textures.
+
+    These are the names in lower case; as they are written if they differ only in case. Names of the
+    package get the prefix saved_; or saved__, if that name is saved, too.
+    """
+    counts = Counter(name.lower() for name in saved - {BLOOM})
+    labels = {name: name.lower() if counts[name.lower()] == 1 else name for name in saved - {BLOOM}}
+    given = set(labels.values())
+    for name, label in labels.items():
+        if label in TAKEN:
+            labels[name] = f"saved{'__' if f'saved_{label}' in given else '_'}{label}"
+    return {**labels, BLOOM: BLOOM_IMAGE}
 
 
 def random_number(seed: int, count: int) -> float:

@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 _MAX_LEVELS: Final = 7
 #: The fields whose derivatives are the channels of a sum.
 _SUMS: Final = {
-    "by_composite": ("intensity", "exposure", "reference_white"),
-    "by_threshold": ("threshold", "knee"),
+    ".by_composite": ("intensity", "exposure", "reference_white"),
+    ".by_threshold": ("threshold", "knee"),
 }
 #: A sum that is less than this, relative to the root of the sum of its squares, has lost digits.
 _MIN_SHARE: Final = 0.3
@@ -61,8 +61,8 @@ class Running:
         """Wait, and return the derivatives by image, mask and emission."""
         framebuffers = self.named()
         return {
-            name: framebuffers[f"by_{name}"]
-            if f"by_{name}" in framebuffers
+            name: framebuffers[f".by_{name}"]
+            if f".by_{name}" in framebuffers
             else self._zeros(part.shape)
             for name, part in self.passes.inputs.named().items()
         }

@@ -72,12 +72,13 @@ def apply(
         The image has another shape; the mask another size or other values; the emission another
         shape or dtype; or ``settings.alpha`` is "max" or "blur" and there is no alpha.
     """
-    if (function := getattr(settings, "numpy_reference", None)) is not None:
-        scene = as_float(image, "image", (3, 4))
-        return custom.framebuffers(function, scene, settings, np.asarray(image).dtype)
     scene, source, weights, format = checked_image(image, settings, mask, emission)
     dtype = np.asarray(image).dtype
-    return framebuffers(scene, source, settings, mask=weights, format=format, dtype=dtype)
+    if (function := getattr(settings, "numpy_reference", None)) is None:
+        return framebuffers(scene, source, settings, mask=weights, format=format, dtype=dtype)
+    _, seen = _first_buffer(source, settings, weights, format)
+    stages = _with_alphas(glare.stages(seen, settings.glare, format))
+    return custom.framebuffers(function, scene, settings, dtype, stages)
 
 
 def checked_image(
@@ -87,7 +88,8 @@ def checked_image(
     emission: NDArray[Any] | None,
 ) -> tuple[Array, Array, Array | None, str]:
     """Return scene, source of the bloom and mask in real units, and the bloom buffers' format."""
-    _method(settings)
+    if getattr(settings, "numpy_reference", None) is None:
+        _method(settings)
     scene = as_float(image, "image", (3, 4))
     format = format_of(image, settings.format)
     if settings.alpha != "keep" and (scene.shape[2] == 3 or format == "rg11b10ufloat"):
@@ -110,21 +112,11 @@ def framebuffers(
 ) -> dict[str, Array]:
     """Return the framebuffers of `apply`; without an emission, `source` is `scene`."""
     method = _method(settings)
-    size = size_of(scene)
     if not settings.bloom:
         return {"final": composite_checked(scene, None, settings, dtype)}
-    store = storage(format)
-    channels = 4 if settings.alpha == "blur" else 3
-
-    def thresholded(colours: Array) -> Array:
-        return masked(apply_threshold(colours, settings.threshold, settings.knee), mask)
-
-    buffers = settings.bloom_size or scaled(size, settings.bloom_scale)
-    reduced = sample(finite(source[..., :channels]), buffers)
-    glow = store.first(reduced) if settings.published else store(thresholded(reduced))
-    blurred = method.passes(BlurInput(glow, size, store, mask), settings)
-    # Published methods do not threshold the glow.
-    seen = thresholded(glow) if settings.published else glow
+    glow, seen = _first_buffer(source, settings, mask, format)
+    given = BlurInput(glow, size_of(scene), storage(format), mask)
+    blurred = method.passes(given, settings)
     stages = glare.stages(seen, settings.glare, format)
     results = _with_alphas({"glow": glow, **stages, **blurred})
     strength = strength_of(settings)
@@ -137,6 +129,25 @@ def framebuffers(
     share = 0.0 if source is not scene else 1.0 if mask is None else mask
     results["final"] = composite_checked(scene, light, settings, dtype, share)
     return results
+
+
+def _first_buffer(
+    source: Array, settings: Settings, mask: Array | None, format: str
+) -> tuple[Array, Array]:
+    """Return the glow, and what the stages of glare read."""
+    store = storage(format)
+    channels = 4 if settings.alpha == "blur" else 3
+
+    def thresholded(colours: Array) -> Array:
+        return masked(apply_threshold(colours, settings.threshold, settings.knee), mask)
+
+    buffers = settings.bloom_size or scaled(size_of(source), settings.bloom_scale)
+    reduced = sample(finite(source[..., :channels]), buffers)
+    if settings.published:
+        glow: Array = store.first(reduced)
+        return glow, thresholded(glow)
+    glow = store(thresholded(reduced))
+    return glow, glow
 
 
 @checked_as(settings=SETTINGS)
