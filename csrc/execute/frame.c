@@ -255,9 +255,9 @@ static bool submit(struct vkb_run *run, const struct vkb_frame_source *source,
         && record_and_submit(run, requests, request_count, error);
 }
 
-// After a failure it is unknown what the device did, so images and commands are created again. The
-// images are created later, when no submission is pending, since a wait here could not be
-// interrupted.
+// After a failure it is unknown what the device did, so images and commands are created again. (The
+// state of resources stays: a submission that failed has not changed it.) The images are created
+// later, when no submission is pending, since a wait here could not be interrupted.
 static void fail_frame(struct vkb_device *device, struct vkb_frame *frame,
                        struct vkb_submission *submission, const struct vkb_error *error)
 {
@@ -274,7 +274,6 @@ static bool renew(struct vkb_device *device, struct vkb_frame *frame, struct vkb
     if (!vkb_submissions_wait(device, &frame->submissions, error))
         return false;
     vkb_image_cache_destroy(device, &frame->cache);
-    vkb_resources_destroy(device, &frame->resources);
     frame->stale = false;
     return true;
 }
@@ -338,6 +337,7 @@ bool vkb_frame_submit(struct vkb_device *device, struct vkb_frame *frame,
     if (!done) {
         vkb_sources_end(&run, source, false);
         fail_frame(device, frame, run.submission, error);
+        vkb_resources_drop(device, &frame->resources, run.submission->number);
     }
     vkb_submissions_give_back(device, &frame->submissions, run.submission);
     return done;

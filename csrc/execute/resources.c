@@ -10,6 +10,7 @@ static void destroy_entry(const struct vkb_device *device, struct vkb_resource_e
     vkb_image_destroy(device, &entry->image);
     vkb_buffer_destroy(device, &entry->buffer);
     vkb_buffer_destroy(device, &entry->staging);
+    vkb_owner_release(entry->owner);
     vkb_free(entry);
 }
 
@@ -21,18 +22,58 @@ void vkb_resources_destroy(const struct vkb_device *device, struct vkb_resources
     *resources = (struct vkb_resources){0};
 }
 
+static void remove_entry(const struct vkb_device *device, struct vkb_resources *resources,
+                         size_t index)
+{
+    destroy_entry(device, resources->entries[index]);
+    resources->entries[index] = resources->entries[--resources->count];
+}
+
+// Destroys what nobody needs any more: state without an owner, and staging memory whose copy is
+// done.
+static void trim_done(const struct vkb_device *device, struct vkb_resources *resources,
+                      const struct vkb_age *age)
+{
+    for (size_t i = resources->count; i-- > 0;) {
+        struct vkb_resource_entry *entry = resources->entries[i];
+        if (entry->filled < age->pending)
+            vkb_buffer_destroy(device, &entry->staging);
+        if (entry->owner && atomic_load(&entry->owner->gone) && entry->used < age->pending)
+            remove_entry(device, resources, i);
+    }
+}
+
+// The number of entries without an owner; *oldest gets the index of the one that was used first.
+static size_t count_cached(const struct vkb_resources *resources, size_t *oldest)
+{
+    size_t count = 0;
+
+    for (size_t i = 0; i < resources->count; ++i) {
+        if (resources->entries[i]->owner)
+            continue;
+        if (count++ == 0 || resources->entries[i]->used < resources->entries[*oldest]->used)
+            *oldest = i;
+    }
+    return count;
+}
+
 void vkb_resources_trim(const struct vkb_device *device, struct vkb_resources *resources,
                         const struct vkb_age *age)
 {
-    for (size_t i = 0; i < resources->count && resources->count > VKB_KEPT_RESOURCES;) {
-        const uint64_t used = resources->entries[i]->used;
-        if (used >= age->pending || used + 1 >= age->now) {
-            ++i;
-            continue;
-        }
-        destroy_entry(device, resources->entries[i]);
-        resources->entries[i] = resources->entries[--resources->count];
-    }
+    size_t oldest = 0;
+
+    trim_done(device, resources, age);
+    while (count_cached(resources, &oldest) > VKB_KEPT_RESOURCES
+           && vkb_is_old(resources->entries[oldest]->used, age))
+        remove_entry(device, resources, oldest);
+}
+
+void vkb_resources_drop(const struct vkb_device *device, struct vkb_resources *resources,
+                        uint64_t submission)
+{
+    for (size_t i = resources->count; i-- > 0;)
+        if (resources->entries[i]->filled == submission)
+            remove_entry(device, resources, i);
 }
 
 static bool check_format(const struct vkb_device *device, const struct vkb_resource *resource,
@@ -132,10 +173,12 @@ bool vkb_resources_load(const struct vkb_device *device, VkCommandBuffer command
                                sizeof *entry);
             if (!entry)
                 return false;
-            // Found only when it is complete: after a failure all entries are destroyed.
+            entry->filled = now;
+            // Found only when it is complete: after a failure this entry is destroyed.
             if (!create_entry(device, resource, entry, error))
                 return false;
             entry->serial = resource->serial;
+            entry->owner = vkb_owner_hold(resource->owner);
             record_fill(device, commands, resource, entry);
         }
         entry->used = now;

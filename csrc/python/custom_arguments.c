@@ -1,6 +1,7 @@
 // The passes of a settings object that bring their shaders, textures and buffers along, as Python
 // packs them (_custom/rows.py). All functions return false with an exception set.
 #include "python/arguments.h"
+#include "python/module.h"
 
 #include <stddef.h>
 #include <string.h>
@@ -28,16 +29,38 @@ static bool copy_block(PyObject *block, void *to, Py_ssize_t size)
     return fits;
 }
 
-// (block, bytes or None)
+static const char OWNER[] = "vkbloom.resource_owner";
+
+static void leave(PyObject *capsule)
+{
+    vkb_owner_leave(PyCapsule_GetPointer(capsule, OWNER));
+}
+
+PyObject *vkb_resource_owner(PyObject *module, PyObject *unused)
+{
+    struct vkb_error error;
+    struct vkb_owner *owner = vkb_owner_create(&error);
+
+    (void)unused;
+    if (!owner)
+        return vkb_raise(vkb_module_state(module), &error);
+    PyObject *capsule = PyCapsule_New(owner, OWNER, leave);
+    if (!capsule)
+        vkb_owner_leave(owner);
+    return capsule;
+}
+
+// (block, bytes or None, owner or None)
 static bool read_resource(PyObject *tuple, struct vkb_resource *resource)
 {
-    PyObject *block, *data;
+    PyObject *block, *data, *owner;
 
-    if (!PyArg_ParseTuple(tuple, "SO:resource", &block, &data)
+    if (!PyArg_ParseTuple(tuple, "SOO:resource", &block, &data, &owner)
         || !copy_block(block, resource, RESOURCE_SIZE))
         return false;
     resource->data = data == Py_None ? NULL : PyBytes_AsString(data);
-    return data == Py_None || resource->data;
+    resource->owner = owner == Py_None ? NULL : PyCapsule_GetPointer(owner, OWNER);
+    return (data == Py_None || resource->data) && (owner == Py_None || resource->owner);
 }
 
 // (block, name of the shader, its SPIR-V, its hash, its threads along x and y, its bytes of shared

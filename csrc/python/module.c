@@ -61,6 +61,8 @@ static PyMethodDef functions[] = {
      "those variants would do; by default it draws every pass as its method defines it."},
     {"read_dlpack", vkb_read_dlpack, METH_O,
      "read_dlpack(capsule) -> (address, device, dtype, shape, strides). Does not consume it."},
+    {"resource_owner", vkb_resource_owner, METH_NOARGS,
+     "resource_owner() -> object. Renderers keep the state of its resources until it is deleted."},
     {"dry_run", vkb_dry_run_steps, METH_O,
      "dry_run(((source, plan), ...)) -> [[pass, ...], ...]. Of each plan the passes (Plan.passes) "
      "that run after those before it, on a renderer that has run nothing."},

@@ -13,6 +13,7 @@ PyObject *vkb_scene_source(PyObject *module, PyObject *arguments);
 PyObject *vkb_read_dlpack(PyObject *module, PyObject *capsule);
 PyObject *vkb_any_plan(PyObject *module, PyObject *arguments);
 PyObject *vkb_dry_run_steps(PyObject *module, PyObject *steps);
+PyObject *vkb_resource_owner(PyObject *module, PyObject *unused);
 
 // Methods of the Renderer.
 PyObject *vkb_renderer_plan(PyObject *renderer, PyObject *arguments);

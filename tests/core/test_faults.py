@@ -149,6 +149,40 @@ def test_what_a_failed_wait_was_for_is_destroyed_later(faulty: dict[str, str]) -
     assert output("-c", WAITS, **faulty) == "[True, True, True]\n"
 
 
+# A method counts its frames. Between two of them each call of another method's frame fails.
+STATE = """
+import itertools
+import numpy as np
+import vkbloom
+from tests.custom.test_rendering import COUNTER
+from vkbloom import _core
+
+image = np.ones((8, 8, 4), np.float32)
+counter = vkbloom.load_method(COUNTER, name="counter")(format="rgba32float")
+failures = 0
+with vkbloom.Renderer("software") as renderer:
+    sequence = renderer.map(itertools.repeat(image), counter)
+    for n in itertools.count(1):
+        assert next(sequence)["bloom"][0, 0, 0] == n, n
+        # The second one is another new frame, with resources of its own.
+        for settings in (vkbloom.Pyramid(levels=2, exposure=n / 1024), counter.replace(exposure=1)):
+            _core.arm_fault(n, -2, "")
+            try:
+                renderer.apply(image, settings)
+            except (vkbloom.Error, MemoryError):
+                failures += 1
+            _, failed, *_ = _core.fault_state()
+            _core.arm_fault(0, 0, "")
+        if not failed:
+            break
+print(failures > 20)
+"""
+
+
+def test_the_state_of_a_method_outlives_failures(faulty: dict[str, str]) -> None:
+    assert output("-c", STATE, **faulty) == "True\n"
+
+
 # Opens renderers until a device is refused.
 MANY = """
 import vkbloom

@@ -150,6 +150,48 @@ def test_textures_buffers_and_their_state(renderer: Renderer) -> None:
         assert renderer.apply(image, settings)["final"][2, 3, 0] == 3
 
 
+#: A count of the frames.
+COUNTER = """\
+//!BUFFER counts
+//!VAR uint n
+//!STORAGE
+
+//!HOOK MAIN
+//!BIND counts
+//!COMPUTE 64 64 1 1
+//!SAVE BLOOM
+void hook() {
+    n += 1u;
+    imageStore(out_image, ivec2(0), vec4(float(n)));
+}
+"""
+
+
+def textured(count: int) -> str:
+    """Return a file of passes that read so many textures."""
+    blocks = [f"//!TEXTURE t{i}\n//!SIZE 1\n//!FORMAT r8\nff" for i in range(count)]
+    for first in range(0, count, 11):
+        names = [f"t{i}" for i in range(first, min(first + 11, count))]
+        total = " + ".join(f"texture({name}, 0.5).r" for name in names)
+        binds = "".join(f"//!BIND {name}\n" for name in names)
+        save = "//!SAVE BLOOM\n" if names[-1] == f"t{count - 1}" else f"//!SAVE S{first}\n"
+        blocks.append(f"//!HOOK MAIN\n{binds}{save}vec4 hook() {{ return vec4({total}); }}")
+    return "\n".join(blocks) + "\n"
+
+
+def test_the_state_of_a_sequence_outlives_any_number_of_other_methods(renderer: Renderer) -> None:
+    counter, other = own(COUNTER, "counter"), own(textured(33), "textured")
+    image = picture(8, 8)
+    counts = []
+    # Some frames are rendered ahead.
+    for frames in renderer.map([image] * 8, counter):
+        counts.append(frames["bloom"][0, 0, 0])
+        for number in range(70 if len(counts) in (2, 4) else 0):
+            renderer.apply(image, other.replace(exposure=number / 64))
+            renderer.apply(image, counter)
+    assert counts == [1, 2, 3, 4, 5, 6, 7, 8]
+
+
 def test_the_random_number_repeats_and_differs_between_passes(renderer: Renderer) -> None:
     text = "//!HOOK MAIN\n//!SAVE A\nvec4 hook() { return vec4(random); }\n"
     settings = own(

@@ -7,6 +7,7 @@ import math
 import struct
 from typing import Any, Final, NamedTuple
 
+from vkbloom import _core
 from vkbloom._custom.buffers import Buffer
 from vkbloom._custom.file import CustomFile
 from vkbloom._custom.textures import Texture
@@ -34,10 +35,14 @@ class CoreShader(NamedTuple):
 
 
 class Resource(NamedTuple):
-    """A texture or a buffer: a block of the core, and its content. None: zeros."""
+    """A texture or a buffer: a block of the core, and its content. None: zeros.
+
+    Renderers keep what passes change as long as there is its `owner`; others have none.
+    """
 
     block: bytes
     data: bytes | None
+    owner: object = None
 
 
 class Row(NamedTuple):
@@ -94,11 +99,15 @@ Resources = dict[str, Resource]
 
 def made_resources(file: CustomFile, *, storage: bool) -> Resources:
     """Return new resources by name: those that passes change, or the others."""
-    return {
+    made = {
         name: texture_resource(block) if isinstance(block, Texture) else buffer_resource(block)
         for name, block in file.given.items()
         if block.storage == storage
     }
+    if not made or not storage:
+        return made
+    owner = _core.resource_owner()
+    return {name: resource._replace(owner=owner) for name, resource in made.items()}
 
 
 def texture_resource(texture: Texture) -> Resource:
