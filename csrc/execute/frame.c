@@ -33,60 +33,18 @@ void vkb_frame_destroy(const struct vkb_device *device, struct vkb_frame *frame)
     *frame = (struct vkb_frame){0};
 }
 
-static bool reserve_descriptors(struct vkb_run *run, uint32_t sets, struct vkb_error *error)
-{
-    const uint32_t resources = sets * VKB_MAX_RESOURCES;
-    const struct VolkDeviceTable *vk = &run->device->vk;
-    struct vkb_submission *submission = run->submission;
-
-    if (sets <= submission->descriptor_capacity)
-        return VK(error,
-                  vk->vkResetDescriptorPool(run->device->handle, submission->descriptors, 0));
-    vk->vkDestroyDescriptorPool(run->device->handle, submission->descriptors, NULL);
-    submission->descriptors = VK_NULL_HANDLE;
-    submission->descriptor_capacity = 0;
-    if (!VK(error,
-            vk->vkCreateDescriptorPool(
-                run->device->handle,
-                &(VkDescriptorPoolCreateInfo){
-                    .sType = VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO,
-                    .maxSets = sets,
-                    .poolSizeCount = 5,
-                    .pPoolSizes =
-                        (VkDescriptorPoolSize[]){
-                            {VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER, sets + resources},
-                            {VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER,
-                             sets * VKB_MAX_READS + resources},
-                            {VK_DESCRIPTOR_TYPE_STORAGE_IMAGE,
-                             sets * (VKB_MAX_LOADS + 1) + resources},
-                            {VK_DESCRIPTOR_TYPE_UNIFORM_TEXEL_BUFFER, sets * VKB_MAX_LINEAR_TEXELS},
-                            {VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, sets + resources},
-                        },
-                },
-                NULL, &submission->descriptors)))
-        return false;
-    submission->descriptor_capacity = sets;
-    return true;
-}
-
 // Reserves what the passes of the requests can need.
 static bool reserve(struct vkb_run *run, const struct vkb_request *requests, uint32_t request_count,
                     struct vkb_error *error)
 {
     const VkDeviceSize align = run->device->limits.minUniformBufferOffsetAlignment;
     const VkDeviceSize params = (sizeof(union vkb_params) + align - 1) / align * align;
-    const struct vkb_scene *scene = &run->frame->scene;
-    const uint32_t surfaces = scene->body.surface_count + scene->glow.surface_count;
     struct vkb_submission *submission = run->submission;
-    uint32_t passes = 0, sets = 2;  // of the probe
+    uint32_t passes = 0;
 
-    for (uint32_t i = 0; i < request_count; ++i) {
-        const struct vkb_plan *plan = requests[i].plan;
-        passes += plan->graph.pass_count;
-        sets += vkb_record_sets(run->device, &plan->graph) + surfaces + VKB_INPUT_COUNT
-              + plan->output_count;
-    }
-    return reserve_descriptors(run, sets, error)
+    for (uint32_t i = 0; i < request_count; ++i)
+        passes += requests[i].plan->graph.pass_count;
+    return vkb_descriptors_reset(run->device, &submission->descriptors, error)
         && vkb_timer_reserve(run->device, passes, &submission->timer, error)
         && vkb_buffer_reserve(run->device, VKB_MEMORY_UPLOAD, VK_BUFFER_USAGE_UNIFORM_BUFFER_BIT,
                               params * passes, &submission->uniforms, error);

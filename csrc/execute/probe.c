@@ -32,7 +32,7 @@ static bool record(struct vkb_run *run, struct vkb_image *image, struct vkb_erro
         || !vkb_strided_copy_create(device, frame->pipelines.cache, work.kind,
                                     &frame->strided_copies, error)
         || !vkb_strided_copy_record(device, &frame->strided_copies, commands,
-                                    run->submission->descriptors, &work, error))
+                                    &run->submission->descriptors, &work, error))
         return false;
     vkb_barrier_record(device, commands, NULL, true, VKB_ACCESS_DISPATCH_STORED,
                        VKB_ACCESS_HOST_READ);

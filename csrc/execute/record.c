@@ -154,15 +154,8 @@ static bool bind_descriptors(struct vkb_run *run, const struct binding *binding,
         vkb_bindings_layouts(&run->frame->pipelines.bindings, pass);
     VkDescriptorSet set;
 
-    if (!VK(error, vk->vkAllocateDescriptorSets(
-                       run->device->handle,
-                       &(VkDescriptorSetAllocateInfo){
-                           .sType = VK_STRUCTURE_TYPE_DESCRIPTOR_SET_ALLOCATE_INFO,
-                           .descriptorPool = run->submission->descriptors,
-                           .descriptorSetCount = 1,
-                           .pSetLayouts = &layouts->made.set,
-                       },
-                       &set))
+    if (!vkb_descriptors_allocate(run->device, &run->submission->descriptors, layouts->made.set,
+                                  &set, error)
         || !write_descriptors(run, binding, layouts, set, error))
         return false;
     vk->vkCmdBindDescriptorSets(run->submission->commands.buffer, vkb_pass_bind_point(pass),
@@ -227,22 +220,6 @@ static uint32_t band_rows(const struct vkb_device *device, const struct vkb_pass
     const size_t blocks = device->limits.maxStorageBufferRange / row_pitch / block;
 
     return (uint32_t)((blocks ? blocks : 1) * block);
-}
-
-uint32_t vkb_record_sets(const struct vkb_device *device, const struct vkb_graph *graph)
-{
-    uint32_t sets = 0;
-
-    for (uint32_t i = 0; i < graph->pass_count; ++i) {
-        const struct vkb_pass_row *pass = &graph->passes[i];
-        ++sets;
-        if (pass->reading == VKB_READING_LINEAR_TEXELS) {
-            const struct vkb_image_row *row = &graph->images[pass->targets[0]];
-            const size_t pitch = vkb_image_row_pitch(row->format, row->width);
-            sets += row->height / band_rows(device, pass, pitch);
-        }
-    }
-    return sets;
 }
 
 // The output whose memory the pass can store to instead of its image; NULL: none. No other pass may

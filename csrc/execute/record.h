@@ -43,9 +43,6 @@ struct vkb_sink {
 };
 extern const struct vkb_sink vkb_host_sink, vkb_cuda_sink, vkb_screen_sink;
 
-// The most descriptor sets that the graph's passes need, without those of surfaces.
-uint32_t vkb_record_sets(const struct vkb_device *device, const struct vkb_graph *graph);
-
 // The planner calls this for each group of passes that has to run. `context` is a struct vkb_run.
 vkb_record vkb_record_group;
 

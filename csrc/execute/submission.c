@@ -12,7 +12,7 @@ static void release_inputs(const struct vkb_device *device, struct vkb_submissio
 static void destroy_submission(const struct vkb_device *device, struct vkb_submission *submission)
 {
     vkb_timer_destroy(device, &submission->timer);
-    device->vk.vkDestroyDescriptorPool(device->handle, submission->descriptors, NULL);
+    vkb_descriptors_destroy(device, &submission->descriptors);
     vkb_buffer_destroy(device, &submission->uniforms);
     vkb_readback_destroy(device, &submission->readback);
     release_inputs(device, submission);

@@ -3,6 +3,7 @@
 #ifndef VKB_SUBMISSION_H
 #define VKB_SUBMISSION_H
 
+#include "execute/descriptors.h"
 #include "graph/graph.h"
 #include "transfer/readback.h"
 #include "vulkan/commands.h"
@@ -12,8 +13,7 @@ struct vkb_submission {
     struct vkb_commands commands;
     struct vkb_buffer uniforms;
     VkDeviceSize uniform_used;
-    VkDescriptorPool descriptors;
-    uint32_t descriptor_capacity;  // in sets
+    struct vkb_descriptors descriptors;
     struct vkb_timer timer;
     struct vkb_readback readback;
     struct vkb_image inputs[VKB_INPUT_COUNT];  // the caller's, which it reads in place; by kind

@@ -81,7 +81,7 @@ static bool copy_strided(struct vkb_run *run, struct vkb_strided_copy_work *work
     return vkb_strided_copy_create(run->device, run->frame->pipelines.cache, work->kind,
                                    &run->frame->strided_copies, error)
         && vkb_strided_copy_record(run->device, &run->frame->strided_copies,
-                                   run->submission->commands.buffer, run->submission->descriptors,
+                                   run->submission->commands.buffer, &run->submission->descriptors,
                                    work, error);
 }
 

@@ -109,23 +109,15 @@ static VkExtent2D count_groups(const struct vkb_strided_copy_work *work)
 
 bool vkb_strided_copy_record(const struct vkb_device *device,
                              const struct vkb_strided_copies *copies, VkCommandBuffer commands,
-                             VkDescriptorPool pool, const struct vkb_strided_copy_work *work,
-                             struct vkb_error *error)
+                             struct vkb_descriptors *descriptors,
+                             const struct vkb_strided_copy_work *work, struct vkb_error *error)
 {
     const struct VolkDeviceTable *vk = &device->vk;
     const struct vkb_strided_copy_pipeline *pipeline = &copies->pipelines[work->kind];
     const VkExtent2D groups = count_groups(work);
     VkDescriptorSet set;
 
-    if (!VK(error, vk->vkAllocateDescriptorSets(
-                       device->handle,
-                       &(VkDescriptorSetAllocateInfo){
-                           .sType = VK_STRUCTURE_TYPE_DESCRIPTOR_SET_ALLOCATE_INFO,
-                           .descriptorPool = pool,
-                           .descriptorSetCount = 1,
-                           .pSetLayouts = &pipeline->layouts.set,
-                       },
-                       &set)))
+    if (!vkb_descriptors_allocate(device, descriptors, pipeline->layouts.set, &set, error))
         return false;
     write_set(device, set, work);
     vk->vkCmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE, pipeline->handle);

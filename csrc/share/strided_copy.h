@@ -4,6 +4,7 @@
 #define VKB_STRIDED_COPY_H
 
 #include "execute/bindings.h"
+#include "execute/descriptors.h"
 #include "vulkan/memory.h"
 
 enum vkb_strided_copy_kind {
@@ -52,7 +53,7 @@ enum { VKB_COUNTS_SIZE = 256 };
 
 bool vkb_strided_copy_record(const struct vkb_device *device,
                              const struct vkb_strided_copies *copies, VkCommandBuffer commands,
-                             VkDescriptorPool pool, const struct vkb_strided_copy_work *work,
-                             struct vkb_error *error);
+                             struct vkb_descriptors *descriptors,
+                             const struct vkb_strided_copy_work *work, struct vkb_error *error);
 
 #endif

@@ -42,6 +42,11 @@
     FUNCTION(vkCreateSemaphore, create_semaphore) \
     FUNCTION(vkGetSemaphoreFdKHR, get_semaphore_file) \
     FUNCTION(vkDestroySemaphore, destroy_semaphore) \
+    FUNCTION(vkCreateDescriptorSetLayout, create_layout) \
+    FUNCTION(vkCreateDescriptorPool, create_pool) \
+    FUNCTION(vkResetDescriptorPool, reset_pool) \
+    FUNCTION(vkDestroyDescriptorPool, destroy_pool) \
+    FUNCTION(vkAllocateDescriptorSets, allocate_sets) \
     FUNCTION(vkCmdClearColorImage, NULL) \
     FUNCTION(vkSignalSemaphore, NULL) \
     FUNCTION(vkWaitSemaphores, NULL)
@@ -622,6 +627,101 @@ static VKAPI_ATTR VkResult VKAPI_CALL wait(VkDevice handle, uint32_t count, cons
     below.vkWaitForFences(handle, count, fences, all, UINT64_MAX);
     raise(SIGINT);
     return VK_TIMEOUT;
+}
+
+// Pools give no more than they were created for ("pools"): sets, and descriptors of each type.
+enum { DESCRIPTOR_TYPES = VK_DESCRIPTOR_TYPE_INPUT_ATTACHMENT + 1, MAX_COUNTED = 1 << 10 };
+struct counted {
+    uint64_t handle;
+    uint32_t sets, types[DESCRIPTOR_TYPES];
+};
+static struct counted_pool {
+    struct counted whole, left;
+} pools[MAX_COUNTED];
+static struct counted layouts[MAX_COUNTED];
+static uint32_t layout_count;
+
+static struct counted_pool *find_pool(VkDescriptorPool handle)
+{
+    uint32_t i = 0;
+
+    while (i < MAX_COUNTED - 1 && pools[i].whole.handle != (uint64_t)handle)
+        ++i;
+    return &pools[i];
+}
+
+static VKAPI_ATTR VkResult VKAPI_CALL create_layout(VkDevice handle,
+                                                    const VkDescriptorSetLayoutCreateInfo *info,
+                                                    const VkAllocationCallbacks *callbacks,
+                                                    VkDescriptorSetLayout *layout)
+{
+    const VkResult result = below.vkCreateDescriptorSetLayout(handle, info, callbacks, layout);
+    struct counted *counted = &layouts[layout_count];
+
+    // (The core destroys layouts only at the end.)
+    layout_count += layout_count < MAX_COUNTED - 1;
+    *counted = (struct counted){.handle = (uint64_t)*layout};
+    for (uint32_t i = 0; i < info->bindingCount; ++i)
+        counted->types[info->pBindings[i].descriptorType] += info->pBindings[i].descriptorCount;
+    return result;
+}
+
+static VKAPI_ATTR VkResult VKAPI_CALL create_pool(VkDevice handle,
+                                                  const VkDescriptorPoolCreateInfo *info,
+                                                  const VkAllocationCallbacks *callbacks,
+                                                  VkDescriptorPool *pool)
+{
+    const VkResult result = below.vkCreateDescriptorPool(handle, info, callbacks, pool);
+    struct counted_pool *counted = find_pool(VK_NULL_HANDLE);
+
+    counted->whole = (struct counted){.handle = (uint64_t)*pool, .sets = info->maxSets};
+    for (uint32_t i = 0; i < info->poolSizeCount; ++i)
+        counted->whole.types[info->pPoolSizes[i].type] += info->pPoolSizes[i].descriptorCount;
+    counted->left = counted->whole;
+    return result;
+}
+
+static VKAPI_ATTR VkResult VKAPI_CALL reset_pool(VkDevice handle, VkDescriptorPool pool,
+                                                 VkDescriptorPoolResetFlags flags)
+{
+    find_pool(pool)->left = find_pool(pool)->whole;
+    return below.vkResetDescriptorPool(handle, pool, flags);
+}
+
+static VKAPI_ATTR void VKAPI_CALL destroy_pool(VkDevice handle, VkDescriptorPool pool,
+                                               const VkAllocationCallbacks *callbacks)
+{
+    if (pool)
+        find_pool(pool)->whole.handle = 0;
+    below.vkDestroyDescriptorPool(handle, pool, callbacks);
+}
+
+// Takes a set of the layout from the pool; false: the pool has too little.
+static bool take_set(struct counted *left, VkDescriptorSetLayout layout)
+{
+    const struct counted *counted = layouts;
+    bool fits = left->sets > 0;
+
+    while (counted->handle != (uint64_t)layout)
+        ++counted;
+    for (int type = 0; type < DESCRIPTOR_TYPES; ++type)
+        fits = fits && left->types[type] >= counted->types[type];
+    for (int type = 0; fits && type < DESCRIPTOR_TYPES; ++type)
+        left->types[type] -= counted->types[type];
+    left->sets -= fits;
+    return fits;
+}
+
+static VKAPI_ATTR VkResult VKAPI_CALL allocate_sets(VkDevice handle,
+                                                    const VkDescriptorSetAllocateInfo *info,
+                                                    VkDescriptorSet *sets)
+{
+    struct counted *left = &find_pool(info->descriptorPool)->left;
+
+    for (uint32_t i = 0; lacks("pools") && i < info->descriptorSetCount; ++i)
+        if (!take_set(left, info->pSetLayouts[i]))
+            return VK_ERROR_OUT_OF_POOL_MEMORY;
+    return below.vkAllocateDescriptorSets(handle, info, sets);
 }
 
 static VKAPI_ATTR VkResult VKAPI_CALL create_instance(const VkInstanceCreateInfo *info,

@@ -20,8 +20,10 @@ import vkbloom
 from tests import tolerance
 from tests.exhaustive import EXHAUSTIVE
 from tests.images import picture
+from tests.screens import CAMERA, panel
 from vkbloom import DualKawase, Frames, Pyramid, Renderer, Scene, Separable, ThreeBloom
 from vkbloom._scene import skybox
+from vkbloom._scene.textures import Texture
 
 DTYPES = ("uint8", "float16", "float32")
 # One of each variant: lines, strips and tiles, levels half and twice as large, sums of all levels.
@@ -68,6 +70,18 @@ CUSTOM = {
 }
 
 
+#: Counts its frames.
+COUNTER = """//!BUFFER counts
+//!VAR uint n
+//!STORAGE
+
+//!HOOK MAIN
+//!BIND counts
+//!COMPUTE 64 64 1 1
+//!SAVE BLOOM
+void hook() { imageStore(out_image, ivec2(0), vec4(float(++n))); }
+"""
+
 #: What the device lacks.
 TAKEN = {*os.environ["VKBLOOM_LESSER"].split(",")}
 
@@ -88,6 +102,23 @@ def use_handles(renderer: Renderer) -> None:
     for _ in range(2):
         for image, frames in zip(images, renderer.map(iter(images), Separable()), strict=True):
             tolerance.assert_matches_reference(frames, image, Separable())
+
+
+def draw_surfaces(renderer: Renderer) -> None:
+    """A body of emissive surfaces, more than a pool has sets; the forward system draws it twice."""
+    one = panel((8, 6), Texture((picture(4, 4, 4, "float16"),)), radiance=(1.0, 2.0, 1.0))
+    body = dataclasses.replace(one, indices=np.tile(one.indices, 70), surfaces=70 * one.surfaces)
+    expected = renderer.render(Scene(body=one, camera=CAMERA), size=(8, 6))
+    frames = renderer.render(Scene(body=body, camera=CAMERA), size=(8, 6))
+    np.testing.assert_array_equal(frames["final"], expected["final"])
+
+
+def count_frames(renderer: Renderer) -> None:
+    """Frames of a method with state, whose memory is freed after each."""
+    counter = vkbloom.load_method(COUNTER, name="counter")(format="rgba32float")
+    for number in range(30):
+        frames = renderer.apply(picture(8, 6), counter.replace(exposure=number / 32))
+        assert frames["bloom"][0, 0, 0] == 1
 
 
 def apply_wide(renderer: Renderer, settings: vkbloom.Settings) -> None:
@@ -149,6 +180,9 @@ def try_all(renderer: Renderer) -> dict[str, str]:
             )
     attempt("fuse", fuse)
     attempt("handles", lambda: use_handles(renderer))
+    attempt("surfaces", lambda: draw_surfaces(renderer))
+    if "state" in sys.argv:
+        attempt("state", lambda: count_frames(renderer))
     attempt("large", lambda: apply(picture(*LARGE, 4, "uint8"), Separable()))
     # A GPU gets its first rows while the others are packed.
     attempt("bands", lambda: apply(picture(*LARGE, 4, "float32"), Separable()))

@@ -138,6 +138,21 @@ def test_more_allocations_than_the_device_allows(layer: Path, name: str) -> None
     assert re.search("allows 24 allocations .maxMemoryAllocationCount.; delete", error)
 
 
+def test_pools_give_no_more_than_they_were_created_for(layer: Path, name: str) -> None:
+    """Strict drivers; lavapipe gives more."""
+    done = run(layer, name, "pools", (*WORK, "surfaces", *LESS_WORK))
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["wrong"] == {}
+
+
+@pytest.mark.usefixtures("glslang")
+def test_the_memory_of_states_is_freed(layer: Path, name: str) -> None:
+    """Not of many frames at once: each has two buffers, one of them only for a copy."""
+    done = run(layer, name, "allocations", (*WORK, "state"))
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["wrong"] == {}
+
+
 @pytest.mark.parametrize("format", some(["store8", "store16", "store32", "store1"], 2))
 def test_no_storage_of_a_format(layer: Path, name: str, format: str) -> None:
     """All workloads are drawn."""
