@@ -13,11 +13,11 @@ struct vkb_cotangents {
     bool sums;  // the derivatives by fields are wanted, not those by images
 };
 
-// Adds the framebuffers ".by_image", ".by_emission" and ".by_mask", of those that the source has and
-// that the cotangents depend on. Or, as sums of one pixel, ".by_composite" (intensity, exposure,
-// reference white) and ".by_threshold" (threshold, knee), where the passes read these, and the same
-// with "_squares". *first is the index of the first image that is added. *possible becomes false if
-// a pass has no adjoint.
+// Adds the framebuffers ".by_image", ".by_emission" and ".by_mask", of those that the source has
+// and that the cotangents depend on. Or, as sums of one pixel, ".by_composite" (intensity,
+// exposure, reference white) and ".by_threshold" (threshold, knee), where the passes read these,
+// and the same with "_squares". *first is the index of the first image that is added. *possible
+// becomes false if a pass has no adjoint.
 bool vkb_build_adjoint(const struct vkb_source *source, const struct vkb_settings *settings,
                        const struct vkb_cotangents *cotangents, uint32_t max_side,
                        struct vkb_graph *graph, uint32_t *first, bool *possible,

@@ -18,7 +18,8 @@ from tests.exhaustive import EXHAUSTIVE, examples
 from tests.images import hdr_picture
 from tests.methods.cases import METHODS, OTHERS, presets_of_low_levels
 from tests.planned import scene_source
-from tests.tolerance import assert_close, tolerance
+from tests.tolerance import assert_close, real, tolerance
+from tests.variants import VARIANTS, opened
 from vkbloom import (
     BlenderGlare,
     Dirt,
@@ -34,6 +35,8 @@ from vkbloom import (
     load_method,
     reference,
 )
+from vkbloom.reference._compositing import composite_checked
+from vkbloom.reference._glare import light as total
 
 Array = NDArray[Any]
 
@@ -274,6 +277,29 @@ def check_rendered(
     method = load_method(text, name=name, reference=twin_of(passes))
     settings = method(glare=glare, format="rgba32float")
     check_frames(renderer.apply(IMAGE, settings), settings)
+
+
+@pytest.mark.usefixtures("glslang")
+@pytest.mark.parametrize("dtype", ["uint8", "float16"])
+def test_glare_is_added_to_a_picture_in_each_variant(dtype: str) -> None:
+    """Exposure, tone map and encoding come after it; alpha is that of the picture."""
+    image = hdr_picture(30, 22, 4, dtype)
+    method = load_method(Pass("HOOKED", "", 0.5, 0.0625).text(), name="half")
+    glare = (Streaks(halvings=1), Dirt(seed=1), Ghosts(intensity=0.5))
+    settings = method(glare=glare, exposure=-1, tonemap="reinhard", threshold=0.5)
+    # The same picture as a frame of its own, to which a bloom of 0 and the same glare are added.
+    halved = np.dstack([0.5 * real(image)[..., :3] + 0.0625, np.ones(image.shape[:2])])
+    plain = Pyramid(**{name: getattr(settings, name) for name in ("glare", "exposure", "tonemap")})
+    stages = reference.apply(image, Pyramid(glare=glare, threshold=0.5))
+    light = total(np.zeros_like(halved), 0.0, [stages["streaks"], stages["ghosts"]], glare)
+    expected = composite_checked(halved, light, plain, np.dtype(dtype))
+    for variant in VARIANTS:
+        with opened(variant) as renderer:
+            got = renderer.apply(image, settings)["final"]
+        limit = tolerance(
+            got.dtype, expected, stages_of_8_bits=2, magnitude=np.abs(halved) + np.abs(light)
+        )
+        assert_close(variant, got, expected, limit)
 
 
 def check_frames(frames: Frames, settings: Settings) -> None:

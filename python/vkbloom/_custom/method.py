@@ -187,8 +187,8 @@ def load_method(
     Notes
     -----
     Passes can bind ``MAIN`` (the frame), ``GLOW`` (what glows), and what they saved. Saved textures
-    are framebuffers under their lower-case names, with the prefix ``saved_`` where the package has a
-    framebuffer of that name. A file that saves ``BLOOM`` leaves the composite to the package; any
+    are framebuffers under their lower-case names, with the prefix ``saved_`` where the package has
+    a framebuffer of that name. A file that saves ``BLOOM`` leaves the composite to the package; any
     other file replaces the picture, to which only glare is added.
 
     Examples
