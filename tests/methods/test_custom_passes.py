@@ -93,4 +93,7 @@ def test_faulty_pass_is_refused(renderer: Renderer, spirv: bytes, call: str, err
     def changed(**fields: Any) -> None:
         run(renderer, Own(row(spirv)._replace(**fields)))
 
-    assert_refused(call, error, {"changed": changed, "Resource": Resource})
+    def twice() -> None:
+        run(renderer, Own(row(spirv), row(spirv)))
+
+    assert_refused(call, error, {"changed": changed, "twice": twice, "Resource": Resource})

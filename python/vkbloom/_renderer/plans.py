@@ -29,7 +29,8 @@ class Pass(NamedTuple):
     shader : str
         The SPIR-V module of the shader, such as "blur_frag".
     reads, writes : tuple of str
-        Names of images: framebuffers and intermediate images.
+        Names of images: framebuffers and intermediate images. That of an intermediate image begins
+        with a dot if a framebuffer has the same name.
     variant : str
         The variant that this class of devices runs instead of the method's own pass. "fragment":
         the pass itself, drawn by a fragment shader.
