@@ -5,7 +5,6 @@ from __future__ import annotations
 import errno
 import glob
 import os
-import re
 import shutil
 import sys
 import tempfile
@@ -16,6 +15,7 @@ from typing import BinaryIO, Final
 
 import click
 
+from vkbloom._cli.numbered_files import NumberedFile, files_of, gap_note, pattern_of
 from vkbloom._cli.terminal import note
 from vkbloom._io import safe_writing
 from vkbloom._io.image_reading import readable_extensions
@@ -27,7 +27,6 @@ PIPE: Final = "-"
 _FOLDER: Final = "vkbloom.streams"
 #: The most names in a note.
 _MAX_NAMES: Final = 5
-_NUMBER: Final = re.compile(r"%(0?)(\d*)d")
 
 
 def is_stream(name: str) -> bool:
@@ -86,16 +85,22 @@ def _opened(name: str) -> Iterator[BinaryIO]:
 
 def pairs(sources: Sequence[str], target: str) -> list[tuple[str, str]]:
     """Return the files to read, each with the file to write."""
-    results = [pair for source in sources for pair in expanded(source)]
+    results: list[NumberedFile] = []
+    for source in sources:
+        files = expanded(source)
+        results += files
+        if (missing := gap_note(files)) is not None:
+            note(f"{source}: {missing}")
     is_folder = os.path.isdir(target) or target.endswith(("/", os.sep))
-    is_pattern = _NUMBER.search(os.path.basename(target)) is not None
+    folder, name = os.path.split(target)
+    pattern = pattern_of(name)
     is_single = len(sources) == 1 and results == [(sources[0], None)]
-    if is_folder or (not is_single and not is_pattern and not Path(target).suffix):
+    if is_folder or (not is_single and pattern is None and not Path(target).suffix):
         written = [os.path.join(target, os.path.basename(name)) for name, _ in results]
-    elif is_pattern:
-        numbers = [number for _, number in results]
-        counted = range(len(results)) if None in numbers else numbers
-        written = [os.path.join(os.path.dirname(target), _filled(target, n)) for n in counted]
+    elif pattern is not None:
+        numbers = [number for _, number in results if number is not None]
+        counted = numbers if len(numbers) == len(results) else range(len(results))
+        written = [os.path.join(folder, pattern.filled(number)) for number in counted]
     elif len(results) == 1:
         written = [target]
     else:
@@ -147,28 +152,17 @@ def _check_folder(target: str, *, makes: bool) -> None:
         raise OSError(errno.EACCES, os.strerror(errno.EACCES), existing)
 
 
-def expanded(source: str) -> list[tuple[str, int | None]]:
+def expanded(source: str) -> list[NumberedFile]:
     """Return the files of a word, with their numbers if the word is a pattern."""
     # The name of an existing file may look like a pattern.
     if source == PIPE or os.path.isfile(source):
         return [(source, None)]
     folder, name = os.path.split(source)
-    results: list[tuple[str, int | None]] = []
+    results: list[NumberedFile] = []
     if os.path.isdir(source):
         results = [(path, None) for path in _images_of(source)]
-    elif (number := _NUMBER.search(name)) is not None:
-        digits = rf"(\d{{{number[2] or 1},}})"
-        form = re.compile(
-            re.escape(name[: number.start()]) + digits + re.escape(name[number.end() :])
-        )
-        numbered = [
-            (int(fits[1]), entry.path)
-            for entry in os.scandir(folder or ".")
-            if (fits := form.fullmatch(entry.name)) is not None
-        ]
-        results = [
-            (os.path.join(folder, os.path.basename(path)), n) for n, path in sorted(numbered)
-        ]
+    elif (pattern := pattern_of(name)) is not None:
+        results = files_of(folder, pattern)
     elif glob.has_magic(source):
         results = [(path, None) for path in sorted(glob.glob(source)) if os.path.isfile(path)]
     else:
@@ -190,10 +184,3 @@ def _images_of(folder: str) -> list[str]:
         more = ", ..." * (len(others) > _MAX_NAMES)
         note(f"{folder}: left out what is no image: {names}{more}")
     return [file for file in files if file not in others]
-
-
-def _filled(pattern: str, number: int | None) -> str:
-    """Return the file name of a pattern with this number."""
-    return _NUMBER.sub(
-        lambda form: f"{number:{form[1]}{form[2]}d}", os.path.basename(pattern), count=1
-    )
