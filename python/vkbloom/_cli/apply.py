@@ -30,7 +30,7 @@ from vkbloom._cli.image_files import (
     reading_options,
 )
 from vkbloom._cli.program import adapter_option, as_wrong_use, described
-from vkbloom._cli.sequences import PIPE, check_targets, is_stream, pairs
+from vkbloom._cli.sequences import PIPE, check_targets, is_stream, pairs, shown
 from vkbloom._cli.settings_options import Start, start_options
 from vkbloom._cli.terminal import complain, hides_progress, note, say, tell_device
 from vkbloom._io import image_writing
@@ -38,6 +38,7 @@ from vkbloom._io.array_files import premultiplied
 from vkbloom._io.displayed import PRIMARIES, Saved
 from vkbloom._io.glows import alike, grey_mask
 from vkbloom._io.images import Colour, Picture, SavedColour
+from vkbloom._io.narrowing import narrowed, narrowing_note
 from vkbloom._renderer.frame_files import settings_facts
 from vkbloom._renderer.interruptible import opened_renderer
 
@@ -169,7 +170,10 @@ class Run:
         pixels = picture.pixels
         is_large = picture.numbers == "uint8" and pixels[..., 0].size >= _HALVED
         if (options.half or is_large) and pixels.dtype == np.float32:
-            picture = dataclasses.replace(picture, pixels=pixels.astype(np.float16))
+            half = np.dtype(np.float16)
+            if (text := narrowing_note(pixels, half)) is not None:
+                note(f"{shown(source)}: {text}")
+            picture = dataclasses.replace(picture, pixels=narrowed(pixels, half))
         return picture
 
     @functools.cached_property

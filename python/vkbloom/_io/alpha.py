@@ -45,6 +45,7 @@ from numpy.typing import NDArray
 
 from vkbloom._io.images import failure_of
 from vkbloom._io.jpeg_xl import header_of
+from vkbloom._io.narrowing import narrowed, saturated
 from vkbloom._io.tiff import tiff_field
 
 if TYPE_CHECKING:
@@ -207,12 +208,14 @@ def divided(values: NDArray[Any]) -> NDArray[Any]:
 def _with_alpha(values: NDArray[Any], factor: NDArray[Any]) -> NDArray[Any]:
     """Return values with colours times a factor; for integers, times factor / largest value."""
     made = values.astype(np.float32)
-    made[:, :, :-1] *= factor
+    with np.errstate(over="ignore", invalid="ignore"):
+        made[:, :, :-1] *= factor
     if values.dtype.kind == "u":
         largest = np.iinfo(values.dtype).max
         made[:, :, :-1] = np.rint(np.minimum(made[:, :, :-1] / largest, largest))
-    with np.errstate(over="ignore"):
         return made.astype(values.dtype)
+    # Colours divided by a small alpha may be beyond the range of their type.
+    return narrowed(saturated(made, np.isfinite(values)), values.dtype)
 
 
 def light_of(values: NDArray[Any]) -> tuple[float, float]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -26,6 +27,7 @@ from vkbloom._io.images import (
     checked_pixels,
     is_exr,
 )
+from vkbloom._io.narrowing import narrowed
 
 FileEncoding = Literal["none", "linear", "srgb", "gamma22", "pq", "hlg"]
 
@@ -223,10 +225,17 @@ def write(
     written as PNG keeps its colours with ``primaries="p3"``; without it, colours outside of Rec.
     709 are clipped. OpenEXR keeps them as negative components. "pq" and "hlg" need 16 bits to show
     no bands.
+
+    Finite values beyond the range of the file's floats become its largest number: 65504 with 16
+    bits, 1.69e38 in Radiance HDR, where infinity becomes this number, too, and NaN and negative
+    values become 0. In files of integers NaN becomes 0 and infinity 1. A UserWarning says so, but
+    not of negative values.
     """
     oiio = import_extra("OpenImageIO", "images", "Writing images")
     target = Path(check_name(path))
-    values = _checked(array)
+    given = _checked(array)
+    # No format has more than 32 bits.
+    values = narrowed(given, np.dtype(np.float32)) if given.dtype.name == "float64" else given
     is_float = values.dtype.kind == "f"
     saved = Saved(encoding, primaries, view)
     _check_conversions(values, saved, bits)
@@ -246,6 +255,8 @@ def write(
             "vkbloom.read gives them"
         )
     image_writing.save(picture, target, saved, quality=quality, layout=layout)
+    if (text := image_writing.number_note(given, layout, target)) is not None:
+        warnings.warn(text, UserWarning, stacklevel=3)
     return target
 
 
@@ -258,7 +269,7 @@ def _checked(array: NDArray[Any]) -> NDArray[Any]:
     values = checked_pixels("array", values)
     if values.shape[2] > 4:
         raise ValueError(f"array: {values.shape[2]} channels are not 1 to 4")
-    return values.astype(np.float32) if values.dtype.name == "float64" else values
+    return values
 
 
 def has_straight(picture: Picture) -> bool:

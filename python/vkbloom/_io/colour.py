@@ -24,6 +24,7 @@ from vkbloom._io.displayed import (
 from vkbloom._io.hdr_curves import DECODERS
 from vkbloom._io.icc import Profile, from_chromaticities, from_lab, read_profile
 from vkbloom._io.images import SPACES, Chromaticities, Colour, StoredImage
+from vkbloom._io.narrowing import narrowed
 from vkbloom._io.srgb import decode_srgb
 from vkbloom._io.stated_colours import name_of
 
@@ -102,7 +103,7 @@ def _of_ultra_hdr(values: NDArray[Any], stored: StoredImage) -> tuple[str, NDArr
     made = values.astype(np.float32)
     made[:, :, :3] = made[:, :, :3] @ profile.matrix.T.astype(np.float32)
     said = "converted to linear Rec. 709 from the primaries of its ICC profile "
-    return "linear", made.astype(values.dtype), [f"{said}{stored.profile_name!r}"]
+    return "linear", narrowed(made, values.dtype), [f"{said}{stored.profile_name!r}"]
 
 
 def _by_space(values: NDArray[Any], stored: StoredImage) -> tuple[str, NDArray[Any], list[str]]:
@@ -195,7 +196,7 @@ def _decoded(
         made = values.astype(np.float32)
         with np.errstate(over="ignore"):
             made[:, :, :3] = _to_light(made[:, :, :3], space, exponent)
-            return made.astype(values.dtype)
+            return narrowed(made, values.dtype)
     made = _scaled(values)
     if space in ("srgb", *DECODERS) or exponent is not None or is_narrow:
         # A table with one entry per integer value, computed in float64.

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from vkbloom._checks import import_extra
 from vkbloom._io.hdr_curves import ENCODERS
 from vkbloom._io.images import SPACES
+from vkbloom._io.narrowing import narrowed
 from vkbloom._io.srgb import encode_srgb
 
 #: A file's attributes by OpenImageIO's names, each with its type and value.
@@ -105,7 +106,7 @@ def converted(
         return _by_ocio(values, "ociodisplay", display, view, *_FROM_LINEAR), display
     if curve != "none" and saved.primaries != "rec709":
         ends = PRIMARIES["rec709"], PRIMARIES[saved.primaries]
-        values = between(values, *ends).astype(values.dtype)
+        values = narrowed(between(values, *ends), values.dtype)
     if is_integer and curve in _ENDING_AT_1:
         values = scaled_to_1(values)
     return encoded(values, curve), (saved.primaries, curve)

@@ -7,6 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from vkbloom._io.narrowing import narrowed
+
 
 def grey_mask(pixels: NDArray[Any], file: str) -> NDArray[Any]:
     """Return the values of a mask."""
@@ -21,4 +23,4 @@ def alike(emission: NDArray[Any], image: NDArray[Any]) -> NDArray[Any]:
     if emission.shape[2] < channels:
         alpha = np.ones((*emission.shape[:2], 1), emission.dtype)
         emission = np.concatenate([emission, alpha], axis=2)
-    return emission[..., :channels].astype(image.dtype, copy=False)
+    return narrowed(emission[..., :channels], image.dtype)

@@ -16,6 +16,7 @@ from vkbloom._checks import check_index, import_extra, native_order
 from vkbloom._io import displayed, safe_writing
 from vkbloom._io.displayed import Saved
 from vkbloom._io.images import DTYPES, PIXEL_TYPES, SPACES, WITH_WINDOWS, Picture, is_exr
+from vkbloom._io.narrowing import file_note, for_radiance, narrowed
 
 if TYPE_CHECKING:
     import OpenImageIO
@@ -122,7 +123,7 @@ def _prepared(
     """Return the values to write in a layout, what describes them, and notes about losses."""
     values, numbers = layout
     integer = numbers.startswith("uint")
-    notes = _losses(picture, target, values, integer)
+    notes = _losses(picture, target, layout)
     if picture.encoding is None:
         return _as_numbers(values, numbers), picture, tuple(notes)
     what: tuple[str, str] | str = ("rec709", picture.encoding)
@@ -171,6 +172,8 @@ def put(oiio: ModuleType, parts: Sequence[Part], temporary: Path, target: Path) 
     writer = oiio.ImageOutput.create(str(temporary))
     if writer.format_name() not in WITH_WINDOWS:
         parts = [part._replace(values=_displayed(part)) for part in parts]
+    if writer.format_name() == "hdr":
+        parts = [part._replace(values=for_radiance(part.values)) for part in parts]
     specs = [_spec_of(oiio, writer, part, target) for part in parts]
     is_written = True
     for index, (part, spec) in enumerate(zip(parts, specs, strict=True)):
@@ -249,9 +252,10 @@ def _layouts(picture: Picture, with_alpha: bool) -> Iterator[NDArray[Any]]:
         yield from layouts
 
 
-def _losses(picture: Picture, target: Path, values: NDArray[Any], integer: bool) -> list[str]:
+def _losses(picture: Picture, target: Path, layout: Layout) -> list[str]:
     """Return notes about information that the file loses or that readers interpret differently."""
     notes: list[str] = []
+    values = layout[0]
     is_float, has_alpha = values.dtype.kind == "f", values.shape[2] in (2, 4)
     if picture.pixels.shape[2] == 4:
         opaque = 1.0 if is_float else np.iinfo(values.dtype).max
@@ -266,9 +270,15 @@ def _losses(picture: Picture, target: Path, values: NDArray[Any], integer: bool)
                 f"colours and alpha are written to {target} unchanged, but its readers expect "
                 f"colours {'' if associated else 'not '}multiplied by alpha"
             )
-    if integer and is_float and not np.isfinite(values).all():
-        notes.append(f"{target} has integers: NaN is written as 0, infinity as 1")
+    if (text := number_note(values, layout, target)) is not None:
+        notes.append(text)
     return notes
+
+
+def number_note(values: NDArray[Any], layout: Layout, target: Path) -> str | None:
+    """Return a note about numbers that a file in a layout cannot hold, or None."""
+    text = file_note(values, DTYPES[layout[1]], safe_writing.writer_of(target).format_name())
+    return None if text is None else f"{target} {text}"
 
 
 def _as_numbers(values: NDArray[Any], numbers: str) -> NDArray[Any]:
@@ -279,7 +289,7 @@ def _as_numbers(values: NDArray[Any], numbers: str) -> NDArray[Any]:
             return values
         values = values / np.float32(np.iinfo(values.dtype).max)
     if dtype.kind == "f":
-        return values.astype(dtype, copy=False)
+        return narrowed(values, dtype)
     clipped = np.clip(np.nan_to_num(values.astype(np.float32), nan=0.0), 0.0, 1.0)
     integers: NDArray[Any] = np.rint(clipped * np.float32(np.iinfo(dtype).max)).astype(dtype)
     return integers
