@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
+import itertools
+import os
+import re
 from pathlib import Path
 
 import numpy as np
@@ -9,8 +13,22 @@ import pytest
 
 import vkbloom
 from tests.framebuffers import make
+from vkbloom._io import safe_writing
+from vkbloom._renderer import frame_files
 
 IMAGE = np.random.default_rng(2).random((5, 7, 4), dtype=np.float32)
+
+
+def interrupt_after(count: int, patch: pytest.MonkeyPatch) -> None:
+    """Let the renaming of a save's files be interrupted."""
+    original, done = safe_writing.put_in_place, itertools.count()
+
+    def put(temporary: Path, file: Path) -> None:
+        if next(done) == count:
+            raise KeyboardInterrupt
+        original(temporary, file)
+
+    patch.setattr(safe_writing, "put_in_place", put)
 
 
 class TestSettings:
@@ -67,12 +85,90 @@ class TestFrames:
         assert list(again) == ["glow", "final"]
         assert np.array_equal(again["final"], image[::-1])
 
-    def test_files_of_two_calls(self, tmp_path: Path) -> None:
+    @pytest.mark.parametrize("name", ["a.png", "a.tif", "a.exr", "folder"])
+    def test_the_last_save_counts(self, tmp_path: Path, name: str) -> None:
+        """More framebuffers, fewer, one, in another dtype: nothing of an earlier save is left."""
         image = np.full((5, 7, 3), 9, np.uint8)
+        (tmp_path / "folder").mkdir()
+        vkbloom.write(tmp_path / "folder" / "photo.png", image)
+        make({"final": image}).save(tmp_path / "folder" / "a.png")
+        vkbloom.write(tmp_path / "a_photo.png", image)
+        others = {path for path in tmp_path.rglob("*") if path.is_file()}
+        saves = [
+            {"glow": image, "bloom": image, "final": image},
+            {"glow": image.astype(np.float16), "final": image + 1},
+            {"final": image + 2},
+            {"final": image.astype(np.float16)},
+            {"glow": image, "bloom": image, "final": image + 3},
+        ]
+        for number, arrays in enumerate(saves):
+            settings = vkbloom.Separable(blur_scale=number + 1)
+            files = make(arrays, settings=settings).save(tmp_path / name)
+            again = vkbloom.Frames.load(tmp_path / name)
+            assert list(again) == list(arrays)
+            assert all(np.array_equal(again[key], array) for key, array in arrays.items())
+            assert again.settings == settings
+            assert {path for path in tmp_path.rglob("*") if path.is_file()} == {*files, *others}
+
+    @pytest.mark.parametrize("name", ["a.png", "folder"])
+    @pytest.mark.parametrize("has_identity", [True, False])
+    def test_a_mixture_of_two_saves(self, tmp_path: Path, name: str, has_identity: bool) -> None:
+        image = np.full((5, 7, 3), 9, np.uint8)
+        kept = {}
+        for number in range(2):
+            settings = vkbloom.Separable(blur_scale=number + 1)
+            made = make({"glow": image, "bloom": image, "final": image}, settings=settings)
+            with pytest.MonkeyPatch.context() as patch:
+                if not has_identity:
+                    patch.setattr(frame_files, "fact_of", lambda *_: "")
+                files = made.save(tmp_path / name)
+            kept[number] = files[0].read_bytes()
+        files[0].write_bytes(kept[0])
+        names = [file.name for file in files]
+        os.utime(files[0], (0, 0))
+        said = f"holds files of 2 saves; the newest: {names[1]}, {names[2]}; older: {names[0]}; "
+        with pytest.raises(ValueError, match=re.escape(f"{tmp_path / name}: {said}")):
+            vkbloom.Frames.load(tmp_path / name)
+        assert list(vkbloom.Frames.load(files[0])) == ["glow"]
+
+    def test_an_old_file_beside_newer_ones(self, tmp_path: Path) -> None:
+        image = np.full((5, 7, 3), 9, np.uint8)
+        make({"final": image}).save(tmp_path / "a.png")
+        old = (tmp_path / "a.png").read_bytes()
+        # This one is of no save to a.png.
+        make({"bloom": image}).save(tmp_path / "a_bloom.png")
+        assert list(vkbloom.Frames.load(tmp_path / "a.png")) == ["final"]
         make({"glow": image, "final": image}).save(tmp_path / "a.png")
-        make({"glow": image.astype(np.float16), "final": image}).save(tmp_path / "a.png")
-        with pytest.raises(ValueError, match=r"a_glow\.\w+: glow is in .*a_glow\.\w+ as well"):
+        (tmp_path / "a.png").write_bytes(old)
+        with pytest.raises(ValueError, match=r"a\.png: holds files of 2 saves.*a_final\.png"):
             vkbloom.Frames.load(tmp_path / "a.png")
+
+    @pytest.mark.parametrize("count", [0, 1, 2, 3])
+    @pytest.mark.parametrize("is_killed", [True, False])
+    def test_an_interrupted_save(self, tmp_path: Path, count: int, is_killed: bool) -> None:
+        """A save ends after `count` of three files were renamed, over an earlier one or nothing."""
+        image = np.full((5, 7, 3), 9, np.uint8)
+        old = make({"glow": image, "bloom": image, "final": image})
+        new = make({"glow": image, "bloom": image + 1, "final": image + 2}, timings={"glow": 1.0})
+        for folder in (tmp_path / "new", tmp_path / "over"):
+            if folder.name == "over":
+                old.save(folder)
+            with pytest.MonkeyPatch.context() as patch:
+                interrupt_after(count, patch)
+                if is_killed:
+                    # Nothing is put back.
+                    patch.setattr(safe_writing, "_backup_of", lambda _: None)
+                with contextlib.suppress(KeyboardInterrupt):
+                    new.save(folder)
+            expected = new if count == 3 else old if folder.name == "over" else None
+            if expected is not None and (count in (0, 3) or not is_killed):
+                again = vkbloom.Frames.load(folder)
+                assert np.array_equal(again["final"], expected["final"])
+                assert again.timings == dict(expected.timings)
+            else:
+                with pytest.raises((ValueError, FileNotFoundError)):
+                    vkbloom.Frames.load(folder)
+            assert not [file for file in folder.iterdir() if safe_writing.is_temporary(file)]
 
     def test_settings_come_back_from_zarr(self, tmp_path: Path) -> None:
         """What `to_xarray` gives has them as JSON in its attributes, for any method."""

@@ -36,7 +36,7 @@ def for_radiance(values: NDArray[Any]) -> NDArray[Any]:
     """Return floats as Radiance HDR holds them, whose writer makes infinity and NaN 0."""
     single = narrowed(values, np.dtype(np.float32))
     limit = np.float32(MAX_RADIANCE)
-    return np.nan_to_num(single, nan=0.0, posinf=limit, neginf=0.0).clip(max=limit)
+    return np.asarray(np.nan_to_num(single, nan=0.0, posinf=limit, neginf=0.0)).clip(max=limit)
 
 
 def narrowing_note(values: NDArray[Any], dtype: np.dtype[Any]) -> str | None:

@@ -13,7 +13,7 @@ import os
 import shutil
 import stat
 import tempfile
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, BinaryIO, Final
@@ -157,11 +157,52 @@ def replacing(oiio: ModuleType, sizes: Mapping[Path, int]) -> Iterator[list[Path
         yield temporaries
         for temporary, file in zip(temporaries, sizes, strict=True):
             check_complete(oiio, temporary, file)
-        for temporary, file in zip(temporaries, sizes, strict=True):
-            put_in_place(temporary, file)
+        _put_all_in_place([*zip(temporaries, sizes, strict=True)])
     finally:
         for temporary in temporaries:
             remove(temporary)
+
+
+def _put_all_in_place(pairs: Sequence[tuple[Path, Path]]) -> None:
+    """Rename temporary files to their final names: all of them, or none if one fails."""
+    if len(pairs) == 1:
+        put_in_place(*pairs[0])
+        return
+    replaced: list[tuple[Path, Path | None]] = []
+    try:
+        for temporary, file in pairs:
+            if (backup := _backup_of(_link_target(file))) is not None:
+                replaced.append(backup)
+            put_in_place(temporary, file)
+    except BaseException:
+        # BaseException includes Ctrl-C.
+        for target, kept in reversed(replaced):
+            if kept is None:
+                target.unlink(missing_ok=True)
+            else:
+                kept.replace(target)
+        raise
+    finally:
+        for _, kept in replaced:
+            if kept is not None:
+                remove(kept)
+
+
+def _backup_of(target: Path) -> tuple[Path, Path | None] | None:
+    """Return a file with a second link to it, or with None if there is no such file.
+
+    None: it cannot be put back, because it is a stream or its file system has no links.
+    """
+    if not os.path.lexists(target):
+        return target, None
+    kept = target.parent / f"{_TEMPORARY}{os.urandom(8).hex()}{target.suffix}"
+    try:
+        _unfinished.add(kept)
+        os.link(target, kept)
+    except OSError:
+        _unfinished.discard(kept)
+        return None
+    return target, kept
 
 
 def write_file(file: Path, content: bytes) -> None:

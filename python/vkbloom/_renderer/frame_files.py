@@ -8,7 +8,7 @@ import glob
 import itertools
 import json
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
@@ -23,6 +23,15 @@ from vkbloom._io import image_reading, safe_writing
 from vkbloom._io.displayed import HDR_CURVES
 from vkbloom._io.image_writing import Part, described_as, put
 from vkbloom._io.images import PIXEL_TYPES, Picture, check_name, complete, is_exr
+from vkbloom._renderer.frame_saves import (
+    FACT,
+    check_alone,
+    chosen_files,
+    fact_of,
+    is_of,
+    obsolete_files,
+    save_of,
+)
 from vkbloom._settings.settings import Settings
 from vkbloom._version import installed_version
 
@@ -33,8 +42,10 @@ if TYPE_CHECKING:
 
 # The text before the JSON in a description.
 _DESCRIBED = ", all of it: "
+# Extensions of files in a folder.
+_IN_FOLDERS = (".png", ".exr")
 # Attributes that `_attributes` writes in addition to the entries of `info`.
-_OWN = ("settings", "timings", "dtype", "framebuffer", "place")
+_OWN = ("settings", "timings", "dtype", "framebuffer", "place", FACT)
 
 
 def save(frames: Frames, path: str | os.PathLike[str]) -> list[Path]:
@@ -60,15 +71,44 @@ def save(frames: Frames, path: str | os.PathLike[str]) -> list[Path]:
                 target.with_name(f"{target.stem}_{name}{target.suffix}"): [name] for name in frames
             }
     files: dict[Path, list[Part]] = {}
+    saved = fact_of(frames, "" if target.is_dir() else target.suffix)
     for planned, names in plan.items():
-        image = None if is_exr(planned) else _image_part(oiio, frames, names[0], planned)
+        image = None if is_exr(planned) else _image_part(oiio, frames, names[0], planned, saved)
         file = planned if image or is_exr(planned) else planned.with_suffix(".exr")
-        files[file] = [image] if image else [_exr_part(frames, name, file) for name in names]
+        files[file] = [image] if image else [_exr_part(frames, name, file, saved) for name in names]
     sizes = {file: sum(part.values.nbytes for part in parts) for file, parts in files.items()}
     with safe_writing.replacing(oiio, sizes) as temporaries:
         for temporary, (file, parts) in zip(temporaries, files.items(), strict=True):
             put(oiio, parts, temporary, file)
+        obsolete = [*obsolete_files(target, files, _facts_of_all(_beside(target, files)))]
+    for file in obsolete:
+        file.unlink(missing_ok=True)
     return list(files)
+
+
+def _beside(target: Path, files: Iterable[Path]) -> list[Path]:
+    """Return existing files that an earlier save to a path may have written."""
+    if not target.is_dir():
+        exact = [file for file in (target, target.with_suffix(".exr")) if file.is_file()]
+        return [*exact, *_split_files_of(target)]
+    replaced = _facts_of_all(_named(target, (file.stem for file in files)))
+    saves = map(save_of, replaced.values())
+    return [*replaced, *_named(target, (name for save in saves for name in save.framebuffers))]
+
+
+def _named(folder: Path, names: Iterable[str]) -> list[Path]:
+    """Return the files of framebuffers that exist in a folder."""
+    files = (folder / f"{name}{suffix}" for name in dict.fromkeys(names) for suffix in _IN_FOLDERS)
+    return [file for file in files if file.is_file()]
+
+
+def _facts_of_all(files: Iterable[Path]) -> dict[Path, dict[str, str]]:
+    """Return the facts of those files that can be read."""
+    found: dict[Path, dict[str, str]] = {}
+    for file in files:
+        with contextlib.suppress(OSError, ValueError):
+            found[file] = facts_of(file)
+    return found
 
 
 def load(path: str | os.PathLike[str]) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
@@ -78,7 +118,16 @@ def load(path: str | os.PathLike[str]) -> tuple[dict[str, NDArray[Any]], dict[st
     target = Path(check_name(path))
     # In a folder, files without the attributes of `save` are ignored.
     is_one = target.is_file()
-    for file in _files_of(target):
+    if is_one:
+        files, others = [target], _facts_of_all(_split_files_of(target))
+        saves = {file: save_of(said) for file, said in others.items() if is_of(target, file, said)}
+        check_alone(target, facts_of(target), saves)
+    else:
+        listed = {file: facts_of(file) for file in _files_of(target)}
+        files = chosen_files(
+            target, {f: said for f, said in listed.items() if is_of(target, f, said)}
+        )
+    for file in files:
         for pixels, said in _parts_of(file, None if is_one else target):
             try:
                 facts = {
@@ -114,22 +163,12 @@ def _parts_of(file: Path, target: Path | None) -> Iterator[tuple[NDArray[Any], d
                 return
             spec = reader.spec()
             said = _facts(spec)
-            if target is not None and not _is_of(target, file, said):
+            if target is not None and not is_of(target, file, said):
                 continue
             image_reading.check_plausible(spec, file)
             pixels = reader.read_image(index, 0, 0, spec.nchannels, spec.format)
             pixels = complete(pixels, reader, file)
             yield pixels.reshape(spec.height, spec.width, spec.nchannels), said
-
-
-def _is_of(target: Path, file: Path, said: Mapping[str, str]) -> bool:
-    """Return whether `save` of `target` wrote a framebuffer to this file."""
-    if "framebuffer" not in said:
-        return False
-    name = said["framebuffer"]
-    return file.stem == (name if target.is_dir() else f"{target.stem}_{name}") or (
-        file.stem == target.stem
-    )
 
 
 def facts_of(path: str | os.PathLike[str]) -> dict[str, str]:
@@ -169,18 +208,25 @@ def _files_of(path: Path) -> list[Path]:
     """Return the files that `save` may have written for a path."""
     if path.is_dir():
         files = sorted(
-            file for file in path.iterdir() if file.is_file() and file.suffix in (".png", ".exr")
+            file for file in path.iterdir() if file.is_file() and file.suffix in _IN_FOLDERS
         )
-    elif path.exists():
-        return [path]
     else:
-        stem = glob.escape(path.stem)
         files = [path.with_suffix(".exr")] if path.with_suffix(".exr").exists() else []
-        for suffix in dict.fromkeys((path.suffix, ".exr")):
-            files += sorted(path.parent.glob(f"{stem}_*{suffix}"))
+        files += _split_files_of(path)
     if not files:
         raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), str(path))
     return files
+
+
+def _split_files_of(path: Path) -> list[Path]:
+    """Return the files named ``<stem>_<name>`` that `save` may have written for a file name."""
+    before = len(path.stem) + 1
+    return [
+        file
+        for suffix in dict.fromkeys((path.suffix, ".exr"))
+        for file in sorted(path.parent.glob(f"{glob.escape(path.stem)}_*{suffix}"))
+        if file.stem[before:].isidentifier() and file.is_file()
+    ]
 
 
 def _as_dtype(pixels: NDArray[Any], dtype: str) -> NDArray[Any]:
@@ -193,7 +239,7 @@ def _as_dtype(pixels: NDArray[Any], dtype: str) -> NDArray[Any]:
     return made[:, :, 0] if made.shape[2] == 1 else made
 
 
-def _image_part(oiio: ModuleType, frames: Frames, name: str, file: Path) -> Part | None:
+def _image_part(oiio: ModuleType, frames: Frames, name: str, file: Path, saved: str) -> Part | None:
     """Return a framebuffer for a file of any format; None if the format cannot hold it."""
     pixels = np.atleast_3d(frames[name])
     writer = oiio.ImageOutput.create(file.name)
@@ -209,10 +255,10 @@ def _image_part(oiio: ModuleType, frames: Frames, name: str, file: Path) -> Part
     encoding = frames.settings.encoding
     if name == "final" and encoding in HDR_CURVES and writer.supports("cicp"):
         picture = described_as(oiio, picture, file, ("rec709", encoding))
-    return Part(pixels, picture, _attributes(frames, name, file))
+    return Part(pixels, picture, _attributes(frames, name, file, saved))
 
 
-def _exr_part(frames: Frames, name: str, file: Path) -> Part:
+def _exr_part(frames: Frames, name: str, file: Path, saved: str) -> Part:
     """Return a framebuffer for a part of an OpenEXR file, in the display window of the frame."""
     pixels = np.atleast_3d(frames[name])
     if pixels.dtype == np.uint8:
@@ -223,12 +269,12 @@ def _exr_part(frames: Frames, name: str, file: Path) -> Part:
     if pixels.shape[2] == 1:
         stored = replace(stored, channels=("Z",))
     # The name of the OpenEXR part.
-    attributes = {**_attributes(frames, name, file), "oiio:subimagename": name}
+    attributes = {**_attributes(frames, name, file, saved), "oiio:subimagename": name}
     return Part(pixels, replace(picture, stored=stored), attributes)
 
 
-def _attributes(frames: Frames, name: str, file: Path) -> dict[str, str | int]:
-    """Return what a file says of a framebuffer."""
+def _attributes(frames: Frames, name: str, file: Path, saved: str) -> dict[str, str | int]:
+    """Return what a file says of a framebuffer; `saved`: of `fact_of`."""
     settings = json.dumps(frames.settings.to_dict())
     adapter = frames.info.get("adapter", "an unnamed adapter")
     facts = {
@@ -237,6 +283,7 @@ def _attributes(frames: Frames, name: str, file: Path) -> dict[str, str | int]:
         "timings": json.dumps(dict(frames.timings)),
         "dtype": str(frames[name].dtype),
         "framebuffer": name,
+        FACT: saved,
         "place": str(list(frames).index(name)),
     }
     description = f"vkbloom on {adapter}, settings {settings}"

@@ -204,7 +204,9 @@ class Frames(Mapping[str, NDArray[Any]]):
         path : str or path-like
             A file name with an extension that OpenImageIO writes, or a folder. Existing files are
             replaced; symbolic links are followed. All files are written under temporary names and
-            renamed when all are complete.
+            renamed when all are complete. Files of an earlier save to the same path that this one
+            does not have are removed; in a folder, only those of a save that has a framebuffer of
+            the same name.
 
         Returns
         -------
@@ -234,6 +236,8 @@ class Frames(Mapping[str, NDArray[Any]]):
         Notes
         -----
         Other files in a folder are ignored, and so are files with other names that start the same.
+        Files of two saves, and those of a save that was killed while it renamed its files, are a
+        ValueError that names them.
         JPEG compresses with loss, so its values differ from the saved ones.
         """
         from vkbloom._renderer import frame_files  # noqa: PLC0415  costs start-up time
