@@ -79,6 +79,29 @@ def test_what_may_change_is_not_written(folder: Path, spread: psf.PSF) -> None:
     assert not folder.exists()
 
 
+@pytest.mark.parametrize("module", [None, "vkbloom.psf._eye"])
+def test_a_class_that_is_defined_again(folder: Path, module: str | None) -> None:
+    """As in a notebook: of the same name and fields, and another formula."""
+    kernel_sets: list[list[np.ndarray[Any, Any]]] = []
+    for shift in (0, 1):
+
+        class Shifted(Convolution):
+            def _kernel(self, *_: Any) -> Any:
+                return np.roll(np.eye(3)[..., None], shift, 0)  # noqa: B023
+
+        class shifted(psf.spencer):
+            def array(self, *_: Any) -> Any:
+                return np.roll(np.eye(3)[..., None].repeat(3, 2), shift, 0)  # noqa: B023
+
+        for kind in (Shifted, shifted) if module else ():
+            kind.__module__ = module or ""
+        made = Shifted(), Convolution(shifted())
+        kernel_sets.append([settings.core_kernel(*SIZES).pixels for settings in made])
+    for first, second in zip(*kernel_sets, strict=True):
+        assert not np.array_equal(first, second)
+    assert not folder.exists()
+
+
 def test_what_is_fast_is_not_written(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(kernels, "MIN_SECONDS", 1000)
     Convolution(APERTURE).core_kernel(*SIZES)
