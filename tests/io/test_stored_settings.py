@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import base64
 import contextlib
 import itertools
+import json
 import os
 import re
+import tracemalloc
+import zlib
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -42,6 +47,46 @@ class TestSettings:
     def test_missing_keys_are_defaults(self) -> None:
         assert vkbloom.Settings.from_dict({"method": "pyramid"}) == vkbloom.Pyramid()
         assert vkbloom.Pyramid.from_dict({"levels": 3}) == vkbloom.Pyramid(levels=3)
+
+
+def packed(shape: list[Any], count: int) -> str:
+    """Return settings with an array that has `count` zeros, and says that it has a shape."""
+    data = base64.b64encode(zlib.compress(bytes(4 * count))).decode()
+    values = {"shape": shape, "zlib": data}
+    return json.dumps({"method": "convolution", "psf": {"psf": "samples", "values": values}})
+
+
+class TestPackedArrays:
+    @pytest.mark.parametrize(
+        ("shape", "count"),
+        [
+            ([1 << 13, 1 << 13], 1 << 26),
+            ([1 << 13, 1 << 13], 4),
+            ([1 << 40, 1 << 40], 4),
+            ([2, 2], 1 << 26),
+            ([2, 2], 5),
+            ([2, 2], 3),
+            ([-2, -2], 4),
+            ([2.5, 2], 5),
+            (["9" * 100_000], 4),
+        ],
+    )
+    def test_a_short_text_cannot_claim_the_memory(self, shape: list[Any], count: int) -> None:
+        text = packed(shape, count)
+        tracemalloc.start()
+        try:
+            with pytest.raises((ValueError, TypeError), match="array") as caught:
+                vkbloom.Settings.from_json(text)
+            assert tracemalloc.get_traced_memory()[1] < 8 << 20
+        finally:
+            tracemalloc.stop()
+        assert len(str(caught.value)) < 300
+
+    def test_sparse_kernels_come_back(self) -> None:
+        kernel = np.zeros((1500, 2000), np.float32)
+        kernel[750, 1000] = 1
+        settings = vkbloom.Convolution(kernel)
+        assert vkbloom.Settings.from_json(settings.to_json()) == settings
 
 
 class TestFrames:
@@ -94,7 +139,7 @@ class TestFrames:
         make({"final": image}).save(tmp_path / "folder" / "a.png")
         vkbloom.write(tmp_path / "a_photo.png", image)
         others = {path for path in tmp_path.rglob("*") if path.is_file()}
-        saves = [
+        saves: list[dict[str, Any]] = [
             {"glow": image, "bloom": image, "final": image},
             {"glow": image.astype(np.float16), "final": image + 1},
             {"final": image + 2},

@@ -35,8 +35,8 @@ def saturated(made: NDArray[Any], was_finite: NDArray[np.bool_]) -> NDArray[Any]
 def for_radiance(values: NDArray[Any]) -> NDArray[Any]:
     """Return floats as Radiance HDR holds them, whose writer makes infinity and NaN 0."""
     single = narrowed(values, np.dtype(np.float32))
-    limit = np.float32(MAX_RADIANCE)
-    return np.asarray(np.nan_to_num(single, nan=0.0, posinf=limit, neginf=0.0)).clip(max=limit)
+    made: NDArray[Any] = np.nan_to_num(single, nan=0.0, posinf=MAX_RADIANCE, neginf=0.0)
+    return np.minimum(made, np.float32(MAX_RADIANCE))
 
 
 def narrowing_note(values: NDArray[Any], dtype: np.dtype[Any]) -> str | None:

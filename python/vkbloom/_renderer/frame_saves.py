@@ -48,7 +48,7 @@ def fact_of(frames: Frames, suffix: str) -> str:
     digest.update(json.dumps(facts, default=str).encode())
     for name, array in frames.items():
         digest.update(f"{name} {array.dtype} {array.shape}".encode())
-        digest.update(np.ascontiguousarray(array))
+        digest.update(np.ascontiguousarray(array).data)
     return json.dumps(
         {"identity": digest.hexdigest(), "suffix": suffix, "framebuffers": list(frames)}
     )

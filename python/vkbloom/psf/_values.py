@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import base64
 import itertools
+import math
+import operator
+import reprlib
 import weakref
 import zlib
 from collections.abc import Mapping
@@ -15,6 +18,10 @@ from numpy.typing import DTypeLike, NDArray
 #: The arrays of this process by names that are never used again: PyTorch compiles with strings as
 #: constants, but not with objects.
 ARRAYS: Final[weakref.WeakValueDictionary[str, ArrayValue]] = weakref.WeakValueDictionary()
+#: Bytes of a stored array. A larger one must not be compressed by more than `MAX_RATIO`: a short
+#: text may claim any size, and zeros are compressed to a thousandth.
+MAX_BYTES: Final = 1 << 27
+MAX_RATIO: Final = 16
 _numbers = itertools.count(1)
 
 
@@ -71,7 +78,13 @@ class ArrayValue:
 
 def _from_plain(plain: Mapping[str, Any]) -> NDArray[Any]:
     try:
-        data = zlib.decompress(base64.b64decode(plain["zlib"], validate=True))
-        return np.frombuffer(data, "<f4").reshape([int(side) for side in plain["shape"]])
+        packed = base64.b64decode(plain["zlib"], validate=True)
+        shape = [operator.index(side) for side in plain["shape"]]
+        size = 4 * math.prod(shape)
+        if min(shape, default=0) < 0 or size > max(MAX_BYTES, MAX_RATIO * len(packed)):
+            raise ValueError(f"{len(packed)} bytes cannot hold the shape {reprlib.repr(shape)}")
+        # A byte more than needed shows that there is more.
+        data = zlib.decompressobj().decompress(packed, size + 1)
+        return np.frombuffer(data, "<f4").reshape(shape)
     except (KeyError, TypeError, ValueError, zlib.error) as error:
         raise ValueError(f"array: not an array's shape and values: {error}") from None
