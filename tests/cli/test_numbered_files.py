@@ -1,14 +1,16 @@
 """Patterns of frame numbers, and the frames that are missing."""
 
+import os
 from pathlib import Path
 
+import click
 import numpy as np
 import pytest
 
 import vkbloom
 from tests.cli.calls import run
 from vkbloom._cli.numbered_files import as_frames, gap_note, gaps, missing_count, pattern_of
-from vkbloom._cli.sequences import expanded
+from vkbloom._cli.sequences import check_targets, expanded
 
 NAMES = {
     "n.%04d.exr": ["n.-002.exr", "n.-001.exr", "n.0000.exr", "n.0001.exr", "n.12345.exr"],
@@ -81,6 +83,28 @@ def test_gaps(names: list[str], note: str | None) -> None:
 def test_files_of_a_glob_are_in_the_order_of_their_numbers() -> None:
     files = [(f"in/f{number}_v2.jp2", None) for number in (10, 2, 9)]
     assert as_frames(files) == [(f"in/f{number}_v2.jp2", number) for number in (2, 9, 10)]
+
+
+def test_targets_are_checked_in_linear_time(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "in").mkdir()
+    (tmp_path / "out").mkdir()
+    work = [
+        (str(tmp_path / "in" / f"{n}.png"), str(tmp_path / "out" / f"{n}.png")) for n in range(300)
+    ]
+    for names in work:
+        for name in names:
+            Path(name).touch()
+    calls: list[object] = []
+    original = os.stat
+    monkeypatch.setattr(os, "stat", lambda *a, **k: calls.append(a) or original(*a, **k))
+    check_targets(work, str(tmp_path / "out"), overwrite=False)
+    assert len(calls) < 10 * len(work)
+    os.remove(work[7][1])
+    os.link(work[250][0], work[7][1])
+    with pytest.raises(click.UsageError, match=r"out/7\.png: is read as IN"):
+        check_targets(work, str(tmp_path / "out"), overwrite=False)
 
 
 def test_apply_names_missing_frames(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -173,6 +173,29 @@ def test_no_folder_is_no_cache(
     assert list(tmp_path.iterdir()) == []
 
 
+def test_files_of_others_stay(folder: Path) -> None:
+    foreign = {
+        "a.txt": b"x" * 400,
+        "00.txt": b"",
+        "0ff.bin": disk_cache.MAGIC,
+        "aa.bin": b"x" * 400,
+    }
+    base = folder.parent / "shaders"
+    (base / "bb.bin").mkdir(parents=True)
+    for name, content in foreign.items():
+        (base / name).write_bytes(content)
+        os.utime(base / name, (0, 0))
+    cache = disk_cache.DiskCache("shaders")
+    cache.max_bytes = 1000
+    for number in range(12):
+        cache.written = {}
+        cache.write(bytes([number]), bytes(100 - disk_cache.HEADER_SIZE))
+    kept = {file.name: file.read_bytes() for file in base.iterdir() if file.is_file()}
+    assert {name: kept.pop(name) for name in foreign} == foreign
+    assert (base / "bb.bin").is_dir()
+    assert sorted(kept) == [f"{number:02x}.bin" for number in range(2, 12)]
+
+
 def test_files_of_each_kind_are_bounded(folder: Path) -> None:
     for kind in ("pipelines", "shaders"):
         for number in range(4):

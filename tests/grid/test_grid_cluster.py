@@ -10,6 +10,7 @@ import time
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -52,6 +53,22 @@ def slow_mean(frames: Frames) -> float:
 
 
 slow_mean.framebuffers = ("final",)  # type: ignore[attr-defined]
+
+
+def test_runs_are_made_in_linear_time() -> None:
+    class Counted:
+        reads = 0
+
+        @property
+        def count(self) -> int:
+            Counted.reads += 1
+            return 1
+
+    blocks: Any = [Counted() for _ in range(1000)]
+    layout: Any = SimpleNamespace(point_size=1)
+    runs = list(cluster._runs(blocks, layout, 300))
+    assert [len(run) for run in runs] == [300, 300, 300, 100]
+    assert Counted.reads <= 2 * len(blocks)
 
 
 def test_workers_write_what_one_process_writes(

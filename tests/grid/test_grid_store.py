@@ -389,6 +389,29 @@ class TestHostile:
         assert contents(copy) == before
 
 
+def test_partial_files_of_others_stay(tmp_path: Path) -> None:
+    folder = tmp_path / "a.zarr"
+    number = "0123456789abcdef" * 2
+    names = ["movie.mkv.partial", "c.partial", "deeper/c.0.partial", f"deeper/c.0.{number}.partial"]
+    for name in names:
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_bytes(b"mine")
+    with pytest.raises(ValueError, match="its content is not a grid"):
+        make(folder)
+    assert sorted(contents(folder)) == sorted(names)
+    shutil.rmtree(folder)
+    make(folder)
+    (folder / "deeper").mkdir()
+    for name in names:
+        (folder / name).write_bytes(b"mine")
+    killed = [folder / f"final/c.0.{number}.partial", folder / f"zarr.{number}.partial"]
+    for path in killed:
+        path.write_bytes(b"half of it")
+    make(folder)
+    assert all((folder / name).read_bytes() == b"mine" for name in names)
+    assert not any(path.exists() for path in killed)
+
+
 @pytest.mark.parametrize("room", [3, 20, 30, 33])
 def test_a_full_disk_keeps_what_is_done(
     tmp_path: Path, undisturbed: Path, room: int, monkeypatch: pytest.MonkeyPatch

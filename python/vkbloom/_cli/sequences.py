@@ -119,7 +119,8 @@ def pairs(sources: Sequence[str], target: str) -> list[tuple[str, str]]:
 
 def check_targets(work: Sequence[tuple[str, str]], out: str, *, overwrite: bool) -> None:
     """Raise an error for files of `pairs` that cannot be written, or that are also read."""
-    read = [source for source, _ in work if os.path.isfile(source)]
+    read = {_identity(source) for source, _ in work if os.path.isfile(source)}
+    checked: set[str] = set()
     for _, target in work:
         if target == PIPE and sys.stdout is None:
             raise OSError(errno.EBADF, "is closed", "standard output")
@@ -129,10 +130,17 @@ def check_targets(work: Sequence[tuple[str, str]], out: str, *, overwrite: bool)
             )
         if is_stream(target):
             continue
-        _check_folder(target, makes=target != out)
-        for source in read if os.path.exists(target) and not overwrite else ():
-            if os.path.samefile(source, target):
-                raise click.UsageError(f"{target}: is read as IN; use --overwrite to replace it")
+        if (folder := os.path.dirname(target)) not in checked:
+            _check_folder(target, makes=target != out)
+            checked.add(folder)
+        if not overwrite and os.path.exists(target) and _identity(target) in read:
+            raise click.UsageError(f"{target}: is read as IN; use --overwrite to replace it")
+
+
+def _identity(file: str) -> tuple[int, int]:
+    """Return what two names of one file have in common."""
+    state = os.stat(file)
+    return state.st_dev, state.st_ino
 
 
 def is_terminal() -> bool:
@@ -178,9 +186,10 @@ def _images_of(folder: str) -> list[str]:
         file.path for file in os.scandir(folder) if file.is_file() and not file.name.startswith(".")
     )
     known = readable_extensions()
+    images = [file for file in files if Path(file).suffix.lower() in known]
     others = [file for file in files if Path(file).suffix.lower() not in known]
     if others:
         names = ", ".join(map(os.path.basename, others[:_MAX_NAMES]))
         more = ", ..." * (len(others) > _MAX_NAMES)
         note(f"{folder}: left out what is no image: {names}{more}")
-    return [file for file in files if file not in others]
+    return images

@@ -86,11 +86,13 @@ def _runs(todo: Iterable[Block], layout: Layout, points: int) -> Iterator[tuple[
     """Yield runs of neighbouring blocks, each of about `points` points."""
     most = max(1, min(points, _RUN_POINTS, _RUN_BYTES // max(layout.point_size, 1)))
     run: list[Block] = []
+    count = 0
     for block in todo:
         run.append(block)
-        if sum(part.count for part in run) >= most:
+        count += block.count
+        if count >= most:
             yield tuple(run)
-            run = []
+            run, count = [], 0
     if run:
         yield tuple(run)
 

@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import warnings
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
@@ -44,8 +45,8 @@ _PURPOSE: Final = "Grids on disk"
 _ZSTD_LEVEL: Final = 1
 # The separator "." puts all chunks of an array in one folder; "/" would nest a folder per axis.
 _KEYS: Final = {"name": "default", "separator": "."}
-# The end of the names of LocalStore's temporary files.
-_PARTIAL: Final = ".partial"
+# Names of LocalStore's temporary files: of a key without its last suffix, a number, ".partial".
+_PARTIAL: Final = re.compile(r"(?:zarr|c(?:\.[0-9]+)*)\.[0-9a-f]+\.partial")
 
 
 def identity(grid: Grid, layout: Layout, chunk: Index) -> dict[str, Any]:
@@ -188,7 +189,7 @@ def folder_of(store: object) -> Path:
 
 def is_empty(folder: Path) -> bool:
     """Return whether a store has no keys; temporary files are none."""
-    return all(path.is_dir() or path.suffix == _PARTIAL for path in folder.rglob("*"))
+    return all(path.is_dir() or _PARTIAL.fullmatch(path.name) for path in folder.rglob("*"))
 
 
 def expected_keys(grid: Grid, layout: Layout, chunk: Index) -> dict[str, bytes]:
@@ -282,9 +283,11 @@ def prepare(
     if changed := [*differences(checked_identity(folder), identity(grid, layout, chunk))]:
         raise ValueError(f"{folder}: contains another grid; {'; '.join(changed)}")
     if part == WHOLE:
-        # Of processes that were killed while writing.
-        for path in folder.rglob(f"*{_PARTIAL}"):
-            path.unlink(missing_ok=True)
+        # Of processes that were killed while writing. (Other files may be anybody's.)
+        for parent in {(folder / key).parent for key in expected}:
+            for path in parent.glob("*.partial"):
+                if _PARTIAL.fullmatch(path.name):
+                    path.unlink(missing_ok=True)
     for key, content in expected.items():
         file = folder / key
         if not file.exists() or file.read_bytes() != content:

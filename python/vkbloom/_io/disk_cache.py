@@ -10,6 +10,7 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import os
+import re
 from pathlib import Path
 
 from vkbloom._io.safe_writing import write_file
@@ -17,6 +18,8 @@ from vkbloom._io.safe_writing import write_file
 MAGIC = b"vkbloom cache 1\n"
 _DIGEST_SIZE = 32
 HEADER_SIZE = len(MAGIC) + _DIGEST_SIZE
+# Of `DiskCache.file`.
+_NAME = re.compile(r"(?:[0-9a-f]{2}){1,64}\.bin")
 
 
 def folder() -> Path | None:
@@ -82,12 +85,23 @@ class DiskCache:
             self._remove_oldest(file.parent)
 
     def _remove_oldest(self, base: Path) -> None:
-        states = sorted(
-            (file.stat().st_mtime_ns, file.stat().st_size, file) for file in base.iterdir()
-        )
+        states = []
+        with os.scandir(base) as entries:
+            for entry in entries:
+                # Other files may be anybody's: users name the folder.
+                if _NAME.fullmatch(entry.name) and entry.is_file(follow_symlinks=False):
+                    state = entry.stat()
+                    states.append((state.st_mtime_ns, state.st_size, Path(entry.path)))
         total = sum(size for _, size, _ in states)
-        for _, size, file in states:
+        for _, size, file in sorted(states):
             if total <= self.max_bytes:
                 return
-            file.unlink(missing_ok=True)
             total -= size
+            if _is_written(file):
+                file.unlink(missing_ok=True)
+
+
+def _is_written(file: Path) -> bool:
+    """Return whether a file begins as those of the cache."""
+    with file.open("rb") as stream:
+        return stream.read(len(MAGIC)) == MAGIC
