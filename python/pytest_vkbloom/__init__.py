@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 __all__ = ["bloom_renderer", "frame_regression"]
 
 _WRITTEN = pytest.StashKey[list[Path]]()
+_USED = pytest.StashKey["dict[Path, FrameRegression]"]()
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -46,6 +47,7 @@ def pytest_configure(config: pytest.Config) -> None:
             "--bloom-update writes files that all workers share; run without -n"
         )
     config.stash[_WRITTEN] = []
+    config.stash[_USED] = {}
 
 
 def pytest_terminal_summary(
@@ -104,4 +106,6 @@ def frame_regression(request: pytest.FixtureRequest) -> FrameRegression:
         update=config.getoption("bloom_update"),
         save=None if save is None else config.invocation_params.dir / save,
         written=config.stash[_WRITTEN],
+        test=item.nodeid,
+        used=config.stash[_USED],
     )

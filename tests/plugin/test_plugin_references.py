@@ -177,6 +177,44 @@ def test_second_needs_a_name(frame_regression):
         assert len(names) == 6
         assert {"own.json", "TestAll.test_names-a.json"} <= set(names)
 
+    def test_a_name_of_two_pictures(self, project: pytest.Pytester) -> None:
+        """Two tests, two parameters, one test; where both have the same picture, they share it."""
+        write(
+            project,
+            PROJECT
+            + """
+def test_one(frame_regression):
+    frame_regression.check(frames(), "before")
+
+def test_equal(frame_regression):
+    frame_regression.check(frames(), "before")
+
+def test_two(frame_regression):
+    frame_regression.check(np.zeros((4, 5, 3), np.uint8), "before")
+
+@pytest.mark.parametrize("level", [1, 2])
+def test_parameters(frame_regression, level):
+    frame_regression.check(np.full((4, 5, 3), 90 * level, np.uint8), "parameters")
+
+def test_twice(frame_regression):
+    frame_regression.check(np.full((4, 5, 3), 3, np.uint8), "twice")
+    frame_regression.check(np.full((4, 5, 3), 99, np.uint8), "twice")
+""",
+        )
+        told = [
+            "*before: the reference is that of the test test_one.py::test_one, too, and this one*",
+            "*parameters: the reference is that of the test *test_parameters[[]1], too, and*",
+            "*twice: the reference is that of an earlier check of this test, too, and this one*",
+        ]
+        # The second time, references are replaced that were used, not written.
+        for arguments in (["--bloom-update"], ["--bloom-update"], []):
+            result = run(project, *arguments)
+            result.assert_outcomes(passed=3, failed=3)
+            if arguments:
+                result.stdout.fnmatch_lines(told)
+        names = [name for name in references(project) if name.endswith(".json")]
+        assert sorted(names) == ["before.json", "parameters.json", "twice.json"]
+
     def test_long_names_stay_apart(self) -> None:
         names = {name_of_test(f"test[{'x' * 200}{end}]") for end in "ab"}
         assert len(names) == 2

@@ -48,16 +48,30 @@ class FrameRegression:
         Folder for the images of failed checks.
     written : list of Path
         Gets the files of references that are written.
+    test : str, optional
+        Name of the test in messages.
+    used : dict, optional
+        Of all tests of a run, gets the fixture that a reference was held against last, by file.
     """
 
     def __init__(
-        self, *, folder: Path, name: str, update: bool, save: Path | None, written: list[Path]
+        self,
+        *,
+        folder: Path,
+        name: str,
+        update: bool,
+        save: Path | None,
+        written: list[Path],
+        test: str | None = None,
+        used: dict[Path, FrameRegression] | None = None,
     ) -> None:
         self._folder = ReferenceFolder(folder)
         self._name = name
         self._update = update
         self._save = save
         self._written = written
+        self._test = test or name
+        self._used: dict[Path, FrameRegression] = {} if used is None else used
         self._has_used_name = False
 
     def check(
@@ -102,8 +116,10 @@ class FrameRegression:
         if reference is not None:
             verdicts = judge(reference.images, given.images, tolerances)
             if not (self._update and first_failure(verdicts)):
+                self._used.setdefault(file, self)
                 self._conclude(name, given, reference, verdicts)
                 return
+            self._check_unused(name, given, reference, verdicts)
         for framebuffer, image in given.images.items():
             if not tolerances.allow_nan and not np.isfinite(image).all():
                 raise ValueError(
@@ -111,7 +127,25 @@ class FrameRegression:
                     "it as a reference"
                 )
         self._folder.write(name, given.images, given.origin)
+        self._used[file] = self
         self._written.append(file)
+
+    def _check_unused(
+        self, name: str, given: Reference, reference: Reference, verdicts: tuple[Verdict, ...]
+    ) -> None:
+        """Raise AssertionError if another check of this run has used or written a reference.
+
+        A test that runs again, as plugins let failed ones do, may replace its own.
+        """
+        other = self._used.get(self._folder.file(name))
+        if other is None or (other is not self and other._test == self._test):
+            return
+        who = "an earlier check of this test" if other is self else f"the test {other._test}"
+        raise AssertionError(
+            f"{name}: the reference is that of {who}, too, and this one differs; it is not "
+            f"replaced: give one of them another name\n"
+            + _message(name, given, verdicts, reference)
+        )
 
     def compare(
         self,
