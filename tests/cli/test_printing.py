@@ -20,6 +20,7 @@ from tests.images import noise_image
 from tests.refusals import assert_matches, rows
 from vkbloom._cli import listing
 from vkbloom._cli.program import program
+from vkbloom._cli.terminal import MAX_MESSAGE
 from vkbloom._settings.registry import STAGES
 from vkbloom.psf._base import functions
 
@@ -30,6 +31,33 @@ pytestmark = pytest.mark.usefixtures("kept_renderers")
 def dark(tmp_path: Path) -> Path:
     """A picture about which there is a note: nothing in it glows."""
     return vkbloom.write(tmp_path / "dark.exr", np.full((12, 16, 3), 0.1, np.float32))
+
+
+def test_long_and_unprintable_texts_are_one_short_line(tmp_path: Path) -> None:
+    layers = [f"layer{number:05d}{'x' * 90}" for number in range(300)]
+    names = [f"{layer}.{name}" for layer in layers for name in "RGB"]
+    channels = np.zeros((2, 2, len(names)), np.float16)
+    file = write_image(tmp_path / "many.exr", channels, "half", channelnames=names)
+    settings = tmp_path / "long.json"
+    settings.write_text(json.dumps({"method": "x" * 270_000}))
+    names = ["red\x1b[31m.png", "\N{RIGHT-TO-LEFT OVERRIDE}gnp.exe", "line\nbreak.png"]
+    for words, end in [
+        (("apply", file, "o.png"), "name one as the layer to read"),
+        (("apply", file, "o.png", "--layer", "x" * 100_000), ""),
+        (("apply", "y.png", "o.png", "--settings", settings), ""),
+        (("apply", "y" * 100_000, "o.png"), ""),
+        (("apply", "y.png", "o.png", "--preset", "z" * 100_000), ""),
+        *((("apply", name, "o.png"), "No such file or directory") for name in names),
+    ]:
+        result = run(*words)
+        assert result.exit_code > 0
+        line = one_line(result.stderr).rstrip("\n")
+        assert line.isprintable()
+        assert len(line) <= MAX_MESSAGE
+        assert line.endswith(end)
+    with pytest.raises(ValueError, match="the layers are") as caught:
+        vkbloom.read(file)
+    assert len(str(caught.value)) < 3000
 
 
 @pytest.mark.parametrize(("place", "option"), [(0, "--quiet"), (1, "-q")])

@@ -11,6 +11,12 @@ if TYPE_CHECKING:
     import vkbloom
 
 
+#: The most characters of an error or a note. Names in files may have any length.
+MAX_MESSAGE: Final = 2000
+# Of these, the end, which has the reason where the beginning has a name.
+_END: Final = 600
+
+
 class _Printing:
     """How much the running command prints; other threads print as well."""
 
@@ -54,12 +60,30 @@ def say(text: str, *, err: bool = False) -> None:
 
 def complain(text: str) -> None:
     """Print an error as one line on standard error."""
-    click.echo(f"vkbloom: {' '.join(text.split())}", err=True)
+    click.echo(f"vkbloom: {in_line(text)}", err=True)
+
+
+def in_line(text: str) -> str:
+    """Return a text of any contents as one line of at most `MAX_MESSAGE` characters.
+
+    What is not printable, such as a terminal's control sequences in names of files, is escaped.
+    """
+    line = " ".join(text.split())
+    if len(line) > MAX_MESSAGE:
+        left_out = f" ... ({len(line)} characters) ... "
+        line = line[: MAX_MESSAGE - _END - len(left_out)] + left_out + line[-_END:]
+    if line.isprintable():
+        return line
+    return "".join(
+        # Bytes of file names that are no text are printed as they are.
+        char if char.isprintable() or "\udc80" <= char <= "\udcff" else ascii(char)[1:-1]
+        for char in line
+    )
 
 
 def note(text: str) -> None:
     """Print a note that is not an error on standard error, unless --quiet."""
-    say(f"vkbloom: note: {text}", err=True)
+    say(f"vkbloom: note: {in_line(text)}", err=True)
 
 
 def tell_device(renderer: vkbloom.Renderer, *, err: bool = False) -> None:

@@ -31,6 +31,7 @@ from vkbloom._io.images import (
     complete,
     failure_of,
     is_kept,
+    listed,
     warnings_of,
 )
 from vkbloom._io.jpeg_xl import header_of, readable
@@ -161,8 +162,8 @@ def _read(
         f"the file says {said} of its values, which are taken as they are" for said in stated.said
     ]
     if points is not None and known is None and points[1] != _UNSPECIFIED:
-        listed = " ".join(map(str, points))
-        notes.insert(0, f"the code points {listed} of its colours are not known, and are ignored")
+        numbers = " ".join(map(str, points))
+        notes.insert(0, f"the code points {numbers} of its colours are not known, and are ignored")
     stored = StoredImage(
         pixels=np.ascontiguousarray(pixels if layer is None else pixels[:, :, kept]),
         channels=tuple(names if layer is None else (names[i].rpartition(".")[2] for i in kept)),
@@ -364,8 +365,8 @@ def _part_with(reader: OpenImageIO.ImageInput, name: str, subimage: int, layer: 
         if layer in layers:
             return index
         known.update(dict.fromkeys(filter(None, layers)))
-    listed = f"its layers are {', '.join(known)}" if known else "it has no named layers"
-    raise ValueError(f"{name}: there is no layer {layer!r}; {listed}")
+    said = f"its layers are {listed(known)}" if known else "it has no named layers"
+    raise ValueError(f"{name}: there is no layer {layer!r}; {said}")
 
 
 def _parts(reader: OpenImageIO.ImageInput, first: int = 0) -> Iterator[OpenImageIO.ImageSpec]:
@@ -378,7 +379,7 @@ def _parts(reader: OpenImageIO.ImageInput, first: int = 0) -> Iterator[OpenImage
 
 def listed_parts(stored: StoredImage) -> str:
     """Return the parts of a file in words."""
-    names = ", ".join(f"{index} {name}" for index, name in enumerate(stored.parts) if name)
+    names = listed(f"{index} {name}" for index, name in enumerate(stored.parts) if name)
     return f"parts {names}" if names else f"{len(stored.parts)} parts"
 
 
@@ -402,7 +403,7 @@ def _decoded(stored: StoredImage, colour: Colour | None, expand: float | None) -
         values = values.astype(np.float16, copy=False)
     notes = [*stored.notes]
     if left_out:
-        notes.append(f"left out the channels {', '.join(left_out)}")
+        notes.append(f"left out the channels {listed(left_out)}")
     grey = len(chosen) < 3
     if grey:
         values = values[:, :, [0, 0, 0, *range(1, len(chosen))]]
@@ -460,12 +461,11 @@ def _chosen_channels(names: tuple[str, ...]) -> tuple[list[int], list[str]]:
         chosen = [min(grey, key=lambda index: bool(_UNNAMED.match(names[index]))), *alpha]
     elif len(layers) > 1:
         raise ValueError(
-            f"the layers are {', '.join(filter(None, layers))}; name one as the layer to read"
+            f"the layers are {listed(filter(None, layers))}; name one as the layer to read"
         )
     else:
         raise ValueError(
-            f"the channels {', '.join(names)} are not R, G, B or a single one, with or without "
-            "alpha"
+            f"the channels {listed(names)} are not R, G, B or a single one, with or without alpha"
         )
     return chosen, [name for index, name in enumerate(names) if name and index not in chosen]
 

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, Literal, Self, TypeAlias
@@ -74,6 +74,9 @@ _KEPT_ATTRIBUTES: Final = frozenset(
     )
 )
 _KEPT_GROUPS: Final = ("Exif:", "GPS:", "IPTC:")
+# Of names in a message: how many, and characters of each.
+_MAX_NAMES: Final = 20
+_MAX_NAME: Final = 255
 # libjpeg's warning about bytes after the pixels of a scan. Before a restart marker, 0xd0 to 0xd7,
 # pixels were lost.
 _EXTRA_BYTES: Final = re.compile(
@@ -223,6 +226,17 @@ def check_name(path: str | os.PathLike[str]) -> str:
             f"path: {name!r} is not UTF-8; rename the image file or its folder"
         ) from None
     return name
+
+
+def listed(names: Iterable[str]) -> str:
+    """Return names of a file in a message: a file may have thousands, of any length."""
+    chosen = [*names]
+    shown = [
+        name if len(name) <= _MAX_NAME else f"{name[: _MAX_NAME - 3]}..."
+        for name in chosen[:_MAX_NAMES]
+    ]
+    more = [f"... ({len(chosen)} in all)"] * (len(chosen) > _MAX_NAMES)
+    return ", ".join([*shown, *more])
 
 
 def is_exr(path: Path) -> bool:
