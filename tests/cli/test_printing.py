@@ -47,7 +47,7 @@ def test_long_and_unprintable_texts_are_one_short_line(tmp_path: Path) -> None:
         (("apply", "y.png", "o.png", "--settings", settings), ""),
         (("apply", "y" * 100_000, "o.png"), ""),
         (("apply", "y.png", "o.png", "--preset", "z" * 100_000), ""),
-        *((("apply", name, "o.png"), "No such file or directory") for name in names),
+        *((("apply", name, "o.png"), "") for name in names),
     ]:
         result = run(*words)
         assert result.exit_code > 0
