@@ -88,6 +88,7 @@ check() {
             want twm command -v twm
             want libjxl-tools command -v cjxl
             want libtiff-tools command -v tiffcp
+            want locales test -f /usr/share/i18n/locales/de_DE
             ;;
         esac
     done

@@ -14,6 +14,7 @@ import numpy as np
 
 import vkbloom
 from vkbloom import _core, reference
+from vkbloom._c_paths import in_utf8
 from vkbloom._doctor.child import ANSWER_MARK
 from vkbloom._renderer.adapter import bundled_driver, from_core
 
@@ -45,7 +46,9 @@ def adapters(which: str) -> dict[str, Any]:
     reasons: list[str] = []
     for driver in ("",) if which == "system" else dict.fromkeys(("", bundled_driver())):
         try:
-            results += map(dataclasses.asdict, map(from_core, _core.adapters(driver)))
+            results += map(
+                dataclasses.asdict, map(from_core, _core.adapters(in_utf8(driver) or driver))
+            )
         except vkbloom.AdapterNotFoundError as error:
             reasons.append(_one_line(error))
     reason = "; ".join(reasons)

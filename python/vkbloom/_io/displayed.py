@@ -163,7 +163,7 @@ def with_names(
         points, name = (_PRIMARY_POINTS[what[0]], _CURVE_POINTS[curve]), " and ".join(what)
         if what[0] == "rec709" and curve in _PLAIN:
             return True, attributes
-    writer = oiio.ImageOutput.create(target.name)
+    writer = oiio.ImageOutput.create(f"image{target.suffix}")
     kind = writer.format_name()
     # A profile of the source would name other colours.
     kept = {name: value for name, value in attributes.items() if name != "ICCProfile"}

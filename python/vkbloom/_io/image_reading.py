@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from vkbloom._c_paths import for_c
 from vkbloom._checks import import_extra
 from vkbloom._io.alpha import Meaning, channels_of, divided, light_of, meaning_of
 from vkbloom._io.colour import LAB, linear
@@ -73,27 +74,29 @@ def opened(path: str | os.PathLike[str], purpose: str) -> Iterator[OpenImageIO.I
     # Otherwise OpenImageIO multiplies straight colours by alpha.
     plain = oiio.ImageSpec()
     plain.attribute("oiio:UnassociatedAlpha", 1)
-    with readable(name) as file:
-        reader = oiio.ImageInput.open(file, plain)
-    reason = failure_of(oiio) if reader is None else ""
-    if _is_lab(reader, reason) or _is_grey_photoshop(reader, name):
-        # libtiff converts L*a*b* to 8 bits without adapting the white of D50, or does not convert.
-        # OpenImageIO takes the layers of a grey Photoshop file for RGB.
-        plain.attribute("oiio:RawColor", 1)
-        reader = oiio.ImageInput.open(name, plain)
-    if (reader is None or reader.format_name() == "tiff") and is_raw(name):
-        # A TIFF reader takes the preview for the picture.
-        if reader is not None:
+    # (Some readers open the file again when they go to another part.)
+    with for_c(name) as given:
+        with readable(name) as file, for_c(file) as first:
+            reader = oiio.ImageInput.open(given if file == name else first, plain)
+        reason = failure_of(oiio).replace(given, name) if reader is None else ""
+        if _is_lab(reader, reason) or _is_grey_photoshop(reader, name):
+            # libtiff converts L*a*b* to 8 bits without adapting the white of D50, or does not
+            # convert. OpenImageIO takes the layers of a grey Photoshop file for RGB.
+            plain.attribute("oiio:RawColor", 1)
+            reader = oiio.ImageInput.open(given, plain)
+        if (reader is None or reader.format_name() == "tiff") and is_raw(name):
+            # A TIFF reader takes the preview for the picture.
+            if reader is not None:
+                reader.close()
+            raise ValueError(f"{name}: is {RAW_ADVICE}")
+        if reader is None:
+            reason = HEIF_ADVICE if is_heif(name) else reason or "unknown format"
+            raise ValueError(f"{name}: is not a readable image: {reason}")
+        try:
+            yield reader
+        finally:
+            failure_of(reader)
             reader.close()
-        raise ValueError(f"{name}: is {RAW_ADVICE}")
-    if reader is None:
-        reason = HEIF_ADVICE if is_heif(name) else reason or "unknown format"
-        raise ValueError(f"{name}: is not a readable image: {reason}")
-    try:
-        yield reader
-    finally:
-        failure_of(reader)
-        reader.close()
 
 
 def _is_lab(reader: OpenImageIO.ImageInput | None, reason: str) -> bool:

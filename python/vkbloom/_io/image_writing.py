@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from vkbloom._c_paths import for_c
 from vkbloom._checks import check_index, import_extra, native_order
 from vkbloom._io import displayed, safe_writing
 from vkbloom._io.displayed import Saved
@@ -169,22 +170,23 @@ def described_as(
 
 def put(oiio: ModuleType, parts: Sequence[Part], temporary: Path, target: Path) -> None:
     """Write the parts of a file to its temporary file; only OpenEXR has more than one."""
-    writer = oiio.ImageOutput.create(str(temporary))
+    writer = oiio.ImageOutput.create(temporary.name)
     if writer.format_name() not in WITH_WINDOWS:
         parts = [part._replace(values=_displayed(part)) for part in parts]
     if writer.format_name() == "hdr":
         parts = [part._replace(values=for_radiance(part.values)) for part in parts]
     specs = [_spec_of(oiio, writer, part, target) for part in parts]
     is_written = True
-    for index, (part, spec) in enumerate(zip(parts, specs, strict=True)):
-        mode = ("AppendSubimage",) if index else ()
-        opened = specs if len(specs) > 1 and not index else spec
-        is_written = (
-            is_written
-            and writer.open(str(temporary), opened, *mode)
-            and writer.write_image(np.ascontiguousarray(native_order(part.values)))
-        )
-    is_written = is_written and writer.close()
+    with for_c(temporary) as name:
+        for index, (part, spec) in enumerate(zip(parts, specs, strict=True)):
+            mode = ("AppendSubimage",) if index else ()
+            opened = specs if len(specs) > 1 and not index else spec
+            is_written = (
+                is_written
+                and writer.open(name, opened, *mode)
+                and writer.write_image(np.ascontiguousarray(native_order(part.values)))
+            )
+        is_written = is_written and writer.close()
     # JPEG 2000's writer says that pictures of under 32 pixels on a side are written.
     is_written = is_written and not (writer.format_name() == "jpeg2000" and writer.has_error)
     if not is_written:

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import os
 import re
+import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -26,6 +27,7 @@ from typing import Any, Final, Literal, Self, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from vkbloom._c_paths import is_name
 from vkbloom._checks import native_order
 
 #: "linear", "srgb" or the name of a colour space of OpenColorIO.
@@ -213,18 +215,18 @@ def checked_pixels(name: str, image: NDArray[Any]) -> NDArray[Any]:
 
 
 def check_name(path: str | os.PathLike[str]) -> str:
-    """Return a file name, which must be text in UTF-8 for OpenImageIO."""
+    """Return a file name, which must be text."""
     if not isinstance(path, str | os.PathLike) or isinstance(name := os.fspath(path), bytes):
         raise TypeError(
             f"path: {path!r} is not a str or a path"
             + "; use os.fsdecode(path)" * isinstance(path, bytes)
         )
-    try:
-        name.encode()
-    except UnicodeEncodeError:
+    if not is_name(name):
+        encoding = sys.getfilesystemencoding()
+        locale = "" if encoding == "utf-8" else f", nor {encoding}, the locale's encoding"
         raise ValueError(
-            f"path: {name!r} is not UTF-8; rename the image file or its folder"
-        ) from None
+            f"path: {name!r} is not UTF-8{locale}; rename the image file or its folder"
+        )
     return name
 
 

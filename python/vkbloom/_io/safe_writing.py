@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, BinaryIO, Final
 
 import numpy as np
 
+from vkbloom._c_paths import for_c, in_utf8
 from vkbloom._checks import import_extra
 from vkbloom._io.images import check_name, failure_of
 from vkbloom._io.jpeg_xl import readable
@@ -82,7 +83,7 @@ def holds(suffix: str, channels: int, numbers: str) -> bool:
     """
     oiio = import_extra("OpenImageIO", "images", "Writing images")
     with tempfile.TemporaryDirectory(prefix="vkbloom-") as folder:
-        name = f"{folder}/image{suffix}"
+        name = in_utf8(f"{folder}/image{suffix}") or f"{folder}/image{suffix}"
         spec = oiio.ImageSpec(_TRIED, _TRIED, channels, numbers)
         writer = oiio.ImageOutput.create(name)
         is_kept = False
@@ -280,12 +281,12 @@ def _link_target(file: Path) -> Path:
 
 def _unreadable(oiio: ModuleType, file: Path) -> str | None:
     """Return why a file cannot be read; None: it can."""
-    with readable(file) as name:
-        reader = oiio.ImageInput.open(name)
-    if reader is None:
-        return failure_of(oiio) or "unknown format"
-    spec = reader.spec()
-    is_readable = reader.read_image(0, 0, 0, spec.nchannels, spec.format) is not None
-    reason = failure_of(reader) or "the pixels are missing"
-    reader.close()
+    with readable(file) as name, for_c(name) as given:
+        reader = oiio.ImageInput.open(given)
+        if reader is None:
+            return failure_of(oiio) or "unknown format"
+        spec = reader.spec()
+        is_readable = reader.read_image(0, 0, 0, spec.nchannels, spec.format) is not None
+        reason = failure_of(reader) or "the pixels are missing"
+        reader.close()
     return None if is_readable else reason

@@ -9,6 +9,7 @@ import os
 from types import ModuleType
 
 from vkbloom import _core
+from vkbloom._c_paths import in_utf8
 
 
 @dataclasses.dataclass(frozen=True)
@@ -110,7 +111,7 @@ def adapters() -> tuple[AdapterInfo, ...]:
     listed: list[_core._AdapterTuple] = []
     for driver in dict.fromkeys(("", bundled_driver())):
         with contextlib.suppress(_core.AdapterNotFoundError):
-            listed += _core.adapters(driver)
+            listed += _core.adapters(in_utf8(driver) or driver)
     return tuple(from_core(adapter) for adapter in listed)
 
 

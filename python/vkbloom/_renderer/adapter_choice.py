@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from typing import Final, NamedTuple
 
 from vkbloom import _core
+from vkbloom._c_paths import in_utf8
 from vkbloom._renderer.adapter import AdapterInfo, from_core
 
 # For "auto", from the best to the last.
@@ -71,7 +72,7 @@ def _is_device(choice: str) -> bool:
 def _listed(driver: str) -> list[_Adapter]:
     return [
         _Adapter(driver, number, from_core(adapter), adapter[9], adapter[10])
-        for number, adapter in enumerate(_core.adapters(driver))
+        for number, adapter in enumerate(_core.adapters(in_utf8(driver) or driver))
     ]
 
 
@@ -136,7 +137,7 @@ def chosen_adapter(choice: str, driver: str) -> tuple[int, str]:
         adapters += bundled
         best = _best(choice, bundled) or best
     if best is not None:
-        return best.number, best.driver
+        return best.number, in_utf8(best.driver) or best.driver
     names = ", ".join(adapter.described(choice) for adapter in adapters) or "none"
     is_limited = _limiting(choice) is not None
     among = " among the GPUs that CUDA_VISIBLE_DEVICES names" * is_limited

@@ -242,7 +242,7 @@ def _as_dtype(pixels: NDArray[Any], dtype: str) -> NDArray[Any]:
 def _image_part(oiio: ModuleType, frames: Frames, name: str, file: Path, saved: str) -> Part | None:
     """Return a framebuffer for a file of any format; None if the format cannot hold it."""
     pixels = np.atleast_3d(frames[name])
-    writer = oiio.ImageOutput.create(file.name)
+    writer = oiio.ImageOutput.create(f"image{file.suffix}")
     if pixels.shape[2] == 4 and not safe_writing.has_alpha(writer):
         opaque = 255 if pixels.dtype == np.uint8 else 1.0
         if not (pixels[:, :, 3] == opaque).all():
