@@ -2,6 +2,7 @@
 
 import os
 from pathlib import Path
+from typing import Any
 
 import click
 import numpy as np
@@ -98,7 +99,12 @@ def test_targets_are_checked_in_linear_time(
             Path(name).touch()
     calls: list[object] = []
     original = os.stat
-    monkeypatch.setattr(os, "stat", lambda *a, **k: calls.append(a) or original(*a, **k))
+
+    def stat(*arguments: Any, **more: Any) -> os.stat_result:
+        calls.append(arguments)
+        return original(*arguments, **more)
+
+    monkeypatch.setattr(os, "stat", stat)
     check_targets(work, str(tmp_path / "out"), overwrite=False)
     assert len(calls) < 10 * len(work)
     os.remove(work[7][1])

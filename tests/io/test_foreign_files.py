@@ -454,6 +454,41 @@ def test_pnm_has_no_notes(tmp_path: Path, name: str) -> None:
     assert np.abs(made - 0.5).max() < 0.005
 
 
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"P1\n4 2\n0 1 1 0\n1 0 0 1\n",
+        # As GIMP and Netpbm write it, with comments where they are allowed, in several lines.
+        b"P1\n# comment\n4 2\n0110\n1001\n",
+        b"P1\n# 1 1\n4 # wide\n2\n01101001",
+        b"P1 4 2 0110#1\n10 01\n# the end",
+        b"P1\r\n4 2\r\n01\r\n101001\r\n1",
+    ],
+)
+def test_plain_bitmaps(tmp_path: Path, content: bytes) -> None:
+    (tmp_path / "a.pbm").write_bytes(content)
+    found = vkbloom.read(tmp_path / "a.pbm")
+    np.testing.assert_array_equal(found[..., 0], [[1, 0, 0, 1], [0, 1, 1, 0]])
+    frames = vkbloom.apply(tmp_path / "a.pbm", "kino", framebuffers="final")
+    assert frames["final"].shape == (2, 4, 3)
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"P1\n4 2\n0110100",
+        b"P1\n4 2\n01101002",
+        b"P1\n4 2",
+        b"P1\n99999999 99999999\n0",
+        b"P1 0 0 ",
+    ],
+)
+def test_damaged_plain_bitmaps(tmp_path: Path, content: bytes) -> None:
+    (tmp_path / "a.pbm").write_bytes(content)
+    with pytest.raises(ValueError, match=r"a\.pbm: "):
+        vkbloom.read(tmp_path / "a.pbm")
+
+
 @pytest.mark.parametrize(("name", "size"), [("a.jp2", 16), ("a.iff", 5)])
 def test_too_small_for_the_format(tmp_path: Path, name: str, size: int) -> None:
     pixels = RNG.random((size, size, 3), np.float32)

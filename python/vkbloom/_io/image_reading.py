@@ -35,7 +35,8 @@ from vkbloom._io.images import (
     listed,
     warnings_of,
 )
-from vkbloom._io.jpeg_xl import header_of, readable
+from vkbloom._io.jpeg_xl import header_of
+from vkbloom._io.readable_copies import readable
 from vkbloom._io.stated_colours import stated_colours
 from vkbloom._io.stored_values import SIGNED, corrected, scale_of, without_white
 from vkbloom._io.tiff import RAW_ADVICE, is_raw, reduced_parts

@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import os
-import tempfile
-from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import BinaryIO, Final, NamedTuple
 
 # A codestream or a container (ISO/IEC 18181-2).
@@ -190,30 +187,21 @@ def _is_multiplied_alpha(bits: _Bits) -> bool | None:
     return None
 
 
-@contextmanager
-def readable(path: str | os.PathLike[str]) -> Iterator[str]:
-    """Yield a file to open in place of a file, which is a copy where OpenImageIO needs another one.
+def readable_content(path: str) -> bytes | None:
+    """Return what OpenImageIO can read instead of a file; None: the file itself.
 
     OpenImageIO needs 128 bytes of JPEG XL. Where it would get linear light of 8 bits, in which dark
-    colours have steps, the copy says 16 bits: libjxl computes floats and rounds them to what the
+    colours have steps, the content says 16 bits: libjxl computes floats and rounds them to what the
     header says.
     """
-    name = os.fspath(path)
-    if not os.path.isfile(name):
-        yield name
-        return
-    header = header_of(name)
-    with open(name, "rb") as stream:
+    header = header_of(path)
+    with open(path, "rb") as stream:
         head = stream.read(_MIN_BYTES)
         is_short = len(head) < _MIN_BYTES and head.startswith((_CODESTREAM, _CONTAINER))
         if not is_short and not header.has_coarse_light:
-            yield name
-            return
+            return None
         content = head + stream.read()
-    with tempfile.NamedTemporaryFile(suffix=".jxl") as file:
-        file.write(_of_16_bits(content, header).ljust(_MIN_BYTES, b"\0"))
-        file.flush()
-        yield file.name
+    return _of_16_bits(content, header).ljust(_MIN_BYTES, b"\0")
 
 
 def _of_16_bits(content: bytes, header: Header) -> bytes:

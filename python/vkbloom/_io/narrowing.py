@@ -36,7 +36,8 @@ def for_radiance(values: NDArray[Any]) -> NDArray[Any]:
     """Return floats as Radiance HDR holds them, whose writer makes infinity and NaN 0."""
     single = narrowed(values, np.dtype(np.float32))
     made: NDArray[Any] = np.nan_to_num(single, nan=0.0, posinf=MAX_RADIANCE, neginf=0.0)
-    return np.minimum(made, np.float32(MAX_RADIANCE))
+    np.minimum(made, np.float32(MAX_RADIANCE), out=made)
+    return made
 
 
 def narrowing_note(values: NDArray[Any], dtype: np.dtype[Any]) -> str | None:
