@@ -20,6 +20,7 @@ from vkbloom._io.colour import LAB, linear
 from vkbloom._io.containers import HEIF_ADVICE, fits_scale, is_heif, orientation_of, upright
 from vkbloom._io.displayed import has_hdr_curve, of_code_points
 from vkbloom._io.expansion import expanded
+from vkbloom._io.exr_attributes import own_attributes, without_colours
 from vkbloom._io.images import (
     DTYPES,
     PIXEL_TYPES,
@@ -183,6 +184,7 @@ def _read(
             for attribute in spec.extra_attribs
             if is_kept(attribute.name)
         },
+        own=own_attributes(spec) if kind == "openexr" else {},
         profile_name=spec.get_string_attribute("ICCProfile:profile_description"),
         code_points=known,
         is_ultra_hdr=_is_ultra_hdr(reader, spec),
@@ -424,6 +426,8 @@ def _decoded(stored: StoredImage, colour: Colour | None, expand: float | None) -
     is_hdr = colour is None and has_hdr_curve(stored.code_points)
     if numbers in ("uint8", "uint16") and not is_hdr:
         values = expanded(values, expand)
+    if colour not in (None, "linear", "srgb"):
+        stored = replace(stored, own=without_colours(stored.own))
     stored = replace(stored, attributes=_attributes_of_linear(stored, taken_as, colour))
     hidden = visible = 0.0
     if has_alpha and not stored.associated:

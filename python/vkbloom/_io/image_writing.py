@@ -16,6 +16,7 @@ from vkbloom._c_paths import for_c
 from vkbloom._checks import check_index, import_extra, native_order
 from vkbloom._io import displayed, safe_writing
 from vkbloom._io.displayed import Saved
+from vkbloom._io.exr_attributes import without_colours, write_own
 from vkbloom._io.images import DTYPES, PIXEL_TYPES, SPACES, WITH_WINDOWS, Picture, is_exr
 from vkbloom._io.narrowing import file_note, for_radiance, narrowed
 
@@ -161,7 +162,8 @@ def described_as(
 ) -> Picture:
     """Return a picture whose attributes name colours; `what` as for `displayed.with_names`."""
     is_plain, attributes = displayed.with_names(oiio, picture.stored.attributes, target, what)
-    stored = dataclasses.replace(picture.stored, attributes=attributes)
+    own = picture.stored.own if is_plain else without_colours(picture.stored.own)
+    stored = dataclasses.replace(picture.stored, attributes=attributes, own=own)
     if is_plain:
         curve: Any = None if what[1] == "none" else what[1]
         return dataclasses.replace(picture, encoding=curve, stored=stored)
@@ -313,6 +315,8 @@ def _describe(
     is_tiff = target.suffix.lower() in (".tif", ".tiff")
     if not to_exr and not (is_tiff and stored.associated):
         spec.attribute("oiio:UnassociatedAlpha", 1)
+    if to_exr:
+        write_own(spec, stored.own)
     is_jpeg = format_name == "jpeg"
     if is_jpeg and spec.nchannels == 3:
         # No subsampling of colours, unless the picture's attributes contain one.

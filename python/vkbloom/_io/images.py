@@ -20,7 +20,7 @@ import os
 import re
 import sys
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final, Literal, Self, TypeAlias
 
@@ -108,6 +108,7 @@ class StoredImage:
     - `gamma`: The exponent that decodes colours to light, if the file states one. It is more exact
       than `space`, and has precedence unless there are `code_points`.
     - `attributes`: Those of which `is_kept` is true, by OpenImageIO's names.
+    - `own`: Those that are only written from OpenEXR to OpenEXR (`exr_attributes.own_attributes`).
     - `parts`: The names of the file's parts (the first 100), of which the pixels are one; "" for a
       part without a name.
     - `profile_name`: The name in the ICC profile; "" without a profile.
@@ -130,6 +131,7 @@ class StoredImage:
     associated: bool
     space: str
     attributes: Mapping[str, tuple[Any, Any]]
+    own: Mapping[str, tuple[Any, Any]] = field(default_factory=dict)
     parts: tuple[str, ...] = ("",)
     profile_name: str = ""
     code_points: tuple[int, ...] | None = None

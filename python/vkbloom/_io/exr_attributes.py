@@ -1,0 +1,61 @@
+"""What an OpenEXR file says that bloom does not change: time code, frame rate, own attributes."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, Final
+
+from vkbloom._io.images import is_kept
+
+if TYPE_CHECKING:
+    import OpenImageIO
+
+#: Attributes by OpenImageIO's names, each with its type and value.
+Attributes = Mapping[str, tuple[Any, Any]]
+
+# What bloom, or another choice of channels, parts and tiles, makes untrue: checksums, previews,
+# lists of channels and views, mattes of channels that are left out, and what vkbloom says itself.
+_UNTRUE: Final = re.compile(
+    r"vkbloom:|cryptomatte/|thumbnail_|oiio:(?!subimagename$)"
+    r"|(?:multiView|Orientation|Software|acesImageContainerFlag|type|version|chunkCount|tiles)$"
+    r"|openexr:(?!lineOrder$)"
+    r"|(?:.*[^a-z])?(?:md5|sha-?(?:1|224|256|384|512)|crc-?(?:16|32|64)?|checksum"
+    r"|(?:node|file|image|pixel)[_-]?hash)(?:[^a-z].*)?$",
+    re.IGNORECASE,
+)
+# What describes colours, besides chromaticities.
+_OF_COLOURS: Final = ("adoptedNeutral", "colorInteropID", "lookModTransform", "renderingTransform")
+# Textures are tiled, which the result is not; environments are still such.
+_TEXTURE: Final = "textureformat"
+_COMPRESSION: Final = "compression"
+_DWA_LEVEL: Final = "openexr:dwaCompressionLevel"
+
+
+def own_attributes(spec: OpenImageIO.ImageSpec) -> dict[str, tuple[Any, Any]]:
+    """Return the attributes of a part that are only written to OpenEXR, and stay true there."""
+    own = {
+        attribute.name: (attribute.type, attribute.value)
+        for attribute in spec.extra_attribs
+        if attribute.value is not None
+        and not is_kept(attribute.name)
+        and _UNTRUE.match(attribute.name) is None
+        and (attribute.name != _TEXTURE or "Environment" in str(attribute.value))
+        and (attribute.name != "openexr:lineOrder" or attribute.value != "randomY")
+    }
+    if (level := spec.get_float_attribute(_DWA_LEVEL)) and "dwa" in str(own.get(_COMPRESSION)):
+        kind, name = own[_COMPRESSION]
+        # OpenImageIO reads the level as an attribute, and writes it by the compression's name.
+        own[_COMPRESSION] = kind, f"{name}:{level:g}"
+    return own
+
+
+def without_colours(attributes: Attributes) -> Attributes:
+    """Return attributes without those of colours, which a conversion makes untrue."""
+    return {name: value for name, value in attributes.items() if name not in _OF_COLOURS}
+
+
+def write_own(spec: OpenImageIO.ImageSpec, attributes: Attributes) -> None:
+    """Set attributes of `own_attributes`."""
+    for name, (kind, value) in attributes.items():
+        spec.attribute(name, kind, value)
