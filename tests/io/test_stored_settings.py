@@ -7,7 +7,12 @@ import contextlib
 import itertools
 import json
 import os
+import random
 import re
+import shutil
+import subprocess
+import sys
+import time
 import tracemalloc
 import zlib
 from pathlib import Path
@@ -214,6 +219,37 @@ class TestFrames:
                 with pytest.raises((ValueError, FileNotFoundError)):
                     vkbloom.Frames.load(folder)
             assert not [file for file in folder.iterdir() if safe_writing.is_temporary(file)]
+
+    def test_a_killed_process(self, tmp_path: Path) -> None:
+        """Saves of five and of nine framebuffers over each other, ended at any time."""
+        code = (
+            "import sys, itertools, numpy as np\n"
+            "from tests.framebuffers import make\n"
+            "for n in itertools.count():\n"
+            "    image = np.full((32, 32, 3), n % 256, np.uint8)\n"
+            "    names = 'abcdefghi'[: 9 if n % 2 else 5]\n"
+            "    make({name: image for name in names}, timings={'a': n}).save(sys.argv[1])\n"
+            "    print(n, flush=True)\n"
+        )
+        words = [sys.executable, "-c", code, str(tmp_path / "folder")]
+        for _ in range(3):
+            with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as child:
+                assert child.stdout is not None
+                assert child.stdout.readline() == "0\n"
+                time.sleep(0.1 * random.random())
+                child.kill()
+            frames, refused = None, ""
+            try:
+                frames = vkbloom.Frames.load(tmp_path / "folder")
+            except ValueError as error:
+                refused = str(error)
+            if frames is None:
+                assert "holds files of 2 saves" in refused or "is missing, which a" in refused
+                shutil.rmtree(tmp_path / "folder")
+                continue
+            number = int(frames.timings["a"])
+            assert len(frames) == (9 if number % 2 else 5)
+            assert all((image == number % 256).all() for image in frames.values())
 
     def test_settings_come_back_from_zarr(self, tmp_path: Path) -> None:
         """What `to_xarray` gives has them as JSON in its attributes, for any method."""

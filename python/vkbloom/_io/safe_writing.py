@@ -145,11 +145,14 @@ def put_in_place(temporary: Path, file: Path) -> None:
 
 
 @contextlib.contextmanager
-def replacing(oiio: ModuleType, sizes: Mapping[Path, int]) -> Iterator[list[Path]]:
+def replacing(
+    oiio: ModuleType, sizes: Mapping[Path, int], obsolete: Sequence[Path] = ()
+) -> Iterator[list[Path]]:
     """Yield temporary files to be written in place of files, whose pixels have these bytes.
 
-    At the end of the block all are checked, then all are renamed. If the block raises, they are
-    removed.
+    At the end of the block all are checked, then all are renamed, and the obsolete files, which the
+    block may add to, are removed before the last one is. If the block raises, the temporary files
+    are removed.
     """
     temporaries: list[Path] = []
     try:
@@ -158,23 +161,33 @@ def replacing(oiio: ModuleType, sizes: Mapping[Path, int]) -> Iterator[list[Path
         yield temporaries
         for temporary, file in zip(temporaries, sizes, strict=True):
             check_complete(oiio, temporary, file)
-        _put_all_in_place([*zip(temporaries, sizes, strict=True)])
+        _put_all_in_place([*zip(temporaries, sizes, strict=True)], obsolete)
     finally:
         for temporary in temporaries:
             remove(temporary)
 
 
-def _put_all_in_place(pairs: Sequence[tuple[Path, Path]]) -> None:
+def _put_all_in_place(pairs: Sequence[tuple[Path, Path]], obsolete: Sequence[Path]) -> None:
     """Rename temporary files to their final names: all of them, or none if one fails."""
-    if len(pairs) == 1:
-        put_in_place(*pairs[0])
+    *others, last = pairs
+    if not others and not obsolete:
+        put_in_place(*last)
         return
     replaced: list[tuple[Path, Path | None]] = []
+
+    def keep(target: Path) -> None:
+        if (backup := _backup_of(target)) is not None:
+            replaced.append(backup)
+
     try:
-        for temporary, file in pairs:
-            if (backup := _backup_of(_link_target(file))) is not None:
-                replaced.append(backup)
+        for temporary, file in others:
+            keep(_link_target(file))
             put_in_place(temporary, file)
+        for file in obsolete:
+            keep(file)
+            file.unlink(missing_ok=True)
+        keep(_link_target(last[1]))
+        put_in_place(*last)
     except BaseException:
         # BaseException includes Ctrl-C.
         for target, kept in reversed(replaced):

@@ -77,12 +77,11 @@ def save(frames: Frames, path: str | os.PathLike[str]) -> list[Path]:
         file = planned if image or is_exr(planned) else planned.with_suffix(".exr")
         files[file] = [image] if image else [_exr_part(frames, name, file, saved) for name in names]
     sizes = {file: sum(part.values.nbytes for part in parts) for file, parts in files.items()}
-    with safe_writing.replacing(oiio, sizes) as temporaries:
+    obsolete: list[Path] = []
+    with safe_writing.replacing(oiio, sizes, obsolete) as temporaries:
         for temporary, (file, parts) in zip(temporaries, files.items(), strict=True):
             put(oiio, parts, temporary, file)
-        obsolete = [*obsolete_files(target, files, _facts_of_all(_beside(target, files)))]
-    for file in obsolete:
-        file.unlink(missing_ok=True)
+        obsolete += obsolete_files(target, files, _facts_of_all(_beside(target, files)))
     return list(files)
 
 
@@ -208,7 +207,12 @@ def _files_of(path: Path) -> list[Path]:
     """Return the files that `save` may have written for a path."""
     if path.is_dir():
         files = sorted(
-            file for file in path.iterdir() if file.is_file() and file.suffix in _IN_FOLDERS
+            file
+            for file in path.iterdir()
+            if file.suffix in _IN_FOLDERS
+            and file.is_file()
+            # Of a process that was killed.
+            and not safe_writing.is_temporary(file)
         )
     else:
         files = [path.with_suffix(".exr")] if path.with_suffix(".exr").exists() else []
