@@ -99,6 +99,16 @@ def test_apply(tmp_path: Path, words: list[str]) -> None:
     assert "Warning" not in done.stderr
 
 
+def test_a_bright_emission(tmp_path: Path) -> None:
+    vkbloom.write(tmp_path / "a.exr", np.ones((16, 16, 3), np.float32))
+    vkbloom.write(tmp_path / "sun.exr", np.full((16, 16, 3), 1e6, np.float32))
+    words = ["--emission", tmp_path / "sun.exr", "--method", "pyramid", "--half"]
+    done = run("apply", tmp_path / "a.exr", tmp_path / "b.exr", *words)
+    assert done.exit_code == 0
+    assert f"{tmp_path / 'sun.exr'}: values beyond 65504" in done.stderr
+    assert np.isfinite(vkbloom.read(tmp_path / "b.exr")).all()
+
+
 def test_apply_to_radiance(tmp_path: Path) -> None:
     image = np.ones((16, 16, 3), np.float32)
     image[8, 8] = INF

@@ -51,6 +51,7 @@ Glow: TypeAlias = Callable[[NDArray[Any]], dict[str, Any]]
 _FAILURES: Final = (OSError, ValueError, MemoryError, click.ClickException)
 # 8-bit pictures of this many pixels or more become half floats, whose steps are finer.
 _HALVED: Final = 1 << 26
+_HALF: Final = np.dtype(np.float16)
 CURVES = ("linear", "srgb", "gamma22", "pq", "hlg")
 
 
@@ -170,10 +171,8 @@ class Run:
         pixels = picture.pixels
         is_large = picture.numbers == "uint8" and pixels[..., 0].size >= _HALVED
         if (options.half or is_large) and pixels.dtype == np.float32:
-            half = np.dtype(np.float16)
-            if (text := narrowing_note(pixels, half)) is not None:
-                note(f"{shown(source)}: {text}")
-            picture = dataclasses.replace(picture, pixels=narrowed(pixels, half))
+            picture = dataclasses.replace(picture, pixels=narrowed(pixels, _HALF))
+            _tell_narrowing(source, pixels)
         return picture
 
     @functools.cached_property
@@ -192,6 +191,8 @@ class Run:
             return lambda image: given
         emission = read_picture(options.emission, 0, options.input_colour)
         glow = (premultiplied(emission) if is_blended else emission).pixels
+        if options.half:
+            _tell_narrowing(options.emission, glow)
         return lambda image: {**given, "emission": alike(glow, image)}
 
     def _write(
@@ -222,6 +223,12 @@ class Run:
                 _send(file, target)
             elif not self.several:
                 say(f"wrote {file}")
+
+
+def _tell_narrowing(source: str, pixels: NDArray[Any]) -> None:
+    """Print a note about values that half floats cannot hold."""
+    if (text := narrowing_note(pixels, _HALF)) is not None:
+        note(f"{shown(source)}: {text}")
 
 
 def _send(file: Path, target: str) -> None:
