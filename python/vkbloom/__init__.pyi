@@ -15,7 +15,8 @@ from ._fit import FitResult, fit, fit_pyramid, translate
 from ._glare.dirt import Dirt
 from ._glare.flares import Ghosts, Halo
 from ._glare.streaks import Streaks
-from ._gradients import deglare, vjp
+from ._gradients import vjp
+from ._gradients.deglare import deglare
 from ._grid.checking import GridReport, check_grid
 from ._grid.grid import grid
 from ._io.array_files import read, write

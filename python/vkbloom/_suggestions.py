@@ -82,27 +82,34 @@ class Named(Mapping[str, T]):
 
     def __init__(self, kind: str, make: Callable[[Any], T]) -> None:
         self._kind = kind
-        self._late: Callable[[], Mapping[str, Any]] | None = None
-        self._filled: dict[str, Any] = {}
+        self._source: Callable[[], Mapping[str, Any]] = dict
+        self._filled: Mapping[str, Any] | None = None
         self._make = make
         self._made: dict[str, T] = {}
 
     def fill(self, entries: Callable[[], Mapping[str, Any]]) -> None:
         """Set the function that returns the entries; it is called at the first use."""
-        self._late = entries
+        self._source, self._filled = entries, None
 
     @property
-    def _entries(self) -> dict[str, Any]:
-        if self._late is not None:
-            late, self._late = self._late, None
-            self._filled = {**late(), **self._filled}
-        return self._filled
+    def _entries(self) -> Mapping[str, Any]:
+        """All entries. The mapping does not change, so that threads can read it at any time."""
+        filled = self._filled
+        if filled is None:
+            # Assigned when it is complete: another thread may be here, too, and gets the same.
+            filled = self._filled = self._source()
+        return filled
 
     def __getitem__(self, name: str) -> T:
-        if name not in self._entries:
-            raise KeyError(unknown(f"unknown {self._kind}", name, self))
+        entries = self._entries
+        if name not in entries:
+            raise KeyError(unknown(f"unknown {self._kind}", name, entries))
+        return self._object(name, entries[name])
+
+    def _object(self, name: str, entry: Any) -> T:
+        """Return the object of an entry: in all threads the same one."""
         if name not in self._made:
-            self._made.setdefault(name, self._make(self._entries[name]))
+            self._made.setdefault(name, self._make(entry))
         return self._made[name]
 
     def __contains__(self, name: object) -> bool:

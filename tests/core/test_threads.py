@@ -1,10 +1,14 @@
-"""Threads that make all calls of the core at once (all_calls.py): their pictures are exact."""
+"""Threads: all calls of the core at once (all_calls.py), and first calls (first_calls.py)."""
 
 from __future__ import annotations
 
 import sys
 
+import pytest
+
+from tests.core import first_calls
 from tests.core.builds import ROOT
+from tests.exhaustive import EXHAUSTIVE
 from tests.processes import output
 from vkbloom import AdapterInfo, Renderer
 
@@ -19,6 +23,13 @@ def test_sixteen_threads_in_random_order(software: AdapterInfo) -> None:
     # `make freethreaded`: the core leaves it off.
     has_gil = getattr(sys, "_is_gil_enabled", lambda: True)()
     assert printed[-1] == f"the GIL is {'on' if has_gil else 'off'}"
+
+
+@pytest.mark.parametrize("call", first_calls.CALLS)
+def test_first_calls_in_threads(software: AdapterInfo, call: str) -> None:
+    """Whatever a process makes at its first use is complete before another thread sees it."""
+    for _ in range(50 if EXHAUSTIVE else 1):
+        output("-W", "error", "-m", "tests.core.first_calls", call, cwd=ROOT)
 
 
 def test_each_device_of_lavapipe_has_an_instance(software: AdapterInfo) -> None:

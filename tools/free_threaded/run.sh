@@ -1,6 +1,7 @@
 #!/bin/sh
 # Makes all calls of the core in 16 threads under Python 3.13 without the GIL: run.sh [CALLS [TSAN_CALLS]]
-# (10000 and 400), the second number under ThreadSanitizer, 0: not at all. Builds both Pythons first, in
+# (10000 and 400), the second number under ThreadSanitizer, 0: not at all. Before them it makes first
+# calls in 32 threads, in 50 processes each. Builds both Pythons first, in
 # build/free_threaded, and there the wheel cp313t. PYTHON: an interpreter with pip 24 or later.
 set -eu
 cd "$(dirname "$0")/../.."
@@ -13,7 +14,7 @@ export PYTHONDONTWRITEBYTECODE=1
 test -x "$folder/plain/bin/python3.13t" || tools/free_threaded/python.sh "$folder/plain"
 test -d "$folder/venv" || "$folder/plain/bin/python3.13t" -m venv --without-pip "$folder/venv"
 "$PYTHON" -m pip --python "$folder/venv/bin/python" install --quiet --only-binary=:all: \
-    "numpy >= 2.2, < 2.5" pytest hypothesis "setuptools >= 77" wheel
+    "numpy >= 2.2, < 2.5" "lazy_loader >= 0.4" pytest hypothesis "setuptools >= 77" wheel
 rm -rf "$folder/package"
 mkdir -p "$folder/package/build"
 test ! -d build/spirv || cp -rp build/spirv "$folder/package/build/"
@@ -21,7 +22,7 @@ packaging/core_wheel.sh "$folder/package" "$PYTHON" "$folder/venv/bin/python"
 "$PYTHON" packaging/sbom.py check "$folder"/package/dist/*.whl
 "$PYTHON" -m pip --python "$folder/venv/bin/python" install --quiet --no-deps --force-reinstall \
     "$folder"/package/dist/*.whl
-"$folder/venv/bin/python" -m pytest -q -p no:cacheprovider tests/core/test_threads.py
+VKBLOOM_EXHAUSTIVE=1 "$folder/venv/bin/python" -m pytest -q -p no:cacheprovider tests/core/test_threads.py
 "$folder/venv/bin/python" -m tests.core.all_calls "$calls"
 test "$tsan_calls" != 0 || exit 0
 

@@ -6,7 +6,9 @@ import copy
 import copyreg
 import dataclasses
 import keyword
+import os
 import re
+import threading
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, ClassVar, Final, Literal, Self
@@ -32,6 +34,19 @@ Reference = Callable[[NDArray[Any], Settings], Mapping[str, NDArray[Any]]]
 LARGEST_FLOAT: Final = 3.4028234663852886e38
 #: Fields that a file without BLOOM has not, since it composites by itself.
 COMPOSITED: Final = ("intensity", "composite")
+
+#: Held while a class is looked up and made, so that threads that load one text get one class.
+_loading = threading.RLock()
+
+
+def _renew_lock() -> None:
+    """Replace the lock in a forked process: another thread of the parent may have held it."""
+    global _loading  # noqa: PLW0603  the lock is of this process
+    _loading = threading.RLock()
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_renew_lock)
 
 
 class CustomType(type):
@@ -133,11 +148,12 @@ def settings_of(
 
 def class_of(name: str, source: Source, reference: Reference | None) -> type[CustomMethod]:
     """Return the class of a text: the one that is registered, or a new one; for pickle."""
-    if name in METHODS:
-        known = METHODS[name]
-        if isinstance(known, CustomType) and known.file.source == source:
-            return known
-    return registered(name, source, reference)
+    with _loading:
+        if name in METHODS:
+            known = METHODS[name]
+            if isinstance(known, CustomType) and known.file.source == source:
+                return known
+        return registered(name, source, reference)
 
 
 def reduced(kind: CustomType) -> Any:
@@ -212,8 +228,9 @@ def load_method(
         name = identifier_of(Path(read.name).stem if read.name != "<text>" else "own")
     elif not isinstance(name, str) or not name.isidentifier() or keyword.iskeyword(name):
         raise ValueError(f"name: {name!r} is not an identifier")
-    known = class_of(name, read, reference)
-    return known if known.numpy_reference is reference else registered(name, read, reference)
+    with _loading:
+        known = class_of(name, read, reference)
+        return known if known.numpy_reference is reference else registered(name, read, reference)
 
 
 def identifier_of(stem: str) -> str:
@@ -223,7 +240,7 @@ def identifier_of(stem: str) -> str:
 
 
 def registered(name: str, source: Source, reference: Reference | None) -> type[CustomMethod]:
-    """Make the class of a text, and register it."""
+    """Make the class of a text, and register it; with the lock of loading."""
     if name in METHODS and not isinstance(METHODS[name], CustomType):
         raise ValueError(f"name: {name!r} is a method of vkbloom; give another name=")
     file = read_file(source)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from vkbloom._checks import import_extra
-from vkbloom._explorer.viewer import Viewer
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -68,6 +67,7 @@ def explore(
     texels looks wider in a reduced frame.
     """
     import_extra("anywidget", "notebook", "explore")
+    from vkbloom._explorer.viewer import Viewer  # noqa: PLC0415  see vkbloom.reference
     from vkbloom._explorer.widget import Explorer  # noqa: PLC0415  needs anywidget
 
     return Explorer(

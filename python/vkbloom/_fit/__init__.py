@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from vkbloom._fit.fitting import fit
-from vkbloom._fit.pyramids import fit_pyramid
-from vkbloom._fit.result import FitResult
-from vkbloom._fit.translating import translate
+import lazy_loader
 
-__all__ = ["FitResult", "fit", "fit_pyramid", "translate"]
+# Modules are imported at the first use of a name. Imported here, they could meet a thread that
+# imports one of them and waits for this module: Python then gives one of the threads half a module.
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from vkbloom._gradients.deglare import deglare
-from vkbloom._gradients.passes import on_device
-from vkbloom._gradients.pulling import Pullback, pull_each, pullback_of, vjp
+import lazy_loader
 
-__all__ = ["Pullback", "deglare", "on_device", "pull_each", "pullback_of", "vjp"]
+# Modules are imported at the first use of a name. Imported here, they could meet a thread that
+# imports one of them and waits for this module: Python then gives one of the threads half a module.
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

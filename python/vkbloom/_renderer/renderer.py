@@ -496,7 +496,8 @@ class Renderer:
             chosen = check_settings(settings, of_image=True)
         if self.closed:
             raise ValueError("the renderer is closed")
-        if names and not (self._named[0] is chosen and self._named[1] == names):
+        checked_settings, checked_names = self._named
+        if names and not (checked_settings is chosen and checked_names == names):
             self._check_names(image_source(_ANY_IMAGE), chosen, names)
             self._named = chosen, names
         destination = self._placed(device)

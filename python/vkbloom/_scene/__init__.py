@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from vkbloom._scene.mesh import Mesh
-from vkbloom._scene.scene import Camera, Scene
-from vkbloom._scene.skybox import Cubemap
+import lazy_loader
 
-__all__ = ["Camera", "Cubemap", "Mesh", "Scene"]
+# Modules are imported at the first use of a name. Imported here, they could meet a thread that
+# imports one of them and waits for this module: Python then gives one of the threads half a module.
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -45,7 +45,12 @@ class Registry(Named[type[Any]]):
 
     def supply(self, package: str, sources: Mapping[str, str]) -> None:
         """Set the classes of a package: "module:Class" by name."""
-        self.fill(lambda: {name: f"{package}.{source}" for name, source in sources.items()})
+        entries = {name: f"{package}.{source}" for name, source in sources.items()}
+        self.fill(lambda: entries)
+
+    def _object(self, name: str, entry: str | type[Any]) -> type[Any]:
+        """Return the class of an entry. None is kept, since a registered class may be replaced."""
+        return _imported(entry)
 
     def _rows(self) -> list[tuple[str, ...]]:
         return [
@@ -59,18 +64,20 @@ class Registry(Named[type[Any]]):
 
 
 class Methods(Registry):
-    """The settings classes of the methods, and the methods in NumPy."""
+    """The settings classes of the methods, and the methods in NumPy.
+
+    Both changes assign a new mapping: other threads may be reading the old one. Two changes at once
+    need the lock of their caller (`vkbloom._custom.method`).
+    """
 
     def register(self, kind: type[Any]) -> None:
         """Add the class of a custom method, or replace one that was added."""
-        self.unregister(kind.method)
-        self._entries[kind.method] = kind
+        self._filled = {**self._entries, kind.method: kind}
 
     def unregister(self, name: str) -> None:
         """Remove a class that was added, if it is there."""
         if self.is_added(name):
-            del self._entries[name]
-            self._made.pop(name, None)
+            self._filled = {other: kind for other, kind in self._entries.items() if other != name}
 
     def reference(self, name: str) -> Reference:
         """Return a method of the package in NumPy; raise KeyError for a custom one."""

@@ -8,26 +8,8 @@ an image with any of them.
 
 from __future__ import annotations
 
-from ._aperture import aperture, iris
-from ._base import PSF
-from ._eye import cie_general, cie_total, spencer
-from ._lens import airy, gaussian, harvey_shack
-from ._measuring import measured
-from ._renderers import fog_glow, unreal
-from ._sampled import samples
+import lazy_loader
 
-__all__ = [
-    "PSF",
-    "airy",
-    "aperture",
-    "cie_general",
-    "cie_total",
-    "fog_glow",
-    "gaussian",
-    "harvey_shack",
-    "iris",
-    "measured",
-    "samples",
-    "spencer",
-    "unreal",
-]
+# Modules are imported at the first use of a name. Imported here, they could meet a thread that
+# imports one of them and waits for this module: Python then gives one of the threads half a module.
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -220,6 +220,10 @@ def centred(array: Array, size: tuple[int, int]) -> Array:
 
 def functions() -> dict[str, type[PSF]]:
     """Return the point-spread functions that there are now, by name."""
+    from vkbloom import psf  # noqa: PLC0415  imports the modules of the package
+
+    for name in psf.__all__:
+        getattr(psf, name)
     return dict(sorted((kind.__name__, kind) for kind in _leaves(PSF)))
 
 

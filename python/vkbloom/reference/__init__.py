@@ -9,9 +9,8 @@ deferred system, and `vjp` the framebuffers with their derivatives.
 
 from __future__ import annotations
 
-from ._compositing import composite
-from ._derivatives import vjp
-from ._framebuffers import apply, blur, gain, passes
-from ._shading import shade
+import lazy_loader
 
-__all__ = ["apply", "blur", "composite", "gain", "passes", "shade", "vjp"]
+# Modules are imported at the first use of a name. Imported here, they could meet a thread that
+# imports one of them and waits for this module: Python then gives one of the threads half a module.
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

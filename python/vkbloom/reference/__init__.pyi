@@ -1,0 +1,15 @@
+# The public names of `vkbloom.reference`; lazy_loader reads them, and imports what is asked for.
+from ._compositing import composite
+from ._derivatives import vjp
+from ._framebuffers import apply, blur, gain, passes
+from ._shading import shade
+
+__all__ = [
+    "apply",
+    "blur",
+    "composite",
+    "gain",
+    "passes",
+    "shade",
+    "vjp",
+]
