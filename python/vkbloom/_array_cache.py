@@ -9,6 +9,8 @@ from collections import OrderedDict
 from collections.abc import Callable, Hashable
 from typing import Any, Final, Protocol, TypeVar, cast
 
+from vkbloom._locks import ProcessLock
+
 #: The bound while a renderer is open, as that of the core's images. The last array that was made
 #: stays whatever its size, since a plan holds it anyway.
 OPEN_BYTES: Final = 256 << 20
@@ -58,16 +60,18 @@ class ArrayCache:
 
 
 _IN_PROCESS: Final = ArrayCache(CLOSED_BYTES, 0)
+_SHARING: Final = ProcessLock()
 _of_renderers: Callable[[], ArrayCache | None] = lambda: None  # noqa: E731  a dead reference
 
 
 def shared() -> ArrayCache:
     """Return the arrays of the open renderers, each of which holds them until it is closed."""
     global _of_renderers  # noqa: PLW0603  a weak reference: the renderers are the owners
-    arrays = _of_renderers()
-    if arrays is None:
-        arrays = ArrayCache(OPEN_BYTES, 1)
-        _of_renderers = weakref.ref(arrays)
+    with _SHARING:
+        arrays = _of_renderers()
+        if arrays is None:
+            arrays = ArrayCache(OPEN_BYTES, 1)
+            _of_renderers = weakref.ref(arrays)
     return arrays
 
 

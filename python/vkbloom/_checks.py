@@ -176,7 +176,7 @@ def check_image(image: object, name: str = "image") -> NDArray[Any]:
             f"{name}: the mode {mode} is not RGB or RGBA; convert it: "
             f'{name}.convert("{_MODE_HINTS[mode]}")'
         )
-    array = _viewed(image, name)
+    array = view_image(image, name)
     if array.dtype.name == "float64":  # in any byte order
         array = array.astype(np.float32)
     if array.dtype not in _DTYPES:
@@ -217,7 +217,7 @@ def check_mask(mask: object, size: tuple[int, int], dtype: Any = np.float32) -> 
     """Return the mask as floats of 0 to 1, (H, W), if it has that height and width."""
     if _pil_mode(mask) == "P":
         raise ValueError('mask: the mode P is a palette; convert it: mask.convert("L")')
-    array = _viewed(mask, "mask", ("y", "x"))
+    array = view_image(mask, "mask", ("y", "x"))
     if array.dtype.name not in ("uint8", "bool", "float16", "float32", "float64"):
         hint = "; convert it: (mask / 65535).astype(np.float32)" * (array.dtype.name == "uint16")
         raise TypeError(
@@ -236,16 +236,31 @@ def check_mask(mask: object, size: tuple[int, int], dtype: Any = np.float32) -> 
     return values
 
 
-def _viewed(
+def plain_array(value: object, name: str) -> NDArray[Any]:
+    """Return what NumPy makes of an object, as a plain ndarray: every array argument comes here.
+
+    Subclasses have their own arithmetic: a masked array of float32, divided by 255, is one of
+    float64. Values under a mask are not the caller's: they are a ValueError.
+    """
+    array = np.asanyarray(value)
+    if type(array) is np.ndarray:
+        return array
+    if np.ma.is_masked(array):
+        raise ValueError(
+            f"{name}: some values are masked; fill them first, such as {name}.filled(0)"
+        )
+    return np.asarray(array)
+
+
+def view_image(
     image: object, name: str, dimensions: tuple[str, ...] = ("y", "x", "channel")
 ) -> NDArray[Any]:
-    """Return an array view of an object, or raise TypeError or ValueError."""
+    """Return the plain array of an image, also of another library's.
+
+    An xarray.DataArray has these dimensions in any order. Raises TypeError or ValueError.
+    """
     if isinstance(image, np.ndarray):
-        if type(image) is not np.ndarray and np.ma.is_masked(image):
-            raise ValueError(
-                f"{name}: some values are masked; fill them first, such as {name}.filled(0)"
-            )
-        return image
+        return plain_array(image, name)
     dims = getattr(image, "dims", None)
     if isinstance(dims, tuple) and hasattr(image, "transpose"):
         # A grid's channels are named after their framebuffer, such as "final_channel".
@@ -258,14 +273,12 @@ def _viewed(
                 else f"rename them: {name}.rename(...)"
             )
             raise ValueError(f"{name}: dimensions {dims} are not {', '.join(dimensions)}; {hint}")
-        return np.asarray(image.transpose(*order))
+        return plain_array(image.transpose(*order), name)
     is_viewed = hasattr(image, "__array__") or hasattr(image, "__array_interface__")
     try:
         if hasattr(image, "__dlpack__") and not is_viewed:
             return np.from_dlpack(image)
-        if is_viewed:
-            return np.asarray(image)
-        return np.asarray(memoryview(image))  # type: ignore[arg-type]
+        array = np.asanyarray(image) if is_viewed else np.asarray(memoryview(image))  # type: ignore[arg-type]
     except (TypeError, ValueError, RuntimeError, BufferError) as error:
         if device_kind(image) not in (0, _DLPACK_CPU):
             raise TypeError(on_another_device(image, name)) from None
@@ -273,6 +286,7 @@ def _viewed(
             f"{name}: an array is needed, not {type(image).__name__}"
             + (f"; NumPy: {error}" if is_viewed else "")
         ) from None
+    return plain_array(array, name)
 
 
 def on_another_device(image: object, name: str) -> str:

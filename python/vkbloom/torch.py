@@ -21,7 +21,7 @@ __all__ = ["Bloom", "bloom"]
 
 def bloom(
     image: Any,
-    settings: Settings,
+    settings: Settings | str,
     *,
     mask: Any = None,
     emission: Any = None,
@@ -37,8 +37,9 @@ def bloom(
         computed in NumPy by `vkbloom.reference`, all others by the renderer. Tensors of CUDA, and
         the derivatives by them, stay on their GPU; only a mask, whose values are checked on the
         host, and what `vjp` takes from the reference go through the host.
-    settings : Settings
-        `Settings.format` is not read: the bloom buffers are "rgba32float".
+    settings : Settings or str
+        Settings, or the name of a preset. `Settings.format` is not read: the bloom buffers are
+        "rgba32float".
     mask : Tensor, shape (..., H, W), optional
         As for `Renderer.apply`, with the image's leading dimensions.
     emission : Tensor, optional
@@ -74,8 +75,9 @@ class Bloom(torch.nn.Module):  # type: ignore[misc]
 
     Parameters
     ----------
-    settings : Settings
-        Where learning starts, and the fields that stay as they are.
+    settings : Settings or str
+        Settings, or the name of a preset: where learning starts, and the fields that stay as they
+        are.
     learn : sequence of str
         The fields that are parameters of the module: real ones, such as "intensity",
         "level_weights" or "glare.0.intensity".
@@ -103,7 +105,7 @@ class Bloom(torch.nn.Module):  # type: ignore[misc]
 
     def __init__(
         self,
-        settings: Settings,
+        settings: Settings | str,
         learn: tuple[str, ...] = (),
         *,
         renderer: Renderer | None = None,

@@ -36,7 +36,9 @@ def apply(index: int) -> Any:
 def render(index: int) -> Any:
     """Render a scene with a glare by its name."""
     scene = vkbloom.Scene.ufo()
-    frames = vkbloom.render(scene, "unity_urp", (16, 16), glare="anamorphic", framebuffers=["final"])
+    frames = vkbloom.render(
+        scene, "unity_urp", (16, 16), glare="anamorphic", framebuffers=["final"]
+    )
     return frames["final"].tobytes()
 
 
@@ -57,7 +59,8 @@ def load_method(index: int) -> Any:
     own = vkbloom.load_method(METHOD, name=f"of_{index}")
     assert vkbloom.Settings.from_dict(own().to_dict()) == own()
     kind = vkbloom.load_method(METHOD, name="gained")
-    return kind, kind(gain=3), vkbloom.Settings.from_dict({"method": "gained", "gain": 3})
+    made: Any = kind
+    return kind, made(gain=3), vkbloom.Settings.from_dict({"method": "gained", "gain": 3})
 
 
 def names(index: int) -> Any:

@@ -6,6 +6,7 @@ test_matrix.py compares the rest of it with the shaders.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -13,8 +14,11 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from numpy.typing import NDArray
 
+import vkbloom
 from tests.images import random_image
-from vkbloom import Pyramid, Separable, reference
+from vkbloom import Pyramid, Renderer, Separable, presets, psf, reference
+
+IMAGE = random_image(12, 16, 3)
 
 
 def assert_close(actual: Any, expected: Any) -> None:
@@ -88,3 +92,38 @@ def test_curves_have_published_values(curve: Any, colour: float, expected: float
     final = reference.composite(flat(colour, 1, 1), None, Separable(bloom=False, **curve))
     atol = 0.005 if curve.get("encoding") in ("pq", "hlg") else 1e-12
     assert_allclose(final, expected, rtol=0, atol=atol)
+
+
+#: Calls of functions that take settings and have no renderer.
+OF_SETTINGS: dict[str, Callable[[Any], Any]] = {
+    "apply": lambda settings: reference.apply(IMAGE, settings),
+    "passes": lambda settings: reference.passes(IMAGE, settings),
+    "blur": lambda settings: reference.blur(IMAGE, settings),
+    "gain": lambda settings: reference.gain(settings, (16, 12)),
+    "composite": lambda settings: reference.composite(IMAGE, IMAGE, settings),
+    "vjp": lambda settings: reference.vjp(IMAGE, settings)[1]({"final": IMAGE})["intensity"],
+    "measured": lambda settings: psf.measured(settings, (16, 12)).array((16, 12)),
+}
+
+
+@pytest.mark.parametrize("call", OF_SETTINGS)
+def test_the_name_of_a_preset_is_settings(call: str) -> None:
+    given, named = OF_SETTINGS[call](presets["deferred"]), OF_SETTINGS[call]("deferred")
+    np.testing.assert_equal(named, given)
+
+
+def test_names_where_a_renderer_searches(renderer: Renderer) -> None:
+    search: Any = {"renderer": renderer, "max_calls": 3}
+    found = vkbloom.fit(IMAGE, IMAGE, "kino", "intensity", **search)
+    assert found.settings.method == "kino"
+    found = vkbloom.translate("deferred", "kino", size=(32, 24), **search)
+    assert found.settings.method == "kino"
+    axes = {"settings": ["kino", "deferred"]}
+    by_name = vkbloom.grid(IMAGE, axes=axes, renderer=renderer)
+    assert by_name.identical(
+        vkbloom.grid(
+            IMAGE,
+            axes={"settings": [presets[name] for name in axes["settings"]]},
+            renderer=renderer,
+        )
+    )

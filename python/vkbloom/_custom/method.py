@@ -6,9 +6,7 @@ import copy
 import copyreg
 import dataclasses
 import keyword
-import os
 import re
-import threading
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, ClassVar, Final, Literal, Self
@@ -23,6 +21,7 @@ from vkbloom._custom.planning import Request, planned
 from vkbloom._custom.rows import made_resources
 from vkbloom._custom.shaders import Shaders
 from vkbloom._custom.source import Source, read_source
+from vkbloom._locks import ProcessLock
 from vkbloom._settings.blocks import settings_block
 from vkbloom._settings.fields import number_field, value_field
 from vkbloom._settings.registry import METHODS
@@ -36,17 +35,7 @@ LARGEST_FLOAT: Final = 3.4028234663852886e38
 COMPOSITED: Final = ("intensity", "composite")
 
 #: Held while a class is looked up and made, so that threads that load one text get one class.
-_loading = threading.RLock()
-
-
-def _renew_lock() -> None:
-    """Replace the lock in a forked process: another thread of the parent may have held it."""
-    global _loading  # noqa: PLW0603  the lock is of this process
-    _loading = threading.RLock()
-
-
-if hasattr(os, "register_at_fork"):
-    os.register_at_fork(after_in_child=_renew_lock)
+_LOADING: Final = ProcessLock()
 
 
 class CustomType(type):
@@ -148,7 +137,7 @@ def settings_of(
 
 def class_of(name: str, source: Source, reference: Reference | None) -> type[CustomMethod]:
     """Return the class of a text: the one that is registered, or a new one; for pickle."""
-    with _loading:
+    with _LOADING:
         if name in METHODS:
             known = METHODS[name]
             if isinstance(known, CustomType) and known.file.source == source:
@@ -228,7 +217,7 @@ def load_method(
         name = identifier_of(Path(read.name).stem if read.name != "<text>" else "own")
     elif not isinstance(name, str) or not name.isidentifier() or keyword.iskeyword(name):
         raise ValueError(f"name: {name!r} is not an identifier")
-    with _loading:
+    with _LOADING:
         known = class_of(name, read, reference)
         return known if known.numpy_reference is reference else registered(name, read, reference)
 

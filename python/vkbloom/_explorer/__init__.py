@@ -17,9 +17,9 @@ if TYPE_CHECKING:
 
 def explore(
     source: Scene | NDArray[Any] | None = None,
-    settings: Settings | None = None,
+    settings: Settings | str | None = None,
     *,
-    against: Settings | None = None,
+    against: Settings | str | None = None,
     size: tuple[int, int] = (1280, 720),
     shading: Shading = "deferred",
     renderer: Renderer | None = None,
@@ -36,11 +36,11 @@ def explore(
         The scene, or an image as `Renderer.apply` takes it. An image that is larger than it is
         shown is reduced first by averaging, unless the page selects its own size. Default:
         ``Scene.ufo()`` with lights 6 times as bright as white.
-    settings : Settings, optional
-        The initial settings. Default: ``presets["bevy_natural"]`` for an image and
-        ``presets["tutorial"]`` for a scene, with ``tonemap="aces"`` and ``encoding="srgb"`` if the
-        shading is deferred.
-    against : Settings, optional
+    settings : Settings or str, optional
+        The initial settings, or the name of a preset. Default: ``presets["bevy_natural"]`` for an
+        image and ``presets["tutorial"]`` for a scene, with ``tonemap="aces"`` and
+        ``encoding="srgb"`` if the shading is deferred.
+    against : Settings or str, optional
         The initial settings of B. Default: `settings` without bloom.
     size : (int, int)
         Width and height of a scene's frame. They give the aspect ratio, and the size if the page

@@ -93,9 +93,9 @@ class Viewer:
     def __init__(
         self,
         source: Scene | NDArray[Any] | None = None,
-        settings: Settings | None = None,
+        settings: Settings | str | None = None,
         *,
-        against: Settings | None = None,
+        against: Settings | str | None = None,
         size: tuple[int, int] = (1280, 720),
         shading: Shading = "deferred",
         renderer: Renderer | None = None,
@@ -128,7 +128,7 @@ class Viewer:
         if self._owned:
             self.renderer.close()
 
-    def _begin(self, settings: Settings | None, *, is_photo: bool = False) -> None:
+    def _begin(self, settings: Settings | str | None, *, is_photo: bool = False) -> None:
         """Set A to the settings or to the source's default, and B to the same without bloom."""
         is_default = settings is None
         if settings is None:

@@ -40,7 +40,22 @@ _FAINT: Final = 0.02
 def fit(
     image: NDArray[Any] | Image,
     target: NDArray[Any],
-    settings: Settings,
+    settings: Literal["all"],
+    vary: str | Sequence[str],
+    *,
+    framebuffer: str = ...,
+    loss: Loss = ...,
+    bounds: Bounds | None = ...,
+    renderer: Renderer | None = ...,
+    max_calls: int = ...,
+    gradient: bool = ...,
+    progress: bool = ...,
+) -> list[FitResult]: ...
+@overload
+def fit(  # type: ignore[overload-overlap]  a name is a sequence of str, too
+    image: NDArray[Any] | Image,
+    target: NDArray[Any],
+    settings: Settings | str,
     vary: str | Sequence[str],
     *,
     framebuffer: str = ...,
@@ -55,7 +70,7 @@ def fit(
 def fit(
     image: NDArray[Any] | Image,
     target: NDArray[Any],
-    settings: Sequence[Settings] | Literal["all"],
+    settings: Sequence[Settings | str],
     vary: str | Sequence[str],
     *,
     framebuffer: str = ...,
@@ -70,7 +85,7 @@ def fit(
 def fit(
     image: NDArray[Any] | Image,
     target: NDArray[Any],
-    settings: Settings | Sequence[Settings] | Literal["all"],
+    settings: Settings | str | Sequence[Settings | str],
     vary: str | Sequence[str],
     *,
     framebuffer: str = "final",
@@ -91,10 +106,11 @@ def fit(
         The picture that the framebuffer should be, of the same size; uint8 is scaled to 0..1.
         Alpha is not compared. With a target of 8 bits, such as a screenshot from `vkbloom.read`,
         framebuffers are clipped and rounded as it is, and its saturated pixels are left out.
-    settings : Settings, sequence of Settings, or "all"
-        Where the search starts, and the fields that stay as they are. Of several, such as presets
-        of several engines, each is searched by itself. "all": every preset; of a preset those of
-        the varied fields vary that it has and that have an effect.
+    settings : Settings, str, sequence of these, or "all"
+        Settings, or the name of a preset: where the search starts, and the fields that stay as
+        they are. Of several, such as presets of several engines, each is searched by itself. "all":
+        every preset; of a preset those of the varied fields vary that it has and that have an
+        effect.
     vary : str or sequence of str
         The fields to find: numbers, integers, flags and choices.
     framebuffer : str
@@ -148,6 +164,7 @@ def fit(
     have it.
     """
     is_all = isinstance(settings, str) and settings == "all"
+    is_many = is_all or not isinstance(settings, Settings | str)
     candidates = _candidates(settings)
     names = _checked_names(vary)
     check_index("max_calls", max_calls, 1, 10_000_000)
@@ -177,10 +194,10 @@ def fit(
         with _bar(progress, space.start.method, max_calls) as on_loss:
             results.append(_fitted(stages, space, max_calls, on_loss, gradient=gradient))
     results.sort(key=lambda item: item.loss)
-    return results[0] if isinstance(settings, Settings) else results
+    return results if is_many else results[0]
 
 
-def _candidates(settings: Settings | Sequence[Settings] | str) -> list[Settings]:
+def _candidates(settings: Settings | Sequence[Settings | str] | str) -> list[Settings]:
     """Return where the searches start."""
     if isinstance(settings, str) and settings == "all":
         return list(presets.values())

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from vkbloom._checks import check_time
 from vkbloom._settings.fields import fields_of, plain_value
 from vkbloom._settings.registry import presets
-from vkbloom._settings.settings import Settings, check_settings, field_info
+from vkbloom._settings.settings import Settings, check_settings, field_info, given_settings
 from vkbloom._suggestions import did_you_mean
 
 Kind = Literal["settings", "time", "preset"]
@@ -92,9 +92,7 @@ def _whole_axis(name: str, values: object) -> Axis:
             except TypeError:
                 raise TypeError(f"axes: preset: {value!r} is not a name") from None
         return Axis(name, tuple(listed), "preset", "", "The name of the settings")
-    for value in listed:
-        if not isinstance(value, Settings):
-            raise TypeError(f"axes: settings: {value!r} is not Settings")
+    listed = [given_settings(value, "axes: settings") for value in listed]
     return Axis(name, tuple(listed), "preset", "", "The settings as JSON")
 
 

@@ -73,9 +73,9 @@ def grid(
         ``presets["bevy_natural"]`` for images, ``presets["tutorial"]`` for a scene.
     axes : mapping of str to sequence
         Values by settings field, or by "time" for a scene. The axis "preset" has names of
-        `vkbloom.presets`, the axis "settings" a list of Settings of any methods. Only one of these
-        two axes and the argument `settings` can be given. All other axes change the settings of
-        these axes, too.
+        `vkbloom.presets`, the axis "settings" a list of Settings of any methods, or of names of
+        presets. Only one of these two axes and the argument `settings` can be given. All other
+        axes change the settings of these axes, too.
     size : (int, int), optional
         Width and height of a scene's frames. Default: (1280, 720).
     shading, time

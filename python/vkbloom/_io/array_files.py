@@ -263,7 +263,7 @@ def write(
 def _checked(array: NDArray[Any]) -> NDArray[Any]:
     """Return the array as (H, W, C), after a check of its shape and dtype."""
     try:
-        values = np.asarray(array)
+        values = np.asanyarray(array)
     except (TypeError, ValueError) as error:
         raise TypeError(f"array: an array is needed; NumPy: {error}") from None
     values = checked_pixels("array", values)

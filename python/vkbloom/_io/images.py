@@ -28,7 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom._c_paths import is_name
-from vkbloom._checks import native_order
+from vkbloom._checks import native_order, plain_array
 
 #: "linear", "srgb" or the name of a colour space of OpenColorIO.
 Colour: TypeAlias = str
@@ -207,6 +207,7 @@ def checked_pixels(name: str, image: NDArray[Any]) -> NDArray[Any]:
     """Return an array of an image file's values as (H, W, C)."""
     if not isinstance(image, np.ndarray):
         raise TypeError(f"{name}: an array is needed, not {type(image).__name__}")
+    image = plain_array(image, name)
     if image.dtype.name not in (kinds := (*PIXEL_TYPES, "float64")):
         raise TypeError(f"{name}: dtype {image.dtype} is not one of {', '.join(kinds)}")
     if image.ndim not in (2, 3) or image.size == 0:

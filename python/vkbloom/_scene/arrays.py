@@ -7,6 +7,8 @@ from typing import Any, ClassVar, Final
 
 from numpy.typing import NDArray
 
+from vkbloom._checks import plain_array
+
 #: The longest side, far above the 4096 that every Vulkan device supports. It rejects the sizes of
 #: damaged images. The device's own limit is checked at upload.
 MAX_SIDE: Final = 16384
@@ -18,6 +20,7 @@ def read_only(array: NDArray[Any]) -> NDArray[Any]:
     An array that is read-only, C-contiguous and owns its memory is returned itself. Any other is
     copied, because the base of a read-only view can still be changed.
     """
+    array = plain_array(array, "array")
     flags = array.flags
     if flags.writeable or not flags.c_contiguous or not flags.owndata:
         array = array.copy(order="C")

@@ -16,6 +16,7 @@ from typing import Any, Final, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from vkbloom._checks import plain_array
 from vkbloom._io import image_reading
 from vkbloom._scene import ktx
 from vkbloom._scene.arrays import MAX_SIDE, Constructed, read_only
@@ -85,6 +86,7 @@ def load(source: SkyboxSource) -> Cubemap:
 
 def from_array(faces: NDArray[Any]) -> Cubemap:
     """Make a cubemap with all mip levels from an array."""
+    faces = plain_array(faces, "skybox")
     if faces.dtype.newbyteorder("=") not in DTYPES:
         raise TypeError(f"skybox: {faces.dtype} is not uint8, float16 or float32")
     shape = faces.shape

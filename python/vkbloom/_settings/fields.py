@@ -25,6 +25,7 @@ from vkbloom._checks import (
     check_number,
     check_size,
 )
+from vkbloom._locks import ProcessLock
 from vkbloom._suggestions import did_you_mean, lacking
 
 Kind = Literal[
@@ -42,6 +43,8 @@ Kind = Literal[
 ]
 #: A range of numbers; one that ends at infinity does not contain its beginning.
 Range = tuple[float, float]
+
+_DESCRIBING: Final = ProcessLock()
 
 _KINDS: Final[Mapping[object, Kind]] = {
     bool: "flag",
@@ -234,24 +237,29 @@ def fields_of(kind: type[Any]) -> Mapping[str, FieldInfo]:
     """Return the descriptions of a dataclass's fields, by name."""
     infos: Mapping[str, FieldInfo] | None = kind.__dict__.get("__field_infos__")
     if infos is None:
-        inherited: dict[str, FieldInfo] = {}
-        for base in reversed(kind.__bases__):
-            if dataclasses.is_dataclass(base):
-                inherited.update(fields_of(base))
-        # Without the annotations of bases, which are in `inherited`.
-        annotations = inspect.get_annotations(kind, eval_str=True)
-        infos = types.MappingProxyType(
-            {
-                field.name: _described(
-                    kind, field, annotations[field.name], inherited.get(field.name)
-                )
-                if field.name in annotations
-                else dataclasses.replace(inherited[field.name], owner=kind)
-                for field in dataclasses.fields(kind)
-            }
-        )
-        kind.__field_infos__ = infos
+        # `get_annotations` copies the attributes of the class, to which another thread would add.
+        with _DESCRIBING:
+            infos = kind.__dict__.get("__field_infos__")
+            if infos is None:
+                infos = kind.__field_infos__ = _fields_of(kind)
     return infos
+
+
+def _fields_of(kind: type[Any]) -> Mapping[str, FieldInfo]:
+    inherited: dict[str, FieldInfo] = {}
+    for base in reversed(kind.__bases__):
+        if dataclasses.is_dataclass(base):
+            inherited.update(fields_of(base))
+    # Without the annotations of bases, which are in `inherited`.
+    annotations = inspect.get_annotations(kind, eval_str=True)
+    return types.MappingProxyType(
+        {
+            field.name: _described(kind, field, annotations[field.name], inherited.get(field.name))
+            if field.name in annotations
+            else dataclasses.replace(inherited[field.name], owner=kind)
+            for field in dataclasses.fields(kind)
+        }
+    )
 
 
 def _described(

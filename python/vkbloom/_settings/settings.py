@@ -259,6 +259,13 @@ def check_settings(
     raise ValueError(unknown(f"{name}: unknown preset", settings, presets))
 
 
+def given_settings(settings: Settings | str, name: str = "settings") -> Settings:
+    """Return the settings, or those of a preset, of a function that has no default for them."""
+    if settings is None:
+        raise TypeError(f"{name}: None is not a Settings")
+    return check_settings(settings, name)
+
+
 def _hint(settings: object) -> str:
     """Return what to give instead of an object that is not a Settings; "" if that is unknown."""
     if isinstance(settings, type) and issubclass(settings, Settings):

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
 from vkbloom._array_cache import kept
 from vkbloom._settings.fields import value_field
 from vkbloom._settings.registry import METHODS
-from vkbloom._settings.settings import Settings
+from vkbloom._settings.settings import Settings, given_settings
 from vkbloom.psf._base import Array
 from vkbloom.psf._sampled import SampledPSF
 
@@ -19,14 +19,13 @@ from vkbloom.psf._sampled import SampledPSF
 def _read_settings(settings: Any) -> Settings:
     if isinstance(settings, Mapping):
         settings = Settings.from_dict(settings)
-    if not isinstance(settings, Settings):
-        raise TypeError(f"settings: {settings!r} is not a Settings")
-    if settings.threshold is not None:
+    given = given_settings(settings)
+    if given.threshold is not None:
         raise ValueError(
-            f"threshold: {settings.threshold!r} is not None; a bloom with a threshold is not "
+            f"threshold: {given.threshold!r} is not None; a bloom with a threshold is not "
             "linear and has no point spread"
         )
-    return settings
+    return given
 
 
 @dataclasses.dataclass(frozen=True)
@@ -37,9 +36,9 @@ class measured(SampledPSF):
 
     Parameters
     ----------
-    settings : Settings
-        Settings without a threshold, which would not be linear. If the spread depends on the
-        position, it is that of the pixel in the middle.
+    settings : Settings or str
+        Settings, or the name of a preset, without a threshold, which would not be linear. If the
+        spread depends on the position, it is that of the pixel in the middle.
     size : (int, int)
         Width and height of the image. The pixel is at (width // 2, height // 2).
 
@@ -49,7 +48,7 @@ class measured(SampledPSF):
         The settings have a threshold, or `size` is not a pair of integers of at least 1.
     """
 
-    settings: Settings = value_field(read=_read_settings)
+    settings: Settings | str = value_field(read=_read_settings)
     size: tuple[int, int] = (256, 256)
 
     def native_array(self) -> Array:
@@ -64,10 +63,11 @@ def _spread(psf: measured) -> Array:
     # Values of doubles are not clamped.
     point = np.zeros((height, width, 3))
     point[height // 2, width // 2] = 1
-    if METHODS.is_added(psf.settings.method):
-        spread = _rendered(point, psf.settings)
+    settings = cast("Settings", psf.settings)
+    if METHODS.is_added(settings.method):
+        spread = _rendered(point, settings)
     else:
-        spread = reference.blur(point, psf.settings, format="rgba32float")
+        spread = reference.blur(point, settings, format="rgba32float")
     spread.flags.writeable = False
     return spread
 

@@ -15,6 +15,8 @@ from typing import Any, Final, Self
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
+from vkbloom._checks import plain_array
+
 #: The arrays of this process by names that are never used again: PyTorch compiles with strings as
 #: constants, but not with objects.
 ARRAYS: Final[weakref.WeakValueDictionary[str, ArrayValue]] = weakref.WeakValueDictionary()
@@ -36,7 +38,9 @@ class ArrayValue:
     def __init__(self, array: Any, name: str = "array") -> None:
         try:
             plain = _from_plain(array) if isinstance(array, Mapping) else array
-            given = np.asarray(plain)
+            given = plain_array(plain, name)
+            if given.dtype.kind not in "biufcO":
+                raise TypeError(f"{given.dtype} is not a type of numbers")
             # An array of Python objects raises for complex numbers by itself.
             is_complex = given.dtype.kind == "c"
             with np.errstate(over="ignore"):  # Infinity is refused by its own message.

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from vkbloom._argument_types import ANY, SETTINGS, checked_as
+from vkbloom._argument_types import ANY, checked_as
+from vkbloom._settings.settings import Settings, given_settings
 
 from ._darktable import screened
 from ._image import as_float, format_of, storage
@@ -16,15 +17,12 @@ from ._sampling import Array
 from ._tape import joined
 from ._tone_map import ENCODINGS, TONE_MAPS
 
-if TYPE_CHECKING:
-    from vkbloom._settings.settings import Settings
 
-
-@checked_as(bloom=ANY, settings=SETTINGS)
+@checked_as(bloom=ANY)
 def composite(
     scene: NDArray[Any],
     bloom: NDArray[Any] | None,
-    settings: Settings,
+    settings: Settings | str,
     dtype: DTypeLike | None = None,
     *,
     share: float | Array = 1.0,
@@ -51,7 +49,8 @@ def composite(
         uint8 (read as value / 255), float16, float32 or float64.
     bloom : ndarray, shape (H, W, 3) or (H, W, 4), or None
         Finite, of the same types. Not read if ``settings.bloom`` is off.
-    settings : vkbloom.Settings
+    settings : vkbloom.Settings or str
+        Settings, or the name of a preset.
     dtype : dtype, optional
         Dtype of the final image; by default the scene's. The result is clamped to its range.
     share : float or ndarray, shape (H, W, 1)
@@ -67,6 +66,7 @@ def composite(
     ValueError
         An image has another shape, or the sizes differ.
     """
+    settings = given_settings(settings)
     image = as_float(scene, "scene", (3, 4))
     stored = np.asarray(scene).dtype if dtype is None else dtype
     if not settings.bloom:

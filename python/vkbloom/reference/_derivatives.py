@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom._argument_types import SETTINGS, checked_as
+from vkbloom._argument_types import checked
+from vkbloom._checks import plain_array
 from vkbloom._settings.fields import fields_of
+from vkbloom._settings.settings import Settings, given_settings
 
 from ._framebuffers import checked_image, framebuffers
 from ._sampling import Array
 from ._tape import Traced, gradients, value_of
-
-if TYPE_CHECKING:
-    from vkbloom._settings.settings import Settings
 
 #: Real fields that decide sizes and counts of levels, or the samples of a kernel: no derivative.
 DISCRETE: Final = frozenset(
@@ -43,10 +42,10 @@ def check_known(name: str, names: Collection[str]) -> None:
         raise ValueError(f"gradients: {name!r} has no derivative; available: {', '.join(names)}")
 
 
-@checked_as(settings=SETTINGS)
+@checked
 def vjp(
     image: NDArray[Any],
-    settings: Settings,
+    settings: Settings | str,
     *,
     mask: NDArray[Any] | None = None,
     emission: NDArray[Any] | None = None,
@@ -65,7 +64,8 @@ def vjp(
     ----------
     image : ndarray, shape (H, W, 3) or (H, W, 4)
         As for `apply`.
-    settings : vkbloom.Settings
+    settings : vkbloom.Settings or str
+        Settings, or the name of a preset.
     mask : ndarray, shape (H, W), optional
     emission : ndarray, optional
         Of the image's shape and dtype.
@@ -94,6 +94,7 @@ def vjp(
     The formulas of the reference run on arrays that record each operation with its derivative; the
     records are applied in reverse order (Griewank and Walther, "Evaluating Derivatives", 2008).
     """
+    settings = given_settings(settings)
     if hasattr(settings, "numpy_reference"):
         raise ValueError(
             f"method: {settings.method!r} has no derivative, since its passes come from a file"
@@ -202,7 +203,7 @@ def check_shape(name: str, shape: tuple[int, ...], values: Mapping[str, Any]) ->
 
 
 def _checked_cotangent(name: str, cotangent: NDArray[Any], values: Mapping[str, Any]) -> Array:
-    given = np.asarray(cotangent)
+    given = plain_array(cotangent, f"cotangents: {name!r}")
     check_shape(name, given.shape, values)
     if given.dtype.kind not in "fiub":
         raise TypeError(f"cotangents: {name!r} is of dtype {given.dtype}, not of real numbers")

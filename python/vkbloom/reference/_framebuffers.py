@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from vkbloom._argument_types import SETTINGS, checked_as
-from vkbloom._checks import check_emission, check_mask
+from vkbloom._argument_types import checked
+from vkbloom._checks import check_emission, check_mask, native_order, view_image
 from vkbloom._settings.registry import METHODS, Reference
+from vkbloom._settings.settings import Settings, given_settings
 
 from . import _custom as custom
 from . import _glare as glare
@@ -18,14 +19,11 @@ from ._image import BlurInput, as_float, finite, format_of, storage
 from ._sampling import Array, sample, scaled, size_of
 from ._threshold import apply_threshold, masked
 
-if TYPE_CHECKING:
-    from vkbloom._settings.settings import Settings
 
-
-@checked_as(settings=SETTINGS)
+@checked
 def apply(
     image: NDArray[Any],
-    settings: Settings,
+    settings: Settings | str,
     *,
     mask: NDArray[Any] | None = None,
     emission: NDArray[Any] | None = None,
@@ -52,7 +50,8 @@ def apply(
         uint8 (read as value / 255), float16, float32 or float64. The format of the bloom
         buffers follows from it unless ``settings.format`` names one; that of float64 is
         "rgba32float".
-    settings : vkbloom.Settings
+    settings : vkbloom.Settings or str
+        Settings, or the name of a preset.
     mask : ndarray, shape (H, W), optional
         uint8 (read as value / 255), bool, or floats in 0..1.
     emission : ndarray, optional
@@ -72,6 +71,7 @@ def apply(
         The image has another shape; the mask another size or other values; the emission another
         shape or dtype; or ``settings.alpha`` is "max" or "blur" and there is no alpha.
     """
+    settings = given_settings(settings)
     scene, source, weights, format = checked_image(image, settings, mask, emission)
     dtype = np.asarray(image).dtype
     if (function := getattr(settings, "numpy_reference", None)) is None:
@@ -97,7 +97,8 @@ def checked_image(
     source = scene
     if emission is not None:
         source = as_float(emission, "emission", (3, 4))
-        check_emission(np.asarray(emission), np.asarray(image))
+        given = (view_image(emission, "emission"), view_image(image, "image"))
+        check_emission(*map(native_order, given))
     return scene, source, _weights(mask, size_of(scene)), format
 
 
@@ -150,10 +151,10 @@ def _first_buffer(
     return glow, glow
 
 
-@checked_as(settings=SETTINGS)
+@checked
 def passes(
     glow: NDArray[Any],
-    settings: Settings,
+    settings: Settings | str,
     size: tuple[int, int] | None = None,
     format: str | None = None,
     *,
@@ -167,8 +168,8 @@ def passes(
         The content of the first bloom buffer, at its size: uint8 (read as value / 255), float16,
         float32 or float64. A fourth channel is alpha; it becomes 1, except with ``settings.alpha``
         "blur". All other channels are blurred separately. NaN and infinity count as 0.
-    settings : vkbloom.Settings
-        Only the fields of the blur and `format` are used.
+    settings : vkbloom.Settings or str
+        Settings, or the name of a preset. Only the fields of the blur and `format` are used.
     size : (int, int), optional
         Width and height of the final image, at whose pixels the last pass is evaluated; by default
         those of the glow.
@@ -190,6 +191,7 @@ def passes(
     ValueError
         The glow has another shape, the size is below 1, or the format is unknown.
     """
+    settings = given_settings(settings)
     method = _method(settings)
     values = finite(as_float(glow, "glow"))
     channels = values.shape[2]
@@ -206,10 +208,10 @@ def passes(
     return _with_alphas(framebuffers) if has_alpha else framebuffers
 
 
-@checked_as(settings=SETTINGS)
+@checked
 def blur(
     glow: NDArray[Any],
-    settings: Settings,
+    settings: Settings | str,
     size: tuple[int, int] | None = None,
     format: str | None = None,
 ) -> Array:
@@ -228,14 +230,14 @@ def blur(
     return passes(glow, settings, size, format)["bloom"]
 
 
-@checked_as(settings=SETTINGS)
-def gain(settings: Settings, size: tuple[int, int] = (1280, 720)) -> Any:
+@checked
+def gain(settings: Settings | str, size: tuple[int, int] = (1280, 720)) -> Any:
     """Return the bloom of a flat image of 1, without clamps and before the intensity.
 
     Parameters
     ----------
-    settings : vkbloom.Settings
-        Their threshold is applied to the flat image of 1.
+    settings : vkbloom.Settings or str
+        Settings, or the name of a preset. Their threshold is applied to the flat image of 1.
     size : (int, int), optional
         Width and height of the image. It matters for `vkbloom.KinoBloom`, which has more levels for
         higher images, and in the eighth digit for `vkbloom.UrpBloom`.
@@ -245,6 +247,7 @@ def gain(settings: Settings, size: tuple[int, int] = (1280, 720)) -> Any:
     float, or ndarray of float64, shape (3,)
         For `vkbloom.Convolution` one number for each channel, without the effect of the boundary.
     """
+    settings = given_settings(settings)
     method = _method(settings)
     threshold = None if settings.published else settings.threshold
     glow = float(apply_threshold(np.ones((1, 1, 3)), threshold, settings.knee)[0, 0, 0])

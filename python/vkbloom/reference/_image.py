@@ -10,6 +10,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from vkbloom._checks import view_image
+
 from ._sampling import Array
 
 _FORMATS = {
@@ -23,10 +25,7 @@ _FORMATS = {
 
 def as_float(image: NDArray[Any], name: str, channels: Collection[int] | None = None) -> Array:
     """Return an image in real units."""
-    try:
-        array = np.asarray(image)
-    except (TypeError, ValueError) as error:
-        raise type(error)(f"{name}: not an array; NumPy: {error}") from None
+    array = view_image(image, name)
     if array.dtype.name not in _FORMATS:
         raise TypeError(
             f"{name}: {array.dtype} is not uint8, float16, float32 or float64"

@@ -10,7 +10,7 @@ from typing import Any, Final, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom._checks import check_index, check_number, check_size
+from vkbloom._checks import check_index, check_number, check_size, plain_array
 
 __tracebackhide__ = True
 
@@ -144,7 +144,7 @@ class Probe:
                 "bloom: it returns a mapping; name the framebuffer, for example "
                 "lambda image: renderer.apply(image, settings)['bloom']"
             )
-        array = np.asarray(result)
+        array = plain_array(result, "bloom: its result")
         if array.dtype.name not in _ERRORS:
             raise TypeError(f"bloom: it returns {array.dtype}, not one of {', '.join(_ERRORS)}")
         whole = array[:, :, np.newaxis] if array.ndim == 2 else array

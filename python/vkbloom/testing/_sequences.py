@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom._argument_types import checked
-from vkbloom._checks import check_number, import_extra
+from vkbloom._checks import check_number, import_extra, plain_array
 from vkbloom._io.srgb import decode_srgb, encode_srgb
 
 # WCAG 2.2, "general flash and red flash thresholds": changes of at least a tenth of the largest
@@ -212,7 +212,7 @@ def _lights(frames: Iterable[NDArray[Any]], degrees: float) -> Iterator[NDArray[
     shape: tuple[int, ...] | None = None
     count = 0
     for count, frame in enumerate(frames, start=1):  # noqa: B007  it is read after the loop
-        array = np.asarray(frame)
+        array = plain_array(frame, "frames")
         if array.ndim != 3 or array.shape[2] not in (3, 4) or array.dtype.kind not in "uf":
             raise ValueError(
                 f"frames: shape {array.shape} of {array.dtype} is not (H, W, 3) or (H, W, 4) of "
