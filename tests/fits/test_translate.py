@@ -5,6 +5,8 @@ from __future__ import annotations
 import functools
 import importlib
 import inspect
+import itertools
+import re
 from collections.abc import Callable
 from typing import Any
 
@@ -15,9 +17,14 @@ import vkbloom
 from tests.exhaustive import some
 from vkbloom import DualKawase, Pyramid, Renderer, Separable, UrpBloom, psf, reference
 from vkbloom._cli import fields, search
-from vkbloom._fit.translating import lights
+from vkbloom._fit.translating import describe_difference, lights
 
 SIZE = (96, 64)
+#: Of ten methods.
+PRESETS = (
+    *("unity_urp", "unreal", "kino", "bevy_natural", "filament", "threejs_unreal", "tutorial"),
+    *("jimenez2014", "dual_kawase", "godot_4_6"),
+)
 
 
 Call = Callable[..., Any]
@@ -67,6 +74,58 @@ class TestTranslate:
         assert seen == [(64, 96, 3)]
         assert found.settings.to_dict()["blur_scale"] == pytest.approx(1.8, rel=0.01)
         assert found.loss < 0.02
+
+    def test_the_verdict_follows_the_loss(self, translated: Call) -> None:
+        """Between ten presets: never that there is no bloom, and what differs in numbers."""
+        losses: dict[str, list[float]] = {"good": [], "fair": [], "poor": []}
+        for pair in some(itertools.permutations(PRESETS, 2), 18):
+            found = translated(*pair, max_calls=6)
+            assert found.words.startswith(f"{found.verdict}: "), found
+            assert "no bloom" not in found.words
+            assert re.search(r"halo|lights", found.cause), found.cause
+            for number in re.findall(r"\d[\d.]*", found.words):
+                assert len(re.sub(r"^0\.0*|\.", "", number)) <= 4, found.words
+            assert found.words in found._repr_html_()
+            losses[found.verdict].append(found.loss)
+        assert max(losses["good"]) <= 0.1 < min(losses["fair"])
+        assert max(losses["fair"]) <= 0.3 < min(losses["poor"])
+
+    @pytest.mark.parametrize(
+        ("loss", "limits"), [("relative", (0.05, 0.2)), ("l2", (0.05, 0.2)), ("flip", (0.05, 0.2))]
+    )
+    def test_verdicts_by_other_losses(
+        self, translated: Call, loss: Any, limits: tuple[float, float]
+    ) -> None:
+        for found in (
+            translated("kino", other, loss=loss, max_calls=calls)
+            for other, calls in (("kino", 3), ("tutorial", 8), ("threejs_unreal", 1))
+        ):
+            target = found.target
+            share = {
+                "relative": found.loss,
+                "l2": found.loss / np.sqrt(np.mean(target**2)),
+                "flip": 1 - found.explained,
+            }[loss]
+            verdict = ("good", "fair", "poor")[sum(share > limit for limit in limits)]
+            assert found.verdict == verdict, found
+
+    @pytest.mark.parametrize(
+        ("halo", "at_lights", "said"),
+        [
+            (1.3, 1 / 6, "halo within 30 %, 6 times too weak at the lights"),
+            (4, 1, "halo 4 times too strong, within 0 % at the lights"),
+            (1 / 2.5, -0.5, "halo 2.5 times too weak, lights within 60 %"),
+            (1, 3, "halo within 0 %, 3 times too strong at the lights"),
+        ],
+    )
+    def test_what_differs(self, halo: float, at_lights: float, said: str) -> None:
+        plain = np.zeros((8, 8, 3))
+        plain[4, 4] = 3
+        target = plain + 0.5
+        target[4, 4] = 4
+        result = np.full_like(plain, 0.5 * halo)
+        result[4, 4] = 3 + at_lights
+        assert describe_difference(target, result, plain) == said
 
     def test_the_usual_size_is_the_same_everywhere(self) -> None:
         (option,) = (one for one in search.translate.params if one.name == "size")

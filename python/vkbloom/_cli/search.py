@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import json
 from collections.abc import Callable, Sequence
@@ -24,6 +25,7 @@ from vkbloom._cli.settings_options import (
 from vkbloom._cli.terminal import is_quiet, note
 from vkbloom._explorer.controls import as_code
 from vkbloom._fit.losses import LossName
+from vkbloom._fit.translating import Translation
 from vkbloom._io.expansion import PHOTO_EXPANSION
 from vkbloom._renderer.interruptible import opened_renderer
 from vkbloom._settings.registry import METHODS
@@ -86,8 +88,21 @@ def _show_results(fits: Sequence[vkbloom.FitResult], *, as_json: bool) -> None:
                 f"{item.settings.method}: {item.loss_name} loss {item.loss:.4g}, from "
                 f"{item.start_loss:.4g}; {item.calls} renders"
             )
-            click.echo(f"  {as_code(item.settings)}")
+            is_translation = isinstance(item, Translation)
+            settings = _in_four_digits(item) if is_translation else item.settings
+            click.echo(f"  {as_code(settings)}")
             click.echo(f"  {item.words}")
+
+
+def _in_four_digits(fit: vkbloom.FitResult) -> vkbloom.Settings:
+    """Return the settings of a translation as they are printed: no more digits tell anything."""
+    settings = fit.settings
+    for name in fit.vary:
+        value = settings.value_of(name)
+        if isinstance(value, float):
+            with contextlib.suppress(ValueError):  # beyond the end of the range
+                settings = settings.replace(**{name: float(f"{value:.4g}")})
+    return settings
 
 
 def _object(fit: vkbloom.FitResult) -> dict[str, Any]:
@@ -204,7 +219,8 @@ def translate(
 
     --preset, --method or --settings, with further options, are the settings to translate; --to
     names the other method. Both get a black picture with four small lights. The result is printed
-    as Python code, with its loss and a verdict.
+    as Python code, with numbers of four digits, its loss, a verdict (good, fair or poor, by the
+    loss alone) and what differs.
     """
     if not any(given(name) for name in STARTS):
         raise click.UsageError(

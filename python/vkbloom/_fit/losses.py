@@ -19,8 +19,8 @@ LossName = Literal["relative", "l2", "log", "flip"]
 Loss = LossName | Callable[[NDArray[np.float64], NDArray[np.float64]], float]
 
 _NAMES: Final = get_args(LossName)
-# Values under this share of the largest one count as it in "log".
-_DARK: Final = 1e-4
+#: Values under this share of the largest one count as it in "log".
+DARK: Final = 1e-4
 _MAX_PIXELS: Final = 2**13
 # How far decoded levels may be from those computed here: curves of profiles have 16 bits.
 _LEVEL: Final = 2e-5
@@ -133,7 +133,7 @@ class Measure:
         if self.loss == "relative":
             scales[:] = 1 / float(np.linalg.norm(self.target))
         elif self.loss == "log":
-            bright = array > _DARK * float(self.target.max())
+            bright = array > DARK * float(self.target.max())
             scales *= np.where(bright, 1 / (math.log(10) * np.where(bright, array, 1.0)), 0.0)
         if self.curve is not None:
             scales[(array < 0) | (array > 1)] = 0
@@ -145,7 +145,7 @@ class Measure:
         self, array: NDArray[np.float64], target: NDArray[np.float64]
     ) -> NDArray[np.float64]:
         if self.loss == "log":
-            floor = _DARK * float(self.target.max())
+            floor = DARK * float(self.target.max())
             first, second = (np.log10(np.maximum(item, floor)) for item in (array, target))
             return np.ravel(first - second) / math.sqrt(array.size)
         scale = math.sqrt(array.size)

@@ -153,7 +153,8 @@ class FitResult:
         pixel's colour explains, such as brightness or contrast.
     cause : str
         What the likely cause is if the verdict is not good: no bloom in the target; a target that
-        is clipped or encoded; or another method.
+        is clipped or encoded; or another method. `translate` says what differs instead, and has a
+        verdict that depends on the loss alone.
     """
 
     settings: Settings
@@ -173,7 +174,7 @@ class FitResult:
     def __repr__(self) -> str:
         values = ", ".join(f"{name}={_shown(getattr(self.settings, name))}" for name in self.vary)
         return (
-            f"<vkbloom.FitResult of {self.settings.method}: {values}; loss {self.loss:.3g} after "
+            f"<vkbloom.FitResult of {self.settings.method}: {values}; loss {self.loss:.4g} after "
             f"{self.calls} calls; {self.verdict}>"
         )
 
@@ -210,12 +211,12 @@ class FitResult:
                 ("difference", np.abs(self.residual), largest),
             )
         )
-        summary = f", from a loss ({self.loss_name}) of {self.start_loss:.3g}"
+        summary = f", from a loss ({self.loss_name}) of {self.start_loss:.4g}"
         report = element(
             "div",
             element("div", element("b", repr(self)[1:-1]), summary),
             element("div", self.words),
-            pictures.thumbnails((name, pixels, f"1 is {unit:.3g}") for name, pixels, unit in shown),
+            pictures.thumbnails((name, pixels, f"1 is {unit:.4g}") for name, pixels, unit in shown),
             element("code", repr(self.settings), style=pictures.CODE),
             style="color:inherit;font-size:13px;max-width:68em",
         )
