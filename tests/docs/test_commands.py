@@ -43,7 +43,7 @@ FASTER: Final = {
     "check": ["--measure-size", "64x64", "--size", "64x48"],
     "fit": ["--max-calls", "3"],
 }
-PROGRAMS = ("vkbloom", "pip", "python", "pytest", "make")
+PROGRAMS = ("vkbloom", "pip", "python", "pytest", "make", "apt", "source", "python3")
 # Each program prints its arguments. Others are not found.
 PRELUDE = "\n".join(f"{name}() {{ printf '%s\\0' {name} \"$@\"; }}" for name in PROGRAMS)
 
@@ -84,14 +84,31 @@ def parse(words: list[str]) -> None:
     command.make_context(words[0], arguments, resilient_parsing=True)
 
 
+def assert_builds(packages: list[str]) -> None:
+    """Check that a line of apt installs what the build needs, and nothing else."""
+    needed: set[str] = set()
+    build = (ROOT / "tools" / "setup_system.sh").read_text().split("build)")[1].split(";;")[0]
+    for row in re.findall(r'^ +need "[^"]*" ("[^"]*"|\S+)', build, re.MULTILINE):
+        needed.update(row.strip('"').split())
+    # Python comes with its headers, and the loader with its own.
+    assert {*packages} == needed - {"python3", "libvulkan1"}
+
+
 @pytest.mark.parametrize("line", list(lines()))
 def test_a_command_of_a_page(line: str, folder: Path, kept_renderers: None) -> None:
     words = words_of(line, folder)
     if any(" ".join(words).startswith(begin) for begin in NOT_RUN):
         parse(words)
     elif words[0] == "pip":
-        (wanted,) = (Requirement(word) for word in words if word.startswith("vkbloom"))
+        # "." is the clone.
+        (wanted,) = (
+            Requirement(re.sub(r"^\.", "vkbloom", word)) for word in words[2:] if "[" in word
+        )
         assert wanted.extras <= {*metadata.metadata("vkbloom").get_all("Provides-Extra", [])}
+    elif words[0] == "apt":
+        assert_builds(words[2:])
+    elif words[0] in ("source", "python3"):  # `make demo` makes it, too
+        assert words[1:] in ([".venv/bin/activate"], ["-m", "venv", ".venv"])
     else:
         of = {"vkbloom": (program, words[1:]), "python": (benchmarks, words[3:])}
         command, arguments = of[words[0]]

@@ -37,7 +37,7 @@ _FAINT: Final = 0.02
 
 
 @overload
-def fit(
+def fit(  # type: ignore[overload-overlap]  # "all" is a str, too
     image: NDArray[Any] | Image,
     target: NDArray[Any],
     settings: Literal["all"],
@@ -52,7 +52,7 @@ def fit(
     progress: bool = ...,
 ) -> list[FitResult]: ...
 @overload
-def fit(  # type: ignore[overload-overlap]  a name is a sequence of str, too
+def fit(  # type: ignore[overload-overlap]  # a str is a sequence of str, too
     image: NDArray[Any] | Image,
     target: NDArray[Any],
     settings: Settings | str,
