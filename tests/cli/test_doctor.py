@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import platform
+import re
 import shutil
 import subprocess
 import sys
@@ -18,6 +19,7 @@ import pytest
 
 import vkbloom
 from tests.cli.calls import run
+from tests.docs.pages import ROOT
 from vkbloom import _doctor as doctor
 from vkbloom._doctor import child, drivers, installation, probe
 from vkbloom._doctor.installation import Finding
@@ -410,8 +412,8 @@ def test_extras_are_those_of_the_package(monkeypatch: pytest.MonkeyPatch) -> Non
     [
         ("images", "OpenImageIO", "pip install 'vkbloom[images]'"),
         # These two are in no registry.
-        ("software", "vkbloom-lavapipe", "pip install vkbloom_lavapipe-*_x86_64.whl, which make"),
-        ("shaders", "vkbloom-glslang", "pip install vkbloom_glslang-*_x86_64.whl, which make"),
+        ("software", "vkbloom-lavapipe", "make wheels, then pip install dist/vkbloom_lavapipe-*"),
+        ("shaders", "vkbloom-glslang", "make wheels, then pip install dist/vkbloom_glslang-*"),
     ],
 )
 def test_a_missing_extra_says_what_can_be_installed(
@@ -426,6 +428,31 @@ def test_a_missing_extra_says_what_can_be_installed(
     assert (finding.status, finding.found) == ("note", f"missing: {absent}")
     assert advice in finding.advice
     assert f"vkbloom[{extra}]" not in finding.advice or extra == "images"
+
+
+def test_what_messages_name_exists() -> None:
+    """Packages of Debian, extras, targets of make, files and variables in advice of all modules."""
+    sources = [*(ROOT / "python").rglob("*.py"), ROOT / "setup.py"]
+    # Texts are broken into lines.
+    text = "\n".join(re.sub(r'" *\n *f?"', "", source.read_text()) for source in sources)
+    system = (ROOT / "tools" / "setup_system.sh").read_text()
+    named = set(re.findall(r"apt install ([\w-]+)", text)) | {*installation._UNPUBLISHED.values()}
+    assert len(named) >= 5
+    assert {package for package in named if not re.search(rf"\b{package}\b", system)} == set()
+    extras = set(re.findall(r"vkbloom\[([\w,]+)\]", text))
+    assert {*",".join(extras).split(",")} <= {
+        *metadata.metadata("vkbloom").get_all("Provides-Extra", [])
+    }
+    makefile = (ROOT / "Makefile").read_text()
+    for target in re.findall(r"\bmake (wheels|demo|test)\b", text):
+        assert re.search(rf"^{target}:", makefile, re.MULTILINE), target
+    for name in installation._UNPUBLISHED:
+        folder = ROOT / "packaging" / name.removeprefix("vkbloom-")
+        assert f'name = "{name}"' in (folder / "pyproject.toml").read_text()
+        wheel = f"dist/{name.replace('-', '_')}-*_{platform.machine()}.whl"
+        assert installation.install_wheel(name).endswith(wheel)
+    pages = set(re.findall(r"\bdocs/[\w/-]+\.(?:md|rst)\b", text))
+    assert {page for page in pages if not (ROOT / page).exists()} == set()
 
 
 @linux_only

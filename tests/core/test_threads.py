@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import sys
 
 import pytest
@@ -30,6 +31,23 @@ def test_first_calls_in_threads(software: AdapterInfo, call: str) -> None:
     """Whatever a process makes at its first use is complete before another thread sees it."""
     for _ in range(50 if EXHAUSTIVE else 1):
         output("-W", "error", "-m", "tests.core.first_calls", call, cwd=ROOT)
+
+
+def test_packages_import_none_of_their_modules() -> None:
+    """A thread that imports a package's module waits for the package, with the module's lock held.
+
+    If another thread imports this module for the package, Python gives one of them half of it.
+    """
+    found = []
+    for file in (ROOT / "python" / "vkbloom").glob("*/__init__.py"):
+        package = f"vkbloom.{file.parent.name}"
+        for node in ast.parse(file.read_text()).body:
+            own = isinstance(node, ast.ImportFrom) and (
+                node.level or (node.module or "").startswith(package)
+            )
+            found += [package] if own else []
+    # Programs start with one thread.
+    assert {*found} <= {"vkbloom._cli", "vkbloom._doctor"}
 
 
 def test_each_device_of_lavapipe_has_an_instance(software: AdapterInfo) -> None:

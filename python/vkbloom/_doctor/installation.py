@@ -18,8 +18,11 @@ from vkbloom._io import disk_cache
 
 # Address space of a render of a small image on lavapipe, with the interpreter.
 _AMPLE: Final = 1 << 30
-# Of the project, and in no registry yet.
-_UNPUBLISHED: Final = ("vkbloom-lavapipe", "vkbloom-glslang")
+# Of the project, in no registry yet; and Debian's packages of the same programs.
+_UNPUBLISHED: Final = {
+    "vkbloom-lavapipe": "mesa-vulkan-drivers",
+    "vkbloom-glslang": "glslang-tools",
+}
 # Variables of the loader, Mesa and vkbloom that change the rendering or choose the device.
 _VARIABLES = re.compile(r"(VK|VKBLOOM|LP|MESA|__GL|GALLIVM|LIBGL|NODEVICE|(DIS|EN)ABLE_LAYER)_\w+")
 
@@ -104,7 +107,8 @@ def _extra(name: str, distributions: list[str]) -> Finding:
     if missing:
         advice = f"To use it: pip install 'vkbloom[{name}]'"
         if missing[0] in _UNPUBLISHED:
-            advice = f"To use it: {install_wheel(missing[0])}."
+            package = _UNPUBLISHED[missing[0]]
+            advice = f"To use it: apt install {package}; or {install_wheel(missing[0])}."
         return Finding(f"extra {name}", "note", f"missing: {', '.join(missing)}", advice)
     return Finding(f"extra {name}", "ok", ", ".join(distributions))
 
@@ -112,7 +116,7 @@ def _extra(name: str, distributions: list[str]) -> Finding:
 def install_wheel(distribution: str) -> str:
     """Return how to install a package of the project that no registry has."""
     wheel = f"{distribution.replace('-', '_')}-*_{platform.machine()}.whl"
-    return f"pip install {wheel}, which make wheels in a checkout of vkbloom puts into dist/"
+    return f"in a clone of vkbloom, as root, make wheels, then pip install dist/{wheel}"
 
 
 def gpu_nodes(has_gpu_adapter: bool) -> list[Finding]:
