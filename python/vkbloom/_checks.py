@@ -246,9 +246,7 @@ def plain_array(value: object, name: str) -> NDArray[Any]:
     if type(array) is np.ndarray:
         return array
     if np.ma.is_masked(array):
-        raise ValueError(
-            f"{name}: some values are masked; fill them first, such as {name}.filled(0)"
-        )
+        raise ValueError(f"{name}: some values are masked; fill them first, as .filled(0) does")
     return np.asarray(array)
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from vkbloom._argument_types import checked
-from vkbloom._checks import check_floats, check_number, check_size
+from vkbloom._checks import check_floats, check_number, check_size, plain_array
 from vkbloom._settings.fields import Record
 
 if TYPE_CHECKING:
@@ -182,7 +182,7 @@ def check_radii(name: str, values: ArrayLike) -> Array:
     try:
         if np.iscomplexobj(values):
             raise TypeError
-        numbers = np.asarray(values, np.float64)
+        numbers = plain_array(values, name).astype(np.float64)
     except (TypeError, ValueError, OverflowError):
         raise TypeError(f"{name}: {values!r} is not a sequence of numbers") from None
     if numbers.ndim != 1 or not (numbers >= 0).all():
