@@ -25,6 +25,7 @@ from vkbloom import KinoBloom, Pyramid, Renderer, Scene, Separable, Settings, gl
 from vkbloom._explorer.controls import as_code, controls, settings_from
 from vkbloom._explorer.fast_pictures import picture_of
 from vkbloom._explorer.viewer import Viewer
+from vkbloom._renderer.frame_files import facts_of
 from vkbloom._settings.registry import METHODS
 from vkbloom._views.pictures import png, reduced
 
@@ -268,13 +269,21 @@ class TestViewer:
         # What was looked at is still there.
         assert frame(viewer, Separable())[0]["size"] == [64, 36]
 
-    def test_the_picture_is_saved_in_its_own_size(self, image: Any, renderer: Renderer) -> None:
+    def test_the_picture_is_saved_in_its_own_size(
+        self, image: Any, renderer: Renderer, tmp_path: Path
+    ) -> None:
         viewer = Viewer(image, renderer=renderer)
         frame(viewer, Pyramid(), size=[20, 15])
         answer, (picture,) = ask(viewer, kind="save", settings=Pyramid().to_dict(), stops=-2)
         assert answer["framebuffer"] == "final"
         whole = renderer.apply(image, Pyramid())["final"]
-        assert picture == picture_of(whole, "final", is_encoded=False, stops=-2.0)
+        shown = picture_of(whole, "final", is_encoded=False, stops=-2.0)
+        assert np.array_equal(decode(picture, tmp_path), decode(shown, tmp_path))
+        # It holds its settings as files of the command do.
+        (tmp_path / "final.png").write_bytes(picture)
+        facts = facts_of(tmp_path / "final.png")
+        assert Settings.from_json(facts["settings"]) == Pyramid()
+        assert "expand" not in facts
 
     def test_a_frame_is_that_of_the_renderer(
         self, viewer: Viewer, scene: Scene, renderer: Renderer, tmp_path: Path

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import functools
-import itertools
+import os
 import shutil
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -26,6 +26,7 @@ from vkbloom._cli.image_files import (
     check_input_colour,
     finished,
     input_colour_option,
+    note_hidden,
     read_picture,
     reading_options,
 )
@@ -33,14 +34,16 @@ from vkbloom._cli.program import adapter_option, as_wrong_use, described
 from vkbloom._cli.sequences import PIPE, check_targets, is_stream, pairs, shown
 from vkbloom._cli.settings_options import Start, start_options
 from vkbloom._cli.terminal import complain, hides_progress, note, say, tell_device
-from vkbloom._io import image_writing
+from vkbloom._io import image_writing, safe_writing
 from vkbloom._io.array_files import premultiplied
 from vkbloom._io.displayed import PRIMARIES, Saved
 from vkbloom._io.glows import alike, grey_mask
-from vkbloom._io.images import Colour, Picture, SavedColour
+from vkbloom._io.images import Colour, Highlights, Picture, SavedColour
 from vkbloom._io.narrowing import narrowed, narrowing_note
+from vkbloom._presets.start import developed
 from vkbloom._renderer.frame_files import settings_facts
 from vkbloom._renderer.interruptible import opened_renderer
+from vkbloom._views.added_light import added_share, faint_note
 
 #: A file to read, and the file to write.
 Pair: TypeAlias = tuple[str, str]
@@ -71,7 +74,9 @@ class Options:
     bits: int | None
     quality: int | None
     pipe_format: str
+    framebuffers: str
     overwrite: bool
+    skip_existing: bool
     expand: float | None
     start: Start
 
@@ -80,11 +85,24 @@ class Options:
         """What the colours of a written file are to be."""
         return Saved(self.output_colour, self.primaries, self.view)
 
+    @property
+    def names(self) -> str | list[str]:
+        """The framebuffers to write: `final`, and those of --framebuffers; "all"."""
+        if self.framebuffers == "all":
+            return "all"
+        others = [name.strip() for name in self.framebuffers.split(",")]
+        return [*dict.fromkeys(["final", *filter(None, others)])]
+
 
 def of_format(target: str, pipe_format: str) -> str:
     """Return a file name with the extension of the format of OUT, which may be a stream."""
     is_nameless = target == PIPE or (is_stream(target) and not Path(target).suffix)
     return f"image.{pipe_format}" if is_nameless else target
+
+
+def beside(target: Path, name: str) -> Path:
+    """Return the file of a framebuffer beside OUT, which has `final`."""
+    return target.with_name(f"{target.stem}_{name}{target.suffix}")
 
 
 @dataclasses.dataclass(kw_only=True, eq=False)
@@ -108,41 +126,41 @@ class Run:
                 raise
             self.failures[pair[0]] = error
 
-    def sequence(self, files: list[Pair], settings: vkbloom.Settings, expand: float | None) -> None:
+    def sequence(self, files: list[Pair]) -> None:
         """Add bloom to files one after the other; each is written while the next one is made."""
         hidden = hides_progress() if self.several else True
         bar = tqdm(files, unit="image", leave=False, disable=hidden)
-        for texts in written_in_background(self._made(bar, settings, expand)):
+        for texts in written_in_background(self._made(bar)):
             for text in texts:
                 note(text)
 
-    def _made(
-        self, files: Iterable[Pair], settings: vkbloom.Settings, expand: float | None
-    ) -> Iterator[tuple[list[str], Callable[[], object]]]:
+    def _made(self, files: Iterable[Pair]) -> Iterator[tuple[list[str], Callable[[], object]]]:
         """Yield of each file a list for notes, and the function that writes it and fills the list.
 
         Notes are printed by the thread that reads files, because it silences standard error.
         """
-        is_blended = settings.alpha != "keep"
-        wanted = no_bloom.with_bloom(["final"], settings)
-        glow_of = self._glow_of(is_blended)
         for pair in files:
-            picture = None
+            read = None
             with self._of_file(pair):
-                picture = self._read(pair[0], expand, is_blended=is_blended)
-            if picture is None:
+                read = self._read(pair[0])
+            if read is None:
                 continue
+            picture, settings, expand = read
             # Opened after the first file is read, so that a wrong file fails at once.
             renderer = self.renderer()
             with self._of_file(pair):
                 with as_wrong_use():
-                    image, glow = picture.pixels, glow_of(picture.pixels)
-                    frames = renderer.apply(image, settings, **glow, framebuffers=wanted)
-                self._tell(pair, picture, frames)
+                    glow = self._glow_of(settings.alpha != "keep")(picture.pixels)
+                    wanted = no_bloom.with_bloom(self.options.names, settings)
+                    frames = renderer.apply(picture.pixels, settings, **glow, framebuffers=wanted)
+                self._tell(pair, picture, frames, expand)
+                kept = no_bloom.only(frames, self.options.names)
                 texts: list[str] = []
-                yield texts, functools.partial(self._write, pair, picture, frames, expand, texts)
+                yield texts, functools.partial(self._write, pair, picture, kept, expand, texts)
 
-    def _tell(self, pair: Pair, picture: Picture, frames: vkbloom.Frames) -> None:
+    def _tell(
+        self, pair: Pair, picture: Picture, frames: vkbloom.Frames, expand: float | None
+    ) -> None:
         """Print a note about the bloom of a file."""
         name, target = pair
         text = ""
@@ -154,26 +172,30 @@ class Run:
             of_format(target, self.options.pipe_format), is_associated=picture.stored.associated
         ):
             text = no_bloom.hidden(frames["final"], frames.settings)
+        is_chosen = self.options.start.is_chosen
+        if not text and is_chosen and self.options.mask is None and self.options.emission is None:
+            can_expand = picture.highlights is Highlights.CLIPPED
+            share = added_share(picture.pixels, frames)
+            text = faint_note(
+                share, frames.settings, can_expand=can_expand, expand=expand, option="--{}"
+            )
         if text:
             note(f"{name}: {text}" if self.several else text)
 
-    def _read(self, source: str, expand: float | None, *, is_blended: bool) -> Picture:
+    def _read(self, source: str) -> tuple[Picture, vkbloom.Settings, float | None]:
+        """Return the picture whose pixels get a bloom, its settings and its expansion."""
         options = self.options
-        picture = read_picture(
-            source,
-            options.subimage,
-            options.input_colour,
-            layer=options.layer,
-            expand=expand,
-            is_blended=is_blended,
-        )
-        picture = premultiplied(picture) if is_blended else picture
+        picture = read_picture(source, options.subimage, options.input_colour, layer=options.layer)
+        settings, expand = options.start.of(picture.highlights)
+        if settings.alpha == "keep":
+            note_hidden(picture, source)
+        picture = developed(picture, expand, settings.alpha)
         pixels = picture.pixels
         is_large = picture.numbers == "uint8" and pixels[..., 0].size >= _HALVED
         if (options.half or is_large) and pixels.dtype == np.float32:
             picture = dataclasses.replace(picture, pixels=narrowed(pixels, _HALF))
             _tell_narrowing(source, pixels)
-        return picture
+        return picture, settings, expand
 
     @functools.cached_property
     def _glow_of(self) -> Callable[[bool], Glow]:
@@ -211,6 +233,8 @@ class Run:
             if is_stream(target):
                 suffix = Path(of_format(target, self.options.pipe_format)).suffix
                 file = self.folder / f"output{suffix}"
+            # Before OUT, so that --skip-existing finds all of them where it finds OUT.
+            others = _save_others(frames, file)
             notes += image_writing.save(
                 finished(picture, frames["final"], frames.settings),
                 file,
@@ -222,7 +246,20 @@ class Run:
             if is_stream(target):
                 _send(file, target)
             elif not self.several:
-                say(f"wrote {file}")
+                for written in (file, *others):
+                    say(f"wrote {written}")
+
+
+def _save_others(frames: vkbloom.Frames, target: Path) -> list[Path]:
+    """Write each framebuffer but `final` to its own file beside OUT, its values unchanged."""
+    written: list[Path] = []
+    for name, array in frames.items():
+        if name != "final":
+            alone = vkbloom.Frames(
+                {name: array}, timings=frames.timings, settings=frames.settings, info=frames.info
+            )
+            written += alone.save(beside(target, name))
+    return written
 
 
 def _tell_narrowing(source: str, pixels: NDArray[Any]) -> None:
@@ -249,6 +286,13 @@ def _send(file: Path, target: str) -> None:
 @click.option(
     "--pipe-format", metavar="EXTENSION", default="png", help="Format of standard output."
 )
+@click.option(
+    "--framebuffers",
+    metavar="all|NAME,...",
+    default="final",
+    help="What to write. final is OUT; each other framebuffer is a file beside OUT, with _NAME "
+    "after OUT's stem, its values unchanged; .exr if OUT's format cannot hold them.",
+)
 @input_colour_option
 @click.option("--output-colour", type=click.Choice(CURVES), help="Encoding of the colours in OUT.")
 @click.option(
@@ -264,7 +308,14 @@ def _send(file: Path, target: str) -> None:
     callback=lambda _, __, value: value and int(value),
     help="Size of a number in OUT [default that of IN]",
 )
-@click.option("--overwrite", is_flag=True, help="OUT may be a file that is read as IN.")
+@click.option(
+    "--overwrite",
+    is_flag=True,
+    help="OUT may be a file that is read as IN, or a picture that vkbloom did not write.",
+)
+@click.option(
+    "--skip-existing", is_flag=True, help="Leave out images whose OUT is there and complete."
+)
 @reading_options
 @click.option(
     "--mask", metavar="FILE", type=click.Path(), help="A grey image: white glows, black does not."
@@ -289,12 +340,15 @@ def command(*, sources: tuple[str, ...], out: str | None, adapter: str, **given:
     with Rec. 709 colours. Files of floats are linear. OUT has the number type of IN, or the closest
     one of its format. Integers are encoded to sRGB and clipped to 0..1; colours above 1 keep their
     hue. Floats (as in OpenEXR and Radiance HDR) are written linear. Alpha does not change, unless
-    --alpha is given. OUT is replaced when the new file is complete. Of several images, those that
-    fail are listed at the end, and the exit status is 1. See docs/command-line.md.
+    --alpha is given. OUT is replaced when the new file is complete; with a picture that vkbloom did
+    not write, only as --out OUT or with --overwrite. Of several images, those that fail are listed
+    at the end, and the exit status is 1. See docs/command-line.md.
     """
     options = Options(**given)
     inputs, target = _arguments(sources, out)
-    work = _planned(options, inputs, target)
+    work = _planned(options, inputs, target, is_named=out is not None)
+    if not work:
+        return 0
     with tempfile.TemporaryDirectory() as folder, ExitStack() as stack:
 
         @functools.cache
@@ -308,8 +362,7 @@ def command(*, sources: tuple[str, ...], out: str | None, adapter: str, **given:
         run = Run(
             options=options, out=target, folder=Path(folder), renderer=renderer, several=several
         )
-        for begun, group in itertools.groupby(work, key=lambda pair: options.start.of(pair[0])):
-            run.sequence([*group], *begun)
+        run.sequence(work)
     written = [target for name, target in work if name not in run.failures]
     if len(work) > 1 and written:
         say(f"wrote {len(written)} images, {written[0]} to {written[-1]}")
@@ -328,18 +381,64 @@ def _tell_failures(failures: Mapping[str, Exception], work: Sequence[Pair]) -> i
     return 1
 
 
-def _planned(options: Options, sources: list[str], out: str) -> list[Pair]:
-    """Check the options, and return the files to read, each with the file to write."""
+def _planned(options: Options, sources: list[str], out: str, *, is_named: bool) -> list[Pair]:
+    """Check the options, and return the files to read, each with the file to write.
+
+    `is_named`: OUT was given as --out, and not as the last of several words.
+    """
     check_input_colour(options.input_colour)
+    if is_stream(out) and options.names != ["final"]:
+        raise click.UsageError("a pipe takes only final; leave out --framebuffers")
     work = pairs(sources, out)
-    settings, _ = options.start.of(work[0][0])
+    settings, _ = options.start.of_file(work[0][0])
     _check_colours(settings, options)
+    if options.skip_existing:
+        left = [pair for pair in work if not _is_done(pair, options)]
+        say(f"skipped {len(work) - len(left)} of {len(work)} images, whose OUT is complete")
+        work = left
+    elif not (is_named or options.overwrite) and [target for _, target in work] == [out]:
+        _check_own(work[0][0], out)
     check_targets(work, out, overwrite=options.overwrite)
     with as_wrong_use():
         for target in {Path(target).suffix: target for _, target in work}.values():
             file = of_format(target, options.pipe_format)
             image_writing.check_options(file, options.saved, options.quality, options.bits)
     return work
+
+
+def _is_done(pair: Pair, options: Options) -> bool:
+    """Return whether OUT, and what --framebuffers writes beside it, are there and complete."""
+    source, target = pair
+    if is_stream(target) or not os.path.isfile(target):
+        return False
+    file = Path(target)
+    names = options.names
+    if names == "all":
+        # Those of a method are known when it is planned; every bloom has this one.
+        names = ["final", "bloom"] if options.start.of_file(source)[0].bloom else ["final"]
+    for beside_it in (beside(file, name) for name in names if name != "final"):
+        there = [one for one in (beside_it, beside_it.with_suffix(".exr")) if one.is_file()]
+        if not there or safe_writing.is_damaged(there[0]):
+            return False
+    if safe_writing.is_damaged(file):
+        return False
+    if not safe_writing.is_picture(file):
+        note(f"{target}: is left as it is, though it is no image")
+    return True
+
+
+def _check_own(source: str, out: str) -> None:
+    """Raise click.UsageError if OUT, the last word, is a picture that vkbloom did not write.
+
+    ``vkbloom apply *.jpg`` of two photographs would otherwise replace the second one.
+    """
+    if not os.path.isfile(out) or (os.path.isfile(source) and os.path.samefile(source, out)):
+        return
+    if safe_writing.is_of_another_program(Path(out)):
+        raise click.UsageError(
+            f"{out}: is a picture that vkbloom did not write; to replace it, give -o {out} or "
+            "--overwrite; to add bloom to it, name a folder as OUT"
+        )
 
 
 def _check_colours(settings: vkbloom.Settings, options: Options) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -17,6 +17,7 @@ from vkbloom._cli.settings_options import DEFAULT_PRESETS, settings_options
 from vkbloom._grid import filling, layout, order, sources
 from vkbloom._io import image_writing, safe_writing
 from vkbloom._io.images import Picture
+from vkbloom._presets.start import developed
 from vkbloom._renderer.frame_files import settings_facts
 from vkbloom._renderer.interruptible import opened_renderer
 from vkbloom._settings.fields import fields_of
@@ -77,9 +78,8 @@ def command(*, source: str | None, out: str, words: tuple[str, ...], **given: An
     picture = None
     if source is not None:
         reading = {name: given[name] for name in ("subimage", "layer")}
-        picture = image_files.read_picture(
-            source, colour=given["input_colour"], expand=expand, **reading
-        )
+        picture = image_files.read_picture(source, colour=given["input_colour"], **reading)
+        picture = developed(picture, expand, _alpha_of(axes, settings))
     looked_at = given["scene"]() if picture is None else picture.pixels
     names = given["framebuffers"].split(",")
     shared = {name: given[name] for name in ("size", "shading", "time")}
@@ -96,6 +96,17 @@ def command(*, source: str | None, out: str, words: tuple[str, ...], **given: An
             _write_images(grid, Path(out), renderer, part=part, **how)
     which = f"part {part[0]}/{part[1]} of " if given["part"] else ""
     terminal.say(f"wrote {out}, {which}{math.prod(grid.shape)} points")
+
+
+def _alpha_of(axes: Mapping[str, Sequence[Any]], settings: vkbloom.Settings | None) -> str:
+    """Return an alpha for which an image is read; points of an axis have one image."""
+    values = axes.get("alpha") or [settings.alpha if settings else "keep"]
+    if len({value == "keep" for value in values}) > 1:
+        raise click.UsageError(
+            "--axis alpha: keep has colours as in the file, max and blur have them multiplied by "
+            "alpha; leave out keep, or the others"
+        )
+    return str(values[0])
 
 
 def axis_values(words: Sequence[str], settings: vkbloom.Settings) -> dict[str, Sequence[Any]]:

@@ -21,7 +21,7 @@ from vkbloom._io.alpha import divided, hidden_notes
 from vkbloom._io.array_files import has_straight
 from vkbloom._io.colour import check_space
 from vkbloom._io.expansion import PHOTO_EXPANSION
-from vkbloom._io.images import Colour, Picture, StoredImage
+from vkbloom._io.images import Colour, Highlights, Picture, StoredImage
 from vkbloom._settings.settings import Settings
 
 #: Encodings of a written file.
@@ -87,29 +87,32 @@ def read_picture(
     colour: Colour | None,
     *,
     layer: str | None = None,
-    expand: float | None = None,
-    is_blended: bool = True,
 ) -> Picture:
-    """Read an image file, decode it for a renderer, and print notes about its contents."""
+    """Read an image file, decode it to linear light, and print notes about its contents."""
     check_input_colour(colour)
     stored = read(source, subimage, layer)
     source = shown(source)
-    picture = image_reading.decode_file(stored, source, colour, expand=expand)
+    picture = image_reading.decode_file(stored, source, colour)
     if layer is None and (parts := other_parts(stored)):
         note(f"{source}: read the first of its {parts}; --subimage reads another")
     counts = (int(test(picture.values).sum()) for test in (np.isnan, np.isinf))
     if (not_finite := image_reading.non_finite_note(*counts)) is not None:
         note(f"{source} {not_finite}")
-    hidden = 0.0 if is_blended else picture.hidden
-    for text in (*picture.notes, *hidden_notes(hidden, picture.visible)):
+    for text in picture.notes:
         note(f"{source}: {text}")
     return picture
 
 
-def is_photograph(source: str) -> bool:
-    """Whether a file holds integers for SDR.
+def note_hidden(picture: Picture, source: str) -> None:
+    """Print a note if light where alpha is 0 blooms like visible light."""
+    for text in hidden_notes(picture.hidden, picture.visible):
+        note(f"{shown(source)}: {text}")
 
-    False for what cannot be read: the error comes from the command that reads it.
+
+def highlights_of_file(source: str, subimage: int, colour: Colour | None) -> Highlights:
+    """Return what a file has of light above white, as `read_picture` finds it.
+
+    That of floats for what cannot be read: the error comes from the command that reads it.
     """
     with (
         suppress(OSError, ValueError),
@@ -117,8 +120,8 @@ def is_photograph(source: str) -> bool:
         as_file(source) as file,
         image_reading.opened(file, "Reading images") as reader,
     ):
-        return image_reading.is_photograph(reader)
-    return False
+        return image_reading.highlights_of(reader, subimage, colour)
+    return Highlights.STORED
 
 
 def finished(picture: Picture, final: NDArray[Any], settings: Settings) -> Picture:

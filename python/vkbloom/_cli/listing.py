@@ -14,9 +14,9 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from vkbloom._cli.settings_options import PRESET_OF_PHOTOS
 from vkbloom._presets.named_glares import GLARES
 from vkbloom._presets.named_settings import ENGINES, PRESETS
+from vkbloom._presets.start import PRESET_OF_PHOTOS
 from vkbloom._settings.fields import fields_of
 from vkbloom._settings.glare import Glare, GlareLight
 from vkbloom._settings.registry import STAGES

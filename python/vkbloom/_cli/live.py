@@ -10,7 +10,7 @@ import signal
 import time
 import webbrowser
 from collections.abc import Callable, Iterator
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import click
 from numpy.typing import NDArray
@@ -26,6 +26,8 @@ from vkbloom._cli.sequences import is_stream
 from vkbloom._cli.settings_options import STARTS, settings_options
 from vkbloom._cli.terminal import tell_device
 from vkbloom._explorer.viewer import GLOW, Viewer
+from vkbloom._io.images import Picture
+from vkbloom._presets.start import developed, start_of
 from vkbloom._renderer.surface import Surface
 from vkbloom._settings.settings import SHADINGS, Settings, Shading
 
@@ -45,11 +47,32 @@ _WAIT_SECONDS: Final = 0.1  # while the window is hidden
 _KEYS: Final = ("SPACE", "ESCAPE", *"BPQ", *"123456789")
 
 
+class Opened(NamedTuple):
+    """An IMAGE: as decoded, its file ("" for a stream), and what it is expanded up to.
+
+    - `is_fixed`: Whether the call says the expansion, so that another preset does not change it.
+    """
+
+    picture: Picture
+    file: str
+    expand: float | None
+    is_fixed: bool
+
+    def pixels(self, settings: Settings) -> NDArray[Any]:
+        """Return what a renderer gets with these settings."""
+        return developed(self.picture, self.expand, settings.alpha).pixels
+
+    def with_preset(self, settings: Settings) -> Opened:
+        """Return the image as it starts with the settings of a preset."""
+        if self.is_fixed:
+            return self
+        return self._replace(expand=start_of(self.picture.highlights, settings).expand)
+
+
 def _live_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """Add IMAGE and its options, and those of the device, the scene and the settings.
 
-    The command gets the pixels of IMAGE as `image`, which is None for a scene, and as `origin` the
-    arguments `file` and `expand` of a `Viewer`.
+    The command gets as `opened` IMAGE, or None for a scene.
     """
 
     @click.argument("source", metavar="[IMAGE]", required=False, type=click.Path())
@@ -64,19 +87,19 @@ def _live_options(command: Callable[..., Any]) -> Callable[..., Any]:
         subimage: int,
         layer: str | None,
         expand: float | None,
+        settings: Settings,
         **arguments: Any,
     ) -> Any:
         if source is None:
             if given("expand"):
                 raise click.UsageError("--expand is only for an IMAGE")
-            return command(image=None, origin={}, **arguments)
+            return command(opened=None, settings=settings, **arguments)
         for name, option in _OF_SCENE.items():
             _check_is_scene(name, option)
-        picture = read_picture(source, subimage, None, layer=layer, expand=expand)
-        is_expanded = picture.numbers.startswith("uint") and expand not in (None, 1)
-        origin: dict[str, Any] = {"file": "" if is_stream(source) else source}
-        origin |= {"expand": expand} if is_expanded else {}
-        return command(image=picture.pixels, origin=origin, **arguments)
+        picture = read_picture(source, subimage, None, layer=layer)
+        file = "" if is_stream(source) else source
+        opened = Opened(picture, file, expand, is_fixed=given("expand"))
+        return command(opened=opened, settings=settings, **arguments)
 
     return run
 
@@ -93,6 +116,7 @@ class Live:
     - `shading`: Of a scene.
     - `framebuffer`: Name of the framebuffer that is shown.
     - `time`: Time of the animation, in periods.
+    - `opened`: The image, if it is none of a scene.
     """
 
     settings: Settings
@@ -102,6 +126,7 @@ class Live:
     time: float = 0.0
     paused: bool = False
     closed: bool = False
+    opened: Opened | None = None
 
     def press(self, key: str, names: list[str]) -> None:
         """Do what a key stands for; `names` are the framebuffers that there are."""
@@ -116,6 +141,8 @@ class Live:
             known = list(vkbloom.presets.values())
             shown = known.index(self.settings) if self.settings in known else -1
             self.settings = known[(shown + 1) % len(known)]
+            if self.opened is not None:
+                self.opened = self.opened.with_preset(self.settings)
         elif key == "space":
             self.paused = not self.paused
         elif key in ("q", "escape"):
@@ -143,8 +170,7 @@ class Live:
 @_live_options
 def view(
     *,
-    image: NDArray[Any] | None,
-    origin: dict[str, Any],
+    opened: Opened | None,
     size: tuple[int, int] | None,
     shading: Shading,
     adapter: str,
@@ -153,19 +179,20 @@ def view(
 ) -> None:
     """Show the bloom of IMAGE, or of a scene, in a window with live controls."""
     glfw = import_extra("glfw", "window", "view")
-    height, width = (720, 1280) if image is None else image.shape[:2]
-    loaded = scene() if image is None else image
+    height, width = (720, 1280) if opened is None else opened.picture.pixels.shape[:2]
+    loaded = scene() if opened is None else None
     with (
         _opened(glfw, size or (min(width, _LARGEST[0]), min(height, _LARGEST[1]))) as window,
         vkbloom.Renderer(adapter) as renderer,
         Surface(renderer, window) as surface,
     ):
-        source = loaded if isinstance(loaded, vkbloom.Scene) else renderer.upload(loaded)
-        live = Live(settings, source, shading)
+        live = Live(settings, loaded, shading, opened=opened)
+        uploaded = _show(live, renderer, None)
         _listen(glfw, window, renderer, live)
         since = before = time.perf_counter()
         shown = 0
         while not (live.closed or glfw.window_should_close(window)):
+            uploaded = _show(live, renderer, uploaded)
             options: dict[str, Any] = {"shading": live.shading, "time": live.time}
             if surface.present(live.source, live.settings, framebuffer=live.framebuffer, **options):
                 shown += 1
@@ -180,6 +207,16 @@ def view(
                 since, shown = now, 0
 
 
+def _show(live: Live, renderer: vkbloom.Renderer, uploaded: object) -> object:
+    """Upload the image for the settings, unless it is there; return what it depends on."""
+    if live.opened is None:
+        return None
+    needed = live.opened.expand, live.settings.alpha != "keep"
+    if needed != uploaded:
+        live.source = renderer.upload(live.opened.pixels(live.settings))
+    return needed
+
+
 @contextlib.contextmanager
 def _opened(glfw: Any, size: tuple[int, int]) -> Iterator[Any]:
     """Open a window without an OpenGL context."""
@@ -190,7 +227,11 @@ def _opened(glfw: Any, size: tuple[int, int]) -> Iterator[Any]:
             glfw.window_hint(glfw.CLIENT_API, glfw.NO_API)
             window = glfw.create_window(*size, "vkbloom", None, None)
         if not window:
-            raise vkbloom.Error(f"no window was opened: {glfw.get_error()[1].decode()}")
+            reason = glfw.get_error()[1].decode()
+            raise vkbloom.Error(
+                f"no window was opened: {reason}; without a display, use vkbloom explore, which "
+                "shows the same in a browser"
+            )
         yield window
     finally:
         glfw.terminate()
@@ -221,8 +262,7 @@ def _listen(glfw: Any, window: Any, renderer: vkbloom.Renderer, live: Live) -> N
 @_live_options
 def explore(
     *,
-    image: NDArray[Any] | None,
-    origin: dict[str, Any],
+    opened: Opened | None,
     port: int,
     opens: bool,
     size: tuple[int, int],
@@ -241,9 +281,11 @@ def explore(
     import_extra("tornado", "notebook", "explore")
     looked_at: vkbloom.Scene | NDArray[Any]
     begun: vkbloom.Settings | None = settings
-    if image is not None:
+    of_file: dict[str, Any] = {}
+    if opened is not None:
         _check_is_scene("size", "--size")
-        looked_at = image
+        looked_at = opened.pixels(settings)
+        of_file = {"picture": opened.picture, "file": opened.file, "expand": opened.expand}
     else:
         looked_at = scene()
         if not any(given(name) for name in ("base", "glow", "glow_intensity")):
@@ -253,7 +295,8 @@ def explore(
     with vkbloom.Renderer(adapter) as renderer:
 
         def new_viewer() -> Viewer:
-            return Viewer(looked_at, begun, size=size, shading=shading, renderer=renderer, **origin)
+            how: dict[str, Any] = {"size": size, "shading": shading, "renderer": renderer}
+            return Viewer(looked_at, begun, **how, **of_file)
 
         with as_wrong_use():
             # Checks the arguments, so that an error appears here and not on the page.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Final
 
 from numpy.typing import NDArray
 
@@ -11,7 +11,7 @@ from vkbloom._renderer.frames import Frames
 from vkbloom._settings.settings import Settings
 
 # The smallest alpha and the smallest light that 8 bits can hold.
-_MIN_VISIBLE = 1 / 255
+_MIN_VISIBLE: Final = 1 / 255
 
 
 def with_bloom(names: str | Sequence[str], settings: Settings) -> str | list[str]:

@@ -9,24 +9,25 @@ from collections.abc import Callable, Sequence
 from typing import Any, get_args
 
 import click
-from numpy.typing import NDArray
 from rich.console import Console
 
 import vkbloom
 from vkbloom._cli.fields import SIZE, Command, NameOf
-from vkbloom._cli.image_files import input_colour_option, is_photograph, read_picture
+from vkbloom._cli.image_files import input_colour_option, read_picture
 from vkbloom._cli.program import adapter_option, as_wrong_use, given
-from vkbloom._cli.settings_options import (
-    PRESET_OF_IMAGES,
-    PRESET_OF_PHOTOS,
-    STARTS,
-    settings_options,
-)
+from vkbloom._cli.settings_options import STARTS, read_settings, settings_options
 from vkbloom._cli.terminal import is_quiet, note
 from vkbloom._explorer.controls import as_code
 from vkbloom._fit.losses import LossName
 from vkbloom._fit.translating import Translation
-from vkbloom._io.expansion import PHOTO_EXPANSION
+from vkbloom._io.images import Highlights, Picture
+from vkbloom._presets.start import (
+    PRESET_OF_IMAGES,
+    PRESET_OF_PHOTOS,
+    Start,
+    developed,
+    start_of,
+)
 from vkbloom._renderer.interruptible import opened_renderer
 from vkbloom._settings.registry import METHODS
 
@@ -129,7 +130,8 @@ def _object(fit: vkbloom.FitResult) -> dict[str, Any]:
     multiple=True,
     type=NameOf("preset", vkbloom.presets, ("all",)),
     help="Settings to start a search from; may be repeated. all: every preset, each with those of "
-    f"the varied settings that it has [default {PRESET_OF_IMAGES}]",
+    f"the varied settings that it has [default {PRESET_OF_IMAGES}; {PRESET_OF_PHOTOS} for files of "
+    "integers]",
 )
 @click.option(
     "--method",
@@ -137,6 +139,13 @@ def _object(fit: vkbloom.FitResult) -> dict[str, Any]:
     multiple=True,
     type=NameOf("method", METHODS),
     help="A method whose defaults start a search; may be repeated.",
+)
+@click.option(
+    "--settings",
+    "stored",
+    metavar="FILE",
+    type=click.Path(),
+    help="A file of settings that start a search, as of vkbloom apply.",
 )
 @_search_options(vary="threshold,intensity", loss="relative", max_calls=1000)
 @input_colour_option
@@ -147,52 +156,57 @@ def fit(
     target: str,
     presets: tuple[str, ...],
     kinds: tuple[str, ...],
+    stored: str | None,
     search: dict[str, Any],
     input_colour: Any,
     adapter: str,
 ) -> list[vkbloom.FitResult]:
     """Find the settings with which the bloom of IMAGE matches TARGET.
 
-    Both files have the same size. Their colours are decoded to linear light, as by vkbloom apply.
-    With a TARGET of 8 bits, such as a screenshot, blooms are clipped and rounded as it is. For the
-    preset photo, the highlights of an IMAGE of integers are also expanded.
+    Both files have the same size. Their colours are decoded to linear light, as by vkbloom apply;
+    an IMAGE of integers is also expanded for the settings for which vkbloom apply expands it, such
+    as the preset photo. With a TARGET of 8 bits, such as a screenshot, blooms are clipped and
+    rounded as it is.
 
-    There is one search for each preset and method, which starts from its settings. --vary names
-    the settings that may change. The results are printed as Python code, sorted by loss, with a
-    verdict (good, fair or poor) and the likely cause, such as a target without bloom.
+    There is one search for each preset and method, and for --settings, which starts from its
+    settings. --vary names the settings that may change. The results are printed as Python code,
+    sorted by loss, with a verdict (good, fair or poor) and the likely cause, such as a target
+    without bloom.
     """
-    pixels = read_picture(image, 0, input_colour).pixels
+    picture = read_picture(image, 0, input_colour)
     wanted = read_picture(target, 0, input_colour).pixels
-    searches = _searches(presets, kinds, pixels)
-    if is_photograph(image) and (photo := _photo_of(presets, search["vary"])):
-        bright = read_picture(image, 0, input_colour, expand=PHOTO_EXPANSION).pixels
-        searches.append((bright, [photo]))
-        note(f"{image}: its highlights are expanded to {PHOTO_EXPANSION:g} for the preset photo")
+    begun = _begun(picture.highlights, presets, kinds, stored)
+    searches: list[tuple[Picture, Any]] = []
+    if "all" in presets:
+        searches.append((picture, "all"))
+        photo = start_of(picture.highlights, PRESET_OF_PHOTOS)
+        if photo.expand and all(hasattr(photo.settings, name) for name in search["vary"]):
+            begun.append(photo)
+    for start in begun:
+        if start.expand is not None:
+            method = start.settings.method
+            note(f"{image}: its highlights are expanded to {start.expand:g} for {method}")
+        source = developed(picture, start.expand, start.settings.alpha)
+        searches.append((source, [start.settings]))
     with opened_renderer(adapter) as renderer, as_wrong_use():
         results = [
             item
-            for image_of, begun in searches
-            for item in vkbloom.fit(image_of, wanted, begun, renderer=renderer, **search)
+            for source, settings in searches
+            for item in vkbloom.fit(source.pixels, wanted, settings, renderer=renderer, **search)
         ]
     return sorted(results, key=lambda item: item.loss)
 
 
-def _searches(
-    presets: Sequence[str], kinds: Sequence[str], pixels: NDArray[Any]
-) -> list[tuple[NDArray[Any], Any]]:
-    """Return what `vkbloom.fit` gets of each search: the image, and the settings."""
-    begun = [METHODS[kind]() for kind in kinds]
-    if "all" in presets:
-        return [(pixels, "all"), *([(pixels, begun)] if begun else [])]
-    begun += [vkbloom.presets[name] for name in presets]
-    return [(pixels, begun or [vkbloom.presets[PRESET_OF_IMAGES]])]
-
-
-def _photo_of(presets: Sequence[str], vary: Sequence[str]) -> vkbloom.Settings | None:
-    """Return the preset for photographs if it is asked for and has the varied fields."""
-    photo = vkbloom.presets[PRESET_OF_PHOTOS]
-    is_asked = "all" in presets or PRESET_OF_PHOTOS in presets
-    return photo if is_asked and all(hasattr(photo, name) for name in vary) else None
+def _begun(
+    highlights: Highlights, presets: Sequence[str], kinds: Sequence[str], stored: str | None
+) -> list[Start]:
+    """Return where the searches start that are named one by one."""
+    begun = [start_of(highlights, METHODS[kind]()) for kind in kinds]
+    begun += [start_of(highlights, name) for name in presets if name != "all"]
+    if stored is not None:
+        settings, expand = read_settings(stored)
+        begun.append(start_of(highlights, settings, expand=expand))
+    return begun if begun or "all" in presets else [start_of(highlights)]
 
 
 @click.command(cls=Command)

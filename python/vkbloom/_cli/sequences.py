@@ -173,8 +173,10 @@ def expanded(source: str) -> list[NumberedFile]:
         results = files_of(folder, pattern)
     elif glob.has_magic(source):
         results = [(path, None) for path in sorted(glob.glob(source)) if os.path.isfile(path)]
-    else:
+    elif os.path.lexists(source):
         return [(source, None)]
+    else:
+        raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), source)
     if not results:
         raise FileNotFoundError(f"{source}: no file was found")
     return results

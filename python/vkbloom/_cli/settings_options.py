@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Callable
+import json
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, Final
 
@@ -12,21 +13,19 @@ import click
 
 import vkbloom
 from vkbloom._cli import fields
-from vkbloom._cli.image_files import is_photograph, silenced
+from vkbloom._cli.image_files import highlights_of_file, silenced
 from vkbloom._cli.program import as_wrong_use
 from vkbloom._cli.sequences import as_file
-from vkbloom._io.expansion import PHOTO_EXPANSION
+from vkbloom._io.expansion import check_expansion
+from vkbloom._io.images import Highlights
+from vkbloom._presets.start import PRESET_OF_IMAGES, PRESET_OF_PHOTOS, PRESET_OF_SCENES, start_of
 from vkbloom._renderer.frame_files import facts_of
 from vkbloom._settings.fields import fields_of
 from vkbloom._settings.registry import METHODS
+from vkbloom._settings.settings import EXPANDED
 
-#: The preset for images if there is no --preset and no --method.
-PRESET_OF_IMAGES: Final = "bevy_natural"
-#: The preset for image files of integers, where a command can expand their highlights.
-PRESET_OF_PHOTOS: Final = "photo"
-_PRESET_OF_SCENES: Final = "tutorial"
 #: The presets that a call without --preset and --method may start from.
-DEFAULT_PRESETS: Final = (PRESET_OF_IMAGES, PRESET_OF_PHOTOS, _PRESET_OF_SCENES)
+DEFAULT_PRESETS: Final = (PRESET_OF_IMAGES, PRESET_OF_PHOTOS, PRESET_OF_SCENES)
 #: Parameters that say what a call starts from.
 STARTS: Final = ("preset", "method", "stored")
 
@@ -35,7 +34,7 @@ def settings_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """Add the options of the settings to a command; its argument `settings` has the result."""
 
     def run(*, start: Start, **rest: Any) -> Any:
-        settings, expand = start.of(str(rest.get("source") or ""))
+        settings, expand = start.of_file(str(rest.get("source") or ""))
         if "expand" in rest:
             rest["expand"] = expand
         return command(settings=settings, **rest)
@@ -51,7 +50,7 @@ def start_options(command: Callable[..., Any]) -> Callable[..., Any]:
         type=fields.NameOf("preset", vkbloom.presets),
         help="Published settings to start from; vkbloom presets lists them "
         f"[default {PRESET_OF_IMAGES} for images, {PRESET_OF_PHOTOS} for files of integers, "
-        f"{_PRESET_OF_SCENES} for scenes]",
+        f"{PRESET_OF_SCENES} for scenes]",
     )
     @click.option(
         "--method",
@@ -84,8 +83,9 @@ def start_options(command: Callable[..., Any]) -> Callable[..., Any]:
             method=method,
             stored=None if stored is None else read_settings(stored),
             changes={**shared, **of_method},
-            expands="expand" in rest,
             expand=rest.get("expand"),
+            subimage=rest.get("subimage") or 0,
+            colour=rest.get("input_colour"),
         )
         return command(start=start, **rest)
 
@@ -94,45 +94,57 @@ def start_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Start:
-    """What the settings of a call start from, and how its options change them.
+    """What the options of a call say of its settings, for `start_of`.
 
     - `stored`: Settings of a file, and what its picture was expanded up to.
-    - `expands`: Whether the highlights of files of integers can be expanded.
-    - `expand`: What they are expanded up to, if the call says it.
+    - `expand`: What highlights are expanded up to, if the call says it.
+    - `subimage`, `colour`: How image files are read.
     """
 
     preset: str | None
     method: str | None
     stored: tuple[vkbloom.Settings, float | None] | None
     changes: dict[str, Any]
-    expands: bool
     expand: float | None
+    subimage: int = 0
+    colour: str | None = None
 
-    def of(self, image: str) -> tuple[vkbloom.Settings, float | None]:
+    @property
+    def is_chosen(self) -> bool:
+        """Whether the call names what it starts from."""
+        return self.preset is not None or self.method is not None or self.stored is not None
+
+    def of_file(self, image: str) -> tuple[vkbloom.Settings, float | None]:
         """Return the settings for an image file, "" for a scene, and the value for --expand."""
-        begun, expand = self._begun(image)
-        return _changed(begun, self.changes), expand if self.expand is None else self.expand
+        if not image:
+            return self.of(None)
+        return self.of(highlights_of_file(image, self.subimage, self.colour))
 
-    def _begun(self, image: str) -> tuple[vkbloom.Settings, float | None]:
+    def of(self, highlights: Highlights | None) -> tuple[vkbloom.Settings, float | None]:
+        """Return the settings for an image with these highlights, and the value for --expand.
+
+        None: for a scene.
+        """
+        expand = self.expand
+        if expand is None and self.stored is not None:
+            expand = self.stored[1]
+        begun = self._begun() or start_of(highlights).settings
+        _check_declared(begun, self.changes)
+        with as_wrong_use():
+            return start_of(highlights, begun, self.changes, expand=expand)
+
+    def _begun(self) -> vkbloom.Settings | None:
+        """Return what the settings start from; None: the default for the source."""
         if self.stored is not None:
-            begun, expand = self.stored
-        elif self.preset is None and self.method is not None:
-            begun, expand = METHODS[self.method](), None
+            begun = self.stored[0]
+        elif self.preset is not None:
+            begun = vkbloom.presets[self.preset]
         else:
-            preset = self.preset or _preset_of(image, expands=self.expands)
-            begun = vkbloom.presets[preset]
-            expand = PHOTO_EXPANSION if preset == PRESET_OF_PHOTOS else None
+            return None if self.method is None else METHODS[self.method]()
         if self.method not in (None, begun.method):
             given = "--settings" if self.stored else f"--preset {self.preset}"
             raise click.UsageError(f"{given} is of the method {begun.method}, not {self.method}")
-        return begun, expand
-
-
-def _preset_of(image: str, *, expands: bool) -> str:
-    """Return the preset that an image file, or a scene (""), starts from."""
-    if not image:
-        return _PRESET_OF_SCENES
-    return PRESET_OF_PHOTOS if expands and is_photograph(image) else PRESET_OF_IMAGES
+        return begun
 
 
 def read_settings(name: str) -> tuple[vkbloom.Settings, float | None]:
@@ -143,20 +155,24 @@ def read_settings(name: str) -> tuple[vkbloom.Settings, float | None]:
                 is_json = stream.read(64).lstrip(b"\xef\xbb\xbf \r\n\t").startswith(b"{")
             if is_json or name.lower().endswith(".json"):
                 text = Path(file).read_text(encoding="utf-8-sig")
-                return vkbloom.Settings.from_json(text), PHOTO_EXPANSION
-            facts = facts_of(file)
-            if "settings" not in facts:
-                raise ValueError("holds no settings; PNG and OpenEXR files of vkbloom hold them")
-            expand = facts.get("expand")
-            settings = vkbloom.Settings.from_json(facts["settings"])
-            return settings, None if expand is None else float(expand)
+                settings = vkbloom.Settings.from_json(text)
+                expand = json.loads(text).get(EXPANDED)
+            else:
+                facts = facts_of(file)
+                if "settings" not in facts:
+                    raise ValueError(
+                        "holds no settings; PNG and OpenEXR files of vkbloom hold them"
+                    )
+                settings = vkbloom.Settings.from_json(facts["settings"])
+                expand = facts.get("expand")
+            return settings, None if expand is None else check_expansion(float(expand))
         except (TypeError, ValueError) as error:
             reason = str(error)
             raise ValueError(reason if file in reason else f"{file}: {reason}") from error
 
 
-def _changed(begun: vkbloom.Settings, changes: dict[str, Any]) -> vkbloom.Settings:
-    """Return settings with the options' changes."""
+def _check_declared(begun: vkbloom.Settings, changes: Mapping[str, Any]) -> None:
+    """Raise click.UsageError for options that the settings' method does not have."""
     foreign = [name for name in changes if not hasattr(begun, name)]
     if foreign:
         declared = {
@@ -172,5 +188,3 @@ def _changed(begun: vkbloom.Settings, changes: dict[str, Any]) -> vkbloom.Settin
             f"the method {begun.method} has no {names}; "
             + (f"give --method {having}" if having else "no method has all of them")
         )
-    with as_wrong_use():
-        return begun.replace(**changes)

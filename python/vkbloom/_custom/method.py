@@ -114,6 +114,7 @@ class CustomMethod(Settings, metaclass=CustomType):
 
     @classmethod
     def _check_stored(cls, values: dict[str, Any]) -> None:
+        super()._check_stored(values)
         digest = values.pop("sha256", cls.file.source.digest)
         if digest != cls.file.source.digest:
             raise ValueError(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from typing import TYPE_CHECKING, Any
 
 from vkbloom._checks import import_extra
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def explore(
-    source: Scene | NDArray[Any] | None = None,
+    source: Scene | NDArray[Any] | str | os.PathLike[str] | None = None,
     settings: Settings | str | None = None,
     *,
     against: Settings | str | None = None,
@@ -32,13 +33,14 @@ def explore(
 
     Parameters
     ----------
-    source : Scene or ndarray, optional
-        The scene, or an image as `Renderer.apply` takes it. An image that is larger than it is
-        shown is reduced first by averaging, unless the page selects its own size. Default:
-        ``Scene.ufo()`` with lights 6 times as bright as white.
+    source : Scene, ndarray, str or path-like, optional
+        The scene, an image as `Renderer.apply` takes it, or the path of an image file, which is
+        read as by `vkbloom.apply`. An image that is larger than it is shown is reduced first by
+        averaging, unless the page selects its own size. Default: ``Scene.ufo()`` with lights 6
+        times as bright as white.
     settings : Settings or str, optional
-        The initial settings, or the name of a preset. Default: ``presets["bevy_natural"]`` for an
-        image and ``presets["tutorial"]`` for a scene, with ``tonemap="aces"`` and
+        The initial settings, or the name of a preset. Default: for an image those of
+        `vkbloom.apply`, for a scene ``presets["tutorial"]``, with ``tonemap="aces"`` and
         ``encoding="srgb"`` if the shading is deferred.
     against : Settings or str, optional
         The initial settings of B. Default: `settings` without bloom.
@@ -70,6 +72,22 @@ def explore(
     from vkbloom._explorer.viewer import Viewer  # noqa: PLC0415  see vkbloom.reference
     from vkbloom._explorer.widget import Explorer  # noqa: PLC0415  needs anywidget
 
-    return Explorer(
-        Viewer(source, settings, against=against, size=size, shading=shading, renderer=renderer)
-    )
+    of_file: dict[str, Any] = {}
+    if isinstance(source, str | os.PathLike):
+        source, of_file = _read(source, settings)
+    how: dict[str, Any] = {"against": against, "size": size, "shading": shading}
+    return Explorer(Viewer(source, settings, renderer=renderer, **how, **of_file))
+
+
+def _read(
+    path: str | os.PathLike[str], settings: Settings | str | None
+) -> tuple[NDArray[Any], dict[str, Any]]:
+    """Return the image of a file, and what a viewer needs to know of it."""
+    from vkbloom._io import image_reading  # noqa: PLC0415  costs start-up time
+    from vkbloom._presets.start import developed, start_of  # noqa: PLC0415  costs start-up time
+
+    file = os.fspath(path)
+    picture = image_reading.decode_file(image_reading.load(path), file)
+    begun, expand = start_of(picture.highlights, settings)
+    pixels = developed(picture, expand, begun.alpha).pixels
+    return pixels, {"picture": picture, "file": file, "expand": expand}

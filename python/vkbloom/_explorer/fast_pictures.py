@@ -18,8 +18,15 @@ _LEVEL: Final = 1
 
 def picture_of(array: NDArray[Any], name: str, *, is_encoded: bool, stops: float) -> bytes:
     """Return a framebuffer as PNG, shown as in `pictures.leading_png`, without alpha."""
+    return pictures.png(shown_pixels(array, name, is_encoded=is_encoded, stops=stops), _LEVEL)
+
+
+def shown_pixels(
+    array: NDArray[Any], name: str, *, is_encoded: bool, stops: float
+) -> NDArray[np.uint8]:
+    """Return the 8-bit levels of `picture_of`."""
     if array.dtype == np.uint8:
-        picture = array[:, :, :3]
+        picture: NDArray[np.uint8] = array[:, :, :3]
     elif array.ndim == 3 and name not in ("normal", "position"):
         is_display = name == "final" and is_encoded
         colours = array[:, :, :3] if is_display else scaled_to_1(array[:, :, :3], 2.0**-stops)
@@ -28,7 +35,7 @@ def picture_of(array: NDArray[Any], name: str, *, is_encoded: bool, stops: float
         picture = _levels(stops, is_display)[halves.view(np.uint16)]
     else:
         picture = pictures.picture(array, name)[:, :, :3]
-    return pictures.png(picture, _LEVEL)
+    return picture
 
 
 @functools.lru_cache(maxsize=16)

@@ -10,6 +10,10 @@ const NARROW = 720; // CSS pixels, as in page.css
 const WATCH = 200; // milliseconds between two looks at the files of custom methods
 const LARGEST_ZOOM = 64; // device pixels of a framebuffer's pixel
 const SIDES = ["a", "b"];
+// The key of stored settings that says what the highlights of their picture were expanded up to.
+const EXPANDED = "vkbloom:expand";
+// What a side is expanded up to if that follows from its settings: the server answers a number.
+const AUTOMATIC = "auto";
 
 const clamp = (value, low, high) => Math.min(Math.max(value, low), high);
 
@@ -130,6 +134,7 @@ export function mount(parent, send, { store = null, heading = "h2" } = {}) {
   let ownSize = false;
   let shading = null; // of a scene
   let glow = null;
+  let expand = { a: null, b: null }; // of a photograph, by side; null: not expanded
   let touched = null; // the control that was changed last
   let zoom = 1; // 1: the picture fits
   let centre = [0.5, 0.5]; // of the visible part of the picture, 0..1 from left and top
@@ -205,7 +210,9 @@ export function mount(parent, send, { store = null, heading = "h2" } = {}) {
     }),
     button("Save picture", savePicture, { title: "As PNG, in the source's own size" }),
     button("Save settings", () => {
-      const text = JSON.stringify(settings[editing], null, 2) + "\n";
+      const kept = { ...settings[editing] };
+      if (setup.expand) kept[EXPANDED] = shown[editing]?.expand ?? 1;
+      const text = JSON.stringify(kept, null, 2) + "\n";
       download(new Blob([text], { type: "application/json" }), "settings.json");
     }),
     button("Reset", reset, { title: "Settings and view as they were at first" }),
@@ -248,6 +255,7 @@ export function mount(parent, send, { store = null, heading = "h2" } = {}) {
       framebuffer,
       size: ownSize ? null : box.map((length) => Math.max(1, Math.round(length * ratio))),
       ...lookedAt(),
+      ...(setup.expand ? { expand: Object.fromEntries(sides.map((side) => [side, expand[side]])) } : {}),
       at: pointer,
     });
     keep();
@@ -322,6 +330,10 @@ export function mount(parent, send, { store = null, heading = "h2" } = {}) {
     sides.forEach(([side, facts], index) => {
       errors[side] = facts.error;
       if (!pictures[index]) return;
+      if (expand[side] === AUTOMATIC) {
+        expand[side] = facts.expand;
+        if (side === editing) showExpansion();
+      }
       shown[side]?.picture.close();
       shown[side] = { ...facts, picture: pictures[index] };
     });
@@ -420,8 +432,9 @@ export function mount(parent, send, { store = null, heading = "h2" } = {}) {
       const ran = passes.length
         ? `${passes.map(([name]) => name).join(", ")}: ${device.toFixed(1)} ms`
         : "nothing had to run";
+      const expanded = a.expand > 1 ? `highlights expanded up to ${a.expand}` : "";
       status.textContent =
-        `${[a.note, setup.note, setup.adapter].filter(Boolean).join(" · ")} · ${a.size[0]} × ${a.size[1]} ${a.dtype} · ${ran} · ` +
+        `${[a.note, a.faint, expanded, setup.adapter].filter(Boolean).join(" · ")} · ${a.size[0]} × ${a.size[1]} ${a.dtype} · ${ran} · ` +
         `${roundTrip.toFixed(0)} ms until shown`;
     }
     showError();
@@ -593,7 +606,7 @@ export function mount(parent, send, { store = null, heading = "h2" } = {}) {
   async function openFile(file) {
     complaint.textContent = "";
     try {
-      if (/\.json$/i.test(file.name)) return use(await readSettings(file));
+      if (/\.json$/i.test(file.name)) return use(...(await readSettings(file)));
       const content = new Uint8Array(await file.arrayBuffer());
       send({ kind: "open", view, name: file.name }, [content]);
     } catch (error) {
@@ -603,16 +616,17 @@ export function mount(parent, send, { store = null, heading = "h2" } = {}) {
 
   // The server checks the values. Only the method must be known here.
   async function readSettings(file) {
-    const read = JSON.parse(await file.text());
+    const { [EXPANDED]: expanded, ...read } = JSON.parse(await file.text());
     const method = setup.methods[read?.method];
     if (!method) throw new Error("no settings of a known method");
-    return { ...method.defaults, ...read };
+    return [{ ...method.defaults, ...read }, expanded];
   }
 
   // The source is another one. A scene's settings are not kept for an image.
   function opened(source) {
     Object.assign(setup, source);
     for (const side of SIDES) settings[side] = setup.sides[side];
+    expand = { a: null, b: null, ...setup.expand };
     pause();
     pointer = null;
     zoom = 1;
@@ -659,7 +673,8 @@ export function mount(parent, send, { store = null, heading = "h2" } = {}) {
   }
 
   function savePicture() {
-    send({ kind: "save", view, settings: settings[editing], framebuffer, ...lookedAt() });
+    const expanded = setup.expand ? { expand: shown[editing]?.expand ?? null } : {};
+    send({ kind: "save", view, settings: settings[editing], framebuffer, ...expanded, ...lookedAt() });
   }
 
   for (const name of ["dragover", "drop"]) {
@@ -695,6 +710,7 @@ export function mount(parent, send, { store = null, heading = "h2" } = {}) {
     if (time && !playing) kept.time = Number(time.toFixed(3));
     if (shading !== setup.shading) kept.shading = shading;
     if (glow !== setup.glow) kept.glow = glow;
+    if (setup.expand && SIDES.some((side) => expand[side] !== setup.expand[side])) kept.expand = expand;
     if (zoom !== 1) kept.zoom = [zoom, ...centre].map((number) => Number(number.toPrecision(5)));
     return kept;
   }
@@ -730,6 +746,11 @@ export function mount(parent, send, { store = null, heading = "h2" } = {}) {
     time = clamp(numberOf(kept.time, 0), 0, 1);
     shading = setup.shadings.includes(kept.shading) ? kept.shading : setup.shading;
     glow = setup.glow === null ? null : Math.max(0, numberOf(kept.glow, setup.glow));
+    expand = { a: null, b: null, ...setup.expand };
+    for (const side of SIDES) {
+      const value = kept.expand?.[side];
+      if (setup.expand && (value === null || value >= 1)) expand[side] = value;
+    }
     const [factor, x, y] = Array.isArray(kept.zoom) ? kept.zoom : [];
     zoom = Math.max(1e-3, numberOf(factor, 1));
     centre = [numberOf(x, 0.5), numberOf(y, 0.5)];
@@ -871,13 +892,15 @@ export function mount(parent, send, { store = null, heading = "h2" } = {}) {
       // Keeps the fields that change only the look, but enables the bloom.
       const { defaults } = setup.methods[preset.method];
       const look = setup.look.filter((name) => name !== "bloom" && preset[name] === defaults[name]);
-      use({ ...preset, ...Object.fromEntries(look.map((name) => [name, settings[editing][name]])) });
+      const kept = Object.fromEntries(look.map((name) => [name, settings[editing][name]]));
+      use({ ...preset, ...kept }, AUTOMATIC);
     });
     presetSelect.ariaLabel = "preset";
     methodSelect = choose(plainly(Object.keys(setup.methods)), () => {
       const carried = setup.look.map((name) => [name, settings[editing][name]]);
       presetSelect.value = "";
-      use({ ...setup.methods[methodSelect.value].defaults, ...Object.fromEntries(carried) });
+      const { defaults } = setup.methods[methodSelect.value];
+      use({ ...defaults, ...Object.fromEntries(carried) }, AUTOMATIC);
     });
     sideSelect = choose(
       [
@@ -890,6 +913,7 @@ export function mount(parent, send, { store = null, heading = "h2" } = {}) {
     const swap = make("button", { type: "button", textContent: "Swap" });
     swap.addEventListener("click", () => {
       [settings.a, settings.b] = [settings.b, settings.a];
+      [expand.a, expand.b] = [expand.b, expand.a];
       buildFields();
       request(...SIDES);
     });
@@ -916,8 +940,10 @@ export function mount(parent, send, { store = null, heading = "h2" } = {}) {
     );
   }
 
-  function use(fields) {
+  // Settings of a preset, a method or a file, and what they expand a photograph to, if they say it.
+  function use(fields, expanded) {
     settings[editing] = { ...fields };
+    if (setup.expand && expanded !== undefined) expand[editing] = expanded;
     buildFields({ keepPreset: true });
     request(editing);
   }
@@ -1009,6 +1035,27 @@ export function mount(parent, send, { store = null, heading = "h2" } = {}) {
     return [choice, ...numbers, adding];
   }
 
+  // What the highlights of a photograph are expanded up to.
+  let showExpansion = () => {};
+  function expansionRow() {
+    const field = { name: "expand", kind: "number", optional: true, from: 1, to: 16, step: 0.5 };
+    const help = "What the highlights of the photograph are expanded up to, so that they can glow";
+    const row = fieldRow({ ...field, low: 1, high: 1024, help }, null, (value) => {
+      expand[editing] = value;
+    });
+    const [on, ...numbers] = row.querySelectorAll("input");
+    showExpansion = () => {
+      const value = expand[editing];
+      on.checked = value > 1;
+      for (const input of numbers) {
+        input.disabled = !on.checked;
+        input.value = on.checked ? value : 4;
+      }
+    };
+    showExpansion();
+    return row;
+  }
+
   function buildFields({ keepPreset = false } = {}) {
     const wasOpen = fields.querySelector("details")?.open ?? false;
     if (!keepPreset) presetSelect.value = "";
@@ -1025,6 +1072,7 @@ export function mount(parent, send, { store = null, heading = "h2" } = {}) {
       });
       rows[field.first].push(row);
     }
+    if (setup.expand) rows.true.push(expansionRow());
     // After the switch of the bloom.
     if (current.psf) rows.true.splice(1, 0, ...functionRows(current.psf));
     fields.replaceChildren(

@@ -9,12 +9,13 @@ kind     asked                                         answered
 setup                                                  controls, both sides' settings, source
 frame    sides: settings of "a", "b" or both;          of each side: a picture (a buffer), the
          framebuffer, size, time, stops; at; of a      framebuffer's facts, the plan's passes and
-         scene shading, glow                           the times of those that ran, settings as
-                                                       code, the values under the pointer; or an
-                                                       error
+         scene shading, glow; of a photograph          the times of those that ran, settings as
+         expand: what "a", "b" are expanded up         code, the expansion, the values under the
+         to, or "auto"                                 pointer; or an error
 probe    at: the pointer's place, 0..1 across, down    of each side: pixel and values
 open     name; the content of a file as a buffer       source, and the settings to begin with
-save     settings; all else as of frame                a picture of the source's own size
+save     settings; expand of them; else as of frame    a picture of the source's own size, which
+                                                       holds its settings as files of vkbloom do
 methods                                                the custom methods whose files changed, as in
                                                        setup, and the errors of their files
 ======== ============================================= =========================================
@@ -29,7 +30,7 @@ import dataclasses
 import math
 import os
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Any, Final
@@ -48,16 +49,21 @@ from vkbloom._explorer.controls import (
     described,
     settings_from,
 )
-from vkbloom._explorer.fast_pictures import picture_of
-from vkbloom._io.array_files import read
-from vkbloom._io.expansion import PHOTO_EXPANSION
+from vkbloom._explorer.fast_pictures import picture_of, shown_pixels
+from vkbloom._io import image_reading
+from vkbloom._io.expansion import check_expansion
+from vkbloom._io.image_writing import levels_of
+from vkbloom._io.images import Highlights, Picture
+from vkbloom._presets.start import developed, start_of
+from vkbloom._renderer.frame_files import settings_facts
 from vkbloom._renderer.plans import Pass
 from vkbloom._renderer.renderer import Renderer
 from vkbloom._scene import Scene
 from vkbloom._settings.fields import fields_of
-from vkbloom._settings.registry import METHODS, presets
+from vkbloom._settings.registry import METHODS
 from vkbloom._settings.settings import SHADINGS, check_settings, check_shading
-from vkbloom._views.pictures import reduced
+from vkbloom._views.added_light import added_share, faint_note
+from vkbloom._views.pictures import png, reduced
 
 if TYPE_CHECKING:
     from vkbloom._renderer.frames import Frames
@@ -73,7 +79,11 @@ GLOW: Final = 6.0
 _LARGEST_SIDE: Final = 8192
 # Views do not say when they are closed. The framebuffers of the oldest ones are dropped.
 _VIEWS_KEPT: Final = 8
-_FAILURES: Final = (_core.Error, OSError, TypeError, ValueError, MemoryError)
+_FAILURES: Final = (_core.Error, OSError, TypeError, ValueError, MemoryError, RecursionError)
+# An expansion that follows from the settings.
+_AUTOMATIC: Final = "auto"
+# Images that are kept: those of both sides, whole and reduced.
+_IMAGES_KEPT: Final = 4
 _LARGEST_GLOW: Final = 1e4
 # A deferred scene has light above white, which needs a tone map.
 _DEVELOPED: Final = {"tonemap": "aces", "encoding": "srgb"}
@@ -84,10 +94,10 @@ Answer = tuple[dict[str, Any], list[bytes]]
 class Viewer:
     """A source and the settings of both sides.
 
-    Arguments are those of `vkbloom.explore`, the file of an image, and what its highlights were
-    expanded up to.
+    Arguments are those of `vkbloom.explore`, and of an image that was read from a file: its picture
+    as it was decoded, the file, and what its highlights are expanded up to in `source`.
 
-    - `settings`, `frames`: The latest ones of the sides "a" and "b".
+    - `settings`, `expand`, `frames`: The latest ones of the sides "a" and "b".
     """
 
     def __init__(
@@ -99,17 +109,21 @@ class Viewer:
         size: tuple[int, int] = (1280, 720),
         shading: Shading = "deferred",
         renderer: Renderer | None = None,
+        picture: Picture | None = None,
         file: str = "",
         expand: float | None = None,
     ) -> None:
         if source is None:
             source = dataclasses.replace(Scene.ufo(), glow_intensity=GLOW)
         self._shading: Shading = check_shading(shading)
-        self._named(file, expand)
+        self._file, self._name = file, PurePath(file).name
+        self._picture = picture
         self._scene = source if isinstance(source, Scene) else None
         self.settings: dict[str, Settings] = {}
+        self.expand: dict[str, float | None] = {}
         self._files = CustomFiles()
-        self._begin(settings)
+        self._images: dict[object, NDArray[Any]] = {}
+        self._begin(settings, expand)
         if against is not None:
             self.settings["b"] = check_settings(against)
         if isinstance(source, Scene):
@@ -128,30 +142,29 @@ class Viewer:
         if self._owned:
             self.renderer.close()
 
-    def _begin(self, settings: Settings | str | None, *, is_photo: bool = False) -> None:
+    @property
+    def _highlights(self) -> Highlights | None:
+        """What the source has of light above white; None: it is a scene."""
+        if self._scene is not None:
+            return None
+        return Highlights.STORED if self._picture is None else self._picture.highlights
+
+    def _begin(self, settings: Settings | str | None, expand: float | None = None) -> None:
         """Set A to the settings or to the source's default, and B to the same without bloom."""
         is_default = settings is None
-        if settings is None:
-            of_image = "photo" if is_photo else "bevy_natural"
-            settings = presets[of_image if self._scene is None else "tutorial"]
-            if self._scene is not None and self._shading == "deferred":
-                settings = settings.replace(**_DEVELOPED)
-        begun = check_settings(settings)
+        begun, expand = start_of(self._highlights, settings, expand=expand)
+        if is_default and self._scene is not None and self._shading == "deferred":
+            begun = begun.replace(**_DEVELOPED)
         self._default = begun if is_default else None
         self.settings = {"a": begun, "b": begun.replace(bloom=False)}
-
-    def _named(self, file: str, expand: float | None) -> None:
-        """Keep the file of the source, and what its highlights were expanded up to."""
-        self._file, self._expand = file, expand
-        self._name = PurePath(file).name
-        self._note = f"highlights expanded up to {expand:g}" if expand is not None else ""
+        self.expand = dict.fromkeys(SIDES, expand)
 
     def _show_image(self, source: NDArray[Any]) -> None:
         # A copy, since the caller may change the array while the page is open.
         image = np.array(check_image(source), order="C")
-        self._scene, self._image = None, image
+        self._scene = None
         self._own_size = (image.shape[1], image.shape[0])
-        self._reduced = (self._own_size, image)
+        self._images = {self._key_of(self.settings["a"], self.expand["a"]): image}
 
     def answer(self, message: object, files: Sequence[bytes] = ()) -> Answer:
         """Return the answer to a message.
@@ -172,11 +185,15 @@ class Viewer:
         kind = message.get("kind") if isinstance(message, Mapping) else None
         if not isinstance(message, Mapping) or not isinstance(kind, str) or kind not in kinds:
             return {"kind": "error", "error": f"message: {message!r:.80} is not understood"}, []
+        asked = {name: message.get(name) for name in ("view", "id")}
+        for name, value in asked.items():
+            if not isinstance(value, str | int | None):
+                return {"kind": "error", "error": f"{name}: it is not text or an integer"}, []
         try:
             body, buffers = kinds[kind](message)
         except _FAILURES as error:
             kind, body, buffers = "error", {"error": _described(error)}, []
-        return {"kind": kind, "view": message.get("view"), "id": message.get("id"), **body}, buffers
+        return {"kind": kind, **asked, **body}, buffers
 
     def _setup(self, message: Mapping[str, Any]) -> Answer:
         self._files = CustomFiles()
@@ -197,10 +214,13 @@ class Viewer:
     def _source(self) -> dict[str, Any]:
         """Return a description of the source, and the initial settings."""
         scene = self._scene
+        expand = self.expand["a"]
+        can_expand = self._highlights is Highlights.CLIPPED
         return {
             "sides": {side: as_fields(current(item)) for side, item in self.settings.items()},
+            "expand": self.expand if can_expand else None,
             "name": self._name,
-            "note": self._note,
+            "note": f"highlights expanded up to {expand:g}" if can_expand and expand else "",
             "animated": scene is not None,
             "own_size": self._own_size,
             "shadings": [] if scene is None else list(SHADINGS),
@@ -211,20 +231,37 @@ class Viewer:
     def _open(self, message: Mapping[str, Any], files: Sequence[bytes]) -> Answer:
         """Replace the source by an image file."""
         name = PurePath(str(message.get("name", ""))).name
-        image, is_photo = _read(name, files)
-        was_scene = self._scene is not None
-        self._show_image(image)
-        self._named(name, PHOTO_EXPANSION if is_photo else None)
+        picture = _read(name, files)
+        check_image(picture.pixels)
+        was_scene, self._scene = self._scene is not None, None
+        self._picture, self._file, self._name = picture, name, name
         self._shown.clear()
         # With a scene's settings a photograph would be white.
         if was_scene or self.settings["a"] == self._default:
-            self._begin(None, is_photo=is_photo)
+            self._begin(None)
+        else:
+            expand = start_of(picture.highlights, self.settings["a"]).expand
+            self.expand = dict.fromkeys(SIDES, expand)
+        settings = self.settings["a"]
+        self._show_image(developed(picture, self.expand["a"], settings.alpha).pixels)
         return self._source(), []
 
     def _save(self, message: Mapping[str, Any]) -> Answer:
         settings = settings_from(message.get("settings"))
-        frames, picture, *_ = self._render(settings, self._own_size, message)
-        return {"framebuffer": next(iter(frames))}, [picture]
+        expand = _expansion(message.get("expand", self.expand["a"]))
+        frames, *_ = self._render(settings, expand, self._own_size, message)
+        (shown,) = frames
+        stops = self._looked_at(message)[-1]
+        if self._scene is None and shown == "final" and stops == 0:
+            # With the levels of the file that vkbloom apply writes.
+            pixels = levels_of(frames[shown], settings.encoding)[:, :, :3]
+        else:
+            pixels = shown_pixels(
+                frames[shown], shown, is_encoded=settings.encoding != "none", stops=stops
+            )
+        is_expanded = self._highlights is Highlights.CLIPPED
+        facts = settings_facts(settings, (expand or 1.0) if is_expanded else None)
+        return {"framebuffer": shown}, [png(np.ascontiguousarray(pixels), texts=facts)]
 
     def _frame(self, message: Mapping[str, Any]) -> Answer:
         asked = message.get("sides")
@@ -243,12 +280,14 @@ class Viewer:
                 continue
             try:
                 settings = settings_from(asked[side])
-                frames, picture, names, plan = self._render(settings, size, message)
+                expand = self._expansion_of(side, settings, message)
+                frames, picture, names, plan = self._render(settings, expand, size, message)
             except _FAILURES as error:
                 # The other side is still shown.
                 sides[side] = {"error": _described(error)}
                 continue
             self.settings[side], self.frames[side] = settings, frames
+            self.expand[side] = expand
             (shown,) = frames
             arrays[side] = frames[shown]
             sides[side] = {
@@ -257,7 +296,9 @@ class Viewer:
                 "size": [frames[shown].shape[1], frames[shown].shape[0]],
                 "dtype": str(frames[shown].dtype),
                 "note": _note_of(settings, shown),
-                "code": code_with_image(settings, self._file, self._expand),
+                "expand": expand,
+                "faint": self._faint_note(frames, expand, size),
+                "code": code_with_image(settings, self._file, expand),
                 "plan": [item._asdict() for item in plan],
                 "passes": _finite(frames.timings),
                 "picture": len(buffers),
@@ -284,8 +325,35 @@ class Viewer:
             check_number("stops", message.get("stops", 0.0), -32, 32),
         )
 
+    def _expansion_of(
+        self, side: str, settings: Settings, message: Mapping[str, Any]
+    ) -> float | None:
+        """Return what a side is expanded up to; what a message leaves out stays."""
+        asked = message.get("expand")
+        if asked is None or (isinstance(asked, Mapping) and side not in asked):
+            return self.expand[side]
+        if not isinstance(asked, Mapping):
+            raise TypeError(f"expand: {asked!r:.80} is not a mapping of a and b to numbers")
+        if asked[side] == _AUTOMATIC:
+            return start_of(self._highlights, settings).expand
+        return _expansion(asked[side])
+
+    def _faint_note(self, frames: Frames, expand: float | None, size: tuple[int, int]) -> str:
+        """Return what a page says of a bloom that adds hardly any light to an image; else ""."""
+        settings = frames.settings
+        if self._scene is not None or "final" not in frames or not settings.bloom:
+            return ""
+        image = self._image_of(size, settings, expand)
+        can_expand = self._highlights is Highlights.CLIPPED
+        share = added_share(image, frames)
+        return faint_note(share, settings, can_expand=can_expand, expand=expand)
+
     def _render(
-        self, settings: Settings, size: tuple[int, int], message: Mapping[str, Any]
+        self,
+        settings: Settings,
+        expand: float | None,
+        size: tuple[int, int],
+        message: Mapping[str, Any],
     ) -> tuple[Frames, bytes, list[str], list[Pass]]:
         """Return the named framebuffer, or `final`; its picture; all names; the planned passes."""
         name = message.get("framebuffer", "final")
@@ -294,7 +362,7 @@ class Viewer:
         draw: Any = self.renderer.apply
         how: dict[str, Any] = {}
         if self._scene is None:
-            source = self._image_of(size)
+            source = self._image_of(size, settings, expand)
         else:
             if glow != self._scene.glow_intensity:
                 source = self._scene = dataclasses.replace(self._scene, glow_intensity=glow)
@@ -309,11 +377,29 @@ class Viewer:
         picture = picture_of(frames[shown], shown, is_encoded=is_encoded, stops=stops)
         return frames, picture, names, list(passes)
 
-    def _image_of(self, size: tuple[int, int]) -> NDArray[Any]:
-        """Return the image at the size at which it is shown."""
-        if self._reduced[0] != size:
-            self._reduced = (size, reduced(self._image, size))
-        return self._reduced[1]
+    def _key_of(self, settings: Settings, expand: float | None) -> object:
+        """Return what the pixels of the image depend on."""
+        return None if self._picture is None else (expand or 1.0, settings.alpha != "keep")
+
+    def _image_of(
+        self, size: tuple[int, int], settings: Settings, expand: float | None
+    ) -> NDArray[Any]:
+        """Return the image at the size at which it is shown, as it starts with the settings."""
+        key = self._key_of(settings, expand)
+
+        def whole() -> NDArray[Any]:
+            assert self._picture is not None  # An array is always kept.
+            return developed(self._picture, expand, settings.alpha).pixels
+
+        return self._kept((size, key), lambda: reduced(self._kept(key, whole), size))
+
+    def _kept(self, key: object, make: Callable[[], NDArray[Any]]) -> NDArray[Any]:
+        """Return an image that was made before, or make it and drop the one not used longest."""
+        image = self._images.pop(key) if key in self._images else make()
+        self._images[key] = image
+        while len(self._images) > _IMAGES_KEPT:
+            del self._images[next(iter(self._images))]
+        return image
 
     def _arrays_of(self, view: object) -> dict[str, NDArray[Any]]:
         """Return the dict of the framebuffers that a view shows, by side."""
@@ -324,8 +410,8 @@ class Viewer:
         return arrays
 
 
-def _read(name: str, files: Sequence[bytes]) -> tuple[NDArray[Any], bool]:
-    """Return the image of a file, its highlights expanded, and whether it has integers."""
+def _read(name: str, files: Sequence[bytes]) -> Picture:
+    """Return the picture of a file."""
     if len(files) != 1:
         raise ValueError("open: the message does not have the content of one file")
     with tempfile.TemporaryDirectory() as folder:
@@ -333,11 +419,15 @@ def _read(name: str, files: Sequence[bytes]) -> tuple[NDArray[Any], bool]:
         path = Path(folder, f"image{PurePath(name).suffix[:8]}")
         path.write_bytes(files[0])
         try:
-            image, facts = read(path, expand=PHOTO_EXPANSION, metadata=True)
-            return image, facts["numbers"].startswith("uint")
+            return image_reading.decode_file(image_reading.load(path), str(path))
         except (OSError, ValueError) as error:
             text = str(error).replace(str(path), name)
             raise ValueError(text if name in text else f"{name}: {text}") from error
+
+
+def _expansion(asked: Any) -> float | None:
+    """Return what a page asks to expand highlights up to."""
+    return None if asked is None else check_expansion(asked)
 
 
 def _note_of(settings: Settings, shown: str) -> str:

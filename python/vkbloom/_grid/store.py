@@ -281,7 +281,8 @@ def prepare(
         # Of processes that start at once, one decides which grid this is.
         _put(folder, METADATA, expected[METADATA], replaces=False)
     if changed := [*differences(checked_identity(folder), identity(grid, layout, chunk))]:
-        raise ValueError(f"{folder}: contains another grid; {'; '.join(changed)}")
+        told = "; ".join(changed)
+        raise ValueError(f"{folder}: contains another grid; {told}; delete it or name another")
     if part == WHOLE:
         # Of processes that were killed while writing. (Other files may be anybody's.)
         for parent in {(folder / key).parent for key in expected}:

@@ -28,6 +28,7 @@ from vkbloom._io.images import (
     is_exr,
 )
 from vkbloom._io.narrowing import narrowed
+from vkbloom._version import installed_version
 
 FileEncoding = Literal["none", "linear", "srgb", "gamma22", "pq", "hlg"]
 
@@ -254,7 +255,11 @@ def write(
             f"{target}: its format holds {layout[1]}, not {numbers}; write linear floats, as "
             "vkbloom.read gives them"
         )
-    image_writing.save(picture, target, saved, quality=quality, layout=layout)
+    # (Such files may be replaced by the command `apply`.)
+    program = {"Software": f"{safe_writing.PROGRAM} {installed_version()}"}
+    if "Software" in (metadata or {}):
+        program = {}
+    image_writing.save(picture, target, saved, program, quality, layout=layout)
     if (text := image_writing.number_note(given, layout, target)) is not None:
         warnings.warn(text, UserWarning, stacklevel=3)
     return target

@@ -11,7 +11,7 @@ from vkbloom._checks import check_number
 
 #: Values up to this one stay as they are: 0.91 of an 8-bit file in sRGB, the level 231.
 KNEE: Final = 0.8
-#: What the command line expands photographs to for the preset "photo".
+#: What photographs are expanded to for the preset "photo".
 PHOTO_EXPANSION: Final = 4.0
 _LARGEST: Final = 1024.0
 

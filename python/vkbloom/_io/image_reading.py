@@ -26,6 +26,7 @@ from vkbloom._io.images import (
     PIXEL_TYPES,
     WITH_WINDOWS,
     Colour,
+    Highlights,
     Picture,
     StoredImage,
     Window,
@@ -336,11 +337,26 @@ def _is_ultra_hdr(reader: OpenImageIO.ImageInput, spec: OpenImageIO.ImageSpec) -
     return reader.format_name() == "jpeg" and str(spec.format) == "half"
 
 
-def is_photograph(reader: OpenImageIO.ImageInput) -> bool:
-    """Whether a file holds integers for SDR, if only in its base image."""
+def highlights_of(
+    reader: OpenImageIO.ImageInput, subimage: int = 0, colour: Colour | None = None
+) -> Highlights:
+    """Return what a part of a file has of highlights; `colour`: as for `decode_file`."""
+    if not _seek(reader, max(subimage, 0)):
+        # The error comes from `load`.
+        return Highlights.STORED
     spec = reader.spec()
-    is_integer = str(spec.format) in ("uint8", "uint16") and not has_hdr_curve(points_of(spec))
-    return is_integer or _is_ultra_hdr(reader, spec)
+    is_ultra_hdr = _is_ultra_hdr(reader, spec)
+    return _highlights(str(spec.format), points_of(spec), colour, is_ultra_hdr=is_ultra_hdr)
+
+
+def _highlights(
+    numbers: str, points: tuple[int, ...] | None, colour: Colour | None, *, is_ultra_hdr: bool
+) -> Highlights:
+    if is_ultra_hdr:
+        return Highlights.MAPPED
+    is_hdr = colour is None and has_hdr_curve(points)
+    is_clipped = numbers in ("uint8", "uint16") and not is_hdr
+    return Highlights.CLIPPED if is_clipped else Highlights.STORED
 
 
 def _seek(reader: OpenImageIO.ImageInput, subimage: int) -> bool:
@@ -423,8 +439,8 @@ def _decoded(stored: StoredImage, colour: Colour | None, expand: float | None) -
         stored = replace(stored, associated=False)
     taken_as, values, said = linear(values, stored, colour)
     notes += said
-    is_hdr = colour is None and has_hdr_curve(stored.code_points)
-    if numbers in ("uint8", "uint16") and not is_hdr:
+    highlights = _highlights(numbers, stored.code_points, colour, is_ultra_hdr=stored.is_ultra_hdr)
+    if highlights is Highlights.CLIPPED:
         values = expanded(values, expand)
     if colour not in (None, "linear", "srgb"):
         stored = replace(stored, own=without_colours(stored.own))
@@ -442,6 +458,7 @@ def _decoded(stored: StoredImage, colour: Colour | None, expand: float | None) -
         colour=taken_as,
         hidden=hidden,
         visible=visible,
+        highlights=highlights,
     )
 
 

@@ -119,6 +119,13 @@ def save(
     return notes
 
 
+def levels_of(final: NDArray[Any], encoding: str) -> NDArray[np.uint8]:
+    """Return the levels that `save` writes of a `final` to an sRGB file of 8 bits."""
+    if encoding == "none" and final.dtype.kind == "f":
+        final = displayed.encoded(displayed.scaled_to_1(final), "srgb")
+    return _as_numbers(final, "uint8")
+
+
 def _prepared(
     oiio: ModuleType, picture: Picture, layout: Layout, saved: Saved, target: Path
 ) -> tuple[NDArray[Any], Picture, tuple[str, ...]]:

@@ -16,6 +16,7 @@ half, float          linear (but JPEG XL: what linear
 
 from __future__ import annotations
 
+import enum
 import os
 import re
 import sys
@@ -88,6 +89,17 @@ _EXTRA_BYTES: Final = re.compile(
 _LOST_ATTRIBUTES: Final = frozenset(
     ("Exif:ColorSpace", "Exif:Gamma", "Exif:PixelXDimension", "Exif:PixelYDimension")
 )
+
+
+class Highlights(enum.Enum):
+    """What a file has of light above white: the one place that says what a photograph is."""
+
+    #: Integers for SDR: everything brighter is clipped at 1, and can be expanded.
+    CLIPPED = enum.auto()
+    #: A photograph for SDR with a gain map, which gives values above 1.
+    MAPPED = enum.auto()
+    #: Floats, and integers on the curves PQ and HLG: values above 1 are stored.
+    STORED = enum.auto()
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -163,6 +175,7 @@ class Picture:
     - `colour`: The colour space from which colours were decoded: "linear", "srgb", the name of
       another space or of the file's profile; "" if the values were not decoded.
     - `hidden`, `visible`: The sum of straight colours where alpha is 0, and that of the others.
+    - `highlights`: What the file has of light above white.
     """
 
     pixels: NDArray[Any]
@@ -174,6 +187,7 @@ class Picture:
     colour: str = ""
     hidden: float = 0.0
     visible: float = 0.0
+    highlights: Highlights = Highlights.STORED
 
     @classmethod
     def of_values(

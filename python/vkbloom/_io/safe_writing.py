@@ -36,6 +36,9 @@ _MISSING: Final = dict.fromkeys(
     (".avif", ".heic", ".heif"), "libheif; PNG can name PQ, HLG and primaries, too"
 )
 
+#: What the attribute "Software" of files begins with.
+PROGRAM: Final = "vkbloom"
+_TOLD_BY: Final = 16  # bytes that tell text from what is left of an image
 _LARGEST_HEADER: Final = 65536  # bytes of a file in addition to its pixels
 _TEMPORARY: Final = ".vkbloom-"  # the beginning of the names of temporary files
 _TRIED: Final = 32  # pixels on a side that every format can have
@@ -242,6 +245,70 @@ def is_stream(path: str | os.PathLike[str]) -> bool:
     except (OSError, ValueError):
         return False
     return not (stat.S_ISREG(mode) or stat.S_ISDIR(mode))
+
+
+def is_picture(file: Path) -> bool:
+    """Return whether a file is an image whose header can be read."""
+    oiio = import_extra("OpenImageIO", "images", "Reading images")
+    with padded(os.fspath(file)) as name:
+        reader = oiio.ImageInput.open(name)
+    if reader is None:
+        failure_of(oiio)
+        return False
+    reader.close()
+    return True
+
+
+def is_damaged(file: Path) -> bool:
+    """Return whether a file is an image that is not complete, or nothing yet.
+
+    False for what is no image, such as text.
+    """
+    oiio = import_extra("OpenImageIO", "images", "Reading images")
+    if is_picture(file):
+        return _unreadable(oiio, file) is not None
+    with file.open("rb") as stream:
+        begun = stream.read(_TOLD_BY)
+    return not begun or not begun.isascii() or b"\0" in begun
+
+
+def is_of_another_program(file: Path) -> bool:
+    """Return whether a file is an image of a format that names its program, and that is another."""
+    oiio = import_extra("OpenImageIO", "images", "Reading images")
+    with padded(os.fspath(file)) as name:
+        reader = oiio.ImageInput.open(name)
+    if reader is None:
+        failure_of(oiio)
+        return False
+    program = _program_of(reader)
+    reader.close()
+    return not program.startswith(PROGRAM) and _names_program(file.suffix)
+
+
+def _program_of(reader: OpenImageIO.ImageInput) -> str:
+    program: str = reader.spec().get_string_attribute("Software")
+    return program
+
+
+@functools.lru_cache
+def _names_program(suffix: str) -> bool:
+    """Return whether a format that can be written keeps the name of the program."""
+    oiio = import_extra("OpenImageIO", "images", "Writing images")
+    with tempfile.TemporaryDirectory(prefix="vkbloom-") as folder:
+        name = f"{folder}/image{suffix}"
+        spec = oiio.ImageSpec(_TRIED, _TRIED, 3, "uint8")
+        spec.attribute("Software", PROGRAM)
+        writer = oiio.ImageOutput.create(name)
+        if writer is None:
+            failure_of(oiio)
+            return False
+        is_written = writer.open(name, spec)
+        is_written = is_written and writer.write_image(np.zeros((_TRIED, _TRIED, 3), np.uint8))
+        is_written = is_written and writer.close()
+        failure_of(writer)
+        reader = oiio.ImageInput.open(name) if is_written else None
+        failure_of(oiio)
+        return reader is not None and _program_of(reader).startswith(PROGRAM)
 
 
 def is_temporary(path: Path) -> bool:

@@ -18,7 +18,6 @@ from vkbloom._renderer.frames import Frames
 from vkbloom._renderer.image import Image
 from vkbloom._renderer.renderer import Renderer
 from vkbloom._renderer.sources import SCENE_SIZE
-from vkbloom._settings.registry import presets
 from vkbloom._settings.settings import Settings, Shading, check_settings
 
 if TYPE_CHECKING:
@@ -95,10 +94,12 @@ def apply(
     ----------
     image : ndarray, Image, str or path-like
         As for `Renderer.apply`; or the path of an image file, which is read as by the command
-        ``vkbloom apply``.
+        ``vkbloom apply``: colours that a file (OpenEXR) has multiplied by alpha stay multiplied,
+        and those of other files are multiplied if the settings' `alpha` is not "keep".
     settings : Settings or str, optional
-        Settings, or the name of a preset. Default: ``presets["bevy_natural"]``. For a file of
-        integers, such as a photograph, ``presets["photo"]``, with its highlights expanded to 4.
+        Settings, or the name of a preset. Default: ``presets["bevy_natural"]``. For a photograph,
+        which is a file of integers for SDR, ``presets["photo"]``, for which its highlights are
+        expanded to 4. With other settings they are not; ``vkbloom.read(path, expand=4)`` does it.
     mask, emission, framebuffers, out, device
         As for `Renderer.apply`.
     renderer : Renderer, optional
@@ -109,7 +110,8 @@ def apply(
     Returns
     -------
     Frames
-        As of `Renderer.apply`.
+        As of `Renderer.apply`. Of a photograph that was expanded, ``.info["expand"]`` says up to
+        what.
 
     Examples
     --------
@@ -118,17 +120,21 @@ def apply(
     >>> vkbloom.apply(image, "kino", threshold=1)["bloom"].shape
     (16, 16, 4)
     """
-    if isinstance(image, str | os.PathLike):
-        image, settings = _read(image, settings)
-    return (renderer or default_renderer()).apply(
-        image,
-        _changed(settings, fields, of_image=True),
-        mask=mask,
-        emission=emission,
-        framebuffers=framebuffers,
-        out=out,
-        device=device,
-    )
+    given: dict[str, Any] = {"mask": mask, "emission": emission, "framebuffers": framebuffers}
+    given |= {"out": out, "device": device}
+    if not isinstance(image, str | os.PathLike):
+        chosen = _changed(settings, fields, of_image=True)
+        return (renderer or default_renderer()).apply(image, chosen, **given)
+    from vkbloom._io import image_reading  # noqa: PLC0415  costs start-up time
+    from vkbloom._presets.start import developed, start_of  # noqa: PLC0415  costs start-up time
+
+    picture = image_reading.decode_file(image_reading.load(image), os.fspath(image))
+    begun, expand = start_of(picture.highlights, settings, fields)
+    pixels = developed(picture, expand, begun.alpha).pixels
+    frames = (renderer or default_renderer()).apply(pixels, begun, **given)
+    if expand is not None:
+        frames._info["expand"] = expand
+    return frames
 
 
 def _changed(
@@ -136,22 +142,6 @@ def _changed(
 ) -> Settings:
     chosen = check_settings(settings, of_image=of_image)
     return chosen.replace(**fields) if fields else chosen
-
-
-def _read(
-    path: str | os.PathLike[str], settings: Settings | str | None
-) -> tuple[NDArray[Any], Settings | str | None]:
-    """Return the image of a file, and the settings: by default those for its type."""
-    from vkbloom._io import array_files, expansion  # noqa: PLC0415  costs start-up time
-
-    image, facts = array_files.read(path, metadata=True)
-    if not facts["numbers"].startswith("uint"):
-        return image, settings
-    photo = presets["photo"]
-    chosen = photo if settings is None else check_settings(settings)
-    return expansion.expanded(
-        image, expansion.PHOTO_EXPANSION
-    ) if chosen == photo else image, chosen
 
 
 @checked

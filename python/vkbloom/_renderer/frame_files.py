@@ -44,6 +44,8 @@ if TYPE_CHECKING:
 _DESCRIBED = ", all of it: "
 # Extensions of files in a folder.
 _IN_FOLDERS = (".png", ".exr")
+# Entries of `info` that are numbers.
+_NUMBERS: Mapping[str, type[int | float]] = {"nan": int, "inf": int, "expand": float}
 # Attributes that `_attributes` writes in addition to the entries of `info`.
 _OWN = ("settings", "timings", "dtype", "framebuffer", "place", FACT)
 
@@ -133,7 +135,7 @@ def load(path: str | os.PathLike[str]) -> tuple[dict[str, NDArray[Any]], dict[st
                     "settings": Settings.from_json(said["settings"]),
                     "timings": json.loads(said["timings"]),
                     "info": {
-                        name: int(text) if name in ("nan", "inf") else text
+                        name: _NUMBERS[name](text) if name in _NUMBERS else text
                         for name, text in said.items()
                         if name not in _OWN
                     },

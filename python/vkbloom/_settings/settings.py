@@ -9,7 +9,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 from collections.abc import Mapping
-from typing import Any, ClassVar, Literal, Self, get_args
+from typing import Any, ClassVar, Final, Literal, Self, get_args
 
 from vkbloom._settings.blocks import settings_block
 from vkbloom._settings.fields import (
@@ -34,6 +34,8 @@ BloomFormat = Literal[
     "rgba8unorm", "rgba16float", "rgba32float", "rg11b10ufloat", "rgba8unorm-srgb"
 ]
 
+#: A key of stored settings: what the highlights of their picture were expanded up to.
+EXPANDED: Final = "vkbloom:expand"
 SHADINGS: tuple[Shading, ...] = get_args(Shading)
 
 
@@ -202,6 +204,11 @@ class Settings(Record):
     @classmethod
     def _classes(cls) -> Mapping[str, type[Settings]]:
         return METHODS
+
+    @classmethod
+    def _check_stored(cls, values: dict[str, Any]) -> None:
+        # Of the picture, not of the settings.
+        values.pop(EXPANDED, None)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import struct
 import zlib
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -190,11 +191,13 @@ def reduced(image: NDArray[Any], size: tuple[int, int]) -> NDArray[Any]:
     return np.rint(small).astype(np.uint8) if image.dtype == np.uint8 else small.astype(image.dtype)
 
 
-def png(pixels: NDArray[np.uint8], level: int = -1) -> bytes:
+def png(
+    pixels: NDArray[np.uint8], level: int = -1, texts: Mapping[str, str] = MappingProxyType({})
+) -> bytes:
     """Encode a picture as PNG (W3C PNG specification).
 
     It lets notebooks show pictures with only NumPy installed; OpenImageIO writes the files that
-    users save.
+    users save. `texts`: texts of the file in ASCII, by keyword.
     """
     height, width, channels = pixels.shape
     rows = pixels.reshape(height, width * channels)
@@ -205,6 +208,7 @@ def png(pixels: NDArray[np.uint8], level: int = -1) -> bytes:
     colour_type = {1: 0, 3: 2, 4: 6}[channels]
     chunks = (
         (b"IHDR", struct.pack(">IIBBBBB", width, height, 8, colour_type, 0, 0, 0)),
+        *((b"tEXt", f"{name}\0{text}".encode("ascii")) for name, text in texts.items()),
         (b"IDAT", zlib.compress(filtered.tobytes(), level)),
         (b"IEND", b""),
     )

@@ -1,0 +1,73 @@
+"""How much light a bloom adds to a picture, and what to do if it is hardly any."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from vkbloom._renderer.frames import Frames
+    from vkbloom._settings.settings import Settings
+
+# The share of a picture's light that a bloom adds, of which less gets a note.
+_MIN_SHARE: Final = 0.01
+# What an expansion is raised to at first, and the factor of a later one.
+_EXPANDED: Final = 8.0
+_MORE: Final = 2.0
+
+
+def faint_note(
+    share: float | None,
+    settings: Settings,
+    *,
+    can_expand: bool,
+    expand: float | None = None,
+    option: str = "{}",
+) -> str:
+    """Return a text if a bloom adds less than 1 % of a picture's light, with the remedies; else "".
+
+    - `share`: As of `added_share`.
+    - `can_expand`: Whether the highlights of the picture's file can be expanded; they are up to
+      `expand`.
+    - `option`: What is written for a setting, such as "--{}".
+    """
+    if share is None or share >= _MIN_SHARE or not settings.bloom:
+        return ""
+    remedies = []
+    if settings.threshold:
+        remedies.append(f"lower {option.format('threshold')}")
+    if can_expand:
+        larger = _EXPANDED if expand is None else _MORE * expand
+        remedies.append(f"{option.format('expand')} {larger:g}")
+    if not remedies:
+        remedies.append(f"raise {option.format('intensity')}")
+    percent = f"{max(100 * share, 0):.2g}"
+    return f"the bloom adds {percent} % of the picture's light: {', or '.join(remedies)}"
+
+
+def added_share(image: NDArray[Any], frames: Frames, light: float | None = None) -> float | None:
+    """Return the light that the bloom adds, divided by that of the image; None: it is not known.
+
+    `light`: `light_of` the image, if it is known.
+    """
+    settings = frames.settings
+    light = light_of(image) if light is None else light
+    if light <= 0:
+        return None
+    is_linear = (settings.tonemap, settings.encoding, settings.exposure) == ("none", "none", 0)
+    if settings.composite == "add" and is_linear and "final" in frames:
+        return (light_of(frames["final"]) - light) / light
+    # Other composites take light, too: what counts is what they spread.
+    return settings.intensity * light_of(frames["bloom"]) / light if "bloom" in frames else None
+
+
+def light_of(image: NDArray[Any]) -> float:
+    """Return the sum of the finite colours of an image."""
+    colours = image[:, :, :3]
+    with np.errstate(invalid="ignore", over="ignore"):
+        total = float(np.sum(colours, dtype=np.float64))
+    if np.isfinite(total):
+        return total
+    return float(np.sum(colours, dtype=np.float64, where=np.isfinite(colours)))
