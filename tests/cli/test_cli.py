@@ -263,11 +263,13 @@ def test_render_writes_every_framebuffer(tmp_path: Path) -> None:
     assert (result.exit_code, result.stderr) == (0, "")
     expected = rendered()
     depths = {"glow_depth", "depth"}
-    names = {f"out_{name}.{'exr' if name in depths else 'png'}" for name in expected}
-    assert {path.name for path in tmp_path.iterdir()} == names
+    files = {name: f"out_{name}.{'exr' if name in depths else 'png'}" for name in expected}
+    # The picture is the file that was named.
+    files["final"] = "out.png"
+    assert {path.name for path in tmp_path.iterdir()} == {*files.values()}
     for name, array in expected.items():
         if name not in depths:
-            assert (rgb(pixels(tmp_path / f"out_{name}.png")) == rgb(array)).all()
+            assert (rgb(pixels(tmp_path / files[name])) == rgb(array)).all()
 
 
 def test_render_tells_adapter_pass_times_and_files(tmp_path: Path) -> None:

@@ -183,3 +183,69 @@ def test_folders_are_made_for_one_picture_and_checked_before(tmp_path: Path) -> 
             "directory" if target == "a.png/" else f"no folder {tmp_path}/no\n"
         ) in failed.stderr
     assert not (tmp_path / "no").exists()
+
+
+class TestFramebuffers:
+    def test_all_are_beside_the_output(self, tmp_path: Path) -> None:
+        image = lights(20, 30, 3, dtype="float16")
+        path = vkbloom.write(tmp_path / "a.exr", image)
+        result = done(path, tmp_path / "b.exr", "--framebuffers", "all")
+        with vkbloom.Renderer() as renderer:
+            frames = renderer.apply(image, NATURAL)
+        others = [name for name in frames if name != "final"]
+        assert sorted(file.name for file in tmp_path.iterdir()) == sorted(
+            ["a.exr", "b.exr", *(f"b_{name}.exr" for name in others)]
+        )
+        for name in others:
+            assert np.array_equal(pixels(tmp_path / f"b_{name}.exr"), frames[name])
+        written = [line for line in result.stdout.splitlines() if line.startswith("wrote ")]
+        assert len(written) == len(frames)
+
+    @pytest.mark.parametrize(
+        ("words", "more"),
+        [
+            ("--framebuffers bloom,final", {"b_bloom.exr"}),
+            ("--framebuffers glow", {"b_glow.exr"}),
+            ("--framebuffers final", set()),
+            ("", set()),
+        ],
+    )
+    def test_files_beside_a_png(self, tmp_path: Path, words: str, more: set[str]) -> None:
+        path = png(tmp_path / "a.png", lights(20, 30, 3, dtype="uint8"))
+        done(path, tmp_path / "b.png", *words.split())
+        assert {file.name for file in tmp_path.iterdir()} == {"a.png", "b.png", *more}
+
+
+class TestPicturesOfOthers:
+    """OUT as the last word replaces only what vkbloom wrote: it may be the second of two INs."""
+
+    @pytest.mark.parametrize("suffix", ["png", "jpg", "tif", "exr", "tga"])
+    def test_a_result_is_replaced_and_a_photograph_is_not(
+        self, tmp_path: Path, suffix: str
+    ) -> None:
+        image = lights(20, 30, 3, dtype="uint8").astype(np.float32) / 255
+        files = [tmp_path / f"{name}.{suffix}" for name in "abc"]
+        for file in files[:2]:
+            vkbloom.write(file, image, metadata={"Software": "a camera"})
+        before = files[1].read_bytes()
+        refused = run(files[0], files[1])
+        assert refused.exit_code == 2
+        assert f"give it as -o {files[1]}, or --overwrite" in refused.stderr
+        assert files[1].read_bytes() == before
+        for _ in range(2):
+            done(files[0], files[2])
+        done(files[0], files[1], "--overwrite")
+        vkbloom.write(files[1], image, metadata={"Software": "a camera"})
+        done(files[0], "-o", files[1])
+        assert files[1].read_bytes() != before
+        # It is a result now.
+        done(files[0], files[1])
+
+    def test_what_python_wrote_is_replaced(self, tmp_path: Path) -> None:
+        image = lights(20, 30, 3, dtype="uint8")
+        path = png(tmp_path / "a.png", image)
+        vkbloom.write(tmp_path / "b.png", image)
+        done(path, tmp_path / "b.png")
+        # A format that does not hold a name of a program cannot tell.
+        vkbloom.write(tmp_path / "b.bmp", image)
+        done(path, tmp_path / "b.bmp")

@@ -212,3 +212,40 @@ def test_a_picture_of_a_grid_gives_itself_again(tmp_path: Path) -> None:
     made = out / "000_final.png"
     assert apply(file, tmp_path / "b.png", "--settings", made).exit_code == 0
     np.testing.assert_array_equal(vkbloom.read(tmp_path / "b.png"), vkbloom.read(made))
+
+
+class TestFaintBlooms:
+    """A bloom that adds less than 1 % of the light has a note with the remedy."""
+
+    @pytest.mark.parametrize(
+        ("source", "words", "told"),
+        [
+            ("a.png", ("--preset", "blender_streaks"), "lower --threshold, or --expand 8"),
+            ("a.png", ("--preset", "blender_streaks", "--expand", "8"), ""),
+            ("a.png", ("--preset", "blender_streaks", "--expand", "1.2"), "or --expand 2.4"),
+            ("a.exr", ("--preset", "kino", "--intensity", "0.002"), "light: lower --threshold\n"),
+            ("a.png", ("--preset", "bevy_natural"), ""),
+            ("a.png", ("--preset", "bevy_natural", "--intensity", "0.004"), "0.39 % of the"),
+            ("a.exr", ("--method", "pyramid", "--intensity", "0.004"), "light: raise --intensity"),
+            ("a.png", ("--preset", "kino", "--no-bloom"), ""),
+            ("a.png", ("--preset", "blender_streaks", "--mask", "mask.png"), ""),
+            ("a.png", (), ""),
+        ],
+    )
+    def test_note(
+        self,
+        tmp_path: Path,
+        monkeypatch: pytest.MonkeyPatch,
+        source: str,
+        words: tuple[str, ...],
+        told: str,
+    ) -> None:
+        monkeypatch.chdir(tmp_path)
+        image = PHOTOS["astronaut"]()
+        png(Path("a.png"), image)
+        vkbloom.write("a.exr", vkbloom.read("a.png"))
+        vkbloom.write("mask.png", np.full(image.shape[:2], 255, np.uint8))
+        result = apply(source, "b.exr", *words)
+        assert result.exit_code == 0, result.stderr
+        assert ("the bloom adds" in result.stderr) is bool(told)
+        assert told in result.stderr

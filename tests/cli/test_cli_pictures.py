@@ -93,6 +93,34 @@ class TestSequences:
         assert result.stderr.endswith("g.0009.png: Is a directory\nvkbloom: 1 of 4 images failed\n")
         assert (frames / "g.0011.png").is_file()
 
+    def test_existing_images_are_skipped(self, frames: Path) -> None:
+        assert run("f.%04d.png", "g.%04d.png").exit_code == 0
+        whole = (frames / "g.0009.png").read_bytes()
+        # One is cut, one is empty, one is missing, and one is no image.
+        (frames / "g.0008.png").write_bytes(whole[: len(whole) // 2])
+        (frames / "g.0009.png").write_bytes(b"")
+        (frames / "g.0010.png").unlink()
+        (frames / "g.0011.png").write_bytes(b"before")
+        result = run("f.%04d.png", "g.%04d.png", "--skip-existing")
+        assert result.exit_code == 0, result.stderr
+        assert "skipped 1 of 4 images" in result.stdout
+        assert "g.0011.png: is left as it is, though it is no image" in result.stderr
+        assert (frames / "g.0011.png").read_bytes() == b"before"
+        for number in (8, 9, 10):
+            assert vkbloom.read(frames / f"g.{number:04d}.png").shape == IMAGE.shape
+        result = run("f.%04d.png", "g.%04d.png", "--skip-existing")
+        assert (result.exit_code, "skipped 4 of 4" in result.stdout) == (0, True)
+
+    @pytest.mark.parametrize("names", ["bloom,glow", "all"])
+    def test_an_image_without_its_framebuffers_is_made_again(
+        self, frames: Path, names: str
+    ) -> None:
+        words = ("f.%04d.png", "out", "--skip-existing", "--framebuffers", names)
+        assert "skipped 0 of 4" in run(*words).stdout
+        (frames / "out" / "f.0009_bloom.exr").unlink()
+        assert "skipped 3 of 4" in run(*words).stdout
+        assert (frames / "out" / "f.0009_bloom.exr").exists()
+
     @pytest.mark.parametrize("order", ["exr first", "png first", "between"])
     def test_each_file_starts_from_its_own_preset(self, frames: Path, order: str) -> None:
         values = np.random.default_rng(0).random((5, 7, 3)).astype(np.float32) ** 8 * 3

@@ -21,7 +21,7 @@ import vkbloom
 from tests.cli.calls import run
 from tests.docs.pages import ROOT
 from vkbloom import _doctor as doctor
-from vkbloom._doctor import child, drivers, installation, probe
+from vkbloom._doctor import child, drivers, installation, probe, self_test
 from vkbloom._doctor.installation import Finding
 
 linux_only = pytest.mark.skipif(sys.platform != "linux", reason="as the loader works on Linux")
@@ -507,3 +507,16 @@ def test_caches(
     assert (finding.status, message.format(tmp=tmp_path) in finding.found) == (status, True)
     assert name in finding.advice or "not writable" not in finding.found
     assert list(tmp_path.iterdir()) == []
+
+
+def test_modules_of_the_current_folder_are_not_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("json", "numpy", "vkbloom"):
+        (tmp_path / f"{name}.py").write_text("raise SystemExit('a module of the folder')")
+    monkeypatch.chdir(tmp_path)
+    answer = child.ask("adapters", "all")
+    assert answer.failure == ""
+    assert answer.value
+    first = next(self_test.run("software", "no case"))
+    assert "device" in first

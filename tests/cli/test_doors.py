@@ -1,4 +1,4 @@
-"""Every door to a file gives the same pixels: it starts with one expansion and one preset."""
+"""Every door to a file starts with the same preset and expansion, and gives equal pixels."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ import vkbloom
 from tests.cli.calls import run
 from tests.images import lights
 from tests.io.parts import store_ultra_hdr
-from vkbloom._cli import live, search
+from vkbloom._cli import live
 from vkbloom._explorer.viewer import Viewer
 from vkbloom._io.image_reading import load
 from vkbloom._io.images import Picture
@@ -38,7 +38,8 @@ def picture(channels: int = 3, highest: float = 6.0) -> Pixels:
 
 
 def levels(bits: int, channels: int = 3) -> Pixels:
-    return np.rint(np.clip(picture(channels, 1.2), 0, 1) * (2**bits - 1)).astype(f"uint{bits}")
+    scaled = np.rint(np.clip(picture(channels, 1.2), 0, 1) * (2**bits - 1))
+    return np.asarray(scaled, f"uint{bits}")
 
 
 def hdr(path: Path, curve: Any) -> None:
@@ -83,7 +84,7 @@ class Doors:
         self.renderer, self.patch = renderer, patch
 
     def python(self, file: str, words: tuple[str, ...], settings: Any) -> Pixels:
-        fields = {"alpha": "max"} if "--alpha" in words else {}
+        fields: dict[str, Any] = {"alpha": "max"} if "--alpha" in words else {}
         chosen = "unity_urp" if fields else settings
         return vkbloom.apply(file, chosen, renderer=self.renderer, **fields)["final"]
 
@@ -178,7 +179,7 @@ class Doors:
             return []
 
         with self.patch.context() as patch:
-            patch.setattr(search.vkbloom, "fit", fit)
+            patch.setattr(vkbloom, "fit", fit)
             done("fit", file, file, *words)
         return found[0]
 

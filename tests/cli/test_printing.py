@@ -121,6 +121,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for name in ("a.png", "b.png", "two/a.png", "two/b.png"):
         vkbloom.write(made / name, levels)
     vkbloom.write(made / "small.png", levels[:6, :, :1])
+    vkbloom.write(made / "foreign.png", levels, metadata={"Software": "a camera"})
     vkbloom.write(made / "alpha.png", np.dstack([levels, levels[..., :1]]))
     vkbloom.write(made / "a.exr", noise_image(16, 24, 3))
     write_image(made / "xyz.exr", noise_image(2, 2, 3), channelnames=("X", "Y", "Z"))

@@ -76,3 +76,4 @@ def test_without_a_display_it_says_so() -> None:
     done = python("-m", "vkbloom._cli", "view", DISPLAY="", WAYLAND_DISPLAY="")
     assert (done.returncode, done.stdout) == (1, "")
     assert "no window was opened: " in done.stderr
+    assert "use vkbloom explore" in done.stderr

@@ -4,13 +4,19 @@ from __future__ import annotations
 
 import asyncio
 import json
+import os
+import signal
 import socket
+import stat
 import struct
 import sys
 import threading
+import webbrowser
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
+from urllib.parse import urlsplit
+from urllib.request import url2pathname
 
 import numpy as np
 import pytest
@@ -19,6 +25,7 @@ import vkbloom
 from tests.cli.calls import run
 from tests.images import noise
 from vkbloom import Renderer, Separable
+from vkbloom._cli.live import _serve
 from vkbloom._explorer.viewer import Viewer
 
 tornado = pytest.importorskip("tornado")
@@ -226,6 +233,61 @@ async def test_wrong_messages_are_refused(server: Server, message: str | bytes, 
     await page.write_message(message, binary=isinstance(message, bytes))
     assert await page.read_message() is None
     assert page.close_code == code
+
+
+DEEP = "[" * 100_000 + "]" * 100_000
+NESTED = '{"psf": ' * 900 + "1" + "}" * 900
+
+
+@pytest.mark.parametrize(
+    ("message", "reason"),
+    [
+        (f'{{"kind": "frame", "sides": {DEEP[:60_000]}}}', "nested too deeply"),
+        (b'{"kind": "open", "name": ' + DEEP[:60_000].encode() + b"}", "nested too deeply"),
+        ('{"kind": "frame", "sides": {}, "time": 1e999}', "1e999 is not a finite number"),
+        ('{"kind": "probe", "at": [0, 0], "id": -1e999}', "-1e999 is not a finite number"),
+        ('{"kind": "probe", "at": [NaN, 0]}', "NaN is not a finite number"),
+        ('{"kind": "setup", "id": 1.5}', "id: it is not text or an integer"),
+        (f'{{"kind": "setup", "id": {NESTED}}}', ""),
+        (f'{{"kind": "save", "settings": {{"method": "convolution", "psf": {NESTED}}}}}', ""),
+    ],
+)
+async def test_messages_are_refused_with_a_reason(
+    server: Server, message: str | bytes, reason: str
+) -> None:
+    page = await connect(server)
+    packed = struct.pack("<I", len(message)) + message if isinstance(message, bytes) else message
+    await page.write_message(packed, binary=isinstance(message, bytes))
+    header, _ = await answer(page)
+    assert header["kind"] == "error"
+    assert header["error"]
+    assert reason in header["error"]
+    # The socket is still there.
+    await page.write_message(json.dumps({"kind": "setup"}))
+    assert (await answer(page))[0]["kind"] == "setup"
+
+
+def test_the_browser_gets_no_token_as_an_argument(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Other users of the machine see the arguments of its processes."""
+    opened: list[tuple[str, int, int, str]] = []
+
+    def open_page(address: str) -> None:
+        file = Path(url2pathname(urlsplit(address).path))
+        modes = (stat.S_IMODE(os.stat(path).st_mode) for path in (file, file.parent))
+        opened.append((address, *modes, file.read_text()))
+        os.kill(os.getpid(), signal.SIGTERM)
+
+    monkeypatch.setattr(webbrowser, "open", open_page)
+    assert asyncio.run(_serve(lambda: pytest.fail("nobody asked"), 0, opens=True)) == 0
+    url = capsys.readouterr().out.splitlines()[0]
+    ((address, mode, folder_mode, text),) = opened
+    assert address.startswith("file://")
+    assert url.split("/")[-2] not in address
+    assert (mode, folder_mode) == (0o600, 0o700)
+    assert f"0; url={url}" in text
+    assert not Path(urlsplit(address).path).exists()
 
 
 async def test_port_in_use_is_an_error(server: Server) -> None:

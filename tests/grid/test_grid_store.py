@@ -229,7 +229,7 @@ class TestRefused:
         self, copy: Path, changes: Any, message: str
     ) -> None:
         before = contents(copy)
-        with pytest.raises(ValueError, match=f"contains another grid; .*{message}"):
+        with pytest.raises(ValueError, match=f"another grid; .*{message}.*; delete it or name"):
             make(copy, **changes)
         assert contents(copy) == before
 

@@ -230,3 +230,18 @@ def test_notebooks_get_plain_text_with_padded_cells(renderer: vkbloom.Renderer) 
         assert type(page) is str, one
         cells = re.findall(r"<t[dh]\b[^>]*>", page)
         assert all("padding" in cell for cell in cells), one
+
+
+def test_times_are_bars() -> None:
+    frames = make({"final": np.zeros((2, 2, 3), np.uint8)}, timings={"glow": 1e-3, "bloom": 4e-3})
+    page = frames._repr_html_()
+    assert [float(width) for width in re.findall(r"width:([\d.]+)%\"", page)[-2:]] == [25, 100]
+    unknown = make({"final": frames["final"]}, timings={"glow": np.nan})._repr_html_()
+    assert "width:0.0%" in unknown
+
+
+def test_settings_show_what_differs() -> None:
+    html = vkbloom.Pyramid(levels=3, tonemap="aces")._repr_html_()
+    assert re.findall(r"<th[^>]*>(\w+)</th>", html) == ["tonemap", "levels"]
+    assert re.findall(r"<td[^>]*>([^<]+)</td>", html) == ["&#x27;aces&#x27;", "3"]
+    assert "all fields are the defaults" in vkbloom.Pyramid()._repr_html_()

@@ -148,9 +148,10 @@ class Run:
             picture, settings, expand = read
             # Opened after the first file is read, so that a wrong file fails at once.
             renderer = self.renderer()
+            glow_of = self._glow_of(settings.alpha != "keep")
             with self._of_file(pair):
                 with as_wrong_use():
-                    glow = self._glow_of(settings.alpha != "keep")(picture.pixels)
+                    glow = glow_of(picture.pixels)
                     wanted = no_bloom.with_bloom(self.options.names, settings)
                     frames = renderer.apply(picture.pixels, settings, **glow, framebuffers=wanted)
                 self._tell(pair, picture, frames, expand)
@@ -436,8 +437,8 @@ def _check_own(source: str, out: str) -> None:
         return
     if safe_writing.is_of_another_program(Path(out)):
         raise click.UsageError(
-            f"{out}: is a picture that vkbloom did not write; to replace it, give -o {out} or "
-            "--overwrite; to add bloom to it, name a folder as OUT"
+            f"{out}: is a picture that vkbloom did not write; to replace it, give it as -o {out}, or "
+            "--overwrite; to add bloom to it as well, name a folder as OUT"
         )
 
 

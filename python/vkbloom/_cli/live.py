@@ -326,7 +326,7 @@ async def _serve(new_viewer: Callable[[], Viewer], port: int, opens: bool) -> in
             asyncio.get_running_loop().add_signal_handler(number, stop, status)
     click.echo(f"{server.url}\nPress Ctrl-C to stop.")
     if opens:
-        webbrowser.open(server.url)
+        webbrowser.open(server.redirect.as_uri())
     try:
         return await stopped
     finally:

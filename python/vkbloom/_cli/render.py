@@ -13,6 +13,8 @@ from vkbloom._cli.program import adapter_option, as_wrong_use
 from vkbloom._cli.scene_options import scene_options
 from vkbloom._cli.settings_options import settings_options
 from vkbloom._cli.terminal import note, say, tell_device
+from vkbloom._framebuffers import leading
+from vkbloom._renderer import frame_files
 from vkbloom._settings.settings import SHADINGS, Shading
 
 
@@ -22,9 +24,10 @@ from vkbloom._settings.settings import SHADINGS, Shading
     "--out",
     required=True,
     type=click.Path(),
-    help="The file or folder to write to. NAME.exr is one file with all framebuffers. Other "
-    "formats have a file for each framebuffer. A name without extension is a folder of PNG files. "
-    "A framebuffer that the format cannot hold is written as .exr.",
+    help="The file or folder to write to. NAME.exr is one file with all framebuffers. Of another "
+    "format, NAME.png is final, and NAME_glow.png and others are beside it. A name without "
+    "extension is a folder of PNG files. A framebuffer that the format cannot hold is written as "
+    ".exr.",
 )
 @click.option("--size", type=SIZE, default="1280x720", help="Size of the frame, in pixels.")
 @click.option("--time", default=0.0, help="Time of the animation; its period is 1.")
@@ -65,7 +68,8 @@ def command(
             )
             if loaded.glow is not None and no_bloom.is_without(frames):
                 note(no_bloom.reason(settings))
-            written = no_bloom.only(frames, names).save(out)
+            kept = no_bloom.only(frames, names)
+            written = frame_files.save(kept, out, to_path=leading(kept))
         device = "CPU" if renderer.info.type == "cpu" else "GPU"
     say(f"  {'pass':<32}{f'ms on the {device}':>14}")
     for name, seconds in frames.timings.items():

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any, Final
 
@@ -14,7 +14,7 @@ import click
 import vkbloom
 from vkbloom._cli import fields
 from vkbloom._cli.image_files import highlights_of_file, silenced
-from vkbloom._cli.program import as_wrong_use
+from vkbloom._cli.program import as_wrong_use, given
 from vkbloom._cli.sequences import as_file
 from vkbloom._io.expansion import check_expansion
 from vkbloom._io.images import Highlights
@@ -142,8 +142,8 @@ class Start:
         else:
             return None if self.method is None else METHODS[self.method]()
         if self.method not in (None, begun.method):
-            given = "--settings" if self.stored else f"--preset {self.preset}"
-            raise click.UsageError(f"{given} is of the method {begun.method}, not {self.method}")
+            named = "--settings" if self.stored else f"--preset {self.preset}"
+            raise click.UsageError(f"{named} is of the method {begun.method}, not {self.method}")
         return begun
 
 
@@ -173,18 +173,34 @@ def read_settings(name: str) -> tuple[vkbloom.Settings, float | None]:
 
 def _check_declared(begun: vkbloom.Settings, changes: Mapping[str, Any]) -> None:
     """Raise click.UsageError for options that the settings' method does not have."""
-    foreign = [name for name in changes if not hasattr(begun, name)]
-    if foreign:
-        declared = {
-            name: info for kind in METHODS.values() for name, info in fields_of(kind).items()
-        }
-        names = ", ".join(f"--{declared[name].option.replace('_', '-')}" for name in foreign)
-        having = " or ".join(
-            method
-            for method, kind in METHODS.items()
-            if all(name in fields_of(kind) for name in foreign)
-        )
-        raise click.UsageError(
-            f"the method {begun.method} has no {names}; "
-            + (f"give --method {having}" if having else "no method has all of them")
-        )
+    used = {name: _used(name) for name in changes}
+    foreign = [name for name in changes if _option_of(type(begun), name) != used[name]]
+    if not foreign:
+        return
+    having = " or ".join(
+        method
+        for method, kind in METHODS.items()
+        if all(_option_of(kind, name) == used[name] for name in foreign)
+    )
+    others = [option for name in foreign if (option := _option_of(type(begun), name))]
+    raise click.UsageError(
+        f"the method {begun.method} has no {_as_words(used[name] for name in foreign)}; "
+        + (f"it has {_as_words(others)}; " if others else "")
+        + (f"give --method {having}" if having else "no method has all of them")
+    )
+
+
+def _used(name: str) -> str:
+    """Return the option that set a field; fields of one name may have several."""
+    options = [_option_of(kind, name) for kind in METHODS.values()]
+    return next(option for option in options if option and given(option))
+
+
+def _option_of(kind: type[vkbloom.Settings], name: str) -> str:
+    """Return the name of the option of a method's field; "" if there is no such field."""
+    info = fields_of(kind).get(name)
+    return "" if info is None else info.option
+
+
+def _as_words(options: Iterable[str]) -> str:
+    return ", ".join(f"--{option.replace('_', '-')}" for option in options)

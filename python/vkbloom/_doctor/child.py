@@ -15,6 +15,8 @@ from collections.abc import Mapping
 from typing import Any, Final, NamedTuple
 
 TIMEOUT: Final = 60.0
+#: Of a child process: without modules of the current folder, such as a json.py.
+PYTHON: Final = (sys.executable, "-P")
 #: Prefix of the line with a probe's answer: drivers and layers may print on stdout as well.
 ANSWER_MARK: Final = "vkbloom-probe "
 
@@ -36,7 +38,7 @@ def ask(*question: str, environment: Mapping[str, str] | None = None) -> Answer:
     """Run `vkbloom._doctor.probe` with arguments and return its answer."""
     try:
         ended = subprocess.run(
-            [sys.executable, "-m", "vkbloom._doctor.probe", *question],
+            [*PYTHON, "-m", "vkbloom._doctor.probe", *question],
             env={**os.environ, **(environment or {})},
             stdin=subprocess.DEVNULL,
             capture_output=True,

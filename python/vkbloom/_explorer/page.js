@@ -474,6 +474,7 @@ export function mount(parent, send, { store = null, heading = "h2" } = {}) {
   function showPlan() {
     if (!plan.open || !shown[editing]) return;
     const rows = shown[editing].plan;
+    const longest = Math.max(...Object.values(shown[editing].passes), 1e-9);
     const head = ["pass", "time", "shader", "variant", "reads", "writes"];
     const cell = (tag, textContent, more = {}) => make(tag, { textContent, ...more });
     passes.replaceChildren(
@@ -486,7 +487,11 @@ export function mount(parent, send, { store = null, heading = "h2" } = {}) {
           const rowSpan = others < 0 ? rows.length - place : others;
           const seconds = shown[editing].passes[row.name];
           const time = seconds === undefined ? "up to date" : `${(1e3 * seconds).toFixed(2)} ms`;
-          cells.unshift(cell("th", row.name, { scope: "rowgroup", rowSpan }), cell("td", time, { rowSpan }));
+          const timed = cell("td", time, { rowSpan });
+          const bar = make("div", { className: "vkb-pass-time" });
+          bar.style.width = `${(100 * (seconds ?? 0)) / longest}%`;
+          timed.append(bar);
+          cells.unshift(cell("th", row.name, { scope: "rowgroup", rowSpan }), timed);
         }
         return make("tr", {}, ...cells);
       })),

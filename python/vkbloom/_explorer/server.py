@@ -9,14 +9,19 @@ itself can open the socket.
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import hmac
 import json
+import math
+import os
 import secrets
 import socket
 import struct
+import tempfile
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from importlib import resources
+from pathlib import Path
 from typing import Any, Final
 
 from tornado.httpserver import HTTPServer
@@ -44,9 +49,18 @@ _REFUSED: Final = (
     "changes with each start. Open the complete address that the running <code>vkbloom explore"
     "</code> or the notebook printed, or start <code>vkbloom explore</code> again.</p>"
 )
+_REDIRECT: Final = (
+    '<!doctype html><meta charset="utf-8"><meta name="referrer" content="no-referrer">'
+    '<meta http-equiv="refresh" content="0; url={url}"><title>vkbloom explore</title>'
+    '<p><a href="{url}">The explorer</a></p>\n'
+)
 # The longest text message in bytes. Settings are shorter. Files are sent as binary messages.
 _LARGEST_MESSAGE: Final = 1 << 16
 _LARGEST_FILE: Final = 1 << 30
+
+
+class _RefusedNumber(ValueError):
+    """A number of a message that JSON does not have."""
 
 
 class Server:
@@ -55,6 +69,8 @@ class Server:
     - `new_viewer`: Makes a viewer for each page that is opened. Viewers may share a renderer.
     - `port`: The port to listen on; 0: any free port.
     - `url`: The address of the page.
+    - `redirect`: A file for this user alone, from which a browser goes to the page. The address
+      would stand among the arguments of the browser, which other users can list.
 
     Create and use it in a running event loop.
     """
@@ -65,6 +81,11 @@ class Server:
         self.port: int = listening.getsockname()[1]
         self.token = secrets.token_urlsafe(24)
         self.url = f"http://{_ADDRESS}:{self.port}/{self.token}/"
+        # A folder that only this user can enter.
+        self._folder = tempfile.TemporaryDirectory(prefix="vkbloom-explore-")
+        self.redirect = Path(self._folder.name, "open.html")
+        with open(os.open(self.redirect, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w") as file:
+            file.write(_REDIRECT.format(url=self.url))
         # One thread: the renderer takes one call at a time.
         self._worker = ThreadPoolExecutor(1, "vkbloom-explore")
         shared = {"server": self, "new_viewer": new_viewer, "worker": self._worker}
@@ -96,6 +117,7 @@ class Server:
         self._http.stop()
         await self._http.close_all_connections()
         self._worker.shutdown()
+        self._folder.cleanup()
 
 
 class _File(RequestHandler):
@@ -159,8 +181,11 @@ class _Socket(WebSocketHandler):
             return
         try:
             text, files = (message, []) if isinstance(message, str) else _unpacked(message)
-            asked = json.loads(text)
+            asked = json.loads(text, parse_float=_finite, parse_constant=_finite)
             kind = str(asked["kind"])
+        except (_RefusedNumber, RecursionError) as error:
+            self._refuse(error)
+            return
         except (ValueError, TypeError, KeyError, struct.error):
             self.close(1003, "a message with a kind is needed")
             return
@@ -176,6 +201,14 @@ class _Socket(WebSocketHandler):
         # Not awaited here, so that the next message is read before the answer is sent.
         if self._answers is None or self._answers.done():
             self._answers = asyncio.ensure_future(self._answer())
+
+    def _refuse(self, error: Exception) -> None:
+        """Answer a message that cannot be read, and keep the socket."""
+        is_deep = isinstance(error, RecursionError)
+        reason = "lists and objects are nested too deeply" if is_deep else str(error)
+        header = {"kind": "error", "error": f"message: {reason}"}
+        with contextlib.suppress(WebSocketClosedError):
+            self.write_message(_packed(header, []), binary=True)
 
     async def _answer(self) -> None:
         loop = asyncio.get_running_loop()
@@ -198,6 +231,13 @@ class _Socket(WebSocketHandler):
 
     def on_close(self) -> None:
         self._waiting.clear()
+
+
+def _finite(text: str) -> float:
+    """Return a number of JSON; raise for 1e999, NaN and Infinity, which answers cannot have."""
+    if not math.isfinite(number := float(text)):
+        raise _RefusedNumber(f"{text:.80} is not a finite number")
+    return number
 
 
 def _unpacked(message: bytes) -> tuple[bytes, list[bytes]]:

@@ -247,6 +247,8 @@ def write(
     encoded: SavedColour | None = "linear" if is_float else None
     picture = Picture.of_values(values, numbers, encoded, _typed(oiio, metadata or {}))
     bits = bits if is_float else None
+    # (Of 32 bits, `chosen_layout` says that the format has no floats.)
+    image_writing.check_options(target, saved, quality, None if bits == 32 else bits)
     layout = image_writing.chosen_layout(picture, target, is_hdr=False, bits=bits)
     if (channels := layout[0].shape[2]) != values.shape[2]:
         raise ValueError(f"{target}: its format has no alpha; write array[..., :{channels}]")

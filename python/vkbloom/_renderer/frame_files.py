@@ -50,8 +50,11 @@ _NUMBERS: Mapping[str, type[int | float]] = {"nan": int, "inf": int, "expand": f
 _OWN = ("settings", "timings", "dtype", "framebuffer", "place", FACT)
 
 
-def save(frames: Frames, path: str | os.PathLike[str]) -> list[Path]:
-    """Write framebuffers to image files, as `Frames.save` documents."""
+def save(frames: Frames, path: str | os.PathLike[str], *, to_path: str | None = None) -> list[Path]:
+    """Write framebuffers to image files, as `Frames.save` documents.
+
+    `to_path`: the framebuffer of several that is written to the path itself, without its name.
+    """
     if not frames:
         raise ValueError("frames: there is no framebuffer to save")
     oiio = import_extra("OpenImageIO", "images", "Frames.save")
@@ -70,7 +73,10 @@ def save(frames: Frames, path: str | os.PathLike[str]) -> list[Path]:
             plan = {target: list(frames)}
         else:
             plan = {
-                target.with_name(f"{target.stem}_{name}{target.suffix}"): [name] for name in frames
+                target
+                if name == to_path
+                else target.with_name(f"{target.stem}_{name}{target.suffix}"): [name]
+                for name in frames
             }
     files: dict[Path, list[Part]] = {}
     saved = fact_of(frames, "" if target.is_dir() else target.suffix)

@@ -184,6 +184,18 @@ class Settings(Record):
         index, field = stage_field_of(self.glare, name)
         return getattr(self.glare[index], field)
 
+    def _repr_html_(self) -> str:
+        """Return a table of the fields that differ from the method's defaults."""
+        from vkbloom._views import markup  # noqa: PLC0415  of notebooks alone
+
+        rows = [
+            (name, repr(getattr(self, name)))
+            for name, info in fields_of(type(self)).items()
+            if getattr(self, name) != info.default
+        ]
+        title = f"{type(self).__name__}" + ("" if rows else ": all fields are the defaults")
+        return str(markup.table(rows, caption=title, name={"style": "text-align:left"}))
+
     def _core_block(self) -> bytes:
         """Return the settings as the core reads them."""
         return settings_block(self.method, vars(self) | self._core_values())

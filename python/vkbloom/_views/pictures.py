@@ -47,8 +47,12 @@ def contact_sheet_html(frames: Frames) -> str:
         (name, _picture(frames, name, thumbnail_size(array))[:, :, :3], _facts(frames, name))
         for name, array in frames.items()
     )
-    times = [(name, f"{1e3 * seconds:.3f} ms") for name, seconds in frames.timings.items()]
-    head = ("pass", f"time on {frames.info.get('adapter', 'the device')}")
+    longest = max((seconds for seconds in frames.timings.values() if seconds > 0), default=0.0)
+    times = [
+        (name, f"{1e3 * seconds:.3f} ms", _bar(seconds, longest))
+        for name, seconds in frames.timings.items()
+    ]
+    head = ("pass", f"time on {frames.info.get('adapter', 'the device')}", "")
     facts = ", ".join(f"{key} {value}" for key, value in frames.info.items())
     sheet = element(
         "div",
@@ -64,6 +68,13 @@ def contact_sheet_html(frames: Frames) -> str:
         style="color:inherit;color-scheme:light dark;font-size:13px;max-width:68em",
     )
     return str(sheet)
+
+
+def _bar(seconds: float, longest: float) -> markup.Markup:
+    """Return a time as a bar; NaN, of a queue without timestamps, has none."""
+    percent = 100 * seconds / longest if seconds > 0 else 0.0
+    bar = "height:.7em;background:currentColor;opacity:.5"
+    return element("div", element("div", style=f"{bar};width:{percent:.1f}%"), style="width:16em")
 
 
 def thumbnail_size(array: NDArray[Any]) -> tuple[int, int]:
