@@ -275,8 +275,8 @@ def test_the_browser_gets_no_token_as_an_argument(
 
     def open_page(address: str) -> None:
         file = Path(url2pathname(urlsplit(address).path))
-        modes = (stat.S_IMODE(os.stat(path).st_mode) for path in (file, file.parent))
-        opened.append((address, *modes, file.read_text()))
+        mode, of_folder = (stat.S_IMODE(os.stat(path).st_mode) for path in (file, file.parent))
+        opened.append((address, mode, of_folder, file.read_text()))
         os.kill(os.getpid(), signal.SIGTERM)
 
     monkeypatch.setattr(webbrowser, "open", open_page)

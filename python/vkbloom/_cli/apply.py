@@ -437,8 +437,8 @@ def _check_own(source: str, out: str) -> None:
         return
     if safe_writing.is_of_another_program(Path(out)):
         raise click.UsageError(
-            f"{out}: is a picture that vkbloom did not write; to replace it, give it as -o {out}, or "
-            "--overwrite; to add bloom to it as well, name a folder as OUT"
+            f"{out}: is a picture that vkbloom did not write; to replace it, give it as -o {out}, "
+            "or --overwrite; to add bloom to it as well, name a folder as OUT"
         )
 
 

@@ -15,8 +15,8 @@ from collections.abc import Mapping
 from typing import Any, Final, NamedTuple
 
 TIMEOUT: Final = 60.0
-#: Of a child process: without modules of the current folder, such as a json.py.
-PYTHON: Final = (sys.executable, "-P")
+#: Python's option for a child process that runs no modules of the current folder (a json.py).
+SAFE_PATH: Final = "-P"
 #: Prefix of the line with a probe's answer: drivers and layers may print on stdout as well.
 ANSWER_MARK: Final = "vkbloom-probe "
 
@@ -38,7 +38,7 @@ def ask(*question: str, environment: Mapping[str, str] | None = None) -> Answer:
     """Run `vkbloom._doctor.probe` with arguments and return its answer."""
     try:
         ended = subprocess.run(
-            [*PYTHON, "-m", "vkbloom._doctor.probe", *question],
+            [sys.executable, SAFE_PATH, "-m", "vkbloom._doctor.probe", *question],
             env={**os.environ, **(environment or {})},
             stdin=subprocess.DEVNULL,
             capture_output=True,

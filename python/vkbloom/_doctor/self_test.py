@@ -18,7 +18,7 @@ from typing import Any, Final
 
 import vkbloom
 from vkbloom._doctor.cases import Case, cases
-from vkbloom._doctor.child import PYTHON
+from vkbloom._doctor.child import SAFE_PATH
 from vkbloom._doctor.deviations import Deviation
 
 PROGRAM = ("-m", "vkbloom._doctor.self_test")
@@ -27,7 +27,7 @@ _MARK: Final = "vkbloom-case "
 
 def run(adapter: str, only: str = "") -> Iterator[dict[str, Any]]:
     """Yield a report of the device, then one of each case; `only`: a part of the cases' names."""
-    command = [*PYTHON, *PROGRAM, adapter, only]
+    command = [sys.executable, SAFE_PATH, *PROGRAM, adapter, only]
     with subprocess.Popen(
         command, stdout=subprocess.PIPE, stdin=subprocess.DEVNULL, text=True, errors="replace"
     ) as child:
