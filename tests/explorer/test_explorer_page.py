@@ -6,6 +6,7 @@ The shown pixels are compared with those of the renderer.
 from __future__ import annotations
 
 import dataclasses
+import json
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -521,6 +522,7 @@ def test_files(page: Page, tmp_path: Path) -> None:
     settings = download.value.path()
     expected = presets["photo"].replace(bloom=False)
     assert vkbloom.Settings.from_json(settings.read_text()) == expected
+    assert json.loads(settings.read_text())["vkbloom:expand"] == 4
     # Dropped, not chosen.
     text = KinoBloom(radius=3).to_json()
     page.evaluate(
@@ -533,6 +535,16 @@ def test_files(page: Page, tmp_path: Path) -> None:
         text,
     )
     wait_for_code(page, f"{read}\nsettings = vkbloom.KinoBloom(radius=3.0)")
+    # Presets begin as on the command line; what is expanded is chosen, too.
+    page.get_by_label("preset").select_option("kino")
+    wait_for_code(page, "vkbloom.KinoBloom()")
+    page.get_by_label("expand, on").check()
+    wait_for_code(page, f"{read}\nsettings = vkbloom.KinoBloom()")
+    field(page, "expand").fill("2.5")
+    wait_for_code(page, f"{read.replace('=4', '=2.5')}\nsettings = vkbloom.KinoBloom()")
+    page.locator(".vkb-status", has_text="highlights expanded up to 2.5").wait_for()
+    page.get_by_label("preset").select_option("photo")
+    wait_for_code(page, f'{read}\nsettings = vkbloom.presets["photo"]')
     (tmp_path / "words.png").write_text("words")
     page.get_by_label("image or settings").set_input_files(tmp_path / "words.png")
     page.get_by_role("alert").get_by_text("words.png").wait_for()
