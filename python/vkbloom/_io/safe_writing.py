@@ -249,14 +249,7 @@ def is_stream(path: str | os.PathLike[str]) -> bool:
 
 def is_picture(file: Path) -> bool:
     """Return whether a file is an image whose header can be read."""
-    oiio = import_extra("OpenImageIO", "images", "Reading images")
-    with padded(os.fspath(file)) as name:
-        reader = oiio.ImageInput.open(name)
-    if reader is None:
-        failure_of(oiio)
-        return False
-    reader.close()
-    return True
+    return _program_of(file) is not None
 
 
 def is_damaged(file: Path) -> bool:
@@ -274,19 +267,20 @@ def is_damaged(file: Path) -> bool:
 
 def is_of_another_program(file: Path) -> bool:
     """Return whether a file is an image of a format that names its program, and that is another."""
+    program = _program_of(file)
+    return program is not None and not program.startswith(PROGRAM) and _names_program(file.suffix)
+
+
+def _program_of(file: Path) -> str | None:
+    """Return the program that an image file names, or ""; None: it is no image."""
     oiio = import_extra("OpenImageIO", "images", "Reading images")
-    with padded(os.fspath(file)) as name:
-        reader = oiio.ImageInput.open(name)
-    if reader is None:
-        failure_of(oiio)
-        return False
-    program = _program_of(reader)
-    reader.close()
-    return not program.startswith(PROGRAM) and _names_program(file.suffix)
-
-
-def _program_of(reader: OpenImageIO.ImageInput) -> str:
-    program: str = reader.spec().get_string_attribute("Software")
+    with readable(file) as name, for_c(name) as given:
+        reader = oiio.ImageInput.open(given)
+        if reader is None:
+            failure_of(oiio)
+            return None
+        program: str = reader.spec().get_string_attribute("Software")
+        reader.close()
     return program
 
 
@@ -295,20 +289,19 @@ def _names_program(suffix: str) -> bool:
     """Return whether a format that can be written keeps the name of the program."""
     oiio = import_extra("OpenImageIO", "images", "Writing images")
     with tempfile.TemporaryDirectory(prefix="vkbloom-") as folder:
-        name = f"{folder}/image{suffix}"
+        file = Path(folder, f"image{suffix}")
         spec = oiio.ImageSpec(_TRIED, _TRIED, 3, "uint8")
         spec.attribute("Software", PROGRAM)
-        writer = oiio.ImageOutput.create(name)
-        if writer is None:
-            failure_of(oiio)
-            return False
-        is_written = writer.open(name, spec)
-        is_written = is_written and writer.write_image(np.zeros((_TRIED, _TRIED, 3), np.uint8))
-        is_written = is_written and writer.close()
-        failure_of(writer)
-        reader = oiio.ImageInput.open(name) if is_written else None
-        failure_of(oiio)
-        return reader is not None and _program_of(reader).startswith(PROGRAM)
+        with for_c(str(file)) as given:
+            writer = oiio.ImageOutput.create(given)
+            if writer is None:
+                failure_of(oiio)
+                return False
+            is_written = writer.open(given, spec)
+            is_written = is_written and writer.write_image(np.zeros((_TRIED, _TRIED, 3), np.uint8))
+            is_written = is_written and writer.close()
+            failure_of(writer)
+        return is_written and (_program_of(file) or "").startswith(PROGRAM)
 
 
 def is_temporary(path: Path) -> bool:
