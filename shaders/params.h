@@ -385,6 +385,9 @@
 #define MAX_TAPS     8
 #define MAX_HALVINGS 4
 
+// The most iterations of Blender's streaks and of its star, whose distances are fewer by one.
+#define STAR_ITERATIONS 5
+
 // The binding of the target of a compute shader: after those that images and resources may have.
 #define TARGET_BINDING 33
 

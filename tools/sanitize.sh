@@ -9,7 +9,7 @@ cd "$(dirname "$0")/.."
 # compared with the reference: tests of these, of Python alone and of other processes are left out.
 # Each preset is in test_matrix.py.
 if [ $# = 0 ]; then
-    for name in adapters array_memory batches bundled_driver core_arguments eviction graph refusals \
+    for name in adapters array_arguments array_memory batches bundled_driver core_arguments eviction graph refusals \
         interruption lifetime pipeline_cache plans readback settings threads; do
         set -- "$@" "tests/core/test_$name.py"
     done

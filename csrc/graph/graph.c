@@ -58,9 +58,25 @@ bool vkb_graph_show_image(struct vkb_graph *graph, uint32_t image, const char *n
     return name_image(graph, image, name, error);
 }
 
+// Later code uses the indices without a check.
+static bool has_images(const struct vkb_graph *graph, const struct vkb_pass_row *row)
+{
+    bool all = row->read_count <= VKB_MAX_READS && row->target_count <= VKB_MAX_TARGETS
+            && (row->depth == VKB_NO_IMAGE || row->depth < graph->image_count);
+
+    for (uint32_t i = 0; all && i < row->read_count; ++i)
+        all = row->reads[i] < graph->image_count;
+    for (uint32_t i = 0; all && i < row->target_count; ++i)
+        all = row->targets[i] < graph->image_count;
+    return all;
+}
+
 bool vkb_graph_add_pass(struct vkb_graph *graph, const struct vkb_pass_row *row,
                         struct vkb_error *error)
 {
+    if (!has_images(graph, row))
+        return vkb_fail(error, VKB_ERROR_GENERAL, "passes: %s needs an image that is not there",
+                        row->name);
     if (!vkb_grow(error, &graph->passes, &graph->pass_capacity, graph->pass_count + 1,
                   sizeof *graph->passes))
         return false;

@@ -169,7 +169,8 @@ bool vkb_graph_add_image(struct vkb_graph *graph, const struct vkb_image_row *ro
 bool vkb_graph_show_image(struct vkb_graph *graph, uint32_t image, const char *name,
                           struct vkb_error *error);
 
-// The copy's constant `stored` is that of its first target.
+// The copy's constant `stored` is that of its first target. Fails if one of its images is not
+// there.
 bool vkb_graph_add_pass(struct vkb_graph *graph, const struct vkb_pass_row *row,
                         struct vkb_error *error);
 

@@ -112,7 +112,7 @@ static uint32_t add_streaks(struct vkb_levels *levels)
             const bool reads_next =
                 values->blender_5_2
                 && set_next(levels->sizes[0], (float)(angle - acos(-1.0)), iteration, next);
-            const double share = last ? 1.0 / (6 - values->iterations) : 1.0;
+            const double share = last ? 1.0 / (STAR_ITERATIONS + 1 - values->iterations) : 1.0;
             light = add_step(levels, "ray_%u", (uint32_t)(i * values->iterations + iteration));
             const struct vkb_ray ray = {
                 .values = &numbers,
@@ -345,12 +345,27 @@ static uint32_t add_end(struct vkb_levels *levels, uint32_t light, double gain)
     return bloom;
 }
 
+// The filter of a star keeps as many pixels of a line as its largest distance; of the shares of
+// streaks nothing is left beyond.
+static bool check_iterations(struct vkb_levels *levels)
+{
+    const int iterations = levels->settings->values.iterations;
+    const int type = levels->settings->choices[VKB_CHOICE_type];
+
+    return (type != TYPE_SIMPLE_STAR && type != TYPE_STREAKS) || iterations <= STAR_ITERATIONS
+        || vkb_fail(levels->error, VKB_ERROR_VALUE, "iterations: %d is out of range, 2 to %d",
+                    iterations, STAR_ITERATIONS);
+}
+
 uint32_t vkb_add_blender(struct vkb_levels *levels)
 {
     const int type = levels->settings->choices[VKB_CHOICE_type];
     const struct vkb_bloom_source *source = levels->source;
     struct vkb_bloom_source floats = *source;
 
+    levels->failed = levels->failed || !check_iterations(levels);
+    if (levels->failed)
+        return 0;
     // What spreads over hundreds of pixels is too little for 8 bits and for 6 bits of mantissa.
     if (source->format != VKB_FORMAT_RGBA32_FLOAT)
         floats.format = VKB_FORMAT_RGBA16_FLOAT;

@@ -35,7 +35,7 @@ static uint32_t least(uint32_t a, uint32_t b)
 // stages that they save in small images.
 static uint32_t most_radix(struct vkb_size size)
 {
-    return size.width * size.height <= FFT_SMALL_PIXELS ? FFT_SMALL_RADIX : FFT_MAX_RADIX;
+    return (uint64_t)size.width * size.height <= FFT_SMALL_PIXELS ? FFT_SMALL_RADIX : FFT_MAX_RADIX;
 }
 
 static struct vkb_fft_axis make_axis(enum vkb_mode direction, enum vkb_boundary boundary,

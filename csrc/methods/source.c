@@ -57,13 +57,43 @@ bool vkb_source_sizes(const struct vkb_source *source, const struct vkb_settings
     return true;
 }
 
+static bool same_size(struct vkb_size one, struct vkb_size other)
+{
+    return one.width == other.width && one.height == other.height;
+}
+
+static bool same_image(const struct vkb_image_source *one, const struct vkb_image_source *other)
+{
+    bool same = one->format == other->format && one->channels == other->channels
+             && one->layers == other->layers && same_size(one->size, other->size)
+             && one->has_emission == other->has_emission && one->has_mask == other->has_mask
+             && one->level_count == other->level_count;
+
+    for (uint32_t i = 0; same && i < one->level_count; ++i)
+        same = one->levels[i].format == other->levels[i].format
+            && same_size(one->levels[i].size, other->levels[i].size);
+    return same;
+}
+
+static bool same_scene(const struct vkb_scene_source *one, const struct vkb_scene_source *other)
+{
+    return same_size(one->size, other->size) && one->has_sky == other->has_sky
+        && one->has_glow == other->has_glow && one->has_emission == other->has_emission
+        && one->body_textured == other->body_textured && one->glow_textured == other->glow_textured;
+}
+
+bool vkb_source_matches(const struct vkb_source *planned, const struct vkb_source *given)
+{
+    if (planned->kind != given->kind)
+        return false;
+    if (given->kind == VKB_SOURCE_IMAGE)
+        return same_image(&planned->image, &given->image);
+    return given->kind == VKB_SOURCE_SCENE && same_scene(&planned->scene, &given->scene)
+        && strcmp(planned->shading, given->shading) == 0;
+}
+
 bool vkb_source_fits(const struct vkb_source *planned, const struct vkb_source *given)
 {
-    const struct vkb_image_source *one = &planned->image, *other = &given->image;
-
-    return planned->kind == VKB_SOURCE_IMAGE && given->kind == VKB_SOURCE_IMAGE
-        && one->format == other->format && one->channels == other->channels
-        && one->layers == other->layers && one->size.width == other->size.width
-        && one->size.height == other->size.height && one->has_emission == other->has_emission
-        && one->has_mask == other->has_mask && one->level_count + other->level_count == 0;
+    return given->kind == VKB_SOURCE_IMAGE && vkb_source_matches(planned, given)
+        && given->image.level_count == 0;
 }

@@ -27,6 +27,10 @@ bool vkb_source_sizes(const struct vkb_source *source, const struct vkb_settings
                       uint32_t max_side, struct vkb_size *frame, struct vkb_size *buffers,
                       struct vkb_error *error);
 
+// Whether a graph of `planned` finds in the data of `given` all that it reads, of the same sizes
+// and formats.
+bool vkb_source_matches(const struct vkb_source *planned, const struct vkb_source *given);
+
 // Whether a graph of the image `planned` can run with the data of `given`: both need the same size
 // and format, and the same optional parts. A graph of a scene depends on its camera.
 bool vkb_source_fits(const struct vkb_source *planned, const struct vkb_source *given);

@@ -1,7 +1,10 @@
 // Settings as Python packs them: the members of struct vkb_settings before its pointers, by the
-// tables that this file gives. All functions return false with an exception set.
+// tables that this file gives. What Python's classes check is checked here again, as far as a graph
+// could not be built of it: other callers may give any bytes. All functions return false with an
+// exception set.
 #include "python/arguments.h"
 
+#include <math.h>
 #include <stddef.h>
 #include <string.h>
 
@@ -94,6 +97,94 @@ PyObject *vkb_settings_block_table(void)
     return table;
 }
 
+// Numbers in the ranges of their rows. A default may be outside, where it stands for no limit.
+static bool check_values(const struct vkb_value_row *rows, size_t count, const void *values)
+{
+    for (const struct vkb_value_row *row = rows; row < rows + count; ++row) {
+        const void *at = (const char *)values + row->offset;
+        const bool single = row->type == VKB_VALUE_FLOAT;
+        const double low = single ? (float)row->low : row->low;
+        const double high = single ? (float)row->high : row->high;
+        const double initial = single ? (float)row->initial : row->initial;
+        double value;
+
+        if (single)
+            value = *(const float *)at;
+        else
+            value = row->type == VKB_VALUE_INT ? *(const int *)at : *(const double *)at;
+        if (!(value >= low && value <= high) && value != initial)
+            return vkb_refuse("%s: %g is out of range, %g to %g", row->name, value, row->low,
+                              row->high);
+    }
+    return true;
+}
+
+static bool check_finite(const char *name, const float *numbers, size_t count)
+{
+    for (size_t i = 0; i < count; ++i)
+        if (!isfinite(numbers[i]))
+            return vkb_refuse("%s: %g is out of range, finite numbers", name, numbers[i]);
+    return true;
+}
+
+static bool check_count(const char *name, uint32_t count, uint32_t least, uint32_t most)
+{
+    return (count >= least && count <= most)
+        || vkb_refuse("%s: %u are out of range, %u to %u", name, count, least, most);
+}
+
+static bool check_choices(const struct vkb_settings *settings)
+{
+    for (size_t i = 0; i < VKB_CHOICE_COUNT; ++i) {
+        const struct vkb_choice_row *row = &vkb_choice_rows[i];
+        if (settings->choices[i] < 0 || settings->choices[i] >= row->count)
+            return vkb_refuse("%s: %d is out of range, 0 to %d", row->name, settings->choices[i],
+                              row->count - 1);
+    }
+    if ((unsigned)settings->method >= VKB_METHOD_COUNT)
+        return vkb_refuse("method: %d is out of range, 0 to %d", (int)settings->method,
+                          VKB_METHOD_COUNT - 1);
+    // Those of buffers come before those of masks and depths.
+    if ((unsigned)settings->format >= VKB_FORMAT_R32_FLOAT)
+        return vkb_refuse("format: %d is out of range, 0 to %d", (int)settings->format,
+                          VKB_FORMAT_R32_FLOAT - 1);
+    return true;
+}
+
+static bool check_stages(const struct vkb_settings *settings)
+{
+    if (!check_count("glare", settings->stage_count, 0, MAX_STAGES))
+        return false;
+    for (uint32_t i = 0; i < settings->stage_count; ++i) {
+        const struct vkb_stage *stage = &settings->stages[i];
+        if ((unsigned)stage->kind >= VKB_STAGE_COUNT)
+            return vkb_refuse("glare: the stage %d is out of range, 0 to %d", (int)stage->kind,
+                              VKB_STAGE_COUNT - 1);
+        if (!check_count("ghosts", stage->ghost_count, 0, MAX_GHOSTS)
+            || !check_finite("ghosts", stage->ghosts[0], 4 * stage->ghost_count)
+            || !check_values(vkb_glare_rows, vkb_glare_row_count, &stage->values))
+            return false;
+    }
+    return true;
+}
+
+static bool check_settings(const struct vkb_settings *settings)
+{
+    const bool separable = settings->method == VKB_METHOD_SEPARABLE;
+    const bool weighted = separable || settings->method == VKB_METHOD_BABYLON;
+
+    return check_choices(settings)
+        && check_values(vkb_value_rows, vkb_value_row_count, &settings->values)
+        && check_count("weights", settings->weight_count, weighted, MAX_WEIGHTS)
+        && check_finite("weights", settings->weights, settings->weight_count)
+        && check_count("layers", settings->layer_count, separable, MAX_LAYERS)
+        && check_finite("layers", &settings->layers[0].scale, 2 * settings->layer_count)
+        && check_count("level_weights", settings->level_weight_count, 0, MAX_LEVELS)
+        && check_finite("level_weights", settings->level_weights, settings->level_weight_count)
+        && check_finite("tint", settings->tint, 3)
+        && check_finite("sun_position", settings->sun_position, 2) && check_stages(settings);
+}
+
 bool vkb_read_settings(PyObject *object, struct vkb_settings *settings)
 {
     PyObject *block = PyObject_CallMethod(object, "_core_block", NULL);
@@ -106,5 +197,5 @@ bool vkb_read_settings(PyObject *object, struct vkb_settings *settings)
     if (done)
         memcpy(settings, PyBytes_AsString(block), BLOCK_SIZE);
     Py_XDECREF(block);
-    return done;
+    return done && check_settings(settings);
 }

@@ -8,6 +8,19 @@
 #include "share/exported_memory.h"
 #include "transfer/upload.h"
 
+// The types of numbers in arrays, as the struct module writes them.
+enum { VKB_UINT8 = 'B', VKB_FLOAT16 = 'e', VKB_FLOAT32 = 'f', VKB_UINT32 = 'I' };
+
+// Whether the array's numbers have that type, in the byte order of the host.
+bool vkb_is_number(const Py_buffer *view, char type);
+// Holds a contiguous array of such numbers, and of so many bytes. False with an exception set,
+// which begins with the name; the view may be held then, too. `flags`: further ones of PyBUF_*.
+bool vkb_hold_array(PyObject *object, const char *name, char type, int flags, Py_buffer *view);
+bool vkb_hold_bytes(PyObject *object, const char *name, char type, int flags, size_t size,
+                    Py_buffer *view);
+// A side of an image. Those beyond every adapter's limit are refused with the plan.
+uint32_t vkb_side(Py_ssize_t length);
+
 // The members of the blocks of a settings object and of a stage of glare, by name: offset, code of
 // the elements and their number. New references; NULL with an exception set.
 PyObject *vkb_settings_block_table(void);
@@ -46,9 +59,11 @@ struct vkb_held_image {
     Py_buffer view;
 };
 
-// An array (H, W, 3) or (H, W, 4) of uint8, float16 or float32, or a mask (H, W) of float32, any
-// strides; or (Exported, offset, (H, W, C), strides, bytes of an element).
-bool vkb_read_image(PyObject *array, struct vkb_held_image *image);
+// An array (H, W, 3) or (H, W, 4) of uint8, float16 or float32, any strides; or (Exported, offset,
+// (H, W, C), strides, bytes of an element). A mask is an array (H, W) of float32. False with an
+// exception set, which begins with the name; the image may be held then, too.
+bool vkb_read_image(PyObject *array, const char *name, struct vkb_held_image *image);
+bool vkb_read_mask(PyObject *array, const char *name, struct vkb_held_image *image);
 
 // Whether the object is memory that CUDA shares; that memory, and to what it belongs.
 bool vkb_is_exported(PyObject *object);

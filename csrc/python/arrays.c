@@ -19,7 +19,7 @@ PyObject *vkb_new_pages(PyObject *object, PyObject *argument)
     const Py_ssize_t size = PyLong_AsSsize_t(argument);
     struct vkb_error error = {0};
 
-    if (PyErr_Occurred())
+    if (PyErr_Occurred() || !vkb_check_bytes("pages", size))
         return NULL;
     struct pages_object *self = vkb_new_object(state->pages_type);
     if (!self)

@@ -3,6 +3,8 @@
 #include "python/arguments.h"
 #include "python/module.h"
 
+#include "spirv/instructions.h"
+
 #include <stddef.h>
 #include <string.h>
 
@@ -50,17 +52,79 @@ PyObject *vkb_resource_owner(PyObject *module, PyObject *unused)
     return capsule;
 }
 
+static bool check_resource(const struct vkb_resource *resource, PyObject *data)
+{
+    const bool image = resource->kind < VKB_RESOURCE_KINDS && vkb_resource_is_image(resource);
+
+    if (resource->kind >= VKB_RESOURCE_KINDS)
+        return vkb_refuse("passes: the kind %u of a resource is not 0 to %d", resource->kind,
+                          VKB_RESOURCE_KINDS - 1);
+    if (resource->serial == 0 || resource->size == 0)
+        return vkb_refuse("passes: the serial and the size of a resource must be at least 1");
+    if (image
+        && (resource->dimensions - 1 > 2 || !resource->width || !resource->height
+            || !resource->depth
+            || resource->border > VK_SAMPLER_ADDRESS_MODE_CLAMP_TO_EDGE
+            // A texel has at most 16 bytes, and at least one.
+            || resource->size / resource->width / resource->height / resource->depth - 1 > 15))
+        return vkb_refuse("passes: a texture of %u x %u x %u in %u dimensions with %llu bytes is "
+                          "none",
+                          resource->width, resource->height, resource->depth, resource->dimensions,
+                          (unsigned long long)resource->size);
+    return data == Py_None || (uint64_t)PyBytes_Size(data) == resource->size
+        || vkb_refuse("passes: a resource has %zd bytes, and its block says %llu",
+                      PyBytes_Size(data), (unsigned long long)resource->size);
+}
+
 // (block, bytes or None, owner or None)
 static bool read_resource(PyObject *tuple, struct vkb_resource *resource)
 {
     PyObject *block, *data, *owner;
 
-    if (!PyArg_ParseTuple(tuple, "SOO:resource", &block, &data, &owner)
+    if (!vkb_require_tuple(tuple, "passes")
+        || !PyArg_ParseTuple(tuple, "SOO:resource", &block, &data, &owner)
         || !copy_block(block, resource, RESOURCE_SIZE))
         return false;
+    if (data != Py_None && !PyBytes_Check(data)) {
+        PyErr_Format(PyExc_TypeError, "passes: %R is not bytes or None", data);
+        return false;
+    }
     resource->data = data == Py_None ? NULL : PyBytes_AsString(data);
     resource->owner = owner == Py_None ? NULL : PyCapsule_GetPointer(owner, OWNER);
-    return (data == Py_None || resource->data) && (owner == Py_None || resource->owner);
+    return (owner == Py_None || resource->owner) && check_resource(resource, data);
+}
+
+// The header of SPIR-V and at least a word of it; the instructions' lengths are those of the code.
+static bool check_code(const struct vkb_shader *shader)
+{
+    const size_t count = shader->size / sizeof *shader->code;
+    size_t at = SPV_HEADER_WORDS;
+
+    if (shader->size % sizeof *shader->code || count <= SPV_HEADER_WORDS
+        || shader->code[0] != SPV_MAGIC)
+        return vkb_refuse("passes: the code of %s is not SPIR-V", shader->name);
+    while (at < count && shader->code[at] >> 16 && at + (shader->code[at] >> 16) <= count)
+        at += shader->code[at] >> 16;
+    if (at != count)
+        return vkb_refuse("passes: the SPIR-V of %s ends within an instruction", shader->name);
+    return (shader->threads[0] > 0 && shader->threads[1] > 0)
+        || vkb_refuse("passes: %s has workgroups of %u x %u threads, which must be at least 1",
+                      shader->name, shader->threads[0], shader->threads[1]);
+}
+
+static bool check_pass(const struct vkb_custom_pass *pass)
+{
+    if (pass->read_count > VKB_MAX_READS)
+        return vkb_refuse("passes: %u images read are more than %d", pass->read_count,
+                          VKB_MAX_READS);
+    if (!memchr(pass->name, 0, sizeof pass->name))
+        return vkb_refuse("passes: a name is longer than %d bytes", VKB_NAME_SIZE - 1);
+    for (uint32_t i = 0; i < pass->read_count; ++i)
+        if (!memchr(pass->reads[i], 0, sizeof pass->reads[i]))
+            return vkb_refuse("passes: a name is longer than %d bytes", VKB_NAME_SIZE - 1);
+    return !pass->block_width == !pass->block_height
+        || vkb_refuse("passes: a workgroup of %u x %u pixels is none", pass->block_width,
+                      pass->block_height);
 }
 
 // (block, name of the shader, its SPIR-V, its hash, its threads along x and y, its bytes of shared
@@ -71,15 +135,21 @@ static bool read_pass(PyObject *tuple, struct vkb_pass_content *content,
     struct vkb_shader *shader = &content->shader;
     PyObject *block, *code, *hash, *resources;
 
-    if (!PyArg_ParseTuple(tuple, "SsSSIIIO!:core_passes", &block, &shader->name, &code, &hash,
-                          &shader->threads[0], &shader->threads[1], &shader->shared, &PyTuple_Type,
-                          &resources)
+    if (!vkb_require_tuple(tuple, "passes")
+        || !PyArg_ParseTuple(tuple, "SsSSIIIO!:core_passes", &block, &shader->name, &code, &hash,
+                             &shader->threads[0], &shader->threads[1], &shader->shared,
+                             &PyTuple_Type, &resources)
         || !copy_block(block, pass, PASS_SIZE)
         || !copy_block(hash, shader->hash.bytes, sizeof shader->hash.bytes))
         return false;
     shader->code = (const void *)PyBytes_AsString(code);
     shader->size = (size_t)PyBytes_Size(code);
     pass->shader = shader;
+    if (!check_code(shader) || !check_pass(pass))
+        return false;
+    if (PyTuple_Size(resources) > VKB_MAX_RESOURCES)
+        return vkb_refuse("passes: %zd textures and buffers are more than %d",
+                          PyTuple_Size(resources), VKB_MAX_RESOURCES);
     for (; pass->resource_count < PyTuple_Size(resources); ++pass->resource_count) {
         struct vkb_resource *resource = &content->resources[pass->resource_count];
         pass->resources[pass->resource_count] = resource;
@@ -92,8 +162,10 @@ static bool read_pass(PyObject *tuple, struct vkb_pass_content *content,
 static bool read_passes(struct vkb_held_passes *held, struct vkb_settings *settings)
 {
     struct vkb_error error;
-    const Py_ssize_t count = PyTuple_Size(held->tuple);
 
+    if (!vkb_require_tuple(held->tuple, "passes"))
+        return false;
+    const Py_ssize_t count = PyTuple_Size(held->tuple);
     held->rows = vkb_alloc(&error, (size_t)count + 1, sizeof *held->rows);
     held->content = vkb_alloc(&error, (size_t)count + 1, sizeof *held->content);
     if (!held->rows || !held->content) {

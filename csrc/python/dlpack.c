@@ -21,12 +21,10 @@ struct versioned {
 #define NAME           "dltensor"
 #define VERSIONED_NAME "dltensor_versioned"
 
-enum { MAX_DIMENSIONS = 4 };
-
 // What an exported capsule owns.
 struct shared {
     PyObject *owner;
-    int64_t shape[MAX_DIMENSIONS], strides[MAX_DIMENSIONS];
+    int64_t shape[VKB_MAX_DIMENSIONS], strides[VKB_MAX_DIMENSIONS];
     struct managed managed;
     struct versioned versioned;
 };
@@ -59,6 +57,10 @@ PyObject *vkb_read_dlpack(PyObject *module, PyObject *capsule)
         if (!managed)
             return NULL;
         tensor = &managed->tensor;
+    }
+    if (tensor->ndim < 0 || (tensor->ndim > 0 && !tensor->shape)) {
+        PyErr_Format(PyExc_BufferError, "DLPack: %d dimensions without a shape", (int)tensor->ndim);
+        return NULL;
     }
     return Py_BuildValue(
         "(K(ii)(iii)NN)", (unsigned long long)(uintptr_t)tensor->data + tensor->byte_offset,

@@ -4,7 +4,10 @@
 
 #include "python/objects.h"
 
-enum { VKB_DEVICE_CUDA = 2 };  // kDLCUDA
+enum {
+    VKB_DEVICE_CUDA = 2,  // kDLCUDA
+    VKB_MAX_DIMENSIONS = 4,
+};
 
 // DLPack's DLTensor.
 struct vkb_tensor {
@@ -21,8 +24,8 @@ struct vkb_tensor {
     uint64_t byte_offset;
 };
 
-// Makes a capsule of a dense array of that shape, of up to 4 sides. The capsule holds the owner of
-// the memory until its consumer lets go.
+// Makes a capsule of a dense array of that shape, of up to VKB_MAX_DIMENSIONS sides. The capsule
+// holds the owner of the memory until its consumer lets go.
 PyObject *vkb_dlpack_capsule(PyObject *owner, const struct vkb_tensor *array, PyObject *shape,
                              bool versioned);
 

@@ -18,6 +18,8 @@ static PyObject *dry_step(const struct vkb_module_state *state, struct vkb_dry_r
 {
     PyObject *source, *plan;
 
+    if (!vkb_require_tuple(step, "dry_run"))
+        return NULL;
     if (!PyArg_ParseTuple(step, "O!O!:dry_run", state->source_type, &source, state->plan_type,
                           &plan))
         return NULL;
@@ -29,6 +31,8 @@ PyObject *vkb_dry_run_steps(PyObject *module, PyObject *steps)
 {
     struct vkb_dry_run dry_run = {0};
 
+    if (!vkb_require_tuple(steps, "dry_run"))
+        return NULL;
     PyObject *list = PyList_New(0);
     for (Py_ssize_t i = 0, count = PyTuple_Size(steps); list && i < count; ++i)
         if (!vkb_append_item(

@@ -127,8 +127,9 @@ PyObject *vkb_renderer_export(PyObject *renderer, PyObject *argument)
 {
     const Py_ssize_t size = PyLong_AsSsize_t(argument);
 
-    return PyErr_Occurred() ? NULL
-                            : (PyObject *)new_exported((struct vkb_renderer *)renderer, size);
+    return PyErr_Occurred() || !vkb_check_bytes("export", size)
+             ? NULL
+             : (PyObject *)new_exported((struct vkb_renderer *)renderer, size);
 }
 
 PyObject *vkb_renderer_cuda(PyObject *object, PyObject *unused)
@@ -199,7 +200,8 @@ PyObject *vkb_renderer_snapshot(PyObject *object, PyObject *arguments)
     struct vkb_error error = {0};
     bool done;
 
-    if (!PyArg_ParseTuple(arguments, "Kn:snapshot", &address, &size))
+    if (!PyArg_ParseTuple(arguments, "Kn:snapshot", &address, &size)
+        || !vkb_check_bytes("snapshot", size))
         return NULL;
     struct exported_object *self = new_exported((struct vkb_renderer *)object, size);
     if (!self)
@@ -257,6 +259,39 @@ static PyObject *complete(PyObject *object, PyObject *unused)
     return finish(object, done, &error);
 }
 
+// Whether the bytes lie in the memory; else a ValueError is set.
+static bool check_part(const struct exported_object *self, const char *name, Py_ssize_t offset,
+                       Py_ssize_t size)
+{
+    const uint64_t whole = self->run->size;
+
+    return (offset >= 0 && size >= 0 && (uint64_t)offset <= whole
+            && (uint64_t)size <= whole - (uint64_t)offset)
+        || vkb_refuse("%s: %zd bytes from byte %zd on lie outside of the memory of %llu bytes",
+                      name, size, offset, (unsigned long long)whole);
+}
+
+// Whether a dense array of that shape lies in the memory.
+static bool check_shape(const struct exported_object *self, PyObject *shape, int bits,
+                        Py_ssize_t offset)
+{
+    const Py_ssize_t sides = PyTuple_Size(shape), most = PY_SSIZE_T_MAX;
+    Py_ssize_t size = bits / 8;
+
+    if (sides > VKB_MAX_DIMENSIONS || bits < 8 || bits > 64 || bits % 8)
+        return vkb_refuse("capsule: %zd dimensions of numbers of %d bits are out of range", sides,
+                          bits);
+    for (Py_ssize_t i = 0; i < sides; ++i) {
+        const Py_ssize_t side = PyLong_AsSsize_t(PyTuple_GetItem(shape, i));
+        if (PyErr_Occurred())
+            return false;
+        if (side < 1 || size > most / side)
+            return vkb_refuse("capsule: a side of %zd is out of range", side);
+        size *= side;
+    }
+    return check_part(self, "capsule", offset, size);
+}
+
 static PyObject *make_capsule(PyObject *object, PyObject *arguments)
 {
     struct exported_object *self = exported_of(object);
@@ -267,7 +302,8 @@ static PyObject *make_capsule(PyObject *object, PyObject *arguments)
     struct vkb_error error = {0};
 
     if (!PyArg_ParseTuple(arguments, "O!iipnK:capsule", &PyTuple_Type, &shape, &code, &bits,
-                          &versioned, &offset, &stream))
+                          &versioned, &offset, &stream)
+        || !check_shape(self, shape, bits, offset))
         return NULL;
     if (!order_stream(self, (void *)(uintptr_t)stream, &error))
         return vkb_raise(PyType_GetModuleState(Py_TYPE(object)), &error);
@@ -300,6 +336,15 @@ static PyObject *copy_between(PyObject *object, PyObject *arguments)
 
     if (!PyArg_ParseTuple(arguments, "KKn:copy_bytes", &to, &from, &size))
         return NULL;
+    // One of both ends is this memory.
+    const vkb_cuda_address start = address_of(exported_of(object), 0);
+    const uint64_t whole = exported_of(object)->run->size;
+    const uint64_t at = to >= start && to - start <= whole ? to - start : from - start;
+    if (at > whole || size < 0 || (uint64_t)size > whole - at) {
+        vkb_refuse("copy_bytes: %zd bytes lie outside of the memory of %llu bytes", size,
+                   (unsigned long long)whole);
+        return NULL;
+    }
     return finish(object, copy_bytes(exported_of(object), to, from, size, &error), &error);
 }
 
@@ -309,7 +354,8 @@ static PyObject *clone_export(PyObject *object, PyObject *arguments)
     Py_ssize_t size, offset;
     struct vkb_error error = {0};
 
-    if (!PyArg_ParseTuple(arguments, "nn:clone", &size, &offset))
+    if (!PyArg_ParseTuple(arguments, "nn:clone", &size, &offset) || !vkb_check_bytes("clone", size)
+        || !check_part(self, "clone", offset, size))
         return NULL;
     struct exported_object *other = vkb_new_object((PyObject *)Py_TYPE(object));
     if (!other)

@@ -8,14 +8,22 @@ static bool read_kernel_tuple(PyObject *tuple, Py_buffer *view, struct vkb_kerne
     unsigned long long serial;
     int grey;
 
-    if (!PyArg_ParseTuple(tuple, "OKp(fff):core_kernel", &pixels, &serial, &grey,
-                          &kernel->prefilter[0], &kernel->prefilter[1], &kernel->prefilter[2])
-        || PyObject_GetBuffer(pixels, view, PyBUF_C_CONTIGUOUS) < 0)
+    if (!vkb_require_tuple(tuple, "kernel")
+        || !PyArg_ParseTuple(tuple, "OKp(fff):core_kernel", &pixels, &serial, &grey,
+                             &kernel->prefilter[0], &kernel->prefilter[1], &kernel->prefilter[2])
+        || !vkb_hold_array(pixels, "kernel", VKB_FLOAT32, 0, view))
         return false;
+    if (view->ndim != 3 || view->shape[2] != 4 || view->len == 0)
+        return vkb_refuse("kernel: an array with %d dimensions and %zd bytes is not (h, w, 4) with "
+                          "sides of at least 1",
+                          view->ndim, view->len);
+    // Images that are filled once have one; 0: the others.
+    if (serial == 0)
+        return vkb_refuse("kernel: the serial 0 is out of range, at least 1");
     kernel->serial = serial;
     kernel->pixels = view->buf;
-    kernel->height = (uint32_t)view->shape[0];
-    kernel->width = (uint32_t)view->shape[1];
+    kernel->height = vkb_side(view->shape[0]);
+    kernel->width = vkb_side(view->shape[1]);
     kernel->grey = grey;
     return true;
 }
@@ -25,7 +33,12 @@ bool vkb_read_kernel_size(PyObject *object, struct vkb_size frame, struct vkb_si
 {
     PyObject *tuple = PyObject_CallMethod(object, "core_kernel_size", "(II)(II)", frame.width,
                                           frame.height, buffers.width, buffers.height);
-    const bool done = tuple && PyArg_ParseTuple(tuple, "II", &kernel->width, &kernel->height);
+    const bool done =
+        tuple && vkb_require_tuple(tuple, "kernel size")
+        && PyArg_ParseTuple(tuple, "II:core_kernel_size", &kernel->width, &kernel->height)
+        && ((kernel->width && kernel->height)
+            || vkb_refuse("kernel: a size of %u x %u is out of range, sides of at least 1",
+                          kernel->width, kernel->height));
 
     Py_XDECREF(tuple);
     // No other kernel has this number, and the check of memory is for graphs with one.

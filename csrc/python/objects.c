@@ -1,6 +1,8 @@
 // What all types share: objects, the state of the module, the exceptions of errors.
 #include "python/objects.h"
 
+#include <stdarg.h>
+#include <stdio.h>
 #include <string.h>
 
 struct vkb_module_state *vkb_module_state(PyObject *module)
@@ -63,6 +65,39 @@ bool vkb_append_item(PyObject *list, PyObject *item)
 
     Py_XDECREF(item);
     return done;
+}
+
+bool vkb_refuse(const char *format, ...)
+{
+    char text[512];
+    va_list arguments;
+
+    va_start(arguments, format);
+    vsnprintf(text, sizeof text, format, arguments);
+    va_end(arguments);
+    PyErr_SetString(PyExc_ValueError, text);
+    return false;
+}
+
+bool vkb_require_tuple(PyObject *object, const char *name)
+{
+    if (PyTuple_Check(object))
+        return true;
+    PyErr_Format(PyExc_TypeError, "%s: %R is not a tuple", name, object);
+    return false;
+}
+
+bool vkb_require_type(PyObject *object, PyObject *type, const char *name)
+{
+    if (PyObject_TypeCheck(object, (PyTypeObject *)type))
+        return true;
+    PyErr_Format(PyExc_TypeError, "%s: %R is not a %R", name, object, type);
+    return false;
+}
+
+bool vkb_check_bytes(const char *name, Py_ssize_t size)
+{
+    return size > 0 || vkb_refuse("%s: %zd bytes are out of range, at least 1", name, size);
 }
 
 void *vkb_new_object(PyObject *type)

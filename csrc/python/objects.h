@@ -34,6 +34,15 @@ bool vkb_set_entry(PyObject *dict, const char *name, PyObject *entry);
 // Appends an item to a list and releases it; false if it is NULL.
 bool vkb_append_item(PyObject *list, PyObject *item);
 
+// Sets a ValueError whose text is formatted as that of vkb_fail. Returns false.
+bool vkb_refuse(const char *format, ...);
+// Whether the object is a tuple, or an object of that type; else a TypeError is set that begins
+// with the name.
+bool vkb_require_tuple(PyObject *object, const char *name);
+bool vkb_require_type(PyObject *object, PyObject *type, const char *name);
+// Whether there is at least one byte; else a ValueError is set.
+bool vkb_check_bytes(const char *name, Py_ssize_t size);
+
 // Raises the exception class of the error; returns NULL.
 PyObject *vkb_raise(const struct vkb_module_state *state, const struct vkb_error *error);
 

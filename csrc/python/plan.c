@@ -75,6 +75,10 @@ static bool choose_outputs(struct vkb_plan *plan, uint32_t first, PyObject *name
     PyObject *known = image_names(graph, plan->outputs, count);
     PyObject *module = known ? PyImport_ImportModule("vkbloom._suggestions") : NULL;
     PyObject *flags = module ? PyObject_CallMethod(module, "wanted", "OO", names, known) : NULL;
+    if (flags && (!PyBytes_Check(flags) || PyBytes_Size(flags) != count)) {
+        PyErr_Format(PyExc_TypeError, "framebuffers: %R is not a byte for each", flags);
+        Py_CLEAR(flags);
+    }
     for (uint32_t i = 0; flags && i < count; ++i)
         if (PyBytes_AsString(flags)[i])
             plan->outputs[plan->output_count++] = plan->outputs[i];
@@ -226,7 +230,12 @@ static PyObject *new_plan(const struct vkb_module_state *state, const struct vkb
 
 static bool read_cotangents(PyObject *tuple, struct vkb_cotangents *cotangents)
 {
-    cotangents->count = (uint32_t)PyTuple_Size(tuple);
+    const Py_ssize_t count = PyTuple_Size(tuple);
+
+    if (count > GATHERED_LEVELS)
+        return vkb_refuse("cotangents: %zd framebuffers are out of range, 0 to %d", count,
+                          GATHERED_LEVELS);
+    cotangents->count = (uint32_t)count;
     for (uint32_t i = 0; i < cotangents->count; ++i) {
         const char *name = PyUnicode_AsUTF8AndSize(PyTuple_GetItem(tuple, i), NULL);
         if (!name)
@@ -253,12 +262,18 @@ PyObject *vkb_renderer_plan(PyObject *object, PyObject *arguments)
         || (cotangents && !read_cotangents(cotangents, &given)))
         return NULL;
     given.sums = sums;
+    if (cotangents && ((struct vkb_source_object *)source)->source.kind != VKB_SOURCE_IMAGE) {
+        vkb_refuse("cotangents: the source is not an image");
+        return NULL;
+    }
     if (!vkb_require_open(renderer, &error))
         return vkb_raise(state, &error);
     if (!vkb_check_source(renderer, (struct vkb_source_object *)source))
         return NULL;
     PyObject *plan = new_plan(state, &renderer->device, renderer->variants, source, settings_object,
                               &settings, cotangents ? &portion : NULL, names);
+    if (plan)
+        ((struct vkb_plan_object *)plan)->renderer = renderer->number;
     if (!plan || portion.is_possible)
         return plan;
     Py_DECREF(plan);
@@ -357,12 +372,20 @@ static PyObject *get_image_size(PyObject *object, void *unused)
 
 static PyObject *shares_images(PyObject *object, PyObject *other)
 {
+    const struct vkb_module_state *state = PyType_GetModuleState(Py_TYPE(object));
+
+    if (!vkb_require_type(other, state->plan_type, "plan"))
+        return NULL;
     return PyBool_FromLong(vkb_graph_same_images(&((struct vkb_plan_object *)object)->plan.graph,
                                                  &((struct vkb_plan_object *)other)->plan.graph));
 }
 
 static PyObject *is_of_image(PyObject *object, PyObject *other)
 {
+    const struct vkb_module_state *state = PyType_GetModuleState(Py_TYPE(object));
+
+    if (!vkb_require_type(other, state->source_type, "source"))
+        return NULL;
     return PyBool_FromLong(vkb_source_fits(&((struct vkb_plan_object *)object)->source,
                                            &((struct vkb_source_object *)other)->source));
 }

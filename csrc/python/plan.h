@@ -24,6 +24,7 @@ struct vkb_plan_object {
     PyObject_HEAD
     struct vkb_source source;
     struct vkb_plan plan;
+    uint64_t renderer;  // the number of that for which it is; 0: none
     PyObject *outputs;  // ((name, shape, dtype), ...)
     Py_buffer kernel, dirt;
     struct vkb_held_passes passes;

@@ -49,6 +49,7 @@ static bool create(struct vkb_renderer *self, uint32_t adapter, const char *driv
 
 static PyObject *new_renderer(PyTypeObject *type, PyObject *arguments, PyObject *keywords)
 {
+    static VKB_ATOMIC(uint64_t) last_number;
     const char *driver, *variants;
     uint32_t adapter;
     int validation;
@@ -60,9 +61,14 @@ static PyObject *new_renderer(PyTypeObject *type, PyObject *arguments, PyObject 
     if (!PyArg_ParseTuple(arguments, "IspsdO:Renderer", &adapter, &driver, &validation, &variants,
                           &frame_seconds, &read_cache))
         return NULL;
+    if (!(frame_seconds > 0.0)) {
+        vkb_refuse("frame_seconds: %g is out of range, above 0", frame_seconds);
+        return NULL;
+    }
     struct vkb_renderer *self = vkb_new_object((PyObject *)type);
     if (!self)
         return NULL;
+    self->number = ++last_number;
     self->process = vkb_current_process();
     self->lock = PyThread_allocate_lock();
     if (!self->lock)

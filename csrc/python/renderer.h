@@ -33,6 +33,7 @@ struct vkb_renderer {
     PyThread_type_lock lock;           // held, without the GIL, around all device work
     VKB_ATOMIC(unsigned long) holder;  // the thread with the lock, 0: none
     PyThreadState *thread;             // of that thread, while it has released the GIL
+    uint64_t number;                   // that no other renderer of this process has
     long process;                      // that opened it; a forked process must not use the device
     atomic_bool open;                  // written with the lock, read without it
     const struct vkb_messages

@@ -1,4 +1,5 @@
 // Plans run on a renderer: the Submission type. The GIL is released around all device work.
+#include "python/arguments.h"
 #include "python/module.h"
 #include "python/plan.h"
 
@@ -64,28 +65,61 @@ static struct vkb_page_run *find_pages(const struct vkb_renderer *renderer, cons
     return run;
 }
 
-// An array has the output's size. None: the output stays in its image.
+// Memory of the renderer's device, with room for the output.
+static bool hold_exported(const struct vkb_renderer *renderer, const struct vkb_plan *plan,
+                          uint32_t index, PyObject *array, struct vkb_output *output)
+{
+    const uint32_t layers = plan->graph.layers;
+    const struct vkb_exports *exports;
+
+    output->exported = vkb_export_of(array, &exports);
+    output->layer_stride = layers ? vkb_layer_stride(plan, index) : 0;
+    const uint64_t size =
+        vkb_output_size(plan, index) + (layers ? (uint64_t)(layers - 1) * output->layer_stride : 0);
+    if (exports != renderer->exports)
+        return vkb_refuse("arrays: the memory is another renderer's");
+    return output->exported->size >= size
+        || vkb_refuse("arrays: memory of %llu bytes is needed, not of %llu",
+                      (unsigned long long)size, (unsigned long long)output->exported->size);
+}
+
+// The type of the numbers of an output.
+static char number_type(const struct vkb_plan *plan, uint32_t index)
+{
+    switch (vkb_formats[plan->graph.images[plan->outputs[index]].format].channel_size) {
+    case 1:
+        return VKB_UINT8;
+    case 2:
+        return VKB_FLOAT16;
+    default:
+        return VKB_FLOAT32;
+    }
+}
+
+// An array has the output's type and size. None: the output stays in its image.
 static bool hold_array(const struct vkb_renderer *renderer, struct vkb_pending *pending,
                        const struct vkb_plan *plan, uint32_t index, PyObject *array)
 {
-    const struct vkb_exports *exports;
     Py_buffer *view = &pending->views[pending->view_count];
     struct vkb_output *output = &pending->outputs[pending->view_count];
+
+    // Releasing a view that is not held is safe.
+    ++pending->view_count;
 
     output->row_count = plan->graph.images[plan->outputs[index]].height;
     output->channels = vkb_graph_channels(&plan->graph, plan->outputs[index]);
     if (vkb_is_exported(array)) {
         view->obj = Py_NewRef(array);
-        output->exported = vkb_export_of(array, &exports);
-        output->layer_stride = plan->graph.layers ? vkb_layer_stride(plan, index) : 0;
-    } else if (array != Py_None) {
-        if (PyObject_GetBuffer(array, view, PyBUF_WRITABLE | PyBUF_C_CONTIGUOUS) < 0)
+        return hold_exported(renderer, plan, index, array, output);
+    }
+    if (array != Py_None) {
+        if (!vkb_hold_bytes(array, "arrays", number_type(plan, index), PyBUF_WRITABLE,
+                            vkb_output_size(plan, index), view))
             return false;
         output->memory = view->buf;
         // Only large arrays are looked up: the search takes time in proportion to the kept arrays.
         output->pages = view->len >= VKB_IMPORTED_BYTES ? find_pages(renderer, view->buf) : NULL;
     }
-    ++pending->view_count;
     return true;
 }
 
@@ -108,6 +142,43 @@ static bool hold_arrays(const struct vkb_renderer *renderer, struct vkb_pending 
             if (!hold_array(renderer, pending, plan, output, PyTuple_GetItem(tuple, output)))
                 return false;
         ++pending->count;
+    }
+    return true;
+}
+
+static bool check_plan(const struct vkb_renderer *renderer, const struct vkb_source_object *source,
+                       const struct vkb_plan_object *first, const struct vkb_plan_object *one)
+{
+    if (one->renderer != renderer->number)
+        return vkb_refuse("plan: it is not of this renderer");
+    if (!vkb_source_matches(&one->source, &source->source))
+        return vkb_refuse("plan: it is of another source");
+    return vkb_graph_same_images(&first->plan.graph, &one->plan.graph)
+        || vkb_refuse("plans: they have other images, so that they cannot be run together");
+}
+
+// Whether the plans are of this renderer and source, and have an array for each output.
+static bool check_run(const struct vkb_renderer *renderer, const struct vkb_source_object *source,
+                      PyObject *plans, PyObject *arrays, bool shows)
+{
+    const Py_ssize_t count = PyTuple_Size(plans);
+
+    if (count == 0 || PyTuple_Size(arrays) != count || (shows && count > 1))
+        return vkb_refuse("plans: %zd with the arrays of %zd are out of range", count,
+                          PyTuple_Size(arrays));
+    for (Py_ssize_t i = 0; i < count; ++i)
+        if (!vkb_require_type(PyTuple_GetItem(plans, i), state_of((PyObject *)renderer)->plan_type,
+                              "plans")
+            || !vkb_require_tuple(PyTuple_GetItem(arrays, i), "arrays"))
+            return false;
+    for (Py_ssize_t i = 0; i < count; ++i) {
+        const struct vkb_plan_object *one = plan_at(plans, i);
+        const Py_ssize_t given = PyTuple_Size(PyTuple_GetItem(arrays, i));
+        if (!check_plan(renderer, source, plan_at(plans, 0), one))
+            return false;
+        if (given != one->plan.output_count || (shows && given != 1))
+            return vkb_refuse("arrays: %zd are given for %u framebuffers", given,
+                              one->plan.output_count);
     }
     return true;
 }
@@ -175,7 +246,7 @@ PyObject *vkb_renderer_run(PyObject *object, PyObject *arguments)
     show.screen = (struct vkb_screen *)(uintptr_t)screen;
     show.linear = linear;
     struct vkb_source_object *given = (struct vkb_source_object *)source;
-    if (!vkb_check_source(renderer, given))
+    if (!vkb_check_source(renderer, given) || !check_run(renderer, given, plans, arrays, shows))
         return NULL;
     struct submission *self = new_submission(renderer, source, plans, arrays);
     if (!self)

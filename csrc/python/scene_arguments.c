@@ -21,37 +21,68 @@ struct picture_block {
     uint32_t address_modes[2], filters[3];  // filters: of magnification, minification, mip levels
 };
 
-// Holds the next array, which must have that size.
-static bool hold_next(struct vkb_held_scene *scene, PyObject *arrays, size_t size,
+// Holds the next array, which must have that size and such numbers.
+static bool hold_next(struct vkb_held_scene *scene, PyObject *arrays, size_t size, char type,
                       const void **memory)
 {
     const Py_ssize_t next = (Py_ssize_t)scene->view_count;
     Py_buffer *view = &scene->views[next];
 
-    if (PyObject_GetBuffer(PyTuple_GetItem(arrays, next), view, PyBUF_C_CONTIGUOUS) < 0)
-        return false;
+    if (next >= PyTuple_Size(arrays))
+        return vkb_refuse("scene: the %zd arrays are fewer than its blocks count", next);
+    // Releasing a view that is not held is safe.
     ++scene->view_count;
+    if (!vkb_hold_bytes(PyTuple_GetItem(arrays, next), "scene", type, 0, size, view))
+        return false;
     *memory = view->buf;
-    if ((size_t)view->len == size)
-        return true;
-    PyErr_Format(PyExc_ValueError, "scene: an array of %zu bytes is needed, not of %zd", size,
-                 view->len);
-    return false;
+    return true;
+}
+
+// The device reads vertices without a check.
+static bool check_indices(const struct vkb_mesh_data *mesh)
+{
+    uint32_t last = 0;
+
+    for (uint32_t i = 0; i < mesh->index_count; ++i)
+        last = mesh->indices[i] > last ? mesh->indices[i] : last;
+    return last < mesh->vertex_count
+        || vkb_refuse("scene: the index %u is beyond the mesh's %u vertices", last,
+                      mesh->vertex_count);
+}
+
+static bool check_surfaces(const struct vkb_mesh_data *mesh, uint32_t texture_count)
+{
+    uint64_t count = 0;
+
+    for (uint32_t i = 0; i < mesh->surface_count; ++i) {
+        const struct vkb_surface *surface = &mesh->surfaces[i];
+        if (surface->base >= texture_count || surface->emission >= texture_count)
+            return vkb_refuse("scene: the textures %u and %u are not among its %u", surface->base,
+                              surface->emission, texture_count);
+        count += surface->index_count;
+    }
+    return count <= mesh->index_count
+        || vkb_refuse("scene: surfaces of %llu indices are more than the mesh's %u",
+                      (unsigned long long)count, mesh->index_count);
 }
 
 static bool read_mesh(struct vkb_held_scene *scene, PyObject *arrays, const uint32_t counts[3],
                       struct vkb_mesh_data *mesh)
 {
-    const void *vertices, *indices, *texcoords = NULL, *surfaces = NULL;
+    const void *vertices = NULL, *indices = NULL, *texcoords = NULL, *surfaces = NULL;
     const size_t vertex_count = counts[0];
 
     if (vertex_count == 0)
         return true;
-    if (!hold_next(scene, arrays, vertex_count * sizeof(struct vkb_vertex), &vertices)
-        || !hold_next(scene, arrays, counts[1] * sizeof *mesh->indices, &indices)
+    if (counts[1] == 0 || counts[1] % 3)
+        return vkb_refuse("scene: %u indices are not a positive multiple of 3", counts[1]);
+    if (!hold_next(scene, arrays, vertex_count * sizeof(struct vkb_vertex), VKB_FLOAT32, &vertices)
+        || !hold_next(scene, arrays, counts[1] * sizeof *mesh->indices, VKB_UINT32, &indices)
         || (counts[2]
-            && (!hold_next(scene, arrays, vertex_count * VKB_TEXCOORDS * sizeof(float), &texcoords)
-                || !hold_next(scene, arrays, counts[2] * sizeof *mesh->surfaces, &surfaces))))
+            && (!hold_next(scene, arrays, vertex_count * VKB_TEXCOORDS * sizeof(float), VKB_FLOAT32,
+                           &texcoords)
+                || !hold_next(scene, arrays, counts[2] * sizeof *mesh->surfaces, VKB_UINT32,
+                              &surfaces))))
         return false;
     *mesh = (struct vkb_mesh_data){
         .vertices = vertices,
@@ -62,7 +93,24 @@ static bool read_mesh(struct vkb_held_scene *scene, PyObject *arrays, const uint
         .index_count = counts[1],
         .surface_count = counts[2],
     };
-    return true;
+    return check_indices(mesh) && check_surfaces(mesh, scene->data.texture_count);
+}
+
+static bool check_picture(const struct picture_block *block)
+{
+    const uint32_t format = block->format, width = block->width, height = block->height;
+
+    if (format != VKB_FORMAT_RGBA8_UNORM && format != VKB_FORMAT_RGBA16_FLOAT
+        && format != VKB_FORMAT_RGBA32_FLOAT)
+        return vkb_refuse("scene: the format %u is not one of pictures", format);
+    if (width == 0 || height == 0 || width > VKB_MAX_SIDE || height > VKB_MAX_SIDE)
+        return vkb_refuse("scene: a picture of %u x %u is out of range, sides of 1 to %d", width,
+                          height, VKB_MAX_SIDE);
+    // A level after that of 1 x 1 is none.
+    return (block->level_count <= VKB_MAX_MIP_LEVELS
+            && (width | height) >> (block->level_count - 1) > 0)
+        || vkb_refuse("scene: a picture of %u x %u has no %u levels", width, height,
+                      block->level_count);
 }
 
 // The mip levels, with the layers of a cube one after the other.
@@ -70,6 +118,16 @@ static bool read_picture(struct vkb_held_scene *scene, PyObject *arrays,
                          const struct picture_block *block, uint32_t layers,
                          struct vkb_picture_data *picture)
 {
+    static const char types[] = {[VKB_FORMAT_RGBA8_UNORM] = VKB_UINT8,
+                                 [VKB_FORMAT_RGBA16_FLOAT] = VKB_FLOAT16,
+                                 [VKB_FORMAT_RGBA32_FLOAT] = VKB_FLOAT32};
+
+    if (block->level_count == 0)
+        return true;
+    if (!check_picture(block))
+        return false;
+    if (layers == 6 && block->width != block->height)
+        return vkb_refuse("scene: a sky of %u x %u is not square", block->width, block->height);
     picture->layers = layers;
     picture->format = (enum vkb_format)block->format;
     picture->width = block->width;
@@ -79,7 +137,7 @@ static bool read_picture(struct vkb_held_scene *scene, PyObject *arrays,
         const size_t width = block->width >> i ? block->width >> i : 1;
         const size_t height = block->height >> i ? block->height >> i : 1;
         if (!hold_next(scene, arrays, layers * width * height * vkb_pixel_size(picture->format),
-                       &picture->levels[i]))
+                       types[picture->format], &picture->levels[i]))
             return false;
     }
     return true;
@@ -90,6 +148,14 @@ static bool read_texture(struct vkb_held_scene *scene, PyObject *arrays,
 {
     const uint32_t *modes = block->address_modes, *filters = block->filters;
 
+    for (int axis = 0; axis < 2; ++axis)
+        if (modes[axis] > VK_SAMPLER_ADDRESS_MODE_CLAMP_TO_EDGE)
+            return vkb_refuse("scene: the address mode %u is not 0 to 2", modes[axis]);
+    for (int which = 0; which < 3; ++which)
+        if (filters[which] > VK_FILTER_LINEAR)
+            return vkb_refuse("scene: the filter %u is not 0 or 1", filters[which]);
+    if (block->level_count == 0)
+        return vkb_refuse("scene: a texture has no levels");
     *texture = (struct vkb_texture_data){
         .address_modes = {(VkSamplerAddressMode)modes[0], (VkSamplerAddressMode)modes[1]},
         .mag_filter = (VkFilter)filters[0],
@@ -113,6 +179,26 @@ static bool allocate(const struct scene_block *block, PyObject *arrays,
     return scene->views && scene->data.textures;
 }
 
+// `pictures` has a block for the sky and one for each texture.
+static bool check_block(const struct scene_block *block, PyObject *pictures)
+{
+    const size_t size = (1 + (size_t)block->texture_count) * sizeof(struct picture_block);
+
+    if ((size_t)PyBytes_Size(pictures) != size)
+        return vkb_refuse("scene: blocks of pictures of %zu bytes are needed, not of %zd", size,
+                          PyBytes_Size(pictures));
+    if (!memchr(block->shading, 0, sizeof block->shading))
+        return vkb_refuse("scene: the name of the shading is too long");
+    return block->serial > 0 || vkb_refuse("scene: the serial 0 is out of range, at least 1");
+}
+
+// Without anything to draw there is nothing to upload either.
+static bool check_content(const struct vkb_scene_data *data)
+{
+    return data->body.index_count || data->glow.index_count || data->sky.level_count
+        || vkb_refuse("scene: there is nothing in it; give it a mesh or a sky");
+}
+
 bool vkb_read_scene(PyObject *bytes, PyObject *pictures, PyObject *arrays,
                     struct vkb_held_scene *scene, struct vkb_source *source)
 {
@@ -125,7 +211,7 @@ bool vkb_read_scene(PyObject *bytes, PyObject *pictures, PyObject *arrays,
         return false;
     }
     memcpy(&block, PyBytes_AsString(bytes), sizeof block);
-    if (!allocate(&block, arrays, scene))
+    if (!check_block(&block, pictures) || !allocate(&block, arrays, scene))
         return false;
     const char *next = PyBytes_AsString(pictures);
     data->serial = block.serial;
@@ -138,6 +224,7 @@ bool vkb_read_scene(PyObject *bytes, PyObject *pictures, PyObject *arrays,
         memcpy(&picture, next += sizeof picture, sizeof picture);
         done = read_texture(scene, arrays, &picture, &data->textures[i]);
     }
+    done = done && check_content(data);
     *source = (struct vkb_source){
         .kind = VKB_SOURCE_SCENE,
         .scene =

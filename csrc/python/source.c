@@ -5,10 +5,13 @@
 static bool read_levels(PyObject *levels, struct vkb_source_object *self)
 {
     struct vkb_image_source *image = &self->source.image;
+    const Py_ssize_t count = PyTuple_Size(levels);
 
-    for (Py_ssize_t i = 0; i < PyTuple_Size(levels); ++i) {
+    if (count > GATHERED_LEVELS)
+        return vkb_refuse("levels: %zd images are out of range, 0 to %d", count, GATHERED_LEVELS);
+    for (Py_ssize_t i = 0; i < count; ++i) {
         struct vkb_held_image *held = &self->images[VKB_INPUT_LEVEL + i];
-        if (!vkb_read_image(PyTuple_GetItem(levels, i), held))
+        if (!vkb_read_image(PyTuple_GetItem(levels, i), "levels", held))
             return false;
         image->levels[image->level_count++] = (struct vkb_level){
             .format = held->input.format,
@@ -16,6 +19,38 @@ static bool read_levels(PyObject *levels, struct vkb_source_object *self)
         };
     }
     return true;
+}
+
+// Whether a part has the size of the image and, unless it is a mask, its format and channels.
+static bool check_part(const struct vkb_held_image *part, const char *name,
+                       const struct vkb_held_image *image)
+{
+    const struct vkb_input *one = &part->input, *other = &image->input;
+    const bool mask = one->format == VKB_FORMAT_R32_FLOAT;
+
+    return (one->width == other->width && one->height == other->height
+            && one->layers == other->layers
+            && (mask || (one->format == other->format && one->channels == other->channels)))
+        || vkb_refuse("%s: %u x %u with %u channels of %s is not the image's, %u x %u with %u of "
+                      "%s",
+                      name, one->width, one->height, one->channels, vkb_formats[one->format].dtype,
+                      other->width, other->height, other->channels,
+                      vkb_formats[other->format].dtype);
+}
+
+// `emission` and `mask` may be None.
+static bool read_parts(PyObject *image, PyObject *emission, PyObject *mask,
+                       struct vkb_held_image *images)
+{
+    struct vkb_held_image *first = &images[VKB_INPUT_IMAGE];
+
+    return vkb_read_image(image, "image", first)
+        && (emission == Py_None
+            || (vkb_read_image(emission, "emission", &images[VKB_INPUT_EMISSION])
+                && check_part(&images[VKB_INPUT_EMISSION], "emission", first)))
+        && (mask == Py_None
+            || (vkb_read_mask(mask, "mask", &images[VKB_INPUT_MASK])
+                && check_part(&images[VKB_INPUT_MASK], "mask", first)));
 }
 
 PyObject *vkb_image_source(PyObject *module, PyObject *arguments)
@@ -28,9 +63,7 @@ PyObject *vkb_image_source(PyObject *module, PyObject *arguments)
     struct vkb_source_object *self = vkb_new_object(vkb_module_state(module)->source_type);
     if (!self)
         return NULL;
-    if (!vkb_read_image(image, &self->images[VKB_INPUT_IMAGE])
-        || (emission != Py_None && !vkb_read_image(emission, &self->images[VKB_INPUT_EMISSION]))
-        || (mask != Py_None && !vkb_read_image(mask, &self->images[VKB_INPUT_MASK]))) {
+    if (!read_parts(image, emission, mask, self->images)) {
         Py_DECREF(self);
         return NULL;
     }
@@ -146,6 +179,16 @@ static bool stage(struct vkb_renderer *renderer, struct vkb_resident *resident,
     return silent;
 }
 
+// Whether the source is an image of the host, and the spare one a source or None.
+static bool check_upload(const struct vkb_module_state *state,
+                         const struct vkb_source_object *source, PyObject *spare)
+{
+    if (spare != Py_None && !vkb_require_type(spare, state->source_type, "upload"))
+        return false;
+    return (source->source.kind == VKB_SOURCE_IMAGE && !source->residents && !is_exported(source))
+        || vkb_refuse("upload: the source is not an image of the host");
+}
+
 PyObject *vkb_renderer_upload(PyObject *object, PyObject *arguments)
 {
     struct vkb_renderer *renderer = (struct vkb_renderer *)object;
@@ -157,6 +200,8 @@ PyObject *vkb_renderer_upload(PyObject *object, PyObject *arguments)
     if (!PyArg_ParseTuple(arguments, "O!Op:upload", state->source_type, &given, &spare, &recycled))
         return NULL;
     const struct vkb_source_object *source = (struct vkb_source_object *)given;
+    if (!check_upload(state, source, spare))
+        return NULL;
     struct vkb_source_object *self = vkb_new_object(state->source_type);
     if (!self)
         return NULL;

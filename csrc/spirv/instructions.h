@@ -7,6 +7,7 @@
 #include <stdint.h>
 
 enum {
+    SPV_MAGIC = 0x07230203,  // the first word of the header
     SPV_HEADER_WORDS = 5,
     SPV_BOUND = 3,    // the word of the header that all ids are below
     SPV_SPEC_ID = 1,  // a decoration

@@ -14,8 +14,17 @@ bool vkb_read_module(const struct vkb_shader *shader, struct vkb_module *module,
     if (!module->at)
         return false;
     for (const uint32_t *at = module->first; at < module->end; at = vkb_next(at)) {
-        if (vkb_result(at))
-            module->at[vkb_result(at)] = at;
+        const uint32_t id = vkb_result(at);
+        if (id >= module->bound) {
+            vkb_free(module->at);
+            module->at = NULL;
+            return vkb_fail(error, VKB_ERROR_SHADER,
+                            "%s: the SPIR-V has an id that is not below "
+                            "its bound",
+                            shader->name);
+        }
+        if (id)
+            module->at[id] = at;
         if (vkb_opcode(at) == SPV_FUNCTION && !module->functions)
             module->functions = at;
     }

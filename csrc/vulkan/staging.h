@@ -4,7 +4,7 @@
 
 #include "vulkan/memory.h"
 
-enum { VKB_MAX_MIP_LEVELS = 16 };
+enum { VKB_MAX_MIP_LEVELS = 16 };  // of the longest side
 
 // The mip levels of a picture, or of the six faces of a cube, tightly packed. The caller keeps the
 // memory alive. No levels: there is no picture.

@@ -50,7 +50,7 @@ vec4 fetch(Line line, int at)
 void main()
 {
     Line line = line_of(int(gl_GlobalInvocationID.x), textureSize(source, 0));
-    vec4 mixed[4];
+    vec4 mixed[STAR_ITERATIONS - 1];
 
     for (int at = 0; at < line.count; ++at) {
         int slot = at % params.distance;

@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 import gc
+import itertools
+import re
+import struct
 from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
 
-from tests.planned import changed, scene_plan, scene_source
+from tests.planned import SCENES, changed, scene_plan, scene_source
 from tests.refusals import assert_refused, rows
 from vkbloom import Renderer, Scene, Separable, _core
+from vkbloom._custom.rows import CoreShader, Row
 from vkbloom._renderer.adapter import bundled_driver
 from vkbloom._scene.blocks import scene_arguments
-from vkbloom._settings.blocks import settings_block
+from vkbloom._settings.blocks import _CODES, settings_block
 
-METHODS = ("bevy", "kino", "filament", "urp", "hdrp", "three")
+_LEAST = {"weights": (1.0,), "layers": ((1.0, 1.0),)}
 
 
 class Given:
@@ -29,7 +33,7 @@ class Given:
 
 def settings_with(**fields: Any) -> Given:
     given = Given()
-    vars(given).update({"weights": (1.0,), "layers": ((1.0, 1.0),), **fields})
+    vars(given).update(_LEAST | fields)
     return given
 
 
@@ -46,6 +50,76 @@ class Block(NamedTuple):
 
     def _core_block(self) -> object:
         return self.block
+
+
+class Kernel(NamedTuple):
+    """Settings of a convolution that give the core this kernel, and its size."""
+
+    kernel: Any
+    size: Any = (1, 1)
+
+    def _core_block(self) -> bytes:
+        return settings_block("convolution", {})
+
+    def core_kernel_size(self, frame: object, buffers: object) -> Any:
+        return self.size
+
+    def core_kernel(self, frame: object, buffers: object) -> Any:
+        return self.kernel
+
+
+class Dirty(NamedTuple):
+    """Settings whose only stage of glare is this."""
+
+    glare: Any
+
+    def _core_block(self) -> bytes:
+        return settings_block("separable", {**_LEAST, "glare": (stage_with(stage="dirt"),)})
+
+
+class Passes(NamedTuple):
+    """Settings of a method that is given to the core as these passes."""
+
+    passes: Any
+
+    def _core_block(self) -> bytes:
+        return settings_block("custom", {})
+
+    def core_passes(self, frame: object, buffers: object) -> Any:
+        return self.passes
+
+
+def kernel(array: Any, serial: int = 1) -> Any:
+    return Kernel((array, serial, False, (0.0, 0.0, 0.0)))
+
+
+#: SPIR-V of no instruction but one of a word.
+SPIRV = np.array([0x07230203, 0x10300, 0, 1, 0, 1 << 16], np.uint32).tobytes()
+
+
+def one_pass(code: bytes = SPIRV, resources: Any = (), digest: bytes = bytes(16), **at: int) -> Any:
+    """Return a method of one pass, whose block has other numbers at some places."""
+    block, *rest, _ = Row("bloom", CoreShader("one", code, digest), (4, 4), ("MAIN",)).packed()
+    return Passes(((changed(block, **at), *rest, resources),))
+
+
+def resource(data: Any = None, **at: int) -> Any:
+    """Return a texture of 4 bytes, whose block has other numbers at some places."""
+    return changed(struct.pack("=2Q8I", 1, 4, 0, 37, 2, 1, 1, 1, 0, 0), **at), data
+
+
+def edited(name: str, *numbers: float, table: Any = None, start: int = 0) -> Block:
+    """Return settings whose block has other numbers at a member's place."""
+    offset, code, _ = (_core.SETTINGS_BLOCK if table is None else table)[name]
+    block = bytearray(settings_block("separable", {**_LEAST, "glare": (stage_with(),)}))
+    struct.pack_into(f"={len(numbers)}{_CODES[code]}", block, start + offset, *numbers)
+    return Block(bytes(block))
+
+
+def edited_stage(name: str, *numbers: float) -> Block:
+    """Return settings whose first stage of glare has other numbers at a member's place."""
+    start = _core.SETTINGS_BLOCK["stages"][0]
+    return edited(name, *numbers, table=_core.STAGE_BLOCK, start=start)
 
 
 class Raising(Given):
@@ -71,6 +145,31 @@ def arrays_for(*plans: _core.Plan) -> tuple[tuple[np.ndarray[Any, Any], ...], ..
     )
 
 
+def triangle(
+    at: Any = None, pictures: Any = None, sky: Any = None, textures: int = 0, **parts: Any
+) -> _core.Source:
+    """Return a scene of a triangle; its block has other numbers at some places, other arrays.
+
+    - `pictures`: Nine numbers of the sky and of each texture.
+    - `sky`: The arrays of levels, those of textures after them.
+    - `parts`: By name, None: none.
+    """
+    arrays = {
+        "vertices": np.zeros((3, 3, 4), np.float32),
+        "indices": np.arange(3, dtype=np.uint32),
+        "texcoords": None,
+        "surfaces": None,
+        **parts,
+    }
+    block, _, _ = scene_arguments(SCENES[False], (8, 8), "forward", 0.0)
+    # No glow mesh, whose counts are after those of the body, at 34 to 36.
+    none = {"at37": 0, "at38": 0, "at39": 0, "at41": textures}
+    block = changed(block, **(none | (at or {})))
+    given = [array for array in arrays.values() if array is not None] + list(sky or ())
+    numbers = np.array(pictures or [0] * 9, np.uint32)
+    return _core.scene_source(block, numbers.tobytes(), tuple(given))
+
+
 @pytest.fixture(scope="module")
 def names(renderer: Renderer, scene: Scene) -> dict[str, Any]:
     """The names that the table uses."""
@@ -92,6 +191,11 @@ def names(renderer: Renderer, scene: Scene) -> dict[str, Any]:
         "plan": lambda **fields: scene_plan(settings_with(**fields), (16, 16)),
         "ghosts": lambda given: stage_with(stage="ghosts", ghosts=given),
         "u8": lambda *shape: np.zeros(shape, np.uint8),
+        "f4": lambda *shape: np.zeros(shape, np.float32),
+        "planned": lambda *settings: planned(renderer, *settings)[1],
+        "any_plan": _core.plan(source, Separable(), None),
+        "uploaded": renderer._core.upload(source, None, False),
+        "triangle": triangle,
         "core": renderer._core,
         "source": source,
         "plans": plans,
@@ -106,6 +210,35 @@ def names(renderer: Renderer, scene: Scene) -> dict[str, Any]:
 @pytest.mark.parametrize(("call", "error"), rows(__file__, "arguments of the core"))
 def test_a_wrong_value_is_refused(names: dict[str, Any], call: str, error: str) -> None:
     assert_refused(call, error, names)
+
+
+@pytest.mark.parametrize("name", sorted(_core.VALUES))
+def test_every_number_of_a_block_is_checked(name: str) -> None:
+    default, low, high = _core.VALUES[name]
+    wrong = [low - 1, 2 * high + 1]
+    if _core.SETTINGS_BLOCK[name][1] != "i4":
+        wrong += [np.nan, np.inf, -np.inf]
+    for number in wrong:
+        value = number if isinstance(number, float) else int(number)
+        with pytest.raises(ValueError, match=f"{name}: .* is out of range"):
+            scene_plan(edited(name, value), (16, 16))
+    for number in (default, low, high):
+        scene_plan(edited(name, number), (16, 16))
+
+
+@pytest.mark.parametrize("name", sorted(_core.GLARE_VALUES))
+def test_every_number_of_a_stage_is_checked(name: str) -> None:
+    _, low, high = _core.GLARE_VALUES[name]
+    for number in (low - 1, 2 * high + 1):
+        with pytest.raises(ValueError, match=f"{name}: .* is out of range"):
+            scene_plan(edited_stage(name, number), (16, 16))
+
+
+@pytest.mark.parametrize("name", sorted(_core.CHOICES))
+def test_every_choice_is_checked(name: str) -> None:
+    for number in (-1, len(_core.CHOICES[name])):
+        with pytest.raises(ValueError, match=f"{name}: .* is out of range"):
+            scene_plan(edited(name, number), (16, 16))
 
 
 @pytest.mark.parametrize("name", sorted(_core.VALUES))
@@ -127,18 +260,36 @@ def test_every_number_of_glare_has_a_range(name: str) -> None:
         scene_plan(settings_with(glare=(stage_with(**{name: end}),)), (16, 16))
 
 
-@pytest.mark.parametrize("method", ["pyramid", "dual_kawase", *METHODS])
+class Ends(Given):
+    """Settings of any method, with a kernel for those that need one."""
+
+    def core_kernel_size(self, frame: object, buffers: object) -> tuple[int, int]:
+        return 5, 5
+
+    def core_kernel(self, frame: object, buffers: object) -> Any:
+        return np.ones((5, 5, 4), np.float32), 1, False, (0.0, 0.0, 0.0)
+
+
+#: Some fields at an end, and one value of one choice.
+CHOSEN = [{}, *({name: one} for name, names in _core.CHOICES.items() for one in names)]
+
+
+@pytest.mark.parametrize("method", [name for name in _core.METHODS if name != "custom"])
 @pytest.mark.parametrize("side", [1, 16, 32768])
 def test_the_ends_of_all_ranges_together(method: str, side: int) -> None:
     """Every number at its least or its most: no index or size follows that is out of bounds."""
-    for end in (1, 2):
+    refused = "out of this adapter's range|iterations: .* is out of range, 2 to 5"
+    for end, chosen in itertools.product((1, 2), CHOSEN):
+        settings = Ends()
         fields = {name: row[end] for name, row in _core.VALUES.items()}
-        settings = settings_with(method=method, **{**fields, "bloom": 1})
-        for size in ((side, side), (side, 1), (1, side)):
+        lists = {"weights": (1.0,) * 65, "layers": ((1.0, 1.0),) * 8, "level_weights": (1.0,) * 7}
+        vars(settings).update({"method": method, **lists, **fields, "bloom": 1, **chosen})
+        # All sizes only where no choice is made, since it takes no part in sizes.
+        for size in ((side, side),) if chosen else ((side, side), (side, 1), (1, side)):
             try:
                 scene_plan(settings, size, shading="deferred")
             except ValueError as error:
-                assert "out of this adapter's range" in str(error)  # noqa: PT017
+                assert re.search(refused, str(error))  # noqa: PT017
 
 
 def test_plans_of_an_image(renderer: Renderer, scene: Scene) -> None:

@@ -20,7 +20,7 @@ import pytest
 import vkbloom
 from tests.device.device_work import ADAPTER, VALIDATION, OnDevice, main, raises, same
 from tests.images import picture
-from vkbloom import Renderer, Separable
+from vkbloom import Renderer, Separable, _core
 
 SETTINGS = Separable()
 cuda: Any = ctypes.CDLL("libcuda.so.1")
@@ -130,6 +130,57 @@ def captures(renderer: Any) -> None:
         same(renderer.apply(OnDevice(image), SETTINGS), wanted)
 
 
+def bounds(renderer: Any) -> None:
+    """Parts of memory on the device that are outside of it."""
+    core, host = renderer._core, np.zeros(16, np.uint8)
+    memory = core.export(100)
+    start, size = memory.address, 65536  # what it is rounded up to
+    source = image_at(memory, 0)
+    plan = core.plan(source, SETTINGS, ("final",))
+    core.run(source, (plan,), ((core.export(64),),)).wait()
+    with Renderer(ADAPTER, validation=VALIDATION) as other:
+        foreign = other._core.export(64)
+        part = "arrays: the memory is another renderer's"
+        raises(ValueError, part, lambda: core.run(source, (plan,), ((foreign,),)))
+    large = core.export(2 * size)
+    wide = image_at(large, 0, (128, 129, 4), (516, 4, 1))
+    of_wide = core.plan(wide, SETTINGS, ("final",))
+    batch = memory, 0, (4, 4, 4), (16, 4, 1), 1, 2, size
+    for part, call in (
+        ("a side of 0 is", lambda: memory.capsule((0, 4), 1, 8, True, 0, 0)),
+        ("a side of -1 is", lambda: memory.capsule((-1,), 1, 8, True, 0, 0)),
+        ("is out of range", lambda: memory.capsule((2**40, 2**40), 1, 8, True, 0, 0)),
+        ("5 dimensions", lambda: memory.capsule((1,) * 5, 1, 8, True, 0, 0)),
+        ("numbers of 0 bits", lambda: memory.capsule((1,), 1, 0, True, 0, 0)),
+        ("outside of the memory", lambda: memory.capsule((size + 1,), 1, 8, True, 0, 0)),
+        ("outside of the memory", lambda: memory.capsule((1,), 1, 8, True, size, 0)),
+        ("outside of the memory", lambda: memory.capsule((1,), 1, 8, True, -1, 0)),
+        ("outside of the memory", lambda: memory.clone(size, 1)),
+        ("outside of the memory", lambda: memory.clone(1, -1)),
+        ("at least 1", lambda: memory.clone(0, 0)),
+        ("outside of the memory", lambda: memory.copy_bytes(host.ctypes.data, start, size + 1)),
+        ("outside of the memory", lambda: memory.copy_bytes(start + size - 1, 0, 2)),
+        ("outside of the memory", lambda: memory.copy_bytes(host.ctypes.data, start, -1)),
+        ("outside of its memory", lambda: image_at(memory, size - 63)),
+        ("outside of its memory", lambda: image_at(memory, -1)),
+        ("outside of its memory", lambda: image_at(memory, 0, (2**32 - 1, 4, 4))),
+        ("outside of its memory", lambda: image_at(memory, 0, strides=(-16, 4, 1))),
+        ("outside of its memory", lambda: image_at(memory, 0, strides=(2**62, 4, 1))),
+        ("outside of its memory", lambda: _core.image_source(batch)),
+        ("sides of at least 1", lambda: image_at(memory, 0, (0, 4, 4))),
+        ("is not 3 or 4", lambda: image_at(memory, 0, (4, 4, 2))),
+        ("elements of 8 bytes", lambda: image_at(memory, 0, size=8)),
+        ("arrays: memory of", lambda: core.run(wide, (of_wide,), ((memory,),))),
+    ):
+        raises(ValueError, part, call)
+
+
+def image_at(
+    memory: Any, offset: int, shape: Any = (4, 4, 4), strides: Any = (16, 4, 1), size: int = 1
+) -> Any:
+    return _core.image_source((memory, offset, shape, strides, size))
+
+
 def callbacks(renderer: Any) -> None:
     """A callback of a stream that needs the GIL does not stop what waits for the stream."""
     image = np.zeros(1 << 16, np.uint8)
@@ -167,4 +218,4 @@ def callbacks(renderer: Any) -> None:
 
 
 if __name__ == "__main__":
-    main((closing, failing, captures, callbacks))
+    main((closing, failing, captures, callbacks, bounds))

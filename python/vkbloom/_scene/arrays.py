@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from typing import Any, ClassVar, Final
 
+import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom._checks import plain_array
@@ -12,6 +14,80 @@ from vkbloom._checks import plain_array
 #: The longest side, far above the 4096 that every Vulkan device supports. It rejects the sizes of
 #: damaged images. The device's own limit is checked at upload.
 MAX_SIDE: Final = 16384
+
+
+def check_rows(name: str, array: object, columns: int, count: int | None = None) -> NDArray[Any]:
+    """Return a mesh's numbers, if they are rows of so many finite floats, and of that count."""
+    if not isinstance(array, np.ndarray):
+        raise TypeError(f"{name}: {type(array).__name__} is not an array")
+    if array.dtype.kind not in "fiu":
+        raise TypeError(f"{name}: {array.dtype} is not float32")
+    rows = "N" if count is None else str(count)
+    if array.ndim != 2 or array.shape[1] != columns or count not in (None, len(array)):
+        raise ValueError(f"{name}: shape {array.shape} is not ({rows}, {columns})")
+    if not len(array):
+        raise ValueError(f"{name}: there are none; a mesh has at least a triangle")
+    if not np.isfinite(array).all():
+        raise ValueError(f"{name}: some numbers are not finite")
+    return array
+
+
+def check_indices(array: object, vertex_count: int) -> NDArray[Any]:
+    """Return the indices of a mesh's triangles, if they are of its vertices."""
+    if not isinstance(array, np.ndarray):
+        raise TypeError(f"indices: {type(array).__name__} is not an array")
+    if array.dtype.kind not in "iu":
+        raise TypeError(f"indices: {array.dtype} is not uint32")
+    if array.ndim != 1 or not array.size or array.size % 3:
+        raise ValueError(
+            f"indices: shape {array.shape} is not (M,) with M a positive multiple of 3"
+        )
+    if array.min() < 0:
+        raise ValueError(f"indices: {array.min()} is below 0")
+    # The device reads vertices without a check.
+    if array.max() >= vertex_count:
+        raise ValueError(f"indices: {array.max()} is beyond the mesh's {vertex_count} vertices")
+    return array
+
+
+def check_levels(
+    levels: object, dtypes: Sequence[np.dtype[Any]], *, cube: bool = False
+) -> tuple[NDArray[Any], ...]:
+    """Return the mip levels of a picture ``(h, w, 4)``, or of a cube ``(6, n, n, 4)``, read-only.
+
+    - `dtypes`: One of these is that of all levels.
+    """
+    if isinstance(levels, np.ndarray) or not isinstance(levels, Sequence):
+        raise TypeError(f"levels: {type(levels).__name__} is not a tuple of arrays")
+    if not levels:
+        raise ValueError("levels: there are none")
+    checked: list[NDArray[Any]] = []
+    for level in levels:
+        if not isinstance(level, np.ndarray):
+            raise TypeError(f"levels: {type(level).__name__} is not an array")
+        dtype = checked[0].dtype if checked else level.dtype
+        if level.dtype not in dtypes or level.dtype != dtype:
+            raise TypeError(f"levels: {level.dtype} is not {' or '.join(map(str, dtypes))}")
+        _check_level(level, checked, cube=cube)
+        checked.append(level)
+    return tuple(map(read_only, checked))
+
+
+def _check_level(level: NDArray[Any], before: Sequence[NDArray[Any]], *, cube: bool) -> None:
+    *faces, height, width, channels = level.shape if level.ndim > 2 else (0, 0, 0)
+    if faces != [6] * cube or channels != 4 or (cube and height != width):
+        raise ValueError(
+            f"levels: shape {level.shape} is not {'(6, n, n, 4)' if cube else '(h, w, 4)'}"
+        )
+    if not (1 <= height <= MAX_SIDE and 1 <= width <= MAX_SIDE):
+        raise ValueError(f"levels: shape {level.shape} is out of range, sides of 1 to {MAX_SIDE}")
+    if not before:
+        return
+    high, wide = before[-1].shape[-3:-1]
+    if (high, wide) == (1, 1) or (height, width) != (max(1, high // 2), max(1, wide // 2)):
+        raise ValueError(
+            f"levels: {width} x {height} is not half of the level before, {wide} x {high}"
+        )
 
 
 def read_only(array: NDArray[Any]) -> NDArray[Any]:

@@ -62,8 +62,7 @@ def _mesh(
         for part in mesh.surfaces
     ]
     if surfaces:
-        if mesh.texcoords is None:
-            raise ValueError("scene: surfaces need texcoords")
+        assert mesh.texcoords is not None
         arrays += [np.ascontiguousarray(mesh.texcoords, np.float32), np.array(surfaces, np.uint32)]
     return arrays, (len(mesh.vertices), len(mesh.indices), len(surfaces))
 

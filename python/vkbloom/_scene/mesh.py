@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom._scene.arrays import Constructed, read_only
+from vkbloom._scene.arrays import Constructed, check_indices, check_rows, read_only
 from vkbloom._scene.textures import WHITE, Surface
 
 
@@ -25,7 +25,8 @@ class Mesh(Constructed):
     - `surfaces`: The textures of triangles at the end of `indices`, one surface after the other.
       The triangles before the first surface have no textures.
 
-    Arrays are copied unless they are read-only, C-contiguous owners of their memory.
+    Arrays are copied unless they are read-only, C-contiguous owners of their memory. N is at least
+    1, M a positive multiple of 3, and all numbers are finite: else a ValueError names the array.
     """
 
     vertices: NDArray[np.float32]
@@ -35,14 +36,27 @@ class Mesh(Constructed):
     surfaces: tuple[Surface, ...] = ()
 
     def __post_init__(self) -> None:
+        count = len(check_rows("vertices", self.vertices, 9))
+        check_indices(self.indices, count)
+        for name, columns in (("emission", 3), ("texcoords", 4)):
+            if getattr(self, name) is not None:
+                check_rows(name, getattr(self, name), columns, count)
+        self._check_surfaces()
         for name in ("vertices", "indices", "emission", "texcoords"):
             if getattr(self, name) is not None:
                 object.__setattr__(self, name, read_only(getattr(self, name)))
-        # The device reads vertices without a check.
-        if self.indices.size and self.indices.max() >= len(self.vertices):
+
+    def _check_surfaces(self) -> None:
+        for surface in self.surfaces:
+            if not isinstance(surface, Surface):
+                raise TypeError(f"surfaces: {type(surface).__name__} is not a Surface")
+        textured = sum(surface.index_count for surface in self.surfaces)
+        if textured > len(self.indices):
             raise ValueError(
-                f"indices: {self.indices.max()} is beyond the mesh's {len(self.vertices)} vertices"
+                f"surfaces: {textured} indices are more than the mesh's {len(self.indices)}"
             )
+        if self.surfaces and self.texcoords is None:
+            raise ValueError("texcoords: None; surfaces need them")
 
     def __repr__(self) -> str:
         return f"Mesh({self.summary})"

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from vkbloom._checks import plain_array
 from vkbloom._io import image_reading
 from vkbloom._scene import ktx
-from vkbloom._scene.arrays import MAX_SIDE, Constructed, read_only
+from vkbloom._scene.arrays import MAX_SIDE, Constructed, check_levels
 from vkbloom._scene.textures import finite_floats, mip_levels, rounded_to
 
 FACES: Final = ("+x", "-x", "+y", "-y", "+z", "-z")
@@ -42,7 +42,7 @@ class Cubemap(Constructed):
     levels: tuple[NDArray[Any], ...]
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "levels", tuple(map(read_only, self.levels)))
+        object.__setattr__(self, "levels", check_levels(self.levels, DTYPES, cube=True))
 
     def __repr__(self) -> str:
         return f"Cubemap({self.size} x {self.size} {self.dtype}, levels: {len(self.levels)})"

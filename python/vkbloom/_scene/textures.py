@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Final, Literal
+from typing import Any, Final, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom._scene.arrays import Constructed, read_only
+from vkbloom._checks import check_integer
+from vkbloom._scene.arrays import Constructed, check_levels
 
 #: How a texture continues beyond its edge, and how texels are filtered: WebGPU's names.
 AddressMode = Literal["repeat", "mirror-repeat", "clamp-to-edge"]
@@ -36,7 +37,21 @@ class Texture(Constructed):
     mipmap_filter: Filter = "linear"
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "levels", tuple(map(read_only, self.levels)))
+        levels = check_levels(self.levels, (np.dtype(np.float16),))
+        if not all(np.isfinite(level).all() for level in levels):
+            raise ValueError("levels: some numbers are not finite")
+        object.__setattr__(self, "levels", levels)
+        if not isinstance(self.address_mode, tuple) or len(self.address_mode) != 2:
+            raise ValueError(f"address_mode: {self.address_mode!r} is not two names")
+        for name, values, kind in (
+            ("address_mode", self.address_mode, AddressMode),
+            ("mag_filter", (self.mag_filter,), Filter),
+            ("min_filter", (self.min_filter,), Filter),
+            ("mipmap_filter", (self.mipmap_filter,), Filter),
+        ):
+            for value in values:
+                if value not in get_args(kind):
+                    raise ValueError(f"{name}: {value!r} is not one of {', '.join(get_args(kind))}")
 
     def __repr__(self) -> str:
         height, width, _ = self.levels[0].shape
@@ -59,6 +74,14 @@ class Surface:
     index_count: int
     base: Texture = WHITE
     emission: Texture = WHITE
+
+    def __post_init__(self) -> None:
+        count = check_integer("index_count", self.index_count, 3, 2**32 - 1)
+        if count % 3:
+            raise ValueError(f"index_count: {count} is not a multiple of 3")
+        for name in ("base", "emission"):
+            if not isinstance(value := getattr(self, name), Texture):
+                raise TypeError(f"{name}: {type(value).__name__} is not a Texture")
 
     @property
     def textures(self) -> tuple[Texture, Texture]:

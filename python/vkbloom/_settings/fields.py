@@ -151,7 +151,8 @@ class FieldInfo:
         numbers: tuple[Any, ...]
         if self.columns == 0:
             numbers = _row(self.name, value, self.limits)
-        elif isinstance(value, Iterable):
+        # An array without dimensions has the method that iterates, too.
+        elif isinstance(value, Iterable) and getattr(value, "ndim", 1) > 0:
             numbers = tuple(_row(self.name, row, self.limits, self.columns) for row in value)
         else:
             raise TypeError(f"{self.name}: {value!r} is not a sequence")
