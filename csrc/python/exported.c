@@ -74,21 +74,42 @@ struct vkb_export *vkb_export_of(PyObject *object, const struct vkb_exports **ex
     return exported_of(object)->run;
 }
 
-// Opens CUDA at the first call. With vkb_memory, as all that uses the result.
-static struct vkb_exports *open_exports(struct vkb_renderer *renderer, struct vkb_error *error)
+// Opens CUDA at the first call, without the GIL: it takes long. The renderer's lock keeps the device.
+static bool open_exports(struct vkb_renderer *renderer, struct vkb_error *error)
 {
-    if (!vkb_require_open(renderer, error))
-        return NULL;
-    if (!renderer->exports)
-        renderer->exports = vkb_exports_create(&renderer->device, error);
-    return renderer->exports;
+    struct vkb_exports *exports = NULL;
+
+    if (renderer->exports)
+        return true;
+    if (!vkb_renderer_enter(renderer, error))
+        return false;
+    bool done = vkb_require_open(renderer, error);
+    if (done && !renderer->exports) {
+        exports = vkb_exports_create(&renderer->device, error);
+        done = exports;
+    }
+    vkb_renderer_leave_with(renderer, exports);
+    return done;
+}
+
+// The exports of an open renderer, with vkb_memory; else NULL.
+static struct vkb_exports *find_exports(const struct vkb_renderer *renderer,
+                                        struct vkb_error *error)
+{
+    struct vkb_exports *exports = vkb_require_open(renderer, error) ? renderer->exports : NULL;
+
+    if (!exports && error->kind == VKB_OK)
+        vkb_fail(error, VKB_ERROR_VALUE, "the renderer is closed");
+    return exports;
 }
 
 // As open_exports, as a user of them.
 static struct vkb_exports *use_exports(struct vkb_renderer *renderer, struct vkb_error *error)
 {
+    if (!open_exports(renderer, error))
+        return NULL;
     VKB_LOCK(vkb_memory);
-    struct vkb_exports *exports = open_exports(renderer, error);
+    struct vkb_exports *exports = find_exports(renderer, error);
     if (exports)
         ++exports->users;
     VKB_UNLOCK(vkb_memory);
@@ -140,8 +161,10 @@ PyObject *vkb_renderer_cuda(PyObject *object, PyObject *unused)
     void *stream = NULL;
 
     (void)unused;
+    if (!open_exports((struct vkb_renderer *)object, &error))
+        return vkb_raise(state, &error);
     VKB_LOCK(vkb_memory);
-    const struct vkb_exports *exports = open_exports((struct vkb_renderer *)object, &error);
+    const struct vkb_exports *exports = find_exports((struct vkb_renderer *)object, &error);
     if (exports) {
         ordinal = vkb_cuda_ordinal(exports->cuda);
         stream = vkb_cuda_stream(exports->cuda);
@@ -160,8 +183,10 @@ PyObject *vkb_renderer_cuda_name(PyObject *object, PyObject *ordinal)
 
     if (PyErr_Occurred())
         return NULL;
+    if (!open_exports((struct vkb_renderer *)object, &error))
+        return vkb_raise(state, &error);
     VKB_LOCK(vkb_memory);
-    const struct vkb_exports *exports = open_exports((struct vkb_renderer *)object, &error);
+    const struct vkb_exports *exports = find_exports((struct vkb_renderer *)object, &error);
     if (exports)
         vkb_cuda_name(exports->cuda, (int)number, name);
     VKB_UNLOCK(vkb_memory);

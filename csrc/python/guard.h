@@ -18,6 +18,10 @@
 #define VKB_ATOMIC(type) type
 #endif
 
+// To be called once in a process: from then on the guards of a module are free in forked processes.
+// (Those of a renderer are not used there: it belongs to its process.)
+bool vkb_guards_begin(void);
+
 #ifdef Py_GIL_DISABLED
 // Guards the memory of renderers that objects outlive: pages, residents and exports, whose
 // functions must not overlap. One for all renderers, since the memory is freed with the last such

@@ -3,6 +3,26 @@
 
 VKB_GUARD(vkb_memory)
 
+#ifdef Py_GIL_DISABLED
+#include <pthread.h>
+
+// A thread of the parent may have held it, which does not exist in the child.
+static void free_memory_guard(void)
+{
+    vkb_memory = (PyMutex){0};
+}
+
+bool vkb_guards_begin(void)
+{
+    return pthread_atfork(NULL, NULL, free_memory_guard) == 0;
+}
+#else
+bool vkb_guards_begin(void)
+{
+    return true;
+}
+#endif
+
 static void release_source(struct vkb_pending *pending)
 {
     struct vkb_source_object *source = (struct vkb_source_object *)pending->source;
@@ -152,7 +172,17 @@ bool vkb_renderer_enter(struct vkb_renderer *self, struct vkb_error *error)
 
 void vkb_renderer_leave(struct vkb_renderer *self)
 {
+    vkb_renderer_leave_with(self, NULL);
+}
+
+void vkb_renderer_leave_with(struct vkb_renderer *self, struct vkb_exports *exports)
+{
     PyEval_RestoreThread(self->thread);
+    if (exports) {
+        VKB_LOCK(vkb_memory);
+        self->exports = exports;
+        VKB_UNLOCK(vkb_memory);
+    }
     VKB_LOCK(self->guard);
     if (self->open) {
         self->pipeline_count = self->frame.pipelines.created;

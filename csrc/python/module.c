@@ -1,6 +1,7 @@
 // The extension module: its state, its exceptions, the tables of the settings.
 #include "python/module.h"
 #include "python/arguments.h"
+#include "python/guard.h"
 
 #include "graph/params.h"
 
@@ -173,6 +174,10 @@ static int execute(PyObject *module)
 {
     struct vkb_module_state *state = vkb_module_state(module);
 
+    if (!vkb_guards_begin()) {
+        PyErr_NoMemory();
+        return -1;
+    }
     return add_errors(module)
                 && add_type(module, &vkb_renderer_spec, "Renderer", &state->renderer_type)
                 && add_type(module, &vkb_source_spec, "Source", &state->source_type)

@@ -60,6 +60,8 @@ bool vkb_require_open(const struct vkb_renderer *renderer, struct vkb_error *err
 // lock. vkb_renderer_leave does the reverse, and releases abandoned submissions that have finished.
 bool vkb_renderer_enter(struct vkb_renderer *renderer, struct vkb_error *error);
 void vkb_renderer_leave(struct vkb_renderer *renderer);
+// As vkb_renderer_leave; the renderer gets these exports, unless they are NULL.
+void vkb_renderer_leave_with(struct vkb_renderer *renderer, struct vkb_exports *exports);
 
 // Returns `done`, or false if there are validation messages; then the error has these, since they
 // explain a failure better. After an interruption, with its exception set, the messages are kept

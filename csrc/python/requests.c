@@ -345,8 +345,11 @@ static PyObject *wait_for(PyObject *object, PyObject *unused)
                                : vkb_require_open(renderer, &error);
     done = vkb_renderer_check_messages(renderer, done, &error);
     vkb_renderer_leave(renderer);
-    // Not before: a collection of garbage may visit it meanwhile, from another thread.
+    // Not before: a collection of garbage may visit it meanwhile, from another thread. get_ordered
+    // reads it with vkb_memory.
+    VKB_LOCK(vkb_memory);
     self->pending = NULL;
+    VKB_UNLOCK(vkb_memory);
     if (!over) {
         vkb_renderer_abandon(renderer, pending);
         return vkb_raise(state_of(object), &error);
@@ -362,12 +365,14 @@ static PyObject *wait_for(PyObject *object, PyObject *unused)
 static PyObject *get_ordered(PyObject *object, void *unused)
 {
     const struct submission *self = (struct submission *)object;
-    const struct vkb_pending *pending = self->pending;
-    bool ordered = pending && pending->view_count > 0;
 
     (void)unused;
+    VKB_LOCK(vkb_memory);
+    const struct vkb_pending *pending = self->pending;
+    bool ordered = pending && pending->view_count > 0;
     for (size_t i = 0; ordered && i < pending->view_count; ++i)
         ordered = pending->outputs[i].exported && pending->outputs[i].exported->drawn;
+    VKB_UNLOCK(vkb_memory);
     return PyBool_FromLong(ordered);
 }
 

@@ -6,6 +6,8 @@
 #include <string.h>
 
 #include <dlfcn.h>
+#include <poll.h>
+#include <stdatomic.h>
 #include <unistd.h>
 
 // As in CUDA's header.
@@ -103,6 +105,8 @@ struct vkb_cuda {
 #undef MEMBER
     int device, ordinal;
     void *context, *stream;
+    // A stream waits for a device that was lost: what would wait for the stream is not called.
+    atomic_bool stuck;
 };
 
 #ifdef VKBLOOM_FAULTS
@@ -225,6 +229,9 @@ static bool require_no_capture(struct vkb_cuda *cuda, void *stream, struct vkb_e
 // As enter, to give work to the own stream and, unless it is NULL, to another one.
 static bool enter_streams(struct vkb_cuda *cuda, void *other, struct vkb_error *error)
 {
+    if (cuda->stuck)
+        return vkb_fail(error, VKB_ERROR_DEVICE_LOST,
+                        "the device was lost, and streams of CUDA wait for it");
     return enter(cuda, error)
         && ((require_no_capture(cuda, cuda->stream, error)
              && (!other || require_no_capture(cuda, other, error)))
@@ -252,9 +259,10 @@ void vkb_cuda_close(struct vkb_cuda *cuda)
 
     if (!cuda)
         return;
-    if (cuda->stream && enter(cuda, &ignored))
+    // Whoever ends a context waits for its streams.
+    if (cuda->stream && !cuda->stuck && enter(cuda, &ignored))
         leave(cuda, cuda->cuStreamDestroy(cuda->stream) == 0);
-    if (cuda->context)
+    if (cuda->context && !cuda->stuck)
         cuda->cuDevicePrimaryCtxRelease(cuda->device);
     vkb_free(cuda);
 }
@@ -323,7 +331,7 @@ void vkb_cuda_free(struct vkb_cuda *cuda, struct vkb_cuda_memory *memory)
 {
     struct vkb_error ignored;
 
-    if (!enter(cuda, &ignored))
+    if (cuda->stuck || !enter(cuda, &ignored))
         return;
     // CUDA leaks the memory unless the mapped buffer is freed first.
     if (memory->address)
@@ -391,6 +399,30 @@ bool vkb_cuda_settle(struct vkb_cuda *cuda)
     struct vkb_error ignored;
 
     return enter(cuda, &ignored) && leave(cuda, cuda->cuCtxSynchronize() == 0);
+}
+
+// Whether all streams come to an end within some milliseconds.
+static bool ends_soon(struct vkb_cuda *cuda, int milliseconds)
+{
+    void *event = NULL;
+    bool over = false;
+
+    if (cuda->cuEventCreate(&event, EVENT_DISABLE_TIMING) != 0)
+        return false;
+    if (cuda->cuCtxRecordEvent(cuda->context, event) == 0)
+        while (!(over = cuda->cuEventQuery(event) == 0) && milliseconds-- > 0)
+            poll(NULL, 0, 1);
+    cuda->cuEventDestroy(event);
+    return over;
+}
+
+bool vkb_cuda_settle_lost(struct vkb_cuda *cuda)
+{
+    enum { MILLISECONDS = 1000 };
+    struct vkb_error ignored;
+
+    cuda->stuck = !(enter(cuda, &ignored) && leave(cuda, ends_soon(cuda, MILLISECONDS)));
+    return !cuda->stuck;
 }
 
 static bool copy(struct vkb_cuda *cuda, vkb_cuda_address to, vkb_cuda_address from, size_t size,

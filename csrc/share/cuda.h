@@ -47,6 +47,10 @@ bool vkb_cuda_finish(struct vkb_cuda *cuda, struct vkb_error *error);
 // The same of all streams of the context. Fails, and makes captures of graphs invalid, if a stream
 // is captured.
 bool vkb_cuda_settle(struct vkb_cuda *cuda);
+// The same when the device was lost, for which streams may wait forever: it returns within about a
+// second. If it fails, calls that would wait for a stream fail from then on, and what vkb_cuda_free
+// and vkb_cuda_close would free stays CUDA's until the process ends.
+bool vkb_cuda_settle_lost(struct vkb_cuda *cuda);
 
 int vkb_cuda_ordinal(const struct vkb_cuda *cuda);
 // As other libraries get it.

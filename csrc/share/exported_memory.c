@@ -172,7 +172,7 @@ bool vkb_export_drawn(const struct vkb_export *one, void *stream, struct vkb_err
 
     if (!one->drawn)
         return true;
-    if (exports->device->lost)
+    if (exports->lost || exports->device->lost)
         return vkb_fail(error, VKB_ERROR_DEVICE_LOST,
                         "the device was lost before the framebuffer was complete");
     return vkb_cuda_wait(exports->cuda, exports->drawn.cuda, one->drawn, stream, error);
@@ -180,13 +180,19 @@ bool vkb_export_drawn(const struct vkb_export *one, void *stream, struct vkb_err
 
 void vkb_exports_complete(struct vkb_exports *exports)
 {
-    for (struct vkb_export *one = exports ? exports->taken : NULL; one; one = one->next)
+    // What a lost device has not signalled it has not drawn.
+    if (!exports || exports->device->lost)
+        return;
+    for (struct vkb_export *one = exports->taken; one; one = one->next)
         one->drawn = 0;
 }
 
 bool vkb_exports_settle(const struct vkb_exports *exports)
 {
-    return !exports || !exports->filled.semaphore || vkb_cuda_settle(exports->cuda);
+    if (!exports || !exports->filled.semaphore)
+        return true;
+    return exports->device->lost ? vkb_cuda_settle_lost(exports->cuda)
+                                 : vkb_cuda_settle(exports->cuda);
 }
 
 // The mark is for the next call that takes memory, which knows of captures of graphs: this one runs
@@ -230,5 +236,6 @@ void vkb_exports_close(struct vkb_exports *exports, bool settled)
         vkb_buffer_destroy(exports->device, &one->buffer);
     destroy_timeline(exports, &exports->filled, settled);
     destroy_timeline(exports, &exports->drawn, settled);
+    exports->lost = exports->device->lost;
     exports->device = NULL;
 }

@@ -27,6 +27,7 @@ struct vkb_shared_timeline {
 
 struct vkb_exports {
     const struct vkb_device *device;  // NULL: closed
+    bool lost;                        // of closed ones: the device was lost
     uint32_t users;                   // which include the renderer
     struct vkb_cuda *cuda;
     struct vkb_export *taken, *idle;  // the latest first
@@ -59,10 +60,11 @@ void vkb_export_signal(const struct vkb_export *one, struct vkb_sync_point *poin
 // here. Fails if the device was lost before.
 bool vkb_export_drawn(const struct vkb_export *one, void *stream, struct vkb_error *error);
 
-// The device has finished everything: no stream has to wait any more. May be NULL, as below.
+// The device has finished everything, unless it was lost: no stream has to wait any more. May be NULL, as below.
 void vkb_exports_complete(struct vkb_exports *exports);
 // Waits until CUDA has done all work of the context, before the timelines are destroyed. May
-// overlap with other calls. May fail, as vkb_cuda_settle.
+// overlap with other calls. May fail, as vkb_cuda_settle and, of a lost device, as
+// vkb_cuda_settle_lost.
 bool vkb_exports_settle(const struct vkb_exports *exports);
 // The device must have finished all work on it, and CUDA a copy to it. What CUDA's streams have got
 // so far may still use it.

@@ -32,9 +32,14 @@ static size_t driver_mib(bool lavapipe)
     return MIN_MIB + (lavapipe ? 144 : 96) * (threads < most ? threads : most);
 }
 
-static struct vkb_lock lock;  // protects the instances and volk's globals
-static struct vkb_instance *instances;
+// Held while an instance is created, which may take long: libraries are loaded and run code of their
+// own. It protects volk's functions of the loader.
+static struct vkb_lock creation;
 static bool loader_open;
+// Held for short times: it protects the list of instances and volk's function for devices. Whoever
+// takes both takes this one last.
+static struct vkb_lock lock;
+static struct vkb_instance *instances;
 // Whether this process was forked from one with an instance. At exit Mesa (22.3.6) waits for the
 // driver threads of the parent, which do not exist here. It mistakes threads of the child for them
 // if their stacks have the same addresses. So no driver thread of the child may be left at exit.
@@ -282,7 +287,6 @@ static bool create_instance(struct vkb_instance *instance, const char *driver, b
     *instance = (struct vkb_instance){
         .validation = validation,
         .process = vkb_current_process(),
-        .next = instance->next,
     };
     if (strlen(driver) >= sizeof instance->driver)
         return vkb_fail(error, VKB_ERROR_GENERAL, "the driver's path is longer than %zu bytes",
@@ -303,48 +307,96 @@ static bool create_instance(struct vkb_instance *instance, const char *driver, b
     return false;
 }
 
-// Finds or creates an instance of this process. Handles of another process, and those of failed
-// calls, are 0. Called with the lock.
-static struct vkb_instance *get_instance(const char *driver, bool validation, bool unclaimed,
-                                         struct vkb_error *error)
+// Finds an instance of this process; NULL: there is none. With the lock.
+static struct vkb_instance *find_instance(const char *driver, bool validation, bool unclaimed)
 {
     const long process = vkb_current_process();
-    struct vkb_instance *empty = NULL;
 
     for (struct vkb_instance *instance = instances; instance; instance = instance->next) {
         forked |= instance->process != process;
-        if (instance->process != process)
-            continue;
-        if (!instance->handle)
-            empty = instance;
-        else if (instance->validation == validation && strcmp(instance->driver, driver) == 0
-                 && !(unclaimed && instance->claimed))
+        if (instance->process == process && instance->handle
+            && instance->validation == validation && strcmp(instance->driver, driver) == 0
+            && !(unclaimed && instance->claimed))
             return instance;
     }
-    if (!empty) {
-        if (!(empty = vkb_alloc(error, 1, sizeof *empty)))
-            return NULL;
-        empty->next = instances;
-        instances = empty;
-    }
-    return create_instance(empty, driver, validation, error) ? empty : NULL;
+    return NULL;
 }
 
-struct vkb_instance *vkb_instance_open(const char *driver, bool validation, struct vkb_error *error)
+// As find_instance, with one user more, who claims it if `unclaimed`.
+static struct vkb_instance *take_instance(const char *driver, bool validation, bool unclaimed)
 {
     vkb_lock_acquire(&lock);
-    struct vkb_instance *instance = get_instance(driver, validation, false, error);
-    if (instance)
+    struct vkb_instance *instance = find_instance(driver, validation, unclaimed);
+    if (instance) {
         ++instance->users;
+        instance->claimed |= unclaimed;
+    }
     vkb_lock_release(&lock);
     return instance;
 }
 
+// Gives an instance its place in the list: that of one that was destroyed, or a new one.
+static struct vkb_instance *add_instance(const struct vkb_instance *made, struct vkb_error *error)
+{
+    struct vkb_instance *place;
+
+    vkb_lock_acquire(&lock);
+    for (place = instances; place; place = place->next)
+        if (place->process == made->process && !place->handle)
+            break;
+    if (!place && (place = vkb_alloc(error, 1, sizeof *place))) {
+        place->next = instances;
+        instances = place;
+    }
+    if (place) {
+        struct vkb_instance *next = place->next;
+        *place = *made;
+        place->next = next;
+    }
+    vkb_lock_release(&lock);
+    return place;
+}
+
+// Finds or creates an instance of this process for one user more.
+static struct vkb_instance *use_instance(const char *driver, bool validation, bool unclaimed,
+                                         struct vkb_error *error)
+{
+    struct vkb_instance made, *instance = take_instance(driver, validation, unclaimed);
+
+    if (instance)
+        return instance;
+    vkb_lock_acquire(&creation);
+    // Another thread may have created it meanwhile.
+    instance = take_instance(driver, validation, unclaimed);
+    if (!instance && create_instance(&made, driver, validation, error)) {
+        made.users = 1;
+        made.claimed = unclaimed;
+        instance = add_instance(&made, error);
+        if (!instance)
+            destroy_instance(&made);
+    }
+    vkb_lock_release(&creation);
+    return instance;
+}
+
+struct vkb_instance *vkb_instance_open(const char *driver, bool validation, struct vkb_error *error)
+{
+    return use_instance(driver, validation, false, error);
+}
+
 static void leave_instance(struct vkb_instance *instance)
 {
+    struct vkb_instance left = {0};
+
+    vkb_lock_acquire(&lock);
     instance->claimed = --instance->users > 0 && instance->claimed;
-    if (instance->users == 0 && forked)
-        destroy_instance(instance);
+    if (instance->users == 0 && forked) {
+        left = *instance;
+        instance->messenger = VK_NULL_HANDLE;
+        instance->handle = VK_NULL_HANDLE;
+    }
+    vkb_lock_release(&lock);
+    destroy_instance(&left);
 }
 
 bool vkb_instance_claim(struct vkb_instance **instance, struct vkb_error *error)
@@ -352,23 +404,22 @@ bool vkb_instance_claim(struct vkb_instance **instance, struct vkb_error *error)
     struct vkb_instance *shared = *instance;
 
     vkb_lock_acquire(&lock);
-    struct vkb_instance *own =
-        shared->claimed ? get_instance(shared->driver, shared->validation, true, error) : shared;
+    const bool first = !shared->claimed;
+    shared->claimed = true;
+    vkb_lock_release(&lock);
+    if (first)
+        return true;
+    struct vkb_instance *own = use_instance(shared->driver, shared->validation, true, error);
     if (own) {
-        own->claimed = true;
-        ++own->users;
         leave_instance(shared);
         *instance = own;
     }
-    vkb_lock_release(&lock);
     return own != NULL;
 }
 
 void vkb_instance_close(struct vkb_instance *instance)
 {
-    vkb_lock_acquire(&lock);
     leave_instance(instance);
-    vkb_lock_release(&lock);
 }
 
 bool vkb_instance_require_room(const struct vkb_instance *instance, bool lavapipe,
@@ -410,7 +461,7 @@ void vkb_instance_load_device(const struct vkb_instance *instance, VkDevice devi
 #ifdef VKBLOOM_FAULTS
 void vkb_fault_forget_instances(void)
 {
-    vkb_lock_acquire(&lock);
+    vkb_lock_acquire(&creation);
     while (instances) {
         struct vkb_instance *instance = instances;
         instances = instance->next;
@@ -418,6 +469,6 @@ void vkb_fault_forget_instances(void)
         vkb_free(instance);
     }
     loader_open = false;
-    vkb_lock_release(&lock);
+    vkb_lock_release(&creation);
 }
 #endif

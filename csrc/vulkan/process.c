@@ -1,5 +1,6 @@
 #include "vulkan/process.h"
 
+#include <poll.h>
 #include <pthread.h>
 #include <sched.h>
 #include <stdio.h>
@@ -42,12 +43,18 @@ bool vkb_fork_leaves_pinned(void)
 
 void vkb_lock_acquire(struct vkb_lock *lock)
 {
+    enum { SHORT_TURNS = 100 };
     const long process = vkb_current_process();
     long holder = 0;
+    int turns = 0;
 
     while (!atomic_compare_exchange_weak(&lock->holder, &holder, process))
         if (holder == process) {
-            sched_yield();
+            // Whoever holds it for long is at work: its waiters sleep for a millisecond.
+            if (++turns < SHORT_TURNS)
+                sched_yield();
+            else
+                poll(NULL, 0, 1);
             holder = 0;
         }
 }

@@ -12,7 +12,7 @@ long vkb_current_process(void);
 // gets a copy at its next write, and the GPU goes on with the page of the child.
 bool vkb_fork_leaves_pinned(void);
 
-// A spinlock, for short times. Zeroed: free.
+// A lock whose waiters look again and again, and sleep between if it takes long. Zeroed: free.
 struct vkb_lock {
     atomic_long holder;  // the process whose thread holds it; 0: none
 };

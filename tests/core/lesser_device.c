@@ -614,12 +614,17 @@ static VKAPI_ATTR void VKAPI_CALL destroy_semaphore(VkDevice handle, VkSemaphore
 }
 
 // Without "patience", the user presses Ctrl-C during the wait, after the validation layer has
-// objected. Without "end", presentations never end.
+// objected. Without "end", presentations never end. Without "device", it is lost.
 static VKAPI_ATTR VkResult VKAPI_CALL wait(VkDevice handle, uint32_t count, const VkFence *fences,
                                            VkBool32 all, uint64_t timeout)
 {
     if (lacks("end") && fences[0] == after_all)
         return VK_TIMEOUT;
+    if (lacks("device")) {
+        // It is destroyed afterwards.
+        below.vkWaitForFences(handle, count, fences, all, UINT64_MAX);
+        return VK_ERROR_DEVICE_LOST;
+    }
     if (!lacks("patience"))
         return below.vkWaitForFences(handle, count, fences, all, timeout);
     object("an objection");

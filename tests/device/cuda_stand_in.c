@@ -202,12 +202,23 @@ static void report(void)
     fclose(file);
 }
 
+static void (*at_init)(void);
+
+static void *call_at_init(void *unused)
+{
+    at_init();
+    return unused;
+}
+
 EXPORT int cuInit(unsigned flags)
 {
     static _Atomic int known;
+    pthread_t thread;
 
     if (!known++)
         atexit(report);
+    if (at_init && pthread_create(&thread, NULL, call_at_init, NULL) == 0)
+        pthread_join(thread, NULL);
     return flags ? INVALID_VALUE : SUCCESS;
 }
 
@@ -537,6 +548,28 @@ EXPORT int stand_in_capture(void *stream)
 EXPORT void stand_in_callback(void (*callback)(void))
 {
     push((struct work){.callback = callback});
+}
+
+// Not of CUDA: cuInit waits for a callback in another thread; NULL: for none.
+EXPORT void stand_in_at_init(void (*callback)(void))
+{
+    at_init = callback;
+}
+
+static _Atomic int held;
+
+static void hold(void)
+{
+    while (held)
+        usleep(1000);
+}
+
+// Not of CUDA: the stream does not go on until it is let go.
+EXPORT void stand_in_hold(int on)
+{
+    held = on;
+    if (on)
+        push((struct work){.callback = hold});
 }
 
 // Not of CUDA: how many contexts are current in this thread.

@@ -9,6 +9,7 @@ from __future__ import annotations
 import ctypes
 import faulthandler
 import gc
+import os
 import sys
 import threading
 import types
@@ -217,5 +218,52 @@ def callbacks(renderer: Any) -> None:
     assert len(seen) >= 4
 
 
+def opening(_: Any) -> None:
+    """CUDA is opened without the GIL: other threads go on."""
+    call = ctypes.CFUNCTYPE(None)(lambda: None)
+    faulthandler.dump_traceback_later(60, exit=True)
+    sys.setswitchinterval(10)
+    other: Any = Renderer(ADAPTER, validation=VALIDATION)
+    try:
+        cuda.stand_in_at_init(call)
+        with other:
+            assert other._core.cuda()[0] == 1
+    finally:
+        cuda.stand_in_at_init(None)
+        sys.setswitchinterval(0.005)
+    faulthandler.cancel_dump_traceback_later()
+
+
+def lost(_: Any) -> None:
+    """A renderer whose device is lost is closed, though a stream of CUDA never ends."""
+    image = picture(24, 16)
+    faulthandler.dump_traceback_later(60, exit=True)
+    for stuck in (False, True):
+        lesser = os.environ["VKBLOOM_LESSER"]
+        # Validation does not know that what a lost device has got may be destroyed.
+        other: Any = Renderer(ADAPTER)
+        complete = other.apply(OnDevice(image), SETTINGS)["final"]
+        right = complete.numpy()
+        late = other.apply(OnDevice(image), SETTINGS)["final"]
+        if stuck:
+            cuda.stand_in_hold(1)
+        os.environ["VKBLOOM_LESSER"] = f"{lesser},device"
+        raises(vkbloom.DeviceLostError, "LOST", lambda: other.apply(image, SETTINGS))  # noqa: B023
+        other.close()
+        os.environ["VKBLOOM_LESSER"] = lesser
+        # What was not signalled is not drawn, whatever the memory holds.
+        raises(vkbloom.DeviceLostError, "lost", late.numpy)
+        if stuck:
+            raises(vkbloom.DeviceLostError, "streams of CUDA wait for it", complete.numpy)
+        else:
+            np.testing.assert_array_equal(complete.numpy(), right)
+        del late, complete
+        gc.collect()
+    cuda.stand_in_hold(0)
+    faulthandler.cancel_dump_traceback_later()
+
+
 if __name__ == "__main__":
-    main((closing, failing, captures, callbacks, bounds))
+    main(
+        (lost,) if "lost" in sys.argv else (closing, failing, captures, callbacks, bounds, opening)
+    )

@@ -441,7 +441,7 @@ def gradient_places(renderer: Any) -> None:
 def raises(kind: type[Exception], part: str, call: Callable[[], object]) -> None:
     with pytest.raises(kind) as caught:
         call()
-    assert part in str(caught.value)
+    assert part in str(caught.value), caught.value
 
 
 def errors(renderer: Any) -> None:

@@ -34,6 +34,8 @@ RUNS = (
     # Code of others that comes between: lifetimes, failures, captures of graphs and callbacks.
     ("", LIMITS, "validated"),
     ("waits", LIMITS, "validated"),
+    # A device that is lost, whose memory CUDA keeps if a stream still waits for it.
+    ("waits", LIMITS, "validated lost"),
     # A renderer on another GPU.
     ("missing", WORK, "validated missing"),
 )
@@ -53,7 +55,9 @@ def test_arrays_on_the_device(
         variables["STAND_IN_UUID"] = "11" * 16
     # The layer objects to buffers that are acquired from CUDA before they are released to it.
     said = watched(layer, software, lesser, ("-m", program, *words.split()), variables)
+    # Before it the validation layer says what a lost device makes right.
+    said = said.splitlines()[-1] if "lost" in words else said
     assert json.loads(said) == {}
     left = (folder / "left").read_text().split()
     # Contexts, streams, events, memories, mappings, contexts that are current.
-    assert left[:6] == ["0"] * 6, left
+    assert "lost" in words or left[:6] == ["0"] * 6, left
