@@ -74,7 +74,8 @@ struct vkb_export *vkb_export_of(PyObject *object, const struct vkb_exports **ex
     return exported_of(object)->run;
 }
 
-// Opens CUDA at the first call, without the GIL: it takes long. The renderer's lock keeps the device.
+// Opens CUDA at the first call, without the GIL: it takes long. The renderer's lock keeps the
+// device.
 static bool open_exports(struct vkb_renderer *renderer, struct vkb_error *error)
 {
     struct vkb_exports *exports = NULL;

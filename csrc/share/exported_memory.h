@@ -60,7 +60,8 @@ void vkb_export_signal(const struct vkb_export *one, struct vkb_sync_point *poin
 // here. Fails if the device was lost before.
 bool vkb_export_drawn(const struct vkb_export *one, void *stream, struct vkb_error *error);
 
-// The device has finished everything, unless it was lost: no stream has to wait any more. May be NULL, as below.
+// The device has finished everything, unless it was lost: no stream has to wait any more. May be
+// NULL, as below.
 void vkb_exports_complete(struct vkb_exports *exports);
 // Waits until CUDA has done all work of the context, before the timelines are destroyed. May
 // overlap with other calls. May fail, as vkb_cuda_settle and, of a lost device, as

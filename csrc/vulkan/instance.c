@@ -32,8 +32,8 @@ static size_t driver_mib(bool lavapipe)
     return MIN_MIB + (lavapipe ? 144 : 96) * (threads < most ? threads : most);
 }
 
-// Held while an instance is created, which may take long: libraries are loaded and run code of their
-// own. It protects volk's functions of the loader.
+// Held while an instance is created, which may take long: libraries are loaded and run code of
+// their own. It protects volk's functions of the loader.
 static struct vkb_lock creation;
 static bool loader_open;
 // Held for short times: it protects the list of instances and volk's function for devices. Whoever
@@ -314,9 +314,8 @@ static struct vkb_instance *find_instance(const char *driver, bool validation, b
 
     for (struct vkb_instance *instance = instances; instance; instance = instance->next) {
         forked |= instance->process != process;
-        if (instance->process == process && instance->handle
-            && instance->validation == validation && strcmp(instance->driver, driver) == 0
-            && !(unclaimed && instance->claimed))
+        if (instance->process == process && instance->handle && instance->validation == validation
+            && strcmp(instance->driver, driver) == 0 && !(unclaimed && instance->claimed))
             return instance;
     }
     return NULL;

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import threading
 import weakref
 from collections import OrderedDict
 from collections.abc import Callable, Hashable
@@ -36,7 +35,7 @@ class ArrayCache:
     def __init__(self, most: int, last: int) -> None:
         self._most, self._last = most, last
         self._arrays: OrderedDict[Hashable, _Sized] = OrderedDict()
-        self._lock = threading.Lock()
+        self._lock = ProcessLock()
 
     @property
     def nbytes(self) -> int:

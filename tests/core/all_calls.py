@@ -135,7 +135,7 @@ def load(renderer: Renderer, which: int, size: int) -> Any:
 
 
 def wait_twice(renderer: Renderer, which: int, size: int) -> Any:
-    """Two threads wait for the same submission: one of them gets it."""
+    """Two threads wait for the same submission: one of them gets it; a third looks at it."""
     core = renderer._core
     source = _core.image_source(IMAGES[size])
     plan = core.plan(source, SETTINGS[which], None)
@@ -149,10 +149,16 @@ def wait_twice(renderer: Renderer, which: int, size: int) -> Any:
         except RuntimeError:
             got.append(None)
 
-    other = threading.Thread(target=wait)
-    other.start()
+    def look_on() -> None:
+        while len(got) < 2:
+            assert not submission.ordered
+
+    others = [threading.Thread(target=target) for target in (wait, look_on)]
+    for other in others:
+        other.start()
     wait()
-    other.join()
+    for other in others:
+        other.join()
     assert sum(one is not None for one in got) == 1
     return list(arrays)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import threading
 from pathlib import Path
 from typing import Any
@@ -10,6 +11,7 @@ import numpy as np
 import pytest
 
 import vkbloom
+from tests.core.builds import ROOT
 from tests.images import picture
 from tests.processes import output
 
@@ -107,6 +109,44 @@ print("parent", vkbloom.default_renderer() is first)
 
 def test_a_forked_child_opens_its_own() -> None:
     assert output("-c", FORKED).split() == ["child", "True", "True", "parent", "True"]
+
+
+# A thread holds all other locks of the package while the process forks.
+LOCKED = """
+import os, signal, threading, types, warnings
+import numpy as np
+import vkbloom
+from tests.planned import MESH
+from vkbloom import _array_cache as array_cache
+from vkbloom import _locks as locks
+from vkbloom._renderer.requests import PendingSubmission
+warnings.simplefilter("ignore")
+image = np.ones((8, 8, 3), np.float32)
+settings = vkbloom.Convolution(vkbloom.psf.gaussian(2))
+renderer = vkbloom.Renderer()
+renderer.apply(image, settings)
+pending = PendingSubmission(types.SimpleNamespace(wait=lambda: ([], ())))
+held = [*(one._lock for one in locks._locks), *(one.lock for one in locks._properties)]
+assert len(held) >= 3
+holder = threading.Thread(target=lambda: [one.acquire() for one in held])
+holder.start()
+holder.join()
+child = os.fork()
+if child == 0:
+    signal.alarm(30)  # of a deadlock
+    array_cache._IN_PROCESS.find(1)
+    array_cache.shared().find(1)
+    pending.complete()
+    assert MESH.packed.shape == (3, 3, 4)
+    print(vkbloom.apply(image, settings)["final"].shape, flush=True)
+    os._exit(0)
+os._exit(os.waitpid(child, 0)[1])
+"""
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="nothing forks there")
+def test_a_forked_child_finds_all_locks_free() -> None:
+    assert output("-c", LOCKED, cwd=ROOT) == "(8, 8, 3)\n"
 
 
 # At exit, other functions may still use it; the validation layer reports what is not destroyed.

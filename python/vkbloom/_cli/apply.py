@@ -40,6 +40,7 @@ from vkbloom._io.displayed import PRIMARIES, Saved
 from vkbloom._io.glows import alike, grey_mask
 from vkbloom._io.images import Colour, Highlights, Picture, SavedColour
 from vkbloom._io.narrowing import narrowed, narrowing_note
+from vkbloom._locks import cached_property
 from vkbloom._presets.start import developed
 from vkbloom._renderer.frame_files import settings_facts
 from vkbloom._renderer.interruptible import opened_renderer
@@ -198,7 +199,7 @@ class Run:
             _tell_narrowing(source, pixels)
         return picture, settings, expand
 
-    @functools.cached_property
+    @cached_property
     def _glow_of(self) -> Callable[[bool], Glow]:
         # The files are read once.
         return functools.cache(self._read_glow)

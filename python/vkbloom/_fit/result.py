@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any, Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom._fit.losses import Loss
+from vkbloom._locks import cached_property
 from vkbloom._renderer.frames import Frames
 from vkbloom._settings.settings import Settings
 from vkbloom._views import pictures

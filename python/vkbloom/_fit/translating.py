@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
-from functools import cached_property
 from typing import Any, Final, Literal
 
 import numpy as np
@@ -16,6 +15,7 @@ from vkbloom._fit.fitting import fit
 from vkbloom._fit.losses import DARK, Loss
 from vkbloom._fit.result import FitResult
 from vkbloom._fit.space import Bounds, varied_as
+from vkbloom._locks import cached_property
 from vkbloom._renderer.default import default_renderer
 from vkbloom._renderer.renderer import Renderer
 from vkbloom._settings.fields import fields_of

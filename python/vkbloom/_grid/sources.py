@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import functools
 import hashlib
 from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
@@ -15,6 +14,7 @@ import numpy as np
 from vkbloom import _core
 from vkbloom._checks import check_framebuffers, check_image, check_size, check_time
 from vkbloom._grid.order import Index
+from vkbloom._locks import cached_property
 from vkbloom._renderer.device_arrays import ImportedArray
 from vkbloom._renderer.frames import Frames
 from vkbloom._renderer.image import Image
@@ -89,7 +89,7 @@ class ImageSource(Constructed):
         """Return the core's Source of the image."""
         return image_source(self.image)
 
-    @functools.cached_property
+    @cached_property
     def description(self) -> dict[str, Any]:
         """The identity of the source: shape, dtype and digest."""
         return {"kind": "image", "images": [_described(self.image)]}
@@ -135,7 +135,7 @@ class SceneSource(Constructed):
         """Return the core's Source of the scene at a time."""
         return scene_source(self.scene, self.size, self.shading, time)
 
-    @functools.cached_property
+    @cached_property
     def description(self) -> dict[str, Any]:
         """The identity of the source: size, shading, time and a digest of the scene."""
         return {

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import math
-import threading
 import time
 from collections import deque
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
@@ -12,6 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, cast
 import numpy as np
 
 from vkbloom import _core
+from vkbloom._locks import ProcessLock
 from vkbloom._renderer.device_arrays import Destination, DeviceArray, memory_for
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ class PendingSubmission:
     """
 
     def __init__(self, submission: _core.Submission) -> None:
-        self._lock = threading.Lock()
+        self._lock = ProcessLock()
         self._submission: _core.Submission | None = submission
         self._results: tuple[list[dict[str, float]], tuple[int, ...]] | None = None
         self._error: Exception | None = None

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vkbloom._locks import cached_property
 from vkbloom._scene.arrays import Constructed, check_indices, check_rows, read_only
 from vkbloom._scene.textures import WHITE, Surface
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Final
 
+from vkbloom._locks import cached_property
 from vkbloom.testing._moving_light import Stability, stability
 from vkbloom.testing._point_spread import measured_spread, point_spread
 from vkbloom.testing._probe import Bloom, Image, Probe
