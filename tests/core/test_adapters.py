@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import json
 import os
+import subprocess
 import sys
+import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +15,10 @@ import pytest
 
 import vkbloom
 from tests.conftest import ADAPTER
+from tests.core.builds import compiler
 from tests.processes import output, python
-from vkbloom import AdapterInfo, AdapterNotFoundError, Renderer, adapters
+from vkbloom import AdapterInfo, AdapterNotFoundError, Renderer, _core, adapters
+from vkbloom._renderer.adapter import bundled_driver
 
 VK_ERROR_INCOMPATIBLE_DRIVER = -9
 
@@ -182,3 +187,40 @@ except vkbloom.Error as error:
     assert printed.startswith("Error ")
     assert "VK_LAYER_KHRONOS_validation is not installed" in printed
     assert "apt install" in printed
+
+
+#: A library that is loaded until a file is there, or for five seconds.
+SLOW = """
+#include <stdlib.h>
+#include <unistd.h>
+__attribute__((constructor)) static void load(void)
+{
+    rmdir(getenv("VKBLOOM_TEST_SLOW"));
+    for (int turns = 0; turns < 5000 && access(getenv("VKBLOOM_TEST_SLOW"), F_OK); ++turns)
+        usleep(1000);
+}
+"""
+
+
+def test_others_go_on_while_a_driver_is_opened(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    library, there = tmp_path / "slow.so", tmp_path / "there"
+    command = [*compiler(), "-shared", "-fPIC", "-x", "c", "-", "-o", str(library)]
+    subprocess.run(command, input=SLOW, text=True, check=True)
+    monkeypatch.setenv("VKBLOOM_TEST_SLOW", str(there))
+    there.mkdir()
+    known = _core.adapters(bundled_driver())
+
+    def open_driver() -> None:
+        with pytest.raises(AdapterNotFoundError, match="is no Vulkan driver"):
+            _core.adapters(str(library))
+
+    with ThreadPoolExecutor(1) as pool:
+        opened = pool.submit(open_driver)
+        while there.exists():
+            time.sleep(0.001)
+        assert _core.adapters(bundled_driver()) == known
+        assert not opened.done()
+        there.mkdir()
+        opened.result()
