@@ -120,15 +120,12 @@ static bool check_passes(const struct vkb_device *device, const struct vkb_graph
 bool vkb_limits_check_memory(const struct vkb_device *device, const struct vkb_graph *graph,
                              uint64_t needed, struct vkb_error *error)
 {
-    uint64_t largest = 0;
+    const uint64_t largest = device->memory_limit;
     bool convolves = false;
 
     for (uint32_t i = 0; i < graph->image_count; ++i)
         convolves = convolves || graph->images[i].serial;
-    for (uint32_t i = 0; i < device->memory.memoryHeapCount; ++i)
-        if (device->memory.memoryHeaps[i].size > largest)
-            largest = device->memory.memoryHeaps[i].size;
-    // Plans without a renderer know no heaps.
+    // Plans without a renderer know none.
     if (!largest || needed <= largest)
         return true;
     vkb_fail(error, VKB_ERROR_OUT_OF_MEMORY,

@@ -8,7 +8,7 @@
 
 // The first fails with what the adapter cannot do; without a renderer it knows no limits. The
 // second fails if the adapter cannot render to the image, the third if images of `needed` bytes
-// exceed its largest heap.
+// exceed its memory.
 bool vkb_limits_check_graph(const struct vkb_device *device, const struct vkb_graph *graph,
                             struct vkb_error *error);
 bool vkb_limits_check_image(const struct vkb_device *device, const struct vkb_image_row *row,

@@ -158,7 +158,7 @@ static bool build_graph(const struct vkb_device *device, enum vkb_variants varia
 
 // The kernel of a convolution for the source's sizes. The graph is built once before it is
 // computed, so that images which do not fit the device are refused at once: a large kernel takes
-// long.
+// long. (Other plans need no memory, and are checked when they are run.)
 static bool hold_kernel(const struct vkb_module_state *state, const struct vkb_device *device,
                         PyObject *settings_object, struct vkb_settings *settings,
                         struct vkb_plan_object *self)
@@ -219,9 +219,7 @@ static PyObject *new_plan(const struct vkb_module_state *state, const struct vkb
         Py_DECREF(self);
         return NULL;
     }
-    uint64_t needed;
-    if (!vkb_plan_size(&self->plan, &needed, &error)
-        || !vkb_limits_check_memory(device, &self->plan.graph, needed, &error)) {
+    if (!vkb_plan_size(&self->plan, &self->needed, &error)) {
         Py_DECREF(self);
         return vkb_raise(state, &error);
     }

@@ -3,6 +3,8 @@
 #include "python/module.h"
 #include "python/plan.h"
 
+#include "execute/limits.h"
+
 #include <string.h>
 
 struct submission {
@@ -183,6 +185,18 @@ static bool check_run(const struct vkb_renderer *renderer, const struct vkb_sour
     return true;
 }
 
+// Whether the device has the memory for each plan: before it is taken for a part of the images.
+static bool check_memory(const struct vkb_renderer *renderer, PyObject *plans,
+                         struct vkb_error *error)
+{
+    for (Py_ssize_t i = 0; renderer->open && i < PyTuple_Size(plans); ++i) {
+        const struct vkb_plan_object *one = plan_at(plans, i);
+        if (!vkb_limits_check_memory(&renderer->device, &one->plan.graph, one->needed, error))
+            return false;
+    }
+    return true;
+}
+
 static struct submission *new_submission(struct vkb_renderer *renderer, PyObject *source,
                                          PyObject *plans, PyObject *arrays)
 {
@@ -248,6 +262,8 @@ PyObject *vkb_renderer_run(PyObject *object, PyObject *arguments)
     struct vkb_source_object *given = (struct vkb_source_object *)source;
     if (!vkb_check_source(renderer, given) || !check_run(renderer, given, plans, arrays, shows))
         return NULL;
+    if (!check_memory(renderer, plans, &error))
+        return vkb_raise(state, &error);
     struct submission *self = new_submission(renderer, source, plans, arrays);
     if (!self)
         return NULL;

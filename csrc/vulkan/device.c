@@ -8,6 +8,8 @@
 #include <string.h>
 #include <time.h>
 
+#include <unistd.h>
+
 VkBufferUsageFlags vkb_device_import_usage(const struct vkb_device *device)
 {
     return device->adapter.device_type == VK_PHYSICAL_DEVICE_TYPE_CPU
@@ -186,6 +188,22 @@ static uint32_t smallest(uint32_t a, uint32_t b)
     return a < b ? a : b;
 }
 
+// What all images together can take: the largest heap; or the memory of the host, where images lie
+// in that, whatever heap a driver tells of. (lavapipe tells of 2 GiB on any machine, Mesa 22.3.6.)
+static uint64_t find_memory_limit(const struct vkb_device *device)
+{
+    uint64_t largest = 0;
+
+    for (uint32_t i = 0; i < device->memory.memoryHeapCount; ++i)
+        if (device->memory.memoryHeaps[i].size > largest)
+            largest = device->memory.memoryHeaps[i].size;
+    if (device->adapter.device_type != VK_PHYSICAL_DEVICE_TYPE_CPU)
+        return largest;
+    const long pages = sysconf(_SC_PHYS_PAGES), size = sysconf(_SC_PAGESIZE);
+    const uint64_t host = pages > 0 && size > 0 ? (uint64_t)pages * (uint64_t)size : 0;
+    return host > largest ? host : largest;
+}
+
 // Device properties, cached. Some are also read after device loss.
 static void read_properties(struct vkb_device *device)
 {
@@ -194,6 +212,7 @@ static void read_properties(struct vkb_device *device)
     const VkPhysicalDeviceLimits *limits = &device->limits;
 
     vk->vkGetPhysicalDeviceMemoryProperties(device->adapter.physical, &device->memory);
+    device->memory_limit = find_memory_limit(device);
     vk->vkGetPhysicalDeviceProperties(device->adapter.physical, &properties);
     device->limits = properties.limits;
     device->max_side = smallest(smallest(limits->maxFramebufferWidth, limits->maxFramebufferHeight),

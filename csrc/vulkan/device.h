@@ -56,7 +56,8 @@ struct vkb_device {
     // Called between the slices of a long wait; true ends the wait. May be NULL.
     bool (*interrupted)(void *context);
     void *context;
-    double frame_seconds;  // the longest wait for each frame
+    double frame_seconds;   // the longest wait for each frame
+    uint64_t memory_limit;  // bytes that all images can take; 0: not known
 };
 
 // `device` must not move in memory, since its messages are in a linked list. Vulkan calls with it

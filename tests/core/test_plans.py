@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 import pickle
 import threading
 import time
@@ -284,3 +285,11 @@ def test_html_and_repr(renderer: Renderer, plain: Any) -> None:
     assert repr(plan) == (
         "<vkbloom.Plan of float32 image, 16 x 9, separable: 4 passes, 4 framebuffers>"
     )
+
+
+def test_a_plan_is_not_refused_for_its_memory(renderer: Renderer) -> None:
+    """It takes none; lavapipe tells of a heap of 2 GiB on any machine."""
+    image = np.broadcast_to(np.float32(1), (4320, 7680, 4))
+    plan = renderer.plan(image, Pyramid(levels=8, format="rgba32float"))
+    shapes = [image.shape, *(shape for shape, _ in plan.framebuffers.values())]
+    assert sum(4 * math.prod(shape) for shape in shapes) > 2 << 30
