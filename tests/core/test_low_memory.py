@@ -8,7 +8,6 @@ import sys
 import numpy as np
 import pytest
 
-import vkbloom
 from tests.device.abilities import max_side
 from tests.exhaustive import some
 from tests.processes import output, python
