@@ -135,9 +135,11 @@ struct vkb_cached_image *vkb_image_cache_add(const struct vkb_device *device,
     destroy_image(device, cached);
     if (!vkb_image_create_row(device, &both, &cached->image, error))
         return NULL;
-    vkb_label_object(device, VK_OBJECT_TYPE_IMAGE, (uint64_t)cached->image.handle, row->name);
+    // For debuggers, to which names need not be different.
+    const char *label = row->name + (row->name[0] == VKB_INTERNAL_NAME);
+    vkb_label_object(device, VK_OBJECT_TYPE_IMAGE, (uint64_t)cached->image.handle, label);
     if (cached->image.buffer)
-        vkb_label_object(device, VK_OBJECT_TYPE_BUFFER, (uint64_t)cached->image.buffer, row->name);
+        vkb_label_object(device, VK_OBJECT_TYPE_BUFFER, (uint64_t)cached->image.buffer, label);
     cached->used = cache->now;
     return cached;
 }

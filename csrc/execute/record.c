@@ -357,7 +357,7 @@ static bool record_pass(struct vkb_run *run, uint32_t index, struct vkb_error *e
         row.constants.format = STORED_UNORM8_SCALED;
     if (!vkb_pipelines_get(run->device, &run->frame->pipelines, run->graph, pass, &pipeline, error))
         return false;
-    vkb_label_begin(run->device, commands, pass->name);
+    vkb_label_begin(run->device, commands, vkb_graph_label(run->graph, pass->name));
     run->device->vk.vkCmdBindPipeline(commands, vkb_pass_bind_point(pass), pipeline);
     const bool done = linear
                         ? dispatch_linear_texels(run, pass, write_params(run, pass), output, error)
