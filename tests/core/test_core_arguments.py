@@ -103,9 +103,9 @@ def one_pass(code: bytes = SPIRV, resources: Any = (), digest: bytes = bytes(16)
     return Passes(((changed(block, **at), *rest, resources),))
 
 
-def resource(data: Any = None, **at: int) -> Any:
+def resource(data: Any = None, owner: Any = None, **at: int) -> Any:
     """Return a texture of 4 bytes, whose block has other numbers at some places."""
-    return changed(struct.pack("=2Q8I", 1, 4, 0, 37, 2, 1, 1, 1, 0, 0), **at), data
+    return changed(struct.pack("=2Q8I", 1, 4, 0, 37, 2, 1, 1, 1, 0, 0), **at), data, owner
 
 
 def edited(name: str, *numbers: float, table: Any = None, start: int = 0) -> Block:
