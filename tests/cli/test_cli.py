@@ -267,6 +267,7 @@ def test_render_writes_every_framebuffer(tmp_path: Path) -> None:
     # The picture is the file that was named.
     files["final"] = "out.png"
     assert {path.name for path in tmp_path.iterdir()} == {*files.values()}
+    assert [*vkbloom.Frames.load(tmp_path / "out.png")] == [*expected]
     for name, array in expected.items():
         if name not in depths:
             assert (rgb(pixels(tmp_path / files[name])) == rgb(array)).all()

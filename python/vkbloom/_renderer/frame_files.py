@@ -126,9 +126,15 @@ def load(path: str | os.PathLike[str]) -> tuple[dict[str, NDArray[Any]], dict[st
     # In a folder, files without the attributes of `save` are ignored.
     is_one = target.is_file()
     if is_one:
-        files, others = [target], _facts_of_all(_split_files_of(target))
-        saves = {file: save_of(said) for file, said in others.items() if is_of(target, file, said)}
-        check_alone(target, facts_of(target), saves)
+        said, others = facts_of(target), _facts_of_all(_split_files_of(target))
+        saves = {
+            file: save_of(facts) for file, facts in others.items() if is_of(target, file, facts)
+        }
+        check_alone(target, said, saves)
+        # The command `render` writes the picture to the path, and the others beside it.
+        own = save_of(said)
+        beside = [file for file, save in saves.items() if save == own and own.suffix is not None]
+        files = [target, *beside]
     else:
         listed = {file: facts_of(file) for file in _files_of(target)}
         files = chosen_files(
