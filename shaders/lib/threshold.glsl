@@ -99,11 +99,13 @@ vec4 part_above(vec4 value, float threshold)
     return vec4(above, value.a * (largest(above) / max(largest(value.rgb), 1e-30)));
 }
 
+// Nothing is divided by 0 at black, also in what is multiplied by 0: 0 / 0 is NaN, though llvmpipe leaves out
+// products with a constant 0.
 vec4 back_part_above(vec4 value, vec4 cotangent, float threshold)
 {
-    float brightest = largest(value.rgb), held = max(brightest, 1e-30);
+    float brightest = largest(value.rgb), held = max(max(brightest, threshold), 1e-30);
     float by_brightest =
-        cotangent.a * value.a * larger(brightest, threshold) * threshold / (held * held);
+        cotangent.a * value.a * larger(brightest, threshold) * (threshold / held / held);
     return vec4(cotangent.rgb * larger(value, vec4(threshold)).rgb
                     + by_brightest * shares_of_brightest(value.rgb),
                 cotangent.a * max(brightest - threshold, 0.0) / held);
