@@ -9,10 +9,16 @@ from __future__ import annotations
 from typing import Any
 
 from vkbloom._checks import import_extra
-from vkbloom._gradients.operators import number_of, refuse_capture, replaced, text_of
+from vkbloom._gradients.operators import (
+    number_of,
+    refuse_capture,
+    refuse_tangents,
+    replaced,
+    text_of,
+)
 from vkbloom._renderer.renderer import Renderer
 from vkbloom._settings.settings import Settings, check_settings, field_info
-from vkbloom.reference._derivatives import differentiable
+from vkbloom.reference._derivatives import differentiable, is_unset
 
 torch: Any = import_extra("torch", "torch", "vkbloom.torch")
 
@@ -57,12 +63,13 @@ def bloom(
     Raises
     ------
     RuntimeError
-        From a backward pass: a second derivative was asked for.
+        An argument has a tangent of forward mode, as in `torch.func.jvp` and `jacfwd`. From a
+        backward pass: a second derivative was asked for.
 
     Notes
     -----
     The operator is ``torch.ops.vkbloom.bloom``, with a fake kernel, so `torch.compile` does not
-    look into it.
+    look into it. Called by itself it does not see tangents of forward mode.
     """
     settings = check_settings(settings, of_image=True)
     return _call(
@@ -87,7 +94,7 @@ class Bloom(torch.nn.Module):  # type: ignore[misc]
     Raises
     ------
     ValueError
-        A field has no derivative, or is None.
+        A field has no derivative, or is None: give it a value where learning starts.
 
     Notes
     -----
@@ -118,6 +125,11 @@ class Bloom(torch.nn.Module):  # type: ignore[misc]
         self._channels_first = channels_first
         known = differentiable(self._start)
         for name in self._names:
+            if is_unset(self._start, name):
+                raise ValueError(
+                    f"learn: {name!r} of the settings is None, where learning cannot start; give "
+                    f"it a value, such as settings.replace({name}=...)"
+                )
             if name not in known:
                 raise ValueError(
                     f"learn: {name!r} of the method {self._start.method} has no derivative; those "
@@ -190,6 +202,7 @@ def _call(
             raise TypeError(f"{name}: a tensor is needed, not {type(tensor).__name__}")
     _check(image, mask, emission, first)
     _check_renderer(renderer)
+    refuse_tangents((image, mask, emission, *values.values()))
     if first:
         image = image.movedim(-3, -1)
         emission = None if emission is None else emission.movedim(-3, -1)

@@ -150,6 +150,8 @@ def test_parameters_return_to_their_ranges(renderer: Renderer) -> None:
     assert module.settings.knee == 0
 
 
+# (PyTorch's own forward mode.)
+@pytest.mark.filterwarnings("ignore:.torch.jit.script. is deprecated")
 @pytest.mark.parametrize(("call", "error"), rows(__file__, "tensors"))
 def test_wrong_arguments_are_named(call: str, error: str) -> None:
     names = {"bloom": vkbloom_torch.bloom, "IMAGE": tensor(6, 5, 3)}

@@ -7,7 +7,7 @@ number, is a constant of code that `torch.compile` made.
 from __future__ import annotations
 
 import functools
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, Final, NamedTuple, cast
 
 import numpy as np
@@ -226,6 +226,17 @@ def refuse_capture(image: Any) -> None:
             "vkbloom::bloom: a CUDA graph cannot hold it, since Vulkan computes it; capture the "
             "parts of the step before and after it"
         )
+
+
+def refuse_tangents(tensors: Iterable[Any]) -> None:
+    """Raise RuntimeError in forward mode: PyTorch would take the operator for a constant."""
+    for tensor in tensors:
+        if tensor is not None and torch.autograd.forward_ad.unpack_dual(tensor).tangent is not None:
+            raise RuntimeError(
+                "vkbloom::bloom: derivatives of forward mode (torch.func.jvp, jacfwd, forward_ad) "
+                "are not implemented; those of reverse mode are exact, so compute with backward() "
+                "or torch.autograd.grad"
+            )
 
 
 @_operator("vkbloom::bloom", "", "Tensor")  # type: ignore[untyped-decorator]

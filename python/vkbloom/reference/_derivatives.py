@@ -147,6 +147,17 @@ def differentiable(settings: Any) -> dict[str, Any]:
     return fields
 
 
+def is_unset(settings: Any, name: str) -> bool:
+    """Whether a field is None that has a derivative at other values."""
+    info = fields_of(type(settings)).get(name)
+    return (
+        info is not None
+        and info.kind in ("number", "numbers")
+        and getattr(settings, name) is None
+        and not ({name, f"{settings.method}.{name}"} & DISCRETE or info.fixed)
+    )
+
+
 def _is_real(value: Any) -> bool:
     """Whether a value is a float, or a tuple of such or of tuples of them, all of one length."""
     if isinstance(value, tuple) and value:
