@@ -564,7 +564,8 @@
     CONSTANT(46, WINDOW, window) \
     CONSTANT(48, EXACT_ROWS, exact_rows) \
     CONSTANT(49, TAKEN_X, taken_x) \
-    CONSTANT(50, TAKEN_Y, taken_y)
+    CONSTANT(50, TAKEN_Y, taken_y) \
+    CONSTANT(51, CLAMPED, clamped)
 
 // The names that a setting can have. Each list is a setting and a specialization constant.
 #define COMPOSITE_NAMES(NAME) \

@@ -14,6 +14,7 @@ static void add_first(struct vkb_levels *levels)
     struct vkb_pass_row row = vkb_groups_row(levels, GROUPS_URP, levels->source->glow, half);
 
     row.constants.thresholded = false;
+    row.constants.clamped = true;
     vkb_levels_pass(levels, &row);
     const uint32_t step = vkb_levels_step(levels, "reduced", 0, levels->sizes[0]);
     vkb_levels_reduce(levels, 1.0, 1.0, half, step);

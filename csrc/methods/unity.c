@@ -104,6 +104,7 @@ static void add_urp_first(struct vkb_levels *levels)
         vkb_levels_reduce(levels, 0.5, step_y, source->glow, from);
     }
     struct vkb_pass_row row = vkb_groups_row(levels, GROUPS_URP, from, vkb_levels_down(levels, 0));
+    row.constants.clamped = true;
     vkb_set_tint(&row, levels->settings->tint);
     vkb_levels_masked(levels, &row);
 }

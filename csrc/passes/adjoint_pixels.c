@@ -68,7 +68,17 @@ static bool is_clamped(const struct vkb_graph *graph)
     for (uint32_t i = 0; i < graph->pass_count; ++i)
         if (graph->passes[i].constants.groups == GROUPS_PYGFX
             || graph->passes[i].constants.groups == GROUPS_PYGFX_KARIS
-            || graph->passes[i].constants.groups == GROUPS_URP)
+            || graph->passes[i].constants.clamped)
+            return true;
+    return false;
+}
+
+// Whether a threshold multiplies the alpha of the bloom by a factor, which is 0 up to a kink.
+static bool is_thresholded(const struct vkb_graph *graph)
+{
+    for (uint32_t i = 0; i < graph->pass_count; ++i)
+        if (graph->passes[i].constants.thresholded
+            || graph->passes[i].constants.threshold_mode != THRESHOLD_NONE)
             return true;
     return false;
 }
@@ -103,6 +113,7 @@ bool vkb_transpose_composite(struct vkb_adjoint *adjoint, const struct vkb_pass_
 
     if (is_clamped(adjoint->graph))
         row.constants.groups = GROUPS_PYGFX;
+    row.constants.thresholded = row.constants.alpha == ALPHA_BLUR && is_thresholded(adjoint->graph);
     if (!vkb_add_sums(adjoint, &row, size_of(adjoint, pass->targets[0]), ".by_composite", error)
         || (is_sum(&row.constants) && depends_on_bloom(&row) && !add_curves(adjoint, &row, error)))
         return false;

@@ -111,8 +111,9 @@ vec4 back_on_side(vec4 given, vec4 bloom, float share, vec4 cotangent, int by)
 }
 
 // GROUPS is of a bloom that a clamp keeps at 0 or above. Where it is 0, it only grows: the mean of both
-// sides is that of the clamp. BY_MIXED is of the picture before exposure and curves, which adds a share of
-// the bloom to a share of the scene.
+// sides is that of the clamp. The same holds for the alpha of a bloom that is THRESHOLDED, where nothing is above
+// the threshold. BY_MIXED is of the picture before exposure and curves, which adds a share of the bloom to a share
+// of the scene.
 vec4 back_composite(vec4 given, vec4 bloom, float share, vec4 cotangent, int by)
 {
     growing = true;
@@ -120,5 +121,7 @@ vec4 back_composite(vec4 given, vec4 bloom, float share, vec4 cotangent, int by)
     growing = false;
     vec4 mean = 0.5 * (up + back_on_side(given, bloom, share, cotangent, by));
     bool clamped = GROUPS == GROUPS_PYGFX && by == BY_BLOOM;
+    if (THRESHOLDED != 0 && by == BY_BLOOM && bloom == vec4(0.0))
+        mean.a = up.a;
     return mix(mean, up, clamped ? equal(bloom, vec4(0.0)) : bvec4(false));
 }

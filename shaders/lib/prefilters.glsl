@@ -177,7 +177,7 @@ bool is_plain()
 
 // What a method makes of the combined groups. Bevy's has a floor before the threshold (bevyengine/bevy
 // v0.19.1, bloom.wgsl). Filament's threshold subtracts (google/filament, bloomDownsample2x.mat
-// @ 9f62dc2f2f53). URP has no negative colours (Unity-Technologies/Graphics,
+// @ 9f62dc2f2f53). CLAMPED: without negative colours, as URP (Unity-Technologies/Graphics,
 // com.unity.render-pipelines.universal, Bloom.shader @ 00d472fae509).
 vec4 bright_part(vec4 value)
 {
@@ -195,7 +195,7 @@ vec4 bright_part(vec4 value)
     }
     if (THRESHOLDED != 0)
         value *= factor_of(value.rgb).a;
-    if (GROUPS == GROUPS_URP)
+    if (CLAMPED != 0)
         value = max(value, vec4(0.0));
     return params.tint[0] * value;
 }

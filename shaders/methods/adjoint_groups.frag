@@ -38,7 +38,7 @@ vec4 back_bright_part(vec4 value, vec4 cotangent)
     vec4 held = GROUPS == GROUPS_BEVY ? vec4(max(value.rgb, vec3(1e-4)), value.a) : value;
     cotangent *= params.tint[0];
     // The threshold's factor is not negative.
-    if (GROUPS == GROUPS_URP)
+    if (CLAMPED != 0)
         cotangent *= larger(value, vec4(0.0));
     if (THRESHOLDED != 0)
         cotangent = back_through_factor(held, factor_of(held.rgb), cotangent);

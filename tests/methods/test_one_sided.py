@@ -201,6 +201,71 @@ def test_kinks_behind_one_another_are_halved_once(
         assert (found * direction).sum() == pytest.approx(expected, rel=1e-3, abs=1e-3)
 
 
+#: Settings at a kink behind another one: the image's colour, and the channels that change.
+MEANS: tuple[tuple[Any, tuple[float, ...], slice], ...] = (
+    (
+        vkbloom.FilamentBloom(resolution=16, levels=2, threshold=0.5, alpha="blur"),
+        (0.5, 0, 0, 0.5),
+        slice(1),
+    ),
+    (vkbloom.UnrealBloom(threshold=0.5, alpha="blur"), (0.5, 0.5, 0.5, 0.5), slice(1)),
+    (vkbloom.PlayCanvasBloom(alpha="blur", intensity=0.5), (0.25, 0.25, 0.25, 0), slice(3, 4)),
+    (vkbloom.PlayCanvasBloom(alpha="blur", intensity=0.5), (0, 0, 0, 1), slice(1)),
+    (vkbloom.UrpBloom(threshold=None, alpha="blur"), (0.25, 0.25, 0.25, 0), slice(3, 4)),
+    (Separable(alpha="max"), (0, 0, 0, 0), slice(3)),
+    (Pyramid(levels=2, alpha="blur", glare=GLARES[:1]), (0, 0, 0, 0), slice(3, 4)),
+)
+
+
+@pytest.mark.parametrize(("settings", "colour", "changed"), MEANS)
+def test_kinks_of_a_chain_have_the_mean_of_both_sides(
+    renderer: Renderer, settings: Any, colour: tuple[float, ...], changed: slice
+) -> None:
+    image = np.broadcast_to(colour, (4, 6, 4)).astype(np.float64)
+    settings = settings.replace(format="rgba32float")
+    direction, given = np.zeros(image.shape), {"final": np.ones(image.shape, np.float32)}
+    direction[1, 2, changed] = 1
+    left, before, right = (
+        float(reference.apply(image + step * direction, settings)["final"].sum())
+        for step in (-STEP, 0, STEP)
+    )
+    # A kink indeed.
+    assert abs(right + left - 2 * before) > 1e-3 * STEP
+    expected = (right - left) / (2 * STEP)
+    for vjp in (reference.vjp, functools.partial(vkbloom.vjp, renderer=renderer)):
+        found = vjp(image.astype(np.float32), settings)[1](given)["image"]  # type: ignore[operator]
+        assert (found * direction).sum() == pytest.approx(expected, rel=1e-4)
+
+
+#: Fields at a kink, and values of them.
+KINKED: tuple[tuple[Any, str, Any], ...] = (
+    (vkbloom.UrpBloom(), "tint", (1.0, 0.5, 0.3)),
+    (vkbloom.PostProcessingBloom(knee=0.5), "threshold", 1.0),
+    (vkbloom.PostProcessingBloom(), "clamp", 1.0),
+    (BlenderGlare(threshold=0.25), "smoothness", 0.25),
+    (BlenderGlare(smoothness=0.25), "threshold", 0.25),
+)
+
+
+@pytest.mark.parametrize(("settings", "name", "value"), KINKED)
+def test_fields_at_a_kink_have_the_mean_of_both_sides(
+    settings: Any, name: str, value: float | tuple[float, ...]
+) -> None:
+    image = np.random.default_rng(1).random((8, 9, 3)) ** 2 * 4
+    settings = settings.replace(format="rgba32float")
+
+    def total(step: float) -> float:
+        first, *rest = np.atleast_1d(value)
+        changed = (first + step, *rest) if isinstance(value, tuple) else first + step
+        return float(reference.apply(image, settings.replace(**{name: changed}))["bloom"].sum())
+
+    left, before, right = (total(step) for step in (-STEP, 0, STEP))
+    assert abs(right + left - 2 * before) > 1e-3 * STEP
+    frames, pullback = reference.vjp(image, settings.replace(**{name: value}))
+    found = pullback({"bloom": np.ones(frames["bloom"].shape)})[name]
+    assert found.ravel()[0] == pytest.approx((right - left) / (2 * STEP), rel=1e-4)
+
+
 CURVES = [
     (tonemap, encoding, composite, alpha)
     for tonemap, encoding in itertools.product(TONEMAPS, ENCODINGS)

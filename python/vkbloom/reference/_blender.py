@@ -155,8 +155,8 @@ def _highlights(rgb: Array, settings: BlenderGlare) -> Array:
     high = math.inf if settings.maximum is None else low + settings.maximum
     value = brightest(rgb)
     # The soft parts must not extend below 0 or beyond the other end.
-    at_low = min(settings.smoothness, low, high - low)
-    at_high = min(settings.smoothness, high, high - low)
+    width = np.minimum(settings.smoothness, high - low)
+    at_low, at_high = np.minimum(width, low), np.minimum(width, high)
     kept = _smooth_extreme(1, value, low, at_low)
     if high < math.inf:
         kept = _smooth_extreme(-1, kept, high, at_high)

@@ -128,7 +128,9 @@ def composite_checked(
 def _blend_alpha(alpha: Array, light: Array, mode: str) -> Array:
     """Return the alpha of the final image, (H, W, 1); (H, W, 0) if the scene has none."""
     if mode == "max":
-        larger: Array = np.maximum(alpha, np.clip(light[..., :3].max(axis=-1, keepdims=True), 0, 1))
+        largest = np.clip(light[..., :3].max(axis=-1, keepdims=True), 0, 1)
+        # The maximum, of which light that is 0 at an alpha of 0 has the side of its clamp.
+        larger: Array = joined(largest - alpha, 0.0, alpha, largest)
         return larger
     if mode == "blur":
         if light.shape[2] == 3:

@@ -15,6 +15,7 @@ import numpy as np
 from ._image import BlurInput
 from ._pyramid import downsample
 from ._sampling import Array, box, size_of
+from ._tape import joined
 from ._threshold import masked, soften, with_alpha
 from ._upsampling import Filter, combine, halvings, tent
 
@@ -73,6 +74,5 @@ def _prefilter(rgb: Array, settings: PostProcessingBloom) -> Array:
 
 def linear_light(value: Any) -> Any:
     """Return the light of a value in sRGB; above 1 it is a power of 2.2, as Unity converts it."""
-    if value > 1:
-        return value**2.2
-    return value / 12.92 if value <= 0.04045 else ((value + 0.055) / 1.055) ** 2.4
+    power = joined(value, 1.0, ((value + 0.055) / 1.055) ** 2.4, value**2.2)
+    return joined(value, 0.04045, value / 12.92, power)
