@@ -20,6 +20,7 @@ from tests.methods.test_adjoint_passes import CASES, RARE
 from tests.variants import VARIANTS, opened
 from vkbloom import Pyramid, Renderer, Scene, glares
 from vkbloom._doctor.cases import METHODS, presets_of_low_levels
+from vkbloom._gradients.passes import DeviceGradients
 
 #: NaN in half and single floats; about 12 in single floats, 3 in half floats.
 BYTES: Final = ("ff", "41")
@@ -50,11 +51,14 @@ def made(renderer: Renderer, settings: Any, size: tuple[int, int]) -> Iterator[t
     fused = renderer.apply(image, settings.replace(exposure=0.25), framebuffers=("final",))
     yield "fused", fused["final"]
     # Also where everything is read that a source can have.
-    for given in ({}, {"mask": mask, "emission": image[::-1].copy()}):
+    both = {"mask": mask, "emission": image[::-1].copy()}
+    arrays: tuple[dict[str, Any], ...] = ({}, both)
+    for given in arrays:
         final, pullback = vkbloom.vjp(image, settings, renderer=renderer, **given)
         derivatives = pullback({"final": np.ones_like(final["final"])})
-        if hasattr(derivatives, "_known"):
-            yield from ((f"by {name} {len(given)}", derivatives[name]) for name in ("image", *given))
+        if isinstance(derivatives, DeviceGradients):
+            for name in ("image", *given):
+                yield f"by {name}, {len(given)} given", derivatives[name]
 
 
 def drawn(renderer: Renderer) -> Iterator[tuple[str, Any]]:

@@ -233,7 +233,7 @@ def test_kinks_of_a_chain_have_the_mean_of_both_sides(
     assert abs(right + left - 2 * before) > 1e-3 * STEP
     expected = (right - left) / (2 * STEP)
     for vjp in (reference.vjp, functools.partial(vkbloom.vjp, renderer=renderer)):
-        found = vjp(image.astype(np.float32), settings)[1](given)["image"]  # type: ignore[operator]
+        found = vjp(image.astype(np.float32), settings)[1](given)["image"]
         assert (found * direction).sum() == pytest.approx(expected, rel=1e-4)
 
 

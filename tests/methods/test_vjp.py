@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import copy
 import functools
+import pickle
 from typing import Any
 
 import numpy as np
@@ -12,6 +14,7 @@ import vkbloom
 from tests.images import random_image
 from tests.refusals import assert_refused, rows
 from vkbloom import Renderer, reference
+from vkbloom._gradients.passes import DeviceGradients
 
 ONES = np.ones((4, 4, 3), np.float32)
 
@@ -72,6 +75,54 @@ def test_uploaded_images_are_refused_as_in_apply(renderer: Renderer) -> None:
                 use(uploaded, vkbloom.Pyramid())
             messages.append(str(raised.value))
     assert messages[0] == messages[1]
+
+
+def through_pickle(value: Any) -> Any:
+    return pickle.loads(pickle.dumps(value))
+
+
+@pytest.mark.parametrize("copied", [through_pickle, copy.copy, copy.deepcopy])
+@pytest.mark.parametrize("settings", [vkbloom.Pyramid(threshold=0.2), vkbloom.HdrpBloom()])
+def test_what_vjp_returns_can_be_pickled_and_copied(
+    renderer: Renderer, settings: Any, copied: Any
+) -> None:
+    """Also derivatives that were not read yet, and a pullback, on any renderer."""
+    image, mask = random_image(6, 7, seed=1).astype(np.float32), np.ones((6, 7), np.float32)
+    cotangents = {"final": image}
+    for vjp in (functools.partial(vkbloom.vjp, renderer=renderer), reference.vjp):
+        frames, pullback = vjp(image, settings, mask=mask)
+        expected = dict(pullback(cotangents))
+        for found in (copied(pullback)(cotangents), copied(pullback(cotangents))):
+            assert [*found] == [*expected]
+            for name, part in expected.items():
+                np.testing.assert_array_equal(found[name], part)
+            with pytest.raises(ValueError, match="gradients: 'levels' has no derivative"):
+                found["levels"]
+        np.testing.assert_array_equal(copied(frames)["final"], frames["final"])
+
+
+def test_after_an_error_derivatives_are_read_again() -> None:
+    """An error, of the device or of the host's memory, takes no source of derivatives away."""
+    errors: list[Exception] = [vkbloom.OutOfMemoryError("full"), MemoryError()]
+
+    def fields() -> dict[str, Any]:
+        if len(errors) == 2:
+            raise errors.pop(0)
+        return {"exposure": np.float32(1)}
+
+    def every() -> dict[str, Any]:
+        if errors:
+            raise errors.pop(0)
+        return {"exposure": np.float32(2), "radius": np.float32(3)}
+
+    gradients = DeviceGradients({}, ("exposure", "radius"), fields, every)
+    with pytest.raises(vkbloom.OutOfMemoryError):
+        gradients["radius"]
+    assert gradients["exposure"] == 1
+    with pytest.raises(MemoryError):
+        gradients["radius"]
+    assert gradients["radius"] == 3
+    assert gradients["exposure"] == 1
 
 
 def test_a_field_has_the_same_bits_however_it_is_read(renderer: Renderer) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final, cast
@@ -14,7 +15,7 @@ from vkbloom._renderer import requests
 from vkbloom._renderer.device_arrays import Destination, ImportedArray, placed
 from vkbloom._renderer.renderer import Renderer
 from vkbloom._renderer.sources import Inputs
-from vkbloom.reference._derivatives import check_known, differentiable
+from vkbloom.reference._derivatives import Gradients, check_known, differentiable
 
 if TYPE_CHECKING:
     from vkbloom._settings.settings import Settings
@@ -153,6 +154,8 @@ def device_fields(settings: Settings) -> frozenset[str]:
 class DeviceGradients(Mapping[str, NDArray[Any]]):
     """Derivatives of the device; others are computed when the first of them is read.
 
+    What is pickled has all of them. After an error the next reading tries again.
+
     - `known`: Those by images.
     - `names`: All names, in the order of the reference.
     - `fields`: Returns those by some of the fields.
@@ -169,12 +172,21 @@ class DeviceGradients(Mapping[str, NDArray[Any]]):
         self._known = dict(known)
         self._names = tuple(names)
         self._sources = [fields, every]
+        self._lock = threading.Lock()
 
     def __getitem__(self, name: str) -> NDArray[Any]:
         check_known(name, self._names)
-        while name not in self._known:
-            self._known = {**self._sources.pop(0)(), **self._known}
-        return self._known[name]
+        with self._lock:
+            while name not in self._known:
+                self._known = {**self._sources[0](), **self._known}
+                del self._sources[0]
+            return self._known[name]
+
+    def __reduce__(self) -> tuple[type[Gradients], tuple[dict[str, NDArray[Any]]]]:
+        return Gradients, (dict(self),)
+
+    def __copy__(self) -> DeviceGradients:
+        return self
 
     def __contains__(self, name: object) -> bool:
         return name in self._names

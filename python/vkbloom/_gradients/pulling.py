@@ -5,7 +5,8 @@ from __future__ import annotations
 import functools
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from typing import TYPE_CHECKING, Any, cast
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -112,13 +113,49 @@ def vjp(
         uploaded = Image(source, shape, np.dtype(dtype))
     floats = settings.replace(format="rgba32float")
     frames = renderer.apply(uploaded, floats, device=device)
+    shapes = {name: Shape(part.shape) for name, part in frames.items()}
     destination = place_of(next(iter(frames.values())))
-    pulled = pullback_of(renderer, inputs, settings, destination)
+    return frames, ImagePullback(inputs, settings, shapes, renderer, destination)
 
-    def pullback(cotangents: Mapping[str, NDArray[Any]]) -> Derivatives:
-        return pulled(_checked(cotangents, frames, core))
 
-    return frames, pullback
+class Shape(NamedTuple):
+    """The shape of a framebuffer."""
+
+    shape: tuple[int, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class ImagePullback:
+    """The pullback of `vjp`, which never changes.
+
+    One that was pickled runs on the default renderer of its process.
+    """
+
+    inputs: Inputs
+    settings: Settings
+    frames: Mapping[str, Shape]
+    renderer: Renderer | None = None
+    destination: Destination = "host"
+
+    def __call__(self, cotangents: Mapping[str, NDArray[Any]]) -> Derivatives:
+        return self._pulled(_checked(cotangents, self.frames, self._renderer._core))
+
+    @functools.cached_property
+    def _renderer(self) -> Renderer:
+        return self.renderer or default_renderer()
+
+    @functools.cached_property
+    def _pulled(self) -> Callable[[Checked], Derivatives]:
+        return pullback_of(self._renderer, self.inputs, self.settings, self.destination)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return ImagePullback, (Inputs(**self.inputs.on_host()), self.settings, self.frames)
+
+    def __copy__(self) -> ImagePullback:
+        return self
+
+    def __deepcopy__(self, memo: object) -> ImagePullback:
+        return self
 
 
 def _checked(cotangents: Any, frames: Mapping[str, Any], core: Any) -> Checked:

@@ -106,12 +106,12 @@ def vjp(
     if weights is not None:
         inputs["mask"] = Traced(weights)
     traced: Any = _TracedSettings(settings, inputs)
-    arrays: dict[str, Any] = {**inputs}
+    images: dict[str, Any] = {**inputs}
     results_by_name: dict[str, Any] = framebuffers(
-        arrays["image"],
-        arrays.get("emission", arrays["image"]),
+        images["image"],
+        images.get("emission", images["image"]),
         traced,
-        mask=arrays.get("mask"),
+        mask=images.get("mask"),
         format="rgba32float",
         dtype=np.asarray(image).dtype,
     )
@@ -130,7 +130,38 @@ def vjp(
             results["mask"] = results["mask"][..., 0]
         return results
 
-    return values, pullback
+    given = {"image": image, "mask": mask, "emission": emission}
+    arrays = {name: np.array(part) for name, part in given.items() if part is not None}
+    return values, RecordedPullback(pullback, arrays, settings)
+
+
+class RecordedPullback:
+    """The pullback of `vjp`, which never changes. What is pickled is recorded anew."""
+
+    def __init__(
+        self,
+        pullback: Callable[[Mapping[str, NDArray[Any]]], Gradients],
+        arrays: dict[str, Array],
+        settings: Settings,
+    ) -> None:
+        self._pullback, self._arrays, self._settings = pullback, arrays, settings
+
+    def __call__(self, cotangents: Mapping[str, NDArray[Any]]) -> Gradients:
+        return self._pullback(cotangents)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _record, (self._arrays, self._settings)
+
+    def __copy__(self) -> RecordedPullback:
+        return self
+
+    def __deepcopy__(self, memo: object) -> RecordedPullback:
+        return self
+
+
+def _record(arrays: dict[str, Array], settings: Settings) -> Any:
+    """Return the pullback of arrays by name; for pickle."""
+    return vjp(settings=settings, **arrays)[1]
 
 
 def differentiable(settings: Any) -> dict[str, Any]:
