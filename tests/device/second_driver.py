@@ -35,12 +35,21 @@ def scenes() -> list[Case]:
     ]
 
 
+def some_of(every: list[Case], turn: int) -> list[Case]:
+    """Return every twelfth case, and derivatives that divide by 0 where a driver lets them.
+
+    (lavapipe leaves out products with a constant 0.)
+    """
+    lamps = [case for case in every if case.name.endswith("a lamp")]
+    return [*every[turn :: 4 * len(VARIANTS)], *lamps]
+
+
 def main() -> None:
     wrong: dict[str, str] = {}
     every = [*(case for case in cases() if case.variant == "auto"), *scenes()]
     for turn, variant in enumerate(VARIANTS):
         with opened(variant, "software", validation=True) as renderer:
-            for case in every if EXHAUSTIVE else every[turn :: 4 * len(VARIANTS)]:
+            for case in every if EXHAUSTIVE else some_of(every, turn):
                 name = f"{case.group}: {case.name}"
                 found = judge(case, renderer)["wrong"]
                 if found and not reason_against(name):

@@ -154,6 +154,15 @@ def test_passes_are_the_transposes_of_the_reference(renderer: Renderer, name: st
         assert np.array_equal(found["image"], again["image"])
 
 
+@pytest.mark.parametrize("name", CASES)
+def test_derivatives_of_a_lamp_on_black_are_finite(renderer: Renderer, name: str) -> None:
+    settings = CASES[name]
+    image = np.zeros((11, 14, 3 if settings.alpha == "keep" else 4), np.float32)
+    image[5, 7], image[..., 3:] = 4, 1
+    pullback, cotangents, expected = pulled(renderer, image, settings)
+    check(pullback(cotangents), expected, "image")
+
+
 @pytest.mark.parametrize(
     "settings",
     [

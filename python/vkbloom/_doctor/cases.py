@@ -22,6 +22,7 @@ from vkbloom import (
     Renderer,
     Scene,
     Separable,
+    Streaks,
     gaussian_weights,
     glares,
     presets,
@@ -72,6 +73,12 @@ TONEMAPS: Final = ("none", "reinhard", "aces", "exponential", "khronos_neutral",
 ENCODINGS: Final = ("none", "gamma22", "srgb", "pq", "hlg")
 # Those whose derivatives have no kink that noise meets.
 _SMOOTH: Final = ("tutorial", "fractional", "layers", "half-size", "pyramid", "dual-kawase")
+# Those whose derivatives divide by a brightness, which at black is 0.
+_DIVIDING: Final[dict[str, Settings]] = {
+    "filament": presets["filament"].replace(resolution=16),
+    "filament-alpha": presets["filament"].replace(resolution=16, alpha="blur"),
+    "streaks": Pyramid(levels=2, glare=(Streaks(threshold=0.1, halvings=1, iterations=2),)),
+}
 _SIZE: Final = (61, 43)
 #: Of scenes.
 FRAME: Final = (96, 54)
@@ -200,9 +207,27 @@ def compare_scene(
 def _derivatives(renderer: Renderer, settings: Settings, given: bool) -> Iterator[Deviation]:
     values = np.random.default_rng(1).random((4, 11, 14, 3), np.float32)
     arrays: dict[str, Any] = {"mask": values[1, ..., 0], "emission": values[2]} if given else {}
-    _, pullback = vkbloom.vjp(values[0], settings, renderer=renderer, **arrays)
-    gradients = pullback({"final": values[3]})
-    for name, part in reference.vjp(values[0], settings, **arrays)[1]({"final": values[3]}).items():
+    yield from _pulled(renderer, settings, values[0], values[3], **arrays)
+
+
+def _derivatives_of_a_lamp(renderer: Renderer, settings: Settings) -> Iterator[Deviation]:
+    image, cotangent = np.zeros((2, 11, 14, 4), np.float32)
+    image[5, 7], image[..., 3] = (4, 2, 1, 1), 1
+    cotangent[:] = np.random.default_rng(1).random(cotangent.shape)
+    yield from _pulled(renderer, settings, image, cotangent)
+
+
+def _pulled(
+    renderer: Renderer,
+    settings: Settings,
+    image: NDArray[Any],
+    cotangent: NDArray[Any],
+    **arrays: Any,
+) -> Iterator[Deviation]:
+    _, pullback = vkbloom.vjp(image, settings, renderer=renderer, **arrays)
+    gradients = pullback({"final": cotangent})
+    _, of_reference = reference.vjp(image, settings, **arrays)
+    for name, part in of_reference({"final": cotangent}).items():
         limit = 1e-5 * max(float(np.abs(part).max()), 1e-3)
         yield deviation(
             f"derivative by {name}", np.asarray(gradients[name]), np.asarray(part), limit
@@ -264,6 +289,9 @@ def cases() -> Iterator[Case]:
         label = f"{name}{' with mask and emission' * given}"
         check = partial(_derivatives, settings=METHODS[name], given=given)
         yield Case("derivatives", label, check)
+    for name, settings in _DIVIDING.items():
+        check = partial(_derivatives_of_a_lamp, settings=settings)
+        yield Case("derivatives", f"{name}, a lamp", check)
     for dtype in DTYPES:
         of_pyramid: Any = {"dtype": dtype, "settings": METHODS["pyramid"]}
         yield Case("NaN and infinity", f"pyramid, {dtype}", partial(_not_finite, **of_pyramid))
