@@ -124,11 +124,15 @@ Sum sum_of(vec4 groups[5], float shares[5])
     return sum;
 }
 
+bvec4 is_usual(vec4 value)
+{
+    return notEqual(floatBitsToUint(value) & 0x7f800000u, uvec4(0x7f800000u));
+}
+
 // What is not finite is 0.
 vec4 usual(vec4 value)
 {
-    return mix(vec4(0.0), value,
-               notEqual(floatBitsToUint(value) & 0x7f800000u, uvec4(0x7f800000u)));
+    return mix(vec4(0.0), value, is_usual(value));
 }
 
 const float ONES[5] = float[](1.0, 1.0, 1.0, 1.0, 1.0);

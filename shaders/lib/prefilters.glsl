@@ -136,8 +136,8 @@ vec4 three_factor(vec3 colour)
     float luminance = dot(colour, weights);
     float place = (luminance - params.threshold) / params.smooth_width, t = clamp(place, 0.0, 1.0);
     float slope = t == place ? 6.0 * t * (1.0 - t) / params.smooth_width : 0.0;
-    return vec4(slope * weights,
-                smoothstep(params.threshold, params.threshold + params.smooth_width, luminance));
+    // Not smoothstep(), which is undefined where rounding makes both ends equal.
+    return vec4(slope * weights, t * t * (3.0 - 2.0 * t));
 }
 
 // Unreal's: the luminance above the threshold, of which 1 more is stored (Epic Games, "Bloom").

@@ -19,11 +19,12 @@ float largest(vec3 value)
     return max(value.r, max(value.g, value.b));
 }
 
-// The slope of the largest channel: equal ones have equal shares.
+// The slope of the largest channel: equal ones have equal shares. (NaN, and a maximum that a device rounds to 0, equal
+// none.)
 vec3 shares_of_brightest(vec3 colour)
 {
     vec3 share = vec3(equal(colour, vec3(largest(colour))));
-    return share / (share.r + share.g + share.b);
+    return share / max(share.r + share.g + share.b, 1.0);
 }
 
 // A soft threshold's factor of a colour, and its derivatives by brightness, threshold and width.

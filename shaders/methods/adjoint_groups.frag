@@ -27,13 +27,14 @@ vec4 back_bright_part(vec4 value, vec4 cotangent)
     if (is_plain())
         return cotangent;
     if (GROUPS == GROUPS_PYGFX || GROUPS == GROUPS_PYGFX_KARIS)
-        return cotangent * larger(usual(value), vec4(0.0));
+        return mix(vec4(0.0), cotangent * larger(value, vec4(0.0)), is_usual(value));
     if (THRESHOLDED != 0 && GROUPS == GROUPS_FILAMENT) {
         vec4 above = part_above(value, params.threshold);
         float divisor = 1.0 + largest(above.rgb) / params.highlight;
-        vec3 slope = shares_of_brightest(above.rgb) / (-params.highlight * divisor * divisor);
-        return back_part_above(
-            value, back_through_factor(above, vec4(slope, 1.0 / divisor), cotangent), params.threshold);
+        // The product with the result, not with what is above, which may overflow.
+        vec3 slope = shares_of_brightest(above.rgb) / (-params.highlight * divisor);
+        vec4 factor = vec4(slope, 1.0 / divisor);
+        return back_part_above(value, back_through_factor(above / divisor, factor, cotangent), params.threshold);
     }
     vec4 held = GROUPS == GROUPS_BEVY ? vec4(max(value.rgb, vec3(1e-4)), value.a) : value;
     cotangent *= params.tint[0];

@@ -163,6 +163,13 @@ def test_derivatives_of_a_lamp_on_black_are_finite(renderer: Renderer, name: str
     check(pullback(cotangents), expected, "image")
 
 
+def test_infinite_weights_have_no_derivative(renderer: Renderer) -> None:
+    """A luminance of -1 makes the divisor 0."""
+    image = -np.ones((6, 7, 3), np.float32)
+    pullback, cotangents, expected = pulled(renderer, image, CASES["pygfx karis"])
+    check(pullback(cotangents), expected, "image")
+
+
 @pytest.mark.parametrize(
     "settings",
     [
