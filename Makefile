@@ -3,6 +3,8 @@
 # make test-devices: runs all tests on SwiftShader, which comes with Debian's Chromium; compiles and
 #   records everything for seven families of AMD's GPUs, without one, on Mesa 22.3.6 and 25.0.7. (make
 #   test runs a part of both.) SWIFTSHADER: its manifest. TESTS: some of the tests.
+# make test-torch: runs the tests that need PyTorch, with the one for CPUs in an environment of its own,
+#   build/torch (0.7 GB).
 # make exhaustive: the same with every case of the tests that otherwise take a few (tests/exhaustive.py),
 #   such as each fault point; takes hours.
 # make check: for use during development: lints the changed files, runs a fast part of the tests.
@@ -39,7 +41,7 @@ WORKERS := $(shell echo $$(($$(nproc 2>/dev/null || echo 2) + 1)))
 GROUPS := all
 PARALLEL := -n $(WORKERS) --dist loadfile --no-loadscope-reorder
 # One thread of lavapipe in each of them: with more they take a quarter more time from each other.
-test exhaustive check sanitize: export LP_NUM_THREADS := 1
+test test-torch exhaustive check sanitize: export LP_NUM_THREADS := 1
 # Python keeps compiled modules, also where the environment says otherwise: each process would compile
 # the package again, and each run the tests' assertions. So pip leaves to the first use what is used.
 export PYTHONDONTWRITEBYTECODE :=
@@ -51,7 +53,7 @@ FAST := tests/core/test_settings.py tests/core/test_core_arguments.py tests/core
 	tests/methods/test_dither.py tests/methods/test_original_blur.py tests/scene/test_scene.py \
 	tests/io/test_files.py tests/views
 
-.PHONY: demo test test-devices exhaustive check docs first-page tables bench engines engine-laws libplacebo cluster wheels lint \
+.PHONY: demo test test-devices test-torch exhaustive check docs first-page tables bench engines engine-laws libplacebo cluster wheels lint \
 	freethreaded try-core try-wheels test-pure test-aarch64 format sanitize clean
 .DELETE_ON_ERROR:
 
@@ -66,6 +68,22 @@ test-devices: build/stamp/core build/stamp/test
 	test -f $(SWIFTSHADER) || { echo "$(SWIFTSHADER) is missing: apt install chromium-common"; exit 2; }
 	$(PYTHON) -m pytest $(PARALLEL) $(TESTS)
 	env -u VK_DRIVER_FILES -u VK_ICD_FILENAMES $(PYTHON) -m tests.device.amd_families
+
+# PyTorch for CPUs comes from an index of its own; where that is out of reach, pip takes what it finds.
+TORCH := build/torch/bin/python
+TORCH_INDEX := https://download.pytorch.org/whl/cpu
+test-torch: build/stamp/core build/stamp/test build/torch/done
+	$(TORCH) -m pytest -q tests/methods/test_torch.py tests/device/test_training_pairs.py
+	$(TORCH) -m pytest -q tests/docs/test_scripts.py -k "torch or operators or learned"
+
+# It finds what is installed in $(VENV), too.
+build/torch/done: pyproject.toml | build/stamp/packages
+	$(PYTHON) -m venv --clear --without-pip build/torch
+	$(PYTHON) -c "import sysconfig; print('import site; site.addsitedir(%r)' % sysconfig.get_path('purelib'))" \
+	    >$$($(TORCH) -c "import sysconfig; print(sysconfig.get_path('purelib'))")/packages.pth
+	$(PYTHON) -m pip --python $(TORCH) install -qq --no-compile --retries 0 --extra-index-url $(TORCH_INDEX) \
+	    torch==2.13.0
+	touch $@
 
 exhaustive: export VKBLOOM_EXHAUSTIVE := 1
 test exhaustive: build/stamp/core build/stamp/test

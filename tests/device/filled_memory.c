@@ -55,11 +55,10 @@ static VKAPI_ATTR VkResult VKAPI_CALL create_device(VkPhysicalDevice physical,
     return result;
 }
 
-static const struct entry entries[] = {ENTRY(vkGetInstanceProcAddr, get_instance_proc, false),
-                                       ENTRY(vkCreateInstance, begin_instance, false),
-                                       ENTRY(vkCreateDevice, create_device, false),
-                                       ENTRY(vkGetDeviceProcAddr, get_device_proc, true),
-                                       ENTRY(vkAllocateMemory, allocate, true)};
+static const struct entry entries[] = {
+    ENTRY(vkGetInstanceProcAddr, get_instance_proc, false),
+    ENTRY(vkCreateInstance, begin_instance, false), ENTRY(vkCreateDevice, create_device, false),
+    ENTRY(vkGetDeviceProcAddr, get_device_proc, true), ENTRY(vkAllocateMemory, allocate, true)};
 
 static PFN_vkVoidFunction find_own(const char *name, bool of_device)
 {

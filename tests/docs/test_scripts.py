@@ -94,7 +94,8 @@ def test_a_script_runs(
     script: str, folder: Path, kept_renderers: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     words, needed = RUN[script]
-    pytest.importorskip(needed)
+    hint = "; run make test-torch" if needed == "torch" else ""
+    pytest.importorskip(needed, reason=f"{needed} is not installed{hint}")
     (folder / "pictures").mkdir()
     shutil.copy(ROOT / "docs" / "plans.md", folder)  # a script writes its flowchart
     monkeypatch.setattr(vkbloom, "presets", Few(vkbloom.presets, "kino", "unity_urp"))
@@ -168,7 +169,7 @@ def examples_in(module: ModuleType) -> list[doctest.DocTest]:
 @pytest.mark.parametrize("name", list(modules()))
 def test_examples_of_a_module(name: str, request: pytest.FixtureRequest) -> None:
     if name.endswith((".torch", ".operators")):
-        pytest.importorskip("torch", reason="PyTorch is not installed")
+        pytest.importorskip("torch", reason="PyTorch is not installed; run make test-torch")
     module = importlib.import_module(name)
     report: list[str] = []
     runner = doctest.DocTestRunner(optionflags=FLAGS, verbose=False)

@@ -14,7 +14,7 @@ from tests.processes import output
 from tests.refusals import assert_refused, rows
 from vkbloom import Renderer
 
-torch = pytest.importorskip("torch", reason="PyTorch is not installed")
+torch = pytest.importorskip("torch", reason="PyTorch is not installed; run make test-torch")
 
 from vkbloom import torch as vkbloom_torch  # noqa: E402
 from vkbloom._gradients import operators  # noqa: E402
