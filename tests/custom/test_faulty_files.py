@@ -142,3 +142,11 @@ def test_a_file_that_is_no_text_is_refused(tmp_path: Path) -> None:
     file.write_bytes(b"//!HOOK MAIN\n\x89PNG\n")
     with pytest.raises(ValueError, match=r"picture\.png:2: byte 0x89 is not UTF-8"):
         read_source(file)
+
+
+@pytest.mark.parametrize("name", ["photo.jpg", "photo"])
+def test_a_picture_is_no_method(tmp_path: Path, name: str) -> None:
+    file = tmp_path / name
+    file.write_bytes(b"\xff\xd8\xff\xe0\0\x10JFIF")
+    with pytest.raises(ValueError, match=f"'vkbloom apply {name} OUT' adds bloom to a picture"):
+        read_source(file)

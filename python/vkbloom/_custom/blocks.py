@@ -6,6 +6,7 @@ import dataclasses
 import re
 from typing import Final
 
+from vkbloom._custom import hints
 from vkbloom._custom.source import Source
 
 MARK: Final = "//!"
@@ -94,7 +95,9 @@ def read_blocks(source: Source) -> list[Block]:
     start = text.find(MARK)
     if start < 0:
         raise source.fault(
-            1, f"the file has no line that begins with {MARK}, so no pass; see custom methods"
+            1,
+            f"the file has no line that begins with {MARK}, so no pass; see custom methods"
+            + hints.for_text(source.name, text),
         )
     blocks = []
     line = text.count("\n", 0, start) + 1

@@ -19,8 +19,10 @@ from typing import Final
 import numpy as np
 
 from vkbloom._core import ShaderError
+from vkbloom._custom import hints
 from vkbloom._custom.file import CustomFile
 from vkbloom._custom.glsl import BODY, Shader
+from vkbloom._custom.names import GLOW, HOOKED, STAGES, stage_of
 from vkbloom._custom.passes import CustomPass
 from vkbloom._custom.spirv import without_contraction
 from vkbloom._io.disk_cache import DiskCache
@@ -159,7 +161,11 @@ def explained(file: CustomFile, item: CustomPass, status: int, text: str) -> str
     last = item.body_line + item.body.count("\n")
     for part, number, cause in MESSAGE.findall(text):
         if part == str(BODY):
-            return source.where(min(max(int(number), 1), last), cause.strip())
+            bound = [stage_of(binding.value) for binding in item.bindings]
+            saved = [each.save.value for each in file.passes if each.save is not None]
+            textures = [HOOKED, GLOW, *STAGES, *saved, *file.given]
+            hint = hints.for_undeclared(cause, bound, textures)
+            return source.where(min(max(int(number), 1), last), cause.strip() + hint)
     if "'hook'" in text:
         kind = "void hook()" if item.compute else "vec4 hook()"
         return source.where(item.body_line, f"the pass defines no function '{kind}'")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterator
 
+from vkbloom._custom import hints
 from vkbloom._custom.blocks import Directive, read_blocks
 from vkbloom._custom.buffers import Buffer, read_buffer
 from vkbloom._custom.expressions import ExpressionError, Values, evaluate
@@ -129,7 +130,7 @@ def check_expression(expression: Directive | None, values: Values) -> None:
     try:
         evaluate(expression.value, values, finite=False)
     except ExpressionError as error:
-        raise expression.fault(error) from None
+        raise expression.fault(f"{error}{hints.for_expression(expression.value)}") from None
 
 
 def check_picture(file: CustomFile) -> None:

@@ -7,6 +7,8 @@ import hashlib
 from pathlib import Path
 from typing import Final
 
+from vkbloom._custom import hints
+
 #: No file of passes is larger; a picture that was given by mistake is.
 LARGEST_FILE: Final = 1 << 26
 #: Of a line that a message quotes.
@@ -55,7 +57,8 @@ def read_source(source: str | Path) -> Source:
     except UnicodeDecodeError as error:
         line = data.count(b"\n", 0, error.start) + 1
         raise ValueError(
-            f"{path}:{line}: byte {data[error.start]:#04x} is not UTF-8; save the file as UTF-8"
+            f"{path}:{line}: byte {data[error.start]:#04x} is not UTF-8; "
+            f"{hints.for_bytes(path.name, data)}"
         ) from None
     return checked(Source(str(path), text))
 
