@@ -13,11 +13,14 @@ from typing import Final
 _NO_ATTRIBUTES: Final[Mapping[str, object]] = {}
 # Of cells: some notebooks, such as marimo, have no padding of their own.
 _CELL: Final = "padding:2px 8px"
-# Of a page, which is no notebook.
+# Of a page, which is no notebook. Only the last cell of a row may break within a word: where every
+# cell may, a long text beside short ones makes their columns as narrow as a letter.
 _STYLE: Final = (
     ":root{color-scheme:light dark;font:15px/1.4 sans-serif}body{max-width:80em;margin:2em auto;"
     "padding:0 1em;background:canvas}pre{white-space:pre-wrap}"
-    "td,th,pre{overflow-wrap:anywhere;text-align:left}"
+    "td,th,pre{text-align:left}th{overflow-wrap:break-word;max-width:40em}"
+    "td:last-child{min-width:12em}td:last-child,pre{overflow-wrap:anywhere}"
+    "td:not(:last-child){white-space:nowrap}"
     "figure{display:inline-block;margin:0 12px 12px 0}img{max-width:100%;image-rendering:pixelated}"
 )
 
