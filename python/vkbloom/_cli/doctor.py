@@ -13,6 +13,7 @@ from tqdm import tqdm
 import vkbloom
 from vkbloom._cli import bare
 from vkbloom._cli.program import adapter_option
+from vkbloom._cli.targets import check_target
 from vkbloom._cli.terminal import hides_progress, say
 from vkbloom._doctor import self_test
 
@@ -40,6 +41,8 @@ def command(compares: bool, adapter: str, as_json: str | None) -> int:
     With --self-test, it renders with every method, format and kind of derivative on one adapter.
     The exit status is 1 if a value is farther from the reference than the documentation allows.
     """
+    if as_json not in (None, "-"):
+        check_target(as_json)
     result = _compared(adapter) if compares else bare.examined()
     text = json.dumps(result, indent=2)
     if as_json == "-":

@@ -16,6 +16,7 @@ from typing import BinaryIO, Final
 import click
 
 from vkbloom._cli.numbered_files import NumberedFile, files_of, gap_note, pattern_of
+from vkbloom._cli.targets import check_folder
 from vkbloom._cli.terminal import note
 from vkbloom._io import safe_writing
 from vkbloom._io.image_reading import readable_extensions
@@ -131,7 +132,7 @@ def check_targets(work: Sequence[tuple[str, str]], out: str, *, overwrite: bool)
         if is_stream(target):
             continue
         if (folder := os.path.dirname(target)) not in checked:
-            _check_folder(target, makes=target != out)
+            check_folder(target, makes=target != out)
             checked.add(folder)
         if not overwrite and os.path.exists(target) and _identity(target) in read:
             raise click.UsageError(f"{target}: is read as IN; use --overwrite to replace it")
@@ -146,18 +147,6 @@ def _identity(file: str) -> tuple[int, int]:
 def is_terminal() -> bool:
     """Return whether standard output is a terminal."""
     return sys.stdout is not None and sys.stdout.isatty()
-
-
-def _check_folder(target: str, *, makes: bool) -> None:
-    folder = os.path.dirname(target) or "."
-    # A missing folder is made with its first file.
-    existing = folder if os.path.lexists(folder) or not makes else os.path.dirname(folder) or "."
-    if not os.path.isdir(existing):
-        is_there = os.path.lexists(existing)
-        code, name = (errno.ENOTDIR, existing) if is_there else (errno.ENOENT, target)
-        raise OSError(code, os.strerror(code), name)
-    if not os.access(existing, os.W_OK | os.X_OK):
-        raise OSError(errno.EACCES, os.strerror(errno.EACCES), existing)
 
 
 def expanded(source: str) -> list[NumberedFile]:
