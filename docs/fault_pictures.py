@@ -63,7 +63,8 @@ def drawn(bloom: Bloom, law: str, words: str) -> Image:
     if "image before" in words or "bright image" in words:
         bloom(np.full((80, 96, 3), 6.0, np.float32))
         bloom(np.full((48, 64, 3), 6.0, np.float32))
-    return bloom(lights((61, 45) if law == "sizes" else (64, 48)))
+    is_odd = law == "sizes" or "last pixel" in words
+    return bloom(lights((61, 45) if is_odd else (64, 48)))
 
 
 def tile(image: Image, brightest: float) -> NDArray[np.uint8]:

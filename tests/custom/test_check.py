@@ -16,6 +16,7 @@ from click.testing import Result
 import vkbloom
 from tests.cli.calls import run
 from vkbloom import Renderer, testing
+from vkbloom.testing import _comparing as comparing
 from vkbloom.testing import _measuring as measuring
 from vkbloom.testing._law_report import law_report
 from vkbloom.testing._law_table import LAWS
@@ -245,6 +246,11 @@ def test_a_program_that_blurs(tmp_path: Path) -> None:
     [
         ("sleep 99", TimeoutError, "did not end within 0.3 s"),
         ("echo no licence; exit 3", ChildProcessError, "status 3; it said: no licence"),
+        (
+            f"{sys.executable} -c 'print(1); {{}}[\"gpu\"]'; s=$?; echo bye; exit $s",
+            ChildProcessError,
+            "status 1; it said: KeyError: 'gpu'$",
+        ),
         ("kill -SEGV $$", ChildProcessError, "was ended by SIGSEGV"),
         ("true", FileNotFoundError, "wrote no file"),
         ("echo junk > $2", ValueError, "cannot be read"),
@@ -343,3 +349,128 @@ def test_what_a_program_does_not_take_is_not_tested() -> None:
     (views,) = found.rows
     assert (found.untaken, views.held, views.applies) == (("region", "time"), None, False)
     assert "takes no region and no time" in str(found)
+
+
+def test_a_program_that_fails_later_fails_its_laws(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where it is given NaN, four channels, or the lights of the nearest preset."""
+
+    def failing(_: Program, image: np.ndarray[Any, Any]) -> Any:
+        if not np.isfinite(image).all() or image.shape[0] == measuring.VIEW[1]:
+            raise ChildProcessError("command 'engine': it failed with exit status 1")
+        return image
+
+    monkeypatch.setattr(Program, "__call__", failing)
+    done, found = checked("--command", "engine {input} {output}", *SMALL, "--require", "finite")
+    assert done.exit_code == 1
+    assert found["laws"]["finite"]["held"] is False
+    assert "it failed with exit status 1" in found["laws"]["finite"]["message"]
+    assert found["laws"]["gain"]["held"] is True
+    assert found["nearest_preset"] == {"name": None, "difference": None}
+
+
+def test_8_bits_are_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Program, "__call__", lambda _, image: image)
+    words = ["--command", "engine {input} {output}", *SMALL, "--suffix", ".png"]
+    done, found = checked(*words, "--require", "stability")
+    assert (done.exit_code, found["bits"], found["stability"]) == (1, 8, None)
+    assert "cannot be tested in 8 bits" in found["laws"]["stability"]["message"]
+    assert checked(*words[:-2])[1]["bits"] is None
+
+
+@pytest.mark.parametrize("option", ["--html", "--markdown"])
+@pytest.mark.parametrize(
+    ("target", "words"),
+    [("missing/page", "there is no folder missing"), (".", "Is a directory")],
+)
+def test_files_are_checked_before_the_work(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, option: str, target: str, words: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(Program, "__call__", lambda *_: pytest.fail("the program ran"))
+    done = run("check", "--command", "engine {input} {output}", option, target)
+    assert (done.exit_code, words in done.stderr) == (1, True), done.stderr
+
+
+def test_each_run_is_shown(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    shown: list[str] = []
+    monkeypatch.setattr("rich.status.Status.update", lambda _, text: shown.append(text))
+
+    def run_once(self: Program, values: Any) -> None:
+        Path(values["{output}"]).write_bytes(Path(values["{input}"]).read_bytes())
+
+    monkeypatch.setattr(Program, "_run", run_once)
+    words = ["--command", "engine {input} {output}", *SMALL, "--measure-size", "32x32"]
+    done, _ = checked(*words, "--suffix", ".png")
+    assert done.exit_code == 0
+    name = "engine {input} {output}"
+    runs = [text for text in shown if ", run " in text]
+    assert f"{name}: gain, run 9 of 90" in runs
+    last = int(runs[-1].split(", run ")[1].split()[0])
+    assert abs(last - measuring.RUNS[True]) < 25
+
+
+def test_untested_is_not_broken() -> None:
+    def law(held: bool | None) -> dict[str, Any]:
+        return {"held": held, "off": None if held is None else 1.0, "limit": 1.0}
+
+    sides = [
+        {"laws": {"gain": law(held)}, "passes": [], "together": {"shortest": 1, "longest": 1}}
+        for held in (True, None, False)
+    ]
+    verdicts = {
+        (old, new): comparing.changes(sides[old], sides[new])[0].verdict
+        for old in range(3)
+        for new in range(3)
+    }
+    assert verdicts == {
+        (0, 0): "same",
+        (0, 1): "changed",
+        (0, 2): "broken",
+        (1, 0): "changed",
+        (1, 1): "same",
+        (1, 2): "broken",
+        (2, 0): "mended",
+        (2, 1): "changed",
+        (2, 2): "same",
+    }
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "verdict"),
+    [
+        # A copy on a busy machine: its shortest run is 1.41 times as long, within the spread.
+        ((1.0, 1.5), (1.41, 1.6), "same"),
+        ((1.0, 1.3), (1.41, 1.6), "worse"),
+        ((1.41, 1.6), (1.0, 1.3), "better"),
+        ((1.0, 1.05), (1.1, 1.2), "same"),
+    ],
+)
+def test_a_time_changes_beyond_the_spread(
+    before: tuple[float, float], after: tuple[float, float], verdict: str
+) -> None:
+    sides = [
+        {
+            "laws": {},
+            "passes": [{"name": "final", "seconds": shortest}],
+            "together": {"runs": 5, "shortest": shortest, "longest": longest},
+        }
+        for shortest, longest in (before, after)
+    ]
+    found = {one.name: one.verdict for one in comparing.changes(*sides)}
+    assert (found["together"], found["final"]) == (verdict, "same")
+
+
+def test_two_blooms_are_timed_in_turns() -> None:
+    calls: list[str] = []
+
+    def timer(name: str) -> Callable[[], dict[str, float]]:
+        def run() -> dict[str, float]:
+            calls.append(name)
+            return {"a": 1.0 + len(calls), "b": 1.0}
+
+        return run
+
+    first, second = measuring.in_turns([timer("A"), timer("B")], 3)
+    assert calls == ["A", "B"] * 3
+    assert first["together"] == {"runs": 3, "shortest": 3.0, "longest": 7.0}
+    assert second["passes"] == [{"name": "a", "seconds": 3.0}, {"name": "b", "seconds": 1.0}]

@@ -179,6 +179,19 @@ def drops_the_last_row(image: Image) -> Image:
     return blurred
 
 
+def in_halves(image: Image, *, pads: bool = True) -> Image:
+    """Blur an image of half the size; where a side is odd, its last line is repeated or dropped."""
+    height, width, _ = image.shape
+    small = halved(image if pads else image[: height // 2 * 2, : width // 2 * 2])
+    large = doubled(gaussian(small), image.shape)
+    missing = (height - large.shape[0], width - large.shape[1])
+    return np.pad(large, ((0, missing[0]), (0, missing[1]), (0, 0)), mode="edge")
+
+
+def drops_odd(image: Image) -> Image:
+    return in_halves(image, pads=False)
+
+
 def across_stacked_views(image: Image, *, region: tuple[int, int, int, int] | None = None) -> Image:
     x, y, width, height = region or (0, 0, *image.shape[1::-1])
     return gaussian(image[:, x : x + width])[y : y + height]
@@ -262,8 +275,8 @@ FAULTS: dict[str, Fault] = {
     "black outside": Fault(
         lambda: lambda a: gaussian(a, mode="constant"),
         lambda: gaussian,
-        "border",
-        "as much bloom in its outermost pixels",
+        "gain",
+        "instead of 1 at x 0, y 0",
     ),
     "darkens transparent ground": Fault(
         lambda: picture(
@@ -300,13 +313,19 @@ FAULTS: dict[str, Fault] = {
         lambda: without_the_outermost, lambda: gaussian, "border", "a line in the outermost column"
     ),
     "the last column is black": Fault(
-        lambda: last_column_black, lambda: gaussian, "border", "a flat image has 0 times"
+        lambda: last_column_black, lambda: gaussian, "gain", "0 instead of 1 at x 63, y 0"
     ),
     "stale columns": Fault(
         stale_columns, lambda: gaussian, "border", "after a bright image, a black one"
     ),
     "the last row is dropped at odd sizes": Fault(
         lambda: drops_the_last_row, lambda: gaussian, "sizes", "the border of a flat image differs"
+    ),
+    "a chain drops the last row at odd sizes": Fault(
+        lambda: drops_odd, lambda: in_halves, "sizes", "the last pixel has 0 of the energy"
+    ),
+    "a chain drops the last column at the border": Fault(
+        lambda: drops_odd, lambda: in_halves, "border", "at 49 x 49 the last pixel has 0 of"
     ),
     "leaks between stacked views": Fault(
         lambda: across_stacked_views, lambda: of_a_view, "views", "the upper one"

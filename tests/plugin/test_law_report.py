@@ -260,3 +260,76 @@ def test_the_page_lists_all_laws() -> None:
     for law in LAWS.values():
         assert law.formula
         assert law.why
+
+
+class Broken(Exception):
+    """An error that no law knows."""
+
+
+@pytest.mark.parametrize("error", [Broken, OSError, ValueError, TypeError, IndexError])
+def test_an_error_of_the_bloom_fails_its_law(error: type[Exception]) -> None:
+    """As of a program that ends with status 1 where it is given NaN."""
+
+    def bloom(image: Image) -> Image:
+        if not np.isfinite(image).all():
+            raise error("no finite light")
+        return gaussian(image)
+
+    found = testing.report(bloom, size=(32, 32))
+    finite = row(found, "finite")
+    assert (finite.held, finite.applies) == (False, True)
+    assert finite.message == f"the bloom raised {error.__name__}: no finite light"
+    right = testing.report(gaussian, size=(32, 32))
+    assert broken(found) == broken(right)
+
+
+def test_a_result_of_another_shape_fails_its_law() -> None:
+    def bloom(image: Image) -> Image:
+        return gaussian(image)[: len(image) // 48 * 48 or None]
+
+    found = row(testing.report(bloom, size=(48, 48), laws=["sizes"]), "sizes")
+    assert found.held is False
+    assert "the bloom raised ValueError: bloom: it returns shape (48, " in found.message
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt, SystemExit])
+def test_an_interrupt_ends_the_report(error: type[BaseException]) -> None:
+    def bloom(image: Image) -> Image:
+        if not np.isfinite(image).all():
+            raise error
+        return gaussian(image)
+
+    with pytest.raises(error):
+        testing.report(bloom, size=(32, 32), laws=["finite"])
+
+
+def test_the_first_error_is_that_of_the_bloom() -> None:
+    def bloom(image: Image) -> Image:
+        raise Broken("always")
+
+    with pytest.raises(Broken, match="always"):
+        testing.report(bloom, size=(32, 32))
+    with pytest.raises(Broken, match="always"):
+        testing.report(bloom, probe=Probe())
+
+
+def test_an_error_with_four_channels_is_not_tested() -> None:
+    def bloom(image: Image) -> Image:
+        if image.shape[2] == 4:
+            raise Broken("three channels")
+        return gaussian(image)
+
+    alpha = row(testing.report(bloom, size=(32, 32), laws=["alpha"]), "alpha")
+    assert (alpha.held, alpha.applies) == (None, False)
+
+
+def test_a_bloom_may_work_in_place() -> None:
+    def in_place(image: Image) -> Image:
+        image[...] = gaussian(image)
+        return image
+
+    found, right = (testing.report(bloom, size=(48, 48)) for bloom in (in_place, gaussian))
+    assert [(each.name, each.held) for each in found.rows] == [
+        (each.name, each.held) for each in right.rows
+    ]
+    testing.assert_stable(in_place)

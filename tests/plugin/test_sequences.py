@@ -113,3 +113,32 @@ def test_check_judges_files(tmp_path: Path) -> None:
     assert "general flashes: fails" in run(*words).stdout
     refused = run(*words, "--preset", "kino")
     assert (refused.exit_code, "without a bloom" in refused.stderr) == (2, True)
+
+
+def test_gaps_are_time(tmp_path: Path) -> None:
+    """A light of 2.5 Hz whose frames are twice as far apart by their numbers flashes slower."""
+    light = flashing(10, 0.4, seconds=0.5)
+    for number, value in enumerate(light):
+        write(tmp_path / f"f.{number:04d}.png", np.full((4, 6, 3), value, np.float32))
+        write(tmp_path / f"slow.{3 * number - 60:04d}.png", np.full((4, 6, 3), value, np.float32))
+    words = ["--sequence", str(tmp_path / "f.%04d.png"), "--fps", str(FPS)]
+    done, found = checked(*words)
+    assert (done.exit_code, found["missing"], found["gaps"]) == (1, 0, [])
+    # Three times as long, beginning with negative numbers: 3.3 Hz.
+    words[1] = str(tmp_path / "slow.%04d.png")
+    done, found = checked(*words)
+    assert (found["frames"], found["missing"]) == (120, 238)
+    assert found["gaps"][:2] == [[-59, -58], [-56, -55]]
+    assert found["flash"]["flashes"] <= 4
+    assert "238 of 358 frames are missing" in done.stderr
+    assert "238 of 358 frames are missing" in run("check", *words).stdout
+
+
+def test_missing_dark_frames_are_named(tmp_path: Path) -> None:
+    for number in (*range(1, 6), *range(11, 16)):
+        write(tmp_path / f"f.{number:04d}.png", np.full((4, 6, 3), 0.8, np.float32))
+    done = run("check", "--sequence", tmp_path / "f.####.png", "--fps", 60)
+    assert "5 of 15 frames are missing: 6 to 10; the frame before each is shown" in done.stdout
+    write(tmp_path / "f.9999999.png", np.full((4, 6, 3), 0.8, np.float32))
+    done = run("check", "--sequence", tmp_path / "f.####.png")
+    assert (done.exit_code, "are not of one sequence" in done.stderr) == (1, True)

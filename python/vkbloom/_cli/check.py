@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
+import itertools
 import json
 import os
 import runpy
@@ -22,9 +24,11 @@ from rich.status import Status
 import vkbloom
 from vkbloom import testing
 from vkbloom._cli.fields import SIZE, Command
+from vkbloom._cli.numbered_files import NumberedFile, as_frames, gap_note, gaps
 from vkbloom._cli.program import adapter_option, as_wrong_use, given
 from vkbloom._cli.sequences import expanded
 from vkbloom._cli.settings_options import settings_options
+from vkbloom._cli.targets import check_target
 from vkbloom._cli.terminal import is_quiet, note, say
 from vkbloom._custom.method import CustomMethod, identifier_of
 from vkbloom._io import safe_writing
@@ -39,6 +43,10 @@ from vkbloom.testing._law_table import LAWS, law_name
 from vkbloom.testing._programs import Program
 from vkbloom.testing._subject import Subject
 
+# Runs whose times are measured; of two blooms, in turns.
+_RUNS: Final = 5
+#: The most frames from the first to the last number of a sequence: half an hour at 60 a second.
+MAX_FRAMES: Final = 108_000
 _ABOVE_0: Final = click.FloatRange(0, min_open=True)
 
 
@@ -137,6 +145,9 @@ def command(
 
     The exit status is 1 if a law of --require is not held, or was not tested.
     """
+    for target in (page, markdown):
+        if target is not None:
+            check_target(target)
     if sequence is not None:
         if file or program or against or given("preset") or given("method"):
             raise click.UsageError("--sequence judges files alone, without a bloom")
@@ -152,7 +163,8 @@ def command(
             sources[against if against not in sources else f"{against} (against)"] = _other(
                 against, settings
             )
-        blooms = [_measured(renderer, *source, how, bar) for source in sources.items()]
+        opened = [_opened(renderer, *source, how, bar) for source in sources.items()]
+        blooms = _measured(opened, how, bar)
         (values, report, subject), *others = blooms
         name = values["name"]
         if page is not None:
@@ -181,33 +193,79 @@ def command(
     return int(bool(failed))
 
 
-def _measured(
+@dataclasses.dataclass
+class _Opened:
+    """A bloom that has run once. `program`, `settings`: one is None; `law`: what is tested."""
+
+    name: str
+    subject: Subject
+    timer: Callable[[], Mapping[str, float]]
+    device: str
+    program: Program | None = None
+    settings: vkbloom.Settings | None = None
+    law: str = "first run"
+
+    def show(self, bar: Status, law: str | None = None) -> None:
+        """Show which law is tested, and which run of a program this is."""
+        self.law = law or self.law
+        runs = ""
+        if self.program is not None:
+            levels = self.program.levels
+            total = measuring.RUNS[levels is not None and levels.is_coarse]
+            runs = f", run {self.program.runs} of {max(total, self.program.runs)}"
+        bar.update(f"{self.name}: {self.law}{runs}")
+
+
+def _opened(
     renderer: vkbloom.Renderer,
     name: str,
     source: str | vkbloom.Settings,
     how: Mapping[str, Any],
     bar: Status,
-) -> tuple[dict[str, Any], LawReport, Subject]:
-    """Return what is measured of the bloom of settings, or of a command, as the options say."""
+) -> _Opened:
+    """Return the bloom of settings, or of a command, which is run to see what it writes."""
     size = how["size"]
-    if isinstance(source, str):
-        with as_wrong_use():
-            run = Program(shlex.split(source), how["suffix"], how["timeout"])
-        with _notes():
-            subject = measuring.of_program(
-                run, how["measured"], how["gain"], less_input=how["less_input"]
-            )
-        passes, device = measuring.run_time(run, size), "this machine"
-    else:
+    if not isinstance(source, str):
         subject = measuring.of_settings(renderer, source, how["measured"], how["gain"])
-        passes, device = measuring.pass_times(renderer, source, size), renderer.info.summary
-    try:
-        report = law_report(subject, LAWS, how["require"], lambda law: bar.update(f"{name}: {law}"))
-        settings = None if isinstance(source, str) else source
-        about = {"name": name, "adapter": device, "size": size, "passes": passes}
-        return measuring.values_of(subject, report, settings, **about), report, subject
-    except AssertionError as error:
-        raise click.ClickException(f"{name}: {error}") from error
+
+        def passes() -> Mapping[str, float]:
+            return measuring.pass_times(renderer, source, size)
+
+        return _Opened(name, subject, passes, renderer.info.summary, settings=source)
+    with as_wrong_use():
+        run = Program(shlex.split(source), how["suffix"], how["timeout"])
+    with _notes():
+        subject = measuring.of_program(
+            run, how["measured"], how["gain"], less_input=how["less_input"]
+        )
+    opened = _Opened(
+        name, subject, lambda: measuring.run_time(run, size), "this machine", program=run
+    )
+    run.on_run = lambda _: opened.show(bar)
+    return opened
+
+
+def _measured(
+    opened: list[_Opened], how: Mapping[str, Any], bar: Status
+) -> list[tuple[dict[str, Any], LawReport, Subject]]:
+    """Return what is measured of blooms, as the options say."""
+    # Of one program, a run is long, and its time is only shown.
+    is_compared = len(opened) > 1
+    runs = _RUNS if is_compared or opened[0].program is None else 1
+    times = measuring.in_turns([each.timer for each in opened], runs)
+    results = []
+    for each, seconds in zip(opened, times, strict=True):
+        try:
+            report = law_report(
+                each.subject, LAWS, how["require"], functools.partial(each.show, bar)
+            )
+            each.law = "figures"
+            about = {"name": each.name, "adapter": each.device, "size": how["size"]}
+            values = measuring.values_of(each.subject, report, each.settings, **about, **seconds)
+            results.append((values, report, each.subject))
+        except AssertionError as error:
+            raise click.ClickException(f"{each.name}: {error}") from error
+    return results
 
 
 def _other(against: str, settings: vkbloom.Settings) -> str | vkbloom.Settings:
@@ -277,23 +335,51 @@ def _add_reference(settings: vkbloom.Settings, where: str) -> None:
 
 def judge(pattern: str, fps: float, degrees: float, *, as_json: bool) -> int:
     """Print flashes and flicker of a sequence of files; return 1 if it fails WCAG 2.2, else 0."""
-    files = [path for path, _ in expanded(pattern)]
+    files = as_frames(expanded(pattern))
+    shown = _frames_shown(pattern, files)
 
     def frames() -> Iterator[NDArray[Any]]:
-        return (vkbloom.read(file)[..., :3].astype(np.float32) for file in files)
+        for (file, _), count in zip(files, shown, strict=True):
+            picture = vkbloom.read(file)[..., :3].astype(np.float32)
+            yield from itertools.repeat(picture, count)
 
     flashes = testing.flash(frames(), fps, degrees=degrees)
     seen = testing.flicker(frames(), fps)
     strongest = int(seen.contrast.argmax())
+    missing = gap_note(files)
     if as_json:
-        values = {"frames": len(files), "fps": fps, "flash": flashes, "flicker": seen}
+        values = {
+            "frames": len(files),
+            "missing": sum(shown) - len(files),
+            "gaps": [(gap.start, gap.stop - 1) for gap in gaps(files)],
+            "fps": fps,
+            "flash": flashes,
+            "flicker": seen,
+        }
         click.echo(json.dumps(plain(values), indent=2))
     else:
         click.echo(f"{len(files)} frames at {fps:g} a second, {degrees:g} degrees wide")
+        if missing is not None:
+            click.echo(f"{missing}; the frame before each is shown until the next one")
         click.echo(str(flashes))
         click.echo(
             f"flicker: contrast up to {seen.contrast[strongest]:.3g}, at "
             f"{seen.frequencies[strongest]:.3g} Hz"
             + ("" if seen.jod is None else f"; {seen.jod:.2f} JOD beside a still")
         )
+    if missing is not None:
+        note(f"{pattern}: {missing}; what they show is not judged")
     return int(flashes.general or flashes.red)
+
+
+def _frames_shown(pattern: str, files: list[NumberedFile]) -> list[int]:
+    """Return for how many frames each file is shown: until the number of the next one."""
+    numbers = [number for _, number in files if number is not None]
+    if len(numbers) < len(files):
+        return [1] * len(files)
+    if numbers[-1] - numbers[0] >= MAX_FRAMES:
+        raise ValueError(
+            f"{pattern}: the numbers {numbers[0]} to {numbers[-1]} are not of one sequence; at "
+            f"most {MAX_FRAMES} frames are judged"
+        )
+    return [after - before for before, after in itertools.pairwise(numbers)] + [1]

@@ -11,9 +11,19 @@ from typing import Any, Final
 import numpy as np
 
 from vkbloom._argument_types import checked
-from vkbloom.testing._deviations import Measured, NotTaken, breaches, fail, figure, judge
-from vkbloom.testing._point_spread import border_share, check_inside
-from vkbloom.testing._probe import DEFAULT, Bloom, Image, Probe, beside_multiple
+from vkbloom.testing._deviations import Findings, Measured, fail, figure, judge
+from vkbloom.testing._point_spread import border_share, check_inside, sum_error
+from vkbloom.testing._probe import (
+    DEFAULT,
+    Bloom,
+    Error,
+    Image,
+    NotTaken,
+    Probe,
+    beside_multiple,
+    call,
+)
+from vkbloom.testing._shape import LastPixel, last_pixel
 
 __tracebackhide__ = True
 
@@ -26,8 +36,12 @@ BORDER_LIMITS: Final = {
     "edge": 2.0,
     "corner": 3.0,
     "lost": 0.05,
-    "flat": 0.1,
+    "dark": 0.1,
+    "line": 0.25,
+    "last": 0.22,
 }
+# The share of its energy that a line in the outermost column has in the frame.
+_LINE: Final = 0.5
 # Side of the light, and the period of a chain of four halvings, in pixels.
 _LIGHT: Final = 3
 _PERIOD: Final = 16
@@ -43,17 +57,31 @@ class _Lights:
     bloom: Bloom
     probe: Probe
     dark: Image
-    made: dict[Any, tuple[Image, float]] = dataclasses.field(default_factory=dict)
+    made: dict[Any, tuple[Image, Error]] = dataclasses.field(default_factory=dict)
+
+    @property
+    def side(self) -> int:
+        """The side of a light in pixels."""
+        return max(_LIGHT, self.probe.light_side)
 
     def spread(
-        self, corner: tuple[int, int], sides: tuple[int, int] = (_LIGHT, _LIGHT)
-    ) -> tuple[Image, float]:
+        self, corner: tuple[int, int], sides: tuple[int, int] | None = None
+    ) -> tuple[Image, Error]:
         """Return the bloom of a rectangle from a pixel on, less that of black, and its error."""
+        sides = sides or (self.side, self.side)
         if (corner, sides) not in self.made:
             image = self.probe.point(corner, self.probe.value, sides)
             lit, error = self.probe.apply(self.bloom, image)
             self.made[corner, sides] = lit - self.dark, 2 * error
         return self.made[corner, sides]
+
+    def energy(
+        self, corner: tuple[int, int], sides: tuple[int, int] | None = None
+    ) -> tuple[float, float]:
+        """Return the sum of the same, and its error where values have few levels."""
+        spread, error = self.spread(corner, sides)
+        lit = 0.0 if self.probe.levels is None else sum_error(spread, error)[0] * spread.shape[2]
+        return float(spread.sum()), lit
 
 
 @checked
@@ -66,15 +94,17 @@ def assert_border(
     standard deviations of h from an edge, the bloom is h, cut off by the frame ("inside" is the
     light that differs, "wrap" that at the opposite edge, as shares of E of the middle). At the
     border, E is at least the part of h that is in the frame, less "lost", and at most "edge" or
-    "corner" times E of the middle. The bloom of a flat image is the same at the border as in the
-    middle, within "flat". The bloom of a black image does not show the image before ("stale").
+    "corner" times E of the middle. A line in the last column has half of its energy, less
+    "line". The last pixel of an image with odd sides has a quarter of its energy, less "last". The
+    bloom of a black image is as dark at the border as in the middle ("dark"), and does not show the
+    image before ("stale"). What a flat image loses at the border is left to `assert_gain`.
 
     Parameters
     ----------
     bloom : callable
         Takes an image and returns one of the same height and width: the bloom alone.
     probe : Probe
-        Where light reaches the border from the middle, only energies and flat images are tested.
+        Where light reaches the border from the middle, only energies are tested.
     limits : mapping of str to float, optional
         Limits by figure, in place of those of `BORDER_LIMITS`.
     """
@@ -82,36 +112,40 @@ def assert_border(
     check_border(bloom, probe, dark, BORDER_LIMITS | dict(limits or {}))
 
 
-def check_border(bloom: Bloom, probe: Probe, dark: Image, allowed: Mapping[str, float]) -> None:
+def check_border(
+    bloom: Bloom,
+    probe: Probe,
+    dark: Image,
+    allowed: Mapping[str, float],
+    last: LastPixel | None = None,
+) -> None:
     """Raise AssertionError if a border matters; `dark` is the bloom of a black image."""
     law = "a light at the border has the bloom of a light far from it, cut off by the frame"
-    flat = _check_stale(bloom, probe, dark, allowed["stale"])
+    _check_stale(bloom, probe, dark, allowed["stale"])
     lights = _Lights(bloom, probe, dark)
     share = border_share(_expected(lights, probe.centre)[0])
     complete = share <= _OUTERMOST
-    reasons = breaches(law, _near_the_border(lights, allowed)) if complete else []
-    reasons += breaches(law, _at_the_border(lights, allowed, complete=complete))
-    reasons += breaches(law, _flat(flat, dark, probe, allowed["flat"]))
-    if reasons:
-        fail(law, "; ".join(reasons))
-    check_inside(share, probe.size, _OUTERMOST)
+    findings = Findings(law, probe)
+    if complete:
+        findings.add(_near_the_border(lights, allowed))
+    findings.add(_at_the_border(lights, allowed, complete=complete))
+    findings.add([_black(dark, probe, allowed["dark"])])
+    inner = _expected(lights, probe.centre)[1] / lights.side**2
+    findings.add(_last_column(lights, inner, allowed["line"]))
+    last = last or last_pixel(bloom, probe, is_dark=not dark.any())
+    findings.add([last.measured(inner / probe.colours / probe.value, allowed["last"])])
+    if not findings.broken:
+        check_inside(share, probe.size, _OUTERMOST)
+    findings.conclude()
 
 
-def _flat(flat: Image, dark: Image, probe: Probe, allowed: float) -> Iterator[Measured]:
-    """Measure the outermost pixels of the blooms of a flat and a black image."""
+def _black(dark: Image, probe: Probe, allowed: float) -> Measured:
+    """Measure the outermost pixels of the bloom of a black image."""
     x, y = probe.centre
-    ring, black = (
-        np.concatenate([image[0], image[-1], image[:, 0], image[:, -1]]).mean(axis=1)
-        for image in (flat, dark)
-    )
-    glow = float(np.abs(black - dark[y, x].mean()).max()) / probe.value
+    ring = np.concatenate([dark[0], dark[-1], dark[:, 0], dark[:, -1]]).mean(axis=1)
+    glow = float(np.abs(ring - dark[y, x].mean()).max()) / probe.value
     text = f"a black image has {glow:.3g} of the light of a flat one at its border"
-    yield "dark", glow, allowed, text
-    middle = float(flat[y, x].mean())
-    if middle > 0:
-        farthest = float(ring[np.abs(ring - middle).argmax()]) / middle
-        text = f"a flat image has {farthest:.3g} times as much bloom in its outermost pixels as in "
-        yield "flat", abs(farthest - 1), allowed, f"{text}the middle"
+    return "dark", glow, allowed, text
 
 
 def _near_the_border(lights: _Lights, allowed: Mapping[str, float]) -> Iterator[Measured]:
@@ -120,7 +154,7 @@ def _near_the_border(lights: _Lights, allowed: Mapping[str, float]) -> Iterator[
         spread, error = lights.spread(at)
         expected, energy = _expected(lights, at)
         excess = np.abs(spread - expected) / energy
-        excess[excess <= 2 * error / energy] = 0
+        excess[excess <= (error + _expected_error(lights, at)) / energy] = 0
         profile = excess.sum(axis=(1 - int(name == "left"), 2))
         # Light that comes round is at the far edge; light that is spread too far is nearer.
         quarter = len(profile) // 4
@@ -140,44 +174,47 @@ def _at_the_border(
     x, y = lights.probe.centre
     for name, at in {"left": (0, y), "top": (x, 0), "corner": (0, 0)}.items():
         expected, energy = _expected(lights, at)
-        share = float(lights.spread(at)[0].sum()) / energy
+        light, error = lights.energy(at)
+        share, error = light / energy, 2 * error / energy
         inside = float(expected.sum()) / energy
         kind = "corner" if name == "corner" else "edge"
         figure(f"energy_{name}", share)
         if complete:
             text = f"a light at the {name} has {share:.3g} of its energy, {inside:.3g} is in the "
-            yield "lost", max(0.0, inside - share), allowed["lost"], f"{text}frame"
+            yield "lost", max(0.0, inside - share), allowed["lost"], f"{text}frame", error
         text = f"a light at the {name} swells to {share:.3g} times its energy"
-        yield kind, share, allowed[kind], text
-    x, height = _PERIOD * round(x / _PERIOD), lights.probe.size[1]
-    outermost = float(lights.spread((0, 0), sides=(1, height))[0].sum())
+        yield kind, share, allowed[kind], text, error
+
+
+def _last_column(lights: _Lights, inner: float, allowed: float) -> Iterator[Measured]:
+    """Measure a line in the last column; `inner` is the light of a pixel in the middle."""
+    x, (width, height) = lights.probe.centre[0], lights.probe.size
+    line, (light, error) = (1, height), lights.energy((width - 1, 0), (1, height))
+    middle = inner * height
     # Of a linear bloom. A line in the middle decides only if the outermost one has too little.
-    inner = _expected(lights, lights.probe.centre)[1] * height / _LIGHT**2
-    if outermost < inner / 2:
-        inner = float(lights.spread((x, 0), sides=(1, height))[0].sum())
-    if inner > 0:
-        share = outermost / inner
+    if light < middle * _LINE:
+        middle = lights.energy((_PERIOD * round(x / _PERIOD), 0), line)[0]
+    if middle > 0:
+        share = light / middle
         text = f"a line in the outermost column has {share:.3g} of the energy of one in the middle"
-        yield "column", max(0.0, 0.5 - share), 0.25, text
+        yield "column", max(0.0, _LINE - share), allowed, text, 2 * error / middle
 
 
-def _check_stale(bloom: Bloom, probe: Probe, dark: Image, allowed: float) -> Image:
-    """Return the bloom of a flat image; that of a black one is the same after bright images."""
+def _check_stale(bloom: Bloom, probe: Probe, dark: Image, allowed: float) -> None:
+    """Raise AssertionError if the bloom of a black image is another one after bright images."""
     width, height = (beside_multiple(min(side, 144)) + 3 for side in probe.size)
     smaller = dataclasses.replace(
         probe, size=(min(width, probe.size[0]), min(height, probe.size[1]))
     )
-    flat = dark
     law = "the bloom of an image does not depend on the image before"
     for name, used in ((", larger", smaller), ("", probe)):
-        flat = probe.apply(bloom, probe.flat(probe.value))[0]
+        probe.apply(bloom, probe.flat(probe.value))
         after = used.apply(bloom, used.flat(0.0))[0]
         rise = np.abs(after) - float(np.abs(dark).max()) if name else np.abs(after - dark)
         off = float(rise.max()) / probe.value
         y, x, _ = np.unravel_index(int(rise.argmax()), rise.shape)
         text = f"after a bright{name} image, a black one has {off:.3g} of its light at x {x}, y {y}"
         judge(law, ("stale", off, allowed, text))
-    return flat
 
 
 @checked
@@ -210,14 +247,15 @@ def assert_views(bloom: Bloom, probe: Probe = DEFAULT, *, limit: float = 1e-3) -
         for other in (probe.flat(0.0), noise[1 - second]):
             views = [other, noise[second]] if second else [noise[second], other]
             given = probe.given(np.concatenate(views, axis=axis))
-            result = np.asarray(bloom(given, region=(*map(int, corner), *probe.size)))  # type: ignore[call-arg]
+            region = (*map(int, corner), *probe.size)
+            result = np.asarray(call(bloom, given, region=region))
             if result.shape[:2] == given.shape[:2]:
                 result = np.split(result, 2, axis=axis)[second]
             results.append(probe.values(result, probe.given(noise[second])))
         (alone, error), (beside, _) = results
         off = np.abs(beside - alone)
         largest = float(np.abs(alone).max()) or 1.0
-        share = max(0.0, float(off.max()) - 2 * error) / largest
+        share = max(0.0, float((off - 2 * error).max())) / largest
         y, x, _ = np.unravel_index(int(off.argmax()), off.shape)
         text = (
             f"the other view changes the {name} one by {share:.3g} of its largest value, most at "
@@ -242,30 +280,42 @@ def _near(lights: _Lights) -> dict[str, tuple[int, int]]:
     """Return places 1.5 standard deviations from an edge, at most a quarter of a side."""
     probe = lights.probe
     spread, energy = _expected(lights, probe.centre)
-    near = []
+    near: list[int] = []
     for axis, side in enumerate(probe.size):
         profile = np.abs(spread.mean(axis=2)).sum(axis=axis)
-        variance = profile @ (np.arange(side) - probe.centre[axis] - _LIGHT // 2) ** 2
+        variance = profile @ (np.arange(side) - probe.centre[axis] - lights.side // 2) ** 2
         deviation = math.sqrt(float(variance / profile.sum())) if energy > 0 else 0.0
-        near.append(min(max(math.ceil(1.5 * deviation) - _LIGHT // 2, 1), side // 4))
+        near.append(min(max(math.ceil(1.5 * deviation) - lights.side // 2, 1), side // 4))
     return {"left": (near[0], probe.centre[1]), "top": (probe.centre[0], near[1])}
 
 
 def _expected(lights: _Lights, at: tuple[int, int]) -> tuple[Image, float]:
-    """Return the bloom of a light near the middle, moved to another place, and its energy.
+    """Return the bloom of a light near the middle, moved to another place, and its energy."""
+    start = _start(lights, at)
+    spread = lights.spread(start)[0]
+    energy = float(spread.sum())
+    if not energy > 0:
+        fail("the bloom of a lit pixel is not black", f"its energy is {energy:.3g}")
+    return _moved(spread, start, at), energy
 
-    The light is a multiple of 16 pixels away, since a chain of halved images spreads each position
-    of a period differently.
+
+def _expected_error(lights: _Lights, at: tuple[int, int]) -> Error:
+    """Return the errors of the values of `_expected`."""
+    start = _start(lights, at)
+    error = lights.spread(start)[1]
+    return error if np.ndim(error) == 0 else _moved(np.asarray(error), start, at)
+
+
+def _start(lights: _Lights, at: tuple[int, int]) -> tuple[int, int]:
+    """Return a place near the middle, a multiple of 16 pixels away.
+
+    A chain of halved images spreads each position of a period differently.
     """
     x, y = (
         position + _PERIOD * round((middle - position) / _PERIOD)
         for position, middle in zip(at, lights.probe.centre, strict=True)
     )
-    spread = lights.spread((x, y))[0]
-    energy = float(spread.sum())
-    if not energy > 0:
-        fail("the bloom of a lit pixel is not black", f"its energy is {energy:.3g}")
-    return _moved(spread, (x, y), at), energy
+    return x, y
 
 
 def _moved(spread: Image, start: tuple[int, int], to: tuple[int, int]) -> Image:

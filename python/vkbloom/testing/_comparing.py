@@ -11,7 +11,8 @@ from vkbloom.testing._showing import FIGURES, figure_of, times, words
 Verdict = Literal["broken", "mended", "worse", "better", "changed", "same"]
 
 # What counts as a change: of a deviation, in shares of its limit, and of a figure, as a share of
-# itself and at least so much; of a time, as a share, since a shared machine repeats it within that.
+# itself and at least so much; of a time, as a share, where all runs of one are longer than all of
+# the other.
 _LAW: Final = (0.1, 0.25)
 _FIGURE: Final = (0.02, 1e-3)
 _TIME: Final = 0.2
@@ -52,9 +53,10 @@ def _laws(before: Mapping[str, Any], after: Mapping[str, Any]) -> Iterator[Chang
         was, now = _share(old), _share(new)
         verdict = _verdict(was, now, *_LAW, less=True)
         if old["held"] != new["held"]:
-            # A law that is no longer tested is no longer promised.
-            lost = new["held"] is False or old["held"]
-            verdict = "broken" if lost else "mended" if old["held"] is False else "changed"
+            # A law that is not tested of one of them is neither broken nor mended by the other.
+            verdict = "broken" if new["held"] is False else "changed"
+            if old["held"] is False and new["held"]:
+                verdict = "mended"
         yield Change("law", name, was, now, (_held(old), _held(new)), verdict)
 
 
@@ -80,8 +82,16 @@ def _times(before: Mapping[str, Any], after: Mapping[str, Any]) -> Iterator[Chan
     for name in dict.fromkeys([*sides[1], *sides[0]]):
         old, new = (side.get(name) for side in sides)
         told = ["none" if each is None else f"{1e3 * each:.3f} ms" for each in (old, new)]
-        verdict = _verdict(old, new, _TIME, 0.0, less=True) if name == "together" else "same"
+        verdict: Verdict = "same"
+        if name == "together" and _are_apart(before["together"], after["together"]):
+            verdict = _verdict(old, new, _TIME, 0.0, less=True)
         yield Change("time", name, old, new, (told[0], told[1]), verdict)
+
+
+def _are_apart(before: Mapping[str, Any], after: Mapping[str, Any]) -> bool:
+    """Return whether all runs of one took longer than all of the other."""
+    sides = sorted([before, after], key=lambda side: float(side["shortest"]))
+    return bool(sides[0]["longest"] < sides[1]["shortest"])
 
 
 def _verdict(

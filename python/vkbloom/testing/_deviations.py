@@ -6,18 +6,17 @@ import math
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
-from dataclasses import dataclass
-from typing import NoReturn
+from dataclasses import dataclass, field
+from typing import Final, NoReturn
 
 import numpy as np
 
-from vkbloom.testing._probe import Image
+from vkbloom.testing._probe import Error, Image, Probe
 
 __tracebackhide__ = True
 
-
-class NotTaken(ValueError):
-    """A bloom does not take what a law needs, such as a region or alpha; so it is not tested."""
+# A deviation of this share of the largest value must be seen where a law counts as held.
+_SEEN: Final = 0.1
 
 
 @dataclass(frozen=True)
@@ -30,8 +29,9 @@ class Deviation:
     name: str
 
 
-#: The name of a figure, the deviation, the limit, and what is wrong where it is beyond the limit.
-Measured = tuple[str, float, float, str]
+#: The name of a figure, the deviation, the limit, what is wrong where it is beyond the limit, and
+#: the error of the deviation, where the levels of values matter.
+Measured = tuple[str, float, float, str] | tuple[str, float, float, str, float]
 
 _measured: ContextVar[list[Deviation] | None] = ContextVar("measured", default=None)
 
@@ -55,15 +55,48 @@ def is_within(law: str, off: float, allowed: float, name: str = "off") -> bool:
     return off <= allowed
 
 
-def breaches(law: str, measured: Iterable[Measured]) -> list[str]:
-    """Return what is wrong with each deviation that is beyond its limit."""
-    return [text for name, off, limit, text in measured if not is_within(law, off, limit, name)]
+@dataclass
+class Findings:
+    """What is wrong with the deviations from a law, and what the levels of values leave open."""
+
+    law: str
+    probe: Probe | None = None
+    broken: list[str] = field(default_factory=list)
+    undecided: list[str] = field(default_factory=list)
+
+    def add(self, measured: Iterable[Measured]) -> None:
+        """Compare deviations with their limits."""
+        for item in measured:
+            name, off, limit, text = item[:4]
+            error = item[4] if len(item) == 5 else 0.0
+            if not is_within(self.law, off, limit + error, name):
+                self.broken.append(text)
+            elif off > limit - error:
+                self.undecided.append(f"{text}, within an error of {error:.3g}")
+
+    def conclude(self) -> None:
+        """Raise AssertionError if the law is broken, ValueError if that is undecided."""
+        if self.broken:
+            fail(self.law, "; ".join(self.broken))
+        if self.undecided:
+            raise_coarse(self.probe, "; ".join(self.undecided))
 
 
-def judge(law: str, *measured: Measured) -> None:
-    """Raise AssertionError with what is wrong with the deviations beyond their limits, if any."""
-    if reasons := breaches(law, measured):
-        fail(law, "; ".join(reasons))
+def raise_coarse(probe: Probe | None, text: str) -> NoReturn:
+    """Raise ValueError, since values have too few levels."""
+    levels = None if probe is None else probe.levels
+    reason = "values of this accuracy" if levels is None else levels.reason
+    raise ValueError(f"cannot be tested in {reason}: {text}")
+
+
+def judge(law: str, *measured: Measured, probe: Probe | None = None) -> None:
+    """Raise AssertionError with what is wrong with the deviations beyond their limits, if any.
+
+    Raise ValueError if none is, but one may be within the error of the figures.
+    """
+    findings = Findings(law, probe)
+    findings.add(measured)
+    findings.conclude()
 
 
 def figure(name: str, value: float) -> None:
@@ -72,18 +105,37 @@ def figure(name: str, value: float) -> None:
 
 
 def compare_with_law(
-    law: str, actual: Image, expected: Image, allowed: float, note: str = ""
+    probe: Probe,
+    law: str,
+    actual: Image,
+    expected: Image,
+    allowed: Error,
+    *,
+    note: str = "",
+    seen: float = _SEEN,
 ) -> None:
-    """Raise AssertionError with the deviation, its position and the law if a value is wrong."""
+    """Raise AssertionError with the deviation, its position and the law if a value is wrong.
+
+    Where values have few levels: ValueError if a deviation of the share `seen` of the largest
+    expected value is within the error of values.
+    """
     difference = np.abs(actual - expected)
-    position = np.unravel_index(int(difference.argmax()), difference.shape)
+    errors = np.broadcast_to(allowed, difference.shape)
+    position = np.unravel_index(int((difference - errors).argmax()), difference.shape)
     y, x, channel = map(int, position)
-    off = float(difference[position])
+    off, limit = float(difference[position]), float(errors[position])
     text = (
         f"{actual[position]:.6g} instead of {expected[position]:.6g} at x {x}, y {y}, channel "
-        f"{channel}: off by {off:.3g}, {allowed:.3g} allowed{note}"
+        f"{channel}: off by {off:.3g}, {limit:.3g} allowed{note}"
     )
-    judge(law, ("off", off, allowed, text))
+    judge(law, ("off", off, limit, text))
+    largest, coarsest = float(np.abs(expected).max()), float(errors.max())
+    if probe.levels is not None and not coarsest < seen * largest:
+        raise_coarse(
+            probe,
+            f"values up to {largest:.3g} have errors of {coarsest:.3g}, which hide a deviation of "
+            f"{100 * seen:g} %",
+        )
 
 
 def fail(law: str, figure: str) -> NoReturn:

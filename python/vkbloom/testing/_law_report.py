@@ -15,9 +15,10 @@ from vkbloom._checks import check_number
 from vkbloom._views import markup
 from vkbloom._views.markup import element
 from vkbloom.testing._border import takes
-from vkbloom.testing._deviations import NotTaken, measuring
+from vkbloom.testing._deviations import measuring
 from vkbloom.testing._law_table import LAWS, Law, law_name
-from vkbloom.testing._probe import Bloom, Probe
+from vkbloom.testing._probe import Bloom, BloomError, NotTaken, Probe
+from vkbloom.testing._programs import levels_of
 from vkbloom.testing._subject import Subject, fitting_probe
 
 __tracebackhide__ = True
@@ -35,7 +36,8 @@ class LawRow:
     name : str
         Name of the assertion without ``assert_``; "transposed" is `assert_symmetric` for "xy".
     held : bool or None
-        None: the premise of the law does not hold, such as light that reaches the border.
+        None: the premise of the law does not hold, such as light that reaches the border. An error
+        that the bloom raises is False.
     off : float
         The deviation that is the largest share of its limit; NaN where nothing was measured.
     limit : float
@@ -198,7 +200,8 @@ def report(
         and `energy` that no light is lost or added.
     probe : Probe, optional
         Replaces `size`. Default: float32 with values up to 1, or up to 16 where a bloom of 1 is
-        black, as after a threshold.
+        black, as after a threshold. For a `command` whose files hold integers, values up to 1/2
+        that these files hold, so that nothing is clipped.
 
     Returns
     -------
@@ -220,7 +223,7 @@ def report(
         required = tuple(dict.fromkeys(law_name(name) for name in names))
     except ValueError as error:
         raise ValueError(f"laws: {error}") from None
-    used = probe or fitting_probe(bloom, Probe(size=size))
+    used = probe or fitting_probe(bloom, Probe(size=size, levels=levels_of(bloom, size)))
     return law_report(Subject(bloom=bloom, probe=used, gain=gain), required or LAWS, required)
 
 
@@ -231,7 +234,10 @@ def law_report(
     progress: Callable[[str], None] = lambda _: None,
 ) -> LawReport:
     """Test a bloom against laws; those that do not apply to it only if they are required."""
-    gain = subject.measured_gain
+    try:
+        gain = subject.measured_gain
+    except BloomError as error:
+        raise (error.__cause__ or error) from None
     rows = []
     for law in (LAWS[name] for name in LAWS if name in names):
         if law.name in required or law.applies(subject):
@@ -243,6 +249,16 @@ def law_report(
     )
 
 
+def _explained(law: Law, subject: Subject) -> str:
+    """Return why a law is broken, where that can be measured."""
+    if law.explain is None:
+        return law.why
+    try:
+        return law.explain(subject, law.why)
+    except Exception:
+        return law.why
+
+
 def _row(law: Law, subject: Subject) -> LawRow:
     """Test a law."""
     message, why, applies = "", law.why, True
@@ -250,14 +266,17 @@ def _row(law: Law, subject: Subject) -> LawRow:
     # NaN and infinity among the test images are no fault of the caller's arithmetic.
     with measuring() as deviations, np.errstate(all="ignore"):
         try:
+            subject.check_visible()
             law.test(subject, law.limit)
         except AssertionError as error:
             message, held = str(error), False
-            if law.explain is not None:
-                why = law.explain(subject, why)
+            why = _explained(law, subject)
         except (TypeError, ValueError) as error:
-            # Not of the bloom itself: report has called it before.
+            # Of the probe: an error of the bloom is a BloomError.
             message, held, applies = str(error), None, not isinstance(error, NotTaken)
+        except Exception as error:
+            # A failure of one law does not end the report.
+            message, held = str(error), False
     limited = (
         [item for item in deviations if not math.isinf(item.allowed)] if held is not None else []
     )

@@ -179,13 +179,12 @@ LAWS: Final[Mapping[str, Law]] = {
         Law(
             "border",
             lambda subject, limit: border.check_border(
-                subject.bloom, subject.lamp, subject.dark[0], limit
+                subject.bloom, subject.lamp, subject.dark[0], limit, subject.last_pixel
             ),
             "a light at the border has the bloom of a light far from it, cut off by the frame, and "
-            "a flat image the same bloom in a corner as in the middle",
+            "no pixel of it is lost, also where sizes are odd",
             "Where the outermost pixels are repeated, a light in them counts for what is beyond "
-            "them, too: in the smallest level of a chain that is most of the picture. A method "
-            "that reads black outside the image loses light there.",
+            "them, too: in the smallest level of a chain that is most of the picture.",
             limit=border.BORDER_LIMITS,
         ),
         Law(
@@ -199,17 +198,21 @@ LAWS: Final[Mapping[str, Law]] = {
         Law(
             "sizes",
             lambda subject, limit: shape.check_sizes(
-                subject.bloom, subject.probe, float(subject.dark[0].mean()), limit
+                subject.bloom,
+                subject.probe,
+                float(subject.dark[0].mean()),
+                limit,
+                subject.last_pixel,
             ),
             "width, centroid and energy of the bloom of a square are the same in images whose "
-            "sizes are 1 to 3 pixels beside a multiple of 16",
+            "sizes are 1 to 3 pixels beside a multiple of 16, and their last pixel is not lost",
             "A chain of halved images rounds each size: the levels cover a little more or less "
             "than the image, and a small image may have one level more.",
             limit=shape.SIZE_LIMITS,
         ),
         Law(
             "round",
-            lambda subject, limit: shape.check_round(subject.spread, limit),
+            tests.round_contours,
             "contours of the bloom of a pixel at 1/2, 1/10 and 1/100 of the peak are circles",
             "Boxes and tents are square, streaks and blades are stars. A wide pyramid shows the "
             "square texels of its small levels.",
@@ -257,7 +260,7 @@ LAWS: Final[Mapping[str, Law]] = {
             "The reference computes something else, rounds differently, or reads other pixels at "
             "the border.",
             limit=1e-3,
-            applies=lambda subject: bool(subject.reference),
+            applies=lambda subject: subject.differences is not None,
         ),
     )
 }

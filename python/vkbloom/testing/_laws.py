@@ -15,11 +15,13 @@ import numpy as np
 
 from vkbloom._argument_types import FUNCTION, NAMES, checked, checked_as
 from vkbloom._checks import check_number
-from vkbloom.testing._deviations import compare_with_law
-from vkbloom.testing._probe import DEFAULT, Bloom, Image, Probe
+from vkbloom.testing._deviations import compare_with_law, raise_coarse
+from vkbloom.testing._probe import DEFAULT, Bloom, Error, Image, Probe
 
 __tracebackhide__ = True
 
+# A wrong gain that must be seen where the law counts as held.
+_SEEN_GAIN: Final = 0.025
 _SWAPPED: Final = {"x": "left and right", "y": "top and bottom", "xy": "rows and columns"}
 
 
@@ -31,14 +33,25 @@ def assert_superposition(bloom: Bloom, probe: Probe = DEFAULT) -> None:
     additivity and homogeneity (Oppenheim and Willsky, "Signals and Systems", chapter 1). A method
     with a threshold, a clamp or a firefly filter is not linear.
     """
-    # Otherwise the dtype would round halves and quarters of the values in the test images.
-    a, b = (_divisible_by_four(probe, probe.noise(index, probe.value)) for index in (0, 1))
-    whole, whole_error = probe.apply(bloom, a / 2 + b / 4)
+    a, b, (half, quarter) = _mixture(probe)
+    whole, whole_error = probe.apply(bloom, half * a + quarter * b)
     of_a, error_a = probe.apply(bloom, a)
     of_b, error_b = probe.apply(bloom, b)
     law = "B(a / 2 + b / 4) = B(a) / 2 + B(b) / 4"
-    allowed = whole_error + error_a / 2 + error_b / 4
-    compare_with_law(law, whole, of_a / 2 + of_b / 4, allowed)
+    allowed = whole_error + half * error_a + quarter * error_b
+    compare_with_law(probe, law, whole, half * of_a + quarter * of_b, allowed)
+
+
+def _mixture(probe: Probe) -> tuple[Image, Image, tuple[float, float]]:
+    """Return two images and their shares in a mixture, all of which the bloom can be given."""
+    if probe.is_coarse:
+        # Where one is lit, the other is black, so that the mixture has no values but these.
+        lit, value = probe.noise(0, probe.value), float(probe.stored(probe.flat(probe.value)).max())
+        shares = [float(probe.stored(probe.flat(value * x)).max()) / value for x in (0.5, 0.25)]
+        return lit, value - lit, (shares[0], shares[1])
+    # Otherwise the dtype would round halves and quarters of the values in the test images.
+    a, b = (_divisible_by_four(probe, probe.noise(index, probe.value)) for index in (0, 1))
+    return a, b, (0.5, 0.25)
 
 
 @checked_as(glow=FUNCTION)
@@ -72,11 +85,12 @@ def assert_additive(
     picture, error = probe.apply(bloom, image)
     if glow is None:
         law = "F(a) >= a: light is added, and none is removed"
-        compare_with_law(law, picture, np.maximum(picture, image), error)
+        compare_with_law(probe, law, picture, np.maximum(picture, image), error)
         return
     light, light_error = probe.apply(glow, image)
     law = f"F(a) = a + {intensity:g} G(a)"
-    compare_with_law(law, picture, image + intensity * light, error + intensity * light_error)
+    allowed = error + intensity * light_error
+    compare_with_law(probe, law, picture, image + intensity * light, allowed)
 
 
 @checked
@@ -97,11 +111,21 @@ def assert_gain(bloom: Bloom, gain: float, probe: Probe = DEFAULT) -> None:
         With integers, `value` times `gain` must be at most 1.
     """
     check_number("gain", gain, 0.0, math.inf)
-    for part in (1.0, 0.5, 0.25):
-        image = _divisible_by_four(probe, probe.flat(probe.value)) * part
+    check_gain(bloom, gain, probe)
+
+
+def check_gain(bloom: Bloom, gain: float, probe: Probe, accuracy: float = 0.0) -> None:
+    """Raise AssertionError if flat images have another gain; `accuracy` is that of a measured one.
+
+    Where values have few levels, those of the darker images are the coarser ones: the brightest one
+    decides what is seen.
+    """
+    for part, seen in ((1.0, _SEEN_GAIN), (0.5, math.inf), (0.25, math.inf)):
+        image = probe.stored(_divisible_by_four(probe, probe.flat(probe.value)) * part)
         result, error = probe.apply(bloom, image)
         law = f"B(v) = {gain:.6g} v, for a flat image of v = {image.flat[0]:.6g}"
-        compare_with_law(law, result, gain * image, error)
+        allowed = error + accuracy * image
+        compare_with_law(probe, law, result, gain * image, allowed, seen=seen)
 
 
 @checked_as(axes=NAMES)
@@ -131,7 +155,19 @@ def assert_symmetric(
             raise ValueError(f"axes: {axis!r} is not one of {', '.join(_SWAPPED)}")
         mirrored, mirrored_error = probe.apply(bloom, _mirrored(image, axis))
         law = f"{_SWAPPED[axis]} swapped before or after the bloom are the same"
-        compare_with_law(law, _mirrored(mirrored, axis), result, error + mirrored_error)
+        allowed = error + _mirrored(mirrored_error, axis)
+        compare_with_law(probe, law, _mirrored(mirrored, axis), result, allowed)
+        if probe.is_coarse and axis != "xy":
+            _check_shift_seen(probe, result, allowed, 1 if axis == "x" else 0)
+
+
+def _check_shift_seen(probe: Probe, result: Image, allowed: Error, axis: int) -> None:
+    """Raise ValueError if half a texel, a pixel from one side to the other, is not seen."""
+    change = np.abs(np.diff(result, axis=axis))
+    errors = np.take(np.broadcast_to(allowed, result.shape), range(1, result.shape[axis]), axis)
+    if not (change > errors).any():
+        text = f"half a texel would change values by {change.max():.3g}, within their errors"
+        raise_coarse(probe, text)
 
 
 @checked
@@ -156,11 +192,12 @@ def assert_no_ringing(bloom: Bloom, probe: Probe = DEFAULT) -> None:
         step = probe.point(first, probe.value, probe.size)
         result, error = probe.apply(bloom, step)
         law = f"a step along {across} stays between the bloom of black and of the flat image"
-        allowed = error + max(dark_error, bright_error)
-        compare_with_law(law, result, np.clip(result, dark, bright), allowed)
+        allowed = error + np.maximum(dark_error, bright_error)
+        compare_with_law(probe, law, result, np.clip(result, dark, bright), allowed)
         # The running maximum. No later value may be lower.
         law = f"along {across}, values only rise across a step from black to bright"
-        compare_with_law(law, result, np.maximum.accumulate(result, axis=axis), 2 * error)
+        highest = np.maximum.accumulate(result, axis=axis)
+        compare_with_law(probe, law, result, highest, 2 * error)
 
 
 @checked
@@ -194,6 +231,8 @@ def assert_bounded_fireflies(
         The law is tested at period x period positions of the pixel, because the result of a chain
         of halved images depends on the position. Use 2 for one halving and 4 for two.
     """
+    if probe.levels is not None:
+        raise ValueError(f"cannot be tested in {probe.levels.reason}: no value is above 1")
     if probe.dtype.kind == "u":
         raise TypeError(f"probe: {probe.dtype} has no values above 1; use a float dtype")
     check_number("limit", limit, 0.0, math.inf)
@@ -207,7 +246,8 @@ def assert_bounded_fireflies(
             result, error = probe.apply(bloom, image, exempt=position)
             place = f"a pixel of {light:g} at x {position[0]}, y {position[1]}"
             law = f"{place} brightens others by {limit:g} at most"
-            compare_with_law(law, result, np.minimum(result, dark + limit), error + dark_error)
+            allowed = error + dark_error
+            compare_with_law(probe, law, result, np.minimum(result, dark + limit), allowed)
 
 
 def _divisible_by_four(probe: Probe, image: Image) -> Image:
@@ -221,7 +261,11 @@ def _divisible_by_four(probe: Probe, image: Image) -> Image:
     return whole
 
 
-def _mirrored(image: Image, axis: str) -> Image:
+def _mirrored(image: Error, axis: str) -> Image:
+    """Return an image, or the errors of its values, with two sides swapped."""
+    image = np.asarray(image)
+    if not image.ndim:
+        return image
     if axis == "xy":
         return image.swapaxes(0, 1)
     return np.flip(image, 1 if axis == "x" else 0)

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import dataclasses
+import functools
 import math
 import time
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,10 +23,14 @@ from vkbloom.psf._sampled import samples
 from vkbloom.testing._law_report import LawReport
 from vkbloom.testing._point_spread import border_share, veiling_glare_index
 from vkbloom.testing._probe import Bloom, Probe
-from vkbloom.testing._programs import COARSE_ERROR, Program
+from vkbloom.testing._programs import Program, levels_of
 from vkbloom.testing._subject import Subject, fitting_probe
 
 Array = NDArray[np.float64]
+T = TypeVar("T")
+
+#: About how often a program is run, in files of floats and in those of 8 bits.
+RUNS: Final = {False: 220, True: 90}
 
 VIEW: Final = (256, 144)
 #: The `sketch` of each preset's bloom, as `python -m tools.preset_blooms` writes them.
@@ -41,38 +48,57 @@ def values_of(
 ) -> dict[str, Any]:
     """Return all that is measured as plain values; what is not a number is None.
 
-    `about`: "name", "adapter", "size", and "passes", in seconds.
+    `about`: "name", "adapter", "size", and the times of `times_of`.
     """
-    probe = subject.probe
-    veil = veiling_glare_index(
-        subject.picture or subject.bloom,
-        size=probe.size,
-        patch=max(1, min(probe.size) // 8),
-        value=probe.value,
+    probe, levels = subject.probe, subject.probe.levels
+    veil = _figure(
+        lambda: veiling_glare_index(
+            subject.picture or subject.bloom,
+            size=probe.size,
+            patch=max(1, min(probe.size) // 8),
+            value=probe.value,
+        )
     )
-    near, difference = nearest_preset(about["name"], subject.bloom)
-    passes = [{"name": name, "seconds": time} for name, time in about.pop("passes").items()]
+    highest = None if levels is None else probe.value
+    near = _figure(lambda: nearest_preset(about["name"], subject.bloom, highest))
+    name, difference = near or ("", math.nan)
+    # In few levels, the bloom of a light smaller than a pixel is rounding.
+    stability = None if probe.is_coarse else _figure(lambda: subject.stability)
+    resolution = _figure(lambda: subject.resolution)
+    spread = _figure(lambda: spread_of(subject.spread, subject.lamp))
+    if spread is not None and probe.is_coarse:
+        spread["energy"] = _figure(lambda: subject.energy[0])
+    reference = _figure(lambda: subject.reference)
     values: dict[str, Any] = plain(
         about
-        | spread_of(subject.spread, subject.lamp)
+        | (spread or {"energy": None, "psf": None})
         | {
             "settings": None if settings is None else exact(settings).to_dict(),
-            "passes": passes,
+            "bits": None if levels is None else levels.bits,
             "laws": {
                 row.name: {name: getattr(row, name) for name in _OF_A_LAW} for row in report.rows
             },
             "untaken": report.untaken,
             "gain": report.gain,
-            "stability": {name: getattr(subject.stability, name) for name in _OF_STABILITY},
-            "resolution": {name: getattr(subject.resolution, name) for name in _OF_RESOLUTION},
+            "stability": stability and {name: getattr(stability, name) for name in _OF_STABILITY},
+            "resolution": resolution
+            and {name: getattr(resolution, name) for name in _OF_RESOLUTION},
             "veiling_glare_index": veil,
-            "reference": subject.reference or None,
-            "nearest_preset": {"name": near or None, "difference": difference},
+            "reference": reference or None,
+            "nearest_preset": {"name": name or None, "difference": difference},
             "required": report.required,
             "passed": all(row.held for row in report.rows if row.name in report.required),
         }
     )
     return values
+
+
+def _figure(measure: Callable[[], T]) -> T | None:
+    """Return a figure; None if the bloom fails, as the law that needs the figure says."""
+    try:
+        return measure()
+    except Exception:
+        return None
 
 
 def exact(settings: Settings) -> Settings:
@@ -107,7 +133,7 @@ def of_settings(
         picture=shown(renderer, used, "final"),
         intensity=used.intensity if used.composite == "add" else None,
         gain=gain,
-        differences=lambda: differences(renderer, used),
+        differences=None if _lacks_reference(used) else lambda: differences(renderer, used),
     )
     if gain is None:
         keeps_light = isinstance(used, CustomMethod) and used.file.saves_bloom
@@ -119,31 +145,30 @@ def of_program(
     program: Program, size: tuple[int, int], gain: float | None, *, less_input: bool
 ) -> Subject:
     """Return the bloom of a program, which is run once to see what it writes."""
-    probe = Probe(size=size)
-    program(probe.given(probe.flat(0.0)))
-    if program.bits is not None:
-        probe = Probe(size=size, atol=COARSE_ERROR)
+    levels = levels_of(program, size)
+    if levels is not None and less_input:
+        levels = dataclasses.replace(levels, is_difference=True)
 
     def difference(image: NDArray[Any]) -> NDArray[Any]:
         return np.asarray(program(image)[..., :3] - image[..., :3])
 
     bloom: Bloom = difference if less_input else program
-    subject = Subject(
+    return Subject(
         bloom=bloom,
-        probe=fitting_probe(bloom, probe),
+        probe=fitting_probe(bloom, Probe(size=size, levels=levels)),
         picture=program if less_input else None,
         gain=1.0 if gain is None else gain,
     )
-    if program.bits is not None:
-        subject.highest = 1.0
-    return subject
 
 
 def pass_times(
-    renderer: Renderer, settings: Settings, size: tuple[int, int], repeats: int = 5
+    renderer: Renderer, settings: Settings, size: tuple[int, int], repeats: int = 1
 ) -> dict[str, float]:
-    """Return the shortest time of each pass in seconds, for an image of 16-bit floats."""
-    images = [noise(size, seed).astype(np.float16) for seed in (0, 1)]
+    """Return the shortest time of each pass in seconds, for an image of 16-bit floats.
+
+    The first run, of another image, is not counted.
+    """
+    images = _images(size)
     results: dict[str, float] = {}
     for turn in range(repeats + 1):
         timings = renderer.apply(images[turn % 2], settings, framebuffers=("final",)).timings
@@ -152,12 +177,40 @@ def pass_times(
     return results
 
 
+@functools.lru_cache(maxsize=1)
+def _images(size: tuple[int, int]) -> tuple[NDArray[np.float16], NDArray[np.float16]]:
+    first, second = (noise(size, seed).astype(np.float16) for seed in (0, 1))
+    return first, second
+
+
 def run_time(program: Bloom, size: tuple[int, int]) -> dict[str, float]:
     """Return the time of one run of a program in seconds, with reading and writing of files."""
     image = noise(size, 0).astype(np.float32)
     begun = time.perf_counter()
     program(image)
     return {"program": time.perf_counter() - begun}
+
+
+def times_of(runs: Sequence[Mapping[str, float]]) -> dict[str, Any]:
+    """Return the shortest time of each pass, and the spread of all passes together."""
+    passes = [
+        {"name": name, "seconds": min(run[name] for run in runs if name in run)}
+        for name in dict.fromkeys(name for run in runs for name in run)
+    ]
+    sums = [math.fsum(run.values()) for run in runs]
+    together = {"runs": len(runs), "shortest": min(sums), "longest": max(sums)}
+    return {"passes": passes, "together": together}
+
+
+def in_turns(
+    timers: Sequence[Callable[[], Mapping[str, float]]], runs: int
+) -> list[dict[str, Any]]:
+    """Return the times of each timer; they run in turns, so that a busy moment slows all."""
+    found: list[list[Mapping[str, float]]] = [[] for _ in timers]
+    for _ in range(runs):
+        for timer, kept in zip(timers, found, strict=True):
+            kept.append(timer())
+    return [times_of(each) for each in found]
 
 
 def noise(size: tuple[int, int], seed: int) -> Array:
@@ -189,10 +242,12 @@ def spread_of(array: Array, probe: Probe) -> dict[str, Any]:
     return {"energy": energy, "psf": of_psf}
 
 
+def _lacks_reference(settings: Settings) -> bool:
+    return isinstance(settings, CustomMethod) and type(settings).numpy_reference is None
+
+
 def differences(renderer: Renderer, settings: Settings) -> dict[str, float]:
     """Return the difference from the reference by framebuffer, as a share of its largest value."""
-    if isinstance(settings, CustomMethod) and type(settings).numpy_reference is None:
-        return {}
     image = noise((96, 64), 2).astype(np.float32)
     expected = reference.apply(image, settings)
     frames = renderer.apply(image, settings)
@@ -206,16 +261,19 @@ def differences(renderer: Renderer, settings: Settings) -> dict[str, float]:
     return results
 
 
-def sketch(bloom: Bloom) -> Array:
-    """Return the bloom of four lights as means of 4 x 4 pixels."""
-    light = np.asarray(bloom(lights(VIEW)))[..., :3].astype(np.float64)
+def sketch(bloom: Bloom, highest: float | None = None) -> Array:
+    """Return the bloom of four lights, the brightest of `highest`, as means of 4 x 4 pixels."""
+    scene = lights(VIEW)
+    if highest is not None:
+        scene *= highest / scene.max()
+    light = np.asarray(bloom(scene))[..., :3].astype(np.float64)
     boxes = light.reshape(VIEW[1] // 4, 4, VIEW[0] // 4, 4, 3)
     return np.asarray(boxes.mean(axis=(1, 3)))
 
 
-def nearest_preset(excluded: str, bloom: Bloom) -> tuple[str, float]:
+def nearest_preset(excluded: str, bloom: Bloom, highest: float | None = None) -> tuple[str, float]:
     """Return the other preset whose bloom of four lights is nearest, at its best intensity."""
-    target = sketch(bloom)
+    target = sketch(bloom, highest)
     length = float(np.linalg.norm(target))
     if not length > 0:
         return "", math.nan

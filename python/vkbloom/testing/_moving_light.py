@@ -14,7 +14,7 @@ from vkbloom._argument_types import checked
 from vkbloom._checks import check_index, check_number
 from vkbloom.testing._deviations import fail, judge
 from vkbloom.testing._point_spread import border_share, check_inside
-from vkbloom.testing._probe import Bloom, Image, Probe
+from vkbloom.testing._probe import Bloom, Image, Probe, call
 
 __tracebackhide__ = True
 
@@ -146,7 +146,7 @@ def stability(
     rows = []
     for position in positions.reshape(-1, 2):
         given = _light(probe, position)
-        result = probe.values(bloom(given), given)[0][:, :, 0]
+        result = probe.values(call(bloom, given), given)[0][:, :, 0]
         rows.append(_figures(result - dark, probe, given, spread))
     energy, across, down, peak, ideal, radius, border = np.array(rows).T.reshape(
         -1, *positions.shape[:2]
@@ -260,7 +260,7 @@ def _convolved_peak(spread: Image, image: Image) -> float:
 
 def _figures(bloom: Image, probe: Probe, given: NDArray[Any], spread: Image) -> tuple[float, ...]:
     """Return energy, x and y of the shift, peak, ideal, radius, and the share at the border."""
-    image = probe.values(given, given)[0][:, :, 0]
+    image = probe.values_of(given)[:, :, 0]
     energy, position, variance = moments(bloom)
     _, from_place, from_variance = moments(image)
     # Replace the variance of the sampled light by that of the square.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -11,11 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom._checks import check_index, check_number, check_size, plain_array
+from vkbloom.testing._levels import Levels
 
 __tracebackhide__ = True
 
 #: An image in real units: integers are scaled to 0..1.
 Image: TypeAlias = NDArray[np.float64]
+
+#: Errors of values: one for all of an image, or one for each.
+Error: TypeAlias = float | Image
 
 #: The bloom under test: takes an image and returns one of the same height and width.
 Bloom: TypeAlias = Callable[[NDArray[Any]], NDArray[Any]]
@@ -30,6 +35,62 @@ _ERRORS: Final[Mapping[str, tuple[float, float]]] = {
     "float32": (0.0, 1e-4),
     "float64": (0.0, 1e-4),
 }
+
+
+# Where levels are coarse, noise is squares of this share of the shorter side.
+_BLOCKS: Final = 8
+# And lights have this side in pixels.
+_LIGHT: Final = 9
+
+
+class NotTaken(ValueError):
+    """A bloom does not take what a law needs, such as a region or alpha; so it is not tested."""
+
+
+class BloomError(Exception):
+    """A bloom under test raised an error, or returned no image; the cause is that error."""
+
+
+def call(bloom: Bloom, given: NDArray[Any], **options: Any) -> NDArray[Any]:
+    """Return the bloom of a copy of an image: a bloom may work in place."""
+    return bloom(given.copy(), **options)
+
+
+def checked_result(result: object, given: NDArray[Any], colours: int) -> NDArray[Any]:
+    """Return the result of a bloom for an image as (H, W, C), after a check of dtype and shape."""
+    if isinstance(result, Mapping):
+        raise TypeError(
+            "bloom: it returns a mapping; name the framebuffer, for example "
+            "lambda image: renderer.apply(image, settings)['bloom']"
+        )
+    array = plain_array(result, "bloom: its result")
+    if array.dtype.name not in _ERRORS:
+        raise TypeError(f"bloom: it returns {array.dtype}, not one of {', '.join(_ERRORS)}")
+    whole = array[:, :, np.newaxis] if array.ndim == 2 else array
+    if whole.ndim != 3 or whole.shape[:2] != given.shape[:2]:
+        raise ValueError(f"bloom: it returns shape {array.shape} for {given.shape}")
+    if whole.shape[2] < colours:
+        raise ValueError(f"bloom: it returns {whole.shape[2]} channels for {colours}")
+    return whole
+
+
+def guarded(bloom: Bloom) -> Bloom:
+    """Return a bloom whose errors, and results that are no image of the same size, are BloomErrors.
+
+    So a report tells them from its own, such as a probe that a law cannot be tested with.
+    """
+
+    @functools.wraps(bloom)
+    def guard(given: NDArray[Any], **options: Any) -> NDArray[Any]:
+        try:
+            result = bloom(given, **options)
+            if not options.get("region"):
+                checked_result(result, given, 1)
+        except Exception as error:
+            raise BloomError(f"the bloom raised {type(error).__name__}: {error}") from error
+        return result
+
+    return guard
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,6 +117,10 @@ class Probe:
         for float.
     seed : int
         Seed of the noise images.
+    levels : Levels or None
+        What the files of a program hold that reads and writes integers; `report` sets it for such
+        a program. Test images then have values that the files hold, and the error of a value
+        follows from them, in place of `atol` and `rtol`. In 8 bits, noise is squares of two values.
     """
 
     size: tuple[int, int] = (65, 65)
@@ -65,6 +130,7 @@ class Probe:
     atol: float | None = None
     rtol: float | None = None
     seed: int = 0
+    levels: Levels | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "size", check_size("size", self.size))
@@ -95,6 +161,21 @@ class Probe:
         """Number of channels without alpha."""
         return 1 if self.channels is None else min(self.channels, 3)
 
+    @property
+    def is_coarse(self) -> bool:
+        """Whether values have few levels, as in files of 8 bits."""
+        return self.levels is not None and self.levels.is_coarse
+
+    @property
+    def light_side(self) -> int:
+        """The side of a light whose bloom has many levels, in pixels; 1 where all values have."""
+        return min(_LIGHT, (min(self.size) // 4) | 1) if self.is_coarse else 1
+
+    def check_fine(self, needed: str) -> None:
+        """Raise ValueError if values have few levels; `needed`: what a law would need."""
+        if self.is_coarse and self.levels is not None:
+            raise ValueError(f"cannot be tested in {self.levels.reason}: {needed}; use .exr")
+
     def flat(self, value: float) -> Image:
         """Return an image of one value."""
         return np.full((self.size[1], self.size[0], self.colours), value)
@@ -109,14 +190,27 @@ class Probe:
         return image
 
     def noise(self, index: int, highest: float) -> Image:
-        """Return random values of 0 to `highest`, rounded to the dtype."""
+        """Return random values of 0 to `highest`, rounded to what the bloom can be given."""
         generator = np.random.default_rng((self.seed, index))
+        if self.is_coarse:
+            return self.stored(self._squares(generator) * highest)
         image = generator.random((self.size[1], self.size[0], self.colours)) * highest
+        return self.stored(image)
+
+    def _squares(self, generator: np.random.Generator) -> Image:
+        """Return squares of 0 and 1, since a blur of noise has few levels."""
+        side = max(4, min(self.size) // _BLOCKS)
+        counts = (-(-self.size[1] // side), -(-self.size[0] // side), self.colours)
+        squares = generator.integers(0, 2, counts).repeat(side, axis=0).repeat(side, axis=1)
+        return np.asarray(squares[: self.size[1], : self.size[0]], np.float64)
+
+    def stored(self, image: Image) -> Image:
+        """Return the values that the bloom is given for an image, in real units."""
         return self._real(self._stored(image))
 
     def apply(
         self, bloom: Bloom, image: Image, *, exempt: tuple[int, int] | None = None
-    ) -> tuple[Image, float]:
+    ) -> tuple[Image, Error]:
         """Return the bloom of an image in real units, without alpha, and the error of its values.
 
         The pixel `exempt`, x and y, is ignored; it is 0 in the result.
@@ -124,11 +218,16 @@ class Probe:
         if not callable(bloom):
             raise TypeError(f"bloom: {bloom!r} is not callable")
         given = self.given(image)
-        return self.values(bloom(given), given, exempt=exempt)
+        return self.values(call(bloom, given), given, exempt=exempt)
 
     def given(self, image: Image) -> NDArray[Any]:
         """Return an image in the probe's dtype and number of channels, as input of a bloom."""
         stored = self._stored(image)
+        if self.levels is not None and self.levels.is_lossy and np.ptp(stored, axis=(0, 1)).any():
+            raise ValueError(
+                "cannot be tested in lossy files, which change every image but a flat one; use "
+                ".png or .exr"
+            )
         if self.channels == 4:
             opaque = np.iinfo(self.dtype).max if self.dtype.kind == "u" else 1
             alpha = np.full((*stored.shape[:2], 1), opaque, self.dtype)
@@ -137,21 +236,9 @@ class Probe:
 
     def values(
         self, result: object, given: NDArray[Any], *, exempt: tuple[int, int] | None = None
-    ) -> tuple[Image, float]:
+    ) -> tuple[Image, Error]:
         """Check the result of a bloom for the input `given`, and return the same as `apply`."""
-        if isinstance(result, Mapping):
-            raise TypeError(
-                "bloom: it returns a mapping; name the framebuffer, for example "
-                "lambda image: renderer.apply(image, settings)['bloom']"
-            )
-        array = plain_array(result, "bloom: its result")
-        if array.dtype.name not in _ERRORS:
-            raise TypeError(f"bloom: it returns {array.dtype}, not one of {', '.join(_ERRORS)}")
-        whole = array[:, :, np.newaxis] if array.ndim == 2 else array
-        if whole.ndim != 3 or whole.shape[:2] != given.shape[:2]:
-            raise ValueError(f"bloom: it returns shape {array.shape} for {given.shape}")
-        if whole.shape[2] < self.colours:
-            raise ValueError(f"bloom: it returns {whole.shape[2]} channels for {self.colours}")
+        whole = checked_result(result, given, self.colours)
         real = self._real(whole[:, :, : self.colours])
         if exempt is not None:
             real[exempt[1], exempt[0]] = 0
@@ -161,12 +248,21 @@ class Probe:
                 f"the result is {real[y, x, channel]} at x {x}, y {y}, channel {channel}\n"
                 "  law: the bloom of finite values is finite"
             )
-        atol, rtol = _ERRORS[array.dtype.name]
+        if self.levels is not None:
+            return real, self.levels.error(real, self.values_of(given))
+        atol, rtol = _ERRORS[whole.dtype.name]
         if self.atol is not None or self.rtol is not None:
             atol, rtol = self.atol or 0.0, self.rtol or 0.0
         return real, atol + rtol * float(np.abs(real).max())
 
+    def values_of(self, given: NDArray[Any]) -> Image:
+        """Return an image that the bloom is given in real units, without alpha."""
+        whole = given[:, :, np.newaxis] if given.ndim == 2 else given
+        return self._real(whole[:, :, : self.colours])
+
     def _stored(self, image: Image) -> NDArray[Any]:
+        if self.levels is not None:
+            image = self.levels.stored(image)
         if self.dtype.kind == "u":
             largest = np.iinfo(self.dtype).max
             rounded: NDArray[Any] = np.rint(np.clip(image, 0, 1) * largest).astype(self.dtype)

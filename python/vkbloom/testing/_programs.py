@@ -9,7 +9,7 @@ import signal
 import subprocess
 import tempfile
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from vkbloom._argument_types import checked
 from vkbloom._checks import check_number
 from vkbloom._io.array_files import read, write
+from vkbloom.testing._levels import Levels
 from vkbloom.testing._probe import Bloom
 
 __tracebackhide__ = True
@@ -28,8 +29,12 @@ _PLACEHOLDER: Final = re.compile("|".join(map(re.escape, _PLACEHOLDERS)))
 #: Bits of the integers in a file, by OpenImageIO's name of the type.
 _BITS: Final = {"uint8": 8, "uint16": 16}
 _COARSE: Final = 8
+#: Formats whose files are written with integers of 8 bits, and those that change more than that.
+_INTEGERS: Final = (".bmp", ".jp2", ".png", ".sgi", ".tga")
+_LOSSY: Final = (".gif", ".jpeg", ".jpg", ".webp")
 #: Error of linear values in 8 bits: two levels, where the curve of sRGB is steepest.
 COARSE_ERROR: Final = 0.018
+_TRACEBACK: Final = "Traceback (most recent call last):"
 _LAST_WORDS: Final = 300  # characters of a failed program's output that an error quotes
 
 
@@ -67,7 +72,11 @@ def command(argv: Sequence[str], *, suffix: str = ".exr", timeout: float = 60.0)
 
 
 class Program:
-    """The callable of `command`. `bits` is 8 or 16 once the program has written such integers."""
+    """The callable of `command`.
+
+    `bits` is 8 or 16 if its files hold such integers, by the suffix; once it has run, by what it
+    has written. `runs` counts its runs, and `on_run` is called before each.
+    """
 
     def __init__(self, argv: Sequence[str], suffix: str, timeout: float) -> None:
         self._argv = tuple(argv)
@@ -78,10 +87,22 @@ class Program:
             raise ValueError(f"suffix: {suffix!r} does not begin with a dot")
         check_number("timeout", timeout, 1e-3, 1e6)
         self._suffix, self._timeout = suffix, timeout
-        self.bits: int | None = None
+        self._is_lossy = suffix.lower() in _LOSSY
+        holds_integers = self._is_lossy or suffix.lower() in _INTEGERS
+        self.bits: int | None = _COARSE if holds_integers else None
+        self.runs = 0
+        self.on_run: Callable[[int], None] = lambda _: None
+        self._is_noted = False
+
+    @property
+    def levels(self) -> Levels | None:
+        """What the files hold; None: floats."""
+        return None if self.bits is None else Levels(bits=self.bits, is_lossy=self._is_lossy)
 
     def __call__(self, image: NDArray[Any]) -> NDArray[Any]:
         """Run the program once."""
+        self.runs += 1
+        self.on_run(self.runs)
         height, width = image.shape[:2]
         with tempfile.TemporaryDirectory(prefix="vkbloom-") as folder:
             source, target = (Path(folder) / f"{name}{self._suffix}" for name in ("in", "out"))
@@ -128,7 +149,7 @@ class Program:
                 with contextlib.suppress(ProcessLookupError):
                     os.killpg(running.pid, signal.SIGKILL)
         if running.returncode:
-            last = " ".join(said.decode(errors="replace").split())[-_LAST_WORDS:]
+            last = _last_words(said.decode(errors="replace"))
             raise ChildProcessError(
                 f"{self._name}: it {_ended(running.returncode)}; it said: {last or 'nothing'}"
             )
@@ -138,16 +159,40 @@ class Program:
             pixels, about = read(target, premultiplied=True, metadata=True)
         except (OSError, ValueError) as error:
             raise ValueError(f"{self._name}: its file cannot be read: {error}") from None
-        if about["numbers"] in _BITS and self.bits is None:
-            self.bits = _BITS[about["numbers"]]
-            if self.bits == _COARSE:
-                warnings.warn(
-                    f"{self._name}: it writes {self.bits} bits, which are clipped to 0..1 and "
-                    f"rounded; test it with Probe(atol={COARSE_ERROR:g}), or let it write EXR",
-                    UserWarning,
-                    stacklevel=3,
-                )
+        # What it reads may have fewer bits than what it writes.
+        written = _BITS.get(about["numbers"])
+        self.bits = min((bits for bits in (self.bits, written) if bits), default=None)
+        if written == _COARSE and not self._is_noted:
+            self._is_noted = True
+            warnings.warn(
+                f"{self._name}: it writes {written} bits, which are clipped to 0..1 and rounded; "
+                f"testing.report knows; assert with Probe(atol={COARSE_ERROR:g}), or let it write "
+                "EXR",
+                UserWarning,
+                stacklevel=3,
+            )
         return pixels
+
+
+def levels_of(bloom: Bloom, size: tuple[int, int]) -> Levels | None:
+    """Return what the files of a program hold, which is run once to see; None: floats.
+
+    A bloom of another kind may declare it, too, as its attribute `levels`.
+    """
+    if isinstance(bloom, Program):
+        bloom(np.zeros((size[1], size[0], 3), np.float32))
+    levels = getattr(bloom, "levels", None)
+    return levels if isinstance(levels, Levels) else None
+
+
+def _last_words(said: str) -> str:
+    """Return the end of what a program has said; of a traceback of Python, the error."""
+    traceback = said.rpartition(_TRACEBACK)[2] if _TRACEBACK in said else ""
+    # Frames are indented; the first line that is not has the error.
+    errors = [line for line in traceback.splitlines() if line.strip() and not line[0].isspace()]
+    if errors:
+        return errors[0][:_LAST_WORDS]
+    return " ".join(said.split())[-_LAST_WORDS:]
 
 
 def _ended(status: int) -> str:

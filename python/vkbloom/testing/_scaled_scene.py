@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Final
 
 import numpy as np
@@ -41,12 +41,16 @@ class ResolutionResponse:
         height; NaN without light.
     peak : ndarray of float64, shape (N,)
         The largest value of the bloom relative to the value of the light.
+    errors : mapping of str to ndarray of float64, shape (N,)
+        Of a program that writes integers, the errors of r50, r90 and peak by the levels of values;
+        otherwise empty.
     """
 
     sizes: tuple[tuple[int, int], ...]
     r50: NDArray[np.float64]
     r90: NDArray[np.float64]
     peak: NDArray[np.float64]
+    errors: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
 
 
 @checked
@@ -79,18 +83,29 @@ def resolution_response(
     """
     check_number("light", light, math.ulp(0.0), 1.0)
     sizes = _sizes(scales, probe.size)
-    rows = []
+    rows, errors = [], []
     for width, height in sizes:
         sized = dataclasses.replace(probe, size=(width, height))
         side = light * height
         share = area_sampled(sized.size, ((width - 1) / 2, (height - 1) / 2), (side, side))
         scene = probe.value * np.repeat(share[:, :, np.newaxis], sized.colours, axis=2)
-        lit = sized.apply(bloom, scene)[0][:, :, 0]
-        lit -= sized.apply(bloom, sized.flat(0.0))[0][:, :, 0]
-        radii = _radii(lit, (0.5, 0.9))
-        rows.append((radii[0] / height, radii[1] / height, float(lit.max()) / probe.value))
+        result, error = sized.apply(bloom, scene)
+        lit = result[:, :, 0] - sized.apply(bloom, sized.flat(0.0))[0][:, :, 0]
+        rows.append(_figures(lit, probe.value))
+        if probe.is_coarse:
+            half = np.broadcast_to(error, result.shape)[:, :, 0] / 2
+            rounded = [_figures(lit + by * half * (lit > half), probe.value) for by in (-1, 1)]
+            errors.append(np.abs(np.subtract(rounded, rows[-1])).max(axis=0))
     r50, r90, peak = np.array(rows).T
-    return ResolutionResponse(sizes=sizes, r50=r50, r90=r90, peak=peak)
+    names = ("r50", "r90", "peak")
+    off = dict(zip(names, np.array(errors).T, strict=True)) if errors else {}
+    return ResolutionResponse(sizes=sizes, r50=r50, r90=r90, peak=peak, errors=off)
+
+
+def _figures(lit: Image, value: float) -> tuple[float, float, float]:
+    """Return both radii as shares of the height, and the peak as a share of the light's value."""
+    r50, r90 = (radius / len(lit) for radius in _radii(lit, (0.5, 0.9)))
+    return r50, r90, float(lit.max()) / value
 
 
 @checked
@@ -121,10 +136,13 @@ def assert_resolution_independent(
     """
     check_number("radius", radius, 0.0, math.inf)
     check_number("peak", peak, 0.0, math.inf)
-    check_independent(resolution_response(bloom, scales, light=light, probe=probe), radius, peak)
+    response = resolution_response(bloom, scales, light=light, probe=probe)
+    check_independent(response, radius, peak, probe)
 
 
-def check_independent(response: ResolutionResponse, radius: float, peak: float) -> None:
+def check_independent(
+    response: ResolutionResponse, radius: float, peak: float, probe: Probe = _DEFAULT
+) -> None:
     """Raise AssertionError if radii or peak change by more than a share of their mean."""
     for name, what, values, allowed in (
         ("r50", "the radius of 50 % of the light", response.r50, radius),
@@ -143,7 +161,9 @@ def check_independent(response: ResolutionResponse, radius: float, peak: float) 
             f"{values[high]:.4g} at {_shown(response.sizes[high])}: off by {change:.3g} of the "
             f"mean, {allowed:.3g} allowed"
         )
-        judge(law, (name, change, allowed, text))
+        errors = response.errors.get(name, np.zeros(len(values)))
+        error = float((errors[low] + errors[high]) / values.mean())
+        judge(law, (name, change, allowed, text, error), probe=probe)
 
 
 def _sizes(scales: Sequence[float], size: tuple[int, int]) -> tuple[tuple[int, int], ...]:

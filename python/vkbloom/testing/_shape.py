@@ -12,17 +12,19 @@ import numpy as np
 from vkbloom._argument_types import checked
 from vkbloom._checks import check_number
 from vkbloom.reference._glare import texels_at
-from vkbloom.testing._deviations import NotTaken, fail, figure, is_within, judge
+from vkbloom.testing._deviations import Findings, Measured, fail, figure, judge
 from vkbloom.testing._moving_light import moments
-from vkbloom.testing._point_spread import border_share, check_inside, point_spread
-from vkbloom.testing._probe import DEFAULT, Bloom, Image, Probe, beside_multiple
+from vkbloom.testing._point_spread import border_share, check_inside, point_spread, sum_error
+from vkbloom.testing._probe import DEFAULT, Bloom, Image, NotTaken, Probe, beside_multiple
 
 __tracebackhide__ = True
 
 #: Shares of the peak whose contours are measured.
 LEVELS: Final = (0.5, 0.1, 0.01)
 #: Limits of the change from one size to the next: width and energy as shares, centroid in pixels.
-SIZE_LIMITS: Final = {"width": 0.05, "centroid": 0.3, "energy": 0.05, "flat": 0.1}
+#: And what the light of the last pixel may lack of a quarter, which is in the frame.
+SIZE_LIMITS: Final = {"width": 0.05, "centroid": 0.3, "energy": 0.05, "flat": 0.1, "last": 0.22}
+_LAST: Final = 0.25
 # Contours nearer to their middle, in pixels, are a few pixels, which are never round.
 _MIN_RADIUS: Final = 3.0
 _ANGLES: Final = 90
@@ -110,7 +112,7 @@ def assert_sizes(
     which 16 n is no power of 2, the bloom of a square of 16 x 16 pixels has the same width (the
     root of the added variance), centroid (beside that of the square) and energy; and in one of
     16 n + 1 pixels, the bloom of a flat image is the same share of its middle in the outermost
-    pixels as in one of 16 n.
+    pixels as in one of 16 n, and the last pixel has at least 3 % of its light.
 
     Parameters
     ----------
@@ -118,34 +120,108 @@ def assert_sizes(
         Takes an image and returns one of the same height and width: the bloom alone.
     probe : Probe
     limits : mapping of str to float, optional
-        Largest difference from the size 16 n: "width", "energy" and "flat" as shares, "centroid" in
-        pixels; by default 0.05, 0.05, 0.1, 0.3.
+        Largest difference from the size 16 n: "width", "energy", "flat" and "last" (less than a
+        quarter of the light) as shares, "centroid" in pixels; by default 0.05, 0.05, 0.1, 0.22,
+        0.3.
     """
     dark = float(probe.apply(bloom, probe.flat(0.0))[0].mean())
-    check_sizes(bloom, probe, dark, SIZE_LIMITS | dict(limits or {}))
+    last = last_pixel(bloom, probe, is_dark=dark == 0)
+    check_sizes(bloom, probe, dark, SIZE_LIMITS | dict(limits or {}), last)
 
 
-def check_sizes(bloom: Bloom, probe: Probe, dark: float, allowed: Mapping[str, float]) -> None:
+def check_sizes(
+    bloom: Bloom, probe: Probe, dark: float, allowed: Mapping[str, float], last: LastPixel
+) -> None:
     """Raise AssertionError if sizes matter; `dark` is the mean of the bloom of a black image."""
     # Small images first, which are faster. Where light leaves them, the probe's size decides.
-    reasons: dict[str, str] = {}
     for most in (_SMALL, max(probe.size)):
         is_small = most < max(probe.size)
         width, height = (beside_multiple(min(side, most)) for side in probe.size)
         sized = dataclasses.replace(probe, size=(width, height))
-        reasons, share = _compare_sizes(bloom, sized, dark, allowed, is_small=is_small)
-        if not reasons:
+        findings, share = _compare_sizes(bloom, sized, dark, allowed, last, is_small=is_small)
+        if not (findings.broken or findings.undecided):
             return
-        if "flat" in reasons or share <= _OUTERMOST:
+        if findings.is_at_border or share <= _OUTERMOST:
             break
     else:
         check_inside(share, sized.size, _OUTERMOST)
-    fail(_SIZES, "; ".join(reasons.values()))
+    findings.conclude()
+
+
+@dataclasses.dataclass(frozen=True)
+class LastPixel:
+    """The bloom of the last pixel of an image with odd sides.
+
+    A chain of halved images may drop the last column and row there.
+    """
+
+    bloom: Bloom
+    probe: Probe
+    is_dark: bool
+    light: float
+    error: float
+
+    def measured(self, energy: float, allowed: float) -> Measured:
+        """Return what its light lacks of a quarter; `energy`: of a pixel of 1 in the middle."""
+        share = self.light / energy
+        # Of a linear bloom. A pixel in the middle decides only if this one has too little.
+        if share < _LAST:
+            x, y = (16 * round(side / 32) for side in self.probe.size)
+            energy = _light(self.bloom, self.probe, (x, y), is_dark=self.is_dark)[0]
+            share = self.light / energy if energy > 0 else math.inf
+        width, height = self.probe.size
+        off, error = max(0.0, _LAST - share), self.error / energy if energy > 0 else 0.0
+        text = f"at {width} x {height} the last pixel has {share:.3g} of the energy of one in the "
+        return "last", off, allowed, f"{text}middle", error
+
+
+def last_pixel(bloom: Bloom, probe: Probe, *, is_dark: bool) -> LastPixel:
+    """Return the bloom of the last pixel of an image of 16 n + 1 pixels, at most 145.
+
+    `is_dark`: Whether the bloom of a black image is black.
+    """
+    width, height = (beside_multiple(min(side, _SMALL)) + 1 for side in probe.size)
+    sized = dataclasses.replace(probe, size=(width, height))
+    light, error = _light(bloom, sized, (width - 1, height - 1), is_dark=is_dark)
+    return LastPixel(bloom, sized, is_dark, light, error)
+
+
+def _light(
+    bloom: Bloom, probe: Probe, at: tuple[int, int], *, is_dark: bool
+) -> tuple[float, float]:
+    """Return the light of the bloom of a pixel, divided by its value, and the error of this sum."""
+    found, error = probe.apply(bloom, probe.point(at, probe.value))
+    rounded = 0.0 if probe.levels is None else sum_error(found, error)[0]
+    if not is_dark:
+        found = found - probe.apply(bloom, probe.flat(0.0))[0]
+    return float(found.mean(axis=2).sum()) / probe.value, rounded / probe.value
+
+
+@dataclasses.dataclass
+class _SizeFindings(Findings):
+    """What differs from the first size; of each figure, the first difference."""
+
+    is_at_border: bool = False
+    named: set[str] = dataclasses.field(default_factory=set)
+
+    def add_first(self, item: Measured) -> None:
+        """Compare a deviation with its limit, unless one of its name is beyond it."""
+        before = len(self.broken), len(self.undecided)
+        if item[0] not in self.named:
+            self.add([item])
+        if before != (len(self.broken), len(self.undecided)):
+            self.named.add(item[0])
 
 
 def _compare_sizes(
-    bloom: Bloom, probe: Probe, dark: float, allowed: Mapping[str, float], *, is_small: bool
-) -> tuple[dict[str, str], float]:
+    bloom: Bloom,
+    probe: Probe,
+    dark: float,
+    allowed: Mapping[str, float],
+    last: LastPixel,
+    *,
+    is_small: bool,
+) -> tuple[_SizeFindings, float]:
     """Return what differs from the probe's size, and the share of light at the border there.
 
     In a small image that light leaves, the first difference is enough.
@@ -153,32 +229,36 @@ def _compare_sizes(
     width, height = probe.size
     # At the same pixels in all sizes, since a chain of halved images spreads each differently.
     at = ((width - _SQUARE) // 2, (height - _SQUARE) // 2)
-    base = _square_figures(bloom, probe, at, dark)
-    reasons: dict[str, str] = {}
+    base, base_error, outside = _square_figures(bloom, probe, at, dark)
+    findings = _SizeFindings(_SIZES, probe)
     for step in _STEPS:
         sized = dataclasses.replace(probe, size=(width + step, height + step))
-        result = _square_figures(bloom, sized, at, dark)
+        result, result_error, _ = _square_figures(bloom, sized, at, dark)
+        error = base_error + result_error
+        spread = base[0] or math.inf
         off = {
-            "width": abs(result[0] - base[0]) / base[0] if base[0] > 0 else 0.0,
-            "energy": abs(result[1] - base[1]) / base[1],
-            "centroid": math.hypot(result[2] - base[2], result[3] - base[3]),
+            "width": (abs(result[0] - base[0]) / spread, error[0] / spread),
+            "energy": (abs(result[1] - base[1]) / base[1], error[1] / base[1]),
+            "centroid": (math.hypot(*(result[2:] - base[2:])), math.hypot(*error[2:])),
         }
         if step == 1:
             flat = _flatness(bloom, sized)
             if np.abs(flat - 1).max() > allowed["flat"] / 10:
                 flat += 1 - _flatness(bloom, probe)
-            off["flat"] = float(np.abs(flat - 1).max())
-        for name, value in off.items():
-            if not is_within(_SIZES, value, allowed[name], name) and name not in reasons:
-                unit = " pixels" if name == "centroid" else " of it"
-                what = "the border of a flat image" if name == "flat" else f"the {name}"
-                reasons[name] = (
-                    f"at {sized.size[0]} x {sized.size[1]} {what} differs by {value:.3g}{unit} "
-                    f"from that at {width} x {height}: {allowed[name]:.3g} allowed"
-                )
-        if is_small and reasons and base[4] > _OUTERMOST:
+            off["flat"] = float(np.abs(flat - 1).max()), 0.0
+            findings.add_first(last.measured(base[1] / _SQUARE**2 / probe.value, allowed["last"]))
+            findings.is_at_border = bool(findings.broken) or off["flat"][0] > allowed["flat"]
+        for name, (value, uncertain) in off.items():
+            unit = " pixels" if name == "centroid" else " of it"
+            what = "the border of a flat image" if name == "flat" else f"the {name}"
+            text = (
+                f"at {sized.size[0]} x {sized.size[1]} {what} differs by {value:.3g}{unit} "
+                f"from that at {width} x {height}: {allowed[name]:.3g} allowed"
+            )
+            findings.add_first((name, value, allowed[name], text, uncertain))
+        if is_small and findings.named and outside > _OUTERMOST:
             break
-    return reasons, base[4]
+    return findings, outside
 
 
 def _flatness(bloom: Bloom, probe: Probe) -> Image:
@@ -195,15 +275,28 @@ def _flatness(bloom: Bloom, probe: Probe) -> Image:
 
 def _square_figures(
     bloom: Bloom, probe: Probe, at: tuple[int, int], dark: float
-) -> tuple[float, float, float, float, float]:
-    """Return width, energy, shift along x and y, and share at the border of a square's bloom."""
+) -> tuple[Image, Image, float]:
+    """Return figures of a square's bloom, their errors, and its share at the border.
+
+    The figures are width, energy, shift along x and y.
+    """
     image = probe.point(at, probe.value, (_SQUARE, _SQUARE))
-    lit = probe.apply(bloom, image)[0].mean(axis=2) - dark
+    found, error = probe.apply(bloom, image)
+    lit = found.mean(axis=2) - dark
+    if not lit.sum() > 0:
+        fail("the bloom of a square is not black", f"its energy is {lit.sum():.3g}")
+    result, errors = _moments(lit, at), np.zeros(4)
+    if probe.levels is not None:
+        half = np.broadcast_to(error, found.shape).mean(axis=2) / 2
+        rounded = [_moments(lit + by * half * (lit > half), at) for by in (-1, 1)]
+        errors = np.abs(np.subtract(rounded, result)).max(axis=0)
+    figure("squared_width", float(result[0] ** 2))
+    return result, errors, border_share(lit)
+
+
+def _moments(lit: Image, at: tuple[int, int]) -> Image:
+    """Return width, energy, and shift along x and y of the bloom of a square."""
     energy, position, variance = moments(lit)
-    if not energy > 0:
-        fail("the bloom of a square is not black", f"its energy is {energy:.3g}")
-    middle = (_SQUARE - 1) / 2
-    squared = variance - 2 * (_SQUARE**2 - 1) / 12
-    figure("squared_width", squared)
-    shift = np.subtract(position, at) - middle
-    return math.sqrt(max(squared, 0.0)), energy, shift[0], shift[1], border_share(lit)
+    squared = max(variance - 2 * (_SQUARE**2 - 1) / 12, 0.0)
+    shift = np.subtract(position, at) - (_SQUARE - 1) / 2
+    return np.array([math.sqrt(squared), energy, *shift])

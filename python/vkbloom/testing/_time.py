@@ -33,9 +33,10 @@ _STEADY: Final = {4: 0.25, 8: 0.5}
 _FEEDBACK: Final = 0.9
 # Frames a second, by which a bloom is given the time.
 _RATE: Final = 60.0
-# Frames after a jump: of a bloom that is given the time, and of any other.
+# Frames before a jump; and after it, of a bloom that is given the time, and of any other.
+_STILL: Final = 8
 _FRAMES: Final = 60
-_FEW_FRAMES: Final = 8
+_FEW_FRAMES: Final = 7
 # Accuracy of a threshold, and the lowest value that is tried, as a share of the probe's.
 _ACCURACY: Final = 1.1
 _LEAST: Final = 2.0**-12
@@ -91,6 +92,7 @@ def assert_jitter(
     AssertionError
         The law does not hold, or a result is not finite.
     """
+    probe.check_fine("the bloom of a line thinner than a pixel has a few levels")
     allowed = JITTER_LIMITS | dict(limits or {})
     law = "the light of a bloom does not change with the jitter of the camera"
     small = small_probe(probe)
@@ -215,7 +217,7 @@ def assert_history(
     """Assert that a bloom shows the image of now, and nothing of the images before.
 
     A light stands still for 8 frames, then jumps. "stays" is the light of the first bloom after the
-    jump that a bloom of the same image 60 frames later has not, as a share (8 frames later, if the
+    jump that a bloom of the same image 60 frames later has not, as a share (7 frames later, if the
     bloom takes no time); the figure "frames" tells for how many frames it stays above its limit.
     "steady" is (largest - smallest) / mean of the light in the second half of these frames.
 
@@ -248,7 +250,7 @@ def assert_history(
         for step in (-8, 8)
     )
     count = _FRAMES if takes(bloom, "time") else _FEW_FRAMES
-    for _ in range(_FEW_FRAMES):
+    for _ in range(_STILL):
         at(before)
     images = [at(after) for _ in range(count)]
     last = float(images[-1].sum())

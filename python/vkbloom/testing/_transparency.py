@@ -9,8 +9,16 @@ from numpy.typing import NDArray
 
 from vkbloom._argument_types import checked
 from vkbloom._checks import check_number
-from vkbloom.testing._deviations import NotTaken, judge
-from vkbloom.testing._probe import DEFAULT, Bloom, Image, Probe, small_probe
+from vkbloom.testing._deviations import judge
+from vkbloom.testing._probe import (
+    DEFAULT,
+    Bloom,
+    Image,
+    NotTaken,
+    Probe,
+    call,
+    small_probe,
+)
 
 __tracebackhide__ = True
 
@@ -38,6 +46,11 @@ def assert_alpha(bloom: Bloom, probe: Probe = DEFAULT, *, limit: float = 0.01) -
         Allowed difference, as a share of the brightest value of the image.
     """
     check_number("limit", limit, 0.0, 1.0)
+    if probe.levels is not None:
+        raise ValueError(
+            f"cannot be tested in {probe.levels.reason}: files of integers hold no light without "
+            "alpha"
+        )
     if probe.dtype.kind == "u" or probe.colours < 3:
         raise NotTaken(f"probe: {probe.colours} channels of {probe.dtype} hold no sum with alpha")
     probe = small_probe(probe)
@@ -80,7 +93,9 @@ def _colours_alike(
     """
     try:
         result = _apply(bloom, probe, colours, alpha)
-    except (TypeError, ValueError) as error:
+    except Exception as error:
+        # A bloom that fails for these colours without alpha, too, fails for another reason.
+        probe.apply(bloom, colours)
         raise NotTaken(f"bloom: it takes no image of four channels ({error})") from None
     opaque = _apply(bloom, probe, colours, np.ones_like(alpha))[..., :3]
     law = "the colours of a premultiplied bloom do not depend on alpha"
@@ -92,7 +107,7 @@ def _colours_alike(
 
 def _apply(bloom: Bloom, probe: Probe, colours: Image, alpha: Image) -> Image:
     given: NDArray[Any] = np.concatenate([colours, alpha], axis=2).astype(probe.dtype)
-    outcome = np.asarray(bloom(given))
+    outcome = np.asarray(call(bloom, given))
     if outcome.ndim != 3 or outcome.shape[:2] != given.shape[:2] or outcome.shape[2] not in (3, 4):
         raise ValueError(f"it returns shape {outcome.shape} for {given.shape}")
     result: Image = outcome.astype(np.float64)
