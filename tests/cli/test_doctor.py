@@ -520,3 +520,13 @@ def test_modules_of_the_current_folder_are_not_run(
     assert answer.value
     first = next(self_test.run("software", "no case"))
     assert "device" in first
+
+
+@pytest.mark.parametrize("words", [[], ["--self-test"]])
+def test_the_file_of_the_findings_is_checked_first(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: list[str]
+) -> None:
+    for name in ("bare.examined", "_compared"):
+        monkeypatch.setattr(f"vkbloom._cli.doctor.{name}", lambda *_: pytest.fail("it ran"))
+    done = run("doctor", *words, "--json", tmp_path / "missing" / "device.json")
+    assert (done.exit_code, "there is no folder" in done.stderr) == (1, True)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+import shutil
+import subprocess
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -14,6 +16,8 @@ from scipy import ndimage
 
 from tests.plugin.faults import every_other_pixel, gaussian
 from vkbloom import Renderer, Separable, testing
+from vkbloom._views import markup
+from vkbloom._views.markup import Markup
 from vkbloom.testing import LawReport, LawRow, Probe
 from vkbloom.testing._law_table import LAWS
 
@@ -333,3 +337,38 @@ def test_a_bloom_may_work_in_place() -> None:
         (each.name, each.held) for each in right.rows
     ]
     testing.assert_stable(in_place)
+
+
+#: Writes the texts of all cells but the last of a row that stand on several lines.
+BROKEN_WORDS = """\
+<script>
+const lines = cell => {
+    const range = document.createRange();
+    range.selectNodeContents(cell);
+    return new Set([...range.getClientRects()].map(one => Math.round(one.top))).size;
+};
+const cells = [...document.querySelectorAll("tbody th, tbody td:not(:last-child), thead th")];
+document.body.dataset.broken = cells.filter(one => lines(one) > 1).map(one => one.textContent);
+document.body.dataset.cells = cells.length;
+</script>
+"""
+
+
+def test_a_page_of_1280_pixels_breaks_no_word(tmp_path: Path) -> None:
+    chromium = shutil.which("chromium")
+    if chromium is None:
+        pytest.skip("Chromium is not installed")
+    page = tmp_path / "page.html"
+    found = testing.report(box_chain, size=(32, 32))
+    text = markup.page("laws", Markup(found._repr_html_()))
+    page.write_text(text.replace("</body>", f"{BROKEN_WORDS}</body>"))
+    words = ["--headless", "--no-sandbox", "--disable-gpu", "--window-size=1280,1200", "--dump-dom"]
+    dumped = subprocess.run(
+        [chromium, *words, f"--user-data-dir={tmp_path}/profile", str(page)],
+        capture_output=True,
+        text=True,
+        check=True,
+        timeout=120,
+    ).stdout
+    assert int(re.findall(r'data-cells="(\d+)"', dumped)[0]) > 100
+    assert re.findall(r'data-broken="(.*?)"', dumped) == [""]
