@@ -286,10 +286,7 @@ uint32_t vkb_add_light(struct vkb_levels *method, const uint32_t *stages, uint32
     double shares[MAX_STAGES + 1] = {0.0};
     const struct vkb_glare_values *dirt = NULL;
 
-    method->failed = method->failed
-                  || (bloom == VKB_NO_IMAGE
-                      && !vkb_fail(method->error, VKB_ERROR_VALUE,
-                                   "glare: it is added to a bloom, and the method has none"));
+    // Then there may be no bloom, nor stages.
     if (method->failed)
         return 0;
     // Not rounded where the bloom's buffers are coarse: the composite rounds.

@@ -76,13 +76,13 @@ static bool check_resource(const struct vkb_resource *resource, PyObject *data)
                       PyBytes_Size(data), (unsigned long long)resource->size);
 }
 
-// (block, bytes or None, owner or None)
+// (block, bytes or None[, owner or None])
 static bool read_resource(PyObject *tuple, struct vkb_resource *resource)
 {
-    PyObject *block, *data, *owner;
+    PyObject *block, *data, *owner = Py_None;
 
     if (!vkb_require_tuple(tuple, "passes")
-        || !PyArg_ParseTuple(tuple, "SOO:resource", &block, &data, &owner)
+        || !PyArg_ParseTuple(tuple, "SO|O:resource", &block, &data, &owner)
         || !copy_block(block, resource, RESOURCE_SIZE))
         return false;
     if (data != Py_None && !PyBytes_Check(data)) {
@@ -90,8 +90,12 @@ static bool read_resource(PyObject *tuple, struct vkb_resource *resource)
         return false;
     }
     resource->data = data == Py_None ? NULL : PyBytes_AsString(data);
+    if (owner != Py_None && !PyCapsule_IsValid(owner, OWNER)) {
+        PyErr_Format(PyExc_TypeError, "passes: %R is not an owner of resources or None", owner);
+        return false;
+    }
     resource->owner = owner == Py_None ? NULL : PyCapsule_GetPointer(owner, OWNER);
-    return (owner == Py_None || resource->owner) && check_resource(resource, data);
+    return check_resource(resource, data);
 }
 
 // The header of SPIR-V and at least a word of it; the instructions' lengths are those of the code.

@@ -35,6 +35,7 @@ from vkbloom import (
     load_method,
     reference,
 )
+from vkbloom._custom.shaders import BLACK, package_shader
 from vkbloom.reference._compositing import composite_checked
 from vkbloom.reference._glare import light as total
 
@@ -150,9 +151,10 @@ def known_names() -> list[str]:
 
 
 @pytest.fixture
-def uncompiled(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Plans without a renderer need no compiled shaders."""
-    monkeypatch.setattr("vkbloom._custom.shaders.cached_code", lambda shader: bytes(4))
+def uncompiled(glslang: None, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Plans need no shader of a pass: each has the same one."""
+    code = package_shader(BLACK).code
+    monkeypatch.setattr("vkbloom._custom.shaders.cached_code", lambda shader: code)
 
 
 def check_plan(plan: _core.Plan, expected: set[str]) -> None:
