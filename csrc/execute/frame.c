@@ -1,6 +1,7 @@
 #include "execute/frame.h"
 
 #include "execute/probe.h"
+#include "execute/transient.h"
 #include "share/exported_images.h"
 #include "transfer/sources.h"
 
@@ -141,7 +142,9 @@ static bool record_request(struct vkb_run *run, struct vkb_request *request,
     }
     if (!vkb_planner_mark(&frame->planner, &step, error))
         return false;
-    for (uint32_t i = 0; i < graph->image_count; ++i)
+    if (run->shares && !vkb_begin_sharing(run, error))
+        return false;
+    for (uint32_t i = 0; !run->shares && i < graph->image_count; ++i)
         if (frame->planner.wanted[i] && !vkb_run_resolve(run, i, error))
             return false;
     if (!vkb_planner_run(&frame->planner, &step, &frame->cache.clock, vkb_record_group, run, error))
@@ -205,7 +208,10 @@ static bool submit(struct vkb_run *run, const struct vkb_frame_source *source,
                    struct vkb_request *requests, uint32_t request_count, struct vkb_error *error)
 {
     run->graph = &requests[0].plan->graph;
+    run->shares = vkb_shares_memory(run->device, requests[0].plan, request_count);
     find_usages(run, source, requests, request_count);
+    if (run->shares)
+        vkb_share_usages(run);
     return (!source->scene || load_scene(run, source->scene, error))
         && vkb_sources_stage(run, source, requests, request_count, error)
         && reserve(run, requests, request_count, error)

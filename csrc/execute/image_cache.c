@@ -120,6 +120,39 @@ struct vkb_cached_image *vkb_image_cache_find(const struct vkb_image_cache *cach
     return cached && vkb_image_fits(&cached->image, row) ? cached : NULL;
 }
 
+// For debuggers, to which names need not be different.
+static void label(const struct vkb_device *device, const struct vkb_cached_image *cached)
+{
+    const char *name = cached->name + (cached->name[0] == VKB_INTERNAL_NAME);
+
+    vkb_label_object(device, VK_OBJECT_TYPE_IMAGE, (uint64_t)cached->image.handle, name);
+    if (cached->image.buffer)
+        vkb_label_object(device, VK_OBJECT_TYPE_BUFFER, (uint64_t)cached->image.buffer, name);
+}
+
+struct vkb_cached_image *vkb_image_cache_entry(const struct vkb_device *device,
+                                               struct vkb_image_cache *cache,
+                                               const struct vkb_image_row *row,
+                                               struct vkb_error *error)
+{
+    struct vkb_cached_image *cached = find_cached(cache, row);
+
+    if (!cached)
+        return add_cached(cache, row, error);
+    if (!vkb_image_fits(&cached->image, row))
+        destroy_image(device, cached);
+    return cached;
+}
+
+void vkb_image_cache_move(const struct vkb_device *device, struct vkb_cached_image *from,
+                          struct vkb_cached_image *to)
+{
+    to->image = from->image;
+    from->image = (struct vkb_image){0};
+    from->content.valid = false;
+    label(device, to);
+}
+
 struct vkb_cached_image *vkb_image_cache_add(const struct vkb_device *device,
                                              struct vkb_image_cache *cache,
                                              const struct vkb_image_row *row,
@@ -135,11 +168,7 @@ struct vkb_cached_image *vkb_image_cache_add(const struct vkb_device *device,
     destroy_image(device, cached);
     if (!vkb_image_create_row(device, &both, &cached->image, error))
         return NULL;
-    // For debuggers, to which names need not be different.
-    const char *label = row->name + (row->name[0] == VKB_INTERNAL_NAME);
-    vkb_label_object(device, VK_OBJECT_TYPE_IMAGE, (uint64_t)cached->image.handle, label);
-    if (cached->image.buffer)
-        vkb_label_object(device, VK_OBJECT_TYPE_BUFFER, (uint64_t)cached->image.buffer, label);
+    label(device, cached);
     cached->used = cache->now;
     return cached;
 }

@@ -44,6 +44,18 @@ bool vkb_image_create_row(const struct vkb_device *device, const struct vkb_imag
 struct vkb_cached_image *vkb_image_cache_find(const struct vkb_image_cache *cache,
                                               const struct vkb_image_row *row);
 
+// The entry of a row, whose image has memory only if it fits. Pending commands must not use one
+// that does not, which is destroyed. NULL and a filled error on failure.
+struct vkb_cached_image *vkb_image_cache_entry(const struct vkb_device *device,
+                                               struct vkb_image_cache *cache,
+                                               const struct vkb_image_row *row,
+                                               struct vkb_error *error);
+
+// Gives the memory of an image to an entry that has none and whose row it fits. The content is
+// lost.
+void vkb_image_cache_move(const struct vkb_device *device, struct vkb_cached_image *from,
+                          struct vkb_cached_image *to);
+
 // Creates the cached image of a row that was not found. Pending commands must not use one of
 // another size, format or usage, which is replaced. NULL and a filled error on failure.
 struct vkb_cached_image *vkb_image_cache_add(const struct vkb_device *device,

@@ -1,5 +1,7 @@
 #include "execute/record.h"
 
+#include "execute/transient.h"
+
 #include "vulkan/labels.h"
 
 #include <stdio.h>
@@ -482,6 +484,8 @@ bool vkb_record_group(void *context, uint32_t first, uint32_t end, struct vkb_er
 {
     struct vkb_run *run = context;
 
+    if (run->shares && !vkb_share_targets(run, first, error))
+        return false;
     for (uint32_t i = first; i < end; ++i)
         if (!load_resources(run, &run->graph->passes[i], error))
             return false;

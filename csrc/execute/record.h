@@ -26,6 +26,7 @@ struct vkb_run {
     struct vkb_content **contents;                    // of the cache
     VkImageUsageFlags *usages;                        // by image: what all requests need
     struct vkb_staged_input inputs[VKB_INPUT_COUNT];  // by kind
+    bool shares;                                      // images share memory (transient.h)
     bool unknown_non_finite;  // whether the source has NaN or infinity is counted on the device
     struct vkb_sync sync;     // what the submission waits for and signals
 };

@@ -158,6 +158,12 @@ uint64_t vkb_image_size(const struct vkb_image_row *row)
     return (uint64_t)row->width * row->height * vkb_pixel_size(row->format);
 }
 
+bool vkb_images_alike(const struct vkb_image_row *a, const struct vkb_image_row *b)
+{
+    return a->format == b->format && a->width == b->width && a->height == b->height
+        && a->layers == b->layers;
+}
+
 uint64_t vkb_graph_size(const struct vkb_graph *graph)
 {
     uint64_t size = 0;

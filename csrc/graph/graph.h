@@ -194,6 +194,9 @@ bool vkb_graph_layer(struct vkb_graph *graph, struct vkb_error *error);
 // fills it once or reads it. How inputs are filled is the source's business.
 void vkb_graph_set_usages(struct vkb_graph *graph);
 
+// Whether one image can have the memory of the other: same format, size and layers.
+bool vkb_images_alike(const struct vkb_image_row *a, const struct vkb_image_row *b);
+
 // Bytes of an image, and of all images that passes use, without layers.
 uint64_t vkb_image_size(const struct vkb_image_row *row);
 uint64_t vkb_graph_size(const struct vkb_graph *graph);

@@ -171,21 +171,75 @@ static void mark(const struct vkb_plan *plan, const bool *skipped, bool *needed,
     }
 }
 
-bool vkb_plan_size(const struct vkb_plan *plan, uint64_t *size, struct vkb_error *error)
+// `current` may be NULL: no pass is.
+static bool is_read_later(const struct vkb_plan *plan, const bool *needed, const bool *current,
+                          uint32_t image, uint32_t first)
 {
     const struct vkb_graph *graph = &plan->graph;
-    // Which passes are skipped, which needed, and which images wanted.
-    bool *marks = vkb_alloc(error, 2 * graph->pass_count + graph->image_count, sizeof *marks);
 
-    if (!marks)
+    for (uint32_t i = first; i < graph->pass_count; ++i) {
+        if (!needed[i] || (current && current[i]))
+            continue;
+        if (vkb_pass_writes(&graph->passes[i], image))
+            return false;
+        if (vkb_pass_reads(&graph->passes[i], image))
+            return true;
+    }
+    for (uint32_t i = 0; i < plan->output_count; ++i)
+        if (plan->outputs[i] == image)
+            return true;
+    return false;
+}
+
+bool vkb_planner_reads(const struct vkb_planner *planner, const struct vkb_plan *plan,
+                       uint32_t image, uint32_t first)
+{
+    return is_read_later(plan, planner->needed, planner->current, image, first);
+}
+
+// Gives the target of pass `first` memory: that of an image which is not read any more, or new one.
+static void hold_target(struct vkb_plan *plan, const bool *needed, bool *held, uint32_t first,
+                        uint32_t target)
+{
+    const struct vkb_graph *graph = &plan->graph;
+    const struct vkb_image_row *row = &graph->images[target];
+
+    for (uint32_t i = 0; i < graph->image_count && !held[target]; ++i)
+        if (held[i] && !vkb_is_given(&graph->images[i]) && vkb_images_alike(&graph->images[i], row)
+            && !is_read_later(plan, needed, NULL, i, first)) {
+            held[i] = false;
+            held[target] = true;
+        }
+    if (!held[target])
+        plan->shared_size += vkb_image_size(row);
+    held[target] = true;
+}
+
+bool vkb_plan_measure(struct vkb_plan *plan, struct vkb_error *error)
+{
+    const struct vkb_graph *graph = &plan->graph;
+    // Which passes are skipped, which needed; which images are wanted, which have memory.
+    bool *skipped = vkb_alloc(error, 2 * (graph->pass_count + graph->image_count), sizeof *skipped);
+
+    if (!skipped)
         return false;
-    bool *wanted = marks + 2 * graph->pass_count;
-    mark(plan, marks, marks + graph->pass_count, wanted);
-    *size = 0;
-    for (uint32_t i = 0; i < graph->image_count; ++i)
-        if (wanted[i])
-            *size += vkb_image_size(&graph->images[i]);
-    vkb_free(marks);
+    bool *needed = skipped + graph->pass_count, *wanted = needed + graph->pass_count;
+    bool *held = wanted + graph->image_count;
+    mark(plan, skipped, needed, wanted);
+    plan->size = plan->shared_size = 0;
+    for (uint32_t i = 0; i < graph->image_count; ++i) {
+        held[i] = wanted[i] && vkb_is_given(&graph->images[i]);
+        plan->size += wanted[i] ? vkb_image_size(&graph->images[i]) : 0;
+        plan->shared_size += held[i] ? vkb_image_size(&graph->images[i]) : 0;
+    }
+    for (uint32_t i = 0; i < graph->pass_count; ++i) {
+        uint32_t targets[VKB_MAX_TARGETS + 1];
+        const uint32_t count = needed[i] ? vkb_pass_targets(&graph->passes[i], targets) : 0;
+        for (uint32_t target = 0; target < count; ++target)
+            if (!held[targets[target]])
+                hold_target(plan, needed, held, i, targets[target]);
+    }
+    vkb_free(skipped);
     return true;
 }
 

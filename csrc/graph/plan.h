@@ -9,6 +9,9 @@ struct vkb_plan {
     struct vkb_graph graph;
     uint32_t *outputs;  // images of the graph, in its order
     uint32_t output_count;
+    // Bytes of the images that the outputs need, and of these where images share memory
+    // (vkb_plan_measure).
+    uint64_t size, shared_size;
 };
 
 void vkb_plan_destroy(struct vkb_plan *plan);
@@ -58,9 +61,14 @@ struct vkb_planner {
     uint64_t previous_source;
 };
 
-// Bytes of the images that the plan's framebuffers need. Those of passes that fused ones may
-// replace count, too.
-bool vkb_plan_size(const struct vkb_plan *plan, uint64_t *size, struct vkb_error *error);
+// Finds the plan's sizes in memory. Images of passes that fused ones may replace count, too.
+bool vkb_plan_measure(struct vkb_plan *plan, struct vkb_error *error);
+
+// Whether the plan's outputs, or passes from `first` on that the planner has marked to run, need
+// the content that an image has before pass `first`. The writing passes of one that is written
+// again come before its readers.
+bool vkb_planner_reads(const struct vkb_planner *planner, const struct vkb_plan *plan,
+                       uint32_t image, uint32_t first);
 
 // Destroying a zeroed or half-created planner is safe.
 void vkb_planner_destroy(struct vkb_planner *planner);

@@ -219,7 +219,7 @@ static PyObject *new_plan(const struct vkb_module_state *state, const struct vkb
         Py_DECREF(self);
         return NULL;
     }
-    if (!vkb_plan_size(&self->plan, &self->needed, &error)) {
+    if (!vkb_plan_measure(&self->plan, &error)) {
         Py_DECREF(self);
         return vkb_raise(state, &error);
     }

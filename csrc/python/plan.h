@@ -25,7 +25,6 @@ struct vkb_plan_object {
     struct vkb_source source;
     struct vkb_plan plan;
     uint64_t renderer;  // the number of that for which it is; 0: none
-    uint64_t needed;    // bytes of the images that its outputs need
     PyObject *outputs;  // ((name, shape, dtype), ...)
     Py_buffer kernel, dirt;
     struct vkb_held_passes passes;

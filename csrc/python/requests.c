@@ -4,6 +4,7 @@
 #include "python/plan.h"
 
 #include "execute/limits.h"
+#include "execute/transient.h"
 
 #include <string.h>
 
@@ -190,8 +191,11 @@ static bool check_memory(const struct vkb_renderer *renderer, PyObject *plans,
                          struct vkb_error *error)
 {
     for (Py_ssize_t i = 0; renderer->open && i < PyTuple_Size(plans); ++i) {
-        const struct vkb_plan_object *one = plan_at(plans, i);
-        if (!vkb_limits_check_memory(&renderer->device, &one->plan.graph, one->needed, error))
+        const struct vkb_plan *plan = &plan_at(plans, i)->plan;
+        const bool shares =
+            vkb_shares_memory(&renderer->device, plan, (uint32_t)PyTuple_Size(plans));
+        if (!vkb_limits_check_memory(&renderer->device, &plan->graph,
+                                     shares ? plan->shared_size : plan->size, error))
             return false;
     }
     return true;

@@ -242,8 +242,53 @@ def test_images_of_too_much_memory(layer: Path, name: str) -> None:
     first, second, *sizes, image = done.stdout.splitlines()
     assert re.match(words, first), first
     assert re.match(words, second), second
-    assert "has 256; an image of 2" in image
+    assert "has 256; an image of 3" in image
     assert sizes == ["(5800, 5800)", "(8000, 8000)"]
+
+
+# Prints bytes of the images of `final` alone, by first and later calls, and of all framebuffers.
+SHARED = """
+import os
+import numpy as np
+import vkbloom
+
+image = np.random.default_rng(0).random((512, 1024, 4), np.float32)
+settings = {
+    "loops": vkbloom.Separable(loops=3, threshold=0.5),
+    "streaks": vkbloom.presets["blender_streaks"].replace(threshold=0.5),
+    "levels": vkbloom.Pyramid(levels=3, bloom_scale=2.0),
+}
+sizes = []
+for name, one in settings.items():
+    with vkbloom.Renderer(os.environ["VKBLOOM_TEST_NAME"], validation=True) as renderer:
+        first = renderer.apply(image, one, framebuffers=("final",))["final"]
+        sizes.append(renderer._core.cached[1])
+        brighter = renderer.apply(image, one.replace(intensity=0.25), framebuffers=("final",))
+        again = renderer.apply(image, one, framebuffers=("final",))["final"]
+        assert np.array_equal(first, again), name
+        sizes.append(renderer._core.cached[1])
+        frames = renderer.apply(image, one)
+        sizes.append(renderer._core.cached[1])
+        assert np.array_equal(first, frames["final"]), name
+        alone = renderer.apply(image, one.replace(intensity=0.25))
+        assert np.array_equal(brighter["final"], alone["final"]), name
+        for key in ("glow", "bloom"):
+            small = renderer.apply(image, one, framebuffers=(key,))[key]
+            assert np.array_equal(small, frames[key]), (name, key)
+print(*sizes)
+"""
+
+
+@pytest.mark.parametrize("variant", ["fragment", "cpu", "gpu"])
+def test_images_share_memory(layer: Path, name: str, variant: str) -> None:
+    """Where they take a quarter of it: those that no later pass reads, for `final` alone most."""
+    done = run(layer, name, "heap,cpu", ("-c", SHARED), VKBLOOM_VARIANT=variant)
+    assert done.returncode == 0, done.stderr
+    loops, loops_again, all_loops, streaks, *_ = map(int, done.stdout.split())
+    one = 512 * 1024 * 16
+    assert loops == loops_again == 3 * one
+    assert all_loops > loops
+    assert streaks <= 5 * one
 
 
 # Prints why each variant is refused.
