@@ -107,7 +107,7 @@ def modules(shader: Path) -> list[Module]:
             for name, _, options in plain_modules(shader, stem, ends=ends)
         ]
         found += plain
-        if shader.stem.startswith(("adjoint", "fft")):
+        if shader.stem.startswith(("adjoint", "fft")) or word == "TRANSPOSED":
             continue
         found += [
             Module(f"{module.name}_layers", shader, (*module.options, "-DLAYERS"))

@@ -161,8 +161,22 @@
     VEC4S(B, weights, MAX_TAPS) \
     VEC4S(B, next, MAX_TAPS)
 
+// Of an adjoint pass in which the texels of a block gather from too many pixels for an invocation
+// (lib/summed.glsl): the block, which is `summed_width` x `summed_height` at (summed_x, summed_y).
+// A pass before it adds up `summed_rows` rows for each texel and each of `summed_groups` groups of
+// rows from row `summed_first` on, in blocks of which `summed_columns` are beside each other.
+#define SUMMED_ROWS(B, INPUT) \
+    INPUT(B, int, summed_x) \
+    INPUT(B, int, summed_y) \
+    INPUT(B, int, summed_width) \
+    INPUT(B, int, summed_height) \
+    INPUT(B, int, summed_first) \
+    INPUT(B, int, summed_rows) \
+    INPUT(B, int, summed_groups) \
+    INPUT(B, int, summed_columns)
+
 // Ghosts and halo (ghosts.frag, halo.frag): `ghosts` has the tint and the scale of each of `count`
-// ghosts.
+// ghosts. SUMMED_ROWS are of adjoints.
 #define FLARE_BLOCK(B, READS, INPUT, VEC4S) \
     INPUT(B, float, threshold) \
     INPUT(B, float, maximum) \
@@ -172,6 +186,7 @@
     INPUT(B, float, vignette) \
     INPUT(B, float, width) \
     INPUT(B, int, count) \
+    SUMMED_ROWS(B, INPUT) \
     VEC4S(B, ghosts, MAX_GHOSTS)
 
 // What a picture of dirt leaves of the light: base + share * dirt (dirt.frag).
@@ -204,12 +219,13 @@
     INPUT(B, int, radius)
 
 // Blender's sun beams (sun_beams.frag): the most steps; the sun from the upper left, as shares of
-// the sides; the share of the samples that jitter leaves.
+// the sides; the share of the samples that jitter leaves. SUMMED_ROWS are of adjoints.
 #define SUN_BEAMS_BLOCK(B, READS, INPUT, VEC4S) \
     INPUT(B, int, most) \
     INPUT(B, float, sun_x) \
     INPUT(B, float, sun_y) \
-    INPUT(B, float, left)
+    INPUT(B, float, left) \
+    SUMMED_ROWS(B, INPUT)
 
 #define COMPOSITE_BLOCK(B, READS, INPUT, VEC4S) COMPOSITE_ROWS(B, READS, INPUT)
 
@@ -487,13 +503,17 @@
 #define HDRP_FAR        0.9
 #define HDRP_NEAR       0.4
 
+// The half-kernels of blurs of nine taps: Godot's, and HDRP's, a binomial of order 8.
+#define GODOT_NINE 0.2024, 0.1790, 0.1240, 0.0672, 0.0285
+#define HDRP_NINE  0.2734375, 0.21875, 0.109375, 0.03125, 0.00390625
+
 // Of a filter: the most taps along an axis, kernels, and texels of a window. The most pixels along
 // an axis that read a texel in the tiles of a transpose, and pictures that these add up.
 #define MAX_FILTER_TAPS 5
 #define MAX_KERNELS     3
 #define MAX_WINDOW      10
 #define MAX_READERS     24
-#define MAX_PICTURES    5
+#define MAX_PICTURES    13
 
 // The most levels that one pass adds up, and the most levels of a chain.
 #define GATHERED_LEVELS 7

@@ -6,7 +6,7 @@
 #include <stdio.h>
 #include <string.h>
 
-// The transpose of a pass by its block.
+// The transpose of a pass by its block. Only passes that were given at run time have none.
 static vkb_transpose *const transposes[VKB_BLOCK_COUNT] = {
     [VKB_BLOCK_composite] = vkb_transpose_composite,
     [VKB_BLOCK_threshold] = vkb_transpose_threshold,
@@ -15,23 +15,13 @@ static vkb_transpose *const transposes[VKB_BLOCK_COUNT] = {
     [VKB_BLOCK_gather] = vkb_transpose_gather,
     [VKB_BLOCK_prefilter] = vkb_transpose_groups,
     [VKB_BLOCK_streaks] = vkb_transpose_streaks,
+    [VKB_BLOCK_flare] = vkb_transpose_flare,
+    [VKB_BLOCK_dirt] = vkb_transpose_dirt,
+    [VKB_BLOCK_blender_end] = vkb_transpose_blender_end,
+    [VKB_BLOCK_star] = vkb_transpose_star,
+    [VKB_BLOCK_sun_beams] = vkb_transpose_sun_beams,
+    [VKB_BLOCK_box] = vkb_transpose_box,
 };
-
-// NULL: there is none, as for what a method does that is rarely differentiated.
-static vkb_transpose *find_transpose(const struct vkb_pass_row *pass)
-{
-    switch (pass->constants.groups) {
-    case GROUPS_BLENDER:
-    case GROUPS_DARKTABLE:
-    case GROUPS_GODOT:
-    case GROUPS_HDRP:
-    case GROUPS_HDRP_BLUR:
-    case GROUPS_HIGHLIGHTS:
-        return NULL;
-    default:
-        return transposes[pass->block];
-    }
-}
 
 // The image of a framebuffer's cotangents, a level of the source.
 static bool add_cotangents(struct vkb_adjoint *adjoint, const struct vkb_source *source,
@@ -81,12 +71,10 @@ static bool add_passes(struct vkb_adjoint *adjoint, const struct vkb_settings *s
 {
     for (uint32_t i = adjoint->graph->pass_count; *possible && i-- > 0;) {
         const struct vkb_pass_row pass = adjoint->graph->passes[i];
-        vkb_transpose *transpose = find_transpose(&pass);
+        vkb_transpose *transpose = transposes[pass.block];
         if (pass.target_count != 1 || vkb_cotangent_of(adjoint, &pass) == VKB_NO_IMAGE)
             continue;
-        // A prefilter of bright colours is left to the reference.
-        const bool convolved = pass.block == VKB_BLOCK_fft
-                            && settings->kernel.prefilter[0] > settings->kernel.prefilter[1];
+        const bool convolved = pass.block == VKB_BLOCK_fft;
         *possible = convolved || transpose;
         if (convolved ? !vkb_transpose_convolution(adjoint, settings, &pass, error)
                       : transpose && !transpose(adjoint, &pass, error))

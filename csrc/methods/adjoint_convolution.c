@@ -33,15 +33,29 @@ static bool mirror_kernel(const struct vkb_kernel_data *kernel, struct vkb_graph
     return true;
 }
 
-// What is convolved: what the first stage of the transform reads.
-static uint32_t find_source(const struct vkb_graph *graph)
+// The first stage of the transform, which reads what is convolved. A copy: adding passes moves those
+// of the graph.
+static struct vkb_pass_row find_first(const struct vkb_graph *graph)
 {
     uint32_t pass = 0;
 
     while (!vkb_computes(&graph->passes[pass], VKB_BLOCK_fft)
            || graph->passes[pass].constants.stage != STAGE_FIRST)
         ++pass;
-    return graph->passes[pass].reads[0];
+    return graph->passes[pass];
+}
+
+// Accumulates cotangents of what the filter of bright colours makes of the image.
+static bool accumulate_bright(struct vkb_adjoint *adjoint, const struct vkb_pass_row *first,
+                              const struct vkb_pass_row *pass, uint32_t cotangents,
+                              struct vkb_error *error)
+{
+    struct vkb_pass_row row = vkb_slope_row(adjoint, pass, &vkb_shader_adjoint_bright_frag, 1);
+
+    row.params = first->params;
+    row.reads[0] = first->reads[0];
+    row.reads[1] = cotangents;
+    return vkb_accumulate_cotangent(adjoint, &row, row.reads[0], error);
 }
 
 bool vkb_transpose_convolution(struct vkb_adjoint *adjoint, const struct vkb_settings *settings,
@@ -51,7 +65,8 @@ bool vkb_transpose_convolution(struct vkb_adjoint *adjoint, const struct vkb_set
     const int boundary = settings->choices[VKB_CHOICE_boundary];
     const bool edge_x = boundary == BOUNDARY_EDGE;
     const bool edge_y = edge_x || boundary == BOUNDARY_WRAP_X;
-    const uint32_t glow = find_source(graph), first = graph->pass_count;
+    const struct vkb_pass_row first_stage = find_first(graph);
+    const uint32_t glow = first_stage.reads[0], first = graph->pass_count;
     const struct vkb_kernel_data *kernel = &settings->kernel;
     const struct vkb_size size = {graph->images[glow].width, graph->images[glow].height};
     const struct vkb_size extended = {size.width + (edge_x ? kernel->width - 1 : 0),
@@ -75,6 +90,9 @@ bool vkb_transpose_convolution(struct vkb_adjoint *adjoint, const struct vkb_set
         || (edge_y
             && !vkb_filter_to_image(adjoint, &filter, source.glow, extended, &source.glow, error)))
         return false;
+    // The filter of bright colours comes before the convolution, after its transpose.
+    mirrored.kernel.prefilter[0] = 1.0f;
+    mirrored.kernel.prefilter[1] = 0.0f;
     uint32_t convolved = vkb_convolve(&levels, &result, "adjoint_");
     if (levels.failed)
         return false;
@@ -83,5 +101,8 @@ bool vkb_transpose_convolution(struct vkb_adjoint *adjoint, const struct vkb_set
         graph->passes[i].constants.alpha = ALPHA_BLUR;
     vkb_axis_move(&filter.x, size.width, extended.width, -left);
     vkb_axis_move(&filter.y, size.height, extended.height, -above);
-    return vkb_accumulate_filter(adjoint, &filter, convolved, glow, error);
+    if (!first_stage.constants.prefiltered)
+        return vkb_accumulate_filter(adjoint, &filter, convolved, glow, error);
+    return (!edge_y || vkb_filter_to_image(adjoint, &filter, convolved, size, &convolved, error))
+        && accumulate_bright(adjoint, &first_stage, pass, convolved, error);
 }

@@ -186,6 +186,15 @@ static bool keeps_cotangents(const struct vkb_adjoint *adjoint, const struct vkb
         && image != adjoint->glow && !vkb_is_given(&adjoint->graph->images[image]);
 }
 
+// The axes that a filter does not leave as they are.
+static enum vkb_mode direction_of(const struct vkb_filter *filter)
+{
+    return filter->kernels > 1                  ? DIRECTION_BOTH
+         : vkb_axis_is_identity(&filter->y) ? DIRECTION_HORIZONTAL
+         : vkb_axis_is_identity(&filter->x) ? DIRECTION_VERTICAL
+                                            : DIRECTION_BOTH;
+}
+
 bool vkb_accumulate_filter(struct vkb_adjoint *adjoint, const struct vkb_filter *filter,
                            uint32_t cotangents, uint32_t image, struct vkb_error *error)
 {
@@ -193,16 +202,11 @@ bool vkb_accumulate_filter(struct vkb_adjoint *adjoint, const struct vkb_filter 
         adjoint->cotangents[image] = cotangents;
         return true;
     }
-    enum vkb_mode direction = DIRECTION_BOTH;
+    const enum vkb_mode direction = direction_of(filter);
 
-    if (filter->kernels == 1) {
-        if (vkb_axis_is_identity(&filter->y))
-            direction = DIRECTION_HORIZONTAL;
-        else if (vkb_axis_is_identity(&filter->x))
-            direction = DIRECTION_VERTICAL;
-        else if (vkb_axis_readers(&filter->x) * vkb_axis_readers(&filter->y) > MAX_IN_ONE_PASS)
-            return accumulate_twice(adjoint, filter, cotangents, image, error);
-    }
+    if (direction == DIRECTION_BOTH && filter->kernels == 1
+        && vkb_axis_readers(&filter->x) * vkb_axis_readers(&filter->y) > MAX_IN_ONE_PASS)
+        return accumulate_twice(adjoint, filter, cotangents, image, error);
     return accumulate_along(adjoint, filter, direction, cotangents, image, error);
 }
 
@@ -212,7 +216,7 @@ bool vkb_filter_to_image(struct vkb_adjoint *adjoint, const struct vkb_filter *f
 {
     struct vkb_pass_row row;
 
-    return make_filter_row(adjoint, filter, DIRECTION_BOTH, cotangents, &row, error)
+    return make_filter_row(adjoint, filter, direction_of(filter), cotangents, &row, error)
         && vkb_add_adjoint_image(adjoint, &row, size, image, error);
 }
 

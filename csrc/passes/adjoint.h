@@ -77,6 +77,11 @@ bool vkb_accumulate_through(struct vkb_adjoint *adjoint, const struct vkb_pass_r
 bool vkb_accumulate_sampled(struct vkb_adjoint *adjoint, const struct vkb_pass_row *row,
                             uint32_t image, uint32_t target, struct vkb_error *error);
 
+// Accumulates cotangents of the samples of a halo or a ghost, which a row of its slopes has, by
+// their places, which are not on a grid.
+bool vkb_accumulate_moved(struct vkb_adjoint *adjoint, const struct vkb_pass_row *row,
+                          uint32_t source, struct vkb_error *error);
+
 // If the pass reads a mask, its second image: accumulates the row's result by it, at the target's
 // pixels.
 bool vkb_accumulate_mask(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
@@ -95,9 +100,11 @@ void vkb_filter_thirteen(struct vkb_filter *filter, double step_x, double step_y
 
 // The families of passes.
 vkb_transpose vkb_transpose_composite, vkb_transpose_threshold;
-vkb_transpose vkb_transpose_blur, vkb_transpose_filter, vkb_transpose_gather;
+vkb_transpose vkb_transpose_blur, vkb_transpose_filter, vkb_transpose_gather, vkb_transpose_nine;
 // Downsamplings that are not linear in groups of their taps.
 vkb_transpose vkb_transpose_groups;
-vkb_transpose vkb_transpose_streaks;
+// Glare.
+vkb_transpose vkb_transpose_streaks, vkb_transpose_flare, vkb_transpose_dirt, vkb_transpose_star;
+vkb_transpose vkb_transpose_box, vkb_transpose_blender_end, vkb_transpose_sun_beams;
 
 #endif

@@ -106,6 +106,53 @@ bool vkb_transpose_filter(struct vkb_adjoint *adjoint, const struct vkb_pass_row
     return vkb_accumulate_filter(adjoint, &filter, cotangents, pass->reads[1], error);
 }
 
+// Nine taps, pixels of the target apart.
+static void set_nine(const double half[5], enum vkb_border border, struct vkb_axis *axis)
+{
+    axis->border = border;
+    axis->count = 0;
+    for (int tap = -4; tap <= 4; ++tap)
+        axis->taps[axis->count++] =
+            (struct vkb_tap){.offset = tap, .weights = {half[tap < 0 ? -tap : tap]}};
+}
+
+// Of Godot's blurs of the frame: weights by brightness are before the horizontal one, at the pixels
+// of the target, and after the vertical one.
+static bool accumulate_first(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
+                             const struct vkb_filter *blur, struct vkb_error *error)
+{
+    const uint32_t target = pass->targets[0], source = pass->reads[0];
+    const struct vkb_size size = {blur->x.to, blur->y.to};
+    struct vkb_pass_row row = vkb_slope_row(adjoint, pass, &vkb_shader_adjoint_nine_frag, 2);
+
+    if (pass->constants.direction == DIRECTION_HORIZONTAL)
+        return vkb_filter_to_image(adjoint, blur, row.reads[2], size, &row.reads[2], error)
+            && vkb_accumulate_sampled(adjoint, &row, source, target, error);
+    return vkb_accumulate_through(adjoint, &row, blur, source, target, error)
+        && vkb_accumulate_mask(adjoint, pass, &row, error);
+}
+
+bool vkb_transpose_nine(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
+                        struct vkb_error *error)
+{
+    static const double hdrps[] = {HDRP_NINE}, godots[] = {GODOT_NINE};
+    const bool godot = pass->constants.groups == GROUPS_GODOT, first = pass->constants.first;
+    const bool rows = pass->constants.direction == DIRECTION_HORIZONTAL;
+    const enum vkb_border border = godot ? VKB_BORDER_PAIRS
+                                 : first ? VKB_BORDER_FIRST_TWO
+                                         : VKB_BORDER_LAST;
+    const uint32_t source = godot && first ? pass->targets[0] : pass->reads[0];
+    struct vkb_filter filter;
+
+    vkb_filter_begin(adjoint->graph, source, pass->targets[0], &filter);
+    set_nine(godot ? godots : hdrps, border, rows ? &filter.x : &filter.y);
+    if (godot && first)
+        return accumulate_first(adjoint, pass, &filter, error);
+    filter.gain = godot && !rows ? pass->params.prefilter.strength : 1.0;
+    return vkb_accumulate_filter(adjoint, &filter, vkb_cotangent_of(adjoint, pass), pass->reads[0],
+                                 error);
+}
+
 bool vkb_transpose_gather(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
                           struct vkb_error *error)
 {

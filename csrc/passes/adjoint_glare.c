@@ -1,5 +1,7 @@
-// The adjoints of rays of streaks.
+// The adjoints of glare: rays of streaks, ghosts and halo, dirt, and filters along lines.
 #include "passes/adjoint.h"
+
+#include <string.h>
 
 // Accumulates the cotangents of another image as they are.
 static bool accumulate_all(struct vkb_adjoint *adjoint, uint32_t cotangents, uint32_t image,
@@ -15,30 +17,171 @@ static bool accumulate_all(struct vkb_adjoint *adjoint, uint32_t cotangents, uin
     return vkb_accumulate_filter(adjoint, &filter, cotangents, image, error);
 }
 
+// Accumulates the cotangents of an image that the pass adds to its result, if there is one.
+static bool accumulate_before(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
+                              struct vkb_error *error)
+{
+    return !pass->constants.add_own
+        || accumulate_all(adjoint, vkb_cotangent_of(adjoint, pass), pass->reads[1], error);
+}
+
+// The row of a pass that has its own transpose: it reads the cotangents in place of its image.
+static struct vkb_pass_row own_row(const struct vkb_adjoint *adjoint,
+                                   const struct vkb_pass_row *pass)
+{
+    struct vkb_pass_row row = *pass;
+
+    row.reads[0] = vkb_cotangent_of(adjoint, pass);
+    if (pass->constants.add_own)
+        row.reads[1] = row.reads[0];
+    row.constants.add_own = 0;
+    row.constants.alpha = ALPHA_BLUR;  // one of a cotangent
+    return row;
+}
+
+// Adds the row with an image like the pass's own.
+static bool add_own_row(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
+                        struct vkb_pass_row *row, uint32_t *image, struct vkb_error *error)
+{
+    const struct vkb_image_row *source = &adjoint->graph->images[pass->reads[0]];
+    const struct vkb_size size = {source->width, source->height};
+
+    return vkb_add_adjoint_row(adjoint, row, size, image, error);
+}
+
+// The same, and accumulates its result.
+static bool accumulate_own_row(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
+                               struct vkb_pass_row *row, struct vkb_error *error)
+{
+    uint32_t image;
+
+    return add_own_row(adjoint, pass, row, &image, error)
+        && accumulate_all(adjoint, image, pass->reads[0], error);
+}
+
+// The transpose of a tap that reads the next texel at some positions is a filter of its own.
+static bool accumulate_taps(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
+                            struct vkb_error *error)
+{
+    const struct vkb_streaks_params *params = &pass->params.streaks;
+    const uint32_t source = pass->reads[0];
+    struct vkb_pass_row row = vkb_slope_row(adjoint, pass, &vkb_shader_adjoint_tap_frag, 0);
+    struct vkb_filter filter;
+
+    for (int tap = 0; tap < params->count; ++tap) {
+        vkb_filter_begin(adjoint->graph, source, pass->targets[0], &filter);
+        // Rounded as the shader does it.
+        filter.x.origin = (float)tap * params->step_x;
+        filter.y.origin = (float)tap * params->step_y;
+        filter.x.border = filter.y.border = VKB_BORDER_ZERO;
+        vkb_filter_next(&filter, params->next[tap]);
+        row.constants.levels = tap;
+        if (!vkb_accumulate_through(adjoint, &row, &filter, source, pass->targets[0], error))
+            return false;
+    }
+    return true;
+}
+
 // The taps are at the same distances everywhere, and there is nothing beyond the edges: the
 // transpose is the same pass with the opposite distances.
 bool vkb_transpose_streaks(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
                            struct vkb_error *error)
 {
-    const uint32_t source = pass->reads[0], cotangents = vkb_cotangent_of(adjoint, pass);
-    const struct vkb_image_row *image = &adjoint->graph->images[source];
-    const struct vkb_size size = {image->width, image->height};
-    struct vkb_pass_row row = *pass;
+    struct vkb_pass_row row = own_row(adjoint, pass);
     uint32_t moved;
 
-    if (pass->constants.add_own && !accumulate_all(adjoint, cotangents, pass->reads[1], error))
+    if (!accumulate_before(adjoint, pass, error))
         return false;
-    row.reads[0] = row.reads[1] = cotangents;
-    row.constants.add_own = row.constants.first = 0;
-    row.constants.alpha = ALPHA_BLUR;  // one of a cotangent
+    // Such streaks have no threshold.
+    if (pass->params.streaks.reads_next)
+        return accumulate_taps(adjoint, pass, error);
+    row.reads[1] = row.reads[0];
+    row.constants.first = 0;
     row.params.streaks.threshold = 0.0f;
     row.params.streaks.step_x = -pass->params.streaks.step_x;
     row.params.streaks.step_y = -pass->params.streaks.step_y;
-    if (!vkb_add_adjoint_row(adjoint, &row, size, &moved, error))
-        return false;
     if (!pass->constants.first)
-        return accumulate_all(adjoint, moved, source, error);
+        return accumulate_own_row(adjoint, pass, &row, error);
+    if (!add_own_row(adjoint, pass, &row, &moved, error))
+        return false;
     row = vkb_slope_row(adjoint, pass, &vkb_shader_adjoint_above_frag, 1);
     row.reads[1] = moved;
-    return vkb_accumulate_cotangent(adjoint, &row, source, error);
+    return vkb_accumulate_cotangent(adjoint, &row, pass->reads[0], error);
+}
+
+// Multiplies the cotangents, as it does the light.
+bool vkb_transpose_dirt(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
+                        struct vkb_error *error)
+{
+    struct vkb_pass_row row = own_row(adjoint, pass);
+
+    return accumulate_own_row(adjoint, pass, &row, error);
+}
+
+// Blender's recursive filter. Its pixels depend on those before them, the transpose's on those
+// after them.
+bool vkb_transpose_star(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
+                        struct vkb_error *error)
+{
+    struct vkb_pass_row row = own_row(adjoint, pass);
+
+    row.shader = &vkb_shader_simple_star_transposed_comp;
+    row.reads[1] = row.reads[0];
+    return accumulate_before(adjoint, pass, error)
+        && accumulate_own_row(adjoint, pass, &row, error);
+}
+
+bool vkb_transpose_box(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
+                       struct vkb_error *error)
+{
+    struct vkb_pass_row row = own_row(adjoint, pass);
+
+    row.shader = &vkb_shader_box_mean_transposed_comp;
+    return accumulate_own_row(adjoint, pass, &row, error);
+}
+
+// An axis that is scaled about its centre.
+static void scale_axis(double scale, struct vkb_axis *axis)
+{
+    axis->step = scale;
+    axis->origin = scale * (0.5 - 0.5 * axis->to) + 0.5 * axis->from - 0.5;
+    axis->border = VKB_BORDER_ZERO;
+}
+
+// A ghost, whose row is that of a pass without others.
+static bool accumulate_ghost(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
+                             const struct vkb_pass_row *row, struct vkb_error *error)
+{
+    const uint32_t source = pass->reads[0], target = pass->targets[0];
+    const float scale = row->params.flare.ghosts[0][3];
+    struct vkb_filter filter;
+
+    // What is sampled in the centre alone is not moved.
+    if (row->params.flare.aberration > 0.0f && scale != 0.0f)
+        return vkb_accumulate_moved(adjoint, row, source, error);
+    vkb_filter_begin(adjoint->graph, source, target, &filter);
+    scale_axis(scale, &filter.x);
+    scale_axis(scale, &filter.y);
+    return vkb_accumulate_through(adjoint, row, &filter, source, target, error);
+}
+
+// Ghosts, or a halo, which has none.
+bool vkb_transpose_flare(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
+                         struct vkb_error *error)
+{
+    struct vkb_pass_row row = vkb_slope_row(adjoint, pass, &vkb_shader_adjoint_flare_frag, 1);
+    struct vkb_flare_params *params = &row.params.flare;
+    const int count = params->count;
+
+    if (!accumulate_before(adjoint, pass, error))
+        return false;
+    if (count == 0)
+        return vkb_accumulate_moved(adjoint, &row, pass->reads[0], error);
+    params->count = 1;
+    for (int ghost = 0; ghost < count; ++ghost) {
+        memcpy(params->ghosts[0], pass->params.flare.ghosts[ghost], sizeof params->ghosts[0]);
+        if (!accumulate_ghost(adjoint, pass, &row, error))
+            return false;
+    }
+    return true;
 }

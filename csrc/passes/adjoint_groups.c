@@ -16,18 +16,44 @@ static void set_pair(struct vkb_axis *axis, double first, double second)
     vkb_axis_set(axis, taps, 2);
 }
 
-// The taps of a group: those of 13 taps are pairs along both axes.
+// The mean of as many texels for each pixel, from the first ones on, or from the last ones back.
+static void set_means(struct vkb_axis *axis, int32_t count, bool backwards)
+{
+    axis->step = count;
+    axis->origin = backwards ? axis->from - 1.0 - axis->step * (axis->to - 1.0) : 0.0;
+    axis->count = 0;
+    for (int32_t i = 0; i < count; ++i)
+        axis->taps[axis->count++] = tap_at(backwards ? -i : i, 1.0 / count);
+}
+
+// The taps of a group: those of 13 taps are pairs along both axes, but for Blender's, which are
+// one tap each.
 static void set_group(const struct vkb_pass_row *row, int group, struct vkb_filter *filter)
 {
     static const double cross[5][2] = {
         {0.0, 0.0}, {-1.0, 0.0}, {1.0, 0.0}, {0.0, -1.0}, {0.0, 1.0}};
+    static const double star[5][2] = {{0.0, 0.0},
+                                      {HDRP_FAR, -HDRP_NEAR},
+                                      {-HDRP_FAR, HDRP_NEAR},
+                                      {HDRP_NEAR, HDRP_FAR},
+                                      {-HDRP_NEAR, -HDRP_FAR}};
     const enum vkb_mode groups = (enum vkb_mode)row->constants.groups;
     const double step_x = row->params.prefilter.step_x, step_y = row->params.prefilter.step_y;
     const int corner = group - 1;
 
-    if (groups == GROUPS_KINO) {
-        filter->x.taps[0].offset = cross[group][0];
-        filter->y.taps[0].offset = cross[group][1];
+    if (groups == GROUPS_KINO || groups == GROUPS_HDRP) {
+        const double *place = (groups == GROUPS_KINO ? cross : star)[group];
+        filter->x.taps[0].offset = place[0];
+        filter->y.taps[0].offset = place[1];
+    } else if (groups == GROUPS_BLENDER && group < 9) {
+        filter->x.taps[0].offset = 2.0 * (group % 3 - 1);
+        filter->y.taps[0].offset = 2.0 * (group / 3 - 1);
+    } else if (groups == GROUPS_BLENDER) {
+        filter->x.taps[0].offset = (group - 9) & 1 ? 1.0 : -1.0;
+        filter->y.taps[0].offset = (group - 9) & 2 ? 1.0 : -1.0;
+    } else if (groups == GROUPS_HIGHLIGHTS && row->constants.radius > 1) {
+        set_means(&filter->x, row->constants.radius, false);
+        set_means(&filter->y, row->constants.radius, true);
     } else if (groups == GROUPS_BOX) {
         filter->x.taps[0].offset = group & 1 ? 1.0 : -1.0;
         filter->y.taps[0].offset = group & 2 ? 1.0 : -1.0;
@@ -48,6 +74,8 @@ static void set_group(const struct vkb_pass_row *row, int group, struct vkb_filt
 static int count_of(enum vkb_mode groups, const struct vkb_pass_row *pass)
 {
     switch (groups) {
+    case GROUPS_BLENDER:
+        return 13;
     case GROUPS_BOX:
     case GROUPS_FILAMENT:
         return 4;
@@ -56,6 +84,7 @@ static int count_of(enum vkb_mode groups, const struct vkb_pass_row *pass)
     case GROUPS_PYRAMID:
     case GROUPS_BEVY:
     case GROUPS_PYGFX_KARIS:
+    case GROUPS_HDRP:
         return 5;
     default:
         return 1;
@@ -111,6 +140,8 @@ bool vkb_transpose_groups(struct vkb_adjoint *adjoint, const struct vkb_pass_row
     const int count = count_of(groups, pass);
     struct vkb_filter filter;
 
+    if (groups == GROUPS_GODOT || groups == GROUPS_HDRP_BLUR)
+        return vkb_transpose_nine(adjoint, pass, error);
     // Without threshold and mask Filament's reduction is a filter.
     if (groups == GROUPS_FILAMENT && !pass->constants.thresholded && !pass->constants.masked) {
         vkb_filter_begin(adjoint->graph, pass->reads[0], pass->targets[0], &filter);

@@ -17,8 +17,9 @@ static bool depends_on_bloom(const struct vkb_pass_row *row)
 {
     const struct vkb_constants *constants = &row->constants;
 
-    return constants->composite == COMPOSITE_SCREEN
-        || constants->composite == COMPOSITE_UNCLAMPED_SCREEN || constants->tonemap != TONEMAP_NONE
+    return constants->composite == COMPOSITE_SCREEN || constants->composite == COMPOSITE_SOFT_LIGHT
+        || constants->composite == COMPOSITE_UNCLAMPED_SCREEN
+        || constants->composite == COMPOSITE_LIGHTNESS_SCREEN || constants->tonemap != TONEMAP_NONE
         || constants->encoding != ENCODING_NONE || constants->alpha != ALPHA_KEEP
         || row->params.composite.limit < (float)SINGLE_LIMIT;
 }
@@ -118,6 +119,21 @@ bool vkb_transpose_composite(struct vkb_adjoint *adjoint, const struct vkb_pass_
         || (is_sum(&row.constants) && depends_on_bloom(&row) && !add_curves(adjoint, &row, error)))
         return false;
     return accumulate_composite(adjoint, &row, error);
+}
+
+bool vkb_transpose_blender_end(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
+                               struct vkb_error *error)
+{
+    const struct vkb_blender_end_params *params = &pass->params.blender_end;
+    const uint32_t source = pass->reads[0], target = pass->targets[0];
+    const struct vkb_pass_row row =
+        vkb_slope_row(adjoint, pass, &vkb_shader_adjoint_blender_end_frag, 1);
+    struct vkb_filter filter;
+
+    vkb_filter_begin(adjoint->graph, source, target, &filter);
+    if (params->reads_next)
+        vkb_filter_next(&filter, params->next[0]);
+    return vkb_accumulate_through(adjoint, &row, &filter, source, target, error);
 }
 
 bool vkb_transpose_threshold(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,

@@ -40,10 +40,17 @@ void vkb_axis_set(struct vkb_axis *axis, const struct vkb_tap *taps, uint32_t co
     axis->count = count;
 }
 
+void vkb_filter_next(struct vkb_filter *filter, const float next[4])
+{
+    filter->x.next = (uint32_t)next[0];
+    filter->y.next = (uint32_t)next[1];
+    filter->y.backwards = true;
+}
+
 bool vkb_axis_is_identity(const struct vkb_axis *axis)
 {
     return axis->from == axis->to && axis->origin == 0.0 && axis->step == 1.0 && axis->first == 0
-        && axis->kind == UPSAMPLE_LINEAR && axis->count == 1 && axis->taps[0].offset == 0.0
+        && axis->kind == UPSAMPLE_LINEAR && axis->next == 0 && axis->count == 1 && axis->taps[0].offset == 0.0
         && axis->taps[0].weights[0] == 1.0;
 }
 
@@ -55,7 +62,8 @@ double vkb_axis_readers(const struct vkb_axis *axis)
         low = fmin(low, axis->taps[i].offset);
         high = fmax(high, axis->taps[i].offset);
     }
-    return (high - low + (axis->kind == UPSAMPLE_CUBIC ? 4.0 : 2.0)) / axis->step;
+    const double apart = axis->border >= VKB_BORDER_LAST ? axis->step : 1.0;
+    return ((high - low) * apart + (axis->kind == UPSAMPLE_CUBIC ? 4.0 : 2.0)) / fabs(axis->step);
 }
 
 // The texels from `first` on that a pixel samples with a tap, and their shares.
@@ -65,13 +73,38 @@ struct sample {
     double shares[4];
 };
 
+// The pixel whose sample a tap reads at pixel `at`, which may be beyond the edges.
+static double at_border(const struct vkb_axis *axis, double at)
+{
+    const double last = axis->to - 1.0, odd = fmod(fabs(at), 2.0);
+    const double pair = fmin(fmax(at - odd, 0.0), fmax(axis->to - 2.0, 0.0));
+
+    if (axis->border == VKB_BORDER_PAIRS)
+        return fmin(pair + odd, last);
+    return fmin(axis->border == VKB_BORDER_FIRST_TWO && at < 0.0 ? odd : at, last);
+}
+
+// The step from a texel to the one that is read for it.
+static double next_step(const struct vkb_axis *axis, double at)
+{
+    const double counted = axis->backwards ? axis->from - 1.0 - at : at;
+
+    for (int bit = 0; axis->next >> bit; ++bit)
+        if ((axis->next >> bit & 1) && counted == (bit ? ldexp(1.0, bit - 1) : 0.0))
+            return axis->backwards ? -1.0 : 1.0;
+    return 0.0;
+}
+
 static double position_of(const struct vkb_axis *axis, uint32_t pixel, double offset)
 {
-    const double position = axis->origin + axis->step * pixel + offset;
+    const double position = axis->border >= VKB_BORDER_LAST
+                              ? axis->origin + axis->step * at_border(axis, pixel + offset)
+                              : axis->origin + axis->step * pixel + offset;
     // A texel's centre is met with roundings.
     const double nearest = floor(position + 0.5);
+    const double settled = fabs(position - nearest) < 1e-9 ? nearest : position;
 
-    return fabs(position - nearest) < 1e-9 ? nearest : position;
+    return settled + next_step(axis, floor(settled));
 }
 
 static struct sample linear_sample(double position)
@@ -135,9 +168,12 @@ static struct sample sample_at(const struct vkb_axis *axis, uint32_t pixel, doub
     }
 }
 
+// The texel that is read; `from` if there is none.
 static uint32_t read_texel(const struct vkb_axis *axis, double texel)
 {
-    return (uint32_t)fmin(fmax(texel, 0.0), axis->from - 1.0);
+    const double within = fmin(fmax(texel, 0.0), axis->from - 1.0);
+
+    return axis->border == VKB_BORDER_ZERO && texel != within ? axis->from : (uint32_t)within;
 }
 
 // The pixels that read a texel, and where their weights begin.
@@ -154,7 +190,10 @@ static size_t find_readers(const struct vkb_axis *axis, struct readers *readers)
         for (uint32_t tap = 0; tap < axis->count; ++tap) {
             const struct sample sample = sample_at(axis, pixel, axis->taps[tap].offset);
             for (uint32_t i = 0; i < sample.count; ++i) {
-                struct readers *texel = &readers[read_texel(axis, sample.first + i)];
+                const uint32_t read = read_texel(axis, sample.first + i);
+                struct readers *texel = &readers[read];
+                if (read == axis->from)
+                    continue;
                 if (!texel->end)
                     texel->first = pixel;
                 texel->end = pixel + 1;
@@ -178,7 +217,10 @@ static void add_weights(const struct vkb_axis *axis, const struct readers *reade
         for (uint32_t tap = 0; tap < axis->count; ++tap) {
             const struct sample sample = sample_at(axis, pixel, axis->taps[tap].offset);
             for (uint32_t i = 0; i < sample.count; ++i) {
-                const struct readers *texel = &readers[read_texel(axis, sample.first + i)];
+                const uint32_t read = read_texel(axis, sample.first + i);
+                const struct readers *texel = &readers[read];
+                if (read == axis->from)
+                    continue;
                 double *sums = weights[texel->start + pixel - texel->first];
                 for (int kernel = 0; kernel < MAX_KERNELS; ++kernel)
                     sums[kernel] += sample.shares[i] * axis->taps[tap].weights[kernel];

@@ -18,12 +18,29 @@ struct vkb_tap {
     double offset, weights[MAX_KERNELS];
 };
 
+// What taps read beyond the first and the last pixel.
+enum vkb_border {
+    VKB_BORDER_NONE,  // the outermost texels
+    VKB_BORDER_ZERO,  // nothing
+    // Taps are pixels of the target apart, and read the samples of other pixels. Beyond the edges
+    // these are the outermost one; before the first one the first two in turn, as at HDRP's first
+    // level; at both edges the two of a pair in turn (Godot).
+    VKB_BORDER_LAST,
+    VKB_BORDER_FIRST_TWO,
+    VKB_BORDER_PAIRS,
+};
+
 // How `to` pixels sample `from` texels. Pixel i is at the position origin + i step, in texels.
 struct vkb_axis {
     uint32_t from, to;
     double origin, step;
     enum vkb_mode kind;  // what a tap samples at its position: UPSAMPLE_*
-    uint32_t first;      // where pixel 0 is in the image that the transpose reads
+    enum vkb_border border;
+    // Bits of next_texel() (shaders/lib/sampling.glsl): at which texels the one after it is read, if
+    // there are any; whether texels are counted from the last one.
+    uint32_t next;
+    bool backwards;
+    uint32_t first;  // where pixel 0 is in the image that the transpose reads
     uint32_t count;
     struct vkb_tap taps[VKB_MAX_TAPS];
 };
@@ -43,6 +60,10 @@ void vkb_filter_begin(const struct vkb_graph *graph, uint32_t from, uint32_t to,
 void vkb_axis_move(struct vkb_axis *axis, uint32_t from, uint32_t to, double origin);
 // Replaces the taps of an axis.
 void vkb_axis_set(struct vkb_axis *axis, const struct vkb_tap *taps, uint32_t count);
+
+// Lets both axes read the next texels of these bits (shaders/lib/sampling.glsl). Rows are counted
+// from the bottom.
+void vkb_filter_next(struct vkb_filter *filter, const float next[4]);
 
 struct vkb_table {
     float (*texels)[4];

@@ -75,7 +75,9 @@ static void read_composite(const struct vkb_graph *graph, struct vkb_pass_row *r
         return;
     const struct vkb_composite_params *params = &pass->params.composite;
     const float intensity = pass->constants.lit ? 1.0f : params->intensity;
-    row->params.adjoint_filter.gain *= intensity * exp2f(params->exposure);
+    // Godot's exposure is of the scene alone.
+    const float exposure = pass->constants.groups == GROUPS_GODOT ? 0.0f : params->exposure;
+    row->params.adjoint_filter.gain *= intensity * exp2f(exposure);
     row->constants.by = BY_BLOOM;
     replace_read(row, by_bloom, pass->reads[3]);
     row->reads[2] = pass->reads[0];

@@ -2,7 +2,8 @@
 // with its parameters.
 
 // A pixel, and on one side (tonemap.glsl) the cotangents of the picture before exposure and curves: by
-// colour and alpha, by exposure and by reference white.
+// colour and alpha, by exposure and by reference white. Of a soft light, which comes after the curve, the
+// colours are not there yet: `by_mixed` is of what the encoding reads. Godot's scene is exposed already.
 struct Pixel {
     vec4 scene, bloom;
     float share;
@@ -16,10 +17,18 @@ vec3 is_stored(vec3 value)
     return inside(value, params.limit == 1.0 ? 0.0 : -params.limit, params.limit);
 }
 
+vec3 softened(Pixel p)
+{
+    return soft_light(apply_tonemap(p.scene.rgb, TONEMAP), apply_tonemap(light_of(p.bloom.rgb), TONEMAP));
+}
+
 Pixel pixel_of(vec4 given, vec4 bloom, float share, vec4 cotangent)
 {
     Pixel p;
+    float exposure = exp2(params.exposure);
     p.scene = finite_or_zero(given);
+    if (GROUPS == GROUPS_GODOT)
+        p.scene.rgb *= exposure;
     p.bloom = bloom;
     p.share = share;
     cotangent = where_finite(cotangent, given);
@@ -28,29 +37,62 @@ Pixel pixel_of(vec4 given, vec4 bloom, float share, vec4 cotangent)
     // Encodings would magnify the rounding of a difference near 0.
     if (COMPOSITE == COMPOSITE_MIX)
         mixed = (1.0 - params.intensity * p.share) * p.scene.rgb + light_of(p.bloom.rgb);
-    vec3 exposed = mixed * exp2(params.exposure), toned = apply_tonemap(exposed, TONEMAP);
+    vec3 exposed = GROUPS == GROUPS_GODOT ? mixed : mixed * exposure;
+    vec3 toned = COMPOSITE == COMPOSITE_SOFT_LIGHT ? softened(p) : apply_tonemap(exposed, TONEMAP);
     vec3 by = cotangent.rgb, encoded = apply_encoding(toned, ENCODING, params.reference_white, by);
     by *= is_stored(encoded);
     // The encoding takes the product of both.
     p.by_white = ENCODING == ENCODING_PQ ? dot(by, toned) / params.reference_white : 0.0;
-    apply_tonemap(exposed, TONEMAP, by);
-    p.by_mixed = by * exp2(params.exposure);
+    if (COMPOSITE != COMPOSITE_SOFT_LIGHT)
+        apply_tonemap(exposed, TONEMAP, by);
+    p.by_mixed = GROUPS == GROUPS_GODOT ? by : by * exposure;
     p.by_exposure = log(2.0) * dot(by, exposed);
     return p;
 }
 
-// The derivative of a screen by one of its images.
-vec3 screen_slope(vec3 image, vec3 other)
+// By the colours of the scene and by the light, i b.
+struct Parts {
+    vec3 scene, light;
+};
+
+Parts back_screen(vec3 s, vec3 light, vec3 by)
 {
-    if (COMPOSITE == COMPOSITE_SCREEN)
-        return (1.0 - clamp(other, 0.0, 1.0)) * inside(image, 0.0, 1.0);
-    return COMPOSITE == COMPOSITE_UNCLAMPED_SCREEN ? 1.0 - other * below(image * other, 1.0) : vec3(1.0);
+    vec3 share = light / params.white;
+    vec3 by_light = (params.white - s) / params.white * inside(share, 0.0, 1.0);
+    if (GROUPS == GROUPS_GODOT)
+        return Parts(by * (1.0 - clamp(share, 0.0, 1.0)), by * by_light);
+    return Parts(by * (1.0 - clamp(light, 0.0, 1.0)) * inside(s, 0.0, 1.0),
+                 by * (1.0 - clamp(s, 0.0, 1.0)) * inside(light, 0.0, 1.0));
 }
 
-// By the light, i b.
-vec3 by_light(Pixel p)
+Parts back_soft_light(vec3 s, vec3 light, vec3 by)
 {
-    return p.by_mixed * screen_slope(light_of(p.bloom.rgb), p.scene.rgb);
+    vec3 toned = apply_tonemap(s, TONEMAP), toned_light = apply_tonemap(light, TONEMAP), lit = below(toned, 1.0);
+    Parts parts = Parts(by * (1.0 + lit * clamp(toned_light, 0.0, 1.0) * (softest_slope(toned) - 1.0)),
+                        by * lit * (softest(toned) - toned) * inside(toned_light, 0.0, 1.0));
+    apply_tonemap(s, TONEMAP, parts.scene);
+    apply_tonemap(light, TONEMAP, parts.light);
+    return parts;
+}
+
+Parts parts_of(Pixel p)
+{
+    vec3 s = p.scene.rgb, light = light_of(p.bloom.rgb), by = p.by_mixed;
+    if (COMPOSITE == COMPOSITE_SCREEN)
+        return back_screen(s, light, by);
+    if (COMPOSITE == COMPOSITE_SOFT_LIGHT)
+        return back_soft_light(s, light, by);
+    if (COMPOSITE == COMPOSITE_UNCLAMPED_SCREEN)
+        return Parts(by * (1.0 - light * below(s * light, 1.0)), by * (1.0 - s * below(s * light, 1.0)));
+    if (COMPOSITE == COMPOSITE_LIGHTNESS_SCREEN) {
+        vec4 both = back_lightness_screen(s, light.r, by);
+        return Parts(both.rgb, vec3(both.a, 0.0, 0.0));
+    }
+    if (COMPOSITE == COMPOSITE_REPLACE)
+        return Parts(vec3(0.0), by);
+    if (COMPOSITE == COMPOSITE_MIX)
+        return Parts((1.0 - params.intensity * p.share) * by, by);
+    return Parts(COMPOSITE == COMPOSITE_ADD_TO_POSITIVE ? by * above(s, 0.0) : by, by);
 }
 
 // Of the light that the alpha shows, as the alpha's cotangent weighs it.
@@ -76,25 +118,23 @@ float alpha_slope(Pixel p)
 
 vec4 by_scene(Pixel p)
 {
-    vec3 colour = p.by_mixed * screen_slope(p.scene.rgb, light_of(p.bloom.rgb));
-    if (COMPOSITE == COMPOSITE_MIX)
-        colour *= 1.0 - params.intensity * p.share;
-    if (COMPOSITE == COMPOSITE_ADD_TO_POSITIVE)
-        colour *= above(p.scene.rgb, 0.0);
+    vec3 colour = parts_of(p).scene;
+    if (GROUPS == GROUPS_GODOT)
+        colour *= exp2(params.exposure);
     return vec4(colour, p.by_alpha * alpha_slope(p));
 }
 
 vec4 by_bloom(Pixel p)
 {
     float gain = LIT != 0 ? 1.0 : params.intensity;
-    return gain * (vec4(by_light(p), 0.0) + by_alpha_light(p));
+    return gain * (vec4(parts_of(p).light, 0.0) + by_alpha_light(p));
 }
 
 // By intensity, exposure and reference white.
 vec4 by_values(Pixel p)
 {
     vec3 unit = COMPOSITE == COMPOSITE_MIX ? p.bloom.rgb - p.share * p.scene.rgb : p.bloom.rgb;
-    float by_intensity = dot(by_light(p), unit) + dot(by_alpha_light(p), p.bloom);
+    float by_intensity = dot(parts_of(p).light, unit) + dot(by_alpha_light(p), p.bloom);
     return vec4(COMPOSITE == COMPOSITE_OFF ? 0.0 : by_intensity, p.by_exposure, p.by_white, 0.0);
 }
 

@@ -38,12 +38,22 @@ vec3 composite(vec3 s, vec3 b, float share)
     return s;
 }
 
+// What the brightest light makes of it. Limited from below, since infinity times 0 is NaN.
+vec3 softest(vec3 s)
+{
+    vec3 low = max(s, -1e6), dark = ((16.0 * low - 12.0) * low + 4.0) * low;
+    return mix(sqrt(max(s, 0.0)), dark, lessThanEqual(s, vec3(0.25)));
+}
+
+vec3 softest_slope(vec3 s)
+{
+    vec3 low = max(s, -1e6), dark = (48.0 * low - 24.0) * low + 4.0;
+    return mix(0.5 / sqrt(max(s, 0.25)), dark, lessThanEqual(s, vec3(0.25)));
+}
+
 vec3 soft_light(vec3 s, vec3 light)
 {
-    // What the brightest light makes of it. Limited from below, since infinity times 0 is NaN.
-    vec3 low = max(s, -1e6), dark = ((16.0 * low - 12.0) * low + 4.0) * low;
-    vec3 full = mix(sqrt(max(s, 0.0)), dark, lessThanEqual(s, vec3(0.25)));
-    return mix(s + clamp(light, 0.0, 1.0) * (full - s), s, greaterThan(s, vec3(1.0)));
+    return mix(s + clamp(light, 0.0, 1.0) * (softest(s) - s), s, greaterThan(s, vec3(1.0)));
 }
 
 // The light that the alpha shows (the setting `alpha`).

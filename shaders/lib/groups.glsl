@@ -17,6 +17,18 @@ vec4[4] taps_of_group(Taps taps, int group)
     return vec4[](taps.outer[first], taps.outer[first + 1], taps.outer[first + 3], taps.outer[first + 4]);
 }
 
+// The weight of taps or of a group, and its derivatives by the channels.
+struct Weight {
+    float value;
+    vec3 slope;
+};
+
+Weight blender_weight(vec4 tap)
+{
+    float weight = 1.0 / (1.0 + largest(tap.rgb));
+    return Weight(weight, -weight * weight * shares_of_brightest(tap.rgb));
+}
+
 // Blender's: within a group, brighter taps weigh less (formulas of the compositor of Blender 5.0). Taps
 // between texels with negative channels may have a negative brightness.
 vec4 blender_mean(vec4 taps[4])
@@ -24,7 +36,7 @@ vec4 blender_mean(vec4 taps[4])
     vec4 sum = vec4(0.0);
     float weights = 0.0;
     [[unroll]] for (int i = 0; i < 4; ++i) {
-        float weight = 1.0 / (1.0 + largest(taps[i].rgb));
+        float weight = blender_weight(taps[i]).value;
         sum += weight * taps[i];
         weights += weight;
     }
@@ -67,12 +79,6 @@ int group_count()
         return ANTI_FLICKER != 0 ? 5 : 1;
     return GROUPS == GROUPS_HDRP ? 5 : 1;
 }
-
-// A group's weight, and its derivatives by the channels.
-struct Weight {
-    float value;
-    vec3 slope;
-};
 
 // Brighter groups weigh less (Karis 2013).
 Weight weight_of(vec4 group, float share)

@@ -1,15 +1,7 @@
 // The elements of the lines that a Fourier transform starts from: the glow, and what lies beyond its
 // edges. Include this after a function `load_source(ivec2)` and `texel_at`.
 
-// Unreal Engine's filter of bright colours.
-vec3 prefiltered(vec3 colour)
-{
-    float luminance = dot(colour, vec3(0.2126, 0.7152, 0.0722));
-    float wanted = min(params.prefilter_factor * (luminance - params.prefilter_min)
-                           + params.prefilter_min,
-                       params.prefilter_max);
-    return luminance > params.prefilter_min ? colour * (wanted / luminance) : colour;
-}
+#include "lib/bright.glsl"
 
 vec4 glow_of(vec4 texel)
 {

@@ -47,8 +47,14 @@ float rounding(float distance_to_end, float width)
     return 0.25 * h * h * width;
 }
 
-// The brightness above the threshold.
-float highlight(float value)
+float rounding_slope(float distance_to_end, float width)
+{
+    float h = width > 0.0 ? max(1.0 - abs(distance_to_end) / width, 0.0) : 0.0;
+    return -0.5 * h * sign(distance_to_end);
+}
+
+// The brightness above the threshold, and its derivative.
+vec2 highlight(float value)
 {
     float low = params.threshold, range = params.maximum, high = low + range;
     // The widths are limited, so that the transitions stay between 0 and the other end.
@@ -56,7 +62,9 @@ float highlight(float value)
     float at_high = min(params.smoothness, min(high, range));
     float above = value - low;
     float kept = max(above, 0.0) + rounding(above, at_low);
-    return min(kept, range) - rounding(kept - range, at_high);
+    float slope = larger(range, kept) - rounding_slope(kept - range, at_high);
+    return vec2(min(kept, range) - rounding(kept - range, at_high),
+                slope * (larger(above, 0.0) + rounding_slope(above, at_low)));
 }
 
 vec4 highlights(vec4 value)
@@ -64,7 +72,21 @@ vec4 highlights(vec4 value)
     if (THRESHOLDED == 0)
         return value;
     float brightest = largest(value.rgb);
-    return brightest > 0.0 ? value * (highlight(brightest) / brightest) : vec4(0.0);
+    return brightest > 0.0 ? value * (highlight(brightest).x / brightest) : vec4(0.0);
+}
+
+vec4 back_highlights(vec4 value, vec4 cotangent)
+{
+    float brightest = largest(value.rgb);
+    if (THRESHOLDED == 0)
+        return cotangent;
+    if (brightest <= 0.0)
+        return vec4(0.0);
+    vec2 kept = highlight(brightest);
+    float factor = kept.x / brightest;
+    // Divided first: products of small numbers are 0.
+    float slope = (kept.y - factor) * dot(cotangent, value / brightest);
+    return factor * cotangent + vec4(slope * shares_of_brightest(value.rgb), 0.0);
 }
 
 // darktable's: a step of the lightness (darktable 4.2.1, src/iop/bloom.c).
@@ -73,6 +95,14 @@ vec4 darktable_prefiltered(vec4 value)
     float light = params.strength * lightness_of(value.rgb);
     bool bright = THRESHOLDED == 0 || light > params.threshold;
     return bright ? vec4(vec3(light / 100.0), value.a) : vec4(0.0);
+}
+
+vec4 back_darktable(vec4 value, vec4 cotangent)
+{
+    float light = params.strength * lightness_of(value.rgb);
+    bool bright = THRESHOLDED == 0 || light > params.threshold;
+    float by_light = (cotangent.r + cotangent.g + cotangent.b) * params.strength * 1.16;
+    return bright ? vec4(by_light * lab_slope(value.rgb).y * WHITE_SHARES[1], cotangent.a) : vec4(0.0);
 }
 
 // The place of a tap that is a group of its own, in texels.

@@ -58,6 +58,42 @@ vec4 back_mean(vec4 mean, vec4 cotangent)
     return factor.a * cotangent + vec4(factor.rgb * dot(cotangent, apart), 0.0);
 }
 
+// Blender's groups are each of four of 13 taps, and these are what has cotangents: nine outer ones in three rows, then
+// the inner ones.
+Taps taps;
+float sums_of_weights[5];
+
+void start_taps()
+{
+    taps = taps_of(place);
+    [[unroll]] for (int group = 0; group < 5; ++group) {
+        vec4 four[4] = taps_of_group(taps, group);
+        sums_of_weights[group] = 0.0;
+        [[unroll]] for (int i = 0; i < 4; ++i)
+            sums_of_weights[group] += blender_weight(four[i]).value;
+    }
+}
+
+bool is_in_group(int group)
+{
+    ivec2 corner = ivec2(group - 1 & 1, group - 1 >> 1), step = ivec2(own_group % 3, own_group / 3) - corner;
+    if (group == 0 || own_group >= 9)
+        return group == 0 && own_group >= 9;
+    return (step.x & 1) == step.x && (step.y & 1) == step.y;
+}
+
+vec4 back_tap(vec4 cotangent)
+{
+    vec4 own = own_group >= 9 ? taps.inner[own_group - 9] : taps.outer[own_group], total = vec4(0.0);
+    Weight weight = blender_weight(own);
+    [[unroll]] for (int group = 0; group < 5; ++group)
+        if (is_in_group(group)) {
+            vec4 by_weight = vec4(weight.slope * dot(cotangent, own - found[group]), 0.0);
+            total += GROUP_SHARES[group] / sums_of_weights[group] * (weight.value * cotangent + by_weight);
+        }
+    return usual(total);
+}
+
 // The cotangents of the three values of a median.
 vec4[3] back_middle(vec4 a, vec4 b, vec4 c, vec4 cotangent)
 {
@@ -81,7 +117,13 @@ vec4 back_medians(vec4 cotangent)
 // The cotangents of the group, from those of what the method makes of all groups.
 vec4 back(vec4 cotangent)
 {
+    if (GROUPS == GROUPS_HIGHLIGHTS)
+        return back_highlights(found[0], cotangent);
+    if (GROUPS == GROUPS_DARKTABLE)
+        return back_darktable(found[0], cotangent);
     vec4 combination = combined(found, place.part);
+    if (GROUPS == GROUPS_BLENDER)
+        return back_tap(mix(vec4(0.0), cotangent, equal(usual(combination), combination)));
     cotangent = back_bright_part(combination, cotangent);
     // The reduction is linear, and this is no group but all of it.
     if (GROUPS == GROUPS_PYGFX)
@@ -100,6 +142,8 @@ void start()
 {
     place = PLACE_IN(source);
     found = means(place);
+    if (GROUPS == GROUPS_BLENDER)
+        start_taps();
     cotangent = texelFetch(cotangents, PIXEL, 0);
     if (ALPHA != ALPHA_BLUR)
         cotangent.a = 0.0;

@@ -1,5 +1,7 @@
 // The mean of the pixels up to a radius away along a row or a column, of those inside of the image. Each
-// invocation follows a line with a running sum, which it corrects for what the additions round off.
+// invocation follows a line with a running sum, which it corrects for what the additions round off. TRANSPOSED,
+// a pixel gets the shares of itself that these means have.
+#pragma compile TRANSPOSED
 
 UNIFORM_BLOCK(BOX_BLOCK);
 
@@ -16,6 +18,12 @@ void add(vec4 value)
     sum = total;
 }
 
+// How many pixels the mean at a place is of.
+float count_at(int at, int count)
+{
+    return float(min(at + params.radius, count - 1) - max(at - params.radius, 0) + 1);
+}
+
 void main()
 {
     ivec2 size = textureSize(source, 0), towards = ivec2(params.across, 1 - params.across);
@@ -26,12 +34,18 @@ void main()
     if (any(greaterThanEqual(first, size)))
         return;
     for (int at = -radius; at < count; ++at) {
+#ifdef TRANSPOSED
+#define TAKEN(place) (texelFetch(source, first + (place) * towards, 0) / count_at(place, count))
+#define MADE(place)  sum
+#else
+#define TAKEN(place) texelFetch(source, first + (place) * towards, 0)
+#define MADE(place)  (sum / count_at(place, count))
+#endif
         if (at + radius < count)
-            add(texelFetch(source, first + (at + radius) * towards, 0));
+            add(TAKEN(at + radius));
         if (at > radius)
-            add(-texelFetch(source, first + (at - radius - 1) * towards, 0));
-        int inside = min(at + radius, count - 1) - max(at - radius, 0) + 1;
+            add(-TAKEN(at - radius - 1));
         if (at >= 0)
-            imageStore(target, first + at * towards, stored(sum / float(inside)));
+            imageStore(target, first + at * towards, stored(MADE(at)));
     }
 }

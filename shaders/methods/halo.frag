@@ -11,9 +11,5 @@ UNIFORM_BLOCK(FLARE_BLOCK);
 vec4 shade()
 {
     vec2 place = FROM_CENTRE;
-    float height = float(textureSize(source, 0).y), distance = length(place);
-    float share = 1.0 - smoothstep(0.0, 1.0, abs(distance / height - params.radius) / params.width);
-    // The direction must be exact, since red and blue are moved along it also where the sample is near the centre.
-    vec2 offset = distance > 0.0 ? (distance - params.radius * height) / distance * place : vec2(0.0);
-    return stored(share * seen_from_centre(offset));
+    return stored(halo_factor(place) * seen_from_centre(halo_offset(place)));
 }

@@ -1,5 +1,8 @@
 // Blender's recursive filter along rows, columns or diagonals: each pixel is mixed with one before it,
-// which is mixed already, and one after it (formulas of the compositor of Blender 5.0).
+// which is mixed already, and one after it (formulas of the compositor of Blender 5.0). TRANSPOSED, from the end
+// of each line: a pixel gets the cotangents of the one after it that it was mixed into, complete, and has shares
+// of these for itself and for the one after it.
+#pragma compile TRANSPOSED
 
 UNIFORM_BLOCK(STAR_BLOCK);
 
@@ -52,6 +55,21 @@ void main()
     Line line = line_of(int(gl_GlobalInvocationID.x), textureSize(source, 0));
     vec4 mixed[STAR_ITERATIONS - 1];
 
+#ifdef TRANSPOSED
+    float own = 1.0 - params.fade, end = 0.5 * params.fade;
+    for (int at = line.count - 1; at >= 0; --at) {
+        int slot = at % params.distance;
+        ivec2 place = line.first + at * line.towards;
+        vec4 cotangent = texelFetch(source, place, 0);
+        if (at + params.distance < line.count) {
+            cotangent += end * mixed[slot];
+            imageStore(target, place + params.distance * line.towards, own * mixed[slot] + end * cotangent);
+        }
+        mixed[slot] = cotangent;
+    }
+    for (int at = 0; at < min(params.distance, line.count); ++at)
+        imageStore(target, line.first + at * line.towards, own * mixed[at]);
+#else
     for (int at = 0; at < line.count; ++at) {
         int slot = at % params.distance;
         vec4 ends = fetch(line, at + params.distance);
@@ -64,4 +82,5 @@ void main()
             value = stored(value + texelFetch(before, place, 0));
         imageStore(target, place, value);
     }
+#endif
 }

@@ -1,0 +1,21 @@
+// Unreal Engine's filter of bright colours before a convolution, for shaders with FFT_BLOCK.
+
+vec3 prefiltered(vec3 colour)
+{
+    float luminance = dot(colour, vec3(0.2126, 0.7152, 0.0722));
+    float wanted = min(params.prefilter_factor * (luminance - params.prefilter_min)
+                           + params.prefilter_min,
+                       params.prefilter_max);
+    return luminance > params.prefilter_min ? colour * (wanted / luminance) : colour;
+}
+
+vec3 back_prefiltered(vec3 colour, vec3 cotangent)
+{
+    float luminance = dot(colour, LUMINANCE);
+    if (luminance <= params.prefilter_min)
+        return cotangent;
+    float line = params.prefilter_factor * (luminance - params.prefilter_min) + params.prefilter_min;
+    float ratio = min(line, params.prefilter_max) / luminance;
+    float slope = params.prefilter_factor * larger(params.prefilter_max, line);
+    return ratio * cotangent + LUMINANCE * (dot(cotangent, colour / luminance) * (slope - ratio));
+}

@@ -1,0 +1,18 @@
+// The cotangents of what is convolved, from those of what its filter of bright colours makes of it.
+
+UNIFORM_BLOCK(FFT_BLOCK);
+#include "lib/bright.glsl"
+
+layout(set = 0, binding = 1) uniform sampler2D source;
+layout(set = 0, binding = 2) uniform sampler2D cotangents;
+
+#define ADDED_BINDING 3
+#include "lib/fullscreen.glsl"
+#include "lib/adjoint.glsl"
+
+vec4 shade()
+{
+    vec4 cotangent = texelFetch(cotangents, PIXEL, 0);
+    cotangent.rgb = back_prefiltered(texelFetch(source, PIXEL, 0).rgb, cotangent.rgb);
+    return gathered(cotangent);
+}

@@ -1,0 +1,27 @@
+// The cotangents of what a halo or a ghost, the only one here, samples.
+#include "lib/sampling.glsl"
+
+UNIFORM_BLOCK(FLARE_BLOCK);
+#include "lib/fetch_inside.glsl"
+#include "lib/flare.glsl"
+
+layout(set = 0, binding = 2) uniform sampler2D cotangents;
+
+#define ADDED_BINDING 3
+#include "lib/fullscreen.glsl"
+#include "lib/adjoint.glsl"
+
+vec4 shade()
+{
+    vec2 place = FROM_CENTRE;
+    vec4 value = colours_from_centre(flare_offset(place)), cotangent = texelFetch(cotangents, PIXEL, 0);
+    cotangent *= params.count == 0 ? vec4(halo_factor(place))
+                                   : ghost_factor(params.ghosts[0], place) * corner_factor(place);
+    if (ALPHA != ALPHA_BLUR)
+        cotangent.a = 0.0;
+    vec4 above = params.threshold > 0.0 ? part_above(value, params.threshold) : value;
+    cotangent.rgb *= larger(vec4(params.maximum), above).rgb;
+    if (params.threshold > 0.0)
+        cotangent = back_part_above(value, cotangent, params.threshold);
+    return gathered(cotangent);
+}

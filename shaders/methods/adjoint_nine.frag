@@ -1,0 +1,28 @@
+// The cotangents of what Godot's blurs of the frame weight by brightness: before the horizontal one the samples, after
+// the vertical one the sum; or those of the mask.
+#include "lib/sampling.glsl"
+
+UNIFORM_BLOCK(PREFILTER_BLOCK);
+
+layout(set = 0, binding = 1) uniform sampler2D source;
+layout(set = 0, binding = 3) uniform sampler2D cotangents;
+
+#define ADDED_BINDING 4
+#include "lib/fullscreen.glsl"
+#include "lib/mask.glsl"
+#include "lib/nine.glsl"
+#include "lib/nine_taps.glsl"
+#include "lib/adjoint.glsl"
+
+vec4 shade()
+{
+    vec4 cotangent = texelFetch(cotangents, PIXEL, 0);
+    if (ALPHA != ALPHA_BLUR)
+        cotangent.a = 0.0;
+    if (DIRECTION == DIRECTION_HORIZONTAL)
+        return gathered(back_dimmed(sample_at(source, PLACE_IN(source), vec2(0.0), SAMPLING), cotangent, 1.0));
+    vec4 sum = nine_sum();
+    if (BY == BY_MASK)
+        return gathered(vec4(dot(glowing(sum), cotangent), 0.0, 0.0, 0.0));
+    return gathered(back_glowing(sum, mask_value() * cotangent));
+}
