@@ -195,10 +195,12 @@
     INPUT(B, float, base) \
     INPUT(B, float, share)
 
-// The end of Blender's glare (blender_end.frag): one factor for each channel.
+// The end of Blender's glare (blender_end.frag): one factor for each channel; up to which difference
+// the derivatives count channels as equal, which they are but for the rounding of a convolution.
 #define BLENDER_END_BLOCK(B, READS, INPUT, VEC4S) \
     SAMPLING_ROWS(B, INPUT) \
     READS(B, saturation) \
+    INPUT(B, float, rounding) \
     INPUT(B, int, reads_next) \
     VEC4S(B, factors, 1) \
     VEC4S(B, next, 1)
@@ -532,7 +534,8 @@
 // of. EMITTERS is how many passes add up in the target by blending. With ENLARGED the target has
 // more rows than the source, and a composite samples the lines of its bloom. STORED is the format
 // of the target (STORED_*). FIRST marks an engine's first level. LEVELS is the number of levels
-// that a pass adds up. GROUPS is what a downsampling makes of its taps. INVERSE to GROUP_HEIGHT are
+// that a pass adds up, or the number of the group or tap whose cotangents an
+// adjoint pass writes. GROUPS is what a downsampling makes of its taps. INVERSE to GROUP_HEIGHT are
 // of Fourier transforms (fft.comp), whose workgroups have GROUP_WIDTH x GROUP_HEIGHT invocations:
 // of a stage of RADIX_1 elements, or with complete lines of stages of RADIX_1 to RADIX_4. (Windows
 // of filters in tiles are RADIX_1 x RADIX_2 texels, in transposes of RADIX_3 pictures below each

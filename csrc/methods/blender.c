@@ -326,6 +326,7 @@ static uint32_t add_end(struct vkb_levels *levels, uint32_t light, double gain)
     row.block = VKB_BLOCK_blender_end;
     row.params.blender_end = (struct vkb_blender_end_params){
         .saturation = settings->values.saturation,
+        .rounding = vkb_needs_kernel(settings) ? 1e-6f : 0.0f,
         .factors = {{
             (float)(gain * tint[0]),
             (float)(gain * tint[1]),

@@ -189,7 +189,7 @@ static bool keeps_cotangents(const struct vkb_adjoint *adjoint, const struct vkb
 // The axes that a filter does not leave as they are.
 static enum vkb_mode direction_of(const struct vkb_filter *filter)
 {
-    return filter->kernels > 1                  ? DIRECTION_BOTH
+    return filter->kernels > 1              ? DIRECTION_BOTH
          : vkb_axis_is_identity(&filter->y) ? DIRECTION_HORIZONTAL
          : vkb_axis_is_identity(&filter->x) ? DIRECTION_VERTICAL
                                             : DIRECTION_BOTH;

@@ -234,8 +234,7 @@ bool vkb_transpose_sun_beams(struct vkb_adjoint *adjoint, const struct vkb_pass_
         .most = params->most + 2.0 + (left > 0.0 && left < 1.0 ? 2.0 / left : 0.0),
         .parts = left < 1.0 ? 2.0 : 1.0,
     };
-    struct vkb_pass_row row =
-        vkb_adjoint_row(&vkb_shader_adjoint_beam_means_frag, &cotangents, 1);
+    struct vkb_pass_row row = vkb_adjoint_row(&vkb_shader_adjoint_beam_means_frag, &cotangents, 1);
     uint32_t sums;
 
     row.block = VKB_BLOCK_sun_beams;

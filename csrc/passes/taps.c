@@ -50,8 +50,8 @@ void vkb_filter_next(struct vkb_filter *filter, const float next[4])
 bool vkb_axis_is_identity(const struct vkb_axis *axis)
 {
     return axis->from == axis->to && axis->origin == 0.0 && axis->step == 1.0 && axis->first == 0
-        && axis->kind == UPSAMPLE_LINEAR && axis->next == 0 && axis->count == 1 && axis->taps[0].offset == 0.0
-        && axis->taps[0].weights[0] == 1.0;
+        && axis->kind == UPSAMPLE_LINEAR && axis->next == 0 && axis->count == 1
+        && axis->taps[0].offset == 0.0 && axis->taps[0].weights[0] == 1.0;
 }
 
 double vkb_axis_readers(const struct vkb_axis *axis)

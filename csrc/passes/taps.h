@@ -36,8 +36,8 @@ struct vkb_axis {
     double origin, step;
     enum vkb_mode kind;  // what a tap samples at its position: UPSAMPLE_*
     enum vkb_border border;
-    // Bits of next_texel() (shaders/lib/sampling.glsl): at which texels the one after it is read, if
-    // there are any; whether texels are counted from the last one.
+    // Bits of next_texel() (shaders/lib/sampling.glsl): at which texels the one after it is read,
+    // if there are any; whether texels are counted from the last one.
     uint32_t next;
     bool backwards;
     uint32_t first;  // where pixel 0 is in the image that the transpose reads

@@ -188,22 +188,46 @@ static bool has_exact_windows(const struct axis *axis, int32_t exact, int32_t *w
     return fits;
 }
 
-// The weights of one kernel in the middle of the axis: of an even texel, then of an odd one.
+// The weight of one kernel that a texel has in a pixel of its window.
+static float weight_in(const struct axis *axis, uint32_t texel, int32_t pixel)
+{
+    const float *entry = entry_of(axis, texel);
+    const float (*list)[4] = axis->texels + (uint32_t)entry[2];
+    const int32_t first = (int32_t)entry[0];
+    const bool reads = pixel >= first && pixel < first + (int32_t)entry[1];
+
+    return reads ? list[pixel - (int32_t)entry[3]][texel % ADJOINT_SIDE] : 0.0f;
+}
+
+// The weights in the middle of the axis: of an even texel, then of an odd one.
 static void take_inner(const struct axis *axis, int32_t exact, int32_t window, float (*inner)[4])
 {
     const uint32_t middle = axis->size / 2 & ~1u;
 
-    for (uint32_t texel = middle; texel < middle + 2 && texel < axis->size; ++texel) {
-        const float *entry = entry_of(axis, texel);
-        const float (*list)[4] = axis->texels + (uint32_t)entry[2];
-        const int32_t first = (int32_t)entry[0], end = first + (int32_t)entry[1];
-        for (int32_t i = 0; i < window; ++i) {
-            const int32_t reader = WINDOW_FIRST(exact, (int32_t)texel, window) + i;
-            const bool reads = reader >= first && reader < end;
+    for (uint32_t texel = middle; texel < middle + 2 && texel < axis->size; ++texel)
+        for (int32_t i = 0; i < window; ++i)
             inner[(texel & 1) * 2 + i / 4][i % 4] =
-                reads ? list[reader - (int32_t)entry[3]][texel % ADJOINT_SIDE] : 0.0f;
-        }
+                weight_in(axis, texel, WINDOW_FIRST(exact, (int32_t)texel, window) + i);
+}
+
+// Whether all texels that are not near an edge have the weights of those in the middle, but for
+// rounding. Those of ghosts differ. (Where tiles take the weights of the middle is told in
+// adjoint_filter_tile.comp.)
+static bool has_inner(const struct axis *axis, int32_t exact, int32_t window, uint32_t pixels,
+                      const float (*inner)[4])
+{
+    bool same = true;
+
+    for (uint32_t texel = 0; same && texel < axis->size; ++texel) {
+        const int32_t first = WINDOW_FIRST(exact, (int32_t)texel, window);
+        if (first < window || first + 2 * window > (int32_t)pixels)
+            continue;
+        for (int32_t i = 0; i < window; ++i)
+            same = same
+                && fabsf(inner[(texel & 1) * 2 + i / 4][i % 4] - weight_in(axis, texel, first + i))
+                       <= 1e-6f;
     }
+    return same;
 }
 
 // Makes `row` tiles, along both axes at once also where the plain passes are one for each axis, of
@@ -239,7 +263,13 @@ static bool make_tiles(const struct vkb_variant_choice *choice, const struct vkb
         || !has_exact_windows(&x, exact_x, &width) || !has_exact_windows(&y, exact_y, &height))
         exact_x = exact_y = 0;
     // Such tiles are turned: they load columns, and x and y change places.
-    const bool keeps = FILTER_TILE_KEEPS(exact_x, constants->kernels, width, height);
+    bool keeps = FILTER_TILE_KEEPS(exact_x, constants->kernels, width, height);
+    if (keeps) {
+        take_inner(&x, exact_x, width, params->inner_x);
+        take_inner(&y, exact_y, height, params->inner_y);
+        keeps = has_inner(&x, exact_x, width, source->width, params->inner_x)
+             && has_inner(&y, exact_y, height, source->height, params->inner_y);
+    }
     // Loops of constant length are slower where they are long: 960 x 540 pixels that 20 x 2 ones
     // read 0.123 ms, 0.094 otherwise (H100, 2026-11-27).
     if (!keeps && width > 1 && height > 1)
@@ -252,8 +282,6 @@ static bool make_tiles(const struct vkb_variant_choice *choice, const struct vkb
         return true;
     row->block_width = row->block_height;
     row->block_height = FILTER_TILE_COLUMNS;
-    take_inner(&x, exact_x, width, params->inner_x);
-    take_inner(&y, exact_y, height, params->inner_y);
     return true;
 }
 

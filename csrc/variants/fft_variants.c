@@ -70,7 +70,7 @@ static uint32_t longer_length(const struct vkb_device *device, uint32_t length)
 
 static bool is_stage(const struct vkb_pass_row *pass)
 {
-    return pass->block == VKB_BLOCK_fft;
+    return vkb_computes(pass, VKB_BLOCK_fft);
 }
 
 // The length of the lines along an axis of the convolution that the pass is of.
@@ -210,7 +210,7 @@ bool vkb_add_transform(struct vkb_variant_choice *choice, const struct vkb_pass_
     const struct vkb_image_row *target = &choice->graph->images[pass->targets[0]];
     struct vkb_pass_row row;
 
-    if (!(pass->block == VKB_BLOCK_fft && vkb_fits_linear(choice, pass)
+    if (!(vkb_computes(pass, VKB_BLOCK_fft) && vkb_fits_linear(choice, pass)
           && reaches(choice->device, target)))
         return false;
     memcpy(&row, pass, sizeof row);

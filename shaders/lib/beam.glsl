@@ -64,3 +64,17 @@ vec2 texels_of(vec2 share, ivec2 size)
 {
     return share * vec2(size) - 0.5;
 }
+
+// The sum of the weights of a pixel's samples.
+float weights_of(ivec2 pixel, ivec2 size)
+{
+    Beam beam = beam_of(pixel, size);
+    float weights = 0.0;
+    for (int i = 0; i <= beam.last; ++i) {
+        float at = steps_to(beam, i);
+        if (!is_place(beam.share + at * beam.towards))
+            break;
+        weights += weight_at(beam, at);
+    }
+    return weights;
+}

@@ -20,6 +20,15 @@ vec3 saturated(vec3 value)
     return most * (1.0 - wanted) + (value - least) * (wanted * most / spread);
 }
 
+// Channels that differ from the largest or the smallest one, or from 0, by rounding alone are equal to it.
+vec3 settled(vec3 value)
+{
+    vec3 near = mix(value, vec3(0.0), lessThanEqual(abs(value), vec3(params.rounding)));
+    float most = largest(near), least = -largest(-near);
+    near = mix(near, vec3(most), lessThanEqual(abs(near - most), vec3(params.rounding * (1.0 + 10.0 * abs(most)))));
+    return mix(near, vec3(least), lessThanEqual(abs(near - least), vec3(params.rounding * (1.0 + 10.0 * abs(least)))));
+}
+
 // Each channel's distance from the largest one is scaled: by the saturation, or by less where that would make a channel
 // negative. Around a grey, distances grow from 0; around black, opposite changes of two channels grow by at most 1/2.
 vec3 back_saturated(vec3 value, vec3 cotangent)

@@ -10,13 +10,6 @@ layout(set = 0, binding = 1) uniform sampler2D cotangents;
 
 vec4 shade()
 {
-    Beam beam = beam_of(PIXEL, textureSize(cotangents, 0));
-    float weights = 0.0;
-    for (int i = 0; i <= beam.last; ++i) {
-        float at = steps_to(beam, i);
-        if (!is_place(beam.share + at * beam.towards))
-            break;
-        weights += weight_at(beam, at);
-    }
+    float weights = weights_of(PIXEL, textureSize(cotangents, 0));
     return texelFetch(cotangents, PIXEL, 0) / (weights > 0.0 ? weights : 1.0);
 }

@@ -21,20 +21,6 @@ layout(set = 0, binding = 2) uniform sampler2D partial_sums;
 #define AT_ONCE 4
 #include "lib/strips.glsl"
 
-// The first sample's weight is 0 if it is as far away as the sun, and so are all others then.
-bool is_without_weights(ivec2 pixel)
-{
-    Beam beam = beam_of(pixel, textureSize(cotangents, 0));
-    float weights = 0.0;
-    for (int i = 0; i <= beam.last; ++i) {
-        float at = steps_to(beam, i);
-        if (!is_place(beam.share + at * beam.towards))
-            break;
-        weights += weight_at(beam, at);
-    }
-    return weights == 0.0;
-}
-
 // The share of a sample, in texels, that a texel has.
 float share_of(vec2 place, ivec2 texel)
 {
@@ -102,7 +88,7 @@ vec4 shade()
     if (STAGE == STAGE_FIRST)
         return sum;
     // A pixel without weights shows itself.
-    if (IS_JITTERED && params.summed_first == 0 && is_without_weights(PIXEL))
+    if (IS_JITTERED && params.summed_first == 0 && weights_of(PIXEL, textureSize(cotangents, 0)) == 0.0)
         sum += texelFetch(cotangents, PIXEL, 0);
     return gathered(sum);
 }

@@ -14,5 +14,7 @@ layout(set = 0, binding = 2) uniform sampler2D cotangents;
 vec4 shade()
 {
     vec4 cotangent = params.factors[0] * texelFetch(cotangents, PIXEL, 0);
-    return gathered(vec4(back_saturated(enlarged().rgb, cotangent.rgb), ALPHA == ALPHA_BLUR ? cotangent.a : 0.0));
+    if (ALPHA != ALPHA_BLUR)
+        cotangent.a = 0.0;
+    return gathered(vec4(back_saturated(settled(enlarged().rgb), cotangent.rgb), cotangent.a));
 }

@@ -66,6 +66,7 @@ float sums_of_weights[5];
 void start_taps()
 {
     taps = taps_of(place);
+    found = group_means(taps);
     [[unroll]] for (int group = 0; group < 5; ++group) {
         vec4 four[4] = taps_of_group(taps, group);
         sums_of_weights[group] = 0.0;
@@ -141,9 +142,10 @@ vec4 back(vec4 cotangent)
 void start()
 {
     place = PLACE_IN(source);
-    found = means(place);
     if (GROUPS == GROUPS_BLENDER)
         start_taps();
+    else
+        found = means(place);
     cotangent = texelFetch(cotangents, PIXEL, 0);
     if (ALPHA != ALPHA_BLUR)
         cotangent.a = 0.0;

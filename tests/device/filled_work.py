@@ -16,7 +16,7 @@ import numpy as np
 
 import vkbloom
 from tests.exhaustive import EXHAUSTIVE
-from tests.methods.test_adjoint_passes import CASES, RARE
+from tests.methods.test_adjoint_passes import CASES
 from tests.variants import VARIANTS, opened
 from vkbloom import Pyramid, Renderer, Scene, glares
 from vkbloom._doctor.cases import METHODS, presets_of_low_levels
@@ -37,7 +37,6 @@ def settings_by_name() -> dict[str, Any]:
             for name, stages in glares.items()
         },
         **{f"adjoint {name}": settings for name, settings in CASES.items() if name != "high"},
-        **{f"rare {number}": settings for number, settings in enumerate(RARE)},
     }
 
 

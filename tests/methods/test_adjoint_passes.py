@@ -10,7 +10,9 @@ import pytest
 
 import vkbloom
 from tests.device.abilities import has_linear_texels
+from tests.exhaustive import EXHAUSTIVE, some
 from tests.images import random_image
+from tests.methods.cases import METHODS, OTHERS
 from tests.variants import opened
 from vkbloom import (
     BevyBloom,
@@ -26,6 +28,7 @@ from vkbloom import (
     Separable,
     ThreeBloom,
     UrpBloom,
+    _core,
     reference,
 )
 from vkbloom._gradients.passes import DeviceGradients, Passes
@@ -35,11 +38,13 @@ SIZES = ((11, 14), (16, 32), (7, 1), (1, 9), (1, 1))
 #: Those whose fields are checked, too, and those that are checked in all sizes.
 FIELDS = (
     *("knee", "pyramid", "streaks", "firefly", "alpha blur", "aces", "exponential", "agx", "pq"),
-    *("bevy", "kino", "filament", "urp", "unreal", "psf", "kawase"),
+    *("bevy", "kino", "filament", "urp", "unreal", "psf", "kawase", "blender"),
 )
 COMPLETE = (
     *FIELDS[:2],
     *("pygfx karis", "filament", "filament threshold", "unreal standard", "halation"),
+    *("hdrp", "godot", "darktable", "blender low", "blender streaks 5.2", "blender ghosts"),
+    *("blender star", "blender jitter", "halo aberration", "ghosts aberration"),
 )
 #: Those whose weights count negative luminances.
 NEGATIVE = ("pygfx karis",)
@@ -102,21 +107,55 @@ CASES: dict[str, Any] = {
     # Its groups below each other would be higher than images may be.
     "high": KinoBloom(radius=1.0),
     "psf": vkbloom.Convolution(psf=KERNEL, threshold=0.3),
-}
-#: Methods whose derivatives are the reference's.
-RARE: tuple[Any, ...] = (
-    HdrpBloom(anamorphism=0.3),
-    GodotBloom(
+    **{
+        f"prefilter {boundary}": vkbloom.Convolution(
+            psf=vkbloom.psf.unreal(KERNEL, prefilter=(0.5, 1.2, 1.5)), boundary=boundary
+        )
+        for boundary in ("zero", "edge")
+    },
+    "hdrp": HdrpBloom(anamorphism=0.3),
+    "godot": GodotBloom(
+        threshold=0.3, threshold_scale=0.4, luminance_cap=1.2, strength=1.3, exposure=0.4
+    ),
+    "godot screen": GodotBloom(
         level_weights=(0.5, 0, 0.3, 0, 0, 0, 0), composite="screen", intensity=0.7, threshold=None
     ),
-    GodotBloom(threshold=0.3, threshold_scale=0.4, luminance_cap=1.2, strength=1.3, exposure=0.4),
-    GodotBloom(composite="soft_light", tonemap="reinhard", bicubic=False, threshold=None),
-    GodotBloom(composite="replace", encoding="srgb", threshold=0.2),
-    BlenderGlare(threshold=0.4, smoothness=0.3, saturation=1.7, tint=(1, 0.5, 0.2)),
-    BlenderGlare(quality="low", size=1.0, maximum=0.4, threshold=0.3, saturation=0.4),
-    BlenderGlare(type="streaks", threshold=0.3, streaks=3, streaks_angle=20),
-    BlenderGlare(type="fog_glow", threshold=0.3, quality="medium"),
-)
+    "godot soft": GodotBloom(
+        composite="soft_light", tonemap="reinhard", bicubic=False, threshold=None
+    ),
+    "godot replace": GodotBloom(composite="replace", encoding="srgb", threshold=0.2),
+    "godot mix": GodotBloom(composite="mix", intensity=0.4, exposure=0.5, threshold=0.2),
+    "darktable": vkbloom.DarktableBloom(threshold=40.0, blur_size=2.0),
+    "darktable aces": vkbloom.DarktableBloom(threshold=None, tonemap="aces"),
+    "blender": BlenderGlare(threshold=0.4, smoothness=0.3, saturation=1.7, tint=(1, 0.5, 0.2)),
+    "blender low": BlenderGlare(
+        quality="low", size=1.0, maximum=0.4, threshold=0.3, saturation=0.4
+    ),
+    **{
+        f"blender {type} {version}": BlenderGlare(
+            type=type, version=version, threshold=0.3, quality="medium", streaks=3, streaks_angle=20
+        )
+        for type, version in (("streaks", "5.0"), ("streaks", "5.2"), ("fog_glow", "5.2"))
+    },
+    "blender kernel": BlenderGlare(type="kernel", kernel=KERNEL, threshold=0.3),
+    "blender ghosts": BlenderGlare(type="ghosts", threshold=None),
+    "blender star": BlenderGlare(type="simple_star", threshold=None),
+    "blender cross": BlenderGlare(type="simple_star", threshold=None, diagonal=False),
+    "blender beams": BlenderGlare(type="sun_beams", threshold=None),
+    "blender jitter": BlenderGlare(type="sun_beams", threshold=None, jitter=0.4),
+    "halo": Pyramid(levels=1, glare=(vkbloom.Halo(radius=0.4, width=0.3),)),
+    "halo aberration": Pyramid(
+        levels=1, glare=(vkbloom.Halo(aberration=0.05, halvings=0, threshold=0.2),)
+    ),
+    "ghosts": Pyramid(
+        levels=1, glare=(vkbloom.Ghosts(halvings=0, threshold=0.1, vignette=0.5, falloff=2.0),)
+    ),
+    "ghosts aberration": Pyramid(
+        levels=1,
+        glare=(vkbloom.Ghosts(scales=(0.001, 0.5, -0.9, 1.5), halvings=0, aberration=0.05),),
+    ),
+    "dirt": Pyramid(levels=1, alpha="blur", glare=(STREAKS, vkbloom.Dirt(seed=1))),
+}
 
 
 def pulled(renderer: Any, image: Any, settings: Any, **given: Any) -> Any:
@@ -170,32 +209,55 @@ def test_infinite_weights_have_no_derivative(renderer: Renderer) -> None:
     check(pullback(cotangents), expected, "image")
 
 
-@pytest.mark.parametrize(
-    "settings",
-    [
-        vkbloom.DarktableBloom(threshold=40.0, blur_size=2.0),
-        *RARE[::4],
-        BlenderGlare(type="streaks", version="5.2", threshold=0.3, streaks=2),
-        BlenderGlare(type="sun_beams", threshold=None),
-        BlenderGlare(type="simple_star", threshold=None),
-        BlenderGlare(type="ghosts", threshold=None),
-        Pyramid(levels=1, glare=(vkbloom.Halo(),)),
-        Pyramid(levels=1, glare=(vkbloom.Dirt(seed=1),)),
-        vkbloom.Convolution(psf=vkbloom.psf.unreal(KERNEL, prefilter=(0.5, 1.2, 1.5))),
-        Pyramid(levels=1, glare=(vkbloom.Ghosts(scales=(0.001, 0.5), aberration=0.05),)),
-    ],
-)
-def test_the_reference_derives_what_has_no_transpose(renderer: Renderer, settings: Any) -> None:
-    """What is rarely differentiated, and samples that are not on a grid."""
-    image = random_image(9, 41, channels=3, seed=1).astype(np.float32)
-    pullback, cotangents, expected = pulled(renderer, image, settings)
-    found = pullback(cotangents)
-    assert not isinstance(found, DeviceGradients)
-    for name in expected:
-        check(found, expected, name)
-    # Also where no pass after the glow has cotangents.
-    glow = {"glow": cotangents["glow"]}
-    check(pullback(glow), reference.vjp(image, settings)[1](glow), "image")
+#: All that the package has: each method in each of its ways, each preset and each stage of glare.
+BUILT_IN: dict[str, Any] = {
+    **METHODS,
+    **OTHERS,
+    **{f"case {name}": settings for name, settings in CASES.items()},
+    **{
+        f"blender {type} {version}": BlenderGlare(type=type, version=version)
+        for type in ("bloom", "ghosts", "streaks", "fog_glow", "simple_star", "sun_beams")
+        for version in ("4.3", "5.0", "5.2")
+    },
+    **{f"preset {name}": settings for name, settings in vkbloom.presets.items()},
+    **{f"glare {name}": Pyramid(glare=stages) for name, stages in vkbloom.glares.items()},
+}
+
+
+@pytest.mark.parametrize("name", BUILT_IN)
+def test_nothing_built_in_is_left_to_the_reference(renderer: Renderer, name: str) -> None:
+    settings = BUILT_IN[name].replace(**SINGLE)
+    image = np.zeros((64, 80, 4), np.float32)
+    source = Inputs(image).source((image,))
+    assert renderer._core.plan(source, settings, None, ("final",), False) is not None
+
+
+def test_all_methods_and_stages_are_among_them() -> None:
+    methods = {settings.method for settings in BUILT_IN.values()}
+    assert methods == {*_core.METHODS} - {"custom"}
+    stages = {stage.stage for settings in BUILT_IN.values() for stage in settings.glare}
+    assert stages == {*_core.STAGES}
+
+
+PRESETS: dict[str, Any] = {
+    **vkbloom.presets,
+    **{f"glare {name}": Pyramid(levels=2, glare=stages) for name, stages in vkbloom.glares.items()},
+}
+
+
+@pytest.mark.parametrize("name", some(PRESETS, 6))
+def test_presets_are_differentiated(renderer: Renderer, name: str) -> None:
+    image = random_image(33, 48, channels=3, seed=1).astype(np.float32)
+    both = {
+        "mask": np.random.default_rng(3).random((33, 48), np.float32),
+        "emission": random_image(33, 48, channels=3, seed=2).astype(np.float32),
+    }
+    for given in ({}, both):
+        pullback, cotangents, expected = pulled(renderer, image, PRESETS[name], **given)
+        found = pullback(cotangents)
+        assert isinstance(found, DeviceGradients)
+        for part in ("image", *given):
+            check(found, expected, part)
 
 
 SINGLE: Any = {"format": "rgba32float"}
@@ -302,6 +364,16 @@ def test_variants_are_transposed(varied: dict[str, Renderer], case: tuple[Any, .
         assert tuple(shader for shader in shaders if shader in special) == passes
 
 
+@pytest.mark.parametrize("name", CASES if EXHAUSTIVE else ("blender ghosts", "prefilter edge"))
+def test_tiles_have_the_derivatives_of_the_reference(varied: Any, name: str) -> None:
+    """Among them ghosts, whose weights differ from texel to texel in a window of the usual size."""
+    image = random_image(9, 41, channels=4, seed=1).astype(np.float32)
+    pullback, cotangents, expected = pulled(varied["gpu"], image, CASES[name])
+    found = pullback(cotangents)
+    assert isinstance(found, DeviceGradients)
+    check(found, expected, "image")
+
+
 def test_the_alpha_gets_nothing_of_the_bloom(renderer: Renderer) -> None:
     """Also where the image itself is the source, and cotangents of the bloom go to it directly."""
     image = random_image(9, 14, channels=4, seed=1).astype(np.float32)
@@ -324,6 +396,10 @@ MASKED = (
     PygfxBloom(levels=1, karis_average=True),
     FilamentBloom(resolution=16, levels=1),
     FilamentBloom(resolution=16, levels=1, threshold=0.3),
+    HdrpBloom(),
+    GodotBloom(threshold=0.2, level_weights=(1.0, 0.5, 0, 0, 0, 0, 0)),
+    vkbloom.DarktableBloom(threshold=40.0, blur_size=2.0),
+    BlenderGlare(threshold=0.3, quality="medium"),
 )
 
 

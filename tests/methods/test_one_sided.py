@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 import vkbloom
 from tests.exhaustive import EXHAUSTIVE, some
 from tests.methods.test_adjoint_passes import CASES as METHODS
-from tests.methods.test_adjoint_passes import RARE
 from tests.methods.test_derivatives import BOUNDARIES, CURVED, KERNEL
 from vkbloom import BlenderGlare, GodotBloom, Pyramid, Renderer, Separable, reference
 
@@ -40,7 +39,6 @@ BLENDER_TYPES: tuple[Any, ...] = (
 )
 SETTINGS: tuple[Any, ...] = (
     *METHODS.values(),
-    *RARE,
     *(each.replace(format=None) for each in CURVED.values()),
     *(
         Separable(tonemap=tonemap, encoding=encoding, composite=composite, threshold=0.25, knee=1.0)
