@@ -195,8 +195,9 @@
     INPUT(B, float, base) \
     INPUT(B, float, share)
 
-// The end of Blender's glare (blender_end.frag): one factor for each channel; up to which difference
-// the derivatives count channels as equal, which they are but for the rounding of a convolution.
+// The end of Blender's glare (blender_end.frag): one factor for each channel; up to which
+// difference the derivatives count channels as equal, which they are but for the rounding of a
+// convolution.
 #define BLENDER_END_BLOCK(B, READS, INPUT, VEC4S) \
     SAMPLING_ROWS(B, INPUT) \
     READS(B, saturation) \

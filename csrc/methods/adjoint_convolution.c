@@ -33,8 +33,8 @@ static bool mirror_kernel(const struct vkb_kernel_data *kernel, struct vkb_graph
     return true;
 }
 
-// The first stage of the transform, which reads what is convolved. A copy: adding passes moves those
-// of the graph.
+// The first stage of the transform, which reads what is convolved. A copy: adding passes moves
+// those of the graph.
 static struct vkb_pass_row find_first(const struct vkb_graph *graph)
 {
     uint32_t pass = 0;

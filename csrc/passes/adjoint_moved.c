@@ -91,7 +91,8 @@ static bool accumulate_summed(struct vkb_adjoint *adjoint, const struct vkb_pass
         return vkb_accumulate_cotangent(adjoint, &row, image, error);
     const int held = (int)fmin(fmax(pixels / ((double)sums.width * sums.height), 1.0),
                                fmin(sums.groups, (double)most_across * most_down));
-    const int across = (int)fmin(ceil(sqrt(held)), most_across);
+    const int across =
+        (int)fmin(fmax(ceil(sqrt(held)), ceil((double)held / most_down)), most_across);
     for (int first = 0; first < sums.groups; first += held) {
         const int count = sums.groups - first < held ? sums.groups - first : held;
         const struct vkb_size size = {
