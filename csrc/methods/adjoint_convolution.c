@@ -45,16 +45,23 @@ static struct vkb_pass_row find_first(const struct vkb_graph *graph)
     return graph->passes[pass];
 }
 
-// Accumulates cotangents of what the filter of bright colours makes of the image.
+// Accumulates cotangents of what the filter of bright colours makes of the image. The result of the
+// pass has its size, so that its cotangents, complete, are replaced by those for a moment.
 static bool accumulate_bright(struct vkb_adjoint *adjoint, const struct vkb_pass_row *first,
-                              const struct vkb_pass_row *pass, uint32_t cotangents,
-                              struct vkb_error *error)
+                              const struct vkb_pass_row *pass, const struct vkb_filter *filter,
+                              uint32_t convolved, struct vkb_error *error)
 {
     struct vkb_pass_row row = vkb_slope_row(adjoint, pass, &vkb_shader_adjoint_bright_frag, 1);
+    uint32_t *cotangent = &adjoint->cotangents[pass->targets[0]];
+    const uint32_t kept = *cotangent;
 
+    *cotangent = VKB_NO_IMAGE;
+    if (!vkb_accumulate_filter(adjoint, filter, convolved, pass->targets[0], error))
+        return false;
     row.params = first->params;
     row.reads[0] = first->reads[0];
-    row.reads[1] = cotangents;
+    row.reads[1] = *cotangent;
+    *cotangent = kept;
     return vkb_accumulate_cotangent(adjoint, &row, row.reads[0], error);
 }
 
@@ -103,6 +110,5 @@ bool vkb_transpose_convolution(struct vkb_adjoint *adjoint, const struct vkb_set
     vkb_axis_move(&filter.y, size.height, extended.height, -above);
     if (!first_stage.constants.prefiltered)
         return vkb_accumulate_filter(adjoint, &filter, convolved, glow, error);
-    return (!edge_y || vkb_filter_to_image(adjoint, &filter, convolved, size, &convolved, error))
-        && accumulate_bright(adjoint, &first_stage, pass, convolved, error);
+    return accumulate_bright(adjoint, &first_stage, pass, &filter, convolved, error);
 }

@@ -186,6 +186,22 @@ static bool keeps_cotangents(const struct vkb_adjoint *adjoint, const struct vkb
         && image != adjoint->glow && !vkb_is_given(&adjoint->graph->images[image]);
 }
 
+// A filter whose texels many pixels read, for each of its kernels by itself: along one axis, then
+// along the other one.
+static bool accumulate_kernels(struct vkb_adjoint *adjoint, const struct vkb_filter *filter,
+                               uint32_t cotangents, uint32_t image, struct vkb_error *error)
+{
+    for (uint32_t kernel = 0; kernel < filter->kernels; ++kernel) {
+        struct vkb_filter own = *filter;
+        own.kernels = 1;
+        vkb_axis_take(&own.x, kernel);
+        vkb_axis_take(&own.y, kernel);
+        if (!vkb_accumulate_filter(adjoint, &own, cotangents, image, error))
+            return false;
+    }
+    return true;
+}
+
 // The axes that a filter does not leave as they are.
 static enum vkb_mode direction_of(const struct vkb_filter *filter)
 {
@@ -203,10 +219,15 @@ bool vkb_accumulate_filter(struct vkb_adjoint *adjoint, const struct vkb_filter 
         return true;
     }
     const enum vkb_mode direction = direction_of(filter);
+    const bool reads_many =
+        direction == DIRECTION_BOTH
+        && vkb_axis_readers(&filter->x) * vkb_axis_readers(&filter->y) > MAX_IN_ONE_PASS;
 
-    if (direction == DIRECTION_BOTH && filter->kernels == 1
-        && vkb_axis_readers(&filter->x) * vkb_axis_readers(&filter->y) > MAX_IN_ONE_PASS)
+    if (reads_many && filter->kernels == 1)
         return accumulate_twice(adjoint, filter, cotangents, image, error);
+    // Those of an image that is enlarged are read together.
+    if (reads_many && filter->x.step >= 1.0 && filter->y.step >= 1.0)
+        return accumulate_kernels(adjoint, filter, cotangents, image, error);
     return accumulate_along(adjoint, filter, direction, cotangents, image, error);
 }
 

@@ -18,7 +18,8 @@ struct gathering {
     struct vkb_size size;
     double centre_x, centre_y, of_row;
     const struct flare *flare;  // or
-    double most, parts;         // of sun beams: the distance of a sample; the parts of its pixels
+    // Of sun beams: how far a sample is from its pixel, and beyond the sun, at most.
+    double most, beyond;
 };
 
 // The values of SUMMED_ROWS, and how many groups there are at all.
@@ -216,7 +217,7 @@ static double beam_iterations(const struct gathering *gathering, double distance
     const double across = outer * SAMPLED_WIDTH / 2.0 / distance + 1.0;
     const double rows = fmin(3.0 * across + outer + 2.0, height);
 
-    return gathering->parts * (8.0 * rows + across * outer / 2.0);
+    return (distance > gathering->beyond ? 1.0 : 2.0) * (8.0 * rows + across * outer / 2.0);
 }
 
 bool vkb_transpose_sun_beams(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
@@ -226,14 +227,15 @@ bool vkb_transpose_sun_beams(struct vkb_adjoint *adjoint, const struct vkb_pass_
     const struct vkb_image_row *image = &adjoint->graph->images[source];
     const struct vkb_sun_beams_params *params = &pass->params.sun_beams;
     const double left = params->left;
+    const double beyond = left >= 1.0 ? 0.0 : left > 0.0 ? 2.0 / left : 2.0;
     const struct gathering gathering = {
         .iterations = beam_iterations,
         .size = {image->width, image->height},
         .centre_x = params->sun_x * (double)image->width - 0.5,
         .centre_y = params->sun_y * (double)image->height - 0.5,
         .of_row = image->width / 4.0 + 14.0,
-        .most = params->most + 2.0 + (left > 0.0 && left < 1.0 ? 2.0 / left : 0.0),
-        .parts = left < 1.0 ? 2.0 : 1.0,
+        .most = left > 0.0 ? params->most + 2.0 + beyond : 4.0,
+        .beyond = beyond + 2.0,
     };
     struct vkb_pass_row row = vkb_adjoint_row(&vkb_shader_adjoint_beam_means_frag, &cotangents, 1);
     uint32_t sums;

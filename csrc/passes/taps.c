@@ -40,6 +40,17 @@ void vkb_axis_set(struct vkb_axis *axis, const struct vkb_tap *taps, uint32_t co
     axis->count = count;
 }
 
+void vkb_axis_take(struct vkb_axis *axis, uint32_t kernel)
+{
+    uint32_t count = 0;
+
+    for (uint32_t i = 0; i < axis->count; ++i)
+        if (axis->taps[i].weights[kernel] != 0.0)
+            axis->taps[count++] = (struct vkb_tap){.offset = axis->taps[i].offset,
+                                                   .weights = {axis->taps[i].weights[kernel]}};
+    axis->count = count;
+}
+
 void vkb_filter_next(struct vkb_filter *filter, const float next[4])
 {
     filter->x.next = (uint32_t)next[0];
@@ -62,8 +73,14 @@ double vkb_axis_readers(const struct vkb_axis *axis)
         low = fmin(low, axis->taps[i].offset);
         high = fmax(high, axis->taps[i].offset);
     }
+    // Of pixels beyond an edge that is repeated, all read the outermost texel.
+    const double end = axis->origin + axis->step * (axis->to - 1.0) + high - (axis->from - 1.0);
+    const double beyond =
+        axis->border == VKB_BORDER_ZERO ? 0.0 : fmax(-(axis->origin + low), end) / axis->step;
     const double apart = axis->border >= VKB_BORDER_LAST ? axis->step : 1.0;
-    return ((high - low) * apart + (axis->kind == UPSAMPLE_CUBIC ? 4.0 : 2.0)) / fabs(axis->step);
+    return fmax(((high - low) * apart + (axis->kind == UPSAMPLE_CUBIC ? 4.0 : 2.0))
+                    / fabs(axis->step),
+                beyond);
 }
 
 // The texels from `first` on that a pixel samples with a tap, and their shares.

@@ -61,6 +61,9 @@ void vkb_axis_move(struct vkb_axis *axis, uint32_t from, uint32_t to, double ori
 // Replaces the taps of an axis.
 void vkb_axis_set(struct vkb_axis *axis, const struct vkb_tap *taps, uint32_t count);
 
+// Leaves the taps of one kernel, as the only one.
+void vkb_axis_take(struct vkb_axis *axis, uint32_t kernel);
+
 // Lets both axes read the next texels of these bits (shaders/lib/sampling.glsl). Rows are counted
 // from the bottom.
 void vkb_filter_next(struct vkb_filter *filter, const float next[4]);

@@ -67,16 +67,15 @@ vec4 share_for(ivec2 pixel, Part part, ivec2 texel)
 vec4 gather(ivec2 texel, int first_row, int last_row)
 {
     vec2 here = vec2(texel) - CENTRE, around = distances_around(here);
-    // How far away a pixel may be from its samples.
-    float most = float(params.most) + 2.0;
-    if (IS_JITTERED)
-        most += params.left > 0.0 ? 2.0 / params.left : 0.0;
+    // How far away a pixel may be from its samples, and these from the sun, beyond it.
+    float beyond = !IS_JITTERED ? 0.0 : params.left > 0.0 ? 2.0 / params.left : 2.0;
+    float most = params.left > 0.0 ? float(params.most) + 2.0 + beyond : 4.0;
     bool both = length(here) <= 2.0;
     vec4 sum = vec4(0.0);
     for (float facing = both ? 0.0 : -1.0; facing <= (both ? 0.0 : 1.0); facing += 2.0) {
         vec2 radii = vec2(facing > 0.0 ? around.x : 0.0, around.y + most) + vec2(-MARGIN, MARGIN);
         if (facing < 0.0)
-            radii.y = IS_JITTERED ? most - around.x + MARGIN : -1.0;
+            radii.y = IS_JITTERED && around.x <= beyond + 2.0 ? most - around.x + MARGIN : -1.0;
         sum += gather_part(Part(0.0, 1.0, facing), texel, radii, first_row, last_row);
     }
     return sum;
