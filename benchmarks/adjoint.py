@@ -45,6 +45,9 @@ SETTINGS: Final[dict[str, vkbloom.Settings]] = {
     "KinoBloom": vkbloom.KinoBloom(),
     "UrpBloom": vkbloom.presets["unity_urp"],
     "ThreeBloom": vkbloom.presets["threejs_unreal"],
+    "HdrpBloom": vkbloom.presets["unity_hdrp"],
+    "GodotBloom": vkbloom.presets["godot_4_6"],
+    "BlenderGlare": vkbloom.presets["blender_bloom"],
 }
 #: The most that a pullback may cost, times the framebuffer.
 MOST: Final = 2.5

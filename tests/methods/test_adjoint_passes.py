@@ -239,6 +239,18 @@ def test_all_methods_and_stages_are_among_them() -> None:
     assert stages == {*_core.STAGES}
 
 
+@pytest.mark.parametrize("size", [(41, 9), (9, 47)])
+@pytest.mark.parametrize("type", ["bloom", "streaks"])
+def test_blender_5_2_reads_the_next_texels(renderer: Renderer, size: Any, type: Any) -> None:
+    """Where its positions are rounded, at sides of these lengths."""
+    image = random_image(*size, channels=3, seed=1).astype(np.float32)
+    settings = BlenderGlare(type=type, version="5.2", threshold=0.3, streaks=2)
+    pullback, cotangents, expected = pulled(renderer, image, settings)
+    other = pulled(renderer, image, settings.replace(version="5.0"))[2]["image"]
+    check(pullback(cotangents), expected, "image")
+    assert np.abs(other - expected["image"]).max() > 0.1
+
+
 @pytest.mark.parametrize(
     ("settings", "name", "passes"),
     [
