@@ -215,6 +215,41 @@ class TestFramebuffers:
         done(path, tmp_path / "b.png", *words.split())
         assert {file.name for file in tmp_path.iterdir()} == {"a.png", "b.png", *more}
 
+    @pytest.mark.parametrize("names", ["bloom", "all"])
+    def test_no_image_of_the_call_is_replaced(self, tmp_path: Path, names: str) -> None:
+        image = lights(20, 30, 3, dtype="float16")
+        path = vkbloom.write(tmp_path / "a_bloom.exr", image)
+        failed = run(path, tmp_path / "a.exr", "--framebuffers", names)
+        assert failed.exit_code
+        assert f"{path}: bloom would replace this file, which IN or OUT names" in failed.stderr
+        assert np.array_equal(pixels(path), image)
+        # The framebuffer of a.exr would be the picture of a_bloom.exr.
+        out = tmp_path / "out"
+        vkbloom.write(tmp_path / "a.exr", image)
+        failed = run(tmp_path, out, "--framebuffers", names)
+        assert failed.exit_code == 1
+        assert "1 of 2 images failed" in failed.stderr
+        assert pixels(out / "a_bloom.exr").shape[2] == 3
+        # Two images with one stem.
+        png(tmp_path / "a.png", lights(20, 30, 3, dtype="uint8"))
+        refused = run(tmp_path, tmp_path / "new", "--framebuffers", names)
+        assert refused.exit_code == 2
+        assert f"a.png: its framebuffers would replace those of {tmp_path}/new/a.exr" in (
+            refused.stderr
+        )
+
+    def test_a_picture_of_another_program_stays(self, tmp_path: Path) -> None:
+        path = png(tmp_path / "a.png", lights(20, 30, 3, dtype="uint8"))
+        image = lights(20, 30, 3, dtype="float16")
+        other = vkbloom.write(tmp_path / "b_glow.exr", image, metadata={"Software": "a camera"})
+        failed = run(path, tmp_path / "b.png", "--framebuffers", "glow")
+        assert failed.exit_code
+        assert "give --overwrite" in failed.stderr
+        assert np.array_equal(pixels(other), image)
+        for words in (["--overwrite"], []):
+            done(path, tmp_path / "b.png", "--framebuffers", "glow", *words)
+        assert not np.array_equal(pixels(other), image)
+
 
 class TestPicturesOfOthers:
     """OUT as the last word replaces only what vkbloom wrote: it may be the second of two INs."""

@@ -8,7 +8,7 @@ import functools
 import os
 import shutil
 import tempfile
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any, Final, TypeAlias
@@ -108,13 +108,19 @@ def beside(target: Path, name: str) -> Path:
 
 @dataclasses.dataclass(kw_only=True, eq=False)
 class Run:
-    """The files of one call; `failures` has the errors of a batch by the file that was read."""
+    """The files of one call; `failures` has the errors of a batch by the file that was read.
+
+    `kept`: absolute names of files that no framebuffer may replace. `is_careful`: nor may it
+    replace a picture of another program.
+    """
 
     options: Options
     out: str
     folder: Path
     renderer: Callable[[], vkbloom.Renderer]
     several: bool
+    kept: Collection[str]
+    is_careful: bool
     failures: dict[str, Exception] = dataclasses.field(default_factory=dict)
 
     @contextlib.contextmanager
@@ -157,8 +163,25 @@ class Run:
                     frames = renderer.apply(picture.pixels, settings, **glow, framebuffers=wanted)
                 self._tell(pair, picture, frames, expand)
                 kept = no_bloom.only(frames, self.options.names)
+                self._check_beside(pair[1], kept)
                 texts: list[str] = []
                 yield texts, functools.partial(self._write, pair, picture, kept, expand, texts)
+
+    def _check_beside(self, target: str, names: Iterable[str]) -> None:
+        """Raise ValueError if a framebuffer beside OUT would replace another file of this call."""
+        for name in names:
+            file = beside(Path(target), name)
+            # Its own extension, or that of a format that holds all values.
+            for one in [] if name == "final" else (file, file.with_suffix(".exr")):
+                if os.path.abspath(one) in self.kept:
+                    raise ValueError(
+                        f"{one}: {name} would replace this file, which IN or OUT names"
+                    )
+                if self.is_careful and one.is_file() and safe_writing.is_of_another_program(one):
+                    raise ValueError(
+                        f"{one}: is a picture that vkbloom did not write; to replace it by {name}, "
+                        "give --overwrite"
+                    )
 
     def _tell(
         self, pair: Pair, picture: Picture, frames: vkbloom.Frames, expand: float | None
@@ -362,7 +385,13 @@ def command(*, sources: tuple[str, ...], out: str | None, adapter: str, **given:
 
         several = len(work) > 1
         run = Run(
-            options=options, out=target, folder=Path(folder), renderer=renderer, several=several
+            options=options,
+            out=target,
+            folder=Path(folder),
+            renderer=renderer,
+            several=several,
+            kept=_kept_files(options, work),
+            is_careful=not (several or out is not None or options.overwrite),
         )
         run.sequence(work)
     written = [target for name, target in work if name not in run.failures]
@@ -392,6 +421,8 @@ def _planned(options: Options, sources: list[str], out: str, *, is_named: bool) 
     if is_stream(out) and options.names != ["final"]:
         raise click.UsageError("a pipe takes only final; leave out --framebuffers")
     work = pairs(sources, out)
+    if options.names != ["final"]:
+        _check_stems(work)
     settings, _ = options.start.of_file(work[0][0])
     _check_colours(settings, options)
     if options.skip_existing:
@@ -427,6 +458,26 @@ def _is_done(pair: Pair, options: Options) -> bool:
     if not safe_writing.is_picture(file):
         note(f"{target}: is left as it is, though it is no image")
     return True
+
+
+def _kept_files(options: Options, work: Sequence[Pair]) -> set[str]:
+    """Return absolute names of files that no framebuffer may replace."""
+    names = {target for _, target in work if not is_stream(target)}
+    if not options.overwrite:
+        names |= {source for source, _ in work if not is_stream(source)}
+    return {os.path.abspath(name) for name in names}
+
+
+def _check_stems(work: Sequence[Pair]) -> None:
+    """Raise click.UsageError if framebuffers of two images would have the same files."""
+    known: dict[str, str] = {}
+    for _, target in work:
+        other = known.setdefault(os.path.splitext(target)[0], target)
+        if other != target:
+            raise click.UsageError(
+                f"{target}: its framebuffers would replace those of {other}; use a pattern such as "
+                "f.%04d.png as OUT"
+            )
 
 
 def _check_own(source: str, out: str) -> None:
