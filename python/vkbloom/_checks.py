@@ -168,7 +168,7 @@ def check_image(image: object, name: str = "image") -> NDArray[Any]:
 
     Anything that NumPy can view is an image: arrays, ``__array__``, the buffer protocol, DLPack on
     the CPU, and an xarray.DataArray with the dimensions y, x and channel in any order. float64
-    becomes float32.
+    becomes float32, and finite values beyond it the largest one.
     """
     mode = _pil_mode(image)
     if mode in _MODE_HINTS:
@@ -178,7 +178,7 @@ def check_image(image: object, name: str = "image") -> NDArray[Any]:
         )
     array = view_image(image, name)
     if array.dtype.name == "float64":  # in any byte order
-        array = array.astype(np.float32)
+        array = _single(array)
     if array.dtype not in _DTYPES:
         if array.dtype.name not in ("uint8", "float16", "float32"):
             hint = _DTYPE_HINTS.get(array.dtype.name, "")
@@ -192,6 +192,16 @@ def check_image(image: object, name: str = "image") -> NDArray[Any]:
             + _shape_hint(array.shape)
         )
     return array
+
+
+def _single(array: NDArray[np.float64]) -> NDArray[np.float32]:
+    """Return float32; finite values beyond its range saturate, since infinity does not glow."""
+    with np.errstate(over="ignore"):
+        made = array.astype(np.float32)
+    is_over = np.isinf(made) & np.isfinite(array)
+    if is_over.any():
+        made[is_over] = np.copysign(np.finfo(np.float32).max, made[is_over])
+    return made
 
 
 def native_order(array: NDArray[Any]) -> NDArray[Any]:

@@ -222,6 +222,7 @@ class TestFaintBlooms:
         [
             ("a.png", ("--preset", "blender_streaks"), "lower --threshold, or --expand 8"),
             ("a.png", ("--preset", "blender_streaks", "--expand", "8"), ""),
+            ("a.png", ("--preset", "blender_streaks", "--expand", "1"), "or --expand 8"),
             ("a.png", ("--preset", "blender_streaks", "--expand", "1.2"), "or --expand 2.4"),
             ("a.exr", ("--preset", "kino", "--intensity", "0.002"), "light: lower --threshold\n"),
             ("a.png", ("--preset", "bevy_natural"), ""),

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -189,6 +190,18 @@ def test_values_under_a_mask_are_refused(renderer: Renderer, in_folder: None, ca
     hidden = np.ma.array(array, mask=np.indices(array.shape)[0] == 1)
     with pytest.raises(ValueError, match=r"some values are masked; fill them first"):
         CALLS[call](renderer, array, hidden)
+
+
+def test_doubles_beyond_floats_are_the_largest_float(renderer: Renderer) -> None:
+    """NumPy's conversion makes infinity, which does not glow, and prints a warning."""
+    largest = float(np.finfo(np.float32).max)
+    image = np.where(np.indices(PLAIN.shape)[0] == 1, 1e39, PLAIN.astype(np.float64))
+    image[0, 0, 0] = -np.inf
+    expected = np.where(np.isinf(image), -np.inf, np.minimum(image, largest)).astype(np.float32)
+    plain = replace(SETTINGS, bloom=False)
+    made = renderer.apply(image, plain)["final"]
+    assert_array_equal(made, renderer.apply(expected, plain)["final"])
+    assert made[1, 1, 1] == np.float32(largest)
 
 
 #: What is no image and no mask, whatever NumPy makes of it.

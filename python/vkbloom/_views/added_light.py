@@ -39,7 +39,7 @@ def faint_note(
     if settings.threshold:
         remedies.append(f"lower {option.format('threshold')}")
     if can_expand:
-        larger = _EXPANDED if expand is None else _MORE * expand
+        larger = _EXPANDED if expand is None or expand == 1 else _MORE * expand
         remedies.append(f"{option.format('expand')} {larger:g}")
     if not remedies:
         remedies.append(f"raise {option.format('intensity')}")
