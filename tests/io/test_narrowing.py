@@ -44,6 +44,8 @@ PNG_NOTE = "has integers: NaN is written as 0, infinity as 1"
         ("a.hdr", "float64", None, ([1e300, -INF, 2], [MAX_RADIANCE, 0, 2], HDR_NOTE)),
         ("a.hdr", "float16", None, ([INF, 1], [MAX_RADIANCE, 1], HDR_NOTE)),
         ("a.hdr", "float32", None, ([1e38, 65504], [1e38, 65504], None)),
+        ("a.hdr", "float32", None, ([-0.3, -1e38, 0.5], [0, 0, 0.5], "negative values are")),
+        ("a.hdr", "float16", None, ([-0.05, 2, 3], [0, 2, 3], "HDR: negative values are")),
         ("a.png", "float32", None, ([INF, -INF, NAN, 1], [1, 0, 0, 1], PNG_NOTE)),
         ("a.png", "float64", 16, ([1e300, 5, -1], [1, 1, 0], None)),
     ],

@@ -33,10 +33,14 @@ def saturated(made: NDArray[Any], was_finite: NDArray[np.bool_]) -> NDArray[Any]
 
 
 def for_radiance(values: NDArray[Any]) -> NDArray[Any]:
-    """Return floats as Radiance HDR holds them, whose writer makes infinity and NaN 0."""
+    """Return floats as Radiance HDR holds them.
+
+    OpenImageIO's writer makes infinity and NaN 0, and of negative numbers, which the format does
+    not have, others: 0.7 of -0.3.
+    """
     single = narrowed(values, np.dtype(np.float32))
     made: NDArray[Any] = np.nan_to_num(single, nan=0.0, posinf=MAX_RADIANCE, neginf=0.0)
-    np.minimum(made, np.float32(MAX_RADIANCE), out=made)
+    np.clip(made, 0, np.float32(MAX_RADIANCE), out=made)
     return made
 
 
@@ -63,12 +67,15 @@ def file_note(values: NDArray[Any], dtype: np.dtype[Any], kind: str) -> str | No
     if kind == "hdr":
         limit = values.dtype.type(min(MAX_RADIANCE, float(np.finfo(values.dtype).max)))
         # (NaN is not below the limit, either.)
-        if (np.abs(values) <= limit).all():
-            return None
-        return (
-            "is Radiance HDR: NaN is written as 0, infinity and what is beyond as its largest "
-            f"number, {MAX_RADIANCE:.3g}"
-        )
+        said = []
+        if not (np.abs(values) <= limit).all():
+            said.append(
+                "NaN is written as 0, infinity and what is beyond as its largest number, "
+                f"{MAX_RADIANCE:.3g}"
+            )
+        if (values < 0).any():
+            said.append("negative values are written as 0")
+        return f"is Radiance HDR: {'; '.join(said)}" if said else None
     note = narrowing_note(values, dtype)
     return None if note is None else f"has numbers of {8 * dtype.itemsize} bits: {note}"
 
