@@ -29,6 +29,7 @@ from vkbloom._cli.image_files import (
     note_hidden,
     read_picture,
     reading_options,
+    silenced,
 )
 from vkbloom._cli.program import adapter_option, as_wrong_use, described
 from vkbloom._cli.sequences import PIPE, check_targets, is_stream, pairs, shown
@@ -449,13 +450,17 @@ def _is_done(pair: Pair, options: Options) -> bool:
     if names == "all":
         # Those of a method are known when it is planned; every bloom has this one.
         names = ["final", "bloom"] if options.start.of_file(source)[0].bloom else ["final"]
-    for beside_it in (beside(file, name) for name in names if name != "final"):
-        there = [one for one in (beside_it, beside_it.with_suffix(".exr")) if one.is_file()]
-        if not there or safe_writing.is_damaged(there[0]):
+    others = [beside(file, name) for name in names if name != "final"]
+    # libpng prints what is wrong with a damaged file.
+    with silenced():
+        for other in others:
+            there = [one for one in (other, other.with_suffix(".exr")) if one.is_file()]
+            if not there or safe_writing.is_damaged(there[0]):
+                return False
+        if safe_writing.is_damaged(file):
             return False
-    if safe_writing.is_damaged(file):
-        return False
-    if not safe_writing.is_picture(file):
+        is_picture = safe_writing.is_picture(file)
+    if not is_picture:
         note(f"{target}: is left as it is, though it is no image")
     return True
 
@@ -487,7 +492,9 @@ def _check_own(source: str, out: str) -> None:
     """
     if not os.path.isfile(out) or (os.path.isfile(source) and os.path.samefile(source, out)):
         return
-    if safe_writing.is_of_another_program(Path(out)):
+    with silenced():
+        is_of_another = safe_writing.is_of_another_program(Path(out))
+    if is_of_another:
         raise click.UsageError(
             f"{out}: is a picture that vkbloom did not write; to replace it, give it as -o {out}, "
             "or --overwrite; to add bloom to it as well, name a folder as OUT"
