@@ -10,7 +10,6 @@ import importlib
 import math
 import operator
 import signal
-import sys
 import threading
 from collections.abc import Iterable, Mapping, Sequence, Set
 from types import ModuleType
@@ -44,8 +43,9 @@ _MODE_HINTS = {
 
 def import_extra(package: str, extra: str, purpose: str) -> ModuleType:
     """Import a package that one of vkbloom's extras installs."""
+    # Not the module of sys.modules as it is: another thread may just import it.
     try:
-        return sys.modules.get(package) or _imported(package)
+        return _imported(package)
     except ModuleNotFoundError as error:
         raise ModuleNotFoundError(
             f"{purpose} needs {package}: pip install vkbloom[{extra}]", name=error.name

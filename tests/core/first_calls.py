@@ -63,6 +63,11 @@ def load_method(index: int) -> Any:
     return kind, made(gain=3), vkbloom.Settings.from_dict({"method": "gained", "gain": 3})
 
 
+def to_xarray(index: int) -> Any:
+    """Give a result to a package that vkbloom imports when it is needed."""
+    return vkbloom.apply(np.zeros((8, 8, 3), np.float32)).to_xarray()["final"].shape
+
+
 def names(index: int) -> Any:
     """Look up all public names, in another order in each thread."""
     modules = (vkbloom, vkbloom.psf, vkbloom.reference, vkbloom.testing)
@@ -79,7 +84,7 @@ def shuffled(names: list[str], seed: int) -> list[str]:
 
 
 CALLS: Final[dict[str, Callable[[int], Any]]] = {
-    call.__name__: call for call in (apply, render, presets, glares, load_method, names)
+    call.__name__: call for call in (apply, render, presets, glares, load_method, to_xarray, names)
 }
 
 

@@ -82,8 +82,9 @@ def _is_watched() -> bool:
     """Return whether standard error is a terminal, or this process a notebook's kernel."""
     if sys.stderr is not None and sys.stderr.isatty():
         return True
-    kernel = sys.modules.get("IPython")
-    shell = kernel.get_ipython() if kernel else None
+    # It may just be imported by another thread.
+    get_ipython = getattr(sys.modules.get("IPython"), "get_ipython", None)
+    shell = get_ipython() if get_ipython else None
     return shell is not None and "IPKernelApp" in shell.config
 
 

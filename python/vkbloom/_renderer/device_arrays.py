@@ -208,10 +208,12 @@ def _require_no_capture() -> None:
     Memory of arrays is used again when all streams have done their work, which CUDA tells of no
     context that captures. It does not tell of captures either.
     """
-    torch = sys.modules.get("torch")
-    if torch is None or not torch.cuda.is_initialized():
+    cuda = sys.modules.get("torch.cuda")
+    # Another thread may just import it.
+    is_initialized = getattr(cuda, "is_initialized", None)
+    if cuda is None or is_initialized is None or not is_initialized():
         return
-    if torch.cuda.is_current_stream_capturing():
+    if cuda.is_current_stream_capturing():
         raise _core.Error(
             "CUDA graph: PyTorch's stream is being captured, and the renderer's work cannot be "
             "recorded; make the call before or after torch.cuda.graph"
