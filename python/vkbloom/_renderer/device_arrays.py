@@ -208,8 +208,8 @@ def _require_no_capture() -> None:
     Memory of arrays is used again when all streams have done their work, which CUDA tells of no
     context that captures. It does not tell of captures either.
     """
-    cuda = sys.modules.get("torch.cuda")
-    # Another thread may just import it.
+    # Another thread may just import it: then parts of it are not there, and nothing is captured.
+    cuda = getattr(sys.modules.get("torch"), "cuda", None)
     is_initialized = getattr(cuda, "is_initialized", None)
     if cuda is None or is_initialized is None or not is_initialized():
         return
