@@ -119,6 +119,7 @@ import vkbloom
 from tests.planned import MESH
 from vkbloom import _array_cache as array_cache
 from vkbloom import _locks as locks
+from vkbloom._gradients.passes import DeviceGradients
 from vkbloom._renderer.requests import PendingSubmission
 warnings.simplefilter("ignore")
 image = np.ones((8, 8, 3), np.float32)
@@ -126,9 +127,11 @@ settings = vkbloom.Convolution(vkbloom.psf.gaussian(2))
 renderer = vkbloom.Renderer()
 renderer.apply(image, settings)
 pending = PendingSubmission(types.SimpleNamespace(wait=lambda: ([], ())))
+gradients = DeviceGradients({}, ("exposure",), lambda: {"exposure": image}, dict)
 held = [*(one._lock for one in locks._locks), *(one.lock for one in locks._properties)]
 assert len(held) >= 3
-holder = threading.Thread(target=lambda: [one.acquire() for one in held])
+enter = [gradients._lock.__enter__, *(one.acquire for one in held)]
+holder = threading.Thread(target=lambda: [one() for one in enter])
 holder.start()
 holder.join()
 child = os.fork()
@@ -138,6 +141,7 @@ if child == 0:
     array_cache.shared().find(1)
     pending.complete()
     assert MESH.packed.shape == (3, 3, 4)
+    assert gradients["exposure"] is image
     print(vkbloom.apply(image, settings)["final"].shape, flush=True)
     os._exit(0)
 os._exit(os.waitpid(child, 0)[1])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final, cast
@@ -11,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom import _core
+from vkbloom._locks import ProcessLock
 from vkbloom._renderer import requests
 from vkbloom._renderer.device_arrays import Destination, ImportedArray, placed
 from vkbloom._renderer.renderer import Renderer
@@ -172,7 +172,7 @@ class DeviceGradients(Mapping[str, NDArray[Any]]):
         self._known = dict(known)
         self._names = tuple(names)
         self._sources = [fields, every]
-        self._lock = threading.Lock()
+        self._lock = ProcessLock()
 
     def __getitem__(self, name: str) -> NDArray[Any]:
         check_known(name, self._names)
