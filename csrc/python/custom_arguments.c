@@ -52,6 +52,42 @@ PyObject *vkb_resource_owner(PyObject *module, PyObject *unused)
     return capsule;
 }
 
+// The bytes of a texel of a texture's format; 0: textures have no such format.
+static uint32_t texel_size(uint32_t format)
+{
+    static const struct {
+        uint32_t first, last, size;
+    } rows[] = {
+        {VK_FORMAT_R8_UNORM, VK_FORMAT_R8_SINT, 1},
+        {VK_FORMAT_R8G8_UNORM, VK_FORMAT_R8G8_SINT, 2},
+        {VK_FORMAT_R8G8B8A8_UNORM, VK_FORMAT_R8G8B8A8_SINT, 4},
+        {VK_FORMAT_R16_UNORM, VK_FORMAT_R16_SFLOAT, 2},
+        {VK_FORMAT_R16G16_UNORM, VK_FORMAT_R16G16_SFLOAT, 4},
+        {VK_FORMAT_R16G16B16A16_UNORM, VK_FORMAT_R16G16B16A16_SFLOAT, 8},
+        {VK_FORMAT_R32_UINT, VK_FORMAT_R32_SFLOAT, 4},
+        {VK_FORMAT_R32G32_UINT, VK_FORMAT_R32G32_SFLOAT, 8},
+        {VK_FORMAT_R32G32B32A32_UINT, VK_FORMAT_R32G32B32A32_SFLOAT, 16},
+    };
+
+    for (size_t i = 0; i < sizeof rows / sizeof rows[0]; ++i)
+        if (format >= rows[i].first && format <= rows[i].last)
+            return rows[i].size;
+    return 0;
+}
+
+// Divides, since products of the sides may not fit.
+static bool has_texels(const struct vkb_resource *resource)
+{
+    const uint32_t width = resource->width, height = resource->height,
+                   texel = texel_size(resource->format);
+
+    if (texel == 0 || width == 0 || height == 0 || resource->size % texel)
+        return false;
+    const uint64_t texels = resource->size / texel;
+    return texels % width == 0 && texels / width % height == 0
+        && texels / width / height == resource->depth;
+}
+
 static bool check_resource(const struct vkb_resource *resource, PyObject *data)
 {
     const bool image = resource->kind < VKB_RESOURCE_KINDS && vkb_resource_is_image(resource);
@@ -62,15 +98,14 @@ static bool check_resource(const struct vkb_resource *resource, PyObject *data)
     if (resource->serial == 0 || resource->size == 0)
         return vkb_refuse("passes: the serial and the size of a resource must be at least 1");
     if (image
-        && (resource->dimensions - 1 > 2 || !resource->width || !resource->height
-            || !resource->depth
-            || resource->border > VK_SAMPLER_ADDRESS_MODE_CLAMP_TO_EDGE
-            // A texel has at most 16 bytes, and at least one.
-            || resource->size / resource->width / resource->height / resource->depth - 1 > 15))
-        return vkb_refuse("passes: a texture of %u x %u x %u in %u dimensions with %llu bytes is "
-                          "none",
+        && (resource->dimensions - 1 > 2 || !has_texels(resource)
+            || (resource->dimensions < 2 && resource->height > 1)
+            || (resource->dimensions < 3 && resource->depth > 1)
+            || resource->border > VK_SAMPLER_ADDRESS_MODE_CLAMP_TO_EDGE))
+        return vkb_refuse("passes: a texture of %u x %u x %u in %u dimensions with %llu bytes of "
+                          "the VkFormat %u is none",
                           resource->width, resource->height, resource->depth, resource->dimensions,
-                          (unsigned long long)resource->size);
+                          (unsigned long long)resource->size, resource->format);
     return data == Py_None || (uint64_t)PyBytes_Size(data) == resource->size
         || vkb_refuse("passes: a resource has %zd bytes, and its block says %llu",
                       PyBytes_Size(data), (unsigned long long)resource->size);
