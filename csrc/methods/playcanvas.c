@@ -5,20 +5,29 @@
 
 #include <math.h>
 
+// Only the format of the buffers limits values from above.
+static struct vkb_pass_row groups_row(const struct vkb_levels *levels, uint32_t from, uint32_t to)
+{
+    struct vkb_pass_row row = vkb_groups_row(levels, GROUPS_URP, from, to);
+
+    row.params.prefilter.clamp_max = (float)SINGLE_LIMIT;
+    return row;
+}
+
 // The half of the frame without negative values, then the first level, to which the threshold is
 // applied.
 static void add_first(struct vkb_levels *levels)
 {
     const struct vkb_size half_size = vkb_halved(levels->source->buffers);
     const uint32_t half = vkb_levels_image(levels, "half", 0, half_size);
-    struct vkb_pass_row row = vkb_groups_row(levels, GROUPS_URP, levels->source->glow, half);
+    struct vkb_pass_row row = groups_row(levels, levels->source->glow, half);
 
     row.constants.thresholded = false;
     row.constants.clamped = true;
     vkb_levels_pass(levels, &row);
     const uint32_t step = vkb_levels_step(levels, "reduced", 0, levels->sizes[0]);
     vkb_levels_reduce(levels, 1.0, 1.0, half, step);
-    row = vkb_groups_row(levels, GROUPS_URP, step, vkb_levels_down(levels, 0));
+    row = groups_row(levels, step, vkb_levels_down(levels, 0));
     vkb_levels_masked(levels, &row);
 }
 

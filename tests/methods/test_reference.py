@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 import vkbloom
 from tests.images import random_image
+from tests.methods.cases import presets_of_low_levels
 from vkbloom import Pyramid, Renderer, Separable, presets, psf, reference
 
 IMAGE = random_image(12, 16, 3)
@@ -127,3 +128,17 @@ def test_names_where_a_renderer_searches(renderer: Renderer) -> None:
             renderer=renderer,
         )
     )
+
+
+@pytest.mark.parametrize("value", [1e5, 1e10])
+def test_no_method_limits_what_buffers_of_single_floats_hold(
+    renderer: Renderer, value: float
+) -> None:
+    """Unless the reference does so; a transform's error is relative to its largest value."""
+    image = np.zeros((15, 22, 4), np.float32)
+    image[6:8, 9:12] = value
+    for name, preset in presets_of_low_levels(22).items():
+        settings = preset.replace(format="rgba32float", dither=False, tonemap="none")
+        got, expected = renderer.apply(image, settings)["bloom"], reference.apply(image, settings)
+        limit = 1e-5 * max(np.abs(expected["bloom"]).max(), 1)
+        assert np.abs(got - expected["bloom"]).max() < limit, name

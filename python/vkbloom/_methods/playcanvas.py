@@ -48,6 +48,5 @@ class PlayCanvasBloom(PublishedSettings):
         return {
             "threshold": self.threshold or None,
             "knee": 0.5,
-            "clamp_max": 65504.0,
             "levels": self.blur_level,
         }
