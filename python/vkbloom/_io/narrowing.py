@@ -66,16 +66,13 @@ def file_note(values: NDArray[Any], dtype: np.dtype[Any], kind: str) -> str | No
         return "has integers: NaN is written as 0, infinity as 1" if is_lossy else None
     if kind == "hdr":
         limit = values.dtype.type(min(MAX_RADIANCE, float(np.finfo(values.dtype).max)))
-        # (NaN is not below the limit, either.)
-        said = []
-        if not (np.abs(values) <= limit).all():
-            said.append(
-                "NaN is written as 0, infinity and what is beyond as its largest number, "
-                f"{MAX_RADIANCE:.3g}"
-            )
-        if (values < 0).any():
-            said.append("negative values are written as 0")
-        return f"is Radiance HDR: {'; '.join(said)}" if said else None
+        # (NaN is not below the limit, either. Negative values are clipped as in files of integers.)
+        if (np.abs(values) <= limit).all():
+            return None
+        return (
+            "is Radiance HDR: NaN is written as 0, infinity and what is beyond as its largest "
+            f"number, {MAX_RADIANCE:.3g}"
+        )
     note = narrowing_note(values, dtype)
     return None if note is None else f"has numbers of {8 * dtype.itemsize} bits: {note}"
 
