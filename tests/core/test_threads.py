@@ -29,6 +29,9 @@ def test_sixteen_threads_in_random_order(software: AdapterInfo) -> None:
 @pytest.mark.parametrize("call", first_calls.CALLS)
 def test_first_calls_in_threads(software: AdapterInfo, call: str) -> None:
     """Whatever a process makes at its first use is complete before another thread sees it."""
+    if call == "to_xarray":
+        # `make freethreaded` has none.
+        pytest.importorskip("xarray", reason="xarray is not installed: pip install vkbloom[grid]")
     for _ in range(50 if EXHAUSTIVE else 1):
         output("-W", "error", "-m", "tests.core.first_calls", call, cwd=ROOT)
 
