@@ -32,6 +32,10 @@ def test_first_calls_in_threads(software: AdapterInfo, call: str) -> None:
     if call == "to_xarray":
         # `make freethreaded` has none.
         pytest.importorskip("xarray", reason="xarray is not installed: pip install vkbloom[grid]")
+    if call == "names" and not getattr(sys, "_is_gil_enabled", lambda: True)():
+        # `importlib._bootstrap._load_unlocked` ends with a `pop` from `sys.modules`: a thread that
+        # then imports a module of the package gets a KeyError, in one of eight processes.
+        pytest.skip("Python 3.13 without the GIL takes a package out of sys.modules for a moment")
     for _ in range(50 if EXHAUSTIVE else 1):
         output("-W", "error", "-m", "tests.core.first_calls", call, cwd=ROOT)
 
