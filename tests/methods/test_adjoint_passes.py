@@ -168,8 +168,8 @@ def pulled(renderer: Any, image: Any, settings: Any, **given: Any) -> Any:
     return pullback, cotangents, reference.vjp(image, settings, **given)[1](cotangents)
 
 
-def check(found: Any, expected: Any, name: str) -> None:
-    limit = 1e-5 * max(np.abs(expected[name]).max(), 1e-3)
+def check(found: Any, expected: Any, name: str, share: float = 1e-5) -> None:
+    limit = share * max(np.abs(expected[name]).max(), 1e-3)
     assert np.abs(found[name] - expected[name]).max() <= limit, name
 
 
@@ -201,8 +201,9 @@ def test_derivatives_of_a_lamp_on_black_are_finite(renderer: Renderer, name: str
     found = pullback(cotangents)
     assert np.isfinite(found["image"]).all()
     # A beam that ends between the lamp and black is one of these by rounding: a kink of saturation.
+    # PQ's exponent of 78.84 makes 4.7e-6 of half a unit in the last place of its base.
     if name != "blender beams":
-        check(found, expected, "image")
+        check(found, expected, "image", 2e-5 if name == "pq" else 1e-5)
 
 
 def test_infinite_weights_have_no_derivative(renderer: Renderer) -> None:
