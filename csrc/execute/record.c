@@ -1,7 +1,6 @@
 #include "execute/record.h"
 
 #include "execute/transient.h"
-
 #include "vulkan/labels.h"
 
 #include <stdio.h>

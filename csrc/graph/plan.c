@@ -180,8 +180,9 @@ static bool is_read_later(const struct vkb_plan *plan, const bool *needed, const
     for (uint32_t i = first; i < graph->pass_count; ++i) {
         if (!needed[i] || (current && current[i]))
             continue;
+        // What pass `first` is about to write must not become the memory of another target of it.
         if (vkb_pass_writes(&graph->passes[i], image))
-            return false;
+            return i == first;
         if (vkb_pass_reads(&graph->passes[i], image))
             return true;
     }
@@ -197,49 +198,76 @@ bool vkb_planner_reads(const struct vkb_planner *planner, const struct vkb_plan 
     return is_read_later(plan, planner->needed, planner->current, image, first);
 }
 
-// Gives the target of pass `first` memory: that of an image which is not read any more, or new one.
-static void hold_target(struct vkb_plan *plan, const bool *needed, bool *held, uint32_t first,
-                        uint32_t target)
-{
-    const struct vkb_graph *graph = &plan->graph;
-    const struct vkb_image_row *row = &graph->images[target];
+// What a plan needs: passes, and images; which passes are skipped, and which images have memory.
+struct needs {
+    bool *skipped, *needed, *wanted, *held;
+};
 
-    for (uint32_t i = 0; i < graph->image_count && !held[target]; ++i)
-        if (held[i] && !vkb_is_given(&graph->images[i]) && vkb_images_alike(&graph->images[i], row)
-            && !is_read_later(plan, needed, NULL, i, first)) {
-            held[i] = false;
-            held[target] = true;
-        }
-    if (!held[target])
-        plan->shared_size += vkb_image_size(row);
-    held[target] = true;
+static bool find_needs(const struct vkb_plan *plan, struct needs *needs, struct vkb_error *error)
+{
+    const size_t passes = plan->graph.pass_count, images = plan->graph.image_count;
+    bool *marks = vkb_alloc(error, 2 * (passes + images), sizeof *marks);
+
+    if (!marks)
+        return false;
+    *needs = (struct needs){marks, marks + passes, marks + 2 * passes, marks + 2 * passes + images};
+    mark(plan, needs->skipped, needs->needed, needs->wanted);
+    return true;
 }
 
 bool vkb_plan_measure(struct vkb_plan *plan, struct vkb_error *error)
 {
-    const struct vkb_graph *graph = &plan->graph;
-    // Which passes are skipped, which needed; which images are wanted, which have memory.
-    bool *skipped = vkb_alloc(error, 2 * (graph->pass_count + graph->image_count), sizeof *skipped);
+    struct needs needs;
 
-    if (!skipped)
+    if (!find_needs(plan, &needs, error))
         return false;
-    bool *needed = skipped + graph->pass_count, *wanted = needed + graph->pass_count;
-    bool *held = wanted + graph->image_count;
-    mark(plan, skipped, needed, wanted);
-    plan->size = plan->shared_size = 0;
+    plan->size = 0;
+    for (uint32_t i = 0; i < plan->graph.image_count; ++i)
+        plan->size += needs.wanted[i] ? vkb_image_size(&plan->graph.images[i]) : 0;
+    vkb_free(needs.skipped);
+    return true;
+}
+
+// Gives the target of pass `first` memory: that of an image which is not read any more, or new one.
+// Returns the bytes of new memory.
+static uint64_t hold_target(const struct vkb_plan *plan, const struct needs *needs, uint32_t first,
+                            uint32_t target)
+{
+    const struct vkb_graph *graph = &plan->graph;
+    const struct vkb_image_row *row = &graph->images[target];
+
+    if (needs->held[target])
+        return 0;
+    needs->held[target] = true;
+    for (uint32_t i = 0; i < graph->image_count; ++i)
+        if (i != target && needs->held[i] && !vkb_is_given(&graph->images[i])
+            && vkb_images_alike(&graph->images[i], row)
+            && !is_read_later(plan, needs->needed, NULL, i, first)) {
+            needs->held[i] = false;
+            return 0;
+        }
+    return vkb_image_size(row);
+}
+
+bool vkb_plan_shared_size(const struct vkb_plan *plan, uint64_t *size, struct vkb_error *error)
+{
+    const struct vkb_graph *graph = &plan->graph;
+    struct needs needs;
+
+    if (!find_needs(plan, &needs, error))
+        return false;
+    *size = 0;
     for (uint32_t i = 0; i < graph->image_count; ++i) {
-        held[i] = wanted[i] && vkb_is_given(&graph->images[i]);
-        plan->size += wanted[i] ? vkb_image_size(&graph->images[i]) : 0;
-        plan->shared_size += held[i] ? vkb_image_size(&graph->images[i]) : 0;
+        needs.held[i] = needs.wanted[i] && vkb_is_given(&graph->images[i]);
+        *size += needs.held[i] ? vkb_image_size(&graph->images[i]) : 0;
     }
     for (uint32_t i = 0; i < graph->pass_count; ++i) {
         uint32_t targets[VKB_MAX_TARGETS + 1];
-        const uint32_t count = needed[i] ? vkb_pass_targets(&graph->passes[i], targets) : 0;
+        const uint32_t count = needs.needed[i] ? vkb_pass_targets(&graph->passes[i], targets) : 0;
         for (uint32_t target = 0; target < count; ++target)
-            if (!held[targets[target]])
-                hold_target(plan, needed, held, i, targets[target]);
+            *size += hold_target(plan, &needs, i, targets[target]);
     }
-    vkb_free(skipped);
+    vkb_free(needs.skipped);
     return true;
 }
 

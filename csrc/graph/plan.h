@@ -9,9 +9,7 @@ struct vkb_plan {
     struct vkb_graph graph;
     uint32_t *outputs;  // images of the graph, in its order
     uint32_t output_count;
-    // Bytes of the images that the outputs need, and of these where images share memory
-    // (vkb_plan_measure).
-    uint64_t size, shared_size;
+    uint64_t size;  // bytes of the images that the outputs need (vkb_plan_measure)
 };
 
 void vkb_plan_destroy(struct vkb_plan *plan);
@@ -61,12 +59,14 @@ struct vkb_planner {
     uint64_t previous_source;
 };
 
-// Finds the plan's sizes in memory. Images of passes that fused ones may replace count, too.
+// Finds the plan's size in memory; and that where images share memory, which takes longer to find.
+// Images of passes that fused ones may replace count, too.
 bool vkb_plan_measure(struct vkb_plan *plan, struct vkb_error *error);
+bool vkb_plan_shared_size(const struct vkb_plan *plan, uint64_t *size, struct vkb_error *error);
 
 // Whether the plan's outputs, or passes from `first` on that the planner has marked to run, need
-// the content that an image has before pass `first`. The writing passes of one that is written
-// again come before its readers.
+// the content that an image has before pass `first`, or that this pass writes. The writing passes
+// of one that is written again come before its readers.
 bool vkb_planner_reads(const struct vkb_planner *planner, const struct vkb_plan *plan,
                        uint32_t image, uint32_t first);
 

@@ -192,10 +192,11 @@ static bool check_memory(const struct vkb_renderer *renderer, PyObject *plans,
 {
     for (Py_ssize_t i = 0; renderer->open && i < PyTuple_Size(plans); ++i) {
         const struct vkb_plan *plan = &plan_at(plans, i)->plan;
-        const bool shares =
-            vkb_shares_memory(&renderer->device, plan, (uint32_t)PyTuple_Size(plans));
-        if (!vkb_limits_check_memory(&renderer->device, &plan->graph,
-                                     shares ? plan->shared_size : plan->size, error))
+        uint64_t size = plan->size;
+        if (vkb_shares_memory(&renderer->device, plan, (uint32_t)PyTuple_Size(plans))
+            && !vkb_plan_shared_size(plan, &size, error))
+            return false;
+        if (!vkb_limits_check_memory(&renderer->device, &plan->graph, size, error))
             return false;
     }
     return true;

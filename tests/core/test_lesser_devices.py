@@ -291,6 +291,30 @@ def test_images_share_memory(layer: Path, name: str, variant: str) -> None:
     assert streaks <= 5 * one
 
 
+# Prints what a deferred scene shows, whose first pass writes several images of one format.
+SHARED_SCENE = """
+import hashlib
+import os
+import vkbloom
+
+with vkbloom.Renderer(os.environ["VKBLOOM_TEST_NAME"], validation=True) as renderer:
+    for names in (("final",), ("albedo", "final"), "all"):
+        frames = renderer.render(
+            vkbloom.Scene.ufo(), "deferred", (2048, 900), shading="deferred", framebuffers=names
+        )
+        for name in frames:
+            print(name, hashlib.sha256(frames[name].tobytes()).hexdigest())
+"""
+
+
+def test_images_of_one_pass_share_no_memory(layer: Path, name: str) -> None:
+    short, enough = (
+        run(layer, name, lesser, ("-c", SHARED_SCENE)) for lesser in ("heap,cpu", "cpu")
+    )
+    assert short.returncode == enough.returncode == 0, short.stderr + enough.stderr
+    assert short.stdout == enough.stdout
+
+
 # Prints why each variant is refused.
 VARIANTS = """
 import os
