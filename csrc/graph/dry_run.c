@@ -21,15 +21,9 @@ static struct vkb_dry_image *find_image(const struct vkb_dry_run *dry_run, const
     return NULL;
 }
 
-static bool is_alike(const struct vkb_dry_image *image, const struct vkb_image_row *row)
-{
-    return image->row.format == row->format && image->row.width == row->width
-        && image->row.height == row->height;
-}
-
 static bool fits(const struct vkb_dry_image *image, const struct vkb_image_row *row)
 {
-    return is_alike(image, row) && (row->usage & ~image->row.usage) == 0;
+    return vkb_images_alike(&image->row, row) && (row->usage & ~image->row.usage) == 0;
 }
 
 // Returns the content of the image with that row's name. An image of another size, format or
@@ -43,7 +37,7 @@ static struct vkb_content *resolve(struct vkb_dry_run *dry_run, const struct vkb
         && !(image = vkb_append(error, &dry_run->images, &dry_run->count, &dry_run->capacity,
                                 sizeof *image)))
         return NULL;
-    const VkImageUsageFlags before = is_alike(image, row) ? image->row.usage : 0;
+    const VkImageUsageFlags before = vkb_images_alike(&image->row, row) ? image->row.usage : 0;
     image->content.valid = image->content.valid && fits(image, row);
     image->row = *row;
     image->row.usage |= before;

@@ -18,6 +18,7 @@ import numpy as np
 
 import vkbloom
 from tests import tolerance
+from tests.custom import COUNTER
 from tests.exhaustive import EXHAUSTIVE
 from tests.images import picture
 from tests.screens import CAMERA, panel
@@ -69,18 +70,6 @@ CUSTOM = {
     "shared": custom(shared=1025),
 }
 
-
-#: Counts its frames.
-COUNTER = """//!BUFFER counts
-//!VAR uint n
-//!STORAGE
-
-//!HOOK MAIN
-//!BIND counts
-//!COMPUTE 64 64 1 1
-//!SAVE BLOOM
-void hook() { imageStore(out_image, ivec2(0), vec4(float(++n))); }
-"""
 
 #: What the device lacks.
 TAKEN = {*os.environ["VKBLOOM_LESSER"].split(",")}

@@ -154,7 +154,7 @@ STATE = """
 import itertools
 import numpy as np
 import vkbloom
-from tests.custom.test_rendering import COUNTER
+from tests.custom import COUNTER
 from vkbloom import _core
 
 image = np.ones((8, 8, 4), np.float32)

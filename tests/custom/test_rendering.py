@@ -13,6 +13,7 @@ import pytest
 from numpy.typing import NDArray
 
 import vkbloom
+from tests.custom import COUNTER
 from tests.images import picture
 from tests.refusals import assert_refused, rows
 from vkbloom import Renderer, Settings, load_method, reference
@@ -148,23 +149,6 @@ def test_textures_buffers_and_their_state(renderer: Renderer) -> None:
     # Each call begins anew, also with the same image.
     for _ in range(2):
         assert renderer.apply(image, settings)["final"][2, 3, 0] == 3
-
-
-#: A count of the frames.
-COUNTER = """\
-//!BUFFER counts
-//!VAR uint n
-//!STORAGE
-
-//!HOOK MAIN
-//!BIND counts
-//!COMPUTE 64 64 1 1
-//!SAVE BLOOM
-void hook() {
-    n += 1u;
-    imageStore(out_image, ivec2(0), vec4(float(n)));
-}
-"""
 
 
 def textured(count: int) -> str:
