@@ -407,6 +407,56 @@
 // The most iterations of Blender's streaks and of its star, whose distances are fewer by one.
 #define STAR_ITERATIONS 5
 
+// The images that a pass reads, by the slots of its family: SLOT(name, number), the index in the
+// row's `reads`. A family has the slots of its list and SLOT_SOURCE, all adjoint passes have one.
+// The images of other slots are absent.
+#define SLOTS(SLOT) \
+    SLOT(SLOT_SOURCE, 0) /* what the pass samples, or what its forward pass has sampled */ \
+    COMPOSITE_SLOTS(SLOT) \
+    ADJOINT_SLOTS(SLOT) \
+    FUSED_SLOTS(SLOT) \
+    FILTER_SLOTS(SLOT) \
+    GLARE_SLOTS(SLOT) \
+    TRANSFORM_SLOTS(SLOT) \
+    LIGHTING_SLOTS(SLOT)
+
+// The composite, and passes that read a mask: thresholds, first passes of published methods.
+#define COMPOSITE_SLOTS(SLOT) \
+    SLOT(SLOT_SCENE, 0) \
+    SLOT(SLOT_BLOOM, 1) \
+    SLOT(SLOT_MASK, 2)
+
+// Adjoint passes have these, and those of COMPOSITE_SLOTS that their forward pass has. (A pass
+// whose transpose is the same pass has its slots.)
+#define ADJOINT_SLOTS(SLOT) \
+    SLOT(SLOT_COTANGENTS, 3)     /* of what the forward pass has written */ \
+    SLOT(SLOT_WEIGHTS, 4)        /* of transposed filters: the table of their weights */ \
+    SLOT(SLOT_SUMS, 4)           /* of SUMMED_ROWS: the sums of groups of rows */ \
+    SLOT(SLOT_ADDED, 5)          /* what other readers of the image have accumulated */ \
+    SLOT(SLOT_DIFFERENTIATED, 6) /* the image itself, if it is a source's */
+
+// Fused passes that end with a composite: the scene is at SLOT_SOURCE, or with a filter at
+// SLOT_OWN.
+#define FUSED_SLOTS(SLOT) SLOT(SLOT_ENDED, 2) /* see lib/ended.glsl */
+
+// Filters, and sums of up to GATHERED_LEVELS levels.
+#define FILTER_SLOTS(SLOT) \
+    SLOT(SLOT_OWN, 1)    /* an image of the target's size that is added */ \
+    SLOT(SLOT_LEVELS, 0) /* the first level */
+
+#define GLARE_SLOTS(SLOT) \
+    SLOT(SLOT_BEFORE, 1) /* the light that a ray, ghosts or a star is added to */ \
+    SLOT(SLOT_DIRT, 1)   /* the picture of dirt */
+
+#define TRANSFORM_SLOTS(SLOT) SLOT(SLOT_SPECTRUM, 1) /* of the kernel, for the product */
+
+// The G-buffer.
+#define LIGHTING_SLOTS(SLOT) \
+    SLOT(SLOT_ALBEDO, 0) \
+    SLOT(SLOT_NORMAL, 1) \
+    SLOT(SLOT_POSITION, 2) \
+    SLOT(SLOT_BRIGHTNESS, 3)
+
 // The binding of the target of a compute shader: after those that images and resources may have.
 #define TARGET_BINDING 33
 

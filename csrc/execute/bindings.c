@@ -115,6 +115,14 @@ uint32_t vkb_pass_descriptor_images(const struct vkb_pass_row *pass)
     return pass->textured ? 2 : pass->geometry == VKB_GEOMETRY_SKYBOX ? 1 : pass->read_count;
 }
 
+uint32_t vkb_pass_bound_image(const struct vkb_pass_row *pass, uint32_t slot)
+{
+    for (uint32_t i = 0; pass->reads[slot] == VKB_NO_IMAGE && i < pass->read_count; ++i)
+        if (pass->reads[i] != VKB_NO_IMAGE)
+            return pass->reads[i];
+    return pass->reads[slot];
+}
+
 VkPipelineBindPoint vkb_pass_bind_point(const struct vkb_pass_row *pass)
 {
     return pass->geometry == VKB_GEOMETRY_DISPATCH ? VK_PIPELINE_BIND_POINT_COMPUTE

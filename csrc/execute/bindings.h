@@ -59,6 +59,10 @@ bool vkb_bindings_prepare(const struct vkb_device *device, struct vkb_bindings *
 // textures.
 uint32_t vkb_pass_descriptor_images(const struct vkb_pass_row *pass);
 
+// The image that is bound for a slot. Vulkan needs one for each binding, so that an absent one is
+// replaced by the first image that the pass reads. Its shader does not read it.
+uint32_t vkb_pass_bound_image(const struct vkb_pass_row *pass, uint32_t slot);
+
 VkPipelineBindPoint vkb_pass_bind_point(const struct vkb_pass_row *pass);
 
 // The layouts of a pass that vkb_bindings_prepare has made.

@@ -123,7 +123,8 @@ static bool may_keep_texels(const struct vkb_plan *plan)
         if (!graph->passes[i].fused || (format != STORED_UNORM8 && format != STORED_HALF))
             continue;
         for (uint32_t read = 0; read < replaced->read_count; ++read)
-            if (!vkb_is_given(&graph->images[replaced->reads[read]])
+            if (replaced->reads[read] != VKB_NO_IMAGE
+                && !vkb_is_given(&graph->images[replaced->reads[read]])
                 && !is_output(plan, replaced->reads[read]))
                 return true;
     }

@@ -34,7 +34,7 @@ static bool read_image(struct vkb_run *run, const struct vkb_pass_row *pass,
     } else if (pass->geometry == VKB_GEOMETRY_SKYBOX) {
         image = &scene->sky;
     } else {
-        image = &run->images[pass->reads[index]]->image;
+        image = &run->images[vkb_pass_bound_image(pass, index)]->image;
     }
     *info = (VkDescriptorImageInfo){
         .sampler = texture ? texture->sampler : VK_NULL_HANDLE,
@@ -90,7 +90,7 @@ static bool write_read(struct vkb_run *run, const struct binding *binding, uint3
     };
     if (pass->reading != VKB_READING_LINEAR_TEXELS)
         return read_image(run, pass, binding->surface, i, info, error);
-    struct vkb_image *image = &run->images[pass->reads[i]]->image;
+    struct vkb_image *image = &run->images[vkb_pass_bound_image(pass, i)]->image;
     write->pTexelBufferView = &image->linear_texels;
     return vkb_image_linear_texels(run->device, image, error);
 }
@@ -262,7 +262,7 @@ static void push_linear_texels(const struct vkb_run *run, const struct vkb_pass_
     describe_linear_texels(&run->images[pass->targets[0]]->image, band->row_pitch, shapes.target);
     shapes.target[3] = (int32_t)band->first;
     for (uint32_t i = 0; i < pass->read_count; ++i) {
-        const struct vkb_image *image = &run->images[pass->reads[i]]->image;
+        const struct vkb_image *image = &run->images[vkb_pass_bound_image(pass, i)]->image;
         describe_linear_texels(image, image->row_pitch, shapes.reads[i]);
     }
     run->device->vk.vkCmdPushConstants(
@@ -349,7 +349,7 @@ static bool record_pass(struct vkb_run *run, uint32_t index, struct vkb_error *e
     struct vkb_output *output = linear ? find_stored(run, pass) : NULL;
     VkPipeline pipeline;
 
-    if (linear && run->images[pass->reads[0]]->image.channels == 3)
+    if (linear && run->images[vkb_pass_bound_image(pass, SLOT_SOURCE)]->image.channels == 3)
         row.shader = row.shader->rgb;
     if (output && !vkb_readback_is_complete(output))
         row.shader = row.shader->packed;
@@ -372,9 +372,9 @@ static void transition_reads(struct vkb_run *run, uint32_t first, uint32_t end)
     for (uint32_t i = first; i < end; ++i) {
         const struct vkb_pass_row *pass = &run->graph->passes[i];
         for (uint32_t read = 0; read < pass->read_count; ++read) {
-            struct vkb_image *image = &run->images[pass->reads[read]]->image;
-            if (!vkb_pass_writes(pass, pass->reads[read]))
-                vkb_image_transition(run->device, run->submission->commands.buffer, image,
+            if (vkb_pass_needs(pass, read))
+                vkb_image_transition(run->device, run->submission->commands.buffer,
+                                     &run->images[pass->reads[read]]->image,
                                      vkb_pass_reads_as(pass));
         }
     }

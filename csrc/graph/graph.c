@@ -65,7 +65,7 @@ static bool has_images(const struct vkb_graph *graph, const struct vkb_pass_row 
             && (row->depth == VKB_NO_IMAGE || row->depth < graph->image_count);
 
     for (uint32_t i = 0; all && i < row->read_count; ++i)
-        all = row->reads[i] < graph->image_count;
+        all = row->reads[i] == VKB_NO_IMAGE || row->reads[i] < graph->image_count;
     for (uint32_t i = 0; all && i < row->target_count; ++i)
         all = row->targets[i] < graph->image_count;
     return all;
@@ -220,6 +220,13 @@ bool vkb_pass_reads(const struct vkb_pass_row *pass, uint32_t image)
     return false;
 }
 
+bool vkb_pass_needs(const struct vkb_pass_row *pass, uint32_t slot)
+{
+    const uint32_t image = pass->reads[slot];
+
+    return image != VKB_NO_IMAGE && !vkb_pass_writes(pass, image);
+}
+
 bool vkb_pass_in_place(const struct vkb_pass_row *pass)
 {
     return pass->geometry == VKB_GEOMETRY_DISPATCH && vkb_pass_reads(pass, pass->targets[0]);
@@ -305,7 +312,8 @@ void vkb_graph_set_usages(struct vkb_graph *graph)
         if (pass->reading == VKB_READING_LINEAR_TEXELS)
             continue;
         for (uint32_t read = 0; read < pass->read_count; ++read)
-            graph->images[pass->reads[read]].usage |= vkb_access_usage(vkb_pass_reads_as(pass));
+            if (pass->reads[read] != VKB_NO_IMAGE)
+                graph->images[pass->reads[read]].usage |= vkb_access_usage(vkb_pass_reads_as(pass));
         for (uint32_t target = 0; target < pass->target_count; ++target)
             graph->images[pass->targets[target]].usage |=
                 vkb_access_usage(draws ? VKB_ACCESS_COLOR_TARGET : VKB_ACCESS_DISPATCH_STORED);

@@ -101,7 +101,7 @@ enum vkb_blend {
     VKB_BLEND_ADD_RGBA,
 };
 
-// Bindings: 0 is the parameter block, then the images read, in order, then the target of a
+// Bindings: 0 is the parameter block, then the images read, by slot, then the target of a
 // dispatch, which can be among the images read: each invocation then stores where it has loaded. A
 // skybox reads the scene's cubemap at binding 1; textured triangles read the textures
 // of base colour and emission. Consecutive draws with the same targets share a render pass, with
@@ -113,8 +113,8 @@ struct vkb_pass_row {
     bool textured;  // draws the mesh's triangles that have textures, not those that have none
     const struct vkb_shader *vertex, *shader;  // a dispatch has no vertex shader
     struct vkb_constants constants;
-    uint32_t reads[VKB_MAX_READS];
-    uint32_t read_count;
+    uint32_t reads[VKB_MAX_READS];  // by slot (SLOT_*); VKB_NO_IMAGE: the pass reads none there
+    uint32_t read_count;            // slots
     enum vkb_reading reading;
     bool fused;            // a fused pass: may replace the pass before it, with the same target
     bool gains_if_finite;  // is compiled a second time, for sources without NaN and infinity
@@ -213,6 +213,8 @@ uint32_t vkb_graph_group_end(const struct vkb_graph *graph, uint32_t first);
 size_t vkb_pass_pack(const struct vkb_pass_row *pass, unsigned char *bytes);
 
 bool vkb_pass_reads(const struct vkb_pass_row *pass, uint32_t image);
+// Whether the pass reads an image at that slot which it does not write.
+bool vkb_pass_needs(const struct vkb_pass_row *pass, uint32_t slot);
 // Whether the pass is a dispatch that reads and writes one image. It is in the group of the pass
 // before, which writes that image.
 bool vkb_pass_in_place(const struct vkb_pass_row *pass);

@@ -134,4 +134,11 @@ enum vkb_three_variant { VARIANT_NAMES(VKB_NAME_ENUM) };
 enum vkb_mode { MODE_NAMES(VKB_NAME_ENUM) };
 #undef VKB_NAME_ENUM
 
+// The images that a pass reads (`reads` of its row).
+enum vkb_slot {
+#define VKB_SLOT_ENUM(name, number) name = number,
+    SLOTS(VKB_SLOT_ENUM)
+#undef VKB_SLOT_ENUM
+};
+
 #endif

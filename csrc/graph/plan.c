@@ -58,7 +58,7 @@ static bool write_recipe(struct vkb_planner *planner, const struct vkb_plan_step
         uint64_t versions[VKB_MAX_READS + 1] = {0};
 
         for (uint32_t read = 0; read < row.read_count; ++read)
-            if (!vkb_pass_writes(&row, row.reads[read]))
+            if (vkb_pass_needs(&row, read))
                 versions[read] = step->contents[row.reads[read]]->version;
         if (row.geometry != VKB_GEOMETRY_FULLSCREEN && row.geometry != VKB_GEOMETRY_DISPATCH)
             versions[VKB_MAX_READS] = step->scene;
@@ -123,7 +123,7 @@ static bool mark_current(struct vkb_planner *planner, const struct vkb_plan_step
         for (uint32_t i = first; i < end; ++i)
             for (uint32_t read = 0; read < graph->passes[i].read_count; ++read)
                 found = found
-                     && (vkb_pass_writes(&graph->passes[i], graph->passes[i].reads[read])
+                     && (!vkb_pass_needs(&graph->passes[i], read)
                          || is_current(planner, step, graph->passes[i].reads[read], first));
         if (found && !compare_recipe(planner, step, first, end, &found, error))
             return false;
@@ -136,7 +136,8 @@ static bool mark_current(struct vkb_planner *planner, const struct vkb_plan_step
 static void mark_images(const struct vkb_pass_row *pass, bool *wanted)
 {
     for (uint32_t read = 0; read < pass->read_count; ++read)
-        wanted[pass->reads[read]] = true;
+        if (pass->reads[read] != VKB_NO_IMAGE)
+            wanted[pass->reads[read]] = true;
     for (uint32_t target = 0; target < pass->target_count; ++target)
         wanted[pass->targets[target]] = true;
     if (pass->depth != VKB_NO_IMAGE)

@@ -95,7 +95,7 @@ static void find_glow(struct vkb_adjoint *adjoint, const struct vkb_cotangents *
         if (vkb_is_threshold(&graph->passes[i])
             && graph->passes[i].constants.threshold_mode == THRESHOLD_NONE) {
             adjoint->glow = graph->passes[i].targets[0];
-            adjoint->image = graph->passes[i].reads[0];
+            adjoint->image = graph->passes[i].reads[SLOT_SOURCE];
         }
 }
 

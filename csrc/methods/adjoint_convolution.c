@@ -51,7 +51,7 @@ static bool accumulate_bright(struct vkb_adjoint *adjoint, const struct vkb_pass
                               const struct vkb_pass_row *pass, const struct vkb_filter *filter,
                               uint32_t convolved, struct vkb_error *error)
 {
-    struct vkb_pass_row row = vkb_slope_row(adjoint, pass, &vkb_shader_adjoint_bright_frag, 1);
+    struct vkb_pass_row row = vkb_slope_row(adjoint, pass, &vkb_shader_adjoint_bright_frag);
     uint32_t *cotangent = &adjoint->cotangents[pass->targets[0]];
     const uint32_t kept = *cotangent;
 
@@ -59,10 +59,10 @@ static bool accumulate_bright(struct vkb_adjoint *adjoint, const struct vkb_pass
     if (!vkb_accumulate_filter(adjoint, filter, convolved, pass->targets[0], error))
         return false;
     row.params = first->params;
-    row.reads[0] = first->reads[0];
-    row.reads[1] = *cotangent;
+    row.reads[SLOT_SOURCE] = first->reads[SLOT_SOURCE];
+    row.reads[SLOT_COTANGENTS] = *cotangent;
     *cotangent = kept;
-    return vkb_accumulate_cotangent(adjoint, &row, row.reads[0], error);
+    return vkb_accumulate_cotangent(adjoint, &row, row.reads[SLOT_SOURCE], error);
 }
 
 bool vkb_transpose_convolution(struct vkb_adjoint *adjoint, const struct vkb_settings *settings,
@@ -73,7 +73,7 @@ bool vkb_transpose_convolution(struct vkb_adjoint *adjoint, const struct vkb_set
     const bool edge_x = boundary == BOUNDARY_EDGE;
     const bool edge_y = edge_x || boundary == BOUNDARY_WRAP_X;
     const struct vkb_pass_row first_stage = find_first(graph);
-    const uint32_t glow = first_stage.reads[0], first = graph->pass_count;
+    const uint32_t glow = first_stage.reads[SLOT_SOURCE], first = graph->pass_count;
     const struct vkb_kernel_data *kernel = &settings->kernel;
     const struct vkb_size size = {graph->images[glow].width, graph->images[glow].height};
     const struct vkb_size extended = {size.width + (edge_x ? kernel->width - 1 : 0),

@@ -235,8 +235,7 @@ static uint32_t add_line(struct vkb_levels *levels, int direction, int step_x, i
         const uint32_t to = add_step(levels, "star_%u", (uint32_t)(direction * passes + i));
         struct vkb_pass_row row =
             vkb_row_of_lines(levels, &vkb_shader_simple_star_comp, lines, from, to);
-        row.reads[1] = adds ? before : from;
-        row.read_count = 2;
+        vkb_read_at(&row, SLOT_BEFORE, adds ? before : VKB_NO_IMAGE);
         row.constants.add_own = adds;
         row.block = VKB_BLOCK_star;
         row.params.star = (struct vkb_star_params){

@@ -100,8 +100,7 @@ static void add_placing(const struct convolution *convolution, uint32_t kernel, 
     row.vertex = NULL;
     row.variant = "dispatch";
     row.block_width = row.block_height = PIXEL_INVOCATIONS;
-    row.reads[0] = kernel;
-    row.read_count = 1;
+    vkb_read_only(&row, kernel);
     row.block = VKB_BLOCK_fft_kernel;
     *params = (struct vkb_fft_kernel_params){
         .padded_x = (int)x->line.length,

@@ -62,8 +62,7 @@ static struct gbuffer add_gbuffer(struct vkb_levels *levels, const struct vkb_sc
         return gbuffer;
     row = vkb_fullscreen_row("glow_light", &vkb_shader_gbuffer_glow_frag, 0);
     row.constants.emitters = emitters;
-    row.reads[0] = glow;
-    row.read_count = 1;
+    vkb_read_only(&row, glow);
     row.blend = VKB_BLEND_ADD;
     set_targets(&gbuffer, &row);
     vkb_levels_pass(levels, &row);
@@ -99,9 +98,10 @@ static uint32_t add_lighting(struct vkb_levels *levels, const struct gbuffer *gb
     const uint32_t scene = vkb_levels_target(levels, "scene", HDR, size, true);
     struct vkb_pass_row row = vkb_fullscreen_row("scene", &vkb_shader_lighting_frag, scene);
 
-    for (int i = 0; i < GBUFFER_COLOURS; ++i)
-        row.reads[i] = gbuffer->colours[i];
-    row.read_count = GBUFFER_COLOURS;
+    vkb_read_at(&row, SLOT_ALBEDO, gbuffer->colours[ALBEDO]);
+    vkb_read_at(&row, SLOT_NORMAL, gbuffer->colours[NORMAL]);
+    vkb_read_at(&row, SLOT_POSITION, gbuffer->colours[POSITION]);
+    vkb_read_at(&row, SLOT_BRIGHTNESS, gbuffer->colours[BRIGHTNESS]);
     vkb_levels_pass(levels, &row);
     return scene;
 }

@@ -69,9 +69,7 @@ static float step_of(double step)
 // Lets a pass add the image `before` to its result, if there is one.
 static void add_before(struct vkb_pass_row *row, uint32_t before)
 {
-    // Every binding of the shader must be filled, also one that this variant does not read.
-    row->reads[1] = before != VKB_NO_IMAGE ? before : row->reads[0];
-    row->read_count = 2;
+    vkb_read_at(row, SLOT_BEFORE, before);
     row->constants.add_own = before != VKB_NO_IMAGE;
 }
 
@@ -266,8 +264,7 @@ static uint32_t add_dirty_light(struct vkb_levels *levels, const struct vkb_glar
     const uint32_t dirty = vkb_levels_step(levels, "dirty_light", 0, levels->source->final);
     struct vkb_pass_row row = vkb_fetching_row(levels, &vkb_shader_dirt_frag, light, dirty);
 
-    row.reads[1] = dirt;
-    row.read_count = 2;
+    vkb_read_at(&row, SLOT_DIRT, dirt);
     row.block = VKB_BLOCK_dirt;
     row.params.dirt = (struct vkb_dirt_params){
         .base = values->lerp ? 1.0f - values->strength : 0.0f,

@@ -81,7 +81,7 @@ static void add_rounding(struct vkb_levels *levels, uint32_t from, uint32_t to)
 
     row.constants.threshold_mode = THRESHOLD_NONE;
     row.constants.sampling = SAMPLING_TEXEL;
-    row.reads[0] = from;
+    vkb_read_only(&row, from);
     vkb_apply_mask(&row, VKB_NO_IMAGE);
     row.block = VKB_BLOCK_threshold;
     VKB_SET_TARGET(&row, threshold, target);

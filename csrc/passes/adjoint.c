@@ -11,29 +11,27 @@ uint32_t vkb_cotangent_of(const struct vkb_adjoint *adjoint, const struct vkb_pa
     return adjoint->cotangents[pass->targets[0]];
 }
 
-struct vkb_pass_row vkb_adjoint_row(const struct vkb_shader *shader, const uint32_t *reads,
-                                    uint32_t count)
+// With a texel buffer for each slot, where the pass has linear texels.
+_Static_assert((int)SLOT_DIFFERENTIATED < (int)VKB_MAX_LINEAR_TEXELS, "there is a slot too many");
+
+struct vkb_pass_row vkb_adjoint_row(const struct vkb_shader *shader, uint32_t cotangents)
 {
     struct vkb_pass_row row = vkb_fullscreen_row("", shader, VKB_NO_IMAGE);
 
     row.transposed = true;
-    while (row.read_count < count) {
-        row.reads[row.read_count] = reads[row.read_count];
-        ++row.read_count;
-    }
+    vkb_read_at(&row, SLOT_COTANGENTS, cotangents);
+    vkb_read_at(&row, SLOT_DIFFERENTIATED, VKB_NO_IMAGE);
     return row;
 }
 
 struct vkb_pass_row vkb_slope_row(const struct vkb_adjoint *adjoint,
-                                  const struct vkb_pass_row *pass, const struct vkb_shader *shader,
-                                  uint32_t images)
+                                  const struct vkb_pass_row *pass, const struct vkb_shader *shader)
 {
-    struct vkb_pass_row row = vkb_adjoint_row(shader, pass->reads, images);
+    struct vkb_pass_row row = vkb_adjoint_row(shader, vkb_cotangent_of(adjoint, pass));
 
-    // In place of a mask that the pass does not read, its image.
-    for (uint32_t i = pass->read_count; i < images; ++i)
-        row.reads[i] = pass->reads[0];
-    row.reads[row.read_count++] = vkb_cotangent_of(adjoint, pass);
+    row.reads[SLOT_SOURCE] = pass->reads[SLOT_SOURCE];
+    if (pass->constants.masked)
+        row.reads[SLOT_MASK] = pass->reads[SLOT_MASK];
     row.constants = pass->constants;
     row.constants.dither = 0;
     row.block = pass->block;
@@ -54,20 +52,13 @@ bool vkb_add_adjoint_row(struct vkb_adjoint *adjoint, struct vkb_pass_row *row,
     return vkb_graph_add_pass(adjoint->graph, row, error);
 }
 
-// Every binding of the shader must be filled, also those that a pass does not read.
-static void read_nothing(struct vkb_pass_row *row)
-{
-    row->reads[row->read_count++] = row->reads[0];
-    row->reads[row->read_count++] = row->reads[0];
-}
-
 void vkb_delay_scene(struct vkb_adjoint *adjoint, const struct vkb_pass_row *row, double share,
                      uint32_t image)
 {
     adjoint->scene = image;
     adjoint->share = share;
     adjoint->scene_row = *row;
-    adjoint->cotangents[image] = row->reads[3];
+    adjoint->cotangents[image] = row->reads[SLOT_COTANGENTS];
 }
 
 bool vkb_end_scene(struct vkb_adjoint *adjoint, struct vkb_error *error)
@@ -104,14 +95,12 @@ bool vkb_accumulate_cotangent(struct vkb_adjoint *adjoint, const struct vkb_pass
         return false;
     const struct vkb_image_row *forward = &adjoint->graph->images[image];
     const struct vkb_size size = {forward->width, forward->height};
-    read_nothing(&row);
     row.constants.add_own = *cotangent != VKB_NO_IMAGE;
-    if (row.constants.add_own)
-        row.reads[row.read_count - 2] = *cotangent;
+    row.reads[SLOT_ADDED] = *cotangent;
     row.constants.from_image =
         forward->input == VKB_INPUT_IMAGE || forward->input == VKB_INPUT_EMISSION;
     if (row.constants.from_image)
-        row.reads[row.read_count - 1] = image;
+        row.reads[SLOT_DIFFERENTIATED] = image;
     return vkb_add_adjoint_row(adjoint, &row, size, cotangent, error);
 }
 
@@ -120,7 +109,6 @@ bool vkb_add_adjoint_image(struct vkb_adjoint *adjoint, const struct vkb_pass_ro
 {
     struct vkb_pass_row row = *given;
 
-    read_nothing(&row);
     return vkb_add_adjoint_row(adjoint, &row, size, image, error);
 }
 
@@ -129,11 +117,10 @@ static bool make_filter_row(struct vkb_adjoint *adjoint, const struct vkb_filter
                             enum vkb_mode direction, uint32_t cotangents, struct vkb_pass_row *row,
                             struct vkb_error *error)
 {
-    // In place of the scene of a composite, the cotangents again.
-    const uint32_t reads[] = {cotangents, adjoint->table_image, cotangents};
     struct vkb_adjoint_filter_params *params = &row->params.adjoint_filter;
 
-    *row = vkb_adjoint_row(&vkb_shader_adjoint_filter_frag, reads, 3);
+    *row = vkb_adjoint_row(&vkb_shader_adjoint_filter_frag, cotangents);
+    row->reads[SLOT_WEIGHTS] = adjoint->table_image;
     row->constants.direction = direction;
     row->constants.levels = (int32_t)filter->kernels;
     row->block = VKB_BLOCK_adjoint_filter;
@@ -273,7 +260,7 @@ bool vkb_accumulate_mask(struct vkb_adjoint *adjoint, const struct vkb_pass_row 
 {
     row->constants.by = BY_MASK;
     return !pass->constants.masked
-        || vkb_accumulate_sampled(adjoint, row, pass->reads[1], pass->targets[0], error);
+        || vkb_accumulate_sampled(adjoint, row, pass->reads[SLOT_MASK], pass->targets[0], error);
 }
 
 static struct vkb_size blocks_of(struct vkb_size size)
@@ -287,7 +274,10 @@ static bool add_sums(struct vkb_adjoint *adjoint, uint32_t image, struct vkb_siz
                      enum vkb_mode by, const char *name, struct vkb_error *error)
 {
     do {
-        struct vkb_pass_row row = vkb_adjoint_row(&vkb_shader_adjoint_sum_frag, &image, 1);
+        struct vkb_pass_row row =
+            vkb_fullscreen_row("", &vkb_shader_adjoint_sum_frag, VKB_NO_IMAGE);
+        row.transposed = true;
+        vkb_read_only(&row, image);
         row.constants.by = by;
         by = BY_VALUES;
         size = blocks_of(size);

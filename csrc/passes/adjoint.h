@@ -32,15 +32,13 @@ typedef bool vkb_transpose(struct vkb_adjoint *adjoint, const struct vkb_pass_ro
 // The cotangents of what the pass writes.
 uint32_t vkb_cotangent_of(const struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass);
 
-// A row of a shader that includes adjoint.glsl and, before what that reads, has these images.
-struct vkb_pass_row vkb_adjoint_row(const struct vkb_shader *shader, const uint32_t *reads,
-                                    uint32_t count);
+// A row with ADJOINT_SLOTS that reads only these cotangents.
+struct vkb_pass_row vkb_adjoint_row(const struct vkb_shader *shader, uint32_t cotangents);
 
-// The row of the slopes of a pass, whose shader has the pass's parameters, its first `images`, and
-// its cotangents.
+// The row of the slopes of a pass, whose shader has the pass's parameters, its source, its mask,
+// if there is one, and its cotangents.
 struct vkb_pass_row vkb_slope_row(const struct vkb_adjoint *adjoint,
-                                  const struct vkb_pass_row *pass, const struct vkb_shader *shader,
-                                  uint32_t images);
+                                  const struct vkb_pass_row *pass, const struct vkb_shader *shader);
 
 // Adds the row, whose result is added to the cotangents of a forward image.
 bool vkb_accumulate_cotangent(struct vkb_adjoint *adjoint, const struct vkb_pass_row *row,
@@ -82,7 +80,7 @@ bool vkb_accumulate_sampled(struct vkb_adjoint *adjoint, const struct vkb_pass_r
 bool vkb_accumulate_moved(struct vkb_adjoint *adjoint, const struct vkb_pass_row *row,
                           uint32_t source, struct vkb_error *error);
 
-// If the pass reads a mask, its second image: accumulates the row's result by it, at the target's
+// If the pass reads a mask: accumulates the row's result by it, at the target's
 // pixels.
 bool vkb_accumulate_mask(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
                          struct vkb_pass_row *row, struct vkb_error *error);

@@ -27,7 +27,7 @@ bool vkb_transpose_blur(struct vkb_adjoint *adjoint, const struct vkb_pass_row *
     const int radius = pass->constants.radius;
     struct vkb_filter filter;
 
-    vkb_filter_begin(adjoint->graph, pass->reads[0], pass->targets[0], &filter);
+    vkb_filter_begin(adjoint->graph, pass->reads[SLOT_SOURCE], pass->targets[0], &filter);
     filter.gain = params->gain;
     if (direction != DIRECTION_VERTICAL)
         set_line(params, radius, params->step_x, pass->constants.taps, &filter.x);
@@ -35,8 +35,8 @@ bool vkb_transpose_blur(struct vkb_adjoint *adjoint, const struct vkb_pass_row *
         set_line(params, radius, params->step_y, pass->constants.taps, &filter.y);
     if (pass->constants.upsample)
         filter.x.kind = UPSAMPLE_INSET_LINEAR;
-    return vkb_accumulate_filter(adjoint, &filter, vkb_cotangent_of(adjoint, pass), pass->reads[0],
-                                 error);
+    return vkb_accumulate_filter(adjoint, &filter, vkb_cotangent_of(adjoint, pass),
+                                 pass->reads[SLOT_SOURCE], error);
 }
 
 // Taps at a distance on both sides, and in the middle, with the weights of one kernel.
@@ -92,18 +92,18 @@ bool vkb_transpose_filter(struct vkb_adjoint *adjoint, const struct vkb_pass_row
     const uint32_t cotangents = vkb_cotangent_of(adjoint, pass);
     struct vkb_filter filter;
 
-    vkb_filter_begin(adjoint->graph, pass->reads[0], pass->targets[0], &filter);
+    vkb_filter_begin(adjoint->graph, pass->reads[SLOT_SOURCE], pass->targets[0], &filter);
     filter.kernels = (uint32_t)constants->kernels;
     filter.gain = (double)params->coarse / params->divisor;
     set_taps(params->taps_x, constants->taps, (enum vkb_mode)constants->upsample, &filter.x);
     set_taps(params->taps_y, constants->taps, (enum vkb_mode)constants->upsample, &filter.y);
-    if (!vkb_accumulate_filter(adjoint, &filter, cotangents, pass->reads[0], error))
+    if (!vkb_accumulate_filter(adjoint, &filter, cotangents, pass->reads[SLOT_SOURCE], error))
         return false;
     if (!constants->add_own)
         return true;
-    vkb_filter_begin(adjoint->graph, pass->reads[1], pass->targets[0], &filter);
+    vkb_filter_begin(adjoint->graph, pass->reads[SLOT_OWN], pass->targets[0], &filter);
     filter.gain = params->own;
-    return vkb_accumulate_filter(adjoint, &filter, cotangents, pass->reads[1], error);
+    return vkb_accumulate_filter(adjoint, &filter, cotangents, pass->reads[SLOT_OWN], error);
 }
 
 // Nine taps, pixels of the target apart.
@@ -121,12 +121,13 @@ static void set_nine(const double half[5], enum vkb_border border, struct vkb_ax
 static bool accumulate_first(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
                              const struct vkb_filter *blur, struct vkb_error *error)
 {
-    const uint32_t target = pass->targets[0], source = pass->reads[0];
+    const uint32_t target = pass->targets[0], source = pass->reads[SLOT_SOURCE];
     const struct vkb_size size = {blur->x.to, blur->y.to};
-    struct vkb_pass_row row = vkb_slope_row(adjoint, pass, &vkb_shader_adjoint_nine_frag, 2);
+    struct vkb_pass_row row = vkb_slope_row(adjoint, pass, &vkb_shader_adjoint_nine_frag);
 
     if (pass->constants.direction == DIRECTION_HORIZONTAL)
-        return vkb_filter_to_image(adjoint, blur, row.reads[2], size, &row.reads[2], error)
+        return vkb_filter_to_image(adjoint, blur, row.reads[SLOT_COTANGENTS], size,
+                                   &row.reads[SLOT_COTANGENTS], error)
             && vkb_accumulate_sampled(adjoint, &row, source, target, error);
     return vkb_accumulate_through(adjoint, &row, blur, source, target, error)
         && vkb_accumulate_mask(adjoint, pass, &row, error);
@@ -141,7 +142,7 @@ bool vkb_transpose_nine(struct vkb_adjoint *adjoint, const struct vkb_pass_row *
     const enum vkb_border border = godot ? VKB_BORDER_PAIRS
                                  : first ? VKB_BORDER_FIRST_TWO
                                          : VKB_BORDER_LAST;
-    const uint32_t source = godot && first ? pass->targets[0] : pass->reads[0];
+    const uint32_t source = godot && first ? pass->targets[0] : pass->reads[SLOT_SOURCE];
     struct vkb_filter filter;
 
     vkb_filter_begin(adjoint->graph, source, pass->targets[0], &filter);
@@ -149,8 +150,8 @@ bool vkb_transpose_nine(struct vkb_adjoint *adjoint, const struct vkb_pass_row *
     if (godot && first)
         return accumulate_first(adjoint, pass, &filter, error);
     filter.gain = godot && !rows ? pass->params.prefilter.strength : 1.0;
-    return vkb_accumulate_filter(adjoint, &filter, vkb_cotangent_of(adjoint, pass), pass->reads[0],
-                                 error);
+    return vkb_accumulate_filter(adjoint, &filter, vkb_cotangent_of(adjoint, pass),
+                                 pass->reads[SLOT_SOURCE], error);
 }
 
 bool vkb_transpose_gather(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
@@ -159,11 +160,12 @@ bool vkb_transpose_gather(struct vkb_adjoint *adjoint, const struct vkb_pass_row
     struct vkb_filter filter;
 
     for (int level = 0; level < pass->constants.levels; ++level) {
-        vkb_filter_begin(adjoint->graph, pass->reads[level], pass->targets[0], &filter);
+        vkb_filter_begin(adjoint->graph, pass->reads[SLOT_LEVELS + level], pass->targets[0],
+                         &filter);
         filter.gain = pass->params.gather.shares[level / 4][level % 4];
         filter.x.kind = filter.y.kind = (enum vkb_mode)pass->constants.upsample;
         if (!vkb_accumulate_filter(adjoint, &filter, vkb_cotangent_of(adjoint, pass),
-                                   pass->reads[level], error))
+                                   pass->reads[SLOT_LEVELS + level], error))
             return false;
     }
     return true;

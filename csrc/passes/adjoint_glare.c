@@ -22,7 +22,8 @@ static bool accumulate_before(struct vkb_adjoint *adjoint, const struct vkb_pass
                               struct vkb_error *error)
 {
     return !pass->constants.add_own
-        || accumulate_all(adjoint, vkb_cotangent_of(adjoint, pass), pass->reads[1], error);
+        || accumulate_all(adjoint, vkb_cotangent_of(adjoint, pass), pass->reads[SLOT_BEFORE],
+                          error);
 }
 
 // The row of a pass that has its own transpose: it reads the cotangents in place of its image.
@@ -31,9 +32,9 @@ static struct vkb_pass_row own_row(const struct vkb_adjoint *adjoint,
 {
     struct vkb_pass_row row = *pass;
 
-    row.reads[0] = vkb_cotangent_of(adjoint, pass);
+    row.reads[SLOT_SOURCE] = vkb_cotangent_of(adjoint, pass);
     if (pass->constants.add_own)
-        row.reads[1] = row.reads[0];
+        row.reads[SLOT_BEFORE] = VKB_NO_IMAGE;
     row.constants.add_own = 0;
     row.constants.alpha = ALPHA_BLUR;  // one of a cotangent
     return row;
@@ -43,7 +44,7 @@ static struct vkb_pass_row own_row(const struct vkb_adjoint *adjoint,
 static bool add_own_row(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
                         struct vkb_pass_row *row, uint32_t *image, struct vkb_error *error)
 {
-    const struct vkb_image_row *source = &adjoint->graph->images[pass->reads[0]];
+    const struct vkb_image_row *source = &adjoint->graph->images[pass->reads[SLOT_SOURCE]];
     const struct vkb_size size = {source->width, source->height};
 
     return vkb_add_adjoint_row(adjoint, row, size, image, error);
@@ -56,7 +57,7 @@ static bool accumulate_own_row(struct vkb_adjoint *adjoint, const struct vkb_pas
     uint32_t image;
 
     return add_own_row(adjoint, pass, row, &image, error)
-        && accumulate_all(adjoint, image, pass->reads[0], error);
+        && accumulate_all(adjoint, image, pass->reads[SLOT_SOURCE], error);
 }
 
 // The transpose of a tap that reads the next texel at some positions is a filter of its own.
@@ -64,10 +65,11 @@ static bool accumulate_taps(struct vkb_adjoint *adjoint, const struct vkb_pass_r
                             struct vkb_error *error)
 {
     const struct vkb_streaks_params *params = &pass->params.streaks;
-    const uint32_t source = pass->reads[0];
-    struct vkb_pass_row row = vkb_slope_row(adjoint, pass, &vkb_shader_adjoint_tap_frag, 0);
+    const uint32_t source = pass->reads[SLOT_SOURCE];
+    struct vkb_pass_row row = vkb_slope_row(adjoint, pass, &vkb_shader_adjoint_tap_frag);
     struct vkb_filter filter;
 
+    row.reads[SLOT_SOURCE] = VKB_NO_IMAGE;
     for (int tap = 0; tap < params->count; ++tap) {
         vkb_filter_begin(adjoint->graph, source, pass->targets[0], &filter);
         // Rounded as the shader does it.
@@ -95,7 +97,6 @@ bool vkb_transpose_streaks(struct vkb_adjoint *adjoint, const struct vkb_pass_ro
     // Such streaks have no threshold.
     if (pass->params.streaks.reads_next)
         return accumulate_taps(adjoint, pass, error);
-    row.reads[1] = row.reads[0];
     row.constants.first = 0;
     row.params.streaks.threshold = 0.0f;
     row.params.streaks.step_x = -pass->params.streaks.step_x;
@@ -104,9 +105,9 @@ bool vkb_transpose_streaks(struct vkb_adjoint *adjoint, const struct vkb_pass_ro
         return accumulate_own_row(adjoint, pass, &row, error);
     if (!add_own_row(adjoint, pass, &row, &moved, error))
         return false;
-    row = vkb_slope_row(adjoint, pass, &vkb_shader_adjoint_above_frag, 1);
-    row.reads[1] = moved;
-    return vkb_accumulate_cotangent(adjoint, &row, pass->reads[0], error);
+    row = vkb_slope_row(adjoint, pass, &vkb_shader_adjoint_above_frag);
+    row.reads[SLOT_COTANGENTS] = moved;
+    return vkb_accumulate_cotangent(adjoint, &row, pass->reads[SLOT_SOURCE], error);
 }
 
 // Multiplies the cotangents, as it does the light.
@@ -126,7 +127,6 @@ bool vkb_transpose_star(struct vkb_adjoint *adjoint, const struct vkb_pass_row *
     struct vkb_pass_row row = own_row(adjoint, pass);
 
     row.shader = &vkb_shader_simple_star_transposed_comp;
-    row.reads[1] = row.reads[0];
     return accumulate_before(adjoint, pass, error)
         && accumulate_own_row(adjoint, pass, &row, error);
 }
@@ -152,7 +152,7 @@ static void scale_axis(double scale, struct vkb_axis *axis)
 static bool accumulate_ghost(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
                              const struct vkb_pass_row *row, struct vkb_error *error)
 {
-    const uint32_t source = pass->reads[0], target = pass->targets[0];
+    const uint32_t source = pass->reads[SLOT_SOURCE], target = pass->targets[0];
     const float scale = row->params.flare.ghosts[0][3];
     struct vkb_filter filter;
 
@@ -169,14 +169,14 @@ static bool accumulate_ghost(struct vkb_adjoint *adjoint, const struct vkb_pass_
 bool vkb_transpose_flare(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
                          struct vkb_error *error)
 {
-    struct vkb_pass_row row = vkb_slope_row(adjoint, pass, &vkb_shader_adjoint_flare_frag, 1);
+    struct vkb_pass_row row = vkb_slope_row(adjoint, pass, &vkb_shader_adjoint_flare_frag);
     struct vkb_flare_params *params = &row.params.flare;
     const int count = params->count;
 
     if (!accumulate_before(adjoint, pass, error))
         return false;
     if (count == 0)
-        return vkb_accumulate_moved(adjoint, &row, pass->reads[0], error);
+        return vkb_accumulate_moved(adjoint, &row, pass->reads[SLOT_SOURCE], error);
     params->count = 1;
     for (int ghost = 0; ghost < count; ++ghost) {
         memcpy(params->ghosts[0], pass->params.flare.ghosts[ghost], sizeof params->ghosts[0]);

@@ -106,10 +106,10 @@ static bool accumulate_stacked(struct vkb_adjoint *adjoint, const struct vkb_pas
     if (!vkb_add_adjoint_image(adjoint, &row, size, &image, error))
         return false;
     for (int group = 0; group < count; ++group) {
-        vkb_filter_begin(adjoint->graph, pass->reads[0], pass->targets[0], &filter);
+        vkb_filter_begin(adjoint->graph, pass->reads[SLOT_SOURCE], pass->targets[0], &filter);
         set_group(&row, group, &filter);
         filter.y.first = (uint32_t)group * height;
-        if (!vkb_accumulate_filter(adjoint, &filter, image, pass->reads[0], error))
+        if (!vkb_accumulate_filter(adjoint, &filter, image, pass->reads[SLOT_SOURCE], error))
             return false;
     }
     return true;
@@ -124,10 +124,10 @@ static bool accumulate_each(struct vkb_adjoint *adjoint, const struct vkb_pass_r
 
     for (int group = 0; group < count; ++group) {
         row.constants.levels = group;
-        vkb_filter_begin(adjoint->graph, pass->reads[0], pass->targets[0], &filter);
+        vkb_filter_begin(adjoint->graph, pass->reads[SLOT_SOURCE], pass->targets[0], &filter);
         set_group(&row, group, &filter);
-        if (!vkb_accumulate_through(adjoint, &row, &filter, pass->reads[0], pass->targets[0],
-                                    error))
+        if (!vkb_accumulate_through(adjoint, &row, &filter, pass->reads[SLOT_SOURCE],
+                                    pass->targets[0], error))
             return false;
     }
     return true;
@@ -144,20 +144,22 @@ bool vkb_transpose_groups(struct vkb_adjoint *adjoint, const struct vkb_pass_row
         return vkb_transpose_nine(adjoint, pass, error);
     // Without threshold and mask Filament's reduction is a filter.
     if (groups == GROUPS_FILAMENT && !pass->constants.thresholded && !pass->constants.masked) {
-        vkb_filter_begin(adjoint->graph, pass->reads[0], pass->targets[0], &filter);
+        vkb_filter_begin(adjoint->graph, pass->reads[SLOT_SOURCE], pass->targets[0], &filter);
         vkb_filter_three(&filter, 1.0, 0.25);
         return vkb_accumulate_filter(adjoint, &filter, vkb_cotangent_of(adjoint, pass),
-                                     pass->reads[0], error);
+                                     pass->reads[SLOT_SOURCE], error);
     }
     const uint32_t height = adjoint->graph->images[pass->targets[0]].height;
     const bool stacked = count > 1 && (uint64_t)count * height <= adjoint->max_side;
-    struct vkb_pass_row row = vkb_slope_row(adjoint, pass, &vkb_shader_adjoint_groups_frag, 2);
+    struct vkb_pass_row row = vkb_slope_row(adjoint, pass, &vkb_shader_adjoint_groups_frag);
 
     row.constants.levels = 0;
     row.constants.radix_1 = 1;
     // Its groups are texels then. The shader reads the mask in the same way.
-    if (groups == GROUPS_KINO && vkb_same_size(adjoint->graph, row.reads[0], pass->targets[0])
-        && vkb_same_size(adjoint->graph, row.reads[1], pass->targets[0]))
+    if (groups == GROUPS_KINO
+        && vkb_same_size(adjoint->graph, row.reads[SLOT_SOURCE], pass->targets[0])
+        && (!row.constants.masked
+            || vkb_same_size(adjoint->graph, row.reads[SLOT_MASK], pass->targets[0])))
         row.constants.sampling = SAMPLING_TEXEL;
     return (stacked ? accumulate_stacked : accumulate_each)(adjoint, pass, &row, count, error)
         && vkb_accumulate_mask(adjoint, pass, &row, error);

@@ -86,7 +86,6 @@ static bool accumulate_summed(struct vkb_adjoint *adjoint, const struct vkb_pass
     struct vkb_pass_row row = *given;
 
     row.constants.stage = STAGE_LAST;
-    row.reads[row.read_count++] = row.reads[0];
     set_groups(&row, &sums, 0, 0, 1);
     if (sums.width == 0)
         return vkb_accumulate_cotangent(adjoint, &row, image, error);
@@ -104,8 +103,8 @@ static bool accumulate_summed(struct vkb_adjoint *adjoint, const struct vkb_pass
         set_groups(&part, &sums, first, count, across);
         row = part;
         part.constants.stage = STAGE_FIRST;
-        part.reads[part.read_count - 1] = part.reads[0];
-        if (!vkb_add_adjoint_image(adjoint, &part, size, &row.reads[row.read_count - 1], error)
+        part.reads[SLOT_SUMS] = VKB_NO_IMAGE;
+        if (!vkb_add_adjoint_image(adjoint, &part, size, &row.reads[SLOT_SUMS], error)
             || !vkb_accumulate_cotangent(adjoint, &row, image, error))
             return false;
     }
@@ -200,7 +199,9 @@ bool vkb_accumulate_moved(struct vkb_adjoint *adjoint, const struct vkb_pass_row
 
     if (!vkb_add_adjoint_image(adjoint, row, size, &sampled, error))
         return false;
-    struct vkb_pass_row moved = vkb_adjoint_row(&vkb_shader_adjoint_moved_frag, &sampled, 1);
+    struct vkb_pass_row moved = vkb_adjoint_row(&vkb_shader_adjoint_moved_frag, VKB_NO_IMAGE);
+    // The shader samples them as the forward pass samples the source.
+    moved.reads[SLOT_SOURCE] = sampled;
     moved.block = row->block;
     moved.params = row->params;
     return accumulate_summed(adjoint, &moved, &gathering, source, error);
@@ -223,7 +224,7 @@ static double beam_iterations(const struct gathering *gathering, double distance
 bool vkb_transpose_sun_beams(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
                              struct vkb_error *error)
 {
-    const uint32_t source = pass->reads[0], cotangents = vkb_cotangent_of(adjoint, pass);
+    const uint32_t source = pass->reads[SLOT_SOURCE], cotangents = vkb_cotangent_of(adjoint, pass);
     const struct vkb_image_row *image = &adjoint->graph->images[source];
     const struct vkb_sun_beams_params *params = &pass->params.sun_beams;
     const double left = params->left;
@@ -237,7 +238,7 @@ bool vkb_transpose_sun_beams(struct vkb_adjoint *adjoint, const struct vkb_pass_
         .most = left > 0.0 ? params->most + 2.0 + beyond : 4.0,
         .beyond = beyond + 2.0,
     };
-    struct vkb_pass_row row = vkb_adjoint_row(&vkb_shader_adjoint_beam_means_frag, &cotangents, 1);
+    struct vkb_pass_row row = vkb_adjoint_row(&vkb_shader_adjoint_beam_means_frag, cotangents);
     uint32_t sums;
 
     row.block = VKB_BLOCK_sun_beams;
@@ -245,6 +246,6 @@ bool vkb_transpose_sun_beams(struct vkb_adjoint *adjoint, const struct vkb_pass_
     if (!vkb_add_adjoint_row(adjoint, &row, gathering.size, &sums, error))
         return false;
     row.shader = &vkb_shader_adjoint_beams_frag;
-    row.reads[0] = sums;
+    row.reads[SLOT_COTANGENTS] = sums;
     return accumulate_summed(adjoint, &row, &gathering, source, error);
 }

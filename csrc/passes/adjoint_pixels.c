@@ -46,17 +46,21 @@ static bool accumulate_composite(struct vkb_adjoint *adjoint, struct vkb_pass_ro
                                  struct vkb_error *error)
 {
     const struct vkb_constants *constants = &row->constants;
-    const uint32_t images[] = {row->reads[0], row->reads[1], row->reads[2]};
+    const uint32_t images[] = {
+        [BY_SCENE] = row->reads[SLOT_SCENE],
+        [BY_BLOOM] = row->reads[SLOT_BLOOM],
+        [BY_MASK] = row->reads[SLOT_MASK],
+    };
 
     if (!depends_on_bloom(row))
-        row->reads[1] = row->reads[0];
+        row->reads[SLOT_BLOOM] = VKB_NO_IMAGE;
     for (enum vkb_mode by = BY_SCENE; by <= BY_MASK; ++by) {
         row->constants.by = by;
         if ((by == BY_BLOOM && constants->composite == COMPOSITE_OFF)
             || (by == BY_MASK && !constants->masked))
             continue;
-        if (by == BY_SCENE && scales_scene(row) && adjoint->cotangents[images[0]] == VKB_NO_IMAGE)
-            vkb_delay_scene(adjoint, row, share_of_scene(row), images[0]);
+        if (by == BY_SCENE && scales_scene(row) && adjoint->cotangents[images[by]] == VKB_NO_IMAGE)
+            vkb_delay_scene(adjoint, row, share_of_scene(row), images[by]);
         else if (!vkb_accumulate_cotangent(adjoint, row, images[by], error))
             return false;
     }
@@ -103,15 +107,16 @@ static bool add_curves(struct vkb_adjoint *adjoint, struct vkb_pass_row *row,
     row->constants.encoding = ENCODING_NONE;
     row->params.composite.exposure = 0.0f;
     row->params.composite.limit = (float)SINGLE_LIMIT;
-    return vkb_add_adjoint_image(adjoint, &curves, size_of(adjoint, row->reads[0]), &row->reads[3],
-                                 error);
+    return vkb_add_adjoint_image(adjoint, &curves, size_of(adjoint, row->reads[SLOT_SCENE]),
+                                 &row->reads[SLOT_COTANGENTS], error);
 }
 
 bool vkb_transpose_composite(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
                              struct vkb_error *error)
 {
-    struct vkb_pass_row row = vkb_slope_row(adjoint, pass, &vkb_shader_adjoint_composite_frag, 3);
+    struct vkb_pass_row row = vkb_slope_row(adjoint, pass, &vkb_shader_adjoint_composite_frag);
 
+    row.reads[SLOT_BLOOM] = pass->reads[SLOT_BLOOM];
     if (is_clamped(adjoint->graph))
         row.constants.groups = GROUPS_PYGFX;
     row.constants.thresholded = row.constants.alpha == ALPHA_BLUR && is_thresholded(adjoint->graph);
@@ -125,9 +130,9 @@ bool vkb_transpose_blender_end(struct vkb_adjoint *adjoint, const struct vkb_pas
                                struct vkb_error *error)
 {
     const struct vkb_blender_end_params *params = &pass->params.blender_end;
-    const uint32_t source = pass->reads[0], target = pass->targets[0];
+    const uint32_t source = pass->reads[SLOT_SOURCE], target = pass->targets[0];
     const struct vkb_pass_row row =
-        vkb_slope_row(adjoint, pass, &vkb_shader_adjoint_blender_end_frag, 1);
+        vkb_slope_row(adjoint, pass, &vkb_shader_adjoint_blender_end_frag);
     struct vkb_filter filter;
 
     vkb_filter_begin(adjoint->graph, source, target, &filter);
@@ -140,12 +145,12 @@ bool vkb_transpose_threshold(struct vkb_adjoint *adjoint, const struct vkb_pass_
                              struct vkb_error *error)
 {
     const uint32_t target = pass->targets[0];
-    struct vkb_pass_row row = vkb_slope_row(adjoint, pass, &vkb_shader_adjoint_threshold_frag, 2);
+    struct vkb_pass_row row = vkb_slope_row(adjoint, pass, &vkb_shader_adjoint_threshold_frag);
 
     if (pass->constants.threshold_mode == THRESHOLD_KNEE
         && !vkb_add_sums(adjoint, &row, size_of(adjoint, target), ".by_threshold", error))
         return false;
     row.constants.by = BY_SCENE;
-    return vkb_accumulate_sampled(adjoint, &row, pass->reads[0], target, error)
+    return vkb_accumulate_sampled(adjoint, &row, pass->reads[SLOT_SOURCE], target, error)
         && vkb_accumulate_mask(adjoint, pass, &row, error);
 }

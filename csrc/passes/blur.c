@@ -47,8 +47,7 @@ struct vkb_pass_row vkb_blur_row(const struct vkb_graph *graph, const char *name
         && (same_size || is_integer(step))
         && move_to_texels(blur, step, moved.weights, &moved.count))
         moved.step_x = moved.step_y = 1.0;
-    row.reads[0] = from;
-    row.read_count = 1;
+    vkb_read_only(&row, from);
     row.block = VKB_BLOCK_blur;
     params->step_x = blur->direction == DIRECTION_VERTICAL ? 0.0f : (float)moved.step_x;
     params->step_y = blur->direction == DIRECTION_HORIZONTAL ? 0.0f : (float)moved.step_y;

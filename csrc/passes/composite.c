@@ -65,11 +65,9 @@ void vkb_add_composite(struct vkb_levels *levels, const struct vkb_composite_sou
     row.constants.lit = source->lit;
     if (settings->method == VKB_METHOD_GODOT && !off)
         row.constants.groups = GROUPS_GODOT;
-    row.reads[0] = source->scene;
-    // Every binding of the shader must be filled, also one that this variant does not read.
-    row.reads[1] = off ? source->scene : source->bloom;
-    row.reads[2] = row.constants.masked ? source->mask : source->scene;
-    row.read_count = 3;
+    vkb_read_only(&row, source->scene);
+    vkb_read_at(&row, SLOT_MASK, row.constants.masked ? source->mask : VKB_NO_IMAGE);
+    vkb_read_at(&row, SLOT_BLOOM, source->bloom);
     row.block = VKB_BLOCK_composite;
     vkb_params_read(row.block, &settings->values, &row.params);
     row.params.composite.limit = vkb_formats[image.format].limit;

@@ -121,9 +121,8 @@ struct vkb_pass_row vkb_fft_row(const struct vkb_graph *graph, const struct vkb_
         groups(horizontal ? count : stage->lines, (uint32_t)row.constants.group_width);
     row.groups_height =
         groups(horizontal ? stage->lines : count, (uint32_t)row.constants.group_height);
-    // Every binding of the shader must be filled, also one that this pass does not read.
-    row.reads[0] = row.reads[1] = stage->from;
-    row.read_count = 2;
+    vkb_read_only(&row, stage->from);
+    vkb_read_at(&row, SLOT_SPECTRUM, VKB_NO_IMAGE);
     row.constants.direction = axis->direction;
     row.constants.inverse = stage->inverse;
     row.constants.padded = stage->padded;
@@ -152,7 +151,7 @@ void vkb_fft_multiply(const struct vkb_fft_axis *rows, const struct vkb_fft_axis
 
     memcpy(blocks, columns->line.radices, sizeof blocks);
     blocks[columns->line.stage_count - 1] = 1;
-    row->reads[1] = spectrum;
+    row->reads[SLOT_SPECTRUM] = spectrum;
     row->constants.stage = grey ? STAGE_GREY : STAGE_PRODUCT;
     if (grey)
         return;

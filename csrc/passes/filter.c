@@ -8,8 +8,7 @@ struct vkb_pass_row vkb_fetching_row(const struct vkb_levels *levels,
 {
     struct vkb_pass_row row = vkb_fullscreen_row(levels->graph->images[to].name, fragment, to);
 
-    row.reads[0] = from;
-    row.read_count = 1;
+    vkb_read_only(&row, from);
     // Filtered in the shader: lavapipe's sampler keeps 8 bits of the position, and the errors of a
     // chain add up.
     row.constants.sampling = SAMPLING_FETCH;
@@ -137,9 +136,7 @@ void vkb_add_filter(struct vkb_levels *levels, const struct vkb_taps *filter, ui
         constants->taken_x = taken(params->taps_x, window, source->width, target->width);
         constants->taken_y = taken(params->taps_y, window, source->height, target->height);
     }
-    // Every binding of the shader must be filled, also one that this variant does not read.
-    row.reads[1] = filter->adds_own ? filter->own : from;
-    row.read_count = 2;
+    vkb_read_at(&row, SLOT_OWN, filter->adds_own ? filter->own : VKB_NO_IMAGE);
     vkb_levels_pass(levels, &row);
 }
 

@@ -259,10 +259,9 @@ void vkb_levels_gather(struct vkb_levels *levels, const double *shares, enum vkb
     row.constants.levels = (int32_t)levels->count;
     row.constants.taps = row.constants.kernels = 1;
     row.constants.window = kernel == UPSAMPLE_CUBIC ? 4 : 2;
-    // Every binding of the shader must be filled, also one that this variant does not read.
-    row.read_count = GATHERED_LEVELS;
     for (uint32_t level = 0; level < GATHERED_LEVELS; ++level)
-        row.reads[level] = levels->downs[level < levels->count ? level : 0];
+        vkb_read_at(&row, SLOT_LEVELS + level,
+                    level < levels->count ? levels->downs[level] : VKB_NO_IMAGE);
     row.block = VKB_BLOCK_gather;
     for (uint32_t level = 0; level < levels->count; ++level)
         row.params.gather.shares[level / 4][level % 4] = (float)shares[level];

@@ -23,15 +23,21 @@ struct vkb_pass_row vkb_fullscreen_row(const char *name, const struct vkb_shader
 void vkb_apply_mask(struct vkb_pass_row *row, uint32_t mask)
 {
     row->constants.masked = mask != VKB_NO_IMAGE;
-    // Every binding of the shader must be filled, also one that this variant does not read.
-    row->reads[1] = row->constants.masked ? mask : row->reads[0];
-    row->read_count = 2;
+    vkb_read_at(row, SLOT_MASK, mask);
 }
 
-void vkb_drop_reads(struct vkb_pass_row *row, uint32_t read_count)
+void vkb_read_at(struct vkb_pass_row *row, enum vkb_slot slot, uint32_t image)
 {
-    while (row->read_count > read_count)
-        row->reads[--row->read_count] = 0;
+    while (row->read_count <= (uint32_t)slot)
+        row->reads[row->read_count++] = VKB_NO_IMAGE;
+    row->reads[slot] = image;
+}
+
+void vkb_read_only(struct vkb_pass_row *row, uint32_t source)
+{
+    memset(row->reads, 0, sizeof row->reads);
+    row->read_count = 0;
+    vkb_read_at(row, SLOT_SOURCE, source);
 }
 
 bool vkb_same_size(const struct vkb_graph *graph, uint32_t a, uint32_t b)

@@ -54,11 +54,13 @@ bool vkb_same_size(const struct vkb_graph *graph, uint32_t a, uint32_t b);
 struct vkb_pass_row vkb_fullscreen_row(const char *name, const struct vkb_shader *fragment,
                                        uint32_t target);
 
-// Makes a pass that reads one image read the mask after it; VKB_NO_IMAGE: no mask.
+// Makes a pass read the mask; VKB_NO_IMAGE: no mask.
 void vkb_apply_mask(struct vkb_pass_row *row, uint32_t mask);
 
-// Removes all images after the first `read_count` from the images that the pass reads.
-void vkb_drop_reads(struct vkb_pass_row *row, uint32_t read_count);
+// Makes a pass read an image at a slot (VKB_NO_IMAGE: none), beside those that it reads; or at
+// SLOT_SOURCE alone.
+void vkb_read_at(struct vkb_pass_row *row, enum vkb_slot slot, uint32_t image);
+void vkb_read_only(struct vkb_pass_row *row, uint32_t source);
 
 // What a graph is built with. After a failure all functions of it do nothing, and an image that
 // they return is the first one. The source is there while a method adds its rows.

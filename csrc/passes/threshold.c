@@ -46,7 +46,7 @@ void vkb_add_threshold_in(struct vkb_levels *levels, enum vkb_mode mode, uint32_
     const bool same_size = vkb_same_size(graph, image, glow)
                         && (mask == VKB_NO_IMAGE || vkb_same_size(graph, mask, glow));
     row.constants.sampling = same_size ? SAMPLING_TEXEL : SAMPLING_FETCH;
-    row.reads[0] = image;
+    vkb_read_only(&row, image);
     vkb_apply_mask(&row, mask);
     row.block = VKB_BLOCK_threshold;
     // Without a threshold its settings stay 0, so that the pass does not depend on them.

@@ -305,11 +305,14 @@ static PyObject *describe_pass(const struct vkb_graph *graph, const char *name, 
                                uint32_t group)
 {
     const struct vkb_pass_row *pass = &graph->passes[index];
-    uint32_t targets[VKB_MAX_TARGETS + 1];
+    uint32_t targets[VKB_MAX_TARGETS + 1], reads[VKB_MAX_READS], read_count = 0;
     const uint32_t target_count = vkb_pass_targets(pass, targets);
 
+    for (uint32_t slot = 0; slot < pass->read_count; ++slot)
+        if (pass->reads[slot] != VKB_NO_IMAGE)
+            reads[read_count++] = pass->reads[slot];
     return Py_BuildValue("(ssNNsI)", name, pass->shader->name,
-                         image_names(graph, pass->reads, pass->read_count),
+                         image_names(graph, reads, read_count),
                          image_names(graph, targets, target_count),
                          pass->variant ? pass->variant : "fragment", group);
 }

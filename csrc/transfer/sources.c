@@ -66,7 +66,8 @@ static bool allows_in_place(const struct vkb_request *request, uint32_t image,
         const struct vkb_pass_row *pass = &graph->passes[i];
         if (vkb_pass_reads(pass, image)
             && (pass->reading != VKB_READING_LINEAR_TEXELS
-                || (input->channels != 4 && (pass->reads[0] != image || !pass->shader->rgb))))
+                || (input->channels != 4
+                    && (pass->reads[SLOT_SOURCE] != image || !pass->shader->rgb))))
             return false;
     }
     for (uint32_t i = 0; i < request->plan->output_count; ++i)

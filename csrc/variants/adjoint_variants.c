@@ -22,7 +22,7 @@ static struct axis axis_of(const struct vkb_graph *graph, const struct vkb_pass_
     const int32_t kept = vertical ? DIRECTION_HORIZONTAL : DIRECTION_VERTICAL;
 
     return (struct axis){
-        .texels = graph->images[pass->reads[1]].pixels,
+        .texels = graph->images[pass->reads[SLOT_WEIGHTS]].pixels,
         .start = pass->constants.direction == kept ? -1
                : vertical                          ? params->start_y
                                                    : params->start_x,
@@ -45,7 +45,9 @@ bool vkb_are_floats(const struct vkb_variant_choice *choice, const struct vkb_pa
     bool fits = vkb_fits_linear(choice, pass);
 
     for (uint32_t i = 0; i < pass->read_count; ++i)
-        fits = fits && choice->graph->images[pass->reads[i]].format == VKB_FORMAT_RGBA32_FLOAT;
+        fits = fits
+            && (pass->reads[i] == VKB_NO_IMAGE
+                || choice->graph->images[pass->reads[i]].format == VKB_FORMAT_RGBA32_FLOAT);
     return fits;
 }
 
@@ -53,23 +55,15 @@ bool vkb_is_factor(const struct vkb_pass_row *pass)
 {
     return vkb_transposes(pass, VKB_BLOCK_composite) && !pass->constants.masked
         && pass->constants.by == BY_BLOOM && !pass->constants.add_own && !pass->constants.from_image
-        && pass->reads[0] == pass->reads[1]
+        && pass->reads[SLOT_BLOOM] == VKB_NO_IMAGE
         && (pass->constants.composite == COMPOSITE_ADD
             || pass->constants.composite == COMPOSITE_MIX);
-}
-
-// Also in place of images that the row does not read.
-static void replace_read(struct vkb_pass_row *row, uint32_t from, uint32_t to)
-{
-    for (uint32_t i = 0; i < row->read_count; ++i)
-        row->reads[i] = row->reads[i] == from ? to : row->reads[i];
 }
 
 // Reads the cotangents of a composite without a curve in place of those of its bloom.
 static void read_composite(const struct vkb_graph *graph, struct vkb_pass_row *row)
 {
-    const uint32_t by_bloom = row->reads[0];
-    const struct vkb_pass_row *pass = vkb_writer_of(graph, by_bloom);
+    const struct vkb_pass_row *pass = vkb_writer_of(graph, row->reads[SLOT_COTANGENTS]);
 
     if (!pass || !vkb_is_factor(pass))
         return;
@@ -79,8 +73,8 @@ static void read_composite(const struct vkb_graph *graph, struct vkb_pass_row *r
     const float exposure = pass->constants.groups == GROUPS_GODOT ? 0.0f : params->exposure;
     row->params.adjoint_filter.gain *= intensity * exp2f(exposure);
     row->constants.by = BY_BLOOM;
-    replace_read(row, by_bloom, pass->reads[3]);
-    row->reads[2] = pass->reads[0];
+    row->reads[SLOT_COTANGENTS] = pass->reads[SLOT_COTANGENTS];
+    row->reads[SLOT_SCENE] = pass->reads[SLOT_SCENE];
 }
 
 // The same, if its images have linear texels, too.
@@ -149,7 +143,7 @@ static uint32_t readers_of_image(const struct vkb_graph *graph, uint32_t image)
 
     for (uint32_t i = 0; i < graph->pass_count; ++i)
         readers += graph->passes[i].block == VKB_BLOCK_adjoint_filter
-                && graph->passes[i].reads[0] == image;
+                && graph->passes[i].reads[SLOT_COTANGENTS] == image;
     return readers;
 }
 
@@ -158,13 +152,13 @@ static const struct vkb_pass_row *other_axis(const struct vkb_variant_choice *ch
                                              const struct vkb_pass_row *pass)
 {
     const struct vkb_graph *graph = &choice->plain;
-    const struct vkb_pass_row *first = vkb_writer_of(graph, pass->reads[0]);
+    const struct vkb_pass_row *first = vkb_writer_of(graph, pass->reads[SLOT_COTANGENTS]);
 
     if (!(pass->constants.direction != DIRECTION_BOTH && first
           && first->block == VKB_BLOCK_adjoint_filter && !first->constants.add_own
           && !first->constants.from_image
           && first->constants.direction == !pass->constants.direction
-          && readers_of_image(graph, pass->reads[0]) == 1))
+          && readers_of_image(graph, pass->reads[SLOT_COTANGENTS]) == 1))
         return NULL;
     const bool vertical = pass->constants.direction == DIRECTION_VERTICAL;
     const struct axis along = axis_of(choice->graph, pass, vertical);
@@ -245,14 +239,15 @@ static bool make_tiles(const struct vkb_variant_choice *choice, const struct vkb
     struct vkb_constants *constants = &row->constants;
     int32_t width = most_readers(&x), height = most_readers(&y);
 
-    const struct vkb_image_row *source = &graph->images[(other ? other : pass)->reads[0]];
+    const struct vkb_image_row *source =
+        &graph->images[(other ? other : pass)->reads[SLOT_COTANGENTS]];
     int32_t exact_x = vkb_ratio_of(source->width, x.size);
     int32_t exact_y = vkb_ratio_of(source->height, y.size);
     if (width > MAX_READERS || height > MAX_READERS
         || (pass->constants.levels == 1 && !exact_y && x.start >= 0 && y.start >= 0))
         return false;
     if (other) {
-        replace_read(row, pass->reads[0], other->reads[0]);
+        row->reads[SLOT_COTANGENTS] = other->reads[SLOT_COTANGENTS];
         params->gain *= other->params.adjoint_filter.gain;
     }
     params->pictures[0][0] = (float)x.start;
@@ -290,8 +285,8 @@ static bool continues(const struct vkb_pass_row *pass, const struct vkb_pass_row
 {
     return pass->block == VKB_BLOCK_adjoint_filter && next->block == pass->block
         && pass->constants.levels == 1 && next->constants.levels == 1
-        && next->reads[0] == pass->reads[0] && next->constants.add_own
-        && next->reads[3] == pass->targets[0]
+        && next->reads[SLOT_COTANGENTS] == pass->reads[SLOT_COTANGENTS] && next->constants.add_own
+        && next->reads[SLOT_ADDED] == pass->targets[0]
         && next->params.adjoint_filter.gain == pass->params.adjoint_filter.gain;
 }
 
@@ -309,7 +304,7 @@ static bool add_pictures(struct vkb_variant_choice *choice, const struct vkb_pas
         return true;
     memcpy(&row, pass, sizeof row);
     row.fused = row.gains_if_finite = true;
-    row.reads[3] = first->reads[3];
+    row.reads[SLOT_ADDED] = first->reads[SLOT_ADDED];
     row.constants.add_own = first->constants.add_own;
     row.params.adjoint_filter.share = first->params.adjoint_filter.share;
     for (const struct vkb_pass_row *each = first; each <= pass; ++each) {

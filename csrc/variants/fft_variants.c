@@ -113,22 +113,22 @@ static struct vkb_pass_row make_row(const struct vkb_variant_choice *choice,
 
     memcpy(&row, first, sizeof row);
     if (first->constants.stage != STAGE_FIRST)
-        row.reads[0] = row.reads[1] = graph->passes[graph->pass_count - 1].targets[0];
+        row.reads[SLOT_SOURCE] = graph->passes[graph->pass_count - 1].targets[0];
     // Columns are transformed in place.
     row.targets[0] = first->constants.inverse ? last->targets[0]
                    : horizontal               ? first->targets[0]
-                                              : row.reads[0];
+                                              : row.reads[SLOT_SOURCE];
     if (first->constants.inverse)
         row.constants.stage = STAGE_LAST;
     for (const struct vkb_pass_row *pass = first; pass < end; ++pass)
         if (pass->constants.stage == STAGE_PRODUCT || pass->constants.stage == STAGE_GREY) {
             row.constants.stage = STAGE_PRODUCT;
-            row.reads[1] = pass->reads[1];
+            row.reads[SLOT_SPECTRUM] = pass->reads[SLOT_SPECTRUM];
         }
     row.constants.rotated = 0;
     row.params.fft.padded = (int)length;
     const struct vkb_image_row *spectra =
-        &graph->images[first->constants.inverse ? row.reads[0] : row.targets[0]];
+        &graph->images[first->constants.inverse ? row.reads[SLOT_SOURCE] : row.targets[0]];
     row.params.fft.kept = horizontal ? last->params.fft.kept : (int)spectra->height;
     row.params.fft.across = (int)(horizontal ? spectra->height : spectra->width);
     (void)make_group(choice->device, length, &group);
@@ -206,7 +206,7 @@ static bool reaches(const struct vkb_device *device, const struct vkb_image_row 
 
 bool vkb_add_transform(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
 {
-    const struct vkb_image_row *from = &choice->graph->images[pass->reads[0]];
+    const struct vkb_image_row *from = &choice->graph->images[pass->reads[SLOT_SOURCE]];
     const struct vkb_image_row *target = &choice->graph->images[pass->targets[0]];
     struct vkb_pass_row row;
 

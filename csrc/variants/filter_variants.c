@@ -33,7 +33,7 @@ static bool fits_rows(const struct vkb_variant_choice *choice, const struct vkb_
     bool fits = vkb_fits_linear(choice, pass);
 
     for (uint32_t i = 0; i < count; ++i) {
-        const struct vkb_size size = rows_size(choice, pass, pass->reads[i]);
+        const struct vkb_size size = rows_size(choice, pass, pass->reads[SLOT_LEVELS + i]);
         fits = fits
             && vkb_image_fits_linear_texels(choice->device, VKB_FORMAT_RGBA32_FLOAT, size.width,
                                             size.height);
@@ -46,7 +46,7 @@ static bool fits_rows(const struct vkb_variant_choice *choice, const struct vkb_
 static uint32_t add_rows(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
                          uint32_t level)
 {
-    const uint32_t from = pass->reads[level];
+    const uint32_t from = pass->reads[SLOT_LEVELS + level];
     const struct vkb_size size = rows_size(choice, pass, from);
     const enum vkb_format format = choice->graph->images[from].format;
     char name[VKB_NAME_SIZE];
@@ -56,8 +56,7 @@ static uint32_t add_rows(struct vkb_variant_choice *choice, const struct vkb_pas
     memcpy(&row, pass, sizeof row);
     row.constants.levels = 0;
     memset(&row.params, 0, sizeof row.params);
-    row.reads[0] = from;
-    vkb_drop_reads(&row, 1);
+    vkb_read_only(&row, from);
     row.targets[0] = vkb_add_floats(choice, name, size);
     vkb_make_linear(&row, rows_shaders[format], GATHER_COLUMNS, GATHER_ROWS);
     vkb_add_variant(choice, &row);
@@ -70,8 +69,8 @@ bool vkb_add_gathered(struct vkb_variant_choice *choice, const struct vkb_pass_r
     const uint32_t levels = (uint32_t)pass->constants.levels;
     const enum vkb_format format = choice->graph->images[pass->targets[0]].format;
     const bool own = pass->constants.upsample == UPSAMPLE_LINEAR
-                  && vkb_same_size(&choice->plain, pass->reads[0], pass->targets[0])
-                  && vkb_has_format_of(&choice->plain, pass->reads[0], pass->targets[0]);
+                  && vkb_same_size(&choice->plain, pass->reads[SLOT_LEVELS], pass->targets[0])
+                  && vkb_has_format_of(&choice->plain, pass->reads[SLOT_LEVELS], pass->targets[0]);
 
     if (!(pass->block == VKB_BLOCK_gather && fits_rows(choice, pass, levels)))
         return false;
@@ -79,9 +78,7 @@ bool vkb_add_gathered(struct vkb_variant_choice *choice, const struct vkb_pass_r
     row.constants.add_own = own;
     row.constants.sampling = 0;
     for (uint32_t level = own; level < levels; ++level)
-        row.reads[level] = add_rows(choice, pass, level);
-    for (uint32_t level = levels; level < row.read_count; ++level)
-        row.reads[level] = row.reads[0];
+        row.reads[SLOT_LEVELS + level] = add_rows(choice, pass, level);
     vkb_make_linear(&row, gather_shaders[format], TEXEL_COLUMNS(vkb_formats[format].channel_size),
                     GATHER_ROWS);
     return vkb_add_variant(choice, &row);
@@ -91,7 +88,7 @@ bool vkb_add_gathered(struct vkb_variant_choice *choice, const struct vkb_pass_r
 static void take_filter(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
                         struct vkb_pass_row *row)
 {
-    const struct vkb_image_row *source = &choice->plain.images[pass->reads[0]];
+    const struct vkb_image_row *source = &choice->plain.images[pass->reads[SLOT_SOURCE]];
     const struct vkb_image_row *target = &choice->plain.images[pass->targets[0]];
     const int32_t upsample = pass->constants.upsample;
 
@@ -117,7 +114,7 @@ struct filter_shaders {
 static bool make_filter(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
                         struct filter_shaders shaders, struct vkb_pass_row *row)
 {
-    const struct vkb_image_row *source = &choice->plain.images[pass->reads[0]];
+    const struct vkb_image_row *source = &choice->plain.images[pass->reads[SLOT_SOURCE]];
     const struct vkb_image_row *target = &choice->plain.images[pass->targets[0]];
 
     // Its taps are in a window.
@@ -129,9 +126,9 @@ static bool make_filter(const struct vkb_variant_choice *choice, const struct vk
         return true;
     }
     // Of images with one format.
-    if (!vkb_has_format_of(&choice->plain, pass->reads[0], pass->targets[0])
+    if (!vkb_has_format_of(&choice->plain, pass->reads[SLOT_SOURCE], pass->targets[0])
         || (pass->constants.add_own
-            && !vkb_has_format_of(&choice->plain, pass->reads[1], pass->targets[0]))
+            && !vkb_has_format_of(&choice->plain, pass->reads[SLOT_OWN], pass->targets[0]))
         || !vkb_fits_linear(choice, row))
         return false;
     row->constants.enlarged = source->height <= target->height;
@@ -159,15 +156,15 @@ const struct vkb_pass_row *vkb_nested_filter(const struct vkb_variant_choice *ch
 {
     const struct vkb_graph *plain = &choice->plain;
     const struct vkb_pass_row *up =
-        vkb_ends_bloom(pass) ? vkb_writer_of(plain, pass->reads[1]) : NULL;
+        vkb_ends_bloom(pass) ? vkb_writer_of(plain, pass->reads[SLOT_BLOOM]) : NULL;
     const uint32_t target = pass->targets[0];
 
     // The shaders are compiled for one format. The levels of a published method may have their own.
     return up && vkb_is_filter(up) && !up->constants.add_own && !pass->constants.masked
-                && vkb_has_format_of(plain, up->reads[0], target)
-                && vkb_has_format_of(plain, pass->reads[0], target)
-                && plain->images[pass->reads[1]].format == plain->images[target].format
-                && vkb_same_size(plain, pass->reads[1], target)
+                && vkb_has_format_of(plain, up->reads[SLOT_SOURCE], target)
+                && vkb_has_format_of(plain, pass->reads[SLOT_SCENE], target)
+                && plain->images[pass->reads[SLOT_BLOOM]].format == plain->images[target].format
+                && vkb_same_size(plain, pass->reads[SLOT_BLOOM], target)
              ? up
              : NULL;
 }
@@ -175,17 +172,17 @@ const struct vkb_pass_row *vkb_nested_filter(const struct vkb_variant_choice *ch
 struct vkb_pass_row vkb_nested_row(const struct vkb_variant_choice *choice,
                                    const struct vkb_pass_row *pass, const struct vkb_pass_row *up)
 {
-    const enum vkb_format format = choice->plain.images[pass->reads[1]].format;
+    const enum vkb_format format = choice->plain.images[pass->reads[SLOT_BLOOM]].format;
     struct vkb_pass_row row;
     struct vkb_filter_final_params *params = &row.params.filter_final;
 
     memcpy(&row, pass, sizeof row);
     memset(&row.params, 0, sizeof row.params);
     row.fused = true;
-    row.reads[0] = up->reads[0];
-    row.reads[1] = pass->reads[0];
-    row.reads[2] = pass->reads[3];
-    vkb_drop_reads(&row, pass->transposed ? 3 : 2);
+    vkb_read_only(&row, up->reads[SLOT_SOURCE]);
+    vkb_read_at(&row, SLOT_OWN, pass->reads[SLOT_SCENE]);
+    if (pass->transposed)
+        vkb_read_at(&row, SLOT_ENDED, pass->reads[SLOT_COTANGENTS]);
     row.block = VKB_BLOCK_filter_final;
     SAMPLING_ROWS(filter_final, TAKE_INPUT)
     FILTER_ROWS(filter_final, TAKE_INPUT, TAKE_VEC4S)

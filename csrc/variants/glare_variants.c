@@ -13,7 +13,7 @@ bool vkb_add_streaks(struct vkb_variant_choice *choice, const struct vkb_pass_ro
 
     if (!(vkb_computes(pass, VKB_BLOCK_streaks) && !pass->params.streaks.reads_next
           && vkb_fits_linear(choice, pass)
-          && vkb_has_format_of(choice->graph, pass->reads[0], pass->targets[0])))
+          && vkb_has_format_of(choice->graph, pass->reads[SLOT_SOURCE], pass->targets[0])))
         return false;
     memcpy(&row, pass, sizeof row);
     row.constants.sampling = 0;

@@ -16,7 +16,7 @@ static const struct vkb_shader *const columns_linear[VKB_FORMAT_COUNT] =
 static bool loads(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
 {
     return vkb_fits_linear(choice, pass)
-        && vkb_has_format_of(&choice->plain, pass->reads[0], pass->targets[0]);
+        && vkb_has_format_of(&choice->plain, pass->reads[SLOT_SOURCE], pass->targets[0]);
 }
 
 // What a pass makes of its taps, of GROUPS_*; 0: it has no groups of taps.
@@ -28,7 +28,7 @@ static enum vkb_mode groups_of(const struct vkb_pass_row *pass)
 // The simple ratio of both sides of the source and the target, of EXACT_*; 0: they have none.
 static int32_t ratio_of(const struct vkb_graph *graph, const struct vkb_pass_row *pass)
 {
-    const struct vkb_image_row *source = &graph->images[pass->reads[0]];
+    const struct vkb_image_row *source = &graph->images[pass->reads[SLOT_SOURCE]];
     const struct vkb_image_row *target = &graph->images[pass->targets[0]];
     const int32_t ratio = vkb_ratio_of(source->height, target->height);
 
@@ -40,13 +40,13 @@ static void make_linear(struct vkb_pass_row *row, const struct vkb_shader *shade
                         uint32_t rows)
 {
     row->constants.sampling = 0;
-    vkb_drop_reads(row, 1);
+    vkb_read_only(row, row->reads[SLOT_SOURCE]);
     vkb_make_linear(row, shader, columns, rows);
 }
 
 bool vkb_add_windowed(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
 {
-    const struct vkb_image_row *source = &choice->plain.images[pass->reads[0]];
+    const struct vkb_image_row *source = &choice->plain.images[pass->reads[SLOT_SOURCE]];
     const struct vkb_image_row *target = &choice->plain.images[pass->targets[0]];
     const uint32_t size = vkb_formats[source->format].channel_size;
     const int32_t ratio = ratio_of(&choice->plain, pass);
@@ -82,7 +82,7 @@ bool vkb_add_windowed(struct vkb_variant_choice *choice, const struct vkb_pass_r
 bool vkb_add_nine(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
 {
     const struct vkb_image_row *target = &choice->plain.images[pass->targets[0]];
-    const enum vkb_format format = choice->plain.images[pass->reads[0]].format;
+    const enum vkb_format format = choice->plain.images[pass->reads[SLOT_SOURCE]].format;
     const bool rows = pass->constants.direction == DIRECTION_HORIZONTAL;
     const bool fits = groups_of(pass) == GROUPS_HDRP_BLUR
                         ? (pass->constants.first || pass->constants.sampling == SAMPLING_TEXEL)

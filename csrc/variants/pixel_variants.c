@@ -12,35 +12,33 @@ static const struct vkb_shader *const threshold_shaders[VKB_FORMAT_COUNT] =
 static bool blends(const struct vkb_graph *graph, const struct vkb_pass_row *pass)
 {
     return vkb_is_composite(pass) && !pass->constants.masked
-        && vkb_same_size(graph, pass->reads[0], pass->targets[0])
-        && vkb_same_size(graph, pass->reads[1], pass->targets[0])
-        && vkb_has_format_of(graph, pass->reads[0], pass->reads[1])
-        && vkb_has_format_of(graph, pass->reads[0], pass->targets[0]);
+        && vkb_same_size(graph, pass->reads[SLOT_SCENE], pass->targets[0])
+        && vkb_same_size(graph, pass->reads[SLOT_BLOOM], pass->targets[0])
+        && vkb_has_format_of(graph, pass->reads[SLOT_SCENE], pass->reads[SLOT_BLOOM])
+        && vkb_has_format_of(graph, pass->reads[SLOT_SCENE], pass->targets[0]);
 }
 
-// Turns a pass that reads only the pixel at its own position into one that loads it, from the first
-// `read_count` images.
+// Turns a pass that reads only the pixel at its own position into one that loads it.
 static void load_pixels(struct vkb_pass_row *row, const struct vkb_shader *shader,
-                        enum vkb_format format, uint32_t read_count)
+                        enum vkb_format format)
 {
     vkb_make_linear(row, shader, TEXEL_COLUMNS(vkb_formats[format].channel_size), TEXEL_ROWS);
-    vkb_drop_reads(row, read_count);
 }
 
 bool vkb_add_fullscreen(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
 {
     const struct vkb_graph *graph = choice->graph;
-    const enum vkb_format format = graph->images[pass->reads[0]].format;
+    const enum vkb_format format = graph->images[pass->reads[SLOT_SOURCE]].format;
     struct vkb_pass_row row;
 
     memcpy(&row, pass, sizeof row);
     if (choice->variants == VKB_VARIANTS_GPU)
         vkb_make_dispatch(&row, pass->shader->dispatch, PIXEL_INVOCATIONS, PIXEL_INVOCATIONS);
     else if (vkb_fits_linear(choice, pass) && blends(graph, pass))
-        load_pixels(&row, blend_shaders[format], format, 2);
+        load_pixels(&row, blend_shaders[format], format);
     else if (vkb_fits_linear(choice, pass) && vkb_is_threshold(pass)
-             && vkb_has_format_of(graph, pass->reads[0], pass->targets[0]))
-        load_pixels(&row, threshold_shaders[format], format, 1);
+             && vkb_has_format_of(graph, pass->reads[SLOT_SOURCE], pass->targets[0]))
+        load_pixels(&row, threshold_shaders[format], format);
     return vkb_add_variant(choice, &row);
 }
 

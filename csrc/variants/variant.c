@@ -80,6 +80,8 @@ bool vkb_fits_linear(const struct vkb_variant_choice *choice, const struct vkb_p
     bool fits = choice->device->linear_texels;
 
     for (uint32_t i = 0; i < pass->read_count; ++i) {
+        if (pass->reads[i] == VKB_NO_IMAGE)
+            continue;
         const struct vkb_image_row *row = &choice->graph->images[pass->reads[i]];
         fits = fits
             && vkb_image_fits_linear_texels(choice->device, row->format, row->width, row->height);
@@ -102,7 +104,7 @@ const struct vkb_pass_row *vkb_threshold_of(const struct vkb_graph *graph, uint3
     const struct vkb_pass_row *pass = vkb_writer_of(graph, image);
 
     return pass && vkb_is_threshold(pass)
-                && graph->images[pass->reads[0]].format == graph->images[image].format
+                && graph->images[pass->reads[SLOT_SOURCE]].format == graph->images[image].format
              ? pass
              : NULL;
 }
@@ -110,21 +112,20 @@ const struct vkb_pass_row *vkb_threshold_of(const struct vkb_graph *graph, uint3
 bool vkb_add_from_image(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
                         const struct vkb_pass_row *variant)
 {
-    const struct vkb_pass_row *threshold = vkb_threshold_of(&choice->plain, pass->reads[0]);
+    const struct vkb_pass_row *threshold =
+        vkb_threshold_of(&choice->plain, pass->reads[SLOT_SOURCE]);
     const bool is_filter = pass->block == VKB_BLOCK_filter;
     struct vkb_pass_row row;
 
     if (!threshold || (!is_filter && threshold->constants.threshold_mode != THRESHOLD_NONE))
         return true;
     memcpy(&row, variant, sizeof row);
-    // Also in place of a mask, if there is none.
-    for (uint32_t i = 0; i < row.read_count; ++i)
-        if (row.reads[i] == pass->reads[0])
-            row.reads[i] = threshold->reads[0];
+    row.reads[SLOT_SOURCE] = threshold->reads[SLOT_SOURCE];
     row.fused = row.gains_if_finite = true;
     row.constants.from_image = true;
     if (is_filter) {
-        row.constants.format = vkb_storage_mode(choice->plain.images[pass->reads[0]].format);
+        row.constants.format =
+            vkb_storage_mode(choice->plain.images[pass->reads[SLOT_SOURCE]].format);
         VKB_TAKE_THRESHOLD(&row, filter, threshold);
     }
     return vkb_add_variant(choice, &row);

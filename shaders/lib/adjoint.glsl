@@ -1,8 +1,7 @@
-// Ends a pass that writes the cotangents of an image. The including shader defines ADDED_BINDING:
-// there is what other readers of the image have accumulated, and after it the image itself.
+// Ends a pass that writes the cotangents of an image: adds what other readers of the image have accumulated.
 
-layout(set = 0, binding = ADDED_BINDING) uniform sampler2D added;
-layout(set = 0, binding = ADDED_BINDING + 1) uniform sampler2D differentiated;
+SAMPLED_IMAGE(SLOT_ADDED, added);
+SAMPLED_IMAGE(SLOT_DIFFERENTIATED, differentiated);
 
 // The cotangents of this pixel. The image of a source has none at NaN and infinity.
 vec4 gathered(vec4 cotangent)

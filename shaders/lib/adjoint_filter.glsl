@@ -4,36 +4,36 @@
 // this file.
 UNIFORM_BLOCK(ADJOINT_FILTER_BLOCK);
 
-// A texel of an image at a binding, and the nearest place in the image of cotangents. (Linear texels repeat the rows
+// A texel of the image of a slot, and the nearest place in the image of cotangents. (Linear texels repeat the rows
 // themselves, and no column is before the first.)
 #ifdef LINEAR_TEXELS
-#define FETCH(name, number, texel) load_floats(name, read_shapes[number - 1], (texel).x, (texel).y)
-#define NEAREST(texel) ivec2(min((texel).x, read_shapes[0].x - 1), (texel).y)
+#define FETCH(name, slot, texel) load_floats(name, read_shapes[slot], (texel).x, (texel).y)
+#define NEAREST(texel) ivec2(min((texel).x, READ_SIZE(SLOT_COTANGENTS).x - 1), (texel).y)
 #else
-#define FETCH(name, number, texel) texelFetch(name, texel, 0)
-#define READ_IMAGE(number, name) layout(set = 0, binding = number) uniform sampler2D name
+#define FETCH(name, slot, texel) texelFetch(name, texel, 0)
+#define READ_IMAGE(slot, name) SAMPLED_IMAGE(slot, name)
 #define NEAREST(texel) clamp(texel, ivec2(0), textureSize(cotangents, 0) - 1)
 #endif
 
 // Copies of parameters (see pixels.glsl).
 float gain = params.gain, share = params.share;
 
-READ_IMAGE(1, cotangents);
-READ_IMAGE(2, table);
-READ_IMAGE(3, scene);
-READ_IMAGE(4, added);
-READ_IMAGE(5, differentiated);
+READ_IMAGE(SLOT_COTANGENTS, cotangents);
+READ_IMAGE(SLOT_WEIGHTS, table);
+READ_IMAGE(SLOT_SCENE, scene);
+READ_IMAGE(SLOT_ADDED, added);
+READ_IMAGE(SLOT_DIFFERENTIATED, differentiated);
 
 // The pixels that read a texel, or the weights of a pixel in a kernel for the texels of a block.
 vec4 entry(int place)
 {
-    return FETCH(table, 2, ivec2(place % TABLE_WIDTH, place / TABLE_WIDTH));
+    return FETCH(table, SLOT_WEIGHTS, ivec2(place % TABLE_WIDTH, place / TABLE_WIDTH));
 }
 
 vec4 cotangent_at(ivec2 pixel)
 {
-    vec4 value = FETCH(cotangents, 1, pixel);
-    return BY == BY_BLOOM ? vec4(where_finite(value, FETCH(scene, 3, pixel)).rgb, 0.0) : value;
+    vec4 value = FETCH(cotangents, SLOT_COTANGENTS, pixel);
+    return BY == BY_BLOOM ? vec4(where_finite(value, FETCH(scene, SLOT_SCENE, pixel)).rgb, 0.0) : value;
 }
 
 // The cotangents of this pixel, or of the nearest one in the image.
@@ -45,12 +45,12 @@ vec4 texel_at(ivec2 texel)
 // What other readers of the image have accumulated.
 vec4 own_at(ivec2 pixel)
 {
-    return ADD_OWN != 0 ? vec4(vec3(share), 1.0) * FETCH(added, 4, pixel) : vec4(0.0);
+    return ADD_OWN != 0 ? vec4(vec3(share), 1.0) * FETCH(added, SLOT_ADDED, pixel) : vec4(0.0);
 }
 
 // The cotangents of a texel. The image of a source has none at NaN and infinity.
 vec4 shade(vec4 own, vec4 sum, ivec2 pixel)
 {
     sum = gain * sum + own;
-    return FROM_IMAGE != 0 ? where_finite(sum, FETCH(differentiated, 5, pixel)) : sum;
+    return FROM_IMAGE != 0 ? where_finite(sum, FETCH(differentiated, SLOT_DIFFERENTIATED, pixel)) : sum;
 }

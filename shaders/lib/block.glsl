@@ -11,6 +11,13 @@
         ROWS(parameters, MEMBER_READS, MEMBER_INPUT, MEMBER_VEC4S) \
     } params
 
+// An image that the pass reads. Those are bound after the parameters.
+#define BINDING_OF(slot) (1 + (slot))
+#define SAMPLED_IMAGE(slot, name) layout(set = 0, binding = BINDING_OF(slot)) uniform sampler2D name
+
+#define SLOT_CONSTANT(name, number) const int name = number;
+SLOTS(SLOT_CONSTANT)
+
 #define CONSTANT_NAME(name, value, spelling) const int name = value;
 #define CHOICE_CONSTANTS(choice, NAMES) NAMES(CONSTANT_NAME)
 CHOICES(CHOICE_CONSTANTS)

@@ -1,6 +1,6 @@
 // How a fused pass ends a bloom: with the finished picture; with MIXED, with the cotangents of the picture before
 // exposure and curves, from those of the finished one; with TRANSPOSED, with the derivatives by the image, from the
-// cotangents of a composite without a curve, which is a factor, and their transposed blur. The image at ENDED_BINDING
+// cotangents of a composite without a curve, which is a factor, and their transposed blur. The image of SLOT_ENDED
 // is then these cotangents or the image. The including shader has composite.glsl and, for linear texels, pixels.glsl.
 #ifndef TRANSPOSED
 #define TRANSPOSED 0
@@ -8,14 +8,14 @@
 
 #if defined(MIXED) || TRANSPOSED
 #ifdef LINEAR_TEXELS
-READ_IMAGE(ENDED_BINDING, other);
+READ_IMAGE(SLOT_ENDED, other);
 vec4 other_at(ivec2 pixel)
 {
-    ivec4 shape = read_shapes[ENDED_BINDING - 1];
+    ivec4 shape = read_shapes[SLOT_ENDED];
     return load_floats(other, shape, clamp(pixel.x, 0, shape.x - 1), pixel.y);
 }
 #else
-layout(set = 0, binding = ENDED_BINDING) uniform sampler2D other;
+SAMPLED_IMAGE(SLOT_ENDED, other);
 vec4 other_at(ivec2 pixel)
 {
     return texelFetch(other, pixel, 0);

@@ -1,6 +1,6 @@
 // What ghosts and halo see, for shaders with FLARE_BLOCK whose source has the target's size.
 
-layout(set = 0, binding = 1) uniform sampler2D source;
+SAMPLED_IMAGE(SLOT_SOURCE, source);
 
 // The place at an offset from the centre, in texels. The offset is not added to the size of the image first,
 // which would round it.

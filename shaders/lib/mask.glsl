@@ -1,7 +1,7 @@
-// The mask of what glows, for a shader that reads it at binding 2 after its source and has SAMPLING_ROWS.
+// The mask of what glows, for a shader with SAMPLING_ROWS.
 // It is read bilinearly at the position of this pixel.
 
-layout(set = 0, binding = 2) uniform sampler2D mask;
+SAMPLED_IMAGE(SLOT_MASK, mask);
 
 float mask_value()
 {

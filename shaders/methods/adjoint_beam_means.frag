@@ -4,7 +4,7 @@
 UNIFORM_BLOCK(SUN_BEAMS_BLOCK);
 #include "lib/beam.glsl"
 
-layout(set = 0, binding = 1) uniform sampler2D cotangents;
+SAMPLED_IMAGE(SLOT_COTANGENTS, cotangents);
 
 #include "lib/fullscreen.glsl"
 

@@ -5,10 +5,9 @@
 UNIFORM_BLOCK(SUN_BEAMS_BLOCK);
 #include "lib/beam.glsl"
 
-layout(set = 0, binding = 1) uniform sampler2D cotangents;
-layout(set = 0, binding = 2) uniform sampler2D partial_sums;
+SAMPLED_IMAGE(SLOT_COTANGENTS, cotangents);
+SAMPLED_IMAGE(SLOT_SUMS, partial_sums);
 
-#define ADDED_BINDING 3
 #include "lib/fullscreen.glsl"
 #include "lib/adjoint.glsl"
 

@@ -3,10 +3,9 @@
 UNIFORM_BLOCK(FFT_BLOCK);
 #include "lib/bright.glsl"
 
-layout(set = 0, binding = 1) uniform sampler2D source;
-layout(set = 0, binding = 2) uniform sampler2D cotangents;
+SAMPLED_IMAGE(SLOT_SOURCE, source);
+SAMPLED_IMAGE(SLOT_COTANGENTS, cotangents);
 
-#define ADDED_BINDING 3
 #include "lib/fullscreen.glsl"
 #include "lib/adjoint.glsl"
 

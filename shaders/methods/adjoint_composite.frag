@@ -5,12 +5,11 @@
 UNIFORM_BLOCK(COMPOSITE_BLOCK);
 #include "lib/composite.glsl"
 
-layout(set = 0, binding = 1) uniform sampler2D scene;
-layout(set = 0, binding = 2) uniform sampler2D bloom;
-layout(set = 0, binding = 3) uniform sampler2D mask;
-layout(set = 0, binding = 4) uniform sampler2D cotangents;
+SAMPLED_IMAGE(SLOT_SCENE, scene);
+SAMPLED_IMAGE(SLOT_BLOOM, bloom);
+SAMPLED_IMAGE(SLOT_MASK, mask);
+SAMPLED_IMAGE(SLOT_COTANGENTS, cotangents);
 
-#define ADDED_BINDING 5
 #include "lib/fullscreen.glsl"
 #include "lib/adjoint.glsl"
 #include "lib/adjoint_composite.glsl"

@@ -5,9 +5,8 @@ UNIFORM_BLOCK(FLARE_BLOCK);
 #include "lib/fetch_inside.glsl"
 #include "lib/flare.glsl"
 
-layout(set = 0, binding = 2) uniform sampler2D cotangents;
+SAMPLED_IMAGE(SLOT_COTANGENTS, cotangents);
 
-#define ADDED_BINDING 3
 #include "lib/fullscreen.glsl"
 #include "lib/adjoint.glsl"
 

@@ -5,10 +5,9 @@
 UNIFORM_BLOCK(PREFILTER_BLOCK);
 #include "lib/prefilters.glsl"
 
-layout(set = 0, binding = 1) uniform sampler2D source;
-layout(set = 0, binding = 3) uniform sampler2D cotangents;
+SAMPLED_IMAGE(SLOT_SOURCE, source);
+SAMPLED_IMAGE(SLOT_COTANGENTS, cotangents);
 
-#define ADDED_BINDING 4
 #define STACKED RADIX_1
 #define STACKED_HEIGHT params.target_height
 #include "lib/fullscreen.glsl"

@@ -11,9 +11,8 @@ UNIFORM_BLOCK(FLARE_BLOCK);
 #include "lib/fetch_inside.glsl"
 #include "lib/flare.glsl"
 
-layout(set = 0, binding = 2) uniform sampler2D partial_sums;
+SAMPLED_IMAGE(SLOT_SUMS, partial_sums);
 
-#define ADDED_BINDING 3
 #include "lib/fullscreen.glsl"
 #include "lib/adjoint.glsl"
 

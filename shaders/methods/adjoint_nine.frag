@@ -4,10 +4,9 @@
 
 UNIFORM_BLOCK(PREFILTER_BLOCK);
 
-layout(set = 0, binding = 1) uniform sampler2D source;
-layout(set = 0, binding = 3) uniform sampler2D cotangents;
+SAMPLED_IMAGE(SLOT_SOURCE, source);
+SAMPLED_IMAGE(SLOT_COTANGENTS, cotangents);
 
-#define ADDED_BINDING 4
 #include "lib/fullscreen.glsl"
 #include "lib/mask.glsl"
 #include "lib/nine.glsl"

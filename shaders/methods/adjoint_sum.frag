@@ -1,6 +1,6 @@
 // Adds up the pixels of an image, or their squares, in blocks of SUM_SIDE x SUM_SIDE, always in the same order.
 
-layout(set = 0, binding = 1) uniform sampler2D source;
+SAMPLED_IMAGE(SLOT_SOURCE, source);
 
 #include "lib/fullscreen.glsl"
 

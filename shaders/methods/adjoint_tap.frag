@@ -2,9 +2,8 @@
 
 UNIFORM_BLOCK(STREAKS_BLOCK);
 
-layout(set = 0, binding = 1) uniform sampler2D cotangents;
+SAMPLED_IMAGE(SLOT_COTANGENTS, cotangents);
 
-#define ADDED_BINDING 2
 #include "lib/fullscreen.glsl"
 #include "lib/adjoint.glsl"
 

@@ -6,10 +6,9 @@
 
 UNIFORM_BLOCK(THRESHOLD_BLOCK);
 
-layout(set = 0, binding = 1) uniform sampler2D image;
-layout(set = 0, binding = 3) uniform sampler2D cotangents;
+SAMPLED_IMAGE(SLOT_SOURCE, image);
+SAMPLED_IMAGE(SLOT_COTANGENTS, cotangents);
 
-#define ADDED_BINDING 4
 #include "lib/fullscreen.glsl"
 #include "lib/adjoint.glsl"
 #include "lib/mask.glsl"

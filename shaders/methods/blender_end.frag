@@ -4,7 +4,7 @@
 
 UNIFORM_BLOCK(BLENDER_END_BLOCK);
 
-layout(set = 0, binding = 1) uniform sampler2D source;
+SAMPLED_IMAGE(SLOT_SOURCE, source);
 
 #include "lib/fullscreen.glsl"
 #include "lib/blender_end.glsl"

@@ -6,7 +6,7 @@
 UNIFORM_BLOCK(BOX_BLOCK);
 
 layout(local_size_x = ROW_INVOCATIONS) in;
-layout(set = 0, binding = 1) uniform sampler2D source;
+SAMPLED_IMAGE(SLOT_SOURCE, source);
 layout(set = 0, binding = TARGET_BINDING) uniform writeonly image2D target;
 
 vec4 sum = vec4(0.0), rest = vec4(0.0);

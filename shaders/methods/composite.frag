@@ -5,9 +5,9 @@
 UNIFORM_BLOCK(COMPOSITE_BLOCK);
 #include "lib/composite.glsl"
 
-layout(set = 0, binding = 1) uniform sampler2D scene;
-layout(set = 0, binding = 2) uniform sampler2D bloom;
-layout(set = 0, binding = 3) uniform sampler2D mask;
+SAMPLED_IMAGE(SLOT_SCENE, scene);
+SAMPLED_IMAGE(SLOT_BLOOM, bloom);
+SAMPLED_IMAGE(SLOT_MASK, mask);
 
 #include "lib/fullscreen.glsl"
 

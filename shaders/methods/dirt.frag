@@ -3,8 +3,8 @@
 
 UNIFORM_BLOCK(DIRT_BLOCK);
 
-layout(set = 0, binding = 1) uniform sampler2D light;
-layout(set = 0, binding = 2) uniform sampler2D dirt;
+SAMPLED_IMAGE(SLOT_SOURCE, light);
+SAMPLED_IMAGE(SLOT_DIRT, dirt);
 
 #include "lib/fullscreen.glsl"
 

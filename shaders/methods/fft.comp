@@ -24,14 +24,14 @@ UNIFORM_BLOCK(FFT_BLOCK);
 #ifdef LINEAR_TEXELS
 #include "variants/pixels.glsl"
 #else
-#define READ_IMAGE(number, name) \
-    layout(set = 0, binding = number, SOURCE_FORMAT) uniform readonly image2D name
+#define READ_IMAGE(slot, name) \
+    layout(set = 0, binding = BINDING_OF(slot), SOURCE_FORMAT) uniform readonly image2D name
 #endif
 #include "lib/fourier.glsl"
 
 layout(local_size_x_id = 34, local_size_y_id = 35) in;
-READ_IMAGE(1, source);
-READ_IMAGE(2, factor);
+READ_IMAGE(SLOT_SOURCE, source);
+READ_IMAGE(SLOT_SPECTRUM, factor);
 #ifndef LINEAR_TEXELS
 layout(set = 0, binding = TARGET_BINDING) uniform writeonly image2D target;
 #elif TARGET_BYTES == 4

@@ -5,7 +5,7 @@
 UNIFORM_BLOCK(FFT_KERNEL_BLOCK);
 
 layout(local_size_x = PIXEL_INVOCATIONS, local_size_y = PIXEL_INVOCATIONS) in;
-layout(set = 0, binding = 1) uniform sampler2D kernel;
+SAMPLED_IMAGE(SLOT_SOURCE, kernel);
 layout(set = 0, binding = TARGET_BINDING) uniform writeonly image2D target;
 
 // First, last and step of the kernel's places along one axis.

@@ -3,8 +3,8 @@
 
 UNIFORM_BLOCK(FILTER_BLOCK);
 
-layout(set = 0, binding = 1) uniform sampler2D source;
-layout(set = 0, binding = 2) uniform sampler2D own;
+SAMPLED_IMAGE(SLOT_SOURCE, source);
+SAMPLED_IMAGE(SLOT_OWN, own);
 
 #include "lib/fullscreen.glsl"
 #include "lib/filter.glsl"

@@ -3,13 +3,13 @@
 
 UNIFORM_BLOCK(GATHER_BLOCK);
 
-layout(set = 0, binding = 1) uniform sampler2D level_0;
-layout(set = 0, binding = 2) uniform sampler2D level_1;
-layout(set = 0, binding = 3) uniform sampler2D level_2;
-layout(set = 0, binding = 4) uniform sampler2D level_3;
-layout(set = 0, binding = 5) uniform sampler2D level_4;
-layout(set = 0, binding = 6) uniform sampler2D level_5;
-layout(set = 0, binding = 7) uniform sampler2D level_6;
+SAMPLED_IMAGE(SLOT_LEVELS + 0, level_0);
+SAMPLED_IMAGE(SLOT_LEVELS + 1, level_1);
+SAMPLED_IMAGE(SLOT_LEVELS + 2, level_2);
+SAMPLED_IMAGE(SLOT_LEVELS + 3, level_3);
+SAMPLED_IMAGE(SLOT_LEVELS + 4, level_4);
+SAMPLED_IMAGE(SLOT_LEVELS + 5, level_5);
+SAMPLED_IMAGE(SLOT_LEVELS + 6, level_6);
 
 #include "lib/fullscreen.glsl"
 #include "lib/gathered.glsl"

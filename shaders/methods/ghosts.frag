@@ -6,7 +6,7 @@ UNIFORM_BLOCK(FLARE_BLOCK);
 #include "lib/fetch_inside.glsl"
 #include "lib/flare.glsl"
 
-layout(set = 0, binding = 2) uniform sampler2D before;
+SAMPLED_IMAGE(SLOT_BEFORE, before);
 
 #include "lib/fullscreen.glsl"
 

@@ -8,7 +8,7 @@
 UNIFORM_BLOCK(PREFILTER_BLOCK);
 #include "lib/prefilters.glsl"
 
-layout(set = 0, binding = 1) uniform sampler2D source;
+SAMPLED_IMAGE(SLOT_SOURCE, source);
 
 #include "lib/fullscreen.glsl"
 #include "lib/mask.glsl"

@@ -7,8 +7,8 @@
 UNIFORM_BLOCK(STAR_BLOCK);
 
 layout(local_size_x = ROW_INVOCATIONS) in;
-layout(set = 0, binding = 1) uniform sampler2D source;
-layout(set = 0, binding = 2) uniform sampler2D before;
+SAMPLED_IMAGE(SLOT_SOURCE, source);
+SAMPLED_IMAGE(SLOT_BEFORE, before);
 layout(set = 0, binding = TARGET_BINDING) uniform writeonly image2D target;
 
 // The pixels of a line: the first one, the step to the next one, and their number; 0: there is no such

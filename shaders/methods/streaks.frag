@@ -5,8 +5,8 @@
 UNIFORM_BLOCK(STREAKS_BLOCK);
 #include "lib/fetch_inside.glsl"
 
-layout(set = 0, binding = 1) uniform sampler2D source;
-layout(set = 0, binding = 2) uniform sampler2D before;
+SAMPLED_IMAGE(SLOT_SOURCE, source);
+SAMPLED_IMAGE(SLOT_BEFORE, before);
 
 #include "lib/fullscreen.glsl"
 

@@ -6,7 +6,7 @@
 
 UNIFORM_BLOCK(THRESHOLD_BLOCK);
 
-layout(set = 0, binding = 1) uniform sampler2D image;
+SAMPLED_IMAGE(SLOT_SOURCE, image);
 
 #include "lib/fullscreen.glsl"
 #include "lib/mask.glsl"

@@ -1,7 +1,7 @@
 // Adds the glow mesh's light to the brightness by blending. Adding 0 keeps the other attachments.
 #include "scene/gbuffer.glsl"
 
-layout(set = 0, binding = 1) uniform sampler2D glow;
+SAMPLED_IMAGE(SLOT_SOURCE, glow);
 
 void main()
 {

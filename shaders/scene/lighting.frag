@@ -1,10 +1,10 @@
 // Lights the G-buffer with the forward system's Phong model, and adds the emission.
 #include "scene/phong.glsl"
 
-layout(set = 0, binding = 1) uniform sampler2D albedo;
-layout(set = 0, binding = 2) uniform sampler2D normal;
-layout(set = 0, binding = 3) uniform sampler2D position;
-layout(set = 0, binding = 4) uniform sampler2D brightness;
+SAMPLED_IMAGE(SLOT_ALBEDO, albedo);
+SAMPLED_IMAGE(SLOT_NORMAL, normal);
+SAMPLED_IMAGE(SLOT_POSITION, position);
+SAMPLED_IMAGE(SLOT_BRIGHTNESS, brightness);
 
 #include "lib/fullscreen.glsl"
 

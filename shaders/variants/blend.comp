@@ -6,12 +6,12 @@ UNIFORM_BLOCK(COMPOSITE_BLOCK);
 
 const int COLUMNS = TEXEL_COLUMNS(CHANNEL_BYTES), ROWS = TEXEL_ROWS;
 
-READ_IMAGE(1, scene);
-READ_IMAGE(2, bloom);
+READ_IMAGE(SLOT_SCENE, scene);
+READ_IMAGE(SLOT_BLOOM, bloom);
 
 #define LOAD load_scene
 #define LOAD_IMAGE scene
-#define LOAD_NUMBER 1
+#define LOAD_SLOT SLOT_SCENE
 #define LOAD_CHANNELS SOURCE_CHANNELS
 #include "variants/load.glsl"
 
@@ -23,7 +23,7 @@ void write_row(int x, int y)
 
     load_scene(x, y, raw);
     [[unroll]] for (int i = 0; i < COLUMNS; ++i) {
-        vec4 light = value_of(raw_in_run(bloom, read_shapes[1], x, i, y));
+        vec4 light = value_of(raw_in_run(bloom, read_shapes[SLOT_BLOOM], x, i, y));
         vec4 sum = finish(value_of(raw[i]), light, 1.0, ivec2(x + i, y));
         raw[i] = finished(raw[i], sum);
     }

@@ -4,7 +4,7 @@
 
 UNIFORM_BLOCK(THRESHOLD_BLOCK);
 
-layout(set = 0, binding = 1) uniform sampler2D lines;
+SAMPLED_IMAGE(SLOT_SOURCE, lines);
 
 #include "lib/fullscreen.glsl"
 

@@ -10,8 +10,8 @@ const int COLUMNS = WINDOW_COLUMNS(CHANNEL_BYTES), ROWS = WINDOW_ROWS;
 // The rows and columns that a pixel needs. At HDRP's border their place differs from the position's.
 const int KEPT = IS_INSET ? WINDOW + 2 : WINDOW;
 
-READ_IMAGE(1, source);
-READ_IMAGE(2, own);
+READ_IMAGE(SLOT_SOURCE, source);
+READ_IMAGE(SLOT_OWN, own);
 
 // The texels of a row are a run where the ratio of widths is simple. The compiler removes loads that no window needs.
 const int BEFORE = MAX_WINDOW / 2, LOADED = 2 * COLUMNS + MAX_WINDOW;
@@ -21,7 +21,6 @@ const int BEFORE = MAX_WINDOW / 2, LOADED = 2 * COLUMNS + MAX_WINDOW;
 #include "variants/load.glsl"
 
 #ifdef FINAL
-#define ENDED_BINDING 3
 #include "lib/ended.glsl"
 #define HAS_OWN true
 #else
@@ -59,7 +58,7 @@ int first_in_run(int column)
 
 void keep_row(int first, int row)
 {
-    ivec2 last = READ_SIZE(source, 1) - 1;
+    ivec2 last = READ_SIZE(SLOT_SOURCE) - 1;
     int line = clamp(row, 0, last.y);
     uvec4 raw[LOADED];
 
@@ -72,7 +71,7 @@ void keep_row(int first, int row)
         vec4 sums[3] = vec4[](vec4(0.0), vec4(0.0), vec4(0.0));
         [[unroll]] for (int at = 0; at < KEPT; ++at) {
             uvec4 texel = EXACT != 0 ? raw[BEFORE + first_in_run(i) + at]
-                                      : raw_pixel(source, read_shapes[0], clamp(windows[i % PHASES].first + at, 0, last.x),
+                                      : raw_pixel(source, read_shapes[SLOT_SOURCE], clamp(windows[i % PHASES].first + at, 0, last.x),
                                                   line);
             [[unroll]] for (int kernel = 0; kernel < KERNELS; ++kernel)
                 if (has_weight(TAKEN_X, at, kernel))
@@ -97,11 +96,11 @@ void write_row(int first, int y, int texel, float part, int phase)
 {
     Window window = row_windows[phase];
     if (EXACT_ROWS == 0)
-        window = window_of(within_border(Axis(texel, part, READ_SIZE(source, 1).y, ratio.y)), KEPT, false);
+        window = window_of(within_border(Axis(texel, part, READ_SIZE(SLOT_SOURCE).y, ratio.y)), KEPT, false);
     uvec4 raw[COLUMNS];
 
     [[unroll]] for (int i = 0; i < COLUMNS; ++i)
-        raw[i] = HAS_OWN ? raw_in_run(own, read_shapes[1], first, i, y) : uvec4(0);
+        raw[i] = HAS_OWN ? raw_in_run(own, read_shapes[SLOT_OWN], first, i, y) : uvec4(0);
     [[unroll]] for (int i = 0; i < COLUMNS; ++i)
         raw[i] = shade(raw[i], coarse * (column_of(window, i) / shares), ivec2(first + i, y));
     store(first, y, raw);
@@ -109,7 +108,7 @@ void write_row(int first, int y, int texel, float part, int phase)
 
 void start_columns(ivec2 first)
 {
-    ivec2 source_size = READ_SIZE(source, 1);
+    ivec2 source_size = READ_SIZE(SLOT_SOURCE);
     ratio = vec2(source_size) / vec2(params.target_width, params.target_height);
     coarse = params.coarse;
     shares = params.divisor;

@@ -2,9 +2,8 @@
 // A filter in tiles (variants/nested.glsl).
 #include "variants/nested.glsl"
 
-layout(set = 0, binding = 1) uniform sampler2D source;
-layout(set = 0, binding = 2) uniform sampler2D own;
-#define ENDED_BINDING 3
+SAMPLED_IMAGE(SLOT_SOURCE, source);
+SAMPLED_IMAGE(SLOT_OWN, own);
 #ifdef FINAL
 #include "lib/ended.glsl"
 #endif

@@ -10,13 +10,13 @@ UNIFORM_BLOCK(GATHER_BLOCK);
 
 const int COLUMNS = TEXEL_COLUMNS(CHANNEL_BYTES), ROWS = GATHER_ROWS;
 
-READ_IMAGE(1, level_0);
-READ_IMAGE(2, level_1);
-READ_IMAGE(3, level_2);
-READ_IMAGE(4, level_3);
-READ_IMAGE(5, level_4);
-READ_IMAGE(6, level_5);
-READ_IMAGE(7, level_6);
+READ_IMAGE(SLOT_LEVELS + 0, level_0);
+READ_IMAGE(SLOT_LEVELS + 1, level_1);
+READ_IMAGE(SLOT_LEVELS + 2, level_2);
+READ_IMAGE(SLOT_LEVELS + 3, level_3);
+READ_IMAGE(SLOT_LEVELS + 4, level_4);
+READ_IMAGE(SLOT_LEVELS + 5, level_5);
+READ_IMAGE(SLOT_LEVELS + 6, level_6);
 
 #include "variants/store.glsl"
 
@@ -32,14 +32,14 @@ vec4 sums[COLUMNS];
 void add_own(int first, int y)
 {
     [[unroll]] for (int i = 0; i < COLUMNS; ++i)
-        sums[i] += params.shares[0][0] * value_of(raw_in_run(level_0, read_shapes[0], first, i, y));
+        sums[i] += params.shares[0][0] * value_of(raw_in_run(level_0, read_shapes[SLOT_LEVELS], first, i, y));
 }
 
 void add(usamplerBuffer image, int level, int first, int y)
 {
     if (level >= LEVELS)
         return;
-    ivec4 shape = read_shapes[level];
+    ivec4 shape = read_shapes[SLOT_LEVELS + level];
     Window window = window_of(row_axis(shape.xy, y), WINDOW, false);
     float weight = params.shares[level >> 2][level & 3];
     [[unroll]] for (int i = 0; i < COLUMNS; ++i) {

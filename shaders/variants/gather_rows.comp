@@ -7,24 +7,24 @@ UNIFORM_BLOCK(GATHER_BLOCK);
 
 const int COLUMNS = GATHER_COLUMNS, ROWS = GATHER_ROWS;
 
-READ_IMAGE(1, source);
+READ_IMAGE(SLOT_SOURCE, source);
 
 #include "lib/gathered.glsl"
 #include "variants/store_float.glsl"
 
 vec4 filter_row(Window window, int line)
 {
-    int last = read_shapes[0].x - 1;
+    int last = read_shapes[SLOT_SOURCE].x - 1;
     vec4 sum = vec4(0.0);
     [[unroll]] for (int i = 0; i < WINDOW; ++i)
         sum += window.weights[i].x
-             * load_pixel(source, read_shapes[0], clamp(window.first + i, 0, last), line);
+             * load_pixel(source, read_shapes[SLOT_SOURCE], clamp(window.first + i, 0, last), line);
     return sum;
 }
 
 void write_block(ivec2 first, int end)
 {
-    ivec2 source_size = READ_SIZE(source, 1);
+    ivec2 source_size = READ_SIZE(SLOT_SOURCE);
     Window windows[COLUMNS];
 
     [[unroll]] for (int i = 0; i < COLUMNS; ++i) {

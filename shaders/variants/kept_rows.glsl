@@ -30,7 +30,7 @@ void write_exact_rows(ivec2 first, int end)
 void write_rows(ivec2 first, int end)
 {
     // The position as in place_in_size(), but with a rest in place of a quotient for each row.
-    uint height = uint(READ_SIZE(source, 1).y);
+    uint height = uint(READ_SIZE(SLOT_SOURCE).y);
     uint divisor = 2u * uint(params.target_height);
     uint number = uint(2 * first.y + 1) * height + divisor / 2u;
     uint rest = number % divisor;

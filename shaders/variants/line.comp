@@ -4,7 +4,7 @@
 UNIFORM_BLOCK(LINE_BLOCK);
 
 layout(local_size_x = ROW_INVOCATIONS) in;
-layout(set = 0, binding = 1, SOURCE_FORMAT) uniform readonly image2D source;
+layout(set = 0, binding = BINDING_OF(SLOT_SOURCE), SOURCE_FORMAT) uniform readonly image2D source;
 layout(set = 0, binding = TARGET_BINDING) uniform writeonly image2D target;
 
 const int LOADED = LINE_OUTPUTS + 2 * RADIUS;

@@ -1,7 +1,7 @@
 // Defines a function that loads a run of pixels of one row. Define before each inclusion:
 //
 //   LOAD           its name
-//   LOAD_IMAGE     the image, and LOAD_NUMBER its binding; default: `source`, 1
+//   LOAD_IMAGE     the image, and LOAD_SLOT its slot; default: `source`
 //   LOAD_CHANNELS  the channels of its pixels in memory, 3 or 4 (default)
 //   LOAD_FROM      the offset of the run from `first` in pixels, 0 (default) or less
 //   LOAD_COUNT     the number of pixels in the run; default: COLUMNS
@@ -9,7 +9,7 @@
 // `first` is at a multiple of 16 bytes. Outside of the image, the outermost pixels are repeated.
 #ifndef LOAD_IMAGE
 #define LOAD_IMAGE source
-#define LOAD_NUMBER 1
+#define LOAD_SLOT SLOT_SOURCE
 #endif
 #ifndef LOAD_CHANNELS
 #define LOAD_CHANNELS 4
@@ -26,7 +26,7 @@ void LOAD(int first, int row, out uvec4 raw[LOAD_COUNT])
     const int BYTES = LOAD_CHANNELS * CHANNEL_BYTES;
     const int BEFORE = (15 - LOAD_FROM * BYTES) / 16;
     const int COUNT = BEFORE + ((LOAD_FROM + LOAD_COUNT) * BYTES + 15) / 16;
-    ivec4 shape = read_shapes[LOAD_NUMBER - 1];
+    ivec4 shape = read_shapes[LOAD_SLOT];
     int last_word = (shape.x * BYTES - 1) / 16;
     uint packed[4 * COUNT + 1];
     [[unroll]] for (int i = 0; i < COUNT; ++i) {
@@ -64,7 +64,7 @@ void LOAD(int first, int row, out uvec4 raw[LOAD_COUNT])
 
 #undef LOAD
 #undef LOAD_IMAGE
-#undef LOAD_NUMBER
+#undef LOAD_SLOT
 #undef LOAD_CHANNELS
 #undef LOAD_FROM
 #undef LOAD_COUNT

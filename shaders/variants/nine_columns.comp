@@ -18,7 +18,7 @@ void take_sample(int x, int y, out vec4 taken[COLUMNS])
     int row = min(y, target_shape.y - 1);
 
     row = before ? (FIRST != 0 ? y & 1 : 0) : FIRST != 0 ? row : 2 * row;
-    load_run(x, min(row, read_shapes[0].y - 1), raw);
+    load_run(x, min(row, read_shapes[SLOT_SOURCE].y - 1), raw);
     if (FIRST == 0)
         load_run(x, before ? 0 : row + 1, next);
     [[unroll]] for (int i = 0; i < COLUMNS; ++i)

@@ -12,7 +12,7 @@ const int COLUMNS = NINE_OUTPUTS, ROWS = GATHER_ROWS, TAPS = 2 * NINE_RADIUS + 1
 const int SAMPLES = COLUMNS + 2 * NINE_RADIUS;
 const bool IS_GODOT = GROUPS == GROUPS_GODOT;
 
-READ_IMAGE(1, source);
+READ_IMAGE(SLOT_SOURCE, source);
 
 #define LOAD load_same
 #define LOAD_FROM (-NINE_RADIUS)

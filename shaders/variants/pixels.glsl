@@ -75,8 +75,8 @@ uint64_t eighth(uvec2 value)
     return packUint2x32(max(value, uvec2(unknown_zero)));
 }
 
-#define READ_IMAGE(number, name) layout(set = 0, binding = number) uniform usamplerBuffer name
-#define READ_SIZE(name, number) (read_shapes[number - 1].xy)
+#define READ_IMAGE(slot, name) layout(set = 0, binding = BINDING_OF(slot)) uniform usamplerBuffer name
+#define READ_SIZE(slot) (read_shapes[slot].xy)
 #define TARGET_SIZE() (target_shape.xy)
 
 // The first pixel of this invocation's block, in coordinates of the complete target, of which the dispatch may

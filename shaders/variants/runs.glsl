@@ -6,7 +6,7 @@
 //
 // and LOAD_FROM and LOAD_CHANNELS as for variants/load.glsl.
 
-READ_IMAGE(1, source);
+READ_IMAGE(SLOT_SOURCE, source);
 
 #define LOAD load_run
 #define LOAD_COUNT LOADED

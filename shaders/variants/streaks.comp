@@ -11,8 +11,8 @@ const int COLUMNS = STREAK_COLUMNS, ROWS = STREAK_ROWS;
 // The texels at tap 0 are those of the strip. The others are filtered.
 const int TAPS = LEVELS > 2 ? LEVELS : 2, FILTERED = TAPS - 1;
 
-READ_IMAGE(1, source);
-READ_IMAGE(2, before);
+READ_IMAGE(SLOT_SOURCE, source);
+READ_IMAGE(SLOT_BEFORE, before);
 
 #include "variants/store.glsl"
 
@@ -25,7 +25,7 @@ vec4 seen(uvec4 raw)
 // The pixels of a row from any place on, 0 outside of the image.
 void load_moved(int first, int row, out uvec4 raw[COLUMNS + 1])
 {
-    ivec4 shape = read_shapes[0];
+    ivec4 shape = read_shapes[SLOT_SOURCE];
     ivec2 last = shape.xy - 1;
     [[unroll]] for (int i = 0; i <= COLUMNS; ++i)
         raw[i] = raw_pixel(source, shape, clamp(first + i, 0, last.x), clamp(row, 0, last.y));
@@ -55,8 +55,8 @@ void write_block(ivec2 first, int end)
         [[unroll]] for (int i = 0; i < COLUMNS; ++i) {
             sums[i] = vec4(0.0);
             if (ADD_OWN != 0)
-                sums[i] = value_of(raw_in_run(before, read_shapes[1], first.x, i, max(y, 0)));
-            sums[i] += weights[0] * seen(raw_in_run(source, read_shapes[0], first.x, i, max(y, 0)));
+                sums[i] = value_of(raw_in_run(before, read_shapes[SLOT_BEFORE], first.x, i, max(y, 0)));
+            sums[i] += weights[0] * seen(raw_in_run(source, read_shapes[SLOT_SOURCE], first.x, i, max(y, 0)));
         }
         [[unroll]] for (int tap = 0; tap < FILTERED; ++tap) {
             load_moved(texels[tap].x, texels[tap].y + y - first.y + 1, moved);

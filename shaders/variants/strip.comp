@@ -4,7 +4,6 @@
 // 10 ms, and 23 with a pass for each axis and the threshold (processor time of 960 x 544 in float32, lavapipe of Mesa
 // 22.3.6, 2026-11-26).
 #include "variants/pixels.glsl"
-#define ENDED_BINDING 2
 #include "variants/fused_bloom.glsl"
 
 // A run of a row: a word, or three words with the pixels of three channels.
@@ -23,7 +22,7 @@ const int RUNS_AT_ONCE = 2, STEP = RUNS_AT_ONCE * COLUMNS;
 const int AHEAD = CHANNEL_BYTES == 4 ? 1 : 2;
 
 layout(local_size_x = ROW_INVOCATIONS) in;
-READ_IMAGE(1, source);
+READ_IMAGE(SLOT_SOURCE, source);
 #define STORE_COUNT STEP
 #include "variants/store.glsl"
 
@@ -93,7 +92,7 @@ void start_row_sums(ivec2 first, ivec2 size)
 {
     start_weights(first, size);
     [[unroll]] for (int i = 0; i < LOADED; ++i)
-        rows[i] = clamp(first.y - STRIP_RADIUS + i, 0, size.y - 1) * read_shapes[0].z;
+        rows[i] = clamp(first.y - STRIP_RADIUS + i, 0, size.y - 1) * read_shapes[SLOT_SOURCE].z;
     [[unroll]] for (int row = 0; row < ROWS; ++row) {
         [[unroll]] for (int i = 0; i < KEPT; ++i)
             unfinished[row][i] = vec3(0.0);
@@ -201,7 +200,7 @@ ivec2 first_of_strip()
 void main()
 {
     copy_shapes();
-    ivec2 size = READ_SIZE(source, 1);
+    ivec2 size = READ_SIZE(SLOT_SOURCE);
     ivec2 first = first_of_strip();
     int end = min(first.x + params.columns, size.x);
 

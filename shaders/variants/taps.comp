@@ -72,7 +72,7 @@ vec4 blend(vec4 a, vec4 b, float part)
 
 void keep_row(int first, int row)
 {
-    ivec2 last = read_shapes[0].xy - 1;
+    ivec2 last = read_shapes[SLOT_SOURCE].xy - 1;
     int y = clamp(row, 0, last.y);
     uvec4 raw[LOADED];
 
@@ -85,7 +85,7 @@ void keep_row(int first, int row)
         vec4 loaded[SIDE];
         [[unroll]] for (int at = 0; at < SIDE; ++at) {
             uvec4 texel = EXACT != 0 ? raw[RATIO * i + at]
-                                     : raw_pixel(source, read_shapes[0], clamp(texels[i] - 2 + at, 0, last.x), y);
+                                     : raw_pixel(source, read_shapes[SLOT_SOURCE], clamp(texels[i] - 2 + at, 0, last.x), y);
             loaded[at] = value_of(FROM_IMAGE != 0 ? finite_bits(texel) : texel);
         }
         [[unroll]] for (int tap = 0; tap < TAPS; ++tap) {
@@ -122,7 +122,7 @@ vec4 prefiltered(int column, float parts[TAPS], vec2 part)
 void start_columns(ivec2 first)
 {
     [[unroll]] for (int i = 0; i < COLUMNS; ++i) {
-        Place place = place_in_size(READ_SIZE(source, 1), ivec2(first.x + i, 0), TARGET_SIZE());
+        Place place = place_in_size(READ_SIZE(SLOT_SOURCE), ivec2(first.x + i, 0), TARGET_SIZE());
         texels[i] = place.texel.x;
         across[i] = EXACT != 0 ? PART : place.part.x;
         columns[i] = parts_of(across[i]);

@@ -1,12 +1,11 @@
 // The complete bloom of an image for GPUs, or its transpose (fused_bloom.glsl). A workgroup writes a tile, and keeps
 // its vertical sums in shared memory between the two blurs.
-#define ENDED_BINDING 2
 #include "variants/fused_bloom.glsl"
 
 const int RUN = TILE_ROWS / TILE_RUNS;
 
 layout(local_size_x = TILE_LOADED, local_size_y = TILE_RUNS) in;
-layout(set = 0, binding = 1) uniform sampler2D source;
+SAMPLED_IMAGE(SLOT_SOURCE, source);
 layout(set = 0, binding = TARGET_BINDING) uniform writeonly image2D target;
 
 // The vertical sums, packed in the format of their image. They are stored in planes of words, so
