@@ -573,73 +573,81 @@
 #define MAX_LEVELS      16
 
 // The specialization constants of all shaders: CONSTANT(id, name in GLSL, name in C). Each is an
-// int, and 0 if a pass does not set it. SAMPLING is how taps are filtered. FORMAT is how values
-// that a fused pass keeps are rounded (STORED_*). RADIUS is 0 for a line whose kernel is too
-// long to unroll its loops; with ROLLED the loop over a line's pixels stays one. With FINITE the
-// source is known to have no NaN and no infinity. TAP_COUNT, KERNELS and WINDOW are of filters
-// (lib/filter.glsl). TAKEN_X and TAKEN_Y have a bit for each texel
-// of a window and each kernel that may have a weight; 0: all may. EXACT says that their images are
-// in this ratio, or for strips and tiles the widths of these; EXACT_ROWS says so of the heights.
-// With FROM_IMAGE, a downsampling to half the size reads the image itself and applies the
-// threshold, and an adjoint pass writes the cotangents of a source's image. BY is what these are
-// of. EMITTERS is how many passes add up in the target by blending. With ENLARGED the target has
-// more rows than the source, and a composite samples the lines of its bloom. STORED is the format
-// of the target (STORED_*). FIRST marks an engine's first level. LEVELS is the number of levels
-// that a pass adds up, or the number of the group or tap whose cotangents an
-// adjoint pass writes. GROUPS is what a downsampling makes of its taps. INVERSE to GROUP_HEIGHT are
-// of Fourier transforms (fft.comp), whose workgroups have GROUP_WIDTH x GROUP_HEIGHT invocations:
-// of a stage of RADIX_1 elements, or with complete lines of stages of RADIX_1 to RADIX_4. (Windows
-// of filters in tiles are RADIX_1 x RADIX_2 texels, in transposes of RADIX_3 pictures below each
-// other.) BOUNDARY is of those that are PADDED, and a first stage that is PREFILTERED has the
-// filter of bright colours.
+// int, and 0 if a pass does not set it. A flag is 1.
 #define SPECIALIZATION_CONSTANTS(CONSTANT) \
-    CONSTANT(0, SAMPLING, sampling) \
-    CONSTANT(1, COMPOSITE, composite) \
-    CONSTANT(2, TONEMAP, tonemap) \
-    CONSTANT(3, ENCODING, encoding) \
-    CONSTANT(4, DITHER, dither) \
-    CONSTANT(5, LIT, lit) \
-    CONSTANT(6, FORMAT, format) \
-    CONSTANT(7, THRESHOLD_MODE, threshold_mode) \
-    CONSTANT(8, THRESHOLDED, thresholded) \
-    CONSTANT(9, ANTI_FLICKER, anti_flicker) \
-    CONSTANT(11, DIRECTION, direction) \
-    CONSTANT(12, RADIUS, radius) \
-    CONSTANT(13, ADD_OWN, add_own) \
-    CONSTANT(14, UPSAMPLE, upsample) \
-    CONSTANT(15, FROM_IMAGE, from_image) \
-    CONSTANT(16, EMITTERS, emitters) \
-    CONSTANT(17, FIRST, first) \
-    CONSTANT(18, LEVELS, levels) \
-    CONSTANT(19, GROUPS, groups) \
-    CONSTANT(20, NODE, node) \
-    CONSTANT(21, ALPHA, alpha) \
-    CONSTANT(22, MASKED, masked) \
-    CONSTANT(23, STORED, stored) \
-    CONSTANT(26, INVERSE, inverse) \
-    CONSTANT(27, ROTATED, rotated) \
-    CONSTANT(28, PADDED, padded) \
-    CONSTANT(29, STAGE, stage) \
-    CONSTANT(30, RADIX_1, radix_1) \
-    CONSTANT(31, RADIX_2, radix_2) \
+    CONSTANT(0, SAMPLING, sampling)   /* how taps are filtered: SAMPLING_* */ \
+    CONSTANT(1, COMPOSITE, composite) /* the formula: COMPOSITE_* */ \
+    CONSTANT(2, TONEMAP, tonemap)     /* TONEMAP_* */ \
+    CONSTANT(3, ENCODING, encoding)   /* ENCODING_* */ \
+    CONSTANT(4, DITHER, dither)       /* noise is added before 8 bits */ \
+    CONSTANT(5, LIT, lit)             /* the bloom contains the glare, and its intensity */ \
+    CONSTANT(6, FORMAT, format)       /* how a fused pass rounds values that it keeps: STORED_* */ \
+    CONSTANT(7, THRESHOLD_MODE, threshold_mode) /* THRESHOLD_* */ \
+    CONSTANT(8, THRESHOLDED, thresholded)       /* a published method's threshold is applied */ \
+    CONSTANT(9, ANTI_FLICKER, anti_flicker)     /* Kino's medians */ \
+    CONSTANT(10, FIRST_LEVEL, first_level)      /* of nine.frag: it makes the first level */ \
+    CONSTANT(11, DIRECTION, direction)          /* along which axis: DIRECTION_* */ \
+    CONSTANT(12, RADIUS, radius)                /* texels of a half-kernel without its middle */ \
+    CONSTANT(13, ADD_OWN, add_own)   /* what is at SLOT_OWN, SLOT_BEFORE or SLOT_ADDED is added */ \
+    CONSTANT(14, UPSAMPLE, upsample) /* what a tap samples: UPSAMPLE_* */ \
+    CONSTANT(15, FROM_IMAGE, \
+             from_image)             /* a variant reads the threshold pass's image in its place */ \
+    CONSTANT(16, EMITTERS, emitters) /* how many passes add up in the target by blending */ \
+    CONSTANT(17, PART_ABOVE, part_above) /* a streak reads what is above its threshold */ \
+    CONSTANT(18, LEVELS, levels)         /* how many levels are added up */ \
+    CONSTANT(19, GROUPS, groups)         /* what a pass makes of its taps: GROUPS_* */ \
+    CONSTANT(20, NODE, node)             /* three.js's node */ \
+    CONSTANT(21, ALPHA, alpha)           /* ALPHA_* */ \
+    CONSTANT(22, MASKED, masked)         /* there is a mask */ \
+    CONSTANT(23, STORED, stored)         /* the format of the target: STORED_* */ \
+    CONSTANT(24, OWN_GROUP, \
+             own_group) /* of a transpose: the first group of taps whose cotangents it writes */ \
+    CONSTANT(25, STACKED_GROUPS, stacked_groups) /* how many such groups, below each other */ \
+    CONSTANT(26, INVERSE, inverse)               /* a transform is the way back */ \
+    CONSTANT(27, ROTATED, rotated)               /* a stage of a transform has factors */ \
+    CONSTANT(28, PADDED, padded)                 /* a stage of a transform pads its lines */ \
+    CONSTANT(29, STAGE, stage)                   /* of a transform: STAGE_* */ \
+    CONSTANT(30, RADIX_1, \
+             radix_1) /* elements of a stage, or of the first one of a complete line */ \
+    CONSTANT(31, RADIX_2, radix_2) /* of the second one, and so on; 0: lines are not complete */ \
     CONSTANT(32, RADIX_3, radix_3) \
     CONSTANT(33, RADIX_4, radix_4) \
-    CONSTANT(34, GROUP_WIDTH, group_width) \
+    CONSTANT(34, GROUP_WIDTH, group_width) /* invocations of a transform's workgroup */ \
     CONSTANT(35, GROUP_HEIGHT, group_height) \
-    CONSTANT(36, ROLLED, rolled) \
-    CONSTANT(37, FINITE, finite) \
-    CONSTANT(39, BY, by) \
-    CONSTANT(40, BOUNDARY, boundary) \
-    CONSTANT(41, PREFILTERED, prefiltered) \
-    CONSTANT(42, ENLARGED, enlarged) \
-    CONSTANT(43, EXACT, exact) \
-    CONSTANT(44, TAP_COUNT, taps) \
-    CONSTANT(45, KERNELS, kernels) \
-    CONSTANT(46, WINDOW, window) \
-    CONSTANT(48, EXACT_ROWS, exact_rows) \
-    CONSTANT(49, TAKEN_X, taken_x) \
+    CONSTANT(36, ROLLED, rolled) /* of line.comp: the loop over a line's pixels stays one */ \
+    CONSTANT(37, FINITE, finite) /* the source is known to have no NaN and no infinity */ \
+    CONSTANT(38, UNROLLED_RADIUS, \
+             unrolled_radius)              /* of line.comp: that of its unrolled loops; 0: any */ \
+    CONSTANT(39, BY, by)                   /* of a transpose: what its cotangents are of: BY_* */ \
+    CONSTANT(40, BOUNDARY, boundary)       /* of what is PADDED: BOUNDARY_* */ \
+    CONSTANT(41, PREFILTERED, prefiltered) /* of STAGE_FIRST: only bright colours */ \
+    CONSTANT(42, ENLARGED, enlarged) /* a row of the source may have several of the target */ \
+    CONSTANT(43, EXACT, exact) /* the ratio of both sides, or of the widths: EXACT_*; 0: none */ \
+    CONSTANT(44, TAP_COUNT, taps)  /* taps of a filter along an axis, or of a streak */ \
+    CONSTANT(45, KERNELS, kernels) /* of a filter or its transpose */ \
+    CONSTANT(46, WINDOW, window)   /* texels along an axis that a filter's taps may read */ \
+    CONSTANT(47, MEAN_SIDE, \
+             mean_side) /* texels of a block, along an axis, that a sample is the mean of */ \
+    CONSTANT(48, EXACT_ROWS, exact_rows) /* the ratio of the heights: EXACT_*; 0: none */ \
+    CONSTANT(49, TAKEN_X, \
+             taken_x) /* bits of texels and kernels of a window that have weights; 0: all */ \
     CONSTANT(50, TAKEN_Y, taken_y) \
-    CONSTANT(51, CLAMPED, clamped)
+    CONSTANT(51, CLAMPED, clamped) /* the bloom is not negative */ \
+    CONSTANT(52, OWN_TAP, \
+             own_tap) /* of a streak's transpose: the tap whose cotangents it writes */ \
+    CONSTANT(53, WINDOW_WIDTH, window_width)   /* of tiles: texels that a pixel adds up along x */ \
+    CONSTANT(54, WINDOW_HEIGHT, window_height) /* the same along y */ \
+    CONSTANT(55, PICTURES, pictures)           /* of tiles: pictures that are added up */ \
+    CONSTANT(56, SPAN_WIDTH, \
+             span_width) /* of a transpose in blocks: pixels along x that a block is read by */ \
+    CONSTANT(57, SPAN_HEIGHT, span_height)     /* the same along y */ \
+    CONSTANT(58, SAMPLES_LINES, samples_lines) /* a composite samples the lines of its bloom */ \
+    CONSTANT(59, PLACED, placed)               /* the taps of a blur are at its `offsets` */ \
+    CONSTANT(60, PARTIAL_SUMS, \
+             partial_sums) /* of SUMMED_ROWS: groups of rows are added up, for another pass */ \
+    CONSTANT(61, OF_SOURCE, \
+             of_source)          /* a transpose's cotangents are of an image that is given */ \
+    CONSTANT(62, BESIDE, beside) /* of strip.comp: a workgroup's strips are beside each other */
 
 // The names that a setting can have. Each list is a setting and a specialization constant.
 #define COMPOSITE_NAMES(NAME) \
@@ -716,7 +724,8 @@
     CHOICE(quality, QUALITY_NAMES) \
     CHOICE(filter, FILTER_NAMES)
 
-// Modes that the core chooses, with the same names in C and GLSL.
+// Modes that the core chooses, with the same names in C and GLSL. 0 means that a pass has not set
+// the constant, or THRESHOLD_NONE. COMPOSITE_* go on with those of COMPOSITE_NAMES.
 #define MODE_NAMES(NAME) \
     NAME(COMPOSITE_OFF, -1, off) \
     NAME(COMPOSITE_ADD_TO_POSITIVE, 5, add_to_positive) \
@@ -725,27 +734,27 @@
     NAME(THRESHOLD_NONE, 0, none) \
     NAME(THRESHOLD_HARD, 1, hard) \
     NAME(THRESHOLD_KNEE, 2, knee) \
-    NAME(DIRECTION_VERTICAL, 0, vertical) \
-    NAME(DIRECTION_HORIZONTAL, 1, horizontal) \
-    NAME(DIRECTION_BOTH, 2, both) \
-    NAME(SAMPLING_TEXEL, 0, texel) \
-    NAME(SAMPLING_FILTER, 1, filter) \
-    NAME(SAMPLING_FETCH, 2, fetch) \
-    NAME(STORED_UNORM8, 0, unorm8) \
-    NAME(STORED_HALF, 1, half) \
-    NAME(STORED_SINGLE, 2, single) \
-    NAME(STORED_UNORM8_SCALED, 3, unorm8_scaled) \
-    NAME(STORED_UFLOAT, 4, ufloat) \
-    NAME(STORED_SRGB8, 5, srgb8) \
-    NAME(UPSAMPLE_TENT, 0, tent) \
-    NAME(UPSAMPLE_LINEAR, 1, linear) \
-    NAME(UPSAMPLE_CUBIC, 2, cubic) \
-    NAME(UPSAMPLE_INSET_LINEAR, 3, inset_linear) \
-    NAME(UPSAMPLE_INSET_CUBIC, 4, inset_cubic) \
-    NAME(UPSAMPLE_CORNERS, 5, corners) \
-    NAME(UPSAMPLE_INSIDE, 6, inside) \
-    NAME(UPSAMPLE_LEFT_PAIR, 7, left_pair) \
-    NAME(UPSAMPLE_RIGHT_PAIR, 8, right_pair) \
+    NAME(DIRECTION_VERTICAL, 1, vertical) \
+    NAME(DIRECTION_HORIZONTAL, 2, horizontal) \
+    NAME(DIRECTION_BOTH, 3, both) \
+    NAME(SAMPLING_TEXEL, 1, texel) \
+    NAME(SAMPLING_FILTER, 2, filter) \
+    NAME(SAMPLING_FETCH, 3, fetch) \
+    NAME(STORED_UNORM8, 1, unorm8) \
+    NAME(STORED_HALF, 2, half) \
+    NAME(STORED_SINGLE, 3, single) \
+    NAME(STORED_UNORM8_SCALED, 4, unorm8_scaled) \
+    NAME(STORED_UFLOAT, 5, ufloat) \
+    NAME(STORED_SRGB8, 6, srgb8) \
+    NAME(UPSAMPLE_TENT, 1, tent) \
+    NAME(UPSAMPLE_LINEAR, 2, linear) \
+    NAME(UPSAMPLE_CUBIC, 3, cubic) \
+    NAME(UPSAMPLE_INSET_LINEAR, 4, inset_linear) \
+    NAME(UPSAMPLE_INSET_CUBIC, 5, inset_cubic) \
+    NAME(UPSAMPLE_CORNERS, 6, corners) \
+    NAME(UPSAMPLE_INSIDE, 7, inside) \
+    NAME(UPSAMPLE_LEFT_PAIR, 8, left_pair) \
+    NAME(UPSAMPLE_RIGHT_PAIR, 9, right_pair) \
     NAME(GROUPS_PYRAMID, 10, pyramid) \
     NAME(GROUPS_PYGFX, 1, pygfx) \
     NAME(GROUPS_PYGFX_KARIS, 2, pygfx_karis) \
@@ -767,12 +776,12 @@
     NAME(EXACT_HALF, 1, exact_half) \
     NAME(EXACT_DOUBLE, 2, exact_double) \
     NAME(EXACT_SAME, 3, exact_same) \
-    NAME(BY_SCENE, 0, by_scene) \
-    NAME(BY_BLOOM, 1, by_bloom) \
-    NAME(BY_MASK, 2, by_mask) \
-    NAME(BY_VALUES, 3, by_values) \
-    NAME(BY_SQUARES, 4, by_squares) \
-    NAME(BY_MIXED, 5, by_mixed) \
+    NAME(BY_SCENE, 1, by_scene) \
+    NAME(BY_BLOOM, 2, by_bloom) \
+    NAME(BY_MASK, 3, by_mask) \
+    NAME(BY_VALUES, 4, by_values) \
+    NAME(BY_SQUARES, 5, by_squares) \
+    NAME(BY_MIXED, 6, by_mixed) \
     NAME(STAGE_FIRST, 1, first_stage) \
     NAME(STAGE_PRODUCT, 2, product) \
     NAME(STAGE_LAST, 3, last_stage) \

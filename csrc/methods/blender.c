@@ -308,7 +308,7 @@ static void add_highlights(struct vkb_levels *levels)
         factor == 1 ? glow : vkb_levels_image(levels, "highlights", 0, levels->sizes[0]);
     struct vkb_pass_row row =
         vkb_groups_row(levels, GROUPS_HIGHLIGHTS, source->glow, levels->downs[0]);
-    row.constants.radius = factor > 1 ? (int32_t)factor : 0;
+    row.constants.mean_side = factor > 1 ? (int32_t)factor : 0;
     vkb_levels_masked(levels, &row);
     if (factor > 1)
         vkb_levels_resize(levels, levels->downs[0], 1.0, glow);

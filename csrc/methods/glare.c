@@ -82,7 +82,7 @@ void vkb_add_ray(struct vkb_levels *levels, const struct vkb_ray *ray)
     struct vkb_streaks_params *params = &row.params.streaks;
 
     add_before(&row, ray->before);
-    row.constants.first = ray->iteration == 0 && values->threshold > 0.0f;
+    row.constants.part_above = ray->iteration == 0 && values->threshold > 0.0f;
     row.block = VKB_BLOCK_streaks;
     set_weights(values, ray->iteration, ray->gain, params);
     // Light goes in the direction of the angle, so that it comes from the other one.

@@ -15,7 +15,7 @@ static void add_blur(struct vkb_levels *levels, enum vkb_mode direction, bool fi
 
     row.constants.groups = GROUPS_GODOT;
     row.constants.direction = direction;
-    row.constants.first = first;
+    row.constants.first_level = first;
     if (first && direction == DIRECTION_VERTICAL)
         vkb_apply_mask(&row, levels->source->mask);
     row.params.prefilter.exposure = first ? levels->settings->values.exposure : 0.0f;

@@ -138,7 +138,7 @@ static void add_hdrp_blur(struct vkb_levels *levels, enum vkb_mode direction, bo
 
     row.constants.groups = GROUPS_HDRP_BLUR;
     row.constants.direction = direction;
-    row.constants.first = first;
+    row.constants.first_level = first;
     if (direction == DIRECTION_HORIZONTAL ? source->width == 2 * target->width
                                           : source->height == 2 * target->height)
         row.constants.sampling = SAMPLING_TEXEL;

@@ -97,9 +97,9 @@ bool vkb_accumulate_cotangent(struct vkb_adjoint *adjoint, const struct vkb_pass
     const struct vkb_size size = {forward->width, forward->height};
     row.constants.add_own = *cotangent != VKB_NO_IMAGE;
     row.reads[SLOT_ADDED] = *cotangent;
-    row.constants.from_image =
+    row.constants.of_source =
         forward->input == VKB_INPUT_IMAGE || forward->input == VKB_INPUT_EMISSION;
-    if (row.constants.from_image)
+    if (row.constants.of_source)
         row.reads[SLOT_DIFFERENTIATED] = image;
     return vkb_add_adjoint_row(adjoint, &row, size, cotangent, error);
 }
@@ -122,7 +122,7 @@ static bool make_filter_row(struct vkb_adjoint *adjoint, const struct vkb_filter
     *row = vkb_adjoint_row(&vkb_shader_adjoint_filter_frag, cotangents);
     row->reads[SLOT_WEIGHTS] = adjoint->table_image;
     row->constants.direction = direction;
-    row->constants.levels = (int32_t)filter->kernels;
+    row->constants.kernels = (int32_t)filter->kernels;
     row->block = VKB_BLOCK_adjoint_filter;
     params->gain = (float)filter->gain;
     params->share = 1.0f;

@@ -30,9 +30,9 @@ bool vkb_transpose_blur(struct vkb_adjoint *adjoint, const struct vkb_pass_row *
     vkb_filter_begin(adjoint->graph, pass->reads[SLOT_SOURCE], pass->targets[0], &filter);
     filter.gain = params->gain;
     if (direction != DIRECTION_VERTICAL)
-        set_line(params, radius, params->step_x, pass->constants.taps, &filter.x);
+        set_line(params, radius, params->step_x, pass->constants.placed, &filter.x);
     if (direction != DIRECTION_HORIZONTAL)
-        set_line(params, radius, params->step_y, pass->constants.taps, &filter.y);
+        set_line(params, radius, params->step_y, pass->constants.placed, &filter.y);
     if (pass->constants.upsample)
         filter.x.kind = UPSAMPLE_INSET_LINEAR;
     return vkb_accumulate_filter(adjoint, &filter, vkb_cotangent_of(adjoint, pass),
@@ -137,7 +137,7 @@ bool vkb_transpose_nine(struct vkb_adjoint *adjoint, const struct vkb_pass_row *
                         struct vkb_error *error)
 {
     static const double hdrps[] = {HDRP_NINE}, godots[] = {GODOT_NINE};
-    const bool godot = pass->constants.groups == GROUPS_GODOT, first = pass->constants.first;
+    const bool godot = pass->constants.groups == GROUPS_GODOT, first = pass->constants.first_level;
     const bool rows = pass->constants.direction == DIRECTION_HORIZONTAL;
     const enum vkb_border border = godot ? VKB_BORDER_PAIRS
                                  : first ? VKB_BORDER_FIRST_TWO

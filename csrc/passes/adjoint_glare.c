@@ -77,7 +77,7 @@ static bool accumulate_taps(struct vkb_adjoint *adjoint, const struct vkb_pass_r
         filter.y.origin = (float)tap * params->step_y;
         filter.x.border = filter.y.border = VKB_BORDER_ZERO;
         vkb_filter_next(&filter, params->next[tap]);
-        row.constants.levels = tap;
+        row.constants.own_tap = tap;
         if (!vkb_accumulate_through(adjoint, &row, &filter, source, pass->targets[0], error))
             return false;
     }
@@ -97,11 +97,11 @@ bool vkb_transpose_streaks(struct vkb_adjoint *adjoint, const struct vkb_pass_ro
     // Such streaks have no threshold.
     if (pass->params.streaks.reads_next)
         return accumulate_taps(adjoint, pass, error);
-    row.constants.first = 0;
+    row.constants.part_above = 0;
     row.params.streaks.threshold = 0.0f;
     row.params.streaks.step_x = -pass->params.streaks.step_x;
     row.params.streaks.step_y = -pass->params.streaks.step_y;
-    if (!pass->constants.first)
+    if (!pass->constants.part_above)
         return accumulate_own_row(adjoint, pass, &row, error);
     if (!add_own_row(adjoint, pass, &row, &moved, error))
         return false;

@@ -51,9 +51,9 @@ static void set_group(const struct vkb_pass_row *row, int group, struct vkb_filt
     } else if (groups == GROUPS_BLENDER) {
         filter->x.taps[0].offset = (group - 9) & 1 ? 1.0 : -1.0;
         filter->y.taps[0].offset = (group - 9) & 2 ? 1.0 : -1.0;
-    } else if (groups == GROUPS_HIGHLIGHTS && row->constants.radius > 1) {
-        set_means(&filter->x, row->constants.radius, false);
-        set_means(&filter->y, row->constants.radius, true);
+    } else if (groups == GROUPS_HIGHLIGHTS && row->constants.mean_side > 1) {
+        set_means(&filter->x, row->constants.mean_side, false);
+        set_means(&filter->y, row->constants.mean_side, true);
     } else if (groups == GROUPS_BOX) {
         filter->x.taps[0].offset = group & 1 ? 1.0 : -1.0;
         filter->y.taps[0].offset = group & 2 ? 1.0 : -1.0;
@@ -102,7 +102,7 @@ static bool accumulate_stacked(struct vkb_adjoint *adjoint, const struct vkb_pas
     struct vkb_filter filter;
     uint32_t image;
 
-    row.constants.radix_1 = count;
+    row.constants.stacked_groups = count;
     if (!vkb_add_adjoint_image(adjoint, &row, size, &image, error))
         return false;
     for (int group = 0; group < count; ++group) {
@@ -123,7 +123,7 @@ static bool accumulate_each(struct vkb_adjoint *adjoint, const struct vkb_pass_r
     struct vkb_filter filter;
 
     for (int group = 0; group < count; ++group) {
-        row.constants.levels = group;
+        row.constants.own_group = group;
         vkb_filter_begin(adjoint->graph, pass->reads[SLOT_SOURCE], pass->targets[0], &filter);
         set_group(&row, group, &filter);
         if (!vkb_accumulate_through(adjoint, &row, &filter, pass->reads[SLOT_SOURCE],
@@ -153,8 +153,7 @@ bool vkb_transpose_groups(struct vkb_adjoint *adjoint, const struct vkb_pass_row
     const bool stacked = count > 1 && (uint64_t)count * height <= adjoint->max_side;
     struct vkb_pass_row row = vkb_slope_row(adjoint, pass, &vkb_shader_adjoint_groups_frag);
 
-    row.constants.levels = 0;
-    row.constants.radix_1 = 1;
+    row.constants.stacked_groups = 1;
     // Its groups are texels then. The shader reads the mask in the same way.
     if (groups == GROUPS_KINO
         && vkb_same_size(adjoint->graph, row.reads[SLOT_SOURCE], pass->targets[0])

@@ -85,7 +85,6 @@ static bool accumulate_summed(struct vkb_adjoint *adjoint, const struct vkb_pass
     const double pixels = (double)gathering->size.width * gathering->size.height;
     struct vkb_pass_row row = *given;
 
-    row.constants.stage = STAGE_LAST;
     set_groups(&row, &sums, 0, 0, 1);
     if (sums.width == 0)
         return vkb_accumulate_cotangent(adjoint, &row, image, error);
@@ -102,7 +101,7 @@ static bool accumulate_summed(struct vkb_adjoint *adjoint, const struct vkb_pass
         struct vkb_pass_row part = row;
         set_groups(&part, &sums, first, count, across);
         row = part;
-        part.constants.stage = STAGE_FIRST;
+        part.constants.partial_sums = true;
         part.reads[SLOT_SUMS] = VKB_NO_IMAGE;
         if (!vkb_add_adjoint_image(adjoint, &part, size, &row.reads[SLOT_SUMS], error)
             || !vkb_accumulate_cotangent(adjoint, &row, image, error))

@@ -60,7 +60,7 @@ struct vkb_pass_row vkb_blur_row(const struct vkb_graph *graph, const char *name
     }
     for (uint32_t i = 0; blur->offsets && i < moved.count; ++i)
         params->offsets[i / 4][i % 4] = (float)blur->offsets[i];
-    row.constants.taps = blur->offsets ? (int32_t)moved.count : 0;
+    row.constants.placed = blur->offsets != NULL;
     row.constants.direction = blur->direction;
     if (blur->inset)
         row.constants.upsample = UPSAMPLE_INSET_LINEAR;
@@ -79,7 +79,7 @@ bool vkb_is_line(const struct vkb_pass_row *pass, enum vkb_mode direction, int l
     const bool vertical = direction == DIRECTION_VERTICAL;
 
     return pass->geometry == VKB_GEOMETRY_FULLSCREEN && vkb_computes(pass, VKB_BLOCK_blur)
-        && pass->constants.direction == direction && !pass->constants.taps
+        && pass->constants.direction == direction && !pass->constants.placed
         && !pass->constants.upsample && (vertical ? params->step_y : params->step_x) == 1.0f
         && pass->constants.radius <= limit;
 }

@@ -54,7 +54,7 @@ bool vkb_are_floats(const struct vkb_variant_choice *choice, const struct vkb_pa
 bool vkb_is_factor(const struct vkb_pass_row *pass)
 {
     return vkb_transposes(pass, VKB_BLOCK_composite) && !pass->constants.masked
-        && pass->constants.by == BY_BLOOM && !pass->constants.add_own && !pass->constants.from_image
+        && pass->constants.by == BY_BLOOM && !pass->constants.add_own && !pass->constants.of_source
         && pass->reads[SLOT_BLOOM] == VKB_NO_IMAGE
         && (pass->constants.composite == COMPOSITE_ADD
             || pass->constants.composite == COMPOSITE_MIX);
@@ -95,11 +95,12 @@ bool vkb_add_adjoint_linear(struct vkb_variant_choice *choice, const struct vkb_
     struct vkb_pass_row row;
 
     if (!(pass->block == VKB_BLOCK_adjoint_filter
-          && pass->constants.levels * params->span_x <= MAX_LINEAR && vkb_are_floats(choice, pass)))
+          && pass->constants.kernels * params->span_x <= MAX_LINEAR
+          && vkb_are_floats(choice, pass)))
         return false;
     memcpy(&row, pass, sizeof row);
-    row.constants.radix_1 = params->span_x;
-    row.constants.radix_2 = params->span_y;
+    row.constants.span_width = params->span_x;
+    row.constants.span_height = params->span_y;
     row.gains_if_finite = true;
     read_linear_of_composite(choice, &row);
     vkb_make_linear(&row, &vkb_shader_adjoint_taps_linear_rgba32float, ADJOINT_SIDE, ADJOINT_ROWS);
@@ -111,13 +112,13 @@ bool vkb_add_adjoint_groups(struct vkb_variant_choice *choice, const struct vkb_
 {
     struct vkb_pass_row row;
 
-    if (!(vkb_transposes(pass, VKB_BLOCK_prefilter) && pass->constants.radix_1 > 1))
+    if (!(vkb_transposes(pass, VKB_BLOCK_prefilter) && pass->constants.stacked_groups > 1))
         return false;
     memcpy(&row, pass, sizeof row);
     vkb_make_dispatch(&row, pass->shader->dispatch, PIXEL_INVOCATIONS, PIXEL_INVOCATIONS);
     // Those of one picture, since llvmpipe also runs what an early end leaves out.
     const struct vkb_image_row *target = &choice->graph->images[row.targets[0]];
-    const uint32_t height = target->height / (uint32_t)row.constants.radix_1;
+    const uint32_t height = target->height / (uint32_t)row.constants.stacked_groups;
     row.groups_width = (target->width + PIXEL_INVOCATIONS - 1) / PIXEL_INVOCATIONS;
     row.groups_height = (height + PIXEL_INVOCATIONS - 1) / PIXEL_INVOCATIONS;
     return vkb_add_variant(choice, &row);
@@ -156,8 +157,8 @@ static const struct vkb_pass_row *other_axis(const struct vkb_variant_choice *ch
 
     if (!(pass->constants.direction != DIRECTION_BOTH && first
           && first->block == VKB_BLOCK_adjoint_filter && !first->constants.add_own
-          && !first->constants.from_image
-          && first->constants.direction == !pass->constants.direction
+          && !first->constants.of_source && first->constants.direction != DIRECTION_BOTH
+          && first->constants.direction != pass->constants.direction
           && readers_of_image(graph, pass->reads[SLOT_COTANGENTS]) == 1))
         return NULL;
     const bool vertical = pass->constants.direction == DIRECTION_VERTICAL;
@@ -244,7 +245,7 @@ static bool make_tiles(const struct vkb_variant_choice *choice, const struct vkb
     int32_t exact_x = vkb_ratio_of(source->width, x.size);
     int32_t exact_y = vkb_ratio_of(source->height, y.size);
     if (width > MAX_READERS || height > MAX_READERS
-        || (pass->constants.levels == 1 && !exact_y && x.start >= 0 && y.start >= 0))
+        || (pass->constants.kernels == 1 && !exact_y && x.start >= 0 && y.start >= 0))
         return false;
     if (other) {
         row->reads[SLOT_COTANGENTS] = other->reads[SLOT_COTANGENTS];
@@ -252,7 +253,6 @@ static bool make_tiles(const struct vkb_variant_choice *choice, const struct vkb
     }
     params->pictures[0][0] = (float)x.start;
     params->pictures[0][1] = (float)y.start;
-    constants->kernels = pass->constants.levels;
     if (constants->kernels > 1
         || choice->device->limits.maxComputeSharedMemorySize < FILTER_TILE_SHARED
         || !has_exact_windows(&x, exact_x, &width) || !has_exact_windows(&y, exact_y, &height))
@@ -284,7 +284,7 @@ static bool make_tiles(const struct vkb_variant_choice *choice, const struct vkb
 static bool continues(const struct vkb_pass_row *pass, const struct vkb_pass_row *next)
 {
     return pass->block == VKB_BLOCK_adjoint_filter && next->block == pass->block
-        && pass->constants.levels == 1 && next->constants.levels == 1
+        && pass->constants.kernels == 1 && next->constants.kernels == 1
         && next->reads[SLOT_COTANGENTS] == pass->reads[SLOT_COTANGENTS] && next->constants.add_own
         && next->reads[SLOT_ADDED] == pass->targets[0]
         && next->params.adjoint_filter.gain == pass->params.adjoint_filter.gain;
@@ -316,9 +316,8 @@ static bool add_pictures(struct vkb_variant_choice *choice, const struct vkb_pas
         picture[0] = (float)x.start;
         picture[1] = (float)y.start;
     }
-    row.constants.kernels = 1;
-    row.constants.radix_3 = (int32_t)(pass - first) + 1;
     vkb_make_tiles(choice, &row, &vkb_shader_adjoint_filter_tile_comp, width, height);
+    row.constants.pictures = (int32_t)(pass - first) + 1;
     return width > MAX_WINDOW || height > MAX_WINDOW || vkb_add_variant(choice, &row);
 }
 

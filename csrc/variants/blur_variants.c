@@ -28,8 +28,8 @@ static struct vkb_pass_row line_row(const struct vkb_variant_choice *choice,
                       vertical ? LINE_OUTPUTS : 1);
     row.reading = VKB_READING_LOADED;
     row.targets[0] = target;
-    row.constants.radius = radius <= LINE_SHORT_RADIUS ? radius : 0;
-    row.constants.rolled = choice->variants == VKB_VARIANTS_CPU && row.constants.radius > 0
+    row.constants.unrolled_radius = radius <= LINE_SHORT_RADIUS ? radius : 0;
+    row.constants.rolled = choice->variants == VKB_VARIANTS_CPU && row.constants.unrolled_radius > 0
                         && (uint64_t)image->width * image->height <= ROLLED_PIXELS;
     if (!row.constants.rolled) {
         row.constants.direction = blur->constants.direction;
@@ -131,7 +131,7 @@ bool vkb_add_enlarged_final(struct vkb_variant_choice *choice, const struct vkb_
     memcpy(&row, pass, sizeof row);
     row.fused = true;
     row.reads[SLOT_BLOOM] = enlarging->reads[SLOT_SOURCE];
-    row.constants.enlarged = true;
+    row.constants.samples_lines = true;
     row.constants.sampling = enlarging->constants.sampling;
     row.constants.format = vkb_storage_mode(choice->plain.images[pass->reads[SLOT_BLOOM]].format);
     return vkb_add_fullscreen(choice, pass) && vkb_add_fullscreen(choice, &row);
@@ -215,7 +215,7 @@ static void make_strips(const struct vkb_variant_choice *choice, struct vkb_pass
     const uint32_t columns = strip_columns(target->width, vertical ? 1 : ROW_INVOCATIONS);
 
     row->params.fused_bloom.columns = (int32_t)columns;
-    row->constants.direction = vertical ? DIRECTION_VERTICAL : DIRECTION_HORIZONTAL;
+    row->constants.beside = !vertical;
     row->gains_if_finite = true;
     vkb_make_linear(row, shader, columns, rows);
     if (vertical) {
@@ -297,7 +297,7 @@ static bool find_adjoint_nest(const struct vkb_graph *graph, const struct vkb_pa
     const bool thresholds = vkb_transposes(pass, VKB_BLOCK_threshold)
                          && pass->constants.by == BY_SCENE && !pass->constants.masked;
 
-    if (!(thresholds || (pass->block == filter && pass->constants.from_image))
+    if (!(thresholds || (pass->block == filter && pass->constants.of_source))
         || !pass->constants.add_own || !find_any_nest(graph, radius, nest))
         return false;
     const struct vkb_pass_row *first =

@@ -63,7 +63,7 @@ bool vkb_add_windowed(struct vkb_variant_choice *choice, const struct vkb_pass_r
     row.constants.enlarged = source->height < target->height;
     row.constants.window = has_thirteen_taps ? 6 : 4;
     // A radius is that of a mean of other texels. HDRP's taps are in other texels at each position.
-    if (!groups || is_blur || pass->constants.masked || pass->constants.radius > 1
+    if (!groups || is_blur || pass->constants.masked || pass->constants.mean_side > 1
         || pass->params.prefilter.step_x != 1.0f || pass->params.prefilter.step_y != 1.0f
         || (!row.constants.exact && groups == GROUPS_HDRP))
         return false;
@@ -84,20 +84,20 @@ bool vkb_add_nine(struct vkb_variant_choice *choice, const struct vkb_pass_row *
     const struct vkb_image_row *target = &choice->plain.images[pass->targets[0]];
     const enum vkb_format format = choice->plain.images[pass->reads[SLOT_SOURCE]].format;
     const bool rows = pass->constants.direction == DIRECTION_HORIZONTAL;
-    const bool fits = groups_of(pass) == GROUPS_HDRP_BLUR
-                        ? (pass->constants.first || pass->constants.sampling == SAMPLING_TEXEL)
-                              && loads(choice, pass)
-                        : groups_of(pass) == GROUPS_GODOT && rows
-                              && ratio_of(&choice->plain, pass) == EXACT_HALF
-                              && target->width % 2 == 0 && target->format == VKB_FORMAT_RGBA32_FLOAT
-                              && vkb_fits_linear(choice, pass);
+    const bool fits =
+        groups_of(pass) == GROUPS_HDRP_BLUR
+            ? (pass->constants.first_level || pass->constants.sampling == SAMPLING_TEXEL)
+                  && loads(choice, pass)
+            : groups_of(pass) == GROUPS_GODOT && rows
+                  && ratio_of(&choice->plain, pass) == EXACT_HALF && target->width % 2 == 0
+                  && target->format == VKB_FORMAT_RGBA32_FLOAT && vkb_fits_linear(choice, pass);
     struct vkb_pass_row row;
 
     if (!fits)
         return false;
     memcpy(&row, pass, sizeof row);
     row.constants.exact =
-        pass->constants.first && pass->constants.groups == GROUPS_HDRP_BLUR ? EXACT_SAME : 0;
+        pass->constants.first_level && pass->constants.groups == GROUPS_HDRP_BLUR ? EXACT_SAME : 0;
     if (rows)
         make_linear(&row, rows_linear[format], NINE_OUTPUTS, GATHER_ROWS);
     else

@@ -69,8 +69,9 @@ void vkb_make_tiles(const struct vkb_variant_choice *choice, struct vkb_pass_row
         || choice->device->limits.maxComputeSharedMemorySize < FILTER_TILE_SHARED)
         constants->exact = constants->exact_rows = 0;
     const bool keeps = FILTER_TILE_KEEPS(constants->exact, constants->kernels, width, height);
-    constants->radix_1 = width;
-    constants->radix_2 = height;
+    constants->window_width = width;
+    constants->window_height = height;
+    constants->pictures = 1;
     vkb_make_dispatch(row, shader, FILTER_TILE_COLUMNS,
                       (uint32_t)FILTER_TILE_ROWS(keeps, constants->exact_rows, height));
 }

@@ -8,6 +8,6 @@ vec4 gathered(vec4 cotangent)
 {
     if (ADD_OWN != 0)
         cotangent += texelFetch(added, PIXEL, 0);
-    return FROM_IMAGE != 0 ? where_finite(cotangent, texelFetch(differentiated, PIXEL, 0))
+    return OF_SOURCE != 0 ? where_finite(cotangent, texelFetch(differentiated, PIXEL, 0))
                            : cotangent;
 }

@@ -52,5 +52,5 @@ vec4 own_at(ivec2 pixel)
 vec4 shade(vec4 own, vec4 sum, ivec2 pixel)
 {
     sum = gain * sum + own;
-    return FROM_IMAGE != 0 ? where_finite(sum, FETCH(differentiated, SLOT_DIFFERENTIATED, pixel)) : sum;
+    return OF_SOURCE != 0 ? where_finite(sum, FETCH(differentiated, SLOT_DIFFERENTIATED, pixel)) : sum;
 }

@@ -11,7 +11,7 @@ float luminance(vec4 value)
 // A sample; brighter ones of the frame weigh less, against fireflies.
 vec4 dimmed(vec4 value)
 {
-    return FIRST != 0 ? value / (1.0 + luminance(value)) : value;
+    return FIRST_LEVEL != 0 ? value / (1.0 + luminance(value)) : value;
 }
 
 const int NINE_RADIUS = 4;

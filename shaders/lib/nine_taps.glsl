@@ -15,7 +15,7 @@ Place place_of(ivec2 pixel, ivec2 size)
 vec4 hdrp_sample(ivec2 pixel, ivec2 size)
 {
     bvec2 before = lessThan(pixel, ivec2(0));
-    if (FIRST != 0)
+    if (FIRST_LEVEL != 0)
         return fetch_clamped(source, mix(pixel, pixel & 1, before));
     Place place = place_of(clamp(pixel, ivec2(0), size - 1), size);
     place = Place(mix(place.texel, ivec2(0), before), mix(place.part, vec2(0.0), before));

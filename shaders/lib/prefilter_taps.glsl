@@ -41,7 +41,7 @@ vec4[5] means(Place place)
         if (group < group_count())
             found[group] = sample_at(source, place, place_of(group, pairs), SAMPLING);
     // Only Blender's highlights are of blocks of texels.
-    if (RADIUS > 1)
-        found[0] = mean_of_texels(source, PIXEL, params.target_height, RADIUS);
+    if (MEAN_SIDE > 1)
+        found[0] = mean_of_texels(source, PIXEL, params.target_height, MEAN_SIDE);
     return found;
 }

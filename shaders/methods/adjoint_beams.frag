@@ -12,7 +12,7 @@ SAMPLED_IMAGE(SLOT_SUMS, partial_sums);
 #include "lib/adjoint.glsl"
 
 #define SUMMED_IMAGE cotangents
-#define PARTIAL_SUMS partial_sums
+#define SUMS_IMAGE partial_sums
 #include "lib/summed.glsl"
 
 #define STRIP_IMAGE cotangents
@@ -83,7 +83,7 @@ vec4 gather(ivec2 texel, int first_row, int last_row)
 vec4 shade()
 {
     vec4 sum = gather_summed();
-    if (STAGE == STAGE_FIRST)
+    if (PARTIAL_SUMS != 0)
         return sum;
     // A pixel without weights shows itself.
     if (IS_JITTERED && params.summed_first == 0 && weights_of(PIXEL, textureSize(cotangents, 0)) == 0.0)

@@ -7,7 +7,7 @@
 ivec3 readers(int start, int texel)
 {
     ivec4 row = ivec4(entry(start + texel));
-    return ivec3(row.xy, row.z + LEVELS * (row.x - row.w));
+    return ivec3(row.xy, row.z + KERNELS * (row.x - row.w));
 }
 
 // Of each kernel the weights of rows times those of columns, added up.
@@ -20,13 +20,13 @@ vec4 shade()
     vec4 sum = vec4(0.0);
     for (int y = 0; y < rows.y; ++y) {
         float shares[MAX_KERNELS];
-        [[unroll]] for (int kernel = 0; kernel < LEVELS; ++kernel)
-            shares[kernel] = one_row ? 1.0 : entry(rows.z + LEVELS * y + kernel)[number.y];
+        [[unroll]] for (int kernel = 0; kernel < KERNELS; ++kernel)
+            shares[kernel] = one_row ? 1.0 : entry(rows.z + KERNELS * y + kernel)[number.y];
         for (int x = 0; x < columns.y; ++x) {
             float weight = 0.0;
-            [[unroll]] for (int kernel = 0; kernel < LEVELS; ++kernel)
+            [[unroll]] for (int kernel = 0; kernel < KERNELS; ++kernel)
                 weight += shares[kernel]
-                        * (one_column ? 1.0 : entry(columns.z + LEVELS * x + kernel)[number.x]);
+                        * (one_column ? 1.0 : entry(columns.z + KERNELS * x + kernel)[number.x]);
             sum += weight * cotangent_at(ivec2(columns.x + x, rows.x + y));
         }
     }

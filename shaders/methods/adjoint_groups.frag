@@ -1,5 +1,5 @@
 // The cotangents of the groups of taps from which a downsampling makes a pixel, where it is not linear
-// in these: of RADIX_1 groups from number LEVELS on, or of the mask.
+// in these: of STACKED_GROUPS groups from number OWN_GROUP on, or of the mask.
 #include "lib/sampling.glsl"
 
 UNIFORM_BLOCK(PREFILTER_BLOCK);
@@ -8,7 +8,7 @@ UNIFORM_BLOCK(PREFILTER_BLOCK);
 SAMPLED_IMAGE(SLOT_SOURCE, source);
 SAMPLED_IMAGE(SLOT_COTANGENTS, cotangents);
 
-#define STACKED RADIX_1
+#define STACKED STACKED_GROUPS
 #define STACKED_HEIGHT params.target_height
 #include "lib/fullscreen.glsl"
 #include "lib/mask.glsl"
@@ -152,7 +152,7 @@ void start()
 
 vec4 shade()
 {
-    own_group = LEVELS + picture;
+    own_group = OWN_GROUP + picture;
     if (BY == BY_MASK)
         return gathered(vec4(dot(made(found, place.part), cotangent), 0.0, 0.0, 0.0));
     return gathered(back(mask_value() * cotangent));

@@ -17,7 +17,7 @@ SAMPLED_IMAGE(SLOT_SUMS, partial_sums);
 #include "lib/adjoint.glsl"
 
 #define SUMMED_IMAGE source
-#define PARTIAL_SUMS partial_sums
+#define SUMS_IMAGE partial_sums
 #include "lib/summed.glsl"
 
 #define STRIP_IMAGE source
@@ -104,7 +104,7 @@ vec4 shade()
 {
     vec4 sum = gather_summed();
     // The pixel in the centre samples itself.
-    if (STAGE == STAGE_FIRST)
+    if (PARTIAL_SUMS != 0)
         return sum;
     if (params.summed_first == 0 && FROM_CENTRE == vec2(0.0))
         sum += texelFetch(source, PIXEL, 0);

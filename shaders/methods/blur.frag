@@ -16,7 +16,7 @@ float weight(int tap)
 // The position of a tap in steps: its number, unless offsets are given.
 float place_of(int tap)
 {
-    return TAP_COUNT == 0 ? float(tap)
+    return PLACED == 0 ? float(tap)
                           : sign(float(tap)) * params.offsets[abs(tap) >> 2][abs(tap) & 3];
 }
 

@@ -11,10 +11,10 @@ SAMPLED_IMAGE(SLOT_MASK, mask);
 
 #include "lib/fullscreen.glsl"
 
-// With ENLARGED the bloom is what variants/enlarge.frag makes of the image.
+// With SAMPLES_LINES the bloom is what variants/enlarge.frag makes of the image.
 vec4 bloom_at(ivec2 pixel)
 {
-    if (ENLARGED == 0)
+    if (SAMPLES_LINES == 0)
         return texelFetch(bloom, pixel, 0);
     return as_stored(sample_bordered(bloom, pixel, textureSize(scene, 0), SAMPLING), FORMAT);
 }

@@ -23,5 +23,5 @@ vec4 shade()
     vec4 sum = nine_sum();
     if (GROUPS == GROUPS_HDRP_BLUR || DIRECTION == DIRECTION_HORIZONTAL)
         return stored(sum);
-    return stored(FIRST == 0 ? params.strength * sum : mask_value() * glowing(sum));
+    return stored(FIRST_LEVEL == 0 ? params.strength * sum : mask_value() * glowing(sum));
 }

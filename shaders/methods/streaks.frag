@@ -13,7 +13,7 @@ SAMPLED_IMAGE(SLOT_BEFORE, before);
 vec4 fetch(ivec2 texel)
 {
     vec4 value = fetch_inside(source, texel);
-    return FIRST != 0 ? part_above(value, params.threshold) : value;
+    return PART_ABOVE != 0 ? part_above(value, params.threshold) : value;
 }
 
 vec4 fetch_in_row(ivec2 texel, float part)

@@ -6,8 +6,7 @@
 
 layout(set = 0, binding = TARGET_BINDING) uniform writeonly image2D target;
 // Turned, an invocation loads a column, and those of a workgroup rows. Weights at the edges differ.
-const bool TURNED = FILTER_TILE_KEEPS(EXACT, KERNELS, RADIX_1, RADIX_2), REPEATS = false;
-const int PICTURES = RADIX_3;
+const bool TURNED = FILTER_TILE_KEEPS(EXACT, KERNELS, WINDOW_WIDTH, WINDOW_HEIGHT), REPEATS = false;
 #include "variants/filter_tile.glsl"
 
 Window window_at(int pixel, bool along_x)
@@ -42,7 +41,7 @@ Window window_at(int pixel, bool along_x)
         if (at >= readers.x && at < readers.x + readers.y)
             [[unroll]] for (int kernel = 0; kernel < KERNELS; ++kernel)
                 window.weights[i][kernel] =
-                    entry(readers.z + LEVELS * (at - readers.w) + kernel)[at_texel % ADJOINT_SIDE];
+                    entry(readers.z + KERNELS * (at - readers.w) + kernel)[at_texel % ADJOINT_SIDE];
     }
     return window;
 }

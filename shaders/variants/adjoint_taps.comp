@@ -1,6 +1,6 @@
 #pragma compile floats
 // The transpose of a filter in blocks: an invocation loads each pixel once that texels next to each other are read
-// by: RADIX_1 columns and RADIX_2 rows, with the weights of a block of texels. LEVELS is the number of kernels. In the
+// by: SPAN_WIDTH columns and SPAN_HEIGHT rows, with the weights of a block of texels. There are KERNELS. In the
 // tiles of GPUs `Pyramid` takes 102 ms backwards in place of 32, `BevyBloom` 621 in place of 244 (processor time of
 // 960 x 544 in float32, lavapipe of Mesa 22.3.6, 2026-11-27).
 #include "variants/pixels.glsl"
@@ -8,13 +8,13 @@
 
 const bool ALONG_X = DIRECTION != DIRECTION_VERTICAL, ALONG_Y = DIRECTION != DIRECTION_HORIZONTAL;
 const int COLUMNS = ADJOINT_SIDE, ROWS = ALONG_Y ? ADJOINT_SIDE : 1;
-const int SPAN_X = ALONG_X ? RADIX_1 : COLUMNS;
+const int SPAN_X = ALONG_X ? SPAN_WIDTH : COLUMNS;
 
 layout(local_size_x = ROW_INVOCATIONS) in;
 #include "variants/store.glsl"
 
 // The weights of columns in all kernels.
-vec4 weights[SPAN_X * LEVELS + 1];
+vec4 weights[SPAN_X * KERNELS + 1];
 
 // Adds a row of cotangents to the texels of the block, whose weights begin at this entry.
 void add_row(ivec2 first, int place, inout vec4 sums[ROWS][COLUMNS])
@@ -23,12 +23,12 @@ void add_row(ivec2 first, int place, inout vec4 sums[ROWS][COLUMNS])
 
     [[unroll]] for (int i = 0; i < SPAN_X; ++i)
         values[i] = texel_at(first + ivec2(i, 0));
-    [[unroll]] for (int kernel = 0; kernel < LEVELS; ++kernel) {
+    [[unroll]] for (int kernel = 0; kernel < KERNELS; ++kernel) {
         vec4 shares = entry(place + kernel);
         [[unroll]] for (int column = 0; column < COLUMNS; ++column) {
             vec4 sum = ALONG_X ? vec4(0.0) : values[column];
             [[unroll]] for (int i = 0; i < (ALONG_X ? SPAN_X : 0); ++i)
-                sum += weights[i * LEVELS + kernel][column] * values[i];
+                sum += weights[i * KERNELS + kernel][column] * values[i];
             [[unroll]] for (int row = 0; row < ROWS; ++row)
                 sums[row][column] += shares[row] * sum;
         }
@@ -65,7 +65,7 @@ void main()
     if (any(greaterThanEqual(first, size)))
         return;
     vec4 columns = ALONG_X ? entry(params.start_x + first.x) : vec4(first.x);
-    [[unroll]] for (int i = 0; i < SPAN_X * LEVELS; ++i)
+    [[unroll]] for (int i = 0; i < SPAN_X * KERNELS; ++i)
         weights[i] = ALONG_X ? entry(int(columns.z) + i) : vec4(1.0);
     for (int y = first.y; y < end; y += ROWS) {
         vec4 rows = ALONG_Y ? entry(start_y + y) : vec4(y);
@@ -75,8 +75,8 @@ void main()
                 sums[row][i] = vec4(0.0);
         // (llvmpipe would run a loop of one round twice.)
         if (ALONG_Y)
-            for (int number = 0; number < RADIX_2; ++number)
-                add_row(ivec2(int(columns.w), int(rows.w) + number), int(rows.z) + LEVELS * number, sums);
+            for (int number = 0; number < SPAN_HEIGHT; ++number)
+                add_row(ivec2(int(columns.w), int(rows.w) + number), int(rows.z) + KERNELS * number, sums);
         else
             add_line(ivec2(int(columns.w), y), sums[0]);
         [[unroll]] for (int row = 0; row < ROWS; ++row)

@@ -9,7 +9,6 @@ SAMPLED_IMAGE(SLOT_OWN, own);
 #endif
 layout(set = 0, binding = TARGET_BINDING) uniform writeonly image2D target;
 const bool TURNED = false, REPEATS = EXACT != 0;
-const int PICTURES = 1;
 #include "variants/filter_tile.glsl"
 
 Window window_at(int pixel, bool along_x)

@@ -1,10 +1,10 @@
 // A filter for GPUs, or its transpose. A workgroup computes the weights of its columns and rows once, and an invocation
 // adds up RUN rows of a column: each row of texels along x, then these sums along y. With TURNED x and y have changed
 // places in all that is here. The results of several PICTURES are added up. The including shader declares `target`,
-// includes lib/window.glsl, and defines TURNED, REPEATS, PICTURES and the functions below.
+// includes lib/window.glsl, and defines TURNED, REPEATS and the functions below.
 
 // The texels along x and along y that a pixel adds up.
-const int WIDTH = RADIX_1, HEIGHT = RADIX_2, MAX_SIDE = WIDTH > HEIGHT ? WIDTH : HEIGHT;
+const int WIDTH = WINDOW_WIDTH, HEIGHT = WINDOW_HEIGHT, MAX_SIDE = WIDTH > HEIGHT ? WIDTH : HEIGHT;
 const int COLUMNS = FILTER_TILE_COLUMNS, RUN = FILTER_TILE_RUN;
 // Whether sums along x are kept for several rows.
 const bool KEEPS = FILTER_TILE_KEEPS(EXACT, KERNELS, WIDTH, HEIGHT);

@@ -7,7 +7,7 @@ layout(local_size_x = ROW_INVOCATIONS) in;
 layout(set = 0, binding = BINDING_OF(SLOT_SOURCE), SOURCE_FORMAT) uniform readonly image2D source;
 layout(set = 0, binding = TARGET_BINDING) uniform writeonly image2D target;
 
-const int LOADED = LINE_OUTPUTS + 2 * RADIUS;
+const int LOADED = LINE_OUTPUTS + 2 * UNROLLED_RADIUS;
 
 ivec2 along()
 {
@@ -26,9 +26,9 @@ void add_short(ivec2 first, inout vec4 sums[LINE_OUTPUTS])
     vec4 texels[LOADED];
 
     [[unroll]] for (int i = 0; i < LOADED; ++i)
-        texels[i] = load(first, i - RADIUS);
+        texels[i] = load(first, i - UNROLLED_RADIUS);
     [[unroll]] for (int i = 0; i < LINE_OUTPUTS; ++i)
-        [[unroll]] for (int tap = 0; tap <= 2 * RADIUS; ++tap)
+        [[unroll]] for (int tap = 0; tap <= 2 * UNROLLED_RADIUS; ++tap)
             sums[i] += params.kernel[tap >> 2][tap & 3] * texels[i + tap];
 }
 
@@ -75,33 +75,33 @@ void blur_rolled()
     ivec2 place = ivec2(gl_GlobalInvocationID.xy) * ivec2(1, ROLLED_OUTPUTS);
     ivec2 direction = along(), first = direction.y != 0 ? place : place.yx;
     ivec2 size = imageSize(target), last = imageSize(source) - 1;
-    ivec2 texel = first + (params.origin - RADIUS) * direction;
-    ivec2 pixel = first - 2 * RADIUS * direction;
+    ivec2 texel = first + (params.origin - UNROLLED_RADIUS) * direction;
+    ivec2 pixel = first - 2 * UNROLLED_RADIUS * direction;
     int number = 0, count = ROLLED_OUTPUTS + 2 * params.radius;
     bool levels = params.levels != 0;
-    float weights[2 * RADIUS + 1];
+    float weights[2 * UNROLLED_RADIUS + 1];
     // Alpha apart: compilers do not remove a part of a vector that lives over an iteration.
-    vec3 sums[2 * RADIUS + 1];
-    float alphas[2 * RADIUS + 1];
+    vec3 sums[2 * UNROLLED_RADIUS + 1];
+    float alphas[2 * UNROLLED_RADIUS + 1];
 
-    [[unroll]] for (int tap = 0; tap < 2 * RADIUS + 1; ++tap) {
+    [[unroll]] for (int tap = 0; tap < 2 * UNROLLED_RADIUS + 1; ++tap) {
         // The kernel is symmetric.
-        int same = max(tap, 2 * RADIUS - tap);
+        int same = max(tap, 2 * UNROLLED_RADIUS - tap);
         weights[tap] = params.kernel[same >> 2][same & 3];
         sums[tap] = vec3(0.0);
         alphas[tap] = 0.0;
     }
     do {
         vec4 value = imageLoad(source, clamp(texel, ivec2(0), last));
-        [[unroll]] for (int j = 2 * RADIUS; j > 0; --j) {
+        [[unroll]] for (int j = 2 * UNROLLED_RADIUS; j > 0; --j) {
             sums[j] = sums[j - 1] + weights[j] * value.rgb;
             alphas[j] = alphas[j - 1] + weights[j] * value.a;
         }
         sums[0] = weights[0] * value.rgb;
         alphas[0] = weights[0] * value.a;
-        if (number >= 2 * RADIUS && all(lessThan(pixel, size))) {
-            vec3 colour = stored_rolled(sums[2 * RADIUS], levels);
-            float alpha = stored_rolled(vec3(alphas[2 * RADIUS]), levels).r;
+        if (number >= 2 * UNROLLED_RADIUS && all(lessThan(pixel, size))) {
+            vec3 colour = stored_rolled(sums[2 * UNROLLED_RADIUS], levels);
+            float alpha = stored_rolled(vec3(alphas[2 * UNROLLED_RADIUS]), levels).r;
             imageStore(target, pixel, vec4(colour, ALPHA == ALPHA_BLUR ? alpha : 1.0));
         }
         texel += direction;
@@ -119,7 +119,7 @@ void blur_unrolled()
         return;
     [[unroll]] for (int i = 0; i < LINE_OUTPUTS; ++i)
         sums[i] = vec4(0.0);
-    if (RADIUS > 0)
+    if (UNROLLED_RADIUS > 0)
         add_short(first, sums);
     else
         add_long(first, sums);

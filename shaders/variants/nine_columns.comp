@@ -1,4 +1,4 @@
-// HDRP's vertical blur of an image of the target's size (FIRST) or of exactly twice its height, whose
+// HDRP's vertical blur of an image of the target's size (FIRST_LEVEL) or of exactly twice its height, whose
 // samples are means of two texels. An invocation writes one word of some rows, and has each sample
 // once for all of them.
 
@@ -17,12 +17,12 @@ void take_sample(int x, int y, out vec4 taken[COLUMNS])
     bool before = y < 0;
     int row = min(y, target_shape.y - 1);
 
-    row = before ? (FIRST != 0 ? y & 1 : 0) : FIRST != 0 ? row : 2 * row;
+    row = before ? (FIRST_LEVEL != 0 ? y & 1 : 0) : FIRST_LEVEL != 0 ? row : 2 * row;
     load_run(x, min(row, read_shapes[SLOT_SOURCE].y - 1), raw);
-    if (FIRST == 0)
+    if (FIRST_LEVEL == 0)
         load_run(x, before ? 0 : row + 1, next);
     [[unroll]] for (int i = 0; i < COLUMNS; ++i)
-        taken[i] = FIRST != 0 ? value_of(raw[i]) : 0.5 * value_of(raw[i]) + 0.5 * value_of(next[i]);
+        taken[i] = FIRST_LEVEL != 0 ? value_of(raw[i]) : 0.5 * value_of(raw[i]) + 0.5 * value_of(next[i]);
 }
 
 void write_block(ivec2 first, int end)

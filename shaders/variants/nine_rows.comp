@@ -1,4 +1,4 @@
-// The horizontal blurs of nine taps: HDRP's, of an image of the target's size (FIRST) or of exactly twice its
+// The horizontal blurs of nine taps: HDRP's, of an image of the target's size (FIRST_LEVEL) or of exactly twice its
 // width, whose samples are means of two texels; Godot's, of an image of twice the target's size, whose samples
 // are means of 2 x 2 texels, into single floats. An invocation has each sample once for all pixels. Without it
 // (and nine_columns.comp) `unity_hdrp` takes 104 ms in place of 67, `godot_4_5` 218 in place of 130 (processor

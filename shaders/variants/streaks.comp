@@ -9,7 +9,7 @@ UNIFORM_BLOCK(STREAKS_BLOCK);
 
 const int COLUMNS = STREAK_COLUMNS, ROWS = STREAK_ROWS;
 // The texels at tap 0 are those of the strip. The others are filtered.
-const int TAPS = LEVELS > 2 ? LEVELS : 2, FILTERED = TAPS - 1;
+const int TAPS = TAP_COUNT > 2 ? TAP_COUNT : 2, FILTERED = TAPS - 1;
 
 READ_IMAGE(SLOT_SOURCE, source);
 READ_IMAGE(SLOT_BEFORE, before);
@@ -19,7 +19,7 @@ READ_IMAGE(SLOT_BEFORE, before);
 vec4 seen(uvec4 raw)
 {
     vec4 value = value_of(raw);
-    return FIRST != 0 ? part_above(value, params.threshold) : value;
+    return PART_ABOVE != 0 ? part_above(value, params.threshold) : value;
 }
 
 // The pixels of a row from any place on, 0 outside of the image.

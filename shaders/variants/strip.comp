@@ -191,7 +191,7 @@ void add_run(int x, uvec4 loaded[LOADED][RUN_WORDS], ivec2 done, int width,
 // The first pixel of this invocation. The strips of a workgroup are below or beside each other.
 ivec2 first_of_strip()
 {
-    if (DIRECTION == DIRECTION_HORIZONTAL)
+    if (BESIDE != 0)
         return first_pixel(ivec2(params.columns, ROWS));
     int below = int(gl_WorkGroupID.y * ROW_INVOCATIONS + gl_LocalInvocationID.x);
     return ivec2(int(gl_WorkGroupID.x) * params.columns, below * ROWS + target_shape.w);
