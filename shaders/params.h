@@ -67,7 +67,7 @@
     THRESHOLD_ROWS(B, READS)
 
 // A blur pass: the distances of its taps in texels of the source, and its half-kernel w0.., four
-// weights in a vec4. Where TAP_COUNT is set, the distances are `offsets` of the steps. `gain` is
+// weights in a vec4. With PLACED, the distances are `offsets` of the steps. `gain` is
 // for a blur in both directions.
 #define BLUR_BLOCK(B, READS, INPUT, VEC4S) \
     INPUT(B, float, step_x) \
@@ -590,9 +590,8 @@
     CONSTANT(12, RADIUS, radius)                /* texels of a half-kernel without its middle */ \
     CONSTANT(13, ADD_OWN, add_own)   /* what is at SLOT_OWN, SLOT_BEFORE or SLOT_ADDED is added */ \
     CONSTANT(14, UPSAMPLE, upsample) /* what a tap samples: UPSAMPLE_* */ \
-    CONSTANT(15, FROM_IMAGE, \
-             from_image)             /* a variant reads the threshold pass's image in its place */ \
-    CONSTANT(16, EMITTERS, emitters) /* how many passes add up in the target by blending */ \
+    CONSTANT(15, FROM_IMAGE, from_image) /* a variant reads the threshold pass's image */ \
+    CONSTANT(16, EMITTERS, emitters)     /* how many passes add up in the target by blending */ \
     CONSTANT(17, PART_ABOVE, part_above) /* a streak reads what is above its threshold */ \
     CONSTANT(18, LEVELS, levels)         /* how many levels are added up */ \
     CONSTANT(19, GROUPS, groups)         /* what a pass makes of its taps: GROUPS_* */ \
@@ -600,54 +599,47 @@
     CONSTANT(21, ALPHA, alpha)           /* ALPHA_* */ \
     CONSTANT(22, MASKED, masked)         /* there is a mask */ \
     CONSTANT(23, STORED, stored)         /* the format of the target: STORED_* */ \
-    CONSTANT(24, OWN_GROUP, \
-             own_group) /* of a transpose: the first group of taps whose cotangents it writes */ \
-    CONSTANT(25, STACKED_GROUPS, stacked_groups) /* how many such groups, below each other */ \
+    CONSTANT(24, OWN_GROUP, own_group)   /* of a transpose: its first group of taps */ \
+    CONSTANT(25, STACKED_GROUPS, stacked_groups) /* how many groups, below each other */ \
     CONSTANT(26, INVERSE, inverse)               /* a transform is the way back */ \
     CONSTANT(27, ROTATED, rotated)               /* a stage of a transform has factors */ \
     CONSTANT(28, PADDED, padded)                 /* a stage of a transform pads its lines */ \
     CONSTANT(29, STAGE, stage)                   /* of a transform: STAGE_* */ \
-    CONSTANT(30, RADIX_1, \
-             radix_1) /* elements of a stage, or of the first one of a complete line */ \
-    CONSTANT(31, RADIX_2, radix_2) /* of the second one, and so on; 0: lines are not complete */ \
-    CONSTANT(32, RADIX_3, radix_3) \
-    CONSTANT(33, RADIX_4, radix_4) \
-    CONSTANT(34, GROUP_WIDTH, group_width) /* invocations of a transform's workgroup */ \
-    CONSTANT(35, GROUP_HEIGHT, group_height) \
+    CONSTANT(30, RADIX_1, radix_1)           /* elements of a stage, or of the first of a line */ \
+    CONSTANT(31, RADIX_2, radix_2)           /* of the second; 0: a pass is one stage */ \
+    CONSTANT(32, RADIX_3, radix_3)           /* of the third; 1: there is none */ \
+    CONSTANT(33, RADIX_4, radix_4)           /* of the fourth; 1: there is none */ \
+    CONSTANT(34, GROUP_WIDTH, group_width)   /* invocations of a transform's workgroup */ \
+    CONSTANT(35, GROUP_HEIGHT, group_height) /* its rows of invocations */ \
     CONSTANT(36, ROLLED, rolled) /* of line.comp: the loop over a line's pixels stays one */ \
     CONSTANT(37, FINITE, finite) /* the source is known to have no NaN and no infinity */ \
-    CONSTANT(38, UNROLLED_RADIUS, \
-             unrolled_radius)              /* of line.comp: that of its unrolled loops; 0: any */ \
-    CONSTANT(39, BY, by)                   /* of a transpose: what its cotangents are of: BY_* */ \
+    CONSTANT(38, UNROLLED_RADIUS, unrolled_radius) /* of line.comp: of unrolled loops; 0: any */ \
+    CONSTANT(39, BY, by)                   /* of a transpose: what its result is of: BY_* */ \
     CONSTANT(40, BOUNDARY, boundary)       /* of what is PADDED: BOUNDARY_* */ \
     CONSTANT(41, PREFILTERED, prefiltered) /* of STAGE_FIRST: only bright colours */ \
     CONSTANT(42, ENLARGED, enlarged) /* a row of the source may have several of the target */ \
     CONSTANT(43, EXACT, exact) /* the ratio of both sides, or of the widths: EXACT_*; 0: none */ \
-    CONSTANT(44, TAP_COUNT, taps)  /* taps of a filter along an axis, or of a streak */ \
-    CONSTANT(45, KERNELS, kernels) /* of a filter or its transpose */ \
-    CONSTANT(46, WINDOW, window)   /* texels along an axis that a filter's taps may read */ \
-    CONSTANT(47, MEAN_SIDE, \
-             mean_side) /* texels of a block, along an axis, that a sample is the mean of */ \
+    CONSTANT(44, TAP_COUNT, taps)        /* taps of a filter along an axis, or of a streak */ \
+    CONSTANT(45, KERNELS, kernels)       /* of a filter or its transpose */ \
+    CONSTANT(46, WINDOW, window)         /* texels along an axis that a filter's taps may read */ \
+    CONSTANT(47, MEAN_SIDE, mean_side)   /* texels of a block of which a sample is the mean */ \
     CONSTANT(48, EXACT_ROWS, exact_rows) /* the ratio of the heights: EXACT_*; 0: none */ \
-    CONSTANT(49, TAKEN_X, \
-             taken_x) /* bits of texels and kernels of a window that have weights; 0: all */ \
-    CONSTANT(50, TAKEN_Y, taken_y) \
-    CONSTANT(51, CLAMPED, clamped) /* the bloom is not negative */ \
-    CONSTANT(52, OWN_TAP, \
-             own_tap) /* of a streak's transpose: the tap whose cotangents it writes */ \
+    CONSTANT(49, TAKEN_X, taken_x)       /* bits of texels that have weights; 0: all */ \
+    CONSTANT(50, TAKEN_Y, taken_y)       /* the same along y */ \
+    CONSTANT(51, CLAMPED, clamped)       /* the bloom is not negative */ \
+    CONSTANT(52, OWN_TAP, own_tap)       /* of a streak's transpose: its tap */ \
     CONSTANT(53, WINDOW_WIDTH, window_width)   /* of tiles: texels that a pixel adds up along x */ \
     CONSTANT(54, WINDOW_HEIGHT, window_height) /* the same along y */ \
     CONSTANT(55, PICTURES, pictures)           /* of tiles: pictures that are added up */ \
-    CONSTANT(56, SPAN_WIDTH, \
-             span_width) /* of a transpose in blocks: pixels along x that a block is read by */ \
+    CONSTANT(56, SPAN_WIDTH, span_width)       /* pixels along x that a block is read by */ \
     CONSTANT(57, SPAN_HEIGHT, span_height)     /* the same along y */ \
     CONSTANT(58, SAMPLES_LINES, samples_lines) /* a composite samples the lines of its bloom */ \
     CONSTANT(59, PLACED, placed)               /* the taps of a blur are at its `offsets` */ \
-    CONSTANT(60, PARTIAL_SUMS, \
-             partial_sums) /* of SUMMED_ROWS: groups of rows are added up, for another pass */ \
-    CONSTANT(61, OF_SOURCE, \
-             of_source)          /* a transpose's cotangents are of an image that is given */ \
-    CONSTANT(62, BESIDE, beside) /* of strip.comp: a workgroup's strips are beside each other */
+    CONSTANT(60, PARTIAL_SUMS, partial_sums)   /* of SUMMED_ROWS: adds up for another pass */ \
+    CONSTANT(61, OF_SOURCE, of_source)         /* its cotangents are of an image that is given */ \
+    CONSTANT(62, BESIDE, beside) /* of strip.comp: a workgroup's strips are beside each other */ \
+    CONSTANT(63, THROUGH_COMPOSITE, through_composite) /* a composite's cotangents are read */ \
+    CONSTANT(64, SQUARED, squared) /* of adjoint_sum.frag: squares are added up */
 
 // The names that a setting can have. Each list is a setting and a specialization constant.
 #define COMPOSITE_NAMES(NAME) \
@@ -780,8 +772,7 @@
     NAME(BY_BLOOM, 2, by_bloom) \
     NAME(BY_MASK, 3, by_mask) \
     NAME(BY_VALUES, 4, by_values) \
-    NAME(BY_SQUARES, 5, by_squares) \
-    NAME(BY_MIXED, 6, by_mixed) \
+    NAME(BY_MIXED, 5, by_mixed) \
     NAME(STAGE_FIRST, 1, first_stage) \
     NAME(STAGE_PRODUCT, 2, product) \
     NAME(STAGE_LAST, 3, last_stage) \

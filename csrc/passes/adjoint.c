@@ -269,17 +269,17 @@ static struct vkb_size blocks_of(struct vkb_size size)
                              (size.height + SUM_SIDE - 1) / SUM_SIDE};
 }
 
-// Adds up an image of values to one pixel. `by` is that of the first sums.
+// Adds up an image of values, or their squares, to one pixel.
 static bool add_sums(struct vkb_adjoint *adjoint, uint32_t image, struct vkb_size size,
-                     enum vkb_mode by, const char *name, struct vkb_error *error)
+                     bool squared, const char *name, struct vkb_error *error)
 {
     do {
         struct vkb_pass_row row =
             vkb_fullscreen_row("", &vkb_shader_adjoint_sum_frag, VKB_NO_IMAGE);
         row.transposed = true;
         vkb_read_only(&row, image);
-        row.constants.by = by;
-        by = BY_VALUES;
+        row.constants.squared = squared;
+        squared = false;
         size = blocks_of(size);
         if (!vkb_add_adjoint_row(adjoint, &row, size, &image, error))
             return false;
@@ -299,6 +299,6 @@ bool vkb_add_sums(struct vkb_adjoint *adjoint, const struct vkb_pass_row *given,
     snprintf(squares, sizeof squares, "%s_squares", name);
     row.constants.by = BY_VALUES;
     return vkb_add_adjoint_image(adjoint, &row, size, &image, error)
-        && add_sums(adjoint, image, size, BY_VALUES, name, error)
-        && add_sums(adjoint, image, size, BY_SQUARES, squares, error);
+        && add_sums(adjoint, image, size, false, name, error)
+        && add_sums(adjoint, image, size, true, squares, error);
 }

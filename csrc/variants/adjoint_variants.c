@@ -72,7 +72,7 @@ static void read_composite(const struct vkb_graph *graph, struct vkb_pass_row *r
     // Godot's exposure is of the scene alone.
     const float exposure = pass->constants.groups == GROUPS_GODOT ? 0.0f : params->exposure;
     row->params.adjoint_filter.gain *= intensity * exp2f(exposure);
-    row->constants.by = BY_BLOOM;
+    row->constants.through_composite = true;
     row->reads[SLOT_COTANGENTS] = pass->reads[SLOT_COTANGENTS];
     row->reads[SLOT_SCENE] = pass->reads[SLOT_SCENE];
 }

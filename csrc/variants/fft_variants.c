@@ -206,13 +206,13 @@ static bool reaches(const struct vkb_device *device, const struct vkb_image_row 
 
 bool vkb_add_transform(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
 {
-    const struct vkb_image_row *from = &choice->graph->images[pass->reads[SLOT_SOURCE]];
     const struct vkb_image_row *target = &choice->graph->images[pass->targets[0]];
     struct vkb_pass_row row;
 
     if (!(vkb_computes(pass, VKB_BLOCK_fft) && vkb_fits_linear(choice, pass)
           && reaches(choice->device, target)))
         return false;
+    const struct vkb_image_row *from = &choice->graph->images[pass->reads[SLOT_SOURCE]];
     memcpy(&row, pass, sizeof row);
     row.reading = VKB_READING_LINEAR_TEXELS;
     row.shader = pass->constants.stage == STAGE_LAST ? stored_shaders[target->format]

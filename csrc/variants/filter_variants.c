@@ -65,15 +65,15 @@ static uint32_t add_rows(struct vkb_variant_choice *choice, const struct vkb_pas
 
 bool vkb_add_gathered(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
 {
-    struct vkb_pass_row row;
     const uint32_t levels = (uint32_t)pass->constants.levels;
+    struct vkb_pass_row row;
+
+    if (!(pass->block == VKB_BLOCK_gather && fits_rows(choice, pass, levels)))
+        return false;
     const enum vkb_format format = choice->graph->images[pass->targets[0]].format;
     const bool own = pass->constants.upsample == UPSAMPLE_LINEAR
                   && vkb_same_size(&choice->plain, pass->reads[SLOT_LEVELS], pass->targets[0])
                   && vkb_has_format_of(&choice->plain, pass->reads[SLOT_LEVELS], pass->targets[0]);
-
-    if (!(pass->block == VKB_BLOCK_gather && fits_rows(choice, pass, levels)))
-        return false;
     memcpy(&row, pass, sizeof row);
     row.constants.add_own = own;
     row.constants.sampling = 0;
@@ -114,12 +114,11 @@ struct filter_shaders {
 static bool make_filter(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
                         struct filter_shaders shaders, struct vkb_pass_row *row)
 {
-    const struct vkb_image_row *source = &choice->plain.images[pass->reads[SLOT_SOURCE]];
-    const struct vkb_image_row *target = &choice->plain.images[pass->targets[0]];
-
     // Its taps are in a window.
     if (!vkb_is_filter(pass) || pass->constants.window == 0)
         return false;
+    const struct vkb_image_row *source = &choice->plain.images[pass->reads[SLOT_SOURCE]];
+    const struct vkb_image_row *target = &choice->plain.images[pass->targets[0]];
     take_filter(choice, pass, row);
     if (choice->variants == VKB_VARIANTS_GPU) {
         vkb_make_tiles(choice, row, shaders.tiles, pass->constants.window, pass->constants.window);

@@ -46,10 +46,6 @@ static void make_linear(struct vkb_pass_row *row, const struct vkb_shader *shade
 
 bool vkb_add_windowed(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
 {
-    const struct vkb_image_row *source = &choice->plain.images[pass->reads[SLOT_SOURCE]];
-    const struct vkb_image_row *target = &choice->plain.images[pass->targets[0]];
-    const uint32_t size = vkb_formats[source->format].channel_size;
-    const int32_t ratio = ratio_of(&choice->plain, pass);
     const enum vkb_mode groups = groups_of(pass);
     const bool is_blur = groups == GROUPS_HDRP_BLUR || groups == GROUPS_GODOT;
     const bool has_thirteen_taps = groups == GROUPS_PYRAMID || groups == GROUPS_PYGFX
@@ -57,13 +53,19 @@ bool vkb_add_windowed(struct vkb_variant_choice *choice, const struct vkb_pass_r
                                 || groups == GROUPS_BEVY;
     struct vkb_pass_row row;
 
+    if (!groups)
+        return false;
+    const struct vkb_image_row *source = &choice->plain.images[pass->reads[SLOT_SOURCE]];
+    const struct vkb_image_row *target = &choice->plain.images[pass->targets[0]];
+    const uint32_t size = vkb_formats[source->format].channel_size;
+    const int32_t ratio = ratio_of(&choice->plain, pass);
     memcpy(&row, pass, sizeof row);
     row.constants.exact = ratio == EXACT_DOUBLE ? 0 : ratio;
     row.constants.exact_rows = row.constants.exact;
     row.constants.enlarged = source->height < target->height;
     row.constants.window = has_thirteen_taps ? 6 : 4;
-    // A radius is that of a mean of other texels. HDRP's taps are in other texels at each position.
-    if (!groups || is_blur || pass->constants.masked || pass->constants.mean_side > 1
+    // HDRP's taps are in other texels at each position.
+    if (is_blur || pass->constants.masked || pass->constants.mean_side > 1
         || pass->params.prefilter.step_x != 1.0f || pass->params.prefilter.step_y != 1.0f
         || (!row.constants.exact && groups == GROUPS_HDRP))
         return false;
@@ -82,7 +84,6 @@ bool vkb_add_windowed(struct vkb_variant_choice *choice, const struct vkb_pass_r
 bool vkb_add_nine(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
 {
     const struct vkb_image_row *target = &choice->plain.images[pass->targets[0]];
-    const enum vkb_format format = choice->plain.images[pass->reads[SLOT_SOURCE]].format;
     const bool rows = pass->constants.direction == DIRECTION_HORIZONTAL;
     const bool fits =
         groups_of(pass) == GROUPS_HDRP_BLUR
@@ -95,6 +96,7 @@ bool vkb_add_nine(struct vkb_variant_choice *choice, const struct vkb_pass_row *
 
     if (!fits)
         return false;
+    const enum vkb_format format = choice->plain.images[pass->reads[SLOT_SOURCE]].format;
     memcpy(&row, pass, sizeof row);
     row.constants.exact =
         pass->constants.first_level && pass->constants.groups == GROUPS_HDRP_BLUR ? EXACT_SAME : 0;

@@ -19,26 +19,28 @@ static bool blends(const struct vkb_graph *graph, const struct vkb_pass_row *pas
 }
 
 // Turns a pass that reads only the pixel at its own position into one that loads it.
-static void load_pixels(struct vkb_pass_row *row, const struct vkb_shader *shader,
-                        enum vkb_format format)
+static void load_pixels(const struct vkb_graph *graph, struct vkb_pass_row *row,
+                        const struct vkb_shader *const *shaders)
 {
-    vkb_make_linear(row, shader, TEXEL_COLUMNS(vkb_formats[format].channel_size), TEXEL_ROWS);
+    const enum vkb_format format = graph->images[row->reads[SLOT_SOURCE]].format;
+
+    vkb_make_linear(row, shaders[format], TEXEL_COLUMNS(vkb_formats[format].channel_size),
+                    TEXEL_ROWS);
 }
 
 bool vkb_add_fullscreen(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
 {
     const struct vkb_graph *graph = choice->graph;
-    const enum vkb_format format = graph->images[pass->reads[SLOT_SOURCE]].format;
     struct vkb_pass_row row;
 
     memcpy(&row, pass, sizeof row);
     if (choice->variants == VKB_VARIANTS_GPU)
         vkb_make_dispatch(&row, pass->shader->dispatch, PIXEL_INVOCATIONS, PIXEL_INVOCATIONS);
     else if (vkb_fits_linear(choice, pass) && blends(graph, pass))
-        load_pixels(&row, blend_shaders[format], format);
+        load_pixels(graph, &row, blend_shaders);
     else if (vkb_fits_linear(choice, pass) && vkb_is_threshold(pass)
              && vkb_has_format_of(graph, pass->reads[SLOT_SOURCE], pass->targets[0]))
-        load_pixels(&row, threshold_shaders[format], format);
+        load_pixels(graph, &row, threshold_shaders);
     return vkb_add_variant(choice, &row);
 }
 

@@ -1,7 +1,7 @@
 // Shared by the variants of a transposed filter: each texel gathers the cotangents of the pixels that read it, with
-// the weights from a table (csrc/passes/taps.h). With BY these are the cotangents of a composite without a curve, from
-// which those of the bloom follow by a factor where the scene is finite. For linear texels, include pixels.glsl before
-// this file.
+// the weights from a table (csrc/passes/taps.h). With THROUGH_COMPOSITE these are the cotangents of a composite without
+// a curve, from which those of the bloom follow by a factor where the scene is finite. For linear texels, include
+// pixels.glsl before this file.
 UNIFORM_BLOCK(ADJOINT_FILTER_BLOCK);
 
 // A texel of the image of a slot, and the nearest place in the image of cotangents. (Linear texels repeat the rows
@@ -33,7 +33,7 @@ vec4 entry(int place)
 vec4 cotangent_at(ivec2 pixel)
 {
     vec4 value = FETCH(cotangents, SLOT_COTANGENTS, pixel);
-    return BY == BY_BLOOM ? vec4(where_finite(value, FETCH(scene, SLOT_SCENE, pixel)).rgb, 0.0) : value;
+    return THROUGH_COMPOSITE != 0 ? vec4(where_finite(value, FETCH(scene, SLOT_SCENE, pixel)).rgb, 0.0) : value;
 }
 
 // The cotangents of this pixel, or of the nearest one in the image.

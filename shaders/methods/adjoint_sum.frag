@@ -12,7 +12,7 @@ vec4 shade()
         vec4 row = vec4(0.0);
         for (int x = first.x; x < end.x; ++x) {
             vec4 value = texelFetch(source, ivec2(x, y), 0);
-            row += BY == BY_SQUARES ? value * value : value;
+            row += SQUARED != 0 ? value * value : value;
         }
         sum += row;
     }

@@ -58,7 +58,7 @@ def specialize(library: ctypes.CDLL) -> Specialize:
         shader = Shader(b"module", code, len(code))
         out, size = ctypes.c_void_p(), ctypes.c_size_t()
         error = ctypes.create_string_buffer(1 << 14)
-        values = (ctypes.c_int32 * 64)(*constants)
+        values = (ctypes.c_int32 * 128)(*constants)
         done = library.vkb_specialize(
             ctypes.byref(shader), values, ctypes.byref(out), ctypes.byref(size), error
         )
