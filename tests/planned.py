@@ -52,4 +52,4 @@ class Row(NamedTuple):
 
 def rows(plan: _core.Plan) -> list[Row]:
     """Return the passes of a plan."""
-    return [Row(*row)._replace(reads=tuple(dict.fromkeys(row[2]))) for row in plan.passes]
+    return [Row(*row) for row in plan.passes]

@@ -58,7 +58,7 @@ ivec2 texel_at(int along, int across)
 vec4 load_source(ivec2 at)
 {
 #ifdef LINEAR_TEXELS
-    return load_pixel(source, shapes.reads[0], at.x, at.y);
+    return load_pixel(source, shapes.reads[SLOT_SOURCE], at.x, at.y);
 #else
     return imageLoad(source, at);
 #endif
@@ -67,7 +67,7 @@ vec4 load_source(ivec2 at)
 vec4 load_factor(ivec2 at)
 {
 #ifdef LINEAR_TEXELS
-    return uintBitsToFloat(texelFetch(factor, at.y * shapes.reads[1].z + at.x));
+    return uintBitsToFloat(texelFetch(factor, at.y * shapes.reads[SLOT_SPECTRUM].z + at.x));
 #else
     return imageLoad(factor, at);
 #endif
@@ -79,10 +79,10 @@ void store(ivec2 at, vec4 value)
     imageStore(target, at, value);
 #elif TARGET_BYTES == 4
     // (Without the maximum LLVM packs lane by lane.)
-    target.texels[at.y * shapes.target.z + at.x] = max(floatBitsToUint(value), uvec4(shapes.reads[0].w));
+    target.texels[at.y * shapes.target.z + at.x] = max(floatBitsToUint(value), uvec4(shapes.reads[SLOT_SOURCE].w));
 #elif TARGET_BYTES == 2
     uvec2 bits = uvec2(packHalf2x16(value.rg), packHalf2x16(value.ba));
-    target.texels[2 * at.y * shapes.target.z + at.x] = max(bits, uvec2(shapes.reads[0].w));
+    target.texels[2 * at.y * shapes.target.z + at.x] = max(bits, uvec2(shapes.reads[SLOT_SOURCE].w));
 #else
     // A sum with 2^23 is rounded to an integer, which its last bits are.
     uvec4 level = floatBitsToUint(value * 255.0 + 8388608.0) & 255u;

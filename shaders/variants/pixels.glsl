@@ -66,7 +66,7 @@ void copy_shapes()
 {
     target_shape = shapes.target;
     read_shapes = shapes.reads;
-    unknown_zero = uint(shapes.reads[0].w);
+    unknown_zero = uint(shapes.reads[SLOT_SOURCE].w);
 }
 
 // Eight bytes of the target. Without the maximum, LLVM packs lane by lane in the loop that stores.

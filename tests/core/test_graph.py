@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import ctypes
+import re
 import subprocess
 from pathlib import Path
 
 import pytest
 
-from tests.core.builds import compiler, core_with_faults
+from tests.core.builds import ROOT, compiler, core_with_faults
 from tests.planned import rows, scene_plan
 from vkbloom import Separable, _core, presets
 
@@ -34,6 +35,23 @@ def test_the_graph_of_a_plan(block: str) -> None:
     settings, _, sky = text.partition(" without ")
     given = eval(settings, {"Separable": Separable, "presets": presets})
     assert shown(scene_plan(given, has_sky=sky != "a sky", shading=shading)) == lines
+
+
+def test_no_image_fills_a_slot_of_another_one() -> None:
+    twice = {
+        name
+        for name, settings in presets.items()
+        for row in rows(scene_plan(settings))
+        if len(set(row.reads)) < len(row.reads)
+    }
+    # Its ghosts are added to the image that they are of.
+    assert twice == {"blender_ghosts"}
+
+
+def test_slots_have_names() -> None:
+    files = [*(ROOT / "csrc").rglob("*.c"), *(ROOT / "shaders").rglob("*.comp")]
+    found = re.compile(r"\breads\[\d|read_shapes\[\d|READ_IMAGE\(\d")
+    assert [file.name for file in files if found.search(file.read_text())] == []
 
 
 # Adds a filter whose last kernel has one tap in the middle, or two at this distance.
