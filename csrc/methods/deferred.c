@@ -116,8 +116,7 @@ void vkb_build_deferred(struct vkb_levels *levels, const struct vkb_scene_source
         .mask = VKB_NO_IMAGE,
         .lit = vkb_has_glare(settings),
     };
-    // Passes that were given at run time may read the scene.
-    const bool scene_first = settings->method == VKB_METHOD_CUSTOM;
+    const bool scene_first = vkb_method_of(settings)->custom;
     uint32_t glow = VKB_NO_IMAGE;
 
     if (settings->values.bloom && source->has_glow) {

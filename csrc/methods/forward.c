@@ -9,7 +9,7 @@ static const struct vkb_size FORWARD_BUFFERS = {256, 256};
 struct vkb_size vkb_forward_buffers(const struct vkb_settings *settings, struct vkb_size frame)
 {
     if (!settings->bloom_width && settings->values.bloom_scale == 1.0
-        && !vkb_is_published(settings))
+        && !vkb_method_of(settings)->published)
         return FORWARD_BUFFERS;
     return vkb_bloom_size(settings, frame);
 }
@@ -45,8 +45,7 @@ void vkb_build_forward(struct vkb_levels *levels, const struct vkb_scene_source 
         .lit = vkb_has_glare(settings),
     };
 
-    // Passes that were given at run time may read the scene.
-    const bool scene_first = settings->method == VKB_METHOD_CUSTOM;
+    const bool scene_first = vkb_method_of(settings)->custom;
 
     if (scene_first)
         composite.scene = add_scene(levels, source, &params);

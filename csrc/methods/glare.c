@@ -187,7 +187,8 @@ static uint32_t add_source(struct vkb_levels *levels)
     const struct vkb_bloom_source *source = levels->source;
     const enum vkb_mode mode = vkb_own_threshold_mode(settings);
 
-    if (!vkb_is_published(settings) || (mode == THRESHOLD_NONE && source->mask == VKB_NO_IMAGE))
+    if (!vkb_method_of(settings)->published
+        || (mode == THRESHOLD_NONE && source->mask == VKB_NO_IMAGE))
         return source->glow;
     const uint32_t image = vkb_levels_step(levels, "glare_source", 0, source->buffers);
     vkb_add_threshold_in(levels, mode, source->glow, source->mask, image);

@@ -4,7 +4,7 @@
 #include <string.h>
 
 static uint32_t (*const methods[VKB_METHOD_COUNT])(struct vkb_levels *) = {
-#define METHOD_ROW(constant, name, published) [VKB_METHOD_##constant] = vkb_add_##name,
+#define METHOD_ROW(constant, name, ...) [VKB_METHOD_##constant] = vkb_add_##name,
     VKB_METHODS(METHOD_ROW)
 #undef METHOD_ROW
 };

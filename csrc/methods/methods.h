@@ -67,8 +67,7 @@ void vkb_add_flare(struct vkb_levels *levels, const struct vkb_stage *stage, uin
 // Adds the rows of the method that the settings name, and those of glare. Returns the last image.
 uint32_t vkb_add_bloom(struct vkb_levels *levels, const struct vkb_bloom_source *source);
 // Each method adds its rows, and returns the last image.
-#define VKB_METHOD_FUNCTION(constant, name, published) \
-    uint32_t vkb_add_##name(struct vkb_levels *levels);
+#define VKB_METHOD_FUNCTION(constant, name, ...) uint32_t vkb_add_##name(struct vkb_levels *levels);
 VKB_METHODS(VKB_METHOD_FUNCTION)
 #undef VKB_METHOD_FUNCTION
 

@@ -5,18 +5,18 @@
 static int composite_of(const struct vkb_settings *settings,
                         const struct vkb_composite_source *source)
 {
+    const struct vkb_method_row *method = vkb_method_of(settings);
     const int composite = settings->choices[VKB_CHOICE_composite];
 
-    if (settings->method == VKB_METHOD_BLENDER && source->bloom != VKB_NO_IMAGE)
-        return COMPOSITE_ADD_TO_POSITIVE;
-    if (settings->method == VKB_METHOD_PMNDRS && composite == COMPOSITE_SCREEN
-        && source->bloom != VKB_NO_IMAGE)
-        return COMPOSITE_UNCLAMPED_SCREEN;
-    if (settings->method == VKB_METHOD_DARKTABLE && source->bloom != VKB_NO_IMAGE)
-        return COMPOSITE_LIGHTNESS_SCREEN;
-    return source->bloom == VKB_NO_IMAGE               ? COMPOSITE_OFF
-         : composite == COMPOSITE_MIX && source->apart ? COMPOSITE_ADD
-                                                       : composite;
+    if (source->bloom == VKB_NO_IMAGE)
+        return COMPOSITE_OFF;
+    if (composite == COMPOSITE_MIX && source->apart)
+        return COMPOSITE_ADD;
+    if (composite == COMPOSITE_ADD)
+        return method->composite_add;
+    if (composite == COMPOSITE_SCREEN && method->composite_screen)
+        return method->composite_screen;
+    return composite;
 }
 
 // A picture that a custom method has written takes the place of the scene, and contains the bloom:
@@ -63,7 +63,7 @@ void vkb_add_composite(struct vkb_levels *levels, const struct vkb_composite_sou
     row.constants.alpha = off ? ALPHA_KEEP : source->alpha;
     row.constants.masked = row.constants.composite == COMPOSITE_MIX && source->mask != VKB_NO_IMAGE;
     row.constants.lit = source->lit;
-    if (settings->method == VKB_METHOD_GODOT && !off)
+    if (vkb_method_of(settings)->exposes_scene && !off)
         row.constants.groups = GROUPS_GODOT;
     vkb_read_only(&row, source->scene);
     vkb_read_at(&row, SLOT_MASK, row.constants.masked ? source->mask : VKB_NO_IMAGE);

@@ -64,9 +64,9 @@ bool vkb_add_target(struct vkb_graph *graph, const char *name, enum vkb_format f
 uint32_t vkb_add_first(struct vkb_levels *levels, enum vkb_format format, struct vkb_size size,
                        bool framebuffer)
 {
-    const bool glows = levels->settings->method != VKB_METHOD_BLENDER;
+    const char *name = vkb_method_of(levels->settings)->first;
 
-    return vkb_levels_target(levels, glows ? "glow" : "frame", format, size, framebuffer && glows);
+    return vkb_levels_target(levels, name ? name : "glow", format, size, framebuffer && !name);
 }
 
 enum vkb_format vkb_first_format(const struct vkb_settings *settings, enum vkb_format buffers)
@@ -76,8 +76,8 @@ enum vkb_format vkb_first_format(const struct vkb_settings *settings, enum vkb_f
 
 enum vkb_format vkb_end_format(const struct vkb_settings *settings, enum vkb_format buffers)
 {
-    return vkb_is_rounded(buffers) && vkb_is_published(settings) ? VKB_FORMAT_RGBA32_FLOAT
-                                                                 : buffers;
+    return vkb_is_rounded(buffers) && vkb_method_of(settings)->published ? VKB_FORMAT_RGBA32_FLOAT
+                                                                         : buffers;
 }
 
 uint32_t vkb_levels_add(struct vkb_levels *levels, const struct vkb_image_row *row)

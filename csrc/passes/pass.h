@@ -83,8 +83,8 @@ uint32_t vkb_levels_add(struct vkb_levels *levels, const struct vkb_image_row *r
 uint32_t vkb_levels_target(struct vkb_levels *levels, const char *name, enum vkb_format format,
                            struct vkb_size size, bool framebuffer);
 
-// Adds the first image of the bloom, the framebuffer "glow"; for Blender's glare, whose glow are
-// its highlights, an image "frame" that is none.
+// Adds the first image of the bloom: the framebuffer "glow", or what the method's row has instead
+// (Blender's highlights are its "glow").
 uint32_t vkb_add_first(struct vkb_levels *levels, enum vkb_format format, struct vkb_size size,
                        bool framebuffer);
 

@@ -4,37 +4,63 @@
 
 #include "graph/graph.h"
 
-// Every method: METHOD(name in C, name in Python and of its vkb_add_ function, published). A
-// published method starts from the complete frame: it reduces and thresholds in its own way.
+// Every method: METHOD(name in C, name in Python and of its vkb_add_ function, the members of its
+// row that are not zero). What sets a method apart from others outside of methods/ is such a
+// member.
 #define VKB_METHODS(METHOD) \
-    METHOD(SEPARABLE, separable, false) \
-    METHOD(PYRAMID, pyramid, false) \
-    METHOD(DUAL_KAWASE, dual_kawase, false) \
-    METHOD(CONVOLUTION, convolution, false) \
-    METHOD(BEVY, bevy, true) \
-    METHOD(KINO, kino, true) \
-    METHOD(FILAMENT, filament, true) \
-    METHOD(URP, urp, true) \
-    METHOD(HDRP, hdrp, true) \
-    METHOD(THREE, three, true) \
-    METHOD(GODOT, godot, true) \
-    METHOD(BLENDER, blender, true) \
-    METHOD(PYGFX, pygfx, true) \
-    METHOD(POST_PROCESSING, post_processing, true) \
-    METHOD(UNREAL, unreal, true) \
-    METHOD(HALATION, halation, true) \
-    METHOD(PMNDRS, pmndrs, true) \
-    METHOD(BABYLON, babylon, true) \
-    METHOD(PLAYCANVAS, playcanvas, true) \
-    METHOD(DARKTABLE, darktable, true) \
-    METHOD(CUSTOM, custom, false)
+    METHOD(SEPARABLE, separable, .min_weights = 1, .min_layers = 1) \
+    METHOD(PYRAMID, pyramid, .published = false) \
+    METHOD(DUAL_KAWASE, dual_kawase, .published = false) \
+    METHOD(CONVOLUTION, convolution, .kernel_types = VKB_ALL_TYPES) \
+    METHOD(BEVY, bevy, .published = true) \
+    METHOD(KINO, kino, .published = true) \
+    METHOD(FILAMENT, filament, .published = true) \
+    METHOD(URP, urp, .published = true) \
+    METHOD(HDRP, hdrp, .published = true) \
+    METHOD(THREE, three, .published = true) \
+    METHOD(GODOT, godot, .published = true, .exposes_scene = true) \
+    METHOD(BLENDER, blender, .published = true, .first = "frame", \
+           .kernel_types = 1u << TYPE_FOG_GLOW | 1u << TYPE_KERNEL, \
+           .composite_add = COMPOSITE_ADD_TO_POSITIVE) \
+    METHOD(PYGFX, pygfx, .published = true) \
+    METHOD(POST_PROCESSING, post_processing, .published = true) \
+    METHOD(UNREAL, unreal, .published = true, .kernel_types = VKB_ALL_TYPES) \
+    METHOD(HALATION, halation, .published = true, .kernel_types = VKB_ALL_TYPES) \
+    METHOD(PMNDRS, pmndrs, .published = true, .composite_screen = COMPOSITE_UNCLAMPED_SCREEN) \
+    METHOD(BABYLON, babylon, .published = true, .min_weights = 1) \
+    METHOD(PLAYCANVAS, playcanvas, .published = true) \
+    METHOD(DARKTABLE, darktable, .published = true, \
+           .composite_screen = COMPOSITE_LIGHTNESS_SCREEN) \
+    METHOD(CUSTOM, custom, .custom = true)
+
+#define VKB_ALL_TYPES UINT32_MAX
+
+struct vkb_method_row {
+    // It starts from the complete frame: it reduces and thresholds in its own way.
+    bool published;
+    // Its passes are given at run time. They may read the scene, which is drawn before them.
+    bool custom;
+    // The exposure multiplies the scene before the composite, not the result.
+    bool exposes_scene;
+    // The name of the first image of the bloom, which then is no framebuffer; NULL: it is "glow".
+    const char *first;
+    // A bit for each type (VKB_CHOICE_type) that convolves with a kernel that Python makes.
+    uint32_t kernel_types;
+    // The formulas of the composites "add" and "screen"; 0: those of their names.
+    int composite_add, composite_screen;
+    // The least number of weights and of layers that its settings have.
+    uint32_t min_weights, min_layers;
+    const char *name;
+};
 
 enum vkb_method {
-#define VKB_METHOD_ENUM(constant, name, published) VKB_METHOD_##constant,
+#define VKB_METHOD_ENUM(constant, name, ...) VKB_METHOD_##constant,
     VKB_METHODS(VKB_METHOD_ENUM)
 #undef VKB_METHOD_ENUM
         VKB_METHOD_COUNT,
 };
+
+extern const struct vkb_method_row vkb_method_rows[VKB_METHOD_COUNT];
 
 struct vkb_layer {
     float scale, strength;
@@ -109,34 +135,20 @@ struct vkb_settings {
     // Python packs what is before here.
     struct vkb_kernel_data kernel;
     struct vkb_kernel_data dirt;           // the picture of the stage of dirt
-    const struct vkb_custom_pass *passes;  // of VKB_METHOD_CUSTOM
+    const struct vkb_custom_pass *passes;  // of a custom method
     uint32_t pass_count;
 };
+
+static inline const struct vkb_method_row *vkb_method_of(const struct vkb_settings *settings)
+{
+    return &vkb_method_rows[settings->method];
+}
 
 // Whether the method convolves with a kernel that Python makes.
 static inline bool vkb_needs_kernel(const struct vkb_settings *settings)
 {
-    const int type = settings->choices[VKB_CHOICE_type];
-
     return settings->values.bloom
-        && (settings->method == VKB_METHOD_CONVOLUTION || settings->method == VKB_METHOD_UNREAL
-            || settings->method == VKB_METHOD_HALATION
-            || (settings->method == VKB_METHOD_BLENDER
-                && (type == TYPE_FOG_GLOW || type == TYPE_KERNEL)));
-}
-
-static inline bool vkb_is_published(const struct vkb_settings *settings)
-{
-    switch (settings->method) {
-#define VKB_METHOD_CASE(constant, name, published) \
-    case VKB_METHOD_##constant: \
-        return published;
-        VKB_METHODS(VKB_METHOD_CASE)
-#undef VKB_METHOD_CASE
-    case VKB_METHOD_COUNT:
-        break;
-    }
-    return false;
+        && (vkb_method_of(settings)->kernel_types >> settings->choices[VKB_CHOICE_type] & 1);
 }
 
 #endif

@@ -11,7 +11,7 @@ enum vkb_mode vkb_own_threshold_mode(const struct vkb_settings *settings)
 
 enum vkb_mode vkb_threshold_mode(const struct vkb_settings *settings)
 {
-    return vkb_is_published(settings) ? THRESHOLD_NONE : vkb_own_threshold_mode(settings);
+    return vkb_method_of(settings)->published ? THRESHOLD_NONE : vkb_own_threshold_mode(settings);
 }
 
 // The luminances of 8-bit colours, (2126 r + 7152 g + 722 b) / 10000 / 255, are integer multiples
@@ -27,7 +27,7 @@ static float between_levels(float threshold)
 void vkb_add_threshold(struct vkb_levels *levels, uint32_t image, uint32_t mask, uint32_t glow)
 {
     vkb_add_threshold_in(levels, vkb_threshold_mode(levels->settings), image,
-                         vkb_is_published(levels->settings) ? VKB_NO_IMAGE : mask, glow);
+                         vkb_method_of(levels->settings)->published ? VKB_NO_IMAGE : mask, glow);
 }
 
 void vkb_add_threshold_in(struct vkb_levels *levels, enum vkb_mode mode, uint32_t image,

@@ -170,14 +170,13 @@ static bool check_stages(const struct vkb_settings *settings)
 
 static bool check_settings(const struct vkb_settings *settings)
 {
-    const bool separable = settings->method == VKB_METHOD_SEPARABLE;
-    const bool weighted = separable || settings->method == VKB_METHOD_BABYLON;
-
     return check_choices(settings)
         && check_values(vkb_value_rows, vkb_value_row_count, &settings->values)
-        && check_count("weights", settings->weight_count, weighted, MAX_WEIGHTS)
+        && check_count("weights", settings->weight_count, vkb_method_of(settings)->min_weights,
+                       MAX_WEIGHTS)
         && check_finite("weights", settings->weights, settings->weight_count)
-        && check_count("layers", settings->layer_count, separable, MAX_LAYERS)
+        && check_count("layers", settings->layer_count, vkb_method_of(settings)->min_layers,
+                       MAX_LAYERS)
         && check_finite("layers", &settings->layers[0].scale, 2 * settings->layer_count)
         && check_count("level_weights", settings->level_weight_count, 0, MAX_LEVELS)
         && check_finite("level_weights", settings->level_weights, settings->level_weight_count)

@@ -224,7 +224,7 @@ bool vkb_hold_passes(const struct vkb_module_state *state, PyObject *object, uin
     struct vkb_size frame, buffers;
     struct vkb_error error = {0};
 
-    if (settings->method != VKB_METHOD_CUSTOM || !settings->values.bloom)
+    if (!vkb_method_of(settings)->custom || !settings->values.bloom)
         return true;
     if (!vkb_source_sizes(source, settings, max_side, &frame, &buffers, &error)) {
         vkb_raise(state, &error);

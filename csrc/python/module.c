@@ -47,7 +47,51 @@ static PyObject *fail_without_adapter(PyObject *module, PyObject *text)
     return vkb_raise(vkb_module_state(module), &error);
 }
 
+// The names of the exceptions, as the package has them.
+static const char *const error_names[VKB_ERROR_VALUE] = {
+    [VKB_ERROR_GENERAL] = "Error",
+    [VKB_ERROR_ADAPTER_NOT_FOUND] = "AdapterNotFoundError",
+    [VKB_ERROR_DEVICE_LOST] = "DeviceLostError",
+    [VKB_ERROR_OUT_OF_MEMORY] = "OutOfMemoryError",
+    [VKB_ERROR_VALIDATION] = "ValidationError",
+    [VKB_ERROR_SHADER] = "ShaderError",
+};
+
+// Sets a reference, which it takes.
+static void replace(PyObject **reference, PyObject *object)
+{
+    PyObject *old = *reference;
+
+    *reference = object;
+    Py_XDECREF(old);
+}
+
+static PyObject *connect(PyObject *module, PyObject *arguments)
+{
+    struct vkb_module_state *state = vkb_module_state(module);
+    PyObject *errors, *describe_unknown;
+
+    if (!PyArg_ParseTuple(arguments, "OO:connect", &errors, &describe_unknown))
+        return NULL;
+    for (int kind = VKB_ERROR_GENERAL; kind < VKB_ERROR_VALUE; ++kind) {
+        PyObject *class = PyObject_GetAttrString(errors, error_names[kind]);
+        if (!class || PyModule_AddObjectRef(module, error_names[kind], class) < 0) {
+            Py_XDECREF(class);
+            return NULL;
+        }
+        replace(&state->errors[kind], class);
+    }
+    replace(&state->describe_unknown, Py_NewRef(describe_unknown));
+    Py_RETURN_NONE;
+}
+
 static PyMethodDef functions[] = {
+    {"connect", connect, METH_VARARGS,
+     "connect(errors, describe_unknown): gives the core what it needs of the package, once: a "
+     "module "
+     "with the exceptions; a function of what is unknown, its name and the known ones, which "
+     "returns "
+     "the text of the error."},
     {"fail_without_adapter", fail_without_adapter, METH_O,
      "fail_without_adapter(text): raises AdapterNotFoundError, with what to install."},
     {"adapters", adapters, METH_VARARGS,
@@ -112,8 +156,15 @@ static PyObject *name_tuple(const char *const *names, Py_ssize_t count)
     return tuple;
 }
 
-#define METHOD_NAME(constant, name, published) [VKB_METHOD_##constant] = #name,
-static const char *const methods[] = {VKB_METHODS(METHOD_NAME)};
+static PyObject *method_tuple(void)
+{
+    const char *names[VKB_METHOD_COUNT];
+
+    for (int i = 0; i < VKB_METHOD_COUNT; ++i)
+        names[i] = vkb_method_rows[i].name;
+    return name_tuple(names, VKB_METHOD_COUNT);
+}
+
 #define STAGE_NAME(constant, name) [VKB_STAGE_##constant] = #name,
 static const char *const stages[] = {VKB_STAGES(STAGE_NAME)};
 
@@ -139,31 +190,6 @@ static PyObject *choice_table(void)
     return table;
 }
 
-// The exceptions of vkbloom/_errors.py.
-static const char *const error_names[VKB_ERROR_VALUE] = {
-    [VKB_ERROR_GENERAL] = "Error",
-    [VKB_ERROR_ADAPTER_NOT_FOUND] = "AdapterNotFoundError",
-    [VKB_ERROR_DEVICE_LOST] = "DeviceLostError",
-    [VKB_ERROR_OUT_OF_MEMORY] = "OutOfMemoryError",
-    [VKB_ERROR_VALIDATION] = "ValidationError",
-    [VKB_ERROR_SHADER] = "ShaderError",
-};
-
-static bool add_errors(PyObject *module)
-{
-    struct vkb_module_state *state = vkb_module_state(module);
-    PyObject *errors = PyImport_ImportModule("vkbloom._errors");
-    bool done = errors;
-
-    for (int kind = VKB_ERROR_GENERAL; done && kind < VKB_ERROR_VALUE; ++kind) {
-        state->errors[kind] = PyObject_GetAttrString(errors, error_names[kind]);
-        done = PyModule_AddObjectRef(module, error_names[kind], state->errors[kind]) == 0;
-    }
-    Py_XDECREF(errors);
-    state->errors[VKB_ERROR_VALUE] = Py_NewRef(PyExc_ValueError);
-    return done;
-}
-
 static bool add_type(PyObject *module, PyType_Spec *spec, const char *name, PyObject **type)
 {
     *type = PyType_FromModuleAndSpec(module, spec, NULL);
@@ -178,8 +204,10 @@ static int execute(PyObject *module)
         PyErr_NoMemory();
         return -1;
     }
-    return add_errors(module)
-                && add_type(module, &vkb_renderer_spec, "Renderer", &state->renderer_type)
+    for (int kind = VKB_ERROR_GENERAL; kind < VKB_ERROR_VALUE; ++kind)
+        state->errors[kind] = Py_NewRef(PyExc_RuntimeError);
+    state->errors[VKB_ERROR_VALUE] = Py_NewRef(PyExc_ValueError);
+    return add_type(module, &vkb_renderer_spec, "Renderer", &state->renderer_type)
                 && add_type(module, &vkb_source_spec, "Source", &state->source_type)
                 && add_type(module, &vkb_plan_spec, "Plan", &state->plan_type)
                 && add_type(module, &vkb_submission_spec, "Submission", &state->submission_type)
@@ -189,7 +217,7 @@ static int execute(PyObject *module)
                 && add_steal(module, "GLARE_VALUES",
                              value_table(vkb_glare_rows, vkb_glare_row_count))
                 && add_steal(module, "CHOICES", choice_table())
-                && add_steal(module, "METHODS", name_tuple(methods, VKB_METHOD_COUNT))
+                && add_steal(module, "METHODS", method_tuple())
                 && add_steal(module, "STAGES", name_tuple(stages, VKB_STAGE_COUNT))
                 && add_steal(module, "FORMATS", format_tuple())
                 && add_steal(module, "SETTINGS_BLOCK", vkb_settings_block_table())

@@ -11,7 +11,10 @@
 struct vkb_module_state {
     PyObject *renderer_type, *source_type, *plan_type, *submission_type, *pages_type,
         *exported_type;
-    PyObject *errors[VKB_ERROR_VALUE + 1];  // exception classes by enum vkb_error_kind
+    // What the package gives the module when it is imported (connect). Exception classes by enum
+    // vkb_error_kind, RuntimeError until then; a function that says which name may be meant.
+    PyObject *errors[VKB_ERROR_VALUE + 1];
+    PyObject *describe_unknown;
 };
 
 struct vkb_module_state *vkb_module_state(PyObject *module);

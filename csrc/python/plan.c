@@ -52,9 +52,47 @@ static PyObject *image_names(const struct vkb_graph *graph, const uint32_t *imag
     return tuple;
 }
 
+// Whether all names are among those of the framebuffers; else an exception is set that says which
+// one may be meant.
+static bool check_names(const struct vkb_module_state *state, PyObject *names, PyObject *known)
+{
+    int found = vkb_require_tuple(names, "framebuffers");
+
+    for (Py_ssize_t i = 0; found > 0 && i < PyTuple_Size(names); ++i) {
+        PyObject *name = PyTuple_GetItem(names, i);
+        found = PySequence_Contains(known, name);
+        if (found)
+            continue;
+        PyObject *text = PyObject_CallFunction(state->describe_unknown, "sOO",
+                                               "framebuffers: unknown framebuffer", name, known);
+        if (text)
+            PyErr_SetObject(PyExc_ValueError, text);
+        Py_XDECREF(text);
+    }
+    return found > 0;
+}
+
+// Keeps of the outputs those whose names are wanted.
+static bool keep_outputs(const struct vkb_module_state *state, struct vkb_plan *plan,
+                         uint32_t count, PyObject *names)
+{
+    PyObject *known = image_names(&plan->graph, plan->outputs, count);
+    bool done = known && check_names(state, names, known);
+
+    for (uint32_t i = 0; done && i < count; ++i) {
+        const int wanted = PySequence_Contains(names, PyTuple_GetItem(known, i));
+        done = wanted >= 0;
+        if (wanted > 0)
+            plan->outputs[plan->output_count++] = plan->outputs[i];
+    }
+    Py_XDECREF(known);
+    return done;
+}
+
 // The framebuffers from the image `first` on; those with a name among the names, unless that is
 // None.
-static bool choose_outputs(struct vkb_plan *plan, uint32_t first, PyObject *names)
+static bool choose_outputs(const struct vkb_module_state *state, struct vkb_plan *plan,
+                           uint32_t first, PyObject *names)
 {
     const struct vkb_graph *graph = &plan->graph;
     struct vkb_error error;
@@ -68,24 +106,10 @@ static bool choose_outputs(struct vkb_plan *plan, uint32_t first, PyObject *name
     for (uint32_t i = first; i < graph->image_count; ++i)
         if (graph->images[i].framebuffer)
             plan->outputs[count++] = i;
-    if (names == Py_None) {
-        plan->output_count = count;
-        return true;
-    }
-    PyObject *known = image_names(graph, plan->outputs, count);
-    PyObject *module = known ? PyImport_ImportModule("vkbloom._suggestions") : NULL;
-    PyObject *flags = module ? PyObject_CallMethod(module, "wanted", "OO", names, known) : NULL;
-    if (flags && (!PyBytes_Check(flags) || PyBytes_Size(flags) != count)) {
-        PyErr_Format(PyExc_TypeError, "framebuffers: %R is not a byte for each", flags);
-        Py_CLEAR(flags);
-    }
-    for (uint32_t i = 0; flags && i < count; ++i)
-        if (PyBytes_AsString(flags)[i])
-            plan->outputs[plan->output_count++] = plan->outputs[i];
-    Py_XDECREF(flags);
-    Py_XDECREF(module);
-    Py_XDECREF(known);
-    return flags;
+    if (names != Py_None)
+        return keep_outputs(state, plan, count, names);
+    plan->output_count = count;
+    return true;
 }
 
 static PyObject *describe_output(const struct vkb_graph *graph, uint32_t image)
@@ -214,7 +238,7 @@ static PyObject *new_plan(const struct vkb_module_state *state, const struct vkb
         PyBuffer_Release(&self->kernel);
         PyBuffer_Release(&self->dirt);
     }
-    if (!choose_outputs(&self->plan, portion ? portion->first : 0, names)
+    if (!choose_outputs(state, &self->plan, portion ? portion->first : 0, names)
         || !(self->outputs = describe_outputs(&self->plan))) {
         Py_DECREF(self);
         return NULL;

@@ -28,6 +28,11 @@ except ImportError as error:
 
     # (Of the package, since other modules import it from here.)
     _core = stand_in(error)
+else:
+    from vkbloom import _errors
+    from vkbloom._suggestions import unknown
+
+    _core.connect(_errors, unknown)
 # These supply the registries of methods, stages of glare and presets.
 from vkbloom import _glare, _methods, _presets  # noqa: F401
 from vkbloom._version import installed_version

@@ -1,4 +1,5 @@
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from types import ModuleType
 from typing import Any, NoReturn, final, overload
 
 import numpy as np
@@ -32,6 +33,9 @@ _ExportedImage = (
 )
 _Pass = tuple[str, str, tuple[str, ...], tuple[str, ...], str, int]
 
+def connect(
+    errors: ModuleType, describe_unknown: Callable[[str, object, Iterable[str]], str], /
+) -> None: ...
 def fail_without_adapter(text: str, /) -> NoReturn: ...
 def adapters(driver: str, /) -> list[_AdapterTuple]: ...
 def image_source(

@@ -56,20 +56,6 @@ def unknown(what: str, name: object, known: Iterable[str]) -> str:
     return f"{what} {name!r}{near} available: {', '.join(known) or 'none'}"
 
 
-def wanted(names: object, known: tuple[str, ...]) -> bytes:
-    """Return for each framebuffer that a plan has whether it is among the names: the core asks.
-
-    Raises ValueError for a name that is unknown.
-    """
-    if not isinstance(names, tuple):
-        raise TypeError(f"framebuffers: a tuple is needed, not {names!r}")
-    for name in names:
-        if name not in known:
-            raise ValueError(unknown("framebuffers: unknown framebuffer", name, known))
-    # Not a comprehension: CPython 3.11 leaks arguments of a call if it cannot allocate a cell.
-    return bytes(map(names.__contains__, known))
-
-
 class Named(Mapping[str, T]):
     """Objects by their published names, as keys or attributes.
 
