@@ -3,7 +3,6 @@
 #define VKB_SCENE_PASSES_H
 
 #include "passes/pass.h"
-#include "scene/scene.h"
 
 // A frame of a scene.
 struct vkb_scene_source {

@@ -5,6 +5,7 @@
 #include "python/objects.h"
 
 #include "methods/source.h"
+#include "scene/scene.h"
 #include "share/exported_memory.h"
 #include "transfer/upload.h"
 

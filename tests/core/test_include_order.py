@@ -6,31 +6,117 @@ import re
 from graphlib import TopologicalSorter
 from pathlib import Path
 
+import pytest
+
 CORE = Path(__file__).parents[2] / "csrc"
 SHADERS = CORE.parent / "shaders"
-#: Folders of one layer include each other; the files within do so without a circle.
-LAYERS = (
-    ("vulkan",),
-    ("graph",),
-    ("spirv",),
-    ("scene",),
-    ("passes",),
-    ("methods",),
-    ("variants",),
-    ("share", "transfer", "execute"),
-    ("python",),
+FILES = sorted([*CORE.glob("*/*.c"), *CORE.glob("*/*.h")])
+#: Headers that setup.py makes, and that C shares with GLSL.
+OTHERS = ("spirv.h", "shaders/params.h")
+
+
+def read_map(text: str) -> dict[str, set[str]]:
+    """Return for each folder of the drawing of csrc/README.md the folders that it may include.
+
+    A line with two columns has a folder of each half; the other lines are the ground of both.
+    """
+    (drawing,) = re.findall(r"```text\n(.*?)```", text, re.DOTALL)
+    lines = drawing.splitlines()
+    margin = min(len(line) - len(line.lstrip()) for line in lines)
+    allowed: dict[str, set[str]] = {}
+    ground: set[str] = set()
+    halves: tuple[set[str], set[str]] = (set(), set())
+    for line in lines:
+        if line[margin] == " ":
+            ground |= halves[0] | halves[1] | {line.strip()}
+            allowed[line.strip()] = set(ground)
+            continue
+        columns = re.split(r" {4,}", line.strip())
+        for half, column in zip(halves, columns, strict=True):
+            rooms = [set(room.split()) for room in column.split("|")]
+            for room in rooms:
+                allowed |= dict.fromkeys(room, ground | half | room)
+            half.update(*rooms)
+    return allowed
+
+
+ALLOWED = read_map((CORE / "README.md").read_text("utf-8"))
+
+
+def refused_includes(folder: str, text: str, allowed: dict[str, set[str]]) -> list[str]:
+    """Return the headers that a file of the folder includes and must not."""
+    found = re.findall(r'^\s*#\s*include\s*(["<])([^">]+)', text, re.MULTILINE)
+    return [
+        name
+        for quote, name in found
+        # A header of the core in angle brackets is found, too.
+        if (quote == '"' or (CORE / name).exists())
+        and name not in OTHERS
+        and (name.count("/") != 1 or name.split("/")[0] not in allowed[folder])
+    ]
+
+
+def test_folders_include_what_the_map_allows() -> None:
+    assert {file.parent.name for file in FILES} == set(ALLOWED)
+    for file in FILES:
+        text = file.read_text("utf-8")
+        assert refused_includes(file.parent.name, text, ALLOWED) == [], file.relative_to(CORE)
+
+
+@pytest.mark.parametrize(
+    ("folder", "include"),
+    [
+        # What runs rows does not know how they are made, and the other way round.
+        ("execute", '"methods/methods.h"'),
+        ("execute", '"passes/settings.h"'),
+        ("transfer", '"variants/variants.h"'),
+        ("share", '"passes/pass.h"'),
+        ("spirv", '"passes/pass.h"'),
+        ("passes", '"scene/scene.h"'),
+        ("methods", '"execute/record.h"'),
+        ("variants", '"spirv/specialize.h"'),
+        # Neighbours.
+        ("methods", '"variants/variant.h"'),
+        ("variants", '"methods/methods.h"'),
+        ("scene", '"spirv/module.h"'),
+        # What is below.
+        ("vulkan", '"graph/graph.h"'),
+        ("graph", '"spirv/module.h"'),
+        ("passes", '"methods/methods.h"'),
+        ("share", '"python/objects.h"'),
+        # Other ways to write it.
+        ("execute", '"../methods/methods.h"'),
+        ("execute", "<methods/methods.h>"),
+        ("execute", '"methods.h"'),
+    ],
 )
-ORDER = {folder: layer for layer, folders in enumerate(LAYERS) for folder in folders}
+def test_planted_includes_are_refused(folder: str, include: str) -> None:
+    text = f'#include "vulkan/error.h"\n#include "spirv.h"\n # include {include}\n'
+    assert refused_includes(folder, text, ALLOWED) == [include[1:-1]]
 
 
-def test_folders_include_those_before_them() -> None:
-    files = [*CORE.glob("*/*.c"), *CORE.glob("*/*.h")]
-    assert {file.parent.name for file in files} == set(ORDER)
-    for file in files:
-        own = ORDER[file.parent.name]
-        for folder in re.findall(r'#include "(\w+)/', file.read_text(encoding="utf-8")):
-            if folder != "shaders":
-                assert ORDER[folder] <= own, (file.relative_to(CORE), folder)
+def test_a_bar_separates_folders_of_a_line() -> None:
+    drawing = "```text\n      low\n  a | b    c d\n      high\n```"
+    assert read_map(drawing) == {
+        "low": {"low"},
+        "a": {"low", "a"},
+        "b": {"low", "b"},
+        "c": {"low", "c", "d"},
+        "d": {"low", "c", "d"},
+        "high": {"low", "a", "b", "c", "d", "high"},
+    }
+
+
+@pytest.mark.parametrize(
+    ("pattern", "reason"),
+    [
+        (r"\bVKB_METHOD_(?!COUNT|ENUM|FUNCTION)[A-Z_]+\b", "a member of the method's row says it"),
+        (r"\bPyImport_\w+", "the package gives the core what it needs (connect)"),
+    ],
+)
+def test_no_file_names(pattern: str, reason: str) -> None:
+    found = {file.name: re.findall(pattern, file.read_text("utf-8")) for file in FILES}
+    assert {name: names for name, names in found.items() if names} == {}, reason
 
 
 def test_headers_do_not_include_each_other_in_a_circle() -> None:
@@ -38,7 +124,7 @@ def test_headers_do_not_include_each_other_in_a_circle() -> None:
     order_of({name: set(re.findall(r'#include "(.+)"', text)) for name, text in found.items()})
 
 
-def test_files_do_not_use_each_other_in_a_circle() -> None:
+def test_files_use_what_the_map_allows_and_not_in_a_circle() -> None:
     """By the names that a file defines for others. (faults.c is part of test builds only.)"""
     texts = {
         str(file.relative_to(CORE)): re.sub(
@@ -55,13 +141,15 @@ def test_files_do_not_use_each_other_in_a_circle() -> None:
         )
     }
     assert owners["vkb_raise"] == "python/objects.c"
-    order_of(
-        {
-            file: {owners.get(name, file) for name in re.findall(r"(?<!struct )\bvkb_\w+", text)}
-            - {file}
-            for file, text in texts.items()
-        }
-    )
+    used = {
+        file: {owners.get(name, file) for name in re.findall(r"(?<!struct )\bvkb_\w+", text)}
+        - {file}
+        for file, text in texts.items()
+    }
+    for file, others in used.items():
+        allowed = ALLOWED[Path(file).parent.name]
+        assert [other for other in others if Path(other).parent.name not in allowed] == [], file
+    order_of(used)
 
 
 def test_functions_have_at_most_60_lines_of_code() -> None:
