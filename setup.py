@@ -35,6 +35,8 @@ SHIPPED = Path("spirv")
 # Beside the modules: the digest of their sources, and the programs' versions.
 MADE = "made.json"
 STAGES = (".vert", ".frag", ".comp")
+# Which modules each shader has.
+TABLE = SHADERS / "modules.txt"
 # What all shaders begin with.
 PREAMBLE = """#version 450
 #extension GL_GOOGLE_include_directive : require
@@ -73,105 +75,59 @@ SIMPLER = f"""
 MAX_UNROLLED = 260_000
 
 
-# GLSL's names of the formats that a shader can be compiled for, by the package's names.
-FORMATS = {"rgba8unorm": "rgba8", "rgba16float": "rgba16f", "rgba32float": "rgba32f"}
-CHANNEL_BYTES = {"rgba8unorm": 1, "rgba16float": 2, "rgba32float": 4}
+# What a word of a module defines (shaders/modules.txt).
+WORDS = {
+    **dict.fromkeys(("frag", "vert", "comp"), ""),
+    "dispatch": "-DDISPATCH",
+    "layers": "-DLAYERS",
+    "textured": "-DTEXTURED",
+    "final": "-DFINAL",
+    "mixed": "-DMIXED=1",
+    "transposed": "-DTRANSPOSED=1",
+    "linear": "-DLINEAR_TEXELS -DCHANNEL_BYTES={bytes}",
+    "packed": "-DLINEAR_TEXELS -DCHANNEL_BYTES={bytes} -DTARGET_CHANNELS=3",
+    "rgb": "-DRGB",
+    "stored": "-DLINEAR_TEXELS -DCHANNEL_BYTES=4 -DTARGET_BYTES={bytes}",
+    "image": "-DSOURCE_FORMAT={glsl}",
+}
+# The formats that a shader can be compiled for: their names in GLSL, and bytes of a channel.
+FORMATS = {"rgba8unorm": ("rgba8", 1), "rgba16float": ("rgba16f", 2), "rgba32float": ("rgba32f", 4)}
 
 
 class Module(NamedTuple):
-    """One SPIR-V module: `blur.frag` is `blur_frag` in C, with a suffix for a variant."""
+    """One SPIR-V module: `dispatch` of `blur.frag` is `blur_dispatch` in C."""
 
     name: str
     shader: Path
     options: tuple[str, ...] = ()
 
 
-def modules(shader: Path) -> list[Module]:
-    """Return the modules that a shader is compiled to, with those for the images of a batch.
-
-    With `#pragma compile WORD` it is also compiled with this word defined, under its name with the
-    word. Adjoints and Fourier transforms run for one image. A shader that includes ended.glsl, with
-    FINAL if it has that word, is also compiled for the adjoint of what it ends with, in single
-    floats; one that includes fused_bloom.glsl, which does so, for its transpose.
-    """
-    text = shader.read_text()
-    words = re.findall(r"^#pragma compile ([A-Z]+)$", text, re.MULTILINE)
-    found: list[Module] = []
-    for word in ("", *words):
-        stem = f"{shader.stem}_{word.lower()}" if word else shader.stem
-        fused = '"variants/fused_bloom.glsl"' in text
-        ends = fused or ('"lib/ended.glsl"' in text and (word == "FINAL" or "FINAL" not in words))
-        defined = (f"-D{word}",) if word else ()
-        plain = [
-            Module(name, shader, (*defined, *options))
-            for name, _, options in plain_modules(shader, stem, ends=ends)
-        ]
-        found += plain
-        if shader.stem.startswith(("adjoint", "fft")) or word == "TRANSPOSED":
-            continue
-        found += [
-            Module(f"{module.name}_layers", shader, (*module.options, "-DLAYERS"))
-            for module in plain
-            if (shader.suffix == ".comp" or "-DDISPATCH" in module.options)
-            and "-DLINEAR_TEXELS" not in module.options
-        ]
-        floats = ("_comp", "_linear_rgba32float", "_packed_rgba32float")
-        found += [
-            Module(name.replace(stem, f"{stem}_{kind.lower()}"), shader, (*options, f"-D{kind}=1"))
-            for kind, endings in (("MIXED", floats[:2]), ("TRANSPOSED", floats))
-            for name, _, options in plain
-            if (fused if kind == "TRANSPOSED" else ends) and name.endswith(endings)
-        ]
-    return found
+def module_of(shader: Path, text: str) -> Module:
+    """Return a module of a shader, with the options of its words."""
+    words = text.split("_")
+    if unknown := [word for word in words if word not in WORDS and word not in FORMATS]:
+        raise SystemExit(
+            f"{TABLE}: {shader}: the module {text} has an unknown word, {unknown[0]!r}"
+        )
+    glsl, size = next((FORMATS[word] for word in words if word in FORMATS), ("", 0))
+    options = " ".join(WORDS.get(word, "") for word in words).format(glsl=glsl, bytes=size)
+    return Module(f"{shader.stem}_{text}", shader, tuple(options.split()))
 
 
-def plain_modules(shader: Path, stem: str, *, ends: bool) -> list[Module]:
-    """Return the modules of a shader for one image.
-
-    A pass over all pixels has a compute form too. A shader that loads pixels without a sampler
-    is compiled for linear texels of each format. Lines of it say more: with `#pragma compile
-    floats` it is for single floats alone, with `#pragma compile images` also for storage images.
-    If it ends a bloom, calls finished(), or has `#pragma compile packed`, it can make the caller's
-    array, and is also compiled for a target of three channels. If it uses SOURCE_CHANNELS, it can
-    read the caller's image, and is also compiled for an image of three single floats. If it uses
-    TARGET_BYTES, it also loads single floats and stores words of each format.
-    """
-    name = f"{stem}{shader.suffix.replace('.', '_')}"
-    text = shader.read_text()
-    if '#include "variants/pixels.glsl"' in text:
-        marks = re.findall(r"^#pragma compile (\w+)$", text, re.MULTILINE)
-        found = []
-        for ours, glsl in FORMATS.items():
-            if "floats" in marks and ours != "rgba32float":
-                continue
-            if "images" in marks:
-                options = (f"-DSOURCE_FORMAT={glsl}",)
-                found.append(Module(f"{name}_{ours}", shader, options))
-            linear = ("-DLINEAR_TEXELS", f"-DCHANNEL_BYTES={CHANNEL_BYTES[ours]}")
-            if "TARGET_BYTES" in text:
-                stored = (
-                    "-DLINEAR_TEXELS",
-                    "-DCHANNEL_BYTES=4",
-                    f"-DTARGET_BYTES={CHANNEL_BYTES[ours]}",
-                )
-                found.append(Module(f"{stem}_stored_linear_{ours}", shader, stored))
-            kinds = [("", ())]
-            if "SOURCE_CHANNELS" in text and ours == "rgba32float":
-                kinds.append(("rgb_", ("-DRGB",)))
-            for kind, options in kinds:
-                found.append(Module(f"{stem}_linear_{kind}{ours}", shader, linear + options))
-                if ends or "finished(" in text or "packed" in marks:
-                    packed = (*linear, *options, "-DTARGET_CHANNELS=3")
-                    found.append(Module(f"{stem}_packed_{kind}{ours}", shader, packed))
-        return found
-    if "SOURCE_FORMAT" in text:
-        return [
-            Module(f"{name}_{ours}", shader, (f"-DSOURCE_FORMAT={glsl}",))
-            for ours, glsl in FORMATS.items()
-        ]
-    if '#include "lib/fullscreen.glsl"' in text:
-        return [Module(name, shader), Module(f"{stem}_dispatch", shader, ("-DDISPATCH",))]
-    return [Module(name, shader)]
+def all_modules() -> list[Module]:
+    """Return the modules of all shaders, as the table says."""
+    rows = [line.split() for line in TABLE.read_text().splitlines() if line and line[0] != "#"]
+    named = {SHADERS / name: modules for name, *modules in rows}
+    there = {path for path in SHADERS.rglob("*.*") if path.suffix in STAGES}
+    if odd := sorted(there ^ named.keys()):
+        lack = "has no row" if odd[0] in there else "is no file, and has a row"
+        raise SystemExit(f"{TABLE}: {odd[0]} {lack}")
+    return [
+        module_of(path, text.replace("FORMAT", form))
+        for path in sorted(named, key=lambda path: path.name)
+        for text in named[path]
+        for form in (FORMATS if "FORMAT" in text else ("",))
+    ]
 
 
 def tool(*names: str, package: str) -> str:
@@ -294,13 +250,6 @@ def compile_modules(built: list[Module], jobs: int) -> Path:
     return SPIRV
 
 
-def all_modules() -> list[Module]:
-    """Return the modules of all shaders."""
-    shaders = [path for path in SHADERS.rglob("*.*") if path.suffix in STAGES]
-    shaders.sort(key=lambda path: path.name)
-    return [module for shader in shaders for module in modules(shader)]
-
-
 def write_spirv(jobs: int) -> None:
     """Write spirv.h and spirv.c: a shader object for each module (csrc/graph/shader.h)."""
     SPIRV.mkdir(parents=True, exist_ok=True)
@@ -371,8 +320,7 @@ def processes(asked: int | None = None) -> int:
     debian = re.search(r"\bparallel=(\d+)", os.environ.get("DEB_BUILD_OPTIONS", ""))
     nix = re.fullmatch(r"(\d+)", os.environ.get("NIX_BUILD_CORES", ""))
     limits = [asked or 0, *(int(limit[1]) for limit in (debian, nix) if limit)]
-    usable = getattr(os, "sched_getaffinity", lambda _: range(os.cpu_count() or 1))(0)
-    return next((limit for limit in limits if limit > 0), len(usable))
+    return next((limit for limit in limits if limit > 0), len(os.sched_getaffinity(0)))
 
 
 class BuildCore(build_ext):
@@ -391,10 +339,7 @@ class BuildCore(build_ext):
         ext.include_dirs += [volk_folder(), str(SPIRV)]
         # First, since it takes longest.
         ext.sources.insert(0, str(SPIRV / "spirv.c"))
-        if self.compiler.compiler_type == "msvc":
-            ext.extra_compile_args += ["/std:c11"]
-        else:
-            ext.extra_compile_args += ["-std=c11", "-fvisibility=hidden"]
+        ext.extra_compile_args += ["-std=c11", "-fvisibility=hidden"]
         # Warnings are errors in CI only: a newer compiler must not stop a user's build.
         ext.extra_compile_args += os.environ.get("VKBLOOM_CFLAGS", "").split()
         ext.extra_link_args += os.environ.get("VKBLOOM_LDFLAGS", "").split()
@@ -419,10 +364,10 @@ class DistributeSpirv(sdist):
 def include_folders() -> list[Path]:
     """Return where headers may be: the Vulkan SDK's, the compiler's, the system's."""
     places = [Path("/usr/include"), Path("/usr/local/include")]
-    for variable in ("CPATH", "C_INCLUDE_PATH", "INCLUDE"):
+    for variable in ("CPATH", "C_INCLUDE_PATH"):
         places[:0] = [Path(one) for one in os.environ.get(variable, "").split(os.pathsep) if one]
     if sdk := os.environ.get("VULKAN_SDK"):
-        places[:0] = [Path(sdk) / "include", Path(sdk) / "Include"]
+        places.insert(0, Path(sdk) / "include")
     return places
 
 
@@ -457,7 +402,7 @@ setup(
             ],
             include_dirs=["csrc", "."],
             define_macros=[("VK_NO_PROTOTYPES", None), *LIMITED_API],
-            libraries=[] if os.name == "nt" else ["m", "dl"],
+            libraries=["m", "dl"],
             py_limited_api=LIMITED,
         )
     ],

@@ -90,11 +90,15 @@ bool vkb_graph_add_pass(struct vkb_graph *graph, const struct vkb_pass_row *row,
 
 enum vkb_mode vkb_storage_mode(enum vkb_format format)
 {
-    return format == VKB_FORMAT_RGBA8_UNORM    ? STORED_UNORM8
-         : format == VKB_FORMAT_RGBA16_FLOAT   ? STORED_HALF
-         : format == VKB_FORMAT_RG11B10_UFLOAT ? STORED_UFLOAT
-         : format == VKB_FORMAT_RGBA8_SRGB     ? STORED_SRGB8
-                                               : STORED_SINGLE;
+    switch (format) {
+#define FORMAT_CASE(argument, buffers, texels, stored, ...) \
+    case VKB_FORMAT_##buffers: \
+        return stored;
+        VKB_BUFFER_FORMATS(FORMAT_CASE, )
+#undef FORMAT_CASE
+    default:
+        return STORED_SINGLE;
+    }
 }
 
 // A dispatch has no vertex shader.

@@ -37,11 +37,10 @@ static bool check_alpha(const struct vkb_settings *settings, const struct vkb_im
         return vkb_fail(error, VKB_ERROR_VALUE,
                         "alpha: '%s' needs an image of 4 channels, and this one has %u", name,
                         image->channels);
-    if (settings->format == VKB_FORMAT_RG11B10_UFLOAT)
+    if (vkb_formats[settings->format].has_no_alpha)
         return vkb_fail(error, VKB_ERROR_VALUE,
-                        "alpha: '%s' needs bloom buffers that have an alpha, and rg11b10ufloat has "
-                        "none",
-                        name);
+                        "alpha: '%s' needs bloom buffers that have an alpha, and %s has none", name,
+                        vkb_formats[settings->format].name);
     return true;
 }
 

@@ -93,7 +93,7 @@ uint32_t vkb_add_separable(struct vkb_levels *levels)
     const struct vkb_settings *settings = levels->settings;
     const struct vkb_bloom_source *source = levels->source;
     // Blending does not round as the shaders do, so such layers are added in a separate image.
-    const bool apart = vkb_is_rounded(source->format) && settings->layer_count > 1;
+    const bool apart = vkb_formats[source->format].rounded && settings->layer_count > 1;
     const enum vkb_format format = apart ? VKB_FORMAT_RGBA32_FLOAT : source->format;
     uint32_t ends[MAX_LAYERS];
     char name[VKB_NAME_SIZE];

@@ -92,7 +92,7 @@ bool vkb_fft_group_radices(uint32_t length, uint32_t *found)
             || split_group(length, FFT_MAX_GROUP_RADIX, found));
 }
 
-static const struct vkb_shader *const shaders[VKB_FORMAT_COUNT] = VKB_BY_FORMAT(fft_comp);
+static const struct vkb_shader *const shaders[VKB_FORMAT_COUNT] = VKB_BY_FORMAT(fft_image);
 
 static uint32_t groups(uint32_t invocations, uint32_t side)
 {

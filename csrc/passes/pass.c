@@ -71,13 +71,14 @@ uint32_t vkb_add_first(struct vkb_levels *levels, enum vkb_format format, struct
 
 enum vkb_format vkb_first_format(const struct vkb_settings *settings, enum vkb_format buffers)
 {
-    return buffers == VKB_FORMAT_RGBA8_SRGB ? buffers : vkb_end_format(settings, buffers);
+    return vkb_formats[buffers].of_frames ? buffers : vkb_end_format(settings, buffers);
 }
 
 enum vkb_format vkb_end_format(const struct vkb_settings *settings, enum vkb_format buffers)
 {
-    return vkb_is_rounded(buffers) && vkb_method_of(settings)->published ? VKB_FORMAT_RGBA32_FLOAT
-                                                                         : buffers;
+    return vkb_formats[buffers].rounded && vkb_method_of(settings)->published
+             ? VKB_FORMAT_RGBA32_FLOAT
+             : buffers;
 }
 
 uint32_t vkb_levels_add(struct vkb_levels *levels, const struct vkb_image_row *row)

@@ -21,14 +21,9 @@ struct vkb_bloom_source {
 };
 
 // A shader that is compiled once for each format that it loads.
-#define VKB_BY_FORMAT(shader) \
-    { \
-        [VKB_FORMAT_RGBA8_UNORM] = &vkb_shader_##shader##_rgba8unorm, \
-        [VKB_FORMAT_RGBA16_FLOAT] = &vkb_shader_##shader##_rgba16float, \
-        [VKB_FORMAT_RGBA32_FLOAT] = &vkb_shader_##shader##_rgba32float, \
-        [VKB_FORMAT_RG11B10_UFLOAT] = &vkb_shader_##shader##_rgba32float, \
-        [VKB_FORMAT_RGBA8_SRGB] = &vkb_shader_##shader##_rgba32float, \
-    }
+#define VKB_BY_FORMAT(shader) {VKB_BUFFER_FORMATS(VKB_SHADER_OF_FORMAT, shader)}
+#define VKB_SHADER_OF_FORMAT(shader, format, texels, stored, ...) \
+    [VKB_FORMAT_##format] = &vkb_shader_##shader##_##texels,
 
 // Adds an image that a pass will write.
 bool vkb_add_target(struct vkb_graph *graph, const char *name, enum vkb_format format,

@@ -7,7 +7,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const struct vkb_shader *const line_shaders[VKB_FORMAT_COUNT] = VKB_BY_FORMAT(line_comp);
+static const struct vkb_shader *const line_shaders[VKB_FORMAT_COUNT] = VKB_BY_FORMAT(line_image);
 static const struct vkb_shader *const strip_shaders[VKB_FORMAT_COUNT] = VKB_LINEAR_BY_FORMAT(strip);
 
 // The row of a line blur. `origin` is the position of the target's first pixel in the source.

@@ -194,8 +194,7 @@ bool vkb_add_lines(struct vkb_variant_choice *choice, const struct vkb_pass_row 
 }
 
 static const struct vkb_shader *const stage_shaders[VKB_FORMAT_COUNT] = VKB_LINEAR_BY_FORMAT(fft);
-static const struct vkb_shader *const stored_shaders[VKB_FORMAT_COUNT] =
-    VKB_LINEAR_BY_FORMAT(fft_stored);
+static const struct vkb_shader *const stored_shaders[VKB_FORMAT_COUNT] = VKB_BY_FORMAT(fft_stored);
 
 // A storage buffer must reach the complete target: an invocation stores to places far apart.
 static bool reaches(const struct vkb_device *device, const struct vkb_image_row *row)

@@ -1,7 +1,6 @@
 // The mean of the pixels up to a radius away along a row or a column, of those inside of the image. Each
 // invocation follows a line with a running sum, which it corrects for what the additions round off. TRANSPOSED,
 // a pixel gets the shares of itself that these means have.
-#pragma compile TRANSPOSED
 
 UNIFORM_BLOCK(BOX_BLOCK);
 

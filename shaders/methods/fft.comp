@@ -1,4 +1,3 @@
-#pragma compile images
 // A Fourier transform along one axis. A texel is two complex numbers: red and green, blue and alpha.
 //
 // A pass is one stage: a butterfly of RADIX_1 elements, `step` apart, for each invocation. The way forth

@@ -2,7 +2,6 @@
 // which is mixed already, and one after it (formulas of the compositor of Blender 5.0). TRANSPOSED, from the end
 // of each line: a pixel gets the cotangents of the one after it that it was mixed into, complete, and has shares
 // of these for itself and for the one after it.
-#pragma compile TRANSPOSED
 
 UNIFORM_BLOCK(STAR_BLOCK);
 

@@ -1,4 +1,3 @@
-#pragma compile TEXTURED
 // The body, as what glows.
 #define EMISSION
 #include "scene/glow.frag"

@@ -1,4 +1,3 @@
-#pragma compile TEXTURED
 // The mesh that is lit later, in view space, with the emission of its material.
 #include "scene/gbuffer.glsl"
 

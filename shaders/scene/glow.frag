@@ -1,4 +1,3 @@
-#pragma compile TEXTURED
 // What glows, after the threshold if there is one: the glow mesh's unlit colour times the intensity, or,
 // with EMISSION, the emission of the body.
 #ifndef EMISSION

@@ -1,4 +1,3 @@
-#pragma compile TEXTURED
 // The glow mesh.
 #define GLOW
 #include "scene/mesh.vert"

@@ -1,4 +1,3 @@
-#pragma compile TEXTURED
 // A mesh in view space, for the glow (GLOW), the Phong and the G-buffer passes.
 
 UNIFORM_BLOCK(MESH_BLOCK);

@@ -1,4 +1,3 @@
-#pragma compile TEXTURED
 // The lit mesh of the forward system, with its emission if EMITTERS is not 0.
 #include "scene/phong.glsl"
 #include "scene/surface.glsl"

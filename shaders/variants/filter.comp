@@ -1,4 +1,3 @@
-#pragma compile FINAL
 // A filter of an image of any size (variants/kept_rows.glsl): each row of the source is filtered along the row once, for
 // each kernel. Where the widths are in a simple ratio (EXACT), columns share loads and the weights of one or two
 // PHASES. Without it `dual_kawase` takes 88 ms in place of 63 (processor time of 1920 x 1080 in float16, lavapipe of

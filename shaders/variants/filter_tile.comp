@@ -1,4 +1,3 @@
-#pragma compile FINAL
 // A filter in tiles (variants/nested.glsl).
 #include "variants/nested.glsl"
 

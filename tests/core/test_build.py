@@ -99,6 +99,44 @@ def test_processes_of_a_build(
     assert build.processes(asked) == expected
 
 
+@pytest.fixture
+def table(build: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The table of the modules of two shaders."""
+    for name in ("a.frag", "b.comp", "c.glsl"):
+        (tmp_path / name).touch()
+    file = tmp_path / "modules.txt"
+    monkeypatch.setattr(build, "SHADERS", tmp_path)
+    monkeypatch.setattr(build, "TABLE", file)
+    return file
+
+
+def test_modules_are_those_of_the_table(build: ModuleType, table: Path) -> None:
+    table.write_text("# a comment\n\na.frag frag dispatch_layers\nb.comp final_packed_FORMAT\n")
+    linear = ("-DFINAL", "-DLINEAR_TEXELS")
+    assert {name: options for name, _, options in build.all_modules()} == {
+        "a_frag": (),
+        "a_dispatch_layers": ("-DDISPATCH", "-DLAYERS"),
+        "b_final_packed_rgba8unorm": (*linear, "-DCHANNEL_BYTES=1", "-DTARGET_CHANNELS=3"),
+        "b_final_packed_rgba16float": (*linear, "-DCHANNEL_BYTES=2", "-DTARGET_CHANNELS=3"),
+        "b_final_packed_rgba32float": (*linear, "-DCHANNEL_BYTES=4", "-DTARGET_CHANNELS=3"),
+    }
+
+
+@pytest.mark.parametrize(
+    ("rows", "message"),
+    [
+        ("a.frag frag\n", "b.comp has no row"),
+        ("a.frag frag\nb.comp comp\nd.comp comp\n", "d.comp is no file, and has a row"),
+        ("a.frag frag\nb.comp x_comp\n", "b.comp: the module x_comp has an unknown word, 'x'"),
+    ],
+)
+def test_wrong_tables_of_modules(build: ModuleType, table: Path, rows: str, message: str) -> None:
+    table.write_text(rows)
+    with pytest.raises(SystemExit) as caught:
+        build.all_modules()
+    assert str(caught.value) == f"{table}: {table.parent}/{message}"
+
+
 def test_modules_are_compiled_only_from_changed_sources_and_by_one_version(
     build: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -92,7 +92,7 @@ def checked_image(
         _method(settings)
     scene = as_float(image, "image", (3, 4))
     format = format_of(image, settings.format)
-    if settings.alpha != "keep" and (scene.shape[2] == 3 or format == "rg11b10ufloat"):
+    if settings.alpha != "keep" and (scene.shape[2] == 3 or not storage(format).has_alpha):
         raise ValueError(f'alpha: {settings.alpha!r} is not "keep"; there is no fourth channel')
     source = scene
     if emission is not None:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Collection
-from typing import Any, Literal
+from collections.abc import Callable, Collection
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,28 +59,33 @@ def format_of(image: NDArray[Any], format: str | None) -> str:
 class Storage:
     """The effect of storing in a format: values are clamped to its range.
 
-    Values are not rounded to the steps of a format, unless these are coarse. The tolerance of a
-    comparison allows for the rounding.
+    - `low`, `high`: The range.
+    - `rounding`: Rounds to the steps of a format where these are coarse. The tolerance of a
+      comparison allows for the rounding of other formats.
+    - `has_alpha`: Whether alpha can be blurred.
+    - `is_of_frames`: Whether a published method reads the frame from this format, too.
     """
 
     low: float
     high: float
-    coarse: Literal["", "rg11b10", "srgb8"] = ""
+    rounding: Callable[[Array], Array] | None = None
+    has_alpha: bool = True
+    is_of_frames: bool = False
 
     @property
     def holds_means(self) -> bool:
         """Whether sums of levels are stored as means, since they would be clamped."""
-        return self.high == 1 and not self.coarse
+        return self.high == 1 and self.rounding is None
 
     def __call__(self, image: Array) -> Array:
         """Return the image as stored."""
-        if self.coarse:
-            return _as_rg11b10(image) if self.coarse == "rg11b10" else _as_srgb8(image)
+        if self.rounding is not None:
+            return self.rounding(image)
         return np.clip(image, self.low, self.high)
 
     def first(self, image: Array) -> Array:
         """Return the first image of a published method as stored."""
-        return self(image) if self.coarse == "srgb8" else self.end(image)
+        return self(image) if self.is_of_frames else self.end(image)
 
     def end(self, image: Array) -> Array:
         """Return the last image of a published method as stored.
@@ -89,7 +94,7 @@ class Storage:
         formats, so that this format does not change them. The one with "rgba8unorm-srgb" reads the
         frame from it, too.
         """
-        return image if self.coarse else self(image)
+        return image if self.rounding is not None else self(image)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -139,8 +144,8 @@ _STORAGES = {
     # Clamped, since a blur would spread an infinity over the picture.
     "rgba16float": Storage(-65504, 65504),
     "rgba32float": Storage(-math.inf, math.inf),
-    "rg11b10ufloat": Storage(0, 65024, "rg11b10"),
-    "rgba8unorm-srgb": Storage(0, 1, "srgb8"),
+    "rg11b10ufloat": Storage(0, 65024, _as_rg11b10, has_alpha=False),
+    "rgba8unorm-srgb": Storage(0, 1, _as_srgb8, is_of_frames=True),
 }
 
 
