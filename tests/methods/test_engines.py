@@ -156,15 +156,13 @@ def test_a_bloom_is_its_engines(renderer: Renderer, shared_data: Path, key: str)
         assert relative(found, expected).max() < (5e-3 if "darktable" in key else 1e-3)
 
 
-class Cut(Storage):
+def cut_rg11b10(image: Array) -> Array:
     """R11G11B10 as lavapipe stores it: values are truncated, not rounded."""
-
-    def __call__(self, image: Array) -> Array:
-        kept = np.maximum(image, 0)
-        _, exponent = np.frexp(kept)
-        step = np.exp2(np.maximum(exponent - 1, -14) - np.array([6, 6, 5]))
-        cut: Array = np.floor(kept / step) * step
-        return cut
+    kept = np.maximum(image, 0)
+    _, exponent = np.frexp(kept)
+    step = np.exp2(np.maximum(exponent - 1, -14) - np.array([6, 6, 5]))
+    cut: Array = np.floor(kept / step) * step
+    return cut
 
 
 def test_levels_of_bevy_in_r11g11b10(renderer: Renderer, shared_data: Path) -> None:
@@ -178,7 +176,7 @@ def test_levels_of_bevy_in_r11g11b10(renderer: Renderer, shared_data: Path) -> N
     image, expected, stride, _ = read_frame(shared_data, COARSE)
     settings = BevyBloom(format="rg11b10ufloat")
     height, width, _ = image.shape
-    source = BlurInput(image.astype(np.float64), (width, height), Cut(0, 65024, "rg11b10"))
+    source = BlurInput(image.astype(np.float64), (width, height), Storage(0, 65024, cut_rg11b10))
     levels = bevy.passes(source, settings)
     cut = relative(every(levels["bloom"], stride), expected)
     assert np.median(cut) < 1e-6
