@@ -633,11 +633,9 @@
     CONSTANT(55, PICTURES, pictures)           /* of tiles: pictures that are added up */ \
     CONSTANT(56, SPAN_WIDTH, span_width)       /* pixels along x that a block is read by */ \
     CONSTANT(57, SPAN_HEIGHT, span_height)     /* the same along y */ \
-    CONSTANT(58, SAMPLES_LINES, samples_lines) /* a composite samples the lines of its bloom */ \
     CONSTANT(59, PLACED, placed)               /* the taps of a blur are at its `offsets` */ \
     CONSTANT(60, PARTIAL_SUMS, partial_sums)   /* of SUMMED_ROWS: adds up for another pass */ \
     CONSTANT(61, OF_SOURCE, of_source)         /* its cotangents are of an image that is given */ \
-    CONSTANT(62, BESIDE, beside) /* of strip.comp: a workgroup's strips are beside each other */ \
     CONSTANT(63, THROUGH_COMPOSITE, through_composite) /* a composite's cotangents are read */ \
     CONSTANT(64, SQUARED, squared) /* of adjoint_sum.frag: squares are added up */
 

@@ -117,25 +117,6 @@ bool vkb_add_enlarged(struct vkb_variant_choice *choice, const struct vkb_pass_r
     return add_line_row(choice, &line) && vkb_add_fullscreen(choice, &row);
 }
 
-// Adds the composite, and after it a fused pass that samples the lines of the bloom.
-bool vkb_add_enlarged_final(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
-{
-    const struct vkb_pass_row *blur =
-        vkb_is_composite(pass) ? vkb_writer_of(&choice->plain, pass->reads[SLOT_BLOOM]) : NULL;
-    struct vkb_pass_row row;
-
-    if (!blur || !is_enlarged(choice, blur))
-        return false;
-    const struct vkb_pass_row *enlarging = vkb_writer_of(choice->graph, pass->reads[SLOT_BLOOM]);
-    memcpy(&row, pass, sizeof row);
-    row.fused = true;
-    row.reads[SLOT_BLOOM] = enlarging->reads[SLOT_SOURCE];
-    row.constants.samples_lines = true;
-    row.constants.sampling = enlarging->constants.sampling;
-    row.constants.format = vkb_storage_mode(choice->plain.images[pass->reads[SLOT_BLOOM]].format);
-    return vkb_add_fullscreen(choice, pass) && vkb_add_fullscreen(choice, &row);
-}
-
 // A composite of two lines of a threshold, all at the size of the image.
 struct nest {
     const struct vkb_pass_row *threshold, *vertical, *horizontal, *composite;
@@ -197,30 +178,24 @@ static struct vkb_pass_row fused_row(const struct vkb_variant_choice *choice,
 
 // The columns of an invocation, at most STRIP_COLUMNS and a multiple of the pixels of two words of
 // any format, so that the invocations of a row share it as evenly as possible.
-static uint32_t strip_columns(uint32_t width, uint32_t beside)
+static uint32_t strip_columns(uint32_t width)
 {
-    const uint32_t most = beside * STRIP_COLUMNS;
-    const uint32_t invocations = beside * ((width + most - 1) / most);
+    const uint32_t most = ROW_INVOCATIONS * STRIP_COLUMNS;
+    const uint32_t invocations = ROW_INVOCATIONS * ((width + most - 1) / most);
 
     return ((width + invocations - 1) / invocations + 7) / 8 * 8;
 }
 
-// Those of a workgroup are below or beside each other.
 static void make_strips(const struct vkb_variant_choice *choice, struct vkb_pass_row *row,
-                        const struct vkb_shader *shader, bool vertical)
+                        const struct vkb_shader *shader)
 {
     const struct vkb_image_row *target = &choice->plain.images[row->targets[0]];
     const uint32_t rows = STRIP_ROWS(vkb_formats[target->format].channel_size);
-    const uint32_t columns = strip_columns(target->width, vertical ? 1 : ROW_INVOCATIONS);
+    const uint32_t columns = strip_columns(target->width);
 
     row->params.fused_bloom.columns = (int32_t)columns;
-    row->constants.beside = !vertical;
     row->gains_if_finite = true;
     vkb_make_linear(row, shader, columns, rows);
-    if (vertical) {
-        row->block_width = columns;
-        row->block_height = ROW_INVOCATIONS * rows;
-    }
 }
 
 // For kernels of up to TILE_RADIUS in three steps.
@@ -250,17 +225,13 @@ bool vkb_add_fused(struct vkb_variant_choice *choice, const struct vkb_pass_row 
                   && (!pass->transposed || vkb_are_floats(choice, pass))))))
         return false;
     struct vkb_pass_row row = fused_row(choice, &nest);
-    // Strips below each other load the same rows at the same time. With four single floats this
-    // takes 7 % less time, with three 5 to 11 % more, and with halves 13 % more.
     if (gpu)
         make_tiles(&row, pass->transposed ? &vkb_shader_tile_mixed_comp : &vkb_shader_tile_comp,
                    &nest);
     else
         make_strips(choice, &row,
                     pass->transposed ? &vkb_shader_strip_mixed_linear_rgba32float
-                                     : strip_shaders[format],
-                    format == VKB_FORMAT_RGBA32_FLOAT
-                        && vkb_graph_channels(&choice->plain, pass->reads[SLOT_SOURCE]) == 4);
+                                     : strip_shaders[format]);
     return vkb_add_fullscreen(choice, pass) && vkb_add_variant(choice, &row);
 }
 
@@ -343,6 +314,6 @@ bool vkb_add_adjoint_fused(struct vkb_variant_choice *choice, const struct vkb_p
     if (gpu)
         make_tiles(&row, &vkb_shader_tile_transposed_comp, &nest);
     else
-        make_strips(choice, &row, &vkb_shader_strip_transposed_linear_rgba32float, false);
+        make_strips(choice, &row, &vkb_shader_strip_transposed_linear_rgba32float);
     return vkb_add_variant(choice, &row);
 }

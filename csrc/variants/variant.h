@@ -27,9 +27,9 @@ uint32_t vkb_add_floats(struct vkb_variant_choice *choice, const char *name, str
 // Adds the variant of a pass to the graph. False: it does not suit the pass, and nothing is added.
 typedef bool vkb_variant_add(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass);
 
-// Lines and enlarged lines of a blur, these also fused with the composite; fused passes for the
-// complete bloom of an image, in strips and in tiles.
-vkb_variant_add vkb_add_line, vkb_add_enlarged, vkb_add_enlarged_final, vkb_add_fused;
+// Lines and enlarged lines of a blur; fused passes for the complete bloom of an image, in strips
+// and in tiles.
+vkb_variant_add vkb_add_line, vkb_add_enlarged, vkb_add_fused;
 // For derivatives of these by the image.
 vkb_variant_add vkb_add_adjoint_fused;
 // Downsamplings that are not linear, and first passes of published methods.

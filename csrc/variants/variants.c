@@ -61,7 +61,6 @@ static const struct variant variants_table[] = {
     {VKB_VARIANTS_CPU, "pixels", vkb_add_pixels, 0},
     {VKB_VARIANTS_GPU, "pixels", vkb_add_windowed, 0},
     {VKB_VARIANTS_GPU, "enlarged", vkb_add_enlarged, 0},
-    {VKB_VARIANTS_GPU, "enlarged_final", vkb_add_enlarged_final, 0},
     {VKB_VARIANTS_GPU, "tiles", vkb_add_fused, 0},
     {VKB_VARIANTS_GPU, "tiles", vkb_add_adjoint_fused, 0},
     {VKB_VARIANTS_GPU, "tiles", vkb_add_adjoint_filter, 0},

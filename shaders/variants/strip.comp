@@ -188,20 +188,11 @@ void add_run(int x, uvec4 loaded[LOADED][RUN_WORDS], ivec2 done, int width,
         finish_row(row, done + ivec2(0, row), sums[row], raw[row]);
 }
 
-// The first pixel of this invocation. The strips of a workgroup are below or beside each other.
-ivec2 first_of_strip()
-{
-    if (BESIDE != 0)
-        return first_pixel(ivec2(params.columns, ROWS));
-    int below = int(gl_WorkGroupID.y * ROW_INVOCATIONS + gl_LocalInvocationID.x);
-    return ivec2(int(gl_WorkGroupID.x) * params.columns, below * ROWS + target_shape.w);
-}
-
 void main()
 {
     copy_shapes();
     ivec2 size = READ_SIZE(SLOT_SOURCE);
-    ivec2 first = first_of_strip();
+    ivec2 first = first_pixel(ivec2(params.columns, ROWS));
     int end = min(first.x + params.columns, size.x);
 
     if (any(greaterThanEqual(first, size)))
