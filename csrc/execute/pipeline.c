@@ -23,6 +23,12 @@ _Static_assert(sizeof(struct pipeline_key)
                                 * sizeof(uint32_t),
                "a pipeline's key has padding");
 
+#ifdef VKBLOOM_FAULTS
+bool vkb_driver_folds;
+#else
+enum { vkb_driver_folds = false };
+#endif
+
 struct vkb_pipeline_entry {
     struct pipeline_key key;
     VkPipeline handle;
@@ -93,14 +99,31 @@ bool vkb_pipelines_save(const struct vkb_device *device, const struct vkb_pipeli
     return false;
 }
 
+#define MAP_ENTRY(id, name, member) {id, offsetof(struct vkb_constants, member), sizeof(int32_t)},
+
+static const VkSpecializationMapEntry map_entries[VKB_CONSTANT_COUNT] = {
+    SPECIALIZATION_CONSTANTS(MAP_ENTRY)};
+
+static VkSpecializationInfo specialization(const struct vkb_constants *constants)
+{
+    return (VkSpecializationInfo){
+        .mapEntryCount = VKB_CONSTANT_COUNT,
+        .pMapEntries = map_entries,
+        .dataSize = sizeof *constants,
+        .pData = constants,
+    };
+}
+
 static VkPipelineShaderStageCreateInfo shader_stage(VkShaderStageFlagBits stage,
-                                                    VkShaderModule module)
+                                                    VkShaderModule module,
+                                                    const VkSpecializationInfo *constants)
 {
     return (VkPipelineShaderStageCreateInfo){
         .sType = VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO,
         .stage = stage,
         .module = module,
         .pName = "main",
+        .pSpecializationInfo = vkb_driver_folds ? constants : NULL,
     };
 }
 
@@ -108,10 +131,10 @@ static bool create_module(const struct vkb_device *device, const struct vkb_shad
                           const struct vkb_constants *constants, VkShaderModule *module,
                           struct vkb_error *error)
 {
-    uint32_t *code;
-    size_t size;
+    uint32_t *folded = NULL;
+    size_t size = shader->size;
 
-    if (!vkb_specialize(shader, constants, &code, &size, error))
+    if (!vkb_driver_folds && !vkb_specialize(shader, constants, &folded, &size, error))
         return false;
     const bool done =
         VK(error,
@@ -119,10 +142,10 @@ static bool create_module(const struct vkb_device *device, const struct vkb_shad
                                            &(VkShaderModuleCreateInfo){
                                                .sType = VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO,
                                                .codeSize = size,
-                                               .pCode = code,
+                                               .pCode = folded ? folded : shader->code,
                                            },
                                            NULL, module));
-    vkb_free(code);
+    vkb_free(folded);
     return done;
 }
 
@@ -130,18 +153,20 @@ bool vkb_compute_create(const struct vkb_device *device, VkPipelineCache cache,
                         const struct vkb_shader *shader, const struct vkb_constants *constants,
                         VkPipelineLayout layout, VkPipeline *pipeline, struct vkb_error *error)
 {
+    const VkSpecializationInfo special = specialization(constants);
     VkShaderModule module;
 
     if (!create_module(device, shader, constants, &module, error))
         return false;
-    const bool done = VK(error, device->vk.vkCreateComputePipelines(
-                                    device->handle, cache, 1,
-                                    &(VkComputePipelineCreateInfo){
-                                        .sType = VK_STRUCTURE_TYPE_COMPUTE_PIPELINE_CREATE_INFO,
-                                        .stage = shader_stage(VK_SHADER_STAGE_COMPUTE_BIT, module),
-                                        .layout = layout,
-                                    },
-                                    NULL, pipeline));
+    const bool done =
+        VK(error, device->vk.vkCreateComputePipelines(
+                      device->handle, cache, 1,
+                      &(VkComputePipelineCreateInfo){
+                          .sType = VK_STRUCTURE_TYPE_COMPUTE_PIPELINE_CREATE_INFO,
+                          .stage = shader_stage(VK_SHADER_STAGE_COMPUTE_BIT, module, &special),
+                          .layout = layout,
+                      },
+                      NULL, pipeline));
     device->vk.vkDestroyShaderModule(device->handle, module, NULL);
     return done;
 }
@@ -224,6 +249,7 @@ static bool create_graphics(const struct vkb_device *device, const struct vkb_pi
                             const VkShaderModule modules[2], VkPipeline *pipeline,
                             struct vkb_error *error)
 {
+    const VkSpecializationInfo special = specialization(&pass->constants);
     const VkPipelineVertexInputStateCreateInfo vertices = vertex_input(pass);
     const VkPipelineRasterizationStateCreateInfo raster = rasterization(pass->geometry);
     const VkPipelineDepthStencilStateCreateInfo depth = depth_test(pass->geometry);
@@ -250,8 +276,8 @@ static bool create_graphics(const struct vkb_device *device, const struct vkb_pi
                 .stageCount = 2,
                 .pStages =
                     (VkPipelineShaderStageCreateInfo[]){
-                        shader_stage(VK_SHADER_STAGE_VERTEX_BIT, modules[0]),
-                        shader_stage(VK_SHADER_STAGE_FRAGMENT_BIT, modules[1]),
+                        shader_stage(VK_SHADER_STAGE_VERTEX_BIT, modules[0], &special),
+                        shader_stage(VK_SHADER_STAGE_FRAGMENT_BIT, modules[1], &special),
                     },
                 .pVertexInputState = &vertices,
                 .pInputAssemblyState = &triangles,

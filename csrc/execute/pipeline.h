@@ -6,6 +6,12 @@
 #include "execute/age.h"
 #include "execute/bindings.h"
 
+#ifdef VKBLOOM_FAULTS
+// Whether the driver folds the constants of the pipelines that are created from now on, in place of
+// vkb_specialize: tests compare both.
+extern bool vkb_driver_folds;
+#endif
+
 struct vkb_pipeline_entry;
 
 struct vkb_pipelines {

@@ -2,6 +2,7 @@
 
 #include "vulkan/faults.h"
 
+#include "execute/pipeline.h"
 #include "python/module.h"
 
 #include <stdatomic.h>
@@ -66,6 +67,17 @@ PyObject *vkb_fault_state(PyObject *module, PyObject *unused)
     (void)unused;
     return Py_BuildValue("(lsll)", atomic_load(&passed), failed, atomic_load(&blocks),
                          atomic_load(&messages));
+}
+
+PyObject *vkb_fault_fold(PyObject *module, PyObject *by_driver)
+{
+    const int value = PyObject_IsTrue(by_driver);
+
+    (void)module;
+    if (value < 0)
+        return NULL;
+    vkb_driver_folds = value;
+    Py_RETURN_NONE;
 }
 
 PyObject *vkb_fault_forget(PyObject *module, PyObject *unused)

@@ -118,6 +118,8 @@ static PyMethodDef functions[] = {
      "(calls since then, the one that failed or \"\", blocks, validation messages)"},
     {"forget_instances", vkb_fault_forget, METH_NOARGS,
      "Destroys the Vulkan instances; all renderers must be closed."},
+    {"fold_by_driver", vkb_fault_fold, METH_O,
+     "fold_by_driver(bool): whether drivers fold the constants of new pipelines, not the core."},
 #endif
     {0},
 };

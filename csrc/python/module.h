@@ -32,6 +32,7 @@ PyObject *vkb_renderer_snapshot(PyObject *renderer, PyObject *arguments);
 PyObject *vkb_fault_arm(PyObject *module, PyObject *arguments);
 PyObject *vkb_fault_state(PyObject *module, PyObject *unused);
 PyObject *vkb_fault_forget(PyObject *module, PyObject *unused);
+PyObject *vkb_fault_fold(PyObject *module, PyObject *by_driver);
 #endif
 
 #endif

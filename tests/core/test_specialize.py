@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import ctypes
 import itertools
+import json
+import os
 import shutil
 import subprocess
 from collections.abc import Callable
@@ -12,9 +14,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.core.builds import ROOT, compiler, require_header
+from tests.core.builds import ROOT, compiler, core_with_faults, require_header
 from tests.core.test_spirv import modules
 from tests.exhaustive import examples
+from tests.processes import output
 
 CONSTANT, STORE = 43, 62
 SOURCES = (
@@ -195,3 +198,15 @@ def test_operations_that_lack_operands_are_left(specialize: Specialize, operatio
     function = [5 << 16 | 54, 1, 4, 0, 5, 2 << 16 | 248, 6, 1 << 16 | 253, 1 << 16 | 56]
     module = np.array([0x07230203, 0x10300, 0, 8, 0, *words, *function], np.uint32)
     assert operation in np.frombuffer(specialize(module.tobytes(), []), np.uint32)
+
+
+@pytest.mark.skipif(
+    "VKBLOOM_SANITIZED" in os.environ, reason="it has a core of its own, without sanitizers"
+)
+def test_drivers_fold_to_the_same_bits(tmp_path_factory: pytest.TempPathFactory) -> None:
+    """Shaders do not depend on the core's folding: their constants have the same effect."""
+    core = core_with_faults(tmp_path_factory.getbasetemp()) / "python"
+    said = output("-m", "tests.core.unfolded", cwd=ROOT, PYTHONPATH=str(core))
+    result = json.loads(said.splitlines()[-1])
+    assert result["compared"] > 30
+    assert result["different"] == []

@@ -83,3 +83,53 @@ def test_loops_over_arrays_are_unrolled() -> None:
             told = "[[unroll]] for (" in line or "[[dont_unroll]] for (" in line
             assert rows.search(line) or told, (shader.name, line)
     assert checked > 50, "the loops were not found"
+
+
+LABEL, LOOP_MERGE, SELECTION_MERGE, BRANCH, CONDITIONAL, SWITCH = 248, 246, 247, 249, 250, 251
+
+
+def has_calls_in_its_condition(blocks: dict[int, list[tuple[int, ...]]], header: int) -> bool:
+    """Whether a switch lies between a loop's header and the branch that leaves it.
+
+    spirv-opt makes a switch of one case of a function with several ends. A loop that ends with
+    its condition, in its continue block, has run its body before.
+    """
+    (merge, end), place, switched = blocks[header][-2][1:3], header, False
+    while place != end:
+        *_, before, last = ((0,), *blocks[place])
+        code = last[0] & 0xFFFF
+        if code == CONDITIONAL and merge in last[2:4]:
+            return switched
+        switched |= code == SWITCH
+        if before[0] & 0xFFFF == SELECTION_MERGE or place != header and is_loop(before):
+            place = before[1]
+        elif code == BRANCH:
+            place = last[1]
+        else:
+            return False
+    return False
+
+
+def is_loop(words: tuple[int, ...]) -> bool:
+    return words[0] & 0xFFFF == LOOP_MERGE
+
+
+def test_no_loop_has_a_call_in_its_condition() -> None:
+    """lavapipe 22.3.6 leaves such a loop early if the core does not fold the module's constants.
+
+    A sum over groups made 3 rounds of group_count() = 5: write the count in a constant, or unroll
+    the loop and compare in it.
+    """
+    loops = 0
+    for _, instructions in modules():
+        blocks: dict[int, list[tuple[int, ...]]] = {}
+        for words in instructions:
+            if words[0] & 0xFFFF == LABEL:
+                block = blocks[words[1]] = []
+            elif blocks:
+                block.append(words)
+        for label, block in blocks.items():
+            if any(map(is_loop, block)):
+                loops += 1
+                assert not has_calls_in_its_condition(blocks, label)
+    assert loops > 1000, "loops were not found"
