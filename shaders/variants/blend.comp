@@ -1,4 +1,6 @@
-// The composite for a scene and a bloom that have the size and format of the result.
+// The composite for a scene and a bloom that have the size and format of the result. As a fragment shader a change of
+// the exposure takes 21 ms in place of 11, with Mesa 25.0.7 19 in place of 11 (processor time of a call, 1920 x 1080 in
+// float16, lavapipe of Mesa 22.3.6, 2026-11-28).
 
 UNIFORM_BLOCK(COMPOSITE_BLOCK);
 #include "lib/composite.glsl"

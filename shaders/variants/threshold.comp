@@ -1,4 +1,6 @@
-// The threshold pass if the bloom buffers have the size of the image.
+// The threshold pass if the bloom buffers have the size of the image. As a fragment shader it takes 23 ms in place of 7,
+// with Mesa 25.0.7 30 in place of 6 (processor time of a call, 1920 x 1080 in float16, lavapipe of Mesa 22.3.6,
+// 2026-11-28).
 
 UNIFORM_BLOCK(THRESHOLD_BLOCK);
 #include "variants/pixels.glsl"
