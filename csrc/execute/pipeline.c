@@ -77,7 +77,8 @@ void vkb_pipelines_trim(const struct vkb_device *device, struct vkb_pipelines *p
         if (!vkb_is_old(oldest->used, age))
             return;
         device->vk.vkDestroyPipeline(device->handle, oldest->handle, NULL);
-        *oldest = pipelines->entries[--pipelines->entry_count];
+        --pipelines->entry_count;
+        *oldest = pipelines->entries[pipelines->entry_count];
     }
 }
 

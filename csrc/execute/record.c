@@ -113,13 +113,16 @@ static bool write_descriptors(struct vkb_run *run, const struct binding *binding
     };
     if (pass->block != VKB_BLOCK_NONE)
         writes[write_count++] = (VkWriteDescriptorSet){.pBufferInfo = &params};
-    for (uint32_t i = 0; i < image_count; ++i)
-        if (!write_read(run, binding, i, &images[i], &writes[write_count++], error))
+    for (uint32_t i = 0; i < image_count; ++i) {
+        if (!write_read(run, binding, i, &images[i], &writes[write_count], error))
             return false;
+        ++write_count;
+    }
     for (uint32_t i = 0; i < pass->resource_count; ++i) {
         write_resource(run, pass->resources[i], &images[image_count + i], &buffers[i],
                        &writes[write_count]);
-        writes[write_count++].dstBinding = image_count + i + 1;
+        writes[write_count].dstBinding = image_count + i + 1;
+        ++write_count;
     }
     const uint32_t last = image_count + pass->resource_count;
     if (pass->geometry == VKB_GEOMETRY_DISPATCH) {

@@ -26,7 +26,8 @@ static void remove_entry(const struct vkb_device *device, struct vkb_resources *
                          size_t index)
 {
     destroy_entry(device, resources->entries[index]);
-    resources->entries[index] = resources->entries[--resources->count];
+    --resources->count;
+    resources->entries[index] = resources->entries[resources->count];
 }
 
 // Destroys what nobody needs any more: state without an owner, and staging memory whose copy is
@@ -51,8 +52,9 @@ static size_t count_cached(const struct vkb_resources *resources, size_t *oldest
     for (size_t i = 0; i < resources->count; ++i) {
         if (resources->entries[i]->owner)
             continue;
-        if (count++ == 0 || resources->entries[i]->used < resources->entries[*oldest]->used)
+        if (count == 0 || resources->entries[i]->used < resources->entries[*oldest]->used)
             *oldest = i;
+        ++count;
     }
     return count;
 }

@@ -76,8 +76,10 @@ void vkb_submissions_give_back(const struct vkb_device *device, struct vkb_submi
     if (free_count <= KEPT_SUBMISSIONS)
         return;
     for (size_t i = 0; i < submissions->count; ++i)
-        if (submissions->submissions[i] == submission)
-            submissions->submissions[i] = submissions->submissions[--submissions->count];
+        if (submissions->submissions[i] == submission) {
+            --submissions->count;
+            submissions->submissions[i] = submissions->submissions[submissions->count];
+        }
     destroy_submission(device, submission);
 }
 

@@ -26,10 +26,9 @@ static void choose_sizes(struct vkb_levels *levels)
     const uint32_t count = (uint32_t)fmax(floor(log2(height)), 2.0) - 1;
     const double width = floor((double)frame.width * height / frame.height + 0.5);
     const double most = vkb_widest_level(levels);
-    struct vkb_size size = {(uint32_t)fmin(fmax(width, 1.0), most), (uint32_t)height};
+    const struct vkb_size size = {(uint32_t)fmin(fmax(width, 1.0), most), (uint32_t)height};
 
-    for (levels->count = 0; levels->count < count; size = vkb_halved(size))
-        levels->sizes[levels->count++] = size;
+    vkb_levels_add_sizes(levels, size, count);
 }
 
 uint32_t vkb_add_bevy(struct vkb_levels *levels)

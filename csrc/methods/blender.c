@@ -101,13 +101,13 @@ static uint32_t add_streaks(struct vkb_levels *levels)
     };
     uint32_t before = VKB_NO_IMAGE, light = VKB_NO_IMAGE;
 
-    for (int i = 0; i < values->streaks; ++i, before = light) {
+    for (int i = 0; i < values->streaks; ++i) {
         // Blender reads in the direction of the angle.
         const double angle =
             acos(-1.0) * (1.0 + values->streaks_angle / 180.0 + 2.0 * i / values->streaks);
         float next[MAX_TAPS][4] = {{0.0f}};
         uint32_t from = levels->downs[0];
-        for (int iteration = 0; iteration < values->iterations; ++iteration, from = light) {
+        for (int iteration = 0; iteration < values->iterations; ++iteration) {
             const bool last = iteration == values->iterations - 1;
             const bool reads_next =
                 values->blender_5_2
@@ -125,7 +125,9 @@ static uint32_t add_streaks(struct vkb_levels *levels)
                 .to = light,
             };
             vkb_add_ray(levels, &ray);
+            from = light;
         }
+        before = light;
     }
     return light;
 }
@@ -189,18 +191,20 @@ static uint32_t add_ghosts(struct vkb_levels *levels)
     };
     uint32_t from, light = VKB_NO_IMAGE, before = VKB_NO_IMAGE;
 
-    for (uint32_t i = 0; i < 2; ++i, before = light) {
+    for (uint32_t i = 0; i < 2; ++i) {
         stage.ghosts[0][3] = scales[i];
         from = add_blurred(levels, radius << i);
         light = add_step(levels, "ghosts_of_blur_%u", i);
         vkb_add_flare(levels, &stage, from, before, light);
+        before = light;
     }
     before = VKB_NO_IMAGE;
-    for (int i = 1; i < values->iterations; ++i, before = light) {
+    for (int i = 1; i < values->iterations; ++i) {
         from = light;
         set_ghosts(values, i, &stage);
         light = add_step(levels, "ghosts_%u", (uint32_t)i);
         vkb_add_flare(levels, &stage, from, before, light);
+        before = light;
     }
     return light;
 }

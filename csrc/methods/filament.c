@@ -22,10 +22,9 @@ static void choose_sizes(struct vkb_levels *levels)
     const double width = fmin(height * frame.width / frame.height, vkb_widest_level(levels));
     const uint32_t most = (uint32_t)log2(floor(fmax(width, height))) + 1;
     const uint32_t wanted = (uint32_t)values->levels, count = wanted < most ? wanted : most;
-    struct vkb_size size = {stepped(width), stepped(height)};
+    const struct vkb_size size = {stepped(width), stepped(height)};
 
-    for (; levels->count < count; size = vkb_halved(size))
-        levels->sizes[levels->count++] = size;
+    vkb_levels_add_sizes(levels, size, count);
 }
 
 // A 3 x 3 binomial filter of `from` at the target's pixels. The first one of a frame applies the

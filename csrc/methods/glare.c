@@ -109,9 +109,9 @@ static uint32_t add_streaks(struct stage *stage)
     const int rays = values->directions == 1 ? 2 : values->directions;
     uint32_t image = VKB_NO_IMAGE, before = VKB_NO_IMAGE;
 
-    for (int ray = 0; ray < rays; ++ray, before = image) {
+    for (int ray = 0; ray < rays; ++ray) {
         uint32_t from = stage->from;
-        for (int iteration = 0; iteration < values->iterations; ++iteration, from = image) {
+        for (int iteration = 0; iteration < values->iterations; ++iteration) {
             const bool last = iteration == values->iterations - 1;
             char name[2 * VKB_NAME_SIZE];
             snprintf(name, sizeof name, "%s_%d_%d", stage->name, ray, iteration);
@@ -128,7 +128,9 @@ static uint32_t add_streaks(struct stage *stage)
                 .to = image,
             };
             vkb_add_ray(&stage->levels, &row);
+            from = image;
         }
+        before = image;
     }
     return image;
 }

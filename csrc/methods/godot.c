@@ -36,7 +36,7 @@ uint32_t vkb_add_godot(struct vkb_levels *levels)
             shares[level] = settings->level_weights[level];
             levels->count = level + 1;
         }
-    for (uint32_t level = 0; level < levels->count; from = levels->downs[level++]) {
+    for (uint32_t level = 0; level < levels->count; ++level) {
         char name[VKB_NAME_SIZE];
         snprintf(name, sizeof name, "down_%u_across", level);
         levels->sizes[level] = size;
@@ -45,6 +45,7 @@ uint32_t vkb_add_godot(struct vkb_levels *levels)
         const uint32_t step = vkb_levels_target(levels, name, VKB_FORMAT_RGBA32_FLOAT, size, false);
         add_blur(levels, DIRECTION_HORIZONTAL, level == 0, from, step);
         add_blur(levels, DIRECTION_VERTICAL, level == 0, step, vkb_levels_down(levels, level));
+        from = levels->downs[level];
         size = vkb_halved(size);
     }
     const uint32_t bloom = vkb_levels_bloom(levels);

@@ -12,10 +12,9 @@ static double choose_sizes(struct vkb_levels *levels)
     const double radius = levels->settings->values.radius;
     const double lg = log2(levels->source->buffers.height) + radius - 8.0;
     const uint32_t count = (uint32_t)fmin(fmax(trunc(lg), 1.0), MAX_LEVELS);
-    struct vkb_size size = levels->source->buffers;
+    const struct vkb_size size = levels->source->buffers;
 
-    while (levels->count < count)
-        levels->sizes[levels->count++] = size = vkb_halved(size);
+    vkb_levels_add_sizes(levels, vkb_halved(size), count);
     return 0.5 + lg - trunc(lg);
 }
 
@@ -29,7 +28,7 @@ uint32_t vkb_add_kino(struct vkb_levels *levels)
     struct vkb_pass_row row = vkb_groups_row(levels, GROUPS_KINO, levels->source->glow, from);
     row.constants.anti_flicker = anti_flicker;
     vkb_levels_masked(levels, &row);
-    for (uint32_t level = 0; level < levels->count; from = levels->downs[level++]) {
+    for (uint32_t level = 0; level < levels->count; ++level) {
         const uint32_t to = vkb_levels_down(levels, level);
         row = vkb_groups_row(levels, GROUPS_BOX, from, to);
         // The first level's box may weight its taps against fireflies.
@@ -37,6 +36,7 @@ uint32_t vkb_add_kino(struct vkb_levels *levels)
             vkb_levels_pass(levels, &row);
         else
             vkb_levels_box(levels, from, to);
+        from = to;
     }
     return vkb_levels_combine(levels, &combination);
 }

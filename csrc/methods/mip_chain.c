@@ -38,8 +38,11 @@ uint32_t vkb_add_dual_kawase(struct vkb_levels *levels)
     uint32_t from = levels->source->glow;
 
     vkb_levels_halve(levels, levels->source->buffers, (uint32_t)values->levels);
-    for (uint32_t level = 0; level < levels->count; from = levels->downs[level++])
-        vkb_kawase_down(levels, values->offset, from, vkb_levels_down(levels, level));
+    for (uint32_t level = 0; level < levels->count; ++level) {
+        const uint32_t to = vkb_levels_down(levels, level);
+        vkb_kawase_down(levels, values->offset, from, to);
+        from = to;
+    }
     from = vkb_kawase_rise(levels, values->offset);
     const uint32_t bloom =
         vkb_levels_target(levels, "bloom", levels->source->format, levels->source->final, true);

@@ -34,12 +34,11 @@ static void add_first(struct vkb_levels *levels)
 uint32_t vkb_add_playcanvas(struct vkb_levels *levels)
 {
     struct vkb_combination combination = vkb_combine(UPSAMPLE_TENT, 1.0, 1.0);
-    struct vkb_size size = vkb_halved(levels->source->buffers);
+    const struct vkb_size size = vkb_halved(levels->source->buffers);
     const double halvings = floor(log2(fmin(size.width, size.height)));
     const double count = fmin(fmax(halvings, 1.0), levels->settings->values.levels);
 
-    for (size = vkb_halved(size); levels->count < (uint32_t)count; size = vkb_halved(size))
-        levels->sizes[levels->count++] = size;
+    vkb_levels_add_sizes(levels, vkb_halved(size), (uint32_t)count);
     add_first(levels);
     vkb_levels_reduce_rest(levels, 1.0, 1.0);
     combination.last_kernel = UPSAMPLE_LINEAR;

@@ -26,14 +26,18 @@ uint32_t vkb_add_pmndrs(struct vkb_levels *levels)
 
     row.constants.node = true;
     vkb_levels_masked(levels, &row);
-    for (; levels->count < (uint32_t)values->levels; from = levels->downs[levels->count++]) {
-        levels->sizes[levels->count] = size = vkb_halved_up(size);
-        add_down(levels, levels->count, from);
+    levels->count = (uint32_t)values->levels;
+    for (uint32_t level = 0; level < levels->count; ++level) {
+        size = vkb_halved_up(size);
+        levels->sizes[level] = size;
+        add_down(levels, level, from);
+        from = levels->downs[level];
     }
     // The tent of a single level is mixed with the level itself.
     if (levels->count == 1) {
         levels->sizes[1] = levels->sizes[0];
-        levels->downs[levels->count++] = levels->downs[0];
+        levels->downs[1] = levels->downs[0];
+        levels->count = 2;
     }
     combination.last_kernel = UPSAMPLE_LINEAR;
     return vkb_levels_combine(levels, &combination);

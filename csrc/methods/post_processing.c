@@ -34,7 +34,7 @@ uint32_t vkb_add_post_processing(struct vkb_levels *levels)
 {
     const struct vkb_values *values = &levels->settings->values;
     const struct vkb_size frame = levels->source->buffers;
-    struct vkb_size size = {reduced(frame.width, -values->anamorphism),
+    const struct vkb_size size = {reduced(frame.width, -values->anamorphism),
                             reduced(frame.height, values->anamorphism)};
     const double halvings = log2(fmax(size.width, size.height)) + values->diffusion - 10.0;
     const double count = fmin(fmax(floor(halvings), 1.0), MAX_LEVELS);
@@ -42,8 +42,7 @@ uint32_t vkb_add_post_processing(struct vkb_levels *levels)
     struct vkb_combination combination =
         vkb_combine(values->fast ? UPSAMPLE_CORNERS : UPSAMPLE_TENT, 1.0, 1.0);
 
-    for (; levels->count < (uint32_t)count; size = vkb_halved(size))
-        levels->sizes[levels->count++] = size;
+    vkb_levels_add_sizes(levels, size, (uint32_t)count);
     combination.radius_x = combination.radius_y = values->fast ? 0.5 * radius : radius;
     add_first(levels);
     for (uint32_t level = 1; level < levels->count; ++level)

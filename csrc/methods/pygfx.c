@@ -18,11 +18,10 @@ uint32_t vkb_add_pygfx(struct vkb_levels *levels)
     const struct vkb_values *values = &levels->settings->values;
     const enum vkb_mode groups = values->karis_average ? GROUPS_PYGFX_KARIS : GROUPS_PYGFX;
     struct vkb_combination combination = vkb_combine(UPSAMPLE_TENT, 1.0, 1.0);
-    struct vkb_size size = vkb_halved(levels->source->buffers);
+    const struct vkb_size size = vkb_halved(levels->source->buffers);
     const uint32_t wanted = (uint32_t)values->levels, most = most_levels(size);
 
-    for (; levels->count < (wanted < most ? wanted : most); size = vkb_halved(size))
-        levels->sizes[levels->count++] = size;
+    vkb_levels_add_sizes(levels, size, wanted < most ? wanted : most);
     const uint32_t first = vkb_levels_down(levels, 0);
     struct vkb_pass_row row = vkb_groups_row(levels, groups, levels->source->glow, first);
     vkb_levels_masked(levels, &row);

@@ -40,10 +40,11 @@ static uint32_t merge(float *weights, double *offsets, uint32_t count)
 {
     uint32_t merged = 1;
 
-    for (uint32_t i = 1; i < count; i += 2, ++merged) {
+    for (uint32_t i = 1; i < count; i += 2) {
         const double a = weights[i], b = i + 1 < count ? weights[i + 1] : 0.0;
         offsets[merged] = (i * a + (i + 1) * b) / (a + b);
         weights[merged] = (float)(a + b);
+        ++merged;
     }
     return merged;
 }
@@ -65,9 +66,10 @@ static void add_level(struct vkb_levels *levels, uint32_t level, uint32_t from)
 }
 
 // Multiplies the levels by the tints, three factors for each level.
-static void add_tints(struct vkb_levels *levels, const float *tints)
+static void add_tints(struct vkb_levels *levels, const float *all_tints)
 {
-    for (uint32_t level = 0; level < levels->count; ++level, tints += 3) {
+    for (uint32_t level = 0; level < levels->count; ++level) {
+        const float *tints = all_tints + 3 * level;
         if (tints[0] == 1.0f && tints[1] == 1.0f && tints[2] == 1.0f)
             continue;
         const uint32_t tinted = vkb_levels_step(levels, "tinted_%u", level, levels->sizes[level]);
@@ -88,13 +90,14 @@ uint32_t vkb_add_three(struct vkb_levels *levels)
     struct vkb_size size = levels->source->buffers;
     double total = 0.0;
 
-    for (; levels->count < THREE_LEVELS; ++levels->count) {
-        const double factor = bloom_factors[levels->count];
-        levels->sizes[levels->count] = size =
-            levels->count ? half_of(settings, size) : first_of(settings, size);
-        shares[levels->count] = factor + (1.2 - 2.0 * factor) * settings->values.radius;
-        total += shares[levels->count];
+    for (uint32_t level = 0; level < THREE_LEVELS; ++level) {
+        const double factor = bloom_factors[level];
+        size = level ? half_of(settings, size) : first_of(settings, size);
+        levels->sizes[level] = size;
+        shares[level] = factor + (1.2 - 2.0 * factor) * settings->values.radius;
+        total += shares[level];
     }
+    levels->count = THREE_LEVELS;
     // A format whose largest value is 1 holds the mean of the levels, and the bloom is multiplied
     // by `total`.
     if (!vkb_stores_means(levels->source->format))
@@ -106,8 +109,10 @@ uint32_t vkb_add_three(struct vkb_levels *levels)
     // The luminance has the weights of three.js' colour management.
     row.constants.node = settings->choices[VKB_CHOICE_variant] != VARIANT_R185;
     vkb_levels_masked(levels, &row);
-    for (uint32_t level = 0; level < levels->count; from = levels->downs[level++])
+    for (uint32_t level = 0; level < levels->count; ++level) {
         add_level(levels, level, from);
+        from = levels->downs[level];
+    }
     add_tints(levels, settings->level_weights);
     const uint32_t sum = vkb_levels_image(levels, "up_%u", 0, levels->sizes[0]);
     vkb_levels_gather(levels, shares, UPSAMPLE_LINEAR, sum);

@@ -58,17 +58,18 @@ static uint32_t add_kawase(struct vkb_levels *levels)
 {
     const double scatter = levels->settings->values.scatter;
     const double share = scatter >= 0.999 ? 1.0 : 0.05 + 0.9 * scatter;
-    uint32_t from = levels->downs[0], to;
+    uint32_t from = levels->downs[0];
 
-    for (uint32_t i = 0; i < levels->count; ++i, from = to) {
+    for (uint32_t i = 0; i < levels->count; ++i) {
         const double distance = 0.5 + (i > levels->count / 2 ? i - 1 : i);
-        to = vkb_levels_image(levels, "kawase_%u", i, levels->sizes[0]);
+        const uint32_t to = vkb_levels_image(levels, "kawase_%u", i, levels->sizes[0]);
         const struct vkb_taps taps = {
             {{{0.0, 0.0, 1.0 - share}, {0.0, 0.0, 1.0}},
              {{distance, 0.5 * share, 0.0}, {distance, 0.5, 0.0}}},
             .gain = 1.0,
         };
         vkb_add_filter(levels, &taps, from, to);
+        from = to;
     }
     return vkb_levels_enlarge(levels, urp_kernel(levels), from, 1.0);
 }
@@ -113,11 +114,10 @@ uint32_t vkb_add_urp(struct vkb_levels *levels)
 {
     const struct vkb_settings *settings = levels->settings;
     const struct vkb_size half = vkb_halved(levels->source->buffers);
-    struct vkb_size size = settings->values.quarter ? vkb_halved(half) : half;
+    const struct vkb_size size = settings->values.quarter ? vkb_halved(half) : half;
     const uint32_t count = level_count(size.width, size.height, 1.0, settings->values.iterations);
 
-    for (; levels->count < count; size = vkb_halved(size))
-        levels->sizes[levels->count++] = size;
+    vkb_levels_add_sizes(levels, size, count);
     add_urp_first(levels);
     return urp_filters[settings->choices[VKB_CHOICE_filter]](levels);
 }
@@ -178,8 +178,10 @@ uint32_t vkb_add_hdrp(struct vkb_levels *levels)
     uint32_t from = vkb_levels_step(levels, "reduced", 0, levels->sizes[0]);
     struct vkb_pass_row row = vkb_groups_row(levels, GROUPS_HDRP, levels->source->glow, from);
     vkb_levels_masked(levels, &row);
-    for (uint32_t level = 0; level < count; from = levels->downs[level++])
+    for (uint32_t level = 0; level < count; ++level) {
         add_hdrp_level(levels, level, from);
+        from = levels->downs[level];
+    }
     combination.last_kernel = UPSAMPLE_CUBIC;
     return vkb_levels_combine(levels, &combination);
 }

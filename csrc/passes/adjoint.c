@@ -44,7 +44,8 @@ bool vkb_add_adjoint_row(struct vkb_adjoint *adjoint, struct vkb_pass_row *row,
 {
     char name[VKB_NAME_SIZE];
 
-    snprintf(name, sizeof name, "adjoint_%u", adjoint->added++);
+    snprintf(name, sizeof name, "adjoint_%u", adjoint->added);
+    ++adjoint->added;
     if (!vkb_add_target(adjoint->graph, name, VKB_FORMAT_RGBA32_FLOAT, size, false, image, error))
         return false;
     snprintf(row->name, sizeof row->name, "%s", name);

@@ -58,8 +58,10 @@ struct vkb_fft_line vkb_fft_line(uint32_t least, uint32_t most)
         bool found = false;
         while (radices[first] > most || radices[first] > most_radix(length))
             ++first;
-        while (is_smooth(length) && !found && line.stage_count < VKB_FFT_STAGES)
-            found = split(length, first, ++line.stage_count, line.radices);
+        while (is_smooth(length) && !found && line.stage_count < VKB_FFT_STAGES) {
+            ++line.stage_count;
+            found = split(length, first, line.stage_count, line.radices);
+        }
         // Each stage loads and stores all elements.
         const uint64_t cost = (uint64_t)length * (line.stage_count + 1);
         if (found && cost < best_cost) {

@@ -51,6 +51,16 @@ struct vkb_size vkb_halved(struct vkb_size size)
     return (struct vkb_size){half(size.width), half(size.height)};
 }
 
+void vkb_levels_add_sizes(struct vkb_levels *levels, struct vkb_size first, uint32_t count)
+{
+    struct vkb_size size = first;
+
+    while (levels->count < count) {
+        levels->sizes[levels->count++] = size;
+        size = vkb_halved(size);
+    }
+}
+
 void vkb_levels_halve(struct vkb_levels *levels, struct vkb_size above, uint32_t count)
 {
     struct vkb_size size = above;

@@ -28,8 +28,10 @@ uint32_t vkb_scaled(uint32_t side, double scale);
 struct vkb_size vkb_halved(struct vkb_size size);
 struct vkb_size vkb_halved_up(struct vkb_size size);
 
-// Appends sizes, each half of the one before, until there are `count`. It stops before a level of 1
-// x 1, unless that is the first.
+// Appends sizes from `first` on, each half of the one before, until there are `count`.
+void vkb_levels_add_sizes(struct vkb_levels *levels, struct vkb_size first, uint32_t count);
+
+// The same from half of `above` on. It stops before a level of 1 x 1, unless that is the first.
 void vkb_levels_halve(struct vkb_levels *levels, struct vkb_size above, uint32_t count);
 
 // The row of a pass from one image to another that filters its taps in the shader: without a block

@@ -371,7 +371,8 @@ static PyObject *copy_between(PyObject *object, PyObject *arguments)
                    (unsigned long long)whole);
         return NULL;
     }
-    return finish(object, copy_bytes(exported_of(object), to, from, size, &error), &error);
+    const bool done = copy_bytes(exported_of(object), to, from, size, &error);
+    return finish(object, done, &error);
 }
 
 static PyObject *clone_export(PyObject *object, PyObject *arguments)

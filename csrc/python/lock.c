@@ -38,8 +38,10 @@ static void release_source(struct vkb_pending *pending)
 
 static void release_views(struct vkb_pending *pending)
 {
-    while (pending->view_count > 0)
-        PyBuffer_Release(&pending->views[--pending->view_count]);
+    while (pending->view_count > 0) {
+        --pending->view_count;
+        PyBuffer_Release(&pending->views[pending->view_count]);
+    }
 }
 
 void vkb_pending_release(struct vkb_pending *pending)

@@ -364,8 +364,11 @@ PyObject *vkb_passes_that_run(const struct vkb_module_state *state, struct vkb_d
 
     for (uint32_t first = 0, end; list && first < graph->pass_count; first = end) {
         end = vkb_graph_group_end(graph, first);
-        if (ran[first] && !add_group(list, graph, first, end, group++))
+        if (!ran[first])
+            continue;
+        if (!add_group(list, graph, first, end, group))
             Py_CLEAR(list);
+        ++group;
     }
     vkb_free(ran);
     return list;

@@ -140,7 +140,8 @@ static bool destroy(struct vkb_renderer *self, struct vkb_error *error)
     self->open = false;
     vkb_frame_destroy(&self->device, &self->frame);
     PyEval_RestoreThread(self->thread);
-    close_memory(self, end_waits(self));
+    const bool settled = end_waits(self);
+    close_memory(self, settled);
     self->thread = PyEval_SaveThread();
     vkb_device_destroy(&self->device);
     return vkb_messages_check(&self->device.messages, error);

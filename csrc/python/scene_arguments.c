@@ -247,8 +247,10 @@ bool vkb_read_scene(PyObject *bytes, PyObject *pictures, PyObject *arrays,
 
 void vkb_release_scene(struct vkb_held_scene *scene)
 {
-    while (scene->view_count > 0)
-        PyBuffer_Release(&scene->views[--scene->view_count]);
+    while (scene->view_count > 0) {
+        --scene->view_count;
+        PyBuffer_Release(&scene->views[scene->view_count]);
+    }
     vkb_free(scene->views);
     vkb_free(scene->data.textures);
     *scene = (struct vkb_held_scene){0};

@@ -203,13 +203,12 @@ static bool enter(struct vkb_cuda *cuda, struct vkb_error *error)
     return true;
 }
 
-static bool leave(struct vkb_cuda *cuda, bool done)
+static void leave(struct vkb_cuda *cuda)
 {
     void *context;
 
     cuda->cuThreadExchangeStreamCaptureMode(&capture_mode);
     cuda->cuCtxPopCurrent(&context);
-    return done;
 }
 
 // Work of Vulkan cannot be recorded into a graph. A stream that waits for another one's event is
@@ -232,10 +231,22 @@ static bool enter_streams(struct vkb_cuda *cuda, void *other, struct vkb_error *
     if (cuda->stuck)
         return vkb_fail(error, VKB_ERROR_DEVICE_LOST,
                         "the device was lost, and streams of CUDA wait for it");
-    return enter(cuda, error)
-        && ((require_no_capture(cuda, cuda->stream, error)
-             && (!other || require_no_capture(cuda, other, error)))
-            || leave(cuda, false));
+    if (!enter(cuda, error))
+        return false;
+    const bool ready = require_no_capture(cuda, cuda->stream, error)
+                    && (!other || require_no_capture(cuda, other, error));
+    if (!ready)
+        leave(cuda);
+    return ready;
+}
+
+static bool make_stream(struct vkb_cuda *cuda, struct vkb_error *error)
+{
+    if (!enter(cuda, error))
+        return false;
+    const bool done = CU(error, cuda->cuStreamCreate(&cuda->stream, STREAM_NON_BLOCKING));
+    leave(cuda);
+    return done;
 }
 
 struct vkb_cuda *vkb_cuda_open(const uint8_t uuid[16], const char *name, struct vkb_error *error)
@@ -246,8 +257,7 @@ struct vkb_cuda *vkb_cuda_open(const uint8_t uuid[16], const char *name, struct 
         return NULL;
     if (load(cuda, error) && find_device(cuda, uuid, name, error)
         && CU(error, cuda->cuDevicePrimaryCtxRetain(&cuda->context, cuda->device))
-        && enter(cuda, error)
-        && leave(cuda, CU(error, cuda->cuStreamCreate(&cuda->stream, STREAM_NON_BLOCKING))))
+        && make_stream(cuda, error))
         return cuda;
     vkb_cuda_close(cuda);
     return NULL;
@@ -260,8 +270,10 @@ void vkb_cuda_close(struct vkb_cuda *cuda)
     if (!cuda)
         return;
     // Whoever ends a context waits for its streams.
-    if (cuda->stream && !cuda->stuck && enter(cuda, &ignored))
-        leave(cuda, cuda->cuStreamDestroy(cuda->stream) == 0);
+    if (cuda->stream && !cuda->stuck && enter(cuda, &ignored)) {
+        cuda->cuStreamDestroy(cuda->stream);
+        leave(cuda);
+    }
     if (cuda->context && !cuda->stuck)
         cuda->cuDevicePrimaryCtxRelease(cuda->device);
     vkb_free(cuda);
@@ -281,7 +293,10 @@ void vkb_cuda_leave(struct vkb_cuda *cuda)
 
 bool vkb_cuda_require_no_capture(struct vkb_cuda *cuda, struct vkb_error *error)
 {
-    return enter_streams(cuda, NULL, error) && leave(cuda, true);
+    if (!enter_streams(cuda, NULL, error))
+        return false;
+    leave(cuda);
+    return true;
 }
 
 int vkb_cuda_ordinal(const struct vkb_cuda *cuda)
@@ -321,7 +336,8 @@ bool vkb_cuda_import(struct vkb_cuda *cuda, int descriptor, uint64_t size,
         close(descriptor);
         return false;
     }
-    const bool done = leave(cuda, import(cuda, descriptor, size, memory, error));
+    const bool done = import(cuda, descriptor, size, memory, error);
+    leave(cuda);
     if (!done)
         vkb_cuda_free(cuda, memory);
     return done;
@@ -340,7 +356,7 @@ void vkb_cuda_free(struct vkb_cuda *cuda, struct vkb_cuda_memory *memory)
         cuda->cuDestroyExternalMemory(memory->handle);
     if (memory->event)
         cuda->cuEventDestroy(memory->event);
-    leave(cuda, true);
+    leave(cuda);
     *memory = (struct vkb_cuda_memory){0};
 }
 
@@ -351,9 +367,14 @@ void *vkb_cuda_import_semaphore(struct vkb_cuda *cuda, int descriptor, struct vk
         .handle.descriptor = descriptor,
     };
     void *semaphore = NULL;
+    bool done = false;
 
-    if (!enter(cuda, error)
-        || !leave(cuda, CU(error, cuda->cuImportExternalSemaphore(&semaphore, &handle)))) {
+    if (enter(cuda, error)) {
+        done = CU(error, cuda->cuImportExternalSemaphore(&semaphore, &handle));
+        leave(cuda);
+    }
+    if (!done) {
+        // An import takes the descriptor over.
         close(descriptor);
         return NULL;
     }
@@ -364,8 +385,10 @@ void vkb_cuda_free_semaphore(struct vkb_cuda *cuda, void *semaphore)
 {
     struct vkb_error ignored;
 
-    if (enter(cuda, &ignored))
-        leave(cuda, cuda->cuDestroyExternalSemaphore(semaphore) == 0);
+    if (!enter(cuda, &ignored))
+        return;
+    cuda->cuDestroyExternalSemaphore(semaphore);
+    leave(cuda);
 }
 
 bool vkb_cuda_signal(struct vkb_cuda *cuda, void *semaphore, uint64_t value,
@@ -373,9 +396,12 @@ bool vkb_cuda_signal(struct vkb_cuda *cuda, void *semaphore, uint64_t value,
 {
     const struct semaphore_point point = {.value = value};
 
-    return enter_streams(cuda, NULL, error)
-        && leave(cuda, CU(error, cuda->cuSignalExternalSemaphoresAsync(&semaphore, &point, 1,
-                                                                       cuda->stream)));
+    if (!enter_streams(cuda, NULL, error))
+        return false;
+    const bool done =
+        CU(error, cuda->cuSignalExternalSemaphoresAsync(&semaphore, &point, 1, cuda->stream));
+    leave(cuda);
+    return done;
 }
 
 bool vkb_cuda_wait(struct vkb_cuda *cuda, void *semaphore, uint64_t value, void *stream,
@@ -383,22 +409,32 @@ bool vkb_cuda_wait(struct vkb_cuda *cuda, void *semaphore, uint64_t value, void 
 {
     const struct semaphore_point point = {.value = value};
 
-    return enter_streams(cuda, stream, error)
-        && leave(cuda, CU(error, cuda->cuWaitExternalSemaphoresAsync(
-                                     &semaphore, &point, 1, stream ? stream : cuda->stream)));
+    if (!enter_streams(cuda, stream, error))
+        return false;
+    const bool done = CU(error, cuda->cuWaitExternalSemaphoresAsync(
+                                    &semaphore, &point, 1, stream ? stream : cuda->stream));
+    leave(cuda);
+    return done;
 }
 
 bool vkb_cuda_finish(struct vkb_cuda *cuda, struct vkb_error *error)
 {
-    return enter_streams(cuda, NULL, error)
-        && leave(cuda, CU(error, cuda->cuStreamSynchronize(cuda->stream)));
+    if (!enter_streams(cuda, NULL, error))
+        return false;
+    const bool done = CU(error, cuda->cuStreamSynchronize(cuda->stream));
+    leave(cuda);
+    return done;
 }
 
 bool vkb_cuda_settle(struct vkb_cuda *cuda)
 {
     struct vkb_error ignored;
 
-    return enter(cuda, &ignored) && leave(cuda, cuda->cuCtxSynchronize() == 0);
+    if (!enter(cuda, &ignored))
+        return false;
+    const bool done = cuda->cuCtxSynchronize() == 0;
+    leave(cuda);
+    return done;
 }
 
 // Whether all streams come to an end within some milliseconds.
@@ -409,9 +445,13 @@ static bool ends_soon(struct vkb_cuda *cuda, int milliseconds)
 
     if (cuda->cuEventCreate(&event, EVENT_DISABLE_TIMING) != 0)
         return false;
-    if (cuda->cuCtxRecordEvent(cuda->context, event) == 0)
-        while (!(over = cuda->cuEventQuery(event) == 0) && milliseconds-- > 0)
+    if (cuda->cuCtxRecordEvent(cuda->context, event) == 0) {
+        over = cuda->cuEventQuery(event) == 0;
+        for (int waited = 0; !over && waited < milliseconds; ++waited) {
             poll(NULL, 0, 1);
+            over = cuda->cuEventQuery(event) == 0;
+        }
+    }
     cuda->cuEventDestroy(event);
     return over;
 }
@@ -420,9 +460,14 @@ bool vkb_cuda_settle_lost(struct vkb_cuda *cuda)
 {
     enum { MILLISECONDS = 1000 };
     struct vkb_error ignored;
+    bool over = false;
 
-    cuda->stuck = !(enter(cuda, &ignored) && leave(cuda, ends_soon(cuda, MILLISECONDS)));
-    return !cuda->stuck;
+    if (enter(cuda, &ignored)) {
+        over = ends_soon(cuda, MILLISECONDS);
+        leave(cuda);
+    }
+    cuda->stuck = !over;
+    return over;
 }
 
 static bool copy(struct vkb_cuda *cuda, vkb_cuda_address to, vkb_cuda_address from, size_t size,
@@ -441,43 +486,61 @@ bool vkb_cuda_copy(struct vkb_cuda *cuda, vkb_cuda_address to, vkb_cuda_address 
     // The first wait may have failed for lack of memory. The caller frees the host's memory now.
     if (begun && !done)
         cuda->cuStreamSynchronize(cuda->stream);
-    return leave(cuda, done);
+    leave(cuda);
+    return done;
 }
 
 bool vkb_cuda_begin_copy(struct vkb_cuda *cuda, struct vkb_cuda_memory *to, vkb_cuda_address from,
                          size_t size, struct vkb_error *error)
 {
-    return enter_streams(cuda, NULL, error)
-        && leave(cuda, copy(cuda, to->address, from, size, error)
-                           && CU(error, cuda->cuEventRecord(to->event, cuda->stream)));
+    if (!enter_streams(cuda, NULL, error))
+        return false;
+    const bool done = copy(cuda, to->address, from, size, error)
+                   && CU(error, cuda->cuEventRecord(to->event, cuda->stream));
+    leave(cuda);
+    return done;
 }
 
 bool vkb_cuda_order_copy(struct vkb_cuda *cuda, const struct vkb_cuda_memory *to)
 {
     struct vkb_error ignored;
 
-    return enter(cuda, &ignored)
-        && leave(cuda, cuda->cuCtxWaitEvent(cuda->context, to->event) == 0);
+    if (!enter(cuda, &ignored))
+        return false;
+    const bool done = cuda->cuCtxWaitEvent(cuda->context, to->event) == 0;
+    leave(cuda);
+    return done;
 }
 
 bool vkb_cuda_end_copy(struct vkb_cuda *cuda, const struct vkb_cuda_memory *to,
                        struct vkb_error *error)
 {
-    return enter(cuda, error) && leave(cuda, CU(error, cuda->cuEventSynchronize(to->event)));
+    if (!enter(cuda, error))
+        return false;
+    const bool done = CU(error, cuda->cuEventSynchronize(to->event));
+    leave(cuda);
+    return done;
 }
 
 bool vkb_cuda_mark(struct vkb_cuda *cuda, struct vkb_cuda_memory *memory)
 {
     struct vkb_error ignored;
 
+    if (!enter(cuda, &ignored))
+        return false;
     // Of all streams, since nothing tells on which ones the memory was used.
-    return enter(cuda, &ignored)
-        && leave(cuda, cuda->cuCtxRecordEvent(cuda->context, memory->event) == 0);
+    const bool done = cuda->cuCtxRecordEvent(cuda->context, memory->event) == 0;
+    leave(cuda);
+    return done;
 }
 
 bool vkb_cuda_passed(struct vkb_cuda *cuda, struct vkb_cuda_memory *memory)
 {
     struct vkb_error ignored;
 
-    return enter(cuda, &ignored) && leave(cuda, cuda->cuEventQuery(memory->event) == 0);
+    if (!enter(cuda, &ignored))
+        return false;
+    const bool passed = cuda->cuEventQuery(memory->event) == 0;
+    leave(cuda);
+    return passed;
 }

@@ -150,12 +150,16 @@ bool vkb_exported_record_input(struct vkb_run *run, struct vkb_staged_input *sta
 static struct vkb_export *next_output(const struct vkb_request *requests, uint32_t request_count,
                                       uint32_t *request, uint32_t *output)
 {
-    for (; *request < request_count; ++*request, *output = 0)
+    while (*request < request_count) {
         while (*output < requests[*request].plan->output_count) {
-            struct vkb_export *exported = requests[*request].outputs[(*output)++].exported;
+            struct vkb_export *exported = requests[*request].outputs[*output].exported;
+            ++*output;
             if (exported)
                 return exported;
         }
+        ++*request;
+        *output = 0;
+    }
     return NULL;
 }
 

@@ -224,8 +224,10 @@ void vkb_readback_fetch(const struct vkb_readback *readback, const struct vkb_ou
 
 void vkb_readback_release(const struct vkb_device *device, struct vkb_readback *readback)
 {
-    while (readback->import_count > 0)
-        vkb_buffer_destroy(device, &readback->imports[--readback->import_count]);
+    while (readback->import_count > 0) {
+        --readback->import_count;
+        vkb_buffer_destroy(device, &readback->imports[readback->import_count]);
+    }
     readback->used = 0;
     readback->counted = false;
 }

@@ -160,11 +160,14 @@ void *vkb_append(struct vkb_error *error, void *pointers, size_t *count, size_t 
     char *first;
     void *object;
 
-    if (!vkb_grow(error, pointers, capacity, *count + 1, sizeof object)
-        || !(object = vkb_alloc(error, 1, size)))
+    if (!vkb_grow(error, pointers, capacity, *count + 1, sizeof object))
+        return NULL;
+    object = vkb_alloc(error, 1, size);
+    if (!object)
         return NULL;
     memcpy(&first, pointers, sizeof first);
-    memcpy(first + (*count)++ * sizeof object, &object, sizeof object);
+    memcpy(first + *count * sizeof object, &object, sizeof object);
+    ++*count;
     return object;
 }
 

@@ -64,8 +64,11 @@ VKAPI_ATTR VkBool32 VKAPI_CALL vkb_messages_receive(
 #endif
     vkb_lock_acquire(&lock);
     for (struct vkb_messages *messages = all_open; messages; messages = messages->next)
-        if ((!current || messages == current) && messages->count++ == 0)
-            snprintf(messages->first, sizeof messages->first, "%s", data->pMessage);
+        if (!current || messages == current) {
+            if (messages->count == 0)
+                snprintf(messages->first, sizeof messages->first, "%s", data->pMessage);
+            ++messages->count;
+        }
     vkb_lock_release(&lock);
     return VK_FALSE;
 }

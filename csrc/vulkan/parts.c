@@ -99,7 +99,8 @@ static void *do_parts(void *argument)
 
     pthread_mutex_lock(&workers->lock);
     // Part 0 is the caller's.
-    work_on(workers, ++workers->running);
+    ++workers->running;
+    work_on(workers, workers->running);
     pthread_mutex_unlock(&workers->lock);
     return NULL;
 }

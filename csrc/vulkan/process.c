@@ -51,7 +51,8 @@ void vkb_lock_acquire(struct vkb_lock *lock)
     while (!atomic_compare_exchange_weak(&lock->holder, &holder, process))
         if (holder == process) {
             // Whoever holds it for long is at work: its waiters sleep for a millisecond.
-            if (++turns < SHORT_TURNS)
+            ++turns;
+            if (turns < SHORT_TURNS)
                 sched_yield();
             else
                 poll(NULL, 0, 1);
