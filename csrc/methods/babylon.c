@@ -14,7 +14,7 @@ uint32_t vkb_add_babylon(struct vkb_levels *levels)
 
     levels->sizes[levels->count++] =
         (struct vkb_size){vkb_scaled(frame.width, scale), vkb_scaled(frame.height, scale)};
-    const uint32_t bright = vkb_levels_image(levels, "bright", 0, levels->sizes[0]);
+    const uint32_t bright = vkb_levels_image(levels, levels->sizes[0], "bright");
     struct vkb_pass_row row = vkb_groups_row(levels, GROUPS_BABYLON, levels->source->glow, bright);
     vkb_levels_masked(levels, &row);
     vkb_levels_blur(levels, 0, bright, &kernel);

@@ -10,11 +10,6 @@
 #include <stdio.h>
 #include <string.h>
 
-static uint32_t add_step(struct vkb_levels *levels, const char *name, uint32_t number)
-{
-    return vkb_levels_step(levels, name, number, levels->sizes[0]);
-}
-
 // The number of halvings of the glare's share of the shorter side; at least 1.
 static uint32_t level_count(const struct vkb_levels *levels)
 {
@@ -113,7 +108,8 @@ static uint32_t add_streaks(struct vkb_levels *levels)
                 values->blender_5_2
                 && set_next(levels->sizes[0], (float)(angle - acos(-1.0)), iteration, next);
             const double share = last ? 1.0 / (STAR_ITERATIONS + 1 - values->iterations) : 1.0;
-            light = add_step(levels, "ray_%u", (uint32_t)(i * values->iterations + iteration));
+            light = vkb_levels_step(levels, levels->sizes[0], "ray_%u",
+                                    (uint32_t)(i * values->iterations + iteration));
             const struct vkb_ray ray = {
                 .values = &numbers,
                 .angle = angle,
@@ -149,8 +145,8 @@ static uint32_t add_blurred(struct vkb_levels *levels, uint32_t radius)
         sum += 2.0 * blur.weights[tap];
     }
     blur.gain = 1.0 / sum;
-    const uint32_t down = add_step(levels, "ghost_%u_down", radius);
-    const uint32_t blurred = add_step(levels, "ghost_%u", radius);
+    const uint32_t down = vkb_levels_step(levels, levels->sizes[0], "ghost_%u_down", radius);
+    const uint32_t blurred = vkb_levels_step(levels, levels->sizes[0], "ghost_%u", radius);
     struct vkb_pass_row row =
         vkb_blur_row(graph, graph->images[down].name, &blur, levels->downs[0], down);
     vkb_levels_pass(levels, &row);
@@ -194,7 +190,7 @@ static uint32_t add_ghosts(struct vkb_levels *levels)
     for (uint32_t i = 0; i < 2; ++i) {
         stage.ghosts[0][3] = scales[i];
         from = add_blurred(levels, radius << i);
-        light = add_step(levels, "ghosts_of_blur_%u", i);
+        light = vkb_levels_step(levels, levels->sizes[0], "ghosts_of_blur_%u", i);
         vkb_add_flare(levels, &stage, from, before, light);
         before = light;
     }
@@ -202,7 +198,7 @@ static uint32_t add_ghosts(struct vkb_levels *levels)
     for (int i = 1; i < values->iterations; ++i) {
         from = light;
         set_ghosts(values, i, &stage);
-        light = add_step(levels, "ghosts_%u", (uint32_t)i);
+        light = vkb_levels_step(levels, levels->sizes[0], "ghosts_%u", (uint32_t)i);
         vkb_add_flare(levels, &stage, from, before, light);
         before = light;
     }
@@ -236,7 +232,8 @@ static uint32_t add_line(struct vkb_levels *levels, int direction, int step_x, i
 
     for (int i = 0; i < passes; ++i) {
         const bool adds = before != VKB_NO_IMAGE && i == passes - 1;
-        const uint32_t to = add_step(levels, "star_%u", (uint32_t)(direction * passes + i));
+        const uint32_t to = vkb_levels_step(levels, levels->sizes[0], "star_%u",
+                                            (uint32_t)(direction * passes + i));
         struct vkb_pass_row row =
             vkb_row_of_lines(levels, &vkb_shader_simple_star_comp, lines, from, to);
         vkb_read_at(&row, SLOT_BEFORE, adds ? before : VKB_NO_IMAGE);
@@ -271,7 +268,7 @@ static uint32_t add_sun_beams(struct vkb_levels *levels)
 
     if (most == 0)
         return levels->downs[0];
-    const uint32_t light = add_step(levels, "beams", 0);
+    const uint32_t light = vkb_levels_step(levels, levels->sizes[0], "beams");
     struct vkb_pass_row row =
         vkb_fetching_row(levels, &vkb_shader_sun_beams_frag, levels->downs[0], light);
     row.block = VKB_BLOCK_sun_beams;
@@ -301,7 +298,7 @@ static void add_highlights(struct vkb_levels *levels)
 {
     const struct vkb_bloom_source *source = levels->source;
     const uint32_t factor = 1u << levels->settings->choices[VKB_CHOICE_quality];
-    const uint32_t glow = vkb_levels_image(levels, "glow", 0, source->buffers);
+    const uint32_t glow = vkb_levels_image(levels, source->buffers, "glow");
 
     levels->sizes[0] = (struct vkb_size){
         .width = (source->buffers.width + factor - 1) / factor,
@@ -309,7 +306,7 @@ static void add_highlights(struct vkb_levels *levels)
     };
     levels->count = 1;
     levels->downs[0] =
-        factor == 1 ? glow : vkb_levels_image(levels, "highlights", 0, levels->sizes[0]);
+        factor == 1 ? glow : vkb_levels_image(levels, levels->sizes[0], "highlights");
     struct vkb_pass_row row =
         vkb_groups_row(levels, GROUPS_HIGHLIGHTS, source->glow, levels->downs[0]);
     row.constants.mean_side = factor > 1 ? (int32_t)factor : 0;

@@ -294,7 +294,7 @@ uint32_t vkb_add_unreal(struct vkb_levels *levels)
     struct vkb_bloom_source masked = *source;
 
     if (source->mask != VKB_NO_IMAGE || levels->settings->thresholded) {
-        masked.glow = vkb_levels_step(levels, "highlights", 0, source->buffers);
+        masked.glow = vkb_levels_step(levels, source->buffers, "highlights");
         struct vkb_pass_row row = vkb_groups_row(levels, GROUPS_UNREAL, source->glow, masked.glow);
         vkb_levels_masked(levels, &row);
     }

@@ -12,7 +12,7 @@ static uint32_t add_box(struct vkb_levels *levels, uint32_t number, uint32_t fro
     const struct vkb_size size = levels->sizes[0];
     const bool across = number % 2 == 0;
     const uint32_t lines = across ? size.height : size.width;
-    const uint32_t to = vkb_levels_step(levels, "box_%u", number, size);
+    const uint32_t to = vkb_levels_step(levels, size, "box_%u", number);
     struct vkb_pass_row row = vkb_row_of_lines(levels, &vkb_shader_box_mean_comp, lines, from, to);
 
     row.block = VKB_BLOCK_box;
@@ -28,7 +28,7 @@ uint32_t vkb_add_darktable(struct vkb_levels *levels)
 {
     const struct vkb_bloom_source *source = levels->source;
     struct vkb_bloom_source floats = *source;
-    uint32_t image = vkb_levels_image(levels, "bright", 0, source->buffers);
+    uint32_t image = vkb_levels_image(levels, source->buffers, "bright");
     struct vkb_pass_row row = vkb_groups_row(levels, GROUPS_DARKTABLE, source->glow, image);
 
     vkb_levels_masked(levels, &row);

@@ -49,7 +49,7 @@ static uint32_t add_halvings(struct vkb_levels *levels)
 
     for (uint32_t i = 0; 2 * least.width < size.width || 2 * least.height < size.height; ++i) {
         size = vkb_halved(size);
-        to = vkb_levels_step(levels, "half_%u", i, size);
+        to = vkb_levels_step(levels, size, "half_%u", i);
         add_reduction(levels, from, to);
         from = to;
     }

@@ -98,7 +98,7 @@ void vkb_add_ray(struct vkb_levels *levels, const struct vkb_ray *ray)
 // The framebuffer of a stage.
 static uint32_t add_end(struct stage *stage)
 {
-    return vkb_levels_image(&stage->levels, stage->name, 0, size_of(stage, stage->from));
+    return vkb_levels_image(&stage->levels, size_of(stage, stage->from), "%s", stage->name);
 }
 
 // Each ray is iterated by itself; its last iteration adds the rays before.
@@ -117,7 +117,7 @@ static uint32_t add_streaks(struct stage *stage)
             snprintf(name, sizeof name, "%s_%d_%d", stage->name, ray, iteration);
             image = last && ray == rays - 1
                       ? add_end(stage)
-                      : vkb_levels_step(&stage->levels, name, 0, size_of(stage, stage->from));
+                      : vkb_levels_step(&stage->levels, size_of(stage, stage->from), "%s", name);
             const struct vkb_ray row = {
                 .values = values,
                 .angle = acos(-1.0) * (values->angle / 180.0 + 2.0 * ray / rays),
@@ -192,7 +192,7 @@ static uint32_t add_source(struct vkb_levels *levels)
     if (!vkb_method_of(settings)->published
         || (mode == THRESHOLD_NONE && source->mask == VKB_NO_IMAGE))
         return source->glow;
-    const uint32_t image = vkb_levels_step(levels, "glare_source", 0, source->buffers);
+    const uint32_t image = vkb_levels_step(levels, source->buffers, "glare_source");
     vkb_add_threshold_in(levels, mode, source->glow, source->mask, image);
     return image;
 }
@@ -204,7 +204,7 @@ static void add_halvings(struct vkb_levels *levels, int halvings, uint32_t *imag
         const uint32_t from = images[*count - 1];
         const struct vkb_image_row *above = &levels->graph->images[from];
         const struct vkb_size size = vkb_halved((struct vkb_size){above->width, above->height});
-        images[*count] = vkb_levels_step(levels, "glare_down_%u", (uint32_t)*count - 1, size);
+        images[*count] = vkb_levels_step(levels, size, "glare_down_%u", (uint32_t)*count - 1);
         vkb_levels_reduce(levels, 1.0, 1.0, from, images[*count]);
     }
 }
@@ -264,7 +264,7 @@ static uint32_t add_dirty_light(struct vkb_levels *levels, const struct vkb_glar
         .serial = data->serial,
     };
     const uint32_t dirt = vkb_levels_add(levels, &picture);
-    const uint32_t dirty = vkb_levels_step(levels, "dirty_light", 0, levels->source->final);
+    const uint32_t dirty = vkb_levels_step(levels, levels->source->final, "dirty_light");
     struct vkb_pass_row row = vkb_fetching_row(levels, &vkb_shader_dirt_frag, light, dirty);
 
     vkb_read_at(&row, SLOT_DIRT, dirt);
@@ -313,7 +313,7 @@ uint32_t vkb_add_light(struct vkb_levels *method, const uint32_t *stages, uint32
                                    "gives light, or save a bloom");
         return VKB_NO_IMAGE;
     }
-    uint32_t light = vkb_levels_step(&levels, "light", 0, floats.final);
+    uint32_t light = vkb_levels_step(&levels, floats.final, "light");
     vkb_levels_gather(&levels, shares, UPSAMPLE_LINEAR, light);
     if (dirt)
         light = add_dirty_light(&levels, dirt, light);

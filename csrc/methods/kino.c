@@ -24,7 +24,7 @@ uint32_t vkb_add_kino(struct vkb_levels *levels)
     struct vkb_combination combination = vkb_combine(UPSAMPLE_TENT, 1.0, 1.0);
 
     combination.radius_x = combination.radius_y = choose_sizes(levels);
-    uint32_t from = vkb_levels_image(levels, "bright", 0, levels->source->buffers);
+    uint32_t from = vkb_levels_image(levels, levels->source->buffers, "bright");
     struct vkb_pass_row row = vkb_groups_row(levels, GROUPS_KINO, levels->source->glow, from);
     row.constants.anti_flicker = anti_flicker;
     vkb_levels_masked(levels, &row);

@@ -19,13 +19,13 @@ static struct vkb_pass_row groups_row(const struct vkb_levels *levels, uint32_t 
 static void add_first(struct vkb_levels *levels)
 {
     const struct vkb_size half_size = vkb_halved(levels->source->buffers);
-    const uint32_t half = vkb_levels_image(levels, "half", 0, half_size);
+    const uint32_t half = vkb_levels_image(levels, half_size, "half");
     struct vkb_pass_row row = groups_row(levels, levels->source->glow, half);
 
     row.constants.thresholded = false;
     row.constants.clamped = true;
     vkb_levels_pass(levels, &row);
-    const uint32_t step = vkb_levels_step(levels, "reduced", 0, levels->sizes[0]);
+    const uint32_t step = vkb_levels_step(levels, levels->sizes[0], "reduced");
     vkb_levels_reduce(levels, 1.0, 1.0, half, step);
     row = groups_row(levels, step, vkb_levels_down(levels, 0));
     vkb_levels_masked(levels, &row);

@@ -21,7 +21,7 @@ uint32_t vkb_add_pmndrs(struct vkb_levels *levels)
     const double share = values->radius;
     struct vkb_combination combination = vkb_combine(UPSAMPLE_TENT, 1.0 - share, share);
     struct vkb_size size = levels->source->buffers;
-    uint32_t from = vkb_levels_image(levels, "bright", 0, size);
+    uint32_t from = vkb_levels_image(levels, size, "bright");
     struct vkb_pass_row row = vkb_groups_row(levels, GROUPS_THREE, levels->source->glow, from);
 
     row.constants.node = true;

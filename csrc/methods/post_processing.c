@@ -16,7 +16,7 @@ static void reduce(struct vkb_levels *levels, uint32_t from, uint32_t to)
 
 static void add_first(struct vkb_levels *levels)
 {
-    const uint32_t step = vkb_levels_step(levels, "reduced", 0, levels->sizes[0]);
+    const uint32_t step = vkb_levels_step(levels, levels->sizes[0], "reduced");
 
     reduce(levels, levels->source->glow, step);
     struct vkb_pass_row row =
@@ -35,7 +35,7 @@ uint32_t vkb_add_post_processing(struct vkb_levels *levels)
     const struct vkb_values *values = &levels->settings->values;
     const struct vkb_size frame = levels->source->buffers;
     const struct vkb_size size = {reduced(frame.width, -values->anamorphism),
-                            reduced(frame.height, values->anamorphism)};
+                                  reduced(frame.height, values->anamorphism)};
     const double halvings = log2(fmax(size.width, size.height)) + values->diffusion - 10.0;
     const double count = fmin(fmax(floor(halvings), 1.0), MAX_LEVELS);
     const double radius = 0.5 + halvings - floor(halvings);

@@ -62,10 +62,13 @@ static uint32_t add_layer(struct vkb_levels *levels, uint32_t layer)
         const bool last = loop + 1 == loops;
         const bool shown = last && last_layer;
         const uint8_t l = (uint8_t)layer, k = (uint8_t)loop;  // both are far below 256
-        snprintf(name, sizeof name, shown ? "blur_vertical" : "blur_vertical_%u_%u", l, k);
+        if (shown)
+            snprintf(name, sizeof name, "blur_vertical");
+        else
+            snprintf(name, sizeof name, "blur_vertical_%u_%u", l, k);
         if (!direct)
             image = add_step(levels, name, shown, DIRECTION_VERTICAL, layer, image);
-        snprintf(name, sizeof name, direct ? "blur_%u_%u" : "blur_horizontal_%u_%u", l, k);
+        snprintf(name, sizeof name, "%s_%u_%u", direct ? "blur" : "blur_horizontal", l, k);
         if (!last)
             image = add_step(levels, name, false, direct ? DIRECTION_BOTH : DIRECTION_HORIZONTAL,
                              layer, image);
@@ -105,7 +108,10 @@ uint32_t vkb_add_separable(struct vkb_levels *levels)
     // The last passes of the layers are consecutive, so they share a render pass, in which blending
     // adds them.
     for (uint32_t layer = 0; layer < settings->layer_count; ++layer) {
-        snprintf(name, sizeof name, settings->layer_count == 1 ? "bloom" : "bloom_%u", layer);
+        if (settings->layer_count == 1)
+            snprintf(name, sizeof name, "bloom");
+        else
+            snprintf(name, sizeof name, "bloom_%u", layer);
         struct vkb_pass_row row =
             blur_row(levels, name, settings->values.direct ? DIRECTION_BOTH : DIRECTION_HORIZONTAL,
                      layer, settings->layers[layer].strength, ends[layer], sum);
@@ -120,7 +126,7 @@ uint32_t vkb_add_separable(struct vkb_levels *levels)
     }
     if (!apart)
         return sum;
-    const uint32_t bloom = vkb_levels_image(levels, "bloom", 0, source->final);
+    const uint32_t bloom = vkb_levels_image(levels, source->final, "bloom");
     add_rounding(levels, sum, bloom);
     return bloom;
 }

@@ -72,7 +72,7 @@ static void add_tints(struct vkb_levels *levels, const float *all_tints)
         const float *tints = all_tints + 3 * level;
         if (tints[0] == 1.0f && tints[1] == 1.0f && tints[2] == 1.0f)
             continue;
-        const uint32_t tinted = vkb_levels_step(levels, "tinted_%u", level, levels->sizes[level]);
+        const uint32_t tinted = vkb_levels_step(levels, levels->sizes[level], "tinted_%u", level);
         struct vkb_pass_row row =
             vkb_groups_row(levels, GROUPS_POST_PROCESSING, levels->downs[level], tinted);
         row.constants.thresholded = false;
@@ -104,7 +104,7 @@ uint32_t vkb_add_three(struct vkb_levels *levels)
         total = 1.0;
     for (uint32_t level = 0; level < THREE_LEVELS; ++level)
         shares[level] /= total;
-    uint32_t from = vkb_levels_image(levels, "bright", 0, levels->sizes[0]);
+    uint32_t from = vkb_levels_image(levels, levels->sizes[0], "bright");
     struct vkb_pass_row row = vkb_groups_row(levels, GROUPS_THREE, levels->source->glow, from);
     // The luminance has the weights of three.js' colour management.
     row.constants.node = settings->choices[VKB_CHOICE_variant] != VARIANT_R185;
@@ -114,7 +114,7 @@ uint32_t vkb_add_three(struct vkb_levels *levels)
         from = levels->downs[level];
     }
     add_tints(levels, settings->level_weights);
-    const uint32_t sum = vkb_levels_image(levels, "up_%u", 0, levels->sizes[0]);
+    const uint32_t sum = vkb_levels_image(levels, levels->sizes[0], "up_0");
     vkb_levels_gather(levels, shares, UPSAMPLE_LINEAR, sum);
     return vkb_levels_enlarge(levels, UPSAMPLE_LINEAR, sum, total);
 }

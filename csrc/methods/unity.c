@@ -62,7 +62,7 @@ static uint32_t add_kawase(struct vkb_levels *levels)
 
     for (uint32_t i = 0; i < levels->count; ++i) {
         const double distance = 0.5 + (i > levels->count / 2 ? i - 1 : i);
-        const uint32_t to = vkb_levels_image(levels, "kawase_%u", i, levels->sizes[0]);
+        const uint32_t to = vkb_levels_image(levels, levels->sizes[0], "kawase_%u", i);
         const struct vkb_taps taps = {
             {{{0.0, 0.0, 1.0 - share}, {0.0, 0.0, 1.0}},
              {{distance, 0.5 * share, 0.0}, {distance, 0.5, 0.0}}},
@@ -101,7 +101,7 @@ static void add_urp_first(struct vkb_levels *levels)
     uint32_t from = source->glow;
 
     if (levels->settings->values.high_quality_filtering) {
-        from = vkb_levels_step(levels, "reduced", 0, levels->sizes[0]);
+        from = vkb_levels_step(levels, levels->sizes[0], "reduced");
         vkb_levels_reduce(levels, 0.5, step_y, source->glow, from);
     }
     struct vkb_pass_row row = vkb_groups_row(levels, GROUPS_URP, from, vkb_levels_down(levels, 0));
@@ -151,7 +151,7 @@ static void add_hdrp_level(struct vkb_levels *levels, uint32_t level, uint32_t f
 {
     const struct vkb_size size = levels->sizes[level];
     const struct vkb_size middle = {size.width, levels->graph->images[from].height};
-    const uint32_t step = vkb_levels_step(levels, "down_%u_across", level, middle);
+    const uint32_t step = vkb_levels_step(levels, middle, "down_%u_across", level);
 
     add_hdrp_blur(levels, DIRECTION_HORIZONTAL, level == 0, from, step);
     add_hdrp_blur(levels, DIRECTION_VERTICAL, level == 0, step, vkb_levels_down(levels, level));
@@ -175,7 +175,7 @@ uint32_t vkb_add_hdrp(struct vkb_levels *levels)
         levels->sizes[level] = (struct vkb_size){rounded(frame.width, across, level),
                                                  rounded(frame.height, down, level)};
     levels->count = count;
-    uint32_t from = vkb_levels_step(levels, "reduced", 0, levels->sizes[0]);
+    uint32_t from = vkb_levels_step(levels, levels->sizes[0], "reduced");
     struct vkb_pass_row row = vkb_groups_row(levels, GROUPS_HDRP, levels->source->glow, from);
     vkb_levels_masked(levels, &row);
     for (uint32_t level = 0; level < count; ++level) {

@@ -168,7 +168,7 @@ uint32_t vkb_kawase_rise(struct vkb_levels *levels, double offset)
     uint32_t from = levels->downs[levels->count - 1];
 
     for (uint32_t level = levels->count - 1; level-- > 0;) {
-        const uint32_t to = vkb_levels_image(levels, "up_%u", level, levels->sizes[level]);
+        const uint32_t to = vkb_levels_image(levels, levels->sizes[level], "up_%u", level);
         vkb_kawase_up(levels, offset, from, to);
         from = to;
     }

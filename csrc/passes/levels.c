@@ -167,7 +167,7 @@ void vkb_levels_blur(struct vkb_levels *levels, uint32_t level, uint32_t from,
     const struct vkb_size size = levels->sizes[level];
     const uint32_t width = levels->graph->images[from].width;
     const double step_x = kernel->step_x > 0.0 ? kernel->step_x : (double)width / size.width;
-    const uint32_t step = vkb_levels_step(levels, "down_%u_across", level, size);
+    const uint32_t step = vkb_levels_step(levels, size, "down_%u_across", level);
 
     add_blur(levels, kernel, DIRECTION_HORIZONTAL, step_x, from, step);
     add_blur(levels, kernel, DIRECTION_VERTICAL, 1.0, step, vkb_levels_down(levels, level));
@@ -225,7 +225,7 @@ uint32_t vkb_levels_add_up(struct vkb_levels *levels, const struct vkb_combinati
         const double own = combination->own[level],
                      coarse = combination->coarse[level] * levels->below;
         const double sum = fabs(own) + fabs(coarse), flat = means && sum > 0.0 ? sum : 1.0;
-        top = vkb_levels_image(levels, "up_%u", level, levels->sizes[level]);
+        top = vkb_levels_image(levels, levels->sizes[level], "up_%u", level);
         add_up(levels, combination, combination->kernel, from, top, levels->downs[level],
                own / flat, coarse / flat);
         levels->below = flat;

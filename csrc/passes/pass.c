@@ -1,5 +1,6 @@
 #include "passes/pass.h"
 
+#include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -101,30 +102,32 @@ uint32_t vkb_levels_target(struct vkb_levels *levels, const char *name, enum vkb
     return image;
 }
 
-static uint32_t add_image(struct vkb_levels *levels, const char *name, uint32_t number,
-                          struct vkb_size size, bool framebuffer)
+uint32_t vkb_levels_image(struct vkb_levels *levels, struct vkb_size size, const char *format, ...)
 {
-    char numbered[VKB_NAME_SIZE];
+    char name[VKB_NAME_SIZE];
+    va_list arguments;
 
-    snprintf(numbered, sizeof numbered, name, number);
-    return vkb_levels_target(levels, numbered, levels->source->format, size, framebuffer);
-}
-
-uint32_t vkb_levels_image(struct vkb_levels *levels, const char *name, uint32_t number,
-                          struct vkb_size size)
-{
-    return add_image(levels, name, number, size, true);
+    va_start(arguments, format);
+    vsnprintf(name, sizeof name, format, arguments);
+    va_end(arguments);
+    return vkb_levels_target(levels, name, levels->source->format, size, true);
 }
 
 uint32_t vkb_levels_down(struct vkb_levels *levels, uint32_t level)
 {
-    return levels->downs[level] = vkb_levels_image(levels, "down_%u", level, levels->sizes[level]);
+    levels->downs[level] = vkb_levels_image(levels, levels->sizes[level], "down_%u", level);
+    return levels->downs[level];
 }
 
-uint32_t vkb_levels_step(struct vkb_levels *levels, const char *name, uint32_t number,
-                         struct vkb_size size)
+uint32_t vkb_levels_step(struct vkb_levels *levels, struct vkb_size size, const char *format, ...)
 {
-    return add_image(levels, name, number, size, false);
+    char name[VKB_NAME_SIZE];
+    va_list arguments;
+
+    va_start(arguments, format);
+    vsnprintf(name, sizeof name, format, arguments);
+    va_end(arguments);
+    return vkb_levels_target(levels, name, levels->source->format, size, false);
 }
 
 uint32_t vkb_levels_bloom(struct vkb_levels *levels)

@@ -83,16 +83,18 @@ uint32_t vkb_levels_target(struct vkb_levels *levels, const char *name, enum vkb
 uint32_t vkb_add_first(struct vkb_levels *levels, enum vkb_format format, struct vkb_size size,
                        bool framebuffer);
 
-// Adds a framebuffer in the format of the bloom buffers. `number` replaces a %u in the name.
-uint32_t vkb_levels_image(struct vkb_levels *levels, const char *name, uint32_t number,
-                          struct vkb_size size);
+// Adds a framebuffer in the format of the bloom buffers, with a name as printf() writes it.
+__attribute__((format(printf, 3, 4))) uint32_t vkb_levels_image(struct vkb_levels *levels,
+                                                                struct vkb_size size,
+                                                                const char *format, ...);
 
 // Adds the image of a level, `levels->downs[level]`.
 uint32_t vkb_levels_down(struct vkb_levels *levels, uint32_t level);
 
 // As vkb_levels_image, for an intermediate image, which is not a framebuffer.
-uint32_t vkb_levels_step(struct vkb_levels *levels, const char *name, uint32_t number,
-                         struct vkb_size size);
+__attribute__((format(printf, 3, 4))) uint32_t vkb_levels_step(struct vkb_levels *levels,
+                                                               struct vkb_size size,
+                                                               const char *format, ...);
 
 // Adds a pass.
 void vkb_levels_pass(struct vkb_levels *levels, const struct vkb_pass_row *row);
