@@ -22,14 +22,16 @@ static bool check(const struct vkb_device *device, const struct vkb_pass_row *pa
 
 enum { DRAW_NEEDS = 7 };  // the others are of dispatches
 
-#define LIMIT(name) #name, .allowed = device->limits.name
+// A row of needs: what a pass needs this many of, and the limit of Vulkan of this name.
+#define NEED(what, needed, limits, name) {what, #name, needed, (limits)->name}
 
 static bool check_needs(const struct vkb_device *device, const struct vkb_pass_row *pass,
                         struct vkb_error *error)
 {
     const bool dispatch = pass->geometry == VKB_GEOMETRY_DISPATCH;
     const uint32_t targets = dispatch ? 0 : pass->target_count;
-    const uint32_t *threads = pass->shader->threads, *size = device->limits.maxComputeWorkGroupSize;
+    const VkPhysicalDeviceLimits *limits = &device->limits;
+    const uint32_t *threads = pass->shader->threads, *size = limits->maxComputeWorkGroupSize;
     uint32_t counts[VKB_RESOURCE_KINDS] = {
         [VKB_RESOURCE_TEXTURE] = pass->read_count,
         [VKB_RESOURCE_IMAGE] = dispatch,  // the target
@@ -39,22 +41,21 @@ static bool check_needs(const struct vkb_device *device, const struct vkb_pass_r
         ++counts[pass->resources[i]->kind];
     const uint32_t textures = counts[VKB_RESOURCE_TEXTURE], images = counts[VKB_RESOURCE_IMAGE];
     const uint32_t uniforms = counts[VKB_RESOURCE_UNIFORM], storage = counts[VKB_RESOURCE_STORAGE];
+    const uint32_t outputs = dispatch ? 0 : images + storage + targets;
+    const uint32_t bindings = textures + images + uniforms + storage + targets;
     const struct need needs[] = {
-        {"textures", LIMIT(maxPerStageDescriptorSampledImages), .needed = textures},
-        {"textures", LIMIT(maxPerStageDescriptorSamplers), .needed = textures},
-        {"storage images", LIMIT(maxPerStageDescriptorStorageImages), .needed = images},
-        {"uniform buffers", LIMIT(maxPerStageDescriptorUniformBuffers), .needed = uniforms},
-        {"storage buffers", LIMIT(maxPerStageDescriptorStorageBuffers), .needed = storage},
-        {"outputs", LIMIT(maxFragmentCombinedOutputResources),
-         .needed = dispatch ? 0 : images + storage + targets},
-        {"bindings", LIMIT(maxPerStageResources),
-         .needed = textures + images + uniforms + storage + targets},
-        {"threads of a workgroup", LIMIT(maxComputeWorkGroupInvocations),
-         .needed = (uint64_t)threads[0] * threads[1]},
+        NEED("textures", textures, limits, maxPerStageDescriptorSampledImages),
+        NEED("textures", textures, limits, maxPerStageDescriptorSamplers),
+        NEED("storage images", images, limits, maxPerStageDescriptorStorageImages),
+        NEED("uniform buffers", uniforms, limits, maxPerStageDescriptorUniformBuffers),
+        NEED("storage buffers", storage, limits, maxPerStageDescriptorStorageBuffers),
+        NEED("outputs", outputs, limits, maxFragmentCombinedOutputResources),
+        NEED("bindings", bindings, limits, maxPerStageResources),
+        NEED("threads of a workgroup", (uint64_t)threads[0] * threads[1], limits,
+             maxComputeWorkGroupInvocations),
         {"threads along x", "maxComputeWorkGroupSize", threads[0], size[0]},
         {"threads along y", "maxComputeWorkGroupSize", threads[1], size[1]},
-        {"bytes of shared memory", LIMIT(maxComputeSharedMemorySize),
-         .needed = pass->shader->shared},
+        NEED("bytes of shared memory", pass->shader->shared, limits, maxComputeSharedMemorySize),
     };
     return check(device, pass, needs, dispatch ? sizeof needs / sizeof *needs : DRAW_NEEDS, error);
 }

@@ -40,6 +40,18 @@ enum { VKB_BLOCK_COUNT = 1 PARAMETER_BLOCKS(VKB_BLOCK_ONE) };
 
 extern const size_t vkb_block_sizes[];  // bytes of each block's struct
 
+// Defines a function that copies ROWS of params.h, made with VKB_COPY_*, from a block to another
+// one that has them, too. It does not compile for blocks without them.
+#define VKB_COPY_FUNCTION(function, target, source, ROWS) \
+    static void function(struct vkb_##target##_params *to, \
+                         const struct vkb_##source##_params *from) \
+    { \
+        ROWS \
+    }
+#define VKB_COPY_READS(block, name)        to->name = from->name;
+#define VKB_COPY_INPUT(block, type, name)  to->name = from->name;
+#define VKB_COPY_VEC4S(block, name, count) memcpy(to->name, from->name, sizeof to->name);
+
 // Writes the fields of a block without the padding between them, whose content is undefined.
 // `bytes` has space for vkb_block_sizes[block]. Returns the number of bytes.
 size_t vkb_params_pack(enum vkb_block block, const union vkb_params *params, unsigned char *bytes);

@@ -24,16 +24,4 @@ bool vkb_is_composite(const struct vkb_pass_row *pass);
 // image.
 bool vkb_ends_bloom(const struct vkb_pass_row *pass);
 
-// Copies all parameters and constants of the composite to the row of a fused pass with block B. A
-// block without COMPOSITE_ROWS does not compile.
-#define VKB_TAKE_COMPOSITE(row, B, composite) \
-    do { \
-        struct vkb_pass_row *const to = (row); \
-        const struct vkb_pass_row *const from = (composite); \
-        to->constants = from->constants; \
-        COMPOSITE_ROWS(B, VKB_TAKE_COMPOSITE_SETTING, VKB_TAKE_COMPOSITE_INPUT) \
-    } while (0)
-#define VKB_TAKE_COMPOSITE_SETTING(B, name)     to->params.B.name = from->params.composite.name;
-#define VKB_TAKE_COMPOSITE_INPUT(B, type, name) VKB_TAKE_COMPOSITE_SETTING(B, name)
-
 #endif

@@ -20,15 +20,4 @@ void vkb_add_threshold_in(struct vkb_levels *levels, enum vkb_mode mode, uint32_
 // Whether the row is a threshold pass that reads only the texel at each pixel's own position.
 bool vkb_is_threshold(const struct vkb_pass_row *pass);
 
-// Copies all parameters and constants of the threshold pass to the row of a fused pass with block
-// B. A block without THRESHOLD_ROWS does not compile.
-#define VKB_TAKE_THRESHOLD(row, B, threshold_pass) \
-    do { \
-        struct vkb_pass_row *const to = (row); \
-        const struct vkb_pass_row *const from = (threshold_pass); \
-        to->constants.threshold_mode = from->constants.threshold_mode; \
-        THRESHOLD_ROWS(B, VKB_TAKE_THRESHOLD_SETTING) \
-    } while (0)
-#define VKB_TAKE_THRESHOLD_SETTING(B, name) to->params.B.name = from->params.threshold.name;
-
 #endif

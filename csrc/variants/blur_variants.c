@@ -153,6 +153,11 @@ static bool find_nest(const struct vkb_graph *graph, const struct vkb_pass_row *
         && nest->threshold->reads[SLOT_SOURCE] == pass->reads[SLOT_SOURCE];
 }
 
+VKB_COPY_FUNCTION(copy_composite, fused_bloom, composite,
+                  COMPOSITE_ROWS(fused_bloom, VKB_COPY_READS, VKB_COPY_INPUT))
+VKB_COPY_FUNCTION(copy_threshold, fused_bloom, threshold,
+                  THRESHOLD_ROWS(fused_bloom, VKB_COPY_READS))
+
 static struct vkb_pass_row fused_row(const struct vkb_variant_choice *choice,
                                      const struct nest *nest)
 {
@@ -168,8 +173,9 @@ static struct vkb_pass_row fused_row(const struct vkb_variant_choice *choice,
         vkb_read_at(&row, SLOT_ENDED, nest->composite->reads[SLOT_COTANGENTS]);
     row.fused = true;
     row.block = VKB_BLOCK_fused_bloom;
-    VKB_TAKE_COMPOSITE(&row, fused_bloom, nest->composite);
-    VKB_TAKE_THRESHOLD(&row, fused_bloom, nest->threshold);
+    copy_composite(params, &nest->composite->params.composite);
+    copy_threshold(params, &nest->threshold->params.threshold);
+    row.constants.threshold_mode = nest->threshold->constants.threshold_mode;
     row.constants.format = vkb_storage_mode(format);
     memcpy(params->vertical, nest->vertical->params.blur.weights, sizeof params->vertical);
     memcpy(params->horizontal, nest->horizontal->params.blur.weights, sizeof params->horizontal);

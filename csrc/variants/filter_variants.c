@@ -146,10 +146,6 @@ bool vkb_add_filtered(struct vkb_variant_choice *choice, const struct vkb_pass_r
         && vkb_add_from_image(choice, pass, &row);
 }
 
-#define TAKE_INPUT(B, type, name) params->name = up->params.filter.name;
-#define TAKE_VEC4S(B, name, count) \
-    memcpy(params->name, up->params.filter.name, sizeof params->name);
-
 const struct vkb_pass_row *vkb_nested_filter(const struct vkb_variant_choice *choice,
                                              const struct vkb_pass_row *pass)
 {
@@ -168,12 +164,17 @@ const struct vkb_pass_row *vkb_nested_filter(const struct vkb_variant_choice *ch
              : NULL;
 }
 
+VKB_COPY_FUNCTION(copy_filter, filter_final, filter,
+                  SAMPLING_ROWS(filter_final, VKB_COPY_INPUT)
+                      FILTER_ROWS(filter_final, VKB_COPY_INPUT, VKB_COPY_VEC4S))
+VKB_COPY_FUNCTION(copy_composite, filter_final, composite,
+                  COMPOSITE_ROWS(filter_final, VKB_COPY_READS, VKB_COPY_INPUT))
+
 struct vkb_pass_row vkb_nested_row(const struct vkb_variant_choice *choice,
                                    const struct vkb_pass_row *pass, const struct vkb_pass_row *up)
 {
     const enum vkb_format format = choice->plain.images[pass->reads[SLOT_BLOOM]].format;
     struct vkb_pass_row row;
-    struct vkb_filter_final_params *params = &row.params.filter_final;
 
     memcpy(&row, pass, sizeof row);
     memset(&row.params, 0, sizeof row.params);
@@ -183,9 +184,8 @@ struct vkb_pass_row vkb_nested_row(const struct vkb_variant_choice *choice,
     if (pass->transposed)
         vkb_read_at(&row, SLOT_ENDED, pass->reads[SLOT_COTANGENTS]);
     row.block = VKB_BLOCK_filter_final;
-    SAMPLING_ROWS(filter_final, TAKE_INPUT)
-    FILTER_ROWS(filter_final, TAKE_INPUT, TAKE_VEC4S)
-    VKB_TAKE_COMPOSITE(&row, filter_final, pass);
+    copy_filter(&row.params.filter_final, &up->params.filter);
+    copy_composite(&row.params.filter_final, &pass->params.composite);
     row.constants.format = vkb_storage_mode(format);
     return row;
 }

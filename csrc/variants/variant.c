@@ -110,6 +110,8 @@ const struct vkb_pass_row *vkb_threshold_of(const struct vkb_graph *graph, uint3
              : NULL;
 }
 
+VKB_COPY_FUNCTION(copy_threshold, filter, threshold, THRESHOLD_ROWS(filter, VKB_COPY_READS))
+
 bool vkb_add_from_image(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
                         const struct vkb_pass_row *variant)
 {
@@ -127,7 +129,8 @@ bool vkb_add_from_image(struct vkb_variant_choice *choice, const struct vkb_pass
     if (is_filter) {
         row.constants.format =
             vkb_storage_mode(choice->plain.images[pass->reads[SLOT_SOURCE]].format);
-        VKB_TAKE_THRESHOLD(&row, filter, threshold);
+        row.constants.threshold_mode = threshold->constants.threshold_mode;
+        copy_threshold(&row.params.filter, &threshold->params.threshold);
     }
     return vkb_add_variant(choice, &row);
 }
