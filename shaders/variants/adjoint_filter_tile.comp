@@ -9,7 +9,7 @@ layout(set = 0, binding = TARGET_BINDING) uniform writeonly image2D target;
 const bool TURNED = FILTER_TILE_KEEPS(EXACT, KERNELS, WINDOW_WIDTH, WINDOW_HEIGHT), REPEATS = false;
 #include "variants/filter_tile.glsl"
 
-Window window_at(int pixel, bool along_x)
+Window window_at(int picture, int pixel, bool along_x)
 {
     bool horizontal = along_x != TURNED;
     int at_texel = min(pixel, imageSize(target)[horizontal ? 0 : 1] - 1);

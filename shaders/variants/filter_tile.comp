@@ -10,7 +10,7 @@ layout(set = 0, binding = TARGET_BINDING) uniform writeonly image2D target;
 const bool TURNED = false, REPEATS = EXACT != 0;
 #include "variants/filter_tile.glsl"
 
-Window window_at(int pixel, bool along_x)
+Window window_at(int picture, int pixel, bool along_x)
 {
     return window_in(textureSize(source, 0), ivec2(pixel), along_x);
 }

@@ -12,11 +12,9 @@ const int ROWS = FILTER_TILE_ROWS(KEEPS, EXACT_ROWS, HEIGHT);
 
 layout(local_size_x = FILTER_TILE_COLUMNS, local_size_y = FILTER_TILE_RUNS) in;
 
-int picture = 0;
-
 // Defined by the including shader: the texels of the picture that a pixel adds up, a texel there or the nearest one in
 // the image, what is added to a pixel, and the pixel that is stored.
-Window window_at(int pixel, bool along_x);
+Window window_at(int picture, int pixel, bool along_x);
 vec4 texel_at(ivec2 texel);
 vec4 own_at(ivec2 pixel);
 vec4 shade(vec4 own, vec4 sum, ivec2 pixel);
@@ -26,16 +24,33 @@ ivec2 turned(ivec2 position)
     return TURNED ? position.yx : position;
 }
 
+// The tile of a workgroup: its first pixel, and where both sides are in a simple ratio the first texel of its windows.
+struct Tile {
+    ivec2 pixel, texel;
+};
+
+Tile tile_of(ivec2 workgroup)
+{
+    ivec2 pixel = ivec2(COLUMNS, ROWS) * turned(workgroup);
+    return Tile(pixel, ivec2(WINDOW_FIRST(EXACT, pixel.x, WIDTH), WINDOW_FIRST(EXACT_ROWS, pixel.y, HEIGHT)));
+}
+
+// The pixels of an invocation, which are RUN rows of a column: the column in the tile and the uppermost row.
+struct Run {
+    int column, top;
+};
+
 // With REPEATS the weights of every second column and row are the same. Windows are of columns, then of rows: the first
 // texel, and the weights. A constant's default is 0, which is no size of an array.
 const int WINDOWS_X = REPEATS ? 2 : COLUMNS, WINDOWS_Y = REPEATS ? 2 : RUN * FILTER_TILE_RUNS;
 shared int firsts[WINDOWS_X + WINDOWS_Y];
 shared float weights[MAX_SIDE + 1][WINDOWS_X + WINDOWS_Y][KERNELS > 0 ? KERNELS : 1];
 
-void keep_window(int number, ivec2 tile)
+void keep_window(int picture, int number, Tile tile)
 {
     bool along_x = number < WINDOWS_X;
-    Window window = window_at(along_x ? tile.x + number : tile.y + number - WINDOWS_X, along_x);
+    int pixel = along_x ? tile.pixel.x + number : tile.pixel.y + number - WINDOWS_X;
+    Window window = window_at(picture, pixel, along_x);
     firsts[number] = window.first;
     [[unroll]] for (int kernel = 0; kernel < KERNELS; ++kernel)
         [[unroll]] for (int i = 0; i < MAX_SIDE; ++i)
@@ -47,117 +62,152 @@ float column_weight(int kernel, int at, int column)
     return weights[at][REPEATS ? column % 2 : column][kernel];
 }
 
-float row_weight(int kernel, int at, int top, int row)
+float row_weight(int kernel, int at, int row)
 {
-    return weights[at][WINDOWS_X + (REPEATS ? row % 2 : top + row)][kernel];
+    return weights[at][WINDOWS_X + (REPEATS ? row % 2 : row)][kernel];
 }
+
+// Arrays that are arguments or results have constant sizes. Of an array whose size depends on a specialization
+// constant, glslang copies as many elements as the constant's default says.
 
 // Where both sides are in a simple ratio (EXACT, EXACT_ROWS) and there is one kernel: an invocation loads what CHUNK
 // columns of a row add up, and keeps their sums. In an odd number of vectors, rows that are stored at once are in
 // different banks. (A transposed halving with two kernels takes 0.26 ms with kept sums, 0.14 without: 3840 x 2160 in
 // float32, H100, 2026-11-27.)
 const int CHUNK = FILTER_TILE_CHUNK(EXACT, EXACT_ROWS), SPAN = WINDOW_SPAN(EXACT, CHUNK, WIDTH);
+const int MAX_SPAN = WINDOW_SPAN(EXACT_HALF, 8, FILTER_TILE_WINDOW);
 const int LINES = WINDOW_SPAN(EXACT_ROWS, ROWS, HEIGHT);
 shared vec4 kept[KEEPS ? LINES : 1][COLUMNS + 1];
-vec4 texels[SPAN];
 
-void keep_sums(int line, int left)
+// What an invocation loads and keeps: the columns from `left` on of a row of texels of the tile.
+struct Chunk {
+    int line, left;
+};
+
+vec4[MAX_SPAN] texels_of(Chunk chunk, Tile tile)
 {
-    [[unroll]] for (int column = 0; column < CHUNK; ++column) {
+    vec4 texels[MAX_SPAN];
+    [[unroll]] for (int i = 0; i < SPAN; ++i)
+        texels[i] = texel_at(turned(tile.texel + ivec2(WINDOW_OFFSET(EXACT, chunk.left) + i, chunk.line)));
+    return texels;
+}
+
+void keep_sums(Chunk chunk, vec4 texels[MAX_SPAN])
+{
+    [[unroll]] for (int i = 0; i < CHUNK; ++i) {
         vec4 sum = vec4(0.0);
         [[unroll]] for (int at = 0; at < WIDTH; ++at)
             if (has_weight(TAKEN_X, at, 0))
-                sum += column_weight(0, at, REPEATS ? column : left + column)
-                     * texels[WINDOW_OFFSET(EXACT, column) + at];
-        kept[line][left + column] = sum;
+                sum += column_weight(0, at, REPEATS ? i : chunk.left + i) * texels[WINDOW_OFFSET(EXACT, i) + at];
+        kept[chunk.line][chunk.left + i] = sum;
     }
 }
 
-// No arguments: of an array whose size depends on a specialization constant, glslang copies as many elements as the
-// constant's default says.
-float of_column[3][MAX_SIDE + 1];
-vec4 of_rows[RUN][3];
+// The weights of a column in each kernel. Each row of texels needs them all: they are loaded once.
+float[3][WINDOW_WEIGHTS] weights_of(int column)
+{
+    float found[3][WINDOW_WEIGHTS];
+    [[unroll]] for (int kernel = 0; kernel < KERNELS; ++kernel)
+        [[unroll]] for (int at = 0; at < WIDTH; ++at)
+            found[kernel][at] = column_weight(kernel, at, column);
+    return found;
+}
 
-vec4[3] sums_along_x(ivec2 first)
+// The sums of a row of texels from `first` on in each kernel.
+vec4[3] sums_along_x(ivec2 first, float weights_of_column[3][WINDOW_WEIGHTS])
 {
     vec4 sums[3] = vec4[](vec4(0.0), vec4(0.0), vec4(0.0));
     [[unroll]] for (int at = 0; at < WIDTH; ++at) {
         vec4 value = texel_at(first + ivec2(at, 0));
         [[unroll]] for (int kernel = 0; kernel < KERNELS; ++kernel)
             if (has_weight(TAKEN_X, at, kernel))
-                sums[kernel] += of_column[kernel][at] * value;
+                sums[kernel] += weights_of_column[kernel][at] * value;
     }
     return sums;
 }
 
-// How far the window of a row is from that of the row `top` of the tile.
-int row_offset(int top, int row)
+// The first texel of a run's windows.
+ivec2 first_texel(Tile tile, Run run)
 {
-    return EXACT != 0 ? WINDOW_OFFSET(EXACT_ROWS, row) : firsts[WINDOWS_X + top + row] - firsts[WINDOWS_X + top];
+    if (EXACT != 0)
+        return tile.texel + ivec2(WINDOW_OFFSET(EXACT, run.column), WINDOW_OFFSET(EXACT_ROWS, run.top));
+    return ivec2(firsts[run.column], firsts[WINDOWS_X + run.top]);
 }
 
-// Adds the sums of a picture.
-void sum_up(ivec2 tile, ivec2 first)
+// How far the window of a pixel of a run is from that of the uppermost one.
+int row_offset(Run run, int pixel)
 {
-    int number = int(gl_LocalInvocationIndex), column = int(gl_LocalInvocationID.x);
-    int top = RUN * int(gl_LocalInvocationID.y);
-    int line = number % LINES, left = CHUNK * (number / LINES);
+    if (EXACT != 0)
+        return WINDOW_OFFSET(EXACT_ROWS, pixel);
+    return firsts[WINDOWS_X + run.top + pixel] - firsts[WINDOWS_X + run.top];
+}
+
+// Adds a row of texels, whose sums along x these are, to all pixels whose windows contain it.
+void add_row(int row, vec4 along_x[3], Run run, inout vec4 sums[RUN][3])
+{
+    [[unroll]] for (int i = 0; i < RUN; ++i) {
+        int at = row - row_offset(run, i);
+        if (at < 0 || at >= HEIGHT)
+            continue;
+        [[unroll]] for (int kernel = 0; kernel < KERNELS; ++kernel)
+            if (has_weight(TAKEN_Y, at, kernel))
+                sums[i][kernel] += row_weight(kernel, at, REPEATS ? i : run.top + i) * along_x[kernel];
+    }
+}
+
+// Adds the sums of a picture in each kernel to those of a run.
+void add_picture(int picture, Tile tile, Run run, inout vec4 sums[RUN][3])
+{
+    int number = int(gl_LocalInvocationIndex);
+    Chunk chunk = Chunk(number % LINES, CHUNK * (number / LINES));
+    vec4 texels[MAX_SPAN];
+    float weights_of_column[3][WINDOW_WEIGHTS];
 
     // Before the windows, which take as long.
-    [[unroll]] for (int i = 0; i < (KEEPS ? SPAN : 0); ++i)
-        texels[i] = texel_at(turned(first + ivec2(WINDOW_OFFSET(EXACT, left) + i, line)));
+    if (KEEPS)
+        texels = texels_of(chunk, tile);
     if (number < WINDOWS_X + WINDOWS_Y)
-        keep_window(number, tile);
+        keep_window(picture, number, tile);
     barrier();
-    ivec2 texel = EXACT != 0 ? first + ivec2(WINDOW_OFFSET(EXACT, column), WINDOW_OFFSET(EXACT_ROWS, top))
-                             : ivec2(firsts[column], firsts[WINDOWS_X + top]);
+    ivec2 texel = first_texel(tile, run);
     if (KEEPS) {
-        if (left < COLUMNS)
-            keep_sums(line, left);
+        if (chunk.left < COLUMNS)
+            keep_sums(chunk, texels);
         barrier();
     } else {
-        [[unroll]] for (int kernel = 0; kernel < KERNELS; ++kernel)
-            [[unroll]] for (int at = 0; at < WIDTH; ++at)
-                of_column[kernel][at] = column_weight(kernel, at, column);
+        weights_of_column = weights_of(run.column);
     }
-    int rows = row_offset(top, RUN - 1) + HEIGHT;
+    int rows = row_offset(run, RUN - 1) + HEIGHT;
     [[unroll]] for (int row = 0; row < rows; ++row) {
-        vec4 sums[3];
+        vec4 along_x[3];
         if (KEEPS)
-            sums[0] = kept[min(texel.y - first.y + row, LINES - 1)][column];
+            along_x[0] = kept[min(texel.y - tile.texel.y + row, LINES - 1)][run.column];
         else
-            sums = sums_along_x(texel + ivec2(0, row));
-        [[unroll]] for (int i = 0; i < RUN; ++i) {
-            int at = row - row_offset(top, i);
-            if (at < 0 || at >= HEIGHT)
-                continue;
-            [[unroll]] for (int kernel = 0; kernel < KERNELS; ++kernel)
-                if (has_weight(TAKEN_Y, at, kernel))
-                    of_rows[i][kernel] += row_weight(kernel, at, top, i) * sums[kernel];
-        }
+            along_x = sums_along_x(texel + ivec2(0, row), weights_of_column);
+        add_row(row, along_x, run, sums);
     }
 }
 
 void main()
 {
-    ivec2 tile = ivec2(COLUMNS, ROWS) * turned(ivec2(gl_WorkGroupID.xy)), size = imageSize(target);
-    ivec2 first = ivec2(WINDOW_FIRST(EXACT, tile.x, WIDTH), WINDOW_FIRST(EXACT_ROWS, tile.y, HEIGHT));
-    ivec2 at = ivec2(1, RUN) * ivec2(gl_LocalInvocationID.xy);
-    ivec2 pixels[RUN];
-    vec4 own[RUN];
+    Tile tile = tile_of(ivec2(gl_WorkGroupID.xy));
+    Run run = Run(int(gl_LocalInvocationID.x), RUN * int(gl_LocalInvocationID.y));
+    ivec2 first = tile.pixel + ivec2(run.column, run.top), size = imageSize(target), pixels[RUN];
+    vec4 own[RUN], sums[RUN][3];
 
     // First, since they take as long as the rest.
     [[unroll]] for (int i = 0; i < RUN; ++i) {
-        pixels[i] = turned(tile + at + ivec2(0, i));
+        pixels[i] = turned(first + ivec2(0, i));
         own[i] = own_at(min(pixels[i], size - 1));
-        of_rows[i] = vec4[](vec4(0.0), vec4(0.0), vec4(0.0));
+        sums[i] = vec4[](vec4(0.0), vec4(0.0), vec4(0.0));
     }
-    sum_up(tile, first);
-    while (++picture < PICTURES) {
+    add_picture(0, tile, run, sums);
+    for (int picture = 1; picture < PICTURES; ++picture) {
+        // All have read the windows and sums of the picture before.
         barrier();
-        sum_up(tile, first);
+        add_picture(picture, tile, run, sums);
     }
     [[unroll]] for (int i = 0; i < RUN; ++i)
-        if (at.y + i < ROWS && all(lessThan(pixels[i], size)))
-            imageStore(target, pixels[i], shade(own[i], sum_of(of_rows[i]), pixels[i]));
+        if (run.top + i < ROWS && all(lessThan(pixels[i], size)))
+            imageStore(target, pixels[i], shade(own[i], sum_of(sums[i]), pixels[i]));
 }
