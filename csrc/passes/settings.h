@@ -76,8 +76,9 @@ struct vkb_kernel_data {
     float prefilter[3];  // min, max, factor; min above max: none
 };
 
-// Every stage of glare: STAGE(name in C, name in Python, of its framebuffer and of its add_ function
-// in methods/glare.c). Dirt is a stage without a framebuffer: it changes the sum of the others.
+// Every stage of glare: STAGE(name in C, name in Python, of its framebuffer and of its add_
+// function in methods/glare.c). Dirt is a stage without a framebuffer: it changes the sum of the
+// others.
 #define VKB_STAGES(STAGE) \
     STAGE(STREAKS, streaks) \
     STAGE(GHOSTS, ghosts) \

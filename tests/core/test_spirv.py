@@ -72,7 +72,10 @@ def test_loops_over_arrays_are_unrolled() -> None:
     # Mesa 25 unrolls only what it is told to. An array indexed by the counter of another loop is
     # in memory, which makes a pass take up to five times as long. The loop over rows, columns,
     # chunks or texels of an invocation is the only one that is not unrolled.
-    rows = re.compile(r"for \(int (y|chunk|number|round) = |^    for \(int x = first\.x - STRIP_RADIUS;")
+    rows = re.compile(
+        r"for \(int (y|chunk|number|round) = "
+        r"|^    for \(int x = first\.x - STRIP_RADIUS;"
+    )
     checked = 0
     for shader in sorted((Path(__file__).parents[2] / "shaders" / "variants").iterdir()):
         lines = shader.read_text().splitlines()

@@ -105,9 +105,9 @@ def random_passes(chance: random.Random, names: list[str]) -> list[Pass]:
     return passes
 
 
-def textures_of(passes: list[Pass]) -> dict[str, Array]:
+def textures_of(passes: list[Pass], glow: Array = IMAGE) -> dict[str, Array]:
     """Return what the passes write, by the names that they save; the picture under ''."""
-    textures = {"HOOKED": IMAGE[..., :3], "GLOW": IMAGE[..., :3]}
+    textures = {"HOOKED": IMAGE[..., :3], "GLOW": glow[..., :3]}
     for one in passes:
         textures[one.save] = one.share * textures[one.read].astype(np.float64) + one.added
     return {one.save: textures[one.save] for one in passes}
@@ -223,8 +223,10 @@ def test_derivatives_beside_textures_of_their_names(renderer: Renderer) -> None:
     assert [name for name, _, _ in plan.outputs] == [".by_image"]
 
 
-def twin_of(passes: list[Pass]) -> Callable[[Array, Settings], Mapping[str, Array]]:
-    textures = textures_of(passes)
+def twin_of(
+    passes: list[Pass], glow: Array = IMAGE
+) -> Callable[[Array, Settings], Mapping[str, Array]]:
+    textures = textures_of(passes, glow)
     names = {**names_of(set(textures), set()), "BLOOM": "bloom", "": "final"}
     is_bloom = "BLOOM" in textures
 
@@ -275,10 +277,17 @@ def test_random_custom_methods_are_rendered(
 def check_rendered(
     renderer: Renderer, passes: list[Pass], glare: tuple[Glare, ...], name: str
 ) -> None:
-    text = "\n".join(one.text() for one in passes)
-    method = load_method(text, name=name, reference=twin_of(passes))
-    settings = method(glare=glare, format="rgba32float")
+    settings = settings_of(passes, name, glare)
     check_frames(renderer.apply(IMAGE, settings), settings)
+
+
+def settings_of(
+    passes: list[Pass], name: str, glare: tuple[Glare, ...], glow: Array = IMAGE
+) -> Settings:
+    """Return settings of a method with these passes and a reference, for IMAGE with this glow."""
+    text = "\n".join(one.text() for one in passes)
+    method = load_method(text, name=name, reference=twin_of(passes, glow))
+    return method(glare=glare, format="rgba32float")
 
 
 @pytest.mark.usefixtures("glslang")
@@ -304,9 +313,9 @@ def test_glare_is_added_to_a_picture_in_each_variant(dtype: str) -> None:
         assert_close(variant, got, expected, limit)
 
 
-def check_frames(frames: Frames, settings: Settings) -> None:
-    """Compare all framebuffers with the reference."""
-    expected = reference.apply(IMAGE, settings)
+def check_frames(frames: Frames, settings: Settings, **given: Array) -> None:
+    """Compare all framebuffers of IMAGE with the reference."""
+    expected = reference.apply(IMAGE, settings, **given)
     assert set(frames) == {"glow", *expected}
     for framebuffer, part in expected.items():
         got = frames[framebuffer]
