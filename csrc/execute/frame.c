@@ -76,7 +76,9 @@ static size_t missing_size(const struct vkb_run *run, uint32_t index)
     const struct vkb_image_row *row = &run->graph->images[index];
     const struct vkb_content *content = run->contents[index];
 
-    return row->serial && !(content->valid && content->version == row->serial)
+    // The content of a history may be what a call before has made.
+    return row->serial && !run->inputs[row->input].image
+                && !(content->valid && content->version == row->serial)
              ? ((size_t)vkb_image_size(row) + 15) & ~(size_t)15
              : 0;
 }
@@ -103,8 +105,11 @@ static bool fill_constants(struct vkb_run *run, struct vkb_error *error)
         const size_t missing = missing_size(run, i);
         if (missing == 0)
             continue;
-        memcpy((char *)staging->mapped + start, graph->images[i].pixels,
-               (size_t)vkb_image_size(&graph->images[i]));
+        if (graph->images[i].pixels)
+            memcpy((char *)staging->mapped + start, graph->images[i].pixels,
+                   (size_t)vkb_image_size(&graph->images[i]));
+        else
+            memset((char *)staging->mapped + start, 0, missing);
         vkb_image_fill(run->device, run->submission->commands.buffer, &run->images[i]->image,
                        staging->handle, start);
         run->contents[i]->version = graph->images[i].serial;
@@ -136,9 +141,8 @@ static bool record_request(struct vkb_run *run, struct vkb_request *request,
     request->first_span = submission->timer.span_count;
     for (uint32_t i = 0; i < graph->image_count; ++i) {
         const struct vkb_image_row row = vkb_run_row(run, i);
-        vkb_run_set_image(run, i,
-                          row.input != VKB_INPUT_NONE ? run->inputs[row.input].image
-                                                      : vkb_image_cache_find(&frame->cache, &row));
+        struct vkb_cached_image *given = run->inputs[row.input].image;
+        vkb_run_set_image(run, i, given ? given : vkb_image_cache_find(&frame->cache, &row));
     }
     if (!vkb_planner_mark(&frame->planner, &step, error))
         return false;
@@ -219,6 +223,21 @@ static bool submit(struct vkb_run *run, const struct vkb_frame_source *source,
         && record_and_submit(run, requests, request_count, error);
 }
 
+// The images that the submission has written become those of the next call. So one that fails
+// changes no history.
+static void keep_histories(struct vkb_run *run)
+{
+    const struct vkb_graph *graph = run->graph;
+
+    for (uint32_t i = 0; i < graph->image_count; ++i) {
+        const struct vkb_image_row *row = &graph->images[i];
+        struct vkb_resident *resident =
+            vkb_is_history(row) ? run->request->kept[row->input - VKB_INPUT_HISTORY] : NULL;
+        if (resident)
+            vkb_resident_take(resident, run->images[row->history_of]);
+    }
+}
+
 // After a failure it is unknown what the device did, so images and commands are created again. (The
 // state of resources stays: a submission that failed has not changed it.) The images are created
 // later, when no submission is pending, since a wait here could not be interrupted.
@@ -283,6 +302,8 @@ bool vkb_frame_submit(struct vkb_device *device, struct vkb_frame *frame,
         && (run.contents = vkb_alloc(error, image_count, sizeof *run.contents))
         && (run.usages = vkb_alloc(error, image_count, sizeof *run.usages))
         && submit(&run, source, requests, request_count, error);
+    if (done && (!show || show->acquired))
+        keep_histories(&run);
     vkb_free(run.images);
     vkb_free(run.contents);
     vkb_free(run.usages);
@@ -292,14 +313,14 @@ bool vkb_frame_submit(struct vkb_device *device, struct vkb_frame *frame,
         for (uint32_t i = 0; i < request_count; ++i)
             requests[i].non_finite = frame->non_finite;
         *submission = run.submission;
-        vkb_sources_end(&run, source, true);
+        vkb_sources_end(&run, true);
         for (size_t i = 0; i < SINK_COUNT; ++i)
             done = (!sinks[i]->finish || sinks[i]->finish(&run, requests, request_count, error))
                 && done;
         return done;
     }
     if (!done) {
-        vkb_sources_end(&run, source, false);
+        vkb_sources_end(&run, false);
         fail_frame(device, frame, run.submission, error);
         vkb_resources_drop(device, &frame->resources, run.submission->number);
     }

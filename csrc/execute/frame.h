@@ -45,6 +45,9 @@ struct vkb_frame_source {
     const struct vkb_scene_data *scene;
     const struct vkb_input *inputs[VKB_INPUT_COUNT];  // by kind
     struct vkb_resident *resident;  // instead of inputs: images that are on the device
+    // What a call before has made of the framebuffers that have a history, in the order of the
+    // graph's histories; NULL: zeros.
+    struct vkb_resident *histories[VKB_MAX_HISTORIES];
     // The inputs do not change until the device has run the submission, so that it may read them
     // where they are.
     bool in_place;
@@ -71,6 +74,8 @@ struct vkb_request {
     uint32_t first_span;                      // of its timings, in the submission's timer
     struct vkb_non_finite non_finite;         // of the inputs; complete after the submission
     struct vkb_non_finite *layer_non_finite;  // of each image of a batch; NULL: it is none
+    // Get the images of these framebuffers for the next call; NULL: there is none.
+    struct vkb_resident *kept[VKB_MAX_HISTORIES];
 };
 
 // Records the passes that the requests' outputs need and that are out of date, request after

@@ -153,6 +153,13 @@ void vkb_image_cache_move(const struct vkb_device *device, struct vkb_cached_ima
     label(device, to);
 }
 
+bool vkb_image_cache_replaces(const struct vkb_image_cache *cache, const struct vkb_image_row *row)
+{
+    const struct vkb_cached_image *cached = find_cached(cache, row);
+
+    return cached && cached->image.handle;
+}
+
 struct vkb_cached_image *vkb_image_cache_add(const struct vkb_device *device,
                                              struct vkb_image_cache *cache,
                                              const struct vkb_image_row *row,

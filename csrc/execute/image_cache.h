@@ -56,6 +56,9 @@ struct vkb_cached_image *vkb_image_cache_entry(const struct vkb_device *device,
 void vkb_image_cache_move(const struct vkb_device *device, struct vkb_cached_image *from,
                           struct vkb_cached_image *to);
 
+// Whether vkb_image_cache_add for the row would destroy an image.
+bool vkb_image_cache_replaces(const struct vkb_image_cache *cache, const struct vkb_image_row *row);
+
 // Creates the cached image of a row that was not found. Pending commands must not use one of
 // another size, format or usage, which is replaced. NULL and a filled error on failure.
 struct vkb_cached_image *vkb_image_cache_add(const struct vkb_device *device,

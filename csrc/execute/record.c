@@ -234,7 +234,7 @@ static struct vkb_output *find_stored(const struct vkb_run *run, const struct vk
     const struct vkb_plan *plan = run->request->plan;
     const uint32_t image = pass->targets[0];
 
-    if (run->contents[image]->repeated)
+    if (run->contents[image]->repeated || vkb_graph_history(run->graph, image) != VKB_NO_IMAGE)
         return NULL;
     for (uint32_t i = 0; i < run->graph->pass_count; ++i)
         if (run->frame->planner.needed[i] && vkb_pass_reads(&run->graph->passes[i], image))

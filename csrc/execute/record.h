@@ -9,6 +9,7 @@ struct vkb_staged_input {
     const struct vkb_source_way *way;
     struct vkb_cached_image *image;  // NULL: there is no such input
     struct vkb_upload *upload;
+    struct vkb_resident *resident;  // whose image it is; NULL: it is none
     const struct vkb_input *input;  // in memory that CUDA shares
     bool send;                      // the device does not have the pixels yet
     enum vkb_access access;         // of a resident image before the submission

@@ -66,12 +66,12 @@ static bool step(struct vkb_dry_run *dry_run, struct vkb_plan_step *planned, boo
         if (!vkb_is_given(&graph->images[i]))
             continue;
         // Pixels are written again to an image that a new usage replaces.
-        if (graph->images[i].input && image && !contents[i])
+        if (!graph->images[i].serial && image && !contents[i])
             dry_run->source_version = ++dry_run->clock;
         if (!(contents[i] = resolve(dry_run, &graph->images[i], error)))
             return false;
         contents[i]->version =
-            graph->images[i].input ? dry_run->source_version : graph->images[i].serial;
+            graph->images[i].serial ? graph->images[i].serial : dry_run->source_version;
     }
     planned->source = planned->scene = dry_run->source_version;
     if (!vkb_planner_mark(&dry_run->planner, planned, error))

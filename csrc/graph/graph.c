@@ -58,6 +58,65 @@ bool vkb_graph_show_image(struct vkb_graph *graph, uint32_t image, const char *n
     return name_image(graph, image, name, error);
 }
 
+// Beyond all versions, which are counted, so that no recipe takes zeros for another content.
+#define ZEROS_SERIAL (UINT64_C(1) << 63)
+
+uint32_t vkb_graph_history(const struct vkb_graph *graph, uint32_t image)
+{
+    for (uint32_t i = 0; i < graph->image_count; ++i)
+        if (vkb_is_history(&graph->images[i]) && graph->images[i].history_of == image)
+            return i;
+    return VKB_NO_IMAGE;
+}
+
+static uint32_t count_histories(const struct vkb_graph *graph)
+{
+    uint32_t count = 0;
+
+    for (uint32_t i = 0; i < graph->image_count; ++i)
+        count += vkb_is_history(&graph->images[i]);
+    return count;
+}
+
+// Images of the host have these, so that the content of a history can come from there.
+static bool can_keep(enum vkb_format format)
+{
+    return format == VKB_FORMAT_RGBA8_UNORM || format == VKB_FORMAT_RGBA16_FLOAT
+        || format == VKB_FORMAT_RGBA32_FLOAT;
+}
+
+bool vkb_graph_add_history(struct vkb_graph *graph, uint32_t image, uint32_t *index,
+                           struct vkb_error *error)
+{
+    const struct vkb_image_row *of = &graph->images[image];
+    const uint32_t count = count_histories(graph);
+    struct vkb_image_row row = {
+        .format = of->format,
+        .width = of->width,
+        .height = of->height,
+        .history_of = image,
+        .serial = ZEROS_SERIAL,
+    };
+
+    *index = vkb_graph_history(graph, image);
+    if (*index != VKB_NO_IMAGE)
+        return true;
+    if (!of->framebuffer)
+        return vkb_fail(error, VKB_ERROR_GENERAL, "history: %s is no framebuffer", of->name);
+    if (!can_keep(of->format))
+        return vkb_fail(error, VKB_ERROR_VALUE,
+                        "format: %s has no history in %s; use rgba8unorm, rgba16float or "
+                        "rgba32float",
+                        of->name, vkb_formats[of->format].name);
+    if (count == VKB_MAX_HISTORIES)
+        return vkb_fail(error, VKB_ERROR_VALUE,
+                        "history: a frame has at most %d, and %s is one more", VKB_MAX_HISTORIES,
+                        of->name);
+    row.input = (enum vkb_input_kind)(VKB_INPUT_HISTORY + count);
+    snprintf(row.name, sizeof row.name, "history_%u", count);
+    return vkb_graph_add_image(graph, &row, index, error);
+}
+
 // Later code uses the indices without a check.
 static bool has_images(const struct vkb_graph *graph, const struct vkb_pass_row *row)
 {
@@ -306,8 +365,13 @@ void vkb_graph_set_usages(struct vkb_graph *graph)
 {
     for (uint32_t i = 0; i < graph->image_count; ++i) {
         struct vkb_image_row *row = &graph->images[i];
+        const bool kept = vkb_graph_history(graph, i) != VKB_NO_IMAGE;
         row->usage = (row->framebuffer ? vkb_access_usage(VKB_ACCESS_COPY_SOURCE) : 0)
-                   | (row->serial ? vkb_access_usage(VKB_ACCESS_COPY_TARGET) : 0);
+                   | (row->serial ? vkb_access_usage(VKB_ACCESS_COPY_TARGET) : 0)
+                   // The next call may read it in another way, or use it as a source.
+                   | (kept ? vkb_access_usage(VKB_ACCESS_SAMPLED)
+                                 | vkb_access_usage(VKB_ACCESS_DISPATCH_LOADED)
+                           : 0);
     }
     for (uint32_t i = 0; i < graph->pass_count; ++i) {
         const struct vkb_pass_row *pass = &graph->passes[i];

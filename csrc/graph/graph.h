@@ -16,6 +16,7 @@ enum {
     // Storage images. With the target, one less than the four that every device supports.
     VKB_MAX_LOADS = 2,
     VKB_MAX_TARGETS = 4,
+    VKB_MAX_HISTORIES = 4,
     // That a method brings along, and that a pass binds.
     VKB_MAX_RESOURCES = 16,
     // Of a pass, beside its parameters.
@@ -30,15 +31,16 @@ typedef char vkb_image_name[VKB_NAME_SIZE];
 // named by users, who cannot write it.
 #define VKB_INTERNAL_NAME '.'
 
-// Which of its data the host writes to an image: the image of a source, its emission, its mask, or
-// an image that another part of the graph has made.
+// Which of its data the host writes to an image: the image of a source, its emission, its mask, an
+// image that another part of the graph has made, or what a call before has made.
 enum vkb_input_kind {
     VKB_INPUT_NONE,
     VKB_INPUT_IMAGE,
     VKB_INPUT_EMISSION,
     VKB_INPUT_MASK,
     VKB_INPUT_LEVEL,
-    VKB_INPUT_COUNT = VKB_INPUT_LEVEL + GATHERED_LEVELS,
+    VKB_INPUT_HISTORY = VKB_INPUT_LEVEL + GATHERED_LEVELS,
+    VKB_INPUT_COUNT = VKB_INPUT_HISTORY + VKB_MAX_HISTORIES,
 };
 
 // FNV-1a by words of 64 bits.
@@ -58,8 +60,10 @@ struct vkb_image_row {
     uint32_t channels;  // that are read back; 0: all
     bool framebuffer;   // one of the frame's results, not an intermediate image
     enum vkb_input_kind input;
+    uint32_t history_of;      // of VKB_INPUT_HISTORY: the framebuffer (vkb_graph_add_history)
     VkImageUsageFlags usage;  // that the graph's passes need (vkb_graph_set_usages)
-    // Filled by the host once: the pixels, without gaps, and their number; 0: it is not.
+    // Filled by the host once: the pixels, without gaps (NULL: zeros), and their number; 0: it is
+    // not. A history holds them if no call before has made it.
     const void *pixels;
     uint64_t serial;
 };
@@ -68,6 +72,11 @@ struct vkb_image_row {
 static inline bool vkb_is_given(const struct vkb_image_row *row)
 {
     return row->input || row->serial;
+}
+
+static inline bool vkb_is_history(const struct vkb_image_row *row)
+{
+    return row->input >= VKB_INPUT_HISTORY;
 }
 
 // What a pass draws; depth test and culling are derived from it. A dispatch draws nothing: its
@@ -168,6 +177,15 @@ bool vkb_graph_add_image(struct vkb_graph *graph, const struct vkb_image_row *ro
 // Makes an image a framebuffer of that name.
 bool vkb_graph_show_image(struct vkb_graph *graph, uint32_t image, const char *name,
                           struct vkb_error *error);
+
+// Adds the history of a framebuffer, or finds it: an image of the same size and format that holds
+// what the framebuffer was after the call before, and zeros if the call continues none (execute/
+// history.h). Fails if the image is no framebuffer, or has a format that images of the host have
+// not.
+bool vkb_graph_add_history(struct vkb_graph *graph, uint32_t image, uint32_t *index,
+                           struct vkb_error *error);
+// The history of an image; VKB_NO_IMAGE: it has none. What has one is made in each call.
+uint32_t vkb_graph_history(const struct vkb_graph *graph, uint32_t image);
 
 // The copy's constant `stored` is that of its first target. Fails if one of its images is not
 // there.

@@ -163,6 +163,10 @@ static void mark(const struct vkb_plan *plan, const bool *skipped, bool *needed,
     memset(wanted, 0, graph->image_count * sizeof *wanted);
     for (uint32_t i = 0; i < plan->output_count; ++i)
         wanted[plan->outputs[i]] = true;
+    // Whatever framebuffers are requested, the call makes the history of the next one.
+    for (uint32_t i = 0; i < graph->image_count; ++i)
+        if (vkb_is_history(&graph->images[i]))
+            wanted[graph->images[i].history_of] = true;
     for (uint32_t i = graph->pass_count; i-- > 0;) {
         // A pass with a turn may write what no image shows.
         needed[i] =
@@ -190,7 +194,7 @@ static bool is_read_later(const struct vkb_plan *plan, const bool *needed, const
     for (uint32_t i = 0; i < plan->output_count; ++i)
         if (plan->outputs[i] == image)
             return true;
-    return false;
+    return vkb_graph_history(graph, image) != VKB_NO_IMAGE;
 }
 
 bool vkb_planner_reads(const struct vkb_planner *planner, const struct vkb_plan *plan,

@@ -113,7 +113,8 @@ static bool show_results(struct vkb_adjoint *adjoint, uint32_t image_count, stru
     for (uint32_t i = 0; done && i < image_count; ++i) {
         const struct vkb_image_row *forward = &adjoint->graph->images[i];
         const uint32_t cotangents = adjoint->cotangents[i];
-        if (forward->input == VKB_INPUT_NONE || cotangents == VKB_NO_IMAGE)
+        // What calls before have made is a constant.
+        if (!names[forward->input] || cotangents == VKB_NO_IMAGE)
             continue;
         adjoint->graph->images[cotangents].channels =
             forward->input == VKB_INPUT_MASK ? 1 : forward->channels;

@@ -58,25 +58,65 @@ static void name_image(const struct vkb_levels *levels, const struct vkb_custom_
         snprintf(name, VKB_NAME_SIZE, "saved__%.24s", pass->name);
 }
 
-// Adds pass `number`. `images` has those of the passes before. A bloom that is enlarged afterwards
-// is no framebuffer.
-static uint32_t add_pass(struct vkb_levels *levels, const uint32_t *images, uint32_t number,
-                         bool is_enlarged)
+static bool has_size(const struct vkb_custom_pass *pass, struct vkb_size size)
+{
+    return pass->width == size.width && pass->height == size.height;
+}
+
+// A bloom that is enlarged afterwards is no framebuffer.
+static bool is_enlarged(const struct vkb_levels *levels, const struct vkb_custom_pass *pass)
+{
+    return strcmp(pass->name, BLOOM) == 0 && !has_size(pass, levels->source->final);
+}
+
+// Adds the image that pass `number` writes, unless an earlier pass that reads its history has.
+static void add_image(struct vkb_levels *levels, uint32_t *images, uint32_t number)
 {
     const struct vkb_custom_pass *pass = &levels->settings->passes[number];
     const struct vkb_size size = {pass->width, pass->height};
+    const bool enlarged = is_enlarged(levels, pass);
     vkb_image_name name;
 
+    if (images[number] != VKB_NO_IMAGE)
+        return;
     if (find_pass(levels->settings, number, pass->name) < number)
         FAIL(levels, "passes: there are two images named %s", pass->name);
     name_image(levels, pass, name);
-    const uint32_t image =
-        vkb_levels_target(levels, is_enlarged ? "bloom_own" : name, levels->source->format, size,
-                          pass->framebuffer && !is_enlarged);
-    struct vkb_pass_row row = vkb_fullscreen_row(name, pass->shader, image);
+    images[number] =
+        vkb_levels_target(levels, enlarged ? "bloom_own" : name, levels->source->format, size,
+                          pass->framebuffer && !enlarged);
+}
+
+// The history of the framebuffer that a pass writes, maybe a later one.
+static uint32_t find_history(struct vkb_levels *levels, uint32_t *images, const char *name)
+{
+    const struct vkb_settings *settings = levels->settings;
+    const uint32_t number = find_pass(settings, settings->pass_count, name);
+
+    if (number == settings->pass_count)
+        return VKB_NO_IMAGE;
+    if (is_enlarged(levels, &settings->passes[number]))
+        FAIL(levels,
+             "passes: the history of a %s that is smaller than the frame is not kept; save "
+             "it under another name, too",
+             BLOOM);
+    add_image(levels, images, number);
+    return vkb_levels_history(levels, images[number]);
+}
+
+// Adds pass `number`. `images` has those of the passes before.
+static void add_pass(struct vkb_levels *levels, uint32_t *images, uint32_t number)
+{
+    const struct vkb_custom_pass *pass = &levels->settings->passes[number];
+
+    add_image(levels, images, number);
+    const char *name = vkb_graph_label(levels->graph, levels->graph->images[images[number]].name);
+    struct vkb_pass_row row = vkb_fullscreen_row(name, pass->shader, images[number]);
     for (; row.read_count < pass->read_count; ++row.read_count) {
         const char *read = pass->reads[row.read_count];
-        const uint32_t found = find_read(levels, images, number, read);
+        const uint32_t found = pass->histories >> row.read_count & 1
+                                 ? find_history(levels, images, read)
+                                 : find_read(levels, images, number, read);
         if (found == VKB_NO_IMAGE)
             FAIL(levels, "passes: %s reads %s, which no pass before it writes", pass->name, read);
         row.reads[row.read_count] = found;
@@ -93,12 +133,6 @@ static uint32_t add_pass(struct vkb_levels *levels, const uint32_t *images, uint
     row.resource_count = pass->resource_count;
     row.turn = pass->turn;
     vkb_levels_pass(levels, &row);
-    return image;
-}
-
-static bool has_size(const struct vkb_custom_pass *pass, struct vkb_size size)
-{
-    return pass->width == size.width && pass->height == size.height;
 }
 
 // Adds all passes. Returns the bloom, if there is one.
@@ -108,11 +142,13 @@ static uint32_t add_passes(struct vkb_levels *levels, uint32_t *images)
     const struct vkb_size final = levels->source->final;
     uint32_t bloom = VKB_NO_IMAGE;
 
+    for (uint32_t i = 0; i < settings->pass_count; ++i)
+        images[i] = VKB_NO_IMAGE;
     for (uint32_t i = 0; i < settings->pass_count; ++i) {
         const struct vkb_custom_pass *pass = &settings->passes[i];
         const bool is_bloom = strcmp(pass->name, BLOOM) == 0, fits = has_size(pass, final);
         const bool is_picture = strcmp(pass->name, PICTURE) == 0;
-        images[i] = add_pass(levels, images, i, is_bloom && !fits);
+        add_pass(levels, images, i);
         if (is_bloom)
             bloom = fits ? images[i] : vkb_levels_enlarge(levels, UPSAMPLE_LINEAR, images[i], 1.0);
         if (is_picture)

@@ -113,6 +113,15 @@ uint32_t vkb_levels_image(struct vkb_levels *levels, struct vkb_size size, const
     return vkb_levels_target(levels, name, levels->source->format, size, true);
 }
 
+uint32_t vkb_levels_history(struct vkb_levels *levels, uint32_t image)
+{
+    uint32_t history = 0;
+
+    levels->failed =
+        levels->failed || !vkb_graph_add_history(levels->graph, image, &history, levels->error);
+    return history;
+}
+
 uint32_t vkb_levels_down(struct vkb_levels *levels, uint32_t level)
 {
     levels->downs[level] = vkb_levels_image(levels, levels->sizes[level], "down_%u", level);

@@ -88,6 +88,9 @@ __attribute__((format(printf, 3, 4))) uint32_t vkb_levels_image(struct vkb_level
                                                                 struct vkb_size size,
                                                                 const char *format, ...);
 
+// The history of a framebuffer: what it was after the call before (vkb_graph_add_history).
+uint32_t vkb_levels_history(struct vkb_levels *levels, uint32_t image);
+
 // Adds the image of a level, `levels->downs[level]`.
 uint32_t vkb_levels_down(struct vkb_levels *levels, uint32_t level);
 

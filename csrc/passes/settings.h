@@ -108,9 +108,11 @@ struct vkb_custom_pass {
     // Of a compute shader: pixels of a workgroup; 0: a fragment shader.
     uint32_t block_width, block_height;
     uint32_t framebuffer, read_count;
+    uint32_t histories;  // bit i: it reads the history of reads[i], not what this frame has made
+    uint32_t unused;
     char name[VKB_NAME_SIZE];  // of the image that it writes
     char reads[VKB_MAX_READS][VKB_NAME_SIZE];
-    // Python packs what is before here, as "1024sQ6I32s512s".
+    // Python packs what is before here, as "1024sQ8I32s512s".
     const struct vkb_shader *shader;
     const struct vkb_resource *resources[VKB_MAX_RESOURCES];
     uint32_t resource_count;

@@ -23,17 +23,29 @@ bool vkb_guards_begin(void)
 }
 #endif
 
-static void release_source(struct vkb_pending *pending)
+void vkb_pending_use(struct vkb_pending *pending, PyObject *object)
 {
-    struct vkb_source_object *source = (struct vkb_source_object *)pending->source;
+    const struct vkb_source_object *source = (struct vkb_source_object *)object;
+
+    pending->sources[pending->source_count++] = Py_NewRef(object);
+    VKB_LOCK(vkb_memory);
+    if (source->resident)
+        ++source->resident->uses;
+    VKB_UNLOCK(vkb_memory);
+}
+
+// No other source takes the memory of one that is used, so it has the resident image still.
+static void end_use(PyObject *object)
+{
+    const struct vkb_source_object *source = (struct vkb_source_object *)object;
 
     // In a forked process the device is the parent's.
-    if (pending->resident && source->process == vkb_current_process()) {
+    if (source->resident && source->process == vkb_current_process()) {
         VKB_LOCK(vkb_memory);
-        vkb_resident_end_use(source->residents, pending->resident);
+        vkb_resident_end_use(source->residents, source->resident);
         VKB_UNLOCK(vkb_memory);
     }
-    Py_XDECREF(pending->source);
+    Py_DECREF(object);
 }
 
 static void release_views(struct vkb_pending *pending)
@@ -57,7 +69,8 @@ void vkb_pending_release(struct vkb_pending *pending)
     vkb_free(pending->timings);
     vkb_free(pending->layer_non_finite);
     Py_XDECREF(pending->plans);
-    release_source(pending);
+    while (pending->source_count > 0)
+        end_use(pending->sources[--pending->source_count]);
     vkb_free(pending);
     PyErr_Restore(type, value, traceback);
 }
@@ -65,7 +78,8 @@ void vkb_pending_release(struct vkb_pending *pending)
 int vkb_pending_traverse(const struct vkb_pending *pending, visitproc visit, void *arg)
 {
     Py_VISIT(pending->plans);
-    Py_VISIT(pending->source);
+    for (uint32_t i = 0; i < pending->source_count; ++i)
+        Py_VISIT(pending->sources[i]);
     for (size_t i = 0; i < pending->view_count; ++i)
         Py_VISIT(pending->views[i].obj);
     return 0;

@@ -391,6 +391,21 @@ static PyObject *get_outputs(PyObject *object, void *unused)
     return Py_NewRef(((struct vkb_plan_object *)object)->outputs);
 }
 
+static PyObject *get_histories(PyObject *object, void *unused)
+{
+    const struct vkb_graph *graph = &((struct vkb_plan_object *)object)->plan.graph;
+    PyObject *list = PyList_New(0);
+
+    (void)unused;
+    for (uint32_t i = 0; list && i < graph->image_count; ++i)
+        if (vkb_is_history(&graph->images[i])
+            && !vkb_append_item(list, describe_output(graph, graph->images[i].history_of)))
+            Py_CLEAR(list);
+    PyObject *tuple = list ? PyList_AsTuple(list) : NULL;
+    Py_XDECREF(list);
+    return tuple;
+}
+
 static PyObject *get_image_size(PyObject *object, void *unused)
 {
     (void)unused;
@@ -459,6 +474,8 @@ static PyGetSetDef attributes[] = {
      "[(name, shader, reads, writes, variant, number of its render pass), ...] of what runs where "
      "nothing has run before.",
      NULL},
+    {"histories", get_histories, NULL,
+     "((name, shape, dtype), ...) of the framebuffers whose content the next call reads.", NULL},
     {"image_size", get_image_size, NULL, "Bytes of all images on the device.", NULL},
     {0},
 };

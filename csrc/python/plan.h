@@ -30,6 +30,14 @@ struct vkb_plan_object {
     struct vkb_held_passes passes;
 };
 
+// Whether `histories` is None, or has an image of the renderer or None for each history of the only
+// plan; else with an exception set.
+bool vkb_check_histories(const struct vkb_renderer *renderer, PyObject *histories, PyObject *plans);
+// Makes the only request continue from such histories, which are not None. Returns a tuple of the
+// sources that it makes for the next call.
+PyObject *vkb_hold_histories(struct vkb_renderer *renderer, struct vkb_pending *pending,
+                             PyObject *histories, struct vkb_frame_source *data);
+
 // A list of (name, shader, reads, writes, variant, number of its render pass) of the passes that
 // the next step of a sequence runs.
 PyObject *vkb_passes_that_run(const struct vkb_module_state *state, struct vkb_dry_run *dry_run,

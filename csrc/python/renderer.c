@@ -290,11 +290,15 @@ static PyMethodDef methods[] = {
      "are the source's levels: of the derivatives by images or, with `sums`, by fields "
      "(methods/adjoint.h); None if a pass has no adjoint."},
     {"run", vkb_renderer_run, METH_VARARGS,
-     "run(source, plans, arrays, in_place=False, show=...) -> Submission. Submits plans with the "
+     "run(source, plans, arrays, in_place=False, show=None, histories=None) -> Submission. Submits "
+     "plans with the "
      "same images; arrays has a tuple for each plan, in the order of its outputs. `in_place`: the "
      "source does not change before the end of the wait, so that the device may read it where it "
      "is. `show`: (screen, width, height, linear) presents the only output on a screen, of that "
-     "size if it has none of its own; `linear`: encoded as sRGB. None: the surface has no image."},
+     "size if it has none of its own; `linear`: encoded as sRGB. None is returned if the surface "
+     "has no image. `histories`, with one plan: what a call before has made of each framebuffer "
+     "that has a history, a resident Source; None: zeros. Submission.histories has those of this "
+     "call. Without `histories` all are zeros, and none is kept."},
     {"upload", vkb_renderer_upload, METH_VARARGS,
      "upload(source, spare, recycled) -> Source. A copy of an image on the device. "
      "`spare`: None, or such a source that nobody needs any more, whose memory it takes; "

@@ -15,9 +15,11 @@
 // abandoned: the renderer owns it.
 struct vkb_pending {
     struct vkb_submission *submission;  // NULL: not submitted
-    PyObject *plans;                // a tuple: their graphs are read until the device has finished
-    PyObject *source;               // read by the device until then
-    struct vkb_resident *resident;  // of the source, in use; NULL: none
+    PyObject *plans;  // a tuple: their graphs are read until the device has finished
+    // Used by the device until then: the source, what calls before have made, and what this one
+    // makes for the next.
+    PyObject *sources[1 + 2 * VKB_MAX_HISTORIES];
+    uint32_t source_count;
     struct vkb_request *requests;
     struct vkb_output *outputs;  // of all requests, one after the other
     Py_buffer *views;            // of the outputs
@@ -78,6 +80,8 @@ bool vkb_renderer_is_ours(const struct vkb_renderer *renderer);
 // Makes the renderer the owner of a submission that nobody waits for. With the GIL.
 void vkb_renderer_abandon(struct vkb_renderer *renderer, struct vkb_pending *pending);
 
+// Makes it use a source (a struct vkb_source_object).
+void vkb_pending_use(struct vkb_pending *pending, PyObject *source);
 // With the GIL; the device must have finished the submission. A set exception is kept.
 void vkb_pending_release(struct vkb_pending *pending);
 int vkb_pending_traverse(const struct vkb_pending *pending, visitproc visit, void *arg);

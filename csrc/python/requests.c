@@ -12,6 +12,7 @@ struct submission {
     PyObject_HEAD
     struct vkb_renderer *renderer;
     VKB_ATOMIC(struct vkb_pending *) pending;  // NULL: finished or abandoned
+    PyObject *histories;                       // a tuple of Sources; NULL: none is kept
     bool taken;                                // a call of wait has it; accessed with the lock
 };
 
@@ -28,7 +29,6 @@ static const struct vkb_plan_object *plan_at(PyObject *plans, Py_ssize_t index)
 // Allocates the memory that the requests need in addition to their plans.
 static struct vkb_pending *new_pending(PyObject *source, PyObject *plans, struct vkb_error *error)
 {
-    const struct vkb_source_object *given = (struct vkb_source_object *)source;
     struct vkb_pending *pending = vkb_alloc(error, 1, sizeof *pending);
     const Py_ssize_t count = PyTuple_Size(plans);
     // All plans of a batch have the same layers.
@@ -42,12 +42,7 @@ static struct vkb_pending *new_pending(PyObject *source, PyObject *plans, struct
         pass_count += plan_at(plans, i)->plan.graph.pass_count;
     }
     pending->plans = Py_NewRef(plans);
-    pending->source = Py_NewRef(source);
-    VKB_LOCK(vkb_memory);
-    pending->resident = given->resident;
-    if (pending->resident)
-        ++pending->resident->uses;
-    VKB_UNLOCK(vkb_memory);
+    vkb_pending_use(pending, source);
     pending->requests = vkb_alloc(error, (size_t)count, sizeof *pending->requests);
     pending->outputs = vkb_alloc(error, output_count, sizeof *pending->outputs);
     pending->views = vkb_alloc(error, output_count, sizeof *pending->views);
@@ -221,59 +216,80 @@ static struct submission *new_submission(struct vkb_renderer *renderer, PyObject
     return NULL;
 }
 
-// `show` may be NULL.
-static bool submit(struct vkb_renderer *renderer, const struct vkb_source_object *source,
-                   struct vkb_pending *pending, bool in_place, struct vkb_show *show,
-                   struct vkb_error *error)
+static void describe_source(const struct vkb_source_object *source, bool in_place,
+                            struct vkb_frame_source *data)
 {
-    struct vkb_frame_source data = {
+    *data = (struct vkb_frame_source){
         .scene = source->source.kind == VKB_SOURCE_SCENE ? &source->scene.data : NULL,
-        .resident = pending->resident,
+        .resident = source->resident,
         .in_place = in_place,
     };
-
     for (int kind = 0; kind < VKB_INPUT_COUNT; ++kind)
         if (source->images[kind].view.obj)
-            data.inputs[kind] = &source->images[kind].input;
+            data->inputs[kind] = &source->images[kind].input;
+}
 
+// `show` may be NULL.
+static bool submit(struct vkb_renderer *renderer, const struct vkb_frame_source *data,
+                   struct vkb_pending *pending, struct vkb_show *show, struct vkb_error *error)
+{
     if (!vkb_renderer_enter(renderer, error))
         return false;
     bool done = vkb_require_open(renderer, error)
              && (!show || vkb_require_screen(renderer, show->screen, error))
-             && vkb_frame_submit(&renderer->device, &renderer->frame, &data, pending->requests,
+             && vkb_frame_submit(&renderer->device, &renderer->frame, data, pending->requests,
                                  pending->count, show, &pending->submission, error);
     done = vkb_renderer_check_messages(renderer, done, error);
     vkb_renderer_leave(renderer);
     return done;
 }
 
+// (screen, width, height, linear)
+static bool read_show(PyObject *tuple, struct vkb_show *show)
+{
+    unsigned long long screen = 0;
+    int linear = false;
+
+    if (!vkb_require_tuple(tuple, "show")
+        || !PyArg_ParseTuple(tuple, "KIIp:show", &screen, &show->extent.width, &show->extent.height,
+                             &linear))
+        return false;
+    show->screen = (struct vkb_screen *)(uintptr_t)screen;
+    show->linear = linear;
+    return true;
+}
+
 PyObject *vkb_renderer_run(PyObject *object, PyObject *arguments)
 {
     struct vkb_renderer *renderer = (struct vkb_renderer *)object;
     struct vkb_module_state *state = state_of(object);
-    const bool shows = PyTuple_Size(arguments) > 4;
-    PyObject *source, *plans, *arrays;
-    unsigned long long screen = 0;
-    int in_place = false, linear = false;
+    PyObject *source, *plans, *arrays, *shown = Py_None, *histories = Py_None;
+    int in_place = false;
     struct vkb_show show = {0};
+    struct vkb_frame_source data;
     struct vkb_error error = {0};
 
-    if (!PyArg_ParseTuple(arguments, "O!O!O!|p(KIIp):run", state->source_type, &source,
-                          &PyTuple_Type, &plans, &PyTuple_Type, &arrays, &in_place, &screen,
-                          &show.extent.width, &show.extent.height, &linear))
+    if (!PyArg_ParseTuple(arguments, "O!O!O!|pOO:run", state->source_type, &source, &PyTuple_Type,
+                          &plans, &PyTuple_Type, &arrays, &in_place, &shown, &histories)
+        || (shown != Py_None && !read_show(shown, &show)))
         return NULL;
-    show.screen = (struct vkb_screen *)(uintptr_t)screen;
-    show.linear = linear;
+    const bool shows = shown != Py_None;
     struct vkb_source_object *given = (struct vkb_source_object *)source;
-    if (!vkb_check_source(renderer, given) || !check_run(renderer, given, plans, arrays, shows))
+    if (!vkb_check_source(renderer, given) || !check_run(renderer, given, plans, arrays, shows)
+        || !vkb_check_histories(renderer, histories, plans))
         return NULL;
     if (!check_memory(renderer, plans, &error))
         return vkb_raise(state, &error);
     struct submission *self = new_submission(renderer, source, plans, arrays);
     if (!self)
         return NULL;
-    const bool done =
-        submit(renderer, given, self->pending, in_place, shows ? &show : NULL, &error);
+    describe_source(given, in_place, &data);
+    if (histories != Py_None
+        && !(self->histories = vkb_hold_histories(renderer, self->pending, histories, &data))) {
+        Py_DECREF(self);
+        return NULL;
+    }
+    const bool done = submit(renderer, &data, self->pending, shows ? &show : NULL, &error);
     if (done && (!shows || show.acquired))
         return (PyObject *)self;
     Py_DECREF(self);
@@ -397,6 +413,14 @@ static PyObject *get_ordered(PyObject *object, void *unused)
     return PyBool_FromLong(ordered);
 }
 
+static PyObject *get_histories(PyObject *object, void *unused)
+{
+    PyObject *histories = ((struct submission *)object)->histories;
+
+    (void)unused;
+    return Py_NewRef(histories ? histories : Py_None);
+}
+
 static int traverse(PyObject *object, visitproc visit, void *arg)
 {
     const struct submission *self = (struct submission *)object;
@@ -404,6 +428,7 @@ static int traverse(PyObject *object, visitproc visit, void *arg)
 
     Py_VISIT(Py_TYPE(object));
     Py_VISIT((PyObject *)self->renderer);
+    Py_VISIT(self->histories);
     return pending ? vkb_pending_traverse(pending, visit, arg) : 0;
 }
 
@@ -419,6 +444,7 @@ static int clear(PyObject *object)
         vkb_renderer_abandon(self->renderer, pending);
     else if (pending)
         vkb_pending_release(pending);
+    Py_CLEAR(self->histories);
     Py_CLEAR(self->renderer);
     return 0;
 }
@@ -433,6 +459,10 @@ static PyMethodDef methods[] = {
 static PyGetSetDef attributes[] = {
     {"ordered", get_ordered, NULL,
      "Whether streams of CUDA wait for all its arrays, so that the host need not.", NULL},
+    {"histories", get_histories, NULL,
+     "A Source for each history of the plan: what the next call continues from. None: none is "
+     "kept.",
+     NULL},
     {0},
 };
 

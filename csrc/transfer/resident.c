@@ -75,6 +75,18 @@ void vkb_resident_end_use(struct vkb_residents *residents, struct vkb_resident *
     }
 }
 
+void vkb_resident_take(struct vkb_resident *resident, struct vkb_cached_image *from)
+{
+    struct vkb_cached_image *to = &resident->inputs[VKB_INPUT_IMAGE].cached;
+
+    to->image = from->image;
+    to->content.version = from->content.version;
+    to->content.valid = true;
+    resident->uncounted = true;
+    from->image = (struct vkb_image){0};
+    from->content.valid = false;
+}
+
 bool vkb_resident_fill(struct vkb_device *device, struct vkb_resident *resident,
                        enum vkb_input_kind kind, const struct vkb_input *input, uint64_t *clock,
                        struct vkb_error *error)

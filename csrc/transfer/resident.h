@@ -1,6 +1,6 @@
 // Images that stay on the device as long as there is a handle of them. Calls must not overlap; the
-// core makes them with the GIL or vkb_memory, and calls the last two functions with the renderer's
-// lock.
+// core makes them with the GIL or vkb_memory, and calls the last three functions with the
+// renderer's lock.
 #ifndef VKB_RESIDENT_H
 #define VKB_RESIDENT_H
 
@@ -14,9 +14,10 @@ struct vkb_resident {
         struct vkb_upload upload;
     } inputs[VKB_INPUT_COUNT];  // by kind
     struct vkb_non_finite non_finite;
-    uint32_t uses;  // submissions that use it and may still run
-    bool staged;    // its pixels are in staging memory, and the next submission copies them
-    bool recycled;  // will get other pixels, so it keeps its staging memory
+    bool uncounted;  // the device has made the image, so that nobody knows its NaN and infinity
+    uint32_t uses;   // submissions that use it and may still run
+    bool staged;     // its pixels are in staging memory, and the next submission copies them
+    bool recycled;   // will get other pixels, so it keeps its staging memory
 };
 
 struct vkb_residents;
@@ -34,6 +35,11 @@ void vkb_resident_release(struct vkb_residents *residents, struct vkb_resident *
 
 // Ends a use by a submission: after the device has finished it, or if there was none.
 void vkb_resident_end_use(struct vkb_residents *residents, struct vkb_resident *resident);
+
+// Gives an element without an image that of a cached image, with its content; the cached one is
+// then without. It is of the kind VKB_INPUT_IMAGE: a history is in all ways an image that was
+// uploaded.
+void vkb_resident_take(struct vkb_resident *resident, struct vkb_cached_image *from);
 
 // Creates the image of this kind, with the input's size, format and pixels. No submission may use
 // the element. The input is read before this returns.

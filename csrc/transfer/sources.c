@@ -26,7 +26,8 @@ bool vkb_run_resolve(struct vkb_run *run, uint32_t image, struct vkb_error *erro
     if (!cached)
         cached = vkb_image_cache_find(cache, &row);
     if (!cached
-        && (!vkb_submissions_wait(run->device, &run->frame->submissions, error)
+        && ((vkb_image_cache_replaces(cache, &row)
+             && !vkb_submissions_wait(run->device, &run->frame->submissions, error))
             || !(cached = vkb_image_cache_add(run->device, cache, &row, error))))
         return false;
     cached->used = cache->now;
@@ -77,30 +78,53 @@ static bool allows_in_place(const struct vkb_request *request, uint32_t image,
     return true;
 }
 
+static void stage_image_of(struct vkb_run *run, enum vkb_input_kind kind,
+                           struct vkb_resident *resident, enum vkb_input_kind of)
+{
+    struct vkb_staged_input *staged = &run->inputs[kind];
+
+    staged->resident = resident;
+    staged->image = &resident->inputs[of].cached;
+    staged->upload = &resident->inputs[of].upload;
+    staged->send = resident->staged;
+    staged->access = staged->image->image.access;
+}
+
 static bool stage_resident(struct vkb_run *run, const struct pixels *pixels, bool *taken,
                            struct vkb_error *error)
 {
     struct vkb_resident *resident = pixels->source->resident;
-    struct vkb_staged_input *staged = &run->inputs[pixels->kind];
 
     (void)error;
     *taken = resident;
     if (!resident)
         return true;
-    staged->image = &resident->inputs[pixels->kind].cached;
-    staged->upload = &resident->inputs[pixels->kind].upload;
-    staged->send = resident->staged;
-    staged->access = staged->image->image.access;
+    stage_image_of(run, pixels->kind, resident, pixels->kind);
     // Those of all its images.
     run->frame->non_finite = resident->non_finite;
+    run->unknown_non_finite = run->unknown_non_finite || resident->uncounted;
     return true;
 }
 
-static void end_resident(const struct vkb_frame_source *source, struct vkb_staged_input *staged,
-                         bool submitted)
+// Without an image it is the cached one of the row, with zeros.
+static bool stage_history(struct vkb_run *run, const struct pixels *pixels, bool *taken,
+                          struct vkb_error *error)
+{
+    (void)error;
+    *taken = pixels->kind >= VKB_INPUT_HISTORY;
+    if (!*taken)
+        return true;
+    struct vkb_resident *resident = pixels->source->histories[pixels->kind - VKB_INPUT_HISTORY];
+    if (resident)
+        stage_image_of(run, pixels->kind, resident, VKB_INPUT_IMAGE);
+    run->unknown_non_finite = run->unknown_non_finite || resident;
+    return true;
+}
+
+static void end_resident(struct vkb_staged_input *staged, bool submitted)
 {
     if (submitted)
-        source->resident->staged = false;
+        staged->resident->staged = false;
     else
         // The recorded commands do not run, so the image keeps its last access.
         staged->image->image.access = staged->access;
@@ -260,9 +284,9 @@ static const struct vkb_source_way {
                   struct vkb_error *error);
     // Both may be NULL.
     bool (*record)(struct vkb_run *run, struct vkb_staged_input *staged, struct vkb_error *error);
-    void (*end)(const struct vkb_frame_source *source, struct vkb_staged_input *staged,
-                bool submitted);
+    void (*end)(struct vkb_staged_input *staged, bool submitted);
 } ways[] = {
+    {stage_history, record_copy, end_resident},
     {stage_resident, record_copy, end_resident},
     {stage_exported, vkb_exported_record_input, NULL},
     {stage_in_place, NULL, NULL},
@@ -299,11 +323,11 @@ bool vkb_sources_record(struct vkb_run *run, struct vkb_error *error)
     return true;
 }
 
-void vkb_sources_end(struct vkb_run *run, const struct vkb_frame_source *source, bool submitted)
+void vkb_sources_end(struct vkb_run *run, bool submitted)
 {
     for (int kind = 0; kind < VKB_INPUT_COUNT; ++kind)
         if (run->inputs[kind].image && run->inputs[kind].way->end)
-            run->inputs[kind].way->end(source, &run->inputs[kind], submitted);
+            run->inputs[kind].way->end(&run->inputs[kind], submitted);
 }
 
 uint64_t vkb_sources_version(const struct vkb_run *run)

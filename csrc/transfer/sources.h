@@ -4,9 +4,9 @@
 
 #include "execute/record.h"
 
-// The ways are rows of a table, and the first one that suits an input is taken: an image that stays
-// on the device; memory that CUDA shares; the caller's memory, read in place; an upload. The source
-// is read before vkb_sources_stage returns, except in place.
+// The ways are rows of a table, and the first one that suits an input is taken: what a call before
+// has made; an image that stays on the device; memory that CUDA shares; the caller's memory, read
+// in place; an upload. The source is read before vkb_sources_stage returns, except in place.
 bool vkb_sources_stage(struct vkb_run *run, const struct vkb_frame_source *source,
                        const struct vkb_request *requests, uint32_t request_count,
                        struct vkb_error *error);
@@ -15,7 +15,7 @@ bool vkb_sources_stage(struct vkb_run *run, const struct vkb_frame_source *sourc
 bool vkb_sources_record(struct vkb_run *run, struct vkb_error *error);
 
 // After the submission, or the failure of one.
-void vkb_sources_end(struct vkb_run *run, const struct vkb_frame_source *source, bool submitted);
+void vkb_sources_end(struct vkb_run *run, bool submitted);
 
 // The version of the scene, or of the input that was written last.
 uint64_t vkb_sources_version(const struct vkb_run *run);

@@ -98,6 +98,8 @@ class Renderer:
         plans: tuple[Plan, ...],
         arrays: tuple[tuple[_Array | Exported | None, ...], ...],
         in_place: bool = False,
+        show: None = None,
+        histories: tuple[Source | None, ...] | None = None,
         /,
     ) -> Submission: ...
     @overload
@@ -108,6 +110,7 @@ class Renderer:
         arrays: tuple[tuple[None]],
         in_place: bool,
         show: tuple[int, int, int, bool],
+        histories: tuple[Source | None, ...] | None = None,
         /,
     ) -> Submission | None: ...
     def upload(self, source: Source, spare: Source | None, recycled: bool, /) -> Source: ...
@@ -136,6 +139,8 @@ class Plan:
     @property
     def outputs(self) -> tuple[tuple[str, tuple[int, ...], str], ...]: ...
     @property
+    def histories(self) -> tuple[tuple[str, tuple[int, ...], str], ...]: ...
+    @property
     def passes(self) -> list[_Pass]: ...
     @property
     def image_size(self) -> int: ...
@@ -147,6 +152,8 @@ class Submission:
     @property
     def ordered(self) -> bool: ...
     def wait(self) -> tuple[list[dict[str, float]], tuple[int, ...]]: ...
+    @property
+    def histories(self) -> tuple[Source, ...] | None: ...
 
 @final
 class Exported:

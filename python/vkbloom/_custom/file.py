@@ -9,7 +9,7 @@ from vkbloom._custom import hints
 from vkbloom._custom.blocks import Directive, read_blocks
 from vkbloom._custom.buffers import Buffer, read_buffer
 from vkbloom._custom.expressions import ExpressionError, Values, evaluate
-from vkbloom._custom.names import BLOOM, GLOW, HOOKED, STAGES, stage_of
+from vkbloom._custom.names import BLOOM, GLOW, HISTORY, HOOKED, STAGES, stage_of
 from vkbloom._custom.params import Param, read_param
 from vkbloom._custom.passes import CustomPass, read_pass
 from vkbloom._custom.source import Source
@@ -34,6 +34,25 @@ class CustomFile:
         """The textures and buffers whose data is in the file, by name."""
         blocks: dict[str, Texture | Buffer] = {block.name: block for block in self.textures}
         return {**blocks, **{block.name: block for block in self.buffers}}
+
+    @property
+    def histories(self) -> dict[str, str]:
+        """The saved textures that passes read as the frame before left them, by bound name.
+
+        A texture that is itself saved, or given, under such a name is what it says.
+        """
+        saved = {item.saved_at(stage) for stage, item in self.runs()}
+        bound = {binding.value for item in self.passes for binding in item.bindings}
+        return {
+            f"{HISTORY}{name}": name
+            for name in sorted(saved - {None}, key=str)
+            if name and f"{HISTORY}{name}" in bound - saved - self.given.keys()
+        }
+
+    @property
+    def has_state(self) -> bool:
+        """Whether a frame depends on those before."""
+        return bool(self.histories) or any(block.storage for block in self.given.values())
 
     @property
     def saves_bloom(self) -> bool:
@@ -100,7 +119,7 @@ def check_names(file: CustomFile) -> None:
         reached = {*STAGES[: STAGES.index(stage) + 1], *known}
         for binding in item.bindings:
             name = stage_of(binding.value)
-            if name not in {*reached, *file.given, HOOKED, GLOW}:
+            if name not in {*reached, *file.given, *file.histories, HOOKED, GLOW}:
                 raise binding.fault(unknown_texture(file, number, stage, binding.value))
         sizes = dict.fromkeys({*reached, *KNOWN_SIZES, "MAINPRESUB"}, (7, 5))
         if "MAIN" not in reached:
@@ -116,6 +135,8 @@ def unknown_texture(file: CustomFile, index: int, stage: str, name: str) -> str:
     later = [item for at, item in list(file.runs())[index:] if item.saved_at(at) == stage_of(name)]
     if later:
         return f"{name!r} is saved only by a later pass, in line {later[0].line}"
+    if name.startswith(HISTORY):
+        return f"{name!r} is not a texture here: no pass saves {name.removeprefix(HISTORY)!r}"
     if stage_of(name) in STAGES:
         return f"the stage {name} comes after the pass's own, {stage}"
     saved = [item.save.value for _, item in list(file.runs())[:index] if item.save]

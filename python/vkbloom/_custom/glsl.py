@@ -172,7 +172,8 @@ def write_shader(
     buffers = [buffer for buffer in file.buffers if buffer.name in bound]
     names_bound = dict.fromkeys(
         stage if binding.value == HOOKED else stage_of(binding.value)
-        for binding in item.bindings
+        # Images of this frame first, as in Row.
+        for binding in sorted(item.bindings, key=lambda binding: binding.value in file.histories)
         if binding.value not in file.given
     )
     images = [(image, names_of(image, stage, bound)) for image in names_bound]

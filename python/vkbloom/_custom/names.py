@@ -21,6 +21,8 @@ RESIZING: Final = ("RGB", "NATIVE", "MAIN")
 HOOKED: Final = "HOOKED"
 GLOW: Final = "GLOW"
 BLOOM: Final = "BLOOM"
+#: Before the name of a saved texture: what the frame before has saved under it.
+HISTORY: Final = "HISTORY_"
 #: The longest name that a framebuffer has.
 LONGEST: Final = 31
 

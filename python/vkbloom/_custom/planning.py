@@ -87,7 +87,7 @@ class Planner:
     def _run(self, stage: str, item: CustomPass) -> None:
         images = self._images(stage)
         for binding in item.bindings:
-            if binding.value not in images and binding.value not in self._file.given:
+            if binding.value not in {*images, *self._file.given, *self._file.histories}:
                 raise binding.refused("was not saved, since the WHEN of its pass is 0")
         size = (self._side(item.width, stage, 0), self._side(item.height, stage, 1))
         saved = item.saved_at(stage)
@@ -145,6 +145,7 @@ def planned(file: CustomFile, shaders: Shaders, request: Request) -> tuple[Row, 
     """Return the rows of a frame."""
     steps = Planner(file, request).steps
     names = framebuffers(file, steps)
+    kept = histories(file, steps)
     rows = []
     for number, step in enumerate(steps):
         shader, core_shader = shaders.of(step.item, step.stage, request.values)
@@ -155,19 +156,20 @@ def planned(file: CustomFile, shaders: Shaders, request: Request) -> tuple[Row, 
             "target_size": request.frame,
             "frame": request.index * len(steps) + number + 1,
             "random": random_number(request.seed, request.index * len(steps) + number),
-            **{name: image.size for name, image in step.sizes.items()},
+            **{name: image.size for name, image in {**step.sizes, **kept}.items()},
         }
         name = names.get(step.image.name, step.image.name)
         shown = name not in (step.image.name, PICTURE)
-        images = [step.sizes[image].name for image in shader.images]
+        images = [step.sizes[image].name for image in shader.images if image not in kept]
         reads = tuple(names.get(image, image) for image in images)
+        before = tuple(names[kept[image].name] for image in shader.images if image in kept)
         block = step.item.compute.block if step.item.compute else None
         params = shader.packed(given)
         blocks: list[Texture | Buffer] = [*shader.textures, *shader.buffers]
         bound = tuple(request.resources[given_block.name] for given_block in blocks)
         turn = next(TURNS) if any(given_block.storage for given_block in blocks) else 0
         size = step.image.size
-        rows.append(Row(name, core_shader, size, reads, shown, params, block, bound, turn))
+        rows.append(Row(name, core_shader, size, reads, shown, params, block, bound, turn, before))
     written = {row.name for row in rows}
     frame = request.frame
     if file.saves_bloom and BLOOM_IMAGE not in written:
@@ -177,6 +179,16 @@ def planned(file: CustomFile, shaders: Shaders, request: Request) -> tuple[Row, 
             rows.append(package_row(COPY, PICTURE, frame, ("MAIN",)))
         rows.append(package_row(DIFFERENCE, BLOOM_IMAGE, frame, (PICTURE, "MAIN")))
     return tuple(rows)
+
+
+def histories(file: CustomFile, steps: list[Step]) -> dict[str, Image]:
+    """Return the images whose content the next frame reads, by the names that passes bind."""
+    saved = {step.saved: step.image for step in steps}
+    for step in steps:
+        for binding in step.item.bindings:
+            if file.histories.get(binding.value, step.saved) not in saved:
+                raise binding.refused("was not saved, since the WHEN of its pass is 0")
+    return {name: saved[of] for name, of in file.histories.items() if of in saved}
 
 
 def package_row(shader: int, name: str, size: Size, reads: tuple[str, ...]) -> Row:

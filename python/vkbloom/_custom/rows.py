@@ -52,6 +52,7 @@ class Row(NamedTuple):
     - `params`: The bytes of its parameters.
     - `group`: The pixels of a compute shader's workgroup. None: it is a fragment shader.
     - `turn`: Another number for each run of a pass that changes a resource; 0 for others.
+    - `histories`: The framebuffers that it reads as the call before left them, after `reads`.
     """
 
     name: str
@@ -63,26 +64,30 @@ class Row(NamedTuple):
     group: tuple[int, int] | None = None
     resources: tuple[Resource, ...] = ()
     turn: int = 0
+    histories: tuple[str, ...] = ()
 
     def packed(self) -> tuple[Any, ...]:
         """Return it as the core takes it; ValueError where the core has no room."""
         for what, count, most in (
-            ("images read", len(self.reads), MAX_READS),
+            ("images read", len(self.reads) + len(self.histories), MAX_READS),
             ("textures and buffers", len(self.resources), MAX_RESOURCES),
             ("bytes of parameters", len(self.params), MAX_PARAMETERS),
         ):
             if count > most:
                 raise ValueError(f"passes: {self.name}: {count} {what} are more than {most}")
+        reads = (*self.reads, *self.histories)
         block = struct.pack(
-            f"={MAX_PARAMETERS}sQ6I{NAME_SIZE}s{MAX_READS * NAME_SIZE}s",
+            f"={MAX_PARAMETERS}sQ8I{NAME_SIZE}s{MAX_READS * NAME_SIZE}s",
             self.params,
             self.turn,
             *self.size,
             *(self.group or (0, 0)),
             self.framebuffer,
-            len(self.reads),
+            len(reads),
+            (1 << len(reads)) - (1 << len(self.reads)),
+            0,
             self.name.encode(),
-            b"".join(read.encode().ljust(NAME_SIZE, b"\0") for read in self.reads),
+            b"".join(read.encode().ljust(NAME_SIZE, b"\0") for read in reads),
         )
         return block, *self.shader, self.resources
 

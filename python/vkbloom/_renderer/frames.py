@@ -14,6 +14,7 @@ from vkbloom._argument_types import checked
 from vkbloom._checks import import_extra
 from vkbloom._framebuffers import dimensions
 from vkbloom._renderer.device_arrays import DeviceArray, on_host
+from vkbloom._renderer.state import State
 from vkbloom._suggestions import unknown
 
 if TYPE_CHECKING:
@@ -63,6 +64,7 @@ class Frames(Mapping[str, NDArray[Any]]):
         self._settings = settings
         self._info = dict(info)
         self._end: Callable[[], tuple[dict[str, float], int, int]] | None = None
+        self._state = State()
 
     def _finish(self, timings: dict[str, float], nan: int, inf: int) -> None:
         """Add what is known when the device has finished."""
@@ -99,6 +101,18 @@ class Frames(Mapping[str, NDArray[Any]]):
     def settings(self) -> Settings:
         """The settings of the request."""
         return self._settings
+
+    @property
+    def state(self) -> Mapping[str, NDArray[Any]]:
+        """What a call continues from that is given this as `state`: framebuffers by name.
+
+        Those whose content the method's passes read in the next frame, and what earlier calls have
+        handed on that this one did not write. Empty for a method that reads none. It does not
+        change, can be pickled, and is equal to another one whose arrays have the same bytes. Its
+        images stay on the device until it is collected; an array is read from there, by an open
+        renderer, when it is first taken.
+        """
+        return self._state
 
     @property
     def info(self) -> dict[str, Any]:

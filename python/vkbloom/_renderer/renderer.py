@@ -31,6 +31,7 @@ from vkbloom._renderer.device_arrays import (
 )
 from vkbloom._renderer.frames import Frames
 from vkbloom._renderer.image import Image
+from vkbloom._renderer.state import State
 from vkbloom._renderer.sources import (
     SCENE_SIZE,
     any_source,
@@ -158,6 +159,10 @@ def _paired(
         count += 1
     if not isinstance(settings, Settings) and count < len(settings):
         raise ValueError(f"settings: {len(settings)} Settings are more than the {count} images")
+
+
+def _as_state(state: Mapping[str, Any] | None) -> State:
+    return state if isinstance(state, State) else State(state or {})
 
 
 class Renderer:
@@ -309,6 +314,7 @@ class Renderer:
         framebuffers: Literal["all"] | str | Sequence[str] = "all",
         out: Mapping[str, Any] | None = None,
         device: Device | None = None,
+        state: Mapping[str, NDArray[Any]] | None = None,
     ) -> Frames:
         """Render a scene with its bloom.
 
@@ -335,6 +341,11 @@ class Renderer:
         device : {"host", "device"}, optional
             Where the framebuffers go: arrays of NumPy, or `DeviceArray` objects. Default: "device"
             if an array of the source is on the GPU, else "host".
+        state : mapping of str to ndarray, optional
+            For settings whose passes read framebuffers of the call before: `Frames.state` of that
+            call, or arrays by the names of these framebuffers, of their shapes and dtypes. Names
+            that the settings do not read are handed on. What is missing is 0 in all channels, so
+            that a call without a state begins anew. A call that fails has changed no state.
 
         Returns
         -------
@@ -359,7 +370,7 @@ class Renderer:
         """
         settings = check_settings(settings)
         source = scene_source(scene, size, shading, time)
-        return self._run_one(source, settings, check_framebuffers(framebuffers), out, device)
+        return self._run_one(source, settings, check_framebuffers(framebuffers), out, device, state)
 
     @checked
     def apply(
@@ -372,6 +383,7 @@ class Renderer:
         framebuffers: Literal["all"] | str | Sequence[str] = "all",
         out: Mapping[str, Any] | None = None,
         device: Device | None = None,
+        state: Mapping[str, NDArray[Any]] | None = None,
     ) -> Frames:
         """Add bloom to an image.
 
@@ -396,6 +408,8 @@ class Renderer:
             mesh in a scene. It is added to the image in ``final``.
         framebuffers, out, device
             As for `render`. Arrays of `out` may be on the GPU.
+        state : mapping of str to ndarray, optional
+            As for `render`.
 
         Returns
         -------
@@ -421,7 +435,7 @@ class Renderer:
         settings = check_settings(settings, of_image=True)
         self._pending.wait()
         source = image_source(image, mask, emission, self._core)
-        return self._run_one(source, settings, check_framebuffers(framebuffers), out, device)
+        return self._run_one(source, settings, check_framebuffers(framebuffers), out, device, state)
 
     @checked
     def map(
@@ -431,6 +445,7 @@ class Renderer:
         *,
         framebuffers: Literal["all"] | str | Sequence[str] = "all",
         device: Device | None = None,
+        state: Mapping[str, NDArray[Any]] | None = None,
     ) -> Iterator[Frames]:
         """Add bloom to many images.
 
@@ -444,6 +459,11 @@ class Renderer:
             For all images, or one for each image. Default: ``presets["bevy_natural"]``.
         framebuffers, device
             As for `apply`.
+        state : mapping of str to ndarray, optional
+            What the first image continues from, as for `apply`. Each other one continues from the
+            image before, whatever settings either has; after an image of another size, what has
+            other sizes begins anew. Memory that a custom method declares as STORAGE is no part of a
+            state: it begins anew in each call of `map`.
 
         Yields
         ------
@@ -501,10 +521,11 @@ class Renderer:
             self._check_names(image_source(_ANY_IMAGE), chosen, names)
             self._named = chosen, names
         destination = self._placed(device)
+        begun = _as_state(state)
         if on_cuda(images) and device != "host" and isinstance(chosen, Settings):
-            return self._run_batch(images, chosen, names, destination)
+            return self._run_batch(images, chosen, names, destination, begun)
         sequence = requests.uploaded(self._core, _paired(_sources(images, self._core), chosen))
-        return self._run_requests(sequence, names, destination, alone=True)
+        return self._run_requests(sequence, names, destination, begun)
 
     @checked
     def upload(
@@ -666,14 +687,19 @@ class Renderer:
         names: tuple[str, ...] | None,
         out: Mapping[str, Any] | None,
         device: Device | None,
+        state: Mapping[str, NDArray[Any]] | None,
     ) -> Frames:
         destination = self._placed(device)(source)
         self._pending.wait()
         plan = self._plan_of(source, settings, names)
+        before = _as_state(state)
+        before.check(plan)
         arrays = _arrays_for(self._core, plan, out, destination)
-        submission = self._core.run(source, (plan,), (arrays,), True)
+        histories = before.histories(self._core, plan)
+        submission = self._core.run(source, (plan,), (arrays,), True, None, histories)
         # While the device works.
-        frames = self._frames(settings, requests.named(plan, arrays, destination))
+        after = before.continued(self._core, plan, submission)
+        frames = self._frames(settings, requests.named(plan, arrays, destination), after)
         if not out and submission.ordered:
             frames._finish_later(self._pending.add(submission).of_request)
             self._save_pipelines()
@@ -690,13 +716,14 @@ class Renderer:
         settings: Settings,
         names: tuple[str, ...] | None,
         destination: Callable[[_core.Source], Destination],
+        state: State,
     ) -> Iterator[Frames]:
         self._pending.wait()
         batch = take_batch(images, self._core)
 
         def rest(first: int) -> Iterator[Frames]:
             sequence = _paired(batch_sources(batch, first), settings)
-            return self._run_requests(sequence, names, destination, alone=True)
+            return self._run_requests(sequence, names, destination, state)
 
         def plan_of(source: _core.Source) -> _core.Plan:
             return self._plan_of(source, settings, names)
@@ -782,18 +809,22 @@ class Renderer:
         sequence: Iterable[requests.Request],
         names: tuple[str, ...] | None,
         destination: Callable[[_core.Source], Destination] = lambda _: "host",
-        *,
-        alone: bool = False,
+        state: State | None = None,
     ) -> Iterator[Frames]:
         self._pending.wait()
-        results = requests.run(sequence, self._core, names, alone=alone, destination=destination)
+        results = requests.run(sequence, self._core, names, state=state, destination=destination)
         return (
-            self._finished(self._frames(settings, arrays), *known)
-            for settings, arrays, known in results
+            self._finished(self._frames(settings, arrays, after), *known)
+            for settings, arrays, known, after in results
         )
 
-    def _frames(self, settings: Settings, arrays: Mapping[str, NDArray[Any]]) -> Frames:
-        return Frames(arrays, timings={}, settings=settings, info=self._made_by)
+    def _frames(
+        self, settings: Settings, arrays: Mapping[str, NDArray[Any]], state: State | None = None
+    ) -> Frames:
+        frames = Frames(arrays, timings={}, settings=settings, info=self._made_by)
+        if state is not None:
+            frames._state = state
+        return frames
 
     def _finished(self, frames: Frames, timings: dict[str, float], nan: int, inf: int) -> Frames:
         self._save_pipelines()

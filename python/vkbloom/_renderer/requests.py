@@ -19,10 +19,14 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from vkbloom._renderer.state import State
     from vkbloom._settings.settings import Settings
 
-    #: The settings of a request, its arrays, and the arguments of `Frames._finish`.
-    Result = tuple[Settings, dict[str, NDArray[Any]], tuple[dict[str, float], int, int]]
+    #: The settings of a request, its arrays, the arguments of `Frames._finish`, and the state after
+    #: it.
+    Result = tuple[
+        Settings, dict[str, NDArray[Any]], tuple[dict[str, float], int, int], State | None
+    ]
 
 #: The most requests in one submission.
 MAX_REQUESTS = 32
@@ -201,21 +205,25 @@ class _Planned(NamedTuple):
     arrays: tuple[NDArray[Any] | _core.Exported, ...]
     destination: Destination
 
-    def result(self, timings: dict[str, float], counts: tuple[int, ...]) -> Result:
+    def result(
+        self, timings: dict[str, float], counts: tuple[int, ...], state: State | None
+    ) -> Result:
         arrays = named(self.plan, self.arrays, self.destination)
-        return self.request.settings, arrays, (timings, counts[0], counts[1])
+        return self.request.settings, arrays, (timings, counts[0], counts[1]), state
 
 
 class _Submitted(NamedTuple):
     submission: _core.Submission
     requests: list[_Planned]
     since: float
+    state: State | None
 
 
 class _Requests:
     """Divides a sequence of requests into submissions, in order.
 
-    - `most`: The most requests in one submission.
+    - `state`: That the first one continues, as each one that of the one before; so each is a
+      submission of its own. None: they are independent.
     - `failure`: To be raised after the results of everything that was submitted.
     """
 
@@ -224,17 +232,18 @@ class _Requests:
         sequence: Iterable[Request],
         core: _core.Renderer,
         names: tuple[str, ...] | None,
-        most: int,
+        state: State | None,
         destination: Callable[[_core.Source], Destination],
     ) -> None:
         self._sequence = iter(sequence)
         self._core = core
         self._names = names
-        self._ever = most
+        self._state = state
+        self._ever = MAX_REQUESTS if state is None else 1
         self._destination = destination
         self._waiting: deque[Request] = deque()  # taken from the sequence, not submitted yet
         self._limit = 1
-        self._most = most  # that fit into MAX_SECONDS, as far as is known
+        self._most = self._ever  # that fit into MAX_SECONDS, as far as is known
         self._ended = False
         self.failure: Exception | None = None
 
@@ -245,15 +254,21 @@ class _Requests:
             return None
         plans = tuple(planned.plan for planned in requests)
         arrays = tuple(planned.arrays for planned in requests)
+        source = requests[0].request.source
         try:
-            submission = self._core.run(requests[0].request.source, plans, arrays)
+            if self._state is None:
+                submission = self._core.run(source, plans, arrays)
+            else:
+                histories = self._state.histories(self._core, plans[0])
+                submission = self._core.run(source, plans, arrays, False, None, histories)
+                self._state = self._state.continued(self._core, plans[0], submission)
         except Exception as error:
             self._fail(error)
             return None
         # Double the number, starting with one request. So the first frame waits for no other, and
         # a caller that stops early wastes little work.
         self._limit = min(2 * len(requests), MAX_REQUESTS)
-        return _Submitted(submission, requests, time.perf_counter())
+        return _Submitted(submission, requests, time.perf_counter(), self._state)
 
     def took(self, seconds: float, count: int) -> None:
         """Update the limit after a submission of `count` requests that took at most `seconds`."""
@@ -313,15 +328,16 @@ def run(
     core: _core.Renderer,
     names: tuple[str, ...] | None,
     *,
-    alone: bool = False,
+    state: State | None = None,
     destination: Callable[[_core.Source], Destination] = lambda _: "host",
 ) -> Iterator[Result]:
     """Yield the result of each request, in their order.
 
     Work is taken before earlier results are yielded, so that the device is busy while the caller
-    uses results: none before the first result, then enough for `AHEAD` submissions.
+    uses results: none before the first result, then enough for `AHEAD` submissions. With a `state`,
+    each request continues that of the one before.
     """
-    waiting = _Requests(sequence, core, names, 1 if alone else MAX_REQUESTS, destination)
+    waiting = _Requests(sequence, core, names, state, destination)
     submitted: deque[_Submitted] = deque()
     ahead = 1
     before = 0.0  # when the last submission ended
@@ -331,7 +347,7 @@ def run(
                 submitted.append(added)
             if not submitted:
                 break
-            submission, requests, since = submitted.popleft()
+            submission, requests, since, after = submitted.popleft()
             timings, counts = submission.wait()
             del submission
             # The device started it after it was submitted and the one before had ended.
@@ -342,8 +358,8 @@ def run(
             requests.reverse()
             timings.reverse()
             while requests:
-                yield requests.pop().result(timings.pop(), counts)
-            ahead = IMAGES_AHEAD if alone else AHEAD
+                yield requests.pop().result(timings.pop(), counts, after)
+            ahead = AHEAD if state is None else IMAGES_AHEAD
     finally:
         # Waits here for submissions whose results nobody takes, not at the next garbage
         # collection.

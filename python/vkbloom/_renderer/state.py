@@ -1,0 +1,143 @@
+"""What a call hands on to the next one: framebuffers that have a history."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from vkbloom._renderer import requests
+from vkbloom._renderer.sources import image_source
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from vkbloom import _core
+
+#: For each history of a plan what a call before has made; None: zeros.
+Histories = tuple["_core.Source | None", ...]
+
+
+class Kept(NamedTuple):
+    """An image on a renderer's device, which nothing changes."""
+
+    core: _core.Renderer
+    source: _core.Source
+    shape: tuple[int, ...]
+    dtype: str
+
+    def read(self) -> NDArray[Any]:
+        """Return the pixels."""
+        from vkbloom._methods.separable import Separable  # noqa: PLC0415  costs start-up time
+
+        # A pass without bloom copies the pixels.
+        plan = self.core.plan(self.source, Separable(bloom=False), ("final",))
+        (array,) = arrays = requests.new_arrays(self.core, plan)
+        self.core.run(self.source, (plan,), (arrays,)).wait()
+        assert isinstance(array, np.ndarray)
+        return array
+
+
+class State(Mapping[str, "NDArray[Any]"]):
+    """The framebuffers of earlier calls that the next call reads, by name. It never changes.
+
+    Images stay on the device of the renderer that made them until this object is collected. They are
+    read when an item is first taken, which needs the renderer to be open. States are equal if their
+    arrays have the same bytes. A pickled state has the arrays.
+
+    Parameters
+    ----------
+    arrays : mapping of str to ndarray
+        (H, W, 4) of uint8, float16 or float32, as framebuffers are. They are copied.
+    """
+
+    def __init__(self, arrays: Mapping[str, NDArray[Any]] = MappingProxyType({})) -> None:
+        self._images: dict[str, NDArray[Any] | Kept] = {}
+        for name, array in arrays.items():
+            copied = np.array(array, order="C")
+            copied.flags.writeable = False
+            self._images[name] = copied
+
+    def __getitem__(self, name: str) -> NDArray[Any]:
+        image = self._images[name]
+        if isinstance(image, Kept):
+            array = image.read()
+            array.flags.writeable = False
+            self._images[name] = image = array
+        return image
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._images)
+
+    def __len__(self) -> int:
+        return len(self._images)
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, State):
+            return NotImplemented
+        return self.keys() == other.keys() and all(
+            self[name].dtype == other[name].dtype
+            and self[name].shape == other[name].shape
+            and self[name].tobytes() == other[name].tobytes()
+            for name in self
+        )
+
+    __hash__ = None  # type: ignore[assignment]  # as other mappings of arrays
+
+    def __repr__(self) -> str:
+        return f"<vkbloom state of {', '.join(self) or 'nothing'}>"
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return State, (dict(self),)
+
+    def check(self, plan: _core.Plan) -> None:
+        """Raise ValueError for an image that a call of the plan cannot continue."""
+        for name, shape, dtype in plan.histories:
+            image = self._images.get(name)
+            if image is not None and not is_alike(image, shape, dtype):
+                raise ValueError(
+                    f"state: {name} has shape {image.shape} and dtype {image.dtype}, and in this "
+                    f"call it has {shape} and {dtype}; leave it out to begin anew"
+                )
+
+    def histories(self, core: _core.Renderer, plan: _core.Plan) -> Histories | None:
+        """Return what a call of the plan continues; None: it has no history.
+
+        An image of another size or type than in the call is as one that is not there.
+        """
+        if not plan.histories:
+            return None
+        found: list[_core.Source | None] = []
+        for name, shape, dtype in plan.histories:
+            image = self._images.get(name)
+            found.append(
+                None
+                if image is None or not is_alike(image, shape, dtype)
+                else self._source(name, core)
+            )
+        return tuple(found)
+
+    def _source(self, name: str, core: _core.Renderer) -> _core.Source:
+        image = self._images[name]
+        if isinstance(image, Kept) and image.core is core:
+            return image.source
+        return core.upload(image_source(self[name], name=f"state: {name}"), None, False)
+
+    def continued(
+        self, core: _core.Renderer, plan: _core.Plan, submission: _core.Submission
+    ) -> State:
+        """Return the state after a call: what it does not write stays."""
+        if submission.histories is None:
+            return self
+        after = State()
+        after._images = dict(self._images)
+        for (name, shape, dtype), source in zip(plan.histories, submission.histories, strict=True):
+            after._images[name] = Kept(core, source, shape, dtype)
+        return after
+
+
+def is_alike(image: NDArray[Any] | Kept, shape: tuple[int, ...], dtype: str) -> bool:
+    """Return whether an image has a shape and a type."""
+    return image.shape == shape and image.dtype == np.dtype(dtype)
