@@ -50,11 +50,6 @@ class CustomFile:
         }
 
     @property
-    def has_state(self) -> bool:
-        """Whether a frame depends on those before."""
-        return bool(self.histories) or any(block.storage for block in self.given.values())
-
-    @property
     def saves_bloom(self) -> bool:
         """Whether the file gives the bloom, and leaves the composite to the package."""
         return any(item.saved_at(stage) == BLOOM for stage, item in self.runs())

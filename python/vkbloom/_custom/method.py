@@ -98,8 +98,8 @@ class CustomMethod(Settings, metaclass=CustomType):
 
     @property
     def _has_state(self) -> bool:
-        """Whether frames depend on those before."""
-        return self.file.has_state
+        """Whether passes change textures or buffers, so that frames depend on those before."""
+        return any(block.storage for block in self.file.given.values())
 
     def _in_sequence(self, index: int, state: dict[Any, Any]) -> Self:
         """Return a copy for a frame of a sequence, which counts the frames before it."""

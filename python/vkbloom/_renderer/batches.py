@@ -115,6 +115,8 @@ class Batches:
             return 0
         if self._size is None or self._size[:2] != (settings, kind):
             single = self._core.plan(_core.image_source(batch.at(0).image()), settings, None)
+            if single.histories:  # each image continues the one before
+                return 0
             self._size = settings, kind, single.image_size
         parts = math.ceil(count / max(1, min(MAX_LAYERS, MAX_BYTES // self._size[2])))
         layers = math.ceil(count / parts)

@@ -31,7 +31,6 @@ from vkbloom._renderer.device_arrays import (
 )
 from vkbloom._renderer.frames import Frames
 from vkbloom._renderer.image import Image
-from vkbloom._renderer.state import State
 from vkbloom._renderer.sources import (
     SCENE_SIZE,
     any_source,
@@ -42,6 +41,7 @@ from vkbloom._renderer.sources import (
     scene_source,
     take_batch,
 )
+from vkbloom._renderer.state import State
 from vkbloom._settings.settings import Settings, Shading, check_settings
 from vkbloom._suggestions import unknown
 from vkbloom._version import installed_version
@@ -162,7 +162,11 @@ def _paired(
 
 
 def _as_state(state: Mapping[str, Any] | None) -> State:
-    return state if isinstance(state, State) else State(state or {})
+    if isinstance(state, State):
+        return state
+    if state is not None and not isinstance(state, abc.Mapping):
+        raise TypeError(f"state: {state!r} is not a mapping of names to arrays")
+    return State(state or {})
 
 
 class Renderer:
@@ -370,7 +374,8 @@ class Renderer:
         """
         settings = check_settings(settings)
         source = scene_source(scene, size, shading, time)
-        return self._run_one(source, settings, check_framebuffers(framebuffers), out, device, state)
+        names = check_framebuffers(framebuffers)
+        return self._run_one(source, settings, names, out, device, state=state)
 
     @checked
     def apply(
@@ -435,7 +440,8 @@ class Renderer:
         settings = check_settings(settings, of_image=True)
         self._pending.wait()
         source = image_source(image, mask, emission, self._core)
-        return self._run_one(source, settings, check_framebuffers(framebuffers), out, device, state)
+        names = check_framebuffers(framebuffers)
+        return self._run_one(source, settings, names, out, device, state=state)
 
     @checked
     def map(
@@ -687,6 +693,7 @@ class Renderer:
         names: tuple[str, ...] | None,
         out: Mapping[str, Any] | None,
         device: Device | None,
+        *,
         state: Mapping[str, NDArray[Any]] | None,
     ) -> Frames:
         destination = self._placed(device)(source)

@@ -43,9 +43,9 @@ class Kept(NamedTuple):
 class State(Mapping[str, "NDArray[Any]"]):
     """The framebuffers of earlier calls that the next call reads, by name. It never changes.
 
-    Images stay on the device of the renderer that made them until this object is collected. They are
-    read when an item is first taken, which needs the renderer to be open. States are equal if their
-    arrays have the same bytes. A pickled state has the arrays.
+    Images stay on the device of the renderer that made them until this object is collected. They
+    are read when an item is first taken, which needs the renderer to be open. States are equal if
+    their arrays have the same bytes. A pickled state has the arrays.
 
     Parameters
     ----------
@@ -56,6 +56,8 @@ class State(Mapping[str, "NDArray[Any]"]):
     def __init__(self, arrays: Mapping[str, NDArray[Any]] = MappingProxyType({})) -> None:
         self._images: dict[str, NDArray[Any] | Kept] = {}
         for name, array in arrays.items():
+            if not isinstance(name, str):
+                raise TypeError(f"state: {name!r} is not a name; use a str")
             copied = np.array(array, order="C")
             copied.flags.writeable = False
             self._images[name] = copied
