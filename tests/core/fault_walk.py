@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import vkbloom
+from tests.custom import TRAIL
 from tests.device.device_work import Consumer, OnDevice, vjp
 from tests.exhaustive import some
 from tests.images import picture
@@ -130,6 +131,31 @@ def handles(renderer: Renderer) -> Arrays:
     arrays = {f"{i} final": one["final"] for i, one in enumerate(frames)}
     arrays["twice"] = renderer.apply(kept, vkbloom.Separable())["final"]
     return arrays
+
+
+@functools.cache
+def trail() -> vkbloom.Settings:
+    return vkbloom.load_method(TRAIL, name="trail")()
+
+
+def histories(renderer: Renderer) -> Arrays:
+    """Calls that continue others. One that fails leaves what it would have continued as it was."""
+    image = picture(*SIZE)
+    first = renderer.apply(image, trail())
+
+    def following() -> vkbloom.Frames:
+        return renderer.apply(image[::-1], trail(), state=first.state)
+
+    try:
+        frames = [first, following()]
+    except (vkbloom.Error, MemoryError):
+        if not renderer._core.lost:
+            expected = 0.5 * image[::-1, :, :3] + 0.5 * first["trail"][..., :3]
+            np.testing.assert_allclose(following()["trail"][..., :3], expected, rtol=1e-6)
+        raise
+    frames += renderer.map([image, image[:8], image[:8]], trail(), state=frames[1].state)
+    states = {f"{i} state": np.array(one.state["trail"]) for i, one in enumerate(frames)}
+    return states | {f"{i} trail": one["trail"] for i, one in enumerate(frames)}
 
 
 def gradients(renderer: Renderer) -> Arrays:
@@ -243,6 +269,7 @@ WORK: dict[str, Work] = {
     "grid to Zarr": stored_grid,
     "readback": readback,
     "handles": handles,
+    "histories": histories,
     "gradients": gradients,
     "present": presented,
     "own passes": lambda renderer: swept(renderer, picture(*SIZE), own_settings()),

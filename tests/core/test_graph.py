@@ -76,17 +76,98 @@ const char *add_filter(int distance)
 """
 
 
-def test_a_filter_with_too_many_places_fails(
-    tmp_path_factory: pytest.TempPathFactory, tmp_path: Path
-) -> None:
-    tree = core_with_faults(tmp_path_factory.getbasetemp())
-    source, library = tmp_path / "filter.c", tmp_path / "filter.so"
-    source.write_text(FILTER)
+# Passes: one reads the history of `bloom` and writes it, one makes `final` of it, and a fused one
+# may replace both. Returns which are needed (n) and current (c), before and after a run, and after
+# a call that continues this one; or why a history is refused.
+HISTORIES = r"""
+#include "graph/plan.h"
+
+#include <stdio.h>
+
+static struct vkb_error error;
+
+static bool record(void *context, uint32_t first, uint32_t end, struct vkb_error *failure)
+{
+    (void)context, (void)first, (void)end, (void)failure;
+    return true;
+}
+
+static void add_pass(struct vkb_graph *graph, uint32_t from, uint32_t to, bool fused)
+{
+    struct vkb_pass_row row = {.reads = {from}, .read_count = 1, .targets = {to}};
+
+    row.depth = VKB_NO_IMAGE;
+    row.target_count = 1;
+    row.fused = fused;
+    vkb_graph_add_pass(graph, &row, &error);
+}
+
+const char *keep(int kept)
+{
+    static char told[256];
+    struct vkb_content contents[3] = {0};
+    struct vkb_content *held[] = {&contents[0], &contents[1], &contents[2]};
+    struct vkb_plan plan = {.outputs = (uint32_t[]){1}, .output_count = 1};
+    struct vkb_plan_step step = {.plan = &plan, .contents = held};
+    struct vkb_planner planner = {0};
+    uint64_t clock = 100;
+    uint32_t history = 0, again = 0;
+
+    for (int i = 0; i < 2; ++i) {
+        struct vkb_image_row row = {.format = VKB_FORMAT_RGBA8_UNORM, .width = 8, .height = 8};
+        row.framebuffer = i != kept;
+        snprintf(row.name, sizeof row.name, "%s", i ? "final" : "bloom");
+        vkb_graph_add_image(&plan.graph, &row, NULL, &error);
+    }
+    if (!vkb_graph_add_history(&plan.graph, 0, &history, &error)
+        || !vkb_graph_add_history(&plan.graph, 0, &again, &error))
+        return error.message;
+    add_pass(&plan.graph, history, 0, false);
+    add_pass(&plan.graph, 0, 1, false);
+    add_pass(&plan.graph, history, 1, true);
+    size_t at = (size_t)snprintf(told, sizeof told, "%u %u", history, again);
+    for (int i = 0; i < 3; ++i) {
+        vkb_planner_mark(&planner, &step, &error);
+        at += (size_t)snprintf(told + at, sizeof told - at, ", ");
+        for (int pass = 0; pass < 3; ++pass)
+            at += (size_t)snprintf(told + at, sizeof told - at, "%s%s ",
+                                   planner.needed[pass] ? "n" : "",
+                                   planner.current[pass] ? "c" : "");
+        vkb_planner_run(&planner, &step, &clock, record, NULL, &error);
+        contents[history].version = i ? contents[0].version : 0;
+    }
+    return told;
+}
+"""
+
+
+def linked(tree: Path, folder: Path, text: str) -> ctypes.CDLL:
+    """Return a library of a text in C and of the core."""
+    source, library = folder / "linked.c", folder / "linked.so"
+    source.write_text(text)
     options = ("-DVK_NO_PROTOTYPES", "-Icsrc", "-I.", "-Ibuild/spirv", "-shared", "-fPIC")
     objects = map(str, (tree / "build").rglob("*.o"))
     command = [*compiler(), *options, str(source), *objects, "-o", str(library), "-lm", "-ldl"]
     subprocess.run(command, cwd=tree, check=True)
-    add_filter = ctypes.CDLL(str(library)).add_filter
+    return ctypes.CDLL(str(library))
+
+
+def test_a_filter_with_too_many_places_fails(
+    tmp_path_factory: pytest.TempPathFactory, tmp_path: Path
+) -> None:
+    add_filter = linked(
+        core_with_faults(tmp_path_factory.getbasetemp()), tmp_path, FILTER
+    ).add_filter
     add_filter.restype = ctypes.c_char_p
     assert add_filter(0) == add_filter(2) == b"added"
     assert add_filter(3) == b"filter: level has 6 x 1 places of taps, more than 5"
+
+
+def test_what_has_a_history_is_made_in_each_call(
+    tmp_path_factory: pytest.TempPathFactory, tmp_path: Path
+) -> None:
+    keep = linked(core_with_faults(tmp_path_factory.getbasetemp()), tmp_path, HISTORIES).keep
+    keep.restype = ctypes.c_char_p
+    # Once it ran, all is up to date until the history has another content.
+    assert keep(-1) == b"2 2, n n  , nc nc  , n n  "
+    assert keep(0) == b"history: .bloom is no framebuffer"

@@ -291,6 +291,30 @@ def test_images_share_memory(layer: Path, name: str, variant: str) -> None:
     assert streaks <= 5 * one
 
 
+# A method that reads the frame before, whose images share memory.
+HISTORY = """
+import os
+import numpy as np
+import vkbloom
+from tests.custom import TRAIL
+
+image = np.random.default_rng(0).integers(0, 256, (1024, 1024, 4)).astype(np.float32) / 256
+settings = vkbloom.load_method(TRAIL, name="trail")()
+trail = np.zeros((1024, 1024, 3), np.float32)
+with vkbloom.Renderer(os.environ["VKBLOOM_TEST_NAME"], validation=True) as renderer:
+    for frames in renderer.map([image] * 3, settings, framebuffers="final"):
+        trail = (image[..., :3] + trail) / 2
+        assert np.array_equal(frames["final"][..., :3], image[..., :3] + trail)
+        assert np.array_equal(frames.state["trail"][..., :3], trail)
+"""
+
+
+@pytest.mark.usefixtures("glslang")
+def test_what_has_a_history_shares_no_memory(layer: Path, name: str) -> None:
+    done = run(layer, name, "heap,cpu", ("-c", HISTORY))
+    assert done.returncode == 0, done.stderr
+
+
 # Prints what a deferred scene shows, whose first pass writes several images of one format.
 SHARED_SCENE = """
 import hashlib

@@ -193,6 +193,12 @@ def test_the_random_number_repeats_and_differs_between_passes(renderer: Renderer
 
 SAVED = COPY.replace("BIND HOOKED", "BIND HOOKED\n//!SAVE A\n//!WHEN HOOKED.w 100 >")
 UNSAVED = SAVED + "//!HOOK MAIN\n//!BIND A\nvec4 hook() { return A_texOff(0); }\n"
+KEPT = """\
+//!HOOK MAIN
+//!BIND HISTORY_{0}
+//!SAVE {0}
+vec4 hook() {{ return HISTORY_{0}_texOff(0); }}
+"""
 PARAMETERS = """\
 //!PARAM mode
 //!TYPE ENUM int

@@ -21,6 +21,7 @@ import pytest
 from numpy.typing import NDArray
 
 import vkbloom
+from tests.custom import TRAIL
 from tests.device.abilities import infinities
 from tests.exhaustive import EXHAUSTIVE
 from tests.images import picture
@@ -124,6 +125,20 @@ def layouts(renderer: Any) -> None:
         # And the host's again: its image on the device was replaced.
         again = renderer.apply(image, settings, mask=mask)
         np.testing.assert_array_equal(again["final"], expected["final"])
+
+
+def histories(renderer: Any) -> None:
+    """A batch, images and states on the device; each image continues the one before."""
+    settings = vkbloom.load_method(TRAIL, name="trail")()
+    images = np.stack([picture(24, 16, 4, "float16", seed=seed) for seed in range(9)])
+    expected = list(renderer.map(list(images), settings))
+    for batch in (OnDevice(images), [OnDevice(image) for image in images]):
+        for frames, right in zip(renderer.map(batch, settings), expected, strict=True):
+            same(frames, right)
+            assert frames.state == right.state
+    given: Any = {"trail": renderer.apply(OnDevice(images[0]), settings)["trail"]}
+    for state in (expected[0].state, given):
+        same(renderer.apply(OnDevice(images[1]), settings, state=state), expected[1])
 
 
 def streams(renderer: Any) -> None:
@@ -493,7 +508,7 @@ def ranges(renderer: Any) -> None:
 
 WORK = (
     *(layouts, streams, sequences, layers, places, capsules, ends, recycling, lifetime, errors),
-    *(gradients, gradient_places),
+    *(histories, gradients, gradient_places),
 )
 
 
