@@ -116,7 +116,7 @@ def test_a_submission_has_a_limit_of_bytes_and_of_time(
     assert [one for one, *_ in results] == settings
     assert max(counting.counts) == most
     assert sum(counting.counts) == len(settings)
-    for one, arrays, _ in results[::20]:
+    for one, arrays, *_ in results[::20]:
         np.testing.assert_array_equal(arrays["final"], renderer.apply(image, one)["final"])
 
 

@@ -486,7 +486,9 @@ class Renderer:
         -----
         The device works on the next images while the caller uses a frame. So after the first frame,
         the number of images taken is up to two larger than the number of yielded frames. Of a batch
-        on the GPU with one Settings, each pass runs for many images at once. An error
+        on the GPU with one Settings, each pass runs for many images at once. Where settings read
+        framebuffers of the image before, each of the frames has its state on the device: of a long
+        sequence keep arrays, not all Frames. An error
         of an image or of the iterable is raised after the frames of all earlier images, and ends
         the iteration.
 
