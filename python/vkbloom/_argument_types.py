@@ -112,7 +112,7 @@ _KINDS: dict[str, Kind] = {
     **dict.fromkeys(("brightness", "scales"), NUMBERS),
     **dict.fromkeys(("frames", "values"), Kind("a sequence", _items(ANY.test))),
     **dict.fromkeys(("at", "size"), PAIR),
-    **dict.fromkeys(("bounds", "chunks", "limits", "metadata", "out", "reduce"), MAPPING),
+    **dict.fromkeys(("bounds", "chunks", "limits", "metadata", "out", "reduce", "state"), MAPPING),
     **dict.fromkeys(("bloom", "on_mended", "reference"), FUNCTION),
     "dtype": DTYPE,
     "loss": LOSS,

@@ -162,11 +162,7 @@ def _paired(
 
 
 def _as_state(state: Mapping[str, Any] | None) -> State:
-    if isinstance(state, State):
-        return state
-    if state is not None and not isinstance(state, abc.Mapping):
-        raise TypeError(f"state: {state!r} is not a mapping of names to arrays")
-    return State(state or {})
+    return state if isinstance(state, State) else State(state or {})
 
 
 class Renderer:

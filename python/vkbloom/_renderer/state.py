@@ -56,8 +56,6 @@ class State(Mapping[str, "NDArray[Any]"]):
     def __init__(self, arrays: Mapping[str, NDArray[Any]] = MappingProxyType({})) -> None:
         self._images: dict[str, NDArray[Any] | Kept] = {}
         for name, array in arrays.items():
-            if not isinstance(name, str):
-                raise TypeError(f"state: {name!r} is not a name; use a str")
             copied = np.array(array, order="C")
             copied.flags.writeable = False
             self._images[name] = copied
