@@ -180,8 +180,8 @@ bool vkb_graph_show_image(struct vkb_graph *graph, uint32_t image, const char *n
 
 // Adds the history of a framebuffer, or finds it: an image of the same size and format that holds
 // what the framebuffer was after the call before, and zeros if the call continues none
-// (python/history.c). Fails if the image is no framebuffer, or has a format that images of the host have
-// not.
+// (python/history.c). Fails if the image is no framebuffer, or has a format that images of the host
+// have not.
 bool vkb_graph_add_history(struct vkb_graph *graph, uint32_t image, uint32_t *index,
                            struct vkb_error *error);
 // The history of an image; VKB_NO_IMAGE: it has none. What has one is made in each call.
