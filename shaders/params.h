@@ -549,16 +549,10 @@
 #define ADJOINT_SIDE 4
 #define ADJOINT_ROWS 16
 
-// Taps of published methods: the distance of Filament's in texels and the share of the outer ones
-// along an axis; the distances of those of HDRP's prefilter.
+// Filament's taps of a level with even sides: their distance in texels, and the share of the outer
+// ones along an axis.
 #define FILAMENT_OFFSET 1.761629
 #define FILAMENT_OUTER  (7.46602 / 32.0)
-#define HDRP_FAR        0.9
-#define HDRP_NEAR       0.4
-
-// The half-kernels of blurs of nine taps: Godot's, and HDRP's, a binomial of order 8.
-#define GODOT_NINE 0.2024, 0.1790, 0.1240, 0.0672, 0.0285
-#define HDRP_NINE  0.2734375, 0.21875, 0.109375, 0.03125, 0.00390625
 
 // Of a filter: the most taps along an axis, kernels, and texels of a window. The most pixels along
 // an axis that read a texel in the tiles of a transpose, and pictures that these add up.
@@ -584,8 +578,8 @@
     CONSTANT(6, FORMAT, format)       /* how a fused pass rounds values that it keeps: STORED_* */ \
     CONSTANT(7, THRESHOLD_MODE, threshold_mode) /* THRESHOLD_* */ \
     CONSTANT(8, THRESHOLDED, thresholded)       /* a published method's threshold is applied */ \
-    CONSTANT(9, ANTI_FLICKER, anti_flicker)     /* Kino's medians */ \
-    CONSTANT(10, FIRST_LEVEL, first_level)      /* of nine.frag: it makes the first level */ \
+    CONSTANT(9, POINT_BEFORE, before)           /* of samples before they are combined: POINT_* */ \
+    CONSTANT(10, FIRST_LEVEL, first_level)      /* of HDRP's blurs: they make the first level */ \
     CONSTANT(11, DIRECTION, direction)          /* along which axis: DIRECTION_* */ \
     CONSTANT(12, RADIUS, radius)                /* texels of a half-kernel without its middle */ \
     CONSTANT(13, ADD_OWN, add_own)   /* what is at SLOT_OWN, SLOT_BEFORE or SLOT_ADDED is added */ \
@@ -594,13 +588,13 @@
     CONSTANT(16, EMITTERS, emitters)     /* how many passes add up in the target by blending */ \
     CONSTANT(17, PART_ABOVE, part_above) /* a streak reads what is above its threshold */ \
     CONSTANT(18, LEVELS, levels)         /* how many levels are added up */ \
-    CONSTANT(19, GROUPS, groups)         /* what a pass makes of its taps: GROUPS_* */ \
-    CONSTANT(20, NODE, node)             /* three.js's node */ \
+    CONSTANT(19, TAPS, tap_set)          /* where a pass samples: TAPS_* */ \
+    CONSTANT(20, COMBINE, combine)       /* what it makes of the samples: COMBINE_* */ \
     CONSTANT(21, ALPHA, alpha)           /* ALPHA_* */ \
     CONSTANT(22, MASKED, masked)         /* there is a mask */ \
     CONSTANT(23, STORED, stored)         /* the format of the target: STORED_* */ \
-    CONSTANT(24, OWN_GROUP, own_group)   /* of a transpose: its first group of taps */ \
-    CONSTANT(25, STACKED_GROUPS, stacked_groups) /* how many groups, below each other */ \
+    CONSTANT(24, OWN_SAMPLE, own_sample) /* of a transpose: its first kernel or tap */ \
+    CONSTANT(25, STACKED_SAMPLES, stacked_samples) /* how many of these, below each other */ \
     CONSTANT(26, INVERSE, inverse)               /* a transform is the way back */ \
     CONSTANT(27, ROTATED, rotated)               /* a stage of a transform has factors */ \
     CONSTANT(28, PADDED, padded)                 /* a stage of a transform pads its lines */ \
@@ -637,7 +631,9 @@
     CONSTANT(60, PARTIAL_SUMS, partial_sums)   /* of SUMMED_ROWS: adds up for another pass */ \
     CONSTANT(61, OF_SOURCE, of_source)         /* its cotangents are of an image that is given */ \
     CONSTANT(63, THROUGH_COMPOSITE, through_composite) /* a composite's cotangents are read */ \
-    CONSTANT(64, SQUARED, squared) /* of adjoint_sum.frag: squares are added up */
+    CONSTANT(64, SQUARED, squared) /* of adjoint_sum.frag: squares are added up */ \
+    CONSTANT(65, POINT_AFTER, after) /* of the combination: POINT_* */ \
+    CONSTANT(66, EXPOSED_SCENE, exposed_scene) /* a composite's scene is exposed before it */
 
 // The names that a setting can have. Each list is a setting and a specialization constant.
 #define COMPOSITE_NAMES(NAME) \
@@ -745,24 +741,6 @@
     NAME(UPSAMPLE_INSIDE, 7, inside) \
     NAME(UPSAMPLE_LEFT_PAIR, 8, left_pair) \
     NAME(UPSAMPLE_RIGHT_PAIR, 9, right_pair) \
-    NAME(GROUPS_PYRAMID, 10, pyramid) \
-    NAME(GROUPS_PYGFX, 1, pygfx) \
-    NAME(GROUPS_PYGFX_KARIS, 2, pygfx_karis) \
-    NAME(GROUPS_BLENDER, 3, blender) \
-    NAME(GROUPS_BOX, 4, box) \
-    NAME(GROUPS_FILAMENT, 5, filament) \
-    NAME(GROUPS_HDRP, 6, hdrp) \
-    NAME(GROUPS_URP, 7, urp) \
-    NAME(GROUPS_THREE, 8, three) \
-    NAME(GROUPS_BEVY, 9, bevy) \
-    NAME(GROUPS_KINO, 11, kino) \
-    NAME(GROUPS_GODOT, 13, godot) \
-    NAME(GROUPS_HDRP_BLUR, 14, hdrp_blur) \
-    NAME(GROUPS_HIGHLIGHTS, 12, highlights) \
-    NAME(GROUPS_BABYLON, 15, babylon) \
-    NAME(GROUPS_POST_PROCESSING, 16, post_processing) \
-    NAME(GROUPS_UNREAL, 17, unreal) \
-    NAME(GROUPS_DARKTABLE, 18, darktable) \
     NAME(EXACT_HALF, 1, exact_half) \
     NAME(EXACT_DOUBLE, 2, exact_double) \
     NAME(EXACT_SAME, 3, exact_same) \
@@ -775,3 +753,160 @@
     NAME(STAGE_PRODUCT, 2, product) \
     NAME(STAGE_LAST, 3, last_stage) \
     NAME(STAGE_GREY, 4, grey)
+
+// What a pass with the block `prefilter` computes is a choice of four tables, whose rows C and GLSL
+// expand: where it samples its source (TAPS), what it makes of the samples (COMBINE), and a function
+// of each sample and one of the result (POINT_BEFORE, POINT_AFTER). All variants of the pass and its
+// adjoint follow from the choice. Each function stands in GLSL, with its slope beside it.
+//
+// Sets of taps: SET(name, value, taps, kernels, place, share).
+//
+//   TAP(number, x, y)                   a sample, at places along both axes: -2 to 2 from the pixel's
+//                                       position
+//   KERNEL(number, share, a, b, c, d)   the mean of four taps: upper left, upper right, lower left,
+//                                       lower right. Without kernels each tap is one.
+//   place(at, part), share(at, part)    where a place is, in texels, and its factor of the share of
+//                                       a tap, for a position that is `part` of a texel after one
+#define CENTRE_TAPS(TAP) TAP(0, 0, 0)
+#define CROSS_TAPS(TAP) \
+    TAP(0, 0, 0) \
+    TAP(1, -1, 0) \
+    TAP(2, 1, 0) \
+    TAP(3, 0, -1) \
+    TAP(4, 0, 1)
+#define CORNER_TAPS(TAP) \
+    TAP(0, -1, -1) \
+    TAP(1, 1, -1) \
+    TAP(2, -1, 1) \
+    TAP(3, 1, 1)
+// Those of HDRP's prefilter (Unity-Technologies/Graphics,
+// com.unity.render-pipelines.high-definition, BloomPrefilter.compute @ 2309d2c2fde8).
+#define STAR_TAPS(TAP) \
+    TAP(0, 0, 0) \
+    TAP(1, 2, -1) \
+    TAP(2, -2, 1) \
+    TAP(3, 1, 2) \
+    TAP(4, -1, -2)
+// Nine in three rows, and four around the centre (Jimenez, "Next Generation Post Processing in Call
+// of Duty: Advanced Warfare", SIGGRAPH 2014).
+#define THIRTEEN_TAPS(TAP) \
+    TAP(0, -2, -2) \
+    TAP(1, 0, -2) \
+    TAP(2, 2, -2) \
+    TAP(3, -2, 0) \
+    TAP(4, 0, 0) \
+    TAP(5, 2, 0) \
+    TAP(6, -2, 2) \
+    TAP(7, 0, 2) \
+    TAP(8, 2, 2) \
+    TAP(9, -1, -1) \
+    TAP(10, 1, -1) \
+    TAP(11, -1, 1) \
+    TAP(12, 1, 1)
+#define THIRTEEN_KERNELS(KERNEL) \
+    KERNEL(0, 0.5, 9, 10, 11, 12) \
+    KERNEL(1, 0.125, 0, 1, 3, 4) \
+    KERNEL(2, 0.125, 1, 2, 4, 5) \
+    KERNEL(3, 0.125, 3, 4, 6, 7) \
+    KERNEL(4, 0.125, 4, 5, 7, 8)
+#define NO_KERNELS(KERNEL)
+
+#define TEXEL_PLACE(at, part) (at)
+#define TEXEL_SHARE(at, part) 1.0
+#define STAR_PLACE(at, part) \
+    ((at) == 0 ? 0.0 : (at) == 1 ? 0.4 : (at) == -1 ? -0.4 : (at) == 2 ? 0.9 : -0.9)
+// Filament's: along an axis the texels at -1 .. 2 have the weights (1 - f, 2 - f, 1 + f, f) / 4,
+// which are linear samples of a filter with PAIR_SIDE on both sides. Two samples, each between two
+// texels, give these weights.
+#define PAIR_SIDE 0.25
+#define PAIR_PLACE(at, part) \
+    ((at) < 0 ? (2.0 - (part)) / (3.0 - 2.0 * (part)) - 1.0 - (part) \
+              : 1.0 + (part) / (1.0 + 2.0 * (part)) - (part))
+#define PAIR_SHARE(at, part) \
+    ((at) < 0 ? PAIR_SIDE * (3.0 - 2.0 * (part)) : PAIR_SIDE * (1.0 + 2.0 * (part)))
+
+// (The sample of a block is the mean of RADIUS x RADIUS texels, as Blender reduces a frame.)
+#define TAP_SETS(SET) \
+    SET(TAPS_CENTRE, 1, CENTRE_TAPS, NO_KERNELS, TEXEL_PLACE, TEXEL_SHARE) \
+    SET(TAPS_BLOCK, 2, CENTRE_TAPS, NO_KERNELS, TEXEL_PLACE, TEXEL_SHARE) \
+    SET(TAPS_CROSS, 3, CROSS_TAPS, NO_KERNELS, TEXEL_PLACE, TEXEL_SHARE) \
+    SET(TAPS_CORNERS, 4, CORNER_TAPS, NO_KERNELS, TEXEL_PLACE, TEXEL_SHARE) \
+    SET(TAPS_PAIRS, 5, CORNER_TAPS, NO_KERNELS, PAIR_PLACE, PAIR_SHARE) \
+    SET(TAPS_STAR, 6, STAR_TAPS, NO_KERNELS, STAR_PLACE, TEXEL_SHARE) \
+    SET(TAPS_THIRTEEN, 7, THIRTEEN_TAPS, THIRTEEN_KERNELS, TEXEL_PLACE, TEXEL_SHARE)
+
+// Nine taps along one axis, pixels of the target apart (nine.frag): LINE(name, value, half-kernel).
+// HDRP's is a binomial of order 8.
+#define GODOT_NINE 0.2024, 0.1790, 0.1240, 0.0672, 0.0285
+#define HDRP_NINE  0.2734375, 0.21875, 0.109375, 0.03125, 0.00390625
+#define LINE_SETS(LINE) \
+    LINE(TAPS_GODOT, 8, GODOT_NINE) \
+    LINE(TAPS_HDRP, 9, HDRP_NINE)
+#define MAX_SET_TAPS    13
+#define MAX_SET_KERNELS 5
+#define MAX_PLACE       2
+
+// What becomes of the kernels of a set, by functions of lib/combine.glsl:
+//
+//   AVERAGE(name, value, weight)   their average with weights, which depend on kernel and share
+//   SUM(name, value, weight)       the same, not divided by the weights
+//   WITHIN(name, value, weight)    the mean, by shares, of kernels whose taps are averaged
+//   SELECT(name, value, function)  another function of them
+#define COMBINATIONS(AVERAGE, SUM, WITHIN, SELECT) \
+    AVERAGE(COMBINE_MEAN, 1, share_weight) \
+    AVERAGE(COMBINE_KARIS, 2, karis_weight) \
+    AVERAGE(COMBINE_KARIS_HDRP, 3, hdrp_weight) \
+    AVERAGE(COMBINE_KARIS_PYGFX, 4, pygfx_weight) \
+    AVERAGE(COMBINE_BRIGHTEST, 5, brightest_weight) \
+    SUM(COMBINE_KARIS_BEVY, 6, bevy_weight) \
+    WITHIN(COMBINE_BLENDER, 7, blender_weight) \
+    SELECT(COMBINE_MEDIAN, 8, median)
+
+// Functions of a value: POINT(name, value, function), in lib/points.glsl, where `back_` and the name
+// is the slope.
+#define POINTS(POINT) \
+    POINT(POINT_CAPPED, 1, capped) \
+    POINT(POINT_FINITE, 2, finite) \
+    POINT(POINT_TINTED, 3, tinted) \
+    POINT(POINT_ROLLED, 4, rolled) \
+    POINT(POINT_HIGHLIGHTS, 5, highlights) \
+    POINT(POINT_LIGHTNESS, 6, bright_lightness) \
+    POINT(POINT_BEVY, 7, bevy) \
+    POINT(POINT_KINO, 8, kino) \
+    POINT(POINT_URP, 9, urp) \
+    POINT(POINT_PPV2, 10, ppv2) \
+    POINT(POINT_THREE, 11, three) \
+    POINT(POINT_THREE_NODE, 12, three_node) \
+    POINT(POINT_UNREAL, 13, unreal) \
+    POINT(POINT_BABYLON, 14, babylon) \
+    POINT(POINT_DIMMED, 15, dimmed) \
+    POINT(POINT_GLOWING, 16, glowing)
+#define POINT_NONE 0
+
+// The choices of the blooms: PREFILTER(name, taps, combine, before, after).
+#define PREFILTERS(PREFILTER) \
+    PREFILTER(pyramid, TAPS_THIRTEEN, COMBINE_KARIS, POINT_NONE, POINT_NONE) \
+    PREFILTER(bevy, TAPS_THIRTEEN, COMBINE_KARIS_BEVY, POINT_NONE, POINT_BEVY) \
+    PREFILTER(pygfx, TAPS_THIRTEEN, COMBINE_MEAN, POINT_NONE, POINT_FINITE) \
+    PREFILTER(pygfx_karis, TAPS_THIRTEEN, COMBINE_KARIS_PYGFX, POINT_NONE, POINT_FINITE) \
+    PREFILTER(blender, TAPS_THIRTEEN, COMBINE_BLENDER, POINT_NONE, POINT_FINITE) \
+    PREFILTER(highlights, TAPS_CENTRE, COMBINE_MEAN, POINT_NONE, POINT_HIGHLIGHTS) \
+    PREFILTER(reduced_highlights, TAPS_BLOCK, COMBINE_MEAN, POINT_NONE, POINT_HIGHLIGHTS) \
+    PREFILTER(kino, TAPS_CENTRE, COMBINE_MEAN, POINT_CAPPED, POINT_KINO) \
+    PREFILTER(kino_median, TAPS_CROSS, COMBINE_MEDIAN, POINT_CAPPED, POINT_KINO) \
+    PREFILTER(kino_level, TAPS_CORNERS, COMBINE_BRIGHTEST, POINT_NONE, POINT_NONE) \
+    PREFILTER(filament, TAPS_PAIRS, COMBINE_MEAN, POINT_NONE, POINT_NONE) \
+    PREFILTER(filament_bright, TAPS_PAIRS, COMBINE_BRIGHTEST, POINT_NONE, POINT_ROLLED) \
+    PREFILTER(hdrp, TAPS_STAR, COMBINE_KARIS_HDRP, POINT_NONE, POINT_NONE) \
+    PREFILTER(hdrp_level, TAPS_HDRP, COMBINE_MEAN, POINT_NONE, POINT_NONE) \
+    PREFILTER(godot_across, TAPS_GODOT, COMBINE_MEAN, POINT_DIMMED, POINT_NONE) \
+    PREFILTER(godot_down, TAPS_GODOT, COMBINE_MEAN, POINT_NONE, POINT_GLOWING) \
+    PREFILTER(godot_level, TAPS_GODOT, COMBINE_MEAN, POINT_NONE, POINT_NONE) \
+    PREFILTER(urp, TAPS_CENTRE, COMBINE_MEAN, POINT_CAPPED, POINT_URP) \
+    PREFILTER(post_processing, TAPS_CENTRE, COMBINE_MEAN, POINT_CAPPED, POINT_PPV2) \
+    PREFILTER(tint, TAPS_CENTRE, COMBINE_MEAN, POINT_NONE, POINT_TINTED) \
+    PREFILTER(three, TAPS_CENTRE, COMBINE_MEAN, POINT_NONE, POINT_THREE) \
+    PREFILTER(three_node, TAPS_CENTRE, COMBINE_MEAN, POINT_NONE, POINT_THREE_NODE) \
+    PREFILTER(unreal, TAPS_CENTRE, COMBINE_MEAN, POINT_NONE, POINT_UNREAL) \
+    PREFILTER(babylon, TAPS_CENTRE, COMBINE_MEAN, POINT_NONE, POINT_BABYLON) \
+    PREFILTER(darktable, TAPS_CENTRE, COMBINE_MEAN, POINT_NONE, POINT_LIGHTNESS)

@@ -144,6 +144,10 @@ enum vkb_quality { QUALITY_NAMES(VKB_NAME_ENUM) };
 enum vkb_blur_filter { FILTER_NAMES(VKB_NAME_ENUM) };
 enum vkb_three_variant { VARIANT_NAMES(VKB_NAME_ENUM) };
 enum vkb_mode { MODE_NAMES(VKB_NAME_ENUM) };
+#define VKB_SET_ENUM(name, value, ROWS, KERNELS, PLACE, SHARE) name = value,
+enum vkb_tap_set { TAP_SETS(VKB_SET_ENUM) LINE_SETS(VKB_NAME_ENUM) };
+enum vkb_combine { COMBINATIONS(VKB_NAME_ENUM, VKB_NAME_ENUM, VKB_NAME_ENUM, VKB_NAME_ENUM) };
+enum vkb_point { POINTS(VKB_NAME_ENUM) };
 #undef VKB_NAME_ENUM
 
 // The images that a pass reads (`reads` of its row).

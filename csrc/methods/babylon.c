@@ -1,7 +1,7 @@
 // The bloom of Babylon.js' DefaultRenderingPipeline. Source: BabylonJS/Babylon.js, bloomEffect.ts
 // @ 05c105649f04, thinBlurPostProcess.ts @ 076e49a15333, kernelBlur.fragment.fx @ 445b0404049f.
 #include "methods/methods.h"
-#include "passes/levels.h"
+#include "passes/prefilter.h"
 
 uint32_t vkb_add_babylon(struct vkb_levels *levels)
 {
@@ -15,7 +15,8 @@ uint32_t vkb_add_babylon(struct vkb_levels *levels)
     levels->sizes[levels->count++] =
         (struct vkb_size){vkb_scaled(frame.width, scale), vkb_scaled(frame.height, scale)};
     const uint32_t bright = vkb_levels_image(levels, levels->sizes[0], "bright");
-    struct vkb_pass_row row = vkb_groups_row(levels, GROUPS_BABYLON, levels->source->glow, bright);
+    struct vkb_pass_row row =
+        vkb_describe_prefilter(levels, VKB_PREFILTER_babylon, levels->source->glow, bright);
     vkb_levels_masked(levels, &row);
     vkb_levels_blur(levels, 0, bright, &kernel);
     return vkb_levels_enlarge(levels, UPSAMPLE_LINEAR, levels->downs[0], 1.0);

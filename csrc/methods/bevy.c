@@ -1,7 +1,7 @@
 // Bevy's bloom. Source: bevyengine/bevy, tag v0.19.1 (b56fc29d3016),
 // crates/bevy_post_process/src/bloom: sizes in mod.rs, factors in upsampling_pipeline.rs.
 #include "methods/methods.h"
-#include "passes/levels.h"
+#include "passes/prefilter.h"
 
 #include <math.h>
 
@@ -40,7 +40,8 @@ uint32_t vkb_add_bevy(struct vkb_levels *levels)
 
     choose_sizes(levels);
     const uint32_t first = vkb_levels_down(levels, 0);
-    struct vkb_pass_row row = vkb_groups_row(levels, GROUPS_BEVY, levels->source->glow, first);
+    struct vkb_pass_row row =
+        vkb_describe_prefilter(levels, VKB_PREFILTER_bevy, levels->source->glow, first);
     vkb_set_steps(&row, x, y);
     vkb_levels_masked(levels, &row);
     vkb_levels_reduce_rest(levels, x, y);

@@ -4,6 +4,7 @@
 #include "methods/methods.h"
 #include "passes/blur.h"
 #include "passes/levels.h"
+#include "passes/prefilter.h"
 
 #include <float.h>
 #include <math.h>
@@ -28,7 +29,7 @@ static uint32_t add_bloom(struct vkb_levels *levels)
         levels->sizes[level] = vkb_halved(levels->sizes[level - 1]);
     for (uint32_t level = 1; level < levels->count; ++level) {
         const uint32_t from = levels->downs[level - 1], to = vkb_levels_down(levels, level);
-        struct vkb_pass_row row = vkb_groups_row(levels, GROUPS_BLENDER, from, to);
+        struct vkb_pass_row row = vkb_describe_prefilter(levels, VKB_PREFILTER_blender, from, to);
         if (level == 1)
             vkb_levels_pass(levels, &row);
         else
@@ -307,8 +308,9 @@ static void add_highlights(struct vkb_levels *levels)
     levels->count = 1;
     levels->downs[0] =
         factor == 1 ? glow : vkb_levels_image(levels, levels->sizes[0], "highlights");
-    struct vkb_pass_row row =
-        vkb_groups_row(levels, GROUPS_HIGHLIGHTS, source->glow, levels->downs[0]);
+    struct vkb_pass_row row = vkb_describe_prefilter(
+        levels, factor == 1 ? VKB_PREFILTER_highlights : VKB_PREFILTER_reduced_highlights,
+        source->glow, levels->downs[0]);
     row.constants.mean_side = factor > 1 ? (int32_t)factor : 0;
     vkb_levels_masked(levels, &row);
     if (factor > 1)

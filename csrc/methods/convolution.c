@@ -9,7 +9,7 @@
 // longer side for zeros, which both sides share; not at all for a period that a transform can have.
 #include "methods/methods.h"
 #include "passes/fft.h"
-#include "passes/levels.h"
+#include "passes/prefilter.h"
 
 #include <stdio.h>
 
@@ -295,7 +295,8 @@ uint32_t vkb_add_unreal(struct vkb_levels *levels)
 
     if (source->mask != VKB_NO_IMAGE || levels->settings->thresholded) {
         masked.glow = vkb_levels_step(levels, source->buffers, "highlights");
-        struct vkb_pass_row row = vkb_groups_row(levels, GROUPS_UNREAL, source->glow, masked.glow);
+        struct vkb_pass_row row =
+            vkb_describe_prefilter(levels, VKB_PREFILTER_unreal, source->glow, masked.glow);
         vkb_levels_masked(levels, &row);
     }
     levels->source = &masked;

@@ -1,7 +1,7 @@
 // darktable's bloom: bright lightness, eight times the mean of a box. Source: darktable 4.2.1,
 // src/iop/bloom.c.
 #include "methods/methods.h"
-#include "passes/levels.h"
+#include "passes/prefilter.h"
 
 #include <math.h>
 
@@ -29,7 +29,8 @@ uint32_t vkb_add_darktable(struct vkb_levels *levels)
     const struct vkb_bloom_source *source = levels->source;
     struct vkb_bloom_source floats = *source;
     uint32_t image = vkb_levels_image(levels, source->buffers, "bright");
-    struct vkb_pass_row row = vkb_groups_row(levels, GROUPS_DARKTABLE, source->glow, image);
+    struct vkb_pass_row row =
+        vkb_describe_prefilter(levels, VKB_PREFILTER_darktable, source->glow, image);
 
     vkb_levels_masked(levels, &row);
     levels->sizes[levels->count++] = source->buffers;

@@ -2,6 +2,7 @@
 // @ 003e5005713c, bloom().
 #include "methods/methods.h"
 #include "passes/filter.h"
+#include "passes/prefilter.h"
 
 #include <math.h>
 
@@ -32,10 +33,12 @@ static void choose_sizes(struct vkb_levels *levels)
 static void add_reduction(struct vkb_levels *levels, uint32_t from, uint32_t to)
 {
     const bool first = from == levels->source->glow;
-    struct vkb_pass_row row = vkb_groups_row(levels, GROUPS_FILAMENT, from, to);
+    const bool bright = first && levels->settings->thresholded;
+    struct vkb_pass_row row = vkb_describe_prefilter(
+        levels, bright ? VKB_PREFILTER_filament_bright : VKB_PREFILTER_filament, from, to);
 
     vkb_apply_mask(&row, first ? levels->source->mask : VKB_NO_IMAGE);
-    row.constants.thresholded = first && row.constants.thresholded;
+    row.constants.thresholded = bright;
     vkb_levels_pass(levels, &row);
 }
 

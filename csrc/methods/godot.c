@@ -1,7 +1,7 @@
 // Godot's glow. Source: godotengine/godot, servers/rendering/renderer_rd/shaders/effects: copy.glsl
 // @ 0a5efd02df51, tonemap.glsl @ 001c8c9c24dc.
 #include "methods/methods.h"
-#include "passes/levels.h"
+#include "passes/prefilter.h"
 
 #include <stdio.h>
 
@@ -11,11 +11,13 @@ static const float MIN_WEIGHT = 1e-4f;
 static void add_blur(struct vkb_levels *levels, enum vkb_mode direction, bool first, uint32_t from,
                      uint32_t to)
 {
-    struct vkb_pass_row row = vkb_prefilter_row(levels, &vkb_shader_nine_frag, from, to);
+    const enum vkb_prefilter prefilter = !first ? VKB_PREFILTER_godot_level
+                                       : direction == DIRECTION_HORIZONTAL
+                                           ? VKB_PREFILTER_godot_across
+                                           : VKB_PREFILTER_godot_down;
+    struct vkb_pass_row row = vkb_describe_prefilter(levels, prefilter, from, to);
 
-    row.constants.groups = GROUPS_GODOT;
     row.constants.direction = direction;
-    row.constants.first_level = first;
     if (first && direction == DIRECTION_VERTICAL)
         vkb_apply_mask(&row, levels->source->mask);
     row.params.prefilter.exposure = first ? levels->settings->values.exposure : 0.0f;

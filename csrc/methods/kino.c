@@ -1,9 +1,12 @@
 // Keijiro Takahashi's KinoBloom, version 2, high quality. Source: keijiro/KinoBloom @ 0a04c43fa47d,
 // Assets/Kino/Bloom/Bloom.cs.
 #include "methods/methods.h"
-#include "passes/levels.h"
+#include "passes/prefilter.h"
 
 #include <math.h>
+
+// Colours of the frame above this are cut off.
+static const float MAX_COLOUR = 65000.0f;
 
 // Sets the sizes of the levels, and returns the step of the tent filter. Both depend on the frame's
 // height and the radius, so that the blur covers the same part of small and large frames.
@@ -25,12 +28,14 @@ uint32_t vkb_add_kino(struct vkb_levels *levels)
 
     combination.radius_x = combination.radius_y = choose_sizes(levels);
     uint32_t from = vkb_levels_image(levels, levels->source->buffers, "bright");
-    struct vkb_pass_row row = vkb_groups_row(levels, GROUPS_KINO, levels->source->glow, from);
-    row.constants.anti_flicker = anti_flicker;
+    struct vkb_pass_row row = vkb_describe_prefilter(
+        levels, anti_flicker ? VKB_PREFILTER_kino_median : VKB_PREFILTER_kino, levels->source->glow,
+        from);
+    row.params.prefilter.clamp_max = MAX_COLOUR;
     vkb_levels_masked(levels, &row);
     for (uint32_t level = 0; level < levels->count; ++level) {
         const uint32_t to = vkb_levels_down(levels, level);
-        row = vkb_groups_row(levels, GROUPS_BOX, from, to);
+        row = vkb_describe_prefilter(levels, VKB_PREFILTER_kino_level, from, to);
         // The first level's box may weight its taps against fireflies.
         if (anti_flicker && level == 0)
             vkb_levels_pass(levels, &row);

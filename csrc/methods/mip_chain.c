@@ -2,6 +2,7 @@
 // dual Kawase, which does not.
 #include "methods/methods.h"
 #include "passes/filter.h"
+#include "passes/prefilter.h"
 
 uint32_t vkb_add_pyramid(struct vkb_levels *levels)
 {
@@ -13,7 +14,8 @@ uint32_t vkb_add_pyramid(struct vkb_levels *levels)
     vkb_levels_halve(levels, levels->source->buffers, (uint32_t)settings->values.levels);
     const uint32_t first = vkb_levels_down(levels, 0);
     if (settings->values.firefly_filter) {
-        struct vkb_pass_row row = vkb_groups_row(levels, GROUPS_PYRAMID, glow, first);
+        struct vkb_pass_row row =
+            vkb_describe_prefilter(levels, VKB_PREFILTER_pyramid, glow, first);
         vkb_set_steps(&row, x, y);
         vkb_levels_pass(levels, &row);
     } else {

@@ -1,14 +1,14 @@
 // The bloom of PlayCanvas' CameraFrame. Source: playcanvas/engine 2.23, frame-pass-bloom.js and
 // downsample.js @ 1f7213d06f78, 2.22.0-beta.20 @ 0aaef5e432c4.
 #include "methods/methods.h"
-#include "passes/levels.h"
+#include "passes/prefilter.h"
 
 #include <math.h>
 
 // Only the format of the buffers limits values from above.
-static struct vkb_pass_row groups_row(const struct vkb_levels *levels, uint32_t from, uint32_t to)
+static struct vkb_pass_row describe_row(const struct vkb_levels *levels, uint32_t from, uint32_t to)
 {
-    struct vkb_pass_row row = vkb_groups_row(levels, GROUPS_URP, from, to);
+    struct vkb_pass_row row = vkb_describe_prefilter(levels, VKB_PREFILTER_urp, from, to);
 
     row.params.prefilter.clamp_max = (float)SINGLE_LIMIT;
     return row;
@@ -20,14 +20,14 @@ static void add_first(struct vkb_levels *levels)
 {
     const struct vkb_size half_size = vkb_halved(levels->source->buffers);
     const uint32_t half = vkb_levels_image(levels, half_size, "half");
-    struct vkb_pass_row row = groups_row(levels, levels->source->glow, half);
+    struct vkb_pass_row row = describe_row(levels, levels->source->glow, half);
 
     row.constants.thresholded = false;
     row.constants.clamped = true;
     vkb_levels_pass(levels, &row);
     const uint32_t step = vkb_levels_step(levels, levels->sizes[0], "reduced");
     vkb_levels_reduce(levels, 1.0, 1.0, half, step);
-    row = groups_row(levels, step, vkb_levels_down(levels, 0));
+    row = describe_row(levels, step, vkb_levels_down(levels, 0));
     vkb_levels_masked(levels, &row);
 }
 

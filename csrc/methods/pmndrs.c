@@ -2,6 +2,7 @@
 // @ 69c61a640078 (6.39.0), MipmapBlurPass.js, BloomEffect.js.
 #include "methods/methods.h"
 #include "passes/filter.h"
+#include "passes/prefilter.h"
 
 // The weights of the source are rounded: they add up to 1.00004.
 static void add_down(struct vkb_levels *levels, uint32_t level, uint32_t from)
@@ -22,9 +23,9 @@ uint32_t vkb_add_pmndrs(struct vkb_levels *levels)
     struct vkb_combination combination = vkb_combine(UPSAMPLE_TENT, 1.0 - share, share);
     struct vkb_size size = levels->source->buffers;
     uint32_t from = vkb_levels_image(levels, size, "bright");
-    struct vkb_pass_row row = vkb_groups_row(levels, GROUPS_THREE, levels->source->glow, from);
+    struct vkb_pass_row row =
+        vkb_describe_prefilter(levels, VKB_PREFILTER_three_node, levels->source->glow, from);
 
-    row.constants.node = true;
     vkb_levels_masked(levels, &row);
     levels->count = (uint32_t)values->levels;
     for (uint32_t level = 0; level < levels->count; ++level) {

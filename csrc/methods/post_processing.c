@@ -1,7 +1,7 @@
 // The bloom of Unity's Post Processing Stack v2. Source: Unity-Technologies/PostProcessing
 // @ 32c3155207d3, PostProcessing/Runtime/Effects/Bloom.cs, Shaders/Builtins/Bloom.shader.
 #include "methods/methods.h"
-#include "passes/levels.h"
+#include "passes/prefilter.h"
 
 #include <math.h>
 
@@ -19,8 +19,8 @@ static void add_first(struct vkb_levels *levels)
     const uint32_t step = vkb_levels_step(levels, levels->sizes[0], "reduced");
 
     reduce(levels, levels->source->glow, step);
-    struct vkb_pass_row row =
-        vkb_groups_row(levels, GROUPS_POST_PROCESSING, step, vkb_levels_down(levels, 0));
+    struct vkb_pass_row row = vkb_describe_prefilter(levels, VKB_PREFILTER_post_processing, step,
+                                                     vkb_levels_down(levels, 0));
     vkb_set_tint(&row, levels->settings->tint);
     vkb_levels_masked(levels, &row);
 }

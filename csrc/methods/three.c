@@ -2,7 +2,7 @@
 // UnrealBloomPass.js with the kernels of #31528 and the factor of #32517, in r187 the merged taps
 // of #34479; examples/jsm/tsl/display/BloomNode.js @ 07e4c12b3840.
 #include "methods/methods.h"
-#include "passes/levels.h"
+#include "passes/prefilter.h"
 
 #include <math.h>
 
@@ -74,9 +74,8 @@ static void add_tints(struct vkb_levels *levels, const float *all_tints)
             continue;
         const uint32_t tinted = vkb_levels_step(levels, levels->sizes[level], "tinted_%u", level);
         struct vkb_pass_row row =
-            vkb_groups_row(levels, GROUPS_POST_PROCESSING, levels->downs[level], tinted);
+            vkb_describe_prefilter(levels, VKB_PREFILTER_tint, levels->downs[level], tinted);
         row.constants.thresholded = false;
-        row.params.prefilter.clamp_max = (float)SINGLE_LIMIT;
         vkb_set_tint(&row, tints);
         vkb_levels_pass(levels, &row);
         levels->downs[level] = tinted;
@@ -105,9 +104,11 @@ uint32_t vkb_add_three(struct vkb_levels *levels)
     for (uint32_t level = 0; level < THREE_LEVELS; ++level)
         shares[level] /= total;
     uint32_t from = vkb_levels_image(levels, levels->sizes[0], "bright");
-    struct vkb_pass_row row = vkb_groups_row(levels, GROUPS_THREE, levels->source->glow, from);
-    // The luminance has the weights of three.js' colour management.
-    row.constants.node = settings->choices[VKB_CHOICE_variant] != VARIANT_R185;
+    // From r187 on the luminance has the weights of three.js' colour management.
+    const enum vkb_prefilter prefilter = settings->choices[VKB_CHOICE_variant] == VARIANT_R185
+                                           ? VKB_PREFILTER_three
+                                           : VKB_PREFILTER_three_node;
+    struct vkb_pass_row row = vkb_describe_prefilter(levels, prefilter, levels->source->glow, from);
     vkb_levels_masked(levels, &row);
     for (uint32_t level = 0; level < levels->count; ++level) {
         add_level(levels, level, from);

@@ -4,6 +4,7 @@
 // @ 0148835ea9ba, BloomBlur.compute @ 0e4ca4d79b2c.
 #include "methods/methods.h"
 #include "passes/filter.h"
+#include "passes/prefilter.h"
 
 #include <math.h>
 
@@ -104,7 +105,8 @@ static void add_urp_first(struct vkb_levels *levels)
         from = vkb_levels_step(levels, levels->sizes[0], "reduced");
         vkb_levels_reduce(levels, 0.5, step_y, source->glow, from);
     }
-    struct vkb_pass_row row = vkb_groups_row(levels, GROUPS_URP, from, vkb_levels_down(levels, 0));
+    struct vkb_pass_row row =
+        vkb_describe_prefilter(levels, VKB_PREFILTER_urp, from, vkb_levels_down(levels, 0));
     row.constants.clamped = true;
     vkb_set_tint(&row, levels->settings->tint);
     vkb_levels_masked(levels, &row);
@@ -132,11 +134,10 @@ static uint32_t rounded(uint32_t side, double scale, uint32_t level)
 static void add_hdrp_blur(struct vkb_levels *levels, enum vkb_mode direction, bool first,
                           uint32_t from, uint32_t to)
 {
-    struct vkb_pass_row row = vkb_prefilter_row(levels, &vkb_shader_nine_frag, from, to);
+    struct vkb_pass_row row = vkb_describe_prefilter(levels, VKB_PREFILTER_hdrp_level, from, to);
     const struct vkb_image_row *source = &levels->graph->images[from];
     const struct vkb_image_row *target = &levels->graph->images[to];
 
-    row.constants.groups = GROUPS_HDRP_BLUR;
     row.constants.direction = direction;
     row.constants.first_level = first;
     if (direction == DIRECTION_HORIZONTAL ? source->width == 2 * target->width
@@ -176,7 +177,8 @@ uint32_t vkb_add_hdrp(struct vkb_levels *levels)
                                                  rounded(frame.height, down, level)};
     levels->count = count;
     uint32_t from = vkb_levels_step(levels, levels->sizes[0], "reduced");
-    struct vkb_pass_row row = vkb_groups_row(levels, GROUPS_HDRP, levels->source->glow, from);
+    struct vkb_pass_row row =
+        vkb_describe_prefilter(levels, VKB_PREFILTER_hdrp, levels->source->glow, from);
     vkb_levels_masked(levels, &row);
     for (uint32_t level = 0; level < count; ++level) {
         add_hdrp_level(levels, level, from);

@@ -90,17 +90,11 @@ bool vkb_accumulate_mask(struct vkb_adjoint *adjoint, const struct vkb_pass_row 
 bool vkb_add_sums(struct vkb_adjoint *adjoint, const struct vkb_pass_row *row, struct vkb_size size,
                   const char *name, struct vkb_error *error);
 
-// Makes both axes those of 3 x 3 taps, of which the outer ones have the share `side` along an axis;
-// or of the pyramid's 13 taps. These are those of two kernels: nine around the centre, and four
-// between them, each with half of the weight.
-void vkb_filter_three(struct vkb_filter *filter, double distance, double side);
-void vkb_filter_thirteen(struct vkb_filter *filter, double step_x, double step_y);
-
 // The families of passes.
 vkb_transpose vkb_transpose_composite, vkb_transpose_threshold;
 vkb_transpose vkb_transpose_blur, vkb_transpose_filter, vkb_transpose_gather, vkb_transpose_nine;
-// Downsamplings that are not linear in groups of their taps.
-vkb_transpose vkb_transpose_groups;
+// Passes that are no filters.
+vkb_transpose vkb_transpose_prefilter;
 // Glare.
 vkb_transpose vkb_transpose_streaks, vkb_transpose_flare, vkb_transpose_dirt, vkb_transpose_star;
 vkb_transpose vkb_transpose_box, vkb_transpose_blender_end, vkb_transpose_sun_beams;

@@ -39,38 +39,6 @@ bool vkb_transpose_blur(struct vkb_adjoint *adjoint, const struct vkb_pass_row *
                                  pass->reads[SLOT_SOURCE], error);
 }
 
-// Taps at a distance on both sides, and in the middle, with the weights of one kernel.
-static void add_taps(struct vkb_axis *axis, int kernel, double distance, double side, double middle)
-{
-    const double offsets[] = {-distance, 0.0, distance}, shares[] = {side, middle, side};
-
-    for (int i = 0; i < 3; ++i) {
-        if (shares[i] == 0.0)
-            continue;
-        struct vkb_tap *tap = &axis->taps[axis->count++];
-        *tap = (struct vkb_tap){.offset = offsets[i]};
-        tap->weights[kernel] = shares[i];
-    }
-}
-
-void vkb_filter_thirteen(struct vkb_filter *filter, double step_x, double step_y)
-{
-    filter->kernels = 2;
-    filter->gain = 0.5;
-    filter->x.count = filter->y.count = 0;
-    add_taps(&filter->x, 0, 2.0 * step_x, 0.25, 0.5);
-    add_taps(&filter->y, 0, 2.0 * step_y, 0.25, 0.5);
-    add_taps(&filter->x, 1, step_x, 0.5, 0.0);
-    add_taps(&filter->y, 1, step_y, 0.5, 0.0);
-}
-
-void vkb_filter_three(struct vkb_filter *filter, double distance, double side)
-{
-    filter->x.count = filter->y.count = 0;
-    add_taps(&filter->x, 0, distance, side, 1.0 - 2.0 * side);
-    add_taps(&filter->y, 0, distance, side, 1.0 - 2.0 * side);
-}
-
 static void set_taps(const float (*taps)[4], int32_t count, enum vkb_mode kind,
                      struct vkb_axis *axis)
 {
@@ -137,7 +105,9 @@ bool vkb_transpose_nine(struct vkb_adjoint *adjoint, const struct vkb_pass_row *
                         struct vkb_error *error)
 {
     static const double hdrps[] = {HDRP_NINE}, godots[] = {GODOT_NINE};
-    const bool godot = pass->constants.groups == GROUPS_GODOT, first = pass->constants.first_level;
+    const bool godot = pass->constants.tap_set == TAPS_GODOT;
+    const bool first =
+        godot ? pass->constants.before || pass->constants.after : pass->constants.first_level;
     const bool rows = pass->constants.direction == DIRECTION_HORIZONTAL;
     const enum vkb_border border = godot ? VKB_BORDER_PAIRS
                                  : first ? VKB_BORDER_FIRST_TWO

@@ -71,9 +71,7 @@ static bool accumulate_composite(struct vkb_adjoint *adjoint, struct vkb_pass_ro
 static bool is_clamped(const struct vkb_graph *graph)
 {
     for (uint32_t i = 0; i < graph->pass_count; ++i)
-        if (graph->passes[i].constants.groups == GROUPS_PYGFX
-            || graph->passes[i].constants.groups == GROUPS_PYGFX_KARIS
-            || graph->passes[i].constants.clamped)
+        if (graph->passes[i].constants.clamped)
             return true;
     return false;
 }
@@ -92,7 +90,8 @@ static bool is_thresholded(const struct vkb_graph *graph)
 static bool is_sum(const struct vkb_constants *constants)
 {
     return (constants->composite == COMPOSITE_ADD || constants->composite == COMPOSITE_MIX)
-        && constants->alpha == ALPHA_KEEP && !constants->masked && !constants->groups;
+        && constants->alpha == ALPHA_KEEP && !constants->masked && !constants->exposed_scene
+        && !constants->clamped;
 }
 
 // Adds the cotangents of the picture before exposure and curves, and makes `row` that of a
@@ -117,8 +116,7 @@ bool vkb_transpose_composite(struct vkb_adjoint *adjoint, const struct vkb_pass_
     struct vkb_pass_row row = vkb_slope_row(adjoint, pass, &vkb_shader_adjoint_composite_frag);
 
     row.reads[SLOT_BLOOM] = pass->reads[SLOT_BLOOM];
-    if (is_clamped(adjoint->graph))
-        row.constants.groups = GROUPS_PYGFX;
+    row.constants.clamped = is_clamped(adjoint->graph);
     row.constants.thresholded = row.constants.alpha == ALPHA_BLUR && is_thresholded(adjoint->graph);
     if (!vkb_add_sums(adjoint, &row, size_of(adjoint, pass->targets[0]), ".by_composite", error)
         || (is_sum(&row.constants) && depends_on_bloom(&row) && !add_curves(adjoint, &row, error)))

@@ -63,8 +63,7 @@ void vkb_add_composite(struct vkb_levels *levels, const struct vkb_composite_sou
     row.constants.alpha = off ? ALPHA_KEEP : source->alpha;
     row.constants.masked = row.constants.composite == COMPOSITE_MIX && source->mask != VKB_NO_IMAGE;
     row.constants.lit = source->lit;
-    if (vkb_method_of(settings)->exposes_scene && !off)
-        row.constants.groups = GROUPS_GODOT;
+    row.constants.exposed_scene = vkb_method_of(settings)->exposes_scene && !off;
     vkb_read_only(&row, source->scene);
     vkb_read_at(&row, SLOT_MASK, row.constants.masked ? source->mask : VKB_NO_IMAGE);
     vkb_read_at(&row, SLOT_BLOOM, source->bloom);

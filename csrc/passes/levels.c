@@ -73,12 +73,6 @@ void vkb_levels_halve(struct vkb_levels *levels, struct vkb_size above, uint32_t
     }
 }
 
-void vkb_set_steps(struct vkb_pass_row *row, double step_x, double step_y)
-{
-    row->params.prefilter.step_x = (float)step_x;
-    row->params.prefilter.step_y = (float)step_y;
-}
-
 void vkb_levels_box(struct vkb_levels *levels, uint32_t from, uint32_t to)
 {
     const struct vkb_taps taps = {{{{1.0, 0.5, 0.0}, {1.0, 0.5, 0.0}}}, .gain = 1.0};
@@ -122,21 +116,6 @@ struct vkb_pass_row vkb_prefilter_row(const struct vkb_levels *levels,
         row.params.prefilter.tint[0][channel] = 1.0f;
     VKB_SET_TARGET(&row, prefilter, &levels->graph->images[to]);
     vkb_apply_mask(&row, VKB_NO_IMAGE);
-    return row;
-}
-
-void vkb_set_tint(struct vkb_pass_row *row, const float *tint)
-{
-    memcpy(row->params.prefilter.tint[0], tint, 3 * sizeof *tint);
-}
-
-struct vkb_pass_row vkb_groups_row(const struct vkb_levels *levels, enum vkb_mode groups,
-                                   uint32_t from, uint32_t to)
-{
-    struct vkb_pass_row row = vkb_prefilter_row(levels, &vkb_shader_prefilter_frag, from, to);
-
-    row.constants.groups = groups;
-    vkb_set_steps(&row, 1.0, 1.0);
     return row;
 }
 

@@ -46,19 +46,6 @@ struct vkb_pass_row vkb_prefilter_row(const struct vkb_levels *levels,
                                       const struct vkb_shader *fragment, uint32_t from,
                                       uint32_t to);
 
-// Sets the distances of the taps of a row with the prefilter's block, in texels of what it reads.
-// The outer ones are two steps away.
-void vkb_set_steps(struct vkb_pass_row *row, double step_x, double step_y);
-
-// Sets the factors of the colours. That of alpha is 1.
-void vkb_set_tint(struct vkb_pass_row *row, const float *tint);
-
-// The row of a pass that makes of its taps what GROUPS_* says: of a downsampling that weights
-// groups of them by brightness, or of the first pass of a published method. The steps are one
-// texel.
-struct vkb_pass_row vkb_groups_row(const struct vkb_levels *levels, enum vkb_mode groups,
-                                   uint32_t from, uint32_t to);
-
 // A pass that downsamples with four diagonal taps at a distance of one texel: a box of 4 x 4
 // texels.
 void vkb_levels_box(struct vkb_levels *levels, uint32_t from, uint32_t to);

@@ -174,12 +174,10 @@ static struct sample sample_at(const struct vkb_axis *axis, uint32_t pixel, doub
         return linear_sample(inset);
     case UPSAMPLE_INSET_CUBIC:
         return inset_cubic_sample(axis, fmin(position - offset, axis->from - 1.5), offset);
-    // Filament's reduction: the texels around a position have the weights (1 - f, 2 - f, 1 + f, f).
-    // The first two of them, or the last two, divided by their sum.
     case UPSAMPLE_LEFT_PAIR:
-        return linear_sample(texel - 1.0 + (2.0 - part) / (3.0 - 2.0 * part));
+        return linear_sample(position + PAIR_PLACE(-1, part));
     case UPSAMPLE_RIGHT_PAIR:
-        return linear_sample(texel + 1.0 + part / (1.0 + 2.0 * part));
+        return linear_sample(position + PAIR_PLACE(1, part));
     default:
         return linear_sample(position);
     }

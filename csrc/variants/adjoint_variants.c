@@ -70,7 +70,7 @@ static void read_composite(const struct vkb_graph *graph, struct vkb_pass_row *r
     const struct vkb_composite_params *params = &pass->params.composite;
     const float intensity = pass->constants.lit ? 1.0f : params->intensity;
     // Godot's exposure is of the scene alone.
-    const float exposure = pass->constants.groups == GROUPS_GODOT ? 0.0f : params->exposure;
+    const float exposure = pass->constants.exposed_scene ? 0.0f : params->exposure;
     row->params.adjoint_filter.gain *= intensity * exp2f(exposure);
     row->constants.through_composite = true;
     row->reads[SLOT_COTANGENTS] = pass->reads[SLOT_COTANGENTS];
@@ -107,18 +107,18 @@ bool vkb_add_adjoint_linear(struct vkb_variant_choice *choice, const struct vkb_
     return vkb_add_variant(choice, &row);
 }
 
-// An invocation for all groups of a pixel, which fragments would compute anew for each.
-bool vkb_add_adjoint_groups(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
+// An invocation for all kernels of a pixel, which fragments would compute anew for each.
+bool vkb_add_adjoint_kernels(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
 {
     struct vkb_pass_row row;
 
-    if (!(vkb_transposes(pass, VKB_BLOCK_prefilter) && pass->constants.stacked_groups > 1))
+    if (!(vkb_transposes(pass, VKB_BLOCK_prefilter) && pass->constants.stacked_samples > 1))
         return false;
     memcpy(&row, pass, sizeof row);
     vkb_make_dispatch(&row, pass->shader->dispatch, PIXEL_INVOCATIONS, PIXEL_INVOCATIONS);
     // Those of one picture, since llvmpipe also runs what an early end leaves out.
     const struct vkb_image_row *target = &choice->graph->images[row.targets[0]];
-    const uint32_t height = target->height / (uint32_t)row.constants.stacked_groups;
+    const uint32_t height = target->height / (uint32_t)row.constants.stacked_samples;
     row.groups_width = (target->width + PIXEL_INVOCATIONS - 1) / PIXEL_INVOCATIONS;
     row.groups_height = (height + PIXEL_INVOCATIONS - 1) / PIXEL_INVOCATIONS;
     return vkb_add_variant(choice, &row);

@@ -2,6 +2,7 @@
 #include "variants/variant.h"
 
 #include "passes/filter.h"
+#include "passes/tap_sets.h"
 
 #include <string.h>
 
@@ -17,12 +18,6 @@ static bool loads(const struct vkb_variant_choice *choice, const struct vkb_pass
 {
     return vkb_fits_linear(choice, pass)
         && vkb_has_format_of(&choice->plain, pass->reads[SLOT_SOURCE], pass->targets[0]);
-}
-
-// What a pass makes of its taps, of GROUPS_*; 0: it has no groups of taps.
-static enum vkb_mode groups_of(const struct vkb_pass_row *pass)
-{
-    return vkb_computes(pass, VKB_BLOCK_prefilter) ? (enum vkb_mode)pass->constants.groups : 0;
 }
 
 // The simple ratio of both sides of the source and the target, of EXACT_*; 0: they have none.
@@ -46,14 +41,13 @@ static void make_linear(struct vkb_pass_row *row, const struct vkb_shader *shade
 
 bool vkb_add_windowed(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
 {
-    const enum vkb_mode groups = groups_of(pass);
-    const bool is_blur = groups == GROUPS_HDRP_BLUR || groups == GROUPS_GODOT;
-    const bool has_thirteen_taps = groups == GROUPS_PYRAMID || groups == GROUPS_PYGFX
-                                || groups == GROUPS_PYGFX_KARIS || groups == GROUPS_BLENDER
-                                || groups == GROUPS_BEVY;
+    const int32_t set = pass->constants.tap_set;
     struct vkb_pass_row row;
 
-    if (!groups)
+    // A block is of other texels. Variants keep the texels of a position for all of them.
+    if (!vkb_computes(pass, VKB_BLOCK_prefilter) || vkb_is_line_set(set) || set == TAPS_BLOCK
+        || pass->constants.masked || pass->params.prefilter.step_x != 1.0f
+        || pass->params.prefilter.step_y != 1.0f)
         return false;
     const struct vkb_image_row *source = &choice->plain.images[pass->reads[SLOT_SOURCE]];
     const struct vkb_image_row *target = &choice->plain.images[pass->targets[0]];
@@ -63,11 +57,8 @@ bool vkb_add_windowed(struct vkb_variant_choice *choice, const struct vkb_pass_r
     row.constants.exact = ratio == EXACT_DOUBLE ? 0 : ratio;
     row.constants.exact_rows = row.constants.exact;
     row.constants.enlarged = source->height < target->height;
-    row.constants.window = has_thirteen_taps ? 6 : 4;
-    // HDRP's taps are in other texels at each position.
-    if (is_blur || pass->constants.masked || pass->constants.mean_side > 1
-        || pass->params.prefilter.step_x != 1.0f || pass->params.prefilter.step_y != 1.0f
-        || (!row.constants.exact && groups == GROUPS_HDRP))
+    row.constants.window = vkb_find_window(set);
+    if (!row.constants.exact && vkb_moves_texels(set))
         return false;
     if (choice->variants == VKB_VARIANTS_GPU)
         vkb_make_dispatch(&row, pass->shader->dispatch, PIXEL_INVOCATIONS, PIXEL_INVOCATIONS);
@@ -85,21 +76,21 @@ bool vkb_add_nine(struct vkb_variant_choice *choice, const struct vkb_pass_row *
 {
     const struct vkb_image_row *target = &choice->plain.images[pass->targets[0]];
     const bool rows = pass->constants.direction == DIRECTION_HORIZONTAL;
+    const int32_t set = pass->constants.tap_set;
     const bool fits =
-        groups_of(pass) == GROUPS_HDRP_BLUR
+        set == TAPS_HDRP
             ? (pass->constants.first_level || pass->constants.sampling == SAMPLING_TEXEL)
                   && loads(choice, pass)
-            : groups_of(pass) == GROUPS_GODOT && rows
-                  && ratio_of(&choice->plain, pass) == EXACT_HALF && target->width % 2 == 0
-                  && target->format == VKB_FORMAT_RGBA32_FLOAT && vkb_fits_linear(choice, pass);
+            : set == TAPS_GODOT && rows && ratio_of(&choice->plain, pass) == EXACT_HALF
+                  && target->width % 2 == 0 && target->format == VKB_FORMAT_RGBA32_FLOAT
+                  && vkb_fits_linear(choice, pass);
     struct vkb_pass_row row;
 
-    if (!fits)
+    if (!vkb_computes(pass, VKB_BLOCK_prefilter) || !fits)
         return false;
     const enum vkb_format format = choice->plain.images[pass->reads[SLOT_SOURCE]].format;
     memcpy(&row, pass, sizeof row);
-    row.constants.exact =
-        pass->constants.first_level && pass->constants.groups == GROUPS_HDRP_BLUR ? EXACT_SAME : 0;
+    row.constants.exact = pass->constants.first_level && set == TAPS_HDRP ? EXACT_SAME : 0;
     if (rows)
         make_linear(&row, rows_linear[format], NINE_OUTPUTS, GATHER_ROWS);
     else

@@ -43,9 +43,9 @@ vkb_variant_add vkb_add_filtered, vkb_add_filtered_final, vkb_add_gathered;
 vkb_variant_add vkb_add_streaks;
 // Transforms: of complete lines in shared memory; stages of images with linear texels.
 vkb_variant_add vkb_add_lines, vkb_add_transform;
-// Adjoint passes: of images with linear texels; of groups of taps; transposed filters in tiles,
+// Adjoint passes: of images with linear texels; of kernels; transposed filters in tiles,
 // fused with the composite's, and with those of the other pictures of an image.
-vkb_variant_add vkb_add_adjoint_linear, vkb_add_adjoint_groups, vkb_add_adjoint_filter;
+vkb_variant_add vkb_add_adjoint_linear, vkb_add_adjoint_kernels, vkb_add_adjoint_filter;
 // Passes that load the pixel at their own position; any other pass as a compute shader.
 vkb_variant_add vkb_add_pixels;
 

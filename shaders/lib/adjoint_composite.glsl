@@ -27,7 +27,7 @@ Pixel pixel_of(vec4 given, vec4 bloom, float share, vec4 cotangent)
     Pixel p;
     float exposure = exp2(params.exposure);
     p.scene = finite_or_zero(given);
-    if (GROUPS == GROUPS_GODOT)
+    if (EXPOSED_SCENE != 0)
         p.scene.rgb *= exposure;
     p.bloom = bloom;
     p.share = share;
@@ -37,7 +37,7 @@ Pixel pixel_of(vec4 given, vec4 bloom, float share, vec4 cotangent)
     // Encodings would magnify the rounding of a difference near 0.
     if (COMPOSITE == COMPOSITE_MIX)
         mixed = (1.0 - params.intensity * p.share) * p.scene.rgb + light_of(p.bloom.rgb);
-    vec3 exposed = GROUPS == GROUPS_GODOT ? mixed : mixed * exposure;
+    vec3 exposed = EXPOSED_SCENE != 0 ? mixed : mixed * exposure;
     vec3 toned = COMPOSITE == COMPOSITE_SOFT_LIGHT ? softened(p) : apply_tonemap(exposed, TONEMAP);
     vec3 by = cotangent.rgb, encoded = apply_encoding(toned, ENCODING, params.reference_white, by);
     by *= is_stored(encoded);
@@ -45,7 +45,7 @@ Pixel pixel_of(vec4 given, vec4 bloom, float share, vec4 cotangent)
     p.by_white = ENCODING == ENCODING_PQ ? dot(by, toned) / params.reference_white : 0.0;
     if (COMPOSITE != COMPOSITE_SOFT_LIGHT)
         apply_tonemap(exposed, TONEMAP, by);
-    p.by_mixed = GROUPS == GROUPS_GODOT ? by : by * exposure;
+    p.by_mixed = EXPOSED_SCENE != 0 ? by : by * exposure;
     p.by_exposure = log(2.0) * dot(by, exposed);
     return p;
 }
@@ -59,7 +59,7 @@ Parts back_screen(vec3 s, vec3 light, vec3 by)
 {
     vec3 share = light / params.white;
     vec3 by_light = (params.white - s) / params.white * inside(share, 0.0, 1.0);
-    if (GROUPS == GROUPS_GODOT)
+    if (EXPOSED_SCENE != 0)
         return Parts(by * (1.0 - clamp(share, 0.0, 1.0)), by * by_light);
     return Parts(by * (1.0 - clamp(light, 0.0, 1.0)) * inside(s, 0.0, 1.0),
                  by * (1.0 - clamp(s, 0.0, 1.0)) * inside(light, 0.0, 1.0));
@@ -119,7 +119,7 @@ float alpha_slope(Pixel p)
 vec4 by_scene(Pixel p)
 {
     vec3 colour = parts_of(p).scene;
-    if (GROUPS == GROUPS_GODOT)
+    if (EXPOSED_SCENE != 0)
         colour *= exp2(params.exposure);
     return vec4(colour, p.by_alpha * alpha_slope(p));
 }
@@ -150,7 +150,7 @@ vec4 back_on_side(vec4 given, vec4 bloom, float share, vec4 cotangent, int by)
     return by == BY_BLOOM ? by_bloom(p) : by_scene(p);
 }
 
-// GROUPS is of a bloom that a clamp keeps at 0 or above. Where it is 0, it only grows: the mean of both
+// CLAMPED is of a bloom that a clamp keeps at 0 or above. Where it is 0, it only grows: the mean of both
 // sides is that of the clamp. The same holds for the alpha of a bloom that is THRESHOLDED, where nothing is above
 // the threshold. BY_MIXED is of the picture before exposure and curves, which adds a share of the bloom to a share
 // of the scene.
@@ -160,7 +160,7 @@ vec4 back_composite(vec4 given, vec4 bloom, float share, vec4 cotangent, int by)
     vec4 up = back_on_side(given, bloom, share, cotangent, by);
     growing = false;
     vec4 mean = 0.5 * (up + back_on_side(given, bloom, share, cotangent, by));
-    bool clamped = GROUPS == GROUPS_PYGFX && by == BY_BLOOM;
+    bool clamped = CLAMPED != 0 && by == BY_BLOOM;
     if (THRESHOLDED != 0 && by == BY_BLOOM && bloom == vec4(0.0))
         mean.a = up.a;
     return mix(mean, up, clamped ? equal(bloom, vec4(0.0)) : bvec4(false));

@@ -20,7 +20,7 @@ vec3 composite(vec3 s, vec3 b, float share)
     if (COMPOSITE == COMPOSITE_SCREEN) {
         // 1 - (1 - s)(1 - b), expanded: differences from 1 lose the precision of dark values. Godot
         // has a white in place of 1, and scenes above it.
-        if (GROUPS != GROUPS_GODOT)
+        if (EXPOSED_SCENE == 0)
             s = clamp(s, 0.0, 1.0);
         return s + (params.white - s) * clamp(light_of(b) / params.white, 0.0, 1.0);
     }
@@ -92,14 +92,14 @@ vec4 finish(vec4 scene, vec4 bloom, float share, ivec2 pixel)
     vec3 colour = finite_or_zero(scene.rgb), light = bloom.rgb;
     // Godot's exposure comes before the composite, its soft light after the tone map (godotengine/godot,
     // tonemap.glsl @ 001c8c9c24dc).
-    if (GROUPS == GROUPS_GODOT)
+    if (EXPOSED_SCENE != 0)
         colour *= exposure;
     if (COMPOSITE == COMPOSITE_SOFT_LIGHT) {
         vec3 toned = apply_tonemap(colour, TONEMAP);
         return encoded(scene, bloom, soft_light(toned, apply_tonemap(light_of(light), TONEMAP)), pixel);
     }
     vec3 result = composite(colour, light, share);
-    if (GROUPS != GROUPS_GODOT)
+    if (EXPOSED_SCENE == 0)
         result *= exposure;
     return encoded(scene, bloom, apply_tonemap(result, TONEMAP), pixel);
 }

@@ -31,7 +31,7 @@ vec4 godot_sample(ivec2 pixel, ivec2 size)
     if (DIRECTION == DIRECTION_VERTICAL)
         return texelFetch(source, ivec2(pixel.x, paired(pixel.y, size.y)), 0);
     pixel.x = paired(pixel.x, size.x);
-    return dimmed(sample_at(source, place_in(source, pixel, size), vec2(0.0), SAMPLING));
+    return apply_point(POINT_BEFORE, sample_at(source, place_in(source, pixel, size), vec2(0.0), SAMPLING));
 }
 
 vec4 nine_sum()
@@ -40,7 +40,7 @@ vec4 nine_sum()
     vec4 sum = vec4(0.0);
     for (int tap = -NINE_RADIUS; tap <= NINE_RADIUS; ++tap)
         sum += nine_weight(tap)
-             * (GROUPS == GROUPS_GODOT ? godot_sample(PIXEL + tap * along, size)
+             * (TAPS == TAPS_GODOT ? godot_sample(PIXEL + tap * along, size)
                                        : hdrp_sample(PIXEL + tap * along, size));
     return sum;
 }

@@ -19,9 +19,9 @@ vec4 shade()
     if (ALPHA != ALPHA_BLUR)
         cotangent.a = 0.0;
     if (DIRECTION == DIRECTION_HORIZONTAL)
-        return gathered(back_dimmed(sample_at(source, PLACE_IN(source), vec2(0.0), SAMPLING), cotangent, 1.0));
+        return gathered(back_point(POINT_BEFORE, sample_at(source, PLACE_IN(source), vec2(0.0), SAMPLING), cotangent));
     vec4 sum = nine_sum();
     if (BY == BY_MASK)
-        return gathered(vec4(dot(glowing(sum), cotangent), 0.0, 0.0, 0.0));
-    return gathered(back_glowing(sum, mask_value() * cotangent));
+        return gathered(vec4(dot(apply_point(POINT_AFTER, sum), cotangent), 0.0, 0.0, 0.0));
+    return gathered(back_point(POINT_AFTER, sum, mask_value() * cotangent));
 }

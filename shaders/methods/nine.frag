@@ -21,7 +21,8 @@ SAMPLED_IMAGE(SLOT_SOURCE, source);
 vec4 shade()
 {
     vec4 sum = nine_sum();
-    if (GROUPS == GROUPS_HDRP_BLUR || DIRECTION == DIRECTION_HORIZONTAL)
+    if (TAPS == TAPS_HDRP || DIRECTION == DIRECTION_HORIZONTAL)
         return stored(sum);
-    return stored(FIRST_LEVEL == 0 ? params.strength * sum : mask_value() * glowing(sum));
+    return stored(POINT_AFTER == POINT_NONE ? params.strength * sum
+                                            : mask_value() * apply_point(POINT_AFTER, sum));
 }

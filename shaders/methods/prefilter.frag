@@ -1,12 +1,12 @@
-// A downsampling that is not linear in groups of its taps, and the first pass of a published method: the
-// taps and what is made of them are by GROUPS (lib/prefilter_taps.glsl).
+// A downsampling that is not linear, and the first pass of a published method: a choice of TAPS, COMBINE and point
+// functions (params.h).
 
 // Where the pass reads the image itself, as the threshold pass does.
 #define TEXEL(value) (FROM_IMAGE != 0 ? finite_or_zero(value) : (value))
 #include "lib/sampling.glsl"
 
 UNIFORM_BLOCK(PREFILTER_BLOCK);
-#include "lib/prefilters.glsl"
+#include "lib/prefilter.glsl"
 
 SAMPLED_IMAGE(SLOT_SOURCE, source);
 
@@ -17,5 +17,5 @@ SAMPLED_IMAGE(SLOT_SOURCE, source);
 vec4 shade()
 {
     Place place = EXACT == EXACT_HALF ? Place(2 * PIXEL, vec2(0.5)) : PLACE_IN(source);
-    return stored(mask_value() * made(means(place), place.part));
+    return stored(mask_value() * prefiltered(taps_at(place), place.part));
 }

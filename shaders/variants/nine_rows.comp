@@ -8,9 +8,9 @@ UNIFORM_BLOCK(PREFILTER_BLOCK);
 #include "lib/nine.glsl"
 #include "variants/pixels.glsl"
 
-const int COLUMNS = NINE_OUTPUTS, ROWS = GATHER_ROWS, TAPS = 2 * NINE_RADIUS + 1;
+const int COLUMNS = NINE_OUTPUTS, ROWS = GATHER_ROWS, TAP_NUMBER = 2 * NINE_RADIUS + 1;
 const int SAMPLES = COLUMNS + 2 * NINE_RADIUS;
-const bool IS_GODOT = GROUPS == GROUPS_GODOT;
+const bool IS_GODOT = TAPS == TAPS_GODOT;
 
 READ_IMAGE(SLOT_SOURCE, source);
 
@@ -27,7 +27,7 @@ READ_IMAGE(SLOT_SOURCE, source);
 #include "variants/store.glsl"
 #include "variants/store_float.glsl"
 
-vec4 middle(vec4 a, vec4 b)
+vec4 halfway(vec4 a, vec4 b)
 {
     return 0.5 * a + 0.5 * b;
 }
@@ -46,10 +46,10 @@ void take_samples(int first, int y, out vec4 samples[SAMPLES])
     [[unroll]] for (int i = 0; i < SAMPLES; ++i) {
         samples[i] = EXACT == EXACT_SAME
                        ? value_of(same[i])
-                       : middle(value_of(upper[2 * i]), value_of(upper[2 * i + 1]));
+                       : halfway(value_of(upper[2 * i]), value_of(upper[2 * i + 1]));
         if (IS_GODOT)
-            samples[i] = dimmed(
-                middle(samples[i], middle(value_of(lower[2 * i]), value_of(lower[2 * i + 1]))));
+            samples[i] = apply_point(POINT_BEFORE,
+                halfway(samples[i], halfway(value_of(lower[2 * i]), value_of(lower[2 * i + 1]))));
     }
     // Beyond the edges the outermost two samples alternate, of HDRP only before the first level. Otherwise the
     // first texel and the last sample are repeated. (The target's width is even for Godot.)
@@ -69,7 +69,7 @@ void write_row(int x, int y)
     take_samples(x, y, samples);
     [[unroll]] for (int i = 0; i < COLUMNS; ++i) {
         vec4 sum = vec4(0.0);
-        [[unroll]] for (int tap = 0; tap < TAPS; ++tap)
+        [[unroll]] for (int tap = 0; tap < TAP_NUMBER; ++tap)
             sum += nine_weight(tap - NINE_RADIUS) * samples[i + tap];
         pixels[i] = buffer_of(sum);
         if (IS_GODOT)

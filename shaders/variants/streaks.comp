@@ -9,7 +9,7 @@ UNIFORM_BLOCK(STREAKS_BLOCK);
 
 const int COLUMNS = STREAK_COLUMNS, ROWS = STREAK_ROWS;
 // The texels at tap 0 are those of the strip. The others are filtered.
-const int TAPS = TAP_COUNT > 2 ? TAP_COUNT : 2, FILTERED = TAPS - 1;
+const int RAY_TAPS = TAP_COUNT > 2 ? TAP_COUNT : 2, FILTERED = RAY_TAPS - 1;
 
 READ_IMAGE(SLOT_SOURCE, source);
 READ_IMAGE(SLOT_BEFORE, before);
@@ -37,9 +37,9 @@ void write_block(ivec2 first, int end)
 {
     ivec2 texels[FILTERED];
     vec2 parts[FILTERED];
-    vec4 weights[TAPS], rows[FILTERED][COLUMNS];
+    vec4 weights[RAY_TAPS], rows[FILTERED][COLUMNS];
 
-    [[unroll]] for (int tap = 0; tap < TAPS; ++tap)
+    [[unroll]] for (int tap = 0; tap < RAY_TAPS; ++tap)
         weights[tap] = params.weights[tap];
     [[unroll]] for (int tap = 0; tap < FILTERED; ++tap) {
         vec2 offset = float(tap + 1) * vec2(params.step_x, params.step_y);

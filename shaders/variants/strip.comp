@@ -15,7 +15,7 @@ const int RUN_WORDS = 1, COLUMNS = 4 / CHANNEL_BYTES;
 #endif
 const int COLUMNS_SHIFT = COLUMNS >> 1;  // the logarithm
 const int ROWS = STRIP_ROWS(CHANNEL_BYTES), LOADED = ROWS + 2 * STRIP_RADIUS;
-const int KEPT = 2 * STRIP_RADIUS, TAPS = KEPT + 1;
+const int KEPT = 2 * STRIP_RADIUS, LINE_TAPS = KEPT + 1;
 const int WAITING = STRIP_RADIUS / COLUMNS;
 const int RUNS_AT_ONCE = 2, STEP = RUNS_AT_ONCE * COLUMNS;
 // Runs of each row that are loaded before the first of them is used: llvmpipe calls a function for
@@ -36,7 +36,7 @@ uvec4 waiting[ROWS][WAITING + 1][RUN_WORDS];
 float weights[2][STRIP_RADIUS + 1], beyond[2][STRIP_RADIUS + 1];
 // The weights of a row's taps, from the uppermost texel on, and those of a run's column, to the pixels from the leftmost
 // one on.
-float row_weights[ROWS][TAPS], column_weights[COLUMNS][TAPS];
+float row_weights[ROWS][LINE_TAPS], column_weights[COLUMNS][LINE_TAPS];
 
 // The weight of a texel for the pixel `tap` before it.
 float weight_of(bool vertical, int texel, int tap, int size)
@@ -60,7 +60,7 @@ void start_weights(ivec2 first, ivec2 size)
             beyond[axis][i] = TRANSPOSED != 0 ? weight_beyond(axis == 1, i, STRIP_RADIUS) : 0.0;
         }
     [[unroll]] for (int row = 0; row < ROWS; ++row)
-        [[unroll]] for (int tap = 0; tap < TAPS; ++tap) {
+        [[unroll]] for (int tap = 0; tap < LINE_TAPS; ++tap) {
             int from = tap - STRIP_RADIUS;
             row_weights[row][tap] = weight_of(true, first.y + row + from, from, size.y);
         }
@@ -69,7 +69,7 @@ void start_weights(ivec2 first, ivec2 size)
 void start_columns(int x, int width)
 {
     [[unroll]] for (int i = 0; i < COLUMNS; ++i)
-        [[unroll]] for (int tap = 0; tap < TAPS; ++tap)
+        [[unroll]] for (int tap = 0; tap < LINE_TAPS; ++tap)
             column_weights[i][tap] = weight_of(false, x + i, STRIP_RADIUS - tap, width);
 }
 

@@ -5,7 +5,7 @@
 #include "lib/sampling.glsl"
 
 UNIFORM_BLOCK(PREFILTER_BLOCK);
-#include "lib/prefilters.glsl"
+#include "lib/prefilter.glsl"
 #include "variants/pixels.glsl"
 
 const int COLUMNS = EXACT != 0 ? TAP_COLUMNS(CHANNEL_BYTES) : 4 / CHANNEL_BYTES, ROWS = TAP_ROWS;
@@ -13,56 +13,40 @@ const int RATIO = EXACT == EXACT_HALF ? 2 : 1;
 const int KEPT = WINDOW;
 // A pixel's position in the source is this part of a texel after a texel.
 const float PART = EXACT == EXACT_HALF ? 0.5 : 0.0;
-// The taps along an axis, and the texels that they are between, from 2 before the position's on.
-const int TAPS = 5, SIDE = TAPS + 1;
+// The places of taps along an axis, and the texels that they are between, from MAX_PLACE before the position's on.
+const int PLACES = 2 * MAX_PLACE + 1, SIDE = PLACES + 1;
 const int LOADED = RATIO * COLUMNS + SIDE;
 
-#define LOAD_FROM -2
+#define LOAD_FROM -MAX_PLACE
 #include "variants/runs.glsl"
 
-// The distances of HDRP's taps along an axis. Those of other methods are whole texels, but for Filament's.
-const float HDRP_STEPS[TAPS] = float[](-HDRP_FAR, -HDRP_NEAR, 0.0, HDRP_NEAR, HDRP_FAR);
-
-// The texel at or before a tap, from the position's on.
-int texel_before(int tap)
+// The texel at or before a place (from -MAX_PLACE to MAX_PLACE), from the position's on.
+int texel_before(int at)
 {
-    return GROUPS == GROUPS_HDRP ? int(floor(PART + HDRP_STEPS[tap])) : tap - 2;
+    return are_texels() ? at : int(floor(PART + place_along(at, PART)));
 }
 
-// The distance of each tap along an axis from the first of its two texels, for a position this part of a texel after
-// a texel. Filament's taps are the second and the fourth one.
-float[TAPS] parts_of(float part)
+// The distance of each place along an axis from the first of its two texels, for a position this part of a texel after
+// a texel.
+float[PLACES] parts_of(float part)
 {
-    FilamentTaps pairs = filament_taps(vec2(part));
-    float parts[TAPS];
+    float parts[PLACES];
 
-    [[unroll]] for (int i = 0; i < TAPS; ++i) {
-        float distance = GROUPS == GROUPS_HDRP               ? HDRP_STEPS[i]
-                       : GROUPS == GROUPS_FILAMENT && i == 1 ? pairs.left.x
-                       : GROUPS == GROUPS_FILAMENT && i == 3 ? pairs.right.x
-                                                             : float(i - 2);
-        parts[i] = (part + distance) - float(texel_before(i));
-    }
+    [[unroll]] for (int i = 0; i < PLACES; ++i)
+        parts[i] = (part + place_along(i - MAX_PLACE, part)) - float(texel_before(i - MAX_PLACE));
     return parts;
-}
-
-// The numbers of a group's tap along both axes. Filament's place depends on the position, its sign does not.
-ivec2 numbers_of(int group)
-{
-    vec2 place = place_of(group, filament_taps(vec2(0.0)));
-    return 2 + ivec2(sign(place)) * mix(ivec2(1), ivec2(2), equal(abs(place), vec2(HDRP_FAR)));
 }
 
 // Of each column: its texel, the part after it, and its taps.
 int texels[COLUMNS];
-float across[COLUMNS], columns[COLUMNS][TAPS];
-vec4 rows[SIDE][TAPS * COLUMNS];
+float across[COLUMNS], columns[COLUMNS][PLACES];
+vec4 rows[SIDE][PLACES * COLUMNS];
 
-// Where the rows have a tap of a column. Taps that are whole texels apart are those of other columns, too.
-int slot(int column, int tap)
+// Where the rows have a place of a column. Places that are whole texels apart are those of other columns, too.
+int slot(int column, int place)
 {
-    bool is_shared = EXACT != 0 && GROUPS != GROUPS_HDRP && GROUPS != GROUPS_FILAMENT;
-    return (is_shared ? RATIO : TAPS) * column + tap;
+    bool is_shared = EXACT != 0 && are_texels();
+    return (is_shared ? RATIO : PLACES) * column + place;
 }
 
 vec4 blend(vec4 a, vec4 b, float part)
@@ -77,7 +61,7 @@ void keep_row(int first, int row)
     uvec4 raw[LOADED];
 
     [[unroll]] for (int kept = 1; kept < KEPT; ++kept)
-        [[unroll]] for (int i = 0; i < TAPS * COLUMNS; ++i)
+        [[unroll]] for (int i = 0; i < PLACES * COLUMNS; ++i)
             rows[kept - 1][i] = rows[kept][i];
     if (EXACT != 0)
         load_run(RATIO * first, y, raw);
@@ -85,38 +69,29 @@ void keep_row(int first, int row)
         vec4 loaded[SIDE];
         [[unroll]] for (int at = 0; at < SIDE; ++at) {
             uvec4 texel = EXACT != 0 ? raw[RATIO * i + at]
-                                     : raw_pixel(source, read_shapes[SLOT_SOURCE], clamp(texels[i] - 2 + at, 0, last.x), y);
+                                     : raw_pixel(source, read_shapes[SLOT_SOURCE], clamp(texels[i] - MAX_PLACE + at, 0, last.x), y);
             loaded[at] = value_of(FROM_IMAGE != 0 ? finite_bits(texel) : texel);
         }
-        [[unroll]] for (int tap = 0; tap < TAPS; ++tap) {
-            int at = 2 + texel_before(tap);
-            rows[KEPT - 1][slot(i, tap)] = blend(loaded[at], loaded[at + 1], columns[i][tap]);
+        [[unroll]] for (int place = 0; place < PLACES; ++place) {
+            int at = MAX_PLACE + texel_before(place - MAX_PLACE);
+            rows[KEPT - 1][slot(i, place)] = blend(loaded[at], loaded[at + 1], columns[i][place]);
         }
     }
 }
 
-vec4 tap_at(int column, float parts[TAPS], ivec2 numbers)
+vec4 tap_at(int column, float parts[PLACES], ivec2 at)
 {
-    int row = KEPT / 2 - 1 + texel_before(numbers.y), at = slot(column, numbers.x);
-    return blend(rows[row][at], rows[row + 1][at], parts[numbers.y]);
+    int row = KEPT / 2 - 1 + texel_before(at.y), place = slot(column, at.x + MAX_PLACE);
+    return blend(rows[row][place], rows[row + 1][place], parts[at.y + MAX_PLACE]);
 }
 
-vec4 prefiltered(int column, float parts[TAPS], vec2 part)
+vec4 prefiltered(int column, float parts[PLACES], vec2 part)
 {
-    vec4 found[5] = vec4[](vec4(0.0), vec4(0.0), vec4(0.0), vec4(0.0), vec4(0.0));
-    Taps taps;
+    vec4 taps[MAX_SET_TAPS];
 
-    if (!are_of_thirteen()) {
-        [[unroll]] for (int group = 0; group < 5; ++group)
-            if (group < group_count())
-                found[group] = tap_at(column, parts, numbers_of(group));
-        return made(found, part);
-    }
-    [[unroll]] for (int i = 0; i < 9; ++i)
-        taps.outer[i] = tap_at(column, parts, 2 * ivec2(i % 3, i / 3));
-    [[unroll]] for (int i = 0; i < 4; ++i)
-        taps.inner[i] = tap_at(column, parts, 1 + 2 * ivec2(i % 2, i / 2));
-    return made(group_means(taps), part);
+    [[unroll]] for (int i = 0; i < MAX_SET_TAPS; ++i)
+        taps[i] = i < tap_count() ? tap_at(column, parts, numbers_of(i)) : vec4(0.0);
+    return prefiltered(taps, part);
 }
 
 void start_columns(ivec2 first)
@@ -128,13 +103,13 @@ void start_columns(ivec2 first)
         columns[i] = parts_of(across[i]);
     }
     [[unroll]] for (int kept = 0; kept < SIDE; ++kept)
-        [[unroll]] for (int i = 0; i < TAPS * COLUMNS; ++i)
+        [[unroll]] for (int i = 0; i < PLACES * COLUMNS; ++i)
             rows[kept][i] = vec4(0.0);
 }
 
 void write_row(int first, int y, int texel, float part, int phase)
 {
-    float parts[TAPS] = parts_of(part);
+    float parts[PLACES] = parts_of(part);
     uvec4 pixels[COLUMNS];
 
     [[unroll]] for (int i = 0; i < COLUMNS; ++i)
