@@ -308,9 +308,8 @@ static void add_highlights(struct vkb_levels *levels)
     levels->count = 1;
     levels->downs[0] =
         factor == 1 ? glow : vkb_levels_image(levels, levels->sizes[0], "highlights");
-    struct vkb_pass_row row = vkb_describe_prefilter(
-        levels, factor == 1 ? VKB_PREFILTER_highlights : VKB_PREFILTER_reduced_highlights,
-        source->glow, levels->downs[0]);
+    struct vkb_pass_row row =
+        vkb_describe_prefilter(levels, VKB_PREFILTER_highlights, source->glow, levels->downs[0]);
     row.constants.mean_side = factor > 1 ? (int32_t)factor : 0;
     vkb_levels_masked(levels, &row);
     if (factor > 1)

@@ -24,7 +24,7 @@ static void begin_filter(const struct vkb_adjoint *adjoint, const struct vkb_pas
 
     vkb_filter_begin(adjoint->graph, pass->reads[SLOT_SOURCE], pass->targets[0], filter);
     filter->y.first = first;
-    if (constants->tap_set == TAPS_BLOCK) {
+    if (constants->mean_side) {
         set_block(&filter->x, constants->mean_side, false);
         set_block(&filter->y, constants->mean_side, true);
     } else {
@@ -43,12 +43,12 @@ static bool accumulate_mean(struct vkb_adjoint *adjoint, const struct vkb_pass_r
     struct vkb_filter filter;
 
     begin_filter(adjoint, pass, 0, 0, &filter);
-    if (constants->tap_set != TAPS_BLOCK
+    if (!constants->mean_side
         && !vkb_filter_mean(&filter, constants->tap_set, params->step_x, params->step_y))
         return vkb_fail(error, VKB_ERROR_GENERAL,
                         "%s: the mean of its taps has more than %d kernels", pass->name,
                         MAX_KERNELS);
-    if (constants->after == POINT_NONE && !constants->masked)
+    if (vkb_is_linear(pass))
         return vkb_accumulate_filter(adjoint, &filter, vkb_cotangent_of(adjoint, pass), source,
                                      error);
     return vkb_accumulate_through(adjoint, row, &filter, source, target, error);

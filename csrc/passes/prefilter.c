@@ -45,6 +45,11 @@ bool vkb_is_mean(const struct vkb_pass_row *pass)
     return pass->constants.combine == COMBINE_MEAN && pass->constants.before == POINT_NONE;
 }
 
+bool vkb_is_linear(const struct vkb_pass_row *pass)
+{
+    return vkb_is_mean(pass) && pass->constants.after == POINT_NONE && !pass->constants.masked;
+}
+
 #define IS_COMBINATION(name, value, weight) || combine == name
 #define SKIP_COMBINATION(name, value, weight)
 

@@ -23,8 +23,9 @@ void vkb_set_steps(struct vkb_pass_row *row, double step_x, double step_y);
 // Sets the factors of the colours. That of alpha is 1.
 void vkb_set_tint(struct vkb_pass_row *row, const float *tint);
 
-// Whether the pass combines samples themselves to their mean, which is linear.
+// Whether the pass combines samples themselves to their mean; whether that is all of it.
 bool vkb_is_mean(const struct vkb_pass_row *pass);
+bool vkb_is_linear(const struct vkb_pass_row *pass);
 
 // Whether cotangents of what it combines are those of its taps, not of its kernels.
 bool vkb_differs_by_tap(const struct vkb_pass_row *pass);

@@ -44,10 +44,10 @@ bool vkb_add_windowed(struct vkb_variant_choice *choice, const struct vkb_pass_r
     const int32_t set = pass->constants.tap_set;
     struct vkb_pass_row row;
 
-    // A block is of other texels. Variants keep the texels of a position for all of them.
-    if (!vkb_computes(pass, VKB_BLOCK_prefilter) || vkb_is_line_set(set) || set == TAPS_BLOCK
-        || pass->constants.masked || pass->params.prefilter.step_x != 1.0f
-        || pass->params.prefilter.step_y != 1.0f)
+    // Variants keep the texels around a position: a block is of others.
+    if (!vkb_computes(pass, VKB_BLOCK_prefilter) || vkb_is_line_set(set)
+        || pass->constants.mean_side || pass->constants.masked
+        || pass->params.prefilter.step_x != 1.0f || pass->params.prefilter.step_y != 1.0f)
         return false;
     const struct vkb_image_row *source = &choice->plain.images[pass->reads[SLOT_SOURCE]];
     const struct vkb_image_row *target = &choice->plain.images[pass->targets[0]];

@@ -50,26 +50,11 @@ Pixel pixel_of(vec4 given, vec4 bloom, float share, vec4 cotangent)
     return p;
 }
 
-// By the colours of the scene and by the light, i b.
-struct Parts {
-    vec3 scene, light;
-};
-
-Parts back_screen(vec3 s, vec3 light, vec3 by)
+// Of a soft light, through the tone map of both.
+Parts back_softened(Pixel p, vec3 light)
 {
-    vec3 share = light / params.white;
-    vec3 by_light = (params.white - s) / params.white * inside(share, 0.0, 1.0);
-    if (EXPOSED_SCENE != 0)
-        return Parts(by * (1.0 - clamp(share, 0.0, 1.0)), by * by_light);
-    return Parts(by * (1.0 - clamp(light, 0.0, 1.0)) * inside(s, 0.0, 1.0),
-                 by * (1.0 - clamp(s, 0.0, 1.0)) * inside(light, 0.0, 1.0));
-}
-
-Parts back_soft_light(vec3 s, vec3 light, vec3 by)
-{
-    vec3 toned = apply_tonemap(s, TONEMAP), toned_light = apply_tonemap(light, TONEMAP), lit = below(toned, 1.0);
-    Parts parts = Parts(by * (1.0 + lit * clamp(toned_light, 0.0, 1.0) * (softest_slope(toned) - 1.0)),
-                        by * lit * (softest(toned) - toned) * inside(toned_light, 0.0, 1.0));
+    vec3 s = p.scene.rgb;
+    Parts parts = back_soft_light(apply_tonemap(s, TONEMAP), apply_tonemap(light, TONEMAP), p.by_mixed);
     apply_tonemap(s, TONEMAP, parts.scene);
     apply_tonemap(light, TONEMAP, parts.light);
     return parts;
@@ -77,22 +62,9 @@ Parts back_soft_light(vec3 s, vec3 light, vec3 by)
 
 Parts parts_of(Pixel p)
 {
-    vec3 s = p.scene.rgb, light = light_of(p.bloom.rgb), by = p.by_mixed;
-    if (COMPOSITE == COMPOSITE_SCREEN)
-        return back_screen(s, light, by);
-    if (COMPOSITE == COMPOSITE_SOFT_LIGHT)
-        return back_soft_light(s, light, by);
-    if (COMPOSITE == COMPOSITE_UNCLAMPED_SCREEN)
-        return Parts(by * (1.0 - light * below(s * light, 1.0)), by * (1.0 - s * below(s * light, 1.0)));
-    if (COMPOSITE == COMPOSITE_LIGHTNESS_SCREEN) {
-        vec4 both = back_lightness_screen(s, light.r, by);
-        return Parts(both.rgb, vec3(both.a, 0.0, 0.0));
-    }
-    if (COMPOSITE == COMPOSITE_REPLACE)
-        return Parts(vec3(0.0), by);
-    if (COMPOSITE == COMPOSITE_MIX)
-        return Parts((1.0 - params.intensity * p.share) * by, by);
-    return Parts(COMPOSITE == COMPOSITE_ADD_TO_POSITIVE ? by * above(s, 0.0) : by, by);
+    vec3 light = light_of(p.bloom.rgb);
+    return COMPOSITE == COMPOSITE_SOFT_LIGHT ? back_softened(p, light)
+                                             : back_composite_formula(p.scene.rgb, light, p.share, p.by_mixed);
 }
 
 // Of the light that the alpha shows, as the alpha's cotangent weighs it.

@@ -22,7 +22,8 @@ vec4[MAX_SET_TAPS] taps_at(Place place)
     vec4 taps[MAX_SET_TAPS];
     [[unroll]] for (int i = 0; i < MAX_SET_TAPS; ++i)
         taps[i] = i < tap_count() ? sample_at(source, place, apart * place_of(i, place.part), SAMPLING) : vec4(0.0);
-    if (TAPS == TAPS_BLOCK)
+    // Only Blender's highlights are of blocks of texels.
+    if (MEAN_SIDE > 1)
         taps[0] = mean_of_texels(source, PIXEL, params.target_height, MEAN_SIDE);
     return taps;
 }

@@ -166,3 +166,29 @@ def test_functions_have_at_most_60_lines_of_code() -> None:
 def order_of(users: dict[str, set[str]]) -> list[str]:
     """Raises CycleError where there is no order."""
     return list(TopologicalSorter(users).static_order())
+
+
+#: The files that may tell a set of taps, a combination or a point function by its name; all others
+#: expand the tables, or name a row of PREFILTERS.
+CHOOSERS = 8
+
+
+def test_few_files_name_the_choices_of_prefilters() -> None:
+    table = (SHADERS / "params.h").read_text("utf-8")
+    rows = re.findall(r"^    PREFILTER\((\w+), (\w+), (\w+), (\w+), (\w+)\)", table, re.MULTILINE)
+    names = set(
+        re.findall(
+            r"^    (?:SET|LINE|AVERAGE|SUM|WITHIN|SELECT|POINT)\((\w+), \d", table, re.MULTILINE
+        )
+    )
+    assert names | {"POINT_NONE"} == {name for _, *choice in rows for name in choice}
+    texts = {
+        file: re.sub(r"//.*", "", file.read_text("utf-8"))
+        for folder in (CORE, SHADERS)
+        for file in folder.glob("*/*.*")
+    }
+    word = re.compile(rf"\b(?:{'|'.join(names)})\b")
+    choosers = [file.name for file, text in texts.items() if word.search(text)]
+    assert len(choosers) < CHOOSERS, choosers
+    methods = "".join(text for file, text in texts.items() if file.parent.name == "methods")
+    assert {name for name, *_ in rows} == set(re.findall(r"\bVKB_PREFILTER_(\w+)", methods))
