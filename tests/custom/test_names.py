@@ -128,9 +128,8 @@ def names_of(saved: set[str], others: set[str]) -> dict[str, str]:
     return names
 
 
-@pytest.fixture(scope="module")
-def known_names() -> list[str]:
-    """Names of all images of the package, as textures may be saved, and some others."""
+def find_names() -> list[str]:
+    """Return names of all images of the package, as textures may be saved, and some others."""
     found = {"foo", "Foo", "FOO", "x", "y1", "MAINPRESUB", "RGB", "n" * 31}
     for settings in EVERY:
         glare = (*STAGES[:3], Halo(), Dirt())
@@ -148,6 +147,11 @@ def known_names() -> list[str]:
     legal |= {f"saved_{name}" for name in legal if len(name) < 20}
     assert len(legal) > 100
     return sorted({change(name) for name in legal for change in (str.lower, str.upper)} - {"GLOW"})
+
+
+@pytest.fixture(scope="module")
+def known_names() -> list[str]:
+    return find_names()
 
 
 @pytest.fixture

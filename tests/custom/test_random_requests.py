@@ -16,6 +16,7 @@ from tests.custom.test_names import (
     EVERY,
     IMAGE,
     check_frames,
+    find_names,
     random_glare,
     random_passes,
     settings_of,
@@ -49,7 +50,7 @@ CHANGES: Final[dict[str, tuple[Any, ...]]] = {
 class Request(NamedTuple):
     image: Array
     settings: Settings
-    given: dict[str, Array]  # a mask and an emission, or one of them
+    given: dict[str, Any]  # a mask and an emission, or one of them
 
     def draw(self, renderer: Renderer) -> Frames:
         return renderer.apply(self.image, self.settings, **self.given)
@@ -73,7 +74,7 @@ def changed(settings: Settings, chance: random.Random) -> Settings:
     return settings
 
 
-def random_given(chance: random.Random, image: Array) -> dict[str, Array]:
+def random_given(chance: random.Random, image: Array) -> dict[str, Any]:
     return given_of([name for name in ("mask", "emission") if chance.random() < 0.3], image)
 
 
@@ -108,6 +109,11 @@ def check_request(renderer: Renderer, request: Request) -> None:
     for name, array in expected.items():
         assert frames[name].tobytes() == array.tobytes(), name
     request.check(frames)
+
+
+@pytest.fixture(scope="module")
+def known_names() -> list[str]:
+    return find_names()
 
 
 @pytest.mark.parametrize("seed", range(600 if EXHAUSTIVE else 3))
