@@ -187,13 +187,12 @@ static uint32_t add_source(struct vkb_levels *levels)
 {
     const struct vkb_settings *settings = levels->settings;
     const struct vkb_bloom_source *source = levels->source;
-    const enum vkb_mode mode = vkb_own_threshold_mode(settings);
 
     if (!vkb_method_of(settings)->published
-        || (mode == THRESHOLD_NONE && source->mask == VKB_NO_IMAGE))
+        || (!vkb_stages_have_threshold(settings) && source->mask == VKB_NO_IMAGE))
         return source->glow;
     const uint32_t image = vkb_levels_step(levels, source->buffers, "glare_source");
-    vkb_add_threshold_in(levels, mode, source->glow, source->mask, image);
+    vkb_add_stage_threshold(levels, source->glow, source->mask, image);
     return image;
 }
 

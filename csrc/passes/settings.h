@@ -122,7 +122,11 @@ struct vkb_settings {
     enum vkb_method method;
     struct vkb_values values;  // the numbers, at the offsets of vkb_value_rows
     int choices[VKB_CHOICE_COUNT];
-    int thresholded;                     // 0: threshold and knee have no effect
+    int thresholded;  // 0: threshold and knee have no effect
+    // Threshold and knee before a published method counts them in its own way, and their number: 2
+    // or 0.
+    float stage_threshold[2];
+    uint32_t stage_threshold_count;
     uint32_t bloom_width, bloom_height;  // 0: by bloom_scale
     enum vkb_format format;              // VKB_FORMAT_NONE: by the source
     float weights[MAX_WEIGHTS];

@@ -2,16 +2,16 @@
 
 #include <math.h>
 
-enum vkb_mode vkb_own_threshold_mode(const struct vkb_settings *settings)
+enum vkb_mode vkb_threshold_mode(const struct vkb_settings *settings)
 {
-    if (!settings->thresholded)
+    if (!settings->thresholded || vkb_method_of(settings)->published)
         return THRESHOLD_NONE;
     return settings->values.knee > 0.0f ? THRESHOLD_KNEE : THRESHOLD_HARD;
 }
 
-enum vkb_mode vkb_threshold_mode(const struct vkb_settings *settings)
+bool vkb_stages_have_threshold(const struct vkb_settings *settings)
 {
-    return vkb_method_of(settings)->published ? THRESHOLD_NONE : vkb_own_threshold_mode(settings);
+    return settings->stage_threshold_count > 0;
 }
 
 // The luminances of 8-bit colours, (2126 r + 7152 g + 722 b) / 10000 / 255, are integer multiples
@@ -24,37 +24,59 @@ static float between_levels(float threshold)
     return (float)((floor(threshold * steps + 0.1) + 0.5) / steps);
 }
 
-void vkb_add_threshold(struct vkb_levels *levels, uint32_t image, uint32_t mask, uint32_t glow)
+// The pass without a threshold.
+static struct vkb_pass_row describe_pass(const struct vkb_graph *graph, uint32_t image,
+                                         uint32_t mask, uint32_t glow)
 {
-    vkb_add_threshold_in(levels, vkb_threshold_mode(levels->settings), image,
-                         vkb_method_of(levels->settings)->published ? VKB_NO_IMAGE : mask, glow);
-}
-
-void vkb_add_threshold_in(struct vkb_levels *levels, enum vkb_mode mode, uint32_t image,
-                          uint32_t mask, uint32_t glow)
-{
-    const struct vkb_graph *graph = levels->graph;
-
-    if (levels->failed)
-        return;
     struct vkb_pass_row row =
         vkb_fullscreen_row(graph->images[glow].name, &vkb_shader_threshold_frag, glow);
-
-    row.constants.threshold_mode = mode;
     // Not the sampler's filter: it would spread NaN, and a threshold magnifies its rounding errors.
     // The mask is read in the same way, and may have another size than the image.
     const bool same_size = vkb_same_size(graph, image, glow)
                         && (mask == VKB_NO_IMAGE || vkb_same_size(graph, mask, glow));
+
     row.constants.sampling = same_size ? SAMPLING_TEXEL : SAMPLING_FETCH;
     vkb_read_only(&row, image);
     vkb_apply_mask(&row, mask);
     row.block = VKB_BLOCK_threshold;
-    // Without a threshold its settings stay 0, so that the pass does not depend on them.
-    if (mode != THRESHOLD_NONE)
-        vkb_params_read(row.block, &levels->settings->values, &row.params);
-    if (mode == THRESHOLD_HARD && graph->images[image].format == VKB_FORMAT_RGBA8_UNORM)
-        row.params.threshold.threshold = between_levels(row.params.threshold.threshold);
     VKB_SET_TARGET(&row, threshold, &graph->images[glow]);
+    return row;
+}
+
+static void set_threshold(const struct vkb_graph *graph, struct vkb_pass_row *row, float threshold,
+                          float knee)
+{
+    const bool levels = graph->images[row->reads[SLOT_SOURCE]].format == VKB_FORMAT_RGBA8_UNORM;
+    const bool hard = knee <= 0.0f;
+
+    row->constants.threshold_mode = hard ? THRESHOLD_HARD : THRESHOLD_KNEE;
+    row->params.threshold.threshold = hard && levels ? between_levels(threshold) : threshold;
+    row->params.threshold.knee = knee;
+}
+
+void vkb_add_threshold(struct vkb_levels *levels, uint32_t image, uint32_t mask, uint32_t glow)
+{
+    const struct vkb_settings *settings = levels->settings;
+
+    if (levels->failed)
+        return;
+    if (vkb_method_of(settings)->published)
+        mask = VKB_NO_IMAGE;
+    struct vkb_pass_row row = describe_pass(levels->graph, image, mask, glow);
+    if (vkb_threshold_mode(settings) != THRESHOLD_NONE)
+        set_threshold(levels->graph, &row, settings->values.threshold, settings->values.knee);
+    vkb_levels_pass(levels, &row);
+}
+
+void vkb_add_stage_threshold(struct vkb_levels *levels, uint32_t image, uint32_t mask,
+                             uint32_t glow)
+{
+    if (levels->failed)
+        return;
+    struct vkb_pass_row row = describe_pass(levels->graph, image, mask, glow);
+    if (vkb_stages_have_threshold(levels->settings))
+        set_threshold(levels->graph, &row, levels->settings->stage_threshold[0],
+                      levels->settings->stage_threshold[1]);
     vkb_levels_pass(levels, &row);
 }
 

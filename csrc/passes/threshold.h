@@ -6,16 +6,16 @@
 
 // How the threshold pass applies the threshold: NONE for published methods, which apply it later.
 enum vkb_mode vkb_threshold_mode(const struct vkb_settings *settings);
-// The same as if no method did.
-enum vkb_mode vkb_own_threshold_mode(const struct vkb_settings *settings);
+// Whether what the stages of a published method read has passed a threshold.
+bool vkb_stages_have_threshold(const struct vkb_settings *settings);
 
 // Adds a pass that reduces `image` to the size of `glow`, applies the threshold, and multiplies by
 // the mask (VKB_NO_IMAGE: none). Published methods apply their threshold and the mask later.
 void vkb_add_threshold(struct vkb_levels *levels, uint32_t image, uint32_t mask, uint32_t glow);
 
-// The same in a mode, with this mask.
-void vkb_add_threshold_in(struct vkb_levels *levels, enum vkb_mode mode, uint32_t image,
-                          uint32_t mask, uint32_t glow);
+// The same for the stages of glare beside a published method.
+void vkb_add_stage_threshold(struct vkb_levels *levels, uint32_t image, uint32_t mask,
+                             uint32_t glow);
 
 // Whether the row is a threshold pass that reads only the texel at each pixel's own position.
 bool vkb_is_threshold(const struct vkb_pass_row *pass);

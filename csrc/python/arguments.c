@@ -22,6 +22,8 @@ struct member {
 static const struct member settings_members[] = {
     MEMBER(vkb_settings, method, "i4"),
     MEMBER(vkb_settings, thresholded, "i4"),
+    MEMBER(vkb_settings, stage_threshold, "f4"),
+    MEMBER(vkb_settings, stage_threshold_count, "u4"),
     MEMBER(vkb_settings, bloom_width, "u4"),
     MEMBER(vkb_settings, bloom_height, "u4"),
     MEMBER(vkb_settings, format, "i4"),

@@ -20,12 +20,14 @@ from vkbloom import (
     Ghosts,
     GodotBloom,
     Halo,
+    PlayCanvasBloom,
     Pyramid,
     Renderer,
     Scene,
     Separable,
     Settings,
     Streaks,
+    UnrealBloom,
     glares,
     reference,
 )
@@ -133,6 +135,9 @@ CASES: dict[str, Case] = {
         GodotBloom(glare=(SHORT,), composite="mix", format="rgba32float", bloom_scale=0.6),
         given=("mask",),
     ),
+    # The threshold of these methods is counted otherwise in the core.
+    "unreal": Case(UnrealBloom(glare=(SHORT,), threshold=0.4, format="rgba32float")),
+    "playcanvas": Case(PlayCanvasBloom(glare=(SHORT,), threshold=0.4, format="rgba32float")),
     "no-bloom": Case(Pyramid(glare=(SHORT,), bloom=False)),
     "no-intensity": Case(Pyramid(glare=(SHORT,), intensity=0)),
 }

@@ -18,6 +18,7 @@ Values = Mapping[str, tuple[float, float, float]]
 _CODES: Final = {"f4": "f", "f8": "d", "i4": "i", "u4": "I"}
 #: Members that are arrays of numbers, and the member that counts them, if there is one.
 _COUNTS: Final[Mapping[str, str | None]] = {
+    "stage_threshold": "stage_threshold_count",
     "weights": "weight_count",
     "layers": "layer_count",
     "level_weights": "level_weight_count",

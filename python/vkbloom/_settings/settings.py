@@ -198,7 +198,11 @@ class Settings(Record):
 
     def _core_block(self) -> bytes:
         """Return the settings as the core reads them."""
-        return settings_block(self.method, vars(self) | self._core_values())
+        # What stages of glare read has passed this threshold, however the method counts its own.
+        stages = None if self.threshold is None else (self.threshold, self.knee)
+        return settings_block(
+            self.method, vars(self) | {"stage_threshold": stages} | self._core_values()
+        )
 
     def _core_values(self) -> dict[str, Any]:
         """Return what the core names or counts otherwise."""
