@@ -104,7 +104,7 @@ def has_calls_in_its_condition(blocks: dict[int, list[tuple[int, ...]]], header:
         if code == CONDITIONAL and merge in last[2:4]:
             return switched
         switched |= code == SWITCH
-        if before[0] & 0xFFFF == SELECTION_MERGE or place != header and is_loop(before):
+        if before[0] & 0xFFFF == SELECTION_MERGE or (place != header and is_loop(before)):
             place = before[1]
         elif code == BRANCH:
             place = last[1]

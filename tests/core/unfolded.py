@@ -20,6 +20,7 @@ from tests.methods.test_matrix import CASES as FORWARDS
 from tests.variants import VARIANTS, opened
 from vkbloom import Renderer, Scene, Settings, _core
 
+core: Any = _core  # fold_by_driver is in test builds only
 #: What the usual run compares: many kinds of passes, and those that weight groups of taps.
 FORWARD: Final = ("pyramid-firefly", "convolution-fixed", "flares", "tutorial", "dual-kawase")
 BACKWARD: Final = ("pygfx karis", "firefly", "bevy threshold", "blender streaks 5.2")
@@ -55,7 +56,7 @@ def main() -> None:
     for variant in VARIANTS if EXHAUSTIVE else ("auto",):
         found: list[dict[str, Any]] = []
         for by_driver in (False, True):
-            _core.fold_by_driver(by_driver)
+            core.fold_by_driver(by_driver)
             with opened(variant, "software", validation=by_driver) as renderer:
                 found.append(dict(arrays(renderer)))
         compared += len(found[0])
