@@ -106,7 +106,7 @@ vec4 by_bloom(Pixel p)
 vec4 by_values(Pixel p)
 {
     vec3 unit = COMPOSITE == COMPOSITE_MIX ? p.bloom.rgb - p.share * p.scene.rgb : p.bloom.rgb;
-    float by_intensity = dot(parts_of(p).light, unit) + dot(by_alpha_light(p), p.bloom);
+    float by_intensity = dot(parts_of(p).light, unit) + inner_product(by_alpha_light(p), p.bloom);
     return vec4(COMPOSITE == COMPOSITE_OFF ? 0.0 : by_intensity, p.by_exposure, p.by_white, 0.0);
 }
 

@@ -36,3 +36,10 @@ SPECIALIZATION_CONSTANTS(SPECIALIZATION_CONSTANT)
 #include "lib/finite.glsl"
 #include "lib/storage.glsl"
 #include "lib/threshold.glsl"
+
+// Like dot(), of which drivers choose the order: lavapipe 22.3.6 takes another one where it knows early that a channel
+// is 0.
+float inner_product(vec4 a, vec4 b)
+{
+    return a.r * b.r + a.g * b.g + a.b * b.b + a.a * b.a;
+}

@@ -196,6 +196,6 @@ vec4 back_combined(Samples samples, int count, int kernel, vec4 cotangent)
 vec4 back_kernel(vec4 kernel, float weights, vec4 tap, vec4 cotangent)
 {
     Weight weight = tap_weight(tap);
-    vec4 by_weight = vec4(weight.slope * dot(cotangent, tap - kernel), 0.0);
+    vec4 by_weight = vec4(weight.slope * inner_product(cotangent, tap - kernel), 0.0);
     return (weight.value * cotangent + by_weight) / weights;
 }

@@ -116,7 +116,7 @@ vec4 back_highlights(vec4 value, vec4 cotangent)
     vec2 kept = highlight(brightest);
     float factor = kept.x / brightest;
     // Divided first: products of small numbers are 0.
-    float slope = (kept.y - factor) * dot(cotangent, value / brightest);
+    float slope = (kept.y - factor) * inner_product(cotangent, value / brightest);
     return factor * cotangent + vec4(slope * shares_of_brightest(value.rgb), 0.0);
 }
 
@@ -261,7 +261,7 @@ vec4 back_divided(vec4 value, vec4 cotangent, float sign)
 {
     float divisor = 1.0 + sign * luminance(value), grey = dot(value.rgb, GODOT_LUMINANCE);
     float slope = sign * larger(grey, 0.0) / max(params.luminance_cap, 6.0);
-    float by_divisor = -dot(cotangent, value) / divisor / divisor;
+    float by_divisor = -inner_product(cotangent, value) / divisor / divisor;
     return cotangent / divisor + vec4(slope * by_divisor * GODOT_LUMINANCE, 0.0);
 }
 

@@ -22,6 +22,6 @@ vec4 shade()
         return gathered(back_point(POINT_BEFORE, sample_at(source, PLACE_IN(source), vec2(0.0), SAMPLING), cotangent));
     vec4 sum = nine_sum();
     if (BY == BY_MASK)
-        return gathered(vec4(dot(apply_point(POINT_AFTER, sum), cotangent), 0.0, 0.0, 0.0));
+        return gathered(vec4(inner_product(apply_point(POINT_AFTER, sum), cotangent), 0.0, 0.0, 0.0));
     return gathered(back_point(POINT_AFTER, sum, mask_value() * cotangent));
 }

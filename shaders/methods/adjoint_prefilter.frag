@@ -53,7 +53,7 @@ void start()
 vec4 shade()
 {
     if (BY == BY_MASK)
-        return gathered(vec4(dot(apply_point(POINT_AFTER, result), cotangent), 0.0, 0.0, 0.0));
+        return gathered(vec4(inner_product(apply_point(POINT_AFTER, result), cotangent), 0.0, 0.0, 0.0));
     vec4 by_combined = back_point(POINT_AFTER, result, mask_value() * cotangent);
     // What they would be multiplied by may be infinite.
     if (is_mean() || by_combined == vec4(0.0))

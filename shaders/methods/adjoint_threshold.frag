@@ -29,11 +29,11 @@ vec4 shade()
         float width = params.threshold * params.knee;
         Soft soft = soft_threshold(largest(colour.rgb), params.threshold, width, 4.0 * width + 1e-5, 1e-5);
         vec2 values = vec2(soft.by_threshold + params.knee * soft.by_width, params.threshold * soft.by_width);
-        return vec4(values * dot(cotangent, colour) * mask_value(), 0.0, 0.0);
+        return vec4(values * inner_product(cotangent, colour) * mask_value(), 0.0, 0.0);
     }
     if (BY == BY_MASK) {
         vec4 kept = apply_threshold(colour, THRESHOLD_MODE, params.threshold, params.knee);
-        return gathered(vec4(dot(kept, cotangent), 0.0, 0.0, 0.0));
+        return gathered(vec4(inner_product(kept, cotangent), 0.0, 0.0, 0.0));
     }
     return gathered(back_through_threshold(colour, mask_value() * cotangent, THRESHOLD_MODE,
                                            params.threshold, params.knee));

@@ -23,7 +23,7 @@ from vkbloom import Renderer, Scene, Settings, _core
 core: Any = _core  # fold_by_driver is in test builds only
 #: What the usual run compares: many kinds of passes, and those that weight groups of taps.
 FORWARD: Final = ("pyramid-firefly", "convolution-fixed", "flares", "tutorial", "dual-kawase")
-BACKWARD: Final = ("pygfx karis", "firefly", "bevy threshold", "blender streaks 5.2")
+BACKWARD: Final = ("pygfx karis", "firefly", "bevy threshold", "blender streaks 5.2", "godot")
 #: The size of an image, and those of cases, by name.
 SIZE: Final = (11, 14)
 SIZES: Final = {"high": (4000, 2)}
