@@ -9,6 +9,9 @@ void vkb_graph_destroy(struct vkb_graph *graph)
     vkb_free(graph->passes);
     vkb_free(graph->owned[0]);
     vkb_free(graph->owned[1]);
+    for (uint32_t i = 0; i < graph->filter_count; ++i)
+        vkb_free(graph->filters[i]);
+    vkb_free(graph->filters);
     *graph = (struct vkb_graph){0};
 }
 
@@ -145,6 +148,21 @@ bool vkb_graph_add_pass(struct vkb_graph *graph, const struct vkb_pass_row *row,
             (int32_t)vkb_storage_mode(graph->images[row->targets[0]].format);
     ++graph->pass_count;
     return true;
+}
+
+const struct vkb_filter *vkb_graph_keep_filters(struct vkb_graph *graph,
+                                                const struct vkb_filter *filters, uint32_t count,
+                                                struct vkb_error *error)
+{
+    struct vkb_filter *kept;
+
+    if (!vkb_grow(error, &graph->filters, &graph->filter_capacity, graph->filter_count + 1,
+                  sizeof *graph->filters)
+        || !(kept = vkb_alloc(error, count, sizeof *kept)))
+        return NULL;
+    memcpy(kept, filters, count * sizeof *kept);
+    graph->filters[graph->filter_count++] = kept;
+    return kept;
 }
 
 enum vkb_mode vkb_storage_mode(enum vkb_format format)

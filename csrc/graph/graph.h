@@ -3,7 +3,7 @@
 #ifndef VKB_GRAPH_H
 #define VKB_GRAPH_H
 
-#include "graph/params.h"
+#include "graph/filter.h"
 #include "graph/resource.h"
 #include "spirv.h"
 #include "vulkan/barrier.h"
@@ -110,6 +110,15 @@ enum vkb_blend {
     VKB_BLEND_ADD_RGBA,
 };
 
+// Of a pass of a convolution by transforms: the lengths of its lines along rows and columns,
+// whether these are padded, so that they may be longer, and how many stages along the same axis
+// follow each other from this one on; 0: it is not the first of them.
+struct vkb_transform {
+    uint32_t width, height;
+    bool pads_rows, pads_columns;
+    uint32_t stages;
+};
+
 // Bindings: 0 is the parameter block, then the images read, by slot, then the target of a
 // dispatch, which can be among the images read: each invocation then stores where it has loaded. A
 // skybox reads the scene's cubemap at binding 1; textured triangles read the textures
@@ -143,6 +152,16 @@ struct vkb_pass_row {
     // What the pass computes, whatever shader it has: the block, or its transpose.
     enum vkb_block block;
     bool transposed;
+    // Of a pass that is linear, but for points before and after: a filter for each of its first
+    // images, whose sum it is. The graph owns these.
+    const struct vkb_filter *filters;
+    uint32_t filter_count;
+    // Of the last of several passes that are a filter together: of two, each along one axis, or of
+    // one for each picture that a transpose adds up. The filters of the image that the first pass
+    // reads, whose sum they are.
+    const struct vkb_filter *joined;
+    uint32_t joined_from, joined_count;
+    struct vkb_transform transform;
     union vkb_params params;
 };
 
@@ -161,7 +180,10 @@ struct vkb_graph {
     struct vkb_pass_row *passes;
     uint32_t image_count, pass_count;
     size_t image_capacity, pass_capacity;
-    void *owned[2];  // pixels of images, freed with the graph
+    void *owned[2];               // pixels of images, freed with the graph
+    struct vkb_filter **filters;  // of its passes
+    uint32_t filter_count;
+    size_t filter_capacity;
     // Of levels whose width follows from the aspect of the frame: the adapter's limit; 0: none.
     uint32_t max_width;
     uint32_t layers;  // of a batch; 0: of one image
@@ -191,6 +213,11 @@ uint32_t vkb_graph_history(const struct vkb_graph *graph, uint32_t image);
 // there.
 bool vkb_graph_add_pass(struct vkb_graph *graph, const struct vkb_pass_row *row,
                         struct vkb_error *error);
+
+// A copy of filters that lives as long as the graph; NULL on failure.
+const struct vkb_filter *vkb_graph_keep_filters(struct vkb_graph *graph,
+                                                const struct vkb_filter *filters, uint32_t count,
+                                                struct vkb_error *error);
 
 // How shaders round what they store to an image of that format: of STORED_*.
 enum vkb_mode vkb_storage_mode(enum vkb_format format);

@@ -84,7 +84,7 @@ bool vkb_transpose_convolution(struct vkb_adjoint *adjoint, const struct vkb_set
     struct vkb_bloom_source source = {.buffers = extended, .glow = vkb_cotangent_of(adjoint, pass)};
     const struct vkb_image_row result = {.name = "adjoint_convolved",
                                          .format = VKB_FORMAT_RGBA32_FLOAT};
-    struct vkb_filter filter = {.kernels = 1, .gain = 1.0};
+    struct vkb_filter filter = {.kernels = 1, .gain = 1.0, .divisor = 1.0};
     struct vkb_levels levels = {
         .settings = &mirrored, .source = &source, .graph = graph, .error = error};
 

@@ -132,28 +132,28 @@ static uint32_t add_streaks(struct vkb_levels *levels)
 // The highlights blurred by a Gaussian, whose standard deviation is a third of the radius.
 static uint32_t add_blurred(struct vkb_levels *levels, uint32_t radius)
 {
-    const struct vkb_graph *graph = levels->graph;
-    struct vkb_blur blur = {
-        .direction = DIRECTION_VERTICAL,
-        .count = radius + 1,
-        .step_x = 1.0,
-        .step_y = 1.0,
-    };
+    struct vkb_kernel kernel = {.count = radius + 1, .step = 1.0};
+    struct vkb_filter filter;
     double sum = -1.0;
 
-    for (uint32_t tap = 0; tap < blur.count; ++tap) {
-        blur.weights[tap] = exp(-4.5 * tap * tap / ((double)radius * radius));
-        sum += 2.0 * blur.weights[tap];
+    for (uint32_t tap = 0; tap < kernel.count; ++tap) {
+        kernel.weights[tap] = exp(-4.5 * tap * tap / ((double)radius * radius));
+        sum += 2.0 * kernel.weights[tap];
     }
-    blur.gain = 1.0 / sum;
     const uint32_t down = vkb_levels_step(levels, levels->sizes[0], "ghost_%u_down", radius);
     const uint32_t blurred = vkb_levels_step(levels, levels->sizes[0], "ghost_%u", radius);
-    struct vkb_pass_row row =
-        vkb_blur_row(graph, graph->images[down].name, &blur, levels->downs[0], down);
-    vkb_levels_pass(levels, &row);
-    blur.direction = DIRECTION_HORIZONTAL;
-    row = vkb_blur_row(graph, graph->images[blurred].name, &blur, down, blurred);
-    vkb_levels_pass(levels, &row);
+    vkb_filter_begin(levels->graph, levels->downs[0], down, &filter);
+    filter.gain = 1.0 / sum;
+    filter.y.kernel = kernel;
+    const struct vkb_pass_row columns =
+        vkb_blur_row(levels, &filter, false, levels->downs[0], down);
+    vkb_levels_pass(levels, &columns);
+    vkb_filter_begin(levels->graph, down, blurred, &filter);
+    filter.gain = 1.0 / sum;
+    filter.x.kernel = kernel;
+    struct vkb_pass_row rows = vkb_blur_row(levels, &filter, false, down, blurred);
+    vkb_join(levels, &columns, &rows);
+    vkb_levels_pass(levels, &rows);
     return blurred;
 }
 

@@ -89,6 +89,19 @@ static uint32_t add_spectrum(const struct convolution *convolution, const char *
     return vkb_levels_target(convolution->levels, named, VKB_FORMAT_RGBA32_FLOAT, size, false);
 }
 
+static struct vkb_transform transform_of(const struct convolution *convolution, uint32_t stages)
+{
+    const struct vkb_fft_axis *x = &convolution->x, *y = &convolution->y;
+
+    return (struct vkb_transform){
+        .width = x->line.length,
+        .height = y->line.length,
+        .pads_rows = x->line.length > x->extent,
+        .pads_columns = y->line.length > y->extent,
+        .stages = stages,
+    };
+}
+
 // The pass that puts the kernel to its places in the padded lines.
 static void add_placing(const struct convolution *convolution, uint32_t kernel, uint32_t spectrum)
 {
@@ -102,6 +115,7 @@ static void add_placing(const struct convolution *convolution, uint32_t kernel, 
     row.block_width = row.block_height = PIXEL_INVOCATIONS;
     vkb_read_only(&row, kernel);
     row.block = VKB_BLOCK_fft_kernel;
+    row.transform = transform_of(convolution, 0);
     *params = (struct vkb_fft_kernel_params){
         .padded_x = (int)x->line.length,
         .boundary_x = x->boundary,
@@ -122,10 +136,14 @@ static void add_placing(const struct convolution *convolution, uint32_t kernel, 
     vkb_levels_pass(convolution->levels, &row);
 }
 
+// The row of a stage, of `stages` that follow each other from this one on; 0: from one before.
 static struct vkb_pass_row stage_row(const struct convolution *convolution,
-                                     const struct vkb_fft_stage *stage)
+                                     const struct vkb_fft_stage *stage, uint32_t stages)
 {
-    return vkb_fft_row(convolution->levels->graph, stage);
+    struct vkb_pass_row row = vkb_fft_row(convolution->levels->graph, stage);
+
+    row.transform = transform_of(convolution, stages);
+    return row;
 }
 
 // The kernel's spectrum, in place.
@@ -143,8 +161,9 @@ static void add_kernel_spectrum(const struct convolution *convolution, uint32_t 
         };
         // The first columns have the glow's pipeline, though none of their elements is padding.
         stage.padded = i == 1 && axes[i]->line.length > axes[i]->extent;
-        for (; stage.number < axes[i]->line.stage_count; ++stage.number) {
-            struct vkb_pass_row row = stage_row(convolution, &stage);
+        const uint32_t count = axes[i]->line.stage_count;
+        for (; stage.number < count; ++stage.number) {
+            struct vkb_pass_row row = stage_row(convolution, &stage, stage.number == 0 ? count : 0);
             row.params.fft.extent = INT32_MAX;
             vkb_levels_pass(convolution->levels, &row);
             stage.padded = false;
@@ -164,9 +183,10 @@ static void add_rows(const struct convolution *convolution, uint32_t rows)
         .from = convolution->levels->source->glow,
         .to = rows,
     };
+    const uint32_t count = stage.axis->line.stage_count;
 
-    for (; stage.number < stage.axis->line.stage_count; ++stage.number) {
-        struct vkb_pass_row row = stage_row(convolution, &stage);
+    for (; stage.number < count; ++stage.number) {
+        struct vkb_pass_row row = stage_row(convolution, &stage, stage.number == 0 ? count : 0);
         if (stage.number == 0) {
             row.constants.stage = STAGE_FIRST;
             row.constants.prefiltered = prefilter[1] >= prefilter[0];
@@ -195,7 +215,8 @@ static void add_columns(const struct convolution *convolution, uint32_t rows, ui
     };
 
     for (; stage.number <= last; ++stage.number) {
-        struct vkb_pass_row row = stage_row(convolution, &stage);
+        struct vkb_pass_row row =
+            stage_row(convolution, &stage, stage.number == 0 ? 2 * last + 1 : 0);
         if (stage.number == last)
             vkb_fft_multiply(&convolution->x, &convolution->y, spectrum,
                              convolution->levels->settings->kernel.grey, &row);
@@ -205,7 +226,7 @@ static void add_columns(const struct convolution *convolution, uint32_t rows, ui
     }
     stage.inverse = true;
     for (stage.number = last; stage.number-- > 0;) {
-        struct vkb_pass_row row = stage_row(convolution, &stage);
+        struct vkb_pass_row row = stage_row(convolution, &stage, 0);
         // The rows back need no other.
         if (stage.number == 0)
             row.params.fft.kept = (int)convolution->y.extent;
@@ -222,10 +243,12 @@ static void add_rows_back(const struct convolution *convolution, uint32_t column
         .inverse = true,
         .from = columns,
     };
+    const uint32_t count = stage.axis->line.stage_count;
 
-    for (stage.number = stage.axis->line.stage_count; stage.number-- > 0;) {
+    for (stage.number = count; stage.number-- > 0;) {
         stage.to = stage.number ? columns : target;
-        struct vkb_pass_row row = stage_row(convolution, &stage);
+        struct vkb_pass_row row =
+            stage_row(convolution, &stage, stage.number == count - 1 ? count : 0);
         if (stage.number == 0)
             row.constants.stage = STAGE_LAST;
         vkb_levels_pass(convolution->levels, &row);

@@ -65,12 +65,12 @@ static void add_down(struct vkb_levels *levels, uint32_t level)
 {
     const uint32_t from = levels->downs[level - 1], to = vkb_levels_down(levels, level);
     const struct vkb_size above = levels->sizes[level - 1];
-    const struct vkb_side_taps sides = {FILAMENT_OFFSET, FILAMENT_OUTER,
-                                        1.0 - 2.0 * FILAMENT_OUTER};
-    const struct vkb_taps taps = {{{sides, sides}}, .gain = 1.0};
+    struct vkb_filter filter;
 
+    vkb_filter_begin(levels->graph, from, to, &filter);
+    vkb_filter_three(&filter, FILAMENT_OFFSET, FILAMENT_OUTER);
     if (above.width % 2 == 0 && above.height % 2 == 0)
-        vkb_add_filter(levels, &taps, from, to);
+        vkb_add_filter(levels, &filter, from, to);
     else
         vkb_levels_reduce(levels, 1.0, 1.0, from, to);
 }

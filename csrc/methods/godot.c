@@ -8,6 +8,8 @@
 // Levels with a weight up to this one are left out.
 static const float MIN_WEIGHT = 1e-4f;
 
+static const struct vkb_kernel kernel = {.count = 5, .step = 1.0, .weights = {GODOT_NINE}};
+
 static void add_blur(struct vkb_levels *levels, enum vkb_mode direction, bool first, uint32_t from,
                      uint32_t to)
 {
@@ -16,10 +18,20 @@ static void add_blur(struct vkb_levels *levels, enum vkb_mode direction, bool fi
                                            ? VKB_PREFILTER_godot_across
                                            : VKB_PREFILTER_godot_down;
     struct vkb_pass_row row = vkb_describe_prefilter(levels, prefilter, from, to);
+    struct vkb_filter filter;
 
     row.constants.direction = direction;
     if (first && direction == DIRECTION_VERTICAL)
         vkb_apply_mask(&row, levels->source->mask);
+    // The first blurs are of samples of the frame at the level's pixels, and of what glows.
+    vkb_filter_begin(levels->graph, first ? to : from, to, &filter);
+    struct vkb_axis *axis = direction == DIRECTION_HORIZONTAL ? &filter.x : &filter.y;
+    axis->kernel = kernel;
+    axis->border = VKB_BORDER_PAIRS;
+    // The horizontal blur leaves the strength to the vertical one.
+    if (!first && direction == DIRECTION_VERTICAL)
+        filter.gain = row.params.prefilter.strength;
+    vkb_set_filters(levels, &row, &filter, 1);
     row.params.prefilter.exposure = first ? levels->settings->values.exposure : 0.0f;
     vkb_levels_pass(levels, &row);
 }
@@ -27,7 +39,7 @@ static void add_blur(struct vkb_levels *levels, enum vkb_mode direction, bool fi
 uint32_t vkb_add_godot(struct vkb_levels *levels)
 {
     const struct vkb_settings *settings = levels->settings;
-    const enum vkb_mode kernel = settings->values.bicubic ? UPSAMPLE_CUBIC : UPSAMPLE_LINEAR;
+    const enum vkb_mode upsample = settings->values.bicubic ? UPSAMPLE_CUBIC : UPSAMPLE_LINEAR;
     struct vkb_size size = vkb_halved(levels->source->buffers);
     double shares[GATHERED_LEVELS] = {0};
     uint32_t from = levels->source->glow;
@@ -51,6 +63,6 @@ uint32_t vkb_add_godot(struct vkb_levels *levels)
         size = vkb_halved(size);
     }
     const uint32_t bloom = vkb_levels_bloom(levels);
-    vkb_levels_gather(levels, shares, kernel, bloom);
+    vkb_levels_gather(levels, shares, upsample, bloom);
     return bloom;
 }

@@ -7,13 +7,15 @@
 // The weights of the source are rounded: they add up to 1.00004.
 static void add_down(struct vkb_levels *levels, uint32_t level, uint32_t from)
 {
-    const struct vkb_taps taps = {
-        {{{1.0, 0.125, 0.0}, {1.0, 1.0, 0.0}}, {{2.0, 0.05556, 0.05556}, {2.0, 1.0, 1.0}}},
-        .upsample = UPSAMPLE_INSIDE,
-        .gain = 1.0,
+    const struct vkb_kernel kernels[][2] = {
+        {vkb_sides(1.0, 0.125, 0.0), vkb_sides(1.0, 1.0, 0.0)},
+        {vkb_sides(2.0, 0.05556, 0.05556), vkb_sides(2.0, 1.0, 1.0)},
     };
+    const uint32_t to = vkb_levels_down(levels, level);
+    struct vkb_filter filter = vkb_make_filter(levels->graph, from, to, kernels, 2, 1.0);
 
-    vkb_add_filter(levels, &taps, from, vkb_levels_down(levels, level));
+    vkb_set_kind(&filter, UPSAMPLE_INSIDE);
+    vkb_add_filter(levels, &filter, from, to);
 }
 
 uint32_t vkb_add_pmndrs(struct vkb_levels *levels)

@@ -6,11 +6,11 @@
 
 #include <stdio.h>
 
-// Adds a blur of a layer. Taps between texels use the sampler's filter in 8 bits. Float formats are
-// filtered in the shader, since the samplers of some adapters keep only 8 bits of the position.
-static struct vkb_pass_row blur_row(const struct vkb_levels *levels, const char *name,
-                                    enum vkb_mode direction, uint32_t layer, double strength,
-                                    uint32_t from, uint32_t to)
+// The row of a blur of a layer. Taps between texels use the sampler's filter in 8 bits. Float
+// formats are filtered in the shader, since the samplers of some adapters keep only 8 bits of the
+// position.
+static struct vkb_pass_row blur_row(struct vkb_levels *levels, enum vkb_mode direction,
+                                    uint32_t layer, double strength, uint32_t from, uint32_t to)
 {
     const struct vkb_settings *settings = levels->settings;
     const struct vkb_image_row *read = &levels->graph->images[from];
@@ -21,35 +21,43 @@ static struct vkb_pass_row blur_row(const struct vkb_levels *levels, const char 
     // twice more, with the strength (as in the loop of the forward system's outline).
     const double side = settings->values.blur_strength;
     const double centre = settings->values.first_tap ? 1.0 : 1.0 + 2.0 * side;
-    struct vkb_blur blur = {
-        .direction = direction,
-        .count = settings->weight_count,
-        .gain = strength,
-        .step_x = scale,
-        .step_y = width_steps ? scale * read->height / read->width : scale,
-        .filter = levels->source->format == VKB_FORMAT_RGBA8_UNORM,
-    };
+    struct vkb_kernel kernel = {.count = settings->weight_count, .step = scale};
+    struct vkb_filter filter;
 
-    for (uint32_t tap = 0; tap < blur.count; ++tap)
-        blur.weights[tap] = (tap ? side : centre) * settings->weights[tap];
-    return vkb_blur_row(levels->graph, name, &blur, from, to);
+    for (uint32_t tap = 0; tap < kernel.count; ++tap)
+        kernel.weights[tap] = (tap ? side : centre) * settings->weights[tap];
+    vkb_filter_begin(levels->graph, from, to, &filter);
+    filter.gain = strength;
+    if (direction != DIRECTION_VERTICAL)
+        filter.x.kernel = kernel;
+    if (width_steps)
+        kernel.step = scale * read->height / read->width;
+    if (direction != DIRECTION_HORIZONTAL)
+        filter.y.kernel = kernel;
+    return vkb_blur_row(levels, &filter, levels->source->format == VKB_FORMAT_RGBA8_UNORM, from,
+                        to);
 }
 
-// Adds a pass to an intermediate image between the glow and the bloom.
-static uint32_t add_step(struct vkb_levels *levels, const char *name, bool framebuffer,
-                         enum vkb_mode direction, uint32_t layer, uint32_t from)
+// Adds a pass to an intermediate image between the glow and the bloom; `columns` is the row of the
+// pass along columns before one along rows. Returns its row.
+static struct vkb_pass_row add_step(struct vkb_levels *levels, const char *name, bool framebuffer,
+                                    enum vkb_mode direction, uint32_t layer, uint32_t from,
+                                    const struct vkb_pass_row *columns)
 {
     const struct vkb_bloom_source *source = levels->source;
     const uint32_t to =
         vkb_levels_target(levels, name, source->format, source->buffers, framebuffer);
-    const struct vkb_pass_row row = blur_row(levels, name, direction, layer, 1.0, from, to);
+    struct vkb_pass_row row = blur_row(levels, direction, layer, 1.0, from, to);
 
+    if (direction == DIRECTION_HORIZONTAL)
+        vkb_join(levels, columns, &row);
     vkb_levels_pass(levels, &row);
-    return to;
+    return row;
 }
 
-// Adds all passes of a layer except the last one. Returns the image that the last one reads.
-static uint32_t add_layer(struct vkb_levels *levels, uint32_t layer)
+// Adds all passes of a layer except the last one. Returns the image that the last one reads, and in
+// *columns the row of the pass along columns before it, if it is along rows.
+static uint32_t add_layer(struct vkb_levels *levels, uint32_t layer, struct vkb_pass_row *columns)
 {
     const struct vkb_settings *settings = levels->settings;
     const int loops = settings->values.loops;
@@ -66,12 +74,15 @@ static uint32_t add_layer(struct vkb_levels *levels, uint32_t layer)
             snprintf(name, sizeof name, "blur_vertical");
         else
             snprintf(name, sizeof name, "blur_vertical_%u_%u", l, k);
-        if (!direct)
-            image = add_step(levels, name, shown, DIRECTION_VERTICAL, layer, image);
+        if (!direct) {
+            *columns = add_step(levels, name, shown, DIRECTION_VERTICAL, layer, image, NULL);
+            image = columns->targets[0];
+        }
         snprintf(name, sizeof name, "%s_%u_%u", direct ? "blur" : "blur_horizontal", l, k);
         if (!last)
             image = add_step(levels, name, false, direct ? DIRECTION_BOTH : DIRECTION_HORIZONTAL,
-                             layer, image);
+                             layer, image, columns)
+                        .targets[0];
     }
     return image;
 }
@@ -98,23 +109,26 @@ uint32_t vkb_add_separable(struct vkb_levels *levels)
     // Blending does not round as the shaders do, so such layers are added in a separate image.
     const bool apart = vkb_formats[source->format].rounded && settings->layer_count > 1;
     const enum vkb_format format = apart ? VKB_FORMAT_RGBA32_FLOAT : source->format;
+    const bool direct = settings->values.direct;
+    struct vkb_pass_row columns[MAX_LAYERS];
     uint32_t ends[MAX_LAYERS];
-    char name[VKB_NAME_SIZE];
 
     for (uint32_t layer = 0; layer < settings->layer_count; ++layer)
-        ends[layer] = add_layer(levels, layer);
+        ends[layer] = add_layer(levels, layer, &columns[layer]);
     const uint32_t sum =
         vkb_levels_target(levels, apart ? "layers" : "bloom", format, source->final, !apart);
     // The last passes of the layers are consecutive, so they share a render pass, in which blending
     // adds them.
     for (uint32_t layer = 0; layer < settings->layer_count; ++layer) {
-        if (settings->layer_count == 1)
-            snprintf(name, sizeof name, "bloom");
-        else
-            snprintf(name, sizeof name, "bloom_%u", layer);
         struct vkb_pass_row row =
-            blur_row(levels, name, settings->values.direct ? DIRECTION_BOTH : DIRECTION_HORIZONTAL,
-                     layer, settings->layers[layer].strength, ends[layer], sum);
+            blur_row(levels, direct ? DIRECTION_BOTH : DIRECTION_HORIZONTAL, layer,
+                     settings->layers[layer].strength, ends[layer], sum);
+        if (settings->layer_count == 1)
+            snprintf(row.name, sizeof row.name, "bloom");
+        else
+            snprintf(row.name, sizeof row.name, "bloom_%u", layer);
+        if (!direct)
+            vkb_join(levels, &columns[layer], &row);
         // Blending does not clamp, and sums of the largest single floats must not overflow. (Half
         // floats have their complete range: the composite clamps a sum that overflows.)
         if (format == VKB_FORMAT_RGBA32_FLOAT)

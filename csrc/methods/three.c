@@ -6,10 +6,10 @@
 
 #include <math.h>
 
-enum { THREE_LEVELS = 5, THREE_LONGEST = 22 };
+enum { THREE_LEVELS = 5 };
 
 // The taps of each level's half-kernel, with the centre. The standard deviation is a third of this.
-static const uint32_t tap_counts[THREE_LEVELS] = {6, 10, 14, 18, THREE_LONGEST};
+static const uint32_t tap_counts[THREE_LEVELS] = {6, 10, 14, 18, 22};
 
 // The factors of the levels for a radius of 0. A radius of 1 mirrors them at 0.6.
 static const double bloom_factors[THREE_LEVELS] = {1.0, 0.8, 0.6, 0.4, 0.2};
@@ -35,34 +35,33 @@ static struct vkb_size first_of(const struct vkb_settings *settings, struct vkb_
     return (struct vkb_size){vkb_scaled(frame.width, scale), vkb_scaled(frame.height, scale)};
 }
 
-// Two neighbouring taps become one sample between them. Returns the number of taps.
-static uint32_t merge(float *weights, double *offsets, uint32_t count)
+// Two neighbouring taps become one sample between them.
+static void merge(struct vkb_kernel *kernel)
 {
     uint32_t merged = 1;
 
-    for (uint32_t i = 1; i < count; i += 2) {
-        const double a = weights[i], b = i + 1 < count ? weights[i + 1] : 0.0;
-        offsets[merged] = (i * a + (i + 1) * b) / (a + b);
-        weights[merged] = (float)(a + b);
+    for (uint32_t i = 1; i < kernel->count; i += 2) {
+        const double a = kernel->weights[i];
+        const double b = i + 1 < kernel->count ? kernel->weights[i + 1] : 0.0;
+        kernel->offsets[merged] = (i * a + (i + 1) * b) / (a + b);
+        kernel->weights[merged] = (float)(a + b);
         ++merged;
     }
-    return merged;
+    kernel->count = merged;
+    kernel->placed = true;
 }
 
 static void add_level(struct vkb_levels *levels, uint32_t level, uint32_t from)
 {
-    float weights[THREE_LONGEST + 1] = {0};
-    double offsets[THREE_LONGEST + 1] = {0};
     const double deviation = tap_counts[level] / 3.0;
-    struct vkb_kernel kernel = {.weights = weights, .count = tap_counts[level]};
+    struct vkb_kernel kernel = {.count = tap_counts[level]};
 
     for (uint32_t i = 0; i < kernel.count; ++i)
-        weights[i] = (float)(0.39894 * exp(-0.5 * i * i / (deviation * deviation)) / deviation);
-    if (levels->settings->choices[VKB_CHOICE_variant] != VARIANT_R185) {
-        kernel.count = merge(weights, offsets, kernel.count);
-        kernel.offsets = offsets;
-    }
-    vkb_levels_blur(levels, level, from, &kernel);
+        kernel.weights[i] =
+            (float)(0.39894 * exp(-0.5 * i * i / (deviation * deviation)) / deviation);
+    if (levels->settings->choices[VKB_CHOICE_variant] != VARIANT_R185)
+        merge(&kernel);
+    vkb_levels_blur(levels, level, from, &kernel, UPSAMPLE_LINEAR);
 }
 
 // Multiplies the levels by the tints, three factors for each level.

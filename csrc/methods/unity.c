@@ -9,10 +9,11 @@
 #include <math.h>
 
 // URP's half-kernel: the binomial coefficients of 12 without the outer ones.
-static const float urp_weights[] = {0.22702703f, 0.19459459f, 0.12162162f, 0.05405405f,
-                                    0.01621622f};
-
-enum { WEIGHT_COUNT = 5 };
+static const struct vkb_kernel urp_kernel = {
+    .count = 5,
+    .step = 2.0,
+    .weights = {0.22702703f, 0.19459459f, 0.12162162f, 0.05405405f, 0.01621622f},
+};
 
 // HDRP treats frames below this size as small.
 enum { HDRP_MIN_WIDTH = 800, HDRP_MIN_HEIGHT = 450 };
@@ -32,7 +33,7 @@ static uint32_t level_count(uint32_t width, uint32_t height, double spared, int 
 }
 
 // How URP enlarges levels; its two newer filters the last one alone.
-static enum vkb_mode urp_kernel(const struct vkb_levels *levels)
+static enum vkb_mode urp_upsample(const struct vkb_levels *levels)
 {
     return levels->settings->values.high_quality_filtering ? UPSAMPLE_CUBIC : UPSAMPLE_LINEAR;
 }
@@ -42,14 +43,12 @@ typedef uint32_t add_urp(struct vkb_levels *levels);
 
 static uint32_t add_gaussian(struct vkb_levels *levels)
 {
-    const struct vkb_combination combination = scattered(levels->settings, urp_kernel(levels));
-    const struct vkb_kernel kernel = {.weights = urp_weights,
-                                      .count = WEIGHT_COUNT,
-                                      .step_x = 2.0,
-                                      .inset = !levels->settings->values.urp_12};
+    const struct vkb_combination combination = scattered(levels->settings, urp_upsample(levels));
+    const enum vkb_mode kind =
+        levels->settings->values.urp_12 ? UPSAMPLE_LINEAR : UPSAMPLE_INSET_LINEAR;
 
     for (uint32_t level = 1; level < levels->count; ++level)
-        vkb_levels_blur(levels, level, levels->downs[level - 1], &kernel);
+        vkb_levels_blur(levels, level, levels->downs[level - 1], &urp_kernel, kind);
     return vkb_levels_combine(levels, &combination);
 }
 
@@ -64,15 +63,15 @@ static uint32_t add_kawase(struct vkb_levels *levels)
     for (uint32_t i = 0; i < levels->count; ++i) {
         const double distance = 0.5 + (i > levels->count / 2 ? i - 1 : i);
         const uint32_t to = vkb_levels_image(levels, levels->sizes[0], "kawase_%u", i);
-        const struct vkb_taps taps = {
-            {{{0.0, 0.0, 1.0 - share}, {0.0, 0.0, 1.0}},
-             {{distance, 0.5 * share, 0.0}, {distance, 0.5, 0.0}}},
-            .gain = 1.0,
+        const struct vkb_kernel kernels[][2] = {
+            {vkb_sides(0.0, 0.0, 1.0 - share), vkb_centre()},
+            {vkb_sides(distance, 0.5 * share, 0.0), vkb_sides(distance, 0.5, 0.0)},
         };
-        vkb_add_filter(levels, &taps, from, to);
+        const struct vkb_filter filter = vkb_make_filter(levels->graph, from, to, kernels, 2, 1.0);
+        vkb_add_filter(levels, &filter, from, to);
         from = to;
     }
-    return vkb_levels_enlarge(levels, urp_kernel(levels), from, 1.0);
+    return vkb_levels_enlarge(levels, urp_upsample(levels), from, 1.0);
 }
 
 // URP 17: dual Kawase, whose way up begins with the last level and adds no other.
@@ -82,7 +81,7 @@ static uint32_t add_dual(struct vkb_levels *levels)
 
     for (uint32_t level = 1; level < levels->count; ++level)
         vkb_kawase_down(levels, 1.0, levels->downs[level - 1], vkb_levels_down(levels, level));
-    return vkb_levels_enlarge(levels, urp_kernel(levels), vkb_kawase_rise(levels, offset), 1.0);
+    return vkb_levels_enlarge(levels, urp_upsample(levels), vkb_kawase_rise(levels, offset), 1.0);
 }
 
 static add_urp *const urp_filters[] = {
@@ -131,10 +130,13 @@ static uint32_t rounded(uint32_t side, double scale, uint32_t level)
     return size < 1.0 ? 1 : (uint32_t)size;
 }
 
-static void add_hdrp_blur(struct vkb_levels *levels, enum vkb_mode direction, bool first,
-                          uint32_t from, uint32_t to)
+static const struct vkb_kernel hdrp_kernel = {.count = 5, .step = 1.0, .weights = {HDRP_NINE}};
+
+static struct vkb_pass_row hdrp_blur_row(struct vkb_levels *levels, enum vkb_mode direction,
+                                         bool first, uint32_t from, uint32_t to)
 {
     struct vkb_pass_row row = vkb_describe_prefilter(levels, VKB_PREFILTER_hdrp_level, from, to);
+    struct vkb_filter filter;
     const struct vkb_image_row *source = &levels->graph->images[from];
     const struct vkb_image_row *target = &levels->graph->images[to];
 
@@ -143,7 +145,12 @@ static void add_hdrp_blur(struct vkb_levels *levels, enum vkb_mode direction, bo
     if (direction == DIRECTION_HORIZONTAL ? source->width == 2 * target->width
                                           : source->height == 2 * target->height)
         row.constants.sampling = SAMPLING_TEXEL;
-    vkb_levels_pass(levels, &row);
+    vkb_filter_begin(levels->graph, from, to, &filter);
+    struct vkb_axis *axis = direction == DIRECTION_HORIZONTAL ? &filter.x : &filter.y;
+    axis->kernel = hdrp_kernel;
+    axis->border = first ? VKB_BORDER_FIRST_TWO : VKB_BORDER_LAST;
+    vkb_set_filters(levels, &row, &filter, 1);
+    return row;
 }
 
 // A level from the image above it: a horizontal blur at the height of that image, then a vertical
@@ -154,8 +161,13 @@ static void add_hdrp_level(struct vkb_levels *levels, uint32_t level, uint32_t f
     const struct vkb_size middle = {size.width, levels->graph->images[from].height};
     const uint32_t step = vkb_levels_step(levels, middle, "down_%u_across", level);
 
-    add_hdrp_blur(levels, DIRECTION_HORIZONTAL, level == 0, from, step);
-    add_hdrp_blur(levels, DIRECTION_VERTICAL, level == 0, step, vkb_levels_down(levels, level));
+    const struct vkb_pass_row rows =
+        hdrp_blur_row(levels, DIRECTION_HORIZONTAL, level == 0, from, step);
+    vkb_levels_pass(levels, &rows);
+    struct vkb_pass_row columns =
+        hdrp_blur_row(levels, DIRECTION_VERTICAL, level == 0, step, vkb_levels_down(levels, level));
+    vkb_join(levels, &rows, &columns);
+    vkb_levels_pass(levels, &columns);
 }
 
 uint32_t vkb_add_hdrp(struct vkb_levels *levels)

@@ -113,65 +113,96 @@ bool vkb_add_adjoint_image(struct vkb_adjoint *adjoint, const struct vkb_pass_ro
     return vkb_add_adjoint_row(adjoint, &row, size, image, error);
 }
 
-// A row along one axis, or both, with their tables.
-static bool make_filter_row(struct vkb_adjoint *adjoint, const struct vkb_filter *filter,
-                            enum vkb_mode direction, uint32_t cotangents, struct vkb_pass_row *row,
-                            struct vkb_error *error)
+// A copy of the filter for rows of its transpose along one axis, or both, whose weights are in the
+// table; NULL on failure.
+static const struct vkb_filter *add_weights(struct vkb_adjoint *adjoint,
+                                            const struct vkb_filter *given, enum vkb_mode direction,
+                                            struct vkb_error *error)
 {
-    struct vkb_adjoint_filter_params *params = &row->params.adjoint_filter;
+    struct vkb_filter filter = *given;
 
-    *row = vkb_adjoint_row(&vkb_shader_adjoint_filter_frag, cotangents);
-    row->reads[SLOT_WEIGHTS] = adjoint->table_image;
-    row->constants.direction = direction;
-    row->constants.kernels = (int32_t)filter->kernels;
-    row->block = VKB_BLOCK_adjoint_filter;
-    params->gain = (float)filter->gain;
-    params->share = 1.0f;
+    vkb_axis_keep(&filter.x);
+    vkb_axis_keep(&filter.y);
     return (direction == DIRECTION_VERTICAL
-            || vkb_axis_transpose(&filter->x, filter->kernels, &adjoint->table, &params->start_x,
-                                  &params->span_x, error))
-        && (direction == DIRECTION_HORIZONTAL
-            || vkb_axis_transpose(&filter->y, filter->kernels, &adjoint->table, &params->start_y,
-                                  &params->span_y, error));
+            || vkb_axis_transpose(&filter.x, filter.kernels, &adjoint->table, error))
+                && (direction == DIRECTION_HORIZONTAL
+                    || vkb_axis_transpose(&filter.y, filter.kernels, &adjoint->table, error))
+             ? vkb_graph_keep_filters(adjoint->graph, &filter, 1, error)
+             : NULL;
+}
+
+// The row of the transpose along one axis, or both, of a filter by add_weights().
+static struct vkb_pass_row filter_row(const struct vkb_adjoint *adjoint,
+                                      const struct vkb_filter *filter, enum vkb_mode direction,
+                                      uint32_t cotangents)
+{
+    struct vkb_pass_row row = vkb_adjoint_row(&vkb_shader_adjoint_filter_frag, cotangents);
+    struct vkb_adjoint_filter_params *params = &row.params.adjoint_filter;
+
+    row.reads[SLOT_WEIGHTS] = adjoint->table_image;
+    row.constants.direction = direction;
+    row.constants.kernels = (int32_t)filter->kernels;
+    row.block = VKB_BLOCK_adjoint_filter;
+    row.filters = filter;
+    row.filter_count = 1;
+    params->gain = (float)(filter->gain / filter->divisor);
+    params->share = 1.0f;
+    if (direction != DIRECTION_VERTICAL) {
+        params->start_x = filter->x.readers.start;
+        params->span_x = filter->x.readers.span;
+    }
+    if (direction != DIRECTION_HORIZONTAL) {
+        params->start_y = filter->y.readers.start;
+        params->span_y = filter->y.readers.span;
+    }
+    return row;
 }
 
 static bool accumulate_along(struct vkb_adjoint *adjoint, const struct vkb_filter *filter,
                              enum vkb_mode direction, uint32_t cotangents, uint32_t image,
                              struct vkb_error *error)
 {
-    struct vkb_pass_row row;
+    const struct vkb_filter *weighted = add_weights(adjoint, filter, direction, error);
 
-    return make_filter_row(adjoint, filter, direction, cotangents, &row, error)
-        && vkb_accumulate_cotangent(adjoint, &row, image, error);
+    if (!weighted)
+        return false;
+    const struct vkb_pass_row row = filter_row(adjoint, weighted, direction, cotangents);
+    return vkb_accumulate_cotangent(adjoint, &row, image, error);
 }
 
 // Along one axis to an image between, then along the other one.
-static bool accumulate_twice(struct vkb_adjoint *adjoint, const struct vkb_filter *filter,
+static bool accumulate_twice(struct vkb_adjoint *adjoint, const struct vkb_filter *given,
                              uint32_t cotangents, uint32_t image, struct vkb_error *error)
 {
-    const struct vkb_axis *x = &filter->x, *y = &filter->y;
+    const struct vkb_filter *filter = add_weights(adjoint, given, DIRECTION_BOTH, error);
+    const struct vkb_axis *x = &given->x, *y = &given->y;
     // Only the table of columns knows where the first row is.
     const bool rows = y->first == 0 && (uint64_t)x->from * y->to < (uint64_t)x->to * y->from;
     const struct vkb_size size = {rows ? x->from : x->to, rows ? y->to : y->from};
-    struct vkb_pass_row row;
     uint32_t between;
 
-    if (!make_filter_row(adjoint, filter, rows ? DIRECTION_HORIZONTAL : DIRECTION_VERTICAL,
-                         cotangents, &row, error))
+    if (!filter)
         return false;
+    struct vkb_pass_row row =
+        filter_row(adjoint, filter, rows ? DIRECTION_HORIZONTAL : DIRECTION_VERTICAL, cotangents);
     row.params.adjoint_filter.gain = 1.0f;
-    return vkb_add_adjoint_image(adjoint, &row, size, &between, error)
-        && accumulate_along(adjoint, filter, rows ? DIRECTION_VERTICAL : DIRECTION_HORIZONTAL,
-                            between, image, error);
+    if (!vkb_add_adjoint_image(adjoint, &row, size, &between, error))
+        return false;
+    row = filter_row(adjoint, filter, rows ? DIRECTION_VERTICAL : DIRECTION_HORIZONTAL, between);
+    row.joined = filter;
+    row.joined_from = cotangents;
+    row.joined_count = 1;
+    return vkb_accumulate_cotangent(adjoint, &row, image, error);
 }
 
 // Whether the filter leaves the cotangents as they are, and nothing is added to them.
 static bool keeps_cotangents(const struct vkb_adjoint *adjoint, const struct vkb_filter *filter,
                              uint32_t image)
 {
-    return filter->kernels == 1 && filter->gain == 1.0 && vkb_axis_is_identity(&filter->x)
-        && vkb_axis_is_identity(&filter->y) && adjoint->cotangents[image] == VKB_NO_IMAGE
-        && image != adjoint->glow && !vkb_is_given(&adjoint->graph->images[image]);
+    return filter->kernels == 1 && filter->gain == filter->divisor
+        && vkb_axis_is_identity(&filter->x) && vkb_axis_is_identity(&filter->y)
+        && adjoint->cotangents[image] == VKB_NO_IMAGE && image != adjoint->glow
+        && !vkb_is_given(&adjoint->graph->images[image]);
 }
 
 // A filter whose texels many pixels read, for each of its kernels by itself: along one axis, then
@@ -199,6 +230,13 @@ static enum vkb_mode direction_of(const struct vkb_filter *filter)
                                             : DIRECTION_BOTH;
 }
 
+// Whether the filter is one row.
+static bool is_one_row(const struct vkb_filter *filter)
+{
+    return direction_of(filter) != DIRECTION_BOTH
+        || vkb_axis_readers(&filter->x) * vkb_axis_readers(&filter->y) <= MAX_IN_ONE_PASS;
+}
+
 bool vkb_accumulate_filter(struct vkb_adjoint *adjoint, const struct vkb_filter *filter,
                            uint32_t cotangents, uint32_t image, struct vkb_error *error)
 {
@@ -207,9 +245,7 @@ bool vkb_accumulate_filter(struct vkb_adjoint *adjoint, const struct vkb_filter 
         return true;
     }
     const enum vkb_mode direction = direction_of(filter);
-    const bool reads_many =
-        direction == DIRECTION_BOTH
-        && vkb_axis_readers(&filter->x) * vkb_axis_readers(&filter->y) > MAX_IN_ONE_PASS;
+    const bool reads_many = !is_one_row(filter);
 
     if (reads_many && filter->kernels == 1)
         return accumulate_twice(adjoint, filter, cotangents, image, error);
@@ -219,14 +255,45 @@ bool vkb_accumulate_filter(struct vkb_adjoint *adjoint, const struct vkb_filter 
     return accumulate_along(adjoint, filter, direction, cotangents, image, error);
 }
 
+bool vkb_accumulate_pictures(struct vkb_adjoint *adjoint, const struct vkb_filter *filters,
+                             uint32_t count, uint32_t cotangents, uint32_t image,
+                             struct vkb_error *error)
+{
+    const struct vkb_graph *graph = adjoint->graph;
+    struct vkb_filter joined[MAX_PICTURES];
+    uint32_t rows = 0;
+    bool joins = true;
+
+    for (uint32_t i = 0; i < count; ++i) {
+        const uint32_t before = graph->pass_count;
+        if (!vkb_accumulate_filter(adjoint, &filters[i], cotangents, image, error))
+            return false;
+        joins = joins && i < MAX_PICTURES && is_one_row(&filters[i]) && filters[i].kernels == 1
+             && filters[i].gain == filters[0].gain;
+        // The first one may leave the cotangents as they are.
+        if (joins && graph->pass_count > before)
+            joined[rows++] = *graph->passes[graph->pass_count - 1].filters;
+    }
+    if (!joins || rows < 2)
+        return true;
+    struct vkb_pass_row *last = &graph->passes[graph->pass_count - 1];
+    last->joined = vkb_graph_keep_filters(adjoint->graph, joined, rows, error);
+    last->joined_from = cotangents;
+    last->joined_count = rows;
+    return last->joined != NULL;
+}
+
 bool vkb_filter_to_image(struct vkb_adjoint *adjoint, const struct vkb_filter *filter,
                          uint32_t cotangents, struct vkb_size size, uint32_t *image,
                          struct vkb_error *error)
 {
-    struct vkb_pass_row row;
+    const enum vkb_mode direction = direction_of(filter);
+    const struct vkb_filter *weighted = add_weights(adjoint, filter, direction, error);
 
-    return make_filter_row(adjoint, filter, direction_of(filter), cotangents, &row, error)
-        && vkb_add_adjoint_image(adjoint, &row, size, image, error);
+    if (!weighted)
+        return false;
+    const struct vkb_pass_row row = filter_row(adjoint, weighted, direction, cotangents);
+    return vkb_add_adjoint_image(adjoint, &row, size, image, error);
 }
 
 bool vkb_accumulate_through(struct vkb_adjoint *adjoint, const struct vkb_pass_row *row,

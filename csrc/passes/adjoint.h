@@ -54,6 +54,11 @@ bool vkb_end_scene(struct vkb_adjoint *adjoint, struct vkb_error *error);
 bool vkb_accumulate_filter(struct vkb_adjoint *adjoint, const struct vkb_filter *filter,
                            uint32_t cotangents, uint32_t image, struct vkb_error *error);
 
+// The same of several pictures below each other in one image of cotangents, a filter each.
+bool vkb_accumulate_pictures(struct vkb_adjoint *adjoint, const struct vkb_filter *filters,
+                             uint32_t count, uint32_t cotangents, uint32_t image,
+                             struct vkb_error *error);
+
 // Adds the row with a new image of `size` as its target.
 bool vkb_add_adjoint_row(struct vkb_adjoint *adjoint, struct vkb_pass_row *row,
                          struct vkb_size size, uint32_t *image, struct vkb_error *error);
@@ -90,9 +95,11 @@ bool vkb_accumulate_mask(struct vkb_adjoint *adjoint, const struct vkb_pass_row 
 bool vkb_add_sums(struct vkb_adjoint *adjoint, const struct vkb_pass_row *row, struct vkb_size size,
                   const char *name, struct vkb_error *error);
 
-// The families of passes.
+// The families of passes. Of what is linear: by the filters of the row.
+vkb_transpose vkb_transpose_filters;
 vkb_transpose vkb_transpose_composite, vkb_transpose_threshold;
-vkb_transpose vkb_transpose_blur, vkb_transpose_filter, vkb_transpose_gather, vkb_transpose_nine;
+// Godot's blurs of nine taps of the frame.
+vkb_transpose vkb_transpose_nine;
 // Passes that are no filters.
 vkb_transpose vkb_transpose_prefilter;
 // Glare.

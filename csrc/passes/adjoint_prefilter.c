@@ -62,19 +62,16 @@ static bool accumulate_stacked(struct vkb_adjoint *adjoint, const struct vkb_pas
     const struct vkb_image_row *target = &adjoint->graph->images[pass->targets[0]];
     const uint32_t height = target->height;
     const struct vkb_size size = {target->width, count * height};
+    struct vkb_filter filters[MAX_SET_TAPS];
     struct vkb_pass_row row = *given;
-    struct vkb_filter filter;
     uint32_t image;
 
     row.constants.stacked_samples = (int32_t)count;
     if (!vkb_add_adjoint_image(adjoint, &row, size, &image, error))
         return false;
-    for (uint32_t kernel = 0; kernel < count; ++kernel) {
-        begin_filter(adjoint, pass, kernel, kernel * height, &filter);
-        if (!vkb_accumulate_filter(adjoint, &filter, image, pass->reads[SLOT_SOURCE], error))
-            return false;
-    }
-    return true;
+    for (uint32_t kernel = 0; kernel < count; ++kernel)
+        begin_filter(adjoint, pass, kernel, kernel * height, &filters[kernel]);
+    return vkb_accumulate_pictures(adjoint, filters, count, image, pass->reads[SLOT_SOURCE], error);
 }
 
 // Each kernel by a pass of its own: if there is one, or if an image of all would be too high.
@@ -103,7 +100,9 @@ bool vkb_transpose_prefilter(struct vkb_adjoint *adjoint, const struct vkb_pass_
     const uint32_t target = pass->targets[0], height = graph->images[target].height;
 
     if (vkb_is_line_set(set))
-        return vkb_transpose_nine(adjoint, pass, error);
+        return (pass->constants.before || pass->constants.after
+                    ? vkb_transpose_nine
+                    : vkb_transpose_filters)(adjoint, pass, error);
     const uint32_t count = vkb_differs_by_tap(pass) ? vkb_count_taps(set) : vkb_count_kernels(set);
     const bool stacked = count > 1 && (uint64_t)count * height <= adjoint->max_side;
     struct vkb_pass_row row = vkb_slope_row(adjoint, pass, &vkb_shader_adjoint_prefilter_frag);

@@ -1,85 +1,110 @@
 #include "passes/blur.h"
 
 #include <math.h>
-#include <string.h>
 
 static bool is_integer(double number)
 {
     return floor(number) == number;
 }
 
-// Distributes each tap to the texels on both sides of it. False if the result is longer than
+// Distributes each tap to the texels on both sides of it, unless the result is longer than
 // LINE_RADIUS.
-static bool move_to_texels(const struct vkb_blur *blur, double step, double weights[MAX_WEIGHTS],
-                           uint32_t *count)
+static void move_to_texels(struct vkb_kernel *kernel)
 {
-    const double last = ceil((blur->count - 1) * step);
+    const double last = ceil((kernel->count - 1) * kernel->step);
+    struct vkb_kernel moved = {.count = (uint32_t)last + 1, .step = 1.0};
 
     if (last > LINE_RADIUS)
-        return false;
-    memset(weights, 0, MAX_WEIGHTS * sizeof *weights);
-    weights[0] = blur->weights[0];
-    for (uint32_t tap = 1; tap < blur->count; ++tap) {
-        const double at = tap * step, part = at - floor(at);
+        return;
+    moved.weights[0] = kernel->weights[0];
+    for (uint32_t tap = 1; tap < kernel->count; ++tap) {
+        const double at = tap * kernel->step, part = at - floor(at);
         const int texel = (int)floor(at);
         // The taps on both sides contribute to the centre texel.
-        weights[texel] += (texel == 0 ? 2.0 : 1.0) * (1.0 - part) * blur->weights[tap];
+        moved.weights[texel] += (texel == 0 ? 2.0 : 1.0) * (1.0 - part) * kernel->weights[tap];
         if (part > 0.0)
-            weights[texel + 1] += part * blur->weights[tap];
+            moved.weights[texel + 1] += part * kernel->weights[tap];
     }
-    *count = (uint32_t)last + 1;
-    while (*count > 1 && weights[*count - 1] == 0.0)
-        --*count;
-    return true;
+    while (moved.count > 1 && moved.weights[moved.count - 1] == 0.0)
+        --moved.count;
+    *kernel = moved;
 }
 
-struct vkb_pass_row vkb_blur_row(const struct vkb_graph *graph, const char *name,
-                                 const struct vkb_blur *blur, uint32_t from, uint32_t to)
+static bool keeps_size(const struct vkb_filter *filter)
 {
-    struct vkb_pass_row row = vkb_fullscreen_row(name, &vkb_shader_blur_frag, to);
-    const bool same_size = vkb_same_size(graph, from, to);
-    const bool vertical = blur->direction == DIRECTION_VERTICAL;
-    const double step = vertical ? blur->step_y : blur->step_x;
-    struct vkb_blur_params *params = &row.params.blur;
-    struct vkb_blur moved = *blur;
+    return filter->x.from == filter->x.to && filter->y.from == filter->y.to;
+}
 
-    if (!blur->offsets && !blur->inset && blur->direction != DIRECTION_BOTH
-        && (same_size || is_integer(step))
-        && move_to_texels(blur, step, moved.weights, &moved.count))
-        moved.step_x = moved.step_y = 1.0;
+static bool is_on_texels(const struct vkb_filter *filter)
+{
+    return is_integer(filter->x.kernel.step) && is_integer(filter->y.kernel.step)
+        && !filter->x.kernel.placed && !filter->y.kernel.placed
+        && filter->x.kind == UPSAMPLE_LINEAR;
+}
+
+void vkb_fill_weights(const struct vkb_kernel *kernel, double gain, float (*weights)[4])
+{
+    for (uint32_t i = 0; i < kernel->count; ++i)
+        weights[i / 4][i % 4] = (float)(gain * kernel->weights[i]);
+}
+
+struct vkb_pass_row vkb_blur_row(struct vkb_levels *levels, const struct vkb_filter *given,
+                                 bool sampled, uint32_t from, uint32_t to)
+{
+    const struct vkb_image_row *target = &levels->graph->images[to];
+    struct vkb_pass_row row = vkb_fullscreen_row(target->name, &vkb_shader_blur_frag, to);
+    struct vkb_blur_params *params = &row.params.blur;
+    struct vkb_filter filter = *given;
+    const enum vkb_mode direction = !filter.x.kernel.count ? DIRECTION_VERTICAL
+                                  : !filter.y.kernel.count ? DIRECTION_HORIZONTAL
+                                                           : DIRECTION_BOTH;
+    const bool both = direction == DIRECTION_BOTH;
+    struct vkb_kernel *kernel =
+        direction == DIRECTION_VERTICAL ? &filter.y.kernel : &filter.x.kernel;
+
+    if (!kernel->placed && filter.x.kind == UPSAMPLE_LINEAR && !both
+        && (keeps_size(&filter) || is_integer(kernel->step)))
+        move_to_texels(kernel);
     vkb_read_only(&row, from);
     row.block = VKB_BLOCK_blur;
-    params->step_x = blur->direction == DIRECTION_VERTICAL ? 0.0f : (float)moved.step_x;
-    params->step_y = blur->direction == DIRECTION_HORIZONTAL ? 0.0f : (float)moved.step_y;
-    VKB_SET_TARGET(&row, blur, &graph->images[to]);
-    // In one direction the gain is part of the weights, so that variants need not apply it.
-    params->gain = blur->direction == DIRECTION_BOTH ? (float)blur->gain : 1.0f;
-    for (uint32_t i = 0; i < moved.count; ++i) {
-        const double gain = blur->direction == DIRECTION_BOTH ? 1.0 : blur->gain;
-        params->weights[i / 4][i % 4] = (float)(gain * moved.weights[i]);
-    }
-    for (uint32_t i = 0; blur->offsets && i < moved.count; ++i)
-        params->offsets[i / 4][i % 4] = (float)blur->offsets[i];
-    row.constants.placed = blur->offsets != NULL;
-    row.constants.direction = blur->direction;
-    if (blur->inset)
-        row.constants.upsample = UPSAMPLE_INSET_LINEAR;
-    row.constants.radius = (int32_t)moved.count - 1;
-    row.constants.sampling = !blur->offsets && !blur->inset && same_size
-                                  && is_integer(params->step_x) && is_integer(params->step_y)
-                               ? SAMPLING_TEXEL
-                           : blur->filter ? SAMPLING_FILTER
-                                          : SAMPLING_FETCH;
+    params->step_x = (float)filter.x.kernel.step;
+    params->step_y = (float)filter.y.kernel.step;
+    VKB_SET_TARGET(&row, blur, target);
+    // Along one axis the gain is part of the weights, so that variants need not apply it.
+    params->gain = both ? (float)filter.gain : 1.0f;
+    vkb_fill_weights(kernel, both ? 1.0 : filter.gain, params->weights);
+    for (uint32_t i = 0; kernel->placed && i < kernel->count; ++i)
+        params->offsets[i / 4][i % 4] = (float)kernel->offsets[i];
+    row.constants.placed = kernel->placed;
+    row.constants.direction = direction;
+    if (filter.x.kind != UPSAMPLE_LINEAR)
+        row.constants.upsample = filter.x.kind;
+    row.constants.radius = (int32_t)kernel->count - 1;
+    row.constants.sampling = keeps_size(&filter) && is_on_texels(&filter) ? SAMPLING_TEXEL
+                           : sampled                                      ? SAMPLING_FILTER
+                                                                          : SAMPLING_FETCH;
+    vkb_set_filters(levels, &row, &filter, 1);
     return row;
 }
 
-bool vkb_is_line(const struct vkb_pass_row *pass, enum vkb_mode direction, int limit)
+const struct vkb_kernel *vkb_texel_kernel(const struct vkb_axis *axis, uint32_t limit)
 {
-    const struct vkb_blur_params *params = &pass->params.blur;
-    const bool vertical = direction == DIRECTION_VERTICAL;
+    const struct vkb_kernel *kernel = &axis->kernel;
 
-    return pass->geometry == VKB_GEOMETRY_FULLSCREEN && vkb_computes(pass, VKB_BLOCK_blur)
-        && pass->constants.direction == direction && !pass->constants.placed
-        && !pass->constants.upsample && (vertical ? params->step_y : params->step_x) == 1.0f
-        && pass->constants.radius <= limit;
+    return kernel->count && !kernel->placed && kernel->step == 1.0 && kernel->count - 1 <= limit
+                && axis->kind == UPSAMPLE_LINEAR && axis->border == VKB_BORDER_NONE
+             ? kernel
+             : NULL;
+}
+
+const struct vkb_kernel *vkb_line_of(const struct vkb_pass_row *pass, enum vkb_mode direction,
+                                     uint32_t limit)
+{
+    const struct vkb_filter *filter = pass->filters;
+
+    if (pass->filter_count != 1 || pass->transposed || pass->geometry != VKB_GEOMETRY_FULLSCREEN)
+        return NULL;
+    if (direction == DIRECTION_VERTICAL)
+        return filter->x.kernel.count ? NULL : vkb_texel_kernel(&filter->y, limit);
+    return filter->y.kernel.count ? NULL : vkb_texel_kernel(&filter->x, limit);
 }

@@ -1,28 +1,26 @@
-// Blur passes with a symmetric kernel, in one direction or in both.
+// Passes of a filter with a symmetric kernel along one axis, or along both in one pass.
 #ifndef VKB_BLUR_H
 #define VKB_BLUR_H
 
 #include "passes/pass.h"
 
-struct vkb_blur {
-    enum vkb_mode direction;
-    double weights[MAX_WEIGHTS];  // of the taps 0, 1, ... to each side
-    uint32_t count;
-    double gain;            // factor of the sum
-    const double *offsets;  // of these taps in steps; NULL: 0, 1, ...
-    double step_x, step_y;  // the distance of two taps in a row and in a column, in source texels
-    bool inset;             // no tap is beyond the middle of the last two columns
-    bool filter;            // the sampler filters taps between texels; otherwise the shader does
-};
+// The row of a filter whose axes x, y or both have a kernel; those of both are equal but for their
+// steps. Wherever the taps are on texels, the row's filter has them there, a step of 1 apart. If
+// all pixels of the target are on texel centres, taps between texels are distributed to the two
+// neighbours, so that no variant has to filter. Otherwise the sampler filters them with `sampled`,
+// or the shader.
+struct vkb_pass_row vkb_blur_row(struct vkb_levels *levels, const struct vkb_filter *filter,
+                                 bool sampled, uint32_t from, uint32_t to);
 
-// The row of a blur from one image to another. Its block has the half-kernel of a line on the
-// texels of its source, a step of 1 apart, wherever the taps are there. If all pixels of the target
-// are on texel centres, taps between texels are distributed to the two neighbours, so that no
-// variant has to filter.
-struct vkb_pass_row vkb_blur_row(const struct vkb_graph *graph, const char *name,
-                                 const struct vkb_blur *blur, uint32_t from, uint32_t to);
+// The kernel of an axis from texels to texels that are at most `limit` away; NULL: it has none.
+const struct vkb_kernel *vkb_texel_kernel(const struct vkb_axis *axis, uint32_t limit);
 
-// Whether the row is a blur in one direction whose kernel is on texels and not longer than `limit`.
-bool vkb_is_line(const struct vkb_pass_row *pass, enum vkb_mode direction, int limit);
+// Writes the weights of a kernel times a gain, four in a vec4.
+void vkb_fill_weights(const struct vkb_kernel *kernel, double gain, float (*weights)[4]);
+
+// The kernel of a row that is a filter along one axis, from texels to texels that are at most
+// `limit` away; NULL: it is none.
+const struct vkb_kernel *vkb_line_of(const struct vkb_pass_row *pass, enum vkb_mode direction,
+                                     uint32_t limit);
 
 #endif

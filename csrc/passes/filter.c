@@ -30,37 +30,103 @@ struct vkb_pass_row vkb_row_of_lines(const struct vkb_levels *levels,
     return row;
 }
 
-// Of taps at the same place there is one.
-static uint32_t add_tap(float (*taps)[4], uint32_t count, int kernel, double offset, double weight)
+struct vkb_kernel vkb_sides(double distance, double side, double middle)
 {
-    uint32_t at = 0;
-
-    if (weight == 0.0)
-        return count;
-    while (at < count && taps[at][0] != (float)offset)
-        ++at;
-    taps[at][0] = (float)offset;
-    taps[at][kernel + 1] += (float)weight;
-    return at < count ? count : count + 1;
+    return (struct vkb_kernel){
+        .count = 2,
+        .placed = true,
+        .step = 1.0,
+        .weights = {middle, side},
+        .offsets = {0.0, distance},
+    };
 }
 
-// Fills the table of an axis, and counts the kernels. Returns the number of taps, of which the
-// table holds MAX_FILTER_TAPS.
-static uint32_t fill_taps(const struct vkb_taps *filter, int axis, float table[MAX_FILTER_TAPS][4],
-                          int32_t *kernels)
+struct vkb_kernel vkb_centre(void)
 {
-    float taps[3 * MAX_KERNELS][4] = {{0.0f}};
+    return (struct vkb_kernel){.count = 1, .step = 1.0, .weights = {1.0}};
+}
+
+// Adds the taps of a kernel to an axis.
+static void add_taps(struct vkb_axis *axis, const struct vkb_kernel *kernel, uint32_t number)
+{
+    const struct vkb_axis whole = {.kernel = *kernel};
+
+    for (uint32_t i = 0; i < vkb_axis_count(&whole); ++i) {
+        const struct vkb_tap tap = vkb_axis_tap(&whole, i);
+        if (tap.weights[0] == 0.0)
+            continue;
+        axis->taps[axis->count] = (struct vkb_tap){.offset = tap.offset};
+        axis->taps[axis->count].weights[number] = tap.weights[0];
+        ++axis->count;
+    }
+}
+
+// Replaces the taps of both axes by those of the kernels.
+static void set_kernels(struct vkb_filter *filter, const struct vkb_kernel (*kernels)[2],
+                        uint32_t count)
+{
+    filter->kernels = count;
+    filter->x.count = filter->y.count = 0;
+    for (uint32_t i = 0; i < count; ++i) {
+        add_taps(&filter->x, &kernels[i][0], i);
+        add_taps(&filter->y, &kernels[i][1], i);
+    }
+}
+
+struct vkb_filter vkb_make_filter(const struct vkb_graph *graph, uint32_t from, uint32_t to,
+                                  const struct vkb_kernel (*kernels)[2], uint32_t count,
+                                  double gain)
+{
+    struct vkb_filter filter;
+
+    vkb_filter_begin(graph, from, to, &filter);
+    set_kernels(&filter, kernels, count);
+    filter.gain = gain;
+    return filter;
+}
+
+void vkb_filter_three(struct vkb_filter *filter, double distance, double side)
+{
+    const struct vkb_kernel kernel = vkb_sides(distance, side, 1.0 - 2.0 * side);
+    const struct vkb_kernel kernels[][2] = {{kernel, kernel}};
+
+    set_kernels(filter, kernels, 1);
+}
+
+void vkb_filter_thirteen(struct vkb_filter *filter, double step_x, double step_y)
+{
+    const struct vkb_kernel kernels[][2] = {
+        {vkb_sides(2.0 * step_x, 0.25, 0.5), vkb_sides(2.0 * step_y, 0.25, 0.5)},
+        {vkb_sides(step_x, 0.5, 0.0), vkb_sides(step_y, 0.5, 0.0)},
+    };
+
+    set_kernels(filter, kernels, 2);
+    filter->gain = 0.5;
+}
+
+void vkb_set_kind(struct vkb_filter *filter, enum vkb_mode kind)
+{
+    filter->x.kind = filter->y.kind = kind;
+}
+
+// Fills the table of an axis, in which there is one of several taps at the same place. Returns the
+// number of places, of which the table holds MAX_FILTER_TAPS.
+static uint32_t fill_taps(const struct vkb_axis *axis, float table[MAX_FILTER_TAPS][4])
+{
+    float places[VKB_MAX_TAPS][4] = {{0.0f}};
     uint32_t count = 0;
 
-    for (int kernel = 0; kernel < MAX_KERNELS; ++kernel) {
-        const struct vkb_side_taps *added = &filter->kernels[kernel][axis];
-        count = add_tap(taps, count, kernel, -added->distance, added->side);
-        count = add_tap(taps, count, kernel, 0.0, added->middle);
-        count = add_tap(taps, count, kernel, added->distance, added->side);
-        if (added->side != 0.0 || added->middle != 0.0)
-            *kernels = kernel + 1;
+    for (uint32_t i = 0; i < axis->count; ++i) {
+        const float offset = (float)axis->taps[i].offset;
+        uint32_t at = 0;
+        while (at < count && places[at][0] != offset)
+            ++at;
+        places[at][0] = offset;
+        for (int kernel = 0; kernel < MAX_KERNELS; ++kernel)
+            places[at][kernel + 1] += (float)axis->taps[i].weights[kernel];
+        count += at == count;
     }
-    memcpy(table, taps, MAX_FILTER_TAPS * sizeof *table);
+    memcpy(table, places, MAX_FILTER_TAPS * sizeof *table);
     return count;
 }
 
@@ -101,66 +167,92 @@ static int32_t taken(float (*taps)[4], int32_t window, uint32_t source, uint32_t
     return bits;
 }
 
-void vkb_add_filter(struct vkb_levels *levels, const struct vkb_taps *filter, uint32_t from,
-                    uint32_t to)
+// The row of a filter, and in *count the number of places along an axis.
+static struct vkb_pass_row filter_row(const struct vkb_levels *levels,
+                                      const struct vkb_filter *filter, uint32_t from, uint32_t to,
+                                      uint32_t *count)
 {
     struct vkb_pass_row row = vkb_fetching_row(levels, &vkb_shader_filter_frag, from, to);
     struct vkb_filter_params *params = &row.params.filter;
     struct vkb_constants *constants = &row.constants;
-    const uint32_t columns = fill_taps(filter, 0, params->taps_x, &constants->kernels);
-    const uint32_t rows = fill_taps(filter, 1, params->taps_y, &constants->kernels);
-    const struct vkb_image_row *source = &levels->graph->images[from];
-    const struct vkb_image_row *target = &levels->graph->images[to];
+    const uint32_t columns = fill_taps(&filter->x, params->taps_x);
+    const uint32_t rows = fill_taps(&filter->y, params->taps_y);
     const double distance = fmax(furthest(params->taps_x), furthest(params->taps_y));
     const int32_t window = 2 * (int32_t)ceil(distance) + 2;
 
-    if (columns > MAX_FILTER_TAPS || rows > MAX_FILTER_TAPS)
-        levels->failed =
-            levels->failed
-            || !vkb_fail(levels->error, VKB_ERROR_GENERAL,
-                         "filter: %s has %u x %u places of taps, more than %d",
-                         vkb_graph_label(levels->graph, row.name), columns, rows, MAX_FILTER_TAPS);
+    *count = columns > rows ? columns : rows;
     row.block = VKB_BLOCK_filter;
-    VKB_SET_TARGET(&row, filter, target);
+    VKB_SET_TARGET(&row, filter, &levels->graph->images[to]);
     params->coarse = (float)filter->gain;
-    params->divisor = filter->divisor != 0.0 ? (float)filter->divisor : 1.0f;
-    params->own = (float)filter->own_share;
-    constants->taps = (int32_t)(columns > rows ? columns : rows);
-    constants->upsample = filter->upsample ? filter->upsample : UPSAMPLE_LINEAR;
-    constants->add_own = filter->adds_own;
+    params->divisor = (float)filter->divisor;
+    constants->taps = (int32_t)*count;
+    constants->kernels = (int32_t)filter->kernels;
+    constants->upsample = filter->x.kind;
     // Taps that are too far apart have no window.
     constants->window = constants->upsample == UPSAMPLE_CUBIC ? 4
                       : window <= MAX_WINDOW                  ? window
                                                               : 0;
     if (constants->upsample == UPSAMPLE_LINEAR && constants->window) {
-        constants->taken_x = taken(params->taps_x, window, source->width, target->width);
-        constants->taken_y = taken(params->taps_y, window, source->height, target->height);
+        constants->taken_x = taken(params->taps_x, window, filter->x.from, filter->x.to);
+        constants->taken_y = taken(params->taps_y, window, filter->y.from, filter->y.to);
     }
-    vkb_read_at(&row, SLOT_OWN, filter->adds_own ? filter->own : VKB_NO_IMAGE);
+    return row;
+}
+
+void vkb_add_mixed_filter(struct vkb_levels *levels, const struct vkb_filter *filter, uint32_t from,
+                          uint32_t own, double own_share, uint32_t to)
+{
+    struct vkb_filter filters[2] = {*filter};
+    const bool adds_own = own != VKB_NO_IMAGE;
+    uint32_t count;
+    struct vkb_pass_row row = filter_row(levels, filter, from, to, &count);
+
+    if (count > MAX_FILTER_TAPS)
+        levels->failed =
+            levels->failed
+            || !vkb_fail(levels->error, VKB_ERROR_GENERAL,
+                         "filter: %s has %u places of taps along an axis, more than %d",
+                         vkb_graph_label(levels->graph, row.name), count, MAX_FILTER_TAPS);
+    row.constants.add_own = adds_own;
+    row.params.filter.own = (float)own_share;
+    vkb_read_at(&row, SLOT_OWN, own);
+    if (adds_own) {
+        vkb_filter_begin(levels->graph, own, to, &filters[1]);
+        filters[1].gain = own_share;
+    }
+    vkb_set_filters(levels, &row, filters, adds_own ? 2 : 1);
     vkb_levels_pass(levels, &row);
+}
+
+void vkb_add_filter(struct vkb_levels *levels, const struct vkb_filter *filter, uint32_t from,
+                    uint32_t to)
+{
+    vkb_add_mixed_filter(levels, filter, from, VKB_NO_IMAGE, 0.0, to);
 }
 
 void vkb_kawase_down(struct vkb_levels *levels, double offset, uint32_t from, uint32_t to)
 {
-    const struct vkb_side_taps centre = {0.0, 0.0, 1.0}, sides = {0.5 * offset, 0.5, 0.0};
-    const struct vkb_taps taps = {{{centre, centre}, {sides, sides}}, .gain = 0.5};
+    const struct vkb_kernel kernels[][2] = {
+        {vkb_centre(), vkb_centre()},
+        {vkb_sides(0.5 * offset, 0.5, 0.0), vkb_sides(0.5 * offset, 0.5, 0.0)},
+    };
+    const struct vkb_filter filter = vkb_make_filter(levels->graph, from, to, kernels, 2, 0.5);
 
-    vkb_add_filter(levels, &taps, from, to);
+    vkb_add_filter(levels, &filter, from, to);
 }
 
 void vkb_kawase_up(struct vkb_levels *levels, double offset, uint32_t from, uint32_t to)
 {
-    const struct vkb_side_taps centre = {0.0, 0.0, 1.0}, axial = {offset, 1.0, 0.0};
-    const struct vkb_side_taps diagonal = {0.5 * offset, 1.0, 0.0};
-    const struct vkb_side_taps twice = {0.5 * offset, 2.0, 0.0};
-    const struct vkb_taps taps = {
-        {{axial, centre}, {centre, axial}, {diagonal, twice}},
-        .gain = 1.0,
-        // Its inverse is no float.
-        .divisor = 12.0,
+    const struct vkb_kernel axial = vkb_sides(offset, 1.0, 0.0);
+    const struct vkb_kernel kernels[][2] = {
+        {axial, vkb_centre()},
+        {vkb_centre(), axial},
+        {vkb_sides(0.5 * offset, 1.0, 0.0), vkb_sides(0.5 * offset, 2.0, 0.0)},
     };
+    struct vkb_filter filter = vkb_make_filter(levels->graph, from, to, kernels, 3, 1.0);
 
-    vkb_add_filter(levels, &taps, from, to);
+    filter.divisor = 12.0;  // Its inverse is no float.
+    vkb_add_filter(levels, &filter, from, to);
 }
 
 uint32_t vkb_kawase_rise(struct vkb_levels *levels, double offset)

@@ -1,30 +1,35 @@
-// Rows that filter an image. The row says what the filter is: its block has the taps along both
-// axes, each with a weight for up to MAX_KERNELS kernels, and its constants what a tap samples
-// (UPSAMPLE_*). All variants and the transpose follow from these (shaders/lib/filter.glsl).
+// Passes that filter an image by a few taps along both axes (shaders/lib/filter.glsl). The row has
+// the filter as data (graph/filter.h): parameters, all variants and the transpose are made from it.
 #ifndef VKB_FILTER_H
 #define VKB_FILTER_H
 
 #include "passes/levels.h"
 
-// Taps of a kernel along an axis: at this distance on both sides, and in the middle.
-struct vkb_side_taps {
-    double distance, side, middle;
-};
+// Taps of a kernel at this distance on both sides, and in the middle; one tap in the middle.
+struct vkb_kernel vkb_sides(double distance, double side, double middle);
+struct vkb_kernel vkb_centre(void);
 
-// A filter: the sum of its kernels, each along x and along y. All kernels together have at most
-// MAX_FILTER_TAPS places along an axis.
-struct vkb_taps {
-    struct vkb_side_taps kernels[MAX_KERNELS][2];
-    enum vkb_mode upsample;  // what a tap samples, of UPSAMPLE_*; 0: UPSAMPLE_LINEAR
-    double gain, divisor;    // of the sum; a divisor of 0 is 1
-    bool adds_own;           // adds the share of an image of the target's size
-    uint32_t own;
-    double own_share;
-};
+// The filter from one image to another that is the sum of kernels, each along x and along y, times
+// a gain. All kernels together have at most MAX_FILTER_TAPS places along an axis.
+struct vkb_filter vkb_make_filter(const struct vkb_graph *graph, uint32_t from, uint32_t to,
+                                  const struct vkb_kernel (*kernels)[2], uint32_t count,
+                                  double gain);
 
-// Adds the pass that filters `from` into `to`.
-void vkb_add_filter(struct vkb_levels *levels, const struct vkb_taps *filter, uint32_t from,
+// Makes both axes of a filter those of 3 x 3 taps, of which the outer ones have the share `side`
+// along an axis; or of the pyramid's 13 taps. These are those of two kernels: nine around the
+// centre, and four between them, each with half of the weight.
+void vkb_filter_three(struct vkb_filter *filter, double distance, double side);
+void vkb_filter_thirteen(struct vkb_filter *filter, double step_x, double step_y);
+
+// Sets what the taps of a filter sample, of UPSAMPLE_*.
+void vkb_set_kind(struct vkb_filter *filter, enum vkb_mode kind);
+
+// Adds the pass that filters `from` into `to`; the one that also adds the share of an image of the
+// size of `to`.
+void vkb_add_filter(struct vkb_levels *levels, const struct vkb_filter *filter, uint32_t from,
                     uint32_t to);
+void vkb_add_mixed_filter(struct vkb_levels *levels, const struct vkb_filter *filter, uint32_t from,
+                          uint32_t own, double own_share, uint32_t to);
 
 // Passes of dual Kawase (Bjorge, "Bandwidth-Efficient Rendering", SIGGRAPH 2015). Down: four times
 // the centre, and four diagonal taps at a distance of half a texel times the offset. Up: four axial

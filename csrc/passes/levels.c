@@ -75,21 +75,20 @@ void vkb_levels_halve(struct vkb_levels *levels, struct vkb_size above, uint32_t
 
 void vkb_levels_box(struct vkb_levels *levels, uint32_t from, uint32_t to)
 {
-    const struct vkb_taps taps = {{{{1.0, 0.5, 0.0}, {1.0, 0.5, 0.0}}}, .gain = 1.0};
+    const struct vkb_kernel kernels[][2] = {{vkb_sides(1.0, 0.5, 0.0), vkb_sides(1.0, 0.5, 0.0)}};
+    const struct vkb_filter filter = vkb_make_filter(levels->graph, from, to, kernels, 1, 1.0);
 
-    vkb_add_filter(levels, &taps, from, to);
+    vkb_add_filter(levels, &filter, from, to);
 }
 
 void vkb_levels_reduce(struct vkb_levels *levels, double step_x, double step_y, uint32_t from,
                        uint32_t to)
 {
-    const struct vkb_taps taps = {
-        {{{2.0 * step_x, 0.25, 0.5}, {2.0 * step_y, 0.25, 0.5}},
-         {{step_x, 0.5, 0.0}, {step_y, 0.5, 0.0}}},
-        .gain = 0.5,
-    };
+    struct vkb_filter filter;
 
-    vkb_add_filter(levels, &taps, from, to);
+    vkb_filter_begin(levels->graph, from, to, &filter);
+    vkb_filter_thirteen(&filter, step_x, step_y);
+    vkb_add_filter(levels, &filter, from, to);
 }
 
 void vkb_levels_reduce_rest(struct vkb_levels *levels, double step_x, double step_y)
@@ -119,52 +118,62 @@ struct vkb_pass_row vkb_prefilter_row(const struct vkb_levels *levels,
     return row;
 }
 
-static void add_blur(struct vkb_levels *levels, const struct vkb_kernel *kernel,
-                     enum vkb_mode direction, double step, uint32_t from, uint32_t to)
+// The row of a blur with the kernel along one axis.
+static struct vkb_pass_row blur_row(struct vkb_levels *levels, const struct vkb_kernel *kernel,
+                                    enum vkb_mode direction, enum vkb_mode kind, uint32_t from,
+                                    uint32_t to)
 {
-    struct vkb_blur blur = {
-        .direction = direction,
-        .count = kernel->count,
-        .gain = 1.0,
-        .step_x = step,
-        .step_y = step,
-        .inset = kernel->inset && direction == DIRECTION_HORIZONTAL,
-        // In columns, whose sizes are equal, samples of two taps are equal to these taps.
-        .offsets = kernel->offsets,
-    };
+    struct vkb_filter filter;
 
-    for (uint32_t tap = 0; tap < kernel->count; ++tap)
-        blur.weights[tap] = kernel->weights[tap];
-    const struct vkb_pass_row row =
-        vkb_blur_row(levels->graph, levels->graph->images[to].name, &blur, from, to);
-    vkb_levels_pass(levels, &row);
+    vkb_filter_begin(levels->graph, from, to, &filter);
+    if (direction == DIRECTION_VERTICAL) {
+        filter.y.kernel = *kernel;
+        filter.y.kernel.step = 1.0;
+    } else {
+        filter.x.kernel = *kernel;
+        filter.x.kernel.step = kernel->step > 0.0 ? kernel->step : filter.x.step;
+        filter.x.kind = kind;
+    }
+    return vkb_blur_row(levels, &filter, false, from, to);
 }
 
 void vkb_levels_blur(struct vkb_levels *levels, uint32_t level, uint32_t from,
-                     const struct vkb_kernel *kernel)
+                     const struct vkb_kernel *kernel, enum vkb_mode kind)
 {
-    const struct vkb_size size = levels->sizes[level];
-    const uint32_t width = levels->graph->images[from].width;
-    const double step_x = kernel->step_x > 0.0 ? kernel->step_x : (double)width / size.width;
-    const uint32_t step = vkb_levels_step(levels, size, "down_%u_across", level);
-
-    add_blur(levels, kernel, DIRECTION_HORIZONTAL, step_x, from, step);
-    add_blur(levels, kernel, DIRECTION_VERTICAL, 1.0, step, vkb_levels_down(levels, level));
+    const uint32_t between = vkb_levels_step(levels, levels->sizes[level], "down_%u_across", level);
+    const struct vkb_pass_row rows =
+        blur_row(levels, kernel, DIRECTION_HORIZONTAL, kind, from, between);
+    vkb_levels_pass(levels, &rows);
+    struct vkb_pass_row columns = blur_row(levels, kernel, DIRECTION_VERTICAL, UPSAMPLE_LINEAR,
+                                           between, vkb_levels_down(levels, level));
+    vkb_join(levels, &rows, &columns);
+    vkb_levels_pass(levels, &columns);
 }
 
-// How UPSAMPLE_TENT and the others sample a smaller level, with the distances of the taps of a
-// tent, or of its corners alone, in its texels.
-static struct vkb_taps taps_of(enum vkb_mode kernel, double radius_x, double radius_y)
+// The filter by which UPSAMPLE_TENT and the others enlarge a smaller level, with the distances of
+// the taps of a tent, or of its corners alone, in its texels.
+static struct vkb_filter enlarging(const struct vkb_graph *graph, uint32_t from, uint32_t to,
+                                   enum vkb_mode kernel, double radius_x, double radius_y,
+                                   double gain)
 {
+    const struct vkb_kernel centre[][2] = {{vkb_centre(), vkb_centre()}};
+    const struct vkb_kernel tent[][2] = {
+        {vkb_sides(radius_x, 0.25, 0.5), vkb_sides(radius_y, 0.25, 0.5)}};
+    const struct vkb_kernel corners[][2] = {
+        {vkb_sides(radius_x, 0.5, 0.0), vkb_sides(radius_y, 0.5, 0.0)}};
+    const struct vkb_kernel halves[][2] = {{vkb_sides(1.0, 1.0, 0.0), vkb_sides(1.0, 1.0, 0.0)}};
+    struct vkb_filter filter;
+
     switch (kernel) {
     case UPSAMPLE_TENT:
-        return (struct vkb_taps){.kernels = {{{radius_x, 0.25, 0.5}, {radius_y, 0.25, 0.5}}}};
+        return vkb_make_filter(graph, from, to, tent, 1, gain);
     case UPSAMPLE_CORNERS:
-        return (struct vkb_taps){.kernels = {{{radius_x, 0.5, 0.0}, {radius_y, 0.5, 0.0}}}};
-    case UPSAMPLE_INSET_CUBIC:
-        return (struct vkb_taps){{{{1.0, 1.0, 0.0}, {1.0, 1.0, 0.0}}}, .upsample = kernel};
+        return vkb_make_filter(graph, from, to, corners, 1, gain);
     default:
-        return (struct vkb_taps){{{{0.0, 0.0, 1.0}, {0.0, 0.0, 1.0}}}, .upsample = kernel};
+        filter = vkb_make_filter(graph, from, to, kernel == UPSAMPLE_INSET_CUBIC ? halves : centre,
+                                 1, gain);
+        vkb_set_kind(&filter, kernel);
+        return filter;
     }
 }
 
@@ -182,12 +191,8 @@ static void add_up(struct vkb_levels *levels, const struct vkb_combination *comb
         x = (double)smaller->width / larger->width;
         y = (double)smaller->height / larger->height;
     }
-    struct vkb_taps taps = taps_of(kernel, x, y);
-    taps.gain = coarse_share;
-    taps.adds_own = own != VKB_NO_IMAGE;
-    taps.own = own;
-    taps.own_share = own_share;
-    vkb_add_filter(levels, &taps, from, to);
+    const struct vkb_filter filter = enlarging(levels->graph, from, to, kernel, x, y, coarse_share);
+    vkb_add_mixed_filter(levels, &filter, from, own, own_share, to);
 }
 
 // Adds up levels. In rgba8unorm, whose largest value is 1, each image holds its sum divided by the
@@ -222,11 +227,11 @@ uint32_t vkb_levels_combine(struct vkb_levels *levels, const struct vkb_combinat
     return bloom;
 }
 
-static const struct vkb_combination enlarging = {0};
+static const struct vkb_combination alone = {0};
 
 void vkb_levels_resize(struct vkb_levels *levels, uint32_t from, double gain, uint32_t to)
 {
-    add_up(levels, &enlarging, UPSAMPLE_LINEAR, from, to, VKB_NO_IMAGE, 0.0, gain);
+    add_up(levels, &alone, UPSAMPLE_LINEAR, from, to, VKB_NO_IMAGE, 0.0, gain);
 }
 
 uint32_t vkb_levels_enlarge(struct vkb_levels *levels, enum vkb_mode kernel, uint32_t from,
@@ -234,7 +239,7 @@ uint32_t vkb_levels_enlarge(struct vkb_levels *levels, enum vkb_mode kernel, uin
 {
     const uint32_t bloom = vkb_levels_bloom(levels);
 
-    add_up(levels, &enlarging, kernel, from, bloom, VKB_NO_IMAGE, 0.0, gain);
+    add_up(levels, &alone, kernel, from, bloom, VKB_NO_IMAGE, 0.0, gain);
     return bloom;
 }
 
@@ -243,6 +248,7 @@ void vkb_levels_gather(struct vkb_levels *levels, const double *shares, enum vkb
 {
     struct vkb_pass_row row =
         vkb_fetching_row(levels, &vkb_shader_gather_frag, levels->downs[0], to);
+    struct vkb_filter filters[GATHERED_LEVELS];
 
     row.constants.upsample = kernel;
     row.constants.levels = (int32_t)levels->count;
@@ -252,8 +258,12 @@ void vkb_levels_gather(struct vkb_levels *levels, const double *shares, enum vkb
         vkb_read_at(&row, SLOT_LEVELS + level,
                     level < levels->count ? levels->downs[level] : VKB_NO_IMAGE);
     row.block = VKB_BLOCK_gather;
-    for (uint32_t level = 0; level < levels->count; ++level)
-        row.params.gather.shares[level / 4][level % 4] = (float)shares[level];
     VKB_SET_TARGET(&row, gather, &levels->graph->images[to]);
+    for (uint32_t level = 0; level < levels->count; ++level) {
+        filters[level] =
+            enlarging(levels->graph, levels->downs[level], to, kernel, 1.0, 1.0, shares[level]);
+        row.params.gather.shares[level / 4][level % 4] = (float)shares[level];
+    }
+    vkb_set_filters(levels, &row, filters, levels->count);
     vkb_levels_pass(levels, &row);
 }

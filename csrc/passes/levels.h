@@ -58,19 +58,11 @@ void vkb_levels_reduce(struct vkb_levels *levels, double step_x, double step_y, 
 // them in this way.
 void vkb_levels_reduce_rest(struct vkb_levels *levels, double step_x, double step_y);
 
-// The kernel of a separable blur while downsampling.
-struct vkb_kernel {
-    const float *weights;   // w0..
-    const double *offsets;  // of these in pixels of the level; NULL: 0, 1, ...
-    uint32_t count;
-    double step_x;  // distance of the horizontal pass's taps in texels of its source; 0: one pixel
-                    // of the level
-    bool inset;     // the horizontal pass is that of URP 17
-};
-
-// Adds the image down_`level` and the two passes that blur `from` into it.
+// Adds the image down_`level` and the two passes that blur `from` into it: along rows with a
+// kernel's step in texels of `from` (0: one pixel of the level), whose taps sample as `kind` says
+// (of UPSAMPLE_*), then along columns of the level.
 void vkb_levels_blur(struct vkb_levels *levels, uint32_t level, uint32_t from,
-                     const struct vkb_kernel *kernel);
+                     const struct vkb_kernel *kernel, enum vkb_mode kind);
 
 // A pass that adds up shares[k] down_k of up to GATHERED_LEVELS levels, each enlarged by the kernel
 // to the size of `to`.

@@ -146,6 +146,40 @@ uint32_t vkb_levels_bloom(struct vkb_levels *levels)
                              levels->source->final, true);
 }
 
+void vkb_set_filters(struct vkb_levels *levels, struct vkb_pass_row *row,
+                     const struct vkb_filter *filters, uint32_t count)
+{
+    if (levels->failed)
+        return;
+    row->filters = vkb_graph_keep_filters(levels->graph, filters, count, levels->error);
+    row->filter_count = count;
+    levels->failed = !row->filters;
+}
+
+void vkb_join(struct vkb_levels *levels, const struct vkb_pass_row *first,
+              struct vkb_pass_row *second)
+{
+    if (levels->failed)
+        return;
+    const struct vkb_filter *one = first->filters, *other = second->filters;
+    const struct vkb_filter *rows = vkb_axis_is_identity(&one->y) ? one : other;
+    const struct vkb_filter *columns = rows == one ? other : one;
+    const struct vkb_filter joined = {
+        .x = rows->x,
+        .y = columns->y,
+        .kernels = 1,
+        .gain = one->gain * other->gain,
+        .divisor = 1.0,
+    };
+
+    if (!vkb_axis_is_identity(&rows->y) || !vkb_axis_is_identity(&columns->x))
+        return;
+    second->joined = vkb_graph_keep_filters(levels->graph, &joined, 1, levels->error);
+    second->joined_from = first->reads[SLOT_SOURCE];
+    second->joined_count = 1;
+    levels->failed = !second->joined;
+}
+
 void vkb_levels_pass(struct vkb_levels *levels, const struct vkb_pass_row *row)
 {
     levels->failed = levels->failed || !vkb_graph_add_pass(levels->graph, row, levels->error);

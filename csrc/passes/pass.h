@@ -99,6 +99,13 @@ __attribute__((format(printf, 3, 4))) uint32_t vkb_levels_step(struct vkb_levels
                                                                struct vkb_size size,
                                                                const char *format, ...);
 
+// Gives a linear pass its filters, one for each of its first images. The row before a pass along
+// the other axis, whose result only this one reads: both are a filter along both axes.
+void vkb_set_filters(struct vkb_levels *levels, struct vkb_pass_row *row,
+                     const struct vkb_filter *filters, uint32_t count);
+void vkb_join(struct vkb_levels *levels, const struct vkb_pass_row *first,
+              struct vkb_pass_row *second);
+
 // Adds a pass.
 void vkb_levels_pass(struct vkb_levels *levels, const struct vkb_pass_row *row);
 

@@ -6,72 +6,14 @@
 // Floats count up to this number.
 enum { MAX_TEXELS = 1 << 24 };
 
-static void begin_axis(uint32_t from, uint32_t to, struct vkb_axis *axis)
-{
-    const struct vkb_tap centre = {.weights = {1.0}};
-    const double step = (double)from / to;
-
-    *axis = (struct vkb_axis){
-        .from = from, .to = to, .origin = 0.5 * step - 0.5, .step = step, .kind = UPSAMPLE_LINEAR};
-    vkb_axis_set(axis, &centre, 1);
-}
-
-void vkb_filter_begin(const struct vkb_graph *graph, uint32_t from, uint32_t to,
-                      struct vkb_filter *filter)
-{
-    const struct vkb_image_row *source = &graph->images[from], *target = &graph->images[to];
-
-    begin_axis(source->width, target->width, &filter->x);
-    begin_axis(source->height, target->height, &filter->y);
-    filter->kernels = 1;
-    filter->gain = 1.0;
-}
-
-void vkb_axis_move(struct vkb_axis *axis, uint32_t from, uint32_t to, double origin)
-{
-    begin_axis(from, to, axis);
-    axis->origin = origin;
-    axis->step = 1.0;
-}
-
-void vkb_axis_set(struct vkb_axis *axis, const struct vkb_tap *taps, uint32_t count)
-{
-    memcpy(axis->taps, taps, count * sizeof *taps);
-    axis->count = count;
-}
-
-void vkb_axis_take(struct vkb_axis *axis, uint32_t kernel)
-{
-    uint32_t count = 0;
-
-    for (uint32_t i = 0; i < axis->count; ++i)
-        if (axis->taps[i].weights[kernel] != 0.0)
-            axis->taps[count++] = (struct vkb_tap){.offset = axis->taps[i].offset,
-                                                   .weights = {axis->taps[i].weights[kernel]}};
-    axis->count = count;
-}
-
-void vkb_filter_next(struct vkb_filter *filter, const float next[4])
-{
-    filter->x.next = (uint32_t)next[0];
-    filter->y.next = (uint32_t)next[1];
-    filter->y.backwards = true;
-}
-
-bool vkb_axis_is_identity(const struct vkb_axis *axis)
-{
-    return axis->from == axis->to && axis->origin == 0.0 && axis->step == 1.0 && axis->first == 0
-        && axis->kind == UPSAMPLE_LINEAR && axis->next == 0 && axis->count == 1
-        && axis->taps[0].offset == 0.0 && axis->taps[0].weights[0] == 1.0;
-}
-
 double vkb_axis_readers(const struct vkb_axis *axis)
 {
     double low = 0.0, high = 0.0;
 
-    for (uint32_t i = 0; i < axis->count; ++i) {
-        low = fmin(low, axis->taps[i].offset);
-        high = fmax(high, axis->taps[i].offset);
+    for (uint32_t i = 0; i < vkb_axis_count(axis); ++i) {
+        const double offset = vkb_axis_tap(axis, i).offset;
+        low = fmin(low, offset);
+        high = fmax(high, offset);
     }
     // Of pixels beyond an edge that is repeated, all read the outermost texel.
     const double end = axis->origin + axis->step * (axis->to - 1.0) + high - (axis->from - 1.0);
@@ -197,14 +139,23 @@ struct readers {
     size_t start;
 };
 
+// Taps of a long kernel may have none.
+static bool has_weight(const struct vkb_tap *tap)
+{
+    return tap->offset == 0.0 || tap->weights[0] != 0.0 || tap->weights[1] != 0.0
+        || tap->weights[2] != 0.0;
+}
+
 static size_t find_readers(const struct vkb_axis *axis, struct readers *readers)
 {
+    const uint32_t count = vkb_axis_count(axis);
     size_t total = 0;
 
     for (uint32_t pixel = 0; pixel < axis->to; ++pixel)
-        for (uint32_t tap = 0; tap < axis->count; ++tap) {
-            const struct sample sample = sample_at(axis, pixel, axis->taps[tap].offset);
-            for (uint32_t i = 0; i < sample.count; ++i) {
+        for (uint32_t tap = 0; tap < count; ++tap) {
+            const struct vkb_tap taken = vkb_axis_tap(axis, tap);
+            const struct sample sample = sample_at(axis, pixel, taken.offset);
+            for (uint32_t i = 0; has_weight(&taken) && i < sample.count; ++i) {
                 const uint32_t read = read_texel(axis, sample.first + i);
                 struct readers *texel = &readers[read];
                 if (read == axis->from)
@@ -228,17 +179,20 @@ static size_t find_readers(const struct vkb_axis *axis, struct readers *readers)
 static void add_weights(const struct vkb_axis *axis, const struct readers *readers,
                         double (*weights)[MAX_KERNELS])
 {
+    const uint32_t count = vkb_axis_count(axis);
+
     for (uint32_t pixel = 0; pixel < axis->to; ++pixel)
-        for (uint32_t tap = 0; tap < axis->count; ++tap) {
-            const struct sample sample = sample_at(axis, pixel, axis->taps[tap].offset);
-            for (uint32_t i = 0; i < sample.count; ++i) {
+        for (uint32_t tap = 0; tap < count; ++tap) {
+            const struct vkb_tap taken = vkb_axis_tap(axis, tap);
+            const struct sample sample = sample_at(axis, pixel, taken.offset);
+            for (uint32_t i = 0; has_weight(&taken) && i < sample.count; ++i) {
                 const uint32_t read = read_texel(axis, sample.first + i);
                 const struct readers *texel = &readers[read];
                 if (read == axis->from)
                     continue;
                 double *sums = weights[texel->start + pixel - texel->first];
                 for (int kernel = 0; kernel < MAX_KERNELS; ++kernel)
-                    sums[kernel] += sample.shares[i] * axis->taps[tap].weights[kernel];
+                    sums[kernel] += sample.shares[i] * taken.weights[kernel];
             }
         }
 }
@@ -317,19 +271,96 @@ static bool write_table(const struct vkb_axis *axis, uint32_t kernels, uint32_t 
                     table->count, MAX_TEXELS);
 }
 
-bool vkb_axis_transpose(const struct vkb_axis *axis, uint32_t kernels, struct vkb_table *table,
-                        int *start, int *span, struct vkb_error *error)
+// The most readers of a texel; too many for tiles where those of a texel begin before those of the
+// one before.
+static int32_t most_readers(const struct vkb_axis *axis, const struct readers *readers)
+{
+    uint32_t most = 1;
+
+    for (uint32_t texel = 0; texel < axis->from; ++texel) {
+        const uint32_t count = readers[texel].end - readers[texel].first;
+        if (texel > 0 && readers[texel].first < readers[texel - 1].first)
+            return MAX_READERS + 1;
+        most = count > most ? count : most;
+    }
+    return (int32_t)most;
+}
+
+// The size of the windows that the ratio of sides gives, if all readers are in these; else 0.
+static int32_t find_window(const struct vkb_axis *axis, const struct readers *readers, int32_t most)
+{
+    const int32_t ratio = vkb_ratio_of(axis->to, axis->from);
+    const int32_t size = ratio == EXACT_SAME ? most : most + most % 2;
+    bool fits = ratio != 0 && axis->first == 0;
+
+    for (uint32_t texel = 0; fits && texel < axis->from; ++texel) {
+        const int32_t first = WINDOW_FIRST(ratio, (int32_t)texel, size);
+        fits =
+            (int32_t)readers[texel].first >= first && (int32_t)readers[texel].end <= first + size;
+    }
+    return fits ? size : 0;
+}
+
+// The weight that a texel has in a pixel of its window.
+static float weight_in(const struct readers *readers, uint32_t texel, int32_t pixel,
+                       double (*weights)[MAX_KERNELS])
+{
+    const struct readers *of = &readers[texel];
+    const int32_t at = pixel - (int32_t)of->first;
+
+    return at >= 0 && pixel < (int32_t)of->end ? (float)weights[of->start + (size_t)at][0] : 0.0f;
+}
+
+// Takes the weights in the middle of the axis, and compares those of the other texels with them.
+// Those of ghosts differ.
+static void find_inner(struct vkb_axis *axis, const struct readers *readers,
+                       double (*weights)[MAX_KERNELS])
+{
+    struct vkb_readers *found = &axis->readers;
+    const int32_t ratio = vkb_ratio_of(axis->to, axis->from), window = found->window;
+    const uint32_t middle = axis->from / 2 & ~1u;
+
+    found->repeats = window > 0 && window <= FILTER_TILE_WINDOW;
+    for (uint32_t texel = middle; found->repeats && texel < middle + 2 && texel < axis->from;
+         ++texel)
+        for (int32_t i = 0; i < window; ++i)
+            found->inner[(texel & 1) * 2 + i / 4][i % 4] =
+                weight_in(readers, texel, WINDOW_FIRST(ratio, (int32_t)texel, window) + i, weights);
+    for (uint32_t texel = 0; found->repeats && texel < axis->from; ++texel) {
+        const int32_t first = WINDOW_FIRST(ratio, (int32_t)texel, window);
+        if (first < window || first + 2 * window > (int32_t)axis->to)
+            continue;
+        for (int32_t i = 0; i < window; ++i)
+            found->repeats = found->repeats
+                          && fabsf(found->inner[(texel & 1) * 2 + i / 4][i % 4]
+                                   - weight_in(readers, texel, first + i, weights))
+                                 <= 1e-6f;
+    }
+}
+
+void vkb_axis_keep(struct vkb_axis *axis)
+{
+    axis->readers = (struct vkb_readers){.start = -1, .span = 1, .most = 1, .window = 1};
+}
+
+bool vkb_axis_transpose(struct vkb_axis *axis, uint32_t kernels, struct vkb_table *table,
+                        struct vkb_error *error)
 {
     struct readers *readers = vkb_alloc(error, axis->from, sizeof *readers);
     double (*weights)[MAX_KERNELS] =
         readers ? vkb_alloc(error, find_readers(axis, readers), sizeof *weights) : NULL;
     bool done = weights != NULL;
 
-    *start = (int)table->count;
+    axis->readers = (struct vkb_readers){.start = (int32_t)table->count};
     if (done) {
+        struct vkb_readers *found = &axis->readers;
         add_weights(axis, readers, weights);
-        *span = (int)most_of_blocks(axis, readers);
-        done = write_table(axis, kernels, (uint32_t)*span, readers, weights, table, error);
+        found->span = (int32_t)most_of_blocks(axis, readers);
+        found->most = most_readers(axis, readers);
+        found->window = find_window(axis, readers, found->most);
+        if (kernels == 1)
+            find_inner(axis, readers, weights);
+        done = write_table(axis, kernels, (uint32_t)found->span, readers, weights, table, error);
     }
     vkb_free(weights);
     vkb_free(readers);

@@ -16,8 +16,10 @@ static struct vkb_pass_row line_row(const struct vkb_variant_choice *choice,
 {
     const struct vkb_graph *graph = choice->graph;
     const struct vkb_image_row *image = &graph->images[target];
-    const bool vertical = blur->constants.direction == DIRECTION_VERTICAL;
-    const int radius = blur->constants.radius;
+    const bool vertical = blur->filters->y.kernel.count > 0;
+    const struct vkb_filter *filter = blur->filters;
+    const struct vkb_kernel *kernel = vertical ? &filter->y.kernel : &filter->x.kernel;
+    const int radius = (int)kernel->count - 1;
     struct vkb_pass_row row;
 
     memcpy(&row, blur, sizeof row);
@@ -32,7 +34,7 @@ static struct vkb_pass_row line_row(const struct vkb_variant_choice *choice,
     row.constants.rolled = choice->variants == VKB_VARIANTS_CPU && row.constants.unrolled_radius > 0
                         && (uint64_t)image->width * image->height <= ROLLED_PIXELS;
     if (!row.constants.rolled) {
-        row.constants.direction = blur->constants.direction;
+        row.constants.direction = vertical ? DIRECTION_VERTICAL : DIRECTION_HORIZONTAL;
     } else {
         const uint32_t across = vertical ? image->width : image->height;
         const uint32_t along = vertical ? image->height : image->width;
@@ -46,8 +48,7 @@ static struct vkb_pass_row line_row(const struct vkb_variant_choice *choice,
     row.params.line.levels = row.constants.rolled && image->format == VKB_FORMAT_RGBA8_UNORM;
     for (int tap = 0; tap <= 2 * radius; ++tap) {
         const int weight = abs(tap - radius);
-        row.params.line.kernel[tap / 4][tap % 4] =
-            blur->params.blur.weights[weight / 4][weight % 4];
+        row.params.line.kernel[tap / 4][tap % 4] = (float)(filter->gain * kernel->weights[weight]);
     }
     return row;
 }
@@ -63,8 +64,8 @@ static bool add_line_row(struct vkb_variant_choice *choice, const struct vkb_pas
 // Adds a line blur if the source has the target's size.
 bool vkb_add_line(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
 {
-    if (!((vkb_is_line(pass, DIRECTION_VERTICAL, LINE_RADIUS)
-           || vkb_is_line(pass, DIRECTION_HORIZONTAL, LINE_RADIUS))
+    if (!((vkb_line_of(pass, DIRECTION_VERTICAL, LINE_RADIUS)
+           || vkb_line_of(pass, DIRECTION_HORIZONTAL, LINE_RADIUS))
           && vkb_same_size(&choice->plain, pass->reads[SLOT_SOURCE], pass->targets[0])
           && vkb_is_written_once(&choice->plain, pass->targets[0])))
         return false;
@@ -80,10 +81,11 @@ bool vkb_add_line(struct vkb_variant_choice *choice, const struct vkb_pass_row *
 // 3840 x 2160 on an H200 0.47 ms in place of 0.30.
 static bool is_enlarged(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
 {
-    if (!vkb_is_line(pass, DIRECTION_HORIZONTAL, LINE_RADIUS))
+    if (!vkb_line_of(pass, DIRECTION_HORIZONTAL, LINE_RADIUS))
         return false;
     const struct vkb_image_row *source = &choice->plain.images[pass->reads[SLOT_SOURCE]];
     const struct vkb_image_row *target = &choice->plain.images[pass->targets[0]];
+
     return !vkb_same_size(&choice->plain, pass->reads[SLOT_SOURCE], pass->targets[0])
         && vkb_is_written_once(&choice->plain, pass->targets[0])
         && source->width + 2 <= choice->device->max_side
@@ -117,40 +119,52 @@ bool vkb_add_enlarged(struct vkb_variant_choice *choice, const struct vkb_pass_r
     return add_line_row(choice, &line) && vkb_add_fullscreen(choice, &row);
 }
 
-// A composite of two lines of a threshold, all at the size of the image.
-struct nest {
-    const struct vkb_pass_row *threshold, *vertical, *horizontal, *composite;
+// A bloom of the image by one filter, at its size: the last row of the filter, the threshold pass
+// before it (NULL: there is none), and the composite after it. For the transpose these are rows of
+// the adjoint, in the opposite order.
+struct bloom {
+    const struct vkb_pass_row *last, *threshold, *composite;
+    const struct vkb_kernel *rows, *columns;
+    double gain;
 };
 
-// The only pass that writes the image, if it is such a line; else NULL.
-static const struct vkb_pass_row *line_of(const struct vkb_graph *graph, uint32_t image,
-                                          enum vkb_mode direction, int radius)
+// Whether the row ends a filter along both axes by kernels that are not longer than `radius`, of an
+// image of the target's size: *from. It sets the kernels.
+static bool find_kernels(const struct vkb_pass_row *last, int radius, struct bloom *bloom,
+                         uint32_t *from)
 {
-    const struct vkb_pass_row *pass = vkb_writer_of(graph, image);
+    const struct vkb_filter *filter = last->joined_count == 1 ? last->joined : last->filters;
 
-    return pass && vkb_is_line(pass, direction, radius) && vkb_is_written_once(graph, image)
-                && vkb_same_size(graph, pass->reads[SLOT_SOURCE], image)
-             ? pass
-             : NULL;
+    if (!filter || filter->kernels > 1 || filter->x.from != filter->x.to
+        || filter->y.from != filter->y.to)
+        return false;
+    bloom->rows = vkb_texel_kernel(&filter->x, (uint32_t)radius);
+    bloom->columns = vkb_texel_kernel(&filter->y, (uint32_t)radius);
+    bloom->gain = filter->gain;
+    *from = filter == last->joined ? last->joined_from
+                                   : last->reads[last->transposed ? SLOT_COTANGENTS : SLOT_SOURCE];
+    return bloom->rows && bloom->columns;
 }
 
-// `threshold_of` finds the threshold pass of a bloom buffer.
-static bool find_nest(const struct vkb_graph *graph, const struct vkb_pass_row *pass, int radius,
-                      const struct vkb_pass_row *(*threshold_of)(const struct vkb_graph *graph,
-                                                                 uint32_t image),
-                      struct nest *nest)
+// The bloom that the composite `pass` ends. `threshold_of` finds the threshold pass of a bloom
+// buffer.
+static bool find_bloom(const struct vkb_graph *graph, const struct vkb_pass_row *pass, int radius,
+                       const struct vkb_pass_row *(*threshold_of)(const struct vkb_graph *graph,
+                                                                  uint32_t image),
+                       struct bloom *bloom)
 {
-    *nest = (struct nest){.composite = pass};
-    if (!vkb_ends_bloom(pass) || !graph->images[pass->reads[SLOT_SOURCE]].input)
+    uint32_t glow;
+
+    if (!vkb_ends_bloom(pass) || !graph->images[pass->reads[SLOT_SCENE]].input)
         return false;
-    nest->horizontal = line_of(graph, pass->reads[SLOT_BLOOM], DIRECTION_HORIZONTAL, radius);
-    if (nest->horizontal)
-        nest->vertical =
-            line_of(graph, nest->horizontal->reads[SLOT_SOURCE], DIRECTION_VERTICAL, radius);
-    if (nest->vertical)
-        nest->threshold = threshold_of(graph, nest->vertical->reads[SLOT_SOURCE]);
-    return nest->threshold && vkb_is_threshold(nest->threshold)
-        && nest->threshold->reads[SLOT_SOURCE] == pass->reads[SLOT_SOURCE];
+    *bloom =
+        (struct bloom){.last = vkb_writer_of(graph, pass->reads[SLOT_BLOOM]), .composite = pass};
+    if (!bloom->last || !bloom->last->joined || !vkb_is_written_once(graph, pass->reads[SLOT_BLOOM])
+        || !find_kernels(bloom->last, radius, bloom, &glow))
+        return false;
+    bloom->threshold = threshold_of(graph, glow);
+    return bloom->threshold && vkb_is_threshold(bloom->threshold)
+        && bloom->threshold->reads[SLOT_SOURCE] == pass->reads[SLOT_SCENE];
 }
 
 VKB_COPY_FUNCTION(copy_composite, fused_bloom, composite,
@@ -159,26 +173,29 @@ VKB_COPY_FUNCTION(copy_threshold, fused_bloom, threshold,
                   THRESHOLD_ROWS(fused_bloom, VKB_COPY_READS))
 
 static struct vkb_pass_row fused_row(const struct vkb_variant_choice *choice,
-                                     const struct nest *nest)
+                                     const struct bloom *bloom)
 {
     const struct vkb_graph *graph = &choice->plain;
-    const enum vkb_format format = graph->images[nest->horizontal->targets[0]].format;
+    const enum vkb_format format = graph->images[bloom->last->targets[0]].format;
     struct vkb_pass_row row;
     struct vkb_fused_bloom_params *params = &row.params.fused_bloom;
 
-    memcpy(&row, nest->composite, sizeof row);
+    memcpy(&row, bloom->composite, sizeof row);
     memset(&row.params, 0, sizeof row.params);
-    vkb_read_only(&row, nest->composite->reads[SLOT_SCENE]);
+    vkb_read_only(&row, bloom->composite->reads[SLOT_SCENE]);
     if (row.transposed)
-        vkb_read_at(&row, SLOT_ENDED, nest->composite->reads[SLOT_COTANGENTS]);
+        vkb_read_at(&row, SLOT_ENDED, bloom->composite->reads[SLOT_COTANGENTS]);
     row.fused = true;
     row.block = VKB_BLOCK_fused_bloom;
-    copy_composite(params, &nest->composite->params.composite);
-    copy_threshold(params, &nest->threshold->params.threshold);
-    row.constants.threshold_mode = nest->threshold->constants.threshold_mode;
+    copy_composite(params, &bloom->composite->params.composite);
+    if (bloom->threshold) {
+        copy_threshold(params, &bloom->threshold->params.threshold);
+        row.constants.threshold_mode = bloom->threshold->constants.threshold_mode;
+    }
     row.constants.format = vkb_storage_mode(format);
-    memcpy(params->vertical, nest->vertical->params.blur.weights, sizeof params->vertical);
-    memcpy(params->horizontal, nest->horizontal->params.blur.weights, sizeof params->horizontal);
+    // The gain is that of the second pass, along rows.
+    vkb_fill_weights(bloom->columns, 1.0, params->vertical);
+    vkb_fill_weights(bloom->rows, bloom->gain, params->horizontal);
     return row;
 }
 
@@ -206,11 +223,13 @@ static void make_strips(const struct vkb_variant_choice *choice, struct vkb_pass
 
 // For kernels of up to TILE_RADIUS in three steps.
 static void make_tiles(struct vkb_pass_row *row, const struct vkb_shader *shader,
-                       const struct nest *nest)
+                       const struct bloom *bloom)
 {
+    const uint32_t rows = bloom->rows->count, columns = bloom->columns->count;
+    const int longest = (int)(rows > columns ? rows : columns) - 1;
     int radius = TILE_RADIUS / 4;
 
-    while (radius < nest->vertical->constants.radius || radius < nest->horizontal->constants.radius)
+    while (radius < longest)
         radius *= 2;
     vkb_make_dispatch(row, shader, (uint32_t)(TILE_LOADED - 2 * radius), TILE_ROWS);
     row->constants.radius = radius;
@@ -222,18 +241,18 @@ bool vkb_add_fused(struct vkb_variant_choice *choice, const struct vkb_pass_row 
 {
     const bool gpu = choice->variants == VKB_VARIANTS_GPU;
     const enum vkb_format format = choice->plain.images[pass->targets[0]].format;
-    struct nest nest;
+    struct bloom bloom;
 
-    if (!(find_nest(&choice->plain, pass, gpu ? TILE_RADIUS : STRIP_RADIUS,
-                    gpu && pass->transposed ? vkb_writer_of : vkb_threshold_of, &nest)
+    if (!(find_bloom(&choice->plain, pass, gpu ? TILE_RADIUS : STRIP_RADIUS,
+                     gpu && pass->transposed ? vkb_writer_of : vkb_threshold_of, &bloom)
           && (gpu
               || (vkb_fits_linear(choice, pass)
                   && (!pass->transposed || vkb_are_floats(choice, pass))))))
         return false;
-    struct vkb_pass_row row = fused_row(choice, &nest);
+    struct vkb_pass_row row = fused_row(choice, &bloom);
     if (gpu)
         make_tiles(&row, pass->transposed ? &vkb_shader_tile_mixed_comp : &vkb_shader_tile_comp,
-                   &nest);
+                   &bloom);
     else
         make_strips(choice, &row,
                     pass->transposed ? &vkb_shader_strip_mixed_linear_rgba32float
@@ -241,65 +260,56 @@ bool vkb_add_fused(struct vkb_variant_choice *choice, const struct vkb_pass_row 
     return vkb_add_fullscreen(choice, pass) && vkb_add_variant(choice, &row);
 }
 
-// The pass that writes the cotangents of an image, if it has this block and nothing else adds
-// any; else NULL.
-static const struct vkb_pass_row *sole_adjoint(const struct vkb_graph *graph, uint32_t image,
-                                               enum vkb_block block)
+// Whether the transpose adds nothing else to its result.
+static bool is_alone(const struct vkb_pass_row *pass)
 {
-    const struct vkb_pass_row *pass = vkb_writer_of(graph, image);
-
-    return pass && vkb_transposes(pass, block) && !pass->constants.add_own
-                && !pass->constants.masked
-             ? pass
-             : NULL;
+    return !pass->constants.add_own && !pass->constants.masked;
 }
 
-// The graph's nest. The formats of image and bloom may differ.
-static bool find_any_nest(const struct vkb_graph *graph, int radius, struct nest *nest)
+// The transposes of a bloom, of which `pass` is the last one: that of the threshold, or of the
+// filter, if there is no threshold. Its composite is a factor. The cotangents of the scene are an
+// image, or left to the last pass.
+static bool find_adjoint_bloom(const struct vkb_graph *graph, const struct vkb_pass_row *pass,
+                               int radius, struct bloom *bloom)
 {
-    for (uint32_t i = 0; i < graph->pass_count; ++i)
-        if (find_nest(graph, &graph->passes[i], radius, vkb_writer_of, nest))
-            return true;
-    return false;
-}
-
-// The transposes of a nest, of which `pass` is the last one: that of the threshold, or of the
-// vertical blur, if there is no threshold. The nest's composite is its adjoint then, a factor.
-// The cotangents of the scene are an image, or left to the last pass.
-static bool find_adjoint_nest(const struct vkb_graph *graph, const struct vkb_pass_row *pass,
-                              int radius, struct nest *nest)
-{
-    const enum vkb_block filter = VKB_BLOCK_adjoint_filter, composite = VKB_BLOCK_composite;
     const bool thresholds = vkb_transposes(pass, VKB_BLOCK_threshold)
-                         && pass->constants.by == BY_SCENE && !pass->constants.masked;
+                         && pass->constants.by == BY_SCENE
+                         && pass->constants.sampling == SAMPLING_TEXEL && !pass->constants.masked
+                         && !pass->constants.alpha;
+    const uint32_t added = pass->reads[SLOT_ADDED], image = pass->reads[SLOT_DIFFERENTIATED];
+    uint32_t by_bloom;
 
-    if (!(thresholds || (pass->block == filter && pass->constants.of_source))
-        || !pass->constants.add_own || !find_any_nest(graph, radius, nest))
+    if (!(thresholds || pass->block == VKB_BLOCK_adjoint_filter) || !pass->constants.of_source
+        || !pass->constants.add_own)
         return false;
-    const struct vkb_pass_row *first =
-        thresholds ? sole_adjoint(graph, pass->reads[SLOT_COTANGENTS], filter) : pass;
-    const struct vkb_pass_row *second =
-        first ? sole_adjoint(graph, first->reads[SLOT_COTANGENTS], filter) : NULL;
-    const uint32_t added = pass->reads[SLOT_ADDED];
-    const struct vkb_pass_row *by_scene = sole_adjoint(graph, added, composite);
-    nest->composite = second ? vkb_writer_of(graph, second->reads[SLOT_COTANGENTS]) : NULL;
-    return nest->composite && vkb_is_factor(nest->composite)
-        && (added == nest->composite->reads[SLOT_COTANGENTS]
-            || (by_scene && by_scene->constants.by == BY_SCENE))
-        && nest->threshold->reads[SLOT_SOURCE] == pass->reads[SLOT_DIFFERENTIATED];
+    *bloom = (struct bloom){
+        .last = thresholds ? vkb_writer_of(graph, pass->reads[SLOT_COTANGENTS]) : pass,
+        .threshold = thresholds ? pass : NULL,
+    };
+    if (!bloom->last || bloom->last->block != VKB_BLOCK_adjoint_filter
+        || (thresholds && !is_alone(bloom->last))
+        || !find_kernels(bloom->last, radius, bloom, &by_bloom))
+        return false;
+    const struct vkb_pass_row *by_scene = vkb_writer_of(graph, added);
+    bloom->composite = vkb_writer_of(graph, by_bloom);
+    return bloom->composite && vkb_is_factor(bloom->composite)
+        && bloom->composite->reads[SLOT_SCENE] == image
+        && (added == bloom->composite->reads[SLOT_COTANGENTS]
+            || (by_scene && vkb_transposes(by_scene, VKB_BLOCK_composite) && is_alone(by_scene)
+                && by_scene->constants.by == BY_SCENE));
 }
 
 // A fused row of the derivatives by the image, which replaces the composite's passes, the blurs'
 // and the threshold's. It reads the image and the composite's cotangents. Nothing is rounded
 // between the passes, whatever the formats are.
 static struct vkb_pass_row adjoint_row(const struct vkb_variant_choice *choice,
-                                       const struct vkb_pass_row *pass, const struct nest *nest)
+                                       const struct vkb_pass_row *pass, const struct bloom *bloom)
 {
-    struct vkb_pass_row row = fused_row(choice, nest);
+    struct vkb_pass_row row = fused_row(choice, bloom);
 
     memcpy(row.name, pass->name, sizeof row.name);
-    vkb_read_only(&row, nest->composite->reads[SLOT_COTANGENTS]);
-    vkb_read_at(&row, SLOT_ENDED, nest->composite->reads[SLOT_SCENE]);
+    vkb_read_only(&row, bloom->composite->reads[SLOT_COTANGENTS]);
+    vkb_read_at(&row, SLOT_ENDED, bloom->composite->reads[SLOT_SCENE]);
     row.targets[0] = pass->targets[0];
     row.constants.format = STORED_SINGLE;
     // Its sums have another order, so it is taken always: all runs have the same bits.
@@ -311,14 +321,14 @@ static struct vkb_pass_row adjoint_row(const struct vkb_variant_choice *choice,
 bool vkb_add_adjoint_fused(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
 {
     const bool gpu = choice->variants == VKB_VARIANTS_GPU;
-    struct nest nest;
+    struct bloom bloom;
 
-    if (!(find_adjoint_nest(&choice->plain, pass, gpu ? TILE_RADIUS : STRIP_RADIUS, &nest)
-          && (gpu || vkb_are_floats(choice, nest.composite))))
+    if (!(find_adjoint_bloom(&choice->plain, pass, gpu ? TILE_RADIUS : STRIP_RADIUS, &bloom)
+          && (gpu || vkb_are_floats(choice, bloom.composite))))
         return false;
-    struct vkb_pass_row row = adjoint_row(choice, pass, &nest);
+    struct vkb_pass_row row = adjoint_row(choice, pass, &bloom);
     if (gpu)
-        make_tiles(&row, &vkb_shader_tile_transposed_comp, &nest);
+        make_tiles(&row, &vkb_shader_tile_transposed_comp, &bloom);
     else
         make_strips(choice, &row, &vkb_shader_strip_transposed_linear_rgba32float);
     return vkb_add_variant(choice, &row);

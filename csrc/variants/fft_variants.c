@@ -68,26 +68,18 @@ static uint32_t longer_length(const struct vkb_device *device, uint32_t length)
     return length;
 }
 
-static bool is_stage(const struct vkb_pass_row *pass)
-{
-    return vkb_computes(pass, VKB_BLOCK_fft);
-}
-
-// The length of the lines along an axis of the convolution that the pass is of.
+// The length of the lines along an axis of the convolution that the pass is of. A period cannot be
+// longer.
 static uint32_t line_length(const struct vkb_variant_choice *choice,
                             const struct vkb_pass_row *pass, enum vkb_mode direction)
 {
-    // Each convolution has these passes. Those of the kernel come first, and do not tell whether
-    // the glow is padded.
-    while (pass->block != VKB_BLOCK_fft_kernel)
-        --pass;
-    while (!is_stage(pass) || pass->constants.stage != STAGE_FIRST)
-        ++pass;
-    while (!is_stage(pass) || (enum vkb_mode)pass->constants.direction != direction)
-        ++pass;
-    const uint32_t length = (uint32_t)pass->params.fft.padded;
-    // A period cannot be longer.
-    return pass->constants.padded ? longer_length(choice->device, length) : length;
+    const struct vkb_transform *transform = &pass->transform;
+    const bool rows = direction == DIRECTION_HORIZONTAL;
+    const uint32_t length = rows ? transform->width : transform->height;
+
+    return (rows ? transform->pads_rows : transform->pads_columns)
+             ? longer_length(choice->device, length)
+             : length;
 }
 
 // Whether the device can hold the lines along both axes.
@@ -171,25 +163,20 @@ static struct vkb_pass_row make_placing(const struct vkb_variant_choice *choice,
 
 bool vkb_add_lines(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
 {
-    const struct vkb_pass_row *all = choice->plain.passes, *end = pass + 1;
     struct vkb_pass_row row;
 
-    if (!((is_stage(pass) || pass->block == VKB_BLOCK_fft_kernel) && holds_lines(choice, pass)))
+    if (!(pass->transform.width && holds_lines(choice, pass)))
         return false;
-    if (!is_stage(pass)) {
+    if (pass->block == VKB_BLOCK_fft_kernel) {
         row = make_placing(choice, pass);
         return vkb_add_variant(choice, &row);
     }
     // The first stage along an axis stands for all.
-    if (pass > all && is_stage(pass - 1)
-        && pass[-1].constants.direction == pass->constants.direction)
+    if (pass->transform.stages == 0)
         return true;
-    while (end < all + choice->plain.pass_count && is_stage(end)
-           && end->constants.direction == pass->constants.direction)
-        ++end;
     if (pass->constants.stage == STAGE_FIRST)
         hold_spectra(choice, pass);
-    row = make_row(choice, pass, end);
+    row = make_row(choice, pass, pass + pass->transform.stages);
     return vkb_add_variant(choice, &row);
 }
 

@@ -50,14 +50,6 @@ void vkb_make_linear(struct vkb_pass_row *row, const struct vkb_shader *shader, 
     row->reading = VKB_READING_LINEAR_TEXELS;
 }
 
-int32_t vkb_ratio_of(uint32_t source, uint32_t target)
-{
-    return source == 2 * target ? EXACT_HALF
-         : source == target     ? EXACT_SAME
-         : 2 * source == target ? EXACT_DOUBLE
-                                : 0;
-}
-
 void vkb_make_tiles(const struct vkb_variant_choice *choice, struct vkb_pass_row *row,
                     const struct vkb_shader *shader, int32_t width, int32_t height)
 {

@@ -86,9 +86,6 @@ bool vkb_are_floats(const struct vkb_variant_choice *choice, const struct vkb_pa
 // Turns a pass over all pixels into a dispatch.
 void vkb_make_dispatch(struct vkb_pass_row *row, const struct vkb_shader *shader,
                        uint32_t block_width, uint32_t block_height);
-// Whether sides are in a simple ratio: EXACT_*; 0: they are not.
-int32_t vkb_ratio_of(uint32_t source, uint32_t target);
-
 // Turns a pass with the constants of a filter into its tiles, whose pixels add up windows of
 // `width` x `height` texels.
 void vkb_make_tiles(const struct vkb_variant_choice *choice, struct vkb_pass_row *row,

@@ -62,13 +62,16 @@ const char *add_filter(int distance)
 {
     static struct vkb_error error;
     const struct vkb_image_row row = {.name = "level", .width = 8, .height = 8};
-    const struct vkb_side_taps one = {0.0, 0.0, 1.0}, two = {1.0, 0.5, 0.0}, four = {2.0, 0.5, 0.0};
-    const struct vkb_side_taps last = {distance, distance ? 0.5 : 0.0, distance ? 0.0 : 1.0};
-    const struct vkb_taps filter = {{{two, one}, {four, one}, {last, one}}, .gain = 1.0};
+    const struct vkb_kernel kernels[][2] = {
+        {vkb_sides(1.0, 0.5, 0.0), vkb_centre()},
+        {vkb_sides(2.0, 0.5, 0.0), vkb_centre()},
+        {vkb_sides(distance, distance ? 0.5 : 0.0, distance ? 0.0 : 1.0), vkb_centre()},
+    };
     struct vkb_graph graph = {0};
     struct vkb_levels levels = {.graph = &graph, .error = &error};
 
     vkb_levels_add(&levels, &row);
+    const struct vkb_filter filter = vkb_make_filter(&graph, 0, 0, kernels, 3, 1.0);
     vkb_add_filter(&levels, &filter, 0, 0);
     vkb_graph_destroy(&graph);
     return levels.failed ? error.message : "added";
@@ -160,7 +163,7 @@ def test_a_filter_with_too_many_places_fails(
     ).add_filter
     add_filter.restype = ctypes.c_char_p
     assert add_filter(0) == add_filter(2) == b"added"
-    assert add_filter(3) == b"filter: level has 6 x 1 places of taps, more than 5"
+    assert add_filter(3) == b"filter: level has 6 places of taps along an axis, more than 5"
 
 
 def test_what_has_a_history_is_made_in_each_call(

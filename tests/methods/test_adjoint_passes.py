@@ -347,8 +347,8 @@ TRANSPOSED: tuple[tuple[str, Any, tuple[int, ...], str, tuple[str, ...]], ...] =
     ("gpu", Pyramid(levels=3, composite="mix", intensity=0.4), (4, 8, 3), "f4", (LEVELS,) * 4),
     ("gpu", Pyramid(levels=1), (2, 2, 4), "f4", (LEVELS,) * 2),
     ("gpu", Pyramid(levels=2), (2, 70, 3), "f4", (LEVELS,) * 4),
-    ("gpu", Pyramid(levels=2), (35, 65, 3), "f4", (LEVELS,) * 3),
-    ("gpu", Pyramid(levels=2, composite="mix", exposure=0.5), (35, 62, 3), "f4", (LEVELS,) * 3),
+    ("gpu", Pyramid(levels=2), (35, 65, 3), "f4", (LEVELS,) * 4),
+    ("gpu", Pyramid(levels=2, composite="mix", exposure=0.5), (35, 62, 3), "f4", (LEVELS,) * 4),
     # Windows of many texels: along one axis, and along both in another ratio.
     ("gpu", Separable(bloom_scale=0.5), (66, 134, 3), "f4", (LEVELS,) * 4),
     ("gpu", Separable(bloom_scale=0.25, blur_scale=2), (66, 135, 3), "f4", (LEVELS,)),
