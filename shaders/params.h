@@ -66,18 +66,7 @@
     INPUT(B, float, glow_intensity) \
     THRESHOLD_ROWS(B, READS)
 
-// A blur pass: the distances of its taps in texels of the source, and its half-kernel w0.., four
-// weights in a vec4. With PLACED, the distances are `offsets` of the steps. `gain` is
-// for a blur in both directions.
-#define BLUR_BLOCK(B, READS, INPUT, VEC4S) \
-    INPUT(B, float, step_x) \
-    INPUT(B, float, step_y) \
-    INPUT(B, float, gain) \
-    SAMPLING_ROWS(B, INPUT) \
-    VEC4S(B, weights, (MAX_WEIGHTS + 3) / 4) \
-    VEC4S(B, offsets, 3)
-
-// The same blur on integer texels: a symmetric kernel from the first tap to the last, then zeros.
+// A filter along a line of integer texels: a symmetric kernel from the first tap to the last, then zeros.
 // `origin` is the position of the target's first pixel in the source, along the line. For ROLLED,
 // so that both directions share a pipeline: whether lines are columns, and whether texels are 8-bit
 // levels.
@@ -112,10 +101,18 @@
     VEC4S(B, taps_x, MAX_FILTER_TAPS) \
     VEC4S(B, taps_y, MAX_FILTER_TAPS)
 
-// A pass that filters an image. The threshold is for one that reads the image itself.
+// A linear pass: what its filters (csrc/graph/filter.h) are for the device. Of a filter with a long
+// kernel: the distances of its taps in texels of the source, and its half-kernel w0.., four weights
+// in a vec4; where PLACED is set, the distances are `offsets` of the steps. Of a sum of levels: their
+// weights. The threshold is for a pass that reads the image itself.
 #define FILTER_BLOCK(B, READS, INPUT, VEC4S) \
     SAMPLING_ROWS(B, INPUT) \
     FILTER_ROWS(B, INPUT, VEC4S) \
+    INPUT(B, float, step_x) \
+    INPUT(B, float, step_y) \
+    VEC4S(B, weights, (MAX_WEIGHTS + 3) / 4) \
+    VEC4S(B, offsets, (MAX_OFFSETS + 3) / 4) \
+    VEC4S(B, shares, (GATHERED_LEVELS + 3) / 4) \
     THRESHOLD_ROWS(B, READS)
 
 // A filter that makes the bloom, fused with the composite.
@@ -143,11 +140,6 @@
     READS(B, maximum) \
     INPUT(B, float, exposure) \
     VEC4S(B, tint, 1)
-
-// A pass that adds up levels of several sizes, and their weights.
-#define GATHER_BLOCK(B, READS, INPUT, VEC4S) \
-    SAMPLING_ROWS(B, INPUT) \
-    VEC4S(B, shares, 2)
 
 // An iteration of a streak (streaks.frag): `count` taps, the step between them in texels, and the
 // weight of each for each channel. The threshold is for the first iteration. With `reads_next`,
@@ -301,13 +293,11 @@
     BLOCK(custom, CUSTOM_BLOCK) \
     BLOCK(mesh, MESH_BLOCK) \
     BLOCK(threshold, THRESHOLD_BLOCK) \
-    BLOCK(blur, BLUR_BLOCK) \
     BLOCK(line, LINE_BLOCK) \
     BLOCK(fused_bloom, FUSED_BLOOM_BLOCK) \
     BLOCK(filter, FILTER_BLOCK) \
     BLOCK(filter_final, FILTER_FINAL_BLOCK) \
     BLOCK(prefilter, PREFILTER_BLOCK) \
-    BLOCK(gather, GATHER_BLOCK) \
     BLOCK(streaks, STREAKS_BLOCK) \
     BLOCK(flare, FLARE_BLOCK) \
     BLOCK(dirt, DIRT_BLOCK) \
@@ -393,8 +383,10 @@
 #define HALF_LIMIT   65504.0
 #define SINGLE_LIMIT 3.402823466e38
 
-// The longest half-kernel (w0..w64) and the most layers of one blur.
+// The longest half-kernel (w0..w64), also of one whose taps are at given places, and the most layers
+// of one blur.
 #define MAX_WEIGHTS 65
+#define MAX_OFFSETS 12
 #define MAX_LAYERS  8
 
 // Of glare: the most stages (the bloom and a picture of dirt are added up with them) and ghosts,

@@ -8,10 +8,7 @@
 
 #include <stdbool.h>
 
-enum {
-    VKB_MAX_TAPS = 3 * MAX_KERNELS,
-    VKB_MAX_OFFSETS = 12,  // of BLUR_BLOCK
-};
+enum { VKB_MAX_TAPS = 3 * MAX_KERNELS };
 
 // A symmetric kernel along an axis: the weights w0.. of a tap in the middle and of those on both
 // sides of it, which are `step` apart, or `offsets` steps from the middle.
@@ -19,7 +16,7 @@ struct vkb_kernel {
     uint32_t count;
     bool placed;  // by offsets
     double step;  // in texels of the source
-    double weights[MAX_WEIGHTS], offsets[VKB_MAX_OFFSETS];
+    double weights[MAX_WEIGHTS], offsets[MAX_OFFSETS];
 };
 
 // A sample at a distance from the position of a pixel, in texels, with a weight for each kernel.

@@ -10,9 +10,7 @@
 static vkb_transpose *const transposes[VKB_BLOCK_COUNT] = {
     [VKB_BLOCK_composite] = vkb_transpose_composite,
     [VKB_BLOCK_threshold] = vkb_transpose_threshold,
-    [VKB_BLOCK_blur] = vkb_transpose_filters,
     [VKB_BLOCK_filter] = vkb_transpose_filters,
-    [VKB_BLOCK_gather] = vkb_transpose_filters,
     [VKB_BLOCK_prefilter] = vkb_transpose_prefilter,
     [VKB_BLOCK_streaks] = vkb_transpose_streaks,
     [VKB_BLOCK_flare] = vkb_transpose_flare,

@@ -70,7 +70,7 @@ static void add_down(struct vkb_levels *levels, uint32_t level)
     vkb_filter_begin(levels->graph, from, to, &filter);
     vkb_filter_three(&filter, FILAMENT_OFFSET, FILAMENT_OUTER);
     if (above.width % 2 == 0 && above.height % 2 == 0)
-        vkb_add_filter(levels, &filter, from, to);
+        vkb_add_filter_pass(levels, &filter, from, to);
     else
         vkb_levels_reduce(levels, 1.0, 1.0, from, to);
 }

@@ -15,7 +15,7 @@ static void add_down(struct vkb_levels *levels, uint32_t level, uint32_t from)
     struct vkb_filter filter = vkb_make_filter(levels->graph, from, to, kernels, 2, 1.0);
 
     vkb_set_kind(&filter, UPSAMPLE_INSIDE);
-    vkb_add_filter(levels, &filter, from, to);
+    vkb_add_filter_pass(levels, &filter, from, to);
 }
 
 uint32_t vkb_add_pmndrs(struct vkb_levels *levels)

@@ -68,7 +68,7 @@ static uint32_t add_kawase(struct vkb_levels *levels)
             {vkb_sides(distance, 0.5 * share, 0.0), vkb_sides(distance, 0.5, 0.0)},
         };
         const struct vkb_filter filter = vkb_make_filter(levels->graph, from, to, kernels, 2, 1.0);
-        vkb_add_filter(levels, &filter, from, to);
+        vkb_add_filter_pass(levels, &filter, from, to);
         from = to;
     }
     return vkb_levels_enlarge(levels, urp_upsample(levels), from, 1.0);

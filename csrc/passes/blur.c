@@ -53,7 +53,7 @@ struct vkb_pass_row vkb_blur_row(struct vkb_levels *levels, const struct vkb_fil
 {
     const struct vkb_image_row *target = &levels->graph->images[to];
     struct vkb_pass_row row = vkb_fullscreen_row(target->name, &vkb_shader_blur_frag, to);
-    struct vkb_blur_params *params = &row.params.blur;
+    struct vkb_filter_params *params = &row.params.filter;
     struct vkb_filter filter = *given;
     const enum vkb_mode direction = !filter.x.kernel.count ? DIRECTION_VERTICAL
                                   : !filter.y.kernel.count ? DIRECTION_HORIZONTAL
@@ -66,12 +66,12 @@ struct vkb_pass_row vkb_blur_row(struct vkb_levels *levels, const struct vkb_fil
         && (keeps_size(&filter) || is_integer(kernel->step)))
         move_to_texels(kernel);
     vkb_read_only(&row, from);
-    row.block = VKB_BLOCK_blur;
+    row.block = VKB_BLOCK_filter;
     params->step_x = (float)filter.x.kernel.step;
     params->step_y = (float)filter.y.kernel.step;
-    VKB_SET_TARGET(&row, blur, target);
+    VKB_SET_TARGET(&row, filter, target);
     // Along one axis the gain is part of the weights, so that variants need not apply it.
-    params->gain = both ? (float)filter.gain : 1.0f;
+    params->coarse = both ? (float)filter.gain : 1.0f;
     vkb_fill_weights(kernel, both ? 1.0 : filter.gain, params->weights);
     for (uint32_t i = 0; kernel->placed && i < kernel->count; ++i)
         params->offsets[i / 4][i % 4] = (float)kernel->offsets[i];

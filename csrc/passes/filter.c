@@ -199,8 +199,8 @@ static struct vkb_pass_row filter_row(const struct vkb_levels *levels,
     return row;
 }
 
-void vkb_add_mixed_filter(struct vkb_levels *levels, const struct vkb_filter *filter, uint32_t from,
-                          uint32_t own, double own_share, uint32_t to)
+void vkb_add_mixed_filter_pass(struct vkb_levels *levels, const struct vkb_filter *filter,
+                               uint32_t from, uint32_t own, double own_share, uint32_t to)
 {
     struct vkb_filter filters[2] = {*filter};
     const bool adds_own = own != VKB_NO_IMAGE;
@@ -224,10 +224,10 @@ void vkb_add_mixed_filter(struct vkb_levels *levels, const struct vkb_filter *fi
     vkb_levels_pass(levels, &row);
 }
 
-void vkb_add_filter(struct vkb_levels *levels, const struct vkb_filter *filter, uint32_t from,
-                    uint32_t to)
+void vkb_add_filter_pass(struct vkb_levels *levels, const struct vkb_filter *filter, uint32_t from,
+                         uint32_t to)
 {
-    vkb_add_mixed_filter(levels, filter, from, VKB_NO_IMAGE, 0.0, to);
+    vkb_add_mixed_filter_pass(levels, filter, from, VKB_NO_IMAGE, 0.0, to);
 }
 
 void vkb_kawase_down(struct vkb_levels *levels, double offset, uint32_t from, uint32_t to)
@@ -238,7 +238,7 @@ void vkb_kawase_down(struct vkb_levels *levels, double offset, uint32_t from, ui
     };
     const struct vkb_filter filter = vkb_make_filter(levels->graph, from, to, kernels, 2, 0.5);
 
-    vkb_add_filter(levels, &filter, from, to);
+    vkb_add_filter_pass(levels, &filter, from, to);
 }
 
 void vkb_kawase_up(struct vkb_levels *levels, double offset, uint32_t from, uint32_t to)
@@ -252,7 +252,7 @@ void vkb_kawase_up(struct vkb_levels *levels, double offset, uint32_t from, uint
     struct vkb_filter filter = vkb_make_filter(levels->graph, from, to, kernels, 3, 1.0);
 
     filter.divisor = 12.0;  // Its inverse is no float.
-    vkb_add_filter(levels, &filter, from, to);
+    vkb_add_filter_pass(levels, &filter, from, to);
 }
 
 uint32_t vkb_kawase_rise(struct vkb_levels *levels, double offset)

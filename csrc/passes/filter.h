@@ -26,10 +26,10 @@ void vkb_set_kind(struct vkb_filter *filter, enum vkb_mode kind);
 
 // Adds the pass that filters `from` into `to`; the one that also adds the share of an image of the
 // size of `to`.
-void vkb_add_filter(struct vkb_levels *levels, const struct vkb_filter *filter, uint32_t from,
-                    uint32_t to);
-void vkb_add_mixed_filter(struct vkb_levels *levels, const struct vkb_filter *filter, uint32_t from,
-                          uint32_t own, double own_share, uint32_t to);
+void vkb_add_filter_pass(struct vkb_levels *levels, const struct vkb_filter *filter, uint32_t from,
+                         uint32_t to);
+void vkb_add_mixed_filter_pass(struct vkb_levels *levels, const struct vkb_filter *filter,
+                               uint32_t from, uint32_t own, double own_share, uint32_t to);
 
 // Passes of dual Kawase (Bjorge, "Bandwidth-Efficient Rendering", SIGGRAPH 2015). Down: four times
 // the centre, and four diagonal taps at a distance of half a texel times the offset. Up: four axial
@@ -40,9 +40,11 @@ void vkb_kawase_up(struct vkb_levels *levels, double offset, uint32_t from, uint
 // The images up_N-2 ... up_0 from the last level, and the passes up to them; the last image.
 uint32_t vkb_kawase_rise(struct vkb_levels *levels, double offset);
 
+// Whether the pass filters an image by a few taps, and may add another one.
 static inline bool vkb_is_filter(const struct vkb_pass_row *pass)
 {
-    return pass->block == VKB_BLOCK_filter;
+    return vkb_computes(pass, VKB_BLOCK_filter) && !pass->constants.levels
+        && !pass->filters->x.kernel.count && !pass->filters->y.kernel.count;
 }
 
 #endif

@@ -78,7 +78,7 @@ void vkb_levels_box(struct vkb_levels *levels, uint32_t from, uint32_t to)
     const struct vkb_kernel kernels[][2] = {{vkb_sides(1.0, 0.5, 0.0), vkb_sides(1.0, 0.5, 0.0)}};
     const struct vkb_filter filter = vkb_make_filter(levels->graph, from, to, kernels, 1, 1.0);
 
-    vkb_add_filter(levels, &filter, from, to);
+    vkb_add_filter_pass(levels, &filter, from, to);
 }
 
 void vkb_levels_reduce(struct vkb_levels *levels, double step_x, double step_y, uint32_t from,
@@ -88,7 +88,7 @@ void vkb_levels_reduce(struct vkb_levels *levels, double step_x, double step_y, 
 
     vkb_filter_begin(levels->graph, from, to, &filter);
     vkb_filter_thirteen(&filter, step_x, step_y);
-    vkb_add_filter(levels, &filter, from, to);
+    vkb_add_filter_pass(levels, &filter, from, to);
 }
 
 void vkb_levels_reduce_rest(struct vkb_levels *levels, double step_x, double step_y)
@@ -192,7 +192,7 @@ static void add_up(struct vkb_levels *levels, const struct vkb_combination *comb
         y = (double)smaller->height / larger->height;
     }
     const struct vkb_filter filter = enlarging(levels->graph, from, to, kernel, x, y, coarse_share);
-    vkb_add_mixed_filter(levels, &filter, from, own, own_share, to);
+    vkb_add_mixed_filter_pass(levels, &filter, from, own, own_share, to);
 }
 
 // Adds up levels. In rgba8unorm, whose largest value is 1, each image holds its sum divided by the
@@ -257,12 +257,12 @@ void vkb_levels_gather(struct vkb_levels *levels, const double *shares, enum vkb
     for (uint32_t level = 0; level < GATHERED_LEVELS; ++level)
         vkb_read_at(&row, SLOT_LEVELS + level,
                     level < levels->count ? levels->downs[level] : VKB_NO_IMAGE);
-    row.block = VKB_BLOCK_gather;
-    VKB_SET_TARGET(&row, gather, &levels->graph->images[to]);
+    row.block = VKB_BLOCK_filter;
+    VKB_SET_TARGET(&row, filter, &levels->graph->images[to]);
     for (uint32_t level = 0; level < levels->count; ++level) {
         filters[level] =
             enlarging(levels->graph, levels->downs[level], to, kernel, 1.0, 1.0, shares[level]);
-        row.params.gather.shares[level / 4][level % 4] = (float)shares[level];
+        row.params.filter.shares[level / 4][level % 4] = (float)shares[level];
     }
     vkb_set_filters(levels, &row, filters, levels->count);
     vkb_levels_pass(levels, &row);

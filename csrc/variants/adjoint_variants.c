@@ -73,7 +73,8 @@ static const struct vkb_readers *readers_along(const struct vkb_axis *axis, bool
                                                                                : &axis->readers;
 }
 
-bool vkb_add_adjoint_linear(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
+bool vkb_add_adjoint_linear_variant(struct vkb_variant_choice *choice,
+                                    const struct vkb_pass_row *pass)
 {
     struct vkb_pass_row row;
 
@@ -91,11 +92,12 @@ bool vkb_add_adjoint_linear(struct vkb_variant_choice *choice, const struct vkb_
     row.gains_if_finite = true;
     read_linear_of_composite(choice, &row);
     vkb_make_linear(&row, &vkb_shader_adjoint_taps_linear_rgba32float, ADJOINT_SIDE, ADJOINT_ROWS);
-    return vkb_add_variant(choice, &row);
+    return vkb_add_variant_pass(choice, &row);
 }
 
 // An invocation for all kernels of a pixel, which fragments would compute anew for each.
-bool vkb_add_adjoint_kernels(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
+bool vkb_add_adjoint_kernels_variant(struct vkb_variant_choice *choice,
+                                     const struct vkb_pass_row *pass)
 {
     struct vkb_pass_row row;
 
@@ -108,7 +110,7 @@ bool vkb_add_adjoint_kernels(struct vkb_variant_choice *choice, const struct vkb
     const uint32_t height = target->height / (uint32_t)row.constants.stacked_samples;
     row.groups_width = (target->width + PIXEL_INVOCATIONS - 1) / PIXEL_INVOCATIONS;
     row.groups_height = (height + PIXEL_INVOCATIONS - 1) / PIXEL_INVOCATIONS;
-    return vkb_add_variant(choice, &row);
+    return vkb_add_variant_pass(choice, &row);
 }
 
 // The transpose of a filter in tiles: windows along both axes, the sizes of the images' ratios, and
@@ -242,12 +244,13 @@ static bool add_pictures(struct vkb_variant_choice *choice, const struct vkb_pas
         row.params.adjoint_filter.pictures[i][0] = (float)x->start;
         row.params.adjoint_filter.pictures[i][1] = (float)y->start;
     }
-    row.constants.pictures = (int32_t)pass->joined_count;
     vkb_make_tiles(choice, &row, &vkb_shader_adjoint_filter_tile_comp, width, height);
-    return width > MAX_WINDOW || height > MAX_WINDOW || vkb_add_variant(choice, &row);
+    row.constants.pictures = (int32_t)pass->joined_count;
+    return width > MAX_WINDOW || height > MAX_WINDOW || vkb_add_variant_pass(choice, &row);
 }
 
-bool vkb_add_adjoint_filter(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
+bool vkb_add_adjoint_filter_variant(struct vkb_variant_choice *choice,
+                                    const struct vkb_pass_row *pass)
 {
     struct vkb_pass_row row;
 
@@ -257,6 +260,7 @@ bool vkb_add_adjoint_filter(struct vkb_variant_choice *choice, const struct vkb_
     row.gains_if_finite = true;
     const bool fits_tiles = make_tiles(choice, pass, &row);
     read_composite(&choice->plain, &row);
-    return (fits_tiles ? vkb_add_variant(choice, &row) : vkb_add_fullscreen(choice, &row))
+    return (fits_tiles ? vkb_add_variant_pass(choice, &row)
+                       : vkb_add_fullscreen_variant(choice, &row))
         && add_pictures(choice, pass);
 }

@@ -55,14 +55,14 @@ static struct vkb_pass_row line_row(const struct vkb_variant_choice *choice,
 
 static bool add_line_row(struct vkb_variant_choice *choice, const struct vkb_pass_row *row)
 {
-    vkb_add_variant(choice, row);
+    vkb_add_variant_pass(choice, row);
     if (row->params.line.levels && !choice->failed)
         choice->graph->passes[choice->graph->pass_count - 1].constants.stored = STORED_SINGLE;
     return true;
 }
 
 // Adds a line blur if the source has the target's size.
-bool vkb_add_line(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
+bool vkb_add_line_variant(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
 {
     if (!((vkb_line_of(pass, DIRECTION_VERTICAL, LINE_RADIUS)
            || vkb_line_of(pass, DIRECTION_HORIZONTAL, LINE_RADIUS))
@@ -94,7 +94,7 @@ static bool is_enlarged(const struct vkb_variant_choice *choice, const struct vk
                                    VK_FORMAT_FEATURE_SAMPLED_IMAGE_FILTER_LINEAR_BIT));
 }
 
-bool vkb_add_enlarged(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
+bool vkb_add_enlarged_variant(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
 {
     if (!is_enlarged(choice, pass))
         return false;
@@ -106,7 +106,7 @@ bool vkb_add_enlarged(struct vkb_variant_choice *choice, const struct vkb_pass_r
     const bool unorm = target->format == VKB_FORMAT_RGBA8_UNORM;
     char name[VKB_NAME_SIZE];
     snprintf(name, sizeof name, "%.24s_lines", pass->name);
-    const uint32_t lines = vkb_add_floats(choice, name, size);
+    const uint32_t lines = vkb_add_float_image(choice, name, size);
     struct vkb_pass_row line = line_row(choice, pass, lines, -1);
     struct vkb_pass_row row =
         vkb_fullscreen_row(pass->name, &vkb_shader_enlarge_frag, pass->targets[0]);
@@ -116,7 +116,7 @@ bool vkb_add_enlarged(struct vkb_variant_choice *choice, const struct vkb_pass_r
     row.block = VKB_BLOCK_threshold;
     // Not of `plain`: a new image may have moved these.
     VKB_SET_TARGET(&row, threshold, &choice->graph->images[pass->targets[0]]);
-    return add_line_row(choice, &line) && vkb_add_fullscreen(choice, &row);
+    return add_line_row(choice, &line) && vkb_add_fullscreen_variant(choice, &row);
 }
 
 // A bloom of the image by one filter, at its size: the last row of the filter, the threshold pass
@@ -155,11 +155,9 @@ static bool find_bloom(const struct vkb_graph *graph, const struct vkb_pass_row 
 {
     uint32_t glow;
 
-    if (!vkb_ends_bloom(pass) || !graph->images[pass->reads[SLOT_SCENE]].input)
-        return false;
-    *bloom =
-        (struct bloom){.last = vkb_writer_of(graph, pass->reads[SLOT_BLOOM]), .composite = pass};
-    if (!bloom->last || !bloom->last->joined || !vkb_is_written_once(graph, pass->reads[SLOT_BLOOM])
+    *bloom = (struct bloom){.last = vkb_bloom_of(graph, pass), .composite = pass};
+    if (!bloom->last || !bloom->last->joined || !graph->images[pass->reads[SLOT_SCENE]].input
+        || !vkb_is_written_once(graph, pass->reads[SLOT_BLOOM])
         || !find_kernels(bloom->last, radius, bloom, &glow))
         return false;
     bloom->threshold = threshold_of(graph, glow);
@@ -237,7 +235,7 @@ static void make_tiles(struct vkb_pass_row *row, const struct vkb_shader *shader
 }
 
 // Adds the composite, and after it the fused pass in strips or in tiles, which may replace it.
-bool vkb_add_fused(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
+bool vkb_add_fused_variant(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
 {
     const bool gpu = choice->variants == VKB_VARIANTS_GPU;
     const enum vkb_format format = choice->plain.images[pass->targets[0]].format;
@@ -257,7 +255,7 @@ bool vkb_add_fused(struct vkb_variant_choice *choice, const struct vkb_pass_row 
         make_strips(choice, &row,
                     pass->transposed ? &vkb_shader_strip_mixed_linear_rgba32float
                                      : strip_shaders[format]);
-    return vkb_add_fullscreen(choice, pass) && vkb_add_variant(choice, &row);
+    return vkb_add_fullscreen_variant(choice, pass) && vkb_add_variant_pass(choice, &row);
 }
 
 // Whether the transpose adds nothing else to its result.
@@ -318,7 +316,8 @@ static struct vkb_pass_row adjoint_row(const struct vkb_variant_choice *choice,
     return row;
 }
 
-bool vkb_add_adjoint_fused(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
+bool vkb_add_adjoint_fused_variant(struct vkb_variant_choice *choice,
+                                   const struct vkb_pass_row *pass)
 {
     const bool gpu = choice->variants == VKB_VARIANTS_GPU;
     struct bloom bloom;
@@ -331,5 +330,5 @@ bool vkb_add_adjoint_fused(struct vkb_variant_choice *choice, const struct vkb_p
         make_tiles(&row, &vkb_shader_tile_transposed_comp, &bloom);
     else
         make_strips(choice, &row, &vkb_shader_strip_transposed_linear_rgba32float);
-    return vkb_add_variant(choice, &row);
+    return vkb_add_variant_pass(choice, &row);
 }

@@ -161,7 +161,8 @@ static struct vkb_pass_row make_placing(const struct vkb_variant_choice *choice,
     return row;
 }
 
-bool vkb_add_lines(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
+bool vkb_add_transform_lines_variant(struct vkb_variant_choice *choice,
+                                     const struct vkb_pass_row *pass)
 {
     struct vkb_pass_row row;
 
@@ -169,7 +170,7 @@ bool vkb_add_lines(struct vkb_variant_choice *choice, const struct vkb_pass_row 
         return false;
     if (pass->block == VKB_BLOCK_fft_kernel) {
         row = make_placing(choice, pass);
-        return vkb_add_variant(choice, &row);
+        return vkb_add_variant_pass(choice, &row);
     }
     // The first stage along an axis stands for all.
     if (pass->transform.stages == 0)
@@ -177,7 +178,7 @@ bool vkb_add_lines(struct vkb_variant_choice *choice, const struct vkb_pass_row 
     if (pass->constants.stage == STAGE_FIRST)
         hold_spectra(choice, pass);
     row = make_row(choice, pass, pass + pass->transform.stages);
-    return vkb_add_variant(choice, &row);
+    return vkb_add_variant_pass(choice, &row);
 }
 
 static const struct vkb_shader *const stage_shaders[VKB_FORMAT_COUNT] = VKB_LINEAR_BY_FORMAT(fft);
@@ -190,7 +191,7 @@ static bool reaches(const struct vkb_device *device, const struct vkb_image_row 
         <= device->limits.maxStorageBufferRange;
 }
 
-bool vkb_add_transform(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
+bool vkb_add_transform_variant(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
 {
     const struct vkb_image_row *target = &choice->graph->images[pass->targets[0]];
     struct vkb_pass_row row;
@@ -203,5 +204,5 @@ bool vkb_add_transform(struct vkb_variant_choice *choice, const struct vkb_pass_
     row.reading = VKB_READING_LINEAR_TEXELS;
     row.shader = pass->constants.stage == STAGE_LAST ? stored_shaders[target->format]
                                                      : stage_shaders[from->format];
-    return vkb_add_variant(choice, &row);
+    return vkb_add_variant_pass(choice, &row);
 }

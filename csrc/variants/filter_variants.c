@@ -57,18 +57,18 @@ static uint32_t add_rows(struct vkb_variant_choice *choice, const struct vkb_pas
     row.constants.levels = 0;
     memset(&row.params, 0, sizeof row.params);
     vkb_read_only(&row, from);
-    row.targets[0] = vkb_add_floats(choice, name, size);
+    row.targets[0] = vkb_add_float_image(choice, name, size);
     vkb_make_linear(&row, rows_shaders[format], GATHER_COLUMNS, GATHER_ROWS);
-    vkb_add_variant(choice, &row);
+    vkb_add_variant_pass(choice, &row);
     return row.targets[0];
 }
 
-bool vkb_add_gathered(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
+bool vkb_add_gathered_variant(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
 {
     const uint32_t levels = (uint32_t)pass->constants.levels;
     struct vkb_pass_row row;
 
-    if (!(pass->block == VKB_BLOCK_gather && fits_rows(choice, pass, levels)))
+    if (!(vkb_computes(pass, VKB_BLOCK_filter) && levels && fits_rows(choice, pass, levels)))
         return false;
     const enum vkb_format format = choice->graph->images[pass->targets[0]].format;
     const bool own = pass->constants.upsample == UPSAMPLE_LINEAR
@@ -81,7 +81,7 @@ bool vkb_add_gathered(struct vkb_variant_choice *choice, const struct vkb_pass_r
         row.reads[SLOT_LEVELS + level] = add_rows(choice, pass, level);
     vkb_make_linear(&row, gather_shaders[format], TEXEL_COLUMNS(vkb_formats[format].channel_size),
                     GATHER_ROWS);
-    return vkb_add_variant(choice, &row);
+    return vkb_add_variant_pass(choice, &row);
 }
 
 // Gives `row` the constants of the filter `pass`.
@@ -136,26 +136,26 @@ static bool make_filter(const struct vkb_variant_choice *choice, const struct vk
     return true;
 }
 
-bool vkb_add_filtered(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
+bool vkb_add_filtered_variant(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
 {
     const struct filter_shaders shaders = {strip_shaders, &vkb_shader_filter_tile_comp};
     struct vkb_pass_row row;
 
     memcpy(&row, pass, sizeof row);
-    return make_filter(choice, pass, shaders, &row) && vkb_add_variant(choice, &row)
-        && vkb_add_from_image(choice, pass, &row);
+    return make_filter(choice, pass, shaders, &row) && vkb_add_variant_pass(choice, &row)
+        && vkb_add_from_image_variant(choice, pass, &row);
 }
 
-const struct vkb_pass_row *vkb_nested_filter(const struct vkb_variant_choice *choice,
-                                             const struct vkb_pass_row *pass)
+// The filter that makes the bloom which `pass` ends, if a fused pass may nest it; NULL: none.
+static const struct vkb_pass_row *nested_filter(const struct vkb_variant_choice *choice,
+                                                const struct vkb_pass_row *pass)
 {
     const struct vkb_graph *plain = &choice->plain;
-    const struct vkb_pass_row *up =
-        vkb_ends_bloom(pass) ? vkb_writer_of(plain, pass->reads[SLOT_BLOOM]) : NULL;
+    const struct vkb_pass_row *up = vkb_bloom_of(plain, pass);
     const uint32_t target = pass->targets[0];
 
     // The shaders are compiled for one format. The levels of a published method may have their own.
-    return up && vkb_is_filter(up) && !up->constants.add_own && !pass->constants.masked
+    return up && vkb_is_filter(up) && !pass->constants.masked
                 && vkb_has_format_of(plain, up->reads[SLOT_SOURCE], target)
                 && vkb_has_format_of(plain, pass->reads[SLOT_SCENE], target)
                 && plain->images[pass->reads[SLOT_BLOOM]].format == plain->images[target].format
@@ -170,8 +170,10 @@ VKB_COPY_FUNCTION(copy_filter, filter_final, filter,
 VKB_COPY_FUNCTION(copy_composite, filter_final, composite,
                   COMPOSITE_ROWS(filter_final, VKB_COPY_READS, VKB_COPY_INPUT))
 
-struct vkb_pass_row vkb_nested_row(const struct vkb_variant_choice *choice,
-                                   const struct vkb_pass_row *pass, const struct vkb_pass_row *up)
+// The row of this pass, without a shader.
+static struct vkb_pass_row nested_row(const struct vkb_variant_choice *choice,
+                                      const struct vkb_pass_row *pass,
+                                      const struct vkb_pass_row *up)
 {
     const enum vkb_format format = choice->plain.images[pass->reads[SLOT_BLOOM]].format;
     struct vkb_pass_row row;
@@ -191,9 +193,10 @@ struct vkb_pass_row vkb_nested_row(const struct vkb_variant_choice *choice,
 }
 
 // Adds the composite, and after it a fused pass that also filters the last level.
-bool vkb_add_filtered_final(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
+bool vkb_add_filtered_final_variant(struct vkb_variant_choice *choice,
+                                    const struct vkb_pass_row *pass)
 {
-    const struct vkb_pass_row *up = vkb_nested_filter(choice, pass);
+    const struct vkb_pass_row *up = nested_filter(choice, pass);
     const struct filter_shaders shaders = {
         pass->transposed ? mixed_shaders : final_shaders,
         pass->transposed ? &vkb_shader_filter_tile_final_mixed_comp
@@ -203,9 +206,9 @@ bool vkb_add_filtered_final(struct vkb_variant_choice *choice, const struct vkb_
 
     if (!up)
         return false;
-    row = vkb_nested_row(choice, pass, up);
+    row = nested_row(choice, pass, up);
     return make_filter(choice, up, shaders, &row)
         && (choice->variants == VKB_VARIANTS_GPU || !pass->transposed
             || vkb_are_floats(choice, pass))
-        && vkb_add_fullscreen(choice, pass) && vkb_add_variant(choice, &row);
+        && vkb_add_fullscreen_variant(choice, pass) && vkb_add_variant_pass(choice, &row);
 }

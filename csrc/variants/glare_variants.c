@@ -6,7 +6,7 @@
 static const struct vkb_shader *const streaks_shaders[VKB_FORMAT_COUNT] =
     VKB_LINEAR_BY_FORMAT(streaks);
 
-bool vkb_add_streaks(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
+bool vkb_add_streaks_variant(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
 {
     const enum vkb_format format = choice->graph->images[pass->targets[0]].format;
     struct vkb_pass_row row;
@@ -19,5 +19,5 @@ bool vkb_add_streaks(struct vkb_variant_choice *choice, const struct vkb_pass_ro
     row.constants.sampling = 0;
     row.constants.taps = pass->params.streaks.count;
     vkb_make_linear(&row, streaks_shaders[format], STREAK_COLUMNS, STREAK_ROWS);
-    return vkb_add_variant(choice, &row);
+    return vkb_add_variant_pass(choice, &row);
 }

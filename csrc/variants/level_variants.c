@@ -39,7 +39,7 @@ static void make_linear(struct vkb_pass_row *row, const struct vkb_shader *shade
     vkb_make_linear(row, shader, columns, rows);
 }
 
-bool vkb_add_windowed(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
+bool vkb_add_windowed_variant(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
 {
     const int32_t set = pass->constants.tap_set;
     struct vkb_pass_row row;
@@ -67,12 +67,12 @@ bool vkb_add_windowed(struct vkb_variant_choice *choice, const struct vkb_pass_r
                     row.constants.exact ? TAP_COLUMNS(size) : 4 / size, TAP_ROWS);
     else
         return false;
-    return vkb_add_variant(choice, &row) && vkb_add_from_image(choice, pass, &row);
+    return vkb_add_variant_pass(choice, &row) && vkb_add_from_image_variant(choice, pass, &row);
 }
 
 // HDRP's blurs of images of the same size, and of twice the size along the line; Godot's horizontal
 // one of an image of twice the size.
-bool vkb_add_nine(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
+bool vkb_add_nine_variant(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
 {
     const struct vkb_image_row *target = &choice->plain.images[pass->targets[0]];
     const bool rows = pass->constants.direction == DIRECTION_HORIZONTAL;
@@ -96,5 +96,5 @@ bool vkb_add_nine(struct vkb_variant_choice *choice, const struct vkb_pass_row *
     else
         make_linear(&row, columns_linear[format], 4 / vkb_formats[format].channel_size,
                     NINE_OUTPUTS);
-    return vkb_add_variant(choice, &row);
+    return vkb_add_variant_pass(choice, &row);
 }

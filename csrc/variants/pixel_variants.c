@@ -28,7 +28,7 @@ static void load_pixels(const struct vkb_graph *graph, struct vkb_pass_row *row,
                     TEXEL_ROWS);
 }
 
-bool vkb_add_fullscreen(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
+bool vkb_add_fullscreen_variant(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
 {
     const struct vkb_graph *graph = choice->graph;
     struct vkb_pass_row row;
@@ -41,12 +41,12 @@ bool vkb_add_fullscreen(struct vkb_variant_choice *choice, const struct vkb_pass
     else if (vkb_fits_linear(choice, pass) && vkb_is_threshold(pass)
              && vkb_has_format_of(graph, pass->reads[SLOT_SOURCE], pass->targets[0]))
         load_pixels(graph, &row, threshold_shaders);
-    return vkb_add_variant(choice, &row);
+    return vkb_add_variant_pass(choice, &row);
 }
 
-bool vkb_add_pixels(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
+bool vkb_add_pixels_variant(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
 {
     return pass->geometry == VKB_GEOMETRY_FULLSCREEN && pass->shader->dispatch
         && vkb_is_written_once(&choice->plain, pass->targets[0])
-        && vkb_add_fullscreen(choice, pass);
+        && vkb_add_fullscreen_variant(choice, pass);
 }

@@ -1,5 +1,7 @@
 #include "variants/variant.h"
 
+#include "passes/filter.h"
+
 #include <string.h>
 
 bool vkb_has_format_of(const struct vkb_graph *graph, uint32_t a, uint32_t b)
@@ -7,13 +9,14 @@ bool vkb_has_format_of(const struct vkb_graph *graph, uint32_t a, uint32_t b)
     return vkb_formats[graph->images[a].format].vk == vkb_formats[graph->images[b].format].vk;
 }
 
-bool vkb_add_variant(struct vkb_variant_choice *choice, const struct vkb_pass_row *row)
+bool vkb_add_variant_pass(struct vkb_variant_choice *choice, const struct vkb_pass_row *row)
 {
     choice->failed = choice->failed || !vkb_graph_add_pass(choice->graph, row, choice->error);
     return true;
 }
 
-uint32_t vkb_add_floats(struct vkb_variant_choice *choice, const char *name, struct vkb_size size)
+uint32_t vkb_add_float_image(struct vkb_variant_choice *choice, const char *name,
+                             struct vkb_size size)
 {
     uint32_t image = 0;
 
@@ -92,6 +95,15 @@ const struct vkb_pass_row *vkb_writer_of(const struct vkb_graph *graph, uint32_t
     return writer;
 }
 
+const struct vkb_pass_row *vkb_bloom_of(const struct vkb_graph *graph,
+                                        const struct vkb_pass_row *composite)
+{
+    const struct vkb_pass_row *pass =
+        vkb_ends_bloom(composite) ? vkb_writer_of(graph, composite->reads[SLOT_BLOOM]) : NULL;
+
+    return pass && pass->filter_count == 1 && vkb_computes(pass, VKB_BLOCK_filter) ? pass : NULL;
+}
+
 const struct vkb_pass_row *vkb_threshold_of(const struct vkb_graph *graph, uint32_t image)
 {
     const struct vkb_pass_row *pass = vkb_writer_of(graph, image);
@@ -104,12 +116,12 @@ const struct vkb_pass_row *vkb_threshold_of(const struct vkb_graph *graph, uint3
 
 VKB_COPY_FUNCTION(copy_threshold, filter, threshold, THRESHOLD_ROWS(filter, VKB_COPY_READS))
 
-bool vkb_add_from_image(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
-                        const struct vkb_pass_row *variant)
+bool vkb_add_from_image_variant(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
+                                const struct vkb_pass_row *variant)
 {
     const struct vkb_pass_row *threshold =
         vkb_threshold_of(&choice->plain, pass->reads[SLOT_SOURCE]);
-    const bool is_filter = pass->block == VKB_BLOCK_filter;
+    const bool is_filter = vkb_is_filter(pass);
     struct vkb_pass_row row;
 
     if (!threshold || (!is_filter && threshold->constants.threshold_mode != THRESHOLD_NONE))
@@ -124,5 +136,5 @@ bool vkb_add_from_image(struct vkb_variant_choice *choice, const struct vkb_pass
         row.constants.threshold_mode = threshold->constants.threshold_mode;
         copy_threshold(&row.params.filter, &threshold->params.threshold);
     }
-    return vkb_add_variant(choice, &row);
+    return vkb_add_variant_pass(choice, &row);
 }

@@ -20,34 +20,36 @@ struct vkb_variant_choice {
 };
 
 // Adds a pass to the graph. True, as every function that adds a variant.
-bool vkb_add_variant(struct vkb_variant_choice *choice, const struct vkb_pass_row *row);
+bool vkb_add_variant_pass(struct vkb_variant_choice *choice, const struct vkb_pass_row *row);
 // Adds an image of single floats.
-uint32_t vkb_add_floats(struct vkb_variant_choice *choice, const char *name, struct vkb_size size);
+uint32_t vkb_add_float_image(struct vkb_variant_choice *choice, const char *name,
+                             struct vkb_size size);
 
 // Adds the variant of a pass to the graph. False: it does not suit the pass, and nothing is added.
 typedef bool vkb_variant_add(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass);
 
 // Lines and enlarged lines of a blur; fused passes for the complete bloom of an image, in strips
 // and in tiles.
-vkb_variant_add vkb_add_line, vkb_add_enlarged, vkb_add_fused;
+vkb_variant_add vkb_add_line_variant, vkb_add_enlarged_variant, vkb_add_fused_variant;
 // For derivatives of these by the image.
-vkb_variant_add vkb_add_adjoint_fused;
+vkb_variant_add vkb_add_adjoint_fused_variant;
 // Downsamplings that are not linear, and first passes of published methods.
-vkb_variant_add vkb_add_windowed;
+vkb_variant_add vkb_add_windowed_variant;
 // Blurs of nine taps, of images of the same size and of twice the size.
-vkb_variant_add vkb_add_nine;
+vkb_variant_add vkb_add_nine_variant;
 // Filters in strips and in tiles, also fused with the composite; the sum of several levels that are
 // filtered.
-vkb_variant_add vkb_add_filtered, vkb_add_filtered_final, vkb_add_gathered;
+vkb_variant_add vkb_add_filtered_variant, vkb_add_filtered_final_variant, vkb_add_gathered_variant;
 // Iterations of streaks.
-vkb_variant_add vkb_add_streaks;
+vkb_variant_add vkb_add_streaks_variant;
 // Transforms: of complete lines in shared memory; stages of images with linear texels.
-vkb_variant_add vkb_add_lines, vkb_add_transform;
+vkb_variant_add vkb_add_transform_lines_variant, vkb_add_transform_variant;
 // Adjoint passes: of images with linear texels; of kernels; transposed filters in tiles,
 // fused with the composite's, and with those of the other pictures of an image.
-vkb_variant_add vkb_add_adjoint_linear, vkb_add_adjoint_kernels, vkb_add_adjoint_filter;
+vkb_variant_add vkb_add_adjoint_linear_variant, vkb_add_adjoint_kernels_variant,
+    vkb_add_adjoint_filter_variant;
 // Passes that load the pixel at their own position; any other pass as a compute shader.
-vkb_variant_add vkb_add_pixels;
+vkb_variant_add vkb_add_pixels_variant;
 
 // The same for images with linear texels.
 #define VKB_LINEAR_BY_FORMAT(shader) VKB_BY_FORMAT(shader##_linear)
@@ -58,6 +60,10 @@ bool vkb_has_format_of(const struct vkb_graph *graph, uint32_t a, uint32_t b);
 bool vkb_is_written_once(const struct vkb_graph *graph, uint32_t image);
 // The last pass whose only target is the image; NULL: none.
 const struct vkb_pass_row *vkb_writer_of(const struct vkb_graph *graph, uint32_t image);
+// The last pass of the filter that makes the bloom which a composite ends (vkb_ends_bloom); NULL:
+// it is no filter of one image.
+const struct vkb_pass_row *vkb_bloom_of(const struct vkb_graph *graph,
+                                        const struct vkb_pass_row *composite);
 // The threshold pass that writes `image` from an image of the same size and format; NULL: no such
 // pass.
 const struct vkb_pass_row *vkb_threshold_of(const struct vkb_graph *graph, uint32_t image);
@@ -67,15 +73,8 @@ const struct vkb_pass_row *vkb_threshold_of(const struct vkb_graph *graph, uint3
 // pass just removes NaN and infinity, as that of a published method does. Without it `DualKawase`
 // takes 0.332 ms in place of 0.248, `bevy_natural` 0.414 in place of 0.325 (3840 x 2160 in float16,
 // H200, 2026-11-28).
-bool vkb_add_from_image(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
-                        const struct vkb_pass_row *variant);
-
-// The filter that makes the bloom which `pass` ends, if a fused pass may nest it; NULL: none. The
-// row of this pass, without a shader.
-const struct vkb_pass_row *vkb_nested_filter(const struct vkb_variant_choice *choice,
-                                             const struct vkb_pass_row *pass);
-struct vkb_pass_row vkb_nested_row(const struct vkb_variant_choice *choice,
-                                   const struct vkb_pass_row *pass, const struct vkb_pass_row *up);
+bool vkb_add_from_image_variant(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
+                                const struct vkb_pass_row *variant);
 
 // Whether a pass gives the bloom a factor of the cotangents of its composite.
 bool vkb_is_factor(const struct vkb_pass_row *pass);
@@ -99,6 +98,6 @@ void vkb_make_linear(struct vkb_pass_row *row, const struct vkb_shader *shader, 
 bool vkb_fits_linear(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass);
 // A pass over all pixels of one target. On CPUs it is drawn if its texels cannot be loaded. On GPUs
 // it is a compute shader, since GPUs that are made for computing draw slowly.
-bool vkb_add_fullscreen(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass);
+bool vkb_add_fullscreen_variant(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass);
 
 #endif

@@ -45,30 +45,30 @@ struct variant {
 enum { TWO_PASSES = 1 << 12, TILES = 1 << 14 };
 
 static const struct variant variants_table[] = {
-    {VKB_VARIANTS_CPU, "line", vkb_add_line, 0},
-    {VKB_VARIANTS_CPU, "enlarged", vkb_add_enlarged, 0},
-    {VKB_VARIANTS_CPU, "strips", vkb_add_fused, 0},
-    {VKB_VARIANTS_CPU, "strips", vkb_add_windowed, 0},
-    {VKB_VARIANTS_CPU, "line", vkb_add_nine, 0},
-    {VKB_VARIANTS_CPU, "filtered", vkb_add_filtered, 0},
-    {VKB_VARIANTS_CPU, "filtered_final", vkb_add_filtered_final, 0},
-    {VKB_VARIANTS_CPU, "gathered", vkb_add_gathered, TWO_PASSES},
-    {VKB_VARIANTS_CPU, "strips", vkb_add_streaks, 0},
-    {VKB_VARIANTS_CPU, "linear", vkb_add_transform, 0},
-    {VKB_VARIANTS_CPU, "strips", vkb_add_adjoint_fused, 0},
-    {VKB_VARIANTS_CPU, "linear", vkb_add_adjoint_linear, 0},
-    {VKB_VARIANTS_CPU, "pixels", vkb_add_adjoint_kernels, 0},
-    {VKB_VARIANTS_CPU, "pixels", vkb_add_pixels, 0},
-    {VKB_VARIANTS_GPU, "pixels", vkb_add_windowed, 0},
-    {VKB_VARIANTS_GPU, "enlarged", vkb_add_enlarged, 0},
-    {VKB_VARIANTS_GPU, "tiles", vkb_add_fused, 0},
-    {VKB_VARIANTS_GPU, "tiles", vkb_add_adjoint_fused, 0},
-    {VKB_VARIANTS_GPU, "tiles", vkb_add_adjoint_filter, 0},
-    {VKB_VARIANTS_GPU, "pixels", vkb_add_adjoint_kernels, 0},
-    {VKB_VARIANTS_GPU, "lines", vkb_add_lines, 0},
-    {VKB_VARIANTS_GPU, "tiles", vkb_add_filtered, TILES},
-    {VKB_VARIANTS_GPU, "tiles_final", vkb_add_filtered_final, 0},
-    {VKB_VARIANTS_GPU, "pixels", vkb_add_pixels, 0},
+    {VKB_VARIANTS_CPU, "line", vkb_add_line_variant, 0},
+    {VKB_VARIANTS_CPU, "enlarged", vkb_add_enlarged_variant, 0},
+    {VKB_VARIANTS_CPU, "strips", vkb_add_fused_variant, 0},
+    {VKB_VARIANTS_CPU, "strips", vkb_add_windowed_variant, 0},
+    {VKB_VARIANTS_CPU, "line", vkb_add_nine_variant, 0},
+    {VKB_VARIANTS_CPU, "filtered", vkb_add_filtered_variant, 0},
+    {VKB_VARIANTS_CPU, "filtered_final", vkb_add_filtered_final_variant, 0},
+    {VKB_VARIANTS_CPU, "gathered", vkb_add_gathered_variant, TWO_PASSES},
+    {VKB_VARIANTS_CPU, "strips", vkb_add_streaks_variant, 0},
+    {VKB_VARIANTS_CPU, "linear", vkb_add_transform_variant, 0},
+    {VKB_VARIANTS_CPU, "strips", vkb_add_adjoint_fused_variant, 0},
+    {VKB_VARIANTS_CPU, "linear", vkb_add_adjoint_linear_variant, 0},
+    {VKB_VARIANTS_CPU, "pixels", vkb_add_adjoint_kernels_variant, 0},
+    {VKB_VARIANTS_CPU, "pixels", vkb_add_pixels_variant, 0},
+    {VKB_VARIANTS_GPU, "pixels", vkb_add_windowed_variant, 0},
+    {VKB_VARIANTS_GPU, "enlarged", vkb_add_enlarged_variant, 0},
+    {VKB_VARIANTS_GPU, "tiles", vkb_add_fused_variant, 0},
+    {VKB_VARIANTS_GPU, "tiles", vkb_add_adjoint_fused_variant, 0},
+    {VKB_VARIANTS_GPU, "tiles", vkb_add_adjoint_filter_variant, 0},
+    {VKB_VARIANTS_GPU, "pixels", vkb_add_adjoint_kernels_variant, 0},
+    {VKB_VARIANTS_GPU, "lines", vkb_add_transform_lines_variant, 0},
+    {VKB_VARIANTS_GPU, "tiles", vkb_add_filtered_variant, TILES},
+    {VKB_VARIANTS_GPU, "tiles_final", vkb_add_filtered_final_variant, 0},
+    {VKB_VARIANTS_GPU, "pixels", vkb_add_pixels_variant, 0},
 };
 
 // Names the rows from `first` on after the table's variant. A row before a fused pass is the
@@ -95,7 +95,7 @@ static void add_variant(struct vkb_variant_choice *choice, const struct vkb_pass
         name_variant(choice->graph, first, variants_table[i].name);
         return;
     }
-    vkb_add_variant(choice, pass);
+    vkb_add_variant_pass(choice, pass);
 }
 
 bool vkb_variants_choose(enum vkb_variants variants, const struct vkb_device *device,

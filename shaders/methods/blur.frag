@@ -2,7 +2,7 @@
 // have another size than the target.
 #include "lib/sampling.glsl"
 
-UNIFORM_BLOCK(BLUR_BLOCK);
+UNIFORM_BLOCK(FILTER_BLOCK);
 
 SAMPLED_IMAGE(SLOT_SOURCE, source);
 
@@ -16,8 +16,10 @@ float weight(int tap)
 // The position of a tap in steps: its number, unless offsets are given.
 float place_of(int tap)
 {
-    return PLACED == 0 ? float(tap)
-                          : sign(float(tap)) * params.offsets[abs(tap) >> 2][abs(tap) & 3];
+    if (PLACED == 0)
+        return float(tap);
+    float distance = params.offsets[abs(tap) >> 2][abs(tap) & 3];
+    return tap < 0 ? -distance : distance;
 }
 
 // URP 17: no tap is beyond the middle of the last two columns.
@@ -53,5 +55,5 @@ vec4 shade()
     vec4 sum = vec4(0.0);
     for (int tap = -RADIUS; tap <= RADIUS; ++tap)
         sum += weight(tap) * blur_line(place, float(tap) * step_y, step_x);
-    return stored(params.gain * sum);
+    return stored(params.coarse * sum);
 }

@@ -1,7 +1,7 @@
 // Adds up levels of several sizes: each is enlarged and multiplied by its weight.
 #include "lib/sampling.glsl"
 
-UNIFORM_BLOCK(GATHER_BLOCK);
+UNIFORM_BLOCK(FILTER_BLOCK);
 
 SAMPLED_IMAGE(SLOT_LEVELS + 0, level_0);
 SAMPLED_IMAGE(SLOT_LEVELS + 1, level_1);

@@ -4,7 +4,7 @@
 // 1080 in float16, lavapipe of Mesa 25.0.7, 2026-11-26).
 #include "lib/sampling.glsl"
 
-UNIFORM_BLOCK(GATHER_BLOCK);
+UNIFORM_BLOCK(FILTER_BLOCK);
 #include "lib/gathered.glsl"
 #include "variants/pixels.glsl"
 

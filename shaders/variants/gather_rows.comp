@@ -2,7 +2,7 @@
 // width. The results are floats, in an image of the target's width and of the level's height.
 #include "lib/sampling.glsl"
 
-UNIFORM_BLOCK(GATHER_BLOCK);
+UNIFORM_BLOCK(FILTER_BLOCK);
 #include "variants/pixels.glsl"
 
 const int COLUMNS = GATHER_COLUMNS, ROWS = GATHER_ROWS;

@@ -72,7 +72,7 @@ const char *add_filter(int distance)
 
     vkb_levels_add(&levels, &row);
     const struct vkb_filter filter = vkb_make_filter(&graph, 0, 0, kernels, 3, 1.0);
-    vkb_add_filter(&levels, &filter, 0, 0);
+    vkb_add_filter_pass(&levels, &filter, 0, 0);
     vkb_graph_destroy(&graph);
     return levels.failed ? error.message : "added";
 }
