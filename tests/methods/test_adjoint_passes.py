@@ -162,7 +162,7 @@ def pulled(renderer: Any, image: Any, settings: Any, **given: Any) -> Any:
     random = np.random.default_rng(5)
     cotangents = {
         name: random.standard_normal(frames[name].shape).astype(np.float32)
-        for name in ("glow", "bloom", "final")
+        for name in ("glow", "blur_vertical", "bloom", "final")
         if name in frames
     }
     return pullback, cotangents, reference.vjp(image, settings, **given)[1](cotangents)
