@@ -66,10 +66,10 @@
     INPUT(B, float, glow_intensity) \
     THRESHOLD_ROWS(B, READS)
 
-// A filter along a line of integer texels: a symmetric kernel from the first tap to the last, then zeros.
-// `origin` is the position of the target's first pixel in the source, along the line. For ROLLED,
-// so that both directions share a pipeline: whether lines are columns, and whether texels are 8-bit
-// levels.
+// A filter along a line of integer texels: a symmetric kernel from the first tap to the last, then
+// zeros. `origin` is the position of the target's first pixel in the source, along the line. For
+// ROLLED, so that both directions share a pipeline: whether lines are columns, and whether texels
+// are 8-bit levels.
 #define LINE_BLOCK(B, READS, INPUT, VEC4S) \
     INPUT(B, int, radius) \
     INPUT(B, int, origin) \
@@ -103,8 +103,8 @@
 
 // A linear pass: what its filters (csrc/graph/filter.h) are for the device. Of a filter with a long
 // kernel: the distances of its taps in texels of the source, and its half-kernel w0.., four weights
-// in a vec4; where PLACED is set, the distances are `offsets` of the steps. Of a sum of levels: their
-// weights. The threshold is for a pass that reads the image itself.
+// in a vec4; where PLACED is set, the distances are `offsets` of the steps. Of a sum of levels:
+// their weights. The threshold is for a pass that reads the image itself.
 #define FILTER_BLOCK(B, READS, INPUT, VEC4S) \
     SAMPLING_ROWS(B, INPUT) \
     FILTER_ROWS(B, INPUT, VEC4S) \
@@ -383,8 +383,8 @@
 #define HALF_LIMIT   65504.0
 #define SINGLE_LIMIT 3.402823466e38
 
-// The longest half-kernel (w0..w64), also of one whose taps are at given places, and the most layers
-// of one blur.
+// The longest half-kernel (w0..w64), the longest one whose taps are at given places, and the most
+// layers of one blur.
 #define MAX_WEIGHTS 65
 #define MAX_OFFSETS 12
 #define MAX_LAYERS  8
