@@ -40,7 +40,6 @@ vec4 nine_sum()
     vec4 sum = vec4(0.0);
     for (int tap = -NINE_RADIUS; tap <= NINE_RADIUS; ++tap)
         sum += nine_weight(tap)
-             * (TAPS == TAPS_GODOT ? godot_sample(PIXEL + tap * along, size)
-                                       : hdrp_sample(PIXEL + tap * along, size));
+             * (IS_GODOT ? godot_sample(PIXEL + tap * along, size) : hdrp_sample(PIXEL + tap * along, size));
     return sum;
 }

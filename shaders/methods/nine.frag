@@ -21,8 +21,8 @@ SAMPLED_IMAGE(SLOT_SOURCE, source);
 vec4 shade()
 {
     vec4 sum = nine_sum();
-    if (TAPS == TAPS_HDRP || DIRECTION == DIRECTION_HORIZONTAL)
-        return stored(sum);
-    return stored(POINT_AFTER == POINT_NONE ? params.strength * sum
-                                            : mask_value() * apply_point(POINT_AFTER, sum));
+    bool ends_level = DIRECTION == DIRECTION_VERTICAL;
+    if (IS_GODOT && ends_level)
+        sum = POINT_AFTER == POINT_NONE ? params.strength * sum : mask_value() * apply_point(POINT_AFTER, sum);
+    return stored(sum);
 }
