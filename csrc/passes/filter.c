@@ -93,17 +93,6 @@ void vkb_filter_three(struct vkb_filter *filter, double distance, double side)
     set_kernels(filter, kernels, 1);
 }
 
-void vkb_filter_thirteen(struct vkb_filter *filter, double step_x, double step_y)
-{
-    const struct vkb_kernel kernels[][2] = {
-        {vkb_sides(2.0 * step_x, 0.25, 0.5), vkb_sides(2.0 * step_y, 0.25, 0.5)},
-        {vkb_sides(step_x, 0.5, 0.0), vkb_sides(step_y, 0.5, 0.0)},
-    };
-
-    set_kernels(filter, kernels, 2);
-    filter->gain = 0.5;
-}
-
 void vkb_set_kind(struct vkb_filter *filter, enum vkb_mode kind)
 {
     filter->x.kind = filter->y.kind = kind;

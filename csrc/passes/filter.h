@@ -16,10 +16,8 @@ struct vkb_filter vkb_make_filter(const struct vkb_graph *graph, uint32_t from, 
                                   double gain);
 
 // Makes both axes of a filter those of 3 x 3 taps, of which the outer ones have the share `side`
-// along an axis; or of the pyramid's 13 taps. These are those of two kernels: nine around the
-// centre, and four between them, each with half of the weight.
+// along an axis.
 void vkb_filter_three(struct vkb_filter *filter, double distance, double side);
-void vkb_filter_thirteen(struct vkb_filter *filter, double step_x, double step_y);
 
 // Sets what the taps of a filter sample, of UPSAMPLE_*.
 void vkb_set_kind(struct vkb_filter *filter, enum vkb_mode kind);

@@ -2,6 +2,7 @@
 
 #include "passes/blur.h"
 #include "passes/filter.h"
+#include "passes/tap_sets.h"
 
 #include <math.h>
 #include <string.h>
@@ -73,22 +74,26 @@ void vkb_levels_halve(struct vkb_levels *levels, struct vkb_size above, uint32_t
     }
 }
 
+// A pass that downsamples with the mean of a set of taps.
+static void add_mean(struct vkb_levels *levels, enum vkb_tap_set set, double step_x, double step_y,
+                     uint32_t from, uint32_t to)
+{
+    struct vkb_filter filter;
+
+    vkb_filter_begin(levels->graph, from, to, &filter);
+    vkb_filter_mean(&filter, (int32_t)set, step_x, step_y);
+    vkb_add_filter_pass(levels, &filter, from, to);
+}
+
 void vkb_levels_box(struct vkb_levels *levels, uint32_t from, uint32_t to)
 {
-    const struct vkb_kernel kernels[][2] = {{vkb_sides(1.0, 0.5, 0.0), vkb_sides(1.0, 0.5, 0.0)}};
-    const struct vkb_filter filter = vkb_make_filter(levels->graph, from, to, kernels, 1, 1.0);
-
-    vkb_add_filter_pass(levels, &filter, from, to);
+    add_mean(levels, TAPS_CORNERS, 1.0, 1.0, from, to);
 }
 
 void vkb_levels_reduce(struct vkb_levels *levels, double step_x, double step_y, uint32_t from,
                        uint32_t to)
 {
-    struct vkb_filter filter;
-
-    vkb_filter_begin(levels->graph, from, to, &filter);
-    vkb_filter_thirteen(&filter, step_x, step_y);
-    vkb_add_filter_pass(levels, &filter, from, to);
+    add_mean(levels, TAPS_THIRTEEN, step_x, step_y, from, to);
 }
 
 void vkb_levels_reduce_rest(struct vkb_levels *levels, double step_x, double step_y)
