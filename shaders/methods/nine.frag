@@ -23,6 +23,6 @@ vec4 shade()
     vec4 sum = nine_sum();
     bool ends_level = DIRECTION == DIRECTION_VERTICAL;
     if (IS_GODOT && ends_level)
-        sum = POINT_AFTER == POINT_NONE ? params.strength * sum : mask_value() * apply_point(POINT_AFTER, sum);
+        sum = HAS_POINT_AFTER ? mask_value() * apply_point(POINT_AFTER, sum) : params.strength * sum;
     return stored(sum);
 }
