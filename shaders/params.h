@@ -121,9 +121,9 @@
     FILTER_ROWS(B, INPUT, VEC4S) \
     COMPOSITE_ROWS(B, READS, INPUT)
 
-// A pass whose GROUPS say what it makes of its taps (prefilter.frag): one that weights them by
-// brightness, and the first pass of a published method, which reads the frame. The steps are the
-// distances of its taps in texels of what it reads.
+// A pass that is no filter: one that weights its taps by brightness, and the first pass of a published
+// method, which reads the frame (PREFILTERS). The steps are the distances of places in texels of what
+// it reads.
 #define PREFILTER_BLOCK(B, READS, INPUT, VEC4S) \
     SAMPLING_ROWS(B, INPUT) \
     INPUT(B, float, step_x) \
@@ -832,6 +832,8 @@
 #define LINE_SETS(LINE) \
     LINE(TAPS_GODOT, 7, GODOT_NINE) \
     LINE(TAPS_HDRP, 8, HDRP_NINE)
+
+// The most taps and kernels of a set, and the largest number of a place.
 #define MAX_SET_TAPS    13
 #define MAX_SET_KERNELS 5
 #define MAX_PLACE       2
