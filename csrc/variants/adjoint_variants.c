@@ -1,4 +1,4 @@
-// Variants of adjoint passes: transposed filters in blocks of texels and in tiles.
+// Variants of adjoint passes: transposed filters in blocks of texels, in tiles and in lines.
 #include "variants/variant.h"
 
 #include "passes/taps.h"
@@ -249,6 +249,19 @@ static bool add_pictures(struct vkb_variant_choice *choice, const struct vkb_pas
     return width > MAX_WINDOW || height > MAX_WINDOW || vkb_add_variant_pass(choice, &row);
 }
 
+// Makes `row` blocks of texels along its only axis. False: it has two, or several kernels.
+static bool make_lines(struct vkb_pass_row *row)
+{
+    const bool along_x = row->constants.direction == DIRECTION_HORIZONTAL;
+
+    if (row->constants.direction == DIRECTION_BOTH || row->constants.kernels > 1)
+        return false;
+    vkb_make_dispatch(row, &vkb_shader_adjoint_line_comp,
+                      PIXEL_INVOCATIONS * (along_x ? ADJOINT_SIDE : 1),
+                      PIXEL_INVOCATIONS * (along_x ? 1 : ADJOINT_SIDE));
+    return true;
+}
+
 bool vkb_add_adjoint_filter_variant(struct vkb_variant_choice *choice,
                                     const struct vkb_pass_row *pass)
 {
@@ -258,9 +271,9 @@ bool vkb_add_adjoint_filter_variant(struct vkb_variant_choice *choice,
         return false;
     memcpy(&row, pass, sizeof row);
     row.gains_if_finite = true;
-    const bool fits_tiles = make_tiles(choice, pass, &row);
+    const bool in_blocks = make_tiles(choice, pass, &row) || make_lines(&row);
     read_composite(&choice->plain, &row);
-    return (fits_tiles ? vkb_add_variant_pass(choice, &row)
+    return (in_blocks ? vkb_add_variant_pass(choice, &row)
                        : vkb_add_fullscreen_variant(choice, &row))
         && add_pictures(choice, pass);
 }
