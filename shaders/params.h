@@ -268,8 +268,8 @@
     INPUT(B, float, prefilter_factor)
 
 // Writes the kernel into padded lines (fft_kernel.comp). For each axis: the kernel's number of
-// texels, how many of them before and after its centre count, and the period of the line. `grey`:
-// all channels are equal.
+// texels, how many of them before and after its centre count, the period of the line, and the place
+// of the centre. `grey`: all channels are equal.
 #define FFT_KERNEL_BLOCK(B, READS, INPUT, VEC4S) \
     INPUT(B, int, padded_x) \
     INPUT(B, int, boundary_x) \
@@ -277,12 +277,14 @@
     INPUT(B, int, period_x) \
     INPUT(B, int, before_x) \
     INPUT(B, int, after_x) \
+    INPUT(B, int, spread_x) \
     INPUT(B, int, padded_y) \
     INPUT(B, int, boundary_y) \
     INPUT(B, int, extent_y) \
     INPUT(B, int, period_y) \
     INPUT(B, int, before_y) \
     INPUT(B, int, after_y) \
+    INPUT(B, int, spread_y) \
     INPUT(B, int, grey) \
     INPUT(B, float, gain)
 

@@ -1,7 +1,7 @@
 // The adjoint of a convolution: a convolution of the cotangents with the mirrored kernel. With a
 // period, or zeros beyond the edges, it is one of the same size. Pixels beyond an edge that is
-// repeated have cotangents of their own, so the image is extended by them, with zeros; then these
-// fold back to the edge. With a mirror, whose kernels are symmetric, it is the convolution itself.
+// repeated have cotangents of their own, so the result has these, too; then they fold back to the
+// edge. With a mirror, whose kernels are symmetric, it is the convolution itself.
 #include "methods/adjoint.h"
 #include "passes/adjoint.h"
 #include "passes/levels.h"
@@ -70,44 +70,33 @@ bool vkb_transpose_convolution(struct vkb_adjoint *adjoint, const struct vkb_set
 {
     struct vkb_graph *graph = adjoint->graph;
     const int boundary = settings->choices[VKB_CHOICE_boundary];
-    const bool edge_x = boundary == BOUNDARY_EDGE;
-    const bool edge_y = edge_x || boundary == BOUNDARY_WRAP_X;
     const struct vkb_pass_row first_stage = find_first(graph);
     const uint32_t glow = first_stage.reads[SLOT_SOURCE], first = graph->pass_count;
-    const struct vkb_kernel_data *kernel = &settings->kernel;
     const struct vkb_size size = {graph->images[glow].width, graph->images[glow].height};
-    const struct vkb_size extended = {size.width + (edge_x ? kernel->width - 1 : 0),
-                                      size.height + (edge_y ? kernel->height - 1 : 0)};
-    const double left = edge_x ? kernel->width - 1 - kernel->width / 2 : 0;
-    const double above = edge_y ? kernel->height - 1 - kernel->height / 2 : 0;
     struct vkb_settings mirrored = *settings;
-    struct vkb_bloom_source source = {.buffers = extended, .glow = vkb_cotangent_of(adjoint, pass)};
+    struct vkb_bloom_source source = {.buffers = size, .glow = vkb_cotangent_of(adjoint, pass)};
     const struct vkb_image_row result = {.name = "adjoint_convolved",
                                          .format = VKB_FORMAT_RGBA32_FLOAT};
     struct vkb_filter filter = {.kernels = 1, .gain = 1.0, .divisor = 1.0};
     struct vkb_levels levels = {
         .settings = &mirrored, .source = &source, .graph = graph, .error = error};
 
-    if (boundary != BOUNDARY_MIRROR)
-        mirrored.choices[VKB_CHOICE_boundary] =
-            boundary == BOUNDARY_ZERO ? BOUNDARY_ZERO : BOUNDARY_WRAP;
-    vkb_axis_move(&filter.x, extended.width, size.width, left);
-    vkb_axis_move(&filter.y, extended.height, size.height, above);
-    if ((boundary != BOUNDARY_MIRROR && !mirror_kernel(kernel, graph, &mirrored.kernel, error))
-        || (edge_y
-            && !vkb_filter_to_image(adjoint, &filter, source.glow, extended, &source.glow, error)))
+    if (boundary != BOUNDARY_MIRROR
+        && !mirror_kernel(&settings->kernel, graph, &mirrored.kernel, error))
         return false;
     // The filter of bright colours comes before the convolution, after its transpose.
     mirrored.kernel.prefilter[0] = 1.0f;
     mirrored.kernel.prefilter[1] = 0.0f;
-    uint32_t convolved = vkb_convolve(&levels, &result, "adjoint_");
+    const uint32_t convolved = vkb_convolve(&levels, &result, "adjoint_", true);
     if (levels.failed)
         return false;
     // The alpha is one of a cotangent, not 1.
     for (uint32_t i = first; i < graph->pass_count; ++i)
         graph->passes[i].constants.alpha = ALPHA_BLUR;
-    vkb_axis_move(&filter.x, size.width, extended.width, -left);
-    vkb_axis_move(&filter.y, size.height, extended.height, -above);
+    // A mirrored kernel reaches as far on both sides.
+    const struct vkb_image_row *whole = &graph->images[convolved];
+    vkb_axis_move(&filter.x, size.width, whole->width, -0.5 * (whole->width - size.width));
+    vkb_axis_move(&filter.y, size.height, whole->height, -0.5 * (whole->height - size.height));
     if (!first_stage.constants.prefiltered)
         return vkb_accumulate_filter(adjoint, &filter, convolved, glow, error);
     return accumulate_bright(adjoint, &first_stage, pass, &filter, convolved, error);

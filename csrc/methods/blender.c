@@ -215,7 +215,7 @@ static uint32_t add_convolution(struct vkb_levels *levels)
     highlights.glow = levels->downs[0];
     highlights.buffers = levels->sizes[0];
     levels->source = &highlights;
-    const uint32_t light = vkb_convolve(levels, &result, "");
+    const uint32_t light = vkb_convolve(levels, &result, "", false);
     levels->source = source;
     return light;
 }

@@ -13,9 +13,12 @@
 
 #include <stdio.h>
 
-// Of the kernel along an axis: its pixels, and the offsets that count.
+// Of the kernel along an axis: its pixels, the offsets that count, and what becomes of the others;
+// where the result begins, before the first texel.
 struct reach {
     uint32_t kernel, before, after;
+    enum vkb_boundary boundary;
+    uint32_t spread;
 };
 
 // Both axes of a convolution.
@@ -39,11 +42,13 @@ static uint32_t most_radix(struct vkb_size size)
 }
 
 static struct vkb_fft_axis make_axis(enum vkb_mode direction, enum vkb_boundary boundary,
-                                     uint32_t extent, uint32_t most, struct reach *reach)
+                                     bool spreads, uint32_t extent, uint32_t most,
+                                     struct reach *reach)
 {
     const uint32_t kernel = reach->kernel;
     struct vkb_fft_axis axis = {.direction = direction, .boundary = boundary, .extent = extent};
 
+    reach->boundary = boundary;
     reach->before = least(kernel / 2, boundary == BOUNDARY_MIRROR ? extent : extent - 1);
     reach->after = least(kernel - 1 - kernel / 2, extent - 1);
     uint32_t padding = reach->before + reach->after;
@@ -57,6 +62,10 @@ static struct vkb_fft_axis make_axis(enum vkb_mode direction, enum vkb_boundary 
     if (boundary == BOUNDARY_ZERO)
         padding = reach->before > reach->after ? reach->before : reach->after;
     axis.before = reach->before;
+    if (spreads && boundary == BOUNDARY_EDGE) {
+        axis.boundary = BOUNDARY_ZERO;
+        reach->spread = reach->before;
+    }
     axis.line = vkb_fft_line(extent + padding, most);
     return axis;
 }
@@ -118,17 +127,19 @@ static void add_placing(const struct convolution *convolution, uint32_t kernel, 
     row.transform = transform_of(convolution, 0);
     *params = (struct vkb_fft_kernel_params){
         .padded_x = (int)x->line.length,
-        .boundary_x = x->boundary,
+        .boundary_x = convolution->reach_x.boundary,
         .extent_x = (int)convolution->reach_x.kernel,
         .period_x = (int)x->extent,
         .before_x = (int)convolution->reach_x.before,
         .after_x = (int)convolution->reach_x.after,
+        .spread_x = (int)convolution->reach_x.spread,
         .padded_y = (int)y->line.length,
-        .boundary_y = y->boundary,
+        .boundary_y = convolution->reach_y.boundary,
         .extent_y = (int)convolution->reach_y.kernel,
         .period_y = (int)y->extent,
         .before_y = (int)convolution->reach_y.before,
         .after_y = (int)convolution->reach_y.after,
+        .spread_y = (int)convolution->reach_y.spread,
         .grey = convolution->levels->settings->kernel.grey,
         // That of the way back.
         .gain = (float)(1.0 / ((double)x->line.length * y->line.length)),
@@ -202,7 +213,7 @@ static void add_rows(const struct convolution *convolution, uint32_t rows)
 
 // Along the columns forth and back, with the product between.
 static void add_columns(const struct convolution *convolution, uint32_t rows, uint32_t spectrum,
-                        uint32_t columns)
+                        uint32_t columns, uint32_t height)
 {
     const uint32_t last = convolution->y.line.stage_count - 1;
     struct vkb_fft_stage stage = {
@@ -229,17 +240,18 @@ static void add_columns(const struct convolution *convolution, uint32_t rows, ui
         struct vkb_pass_row row = stage_row(convolution, &stage, 0);
         // The rows back need no other.
         if (stage.number == 0)
-            row.params.fft.kept = (int)convolution->y.extent;
+            row.params.fft.kept = (int)height;
         vkb_levels_pass(convolution->levels, &row);
     }
 }
 
-static void add_rows_back(const struct convolution *convolution, uint32_t columns, uint32_t target)
+static void add_rows_back(const struct convolution *convolution, uint32_t columns, uint32_t height,
+                          uint32_t target)
 {
     struct vkb_fft_stage stage = {
         .name = "bloom",
         .axis = &convolution->x,
-        .lines = convolution->y.extent,
+        .lines = height,
         .inverse = true,
         .from = columns,
     };
@@ -255,8 +267,14 @@ static void add_rows_back(const struct convolution *convolution, uint32_t column
     }
 }
 
+// The result along an axis.
+static uint32_t extent_of(const struct vkb_fft_axis *axis, const struct reach *reach)
+{
+    return axis->extent + (reach->spread ? reach->before + reach->after : 0);
+}
+
 uint32_t vkb_convolve(struct vkb_levels *levels, const struct vkb_image_row *result,
-                      const char *prefix)
+                      const char *prefix, bool spreads)
 {
     const struct vkb_settings *settings = levels->settings;
     const int boundary = settings->choices[VKB_CHOICE_boundary];
@@ -271,23 +289,25 @@ uint32_t vkb_convolve(struct vkb_levels *levels, const struct vkb_image_row *res
 
     convolution.x =
         make_axis(DIRECTION_HORIZONTAL, wrap_x ? BOUNDARY_WRAP : (enum vkb_boundary)boundary,
-                  size.width, most_radix(size), &convolution.reach_x);
+                  spreads, size.width, most_radix(size), &convolution.reach_x);
     convolution.y =
-        make_axis(DIRECTION_VERTICAL, wrap_x ? BOUNDARY_EDGE : (enum vkb_boundary)boundary,
+        make_axis(DIRECTION_VERTICAL, wrap_x ? BOUNDARY_EDGE : (enum vkb_boundary)boundary, spreads,
                   size.height, most_radix(size), &convolution.reach_y);
     const struct vkb_size padded = {convolution.x.line.length, convolution.y.line.length};
-    const struct vkb_size lines = {padded.width, size.height};
+    const struct vkb_size whole = {extent_of(&convolution.x, &convolution.reach_x),
+                                   extent_of(&convolution.y, &convolution.reach_y)};
+    const struct vkb_size lines = {padded.width, whole.height};
     const uint32_t kernel = add_kernel(&convolution);
     const uint32_t spectrum = add_spectrum(&convolution, "kernel_spectrum", padded);
     const uint32_t rows = add_spectrum(&convolution, "rows_spectrum", lines);
     const uint32_t columns = add_spectrum(&convolution, "spectrum", padded);
     const uint32_t target =
-        vkb_levels_target(levels, result->name, result->format, size, result->framebuffer);
+        vkb_levels_target(levels, result->name, result->format, whole, result->framebuffer);
     add_placing(&convolution, kernel, spectrum);
     add_kernel_spectrum(&convolution, spectrum);
     add_rows(&convolution, rows);
-    add_columns(&convolution, rows, spectrum, columns);
-    add_rows_back(&convolution, columns, target);
+    add_columns(&convolution, rows, spectrum, columns, whole.height);
+    add_rows_back(&convolution, columns, whole.height, target);
     return target;
 }
 
@@ -299,7 +319,7 @@ uint32_t vkb_add_convolution(struct vkb_levels *levels)
     const struct vkb_image_row whole = {
         .name = "bloom", .format = source->format, .framebuffer = true};
     const struct vkb_image_row part = {.name = "convolved", .format = VKB_FORMAT_RGBA32_FLOAT};
-    const uint32_t convolved = vkb_convolve(levels, same ? &whole : &part, "");
+    const uint32_t convolved = vkb_convolve(levels, same ? &whole : &part, "", false);
 
     return same ? convolved : vkb_levels_enlarge(levels, UPSAMPLE_LINEAR, convolved, 1.0);
 }

@@ -122,7 +122,11 @@ static struct vkb_pass_row make_row(const struct vkb_variant_choice *choice,
     const struct vkb_image_row *spectra =
         &graph->images[first->constants.inverse ? row.reads[SLOT_SOURCE] : row.targets[0]];
     row.params.fft.kept = horizontal ? last->params.fft.kept : (int)spectra->height;
-    row.params.fft.across = (int)(horizontal ? spectra->height : spectra->width);
+    // The kernel's rows are as many as the columns' elements, which are more here.
+    row.params.fft.across = !horizontal ? (int)spectra->width
+                          : first->constants.inverse || row.constants.stage == STAGE_FIRST
+                              ? first->params.fft.across
+                              : (int)spectra->height;
     (void)make_group(choice->device, length, &group);
     row.constants.radix_1 = (int32_t)group.radices[0];
     row.constants.radix_2 = (int32_t)group.radices[1];
