@@ -153,19 +153,13 @@
     VEC4S(B, weights, MAX_TAPS) \
     VEC4S(B, next, MAX_TAPS)
 
-// Of an adjoint pass in which the texels of a block gather from too many pixels for an invocation
-// (lib/summed.glsl): the block, which is `summed_width` x `summed_height` at (summed_x, summed_y).
-// A pass before it adds up `summed_rows` rows for each texel and each of `summed_groups` groups of
-// rows from row `summed_first` on, in blocks of which `summed_columns` are beside each other.
-#define SUMMED_ROWS(B, INPUT) \
-    INPUT(B, int, summed_x) \
-    INPUT(B, int, summed_y) \
-    INPUT(B, int, summed_width) \
-    INPUT(B, int, summed_height) \
-    INPUT(B, int, summed_first) \
-    INPUT(B, int, summed_rows) \
-    INPUT(B, int, summed_groups) \
-    INPUT(B, int, summed_columns)
+// Of an adjoint pass in which texels near a centre gather from too many pixels for an invocation
+// (lib/summed.glsl): `summed_blocks` blocks around the centre, each of which contains those before
+// it. A block has two texels of `summed`: x, y, width and height; the groups that have its pixels,
+// how many of them are beside each other in the image of their sums, and the row where they begin.
+#define SUMMED_ROWS(B, INPUT, VEC4S) \
+    INPUT(B, int, summed_blocks) \
+    VEC4S(B, summed, 2 * MAX_SUMMED)
 
 // Ghosts and halo (ghosts.frag, halo.frag): `ghosts` has the tint and the scale of each of `count`
 // ghosts. SUMMED_ROWS are of adjoints.
@@ -178,7 +172,7 @@
     INPUT(B, float, vignette) \
     INPUT(B, float, width) \
     INPUT(B, int, count) \
-    SUMMED_ROWS(B, INPUT) \
+    SUMMED_ROWS(B, INPUT, VEC4S) \
     VEC4S(B, ghosts, MAX_GHOSTS)
 
 // What a picture of dirt leaves of the light: base + share * dirt (dirt.frag).
@@ -220,7 +214,7 @@
     INPUT(B, float, sun_x) \
     INPUT(B, float, sun_y) \
     INPUT(B, float, left) \
-    SUMMED_ROWS(B, INPUT)
+    SUMMED_ROWS(B, INPUT, VEC4S)
 
 #define COMPOSITE_BLOCK(B, READS, INPUT, VEC4S) COMPOSITE_ROWS(B, READS, INPUT)
 
@@ -397,6 +391,11 @@
 #define MAX_GHOSTS   16
 #define MAX_TAPS     8
 #define MAX_HALVINGS 4
+
+// The most blocks of SUMMED_ROWS, and the side of the cell of texels that an invocation has of the
+// transpose of sun beams (adjoint_beams.comp).
+#define MAX_SUMMED 12
+#define BEAM_CELL  2
 
 // The most iterations of Blender's streaks and of its star, whose distances are fewer by one.
 #define STAR_ITERATIONS 5

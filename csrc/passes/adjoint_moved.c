@@ -3,111 +3,132 @@
 #include "passes/adjoint.h"
 
 #include <math.h>
+#include <string.h>
 
 // llvmpipe of Mesa 22.3 ends all loops of an invocation after 65535 iterations. The invocations
 // that it runs together take as many as the slowest of them in each loop; neighbours take about
-// as many.
-enum { MAX_ITERATIONS = 1 << 15 };
+// as many. On a GPU all others wait for the invocation with the most iterations, so that these are
+// as few as an image of sums with a part of the source's pixels allows.
+enum { MIN_ITERATIONS = 512, MAX_ITERATIONS = 1 << 15, PART_OF_PIXELS = 4 };
 
 // Twice the distance from a texel to a sample that it is part of, at most (adjoint_moved.frag).
 static const double SAMPLED_WIDTH = 2.0 * 1.503;
 
-// How many iterations a texel takes at most: at a distance from the centre, and for one row.
+// About how many iterations a texel takes at most, at a distance from the centre.
 struct gathering {
     double (*iterations)(const struct gathering *gathering, double distance);
     struct vkb_size size;
-    double centre_x, centre_y, of_row;
+    double centre_x, centre_y;
+    int cell;                   // the side of the cells of texels that blocks have
     const struct flare *flare;  // or
     // Of sun beams: how far a sample is from its pixel, and beyond the sun, at most.
     double most, beyond;
 };
 
-// The values of SUMMED_ROWS, and how many groups there are at all.
+// The values of SUMMED_ROWS, and the size of the image of sums.
 struct sums {
-    int x, y, width, height, rows, groups;
+    float blocks[2 * MAX_SUMMED][4];
+    int count;
+    struct vkb_size size;
 };
 
-// The texels of an axis that are no further away than the radius: the first one, and their number.
-static void set_range(double centre, double radius, uint32_t side, int *first, int *count)
+// The texels of an axis that are no further away than the radius, in complete cells: the first one,
+// and their number.
+static void set_range(double centre, double radius, uint32_t side, int cell, float *first,
+                      float *count)
 {
-    const double low = fmax(ceil(centre - radius), 0.0);
-    const double high = fmin(floor(centre + radius), side - 1.0);
+    const double low = floor(fmax(centre - radius, 0.0) / cell);
+    const double high = floor(fmin(centre + radius, side - 1.0) / cell);
 
-    *first = low <= high ? (int)low : 0;
-    *count = low <= high ? (int)(high - low) + 1 : 0;
+    *first = low <= high ? (float)(cell * low) : 0.0f;
+    *count = low <= high ? (float)(cell * (high - low + 1.0)) : 0.0f;
 }
 
-// Finds the block of texels that take too many iterations, if there is one.
-static struct sums find_sums(const struct gathering *gathering, uint32_t max_side)
+// Makes the blocks of texels that take more than `most` iterations. Each block is twice as large as
+// the one in it, and has as many groups as the texels around that one need.
+static struct sums make_blocks(const struct gathering *gathering, double most)
 {
     const struct vkb_size size = gathering->size;
-    struct sums sums = {.rows = 1};
-    double radius = 2.0;
+    const double lines = fmax(size.width, size.height);
+    struct sums sums = {.count = 0};
+    double inner = 0.0;
 
-    if (gathering->of_row * size.height <= MAX_ITERATIONS)
-        return sums;
-    while (radius < 2.0 * max_side && gathering->iterations(gathering, radius) > MAX_ITERATIONS)
-        radius *= 1.25;
-    set_range(gathering->centre_x, radius, size.width, &sums.x, &sums.width);
-    set_range(gathering->centre_y, radius, size.height, &sums.y, &sums.height);
-    if (sums.width == 0 || sums.height == 0)
-        sums.width = sums.height = 0;
-    sums.rows = (int)fmax(MAX_ITERATIONS / gathering->of_row, 1.0);
-    sums.groups = ((int)size.height + sums.rows - 1) / sums.rows;
+    for (double radius = 2.0; sums.count < MAX_SUMMED; radius *= 2.0) {
+        const double groups = ceil(gathering->iterations(gathering, inner) / most);
+        float *place = sums.blocks[2 * sums.count];
+        if (groups <= 1.0)
+            break;
+        set_range(gathering->centre_x, radius, size.width, gathering->cell, &place[0], &place[2]);
+        set_range(gathering->centre_y, radius, size.height, gathering->cell, &place[1], &place[3]);
+        inner = radius;
+        if (place[2] == 0.0f || place[3] == 0.0f)
+            continue;
+        // A group has at least a line of pixels.
+        sums.blocks[2 * sums.count++ + 1][0] = (float)fmin(groups, lines);
+    }
     return sums;
 }
 
-#define SET_SUMS(params, sums, first, count, across) \
-    ((params)->summed_x = (sums)->x, (params)->summed_y = (sums)->y, \
-     (params)->summed_width = (sums)->width, (params)->summed_height = (sums)->height, \
-     (params)->summed_first = (first) * (sums)->rows, (params)->summed_rows = (sums)->rows, \
-     (params)->summed_groups = (count), (params)->summed_columns = (across))
-
-// Sets `count` groups from number `first` on, of which `across` are beside each other.
-static void set_groups(struct vkb_pass_row *row, const struct sums *sums, int first, int count,
-                       int across)
+// Places the groups of all blocks below each other. False: the image would be too high, or have
+// more pixels than it may.
+static bool place_groups(struct sums *sums, uint32_t max_side, double max_pixels)
 {
-    if (row->block == VKB_BLOCK_flare)
-        SET_SUMS(&row->params.flare, sums, first, count, across);
-    else
-        SET_SUMS(&row->params.sun_beams, sums, first, count, across);
+    double pixels = 0.0, height = 0.0, width = 1.0;
+
+    for (int i = 0; i < sums->count; ++i) {
+        const float *place = sums->blocks[2 * i];
+        pixels += (double)place[2] * place[3] * sums->blocks[2 * i + 1][0];
+        width = fmax(width, place[2]);
+    }
+    width = fmin(fmax(width, ceil(sqrt(pixels))), max_side);
+    for (int i = 0; i < sums->count; ++i) {
+        const float *place = sums->blocks[2 * i];
+        float *groups = sums->blocks[2 * i + 1];
+        groups[1] = fminf(floorf((float)width / place[2]), groups[0]);
+        groups[2] = (float)height;
+        height += ceil(groups[0] / groups[1]) * place[3];
+    }
+    sums->size = (struct vkb_size){(uint32_t)width, (uint32_t)fmin(height, max_side)};
+    return height <= max_side && pixels <= max_pixels;
 }
 
-// Accumulates what the row gathers, for which others add up groups of rows, if there are sums: as
-// many at a time as an image of about the size of the source holds.
+static struct sums find_sums(const struct gathering *gathering, uint32_t max_side)
+{
+    const double pixels = (double)gathering->size.width * gathering->size.height;
+    double most = MIN_ITERATIONS;
+    struct sums sums = make_blocks(gathering, most);
+
+    for (; !place_groups(&sums, max_side, pixels / PART_OF_PIXELS) && most < MAX_ITERATIONS;
+         most *= 2.0)
+        sums = make_blocks(gathering, 2.0 * most);
+    return sums;
+}
+
+static void set_sums(struct vkb_pass_row *row, const struct sums *sums)
+{
+    const bool flare = row->block == VKB_BLOCK_flare;
+    struct vkb_flare_params *flares = &row->params.flare;
+    struct vkb_sun_beams_params *beams = &row->params.sun_beams;
+
+    *(flare ? &flares->summed_blocks : &beams->summed_blocks) = sums->count;
+    memcpy(flare ? flares->summed : beams->summed, sums->blocks, sizeof sums->blocks);
+}
+
+// Accumulates what the row gathers, for which another one adds up groups of pixels, if there are
+// sums.
 static bool accumulate_summed(struct vkb_adjoint *adjoint, const struct vkb_pass_row *given,
                               const struct gathering *gathering, uint32_t image,
                               struct vkb_error *error)
 {
     const struct sums sums = find_sums(gathering, adjoint->max_side);
-    const int most_across = sums.width ? (int)adjoint->max_side / sums.width : 1;
-    const int most_down = sums.height ? (int)adjoint->max_side / sums.height : 1;
-    const double pixels = (double)gathering->size.width * gathering->size.height;
-    struct vkb_pass_row row = *given;
+    struct vkb_pass_row row = *given, first;
 
-    set_groups(&row, &sums, 0, 0, 1);
-    if (sums.width == 0)
-        return vkb_accumulate_cotangent(adjoint, &row, image, error);
-    const int held = (int)fmin(fmax(pixels / ((double)sums.width * sums.height), 1.0),
-                               fmin(sums.groups, (double)most_across * most_down));
-    const int across =
-        (int)fmin(fmax(ceil(sqrt(held)), ceil((double)held / most_down)), most_across);
-    for (int first = 0; first < sums.groups; first += held) {
-        const int count = sums.groups - first < held ? sums.groups - first : held;
-        const struct vkb_size size = {
-            .width = (uint32_t)(across * sums.width),
-            .height = (uint32_t)((count - 1) / across + 1) * (uint32_t)sums.height,
-        };
-        struct vkb_pass_row part = row;
-        set_groups(&part, &sums, first, count, across);
-        row = part;
-        part.constants.partial_sums = true;
-        part.reads[SLOT_SUMS] = VKB_NO_IMAGE;
-        if (!vkb_add_adjoint_image(adjoint, &part, size, &row.reads[SLOT_SUMS], error)
-            || !vkb_accumulate_cotangent(adjoint, &row, image, error))
-            return false;
-    }
-    return true;
+    set_sums(&row, &sums);
+    first = row;
+    first.constants.partial_sums = true;
+    return (sums.count == 0
+            || vkb_add_adjoint_image(adjoint, &first, sums.size, &row.reads[SLOT_SUMS], error))
+        && vkb_accumulate_cotangent(adjoint, &row, image, error);
 }
 
 // What bounds the work of a halo or a ghost.
@@ -120,12 +141,16 @@ struct flare {
 
 // A part of the pixels is a strip around the texel's line, between two radii. The loops over a row
 // and its sides take three iterations, and the ends of its pixels four.
-static double iterations_of_part(double reach, double distance, double thickness)
+static double iterations_of_part(const struct gathering *gathering, double distance,
+                                 double thickness)
 {
-    const double across = reach * SAMPLED_WIDTH / 2.0 / distance + 1.0;
-    const double between = fmin(thickness, reach), rows = 3.0 * across + between + 2.0;
+    const double reach = gathering->flare->reach, height = gathering->size.height;
+    const double pixels = (double)gathering->size.width * gathering->size.height;
+    const double across = fmin(reach * SAMPLED_WIDTH / 2.0 / distance + 1.0, reach);
+    const double between = fmin(thickness, reach);
+    const double rows = fmin(3.0 * across + between + 2.0, height);
 
-    return 7.0 * rows + 2.0 * acos(-1.0) * across * between;
+    return 7.0 * rows + fmin(2.0 * acos(-1.0) * across * between, pixels);
 }
 
 static double flare_iterations(const struct gathering *gathering, double distance)
@@ -142,23 +167,10 @@ static double flare_iterations(const struct gathering *gathering, double distanc
     if (distance > flare->scale * flare->reach + aberration * longer + SAMPLED_WIDTH)
         return 0.0;
     return flare->parts
-             * iterations_of_part(flare->reach, distance, SAMPLED_WIDTH / flare->scale + 2.0)
+             * iterations_of_part(gathering, distance, SAMPLED_WIDTH / flare->scale + 2.0)
          + flare->more_parts
-               * iterations_of_part(flare->reach, distance,
+               * iterations_of_part(gathering, distance,
                                     (SAMPLED_WIDTH + spread) / flare->scale + 2.0);
-}
-
-// Of a row between two radii: a chord of the outer circle that touches the inner one, at most.
-static double iterations_of_row(const struct flare *flare, double width)
-{
-    const double spread = flare->params->aberration * (flare->longer - flare->shorter);
-    const double thickness =
-        fmin((3.0 * SAMPLED_WIDTH + spread) / flare->scale + 2.0, flare->reach);
-    const double chord = 2.0 * sqrt(2.0 * flare->reach * thickness) + 7.0;
-    const double parts = flare->parts + flare->more_parts;
-
-    // The parts of a colour have no pixel in common, but for the margins of their radii.
-    return fmin(parts * chord, (flare->more_parts > 0.0 ? 3.0 : 1.0) * (width + 28.0));
 }
 
 static struct flare flare_of(const struct vkb_pass_row *row, struct vkb_size size)
@@ -191,7 +203,7 @@ bool vkb_accumulate_moved(struct vkb_adjoint *adjoint, const struct vkb_pass_row
         .size = size,
         .centre_x = 0.5 * size.width - 0.5,
         .centre_y = 0.5 * size.height - 0.5,
-        .of_row = iterations_of_row(&flare, size.width),
+        .cell = 1,
         .flare = &flare,
     };
     uint32_t sampled;
@@ -206,7 +218,8 @@ bool vkb_accumulate_moved(struct vkb_adjoint *adjoint, const struct vkb_pass_row
     return accumulate_summed(adjoint, &moved, &gathering, source, error);
 }
 
-// Sun beams: four pixels of a strip behind the texel in an iteration.
+// Sun beams: of each line across the longer axis the pixels between two slopes, which differ by
+// less than six texels over the distance on that axis, and the ends of a line.
 static double beam_iterations(const struct gathering *gathering, double distance)
 {
     const double x = gathering->centre_x, y = gathering->centre_y;
@@ -214,10 +227,12 @@ static double beam_iterations(const struct gathering *gathering, double distance
     const double reach =
         hypot(fmax(fabs(x), fabs(width - x)), fmax(fabs(y), fabs(height - y))) + 1.0;
     const double outer = fmin(distance + gathering->most + SAMPLED_WIDTH, reach);
-    const double across = outer * SAMPLED_WIDTH / 2.0 / distance + 1.0;
-    const double rows = fmin(3.0 * across + outer + 2.0, height);
+    const double lines = fmin(2.0 * outer, fmax(width, height));
+    const double slope = 6.0 / fmax(distance / sqrt(2.0) - 2.0, 0.1);
+    const double inner = fmin(distance, outer);
+    const double pixels = fmin(slope * (outer * outer - inner * inner) / 2.0, width * height);
 
-    return (distance > gathering->beyond ? 1.0 : 2.0) * (8.0 * rows + across * outer / 2.0);
+    return (distance > gathering->beyond ? 1.0 : 2.0) * (4.0 * lines + pixels);
 }
 
 bool vkb_transpose_sun_beams(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
@@ -233,7 +248,7 @@ bool vkb_transpose_sun_beams(struct vkb_adjoint *adjoint, const struct vkb_pass_
         .size = {image->width, image->height},
         .centre_x = params->sun_x * (double)image->width - 0.5,
         .centre_y = params->sun_y * (double)image->height - 0.5,
-        .of_row = image->width / 4.0 + 14.0,
+        .cell = BEAM_CELL,
         .most = left > 0.0 ? params->most + 2.0 + beyond : 4.0,
         .beyond = beyond + 2.0,
     };
@@ -244,7 +259,11 @@ bool vkb_transpose_sun_beams(struct vkb_adjoint *adjoint, const struct vkb_pass_
     row.params = pass->params;
     if (!vkb_add_adjoint_row(adjoint, &row, gathering.size, &sums, error))
         return false;
-    row.shader = &vkb_shader_adjoint_beams_frag;
+    row.shader = &vkb_shader_adjoint_beams_comp;
+    row.geometry = VKB_GEOMETRY_DISPATCH;
+    row.vertex = NULL;
+    row.variant = "dispatch";
+    row.block_width = row.block_height = BEAM_CELL * PIXEL_INVOCATIONS;
     row.reads[SLOT_COTANGENTS] = sums;
     return accumulate_summed(adjoint, &row, &gathering, source, error);
 }

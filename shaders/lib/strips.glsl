@@ -1,10 +1,10 @@
 // Gathers from pixels that are about on one line through a centre with a texel, between two radii. The
-// including shader defines CENTRE, the centre in texels, STRIP_IMAGE, whose pixels these are, AT_ONCE,
-// the pixels of an iteration, and share_for(), what the texel has of the cotangents of one of them.
+// including shader defines CENTRE, the centre in texels, STRIP_IMAGE, whose pixels these are, and
+// share_for(), what the texel has of the cotangents of one of them.
 
 // A sample is part of a texel that is less than this distance away along both axes. Rounding is less
-// than 1 / 16 of a texel in a sample's place, and less than a pixel in the radii of pixels.
-const float NEAR = 1.0 + 1.0 / 16.0, MARGIN = 1.0;
+// than 1 / 16 of a texel in a sample's place, and less than MARGIN in the radii of pixels.
+const float NEAR = 1.0 + 1.0 / 16.0, MARGIN = 1.0 / 8.0;
 
 // Part of the pixels. `facing` is 1 for pixels on the texel's side of the centre, -1 for the others, 0
 // for both. The rest is for share_for().
@@ -20,8 +20,8 @@ vec2 distances_around(vec2 here)
     return vec2(length(max(abs(here) - NEAR, vec2(0.0))), length(abs(here) + NEAR));
 }
 
-// Adds up the pixels of a part between two radii and between two rows.
-vec4 gather_part(Part part, ivec2 texel, vec2 radii, int first_row, int last_row)
+// Adds up the pixels of a part between two radii, in the rows of a group.
+vec4 gather_part(Part part, ivec2 texel, vec2 radii, int group, int groups)
 {
     ivec2 pixels = textureSize(STRIP_IMAGE, 0);
     vec2 centre = CENTRE, here = vec2(texel) - centre;
@@ -45,8 +45,8 @@ vec4 gather_part(Part part, ivec2 texel, vec2 radii, int first_row, int last_row
     if (low.y > high.y || low.x > high.x)
         return sum;
     int middle = clamp(int(ceil(centre.x)), 0, pixels.x);
-    last_row = min(int(floor(high.y + centre.y)), last_row);
-    for (int y = max(int(ceil(low.y + centre.y)), first_row); y <= last_row; ++y) {
+    int first_row = max(int(ceil(low.y + centre.y)), 0), last_row = min(int(floor(high.y + centre.y)), pixels.y - 1);
+    for (int y = first_of_group(first_row, group, groups); y <= last_row; y += groups) {
         float down = float(y) - centre.y;
         vec2 ring = sqrt(max(vec2(inner * inner, outer * outer) - down * down, vec2(0.0)));
         vec2 row = vec2(low.x, high.x);
@@ -66,10 +66,8 @@ vec4 gather_part(Part part, ivec2 texel, vec2 radii, int first_row, int last_row
             ends.x = min(ends.x, float(pixels.x));
             int x = max(int(ceil(ends.x)), right == 0 ? 0 : middle);
             int last = min(int(floor(ends.y)), right == 0 ? middle - 1 : pixels.x - 1);
-            for (; x <= last; x += AT_ONCE)
-                [[unroll]] for (int i = 0; i < AT_ONCE; ++i)
-                    if (x + i <= last)
-                        sum += share_for(ivec2(x + i, y), part, texel);
+            for (; x <= last; ++x)
+                sum += share_for(ivec2(x, y), part, texel);
         }
     }
     return sum;

@@ -267,11 +267,11 @@ def test_blender_5_2_reads_the_next_texels(renderer: Renderer, size: Any, type: 
                 glare=(vkbloom.Halo(halvings=0, aberration=0.1, radius=0.2, width=0.2),),
             ),
             "halo",
-            16,
+            2,
         ),
     ],
 )
-def test_groups_of_rows_are_added_up(
+def test_groups_of_pixels_are_added_up(
     renderer: Renderer, settings: Any, name: str, passes: int
 ) -> None:
     """Of more pixels than an invocation may go through, about a centre. Both are linear.
