@@ -274,6 +274,6 @@ bool vkb_add_adjoint_filter_variant(struct vkb_variant_choice *choice,
     const bool in_blocks = make_tiles(choice, pass, &row) || make_lines(&row);
     read_composite(&choice->plain, &row);
     return (in_blocks ? vkb_add_variant_pass(choice, &row)
-                       : vkb_add_fullscreen_variant(choice, &row))
+                      : vkb_add_fullscreen_variant(choice, &row))
         && add_pictures(choice, pass);
 }
