@@ -3,7 +3,7 @@
 #include "methods/methods.h"
 #include "passes/prefilter.h"
 
-uint32_t vkb_add_babylon(struct vkb_levels *levels)
+uint32_t vkb_add_babylon_method(struct vkb_levels *levels)
 {
     const struct vkb_settings *settings = levels->settings;
     const struct vkb_size frame = levels->source->buffers;

@@ -31,7 +31,7 @@ static void choose_sizes(struct vkb_levels *levels)
     vkb_levels_add_sizes(levels, size, count);
 }
 
-uint32_t vkb_add_bevy(struct vkb_levels *levels)
+uint32_t vkb_add_bevy_method(struct vkb_levels *levels)
 {
     const struct vkb_settings *settings = levels->settings;
     const bool mixed = settings->choices[VKB_CHOICE_composite] == COMPOSITE_MIX;

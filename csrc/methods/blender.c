@@ -121,7 +121,7 @@ static uint32_t add_streaks(struct vkb_levels *levels)
                 .before = last ? before : VKB_NO_IMAGE,
                 .to = light,
             };
-            vkb_add_ray(levels, &ray);
+            vkb_add_ray_pass(levels, &ray);
             from = light;
         }
         before = light;
@@ -192,7 +192,7 @@ static uint32_t add_ghosts(struct vkb_levels *levels)
         stage.ghosts[0][3] = scales[i];
         from = add_blurred(levels, radius << i);
         light = vkb_levels_step(levels, levels->sizes[0], "ghosts_of_blur_%u", i);
-        vkb_add_flare(levels, &stage, from, before, light);
+        vkb_add_flare_pass(levels, &stage, from, before, light);
         before = light;
     }
     before = VKB_NO_IMAGE;
@@ -200,7 +200,7 @@ static uint32_t add_ghosts(struct vkb_levels *levels)
         from = light;
         set_ghosts(values, i, &stage);
         light = vkb_levels_step(levels, levels->sizes[0], "ghosts_%u", (uint32_t)i);
-        vkb_add_flare(levels, &stage, from, before, light);
+        vkb_add_flare_pass(levels, &stage, from, before, light);
         before = light;
     }
     return light;
@@ -359,7 +359,7 @@ static bool check_iterations(struct vkb_levels *levels)
                     iterations, STAR_ITERATIONS);
 }
 
-uint32_t vkb_add_blender(struct vkb_levels *levels)
+uint32_t vkb_add_blender_method(struct vkb_levels *levels)
 {
     const int type = levels->settings->choices[VKB_CHOICE_type];
     const struct vkb_bloom_source *source = levels->source;

@@ -311,7 +311,7 @@ uint32_t vkb_convolve(struct vkb_levels *levels, const struct vkb_image_row *res
     return target;
 }
 
-uint32_t vkb_add_convolution(struct vkb_levels *levels)
+uint32_t vkb_add_convolution_method(struct vkb_levels *levels)
 {
     const struct vkb_bloom_source *source = levels->source;
     const struct vkb_size size = source->buffers;
@@ -325,13 +325,13 @@ uint32_t vkb_add_convolution(struct vkb_levels *levels)
 }
 
 // Film's halation: the kernel is a sum of Gaussians, too.
-uint32_t vkb_add_halation(struct vkb_levels *levels)
+uint32_t vkb_add_halation_method(struct vkb_levels *levels)
 {
-    return vkb_add_unreal(levels);
+    return vkb_add_unreal_method(levels);
 }
 
 // Unreal Engine's standard bloom, by its documentation: the kernel is a sum of Gaussians.
-uint32_t vkb_add_unreal(struct vkb_levels *levels)
+uint32_t vkb_add_unreal_method(struct vkb_levels *levels)
 {
     const struct vkb_bloom_source *source = levels->source;
     struct vkb_bloom_source masked = *source;
@@ -343,7 +343,7 @@ uint32_t vkb_add_unreal(struct vkb_levels *levels)
         vkb_levels_masked(levels, &row);
     }
     levels->source = &masked;
-    const uint32_t bloom = vkb_add_convolution(levels);
+    const uint32_t bloom = vkb_add_convolution_method(levels);
     levels->source = source;
     return bloom;
 }

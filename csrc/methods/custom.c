@@ -162,7 +162,7 @@ static uint32_t add_passes(struct vkb_levels *levels, uint32_t *images)
     return bloom;
 }
 
-uint32_t vkb_add_custom(struct vkb_levels *levels)
+uint32_t vkb_add_custom_method(struct vkb_levels *levels)
 {
     uint32_t *images = vkb_alloc(levels->error, levels->settings->pass_count + 1, sizeof *images);
     const uint32_t bloom = images ? add_passes(levels, images) : VKB_NO_IMAGE;

@@ -24,7 +24,7 @@ static uint32_t add_box(struct vkb_levels *levels, uint32_t number, uint32_t fro
     return to;
 }
 
-uint32_t vkb_add_darktable(struct vkb_levels *levels)
+uint32_t vkb_add_darktable_method(struct vkb_levels *levels)
 {
     const struct vkb_bloom_source *source = levels->source;
     struct vkb_bloom_source floats = *source;

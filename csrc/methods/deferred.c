@@ -57,7 +57,7 @@ static struct gbuffer add_gbuffer(struct vkb_levels *levels, const struct vkb_sc
     row = vkb_scene_row("gbuffer", VKB_GEOMETRY_BODY, &vkb_shader_gbuffer_body_frag, 0, 0, params);
     row.constants.emitters = emitters;
     set_targets(&gbuffer, &row);
-    vkb_add_mesh(levels, &row, source->body_textured, &vkb_shader_gbuffer_body_textured_frag);
+    vkb_add_mesh_pass(levels, &row, source->body_textured, &vkb_shader_gbuffer_body_textured_frag);
     if (glow == VKB_NO_IMAGE)
         return gbuffer;
     row = vkb_fullscreen_row("glow_light", &vkb_shader_gbuffer_glow_frag, 0);
@@ -87,7 +87,7 @@ static uint32_t add_bloom(struct vkb_levels *levels, struct vkb_size size, uint3
 
     if (!as_it_is) {
         source.glow = vkb_levels_target(levels, "extracted", extracted, source.buffers, false);
-        vkb_add_threshold(levels, brightness, VKB_NO_IMAGE, source.glow);
+        vkb_add_threshold_pass(levels, brightness, VKB_NO_IMAGE, source.glow);
     }
     return vkb_add_bloom(levels, &source);
 }
@@ -122,7 +122,7 @@ void vkb_build_deferred(struct vkb_levels *levels, const struct vkb_scene_source
     if (settings->values.bloom && source->has_glow) {
         struct vkb_mesh_params lamp = params;
         lamp.glow_intensity = (float)fmin(source->glow_intensity, FLT_MAX);
-        glow = vkb_add_glow(levels, source, &lamp, HDR, source->size, false, THRESHOLD_NONE);
+        glow = vkb_add_glow_pass(levels, source, &lamp, HDR, source->size, false, THRESHOLD_NONE);
     }
     const struct gbuffer gbuffer = add_gbuffer(levels, source, &params, glow);
     if (scene_first)
@@ -132,5 +132,5 @@ void vkb_build_deferred(struct vkb_levels *levels, const struct vkb_scene_source
             add_bloom(levels, source->size, composite.scene, gbuffer.colours[BRIGHTNESS]);
     if (!scene_first)
         composite.scene = add_lighting(levels, &gbuffer, source->size);
-    vkb_add_composite(levels, &composite, VKB_FORMAT_RGBA8_UNORM);
+    vkb_add_composite_pass(levels, &composite, VKB_FORMAT_RGBA8_UNORM);
 }

@@ -75,7 +75,7 @@ static void add_down(struct vkb_levels *levels, uint32_t level)
         vkb_levels_reduce(levels, 1.0, 1.0, from, to);
 }
 
-uint32_t vkb_add_filament(struct vkb_levels *levels)
+uint32_t vkb_add_filament_method(struct vkb_levels *levels)
 {
     struct vkb_combination combination = vkb_combine(UPSAMPLE_TENT, 1.0, 1.0);
 

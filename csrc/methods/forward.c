@@ -30,7 +30,7 @@ static uint32_t add_scene(struct vkb_levels *levels, const struct vkb_scene_sour
     struct vkb_pass_row body =
         vkb_scene_row("scene", VKB_GEOMETRY_BODY, &vkb_shader_phong_frag, scene, depth, params);
     body.constants.emitters = vkb_body_glows(source);
-    vkb_add_mesh(levels, &body, source->body_textured, &vkb_shader_phong_textured_frag);
+    vkb_add_mesh_pass(levels, &body, source->body_textured, &vkb_shader_phong_textured_frag);
     return scene;
 }
 
@@ -60,11 +60,12 @@ void vkb_build_forward(struct vkb_levels *levels, const struct vkb_scene_source 
         struct vkb_mesh_params lamp = params;
         // The intensity applies to the deferred system only: 8 bits cannot hold radiance.
         lamp.glow_intensity = 1.0f;
-        glow.glow = vkb_add_glow(levels, source, &lamp, vkb_first_format(settings, glow.format),
-                                 glow.buffers, true, vkb_threshold_mode(settings));
+        glow.glow =
+            vkb_add_glow_pass(levels, source, &lamp, vkb_first_format(settings, glow.format),
+                              glow.buffers, true, vkb_threshold_mode(settings));
         composite.bloom = vkb_add_bloom(levels, &glow);
     }
     if (!scene_first)
         composite.scene = add_scene(levels, source, &params);
-    vkb_add_composite(levels, &composite, VKB_FORMAT_RGBA8_UNORM);
+    vkb_add_composite_pass(levels, &composite, VKB_FORMAT_RGBA8_UNORM);
 }

@@ -73,7 +73,7 @@ static void add_before(struct vkb_pass_row *row, uint32_t before)
     row->constants.add_own = before != VKB_NO_IMAGE;
 }
 
-void vkb_add_ray(struct vkb_levels *levels, const struct vkb_ray *ray)
+void vkb_add_ray_pass(struct vkb_levels *levels, const struct vkb_ray *ray)
 {
     const struct vkb_glare_values *values = ray->values;
     const double step = values->length * pow(values->base, ray->iteration);
@@ -127,7 +127,7 @@ static uint32_t add_streaks(struct stage *stage)
                 .before = last ? before : VKB_NO_IMAGE,
                 .to = image,
             };
-            vkb_add_ray(&stage->levels, &row);
+            vkb_add_ray_pass(&stage->levels, &row);
             from = image;
         }
         before = image;
@@ -135,8 +135,8 @@ static uint32_t add_streaks(struct stage *stage)
     return image;
 }
 
-void vkb_add_flare(struct vkb_levels *levels, const struct vkb_stage *stage, uint32_t from,
-                   uint32_t before, uint32_t to)
+void vkb_add_flare_pass(struct vkb_levels *levels, const struct vkb_stage *stage, uint32_t from,
+                        uint32_t before, uint32_t to)
 {
     const struct vkb_glare_values *values = &stage->values;
     const bool ghosts = stage->kind == VKB_STAGE_GHOSTS;
@@ -165,7 +165,7 @@ static uint32_t add_flare(struct stage *stage)
 {
     const uint32_t image = add_end(stage);
 
-    vkb_add_flare(&stage->levels, stage->settings, stage->from, VKB_NO_IMAGE, image);
+    vkb_add_flare_pass(&stage->levels, stage->settings, stage->from, VKB_NO_IMAGE, image);
     return image;
 }
 
@@ -192,7 +192,7 @@ static uint32_t add_source(struct vkb_levels *levels)
         || (!vkb_stages_have_threshold(settings) && source->mask == VKB_NO_IMAGE))
         return source->glow;
     const uint32_t image = vkb_levels_step(levels, source->buffers, "glare_source");
-    vkb_add_stage_threshold(levels, source->glow, source->mask, image);
+    vkb_add_stage_threshold_pass(levels, source->glow, source->mask, image);
     return image;
 }
 
@@ -224,7 +224,7 @@ static void name_stage(const struct vkb_settings *settings, uint32_t index, char
         snprintf(name, VKB_NAME_SIZE, "%s_%u", kinds[kind].name, number);
 }
 
-void vkb_add_stages(struct vkb_levels *levels, uint32_t *stages)
+void vkb_add_glare_stages(struct vkb_levels *levels, uint32_t *stages)
 {
     const struct vkb_settings *settings = levels->settings;
     struct vkb_bloom_source floats = *levels->source;
@@ -277,7 +277,7 @@ static uint32_t add_dirty_light(struct vkb_levels *levels, const struct vkb_glar
     return dirty;
 }
 
-uint32_t vkb_add_light(struct vkb_levels *method, const uint32_t *stages, uint32_t bloom)
+uint32_t vkb_add_light_passes(struct vkb_levels *method, const uint32_t *stages, uint32_t bloom)
 {
     const struct vkb_settings *settings = method->settings;
     struct vkb_bloom_source floats = *method->source;

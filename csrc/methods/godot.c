@@ -36,7 +36,7 @@ static void add_blur(struct vkb_levels *levels, enum vkb_mode direction, bool fi
     vkb_levels_pass(levels, &row);
 }
 
-uint32_t vkb_add_godot(struct vkb_levels *levels)
+uint32_t vkb_add_godot_method(struct vkb_levels *levels)
 {
     const struct vkb_settings *settings = levels->settings;
     const enum vkb_mode upsample = settings->values.bicubic ? UPSAMPLE_CUBIC : UPSAMPLE_LINEAR;

@@ -59,9 +59,9 @@ static uint32_t add_bloom(struct vkb_levels *levels, const struct vkb_image_sour
         .format = settings->format ? settings->format : image->format,
     };
 
-    source.glow =
-        vkb_add_first(levels, vkb_first_format(settings, source.format), source.buffers, true);
-    vkb_add_threshold(levels, from, mask, source.glow);
+    source.glow = vkb_add_first_image(levels, vkb_first_format(settings, source.format),
+                                      source.buffers, true);
+    vkb_add_threshold_pass(levels, from, mask, source.glow);
     const uint32_t bloom = vkb_add_bloom(levels, &source);
     for (uint32_t i = 0; source.blurs_alpha && i < graph->pass_count; ++i)
         graph->passes[i].constants.alpha = ALPHA_BLUR;
@@ -87,5 +87,5 @@ void vkb_build_image(struct vkb_levels *levels, const struct vkb_image_source *i
         source.mask = add_input(levels, image, VKB_INPUT_MASK);
     if (settings->values.bloom)
         source.bloom = add_bloom(levels, image, source.scene, glow, source.mask);
-    vkb_add_composite(levels, &source, image->format);
+    vkb_add_composite_pass(levels, &source, image->format);
 }

@@ -21,7 +21,7 @@ static double choose_sizes(struct vkb_levels *levels)
     return 0.5 + lg - trunc(lg);
 }
 
-uint32_t vkb_add_kino(struct vkb_levels *levels)
+uint32_t vkb_add_kino_method(struct vkb_levels *levels)
 {
     const bool anti_flicker = levels->settings->values.anti_flicker;
     struct vkb_combination combination = vkb_combine(UPSAMPLE_TENT, 1.0, 1.0);

@@ -4,7 +4,7 @@
 #include <string.h>
 
 static uint32_t (*const methods[VKB_METHOD_COUNT])(struct vkb_levels *) = {
-#define METHOD_ROW(constant, name, ...) [VKB_METHOD_##constant] = vkb_add_##name,
+#define METHOD_ROW(constant, name, ...) [VKB_METHOD_##constant] = vkb_add_##name##_method,
     VKB_METHODS(METHOD_ROW)
 #undef METHOD_ROW
 };
@@ -17,11 +17,12 @@ uint32_t vkb_add_bloom(struct vkb_levels *levels, const struct vkb_bloom_source 
         return VKB_NO_IMAGE;
     levels->source = source;
     if (vkb_has_glare(levels->settings))
-        vkb_add_stages(levels, stages);
+        vkb_add_glare_stages(levels, stages);
     const uint32_t bloom = methods[levels->settings->method](levels);
-    const uint32_t light = vkb_has_glare(levels->settings)
-                             ? vkb_add_light(levels, stages, levels->picture ? VKB_NO_IMAGE : bloom)
-                             : bloom;
+    const uint32_t light =
+        vkb_has_glare(levels->settings)
+            ? vkb_add_light_passes(levels, stages, levels->picture ? VKB_NO_IMAGE : bloom)
+            : bloom;
     levels->source = NULL;  // the caller's
     return light;
 }

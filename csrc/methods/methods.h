@@ -38,10 +38,10 @@ struct vkb_size vkb_forward_buffers(const struct vkb_settings *settings, struct 
 bool vkb_has_glare(const struct vkb_settings *settings);
 
 // Adds the rows of the stages of glare to the graph; `stages` gets the image of each.
-void vkb_add_stages(struct vkb_levels *levels, uint32_t *stages);
+void vkb_add_glare_stages(struct vkb_levels *levels, uint32_t *stages);
 // Adds the sum of the bloom (VKB_NO_IMAGE: none) and the stages, each times its intensity. Returns
 // this image.
-uint32_t vkb_add_light(struct vkb_levels *method, const uint32_t *stages, uint32_t bloom);
+uint32_t vkb_add_light_passes(struct vkb_levels *method, const uint32_t *stages, uint32_t bloom);
 
 // Adds the convolution of the source's glow with the kernel of the settings. `result` has the name
 // and the format of the image that it writes and returns, and whether this is a framebuffer. If it
@@ -60,16 +60,17 @@ struct vkb_ray {
     int iteration;
     uint32_t from, before, to;
 };
-void vkb_add_ray(struct vkb_levels *levels, const struct vkb_ray *ray);
+void vkb_add_ray_pass(struct vkb_levels *levels, const struct vkb_ray *ray);
 
 // Adds the ghosts of a stage of `from` into the image `to`. `before`, if there is one, is added.
-void vkb_add_flare(struct vkb_levels *levels, const struct vkb_stage *stage, uint32_t from,
-                   uint32_t before, uint32_t to);
+void vkb_add_flare_pass(struct vkb_levels *levels, const struct vkb_stage *stage, uint32_t from,
+                        uint32_t before, uint32_t to);
 
 // Adds the rows of the method that the settings name, and those of glare. Returns the last image.
 uint32_t vkb_add_bloom(struct vkb_levels *levels, const struct vkb_bloom_source *source);
 // Each method adds its rows, and returns the last image.
-#define VKB_METHOD_FUNCTION(constant, name, ...) uint32_t vkb_add_##name(struct vkb_levels *levels);
+#define VKB_METHOD_FUNCTION(constant, name, ...) \
+    uint32_t vkb_add_##name##_method(struct vkb_levels *levels);
 VKB_METHODS(VKB_METHOD_FUNCTION)
 #undef VKB_METHOD_FUNCTION
 

@@ -4,7 +4,7 @@
 #include "passes/filter.h"
 #include "passes/prefilter.h"
 
-uint32_t vkb_add_pyramid(struct vkb_levels *levels)
+uint32_t vkb_add_pyramid_method(struct vkb_levels *levels)
 {
     const struct vkb_settings *settings = levels->settings;
     const double x = settings->values.scale_x, y = settings->values.scale_y;
@@ -34,7 +34,7 @@ uint32_t vkb_add_pyramid(struct vkb_levels *levels)
     return vkb_levels_combine(levels, &combination);
 }
 
-uint32_t vkb_add_dual_kawase(struct vkb_levels *levels)
+uint32_t vkb_add_dual_kawase_method(struct vkb_levels *levels)
 {
     const struct vkb_values *values = &levels->settings->values;
     uint32_t from = levels->source->glow;

@@ -31,7 +31,7 @@ static void add_first(struct vkb_levels *levels)
     vkb_levels_masked(levels, &row);
 }
 
-uint32_t vkb_add_playcanvas(struct vkb_levels *levels)
+uint32_t vkb_add_playcanvas_method(struct vkb_levels *levels)
 {
     struct vkb_combination combination = vkb_combine(UPSAMPLE_TENT, 1.0, 1.0);
     const struct vkb_size size = vkb_halved(levels->source->buffers);

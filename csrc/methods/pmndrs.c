@@ -18,7 +18,7 @@ static void add_down(struct vkb_levels *levels, uint32_t level, uint32_t from)
     vkb_add_filter_pass(levels, &filter, from, to);
 }
 
-uint32_t vkb_add_pmndrs(struct vkb_levels *levels)
+uint32_t vkb_add_pmndrs_method(struct vkb_levels *levels)
 {
     const struct vkb_values *values = &levels->settings->values;
     const double share = values->radius;

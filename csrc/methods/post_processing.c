@@ -30,7 +30,7 @@ static uint32_t reduced(uint32_t side, double anamorphism)
     return (uint32_t)fmax(1.0, floor(side / (2.0 - fmax(anamorphism, 0.0))));
 }
 
-uint32_t vkb_add_post_processing(struct vkb_levels *levels)
+uint32_t vkb_add_post_processing_method(struct vkb_levels *levels)
 {
     const struct vkb_values *values = &levels->settings->values;
     const struct vkb_size frame = levels->source->buffers;

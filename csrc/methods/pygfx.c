@@ -13,7 +13,7 @@ static uint32_t most_levels(struct vkb_size first)
     return count;
 }
 
-uint32_t vkb_add_pygfx(struct vkb_levels *levels)
+uint32_t vkb_add_pygfx_method(struct vkb_levels *levels)
 {
     const struct vkb_values *values = &levels->settings->values;
     const enum vkb_prefilter prefilter =

@@ -102,7 +102,7 @@ static void add_rounding(struct vkb_levels *levels, uint32_t from, uint32_t to)
     vkb_levels_pass(levels, &row);
 }
 
-uint32_t vkb_add_separable(struct vkb_levels *levels)
+uint32_t vkb_add_separable_method(struct vkb_levels *levels)
 {
     const struct vkb_settings *settings = levels->settings;
     const struct vkb_bloom_source *source = levels->source;

@@ -81,7 +81,7 @@ static void add_tints(struct vkb_levels *levels, const float *all_tints)
     }
 }
 
-uint32_t vkb_add_three(struct vkb_levels *levels)
+uint32_t vkb_add_three_method(struct vkb_levels *levels)
 {
     const struct vkb_settings *settings = levels->settings;
     double shares[THREE_LEVELS];

@@ -111,7 +111,7 @@ static void add_urp_first(struct vkb_levels *levels)
     vkb_levels_masked(levels, &row);
 }
 
-uint32_t vkb_add_urp(struct vkb_levels *levels)
+uint32_t vkb_add_urp_method(struct vkb_levels *levels)
 {
     const struct vkb_settings *settings = levels->settings;
     const struct vkb_size half = vkb_halved(levels->source->buffers);
@@ -170,7 +170,7 @@ static void add_hdrp_level(struct vkb_levels *levels, uint32_t level, uint32_t f
     vkb_levels_pass(levels, &columns);
 }
 
-uint32_t vkb_add_hdrp(struct vkb_levels *levels)
+uint32_t vkb_add_hdrp_method(struct vkb_levels *levels)
 {
     const struct vkb_settings *settings = levels->settings;
     const struct vkb_size frame = levels->source->buffers;

@@ -39,14 +39,15 @@ struct vkb_pass_row vkb_slope_row(const struct vkb_adjoint *adjoint,
     return row;
 }
 
-bool vkb_add_adjoint_row(struct vkb_adjoint *adjoint, struct vkb_pass_row *row,
-                         struct vkb_size size, uint32_t *image, struct vkb_error *error)
+bool vkb_add_adjoint_pass(struct vkb_adjoint *adjoint, struct vkb_pass_row *row,
+                          struct vkb_size size, uint32_t *image, struct vkb_error *error)
 {
     char name[VKB_NAME_SIZE];
 
     snprintf(name, sizeof name, "adjoint_%u", adjoint->added);
     ++adjoint->added;
-    if (!vkb_add_target(adjoint->graph, name, VKB_FORMAT_RGBA32_FLOAT, size, false, image, error))
+    if (!vkb_add_target_image(adjoint->graph, name, VKB_FORMAT_RGBA32_FLOAT, size, false, image,
+                              error))
         return false;
     snprintf(row->name, sizeof row->name, "%s", name);
     row->targets[0] = *image;
@@ -102,7 +103,7 @@ bool vkb_accumulate_cotangent(struct vkb_adjoint *adjoint, const struct vkb_pass
         forward->input == VKB_INPUT_IMAGE || forward->input == VKB_INPUT_EMISSION;
     if (row.constants.of_source)
         row.reads[SLOT_DIFFERENTIATED] = image;
-    return vkb_add_adjoint_row(adjoint, &row, size, cotangent, error);
+    return vkb_add_adjoint_pass(adjoint, &row, size, cotangent, error);
 }
 
 bool vkb_add_adjoint_image(struct vkb_adjoint *adjoint, const struct vkb_pass_row *given,
@@ -110,7 +111,7 @@ bool vkb_add_adjoint_image(struct vkb_adjoint *adjoint, const struct vkb_pass_ro
 {
     struct vkb_pass_row row = *given;
 
-    return vkb_add_adjoint_row(adjoint, &row, size, image, error);
+    return vkb_add_adjoint_pass(adjoint, &row, size, image, error);
 }
 
 // A copy of the filter for rows of its transpose along one axis, or both, whose weights are in the
@@ -349,14 +350,14 @@ static bool add_sums(struct vkb_adjoint *adjoint, uint32_t image, struct vkb_siz
         row.constants.squared = squared;
         squared = false;
         size = blocks_of(size);
-        if (!vkb_add_adjoint_row(adjoint, &row, size, &image, error))
+        if (!vkb_add_adjoint_pass(adjoint, &row, size, &image, error))
             return false;
     } while (size.width > 1 || size.height > 1);
     return vkb_graph_show_image(adjoint->graph, image, name, error);
 }
 
-bool vkb_add_sums(struct vkb_adjoint *adjoint, const struct vkb_pass_row *given,
-                  struct vkb_size size, const char *name, struct vkb_error *error)
+bool vkb_add_sum_passes(struct vkb_adjoint *adjoint, const struct vkb_pass_row *given,
+                        struct vkb_size size, const char *name, struct vkb_error *error)
 {
     struct vkb_pass_row row = *given;
     char squares[VKB_NAME_SIZE];

@@ -60,8 +60,8 @@ bool vkb_accumulate_pictures(struct vkb_adjoint *adjoint, const struct vkb_filte
                              struct vkb_error *error);
 
 // Adds the row with a new image of `size` as its target.
-bool vkb_add_adjoint_row(struct vkb_adjoint *adjoint, struct vkb_pass_row *row,
-                         struct vkb_size size, uint32_t *image, struct vkb_error *error);
+bool vkb_add_adjoint_pass(struct vkb_adjoint *adjoint, struct vkb_pass_row *row,
+                          struct vkb_size size, uint32_t *image, struct vkb_error *error);
 
 // The same of a row by vkb_slope_row(), to which no other cotangents are added, and of the
 // transpose of a filter.
@@ -92,8 +92,8 @@ bool vkb_accumulate_mask(struct vkb_adjoint *adjoint, const struct vkb_pass_row 
 
 // If sums are wanted: adds the row of an image of values, and the passes that add these up to one
 // pixel, the framebuffer `name`; and the same for their squares, which tell how exact the sum is.
-bool vkb_add_sums(struct vkb_adjoint *adjoint, const struct vkb_pass_row *row, struct vkb_size size,
-                  const char *name, struct vkb_error *error);
+bool vkb_add_sum_passes(struct vkb_adjoint *adjoint, const struct vkb_pass_row *row,
+                        struct vkb_size size, const char *name, struct vkb_error *error);
 
 // The families of passes. Of what is linear: by the filters of the row.
 vkb_transpose vkb_transpose_filters;

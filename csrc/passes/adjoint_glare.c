@@ -47,7 +47,7 @@ static bool add_own_row(struct vkb_adjoint *adjoint, const struct vkb_pass_row *
     const struct vkb_image_row *source = &adjoint->graph->images[pass->reads[SLOT_SOURCE]];
     const struct vkb_size size = {source->width, source->height};
 
-    return vkb_add_adjoint_row(adjoint, row, size, image, error);
+    return vkb_add_adjoint_pass(adjoint, row, size, image, error);
 }
 
 // The same, and accumulates its result.

@@ -257,7 +257,7 @@ bool vkb_transpose_sun_beams(struct vkb_adjoint *adjoint, const struct vkb_pass_
 
     row.block = VKB_BLOCK_sun_beams;
     row.params = pass->params;
-    if (!vkb_add_adjoint_row(adjoint, &row, gathering.size, &sums, error))
+    if (!vkb_add_adjoint_pass(adjoint, &row, gathering.size, &sums, error))
         return false;
     row.shader = &vkb_shader_adjoint_beams_comp;
     row.geometry = VKB_GEOMETRY_DISPATCH;

@@ -33,8 +33,8 @@ static struct vkb_composite_source composited(const struct vkb_levels *levels,
     } : *source;
 }
 
-void vkb_add_composite(struct vkb_levels *levels, const struct vkb_composite_source *given,
-                       enum vkb_format format)
+void vkb_add_composite_pass(struct vkb_levels *levels, const struct vkb_composite_source *given,
+                            enum vkb_format format)
 {
     const struct vkb_settings *settings = levels->settings;
     const struct vkb_graph *graph = levels->graph;

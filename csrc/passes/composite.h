@@ -15,8 +15,8 @@ struct vkb_composite_source {
 };
 
 // Adds the last pass. It writes the framebuffer "final" in this format, with the scene's channels.
-void vkb_add_composite(struct vkb_levels *levels, const struct vkb_composite_source *source,
-                       enum vkb_format format);
+void vkb_add_composite_pass(struct vkb_levels *levels, const struct vkb_composite_source *source,
+                            enum vkb_format format);
 
 // Whether the row is a composite that adds a bloom.
 bool vkb_is_composite(const struct vkb_pass_row *pass);

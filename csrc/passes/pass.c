@@ -47,9 +47,9 @@ bool vkb_same_size(const struct vkb_graph *graph, uint32_t a, uint32_t b)
     return first->width == second->width && first->height == second->height;
 }
 
-bool vkb_add_target(struct vkb_graph *graph, const char *name, enum vkb_format format,
-                    struct vkb_size size, bool framebuffer, uint32_t *index,
-                    struct vkb_error *error)
+bool vkb_add_target_image(struct vkb_graph *graph, const char *name, enum vkb_format format,
+                          struct vkb_size size, bool framebuffer, uint32_t *index,
+                          struct vkb_error *error)
 {
     struct vkb_image_row row = {
         .format = format,
@@ -62,8 +62,8 @@ bool vkb_add_target(struct vkb_graph *graph, const char *name, enum vkb_format f
     return vkb_graph_add_image(graph, &row, index, error);
 }
 
-uint32_t vkb_add_first(struct vkb_levels *levels, enum vkb_format format, struct vkb_size size,
-                       bool framebuffer)
+uint32_t vkb_add_first_image(struct vkb_levels *levels, enum vkb_format format,
+                             struct vkb_size size, bool framebuffer)
 {
     const char *name = vkb_method_of(levels->settings)->first;
 
@@ -96,9 +96,9 @@ uint32_t vkb_levels_target(struct vkb_levels *levels, const char *name, enum vkb
 {
     uint32_t image = 0;
 
-    levels->failed =
-        levels->failed
-        || !vkb_add_target(levels->graph, name, format, size, framebuffer, &image, levels->error);
+    levels->failed = levels->failed
+                  || !vkb_add_target_image(levels->graph, name, format, size, framebuffer, &image,
+                                           levels->error);
     return image;
 }
 

@@ -26,9 +26,9 @@ struct vkb_bloom_source {
     [VKB_FORMAT_##format] = &vkb_shader_##shader##_##texels,
 
 // Adds an image that a pass will write.
-bool vkb_add_target(struct vkb_graph *graph, const char *name, enum vkb_format format,
-                    struct vkb_size size, bool framebuffer, uint32_t *index,
-                    struct vkb_error *error);
+bool vkb_add_target_image(struct vkb_graph *graph, const char *name, enum vkb_format format,
+                          struct vkb_size size, bool framebuffer, uint32_t *index,
+                          struct vkb_error *error);
 
 // The formats of a method's first image and of its bloom, for bloom buffers of this format.
 // Published methods store only their levels in R11G11B10, and read the frame from sRGB, too.
@@ -80,8 +80,8 @@ uint32_t vkb_levels_target(struct vkb_levels *levels, const char *name, enum vkb
 
 // Adds the first image of the bloom: the framebuffer "glow", or what the method's row has instead
 // (Blender's highlights are its "glow").
-uint32_t vkb_add_first(struct vkb_levels *levels, enum vkb_format format, struct vkb_size size,
-                       bool framebuffer);
+uint32_t vkb_add_first_image(struct vkb_levels *levels, enum vkb_format format,
+                             struct vkb_size size, bool framebuffer);
 
 // Adds a framebuffer in the format of the bloom buffers, with a name as printf() writes it.
 __attribute__((format(printf, 3, 4))) uint32_t vkb_levels_image(struct vkb_levels *levels,

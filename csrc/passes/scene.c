@@ -30,8 +30,8 @@ struct vkb_pass_row vkb_scene_row(const char *name, enum vkb_geometry geometry,
     return row;
 }
 
-void vkb_add_mesh(struct vkb_levels *levels, const struct vkb_pass_row *row, bool has_textures,
-                  const struct vkb_shader *textured)
+void vkb_add_mesh_pass(struct vkb_levels *levels, const struct vkb_pass_row *row, bool has_textures,
+                       const struct vkb_shader *textured)
 {
     struct vkb_pass_row second;
 
@@ -47,12 +47,12 @@ void vkb_add_mesh(struct vkb_levels *levels, const struct vkb_pass_row *row, boo
     vkb_levels_pass(levels, &second);
 }
 
-uint32_t vkb_add_glow(struct vkb_levels *levels, const struct vkb_scene_source *source,
-                      const struct vkb_mesh_params *params, enum vkb_format format,
-                      struct vkb_size size, bool framebuffer, enum vkb_mode threshold)
+uint32_t vkb_add_glow_pass(struct vkb_levels *levels, const struct vkb_scene_source *source,
+                           const struct vkb_mesh_params *params, enum vkb_format format,
+                           struct vkb_size size, bool framebuffer, enum vkb_mode threshold)
 {
     const bool own = vkb_body_glows(source);
-    const uint32_t glow = vkb_add_first(levels, format, size, framebuffer);
+    const uint32_t glow = vkb_add_first_image(levels, format, size, framebuffer);
     const uint32_t depth =
         vkb_levels_target(levels, "glow_depth", VKB_FORMAT_DEPTH32_FLOAT, size, framebuffer);
     struct vkb_pass_row row =
@@ -61,7 +61,7 @@ uint32_t vkb_add_glow(struct vkb_levels *levels, const struct vkb_scene_source *
     row.constants.threshold_mode = threshold;
     if (threshold != THRESHOLD_NONE)
         vkb_params_read(row.block, &levels->settings->values, &row.params);
-    vkb_add_mesh(levels, &row, own ? source->body_textured : source->glow_textured,
-                 own ? &vkb_shader_emission_textured_frag : &vkb_shader_glow_textured_frag);
+    vkb_add_mesh_pass(levels, &row, own ? source->body_textured : source->glow_textured,
+                      own ? &vkb_shader_emission_textured_frag : &vkb_shader_glow_textured_frag);
     return glow;
 }

@@ -26,9 +26,9 @@ static inline bool vkb_body_glows(const struct vkb_scene_source *source)
 
 // Adds the pass that draws the glow mesh into "glow" and "glow_depth", with a threshold of this
 // mode. If the body glows instead, draws its emission.
-uint32_t vkb_add_glow(struct vkb_levels *levels, const struct vkb_scene_source *source,
-                      const struct vkb_mesh_params *params, enum vkb_format format,
-                      struct vkb_size size, bool framebuffer, enum vkb_mode threshold);
+uint32_t vkb_add_glow_pass(struct vkb_levels *levels, const struct vkb_scene_source *source,
+                           const struct vkb_mesh_params *params, enum vkb_format format,
+                           struct vkb_size size, bool framebuffer, enum vkb_mode threshold);
 
 // A row that draws a mesh or the sky with a depth test. The caller may add targets.
 struct vkb_pass_row vkb_scene_row(const char *name, enum vkb_geometry geometry,
@@ -37,7 +37,7 @@ struct vkb_pass_row vkb_scene_row(const char *name, enum vkb_geometry geometry,
 
 // Adds the row, which draws a mesh. If some triangles have textures, adds a second row that draws
 // these with the fragment shader `textured`.
-void vkb_add_mesh(struct vkb_levels *levels, const struct vkb_pass_row *row, bool has_textures,
-                  const struct vkb_shader *textured);
+void vkb_add_mesh_pass(struct vkb_levels *levels, const struct vkb_pass_row *row, bool has_textures,
+                       const struct vkb_shader *textured);
 
 #endif

@@ -54,7 +54,7 @@ static void set_threshold(const struct vkb_graph *graph, struct vkb_pass_row *ro
     row->params.threshold.knee = knee;
 }
 
-void vkb_add_threshold(struct vkb_levels *levels, uint32_t image, uint32_t mask, uint32_t glow)
+void vkb_add_threshold_pass(struct vkb_levels *levels, uint32_t image, uint32_t mask, uint32_t glow)
 {
     const struct vkb_settings *settings = levels->settings;
 
@@ -68,8 +68,8 @@ void vkb_add_threshold(struct vkb_levels *levels, uint32_t image, uint32_t mask,
     vkb_levels_pass(levels, &row);
 }
 
-void vkb_add_stage_threshold(struct vkb_levels *levels, uint32_t image, uint32_t mask,
-                             uint32_t glow)
+void vkb_add_stage_threshold_pass(struct vkb_levels *levels, uint32_t image, uint32_t mask,
+                                  uint32_t glow)
 {
     if (levels->failed)
         return;

@@ -11,11 +11,12 @@ bool vkb_stages_have_threshold(const struct vkb_settings *settings);
 
 // Adds a pass that reduces `image` to the size of `glow`, applies the threshold, and multiplies by
 // the mask (VKB_NO_IMAGE: none). Published methods apply their threshold and the mask later.
-void vkb_add_threshold(struct vkb_levels *levels, uint32_t image, uint32_t mask, uint32_t glow);
+void vkb_add_threshold_pass(struct vkb_levels *levels, uint32_t image, uint32_t mask,
+                            uint32_t glow);
 
 // The same for the stages of glare beside a published method.
-void vkb_add_stage_threshold(struct vkb_levels *levels, uint32_t image, uint32_t mask,
-                             uint32_t glow);
+void vkb_add_stage_threshold_pass(struct vkb_levels *levels, uint32_t image, uint32_t mask,
+                                  uint32_t glow);
 
 // Whether the row is a threshold pass that reads only the texel at each pixel's own position.
 bool vkb_is_threshold(const struct vkb_pass_row *pass);

@@ -21,8 +21,8 @@ uint32_t vkb_add_float_image(struct vkb_variant_choice *choice, const char *name
     uint32_t image = 0;
 
     choice->failed = choice->failed
-                  || !vkb_add_target(choice->graph, name, VKB_FORMAT_RGBA32_FLOAT, size, false,
-                                     &image, choice->error);
+                  || !vkb_add_target_image(choice->graph, name, VKB_FORMAT_RGBA32_FLOAT, size,
+                                           false, &image, choice->error);
     return image;
 }
 
