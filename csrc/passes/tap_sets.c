@@ -229,6 +229,7 @@ bool vkb_filter_mean(struct vkb_filter *filter, int32_t set, double step_x, doub
         return false;
     filter->kernels = count;
     filter->x.count = filter->y.count = 0;
+    filter->x.kind = filter->y.kind = UPSAMPLE_LINEAR;
     for (uint32_t i = 0; i < count; ++i) {
         take_line(&filter->x, &products[i].x, i, step_x);
         take_line(&filter->y, &products[i].y, i, step_y);
