@@ -121,9 +121,9 @@
     FILTER_ROWS(B, INPUT, VEC4S) \
     COMPOSITE_ROWS(B, READS, INPUT)
 
-// A pass that is no filter: one that weights its taps by brightness, and the first pass of a published
-// method, which reads the frame (PREFILTERS). The steps are the distances of places in texels of what
-// it reads.
+// A pass that is no filter: one that weights its taps by brightness, and the first pass of a
+// published method, which reads the frame (PREFILTERS). The steps are the distances of places in
+// texels of what it reads.
 #define PREFILTER_BLOCK(B, READS, INPUT, VEC4S) \
     SAMPLING_ROWS(B, INPUT) \
     INPUT(B, float, step_x) \
@@ -588,10 +588,10 @@
     CONSTANT(23, STORED, stored)         /* the format of the target: STORED_* */ \
     CONSTANT(24, OWN_SAMPLE, own_sample) /* of a transpose: its first kernel or tap */ \
     CONSTANT(25, STACKED_SAMPLES, stacked_samples) /* how many of these, below each other */ \
-    CONSTANT(26, INVERSE, inverse)               /* a transform is the way back */ \
-    CONSTANT(27, ROTATED, rotated)               /* a stage of a transform has factors */ \
-    CONSTANT(28, PADDED, padded)                 /* a stage of a transform pads its lines */ \
-    CONSTANT(29, STAGE, stage)                   /* of a transform: STAGE_* */ \
+    CONSTANT(26, INVERSE, inverse)                 /* a transform is the way back */ \
+    CONSTANT(27, ROTATED, rotated)                 /* a stage of a transform has factors */ \
+    CONSTANT(28, PADDED, padded)                   /* a stage of a transform pads its lines */ \
+    CONSTANT(29, STAGE, stage)                     /* of a transform: STAGE_* */ \
     CONSTANT(30, RADIX_1, radix_1)           /* elements of a stage, or of the first of a line */ \
     CONSTANT(31, RADIX_2, radix_2)           /* of the second; 0: a pass is one stage */ \
     CONSTANT(32, RADIX_3, radix_3)           /* of the third; 1: there is none */ \
@@ -624,8 +624,8 @@
     CONSTANT(60, PARTIAL_SUMS, partial_sums)   /* of SUMMED_ROWS: adds up for another pass */ \
     CONSTANT(61, OF_SOURCE, of_source)         /* its cotangents are of an image that is given */ \
     CONSTANT(63, THROUGH_COMPOSITE, through_composite) /* a composite's cotangents are read */ \
-    CONSTANT(64, SQUARED, squared) /* of adjoint_sum.frag: squares are added up */ \
-    CONSTANT(65, POINT_AFTER, after) /* of the combination: POINT_* */ \
+    CONSTANT(64, SQUARED, squared)             /* of adjoint_sum.frag: squares are added up */ \
+    CONSTANT(65, POINT_AFTER, after)           /* of the combination: POINT_* */ \
     CONSTANT(66, EXPOSED_SCENE, exposed_scene) /* a composite's scene is exposed before it */
 
 // The names that a setting can have. Each list is a setting and a specialization constant.
@@ -748,13 +748,15 @@
     NAME(STAGE_GREY, 4, grey)
 
 // What a pass with the block `prefilter` computes is a choice of four tables, whose rows C and GLSL
-// expand: where it samples its source (TAPS), what it makes of the samples (COMBINE), and a function
-// of each sample and one of the result (POINT_BEFORE, POINT_AFTER). All variants of the pass and its
-// adjoint follow from the choice. Each function stands in GLSL, with its slope beside it.
+// expand: where it samples its source (TAPS), what it makes of the samples (COMBINE), and a
+// function of each sample and one of the result (POINT_BEFORE, POINT_AFTER). All variants of the
+// pass and its adjoint follow from the choice. Each function stands in GLSL, with its slope beside
+// it.
 //
 // Sets of taps: SET(name, value, taps, kernels, place, share).
 //
-//   TAP(number, x, y)                   a sample, at places along both axes: -2 to 2 from the pixel's
+//   TAP(number, x, y)                   a sample, at places along both axes: -2 to 2 from the
+//   pixel's
 //                                       position
 //   KERNEL(number, share, a, b, c, d)   the mean of four taps: upper left, upper right, lower left,
 //                                       lower right. Without kernels each tap is one.
@@ -855,8 +857,8 @@
     WITHIN(COMBINE_BLENDER, 7, blender_weight) \
     SELECT(COMBINE_MEDIAN, 8, median)
 
-// Functions of a value: POINT(name, value, function), in lib/points.glsl, where `back_` and the name
-// is the slope.
+// Functions of a value: POINT(name, value, function), in lib/points.glsl, where `back_` and the
+// name is the slope.
 #define POINTS(POINT) \
     POINT(POINT_CAPPED, 1, capped) \
     POINT(POINT_FINITE, 2, finite) \
