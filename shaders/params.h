@@ -235,11 +235,13 @@
 
 // A stage of a Fourier transform along one axis (fft.comp). There are `across` lines of `padded`
 // elements, with `count` butterflies in each line. The elements of a butterfly are `step` apart.
-// Elements from `kept` on are not stored. The first stage pads the line: its first `extent`
-// elements are texels, and elements from `turn` on are positions before the first texel. The
-// product with a kernel with colours reads the frequency of the opposite sign. To find it, it needs
-// the radices of the rows' stages (`row_a` to `row_d`; `row_last` is the last one that is used),
-// the rows' number of elements, and the radices of the columns' stages without the last one.
+// Elements from `kept` on are not stored. The first stage pads the line: `extent` elements from
+// `first` on are texels, and elements from `turn` on are positions before the first texel. The
+// product is one with the kernel's spectrum; with its conjugate where `kernel_sign` is -1, which is
+// the transpose of the convolution. That with a kernel with colours reads the frequency of the
+// opposite sign. To find it, it needs the radices of the rows' stages (`row_a` to `row_d`;
+// `row_last` is the last one that is used), the rows' number of elements, and the radices of the
+// columns' stages without the last one.
 #define FFT_BLOCK(B, READS, INPUT, VEC4S) \
     INPUT(B, int, count) \
     INPUT(B, int, across) \
@@ -247,7 +249,9 @@
     INPUT(B, int, kept) \
     INPUT(B, int, padded) \
     INPUT(B, int, extent) \
+    INPUT(B, int, first) \
     INPUT(B, int, turn) \
+    INPUT(B, float, kernel_sign) \
     INPUT(B, int, row_length) \
     INPUT(B, int, row_a) \
     INPUT(B, int, row_b) \
@@ -262,8 +266,8 @@
     INPUT(B, float, prefilter_factor)
 
 // Writes the kernel into padded lines (fft_kernel.comp). For each axis: the kernel's number of
-// texels, how many of them before and after its centre count, the period of the line, and the place
-// of the centre. `grey`: all channels are equal.
+// texels, how many of them before and after its centre count, and the period of the line. `grey`:
+// all channels are equal.
 #define FFT_KERNEL_BLOCK(B, READS, INPUT, VEC4S) \
     INPUT(B, int, padded_x) \
     INPUT(B, int, boundary_x) \
@@ -271,14 +275,12 @@
     INPUT(B, int, period_x) \
     INPUT(B, int, before_x) \
     INPUT(B, int, after_x) \
-    INPUT(B, int, spread_x) \
     INPUT(B, int, padded_y) \
     INPUT(B, int, boundary_y) \
     INPUT(B, int, extent_y) \
     INPUT(B, int, period_y) \
     INPUT(B, int, before_y) \
     INPUT(B, int, after_y) \
-    INPUT(B, int, spread_y) \
     INPUT(B, int, grey) \
     INPUT(B, float, gain)
 

@@ -7,8 +7,7 @@ void vkb_graph_destroy(struct vkb_graph *graph)
 {
     vkb_free(graph->images);
     vkb_free(graph->passes);
-    vkb_free(graph->owned[0]);
-    vkb_free(graph->owned[1]);
+    vkb_free(graph->owned);
     for (uint32_t i = 0; i < graph->filter_count; ++i)
         vkb_free(graph->filters[i]);
     vkb_free(graph->filters);

@@ -180,7 +180,7 @@ struct vkb_graph {
     struct vkb_pass_row *passes;
     uint32_t image_count, pass_count;
     size_t image_capacity, pass_capacity;
-    void *owned[2];               // pixels of images, freed with the graph
+    void *owned;                  // pixels of an image, freed with the graph
     struct vkb_filter **filters;  // of its passes
     uint32_t filter_count;
     size_t filter_capacity;

@@ -123,11 +123,12 @@ static bool show_results(struct vkb_adjoint *adjoint, uint32_t image_count, stru
 
 bool vkb_build_adjoint(const struct vkb_source *source, const struct vkb_settings *settings,
                        const struct vkb_cotangents *cotangents, uint32_t max_side,
-                       struct vkb_graph *graph, uint32_t *first, bool *possible,
-                       struct vkb_error *error)
+                       struct vkb_transposes *transposes, struct vkb_graph *graph, uint32_t *first,
+                       bool *possible, struct vkb_error *error)
 {
     struct vkb_adjoint adjoint = {
         .graph = graph,
+        .table = {.transposes = transposes, .hash = VKB_HASH_START},
         .max_side = max_side,
         .sums = cotangents->sums,
         .scene = VKB_NO_IMAGE,

@@ -5,6 +5,7 @@
 
 #include "graph/graph.h"
 #include "methods/source.h"
+#include "passes/transposes.h"
 
 // The framebuffers with cotangents, which are the levels of the source.
 struct vkb_cotangents {
@@ -20,8 +21,8 @@ struct vkb_cotangents {
 // becomes false if a pass has no adjoint.
 bool vkb_build_adjoint(const struct vkb_source *source, const struct vkb_settings *settings,
                        const struct vkb_cotangents *cotangents, uint32_t max_side,
-                       struct vkb_graph *graph, uint32_t *first, bool *possible,
-                       struct vkb_error *error);
+                       struct vkb_transposes *transposes, struct vkb_graph *graph, uint32_t *first,
+                       bool *possible, struct vkb_error *error);
 
 struct vkb_adjoint;
 

@@ -1,6 +1,7 @@
 // Blender's Glare node: formulas of the compositor of Blender 5.0 (node_composite_glare.cc). From
 // the frame come the highlights, in the size of the quality; from these a glare of the same size,
 // by the type; and from this the bloom.
+#include "methods/convolution.h"
 #include "methods/methods.h"
 #include "passes/blur.h"
 #include "passes/levels.h"
@@ -215,7 +216,7 @@ static uint32_t add_convolution(struct vkb_levels *levels)
     highlights.glow = levels->downs[0];
     highlights.buffers = levels->sizes[0];
     levels->source = &highlights;
-    const uint32_t light = vkb_convolve(levels, &result, "", false);
+    const uint32_t light = vkb_convolve(levels, &result);
     levels->source = source;
     return light;
 }

@@ -43,13 +43,6 @@ void vkb_add_glare_stages(struct vkb_levels *levels, uint32_t *stages);
 // this image.
 uint32_t vkb_add_light_passes(struct vkb_levels *method, const uint32_t *stages, uint32_t bloom);
 
-// Adds the convolution of the source's glow with the kernel of the settings. `result` has the name
-// and the format of the image that it writes and returns, and whether this is a framebuffer. If it
-// spreads, zeros are beyond edges that are repeated, and the result has the places there, too, as
-// many on each side as the kernel reaches.
-uint32_t vkb_convolve(struct vkb_levels *levels, const struct vkb_image_row *result,
-                      const char *prefix, bool spreads);
-
 // Adds an iteration of a ray of streaks from `from`, with the numbers of a stage, into the image
 // `to`. `before`, if there is one, is added. `gain` is the sum of the taps' weights. `next`, if
 // there is one, has the bits of next_texel() for each tap.

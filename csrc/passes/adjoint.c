@@ -1,5 +1,7 @@
 #include "passes/adjoint.h"
 
+#include "passes/taps.h"
+
 #include <stdio.h>
 #include <string.h>
 

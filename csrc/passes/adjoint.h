@@ -5,7 +5,7 @@
 #define VKB_ADJOINT_H
 
 #include "passes/pass.h"
-#include "passes/taps.h"
+#include "passes/transposes.h"
 
 struct vkb_adjoint {
     struct vkb_graph *graph;

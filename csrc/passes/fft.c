@@ -140,12 +140,13 @@ struct vkb_pass_row vkb_fft_row(const struct vkb_graph *graph, const struct vkb_
     params->kept = (int)(horizontal ? target->width : target->height);
     params->padded = (int)axis->line.length;
     params->extent = (int)axis->extent;
+    params->first = stage->padded ? (int)axis->first : 0;
     params->turn = (int)(axis->extent + axis->before);
     return row;
 }
 
 void vkb_fft_multiply(const struct vkb_fft_axis *rows, const struct vkb_fft_axis *columns,
-                      uint32_t spectrum, bool grey, struct vkb_pass_row *row)
+                      uint32_t spectrum, bool grey, bool conjugate, struct vkb_pass_row *row)
 {
     const uint32_t *row_radices = rows->line.radices;
     const uint32_t last = row_radices[rows->line.stage_count - 1];
@@ -155,6 +156,7 @@ void vkb_fft_multiply(const struct vkb_fft_axis *rows, const struct vkb_fft_axis
     blocks[columns->line.stage_count - 1] = 1;
     row->reads[SLOT_SPECTRUM] = spectrum;
     row->constants.stage = grey ? STAGE_GREY : STAGE_PRODUCT;
+    row->params.fft.kernel_sign = conjugate ? -1.0f : 1.0f;
     if (grey)
         return;
     row->params.fft.row_length = (int)rows->line.length;

@@ -27,6 +27,7 @@ struct vkb_fft_axis {
     enum vkb_boundary boundary;  // not wrap_x
     uint32_t extent;             // texels of the image along the axis
     uint32_t before;             // of which a kernel reaches so many on one side
+    uint32_t first;              // elements before the first texel; above 0 only with zeros beyond
     struct vkb_fft_line line;
 };
 
@@ -44,9 +45,9 @@ struct vkb_fft_stage {
 
 struct vkb_pass_row vkb_fft_row(const struct vkb_graph *graph, const struct vkb_fft_stage *stage);
 
-// Makes a product with the spectrum of a kernel of the last stage along columns, and of the first
-// stage back.
+// Makes a product with the spectrum of a kernel, or with its conjugate, of the last stage along
+// columns, and of the first stage back.
 void vkb_fft_multiply(const struct vkb_fft_axis *rows, const struct vkb_fft_axis *columns,
-                      uint32_t spectrum, bool grey, struct vkb_pass_row *row);
+                      uint32_t spectrum, bool grey, bool conjugate, struct vkb_pass_row *row);
 
 #endif

@@ -3,9 +3,6 @@
 #include <math.h>
 #include <string.h>
 
-// Floats count up to this number.
-enum { MAX_TEXELS = 1 << 24 };
-
 double vkb_axis_readers(const struct vkb_axis *axis)
 {
     double low = 0.0, high = 0.0;
@@ -237,38 +234,37 @@ static void write_weights(const struct vkb_axis *axis, uint32_t block, uint32_t 
     }
 }
 
-// Adds entries, and a list of weights for each block that differs from the one before.
-static bool write_table(const struct vkb_axis *axis, uint32_t kernels, uint32_t span,
-                        const struct readers *readers, double (*weights)[MAX_KERNELS],
-                        struct vkb_table *table, struct vkb_error *error)
+// Writes entries, and a list of weights for each block that differs from the one before. Places
+// count from the first entry.
+static bool write_table(const struct vkb_axis *axis, uint32_t kernels, const struct readers *readers,
+                        double (*weights)[MAX_KERNELS], struct vkb_transposed *found,
+                        struct vkb_error *error)
 {
-    const size_t start = table->count, size = (size_t)span * kernels;
-    size_t place = 0;
+    const size_t size = (size_t)found->readers.span * kernels;
+    size_t capacity = 0, place = 0;
 
-    table->count += axis->from;
+    found->count = axis->from;
     for (uint32_t block = 0; block < axis->from; block += ADJOINT_SIDE) {
         const uint32_t first = readers_of_block(axis, readers, block).first;
-        if (!vkb_grow(error, &table->texels, &table->capacity, table->count + size,
-                      sizeof *table->texels))
+        if (!vkb_grow(error, &found->texels, &capacity, found->count + size,
+                      sizeof *found->texels))
             return false;
-        float (*list)[4] = table->texels + table->count;
+        float (*list)[4] = found->texels + found->count;
         memset(list, 0, size * sizeof *list);
         write_weights(axis, block, first, kernels, readers, weights, list);
-        if (!place || memcmp(table->texels[place], list, size * sizeof *list) != 0) {
-            place = table->count;
-            table->count += size;
+        if (!place || memcmp(found->texels[place], list, size * sizeof *list) != 0) {
+            place = found->count;
+            found->count += size;
         }
         for (uint32_t texel = block; texel < block + ADJOINT_SIDE && texel < axis->from; ++texel) {
-            float *entry = table->texels[start + texel];
+            float *entry = found->texels[texel];
             entry[0] = (float)(axis->first + readers[texel].first);
             entry[1] = (float)(readers[texel].end - readers[texel].first);
             entry[2] = (float)place;
             entry[3] = (float)(axis->first + first);
         }
     }
-    return table->count <= MAX_TEXELS
-        || vkb_fail(error, VKB_ERROR_VALUE, "derivatives: filters need %zu weights, more than %d",
-                    table->count, MAX_TEXELS);
+    return true;
 }
 
 // The most readers of a texel; too many for tiles where those of a texel begin before those of the
@@ -313,10 +309,9 @@ static float weight_in(const struct readers *readers, uint32_t texel, int32_t pi
 
 // Takes the weights in the middle of the axis, and compares those of the other texels with them.
 // Those of ghosts differ.
-static void find_inner(struct vkb_axis *axis, const struct readers *readers,
-                       double (*weights)[MAX_KERNELS])
+static void find_inner(const struct vkb_axis *axis, const struct readers *readers,
+                       double (*weights)[MAX_KERNELS], struct vkb_readers *found)
 {
-    struct vkb_readers *found = &axis->readers;
     const int32_t ratio = vkb_ratio_of(axis->to, axis->from), window = found->window;
     const uint32_t middle = axis->from / 2 & ~1u;
 
@@ -343,60 +338,24 @@ void vkb_axis_keep(struct vkb_axis *axis)
     axis->readers = (struct vkb_readers){.start = -1, .span = 1, .most = 1, .window = 1};
 }
 
-bool vkb_axis_transpose(struct vkb_axis *axis, uint32_t kernels, struct vkb_table *table,
-                        struct vkb_error *error)
+bool vkb_axis_build(const struct vkb_axis *axis, uint32_t kernels, struct vkb_transposed *found,
+                    struct vkb_error *error)
 {
     struct readers *readers = vkb_alloc(error, axis->from, sizeof *readers);
     double (*weights)[MAX_KERNELS] =
         readers ? vkb_alloc(error, find_readers(axis, readers), sizeof *weights) : NULL;
     bool done = weights != NULL;
 
-    axis->readers = (struct vkb_readers){.start = (int32_t)table->count};
     if (done) {
-        struct vkb_readers *found = &axis->readers;
         add_weights(axis, readers, weights);
-        found->span = (int32_t)most_of_blocks(axis, readers);
-        found->most = most_readers(axis, readers);
-        found->window = find_window(axis, readers, found->most);
+        found->readers.span = (int32_t)most_of_blocks(axis, readers);
+        found->readers.most = most_readers(axis, readers);
+        found->readers.window = find_window(axis, readers, found->readers.most);
         if (kernels == 1)
-            find_inner(axis, readers, weights);
-        done = write_table(axis, kernels, (uint32_t)found->span, readers, weights, table, error);
+            find_inner(axis, readers, weights, &found->readers);
+        done = write_table(axis, kernels, readers, weights, found, error);
     }
     vkb_free(weights);
     vkb_free(readers);
-    return done;
-}
-
-// Texels are four words of 32 bits, taken by two.
-static uint64_t hash_of(const struct vkb_table *table)
-{
-    uint64_t hash = VKB_HASH_START;
-
-    for (size_t i = 0; i < 2 * table->count; ++i) {
-        uint64_t word;
-        memcpy(&word, &table->texels[i / 2][i % 2 * 2], sizeof word);
-        hash = vkb_hash_word(hash, word);
-    }
-    return hash ? hash : 1;
-}
-
-bool vkb_table_end(struct vkb_table *table, struct vkb_graph *graph, uint32_t image,
-                   struct vkb_error *error)
-{
-    const size_t rows = table->count / TABLE_WIDTH + 1, texels = rows * TABLE_WIDTH;
-    struct vkb_image_row *row = &graph->images[image];
-    const bool done =
-        vkb_grow(error, &table->texels, &table->capacity, texels, sizeof *table->texels);
-
-    if (done) {
-        memset(table->texels[table->count], 0, (texels - table->count) * sizeof *table->texels);
-        table->count = texels;
-        row->height = (uint32_t)rows;
-        row->serial = hash_of(table);
-        row->pixels = graph->owned[0] = table->texels;
-    } else {
-        vkb_free(table->texels);
-    }
-    *table = (struct vkb_table){0};
     return done;
 }

@@ -10,22 +10,23 @@
 
 #include "graph/graph.h"
 
-struct vkb_table {
+// The transpose of an axis: its table, whose places count from its first texel, and its readers.
+struct vkb_transposed {
+    struct vkb_transposed *next;
+    double *description;  // of the axis (passes/transposes.c)
+    size_t described;     // numbers of it
+    uint64_t hash;        // of the description
     float (*texels)[4];
-    size_t count, capacity;
+    size_t count;
+    struct vkb_readers readers;
 };
-
-// Fills the rest of the last row of the table, and gives its texels to the graph as the pixels of
-// the image. On failure they are freed.
-bool vkb_table_end(struct vkb_table *table, struct vkb_graph *graph, uint32_t image,
-                   struct vkb_error *error);
 
 // About how many pixels read a texel.
 double vkb_axis_readers(const struct vkb_axis *axis);
 
-// Adds the transpose of an axis to the table, and finds its readers.
-bool vkb_axis_transpose(struct vkb_axis *axis, uint32_t kernels, struct vkb_table *table,
-                        struct vkb_error *error);
+// Computes the table and the readers. On failure the caller frees what is there.
+bool vkb_axis_build(const struct vkb_axis *axis, uint32_t kernels, struct vkb_transposed *found,
+                    struct vkb_error *error);
 // The readers of an axis that a pass keeps.
 void vkb_axis_keep(struct vkb_axis *axis);
 

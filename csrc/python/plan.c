@@ -10,6 +10,7 @@
 
 // The derivatives that a plan is of.
 struct portion {
+    struct vkb_renderer *renderer;  // keeps transposes for the next plan
     const struct vkb_cotangents *cotangents;
     uint32_t first;    // of the images of derivatives
     bool is_possible;  // whether all passes have adjoints
@@ -159,6 +160,20 @@ static bool layer_graph(const struct vkb_device *device, struct vkb_graph *graph
     return vkb_graph_layer(graph, error);
 }
 
+static bool build_adjoint(const struct vkb_source *source, const struct vkb_settings *settings,
+                          uint32_t max_side, struct portion *portion, struct vkb_graph *graph,
+                          struct vkb_error *error)
+{
+    struct vkb_renderer *renderer = portion->renderer;
+
+    VKB_LOCK(renderer->guard);
+    const bool built =
+        vkb_build_adjoint(source, settings, portion->cotangents, max_side, &renderer->transposes,
+                          graph, &portion->first, &portion->is_possible, error);
+    VKB_UNLOCK(renderer->guard);
+    return built;
+}
+
 // `portion` may be NULL.
 static bool build_graph(const struct vkb_device *device, enum vkb_variants variants,
                         const struct vkb_source *source, const struct vkb_settings *settings,
@@ -166,8 +181,7 @@ static bool build_graph(const struct vkb_device *device, enum vkb_variants varia
 {
     graph->max_width = device->max_side;
     const bool built =
-        (portion ? vkb_build_adjoint(source, settings, portion->cotangents, device->max_side, graph,
-                                     &portion->first, &portion->is_possible, error)
+        (portion ? build_adjoint(source, settings, device->max_side, portion, graph, error)
                  : vkb_source_build(source, settings, device->max_side, graph, error))
         // Variants divide by the sizes of images, and add images of their own.
         && vkb_graph_check_sizes(graph, device->max_side, error)
@@ -269,11 +283,11 @@ static bool read_cotangents(PyObject *tuple, struct vkb_cotangents *cotangents)
 
 PyObject *vkb_renderer_plan(PyObject *object, PyObject *arguments)
 {
-    const struct vkb_renderer *renderer = (const struct vkb_renderer *)object;
+    struct vkb_renderer *renderer = (struct vkb_renderer *)object;
     const struct vkb_module_state *state = PyType_GetModuleState(Py_TYPE(object));
     PyObject *source, *settings_object, *names, *cotangents = NULL;
     struct vkb_cotangents given;
-    struct portion portion = {.cotangents = &given, .is_possible = true};
+    struct portion portion = {.renderer = renderer, .cotangents = &given, .is_possible = true};
     struct vkb_settings settings;
     struct vkb_error error = {0};
     int sums = false;

@@ -105,6 +105,13 @@ static void close_memory(struct vkb_renderer *self, bool settled)
         vkb_release_exports(exports);
 }
 
+static void drop_transposes(struct vkb_renderer *self)
+{
+    VKB_LOCK(self->guard);
+    vkb_transposes_destroy(&self->transposes);
+    VKB_UNLOCK(self->guard);
+}
+
 // Streams of CUDA may still wait for the device, which has finished everything. False: some may
 // wait afterwards, too.
 static bool end_waits(struct vkb_renderer *self)
@@ -142,6 +149,7 @@ static bool destroy(struct vkb_renderer *self, struct vkb_error *error)
     PyEval_RestoreThread(self->thread);
     const bool settled = end_waits(self);
     close_memory(self, settled);
+    drop_transposes(self);
     self->thread = PyEval_SaveThread();
     vkb_device_destroy(&self->device);
     return vkb_messages_check(&self->device.messages, error);
@@ -183,6 +191,8 @@ static void dealloc(PyObject *object)
     vkb_renderer_release_finished(self);
     if (self->pages)
         close_memory(self, true);
+    // A plan that began before close() may have made some.
+    drop_transposes(self);
     if (self->lock)
         PyThread_free_lock(self->lock);
     vkb_free_object(object);
@@ -259,6 +269,17 @@ static PyObject *get_instance(PyObject *object, void *unused)
     return handle ? PyLong_FromVoidPtr(handle) : vkb_raise(state_of(object), &error);
 }
 
+static PyObject *get_transpose_count(PyObject *object, void *unused)
+{
+    struct vkb_renderer *self = (struct vkb_renderer *)object;
+
+    (void)unused;
+    VKB_LOCK(self->guard);
+    const size_t count = self->transposes.built;
+    VKB_UNLOCK(self->guard);
+    return PyLong_FromSize_t(count);
+}
+
 static PyObject *get_pipeline_count(PyObject *object, void *unused)
 {
     struct vkb_renderer *self = (struct vkb_renderer *)object;
@@ -329,6 +350,7 @@ static PyGetSetDef attributes[] = {
     {"info", get_info, NULL, "The adapter, as adapters() describes it.", NULL},
     {"instance", get_instance, NULL, "The VkInstance, if it is open.", NULL},
     {"pipeline_count", get_pipeline_count, NULL, "Pipelines created so far.", NULL},
+    {"transpose_count", get_transpose_count, NULL, "Transposes of axes computed so far.", NULL},
     {"cached", get_cached, NULL, "(pipelines, bytes of images) that are kept for later frames.",
      NULL},
     {0},

@@ -5,6 +5,7 @@
 #include "python/objects.h"
 
 #include "execute/frame.h"
+#include "passes/transposes.h"
 #include "python/guard.h"
 #include "variants/variants.h"
 #include "vulkan/process.h"
@@ -45,10 +46,11 @@ struct vkb_renderer {
     VKB_ATOMIC(struct vkb_residents *) residents;  // of handles; NULL: closed
     // Of arrays that CUDA shares; NULL: none so far, or closed.
     VKB_ATOMIC(struct vkb_exports *) exports;
-    VKB_GUARD(guard)  // of the next three
+    VKB_GUARD(guard)  // of the next four
     struct vkb_pending *abandoned;
     size_t pipeline_count;  // created so far
     struct vkb_cached cached;
+    struct vkb_transposes transposes;  // of plans of derivatives
     enum vkb_variants variants;
     struct vkb_device device;
     struct vkb_frame frame;

@@ -116,6 +116,7 @@ static struct vkb_pass_row make_row(const struct vkb_variant_choice *choice,
         if (pass->constants.stage == STAGE_PRODUCT || pass->constants.stage == STAGE_GREY) {
             row.constants.stage = STAGE_PRODUCT;
             row.reads[SLOT_SPECTRUM] = pass->reads[SLOT_SPECTRUM];
+            row.params.fft.kernel_sign = pass->params.fft.kernel_sign;
         }
     row.constants.rotated = 0;
     row.params.fft.padded = (int)length;

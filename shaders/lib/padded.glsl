@@ -13,15 +13,16 @@ vec4 glow_of(vec4 texel)
 // it is from `turn` on.
 vec4 load_padded(int along, int across)
 {
-    bool inside = along < params.extent, behind = along < params.turn;
-    int place = along;
+    int texel_place = along - params.first;
+    bool inside = texel_place >= 0 && texel_place < params.extent, behind = along < params.turn;
+    int place;
     if (BOUNDARY == BOUNDARY_WRAP)
         place = behind ? along - params.extent : along - params.padded + params.extent;
     else if (BOUNDARY == BOUNDARY_MIRROR)
         place = behind ? 2 * params.extent - 1 - along : params.padded - 1 - along;
     else
         place = behind ? params.extent - 1 : 0;
-    place = inside ? along : clamp(place, 0, params.extent - 1);
+    place = inside ? texel_place : clamp(place, 0, params.extent - 1);
     vec4 texel = load_source(texel_at(place, across));
     return inside || BOUNDARY != BOUNDARY_ZERO ? texel : vec4(0.0);
 }

@@ -269,9 +269,10 @@ void store_separated(int number, int across)
 void multiply_each(int number, int across)
 {
     vec4 values[FFT_MAX_RADIX];
+    vec4 signs = vec2(1.0, params.kernel_sign).xyxy;
     [[unroll]] for (int i = 0; i < LAST_RADIX; ++i) {
         vec4 value = held[place_of(i, LAST_RADIX)];
-        vec4 by = load_factor(ivec2(across, place_in_line(number, i, LAST_RADIX)));
+        vec4 by = signs * load_factor(ivec2(across, place_in_line(number, i, LAST_RADIX)));
         values[i] = vec4(product(value.xy, by.xy), product(value.zw, by.zw));
     }
     [[unroll]] for (int i = 0; i < LAST_RADIX; ++i)
@@ -329,6 +330,8 @@ void multiply(int block, int index)
     int other_block = mirrored(block, blocks, params.count);
     int frequency = frequency_at(across, rows), other = (params.row_length - frequency) % params.row_length;
     bool own = block == 0;
+    // The conjugate spectrum of a real channel is that at the opposite frequency.
+    bool conjugates = params.kernel_sign < 0.0;
     vec4 values[FFT_MAX_RADIX], others[FFT_MAX_RADIX];
 
     if (frequency > other || (frequency == other && block > other_block))
@@ -343,9 +346,9 @@ void multiply(int block, int index)
     [[unroll]] for (int i = 0; i < RADIX; ++i) {
         int j = RADIX - 1 - i, own_j = (RADIX - i) % RADIX;
         vec4 mirror = own ? held[place_of(own_j, RADIX)] : held[place_of(j, RADIX)];
-        vec4 kernel = load_factor(texel_at(block * RADIX + i, across));
-        vec4 kernel_mirror =
-            load_factor(texel_at(other_block * RADIX + (own ? own_j : j), other_across));
+        vec4 here = load_factor(texel_at(block * RADIX + i, across));
+        vec4 there = load_factor(texel_at(other_block * RADIX + (own ? own_j : j), other_across));
+        vec4 kernel = conjugates ? there : here, kernel_mirror = conjugates ? here : there;
         others[i] = channels(mirror, values[i], kernel_mirror, kernel);
         values[i] = channels(values[i], mirror, kernel, kernel_mirror);
     }

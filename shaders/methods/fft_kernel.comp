@@ -1,5 +1,5 @@
 // The kernel of a convolution at the places of the padded lines: its point at 0, what lies before it at
-// the end. One that spreads beyond the edges begins at 0. Values whose light comes from the same place are added: beyond an edge all of them, with a
+// the end. Values whose light comes from the same place are added: beyond an edge all of them, with a
 // period those that are whole periods apart.
 
 UNIFORM_BLOCK(FFT_KERNEL_BLOCK);
@@ -9,9 +9,9 @@ SAMPLED_IMAGE(SLOT_SOURCE, kernel);
 layout(set = 0, binding = TARGET_BINDING) uniform writeonly image2D target;
 
 // First, last and step of the kernel's places along one axis.
-ivec3 places(int along, int padded, int boundary, int extent, int period, int before, int after, int spread)
+ivec3 places(int along, int padded, int boundary, int extent, int period, int before, int after)
 {
-    int moved = along - spread, offset = moved <= after ? moved : moved - padded, centre = extent / 2;
+    int offset = along <= after ? along : along - padded, centre = extent / 2;
     ivec3 found = ivec3(centre + offset, centre + offset, 1);
     if (offset < -before)
         return ivec3(0, -1, 1);
@@ -30,9 +30,9 @@ void main()
     if (any(greaterThanEqual(at, imageSize(target))))
         return;
     ivec3 x = places(at.x, params.padded_x, params.boundary_x, params.extent_x, params.period_x,
-                     params.before_x, params.after_x, params.spread_x);
+                     params.before_x, params.after_x);
     ivec3 y = places(at.y, params.padded_y, params.boundary_y, params.extent_y, params.period_y,
-                     params.before_y, params.after_y, params.spread_y);
+                     params.before_y, params.after_y);
     vec4 sum = vec4(0.0);
     for (int j = y.x; j <= y.y; j += y.z)
         for (int i = x.x; i <= x.y; i += x.z)

@@ -1,0 +1,187 @@
+#include "passes/transposes.h"
+
+#include "passes/taps.h"
+
+#include <string.h>
+
+// Floats count up to this number.
+enum { MAX_TEXELS = 1 << 24 };
+// Of the transposes that are kept. All presets at 3840 x 2160 have less than half of it.
+static const size_t MAX_KEPT_BYTES = (size_t)32 << 20;
+
+enum {
+    AXIS_NUMBERS = 10,
+    TAP_NUMBERS = 1 + MAX_KERNELS,
+    MAX_LONG_TAPS = 2 * MAX_WEIGHTS - 1,
+    MAX_NUMBERS = AXIS_NUMBERS + TAP_NUMBERS * MAX_LONG_TAPS,
+};
+_Static_assert((int)VKB_MAX_TAPS <= (int)MAX_LONG_TAPS, "a description has space for all taps");
+
+// All that a transpose follows from, as numbers. Returns how many there are.
+static size_t describe(const struct vkb_axis *axis, uint32_t kernels, double *numbers)
+{
+    const double of_axis[AXIS_NUMBERS] = {
+        axis->from,   axis->to,        axis->origin, axis->step, axis->kind, axis->border,
+        axis->next,   axis->backwards, axis->first,  kernels,
+    };
+    const uint32_t count = vkb_axis_count(axis);
+
+    memcpy(numbers, of_axis, sizeof of_axis);
+    for (uint32_t i = 0; i < count; ++i) {
+        const struct vkb_tap tap = vkb_axis_tap(axis, i);
+        double *of_tap = numbers + AXIS_NUMBERS + (size_t)i * TAP_NUMBERS;
+        of_tap[0] = tap.offset;
+        memcpy(of_tap + 1, tap.weights, sizeof tap.weights);
+    }
+    return AXIS_NUMBERS + (size_t)count * TAP_NUMBERS;
+}
+
+// By half words: the upper bits of a double would change the upper bits of the hash only.
+static uint64_t hash_of(const double *numbers, size_t count)
+{
+    uint64_t hash = VKB_HASH_START;
+
+    for (size_t i = 0; i < count; ++i) {
+        uint64_t bits;
+        memcpy(&bits, &numbers[i], sizeof bits);
+        hash = vkb_hash_word(vkb_hash_word(hash, bits >> 32), bits & UINT32_MAX);
+    }
+    return hash;
+}
+
+static void destroy(struct vkb_transposed *transposed)
+{
+    vkb_free(transposed->description);
+    vkb_free(transposed->texels);
+    vkb_free(transposed);
+}
+
+static size_t size_of(const struct vkb_transposed *transposed)
+{
+    return sizeof *transposed + transposed->described * sizeof(double)
+         + transposed->count * sizeof *transposed->texels;
+}
+
+// Destroys the oldest ones: what is beyond so many bytes.
+static void trim(struct vkb_transposes *transposes, size_t most)
+{
+    struct vkb_transposed **link = &transposes->newest;
+    size_t newer = 0;
+
+    if (transposes->bytes <= most)
+        return;
+    while (*link && newer + size_of(*link) <= most) {
+        newer += size_of(*link);
+        link = &(*link)->next;
+    }
+    while (*link) {
+        struct vkb_transposed *old = *link;
+        *link = old->next;
+        destroy(old);
+    }
+    transposes->bytes = newer;
+}
+
+void vkb_transposes_destroy(struct vkb_transposes *transposes)
+{
+    trim(transposes, 0);
+}
+
+static struct vkb_transposed *build(const struct vkb_axis *axis, uint32_t kernels,
+                                    const double *numbers, size_t count, struct vkb_error *error)
+{
+    struct vkb_transposed *built = vkb_alloc(error, 1, sizeof *built);
+
+    if (!built)
+        return NULL;
+    built->description = vkb_alloc(error, count, sizeof *numbers);
+    if (!built->description || !vkb_axis_build(axis, kernels, built, error)) {
+        destroy(built);
+        return NULL;
+    }
+    memcpy(built->description, numbers, count * sizeof *numbers);
+    built->described = count;
+    return built;
+}
+
+// The transpose of an axis, which becomes the newest one; NULL on failure.
+static const struct vkb_transposed *find(struct vkb_transposes *transposes,
+                                         const struct vkb_axis *axis, uint32_t kernels,
+                                         struct vkb_error *error)
+{
+    double numbers[MAX_NUMBERS];
+    const size_t count = describe(axis, kernels, numbers);
+    const uint64_t hash = hash_of(numbers, count);
+    struct vkb_transposed **link = &transposes->newest;
+
+    while (*link
+           && ((*link)->hash != hash || (*link)->described != count
+               || memcmp((*link)->description, numbers, count * sizeof *numbers) != 0))
+        link = &(*link)->next;
+    struct vkb_transposed *found = *link;
+    if (found) {
+        *link = found->next;
+    } else {
+        found = build(axis, kernels, numbers, count, error);
+        if (!found)
+            return NULL;
+        found->hash = hash;
+        transposes->bytes += size_of(found);
+        ++transposes->built;
+    }
+    found->next = transposes->newest;
+    transposes->newest = found;
+    return found;
+}
+
+// Places count from the first texel of the table.
+static void append(const struct vkb_transposed *transposed, uint32_t entries,
+                   struct vkb_table *table)
+{
+    float (*texels)[4] = table->texels + table->count;
+
+    memcpy(texels, transposed->texels, transposed->count * sizeof *texels);
+    for (uint32_t i = 0; i < entries; ++i)
+        texels[i][2] += (float)table->count;
+    table->count += transposed->count;
+    table->hash = vkb_hash_word(table->hash, transposed->hash);
+}
+
+bool vkb_axis_transpose(struct vkb_axis *axis, uint32_t kernels, struct vkb_table *table,
+                        struct vkb_error *error)
+{
+    const struct vkb_transposed *found = find(table->transposes, axis, kernels, error);
+
+    if (!found)
+        return false;
+    const size_t count = table->count + found->count;
+    if (count > MAX_TEXELS)
+        vkb_fail(error, VKB_ERROR_VALUE, "derivatives: filters need %zu weights, more than %d",
+                 count, MAX_TEXELS);
+    const bool done = count <= MAX_TEXELS
+                   && vkb_grow(error, &table->texels, &table->capacity, count,
+                               sizeof *table->texels);
+    if (done) {
+        axis->readers = found->readers;
+        axis->readers.start = (int32_t)table->count;
+        append(found, axis->from, table);
+    }
+    trim(table->transposes, MAX_KEPT_BYTES);
+    return done;
+}
+
+bool vkb_table_end(struct vkb_table *table, struct vkb_graph *graph, uint32_t image,
+                   struct vkb_error *error)
+{
+    const size_t rows = table->count / TABLE_WIDTH + 1, texels = rows * TABLE_WIDTH;
+    struct vkb_image_row *row = &graph->images[image];
+
+    if (!vkb_grow(error, &table->texels, &table->capacity, texels, sizeof *table->texels))
+        return false;
+    memset(table->texels[table->count], 0, (texels - table->count) * sizeof *table->texels);
+    row->height = (uint32_t)rows;
+    row->serial = table->hash ? table->hash : 1;
+    row->pixels = graph->owned = table->texels;
+    table->texels = NULL;
+    return true;
+}

@@ -1,0 +1,36 @@
+// Transposes of axes, each computed once, and the table of a graph, which has those of its filters.
+#ifndef VKB_TRANSPOSES_H
+#define VKB_TRANSPOSES_H
+
+#include "graph/graph.h"
+
+struct vkb_transposed;
+
+// The transposes that were used last, the newest first. The owner sees to it that one thread at a
+// time uses them.
+struct vkb_transposes {
+    struct vkb_transposed *newest;
+    size_t bytes;
+    size_t built;  // so far
+};
+
+void vkb_transposes_destroy(struct vkb_transposes *transposes);
+
+// The texels of all axes, one after the other, and the hash of their descriptions.
+struct vkb_table {
+    struct vkb_transposes *transposes;
+    float (*texels)[4];
+    size_t count, capacity;
+    uint64_t hash;
+};
+
+// Adds the transpose of an axis to the table, and sets its readers.
+bool vkb_axis_transpose(struct vkb_axis *axis, uint32_t kernels, struct vkb_table *table,
+                        struct vkb_error *error);
+
+// Fills the rest of the last row of the table, and gives its texels to the graph as the pixels of
+// the image.
+bool vkb_table_end(struct vkb_table *table, struct vkb_graph *graph, uint32_t image,
+                   struct vkb_error *error);
+
+#endif
