@@ -94,6 +94,5 @@ bool vkb_source_matches(const struct vkb_source *planned, const struct vkb_sourc
 
 bool vkb_source_fits(const struct vkb_source *planned, const struct vkb_source *given)
 {
-    return given->kind == VKB_SOURCE_IMAGE && vkb_source_matches(planned, given)
-        && given->image.level_count == 0;
+    return given->kind == VKB_SOURCE_IMAGE && vkb_source_matches(planned, given);
 }

@@ -13,6 +13,7 @@ from typing import Any, Final, NamedTuple, cast
 import numpy as np
 
 from vkbloom._checks import check_mask, import_extra
+from vkbloom._gradients.passes import in_floats
 from vkbloom._gradients.pulling import pull_each, pullback_of
 from vkbloom._renderer.default import default_renderer, renderer_on
 from vkbloom._renderer.device_arrays import DeviceArray, merged, take
@@ -86,14 +87,10 @@ def _settings(text: str) -> Settings:
     return Settings.from_json(text)
 
 
-@functools.lru_cache(64)
-def _in_floats(text: str) -> Settings:
-    """Return settings whose bloom buffers are floats; the same object, whose plan is kept."""
-    return _settings(text).replace(format="rgba32float")
-
-
 def replaced(settings: Settings, values: Mapping[str, Any]) -> Settings:
     """Return settings with the values of tensors."""
+    if not values:
+        return settings
     return settings.replace(
         **{name: _field_value(value.detach().cpu().tolist()) for name, value in values.items()}
     )
@@ -253,7 +250,7 @@ def _bloom(*given: Any) -> Any:
             final[index] = reference_apply(pixels, chosen, **arrays)["final"]
         else:
             frames = _renderer(call.renderer).apply(
-                pixels, chosen.replace(format="rgba32float"), framebuffers="final", **arrays
+                pixels, in_floats(chosen), framebuffers="final", **arrays
             )
             final[index] = frames["final"]
     return torch.from_numpy(final).to(image.device)
@@ -261,9 +258,7 @@ def _bloom(*given: Any) -> Any:
 
 def _on_device(call: _Call) -> Any:
     """Run the operator without the host; a batch without masks changes the context once."""
-    settings = _in_floats(call.settings)
-    if call.names:
-        settings = replaced(settings, call.fields)
+    settings = replaced(in_floats(_settings(call.settings)), call.fields)
     renderer, images = _renderer(call.renderer, call.image), _batch(call.image)
     if call.mask is None and call.emission is None and len(images) > 1:
         frames = renderer.map(images, settings, framebuffers="final")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final, cast
@@ -99,7 +100,9 @@ class Passes:
         if any(len(level.shape) != 3 or level.shape[2] not in (3, 4) for level in levels):
             return None
         source = self.inputs.source(levels)
-        plan = core.plan(source, self.settings, None, tuple(self.cotangents), sums)
+        plan = self.renderer._plan_derivatives(
+            source, self.settings, tuple(self.cotangents), sums=sums
+        )
         if plan is None:
             return None
         destination: Destination = "host" if sums else self.destination
@@ -129,10 +132,16 @@ def _level(cotangent: NDArray[Any] | ImportedArray) -> NDArray[Any] | ImportedAr
     return np.ascontiguousarray(cotangent, np.float32)
 
 
+@functools.lru_cache(64)
+def in_floats(settings: Settings) -> Settings:
+    """Return settings whose bloom buffers are floats; the same object, whose plan is kept."""
+    return settings.replace(format="rgba32float")
+
+
 def on_device(renderer: Renderer, settings: Settings) -> bool:
     """Return whether the device has passes for the derivative of "final" by an image with alpha."""
     pixels = np.zeros((32, 40, 4), np.float32)
-    floats = settings.replace(format="rgba32float")
+    floats = in_floats(settings)
     return Passes(renderer, Inputs(pixels), floats, {"final": pixels}).submit() is not None
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom._argument_types import checked
-from vkbloom._gradients.passes import DeviceGradients, Passes, check_finite
+from vkbloom._gradients.passes import DeviceGradients, Passes, check_finite, in_floats
 from vkbloom._methods.separable import Separable
 from vkbloom._renderer.default import default_renderer
 from vkbloom._renderer.device_arrays import ImportedArray, on_cuda, on_host, place_of, placed, take
@@ -111,7 +111,7 @@ def vjp(
         source = inputs.source()
         shape, dtype = source.kind
         uploaded = Image(source, shape, np.dtype(dtype))
-    floats = settings.replace(format="rgba32float")
+    floats = in_floats(settings)
     frames = renderer.apply(uploaded, floats, device=device)
     shapes = {name: Shape(part.shape) for name, part in frames.items()}
     destination = place_of(next(iter(frames.values())))
@@ -205,11 +205,9 @@ def _starter(
     renderer: Renderer, inputs: Inputs, settings: Settings, destination: Destination
 ) -> Callable[[Checked], Callable[[], Derivatives]]:
     """Return a function that submits passes, and returns one that waits for the derivatives."""
-    floats = settings.replace(format="rgba32float")
+    floats = in_floats(settings)
     recorded = functools.cache(lambda: reference_vjp(settings=settings, **inputs.on_host())[1])
-    names = (*inputs.named(), *differentiable(settings))
-    if settings.bloom and callable(getattr(settings, "kernel", None)):
-        names += ("kernel",)
+    names = (*inputs.named(), *_names(settings))
 
     def by_reference(cotangents: Checked) -> Gradients:
         check_finite(cotangents)
@@ -230,6 +228,13 @@ def _starter(
         return end
 
     return start
+
+
+@functools.lru_cache(64)
+def _names(settings: Settings) -> tuple[str, ...]:
+    """Return the names of the derivatives that are not by images."""
+    has_kernel = settings.bloom and callable(getattr(settings, "kernel", None))
+    return (*differentiable(settings), *(("kernel",) if has_kernel else ()))
 
 
 def _placed(

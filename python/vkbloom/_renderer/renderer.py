@@ -263,7 +263,8 @@ class Renderer:
         if self.info.bundled and (sha256 := bundled_hash()):
             self._made_by["driver_sha256"] = sha256
         self._saved_pipelines = 0
-        self._planned: tuple[Settings, tuple[str, ...] | None, _core.Plan] | None = None
+        # The last plan of frames (None), of derivatives by images (False) and of sums (True).
+        self._planned: dict[bool | None, tuple[Settings, Any, _core.Plan]] = {}
         self._pending = requests.PendingSubmissions()
         self._batches = Batches(self._core, self._pending)
         # What map has checked last.
@@ -279,7 +280,8 @@ class Renderer:
 
     def close(self) -> None:
         """Release the device and everything on it. May be called twice."""
-        self._planned = self._kept = None
+        self._planned = {}
+        self._kept = None
         try:
             self._pending.wait()
         except ValueError:  # the device belongs to the process that this one was forked from
@@ -757,13 +759,32 @@ class Renderer:
 
         For small images, making a plan takes most of the time of a call.
         """
-        if (planned := self._planned) is not None:
-            last, last_names, plan = planned
-            if last is settings and last_names == names and plan.is_of_image(source):
+        return cast("_core.Plan", self._kept_plan(source, settings, names))
+
+    def _plan_derivatives(
+        self, source: _core.Source, settings: Settings, cotangents: tuple[str, ...], *, sums: bool
+    ) -> _core.Plan | None:
+        """Return the plan of derivatives, or None if a pass has none; the last one if it fits."""
+        return self._kept_plan(source, settings, None, cotangents, sums)
+
+    def _kept_plan(
+        self,
+        source: _core.Source,
+        settings: Settings,
+        names: tuple[str, ...] | None,
+        *derivatives: Any,
+    ) -> _core.Plan | None:
+        kind = derivatives[-1] if derivatives else None
+        last, wanted, plan = self._planned.get(kind, (None, None, None))
+        if plan and last is settings and wanted == (names, derivatives):
+            if plan.is_of_image(source):
                 return plan
-        plan = self._core.plan(source, settings, names)
-        self._planned = None if settings._has_state else (settings, names, plan)
-        return plan
+        made = self._core.plan(source, settings, names, *derivatives)
+        if made is None or settings._has_state:
+            self._planned.pop(kind, None)
+        else:
+            self._planned[kind] = settings, (names, derivatives), made
+        return made
 
     def _run_many(
         self,
