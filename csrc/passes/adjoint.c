@@ -41,19 +41,31 @@ struct vkb_pass_row vkb_slope_row(const struct vkb_adjoint *adjoint,
     return row;
 }
 
-bool vkb_add_adjoint_pass(struct vkb_adjoint *adjoint, struct vkb_pass_row *row,
-                          struct vkb_size size, uint32_t *image, struct vkb_error *error)
+static bool add_numbered_pass(struct vkb_adjoint *adjoint, const char *prefix, uint32_t number,
+                              struct vkb_pass_row *row, struct vkb_size size, uint32_t *image,
+                              struct vkb_error *error)
 {
     char name[VKB_NAME_SIZE];
 
-    snprintf(name, sizeof name, "adjoint_%u", adjoint->added);
-    ++adjoint->added;
+    snprintf(name, sizeof name, "%s_%u", prefix, number);
     if (!vkb_add_target_image(adjoint->graph, name, VKB_FORMAT_RGBA32_FLOAT, size, false, image,
                               error))
         return false;
     snprintf(row->name, sizeof row->name, "%s", name);
     row->targets[0] = *image;
     return vkb_graph_add_pass(adjoint->graph, row, error);
+}
+
+bool vkb_add_adjoint_pass(struct vkb_adjoint *adjoint, struct vkb_pass_row *row,
+                          struct vkb_size size, uint32_t *image, struct vkb_error *error)
+{
+    return add_numbered_pass(adjoint, "adjoint", adjoint->added++, row, size, image, error);
+}
+
+static bool add_sum_pass(struct vkb_adjoint *adjoint, struct vkb_pass_row *row,
+                         struct vkb_size size, uint32_t *image, struct vkb_error *error)
+{
+    return add_numbered_pass(adjoint, "sum", adjoint->summed++, row, size, image, error);
 }
 
 void vkb_delay_scene(struct vkb_adjoint *adjoint, const struct vkb_pass_row *row, double share,
@@ -352,7 +364,7 @@ static bool add_sums(struct vkb_adjoint *adjoint, uint32_t image, struct vkb_siz
         row.constants.squared = squared;
         squared = false;
         size = blocks_of(size);
-        if (!vkb_add_adjoint_pass(adjoint, &row, size, &image, error))
+        if (!add_sum_pass(adjoint, &row, size, &image, error))
             return false;
     } while (size.width > 1 || size.height > 1);
     return vkb_graph_show_image(adjoint->graph, image, name, error);
@@ -369,7 +381,7 @@ bool vkb_add_sum_passes(struct vkb_adjoint *adjoint, const struct vkb_pass_row *
         return true;
     snprintf(squares, sizeof squares, "%s_squares", name);
     row.constants.by = BY_VALUES;
-    return vkb_add_adjoint_image(adjoint, &row, size, &image, error)
+    return add_sum_pass(adjoint, &row, size, &image, error)
         && add_sums(adjoint, image, size, false, name, error)
         && add_sums(adjoint, image, size, true, squares, error);
 }

@@ -12,7 +12,9 @@ struct vkb_adjoint {
     struct vkb_table table;  // of all filters
     uint32_t table_image;
     uint32_t *cotangents;  // by forward image: its cotangents so far; VKB_NO_IMAGE: none
-    uint32_t added;        // images so far
+    // Images so far, of sums and others. These have the same names whether sums are wanted or not,
+    // so that a plan of sums finds what that of derivatives by images has made.
+    uint32_t added, summed;
     uint32_t max_side;
     bool sums;  // the derivatives by fields are wanted, not those by images
     // The cotangents of the scene of a composite without a curve are `share` times those that the
