@@ -236,9 +236,9 @@ static void write_weights(const struct vkb_axis *axis, uint32_t block, uint32_t 
 
 // Writes entries, and a list of weights for each block that differs from the one before. Places
 // count from the first entry.
-static bool write_table(const struct vkb_axis *axis, uint32_t kernels, const struct readers *readers,
-                        double (*weights)[MAX_KERNELS], struct vkb_transposed *found,
-                        struct vkb_error *error)
+static bool write_table(const struct vkb_axis *axis, uint32_t kernels,
+                        const struct readers *readers, double (*weights)[MAX_KERNELS],
+                        struct vkb_transposed *found, struct vkb_error *error)
 {
     const size_t size = (size_t)found->readers.span * kernels;
     size_t capacity = 0, place = 0;
@@ -246,8 +246,7 @@ static bool write_table(const struct vkb_axis *axis, uint32_t kernels, const str
     found->count = axis->from;
     for (uint32_t block = 0; block < axis->from; block += ADJOINT_SIDE) {
         const uint32_t first = readers_of_block(axis, readers, block).first;
-        if (!vkb_grow(error, &found->texels, &capacity, found->count + size,
-                      sizeof *found->texels))
+        if (!vkb_grow(error, &found->texels, &capacity, found->count + size, sizeof *found->texels))
             return false;
         float (*list)[4] = found->texels + found->count;
         memset(list, 0, size * sizeof *list);

@@ -21,8 +21,8 @@ _Static_assert((int)VKB_MAX_TAPS <= (int)MAX_LONG_TAPS, "a description has space
 static size_t describe(const struct vkb_axis *axis, uint32_t kernels, double *numbers)
 {
     const double of_axis[AXIS_NUMBERS] = {
-        axis->from,   axis->to,        axis->origin, axis->step, axis->kind, axis->border,
-        axis->next,   axis->backwards, axis->first,  kernels,
+        axis->from,   axis->to,   axis->origin,    axis->step,  axis->kind,
+        axis->border, axis->next, axis->backwards, axis->first, kernels,
     };
     const uint32_t count = vkb_axis_count(axis);
 
@@ -158,9 +158,9 @@ bool vkb_axis_transpose(struct vkb_axis *axis, uint32_t kernels, struct vkb_tabl
     if (count > MAX_TEXELS)
         vkb_fail(error, VKB_ERROR_VALUE, "derivatives: filters need %zu weights, more than %d",
                  count, MAX_TEXELS);
-    const bool done = count <= MAX_TEXELS
-                   && vkb_grow(error, &table->texels, &table->capacity, count,
-                               sizeof *table->texels);
+    const bool done =
+        count <= MAX_TEXELS
+        && vkb_grow(error, &table->texels, &table->capacity, count, sizeof *table->texels);
     if (done) {
         axis->readers = found->readers;
         axis->readers.start = (int32_t)table->count;

@@ -269,15 +269,15 @@ static PyObject *get_instance(PyObject *object, void *unused)
     return handle ? PyLong_FromVoidPtr(handle) : vkb_raise(state_of(object), &error);
 }
 
-static PyObject *get_transpose_count(PyObject *object, void *unused)
+static PyObject *get_transposes(PyObject *object, void *unused)
 {
     struct vkb_renderer *self = (struct vkb_renderer *)object;
 
     (void)unused;
     VKB_LOCK(self->guard);
-    const size_t count = self->transposes.built;
+    const struct vkb_transposes transposes = self->transposes;
     VKB_UNLOCK(self->guard);
-    return PyLong_FromSize_t(count);
+    return Py_BuildValue("nn", (Py_ssize_t)transposes.built, (Py_ssize_t)transposes.bytes);
 }
 
 static PyObject *get_pipeline_count(PyObject *object, void *unused)
@@ -350,7 +350,8 @@ static PyGetSetDef attributes[] = {
     {"info", get_info, NULL, "The adapter, as adapters() describes it.", NULL},
     {"instance", get_instance, NULL, "The VkInstance, if it is open.", NULL},
     {"pipeline_count", get_pipeline_count, NULL, "Pipelines created so far.", NULL},
-    {"transpose_count", get_transpose_count, NULL, "Transposes of axes computed so far.", NULL},
+    {"transposes", get_transposes, NULL,
+     "(computed so far, bytes that are kept) of the transposes of filters.", NULL},
     {"cached", get_cached, NULL, "(pipelines, bytes of images) that are kept for later frames.",
      NULL},
     {0},

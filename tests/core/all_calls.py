@@ -193,6 +193,7 @@ def ask(renderer: Renderer, which: int, size: int) -> Any:
     del which, size
     core = renderer._core
     assert core.pipeline_count > 0
+    assert core.transposes >= (0, 0)
     assert core.cached[0] > 0
     assert core.instance
     assert core.pipeline_cache()

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
+import operator
 import pickle
 import threading
 import time
@@ -18,6 +20,7 @@ from hypothesis import strategies as st
 from tests.exhaustive import examples, some
 from tests.images import picture
 from vkbloom import (
+    BlenderGlare,
     Convolution,
     DualKawase,
     Plan,
@@ -29,7 +32,8 @@ from vkbloom import (
     _core,
     presets,
 )
-from vkbloom._renderer.sources import image_source
+from vkbloom._renderer import requests
+from vkbloom._renderer.sources import Inputs, image_source
 from vkbloom._scene.blocks import scene_arguments
 
 SIZE = (96, 54)
@@ -293,3 +297,99 @@ def test_a_plan_is_not_refused_for_its_memory(renderer: Renderer) -> None:
     plan = renderer.plan(image, Pyramid(levels=8, format="rgba32float"))
     shapes = [image.shape, *(shape for shape, _ in plan.framebuffers.values())]
     assert sum(4 * math.prod(shape) for shape in shapes) > 2 << 30
+
+
+STEPS: dict[str, Settings] = {
+    "separable": Separable(threshold=0.3, knee=0.2),
+    "pyramid": Pyramid(levels=3, threshold=0.3, knee=0.2),
+    "kino": presets["kino"],
+    "edge": Convolution(np.random.default_rng(1).random((5, 4, 3)), boundary="edge"),
+    "mirror": BlenderGlare(type="kernel", kernel=np.ones((3, 3))),
+}
+
+
+def plan_derivatives(
+    renderer: Renderer, settings: Settings, size: tuple[int, int], *sums: bool
+) -> tuple[Any, Any]:
+    """Return a source and its plan: of frames, or of derivatives by images or by fields."""
+    pixels = picture(*size, 3, dtype="float32")
+    floats = settings.replace(format="rgba32float")
+    if not sums:
+        source = Inputs(pixels).source()
+        return source, renderer._core.plan(source, floats, None)
+    source = Inputs(pixels).source((pixels,))
+    return source, renderer._core.plan(source, floats, None, ("final",), *sums)
+
+
+@pytest.mark.parametrize("name", STEPS)
+def test_a_training_step_computes_no_transposes_again(renderer: Renderer, name: str) -> None:
+    """Also with other settings, after another size."""
+    settings, counts = STEPS[name], []
+    for size, intensity in (((37, 22), 0.5), ((37, 22), 0.6), ((22, 37), 0.6), ((37, 22), 0.7)):
+        plan_derivatives(renderer, settings.replace(intensity=intensity), size, False)
+        counts.append(renderer._core.transposes[0])
+    assert counts[0] == counts[1]
+    assert counts[2] == counts[3]
+
+
+def test_transposes_that_are_kept_are_few(renderer: Renderer) -> None:
+    """Of many sizes, until the oldest ones are dropped; a closed renderer has none."""
+    with Renderer(renderer.info.name) as own:
+        sizes: list[int] = []
+        for width in range(16_000, 16_040):
+            plan_derivatives(own, Pyramid(levels=12), (width, 1), False)
+            sizes.append(own._core.transposes[1])
+        assert max(sizes) <= 32 << 20
+        assert any(after < before for before, after in itertools.pairwise(sizes))
+    assert own._core.transposes[1] == 0
+
+
+def test_plans_of_derivatives_are_kept(renderer: Renderer) -> None:
+    """For the same settings and kind of image; frames, derivatives and sums have one each."""
+    settings, plans = Separable(threshold=0.3, knee=0.2), []
+    with Renderer(renderer.info.name) as own:
+        for size in ((9, 8), (9, 8), (8, 9)):
+            pixels = picture(*size, 3, dtype="float32")
+            sources = Inputs(pixels).source(), Inputs(pixels).source((pixels,))
+            plans.append(
+                [
+                    own._plan_of(sources[0], settings, None),
+                    *(
+                        own._plan_derivatives(sources[1], settings, ("bloom",), sums=sums)
+                        for sums in (False, True)
+                    ),
+                ]
+            )
+        assert all(map(operator.is_, plans[0], plans[1]))
+        assert not any(map(operator.is_, plans[1], plans[2]))
+        other = own._plan_derivatives(sources[1], settings, ("final",), sums=False)
+        assert other is not plans[2][1]
+
+
+def passes_of(renderer: Renderer, settings: Settings, *sums: bool) -> set[str]:
+    """Run a plan of plan_derivatives(); return the names of the passes that ran."""
+    source, plan = plan_derivatives(renderer, settings, (19, 12), *sums)
+    arrays = requests.new_arrays(renderer._core, plan, "host")
+    return {*renderer._core.run(source, (plan,), (arrays,), True).wait()[0][0]}
+
+
+@pytest.mark.parametrize("boundary", ["zero", "edge", "wrap", "wrap_x"])
+def test_a_convolution_and_its_transpose_have_one_spectrum(
+    renderer: Renderer, boundary: Any
+) -> None:
+    """The kernel is transformed for frames, and not again for derivatives."""
+    kernel = np.random.default_rng(1).random((5, 4, 3))
+    settings = Convolution(kernel, boundary=boundary, tonemap="reinhard")
+    assert "kernel" in passes_of(renderer, settings)
+    ran = passes_of(renderer, settings, False)
+    assert "spectrum" in ran
+    assert "kernel" not in ran
+
+
+def test_sums_find_the_cotangents_of_images(renderer: Renderer) -> None:
+    """What the derivatives by images need is not computed again for those by fields."""
+    settings = Pyramid(levels=3, threshold=0.3, knee=0.2)
+    images, sums = (passes_of(renderer, settings, wanted) for wanted in (False, True))
+    assert any(name.startswith("adjoint") for name in images)
+    assert not any(name.startswith("adjoint") for name in sums)
+    assert {"by_composite", "by_threshold"} <= sums

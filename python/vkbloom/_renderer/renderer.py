@@ -776,9 +776,9 @@ class Renderer:
     ) -> _core.Plan | None:
         kind = derivatives[-1] if derivatives else None
         last, wanted, plan = self._planned.get(kind, (None, None, None))
-        if plan and last is settings and wanted == (names, derivatives):
-            if plan.is_of_image(source):
-                return plan
+        is_wanted = last is settings and wanted == (names, derivatives)
+        if plan and is_wanted and plan.is_of_image(source):
+            return plan
         made = self._core.plan(source, settings, names, *derivatives)
         if made is None or settings._has_state:
             self._planned.pop(kind, None)
