@@ -46,6 +46,16 @@ static bool split(uint32_t length, uint32_t first, uint32_t stages, uint32_t *fo
     return least != UINT32_MAX;
 }
 
+// No line of the length has fewer, whatever its factors.
+static uint32_t least_stages(uint32_t length)
+{
+    uint32_t stages = 1;
+
+    for (uint32_t reach = FFT_MAX_RADIX; reach < length; reach *= FFT_MAX_RADIX)
+        ++stages;
+    return stages;
+}
+
 struct vkb_fft_line vkb_fft_line(uint32_t least, uint32_t most)
 {
     struct vkb_fft_line best = {0};
@@ -56,6 +66,9 @@ struct vkb_fft_line vkb_fft_line(uint32_t least, uint32_t most)
         struct vkb_fft_line line = {.length = length, .radices = {1, 1, 1, 1}};
         uint32_t first = 0;
         bool found = false;
+        // Longer ones take at least as long.
+        if ((uint64_t)length * (least_stages(length) + 1) >= best_cost)
+            break;
         while (radices[first] > most || radices[first] > most_radix(length))
             ++first;
         while (is_smooth(length) && !found && line.stage_count < VKB_FFT_STAGES) {
