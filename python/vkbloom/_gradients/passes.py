@@ -132,7 +132,8 @@ def _level(cotangent: NDArray[Any] | ImportedArray) -> NDArray[Any] | ImportedAr
     return np.ascontiguousarray(cotangent, np.float32)
 
 
-@functools.lru_cache(64)
+# Few: settings may have large arrays.
+@functools.lru_cache(16)
 def in_floats(settings: Settings) -> Settings:
     """Return settings whose bloom buffers are floats; the same object, whose plan is kept."""
     return settings.replace(format="rgba32float")

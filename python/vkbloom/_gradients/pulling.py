@@ -230,7 +230,7 @@ def _starter(
     return start
 
 
-@functools.lru_cache(64)
+@functools.lru_cache(16)
 def _names(settings: Settings) -> tuple[str, ...]:
     """Return the names of the derivatives that are not by images."""
     has_kernel = settings.bloom and callable(getattr(settings, "kernel", None))
