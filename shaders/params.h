@@ -757,13 +757,18 @@
 //
 // Sets of taps: SET(name, value, taps, kernels, place, share).
 //
-//   TAP(number, x, y)                   a sample, at places along both axes: -2 to 2 from the
-//   pixel's
-//                                       position
+//   TAP(number, x, y)                   a sample, at places along both axes, which have numbers
+//   from
+//                                       -MAX_PLACE to MAX_PLACE; 0 is the pixel's position
 //   KERNEL(number, share, a, b, c, d)   the mean of four taps: upper left, upper right, lower left,
-//                                       lower right. Without kernels each tap is one.
-//   place(at, part), share(at, part)    where a place is, in texels, and its factor of the share of
-//                                       a tap, for a position that is `part` of a texel after one
+//                                       lower right. Without kernels each tap is one, of which
+//                                       there are at most MAX_SET_KERNELS.
+//   place(at, part), share(at, part)    where the place with the number `at` is, at most MAX_PLACE
+//                                       texels from the position, and its factor of the share of a
+//                                       tap that is a kernel, for a position that is `part` of a
+//                                       texel after one
+//
+// csrc/README.md has the limits of a new set.
 #define CENTRE_TAPS(TAP) TAP(0, 0, 0)
 #define CROSS_TAPS(TAP) \
     TAP(0, 0, 0) \
@@ -831,6 +836,7 @@
     SET(TAPS_THIRTEEN, 6, THIRTEEN_TAPS, THIRTEEN_KERNELS, TEXEL_PLACE, TEXEL_SHARE)
 
 // Nine taps along one axis, pixels of the target apart (nine.frag): LINE(name, value, half-kernel).
+// Values are those of TAP_SETS, continued: one constant has the number of either kind of set.
 // HDRP's is a binomial of order 8.
 #define GODOT_NINE 0.2024, 0.1790, 0.1240, 0.0672, 0.0285
 #define HDRP_NINE  0.2734375, 0.21875, 0.109375, 0.03125, 0.00390625
@@ -847,7 +853,8 @@
 //
 //   AVERAGE(name, value, weight)   their average with weights, which depend on kernel and share
 //   SUM(name, value, weight)       the same, not divided by the weights
-//   WITHIN(name, value, weight)    the mean, by shares, of kernels whose taps are averaged
+//   WITHIN(name, value, weight)    the mean, by shares, of kernels of four taps, whose taps are
+//                                  averaged
 //   SELECT(name, value, function)  another function of them
 #define COMBINATIONS(AVERAGE, SUM, WITHIN, SELECT) \
     AVERAGE(COMBINE_MEAN, 1, share_weight) \
