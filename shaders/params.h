@@ -583,7 +583,7 @@
     CONSTANT(16, EMITTERS, emitters)     /* how many passes add up in the target by blending */ \
     CONSTANT(17, PART_ABOVE, part_above) /* a streak reads what is above its threshold */ \
     CONSTANT(18, LEVELS, levels)         /* how many levels are added up */ \
-    CONSTANT(19, TAPS, tap_set)          /* where a pass samples: TAPS_* */ \
+    CONSTANT(19, TAP_SET, tap_set)       /* where a pass samples: TAPS_* */ \
     CONSTANT(20, COMBINE, combine)       /* what it makes of the samples: COMBINE_* */ \
     CONSTANT(21, ALPHA, alpha)           /* ALPHA_* */ \
     CONSTANT(22, MASKED, masked)         /* there is a mask */ \
@@ -608,7 +608,7 @@
     CONSTANT(41, PREFILTERED, prefiltered) /* of STAGE_FIRST: only bright colours */ \
     CONSTANT(42, ENLARGED, enlarged) /* a row of the source may have several of the target */ \
     CONSTANT(43, EXACT, exact) /* the ratio of both sides, or of the widths: EXACT_*; 0: none */ \
-    CONSTANT(44, TAP_COUNT, taps)        /* taps of a filter along an axis, or of a streak */ \
+    CONSTANT(44, TAP_COUNT, tap_count)   /* taps of a filter along an axis, or of a streak */ \
     CONSTANT(45, KERNELS, kernels)       /* of a filter or its transpose */ \
     CONSTANT(46, WINDOW, window)         /* texels along an axis that a filter's taps may read */ \
     CONSTANT(47, MEAN_SIDE, mean_side)   /* texels of a block of which a sample is the mean */ \
@@ -750,15 +750,14 @@
     NAME(STAGE_GREY, 4, grey)
 
 // What a pass with the block `prefilter` computes is a choice of four tables, whose rows C and GLSL
-// expand: where it samples its source (TAPS), what it makes of the samples (COMBINE), and a
+// expand: where it samples its source (TAP_SET), what it makes of the samples (COMBINE), and a
 // function of each sample and one of the result (POINT_BEFORE, POINT_AFTER). All variants of the
 // pass and its adjoint follow from the choice. Each function stands in GLSL, with its slope beside
 // it.
 //
 // Sets of taps: SET(name, value, taps, kernels, place, share).
 //
-//   TAP(number, x, y)                   a sample, at places along both axes, which have numbers
-//   from
+//   TAP(number, x, y)                   a sample, at numbers of places along both axes, from
 //                                       -MAX_PLACE to MAX_PLACE; 0 is the pixel's position
 //   KERNEL(number, share, a, b, c, d)   the mean of four taps: upper left, upper right, lower left,
 //                                       lower right. Without kernels each tap is one, of which

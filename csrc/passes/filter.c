@@ -174,7 +174,7 @@ static struct vkb_pass_row filter_row(const struct vkb_levels *levels,
     VKB_SET_TARGET(&row, filter, &levels->graph->images[to]);
     params->coarse = (float)filter->gain;
     params->divisor = (float)filter->divisor;
-    constants->taps = (int32_t)*count;
+    constants->tap_count = (int32_t)*count;
     constants->kernels = (int32_t)filter->kernels;
     constants->upsample = filter->x.kind;
     // Taps that are too far apart have no window.

@@ -257,7 +257,7 @@ void vkb_levels_gather(struct vkb_levels *levels, const double *shares, enum vkb
 
     row.constants.upsample = kernel;
     row.constants.levels = (int32_t)levels->count;
-    row.constants.taps = row.constants.kernels = 1;
+    row.constants.tap_count = row.constants.kernels = 1;
     row.constants.window = kernel == UPSAMPLE_CUBIC ? 4 : 2;
     for (uint32_t level = 0; level < GATHERED_LEVELS; ++level)
         vkb_read_at(&row, SLOT_LEVELS + level,

@@ -29,6 +29,20 @@ struct tap_set {
 
 static const struct tap_set tap_sets[] = {TAP_SETS(TAP_SET)};
 
+// Each number is of one set. Without kernels each tap is one, of which a shader has room for few.
+#define CHECK_KERNELS(name, value, ROWS, KERNELS, PLACE, SHARE) \
+    _Static_assert((0 KERNELS(COUNT_FOUR) ? 0 KERNELS(COUNT_FOUR) : 0 ROWS(COUNT_TAP)) \
+                       <= MAX_SET_KERNELS, \
+                   #name " has more than MAX_SET_KERNELS kernels");
+TAP_SETS(CHECK_KERNELS)
+#define SET_NUMBER(name, value, ROWS, KERNELS, PLACE, SHARE) +(1ull << (value))
+#define LINE_NUMBER(name, value, half_kernel)                +(1ull << (value))
+#define SET_BIT(name, value, ROWS, KERNELS, PLACE, SHARE)    | (1ull << (value))
+#define LINE_BIT(name, value, half_kernel)                   | (1ull << (value))
+_Static_assert((0 TAP_SETS(SET_NUMBER) LINE_SETS(LINE_NUMBER))
+                   == (0 TAP_SETS(SET_BIT) LINE_SETS(LINE_BIT)),
+               "two sets of taps have the same number");
+
 #define PLACE_CASE(name, value, ROWS, KERNELS, PLACE, SHARE) \
     case name: \
         return PLACE(at, part);

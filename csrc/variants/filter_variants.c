@@ -94,7 +94,7 @@ static void take_filter(const struct vkb_variant_choice *choice, const struct vk
 
     row->constants.sampling = 0;
     row->constants.upsample = upsample;
-    row->constants.taps = pass->constants.taps;
+    row->constants.tap_count = pass->constants.tap_count;
     row->constants.kernels = pass->constants.kernels;
     row->constants.window = pass->constants.window;
     row->constants.taken_x = pass->constants.taken_x;

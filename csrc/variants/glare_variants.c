@@ -17,7 +17,7 @@ bool vkb_add_streaks_variant(struct vkb_variant_choice *choice, const struct vkb
         return false;
     memcpy(&row, pass, sizeof row);
     row.constants.sampling = 0;
-    row.constants.taps = pass->params.streaks.count;
+    row.constants.tap_count = pass->params.streaks.count;
     vkb_make_linear(&row, streaks_shaders[format], STREAK_COLUMNS, STREAK_ROWS);
     return vkb_add_variant_pass(choice, &row);
 }

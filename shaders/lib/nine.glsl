@@ -1,11 +1,11 @@
 // What the directions and the variants of blurs of nine taps share. For shaders with PREFILTER_BLOCK.
 #include "lib/points.glsl"
 
-const bool IS_GODOT = TAPS == TAPS_GODOT, HAS_POINT_AFTER = POINT_AFTER != POINT_NONE;
+const bool IS_GODOT = TAP_SET == TAPS_GODOT, HAS_POINT_AFTER = POINT_AFTER != POINT_NONE;
 const int NINE_RADIUS = 4;
 
 #define LINE_WEIGHT(name, value, half_kernel) \
-    if (TAPS == name) \
+    if (TAP_SET == name) \
         return float[](half_kernel)[abs(tap)];
 
 float nine_weight(int tap)

@@ -7,10 +7,10 @@
 #define COUNT_TAP(number, x, y) +1
 #define COUNT_KERNEL(number, share, a, b, c, d) +1
 #define SET_TAP_COUNT(name, value, ROWS, KERNELS, PLACE, SHARE) \
-    if (TAPS == name) \
+    if (TAP_SET == name) \
         return 0 ROWS(COUNT_TAP);
 #define SET_FOUR_COUNT(name, value, ROWS, KERNELS, PLACE, SHARE) \
-    if (TAPS == name) \
+    if (TAP_SET == name) \
         return 0 KERNELS(COUNT_KERNEL);
 
 int tap_count()
@@ -50,7 +50,7 @@ bool by_taps()
 // The numbers of a tap's places along both axes, from -MAX_PLACE to MAX_PLACE.
 #define TAP_NUMBERS(number, x, y) tap == number ? ivec2(x, y) :
 #define SET_NUMBERS(name, value, ROWS, KERNELS, PLACE, SHARE) \
-    if (TAPS == name) \
+    if (TAP_SET == name) \
         return ROWS(TAP_NUMBERS) ivec2(0);
 
 ivec2 numbers_of(int tap)
@@ -61,10 +61,10 @@ ivec2 numbers_of(int tap)
 
 // Where a place is along an axis, in texels, and its factor of a share, for a position this part of a texel after one.
 #define SET_PLACE(name, value, ROWS, KERNELS, PLACE, SHARE) \
-    if (TAPS == name) \
+    if (TAP_SET == name) \
         return float(PLACE(at, part));
 #define SET_SHARE(name, value, ROWS, KERNELS, PLACE, SHARE) \
-    if (TAPS == name) \
+    if (TAP_SET == name) \
         return SHARE(at, part);
 
 float place_along(int at, float part)
@@ -104,7 +104,7 @@ float share_of(int tap, vec2 part)
         kernel_of(vec4[](samples.taps[a], samples.taps[b], samples.taps[c], samples.taps[d]), samples.weights[number]); \
     samples.shares[number] = share;
 #define MAKE_SET_KERNELS(name, value, ROWS, KERNELS, PLACE, SHARE) \
-    if (TAPS == name) { \
+    if (TAP_SET == name) { \
         KERNELS(MAKE_KERNEL) \
     }
 

@@ -25,7 +25,7 @@ Samples samples;
         total += back_kernel(samples.kernels[number], samples.weights[number], samples.taps[tap], \
                              back_combined(samples, kernel_count(), number, by_combined));
 #define ADD_SET_KERNELS(name, value, ROWS, KERNELS, PLACE, SHARE) \
-    if (TAPS == name) { \
+    if (TAP_SET == name) { \
         KERNELS(ADD_KERNEL) \
     }
 

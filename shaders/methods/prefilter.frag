@@ -1,4 +1,4 @@
-// A downsampling that is not linear, and the first pass of a published method: a choice of TAPS, COMBINE and point
+// A downsampling that is not linear, and the first pass of a published method: a choice of TAP_SET, COMBINE and point
 // functions (params.h).
 
 // Where the pass reads the image itself, as the threshold pass does.
