@@ -35,11 +35,12 @@ IMAGES: Final = (
     hdr_picture(30, 22, 4, "float16", seed=2),
     hdr_picture(41, 33, 3, "uint8", seed=3),
 )
-#: Values of settings. Some methods refuse some of them.
+#: Values of settings. Some methods refuse some of them. An exposure above 0 would magnify the
+#: rounding of 8 bits, which the limits are of.
 CHANGES: Final[dict[str, tuple[Any, ...]]] = {
     "threshold": (None, 0.0, 0.3),
     "intensity": (0.25, 0.75),
-    "exposure": (-1.0, 0.5),
+    "exposure": (-1.0, -0.5),
     "tonemap": ("none", "reinhard"),
     "encoding": ("none", "gamma22"),
     "bloom_scale": (0.5, 0.75),
@@ -96,7 +97,11 @@ def random_request(chance: random.Random, names: list[str] | None) -> Request:
     image = IMAGE if glare else chance.choice(IMAGES)
     settings = changed(chance.choice(EVERY), chance)
     if image is IMAGE:
-        settings = settings.replace(glare=glare, format="rgba32float", dither=False)
+        # Its light may be near -1, where Reinhard's curve has a pole.
+        settings = settings.replace(glare=glare, format="rgba32float", dither=False, tonemap="none")
+    elif any(weight < 0 for weight in getattr(settings, "weights", None) or ()):
+        # The limits are of the sum, in which these weights cancel rounded values.
+        settings = settings.replace(format="rgba32float")
     return Request(image, settings, random_given(chance, image))
 
 
