@@ -102,15 +102,24 @@ uint32_t vkb_levels_target(struct vkb_levels *levels, const char *name, enum vkb
     return image;
 }
 
-uint32_t vkb_levels_image(struct vkb_levels *levels, struct vkb_size size, const char *format, ...)
+// Adds an image of the bloom's format whose name is made by a format of printf.
+static uint32_t add_named(struct vkb_levels *levels, struct vkb_size size, bool framebuffer,
+                          const char *format, va_list arguments)
 {
     char name[VKB_NAME_SIZE];
+
+    vsnprintf(name, sizeof name, format, arguments);
+    return vkb_levels_target(levels, name, levels->source->format, size, framebuffer);
+}
+
+uint32_t vkb_levels_image(struct vkb_levels *levels, struct vkb_size size, const char *format, ...)
+{
     va_list arguments;
 
     va_start(arguments, format);
-    vsnprintf(name, sizeof name, format, arguments);
+    const uint32_t image = add_named(levels, size, true, format, arguments);
     va_end(arguments);
-    return vkb_levels_target(levels, name, levels->source->format, size, true);
+    return image;
 }
 
 uint32_t vkb_levels_history(struct vkb_levels *levels, uint32_t image)
@@ -130,13 +139,12 @@ uint32_t vkb_levels_down(struct vkb_levels *levels, uint32_t level)
 
 uint32_t vkb_levels_step(struct vkb_levels *levels, struct vkb_size size, const char *format, ...)
 {
-    char name[VKB_NAME_SIZE];
     va_list arguments;
 
     va_start(arguments, format);
-    vsnprintf(name, sizeof name, format, arguments);
+    const uint32_t image = add_named(levels, size, false, format, arguments);
     va_end(arguments);
-    return vkb_levels_target(levels, name, levels->source->format, size, false);
+    return image;
 }
 
 uint32_t vkb_levels_bloom(struct vkb_levels *levels)
