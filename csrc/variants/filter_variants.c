@@ -10,8 +10,6 @@ static const struct vkb_shader *const strip_shaders[VKB_FORMAT_COUNT] =
     VKB_LINEAR_BY_FORMAT(filter);
 static const struct vkb_shader *const final_shaders[VKB_FORMAT_COUNT] =
     VKB_LINEAR_BY_FORMAT(filter_final);
-static const struct vkb_shader *const mixed_shaders[VKB_FORMAT_COUNT] = {
-    [VKB_FORMAT_RGBA32_FLOAT] = &vkb_shader_filter_final_mixed_linear_rgba32float};
 static const struct vkb_shader *const rows_shaders[VKB_FORMAT_COUNT] =
     VKB_LINEAR_BY_FORMAT(gather_rows);
 static const struct vkb_shader *const gather_shaders[VKB_FORMAT_COUNT] =
@@ -155,7 +153,7 @@ static const struct vkb_pass_row *nested_filter(const struct vkb_variant_choice 
     const uint32_t target = pass->targets[0];
 
     // The shaders are compiled for one format. The levels of a published method may have their own.
-    return up && vkb_is_filter(up) && !pass->constants.masked
+    return up && vkb_is_filter(up) && !pass->constants.masked && !pass->transposed
                 && vkb_has_format_of(plain, up->reads[SLOT_SOURCE], target)
                 && vkb_has_format_of(plain, pass->reads[SLOT_SCENE], target)
                 && plain->images[pass->reads[SLOT_BLOOM]].format == plain->images[target].format
@@ -183,8 +181,6 @@ static struct vkb_pass_row nested_row(const struct vkb_variant_choice *choice,
     row.fused = true;
     vkb_read_only(&row, up->reads[SLOT_SOURCE]);
     vkb_read_at(&row, SLOT_OWN, pass->reads[SLOT_SCENE]);
-    if (pass->transposed)
-        vkb_read_at(&row, SLOT_ENDED, pass->reads[SLOT_COTANGENTS]);
     row.block = VKB_BLOCK_filter_final;
     copy_filter(&row.params.filter_final, &up->params.filter);
     copy_composite(&row.params.filter_final, &pass->params.composite);
@@ -197,18 +193,12 @@ bool vkb_add_filtered_final_variant(struct vkb_variant_choice *choice,
                                     const struct vkb_pass_row *pass)
 {
     const struct vkb_pass_row *up = nested_filter(choice, pass);
-    const struct filter_shaders shaders = {
-        pass->transposed ? mixed_shaders : final_shaders,
-        pass->transposed ? &vkb_shader_filter_tile_final_mixed_comp
-                         : &vkb_shader_filter_tile_final_comp,
-    };
+    const struct filter_shaders shaders = {final_shaders, &vkb_shader_filter_tile_final_comp};
     struct vkb_pass_row row;
 
     if (!up)
         return false;
     row = nested_row(choice, pass, up);
-    return make_filter(choice, up, shaders, &row)
-        && (choice->variants == VKB_VARIANTS_GPU || !pass->transposed
-            || vkb_are_floats(choice, pass))
-        && vkb_add_fullscreen_variant(choice, pass) && vkb_add_variant_pass(choice, &row);
+    return make_filter(choice, up, shaders, &row) && vkb_add_fullscreen_variant(choice, pass)
+        && vkb_add_variant_pass(choice, &row);
 }

@@ -1,6 +1,6 @@
 // The block of a filter, and how it changes the texels that it reads. With FINAL it makes the bloom, and is fused with
-// the composite, or with its MIXED cotangents. Otherwise it may add the share of an image of the target's size, and
-// with FROM_IMAGE it reads the image itself in place of the threshold pass's result.
+// the composite. Otherwise it may add the share of an image of the target's size, and with FROM_IMAGE it reads the image
+// itself in place of the threshold pass's result.
 #include "lib/sampling.glsl"
 
 #ifdef FINAL

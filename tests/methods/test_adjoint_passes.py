@@ -321,7 +321,6 @@ def test_presets_are_differentiated(renderer: Renderer, name: str) -> None:
 SINGLE: Any = {"format": "rgba32float"}
 TILES = ("tile_mixed_comp", "tile_transposed_comp")
 STRIPS = ("strip_mixed_linear_rgba32float", "strip_transposed_linear_rgba32float")
-CURVED = "filter_final_mixed_linear_rgba32float"
 LEVELS = "adjoint_filter_tile_comp"
 TAPS = "adjoint_taps_linear_rgba32float"
 #: By variant: settings, sizes and dtypes with the passes of the variant's own among those that make
@@ -372,14 +371,14 @@ TRANSPOSED: tuple[tuple[str, Any, tuple[int, ...], str, tuple[str, ...]], ...] =
         Pyramid(levels=1, threshold=0.5, tonemap="aces"),
         (8, 32, 3),
         "f4",
-        (CURVED, *(TAPS,) * 3),
+        (TAPS,) * 3,
     ),
     (
         "cpu",
         DualKawase(levels=1, threshold=0.5, tonemap="aces"),
         (8, 32, 3),
         "f4",
-        (CURVED, TAPS, TAPS),
+        (TAPS, TAPS),
     ),
     ("cpu", Pyramid(levels=2, composite="mix", exposure=0.5), (35, 62, 3), "f4", (TAPS,) * 6),
 )
@@ -418,7 +417,7 @@ def test_variants_are_transposed(varied: dict[str, Renderer], case: tuple[Any, .
     assert plan
     shaders = [shader for _, shader, *_ in plan.passes]
     if variant == "gpu" or has_linear_texels(renderer):
-        special = (*TILES, *STRIPS, CURVED, LEVELS, TAPS)
+        special = (*TILES, *STRIPS, LEVELS, TAPS)
         assert tuple(shader for shader in shaders if shader in special) == passes
 
 
