@@ -11,6 +11,7 @@ from typing import Any, Final
 
 from vkbloom import _core
 from vkbloom._argument_types import checked
+from vkbloom._public import public
 from vkbloom._renderer.default import default_renderer
 from vkbloom._renderer.renderer import Renderer
 
@@ -41,6 +42,7 @@ def _functions() -> Callable[..., int]:
     return call
 
 
+@public("vkbloom")
 @checked
 def capture(
     path: str | os.PathLike[str], *, renderer: Renderer | None = None

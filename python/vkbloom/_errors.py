@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+from typing import Any, Self
 
+from vkbloom._public import public
+
+
+@public("vkbloom")
 class Error(Exception):
     """Something failed in the core; base of the package's own exceptions.
 
@@ -14,8 +19,6 @@ class Error(Exception):
         The VkResult that it answered.
     """
 
-    __module__ = "vkbloom"
-
     def __init__(
         self, message: str = "", vk_call: str | None = None, vk_result: int | None = None
     ) -> None:
@@ -24,31 +27,30 @@ class Error(Exception):
         self.vk_result = vk_result
 
 
+@public("vkbloom")
 class AdapterNotFoundError(Error, RuntimeError):
     """No adapter fits; says what was found, what is missing and what to install."""
 
-    __module__ = "vkbloom"
 
-
+@public("vkbloom")
 class DeviceLostError(Error):
     """The device was lost or did not answer; the renderer can only be closed."""
 
-    __module__ = "vkbloom"
 
-
+@public("vkbloom")
 class OutOfMemoryError(Error, MemoryError):
     """The host or the device has no memory left."""
 
-    __module__ = "vkbloom"
+    def __new__(cls, *args: Any, **_: Any) -> Self:
+        # MemoryError's refuses subclasses of two classes. Dask calls it for a worker's exception.
+        return Exception.__new__(cls, *args)
 
 
+@public("vkbloom")
 class ValidationError(Error):
     """The validation layer objected to a Vulkan call."""
 
-    __module__ = "vkbloom"
 
-
+@public("vkbloom")
 class ShaderError(Error):
     """The driver refused a shader."""
-
-    __module__ = "vkbloom"

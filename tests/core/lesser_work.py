@@ -116,7 +116,7 @@ def apply_wide(renderer: Renderer, settings: vkbloom.Settings) -> None:
     frames = renderer.apply(image, settings)
     width = frames["down_0"].shape[1]
     assert width >= 4096
-    name = type(settings).__module__.rpartition(".")[2]
+    name = settings.method
     with mock.patch(f"vkbloom.reference._{name}.WIDEST_LEVEL", width):
         tolerance.assert_matches_reference(frames, image, settings)
 

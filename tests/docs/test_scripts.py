@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import doctest
 import importlib
+import inspect
 import pkgutil
 import runpy
 import shutil
@@ -23,6 +24,7 @@ import pytest
 import vkbloom
 from tests.docs.pages import ROOT
 from tests.exhaustive import witness
+from vkbloom._public import defining_module
 
 #: The arguments of a script, in a folder with `photo.exr`; a module that it cannot do without.
 RUN: Final[dict[str, tuple[str, str]]] = {
@@ -159,10 +161,19 @@ def modules() -> Iterator[str]:
     yield "pytest_vkbloom"
 
 
+class Finder(doctest.DocTestFinder):
+    """Finds the examples of public names where these are defined."""
+
+    def _from_module(self, module: ModuleType | None, thing: Any) -> bool:
+        if module is not None and (inspect.isclass(thing) or inspect.isfunction(thing)):
+            return defining_module(thing) == module.__name__
+        return super()._from_module(module, thing)  # type: ignore[misc, no-any-return]
+
+
 def examples_in(module: ModuleType) -> list[doctest.DocTest]:
     """The examples of a module, with the names that they use without importing them."""
     names = {"np": np, "vkbloom": vkbloom}
-    found = doctest.DocTestFinder(exclude_empty=True).find(module, extraglobs=names)
+    found = Finder(exclude_empty=True).find(module, extraglobs=names)
     return [test for test in found if test.examples]
 
 

@@ -163,7 +163,7 @@ def test_levels_of_very_wide_frames(renderer: Renderer, settings: Settings) -> N
     frames = renderer.apply(row, settings)
     width = min(16384, max_side(renderer))
     assert frames["down_0"].shape[:2] == (16, width)
-    name = type(settings).__module__.rpartition(".")[2]
+    name = settings.method
     with mock.patch(f"vkbloom.reference._{name}.WIDEST_LEVEL", width):
         assert_matches_reference(frames, row, settings)
 

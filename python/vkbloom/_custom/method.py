@@ -22,6 +22,7 @@ from vkbloom._custom.rows import made_resources
 from vkbloom._custom.shaders import Shaders
 from vkbloom._custom.source import Source, read_source
 from vkbloom._locks import ProcessLock
+from vkbloom._public import public
 from vkbloom._settings.blocks import settings_block
 from vkbloom._settings.fields import number_field, value_field
 from vkbloom._settings.registry import METHODS
@@ -156,6 +157,7 @@ def reduced(kind: CustomType) -> Any:
 copyreg.pickle(CustomType, reduced)
 
 
+@public("vkbloom")
 @checked
 def load_method(
     source: str | Path, *, name: str | None = None, reference: Reference | None = None

@@ -6,6 +6,7 @@ import os
 from typing import TYPE_CHECKING, Any
 
 from vkbloom._checks import import_extra
+from vkbloom._public import public
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
     from vkbloom._settings.settings import Settings, Shading
 
 
+@public("vkbloom")
 def explore(
     source: Scene | NDArray[Any] | str | os.PathLike[str] | None = None,
     settings: Settings | str | None = None,

@@ -22,6 +22,7 @@ from vkbloom._fit.result import FitResult, loss_text
 from vkbloom._fit.search import CLOSE, ENOUGH, Search
 from vkbloom._fit.space import Bounds, Space, space_of, spaces_of_all
 from vkbloom._gradients import pullback_of
+from vkbloom._public import public
 from vkbloom._renderer.default import default_renderer
 from vkbloom._renderer.image import Image
 from vkbloom._renderer.renderer import Renderer
@@ -81,6 +82,7 @@ def fit(
     gradient: bool = ...,
     progress: bool = ...,
 ) -> list[FitResult]: ...
+@public("vkbloom")
 @checked_as(settings=MANY_SETTINGS)
 def fit(
     image: NDArray[Any] | Image,

@@ -13,6 +13,7 @@ from vkbloom._checks import check_index, check_size, import_extra
 from vkbloom._fit.losses import Measure, light
 from vkbloom._fit.result import FitResult
 from vkbloom._methods.mip_chain import Pyramid
+from vkbloom._public import public
 from vkbloom._renderer.default import default_renderer
 from vkbloom._renderer.renderer import Renderer
 from vkbloom.psf import PSF
@@ -22,6 +23,7 @@ PyramidLoss = Literal["relative", "log"]
 _DARK: Final = 1e-4
 
 
+@public("vkbloom")
 @checked
 def fit_pyramid(
     psf: PSF,

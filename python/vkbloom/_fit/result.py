@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from vkbloom._fit.losses import Loss
 from vkbloom._locks import cached_property
+from vkbloom._public import public
 from vkbloom._renderer.frames import Frames
 from vkbloom._settings.settings import Settings
 from vkbloom._views import pictures
@@ -116,6 +117,7 @@ def _other_encoding(target: Array, result: Array) -> str:
 _GOOD, _FAIR = 0.95, 0.8
 
 
+@public("vkbloom")
 @dataclass(frozen=True, eq=False, kw_only=True)
 class FitResult:
     """The settings that a fit found.

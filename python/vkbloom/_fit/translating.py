@@ -16,6 +16,7 @@ from vkbloom._fit.losses import DARK, Loss
 from vkbloom._fit.result import FitResult
 from vkbloom._fit.space import Bounds, varied_as
 from vkbloom._locks import cached_property
+from vkbloom._public import public
 from vkbloom._renderer.default import default_renderer
 from vkbloom._renderer.renderer import Renderer
 from vkbloom._settings.fields import fields_of
@@ -136,6 +137,7 @@ def _off(what: str, factor: float, word: str) -> str:
     return f"{what} {text}".strip()
 
 
+@public("vkbloom")
 @checked
 def translate(
     settings: Settings | str | Maker,

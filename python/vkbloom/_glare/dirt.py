@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from vkbloom._array_cache import kept
 from vkbloom._checks import check_number
 from vkbloom._core_kernel import CoreKernel
+from vkbloom._public import public
 from vkbloom._settings.fields import value_field
 from vkbloom._settings.glare import Glare, stage_field
 from vkbloom.psf._core_kernels import WithKernel
@@ -23,6 +24,7 @@ def _read_image(image: Any) -> Any:
     return check_values("image", image)
 
 
+@public("vkbloom")
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Dirt(WithKernel, Glare):
     """A picture of dirt on the lens, which multiplies bloom and glare.

@@ -6,10 +6,12 @@ import dataclasses
 from typing import ClassVar
 
 from vkbloom import _core
+from vkbloom._public import public
 from vkbloom._settings.fields import numbers_field
 from vkbloom._settings.glare import GlareLight, stage_field
 
 
+@public("vkbloom")
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Ghosts(GlareLight):
     """Reflections in a lens: copies of what glows, mirrored and scaled about the centre.
@@ -80,6 +82,7 @@ class Ghosts(GlareLight):
         return tuple(zip(self.scales, tints, strict=True))
 
 
+@public("vkbloom")
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Halo(GlareLight):
     """A ring around the centre of the picture, made from the glow near the centre.

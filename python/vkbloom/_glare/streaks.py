@@ -5,9 +5,11 @@ from __future__ import annotations
 import dataclasses
 from typing import ClassVar
 
+from vkbloom._public import public
 from vkbloom._settings.glare import GlareLight, stage_field
 
 
+@public("vkbloom")
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Streaks(GlareLight):
     """Rays from what glows, as a star filter makes them; with one direction an anamorphic streak.

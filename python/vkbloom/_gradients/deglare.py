@@ -11,10 +11,12 @@ from vkbloom._argument_types import ANY, INTEGER, NUMBER, checked_as
 from vkbloom._checks import check_image, check_number
 from vkbloom._gradients.pulling import vjp
 from vkbloom._methods.convolution import Convolution, PSFLike, read_psf
+from vkbloom._public import public
 from vkbloom._renderer.default import default_renderer
 from vkbloom._renderer.renderer import Renderer
 
 
+@public("vkbloom")
 @checked_as(psf=ANY, share=NUMBER, iterations=INTEGER)
 def deglare(
     image: NDArray[Any],

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from vkbloom._argument_types import checked
 from vkbloom._gradients.passes import DeviceGradients, Passes, check_finite, in_floats
 from vkbloom._methods.separable import Separable
+from vkbloom._public import public
 from vkbloom._renderer.default import default_renderer
 from vkbloom._renderer.device_arrays import ImportedArray, on_cuda, on_host, place_of, placed, take
 from vkbloom._renderer.frames import Frames
@@ -35,6 +36,7 @@ Pullback = Callable[[Mapping[str, NDArray[Any]]], Derivatives]
 Checked = Mapping[str, NDArray[Any] | ImportedArray]
 
 
+@public("vkbloom")
 @checked
 def vjp(
     image: NDArray[Any] | Image,

@@ -20,8 +20,10 @@ from vkbloom._grid.store import (
     folder_of,
     is_empty,
 )
+from vkbloom._public import public
 
 
+@public("vkbloom")
 @dataclass(frozen=True)
 class GridReport:
     """The result of `check_grid`.
@@ -49,6 +51,7 @@ class GridReport:
         return "\n".join([f"{self.done} of {self.points} points are done", *self.problems])
 
 
+@public("vkbloom")
 @checked
 def check_grid(store: Any) -> GridReport:
     """Check a grid's store for missing and damaged data, without changing it.

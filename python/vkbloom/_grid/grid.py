@@ -21,6 +21,7 @@ from vkbloom._grid.layout import Grid, Layout, Variable, ask, lay_out, made_data
 from vkbloom._grid.order import Block, Index, default_chunk, read_part
 from vkbloom._grid.sources import ImageSource
 from vkbloom._grid.store import IDENTITY, GridStore, chunk_in, folder_of, prepare, stored_identity
+from vkbloom._public import public
 from vkbloom._renderer.default import default_renderer
 from vkbloom._renderer.frames import Frames
 from vkbloom._renderer.image import Image
@@ -41,6 +42,7 @@ BLOCK_POINTS = 1024
 _MARGIN = 10
 
 
+@public("vkbloom")
 @checked
 def grid(
     source: Scene | NDArray[Any] | Image,

@@ -28,6 +28,7 @@ from vkbloom._io.images import (
     is_exr,
 )
 from vkbloom._io.narrowing import narrowed
+from vkbloom._public import public
 from vkbloom._version import installed_version
 
 FileEncoding = Literal["none", "linear", "srgb", "gamma22", "pq", "hlg"]
@@ -57,6 +58,7 @@ def read(
     expand: float | None = ...,
     metadata: Literal[True],
 ) -> tuple[NDArray[Any], dict[str, Any]]: ...
+@public("vkbloom")
 @checked_as(metadata=FLAG)
 def read(
     path: str | os.PathLike[str],
@@ -163,6 +165,7 @@ def _check_conversions(values: NDArray[Any], saved: Saved, bits: int | None) -> 
         raise ValueError("array: primaries and views need linear floats of RGB or RGBA")
 
 
+@public("vkbloom")
 @checked
 def write(
     path: str | os.PathLike[str],

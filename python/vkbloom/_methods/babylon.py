@@ -6,10 +6,12 @@ import dataclasses
 import math
 from typing import Any, ClassVar
 
+from vkbloom._public import public
 from vkbloom._settings.fields import number_field
 from vkbloom._settings.settings import PublishedSettings
 
 
+@public("vkbloom")
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class BabylonBloom(PublishedSettings):
     """Bloom of Babylon.js' DefaultRenderingPipeline.

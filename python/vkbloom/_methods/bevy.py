@@ -5,10 +5,12 @@ from __future__ import annotations
 import dataclasses
 from typing import ClassVar
 
+from vkbloom._public import public
 from vkbloom._settings.fields import choice_field, number_field
 from vkbloom._settings.settings import Composite, PublishedSettings
 
 
+@public("vkbloom")
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class BevyBloom(PublishedSettings):
     """Bevy's bloom, by default its ``Bloom::NATURAL``.

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from vkbloom._methods.blender_kernels import kernel_of, kernel_sides
 from vkbloom._methods.convolution import PSFLike, read_psf
+from vkbloom._public import public
 from vkbloom._settings.fields import (
     choice_field,
     flag_field,
@@ -25,6 +26,7 @@ Quality = Literal["high", "medium", "low"]
 Version = Literal["5.0", "5.2", "4.3"]
 
 
+@public("vkbloom")
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class BlenderGlare(WithKernel, PublishedSettings):
     """The Glare node of Blender 5.0, as its compositor runs it on a CPU.

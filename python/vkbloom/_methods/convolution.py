@@ -10,6 +10,7 @@ from typing import Any, ClassVar, Literal, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from vkbloom._public import public
 from vkbloom._settings.fields import choice_field, number_field
 from vkbloom._settings.settings import Settings
 from vkbloom.psf._base import PSF
@@ -40,6 +41,7 @@ def read_psf(psf: Any) -> PSF:
         raise type(error)(str(error).replace("values:", "psf:", 1)) from None
 
 
+@public("vkbloom")
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Convolution(WithKernel, Settings):
     """A convolution with a point-spread function, by Fourier transforms.

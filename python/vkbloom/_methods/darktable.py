@@ -6,10 +6,12 @@ import dataclasses
 import math
 from typing import Any, ClassVar
 
+from vkbloom._public import public
 from vkbloom._settings.fields import choice_field, number_field
 from vkbloom._settings.settings import Composite, PublishedSettings
 
 
+@public("vkbloom")
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class DarktableBloom(PublishedSettings):
     """Bloom of darktable, on the lightness of CIE Lab.

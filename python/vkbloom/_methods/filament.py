@@ -5,10 +5,12 @@ from __future__ import annotations
 import dataclasses
 from typing import ClassVar
 
+from vkbloom._public import public
 from vkbloom._settings.fields import number_field
 from vkbloom._settings.settings import PublishedSettings
 
 
+@public("vkbloom")
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class FilamentBloom(PublishedSettings):
     """Filament's bloom at its low quality, the default one.

@@ -6,6 +6,7 @@ import dataclasses
 from typing import ClassVar
 
 from vkbloom._checks import FLT_MAX
+from vkbloom._public import public
 from vkbloom._settings.fields import choice_field, flag_field, number_field, numbers_field
 from vkbloom._settings.settings import Composite, PublishedSettings
 
@@ -13,6 +14,7 @@ from vkbloom._settings.settings import Composite, PublishedSettings
 GODOT_LEVELS = 7
 
 
+@public("vkbloom")
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class GodotBloom(PublishedSettings):
     """Godot's glow, by default that of 4.6.

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom._methods.gaussian_sum import GaussianSum, gaussian
+from vkbloom._public import public
 from vkbloom._settings.fields import choice_field, number_field, numbers_field, value_field
 from vkbloom._settings.settings import Composite
 
@@ -19,6 +20,7 @@ Size = tuple[int, int]
 _FILM = 35000.0
 
 
+@public("vkbloom")
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Halation(GaussianSum):
     """Halation of film, light that its base reflects, and the scattering in its layers.

@@ -6,10 +6,12 @@ import dataclasses
 from typing import ClassVar
 
 from vkbloom._checks import check_floats
+from vkbloom._public import public
 from vkbloom._settings.fields import flag_field, number_field
 from vkbloom._settings.settings import Settings
 
 
+@public("vkbloom")
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Pyramid(Settings):
     """A mip chain: 13 taps down, a 3 x 3 tent up, the levels added on the way.
@@ -75,6 +77,7 @@ class Pyramid(Settings):
             object.__setattr__(self, "level_weights", weights)
 
 
+@public("vkbloom")
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class DualKawase(Settings):
     """A chain of halved images: downsampled with 5 taps, upsampled with 8, nothing added.

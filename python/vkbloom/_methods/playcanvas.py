@@ -5,10 +5,12 @@ from __future__ import annotations
 import dataclasses
 from typing import Any, ClassVar
 
+from vkbloom._public import public
 from vkbloom._settings.fields import number_field
 from vkbloom._settings.settings import PublishedSettings
 
 
+@public("vkbloom")
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class PlayCanvasBloom(PublishedSettings):
     """Bloom of PlayCanvas' CameraFrame.

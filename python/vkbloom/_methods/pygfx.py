@@ -5,10 +5,12 @@ from __future__ import annotations
 import dataclasses
 from typing import ClassVar
 
+from vkbloom._public import public
 from vkbloom._settings.fields import choice_field, flag_field, number_field, value_field
 from vkbloom._settings.settings import Composite, PublishedSettings
 
 
+@public("vkbloom")
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class PygfxBloom(PublishedSettings):
     """The PhysicalBasedBloomPass of pygfx.

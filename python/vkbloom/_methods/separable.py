@@ -9,6 +9,7 @@ from typing import ClassVar, Literal
 from vkbloom import _core
 from vkbloom._argument_types import INTEGER, NUMBER, checked_as
 from vkbloom._checks import FLT_MAX, check_above, check_index
+from vkbloom._public import public
 from vkbloom._settings.fields import choice_field, flag_field, number_field, numbers_field
 from vkbloom._settings.settings import Settings
 
@@ -18,6 +19,7 @@ Texel = Literal["own", "x"]
 TUTORIAL: tuple[float, ...] = (0.227027, 0.1945946, 0.1216216, 0.054054, 0.016216)
 
 
+@public("vkbloom")
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Separable(Settings):
     """A blur by a symmetric kernel, first vertical, then horizontal.
@@ -72,6 +74,7 @@ class Separable(Settings):
     direct: bool = flag_field("direct")
 
 
+@public("vkbloom")
 @checked_as(sigma=NUMBER, radius=INTEGER)
 def gaussian_weights(sigma: float, radius: int | None = None) -> tuple[float, ...]:
     """Make a normalized Gaussian half-kernel.

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from typing import Any, ClassVar, Literal
 
+from vkbloom._public import public
 from vkbloom._settings.fields import choice_field, number_field, numbers_field
 from vkbloom._settings.settings import PublishedSettings
 
@@ -12,6 +13,7 @@ Variant = Literal["r185", "r187", "node"]
 Tint = tuple[float, float, float]
 
 
+@public("vkbloom")
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class ThreeBloom(PublishedSettings):
     """three.js' UnrealBloomPass, and BloomNode, its successor for WebGPU.

@@ -6,6 +6,7 @@ import dataclasses
 import math
 from typing import Any, ClassVar, Literal
 
+from vkbloom._public import public
 from vkbloom._settings.fields import (
     choice_field,
     flag_field,
@@ -25,6 +26,7 @@ def _linear(value: float) -> float:
     return value / 12.92 if value <= 0.04045 else float(((value + 0.055) / 1.055) ** 2.4)
 
 
+@public("vkbloom")
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class UrpBloom(PublishedSettings):
     """Bloom of Unity's Universal Render Pipeline.
@@ -107,6 +109,7 @@ class UrpBloom(PublishedSettings):
         }
 
 
+@public("vkbloom")
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class HdrpBloom(PublishedSettings):
     """Bloom of Unity's High Definition Render Pipeline, without a threshold, at half resolution.
@@ -160,6 +163,7 @@ class HdrpBloom(PublishedSettings):
     anamorphism: float = number_field("anamorphism")
 
 
+@public("vkbloom")
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class PostProcessingBloom(PublishedSettings):
     """Bloom of Unity's Post Processing Stack v2.

@@ -10,9 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom._methods.gaussian_sum import GaussianSum, gaussian
+from vkbloom._public import public
 from vkbloom._settings.fields import number_field, numbers_field
 
 
+@public("vkbloom")
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class UnrealBloom(GaussianSum):
     """Unreal Engine's standard bloom, by its documentation. Nothing of the engine ran.

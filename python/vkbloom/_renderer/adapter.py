@@ -10,8 +10,10 @@ from types import ModuleType
 
 from vkbloom import _core
 from vkbloom._c_paths import in_utf8
+from vkbloom._public import public
 
 
+@public("vkbloom")
 @dataclasses.dataclass(frozen=True)
 class AdapterInfo:
     """An adapter that can run vkbloom.
@@ -99,6 +101,7 @@ def _library_of(manifest: str) -> str:
         raise ValueError(f"VKBLOOM_DRIVER: {manifest} is not a driver's manifest") from error
 
 
+@public("vkbloom")
 def adapters() -> tuple[AdapterInfo, ...]:
     """List the adapters that can run vkbloom: the system's in its order, then the bundled ones.
 

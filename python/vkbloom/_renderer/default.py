@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from vkbloom import _core
 from vkbloom._argument_types import checked
+from vkbloom._public import public
 from vkbloom._renderer.device_arrays import Device
 from vkbloom._renderer.frames import Frames
 from vkbloom._renderer.image import Image
@@ -63,6 +64,7 @@ def renderer_on(adapter: str) -> Renderer:
     return _DEFAULT.get(adapter)
 
 
+@public("vkbloom")
 def default_renderer() -> Renderer:
     """Return the renderer that functions use where no renderer is given.
 
@@ -75,6 +77,7 @@ def default_renderer() -> Renderer:
     return renderer_on("auto")
 
 
+@public("vkbloom")
 @checked
 def apply(
     image: NDArray[Any] | Image | str | os.PathLike[str],
@@ -144,6 +147,7 @@ def _changed(
     return chosen.replace(**fields) if fields else chosen
 
 
+@public("vkbloom")
 @checked
 def render(
     scene: Scene,

@@ -11,6 +11,7 @@ import numpy as np
 
 from vkbloom import _core
 from vkbloom._checks import device_kind, on_another_device
+from vkbloom._public import public
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -31,6 +32,7 @@ _CODES = {"u": _UINT, "f": _FLOAT}
 _LEGACY = 1
 
 
+@public("vkbloom")
 class DeviceArray:
     """A framebuffer that stays on the renderer's device.
 

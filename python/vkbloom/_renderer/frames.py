@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from vkbloom._argument_types import checked
 from vkbloom._checks import import_extra
 from vkbloom._framebuffers import dimensions
+from vkbloom._public import public
 from vkbloom._renderer.device_arrays import DeviceArray, on_host
 from vkbloom._renderer.state import State
 from vkbloom._suggestions import unknown
@@ -28,6 +29,7 @@ _IMAGE_DTYPES = (np.dtype(np.uint8), np.dtype(np.float16), np.dtype(np.float32))
 _CHANNELS = ("r", "g", "b", "a")
 
 
+@public("vkbloom")
 class Frames(Mapping[str, NDArray[Any]]):
     """Framebuffers by name, in the order of the data flow, with timings, settings and adapter.
 

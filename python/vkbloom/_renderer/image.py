@@ -5,6 +5,8 @@ from __future__ import annotations
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NoReturn
 
+from vkbloom._public import public
+
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
@@ -13,6 +15,7 @@ if TYPE_CHECKING:
     from vkbloom import _core
 
 
+@public("vkbloom")
 class Image:
     """A copy of an image on a renderer's device, made by `Renderer.upload`.
 

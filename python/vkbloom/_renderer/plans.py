@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from vkbloom._public import public
+from vkbloom._settings.settings import Settings
 from vkbloom._views import markup
 
 if TYPE_CHECKING:
     from vkbloom import _core
-    from vkbloom._settings.settings import Settings
 
 Framebuffer = tuple[tuple[int, ...], np.dtype[Any]]
 
@@ -43,6 +44,7 @@ class Pass(NamedTuple):
     variant: str
 
 
+@public("vkbloom")
 @dataclass(frozen=True, repr=False)
 class Plan:
     """The passes and framebuffers of one request: one source with one settings.

@@ -17,6 +17,7 @@ from vkbloom import _core
 from vkbloom._argument_types import checked
 from vkbloom._array_cache import ArrayCache, shared
 from vkbloom._checks import check_framebuffers, check_size
+from vkbloom._public import public
 from vkbloom._renderer import requests
 from vkbloom._renderer.adapter import bundled_driver, bundled_hash, from_core
 from vkbloom._renderer.adapter_choice import chosen_adapter
@@ -165,6 +166,7 @@ def _as_state(state: Mapping[str, Any] | None) -> State:
     return state if isinstance(state, State) else State(state or {})
 
 
+@public("vkbloom")
 class Renderer:
     """A device and its pipeline, in this process until it is closed.
 

@@ -19,6 +19,7 @@ import numpy as np
 
 from vkbloom._argument_types import PATH, checked_as
 from vkbloom._checks import check_above, check_floats, check_number
+from vkbloom._public import public
 from vkbloom._scene import gltf
 from vkbloom._scene import skybox as sky
 from vkbloom._scene.arrays import Constructed
@@ -45,6 +46,7 @@ _contents: weakref.WeakValueDictionary[tuple[int, int, int], _Contents] = (
 _UFO: Final = Path(__file__).parents[1] / "assets" / "ufo.npz"
 
 
+@public("vkbloom")
 @dataclass(frozen=True)
 class Camera:
     """A look-at camera: view = translate(position) rotate(x) rotate(y) rotate(z).
@@ -81,6 +83,7 @@ class Camera:
             raise ValueError(f"fov: {self.fov} is out of range, above 0 and below 180")
 
 
+@public("vkbloom")
 @dataclass(frozen=True, eq=False, repr=False)
 class Scene(Constructed):
     """A body, a glow mesh, a sky, and the camera.

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any, ClassVar
 
 from vkbloom import _core
+from vkbloom._public import public
 from vkbloom._settings.fields import Record, fields_of, number_field
 from vkbloom._settings.registry import STAGES
 
@@ -15,6 +16,7 @@ from vkbloom._settings.registry import STAGES
 stage_field = functools.partial(number_field, table=_core.GLARE_VALUES)
 
 
+@public("vkbloom")
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Glare(Record):
     """Base class of the stages of glare; use a stage's class, such as `Streaks`.

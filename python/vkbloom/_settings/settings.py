@@ -11,6 +11,7 @@ import functools
 from collections.abc import Mapping
 from typing import Any, ClassVar, Final, Literal, Self, get_args
 
+from vkbloom._public import public
 from vkbloom._settings.blocks import settings_block
 from vkbloom._settings.fields import (
     FieldInfo,
@@ -49,6 +50,7 @@ def _read_glare(glare: object) -> tuple[Glare, ...]:
     return glares[glare]
 
 
+@public("vkbloom")
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Settings(Record):
     """Base class of the settings of all methods; use a method's class, such as `Separable`.

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from vkbloom._io.images import checked_pixels
 from vkbloom._io.srgb import decode_srgb, encode_srgb
+from vkbloom._public import public
 from vkbloom._views.comparison import pair_of
 from vkbloom._views.shifts import MIN_SHIFT, find_shift, rms
 
@@ -42,6 +43,7 @@ _MIN_ROUNDING: Final = 0.3
 _FEW: Final = 100
 
 
+@public("vkbloom.testing")
 @dataclass(frozen=True, kw_only=True)
 class Diagnosis:
     """The single cause of the difference of two images.
@@ -89,6 +91,7 @@ class _Candidate:
     is_of_b: bool = False  # it maps the second image to the first one
 
 
+@public("vkbloom.testing")
 def diagnose(a: NDArray[Any], b: NDArray[Any]) -> Diagnosis:
     """Name the single cause of the difference of `b` from `a`, with its figure.
 

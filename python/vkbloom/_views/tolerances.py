@@ -10,6 +10,7 @@ from typing import Any, Final, Literal
 import numpy as np
 
 from vkbloom._checks import check_number
+from vkbloom._public import public
 from vkbloom._views.comparison import METRICS, Comparison, Metric
 
 Stage = Literal["shape and dtype", "finiteness", "exact", "tolerances", "SSIM", "FLIP"]
@@ -27,6 +28,7 @@ DEFAULTS: Final[Mapping[str, tuple[float, float]]] = {
 }
 
 
+@public("vkbloom.testing")
 @dataclass(frozen=True, kw_only=True)
 class Tolerances:
     """The allowed differences of an image from its reference, named as in OpenImageIO's `idiff`.

@@ -11,6 +11,7 @@ from numpy.typing import DTypeLike, NDArray
 
 from vkbloom._array_cache import kept
 from vkbloom._checks import check_size
+from vkbloom._public import public
 from vkbloom._settings.fields import check_fields, number_field, value_field
 from vkbloom.psf._base import Array, centred, check_wavelengths
 from vkbloom.psf._sampled import SampledPSF
@@ -32,6 +33,7 @@ _SRGB = np.array(
 )
 
 
+@public("vkbloom.psf")
 @dataclasses.dataclass(frozen=True)
 class iris:
     """The mask of a camera's iris, for `aperture`.
@@ -155,6 +157,7 @@ def _check_wavelengths(wavelengths: Any) -> tuple[float, ...]:
     return lengths
 
 
+@public("vkbloom.psf")
 @dataclasses.dataclass(frozen=True)
 class aperture(SampledPSF):
     """Diffraction of an aperture of any shape, in white light or single wavelengths, in pixels.

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from vkbloom._argument_types import checked
 from vkbloom._checks import check_floats, check_number, check_size, plain_array
+from vkbloom._public import public
 from vkbloom._settings.fields import Record
 
 if TYPE_CHECKING:
@@ -24,6 +25,7 @@ Array = NDArray[np.float64]
 FRAME_DEGREES = 50.0
 
 
+@public("vkbloom.psf")
 class PSF(Record, abc.ABC):
     """Base class of the point-spread functions of `vkbloom.psf`.
 

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from vkbloom._array_cache import kept
 from vkbloom._core_kernel import CoreKernel, core_kernel
 from vkbloom._io.disk_cache import DiskCache
+from vkbloom._public import defining_module
 
 Size = tuple[int, int]
 
@@ -66,7 +67,7 @@ def _core_kernel(shape: WithKernel, frame: Size, buffers: Size) -> CoreKernel:
     fields = tuple(getattr(shape, name) for name in shape.shaping)
     kind = type(shape)
     # A subclass of a user's may have another formula under the same name.
-    is_ours = kind.__module__.startswith(_OURS) and _is_there(kind)
+    is_ours = defining_module(kind).startswith(_OURS) and _is_there(kind)
     key = _key((kind.__name__, *fields, frame, buffers)) if is_ours else None
     data = CACHE.read(key) if key else None
     if data is not None:
@@ -99,7 +100,7 @@ def _update(digest: Any, value: Any) -> bool:
         digest.update(f"{len(value)}\n".encode())
         return all(_update(digest, item) for item in value)
     kind = type(value)
-    is_pure = dataclasses.is_dataclass(kind) and kind.__module__ in _PURE_MODULES
+    is_pure = dataclasses.is_dataclass(kind) and defining_module(kind) in _PURE_MODULES
     if not is_pure or not _is_there(kind):
         return False
     digest.update(f"{kind.__name__}\n".encode())
@@ -108,7 +109,7 @@ def _update(digest: Any, value: Any) -> bool:
 
 def _is_there(kind: type[Any]) -> bool:
     """Return whether a class is the one that its module has under its name."""
-    return getattr(sys.modules.get(kind.__module__), kind.__name__, None) is kind
+    return getattr(sys.modules.get(defining_module(kind)), kind.__name__, None) is kind
 
 
 @functools.cache

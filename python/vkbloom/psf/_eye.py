@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
+from vkbloom._public import public
 from vkbloom._settings.fields import number_field, numbers_field
 from vkbloom.psf._base import Array, in_grey
 from vkbloom.psf._radial import RadialPSF
@@ -22,6 +23,7 @@ _SHARES: dict[str, tuple[float, float, float, float]] = {
 }
 
 
+@public("vkbloom.psf")
 @dataclasses.dataclass(frozen=True)
 class spencer(RadialPSF):
     """Glare of the eye by day, at dusk and at night, by Spencer et al.
@@ -67,6 +69,7 @@ class spencer(RadialPSF):
         return np.asarray(total + shares[3] * halo)
 
 
+@public("vkbloom.psf")
 @dataclasses.dataclass(frozen=True)
 class cie_general(RadialPSF):
     """The CIE's general disability glare, for 0.1 to 100 degrees.
@@ -100,6 +103,7 @@ class cie_general(RadialPSF):
         return in_grey(10 / angle**3 + veil + 0.0025 * self.pigment)
 
 
+@public("vkbloom.psf")
 @dataclasses.dataclass(frozen=True)
 class cie_total(RadialPSF):
     """The CIE's total glare, the complete point-spread function of the eye.

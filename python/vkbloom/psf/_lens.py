@@ -9,11 +9,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vkbloom._checks import check_size
+from vkbloom._public import public
 from vkbloom._settings.fields import number_field
 from vkbloom.psf._base import PSF, Array, check_radii, in_grey
 from vkbloom.psf._radial import RadialPSF, bessel, integrate_pixels
 
 
+@public("vkbloom.psf")
 @dataclasses.dataclass(frozen=True)
 class gaussian(PSF):
     """A Gaussian, defined in pixels.
@@ -57,6 +59,7 @@ class gaussian(PSF):
         return in_grey(np.exp(-2 * (math.pi * self.sigma * cycles) ** 2))
 
 
+@public("vkbloom.psf")
 @dataclasses.dataclass(frozen=True)
 class airy(PSF):
     """Diffraction of a circular aperture at one wavelength, defined in pixels.
@@ -114,6 +117,7 @@ class airy(PSF):
         return in_grey(2 / np.pi * (np.arccos(v) - v * np.sqrt(1 - v**2)))
 
 
+@public("vkbloom.psf")
 @dataclasses.dataclass(frozen=True)
 class harvey_shack(RadialPSF):
     """Veiling glare of a camera lens, which is the light that its surfaces scatter.

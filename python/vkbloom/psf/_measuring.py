@@ -9,6 +9,7 @@ from typing import Any, cast
 import numpy as np
 
 from vkbloom._array_cache import kept
+from vkbloom._public import public
 from vkbloom._settings.fields import value_field
 from vkbloom._settings.registry import METHODS
 from vkbloom._settings.settings import Settings, given_settings
@@ -28,6 +29,7 @@ def _read_settings(settings: Any) -> Settings:
     return given
 
 
+@public("vkbloom.psf")
 @dataclasses.dataclass(frozen=True)
 class measured(SampledPSF):
     """The bloom of one pixel of 1, computed by `vkbloom.reference`, defined in pixels.

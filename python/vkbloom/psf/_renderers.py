@@ -11,6 +11,7 @@ import numpy as np
 
 from vkbloom._array_cache import kept
 from vkbloom._checks import FLT_MAX
+from vkbloom._public import public
 from vkbloom._settings.fields import number_field, numbers_field, value_field
 from vkbloom.psf._base import PSF, Array, centred, in_grey
 from vkbloom.psf._resampling import box_resample
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from vkbloom.psf._values import ArrayValue
 
 
+@public("vkbloom.psf")
 @dataclasses.dataclass(frozen=True)
 class fog_glow(SampledPSF):
     """The kernel of Blender's Fog Glow before version 4.4, defined in pixels.
@@ -63,6 +65,7 @@ def _check_image(image: Any) -> SampledPSF | ArrayValue:
     return held
 
 
+@public("vkbloom.psf")
 @dataclasses.dataclass(frozen=True)
 class unreal(SampledPSF):
     """The kernel that Unreal Engine's convolution bloom makes from an image, defined in pixels.

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
+from vkbloom._public import public
 from vkbloom._settings.fields import value_field
 from vkbloom.psf._base import PSF, Array, centred, check_radii, in_grey
 from vkbloom.psf._values import ArrayValue
@@ -76,6 +77,7 @@ def check_values(name: str, values: Any) -> ArrayValue:
     return held
 
 
+@public("vkbloom.psf")
 @dataclasses.dataclass(frozen=True)
 class samples(SampledPSF):
     """An array as a point-spread function.

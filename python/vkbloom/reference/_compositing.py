@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from vkbloom._argument_types import ANY, checked_as
+from vkbloom._public import public
 from vkbloom._settings.settings import Settings, given_settings
 
 from ._darktable import screened
@@ -18,6 +19,7 @@ from ._tape import joined
 from ._tone_map import ENCODINGS, TONE_MAPS
 
 
+@public("vkbloom.reference")
 @checked_as(bloom=ANY)
 def composite(
     scene: NDArray[Any],

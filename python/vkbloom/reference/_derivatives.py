@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from vkbloom._argument_types import checked
 from vkbloom._checks import plain_array
+from vkbloom._public import public
 from vkbloom._settings.fields import fields_of
 from vkbloom._settings.settings import Settings, given_settings
 
@@ -42,6 +43,7 @@ def check_known(name: str, names: Collection[str]) -> None:
         raise ValueError(f"gradients: {name!r} has no derivative; available: {', '.join(names)}")
 
 
+@public("vkbloom.reference")
 @checked
 def vjp(
     image: NDArray[Any],

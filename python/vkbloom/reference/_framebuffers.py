@@ -9,6 +9,7 @@ from numpy.typing import DTypeLike, NDArray
 
 from vkbloom._argument_types import checked
 from vkbloom._checks import check_emission, check_mask, native_order, view_image
+from vkbloom._public import public
 from vkbloom._settings.registry import METHODS, Reference
 from vkbloom._settings.settings import Settings, given_settings
 
@@ -20,6 +21,7 @@ from ._sampling import Array, sample, scaled, size_of
 from ._threshold import apply_threshold, masked
 
 
+@public("vkbloom.reference")
 @checked
 def apply(
     image: NDArray[Any],
@@ -151,6 +153,7 @@ def _first_buffer(
     return glow, glow
 
 
+@public("vkbloom.reference")
 @checked
 def passes(
     glow: NDArray[Any],
@@ -208,6 +211,7 @@ def passes(
     return _with_alphas(framebuffers) if has_alpha else framebuffers
 
 
+@public("vkbloom.reference")
 @checked
 def blur(
     glow: NDArray[Any],
@@ -230,6 +234,7 @@ def blur(
     return passes(glow, settings, size, format)["bloom"]
 
 
+@public("vkbloom.reference")
 @checked
 def gain(settings: Settings | str, size: tuple[int, int] = (1280, 720)) -> Any:
     """Return the bloom of a flat image of 1, without clamps and before the intensity.

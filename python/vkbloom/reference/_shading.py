@@ -7,6 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from vkbloom._public import public
+
 from ._image import as_float, storage
 from ._sampling import Array
 
@@ -18,6 +20,7 @@ _SPECULAR = 0.75
 _SHININESS = 8
 
 
+@public("vkbloom.reference")
 def shade(
     albedo: NDArray[Any],
     normal: NDArray[Any],

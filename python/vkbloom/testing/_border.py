@@ -11,6 +11,7 @@ from typing import Any, Final
 import numpy as np
 
 from vkbloom._argument_types import checked
+from vkbloom._public import public
 from vkbloom.testing._deviations import Findings, Measured, fail, figure, judge
 from vkbloom.testing._point_spread import border_share, check_inside, sum_error
 from vkbloom.testing._probe import (
@@ -84,6 +85,7 @@ class _Lights:
         return float(spread.sum()), lit
 
 
+@public("vkbloom.testing")
 @checked
 def assert_border(
     bloom: Bloom, probe: Probe = DEFAULT, *, limits: Mapping[str, float] | None = None
@@ -217,6 +219,7 @@ def _check_stale(bloom: Bloom, probe: Probe, dark: Image, allowed: float) -> Non
         judge(law, ("stale", off, allowed, text))
 
 
+@public("vkbloom.testing")
 @checked
 def assert_views(bloom: Bloom, probe: Probe = DEFAULT, *, limit: float = 1e-3) -> None:
     """Assert that no light crosses from one view of a picture to the other.

@@ -12,6 +12,7 @@ import numpy as np
 
 from vkbloom._argument_types import checked
 from vkbloom._checks import check_number
+from vkbloom._public import public
 from vkbloom._views import markup
 from vkbloom._views.markup import element
 from vkbloom.testing._border import takes
@@ -27,6 +28,7 @@ __tracebackhide__ = True
 COLOURS: Final = {"required": "#c33", "broken": "#b60", "untested": "#888", "held": "inherit"}
 
 
+@public("vkbloom.testing")
 @dataclass(frozen=True, kw_only=True)
 class LawRow:
     """One law of a report.
@@ -70,6 +72,7 @@ class LawRow:
         return {True: "yes", False: "no", None: "not tested"}[self.held]
 
 
+@public("vkbloom.testing")
 @dataclass(frozen=True, eq=False, kw_only=True)
 class LawReport:
     """Which laws a bloom holds.
@@ -175,6 +178,7 @@ def cells(row: LawRow) -> tuple[str, str]:
     return ("", "") if math.isnan(row.off) else (f"{row.off:.3g}", f"{row.limit:.3g}")
 
 
+@public("vkbloom.testing")
 @checked
 def report(
     bloom: Bloom,

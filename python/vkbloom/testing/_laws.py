@@ -15,6 +15,7 @@ import numpy as np
 
 from vkbloom._argument_types import FUNCTION, NAMES, checked, checked_as
 from vkbloom._checks import check_number
+from vkbloom._public import public
 from vkbloom.testing._deviations import compare_with_law, raise_coarse
 from vkbloom.testing._probe import DEFAULT, Bloom, Error, Image, Probe
 
@@ -25,6 +26,7 @@ _SEEN_GAIN: Final = 0.025
 _SWAPPED: Final = {"x": "left and right", "y": "top and bottom", "xy": "rows and columns"}
 
 
+@public("vkbloom.testing")
 @checked
 def assert_superposition(bloom: Bloom, probe: Probe = DEFAULT) -> None:
     """Assert that the bloom of a mixture of two images is the mixture of their blooms.
@@ -54,6 +56,7 @@ def _mixture(probe: Probe) -> tuple[Image, Image, tuple[float, float]]:
     return a, b, (0.5, 0.25)
 
 
+@public("vkbloom.testing")
 @checked_as(glow=FUNCTION)
 def assert_additive(
     bloom: Bloom,
@@ -93,6 +96,7 @@ def assert_additive(
     compare_with_law(probe, law, picture, image + intensity * light, allowed)
 
 
+@public("vkbloom.testing")
 @checked
 def assert_gain(bloom: Bloom, gain: float, probe: Probe = DEFAULT) -> None:
     """Assert the gain of flat images.
@@ -128,6 +132,7 @@ def check_gain(bloom: Bloom, gain: float, probe: Probe, accuracy: float = 0.0) -
         compare_with_law(probe, law, result, gain * image, allowed, seen=seen)
 
 
+@public("vkbloom.testing")
 @checked_as(axes=NAMES)
 def assert_symmetric(
     bloom: Bloom,
@@ -170,6 +175,7 @@ def _check_shift_seen(probe: Probe, result: Image, allowed: Error, axis: int) ->
         raise_coarse(probe, text)
 
 
+@public("vkbloom.testing")
 @checked
 def assert_no_ringing(bloom: Bloom, probe: Probe = DEFAULT) -> None:
     """Assert that the bloom of an edge has no dark or bright line beside the edge.
@@ -200,6 +206,7 @@ def assert_no_ringing(bloom: Bloom, probe: Probe = DEFAULT) -> None:
         compare_with_law(probe, law, result, highest, 2 * error)
 
 
+@public("vkbloom.testing")
 @checked
 def assert_bounded_fireflies(
     bloom: Bloom,

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from vkbloom._argument_types import checked
 from vkbloom._checks import check_index, check_number
+from vkbloom._public import public
 from vkbloom.testing._deviations import fail, judge
 from vkbloom.testing._point_spread import border_share, check_inside
 from vkbloom.testing._probe import Bloom, Image, Probe, call
@@ -26,6 +27,7 @@ _LIGHT: Final = 0.5
 _DIM: Final = 1e-3
 
 
+@public("vkbloom.testing")
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Stability:
     """Figures of the bloom of a light that moves along x, along y and along both.
@@ -91,6 +93,7 @@ class Stability:
         return _variation(self.radius)
 
 
+@public("vkbloom.testing")
 @checked
 def stability(
     bloom: Bloom,
@@ -164,6 +167,7 @@ def stability(
     )
 
 
+@public("vkbloom.testing")
 @checked
 def assert_stable(
     bloom: Bloom,

@@ -9,6 +9,7 @@ import numpy as np
 
 from vkbloom._argument_types import checked
 from vkbloom._checks import check_number, check_size
+from vkbloom._public import public
 from vkbloom.testing._deviations import Findings, compare_with_law, fail, judge
 from vkbloom.testing._probe import DEFAULT, Bloom, Error, Image, Probe
 
@@ -19,6 +20,7 @@ __tracebackhide__ = True
 _AT_THE_BORDER: Final = 1e-3
 
 
+@public("vkbloom.testing")
 @checked
 def point_spread(
     bloom: Bloom, probe: Probe = DEFAULT, *, at: tuple[int, int] | None = None
@@ -56,6 +58,7 @@ def point_spread(
     return measured_spread(bloom, probe, at)[0]
 
 
+@public("vkbloom.testing")
 @checked
 def assert_separable(bloom: Bloom, probe: Probe = DEFAULT) -> None:
     """Assert that the point spread is the product of a row and a column.
@@ -92,6 +95,7 @@ def assert_separable(bloom: Bloom, probe: Probe = DEFAULT) -> None:
     compare_with_law(probe, law, spread, product, allowed, note=note)
 
 
+@public("vkbloom.testing")
 @checked
 def assert_centroid_kept(
     bloom: Bloom,
@@ -145,6 +149,7 @@ def assert_centroid_kept(
     findings.conclude()
 
 
+@public("vkbloom.testing")
 @checked
 def veiling_glare_index(
     bloom: Bloom,

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom._checks import check_index, check_number, check_size, plain_array
+from vkbloom._public import public
 from vkbloom.testing._levels import Levels
 
 __tracebackhide__ = True
@@ -93,6 +94,7 @@ def guarded(bloom: Bloom) -> Bloom:
     return guard
 
 
+@public("vkbloom.testing")
 @dataclass(frozen=True, kw_only=True)
 class Probe:
     """The kind of test image for the laws, and the allowed errors of the results.

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from vkbloom._argument_types import checked
 from vkbloom._checks import check_number
 from vkbloom._io.array_files import read, write
+from vkbloom._public import public
 from vkbloom.testing._levels import Levels
 from vkbloom.testing._probe import Bloom
 
@@ -38,6 +39,7 @@ _TRACEBACK: Final = "Traceback (most recent call last):"
 _LAST_WORDS: Final = 300  # characters of a failed program's output that an error quotes
 
 
+@public("vkbloom.testing")
 @checked
 def command(argv: Sequence[str], *, suffix: str = ".exr", timeout: float = 60.0) -> Bloom:
     """Make a bloom for the laws out of a program.

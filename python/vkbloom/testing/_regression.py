@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom._checks import native_order, plain_array
+from vkbloom._public import public
 from vkbloom._renderer.frames import Frames
 from vkbloom._version import installed_version
 from vkbloom._views.tolerances import Tolerances
@@ -33,6 +34,7 @@ class Limits(TypedDict, total=False):
     allow_nan: bool
 
 
+@public("vkbloom.testing")
 class FrameRegression:
     """Compares frames with references; the type of the fixture `frame_regression`.
 

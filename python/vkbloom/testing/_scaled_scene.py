@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from vkbloom._argument_types import checked
 from vkbloom._checks import check_number
+from vkbloom._public import public
 from vkbloom.testing._deviations import fail, judge
 from vkbloom.testing._moving_light import area_sampled, moments
 from vkbloom.testing._probe import Bloom, Image, Probe
@@ -26,6 +27,7 @@ _RINGS: Final = 4
 _FINE: Final = 512
 
 
+@public("vkbloom.testing")
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ResolutionResponse:
     """Figures of the bloom of one scene at several sizes.
@@ -53,6 +55,7 @@ class ResolutionResponse:
     errors: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
 
 
+@public("vkbloom.testing")
 @checked
 def resolution_response(
     bloom: Bloom,
@@ -108,6 +111,7 @@ def _figures(lit: Image, value: float) -> tuple[float, float, float]:
     return r50, r90, float(lit.max()) / value
 
 
+@public("vkbloom.testing")
 @checked
 def assert_resolution_independent(
     bloom: Bloom,

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from vkbloom._argument_types import checked
 from vkbloom._checks import check_number, import_extra, plain_array
 from vkbloom._io.srgb import decode_srgb, encode_srgb
+from vkbloom._public import public
 
 # WCAG 2.2, "general flash and red flash thresholds": changes of at least a tenth of the largest
 # relative luminance, the darker of which is below 0.8; more than three flashes within a second, on
@@ -32,6 +33,7 @@ _FIELD_PIXELS: Final = 32
 _EXACT: Final = 1e-6
 
 
+@public("vkbloom.testing")
 @dataclass(frozen=True, kw_only=True)
 class Flash:
     """Flashes of a sequence, by the thresholds of WCAG 2.2.
@@ -69,6 +71,7 @@ class Flash:
         )
 
 
+@public("vkbloom.testing")
 @dataclass(frozen=True, kw_only=True)
 class Flicker:
     """How visible the flicker of a sequence is.
@@ -90,6 +93,7 @@ class Flicker:
     contrast: NDArray[np.float64]
 
 
+@public("vkbloom.testing")
 @checked
 def flash(frames: Iterable[NDArray[Any]], fps: float, *, degrees: float) -> Flash:
     """Judge a sequence by the general and the red flash thresholds of WCAG 2.2.
@@ -243,6 +247,7 @@ def _reduced(light: NDArray[np.float64], degrees: float) -> NDArray[np.float64]:
     return means
 
 
+@public("vkbloom.testing")
 @checked
 def flicker(frames: Iterable[NDArray[Any]], fps: float) -> Flicker:
     """Measure how visible the flicker of a sequence is.

@@ -11,6 +11,7 @@ import numpy as np
 
 from vkbloom._argument_types import checked
 from vkbloom._checks import check_number
+from vkbloom._public import public
 from vkbloom.reference._glare import texels_at
 from vkbloom.testing._deviations import Findings, Measured, fail, figure, judge
 from vkbloom.testing._moving_light import moments
@@ -69,6 +70,7 @@ def _contours(spread: Image) -> dict[float, float]:
     return results
 
 
+@public("vkbloom.testing")
 @checked
 def assert_round(bloom: Bloom, probe: Probe = DEFAULT, *, limit: float = 1.35) -> None:
     """Assert that the bloom of a pixel is round.
@@ -102,6 +104,7 @@ def check_round(spread: Image, limit: float) -> None:
     judge(law, *measured)
 
 
+@public("vkbloom.testing")
 @checked
 def assert_sizes(
     bloom: Bloom, probe: Probe = DEFAULT, *, limits: Mapping[str, float] | None = None

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom._argument_types import checked
+from vkbloom._public import public
 from vkbloom.testing._border import takes
 from vkbloom.testing._deviations import fail, figure, is_within, judge
 from vkbloom.testing._moving_light import area_sampled
@@ -59,6 +60,7 @@ def _inverse(index: int, base: int) -> float:
     return result
 
 
+@public("vkbloom.testing")
 @checked
 def assert_jitter(
     bloom: Bloom,
@@ -210,6 +212,7 @@ def _threshold_ratio(bloom: Bloom, probe: Probe, limit: float) -> float:
     return first(True, flat) / flat if blooms(probe.value, True) else 1.0
 
 
+@public("vkbloom.testing")
 @checked
 def assert_history(
     bloom: Bloom, probe: Probe = DEFAULT, *, limits: Mapping[str, float] | None = None

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from vkbloom._argument_types import checked
 from vkbloom._checks import check_number
+from vkbloom._public import public
 from vkbloom.testing._deviations import judge
 from vkbloom.testing._probe import (
     DEFAULT,
@@ -26,6 +27,7 @@ __tracebackhide__ = True
 _BACKDROPS = (0.0, 0.25)
 
 
+@public("vkbloom.testing")
 @checked
 def assert_alpha(bloom: Bloom, probe: Probe = DEFAULT, *, limit: float = 0.01) -> None:
     """Assert that glow over transparent ground is the glow of the flattened picture.
