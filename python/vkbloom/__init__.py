@@ -30,9 +30,9 @@ except ImportError as error:
     _core = stand_in(error)
 else:
     from vkbloom import _errors
-    from vkbloom._suggestions import unknown
+    from vkbloom._spelling import describe_unknown
 
-    _core.connect(_errors, unknown)
+    _core.connect(_errors, describe_unknown)
 # These supply the registries of methods, stages of glare and presets.
 from vkbloom import _glare, _methods, _presets  # noqa: F401
 from vkbloom._version import installed_version

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple, TypeVar, cast
 
 import numpy as np
 
-from vkbloom._checks import as_float
+from vkbloom._numbers import as_float
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 _Test = Callable[[Any], bool]

@@ -1,8 +1,8 @@
-"""Properties of framebuffers by name and shape: the leading one, and the names of dimensions."""
+"""Framebuffers by name and shape: the requested ones, the leading one, the names of dimensions."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from numpy.typing import NDArray
@@ -35,3 +35,10 @@ def dimensions(arrays: Mapping[str, NDArray[Any]]) -> dict[str, tuple[str, ...]]
         if array.ndim == 3:
             named[name] += (prefixes.setdefault(array.shape[2:], f"{name}_") + "channel",)
     return named
+
+
+def check_framebuffers(framebuffers: str | Sequence[str]) -> tuple[str, ...] | None:
+    """Return the names of the requested framebuffers; None for all."""
+    if isinstance(framebuffers, str):
+        return None if framebuffers == "all" else (framebuffers,)
+    return tuple(framebuffers)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from vkbloom._checks import import_extra
+from vkbloom._extras import import_extra
 from vkbloom._gradients.operators import (
     number_of,
     refuse_capture,

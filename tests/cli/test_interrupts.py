@@ -90,7 +90,7 @@ def test_imports_of_compiled_packages_are_not_interrupted(tmp_path: Path) -> Non
         "import os, signal\nos.kill(os.getpid(), signal.SIGINT)\nwhole = 1\n"
     )
     code = (
-        "import sys; from vkbloom._checks import import_extra\n"
+        "import sys; from vkbloom._extras import import_extra\n"
         "try: import_extra('compiled', 'images', '')\n"
         "except KeyboardInterrupt: print(sys.modules['compiled'].whole)"
     )

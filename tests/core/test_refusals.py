@@ -23,7 +23,7 @@ from tests.refusals import assert_refused, rows
 from vkbloom import FilamentBloom, Frames, Renderer, Scene, Separable, Settings, _core, presets, psf
 from vkbloom._renderer.surface import Surface
 from vkbloom._settings.registry import METHODS, STAGES
-from vkbloom._suggestions import nearest
+from vkbloom._spelling import nearest
 
 SIZE = (16, 9)
 
@@ -176,7 +176,7 @@ def test_nothing_is_near() -> None:
 def test_registries_are_tables() -> None:
     lines = [line.split() for line in repr(METHODS).splitlines()]
     assert ["pyramid", "vkbloom._methods.mip_chain:Pyramid"] in lines
-    assert ">streaks</td>" in STAGES._repr_html_()
+    assert ">streaks</th>" in STAGES._repr_html_()
 
 
 @pytest.mark.parametrize(

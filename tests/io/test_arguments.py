@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 import vkbloom
 from tests.framebuffers import names_in
 from tests.refusals import assert_refused, rows
-from vkbloom._checks import check_image, check_mask
+from vkbloom._image_arguments import check_image, check_mask
 
 IMAGE = np.zeros((16, 24, 3), np.float32)
 RANDOM = np.random.default_rng(2).random((5, 7, 3), dtype=np.float32)

@@ -33,7 +33,7 @@ from vkbloom._cli.terminal import is_quiet, note, say
 from vkbloom._custom.method import CustomMethod, identifier_of
 from vkbloom._io import safe_writing
 from vkbloom._renderer.interruptible import opened_renderer
-from vkbloom._suggestions import did_you_mean
+from vkbloom._spelling import did_you_mean
 from vkbloom._views.plain_values import plain
 from vkbloom.testing import _comparing as comparing
 from vkbloom.testing import _measuring as measuring

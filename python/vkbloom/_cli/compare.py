@@ -11,13 +11,13 @@ from typing import Any
 import click
 from rich.console import Console
 
-from vkbloom._checks import check_number
 from vkbloom._cli import fields
 from vkbloom._cli.image_files import other_parts, read, subimage_option
 from vkbloom._cli.program import as_wrong_use
 from vkbloom._cli.terminal import is_quiet, note, say
 from vkbloom._io import image_writing, safe_writing
 from vkbloom._io.images import Picture, StoredImage
+from vkbloom._numbers import check_number
 from vkbloom._views.comparison import Comparison, compare, difference
 from vkbloom._views.diagnosis import Diagnosis, diagnose
 from vkbloom._views.plain_values import plain

@@ -22,7 +22,7 @@ from vkbloom._cli.sequences import as_file
 from vkbloom._settings.fields import FieldInfo, Kind, fields_of
 from vkbloom._settings.glare import Glare
 from vkbloom._settings.registry import METHODS, STAGES, glares
-from vkbloom._suggestions import did_you_mean, nearest, unknown
+from vkbloom._spelling import describe_unknown, did_you_mean, nearest
 from vkbloom.psf._base import PSF, functions
 
 if TYPE_CHECKING:
@@ -389,7 +389,7 @@ class NameOf(_ParamType):
         """Return the name as it was published."""
         names = {name.lower(): name for names in self._known for name in names}
         if value.lower() not in names:
-            self.fail(unknown(f"unknown {self.name}", value, names.values()), param, ctx)
+            self.fail(describe_unknown(f"unknown {self.name}", value, names.values()), param, ctx)
         return names[value.lower()]
 
     def shell_complete(

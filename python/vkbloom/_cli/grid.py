@@ -22,7 +22,7 @@ from vkbloom._renderer.frame_files import settings_facts
 from vkbloom._renderer.interruptible import opened_renderer
 from vkbloom._settings.fields import fields_of
 from vkbloom._settings.settings import SHADINGS, field_info
-from vkbloom._suggestions import did_you_mean
+from vkbloom._spelling import did_you_mean
 
 _PRESETS: Final = fields.NameOf("preset", vkbloom.presets)
 

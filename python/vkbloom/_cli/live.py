@@ -16,7 +16,6 @@ import click
 from numpy.typing import NDArray
 
 import vkbloom
-from vkbloom._checks import import_extra
 from vkbloom._cli.fields import SIZE, Command
 from vkbloom._cli.image_files import read_picture, reading_options
 from vkbloom._cli.interrupts import INTERRUPTED
@@ -26,6 +25,7 @@ from vkbloom._cli.sequences import is_stream
 from vkbloom._cli.settings_options import STARTS, settings_options
 from vkbloom._cli.terminal import tell_device
 from vkbloom._explorer.viewer import GLOW, Viewer
+from vkbloom._extras import import_extra
 from vkbloom._io.images import Picture
 from vkbloom._presets.start import developed, start_of
 from vkbloom._renderer.surface import Surface

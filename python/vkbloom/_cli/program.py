@@ -19,7 +19,7 @@ from vkbloom._cli import terminal
 from vkbloom._cli.interrupts import INTERRUPTED, raise_interrupts
 from vkbloom._free_memory import ADVICE, memory_left
 from vkbloom._settings.registry import METHODS
-from vkbloom._suggestions import did_you_mean
+from vkbloom._spelling import did_you_mean
 
 #: What the commands do, by the modules of this package that have a click command `command`.
 COMMANDS: Final = {

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from typing import TYPE_CHECKING, Any
 
-from vkbloom._checks import import_extra
+from vkbloom._extras import import_extra
 from vkbloom._public import public
 
 if TYPE_CHECKING:

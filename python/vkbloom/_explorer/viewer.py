@@ -39,7 +39,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom import _core
-from vkbloom._checks import check_image, check_number, check_size
 from vkbloom._custom.method import CustomType, registered
 from vkbloom._custom.source import read_source
 from vkbloom._explorer.controls import (
@@ -50,10 +49,12 @@ from vkbloom._explorer.controls import (
     settings_from,
 )
 from vkbloom._explorer.fast_pictures import picture_of, shown_pixels
+from vkbloom._image_arguments import check_image
 from vkbloom._io import image_reading
 from vkbloom._io.expansion import check_expansion
 from vkbloom._io.image_writing import levels_of
 from vkbloom._io.images import Highlights, Picture
+from vkbloom._numbers import check_number, check_size
 from vkbloom._presets.start import developed, start_of
 from vkbloom._renderer.frame_files import settings_facts
 from vkbloom._renderer.plans import Pass

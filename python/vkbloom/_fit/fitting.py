@@ -15,13 +15,15 @@ from numpy.typing import NDArray
 
 from vkbloom import _core
 from vkbloom._argument_types import MANY_SETTINGS, checked_as
-from vkbloom._checks import check_image, check_index, import_extra
+from vkbloom._extras import import_extra
 from vkbloom._fit.descent import Descent, check_derivatives
 from vkbloom._fit.losses import Loss, Measure, light, loss_named, reduced
 from vkbloom._fit.result import FitResult, loss_text
 from vkbloom._fit.search import CLOSE, ENOUGH, Search
 from vkbloom._fit.space import Bounds, Space, space_of, spaces_of_all
 from vkbloom._gradients import pullback_of
+from vkbloom._image_arguments import check_image
+from vkbloom._numbers import check_index
 from vkbloom._public import public
 from vkbloom._renderer.default import default_renderer
 from vkbloom._renderer.image import Image

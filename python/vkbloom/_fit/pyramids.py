@@ -9,10 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom._argument_types import checked
-from vkbloom._checks import check_index, check_size, import_extra
+from vkbloom._extras import import_extra
 from vkbloom._fit.losses import Measure, light
 from vkbloom._fit.result import FitResult
 from vkbloom._methods.mip_chain import Pyramid
+from vkbloom._numbers import check_index, check_size
 from vkbloom._public import public
 from vkbloom._renderer.default import default_renderer
 from vkbloom._renderer.renderer import Renderer

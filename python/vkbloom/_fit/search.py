@@ -9,7 +9,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom._checks import import_extra
+from vkbloom._extras import import_extra
 from vkbloom._fit.losses import Measure
 from vkbloom._fit.space import Point, Space
 

@@ -10,10 +10,10 @@ from typing import Any, Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom._checks import check_number
+from vkbloom._numbers import check_number
 from vkbloom._settings.fields import FieldInfo, fields_of
 from vkbloom._settings.settings import Settings
-from vkbloom._suggestions import did_you_mean
+from vkbloom._spelling import did_you_mean
 
 #: Coordinates, 0 to 1, one for each axis.
 Point = NDArray[np.float64]

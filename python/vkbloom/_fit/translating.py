@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom._argument_types import checked
-from vkbloom._checks import check_size
 from vkbloom._fit.fitting import fit
 from vkbloom._fit.losses import DARK, Loss
 from vkbloom._fit.result import FitResult
 from vkbloom._fit.space import Bounds, varied_as
 from vkbloom._locks import cached_property
+from vkbloom._numbers import check_size
 from vkbloom._public import public
 from vkbloom._renderer.default import default_renderer
 from vkbloom._renderer.renderer import Renderer

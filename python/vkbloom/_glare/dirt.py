@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom._array_cache import kept
-from vkbloom._checks import check_number
 from vkbloom._core_kernel import CoreKernel
+from vkbloom._numbers import check_number
 from vkbloom._public import public
 from vkbloom._settings.fields import value_field
 from vkbloom._settings.glare import Glare, stage_field

@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom._argument_types import ANY, INTEGER, NUMBER, checked_as
-from vkbloom._checks import check_image, check_number
 from vkbloom._gradients.pulling import vjp
+from vkbloom._image_arguments import check_image
 from vkbloom._methods.convolution import Convolution, PSFLike, read_psf
+from vkbloom._numbers import check_number
 from vkbloom._public import public
 from vkbloom._renderer.default import default_renderer
 from vkbloom._renderer.renderer import Renderer

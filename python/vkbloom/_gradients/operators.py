@@ -12,9 +12,10 @@ from typing import Any, Final, NamedTuple, cast
 
 import numpy as np
 
-from vkbloom._checks import check_mask, import_extra
+from vkbloom._extras import import_extra
 from vkbloom._gradients.passes import in_floats
 from vkbloom._gradients.pulling import pull_each, pullback_of
+from vkbloom._image_arguments import check_mask
 from vkbloom._renderer.default import default_renderer, renderer_on
 from vkbloom._renderer.device_arrays import DeviceArray, merged, take
 from vkbloom._renderer.renderer import RENDERERS, Renderer

@@ -11,11 +11,11 @@ from typing import Any, Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom._checks import check_time
+from vkbloom._numbers import check_time
 from vkbloom._settings.fields import fields_of, plain_value
 from vkbloom._settings.registry import presets
 from vkbloom._settings.settings import Settings, check_settings, field_info, given_settings
-from vkbloom._suggestions import did_you_mean
+from vkbloom._spelling import did_you_mean
 
 Kind = Literal["settings", "time", "preset"]
 

@@ -12,8 +12,8 @@ import warnings
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any, Final, TypeAlias
 
-from vkbloom._checks import import_extra
 from vkbloom._core import Error
+from vkbloom._extras import import_extra
 from vkbloom._grid.filling import Filler, progress_bar
 from vkbloom._grid.layout import Grid, Layout, lay_out, origin
 from vkbloom._grid.order import Block

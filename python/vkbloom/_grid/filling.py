@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom._background_writer import written_in_background
-from vkbloom._checks import import_extra
+from vkbloom._extras import import_extra
 from vkbloom._grid.layout import Grid, Layout, checked_value
 from vkbloom._grid.order import Block, Index, points
 from vkbloom._grid.sources import visit

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom._argument_types import checked
-from vkbloom._checks import check_index, import_extra
+from vkbloom._extras import import_extra
 from vkbloom._free_memory import memory_left
 from vkbloom._grid import cluster
 from vkbloom._grid.filling import Filler, progress_bar
@@ -21,6 +21,7 @@ from vkbloom._grid.layout import Grid, Layout, Variable, ask, lay_out, made_data
 from vkbloom._grid.order import Block, Index, default_chunk, read_part
 from vkbloom._grid.sources import ImageSource
 from vkbloom._grid.store import IDENTITY, GridStore, chunk_in, folder_of, prepare, stored_identity
+from vkbloom._numbers import check_index
 from vkbloom._public import public
 from vkbloom._renderer.default import default_renderer
 from vkbloom._renderer.frames import Frames

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom import _core
-from vkbloom._checks import check_framebuffers, import_extra
-from vkbloom._framebuffers import dimensions, leading
+from vkbloom._extras import import_extra
+from vkbloom._framebuffers import check_framebuffers, dimensions, leading
 from vkbloom._grid.axes import Axis, read_axes, settings_of
 from vkbloom._grid.order import Index, ranking_of, walk
 from vkbloom._grid.sources import Point, Source, read_source, visit

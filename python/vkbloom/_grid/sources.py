@@ -12,9 +12,11 @@ from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
 import numpy as np
 
 from vkbloom import _core
-from vkbloom._checks import check_framebuffers, check_image, check_size, check_time
+from vkbloom._framebuffers import check_framebuffers
 from vkbloom._grid.order import Index
+from vkbloom._image_arguments import check_image
 from vkbloom._locks import cached_property
+from vkbloom._numbers import check_size, check_time
 from vkbloom._renderer.device_arrays import ImportedArray
 from vkbloom._renderer.frames import Frames
 from vkbloom._renderer.image import Image

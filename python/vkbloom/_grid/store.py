@@ -27,7 +27,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom._checks import import_extra
+from vkbloom._extras import import_extra
 from vkbloom._grid.layout import Grid, Layout, Variable, made_dataset
 from vkbloom._grid.order import WHOLE, Block, Index, Part, blocks
 from vkbloom._settings.fields import plain_value

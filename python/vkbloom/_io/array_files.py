@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom._argument_types import FLAG, checked, checked_as
-from vkbloom._checks import check_index, import_extra
+from vkbloom._extras import import_extra
 from vkbloom._io import image_reading, image_writing, safe_writing
 from vkbloom._io.alpha import divided, hidden_notes, multiplied
 from vkbloom._io.displayed import Saved, check_saved
@@ -28,6 +28,7 @@ from vkbloom._io.images import (
     is_exr,
 )
 from vkbloom._io.narrowing import narrowed
+from vkbloom._numbers import check_index
 from vkbloom._public import public
 from vkbloom._version import installed_version
 

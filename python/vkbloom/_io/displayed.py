@@ -11,7 +11,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom._checks import import_extra
+from vkbloom._extras import import_extra
 from vkbloom._io.hdr_curves import ENCODERS
 from vkbloom._io.images import SPACES
 from vkbloom._io.narrowing import narrowed

@@ -7,7 +7,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom._checks import check_number
+from vkbloom._numbers import check_number
 
 #: Values up to this one stay as they are: 0.91 of an 8-bit file in sRGB, the level 231.
 KNEE: Final = 0.8

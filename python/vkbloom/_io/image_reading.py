@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom._c_paths import for_c
-from vkbloom._checks import import_extra
+from vkbloom._extras import import_extra
 from vkbloom._io.alpha import Meaning, channels_of, divided, light_of, meaning_of
 from vkbloom._io.colour import LAB, linear
 from vkbloom._io.containers import HEIF_ADVICE, fits_scale, is_heif, orientation_of, upright

@@ -12,13 +12,15 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from vkbloom._arrays import native_order
 from vkbloom._c_paths import for_c
-from vkbloom._checks import check_index, import_extra, native_order
+from vkbloom._extras import import_extra
 from vkbloom._io import displayed, safe_writing
 from vkbloom._io.displayed import Saved
 from vkbloom._io.exr_attributes import without_colours, write_own
 from vkbloom._io.images import DTYPES, PIXEL_TYPES, SPACES, WITH_WINDOWS, Picture, is_exr
 from vkbloom._io.narrowing import file_note, for_radiance, narrowed
+from vkbloom._numbers import check_index
 
 if TYPE_CHECKING:
     import OpenImageIO

@@ -28,8 +28,8 @@ from typing import Any, Final, Literal, Self, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from vkbloom._arrays import native_order, plain_array
 from vkbloom._c_paths import is_name
-from vkbloom._checks import native_order, plain_array
 
 #: "linear", "srgb" or the name of a colour space of OpenColorIO.
 Colour: TypeAlias = str

@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, BinaryIO, Final
 import numpy as np
 
 from vkbloom._c_paths import for_c, in_utf8
-from vkbloom._checks import import_extra
+from vkbloom._extras import import_extra
 from vkbloom._io.images import check_name, failure_of
 from vkbloom._io.readable_copies import readable
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from typing import ClassVar
 
-from vkbloom._checks import FLT_MAX
+from vkbloom._numbers import MAX_FLOAT
 from vkbloom._public import public
 from vkbloom._settings.fields import choice_field, flag_field, number_field, numbers_field
 from vkbloom._settings.settings import Composite, PublishedSettings
@@ -79,7 +79,7 @@ class GodotBloom(PublishedSettings):
     glow_bloom: float = number_field("glow_bloom")
     strength: float = number_field("strength", slider=(0, 2))
     level_weights: tuple[float, ...] = numbers_field(
-        (0.0, 0.8, 0.4, 0.1, 0.0, 0.0, 0.0), high=FLT_MAX
+        (0.0, 0.8, 0.4, 0.1, 0.0, 0.0, 0.0), high=MAX_FLOAT
     )
     bicubic: bool = flag_field("bicubic")
     white: float = number_field("white", slider=(1, 16))

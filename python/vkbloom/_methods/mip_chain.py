@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from typing import ClassVar
 
-from vkbloom._checks import check_floats
+from vkbloom._numbers import check_floats
 from vkbloom._public import public
 from vkbloom._settings.fields import flag_field, number_field
 from vkbloom._settings.settings import Settings

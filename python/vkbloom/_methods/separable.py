@@ -8,7 +8,7 @@ from typing import ClassVar, Literal
 
 from vkbloom import _core
 from vkbloom._argument_types import INTEGER, NUMBER, checked_as
-from vkbloom._checks import FLT_MAX, check_above, check_index
+from vkbloom._numbers import MAX_FLOAT, check_above, check_index
 from vkbloom._public import public
 from vkbloom._settings.fields import choice_field, flag_field, number_field, numbers_field
 from vkbloom._settings.settings import Settings
@@ -63,7 +63,7 @@ class Separable(Settings):
     blur_scale: float = number_field("blur_scale", unit="texel", slider=(0.1, 2))
     blur_strength: float = number_field("blur_strength", slider=(0, 4))
     weights: tuple[float, ...] = numbers_field(
-        TUTORIAL, -FLT_MAX, FLT_MAX, count=(1, _core.MAX_WEIGHTS)
+        TUTORIAL, -MAX_FLOAT, MAX_FLOAT, count=(1, _core.MAX_WEIGHTS)
     )
     loops: int = number_field("loops", slider=(1, 8))
     layers: tuple[tuple[float, float], ...] = numbers_field(

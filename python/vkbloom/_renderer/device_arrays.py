@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple, NoReturn
 import numpy as np
 
 from vkbloom import _core
-from vkbloom._checks import device_kind, on_another_device
+from vkbloom._arrays import device_kind, on_another_device
 from vkbloom._public import public
 
 if TYPE_CHECKING:

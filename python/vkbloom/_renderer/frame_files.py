@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom._checks import import_extra
+from vkbloom._extras import import_extra
 from vkbloom._framebuffers import leading
 from vkbloom._io import image_reading, safe_writing
 from vkbloom._io.displayed import HDR_CURVES

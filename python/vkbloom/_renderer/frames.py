@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom._argument_types import checked
-from vkbloom._checks import import_extra
+from vkbloom._extras import import_extra
 from vkbloom._framebuffers import dimensions
 from vkbloom._public import public
 from vkbloom._renderer.device_arrays import DeviceArray, on_host
 from vkbloom._renderer.state import State
-from vkbloom._suggestions import unknown
+from vkbloom._spelling import describe_unknown
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -129,7 +129,7 @@ class Frames(Mapping[str, NDArray[Any]]):
         try:
             return self._arrays[name]
         except KeyError:
-            raise KeyError(unknown("unknown framebuffer", name, self._arrays)) from None
+            raise KeyError(describe_unknown("unknown framebuffer", name, self._arrays)) from None
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._arrays)

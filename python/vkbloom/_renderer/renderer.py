@@ -16,7 +16,8 @@ import numpy as np
 from vkbloom import _core
 from vkbloom._argument_types import checked
 from vkbloom._array_cache import ArrayCache, shared
-from vkbloom._checks import check_framebuffers, check_size
+from vkbloom._framebuffers import check_framebuffers
+from vkbloom._numbers import check_size
 from vkbloom._public import public
 from vkbloom._renderer import requests
 from vkbloom._renderer.adapter import bundled_driver, bundled_hash, from_core
@@ -44,7 +45,7 @@ from vkbloom._renderer.sources import (
 )
 from vkbloom._renderer.state import State
 from vkbloom._settings.settings import Settings, Shading, check_settings
-from vkbloom._suggestions import unknown
+from vkbloom._spelling import describe_unknown
 from vkbloom._version import installed_version
 
 if TYPE_CHECKING:
@@ -830,7 +831,7 @@ class Renderer:
         kinds = {_NUMBER.sub("#", name) for name in known}
         for name in names or ():
             if known and _NUMBER.sub("#", name) not in kinds:
-                raise ValueError(unknown("framebuffers: unknown framebuffer", name, known))
+                raise ValueError(describe_unknown("framebuffers: unknown framebuffer", name, known))
 
     def _run_requests(
         self,

@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 from vkbloom import _core
-from vkbloom._checks import check_emission, check_image, check_mask, check_size, check_time
+from vkbloom._image_arguments import check_emission, check_image, check_mask
+from vkbloom._numbers import check_size, check_time
 from vkbloom._renderer.device_arrays import ImportedArray, on_cuda, on_host, take
 from vkbloom._renderer.image import Image
 from vkbloom._settings.settings import check_shading

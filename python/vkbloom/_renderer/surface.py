@@ -7,7 +7,8 @@ from collections import deque
 from typing import TYPE_CHECKING, Any, Final, Self, cast
 
 from vkbloom import _core
-from vkbloom._checks import check_size, import_extra
+from vkbloom._extras import import_extra
+from vkbloom._numbers import check_size
 from vkbloom._renderer.sources import image_source, is_image, scene_source
 from vkbloom._settings.settings import check_settings
 

@@ -9,7 +9,7 @@ from typing import Any, ClassVar, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom._checks import plain_array
+from vkbloom._arrays import plain_array
 
 #: The longest side, far above the 4096 that every Vulkan device supports. It rejects the sizes of
 #: damaged images. The device's own limit is checked at upload.

@@ -25,7 +25,7 @@ from urllib.parse import unquote
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom._checks import import_extra
+from vkbloom._extras import import_extra
 
 Floats: TypeAlias = NDArray[np.float64]
 # An object of pygltflib, which has no type hints.

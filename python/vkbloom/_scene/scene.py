@@ -18,7 +18,7 @@ from typing import Final
 import numpy as np
 
 from vkbloom._argument_types import PATH, checked_as
-from vkbloom._checks import check_above, check_floats, check_number
+from vkbloom._numbers import check_above, check_floats, check_number
 from vkbloom._public import public
 from vkbloom._scene import gltf
 from vkbloom._scene import skybox as sky

@@ -16,7 +16,7 @@ from typing import Any, Final, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom._checks import plain_array
+from vkbloom._arrays import plain_array
 from vkbloom._io import image_reading
 from vkbloom._scene import ktx
 from vkbloom._scene.arrays import MAX_SIDE, Constructed, check_levels

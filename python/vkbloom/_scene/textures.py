@@ -8,7 +8,7 @@ from typing import Any, Final, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom._checks import check_integer
+from vkbloom._numbers import check_integer
 from vkbloom._scene.arrays import Constructed, check_levels
 
 #: How a texture continues beyond its edge, and how texels are filtered: WebGPU's names.

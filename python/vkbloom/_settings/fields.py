@@ -17,16 +17,16 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import Any, ClassVar, Final, Literal, Self
 
 from vkbloom import _core
-from vkbloom._checks import (
-    FLT_MAX,
+from vkbloom._locks import ProcessLock
+from vkbloom._numbers import (
+    MAX_FLOAT,
     check_above,
     check_floats,
     check_integer,
     check_number,
     check_size,
 )
-from vkbloom._locks import ProcessLock
-from vkbloom._suggestions import did_you_mean, lacking
+from vkbloom._spelling import describe_missing_fields, did_you_mean
 
 Kind = Literal[
     "flag",
@@ -86,7 +86,7 @@ class FieldInfo:
     fixed: str = ""
     narrowed: bool = False
     count: tuple[int, int] | None = None
-    limits: Range = (0.0, FLT_MAX)
+    limits: Range = (0.0, MAX_FLOAT)
     columns: int = 0
     read: Callable[[Any], Any] | None = None
     text: str = ""
@@ -314,7 +314,7 @@ class _ConstructorSignature:
 def _unknown(kind: type[Record], name: str, unknown: list[str]) -> str:
     """Return the text of an error for fields that a class lacks."""
     others = {other: fields_of(other_kind) for other, other_kind in kind._classes().items()}
-    return lacking(name, unknown, fields_of(kind), others)
+    return describe_missing_fields(name, unknown, fields_of(kind), others)
 
 
 class Record:

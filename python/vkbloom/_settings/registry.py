@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Final, Protocol
 
-from vkbloom._suggestions import Named
+from vkbloom._settings.named import Named
 
 if TYPE_CHECKING:
     from vkbloom._settings.glare import Glare

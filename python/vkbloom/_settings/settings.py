@@ -24,7 +24,7 @@ from vkbloom._settings.fields import (
 )
 from vkbloom._settings.glare import Glare, check_glare, replaced_stages, stage_field_of
 from vkbloom._settings.registry import METHODS, glares, presets
-from vkbloom._suggestions import did_you_mean, unknown
+from vkbloom._spelling import describe_unknown, did_you_mean
 
 Shading = Literal["forward", "deferred"]
 Composite = Literal["add", "mix", "screen", "soft_light", "replace"]
@@ -281,7 +281,7 @@ def check_settings(
         given = METHODS[settings].__name__
         package = "" if METHODS.is_added(settings) else "vkbloom."
         raise ValueError(f"{name}: {settings!r} is a method; give {package}{given}()")
-    raise ValueError(unknown(f"{name}: unknown preset", settings, presets))
+    raise ValueError(describe_unknown(f"{name}: unknown preset", settings, presets))
 
 
 def given_settings(settings: Settings | str, name: str = "settings") -> Settings:

@@ -10,7 +10,7 @@ from typing import Any, Final, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom._checks import import_extra
+from vkbloom._extras import import_extra
 from vkbloom._io.images import checked_pixels
 from vkbloom._io.srgb import decode_srgb
 

@@ -72,7 +72,10 @@ def table(
     cell: Mapping[str, object] = _NO_ATTRIBUTES,
     **attributes: object,
 ) -> Markup:
-    """Return rows whose first value is their name; `name`, `cell`: attributes of the cells."""
+    """Return rows whose first value is their name.
+
+    `name`, `cell`: attributes of cells with the name of a row or column, and of all others.
+    """
     name, cell = ({**given, "style": f"{_CELL};{given.get('style', '')}"} for given in (name, cell))
     body = [
         element(
@@ -82,7 +85,7 @@ def table(
         )
         for first, *rest in rows
     ]
-    heads = [element("th", text, scope="col", style=_CELL) for text in head]
+    heads = [element("th", text, scope="col", **name) for text in head]
     return element(
         "table",
         *([] if caption is None else [element("caption", caption)]),

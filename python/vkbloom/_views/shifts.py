@@ -8,7 +8,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom._checks import import_extra
+from vkbloom._extras import import_extra
 
 _Image = NDArray[np.float64]
 _Shift = tuple[float, float]

@@ -9,7 +9,7 @@ from typing import Any, Final, Literal
 
 import numpy as np
 
-from vkbloom._checks import check_number
+from vkbloom._numbers import check_number
 from vkbloom._public import public
 from vkbloom._views.comparison import METRICS, Comparison, Metric
 

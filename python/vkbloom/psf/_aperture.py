@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from vkbloom._array_cache import kept
-from vkbloom._checks import check_size
+from vkbloom._numbers import check_size
 from vkbloom._public import public
 from vkbloom._settings.fields import check_fields, number_field, value_field
 from vkbloom.psf._base import Array, centred, check_wavelengths

@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from vkbloom._argument_types import checked
-from vkbloom._checks import check_floats, check_number, check_size, plain_array
+from vkbloom._arrays import plain_array
+from vkbloom._numbers import check_floats, check_number, check_size
 from vkbloom._public import public
 from vkbloom._settings.fields import Record
 

@@ -8,7 +8,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vkbloom._checks import check_size
+from vkbloom._numbers import check_size
 from vkbloom._public import public
 from vkbloom._settings.fields import number_field
 from vkbloom.psf._base import PSF, Array, check_radii, in_grey

@@ -10,7 +10,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vkbloom._checks import check_above, check_size
+from vkbloom._numbers import check_above, check_size
 from vkbloom.psf._base import FRAME_DEGREES, PSF, Array, check_radii
 
 # (first distance in pixels, nodes along a side of a pixel). The outer parts are smooth and need

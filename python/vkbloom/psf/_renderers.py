@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vkbloom._array_cache import kept
-from vkbloom._checks import FLT_MAX
+from vkbloom._numbers import MAX_FLOAT
 from vkbloom._public import public
 from vkbloom._settings.fields import number_field, numbers_field, value_field
 from vkbloom.psf._base import PSF, Array, centred, in_grey
@@ -101,7 +101,7 @@ class unreal(SampledPSF):
     image: Any = value_field(read=_check_image)
     center: tuple[float, float] | None = numbers_field(None, 0, 1, count=(2, 2))
     size: float = number_field(default=1.0, range=(0.001, 4))
-    prefilter: tuple[float, float, float] = numbers_field((7.0, 15000.0, 15.0), high=FLT_MAX)
+    prefilter: tuple[float, float, float] = numbers_field((7.0, 15000.0, 15.0), high=MAX_FLOAT)
     scatter: float = number_field(default=1.0, range=(0, 1000))
 
     def native_array(self) -> Array:

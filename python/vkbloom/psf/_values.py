@@ -15,7 +15,7 @@ from typing import Any, Final, Self
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from vkbloom._checks import plain_array
+from vkbloom._arrays import plain_array
 
 #: The arrays of this process by names that are never used again: PyTorch compiles with strings as
 #: constants, but not with objects.

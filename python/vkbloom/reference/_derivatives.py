@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom._argument_types import checked
-from vkbloom._checks import plain_array
+from vkbloom._arrays import plain_array
 from vkbloom._public import public
 from vkbloom._settings.fields import fields_of
 from vkbloom._settings.settings import Settings, given_settings

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from vkbloom._argument_types import checked
-from vkbloom._checks import check_emission, check_mask, native_order, view_image
+from vkbloom._arrays import native_order, view_image
+from vkbloom._image_arguments import check_emission, check_mask
 from vkbloom._public import public
 from vkbloom._settings.registry import METHODS, Reference
 from vkbloom._settings.settings import Settings, given_settings

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom._checks import view_image
+from vkbloom._arrays import view_image
 
 from ._sampling import Array
 

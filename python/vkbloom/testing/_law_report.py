@@ -11,7 +11,7 @@ from typing import Final
 import numpy as np
 
 from vkbloom._argument_types import checked
-from vkbloom._checks import check_number
+from vkbloom._numbers import check_number
 from vkbloom._public import public
 from vkbloom._views import markup
 from vkbloom._views.markup import element

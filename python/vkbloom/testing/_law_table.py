@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
-from vkbloom._suggestions import did_you_mean
+from vkbloom._spelling import did_you_mean
 from vkbloom.testing import _border as border
 from vkbloom.testing import _law_tests as tests
 from vkbloom.testing import _laws as laws

@@ -14,7 +14,7 @@ from typing import Final, Literal
 import numpy as np
 
 from vkbloom._argument_types import FUNCTION, NAMES, checked, checked_as
-from vkbloom._checks import check_number
+from vkbloom._numbers import check_number
 from vkbloom._public import public
 from vkbloom.testing._deviations import compare_with_law, raise_coarse
 from vkbloom.testing._probe import DEFAULT, Bloom, Error, Image, Probe

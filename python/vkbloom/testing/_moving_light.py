@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom._argument_types import checked
-from vkbloom._checks import check_index, check_number
+from vkbloom._numbers import check_index, check_number
 from vkbloom._public import public
 from vkbloom.testing._deviations import fail, judge
 from vkbloom.testing._point_spread import border_share, check_inside

@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from vkbloom._argument_types import checked
-from vkbloom._checks import check_number, check_size
+from vkbloom._numbers import check_number, check_size
 from vkbloom._public import public
 from vkbloom.testing._deviations import Findings, compare_with_law, fail, judge
 from vkbloom.testing._probe import DEFAULT, Bloom, Error, Image, Probe

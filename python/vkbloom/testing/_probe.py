@@ -11,7 +11,8 @@ from typing import Any, Final, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom._checks import check_index, check_number, check_size, plain_array
+from vkbloom._arrays import plain_array
+from vkbloom._numbers import check_index, check_number, check_size
 from vkbloom._public import public
 from vkbloom.testing._levels import Levels
 

@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom._argument_types import checked
-from vkbloom._checks import check_number
 from vkbloom._io.array_files import read, write
+from vkbloom._numbers import check_number
 from vkbloom._public import public
 from vkbloom.testing._levels import Levels
 from vkbloom.testing._probe import Bloom

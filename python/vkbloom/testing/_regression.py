@@ -11,7 +11,7 @@ from typing import Any, TypedDict, Unpack
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom._checks import native_order, plain_array
+from vkbloom._arrays import native_order, plain_array
 from vkbloom._public import public
 from vkbloom._renderer.frames import Frames
 from vkbloom._version import installed_version

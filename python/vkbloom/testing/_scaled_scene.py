@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom._argument_types import checked
-from vkbloom._checks import check_number
+from vkbloom._numbers import check_number
 from vkbloom._public import public
 from vkbloom.testing._deviations import fail, judge
 from vkbloom.testing._moving_light import area_sampled, moments

@@ -12,8 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom._argument_types import checked
-from vkbloom._checks import check_number, import_extra, plain_array
+from vkbloom._arrays import plain_array
+from vkbloom._extras import import_extra
 from vkbloom._io.srgb import decode_srgb, encode_srgb
+from vkbloom._numbers import check_number
 from vkbloom._public import public
 
 # WCAG 2.2, "general flash and red flash thresholds": changes of at least a tenth of the largest

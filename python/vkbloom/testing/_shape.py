@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 
 from vkbloom._argument_types import checked
-from vkbloom._checks import check_number
+from vkbloom._numbers import check_number
 from vkbloom._public import public
 from vkbloom.reference._glare import texels_at
 from vkbloom.testing._deviations import Findings, Measured, fail, figure, judge
