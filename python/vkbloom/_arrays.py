@@ -11,6 +11,16 @@ from numpy.typing import NDArray
 _DLPACK_CPU: Final = 1
 
 
+def check_dtype(name: str, value: Any) -> np.dtype[Any]:
+    """Return what NumPy makes of a dtype, or raise TypeError, also for None."""
+    try:
+        # To NumPy, None is float64.
+        return np.dtype("" if value is None else value)
+    # (Some names of dtypes are deprecated, which is an error where warnings are.)
+    except (TypeError, ValueError, DeprecationWarning):
+        raise TypeError(f"{name}: {value!r} is not a dtype") from None
+
+
 def plain_array(value: object, name: str) -> NDArray[Any]:
     """Return what NumPy makes of an object, as a plain ndarray: every array argument comes here.
 

@@ -223,3 +223,15 @@ def test_a_wrong_type_is_an_error_of_the_renderers_methods(
     function = getattr(renderer, method)
     for argument in wrong_arguments(function):
         check(function, needed(function), *argument)
+
+
+def test_an_object_of_another_class_of_the_same_name_is_refused() -> None:
+    values = {name: type(name, (), {})() for name in ("Camera", "PSF", "Probe", "Renderer")}
+    for call in (
+        lambda: testing.point_spread(blurred, values["Probe"]),
+        lambda: vkbloom.capture("a.rdc", renderer=values["Renderer"]),
+        lambda: vkbloom.fit_pyramid(values["PSF"]),
+        lambda: vkbloom.Scene.from_gltf("a.gltf", camera=values["Camera"]),
+    ):
+        with pytest.raises(TypeError, match=r"^(camera|probe|psf|renderer): .* is not a "):
+            call()

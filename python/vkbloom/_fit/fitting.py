@@ -6,7 +6,7 @@ import contextlib
 import dataclasses
 import itertools
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
 from functools import partial
 from typing import Any, Final, Literal, overload
 
@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom import _core
-from vkbloom._argument_types import MANY_SETTINGS, checked_as
+from vkbloom._argument_types import checked
 from vkbloom._extras import import_extra
 from vkbloom._fit.descent import Descent, check_derivatives
 from vkbloom._fit.losses import Loss, Measure, light, loss_named, reduced
@@ -85,7 +85,7 @@ def fit(
     progress: bool = ...,
 ) -> list[FitResult]: ...
 @public("vkbloom")
-@checked_as(settings=MANY_SETTINGS)
+@checked
 def fit(
     image: NDArray[Any] | Image,
     target: NDArray[Any],
@@ -172,6 +172,8 @@ def fit(
     candidates = _candidates(settings)
     names = _checked_names(vary)
     check_index("max_calls", max_calls, 1, 10_000_000)
+    if not isinstance(bounds, Mapping | None):
+        raise TypeError(f"bounds: {bounds!r} is not a mapping of fields to their bounds")
     for name in bounds or {}:
         if name not in names:
             raise ValueError(f"bounds: {name!r} is not among the varied fields {', '.join(names)}")
@@ -205,6 +207,8 @@ def _candidates(settings: Settings | Sequence[Settings | str] | str) -> list[Set
     """Return where the searches start."""
     if isinstance(settings, str) and settings == "all":
         return list(presets.values())
+    if not isinstance(settings, Settings | str | Iterable) or isinstance(settings, Mapping | Set):
+        raise TypeError(f"settings: {settings!r} is not a Settings or a sequence of them")
     some: list[Any] = [settings] if isinstance(settings, Settings | str) else list(settings)
     if not some:
         raise ValueError("settings: there are none; give at least one")

@@ -16,7 +16,15 @@ from vkbloom._gradients.passes import DeviceGradients, Passes, check_finite, in_
 from vkbloom._methods.separable import Separable
 from vkbloom._public import public
 from vkbloom._renderer.default import default_renderer
-from vkbloom._renderer.device_arrays import ImportedArray, on_cuda, on_host, place_of, placed, take
+from vkbloom._renderer.device_arrays import (
+    Device,
+    ImportedArray,
+    on_cuda,
+    on_host,
+    place_of,
+    placed,
+    take,
+)
 from vkbloom._renderer.frames import Frames
 from vkbloom._renderer.image import Image
 from vkbloom._renderer.renderer import Renderer
@@ -27,7 +35,7 @@ from vkbloom.reference import vjp as reference_vjp
 from vkbloom.reference._derivatives import Gradients, check_cotangents, check_shape, differentiable
 
 if TYPE_CHECKING:
-    from vkbloom._renderer.device_arrays import Destination, Device
+    from vkbloom._renderer.device_arrays import Destination
 
 Derivatives = Mapping[str, NDArray[Any]]
 #: From cotangents by framebuffer to derivatives by name.

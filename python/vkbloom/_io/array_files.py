@@ -13,7 +13,7 @@ from typing import Any, Final, Literal, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom._argument_types import FLAG, checked, checked_as
+from vkbloom._argument_types import checked
 from vkbloom._extras import import_extra
 from vkbloom._io import image_reading, image_writing, safe_writing
 from vkbloom._io.alpha import divided, hidden_notes, multiplied
@@ -60,7 +60,7 @@ def read(
     metadata: Literal[True],
 ) -> tuple[NDArray[Any], dict[str, Any]]: ...
 @public("vkbloom")
-@checked_as(metadata=FLAG)
+@checked
 def read(
     path: str | os.PathLike[str],
     *,

@@ -7,7 +7,7 @@ import math
 from typing import ClassVar, Literal
 
 from vkbloom import _core
-from vkbloom._argument_types import INTEGER, NUMBER, checked_as
+from vkbloom._argument_types import checked
 from vkbloom._numbers import MAX_FLOAT, check_above, check_index
 from vkbloom._public import public
 from vkbloom._settings.fields import choice_field, flag_field, number_field, numbers_field
@@ -75,7 +75,7 @@ class Separable(Settings):
 
 
 @public("vkbloom")
-@checked_as(sigma=NUMBER, radius=INTEGER)
+@checked
 def gaussian_weights(sigma: float, radius: int | None = None) -> tuple[float, ...]:
     """Make a normalized Gaussian half-kernel.
 

@@ -8,10 +8,11 @@ import math
 import os
 import re
 import weakref
-from collections import abc
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Sized
 from typing import TYPE_CHECKING, Any, Final, Literal, NoReturn, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vkbloom import _core
 from vkbloom._argument_types import checked
@@ -49,10 +50,6 @@ from vkbloom._spelling import describe_unknown
 from vkbloom._version import installed_version
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-
-    from numpy.typing import NDArray
-
     from vkbloom._renderer.plans import Plan
     from vkbloom._scene import Scene
 
@@ -319,7 +316,7 @@ class Renderer:
         framebuffers: Literal["all"] | str | Sequence[str] = "all",
         out: Mapping[str, Any] | None = None,
         device: Device | None = None,
-        state: Mapping[str, NDArray[Any]] | None = None,
+        state: Mapping[str, Any] | None = None,
     ) -> Frames:
         """Render a scene with its bloom.
 
@@ -389,7 +386,7 @@ class Renderer:
         framebuffers: Literal["all"] | str | Sequence[str] = "all",
         out: Mapping[str, Any] | None = None,
         device: Device | None = None,
-        state: Mapping[str, NDArray[Any]] | None = None,
+        state: Mapping[str, Any] | None = None,
     ) -> Frames:
         """Add bloom to an image.
 
@@ -452,7 +449,7 @@ class Renderer:
         *,
         framebuffers: Literal["all"] | str | Sequence[str] = "all",
         device: Device | None = None,
-        state: Mapping[str, NDArray[Any]] | None = None,
+        state: Mapping[str, Any] | None = None,
     ) -> Iterator[Frames]:
         """Add bloom to many images.
 
@@ -507,17 +504,17 @@ class Renderer:
         is_one = isinstance(images, str | bytes) or (
             isinstance(images, np.ndarray) and images.ndim != 4
         )
-        if (not isinstance(images, abc.Iterable) and not on_cuda(images)) or is_one:
+        if (not isinstance(images, Iterable) and not on_cuda(images)) or is_one:
             raise TypeError(
                 f"images: {type(images).__name__} is not an iterable of images; for one image, "
                 "call apply or pass a list"
             )
         chosen: Settings | Sequence[Settings]
-        if isinstance(settings, abc.Sequence) and not isinstance(settings, str):
+        if isinstance(settings, Sequence) and not isinstance(settings, str):
             chosen = [
                 check_settings(item, f"settings[{number}]") for number, item in enumerate(settings)
             ]
-            if isinstance(images, abc.Sized) and len(images) != len(chosen):
+            if isinstance(images, Sized) and len(images) != len(chosen):
                 raise ValueError(
                     f"settings: {len(chosen)} Settings do not match the {len(images)} images"
                 )
@@ -798,11 +795,11 @@ class Renderer:
     ) -> Iterator[Frames]:
         destination = self._placed(device)
         # Not a generator, so that arguments are checked at the call and not with the first frame.
-        if not isinstance(settings, abc.Iterable) or isinstance(settings, str | bytes):
+        if not isinstance(settings, Iterable) or isinstance(settings, str | bytes):
             raise TypeError(f"settings: {settings!r} is not an iterable of Settings")
         if self.closed:
             raise ValueError("the renderer is closed")
-        if isinstance(settings, abc.Sequence):
+        if isinstance(settings, Sequence):
             settings = tuple(settings)
             if names:
                 self._check_names(source, settings, names)

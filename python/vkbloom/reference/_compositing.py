@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from vkbloom._argument_types import ANY, checked_as
+from vkbloom._argument_types import checked
+from vkbloom._arrays import check_dtype
 from vkbloom._public import public
 from vkbloom._settings.settings import Settings, given_settings
 
@@ -20,7 +21,7 @@ from ._tone_map import ENCODINGS, TONE_MAPS
 
 
 @public("vkbloom.reference")
-@checked_as(bloom=ANY)
+@checked
 def composite(
     scene: NDArray[Any],
     bloom: NDArray[Any] | None,
@@ -70,7 +71,7 @@ def composite(
     """
     settings = given_settings(settings)
     image = as_float(scene, "scene", (3, 4))
-    stored = np.asarray(scene).dtype if dtype is None else dtype
+    stored = np.asarray(scene).dtype if dtype is None else check_dtype("dtype", dtype)
     if not settings.bloom:
         return composite_checked(image, None, settings, stored)
     if bloom is None:

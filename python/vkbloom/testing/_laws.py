@@ -13,7 +13,7 @@ from typing import Final, Literal
 
 import numpy as np
 
-from vkbloom._argument_types import FUNCTION, NAMES, checked, checked_as
+from vkbloom._argument_types import checked
 from vkbloom._numbers import check_number
 from vkbloom._public import public
 from vkbloom.testing._deviations import compare_with_law, raise_coarse
@@ -57,7 +57,7 @@ def _mixture(probe: Probe) -> tuple[Image, Image, tuple[float, float]]:
 
 
 @public("vkbloom.testing")
-@checked_as(glow=FUNCTION)
+@checked
 def assert_additive(
     bloom: Bloom,
     glow: Bloom | None = None,
@@ -133,7 +133,7 @@ def check_gain(bloom: Bloom, gain: float, probe: Probe, accuracy: float = 0.0) -
 
 
 @public("vkbloom.testing")
-@checked_as(axes=NAMES)
+@checked
 def assert_symmetric(
     bloom: Bloom,
     probe: Probe = DEFAULT,

@@ -11,7 +11,7 @@ from typing import Any, Final, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom._arrays import plain_array
+from vkbloom._arrays import check_dtype, plain_array
 from vkbloom._numbers import check_index, check_number, check_size
 from vkbloom._public import public
 from vkbloom.testing._levels import Levels
@@ -139,11 +139,7 @@ class Probe:
         object.__setattr__(self, "size", check_size("size", self.size))
         if self.channels is not None:
             check_index("channels", self.channels, 1, 4)
-        try:
-            # To NumPy, None is float64.
-            dtype = np.dtype("" if self.dtype is None else self.dtype)
-        except TypeError:
-            raise TypeError(f"dtype: {self.dtype!r} is not a dtype") from None
+        dtype = check_dtype("dtype", self.dtype)
         if dtype.name not in _ERRORS:
             raise ValueError(f"dtype: {dtype} is not one of {', '.join(_ERRORS)}")
         object.__setattr__(self, "dtype", dtype)

@@ -215,6 +215,8 @@ def _largest_share(flashing: NDArray[np.bool_], field: float) -> float:
 
 def _lights(frames: Iterable[NDArray[Any]], degrees: float) -> Iterator[NDArray[np.float64]]:
     """Yield the linear light of each frame, reduced to about the pixels that a field needs."""
+    if not isinstance(frames, Iterable):
+        raise TypeError(f"frames: {frames!r} is not a sequence of images")
     shape: tuple[int, ...] | None = None
     count = 0
     for count, frame in enumerate(frames, start=1):  # noqa: B007  it is read after the loop
@@ -273,7 +275,7 @@ def flicker(frames: Iterable[NDArray[Any]], fps: float) -> Flicker:
     display distortions", SIGGRAPH 2024.
     """
     check_number("fps", fps, 1e-3, 1e5)
-    kept = list(frames) if find_spec("pycvvdp") else frames
+    kept = list(frames) if isinstance(frames, Iterable) and find_spec("pycvvdp") else frames
     lights = np.stack(list(_lights(kept, _FIELD)))
     luminances = lights @ _LUMINANCE
     mean = luminances.mean(axis=0)
