@@ -9,6 +9,7 @@ import json
 import math
 import pickle
 import re
+from collections.abc import Callable
 from decimal import Decimal
 from fractions import Fraction
 from pathlib import Path
@@ -21,7 +22,7 @@ import vkbloom
 from tests.processes import output
 from vkbloom import Separable, Settings, _core, gaussian_weights, presets
 from vkbloom._methods.separable import TUTORIAL
-from vkbloom._settings.fields import fields_of
+from vkbloom._settings.fields import fields_of, number_field, value_field
 from vkbloom._settings.registry import METHODS
 
 DEFAULTS = {
@@ -252,3 +253,31 @@ def test_choices_are_names_of_the_core(kind: type[Settings]) -> None:
     for name, info in fields_of(kind).items():
         if name in vkbloom._core.CHOICES:
             assert set(info.choices) <= set(vkbloom._core.CHOICES[name])
+
+
+@pytest.mark.parametrize(
+    ("declare", "message"),
+    [
+        (
+            lambda: number_field(silder=(0, 1)),  # type: ignore[call-arg]
+            "Planted.radius: 'silder' is not a keyword; did you mean 'slider'?",
+        ),
+        (
+            lambda: value_field(0.0, help="x"),  # type: ignore[call-arg]
+            "Planted.radius: 'help' is not a keyword; these are kind, ",
+        ),
+        (lambda: number_field(core="raduis"), "Planted.radius: the core has no 'raduis'; build"),
+    ],
+)
+def test_a_wrong_declaration_fails_where_the_class_is_declared(
+    declare: Callable[[], Any], message: str
+) -> None:
+    """The error names the class and the field."""
+
+    def plant() -> None:
+        type("Planted", (Settings,), {"radius": declare()})
+
+    # (Python 3.11 makes a RuntimeError of it.)
+    with pytest.raises((TypeError, RuntimeError)) as caught:
+        plant()
+    assert str(caught.value.__cause__ or caught.value).startswith(message)

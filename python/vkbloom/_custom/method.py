@@ -24,7 +24,7 @@ from vkbloom._custom.source import Source, read_source
 from vkbloom._locks import ProcessLock
 from vkbloom._public import public
 from vkbloom._settings.blocks import settings_block
-from vkbloom._settings.fields import number_field, value_field
+from vkbloom._settings.fields import choice_field, number_field
 from vkbloom._settings.registry import METHODS
 from vkbloom._settings.settings import Settings
 
@@ -279,9 +279,7 @@ def field_of(file: CustomFile, param: Param) -> tuple[Any, Any]:
         )
     if param.names:
         read = EnumReader(param.name, param.names)
-        return Literal[param.names], value_field(
-            param.names[0], kind="choice", choices=param.names, read=read, text=param.description
-        )
+        return Literal[param.names], choice_field(param.names, read=read, text=param.description)
     whole = param.number != "float"
     default = int(param.default) if whole else param.default
     return (int if whole else float), number_field(

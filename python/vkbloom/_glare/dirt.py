@@ -12,8 +12,8 @@ from vkbloom._array_cache import kept
 from vkbloom._core_kernel import CoreKernel
 from vkbloom._numbers import check_number
 from vkbloom._public import public
-from vkbloom._settings.fields import value_field
-from vkbloom._settings.glare import Glare, stage_field
+from vkbloom._settings.fields import number_field, value_field
+from vkbloom._settings.glare import Glare
 from vkbloom.psf._core_kernels import WithKernel
 from vkbloom.psf._sampled import check_values
 
@@ -51,8 +51,8 @@ class Dirt(WithKernel, Glare):
     shaping: ClassVar[tuple[str, ...]] = ("image", "seed")
 
     image: Any = value_field(None, optional=True, read=_read_image)
-    seed: int = stage_field("seed", slider=(0, 100))
-    strength: float = stage_field("strength", slider=(0, 1))
+    seed: int = number_field(slider=(0, 100))
+    strength: float = number_field(slider=(0, 1))
     mode: DirtMode = "multiply"
 
     def __post_init__(self) -> None:

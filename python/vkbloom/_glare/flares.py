@@ -7,8 +7,8 @@ from typing import ClassVar
 
 from vkbloom import _core
 from vkbloom._public import public
-from vkbloom._settings.fields import numbers_field
-from vkbloom._settings.glare import GlareLight, stage_field
+from vkbloom._settings.fields import number_field, numbers_field
+from vkbloom._settings.glare import GlareLight
 
 
 @public("vkbloom")
@@ -61,11 +61,11 @@ class Ghosts(GlareLight):
     tints: tuple[tuple[float, float, float], ...] = numbers_field(
         ((1.0, 1.0, 1.0),), count=(1, _core.MAX_GHOSTS)
     )
-    maximum: float = stage_field("maximum", slider=(0, 100))
-    falloff: float = stage_field("falloff", default=2.0, slider=(0, 32))
-    radius: float = stage_field("radius", default=0.75, slider=(0.001, 1.5))
-    vignette: float = stage_field("vignette")
-    aberration: float = stage_field("aberration", slider=(0, 0.05))
+    maximum: float = number_field(slider=(0, 100))
+    falloff: float = number_field(default=2.0, slider=(0, 32))
+    radius: float = number_field(default=0.75, slider=(0.001, 1.5))
+    vignette: float = number_field()
+    aberration: float = number_field(slider=(0, 0.05))
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -114,7 +114,7 @@ class Halo(GlareLight):
 
     stage: ClassVar[str] = "halo"
 
-    radius: float = stage_field("radius", default=0.4, slider=(0.001, 1.5))
-    width: float = stage_field("width", slider=(0.001, 1))
-    maximum: float = stage_field("maximum", slider=(0, 100))
-    aberration: float = stage_field("aberration", slider=(0, 0.05))
+    radius: float = number_field(default=0.4, slider=(0.001, 1.5))
+    width: float = number_field(slider=(0.001, 1))
+    maximum: float = number_field(slider=(0, 100))
+    aberration: float = number_field(slider=(0, 0.05))

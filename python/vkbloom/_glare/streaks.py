@@ -6,7 +6,8 @@ import dataclasses
 from typing import ClassVar
 
 from vkbloom._public import public
-from vkbloom._settings.glare import GlareLight, stage_field
+from vkbloom._settings.fields import number_field
+from vkbloom._settings.glare import GlareLight
 
 
 @public("vkbloom")
@@ -53,10 +54,10 @@ class Streaks(GlareLight):
 
     stage: ClassVar[str] = "streaks"
 
-    directions: int = stage_field("directions")
-    angle: float = stage_field("angle", unit="degree", slider=(-180, 180))
-    length: float = stage_field("length", unit="texel", slider=(0, 4))
-    fade: float = stage_field("fade")
-    base: int = stage_field("base")
-    iterations: int = stage_field("iterations")
-    colour_shift: float = stage_field("colour_shift")
+    directions: int = number_field()
+    angle: float = number_field(unit="degree", slider=(-180, 180))
+    length: float = number_field(unit="texel", slider=(0, 4))
+    fade: float = number_field()
+    base: int = number_field()
+    iterations: int = number_field()
+    colour_shift: float = number_field()

@@ -49,7 +49,7 @@ class BabylonBloom(PublishedSettings):
 
     method: ClassVar[str] = "babylon"
 
-    threshold: float | None = number_field("threshold", default=0.9, slider=(0, 4))
+    threshold: float | None = number_field(default=0.9, slider=(0, 4))
     kernel: float = number_field(default=64.0, range=(1, 256), option="kernel-width")
     scale: float = number_field(default=0.5, range=(0.01, 1))
     weight: float = number_field(default=0.15, range=(0, 65504), slider=(0, 2))

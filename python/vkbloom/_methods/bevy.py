@@ -60,12 +60,12 @@ class BevyBloom(PublishedSettings):
 
     method: ClassVar[str] = "bevy"
 
-    knee: float = number_field("knee", fixed="")
-    composite: Composite = choice_field("composite", ("mix", "add"))
-    intensity: float = number_field("intensity", default=0.15, range=(0, 1))
-    low_frequency_boost: float = number_field("low_frequency_boost")
-    low_frequency_boost_curvature: float = number_field("low_frequency_boost_curvature")
-    high_pass_frequency: float = number_field("high_pass_frequency")
-    max_mip_dimension: int = number_field("max_mip_dimension", unit="pixel", slider=(16, 1024))
-    scale_x: float = number_field("scale_x", slider=(0, 8))
-    scale_y: float = number_field("scale_y", slider=(0, 8))
+    knee: float = number_field(fixed="")
+    composite: Composite = choice_field(("mix", "add"))
+    intensity: float = number_field(default=0.15, range=(0, 1))
+    low_frequency_boost: float = number_field()
+    low_frequency_boost_curvature: float = number_field()
+    high_pass_frequency: float = number_field()
+    max_mip_dimension: int = number_field(unit="pixel", slider=(16, 1024))
+    scale_x: float = number_field(slider=(0, 8))
+    scale_y: float = number_field(slider=(0, 8))

@@ -132,26 +132,26 @@ class BlenderGlare(WithKernel, PublishedSettings):
     glow_note: ClassVar[str] = ""
 
     threshold: float | None = 1.0
-    intensity: float = number_field("intensity", range=(0, 1))
+    intensity: float = number_field(range=(0, 1))
     # On the command line, --size is the size of a frame, --version the program's, and --streaks a
     # stage of glare.
-    type: GlareType = choice_field("type", option="glare-type")
-    quality: Quality = choice_field("quality", option="glare-quality")
-    smoothness: float = number_field("smoothness")
-    maximum: float | None = number_field("maximum", default=None, slider=(0, 20))
-    saturation: float = number_field("saturation", slider=(0, 1))
+    type: GlareType = choice_field(option="glare-type")
+    quality: Quality = choice_field(option="glare-quality")
+    smoothness: float = number_field()
+    maximum: float | None = number_field(default=None, slider=(0, 20))
+    saturation: float = number_field(slider=(0, 1))
     tint: tuple[float, float, float] = numbers_field((1.0, 1.0, 1.0))
-    size: float = number_field("size", option="glare-size")
-    streaks: int = number_field("streaks", option="glare-streaks")
-    streaks_angle: float = number_field("streaks_angle", unit="degree")
-    iterations: int = number_field("iterations", default=3, range=(2, 5))
-    fade: float = number_field("fade")
-    color_modulation: float = number_field("color_modulation")
-    diagonal: bool = flag_field("diagonal")
+    size: float = number_field(option="glare-size")
+    streaks: int = number_field(option="glare-streaks")
+    streaks_angle: float = number_field(unit="degree")
+    iterations: int = number_field(default=3, range=(2, 5))
+    fade: float = number_field()
+    color_modulation: float = number_field()
+    diagonal: bool = flag_field()
     sun_position: tuple[float, ...] = numbers_field((0.5, 0.5), -16.0, 16.0)
-    jitter: float = number_field("jitter")
+    jitter: float = number_field()
     kernel: PSFLike | None = value_field(None, kind="psf", read=read_psf)
-    version: Version = choice_field("version", ("5.0", "5.2", "4.3"), option="blender-version")
+    version: Version = choice_field(("5.0", "5.2", "4.3"), option="blender-version")
 
     def _core_values(self) -> dict[str, Any]:
         """Return what the core names or counts otherwise."""

@@ -80,7 +80,7 @@ class Convolution(WithKernel, Settings):
         default=spencer(), kw_only=False, metadata={"kind": "psf", "read": read_psf}
     )
     normalize: bool = True
-    boundary: Boundary = choice_field("boundary", ("zero", "edge", "wrap", "wrap_x"))
+    boundary: Boundary = choice_field(("zero", "edge", "wrap", "wrap_x"))
     pixels_per_degree: float | None = number_field(default=None, range=(0, math.inf))
     kernel_size: tuple[int, int] | None = None
 

@@ -42,7 +42,7 @@ class DarktableBloom(PublishedSettings):
     method: ClassVar[str] = "darktable"
 
     threshold: float | None = number_field(default=90.0, range=(0, 100))
-    composite: Composite = choice_field("composite", ("screen",))
+    composite: Composite = choice_field(("screen",))
     blur_size: float = number_field(default=20.0, range=(0, 100))
     strength: float = number_field(default=25.0, range=(0, 100))
 

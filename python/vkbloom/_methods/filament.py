@@ -53,7 +53,7 @@ class FilamentBloom(PublishedSettings):
     method: ClassVar[str] = "filament"
 
     threshold: float | None = 1.0
-    intensity: float = number_field("intensity", default=0.1, range=(0, 1))
-    levels: int = number_field("levels", range=(1, 12))
-    resolution: int = number_field("resolution", unit="pixel", slider=(16, 1024))
-    highlight: float = number_field("highlight", slider=(10, 5000))
+    intensity: float = number_field(default=0.1, range=(0, 1))
+    levels: int = number_field(range=(1, 12))
+    resolution: int = number_field(unit="pixel", slider=(16, 1024))
+    highlight: float = number_field(slider=(10, 5000))

@@ -58,8 +58,8 @@ class Halation(GaussianSum):
     )
 
     threshold: float | None = value_field(None, fixed="film has no threshold")
-    composite: Composite = choice_field("composite", ("mix",))
-    intensity: float = number_field("intensity", default=1.0, range=(0, 1))
+    composite: Composite = choice_field(("mix",))
+    intensity: float = number_field(default=1.0, range=(0, 1))
     strength: Channels = numbers_field((0.08, 0.005, 0.001), option="halation_strength")
     sizes: Channels = numbers_field((200.0, 200.0, 200.0), option="halation_sizes")
     scattering_strength: Channels = numbers_field(

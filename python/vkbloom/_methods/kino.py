@@ -47,7 +47,7 @@ class KinoBloom(PublishedSettings):
     method: ClassVar[str] = "kino"
 
     threshold: float | None = ((0.8 + 0.055) / 1.055) ** 2.4  # 0.8 in sRGB
-    knee: float = number_field("knee", fixed="", default=0.5)
-    intensity: float = number_field("intensity", default=0.8)
-    radius: float = number_field("radius", default=2.5, range=(1, 7))
-    anti_flicker: bool = flag_field("anti_flicker")
+    knee: float = number_field(fixed="", default=0.5)
+    intensity: float = number_field(default=0.8)
+    radius: float = number_field(default=2.5, range=(1, 7))
+    anti_flicker: bool = flag_field()

@@ -58,12 +58,12 @@ class Pyramid(Settings):
 
     method: ClassVar[str] = "pyramid"
 
-    levels: int = number_field("levels", slider=(1, 10))
-    radius: float = number_field("radius", unit="texel", slider=(0, 4))
-    firefly_filter: bool = flag_field("firefly_filter")
+    levels: int = number_field(slider=(1, 10))
+    radius: float = number_field(unit="texel", slider=(0, 4))
+    firefly_filter: bool = flag_field()
     level_weights: tuple[float, ...] | None = None
-    scale_x: float = number_field("scale_x", slider=(0, 8))
-    scale_y: float = number_field("scale_y", slider=(0, 8))
+    scale_x: float = number_field(slider=(0, 8))
+    scale_y: float = number_field(slider=(0, 8))
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -106,5 +106,5 @@ class DualKawase(Settings):
 
     method: ClassVar[str] = "dual_kawase"
 
-    levels: int = number_field("levels", default=4, slider=(1, 10))
-    offset: float = number_field("offset", slider=(0, 8))
+    levels: int = number_field(default=4, slider=(1, 10))
+    offset: float = number_field(slider=(0, 8))

@@ -42,7 +42,7 @@ class PlayCanvasBloom(PublishedSettings):
 
     method: ClassVar[str] = "playcanvas"
 
-    intensity: float = number_field("intensity", default=0.01, slider=(0, 0.1))
+    intensity: float = number_field(default=0.01, slider=(0, 0.1))
     blur_level: int = number_field(default=16, range=(1, 16))
 
     def _core_values(self) -> dict[str, Any]:

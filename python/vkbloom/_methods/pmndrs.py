@@ -45,10 +45,10 @@ class PmndrsBloom(PublishedSettings):
 
     method: ClassVar[str] = "pmndrs"
 
-    threshold: float | None = number_field("threshold", default=1.0, slider=(0, 4))
-    composite: Composite = choice_field("composite", ("screen", "add"))
-    radius: float = number_field("radius", default=0.85, range=(0, 1))
-    levels: int = number_field("levels", default=8)
+    threshold: float | None = number_field(default=1.0, slider=(0, 4))
+    composite: Composite = choice_field(("screen", "add"))
+    radius: float = number_field(default=0.85, range=(0, 1))
+    levels: int = number_field(default=8)
     smoothing: float = number_field(default=0.03, range=(0, 65504), slider=(0, 1))
 
     def _core_values(self) -> dict[str, Any]:

@@ -48,8 +48,8 @@ class PygfxBloom(PublishedSettings):
     method: ClassVar[str] = "pygfx"
 
     threshold: float | None = value_field(None, fixed="pygfx has no threshold")
-    composite: Composite = choice_field("composite", ("mix",))
-    intensity: float = number_field("intensity", default=0.04, range=(0, 1))
-    levels: int = number_field("levels", slider=(1, 10))
-    filter_radius: float = number_field("filter_radius", slider=(0, 0.05))
-    karis_average: bool = flag_field("karis_average")
+    composite: Composite = choice_field(("mix",))
+    intensity: float = number_field(default=0.04, range=(0, 1))
+    levels: int = number_field(slider=(1, 10))
+    filter_radius: float = number_field(slider=(0, 0.05))
+    karis_average: bool = flag_field()

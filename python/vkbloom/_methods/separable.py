@@ -60,18 +60,18 @@ class Separable(Settings):
 
     method: ClassVar[str] = "separable"
 
-    blur_scale: float = number_field("blur_scale", unit="texel", slider=(0.1, 2))
-    blur_strength: float = number_field("blur_strength", slider=(0, 4))
+    blur_scale: float = number_field(unit="texel", slider=(0.1, 2))
+    blur_strength: float = number_field(slider=(0, 4))
     weights: tuple[float, ...] = numbers_field(
         TUTORIAL, -MAX_FLOAT, MAX_FLOAT, count=(1, _core.MAX_WEIGHTS)
     )
-    loops: int = number_field("loops", slider=(1, 8))
+    loops: int = number_field(slider=(1, 8))
     layers: tuple[tuple[float, float], ...] = numbers_field(
         ((1.0, 1.0),), 0, 16, count=(1, _core.MAX_LAYERS)
     )
-    first_tap: int = number_field("first_tap")
-    texel: Texel = choice_field("texel")
-    direct: bool = flag_field("direct")
+    first_tap: int = number_field()
+    texel: Texel = choice_field()
+    direct: bool = flag_field()
 
 
 @public("vkbloom")

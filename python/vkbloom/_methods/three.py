@@ -65,10 +65,10 @@ class ThreeBloom(PublishedSettings):
     method: ClassVar[str] = "three"
 
     threshold: float | None = 0.0
-    intensity: float = number_field("intensity", default=3.0)
-    variant: Variant = choice_field("variant")
-    radius: float = number_field("radius", default=0.0, range=(0, 1))
-    smooth_width: float = number_field("smooth_width", slider=(0.01, 1))
+    intensity: float = number_field(default=3.0)
+    variant: Variant = choice_field()
+    radius: float = number_field(default=0.0, range=(0, 1))
+    smooth_width: float = number_field(slider=(0.01, 1))
     resolution_scale: float = number_field(default=0.5, range=(0.01, 1))
     tints: tuple[Tint, ...] = numbers_field(
         ((1.0, 1.0, 1.0),) * 5, kind="pairs", option="level-tints"

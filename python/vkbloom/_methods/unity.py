@@ -86,15 +86,15 @@ class UrpBloom(PublishedSettings):
     method: ClassVar[str] = "urp"
 
     threshold: float | None = ((0.9 + 0.055) / 1.055) ** 2.4  # 0.9 in sRGB
-    knee: float = number_field("knee", fixed="", default=0.5)
-    filter: BlurFilter = choice_field("filter")
-    scatter: float = number_field("scatter")
-    iterations: int = number_field("iterations")
-    downscale: Literal["half", "quarter"] = choice_field("downscale", ("half", "quarter"))
+    knee: float = number_field(fixed="", default=0.5)
+    filter: BlurFilter = choice_field()
+    scatter: float = number_field()
+    iterations: int = number_field()
+    downscale: Literal["half", "quarter"] = choice_field(("half", "quarter"))
     high_quality: bool = value_field(False)
     tint: tuple[float, float, float] = numbers_field((1.0, 1.0, 1.0))
-    clamp: float = number_field("clamp_max", slider=(0, 100))
-    version: Literal["17", "12"] = choice_field("version", ("17", "12"))
+    clamp: float = number_field(core="clamp_max", slider=(0, 100))
+    version: Literal["17", "12"] = choice_field(("17", "12"))
 
     def _core_values(self) -> dict[str, Any]:
         """Return what the core names or counts otherwise."""
@@ -156,11 +156,11 @@ class HdrpBloom(PublishedSettings):
     threshold: float | None = value_field(
         None, fixed="the composite that HDRP uses with a threshold is not supported"
     )
-    composite: Composite = choice_field("composite", ("mix",))
-    intensity: float = number_field("intensity", default=2**0.2 - 1, range=(0, 1))
-    scatter: float = number_field("scatter")
-    high_quality_filtering: bool = flag_field("high_quality_filtering")
-    anamorphism: float = number_field("anamorphism")
+    composite: Composite = choice_field(("mix",))
+    intensity: float = number_field(default=2**0.2 - 1, range=(0, 1))
+    scatter: float = number_field()
+    high_quality_filtering: bool = flag_field()
+    anamorphism: float = number_field()
 
 
 @public("vkbloom")
@@ -208,12 +208,12 @@ class PostProcessingBloom(PublishedSettings):
 
     method: ClassVar[str] = "post_processing"
 
-    threshold: float | None = number_field("threshold", default=1.0, slider=(0, 4))
-    knee: float = number_field("knee", fixed="", default=0.5)
-    clamp: float = number_field("clamp_max", slider=(0, 100))
-    diffusion: float = number_field("diffusion")
-    anamorphic_ratio: float = number_field("anamorphism")
-    fast: bool = flag_field("fast")
+    threshold: float | None = number_field(default=1.0, slider=(0, 4))
+    knee: float = number_field(fixed="", default=0.5)
+    clamp: float = number_field(core="clamp_max", slider=(0, 100))
+    diffusion: float = number_field()
+    anamorphic_ratio: float = number_field(core="anamorphism")
+    fast: bool = flag_field()
     color: tuple[float, float, float] = numbers_field((1.0, 1.0, 1.0))
 
     def _core_values(self) -> dict[str, Any]:

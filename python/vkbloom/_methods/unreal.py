@@ -51,7 +51,7 @@ class UnrealBloom(GaussianSum):
     shaping: ClassVar[tuple[str, ...]] = ("sizes", "tints", "size_scale")
 
     threshold: float | None = number_field(default=-1.0, range=(-1, 65504), slider=(-1, 4))
-    intensity: float = number_field("intensity", default=0.675)
+    intensity: float = number_field(default=0.675)
     sizes: tuple[float, ...] = numbers_field((0.3, 1.0, 2.0, 10.0, 30.0, 64.0))
     tints: tuple[float, ...] = numbers_field(
         (0.3465, 0.138, 0.1176, 0.066, 0.066, 0.061), low=-65504.0

@@ -14,7 +14,7 @@ import math
 import types
 import typing
 from collections.abc import Callable, Iterable, Mapping
-from typing import Any, ClassVar, Final, Literal, Self
+from typing import Any, ClassVar, Final, Literal, Self, TypedDict, Unpack
 
 from vkbloom import _core
 from vkbloom._locks import ProcessLock
@@ -43,6 +43,8 @@ Kind = Literal[
 ]
 #: A range of numbers; one that ends at infinity does not contain its beginning.
 Range = tuple[float, float]
+#: A table of the core: default, least and largest value by name.
+CoreNumbers = Mapping[str, tuple[float, float, float]]
 
 _DESCRIBING: Final = ProcessLock()
 
@@ -71,6 +73,11 @@ class FieldInfo:
       numbers; `columns`: how many numbers each entry has, if it is a tuple, too.
     - `read`: Checks a value of another kind and returns the value to store.
     - `text`: The help of a class without a docstring.
+    - `everyday`: The place of a field of everyday use on a page: before the method's numbers below
+      0, after them above 0. 0: the field is rarely changed. None: a number of everyday use if its
+      slider has more than two places.
+    - `differentiable`: Whether a real number has a derivative. One that decides sizes, counts of
+      levels or the samples of a kernel has none.
     """
 
     name: str
@@ -90,6 +97,8 @@ class FieldInfo:
     columns: int = 0
     read: Callable[[Any], Any] | None = None
     text: str = ""
+    everyday: int | None = None
+    differentiable: bool = True
 
     @property
     def help(self) -> str:
@@ -177,36 +186,104 @@ class FieldInfo:
         return self.choices[self.choices.index(value)]
 
 
+class Declared(TypedDict, total=False):
+    """What a class can declare of any field: attributes of its `FieldInfo`."""
+
+    kind: Kind
+    optional: bool
+    range: Range
+    slider: Range | tuple[()] | None
+    unit: str
+    option: str
+    fixed: str
+    read: Callable[[Any], Any]
+    text: str
+    everyday: int
+    differentiable: bool
+
+
+class _Declaration:
+    """A field whose class has not named it yet. Then it becomes a field of `dataclasses`.
+
+    - `complete`: Returns the default by class and name, and can add to what is declared.
+    """
+
+    def __init__(
+        self, complete: Callable[[type, str, dict[str, Any]], Any], declared: Declared
+    ) -> None:
+        self._complete, self._declared = complete, dict(declared)
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        """Replace the declaration.
+
+        Python 3.11 raises a RuntimeError for an error, which is then its cause.
+        """
+        known = Declared.__annotations__
+        for word in self._declared:
+            if word not in known:
+                near = did_you_mean(word, known) or f"; these are {', '.join(known)}"
+                raise TypeError(f"{owner.__name__}.{name}: {word!r} is not a keyword{near}")
+        default = self._complete(owner, name, self._declared)
+        setattr(owner, name, dataclasses.field(default=default, metadata=self._declared))
+
+
+def _of_core(table: Mapping[str, Any], name: str, owner: type, field: str, instead: str) -> Any:
+    """Return the row of the core's table that a class's field takes its default from."""
+    if name not in table:
+        raise TypeError(
+            f"{owner.__name__}.{field}: the core has no {name!r}; build the core, or give {instead}"
+        )
+    return table[name]
+
+
 def number_field(
-    name: str = "",
-    *,
-    default: Any = dataclasses.MISSING,
-    table: Mapping[str, tuple[float, float, float]] = _core.VALUES,
-    **declared: Any,
+    *, default: Any = dataclasses.MISSING, core: str = "", **declared: Unpack[Declared]
 ) -> Any:
-    """Declare a field that is a number."""
-    if name:
-        initial, low, high = table[name]
-        default = initial if default is dataclasses.MISSING else default
+    """Declare a field that is a number.
+
+    In settings and stages, the core's number of this name has the default and the range that the
+    class does not declare.
+
+    - `core`: The core's name, where it differs.
+    """
+
+    def complete(owner: type, name: str, given: dict[str, Any]) -> Any:
+        table = getattr(owner, "_core_numbers", None)
+        is_complete = default is not dataclasses.MISSING and "range" in given
+        if table is None or (is_complete and not core):
+            return default
+        instead = "core= with its name there, or default= and range="
+        initial, low, high = _of_core(table, core or name, owner, name, instead)
         # A class that declares no range keeps the range of its base.
-        declared["table_range"] = low, high
-    return dataclasses.field(default=default, metadata=declared)
+        given["table_range"] = low, high
+        return initial if default is dataclasses.MISSING else default
+
+    return _Declaration(complete, declared)
 
 
-def flag_field(name: str, **declared: Any) -> Any:
+def flag_field(**declared: Unpack[Declared]) -> Any:
     """Declare a bool field, which is 0 or 1 in the core's table."""
-    return dataclasses.field(default=bool(_core.VALUES[name][0]), metadata=declared)
+
+    def complete(owner: type, name: str, _: dict[str, Any]) -> bool:
+        return bool(_of_core(_core.VALUES, name, owner, name, "value_field() and a default")[0])
+
+    return _Declaration(complete, declared)
 
 
-def choice_field(name: str, choices: tuple[Any, ...] = (), **declared: Any) -> Any:
+def choice_field(choices: tuple[Any, ...] = (), **declared: Unpack[Declared]) -> Any:
     """Declare a field whose value is one of the core's names, or of some; the first is default."""
-    declared |= {"choices": choices} if choices else {}
-    return dataclasses.field(default=(choices or _core.CHOICES[name])[0], metadata=declared)
+
+    def complete(owner: type, name: str, given: dict[str, Any]) -> Any:
+        if choices:
+            given["choices"] = choices
+        return (choices or _of_core(_core.CHOICES, name, owner, name, "the choices"))[0]
+
+    return _Declaration(complete, declared)
 
 
-def value_field(default: Any = dataclasses.MISSING, **declared: Any) -> Any:
+def value_field(default: Any = dataclasses.MISSING, **declared: Unpack[Declared]) -> Any:
     """Declare a field of any type; `kind` and `read` are values of a `FieldInfo`."""
-    return dataclasses.field(default=default, metadata=declared)
+    return _Declaration(lambda owner, name, given: default, declared)
 
 
 def numbers_field(
@@ -215,13 +292,17 @@ def numbers_field(
     high: float = 65504.0,
     *,
     count: tuple[int, int] | None = None,
-    **declared: Any,
+    **declared: Unpack[Declared],
 ) -> Any:
     """Declare a field of numbers, or of rows of them; `count`: None: as many as by default."""
-    if default and isinstance(default[0], tuple):
-        declared["columns"] = len(default[0])
-    count = count or (len(default or ()),) * 2
-    return value_field(default, count=count, limits=(low, high), **declared)
+
+    def complete(owner: type, name: str, given: dict[str, Any]) -> Any:
+        if default and isinstance(default[0], tuple):
+            given["columns"] = len(default[0])
+        given |= {"count": count or (len(default or ()),) * 2, "limits": (low, high)}
+        return default
+
+    return _Declaration(complete, declared)
 
 
 def _row(name: str, values: Any, limits: Range, count: int = 0) -> tuple[float, ...]:
@@ -329,6 +410,8 @@ class Record:
     _subject: ClassVar[str]
     #: What to use instead of an abstract class.
     _example: ClassVar[str]
+    #: The core's numbers that the fields may be; None: it has none of this class.
+    _core_numbers: ClassVar[CoreNumbers | None] = None
 
     #: The constructor's, since `inspect` would show the arguments of `__new__`.
     __signature__ = _ConstructorSignature()

@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
-import functools
 from collections.abc import Iterable, Mapping
 from typing import Any, ClassVar
 
 from vkbloom import _core
 from vkbloom._public import public
-from vkbloom._settings.fields import Record, fields_of, number_field
+from vkbloom._settings.fields import CoreNumbers, Record, fields_of, number_field
 from vkbloom._settings.registry import STAGES
-
-#: Declares a field that is a number in the core's table of glare.
-stage_field = functools.partial(number_field, table=_core.GLARE_VALUES)
 
 
 @public("vkbloom")
@@ -29,6 +25,7 @@ class Glare(Record):
     _class_key: ClassVar[str] = "stage"
     _subject: ClassVar[str] = "glare"
     _example: ClassVar[str] = "a stage, such as Streaks"
+    _core_numbers: ClassVar[CoreNumbers] = _core.GLARE_VALUES
     stage: ClassVar[str]
 
     @classmethod
@@ -61,9 +58,9 @@ class GlareLight(Glare):
     of stages are "rgba32float" if the bloom buffers are, and otherwise "rgba16float".
     """
 
-    intensity: float = stage_field("intensity", slider=(0, 4))
-    threshold: float = stage_field("threshold", slider=(0, 16))
-    halvings: int = stage_field("halvings")
+    intensity: float = number_field(slider=(0, 4))
+    threshold: float = number_field(slider=(0, 16))
+    halvings: int = number_field()
 
 
 def check_glare(glare: object) -> tuple[Glare, ...]:

@@ -11,9 +11,11 @@ import functools
 from collections.abc import Mapping
 from typing import Any, ClassVar, Final, Literal, Self, get_args
 
+from vkbloom import _core
 from vkbloom._public import public
 from vkbloom._settings.blocks import settings_block
 from vkbloom._settings.fields import (
+    CoreNumbers,
     FieldInfo,
     Record,
     choice_field,
@@ -137,24 +139,25 @@ class Settings(Record):
     _class_key: ClassVar[str] = "method"
     _subject: ClassVar[str] = "fields"
     _example: ClassVar[str] = "a method, such as Separable"
+    _core_numbers: ClassVar[CoreNumbers] = _core.VALUES
     method: ClassVar[str]
     #: Whether the method starts from the complete frame: it reduces it and thresholds it itself.
     published: ClassVar[bool] = False
 
-    bloom: bool = flag_field("bloom")
-    threshold: float | None = number_field("threshold", default=None, slider=(0, 4))
-    knee: float = number_field("knee")
-    composite: Composite = choice_field("composite", ("add", "mix", "screen"))
-    intensity: float = number_field("intensity", slider=(0, 4))
-    alpha: Alpha = choice_field("alpha")
-    tonemap: ToneMap = choice_field("tonemap")
-    exposure: float = number_field("exposure", unit="stop", slider=(-8, 8))
-    encoding: Encoding = choice_field("encoding")
-    reference_white: float = number_field("reference_white", unit="cd/m2")
-    dither: bool = flag_field("dither")
-    dither_seed: int = number_field("dither_seed", slider=(0, 100))
+    bloom: bool = flag_field()
+    threshold: float | None = number_field(default=None, slider=(0, 4))
+    knee: float = number_field()
+    composite: Composite = choice_field(("add", "mix", "screen"))
+    intensity: float = number_field(slider=(0, 4))
+    alpha: Alpha = choice_field()
+    tonemap: ToneMap = choice_field()
+    exposure: float = number_field(unit="stop", slider=(-8, 8))
+    encoding: Encoding = choice_field()
+    reference_white: float = number_field(unit="cd/m2")
+    dither: bool = flag_field()
+    dither_seed: int = number_field(slider=(0, 100))
     bloom_size: tuple[int, int] | None = value_field(None, unit="pixel")
-    bloom_scale: float = number_field("bloom_scale", slider=(0.05, 1))
+    bloom_scale: float = number_field(slider=(0.05, 1))
     format: BloomFormat | None = None
     glare: tuple[Glare, ...] = value_field((), kind="glare", read=_read_glare)
 
@@ -235,8 +238,8 @@ class PublishedSettings(Settings):
 
     published: ClassVar[bool] = True
 
-    knee: float = number_field("knee", fixed="the threshold of this method has no knee")
-    composite: Composite = choice_field("composite", ("add",))
+    knee: float = number_field(fixed="the threshold of this method has no knee")
+    composite: Composite = choice_field(("add",))
     format: BloomFormat | None = "rgba16float"
 
 
