@@ -20,7 +20,8 @@ from vkbloom._renderer.default import default_renderer, renderer_on
 from vkbloom._renderer.device_arrays import DeviceArray, merged, take
 from vkbloom._renderer.renderer import RENDERERS, Renderer
 from vkbloom._renderer.sources import Inputs, checked_inputs
-from vkbloom._settings.fields import Record, fields_of
+from vkbloom._settings.fields import fields_of
+from vkbloom._settings.records import Record
 from vkbloom._settings.settings import Settings
 from vkbloom.psf._values import ARRAYS, ArrayValue
 from vkbloom.reference import apply as reference_apply

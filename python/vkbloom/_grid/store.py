@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 from vkbloom._extras import import_extra
 from vkbloom._grid.layout import Grid, Layout, Variable, made_dataset
 from vkbloom._grid.order import WHOLE, Block, Index, Part, blocks
-from vkbloom._settings.fields import plain_value
+from vkbloom._settings.records import plain_value
 
 #: Version of the store's layout. A store with another version cannot be read.
 FORMAT: Final = 3

@@ -8,7 +8,8 @@ from typing import Any, ClassVar
 
 from vkbloom import _core
 from vkbloom._public import public
-from vkbloom._settings.fields import CoreNumbers, Record, fields_of, number_field
+from vkbloom._settings.fields import CoreNumbers, fields_of, number_field
+from vkbloom._settings.records import Record
 from vkbloom._settings.registry import STAGES
 
 

@@ -17,7 +17,6 @@ from vkbloom._settings.blocks import settings_block
 from vkbloom._settings.fields import (
     CoreNumbers,
     FieldInfo,
-    Record,
     choice_field,
     fields_of,
     flag_field,
@@ -25,6 +24,7 @@ from vkbloom._settings.fields import (
     value_field,
 )
 from vkbloom._settings.glare import Glare, check_glare, replaced_stages, stage_field_of
+from vkbloom._settings.records import Record
 from vkbloom._settings.registry import METHODS, glares, presets
 from vkbloom._spelling import describe_unknown, did_you_mean
 

@@ -15,7 +15,7 @@ from vkbloom._argument_types import checked
 from vkbloom._arrays import plain_array
 from vkbloom._numbers import check_floats, check_number, check_size
 from vkbloom._public import public
-from vkbloom._settings.fields import Record
+from vkbloom._settings.records import Record
 
 if TYPE_CHECKING:
     from pathlib import Path
