@@ -15,9 +15,12 @@ import pytest
 
 import vkbloom
 from tests.exhaustive import some
-from vkbloom import DualKawase, Pyramid, Renderer, Separable, UrpBloom, psf, reference
+from vkbloom import DualKawase, Pyramid, Renderer, Separable, Settings, UrpBloom, psf, reference
 from vkbloom._cli import fields, search
+from vkbloom._fit.space import varied_as
 from vkbloom._fit.translating import describe_difference, lights
+from vkbloom._settings.fields import fields_of
+from vkbloom._settings.registry import METHODS
 
 SIZE = (96, 64)
 #: Of ten methods.
@@ -34,6 +37,16 @@ Call = Callable[..., Any]
 def translated(renderer: Renderer) -> Call:
     """Translate at a small size with the shared renderer."""
     return functools.partial(vkbloom.translate, size=SIZE, renderer=renderer)
+
+
+@pytest.mark.parametrize("kind", METHODS.values())
+def test_every_method_says_what_its_users_turn(kind: type[Settings]) -> None:
+    """Beside the intensity: without them a translation would vary that alone."""
+    assert "_knobs" in vars(kind), f"{kind.__name__}: _knobs is missing"
+    fields = fields_of(kind)
+    for name in kind._knobs:
+        assert name in fields, f"{kind.__name__}: _knobs has {name!r}, which is no field"
+        assert varied_as(fields[name]), f"{kind.__name__}: {name} of _knobs cannot vary"
 
 
 class TestTranslate:

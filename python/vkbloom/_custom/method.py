@@ -249,6 +249,7 @@ def registered(name: str, source: Source, reference: Reference | None) -> type[C
             "method": name,
             "file": file,
             "shaders": shaders,
+            "_knobs": tuple(param.name for param in file.params if param.name != SHARED),
             "numpy_reference": None if reference is None else staticmethod(reference),
         },
         frozen=True,

@@ -15,15 +15,6 @@ from vkbloom._settings.registry import METHODS, STAGES, glares, presets
 from vkbloom._settings.settings import Settings
 from vkbloom.psf._base import PSF, functions
 
-# Fields of everyday use: these, in this order, with the numbers that only this method has between
-# them.
-_FIRST: Final = ("bloom", "intensity", "threshold")
-_LAST: Final = ("exposure", "tonemap")
-# Numbers of methods that are rarely changed.
-_RARE: Final = {
-    *("clamp", "jitter", "low_frequency_boost_curvature", "luminance_cap", "max_mip_dimension"),
-    *("maximum", "saturation", "scale_x", "scale_y", "smoothness", "white"),
-}
 # Fields that keep their values on the page when another preset or method is selected.
 _LOOK: Final = ("bloom", "exposure", "tonemap", "encoding", "dither", "dither_seed")
 
@@ -86,19 +77,18 @@ def _functions() -> list[PSF]:
 
 
 def _fields_of_method(kind: type[Settings]) -> list[dict[str, Any]]:
-    shared = fields_of(Settings)
+    infos, shared = fields_of(kind), fields_of(Settings)
     result = _controls(kind)
     for control in result:
+        place = infos[control["name"]].everyday
         # An integer with two values is more like a switch than a slider.
         slides = control["kind"] == "number" and control["from"] + control["step"] < control["to"]
-        is_of_method = control["name"] not in shared and control["name"] not in _RARE
-        control["first"] = control["name"] in (*_FIRST, *_LAST) or (is_of_method and slides)
+        control["first"] = slides if place is None else place != 0
 
     def rank(control: dict[str, Any]) -> tuple[int, ...]:
-        name = control["name"]
-        if name in _FIRST:
-            return 0, _FIRST.index(name)
-        return (2, _LAST.index(name)) if name in _LAST else (1 + 2 * (name in shared), 0)
+        if place := infos[control["name"]].everyday:
+            return 0 if place < 0 else 2, place
+        return 1 + 2 * (control["name"] in shared), 0
 
     return sorted(result, key=rank)
 

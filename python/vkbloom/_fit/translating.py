@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, Final, Literal
 
 import numpy as np
@@ -20,34 +20,11 @@ from vkbloom._public import public
 from vkbloom._renderer.default import default_renderer
 from vkbloom._renderer.renderer import Renderer
 from vkbloom._settings.fields import fields_of
-from vkbloom._settings.registry import METHODS
 from vkbloom._settings.settings import Settings, check_settings
 
 #: A function of an image, such as `vkbloom.testing.command` makes of a program.
 Maker = Callable[[NDArray[Any]], NDArray[Any]]
 
-# What a user of a method turns; other fields of `to` stay as they are.
-_KNOBS: Final[Mapping[str, tuple[str, ...]]] = {
-    "separable": ("blur_scale", "blur_strength"),
-    "pyramid": ("levels", "radius"),
-    "dual_kawase": ("levels", "offset"),
-    "bevy": ("low_frequency_boost", "max_mip_dimension"),
-    "kino": ("threshold", "radius"),
-    "filament": ("levels", "resolution"),
-    "urp": ("threshold", "scatter"),
-    "hdrp": ("scatter",),
-    "three": ("threshold", "radius"),
-    "post_processing": ("threshold", "diffusion"),
-    "unreal": ("size_scale",),
-    "halation": ("pixel_size",),
-    "pmndrs": ("threshold", "radius"),
-    "babylon": ("threshold", "kernel"),
-    "playcanvas": ("threshold", "blur_level"),
-    "darktable": ("threshold", "blur_size", "strength"),
-    "godot": ("threshold", "strength", "glow_bloom"),
-    "blender": ("threshold", "size"),
-    "pygfx": ("levels", "filter_radius"),
-}
 # Values of the lights, and their places as shares of width and height, where no texel of a chain
 # begins.
 _VALUES: Final = (0.5, 1.5, 6.0, 40.0)
@@ -228,14 +205,9 @@ def lights(size: tuple[int, int]) -> NDArray[np.float32]:
 
 
 def _knobs(settings: Settings) -> tuple[str, ...]:
-    names = _KNOBS.get(settings.method, ())
-    if METHODS.is_added(settings.method):
-        shared = fields_of(Settings)
-        names = tuple(
-            name
-            for name, info in fields_of(type(settings)).items()
-            if name not in shared and varied_as(info) is not None
-        )
+    """Return the fields that vary by default; others of `to` stay as they are."""
+    fields = fields_of(type(settings))
+    names = (name for name in settings._knobs if varied_as(fields[name]) is not None)
     threshold = ("threshold",) if settings.threshold is not None else ()
     return tuple(dict.fromkeys((*threshold, *names, "intensity")))
 

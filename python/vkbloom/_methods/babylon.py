@@ -48,10 +48,13 @@ class BabylonBloom(PublishedSettings):
     """
 
     method: ClassVar[str] = "babylon"
+    _knobs: ClassVar[tuple[str, ...]] = ("threshold", "kernel")
 
     threshold: float | None = number_field(default=0.9, slider=(0, 4))
-    kernel: float = number_field(default=64.0, range=(1, 256), option="kernel-width")
-    scale: float = number_field(default=0.5, range=(0.01, 1))
+    kernel: float = number_field(
+        default=64.0, range=(1, 256), option="kernel-width", differentiable=False
+    )
+    scale: float = number_field(default=0.5, range=(0.01, 1), differentiable=False)
     weight: float = number_field(default=0.15, range=(0, 65504), slider=(0, 2))
 
     def __post_init__(self) -> None:

@@ -59,13 +59,14 @@ class BevyBloom(PublishedSettings):
     """
 
     method: ClassVar[str] = "bevy"
+    _knobs: ClassVar[tuple[str, ...]] = ("low_frequency_boost", "max_mip_dimension")
 
     knee: float = number_field(fixed="")
     composite: Composite = choice_field(("mix", "add"))
     intensity: float = number_field(default=0.15, range=(0, 1))
     low_frequency_boost: float = number_field()
-    low_frequency_boost_curvature: float = number_field()
+    low_frequency_boost_curvature: float = number_field(everyday=0)
     high_pass_frequency: float = number_field()
-    max_mip_dimension: int = number_field(unit="pixel", slider=(16, 1024))
-    scale_x: float = number_field(slider=(0, 8))
-    scale_y: float = number_field(slider=(0, 8))
+    max_mip_dimension: int = number_field(unit="pixel", slider=(16, 1024), everyday=0)
+    scale_x: float = number_field(slider=(0, 8), everyday=0)
+    scale_y: float = number_field(slider=(0, 8), everyday=0)

@@ -127,6 +127,7 @@ class BlenderGlare(WithKernel, PublishedSettings):
     """
 
     method: ClassVar[str] = "blender"
+    _knobs: ClassVar[tuple[str, ...]] = ("threshold", "size")
     shaping: ClassVar[tuple[str, ...]] = ("type", "quality", "version", "size", "kernel")
     #: `glow` is the node's output Highlights.
     glow_note: ClassVar[str] = ""
@@ -137,19 +138,19 @@ class BlenderGlare(WithKernel, PublishedSettings):
     # stage of glare.
     type: GlareType = choice_field(option="glare-type")
     quality: Quality = choice_field(option="glare-quality")
-    smoothness: float = number_field()
-    maximum: float | None = number_field(default=None, slider=(0, 20))
-    saturation: float = number_field(slider=(0, 1))
+    smoothness: float = number_field(everyday=0)
+    maximum: float | None = number_field(default=None, slider=(0, 20), everyday=0)
+    saturation: float = number_field(slider=(0, 1), everyday=0)
     tint: tuple[float, float, float] = numbers_field((1.0, 1.0, 1.0))
-    size: float = number_field(option="glare-size")
+    size: float = number_field(option="glare-size", differentiable=False)
     streaks: int = number_field(option="glare-streaks")
     streaks_angle: float = number_field(unit="degree")
     iterations: int = number_field(default=3, range=(2, 5))
     fade: float = number_field()
     color_modulation: float = number_field()
     diagonal: bool = flag_field()
-    sun_position: tuple[float, ...] = numbers_field((0.5, 0.5), -16.0, 16.0)
-    jitter: float = number_field()
+    sun_position: tuple[float, ...] = numbers_field((0.5, 0.5), -16.0, 16.0, differentiable=False)
+    jitter: float = number_field(everyday=0, differentiable=False)
     kernel: PSFLike | None = value_field(None, kind="psf", read=read_psf)
     version: Version = choice_field(("5.0", "5.2", "4.3"), option="blender-version")
 

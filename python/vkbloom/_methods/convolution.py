@@ -74,6 +74,8 @@ class Convolution(WithKernel, Settings):
     """
 
     method: ClassVar[str] = "convolution"
+    # Its width is that of the function.
+    _knobs: ClassVar[tuple[str, ...]] = ()
     shaping: ClassVar[tuple[str, ...]] = ("psf", "normalize", "pixels_per_degree", "kernel_size")
 
     psf: PSFLike = dataclasses.field(
@@ -81,7 +83,9 @@ class Convolution(WithKernel, Settings):
     )
     normalize: bool = True
     boundary: Boundary = choice_field(("zero", "edge", "wrap", "wrap_x"))
-    pixels_per_degree: float | None = number_field(default=None, range=(0, math.inf))
+    pixels_per_degree: float | None = number_field(
+        default=None, range=(0, math.inf), differentiable=False
+    )
     kernel_size: tuple[int, int] | None = None
 
     @property

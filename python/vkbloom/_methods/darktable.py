@@ -40,6 +40,7 @@ class DarktableBloom(PublishedSettings):
     """
 
     method: ClassVar[str] = "darktable"
+    _knobs: ClassVar[tuple[str, ...]] = ("threshold", "blur_size", "strength")
 
     threshold: float | None = number_field(default=90.0, range=(0, 100))
     composite: Composite = choice_field(("screen",))

@@ -51,6 +51,7 @@ class FilamentBloom(PublishedSettings):
     """
 
     method: ClassVar[str] = "filament"
+    _knobs: ClassVar[tuple[str, ...]] = ("levels", "resolution")
 
     threshold: float | None = 1.0
     intensity: float = number_field(default=0.1, range=(0, 1))

@@ -68,16 +68,17 @@ class GodotBloom(PublishedSettings):
     """
 
     method: ClassVar[str] = "godot"
+    _knobs: ClassVar[tuple[str, ...]] = ("threshold", "strength", "glow_bloom")
 
     threshold: float | None = 1.0
     composite: Composite = choice_field(("screen", "soft_light", "add", "replace", "mix"))
     intensity: float = number_field(default=0.3)
     threshold_scale: float = number_field(slider=(0, 8))
-    luminance_cap: float = number_field(slider=(0, 48))
+    luminance_cap: float = number_field(slider=(0, 48), everyday=0)
     glow_bloom: float = number_field()
     strength: float = number_field(slider=(0, 2))
     level_weights: tuple[float, ...] = numbers_field(
         (0.0, 0.8, 0.4, 0.1, 0.0, 0.0, 0.0), high=MAX_FLOAT
     )
     bicubic: bool = flag_field()
-    white: float = number_field(slider=(1, 16))
+    white: float = number_field(slider=(1, 16), everyday=0)

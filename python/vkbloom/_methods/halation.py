@@ -51,6 +51,7 @@ class Halation(GaussianSum):
     """
 
     method: ClassVar[str] = "halation"
+    _knobs: ClassVar[tuple[str, ...]] = ("pixel_size",)
     boundary: ClassVar[str] = "mirror"
     shaping: ClassVar[tuple[str, ...]] = (
         *("strength", "sizes", "scattering_strength", "scattering_sizes"),
@@ -60,15 +61,21 @@ class Halation(GaussianSum):
     threshold: float | None = value_field(None, fixed="film has no threshold")
     composite: Composite = choice_field(("mix",))
     intensity: float = number_field(default=1.0, range=(0, 1))
-    strength: Channels = numbers_field((0.08, 0.005, 0.001), option="halation_strength")
-    sizes: Channels = numbers_field((200.0, 200.0, 200.0), option="halation_sizes")
+    strength: Channels = numbers_field(
+        (0.08, 0.005, 0.001), option="halation_strength", differentiable=False
+    )
+    sizes: Channels = numbers_field(
+        (200.0, 200.0, 200.0), option="halation_sizes", differentiable=False
+    )
     scattering_strength: Channels = numbers_field(
-        (0.01, 0.02, 0.04), option="halation_scattering_strength"
+        (0.01, 0.02, 0.04), option="halation_scattering_strength", differentiable=False
     )
     scattering_sizes: Channels = numbers_field(
-        (30.0, 20.0, 15.0), option="halation_scattering_sizes"
+        (30.0, 20.0, 15.0), option="halation_scattering_sizes", differentiable=False
     )
-    pixel_size: float | None = number_field(default=None, range=(0.01, 65504), slider=(1, 100))
+    pixel_size: float | None = number_field(
+        default=None, range=(0.01, 65504), slider=(1, 100), differentiable=False
+    )
 
     def core_kernel_size(self, frame: Size, buffers: Size) -> Size:
         """Return the kernel's width and height, without the kernel.

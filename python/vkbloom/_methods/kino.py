@@ -45,6 +45,7 @@ class KinoBloom(PublishedSettings):
     """
 
     method: ClassVar[str] = "kino"
+    _knobs: ClassVar[tuple[str, ...]] = ("threshold", "radius")
 
     threshold: float | None = ((0.8 + 0.055) / 1.055) ** 2.4  # 0.8 in sRGB
     knee: float = number_field(fixed="", default=0.5)

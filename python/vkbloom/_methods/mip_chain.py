@@ -57,13 +57,14 @@ class Pyramid(Settings):
     """
 
     method: ClassVar[str] = "pyramid"
+    _knobs: ClassVar[tuple[str, ...]] = ("levels", "radius")
 
     levels: int = number_field(slider=(1, 10))
     radius: float = number_field(unit="texel", slider=(0, 4))
     firefly_filter: bool = flag_field()
     level_weights: tuple[float, ...] | None = None
-    scale_x: float = number_field(slider=(0, 8))
-    scale_y: float = number_field(slider=(0, 8))
+    scale_x: float = number_field(slider=(0, 8), everyday=0)
+    scale_y: float = number_field(slider=(0, 8), everyday=0)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -105,6 +106,7 @@ class DualKawase(Settings):
     """
 
     method: ClassVar[str] = "dual_kawase"
+    _knobs: ClassVar[tuple[str, ...]] = ("levels", "offset")
 
     levels: int = number_field(default=4, slider=(1, 10))
     offset: float = number_field(slider=(0, 8))

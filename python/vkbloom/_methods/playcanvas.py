@@ -41,6 +41,7 @@ class PlayCanvasBloom(PublishedSettings):
     """
 
     method: ClassVar[str] = "playcanvas"
+    _knobs: ClassVar[tuple[str, ...]] = ("threshold", "blur_level")
 
     intensity: float = number_field(default=0.01, slider=(0, 0.1))
     blur_level: int = number_field(default=16, range=(1, 16))

@@ -44,6 +44,7 @@ class PmndrsBloom(PublishedSettings):
     """
 
     method: ClassVar[str] = "pmndrs"
+    _knobs: ClassVar[tuple[str, ...]] = ("threshold", "radius")
 
     threshold: float | None = number_field(default=1.0, slider=(0, 4))
     composite: Composite = choice_field(("screen", "add"))

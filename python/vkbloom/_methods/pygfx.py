@@ -46,6 +46,7 @@ class PygfxBloom(PublishedSettings):
     """
 
     method: ClassVar[str] = "pygfx"
+    _knobs: ClassVar[tuple[str, ...]] = ("levels", "filter_radius")
 
     threshold: float | None = value_field(None, fixed="pygfx has no threshold")
     composite: Composite = choice_field(("mix",))

@@ -59,6 +59,7 @@ class Separable(Settings):
     """
 
     method: ClassVar[str] = "separable"
+    _knobs: ClassVar[tuple[str, ...]] = ("blur_scale", "blur_strength")
 
     blur_scale: float = number_field(unit="texel", slider=(0.1, 2))
     blur_strength: float = number_field(slider=(0, 4))

@@ -63,13 +63,14 @@ class ThreeBloom(PublishedSettings):
     """
 
     method: ClassVar[str] = "three"
+    _knobs: ClassVar[tuple[str, ...]] = ("threshold", "radius")
 
     threshold: float | None = 0.0
     intensity: float = number_field(default=3.0)
     variant: Variant = choice_field()
     radius: float = number_field(default=0.0, range=(0, 1))
     smooth_width: float = number_field(slider=(0.01, 1))
-    resolution_scale: float = number_field(default=0.5, range=(0.01, 1))
+    resolution_scale: float = number_field(default=0.5, range=(0.01, 1), differentiable=False)
     tints: tuple[Tint, ...] = numbers_field(
         ((1.0, 1.0, 1.0),) * 5, kind="pairs", option="level-tints"
     )

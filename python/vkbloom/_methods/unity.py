@@ -84,6 +84,7 @@ class UrpBloom(PublishedSettings):
     """
 
     method: ClassVar[str] = "urp"
+    _knobs: ClassVar[tuple[str, ...]] = ("threshold", "scatter")
 
     threshold: float | None = ((0.9 + 0.055) / 1.055) ** 2.4  # 0.9 in sRGB
     knee: float = number_field(fixed="", default=0.5)
@@ -93,7 +94,7 @@ class UrpBloom(PublishedSettings):
     downscale: Literal["half", "quarter"] = choice_field(("half", "quarter"))
     high_quality: bool = value_field(False)
     tint: tuple[float, float, float] = numbers_field((1.0, 1.0, 1.0))
-    clamp: float = number_field(core="clamp_max", slider=(0, 100))
+    clamp: float = number_field(core="clamp_max", slider=(0, 100), everyday=0)
     version: Literal["17", "12"] = choice_field(("17", "12"))
 
     def _core_values(self) -> dict[str, Any]:
@@ -152,6 +153,7 @@ class HdrpBloom(PublishedSettings):
     """
 
     method: ClassVar[str] = "hdrp"
+    _knobs: ClassVar[tuple[str, ...]] = ("scatter",)
 
     threshold: float | None = value_field(
         None, fixed="the composite that HDRP uses with a threshold is not supported"
@@ -160,7 +162,7 @@ class HdrpBloom(PublishedSettings):
     intensity: float = number_field(default=2**0.2 - 1, range=(0, 1))
     scatter: float = number_field()
     high_quality_filtering: bool = flag_field()
-    anamorphism: float = number_field()
+    anamorphism: float = number_field(differentiable=False)
 
 
 @public("vkbloom")
@@ -207,12 +209,13 @@ class PostProcessingBloom(PublishedSettings):
     """
 
     method: ClassVar[str] = "post_processing"
+    _knobs: ClassVar[tuple[str, ...]] = ("threshold", "diffusion")
 
     threshold: float | None = number_field(default=1.0, slider=(0, 4))
     knee: float = number_field(fixed="", default=0.5)
-    clamp: float = number_field(core="clamp_max", slider=(0, 100))
-    diffusion: float = number_field()
-    anamorphic_ratio: float = number_field(core="anamorphism")
+    clamp: float = number_field(core="clamp_max", slider=(0, 100), everyday=0)
+    diffusion: float = number_field(differentiable=False)
+    anamorphic_ratio: float = number_field(core="anamorphism", differentiable=False)
     fast: bool = flag_field()
     color: tuple[float, float, float] = numbers_field((1.0, 1.0, 1.0))
 

@@ -47,16 +47,19 @@ class UnrealBloom(GaussianSum):
     """
 
     method: ClassVar[str] = "unreal"
+    _knobs: ClassVar[tuple[str, ...]] = ("size_scale",)
     boundary: ClassVar[str] = "edge"
     shaping: ClassVar[tuple[str, ...]] = ("sizes", "tints", "size_scale")
 
     threshold: float | None = number_field(default=-1.0, range=(-1, 65504), slider=(-1, 4))
     intensity: float = number_field(default=0.675)
-    sizes: tuple[float, ...] = numbers_field((0.3, 1.0, 2.0, 10.0, 30.0, 64.0))
-    tints: tuple[float, ...] = numbers_field(
-        (0.3465, 0.138, 0.1176, 0.066, 0.066, 0.061), low=-65504.0
+    sizes: tuple[float, ...] = numbers_field(
+        (0.3, 1.0, 2.0, 10.0, 30.0, 64.0), differentiable=False
     )
-    size_scale: float = number_field(default=4.0, range=(0, 64))
+    tints: tuple[float, ...] = numbers_field(
+        (0.3465, 0.138, 0.1176, 0.066, 0.066, 0.061), low=-65504.0, differentiable=False
+    )
+    size_scale: float = number_field(default=4.0, range=(0, 64), differentiable=False)
 
     def core_kernel_size(self, frame: tuple[int, int], buffers: tuple[int, int]) -> tuple[int, int]:
         """Return the kernel's width and height, without the kernel."""

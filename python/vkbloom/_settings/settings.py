@@ -141,23 +141,26 @@ class Settings(Record):
     _example: ClassVar[str] = "a method, such as Separable"
     _core_numbers: ClassVar[CoreNumbers] = _core.VALUES
     method: ClassVar[str]
+    #: What a user of the method turns beside the intensity: the fields that `translate` finds by
+    #: default. They set width and strength of the blur, and its threshold.
+    _knobs: ClassVar[tuple[str, ...]]
     #: Whether the method starts from the complete frame: it reduces it and thresholds it itself.
     published: ClassVar[bool] = False
 
-    bloom: bool = flag_field()
-    threshold: float | None = number_field(default=None, slider=(0, 4))
-    knee: float = number_field()
+    bloom: bool = flag_field(everyday=-3)
+    threshold: float | None = number_field(default=None, slider=(0, 4), everyday=-1)
+    knee: float = number_field(everyday=0)
     composite: Composite = choice_field(("add", "mix", "screen"))
-    intensity: float = number_field(slider=(0, 4))
+    intensity: float = number_field(slider=(0, 4), everyday=-2)
     alpha: Alpha = choice_field()
-    tonemap: ToneMap = choice_field()
-    exposure: float = number_field(unit="stop", slider=(-8, 8))
+    tonemap: ToneMap = choice_field(everyday=2)
+    exposure: float = number_field(unit="stop", slider=(-8, 8), everyday=1)
     encoding: Encoding = choice_field()
-    reference_white: float = number_field(unit="cd/m2")
+    reference_white: float = number_field(unit="cd/m2", everyday=0)
     dither: bool = flag_field()
-    dither_seed: int = number_field(slider=(0, 100))
+    dither_seed: int = number_field(slider=(0, 100), everyday=0)
     bloom_size: tuple[int, int] | None = value_field(None, unit="pixel")
-    bloom_scale: float = number_field(slider=(0.05, 1))
+    bloom_scale: float = number_field(slider=(0.05, 1), everyday=0, differentiable=False)
     format: BloomFormat | None = None
     glare: tuple[Glare, ...] = value_field((), kind="glare", read=_read_glare)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,16 +17,6 @@ from vkbloom._settings.settings import Settings, given_settings
 from ._framebuffers import checked_image, framebuffers
 from ._sampling import Array
 from ._tape import Traced, gradients, value_of
-
-#: Real fields that decide sizes and counts of levels, or the samples of a kernel: no derivative.
-DISCRETE: Final = frozenset(
-    {
-        *("pixel_size", "scattering_sizes", "scattering_strength"),
-        *("anamorphic_ratio", "anamorphism", "babylon.kernel", "babylon.scale", "bloom_scale"),
-        *("diffusion", "jitter", "pixels_per_degree", "resolution_scale", "size", "size_scale"),
-        *("sizes", "sun_position", "unreal.tints", "halation.strength"),
-    }
-)
 
 
 class Gradients(dict[str, Array]):
@@ -168,12 +158,10 @@ def _record(arrays: dict[str, Array], settings: Settings) -> Any:
 
 def differentiable(settings: Any) -> dict[str, Any]:
     """Return the values of the real fields with a derivative, by name."""
-    method = getattr(settings, "method", "")
     fields = {
         name: getattr(settings, name)
         for name, info in fields_of(type(settings)).items()
-        if not ({name, f"{method}.{name}"} & DISCRETE or info.fixed)
-        and _is_real(getattr(settings, name))
+        if info.differentiable and not info.fixed and _is_real(getattr(settings, name))
     }
     for index, stage in enumerate(getattr(settings, "glare", ())):
         fields |= {f"glare.{index}.{name}": value for name, value in differentiable(stage).items()}
@@ -187,7 +175,8 @@ def is_unset(settings: Any, name: str) -> bool:
         info is not None
         and info.kind in ("number", "numbers")
         and getattr(settings, name) is None
-        and not ({name, f"{settings.method}.{name}"} & DISCRETE or info.fixed)
+        and info.differentiable
+        and not info.fixed
     )
 
 
