@@ -16,15 +16,6 @@ Values = Mapping[str, tuple[float, float, float]]
 
 #: The codes of the tables as those of the module struct.
 _CODES: Final = {"f4": "f", "f8": "d", "i4": "i", "u4": "I"}
-#: Members that are arrays of numbers, and the member that counts them, if there is one.
-_COUNTS: Final[Mapping[str, str | None]] = {
-    "stage_threshold": "stage_threshold_count",
-    "weights": "weight_count",
-    "layers": "layer_count",
-    "level_weights": "level_weight_count",
-    "tint": None,
-    "sun_position": None,
-}
 _MAX_FLOAT: Final = 3.4028234663852886e38
 
 
@@ -43,6 +34,10 @@ def _defaults(table: Table, values: Values) -> bytes:
 
 _STAGE: Final = _defaults(_core.STAGE_BLOCK, _core.GLARE_VALUES)
 _SETTINGS: Final = _defaults(_core.SETTINGS_BLOCK, _core.VALUES)
+#: Members that are arrays of numbers.
+_ARRAYS: Final = {
+    name for name, (_, code, count) in _core.SETTINGS_BLOCK.items() if code in _CODES and count > 1
+}
 
 
 def _index(name: str, value: object, names: Sequence[str]) -> int:
@@ -68,7 +63,9 @@ def _pack_array(block: bytearray, name: str, value: Sequence[Any]) -> None:
     if not all(abs(number) <= _MAX_FLOAT for number in numbers):
         raise ValueError(f"{name}: {value!r} is out of range, finite numbers")
     _pack(block, _core.SETTINGS_BLOCK, name, *numbers)
-    if counter := _COUNTS[name]:
+    # The member that counts the rows, if there is one: "weight_count" of "weights".
+    counter = f"{name.removesuffix('s')}_count"
+    if counter in _core.SETTINGS_BLOCK:
         _pack(block, _core.SETTINGS_BLOCK, counter, len(rows))
 
 
@@ -111,7 +108,7 @@ def settings_block(method: str, fields: Mapping[str, Any]) -> bytes:
             _pack_value(block, table, name, value, _core.VALUES)
         elif name in _core.CHOICES:
             _pack(block, table, name, _index(name, value, _core.CHOICES[name]))
-        elif name in _COUNTS:
+        elif name in _ARRAYS:
             _pack_array(block, name, value)
         elif name == "bloom_size":
             _pack_size(block, value)
