@@ -8,7 +8,6 @@ import operator
 import os
 import reprlib
 from collections.abc import Callable, Iterable, Mapping, Sequence, Set
-from pathlib import Path
 from types import NoneType, UnionType
 from typing import Any, Final, Literal, NamedTuple, TypeVar, Union, cast, get_args, get_origin
 
@@ -61,7 +60,6 @@ _KINDS: Final[Mapping[Any, _Kind]] = {
     # Which ones there are, the function says.
     Literal: _TEXT,
     os.PathLike: _PATH,
-    Path: _PATH,
     Callable: _Kind("callable", "callables", callable),
 }
 
@@ -96,6 +94,8 @@ def _builtin_kind_of(annotation: Any) -> _Kind | None:
 
 
 def _scalar_kind_of(annotation: Any) -> _Kind | None:
+    if isinstance(annotation, type) and issubclass(annotation, os.PathLike):
+        return _PATH
     return _KINDS.get(get_origin(annotation) or annotation)
 
 
