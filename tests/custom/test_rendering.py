@@ -17,6 +17,7 @@ from tests.custom import COUNTER
 from tests.images import picture
 from tests.refusals import assert_refused, rows
 from vkbloom import Renderer, Settings, load_method, reference
+from vkbloom._explorer.controls import described
 from vkbloom._settings.registry import METHODS
 
 pytestmark = pytest.mark.usefixtures("glslang")
@@ -257,6 +258,26 @@ def test_a_param_can_be_the_setting_of_the_reference_white(renderer: Renderer) -
     for value in (0.5, 1001):
         with pytest.raises(ValueError, match="reference_white"):
             settings.replace(reference_white=value)
+
+
+def test_params_mean_nothing_beyond_the_file(renderer: Renderer) -> None:
+    """Methods of the package have fields of these names: a factor of the bloom, a rare one."""
+    params = "".join(
+        f"//!PARAM {name}\n//!TYPE float\n//!MINIMUM 0\n//!MAXIMUM 4\n0.5\n"
+        for name in ("weight", "white")
+    )
+    body = "vec4 hook() { return weight * GLOW_tex(GLOW_pos); }\n"
+    text = f"{params}//!HOOK MAIN\n//!BIND GLOW\n//!SAVE BLOOM\n{body}"
+
+    def weighted(image: Array, settings: Any) -> dict[str, Array]:
+        return {"bloom": settings.weight * image}
+
+    kind = load_method(text, name="weighted", reference=weighted)
+    image, settings = picture(24, 16, highest=2), kind(format="rgba32float")
+    final = renderer.apply(image, settings)["final"]
+    assert difference(final, reference.apply(image, settings)["final"]) < 1e-6
+    everyday = {field["name"] for field in described(kind)["fields"] if field["first"]}
+    assert everyday >= {"weight", "white"}
 
 
 @pytest.mark.parametrize("shading", ["forward", "deferred"])

@@ -8,19 +8,9 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from vkbloom import (
-    BlenderGlare,
-    Convolution,
-    DualKawase,
-    Frames,
-    GodotBloom,
-    Halation,
-    Pyramid,
-    Separable,
-    UnrealBloom,
-    reference,
-)
+from vkbloom import Frames, reference
 from vkbloom._settings.settings import Settings
+from vkbloom.reference._compositing import slope_of
 
 FORMATS: Final = {"uint8": "rgba8unorm", "float16": "rgba16float", "float32": "rgba32float"}
 _DTYPES: Final = {format: dtype for dtype, format in FORMATS.items()}
@@ -35,12 +25,6 @@ _SINGLE: Final = 1e-4
 # normal half, 2 ** -14.
 _HALF_ROUNDING: Final = 2.0**-11
 _HALF_LEAST: Final = 2.0**-25
-
-# The threshold pass of these methods writes the glow.
-_WITH_THRESHOLD_PASS: Final = (Separable, Pyramid, DualKawase, BlenderGlare)
-
-# Framebuffers in which one 8-bit stage's rounding arrives, or that of the glow and one more.
-_FIRST_STAGES: Final = ("glow", "blur_vertical", "down_0")
 
 
 class Deviation(NamedTuple):
@@ -122,30 +106,6 @@ def deviation(
     return Deviation(name, off, allowed, wrong)
 
 
-def _slope(image: NDArray[Any], settings: Settings) -> Limit:
-    """Return how much of a difference of the bloom, after its intensity, is in `final` at most.
-
-    Godot's screen is s + g - s g / white, of which s may be any number; so may that of soft light,
-    whose g is multiplied by a cubic of the scene where that is dark or negative.
-    """
-    if not isinstance(settings, GodotBloom):
-        return 1.0
-    scene = real(image) * 2.0**settings.exposure
-    slope = np.ones_like(scene)
-    if settings.composite == "screen":
-        slope = np.abs(1.0 - scene / settings.white)
-    elif settings.composite == "soft_light" and settings.tonemap == "none":
-        slope = np.abs(((16 * scene - 12) * scene + 3) * scene)
-        slope = np.where(scene <= 0.25, slope, 1.0)
-    limit: NDArray[np.float64] = np.maximum(1.0, slope)
-    return limit
-
-
-def _is_transform(settings: Settings) -> bool:
-    is_fog = isinstance(settings, BlenderGlare) and settings.type == "fog_glow"
-    return is_fog or isinstance(settings, Convolution | UnrealBloom | Halation)
-
-
 def _after_threshold(
     frames: Frames, image: NDArray[Any], settings: Settings, given: dict[str, Any]
 ) -> dict[str, NDArray[np.float64]]:
@@ -166,10 +126,6 @@ def _limits(
     given: dict[str, Any],
 ) -> dict[str, Limit]:
     format = settings.format or FORMATS[image.dtype.name]
-    passes_before_vertical = 2 * getattr(settings, "loops", 1) - 1
-    hidden = passes_before_vertical - 1
-    if isinstance(settings, Separable):
-        hidden += len(settings.layers) - 1
     magnitudes: dict[str, Any] = dict.fromkeys(expected, 0.0)
     if "float16" in (image.dtype.name, _DTYPES[format]):
         # A threshold takes away from a value, but not from what it was rounded by.
@@ -179,29 +135,25 @@ def _limits(
         magnitudes |= reference.apply(np.abs(image), settings.replace(threshold=None), **sizes)
     limits = {}
     for index, name in enumerate(frames):
-        is_first = name in _FIRST_STAGES and (
-            name != "blur_vertical" or passes_before_vertical == 1
-        )
         limits[name] = tolerance(
             frames[name].dtype,
             expected[name],
-            stages_of_8_bits=1 if is_first else 2,
+            stages_of_8_bits=1 if name in settings._first_stages else 2,
             # No value has come through more passes than there are before it.
-            # (Blender's glow are the highlights of a frame, which is an image of its own.)
-            stages=index + 1 + hidden * (index > 0) + isinstance(settings, BlenderGlare),
+            stages=index + 1 + settings._hidden_stores(name),
             # (Where taps count less the brighter they are, signs may make more of them.)
             magnitude=np.maximum(np.abs(expected[name]), magnitudes[name]),
         )
-        if _is_transform(settings) and frames[name].dtype == np.float32:
+        if settings._is_transform and frames[name].dtype == np.float32:
             # A transform's error is relative to the largest value that it is made of.
             limits[name] = max(limits[name], tolerance(np.float32, expected["glow"]))
-        elif _is_transform(settings):
+        elif settings._is_transform:
             # So in halves it has some more than the rounding, where that is next to nothing.
             limits[name] = limits[name] + 0.01 * tolerance(np.float32, expected["glow"])
     if settings.bloom and _DTYPES[format] != image.dtype:
         # The coarser bloom's rounding goes through the composite into a finer final.
         of_bloom = np.broadcast_to(limits["bloom"], frames["bloom"].shape)[..., : image.shape[2]]
-        slope = settings.intensity * _slope(image, settings)
+        slope = settings.intensity * slope_of(real(image), settings)
         limits["final"] = limits["final"] + slope * of_bloom
     return limits
 
@@ -215,7 +167,7 @@ def deviations(
         wrong = f"framebuffers: {', '.join(frames)}; not {', '.join(expected)}"
         yield Deviation("framebuffers", np.nan, 0.0, wrong)
         return
-    if settings.threshold is not None and not isinstance(settings, _WITH_THRESHOLD_PASS):
+    if settings.threshold is not None and not settings._has_threshold_pass:
         # Its threshold comes after the glow, and magnifies what that was rounded by.
         glow = frames["glow"]
         yield deviation("glow", glow, expected["glow"], tolerance(glow.dtype, expected["glow"]))

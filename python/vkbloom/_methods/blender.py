@@ -130,7 +130,7 @@ class BlenderGlare(WithKernel, PublishedSettings):
     _knobs: ClassVar[tuple[str, ...]] = ("threshold", "size")
     shaping: ClassVar[tuple[str, ...]] = ("type", "quality", "version", "size", "kernel")
     #: `glow` is the node's output Highlights.
-    glow_note: ClassVar[str] = ""
+    _has_threshold_pass: ClassVar[bool] = True
 
     threshold: float | None = 1.0
     intensity: float = number_field(range=(0, 1))
@@ -153,6 +153,15 @@ class BlenderGlare(WithKernel, PublishedSettings):
     jitter: float = number_field(everyday=0, differentiable=False)
     kernel: PSFLike | None = value_field(None, kind="psf", read=read_psf)
     version: Version = choice_field(("5.0", "5.2", "4.3"), option="blender-version")
+
+    @property
+    def _is_transform(self) -> bool:
+        # (The kernel of "kernel" is an image, and smaller than the frame.)
+        return self.type == "fog_glow"
+
+    def _hidden_stores(self, framebuffer: str) -> int:
+        # The highlights are of the frame, which is an image of its own.
+        return 1
 
     def _core_values(self) -> dict[str, Any]:
         """Return what the core names or counts otherwise."""

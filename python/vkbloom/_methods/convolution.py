@@ -116,6 +116,10 @@ class Convolution(WithKernel, Settings):
         """
         return self._kernel(frame, buffers or frame)
 
+    @property
+    def _is_transform(self) -> bool:
+        return True
+
     def core_kernel_size(self, frame: tuple[int, int], buffers: tuple[int, int]) -> tuple[int, int]:
         """Return estimates of the kernel's width and height, without the kernel."""
         sides = self.kernel_size or tuple(2 * side - 1 for side in frame)

@@ -26,6 +26,10 @@ class GaussianSum(WithKernel, PublishedSettings):
 
     format: BloomFormat | None = None
 
+    @property
+    def _is_transform(self) -> bool:
+        return True
+
     def kernel(self, frame: Size, buffers: Size | None = None) -> NDArray[np.float64]:
         """Return the kernel for a frame in pixels of the bloom buffers, shape (h, w, 3)."""
         return self._kernel(frame, buffers or frame)

@@ -74,6 +74,16 @@ class Separable(Settings):
     texel: Texel = choice_field()
     direct: bool = flag_field()
 
+    @property
+    def _first_stages(self) -> tuple[str, ...]:
+        return ("glow", "blur_vertical") if self.loops == 1 else ("glow",)
+
+    def _hidden_stores(self, framebuffer: str) -> int:
+        """Return the passes along x, those of earlier loops, and the sums of layers."""
+        if framebuffer == "glow" or not self.bloom:
+            return 0
+        return 2 * (self.loops - 1) + len(self.layers) - 1
+
 
 @public("vkbloom")
 @checked

@@ -24,6 +24,11 @@ class Reference(Protocol):
     flow; the last one is "bloom". `source` is a `vkbloom.reference._image.BlurInput`.
     ``gain(settings, size)`` returns the bloom of a flat image of 1; `size` is the width and height
     of the frame.
+
+    A method with a composite of its own has ``composite(scene, light, settings, share)`` (as that
+    of `vkbloom.reference._blending`), and ``slope(scene, settings)``, if its largest derivative by
+    the light is not 1. ``strength(settings)`` is the factor of a bloom that has more than the
+    intensity.
     """
 
     passes: Any

@@ -146,6 +146,8 @@ class Settings(Record):
     _knobs: ClassVar[tuple[str, ...]]
     #: Whether the method starts from the complete frame: it reduces it and thresholds it itself.
     published: ClassVar[bool] = False
+    #: Whether `glow` is what has passed the threshold; other methods apply it in a later pass.
+    _has_threshold_pass: ClassVar[bool] = True
 
     bloom: bool = flag_field(everyday=-3)
     threshold: float | None = number_field(default=None, slider=(0, 4), everyday=-1)
@@ -167,8 +169,22 @@ class Settings(Record):
     @property
     def glow_note(self) -> str:
         """What `glow` shows if it is not the light above the threshold; empty if it is."""
-        is_frame = self.published and self.threshold is not None
+        is_frame = not self._has_threshold_pass and self.threshold is not None
         return "the frame before its threshold" if is_frame else ""
+
+    @property
+    def _is_transform(self) -> bool:
+        """Whether light passes a transform, whose error is relative to the largest value."""
+        return False
+
+    @property
+    def _first_stages(self) -> tuple[str, ...]:
+        """The framebuffers in which the rounding of one 8-bit store arrives, or of `glow`, too."""
+        return "glow", "down_0"
+
+    def _hidden_stores(self, framebuffer: str) -> int:
+        """Return how many of the images before a framebuffer are not framebuffers themselves."""
+        return 0
 
     def replace(self, **changes: Any) -> Self:
         """Return a copy with some fields changed, as `dataclasses.replace` does.
@@ -240,6 +256,7 @@ class PublishedSettings(Settings):
     """Base class of the settings of published methods, with what most of them have."""
 
     published: ClassVar[bool] = True
+    _has_threshold_pass: ClassVar[bool] = False
 
     knee: float = number_field(fixed="the threshold of this method has no knee")
     composite: Composite = choice_field(("add",))

@@ -42,6 +42,11 @@ def gain(settings: BabylonBloom, size: tuple[int, int]) -> float:
     return float(_prefilter(np.ones((1, 1, 1)), settings)[0, 0, 0]) * weights**2
 
 
+def strength(settings: BabylonBloom) -> float:
+    """Return the factor of the bloom: the weight is a field of its own."""
+    return settings.intensity * settings.weight
+
+
 def _prefilter(rgb: Array, settings: BabylonBloom) -> Array:
     if settings.threshold is None:
         return rgb

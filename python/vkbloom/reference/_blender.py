@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ._blender_lights import FACTORS, GAINS, LIGHTS, reads_next
+from ._blending import develop
 from ._image import BlurInput, Storage, finite, storage
 from ._pyramid import GROUPS, downsample
 from ._sampling import Array, halved, sample, size_of, weighted_mean
@@ -47,6 +48,11 @@ def passes(source: BlurInput, settings: BlenderGlare) -> dict[str, Array]:
     alpha = light[..., 3:] * (sum(settings.tint[i] for i in range(3)) / 3)
     bloom = source.store.end(np.concatenate([rgb, alpha], axis=2))
     return {**framebuffers, **images, "bloom": bloom}
+
+
+def composite(scene: Array, light: Array, settings: BlenderGlare, share: float | Array) -> Array:
+    """Return max(0, s) + light, whose derivative at black is the mean of both sides."""
+    return develop((scene + np.abs(scene)) / 2 + light, settings)
 
 
 def _enlarged(light: Array, size: tuple[int, int], version: str) -> Array:

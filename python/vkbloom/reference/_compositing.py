@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -11,13 +10,15 @@ from numpy.typing import DTypeLike, NDArray
 from vkbloom._argument_types import checked
 from vkbloom._arrays import check_dtype
 from vkbloom._public import public
+from vkbloom._settings.registry import METHODS
 from vkbloom._settings.settings import Settings, given_settings
 
-from ._darktable import screened
+from . import _blending as blending
+from ._blending import develop
 from ._image import as_float, format_of, storage
 from ._sampling import Array
 from ._tape import joined
-from ._tone_map import ENCODINGS, TONE_MAPS
+from ._tone_map import ENCODINGS
 
 
 @public("vkbloom.reference")
@@ -85,8 +86,24 @@ def composite(
 
 
 def strength_of(settings: Settings) -> Any:
-    """Return the factor of the bloom; Babylon's weight is a field of its own."""
-    return settings.intensity * getattr(settings, "weight", 1.0)
+    """Return the factor of the bloom: the intensity, unless the method says more."""
+    strength = _declared("strength", settings)
+    return settings.intensity if strength is None else strength(settings)
+
+
+def slope_of(scene: Array, settings: Settings) -> float | Array:
+    """Return the largest derivative of the composite by the light, before exposure and curve."""
+    slope = _declared("slope", settings)
+    return 1.0 if slope is None else slope(scene, settings)
+
+
+def _declared(name: str, settings: Settings) -> Any:
+    """Return a function of the method's module; None if there is none, as for custom methods."""
+    try:
+        module = METHODS.reference(settings.method)
+    except KeyError:
+        return None
+    return getattr(module, name, None)
 
 
 def composite_checked(
@@ -99,23 +116,11 @@ def composite_checked(
     """Return the final image of a scene and light, both in real units; None: without bloom."""
     original, alpha = image[..., :3], image[..., 3:]
     rgb = np.where(np.isfinite(original), original, 0.0)
-    scale, curve = 2.0**settings.exposure, TONE_MAPS[settings.tonemap]
     if light is None:
-        rgb = curve(rgb * scale)
+        rgb = develop(rgb, settings)
     else:
-        glow = light[..., :3]
-        if settings.method == "godot":
-            # The glow was already exposed before the threshold.
-            rgb = _godots(rgb * scale, glow, settings, curve, share)
-        elif settings.method == "blender":
-            # max(0, s), whose derivative at black is the mean of both sides.
-            rgb = curve(((rgb + np.abs(rgb)) / 2 + glow) * scale)
-        elif settings.method == "darktable":
-            rgb = curve(screened(rgb, glow) * scale)
-        elif settings.method == "pmndrs" and settings.composite == "screen":
-            rgb = curve((rgb + glow - np.minimum(rgb * glow, 1)) * scale)
-        else:
-            rgb = curve(_blend(rgb, glow, settings.composite, settings.intensity, share) * scale)
+        method = _declared("composite", settings) or blending.composite
+        rgb = method(rgb, light[..., :3], settings, share)
         alpha = _blend_alpha(alpha, light, settings.alpha)
     rgb = ENCODINGS[settings.encoding](rgb, settings.reference_white)
     stored = np.dtype(dtype)
@@ -140,44 +145,6 @@ def _blend_alpha(alpha: Array, light: Array, mode: str) -> Array:
             raise ValueError('bloom: 3 channels are not the 4 that settings.alpha "blur" needs')
         return 1 - (1 - alpha) * (1 - np.clip(light[..., 3:], 0, 1))
     return alpha
-
-
-def _blend(scene: Array, light: Array, mode: str, intensity: float, share: float | Array) -> Array:
-    """Return the combination of scene and light, which is i b."""
-    if mode == "add":
-        return scene + light
-    if mode == "mix":
-        return scene + light - intensity * share * scene
-    if mode == "screen":
-        return 1 - (1 - np.clip(scene, 0, 1)) * (1 - np.clip(light, 0, 1))
-    raise ValueError(f'composite: {mode!r} is not "add", "mix" or "screen"')
-
-
-def _godots(
-    scene: Array,
-    glow: Array,
-    settings: Settings,
-    curve: Callable[[Array], Array],
-    share: float | Array,
-) -> Array:
-    """Return scene and light after the tone map, as Godot blends them.
-
-    From godotengine/godot, servers/rendering/renderer_rd/shaders/effects/tonemap.glsl
-    @ 001c8c9c24dc.
-    """
-    if settings.composite == "soft_light":
-        light, toned = np.clip(curve(glow), 0, 1), curve(scene)
-        dark = ((16 * toned - 12) * toned + 4) * toned
-        full = np.where(toned <= 0.25, dark, np.sqrt(np.maximum(toned, 0)))
-        lit: Array = joined(toned, 1.0, toned + light * (full - toned), toned)
-        return lit
-    if settings.composite == "screen":
-        white = getattr(settings, "white")  # noqa: B009
-        glow = np.clip(glow, 0, white)
-        return curve(scene + glow - scene * glow / white)
-    if settings.composite == "replace":
-        return curve(glow)
-    return curve(_blend(scene, glow, settings.composite, settings.intensity, share))
 
 
 def _noise(size: tuple[int, int], seed: int) -> Array:

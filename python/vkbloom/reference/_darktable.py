@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ._blending import develop
 from ._image import BlurInput
 from ._sampling import Array, sample
 from ._tape import contiguous, operation, value_of
@@ -48,13 +49,12 @@ def gain(settings: DarktableBloom, size: tuple[int, int]) -> float:
     return float(_bright(np.ones((1, 1, 3)), settings)[0, 0, 0])
 
 
-def screened(colour: Array, light: Array) -> Array:
-    """Return the colour with the screen of its lightness and of light, and its a and b."""
-    f = _lab(colour)
+def composite(scene: Array, light: Array, settings: DarktableBloom, share: float | Array) -> Array:
+    """Return the scene with the screen of its lightness and of light, and its a and b."""
+    f = _lab(scene)
     f = f + light[..., :1] * (1 - f[..., 1:2])
     shares = np.where(f > 6 / 29, f**3, (116 * f - 16) / _SLOPE)
-    result: Array = shares @ np.linalg.inv(_SHARES).T
-    return result
+    return develop(shares @ np.linalg.inv(_SHARES).T, settings)
 
 
 def _lab(colour: Array) -> Array:

@@ -1,7 +1,7 @@
 """Godot's glow.
 
 From godotengine/godot, servers/rendering/renderer_rd/shaders/effects: copy.glsl @ 0a5efd02df51 (the
-blur), tonemap.glsl @ 001c8c9c24dc (the gathering).
+blur), tonemap.glsl @ 001c8c9c24dc (the gathering and the composite).
 """
 
 from __future__ import annotations
@@ -10,10 +10,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ._blending import blend
 from ._image import BlurInput
 from ._sampling import Array, sample
-from ._tape import contiguous
+from ._tape import contiguous, joined
 from ._threshold import brightest, luminance, masked
+from ._tone_map import TONE_MAPS
 from ._upsampling import cubic, linear
 
 if TYPE_CHECKING:
@@ -61,6 +63,43 @@ def gain(settings: GodotBloom, size: tuple[int, int]) -> float:
         value = _first(value, settings) if level == 0 else _later(value, settings)
         total += weight * float(value[0, 0, 0])
     return total
+
+
+def composite(scene: Array, light: Array, settings: GodotBloom, share: float | Array) -> Array:
+    """Return scene and light after the tone map, as Godot blends them.
+
+    The light was already exposed before the threshold.
+    """
+    scene, curve = scene * 2.0**settings.exposure, TONE_MAPS[settings.tonemap]
+    if settings.composite == "soft_light":
+        soft, toned = np.clip(curve(light), 0, 1), curve(scene)
+        dark = ((16 * toned - 12) * toned + 4) * toned
+        full = np.where(toned <= 0.25, dark, np.sqrt(np.maximum(toned, 0)))
+        lit: Array = joined(toned, 1.0, toned + soft * (full - toned), toned)
+        return lit
+    if settings.composite == "screen":
+        light = np.clip(light, 0, settings.white)
+        return curve(scene + light - scene * light / settings.white)
+    if settings.composite == "replace":
+        return curve(light)
+    return curve(blend(scene, light, settings.composite, settings.intensity, share))
+
+
+def slope(scene: Array, settings: GodotBloom) -> Array:
+    """Return the largest derivative of the composite by the light.
+
+    The screen is s + g - s g / white, of which s may be any number; so may that of soft light,
+    whose g is multiplied by a cubic of the scene where that is dark or negative.
+    """
+    scene = scene * 2.0**settings.exposure
+    slope = np.ones_like(scene)
+    if settings.composite == "screen":
+        slope = np.abs(1.0 - scene / settings.white)
+    elif settings.composite == "soft_light" and settings.tonemap == "none":
+        slope = np.abs(((16 * scene - 12) * scene + 3) * scene)
+        slope = np.where(scene <= 0.25, slope, 1.0)
+    limit: Array = np.maximum(1.0, slope)
+    return limit
 
 
 def _weights(settings: GodotBloom) -> list[float]:

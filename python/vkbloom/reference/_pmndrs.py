@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from . import _blending as blending
+from ._blending import develop
 from ._image import BlurInput
 from ._sampling import Array, halved, sample, size_of
 from ._threshold import luminance, masked, smooth_step
@@ -54,6 +56,13 @@ def gain(settings: PmndrsBloom, size: tuple[int, int]) -> float:
         level *= sum(weight * len(offsets) ** 2 for weight, offsets in _DOWN)
         downs.append(level)
     return flat_gain(mixed(settings.radius, len(downs)), downs)
+
+
+def composite(scene: Array, light: Array, settings: PmndrsBloom, share: float | Array) -> Array:
+    """Return scene and light; the library's screen does not clamp them, but their product."""
+    if settings.composite == "screen":
+        return develop(scene + light - np.minimum(scene * light, 1), settings)
+    return blending.composite(scene, light, settings, share)
 
 
 def _prefilter(rgb: Array, settings: PmndrsBloom) -> Array:
