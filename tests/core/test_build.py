@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import importlib.util
 import json
-import shutil
+import os
+import struct
 import sys
 from pathlib import Path
 from types import ModuleType
@@ -17,7 +18,7 @@ from tests.core.builds import ROOT
 
 @pytest.fixture
 def build(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> ModuleType:
-    """setup.py as a module that builds nothing, on a machine that lacks what it looks for."""
+    """setup.py as a module that builds nothing, in an empty folder and without any tool."""
     monkeypatch.chdir(ROOT)
     monkeypatch.setattr("setuptools.setup", lambda **_: None)
     spec = importlib.util.spec_from_file_location("vkbloom_setup", ROOT / "setup.py")
@@ -32,10 +33,18 @@ def build(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> ModuleType:
         patch.setattr(Path, "is_file", lambda self: self.stem != "volk" and is_file(self))
         spec.loader.exec_module(module)
     monkeypatch.setattr(module, "include_folders", lambda: [tmp_path / "include"])
-    monkeypatch.setattr(shutil, "which", lambda name: None)
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "bin").mkdir()
+    monkeypatch.setenv("PATH", str(tmp_path / "bin"))
     for variable in ("DEB_BUILD_OPTIONS", "NIX_BUILD_CORES"):
         monkeypatch.delenv(variable, raising=False)
     return module
+
+
+def script(file: Path, text: str) -> Path:
+    file.write_text(f"#!/bin/sh\n{text}\n")
+    file.chmod(0o755)
+    return file
 
 
 @pytest.mark.parametrize(
@@ -62,15 +71,13 @@ def test_missing_build_tool_is_named_with_its_package(
     ("command", "reason"),
     [
         ("kill -SEGV $$", "is ended by SIGSEGV (Segmentation fault):\nsaid"),
-        ("sh -c 'kill -ABRT $$'", "is ended by SIGABRT (Aborted):\nsaid"),
+        ("/bin/sh -c 'kill -ABRT $$'", "is ended by SIGABRT (Aborted):\nsaid"),
         ("exit 3", "fails with status 3:\nsaid"),
     ],
     ids=["signal", "signal-below-a-shell", "status"],
 )
 def test_how_a_tool_fails(build: ModuleType, tmp_path: Path, command: str, reason: str) -> None:
-    tool = tmp_path / "spirv-opt"
-    tool.write_text(f"#!/bin/sh\necho said >&2\n{command}\n")
-    tool.chmod(0o755)
+    tool = script(tmp_path / "spirv-opt", f"echo said >&2\n{command}")
     with pytest.raises(SystemExit) as caught:
         build.run_tool(Path("bloom.comp"), str(tool))
     assert str(caught.value).startswith(f"bloom.comp: {tool} {reason}")
@@ -82,8 +89,8 @@ def test_how_a_tool_fails(build: ModuleType, tmp_path: Path, command: str, reaso
         (None, {"DEB_BUILD_OPTIONS": "nocheck parallel=3"}, 3),
         (None, {"DEB_BUILD_OPTIONS": "nocheck", "NIX_BUILD_CORES": "5"}, 5),
         (2, {"DEB_BUILD_OPTIONS": "parallel=3", "NIX_BUILD_CORES": "5"}, 2),
-        (None, {"NIX_BUILD_CORES": "0"}, 7),
-        (None, {}, 7),
+        (None, {"NIX_BUILD_CORES": "0"}, len(os.sched_getaffinity(0))),
+        (None, {}, len(os.sched_getaffinity(0))),
     ],
 )
 def test_processes_of_a_build(
@@ -93,21 +100,19 @@ def test_processes_of_a_build(
     environment: dict[str, str],
     expected: int,
 ) -> None:
-    monkeypatch.setattr("os.sched_getaffinity", lambda _: range(7), raising=False)
     for name, value in environment.items():
         monkeypatch.setenv(name, value)
     assert build.processes(asked) == expected
 
 
 @pytest.fixture
-def table(build: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def table(build: ModuleType) -> Path:
     """The table of the modules of two shaders."""
+    shaders = Path("shaders")
+    shaders.mkdir()
     for name in ("a.frag", "b.comp", "c.glsl"):
-        (tmp_path / name).touch()
-    file = tmp_path / "modules.txt"
-    monkeypatch.setattr(build, "SHADERS", tmp_path)
-    monkeypatch.setattr(build, "TABLE", file)
-    return file
+        (shaders / name).touch()
+    return shaders / "modules.txt"
 
 
 def test_modules_are_those_of_the_table(build: ModuleType, table: Path) -> None:
@@ -138,42 +143,42 @@ def test_wrong_tables_of_modules(build: ModuleType, table: Path, rows: str, mess
 
 
 def test_modules_are_compiled_only_from_changed_sources_and_by_one_version(
-    build: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    build: ModuleType, tmp_path: Path
 ) -> None:
-    shipped, kept = tmp_path / "shipped", tmp_path / "kept"
-    source = tmp_path / "a.comp"
-    source.write_text("one")
-    versions = ["tool 1"]
-    compiled: list[str] = []
-
-    def compile_shader(module: Any, target: Path) -> None:
-        target.write_text(source.read_text() + module.name)
-
-    def optimize(module: Any, target: Path, passes: list[str]) -> None:
-        if passes is build.SIMPLER:
-            compiled.append(module.name)
-
-    monkeypatch.setattr(build, "SPIRV", kept)
-    monkeypatch.setattr(build, "SHIPPED", shipped)
-    recipes = [tmp_path / name for name in ("setup.py", "spirv.py")]
-    for recipe in recipes:
-        recipe.touch()
-    monkeypatch.setattr(build, "sources", lambda: [*recipes, source])
-    monkeypatch.setattr(build, "compile_shader", compile_shader)
-    monkeypatch.setattr(build, "decorate", lambda target: None)
-    monkeypatch.setattr(build, "optimize", optimize)
-    monkeypatch.setattr(build, "run_tool", lambda *_: versions[-1])
+    shipped, kept = Path("spirv"), Path("build/spirv")
+    source = Path("shaders/a.comp")
+    for file in (source, Path("setup.py"), Path("python/vkbloom/_custom/spirv.py")):
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text("one")
     built = [build.Module(name, source) for name in ("one", "two")]
+    version, module, calls = (tmp_path / name for name in ("version", "module", "calls"))
+    version.write_text("tool 1\n")
+    # The least SPIR-V: its magic number, version 1.3, and no instruction.
+    module.write_bytes(struct.pack("=5I", 0x07230203, 0x00010300, 0, 1, 0))
+    asked = f'[ "$1" = --version ] && exec /bin/cat {version}'
+    tools = {
+        "glslangValidator": f'for target; do :; done\nexec /bin/cp {module} "$target"',
+        "spirv-opt": f'echo "$*" >> {calls}',
+    }
+
+    def install() -> None:
+        for name, text in tools.items():
+            script(tmp_path / "bin" / name, f"{asked}\n{text}")
+
+    def uninstall() -> None:
+        for name in tools:
+            (tmp_path / "bin" / name).unlink()
 
     def compile_from(folder: Path) -> list[str]:
-        compiled.clear()
+        """Return the modules that spirv-opt got."""
+        calls.write_text("")
         assert build.compile_modules(built, 1) == folder
-        return compiled
+        return sorted({Path(line.split()[-1]).stem for line in calls.read_text().splitlines()})
 
     # Nothing is there, and no tool to make it.
     with pytest.raises(SystemExit, match="glslangValidator is missing"):
         build.compile_modules(built, 1)
-    monkeypatch.setattr(shutil, "which", lambda name: name)
+    install()
     assert compile_from(kept) == ["one", "two"]
     assert json.loads((kept / "made.json").read_text())["spirv-opt"] == "tool 1"
     assert compile_from(kept) == []
@@ -181,19 +186,20 @@ def test_modules_are_compiled_only_from_changed_sources_and_by_one_version(
     (kept / "two.spv").unlink()
     assert compile_from(kept) == ["two"]
     (kept / "two.spv").unlink()
-    versions.append("tool 2")
+    version.write_text("tool 2\n")
     assert compile_from(kept) == ["one", "two"]
     # A changed source that gives the same module, as a comment does, is compiled by glslang alone.
     (kept / "made.json").write_text("{}")
     assert compile_from(kept) == []
     # Modules of a source distribution are taken without tools, until a source is changed.
     kept.rename(shipped)
-    monkeypatch.setattr(shutil, "which", lambda name: None)
+    uninstall()
     assert compile_from(shipped) == []
     source.write_text("changed")
+    module.write_bytes(struct.pack("=5I", 0x07230203, 0x00010300, 0, 2, 0))
     with pytest.raises(SystemExit, match="glslangValidator is missing"):
         build.compile_modules(built, 1)
-    monkeypatch.setattr(shutil, "which", lambda name: name)
+    install()
     assert compile_from(kept) == ["one", "two"]
 
 
@@ -224,13 +230,14 @@ class Compiler:
 
 
 def test_a_source_is_compiled_again_only_if_it_a_header_or_an_option_has_changed(
-    build: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    build: ModuleType, tmp_path: Path
 ) -> None:
-    monkeypatch.setattr(build, "SPIRV", tmp_path)
-    monkeypatch.setattr(build, "volk_folder", lambda: str(tmp_path))
     one, other = sources = [str(tmp_path / name) for name in ("one.c", "other.c")]
-    for name in (*sources, "spirv.h", "volk.h", "volk.c"):
-        (tmp_path / name).touch()
+    header = Path("build/spirv/spirv.h")
+    volk = (f"include/volk/volk.{kind}" for kind in "ch")
+    for name in (*sources, header, "shaders/params.h", *volk):
+        Path(name).parent.mkdir(parents=True, exist_ok=True)
+        Path(name).touch()
 
     def compiled(*options: str) -> list[str]:
         compiler = Compiler()
@@ -242,7 +249,7 @@ def test_a_source_is_compiled_again_only_if_it_a_header_or_an_option_has_changed
     assert compiled() == []
     Path(other).write_text("changed")
     assert compiled() == [other]
-    (tmp_path / "spirv.h").write_text("changed")
+    header.write_text("changed")
     assert compiled() == [one, other]
     assert compiled("-O0") == [one, other]
     (tmp_path / "one.o").unlink()
