@@ -6,13 +6,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from tests.scene.parts import Cubemap, Mesh
 from vkbloom import Scene, _core
 from vkbloom._scene.blocks import scene_arguments
-from vkbloom._scene.mesh import Mesh
-from vkbloom._scene.skybox import from_array
 
 MESH = Mesh(np.zeros((3, 9), np.float32), np.arange(3, dtype=np.uint32))
-SKY = from_array(np.zeros((6, 1, 1, 4), np.uint8))
+SKY = Cubemap((np.zeros((6, 1, 1, 4), np.uint8),))
 SCENES = {has_sky: Scene(MESH, MESH, SKY if has_sky else None) for has_sky in (False, True)}
 
 

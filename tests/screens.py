@@ -8,9 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tests.scene.parts import WHITE, Mesh, Surface, Texture
 from vkbloom import Camera, Frames, Renderer, Scene, Settings
-from vkbloom._scene import Mesh
-from vkbloom._scene.textures import WHITE, Surface, Texture
 
 # The model matrix of time 0 moves a mesh by (0, -1, 0.25); this camera takes that back and stands
 # DISTANCE away from the plane z = 0, looking straight at it.

@@ -29,10 +29,10 @@ from tests.device.device_work import Consumer, OnDevice, vjp
 from tests.exhaustive import some
 from tests.images import picture
 from tests.processes import open_descriptors
+from tests.scene.parts import Texture
 from tests.screens import CAMERA, panel
 from vkbloom import Renderer, Scene, _core
 from vkbloom._renderer.surface import Surface
-from vkbloom._scene.textures import Texture
 
 OUT_OF_DEVICE_MEMORY = -2
 DEVICE_LOST = -4

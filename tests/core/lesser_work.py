@@ -21,10 +21,9 @@ from tests import tolerance
 from tests.custom import COUNTER
 from tests.exhaustive import EXHAUSTIVE
 from tests.images import picture
+from tests.scene.parts import Texture, load_sky
 from tests.screens import CAMERA, panel
 from vkbloom import DualKawase, Frames, Pyramid, Renderer, Scene, Separable, ThreeBloom
-from vkbloom._scene import skybox
-from vkbloom._scene.textures import Texture
 
 DTYPES = ("uint8", "float16", "float32")
 # One of each variant: lines, strips and tiles, levels half and twice as large, sums of all levels.
@@ -177,7 +176,7 @@ def try_all(renderer: Renderer) -> dict[str, str]:
     attempt("bands", lambda: apply(picture(*LARGE, 4, "float32"), Separable()))
     attempt("large RGB", lambda: apply_alone(picture(*LARGE_RGB, 3, "uint8"), Separable()))
     for dtype in DTYPES:
-        sky = skybox.load(picture(4, 24, 4, dtype).reshape(6, 4, 4, 4))
+        sky = load_sky(picture(4, 24, 4, dtype).reshape(6, 4, 4, 4))
         with_sky = dataclasses.replace(scene, skybox=sky)
         attempt(f"sky {dtype}", lambda: renderer.render(with_sky, None, (40, 30)))  # noqa: B023
     methods = (vkbloom.BevyBloom(max_mip_dimension=16), vkbloom.FilamentBloom(resolution=16))

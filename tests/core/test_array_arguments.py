@@ -10,10 +10,8 @@ import numpy as np
 import pytest
 
 import vkbloom
+from tests.scene.parts import WHITE, Cubemap, Mesh, Surface, Texture, load_sky
 from vkbloom import Convolution, Ghosts, GodotBloom, Pyramid, Renderer, Scene, Separable, psf
-from vkbloom._scene import Cubemap, Mesh
-from vkbloom._scene.skybox import from_array
-from vkbloom._scene.textures import WHITE, Surface, Texture
 
 Array = np.ndarray[Any, Any]
 Call = Callable[[Renderer, Any], object]
@@ -126,7 +124,7 @@ PLACES: Final[Mapping[str, Place]] = {
         (*COLUMNS, *CONVERTED),
     ),
     "faces": Place(
-        lambda renderer, array: shown(renderer, sky=from_array(array)),
+        lambda renderer, array: shown(renderer, sky=load_sky(array)),
         np.zeros((6, 2, 2, 4), np.float32),
         "skybox",
         ("float16", "uint8"),

@@ -12,12 +12,12 @@ from functools import partial
 from tests.device.exceptions import reason_against
 from tests.exhaustive import EXHAUSTIVE
 from tests.images import picture
+from tests.scene.parts import Texture
 from tests.screens import CAMERA, panel
 from tests.variants import VARIANTS, opened
 from vkbloom import Scene
 from vkbloom._doctor.cases import FRAME, Case, cases, compare_scene
 from vkbloom._doctor.self_test import judge
-from vkbloom._scene.textures import Texture
 
 
 def scenes() -> list[Case]:

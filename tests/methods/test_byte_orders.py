@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 import vkbloom
 from tests.exhaustive import by_turns
 from tests.images import picture
+from tests.scene.parts import load_sky
 from vkbloom import Convolution, Renderer, Separable, psf, reference, testing
-from vkbloom._scene import skybox
 
 Image = NDArray[Any]
 Call = Callable[[Any, Any, Any], Any]
@@ -105,7 +105,7 @@ CALLS: dict[str, Call] = {
     "deglare": lambda r, array, given: vkbloom.deglare(
         given, psf.gaussian(1), iterations=2, renderer=r
     ),
-    "skybox": lambda r, array, given: skybox.from_array(_cube(given)).levels[0],
+    "skybox": lambda r, array, given: load_sky(_cube(given)).levels[0],
     "flash": lambda r, array, given: testing.flash([array, given, array], 3, degrees=20).general,
     "diagnose": lambda r, array, given: str(testing.diagnose(given, array)),
     "probe": lambda r, array, given: testing.assert_superposition(

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from tests.images import picture
+from tests.scene.parts import Texture
 from tests.screens import CAMERA, panel
 from tests.tolerance import assert_close
 from vkbloom import Frames, Pyramid, Renderer, Scene, Separable, Settings, ThreeBloom, reference
-from vkbloom._scene.textures import Texture
 
 # What it leaves alone
 

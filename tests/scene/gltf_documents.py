@@ -15,8 +15,7 @@ import numpy as np
 from hypothesis import settings, strategies
 
 from tests.exhaustive import examples
-from vkbloom._scene import Mesh
-from vkbloom._scene.gltf import load_mesh
+from tests.scene.parts import Mesh, load_mesh
 
 FLOAT, BYTE, SHORT, INT = 5126, 5121, 5123, 5125
 DTYPES = {FLOAT: "<f4", BYTE: "<u1", SHORT: "<u2", INT: "<u4"}

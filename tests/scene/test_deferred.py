@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from tests.scene.parts import Mesh
 from tests.screens import BLURRED, DISTANCE, GBUFFER, NOTHING, SIZE, deferred, noise, rgb, screen
 from tests.tolerance import assert_close, tolerance
 from vkbloom import (
@@ -25,7 +26,6 @@ from vkbloom import (
     presets,
     reference,
 )
-from vkbloom._scene import Mesh
 
 Array = NDArray[Any]
 

@@ -14,11 +14,10 @@ import pytest
 from numpy.typing import NDArray
 
 import vkbloom
+from tests.scene.parts import Cubemap, Mesh
 from tests.screens import GBUFFER, noise, rgb, screen
 from tests.tolerance import real
 from vkbloom import Camera, Renderer, Scene, Separable, reference
-from vkbloom._scene import Mesh
-from vkbloom._scene.skybox import Cubemap
 
 SIZE = (320, 180)
 FORWARD = ["glow", "glow_depth", "blur_vertical", "bloom", "scene", "depth", "final"]

@@ -14,8 +14,8 @@ import pytest
 
 from tests.processes import output
 from tests.refusals import assert_refused, rows
-from vkbloom._scene import Camera, Mesh, Scene
-from vkbloom._scene.skybox import Cubemap
+from tests.scene.parts import Cubemap, Mesh
+from vkbloom import Camera, Scene
 
 
 def mesh(**changes: Any) -> Mesh:

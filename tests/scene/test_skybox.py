@@ -18,8 +18,7 @@ from numpy.typing import NDArray
 from tests.framebuffers import write_image
 from tests.refusals import assert_refused, rows
 from tests.scene.gltf_documents import CHANGES, many
-from vkbloom._scene import ktx, skybox
-from vkbloom._scene.skybox import Cubemap
+from tests.scene.parts import Cubemap, load_sky
 
 # name -> (glInternalFormat, glFormat, glType, channels, dtype)
 FORMATS = {
@@ -91,7 +90,7 @@ def look_up(faces: NDArray[Any], direction: tuple[float, float, float]) -> NDArr
 def refusal(path: Path) -> str | None:
     """Return the message with which a file is refused as it should be, None if it is loaded."""
     try:
-        skybox.load(path)
+        load_sky(path)
     except ValueError as error:
         return str(error)
     return None
@@ -103,7 +102,7 @@ def refusal(path: Path) -> str | None:
 @pytest.mark.parametrize("dtype", ["u1", "f2", "f4"])
 def test_rgb_arrays_get_full_alpha(dtype: str) -> None:
     faces = faces_of(4, 3, dtype)
-    cube = skybox.load(faces)
+    cube = load_sky(faces)
     assert (cube.size, cube.dtype, len(cube.levels)) == (4, np.dtype(dtype), 3)
     np.testing.assert_array_equal(cube.levels[0][..., :3], faces)
     for level in cube.levels:
@@ -112,7 +111,7 @@ def test_rgb_arrays_get_full_alpha(dtype: str) -> None:
 
 def test_rgba_arrays_are_used_as_they_are_and_not_shared() -> None:
     faces = faces_of(4)
-    cube = skybox.load(faces)
+    cube = load_sky(faces)
     np.testing.assert_array_equal(cube.levels[0], faces)
     faces[...] = 0
     assert cube.levels[0].any()
@@ -126,19 +125,19 @@ def test_rgba_arrays_are_used_as_they_are_and_not_shared() -> None:
 def test_other_layouts_and_byte_orders_are_converted() -> None:
     faces = faces_of(3, 4, "f4")
     for given_faces in (np.asfortranarray(faces), faces.astype(">f4"), faces[:, ::-1][:, ::-1]):
-        level = skybox.load(given_faces).levels[0]
+        level = load_sky(given_faces).levels[0]
         assert level.dtype == np.dtype(np.float32)
         assert level.flags.c_contiguous
         np.testing.assert_array_equal(level, faces)
 
 
 def test_a_cubemap_is_returned_itself() -> None:
-    cube = skybox.load(faces_of(2))
-    assert skybox.load(cube) is cube
+    cube = load_sky(faces_of(2))
+    assert load_sky(cube) is cube
 
 
 def test_a_pickled_cubemap_stays_read_only() -> None:
-    cube = pickle.loads(pickle.dumps(skybox.load(faces_of(2))))
+    cube = pickle.loads(pickle.dumps(load_sky(faces_of(2))))
     np.testing.assert_array_equal(cube.levels[0], faces_of(2))
     assert not cube.levels[1].flags.writeable
 
@@ -151,7 +150,7 @@ def test_a_mip_level_is_the_mean_of_four() -> None:
     faces[0, :, :, 0] = [[1, 2], [3, 4]]
     faces[5, :, :, 1] = [[255, 255], [255, 254]]
     faces[3, :, :, 2] = [[0, 0], [0, 1]]
-    top = skybox.from_array(faces).levels[1]
+    top = load_sky(faces).levels[1]
     # 2.5 rounds to even, 254.75 up, 0.25 down.
     assert (top[0, 0, 0, 0], top[5, 0, 0, 1], top[3, 0, 0, 2]) == (2, 255, 0)
     assert top.dtype == np.uint8
@@ -161,7 +160,7 @@ def test_rounding_does_not_add_up() -> None:
     # Rounded level by level, the mean of 3/4 would become 1 at once and never come back.
     faces = np.zeros((6, 4, 4, 4), np.uint8)
     faces[:, :2, :2] = [[[1], [1]], [[1], [0]]]
-    assert [int(level.max()) for level in skybox.from_array(faces).levels] == [1, 1, 0]
+    assert [int(level.max()) for level in load_sky(faces).levels] == [1, 1, 0]
 
 
 @pytest.mark.parametrize("dtype", ["f2", "f4"])
@@ -172,7 +171,7 @@ def test_mip_levels_of_floats_neither_overflow_nor_spread_nan(dtype: str) -> Non
     faces[2, 0, 0] = math.inf
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        levels = skybox.from_array(faces).levels
+        levels = load_sky(faces).levels
     np.testing.assert_array_equal(levels[0], faces)
     assert (levels[1][0] == largest).all()
     np.testing.assert_allclose(levels[1][1:3].astype("f8"), float(largest) * 0.75, rtol=1e-3)
@@ -190,11 +189,10 @@ def test_ktx_formats(tmp_path: Path, name: str, order: Literal["<", ">"], side: 
     levels = [faces_of(max(1, side >> i), channels, kind) + i for i in range(side.bit_length())]
     path = tmp_path / "sky.ktx"
     path.write_bytes(ktx_bytes(levels, name, order))
-    for read, written in zip(ktx.read(path), levels, strict=True):
+    cube = load_sky(str(path))
+    for read, written in zip(cube.levels, levels, strict=True):
         assert read.dtype == np.dtype(kind)
-        np.testing.assert_array_equal(read, written)
-    cube = skybox.load(str(path))
-    assert len(cube.levels) == len(levels)
+        np.testing.assert_array_equal(read[..., :channels], written)
     assert cube.levels[-1].shape == (6, 1, 1, 4)
 
 
@@ -202,15 +200,15 @@ def test_a_ktx_with_one_level_gets_the_others(tmp_path: Path) -> None:
     path = tmp_path / "sky.ktx"
     for count in (0, 1):
         path.write_bytes(ktx_bytes([faces_of(4)], level_count=count))
-        cube = skybox.load(path)
+        cube = load_sky(path)
         assert [level.shape[1] for level in cube.levels] == [4, 2, 1]
-        np.testing.assert_array_equal(cube.levels[1], skybox.from_array(faces_of(4)).levels[1])
+        np.testing.assert_array_equal(cube.levels[1], load_sky(faces_of(4)).levels[1])
 
 
 def test_a_ktx_with_a_part_of_the_chain_keeps_it(tmp_path: Path) -> None:
     path = tmp_path / "any.name"
     path.write_bytes(ktx_bytes([faces_of(8), faces_of(4)]))
-    assert [level.shape[1] for level in skybox.load(path).levels] == [8, 4]
+    assert [level.shape[1] for level in load_sky(path).levels] == [8, 4]
 
 
 @pytest.mark.parametrize(("call", "error"), rows(__file__, "skyboxes"))
@@ -218,9 +216,9 @@ def test_a_wrong_value_is_refused(tmp_path: Path, call: str, error: str) -> None
     def ktx_with(**header: int) -> Cubemap:
         path = tmp_path / "sky.ktx"
         path.write_bytes(ktx_bytes([faces_of(4), faces_of(2)], "RGBA8", "<", **header) + bytes(8))
-        return skybox.load(path)
+        return load_sky(path)
 
-    levels = dict(zip(("four", "two", "one"), skybox.load(faces_of(4)).levels, strict=True))
+    levels = dict(zip(("four", "two", "one"), load_sky(faces_of(4)).levels, strict=True))
     assert_refused(call, error, {**globals(), **levels, "ktx_with": ktx_with})
 
 
@@ -228,11 +226,11 @@ def test_a_ktx_cut_anywhere_is_refused(tmp_path: Path) -> None:
     whole = ktx_bytes([faces_of(2), faces_of(1)])
     path = tmp_path / "sky.ktx"
     path.write_bytes(whole)
-    assert len(ktx.read(path)) == 2
+    assert len(load_sky(path).levels) == 2
     for size in range(len(whole)):
         path.write_bytes(whole[:size])
         with pytest.raises(ValueError, match=r"sky\.ktx: "):
-            skybox.load(path)
+            load_sky(path)
 
 
 @many
@@ -250,7 +248,7 @@ def test_changed_bytes_load_or_are_refused(tmp_path: Path, changes: list[tuple[i
 def test_missing_files_are_os_errors_that_name_them(tmp_path: Path) -> None:
     for source in (tmp_path / "gone.ktx", tmp_path / "gone.png", [tmp_path / "gone.png"] * 6):
         with pytest.raises(FileNotFoundError, match="gone"):
-            skybox.load(source)
+            load_sky(source)
 
 
 # Images
@@ -270,7 +268,7 @@ def test_six_face_images(tmp_path: Path, suffix: str, kind: str, dtype: str, cha
     # With alphas of all sizes, so that a multiplication by it would show.
     faces = faces_of(4, channels, dtype)
     paths = [write_image(tmp_path / f"{i}.{suffix}", faces[i], kind) for i in range(6)]
-    cube = skybox.load(paths)
+    cube = load_sky(paths)
     assert cube.dtype == np.dtype(dtype)
     np.testing.assert_array_equal(cube.levels[0][..., :channels], faces)
     assert len(cube.levels) == 3
@@ -279,7 +277,7 @@ def test_six_face_images(tmp_path: Path, suffix: str, kind: str, dtype: str, cha
 def test_16_bit_images_become_floats(tmp_path: Path) -> None:
     face = np.full((2, 2, 3), 65535, np.uint16)
     face[0, 0, 0] = 13107
-    cube = skybox.load([write_image(tmp_path / "a.png", face, "uint16")] * 6)
+    cube = load_sky([write_image(tmp_path / "a.png", face, "uint16")] * 6)
     assert cube.dtype == np.dtype(np.float32)
     np.testing.assert_allclose(cube.levels[0][3, 0, 0], [0.2, 1, 1, 1], rtol=1e-6)
 
@@ -293,7 +291,7 @@ def test_face_images_that_do_not_fit(tmp_path: Path) -> None:
     damaged = tmp_path / "damaged.png"
     damaged.write_bytes(b"\x89PNG\r\n\x1a\n" + bytes(40))
     with pytest.raises(ValueError, match="5 face images"):
-        skybox.load([good] * 5)
+        load_sky([good] * 5)
     for bad, message in (
         (wide, "the -z face is 8 x 4"),
         (large, "the -z face is 8 x 8"),
@@ -302,7 +300,7 @@ def test_face_images_that_do_not_fit(tmp_path: Path) -> None:
         (damaged, "damaged.png"),
     ):
         with pytest.raises(ValueError, match=rf"{bad.name}.*{message}|{message}"):
-            skybox.load([good] * 5 + [bad])
+            load_sky([good] * 5 + [bad])
 
 
 @pytest.mark.parametrize("suffix", ["png", "jpg"])
@@ -327,7 +325,7 @@ def test_without_openimageio_the_message_says_what_to_install(
     path = write_image(tmp_path / "a.png", np.zeros((2, 4, 3), np.uint8), "uint8")
     monkeypatch.setitem(sys.modules, "OpenImageIO", None)
     with pytest.raises(ModuleNotFoundError, match=r"pip install vkbloom\[images\]"):
-        skybox.load(path)
+        load_sky(path)
 
 
 # Panoramas
@@ -342,8 +340,14 @@ def panorama_of_directions(height: int) -> NDArray[np.float32]:
     return np.stack((x, y, z), axis=-1).astype(np.float32)
 
 
-def test_a_panorama_ends_up_in_the_directions_it_shows() -> None:
-    faces = skybox.project_equirectangular(panorama_of_directions(256), 64)
+def shown(folder: Path, panorama: NDArray[Any]) -> NDArray[Any]:
+    """Return the faces of a panorama, whose sides are a quarter of its width."""
+    suffix, kind = ("png", "uint8") if panorama.dtype == np.uint8 else ("exr", "float")
+    return load_sky(write_image(folder / f"sky.{suffix}", panorama, kind)).levels[0][..., :3]
+
+
+def test_a_panorama_ends_up_in_the_directions_it_shows(tmp_path: Path) -> None:
+    faces = shown(tmp_path, panorama_of_directions(128))
     rng = np.random.default_rng(3)
     for direction in rng.normal(size=(500, 3)):
         unit = direction / np.linalg.norm(direction)
@@ -352,21 +356,20 @@ def test_a_panorama_ends_up_in_the_directions_it_shows() -> None:
         assert np.linalg.norm(found - unit) < 0.7 * 2 / 64 + 0.01
 
 
-def test_a_panorama_wraps_around() -> None:
-    panorama = np.full((4, 8, 3), 100, np.uint8)
+def test_a_panorama_wraps_around(tmp_path: Path) -> None:
+    panorama = np.full((6, 12, 3), 100, np.uint8)
     panorama[:, 0] = 200
     # The seam lies behind the camera, at +z: the middle of face 4 blends first and last column.
-    face = skybox.project_equirectangular(panorama, 65)[4]
-    assert face[32, 32].tolist() == [150, 150, 150]
+    assert shown(tmp_path, panorama)[4][1, 1].tolist() == [150, 150, 150]
 
 
-def test_values_that_are_not_finite_do_not_spread_from_a_panorama() -> None:
-    panorama = np.ones((4, 8, 3), np.float32)
-    panorama[1, 2] = math.nan
-    panorama[2, 5] = math.inf
+def test_values_that_are_not_finite_do_not_spread_from_a_panorama(tmp_path: Path) -> None:
+    panorama = np.ones((16, 32, 3), np.float32)
+    panorama[7:9, 10:12] = math.nan
+    panorama[7:9, 18:20] = math.inf
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        faces = skybox.project_equirectangular(panorama, 8)
+        faces = shown(tmp_path, panorama)
     assert np.isfinite(faces).all()
     assert faces.min() < 1.0
 
@@ -377,7 +380,7 @@ def test_values_that_are_not_finite_do_not_spread_from_a_panorama() -> None:
 )
 def test_panorama_files(tmp_path: Path, suffix: str, kind: str, dtype: str) -> None:
     path = write_image(tmp_path / f"sky.{suffix}", np.ones((8, 16, 3), dtype), kind)
-    cube = skybox.load(path)
+    cube = load_sky(path)
     assert (cube.size, cube.dtype) == (4, np.dtype(dtype))
     assert (cube.levels[0][..., :3] == 1).all()
 
@@ -385,4 +388,4 @@ def test_panorama_files(tmp_path: Path, suffix: str, kind: str, dtype: str) -> N
 def test_a_panorama_must_be_twice_as_wide_as_high(tmp_path: Path) -> None:
     path = write_image(tmp_path / "sky.png", np.zeros((8, 17, 3), np.uint8), "uint8")
     with pytest.raises(ValueError, match=r"sky\.png: 17 x 8; .*twice as wide"):
-        skybox.load(path)
+        load_sky(path)

@@ -15,12 +15,11 @@ from numpy.typing import NDArray
 
 from tests.planned import changed
 from tests.refusals import assert_refused, rows
+from tests.scene.parts import Mesh, Texture, mip_levels
 from tests.screens import CAMERA, NOTHING, panel, rgb
 from vkbloom import Frames, Renderer, Scene, Separable, _core, reference
 from vkbloom._renderer.requests import new_arrays
-from vkbloom._scene import Mesh
 from vkbloom._scene.blocks import scene_arguments
-from vkbloom._scene.textures import Texture, mip_levels
 
 Array = NDArray[Any]
 
