@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 
 from tests.images import noise
 from tests.io.parts import reread, written
-from vkbloom import Separable, Settings
-from vkbloom._renderer.frames import Frames
+from vkbloom import Frames, Separable, Settings
 
 INFO = {
     "adapter": "Some <GPU> & co",

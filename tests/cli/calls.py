@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
+from click import Context
 from click.testing import CliRunner, Result
 
 import vkbloom
 from vkbloom._cli.program import program
 
+COMMANDS = program.list_commands(Context(program))
 NATURAL = vkbloom.presets["bevy_natural"]
 
 

@@ -18,16 +18,14 @@ import pytest
 from numpy.typing import NDArray
 
 import vkbloom
-from tests.cli.calls import one_line
+from tests.cli.calls import COMMANDS, one_line
 from tests.cli.calls import run as vkb
 from tests.io.parts import reread
+from tests.kinds import METHODS, fields_of
 from tests.processes import python
+from vkbloom import Camera, Scene
 from vkbloom._cli import fields
-from vkbloom._cli.program import COMMANDS
 from vkbloom._cli.settings_options import settings_options
-from vkbloom._scene import Camera, Scene
-from vkbloom._settings.fields import fields_of
-from vkbloom._settings.registry import METHODS
 
 pytestmark = pytest.mark.usefixtures("kept_renderers")
 

@@ -15,10 +15,9 @@ import vkbloom
 from tests.cli.calls import NATURAL, applied
 from tests.cli.calls import apply as run
 from tests.images import lights
+from tests.io.parts import reread
 from tests.io.profiles import store_png as png
-from vkbloom._io.image_reading import load
-from vkbloom._io.srgb import decode_srgb, encode_srgb
-from vkbloom._methods.mip_chain import Pyramid
+from tests.srgb import decode_srgb, encode_srgb
 
 oiio = pytest.importorskip("OpenImageIO")
 
@@ -36,7 +35,7 @@ def done(*arguments: str | Path) -> Result:
 
 
 def pixels(path: Path) -> NDArray[Any]:
-    return load(path).pixels
+    return reread(path)[1]
 
 
 def linear(levels: NDArray[Any]) -> NDArray[np.float32]:
@@ -115,7 +114,7 @@ class TestColours:
         path = vkbloom.write(tmp_path / "a.exr", image)
         words = "--method pyramid --levels 3 --threshold 0.5 --knee 0.2 --intensity 0.5"
         done(path, tmp_path / "b.exr", *words.split())
-        settings = Pyramid(levels=3, threshold=0.5, knee=0.2, intensity=0.5)
+        settings = vkbloom.Pyramid(levels=3, threshold=0.5, knee=0.2, intensity=0.5)
         assert np.array_equal(pixels(tmp_path / "b.exr"), applied(image, settings))
         kept = oiio.ImageBuf(str(tmp_path / "b.exr")).spec()["vkbloom:settings"]
         assert json.loads(kept) == json.loads(json.dumps(settings.to_dict()))

@@ -14,9 +14,8 @@ import pytest
 
 import vkbloom
 from tests.cli.calls import run
-from tests.io.parts import written
+from tests.io.parts import reread, written
 from tests.io.profiles import store_png
-from vkbloom._io.image_reading import load
 
 oiio = pytest.importorskip("OpenImageIO")
 
@@ -52,7 +51,7 @@ def test_colours_under_alpha_0_are_told(tmp_path: Path, under: int) -> None:
     assert ("where alpha is 0" in result.stderr) is (under == 255)
     assert ("(--alpha blur) leave them out" in result.stderr) is (under == 255)
     assert apply(path, tmp_path / "c.png", "--alpha", "blur").stderr == ""
-    shown = load(tmp_path / "c.png").pixels[24, 32]
+    shown = reread(tmp_path / "c.png")[1][24, 32]
     assert np.abs(shown.astype(int) - (200, 40, 40, 255)).max() <= 2
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from pathlib import Path
 from typing import Any
 
@@ -12,12 +11,11 @@ from click.testing import Result
 
 import vkbloom
 from tests.cli import calls
+from tests.framebuffers import write_image
 from tests.images import noise
+from tests.io.parts import reread
 from vkbloom import Renderer, Separable
 from vkbloom._cli.grid import axis_values
-from vkbloom._io.image_reading import load
-from vkbloom._io.image_writing import save
-from vkbloom._io.images import Picture
 
 pytestmark = pytest.mark.usefixtures("kept_renderers")
 
@@ -38,7 +36,7 @@ def done(*arguments: Any) -> str:
 @pytest.fixture
 def image_file(tmp_path: Path) -> Path:
     values = np.random.default_rng(5).random((9, 12, 3)).astype(np.float32)
-    save(Picture.of_values(values, "float"), tmp_path / "a.exr")
+    vkbloom.write(tmp_path / "a.exr", values)
     return tmp_path / "a.exr"
 
 
@@ -106,7 +104,7 @@ class TestImageFiles:
         )
         one = tmp_path / "one.png"
         calls.run("apply", image_file, one, "--exposure", -1, "--intensity", 1)
-        np.testing.assert_array_equal(load(out / "001_000_final.png").pixels, load(one).pixels)
+        np.testing.assert_array_equal(reread(out / "001_000_final.png")[1], reread(one)[1])
 
     @pytest.mark.parametrize(
         ("axis", "points"),
@@ -126,21 +124,20 @@ class TestImageFiles:
         for index, words in enumerate(points):
             one = tmp_path / "one.png"
             calls.run("apply", photo, one, *words)
-            found = load(tmp_path / "files" / f"00{index}_final.png").pixels
-            np.testing.assert_array_equal(found, load(one).pixels)
+            found = reread(tmp_path / "files" / f"00{index}_final.png")[1]
+            np.testing.assert_array_equal(found, reread(one)[1])
 
     def test_a_grey_file_stays_grey(self, tmp_path: Path) -> None:
-        grey = dataclasses.replace(Picture.of_values(noise(9, 12, 3, dtype="uint8")), grey=True)
-        save(grey, tmp_path / "a.png")
+        write_image(tmp_path / "a.png", noise(9, 12, 1, dtype="uint8"))
         assert run(tmp_path / "a.png", "--axis", "exposure=0", "-o", tmp_path / "g").exit_code == 0
-        assert len(load(tmp_path / "g" / "000_final.png").channels) == 1
+        assert len(reread(tmp_path / "g" / "000_final.png")[0].channelnames) == 1
 
     def test_exr_of_a_scene(self, tmp_path: Path, renderer: Renderer, scene: vkbloom.Scene) -> None:
         out = tmp_path / "files"
         words = "--axis blur_scale=1,2 --size 20x10 --image-format exr --framebuffers final -o"
         done(words, out)
         expected = renderer.render(scene, Separable(blur_scale=2), (20, 10))["final"]
-        found = load(out / "001_final.exr").pixels
+        found = reread(out / "001_final.exr")[1]
         np.testing.assert_array_equal(np.rint(found * np.float32(255)), expected)
 
     def test_a_folder_named_like_an_image(self, tmp_path: Path, image_file: Path) -> None:

@@ -14,11 +14,8 @@ from numpy.typing import NDArray
 
 import vkbloom
 from tests.cli.calls import run
-from tests.io.parts import store_ultra_hdr
-from vkbloom._io.expansion import KNEE
-from vkbloom._io.image_reading import load
-from vkbloom._io.srgb import decode_srgb
-from vkbloom._renderer.frame_files import facts_of
+from tests.io.parts import facts_in, reread, store_ultra_hdr
+from tests.srgb import decode_srgb
 
 pytestmark = pytest.mark.usefixtures("kept_renderers")
 
@@ -73,7 +70,7 @@ def test_nothing_becomes_darker(name: str, tmp_path: Path) -> None:
     image = PHOTOS[name]()
     result = apply(png(tmp_path / "a.png", image), tmp_path / "b.png")
     assert result.exit_code == 0, result.output
-    after = load(tmp_path / "b.png").pixels.astype(int)
+    after = reread(tmp_path / "b.png")[1].astype(int)
     assert (after.max(axis=2) - image.max(axis=2)).min() >= -1
     # A highlight takes the hue of a glow over it, which is some levels less in other components.
     is_full = (after.max(axis=2) == 255)[..., np.newaxis]
@@ -103,7 +100,7 @@ def test_colours_of_graphics_keep_their_hue(suffix: str, alpha: bool, tmp_path: 
     vkbloom.write(tmp_path / "c.png", values)
     # Over each colour lies a little of its neighbours' glow.
     for file, most in ((files[1], 14), (tmp_path / "c.png", 3)):
-        after = load(file).pixels[20, 20::40, :3].astype(int)
+        after = reread(file)[1][20, 20::40, :3].astype(int)
         assert np.abs(after - colours).max() <= most, (file.name, after)
 
 
@@ -113,7 +110,7 @@ def test_the_command_is_the_preset_in_python(tmp_path: Path, renderer: vkbloom.R
     photo = vkbloom.read(path, expand=4)
     final = renderer.apply(photo, vkbloom.presets["photo"])["final"]
     written = vkbloom.write(tmp_path / "c.png", final)
-    np.testing.assert_array_equal(load(tmp_path / "b.png").pixels, load(written).pixels)
+    np.testing.assert_array_equal(reread(tmp_path / "b.png")[1], reread(written)[1])
 
 
 def test_expand(tmp_path: Path) -> None:
@@ -133,9 +130,11 @@ class TestRead:
         levels = np.arange(256, dtype=np.uint8)
         path = png(tmp_path / "a.png", np.repeat(levels[None, :, None], 3, axis=2))
         plain, found = vkbloom.read(path), vkbloom.read(path, expand=4)
-        steep = 1 / (1 - KNEE) - 1 / (4 - KNEE)
-        over = np.maximum(plain.astype(np.float64) - KNEE, 0)
-        expected = np.where(plain > KNEE, KNEE + over / (1 - steep * over), plain)
+        # Highlights begin at 0.8.
+        knee = 0.8
+        steep = 1 / (1 - knee) - 1 / (4 - knee)
+        over = np.maximum(plain.astype(np.float64) - knee, 0)
+        expected = np.where(plain > knee, knee + over / (1 - steep * over), plain)
         np.testing.assert_allclose(found, expected, rtol=1e-5)
         assert found.max() == pytest.approx(4, rel=1e-5)
         for off in (None, 1):
@@ -198,11 +197,11 @@ class TestSettingsOfFiles:
         # Options change the settings, of every command.
         words = ("--settings", "settings.json", "--intensity", "0.25", "--bits", "32")
         assert apply("a.png", "b.exr", *words).exit_code == 0
-        assert json.loads(facts_of("b.exr")["settings"])["intensity"] == 0.25
+        assert json.loads(facts_in(Path("b.exr"))["settings"])["intensity"] == 0.25
         words = ("--size", "16x16", "--bloom-size", "8x8", "--settings", "b.exr")
         drawn = run("render", "-o", "r.exr", *words)
         assert drawn.exit_code == 0, drawn.stderr
-        assert json.loads(facts_of("r.exr")["settings"])["intensity"] == 0.25
+        assert json.loads(facts_in(Path("r.exr"))["settings"])["intensity"] == 0.25
 
 
 def test_a_picture_of_a_grid_gives_itself_again(tmp_path: Path) -> None:

@@ -14,11 +14,10 @@ from numpy.typing import NDArray
 
 import vkbloom
 from tests.cli.calls import run
+from tests.explorer.pages import Viewer
 from tests.images import lights
-from tests.io.parts import store_ultra_hdr
+from tests.io.parts import reread, store_ultra_hdr
 from vkbloom._cli import live
-from vkbloom._explorer.viewer import Viewer
-from vkbloom._io.image_reading import load
 from vkbloom._io.images import Picture
 
 pytestmark = pytest.mark.usefixtures("kept_renderers")
@@ -233,6 +232,15 @@ def test_all_doors_start_alike(doors: Doors, file: str) -> None:
     assert wrong == {}
 
 
+@pytest.mark.parametrize("file", ["photo.jpg", "half.exr"], indirect=True)
+def test_the_expansion_of_a_call(doors: Doors, file: str) -> None:
+    words = ("--expand", "8")
+    results = {door: getattr(doors, door)(file, words) for door in ("apply", "explore", "grid")}
+    assert differing(results) == []
+    # (A preset that needs the light that is given.)
+    assert (results["apply"].max() > 4.5) == (file == "photo.jpg")
+
+
 @pytest.mark.parametrize("file", FILES, indirect=True)
 def test_settings_of_a_result_give_it_again(doors: Doors, file: str) -> None:
     wrong = {}
@@ -290,13 +298,13 @@ def test_the_picture_of_the_page(doors: Doors, file: str, expand: float | None) 
     _, (png,) = viewer.answer(message)
     Path("page.png").write_bytes(png)
     done("apply", file, "again.png", "--settings", "page.png", "--bits", "8")
-    found, again = (load(name).pixels[..., :3] for name in ("page.png", "again.png"))
+    found, again = (reread(Path(name))[1][..., :3] for name in ("page.png", "again.png"))
     np.testing.assert_array_equal(found, again)
     # Also the JSON of "Save settings", which says the expansion beside the settings.
     text = settings.to_json()[:-1] + f', "vkbloom:expand": {expand or 1}}}'
     Path("page.json").write_text(text)
     done("apply", file, "again.png", "--settings", "page.json", "--bits", "8")
-    np.testing.assert_array_equal(load("again.png").pixels[..., :3], found)
+    np.testing.assert_array_equal(reread(Path("again.png"))[1][..., :3], found)
     assert vkbloom.Settings.from_json(text) == settings
 
 

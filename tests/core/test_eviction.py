@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from tests.exhaustive import EXHAUSTIVE
 from tests.images import picture
+from tests.kinds import fields_of
 from vkbloom import Pyramid, Renderer, Separable, Settings, _core
-from vkbloom._settings.fields import fields_of
 
 #: The core's bounds (csrc/execute/age.h, pipeline.h, image_cache.h).
 MIN_AGE = 64

@@ -13,9 +13,8 @@ import pytest
 
 from tests.framebuffers import INFO, TIMINGS, make, mixed
 from tests.images import noise
-from vkbloom import Separable
+from vkbloom import Frames, Separable
 from vkbloom._framebuffers import dimensions
-from vkbloom._renderer.frames import Frames
 
 
 @pytest.fixture

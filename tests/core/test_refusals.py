@@ -18,12 +18,11 @@ import numpy as np
 import pytest
 
 import vkbloom
-from tests.framebuffers import mixed
+from tests.framebuffers import make, mixed
 from tests.refusals import assert_refused, rows
 from vkbloom import FilamentBloom, Frames, Renderer, Scene, Separable, Settings, _core, presets, psf
 from vkbloom._renderer.surface import Surface
 from vkbloom._settings.registry import METHODS, STAGES
-from vkbloom._spelling import nearest
 
 SIZE = (16, 9)
 
@@ -140,16 +139,13 @@ def test_own_methods(renderer: vkbloom.Renderer) -> None:
 vec4 hook() { return GLOW_tex(GLOW_pos) * softness; }
 """
     own: Any = vkbloom.load_method(text, name="soft_one")
-    try:
-        with pytest.raises(TypeError, match="did you mean 'softness'\\?"):
-            own(softnes=1)
-        with pytest.raises(TypeError, match="did you mean 'softness'\\?"):
-            own().replace(softnes=1)
-        with pytest.raises(ValueError, match=f"give {own.__name__}\\(\\)"):
-            renderer.apply(IMAGE, "soft_one")
-        assert own().replace(softness=1) == pickle.loads(pickle.dumps(own(softness=1)))
-    finally:
-        METHODS.unregister("soft_one")
+    with pytest.raises(TypeError, match="did you mean 'softness'\\?"):
+        own(softnes=1)
+    with pytest.raises(TypeError, match="did you mean 'softness'\\?"):
+        own().replace(softnes=1)
+    with pytest.raises(ValueError, match=f"give {own.__name__}\\(\\)"):
+        renderer.apply(IMAGE, "soft_one")
+    assert own().replace(softness=1) == pickle.loads(pickle.dumps(own(softness=1)))
 
 
 def test_the_signature_is_that_of_the_fields() -> None:
@@ -157,20 +153,27 @@ def test_the_signature_is_that_of_the_fields() -> None:
     assert list(inspect.signature(vkbloom.Pyramid).parameters)[:2] == ["bloom", "threshold"]
 
 
-def test_nothing_is_near() -> None:
-    assert nearest("zzz", ["final", "bloom"]) is None
-    assert nearest("of", ["roof_garden"]) is None
-    for asked, known in (
-        ("--gpu", "--psf"),
-        ("blade", "balance"),
-        ("strength", "threshold"),
-        ("saturate", "scatter"),
-        ("roof", "proof_reader"),
-    ):
-        assert nearest(asked, [known]) is None
-    assert nearest("unity", ["unity_urp", "kino"]) == "unity_urp"
-    assert nearest("kion", ["unity_urp", "kino"]) == "kino"
-    assert nearest("--tresholds", ["--threshold"]) == "--threshold"
+@pytest.mark.parametrize(
+    ("asked", "known", "meant"),
+    [
+        ("zzz", ["final", "bloom"], None),
+        ("of", ["roof_garden"], None),
+        ("gpu", ["psf"], None),
+        ("blade", ["balance"], None),
+        ("strength", ["threshold"], None),
+        ("saturate", ["scatter"], None),
+        ("roof", ["proof_reader"], None),
+        ("unity", ["unity_urp", "kino"], "unity_urp"),
+        ("kion", ["unity_urp", "kino"], "kino"),
+        ("tresholds", ["threshold"], "threshold"),
+    ],
+)
+def test_only_what_is_near_is_suggested(asked: str, known: list[str], meant: str | None) -> None:
+    frames = make({name: np.zeros((1, 1, 4), np.float32) for name in known})
+    with pytest.raises(KeyError) as caught:
+        frames[asked]
+    assert (f"did you mean '{meant}'?" if meant else ";") in str(caught.value)
+    assert ("did you mean" in str(caught.value)) == (meant is not None)
 
 
 def test_registries_are_tables() -> None:

@@ -11,11 +11,10 @@ from numpy.typing import NDArray
 
 import vkbloom
 from tests.cli.calls import run
+from tests.explorer.pages import as_code
 from tests.images import picture
 from vkbloom import Renderer, load_method, psf, testing
 from vkbloom._cli.live import Live
-from vkbloom._explorer.controls import as_code
-from vkbloom._settings.registry import METHODS
 
 pytestmark = pytest.mark.usefixtures("glslang")
 
@@ -214,4 +213,3 @@ def test_commands(tmp_path: Path, words: list[str], result: str) -> None:
     done = run(*words, *given)
     assert done.exit_code == 0, done.output
     assert Path(result.format(**places)).exists()
-    METHODS.unregister("soft")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import pickle
+import re
 import runpy
 from pathlib import Path
 from typing import Any
@@ -15,10 +16,10 @@ from numpy.typing import NDArray
 import vkbloom
 from tests.custom import COUNTER
 from tests.images import picture
+from tests.processes import output
 from tests.refusals import assert_refused, rows
 from vkbloom import Renderer, Settings, load_method, reference
 from vkbloom._explorer.controls import described
-from vkbloom._settings.registry import METHODS
 
 pytestmark = pytest.mark.usefixtures("glslang")
 
@@ -227,11 +228,22 @@ def test_a_wrong_value_is_refused(renderer: Renderer, call: str, error: str) -> 
     assert_refused(call, error, {**globals(), **names})
 
 
+NOT_LOADED = """
+import json, pickle, sys
+import vkbloom
+try:
+    vkbloom.Settings.from_dict(json.loads(sys.argv[1]))
+except ValueError as error:
+    print(f"ValueError: {error}")
+print(pickle.loads(bytes.fromhex(sys.argv[2])).radius)
+"""
+
+
 def test_a_method_is_registered_and_stored() -> None:
     text = "//!PARAM radius\n//!TYPE int\n//!MINIMUM 1\n//!MAXIMUM 30\n4\n" + COPY
     kind: Any = load_method(text, name="stored_one")
     settings = kind(radius=20)
-    assert METHODS["stored_one"] is kind
+    assert type(Settings.from_dict(settings.to_dict())) is kind
     assert Settings.from_json(settings.to_json()) == settings
     assert pickle.loads(pickle.dumps(settings)) == settings
     stored = settings.to_dict()
@@ -239,12 +251,9 @@ def test_a_method_is_registered_and_stored() -> None:
     load_method(text + "\n", name="stored_one")
     with pytest.raises(ValueError, match="has another text"):
         Settings.from_dict(stored)
-    METHODS.unregister("stored_one")
-    with pytest.raises(ValueError, match="load_method"):
-        Settings.from_dict(stored)
-    # A process that has not loaded it gets the text.
-    assert pickle.loads(pickle.dumps(settings)).radius == 20
-    METHODS.unregister("stored_one")
+    # A process that has not loaded it gets the text with a pickle, and not with a dictionary.
+    printed = output("-c", NOT_LOADED, json.dumps(stored), pickle.dumps(settings).hex())
+    assert re.fullmatch("ValueError: .*load_method.*\n20\n", printed), printed
 
 
 def test_a_param_can_be_the_setting_of_the_reference_white(renderer: Renderer) -> None:

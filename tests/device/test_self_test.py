@@ -10,13 +10,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
 import vkbloom
+from tests.cli.calls import run
 from tests.device.exceptions import reason_against
 from tests.variants import opened
 from vkbloom import Renderer
-from vkbloom._cli.program import program
 from vkbloom._doctor import self_test
 from vkbloom._doctor.cases import Case, cases
 from vkbloom._doctor.deviations import deviation
@@ -52,7 +51,7 @@ def few(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.usefixtures("few")
 def test_the_command(tmp_path: Path) -> None:
     file = tmp_path / "report.json"
-    ended = CliRunner().invoke(program, ["doctor", "--self-test", "--json", str(file)])
+    ended = run("doctor", "--self-test", "--json", str(file))
     assert ended.exit_code == 0, ended.output
     assert "3 cases in" in ended.stdout
     found = json.loads(file.read_text())
@@ -61,13 +60,13 @@ def test_the_command(tmp_path: Path) -> None:
     (group,) = found["groups"]
     assert (group["name"], group["cases"], group["wrong"]) == ("masks", 3, 0)
     assert 0 <= group["largest_error"] <= group["allowed"]
-    ended = CliRunner().invoke(program, ["doctor", "--self-test", "--json"])
+    ended = run("doctor", "--self-test", "--json")
     assert json.loads(ended.stdout)["passed"] is True
 
 
 def test_an_adapter_that_does_not_open() -> None:
     command = ["doctor", "--self-test", "--adapter", "nonsense"]
-    ended = CliRunner().invoke(program, command)
+    ended = run(*command)
     assert ended.exit_code == 1
     assert 'no Vulkan adapter for "nonsense"' in ended.stdout
 

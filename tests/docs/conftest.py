@@ -9,8 +9,6 @@ import pytest
 
 from tests.docs.pages import ROOT, blocks
 from vkbloom import write
-from vkbloom._io.image_writing import save
-from vkbloom._io.images import Picture
 from vkbloom.testing import _measuring as measuring
 
 
@@ -22,7 +20,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     timed = measuring.pass_times
     monkeypatch.setattr(measuring, "pass_times", lambda one, of, _: timed(one, of, (64, 36), 1))
     photo = (np.random.default_rng(0).random((24, 32, 3)) ** 8 * 20).astype(np.float16)
-    save(Picture.of_values(photo, "half"), "photo.exr")
+    write("photo.exr", photo)
     write("photo.jpg", photo.astype(np.float32))
     np.save("picture.npy", photo)
     custom = ROOT / "docs" / "custom_methods.md"

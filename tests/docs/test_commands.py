@@ -18,8 +18,8 @@ from benchmarks.__main__ import command as benchmarks
 from click.testing import CliRunner
 from packaging.requirements import Requirement
 
+from tests.cli.calls import program
 from tests.docs.pages import ROOT, TEXTS, blocks
-from vkbloom._cli.program import program
 
 #: Why a command is not run here, by how it begins; its arguments are parsed.
 NOT_RUN: Final = {

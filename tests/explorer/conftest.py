@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from tests.explorer.explorer_hosts import CHROMIUM, PATIENCE
-from vkbloom._explorer.server import Server
-from vkbloom._explorer.viewer import Viewer
+from tests.explorer.pages import Server, Viewer
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser

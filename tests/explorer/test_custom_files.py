@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -12,10 +11,8 @@ import numpy as np
 import pytest
 
 import vkbloom
+from tests.explorer.pages import Viewer, as_code, controls, settings_from
 from vkbloom import Renderer, Settings
-from vkbloom._explorer.controls import as_code, controls, settings_from
-from vkbloom._explorer.viewer import Viewer
-from vkbloom._settings.registry import METHODS
 
 pytestmark = pytest.mark.usefixtures("glslang")
 
@@ -41,11 +38,10 @@ vec4 hook() {
 
 
 @pytest.fixture
-def file(tmp_path: Path) -> Iterator[Path]:
+def file(tmp_path: Path) -> Path:
     path = tmp_path / "watched.hook"
     path.write_text(TEXT)
-    yield path
-    METHODS.unregister("watched")
+    return path
 
 
 def save(path: Path, text: str) -> None:

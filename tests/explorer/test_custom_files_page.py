@@ -13,10 +13,10 @@ import pytest
 
 import vkbloom
 from tests.explorer.explorer_hosts import CHROMIUM
+from tests.explorer.pages import Viewer
 from tests.explorer.test_custom_files import TEXT, file, save  # noqa: F401
 from tests.explorer.test_explorer_page import field, opened, see
 from vkbloom import Renderer
-from vkbloom._explorer.viewer import Viewer
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser

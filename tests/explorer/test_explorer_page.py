@@ -19,10 +19,9 @@ from numpy.typing import NDArray
 import vkbloom
 from tests.exhaustive import by_turns
 from tests.explorer.explorer_hosts import CHROMIUM, PATIENCE, wait_until
+from tests.explorer.pages import Viewer, picture_of
 from tests.framebuffers import decode
 from vkbloom import KinoBloom, Pyramid, Renderer, Scene, Separable, presets
-from vkbloom._explorer.fast_pictures import picture_of
-from vkbloom._explorer.viewer import Viewer
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Locator, Page

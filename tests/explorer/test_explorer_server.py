@@ -18,22 +18,19 @@ from typing import Any
 from urllib.parse import urlsplit
 from urllib.request import url2pathname
 
-import numpy as np
 import pytest
 
 import vkbloom
 from tests.cli.calls import run
 from tests.images import noise
 from vkbloom import Renderer, Separable
-from vkbloom._cli.live import _serve
-from vkbloom._explorer.viewer import Viewer
 
 tornado = pytest.importorskip("tornado")
 
 from tornado.httpclient import AsyncHTTPClient, HTTPClientError, HTTPRequest, HTTPResponse  # noqa: E402
 from tornado.websocket import WebSocketClientConnection, websocket_connect  # noqa: E402
 
-from vkbloom._explorer.server import Server, _Socket  # noqa: E402
+from tests.explorer.pages import Server, Viewer  # noqa: E402
 
 #: Connections of the running test, which it leaves open.
 OPENED: list[WebSocketClientConnection] = []
@@ -170,33 +167,24 @@ async def test_frames_come_with_their_pictures(server: Server) -> None:
     assert (await answer(other))[0]["kind"] == "error"
 
 
-async def test_the_newest_wins(server: Server, monkeypatch: pytest.MonkeyPatch) -> None:
-    received: list[Any] = []
-    take = _Socket.on_message
-
-    def noted(socket: _Socket, message: str | bytes) -> None:
-        take(socket, message)
-        received.append(message)
-
-    monkeypatch.setattr(_Socket, "on_message", noted)
-
-    async def arrived(count: int) -> None:
-        while len(received) < count:
-            await asyncio.sleep(0.01)
-        # And the first of them is given to the thread.
-        await asyncio.sleep(0.01)
-
+async def test_the_newest_wins(server: Server) -> None:
     page = await connect(server)
+
+    async def arrived() -> None:
+        """Wait until the messages before are read: a wrong one is answered by no thread."""
+        await page.write_message('{"kind": "probe", "at": NaN}')
+        assert (await answer(page))[0]["kind"] == "error"
+
     held = threading.Event()
     server._worker.submit(held.wait)
     await page.write_message(asked(1, "a", "b"))
     # The first is being answered when the others come.
-    await arrived(1)
+    await arrived()
     await page.write_message(asked(2, "b"))
     for number in range(3, 50):
         await page.write_message(asked(number, "a"))
     await page.write_message(json.dumps({"kind": "probe", "id": 50, "at": [0, 0]}))
-    await arrived(50)
+    await arrived()
     held.set()
     answers = [(await answer(page))[0] for _ in range(3)]
     assert [(header["kind"], header["id"]) for header in answers] == [
@@ -267,9 +255,7 @@ async def test_messages_are_refused_with_a_reason(
     assert (await answer(page))[0]["kind"] == "setup"
 
 
-def test_the_browser_gets_no_token_as_an_argument(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_browser_gets_no_token_as_an_argument(monkeypatch: pytest.MonkeyPatch) -> None:
     """Other users of the machine see the arguments of its processes."""
     opened: list[tuple[str, int, int, str]] = []
 
@@ -280,8 +266,9 @@ def test_the_browser_gets_no_token_as_an_argument(
         os.kill(os.getpid(), signal.SIGTERM)
 
     monkeypatch.setattr(webbrowser, "open", open_page)
-    assert asyncio.run(_serve(lambda: pytest.fail("nobody asked"), 0, opens=True)) == 0
-    url = capsys.readouterr().out.splitlines()[0]
+    done = run("explore")
+    assert done.exit_code == 0, done.output
+    (url,) = (line for line in done.output.splitlines() if line.startswith("http"))
     ((address, mode, folder_mode, text),) = opened
     assert address.startswith("file://")
     assert url.split("/")[-2] not in address
@@ -300,34 +287,3 @@ def test_without_tornado(monkeypatch: pytest.MonkeyPatch) -> None:
     result = run("explore", "--no-open")
     assert result.exit_code == 1
     assert "pip install vkbloom[notebook]" in result.stderr
-
-
-@pytest.mark.parametrize(
-    ("words", "preset", "largest"),
-    [
-        (["photo.png"], "photo", 4),
-        (["photo.png", "--expand", "8"], "photo", 8),
-        (["photo.png", "--preset", "kino"], "kino", 1),
-        (["photo.exr"], "bevy_natural", 2),
-    ],
-)
-def test_an_image_begins_as_in_apply(
-    words: list[str], preset: str, largest: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    vkbloom.write("photo.png", np.full((8, 8, 3), 255, np.uint8))
-    vkbloom.write("photo.exr", np.full((8, 8, 3), 2, np.float32))
-    begun: list[tuple[Any, ...]] = []
-
-    class Recorded:
-        def __init__(self, *arguments: Any, **options: Any) -> None:
-            begun.append(arguments)
-            # Nothing is to be served.
-            raise ValueError("recorded")
-
-    monkeypatch.setattr("vkbloom._cli.live.Viewer", Recorded)
-    result = run("explore", "--no-open", *words)
-    assert "recorded" in result.stderr
-    ((image, settings),) = begun
-    assert settings == vkbloom.presets[preset]
-    assert image.max() == pytest.approx(largest, rel=1e-5)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 import vkbloom
 from tests.refusals import assert_refused, rows
+from tests.srgb import decode_srgb, encode_srgb
 from vkbloom import (
     DualKawase,
     FitResult,
@@ -24,7 +25,6 @@ from vkbloom import (
 )
 from vkbloom._fit.losses import Measure, light
 from vkbloom._fit.space import Axis, space_of
-from vkbloom._io.srgb import decode_srgb, encode_srgb
 
 Image = NDArray[Any]
 
@@ -265,7 +265,7 @@ class TestVerdict:
             image, target = (np.rint(255 * np.minimum(one, 1)) for one in (image, target))
             image, target = (one.astype(np.uint8) for one in (image, target))
         if kind == "decoded":
-            image, target = (decode_srgb(one / np.float32(255)) for one in (image, target))
+            image, target = (decode_srgb(one / 255).astype(np.float32) for one in (image, target))
         start = Pyramid(levels=3, threshold=0.1, knee=0.5)
         found = fit(image, target, start, ["threshold", "intensity"], max_calls=40)
         assert found.verdict == "poor"
@@ -347,7 +347,7 @@ class TestParts:
         """Framebuffers are clipped and rounded alike; saturated pixels have no difference."""
         levels = np.random.default_rng(0).integers(0, 256, (20, 30, 3)).astype(np.uint8)
         levels[:2] = 255
-        decoded = decode_srgb(levels / np.float32(255))
+        decoded = decode_srgb(levels / 255).astype(np.float32)
         for target, encode in ((levels, lambda one: one), (decoded, encode_srgb)):
             measure = Measure.of(target, "relative")
             values = light(target)

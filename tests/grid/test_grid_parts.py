@@ -13,14 +13,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
 import vkbloom
+from tests.cli.calls import run
 from tests.grid.grid_in_parts import render
 from tests.grid.stores import contents
 from tests.images import noise
 from vkbloom import check_grid
-from vkbloom._cli.program import program
 from vkbloom._grid.layout import Grid, Layout, Variable, ask
 from vkbloom._grid.order import blocks
 from vkbloom._grid.store import prepare
@@ -158,10 +157,10 @@ def test_command_line(tmp_path: Path) -> None:
         words = ["grid", str(image), "-o", str(tmp_path / out), "--axis", "intensity=0:1:6"]
         for number in "20" if out == "parts" else [""]:
             more = ["--part", f"{number}/3"] if number else []
-            done = CliRunner().invoke(program, [*words, *more])
+            done = run(*words, *more)
             assert done.exit_code == 0, done.output
         assert len(list((tmp_path / out).glob("*.png"))) == (4 if out == "parts" else 6)
     assert "part 3/3 of 6 points" in done.output
-    done = CliRunner().invoke(program, [*words, "--part", "1/3"])
+    done = run(*words, "--part", "1/3")
     assert contents(tmp_path / "whole") == contents(tmp_path / "parts")
-    assert CliRunner().invoke(program, [*words, "--part", "4/3"]).exit_code == 2
+    assert run(*words, "--part", "4/3").exit_code == 2

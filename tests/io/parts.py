@@ -54,3 +54,12 @@ def store_parts(path: Path, parts: Mapping[str, NDArray[Any]]) -> None:
         assert not index or writer.open(str(path), specs[index], "AppendSubimage")
         assert writer.write_image(pixels)
     assert writer.close()
+
+
+def facts_in(path: Path) -> dict[str, str]:
+    """Return what vkbloom wrote into a file with attributes, such as "settings"."""
+    return {
+        attribute.name.removeprefix("vkbloom:"): str(attribute.value)
+        for attribute in reread(path)[0].extra_attribs
+        if attribute.name.startswith("vkbloom:")
+    }

@@ -23,7 +23,7 @@ from tests.io.profiles import (
     store_png,
     to_xyz,
 )
-from vkbloom._io.srgb import decode_srgb
+from tests.srgb import decode_srgb
 
 oiio = pytest.importorskip("OpenImageIO")
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 import vkbloom
 from tests.io import foreign
 from tests.io.parts import written
-from vkbloom._io.srgb import decode_srgb
+from tests.srgb import decode_srgb
 
 oiio = pytest.importorskip("OpenImageIO")
 image = pytest.importorskip("PIL.Image")

@@ -25,9 +25,8 @@ import pytest
 from tests.exhaustive import by_turns
 from tests.framebuffers import INFO, TIMINGS, make, mixed, names_in, read
 from tests.images import noise
-from vkbloom import Separable
+from vkbloom import Frames, Separable
 from vkbloom._io import safe_writing
-from vkbloom._renderer.frames import Frames
 
 
 @pytest.fixture

@@ -24,8 +24,8 @@ from tests.io.profiles import (
     store_png,
     to_xyz,
 )
+from tests.srgb import decode_srgb, encode_srgb
 from vkbloom._io.containers import orientation_of
-from vkbloom._io.srgb import decode_srgb, encode_srgb
 from vkbloom._io.tiff import is_raw, reduced_parts
 
 image = pytest.importorskip("PIL.Image")

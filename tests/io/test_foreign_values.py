@@ -18,10 +18,10 @@ import vkbloom
 from tests.io import foreign
 from tests.io.parts import written
 from tests.io.profiles import png_chunk, store_png
+from tests.srgb import decode_srgb, encode_srgb
 from vkbloom._io.image_reading import decode_file, load
 from vkbloom._io.image_writing import save
 from vkbloom._io.jpeg_xl import header_of
-from vkbloom._io.srgb import decode_srgb, encode_srgb
 
 oiio = pytest.importorskip("OpenImageIO")
 image = pytest.importorskip("PIL.Image")

@@ -17,12 +17,12 @@ from tests import images
 from tests.framebuffers import names_in
 from tests.framebuffers import write_image as store
 from tests.io.parts import reread, written
+from tests.srgb import decode_srgb, encode_srgb
 from vkbloom._io import safe_writing
 from vkbloom._io.displayed import Saved
 from vkbloom._io.image_reading import decode_file, load
 from vkbloom._io.image_writing import save
 from vkbloom._io.images import Picture, StoredImage, Window
-from vkbloom._io.srgb import decode_srgb, encode_srgb
 
 oiio = pytest.importorskip("OpenImageIO")
 

@@ -11,6 +11,7 @@ from numpy.testing import assert_allclose
 
 from tests.device.abilities import max_side
 from tests.images import hdr_picture, lights
+from tests.kinds import fields_of
 from tests.methods.cases import METHODS, presets_of_low_levels
 from tests.tolerance import assert_close, assert_matches_reference, real, tolerance
 from vkbloom import (
@@ -35,7 +36,6 @@ from vkbloom import (
     psf,
     reference,
 )
-from vkbloom._settings.fields import fields_of
 
 CONVOLUTIONS = [name for name in presets if isinstance(presets[name], Convolution)]
 LOW = presets_of_low_levels(64)

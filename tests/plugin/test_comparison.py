@@ -11,8 +11,8 @@ import pytest
 
 from tests.images import changed, noise_image
 from tests.refusals import assert_refused, rows
+from tests.srgb import decode_srgb
 from vkbloom._cli.compare import tolerances_of
-from vkbloom._io.srgb import decode_srgb
 from vkbloom._views.comparison import Comparison, compare, difference, flip_map
 from vkbloom._views.tolerances import Tolerances, failures
 from vkbloom.testing import diagnose

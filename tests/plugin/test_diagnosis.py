@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from tests.cli.calls import run
 from tests.exhaustive import EXHAUSTIVE
+from tests.srgb import encode_srgb
 from vkbloom import Separable, reference, write
-from vkbloom._io.srgb import encode_srgb
 from vkbloom._views.tolerances import Tolerances
 from vkbloom.testing import FrameRegression, diagnose
 from vkbloom.testing._judging import judge

@@ -14,8 +14,8 @@ from scipy import ndimage
 from tests.exhaustive import EXHAUSTIVE
 from tests.plugin.faults import gaussian, in_halves
 from tests.plugin.test_law_report import FAULTS, OF_A_BLUR, Image, row, thresholded
+from tests.srgb import decode_srgb, encode_srgb
 from vkbloom import testing
-from vkbloom._io.srgb import decode_srgb, encode_srgb
 from vkbloom.testing import LawReport
 from vkbloom.testing import _measuring as measuring
 from vkbloom.testing._law_report import law_report
@@ -32,7 +32,7 @@ def in_bits(image: NDArray[Any], bits: int, rounded: Callable[..., Any] = np.rin
     """Return what a file of integers holds of linear light."""
     most = 2**bits - 1
     encoded = encode_srgb(np.clip(np.nan_to_num(image.astype(np.float64)), 0, 1)) * most
-    return decode_srgb((rounded(encoded + 1e-9) / most).astype(np.float32))
+    return decode_srgb(rounded(encoded + 1e-9) / most).astype(np.float32)
 
 
 class Quantized(Program):

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from tests.cli.calls import run
 from tests.custom.test_check import checked
 from tests.exhaustive import EXHAUSTIVE
+from tests.srgb import encode_srgb
 from vkbloom import write
-from vkbloom._io.srgb import encode_srgb
 from vkbloom.testing import flash, flicker
 
 FPS = 240

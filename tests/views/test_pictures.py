@@ -15,12 +15,11 @@ import pytest
 from numpy.typing import NDArray
 
 import vkbloom
+from tests.explorer.pages import picture_of
 from tests.framebuffers import decode, make, mixed
 from tests.images import noise, noise_image
-from vkbloom import Separable
-from vkbloom._explorer.fast_pictures import picture_of
-from vkbloom._io.srgb import encode_srgb
-from vkbloom._renderer.frames import Frames
+from tests.srgb import encode_srgb
+from vkbloom import Frames, Separable
 from vkbloom._views.pictures import picture
 
 

@@ -1,0 +1,15 @@
+"""What a page of the explorer asks: a viewer and its server, and what it shows of both.
+
+Users have the page and the widget of a notebook, whose messages take a browser. Tests ask the
+viewer itself where the page is not what they are about.
+"""
+
+from __future__ import annotations
+
+from vkbloom._explorer.controls import as_code, controls, settings_from
+from vkbloom._explorer.fast_pictures import picture_of
+from vkbloom._explorer.server import Server
+from vkbloom._explorer.viewer import Viewer
+from vkbloom._views.pictures import reduced
+
+__all__ = ["Server", "Viewer", "as_code", "controls", "picture_of", "reduced", "settings_from"]
