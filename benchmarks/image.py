@@ -70,7 +70,7 @@ def run(plan: Plan, section: Section) -> None:
     """Time the bloom of RGBA and RGB images of each dtype."""
     size = plan.size(*SIZE)
     section.title = f"An image's bloom at {size[0]} x {size[1]}"
-    for dtype in ("float16", "float32", "uint8"):
+    for dtype in _OF_OPENCV:
         for channels in (4, 3):
             _time_one(plan, section, size, np.dtype(dtype), channels)
 

@@ -8,6 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from vkbloom._formats import IMAGE_DTYPES
+
+DTYPES = IMAGE_DTYPES
+
 
 def picture(
     width: int,

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom import Frames, Settings, _core
-from vkbloom._doctor.deviations import FORMATS, Limit, deviation, deviations, real, tolerance
+from vkbloom._doctor.deviations import Limit, deviation, deviations, real, tolerance
 
-__all__ = ["FORMATS", "assert_close", "assert_matches_reference", "colours", "real", "tolerance"]
+__all__ = ["assert_close", "assert_matches_reference", "colours", "real", "tolerance"]
 
 
 def colours(array: NDArray[Any]) -> NDArray[np.float64]:

@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom._arrays import native_order, pil_mode, view_image
+from vkbloom._formats import IMAGE_DTYPES, MAX_FLOAT
 
 # Fast path for native byte order.
-_DTYPES: Final = frozenset(map(np.dtype, (np.uint8, np.float16, np.float32)))
+_DTYPES: Final = frozenset(map(np.dtype, IMAGE_DTYPES))
 
 _DTYPE_HINTS: Final = {
     "uint16": "; convert it: (image / 65535).astype(np.float32)",
@@ -47,10 +48,11 @@ def check_image(image: object, name: str = "image") -> NDArray[Any]:
     if array.dtype.name == "float64":  # in any byte order
         array = _single(array)
     if array.dtype not in _DTYPES:
-        if array.dtype.name not in ("uint8", "float16", "float32"):
+        if array.dtype.name not in IMAGE_DTYPES:
             hint = _DTYPE_HINTS.get(array.dtype.name, "")
             raise TypeError(
-                f"{name}: dtype {array.dtype} is not one of uint8, float16, float32, float64{hint}"
+                f"{name}: dtype {array.dtype} is not one of "
+                f"{', '.join(IMAGE_DTYPES)}, float64{hint}"
             )
         array = native_order(array)
     if array.ndim != 3 or array.shape[2] not in (3, 4) or 0 in array.shape:
@@ -67,7 +69,7 @@ def _single(array: NDArray[np.float64]) -> NDArray[np.float32]:
         made = array.astype(np.float32)
     is_over = np.isinf(made) & np.isfinite(array)
     if is_over.any():
-        made[is_over] = np.copysign(np.finfo(np.float32).max, made[is_over])
+        made[is_over] = np.copysign(MAX_FLOAT, made[is_over])
     return made
 
 

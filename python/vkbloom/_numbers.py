@@ -13,8 +13,7 @@ from typing import Any, Final
 
 import numpy as np
 
-#: The largest 32-bit float; the device computes in 32-bit floats.
-MAX_FLOAT: Final = (2 - 2**-23) * 2.0**127
+from vkbloom._formats import MAX_FLOAT
 
 # What has items, but no first one.
 _UNORDERED: Final = (Mapping, Set)

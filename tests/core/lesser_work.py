@@ -20,12 +20,11 @@ import vkbloom
 from tests import tolerance
 from tests.custom import COUNTER
 from tests.exhaustive import EXHAUSTIVE
-from tests.images import picture
+from tests.images import DTYPES, picture
 from tests.scene.parts import Texture, load_sky
 from tests.screens import CAMERA, panel
 from vkbloom import DualKawase, Frames, Pyramid, Renderer, Scene, Separable, ThreeBloom
 
-DTYPES = ("uint8", "float16", "float32")
 # One of each variant: lines, strips and tiles, levels half and twice as large, sums of all levels.
 SETTINGS = {
     "whole": Separable(threshold=0.4),

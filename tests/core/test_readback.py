@@ -13,11 +13,10 @@ import pytest
 
 from tests.device.abilities import max_side
 from tests.exhaustive import by_turns
-from tests.images import picture
+from tests.images import DTYPES, picture
 from vkbloom import Pyramid, Renderer, Scene, Separable, Settings, _core
 
 OFF = Separable(bloom=False)
-DTYPES = ["uint8", "float16", "float32"]
 
 
 def placed(shape: tuple[int, ...], dtype: str, start: int) -> tuple[Any, Any]:

@@ -23,7 +23,8 @@ import numpy as np
 
 import vkbloom
 from tests.core.builds import ROOT, build_layer, layer_variables
-from tests.methods.cases import DTYPES, METHODS, presets_of_low_levels
+from tests.images import DTYPES
+from tests.methods.cases import METHODS, presets_of_low_levels
 from vkbloom import Renderer, Scene
 from vkbloom._settings.settings import BloomFormat
 

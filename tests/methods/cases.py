@@ -33,10 +33,9 @@ from vkbloom import (
     presets,
     psf,
 )
-from vkbloom._doctor.cases import DTYPES, HARD_THRESHOLD, METHODS, presets_of_low_levels
+from vkbloom._doctor.cases import HARD_THRESHOLD, METHODS, presets_of_low_levels
 
 __all__ = [
-    "DTYPES",
     "GIVEN",
     "HARD_THRESHOLD",
     "METHODS",

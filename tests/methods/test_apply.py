@@ -12,8 +12,8 @@ import pytest
 from numpy.typing import NDArray
 
 from tests.exhaustive import EXHAUSTIVE, by_turns, some
-from tests.images import hdr_picture
-from tests.methods.cases import DTYPES, METHODS
+from tests.images import DTYPES, hdr_picture
+from tests.methods.cases import METHODS
 from tests.tolerance import assert_close, assert_matches_reference, real, tolerance
 from vkbloom import Renderer, Separable, Settings, presets, reference
 from vkbloom._doctor.cases import COMPOSITES, ENCODINGS, TONEMAPS

@@ -12,8 +12,8 @@ from numpy.testing import assert_array_equal
 from tests import variants
 from tests.conftest import SANITIZED
 from tests.exhaustive import EXHAUSTIVE, by_turns
-from tests.images import cut_out, given_of, hdr_picture
-from tests.methods.cases import DTYPES, GIVEN, METHODS, OTHERS, WHOLE, presets_of_low_levels
+from tests.images import DTYPES, cut_out, given_of, hdr_picture
+from tests.methods.cases import GIVEN, METHODS, OTHERS, WHOLE, presets_of_low_levels
 from tests.tolerance import assert_matches_reference
 from tests.variants import VARIANTS
 from vkbloom import (

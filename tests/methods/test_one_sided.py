@@ -19,6 +19,7 @@ from tests.exhaustive import EXHAUSTIVE, some
 from tests.methods.test_adjoint_passes import CASES as METHODS
 from tests.methods.test_derivatives import BOUNDARIES, CURVED, KERNEL
 from vkbloom import BlenderGlare, GodotBloom, Pyramid, Renderer, Separable, reference
+from vkbloom._doctor.cases import COMPOSITES, ENCODINGS, TONEMAPS
 
 Array = NDArray[np.float64]
 
@@ -28,9 +29,6 @@ GLARES = (
     vkbloom.Halo(),
     vkbloom.Dirt(seed=1),
 )
-TONEMAPS: tuple[Any, ...] = ("none", "reinhard", "aces", "exponential", "khronos_neutral", "agx")
-ENCODINGS: tuple[Any, ...] = ("none", "gamma22", "srgb", "pq", "hlg")
-COMPOSITES: tuple[Any, ...] = ("add", "mix", "screen")
 GODOTS: tuple[Any, ...] = (*COMPOSITES, "soft_light", "replace")
 GODOT_TONEMAPS: tuple[Any, ...] = ("none", "reinhard", "agx")
 ALPHAS: tuple[Any, ...] = ("keep", "max", "blur")

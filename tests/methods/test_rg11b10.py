@@ -10,8 +10,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 from numpy.typing import NDArray
 
 from tests.exhaustive import by_turns
-from tests.images import lights
-from tests.methods.cases import DTYPES, presets_of_low_levels
+from tests.images import DTYPES, lights
+from tests.methods.cases import presets_of_low_levels
 from vkbloom import (
     Convolution,
     DualKawase,

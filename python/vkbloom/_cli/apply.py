@@ -11,7 +11,7 @@ import tempfile
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Any, Final, TypeAlias
+from typing import Any, Final, TypeAlias, get_args
 
 import click
 import numpy as np
@@ -57,7 +57,6 @@ _FAILURES: Final = (OSError, ValueError, MemoryError, click.ClickException)
 # 8-bit pictures of this many pixels or more become half floats, whose steps are finer.
 _HALVED: Final = 1 << 26
 _HALF: Final = np.dtype(np.float16)
-CURVES = ("linear", "srgb", "gamma22", "pq", "hlg")
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -320,7 +319,11 @@ def _send(file: Path, target: str) -> None:
     "after OUT's stem, its values unchanged; .exr if OUT's format cannot hold them.",
 )
 @input_colour_option
-@click.option("--output-colour", type=click.Choice(CURVES), help="Encoding of the colours in OUT.")
+@click.option(
+    "--output-colour",
+    type=click.Choice(get_args(SavedColour)),
+    help="Encoding of the colours in OUT.",
+)
 @click.option(
     "--primaries", type=click.Choice([*PRIMARIES]), default="rec709", help="Of the colours in OUT."
 )

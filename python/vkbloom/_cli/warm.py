@@ -13,9 +13,9 @@ import vkbloom
 from vkbloom._cli.fields import SIZE, NameOf
 from vkbloom._cli.program import adapter_option
 from vkbloom._cli.terminal import hides_progress, say
+from vkbloom._formats import IMAGE_DTYPES
 from vkbloom._settings.registry import METHODS
 
-_TYPES: Final = ("uint8", "float16", "float32")
 _USUAL_SIZE: Final = (1920, 1080)
 # A single framebuffer may come from a fused pass.
 _KEPT: Final[tuple[Any, ...]] = ("all", ("final",))
@@ -55,7 +55,7 @@ def command(
     everything = not presets and not methods
     warmed = [vkbloom.presets[name] for name in (vkbloom.presets if everything else presets)]
     warmed += [METHODS[name]() for name in methods]
-    calls = list(itertools.product(sizes or (_USUAL_SIZE,), _TYPES, (3, 4), warmed, _KEPT))
+    calls = list(itertools.product(sizes or (_USUAL_SIZE,), IMAGE_DTYPES, (3, 4), warmed, _KEPT))
     with vkbloom.Renderer(adapter) as renderer:
         if everything:
             scene = vkbloom.Scene.ufo()

@@ -21,6 +21,7 @@ from vkbloom._custom.planning import Request, planned
 from vkbloom._custom.rows import made_resources
 from vkbloom._custom.shaders import Shaders
 from vkbloom._custom.source import Source, read_source
+from vkbloom._formats import MAX_FLOAT
 from vkbloom._locks import ProcessLock
 from vkbloom._public import public
 from vkbloom._settings.blocks import settings_block
@@ -30,8 +31,6 @@ from vkbloom._settings.settings import Settings
 
 Reference = Callable[[NDArray[Any], Settings], Mapping[str, NDArray[Any]]]
 
-#: The largest value of a uniform.
-LARGEST_FLOAT: Final = 3.4028234663852886e38
 #: Fields that a file without BLOOM has not, since it composites by itself.
 COMPOSITED: Final = ("intensity", "composite")
 
@@ -268,7 +267,7 @@ def class_name(name: str) -> str:
 
 def field_of(file: CustomFile, param: Param) -> tuple[Any, Any]:
     """Return type and declaration of a parameter's field."""
-    low, high = max(param.low, -LARGEST_FLOAT), min(param.high, LARGEST_FLOAT)
+    low, high = max(param.low, -MAX_FLOAT), min(param.high, MAX_FLOAT)
     shared = param.name == SHARED and param.number == "float"
     if shared:
         _, least, most = _core.VALUES[SHARED]

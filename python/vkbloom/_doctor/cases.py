@@ -9,7 +9,7 @@ import dataclasses
 import itertools
 from collections.abc import Callable, Iterable, Iterator
 from functools import partial
-from typing import Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,11 +29,11 @@ from vkbloom import (
     psf,
     reference,
 )
-from vkbloom._doctor.deviations import FORMATS, Deviation, deviation, deviations, tolerance
+from vkbloom._doctor.deviations import Deviation, deviation, deviations, tolerance
+from vkbloom._formats import FORMATS_BY_DTYPE, IMAGE_DTYPES
 from vkbloom._scene import skybox
-from vkbloom._settings.settings import Settings
-
-DTYPES: Final = ("uint8", "float16", "float32")
+from vkbloom._settings.fields import fields_of
+from vkbloom._settings.settings import Encoding, Settings, ToneMap
 
 # No colour of an 8-bit image has this luminance, since it is not a multiple of 1e-4 / 255. So
 # rounding cannot move a pixel across the threshold.
@@ -68,9 +68,9 @@ METHODS: Final[dict[str, Settings]] = {
     "dual-kawase-offset": DualKawase(levels=2, offset=2.3, threshold=HARD_THRESHOLD),
     "dual-kawase-deep": DualKawase(levels=7, bloom_size=(64, 48), intensity=0.3),
 }
-COMPOSITES: Final = ("add", "mix", "screen")
-TONEMAPS: Final = ("none", "reinhard", "aces", "exponential", "khronos_neutral", "agx")
-ENCODINGS: Final = ("none", "gamma22", "srgb", "pq", "hlg")
+COMPOSITES: Final = fields_of(Settings)["composite"].choices
+TONEMAPS: Final = get_args(ToneMap)
+ENCODINGS: Final = get_args(Encoding)
 # Those whose derivatives have no kink that noise meets.
 _SMOOTH: Final = ("tutorial", "fractional", "layers", "half-size", "pyramid", "dual-kawase")
 # Those whose derivatives divide by a brightness, which at black is 0.
@@ -257,7 +257,7 @@ def _requests() -> Iterator[tuple[str, str, Settings, dict[str, Any]]]:
         for name, each in presets_of_low_levels(64).items()
     )
     for name in ("tutorial", "loops-layers", "knee", "direct", "pyramid-firefly", "dual-kawase"):
-        for format in FORMATS.values():
+        for format in FORMATS_BY_DTYPE.values():
             yield "formats", f"{name} {format}", METHODS[name].replace(format=format), {}
     three = ("tutorial", "pyramid", "dual-kawase")
     for size in ((1, 1), (1, 7), (7, 1), (13, 17), (211, 317), (320, 240)):
@@ -275,13 +275,13 @@ def _requests() -> Iterator[tuple[str, str, Settings, dict[str, Any]]]:
 def cases() -> Iterator[Case]:
     """Return all cases, by group."""
     for number, (group, name, settings, kept) in enumerate(_requests()):
-        dtype = kept.pop("dtype", DTYPES[(number + number // 3) % 3])
+        dtype = kept.pop("dtype", IMAGE_DTYPES[(number + number // 3) % 3])
         width, height = size = kept.pop("size", _SIZE)
         check = partial(_apply, size=size, dtype=dtype, settings=settings, **kept)
         variant = "fragment" if group == "fragment shaders" else "auto"
         yield Case(group, f"{name}, {dtype}, {width} x {height}", check, variant)
     for number, (tonemap, encoding) in enumerate(itertools.product(TONEMAPS, ENCODINGS)):
-        parts = (COMPOSITES[number % 3], tonemap, encoding, DTYPES[number // 3 % 3])
+        parts = (COMPOSITES[number % 3], tonemap, encoding, IMAGE_DTYPES[number // 3 % 3])
         yield Case("last pass", " ".join(parts), partial(_final, parts=parts))
     for size in ((8, 11), (15, 30), (45, 77), (64, 33), (90, 7)):
         yield Case("convolutions", f"{size[0]} x {size[1]}", partial(_convolve, size=size))
@@ -292,7 +292,7 @@ def cases() -> Iterator[Case]:
     for name, settings in _DIVIDING.items():
         check = partial(_derivatives_of_a_lamp, settings=settings)
         yield Case("derivatives", f"{name}, a lamp", check)
-    for dtype in DTYPES:
+    for dtype in IMAGE_DTYPES:
         of_pyramid: Any = {"dtype": dtype, "settings": METHODS["pyramid"]}
         yield Case("NaN and infinity", f"pyramid, {dtype}", partial(_not_finite, **of_pyramid))
         yield Case("map and sweep", f"map, {dtype}", partial(_map, **of_pyramid))
@@ -300,6 +300,6 @@ def cases() -> Iterator[Case]:
     ufo = Scene.ufo()
     sky = skybox.load(picture((4, 24), 4, "uint8").reshape(6, 4, 4, 4))
     named = {"ufo": ufo, "ufo with sky": dataclasses.replace(ufo, skybox=sky)}
-    for each in itertools.product(named, ("forward", "deferred"), FORMATS.values()):
+    for each in itertools.product(named, ("forward", "deferred"), FORMATS_BY_DTYPE.values()):
         check = partial(compare_scene, named[each[0]], *each[1:])
         yield Case("scenes", ", ".join(each), check)

@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from vkbloom import Frames, reference
+from vkbloom._formats import FORMATS_BY_DTYPE
 from vkbloom._settings.settings import Settings
 from vkbloom.reference._compositing import slope_of
 
-FORMATS: Final = {"uint8": "rgba8unorm", "float16": "rgba16float", "float32": "rgba32float"}
-_DTYPES: Final = {format: dtype for dtype, format in FORMATS.items()}
+_DTYPES: Final = {format: dtype for dtype, format in FORMATS_BY_DTYPE.items()}
 
 # A bound of all values, or of each.
 Limit = float | NDArray[np.float64]
@@ -111,7 +111,7 @@ def _after_threshold(
 ) -> dict[str, NDArray[np.float64]]:
     """Return what the reference makes of the renderer's own glow."""
     mask, (height, width, _) = given.get("mask"), image.shape
-    format = settings.format or FORMATS[image.dtype.name]
+    format = settings.format or FORMATS_BY_DTYPE[image.dtype.name]
     made = reference.passes(frames["glow"], settings, (width, height), format, mask=mask)
     share = 1.0 if mask is None else real(mask)[..., None]
     share = 0.0 if given.get("emission") is not None else share
@@ -125,7 +125,7 @@ def _limits(
     settings: Settings,
     given: dict[str, Any],
 ) -> dict[str, Limit]:
-    format = settings.format or FORMATS[image.dtype.name]
+    format = settings.format or FORMATS_BY_DTYPE[image.dtype.name]
     magnitudes: dict[str, Any] = dict.fromkeys(expected, 0.0)
     if "float16" in (image.dtype.name, _DTYPES[format]):
         # A threshold takes away from a value, but not from what it was rounded by.
@@ -173,7 +173,7 @@ def deviations(
         yield deviation("glow", glow, expected["glow"], tolerance(glow.dtype, expected["glow"]))
         expected |= _after_threshold(frames, image, settings, given)
     limits = _limits(frames, expected, image, settings, given)
-    format = settings.format or FORMATS[image.dtype.name]
+    format = settings.format or FORMATS_BY_DTYPE[image.dtype.name]
     dtypes = {"final": image.dtype.name, "kernel": "float32"}
     # Light that glare adds is not stored in 8 bits.
     wide = "float16" if format == "rgba8unorm" else _DTYPES[format]

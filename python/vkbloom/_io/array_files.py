@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
-from typing import Any, Final, Literal, overload
+from typing import Any, Final, Literal, get_args, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,9 +32,9 @@ from vkbloom._numbers import check_index
 from vkbloom._public import public
 from vkbloom._version import installed_version
 
-FileEncoding = Literal["none", "linear", "srgb", "gamma22", "pq", "hlg"]
+FileEncoding = Literal["none", SavedColour]
 
-_ENCODINGS: Final = ("none", "linear", "srgb", "gamma22", "pq", "hlg")
+_ENCODINGS: Final = get_args(FileEncoding)
 # Metadata that `read` adds about the file. The other entries are attributes, which can be written.
 _FACTS: Final = ("numbers", "colour", "alpha", "parts", "notes")
 

@@ -11,6 +11,7 @@ from typing import Any, BinaryIO, Final
 
 from numpy.typing import NDArray
 
+from vkbloom._formats import MAX_FLOAT
 from vkbloom._io.tiff import tiff_field
 
 #: What to do with AVIF and HEIF.
@@ -32,8 +33,6 @@ _FITS_IMAGES: Final = (b"SIMPLE", b"XTENSION= 'IMAGE   '")
 _FITS_SCALE: Final = re.compile(
     rb"(BSCALE  |BZERO   )= *([-+]?(?:\d+\.?\d*|\.\d+)(?:[ED][-+]?\d+)?) *(?:/|\Z)", re.IGNORECASE
 )
-# Larger ones are no floats of 32 bits.
-_MAX_FLOAT: Final = 3e38
 _ORIENTATION: Final = 274
 _XMP: Final = 700
 _EXIF_OF_JPEG: Final = b"Exif\0\0"
@@ -133,7 +132,7 @@ def fits_scale(path: str | os.PathLike[str], part: int) -> tuple[float, float]:
             cards = [block[at : at + _FITS_CARD] for at in range(0, _FITS_BLOCK, _FITS_CARD)]
             for match in filter(None, map(_FITS_SCALE.match, cards)):
                 value = float(match[2].upper().replace(b"D", b"E"))
-                if abs(value) < _MAX_FLOAT:
+                if abs(value) <= MAX_FLOAT:
                     found.setdefault(match[1].upper().strip(), value)
             if any(card.startswith(b"END ") for card in cards):
                 break

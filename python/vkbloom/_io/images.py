@@ -30,11 +30,12 @@ from numpy.typing import NDArray
 
 from vkbloom._arrays import native_order, plain_array
 from vkbloom._c_paths import is_name
+from vkbloom._formats import Curve
 
 #: "linear", "srgb" or the name of a colour space of OpenColorIO.
 Colour: TypeAlias = str
 #: The colour encoding of a file to write.
-SavedColour = Literal["linear", "srgb", "gamma22", "pq", "hlg"]
+SavedColour = Literal["linear", Curve]
 #: x and y of red, green, blue and white.
 Chromaticities: TypeAlias = tuple[float, ...]
 #: x, y, width, height in pixels.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from typing import ClassVar
 
-from vkbloom._numbers import MAX_FLOAT
+from vkbloom._formats import MAX_FLOAT
 from vkbloom._public import public
 from vkbloom._settings.fields import choice_field, flag_field, number_field, numbers_field
 from vkbloom._settings.settings import Composite, PublishedSettings

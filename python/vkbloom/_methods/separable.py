@@ -8,7 +8,8 @@ from typing import ClassVar, Literal
 
 from vkbloom import _core
 from vkbloom._argument_types import checked
-from vkbloom._numbers import MAX_FLOAT, check_above, check_index
+from vkbloom._formats import MAX_FLOAT
+from vkbloom._numbers import check_above, check_index
 from vkbloom._public import public
 from vkbloom._settings.fields import choice_field, flag_field, number_field, numbers_field
 from vkbloom._settings.settings import Settings

@@ -5,12 +5,13 @@ from __future__ import annotations
 import functools
 import math
 import sys
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple, NoReturn
+from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple, NoReturn
 
 import numpy as np
 
 from vkbloom import _core
 from vkbloom._arrays import device_kind, on_another_device
+from vkbloom._formats import IMAGE_DTYPES
 from vkbloom._public import public
 
 if TYPE_CHECKING:
@@ -27,6 +28,7 @@ Destination = Literal["host", "viewed", "cuda"]
 _CPU, _CUDA, _CUDA_HOST, _CUDA_MANAGED = 1, 2, 3, 13
 _UINT, _FLOAT, _BFLOAT, _COMPLEX, _BOOL = 1, 2, 4, 5, 6
 _DTYPES = {(_UINT, 8): "uint8", (_FLOAT, 16): "float16", (_FLOAT, 32): "float32"}
+_READABLE: Final = f"{', '.join(IMAGE_DTYPES)} on the device"
 _CODES = {"u": _UINT, "f": _FLOAT}
 # CUDA's handles of the default stream and of each thread's; 0 is not one of DLPack.
 _LEGACY = 1
@@ -250,8 +252,8 @@ def on_cuda(image: object) -> bool:
 def likeness(image: Any) -> NDArray[Any]:
     """Return an array of the host with an array's shape and dtype, of undefined content."""
     dtype = str(image.dtype).rsplit(".", 1)[-1]
-    if dtype not in _DTYPES.values():
-        raise TypeError(f"image: dtype {dtype} is not one of uint8, float16, float32 on the device")
+    if dtype not in IMAGE_DTYPES:
+        raise TypeError(f"image: dtype {dtype} is not one of {_READABLE}")
     return np.empty(tuple(image.shape), dtype)
 
 
@@ -314,9 +316,7 @@ def _check_dtype(name: str, code: int, bits: int, lanes: int) -> str:
     hint = f"convert it: {name}.to(torch.float32) in PyTorch, {name}.astype('float32') elsewhere"
     if code == _COMPLEX:
         hint = f"take its real part or its absolute value: abs({name})"
-    raise TypeError(
-        f"{name}: dtype {kind}{bits} is not one of uint8, float16, float32 on the device; {hint}"
-    )
+    raise TypeError(f"{name}: dtype {kind}{bits} is not one of {_READABLE}; {hint}")
 
 
 def _contiguous(shape: tuple[int, ...]) -> tuple[int, ...]:

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom._extras import import_extra
+from vkbloom._formats import IMAGE_DTYPES
 from vkbloom._framebuffers import leading
 from vkbloom._io import image_reading, safe_writing
 from vkbloom._io.displayed import HDR_CURVES
@@ -249,7 +250,7 @@ def _split_files_of(path: Path) -> list[Path]:
 
 def _as_dtype(pixels: NDArray[Any], dtype: str) -> NDArray[Any]:
     """Return pixels in their original dtype, depth without a channel."""
-    if dtype not in ("uint8", "float16", "float32"):
+    if dtype not in IMAGE_DTYPES:
         raise ValueError(f"{dtype!r} is no dtype of a framebuffer")
     if dtype == "uint8" and pixels.dtype != np.uint8:
         pixels = np.rint(pixels.astype(np.float32) * 255)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from vkbloom._argument_types import checked
 from vkbloom._extras import import_extra
+from vkbloom._formats import IMAGE_DTYPES
 from vkbloom._framebuffers import dimensions
 from vkbloom._public import public
 from vkbloom._renderer.device_arrays import DeviceArray, on_host
@@ -25,7 +26,6 @@ if TYPE_CHECKING:
 
     from vkbloom._settings.settings import Settings
 
-_IMAGE_DTYPES = (np.dtype(np.uint8), np.dtype(np.float16), np.dtype(np.float32))
 _CHANNELS = ("r", "g", "b", "a")
 
 
@@ -283,7 +283,7 @@ def _checked(name: str, array: NDArray[Any]) -> NDArray[Any]:
         return array
     if not isinstance(array, np.ndarray):
         raise TypeError(f"arrays[{name!r}]: {type(array).__name__} is not a NumPy array")
-    is_image = array.ndim == 3 and array.shape[2] in (3, 4) and array.dtype in _IMAGE_DTYPES
+    is_image = array.ndim == 3 and array.shape[2] in (3, 4) and array.dtype in IMAGE_DTYPES
     is_depth = array.ndim == 2 and array.dtype == np.float32
     if not (is_image or is_depth) or array.size == 0:
         raise ValueError(

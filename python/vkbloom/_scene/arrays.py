@@ -51,7 +51,7 @@ def check_indices(array: object, vertex_count: int) -> NDArray[Any]:
 
 
 def check_levels(
-    levels: object, dtypes: Sequence[np.dtype[Any]], *, cube: bool = False
+    levels: object, dtypes: Sequence[np.dtype[Any] | str], *, cube: bool = False
 ) -> tuple[NDArray[Any], ...]:
     """Return the mip levels of a picture ``(h, w, 4)``, or of a cube ``(6, n, n, 4)``, read-only.
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom import _core
+from vkbloom._formats import FORMATS_BY_DTYPE
 from vkbloom._scene.mesh import Mesh
 from vkbloom._scene.scene import Scene
 from vkbloom._scene.textures import Texture
@@ -18,7 +19,6 @@ from vkbloom._scene.view import matrices
 #: As Vulkan numbers them.
 _ADDRESS_MODES: Final = ("repeat", "mirror-repeat", "clamp-to-edge")
 _FILTERS: Final = ("nearest", "linear")
-_FORMATS: Final = {"uint8": "rgba8unorm", "float16": "rgba16float", "float32": "rgba32float"}
 
 #: Arguments of scene_source: a block, one of each picture, and arrays.
 Arguments = tuple[bytes, bytes, tuple[NDArray[Any], ...]]
@@ -72,7 +72,7 @@ def _picture(levels: tuple[NDArray[Any], ...], *sampler: int) -> bytes:
     if not levels:
         return bytes(4 * 9)
     height, width, _ = levels[0].shape[-3:]
-    number = _core.FORMATS.index(_FORMATS[levels[0].dtype.name])
+    number = _core.FORMATS.index(FORMATS_BY_DTYPE[levels[0].dtype.name])
     return struct.pack("=9I", number, width, height, len(levels), *(sampler or (0,) * 5))
 
 

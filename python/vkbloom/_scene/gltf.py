@@ -16,9 +16,9 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from vkbloom._formats import MAX_FLOAT
 from vkbloom._scene.gltf_file import (
     EMISSIVE_STRENGTH,
-    FLOAT_MAX,
     INTEGERS,
     MAX_VERTICES,
     Floats,
@@ -263,7 +263,7 @@ class _Loader:
         rows = np.concatenate((positions, normals, colours), axis=1)
         rows[:, (1, 4)] *= -1.0
         # Also False for NaN.
-        if not all((np.abs(values) <= FLOAT_MAX).all() for values in (rows, texcoords)):
+        if not all((np.abs(values) <= MAX_FLOAT).all() for values in (rows, texcoords)):
             self._file.fail(f"{what}: a transformed vertex is not finite")
         return rows.astype(np.float32), texcoords.astype(np.float32), triangles
 
@@ -392,7 +392,7 @@ class _Loader:
                 self._file.fail(f"{what}.{EMISSIVE_STRENGTH} is not an object")
             strength = [extension.get("emissiveStrength", 1.0)]
             emission *= self._file.floats(strength, f"{what}.emissiveStrength", (1,), low=0.0)
-            if emission.max() > FLOAT_MAX:
+            if emission.max() > MAX_FLOAT:
                 self._file.fail(f"{what} emits more than float32 can hold")
         return emission
 

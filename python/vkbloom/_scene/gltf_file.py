@@ -26,6 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom._extras import import_extra
+from vkbloom._formats import MAX_FLOAT
 
 Floats: TypeAlias = NDArray[np.float64]
 # An object of pygltflib, which has no type hints.
@@ -35,7 +36,6 @@ FLOAT: Final = 5126
 INTEGERS: Final = (5121, 5123, 5125)
 EMISSIVE_STRENGTH: Final = "KHR_materials_emissive_strength"
 TEXTURE_TRANSFORM: Final = "KHR_texture_transform"
-FLOAT_MAX: Final = float(np.finfo(np.float32).max)
 # A limit, since a small file can need any amount of memory: several nodes can use one mesh, and a
 # sparse accessor stores no zeros. This many baked vertices take 0.6 GB.
 MAX_VERTICES: Final = 2**24
@@ -176,7 +176,7 @@ class GltfFile:
         return value
 
     def floats(
-        self, value: object, what: str, usual: Sequence[float], *, low: float = -FLOAT_MAX
+        self, value: object, what: str, usual: Sequence[float], *, low: float = -MAX_FLOAT
     ) -> Floats:
         """Return a list as an array if it has as many finite numbers as what None stands for."""
         value = list(usual) if value is None else value
@@ -186,7 +186,7 @@ class GltfFile:
             if isinstance(number, bool) or not isinstance(number, (int, float)):
                 self.fail(f"{what} holds {reprlib.repr(number)}; a number is needed")
             # False for NaN. Works for integers that are too large for a float.
-            if not low <= number <= FLOAT_MAX:
+            if not low <= number <= MAX_FLOAT:
                 self.fail(f"{what} holds {reprlib.repr(number)}, which is out of range")
         return np.array(value, np.float64)
 

@@ -17,13 +17,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom._arrays import plain_array
+from vkbloom._formats import IMAGE_DTYPES
 from vkbloom._io import image_reading
 from vkbloom._scene import ktx
 from vkbloom._scene.arrays import MAX_SIDE, Constructed, check_levels
 from vkbloom._scene.textures import finite_floats, mip_levels, rounded_to
 
 FACES: Final = ("+x", "-x", "+y", "-y", "+z", "-z")
-DTYPES: Final = (np.dtype(np.uint8), np.dtype(np.float16), np.dtype(np.float32))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -42,7 +42,7 @@ class Cubemap(Constructed):
     levels: tuple[NDArray[Any], ...]
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "levels", check_levels(self.levels, DTYPES, cube=True))
+        object.__setattr__(self, "levels", check_levels(self.levels, IMAGE_DTYPES, cube=True))
 
     def __repr__(self) -> str:
         return f"Cubemap({self.size} x {self.size} {self.dtype}, levels: {len(self.levels)})"
@@ -87,7 +87,7 @@ def load(source: SkyboxSource) -> Cubemap:
 def from_array(faces: NDArray[Any]) -> Cubemap:
     """Make a cubemap with all mip levels from an array."""
     faces = plain_array(faces, "skybox")
-    if faces.dtype.newbyteorder("=") not in DTYPES:
+    if faces.dtype.newbyteorder("=") not in IMAGE_DTYPES:
         raise TypeError(f"skybox: {faces.dtype} is not uint8, float16 or float32")
     shape = faces.shape
     is_cube = faces.ndim == 4 and shape[0] == 6 and shape[1] == shape[2] and shape[3] in (3, 4)

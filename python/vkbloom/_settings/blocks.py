@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
 from vkbloom import _core
+from vkbloom._formats import MAX_FLOAT
 
 if TYPE_CHECKING:
     from vkbloom._settings.glare import Glare
@@ -16,7 +17,6 @@ Values = Mapping[str, tuple[float, float, float]]
 
 #: The codes of the tables as those of the module struct.
 _CODES: Final = {"f4": "f", "f8": "d", "i4": "i", "u4": "I"}
-_MAX_FLOAT: Final = 3.4028234663852886e38
 
 
 def _pack(block: bytearray, table: Table, name: str, *numbers: float) -> None:
@@ -60,7 +60,7 @@ def _pack_array(block: bytearray, name: str, value: Sequence[Any]) -> None:
     room = _core.SETTINGS_BLOCK[name][2]
     if not 1 <= len(numbers) <= room:
         raise ValueError(f"{name}: {len(numbers)} numbers are out of range, 1 to {room}")
-    if not all(abs(number) <= _MAX_FLOAT for number in numbers):
+    if not all(abs(number) <= MAX_FLOAT for number in numbers):
         raise ValueError(f"{name}: {value!r} is out of range, finite numbers")
     _pack(block, _core.SETTINGS_BLOCK, name, *numbers)
     # The member that counts the rows, if there is one: "weight_count" of "weights".

@@ -17,9 +17,9 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import Any, Final, Literal, TypedDict, Unpack
 
 from vkbloom import _core
+from vkbloom._formats import MAX_FLOAT, MAX_HALF
 from vkbloom._locks import ProcessLock
 from vkbloom._numbers import (
-    MAX_FLOAT,
     check_above,
     check_floats,
     check_integer,
@@ -290,7 +290,7 @@ def value_field(default: Any = dataclasses.MISSING, **declared: Unpack[Declared]
 def numbers_field(
     default: tuple[Any, ...] | None,
     low: float = 0.0,
-    high: float = 65504.0,
+    high: float = MAX_HALF,
     *,
     count: tuple[int, int] | None = None,
     **declared: Unpack[Declared],

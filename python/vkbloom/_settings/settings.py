@@ -12,6 +12,7 @@ from collections.abc import Mapping
 from typing import Any, ClassVar, Final, Literal, Self, get_args
 
 from vkbloom import _core
+from vkbloom._formats import Curve
 from vkbloom._public import public
 from vkbloom._settings.blocks import settings_block
 from vkbloom._settings.fields import (
@@ -31,7 +32,7 @@ from vkbloom._spelling import describe_unknown, did_you_mean
 Shading = Literal["forward", "deferred"]
 Composite = Literal["add", "mix", "screen", "soft_light", "replace"]
 ToneMap = Literal["none", "reinhard", "aces", "exponential", "khronos_neutral", "agx"]
-Encoding = Literal["none", "gamma22", "srgb", "pq", "hlg"]
+Encoding = Literal["none", Curve]
 Alpha = Literal["keep", "max", "blur"]
 BloomFormat = Literal[
     "rgba8unorm", "rgba16float", "rgba32float", "rg11b10ufloat", "rgba8unorm-srgb"

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom._extras import import_extra
+from vkbloom._formats import MAX_FLOAT
 from vkbloom._io.images import checked_pixels
 from vkbloom._io.srgb import decode_srgb
 
@@ -257,7 +258,7 @@ def flip_map(a: NDArray[Any], b: NDArray[Any]) -> NDArray[np.float32]:
 def _linear(pair: Pair) -> list[NDArray[np.float32]]:
     """Return both images as linear (H, W, 3) of float32."""
     colours = 3 if pair.a.shape[2] >= 3 else 1
-    largest = np.finfo(np.float32).max
+    largest = np.float32(MAX_FLOAT)
     results = []
     for image in (pair.a, pair.b):
         linear = image[:, :, :colours]

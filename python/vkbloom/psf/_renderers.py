@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vkbloom._array_cache import kept
-from vkbloom._numbers import MAX_FLOAT
+from vkbloom._formats import MAX_FLOAT
 from vkbloom._public import public
 from vkbloom._settings.fields import number_field, numbers_field, value_field
 from vkbloom.psf._base import PSF, Array, centred, in_grey

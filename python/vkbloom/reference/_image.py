@@ -11,13 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom._arrays import view_image
+from vkbloom._formats import FORMATS_BY_DTYPE, MAX_HALF
 
 from ._sampling import Array
 
 _FORMATS = {
-    "uint8": "rgba8unorm",
-    "float16": "rgba16float",
-    "float32": "rgba32float",
+    **FORMATS_BY_DTYPE,
     # There are no bloom buffers of doubles. Only the reference uses them, without clamps.
     "float64": "rgba32float",
 }
@@ -142,7 +141,7 @@ def _as_srgb8(image: Array) -> Array:
 _STORAGES = {
     "rgba8unorm": Storage(0, 1),
     # Clamped, since a blur would spread an infinity over the picture.
-    "rgba16float": Storage(-65504, 65504),
+    "rgba16float": Storage(-MAX_HALF, MAX_HALF),
     "rgba32float": Storage(-math.inf, math.inf),
     "rg11b10ufloat": Storage(0, 65024, _as_rg11b10, has_alpha=False),
     "rgba8unorm-srgb": Storage(0, 1, _as_srgb8, is_of_frames=True),

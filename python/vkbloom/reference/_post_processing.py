@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from vkbloom._formats import MAX_HALF
+
 from ._image import BlurInput
 from ._pyramid import downsample
 from ._sampling import Array, box, size_of
@@ -65,7 +67,7 @@ def _plan(
 
 
 def _prefilter(rgb: Array, settings: PostProcessingBloom) -> Array:
-    limit = min(65504.0, linear_light(settings.clamp))
+    limit = min(MAX_HALF, linear_light(settings.clamp))
     # The clamp is not applied to alpha.
     kept = np.concatenate([np.minimum(rgb[..., :3], limit), rgb[..., 3:]], axis=-1)
     threshold = None if settings.threshold is None else linear_light(settings.threshold)
