@@ -51,7 +51,6 @@ def _is_mapping(value: Any) -> bool:
 
 
 _TEXT: Final = _Kind("a str", "str", lambda value: isinstance(value, str))
-_PATH: Final = _Kind("a path", "paths", _is_path)
 _KINDS: Final[Mapping[Any, _Kind]] = {
     bool: _Kind("a bool", "bools", lambda value: isinstance(value, bool | np.bool_)),
     int: _Kind("an integer", "integers", _is_integer),
@@ -59,7 +58,7 @@ _KINDS: Final[Mapping[Any, _Kind]] = {
     str: _TEXT,
     # Which ones there are, the function says.
     Literal: _TEXT,
-    os.PathLike: _PATH,
+    os.PathLike: _Kind("a path", "paths", _is_path),
     Callable: _Kind("callable", "callables", callable),
 }
 
@@ -94,8 +93,6 @@ def _builtin_kind_of(annotation: Any) -> _Kind | None:
 
 
 def _scalar_kind_of(annotation: Any) -> _Kind | None:
-    if isinstance(annotation, type) and issubclass(annotation, os.PathLike):
-        return _PATH
     return _KINDS.get(get_origin(annotation) or annotation)
 
 

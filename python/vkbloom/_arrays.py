@@ -101,6 +101,14 @@ def pil_mode(image: object) -> str:
     return str(getattr(image, "mode", "")) if type(image).__module__.startswith("PIL.") else ""
 
 
+def saturate(made: NDArray[Any], was_finite: NDArray[np.bool_]) -> NDArray[Any]:
+    """Replace infinite results of finite values by the largest number of their type, in place."""
+    is_over = np.isinf(made) & was_finite
+    if is_over.any():
+        made[is_over] = np.copysign(np.finfo(made.dtype).max, made[is_over])
+    return made
+
+
 def native_order(array: NDArray[Any]) -> NDArray[Any]:
     """Return the values with a dtype that names no byte order, as a view where that is possible.
 

@@ -11,8 +11,8 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom._arrays import native_order, pil_mode, view_image
-from vkbloom._formats import IMAGE_DTYPES, MAX_FLOAT
+from vkbloom._arrays import native_order, pil_mode, saturate, view_image
+from vkbloom._formats import IMAGE_DTYPES
 
 # Fast path for native byte order.
 _DTYPES: Final = frozenset(map(np.dtype, IMAGE_DTYPES))
@@ -66,11 +66,7 @@ def check_image(image: object, name: str = "image") -> NDArray[Any]:
 def _single(array: NDArray[np.float64]) -> NDArray[np.float32]:
     """Return float32; finite values beyond its range saturate, since infinity does not glow."""
     with np.errstate(over="ignore"):
-        made = array.astype(np.float32)
-    is_over = np.isinf(made) & np.isfinite(array)
-    if is_over.any():
-        made[is_over] = np.copysign(MAX_FLOAT, made[is_over])
-    return made
+        return saturate(array.astype(np.float32), np.isfinite(array))
 
 
 def _shape_hint(shape: tuple[int, ...]) -> str:

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import dataclasses
 import re
-from typing import Final
+from typing import Final, get_args
 
 from vkbloom._custom.blocks import Block, Directive
+from vkbloom._custom.params import Number
 from vkbloom._custom.textures import read_hex
 
 #: Rows and columns of each type; all numbers have 4 bytes.
 TYPES: Final = {
-    **dict.fromkeys(("float", "int", "uint"), (1, 1)),
+    **dict.fromkeys(get_args(Number), (1, 1)),
     **{f"{kind}vec{n}": (n, 1) for kind in ("", "i", "u") for n in (2, 3, 4)},
     **{f"mat{n}": (n, n) for n in (2, 3, 4)},
     **{f"mat{c}x{r}": (r, c) for c in (2, 3, 4) for r in (2, 3, 4)},

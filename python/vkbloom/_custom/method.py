@@ -6,6 +6,7 @@ import copy
 import copyreg
 import dataclasses
 import keyword
+import os
 import re
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -159,7 +160,10 @@ copyreg.pickle(CustomType, reduced)
 @public("vkbloom")
 @checked
 def load_method(
-    source: str | Path, *, name: str | None = None, reference: Reference | None = None
+    source: str | os.PathLike[str],
+    *,
+    name: str | None = None,
+    reference: Reference | None = None,
 ) -> type[Settings]:
     """Load a method from a file of passes in the syntax of mpv's user shaders.
 

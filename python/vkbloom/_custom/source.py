@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import hashlib
+import os
 from pathlib import Path
 from typing import Final
 
@@ -42,11 +43,11 @@ class Source:
         return ValueError(self.where(line, cause))
 
 
-def read_source(source: str | Path) -> Source:
+def read_source(source: str | os.PathLike[str]) -> Source:
     """Read a file, or take a text: what contains a line feed is one."""
     if isinstance(source, str) and "\n" in source:
         return checked(Source("<text>", source.replace("\r\n", "\n")))
-    if not isinstance(source, str | Path):
+    if not isinstance(source, str | os.PathLike):
         raise TypeError(f"source: {source!r} is neither a path nor a text")
     path = Path(source)
     if path.stat().st_size > LARGEST_FILE:

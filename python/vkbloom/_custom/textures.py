@@ -5,20 +5,20 @@ from __future__ import annotations
 import dataclasses
 import re
 from collections.abc import Callable
-from typing import Final, Literal, TypeVar
+from typing import Final, Literal, TypeVar, get_args
 
 import numpy as np
 
 from vkbloom._custom.blocks import Block
+from vkbloom._custom.params import Number
 
-Scalar = Literal["float", "int", "uint"]
 Filter = Literal["NEAREST", "LINEAR"]
 Border = Literal["CLAMP", "REPEAT", "MIRROR"]
 
 Word = TypeVar("Word", bound=str)
 
-FILTERS: Final[tuple[Filter, ...]] = ("NEAREST", "LINEAR")
-BORDERS: Final[tuple[Border, ...]] = ("CLAMP", "REPEAT", "MIRROR")
+FILTERS: Final[tuple[Filter, ...]] = get_args(Filter)
+BORDERS: Final[tuple[Border, ...]] = get_args(Border)
 #: Of a side, in each number of dimensions: what every device of Vulkan 1.1 has.
 LARGEST_SIDES: Final = {1: 4096, 2: 4096, 3: 256}
 
@@ -33,7 +33,7 @@ class TextureFormat:
 
     vulkan: int
     layout: str
-    scalar: Scalar
+    scalar: Number
     channels: int
     file_bytes: int
     read: Callable[[bytes], np.ndarray]
@@ -87,7 +87,7 @@ NUMBERS: Final = {
     (32, "f"): (100, 103, 109),
 }
 LAYOUT_KINDS: Final = {"": "", "s": "_snorm", "u": "ui", "i": "i", "f": "f"}
-SCALARS: Final[dict[str, Scalar]] = {"u": "uint", "i": "int"}
+SCALARS: Final[dict[str, Number]] = {"u": "uint", "i": "int"}
 RGBA32_FLOAT: Final = 109
 
 

@@ -30,6 +30,8 @@ _CLIPPED: Final = 1e-3
 _PIXELS: Final = 2**16
 
 Array = NDArray[np.float64]
+#: Whether a search came close to its target.
+Verdict = Literal["good", "fair", "poor"]
 
 
 def is_found(target: Array, residual: Array, plain: Array) -> bool:
@@ -181,7 +183,7 @@ class FitResult:
         )
 
     @cached_property
-    def verdict(self) -> Literal["good", "fair", "poor"]:
+    def verdict(self) -> Verdict:
         """Whether the search found the picture."""
         if self.explained < _FAIR or not is_found(self.target, self.residual, self.plain):
             return "poor"

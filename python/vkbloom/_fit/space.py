@@ -20,6 +20,7 @@ Point = NDArray[np.float64]
 
 #: Bounds by field: (low, high) of a number, the values of a choice.
 Bounds = Mapping[str, Sequence[Any]]
+AxisKind = Literal["number", "integer", "choice"]
 
 # A range this many times as wide as its scale is searched on a logarithmic scale.
 _WIDE: Final = 4.0
@@ -36,7 +37,7 @@ class Axis:
     """
 
     name: str
-    kind: Literal["number", "integer", "choice"]
+    kind: AxisKind
     low: float = 0.0
     high: float = 1.0
     scale: float | None = None
@@ -168,7 +169,7 @@ def _begun(settings: Settings, name: str) -> Any:
     return 0.0 if value is None and name == "threshold" else value
 
 
-def varied_as(info: FieldInfo) -> Literal["number", "integer", "choice"] | None:
+def varied_as(info: FieldInfo) -> AxisKind | None:
     """Return how a field varies; None if it cannot."""
     match info.kind:
         case "flag":

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Sequence
-from typing import Any, Final, Literal
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from vkbloom._argument_types import checked
 from vkbloom._fit.fitting import fit
 from vkbloom._fit.losses import DARK, Loss
-from vkbloom._fit.result import FitResult
+from vkbloom._fit.result import FitResult, Verdict
 from vkbloom._fit.space import Bounds, varied_as
 from vkbloom._locks import cached_property
 from vkbloom._numbers import check_size
@@ -51,7 +51,7 @@ class Translation(FitResult):
     """
 
     @cached_property
-    def verdict(self) -> Literal["good", "fair", "poor"]:
+    def verdict(self) -> Verdict:
         """How close the bloom comes."""
         good, fair = _DECADES if self.loss_name == "log" else _SHARES
         loss = self._share if self.loss_name != "log" else self.loss

@@ -43,9 +43,10 @@ from typing import TYPE_CHECKING, Any, BinaryIO, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from vkbloom._arrays import saturate
 from vkbloom._io.images import failure_of
 from vkbloom._io.jpeg_xl import header_of
-from vkbloom._io.narrowing import narrowed, saturated
+from vkbloom._io.narrowing import narrowed
 from vkbloom._io.tiff import tiff_field
 
 if TYPE_CHECKING:
@@ -215,7 +216,7 @@ def _with_alpha(values: NDArray[Any], factor: NDArray[Any]) -> NDArray[Any]:
         made[:, :, :-1] = np.rint(np.minimum(made[:, :, :-1] / largest, largest))
         return made.astype(values.dtype)
     # Colours divided by a small alpha may be beyond the range of their type.
-    return narrowed(saturated(made, np.isfinite(values)), values.dtype)
+    return narrowed(saturate(made, np.isfinite(values)), values.dtype)
 
 
 def light_of(values: NDArray[Any]) -> tuple[float, float]:

@@ -7,6 +7,8 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from vkbloom._arrays import saturate
+
 #: The largest number of Radiance HDR: 8 bits of mantissa, and exponents to 127.
 MAX_RADIANCE: Final = 255 / 256 * 2.0**127
 _NAMES: Final = {"float16": "half float", "float32": "float"}
@@ -21,15 +23,7 @@ def narrowed(values: NDArray[Any], dtype: np.dtype[Any]) -> NDArray[Any]:
         return values.astype(dtype, copy=False)
     with np.errstate(over="ignore"):
         made = values.astype(dtype)
-    return saturated(made, np.isfinite(values))
-
-
-def saturated(made: NDArray[Any], was_finite: NDArray[np.bool_]) -> NDArray[Any]:
-    """Replace infinite results of finite values by the largest number of their type, in place."""
-    is_over = np.isinf(made) & was_finite
-    if is_over.any():
-        made[is_over] = np.copysign(np.finfo(made.dtype).max, made[is_over])
-    return made
+    return saturate(made, np.isfinite(values))
 
 
 def for_radiance(values: NDArray[Any]) -> NDArray[Any]:

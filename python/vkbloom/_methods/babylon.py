@@ -6,6 +6,7 @@ import dataclasses
 import math
 from typing import Any, ClassVar
 
+from vkbloom._formats import MAX_HALF
 from vkbloom._public import public
 from vkbloom._settings.fields import number_field
 from vkbloom._settings.settings import PublishedSettings
@@ -55,7 +56,7 @@ class BabylonBloom(PublishedSettings):
         default=64.0, range=(1, 256), option="kernel-width", differentiable=False
     )
     scale: float = number_field(default=0.5, range=(0.01, 1), differentiable=False)
-    weight: float = number_field(default=0.15, range=(0, 65504), slider=(0, 2))
+    weight: float = number_field(default=0.15, range=(0, MAX_HALF), slider=(0, 2))
 
     def __post_init__(self) -> None:
         super().__post_init__()

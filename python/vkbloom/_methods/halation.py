@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from vkbloom._formats import MAX_HALF
 from vkbloom._methods.gaussian_sum import GaussianSum, gaussian
 from vkbloom._public import public
 from vkbloom._settings.fields import choice_field, number_field, numbers_field, value_field
@@ -74,7 +75,7 @@ class Halation(GaussianSum):
         (30.0, 20.0, 15.0), option="halation_scattering_sizes", differentiable=False
     )
     pixel_size: float | None = number_field(
-        default=None, range=(0.01, 65504), slider=(1, 100), differentiable=False
+        default=None, range=(0.01, MAX_HALF), slider=(1, 100), differentiable=False
     )
 
     def core_kernel_size(self, frame: Size, buffers: Size) -> Size:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from typing import Any, ClassVar
 
+from vkbloom._formats import MAX_HALF
 from vkbloom._public import public
 from vkbloom._settings.fields import choice_field, number_field
 from vkbloom._settings.settings import Composite, PublishedSettings
@@ -50,7 +51,7 @@ class PmndrsBloom(PublishedSettings):
     composite: Composite = choice_field(("screen", "add"))
     radius: float = number_field(default=0.85, range=(0, 1))
     levels: int = number_field(default=8)
-    smoothing: float = number_field(default=0.03, range=(0, 65504), slider=(0, 1))
+    smoothing: float = number_field(default=0.03, range=(0, MAX_HALF), slider=(0, 1))
 
     def _core_values(self) -> dict[str, Any]:
         """Return what the core names or counts otherwise."""

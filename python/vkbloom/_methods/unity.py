@@ -6,6 +6,7 @@ import dataclasses
 import math
 from typing import Any, ClassVar, Literal
 
+from vkbloom._formats import MAX_HALF
 from vkbloom._public import public
 from vkbloom._settings.fields import (
     choice_field,
@@ -223,7 +224,7 @@ class PostProcessingBloom(PublishedSettings):
         """Return what the core names or counts otherwise."""
         return {
             "threshold": None if self.threshold is None else _linear(self.threshold),
-            "clamp_max": min(65504.0, _linear(self.clamp)),
+            "clamp_max": min(MAX_HALF, _linear(self.clamp)),
             "anamorphism": self.anamorphic_ratio,
             "tint": self.color,
         }

@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from vkbloom._formats import MAX_HALF
 from vkbloom._methods.gaussian_sum import GaussianSum, gaussian
 from vkbloom._public import public
 from vkbloom._settings.fields import number_field, numbers_field
@@ -51,13 +52,13 @@ class UnrealBloom(GaussianSum):
     boundary: ClassVar[str] = "edge"
     shaping: ClassVar[tuple[str, ...]] = ("sizes", "tints", "size_scale")
 
-    threshold: float | None = number_field(default=-1.0, range=(-1, 65504), slider=(-1, 4))
+    threshold: float | None = number_field(default=-1.0, range=(-1, MAX_HALF), slider=(-1, 4))
     intensity: float = number_field(default=0.675)
     sizes: tuple[float, ...] = numbers_field(
         (0.3, 1.0, 2.0, 10.0, 30.0, 64.0), differentiable=False
     )
     tints: tuple[float, ...] = numbers_field(
-        (0.3465, 0.138, 0.1176, 0.066, 0.066, 0.061), low=-65504.0, differentiable=False
+        (0.3465, 0.138, 0.1176, 0.066, 0.066, 0.061), low=-MAX_HALF, differentiable=False
     )
     size_scale: float = number_field(default=4.0, range=(0, 64), differentiable=False)
 
