@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -18,6 +19,7 @@ from tests.images import noise_image
 from tests.kinds import STAGES
 from tests.refusals import assert_matches, rows
 from vkbloom import psf
+from vkbloom._presets import named_settings
 
 pytestmark = pytest.mark.usefixtures("kept_renderers")
 
@@ -176,6 +178,13 @@ def test_one_line_each(command: str) -> None:
 
 
 def test_presets_are_grouped_by_engine() -> None:
+    for name, item in named_settings.PRESETS.items():
+        assert item.engine in get_args(named_settings.Engine), f"{name}: engine is wrong"
+        assert item.confirmed in get_args(named_settings.Confirmed), f"{name}: confirmed is wrong"
+    with pytest.raises(TypeError, match="missing 1 required positional argument: 'engine'"):
+        named_settings.Preset(  # type: ignore[call-arg]
+            {"method": "kino"}, "a glow", "somebody", confirmed="frames"
+        )
     lines = [line.strip() for line in run("presets").stdout.splitlines()]
     engines = [line for line in lines if line.endswith(":")]
     assert len(engines) == len(set(engines)) > 10

@@ -18,8 +18,9 @@ from tqdm import tqdm
 import vkbloom
 from vkbloom import testing
 from vkbloom._cli.program import program
+from vkbloom._doctor.cases import of_low_levels
 from vkbloom._gradients import on_device
-from vkbloom._presets.named_settings import ENGINES
+from vkbloom._presets.named_settings import PRESETS
 from vkbloom._settings.fields import fields_of
 from vkbloom._settings.registry import METHODS
 from vkbloom.reference._derivatives import differentiable
@@ -36,8 +37,6 @@ PATH, STEPS, LIGHT = 16, 1.5, 1000.0
 # 720p, 1080p, 4K; a lamp of four pixels at 720p.
 SCALES = (1.0, 1.5, 3.0)
 LAMP, LAMP_SIDE = 100.0, 1 / 180
-# By engine.
-CONFIRMED = {name: how for _, how, names in ENGINES for name in names.split()}
 # Change of both radii, as a share of their mean, that a preset keeps its look with.
 KEPT = 0.1
 
@@ -111,8 +110,8 @@ def measured(renderer: vkbloom.Renderer, quick: bool) -> str:
     point = np.zeros((FRAME[1], FRAME[0], 3), np.float32)
     y, x = FRAME[1] // 2, FRAME[0] // 2
     point[y - 1 : y + 2, x - 1 : x + 2] = VALUE
-    for name, how in CONFIRMED.items():
-        settings = vkbloom.presets[name]
+    for name, item in PRESETS.items():
+        settings = item.make()
         exact = settings.replace(format="rgba32float")
         bloom = renderer.apply(point, exact)["bloom"]
         share, radii = spread(bloom[:, :, 0].astype(np.float64), 9 * VALUE)
@@ -127,7 +126,7 @@ def measured(renderer: vkbloom.Renderer, quick: bool) -> str:
         rows.append(
             [
                 f"`{name}`",
-                how,
+                item.confirmed,
                 f"{gain:.3g}",
                 f"{settings.intensity * gain:.3g}" if adds else settings.composite,
                 f"{share:.3g}",
@@ -210,14 +209,11 @@ def resolution(renderer: vkbloom.Renderer, quick: bool) -> str:
 def _with_threshold(name: str) -> vkbloom.Settings:
     """Return settings of a method with a threshold."""
     kind = METHODS[name]
-    kernel = np.random.default_rng(1).random((5, 5))
-    settings: Any = kind(psf=kernel) if name == "convolution" else kind()
-    # The levels of two engines have a height of their own, which takes long.
-    smaller = {"bevy": {"max_mip_dimension": 32}, "filament": {"resolution": 32}}
-    settings = settings.replace(**smaller.get(name, {}))
-    if name == "pyramid":
-        settings = settings.replace(level_weights=(1.0,) * settings.levels)
     fields = fields_of(kind)
+    kernel = np.random.default_rng(1).random((5, 5))
+    settings: Any = of_low_levels(kind(psf=kernel) if "psf" in fields else kind(), 32)
+    if "level_weights" in fields and settings.level_weights is None:
+        settings = settings.replace(level_weights=(1.0,) * settings.levels)
     if settings.threshold is None and not fields["threshold"].fixed:
         settings = settings.replace(threshold=0.4)
     return settings if fields["knee"].fixed else settings.replace(knee=0.5)

@@ -6,7 +6,7 @@ import inspect
 import json
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from typing import Any, Final, TypeAlias
+from typing import Any, Final, TypeAlias, get_args
 
 import click
 from rich import box
@@ -15,8 +15,7 @@ from rich.table import Table
 from rich.text import Text
 
 from vkbloom._presets.named_glares import GLARES
-from vkbloom._presets.named_settings import ENGINES, PRESETS
-from vkbloom._presets.start import PRESET_OF_PHOTOS
+from vkbloom._presets.named_settings import PRESETS, Engine
 from vkbloom._settings.fields import fields_of
 from vkbloom._settings.glare import Glare, GlareLight
 from vkbloom._settings.registry import STAGES
@@ -89,19 +88,16 @@ def preset_entries() -> Iterator[Entry]:
     program itself, or a formula alone), whether they mix or add, and whether they need values above
     1.
     """
-    engines = {
-        name: (engine, confirmed) for engine, confirmed, names in ENGINES for name in names.split()
-    }
-    for name, (engine, confirmed) in engines.items():
-        item = PRESETS[name]
+    order = get_args(Engine)
+    for name, item in sorted(PRESETS.items(), key=lambda row: order.index(row[1].engine)):
         settings = item.make()
-        # The command line expands the highlights of a photograph for the preset photo.
-        needs_hdr = (settings.threshold or 0) >= 1 and name != PRESET_OF_PHOTOS
+        # The command line expands the highlights of a photograph for the one that it starts from.
+        needs_hdr = (settings.threshold or 0) >= 1 and item.starts != "photographs"
         yield {
             **{"name": name, "what": item.what, "whose": item.whose},
             **{"composite": settings.composite, "needs_hdr": needs_hdr},
             **{"intensity": settings.intensity, "settings": settings.to_dict()},
-            **{"engine": engine, "confirmed": confirmed},
+            **{"engine": item.engine, "confirmed": item.confirmed},
         }
 
 

@@ -27,7 +27,7 @@ from vkbloom._cli.terminal import tell_device
 from vkbloom._explorer.viewer import GLOW, Viewer
 from vkbloom._extras import import_extra
 from vkbloom._io.images import Picture
-from vkbloom._presets.start import developed, start_of
+from vkbloom._presets.start import PRESET_OF_SCENES, developed, start_of
 from vkbloom._renderer.surface import Surface
 from vkbloom._settings.settings import SHADINGS, Settings, Shading
 
@@ -290,7 +290,9 @@ def explore(
         looked_at = scene()
         if not any(given(name) for name in ("base", "glow", "glow_intensity")):
             looked_at = dataclasses.replace(looked_at, glow_intensity=GLOW)
-        if settings == vkbloom.presets["tutorial"] and not any(given(name) for name in STARTS):
+        if settings == vkbloom.presets[PRESET_OF_SCENES] and not any(
+            given(name) for name in STARTS
+        ):
             begun = None
     with vkbloom.Renderer(adapter) as renderer:
 

@@ -66,7 +66,7 @@ class CustomMethod(Settings, metaclass=CustomType):
                         f"{name}: {getattr(self, name)!r} is not {getattr(type(self), name)!r}; "
                         f"the method {self.method} composites by itself, since it saves no BLOOM"
                     )
-            if self.glare and all(stage.stage == "dirt" for stage in self.glare):
+            if self.glare and not any(stage._adds_light for stage in self.glare):
                 raise ValueError(
                     f"glare: Dirt has no light that it multiplies, since the method {self.method} "
                     "saves no BLOOM; add a stage that gives light, or save BLOOM"

@@ -100,12 +100,13 @@ def presets_of_low_levels(height: int) -> dict[str, Settings]:
 
     Of small images, levels of the engines' heights take seconds and show nothing more.
     """
-    fields = {"bevy_natural": "max_mip_dimension", "photo": "max_mip_dimension"}
-    fields |= {"filament": "resolution"}
-    return {
-        name: each.replace(**{fields[name]: height}) if name in fields else each
-        for name, each in presets.items()
-    }
+    return {name: of_low_levels(each, height) for name, each in presets.items()}
+
+
+def of_low_levels(settings: Settings, height: int) -> Settings:
+    """Return the settings, with levels of this height if theirs does not follow from the image."""
+    field = settings._level_height
+    return settings.replace(**{field: height}) if field else settings
 
 
 def picture(size: tuple[int, int], channels: int, dtype: str, seed: int = 0) -> NDArray[Any]:

@@ -17,8 +17,9 @@ from vkbloom import _core, reference
 from vkbloom._c_paths import in_utf8
 from vkbloom._doctor.child import ANSWER_MARK
 from vkbloom._renderer.adapter import bundled_driver, from_core
+from vkbloom._settings.settings import check_settings
 
-SETTINGS: Final = vkbloom.Separable(bloom_size=(32, 24))
+SETTINGS: Final = check_settings(None).replace(bloom_size=(32, 24))
 # A rectangle in no place that a mirrored picture has one.
 IMAGE: Final = np.zeros((48, 64, 3), np.uint8)
 IMAGE[:20, :24] = (255, 128, 64)

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from vkbloom._argument_types import checked
 from vkbloom._gradients.passes import DeviceGradients, Passes, check_finite, in_floats
-from vkbloom._methods.separable import Separable
 from vkbloom._public import public
 from vkbloom._renderer.default import default_renderer
 from vkbloom._renderer.device_arrays import (
@@ -110,7 +109,7 @@ def vjp(
     if isinstance(image, Image):
         image_source(image, mask, emission)
         # A pass without bloom copies the pixels.
-        alone = Separable(bloom=False)
+        alone = check_settings(None).replace(bloom=False)
         inputs = uploaded_inputs(
             image,
             lambda: renderer.apply(image, alone, framebuffers="final", device="host")["final"],

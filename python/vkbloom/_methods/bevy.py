@@ -59,6 +59,7 @@ class BevyBloom(PublishedSettings):
     """
 
     method: ClassVar[str] = "bevy"
+    _level_height: ClassVar[str] = "max_mip_dimension"
     _knobs: ClassVar[tuple[str, ...]] = ("low_frequency_boost", "max_mip_dimension")
 
     knee: float = number_field(fixed="")

@@ -51,6 +51,7 @@ class FilamentBloom(PublishedSettings):
     """
 
     method: ClassVar[str] = "filament"
+    _level_height: ClassVar[str] = "resolution"
     _knobs: ClassVar[tuple[str, ...]] = ("levels", "resolution")
 
     threshold: float | None = 1.0

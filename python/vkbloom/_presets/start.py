@@ -29,11 +29,11 @@ from vkbloom._settings.registry import presets
 from vkbloom._settings.settings import Settings, check_settings
 
 #: The preset of images whose highlights are stored.
-PRESET_OF_IMAGES: Final = "bevy_natural"
+PRESET_OF_IMAGES: Final = presets.start("images")
 #: The preset of files of integers for SDR.
-PRESET_OF_PHOTOS: Final = "photo"
+PRESET_OF_PHOTOS: Final = presets.start("photographs")
 #: The preset of scenes.
-PRESET_OF_SCENES: Final = "tutorial"
+PRESET_OF_SCENES: Final = presets.start("scenes")
 
 _DEFAULTS: Final[Mapping[Highlights | None, str]] = {
     Highlights.CLIPPED: PRESET_OF_PHOTOS,

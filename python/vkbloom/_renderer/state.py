@@ -10,6 +10,7 @@ import numpy as np
 
 from vkbloom._renderer import requests
 from vkbloom._renderer.sources import image_source
+from vkbloom._settings.settings import check_settings
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -30,10 +31,9 @@ class Kept(NamedTuple):
 
     def read(self) -> NDArray[Any]:
         """Return the pixels."""
-        from vkbloom._methods.separable import Separable  # noqa: PLC0415  costs start-up time
-
         # A pass without bloom copies the pixels.
-        plan = self.core.plan(self.source, Separable(bloom=False), ("final",))
+        copy = check_settings(None).replace(bloom=False)
+        plan = self.core.plan(self.source, copy, ("final",))
         (array,) = arrays = requests.new_arrays(self.core, plan)
         self.core.run(self.source, (plan,), (arrays,)).wait()
         assert isinstance(array, np.ndarray)

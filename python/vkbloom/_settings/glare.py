@@ -28,6 +28,8 @@ class Glare(Record):
     _example: ClassVar[str] = "a stage, such as Streaks"
     _core_numbers: ClassVar[CoreNumbers] = _core.GLARE_VALUES
     stage: ClassVar[str]
+    #: Whether the stage adds light of its own; the other kind changes the sum, and is there once.
+    _adds_light: ClassVar[bool] = False
 
     @classmethod
     def _classes(cls) -> Mapping[str, type[Glare]]:
@@ -59,6 +61,8 @@ class GlareLight(Glare):
     of stages are "rgba32float" if the bloom buffers are, and otherwise "rgba16float".
     """
 
+    _adds_light: ClassVar[bool] = True
+
     intensity: float = number_field(slider=(0, 4))
     threshold: float = number_field(slider=(0, 16))
     halvings: int = number_field()
@@ -76,8 +80,10 @@ def check_glare(glare: object) -> tuple[Glare, ...]:
         if not isinstance(stage, Glare):
             raise TypeError(f"glare: {part!r} is not a stage, such as Streaks()")
         stages.append(stage)
-    if sum(stage.stage == "dirt" for stage in stages) > 1:
-        raise ValueError("glare: there is more than one Dirt; give one")
+    others = [stage for stage in stages if not stage._adds_light]
+    if len(others) > 1:
+        name = type(others[0]).__name__
+        raise ValueError(f"glare: there is more than one {name}; give one")
     if len(stages) > _core.MAX_STAGES:
         raise ValueError(f"glare: {len(stages)} stages are out of range, 0 to {_core.MAX_STAGES}")
     return tuple(stages)

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Final, Protocol
 
-from vkbloom._settings.named import Named
+from vkbloom._settings.named import Named, T
 
 if TYPE_CHECKING:
     from vkbloom._settings.glare import Glare
@@ -92,13 +92,27 @@ class Methods(Registry):
         return module  # type: ignore[no-any-return]
 
 
+class Presets(Named[T]):
+    """Settings by their published names."""
+
+    def __init__(self) -> None:
+        super().__init__("preset", lambda preset: preset.make())
+        self._starts: dict[str, str] = {}
+
+    def start(self, sources: str) -> str:
+        """Return the preset that images, photographs or scenes start from if a call names none."""
+        if sources not in self._starts:
+            self._starts = {preset.starts: name for name, preset in self._entries.items()}
+        return self._starts[sources]
+
+
 #: The methods, which `vkbloom._methods` supplies, in the order of ``VKB_METHODS`` in the core.
 METHODS: Final = Methods("method")
 #: The stages of glare, which `vkbloom._glare` supplies.
 STAGES: Final = Registry("glare")
 #: Name to settings, which `vkbloom._presets` supplies. ``vkbloom presets`` and ``docs/presets.md``
 #: list what they are, with their sources.
-presets: Final[Named[Settings]] = Named("preset", lambda preset: preset.make())
+presets: Final[Presets[Settings]] = Presets()
 #: Name to stages, for ``glare=vkbloom.glares[name]``, or ``glare=name``. ``vkbloom glares`` and
 #: ``docs/glare.md`` list what they are, with their sources.
 glares: Final[Named[tuple[Glare, ...]]] = Named("glare", lambda glare: glare.stages)

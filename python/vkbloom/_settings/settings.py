@@ -7,7 +7,6 @@ declared once for the shaders, the core and Python.
 from __future__ import annotations
 
 import dataclasses
-import functools
 from collections.abc import Mapping
 from typing import Any, ClassVar, Final, Literal, Self, get_args
 
@@ -147,6 +146,8 @@ class Settings(Record):
     _knobs: ClassVar[tuple[str, ...]]
     #: Whether the method starts from the complete frame: it reduces it and thresholds it itself.
     published: ClassVar[bool] = False
+    #: The field with the height of the first level, if that does not follow from the frame's.
+    _level_height: ClassVar[str] = ""
     #: Whether `glow` is what has passed the threshold; other methods apply it in a later pass.
     _has_threshold_pass: ClassVar[bool] = True
 
@@ -279,24 +280,18 @@ def check_shading(shading: str) -> Shading:
     return shading
 
 
-@functools.cache
-def _defaults(method: str) -> Settings:
-    # Always the same object, since a renderer keeps the plan of the last one.
-    settings: Settings = METHODS[method]()
-    return settings
-
-
 def check_settings(
     settings: Settings | str | None, name: str = "settings", *, of_image: bool = False
 ) -> Settings:
     """Return the settings, or those of a preset; raise TypeError for what is neither.
 
-    None: the preset "tutorial", or with `of_image` "bevy_natural".
+    None: those that scenes start from, or images with `of_image`.
     """
     if isinstance(settings, Settings):
         return settings
     if settings is None:
-        return _defaults("bevy" if of_image else "separable")
+        # Always the same object, since a renderer keeps the plan of the last one.
+        return presets[presets.start("images" if of_image else "scenes")]
     if not isinstance(settings, str):
         raise TypeError(f"{name}: {settings!r} is not a Settings{_hint(settings)}")
     if settings in presets:

@@ -41,7 +41,7 @@ def light(bloom: Array, intensity: float, images: Sequence[Array], glare: Sequen
     for image, stage in zip(images, _lights(glare), strict=True):
         total = total + stage.intensity * sample(image, (width, height))
     for stage in glare:
-        if stage.stage == "dirt":
+        if not stage._adds_light:
             dirt = np.atleast_3d(stage.pixels.astype(np.float64))
             dirt = np.broadcast_to(dirt, (*dirt.shape[:2], 3))
             dirt = np.concatenate([dirt, dirt.mean(axis=2, keepdims=True)], axis=2)[..., :channels]
@@ -52,7 +52,7 @@ def light(bloom: Array, intensity: float, images: Sequence[Array], glare: Sequen
 
 def _lights(glare: Sequence[Any]) -> list[Any]:
     """Return the stages that add light: all but dirt."""
-    return [stage for stage in glare if stage.stage != "dirt"]
+    return [stage for stage in glare if stage._adds_light]
 
 
 def _above(image: Array, threshold: float) -> Array:
