@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
+import os
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -160,13 +164,16 @@ def test_a_file_that_is_read_needs_overwrite(tmp_path: Path) -> None:
     assert file.read_bytes() != before
 
 
-def test_no_picture_is_written_to_a_terminal(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("vkbloom._cli.sequences.is_terminal", lambda: True)
-    refused = run(picture(tmp_path / "a.png"), "-")
-    assert (refused.exit_code, refused.stdout) == (2, "")
-    assert "standard output is a terminal" in refused.stderr
+def test_no_picture_is_written_to_a_terminal(tmp_path: Path) -> None:
+    pty = pytest.importorskip("pty")
+    screen, terminal = pty.openpty()
+    words = [sys.executable, "-m", "vkbloom", "apply", picture(tmp_path / "a.png"), "-"]
+    refused = subprocess.run(words, stdout=terminal, stderr=subprocess.PIPE, check=False)
+    os.close(terminal)
+    with os.fdopen(screen, "rb") as shown, contextlib.suppress(OSError):
+        assert shown.read() == b""
+    assert refused.returncode == 2
+    assert b"standard output is a terminal" in refused.stderr
 
 
 def test_folders_are_made_for_one_picture_and_checked_before(tmp_path: Path) -> None:

@@ -208,10 +208,7 @@ class TestWholeSettings:
 
 
 class TestMemory:
-    def test_grid_larger_than_memory_is_refused(
-        self, filled: Call, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
-        monkeypatch.setattr(Renderer, "_run_requests", None)
+    def test_grid_larger_than_memory_is_refused(self, filled: Call) -> None:
         image = np.zeros((1000, 1000, 4), np.float32)
         axes = {"exposure": np.linspace(-1, 1, 1000), "intensity": np.linspace(0, 1, 1000)}
         message = r"1000000 points with final needs 16,000.0 GB .* grid, .* framebuffers=\(\)"
@@ -265,12 +262,19 @@ class TestRefusals:
         assert_refused(call, error, {**public, **own})
 
     def test_shapes_are_compared_before_anything_is_rendered(
-        self, filled: Call, image: Any, monkeypatch: pytest.MonkeyPatch
+        self, filled: Call, image: Any
     ) -> None:
-        for name in ("apply", "_run_requests"):
-            monkeypatch.setattr(Renderer, name, None)
+        def reached(frames: Frames) -> float:
+            pytest.fail("frames were rendered")
+
         with pytest.raises(ValueError, match="bloom changes its shape or dtype along format"):
-            filled(image, Separable(), {"format": ["rgba8unorm", None]}, framebuffers=["bloom"])
+            filled(
+                image,
+                Separable(),
+                {"format": ["rgba8unorm", None]},
+                framebuffers=["bloom"],
+                reduce={"mean": reached},
+            )
 
     def test_an_error_on_the_way_leaves_the_renderer_usable(
         self, renderer: Renderer, filled: Call, image: Any
