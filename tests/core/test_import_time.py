@@ -3,32 +3,21 @@ first use of a renderer loads only those that a program needs to render one fram
 
 from __future__ import annotations
 
+import pkgutil
+from importlib.util import find_spec
+
 import pytest
 
 import vkbloom
 from tests.processes import output
 
+#: The packages that a program needs to render one frame. Every other one is loaded later.
+NEEDED = {"_glare", "_methods", "_presets", "_renderer", "_settings"}
+#: Packages of which it needs these modules alone.
+FEW = {"_glare": set(), "_methods": {"mip_chain"}, "_presets": set()}
 # NumPy loads some of the standard library itself, differently by version.
-LATE = (
-    "vkbloom._cli",
-    "vkbloom._doctor",
-    "vkbloom._explorer",
-    "vkbloom._glare.dirt",
-    "vkbloom._glare.flares",
-    "vkbloom._glare.streaks",
-    "vkbloom._grid",
-    "vkbloom._io",
-    "vkbloom._methods.bevy",
-    "vkbloom._methods.convolution",
-    "vkbloom._methods.pygfx",
-    "vkbloom._presets.named_glares",
-    "vkbloom._presets.named_settings",
-    "vkbloom.plans",
-    "vkbloom.psf",
-    "vkbloom.reference",
-    "vkbloom._scene",
-    "vkbloom.testing",
-    "vkbloom._views",
+LATE = {
+    "vkbloom._renderer.plans",
     "hashlib",
     "html",
     "importlib.metadata",
@@ -36,7 +25,7 @@ LATE = (
     "pathlib",
     "shutil",
     "tempfile",
-)
+}
 
 
 def loaded(code: str) -> set[str]:
@@ -49,13 +38,20 @@ def test_the_import_loads_what_is_needed() -> None:
     assert not late & loaded("import vkbloom._cli")
     code = "import vkbloom; vkbloom.Renderer, vkbloom.Pyramid"
     added = loaded(code) - loaded("import numpy, numpy.typing, dataclasses")
-    assert "vkbloom._renderer.renderer" in added
-    assert sorted(added & set(LATE)) == []
+    names = [name.split(".")[1:] for name in added if name.startswith("vkbloom.")]
+    packages = {module.name for module in pkgutil.iter_modules(vkbloom.__path__) if module.ispkg}
+    assert packages & {parts[0] for parts in names} == NEEDED
+    for package, modules in FEW.items():
+        assert {parts[1] for parts in names if parts[0] == package and parts[1:]} == modules
+    # A module that is gone would never be loaded.
+    assert [name for name in LATE if find_spec(name) is None] == []
+    assert sorted(added & LATE) == []
 
 
 @pytest.mark.parametrize("name", [*vkbloom.__all__, "__version__"])
 def test_every_public_name_is_there_after_the_import(name: str) -> None:
-    assert getattr(vkbloom, name) is not None
+    found = getattr(vkbloom, name)
+    assert getattr(found, "__name__", name).rpartition(".")[2] == name
 
 
 def test_late_modules_are_there_at_the_first_use() -> None:
