@@ -80,7 +80,10 @@ def test_frames_record_the_hash_of_the_packages_driver(monkeypatch: pytest.Monke
 
 def test_system_leaves_it_out(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("VKBLOOM_DRIVER", "system")
-    assert not any(adapter.bundled for adapter in adapters())
+    found = adapters()
+    if not found:
+        pytest.skip("the system has no driver")
+    assert not any(adapter.bundled for adapter in found)
 
 
 def test_a_manifest_names_its_library(

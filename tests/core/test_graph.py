@@ -51,6 +51,8 @@ def test_no_image_fills_a_slot_of_another_one() -> None:
 def test_slots_have_names() -> None:
     files = [*(ROOT / "csrc").rglob("*.c"), *(ROOT / "shaders").rglob("*.comp")]
     found = re.compile(r"\breads\[\d|read_shapes\[\d|READ_IMAGE\(\d")
+    assert all(map(found.search, ("reads[1]", "read_shapes[0]", "READ_IMAGE(2)")))
+    assert {"filter.c", "fft.comp"} <= {file.name for file in files}
     assert [file.name for file in files if found.search(file.read_text())] == []
 
 

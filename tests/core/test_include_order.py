@@ -108,20 +108,32 @@ def test_a_bar_separates_folders_of_a_line() -> None:
 
 
 @pytest.mark.parametrize(
-    ("pattern", "reason"),
+    ("pattern", "planted", "reason"),
     [
-        (r"\bVKB_METHOD_(?!COUNT|ENUM|FUNCTION)[A-Z_]+\b", "a member of the method's row says it"),
-        (r"\bPyImport_\w+", "the package gives the core what it needs (connect)"),
+        (
+            r"\bVKB_METHOD_(?!COUNT|ENUM|FUNCTION)[A-Z_]+\b",
+            "VKB_METHOD_KINO",
+            "a member of the method's row says it",
+        ),
+        (
+            r"\bPyImport_\w+",
+            "PyImport_ImportModule",
+            "the package gives the core what it needs (connect)",
+        ),
     ],
 )
-def test_no_file_names(pattern: str, reason: str) -> None:
+def test_no_file_names(pattern: str, planted: str, reason: str) -> None:
+    assert re.findall(pattern, f"if ({planted}(one))") == [planted]
     found = {file.name: re.findall(pattern, file.read_text("utf-8")) for file in FILES}
     assert {name: names for name, names in found.items() if names} == {}, reason
 
 
 def test_headers_do_not_include_each_other_in_a_circle() -> None:
     found = {str(file.relative_to(CORE)): file.read_text("utf-8") for file in CORE.glob("*/*.h")}
-    order_of({name: set(re.findall(r'#include "(.+)"', text)) for name, text in found.items()})
+    order = order_of(
+        {name: set(re.findall(r'#include "(.+)"', text)) for name, text in found.items()}
+    )
+    assert order.index("vulkan/error.h") < order.index("vulkan/memory.h")
 
 
 def test_files_use_what_the_map_allows_and_not_in_a_circle() -> None:
