@@ -1,4 +1,4 @@
-"""Dtypes of images, their formats, and the largest numbers of floats; curves of encoded colours."""
+"""Dtypes of images, their formats, the largest floats; curves and luminance of colours."""
 
 from __future__ import annotations
 
@@ -20,3 +20,8 @@ MAX_FLOAT: Final = (2 - 2**-23) * 2.0**127
 
 #: Curves that encode colours.
 Curve = Literal["gamma22", "srgb", "pq", "hlg"]
+
+#: Red, green and blue of the luminance of Rec. ITU-R BT.709, with four digits, and with the seven
+#: that Unity and three.js have.
+LUMINANCE: Final = (0.2126, 0.7152, 0.0722)
+LUMINANCE_7_DIGITS: Final = (0.2126729, 0.7151522, 0.0721750)

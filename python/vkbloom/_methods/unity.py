@@ -6,7 +6,7 @@ import dataclasses
 import math
 from typing import Any, ClassVar, Literal
 
-from vkbloom._formats import MAX_HALF
+from vkbloom._formats import LUMINANCE_7_DIGITS, MAX_HALF
 from vkbloom._public import public
 from vkbloom._settings.fields import (
     choice_field,
@@ -101,7 +101,7 @@ class UrpBloom(PublishedSettings):
     def _core_values(self) -> dict[str, Any]:
         """Return what the core names or counts otherwise."""
         colour = [_linear(channel) for channel in self.tint]
-        grey = sum(map(math.prod, zip(colour, (0.2126729, 0.7151522, 0.0721750), strict=True)))
+        grey = sum(map(math.prod, zip(colour, LUMINANCE_7_DIGITS, strict=True)))
         return {
             "quarter": self.downscale == "quarter",
             "high_quality_filtering": self.high_quality,

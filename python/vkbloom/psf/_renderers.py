@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vkbloom._array_cache import kept
-from vkbloom._formats import MAX_FLOAT
+from vkbloom._formats import LUMINANCE, MAX_FLOAT
 from vkbloom._public import public
 from vkbloom._settings.fields import number_field, numbers_field, value_field
 from vkbloom.psf._base import PSF, Array, centred, in_grey
@@ -165,6 +165,6 @@ def _point(image: Array, center: tuple[float, float] | None) -> tuple[int, int]:
             min(height - 1, math.floor(center[1] * height)),
             min(width - 1, math.floor(center[0] * width)),
         )
-    brightness = image @ np.array([0.2126, 0.7152, 0.0722])
+    brightness = image @ np.array(LUMINANCE)
     row, column = np.unravel_index(int(np.argmax(brightness)), (height, width))
     return int(row), int(column)

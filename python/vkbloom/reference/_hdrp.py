@@ -14,6 +14,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from vkbloom._formats import LUMINANCE_7_DIGITS
+
 from ._image import BlurInput, Storage
 from ._sampling import Array, read_rows, sample, size_of, weighted_mean
 from ._tape import contiguous
@@ -25,7 +27,7 @@ if TYPE_CHECKING:
 
 # (x, y) in texels of the frame.
 _PREFILTER_TAPS = ((0.0, 0.0), (0.9, -0.4), (-0.9, 0.4), (0.4, 0.9), (-0.4, -0.9))
-_LUMINANCE = np.array([0.2126729, 0.7151522, 0.0721750])
+_LUMINANCE = np.array(LUMINANCE_7_DIGITS)
 _RADIUS = 4
 _KERNEL = [math.comb(2 * _RADIUS, i) / 4**_RADIUS for i in range(2 * _RADIUS + 1)]
 

@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from vkbloom._formats import LUMINANCE, LUMINANCE_7_DIGITS
+
 from ._image import BlurInput
 from ._sampling import Array, halved, sample, scaled, size_of
 from ._threshold import luminance, masked, smooth_step, with_alpha
@@ -22,8 +24,8 @@ if TYPE_CHECKING:
 
 _TAP_COUNTS = (6, 10, 14, 18, 22)
 _FACTORS = (1.0, 0.8, 0.6, 0.4, 0.2)
-_LUMINANCE = np.array([0.2126729, 0.7151522, 0.0721750])
-_NODES_LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+_LUMINANCE = np.array(LUMINANCE_7_DIGITS)
+_NODES_LUMINANCE = np.array(LUMINANCE)
 
 
 def passes(source: BlurInput, settings: ThreeBloom) -> dict[str, Array]:

@@ -6,11 +6,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from vkbloom._formats import LUMINANCE
+
 from ._sampling import Array, sample, size_of
 from ._tape import joined
 
 # Rec. 709 luma coefficients of linear rgb.
-_LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+_LUMINANCE = np.array(LUMINANCE)
 
 
 def luminance(rgb: Array, coefficients: Array = _LUMINANCE) -> Array:

@@ -15,6 +15,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from vkbloom._formats import LUMINANCE_7_DIGITS
+
 from . import _dual_kawase as dual_kawase
 from ._image import BlurInput
 from ._post_processing import linear_light
@@ -106,7 +108,7 @@ def _first_size(size: tuple[int, int], settings: UrpBloom) -> tuple[int, int]:
 def _tint(settings: UrpBloom) -> Any:
     """Return the light of the tint, divided by its luminance."""
     colour = [linear_light(channel) for channel in settings.tint]
-    grey = sum(map(operator.mul, colour, (0.2126729, 0.7151522, 0.0721750)))
+    grey = sum(map(operator.mul, colour, LUMINANCE_7_DIGITS))
     ones = np.ones(1)
     return np.concatenate([channel / grey * ones if grey else ones for channel in colour])
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from vkbloom._argument_types import checked
 from vkbloom._arrays import plain_array
 from vkbloom._extras import import_extra
+from vkbloom._formats import LUMINANCE
 from vkbloom._io.srgb import decode_srgb, encode_srgb
 from vkbloom._numbers import check_number
 from vkbloom._public import public
@@ -28,7 +29,7 @@ _RED_CHANGE: Final = 20 / 320
 _FLASHES: Final = 3
 _FIELD: Final = 10.0
 _SHARE: Final = 0.25
-_LUMINANCE: Final = np.array([0.2126, 0.7152, 0.0722])
+_LUMINANCE: Final = np.array(LUMINANCE)
 # The longer side of the pictures that are judged, in pixels: a field has about this many.
 _FIELD_PIXELS: Final = 32
 # Allowance for roundings of a difference that is exactly the limit.
