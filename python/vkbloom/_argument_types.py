@@ -84,7 +84,7 @@ def _builtin_kind_of(annotation: Any) -> _Kind | None:
     if origin in (Sequence, Iterable):
         item = _scalar_kind_of(parts[0])
         return None if item is None else _sequence(item)
-    if origin is Mapping:
+    if origin is Mapping and parts[0] is str:
         is_known = parts[1] is Any or _scalar_kind_of(parts[1]) is not None
         return _Kind("a mapping by str", "", _is_mapping) if is_known else None
     if annotation == tuple[int, int]:

@@ -122,7 +122,7 @@ def translate(
     *,
     size: tuple[int, int] = (640, 360),
     renderer: Renderer | None = None,
-    vary: Sequence[str] | None = None,
+    vary: str | Sequence[str] | None = None,
     loss: Loss = "log",
     bounds: Bounds | None = None,
     max_calls: int = 300,
@@ -147,7 +147,7 @@ def translate(
         by shares of the frame at every size but this.
     renderer : Renderer, optional
         Default: `default_renderer`.
-    vary : sequence of str, optional
+    vary : str or sequence of str, optional
         The fields of `to` to find. Default: those that set width and strength of its blur, its
         intensity, and its threshold where it has one.
     loss, bounds, max_calls, progress
