@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 import vkbloom
 from vkbloom._io.srgb import encode_srgb
-from vkbloom.testing._law_table import LAWS
+from vkbloom.testing._laws.table import LAWS
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from tests.plugin.faults import FAULTS, Bloom, Image
@@ -35,6 +35,23 @@ def lights(size: tuple[int, int] = (64, 48)) -> Image:
     return image
 
 
+def image_for(law: str, words: str) -> Image:
+    """Return an image whose bloom shows whether a law holds."""
+    if law == "round":
+        point = np.zeros((48, 64, 3), np.float32)
+        point[24, 32] = 1.0
+        return point
+    if law == "jitter":
+        thin = np.zeros((48, 64, 3), np.float32)
+        thin[23:25, 8:56:5] = 3.0
+        return thin
+    is_odd = law == "sizes" or "last pixel" in words
+    image = lights((61, 45) if is_odd else (64, 48))
+    if law == "finite":
+        image[24, 32] = np.nan if "nan" in words else np.inf
+    return image * (200 if law in ("unclamped", "bounded_fireflies") else 1)
+
+
 def drawn(bloom: Bloom, law: str, words: str) -> Image:
     """Return what a bloom makes of an image that shows whether the law holds."""
     if law == "views":
@@ -51,20 +68,11 @@ def drawn(bloom: Bloom, law: str, words: str) -> Image:
         return found[..., :3] + (1 - found[..., 3:]) * BACKDROP
     if law == "history":
         bloom(np.roll(lights(), -16, axis=1))
-        return bloom(lights())
-    if law == "jitter":
-        thin = np.zeros((48, 64, 3), np.float32)
-        thin[23:25, 8:56:5] = 3.0
-        return bloom(thin)
-    if law == "round":
-        point = np.zeros((48, 64, 3), np.float32)
-        point[24, 32] = 1.0
-        return bloom(point)
-    if "image before" in words or "bright image" in words:
+    elif "image before" in words or "bright image" in words:
         bloom(np.full((80, 96, 3), 6.0, np.float32))
         bloom(np.full((48, 64, 3), 6.0, np.float32))
-    is_odd = law == "sizes" or "last pixel" in words
-    return bloom(lights((61, 45) if is_odd else (64, 48)))
+    # What is not finite is shown white.
+    return np.nan_to_num(bloom(image_for(law, words)), nan=6.0, posinf=6.0)
 
 
 def tile(image: Image, brightest: float) -> NDArray[np.uint8]:
@@ -86,7 +94,7 @@ def write(folder: Path) -> None:
     for law in LAWS:
         faults = {name: fault for name, fault in FAULTS.items() if fault.law == law}
         if faults:
-            text += [f"## `{law}`\n", f"{LAWS[law].formula[0].upper()}{LAWS[law].formula[1:]}.\n"]
+            text += [f"## `{law}`\n", f"{LAWS[law].sentence}\n"]
         for name, fault in faults.items():
             right, wrong = (drawn(make(), law, fault.words) for make in (fault.twin, fault.fault))
             off: Any = np.abs(wrong.astype(np.float64) - right)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import argparse
 import dataclasses
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -140,48 +140,27 @@ def pygfx(adapter: str) -> Iterator[Subject]:
     )
 
 
-Law = Callable[[Subject], None]
+#: The laws of the columns.
+LAWS = (
+    "superposition",
+    "gain",
+    "symmetric",
+    "transposed",
+    "centroid_kept",
+    "separable",
+    "no_ringing",
+    "bounded_fireflies",
+    "additive",
+)
+#: Those of the bloom alone.
+OF_A_BLOOM = {"centroid_kept", "separable", "bounded_fireflies"}
 
 
-def laws() -> dict[str, Law]:
-    """Return the laws by column; a law that does not apply raises LookupError."""
-
-    def of_the_bloom(law: Callable[[Bloom, Probe], None]) -> Law:
-        def check(subject: Subject) -> None:
-            if subject.picture:
-                raise LookupError("of the bloom alone")
-            law(subject.bloom, subject.probe)
-
-        return check
-
-    def gain(subject: Subject) -> None:
-        if subject.gain is None:
-            raise LookupError("none promised")
-        testing.assert_gain(subject.bloom, subject.gain, subject.probe)
-
-    def additive(subject: Subject) -> None:
-        if not subject.picture:
-            raise LookupError("of a picture with its bloom")
-        testing.assert_additive(subject.bloom, probe=subject.probe)
-
-    return {
-        "superposition": lambda s: testing.assert_superposition(s.bloom, s.probe),
-        "gain": gain,
-        "mirrored": lambda s: testing.assert_symmetric(s.bloom, s.probe),
-        "transposed": lambda s: testing.assert_symmetric(s.bloom, s.probe, axes=("xy",)),
-        "centroid kept": of_the_bloom(testing.assert_centroid_kept),
-        "separable": of_the_bloom(testing.assert_separable),
-        "no ringing": lambda s: testing.assert_no_ringing(s.bloom, s.probe),
-        "bounded fireflies": of_the_bloom(fireflies),
-        "additive": additive,
-    }
-
-
-def fireflies(bloom: Bloom, probe: Probe) -> None:
-    """Try all positions that differ in a chain of two halvings."""
-    if probe.dtype.kind == "u":
-        raise LookupError("nothing is brighter than 1")
-    testing.assert_bounded_fireflies(bloom, probe=probe, period=4)
+def applies(law: str, subject: Subject) -> bool:
+    """Return whether a law is one of the subject: of a picture, or of the bloom alone."""
+    if law == "gain":
+        return subject.gain is not None
+    return law != "additive" if not subject.picture else law not in OF_A_BLOOM
 
 
 def measured(subject: Subject) -> str:
@@ -200,20 +179,17 @@ def measured(subject: Subject) -> str:
 
 def table(subjects: list[Subject], device: str) -> str:
     """Return the table: what each blur breaks, and by how much."""
-    columns = laws()
     rows = []
     for subject in subjects:
-        broken, untested = [], []
-        for name, law in columns.items():
-            try:
-                law(subject)
-            except LookupError:
-                untested.append(name)
-            except AssertionError as error:
-                figure = str(error).split("\n  law: ")[0].partition(": ")[2]
-                broken.append(f"{name}: {re.split(' at x|, channel', figure)[0]}")
-            except ValueError as error:
-                untested.append(f"{name} ({error})")
+        chosen = [law for law in LAWS if applies(law, subject)]
+        report = testing.report(subject.bloom, laws=chosen, gain=subject.gain, probe=subject.probe)
+        broken, untested = [], [law for law in LAWS if law not in chosen]
+        for row in report.rows:
+            figure = row.message.split("\n  law: ")[0]
+            if row.held is False:
+                broken.append(f"{row.name}: {re.split(' at x|, channel', figure)[0]}")
+            elif row.held is None:
+                untested.append(f"{row.name} ({row.message})")
         point = "" if subject.picture else measured(subject)
         rows.append(f"| {subject.name} | {point} | {'; '.join(broken)} | {', '.join(untested)} |")
     heads = ["| blur | one lit pixel | breaks | not tested |", "|---|---|---|---|"]

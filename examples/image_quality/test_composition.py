@@ -33,8 +33,9 @@ def test_final_is_picture_plus_bloom(
 @pytest.mark.parametrize("name", ADDITIVE)
 def test_no_pixel_becomes_darker(bloom_renderer: vkbloom.Renderer, name: str) -> None:
     """The law behind it, on noise of up to 8 times white."""
-    testing.assert_additive(
+    testing.assert_laws(
         lambda image: bloom_renderer.apply(image, ADDITIVE[name])["final"],
+        "additive",
         probe=testing.Probe(value=8.0),
     )
 
@@ -50,8 +51,8 @@ def test_without_bloom_the_picture_stays(
 
 def test_the_light_of_two_lamps_adds_up(bloom_renderer: vkbloom.Renderer) -> None:
     """Without a threshold, the bloom of a sum is the sum of the blooms."""
-    testing.assert_superposition(
-        lambda image: bloom_renderer.apply(image, vkbloom.Pyramid())["bloom"]
+    testing.assert_laws(
+        lambda image: bloom_renderer.apply(image, vkbloom.Pyramid())["bloom"], "superposition"
     )
 
 
@@ -59,4 +60,4 @@ def test_a_mix_is_not_additive(bloom_renderer: vkbloom.Renderer) -> None:
     """It takes from bright pixels what it gives to others: an average, not added light."""
     mix = vkbloom.Pyramid(composite="mix", intensity=0.3)
     with pytest.raises(AssertionError, match="light is added, and none is removed"):
-        testing.assert_additive(lambda image: bloom_renderer.apply(image, mix)["final"])
+        testing.assert_laws(lambda image: bloom_renderer.apply(image, mix)["final"], "additive")

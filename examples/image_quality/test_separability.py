@@ -66,11 +66,11 @@ def test_the_point_spread_is_a_row_times_a_column(bloom_renderer: vkbloom.Render
     def blur(image: NDArray[np.float32]) -> NDArray[np.float32]:
         return bloom_renderer.apply(image, gaussian_blur(2.5))["bloom"]
 
-    testing.assert_separable(blur)
+    testing.assert_laws(blur, "separable")
 
 
 def test_a_sum_of_two_blurs_is_not_separable(bloom_renderer: vkbloom.Renderer) -> None:
     """A core and a halo are two layers: no row times a column makes both."""
     halo = gaussian_blur(1.0).replace(layers=((1, 0.5), (4, 0.5)))
     with pytest.raises(AssertionError, match="a row times a column"):
-        testing.assert_separable(lambda image: bloom_renderer.apply(image, halo)["bloom"])
+        testing.assert_laws(lambda image: bloom_renderer.apply(image, halo)["bloom"], "separable")

@@ -168,7 +168,7 @@ def wrong_arguments(function: Callable[..., Any]) -> Iterator[tuple[str, Any]]:
     """Yield pairs of a parameter and a value of a wrong type: one of each type, with another value
     of the type for the next parameter."""
     for place, (name, parameter) in enumerate(inspect.signature(function).parameters.items()):
-        if parameter.kind is parameter.VAR_KEYWORD:
+        if parameter.kind in (parameter.VAR_POSITIONAL, parameter.VAR_KEYWORD):
             continue
         types = accepted(str(parameter.annotation))
         if types is not None:
@@ -203,7 +203,8 @@ def needed(function: Callable[..., Any]) -> dict[str, Any]:
     return {
         name: values[name]
         for name, parameter in parameters
-        if parameter.default is parameter.empty and parameter.kind is not parameter.VAR_KEYWORD
+        if parameter.default is parameter.empty
+        and parameter.kind not in (parameter.VAR_POSITIONAL, parameter.VAR_KEYWORD)
     }
 
 

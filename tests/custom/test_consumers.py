@@ -159,7 +159,7 @@ def test_laws_and_figures(renderer: Renderer, kind: Any) -> None:
         return renderer.apply(image, settings)["bloom"]
 
     testing.report(bloom, size=(48, 48)).assert_held("superposition", "gain", "symmetric")
-    testing.assert_stable(bloom, texel=2, steps=2, probe=testing.Probe(size=(48, 48)))
+    testing.assert_laws(bloom, "stability", size=(48, 48))
     assert testing.diagnose(bloom(photo()), bloom(2 * photo())).cause == "gain"
 
 

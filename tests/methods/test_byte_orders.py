@@ -108,8 +108,10 @@ CALLS: dict[str, Call] = {
     "skybox": lambda r, array, given: load_sky(_cube(given)).levels[0],
     "flash": lambda r, array, given: testing.flash([array, given, array], 3, degrees=20).general,
     "diagnose": lambda r, array, given: str(testing.diagnose(given, array)),
-    "probe": lambda r, array, given: testing.assert_superposition(
-        lambda image: image.view(image.dtype.newbyteorder(given.dtype.byteorder))
+    "probe": lambda r, array, given: testing.assert_laws(
+        lambda image: image.view(image.dtype.newbyteorder(given.dtype.byteorder)),
+        "superposition",
+        size=(16, 16),
     ),
     "memoryview": lambda r, array, given: r.apply(memoryview(given), SETTINGS)["final"],
 }

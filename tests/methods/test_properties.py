@@ -77,9 +77,8 @@ def test_linear_blurs_obey_the_laws_of_filters(
         return bloom_of(renderer, image, METHODS[method])
 
     probe = Probe(size=size, dtype=dtype, seed=seed, rtol=ERRORS[dtype])
-    testing.assert_superposition(bloom, probe)
-    testing.assert_gain(bloom, reference.gain(METHODS[method]), probe)
-    testing.assert_no_ringing(bloom, probe)
+    gain = reference.gain(METHODS[method])
+    testing.assert_laws(bloom, "superposition", "gain", "no_ringing", gain=gain, probe=probe)
 
 
 # --- Exact laws ---

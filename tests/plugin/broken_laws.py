@@ -1,19 +1,22 @@
-"""What the tests of laws expect of an assertion that fails."""
+"""What the tests of laws expect of a law that is broken."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import pytest
 
+from vkbloom import testing
+from vkbloom.testing._probe import Bloom
 
-def fails(assertion: Callable[..., None], *arguments: Any, **options: Any) -> str:
-    """Check the parts of a message (figure, position and law), and return it."""
+
+def fails(bloom: Bloom, law: str, **options: Any) -> str:
+    """Check the parts of a message (law, figure, position and reason), and return it."""
     with pytest.raises(AssertionError) as caught:
-        assertion(*arguments, **options)
+        testing.assert_laws(bloom, law, **options)
     message = str(caught.value)
-    first, law = message.split("\n  law: ")
+    first, words = message.split("\n  law: ")
+    assert first.startswith(f"{law}: ")
     assert "allowed" in first
-    assert law
+    assert "\n  why: " in words
     return message

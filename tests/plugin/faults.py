@@ -1,4 +1,4 @@
-"""Faults of blooms that people have reported, each with a correct twin and the law it breaks."""
+"""Faults of blooms that people have reported, each with a correct bloom and the law it breaks."""
 
 from __future__ import annotations
 
@@ -14,12 +14,17 @@ Bloom = Callable[..., Image]
 
 
 class Fault(NamedTuple):
-    """Functions that make the bloom: some keep a state."""
+    """A bloom with a fault, and the law that names it, in words.
+
+    - `fault`, `twin`: Make the blooms: some keep a state.
+    - `others`: Other laws that the fault breaks and the twin does not; None: they are not told.
+    """
 
     fault: Callable[[], Bloom]
     twin: Callable[[], Bloom]
     law: str
     words: str
+    others: frozenset[str] | None = None
 
 
 def gaussian(image: Image, sigma: float = 2.0, mode: str = "nearest") -> Image:
@@ -236,7 +241,136 @@ def a_frame_late() -> Bloom:
 
 _keeps = picture(lambda alpha, _: alpha, of_colours)
 
+
+def correlated(weights: list[list[float]]) -> Bloom:
+    """Return the correlation of a Gaussian with a kernel."""
+    taps = np.array(weights)[..., np.newaxis]
+    return lambda image: np.asarray(ndimage.correlate(gaussian(image), taps, mode="nearest"))
+
+
+def in_shares_of_the_height(image: Image) -> Image:
+    """Blur by a sixteenth of the height, which is rounded to a multiple of 16."""
+    return gaussian(image, float(round(image.shape[0] / 16)))
+
+
+def at_finite(image: Image) -> Image:
+    """Blur after NaN and infinity were replaced."""
+    return gaussian(np.nan_to_num(image, posinf=0, neginf=0))
+
+
+def thresholded(image: Image, above: float = 1.0) -> Image:
+    return gaussian(image * (image.max(axis=2, keepdims=True) > above))
+
+
+def with_wider_blue(image: Image) -> Image:
+    return np.dstack([gaussian(image[..., :2]), gaussian(image[..., 2:], 2.4)])
+
+
+def with_red_in_blue(image: Image) -> Image:
+    return gaussian(image @ np.array([[0.75, 0, 0.25], [0, 1, 0], [0, 0, 1]], image.dtype))
+
+
+def of_linear(fault: Bloom, law: str, words: str, *others: str, twin: Bloom = gaussian) -> Fault:
+    """Return a fault beside a Gaussian, with all laws that it breaks."""
+    return Fault(lambda: fault, lambda: twin, law, words, frozenset(others))
+
+
+#: Faults whose other broken laws are told, too.
+_LINEAR: dict[str, Fault] = {
+    "gain 0.97": of_linear(lambda a: 0.97 * gaussian(a), "energy", "0.97 instead of 1"),
+    "gain 1.03": of_linear(lambda a: 1.03 * gaussian(a), "energy", "1.03 instead of 1"),
+    "half of the light is lost": of_linear(lambda a: 0.5 * gaussian(a), "energy", "0.5 instead"),
+    "channels are swapped": of_linear(
+        lambda a: gaussian(a)[..., ::-1], "colour", "0.25 instead of 1", "channels"
+    ),
+    "channels are rotated": of_linear(
+        lambda a: gaussian(a)[..., [1, 2, 0]], "channels", "instead of 0", "colour"
+    ),
+    "all is grey": of_linear(
+        lambda a: gaussian(a).mean(axis=2, keepdims=True).repeat(3, axis=2),
+        "colour",
+        "instead of 1 ",
+        "channels",
+    ),
+    "a fourth of red is in blue": of_linear(
+        with_red_in_blue, "channels", "channel 2: off by", "grey", "colour", "gain"
+    ),
+    "the input is clamped at 1": of_linear(
+        lambda a: gaussian(np.minimum(a, 1)), "unclamped", "1 instead of"
+    ),
+    "the output is clamped at 1": of_linear(
+        lambda a: np.minimum(gaussian(a), 1), "unclamped", "1 instead of"
+    ),
+    "the output is clamped at 100": of_linear(
+        lambda a: np.minimum(gaussian(a), 100), "unclamped", "100 instead of"
+    ),
+    "clamped above a threshold": of_linear(
+        lambda a: np.minimum(thresholded(a), 30), "unclamped", "30 instead of", twin=thresholded
+    ),
+    "NaN reaches others": of_linear(gaussian, "finite", "nan at x 32", twin=at_finite),
+    "infinity reaches others": of_linear(
+        lambda a: gaussian(np.where(np.isnan(a), 0, a)), "finite", "inf at x 32", twin=at_finite
+    ),
+    "one channel is wider": of_linear(with_wider_blue, "grey", "instead of"),
+    "reads every other pixel": of_linear(
+        every_other_pixel,
+        "stability",
+        "the energy of the bloom changes by",
+        *("symmetric", "gain", "no_ringing", "colour", "energy", "border", "sizes", "jitter"),
+        twin=wide,
+    ),
+    "a curve before the blur": of_linear(
+        lambda a: gaussian(np.maximum(a, 0) ** 1.1),
+        "superposition",
+        "B(a / 2 + b / 4)",
+        *("gain", "colour", "stability", "jitter"),
+    ),
+    "one side is brighter": of_linear(
+        correlated([[0.2, 0.5, 0.3]]),
+        "symmetric",
+        "left and right swapped",
+        *("transposed", "centroid_kept", "stability"),
+    ),
+    "half a texel off": of_linear(
+        correlated([[0.5, 0.5]]),
+        "centroid_kept",
+        "+0.5 pixels from x",
+        *("symmetric", "transposed", "stability"),
+    ),
+    "wider along rows": of_linear(
+        lambda a: ndimage.gaussian_filter(a, (2.0, 2.2, 0), mode="nearest"),
+        "transposed",
+        "rows and columns swapped",
+    ),
+    "a sum of two widths": of_linear(
+        lambda a: gaussian(a) / 2 + wide(a) / 2, "separable", "a row times a column"
+    ),
+    "rings beside an edge": of_linear(
+        lambda a: 2 * gaussian(a) - wide(a),
+        "no_ringing",
+        "a step along x",
+        *("separable", "border", "sizes"),
+    ),
+    "a firefly is not limited": of_linear(
+        gaussian,
+        "bounded_fireflies",
+        "brightens others by 1 at most",
+        twin=lambda a: gaussian(np.minimum(a, 8)),
+    ),
+    "takes light from bright pixels": of_linear(
+        lambda a: np.dstack([a[..., :3] / 2 + of_colours(a) / 2, a[..., 3:]]),
+        "additive",
+        "light is added, and none is removed",
+        twin=_keeps,
+    ),
+    "a width in pixels": of_linear(
+        gaussian, "resolution", "the radius of 50 %", twin=in_shares_of_the_height
+    ),
+}
+
+#: Each law but `reference` has a fault that breaks it.
 FAULTS: dict[str, Fault] = {
+    **_LINEAR,
     "wraps around": Fault(
         lambda: lambda a: gaussian(a, mode="wrap"),
         lambda: gaussian,

@@ -7,7 +7,7 @@ import pytest
 
 from tests.plugin.faults import FAULTS, Image
 from vkbloom import presets, reference, testing
-from vkbloom.testing._law_table import LAWS
+from vkbloom.testing._laws.table import LAWS
 
 #: Laws of these faults: linear blurs of a width in pixels break others on purpose.
 NEW = ("border", "views", "sizes", "round", "alpha", "jitter", "history")
@@ -16,7 +16,7 @@ SIZE = (64, 64)
 
 @pytest.mark.parametrize("name", FAULTS)
 def test_a_fault_breaks_its_law(name: str) -> None:
-    fault, twin, law, words = FAULTS[name]
+    fault, twin, law, words, _ = FAULTS[name]
     laws = sorted({*NEW, law})
     right = testing.report(twin(), size=SIZE, laws=laws)
     assert not [row.name for row in right.rows if row.applies and not row.held], right
@@ -44,8 +44,10 @@ def test_laws_share_images_and_render_few() -> None:
     assert len(images) <= 60
 
 
-def test_each_law_has_a_limit() -> None:
-    assert {name for name in NEW if not LAWS[name].limit} == set()
+def test_each_law_has_a_limit_and_a_fault() -> None:
+    """Without a reference beside it, no bloom breaks the law `reference` (custom/test_check)."""
+    assert [name for name, law in LAWS.items() if not law.limits] == []
+    assert {*LAWS} - {fault.law for fault in FAULTS.values()} == {"reference"}
 
 
 @pytest.mark.parametrize("law", ["border", "sizes"])
@@ -65,7 +67,8 @@ def test_light_that_leaves_a_small_image_is_not_judged(law: str) -> None:
 def test_a_threshold_of_an_average_is_no_fault_of_alpha() -> None:
     """Half of the size is averaged before the threshold, so that light and backdrop add up."""
     settings = presets["unity_ppv2"]
-    testing.assert_alpha(
+    testing.assert_laws(
         lambda image: reference.apply(image, settings)["final"],
-        testing.Probe(size=(64, 64), value=16.0),
+        "alpha",
+        probe=testing.Probe(size=(64, 64), value=16.0),
     )

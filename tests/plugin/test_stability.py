@@ -82,19 +82,12 @@ class TestStability:
         found = testing.stability(bloom, texel=1, probe=SMALL)
         assert (found.flicker > 0.1) == (sigma < 3)
         assert found.shimmer < 1e-5
-        testing.assert_stable(bloom, texel=1, probe=SMALL)
 
     def test_a_chain_is_stable(self) -> None:
-        testing.assert_stable(chain, texel=4, steps=4, probe=SMALL)
+        testing.assert_laws(chain, "stability", probe=SMALL)
 
     def test_an_upsample_half_a_texel_off(self) -> None:
-        message = fails(
-            testing.assert_stable,
-            lambda image: chain(image, off=0.5),
-            texel=4,
-            steps=2,
-            probe=SMALL,
-        )
+        message = fails(lambda image: chain(image, off=0.5), "stability", probe=SMALL)
         # Half a texel of the smaller level, two pixels, down and across.
         assert "the centroid of the bloom is 2.83 pixels from that of the image" in message
 
@@ -102,7 +95,7 @@ class TestStability:
         def nearest(image: Image) -> Image:
             return chain(image, lambda larger: larger[::2, ::2])
 
-        message = fails(testing.assert_stable, nearest, texel=4, steps=2, probe=SMALL)
+        message = fails(nearest, "stability", probe=SMALL)
         assert "the energy of the bloom changes by" in message
         assert testing.stability(nearest, texel=4, steps=2, probe=SMALL).ripple > 2
 
@@ -114,8 +107,8 @@ class TestStability:
         found = testing.stability(boxes, texel=2, steps=4, probe=SMALL)
         assert found.ripple < 1e-5
         assert 0.4 < found.jitter < 0.75
-        testing.assert_stable(boxes, texel=2, steps=4, jitter=0.75, probe=SMALL)
-        fails(testing.assert_stable, boxes, texel=2, steps=4, jitter=0.4, probe=SMALL)
+        for jitter, check in ((0.75, testing.assert_laws), (0.4, fails)):
+            check(boxes, "stability", limits={"stability": {"jitter": jitter}}, probe=SMALL)
 
     def test_a_pulse(self) -> None:
         """Of each limit: the radius and the peak with it, at constant energy and place."""
@@ -124,12 +117,17 @@ class TestStability:
             x = float(image.sum(axis=(0, 2)) @ np.arange(48)) / max(float(image.sum()), 1e-9)
             return gaussian(image, 2.0 if x < 23.5 else 2.2)
 
+        def within(**limits: float) -> dict[str, Any]:
+            return {"limits": {"stability": limits}, "probe": SMALL}
+
         # (A radius of 2.2 in place of 2, and the peak by the square of that.)
-        message = fails(testing.assert_stable, pulsing, texel=2, steps=4, probe=SMALL)
+        message = fails(pulsing, "stability", **within())
         assert "the peak of the bloom changes by" in message
-        message = fails(testing.assert_stable, pulsing, texel=2, flicker=1.0, probe=SMALL)
+        message = fails(pulsing, "stability", **within(shimmer=1.0))
         assert "the radius of the bloom changes by 0.09" in message
-        testing.assert_stable(pulsing, texel=2, steps=4, flicker=1.0, growth=0.1, probe=SMALL)
+        testing.assert_laws(pulsing, "stability", **within(shimmer=1.0, growth=0.1))
+        # A limit of infinity leaves a figure out.
+        testing.assert_laws(pulsing, "stability", **within(shimmer=math.inf, growth=math.inf))
 
     @pytest.mark.parametrize("dtype", ["uint8", "float16"])
     @pytest.mark.parametrize("channels", [None, 4])
@@ -164,7 +162,7 @@ class TestResolution:
         np.testing.assert_allclose(found.r50, 1.1774 * sigma, rtol=0.04)
         np.testing.assert_allclose(found.r90, 2.1460 * sigma, rtol=0.04)
         np.testing.assert_allclose(found.peak, (1 / 32) ** 2 / (2 * np.pi * sigma**2), rtol=0.04)
-        testing.assert_resolution_independent(bloom, (1, 1.5, 2), probe=SMALL)
+        testing.assert_laws(bloom, "resolution")
 
     def test_scenes_are_box_reductions_of_one_another(self) -> None:
         seen = []
@@ -180,18 +178,16 @@ class TestResolution:
         np.testing.assert_allclose(small.sum(), (0.13 * 48) ** 2, rtol=1e-5)
 
     def test_a_radius_in_pixels(self) -> None:
-        message = fails(testing.assert_resolution_independent, gaussian, (1, 2), probe=SMALL)
+        message = fails(gaussian, "resolution")
         assert "the radius of 50 % of the light" in message
-        assert "at 96 x 96" in message
+        assert "at 512 x 512" in message
 
     def test_a_peak_that_changes(self) -> None:
         def bloom(image: Image) -> Image:
             return np.asarray(gaussian(image, image.shape[0] / 16) * image.shape[0] / 48)
 
-        assert "the peak of the bloom" in fails(
-            testing.assert_resolution_independent, bloom, (1, 2), probe=SMALL
-        )
-        testing.assert_resolution_independent(bloom, (1, 2), peak=0.7, probe=SMALL)
+        assert "the peak of the bloom" in fails(bloom, "resolution")
+        testing.assert_laws(bloom, "resolution", limits={"resolution": {"peak": 2.0}})
 
 
 @pytest.mark.parametrize(("call", "error"), rows(__file__, "figures"))

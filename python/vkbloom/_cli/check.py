@@ -39,7 +39,7 @@ from vkbloom.testing import _comparing as comparing
 from vkbloom.testing import _measuring as measuring
 from vkbloom.testing import _showing as showing
 from vkbloom.testing._law_report import LawReport, law_report
-from vkbloom.testing._law_table import LAWS, law_name
+from vkbloom.testing._laws.table import find_law, merge_limits
 from vkbloom.testing._programs import Program
 from vkbloom.testing._subject import Subject
 
@@ -73,7 +73,7 @@ class CheckCommand(Command):
 
 def _laws(_: click.Context, __: click.Parameter, text: str) -> tuple[str, ...]:
     try:
-        return tuple(dict.fromkeys(law_name(name) for name in text.split(",") if name.strip()))
+        return tuple(dict.fromkeys(find_law(name) for name in text.split(",") if name.strip()))
     except ValueError as error:
         raise click.BadParameter(str(error)) from None
 
@@ -257,7 +257,7 @@ def _measured(
     for each, seconds in zip(opened, times, strict=True):
         try:
             report = law_report(
-                each.subject, LAWS, how["require"], functools.partial(each.show, bar)
+                each.subject, merge_limits({}), how["require"], functools.partial(each.show, bar)
             )
             each.law = "figures"
             about = {"name": each.name, "adapter": each.device, "size": how["size"]}

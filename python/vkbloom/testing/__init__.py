@@ -1,9 +1,8 @@
 """Tests of bloom: laws that every blur or bloom should obey, and comparisons with references.
 
-The laws need no reference picture. They take any callable that maps an image to an image. What
-measures one raises AssertionError if a law does not hold or a result is not finite, and TypeError
-or ValueError if the callable returns something else, an argument is out of range, or light reaches
-the border of an image that is too small.
+The laws need no reference picture. `report` and `assert_laws` test any callable that maps an image
+to an image. What measures one raises AssertionError if a result is not finite, and TypeError or
+ValueError if the callable returns something else or an argument is out of range.
 `FrameRegression` is the type of the pytest fixture `frame_regression`.
 """
 

@@ -48,11 +48,11 @@ def measuring() -> Iterator[list[Deviation]]:
 
 
 def is_within(law: str, off: float, allowed: float, name: str = "off") -> bool:
-    """Return whether a deviation is within its limit; NaN is not."""
+    """Return whether a deviation is within its limit; NaN is not, unless the limit is infinity."""
     result = _measured.get()
     if result is not None:
         result.append(Deviation(law, off, allowed, name))
-    return off <= allowed
+    return off <= allowed or math.isinf(allowed)
 
 
 @dataclass
@@ -109,28 +109,31 @@ def compare_with_law(
     law: str,
     actual: Image,
     expected: Image,
-    allowed: Error,
+    error: Error,
     *,
+    limit: float,
+    name: str = "off",
     note: str = "",
     seen: float = _SEEN,
 ) -> None:
     """Raise AssertionError with the deviation, its position and the law if a value is wrong.
 
-    Where values have few levels: ValueError if a deviation of the share `seen` of the largest
-    expected value is within the error of values.
+    `error` is that of values, beyond which the limit is allowed. Where values have few levels:
+    ValueError if a deviation of the share `seen` of the largest expected value is within the error.
     """
     difference = np.abs(actual - expected)
-    errors = np.broadcast_to(allowed, difference.shape)
+    errors = np.broadcast_to(error, difference.shape)
     position = np.unravel_index(int((difference - errors).argmax()), difference.shape)
     y, x, channel = map(int, position)
-    off, limit = float(difference[position]), float(errors[position])
+    off, allowed = float(difference[position]), float(errors[position]) + limit
     text = (
         f"{actual[position]:.6g} instead of {expected[position]:.6g} at x {x}, y {y}, channel "
-        f"{channel}: off by {off:.3g}, {limit:.3g} allowed{note}"
+        f"{channel}: off by {off:.3g}, {allowed:.3g} allowed{note}"
     )
-    judge(law, ("off", off, limit, text))
+    judge(law, (name, off, allowed, text))
     largest, coarsest = float(np.abs(expected).max()), float(errors.max())
-    if probe.levels is not None and not coarsest < seen * largest:
+    hides = not coarsest < seen * largest
+    if probe.levels is not None and hides and not math.isinf(limit):
         raise_coarse(
             probe,
             f"values up to {largest:.3g} have errors of {coarsest:.3g}, which hide a deviation of "

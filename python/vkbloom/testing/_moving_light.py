@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -13,14 +12,11 @@ from numpy.typing import NDArray
 from vkbloom._argument_types import checked
 from vkbloom._numbers import check_index, check_number
 from vkbloom._public import public
-from vkbloom.testing._deviations import fail, judge
-from vkbloom.testing._point_spread import border_share, check_inside
+from vkbloom.testing._point_spread import border_share
 from vkbloom.testing._probe import Bloom, Image, Probe, call
 
 __tracebackhide__ = True
 
-#: Limits of the figures of a moving light.
-LIMITS: Final = {"ripple": 0.02, "jitter": 0.1, "shimmer": 0.1, "growth": 0.05}
 # Side of the light in pixels.
 _LIGHT: Final = 0.5
 # A bloom with less than this share of the light of the brightest bloom has no centroid or radius.
@@ -167,70 +163,6 @@ def stability(
     )
 
 
-@public("vkbloom.testing")
-@checked
-def assert_stable(
-    bloom: Bloom,
-    *,
-    ripple: float = LIMITS["ripple"],
-    jitter: float = LIMITS["jitter"],
-    flicker: float = LIMITS["shimmer"],
-    growth: float = LIMITS["growth"],
-    texel: int = 8,
-    steps: float = 8,
-    probe: Probe | None = None,
-) -> None:
-    """Assert that the bloom of a small moving light neither flickers nor jumps.
-
-    The law: while a light smaller than a pixel moves over one texel of the coarsest level, the
-    bloom's energy, peak and radius change by no more than a share of their mean, and its centroid
-    is no further from that of the image than `jitter`.
-
-    Parameters
-    ----------
-    bloom : callable
-        As for `stability`.
-    ripple, flicker, growth : float
-        Allowed difference of the largest and the smallest energy, peak and radius, relative to
-        the mean. The peak is judged beside that of a convolution: `Stability.shimmer`.
-    jitter : float
-        Allowed distance of the centroids in pixels.
-    texel, steps, probe
-        As for `stability`. The image must be large enough that no light reaches the border.
-    """
-    limits = {"ripple": ripple, "jitter": jitter, "flicker": flicker, "growth": growth}
-    for name, limit in limits.items():
-        check_number(name, limit, 0.0, math.inf)
-    probe = probe or _wide(texel)
-    figures = stability(bloom, texel=texel, steps=steps, probe=probe)
-    check_stable(figures, {"shimmer" if n == "flicker" else n: v for n, v in limits.items()}, probe)
-
-
-def check_stable(figures: Stability, limits: Mapping[str, float], probe: Probe) -> None:
-    """Raise AssertionError if a figure is above its limit, ValueError if light is cut off."""
-    if not figures.energy.max() > 0:
-        text = f"the largest sum of the bloom is {figures.energy.max():.3g}: only sums above 0 are "
-        fail("the bloom of a light is not black", f"{text}allowed")
-    check_inside(figures.at_border, probe.size)
-    change = "changes by {:.3g} of its mean"
-    shown = {
-        "ripple": ("energy", figures.energy, change),
-        "jitter": (
-            *("centroid", np.hypot(figures.shift[..., 0], figures.shift[..., 1])),
-            "is {:.3g} pixels from that of the image",
-        ),
-        "shimmer": ("peak", figures.peak / figures.ideal, f"{change}, beside a convolution's"),
-        "growth": ("radius", figures.radius, change),
-    }
-    measured = []
-    for name, limit in limits.items():
-        (what, values, how), off = shown[name], getattr(figures, name)
-        text = f"the {what} of the bloom {how.format(off)}, {_extremes(figures, values)}"
-        measured.append((name, off, limit, f"{text}: {limit:.3g} allowed"))
-    law = "the bloom stays the same while a light smaller than a pixel moves"
-    judge(law, *measured)
-
-
 def area_sampled(
     size: tuple[int, int], centre: tuple[float, float], sides: tuple[float, float]
 ) -> Image:
@@ -306,13 +238,3 @@ def _variation(values: NDArray[np.float64]) -> float:
 def _largest(values: NDArray[np.float64]) -> float:
     known = values[np.isfinite(values)]
     return float(known.max()) if known.size else math.nan
-
-
-def _extremes(figures: Stability, values: NDArray[np.float64]) -> str:
-    """Return a text with the positions of the smallest and the largest value."""
-    parts = []
-    for index in (np.nanargmin(values), np.nanargmax(values)):
-        position = np.unravel_index(int(index), values.shape)
-        x, y = figures.positions[position]
-        parts.append(f"{values[position]:.4g} with the light at x {x:.4g}, y {y:.4g}")
-    return f"from {parts[0]} to {parts[1]}"

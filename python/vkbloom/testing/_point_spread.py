@@ -1,4 +1,4 @@
-"""The point spread of a blur or bloom, the laws of its shape, and its veiling glare."""
+"""The point spread of a blur or bloom, and its veiling glare."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from vkbloom._argument_types import checked
 from vkbloom._numbers import check_number, check_size
 from vkbloom._public import public
-from vkbloom.testing._deviations import Findings, compare_with_law, fail, judge
+from vkbloom.testing._deviations import fail
 from vkbloom.testing._probe import DEFAULT, Bloom, Error, Image, Probe
 
 __tracebackhide__ = True
@@ -56,97 +56,6 @@ def point_spread(
            [0.0625, 0.125 , 0.0625]])
     """
     return measured_spread(bloom, probe, at)[0]
-
-
-@public("vkbloom.testing")
-@checked
-def assert_separable(bloom: Bloom, probe: Probe = DEFAULT) -> None:
-    """Assert that the point spread is the product of a row and a column.
-
-    The law: h(x, y) h(x0, y0) = h(x, y0) h(x0, y), where (x0, y0) is the position of the largest
-    value. Equivalently, h as a matrix has rank 1, and its second singular value is 0 (Treitel and
-    Shanks, "The Design of Multistage Separable Planar Filters", IEEE Transactions on Geoscience
-    Electronics, 1971). A sum of separable layers is not separable.
-
-    Parameters
-    ----------
-    bloom : callable
-        Takes an image and returns the bloom alone, of the same height and width. The picture with
-        bloom is a sum of two layers and fails.
-    probe : Probe
-        `value` must be low enough that nothing is clamped.
-    """
-    spread, error = measured_spread(bloom, probe, side=probe.light_side)
-    _check_lit(spread, error)
-    product, allowed = np.empty_like(spread), np.empty_like(spread)
-    errors = np.broadcast_to(error, spread.shape)
-    shares = []
-    for channel in range(spread.shape[2]):
-        plane = spread[:, :, channel]
-        y, x = np.unravel_index(int(np.abs(plane).argmax()), plane.shape)
-        product[:, :, channel] = np.outer(plane[:, x], plane[y]) / plane[y, x]
-        # The law has four values. None is larger than the divisor.
-        off = errors[:, :, channel]
-        allowed[:, :, channel] = off + off[y, x] + np.add.outer(off[:, x], off[y])
-        singular = np.linalg.svd(plane, compute_uv=False)
-        shares.append(float(singular[1] / singular[0]) if len(singular) > 1 else 0.0)
-    law = "h(x, y) h(x0, y0) = h(x, y0) h(x0, y): the point spread is a row times a column"
-    note = f"; the second singular value is {100 * max(shares):.3g} % of the first"
-    compare_with_law(probe, law, spread, product, allowed, note=note)
-
-
-@public("vkbloom.testing")
-@checked
-def assert_centroid_kept(
-    bloom: Bloom,
-    probe: Probe = DEFAULT,
-    *,
-    at: tuple[int, int] | None = None,
-    within: float = 0.01,
-) -> None:
-    """Assert that the light of a pixel is centred on that pixel.
-
-    The law: the centroid of the point spread, sum of h(x, y) (x, y) / sum of h, is the lit pixel.
-    A chain of halved images keeps the centroid only on average over all positions. Use a larger
-    `within` for such a method.
-
-    Parameters
-    ----------
-    bloom : callable
-        Takes an image and returns one of the same height and width.
-    probe : Probe
-        Its image must be large enough that no light reaches the border.
-    at : (int, int), optional
-        x and y of the lit pixel. Default: the middle of the image.
-    within : float
-        Allowed distance along each axis in pixels, in addition to the effect of the errors of
-        single values.
-    """
-    check_number("within", within, 0.0, math.inf)
-    spread, error = measured_spread(bloom, probe, at, side=probe.light_side)
-    _check_lit(spread, error)
-    check_inside(max(map(border_share, np.moveaxis(spread, 2, 0))), probe.size)
-    position, errors = at or probe.centre, np.broadcast_to(error, spread.shape)
-    findings = Findings("the centroid of the light of a pixel is that pixel", probe)
-    for channel in range(spread.shape[2]):
-        for axis, name in ((0, "x"), (1, "y")):
-            profile = spread[:, :, channel].sum(axis=axis)
-            distance = np.arange(len(profile), dtype=np.float64) - position[axis]
-            off = float((profile * distance).sum() / profile.sum())
-            plane = spread[:, :, channel], errors[:, :, channel]
-            uncertain = _moment_error(*plane, axis, distance)
-            allowed = within + uncertain
-            text = (
-                f"the centroid is {name} {position[axis] + off:.6g}, {off:+.3g} pixels from "
-                f"{name} {position[axis]}, channel {channel}: {allowed:.3g} allowed"
-            )
-            if probe.levels is None:
-                judge(findings.law, ("off", abs(off), allowed, text))
-            else:
-                findings.add([("off", abs(off), within, text, uncertain)])
-                if findings.broken:
-                    findings.conclude()
-    findings.conclude()
 
 
 @public("vkbloom.testing")
@@ -216,7 +125,7 @@ def measured_spread(
     return (lit - black) / value, (lit_error + dark_error) / value
 
 
-def _check_lit(spread: Image, errors: Error) -> None:
+def check_lit(spread: Image, errors: Error) -> None:
     """Raise AssertionError if the point spread is black."""
     error = float(np.min(errors))
     for channel in range(spread.shape[2]):
@@ -251,15 +160,3 @@ def sum_error(plane: Image, errors: Error) -> tuple[float, float]:
     lit = np.abs(plane) > half / 2
     planes = plane.shape[2] if plane.ndim > 2 else 1
     return float(half[lit].sum()) / planes, float(half[~lit].sum()) / planes
-
-
-def _moment_error(plane: Image, errors: Image, axis: int, weights: Image) -> float:
-    """Return the error of a moment, for values with independent errors.
-
-    Pixels without light are exactly 0 and have no error. Independent errors add as the root of the
-    sum of squares; three times that is allowed.
-    """
-    lit = plane != 0
-    along = np.broadcast_to(weights if axis == 0 else weights[:, np.newaxis], plane.shape)
-    squares = (errors[lit] * along[lit]) ** 2
-    return 3 * math.sqrt(float(squares.sum())) / abs(float(plane.sum()))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import inspect
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -93,6 +94,18 @@ def guarded(bloom: Bloom) -> Bloom:
         return result
 
     return guard
+
+
+def takes(bloom: object, name: str) -> bool:
+    """Return whether a callable takes a keyword of this name."""
+    try:
+        parameters = inspect.signature(bloom).parameters.values()  # type: ignore[arg-type]
+    except (TypeError, ValueError):
+        return False
+    return any(
+        parameter.name == name or parameter.kind is parameter.VAR_KEYWORD
+        for parameter in parameters
+    )
 
 
 @public("vkbloom.testing")
@@ -275,7 +288,7 @@ class Probe:
         return values / np.iinfo(array.dtype).max if array.dtype.kind == "u" else values
 
 
-#: The probe of assertions that are given none.
+#: The probe of measurements that are given none.
 DEFAULT: Final = Probe()
 
 

@@ -168,8 +168,8 @@ class Program:
             self._is_noted = True
             warnings.warn(
                 f"{self._name}: it writes {written} bits, which are clipped to 0..1 and rounded; "
-                f"testing.report knows; assert with Probe(atol={COARSE_ERROR:g}), or let it write "
-                "EXR",
+                "testing.report and testing.assert_laws know; measure with "
+                f"Probe(atol={COARSE_ERROR:g}), or let it write EXR",
                 UserWarning,
                 stacklevel=3,
             )

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from vkbloom._argument_types import checked
 from vkbloom._numbers import check_number
 from vkbloom._public import public
-from vkbloom.testing._deviations import fail, judge
 from vkbloom.testing._moving_light import area_sampled, moments
 from vkbloom.testing._probe import Bloom, Image, Probe
 
@@ -109,65 +108,6 @@ def _figures(lit: Image, value: float) -> tuple[float, float, float]:
     """Return both radii as shares of the height, and the peak as a share of the light's value."""
     r50, r90 = (radius / len(lit) for radius in _radii(lit, (0.5, 0.9)))
     return r50, r90, float(lit.max()) / value
-
-
-@public("vkbloom.testing")
-@checked
-def assert_resolution_independent(
-    bloom: Bloom,
-    scales: Sequence[float] = _SCALES,
-    *,
-    radius: float = 0.1,
-    peak: float = 0.2,
-    light: float = 1 / 32,
-    probe: Probe = _DEFAULT,
-) -> None:
-    """Assert that a bloom looks the same at all sizes of the frame.
-
-    The law: the radii that contain 50 % and 90 % of the light are the same share of the height at
-    all sizes, and the peak of the bloom is the same. A method with a radius in pixels, or with a
-    number of levels that does not depend on the height, does not obey it.
-
-    Parameters
-    ----------
-    bloom : callable
-        As for `resolution_response`.
-    scales, light, probe
-        As for `resolution_response`.
-    radius, peak : float
-        Allowed difference of the largest and the smallest value, relative to the mean, for both
-        radii and for the peak.
-    """
-    check_number("radius", radius, 0.0, math.inf)
-    check_number("peak", peak, 0.0, math.inf)
-    response = resolution_response(bloom, scales, light=light, probe=probe)
-    check_independent(response, radius, peak, probe)
-
-
-def check_independent(
-    response: ResolutionResponse, radius: float, peak: float, probe: Probe = _DEFAULT
-) -> None:
-    """Raise AssertionError if radii or peak change by more than a share of their mean."""
-    for name, what, values, allowed in (
-        ("r50", "the radius of 50 % of the light", response.r50, radius),
-        ("r90", "the radius of 90 % of the light", response.r90, radius),
-        ("peak", "the peak of the bloom", response.peak, peak),
-    ):
-        share = "the light's value" if values is response.peak else "the height"
-        if not values.mean() > 0:
-            text = f"{what} is {values.min():.3g} of {share}: only values above 0 are allowed"
-            fail("the bloom of a light is not black", text)
-        low, high = int(values.argmin()), int(values.argmax())
-        change = float((values[high] - values[low]) / values.mean())
-        law = f"{what} is the same share of {share} at all sizes"
-        text = (
-            f"{what} is {values[low]:.4g} of {share} at {_shown(response.sizes[low])} and "
-            f"{values[high]:.4g} at {_shown(response.sizes[high])}: off by {change:.3g} of the "
-            f"mean, {allowed:.3g} allowed"
-        )
-        errors = response.errors.get(name, np.zeros(len(values)))
-        error = float((errors[low] + errors[high]) / values.mean())
-        judge(law, (name, change, allowed, text, error), probe=probe)
 
 
 def _sizes(scales: Sequence[float], size: tuple[int, int]) -> tuple[tuple[int, int], ...]:

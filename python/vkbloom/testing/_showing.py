@@ -14,9 +14,9 @@ from vkbloom._views.markup import Markup, element
 from vkbloom._views.pictures import picture, png
 from vkbloom.psf._sampled import samples
 from vkbloom.testing._law_report import LawReport, cells
+from vkbloom.testing._laws.shape import LEVELS
 from vkbloom.testing._measuring import VIEW
 from vkbloom.testing._probe import BloomError, call
-from vkbloom.testing._shape import LEVELS
 from vkbloom.testing._subject import Subject
 
 Values = Mapping[str, Any]

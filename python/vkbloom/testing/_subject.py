@@ -10,11 +10,11 @@ from typing import Final
 import numpy as np
 
 from vkbloom._locks import cached_property
+from vkbloom.testing._last_pixel import LastPixel, last_pixel
 from vkbloom.testing._moving_light import Stability, stability
 from vkbloom.testing._point_spread import measured_spread, point_spread, sum_error
 from vkbloom.testing._probe import Bloom, Error, Image, Probe, guarded
 from vkbloom.testing._scaled_scene import ResolutionResponse, resolution_response
-from vkbloom.testing._shape import LastPixel, last_pixel
 
 # A threshold of 1, the usual one, lets nothing of an image of 1 through.
 _BRIGHT: Final = 16.0
@@ -74,6 +74,12 @@ class Subject:
             raise ValueError(
                 f"cannot be tested in {levels.reason}: the bloom of values up to 1 is black"
             )
+
+    def check_spread_visible(self) -> None:
+        """Raise ValueError if the bloom of a pixel is black."""
+        spread, error = self.light
+        if not spread.max(axis=(0, 1)).min() > np.min(error):
+            raise ValueError("the bloom of a pixel is black, as after a median or a threshold")
 
     @property
     def gain_error(self) -> float:

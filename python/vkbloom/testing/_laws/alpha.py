@@ -1,25 +1,16 @@
-"""Glow over transparent ground."""
+"""A law of glow over transparent ground."""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom._argument_types import checked
-from vkbloom._numbers import check_number
-from vkbloom._public import public
 from vkbloom.testing._deviations import judge
-from vkbloom.testing._probe import (
-    DEFAULT,
-    Bloom,
-    Image,
-    NotTaken,
-    Probe,
-    call,
-    small_probe,
-)
+from vkbloom.testing._laws.law import Figure, Law, Limits
+from vkbloom.testing._probe import Bloom, Image, NotTaken, Probe, call, small_probe
+from vkbloom.testing._subject import Subject
 
 __tracebackhide__ = True
 
@@ -27,27 +18,13 @@ __tracebackhide__ = True
 _BACKDROPS = (0.0, 0.25)
 
 
-@public("vkbloom.testing")
-@checked
-def assert_alpha(bloom: Bloom, probe: Probe = DEFAULT, *, limit: float = 0.01) -> None:
-    """Assert that glow over transparent ground is the glow of the flattened picture.
+def _test_alpha(subject: Subject, limits: Limits) -> None:
+    """Compare glow over transparent ground with the glow of the flattened picture.
 
-    Images are premultiplied. With the picture F(a), its alpha A and a backdrop b, the law is
-    F(a) + (1 - A) b = F(a + (1 - alpha) b) - F((1 - alpha) b) + (1 - alpha) b: the picture over any
-    backdrop looks as if it had been flattened first, less the bloom of the backdrop itself. For the
-    bloom alone, its colours do not depend on alpha.
-
-    Parameters
-    ----------
-    bloom : callable
-        Takes an image of four channels and returns one of the same height and width: the picture
-        with its bloom and its alpha, or the bloom alone.
-    probe : Probe
-        Its `channels` do not count.
-    limit : float
-        Allowed difference, as a share of the brightest value of the image.
+    Images are premultiplied. The picture over any backdrop looks as if it had been flattened first,
+    less the bloom of the backdrop itself. For the bloom alone, its colours do not depend on alpha.
     """
-    check_number("limit", limit, 0.0, 1.0)
+    bloom, probe, limit = subject.picture or subject.bloom, subject.probe, limits["alpha"]
     if probe.levels is not None:
         raise ValueError(
             f"cannot be tested in {probe.levels.reason}: files of integers hold no light without "
@@ -127,3 +104,13 @@ def _judge(law: str, off: Image, largest: float, limit: float, where: str) -> No
         f"{limit:g} allowed"
     )
     judge(law, ("alpha", share, limit, text))
+
+
+ALPHA: Final = Law(
+    name="alpha",
+    test=_test_alpha,
+    formula="F(a) + (1 - A) b = F(a + (1 - alpha) b) - F((1 - alpha) b) + (1 - alpha) b, "
+    "premultiplied, for backdrops b of 0 and 1/4",
+    figures={"alpha": Figure("largest difference, as a share of the brightest value", 0.01)},
+    why="A glow with an alpha of its own covers the backdrop instead of adding to it.",
+)

@@ -1,30 +1,22 @@
-"""Bloom in time: jitter of the camera, and what stays of a light that has moved."""
+"""Laws of bloom in time: jitter of the camera, and what stays of a light that has moved."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom._argument_types import checked
-from vkbloom._public import public
-from vkbloom.testing._border import takes
 from vkbloom.testing._deviations import fail, figure, is_within, judge
+from vkbloom.testing._laws.law import Figure, Law, Limits
 from vkbloom.testing._moving_light import area_sampled
-from vkbloom.testing._probe import DEFAULT, Bloom, Image, Probe, small_probe
+from vkbloom.testing._probe import Bloom, Image, Probe, small_probe, takes
+from vkbloom.testing._subject import Subject
 
 __tracebackhide__ = True
 
-__all__ = ["HISTORY_LIMITS", "JITTER_LIMITS", "assert_history", "assert_jitter", "halton"]
-
-#: Limits by figure: changes of the bloom's light as shares of its mean, and how many times as
-#: bright a pixel must be as a flat image to pass a threshold.
-JITTER_LIMITS: Final = {"flicker": 0.05, "resolved": 0.02, "threshold": 1.5}
-#: Limits by figure, as shares of the light: what stays in the first frame; changes of a still.
-HISTORY_LIMITS: Final = {"stays": 0.01, "steady": 0.01}
 # The order in which positions are tried: the light in one pixel first, then across the borders of
 # pixels in different directions. After as many positions, the figure decides if it is at most this
 # share of the limit: in all presets, 16 positions have at most 2.2 and 1.2 times as much.
@@ -60,55 +52,30 @@ def _inverse(index: int, base: int) -> float:
     return result
 
 
-@public("vkbloom.testing")
-@checked
-def assert_jitter(
-    bloom: Bloom,
-    probe: Probe = DEFAULT,
-    *,
-    limits: Mapping[str, float] | None = None,
-) -> None:
-    """Assert that the jitter of a camera does not make a bloom flicker.
+def _test_jitter(subject: Subject, limits: Limits) -> None:
+    """Measure the light of the bloom of thin lights in each frame of a camera that jitters.
 
     A point, a line along x and a line at an angle, half a pixel wide and sampled by their area,
-    are seen by a camera that follows a Halton path of 16 positions. The law: the light of the bloom
-    is the same in each frame. "flicker" is (largest - smallest) / mean of its sum; 4 or 8 positions
-    that differ most are enough if the figure is far from the limit. "resolved" is the same of a
-    reference TAA, whose result blooms: s_t = 0.9 s_t-1 + 0.1 a_t. Of lines it is
-    measured only if they flicker by more than a quarter of its limit, though not beyond the other
-    limit. The first light that breaks the law decides. And a
-    lit pixel blooms from the same value on as a flat image: "threshold" is the first divided by the
-    second.
-
-    Parameters
-    ----------
-    bloom : callable
-        Takes an image and returns one of the same height and width: the bloom alone.
-    probe : Probe
-        Its value must be far above a threshold.
-    limits : mapping of str to float, optional
-        Limits by figure; by default 0.05, 0.02, 1.5.
-
-    Raises
-    ------
-    AssertionError
-        The law does not hold, or a result is not finite.
+    are seen by a camera that follows a Halton path of 16 positions. 4 or 8 positions that differ
+    most are enough if the flicker is far from its limit. A reference TAA, whose result blooms, is
+    s_t = 0.9 s_t-1 + 0.1 a_t. Of lines it is measured only if they flicker by more than a quarter
+    of its limit, though not beyond the other limit. The first light that breaks the law decides.
     """
+    bloom, probe = subject.bloom, subject.lamp
     probe.check_fine("the bloom of a line thinner than a pixel has a few levels")
-    allowed = JITTER_LIMITS | dict(limits or {})
     law = "the light of a bloom does not change with the jitter of the camera"
     small = small_probe(probe)
     reasons: list[str] = []
     for name, scene in _SCENES.items():
         if reasons:
             break
-        for label, kind, off in _flickers(bloom, small, scene, allowed):
+        for label, kind, off in _flickers(bloom, small, scene, limits):
             figure(f"{name}, {label}", off)
-            if not is_within(law, off, allowed[kind], kind):
+            if not is_within(law, off, limits[kind], kind):
                 words = f"changes by {off:.3g} of its mean" if off < math.inf else "is black"
-                reasons.append(f"{name}, {label}: the light {words}, {allowed[kind]:g} allowed")
-    ratio = _threshold_ratio(bloom, small, allowed["threshold"])
-    if not is_within(law, ratio, allowed["threshold"], "threshold"):
+                reasons.append(f"{name}, {label}: the light {words}, {limits[kind]:g} allowed")
+    ratio = _threshold_ratio(bloom, small, limits["threshold"])
+    if not is_within(law, ratio, limits["threshold"], "threshold"):
         reasons.append(
             f"a lit pixel blooms from {ratio:.2g} times the value on that a flat image needs: the "
             "threshold reads an average"
@@ -117,11 +84,29 @@ def assert_jitter(
         fail(law, "; ".join(reasons))
 
 
+JITTER: Final = Law(
+    name="jitter",
+    test=_test_jitter,
+    formula="the bloom of thin lights has the same light in each frame of a camera that moves by "
+    "parts of a pixel, and a lit pixel blooms from the same value on as a flat image",
+    figures={
+        "LIGHT, POSITIONS": Figure("one of the two below, by light and number of positions"),
+        "flicker": Figure("(largest - smallest) / mean light of the frames", 0.05),
+        "resolved": Figure("the same after a TAA", 0.02),
+        "threshold": Figure(
+            "value from which a pixel blooms, divided by that of a flat image", 1.5
+        ),
+    },
+    why="A threshold after a reduction reads an average: thin lights fall below it. A reduction "
+    "that skips pixels sees them now and then.",
+)
+
+
 def _flickers(
     bloom: Bloom,
     probe: Probe,
     scene: Callable[[Probe, float, float], Image],
-    allowed: Mapping[str, float],
+    limits: Limits,
 ) -> Iterator[tuple[str, str, float]]:
     """Yield the positions, the kind and the value of each figure of a scene."""
     frames = [scene(probe, x, y) for x, y in halton(len(_ORDER))]
@@ -131,12 +116,12 @@ def _flickers(
         lights.append(_light(bloom, probe, frames[index]))
         off = _flicker(lights)
         steady = _STEADY.get(len(lights))
-        if steady and not steady < off / allowed["flicker"] <= 1:
+        if steady and not steady * limits["flicker"] < off <= limits["flicker"]:
             break
     yield f"{len(lights)} positions", "flicker", off
     # The light of a linear bloom changes less after TAA. The point shows whether it is linear.
-    least = 0.0 if scene is _point else allowed["resolved"] / 4
-    if least <= off <= allowed["flicker"]:
+    least = 0.0 if scene is _point else limits["resolved"] / 4
+    if least <= off <= limits["flicker"]:
         resolved = list(_taa(frames))[:: len(frames) // 2]
         lights = [_light(bloom, probe, frame) for frame in resolved]
         yield f"{len(frames)} positions, after TAA", "resolved", _flicker(lights)
@@ -212,35 +197,14 @@ def _threshold_ratio(bloom: Bloom, probe: Probe, limit: float) -> float:
     return first(True, flat) / flat if blooms(probe.value, True) else 1.0
 
 
-@public("vkbloom.testing")
-@checked
-def assert_history(
-    bloom: Bloom, probe: Probe = DEFAULT, *, limits: Mapping[str, float] | None = None
-) -> None:
-    """Assert that a bloom shows the image of now, and nothing of the images before.
+def _test_history(subject: Subject, limits: Limits) -> None:
+    """Let a light stand still for 8 frames, then jump.
 
-    A light stands still for 8 frames, then jumps. "stays" is the light of the first bloom after the
-    jump that a bloom of the same image 60 frames later has not, as a share (7 frames later, if the
-    bloom takes no time); the figure "frames" tells for how many frames it stays above its limit.
-    "steady" is (largest - smallest) / mean of the light in the second half of these frames.
-
-    Parameters
-    ----------
-    bloom : callable
-        ``bloom(image)`` or ``bloom(image, *, time)``, with the time in seconds; called in the order
-        of the frames, at 60 frames a second.
-    probe : Probe
-    limits : mapping of str to float, optional
-        Limits by figure; by default 0.01 of both.
-
-    Raises
-    ------
-    AssertionError
-        The law does not hold, or a result is not finite.
+    The image after the jump stays for 60 frames; for 7, if the bloom takes no time. A bloom that
+    takes `time` is given it in seconds, in the order of the frames, at 60 frames a second.
     """
-    allowed = HISTORY_LIMITS | dict(limits or {})
+    bloom, probe = subject.bloom, small_probe(subject.lamp)
     law = "the bloom of an image depends on that image alone"
-    probe = small_probe(probe)
     clock = iter(range(1 << 30))
 
     def at(image: Image) -> Image:
@@ -262,15 +226,28 @@ def assert_history(
     left = [float(np.abs(image - images[-1]).sum()) / last for image in images]
     sums = np.array([image.sum() for image in images[count // 2 :]])
     steady = float(np.ptp(sums) / sums.mean()) if sums.mean() > 0 else math.inf
-    above = sum(share > allowed["stays"] for share in left)
+    above = sum(share > limits["stays"] for share in left)
     figure("frames", float(above))
     changes = f"the bloom of an image that stays the same changes by {steady:.3g} of its mean"
     stays = (
         f"after a light has jumped, {left[0]:.3g} of the light differs from what it becomes, "
-        f"and {above} frames are above {allowed['stays']:g}"
+        f"and {above} frames are above {limits['stays']:g}"
     )
     judge(
         law,
-        ("steady", steady, allowed["steady"], changes),
-        ("stays", left[0], allowed["stays"], stays),
+        ("steady", steady, limits["steady"], changes),
+        ("stays", left[0], limits["stays"], stays),
     )
+
+
+HISTORY: Final = Law(
+    name="history",
+    test=_test_history,
+    formula="the bloom of an image does not depend on the images before, nor on the time",
+    figures={
+        "frames": Figure("frames for which more than the limit differs after a jump"),
+        "stays": Figure("light that differs in the first frame after a jump, as a share", 0.01),
+        "steady": Figure("(largest - smallest) / mean light of an image that stays", 0.01),
+    },
+    why="A bloom that is smoothed in time keeps what has moved for some frames on purpose.",
+)

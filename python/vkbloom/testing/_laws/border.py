@@ -1,46 +1,22 @@
-"""What a bloom does at the border of the image, and across the seam of two views."""
+"""A law of the border: a light there blooms as one far from it, cut off by the frame."""
 
 from __future__ import annotations
 
 import dataclasses
-import inspect
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from typing import Any, Final
 
 import numpy as np
 
-from vkbloom._argument_types import checked
-from vkbloom._public import public
 from vkbloom.testing._deviations import Findings, Measured, fail, figure, judge
+from vkbloom.testing._laws.law import Figure, Law, Limits
 from vkbloom.testing._point_spread import border_share, check_inside, sum_error
-from vkbloom.testing._probe import (
-    DEFAULT,
-    Bloom,
-    Error,
-    Image,
-    NotTaken,
-    Probe,
-    beside_multiple,
-    call,
-)
-from vkbloom.testing._shape import LastPixel, last_pixel
+from vkbloom.testing._probe import Bloom, Error, Image, Probe, beside_multiple
+from vkbloom.testing._subject import Subject
 
 __tracebackhide__ = True
 
-#: Limits by figure. Where the outermost pixels are repeated, a light in them counts for what is
-#: beyond them, too: a Gaussian of 8 pixels reaches 1.6 at an edge and 2.7 in a corner.
-BORDER_LIMITS: Final = {
-    "stale": 1e-3,
-    "wrap": 0.01,
-    "inside": 0.015,
-    "edge": 2.0,
-    "corner": 3.0,
-    "lost": 0.05,
-    "dark": 0.1,
-    "line": 0.25,
-    "last": 0.22,
-}
 # The share of its energy that a line in the outermost column has in the frame.
 _LINE: Final = 0.5
 # Side of the light, and the period of a chain of four halvings, in pixels.
@@ -85,57 +61,32 @@ class _Lights:
         return float(spread.sum()), lit
 
 
-@public("vkbloom.testing")
-@checked
-def assert_border(
-    bloom: Bloom, probe: Probe = DEFAULT, *, limits: Mapping[str, float] | None = None
-) -> None:
-    """Assert that a border neither adds light nor takes it away.
+def _test_border(subject: Subject, limits: Limits) -> None:
+    """Compare lights near the border and in the outermost pixels with one in the middle.
 
     With the bloom h of a square of 3 x 3 pixels in the middle, and E the sum of such a bloom: 1.5
-    standard deviations of h from an edge, the bloom is h, cut off by the frame ("inside" is the
-    light that differs, "wrap" that at the opposite edge, as shares of E of the middle). At the
-    border, E is at least the part of h that is in the frame, less "lost", and at most "edge" or
-    "corner" times E of the middle. A line in the last column has half of its energy, less
-    "line". The last pixel of an image with odd sides has a quarter of its energy, less "last". The
-    bloom of a black image is as dark at the border as in the middle ("dark"), and does not show the
-    image before ("stale"). What a flat image loses at the border is left to `assert_gain`.
-
-    Parameters
-    ----------
-    bloom : callable
-        Takes an image and returns one of the same height and width: the bloom alone.
-    probe : Probe
-        Where light reaches the border from the middle, only energies are tested.
-    limits : mapping of str to float, optional
-        Limits by figure, in place of those of `BORDER_LIMITS`.
+    standard deviations of h from an edge, the bloom is h, cut off by the frame. At the border, E is
+    at least the part of h that is in the frame. A line in the last column has half of its energy,
+    the last pixel of an image with odd sides a quarter. The bloom of a black image is as dark at
+    the border as in the middle, and does not show the image before. Where light reaches the border
+    from the middle, only energies are tested. What a flat image loses at the border is left to the
+    law `gain`.
     """
-    dark = probe.apply(bloom, probe.flat(0.0))[0]
-    check_border(bloom, probe, dark, BORDER_LIMITS | dict(limits or {}))
-
-
-def check_border(
-    bloom: Bloom,
-    probe: Probe,
-    dark: Image,
-    allowed: Mapping[str, float],
-    last: LastPixel | None = None,
-) -> None:
-    """Raise AssertionError if a border matters; `dark` is the bloom of a black image."""
+    bloom, probe, dark = subject.bloom, subject.lamp, subject.dark[0]
     law = "a light at the border has the bloom of a light far from it, cut off by the frame"
-    _check_stale(bloom, probe, dark, allowed["stale"])
+    _check_stale(bloom, probe, dark, limits["stale"])
     lights = _Lights(bloom, probe, dark)
     share = border_share(_expected(lights, probe.centre)[0])
     complete = share <= _OUTERMOST
     findings = Findings(law, probe)
     if complete:
-        findings.add(_near_the_border(lights, allowed))
-    findings.add(_at_the_border(lights, allowed, complete=complete))
-    findings.add([_black(dark, probe, allowed["dark"])])
+        findings.add(_near_the_border(lights, limits))
+    findings.add(_at_the_border(lights, limits, complete=complete))
+    findings.add([_black(dark, probe, limits["dark"])])
     inner = _expected(lights, probe.centre)[1] / lights.side**2
-    findings.add(_last_column(lights, inner, allowed["line"]))
-    last = last or last_pixel(bloom, probe, is_dark=not dark.any())
-    findings.add([last.measured(inner / probe.colours / probe.value, allowed["last"])])
+    findings.add(_last_column(lights, inner, limits["column"]))
+    last = subject.last_pixel
+    findings.add([last.measured(inner / probe.colours / probe.value, limits["last"])])
     if not findings.broken:
         check_inside(share, probe.size, _OUTERMOST)
     findings.conclude()
@@ -150,7 +101,7 @@ def _black(dark: Image, probe: Probe, allowed: float) -> Measured:
     return "dark", glow, allowed, text
 
 
-def _near_the_border(lights: _Lights, allowed: Mapping[str, float]) -> Iterator[Measured]:
+def _near_the_border(lights: _Lights, limits: Limits) -> Iterator[Measured]:
     """Measure how lights 1.5 standard deviations from an edge differ from one in the middle."""
     for name, at in _near(lights).items():
         spread, error = lights.spread(at)
@@ -166,12 +117,10 @@ def _near_the_border(lights: _Lights, allowed: Mapping[str, float]) -> Iterator[
             ("inside", float(profile.sum()), "where the middle has none"),
         ):
             text = f"{100 * share:.3g} % of the light of a square near the {name} edge is {where}"
-            yield kind, share, allowed[kind], text
+            yield kind, share, limits[kind], text
 
 
-def _at_the_border(
-    lights: _Lights, allowed: Mapping[str, float], *, complete: bool
-) -> Iterator[Measured]:
+def _at_the_border(lights: _Lights, limits: Limits, *, complete: bool) -> Iterator[Measured]:
     """Measure lights in the outermost pixels."""
     x, y = lights.probe.centre
     for name, at in {"left": (0, y), "top": (x, 0), "corner": (0, 0)}.items():
@@ -183,9 +132,9 @@ def _at_the_border(
         figure(f"energy_{name}", share)
         if complete:
             text = f"a light at the {name} has {share:.3g} of its energy, {inside:.3g} is in the "
-            yield "lost", max(0.0, inside - share), allowed["lost"], f"{text}frame", error
+            yield "lost", max(0.0, inside - share), limits["lost"], f"{text}frame", error
         text = f"a light at the {name} swells to {share:.3g} times its energy"
-        yield kind, share, allowed[kind], text, error
+        yield kind, share, limits[kind], text, error
 
 
 def _last_column(lights: _Lights, inner: float, allowed: float) -> Iterator[Measured]:
@@ -217,66 +166,6 @@ def _check_stale(bloom: Bloom, probe: Probe, dark: Image, allowed: float) -> Non
         y, x, _ = np.unravel_index(int(rise.argmax()), rise.shape)
         text = f"after a bright{name} image, a black one has {off:.3g} of its light at x {x}, y {y}"
         judge(law, ("stale", off, allowed, text))
-
-
-@public("vkbloom.testing")
-@checked
-def assert_views(bloom: Bloom, probe: Probe = DEFAULT, *, limit: float = 1e-3) -> None:
-    """Assert that no light crosses from one view of a picture to the other.
-
-    The law: B(a, region=r) inside of r depends on the pixels inside of r alone. The picture has two
-    views, side by side and then one above the other, as for the two eyes of a headset. One has
-    noise, the other one is black or has noise, too; then the other way round.
-
-    Parameters
-    ----------
-    bloom : callable
-        ``bloom(image, *, region)``; `region` is (x, y, width, height) in pixels. Returns an image
-        of the picture's size, or of that of the region.
-    probe : Probe
-        Its size is that of a view.
-    limit : float
-        Allowed difference, as a share of the largest value of the bloom, beyond the errors of
-        values.
-    """
-    if not takes(bloom, "region"):
-        raise NotTaken("bloom: it takes no keyword region, so views are not told apart")
-    noise = [probe.noise(index, probe.value) for index in (0, 1)]
-    law = "the bloom of a view depends on the pixels of that view alone"
-    for side, name in enumerate(("left", "right", "upper", "lower")):
-        axis, second = 1 - side // 2, side % 2
-        corner = second * np.array(probe.size) * (axis == 1, axis == 0)
-        results = []
-        for other in (probe.flat(0.0), noise[1 - second]):
-            views = [other, noise[second]] if second else [noise[second], other]
-            given = probe.given(np.concatenate(views, axis=axis))
-            region = (*map(int, corner), *probe.size)
-            result = np.asarray(call(bloom, given, region=region))
-            if result.shape[:2] == given.shape[:2]:
-                result = np.split(result, 2, axis=axis)[second]
-            results.append(probe.values(result, probe.given(noise[second])))
-        (alone, error), (beside, _) = results
-        off = np.abs(beside - alone)
-        largest = float(np.abs(alone).max()) or 1.0
-        share = max(0.0, float((off - 2 * error).max())) / largest
-        y, x, _ = np.unravel_index(int(off.argmax()), off.shape)
-        text = (
-            f"the other view changes the {name} one by {share:.3g} of its largest value, most at "
-            f"x {x}, y {y}: {limit:g} allowed"
-        )
-        judge(law, ("crosstalk", share, limit, text))
-
-
-def takes(bloom: object, name: str) -> bool:
-    """Return whether a callable takes a keyword of this name."""
-    try:
-        parameters = inspect.signature(bloom).parameters.values()  # type: ignore[arg-type]
-    except (TypeError, ValueError):
-        return False
-    return any(
-        parameter.name == name or parameter.kind is parameter.VAR_KEYWORD
-        for parameter in parameters
-    )
 
 
 def _near(lights: _Lights) -> dict[str, tuple[int, int]]:
@@ -328,3 +217,29 @@ def _moved(spread: Image, start: tuple[int, int], to: tuple[int, int]) -> Image:
     for lines, by in ((moved, y), (moved.swapaxes(0, 1), x)):
         lines[slice(by, None) if by < 0 else slice(by)] = 0
     return moved
+
+
+#: Where the outermost pixels are repeated, a light in them counts for what is beyond them, too: a
+#: Gaussian of 8 pixels reaches 1.6 at an edge and 2.7 in a corner.
+BORDER: Final = Law(
+    name="border",
+    test=_test_border,
+    formula="a light at the border has the bloom of a light far from it, cut off by the frame, and "
+    "no pixel of it is lost, also where sizes are odd",
+    figures={
+        "stale": Figure("light of a black image after a bright one", 1e-3),
+        "wrap": Figure("light of a square near an edge that is at the opposite edge", 0.01),
+        "inside": Figure("light of a square near an edge that is elsewhere", 0.015),
+        "energy_left": Figure("light of a square at the left edge, beside the middle"),
+        "energy_top": Figure("the same at the top edge"),
+        "energy_corner": Figure("the same in a corner"),
+        "edge": Figure("the largest of both edges", 2.0),
+        "corner": Figure("the same in a corner", 3.0),
+        "lost": Figure("light of a square at the border that is in the frame and lost", 0.05),
+        "dark": Figure("light of a black image at the border", 0.1),
+        "column": Figure("what a line in the last column lacks of half its light", 0.25),
+        "last": Figure("what the last pixel of an odd size lacks of a quarter of it", 0.22),
+    },
+    why="Where the outermost pixels are repeated, a light in them counts for what is beyond them, "
+    "too: in the smallest level of a chain that is most of the picture.",
+)

@@ -1,0 +1,1 @@
+"""The laws of a bloom, a module for each kind of them; `table.LAWS` has all."""
