@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 import vkbloom
-from vkbloom.testing._measuring import PRESET_BLOOMS, exact, shown, sketch
+from vkbloom._cli.check.measuring import PRESET_BLOOMS, exact, shown, sketch
 
 
 def main() -> None:

@@ -17,8 +17,7 @@ import vkbloom
 from tests.cli.calls import run
 from tests.custom.engines import engine
 from vkbloom import Renderer, testing
-from vkbloom.testing import _comparing as comparing
-from vkbloom.testing import _measuring as measuring
+from vkbloom._cli.check import comparing, measuring
 from vkbloom.testing._law_report import law_report
 from vkbloom.testing._laws.table import LAWS, merge_limits
 

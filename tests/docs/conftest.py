@@ -9,7 +9,7 @@ import pytest
 
 from tests.docs.pages import ROOT, blocks
 from vkbloom import write
-from vkbloom.testing import _measuring as measuring
+from vkbloom._cli.check import measuring
 
 
 @pytest.fixture

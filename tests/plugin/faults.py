@@ -343,7 +343,7 @@ _LINEAR: dict[str, Fault] = {
         "rows and columns swapped",
     ),
     "a sum of two widths": of_linear(
-        lambda a: gaussian(a) / 2 + wide(a) / 2, "separable", "a row times a column"
+        lambda a: gaussian(a, 1.0) / 2 + gaussian(a, 6.0) / 2, "separable", "a row times a column"
     ),
     "rings beside an edge": of_linear(
         lambda a: 2 * gaussian(a) - wide(a),

@@ -40,8 +40,9 @@ COMMANDS: Final = {
     "warm": "Fill the caches of pipelines and kernels before the first call needs them",
 }
 
-# Modules of several commands.
+# Modules of several commands, and of a command's package.
 _MODULES: Final = {
+    "check": "check.command",
     **dict.fromkeys(("presets", "glares", "psfs"), "listing"),
     **dict.fromkeys(("fit", "translate"), "search"),
     **dict.fromkeys(("view", "explore"), "live"),

@@ -8,6 +8,7 @@ from typing import Any, Final
 
 import click
 
+from vkbloom._cli.check.measuring import VIEW
 from vkbloom._fit.translating import lights
 from vkbloom._views import markup
 from vkbloom._views.markup import Markup, element
@@ -15,7 +16,6 @@ from vkbloom._views.pictures import picture, png
 from vkbloom.psf._sampled import samples
 from vkbloom.testing._law_report import LawReport, cells
 from vkbloom.testing._laws.shape import LEVELS
-from vkbloom.testing._measuring import VIEW
 from vkbloom.testing._probe import BloomError, call
 from vkbloom.testing._subject import Subject
 

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, Literal
 
-from vkbloom.testing._showing import FIGURES, figure_of, times, words
+from vkbloom._cli.check.showing import FIGURES, figure_of, times, words
 
 Verdict = Literal["broken", "mended", "worse", "better", "changed", "same"]
 

@@ -1,4 +1,4 @@
-"""``vkbloom check``: measure a bloom by every law."""
+"""``vkbloom check``: the command."""
 
 from __future__ import annotations
 
@@ -23,6 +23,7 @@ from rich.status import Status
 
 import vkbloom
 from vkbloom import testing
+from vkbloom._cli.check import comparing, measuring, showing
 from vkbloom._cli.fields import SIZE, Command
 from vkbloom._cli.numbered_files import NumberedFile, as_frames, gap_note, gaps
 from vkbloom._cli.program import adapter_option, as_wrong_use, given
@@ -35,9 +36,6 @@ from vkbloom._io import safe_writing
 from vkbloom._renderer.interruptible import opened_renderer
 from vkbloom._spelling import did_you_mean
 from vkbloom._views.plain_values import plain
-from vkbloom.testing import _comparing as comparing
-from vkbloom.testing import _measuring as measuring
-from vkbloom.testing import _showing as showing
 from vkbloom.testing._law_report import LawReport, law_report
 from vkbloom.testing._laws.table import find_law, merge_limits
 from vkbloom.testing._programs import Program
@@ -120,7 +118,7 @@ def _laws(_: click.Context, __: click.Parameter, text: str) -> tuple[str, ...]:
 )
 @adapter_option
 @settings_options
-def command(
+def check(
     *,
     file: str | None,
     program: str | None,

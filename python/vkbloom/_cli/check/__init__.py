@@ -1,0 +1,1 @@
+"""``vkbloom check``: the command, what it measures, and what it prints."""
