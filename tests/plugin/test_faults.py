@@ -23,6 +23,10 @@ def test_a_fault_breaks_its_law(name: str) -> None:
     found = testing.report(fault(), size=SIZE, laws=laws)
     broken = {row.name: row.message for row in found.rows if row.held is False}
     assert words in broken[law], found
+    for row in found.rows:
+        declared = {*LAWS[row.name].figures}
+        # A name in upper case stands for several.
+        assert {*row.figures} <= declared or any(name.isupper() for name in declared)
 
 
 def test_laws_that_need_more_than_an_image_say_so() -> None:
