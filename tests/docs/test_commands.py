@@ -36,6 +36,7 @@ NOT_RUN: Final = {
     "vkbloom doctor": "takes seconds; tests/cli/test_doctor.py does",
     "vkbloom check --preset unity_urp --against": "needs an engine; test_check.py does",
     "vkbloom view": "does not end, and needs a screen; tests/cli/test_view.py does",
+    "vkbloom grid photo.exr --store s3:": "needs a bucket; tests/grid/test_grid_stores.py has one",
     "vkbloom grid --axis time=0:1:24": "needs the scheduler of a cluster",
 }
 # Options for the same in less time, by command.

@@ -17,7 +17,7 @@ import vkbloom
 from vkbloom._grid.store import Chunks
 
 
-def render(store: Path, part: str | None) -> None:
+def render(store: Path | str, part: str | None) -> None:
     """Render 120 points in 30 chunks."""
     vkbloom.grid(
         np.random.default_rng(3).random((12, 10, 3), dtype=np.float32),
@@ -35,14 +35,15 @@ def render(store: Path, part: str | None) -> None:
     )
 
 
-def kill_after_two_chunks(store: Path) -> None:
-    """End this process as by a power failure, with a temporary file beside its chunks."""
+def kill_after_two_chunks(store: Path | str) -> None:
+    """End this process as by a power failure; a folder has a temporary file then."""
     written: list[Any] = []
     write = Chunks.write
 
     def writing(self: Chunks, block: Any, arrays: Any) -> None:
         if len(written) == 2:
-            (store / "final" / f"c.{os.getpid()}.partial").write_bytes(b"half of it")
+            if isinstance(store, Path):
+                (store / "final" / f"c.{os.getpid()}.partial").write_bytes(b"half of it")
             os.kill(os.getpid(), signal.SIGKILL)
         written.append(block)
         write(self, block, arrays)
@@ -51,8 +52,9 @@ def kill_after_two_chunks(store: Path) -> None:
 
 
 if __name__ == "__main__":
+    named = sys.argv[1] if "://" in sys.argv[1] else Path(sys.argv[1])
     for word in sys.stdin.read().split():
         if word == "killed":
-            kill_after_two_chunks(Path(sys.argv[1]))
+            kill_after_two_chunks(named)
         else:
-            render(Path(sys.argv[1]), word)
+            render(named, word)

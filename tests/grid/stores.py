@@ -1,4 +1,4 @@
-"""A grid of images in a store, and the content of its folder."""
+"""A grid of images in a store, and the content of the store."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import Any
 import vkbloom
 from tests.images import noise
 from vkbloom import Frames, Separable
+from vkbloom._grid.keys import open_keys
 
 
 class Stop(Exception):
@@ -58,8 +59,11 @@ def make(store: Any, **changes: Any) -> Any:
     return vkbloom.grid(arguments.pop("source", source()), settings, axes, store=store, **arguments)
 
 
-def contents(store: Path) -> dict[str, bytes]:
-    """Return the bytes of each file below the folder by its path in it."""
+def contents(store: Any) -> dict[str, bytes | None]:
+    """Return the bytes of each key; of a folder, of each file below it by its path in it."""
+    if not isinstance(store, Path):
+        keys = open_keys(store)
+        return {key: keys.read(key) for key in keys.listed()}
     return {
         str(path.relative_to(store)): path.read_bytes()
         for path in store.rglob("*")

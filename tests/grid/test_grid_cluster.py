@@ -79,6 +79,16 @@ def test_workers_write_what_one_process_writes(
     assert made["done"].values.all()
 
 
+def test_workers_write_to_a_cloud(client: Any, s3: str, undisturbed: Path) -> None:
+    url = "s3://grids/cluster.zarr"
+    # The workers have other variables of the environment than this process.
+    options = {"endpoint_url": s3, "key": "anything", "secret": "anything"}
+    store = pytest.importorskip("zarr").storage.FsspecStore.from_url(url, storage_options=options)
+    made = make(store, client=client)
+    assert made["done"].values.all()
+    assert contents(store) == contents(undisturbed)
+
+
 def test_killed_worker_is_replaced(client: Any, tmp_path: Path, undisturbed: Path) -> None:
     killed = threading.Event()
 

@@ -29,7 +29,10 @@ _PRESETS: Final = fields.NameOf("preset", vkbloom.presets)
 
 @click.command(cls=fields.Command)
 @click.argument("source", metavar="[IMAGE]", required=False, type=click.Path())
-@click.option("-o", "--out", required=True, type=click.Path(), help="NAME.zarr, or a folder")
+@click.option("-o", "--out", type=click.Path(), help="NAME.zarr, or a folder of image files")
+@click.option(
+    "--store", metavar="PATH|URL", help="A store of any name or kind, such as s3://bucket/NAME.zarr"
+)
 @click.option("--axis", "words", metavar="NAME=VALUES", multiple=True, help="Values, as above")
 @click.option("--size", type=fields.SIZE, help="Size of a scene's frames [default 1280x720]")
 @click.option("--time", default=0.0, help="Time of a scene's animation; its period is 1.")
@@ -42,7 +45,9 @@ _PRESETS: Final = fields.NameOf("preset", vkbloom.presets)
 @program.adapter_option
 @scene_options
 @settings_options
-def command(*, source: str | None, out: str, words: tuple[str, ...], **given: Any) -> None:
+def command(
+    *, source: str | None, out: str | None, store: str | None, words: tuple[str, ...], **given: Any
+) -> None:
     """Render all combinations of the axes' values.
 
     The source is a scene, or IMAGE, read as vkbloom apply reads it: files of integers (JPEG, PNG)
@@ -61,8 +66,11 @@ def command(*, source: str | None, out: str, words: tuple[str, ...], **given: An
     with program.as_wrong_use():
         safe_writing.writer_of(f"image{suffix}")
         part = order.read_part(given["part"])
-    is_store = out.endswith(".zarr")
-    if not is_store and Path(out).suffix and not Path(out).is_dir():
+    if (out is None) == (store is None):
+        raise click.UsageError("give either --out or --store, where the grid is written")
+    if store is None and out is not None and out.endswith(".zarr"):
+        store = out
+    if out is not None and store is None and Path(out).suffix and not Path(out).is_dir():
         hint = f"name a folder, and give --image-format {Path(out).suffix[1:]}"
         raise click.UsageError(f"--out: {out} is not NAME.zarr; for an image of each point {hint}")
     if not words:
@@ -88,14 +96,14 @@ def command(*, source: str | None, out: str, words: tuple[str, ...], **given: An
         grid = layout.ask(looked_at, settings, axes, reduce=None, **shared)
     with opened_renderer(given["adapter"]) as renderer:
         _note_no_bloom(grid, renderer)
-        if is_store:
+        if store is not None:
             shared |= {"part": part, "progress": not terminal.is_quiet()}
-            vkbloom.grid(looked_at, settings, axes, store=out, renderer=renderer, **shared)
-        else:
+            vkbloom.grid(looked_at, settings, axes, store=store, renderer=renderer, **shared)
+        elif out is not None:
             how: dict[str, Any] = {"suffix": suffix, "picture": picture, "expand": expand}
             _write_images(grid, Path(out), renderer, part=part, **how)
     which = f"part {part[0]}/{part[1]} of " if given["part"] else ""
-    terminal.say(f"wrote {out}, {which}{math.prod(grid.shape)} points")
+    terminal.say(f"wrote {store or out}, {which}{math.prod(grid.shape)} points")
 
 
 def _alpha_of(axes: Mapping[str, Sequence[Any]], settings: vkbloom.Settings | None) -> str:

@@ -3,23 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+import re
+from collections.abc import Iterable, Mapping, Set
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 from vkbloom._argument_types import checked
 from vkbloom._grid.axes import Axis
+from vkbloom._grid.keys import Keys, open_keys
 from vkbloom._grid.order import Block, blocks
-from vkbloom._grid.store import (
-    DONE,
-    METADATA,
-    MISSING,
-    Chunks,
-    checked_identity,
-    folder_of,
-    is_empty,
-)
+from vkbloom._grid.store import DONE, METADATA, MISSING, Chunks, checked_identity
 from vkbloom._public import public
 
 
@@ -58,8 +51,8 @@ def check_grid(store: Any) -> GridReport:
 
     Parameters
     ----------
-    store : str or path-like
-        As for `vkbloom.grid`.
+    store : str, path-like or zarr.abc.store.Store
+        As for `vkbloom.grid`. It may be read-only.
 
     Returns
     -------
@@ -72,32 +65,35 @@ def check_grid(store: Any) -> GridReport:
         The store does not exist or is empty.
     ValueError
         The store is not a grid, has another format version, or the group's metadata are damaged.
+    OSError
+        The store cannot be read.
     """
-    folder = folder_of(store)
-    if is_empty(folder):
-        raise FileNotFoundError(f"{folder}: the store does not exist or is empty")
-    identity = checked_identity(folder)
+    keys = open_keys(store)
+    held = keys.listed()
+    if not held:
+        raise FileNotFoundError(f"{keys.name}: the store does not exist or is empty")
+    identity = checked_identity(keys)
     try:
-        return _report(identity, folder)
+        return _report(identity, keys, held)
     except (KeyError, TypeError, AttributeError) as error:
-        raise ValueError(f"{folder}: its {METADATA} is damaged: {error}") from error
+        raise ValueError(f"{keys.name}: its {METADATA} is damaged: {error}") from error
 
 
-def _report(identity: Mapping[str, Any], folder: Path) -> GridReport:
+def _report(identity: Mapping[str, Any], keys: Keys, held: Set[str]) -> GridReport:
     named = identity["axes"]
     axes = [Axis(name, tuple(named[name]), "settings", "", "") for name in named]
     variables = {name: len(variable["shape"]) for name, variable in identity["variables"].items()}
-    chunks = Chunks(folder, variables, tuple(identity["chunk"]))
+    chunks = Chunks(keys, variables, tuple(identity["chunk"]))
     shape = tuple(map(len, axes))
-    there = (file.parent.name for file in sorted(folder.glob(f"*/{METADATA}")))
+    arrays = (key.split("/")[0] for key in sorted(held) if re.fullmatch(f"[^/]+/{METADATA}", key))
     problems = [
         f"{problem}, of all points"
-        for name in dict.fromkeys((DONE, *variables, *named, *there))
-        if (problem := chunks.array_problem(name))
+        for name in dict.fromkeys((DONE, *variables, *named, *arrays))
+        if (problem := chunks.array_problem(name, held))
     ]
     done = 0
-    for block in blocks(shape, chunks.chunk, range(len(shape))) if not problems else ():
-        told = {name: chunks.problem(name, block) for name in (DONE, *variables)}
+    every = [] if problems else list(blocks(shape, chunks.chunk, range(len(shape))))
+    for block, told in zip(every, chunks.problems(every, held), strict=True):
         if told[DONE] == MISSING:
             continue
         done += block.count * (told[DONE] is None)

@@ -6,7 +6,6 @@ import math
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import ExitStack
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -17,10 +16,11 @@ from vkbloom._extras import import_extra
 from vkbloom._free_memory import memory_left
 from vkbloom._grid import cluster
 from vkbloom._grid.filling import Filler, progress_bar
+from vkbloom._grid.keys import Keys, open_keys
 from vkbloom._grid.layout import Grid, Layout, Variable, ask, lay_out, made_dataset
 from vkbloom._grid.order import Block, Index, default_chunk, read_part
 from vkbloom._grid.sources import ImageSource
-from vkbloom._grid.store import IDENTITY, GridStore, chunk_in, folder_of, prepare, stored_identity
+from vkbloom._grid.store import IDENTITY, GridStore, chunk_in, prepare, stored_identity
 from vkbloom._numbers import check_index
 from vkbloom._public import public
 from vkbloom._renderer.default import default_renderer
@@ -91,10 +91,11 @@ def grid(
         Figures to keep, by name. Each callable gets the `Frames` of a point and returns a number
         or a small array. With ``framebuffers=()`` only they are kept. A callable gets the
         framebuffers that its attribute ``framebuffers`` names, or all if it has no such attribute.
-    store : str or path-like, optional
-        Where to write the grid instead: a folder ``name.zarr``. With a `client`, all its workers
-        must be able to write to it. It can be opened with
-        ``xarray.open_zarr`` while it is written; its variable ``done`` tells which points are
+    store : str, path-like or zarr.abc.store.Store, optional
+        Where to write the grid instead: a folder ``name.zarr``, a URL that fsspec supports, such
+        as ``"s3://bucket/name.zarr"`` (the extra ``cloud`` installs S3) or ``"memory://name"``, or
+        a Zarr store. With a `client`, all its workers must be able to write to it. It can be opened
+        with ``xarray.open_zarr`` while it is written; its variable ``done`` tells which points are
         complete. If the process is killed, the same call renders only the missing points.
     chunks : mapping of str to int, optional
         Grid points per chunk of the store by axis; 1 for an axis that is not named. Default: chunks
@@ -135,7 +136,8 @@ def grid(
     FileExistsError
         The store exists and `resume` is False.
     OSError
-        Writing failed, for example because the disk is full. Completed points are kept.
+        Reading or writing the store failed, for example because the disk is full or credentials are
+        missing. Completed points are kept.
 
     Notes
     -----
@@ -160,7 +162,7 @@ def grid(
             raise ValueError(f"{name}: a grid in memory has none; give store, too")
     if renderer is not None and (client is not None or adapter is not None):
         raise ValueError("renderer: the grid is rendered by those of client or adapter; give one")
-    folder = None if store is None else folder_of(store)
+    keys = None if store is None else open_keys(store)
     asked = ask(
         source,
         settings,
@@ -174,14 +176,17 @@ def grid(
     with ExitStack() as stack:
         if client is None and adapter is not None:
             renderer = stack.enter_context(opened_renderer(adapter))
-        if folder is None:
+        if keys is None:
             return in_memory(asked, renderer or default_renderer(), progress)
         numbers = read_part(part)
+        keys.check_writable()
+        if client is not None:
+            keys.check_shared()
         _check_stored(asked, chunks, is_shared=client is not None)
 
         def prepared(layout: Layout) -> GridStore:
-            chunk = _chunk(asked, layout, chunks, folder, numbers[1])
-            return prepare(folder, asked, layout, chunk, numbers, resume=resume)
+            chunk = _chunk(asked, layout, chunks, keys, numbers[1])
+            return prepare(keys, asked, layout, chunk, numbers, resume=resume)
 
         if client is not None:
             cluster.fill_there(client, asked, prepared, adapter or "auto", progress)
@@ -191,7 +196,7 @@ def grid(
             with progress_bar(stored.total, stored.done, shown=progress) as count:
                 filler = Filler(asked, stored.layout, renderer, count)
                 filler.store(stored.missing, stored.chunks)
-    dataset: xarray.Dataset = xr.open_zarr(folder)
+    dataset: xarray.Dataset = xr.open_zarr(keys.folder or keys.store, zarr_format=3)
     dataset.attrs.pop(IDENTITY, None)
     return dataset
 
@@ -212,11 +217,11 @@ def _check_stored(grid: Grid, chunks: Mapping[str, int] | None, *, is_shared: bo
 
 
 def _chunk(
-    grid: Grid, layout: Layout, chunks: Mapping[str, int] | None, folder: Path, parts: int
+    grid: Grid, layout: Layout, chunks: Mapping[str, int] | None, keys: Keys, parts: int
 ) -> Index:
     """Return the grid points per chunk by axis: requested, from the store, or the default."""
     if chunks is None:
-        stored = stored_identity(folder)
+        stored = stored_identity(keys)
         held = None if stored is None else chunk_in(stored, grid.shape)
         return chunk_of(grid, layout, parts) if held is None else held
     return tuple(min(int(chunks.get(axis.name, 1)), len(axis)) for axis in grid.axes)

@@ -7,7 +7,7 @@ The process may be killed at any time, because it writes in this order:
    others are refused.
 2. The arrays' metadata, and the coordinates.
 3. Blocks of points: a complete chunk of each variable, with a checksum, then the chunk of
-   ``done``. Zarr's LocalStore writes a key to a temporary file first and renames it.
+   ``done``.
 
 ``done`` has the same chunks as the variables. So a process writes only keys of its own blocks, and
 processes with different parts need no lock: they write the same metadata.
@@ -16,18 +16,17 @@ processes with different parts need no lock: they write the same metadata.
 from __future__ import annotations
 
 import json
-import os
-import re
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Container, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom._extras import import_extra
+from vkbloom._grid.keys import PURPOSE, Keys
 from vkbloom._grid.layout import Grid, Layout, Variable, made_dataset
 from vkbloom._grid.order import WHOLE, Block, Index, Part, blocks
 from vkbloom._settings.records import plain_value
@@ -40,13 +39,12 @@ DONE: Final = "done"
 METADATA: Final = "zarr.json"
 MISSING: Final = "missing"
 IDENTITY: Final = "vkbloom_grid"
-_PURPOSE: Final = "Grids on disk"
 # Level 1 is fast; on noisy pictures higher levels compress little better.
 _ZSTD_LEVEL: Final = 1
 # The separator "." puts all chunks of an array in one folder; "/" would nest a folder per axis.
 _KEYS: Final = {"name": "default", "separator": "."}
-# Names of LocalStore's temporary files: of a key without its last suffix, a number, ".partial".
-_PARTIAL: Final = re.compile(r"(?:zarr|c(?:\.[0-9]+)*)\.[0-9a-f]+\.partial")
+# Blocks that are read at a time: an object store answers each request after a while.
+_READERS: Final = 16
 
 
 def identity(grid: Grid, layout: Layout, chunk: Index) -> dict[str, Any]:
@@ -120,15 +118,17 @@ class Chunks:
     of values per block, by axis.
     """
 
-    folder: Path
+    keys: Keys
     trailing: Mapping[str, int]
     chunk: Index
     _opened: dict[str, Any] = field(default_factory=dict)
 
     def _array(self, name: str) -> Any:
         if name not in self._opened:
-            zarr = import_extra("zarr", "grid", "Grids on disk")
-            array = zarr.open_array(self.folder / name, mode="r+")
+            zarr = import_extra("zarr", "grid", PURPOSE)
+            store = self.keys.store
+            mode = "r" if store.read_only else "r+"
+            array = zarr.open_array(store, path=name, mode=mode, zarr_format=3)
             # Also write chunks of zeros: a missing key would look like a missing point.
             self._opened[name] = array.with_config({"write_empty_chunks": True})
         return self._opened[name]
@@ -143,30 +143,39 @@ class Chunks:
     def write(self, block: Block, arrays: Mapping[str, NDArray[Any]]) -> None:
         """Write a block's variables, then mark it as done."""
         for name, values in {**arrays, DONE: np.True_}.items():
-            try:
+            with self.keys.named(name):
                 self._array(name)[block.slices] = values
-            except OSError as error:
-                # A full disk names no file.
-                error.filename = error.filename or str(self.folder / name)
-                raise
 
-    def problem(self, name: str, block: Block) -> str | None:
-        """Return what is wrong with a block's chunk of a variable: it is missing or damaged."""
-        if not (self.folder / self.key(name, block)).exists():
-            return MISSING
-        return self._damage(name, block.slices)
+    def problems(
+        self, examined: Sequence[Block], held: Container[str]
+    ) -> Iterator[Mapping[str, str | None]]:
+        """Yield what is wrong with each block's chunks by variable: missing, damaged or None.
 
-    def array_problem(self, name: str) -> str | None:
+        `held` has the keys of the store.
+        """
+
+        def examine(block: Block) -> Mapping[str, str | None]:
+            return {name: self._problem(name, block, held) for name in (DONE, *self.trailing)}
+
+        with ThreadPoolExecutor(_READERS, "vkbloom-read") as pool:
+            for first in range(0, len(examined), _READERS):
+                yield from pool.map(examine, examined[first : first + _READERS])
+
+    def _problem(self, name: str, block: Block, held: Container[str]) -> str | None:
+        key = self.key(name, block)
+        return self._damage(name, key, block.slices) if key in held else MISSING
+
+    def array_problem(self, name: str, held: Container[str]) -> str | None:
         """Return what is wrong with an array's metadata, or with the values of a coordinate."""
         is_coordinate = name not in (DONE, *self.trailing)
         keys = [f"{name}/{METADATA}", *[f"{name}/c.0"] * is_coordinate]
         for key in keys:
-            if not (self.folder / key).exists():
+            if key not in held:
                 return f"{key} is missing"
-        damage = self._damage(name, (...,) if is_coordinate else None)
+        damage = self._damage(name, keys[-1], (...,) if is_coordinate else None)
         return f"{keys[-1]} is {damage}" if damage else None
 
-    def _damage(self, name: str, slices: tuple[Any, ...] | None) -> str | None:
+    def _damage(self, name: str, key: str, slices: tuple[Any, ...] | None) -> str | None:
         """Return how a part of a variable is damaged; None: only its metadata are read."""
         try:
             array = self._array(name)
@@ -175,28 +184,19 @@ class Chunks:
         except MemoryError:
             raise
         except Exception as error:  # Zarr does not document what damaged metadata and chunks raise
+            if self.keys.folder is None:
+                # Raises if the store cannot be read, which is no damage.
+                self.keys.read(key)
             text = str(error).partition(". ")[0].removesuffix(".") or type(error).__name__
             return f"damaged ({text})"
         return None
 
 
-def folder_of(store: object) -> Path:
-    """Return the folder of a store, which need not exist."""
-    if not isinstance(store, str | os.PathLike) or "://" in os.fspath(store):
-        raise TypeError(f"store: {store!r} is not the path of a folder")
-    return Path(store).absolute()
-
-
-def is_empty(folder: Path) -> bool:
-    """Return whether a store has no keys; temporary files are none."""
-    return all(path.is_dir() or _PARTIAL.fullmatch(path.name) for path in folder.rglob("*"))
-
-
 def expected_keys(grid: Grid, layout: Layout, chunk: Index) -> dict[str, bytes]:
     """Return the contents of a store before its first block, the group's metadata first."""
-    zarr = import_extra("zarr", "grid", _PURPOSE)
-    codecs = import_extra("zarr.codecs", "grid", _PURPOSE)
-    dask = import_extra("dask.array", "grid", _PURPOSE)
+    zarr = import_extra("zarr", "grid", PURPOSE)
+    codecs = import_extra("zarr.codecs", "grid", PURPOSE)
+    dask = import_extra("dask.array", "grid", PURPOSE)
     facts = {"description": "Whether the point is done"}
     marked = {**layout.variables, DONE: Variable((), (), np.dtype(np.bool_), facts)}
     dataset = made_dataset(
@@ -235,15 +235,6 @@ def expected_keys(grid: Grid, layout: Layout, chunk: Index) -> dict[str, bytes]:
     return {key: bytes(held[key].to_bytes()) for key in names}
 
 
-def _put(folder: Path, key: str, content: bytes, *, replaces: bool) -> None:
-    """Write a key: a reader sees the old content or the new one. Of several processes one does."""
-    zarr = import_extra("zarr", "grid", _PURPOSE)
-    store = zarr.storage.LocalStore(folder)
-    put = store.set if replaces else store.set_if_not_exists
-    buffers = zarr.core.buffer.default_buffer_prototype()
-    zarr.core.sync.sync(put(key, buffers.buffer.from_bytes(content)))
-
-
 @dataclass(frozen=True)
 class GridStore:
     """A prepared store.
@@ -264,7 +255,7 @@ class GridStore:
 
 
 def prepare(
-    folder: Path, grid: Grid, layout: Layout, chunk: Index, part: Part = WHOLE, *, resume: bool
+    keys: Keys, grid: Grid, layout: Layout, chunk: Index, part: Part = WHOLE, *, resume: bool
 ) -> GridStore:
     """Create the store, or examine an existing one and replace damaged metadata of arrays.
 
@@ -272,55 +263,53 @@ def prepare(
     another grid; nothing is written.
     """
     expected = expected_keys(grid, layout, chunk)
-    is_new = is_empty(folder)
-    if not is_new and not resume:
+    held = keys.listed()
+    if held and not resume:
         raise FileExistsError(
-            f"{folder}: the store already has a grid; resume it, or name another store"
+            f"{keys.name}: the store already has a grid; resume it, or name another store"
         )
-    if is_new:
+    if not held:
         # Of processes that start at once, one decides which grid this is.
-        _put(folder, METADATA, expected[METADATA], replaces=False)
-    if changed := [*differences(checked_identity(folder), identity(grid, layout, chunk))]:
+        keys.create(METADATA, expected[METADATA])
+    if changed := [*differences(checked_identity(keys), identity(grid, layout, chunk))]:
         told = "; ".join(changed)
-        raise ValueError(f"{folder}: contains another grid; {told}; delete it or name another")
+        raise ValueError(f"{keys.name}: contains another grid; {told}; delete it or name another")
     if part == WHOLE:
-        # Of processes that were killed while writing. (Other files may be anybody's.)
-        for parent in {(folder / key).parent for key in expected}:
-            for path in parent.glob("*.partial"):
-                if _PARTIAL.fullmatch(path.name):
-                    path.unlink(missing_ok=True)
+        keys.remove_partial(expected)
     for key, content in expected.items():
-        file = folder / key
-        if not file.exists() or file.read_bytes() != content:
-            _put(folder, key, content, replaces=True)
+        is_there = key in held or key == METADATA
+        if not is_there or keys.read(key) != content:
+            keys.write(key, content)
     trailing = {name: len(variable.shape) for name, variable in layout.variables.items()}
-    chunks = Chunks(folder, trailing, chunk)
-    missing, total = [], 0
-    for block in blocks(grid.shape, chunk, layout.ranking, part):
-        total += block.count
-        if any(chunks.problem(name, block) for name in (DONE, *trailing)):
-            (folder / chunks.key(DONE, block)).unlink(missing_ok=True)
+    chunks = Chunks(keys, trailing, chunk)
+    every = list(blocks(grid.shape, chunk, layout.ranking, part))
+    missing = []
+    for block, problems in zip(every, chunks.problems(every, held), strict=True):
+        if any(problems.values()):
+            if problems[DONE] != MISSING:
+                keys.remove(chunks.key(DONE, block))
             missing.append(block)
-    return GridStore(chunks, layout, missing, total)
+    return GridStore(chunks, layout, missing, sum(block.count for block in every))
 
 
-def stored_identity(folder: Path) -> dict[str, Any] | None:
+def stored_identity(keys: Keys) -> dict[str, Any] | None:
     """Return the grid's identity from the group's metadata; None if there is none."""
+    content = keys.read(METADATA)
     try:
-        held = json.loads(json.loads((folder / METADATA).read_bytes())["attributes"][IDENTITY])
-    except (FileNotFoundError, KeyError, TypeError, ValueError, RecursionError):
+        held = json.loads(json.loads(content or b"")["attributes"][IDENTITY])
+    except (KeyError, TypeError, ValueError, RecursionError):
         return None
     return held if isinstance(held, dict) else None
 
 
-def checked_identity(folder: Path) -> dict[str, Any]:
+def checked_identity(keys: Keys) -> dict[str, Any]:
     """Return the grid's identity, or raise ValueError if there is none of this version."""
-    held = stored_identity(folder)
+    held = stored_identity(keys)
     if held is None:
         raise ValueError(
-            f"{folder}: its content is not a grid of vkbloom, or its {METADATA} is damaged"
+            f"{keys.name}: its content is not a grid of vkbloom, or its {METADATA} is damaged"
         )
     version = held.get("format")
     if version != FORMAT:
-        raise ValueError(f"{folder}: its format version {short(version)} is not {FORMAT}")
+        raise ValueError(f"{keys.name}: its format version {short(version)} is not {FORMAT}")
     return held
