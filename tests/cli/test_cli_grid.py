@@ -127,6 +127,17 @@ class TestImageFiles:
             found = reread(tmp_path / "files" / f"00{index}_final.png")[1]
             np.testing.assert_array_equal(found, reread(one)[1])
 
+    def test_masks_and_emissions_as_apply_has_them(self, tmp_path: Path, image_file: Path) -> None:
+        mask = vkbloom.write(tmp_path / "mask.png", np.eye(9, 12, dtype=np.uint8)[..., None] * 255)
+        emission = vkbloom.write(tmp_path / "emission.png", noise(9, 12, 3, dtype="uint8"))
+        words = ("--mask", mask, "--emission", emission)
+        done(image_file, "--axis intensity=1", *words, "-o", tmp_path / "files")
+        calls.run("apply", image_file, tmp_path / "one.png", "--intensity", 1, *words)
+        found = reread(tmp_path / "files" / "000_final.png")[1]
+        np.testing.assert_array_equal(found, reread(tmp_path / "one.png")[1])
+        scene = run("--axis time=0 --mask", mask, "-o", tmp_path / "scene")
+        assert (scene.exit_code, "the source is a scene" in scene.stderr) == (2, True)
+
     def test_a_grey_file_stays_grey(self, tmp_path: Path) -> None:
         write_image(tmp_path / "a.png", noise(9, 12, 1, dtype="uint8"))
         assert run(tmp_path / "a.png", "--axis", "exposure=0", "-o", tmp_path / "g").exit_code == 0

@@ -8,7 +8,7 @@ from typing import Any
 import vkbloom
 from tests.images import noise
 from vkbloom import Frames, Separable
-from vkbloom._grid.keys import open_keys
+from vkbloom._grid.keys import Keys, open_keys
 
 
 class Stop(Exception):
@@ -59,10 +59,14 @@ def make(store: Any, **changes: Any) -> Any:
     return vkbloom.grid(arguments.pop("source", source()), settings, axes, store=store, **arguments)
 
 
+def keys_of(store: Any) -> Keys:
+    return open_keys(store)
+
+
 def contents(store: Any) -> dict[str, bytes | None]:
     """Return the bytes of each key; of a folder, of each file below it by its path in it."""
     if not isinstance(store, Path):
-        keys = open_keys(store)
+        keys = keys_of(store)
         return {key: keys.read(key) for key in keys.listed()}
     return {
         str(path.relative_to(store)): path.read_bytes()

@@ -79,14 +79,16 @@ def test_workers_write_what_one_process_writes(
     assert made["done"].values.all()
 
 
-def test_workers_write_to_a_cloud(client: Any, s3: str, undisturbed: Path) -> None:
+def test_workers_write_to_a_cloud(client: Any, s3: str, tmp_path: Path) -> None:
     url = "s3://grids/cluster.zarr"
     # The workers have other variables of the environment than this process.
     options = {"endpoint_url": s3, "key": "anything", "secret": "anything"}
     store = pytest.importorskip("zarr").storage.FsspecStore.from_url(url, storage_options=options)
-    made = make(store, client=client)
+    mask = np.linspace(0, 1, 16 * 21, dtype=np.float32).reshape(16, 21)
+    made = make(store, client=client, mask=mask)
     assert made["done"].values.all()
-    assert contents(store) == contents(undisturbed)
+    make(tmp_path / "a.zarr", mask=mask)
+    assert contents(store) == contents(tmp_path / "a.zarr")
 
 
 def test_killed_worker_is_replaced(client: Any, tmp_path: Path, undisturbed: Path) -> None:

@@ -17,10 +17,9 @@ import pytest
 import vkbloom
 from tests.cli.calls import run
 from tests.grid.grid_in_parts import render
-from tests.grid.stores import contents
+from tests.grid.stores import contents, keys_of
 from tests.images import noise
 from vkbloom import check_grid
-from vkbloom._grid.keys import open_keys
 from vkbloom._grid.layout import Grid, Layout, Variable, ask
 from vkbloom._grid.order import blocks
 from vkbloom._grid.store import prepare
@@ -97,7 +96,7 @@ def test_a_store_is_created_at_once(tmp_path: Path, turn: int) -> None:
         asked = laid_out(grids[number - 1])
         start.wait(60)
         try:
-            prepare(open_keys(tmp_path / "a.zarr"), *asked, (1,), (number, 4), resume=True)
+            prepare(keys_of(tmp_path / "a.zarr"), *asked, (1,), (number, 4), resume=True)
         except ValueError as error:
             return str(error)
         return ""
@@ -109,7 +108,7 @@ def test_a_store_is_created_at_once(tmp_path: Path, turn: int) -> None:
     assert len(refused) == 2, said
     created = next(grid for grid, text in zip(grids, said, strict=True) if not text)
     for number in (1, 3) if created == 0.25 else (2, 4):
-        prepare(open_keys(tmp_path / "alone"), *laid_out(created), (1,), (number, 4), resume=True)
+        prepare(keys_of(tmp_path / "alone"), *laid_out(created), (1,), (number, 4), resume=True)
     assert contents(tmp_path / "a.zarr") == contents(tmp_path / "alone")
 
 

@@ -127,6 +127,28 @@ class TestWhole:
         with pytest.raises(ValueError, match=r"source\.images"):
             made(255 - levels, store=store)
 
+    def test_masks_and_emissions_beside_an_array(self, tmp_path: Path, renderer: Renderer) -> None:
+        levels = np.arange(16 * 21, dtype=np.uint16).reshape(16, 21).astype(np.uint8)
+        beside: dict[str, Any] = {
+            "mask": levels,
+            "emission": noise(16, 21, 3, dtype="float32", seed=9),
+        }
+        plain: dict[str, Any] = {"axes": {"exposure": [0.0, 1.0]}, "chunks": None, "reduce": None}
+        store = tmp_path / "glow.zarr"
+        grid = make(store, **beside, **plain)
+        for index, exposure in enumerate((0.0, 1.0)):
+            expected = renderer.apply(source(), Separable(exposure=exposure), **beside)
+            for name in ("final", "bloom"):
+                assert np.array_equal(grid[name][index], expected[name])
+        in_memory = make(None, **beside, **plain)
+        assert np.array_equal(in_memory["bloom"], grid["bloom"])
+        kept = contents(store)
+        make(store, **beside, **plain)
+        assert contents(store) == kept
+        for name, array in beside.items():
+            with pytest.raises(ValueError, match=r"source\.images"):
+                make(store, **{**beside, name: array[::-1].copy()}, **plain)
+
     def test_default_chunks_hold_about_a_megabyte(self, tmp_path: Path) -> None:
         axes = {"intensity": np.linspace(0, 1, 40), "blur_scale": np.linspace(1, 2, 3)}
         picture = noise(128, 96, 3, dtype="uint8")

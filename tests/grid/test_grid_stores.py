@@ -14,11 +14,9 @@ import vkbloom
 from tests.cli import calls
 from tests.grid.conftest import KINDS
 from tests.grid.grid_in_parts import render
-from tests.grid.stores import AXES, contents, make
+from tests.grid.stores import AXES, colour, contents, keys_of, make
 from tests.images import noise
-from vkbloom import Separable, check_grid
-from vkbloom._grid.keys import open_keys
-from vkbloom._grid.store import Chunks
+from vkbloom import Frames, Separable, check_grid
 
 xr = pytest.importorskip("xarray")
 zarr = pytest.importorskip("zarr")
@@ -26,7 +24,21 @@ zarr = pytest.importorskip("zarr")
 pytestmark = pytest.mark.usefixtures("kept_renderers")
 
 ROOT = Path(__file__).resolve().parents[2]
-FORTY: dict[str, Any] = {"axes": {**AXES, "exposure": [0.0, 1.0, 2.0, 3.0, 4.0]}}
+#: How many points are left until the user interrupts the call.
+LEFT = [1000]
+
+
+def mean(frames: Frames) -> float:
+    LEFT[0] -= 1
+    if LEFT[0] == 0:
+        raise KeyboardInterrupt
+    return float(frames["final"].mean())
+
+
+FORTY: dict[str, Any] = {
+    "axes": {**AXES, "exposure": [0.0, 1.0, 2.0, 3.0, 4.0]},
+    "reduce": {"mean": mean, "colour": colour},
+}
 
 
 @pytest.fixture(scope="module")
@@ -44,28 +56,20 @@ def test_every_store_does_what_a_folder_does(
     store = elsewhere
     with pytest.raises(FileNotFoundError, match="does not exist or is empty"):
         check_grid(store)
-    written: list[Any] = []
-    write = Chunks.write
-
-    def interrupted(self: Chunks, block: Any, arrays: Any) -> None:
-        if len(written) == 3:
-            raise KeyboardInterrupt
-        written.append(block)
-        write(self, block, arrays)
-
-    with monkeypatch.context() as patched:
-        patched.setattr(Chunks, "write", interrupted)
-        with pytest.raises(KeyboardInterrupt):
-            make(store, **FORTY)
+    monkeypatch.setattr(sys.modules[__name__], "LEFT", [20])
+    with pytest.raises(KeyboardInterrupt):
+        make(store, **FORTY)
+    monkeypatch.undo()
     report = check_grid(store)
-    assert (report.done, report.problems) == (sum(block.count for block in written), ())
+    assert (report.points, report.problems) == (40, ())
+    assert 0 < report.done < 20
     for part in ("2/2", "1/2"):
         made = make(store, **FORTY, part=part)
     assert made["done"].values.all()
     whole = contents(forty)
     assert contents(store) == whole
 
-    keys = open_keys(store)
+    keys = keys_of(store)
     keys.write("final/c.0.0.1.0.0.0", (whole["final/c.0.0.1.0.0.0"] or b"")[:-7])
     keys.remove("mean/c.1.1.0")
     problems = sorted(check_grid(store).problems)
@@ -91,7 +95,7 @@ def test_every_store_does_what_a_folder_does(
 def test_of_processes_that_start_at_once_one_creates_the_store(
     elsewhere: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    keys = open_keys(elsewhere)
+    keys = keys_of(elsewhere)
     keys.create("zarr.json", b"first")
 
     async def is_there(*_: object) -> bool:

@@ -22,6 +22,7 @@ import vkbloom
 from vkbloom._background_writer import written_in_background
 from vkbloom._cli import no_bloom
 from vkbloom._cli.fields import Command
+from vkbloom._cli.glows import glow_options, read_glows
 from vkbloom._cli.image_files import (
     check_input_colour,
     finished,
@@ -36,9 +37,7 @@ from vkbloom._cli.sequences import PIPE, check_targets, is_stream, pairs, shown
 from vkbloom._cli.settings_options import Start, start_options
 from vkbloom._cli.terminal import complain, hides_progress, note, say, tell_device
 from vkbloom._io import image_writing, safe_writing
-from vkbloom._io.array_files import premultiplied
 from vkbloom._io.displayed import PRIMARIES, Saved
-from vkbloom._io.glows import alike, grey_mask
 from vkbloom._io.images import Colour, Highlights, Picture, SavedColour
 from vkbloom._io.narrowing import narrowed, narrowing_note
 from vkbloom._locks import cached_property
@@ -230,17 +229,12 @@ class Run:
     def _read_glow(self, is_blended: bool) -> Glow:
         """Return a function that gives mask and emission for an image."""
         options = self.options
-        given: dict[str, NDArray[Any]] = {}
-        if options.mask is not None:
-            mask = read_picture(options.mask, 0, "linear").pixels
-            given["mask"] = grey_mask(mask, options.mask)
-        if options.emission is None:
-            return lambda image: given
-        emission = read_picture(options.emission, 0, options.input_colour)
-        glow = (premultiplied(emission) if is_blended else emission).pixels
-        if options.half:
-            _tell_narrowing(options.emission, glow)
-        return lambda image: {**given, "emission": alike(glow, image)}
+        glows = read_glows(
+            options.mask, options.emission, options.input_colour, is_blended=is_blended
+        )
+        if options.half and options.emission is not None and glows.emission is not None:
+            _tell_narrowing(options.emission, glows.emission)
+        return glows.of
 
     def _write(
         self,
@@ -346,12 +340,7 @@ def _send(file: Path, target: str) -> None:
     "--skip-existing", is_flag=True, help="Leave out images whose OUT is there and complete."
 )
 @reading_options
-@click.option(
-    "--mask", metavar="FILE", type=click.Path(), help="A grey image: white glows, black does not."
-)
-@click.option(
-    "--emission", metavar="FILE", type=click.Path(), help="An image that glows instead of IN."
-)
+@glow_options
 @adapter_option
 @start_options
 def command(*, sources: tuple[str, ...], out: str | None, adapter: str, **given: Any) -> int:

@@ -11,7 +11,7 @@ import click
 import numpy as np
 
 import vkbloom
-from vkbloom._cli import fields, image_files, no_bloom, program, terminal
+from vkbloom._cli import fields, glows, image_files, no_bloom, program, terminal
 from vkbloom._cli.scene_options import scene_options
 from vkbloom._cli.settings_options import DEFAULT_PRESETS, settings_options
 from vkbloom._grid import filling, layout, order, sources
@@ -42,6 +42,7 @@ _PRESETS: Final = fields.NameOf("preset", vkbloom.presets)
 @click.option("--part", metavar="I/N", help="Render part I of N, from 1, as above")
 @image_files.input_colour_option
 @image_files.reading_options
+@glows.glow_options
 @program.adapter_option
 @scene_options
 @settings_options
@@ -66,13 +67,8 @@ def command(
     with program.as_wrong_use():
         safe_writing.writer_of(f"image{suffix}")
         part = order.read_part(given["part"])
-    if (out is None) == (store is None):
-        raise click.UsageError("give either --out or --store, where the grid is written")
-    if store is None and out is not None and out.endswith(".zarr"):
-        store = out
-    if out is not None and store is None and Path(out).suffix and not Path(out).is_dir():
-        hint = f"name a folder, and give --image-format {Path(out).suffix[1:]}"
-        raise click.UsageError(f"--out: {out} is not NAME.zarr; for an image of each point {hint}")
+    folder = _folder_of(out, store)
+    target = str(store or out)
     if not words:
         raise click.UsageError("there is no --axis; give one, such as exposure=-1:1:5")
     settings: vkbloom.Settings | None = given["settings"]
@@ -84,26 +80,47 @@ def command(
     # The presets of an axis differ in whether they expand.
     expand: float | None = given["expand"] if settings or program.given("expand") else None
     picture = None
-    if source is not None:
-        reading = {name: given[name] for name in ("subimage", "layer")}
-        picture = image_files.read_picture(source, colour=given["input_colour"], **reading)
-        picture = developed(picture, expand, _alpha_of(axes, settings))
-    looked_at = given["scene"]() if picture is None else picture.pixels
-    names = given["framebuffers"].split(",")
     shared = {name: given[name] for name in ("size", "shading", "time")}
+    if source is None:
+        for name in ("mask", "emission"):
+            if given[name] is not None:
+                raise click.UsageError(f"--{name}: the source is a scene; name an IMAGE")
+        looked_at = given["scene"]()
+    else:
+        reading = {name: given[name] for name in ("subimage", "layer")}
+        alpha = _alpha_of(axes, settings)
+        picture = image_files.read_picture(source, colour=given["input_colour"], **reading)
+        picture = developed(picture, expand, alpha)
+        looked_at = picture.pixels
+        files = given["mask"], given["emission"], given["input_colour"]
+        shared |= glows.read_glows(*files, is_blended=alpha != "keep").of(looked_at)
+    names = given["framebuffers"].split(",")
     shared["framebuffers"] = "all" if names == ["all"] else names
     with program.as_wrong_use():
         grid = layout.ask(looked_at, settings, axes, reduce=None, **shared)
     with opened_renderer(given["adapter"]) as renderer:
         _note_no_bloom(grid, renderer)
-        if store is not None:
+        if folder is None:
             shared |= {"part": part, "progress": not terminal.is_quiet()}
-            vkbloom.grid(looked_at, settings, axes, store=store, renderer=renderer, **shared)
-        elif out is not None:
+            vkbloom.grid(looked_at, settings, axes, store=target, renderer=renderer, **shared)
+        else:
             how: dict[str, Any] = {"suffix": suffix, "picture": picture, "expand": expand}
-            _write_images(grid, Path(out), renderer, part=part, **how)
+            _write_images(grid, folder, renderer, part=part, **how)
     which = f"part {part[0]}/{part[1]} of " if given["part"] else ""
-    terminal.say(f"wrote {store or out}, {which}{math.prod(grid.shape)} points")
+    terminal.say(f"wrote {target}, {which}{math.prod(grid.shape)} points")
+
+
+def _folder_of(out: str | None, store: str | None) -> Path | None:
+    """Return the folder of a grid's image files; None for a store."""
+    if (out is None) == (store is None):
+        raise click.UsageError("give either --out or --store, where the grid is written")
+    if out is None or out.endswith(".zarr"):
+        return None
+    folder = Path(out)
+    if folder.suffix and not folder.is_dir():
+        hint = f"name a folder, and give --image-format {folder.suffix[1:]}"
+        raise click.UsageError(f"--out: {out} is not NAME.zarr; for an image of each point {hint}")
+    return folder
 
 
 def _alpha_of(axes: Mapping[str, Sequence[Any]], settings: vkbloom.Settings | None) -> str:

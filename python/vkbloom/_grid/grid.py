@@ -53,6 +53,8 @@ def grid(
     size: tuple[int, int] | None = None,
     shading: Shading = "forward",
     time: float = 0.0,
+    mask: NDArray[Any] | None = None,
+    emission: NDArray[Any] | None = None,
     framebuffers: Literal["all"] | str | Sequence[str] = ("final",),
     reduce: Mapping[str, Callable[[Frames], Any]] | None = None,
     store: Any = None,
@@ -83,6 +85,8 @@ def grid(
         Width and height of a scene's frames. Default: (1280, 720).
     shading, time
         Of a scene, as for `render`.
+    mask, emission : ndarray, optional
+        As for `apply`, the same at all points. An uploaded image has its own.
     framebuffers : "all" or sequence of str
         The framebuffers to keep. Each must have the same shape at all points. Its dtype must be
         uint8 at all points, or a float type at all points. Floats are stored in the largest of
@@ -172,6 +176,8 @@ def grid(
         time=time,
         framebuffers=framebuffers,
         reduce=reduce,
+        mask=mask,
+        emission=emission,
     )
     with ExitStack() as stack:
         if client is None and adapter is not None:

@@ -133,11 +133,13 @@ def ask(
     time: float,
     framebuffers: str | Sequence[str],
     reduce: Reduce | None,
+    mask: object = None,
+    emission: object = None,
 ) -> Grid:
     """Check the arguments that all grids share."""
     if settings is not None:
         settings = check_settings(settings)
-    checked = read_source(source, size, shading, time)
+    checked = read_source(source, size, shading, time, mask=mask, emission=emission)
     grid_axes = read_axes(settings, {} if axes is None else axes, has_time=checked.has_time)
     names = check_framebuffers(framebuffers)
     reductions = {} if reduce is None else dict(reduce)

@@ -14,7 +14,6 @@ import numpy as np
 from vkbloom import _core
 from vkbloom._framebuffers import check_framebuffers
 from vkbloom._grid.order import Index
-from vkbloom._image_arguments import check_image
 from vkbloom._locks import cached_property
 from vkbloom._numbers import check_size, check_time
 from vkbloom._renderer.device_arrays import ImportedArray
@@ -22,14 +21,19 @@ from vkbloom._renderer.frames import Frames
 from vkbloom._renderer.image import Image
 from vkbloom._renderer.renderer import Renderer
 from vkbloom._renderer.requests import Request
-from vkbloom._renderer.sources import SCENE_SIZE, image_source, is_image, scene_source
+from vkbloom._renderer.sources import (
+    SCENE_SIZE,
+    Inputs,
+    checked_inputs,
+    image_source,
+    is_image,
+    scene_source,
+)
 from vkbloom._scene import Scene
 from vkbloom._scene.arrays import Constructed
 from vkbloom._settings.settings import Settings, check_shading
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from vkbloom._renderer.plans import Plan
     from vkbloom._scene import Scene
     from vkbloom._settings.settings import Shading
@@ -64,12 +68,12 @@ def visit(
 
 @dataclass(eq=False)
 class ImageSource(Constructed):
-    """An image."""
+    """An image with its mask and emission: arrays, or an uploaded image."""
 
     has_time: ClassVar = False
     time: ClassVar = 0.0
 
-    image: NDArray[Any] | Image
+    image: Inputs | Image
     _uploaded: tuple[_core.Renderer, _core.Source] | None = dataclasses.field(
         default=None, init=False
     )
@@ -85,24 +89,31 @@ class ImageSource(Constructed):
 
     def plan(self, renderer: Renderer, settings: Settings) -> Plan:
         """Return the plan of the image."""
-        return renderer.plan(self.image, settings)
+        pixels: Any = self.image if isinstance(self.image, Image) else self.image.image
+        return renderer.plan(pixels, settings)
 
     def for_core(self, time: float) -> _core.Source:
         """Return the core's Source of the image."""
-        return image_source(self.image)
+        return image_source(self.image) if isinstance(self.image, Image) else self.image.source()
 
     @cached_property
     def description(self) -> dict[str, Any]:
-        """The identity of the source: shape, dtype and digest."""
+        """The identity of the source: shape, dtype and digests."""
         return {"kind": "image", "images": [_described(self.image)]}
 
 
-def _described(image: NDArray[Any] | Image) -> dict[str, Any]:
+def _described(image: Inputs | Image) -> dict[str, Any]:
     """Return the identity of an image; of an uploaded one what is on the host: mask, emission."""
-    arrays = image._inputs if isinstance(image, Image) else {"sha256": image}
+    pixels: Any = image if isinstance(image, Image) else image.image
+    if isinstance(image, Image):
+        arrays = image._inputs
+    else:
+        arrays = {
+            "sha256" if name == "image" else name: part for name, part in image.named().items()
+        }
     return {
-        "shape": list(image.shape),
-        "dtype": image.dtype.name,
+        "shape": list(pixels.shape),
+        "dtype": pixels.dtype.name,
         **{
             name: digest(part.numpy() if isinstance(part, ImportedArray) else part)
             for name, part in arrays.items()
@@ -152,9 +163,20 @@ class SceneSource(Constructed):
 Source: TypeAlias = ImageSource | SceneSource
 
 
-def read_source(source: object, size: tuple[int, int] | None, shading: str, time: float) -> Source:
+def read_source(
+    source: object,
+    size: tuple[int, int] | None,
+    shading: str,
+    time: float,
+    *,
+    mask: object = None,
+    emission: object = None,
+) -> Source:
     """Check the source of a grid."""
     if isinstance(source, Scene):
+        for name, array in (("mask", mask), ("emission", emission)):
+            if array is not None:
+                raise ValueError(f"{name}: the source is not an image; leave the argument out")
         frame = check_size("size", size or SCENE_SIZE)
         return SceneSource(source, frame, check_shading(shading), check_time(time))
     for name, is_given in (
@@ -166,7 +188,11 @@ def read_source(source: object, size: tuple[int, int] | None, shading: str, time
             raise ValueError(f"{name}: the source is not a scene; leave the argument out")
     if not is_image(source):
         raise TypeError(f"source: {type(source).__name__} is not a Scene or an image")
-    return ImageSource(source if isinstance(source, Image) else check_image(source, "source"))
+    if isinstance(source, Image):
+        # Raises if there is a mask or an emission, too.
+        image_source(source, mask, emission)
+        return ImageSource(source)
+    return ImageSource(checked_inputs(source, mask, emission, name="source"))
 
 
 def digest(value: object) -> str:
