@@ -6,7 +6,6 @@ import base64
 import json
 import math
 import struct
-import sys
 import warnings
 from collections.abc import Callable
 from pathlib import Path
@@ -393,14 +392,6 @@ def test_everything_left_out_is_named_in_one_warning(tmp_path: Path) -> None:
         "without positions",
     ):
         assert part in message
-
-
-def test_without_pygltflib_the_message_says_what_to_install(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setitem(sys.modules, "pygltflib", None)
-    with pytest.raises(ModuleNotFoundError, match=r"pip install vkbloom\["):
-        triangle().load(tmp_path)
 
 
 # Files that point elsewhere

@@ -269,18 +269,16 @@ class _Loader:
 
     def _geometry(self, primitive: Parsed, what: str) -> _Geometry | None:
         """Read a primitive; None if it has no triangles."""
-        if not hasattr(primitive, "attributes"):
-            self._file.fail(f"{what} is not an object")
-        mode = self._file.integer(primitive.mode, f"{what}.mode", 0, _FAN)
+        primitive = self._file.part(primitive, what)
+        attributes = self._file.part(primitive.attributes, f"{what}.attributes")
+        mode = _TRIANGLES if primitive.mode is None else primitive.mode
+        mode = self._file.integer(mode, f"{what}.mode", 0, _FAN)
         if mode in _LINE_MODES:
             self._file.leave_out(_LINE_MODES[mode])
             return None
         if primitive.targets:
             self._file.leave_out("morph targets")
-        attribute = {
-            name: getattr(primitive.attributes, name, None)
-            for name in ("POSITION", "NORMAL", "COLOR_0")
-        }
+        attribute = {name: getattr(attributes, name) for name in ("POSITION", "NORMAL", "COLOR_0")}
         if attribute["POSITION"] is None:
             self._file.leave_out("primitives without positions")
             return None
@@ -324,7 +322,7 @@ class _Loader:
         for column, use in ((0, material.base_texture), (2, material.emission_texture)):
             if use is None:
                 continue
-            index = getattr(primitive.attributes, use.coordinates, None)
+            index = getattr(primitive.attributes, use.coordinates)
             if index is None:
                 self._file.fail(
                     f"damaged: {what} has no {use.coordinates}, "
@@ -356,16 +354,13 @@ class _Loader:
             return _Material(np.ones(3), np.zeros(3))
         material = self._file.item("materials", index, what)
         what = f"materials[{index}]"
-        factor = np.ones(3)
-        base_texture = None
-        metal = material.pbrMetallicRoughness
-        if metal is not None:
-            factor = self._file.floats(
-                metal.baseColorFactor, f"{what}.baseColorFactor", (1, 1, 1, 1), low=0.0
-            )[:3]
-            base_texture = self._textures.use(metal.baseColorTexture, f"{what}.baseColorTexture")
-            if metal.metallicRoughnessTexture is not None:
-                self._file.leave_out("metallic-roughness textures")
+        metal = self._file.part(material.pbrMetallicRoughness, f"{what}.pbrMetallicRoughness")
+        factor = self._file.floats(
+            metal.baseColorFactor, f"{what}.baseColorFactor", (1, 1, 1, 1), low=0.0
+        )[:3]
+        base_texture = self._textures.use(metal.baseColorTexture, f"{what}.baseColorTexture")
+        if metal.metallicRoughnessTexture is not None:
+            self._file.leave_out("metallic-roughness textures")
         if material.normalTexture is not None:
             self._file.leave_out("normal textures")
         if material.occlusionTexture is not None:
@@ -385,12 +380,9 @@ class _Loader:
         emission = self._file.floats(
             material.emissiveFactor, f"{what}.emissiveFactor", (0, 0, 0), low=0.0
         )
-        extensions = material.extensions
-        if isinstance(extensions, dict) and EMISSIVE_STRENGTH in extensions:
-            extension = extensions[EMISSIVE_STRENGTH]
-            if not isinstance(extension, dict):
-                self._file.fail(f"{what}.{EMISSIVE_STRENGTH} is not an object")
-            strength = [extension.get("emissiveStrength", 1.0)]
+        extension = self._file.extension(material, EMISSIVE_STRENGTH, what)
+        if extension is not None and extension.emissiveStrength is not None:
+            strength = [extension.emissiveStrength]
             emission *= self._file.floats(strength, f"{what}.emissiveStrength", (1,), low=0.0)
             if emission.max() > MAX_FLOAT:
                 self._file.fail(f"{what} emits more than float32 can hold")

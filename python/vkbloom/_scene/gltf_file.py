@@ -1,7 +1,7 @@
 """glTF 2.0 and GLB files: the container, checked access to the JSON, accessors and buffers.
 
-pygltflib turns the JSON into objects with few checks, so everything that is used is checked here.
-Files are not trusted: a URI must not lead out of the file's folder, sizes are checked before memory
+Everything that is used is checked where it is read; other members may have any value. Files are not
+trusted: a URI must not lead out of the file's folder, sizes are checked before memory
 is allocated, and every defect becomes a ValueError that names the file.
 
 Section numbers are those of the "glTF 2.0 Specification", version 2.0.1, Khronos Group.
@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import base64
 import binascii
-import dataclasses
 import json
 import os
 import re
@@ -25,12 +24,9 @@ from urllib.parse import unquote
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom._extras import import_extra
 from vkbloom._formats import MAX_FLOAT
 
 Floats: TypeAlias = NDArray[np.float64]
-# An object of pygltflib, which has no type hints.
-Parsed: TypeAlias = Any
 
 FLOAT: Final = 5126
 INTEGERS: Final = (5121, 5123, 5125)
@@ -41,28 +37,35 @@ TEXTURE_TRANSFORM: Final = "KHR_texture_transform"
 MAX_VERTICES: Final = 2**24
 _COMPONENTS: Final = {5121: "<u1", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 _WIDTHS: Final = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
-# Of any object. They are dropped before pygltflib sees them, since it refuses odd values in them.
-_UNREAD: Final = (
-    *("cameras", "copyright", "extras", "generator", "max", "min", "name", "skins", "target"),
-    "weights",
-)
 _EXTENSIONS: Final = frozenset({EMISSIVE_STRENGTH, TEXTURE_TRANSFORM})
 # Of compressed bytes. The number of texels is checked when the image is decoded.
 _MAX_IMAGE_BYTES: Final = 2**30
+
+
+class Parsed:
+    """An object of the JSON, with its members as attributes; a missing one is None."""
+
+    def __init__(self, members: dict[str, Any]) -> None:
+        self.__dict__.update(members)
+
+    def __getattr__(self, name: str) -> Any:
+        return None
+
+    def __repr__(self) -> str:
+        return repr(self.__dict__)
 
 
 class GltfFile:
     """An opened file: its parsed JSON, its buffers, and the list of things that are not loaded."""
 
     def __init__(self, path: Path) -> None:
-        pygltflib = import_extra("pygltflib", "scenes", "Reading glTF files")
         self.path = path
         # A dict, which keeps the order and names each thing once.
         self.left_out: dict[str, None] = {}
         self._buffers: dict[object, bytes] = {}
         data = path.read_bytes()
         text, self._blob = self._split_glb(data) if data[:4] == b"glTF" else (data, None)
-        self.root = self._parsed(text, pygltflib)
+        self.root = self._parsed(text)
 
     def fail(self, what: str) -> NoReturn:
         """Raise a ValueError that names the file and what is wrong with it."""
@@ -70,7 +73,7 @@ class GltfFile:
 
     # The container and its header
 
-    def _parsed(self, text: bytes, pygltflib: Any) -> Parsed:
+    def _parsed(self, text: bytes) -> Parsed:
         try:
             # Some exporters pad the JSON chunk with NUL, where 4.4.3.2 requires spaces.
             document = json.loads(
@@ -82,19 +85,10 @@ class GltfFile:
             raise ValueError(
                 f"{self.path}: not a glTF 2.0 document ({type(error).__name__}: {error})"
             ) from error
-        if not isinstance(document, dict):
+        if not isinstance(document, Parsed):
             self.fail("not a glTF 2.0 document: a JSON object is needed")
         self._check_asset(document)
-        try:
-            return pygltflib.GLTF2.from_json(json.dumps(document), infer_missing=True)
-        except MemoryError:
-            raise
-        # For values of a wrong type, the parser raises any error of its Python code:
-        # AttributeError, KeyError and others. All of them mean the same.
-        except Exception as error:
-            raise ValueError(
-                f"{self.path}: not a glTF 2.0 document ({type(error).__name__}: {error})"
-            ) from error
+        return document
 
     def _split_glb(self, data: bytes) -> tuple[bytes, bytes | None]:
         """Split a GLB (4.4) into its JSON and its binary chunk."""
@@ -120,19 +114,19 @@ class GltfFile:
         blob = chunks[1][1] if len(chunks) > 1 and chunks[1][0] == b"BIN\0" else None
         return chunks[0][1], blob
 
-    def _check_asset(self, document: dict[str, Any]) -> None:
+    def _check_asset(self, document: Parsed) -> None:
         # Optional in glTF 1.0.
-        asset = document.get("asset")
-        asset = asset if isinstance(asset, dict) else {}
-        version = asset.get("version")
+        asset = document.asset if isinstance(document.asset, Parsed) else Parsed({})
+        version = asset.version
         if not isinstance(version, str) or not version.startswith("2."):
             given = "missing" if version is None else reprlib.repr(version)
             self.fail(f"glTF version (asset.version) is {given}; 2.0 is needed")
-        minimum = asset.get("minVersion", "2.0")
+        minimum = "2.0" if asset.minVersion is None else asset.minVersion
         if not isinstance(minimum, str) or not re.fullmatch(r"1\.\d+|2\.0", minimum):
             self.fail(f"needs at least glTF {reprlib.repr(minimum)}; 2.0 is supported")
         for field in ("extensionsRequired", "extensionsUsed"):
-            names = document.get(field, [])
+            names = getattr(document, field)
+            names = [] if names is None else names
             if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
                 self.fail(f"{field} is not a list of names")
             unknown = [name for name in names if name not in _EXTENSIONS]
@@ -140,7 +134,7 @@ class GltfFile:
                 self.fail(f"needs extensions that are not supported: {', '.join(unknown)}")
             for name in unknown:
                 self.leave_out(f"extension {name}")
-        if document.pop("animations", None):
+        if document.animations:
             self.leave_out("animations")
 
     # Checked access to the parsed JSON
@@ -151,7 +145,8 @@ class GltfFile:
 
     def items(self, field: str) -> list[Parsed]:
         """Return one of the root's lists; an empty one if it is missing."""
-        items = getattr(self.root, field) or []
+        items = getattr(self.root, field)
+        items = [] if items is None else items
         if not isinstance(items, list):
             self.fail(f"{field} is not a list")
         return items
@@ -162,9 +157,20 @@ class GltfFile:
         if not items:
             self.fail(f"{user}: index into {field} is {reprlib.repr(index)}; there are none")
         item = items[self.integer(index, f"{user}: index into {field}", 0, len(items) - 1)]
-        if not dataclasses.is_dataclass(item):
-            self.fail(f"{field}[{index}] is not an object")
-        return item
+        return self.part(item, f"{field}[{index}]")
+
+    def part(self, value: object, what: str) -> Parsed:
+        """Return `value` if it is an object; an empty one for None."""
+        if value is None:
+            return Parsed({})
+        if not isinstance(value, Parsed):
+            self.fail(f"{what} is not an object")
+        return value
+
+    def extension(self, owner: Parsed, name: str, what: str) -> Parsed | None:
+        """Return an extension of an object; None if it has none of this name."""
+        given = getattr(self.part(owner.extensions, f"{what}.extensions"), name)
+        return None if given is None else self.part(given, f"{what}.{name}")
 
     def integer(self, value: object, what: str, low: int, high: int) -> int:
         """Return `value` if it is an integer in low..high."""
@@ -241,11 +247,11 @@ class GltfFile:
             return elements
         return self._with_sparse(accessor.sparse, elements, what)
 
-    def _with_sparse(self, sparse: Parsed, elements: NDArray[Any], what: str) -> NDArray[Any]:
+    def _with_sparse(self, sparse: object, elements: NDArray[Any], what: str) -> NDArray[Any]:
         """Return `elements` with those replaced that the sparse part contains (3.6.2.3)."""
-        indices: Parsed = getattr(sparse, "indices", None)
-        values: Parsed = getattr(sparse, "values", None)
-        if not hasattr(indices, "componentType") or not hasattr(values, "bufferView"):
+        sparse = self.part(sparse, f"{what}.sparse")
+        indices, values = sparse.indices, sparse.values
+        if not isinstance(indices, Parsed) or not isinstance(values, Parsed):
             self.fail(f"damaged: {what}.sparse lacks its indices or its values")
         count = self.integer(sparse.count, f"{what}.sparse.count", 1, len(elements))
         if indices.componentType not in INTEGERS:
@@ -272,8 +278,7 @@ class GltfFile:
         data = self._buffer(view.buffer, user)
         start = self.integer(view.byteOffset or 0, f"{user}.byteOffset", 0, len(data))
         length = self.integer(view.byteLength, f"{user}.byteLength", 1, len(data) - start)
-        offset = getattr(part, "byteOffset", None) or 0
-        inside = self.integer(offset, f"{what}.byteOffset", 0, length)
+        inside = self.integer(part.byteOffset or 0, f"{what}.byteOffset", 0, length)
         size = width * dtype.itemsize
         stride = size
         if view.byteStride is not None:
@@ -318,7 +323,8 @@ class GltfFile:
             length = self.integer(
                 view.byteLength, f"bufferViews[{image.bufferView}].byteLength", 1, 2**63 - 1
             )
-            return self._elements(image, length, 1, np.dtype(np.uint8), what).tobytes()
+            whole = Parsed({"bufferView": image.bufferView})
+            return self._elements(whole, length, 1, np.dtype(np.uint8), what).tobytes()
         return self._resource(image.uri, None, what)
 
     def _resource(self, uri: object, length: int | None, what: str) -> bytes:
@@ -372,9 +378,9 @@ class GltfFile:
             ) from error
 
 
-def _read_parts(value: dict[str, Any]) -> dict[str, Any]:
-    """Drop what is not read, and null, which some exporters write for what is missing."""
-    return {key: part for key, part in value.items() if part is not None and key not in _UNREAD}
+def _read_parts(members: dict[str, Any]) -> Parsed:
+    """Return an object without null, which some exporters write for what is missing."""
+    return Parsed({name: value for name, value in members.items() if value is not None})
 
 
 def _number(text: str) -> float:

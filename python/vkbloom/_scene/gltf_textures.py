@@ -67,10 +67,11 @@ class TextureReader:
         self._textures: dict[tuple[object, object], Texture] = {}
         self._texels = 0
 
-    def use(self, info: Parsed, what: str) -> TextureUse | None:
+    def use(self, info: object, what: str) -> TextureUse | None:
         """Read the texture of a material's textureInfo, if there is one with a supported image."""
         if info is None:
             return None
+        info = self._file.part(info, what)
         texture = self._file.item("textures", info.index, what)
         user = f"textures[{info.index}]"
         if texture.source is None:
@@ -78,29 +79,30 @@ class TextureReader:
             return None
         coordinate_set = 0 if info.texCoord is None else info.texCoord
         transform = np.eye(3)[:2]
-        extensions = info.extensions
-        if isinstance(extensions, dict) and TEXTURE_TRANSFORM in extensions:
-            given = extensions[TEXTURE_TRANSFORM]
-            if not isinstance(given, dict):
-                self._file.fail(f"{what}.{TEXTURE_TRANSFORM} is not an object")
+        given = self._file.extension(info, TEXTURE_TRANSFORM, what)
+        if given is not None:
             transform = self._transform(given, what)
-            coordinate_set = given.get("texCoord", coordinate_set)
+            coordinate_set = coordinate_set if given.texCoord is None else given.texCoord
         coordinate_set = self._file.integer(coordinate_set, f"{what}.texCoord", 0, 2**31 - 1)
+        self._file.item("images", texture.source, user)
+        if texture.sampler is not None:
+            self._file.item("samplers", texture.sampler, user)
         key = (texture.source, texture.sampler)
         if key not in self._textures:
             self._textures[key] = self._texture(texture, user)
         return TextureUse(self._textures[key], f"TEXCOORD_{coordinate_set}", transform)
 
-    def _transform(self, given: dict[str, Any], what: str) -> Floats:
+    def _transform(self, given: Parsed, what: str) -> Floats:
         """Return the matrix ``(2, 3)`` of KHR_texture_transform: offset * rotation * scale.
 
         With v pointing down, the rotation appears counter-clockwise, as in the example in the
         extension's specification.
         """
         what = f"{what}.{TEXTURE_TRANSFORM}"
-        offset = self._file.floats(given.get("offset"), f"{what}.offset", (0, 0))
-        scale = self._file.floats(given.get("scale"), f"{what}.scale", (1, 1))
-        (angle,) = self._file.floats([given.get("rotation", 0.0)], f"{what}.rotation", (0,))
+        offset = self._file.floats(given.offset, f"{what}.offset", (0, 0))
+        scale = self._file.floats(given.scale, f"{what}.scale", (1, 1))
+        turned = 0.0 if given.rotation is None else given.rotation
+        (angle,) = self._file.floats([turned], f"{what}.rotation", (0,))
         cosine, sine = math.cos(angle), math.sin(angle)
         return np.column_stack((np.array([[cosine, sine], [-sine, cosine]]) * scale, offset))
 
