@@ -26,6 +26,7 @@ from benchmarks.results import Goal, Section, Table, agreement, side_by_side
 from benchmarks.timing import alternate_seconds, wall_clock
 from vkbloom import _core
 from vkbloom._renderer import requests
+from vkbloom._renderer.new_arrays import new_arrays
 
 __all__ = ["run"]
 
@@ -128,7 +129,7 @@ def _pulled(
     source = _core.image_source(image, None, None, (cotangent,))
     plan = core.plan(source, settings, None, ("final",), False)
     assert plan is not None
-    arrays = requests.new_arrays(core, plan)
+    arrays = new_arrays(core, plan)
     (timings,), _ = core.run(source, (plan,), (arrays,)).wait()
     return requests.named(plan, arrays)[".by_image"], sum(timings.values())
 

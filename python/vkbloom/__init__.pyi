@@ -45,9 +45,8 @@ from ._renderer.image import Image
 from ._renderer.plans import Plan
 from ._renderer.renderer import Renderer
 from ._scene import Camera, Scene
-from ._settings.glare import Glare
-from ._settings.registry import glares, presets
-from ._settings.settings import Settings
+from ._settings.glare import Glare, glares
+from ._settings.settings import Settings, presets
 
 __all__ = [
     "AdapterInfo",

@@ -29,8 +29,8 @@ from tests.device.device_work import OnDevice
 from tests.images import picture
 from tests.planned import MESH, scene_source
 from vkbloom import DualKawase, Pyramid, Renderer, Scene, Separable, Settings, _core
-from vkbloom._renderer import requests
 from vkbloom._renderer.device_arrays import placed
+from vkbloom._renderer.new_arrays import new_arrays
 
 THREADS: Final = 16
 #: Renderers of the threads that share none with all others.
@@ -73,7 +73,7 @@ def host(frames: Any) -> list[NDArray[Any]]:
 
 
 def run(core: _core.Renderer, source: _core.Source, plan: _core.Plan) -> list[Any]:
-    arrays = requests.new_arrays(core, plan)
+    arrays = new_arrays(core, plan)
     core.run(source, (plan,), (arrays,)).wait()
     return list(arrays)
 
@@ -139,7 +139,7 @@ def wait_twice(renderer: Renderer, which: int, size: int) -> Any:
     core = renderer._core
     source = _core.image_source(IMAGES[size])
     plan = core.plan(source, SETTINGS[which], None)
-    arrays = requests.new_arrays(core, plan)
+    arrays = new_arrays(core, plan)
     submission = core.run(source, (plan,), (arrays,))
     got: list[Any] = []
 
@@ -243,7 +243,7 @@ def collect(renderer: Renderer, which: int, size: int) -> Any:
     core = renderer._core
     source = _core.image_source(IMAGES[size])
     plan = core.plan(source, SETTINGS[which], None)
-    core.run(source, (plan,), (requests.new_arrays(core, plan),))
+    core.run(source, (plan,), (new_arrays(core, plan),))
     gc.collect()
     return []
 

@@ -19,7 +19,8 @@ from numpy.typing import NDArray
 from tests.core.fault_walk import SIZE, core, open_renderer
 from tests.images import picture
 from vkbloom import Renderer, Separable
-from vkbloom._renderer.requests import named, new_arrays
+from vkbloom._renderer.new_arrays import new_arrays
+from vkbloom._renderer.requests import named
 
 BEYOND = 40  # a frame that does without one refused block may stop at the next
 

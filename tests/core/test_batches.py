@@ -17,7 +17,7 @@ from tests.framebuffers import assert_same
 from tests.images import picture
 from vkbloom import BevyBloom, DualKawase, Pyramid, Renderer, Scene, Separable, Settings, _core
 from vkbloom._renderer import requests
-from vkbloom._renderer.requests import new_arrays
+from vkbloom._renderer.new_arrays import new_arrays
 
 SIZE = (64, 36)
 # As the default, of levels that do not take most of the time.

@@ -17,7 +17,7 @@ from tests.framebuffers import assert_same
 from tests.images import picture
 from tests.processes import output
 from vkbloom import AdapterInfo, BevyBloom, Pyramid, Renderer, Separable, _core
-from vkbloom._renderer import requests
+from vkbloom._renderer.new_arrays import new_arrays
 
 #: Changes of size, dtype and channels, and sizes above 1 MiB, which are copied in another way.
 IMAGES: list[tuple[int, int, int, str]] = [
@@ -155,7 +155,7 @@ def test_a_handle_that_is_dropped_while_the_device_works(renderer: Renderer) -> 
     expected = renderer.apply(image, Separable(loops=3))["final"].copy()
     source = renderer.upload(image)._source
     plan = renderer._core.plan(source, Separable(loops=3), ("final",))
-    arrays = requests.new_arrays(renderer._core, plan)
+    arrays = new_arrays(renderer._core, plan)
     submission = renderer._core.run(source, (plan,), (arrays,))
     del source
     gc.collect()
@@ -169,7 +169,7 @@ def test_an_image_in_use_is_not_taken_over(renderer: Renderer) -> None:
     settings = Separable(bloom=False)
     used = core.upload(_core.image_source(old), None, True)
     plan = core.plan(used, settings, ("final",))
-    arrays = requests.new_arrays(core, plan)
+    arrays = new_arrays(core, plan)
     submission = core.run(used, (plan,), (arrays,))
     other = core.upload(_core.image_source(new), used, True)
     assert used.resident

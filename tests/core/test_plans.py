@@ -32,7 +32,7 @@ from vkbloom import (
     _core,
     presets,
 )
-from vkbloom._renderer import requests
+from vkbloom._renderer.new_arrays import new_arrays
 from vkbloom._renderer.sources import Inputs, image_source
 from vkbloom._scene.blocks import scene_arguments
 
@@ -369,7 +369,7 @@ def test_plans_of_derivatives_are_kept(renderer: Renderer) -> None:
 def passes_of(renderer: Renderer, settings: Settings, *sums: bool) -> set[str]:
     """Run a plan of plan_derivatives(); return the names of the passes that ran."""
     source, plan = plan_derivatives(renderer, settings, (19, 12), *sums)
-    arrays = requests.new_arrays(renderer._core, plan, "host")
+    arrays = new_arrays(renderer._core, plan, "host")
     return {*renderer._core.run(source, (plan,), (arrays,), True).wait()[0][0]}
 
 

@@ -42,9 +42,9 @@ from vkbloom._io.images import Colour, Highlights, Picture, SavedColour
 from vkbloom._io.narrowing import narrowed, narrowing_note
 from vkbloom._locks import cached_property
 from vkbloom._presets.start import developed
+from vkbloom._renderer.added_light import added_share, faint_note
 from vkbloom._renderer.frame_files import settings_facts
 from vkbloom._renderer.interruptible import opened_renderer
-from vkbloom._views.added_light import added_share, faint_note
 
 #: A file to read, and the file to write.
 Pair: TypeAlias = tuple[str, str]

@@ -17,7 +17,7 @@ _LEVEL: Final = 1
 
 
 def picture_of(array: NDArray[Any], name: str, *, is_encoded: bool, stops: float) -> bytes:
-    """Return a framebuffer as PNG, shown as in `pictures.leading_png`, without alpha."""
+    """Return a framebuffer as PNG, shown as in `pictures.picture`, without alpha."""
     return pictures.png(shown_pixels(array, name, is_encoded=is_encoded, stops=stops), _LEVEL)
 
 

@@ -56,6 +56,7 @@ from vkbloom._io.image_writing import levels_of
 from vkbloom._io.images import Highlights, Picture
 from vkbloom._numbers import check_number, check_size
 from vkbloom._presets.start import developed, start_of
+from vkbloom._renderer.added_light import added_share, faint_note
 from vkbloom._renderer.frame_files import settings_facts
 from vkbloom._renderer.plans import Pass
 from vkbloom._renderer.renderer import Renderer
@@ -63,7 +64,6 @@ from vkbloom._scene import Scene
 from vkbloom._settings.fields import fields_of
 from vkbloom._settings.registry import METHODS
 from vkbloom._settings.settings import SHADINGS, check_settings, check_shading
-from vkbloom._views.added_light import added_share, faint_note
 from vkbloom._views.pictures import png, reduced
 
 if TYPE_CHECKING:

@@ -29,8 +29,7 @@ from vkbloom._renderer.default import default_renderer
 from vkbloom._renderer.image import Image
 from vkbloom._renderer.renderer import Renderer
 from vkbloom._renderer.sources import Inputs, image_source
-from vkbloom._settings.registry import presets
-from vkbloom._settings.settings import Settings, check_settings
+from vkbloom._settings.settings import Settings, check_settings, presets
 
 # Longer side of the image of the first search in pixels, and its share of the calls.
 _COARSE_SIDE: Final = 384

@@ -14,6 +14,7 @@ from vkbloom import _core
 from vkbloom._locks import ProcessLock
 from vkbloom._renderer import requests
 from vkbloom._renderer.device_arrays import Destination, ImportedArray, placed
+from vkbloom._renderer.new_arrays import new_arrays
 from vkbloom._renderer.renderer import Renderer
 from vkbloom._renderer.sources import Inputs
 from vkbloom.reference._derivatives import Gradients, check_known, differentiable
@@ -106,7 +107,7 @@ class Passes:
         if plan is None:
             return None
         destination: Destination = "host" if sums else self.destination
-        arrays = requests.new_arrays(core, plan, destination)
+        arrays = new_arrays(core, plan, destination)
         submission = core.run(source, (plan,), (arrays,)) if plan.outputs else None
         return Running(self, plan, arrays, destination, submission)
 

@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 from vkbloom._numbers import check_time
 from vkbloom._settings.fields import fields_of
 from vkbloom._settings.records import plain_value
-from vkbloom._settings.registry import presets
-from vkbloom._settings.settings import Settings, check_settings, field_info, given_settings
+from vkbloom._settings.settings import Settings, check_settings, field_info, given_settings, presets
 from vkbloom._spelling import did_you_mean
 
 Kind = Literal["settings", "time", "preset"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from vkbloom._settings.registry import glares, presets
+from vkbloom._settings.registry import NAMED_SETTINGS, NAMED_STAGES
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -25,5 +25,5 @@ def _stages() -> Mapping[str, NamedGlare]:
     return GLARES
 
 
-presets.fill(_settings)
-glares.fill(_stages)
+NAMED_SETTINGS.fill(_settings)
+NAMED_STAGES.fill(_stages)

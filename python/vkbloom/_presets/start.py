@@ -25,8 +25,7 @@ from typing import Any, Final, NamedTuple
 from vkbloom._io.array_files import premultiplied
 from vkbloom._io.expansion import PHOTO_EXPANSION, expanded
 from vkbloom._io.images import Highlights, Picture
-from vkbloom._settings.registry import presets
-from vkbloom._settings.settings import Settings, check_settings
+from vkbloom._settings.settings import Settings, check_settings, presets
 
 #: The preset of images whose highlights are stored.
 PRESET_OF_IMAGES: Final = presets.start("images")

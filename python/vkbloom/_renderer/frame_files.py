@@ -33,13 +33,12 @@ from vkbloom._renderer.frame_saves import (
     obsolete_files,
     save_of,
 )
+from vkbloom._renderer.framebuffers import Framebuffers
 from vkbloom._settings.settings import Settings
 from vkbloom._version import installed_version
 
 if TYPE_CHECKING:
     import OpenImageIO
-
-    from vkbloom._renderer.frames import Frames
 
 # The text before the JSON in a description.
 _DESCRIBED = ", all of it: "
@@ -51,7 +50,9 @@ _NUMBERS: Mapping[str, type[int | float]] = {"nan": int, "inf": int, "expand": f
 _OWN = ("settings", "timings", "dtype", "framebuffer", "place", FACT)
 
 
-def save(frames: Frames, path: str | os.PathLike[str], *, to_path: str | None = None) -> list[Path]:
+def save(
+    frames: Framebuffers, path: str | os.PathLike[str], *, to_path: str | None = None
+) -> list[Path]:
     """Write framebuffers to image files, as `Frames.save` documents.
 
     `to_path`: the framebuffer of several that is written to the path itself, without its name.
@@ -258,7 +259,9 @@ def _as_dtype(pixels: NDArray[Any], dtype: str) -> NDArray[Any]:
     return made[:, :, 0] if made.shape[2] == 1 else made
 
 
-def _image_part(oiio: ModuleType, frames: Frames, name: str, file: Path, saved: str) -> Part | None:
+def _image_part(
+    oiio: ModuleType, frames: Framebuffers, name: str, file: Path, saved: str
+) -> Part | None:
     """Return a framebuffer for a file of any format; None if the format cannot hold it."""
     pixels = np.atleast_3d(frames[name])
     writer = oiio.ImageOutput.create(f"image{file.suffix}")
@@ -277,7 +280,7 @@ def _image_part(oiio: ModuleType, frames: Frames, name: str, file: Path, saved: 
     return Part(pixels, picture, _attributes(frames, name, file, saved))
 
 
-def _exr_part(frames: Frames, name: str, file: Path, saved: str) -> Part:
+def _exr_part(frames: Framebuffers, name: str, file: Path, saved: str) -> Part:
     """Return a framebuffer for a part of an OpenEXR file, in the display window of the frame."""
     pixels = np.atleast_3d(frames[name])
     if pixels.dtype == np.uint8:
@@ -292,7 +295,7 @@ def _exr_part(frames: Frames, name: str, file: Path, saved: str) -> Part:
     return Part(pixels, replace(picture, stored=stored), attributes)
 
 
-def _attributes(frames: Frames, name: str, file: Path, saved: str) -> dict[str, str | int]:
+def _attributes(frames: Framebuffers, name: str, file: Path, saved: str) -> dict[str, str | int]:
     """Return what a file says of a framebuffer; `saved`: of `fact_of`."""
     settings = json.dumps(frames.settings.to_dict())
     adapter = frames.info.get("adapter", "an unnamed adapter")

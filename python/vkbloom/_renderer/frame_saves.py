@@ -13,12 +13,11 @@ import json
 import os
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from vkbloom._renderer.frames import Frames
+from vkbloom._renderer.framebuffers import Framebuffers
 
 #: The fact of a file that `fact_of` makes.
 FACT: Final = "save"
@@ -41,7 +40,7 @@ class Save(NamedTuple):
     framebuffers: tuple[str, ...]
 
 
-def fact_of(frames: Frames, suffix: str) -> str:
+def fact_of(frames: Framebuffers, suffix: str) -> str:
     """Return the identity of a save of frames, as text for their files."""
     digest = hashlib.blake2b(digest_size=16)
     facts = [frames.settings.to_dict(), dict(frames.timings), {**frames.info}]

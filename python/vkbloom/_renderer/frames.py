@@ -16,6 +16,7 @@ from vkbloom._formats import IMAGE_DTYPES
 from vkbloom._framebuffers import dimensions
 from vkbloom._public import public
 from vkbloom._renderer.device_arrays import DeviceArray, on_host
+from vkbloom._renderer.framebuffers import Framebuffers
 from vkbloom._renderer.state import State
 from vkbloom._spelling import describe_unknown
 
@@ -30,7 +31,7 @@ _CHANNELS = ("r", "g", "b", "a")
 
 
 @public("vkbloom")
-class Frames(Mapping[str, NDArray[Any]]):
+class Frames(Framebuffers):
     """Framebuffers by name, in the order of the data flow, with timings, settings and adapter.
 
     A read-only mapping: framebuffers cannot be added, replaced or removed. The arrays are plain
@@ -262,16 +263,16 @@ class Frames(Mapping[str, NDArray[Any]]):
         return cls(arrays, **facts)
 
     def _repr_png_(self) -> bytes | None:
-        """Return the picture of `pictures.leading_png`; None without framebuffers."""
-        from vkbloom._views import pictures  # noqa: PLC0415  costs start-up time
+        """Return the picture of `contact_sheet.leading_png`; None without framebuffers."""
+        from vkbloom._renderer import contact_sheet  # noqa: PLC0415  costs start-up time
 
-        return pictures.leading_png(self._on_host()) if self else None
+        return contact_sheet.leading_png(self._on_host()) if self else None
 
     def _repr_html_(self) -> str:
-        """Return the page of `pictures.contact_sheet_html`."""
-        from vkbloom._views import pictures  # noqa: PLC0415  costs start-up time
+        """Return the page of `contact_sheet.contact_sheet_html`."""
+        from vkbloom._renderer import contact_sheet  # noqa: PLC0415  costs start-up time
 
-        return pictures.contact_sheet_html(self._on_host())
+        return contact_sheet.contact_sheet_html(self._on_host())
 
 
 def _checked(name: str, array: NDArray[Any]) -> NDArray[Any]:

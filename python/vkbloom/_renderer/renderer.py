@@ -34,6 +34,7 @@ from vkbloom._renderer.device_arrays import (
 )
 from vkbloom._renderer.frames import Frames
 from vkbloom._renderer.image import Image
+from vkbloom._renderer.new_arrays import new_arrays, new_memory
 from vkbloom._renderer.sources import (
     SCENE_SIZE,
     any_source,
@@ -100,7 +101,7 @@ def _arrays_for(
     Arrays of `out` that are on the device are filled later, from new ones that are there.
     """
     if out is None:
-        return requests.new_arrays(core, plan, destination)
+        return new_arrays(core, plan, destination)
     names = [name for name, _, _ in plan.outputs]
     for name in out:
         if name not in names:
@@ -118,7 +119,7 @@ def _arrays_for(
     return tuple(
         given[name]
         if name in given
-        else requests.new_memory(core, shape, dtype, "cuda" if name in out else destination)
+        else new_memory(core, shape, dtype, "cuda" if name in out else destination)
         for name, shape, dtype in plan.outputs
     )
 

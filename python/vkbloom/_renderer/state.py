@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from vkbloom._renderer import requests
+from vkbloom._renderer.new_arrays import new_arrays
 from vkbloom._renderer.sources import image_source
 from vkbloom._settings.settings import check_settings
 
@@ -34,7 +34,7 @@ class Kept(NamedTuple):
         # A pass without bloom copies the pixels.
         copy = check_settings(None).replace(bloom=False)
         plan = self.core.plan(self.source, copy, ("final",))
-        (array,) = arrays = requests.new_arrays(self.core, plan)
+        (array,) = arrays = new_arrays(self.core, plan)
         self.core.run(self.source, (plan,), (arrays,)).wait()
         assert isinstance(array, np.ndarray)
         return array

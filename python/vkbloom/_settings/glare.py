@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterable, Mapping
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Final
 
 from vkbloom import _core
 from vkbloom._public import public
 from vkbloom._settings.fields import CoreNumbers, fields_of, number_field
+from vkbloom._settings.named import Named
 from vkbloom._settings.records import Record
-from vkbloom._settings.registry import STAGES
+from vkbloom._settings.registry import NAMED_STAGES, STAGES
 
 
 @public("vkbloom")
@@ -66,6 +67,11 @@ class GlareLight(Glare):
     intensity: float = number_field(slider=(0, 4))
     threshold: float = number_field(slider=(0, 16))
     halvings: int = number_field()
+
+
+#: Name to stages, for ``glare=vkbloom.glares[name]``, or ``glare=name``. ``vkbloom glares`` and
+#: ``docs/glare.md`` list what they are, with their sources.
+glares: Final[Named[tuple[Glare, ...]]] = NAMED_STAGES
 
 
 def check_glare(glare: object) -> tuple[Glare, ...]:

@@ -8,13 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, Final, Protocol
+from typing import Any, Final, Protocol
 
 from vkbloom._settings.named import Named, T
-
-if TYPE_CHECKING:
-    from vkbloom._settings.glare import Glare
-    from vkbloom._settings.settings import Settings
 
 
 class Reference(Protocol):
@@ -110,9 +106,6 @@ class Presets(Named[T]):
 METHODS: Final = Methods("method")
 #: The stages of glare, which `vkbloom._glare` supplies.
 STAGES: Final = Registry("glare")
-#: Name to settings, which `vkbloom._presets` supplies. ``vkbloom presets`` and ``docs/presets.md``
-#: list what they are, with their sources.
-presets: Final[Presets[Settings]] = Presets()
-#: Name to stages, for ``glare=vkbloom.glares[name]``, or ``glare=name``. ``vkbloom glares`` and
-#: ``docs/glare.md`` list what they are, with their sources.
-glares: Final[Named[tuple[Glare, ...]]] = Named("glare", lambda glare: glare.stages)
+#: What `vkbloom.presets` and `vkbloom.glares` are, which `vkbloom._presets` supplies.
+NAMED_SETTINGS: Final[Presets[Any]] = Presets()
+NAMED_STAGES: Final[Named[Any]] = Named("glare", lambda glare: glare.stages)

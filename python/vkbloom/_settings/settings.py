@@ -23,9 +23,9 @@ from vkbloom._settings.fields import (
     number_field,
     value_field,
 )
-from vkbloom._settings.glare import Glare, check_glare, replaced_stages, stage_field_of
+from vkbloom._settings.glare import Glare, check_glare, glares, replaced_stages, stage_field_of
 from vkbloom._settings.records import Record
-from vkbloom._settings.registry import METHODS, glares, presets
+from vkbloom._settings.registry import METHODS, NAMED_SETTINGS, Presets
 from vkbloom._spelling import describe_unknown, did_you_mean
 
 Shading = Literal["forward", "deferred"]
@@ -263,6 +263,11 @@ class PublishedSettings(Settings):
     knee: float = number_field(fixed="the threshold of this method has no knee")
     composite: Composite = choice_field(("add",))
     format: BloomFormat | None = "rgba16float"
+
+
+#: Name to settings. ``vkbloom presets`` and ``docs/presets.md`` list what they are, with their
+#: sources.
+presets: Final[Presets[Settings]] = NAMED_SETTINGS
 
 
 def field_info(settings: Settings, name: str) -> FieldInfo:

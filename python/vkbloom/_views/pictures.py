@@ -1,4 +1,4 @@
-"""Viewable pictures of framebuffers: PNG, and contact sheets as HTML."""
+"""Viewable pictures of arrays, as PNG and side by side in HTML."""
 
 from __future__ import annotations
 
@@ -6,75 +6,20 @@ import struct
 import zlib
 from collections.abc import Iterable, Mapping
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom._framebuffers import leading
 from vkbloom._io.displayed import scaled_to_1
 from vkbloom._io.srgb import encode_srgb
 from vkbloom._views import markup
 from vkbloom._views.markup import element
 
-if TYPE_CHECKING:
-    from vkbloom._renderer.frames import Frames
-
 #: The style of settings as code.
 CODE = "color:inherit;background:none;padding:0;white-space:pre-wrap;overflow-wrap:anywhere"
 _COLUMNS = "display:grid;gap:12px;grid-template-columns:repeat(auto-fill,minmax(200px,1fr))"
 _THUMBNAIL_SIDE = 320  # pixels; keeps the page of a whole frame under about 1 MB
-
-
-def leading_png(frames: Frames) -> bytes:
-    """Return the picture of `final`, or else of the last image, or else of the last framebuffer.
-
-    8-bit images are shown as stored. Float images are shown with the sRGB curve, unless the
-    settings' encoding was already applied to them; colours with a component above 1 are divided by
-    the largest one, which keeps their hue, others are clipped to 0..1. `normal` is shown as
-    (n + 1) / 2, `position` with each axis stretched to 0..1, depth from white (nearest) to black
-    (farthest). NaN counts as 0.
-    """
-    return png(_picture(frames, leading(frames)))
-
-
-def contact_sheet_html(frames: Frames) -> str:
-    """Return a contact sheet of all framebuffers, with the pass times, as HTML.
-
-    Pictures are made as in `leading_png`, without alpha, and averaged to at most 320 pixels.
-    """
-    shown = (
-        (name, _picture(frames, name, thumbnail_size(array))[:, :, :3], _facts(frames, name))
-        for name, array in frames.items()
-    )
-    longest = max((seconds for seconds in frames.timings.values() if seconds > 0), default=0.0)
-    times = [
-        (name, f"{1e3 * seconds:.3f} ms", _bar(seconds, longest))
-        for name, seconds in frames.timings.items()
-    ]
-    head = ("pass", f"time on {frames.info.get('adapter', 'the device')}", "")
-    facts = ", ".join(f"{key} {value}" for key, value in frames.info.items())
-    sheet = element(
-        "div",
-        thumbnails(shown),
-        *([markup.table(times, head)] if times else []),
-        element(
-            "div",
-            facts,
-            element("br"),
-            element("code", repr(frames.settings), style=CODE),
-            style="margin-top:10px;opacity:.8",
-        ),
-        style="color:inherit;color-scheme:light dark;font-size:13px;max-width:68em",
-    )
-    return str(sheet)
-
-
-def _bar(seconds: float, longest: float) -> markup.Markup:
-    """Return a time as a bar; NaN, of a queue without timestamps, has none."""
-    percent = 100 * seconds / longest if seconds > 0 else 0.0
-    bar = "height:.7em;background:currentColor;opacity:.5"
-    return element("div", element("div", style=f"{bar};width:{percent:.1f}%"), style="width:16em")
 
 
 def thumbnail_size(array: NDArray[Any]) -> tuple[int, int]:
@@ -97,12 +42,6 @@ def thumbnails(shown: Iterable[tuple[str, NDArray[np.uint8], str]]) -> markup.Ma
     return element("div", *parts, style=_COLUMNS)
 
 
-def _picture(frames: Frames, name: str, size: tuple[int, int] | None = None) -> NDArray[np.uint8]:
-    """Return a framebuffer as an 8-bit (H, W, C) picture, resized to (width, height)."""
-    encoded = name == "final" and frames.settings.encoding != "none"
-    return picture(frames[name], name, encoded=encoded, size=size)
-
-
 def picture(
     array: NDArray[Any],
     name: str = "",
@@ -111,7 +50,13 @@ def picture(
     size: tuple[int, int] | None = None,
     stops: float = 0.0,
 ) -> NDArray[np.uint8]:
-    """Convert an image to a viewable 8-bit picture, as `leading_png` documents."""
+    """Convert an image to a viewable 8-bit picture.
+
+    8-bit images are shown as stored. Float images are shown with the sRGB curve, unless they are
+    `encoded`; colours with a component above 1 are divided by the largest one, which keeps their
+    hue, others are clipped to 0..1. `normal` is shown as (n + 1) / 2, `position` with each axis
+    stretched to 0..1, depth from white (nearest) to black (farthest). NaN counts as 0.
+    """
     values = np.atleast_3d(array).astype(np.float32)
     linear = False
     if array.dtype.kind == "u":
@@ -133,27 +78,6 @@ def picture(
         shown[:, :, :3] = encode_srgb(shown[:, :, :3])
     pixels: NDArray[np.uint8] = np.rint(shown * np.float32(255)).astype(np.uint8)
     return pixels
-
-
-def _facts(frames: Frames, name: str) -> str:
-    """Return size and dtype of a framebuffer, what its name does not tell, and its range."""
-    array = frames[name]
-    note = frames.settings.glow_note if name == "glow" else ""
-    facts = (f"{array.shape[1]} x {array.shape[0]}", str(array.dtype), note, _range_of(array))
-    return ", ".join(filter(None, facts))
-
-
-def _range_of(array: NDArray[Any]) -> str:
-    """Return the range of finite floats without alpha as text; "" for integers."""
-    if array.dtype == np.uint8:
-        return ""
-    values = np.atleast_3d(array)[:, :, :3]
-    finite = np.isfinite(values)
-    if not finite.any():
-        return "nothing finite"
-    low = values.min(where=finite, initial=np.inf)
-    high = values.max(where=finite, initial=-np.inf)
-    return f"{low:.4g} to {high:.4g}" + ("" if finite.all() else ", some not finite")
 
 
 def _clipped(values: NDArray[np.float32]) -> NDArray[np.float32]:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from vkbloom._renderer.frames import Frames
-    from vkbloom._settings.settings import Settings
+from vkbloom._renderer.framebuffers import Framebuffers
+from vkbloom._settings.settings import Settings
 
 # The share of a picture's light that a bloom adds, of which less gets a note.
 _MIN_SHARE: Final = 0.01
@@ -47,7 +46,9 @@ def faint_note(
     return f"the bloom adds {percent} % of the picture's light: {', or '.join(remedies)}"
 
 
-def added_share(image: NDArray[Any], frames: Frames, light: float | None = None) -> float | None:
+def added_share(
+    image: NDArray[Any], frames: Framebuffers, light: float | None = None
+) -> float | None:
     """Return the light that the bloom adds, divided by that of the image; None: it is not known.
 
     `light`: `light_of` the image, if it is known.
