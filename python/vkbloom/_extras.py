@@ -28,11 +28,11 @@ def _import_before_interrupts(package: str) -> ModuleType:
     handler = signal.getsignal(signal.SIGINT)
     # Python runs signal handlers in the main thread alone.
     if not callable(handler) or threading.current_thread() is not threading.main_thread():
-        return importlib.import_module(package)
+        return importlib.import_module(package)  # noqa: TID251  of others
     interrupts: list[int] = []
     signal.signal(signal.SIGINT, lambda number, _: interrupts.append(number))
     try:
-        return importlib.import_module(package)
+        return importlib.import_module(package)  # noqa: TID251  of others
     finally:
         signal.signal(signal.SIGINT, handler)
         if interrupts:

@@ -12,7 +12,7 @@ import pytest
 from vkbloom import BlenderGlare, Convolution, Pyramid, psf
 from vkbloom import _array_cache as array_cache
 from vkbloom._core_kernel import core_kernel
-from vkbloom.psf import _core_kernels as kernels
+from vkbloom._psf import core_kernels as kernels
 
 SIZES = (8, 6), (8, 6)
 APERTURE = psf.aperture(psf.iris(size=16), f_number=2, pixel_pitch=8)
@@ -52,7 +52,7 @@ def test_methods_use_it(
     made = settings.core_kernel(*SIZES)
     (file,) = folder.iterdir()
     with monkeypatch.context() as patch:
-        patch.setattr("vkbloom.psf._core_kernels.core_kernel", lambda _: pytest.fail("made again"))
+        patch.setattr("vkbloom._psf.core_kernels.core_kernel", lambda _: pytest.fail("made again"))
         assert np.array_equal(settings.core_kernel(*SIZES).pixels, made.pixels)
     file.write_bytes(file.read_bytes()[:-1])
     assert np.array_equal(settings.core_kernel(*SIZES).pixels, made.pixels)
@@ -79,7 +79,7 @@ def test_what_may_change_is_not_written(folder: Path, spread: psf.PSF) -> None:
     assert not folder.exists()
 
 
-@pytest.mark.parametrize("module", [None, "vkbloom.psf._eye"])
+@pytest.mark.parametrize("module", [None, "vkbloom._psf.eye"])
 def test_a_class_that_is_defined_again(folder: Path, module: str | None) -> None:
     """As in a notebook: of the same name and fields, and another formula."""
     kernel_sets: list[list[np.ndarray[Any, Any]]] = []

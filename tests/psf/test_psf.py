@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 import vkbloom
 from tests.refusals import assert_refused, rows
 from vkbloom import psf
-from vkbloom.psf._eye import cie_general, cie_total
-from vkbloom.psf._radial import bessel
-from vkbloom.psf._resampling import box_resample
+from vkbloom._psf.eye import cie_general, cie_total
+from vkbloom._psf.radial import bessel
+from vkbloom._psf.resampling import box_resample
 
 KERNEL = np.pad(np.full((3, 5), 0.125, np.float32), 2)
 KERNEL[3, 4] = 4.0

@@ -19,11 +19,11 @@ from vkbloom import psf
 from vkbloom._cli.image_files import silenced
 from vkbloom._cli.program import given
 from vkbloom._cli.sequences import as_file
+from vkbloom._psf.base import PSF, functions
 from vkbloom._settings.fields import FieldInfo, Kind, fields_of
 from vkbloom._settings.glare import Glare, glares
 from vkbloom._settings.registry import METHODS, STAGES
 from vkbloom._spelling import describe_unknown, did_you_mean, nearest
-from vkbloom.psf._base import PSF, functions
 
 if TYPE_CHECKING:
     _ParamType = click.ParamType[Any]

@@ -16,10 +16,10 @@ from rich.text import Text
 
 from vkbloom._presets.named_glares import GLARES
 from vkbloom._presets.named_settings import PRESETS, Engine
+from vkbloom._psf.base import functions
 from vkbloom._settings.fields import fields_of
 from vkbloom._settings.glare import Glare, GlareLight
 from vkbloom._settings.registry import STAGES
-from vkbloom.psf._base import functions
 
 # Console width for output to a file or another program, where lines must not be wrapped.
 _UNBROKEN: Final = 4096

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import errno
-import importlib
 import itertools
 import os
 import sys
@@ -18,6 +17,7 @@ import vkbloom
 from vkbloom._cli import terminal
 from vkbloom._cli.interrupts import INTERRUPTED, raise_interrupts
 from vkbloom._free_memory import ADVICE, memory_left
+from vkbloom._lazy_modules import own_module
 from vkbloom._settings.registry import METHODS
 from vkbloom._spelling import did_you_mean
 
@@ -72,7 +72,7 @@ class Program(click.Group):
         """Import and return a command; None if there is no such command."""
         if cmd_name not in COMMANDS:
             return None
-        module = importlib.import_module(f"vkbloom._cli.{_MODULES.get(cmd_name, cmd_name)}")
+        module = own_module(__package__, _MODULES.get(cmd_name, cmd_name))
         command: click.Command = getattr(module, cmd_name if cmd_name in _MODULES else "command")
         raise_interrupts()
         if terminal.QUIET_OPTION not in command.params:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import functools
 import hashlib
-import importlib
 import os
 import re
 import shutil
@@ -52,7 +51,9 @@ MISSING: Final = (
 def find_compiler() -> str:
     """Return the path of the compiler: the wheel's, or the system's."""
     with contextlib.suppress(ImportError):
-        return str(importlib.import_module("vkbloom_glslang").PATH)
+        import vkbloom_glslang  # noqa: PLC0415  where it is installed
+
+        return str(vkbloom_glslang.PATH)
     program = shutil.which("glslangValidator") or shutil.which("glslang")
     if program is None:
         raise ShaderError(MISSING)

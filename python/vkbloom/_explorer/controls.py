@@ -9,11 +9,11 @@ from typing import Any, Final
 
 from vkbloom import psf
 from vkbloom._custom.method import CustomType, identifier_of
+from vkbloom._psf.base import PSF, functions
 from vkbloom._settings.fields import FieldInfo, fields_of
 from vkbloom._settings.glare import Glare, glares
 from vkbloom._settings.registry import METHODS, STAGES
 from vkbloom._settings.settings import Settings, presets
-from vkbloom.psf._base import PSF, functions
 
 # Fields that keep their values on the page when another preset or method is selected.
 _LOOK: Final = ("bloom", "exposure", "tonemap", "encoding", "dither", "dither_seed")

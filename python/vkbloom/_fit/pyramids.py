@@ -14,10 +14,10 @@ from vkbloom._fit.losses import Measure, light
 from vkbloom._fit.result import FitResult
 from vkbloom._methods.mip_chain import Pyramid
 from vkbloom._numbers import check_index, check_size
+from vkbloom._psf.base import PSF
 from vkbloom._public import public
 from vkbloom._renderer.default import default_renderer
 from vkbloom._renderer.renderer import Renderer
-from vkbloom.psf import PSF
 
 PyramidLoss = Literal["relative", "log"]
 # Rows of the matrix are not weighted by more than 1 over this share of the peak.

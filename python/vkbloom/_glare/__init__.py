@@ -9,7 +9,7 @@ from __future__ import annotations
 from vkbloom._settings.registry import STAGES
 
 STAGES.supply(
-    "vkbloom._glare",
+    __package__,
     {
         "streaks": "streaks:Streaks",
         "ghosts": "flares:Ghosts",

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 from vkbloom._array_cache import kept
 from vkbloom._core_kernel import CoreKernel
 from vkbloom._numbers import check_number
+from vkbloom._psf.core_kernels import WithKernel
+from vkbloom._psf.sampled import check_values
 from vkbloom._public import public
 from vkbloom._settings.fields import number_field, value_field
 from vkbloom._settings.glare import Glare
-from vkbloom.psf._core_kernels import WithKernel
-from vkbloom.psf._sampled import check_values
 
 DirtMode = Literal["multiply", "lerp"]
 

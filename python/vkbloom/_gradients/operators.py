@@ -16,6 +16,7 @@ from vkbloom._extras import import_extra
 from vkbloom._gradients.passes import in_floats
 from vkbloom._gradients.pulling import pull_each, pullback_of
 from vkbloom._image_arguments import check_mask
+from vkbloom._psf.values import ARRAYS, ArrayValue
 from vkbloom._renderer.default import default_renderer, renderer_on
 from vkbloom._renderer.device_arrays import DeviceArray, merged, take
 from vkbloom._renderer.renderer import RENDERERS, Renderer
@@ -23,7 +24,6 @@ from vkbloom._renderer.sources import Inputs, checked_inputs
 from vkbloom._settings.fields import fields_of
 from vkbloom._settings.records import Record
 from vkbloom._settings.settings import Settings
-from vkbloom.psf._values import ARRAYS, ArrayValue
 from vkbloom.reference import apply as reference_apply
 from vkbloom.reference import vjp as reference_vjp
 from vkbloom.reference._derivatives import check_cotangents

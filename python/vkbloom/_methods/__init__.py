@@ -14,7 +14,7 @@ from __future__ import annotations
 from vkbloom._settings.registry import METHODS
 
 METHODS.supply(
-    "vkbloom._methods",
+    __package__,
     {
         "separable": "separable:Separable",
         "pyramid": "mip_chain:Pyramid",

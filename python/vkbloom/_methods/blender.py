@@ -9,6 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom._methods.convolution import PSFLike, read_psf
+from vkbloom._psf.base import PSF
+from vkbloom._psf.core_kernels import WithKernel
+from vkbloom._psf.eye import spencer
 from vkbloom._public import public
 from vkbloom._settings.fields import (
     choice_field,
@@ -18,9 +21,6 @@ from vkbloom._settings.fields import (
     value_field,
 )
 from vkbloom._settings.settings import PublishedSettings
-from vkbloom.psf._base import PSF
-from vkbloom.psf._core_kernels import WithKernel
-from vkbloom.psf._eye import spencer
 
 GlareType = Literal["bloom", "ghosts", "streaks", "fog_glow", "simple_star", "sun_beams", "kernel"]
 Quality = Literal["high", "medium", "low"]

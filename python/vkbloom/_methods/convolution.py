@@ -10,14 +10,14 @@ from typing import Any, ClassVar, Literal, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from vkbloom._psf.base import PSF
+from vkbloom._psf.core_kernels import WithKernel
+from vkbloom._psf.eye import spencer
+from vkbloom._psf.resampling import box_resample
+from vkbloom._psf.sampled import samples
 from vkbloom._public import public
 from vkbloom._settings.fields import choice_field, number_field
 from vkbloom._settings.settings import Settings
-from vkbloom.psf._base import PSF
-from vkbloom.psf._core_kernels import WithKernel
-from vkbloom.psf._eye import spencer
-from vkbloom.psf._resampling import box_resample
-from vkbloom.psf._sampled import samples
 
 Boundary = Literal["zero", "edge", "wrap", "wrap_x"]
 #: The types of a kernel: a function, the result of its `to_dict`, or an array.

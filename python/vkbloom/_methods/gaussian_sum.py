@@ -9,8 +9,8 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from vkbloom._psf.core_kernels import WithKernel
 from vkbloom._settings.settings import BloomFormat, PublishedSettings
-from vkbloom.psf._core_kernels import WithKernel
 
 Size = tuple[int, int]
 

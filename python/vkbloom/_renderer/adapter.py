@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
-import importlib
 import os
 from types import ModuleType
 
@@ -83,9 +82,10 @@ def bundled_hash() -> str:
 
 def _package() -> ModuleType | None:
     try:
-        return importlib.import_module("vkbloom_lavapipe")
+        import vkbloom_lavapipe  # noqa: PLC0415  where it is installed
     except ModuleNotFoundError:
         return None
+    return vkbloom_lavapipe  # type: ignore[no-any-return]
 
 
 def _library_of(manifest: str) -> str:

@@ -10,12 +10,12 @@ from numpy.typing import DTypeLike, NDArray
 from vkbloom._argument_types import checked
 from vkbloom._arrays import check_dtype
 from vkbloom._public import public
-from vkbloom._settings.registry import METHODS
 from vkbloom._settings.settings import Settings, given_settings
 
 from . import _blending as blending
 from ._blending import develop
 from ._image import as_float, format_of, storage
+from ._lookup import reference_of
 from ._sampling import Array
 from ._tape import joined
 from ._tone_map import ENCODINGS
@@ -100,7 +100,7 @@ def slope_of(scene: Array, settings: Settings) -> float | Array:
 def _declared(name: str, settings: Settings) -> Any:
     """Return a function of the method's module; None if there is none, as for custom methods."""
     try:
-        module = METHODS.reference(settings.method)
+        module = reference_of(settings.method)
     except KeyError:
         return None
     return getattr(module, name, None)

@@ -11,13 +11,13 @@ from vkbloom._argument_types import checked
 from vkbloom._arrays import native_order, view_image
 from vkbloom._image_arguments import check_emission, check_mask
 from vkbloom._public import public
-from vkbloom._settings.registry import METHODS, Reference
 from vkbloom._settings.settings import Settings, given_settings
 
 from . import _custom as custom
 from . import _glare as glare
 from ._compositing import composite_checked, strength_of
 from ._image import BlurInput, as_float, finite, format_of, storage
+from ._lookup import Reference, reference_of
 from ._sampling import Array, sample, scaled, size_of
 from ._threshold import apply_threshold, masked
 
@@ -262,7 +262,7 @@ def gain(settings: Settings | str, size: tuple[int, int] = (1280, 720)) -> Any:
 
 def _method(settings: Settings) -> Reference:
     try:
-        return METHODS.reference(settings.method)
+        return reference_of(settings.method)
     except KeyError:
         raise ValueError(
             f"method: {settings.method!r} has no reference in NumPy; give one when it is loaded, "

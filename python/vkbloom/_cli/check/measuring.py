@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 from vkbloom import reference
 from vkbloom._custom.method import CustomMethod
 from vkbloom._fit.translating import lights
+from vkbloom._psf.sampled import samples
 from vkbloom._renderer.renderer import Renderer
 from vkbloom._settings.settings import Settings
 from vkbloom._views.plain_values import plain
-from vkbloom.psf._sampled import samples
 from vkbloom.testing._law_report import LawReport
 from vkbloom.testing._point_spread import border_share, veiling_glare_index
 from vkbloom.testing._probe import Bloom, Probe

@@ -10,10 +10,10 @@ import click
 
 from vkbloom._cli.check.measuring import VIEW
 from vkbloom._fit.translating import lights
+from vkbloom._psf.sampled import samples
 from vkbloom._views import markup
 from vkbloom._views.markup import Markup, element
 from vkbloom._views.pictures import picture, png
-from vkbloom.psf._sampled import samples
 from vkbloom.testing._law_report import LawReport, cells
 from vkbloom.testing._laws.shape import LEVELS
 from vkbloom.testing._probe import BloomError, call

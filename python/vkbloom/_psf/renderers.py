@@ -11,14 +11,14 @@ import numpy as np
 
 from vkbloom._array_cache import kept
 from vkbloom._formats import LUMINANCE, MAX_FLOAT
+from vkbloom._psf.base import PSF, Array, centred, in_grey
+from vkbloom._psf.resampling import box_resample
+from vkbloom._psf.sampled import SampledPSF, check_values, rgb
 from vkbloom._public import public
 from vkbloom._settings.fields import number_field, numbers_field, value_field
-from vkbloom.psf._base import PSF, Array, centred, in_grey
-from vkbloom.psf._resampling import box_resample
-from vkbloom.psf._sampled import SampledPSF, check_values, rgb
 
 if TYPE_CHECKING:
-    from vkbloom.psf._values import ArrayValue
+    from vkbloom._psf.values import ArrayValue
 
 
 @public("vkbloom.psf")

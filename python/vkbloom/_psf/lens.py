@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vkbloom._numbers import check_size
+from vkbloom._psf.base import PSF, Array, check_radii, in_grey
+from vkbloom._psf.radial import RadialPSF, bessel, integrate_pixels
 from vkbloom._public import public
 from vkbloom._settings.fields import number_field
-from vkbloom.psf._base import PSF, Array, check_radii, in_grey
-from vkbloom.psf._radial import RadialPSF, bessel, integrate_pixels
 
 
 @public("vkbloom.psf")

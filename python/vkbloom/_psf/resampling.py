@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from vkbloom.psf._base import Array
+from vkbloom._psf.base import Array
 
 
 def box_resample(

@@ -36,7 +36,9 @@ _HEADER: Final = struct.Struct("<Q7I")
 _PACKAGE: Final = Path(__file__).parents[1]
 # Modules whose functions follow from their fields alone. Those of users may change at any time.
 _OURS: Final = ("vkbloom._methods.", "vkbloom._glare.")
-_PURE_MODULES: Final = {f"vkbloom.psf._{name}" for name in ("aperture", "eye", "lens", "renderers")}
+_PURE_MODULES: Final = {
+    f"vkbloom._psf.{name}" for name in ("apertures", "eye", "lens", "renderers")
+}
 
 
 class WithKernel:
@@ -116,7 +118,7 @@ def _is_there(kind: type[Any]) -> bool:
 def _formulas() -> bytes | None:
     """Return a digest of the source of all formulas; None if it cannot be read."""
     digest = hashlib.blake2b(np.__version__.encode())
-    folders = [_PACKAGE / name for name in ("psf", "_methods", "_glare")]
+    folders = [_PACKAGE / name for name in ("_psf", "_methods", "_glare")]
     try:
         for file in (
             _PACKAGE / "_core_kernel.py",

@@ -16,6 +16,7 @@ from vkbloom._arrays import plain_array
 from vkbloom._numbers import check_floats, check_number, check_size
 from vkbloom._public import public
 from vkbloom._settings.records import Record
+from vkbloom._settings.registry import FUNCTIONS
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -223,11 +224,9 @@ def centred(array: Array, size: tuple[int, int]) -> Array:
 
 def functions() -> dict[str, type[PSF]]:
     """Return the point-spread functions that there are now, by name."""
-    from vkbloom import psf  # noqa: PLC0415  imports the modules of the package
-
-    for name in psf.__all__:
-        getattr(psf, name)
-    return dict(sorted((kind.__name__, kind) for kind in _leaves(PSF)))
+    # Classes of users are known when they are defined; those of the package are imported here.
+    kinds = [*_leaves(PSF), *FUNCTIONS.values()]
+    return dict(sorted({kind.__name__: kind for kind in kinds}.items()))
 
 
 def _leaves(kind: type[Any]) -> list[type[Any]]:

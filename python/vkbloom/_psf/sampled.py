@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
+from vkbloom._psf.base import PSF, Array, centred, check_radii, in_grey
+from vkbloom._psf.values import ArrayValue
 from vkbloom._public import public
 from vkbloom._settings.fields import value_field
-from vkbloom.psf._base import PSF, Array, centred, check_radii, in_grey
-from vkbloom.psf._values import ArrayValue
 
 
 class SampledPSF(PSF):

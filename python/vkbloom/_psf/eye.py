@@ -8,10 +8,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
+from vkbloom._psf.base import Array, in_grey
+from vkbloom._psf.radial import RadialPSF
 from vkbloom._public import public
 from vkbloom._settings.fields import number_field, numbers_field
-from vkbloom.psf._base import Array, in_grey
-from vkbloom.psf._radial import RadialPSF
 
 State = Literal["photopic", "mesopic", "scotopic"]
 

@@ -9,12 +9,12 @@ from typing import Any, cast
 import numpy as np
 
 from vkbloom._array_cache import kept
+from vkbloom._psf.base import Array
+from vkbloom._psf.sampled import SampledPSF
 from vkbloom._public import public
 from vkbloom._settings.fields import value_field
 from vkbloom._settings.registry import METHODS
 from vkbloom._settings.settings import Settings, given_settings
-from vkbloom.psf._base import Array
-from vkbloom.psf._sampled import SampledPSF
 
 
 def _read_settings(settings: Any) -> Settings:

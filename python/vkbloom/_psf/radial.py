@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vkbloom._numbers import check_above, check_size
-from vkbloom.psf._base import FRAME_DEGREES, PSF, Array, check_radii
+from vkbloom._psf.base import FRAME_DEGREES, PSF, Array, check_radii
 
 # (first distance in pixels, nodes along a side of a pixel). The outer parts are smooth and need
 # few nodes. The inner parts may have a core or a halo that is narrower than a pixel.

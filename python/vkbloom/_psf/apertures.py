@@ -11,11 +11,11 @@ from numpy.typing import DTypeLike, NDArray
 
 from vkbloom._array_cache import kept
 from vkbloom._numbers import check_size
+from vkbloom._psf.base import Array, centred, check_wavelengths
+from vkbloom._psf.sampled import SampledPSF
+from vkbloom._psf.values import ArrayValue
 from vkbloom._public import public
 from vkbloom._settings.fields import check_fields, number_field, value_field
-from vkbloom.psf._base import Array, centred, check_wavelengths
-from vkbloom.psf._sampled import SampledPSF
-from vkbloom.psf._values import ArrayValue
 
 # Samples of the diffraction pattern per period of its highest frequency.
 _PADDING = 4

@@ -1,0 +1,46 @@
+"""Point-spread functions: how the light of a point is distributed over a picture.
+
+There are functions of the eye (`spencer`, `cie_general`, `cie_total`), of lenses (`harvey_shack`,
+`airy`, `aperture` with `iris`), of renderers (`fog_glow`, `unreal`) and of settings (`measured`).
+`gaussian` and `samples` are general. All are subclasses of `PSF`. `vkbloom.Convolution` convolves
+an image with any of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from vkbloom import _psf
+from vkbloom._settings.registry import FUNCTIONS
+
+if TYPE_CHECKING:
+    from vkbloom._measured import measured
+    from vkbloom._psf import *  # noqa: F403
+
+__all__ = ["measured"]
+__all__ += _psf.__all__
+
+
+def __getattr__(name: str) -> Any:
+    if name == "measured":
+        from vkbloom._measured import measured  # noqa: PLC0415  costs start-up time
+
+        return measured
+    if name in __all__:
+        return getattr(_psf, name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return __all__
+
+
+def _classes() -> Mapping[str, type[Any]]:
+    from vkbloom._measured import measured  # noqa: PLC0415  costs start-up time
+
+    kinds = [measured, *(getattr(_psf, name) for name in _psf.__all__ if name != "PSF")]
+    return {kind.__name__: kind for kind in kinds if issubclass(kind, _psf.PSF)}
+
+
+FUNCTIONS.fill(_classes)
