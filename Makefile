@@ -188,6 +188,7 @@ lint: build/stamp/core build/stamp/test build/stamp/lint
 	$(PYTHON) -m mypy.stubtest vkbloom --concise --mypy-config-file pyproject.toml \
 	    --allowlist tools/stubtest_allowlist.txt --ignore-unused-allowlist
 	$(VENV)/bin/lint-imports
+	$(PYTHON) -m pytest -q tests/core/test_floors.py
 	$(VENV)/bin/clang-format --dry-run -Werror csrc/*/*.c csrc/*/*.h packaging/*/*.c tests/*/*.c tools/*/*.c
 	$(VENV)/bin/abi3audit --strict --assume-minimum-abi3 3.11 python/vkbloom/_core.abi3.so
 

@@ -74,7 +74,7 @@ def failing(monkeypatch: pytest.MonkeyPatch) -> Failing:
     """Runs a command that fails as a function does."""
 
     def run_it(fail: Callable[[], None]) -> Result:
-        monkeypatch.setattr(vkbloom, "adapters", fail)
+        monkeypatch.setattr("vkbloom._renderer.adapter.adapters", fail)
         return vkb("adapters")
 
     return run_it

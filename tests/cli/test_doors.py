@@ -178,7 +178,7 @@ class Doors:
             return []
 
         with self.patch.context() as patch:
-            patch.setattr(vkbloom, "fit", fit)
+            patch.setattr("vkbloom._fit.fit", fit)
             done("fit", file, file, *words)
         return found[0]
 

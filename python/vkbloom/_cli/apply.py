@@ -18,7 +18,6 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-import vkbloom
 from vkbloom._background_writer import written_in_background
 from vkbloom._cli import no_bloom
 from vkbloom._cli.fields import Command
@@ -44,7 +43,10 @@ from vkbloom._locks import cached_property
 from vkbloom._presets.start import developed
 from vkbloom._renderer.added_light import added_share, faint_note
 from vkbloom._renderer.frame_files import settings_facts
+from vkbloom._renderer.frames import Frames
 from vkbloom._renderer.interruptible import opened_renderer
+from vkbloom._renderer.renderer import Renderer
+from vkbloom._settings.settings import Settings
 
 #: A file to read, and the file to write.
 Pair: TypeAlias = tuple[str, str]
@@ -116,7 +118,7 @@ class Run:
     options: Options
     out: str
     folder: Path
-    renderer: Callable[[], vkbloom.Renderer]
+    renderer: Callable[[], Renderer]
     several: bool
     kept: Collection[str]
     is_careful: bool
@@ -182,9 +184,7 @@ class Run:
                         "give --overwrite"
                     )
 
-    def _tell(
-        self, pair: Pair, picture: Picture, frames: vkbloom.Frames, expand: float | None
-    ) -> None:
+    def _tell(self, pair: Pair, picture: Picture, frames: Frames, expand: float | None) -> None:
         """Print a note about the bloom of a file."""
         name, target = pair
         text = ""
@@ -206,7 +206,7 @@ class Run:
         if text:
             note(f"{name}: {text}" if self.several else text)
 
-    def _read(self, source: str) -> tuple[Picture, vkbloom.Settings, float | None]:
+    def _read(self, source: str) -> tuple[Picture, Settings, float | None]:
         """Return the picture whose pixels get a bloom, its settings and its expansion."""
         options = self.options
         picture = read_picture(source, options.subimage, options.input_colour, layer=options.layer)
@@ -240,7 +240,7 @@ class Run:
         self,
         pair: Pair,
         picture: Picture,
-        frames: vkbloom.Frames,
+        frames: Frames,
         expand: float | None,
         notes: list[str],
     ) -> None:
@@ -269,12 +269,12 @@ class Run:
                     say(f"wrote {written}")
 
 
-def _save_others(frames: vkbloom.Frames, target: Path) -> list[Path]:
+def _save_others(frames: Frames, target: Path) -> list[Path]:
     """Write each framebuffer but `final` to its own file beside OUT, its values unchanged."""
     written: list[Path] = []
     for name, array in frames.items():
         if name != "final":
-            alone = vkbloom.Frames(
+            alone = Frames(
                 {name: array}, timings=frames.timings, settings=frames.settings, info=frames.info
             )
             written += alone.save(beside(target, name))
@@ -370,7 +370,7 @@ def command(*, sources: tuple[str, ...], out: str | None, adapter: str, **given:
     with tempfile.TemporaryDirectory() as folder, ExitStack() as stack:
 
         @functools.cache
-        def renderer() -> vkbloom.Renderer:
+        def renderer() -> Renderer:
             opened = stack.enter_context(opened_renderer(adapter))
             # Standard output may have the picture.
             tell_device(opened, err=is_stream(target))
@@ -493,7 +493,7 @@ def _check_own(source: str, out: str) -> None:
         )
 
 
-def _check_colours(settings: vkbloom.Settings, options: Options) -> None:
+def _check_colours(settings: Settings, options: Options) -> None:
     """Raise click.UsageError for options that do not go together."""
     names = ("output_colour", "view", "primaries")
     used = [name for name in names if getattr(options, name) not in (None, "rec709")]

@@ -8,7 +8,7 @@ import sys
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-import vkbloom
+from vkbloom._version import installed_version
 
 INSTALL = (
     "install it: pip install 'vkbloom[cli]', or run it without: "
@@ -22,7 +22,7 @@ def run(words: Sequence[str], missing: Sequence[str]) -> int:
     first, *options = words or [""]
     as_json = options == ["--json"]
     if words in (["--version"], ["-V"]):
-        print(f"vkbloom {vkbloom.__version__}")
+        print(f"vkbloom {installed_version()}")
         return 0
     if first == "doctor" and (as_json or not options):
         report = examined()
@@ -36,15 +36,17 @@ def run(words: Sequence[str], missing: Sequence[str]) -> int:
 
 def list_adapters(*, as_json: bool) -> int:
     """Print the adapters, one a line or as JSON, and return the status: 1 if there is none."""
-    adapters = vkbloom.adapters()
+    from vkbloom._renderer import adapter  # noqa: PLC0415  costs start-up time
+
+    found = adapter.adapters()
     if as_json:
-        print(json.dumps([dataclasses.asdict(adapter) for adapter in adapters], indent=2))
+        print(json.dumps([dataclasses.asdict(one) for one in found], indent=2))
     else:
-        for adapter in adapters:
-            print(adapter.summary)
-    if not adapters:
+        for one in found:
+            print(one.summary)
+    if not found:
         print(_NO_ADAPTER, file=sys.stderr)
-    return int(not adapters)
+    return int(not found)
 
 
 def examined() -> dict[str, Any]:
@@ -53,7 +55,7 @@ def examined() -> dict[str, Any]:
 
     findings, can_render = examine()
     entries = [finding._asdict() for finding in findings]
-    return {"version": vkbloom.__version__, "can_render": can_render, "findings": entries}
+    return {"version": installed_version(), "can_render": can_render, "findings": entries}
 
 
 def lines_of(report: Mapping[str, Any]) -> Iterator[str]:

@@ -10,12 +10,12 @@ from typing import Any
 import click
 from tqdm import tqdm
 
-import vkbloom
 from vkbloom._cli import bare
 from vkbloom._cli.program import adapter_option
 from vkbloom._cli.targets import check_target
 from vkbloom._cli.terminal import hides_progress, say
 from vkbloom._doctor import self_test
+from vkbloom._renderer.adapter import AdapterInfo
 
 
 @click.command()
@@ -69,7 +69,7 @@ def _compared(adapter: str) -> dict[str, Any]:
 
 def _show_groups(report: dict[str, Any]) -> None:
     if report["device"]:
-        click.echo(vkbloom.AdapterInfo(**report["device"]).summary)
+        click.echo(AdapterInfo(**report["device"]).summary)
     click.echo(f"\n{'group':18}{'cases':>6}{'wrong':>6}{'error':>10}{'allowed':>10}{'seconds':>9}")
     for group in report["groups"]:
         error, allowed = (

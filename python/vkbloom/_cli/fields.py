@@ -14,15 +14,16 @@ import click
 from click.shell_completion import CompletionItem
 from numpy.typing import NDArray
 
-import vkbloom
 from vkbloom import psf
 from vkbloom._cli.image_files import silenced
 from vkbloom._cli.program import given
 from vkbloom._cli.sequences import as_file
+from vkbloom._io.array_files import read
 from vkbloom._psf.base import PSF, functions
 from vkbloom._settings.fields import FieldInfo, Kind, fields_of
 from vkbloom._settings.glare import Glare, glares
 from vkbloom._settings.registry import METHODS, STAGES
+from vkbloom._settings.settings import Settings, presets
 from vkbloom._spelling import describe_unknown, did_you_mean, nearest
 
 if TYPE_CHECKING:
@@ -86,7 +87,7 @@ def read_colours(path: str) -> NDArray[Any]:
     """Read the colours of an image file, (H, W, 3), or raise OSError or click.ClickException."""
     try:
         with silenced(), as_file(path) as file:
-            return vkbloom.read(file)[..., :3]
+            return read(file)[..., :3]
     except ValueError as error:
         # The file is at fault, and not the use of the option.
         raise click.ClickException(str(error)) from error
@@ -345,8 +346,8 @@ def _method_of(args: Sequence[str]) -> str | None:
     for option, value in itertools.pairwise(args):
         if option == "--method" and (name := nearest(value, METHODS)):
             return name
-        if option == "--preset" and (name := nearest(value, vkbloom.presets)):
-            return vkbloom.presets[name].method
+        if option == "--preset" and (name := nearest(value, presets)):
+            return presets[name].method
     return None
 
 
@@ -355,7 +356,7 @@ def _options_of(method: str) -> list[click.Option]:
     fields = fields_of(METHODS[method]).values()
     # A field with one value is none to choose.
     infos = [info for info in fields if not info.fixed and len(info.choices) != 1]
-    infos.sort(key=lambda info: info.name in fields_of(vkbloom.Settings))
+    infos.sort(key=lambda info: info.name in fields_of(Settings))
     return [FieldOption({"": info}, "", "") for info in infos]
 
 

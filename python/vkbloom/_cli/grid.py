@@ -10,21 +10,23 @@ from typing import Any, Final
 import click
 import numpy as np
 
-import vkbloom
 from vkbloom._cli import fields, glows, image_files, no_bloom, program, terminal
 from vkbloom._cli.scene_options import scene_options
 from vkbloom._cli.settings_options import DEFAULT_PRESETS, settings_options
 from vkbloom._grid import filling, layout, order, sources
+from vkbloom._grid.grid import grid as render_grid
 from vkbloom._io import image_writing, safe_writing
 from vkbloom._io.images import Picture
 from vkbloom._presets.start import developed
 from vkbloom._renderer.frame_files import settings_facts
+from vkbloom._renderer.frames import Frames
 from vkbloom._renderer.interruptible import opened_renderer
+from vkbloom._renderer.renderer import Renderer
 from vkbloom._settings.fields import fields_of
-from vkbloom._settings.settings import SHADINGS, field_info
+from vkbloom._settings.settings import SHADINGS, Settings, field_info, presets
 from vkbloom._spelling import did_you_mean
 
-_PRESETS: Final = fields.NameOf("preset", vkbloom.presets)
+_PRESETS: Final = fields.NameOf("preset", presets)
 
 
 @click.command(cls=fields.Command)
@@ -71,10 +73,10 @@ def command(
     target = str(store or out)
     if not words:
         raise click.UsageError("there is no --axis; give one, such as exposure=-1:1:5")
-    settings: vkbloom.Settings | None = given["settings"]
+    settings: Settings | None = given["settings"]
     axes = axis_values(words, given["settings"])
     if "preset" in axes:
-        if settings not in map(vkbloom.presets.get, DEFAULT_PRESETS):
+        if settings not in map(presets.get, DEFAULT_PRESETS):
             raise click.UsageError("--axis preset sets all settings; leave out options of settings")
         settings = None
     # The presets of an axis differ in whether they expand.
@@ -102,7 +104,7 @@ def command(
         _note_no_bloom(grid, renderer)
         if folder is None:
             shared |= {"part": part, "progress": not terminal.is_quiet()}
-            vkbloom.grid(looked_at, settings, axes, store=target, renderer=renderer, **shared)
+            render_grid(looked_at, settings, axes, store=target, renderer=renderer, **shared)
         else:
             how: dict[str, Any] = {"suffix": suffix, "picture": picture, "expand": expand}
             _write_images(grid, folder, renderer, part=part, **how)
@@ -123,7 +125,7 @@ def _folder_of(out: str | None, store: str | None) -> Path | None:
     return folder
 
 
-def _alpha_of(axes: Mapping[str, Sequence[Any]], settings: vkbloom.Settings | None) -> str:
+def _alpha_of(axes: Mapping[str, Sequence[Any]], settings: Settings | None) -> str:
     """Return an alpha for which an image is read; points of an axis have one image."""
     values = axes.get("alpha") or [settings.alpha if settings else "keep"]
     if len({value == "keep" for value in values}) > 1:
@@ -134,12 +136,12 @@ def _alpha_of(axes: Mapping[str, Sequence[Any]], settings: vkbloom.Settings | No
     return str(values[0])
 
 
-def axis_values(words: Sequence[str], settings: vkbloom.Settings) -> dict[str, Sequence[Any]]:
+def axis_values(words: Sequence[str], settings: Settings) -> dict[str, Sequence[Any]]:
     """Return the values of each ``NAME=VALUES``."""
     begun = [settings]
     for word in words:
         if word.startswith("preset="):
-            begun = [vkbloom.presets[value] for value in _values(word, _PRESETS)]
+            begun = [presets[value] for value in _values(word, _PRESETS)]
     results: dict[str, Sequence[Any]] = {}
     for word in words:
         name = word.partition("=")[0].strip().replace("-", "_")
@@ -149,7 +151,7 @@ def axis_values(words: Sequence[str], settings: vkbloom.Settings) -> dict[str, S
     return results
 
 
-def _type_of(name: str, begun: Sequence[vkbloom.Settings]) -> Any:
+def _type_of(name: str, begun: Sequence[Settings]) -> Any:
     """Return the type of a field's option, so that axes and options have one syntax."""
     if name in ("preset", "time"):
         return click.FLOAT if name == "time" else _PRESETS
@@ -177,7 +179,7 @@ def _values(word: str, kind: Any) -> Sequence[Any]:
         raise click.UsageError(f"--axis {word}: {error}{hint}") from error
 
 
-def _note_no_bloom(grid: layout.Grid, renderer: vkbloom.Renderer) -> None:
+def _note_no_bloom(grid: layout.Grid, renderer: Renderer) -> None:
     """Print a note if the first and the last point of a grid have no bloom."""
     corners = {tuple(0 for _ in grid.shape), tuple(count - 1 for count in grid.shape)}
     lit = [point for point in map(grid.point, sorted(corners)) if point.settings.bloom]
@@ -189,7 +191,7 @@ def _note_no_bloom(grid: layout.Grid, renderer: vkbloom.Renderer) -> None:
 def _write_images(
     grid: layout.Grid,
     folder: Path,
-    renderer: vkbloom.Renderer,
+    renderer: Renderer,
     *,
     suffix: str,
     part: order.Part,
@@ -215,7 +217,7 @@ def _write_images(
 
 
 def _save(
-    frames: vkbloom.Frames, name: str, path: Path, picture: Picture | None, expand: float | None
+    frames: Frames, name: str, path: Path, picture: Picture | None, expand: float | None
 ) -> None:
     """Write a framebuffer of a point; `final` in the colours of the image's file."""
     settings = frames.settings
@@ -225,4 +227,4 @@ def _save(
     else:
         # Without the timings, so that the same call writes the same file.
         alone = {name: frames[name]}
-        vkbloom.Frames(alone, timings={}, settings=settings, info=frames.info).save(path)
+        Frames(alone, timings={}, settings=settings, info=frames.info).save(path)

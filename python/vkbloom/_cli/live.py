@@ -15,7 +15,6 @@ from typing import Any, Final, NamedTuple
 import click
 from numpy.typing import NDArray
 
-import vkbloom
 from vkbloom._cli.fields import SIZE, Command
 from vkbloom._cli.image_files import read_picture, reading_options
 from vkbloom._cli.interrupts import INTERRUPTED
@@ -24,12 +23,16 @@ from vkbloom._cli.scene_options import scene_options
 from vkbloom._cli.sequences import is_stream
 from vkbloom._cli.settings_options import STARTS, settings_options
 from vkbloom._cli.terminal import tell_device
+from vkbloom._errors import Error
 from vkbloom._explorer.viewer import GLOW, Viewer
 from vkbloom._extras import import_extra
 from vkbloom._io.images import Picture
 from vkbloom._presets.start import PRESET_OF_SCENES, developed, start_of
+from vkbloom._renderer.interruptible import opened_renderer
+from vkbloom._renderer.renderer import Renderer
 from vkbloom._renderer.surface import Surface
-from vkbloom._settings.settings import SHADINGS, Settings, Shading
+from vkbloom._scene import Scene
+from vkbloom._settings.settings import SHADINGS, Settings, Shading, presets
 
 #: Options of a scene, by the names of their parameters.
 _OF_SCENE: Final = {"base": "--scene", "shading": "--shading"}
@@ -138,7 +141,7 @@ class Live:
         elif key in "123456789" and int(key) <= len(names):
             self.framebuffer = names[int(key) - 1]
         elif key == "p":
-            known = list(vkbloom.presets.values())
+            known = list(presets.values())
             shown = known.index(self.settings) if self.settings in known else -1
             self.settings = known[(shown + 1) % len(known)]
             if self.opened is not None:
@@ -174,8 +177,8 @@ def view(
     size: tuple[int, int] | None,
     shading: Shading,
     adapter: str,
-    scene: Callable[[], vkbloom.Scene],
-    settings: vkbloom.Settings,
+    scene: Callable[[], Scene],
+    settings: Settings,
 ) -> None:
     """Show the bloom of IMAGE, or of a scene, in a window with live controls."""
     glfw = import_extra("glfw", "window", "view")
@@ -183,7 +186,7 @@ def view(
     loaded = scene() if opened is None else None
     with (
         _opened(glfw, size or (min(width, _LARGEST[0]), min(height, _LARGEST[1]))) as window,
-        vkbloom.Renderer(adapter) as renderer,
+        opened_renderer(adapter) as renderer,
         Surface(renderer, window) as surface,
     ):
         live = Live(settings, loaded, shading, opened=opened)
@@ -207,7 +210,7 @@ def view(
                 since, shown = now, 0
 
 
-def _show(live: Live, renderer: vkbloom.Renderer, uploaded: object) -> object:
+def _show(live: Live, renderer: Renderer, uploaded: object) -> object:
     """Upload the image for the settings, unless it is there; return what it depends on."""
     if live.opened is None:
         return None
@@ -228,7 +231,7 @@ def _opened(glfw: Any, size: tuple[int, int]) -> Iterator[Any]:
             window = glfw.create_window(*size, "vkbloom", None, None)
         if not window:
             reason = glfw.get_error()[1].decode()
-            raise vkbloom.Error(
+            raise Error(
                 f"no window was opened: {reason}; without a display, use vkbloom explore, which "
                 "shows the same in a browser"
             )
@@ -237,7 +240,7 @@ def _opened(glfw: Any, size: tuple[int, int]) -> Iterator[Any]:
         glfw.terminate()
 
 
-def _listen(glfw: Any, window: Any, renderer: vkbloom.Renderer, live: Live) -> None:
+def _listen(glfw: Any, window: Any, renderer: Renderer, live: Live) -> None:
     """Connect keys to the state."""
     keys = {getattr(glfw, f"KEY_{name}"): name.lower() for name in _KEYS}
 
@@ -268,8 +271,8 @@ def explore(
     size: tuple[int, int],
     shading: Shading,
     adapter: str,
-    scene: Callable[[], vkbloom.Scene],
-    settings: vkbloom.Settings,
+    scene: Callable[[], Scene],
+    settings: Settings,
 ) -> int:
     """Explore the bloom of IMAGE, or of a scene, in a browser with controls for all settings.
 
@@ -279,8 +282,8 @@ def explore(
     shading begins with the tone map "aces" and the encoding "srgb".
     """
     import_extra("tornado", "notebook", "explore")
-    looked_at: vkbloom.Scene | NDArray[Any]
-    begun: vkbloom.Settings | None = settings
+    looked_at: Scene | NDArray[Any]
+    begun: Settings | None = settings
     of_file: dict[str, Any] = {}
     if opened is not None:
         _check_is_scene("size", "--size")
@@ -290,11 +293,9 @@ def explore(
         looked_at = scene()
         if not any(given(name) for name in ("base", "glow", "glow_intensity")):
             looked_at = dataclasses.replace(looked_at, glow_intensity=GLOW)
-        if settings == vkbloom.presets[PRESET_OF_SCENES] and not any(
-            given(name) for name in STARTS
-        ):
+        if settings == presets[PRESET_OF_SCENES] and not any(given(name) for name in STARTS):
             begun = None
-    with vkbloom.Renderer(adapter) as renderer:
+    with opened_renderer(adapter) as renderer:
 
         def new_viewer() -> Viewer:
             how: dict[str, Any] = {"size": size, "shading": shading, "renderer": renderer}

@@ -13,9 +13,9 @@ from typing import Any, Final, NoReturn
 import click
 from click.core import ParameterSource
 
-import vkbloom
 from vkbloom._cli import terminal
 from vkbloom._cli.interrupts import INTERRUPTED, raise_interrupts
+from vkbloom._errors import Error
 from vkbloom._free_memory import ADVICE, memory_left
 from vkbloom._lazy_modules import own_module
 from vkbloom._settings.registry import METHODS
@@ -49,7 +49,7 @@ _MODULES: Final = {
     "adapters": "doctor",
 }
 
-_FAILURES: Final = (vkbloom.Error, OSError, ValueError, ImportError, MemoryError)
+_FAILURES: Final = (Error, OSError, ValueError, ImportError, MemoryError)
 
 
 # How Python and OpenImageIO report that there is no memory for a thread's stack, and the dynamic
@@ -157,7 +157,9 @@ def with_methods(words: Sequence[str]) -> list[str]:
         changed += [option, value] if is_joined else [word]
     for index, (option, value) in enumerate(itertools.pairwise(changed), 1):
         if option in ("--method", "--to") and value not in METHODS and os.path.isfile(value):
-            changed[index] = vkbloom.load_method(value).method
+            from vkbloom._custom.method import load_method  # noqa: PLC0415  costs start-up time
+
+            changed[index] = load_method(value).method
     return changed
 
 

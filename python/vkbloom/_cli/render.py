@@ -6,7 +6,6 @@ from collections.abc import Callable
 
 import click
 
-import vkbloom
 from vkbloom._cli import no_bloom
 from vkbloom._cli.fields import SIZE, Command
 from vkbloom._cli.program import adapter_option, as_wrong_use
@@ -15,7 +14,9 @@ from vkbloom._cli.settings_options import settings_options
 from vkbloom._cli.terminal import note, say, tell_device
 from vkbloom._framebuffers import leading
 from vkbloom._renderer import frame_files
-from vkbloom._settings.settings import SHADINGS, Shading
+from vkbloom._renderer.interruptible import opened_renderer
+from vkbloom._scene import Scene
+from vkbloom._settings.settings import SHADINGS, Settings, Shading
 
 
 @click.command(cls=Command)
@@ -44,8 +45,8 @@ def command(
     shading: Shading,
     framebuffers: str,
     adapter: str,
-    scene: Callable[[], vkbloom.Scene],
-    settings: vkbloom.Settings,
+    scene: Callable[[], Scene],
+    settings: Settings,
 ) -> None:
     """Render a scene with its bloom and write the framebuffers.
 
@@ -55,7 +56,7 @@ def command(
         raise click.UsageError("render does not write to a pipe; give --out a file or a folder")
     names = "all" if framebuffers == "all" else framebuffers.split(",")
     loaded = scene()
-    with vkbloom.Renderer(adapter) as renderer:
+    with opened_renderer(adapter) as renderer:
         tell_device(renderer)
         with as_wrong_use():
             frames = renderer.render(

@@ -10,11 +10,10 @@ from typing import Any, Final
 
 import click
 
-from vkbloom import Camera, Scene
 from vkbloom._cli import fields
 from vkbloom._cli.program import as_wrong_use
 from vkbloom._cli.sequences import as_file
-from vkbloom._scene import gltf, skybox
+from vkbloom._scene import Camera, Scene, gltf, skybox
 
 _BUILT_IN: Final = "ufo"
 _FACES: Final = 6

@@ -11,13 +11,14 @@ from typing import Any, get_args
 import click
 from rich.console import Console
 
-import vkbloom
+from vkbloom import _fit
 from vkbloom._cli.fields import SIZE, Command, NameOf
 from vkbloom._cli.image_files import input_colour_option, read_picture
 from vkbloom._cli.program import adapter_option, as_wrong_use, given
 from vkbloom._cli.settings_options import STARTS, read_settings, settings_options
 from vkbloom._cli.terminal import is_quiet, note
 from vkbloom._explorer.controls import as_code
+from vkbloom._fit import FitResult
 from vkbloom._fit.losses import LossName
 from vkbloom._fit.translating import Translation
 from vkbloom._io.images import Highlights, Picture
@@ -30,6 +31,7 @@ from vkbloom._presets.start import (
 )
 from vkbloom._renderer.interruptible import opened_renderer
 from vkbloom._settings.registry import METHODS
+from vkbloom._settings.settings import Settings, presets
 
 
 def _search_options(
@@ -79,7 +81,7 @@ def _search_options(
     return add
 
 
-def _show_results(fits: Sequence[vkbloom.FitResult], *, as_json: bool) -> None:
+def _show_results(fits: Sequence[FitResult], *, as_json: bool) -> None:
     """Print results, the best one first."""
     if as_json:
         click.echo(json.dumps([_object(item) for item in fits], indent=2))
@@ -95,7 +97,7 @@ def _show_results(fits: Sequence[vkbloom.FitResult], *, as_json: bool) -> None:
             click.echo(f"  {item.words}")
 
 
-def _in_four_digits(fit: vkbloom.FitResult) -> vkbloom.Settings:
+def _in_four_digits(fit: FitResult) -> Settings:
     """Return the settings of a translation as they are printed: no more digits tell anything."""
     settings = fit.settings
     for name in fit.vary:
@@ -106,7 +108,7 @@ def _in_four_digits(fit: vkbloom.FitResult) -> vkbloom.Settings:
     return settings
 
 
-def _object(fit: vkbloom.FitResult) -> dict[str, Any]:
+def _object(fit: FitResult) -> dict[str, Any]:
     """Return the object of one result that --json prints."""
     return {
         "settings": fit.settings.to_dict(),
@@ -128,7 +130,7 @@ def _object(fit: vkbloom.FitResult) -> dict[str, Any]:
     "--preset",
     "presets",
     multiple=True,
-    type=NameOf("preset", vkbloom.presets, ("all",)),
+    type=NameOf("preset", presets, ("all",)),
     help="Settings to start a search from; may be repeated. all: every preset, each with those of "
     f"the varied settings that it has [default {PRESET_OF_IMAGES}; {PRESET_OF_PHOTOS} for files of "
     "integers]",
@@ -160,7 +162,7 @@ def fit(
     search: dict[str, Any],
     input_colour: Any,
     adapter: str,
-) -> list[vkbloom.FitResult]:
+) -> list[FitResult]:
     """Find the settings with which the bloom of IMAGE matches TARGET.
 
     Both files have the same size. Their colours are decoded to linear light, as by vkbloom apply;
@@ -192,7 +194,7 @@ def fit(
         results = [
             item
             for source, settings in searches
-            for item in vkbloom.fit(source.pixels, wanted, settings, renderer=renderer, **search)
+            for item in _fit.fit(source.pixels, wanted, settings, renderer=renderer, **search)
         ]
     return sorted(results, key=lambda item: item.loss)
 
@@ -214,7 +216,7 @@ def _begun(
     "--to",
     "target",
     required=True,
-    type=NameOf("preset or method", vkbloom.presets, METHODS),
+    type=NameOf("preset or method", presets, METHODS),
     help="A preset or a method: where the search starts, and what does not vary.",
 )
 @click.option("--size", type=SIZE, default="640x360", help="Size of the picture.")
@@ -227,8 +229,8 @@ def translate(
     size: tuple[int, int],
     search: dict[str, Any],
     adapter: str,
-    settings: vkbloom.Settings,
-) -> list[vkbloom.FitResult]:
+    settings: Settings,
+) -> list[FitResult]:
     """Find another method's parameters whose bloom comes closest.
 
     --preset, --method or --settings, with further options, are the settings to translate; --to
@@ -240,6 +242,6 @@ def translate(
         raise click.UsageError(
             "give what to translate: --preset NAME, --method NAME or --settings FILE"
         )
-    start = vkbloom.presets[target] if target in vkbloom.presets else METHODS[target]()
+    start = presets[target] if target in presets else METHODS[target]()
     with opened_renderer(adapter) as renderer, as_wrong_use():
-        return [vkbloom.translate(settings, start, size=size, renderer=renderer, **search)]
+        return [_fit.translate(settings, start, size=size, renderer=renderer, **search)]

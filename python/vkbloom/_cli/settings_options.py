@@ -11,7 +11,6 @@ from typing import Any, Final
 
 import click
 
-import vkbloom
 from vkbloom._cli import fields
 from vkbloom._cli.image_files import highlights_of_file, silenced
 from vkbloom._cli.program import as_wrong_use, given
@@ -22,7 +21,7 @@ from vkbloom._presets.start import PRESET_OF_IMAGES, PRESET_OF_PHOTOS, PRESET_OF
 from vkbloom._renderer.frame_files import facts_of
 from vkbloom._settings.fields import fields_of
 from vkbloom._settings.registry import METHODS
-from vkbloom._settings.settings import EXPANDED
+from vkbloom._settings.settings import EXPANDED, Settings, presets
 
 #: The presets that a call without --preset and --method may start from.
 DEFAULT_PRESETS: Final = (PRESET_OF_IMAGES, PRESET_OF_PHOTOS, PRESET_OF_SCENES)
@@ -47,7 +46,7 @@ def start_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
     @click.option(
         "--preset",
-        type=fields.NameOf("preset", vkbloom.presets),
+        type=fields.NameOf("preset", presets),
         help="Published settings to start from; vkbloom presets lists them "
         f"[default {PRESET_OF_IMAGES} for images, {PRESET_OF_PHOTOS} for files of integers, "
         f"{PRESET_OF_SCENES} for scenes]",
@@ -57,8 +56,8 @@ def start_options(command: Callable[..., Any]) -> Callable[..., Any]:
         type=fields.NameOf("method", METHODS),
         help="The method of the blur, with its defaults, or a file of a custom method.",
     )
-    @fields.options({"": vkbloom.Settings}, "shared")
-    @fields.options(METHODS, "of_method", base=vkbloom.Settings)
+    @fields.options({"": Settings}, "shared")
+    @fields.options(METHODS, "of_method", base=Settings)
     @click.option(
         "--settings",
         "stored",
@@ -103,7 +102,7 @@ class Start:
 
     preset: str | None
     method: str | None
-    stored: tuple[vkbloom.Settings, float | None] | None
+    stored: tuple[Settings, float | None] | None
     changes: dict[str, Any]
     expand: float | None
     subimage: int = 0
@@ -114,13 +113,13 @@ class Start:
         """Whether the call names what it starts from."""
         return self.preset is not None or self.method is not None or self.stored is not None
 
-    def of_file(self, image: str) -> tuple[vkbloom.Settings, float | None]:
+    def of_file(self, image: str) -> tuple[Settings, float | None]:
         """Return the settings for an image file, "" for a scene, and the value for --expand."""
         if not image:
             return self.of(None)
         return self.of(highlights_of_file(image, self.subimage, self.colour))
 
-    def of(self, highlights: Highlights | None) -> tuple[vkbloom.Settings, float | None]:
+    def of(self, highlights: Highlights | None) -> tuple[Settings, float | None]:
         """Return the settings for an image with these highlights, and the value for --expand.
 
         None: for a scene.
@@ -133,12 +132,12 @@ class Start:
         with as_wrong_use():
             return start_of(highlights, begun, self.changes, expand=expand)
 
-    def _begun(self) -> vkbloom.Settings | None:
+    def _begun(self) -> Settings | None:
         """Return what the settings start from; None: the default for the source."""
         if self.stored is not None:
             begun = self.stored[0]
         elif self.preset is not None:
-            begun = vkbloom.presets[self.preset]
+            begun = presets[self.preset]
         else:
             return None if self.method is None else METHODS[self.method]()
         if self.method not in (None, begun.method):
@@ -147,7 +146,7 @@ class Start:
         return begun
 
 
-def read_settings(name: str) -> tuple[vkbloom.Settings, float | None]:
+def read_settings(name: str) -> tuple[Settings, float | None]:
     """Return the settings of a file, and what the highlights of its picture were expanded up to."""
     with silenced(), as_file(name) as file:
         try:
@@ -155,7 +154,7 @@ def read_settings(name: str) -> tuple[vkbloom.Settings, float | None]:
                 is_json = stream.read(64).lstrip(b"\xef\xbb\xbf \r\n\t").startswith(b"{")
             if is_json or name.lower().endswith(".json"):
                 text = Path(file).read_text(encoding="utf-8-sig")
-                settings = vkbloom.Settings.from_json(text)
+                settings = Settings.from_json(text)
                 expand = json.loads(text).get(EXPANDED)
             else:
                 facts = facts_of(file)
@@ -163,7 +162,7 @@ def read_settings(name: str) -> tuple[vkbloom.Settings, float | None]:
                     raise ValueError(
                         "holds no settings; PNG and OpenEXR files of vkbloom hold them"
                     )
-                settings = vkbloom.Settings.from_json(facts["settings"])
+                settings = Settings.from_json(facts["settings"])
                 expand = facts.get("expand")
             return settings, None if expand is None else check_expansion(float(expand))
         except (TypeError, ValueError) as error:
@@ -171,7 +170,7 @@ def read_settings(name: str) -> tuple[vkbloom.Settings, float | None]:
             raise ValueError(reason if file in reason else f"{file}: {reason}") from error
 
 
-def _check_declared(begun: vkbloom.Settings, changes: Mapping[str, Any]) -> None:
+def _check_declared(begun: Settings, changes: Mapping[str, Any]) -> None:
     """Raise click.UsageError for options that the settings' method does not have."""
     used = {name: _used(name) for name in changes}
     foreign = [name for name in changes if _option_of(type(begun), name) != used[name]]
@@ -196,7 +195,7 @@ def _used(name: str) -> str:
     return next(option for option in options if option and given(option))
 
 
-def _option_of(kind: type[vkbloom.Settings], name: str) -> str:
+def _option_of(kind: type[Settings], name: str) -> str:
     """Return the name of the option of a method's field; "" if there is no such field."""
     info = fields_of(kind).get(name)
     return "" if info is None else info.option

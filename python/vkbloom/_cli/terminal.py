@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 import click
 
 if TYPE_CHECKING:
-    import vkbloom
+    from vkbloom._renderer.renderer import Renderer
 
 
 #: The most characters of an error or a note. Names in files may have any length.
@@ -86,6 +86,6 @@ def note(text: str) -> None:
     say(f"vkbloom: note: {in_line(text)}", err=True)
 
 
-def tell_device(renderer: vkbloom.Renderer, *, err: bool = False) -> None:
+def tell_device(renderer: Renderer, *, err: bool = False) -> None:
     """Print the adapter."""
     say(f"Rendering on {renderer.info.summary}", err=err)

@@ -9,12 +9,14 @@ import click
 import numpy as np
 from tqdm import tqdm
 
-import vkbloom
 from vkbloom._cli.fields import SIZE, NameOf
 from vkbloom._cli.program import adapter_option
 from vkbloom._cli.terminal import hides_progress, say
 from vkbloom._formats import IMAGE_DTYPES
+from vkbloom._renderer.interruptible import opened_renderer
+from vkbloom._scene import Scene
 from vkbloom._settings.registry import METHODS
+from vkbloom._settings.settings import presets as known_presets
 
 _USUAL_SIZE: Final = (1920, 1080)
 # A single framebuffer may come from a fused pass.
@@ -25,7 +27,7 @@ _KEPT: Final[tuple[Any, ...]] = ("all", ("final",))
 @click.option(
     "--preset",
     "presets",
-    type=NameOf("preset", vkbloom.presets),
+    type=NameOf("preset", known_presets),
     multiple=True,
     help="Only this preset; repeat it for more.",
 )
@@ -53,12 +55,12 @@ def command(
     compiles for the CPU that it runs on: another type of CPU does not find these pipelines.
     """
     everything = not presets and not methods
-    warmed = [vkbloom.presets[name] for name in (vkbloom.presets if everything else presets)]
+    warmed = [known_presets[name] for name in (known_presets if everything else presets)]
     warmed += [METHODS[name]() for name in methods]
     calls = list(itertools.product(sizes or (_USUAL_SIZE,), IMAGE_DTYPES, (3, 4), warmed, _KEPT))
-    with vkbloom.Renderer(adapter) as renderer:
+    with opened_renderer(adapter) as renderer:
         if everything:
-            scene = vkbloom.Scene.ufo()
+            scene = Scene.ufo()
             for shading in ("forward", "deferred"):
                 for framebuffers in _KEPT:
                     renderer.render(scene, shading=shading, framebuffers=framebuffers)

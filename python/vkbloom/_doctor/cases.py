@@ -14,26 +14,19 @@ from typing import Any, Final, NamedTuple, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-import vkbloom
-from vkbloom import (
-    Convolution,
-    DualKawase,
-    Pyramid,
-    Renderer,
-    Scene,
-    Separable,
-    Streaks,
-    gaussian_weights,
-    glares,
-    presets,
-    psf,
-    reference,
-)
+from vkbloom import psf, reference
 from vkbloom._doctor.deviations import Deviation, deviation, deviations, tolerance
 from vkbloom._formats import FORMATS_BY_DTYPE, IMAGE_DTYPES
-from vkbloom._scene import skybox
+from vkbloom._glare.streaks import Streaks
+from vkbloom._gradients import vjp
+from vkbloom._methods.convolution import Convolution
+from vkbloom._methods.mip_chain import DualKawase, Pyramid
+from vkbloom._methods.separable import Separable, gaussian_weights
+from vkbloom._renderer.renderer import Renderer
+from vkbloom._scene import Scene, skybox
 from vkbloom._settings.fields import fields_of
-from vkbloom._settings.settings import Encoding, Settings, ToneMap
+from vkbloom._settings.glare import glares
+from vkbloom._settings.settings import Encoding, Settings, ToneMap, presets
 
 # No colour of an 8-bit image has this luminance, since it is not a multiple of 1e-4 / 255. So
 # rounding cannot move a pixel across the threshold.
@@ -225,7 +218,7 @@ def _pulled(
     cotangent: NDArray[Any],
     **arrays: Any,
 ) -> Iterator[Deviation]:
-    _, pullback = vkbloom.vjp(image, settings, renderer=renderer, **arrays)
+    _, pullback = vjp(image, settings, renderer=renderer, **arrays)
     gradients = pullback({"final": cotangent})
     _, of_reference = reference.vjp(image, settings, **arrays)
     for name, part in of_reference({"final": cotangent}).items():

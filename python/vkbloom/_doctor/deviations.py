@@ -8,8 +8,9 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from vkbloom import Frames, reference
+from vkbloom import reference
 from vkbloom._formats import FORMATS_BY_DTYPE
+from vkbloom._renderer.frames import Frames
 from vkbloom._settings.settings import Settings
 from vkbloom.reference._compositing import slope_of
 

@@ -12,11 +12,13 @@ from typing import Any, Final
 
 import numpy as np
 
-import vkbloom
 from vkbloom import _core, reference
 from vkbloom._c_paths import in_utf8
 from vkbloom._doctor.child import ANSWER_MARK
+from vkbloom._errors import AdapterNotFoundError, Error
 from vkbloom._renderer.adapter import bundled_driver, from_core
+from vkbloom._renderer.frames import Frames
+from vkbloom._renderer.interruptible import opened_renderer
 from vkbloom._settings.settings import check_settings
 
 SETTINGS: Final = check_settings(None).replace(bloom_size=(32, 24))
@@ -29,7 +31,7 @@ IMAGE[:20, :24] = (255, 128, 64)
 _TOLERANCE: Final = 3.0
 
 
-def differences(frames: vkbloom.Frames) -> list[str]:
+def differences(frames: Frames) -> list[str]:
     """Compare the framebuffers of `IMAGE` with those of `vkbloom.reference`."""
     expected = reference.apply(IMAGE, SETTINGS)
     results = {name: np.abs(frames[name] - 255.0 * array).max() for name, array in expected.items()}
@@ -50,7 +52,7 @@ def adapters(which: str) -> dict[str, Any]:
             results += map(
                 dataclasses.asdict, map(from_core, _core.adapters(in_utf8(driver) or driver))
             )
-        except vkbloom.AdapterNotFoundError as error:
+        except AdapterNotFoundError as error:
             reasons.append(_one_line(error))
     reason = "; ".join(reasons)
     return {"adapters": results, "reason": reason} if results or not reason else {"failure": reason}
@@ -58,7 +60,7 @@ def adapters(which: str) -> dict[str, Any]:
 
 def render(adapter: str) -> dict[str, Any]:
     """Make the test render."""
-    with vkbloom.Renderer(adapter) as renderer:
+    with opened_renderer(adapter) as renderer:
         info, results = renderer.info, differences(renderer.apply(IMAGE, SETTINGS))
         return {"name": info.name, "summary": info.summary, "differences": results}
 
@@ -66,10 +68,10 @@ def render(adapter: str) -> dict[str, Any]:
 def _one_line(error: Exception) -> str:
     """Return the message of an error in one line."""
     text = " ".join(str(error).split())
-    if isinstance(error, vkbloom.AdapterNotFoundError):
+    if isinstance(error, AdapterNotFoundError):
         # The rest of the message advises to run the doctor, which is running.
         return text.partition(". ")[0]
-    return text if isinstance(error, vkbloom.Error | OSError) else f"{type(error).__name__}: {text}"
+    return text if isinstance(error, Error | OSError) else f"{type(error).__name__}: {text}"
 
 
 def main() -> None:

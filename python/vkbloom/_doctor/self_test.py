@@ -16,10 +16,13 @@ import time
 from collections.abc import Iterator
 from typing import Any, Final
 
-import vkbloom
 from vkbloom._doctor.cases import Case, cases
 from vkbloom._doctor.child import SAFE_PATH
 from vkbloom._doctor.deviations import Deviation
+from vkbloom._errors import Error
+from vkbloom._renderer.interruptible import opened_renderer
+from vkbloom._renderer.renderer import Renderer
+from vkbloom._version import installed_version
 
 PROGRAM = ("-m", "vkbloom._doctor.self_test")
 _MARK: Final = "vkbloom-case "
@@ -68,7 +71,7 @@ def report(adapter: str, result: list[dict[str, Any]], seconds: float) -> dict[s
     ]
     return {
         "self_test": 1,
-        "version": vkbloom.__version__,
+        "version": installed_version(),
         "platform": platform.platform(),
         "adapter": adapter,
         "device": device["device"],
@@ -86,17 +89,17 @@ class _Renderers(contextlib.ExitStack):
     def __init__(self, adapter: str) -> None:
         super().__init__()
         self.adapter = adapter
-        self.opened: dict[str, vkbloom.Renderer] = {}
+        self.opened: dict[str, Renderer] = {}
 
-    def get(self, variant: str) -> vkbloom.Renderer:
+    def get(self, variant: str) -> Renderer:
         if variant not in self.opened:
             if variant != "auto":
                 os.environ["VKBLOOM_VARIANT"] = variant
-            self.opened[variant] = self.enter_context(vkbloom.Renderer(self.adapter))
+            self.opened[variant] = self.enter_context(opened_renderer(self.adapter))
         return self.opened[variant]
 
 
-def judge(case: Case, renderer: vkbloom.Renderer) -> dict[str, Any]:
+def judge(case: Case, renderer: Renderer) -> dict[str, Any]:
     """Run a case; return its error of the largest share of what is allowed, and its time."""
     start = time.perf_counter()
     worst = Deviation("", 0.0, 0.0)
@@ -133,7 +136,7 @@ def main() -> None:
     with _Renderers(adapter) as renderers:
         try:
             info = renderers.get("auto").info
-        except (vkbloom.Error, ValueError, OSError) as error:
+        except (Error, ValueError, OSError) as error:
             _tell(group="device", name=adapter, wrong=f"{type(error).__name__}: {error}")
             return
         _tell(device=dataclasses.asdict(info), count=len(chosen))

@@ -21,7 +21,6 @@ from numpy.typing import NDArray
 from rich.console import Console
 from rich.status import Status
 
-import vkbloom
 from vkbloom import testing
 from vkbloom._cli.check import comparing, measuring, showing
 from vkbloom._cli.fields import SIZE, Command
@@ -31,9 +30,12 @@ from vkbloom._cli.sequences import expanded
 from vkbloom._cli.settings_options import settings_options
 from vkbloom._cli.targets import check_target
 from vkbloom._cli.terminal import is_quiet, note, say
-from vkbloom._custom.method import CustomMethod, identifier_of
+from vkbloom._custom.method import CustomMethod, identifier_of, load_method
 from vkbloom._io import safe_writing
+from vkbloom._io.array_files import read
 from vkbloom._renderer.interruptible import opened_renderer
+from vkbloom._renderer.renderer import Renderer
+from vkbloom._settings.settings import Settings, presets
 from vkbloom._spelling import did_you_mean
 from vkbloom._views.plain_values import plain
 from vkbloom.testing._law_report import LawReport, law_report
@@ -64,7 +66,7 @@ class CheckCommand(Command):
             if word.startswith("-") or (index and words[index - 1] in taking):
                 continue
             if os.path.isfile(word):
-                words[index : index + 1] = ["--method", vkbloom.load_method(word).method]
+                words[index : index + 1] = ["--method", load_method(word).method]
                 break
         return super().parse_args(ctx, words)
 
@@ -129,7 +131,7 @@ def check(
     page: str | None,
     markdown: str | None,
     adapter: str,
-    settings: vkbloom.Settings,
+    settings: Settings,
     **how: Any,
 ) -> int:
     """Measure what a bloom is worth.
@@ -200,7 +202,7 @@ class _Opened:
     timer: Callable[[], Mapping[str, float]]
     device: str
     program: Program | None = None
-    settings: vkbloom.Settings | None = None
+    settings: Settings | None = None
     law: str = "first run"
 
     def show(self, bar: Status, law: str | None = None) -> None:
@@ -215,9 +217,9 @@ class _Opened:
 
 
 def _opened(
-    renderer: vkbloom.Renderer,
+    renderer: Renderer,
     name: str,
-    source: str | vkbloom.Settings,
+    source: str | Settings,
     how: Mapping[str, Any],
     bar: Status,
 ) -> _Opened:
@@ -266,7 +268,7 @@ def _measured(
     return results
 
 
-def _other(against: str, settings: vkbloom.Settings) -> str | vkbloom.Settings:
+def _other(against: str, settings: Settings) -> str | Settings:
     """Return what --against names: a command, or settings.
 
     Of a file, parameters have the values that differ from the defaults of the first bloom.
@@ -275,7 +277,7 @@ def _other(against: str, settings: vkbloom.Settings) -> str | vkbloom.Settings:
         return against
     if os.path.isfile(against):
         # Another name, so that it does not replace a file of the same name.
-        kind = vkbloom.load_method(against, name=f"{identifier_of(Path(against).stem)}_against")
+        kind = load_method(against, name=f"{identifier_of(Path(against).stem)}_against")
         usual, other = type(settings)(), kind()
         changed = {
             field.name: getattr(settings, field.name)
@@ -284,12 +286,12 @@ def _other(against: str, settings: vkbloom.Settings) -> str | vkbloom.Settings:
             and getattr(settings, field.name) != getattr(usual, field.name, None)
         }
         return other.replace(**changed) if isinstance(settings, CustomMethod) else other
-    if against not in vkbloom.presets:
-        near = did_you_mean(against, vkbloom.presets)
+    if against not in presets:
+        near = did_you_mean(against, presets)
         raise click.UsageError(
             f"--against: {against!r} is not a file, a preset, or a command with {{input}}{near}"
         )
-    return vkbloom.presets[against]
+    return presets[against]
 
 
 def _check_choice(params: Mapping[str, Any]) -> None:
@@ -318,7 +320,7 @@ def _notes() -> Iterator[None]:
         note(str(warning.message).partition("; ")[0])
 
 
-def _add_reference(settings: vkbloom.Settings, where: str) -> None:
+def _add_reference(settings: Settings, where: str) -> None:
     """Give a custom method its reference, FILE.py:FUNCTION."""
     path, _, function = where.rpartition(":")
     if not isinstance(settings, CustomMethod):
@@ -338,7 +340,7 @@ def judge(pattern: str, fps: float, degrees: float, *, as_json: bool) -> int:
 
     def frames() -> Iterator[NDArray[Any]]:
         for (file, _), count in zip(files, shown, strict=True):
-            picture = vkbloom.read(file)[..., :3].astype(np.float32)
+            picture = read(file)[..., :3].astype(np.float32)
             yield from itertools.repeat(picture, count)
 
     flashes = testing.flash(frames(), fps, degrees=degrees)
