@@ -6,6 +6,8 @@ There are functions of the eye (`spencer`, `cie_general`, `cie_total`), of lense
 an image with any of them.
 """
 
+# ruff: noqa: F403, F405  the names are imported at the first use
+
 from __future__ import annotations
 
 from collections.abc import Mapping
@@ -16,10 +18,23 @@ from vkbloom._settings.registry import FUNCTIONS
 
 if TYPE_CHECKING:
     from vkbloom._measured import measured
-    from vkbloom._psf import *  # noqa: F403
+    from vkbloom._psf import *
 
-__all__ = ["measured"]
-__all__ += _psf.__all__
+__all__ = [
+    "PSF",
+    "airy",
+    "aperture",
+    "cie_general",
+    "cie_total",
+    "fog_glow",
+    "gaussian",
+    "harvey_shack",
+    "iris",
+    "measured",
+    "samples",
+    "spencer",
+    "unreal",
+]
 
 
 def __getattr__(name: str) -> Any:
@@ -39,7 +54,7 @@ def __dir__() -> list[str]:
 def _classes() -> Mapping[str, type[Any]]:
     from vkbloom._measured import measured  # noqa: PLC0415  costs start-up time
 
-    kinds = [measured, *(getattr(_psf, name) for name in _psf.__all__ if name != "PSF")]
+    kinds = [measured, *(getattr(_psf, name) for name in dir(_psf) if name != "PSF")]
     return {kind.__name__: kind for kind in kinds if issubclass(kind, _psf.PSF)}
 
 
