@@ -18,7 +18,7 @@ from tests.explorer.pages import Viewer
 from tests.images import lights
 from tests.io.parts import reread, store_ultra_hdr
 from vkbloom._cli import live
-from vkbloom._io.images import Picture
+from vkbloom._io.picture import Picture
 
 pytestmark = pytest.mark.usefixtures("kept_renderers")
 

@@ -19,9 +19,9 @@ from tests.io import foreign
 from tests.io.parts import written
 from tests.io.profiles import png_chunk, store_png
 from tests.srgb import decode_srgb, encode_srgb
-from vkbloom._io.image_reading import decode_file, load
+from vkbloom._io.formats.jpeg_xl import read_header
+from vkbloom._io.image_file import read_picture, read_stored
 from vkbloom._io.image_writing import save
-from vkbloom._io.jpeg_xl import header_of
 
 oiio = pytest.importorskip("OpenImageIO")
 image = pytest.importorskip("PIL.Image")
@@ -101,17 +101,17 @@ POSITIONS: list[tuple[str, Callable[[Path], None]]] = [
 @pytest.mark.parametrize(("name", "store"), POSITIONS, ids=[name for name, _ in POSITIONS])
 def test_a_position_moves_nothing(tmp_path: Path, name: str, store: Callable[[Path], None]) -> None:
     store(tmp_path / name)
-    stored = load(tmp_path / name)
+    stored = read_stored(tmp_path / name)
     assert np.array_equal(stored.pixels, PIXELS)
-    assert (stored.origin, stored.display) == ((0, 0), (0, 0, 48, 32))
+    assert (stored.header.origin, stored.header.display) == ((0, 0), (0, 0, 48, 32))
 
 
 def test_layers_of_photoshop_are_their_pixels(tmp_path: Path) -> None:
     grey = np.stack([LEVELS, ALPHA], -1)
     foreign.grey_psd(tmp_path / "a.psd", grey, grey[:5, :7])
-    stored = load(tmp_path / "a.psd", 1)
+    stored = read_stored(tmp_path / "a.psd", 1)
     assert np.array_equal(stored.pixels, grey[:5, :7])
-    assert stored.channels == ("Y", "A")
+    assert stored.header.channels == ("Y", "A")
 
 
 @pytest.mark.parametrize("suffix", ["dpx", "rla"])
@@ -120,9 +120,9 @@ def test_only_openexr_gets_windows(tmp_path: Path, suffix: str) -> None:
     spec.x, spec.y = -8, -4
     spec.full_width, spec.full_height = 32, 24
     written(tmp_path / "a.exr", spec, (PIXELS / 255).astype(np.float16))
-    picture = decode_file(load(tmp_path / "a.exr"), "a.exr")
+    picture = read_picture(tmp_path / "a.exr")
     save(picture, tmp_path / f"a.{suffix}")
-    assert load(tmp_path / f"a.{suffix}").pixels.shape == (24, 32, 3)
+    assert read_stored(tmp_path / f"a.{suffix}").pixels.shape == (24, 32, 3)
 
 
 # JPEG 2000
@@ -167,9 +167,9 @@ def test_signed_jpeg_2000(tmp_path: Path, bits: int) -> None:
     path.write_bytes(content)
     if bits == 12:
         with pytest.raises(ValueError, match=r"a\.j2k: JPEG 2000 with signed numbers of 12 bits"):
-            load(path)
+            read_stored(path)
     else:
-        assert np.array_equal(load(path).pixels[..., 0], values)
+        assert np.array_equal(read_stored(path).pixels[..., 0], values)
 
 
 # TIFF whose 0 is white
@@ -276,7 +276,8 @@ def test_alpha_of_jpeg_xl(tmp_path: Path, container: str, is_multiplied: bool) -
 @pytest.mark.parametrize("cut", range(0, len(STRAIGHT), 3))
 def test_headers_of_jpeg_xl_that_end_early(tmp_path: Path, cut: int) -> None:
     (tmp_path / "a.jxl").write_bytes(STRAIGHT[:cut])
-    assert isinstance(header_of(tmp_path / "a.jxl").is_multiplied, bool)
+    with open(tmp_path / "a.jxl", "rb") as stream:
+        assert isinstance(read_header(stream).is_multiplied, bool)
 
 
 def test_dark_levels_of_lossy_jpeg_xl_with_a_profile(tmp_path: Path) -> None:

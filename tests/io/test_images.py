@@ -19,18 +19,15 @@ from tests.framebuffers import write_image as store
 from tests.io.parts import reread, written
 from tests.srgb import decode_srgb, encode_srgb
 from vkbloom._io import safe_writing
+from vkbloom._io.decoding import decode
 from vkbloom._io.displayed import Saved
-from vkbloom._io.image_reading import decode_file, load
+from vkbloom._io.image_file import read_stored
 from vkbloom._io.image_writing import save
-from vkbloom._io.images import Picture, StoredImage, Window
+from vkbloom._io.picture import Picture, Window
 
 oiio = pytest.importorskip("OpenImageIO")
 
 DTYPES = {"uint8": "uint8", "uint16": "uint16", "half": "float16", "float": "float32"}
-
-
-def decode(stored: StoredImage, colour: str | None = None) -> Picture:
-    return decode_file(stored, "image", colour)
 
 
 def noise(*shape: int, numbers: str, seed: int = 3) -> NDArray[Any]:
@@ -77,16 +74,16 @@ class TestLoad:
         self, tmp_path: Path, name: str, numbers: str, channels: int
     ) -> None:
         pixels = noise(5, 7, channels, numbers=numbers)
-        stored = load(store(tmp_path / name, pixels, numbers))
+        stored = read_stored(store(tmp_path / name, pixels, numbers))
         assert stored.pixels.dtype == pixels.dtype
         assert stored.pixels.flags.c_contiguous
         assert np.array_equal(stored.pixels, pixels)
-        assert stored.numbers == (numbers,) * channels
-        assert stored.display == (0, 0, 7, 5)
+        assert stored.header.numbers == (numbers,) * channels
+        assert stored.header.display == (0, 0, 7, 5)
 
     def test_doubles_become_floats(self, tmp_path: Path) -> None:
         pixels = noise(2, 3, 3, numbers="float")
-        stored = load(store(tmp_path / "a.tif", pixels.astype(np.float64), "double"))
+        stored = read_stored(store(tmp_path / "a.tif", pixels.astype(np.float64), "double"))
         assert stored.pixels.dtype == np.float32
         assert np.array_equal(stored.pixels, pixels)
 
@@ -112,8 +109,8 @@ class TestLoad:
         x, y, width, height = data
         pixels = noise(height, width, 3, numbers="half")
         fields = dict(zip(("full_x", "full_y", "full_width", "full_height"), display, strict=True))
-        stored = load(store(tmp_path / "a.exr", pixels, "half", x=x, y=y, **fields))
-        assert (stored.origin, stored.display) == (origin, display)
+        stored = read_stored(store(tmp_path / "a.exr", pixels, "half", x=x, y=y, **fields))
+        assert (stored.header.origin, stored.header.display) == (origin, display)
         assert stored.pixels.shape == (*size[::-1], 3)
         row, column = y - origin[1], x - origin[0]
         inside = stored.pixels[row : row + height, column : column + width]
@@ -128,7 +125,7 @@ class TestLoad:
         path = tmp_path / f"a.{suffix}"
         path.write_bytes(content)
         with pytest.raises(ValueError, match=f"a.{suffix}: "):
-            load(path)
+            read_stored(path)
 
     @pytest.mark.parametrize(
         "suffix", ["png", "jpg", "exr", "hdr", "tif", "bmp", "tga", "webp", "gif"]
@@ -137,11 +134,11 @@ class TestLoad:
         numbers = {"exr": "half", "hdr": "float"}.get(suffix, "uint8")
         pixels = np.abs(noise(60, 80, 3, numbers=numbers))
         path = store(tmp_path / f"a.{suffix}", pixels, numbers)
-        load(path)
+        read_stored(path)
         content = path.read_bytes()
         path.write_bytes(content[: len(content) * 2 // 3])
         with pytest.raises(ValueError, match=f"a.{suffix}: "):
-            load(path)
+            read_stored(path)
 
     def test_size_larger_than_the_file_allows_is_refused(self, tmp_path: Path) -> None:
         path = tmp_path / "a.exr"
@@ -149,12 +146,12 @@ class TestLoad:
             fields = {"full_width": width, "full_height": height}
             store(path, noise(1, 2, 3, numbers="half"), "half", **fields)
             with pytest.raises(ValueError, match=f"a.exr: {width} x {height} is larger than"):
-                load(path)
+                read_stored(path)
 
     def test_numbers_of_other_types(self, tmp_path: Path) -> None:
         path = store(tmp_path / "a.tif", np.zeros((2, 2, 3), np.int16), "int16")
         with pytest.raises(ValueError, match=r"a\.tif: numbers of int16 are not supported"):
-            load(path)
+            read_stored(path)
 
     @pytest.mark.parametrize("folder", ["", "caf\udce9/"], ids=["file", "folder"])
     def test_names_that_are_not_utf8(self, tmp_path: Path, folder: str) -> None:
@@ -162,7 +159,7 @@ class TestLoad:
         other = tmp_path / f"{folder}b\udce9.png"
         other.parent.mkdir(exist_ok=True)
         other.write_bytes(path.read_bytes())
-        for call in (lambda: load(other), lambda: save(decode(load(path)), other)):
+        for call in (lambda: read_stored(other), lambda: save(decode(read_stored(path)), other)):
             with pytest.raises(ValueError, match=r"b\\udce9\.png' is not UTF-8"):
                 call()
         assert other.read_bytes() == path.read_bytes()
@@ -176,7 +173,7 @@ class TestLoad:
             content.replace(b"compression\0compression\0", b"compression\0c\xe9mpression\0")
         )
         with pytest.raises(ValueError, match=r"a\.exr: .*c\ufffdmpression"):
-            load(path)
+            read_stored(path)
 
     def test_deep_images(self, tmp_path: Path) -> None:
         path = tmp_path / "a.exr"
@@ -190,19 +187,19 @@ class TestLoad:
         assert writer.write_deep_image(deep)
         assert writer.close()
         with pytest.raises(ValueError, match=r"a\.exr: a deep image or a volume is not supported"):
-            load(path)
+            read_stored(path)
 
     def test_openimageio_missing(self, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setitem(sys.modules, "OpenImageIO", None)
         with pytest.raises(ModuleNotFoundError, match=r"pip install vkbloom\[images\]"):
-            load("a.png")
+            read_stored("a.png")
 
 
 class TestDecode:
     def test_integers_that_the_file_calls_linear(self, tmp_path: Path) -> None:
         pixels = noise(4, 6, 3, numbers="uint8")
         linear = {"oiio__ColorSpace": "lin_rec709_scene"}
-        stored = load(store(tmp_path / "a.png", pixels, "uint8", **linear))
+        stored = read_stored(store(tmp_path / "a.png", pixels, "uint8", **linear))
         assert np.allclose(decode(stored).pixels, pixels / 255, rtol=1e-6, atol=0)
         forced = decode(stored, "srgb").pixels
         assert np.allclose(forced, decode_srgb(pixels / 255), rtol=1e-6, atol=0)
@@ -210,13 +207,13 @@ class TestDecode:
     def test_other_colour_spaces_are_noted(self, tmp_path: Path) -> None:
         space = {"oiio__ColorSpace": "g22_rec709_scene"}
         path = store(tmp_path / "a.png", noise(4, 6, 3, numbers="uint8"), "uint8", **space)
-        (note,) = decode(load(path)).notes
+        (note,) = decode(read_stored(path)).notes
         assert note == "the file says g22_rec709_scene of its colours; converted to linear Rec. 709"
 
     @pytest.mark.parametrize("numbers", ["half", "float"])
     def test_floats_can_be_srgb(self, tmp_path: Path, numbers: str) -> None:
         pixels = np.abs(noise(4, 6, 4, numbers=numbers))
-        made = decode(load(store(tmp_path / "a.exr", pixels, numbers)), "srgb")
+        made = decode(read_stored(store(tmp_path / "a.exr", pixels, numbers)), "srgb")
         expected = decode_srgb(pixels[:, :, :3].astype(np.float64))
         step = np.finfo(pixels.dtype).eps
         assert made.pixels.dtype == pixels.dtype
@@ -227,7 +224,7 @@ class TestDecode:
     @pytest.mark.parametrize("names", [("Y",), ("Z",), ("Y", "A"), ("left.Y", "left.A")])
     def test_grey_becomes_rgb(self, tmp_path: Path, names: tuple[str, ...]) -> None:
         pixels = noise(3, 4, len(names), numbers="half")
-        made = decode(load(store(tmp_path / "a.exr", pixels, "half", channelnames=names)))
+        made = decode(read_stored(store(tmp_path / "a.exr", pixels, "half", channelnames=names)))
         assert made.grey
         assert made.pixels.shape == (3, 4, 2 + len(names))
         assert made.pixels.flags.c_contiguous
@@ -241,7 +238,9 @@ class TestDecode:
         pixels = noise(3, 4, 6, numbers="half")
         kinds = tuple(oiio.TypeDesc(kind) for kind in ("half",) * 4 + ("float",) * 2)
         fields = {"channelnames": names, "channelformats": kinds, "alpha_channel": 0}
-        made = decode(load(store(tmp_path / "a.exr", pixels.astype(np.float32), "float", **fields)))
+        made = decode(
+            read_stored(store(tmp_path / "a.exr", pixels.astype(np.float32), "float", **fields))
+        )
         assert made.pixels.dtype == np.float16
         assert np.array_equal(made.pixels, pixels[:, :, [3, 2, 1, 0]])
         (note,) = made.notes
@@ -252,7 +251,7 @@ class TestDecode:
         pixels = noise(3, 4, len(names), numbers="half")
         path = store(tmp_path / "a.exr", pixels, "half", channelnames=names)
         with pytest.raises(ValueError, match=f"the channels {', '.join(names)} are not R, G, B"):
-            decode(load(path))
+            decode(read_stored(path))
 
 
 class TestSave:
@@ -338,22 +337,24 @@ class TestSave:
 
     def test_alpha_that_is_read_otherwise_is_noted(self, tmp_path: Path) -> None:
         pixels = np.full((4, 4, 4), 0.5, np.float16)
-        plain = decode(load(store(tmp_path / "a.png", (pixels * 255).astype("uint8"), "uint8")))
-        multiplied = decode(load(store(tmp_path / "a.exr", pixels, "half")))
+        plain = decode(
+            read_stored(store(tmp_path / "a.png", (pixels * 255).astype("uint8"), "uint8"))
+        )
+        multiplied = decode(read_stored(store(tmp_path / "a.exr", pixels, "half")))
         (note,) = save(plain, tmp_path / "b.exr")
         assert note.endswith("its readers expect colours multiplied by alpha")
         assert save(plain, tmp_path / "b.tif") == save(plain, tmp_path / "b.png") == ()
-        assert not load(tmp_path / "b.tif").associated
+        assert not read_stored(tmp_path / "b.tif").is_multiplied
         assert save(multiplied, tmp_path / "b.exr") == save(multiplied, tmp_path / "b.tif") == ()
-        assert load(tmp_path / "b.tif").associated
-        assert np.array_equal(load(tmp_path / "b.tif").pixels, pixels)
+        assert read_stored(tmp_path / "b.tif").is_multiplied
+        assert np.array_equal(read_stored(tmp_path / "b.tif").pixels, pixels)
 
     @pytest.mark.parametrize("name", ["b.exr", "b.png"])
     def test_windows(self, tmp_path: Path, name: str) -> None:
         pixels = np.random.default_rng(0).random((6, 8, 3)).astype(np.float16)
         window = {"full_x": 12, "full_y": 21, "full_width": 4, "full_height": 3}
         path = store(tmp_path / "a.exr", pixels, "half", x=10, y=20, **window)
-        save(decode(load(path)), tmp_path / name)
+        save(decode(read_stored(path)), tmp_path / name)
         spec, written = reread(tmp_path / name)
         if name == "b.exr":
             assert (spec.x, spec.y) == (10, 20)
@@ -370,7 +371,7 @@ class TestSave:
         spec.attribute("chromaticities", oiio.TypeDesc("float[8]"), chromaticities)
         spec.attribute("PixelAspectRatio", 2.0)
         written(tmp_path / "a.exr", spec, noise(2, 2, 3, numbers="half"))
-        save(decode(load(tmp_path / "a.exr")), tmp_path / "b.exr")
+        save(decode(read_stored(tmp_path / "a.exr")), tmp_path / "b.exr")
         kept, _ = reread(tmp_path / "b.exr")
         assert np.allclose(kept["chromaticities"], chromaticities)
         assert kept["PixelAspectRatio"] == 2.0
@@ -384,7 +385,9 @@ class TestSave:
     ) -> None:
         # Any JPEG XL has one.
         store(tmp_path / "a.jxl", noise(64, 64, 3, numbers="uint8"), "uint8")
-        save(decode(load(tmp_path / "a.jxl"), read_as), tmp_path / "b.png", Saved(written_as))
+        save(
+            decode(read_stored(tmp_path / "a.jxl"), read_as), tmp_path / "b.png", Saved(written_as)
+        )
         kept, _ = reread(tmp_path / "b.png")
         original, _ = reread(tmp_path / "a.jxl")
         profile = kept.getattribute("ICCProfile")
@@ -402,7 +405,7 @@ class TestSave:
 
         def unreadable(oiio: Any, file: Path) -> str:
             seen.append(names_in(tmp_path))
-            assert load(file).pixels.shape == (2, 2, 3)
+            assert read_stored(file).pixels.shape == (2, 2, 3)
             assert target.read_bytes() == b"before"
             return f"{file}: no pixels"
 
@@ -421,4 +424,4 @@ class TestSave:
         with target.open("rb") as opened:
             save(linear_picture(np.ones((2, 2, 3), np.float32), "uint8"), target)
             assert opened.read() == b"before"
-        assert load(target).pixels.shape == (2, 2, 3)
+        assert read_stored(target).pixels.shape == (2, 2, 3)

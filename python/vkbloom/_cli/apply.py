@@ -33,14 +33,13 @@ from vkbloom._cli.image_files import (
 )
 from vkbloom._cli.program import adapter_option, as_wrong_use, described
 from vkbloom._cli.sequences import PIPE, check_targets, is_stream, pairs, shown
-from vkbloom._cli.settings_options import Start, start_options
+from vkbloom._cli.settings_options import StartOptions, start_options
 from vkbloom._cli.terminal import complain, hides_progress, note, say, tell_device
 from vkbloom._io import image_writing, safe_writing
 from vkbloom._io.displayed import PRIMARIES, Saved
-from vkbloom._io.images import Colour, Highlights, Picture, SavedColour
 from vkbloom._io.narrowing import narrowed, narrowing_note
+from vkbloom._io.picture import Colour, Highlights, Picture, SavedColour
 from vkbloom._locks import cached_property
-from vkbloom._presets.start import developed
 from vkbloom._renderer.added_light import added_share, faint_note
 from vkbloom._renderer.frame_files import settings_facts
 from vkbloom._renderer.frames import Frames
@@ -80,7 +79,7 @@ class Options:
     overwrite: bool
     skip_existing: bool
     expand: float | None
-    start: Start
+    start: StartOptions
 
     @property
     def saved(self) -> Saved:
@@ -193,7 +192,7 @@ class Run:
             brightest = float(np.max(colours, initial=0, where=np.isfinite(colours)))
             text = no_bloom.reason(frames.settings, brightest)
         elif image_writing.is_straight(
-            of_format(target, self.options.pipe_format), is_associated=picture.stored.associated
+            of_format(target, self.options.pipe_format), is_multiplied=picture.is_multiplied
         ):
             text = no_bloom.hidden(frames["final"], frames.settings)
         is_chosen = self.options.start.is_chosen
@@ -210,16 +209,16 @@ class Run:
         """Return the picture whose pixels get a bloom, its settings and its expansion."""
         options = self.options
         picture = read_picture(source, options.subimage, options.input_colour, layer=options.layer)
-        settings, expand = options.start.of(picture.highlights)
-        if settings.alpha == "keep":
+        start = options.start.of(picture.highlights)
+        if start.settings.alpha == "keep":
             note_hidden(picture, source)
-        picture = developed(picture, expand, settings.alpha)
+        picture = start.develop(picture)
         pixels = picture.pixels
         is_large = picture.numbers == "uint8" and pixels[..., 0].size >= _HALVED
         if (options.half or is_large) and pixels.dtype == np.float32:
             picture = dataclasses.replace(picture, pixels=narrowed(pixels, _HALF))
             _tell_narrowing(source, pixels)
-        return picture, settings, expand
+        return picture, *start
 
     @cached_property
     def _glow_of(self) -> Callable[[bool], Glow]:

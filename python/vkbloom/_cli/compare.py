@@ -16,7 +16,7 @@ from vkbloom._cli.image_files import other_parts, read, subimage_option
 from vkbloom._cli.program import as_wrong_use
 from vkbloom._cli.terminal import is_quiet, note, say
 from vkbloom._io import image_writing, safe_writing
-from vkbloom._io.images import Picture, StoredImage
+from vkbloom._io.picture import Picture
 from vkbloom._numbers import check_number
 from vkbloom._views.comparison import Comparison, compare, difference
 from vkbloom._views.diagnosis import Diagnosis, diagnose
@@ -88,8 +88,8 @@ def command(
         if diff is not None:
             safe_writing.writer_of(diff)
     a, b = read(first, subimage), read(second, subimage)
-    for file, stored in ((first, a), (second, b)):
-        if parts := other_parts(stored):
+    for file, picture in ((first, a), (second, b)):
+        if parts := other_parts(picture):
             told = f"{file}: has several parts; choose one with --subimage: {parts}"
             raise click.UsageError(told)
     # FLIP of a large picture of floats takes half a minute.
@@ -114,9 +114,9 @@ def command(
     return 1 if failed else 0
 
 
-def _with_windows(comparison: Comparison, a: StoredImage, b: StoredImage) -> Comparison:
+def _with_windows(comparison: Comparison, a: Picture, b: Picture) -> Comparison:
     """Add a mismatch if images of one size have different data or display windows."""
-    windows = [(*image.origin, *image.display) for image in (a, b)]
+    windows = [(*image.header.origin, *image.header.display) for image in (a, b)]
     if a.pixels.shape[:2] != b.pixels.shape[:2] or windows[0] == windows[1]:
         return comparison
     told = " against ".join(
@@ -127,7 +127,7 @@ def _with_windows(comparison: Comparison, a: StoredImage, b: StoredImage) -> Com
     return dataclasses.replace(comparison, mismatches=(*comparison.mismatches, reason))
 
 
-def _write_difference(a: StoredImage, b: StoredImage, path: str) -> float:
+def _write_difference(a: Picture, b: Picture, path: str) -> float:
     """Write the difference picture and return its scale."""
     picture, scale = difference(a.pixels, b.pixels)
     for text in image_writing.save(Picture.of_values(picture), path):
@@ -157,7 +157,7 @@ def _object(
 
 def _lines(
     files: tuple[str, str],
-    a: StoredImage,
+    a: Picture,
     comparison: Comparison,
     failed: tuple[str, ...],
     cause: Diagnosis,
@@ -165,9 +165,9 @@ def _lines(
     """Return the lines of the text report."""
     height, width = a.pixels.shape[:2]
     lines = [" and ".join(files)]
-    lines.append(f"  {width} x {height}, {', '.join(a.channels)}, {a.pixels.dtype}")
+    lines.append(f"  {width} x {height}, {', '.join(a.header.channels)}, {a.pixels.dtype}")
     if comparison.percent_over is not None:
-        lines += _figures(comparison, a.channels)
+        lines += _figures(comparison, a.header.channels)
     lines.append(f"  cause      {cause.summary}")
     for reason in failed:
         lines.append(f"FAILED: {reason}")

@@ -16,8 +16,8 @@ from vkbloom._cli.settings_options import DEFAULT_PRESETS, settings_options
 from vkbloom._grid import filling, layout, order, sources
 from vkbloom._grid.grid import grid as render_grid
 from vkbloom._io import image_writing, safe_writing
-from vkbloom._io.images import Picture
-from vkbloom._presets.start import developed
+from vkbloom._io.picture import Picture
+from vkbloom._presets.start import Start
 from vkbloom._renderer.frame_files import settings_facts
 from vkbloom._renderer.frames import Frames
 from vkbloom._renderer.interruptible import opened_renderer
@@ -92,7 +92,7 @@ def command(
         reading = {name: given[name] for name in ("subimage", "layer")}
         alpha = _alpha_of(axes, settings)
         picture = image_files.read_picture(source, colour=given["input_colour"], **reading)
-        picture = developed(picture, expand, alpha)
+        picture = Start(given["settings"].replace(alpha=alpha), expand).develop(picture)
         looked_at = picture.pixels
         files = given["mask"], given["emission"], given["input_colour"]
         shared |= glows.read_glows(*files, is_blended=alpha != "keep").of(looked_at)

@@ -16,12 +16,11 @@ from numpy.typing import NDArray
 from vkbloom._cli.program import given
 from vkbloom._cli.sequences import as_file, shown
 from vkbloom._cli.terminal import note
-from vkbloom._io import image_reading
 from vkbloom._io.alpha import divided, hidden_notes
-from vkbloom._io.array_files import has_straight
-from vkbloom._io.colour import check_space
+from vkbloom._io.decoding import check_space
 from vkbloom._io.expansion import PHOTO_EXPANSION
-from vkbloom._io.images import Colour, Highlights, Picture, StoredImage
+from vkbloom._io.image_file import ImageFile
+from vkbloom._io.picture import Colour, Highlights, Picture, listed
 from vkbloom._settings.settings import Settings
 
 #: Encodings of a written file.
@@ -59,16 +58,26 @@ def reading_options(command: Callable[..., Any]) -> Callable[..., Any]:
     return subimage_option(layer_option(expand_option(command)))
 
 
-def read(path: str, subimage: int, layer: str | None = None) -> StoredImage:
-    """Read an image file; libraries print no messages of their own."""
-    with silenced(), as_file(path) as file:
-        return image_reading.load(file, subimage, layer)
+@contextmanager
+def opened(source: str, subimage: int, layer: str | None = None) -> Iterator[ImageFile]:
+    """Open an image file; libraries print no messages of their own."""
+    with silenced(), as_file(source) as file, ImageFile(file, subimage, layer) as image:
+        yield image
 
 
-def other_parts(stored: StoredImage) -> str:
+def read(source: str, subimage: int) -> Picture:
+    """Read an image file as it is stored."""
+    with opened(source, subimage) as file:
+        return file.stored()
+
+
+def other_parts(picture: Picture) -> str:
     """Return the parts of a file of several if neither --subimage nor the file chooses one."""
-    is_open = len(stored.parts) > 1 and not given("subimage") and not stored.part
-    return image_reading.listed_parts(stored) if is_open else ""
+    parts = picture.parts
+    if len(parts) == 1 or given("subimage") or picture.header.part:
+        return ""
+    names = listed(f"{index} {name}" for index, name in enumerate(parts) if name)
+    return f"parts {names}" if names else f"{len(parts)} parts"
 
 
 def check_input_colour(colour: Colour | None) -> None:
@@ -90,14 +99,17 @@ def read_picture(
 ) -> Picture:
     """Read an image file, decode it to linear light, and print notes about its contents."""
     check_input_colour(colour)
-    stored = read(source, subimage, layer)
+    with opened(source, subimage, layer) as file:
+        picture = file.picture(colour)
     source = shown(source)
-    picture = image_reading.decode_file(stored, source, colour)
-    if layer is None and (parts := other_parts(stored)):
+    if layer is None and (parts := other_parts(picture)):
         note(f"{source}: read the first of its {parts}; --subimage reads another")
-    counts = (int(test(picture.values).sum()) for test in (np.isnan, np.isinf))
-    if (not_finite := image_reading.non_finite_note(*counts)) is not None:
-        note(f"{source} {not_finite}")
+    nan, infinite = (int(test(picture.values).sum()) for test in (np.isnan, np.isinf))
+    if nan or infinite:
+        note(
+            f"{source} has {nan} NaN and {infinite} infinite values; they count as 0 in the bloom, "
+            "and stay in the picture"
+        )
     for text in picture.notes:
         note(f"{source}: {text}")
     return picture
@@ -105,28 +117,25 @@ def read_picture(
 
 def note_hidden(picture: Picture, source: str) -> None:
     """Print a note if light where alpha is 0 blooms like visible light."""
-    for text in hidden_notes(picture.hidden, picture.visible):
+    for text in hidden_notes(picture):
         note(f"{shown(source)}: {text}")
 
 
-def highlights_of_file(source: str, subimage: int, colour: Colour | None) -> Highlights:
-    """Return what a file has of light above white, as `read_picture` finds it.
+def highlights_of_file(
+    source: str, subimage: int, layer: str | None, colour: Colour | None
+) -> Highlights:
+    """Return what a file has of light above white, as its picture says.
 
     That of floats for what cannot be read: the error comes from the command that reads it.
     """
-    with (
-        suppress(OSError, ValueError),
-        silenced(),
-        as_file(source) as file,
-        image_reading.opened(file, "Reading images") as reader,
-    ):
-        return image_reading.highlights_of(reader, subimage, colour)
+    with suppress(OSError, ValueError), opened(source, subimage, layer) as file:
+        return file.header.highlights(colour)
     return Highlights.STORED
 
 
 def finished(picture: Picture, final: NDArray[Any], settings: Settings) -> Picture:
     """Return a picture with the pixels of `final`, and their alpha and encoding as in its file."""
-    if settings.alpha != "keep" and has_straight(picture):
+    if settings.alpha != "keep" and picture.has_straight:
         final = divided(final)
     encoding = picture.encoding if settings.encoding == "none" else settings.encoding
     return dataclasses.replace(picture, pixels=final, encoding=encoding)

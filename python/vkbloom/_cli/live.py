@@ -26,8 +26,8 @@ from vkbloom._cli.terminal import tell_device
 from vkbloom._errors import Error
 from vkbloom._explorer.viewer import GLOW, Viewer
 from vkbloom._extras import import_extra
-from vkbloom._io.images import Picture
-from vkbloom._presets.start import PRESET_OF_SCENES, developed, start_of
+from vkbloom._io.picture import Picture
+from vkbloom._presets.start import PRESET_OF_SCENES, Start, start_of
 from vkbloom._renderer.interruptible import opened_renderer
 from vkbloom._renderer.renderer import Renderer
 from vkbloom._renderer.surface import Surface
@@ -63,7 +63,7 @@ class Opened(NamedTuple):
 
     def pixels(self, settings: Settings) -> NDArray[Any]:
         """Return what a renderer gets with these settings."""
-        return developed(self.picture, self.expand, settings.alpha).pixels
+        return Start(settings, self.expand).develop(self.picture).pixels
 
     def with_preset(self, settings: Settings) -> Opened:
         """Return the image as it starts with the settings of a preset."""
@@ -282,13 +282,13 @@ def explore(
     shading begins with the tone map "aces" and the encoding "srgb".
     """
     import_extra("tornado", "notebook", "explore")
-    looked_at: Scene | NDArray[Any]
+    looked_at: Scene | Picture
     begun: Settings | None = settings
     of_file: dict[str, Any] = {}
     if opened is not None:
         _check_is_scene("size", "--size")
-        looked_at = opened.pixels(settings)
-        of_file = {"picture": opened.picture, "file": opened.file, "expand": opened.expand}
+        looked_at = opened.picture
+        of_file = {"file": opened.file, "expand": opened.expand}
     else:
         looked_at = scene()
         if not any(given(name) for name in ("base", "glow", "glow_intensity")):

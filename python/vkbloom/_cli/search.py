@@ -21,12 +21,11 @@ from vkbloom._explorer.controls import as_code
 from vkbloom._fit import FitResult
 from vkbloom._fit.losses import LossName
 from vkbloom._fit.translating import Translation
-from vkbloom._io.images import Highlights, Picture
+from vkbloom._io.picture import Highlights, Picture
 from vkbloom._presets.start import (
     PRESET_OF_IMAGES,
     PRESET_OF_PHOTOS,
     Start,
-    developed,
     start_of,
 )
 from vkbloom._renderer.interruptible import opened_renderer
@@ -188,8 +187,7 @@ def fit(
         if start.expand is not None:
             method = start.settings.method
             note(f"{image}: its highlights are expanded to {start.expand:g} for {method}")
-        source = developed(picture, start.expand, start.settings.alpha)
-        searches.append((source, [start.settings]))
+        searches.append((start.develop(picture), [start.settings]))
     with opened_renderer(adapter) as renderer, as_wrong_use():
         results = [
             item

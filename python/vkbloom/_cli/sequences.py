@@ -19,7 +19,7 @@ from vkbloom._cli.numbered_files import NumberedFile, files_of, gap_note, patter
 from vkbloom._cli.targets import check_folder
 from vkbloom._cli.terminal import note
 from vkbloom._io import safe_writing
-from vkbloom._io.image_reading import readable_extensions
+from vkbloom._io.readers import readable_extensions
 
 #: Stands for standard input and standard output.
 PIPE: Final = "-"

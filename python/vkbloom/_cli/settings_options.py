@@ -16,8 +16,14 @@ from vkbloom._cli.image_files import highlights_of_file, silenced
 from vkbloom._cli.program import as_wrong_use, given
 from vkbloom._cli.sequences import as_file
 from vkbloom._io.expansion import check_expansion
-from vkbloom._io.images import Highlights
-from vkbloom._presets.start import PRESET_OF_IMAGES, PRESET_OF_PHOTOS, PRESET_OF_SCENES, start_of
+from vkbloom._io.picture import Highlights
+from vkbloom._presets.start import (
+    PRESET_OF_IMAGES,
+    PRESET_OF_PHOTOS,
+    PRESET_OF_SCENES,
+    Start,
+    start_of,
+)
 from vkbloom._renderer.frame_files import facts_of
 from vkbloom._settings.fields import fields_of
 from vkbloom._settings.registry import METHODS
@@ -32,7 +38,7 @@ STARTS: Final = ("preset", "method", "stored")
 def settings_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """Add the options of the settings to a command; its argument `settings` has the result."""
 
-    def run(*, start: Start, **rest: Any) -> Any:
+    def run(*, start: StartOptions, **rest: Any) -> Any:
         settings, expand = start.of_file(str(rest.get("source") or ""))
         if "expand" in rest:
             rest["expand"] = expand
@@ -77,13 +83,14 @@ def start_options(command: Callable[..., Any]) -> Callable[..., Any]:
     ) -> Any:
         if stored is not None and preset is not None:
             raise click.UsageError("--settings and --preset exclude each other; leave one out")
-        start = Start(
+        start = StartOptions(
             preset=preset,
             method=method,
             stored=None if stored is None else read_settings(stored),
             changes={**shared, **of_method},
             expand=rest.get("expand"),
             subimage=rest.get("subimage") or 0,
+            layer=rest.get("layer"),
             colour=rest.get("input_colour"),
         )
         return command(start=start, **rest)
@@ -92,12 +99,12 @@ def start_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
-class Start:
+class StartOptions:
     """What the options of a call say of its settings, for `start_of`.
 
     - `stored`: Settings of a file, and what its picture was expanded up to.
     - `expand`: What highlights are expanded up to, if the call says it.
-    - `subimage`, `colour`: How image files are read.
+    - `subimage`, `layer`, `colour`: How image files are read.
     """
 
     preset: str | None
@@ -106,6 +113,7 @@ class Start:
     changes: dict[str, Any]
     expand: float | None
     subimage: int = 0
+    layer: str | None = None
     colour: str | None = None
 
     @property
@@ -113,17 +121,14 @@ class Start:
         """Whether the call names what it starts from."""
         return self.preset is not None or self.method is not None or self.stored is not None
 
-    def of_file(self, image: str) -> tuple[Settings, float | None]:
-        """Return the settings for an image file, "" for a scene, and the value for --expand."""
+    def of_file(self, image: str) -> Start:
+        """Return where an image file starts; "": a scene."""
         if not image:
             return self.of(None)
-        return self.of(highlights_of_file(image, self.subimage, self.colour))
+        return self.of(highlights_of_file(image, self.subimage, self.layer, self.colour))
 
-    def of(self, highlights: Highlights | None) -> tuple[Settings, float | None]:
-        """Return the settings for an image with these highlights, and the value for --expand.
-
-        None: for a scene.
-        """
+    def of(self, highlights: Highlights | None) -> Start:
+        """Return where an image with these highlights starts; None: a scene."""
         expand = self.expand
         if expand is None and self.stored is not None:
             expand = self.stored[1]

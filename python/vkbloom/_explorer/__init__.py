@@ -74,22 +74,10 @@ def explore(
     from vkbloom._explorer.viewer import Viewer  # noqa: PLC0415  see vkbloom.reference
     from vkbloom._explorer.widget import Explorer  # noqa: PLC0415  needs anywidget
 
-    of_file: dict[str, Any] = {}
-    if isinstance(source, str | os.PathLike):
-        source, of_file = _read(source, settings)
     how: dict[str, Any] = {"against": against, "size": size, "shading": shading}
-    return Explorer(Viewer(source, settings, renderer=renderer, **how, **of_file))
+    looked_at: Any = source
+    if isinstance(source, str | os.PathLike):
+        from vkbloom._io.image_file import read_picture  # noqa: PLC0415  costs start-up time
 
-
-def _read(
-    path: str | os.PathLike[str], settings: Settings | str | None
-) -> tuple[NDArray[Any], dict[str, Any]]:
-    """Return the image of a file, and what a viewer needs to know of it."""
-    from vkbloom._io import image_reading  # noqa: PLC0415  costs start-up time
-    from vkbloom._presets.start import developed, start_of  # noqa: PLC0415  costs start-up time
-
-    file = os.fspath(path)
-    picture = image_reading.decode_file(image_reading.load(path), file)
-    begun, expand = start_of(picture.highlights, settings)
-    pixels = developed(picture, expand, begun.alpha).pixels
-    return pixels, {"picture": picture, "file": file, "expand": expand}
+        looked_at, how["file"] = read_picture(source), os.fspath(source)
+    return Explorer(Viewer(looked_at, settings, renderer=renderer, **how))

@@ -50,12 +50,12 @@ from vkbloom._explorer.controls import (
 )
 from vkbloom._explorer.fast_pictures import picture_of, shown_pixels
 from vkbloom._image_arguments import check_image
-from vkbloom._io import image_reading
 from vkbloom._io.expansion import check_expansion
+from vkbloom._io.image_file import read_picture
 from vkbloom._io.image_writing import levels_of
-from vkbloom._io.images import Highlights, Picture
+from vkbloom._io.picture import Highlights, Picture
 from vkbloom._numbers import check_number, check_size
-from vkbloom._presets.start import developed, start_of
+from vkbloom._presets.start import Start, start_of
 from vkbloom._renderer.added_light import added_share, faint_note
 from vkbloom._renderer.frame_files import settings_facts
 from vkbloom._renderer.plans import Pass
@@ -95,22 +95,21 @@ Answer = tuple[dict[str, Any], list[bytes]]
 class Viewer:
     """A source and the settings of both sides.
 
-    Arguments are those of `vkbloom.explore`, and of an image that was read from a file: its picture
-    as it was decoded, the file, and what its highlights are expanded up to in `source`.
+    Arguments are those of `vkbloom.explore`; of an image file the source is its decoded picture,
+    and there are the file and what its highlights are expanded up to (None: as the settings say).
 
     - `settings`, `expand`, `frames`: The latest ones of the sides "a" and "b".
     """
 
     def __init__(
         self,
-        source: Scene | NDArray[Any] | None = None,
+        source: Scene | NDArray[Any] | Picture | None = None,
         settings: Settings | str | None = None,
         *,
         against: Settings | str | None = None,
         size: tuple[int, int] = (1280, 720),
         shading: Shading = "deferred",
         renderer: Renderer | None = None,
-        picture: Picture | None = None,
         file: str = "",
         expand: float | None = None,
     ) -> None:
@@ -118,7 +117,7 @@ class Viewer:
             source = dataclasses.replace(Scene.ufo(), glow_intensity=GLOW)
         self._shading: Shading = check_shading(shading)
         self._file, self._name = file, PurePath(file).name
-        self._picture = picture
+        self._picture = source if isinstance(source, Picture) else None
         self._scene = source if isinstance(source, Scene) else None
         self.settings: dict[str, Settings] = {}
         self.expand: dict[str, float | None] = {}
@@ -129,6 +128,8 @@ class Viewer:
             self.settings["b"] = check_settings(against)
         if isinstance(source, Scene):
             self._own_size = check_size("size", size)
+        elif isinstance(source, Picture):
+            self._show_image(self._start_of("a").develop(source).pixels)
         else:
             self._show_image(source)
         if renderer is not None and renderer.closed:
@@ -149,6 +150,9 @@ class Viewer:
         if self._scene is not None:
             return None
         return Highlights.STORED if self._picture is None else self._picture.highlights
+
+    def _start_of(self, side: str) -> Start:
+        return Start(self.settings[side], self.expand[side])
 
     def _begin(self, settings: Settings | str | None, expand: float | None = None) -> None:
         """Set A to the settings or to the source's default, and B to the same without bloom."""
@@ -243,8 +247,7 @@ class Viewer:
         else:
             expand = start_of(picture.highlights, self.settings["a"]).expand
             self.expand = dict.fromkeys(SIDES, expand)
-        settings = self.settings["a"]
-        self._show_image(developed(picture, self.expand["a"], settings.alpha).pixels)
+        self._show_image(self._start_of("a").develop(picture).pixels)
         return self._source(), []
 
     def _save(self, message: Mapping[str, Any]) -> Answer:
@@ -390,7 +393,7 @@ class Viewer:
 
         def whole() -> NDArray[Any]:
             assert self._picture is not None  # An array is always kept.
-            return developed(self._picture, expand, settings.alpha).pixels
+            return Start(settings, expand).develop(self._picture).pixels
 
         return self._kept((size, key), lambda: reduced(self._kept(key, whole), size))
 
@@ -420,7 +423,7 @@ def _read(name: str, files: Sequence[bytes]) -> Picture:
         path = Path(folder, f"image{PurePath(name).suffix[:8]}")
         path.write_bytes(files[0])
         try:
-            return image_reading.decode_file(image_reading.load(path), str(path))
+            return read_picture(path)
         except (OSError, ValueError) as error:
             text = str(error).replace(str(path), name)
             raise ValueError(text if name in text else f"{name}: {text}") from error

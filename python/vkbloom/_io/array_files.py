@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import warnings
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 from typing import Any, Final, Literal, get_args, overload
@@ -15,19 +14,14 @@ from numpy.typing import NDArray
 
 from vkbloom._argument_types import checked
 from vkbloom._extras import import_extra
-from vkbloom._io import image_reading, image_writing, safe_writing
+from vkbloom._io import image_writing, safe_writing
 from vkbloom._io.alpha import divided, hidden_notes, multiplied
 from vkbloom._io.displayed import Saved, check_saved
-from vkbloom._io.expansion import check_expansion
-from vkbloom._io.images import (
-    PIXEL_TYPES,
-    Picture,
-    SavedColour,
-    check_name,
-    checked_pixels,
-    is_exr,
-)
+from vkbloom._io.expansion import check_expansion, expand_photograph
+from vkbloom._io.image_file import read_picture
 from vkbloom._io.narrowing import narrowed
+from vkbloom._io.picture import PIXEL_TYPES, Picture, SavedColour, checked_pixels, is_exr
+from vkbloom._io.readers import check_name
 from vkbloom._numbers import check_index
 from vkbloom._public import public
 from vkbloom._version import installed_version
@@ -125,24 +119,22 @@ def read(
     check_name(path)
     subimage = check_index("subimage", subimage, -(2**31), 2**31 - 1)
     check_expansion(expand)
-    stored = image_reading.load(path, subimage, layer)
-    picture = image_reading.decode_file(stored, os.fspath(path), expand=expand)
+    picture = expand_photograph(read_picture(path, subimage, layer), expand)
     pixels = picture.pixels
     has_alpha = pixels.shape[2] == 4
-    if has_alpha and picture.stored.associated is not premultiplied:
+    if has_alpha and picture.is_multiplied is not premultiplied:
         pixels = multiplied(pixels) if premultiplied else divided(pixels)
     if not metadata:
         return pixels
-    hidden = 0.0 if premultiplied else picture.hidden
     facts: dict[str, Any] = {
-        name: _plain(value) for name, (_, value) in picture.stored.attributes.items()
+        name: _plain(value) for name, (_, value) in picture.header.attributes.items()
     }
     facts.update(
         numbers=picture.numbers,
         colour=picture.colour,
         alpha=("premultiplied" if premultiplied else "straight") if has_alpha else None,
-        parts=stored.parts,
-        notes=(*picture.notes, *hidden_notes(hidden, picture.visible)),
+        parts=picture.parts,
+        notes=(*picture.notes, *(() if premultiplied else hidden_notes(picture))),
     )
     return pixels, facts
 
@@ -281,18 +273,6 @@ def _checked(array: NDArray[Any]) -> NDArray[Any]:
     if values.shape[2] > 4:
         raise ValueError(f"array: {values.shape[2]} channels are not 1 to 4")
     return values
-
-
-def has_straight(picture: Picture) -> bool:
-    """Whether a picture's file has alpha, and colours that are not multiplied by it."""
-    return picture.pixels.shape[2] == 4 and not picture.stored.associated
-
-
-def premultiplied(picture: Picture) -> Picture:
-    """Return a picture whose colours are multiplied by alpha, if there is one."""
-    if not has_straight(picture):
-        return picture
-    return replace(picture, pixels=multiplied(picture.pixels), hidden=0.0)
 
 
 def _plain(value: Any) -> Any:

@@ -12,13 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom._extras import import_extra
-from vkbloom._io.hdr_curves import ENCODERS
-from vkbloom._io.images import SPACES
+from vkbloom._io.chromaticities import CHROMATICITIES
+from vkbloom._io.hdr_curves import ENCODERS, HDR_CURVES
 from vkbloom._io.narrowing import narrowed
+from vkbloom._io.picture import SPACES, Attributes, CodePoints
 from vkbloom._io.srgb import encode_srgb
-
-#: A file's attributes by OpenImageIO's names, each with its type and value.
-Attributes = Mapping[str, tuple[Any, Any]]
 
 #: OpenColorIO's built-in configuration.
 CONFIGURATION: Final = "ocio://default"
@@ -33,8 +31,6 @@ _FROM_LINEAR: Final = (PRIMARIES["rec709"], "", False)
 # Code points of Rec. ITU-T H.273, for primaries and for curves; 2 is an unknown curve.
 _PRIMARY_POINTS: Final = {"rec709": 1, "rec2020": 9, "p3": 12}
 _CURVE_POINTS: Final = {"none": 2, "gamma22": 4, "linear": 8, "srgb": 13, "pq": 16, "hlg": 18}
-#: Curves for displays of HDR.
-HDR_CURVES: Final = ("pq", "hlg")
 # Of files, in addition: the curve of Rec. ITU-R BT.709, which BT.601 and BT.2020 have, too.
 _READ_CURVES: Final = {
     **{point: curve for curve, point in _CURVE_POINTS.items() if curve != "none"},
@@ -44,12 +40,6 @@ _READ_CURVES: Final = {
 _PLAIN: Final = ("linear", "srgb", "gamma22", "none")
 # Curves whose values end at 1 in files of integers.
 _ENDING_AT_1: Final = ("linear", "srgb", "gamma22")
-# Red, green, blue, white, as x and y: Rec. ITU-R BT.709 and BT.2020, SMPTE EG 432-1.
-CHROMATICITIES: Final = {
-    "rec709": (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290),
-    "rec2020": (0.708, 0.292, 0.170, 0.797, 0.131, 0.046, 0.3127, 0.3290),
-    "p3": (0.680, 0.320, 0.265, 0.690, 0.150, 0.060, 0.3127, 0.3290),
-}
 # Code points of the built-in displays; the others have none.
 _DISPLAYS: Final[Mapping[str, tuple[int, int]]] = {
     "sRGB - Display": (1, 13),
@@ -84,17 +74,13 @@ def check_saved(saved: Saved) -> None:
     _display_of(import_extra("OpenImageIO", "images", "Views"), saved.view)
 
 
-def has_hdr_curve(points: Sequence[int] | None) -> bool:
-    """Whether code points of a file have the curve PQ or HLG."""
-    return points is not None and points[1] in (_CURVE_POINTS[curve] for curve in HDR_CURVES)
-
-
 def is_hdr(saved: Saved) -> bool:
     """Whether a file is for HDR displays, and needs more than 8 bits."""
     if saved.view is None:
         return saved.curve in HDR_CURVES
     oiio = import_extra("OpenImageIO", "images", "Views")
-    return has_hdr_curve(_DISPLAYS.get(_display_of(oiio, saved.view)[0]))
+    _, curve = _DISPLAYS.get(_display_of(oiio, saved.view)[0], (0, 0))
+    return curve in (_CURVE_POINTS[name] for name in HDR_CURVES)
 
 
 def converted(
@@ -128,13 +114,6 @@ def scaled_to_1(values: NDArray[Any], limit: float = 1.0) -> NDArray[Any]:
     made = values.astype(np.result_type(values.dtype, np.float32))
     made[:, :, :count] /= np.where(is_over, peak / made.dtype.type(limit), made.dtype.type(1))
     return made
-
-
-def from_primaries(colours: NDArray[Any], primaries: str) -> NDArray[np.float32]:
-    """Return linear colours (H, W, 3 or 4) of these primaries in those of Rec. 709."""
-    if primaries == "rec709":
-        return colours.astype(np.float32, copy=False)
-    return between(colours, PRIMARIES[primaries], PRIMARIES["rec709"])
 
 
 def encoded(values: NDArray[Any], curve: str) -> NDArray[Any]:
@@ -185,11 +164,13 @@ def with_names(
     raise ValueError(f"{target}: {kind} cannot name the colours {name}; {hint}")
 
 
-def of_code_points(points: Sequence[int]) -> tuple[str, str] | None:
-    """Return primaries and curve of a file's code points; None: one of them is not known."""
-    primaries = [name for name, point in _PRIMARY_POINTS.items() if point == points[0]]
+def code_points_of(points: Sequence[int], channels: int) -> CodePoints | None:
+    """Return the names of a file's code points; None: one is not known."""
+    # Grey has no primaries.
+    point = points[0] if channels >= 3 else _PRIMARY_POINTS["rec709"]
+    primaries = [name for name, known in _PRIMARY_POINTS.items() if known == point]
     curve = _READ_CURVES.get(points[1])
-    return (primaries[0], curve) if primaries and curve else None
+    return CodePoints(primaries[0], curve, points[3] == 0) if primaries and curve else None
 
 
 @functools.cache

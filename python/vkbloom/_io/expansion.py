@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vkbloom._io.picture import Highlights, Picture
 from vkbloom._numbers import check_number
 
 #: Values up to this one stay as they are: 0.91 of an 8-bit file in sRGB, the level 231.
@@ -46,3 +48,10 @@ def expanded(image: NDArray[Any], expand: float | None) -> NDArray[Any]:
     result = image.copy()
     result[:, :, :3] *= factor.astype(image.dtype)
     return result
+
+
+def expand_photograph(picture: Picture, expand: float | None) -> Picture:
+    """Return a decoded picture with its highlights expanded, if the file has clipped ones."""
+    if picture.highlights is not Highlights.CLIPPED:
+        return picture
+    return replace(picture, pixels=expanded(picture.pixels, expand))

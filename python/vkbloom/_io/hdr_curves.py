@@ -55,6 +55,8 @@ def _from_rec709(signal: NDArray[Any]) -> NDArray[np.float64]:
 
 #: From linear colours to the signal, 0..1.
 ENCODERS: Final[Mapping[str, Curve]] = {"pq": _pq, "hlg": _hlg}
+#: Curves for displays of HDR.
+HDR_CURVES: Final = tuple(ENCODERS)
 #: From a signal of 0..1 to linear colours.
 DECODERS: Final[Mapping[str, Curve]] = {
     "pq": _from_pq,

@@ -9,10 +9,14 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from vkbloom._io.srgb import decode_srgb
+
 #: A curve for values of 0..1, and for floats above 1.
 Curve = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 
 _COLOURS: Final = ("r", "g", "b")
+# Half an 8-bit level, encoded. A profile that differs by less from sRGB counts as sRGB.
+_SAME: Final = 0.5 / 255
 # Tags, of 12 bytes each. Profiles have about 20; a damaged one may claim billions.
 _MAX_TAGS: Final = 1000
 # The matrix from linear Rec. 709 (BT.709-6) to XYZ.
@@ -65,6 +69,17 @@ class Profile(NamedTuple):
             linear[:, :, channel] = table[colours[:, :, channel]]
         made: NDArray[np.float32] = linear @ self.matrix.T.astype(np.float32)
         return made
+
+    @property
+    def is_srgb(self) -> bool:
+        """Whether the profile means sRGB, within half a level of 8 bits."""
+        levels = np.arange(0, 256, 51, dtype=np.uint8)
+        probe = np.stack(np.meshgrid(levels, levels, levels), -1).reshape(6, 36, 3)
+        plain = probe / 255
+        expected = decode_srgb(plain)
+        # Where the curve is flat, the same encoded difference is a smaller linear one.
+        slope = np.maximum((decode_srgb(plain + 0.01) - expected) / 0.01, 1 / 12.92)
+        return bool((np.abs(self.decode(probe) - expected) <= _SAME * slope).all())
 
 
 def read_profile(content: bytes) -> Profile:

@@ -16,10 +16,10 @@ from vkbloom._arrays import native_order
 from vkbloom._c_paths import for_c
 from vkbloom._extras import import_extra
 from vkbloom._io import displayed, safe_writing
+from vkbloom._io.attributes import without_colours, write_own
 from vkbloom._io.displayed import Saved
-from vkbloom._io.exr_attributes import without_colours, write_own
-from vkbloom._io.images import DTYPES, PIXEL_TYPES, SPACES, WITH_WINDOWS, Picture, is_exr
 from vkbloom._io.narrowing import file_note, for_radiance, narrowed
+from vkbloom._io.picture import DTYPES, PIXEL_TYPES, SPACES, WITH_WINDOWS, Picture, is_exr
 from vkbloom._numbers import check_index
 
 if TYPE_CHECKING:
@@ -76,10 +76,10 @@ def check_options(
             raise ValueError(f"bits: {kind} has no numbers of {bits} bits; write another format")
 
 
-def is_straight(path: str | os.PathLike[str], *, is_associated: bool) -> bool:
+def is_straight(path: str | os.PathLike[str], *, is_multiplied: bool) -> bool:
     """Return whether readers of a file expect alpha, and colours that are not multiplied by it."""
     file = Path(path)
-    if is_exr(file) or (is_associated and file.suffix.lower() in (".tif", ".tiff")):
+    if is_exr(file) or (is_multiplied and file.suffix.lower() in (".tif", ".tiff")):
         return False
     return bool(safe_writing.writer_of(file).supports("alpha"))
 
@@ -170,13 +170,15 @@ def described_as(
     oiio: ModuleType, picture: Picture, target: Path, what: tuple[str, str] | str
 ) -> Picture:
     """Return a picture whose attributes name colours; `what` as for `displayed.with_names`."""
-    is_plain, attributes = displayed.with_names(oiio, picture.stored.attributes, target, what)
-    own = picture.stored.own if is_plain else without_colours(picture.stored.own)
-    stored = dataclasses.replace(picture.stored, attributes=attributes, own=own)
+    is_plain, attributes = displayed.with_names(oiio, picture.header.attributes, target, what)
+    own = picture.header.own if is_plain else without_colours(picture.header.own)
+    header = dataclasses.replace(picture.header, attributes=attributes, own=own)
     if is_plain:
         curve: Any = None if what[1] == "none" else what[1]
-        return dataclasses.replace(picture, encoding=curve, stored=stored)
-    return dataclasses.replace(picture, encoding=None, stored=dataclasses.replace(stored, space=""))
+        return dataclasses.replace(picture, encoding=curve, header=header)
+    colours = header.colours._replace(space="")
+    header = dataclasses.replace(header, colours=colours)
+    return dataclasses.replace(picture, encoding=None, header=header)
 
 
 def put(oiio: ModuleType, parts: Sequence[Part], temporary: Path, target: Path) -> None:
@@ -208,9 +210,9 @@ def put(oiio: ModuleType, parts: Sequence[Part], temporary: Path, target: Path) 
 
 def _displayed(part: Part) -> NDArray[Any]:
     """Return the values inside the display window."""
-    stored = part.picture.stored
-    x, y, width, height = stored.display
-    row, column = y - stored.origin[1], x - stored.origin[0]
+    header = part.picture.header
+    x, y, width, height = header.display
+    row, column = y - header.origin[1], x - header.origin[0]
     return part.values[row : row + height, column : column + width]
 
 
@@ -218,21 +220,21 @@ def _spec_of(
     oiio: ModuleType, writer: OpenImageIO.ImageOutput, part: Part, target: Path
 ) -> OpenImageIO.ImageSpec:
     """Return OpenImageIO's description of a part."""
-    stored = part.picture.stored
+    header = part.picture.header
     height, width, channels = part.values.shape
     spec: OpenImageIO.ImageSpec = oiio.ImageSpec(
         width, height, channels, PIXEL_TYPES[part.values.dtype.name]
     )
-    if stored.channels == ("Z",):
-        spec.channelnames = stored.channels
+    if header.channels == ("Z",):
+        spec.channelnames = header.channels
         spec.z_channel = 0
     elif channels < 3:
         has_alpha = channels == 2
         spec.channelnames = ("Y", "A")[:channels]
         spec.alpha_channel = 1 if has_alpha else -1
     if writer.format_name() in WITH_WINDOWS:
-        spec.x, spec.y = stored.origin
-        spec.full_x, spec.full_y, spec.full_width, spec.full_height = stored.display
+        spec.x, spec.y = header.origin
+        spec.full_x, spec.full_y, spec.full_width, spec.full_height = header.display
     _describe(spec, part.picture, writer.format_name(), target)
     for name, value in part.attributes.items():
         spec.attribute(name, value)
@@ -278,7 +280,7 @@ def _losses(picture: Picture, target: Path, layout: Layout) -> list[str]:
         associated = (suffix == ".exr") if suffix not in (".tif", ".tiff") else None
         if not has_alpha and not is_opaque:
             notes.append(f"{target} cannot hold alpha, which is not 1 everywhere")
-        elif has_alpha and not is_opaque and associated is (not picture.stored.associated):
+        elif has_alpha and not is_opaque and associated is (not picture.is_multiplied):
             notes.append(
                 f"colours and alpha are written to {target} unchanged, but its readers expect "
                 f"colours {'' if associated else 'not '}multiplied by alpha"
@@ -313,24 +315,24 @@ def _describe(
 ) -> None:
     """Set the attributes that describe a file's colours, alpha and pixels."""
     to_exr = is_exr(target)
-    stored, encoding = picture.stored, picture.encoding
+    header, encoding = picture.header, picture.encoding
     # OpenImageIO has no names for PQ and HLG with the primaries of Rec. 709.
-    space = stored.space if encoding is None else SPACES.get(encoding, "")
+    space = header.colours.space if encoding is None else SPACES.get(encoding, "")
     # OpenEXR files are linear by definition, and another attribute has their primaries.
     if space and not (to_exr and encoding == "linear"):
         spec.attribute("oiio:ColorSpace", space)
     # Otherwise OpenImageIO divides by alpha for formats with straight colours. TIFF can record
     # either.
     is_tiff = target.suffix.lower() in (".tif", ".tiff")
-    if not to_exr and not (is_tiff and stored.associated):
+    if not to_exr and not (is_tiff and picture.is_multiplied):
         spec.attribute("oiio:UnassociatedAlpha", 1)
     if to_exr:
-        write_own(spec, stored.own)
+        write_own(spec, header.own)
     is_jpeg = format_name == "jpeg"
     if is_jpeg and spec.nchannels == 3:
         # No subsampling of colours, unless the picture's attributes contain one.
         spec.attribute("jpeg:subsampling", "4:4:4")
-    for name, (kind, value) in stored.attributes.items():
+    for name, (kind, value) in header.attributes.items():
         # A profile describes encoded colours, not those of a picture that was written linear.
         if name == "ICCProfile" and encoding not in ("srgb", None):
             continue

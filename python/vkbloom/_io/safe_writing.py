@@ -22,8 +22,7 @@ import numpy as np
 
 from vkbloom._c_paths import for_c, in_utf8
 from vkbloom._extras import import_extra
-from vkbloom._io.images import check_name, failure_of
-from vkbloom._io.readable_copies import readable
+from vkbloom._io.readers import check_name, failure_of, readable
 
 if TYPE_CHECKING:
     import OpenImageIO

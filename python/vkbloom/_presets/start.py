@@ -17,14 +17,16 @@ that the settings came from.
 
 from __future__ import annotations
 
-import dataclasses
+import os
 from collections.abc import Mapping
+from dataclasses import replace
 from types import MappingProxyType
 from typing import Any, Final, NamedTuple
 
-from vkbloom._io.array_files import premultiplied
-from vkbloom._io.expansion import PHOTO_EXPANSION, expanded
-from vkbloom._io.images import Highlights, Picture
+from vkbloom._io.alpha import multiplied
+from vkbloom._io.expansion import PHOTO_EXPANSION, expand_photograph
+from vkbloom._io.image_file import read_picture
+from vkbloom._io.picture import PHOTOGRAPHS, Highlights, Picture
 from vkbloom._settings.settings import Settings, check_settings, presets
 
 #: The preset of images whose highlights are stored.
@@ -34,12 +36,6 @@ PRESET_OF_PHOTOS: Final = presets.start("photographs")
 #: The preset of scenes.
 PRESET_OF_SCENES: Final = presets.start("scenes")
 
-_DEFAULTS: Final[Mapping[Highlights | None, str]] = {
-    Highlights.CLIPPED: PRESET_OF_PHOTOS,
-    Highlights.MAPPED: PRESET_OF_PHOTOS,
-    Highlights.STORED: PRESET_OF_IMAGES,
-    None: PRESET_OF_SCENES,
-}
 _NONE: Final[Mapping[str, Any]] = MappingProxyType({})
 # What makes a glow that needs the expansion. The other fields may differ.
 _OF_PHOTOS: Final = ("method", "composite", "threshold", "knee")
@@ -50,6 +46,28 @@ class Start(NamedTuple):
 
     settings: Settings
     expand: float | None
+
+    def develop(self, picture: Picture) -> Picture:
+        """Return the picture whose pixels a renderer gets, of one that was decoded.
+
+        The highlights of a photograph are expanded, and colours are multiplied by alpha if the
+        settings give the bloom its own.
+        """
+        if self.expand is not None:
+            picture = expand_photograph(picture, self.expand)
+        if self.settings.alpha == "keep":
+            return picture
+        return with_multiplied_colours(picture)
+
+
+def start_file(
+    path: str | os.PathLike[str],
+    settings: Settings | str | None = None,
+    changes: Mapping[str, Any] = _NONE,
+) -> tuple[Picture, Start]:
+    """Return the decoded picture of an image file, and where it starts."""
+    picture = read_picture(path)
+    return picture, start_of(picture.highlights, settings, changes)
 
 
 def start_of(
@@ -64,7 +82,7 @@ def start_of(
     `changes`: fields of the settings that are changed.
     """
     if settings is None:
-        settings = _DEFAULTS[highlights]
+        settings = _default_preset(highlights)
     begun = check_settings(settings)
     changed = begun.replace(**changes) if changes else begun
     if expand is None and highlights is Highlights.CLIPPED:
@@ -79,12 +97,17 @@ def _is_of_photos(settings: Settings) -> bool:
     return all(getattr(settings, name) == getattr(photo, name) for name in _OF_PHOTOS)
 
 
-def developed(picture: Picture, expand: float | None, alpha: str) -> Picture:
-    """Return the picture whose pixels a renderer gets, of one that was decoded unexpanded.
+def _default_preset(highlights: Highlights | None) -> str:
+    if highlights is None:
+        return PRESET_OF_SCENES
+    return PRESET_OF_PHOTOS if highlights in PHOTOGRAPHS else PRESET_OF_IMAGES
 
-    Its highlights are expanded, and its colours are multiplied by alpha if the setting `alpha`
-    gives the bloom its own.
+
+def with_multiplied_colours(picture: Picture) -> Picture:
+    """Return a decoded picture's colours multiplied by alpha, if its file has straight ones.
+
+    The file that is written has straight ones again.
     """
-    if picture.highlights is Highlights.CLIPPED:
-        picture = dataclasses.replace(picture, pixels=expanded(picture.pixels, expand))
-    return picture if alpha == "keep" else premultiplied(picture)
+    if not picture.has_straight:
+        return picture
+    return replace(picture, pixels=multiplied(picture.pixels))

@@ -128,15 +128,13 @@ def apply(
     if not isinstance(image, str | os.PathLike):
         chosen = _changed(settings, fields, of_image=True)
         return (renderer or default_renderer()).apply(image, chosen, **given)
-    from vkbloom._io import image_reading  # noqa: PLC0415  costs start-up time
-    from vkbloom._presets.start import developed, start_of  # noqa: PLC0415  costs start-up time
+    from vkbloom._presets.start import start_file  # noqa: PLC0415  costs start-up time
 
-    picture = image_reading.decode_file(image_reading.load(image), os.fspath(image))
-    begun, expand = start_of(picture.highlights, settings, fields)
-    pixels = developed(picture, expand, begun.alpha).pixels
-    frames = (renderer or default_renderer()).apply(pixels, begun, **given)
-    if expand is not None:
-        frames._info["expand"] = expand
+    picture, start = start_file(image, settings, fields)
+    pixels = start.develop(picture).pixels
+    frames = (renderer or default_renderer()).apply(pixels, start.settings, **given)
+    if start.expand is not None:
+        frames._info["expand"] = start.expand
     return frames
 
 

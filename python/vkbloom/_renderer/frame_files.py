@@ -20,10 +20,11 @@ from numpy.typing import NDArray
 from vkbloom._extras import import_extra
 from vkbloom._formats import IMAGE_DTYPES
 from vkbloom._framebuffers import leading
-from vkbloom._io import image_reading, safe_writing
-from vkbloom._io.displayed import HDR_CURVES
+from vkbloom._io import safe_writing
+from vkbloom._io.hdr_curves import HDR_CURVES
 from vkbloom._io.image_writing import Part, described_as, put
-from vkbloom._io.images import PIXEL_TYPES, Picture, check_name, complete, is_exr
+from vkbloom._io.picture import PIXEL_TYPES, Picture, is_exr
+from vkbloom._io.readers import check_name, check_plausible, complete, opened
 from vkbloom._renderer.frame_saves import (
     FACT,
     check_alone,
@@ -172,7 +173,7 @@ def load(path: str | os.PathLike[str]) -> tuple[dict[str, NDArray[Any]], dict[st
 
 def _parts_of(file: Path, target: Path | None) -> Iterator[tuple[NDArray[Any], dict[str, str]]]:
     """Yield the pixels of each part without the padding of its window, and its attributes."""
-    with image_reading.opened(file, "Frames.load") as reader:
+    with opened(file, "Frames.load") as reader:
         for index in itertools.count():
             if not reader.seek_subimage(index, 0):
                 return
@@ -180,7 +181,7 @@ def _parts_of(file: Path, target: Path | None) -> Iterator[tuple[NDArray[Any], d
             said = _facts(spec)
             if target is not None and not is_of(target, file, said):
                 continue
-            image_reading.check_plausible(spec, file)
+            check_plausible(spec, file)
             pixels = reader.read_image(index, 0, 0, spec.nchannels, spec.format)
             pixels = complete(pixels, reader, file)
             yield pixels.reshape(spec.height, spec.width, spec.nchannels), said
@@ -188,7 +189,7 @@ def _parts_of(file: Path, target: Path | None) -> Iterator[tuple[NDArray[Any], d
 
 def facts_of(path: str | os.PathLike[str]) -> dict[str, str]:
     """Return what vkbloom wrote into an image file: "settings" and others, as text."""
-    with image_reading.opened(path, "Reading settings") as reader:
+    with opened(path, "Reading settings") as reader:
         return _facts(reader.spec())
 
 
@@ -287,12 +288,12 @@ def _exr_part(frames: Framebuffers, name: str, file: Path, saved: str) -> Part:
         pixels = (pixels / np.float32(255)).astype(np.float16)
     height, width = frames[leading(frames)].shape[:2]
     picture = Picture.of_values(pixels, PIXEL_TYPES[pixels.dtype.name])
-    stored = replace(picture.stored, display=(0, 0, width, height))
+    header = replace(picture.header, display=(0, 0, width, height))
     if pixels.shape[2] == 1:
-        stored = replace(stored, channels=("Z",))
+        header = replace(header, channels=("Z",))
     # The name of the OpenEXR part.
     attributes = {**_attributes(frames, name, file, saved), "oiio:subimagename": name}
-    return Part(pixels, replace(picture, stored=stored), attributes)
+    return Part(pixels, replace(picture, header=header), attributes)
 
 
 def _attributes(frames: Framebuffers, name: str, file: Path, saved: str) -> dict[str, str | int]:

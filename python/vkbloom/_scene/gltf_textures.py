@@ -14,8 +14,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom._io.image_reading import check_plausible, opened
-from vkbloom._io.images import failure_of
+from vkbloom._io.readers import check_plausible, failure_of, opened
 from vkbloom._io.srgb import decode_srgb
 from vkbloom._scene.arrays import MAX_SIDE
 from vkbloom._scene.gltf_file import TEXTURE_TRANSFORM, Floats, GltfFile, Parsed

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from vkbloom._arrays import plain_array
 from vkbloom._formats import IMAGE_DTYPES
-from vkbloom._io import image_reading
+from vkbloom._io.image_file import read_stored
 from vkbloom._scene import ktx
 from vkbloom._scene.arrays import MAX_SIDE, Constructed, check_levels
 from vkbloom._scene.textures import finite_floats, mip_levels, rounded_to
@@ -216,7 +216,7 @@ def _split(coordinate: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[n
 
 def _read_image(path: str | os.PathLike[str]) -> NDArray[Any]:
     """Read an RGB or RGBA image file as ``(H, W, C)``, with its stored values."""
-    pixels = image_reading.load(path).pixels
+    pixels = read_stored(path).pixels
     if pixels.shape[2] not in (3, 4):
         raise ValueError(
             f"{os.fspath(path)}: has {pixels.shape[2]} channels; flat RGB or RGBA is needed"

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from vkbloom._extras import import_extra
 from vkbloom._formats import MAX_FLOAT
-from vkbloom._io.images import checked_pixels
+from vkbloom._io.picture import checked_pixels
 from vkbloom._io.srgb import decode_srgb
 
 Metric = Literal["ssim", "psnr", "flip"]

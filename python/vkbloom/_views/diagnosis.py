@@ -11,7 +11,7 @@ from typing import Any, Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom._io.images import checked_pixels
+from vkbloom._io.picture import checked_pixels
 from vkbloom._io.srgb import decode_srgb, encode_srgb
 from vkbloom._public import public
 from vkbloom._views.comparison import pair_of

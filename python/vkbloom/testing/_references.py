@@ -16,7 +16,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom._io import array_files, image_reading, safe_writing
+from vkbloom._io import array_files, image_file, safe_writing
 
 __tracebackhide__ = True
 
@@ -122,7 +122,7 @@ class ReferenceFolder:
 
     def _image(self, entry: Mapping[str, Any], listed_in: Path) -> NDArray[Any]:
         file = self.path / entry["file"]
-        pixels = image_reading.load(file).pixels
+        pixels = image_file.read_stored(file).pixels
         shape = tuple(entry["shape"])
         if pixels.dtype != np.dtype(entry["dtype"]) or pixels.shape != _with_channels(shape):
             raise ValueError(

@@ -1,13 +1,22 @@
-"""Read the header of JPEG XL files (ISO/IEC 18181), for what OpenImageIO's reader leaves out."""
+"""Facts of JPEG XL files (ISO/IEC 18181), of their header."""
 
 from __future__ import annotations
 
-import os
-from typing import BinaryIO, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, BinaryIO, Final, NamedTuple
+
+from numpy.typing import NDArray
+
+from vkbloom._io.formats.facts import Corrected, Facts
+from vkbloom._io.picture import Alpha, StatedColours
+
+if TYPE_CHECKING:
+    import OpenImageIO
 
 # A codestream or a container (ISO/IEC 18181-2).
 _CODESTREAM: Final = b"\xff\x0a"
 _CONTAINER: Final = b"\0\0\0\x0cJXL \r\n\x87\n"
+#: How files begin.
+SIGNATURES: Final = (_CODESTREAM, _CONTAINER)
 # OpenImageIO needs this many bytes of a file.
 _MIN_BYTES: Final = 128
 # Bytes of a codestream that are looked at: enough for some channels with names.
@@ -75,14 +84,36 @@ class _Bits:
         return self.take(count) + more
 
 
-def header_of(path: str | os.PathLike[str]) -> Header:
+def find_facts(stream: BinaryIO, spec: OpenImageIO.ImageSpec, part: int) -> Facts:
+    """Return what the header says. Floats are on the curve that the file states."""
+    header = read_header(stream)
+    colours = StatedColours(
+        space=spec.get_string_attribute("oiio:ColorSpace"),
+        gamma=spec.get_float_attribute("oiio:Gamma", 0.0) or None,
+        is_encoded=True,
+    )
+    return Facts(
+        alpha=Alpha.MULTIPLIED if header.is_multiplied else Alpha.STRAIGHT,
+        colours=colours,
+        correct=_with_note if header.has_coarse_light else None,
+    )
+
+
+def _with_note(pixels: NDArray[Any]) -> Corrected:
+    said = (
+        "its colours are stored in another space than that of its ICC profile, and are decoded "
+        "to linear Rec. 709; colours outside of it are clipped"
+    )
+    return Corrected(pixels, (said,))
+
+
+def read_header(stream: BinaryIO) -> Header:
     """Return what the header of a file says; a header that is cut off says nothing."""
-    with open(path, "rb") as stream:
-        start = _codestream_at(stream)
-        if start is None:
-            return Header()
-        stream.seek(start)
-        content = stream.read(_MAX_HEADER)
+    start = _codestream_at(stream)
+    if start is None:
+        return Header()
+    stream.seek(start)
+    content = stream.read(_MAX_HEADER)
     try:
         return _header(_Bits(content[2:]), 8 * (start + 2))
     except EOFError:
@@ -194,10 +225,11 @@ def readable_content(path: str) -> bytes | None:
     colours have steps, the content says 16 bits: libjxl computes floats and rounds them to what the
     header says.
     """
-    header = header_of(path)
     with open(path, "rb") as stream:
+        header = read_header(stream)
+        stream.seek(0)
         head = stream.read(_MIN_BYTES)
-        is_short = len(head) < _MIN_BYTES and head.startswith((_CODESTREAM, _CONTAINER))
+        is_short = len(head) < _MIN_BYTES and head.startswith(SIGNATURES)
         if not is_short and not header.has_coarse_light:
             return None
         content = head + stream.read()

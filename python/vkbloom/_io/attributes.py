@@ -1,19 +1,32 @@
-"""What an OpenEXR file says that bloom does not change: time code, frame rate, own attributes."""
+"""Attributes of a file that are also valid for the result.
+
+Those of all formats are about colours and pixels, the size in print, and who took the picture where
+and how. OpenEXR keeps all that bloom does not change: time code, frame rate, a program's own ones.
+"""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final
 
-from vkbloom._io.images import is_kept
+from vkbloom._io.picture import Attributes
 
 if TYPE_CHECKING:
     import OpenImageIO
 
-#: Attributes by OpenImageIO's names, each with its type and value.
-Attributes = Mapping[str, tuple[Any, Any]]
-
+_KEPT_ATTRIBUTES: Final = frozenset(
+    (
+        *("chromaticities", "ICCProfile", "PixelAspectRatio"),
+        *("XResolution", "YResolution", "ResolutionUnit", "jpeg:subsampling"),
+        *("Artist", "Copyright", "DateTime", "ImageDescription", "Make", "Model", "Keywords"),
+        *("ExposureTime", "FNumber"),
+    )
+)
+_KEPT_GROUPS: Final = ("Exif:", "GPS:", "IPTC:")
+# Attributes that a conversion or rotation makes wrong.
+_LOST_ATTRIBUTES: Final = frozenset(
+    ("Exif:ColorSpace", "Exif:Gamma", "Exif:PixelXDimension", "Exif:PixelYDimension")
+)
 # What bloom, or another choice of channels, parts and tiles, makes untrue: checksums, previews,
 # lists of channels and views, mattes of channels that are left out, and what vkbloom says itself.
 _UNTRUE: Final = re.compile(
@@ -32,13 +45,28 @@ _COMPRESSION: Final = "compression"
 _DWA_LEVEL: Final = "openexr:dwaCompressionLevel"
 
 
+def kept_attributes(spec: OpenImageIO.ImageSpec) -> dict[str, tuple[Any, Any]]:
+    """Return the attributes of a part that are valid for the result in every format."""
+    return {
+        attribute.name: (attribute.type, attribute.value)
+        for attribute in spec.extra_attribs
+        if _is_kept(attribute.name)
+    }
+
+
+def _is_kept(attribute: str) -> bool:
+    return attribute not in _LOST_ATTRIBUTES and (
+        attribute in _KEPT_ATTRIBUTES or attribute.startswith(_KEPT_GROUPS)
+    )
+
+
 def own_attributes(spec: OpenImageIO.ImageSpec) -> dict[str, tuple[Any, Any]]:
     """Return the attributes of a part that are only written to OpenEXR, and stay true there."""
     own = {
         attribute.name: (attribute.type, attribute.value)
         for attribute in spec.extra_attribs
         if attribute.value is not None
-        and not is_kept(attribute.name)
+        and not _is_kept(attribute.name)
         and _UNTRUE.match(attribute.name) is None
         and (attribute.name != _TEXTURE or "Environment" in str(attribute.value))
         and (attribute.name != "openexr:lineOrder" or attribute.value != "randomY")

@@ -1,14 +1,23 @@
-"""Read fields of TIFF directories (TIFF 6.0, BigTIFF), which Exif has, too."""
+"""Facts of TIFF files (TIFF 6.0, BigTIFF), and of Exif and XMP, which other formats have, too."""
 
 from __future__ import annotations
 
 import os
+import re
 import struct
-from collections.abc import Collection, Iterator, Mapping
-from typing import Any, BinaryIO, Final, Literal
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from io import BytesIO
+from typing import TYPE_CHECKING, Any, BinaryIO, Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
+
+from vkbloom._io.chromaticities import ADOBE, ADOBE_GAMMA, CHROMATICITIES, other_primaries
+from vkbloom._io.formats.facts import Corrected, Facts
+from vkbloom._io.picture import Alpha, StatedColours
+
+if TYPE_CHECKING:
+    import OpenImageIO
 
 #: What to do with a camera's raw file.
 RAW_ADVICE: Final = (
@@ -16,8 +25,10 @@ RAW_ADVICE: Final = (
     "RawTherapee, and save it as TIFF or OpenEXR"
 )
 
-# Values in bytes: a damaged file may claim more.
-_MAX_BYTES: Final = 1 << 24
+#: Spaces whose numbers are not those of red, green and blue.
+LAB: Final = ("CIELAB", "ICCLAB")
+#: Metadata in bytes: a damaged file may claim more.
+MAX_PACKET: Final = 1 << 24
 # Directories and fields of one directory. Readers of TIFF know a few hundred tags.
 _MAX_DIRECTORIES: Final = 100
 _MAX_FIELDS: Final = 4096
@@ -57,6 +68,27 @@ _RAW_SIGNATURES: Final = (
     (0, b"FOVb"),
     (0, b"\0MRM"),
 )
+# ExtraSamples of TIFF 6.0, and its value for colours that are multiplied by alpha.
+_EXTRA_SAMPLES: Final = 338
+_ASSOCIATED: Final = 1
+# PhotometricInterpretation for grey: 0 is white, 0 is black. And the compressions of JPEG, which
+# libtiff inverts itself.
+_GREY: Final = (0, 1)
+_WHITE_IS_0: Final = 0
+_JPEG: Final = (6, 7)
+_ORIENTATION: Final = 274
+_XMP: Final = 700
+# Of an attribute or an element (XMP specification part 1, 7).
+_IN_XMP: Final = re.compile(rb"tiff:Orientation\s*(?:=\s*[\"']|>)\s*([1-8])\b")
+# Tags of TIFF and Exif: directories, and what they say of colours.
+_EXIF, _INTEROPERABILITY = 34665, 40965
+_WHITE, _PRIMARIES = 318, 319
+_COLOUR_SPACE, _GAMMA = 40961, 42240
+_INDEX: Final = 1
+# Exif's colour space: sRGB, uncalibrated, and some cameras' number of Adobe RGB.
+_SRGB, _UNCALIBRATED, _ADOBE_RGB = 1, 65535, 2
+# What DCF 2.0 calls its option file, which has Adobe RGB.
+_OPTION_FILE: Final = b"R03"
 
 
 class Directories:
@@ -111,7 +143,7 @@ class Directories:
             dtype = np.dtype(_TYPES[kind]).newbyteorder(self._order)
             if length * dtype.itemsize > len(value):
                 self._stream.seek(struct.unpack(self._order + self._offset_form, value)[0])
-                value = self._stream.read(min(length * dtype.itemsize, _MAX_BYTES))
+                value = self._stream.read(min(length * dtype.itemsize, MAX_PACKET))
             return np.frombuffer(value, dtype, length)
         except _DAMAGE:
             return None
@@ -148,6 +180,22 @@ def tiff_field(stream: BinaryIO, tag: int, part: int = 0) -> NDArray[Any] | None
         return None
     value = _integers(fields, tag)
     return value if tag in fields and value.size == fields[tag].size else None
+
+
+def full_picture(path: str) -> tuple[int, str | None]:
+    """Return the number of the first part that is no reduced picture, and a note about it.
+
+    Raises ValueError for a camera's raw file, whose preview OpenImageIO takes for the picture.
+    """
+    if is_raw(path):
+        raise ValueError(f"{path}: is {RAW_ADVICE}")
+    reduced = reduced_parts(path)
+    if not any(reduced[:1]):
+        return 0, None
+    if all(reduced):
+        return 0, "the picture is a reduced one, as the file says; the full one cannot be read"
+    part = reduced.index(False)
+    return part, f"part 0 is a reduced picture, as the file says; read part {part}"
 
 
 def is_raw(path: str | os.PathLike[str]) -> bool:
@@ -199,3 +247,107 @@ def exif_fields(stream: BinaryIO, *tags: int, pointers: tuple[int, ...] = ()) ->
     except (*_DAMAGE, IndexError):
         return {}
     return {tag: value for tag, value in fields.items() if value.size}
+
+
+def find_facts(stream: BinaryIO, spec: OpenImageIO.ImageSpec, part: int) -> Facts:
+    """Return what the fields of a part say."""
+    extra = tiff_field(stream, _EXTRA_SAMPLES, part)
+    is_multiplied = extra is not None and [*extra[extra != 0][:1]] == [_ASSOCIATED]
+    orientation = None
+    if not isinstance(spec.getattribute("Orientation"), int):
+        orientation = orientation_of_exif(stream)
+    photometric = spec.get_int_attribute("tiff:PhotometricInterpretation", 2)
+    channels = None
+    if photometric in _GREY:
+        # OpenImageIO calls further samples green and blue.
+        more = range(1, spec.nchannels)
+        alpha = spec.alpha_channel
+        channels = ("Y", *("A" if index == alpha else f"channel{index}" for index in more))
+    is_inverted_jpeg = (
+        str(spec.format) == "uint8" and spec.get_int_attribute("tiff:Compression") in _JPEG
+    )
+    is_wrong = photometric == _WHITE_IS_0 and not is_inverted_jpeg
+    return Facts(
+        channels=channels,
+        orientation=orientation,
+        alpha=Alpha.MULTIPLIED if is_multiplied else Alpha.STRAIGHT,
+        colours=exif_colours(stream, spec),
+        correct=_with_black_0 if is_wrong else None,
+    )
+
+
+def _with_black_0(pixels: NDArray[Any]) -> Corrected:
+    """Return grey whose 0 is black; other channels as they are stored."""
+    is_float = pixels.dtype.kind == "f"
+    unit = pixels.dtype.type(1 if is_float else np.iinfo(pixels.dtype).max)
+    made = pixels.copy()
+    wrong = slice(1, None) if pixels.dtype == np.uint8 else slice(0, 1)
+    made[:, :, wrong] = unit - made[:, :, wrong]
+    # TIFF 6.0 defines it for integers.
+    said = "the file says that 0 is white; its floats are taken as 1 minus the light"
+    return Corrected(made, (said,) if is_float else ())
+
+
+def orientation_of_exif(stream: BinaryIO) -> int | None:
+    """Return the orientation of Exif, which is a TIFF stream, or that of XMP in it."""
+    numbers = tiff_field(stream, _ORIENTATION)
+    if numbers is not None and numbers.size:
+        return int(numbers[0])
+    packet = tiff_field(stream, _XMP)
+    return None if packet is None else orientation_of_xmp(packet.tobytes())
+
+
+def first_orientation(exif: Iterable[bytes | None], packets: Iterable[bytes]) -> int | None:
+    """Return the first orientation of some Exif, else of some XMP; None is damaged Exif."""
+    for content in exif:
+        if content is not None and (found := orientation_of_exif(BytesIO(content))) is not None:
+            return found
+    for packet in packets:
+        if (found := orientation_of_xmp(packet)) is not None:
+            return found
+    return None
+
+
+def orientation_of_xmp(packet: bytes) -> int | None:
+    """Return the orientation that an XMP packet has."""
+    match = _IN_XMP.search(packet)
+    return None if match is None else int(match[1])
+
+
+def exif_colours(
+    exif: BinaryIO, spec: OpenImageIO.ImageSpec, stated: StatedColours | None = None
+) -> StatedColours:
+    """Return what Exif, a TIFF stream, says of colours.
+
+    `stated`: What the file says otherwise; by default what OpenImageIO says.
+    """
+    if stated is None:
+        space = spec.get_string_attribute("oiio:ColorSpace")
+        stated = StatedColours(space, spec.get_float_attribute("oiio:Gamma", 0.0) or None)
+    own = exif_fields(exif, _COLOUR_SPACE, _GAMMA, pointers=(_EXIF,))
+    number = own[_COLOUR_SPACE][0] if _COLOUR_SPACE in own else _UNCALIBRATED
+    if number == _SRGB:
+        return stated
+    index = exif_fields(exif, _INDEX, pointers=(_EXIF, _INTEROPERABILITY)).get(_INDEX)
+    if number == _ADOBE_RGB or (index is not None and index.tobytes()[:3] == _OPTION_FILE):
+        return stated._replace(gamma=ADOBE_GAMMA, primaries=ADOBE)
+    fields = exif_fields(exif, _WHITE, _PRIMARIES)
+    primaries, white = _numbers(fields, _PRIMARIES, 6), _numbers(fields, _WHITE, 2)
+    if not primaries:
+        return stated
+    found = other_primaries([*primaries, *(white or CHROMATICITIES["rec709"][6:])])
+    if found is None:
+        return stated
+    gamma = (*_numbers(own, _GAMMA, 1), None)[0]
+    return stated._replace(
+        gamma=gamma if gamma is not None and gamma > 0 else None, primaries=found
+    )
+
+
+def _numbers(fields: Mapping[int, NDArray[Any]], tag: int, count: int) -> list[float]:
+    """Return a field's numbers; []: it has others than expected."""
+    values = fields.get(tag, np.empty(0))
+    if values.size == 2 * count and values[1::2].all():
+        # Fractions.
+        values = values[::2] / values[1::2]
+    return [float(value) for value in values] if values.size == count else []
