@@ -16,6 +16,7 @@ import vkbloom
 from tests.cli.calls import run
 from tests.explorer.pages import Viewer
 from tests.images import lights
+from tests.io import foreign
 from tests.io.parts import reread, store_ultra_hdr
 from vkbloom._cli import live
 from vkbloom._io.picture import Picture
@@ -50,6 +51,21 @@ def ultra_hdr(path: Path) -> None:
     store_ultra_hdr(path, image.astype(np.float16))
 
 
+def unsigned_fits(path: Path) -> None:
+    """Unsigned numbers, which FITS has as signed ones with an offset."""
+    planes = np.moveaxis(levels(16)[::-1], -1, 0)
+    signed = (planes.astype(int) - 32768).astype(np.int16)
+    foreign.fits(path, signed, BSCALE=1, BZERO=32768)
+
+
+def with_preview(path: Path) -> None:
+    """Light, after a preview of integers."""
+    tifffile = pytest.importorskip("tifffile")
+    with tifffile.TiffWriter(path) as file:
+        file.write(levels(8)[::4, ::4], photometric="rgb", subfiletype=1)
+        file.write(picture(), photometric="rgb")
+
+
 #: Files by name, and whether they are expanded.
 FILES: dict[str, tuple[Callable[[Path], object], bool]] = {
     "photo.jpg": (lambda path: vkbloom.write(path, levels(8), quality=95), True),
@@ -62,6 +78,8 @@ FILES: dict[str, tuple[Callable[[Path], object], bool]] = {
     "alpha.exr": (lambda path: vkbloom.write(path, picture(4)), False),
     "radiance.hdr": (lambda path: vkbloom.write(path, picture()), False),
     "gain_map.jpg": (ultra_hdr, False),
+    "unsigned.fits": (unsigned_fits, True),
+    "preview.tif": (with_preview, False),
 }
 BEGINNINGS: dict[str, Begin] = {
     "nothing": ((), None),
