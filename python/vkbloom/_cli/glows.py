@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from vkbloom._cli.image_files import read_picture
 from vkbloom._io.glows import alike, grey_mask
-from vkbloom._presets.start import with_multiplied_colours
+from vkbloom._presets.start import multiply_by_alpha
 
 
 def glow_options(command: Callable[..., Any]) -> Callable[..., Any]:
@@ -61,5 +61,5 @@ def read_glows(
         grey = grey_mask(read_picture(mask, 0, "linear").pixels, mask)
     if emission is not None:
         picture = read_picture(emission, 0, colour)
-        glow = (with_multiplied_colours(picture) if is_blended else picture).pixels
+        glow = (multiply_by_alpha(picture) if is_blended else picture).pixels
     return Glows(grey, glow)

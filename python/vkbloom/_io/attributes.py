@@ -60,9 +60,9 @@ def _is_kept(attribute: str) -> bool:
     )
 
 
-def own_attributes(spec: OpenImageIO.ImageSpec) -> dict[str, tuple[Any, Any]]:
+def exr_attributes(spec: OpenImageIO.ImageSpec) -> dict[str, tuple[Any, Any]]:
     """Return the attributes of a part that are only written to OpenEXR, and stay true there."""
-    own = {
+    found = {
         attribute.name: (attribute.type, attribute.value)
         for attribute in spec.extra_attribs
         if attribute.value is not None
@@ -71,11 +71,11 @@ def own_attributes(spec: OpenImageIO.ImageSpec) -> dict[str, tuple[Any, Any]]:
         and (attribute.name != _TEXTURE or "Environment" in str(attribute.value))
         and (attribute.name != "openexr:lineOrder" or attribute.value != "randomY")
     }
-    if (level := spec.get_float_attribute(_DWA_LEVEL)) and "dwa" in str(own.get(_COMPRESSION)):
-        kind, name = own[_COMPRESSION]
+    if (level := spec.get_float_attribute(_DWA_LEVEL)) and "dwa" in str(found.get(_COMPRESSION)):
+        kind, name = found[_COMPRESSION]
         # OpenImageIO reads the level as an attribute, and writes it by the compression's name.
-        own[_COMPRESSION] = kind, f"{name}:{level:g}"
-    return own
+        found[_COMPRESSION] = kind, f"{name}:{level:g}"
+    return found
 
 
 def without_colours(attributes: Attributes) -> Attributes:
@@ -83,7 +83,7 @@ def without_colours(attributes: Attributes) -> Attributes:
     return {name: value for name, value in attributes.items() if name not in _OF_COLOURS}
 
 
-def write_own(spec: OpenImageIO.ImageSpec, attributes: Attributes) -> None:
-    """Set attributes of `own_attributes`."""
+def write_exr_attributes(spec: OpenImageIO.ImageSpec, attributes: Attributes) -> None:
+    """Set attributes of `exr_attributes`."""
     for name, (kind, value) in attributes.items():
         spec.attribute(name, kind, value)

@@ -78,10 +78,10 @@ def decode(stored: Picture, colour: Colour | None = None) -> Picture:
         values = values[:, :, [0, 0, 0, *range(1, len(chosen))]]
     is_encoded = values.dtype.kind == "u" or header.colours.is_encoded
     if is_encoded and values.shape[2] == 4 and header.alpha is Alpha.MULTIPLIED:
-        values = _divided(values)
+        values = _divide_by_alpha(values)
         header = replace(header, alpha=Alpha.STRAIGHT)
     is_other = colour not in (None, "linear", "srgb")
-    own = without_colours(header.own) if is_other else header.own
+    exr = without_colours(header.exr_attributes) if is_other else header.exr_attributes
     taken_as, values, said = _linear(values, header, colour, is_encoded=is_encoded)
     # Attributes of the colours before the conversion are untrue now.
     attributes = {**header.attributes}
@@ -91,7 +91,7 @@ def decode(stored: Picture, colour: Colour | None = None) -> Picture:
         attributes.pop("chromaticities", None)
     return Picture(
         pixels=np.ascontiguousarray(values),
-        header=replace(header, attributes=attributes, own=own),
+        header=replace(header, attributes=attributes, exr_attributes=exr),
         encoding="linear",
         numbers=numbers,
         grey=is_grey,
@@ -125,7 +125,7 @@ def _chosen_channels(names: tuple[str, ...]) -> tuple[list[int], list[str]]:
     return chosen, [name for index, name in enumerate(names) if name and index not in chosen]
 
 
-def _divided(values: NDArray[Any]) -> NDArray[Any]:
+def _divide_by_alpha(values: NDArray[Any]) -> NDArray[Any]:
     """Return encoded colours divided by alpha; 16 bits hold the quotients of 8 bits."""
     if values.dtype.kind == "u":
         scale = 65535 // np.iinfo(values.dtype).max

@@ -9,7 +9,7 @@ from typing import Any, Final, Self
 
 import numpy as np
 
-from vkbloom._io.attributes import kept_attributes, own_attributes
+from vkbloom._io.attributes import exr_attributes, kept_attributes
 from vkbloom._io.decoding import decode
 from vkbloom._io.displayed import code_points_of
 from vkbloom._io.formats.facts import Facts
@@ -53,10 +53,10 @@ class ImageFile:
                 spec, number = self._part.spec, self._part.number
                 self._facts = Facts() if find is None else find(stream, spec, number)
             attributes = kept_attributes(spec)
-            own = own_attributes(spec) if self._kind == "openexr" else {}
+            exr = exr_attributes(spec) if self._kind == "openexr" else {}
             points = spec.getattribute("CICP")
             known = None if points is None else code_points_of(points, spec.nchannels)
-            self.header = self._header_with(attributes, own, known)
+            self.header = self._header_with(attributes, exr, known)
             self._notes = [*self._part.notes]
             if points is not None and known is None and points[1] != _UNSPECIFIED:
                 numbers = " ".join(map(str, points))
@@ -111,7 +111,7 @@ class ImageFile:
             raise ValueError(f"{self._name}: {error}") from error
 
     def _header_with(
-        self, attributes: Attributes, own: Attributes, points: CodePoints | None
+        self, attributes: Attributes, exr: Attributes, points: CodePoints | None
     ) -> Header:
         """Return the header with these attributes and known code points."""
         spec, facts, kept = self._part.spec, self._facts, self._part.kept
@@ -137,7 +137,7 @@ class ImageFile:
             orientation=orientation if is_turned else 1,
             colours=self._colours_with(attributes, points),
             attributes=attributes,
-            own=own,
+            exr_attributes=exr,
             part=self._part.number,
         )
 

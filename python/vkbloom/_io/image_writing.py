@@ -16,7 +16,7 @@ from vkbloom._arrays import native_order
 from vkbloom._c_paths import for_c
 from vkbloom._extras import import_extra
 from vkbloom._io import displayed, safe_writing
-from vkbloom._io.attributes import without_colours, write_own
+from vkbloom._io.attributes import without_colours, write_exr_attributes
 from vkbloom._io.displayed import Saved
 from vkbloom._io.narrowing import file_note, for_radiance, narrowed
 from vkbloom._io.picture import DTYPES, PIXEL_TYPES, SPACES, WITH_WINDOWS, Picture, is_exr
@@ -171,8 +171,9 @@ def described_as(
 ) -> Picture:
     """Return a picture whose attributes name colours; `what` as for `displayed.with_names`."""
     is_plain, attributes = displayed.with_names(oiio, picture.header.attributes, target, what)
-    own = picture.header.own if is_plain else without_colours(picture.header.own)
-    header = dataclasses.replace(picture.header, attributes=attributes, own=own)
+    exr = picture.header.exr_attributes
+    exr = exr if is_plain else without_colours(exr)
+    header = dataclasses.replace(picture.header, attributes=attributes, exr_attributes=exr)
     if is_plain:
         curve: Any = None if what[1] == "none" else what[1]
         return dataclasses.replace(picture, encoding=curve, header=header)
@@ -327,7 +328,7 @@ def _describe(
     if not to_exr and not (is_tiff and picture.is_multiplied):
         spec.attribute("oiio:UnassociatedAlpha", 1)
     if to_exr:
-        write_own(spec, header.own)
+        write_exr_attributes(spec, header.exr_attributes)
     is_jpeg = format_name == "jpeg"
     if is_jpeg and spec.nchannels == 3:
         # No subsampling of colours, unless the picture's attributes contain one.

@@ -152,7 +152,7 @@ class Header:
       and are straight from then on.
     - `orientation`: That of TIFF and Exif, 1 to 8, which was undone.
     - `attributes`: Those that are also valid for the result, by OpenImageIO's names.
-    - `own`: Those that are only written from OpenEXR to OpenEXR.
+    - `exr_attributes`: Those that are only written from OpenEXR to OpenEXR.
     - `part`: The number of the part.
     """
 
@@ -164,7 +164,7 @@ class Header:
     orientation: int = 1
     colours: StatedColours = StatedColours()
     attributes: Attributes = field(default_factory=dict)
-    own: Attributes = field(default_factory=dict)
+    exr_attributes: Attributes = field(default_factory=dict)
     part: int = 0
 
     def highlights(self, colour: Colour | None = None) -> Highlights:

@@ -142,7 +142,7 @@ def readable(path: str | os.PathLike[str]) -> Iterator[str]:
     if head.startswith(jpeg_xl.SIGNATURES):
         content = jpeg_xl.readable_content(name)
     elif head.startswith(pnm.PLAIN):
-        content, suffix = pnm.packed_bitmap(name), ".pbm"
+        content, suffix = pnm.pack_bitmap(name), ".pbm"
     if content is None:
         yield name
         return

@@ -57,7 +57,7 @@ class Start(NamedTuple):
             picture = expand_photograph(picture, self.expand)
         if self.settings.alpha == "keep":
             return picture
-        return with_multiplied_colours(picture)
+        return multiply_by_alpha(picture)
 
 
 def start_file(
@@ -103,7 +103,7 @@ def _default_preset(highlights: Highlights | None) -> str:
     return PRESET_OF_PHOTOS if highlights in PHOTOGRAPHS else PRESET_OF_IMAGES
 
 
-def with_multiplied_colours(picture: Picture) -> Picture:
+def multiply_by_alpha(picture: Picture) -> Picture:
     """Return a decoded picture's colours multiplied by alpha, if its file has straight ones.
 
     The file that is written has straight ones again.

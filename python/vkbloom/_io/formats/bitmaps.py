@@ -29,7 +29,7 @@ def find_bmp_facts(stream: BinaryIO, spec: OpenImageIO.ImageSpec, part: int) -> 
         return Facts(alpha=Alpha.UNKNOWN)
 
     def unpack(pixels: NDArray[Any]) -> Corrected:
-        return Corrected(_unpacked(pixels, masks) if pixels.shape[2] == 4 else pixels)
+        return Corrected(_unpack_masks(pixels, masks) if pixels.shape[2] == 4 else pixels)
 
     return Facts(alpha=Alpha.STRAIGHT if masks[3] else Alpha.NONE, correct=unpack)
 
@@ -47,7 +47,7 @@ def _bmp_masks(stream: BinaryIO) -> tuple[int, ...] | None:
     return (*masks, 0)[:4] if all(masks[:3]) else None
 
 
-def _unpacked(pixels: NDArray[Any], masks: tuple[int, ...]) -> NDArray[Any]:
+def _unpack_masks(pixels: NDArray[Any], masks: tuple[int, ...]) -> NDArray[Any]:
     """Return pixels with the channels that masks name."""
     words = pixels[:, :, [2, 1, 0, 3]].copy().view("<u4")[:, :, 0]
     made = np.zeros_like(pixels)

@@ -49,7 +49,7 @@ def find_facts(stream: BinaryIO, spec: OpenImageIO.ImageSpec, part: int) -> Fact
     chunks = _read_chunks(stream)
     is_stated = isinstance(spec.getattribute("Orientation"), int)
     packets = [] if is_stated else [*map(_text_of, chunks.texts)]
-    colours = _stated(chunks.colours)
+    colours = _find_colours(chunks.colours)
     if colours is None:
         exif = chunks.exif[0] if chunks.exif else None
         srgb = StatedColours(SPACES["srgb"])
@@ -103,7 +103,7 @@ def _text_of(content: bytes) -> bytes:
         return b""
 
 
-def _stated(found: dict[bytes, bytes]) -> StatedColours | None:
+def _find_colours(found: dict[bytes, bytes]) -> StatedColours | None:
     """Return what chunks say of colours; None: nothing.
 
     OpenImageIO rounds the exponent to one decimal place, and takes an exponent of 0, which PNG does

@@ -13,7 +13,7 @@ PLAIN: Final = b"P1"
 _HEADER: Final = re.compile(rb"P1\s+(\d{1,9})\s+(\d{1,9})\s")
 
 
-def packed_bitmap(path: str) -> bytes | None:
+def pack_bitmap(path: str) -> bytes | None:
     """Return a plain PBM file as one of packed bits (P4); None: it is damaged.
 
     OpenImageIO wants white space between its digits, which Netpbm and GIMP do not write.

@@ -32,11 +32,11 @@ def find_facts(stream: BinaryIO, spec: OpenImageIO.ImageSpec, part: int) -> Fact
     )
     return Facts(
         orientation=_ORIENTATIONS.index(axes) + 1 if axes in _ORIENTATIONS else None,
-        colours=_stated(header, stated),
+        colours=_find_colours(header, stated),
     )
 
 
-def _stated(header: bytes, stated: StatedColours) -> StatedColours:
+def _find_colours(header: bytes, stated: StatedColours) -> StatedColours:
     said = []
     for name, words in _LINE.findall(header.replace(b"\r\n", b"\n").partition(b"\n\n")[0]):
         try:

@@ -324,8 +324,8 @@ def exif_colours(
     if stated is None:
         space = spec.get_string_attribute("oiio:ColorSpace")
         stated = StatedColours(space, spec.get_float_attribute("oiio:Gamma", 0.0) or None)
-    own = exif_fields(exif, _COLOUR_SPACE, _GAMMA, pointers=(_EXIF,))
-    number = own[_COLOUR_SPACE][0] if _COLOUR_SPACE in own else _UNCALIBRATED
+    found = exif_fields(exif, _COLOUR_SPACE, _GAMMA, pointers=(_EXIF,))
+    number = found[_COLOUR_SPACE][0] if _COLOUR_SPACE in found else _UNCALIBRATED
     if number == _SRGB:
         return stated
     index = exif_fields(exif, _INDEX, pointers=(_EXIF, _INTEROPERABILITY)).get(_INDEX)
@@ -335,12 +335,12 @@ def exif_colours(
     primaries, white = _numbers(fields, _PRIMARIES, 6), _numbers(fields, _WHITE, 2)
     if not primaries:
         return stated
-    found = other_primaries([*primaries, *(white or CHROMATICITIES["rec709"][6:])])
-    if found is None:
+    others = other_primaries([*primaries, *(white or CHROMATICITIES["rec709"][6:])])
+    if others is None:
         return stated
-    gamma = (*_numbers(own, _GAMMA, 1), None)[0]
+    gamma = (*_numbers(found, _GAMMA, 1), None)[0]
     return stated._replace(
-        gamma=gamma if gamma is not None and gamma > 0 else None, primaries=found
+        gamma=gamma if gamma is not None and gamma > 0 else None, primaries=others
     )
 
 
