@@ -74,7 +74,7 @@ def read(source: str, subimage: int) -> Picture:
 def other_parts(picture: Picture) -> str:
     """Return the parts of a file of several if neither --subimage nor the file chooses one."""
     parts = picture.parts
-    if len(parts) == 1 or given("subimage") or picture.header.part:
+    if len(parts) < 2 or given("subimage") or picture.header.part:
         return ""
     names = listed(f"{index} {name}" for index, name in enumerate(parts) if name)
     return f"parts {names}" if names else f"{len(parts)} parts"
