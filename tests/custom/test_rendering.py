@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 
 import vkbloom
 from tests.custom import COUNTER
+from tests.explorer.pages import described
 from tests.images import picture
 from tests.processes import output
 from tests.refusals import assert_refused, rows
 from vkbloom import Renderer, Settings, load_method, reference
-from vkbloom._explorer.controls import described
 
 pytestmark = pytest.mark.usefixtures("glslang")
 
