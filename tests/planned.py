@@ -1,4 +1,4 @@
-"""Plans of the core without a renderer."""
+"""Plans of the core without a renderer, and what the package hands to the core."""
 
 from __future__ import annotations
 
@@ -8,7 +8,27 @@ import numpy as np
 
 from tests.scene.parts import Cubemap, Mesh
 from vkbloom import Scene, _core
+from vkbloom._renderer.adapter import bundled_driver
+from vkbloom._renderer.requests import new_array, new_arrays
+from vkbloom._renderer.sources import Inputs, image_source
 from vkbloom._scene.blocks import scene_arguments
+
+__all__ = [
+    "MESH",
+    "SCENES",
+    "SKY",
+    "Inputs",
+    "Row",
+    "bundled_driver",
+    "changed",
+    "image_source",
+    "new_array",
+    "new_arrays",
+    "rows",
+    "scene_arguments",
+    "scene_plan",
+    "scene_source",
+]
 
 MESH = Mesh(np.zeros((3, 9), np.float32), np.arange(3, dtype=np.uint32))
 SKY = Cubemap((np.zeros((6, 1, 1, 4), np.uint8),))

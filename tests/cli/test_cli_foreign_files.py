@@ -21,7 +21,7 @@ oiio = pytest.importorskip("OpenImageIO")
 
 pytestmark = pytest.mark.usefixtures("kept_renderers")
 
-# PendingSubmissions the process while a file is written: in another thread, if there are several.
+# Ends the process while a file is written: in another thread, if there are several.
 SLOW = """
 import sys, time
 from vkbloom import _cli

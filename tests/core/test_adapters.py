@@ -16,9 +16,9 @@ import pytest
 import vkbloom
 from tests.conftest import ADAPTER
 from tests.core.builds import compiler
+from tests.planned import bundled_driver
 from tests.processes import output, python
 from vkbloom import AdapterInfo, AdapterNotFoundError, Renderer, _core, adapters
-from vkbloom._renderer.adapter import bundled_driver
 
 VK_ERROR_INCOMPATIBLE_DRIVER = -9
 

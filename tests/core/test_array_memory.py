@@ -11,6 +11,7 @@ import pytest
 from numpy.typing import NDArray
 
 from tests.images import picture
+from tests.planned import new_array
 from vkbloom import OutOfMemoryError, Renderer, Separable, _core
 from vkbloom._renderer.new_arrays import new_array
 

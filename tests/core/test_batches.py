@@ -15,6 +15,7 @@ import pytest
 import vkbloom
 from tests.framebuffers import assert_same
 from tests.images import picture
+from tests.planned import new_arrays
 from vkbloom import BevyBloom, DualKawase, Pyramid, Renderer, Scene, Separable, Settings, _core
 from vkbloom._renderer import requests
 from vkbloom._renderer.new_arrays import new_arrays

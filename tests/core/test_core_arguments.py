@@ -11,12 +11,10 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
-from tests.planned import SCENES, changed, scene_plan, scene_source
+from tests.planned import SCENES, bundled_driver, changed, scene_arguments, scene_plan, scene_source
 from tests.refusals import assert_refused, rows
 from vkbloom import Renderer, Scene, Separable, _core
 from vkbloom._custom.rows import CoreShader, Row
-from vkbloom._renderer.adapter import bundled_driver
-from vkbloom._scene.blocks import scene_arguments
 from vkbloom._settings.blocks import _CODES, settings_block
 
 _LEAST = {"weights": (1.0,), "layers": ((1.0, 1.0),)}

@@ -6,6 +6,7 @@ import copy
 import json
 import pickle
 import sys
+from collections.abc import Hashable, Mapping
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,6 @@ import pytest
 from tests.framebuffers import INFO, TIMINGS, make, mixed
 from tests.images import noise
 from vkbloom import Frames, Separable
-from vkbloom._framebuffers import dimensions
 
 
 @pytest.fixture
@@ -94,6 +94,12 @@ class TestMapping:
             assert other[name].tobytes() == array.tobytes()
         assert other.timings == frames.timings
         assert (other.settings, other.info) == (frames.settings, frames.info)
+
+
+def dimensions(arrays: Mapping[str, np.ndarray[Any, Any]]) -> dict[str, tuple[Hashable, ...]]:
+    """Return those of each framebuffer in a Dataset."""
+    dataset = make(arrays, timings={}).to_xarray()
+    return {name: dataset[name].dims for name in arrays}
 
 
 class TestXarray:

@@ -19,6 +19,7 @@ from hypothesis import strategies as st
 
 from tests.exhaustive import examples, some
 from tests.images import picture
+from tests.planned import Inputs, image_source, scene_arguments
 from vkbloom import (
     BlenderGlare,
     Convolution,
@@ -33,8 +34,6 @@ from vkbloom import (
     presets,
 )
 from vkbloom._renderer.new_arrays import new_arrays
-from vkbloom._renderer.sources import Inputs, image_source
-from vkbloom._scene.blocks import scene_arguments
 
 SIZE = (96, 54)
 

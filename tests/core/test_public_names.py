@@ -16,9 +16,8 @@ import pytest
 
 import vkbloom
 from tests.framebuffers import assert_same, mixed
+from tests.kinds import METHODS, STAGES, fields_of
 from vkbloom import psf, reference, testing
-from vkbloom._settings.fields import fields_of
-from vkbloom._settings.registry import METHODS, STAGES
 
 PUBLIC = [
     pytest.param(module, name, id=f"{module.__name__}.{name}")
@@ -74,7 +73,7 @@ sys.stdout.buffer.write(pickle.dumps(objects))
 
 
 def test_objects_survive_another_process() -> None:
-    records: list[Any] = [METHODS[name]() for name in METHODS if not METHODS.is_added(name)]
+    records: list[Any] = [kind() for kind in METHODS.values()]
     records += [STAGES[name]() for name in STAGES if name != "dirt"]
     records += [getattr(psf, name)() for name in psf.__all__ if name in ("spencer", "fog_glow")]
     records += [vkbloom.Camera(), vkbloom.Convolution(psf.gaussian(2.0))]

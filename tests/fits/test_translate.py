@@ -15,12 +15,11 @@ import pytest
 
 import vkbloom
 from tests.exhaustive import some
+from tests.kinds import METHODS, fields_of
 from vkbloom import DualKawase, Pyramid, Renderer, Separable, Settings, UrpBloom, psf, reference
 from vkbloom._cli import fields, search
 from vkbloom._fit.space import varied_as
 from vkbloom._fit.translating import describe_difference, lights
-from vkbloom._settings.fields import fields_of
-from vkbloom._settings.registry import METHODS
 
 SIZE = (96, 64)
 #: Of ten methods.

@@ -11,7 +11,7 @@ import pytest
 
 from tests.exhaustive import EXHAUSTIVE
 from tests.processes import output
-from vkbloom._scene import skybox
+from tests.scene.parts import load_sky
 
 RUN = Path(__file__).resolve().parents[2] / "tools" / "fuzz" / "run.py"
 GLSLANG = any(map(shutil.which, ("glslangValidator", "glslang")))
@@ -39,4 +39,4 @@ def test_a_small_file_that_promises_many_pixels(tmp_path: Path) -> None:
     path = tmp_path / "panorama.hdr"
     path.write_bytes(b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 8192 +X 8192\n")
     with pytest.raises(ValueError, match=r"panorama\.hdr: .*cannot hold 8192 x 8192 pixels"):
-        skybox.from_equirectangular(path)
+        load_sky(path)

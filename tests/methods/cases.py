@@ -33,13 +33,23 @@ from vkbloom import (
     presets,
     psf,
 )
-from vkbloom._doctor.cases import HARD_THRESHOLD, METHODS, presets_of_low_levels
+from vkbloom._doctor.cases import (
+    COMPOSITES,
+    ENCODINGS,
+    HARD_THRESHOLD,
+    METHODS,
+    TONEMAPS,
+    presets_of_low_levels,
+)
 
 __all__ = [
+    "COMPOSITES",
+    "ENCODINGS",
     "GIVEN",
     "HARD_THRESHOLD",
     "METHODS",
     "OTHERS",
+    "TONEMAPS",
     "WHOLE",
     "presets_of_low_levels",
 ]

@@ -13,6 +13,7 @@ from tests.device.abilities import has_linear_texels
 from tests.exhaustive import EXHAUSTIVE, some
 from tests.images import random_image
 from tests.methods.cases import METHODS, OTHERS
+from tests.planned import Inputs
 from tests.variants import opened
 from vkbloom import (
     BevyBloom,
@@ -32,7 +33,6 @@ from vkbloom import (
     reference,
 )
 from vkbloom._gradients.passes import DeviceGradients, Passes
-from vkbloom._renderer.sources import Inputs
 
 SIZES = ((11, 14), (16, 32), (7, 1), (1, 9), (1, 1))
 #: Those whose fields are checked, too, and those that are checked in all sizes.

@@ -13,10 +13,9 @@ from numpy.typing import NDArray
 
 from tests.exhaustive import EXHAUSTIVE, by_turns, some
 from tests.images import DTYPES, hdr_picture
-from tests.methods.cases import METHODS
+from tests.methods.cases import COMPOSITES, ENCODINGS, METHODS, TONEMAPS
 from tests.tolerance import assert_close, assert_matches_reference, real, tolerance
 from vkbloom import Renderer, Separable, Settings, presets, reference
-from vkbloom._doctor.cases import COMPOSITES, ENCODINGS, TONEMAPS
 
 Image = NDArray[Any]
 

@@ -16,9 +16,9 @@ from tests.device.abilities import infinities, max_side
 from tests.exhaustive import by_turns, some
 from tests.framebuffers import assert_same
 from tests.images import DTYPES, picture
+from tests.methods.cases import COMPOSITES, TONEMAPS
 from tests.tolerance import assert_close, assert_matches_reference, tolerance
 from vkbloom import DualKawase, Pyramid, Renderer, Separable, Settings, reference
-from vkbloom._doctor.cases import COMPOSITES, TONEMAPS
 
 Image = NDArray[Any]
 

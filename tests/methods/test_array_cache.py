@@ -9,9 +9,9 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
+from tests.planned import image_source
 from vkbloom import Convolution, Dirt, Pyramid, Renderer, Settings, _core, psf
 from vkbloom import _array_cache as array_cache
-from vkbloom._renderer.sources import image_source
 
 IMAGE = np.zeros((90, 160, 3), np.float32)
 #: Kernels of (179, 319, 4) float32 each, some with arrays of their own.

@@ -11,9 +11,9 @@ from numpy.testing import assert_allclose
 import vkbloom
 from tests.exhaustive import by_turns
 from tests.images import random_image
+from tests.kinds import fields_of
 from tests.methods.cases import METHODS, presets_of_low_levels
 from vkbloom import reference
-from vkbloom._settings.fields import fields_of
 from vkbloom.reference._derivatives import differentiable
 
 # Odd sides, and sides of one pixel.

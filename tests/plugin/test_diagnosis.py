@@ -15,8 +15,7 @@ from tests.cli.calls import run
 from tests.exhaustive import EXHAUSTIVE
 from tests.srgb import encode_srgb
 from vkbloom import Separable, reference, write
-from vkbloom._views.tolerances import Tolerances
-from vkbloom.testing import FrameRegression, diagnose
+from vkbloom.testing import FrameRegression, Tolerances, diagnose
 from vkbloom.testing._judging import judge
 
 Image = NDArray[Any]

@@ -13,13 +13,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from tests.planned import changed
+from tests.planned import changed, new_arrays, scene_arguments
 from tests.refusals import assert_refused, rows
 from tests.scene.parts import Mesh, Texture, mip_levels
 from tests.screens import CAMERA, NOTHING, panel, rgb
 from vkbloom import Frames, Renderer, Scene, Separable, _core, reference
 from vkbloom._renderer.new_arrays import new_arrays
-from vkbloom._scene.blocks import scene_arguments
 
 Array = NDArray[Any]
 
