@@ -10,6 +10,17 @@ from click.testing import CliRunner, Result
 import vkbloom
 from vkbloom._cli.program import program
 
+__all__ = [
+    "COMMANDS",
+    "NATURAL",
+    "applied",
+    "apply",
+    "done",
+    "one_line",
+    "program",
+    "run",
+]
+
 COMMANDS = program.list_commands(Context(program))
 NATURAL = vkbloom.presets["bevy_natural"]
 

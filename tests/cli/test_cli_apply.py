@@ -167,7 +167,7 @@ def test_a_file_that_is_read_needs_overwrite(tmp_path: Path) -> None:
 def test_no_picture_is_written_to_a_terminal(tmp_path: Path) -> None:
     pty = pytest.importorskip("pty")
     screen, terminal = pty.openpty()
-    words = [sys.executable, "-m", "vkbloom", "apply", picture(tmp_path / "a.png"), "-"]
+    words = [sys.executable, "-m", "vkbloom", "apply", str(picture(tmp_path / "a.png")), "-"]
     refused = subprocess.run(words, stdout=terminal, stderr=subprocess.PIPE, check=False)
     os.close(terminal)
     with os.fdopen(screen, "rb") as shown, contextlib.suppress(OSError):

@@ -236,7 +236,7 @@ def test_a_source_is_compiled_again_only_if_it_a_header_or_an_option_has_changed
     one, other = sources = [str(tmp_path / name) for name in ("one.c", "other.c")]
     header = Path("build/spirv/spirv.h")
     volk = (f"include/volk/volk.{kind}" for kind in "ch")
-    for name in (*sources, header, "shaders/params.h", *volk):
+    for name in (*sources, str(header), "shaders/params.h", *volk):
         Path(name).parent.mkdir(parents=True, exist_ok=True)
         Path(name).touch()
 

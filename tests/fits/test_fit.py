@@ -254,7 +254,7 @@ class TestVerdict:
     @pytest.mark.parametrize("kind", ["float32", "uint8", "decoded"])
     @pytest.mark.parametrize("change", ["equal", "another picture", "mirrored", "brighter"])
     def test_no_bloom(self, fit: Call, change: str, kind: str) -> None:
-        image = lamps() / 12
+        image: Image = lamps() / 12
         target = {
             "equal": image,
             "another picture": np.roll(image, 20, axis=1)[::-1],
@@ -347,7 +347,7 @@ class TestParts:
         """Framebuffers are clipped and rounded alike; saturated pixels have no difference."""
         levels = np.random.default_rng(0).integers(0, 256, (20, 30, 3)).astype(np.uint8)
         levels[:2] = 255
-        decoded = decode_srgb(levels / 255).astype(np.float32)
+        decoded: Image = decode_srgb(levels / 255).astype(np.float32)
         for target, encode in ((levels, lambda one: one), (decoded, encode_srgb)):
             measure = Measure.of(target, "relative")
             values = light(target)
