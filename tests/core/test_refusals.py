@@ -158,14 +158,14 @@ def test_the_signature_is_that_of_the_fields() -> None:
     [
         ("zzz", ["final", "bloom"], None),
         ("of", ["roof_garden"], None),
-        ("--gpu", ["--psf"], None),
+        ("gpu", ["psf"], None),
         ("blade", ["balance"], None),
         ("strength", ["threshold"], None),
         ("saturate", ["scatter"], None),
         ("roof", ["proof_reader"], None),
         ("unity", ["unity_urp", "kino"], "unity_urp"),
         ("kion", ["unity_urp", "kino"], "kino"),
-        ("--tresholds", ["--threshold"], "--threshold"),
+        ("--Tresh-olds", ["thresh_old"], "thresh_old"),
     ],
 )
 def test_only_what_is_near_is_suggested(asked: str, known: list[str], meant: str | None) -> None:
