@@ -21,7 +21,6 @@ APERTURE = psf.aperture(psf.iris(size=16), f_number=2, pixel_pitch=8)
 @pytest.fixture(autouse=True)
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setenv("VKBLOOM_CACHE_DIR", str(tmp_path / "cache"))
-    monkeypatch.setattr(kernels.CACHE, "written", {})
     monkeypatch.setattr(kernels, "MIN_SECONDS", 0)
     # Nothing is found in memory.
     monkeypatch.setattr(array_cache, "_of_renderers", lambda: array_cache.ArrayCache(0, 0))
