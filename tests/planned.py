@@ -9,7 +9,7 @@ import numpy as np
 from tests.scene.parts import Cubemap, Mesh
 from vkbloom import Scene, _core
 from vkbloom._renderer.adapter import bundled_driver
-from vkbloom._renderer.requests import new_array, new_arrays
+from vkbloom._renderer.new_arrays import new_array, new_arrays
 from vkbloom._renderer.sources import Inputs, image_source
 from vkbloom._scene.blocks import scene_arguments
 

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from tests.images import picture
 from tests.planned import new_array
 from vkbloom import OutOfMemoryError, Renderer, Separable, _core
-from vkbloom._renderer.new_arrays import new_array
 
 #: At least 1.3 MiB in every dtype, so that the device writes without staging memory.
 SIDE = 600

@@ -18,7 +18,6 @@ from tests.images import picture
 from tests.planned import new_arrays
 from vkbloom import BevyBloom, DualKawase, Pyramid, Renderer, Scene, Separable, Settings, _core
 from vkbloom._renderer import requests
-from vkbloom._renderer.new_arrays import new_arrays
 
 SIZE = (64, 36)
 # As the default, of levels that do not take most of the time.

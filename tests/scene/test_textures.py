@@ -18,7 +18,6 @@ from tests.refusals import assert_refused, rows
 from tests.scene.parts import Mesh, Texture, mip_levels
 from tests.screens import CAMERA, NOTHING, panel, rgb
 from vkbloom import Frames, Renderer, Scene, Separable, _core, reference
-from vkbloom._renderer.new_arrays import new_arrays
 
 Array = NDArray[Any]
 
