@@ -105,7 +105,7 @@ def draw_gallery(renderer: vkbloom.Renderer, path: Path) -> None:
     for name, settings in {"no bloom": vkbloom.Separable(bloom=False), **vkbloom.presets}.items():
         changed = settings.replace(tonemap="aces", encoding="srgb")
         final = renderer.apply(night(), changed, framebuffers="final")["final"]
-        tiles.append((pictures.picture(final, "final", encoded=True), name))
+        tiles.append((pictures.picture(final, "final", encoding="srgb"), name))
     write_sheet(path, tiles, 4)
 
 

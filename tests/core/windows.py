@@ -93,7 +93,7 @@ def pixels(renderer: Renderer) -> None:
             shown = renderer.apply(image, bloom)["final"]
             # (A window clips each channel; pictures keep the hue.)
             clipped = shown if dtype == "uint8" else np.minimum(shown, 1)
-            levels = pictures.picture(clipped, encoded=encoding != "none")
+            levels = pictures.picture(clipped, encoding=encoding)
             assert difference(levels, most) <= most, (encoding, dtype)
         # Above and below a frame of other proportions there is black.
         assert surface.present(UFO, size=(SIZE[0], 54))

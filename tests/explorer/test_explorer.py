@@ -165,7 +165,7 @@ class TestShown:
             array[0, 0] = (np.nan, np.inf, -np.inf, 1)
         whole = make({name: array}, settings=Separable(encoding=encoding))
         expected = decode(whole._repr_png_(), tmp_path)[:, :, :3].astype(int)
-        picture = picture_of(array, name, is_encoded=encoding != "none", stops=0.0)
+        picture = picture_of(array, name, encoding=encoding, stops=0.0)
         shown = decode(picture, tmp_path)
         # float32 colours are rounded to half floats first: a level where two meet.
         allowed = 1 if dtype == "float32" else 0
@@ -173,13 +173,13 @@ class TestShown:
 
     def test_stops(self, tmp_path: Path) -> None:
         array = np.full((1, 1, 3), 4, np.float32)
-        for name, is_encoded, level in (("bloom", False, 188), ("final", True, 128)):
-            shown = decode(picture_of(array, name, is_encoded=is_encoded, stops=-3), tmp_path)
+        for name, encoding, level in (("bloom", "none", 188), ("final", "srgb", 128)):
+            shown = decode(picture_of(array, name, encoding=encoding, stops=-3), tmp_path)
             assert shown[0, 0, 0] == level
 
     def test_depth(self, tmp_path: Path) -> None:
         depth = np.array([[0.5, 1.0]], np.float32)
-        shown = decode(picture_of(depth, "depth", is_encoded=False, stops=0), tmp_path)
+        shown = decode(picture_of(depth, "depth", encoding="none", stops=0), tmp_path)
         assert shown[0, :, 0].tolist() == [255, 0]
 
 
@@ -274,7 +274,7 @@ class TestViewer:
         answer, (picture,) = ask(viewer, kind="save", settings=Pyramid().to_dict(), stops=-2)
         assert answer["framebuffer"] == "final"
         whole = renderer.apply(image, Pyramid())["final"]
-        shown = picture_of(whole, "final", is_encoded=False, stops=-2.0)
+        shown = picture_of(whole, "final", encoding="none", stops=-2.0)
         assert np.array_equal(decode(picture, tmp_path), decode(shown, tmp_path))
         # It holds its settings as files of the command do.
         (tmp_path / "final.png").write_bytes(picture)
@@ -328,7 +328,7 @@ class TestViewer:
             facts, picture = frame(viewer, settings, size=size, stops=-2)
             assert facts["size"] == [40, 30]
             whole = renderer.apply(image, settings)["final"]
-            shown = picture_of(whole, "final", is_encoded=False, stops=-2)
+            shown = picture_of(whole, "final", encoding="none", stops=-2)
             assert np.array_equal(decode(picture, tmp_path), decode(shown, tmp_path))
 
     def test_the_pointer_reads_the_framebuffer_itself(self, image: Any, renderer: Renderer) -> None:

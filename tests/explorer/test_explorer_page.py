@@ -454,7 +454,7 @@ def test_the_address_keeps_the_state(
             "bloom"
         ]
         assert np.array_equal(
-            picture, decode(picture_of(expected, "bloom", is_encoded=False, stops=0.0), tmp_path)
+            picture, decode(picture_of(expected, "bloom", encoding="none", stops=0.0), tmp_path)
         )
         page.get_by_role("button", name="Reset").click()
         wait_for_code(page, "vkbloom.Separable()")

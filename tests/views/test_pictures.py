@@ -206,7 +206,7 @@ def test_colours_above_1_keep_their_hue(dtype: str, stops: float, tmp_path: Path
     kept = np.array([[[limit, limit / 2, limit / 4], [0.5, 0.25, 0.125]]], np.float32)
     expected = np.rint(255 * encode_srgb(kept * np.float32(2.0**stops)))
     shown = picture(image, "bloom", stops=stops)
-    page = decode(picture_of(image, "bloom", is_encoded=False, stops=stops), tmp_path)
+    page = decode(picture_of(image, "bloom", encoding="none", stops=stops), tmp_path)
     assert np.abs(shown - expected).max() <= 1
     assert np.abs(page.astype(int) - shown).max() <= 1
 

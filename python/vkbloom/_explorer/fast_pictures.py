@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,38 +11,46 @@ from numpy.typing import NDArray
 from vkbloom._io.displayed import scaled_to_1
 from vkbloom._views import pictures
 
+if TYPE_CHECKING:
+    from vkbloom._settings.settings import Encoding
+
 # Compression level of zlib. The pictures go to a browser on this machine or through a notebook
 # server, where compressing takes longer than sending a larger file.
 _LEVEL: Final = 1
 
 
-def picture_of(array: NDArray[Any], name: str, *, is_encoded: bool, stops: float) -> bytes:
-    """Return a framebuffer as PNG, shown as in `pictures.picture`, without alpha."""
-    return pictures.png(shown_pixels(array, name, is_encoded=is_encoded, stops=stops), _LEVEL)
+def picture_of(array: NDArray[Any], name: str, *, encoding: Encoding, stops: float) -> bytes:
+    """Return a framebuffer as PNG, shown as in `pictures.picture`, without alpha.
+
+    `encoding`: That of `final` in the settings.
+    """
+    return pictures.png(shown_pixels(array, name, encoding=encoding, stops=stops), _LEVEL)
 
 
 def shown_pixels(
-    array: NDArray[Any], name: str, *, is_encoded: bool, stops: float
+    array: NDArray[Any], name: str, *, encoding: Encoding, stops: float
 ) -> NDArray[np.uint8]:
     """Return the 8-bit levels of `picture_of`."""
     if array.dtype == np.uint8:
         picture: NDArray[np.uint8] = array[:, :, :3]
     elif array.ndim == 3 and name not in ("normal", "position"):
-        is_display = name == "final" and is_encoded
-        colours = array[:, :, :3] if is_display else scaled_to_1(array[:, :, :3], 2.0**-stops)
+        encoding = encoding if name == "final" else "none"
+        colours = array[:, :, :3]
+        if encoding == "none":
+            colours = scaled_to_1(colours, 2.0**-stops)
         with np.errstate(over="ignore"):
             halves = np.ascontiguousarray(colours).astype(np.float16, copy=False)
-        picture = _levels(stops, is_display)[halves.view(np.uint16)]
+        picture = _levels(stops, encoding)[halves.view(np.uint16)]
     else:
         picture = pictures.picture(array, name)[:, :, :3]
     return picture
 
 
 @functools.lru_cache(maxsize=16)
-def _levels(stops: float, is_encoded: bool) -> NDArray[np.uint8]:
+def _levels(stops: float, encoding: Encoding) -> NDArray[np.uint8]:
     """Return the 8-bit level of every half float, by its bits."""
     halves = np.arange(1 << 16, dtype=np.uint16).view(np.float16).reshape(1, -1, 1)
     with np.errstate(all="ignore"):
         colours = halves.repeat(3, axis=2)
-        shown = pictures.picture(colours, encoded=is_encoded, stops=stops)
+        shown = pictures.picture(colours, encoding=encoding, stops=stops)
     return shown[0, :, 0]

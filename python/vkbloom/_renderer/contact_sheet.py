@@ -68,8 +68,8 @@ def _picture(
     frames: Framebuffers, name: str, size: tuple[int, int] | None = None
 ) -> NDArray[np.uint8]:
     """Return a framebuffer as an 8-bit (H, W, C) picture, resized to (width, height)."""
-    encoded = name == "final" and frames.settings.encoding != "none"
-    return pictures.picture(frames[name], name, encoded=encoded, size=size)
+    encoding = frames.settings.encoding if name == "final" else "none"
+    return pictures.picture(frames[name], name, encoding=encoding, size=size)
 
 
 def _facts(frames: Framebuffers, name: str) -> str:

@@ -46,15 +46,15 @@ def picture(
     array: NDArray[Any],
     name: str = "",
     *,
-    encoded: bool = False,
+    encoding: str = "none",
     size: tuple[int, int] | None = None,
     stops: float = 0.0,
 ) -> NDArray[np.uint8]:
     """Convert an image to a viewable 8-bit picture.
 
-    8-bit images are shown as stored. Float images are shown with the sRGB curve, unless they are
-    `encoded`; colours with a component above 1 are divided by the largest one, which keeps their
-    hue, others are clipped to 0..1. `normal` is shown as (n + 1) / 2, `position` with each axis
+    8-bit images are shown as stored. Float images are shown with the sRGB curve, unless
+    `encoding` says that their colours have a curve; colours with a component above 1 are divided by
+    the largest one, which keeps their hue, others are clipped to 0..1. `normal` is shown as (n + 1) / 2, `position` with each axis
     stretched to 0..1, depth from white (nearest) to black (farthest). NaN counts as 0.
     """
     values = np.atleast_3d(array).astype(np.float32)
@@ -70,7 +70,7 @@ def picture(
     else:
         if stops != 0:
             values[:, :, :3] *= np.float32(2.0**stops)
-        linear = not encoded
+        linear = encoding == "none"
         shown = _clipped(scaled_to_1(values) if linear else values)
     if size is not None:
         shown = resized(shown, *size)
