@@ -38,7 +38,7 @@ from vkbloom._cli.terminal import complain, hides_progress, note, say, tell_devi
 from vkbloom._io import image_writing, safe_writing
 from vkbloom._io.displayed import PRIMARIES, Saved
 from vkbloom._io.narrowing import narrowed, narrowing_note
-from vkbloom._io.picture import Colour, Highlights, Picture, SavedColour
+from vkbloom._io.picture import Colour, Picture, SavedColour
 from vkbloom._locks import cached_property
 from vkbloom._renderer.added_light import added_share, faint_note
 from vkbloom._renderer.frame_files import settings_facts
@@ -197,10 +197,12 @@ class Run:
             text = no_bloom.hidden(frames["final"], frames.settings)
         is_chosen = self.options.start.is_chosen
         if not text and is_chosen and self.options.mask is None and self.options.emission is None:
-            can_expand = picture.highlights is Highlights.CLIPPED
-            share = added_share(picture.pixels, frames)
             text = faint_note(
-                share, frames.settings, can_expand=can_expand, expand=expand, option="--{}"
+                added_share(picture.pixels, frames),
+                frames.settings,
+                highlights=picture.highlights,
+                expand=expand,
+                option="--{}",
             )
         if text:
             note(f"{name}: {text}" if self.several else text)

@@ -260,9 +260,7 @@ class Viewer:
             # With the levels of the file that vkbloom apply writes.
             pixels = levels_of(frames[shown], settings.encoding)[:, :, :3]
         else:
-            pixels = shown_pixels(
-                frames[shown], shown, is_encoded=settings.encoding != "none", stops=stops
-            )
+            pixels = shown_pixels(frames[shown], shown, encoding=settings.encoding, stops=stops)
         is_expanded = self._highlights is Highlights.CLIPPED
         facts = settings_facts(settings, (expand or 1.0) if is_expanded else None)
         return {"framebuffer": shown}, [png(np.ascontiguousarray(pixels), texts=facts)]
@@ -348,9 +346,8 @@ class Viewer:
         if self._scene is not None or "final" not in frames or not settings.bloom:
             return ""
         image = self._image_of(size, settings, expand)
-        can_expand = self._highlights is Highlights.CLIPPED
         share = added_share(image, frames)
-        return faint_note(share, settings, can_expand=can_expand, expand=expand)
+        return faint_note(share, settings, highlights=self._highlights, expand=expand)
 
     def _render(
         self,
@@ -377,8 +374,7 @@ class Viewer:
         how["framebuffers"] = [shown]
         passes = self.renderer.plan(source, settings, **how).passes
         frames = draw(source, settings, **how)
-        is_encoded = settings.encoding != "none"
-        picture = picture_of(frames[shown], shown, is_encoded=is_encoded, stops=stops)
+        picture = picture_of(frames[shown], shown, encoding=settings.encoding, stops=stops)
         return frames, picture, names, list(passes)
 
     def _key_of(self, settings: Settings, expand: float | None) -> object:

@@ -7,6 +7,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from vkbloom._io.picture import Highlights
 from vkbloom._renderer.framebuffers import Framebuffers
 from vkbloom._settings.settings import Settings
 
@@ -21,14 +22,14 @@ def faint_note(
     share: float | None,
     settings: Settings,
     *,
-    can_expand: bool,
+    highlights: Highlights | None,
     expand: float | None = None,
     option: str = "{}",
 ) -> str:
     """Return a text if a bloom adds less than 1 % of a picture's light, with the remedies; else "".
 
     - `share`: As of `added_share`.
-    - `can_expand`: Whether the highlights of the picture's file can be expanded; they are up to
+    - `highlights`: Those of the picture's file; clipped ones can be expanded, and are up to
       `expand`.
     - `option`: What is written for a setting, such as "--{}".
     """
@@ -37,7 +38,7 @@ def faint_note(
     remedies = []
     if settings.threshold:
         remedies.append(f"lower {option.format('threshold')}")
-    if can_expand:
+    if highlights is Highlights.CLIPPED:
         larger = _EXPANDED if expand is None or expand == 1 else _MORE * expand
         remedies.append(f"{option.format('expand')} {larger:g}")
     if not remedies:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
-from typing import Any, ClassVar, Final
+from typing import Any, ClassVar, Final, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,9 @@ from vkbloom._arrays import plain_array
 #: The longest side, far above the 4096 that every Vulkan device supports. It rejects the sizes of
 #: damaged images. The device's own limit is checked at upload.
 MAX_SIDE: Final = 16384
+
+#: The shape of a mip level: of a picture, or of a cube.
+LevelShape: TypeAlias = Literal["(h, w, 4)", "(6, n, n, 4)"]
 
 
 def check_rows(name: str, array: object, columns: int, count: int | None = None) -> NDArray[Any]:
@@ -51,11 +54,12 @@ def check_indices(array: object, vertex_count: int) -> NDArray[Any]:
 
 
 def check_levels(
-    levels: object, dtypes: Sequence[np.dtype[Any] | str], *, cube: bool = False
+    levels: object, dtypes: Sequence[np.dtype[Any] | str], shape: LevelShape = "(h, w, 4)"
 ) -> tuple[NDArray[Any], ...]:
-    """Return the mip levels of a picture ``(h, w, 4)``, or of a cube ``(6, n, n, 4)``, read-only.
+    """Return the mip levels of a picture or of a cube, read-only.
 
     - `dtypes`: One of these is that of all levels.
+    - `shape`: That of a level.
     """
     if isinstance(levels, np.ndarray) or not isinstance(levels, Sequence):
         raise TypeError(f"levels: {type(levels).__name__} is not a tuple of arrays")
@@ -68,17 +72,16 @@ def check_levels(
         dtype = checked[0].dtype if checked else level.dtype
         if level.dtype not in dtypes or level.dtype != dtype:
             raise TypeError(f"levels: {level.dtype} is not {' or '.join(map(str, dtypes))}")
-        _check_level(level, checked, cube=cube)
+        _check_level(level, checked, shape)
         checked.append(level)
     return tuple(map(read_only, checked))
 
 
-def _check_level(level: NDArray[Any], before: Sequence[NDArray[Any]], *, cube: bool) -> None:
+def _check_level(level: NDArray[Any], before: Sequence[NDArray[Any]], shape: LevelShape) -> None:
+    is_cube = shape == "(6, n, n, 4)"
     *faces, height, width, channels = level.shape if level.ndim > 2 else (0, 0, 0)
-    if faces != [6] * cube or channels != 4 or (cube and height != width):
-        raise ValueError(
-            f"levels: shape {level.shape} is not {'(6, n, n, 4)' if cube else '(h, w, 4)'}"
-        )
+    if faces != [6] * is_cube or channels != 4 or (is_cube and height != width):
+        raise ValueError(f"levels: shape {level.shape} is not {shape}")
     if not (1 <= height <= MAX_SIDE and 1 <= width <= MAX_SIDE):
         raise ValueError(f"levels: shape {level.shape} is out of range, sides of 1 to {MAX_SIDE}")
     if not before:

@@ -42,7 +42,8 @@ class Cubemap(Constructed):
     levels: tuple[NDArray[Any], ...]
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "levels", check_levels(self.levels, IMAGE_DTYPES, cube=True))
+        levels = check_levels(self.levels, IMAGE_DTYPES, "(6, n, n, 4)")
+        object.__setattr__(self, "levels", levels)
 
     def __repr__(self) -> str:
         return f"Cubemap({self.size} x {self.size} {self.dtype}, levels: {len(self.levels)})"
