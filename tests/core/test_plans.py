@@ -353,15 +353,13 @@ def test_plans_of_derivatives_are_kept(renderer: Renderer) -> None:
             plans.append(
                 [
                     own._plan_of(sources[0], settings, None),
-                    *(
-                        own._plan_derivatives(sources[1], settings, ("bloom",), sums=sums)
-                        for sums in (False, True)
-                    ),
+                    own._plan_derivatives(sources[1], settings, ("bloom",), "images"),
+                    own._plan_derivatives(sources[1], settings, ("bloom",), "sums"),
                 ]
             )
         assert all(map(operator.is_, plans[0], plans[1]))
         assert not any(map(operator.is_, plans[1], plans[2]))
-        other = own._plan_derivatives(sources[1], settings, ("final",), sums=False)
+        other = own._plan_derivatives(sources[1], settings, ("final",), "images")
         assert other is not plans[2][1]
 
 

@@ -15,7 +15,7 @@ from vkbloom._locks import ProcessLock
 from vkbloom._renderer import requests
 from vkbloom._renderer.device_arrays import Destination, ImportedArray, placed
 from vkbloom._renderer.new_arrays import new_arrays
-from vkbloom._renderer.renderer import Renderer
+from vkbloom._renderer.renderer import DerivativeKind, Renderer
 from vkbloom._renderer.sources import Inputs
 from vkbloom.reference._derivatives import Gradients, check_known, differentiable
 
@@ -89,7 +89,7 @@ class Passes:
     cotangents: Mapping[str, NDArray[Any] | ImportedArray]
     destination: Destination = "host"
 
-    def submit(self, *, sums: bool = False) -> Running | None:
+    def submit(self, results: DerivativeKind = "images") -> Running | None:
         """Submit the passes of the derivatives by images, or the sums of those by fields.
 
         None: a pass has no adjoint, or the renderer is closed.
@@ -102,11 +102,11 @@ class Passes:
             return None
         source = self.inputs.source(levels)
         plan = self.renderer._plan_derivatives(
-            source, self.settings, tuple(self.cotangents), sums=sums
+            source, self.settings, tuple(self.cotangents), results
         )
         if plan is None:
             return None
-        destination: Destination = "host" if sums else self.destination
+        destination: Destination = self.destination if results == "images" else "host"
         arrays = new_arrays(core, plan, destination)
         submission = core.run(source, (plan,), (arrays,)) if plan.outputs else None
         return Running(self, plan, arrays, destination, submission)
@@ -114,7 +114,7 @@ class Passes:
     def fields(self) -> dict[str, NDArray[np.float32]]:
         """Return the derivatives by fields that are exact to single floats."""
         wanted = device_fields(self.settings)
-        running = self.submit(sums=True) if wanted else None
+        running = self.submit("sums") if wanted else None
         totals = running.named() if running else {}
         results: dict[str, NDArray[np.float32]] = {}
         for kind, names in _SUMS.items():

@@ -64,6 +64,9 @@ _NUMBER = re.compile(r"\d+")
 RENDERERS: Final[weakref.WeakValueDictionary[int, Renderer]] = weakref.WeakValueDictionary()
 _numbers = itertools.count(1)
 
+#: What adjoint passes compute: derivatives by images, or sums of derivatives by fields.
+DerivativeKind = Literal["images", "sums"]
+
 
 def _frame_seconds() -> float:
     """Return how long the device may take for a frame before it counts as lost."""
@@ -763,10 +766,14 @@ class Renderer:
         return cast("_core.Plan", self._kept_plan(source, settings, names))
 
     def _plan_derivatives(
-        self, source: _core.Source, settings: Settings, cotangents: tuple[str, ...], *, sums: bool
+        self,
+        source: _core.Source,
+        settings: Settings,
+        cotangents: tuple[str, ...],
+        results: DerivativeKind,
     ) -> _core.Plan | None:
         """Return the plan of derivatives, or None if a pass has none; the last one if it fits."""
-        return self._kept_plan(source, settings, None, cotangents, sums)
+        return self._kept_plan(source, settings, None, cotangents, results == "sums")
 
     def _kept_plan(
         self,
