@@ -191,13 +191,18 @@ def fit(
     renderer = renderer or default_renderer()
     stages = _stages(renderer, framebuffer, image, pixels, measure)
     # All of them before the first is searched: the most likely failures come at once.
-    spaces = [_effective(stages[-1], space, drop=is_all) for space in spaces]
+    narrow = _drop_ineffective if is_all else _refuse_ineffective
+    spaces = [narrow(stages[-1], space) for space in spaces]
     results = []
     for space in spaces:
         if not space.axes:
             continue
-        with _bar(progress, space.start.method, max_calls) as on_loss:
-            results.append(_fitted(stages, space, max_calls, on_loss, gradient=gradient))
+        bar: Any = contextlib.nullcontext(_ignore)
+        if progress:
+            bar = _bar(space.start.method, max_calls)
+        with bar as on_loss:
+            new_search = _descent_of if gradient else _search_of
+            results.append(_fitted(stages, space, max_calls, on_loss, new_search))
     results.sort(key=lambda item: item.loss)
     return results if is_many else results[0]
 
@@ -265,8 +270,25 @@ def _stages(
     return stages
 
 
-def _effective(stage: _Stage, space: Space, *, drop: bool) -> Space:
-    """Return the space of the fields that have an effect; others are refused, or dropped."""
+def _refuse_ineffective(stage: _Stage, space: Space) -> Space:
+    """Return the space; raise ValueError if one of its fields has no effect."""
+    for axis, has_effect in zip(space.axes, _effects(stage, space), strict=True):
+        if not has_effect:
+            raise ValueError(
+                f"vary: {axis.name} has no effect on {stage.framebuffer}"
+                + ("; give framebuffer='final'" if stage.framebuffer != "final" else "")
+            )
+    return space
+
+
+def _drop_ineffective(stage: _Stage, space: Space) -> Space:
+    """Return the space of the fields that have an effect."""
+    effective = itertools.compress(space.axes, _effects(stage, space))
+    return dataclasses.replace(space, axes=tuple(effective))
+
+
+def _effects(stage: _Stage, space: Space) -> list[bool]:
+    """Return for each field whether it has an effect on the framebuffer that is compared."""
     framebuffer = stage.framebuffer
     plan = stage.renderer.plan(stage.image, space.start, framebuffers=[framebuffer])
     shape = plan.framebuffers[framebuffer][0]
@@ -275,14 +297,7 @@ def _effective(stage: _Stage, space: Space, *, drop: bool) -> Space:
             f"framebuffer: {framebuffer} of the method {space.start.method} has the shape {shape}, "
             f"not the size of the target; it can be bloom or final"
         )
-    has_effect = [_has_effect(stage, space, index) for index in range(len(space.axes))]
-    for axis, is_effective in zip(space.axes, has_effect, strict=True):
-        if not (is_effective or drop):
-            raise ValueError(
-                f"vary: {axis.name} has no effect on {framebuffer}"
-                + ("; give framebuffer='final'" if framebuffer != "final" else "")
-            )
-    return dataclasses.replace(space, axes=tuple(itertools.compress(space.axes, has_effect)))
+    return [_has_effect(stage, space, index) for index in range(len(space.axes))]
 
 
 def _has_effect(stage: _Stage, space: Space, index: int) -> bool:
@@ -312,21 +327,27 @@ def _one_thread() -> Iterator[None]:
         yield
 
 
+def _search_of(_: _Stage) -> type[Search]:
+    return Search
+
+
+def _descent_of(stage: _Stage) -> Callable[..., Descent]:
+    return partial(Descent, partial(_derivatives, stage))
+
+
 def _fitted(
     stages: list[_Stage],
     space: Space,
     max_calls: int,
     on_loss: Callable[[float], None],
-    *,
-    gradient: bool,
+    new_search: Callable[[_Stage], Any],
 ) -> FitResult:
-    """Return what is found from one start."""
+    """Return what is found from one start; `new_search` gives the class of search of a stage."""
     history: list[float] = []
     best = None
     for stage in stages:
         is_last = stage is stages[-1]
-        kind: Any = partial(Descent, partial(_derivatives, stage)) if gradient else Search
-        search = kind(
+        search = new_search(stage)(
             space,
             stage.measure,
             stage.rendered,
@@ -411,12 +432,13 @@ def _smaller(settings: Settings, factor: int) -> Settings:
     return settings.replace(**changes)
 
 
+def _ignore(_: float) -> None:
+    """Show no progress."""
+
+
 @contextlib.contextmanager
-def _bar(progress: bool, method: str, total: int) -> Iterator[Callable[[float], None]]:
-    """Give the function that gets each loss, and counts the calls where asked for."""
-    if not progress:
-        yield lambda loss: None
-        return
+def _bar(method: str, total: int) -> Iterator[Callable[[float], None]]:
+    """Show a progress bar, and give the function that gets each loss and counts the calls."""
     tqdm = import_extra("tqdm.auto", "cli", "A progress bar").tqdm
     with tqdm(total=total, desc=method, unit="call", leave=False) as bar:
         yield lambda loss: bar.update()
