@@ -31,8 +31,9 @@ def passes(source: BlurInput, settings: KinoBloom) -> dict[str, Array]:
     size = size_of(source.image)
     count, step = _count_and_step(settings, size[1])
     bright = source.store(masked(_prefilter(source.image, settings), source.mask))
-    first = source.store(_box(bright, halved(size), settings.anti_flicker))
-    downs = halvings(first, count, source.store, partial(_box, firefly_filter=False))
+    reduce = _firefly_box if settings.anti_flicker else _box
+    first = source.store(reduce(bright, halved(size)))
+    downs = halvings(first, count, source.store, _box)
     up = partial(tent, x_step=step, y_step=step)
     ups = combine(downs, source, upsample=up, last=up)
     return {"bright": bright, **ups}
@@ -69,12 +70,15 @@ def _threshold(rgb: Array, settings: KinoBloom) -> Array:
     return soften(rgb, settings.threshold, settings.knee, wider=1e-5, least=1e-5)
 
 
-def _box(image: Array, size: tuple[int, int], firefly_filter: bool) -> Array:
-    """Return the mean of the four diagonal taps one texel away.
+def _taps(image: Array, size: tuple[int, int]) -> list[Array]:
+    """Return the four diagonal taps one texel away."""
+    return [sample(image, size, [(x, 1.0)], [(y, 1.0)]) for x in (-1.0, 1.0) for y in (-1.0, 1.0)]
 
-    With `firefly_filter` they are weighted by 1 / (1 + brightest channel).
-    """
-    taps = [sample(image, size, [(x, 1.0)], [(y, 1.0)]) for x in (-1.0, 1.0) for y in (-1.0, 1.0)]
-    return weighted_mean(
-        (firefly_weight(brightest(tap)) if firefly_filter else 1.0, tap) for tap in taps
-    )
+
+def _box(image: Array, size: tuple[int, int]) -> Array:
+    return weighted_mean((1.0, tap) for tap in _taps(image, size))
+
+
+def _firefly_box(image: Array, size: tuple[int, int]) -> Array:
+    """Return the mean of taps, weighted by 1 / (1 + brightest channel)."""
+    return weighted_mean((firefly_weight(brightest(tap)), tap) for tap in _taps(image, size))

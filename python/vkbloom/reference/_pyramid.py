@@ -37,7 +37,8 @@ def passes(source: BlurInput, settings: Pyramid) -> dict[str, Array]:
     """
     scale = (settings.scale_x, settings.scale_y)
     levels = level_sizes(size_of(source.image), settings.levels)
-    first = source.store(downsample(source.image, levels[0], settings.firefly_filter, scale))
+    reduce = downsample_fireflies if settings.firefly_filter else downsample
+    first = source.store(reduce(source.image, levels[0], scale))
     count, weights = len(levels), settings.level_weights
     downs = halvings(first, count, source.store, partial(downsample, scale=scale))
     up = partial(tent, x_step=settings.radius * scale[0], y_step=settings.radius * scale[1])
@@ -78,21 +79,25 @@ def groups(
 
 
 def downsample(
-    image: Array,
-    size: tuple[int, int],
-    firefly_filter: bool = False,
-    scale: tuple[float, float] = (1.0, 1.0),
+    image: Array, size: tuple[int, int], scale: tuple[float, float] = (1.0, 1.0)
 ) -> Array:
-    """Return an image reduced by 13 taps around each pixel, at `scale` times their distances.
+    """Return an image reduced by 13 taps around each pixel, at `scale` times their distances."""
+    return weighted_mean(groups(image, size, scale))
 
-    With `firefly_filter`, the share of each group is multiplied by 1 / (1 + luminance of the
-    group's mean), and the shares are divided by their sum. A negative luminance counts as 0.
+
+def downsample_fireflies(
+    image: Array, size: tuple[int, int], scale: tuple[float, float] = (1.0, 1.0)
+) -> Array:
+    """Return an image reduced by 13 taps around each pixel, with less weight of bright groups.
+
+    The share of each group is multiplied by 1 / (1 + luminance of the group's mean), and the shares
+    are divided by their sum. A negative luminance counts as 0.
     """
-    if firefly_filter and image.shape[2] not in (1, 3, 4):
+    if image.shape[2] not in (1, 3, 4):
         raise ValueError(
             f"firefly_filter needs an image of 1, 3 or 4 channels, not {image.shape[2]}"
         )
     return weighted_mean(
-        (share * (firefly_weight(luminance(mean)) if firefly_filter else 1.0), mean)
+        (share * firefly_weight(luminance(mean)), mean)
         for share, mean in groups(image, size, scale)
     )
