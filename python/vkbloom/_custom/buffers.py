@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import re
-from typing import Final, get_args
+from typing import Final, Literal, TypeAlias, get_args
 
 from vkbloom._custom.blocks import Block, Directive
 from vkbloom._custom.params import Number
@@ -20,6 +20,9 @@ TYPES: Final = {
 #: What every device of Vulkan 1.1 allows for a uniform buffer.
 LARGEST_UNIFORM: Final = 16384
 LARGEST_STORAGE: Final = 1 << 27
+
+#: Rules of GLSL for the places of variables in a buffer.
+Packing: TypeAlias = Literal["std140", "std430"]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -48,14 +51,14 @@ class Buffer:
     line: int
 
 
-def packed_size(variables: tuple[Variable, ...], storage: bool) -> int:
-    """Return the size of a buffer up to its last number: std430 for storage, else std140."""
+def packed_size(variables: tuple[Variable, ...], packing: Packing) -> int:
+    """Return the size of a buffer up to its last number."""
     end = 0
     for variable in variables:
         rows, columns = TYPES[variable.type]
         align = 4 * (4 if rows == 3 else rows)
         repeated = columns > 1 or variable.count is not None
-        if repeated and not storage:
+        if repeated and packing == "std140":
             align = 16
         count = columns * (1 if variable.count is None else variable.count)
         end = -(-end // align) * align + (align * count if repeated else 4 * rows)
@@ -69,7 +72,7 @@ def read_buffer(block: Block) -> Buffer:
     variables = tuple(read_variable(directive) for directive in block.all("VAR"))
     if not variables:
         raise block.fault(line, "the block has no //!VAR")
-    size = packed_size(variables, storage)
+    size = packed_size(variables, "std430" if storage else "std140")
     largest = LARGEST_STORAGE if storage else LARGEST_UNIFORM
     if size > largest:
         raise block.fault(line, f"{size} bytes are more than {largest}")

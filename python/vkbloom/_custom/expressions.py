@@ -57,19 +57,35 @@ def tokens(text: str) -> list[str]:
     return words
 
 
-def evaluate(text: str, values: Values, *, finite: bool = True) -> float:
-    """Return the value of an expression; `finite`: all results must be finite."""
+def evaluate(text: str, values: Values) -> float:
+    """Return the value of an expression; all results must be finite."""
     stack: Stack = []
     with np.errstate(all="ignore"):
         for token in tokens(text):
-            push(stack, token, values, finite)
+            operation = push(stack, token, values)
+            if operation and not np.isfinite(stack[-1]):
+                raise ExpressionError(f"{operation} is not a finite number")
+    return result_of(stack)
+
+
+def check_syntax(text: str, values: Values) -> None:
+    """Raise ExpressionError if an expression has no value; results may be infinite or NaN."""
+    stack: Stack = []
+    with np.errstate(all="ignore"):
+        for token in tokens(text):
+            push(stack, token, values)
+    result_of(stack)
+
+
+def result_of(stack: Stack) -> float:
+    """Return the only value of a stack."""
     if len(stack) != 1:
         raise ExpressionError(f"{len(stack)} values are left, not 1")
     return float(stack[0])
 
 
-def push(stack: Stack, token: str, values: Values, finite: bool) -> None:
-    """Apply one token to the stack."""
+def push(stack: Stack, token: str, values: Values) -> str:
+    """Apply one token to the stack, and return the operation with its operands; "": it has none."""
     ending = next((ending for ending in SIZES if token.endswith(ending)), None)
     if ending:
         name = token.removesuffix(ending)
@@ -82,10 +98,8 @@ def push(stack: Stack, token: str, values: Values, finite: bool) -> None:
             negative = "; write -1 as '0 1 -'" if len(token) > 1 and token[0] == "-" else ""
             raise ExpressionError(f"{token!r} needs two values before it{negative}")
         b, a = stack.pop(), stack.pop()
-        result = np.float32(OPERATORS[token[0]](a, b))
-        if finite and not np.isfinite(result):
-            raise ExpressionError(f"{a:g} {b:g} {token[0]} is not a finite number")
-        stack.append(result)
+        stack.append(np.float32(OPERATORS[token[0]](a, b)))
+        return f"{a:g} {b:g} {token[0]}"
     elif token[0] == "!":
         if not stack:
             raise ExpressionError("'!' needs a value before it")
@@ -96,6 +110,7 @@ def push(stack: Stack, token: str, values: Values, finite: bool) -> None:
         stack.append(np.float32(values.words[token]))
     else:
         raise ExpressionError(unknown_word(token, values))
+    return ""
 
 
 def unknown_word(token: str, values: Values) -> str:

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from vkbloom._custom import hints
 from vkbloom._custom.blocks import Directive, read_blocks
 from vkbloom._custom.buffers import Buffer, read_buffer
-from vkbloom._custom.expressions import ExpressionError, Values, evaluate
+from vkbloom._custom.expressions import ExpressionError, Values, check_syntax
 from vkbloom._custom.names import BLOOM, GLOW, HISTORY, HOOKED, STAGES, stage_of
 from vkbloom._custom.params import Param, read_param
 from vkbloom._custom.passes import CustomPass, read_pass
@@ -144,7 +144,7 @@ def check_expression(expression: Directive | None, values: Values) -> None:
     if expression is None:
         return
     try:
-        evaluate(expression.value, values, finite=False)
+        check_syntax(expression.value, values)
     except ExpressionError as error:
         raise expression.fault(f"{error}{hints.for_expression(expression.value)}") from None
 

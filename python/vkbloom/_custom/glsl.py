@@ -38,7 +38,8 @@ ROUNDING_NAMES: Final = (
 
 #: The main function of a fragment pass. The constant is STORED of shaders/params.h: how the
 #: target's format rounds. Single floats are stored as they are.
-MAIN: Final = """#include "vkbloom/rounding.glsl"
+COMPUTE_MAIN: Final = "void main() { hook(); }"
+FRAGMENT_MAIN: Final = """#include "vkbloom/rounding.glsl"
 layout(constant_id = 23) const int vkb_stored = 2;
 layout(location = 0) out vec4 vkb_colour;
 void main()
@@ -98,12 +99,23 @@ def names_of(image: str, stage: str, bound: set[str]) -> list[str]:
     return names
 
 
-def image_lines(name: str, sampler: str, compute: bool) -> str:
-    """Return the macros of a bound image."""
-    at = f"{name}_map(gl_GlobalInvocationID)" if compute else "(gl_FragCoord.xy / vkb_target)"
-    lines = [
+def image_lines(name: str, sampler: str) -> str:
+    """Return the macros of an image that a fragment shader reads."""
+    return "\n".join(macros_of(name, sampler, "(gl_FragCoord.xy / vkb_target)"))
+
+
+def compute_image_lines(name: str, sampler: str) -> str:
+    """Return the macros of an image that a compute shader reads."""
+    lines = macros_of(name, sampler, f"{name}_map(gl_GlobalInvocationID)")
+    lines.append(f"#define {name}_map(id) ((vec2(id) + vec2(0.5)) / vkb_target)")
+    return "\n".join(lines)
+
+
+def macros_of(name: str, sampler: str, position: str) -> list[str]:
+    """Return the macros of an image, which the shader reads at a position."""
+    return [
         f"#define {name}_raw {sampler}",
-        f"#define {name}_pos {at}",
+        f"#define {name}_pos {position}",
         f"#define {name}_size vkb_size_of_{sampler}",
         f"#define {name}_pt (1.0 / vkb_size_of_{sampler})",
         f"#define {name}_off vec2(0.0)",
@@ -113,9 +125,6 @@ def image_lines(name: str, sampler: str, compute: bool) -> str:
         f"#define {name}_texOff(o) textureLod({sampler}, {name}_pos + {name}_pt * vec2(o), 0.0)",
         f"#define {name}_gather(p, c) textureGather({sampler}, p, c)",
     ]
-    if compute:
-        lines.append(f"#define {name}_map(id) ((vec2(id) + vec2(0.5)) / vkb_target)")
-    return "\n".join(lines)
 
 
 def literal(param: Param, value: float) -> str:
@@ -180,6 +189,7 @@ def write_shader(
     without_remarks = re.sub(r"//[^\n]*|/\*.*?\*/", " ", item.body, flags=re.DOTALL)
     members = block_members(file, without_remarks, images)
     compute = item.compute is not None
+    lines_of = compute_image_lines if compute else image_lines
     lines = ["#version 450", "#extension GL_GOOGLE_include_directive : enable"]
     if members:
         inside = "".join(f"{member.type} {member.name}; " for member in members)
@@ -187,7 +197,7 @@ def write_shader(
     for index, (_, names) in enumerate(images):
         sampler = f"vkb_image_{index}"
         lines.append(f"layout(binding = {index + 1}) uniform sampler2D {sampler};")
-        lines += [image_lines(name, sampler, compute) for name in names]
+        lines += [lines_of(name, sampler) for name in names]
     binding = len(images) + 1
     for texture in textures:
         lines.append(texture_lines(texture, binding))
@@ -207,7 +217,7 @@ def write_shader(
         f"#line {item.body_line} {BODY}",
         item.body,
         f"#line 1 {REST}",
-        main_lines(compute),
+        COMPUTE_MAIN if compute else fragment_main(),
     ]
     return Shader(
         "\n".join(lines) + "\n",
@@ -237,9 +247,7 @@ def buffer_lines(buffer: Buffer, binding: int) -> str:
     return f"layout(binding = {binding}, {packing}) {kind} vkb_of_{buffer.name} {{ {inside} }};"
 
 
-def main_lines(compute: bool) -> str:
-    """Return what follows the body: main, which rounds to the target's format."""
-    if compute:
-        return "void main() { hook(); }"
+def fragment_main() -> str:
+    """Return what follows the body of a fragment shader: main, which rounds to the format."""
     renamed = "".join(f"#undef {name}\n#define {name} vkb_{name}\n" for name in ROUNDING_NAMES)
-    return renamed + MAIN
+    return renamed + FRAGMENT_MAIN

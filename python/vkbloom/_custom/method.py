@@ -19,7 +19,7 @@ from vkbloom._argument_types import checked
 from vkbloom._custom.file import CustomFile, read_file
 from vkbloom._custom.params import RANGES, Param
 from vkbloom._custom.planning import Request, planned
-from vkbloom._custom.rows import made_resources
+from vkbloom._custom.rows import changing_resources
 from vkbloom._custom.shaders import Shaders
 from vkbloom._custom.source import Source, read_source
 from vkbloom._formats import MAX_FLOAT
@@ -84,9 +84,9 @@ class CustomMethod(Settings, metaclass=CustomType):
     def core_passes(self, frame: tuple[int, int], buffers: tuple[int, int]) -> tuple[Any, ...]:
         """Return the passes of a frame, as the core takes them."""
         if self._state is None:
-            changed = made_resources(self.file, storage=True)
+            changed = changing_resources(self.file)
         elif (changed := self._state.get(type(self), {})) == {}:
-            changed = self._state[type(self)] = made_resources(self.file, storage=True)
+            changed = self._state[type(self)] = changing_resources(self.file)
         request = Request(
             frame,
             buffers,

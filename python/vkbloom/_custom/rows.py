@@ -102,17 +102,23 @@ SERIALS: Final = itertools.count(1)
 Resources = dict[str, Resource]
 
 
-def made_resources(file: CustomFile, *, storage: bool) -> Resources:
-    """Return new resources by name: those that passes change, or the others."""
-    made = {
-        name: texture_resource(block) if isinstance(block, Texture) else buffer_resource(block)
-        for name, block in file.given.items()
-        if block.storage == storage
-    }
-    if not made or not storage:
+def constant_resources(file: CustomFile) -> Resources:
+    """Return new resources by name, of those that no pass changes."""
+    return {name: resource_of(block) for name, block in file.given.items() if not block.storage}
+
+
+def changing_resources(file: CustomFile) -> Resources:
+    """Return new resources by name, of those that passes change; they have an owner."""
+    made = {name: resource_of(block) for name, block in file.given.items() if block.storage}
+    if not made:
         return made
     owner = _core.resource_owner()
     return {name: resource._replace(owner=owner) for name, resource in made.items()}
+
+
+def resource_of(block: Texture | Buffer) -> Resource:
+    """Return a texture or a buffer as a resource."""
+    return texture_resource(block) if isinstance(block, Texture) else buffer_resource(block)
 
 
 def texture_resource(texture: Texture) -> Resource:

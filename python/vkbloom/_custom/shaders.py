@@ -14,7 +14,7 @@ from vkbloom._custom.compiler import cached_code, compile_shader
 from vkbloom._custom.file import CustomFile, read_file
 from vkbloom._custom.glsl import Shader, write_shader
 from vkbloom._custom.passes import CustomPass
-from vkbloom._custom.rows import CoreShader, made_resources
+from vkbloom._custom.rows import CoreShader, constant_resources
 from vkbloom._custom.source import Source
 from vkbloom._custom.spirv import shared_bytes
 
@@ -43,7 +43,7 @@ class Shaders:
     def __init__(self, name: str, file: CustomFile) -> None:
         self._name = name
         self._file = file
-        self.resources = made_resources(file, storage=False)
+        self.resources = constant_resources(file)
         self._compiled: dict[tuple[Any, ...], tuple[Shader, CoreShader]] = {}
 
     def of(
