@@ -469,8 +469,8 @@ def test_gpus(
 ) -> None:
     nodes = [] if name is None else [Path(name)]
     monkeypatch.setattr(Path, "glob", lambda _, pattern: nodes if "render" in pattern else [])
-    assert installation.gpu_nodes(True) == []
-    found = [(one.status, one.found) for one in installation.gpu_nodes(False)]
+    assert installation.gpu_nodes([{"type": "discrete"}]) == []
+    found = [(one.status, one.found) for one in installation.gpu_nodes([{"type": "cpu"}])]
     assert len(found) == (expected is not None)
     for (status, text), (wanted, part) in zip(found, [expected] if expected else [], strict=True):
         assert status == wanted

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from vkbloom._doctor import child, drivers, installation
@@ -39,8 +39,8 @@ def examine() -> Report:
         *installation.memory(),
         *loading,
         *installation.environment(),
-        _adapters(listed, any(finding.status == "problem" for finding in loading)),
-        *installation.gpu_nodes(any(adapter["type"] != "cpu" for adapter in adapters)),
+        _adapters(listed, loading),
+        *installation.gpu_nodes(adapters),
         *([_chosen(chosen)] if adapters else []),
         *(_test_render(name, answer) for name, answer in renders.items()),
         *installation.caches(),
@@ -62,13 +62,14 @@ def _loader(listed: child.Answer) -> Finding:
     return Finding("Vulkan loader", "ok", f"version {version[1] if version else 'not in its log'}")
 
 
-def _adapters(listed: child.Answer, has_problem: bool) -> Finding:
-    """Judge the list of adapters; `has_problem`: the loader or a driver has a problem."""
+def _adapters(listed: child.Answer, loading: Sequence[Finding]) -> Finding:
+    """Judge the list of adapters; `loading`: what was found of the loader and of drivers."""
     if listed.value and listed.value["adapters"]:
         return Finding("adapters", "ok", drivers.names(listed.value["adapters"]))
     reason = listed.failure or "no driver has a device with Vulkan 1.3"
     messages = drivers.complaints(listed.messages)
     said = f"; the loader says: {' / '.join(messages)}" if messages else ""
+    has_problem = any(finding.status == "problem" for finding in loading)
     is_above = has_problem or installation.memory()
     advice = "Solve the problems above first." if is_above else drivers.INSTALL_DRIVER
     return Finding("adapters", "problem", f"none: {reason}{said}", advice)

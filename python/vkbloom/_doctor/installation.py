@@ -6,9 +6,10 @@ import os
 import platform
 import re
 import tempfile
+from collections.abc import Iterable, Mapping
 from importlib import metadata
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
@@ -119,10 +120,10 @@ def install_wheel(distribution: str) -> str:
     return f"in a clone of vkbloom, as root, make wheels, then pip install dist/{wheel}"
 
 
-def gpu_nodes(has_gpu_adapter: bool) -> list[Finding]:
-    """Examine the device files of GPUs, which Linux has."""
+def gpu_nodes(adapters: Iterable[Mapping[str, Any]]) -> list[Finding]:
+    """Examine the device files of GPUs, which Linux has, if none of the adapters is a GPU."""
     nodes = sorted([*Path("/dev/dri").glob("renderD*"), *Path("/dev").glob("nvidia[0-9]*")])
-    if not nodes or has_gpu_adapter:
+    if not nodes or any(adapter["type"] != "cpu" for adapter in adapters):
         return []
     text = f"{', '.join(map(str, nodes))}, but no Vulkan adapter that uses it"
     advice = "Install the Vulkan driver of the GPU's vendor. In a container, mount the driver."
