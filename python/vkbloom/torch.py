@@ -6,7 +6,7 @@ are "rgba32float".
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Literal, TypeAlias
 
 from vkbloom._extras import import_extra
 from vkbloom._gradients.operators import (
@@ -23,6 +23,9 @@ from vkbloom.reference._derivatives import differentiable, is_unset
 torch: Any = import_extra("torch", "torch", "vkbloom.torch")
 
 __all__ = ["Bloom", "bloom"]
+
+# The order of an image's dimensions, after those of a batch.
+Order: TypeAlias = Literal["HWC", "CHW"]
 
 
 def bloom(
@@ -72,9 +75,8 @@ def bloom(
     look into it. Called by itself it does not see tangents of forward mode.
     """
     settings = check_settings(settings, of_image=True)
-    return _call(
-        image, settings, {}, mask=mask, emission=emission, renderer=renderer, first=channels_first
-    )
+    order: Order = "CHW" if channels_first else "HWC"
+    return _call(image, settings, {}, order, mask=mask, emission=emission, renderer=renderer)
 
 
 class Bloom(torch.nn.Module):  # type: ignore[misc]
@@ -122,7 +124,7 @@ class Bloom(torch.nn.Module):  # type: ignore[misc]
         self._start = check_settings(settings, of_image=True)
         self._names = (learn,) if isinstance(learn, str) else tuple(learn)
         self._renderer = _check_renderer(renderer)
-        self._channels_first = channels_first
+        self._order: Order = "CHW" if channels_first else "HWC"
         known = differentiable(self._start)
         for name in self._names:
             if is_unset(self._start, name):
@@ -153,8 +155,8 @@ class Bloom(torch.nn.Module):  # type: ignore[misc]
             # Comparing parameters waits for the device, which would end the capture.
             refuse_capture(image)
         values = dict(zip(self._names, self._values(), strict=True))
-        options: dict[str, Any] = {"renderer": self._renderer, "first": self._channels_first}
-        return _call(image, self._start, values, mask=mask, emission=emission, **options)
+        arrays = {"mask": mask, "emission": emission}
+        return _call(image, self._start, values, self._order, **arrays, renderer=self._renderer)
 
     def _parameter(self, name: str) -> Any:
         return self.learned[name.replace(".", "_")]
@@ -190,20 +192,20 @@ def _call(
     image: Any,
     settings: Settings,
     values: dict[str, Any],
+    order: Order,
     *,
     mask: Any,
     emission: Any,
     renderer: Renderer | None,
-    first: bool,
 ) -> Any:
-    """Run the operator; `values` are tensors of fields, `first`: channels stand first."""
+    """Run the operator; `values` are tensors of fields."""
     for name, tensor in (("image", image), ("mask", mask), ("emission", emission)):
         if not isinstance(tensor, torch.Tensor) and (tensor is not None or name == "image"):
             raise TypeError(f"{name}: a tensor is needed, not {type(tensor).__name__}")
-    _check(image, mask, emission, first)
+    _check(image, mask, emission, order)
     _check_renderer(renderer)
     refuse_tangents((image, mask, emission, *values.values()))
-    if first:
+    if order == "CHW":
         image = image.movedim(-3, -1)
         emission = None if emission is None else emission.movedim(-3, -1)
     final = torch.ops.vkbloom.bloom(
@@ -215,20 +217,20 @@ def _call(
         text_of(settings),
         number_of(renderer),
     )
-    return final.movedim(-1, -3) if first else final
+    return final.movedim(-1, -3) if order == "CHW" else final
 
 
-def _check(image: Any, mask: Any, emission: Any, channels_first: bool) -> None:
+def _check(image: Any, mask: Any, emission: Any, order: Order) -> None:
     """Check shapes, dtypes and devices, so that errors come from the call and not the operator."""
-    shape = tuple(image.shape)
-    order = "(..., C, H, W)" if channels_first else "(..., H, W, C)"
+    shape, channels_first = tuple(image.shape), order == "CHW"
+    form = "(..., C, H, W)" if channels_first else "(..., H, W, C)"
     if len(shape) < 3 or shape[-3 if channels_first else -1] not in (3, 4):
-        text = f"image: the shape {shape} is not {order} with 3 or 4 channels"
+        text = f"image: the shape {shape} is not {form} with 3 or 4 channels"
         if len(shape) >= 3 and shape[-1 if channels_first else -3] in (3, 4):
             text += f"; give channels_first={not channels_first}"
         raise ValueError(text)
     if 0 in shape[-3:]:
-        raise ValueError(f"image: the shape {shape} is not {order} with sides of at least 1")
+        raise ValueError(f"image: the shape {shape} is not {form} with sides of at least 1")
     if not image.is_floating_point():
         raise TypeError(f"image: {image.dtype} has no derivative; give floats of linear light")
     if image.dtype == torch.bfloat16:
