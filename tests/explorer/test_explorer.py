@@ -173,7 +173,8 @@ class TestShown:
 
     def test_stops(self, tmp_path: Path) -> None:
         array = np.full((1, 1, 3), 4, np.float32)
-        for name, encoding, level in (("bloom", "none", 188), ("final", "srgb", 128)):
+        cases: tuple[tuple[str, Any, int], ...] = (("bloom", "none", 188), ("final", "srgb", 128))
+        for name, encoding, level in cases:
             shown = decode(picture_of(array, name, encoding=encoding, stops=-3), tmp_path)
             assert shown[0, 0, 0] == level
 

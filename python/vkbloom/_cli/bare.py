@@ -6,7 +6,7 @@ import dataclasses
 import json
 import sys
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from typing import Any, Literal
 
 from vkbloom._version import installed_version
 
@@ -20,26 +20,26 @@ _NO_ADAPTER = "vkbloom: no Vulkan adapter was found; run vkbloom doctor for the 
 def run(words: Sequence[str], missing: Sequence[str]) -> int:
     """Run a command that needs no other package and return its status, or say what to install."""
     first, *options = words or [""]
-    as_json = options == ["--json"]
+    form: Literal["text", "json"] = "json" if options == ["--json"] else "text"
     if words in (["--version"], ["-V"]):
         print(f"vkbloom {installed_version()}")
         return 0
-    if first == "doctor" and (as_json or not options):
+    if first == "doctor" and (form == "json" or not options):
         report = examined()
-        print(json.dumps(report, indent=2) if as_json else "\n".join(lines_of(report)))
+        print(json.dumps(report, indent=2) if form == "json" else "\n".join(lines_of(report)))
         return int(not report["can_render"])
-    if first == "adapters" and (as_json or not options):
-        return list_adapters(as_json=as_json)
+    if first == "adapters" and (form == "json" or not options):
+        return list_adapters(form)
     print(f"vkbloom: the command line needs {' and '.join(missing)}; {INSTALL}", file=sys.stderr)
     return 1
 
 
-def list_adapters(*, as_json: bool) -> int:
+def list_adapters(form: Literal["text", "json"]) -> int:
     """Print the adapters, one a line or as JSON, and return the status: 1 if there is none."""
     from vkbloom._renderer import adapter  # noqa: PLC0415  costs start-up time
 
     found = adapter.adapters()
-    if as_json:
+    if form == "json":
         print(json.dumps([dataclasses.asdict(one) for one in found], indent=2))
     else:
         for one in found:

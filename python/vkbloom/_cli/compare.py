@@ -14,7 +14,7 @@ from rich.console import Console
 from vkbloom._cli import fields
 from vkbloom._cli.image_files import other_parts, read, subimage_option
 from vkbloom._cli.program import as_wrong_use
-from vkbloom._cli.terminal import is_quiet, note, say
+from vkbloom._cli.terminal import Form, is_quiet, json_option, note, say
 from vkbloom._io import image_writing, safe_writing
 from vkbloom._io.picture import Picture
 from vkbloom._numbers import check_number
@@ -52,7 +52,7 @@ def tolerances_of(
     "--diff", metavar="OUT", type=click.Path(), help="Write a picture of the absolute differences."
 )
 @click.option("--allow-nan", is_flag=True, help="Accept NaN and infinity that both images have.")
-@click.option("--json", "as_json", is_flag=True, help="Print one object.")
+@json_option("Print one object.")
 @subimage_option
 @_limit("max_error", "Largest allowed difference of a value; integers are scaled to 0..1")
 @_limit("min_ssim", "Smallest allowed structural similarity, -1 to 1")
@@ -63,7 +63,7 @@ def command(
     second: str,
     diff: str | None,
     allow_nan: bool,
-    as_json: bool,
+    form: Form,
     subimage: int,
     **limits: float | None,
 ) -> int:
@@ -103,7 +103,7 @@ def command(
         note(f"{diff} is not written: the images have no values to compare")
     elif diff is not None:
         scale = _write_difference(a, b, diff)
-    if as_json:
+    if form == "json":
         shown = _object((first, second), result, failed, scale, cause)
         click.echo(json.dumps(shown, indent=2))
     else:

@@ -13,7 +13,7 @@ from tqdm import tqdm
 from vkbloom._cli import bare
 from vkbloom._cli.program import adapter_option
 from vkbloom._cli.targets import check_target
-from vkbloom._cli.terminal import hides_progress, say
+from vkbloom._cli.terminal import Form, hides_progress, json_option, say
 from vkbloom._doctor import self_test
 from vkbloom._renderer.adapter import AdapterInfo
 
@@ -86,7 +86,7 @@ def _show_groups(report: dict[str, Any]) -> None:
 
 
 @click.command()
-@click.option("--json", "as_json", is_flag=True, help="Print a list of objects.")
-def adapters(as_json: bool) -> int:
+@json_option("Print a list of objects.")
+def adapters(form: Form) -> int:
     """List the Vulkan adapters that vkbloom can use."""
-    return bare.list_adapters(as_json=as_json)
+    return bare.list_adapters(form)

@@ -34,15 +34,11 @@ else:
 
 
 class _Word(_ParamType):
-    """The type of an option whose value is one word, such as 256x256.
+    """The type of an option whose value is one word, such as 256x256."""
 
-    An error says that the word does not have the form, or with `explains` the reader's reason.
-    """
-
-    def __init__(self, form: str, read: Callable[[str], Any], *, explains: bool = False) -> None:
+    def __init__(self, form: str, read: Callable[[str], Any]) -> None:
         self.name = form
         self._read = read
-        self._explains = explains
 
     def get_metavar(self, param: click.Parameter, ctx: click.Context | None = None) -> str:
         """Return the placeholder of the value in the help."""
@@ -55,8 +51,17 @@ class _Word(_ParamType):
         try:
             return self._read(value)
         except (TypeError, ValueError, click.BadParameter) as error:
-            reason = f": {error}" if self._explains else f" is not {self.name}"
-            self.fail(f"{value!r}{reason}", param, ctx)
+            self.fail(f"{value!r}{self._reason(error)}", param, ctx)
+
+    def _reason(self, error: Exception) -> str:
+        return f" is not {self.name}"
+
+
+class _ExplainedWord(_Word):
+    """A word of which an error says what the reader does, not only that it lacks the form."""
+
+    def _reason(self, error: Exception) -> str:
+        return f": {error}"
 
 
 def _read_size(word: str) -> tuple[int, int]:
@@ -141,8 +146,8 @@ def _read_glare(word: str) -> tuple[Glare, ...]:
 
 
 _OPTION_TYPES: Final[Mapping[Kind, _ParamType]] = {
-    "psf": _Word("NAME[:A=1,...]|FILE", _read_psf, explains=True),
-    "glare": _Word("NAME[:A=1,...]+...", _read_glare, explains=True),
+    "psf": _ExplainedWord("NAME[:A=1,...]|FILE", _read_psf),
+    "glare": _ExplainedWord("NAME[:A=1,...]+...", _read_glare),
     "flag": click.BOOL,
     "number": click.FLOAT,
     "integer": click.INT,

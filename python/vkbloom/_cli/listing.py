@@ -14,6 +14,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from vkbloom._cli.terminal import Form, json_option
 from vkbloom._presets.named_glares import GLARES
 from vkbloom._presets.named_settings import PRESETS, Engine
 from vkbloom._psf.base import functions
@@ -35,9 +36,9 @@ def _command(entries: Callable[[], Iterable[Entry]]) -> click.Command:
     """Return the command that lists entries; their docstring is its help."""
 
     @click.command(help=inspect.getdoc(entries))
-    @click.option("--json", "as_json", is_flag=True, help="Print a list of objects.")
-    def command(*, as_json: bool) -> None:
-        if as_json:
+    @json_option("Print a list of objects.")
+    def command(*, form: Form) -> None:
+        if form == "json":
             click.echo(json.dumps(list(entries()), indent=2))
         else:
             _show(_table(entries()))

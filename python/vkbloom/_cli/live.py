@@ -306,13 +306,17 @@ def explore(
             new_viewer()
         tell_device(renderer)
         try:
-            return asyncio.run(_serve(new_viewer, port, opens))
+            return asyncio.run(_serve(new_viewer, port, webbrowser.open if opens else _ignore))
         except KeyboardInterrupt:
             return INTERRUPTED
 
 
-async def _serve(new_viewer: Callable[[], Viewer], port: int, opens: bool) -> int:
-    """Serve the page until a signal comes, and return the exit status."""
+def _ignore(_: str) -> None:
+    """Leave it to the user to open the page."""
+
+
+async def _serve(new_viewer: Callable[[], Viewer], port: int, show: Callable[[str], object]) -> int:
+    """Serve the page until a signal comes, and return the exit status; `show` gets its address."""
     # Imported here because it needs tornado; `command` has checked that it is installed.
     from vkbloom._explorer.server import Server  # noqa: PLC0415
 
@@ -328,8 +332,7 @@ async def _serve(new_viewer: Callable[[], Viewer], port: int, opens: bool) -> in
         for number, status in ((signal.SIGINT, INTERRUPTED), (signal.SIGTERM, 0)):
             asyncio.get_running_loop().add_signal_handler(number, stop, status)
     click.echo(f"{server.url}\nPress Ctrl-C to stop.")
-    if opens:
-        webbrowser.open(server.redirect.as_uri())
+    show(server.redirect.as_uri())
     try:
         return await stopped
     finally:

@@ -16,7 +16,7 @@ from vkbloom._cli.fields import SIZE, Command, NameOf
 from vkbloom._cli.image_files import input_colour_option, read_picture
 from vkbloom._cli.program import adapter_option, as_wrong_use, given
 from vkbloom._cli.settings_options import STARTS, read_settings, settings_options
-from vkbloom._cli.terminal import is_quiet, note
+from vkbloom._cli.terminal import Form, is_quiet, json_option, note
 from vkbloom._explorer.controls import as_code
 from vkbloom._fit import FitResult
 from vkbloom._fit.losses import LossName
@@ -65,24 +65,24 @@ def _search_options(
             default=max_calls,
             help="Limit of the renders of each search.",
         )
-        @click.option("--json", "as_json", is_flag=True, help="Print one list, sorted by loss.")
+        @json_option("Print one list, sorted by loss.")
         @functools.wraps(command)
-        def run(*, vary: str | None, as_json: bool, **rest: Any) -> None:
+        def run(*, vary: str | None, form: Form, **rest: Any) -> None:
             search = {name: rest.pop(name) for name in ("loss", "max_calls")}
             search["progress"] = Console(stderr=True).is_terminal and not is_quiet()
             if vary is not None:
                 names = (name.strip().replace("-", "_") for name in vary.split(","))
                 search["vary"] = [name for name in names if name]
-            _show_results(command(search=search, **rest), as_json=as_json)
+            _show_results(command(search=search, **rest), form)
 
         return run
 
     return add
 
 
-def _show_results(fits: Sequence[FitResult], *, as_json: bool) -> None:
+def _show_results(fits: Sequence[FitResult], form: Form) -> None:
     """Print results, the best one first."""
-    if as_json:
+    if form == "json":
         click.echo(json.dumps([_object(item) for item in fits], indent=2))
     else:
         for item in fits:

@@ -16,7 +16,7 @@ from typing import BinaryIO, Final
 import click
 
 from vkbloom._cli.numbered_files import NumberedFile, files_of, gap_note, pattern_of
-from vkbloom._cli.targets import check_folder
+from vkbloom._cli.targets import check_folder, check_new_folder
 from vkbloom._cli.terminal import note
 from vkbloom._io import safe_writing
 from vkbloom._io.readers import readable_extensions
@@ -132,7 +132,7 @@ def check_targets(work: Sequence[tuple[str, str]], out: str, *, overwrite: bool)
         if is_stream(target):
             continue
         if (folder := os.path.dirname(target)) not in checked:
-            check_folder(target, makes=target != out)
+            (check_folder if target == out else check_new_folder)(target)
             checked.add(folder)
         if not overwrite and os.path.exists(target) and _identity(target) in read:
             raise click.UsageError(f"{target}: is read as IN; use --overwrite to replace it")

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import sys
-from typing import TYPE_CHECKING, Final
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, Final, Literal, TypeAlias, TypeVar
 
 import click
 
@@ -15,6 +16,11 @@ if TYPE_CHECKING:
 MAX_MESSAGE: Final = 2000
 # Of these, the end, which has the reason where the beginning has a name.
 _END: Final = 600
+
+
+#: How a command prints its results.
+Form: TypeAlias = Literal["text", "json"]
+_Command = TypeVar("_Command", bound=Callable[..., Any])
 
 
 class _Printing:
@@ -35,6 +41,17 @@ QUIET_OPTION: Final = click.Option(
     callback=_set_quiet,
     help="Print results and errors only: no progress, no notes, no names of written files.",
 )
+
+
+def json_option(help: str) -> Callable[[_Command], _Command]:
+    """Return the decorator that adds ``--json`` to a command, which gets its `form`."""
+    return click.option(
+        "--json",
+        "form",
+        is_flag=True,
+        callback=lambda _, __, given: "json" if given else "text",
+        help=help,
+    )
 
 
 def print_as_usual() -> None:
