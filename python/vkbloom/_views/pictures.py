@@ -52,10 +52,11 @@ def picture(
 ) -> NDArray[np.uint8]:
     """Convert an image to a viewable 8-bit picture.
 
-    8-bit images are shown as stored. Float images are shown with the sRGB curve, unless
-    `encoding` says that their colours have a curve; colours with a component above 1 are divided by
-    the largest one, which keeps their hue, others are clipped to 0..1. `normal` is shown as (n + 1) / 2, `position` with each axis
-    stretched to 0..1, depth from white (nearest) to black (farthest). NaN counts as 0.
+    8-bit images are shown as stored. Float images are shown with the sRGB curve, unless `encoding`
+    says that their colours have a curve; colours with a component above 1 are divided by the
+    largest one, which keeps their hue, others are clipped to 0..1. `normal` is shown as
+    (n + 1) / 2, `position` with each axis stretched to 0..1, depth from white (nearest) to black
+    (farthest). NaN counts as 0.
     """
     values = np.atleast_3d(array).astype(np.float32)
     linear = False
