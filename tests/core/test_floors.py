@@ -28,10 +28,10 @@ class Planted(NamedTuple):
 
 PLANTED: Final = {
     "a statement": Planted(
-        "_io.images",
+        "_io.picture",
         "from vkbloom._renderer.frames import Frames",
         "floors",
-        "vkbloom._io.images -> vkbloom._renderer.frames",
+        "vkbloom._io.picture -> vkbloom._renderer.frames",
     ),
     "in a function": Planted(
         "_settings.fields",

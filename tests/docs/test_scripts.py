@@ -61,6 +61,7 @@ ELSEWHERE: Final = {
     "tools/engines/": "Makefile",
     "tools/free_threaded/": "Makefile",
     "tools/fuzz/": "tests/io/test_fuzz.py",
+    "tools/import_contracts.py": "tests/core/test_floors.py",
     "tools/libplacebo/": "Makefile",
     "tools/mesa_backports.sh": "tests/device/amd_families.py",
     "tools/renderer_memory.py": "tests/core/test_lifetime.py",

@@ -33,7 +33,7 @@ def patches(tree: ast.AST) -> Iterator[str]:
 def test_what_is_counted() -> None:
     text = (
         "from vkbloom import Pyramid, _core\n"
-        "from vkbloom._io.images import Picture\n"
+        "from vkbloom._io.picture import Picture\n"
         "from vkbloom.testing import _probe as probe\n"
         "from vkbloom import Scene, __version__\n"
         "def test(monkeypatch):\n    monkeypatch.setattr(probe, 'size', 3)\n"
