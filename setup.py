@@ -262,14 +262,15 @@ def write_spirv(jobs: int) -> None:
         words = ",".join(map(str, struct.unpack(f"={len(code) // 4}I", code)))
         arrays += f"static const uint32_t {module.name}[] = {{{words}}};\n"
         hashed = ", ".join(map(str, hashlib.sha256(code).digest()[:16]))
-        twins = (
+        siblings = (
             f"{module.shader.stem}_dispatch",
             module.name.replace("_linear_", "_packed_"),
             module.name.replace("_linear_", "_linear_rgb_"),
             f"{module.name}_layers",
         )
         pointers = ", ".join(
-            f"&vkb_shader_{twin}" if twin in names - {module.name} else "NULL" for twin in twins
+            f"&vkb_shader_{sibling}" if sibling in names - {module.name} else "NULL"
+            for sibling in siblings
         )
         declared += f"extern const struct vkb_shader vkb_shader_{module.name};\n"
         objects += (

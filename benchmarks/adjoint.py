@@ -51,7 +51,7 @@ SETTINGS: Final[dict[str, vkbloom.Settings]] = {
     "BlenderGlare": vkbloom.presets["blender_bloom"],
 }
 #: The most that a pullback may cost, times the framebuffer.
-MOST: Final = 2.5
+MAX_RATIO: Final = 2.5
 #: How much faster than PyTorch, and in which part of its memory.
 FASTER, PART_OF_MEMORY = 5.0, 0.25
 
@@ -81,7 +81,7 @@ def run(plan: Plan, section: Section) -> None:
             times[name] = alternate_seconds(ours, plan.times(ROUNDS), warm_up=3)
             memory = renderer._core.cached[1]
         backward = times[name]["backward"].over(times[name]["forward"]).value
-        section.goals.append(Goal(f"{name}: backward / forward", backward, MOST, at_most=True))
+        section.goals.append(Goal(f"{name}: backward / forward", backward, MAX_RATIO, at_most=True))
         section.times[name] = times[name]
         section.tables.append(side_by_side(name, times[name], "forward"))
         if name == "Pyramid":
@@ -101,7 +101,7 @@ def _calls(
         return sum(renderer.apply(image, settings, framebuffers="final").timings.values())
 
     def backward(turn: int) -> float:
-        return _pulled(renderer, settings, images[turn % 3], cotangents[turn % 3])[1]
+        return _pull(renderer, settings, images[turn % 3], cotangents[turn % 3])[1]
 
     source = _core.image_source(images[0], None, None, (cotangents[0],))
     if renderer._core.plan(source, settings, None, ("final",), False) is None:
@@ -110,15 +110,15 @@ def _calls(
 
 
 def _processor_time(call: Callable[[int], float]) -> Callable[[int], float]:
-    def timed(turn: int) -> float:
+    def time_turn(turn: int) -> float:
         start = time.process_time()
         call(turn)
         return time.process_time() - start
 
-    return timed
+    return time_turn
 
 
-def _pulled(
+def _pull(
     renderer: vkbloom.Renderer,
     settings: vkbloom.Settings,
     image: NDArray[Any],
@@ -131,7 +131,7 @@ def _pulled(
     assert plan is not None
     arrays = new_arrays(core, plan)
     (timings,), _ = core.run(source, (plan,), (arrays,)).wait()
-    return requests.named(plan, arrays)[".by_image"], sum(timings.values())
+    return requests.name_outputs(plan, arrays)[".by_image"], sum(timings.values())
 
 
 def _beside_torch(
@@ -156,19 +156,19 @@ def _beside_torch(
         for kind in inputs
     ]
 
-    def pulled(turn: int) -> Any:
+    def pull(turn: int) -> Any:
         image = given[0][turn % 3].detach().requires_grad_()
         final = image + _pyramid(torch, image)
         return torch.autograd.grad(final, image, given[1][turn % 3])[0]
 
     with plan.renderer() as renderer:
-        expected, _ = _pulled(renderer, PYRAMID, images[0], cotangents[0])
-    found = pulled(0)[0].movedim(0, -1).cpu().numpy()
+        expected, _ = _pull(renderer, PYRAMID, images[0], cotangents[0])
+    found = pull(0)[0].movedim(0, -1).cpu().numpy()
     most = 1e-5 * float(np.abs(expected).max())
     reason = "a hundred-thousandth of the largest derivative"
     what = "Pyramid: derivatives of PyTorch"
     section.agreements.append(agreement(what, expected, found, most, reason))
-    both = alternate_seconds({"PyTorch": _timed(torch, device, pulled)}, plan.times(ROUNDS))
+    both = alternate_seconds({"PyTorch": _time(torch, device, pull)}, plan.times(ROUNDS))
     seconds = ours["forward"].median + ours["backward"].median
     theirs = both["PyTorch"].median
     rows = [
@@ -180,7 +180,7 @@ def _beside_torch(
     ]
     if device == "cuda":
         torch.cuda.reset_peak_memory_stats()
-        pulled(1)
+        pull(1)
         # One image and its cotangents belong to the work, the others wait for their turn.
         waiting = 2 * sum(kind[0].nbytes for kind in given)
         most = torch.cuda.max_memory_allocated() - waiting
@@ -195,7 +195,7 @@ def _beside_torch(
     )
 
 
-def _timed(torch: Any, device: str, call: Callable[[int], Any]) -> Callable[[int], float]:
+def _time(torch: Any, device: str, call: Callable[[int], Any]) -> Callable[[int], float]:
     """Return a call that returns its seconds on the device."""
     if device == "cpu":
         return wall_clock(call)
@@ -225,7 +225,7 @@ def _pyramid(torch: Any, image: Any) -> Any:
         padded = functional.pad(levels[-1], (2, 2, 2, 2), mode="replicate")
         levels.append(functional.conv2d(padded, kernels[0], stride=2, groups=3))
 
-    def enlarged(level: Any) -> Any:
+    def enlarge(level: Any) -> Any:
         padded = functional.pad(level, (2, 2, 2, 2), mode="replicate")
         filtered = functional.conv2d(padded, kernels[1], groups=3)
         double = functional.interpolate(filtered, scale_factor=2, mode="bilinear")
@@ -233,8 +233,8 @@ def _pyramid(torch: Any, image: Any) -> Any:
 
     up = levels[-1]
     for level in levels[-2:0:-1]:
-        up = level + enlarged(up)
-    return enlarged(up) / LEVELS
+        up = level + enlarge(up)
+    return enlarge(up) / LEVELS
 
 
 def _line(distance: float, side: float, middle: float = 0.0) -> list[float]:

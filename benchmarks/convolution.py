@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 import vkbloom
 from benchmarks import peers
 from benchmarks.inputs import COUNT, THRESHOLD, pictures
-from benchmarks.ours import OURS, applied, contest, ratios
+from benchmarks.ours import OURS, contest, prepare_call, ratios
 from benchmarks.plan import Plan
 from benchmarks.results import Section
 from benchmarks.timing import Contender
 
-__all__ = ["ALLOWED", "kernel_sizes", "placed", "run", "settings_of"]
+__all__ = ["ALLOWED", "kernel_sizes", "place", "run", "settings_of"]
 
 SIZE: Final = (1920, 1080)
 ROUNDS: Final = 9
@@ -48,7 +48,7 @@ def settings_of(size: tuple[int, int]) -> vkbloom.Convolution:
     return vkbloom.Convolution(kernel, threshold=THRESHOLD)
 
 
-def placed(
+def place(
     settings: vkbloom.Convolution, size: tuple[int, int]
 ) -> tuple[NDArray[np.float32], tuple[int, int]]:
     """Return the kernel as a transform needs it.
@@ -105,11 +105,11 @@ def _time_one(
     height, width = images[0].shape[:2]
     theirs: dict[str, peers.ImageBloom] = peers.gather(
         ("SciPy",),
-        lambda peer: peer.convolution(*placed(settings, (width, height)), THRESHOLD, plan.threads),
+        lambda peer: peer.convolution(*place(settings, (width, height)), THRESHOLD, plan.threads),
         section.missing,
     )
     with plan.renderer() as renderer:
-        bloom = applied(renderer, images, settings)
+        bloom = prepare_call(renderer, images, settings)
         picture = bloom(0)["final"]
         contenders = [Contender(OURS, bloom)]
         contenders += [

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 import vkbloom
 from benchmarks import peers
-from benchmarks.convolution import ALLOWED, kernel_sizes, placed, settings_of
+from benchmarks.convolution import ALLOWED, kernel_sizes, place, settings_of
 from benchmarks.inputs import COUNT, THRESHOLD, pictures
-from benchmarks.ours import OURS, applied, contest, ratios
+from benchmarks.ours import OURS, contest, prepare_call, ratios
 from benchmarks.plan import Plan
 from benchmarks.results import Section, Table
 from benchmarks.timing import Contender, device_clock
@@ -63,16 +63,16 @@ def _time_one(
     (group, settings), (height, width) = work, images[0].shape[:2]
     theirs: dict[str, peers.GpuWork] = peers.gather(
         ("PyTorch",),
-        lambda peer: peer.gpu_convolution(images[0], *placed(settings, (width, height)), THRESHOLD),
+        lambda peer: peer.gpu_convolution(images[0], *place(settings, (width, height)), THRESHOLD),
         section.missing,
     )
     ours, stages = renderers
     clock = device_clock(ours.info)
     # Each call of a renderer has another image than the call before, or no pass would run.
     final, staged = (
-        applied(one, [*images[::2], *images[1::2]], settings) for one in (ours, stages)
+        prepare_call(one, [*images[::2], *images[1::2]], settings) for one in (ours, stages)
     )
-    alone = applied(ours, images, settings, "bloom", 1)
+    alone = prepare_call(ours, images, settings, "bloom", 1)
     contenders = [
         Contender(OURS, final, clock),
         Contender(

@@ -103,7 +103,7 @@ def _over_pixels(
         section.times[f"{side} x {side}"] = times
         for name, measured in times.items():
             found.setdefault(name, []).append(measured)
-    axis = Axis(
+    axis = CostAxis(
         "pixels",
         tuple(f"{side} x {side}" for side in sides),
         tuple(float(side * side) for side in sides),
@@ -133,7 +133,7 @@ def _over_taps(plan: Plan, section: Section, ours: vkbloom.Renderer) -> None:
         for name, measured in times.items():
             found.setdefault(name, []).append(measured)
     taps = tuple(2 * radius + 1 for radius in radii)
-    axis = Axis(
+    axis = CostAxis(
         "taps",
         tuple(map(str, taps)),
         tuple(map(float, taps)),
@@ -158,14 +158,14 @@ def _over_levels(plan: Plan, section: Section, ours: vkbloom.Renderer) -> None:
     section.times["levels"] = times
     # The first two levels hold nearly all pixels. Each further level costs only its passes.
     first = min(2, len(levels) - 2)
-    axis = Axis(
+    axis = CostAxis(
         "levels", tuple(map(str, levels)), tuple(map(float, levels)), first, "us a level", 1e6
     )
     _add(section, axis, f"vkbloom, Pyramid, {side} x {side}", list(times.values()))
 
 
 @dataclass(frozen=True)
-class Axis:
+class CostAxis:
     """The x axis of a cost, the first row of its fitted line, and the unit of the slope."""
 
     chart: str
@@ -176,7 +176,7 @@ class Axis:
     scale: float
 
 
-def _add(section: Section, axis: Axis, name: str, measured: list[Times]) -> None:
+def _add(section: Section, axis: CostAxis, name: str, measured: list[Times]) -> None:
     """Add the table and the curve of one contender."""
     medians = [times.median for times in measured]
     line = Line.through(axis.x[axis.first :], medians[axis.first :])

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 import vkbloom
 from benchmarks import peers
 from benchmarks.inputs import COUNT, THRESHOLD, pictures
-from benchmarks.ours import FRAGMENT, OURS, applied, contest, ratios
+from benchmarks.ours import FRAGMENT, OURS, contest, prepare_call, ratios
 from benchmarks.plan import Plan
 from benchmarks.results import Section
 from benchmarks.timing import Contender
@@ -93,7 +93,7 @@ def _time_one(
             for variant in ("auto", "fragment", "auto", "auto")
         )
         calls = {
-            name: applied(renderer, images, SETTINGS)
+            name: prepare_call(renderer, images, SETTINGS)
             for name, renderer in ((OURS, ours), (FRAGMENT, source))
         }
         picture = calls[OURS](0)["final"]

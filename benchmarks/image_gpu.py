@@ -22,7 +22,7 @@ import vkbloom
 from benchmarks import peers
 from benchmarks.image import ALLOWED, SETTINGS, full_kernel
 from benchmarks.inputs import THRESHOLD, pictures
-from benchmarks.ours import FRAGMENT, OURS, applied, contest, ratios
+from benchmarks.ours import FRAGMENT, OURS, contest, prepare_call, ratios
 from benchmarks.plan import Plan
 from benchmarks.results import Goal, Section, side_by_side
 from benchmarks.timing import Contender, Times, alternate_seconds, device_clock, wall_clock
@@ -81,7 +81,7 @@ def _on_device(
 
     theirs: dict[str, peers.GpuWork] = peers.gather(("CuPy", "PyTorch"), make, section.missing)
     calls = {
-        name: applied(renderer, images, SETTINGS)
+        name: prepare_call(renderer, images, SETTINGS)
         for name, renderer in ((OURS, ours), (FRAGMENT, source))
     }
     picture = calls[OURS](0)["final"]
@@ -149,7 +149,7 @@ def _in_hands(
         warm_up=WARM_UP,
     )
     times |= alternate_seconds(
-        {NEW: wall_clock(applied(ours, images, SETTINGS))},
+        {NEW: wall_clock(prepare_call(ours, images, SETTINGS))},
         plan.times(ROUNDS),
         warm_up=WARM_UP,
     )

@@ -13,13 +13,13 @@ from benchmarks.plan import Plan
 from benchmarks.results import Goal, Section, agreement, side_by_side
 from benchmarks.timing import Contender, Times, alternate, device_clock
 
-__all__ = ["FRAGMENT", "OURS", "applied", "contender", "contest", "ratios"]
+__all__ = ["FRAGMENT", "OURS", "contender", "contest", "prepare_call", "ratios"]
 
 OURS: Final = "vkbloom"
 FRAGMENT: Final = "vkbloom, the source's fragment variant"
 
 
-def applied(
+def prepare_call(
     renderer: vkbloom.Renderer,
     images: Sequence[NDArray[Any]],
     settings: vkbloom.Settings,

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 import vkbloom
 from benchmarks import peers
 from benchmarks.inputs import COUNT, pictures
-from benchmarks.ours import OURS, applied, contest, ratios
+from benchmarks.ours import OURS, contest, prepare_call, ratios
 from benchmarks.plan import Plan
 from benchmarks.results import Agreement, Section, Table
 from benchmarks.spread import spread
@@ -51,7 +51,7 @@ def run(plan: Plan, section: Section) -> None:
             lambda image: ours.apply(image, SETTINGS, framebuffers=("bloom",))["bloom"], size
         )
         spreads = {OURS: (sigma, gain)}
-        whole, fragments = (applied(one, images, SETTINGS) for one in (ours, source))
+        whole, fragments = (prepare_call(one, images, SETTINGS) for one in (ours, source))
         contenders = [Contender(OURS, whole), Contender(FRAGMENT, fragments)]
         contenders += _pygfx(section, images, size, ours.info.name, spreads)
         contenders += _gaussian(plan, section, images, spreads)

@@ -23,7 +23,7 @@ __all__ = ["run"]
 
 ROUNDS: Final = 9
 SIZE: Final = (1280, 720)
-LONGEST: Final = 120
+MAX_SECONDS: Final = 120
 
 _FIRST_FRAMES: Final = """
 import json, sys, time
@@ -68,7 +68,7 @@ def _child(arguments: list[str], environment: dict[str, str] | None = None) -> A
         env=environment,
         capture_output=True,
         text=True,
-        timeout=LONGEST,
+        timeout=MAX_SECONDS,
         check=False,
     )
     if done.returncode != 0:

@@ -52,7 +52,7 @@ def image_for(law: str, words: str) -> Image:
     return image * (200 if law in ("unclamped", "bounded_fireflies") else 1)
 
 
-def drawn(bloom: Bloom, law: str, words: str) -> Image:
+def draw(bloom: Bloom, law: str, words: str) -> Image:
     """Return what a bloom makes of an image that shows whether the law holds."""
     if law == "views":
         across = 0 if "upper" in words else 1
@@ -96,7 +96,7 @@ def write(folder: Path) -> None:
         if faults:
             text += [f"## `{law}`\n", f"{LAWS[law].sentence}\n"]
         for name, fault in faults.items():
-            right, wrong = (drawn(make(), law, fault.words) for make in (fault.twin, fault.fault))
+            right, wrong = (draw(make(), law, fault.words) for make in (fault.correct, fault.fault))
             off: Any = np.abs(wrong.astype(np.float64) - right)
             brightest, most = float(right.max()), float(off.max())
             tiles = [tile(right, brightest), gap, tile(wrong, brightest), gap, tile(off, most)]

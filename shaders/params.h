@@ -91,11 +91,11 @@
     SAMPLING_ROWS(B, INPUT) \
     THRESHOLD_ROWS(B, READS)
 
-// A filter (lib/filter.glsl): `own` and `coarse` are the shares of an image of the target's size
+// A filter (lib/filter.glsl): `same_size` and `coarse` are the shares of an image of the target's size
 // and of the filtered image, whose weights have the sum `divisor`; the taps along rows and along
 // columns.
 #define FILTER_ROWS(B, INPUT, VEC4S) \
-    INPUT(B, float, own) \
+    INPUT(B, float, same_size) \
     INPUT(B, float, coarse) \
     INPUT(B, float, divisor) \
     VEC4S(B, taps_x, MAX_FILTER_TAPS) \
@@ -431,12 +431,12 @@
     SLOT(SLOT_DIFFERENTIATED, 6) /* the image itself, if it is a source's */
 
 // Fused passes that end with a composite: the scene is at SLOT_SOURCE, or with a filter at
-// SLOT_OWN.
+// SLOT_SAME_SIZE.
 #define FUSED_SLOTS(SLOT) SLOT(SLOT_ENDED, 2) /* see lib/ended.glsl */
 
 // Filters, and sums of up to GATHERED_LEVELS levels.
 #define FILTER_SLOTS(SLOT) \
-    SLOT(SLOT_OWN, 1)    /* an image of the target's size that is added */ \
+    SLOT(SLOT_SAME_SIZE, 1)    /* an image of the target's size that is added */ \
     SLOT(SLOT_LEVELS, 0) /* the first level */
 
 #define GLARE_SLOTS(SLOT) \
@@ -577,7 +577,7 @@
     CONSTANT(10, FIRST_LEVEL, first_level)      /* of HDRP's blurs: they make the first level */ \
     CONSTANT(11, DIRECTION, direction)          /* along which axis: DIRECTION_* */ \
     CONSTANT(12, RADIUS, radius)                /* texels of a half-kernel without its middle */ \
-    CONSTANT(13, ADD_OWN, add_own)   /* what is at SLOT_OWN, SLOT_BEFORE or SLOT_ADDED is added */ \
+    CONSTANT(13, ADDS_IMAGE, adds_image)   /* what is at SLOT_SAME_SIZE, SLOT_BEFORE or SLOT_ADDED is added */ \
     CONSTANT(14, UPSAMPLE, upsample) /* what a tap samples: UPSAMPLE_* */ \
     CONSTANT(15, FROM_IMAGE, from_image) /* a variant reads the threshold pass's image */ \
     CONSTANT(16, EMITTERS, emitters)     /* how many passes add up in the target by blending */ \
@@ -588,7 +588,7 @@
     CONSTANT(21, ALPHA, alpha)           /* ALPHA_* */ \
     CONSTANT(22, MASKED, masked)         /* there is a mask */ \
     CONSTANT(23, STORED, stored)         /* the format of the target: STORED_* */ \
-    CONSTANT(24, OWN_SAMPLE, own_sample) /* of a transpose: its first kernel or tap */ \
+    CONSTANT(24, FIRST_SAMPLE, first_sample) /* of a transpose: its first kernel or tap */ \
     CONSTANT(25, STACKED_SAMPLES, stacked_samples) /* how many of these, below each other */ \
     CONSTANT(26, INVERSE, inverse)                 /* a transform is the way back */ \
     CONSTANT(27, ROTATED, rotated)                 /* a stage of a transform has factors */ \
@@ -616,7 +616,7 @@
     CONSTANT(49, TAKEN_X, taken_x)       /* bits of texels that have weights; 0: all */ \
     CONSTANT(50, TAKEN_Y, taken_y)       /* the same along y */ \
     CONSTANT(51, CLAMPED, clamped)       /* the bloom is not negative */ \
-    CONSTANT(52, OWN_TAP, own_tap)       /* of a streak's transpose: its tap */ \
+    CONSTANT(52, STREAK_TAP, streak_tap)       /* of a streak's transpose: its tap */ \
     CONSTANT(53, WINDOW_WIDTH, window_width)   /* of tiles: texels that a pixel adds up along x */ \
     CONSTANT(54, WINDOW_HEIGHT, window_height) /* the same along y */ \
     CONSTANT(55, PICTURES, pictures)           /* of tiles: pictures that are added up */ \

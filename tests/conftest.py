@@ -166,15 +166,15 @@ def kept(environment: None) -> Iterator[dict[object, Kept]]:
 def kept_renderers(kept: dict[object, Kept], monkeypatch: pytest.MonkeyPatch) -> None:
     """The commands of a module's tests share their renderers."""
 
-    def opened(adapter: str = "auto", *, validation: bool = False) -> Renderer:
+    def open_renderer(adapter: str = "auto", *, validation: bool = False) -> Renderer:
         variables = sorted(item for item in os.environ.items() if item[0].startswith("V"))
         key = (adapter, validation, *variables)
         if key not in kept or kept[key].closed:
             kept[key] = Kept(adapter, validation=validation)
         return kept[key]
 
-    monkeypatch.setattr(vkbloom, "Renderer", opened)
-    monkeypatch.setattr(interruptible, "Renderer", opened)
+    monkeypatch.setattr(vkbloom, "Renderer", open_renderer)
+    monkeypatch.setattr(interruptible, "Renderer", open_renderer)
 
 
 @pytest.fixture(scope="session")

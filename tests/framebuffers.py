@@ -12,7 +12,7 @@ import OpenImageIO as oiio
 from numpy.typing import NDArray
 
 from tests.images import noise
-from tests.io.parts import reread, written
+from tests.io.parts import reread, write
 from vkbloom import Frames, Separable, Settings
 
 INFO = {
@@ -36,7 +36,7 @@ def make(
     )
 
 
-def mixed() -> Frames:
+def make_mixed() -> Frames:
     """Return Frames of every dtype, of two sizes, with three and four channels, and depth."""
     return make(
         {
@@ -81,7 +81,7 @@ def write_image(path: Path, pixels: NDArray[Any], kind: str = "", **changes: Any
             setattr(spec, name, value)
         else:
             spec.attribute(name.replace("__", ":"), value)
-    return written(path, spec, np.ascontiguousarray(pixels))
+    return write(path, spec, np.ascontiguousarray(pixels))
 
 
 def decode(data: bytes | None, folder: Path) -> NDArray[np.uint8]:

@@ -47,7 +47,7 @@ def hdr_picture(width: int, height: int, channels: int, dtype: str, seed: int = 
     return (8 * values - 0.5).astype(dtype)
 
 
-def cut_out(width: int, height: int, dtype: str, seed: int = 0) -> NDArray[Any]:
+def make_cut_out(width: int, height: int, dtype: str, seed: int = 0) -> NDArray[Any]:
     """Return a picture whose alpha is 0 to 1, and whose right quarter is transparent black."""
     image = hdr_picture(width, height, 4, dtype, seed)
     if dtype != "uint8":
@@ -56,7 +56,7 @@ def cut_out(width: int, height: int, dtype: str, seed: int = 0) -> NDArray[Any]:
     return image
 
 
-def given_of(names: Iterable[str], image: NDArray[Any]) -> dict[str, Any]:
+def choose_given(names: Iterable[str], image: NDArray[Any]) -> dict[str, Any]:
     """Return a mask and an emission for an image, those that are named."""
     mask = np.random.default_rng(3).random(image.shape[:2], np.float32)
     mask[:9, :9] = 0
@@ -104,7 +104,7 @@ def random_image(height: int, width: int, channels: int = 3, seed: int = 1) -> N
     return np.random.default_rng(seed).random((height, width, channels))
 
 
-def changed(a: NDArray[Any], place: tuple[int, int, int], value: float) -> NDArray[Any]:
+def change(a: NDArray[Any], place: tuple[int, int, int], value: float) -> NDArray[Any]:
     """Return a copy with one value changed."""
     b = a.copy()
     b[place] = value

@@ -1,6 +1,6 @@
 """For a run without the core (make test-pure): a test that asks for a device is skipped.
 
-What is left fails as usual. `MINIMUM` guards against a run in which nearly all is skipped.
+What is left fails as usual. `MIN_PASSED` guards against a run in which nearly all is skipped.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import pytest
 
 import vkbloom
 
-MINIMUM = 300
+MIN_PASSED = 300
 
 
 @pytest.hookimpl(wrapper=True)
@@ -29,9 +29,9 @@ def pytest_runtest_makereport(
 def pytest_sessionfinish(session: pytest.Session) -> None:
     reporter = session.config.pluginmanager.get_plugin("terminalreporter")
     passed = len(reporter.stats.get("passed", ())) if reporter else 0
-    if passed < MINIMUM and session.exitstatus == pytest.ExitCode.OK:
+    if passed < MIN_PASSED and session.exitstatus == pytest.ExitCode.OK:
         session.exitstatus = pytest.ExitCode.TESTS_FAILED
-        print(f"\nwithout the core {passed} tests passed, {MINIMUM} are expected")
+        print(f"\nwithout the core {passed} tests passed, {MIN_PASSED} are expected")
 
 
 def pytest_configure() -> None:

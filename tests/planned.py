@@ -20,7 +20,7 @@ __all__ = [
     "Inputs",
     "Row",
     "bundled_driver",
-    "changed",
+    "change",
     "image_source",
     "new_array",
     "new_arrays",
@@ -35,7 +35,7 @@ SKY = Cubemap((np.zeros((6, 1, 1, 4), np.uint8),))
 SCENES = {has_sky: Scene(MESH, MESH, SKY if has_sky else None) for has_sky in (False, True)}
 
 
-def changed(block: bytes, **places: int) -> bytes:
+def change(block: bytes, **places: int) -> bytes:
     """Return a block of the core with other numbers of 32 bits at some places, `at12` and so on."""
     numbers = np.frombuffer(block, np.uint32).copy()
     for place, number in places.items():

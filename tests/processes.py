@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 from typing import Final
 
-LONGEST: Final = 600  # seconds, after which a process that hangs is ended
+MAX_SECONDS: Final = 600  # seconds, after which a process that hangs is ended
 
 
 def python(
@@ -19,7 +19,7 @@ def python(
         [sys.executable, *arguments],
         cwd=cwd,
         env={**os.environ, **environment},
-        timeout=LONGEST,
+        timeout=MAX_SECONDS,
         capture_output=True,
         text=True,
         check=False,

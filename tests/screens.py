@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tests.scene.parts import WHITE, Mesh, Surface, Texture
+from tests.scene.parts import WHITE, Material, Mesh, Texture
 from vkbloom import Camera, Frames, Renderer, Scene, Settings
 
 # The model matrix of time 0 moves a mesh by (0, -1, 0.25); this camera takes that back and stands
@@ -84,7 +84,7 @@ def panel(
         SQUARE,
         None if radiance is None else np.tile(np.array(radiance, np.float32), (4, 1)),
         np.stack((u, v, u, v), axis=1).astype(np.float32),
-        (Surface(len(SQUARE), base, emission),),
+        (Material(len(SQUARE), base, emission),),
     )
 
 
@@ -103,7 +103,7 @@ GBUFFER = ["albedo", "normal", "position", "brightness", "depth"]
 BLURRED = ["blur_vertical", "bloom"]
 
 
-def deferred(
+def render_deferred(
     renderer: Renderer,
     scene: Scene,
     settings: Settings | None = None,

@@ -22,7 +22,7 @@ _PROPERTY: Final = "processor seconds"
 _SHOWN: Final = 10
 
 
-def _spent() -> float:
+def _spent_seconds() -> float:
     return sum(os.times()[:4])
 
 
@@ -34,7 +34,7 @@ class TimeBudget:
         self.seconds: defaultdict[str, float] = defaultdict(float)
 
     def pytest_runtest_logstart(self) -> None:
-        self.began = _spent()
+        self.began = _spent_seconds()
 
     @pytest.hookimpl(wrapper=True)
     def pytest_runtest_makereport(
@@ -42,7 +42,7 @@ class TimeBudget:
     ) -> Generator[None, pytest.TestReport, pytest.TestReport]:
         report = yield
         if call.when == "teardown":
-            report.user_properties.append((_PROPERTY, _spent() - self.began))
+            report.user_properties.append((_PROPERTY, _spent_seconds() - self.began))
         return report
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:

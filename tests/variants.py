@@ -10,7 +10,9 @@ from vkbloom import Renderer
 VARIANTS = ("fragment", "cpu", "gpu")
 
 
-def opened(variant: str, adapter: str = "auto", *, validation: bool = not SANITIZED) -> Renderer:
+def open_variant(
+    variant: str, adapter: str = "auto", *, validation: bool = not SANITIZED
+) -> Renderer:
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("VKBLOOM_VARIANT", variant)
         return Renderer(adapter, validation=validation)

@@ -163,7 +163,7 @@ def applies(law: str, subject: Subject) -> bool:
     return law != "additive" if not subject.picture else law not in OF_A_BLOOM
 
 
-def measured(subject: Subject) -> str:
+def measure(subject: Subject) -> str:
     """Return gain and standard deviation of the point spread as a short text."""
     spread = testing.point_spread(subject.bloom, subject.probe)[:, :, 0]
     gain, outside = spread.sum(), np.abs(spread).sum() - np.abs(spread[1:-1, 1:-1]).sum()
@@ -190,7 +190,7 @@ def table(subjects: list[Subject], device: str) -> str:
                 broken.append(f"{row.name}: {re.split(' at x|, channel', figure)[0]}")
             elif row.held is None:
                 untested.append(f"{row.name} ({row.message})")
-        point = "" if subject.picture else measured(subject)
+        point = "" if subject.picture else measure(subject)
         rows.append(f"| {subject.name} | {point} | {'; '.join(broken)} | {', '.join(untested)} |")
     heads = ["| blur | one lit pixel | breaks | not tested |", "|---|---|---|---|"]
     return "\n".join([f"The adapter, where one is used: {device}.", "", *heads, *rows, ""])

@@ -8,14 +8,14 @@ from __future__ import annotations
 import numpy as np
 
 import vkbloom
-from vkbloom._cli.check.measuring import PRESET_BLOOMS, exact, shown, sketch
+from vkbloom._cli.check.measuring import PRESET_BLOOMS, bloom_of, exact, sketch
 
 
 def main() -> None:
     """Render the presets with software, and write what `nearest_preset` reads."""
     with vkbloom.Renderer("software") as renderer:
         blooms = {
-            name: sketch(shown(renderer, exact(settings), "bloom")).astype(np.float16)
+            name: sketch(bloom_of(renderer, exact(settings), "bloom")).astype(np.float16)
             for name, settings in vkbloom.presets.items()
         }
     np.savez_compressed(PRESET_BLOOMS, **blooms)

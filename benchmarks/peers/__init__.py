@@ -119,7 +119,7 @@ def bandwidths(group: str, times: dict[str, Times], size: int, names: Iterable[s
     return [Table(f"{group}: image read once and written once", header, rows)]
 
 
-def rounded(values: NDArray[Any], dtype: np.dtype[Any]) -> NDArray[Any]:
+def round_to(values: NDArray[Any], dtype: np.dtype[Any]) -> NDArray[Any]:
     """Return float values as `dtype`; 8-bit levels are rounded and clamped."""
     levels = np.rint(np.clip(values, 0, 255)) if dtype == np.uint8 else values
     result: NDArray[Any] = levels.astype(dtype, copy=False)

@@ -26,7 +26,7 @@ def _cupy() -> Any:
     return cupy
 
 
-def _timed(cupy: Any, work: Any) -> GpuWork:
+def _time(cupy: Any, work: Any) -> GpuWork:
     """Return work on the device, timed by events."""
 
     def call(_: int) -> Any:
@@ -80,15 +80,15 @@ def gpu_bloom(
         return source + blur()
 
     brighter(source, np.float32(threshold), bright)
-    fused = _fused(cupy, source, kernel, threshold)
+    fused = _run_fused(cupy, source, kernel, threshold)
     return {
-        "cupyx correlate1d twice": _timed(cupy, bloom),
-        "cupyx correlate1d twice, blur alone": _timed(cupy, blur),
-        "a CUDA kernel of our own": _timed(cupy, fused),
+        "cupyx correlate1d twice": _time(cupy, bloom),
+        "cupyx correlate1d twice, blur alone": _time(cupy, blur),
+        "a CUDA kernel of our own": _time(cupy, fused),
     }
 
 
-def _fused(cupy: Any, source: Any, kernel: NDArray[np.float32], threshold: float) -> Any:
+def _run_fused(cupy: Any, source: Any, kernel: NDArray[np.float32], threshold: float) -> Any:
     """Return the bloom of `source` by fused.cu, one kernel for all steps."""
     height, width, _ = source.shape
     radius = len(kernel) // 2
@@ -121,7 +121,7 @@ def gpu_copy(image: NDArray[Any]) -> dict[str, GpuWork]:
         target.data.copy_from_device_async(source.data, source.nbytes, cupy.cuda.Stream.null)
         return target
 
-    return {COPY: _timed(cupy, copy)}
+    return {COPY: _time(cupy, copy)}
 
 
 def transfers(image: NDArray[Any]) -> dict[str, GpuWork]:

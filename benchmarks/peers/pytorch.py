@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.inputs import REC709
-from benchmarks.peers import COPY, GpuWork, ImageBloom, rounded
+from benchmarks.peers import COPY, GpuWork, ImageBloom, round_to
 
 
 class _Blur:
@@ -52,7 +52,7 @@ def image_bloom(
             single = torch.from_numpy(picture).permute(2, 0, 1)[None].float()
             result = single + blur.blur(blur.glow(single, threshold * scale))
             values: NDArray[Any] = result[0].permute(1, 2, 0).numpy()
-        return rounded(values, picture.dtype)
+        return round_to(values, picture.dtype)
 
     return {"PyTorch": bloom}
 
@@ -125,7 +125,7 @@ def gpu_convolution(
     def glow_of() -> Any:
         return torch.where((source @ weights > threshold)[..., None], source, 0)
 
-    def convolved(glow: Any) -> Any:
+    def convolve(glow: Any) -> Any:
         # Three real transforms: alpha is not convolved.
         planes = glow[..., :3].permute(2, 0, 1).float()
         spectra = torch.fft.rfft2(planes, padded)
@@ -134,13 +134,13 @@ def gpu_convolution(
 
     def alone() -> Any:
         result = torch.empty_like(source)
-        result[..., :3] = convolved(glow)
+        result[..., :3] = convolve(glow)
         result[..., 3] = 1
         return result
 
     def bloom() -> Any:
         result = source.clone()
-        result[..., :3] += convolved(glow_of())
+        result[..., :3] += convolve(glow_of())
         return result
 
     def copy() -> Any:

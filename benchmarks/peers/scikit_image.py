@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.peers import ImageBloom, rounded
+from benchmarks.peers import ImageBloom, round_to
 from benchmarks.peers.scipy import glow_of
 
 
@@ -25,6 +25,6 @@ def image_bloom(
         single, blurred = glow_of(picture, threshold)
         for shape in ((-1, 1, 1), (1, -1, 1)):
             blurred = filters.correlate_sparse(blurred, kernel.reshape(shape), mode="nearest")
-        return rounded(np.add(single, blurred, out=blurred), picture.dtype)
+        return round_to(np.add(single, blurred, out=blurred), picture.dtype)
 
     return {"scikit-image": bloom}

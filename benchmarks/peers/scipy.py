@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.inputs import REC709
-from benchmarks.peers import ImageBloom, rounded
+from benchmarks.peers import ImageBloom, round_to
 
 
 def glow_of(
@@ -34,7 +34,7 @@ def image_bloom(
         single, glow = glow_of(picture, threshold)
         blurred = ndimage.correlate1d(glow, kernel, axis=0, mode="nearest")
         blurred = ndimage.correlate1d(blurred, kernel, axis=1, mode="nearest", output=glow)
-        return rounded(np.add(single, blurred, out=blurred), picture.dtype)
+        return round_to(np.add(single, blurred, out=blurred), picture.dtype)
 
     return {"SciPy": bloom}
 
@@ -57,6 +57,6 @@ def convolution(
         blurred = fft.irfft2(spectra, padded, workers=threads, overwrite_x=True)
         height, width = picture.shape[:2]
         result = single + blurred[:, :height, :width].transpose(1, 2, 0)
-        return rounded(result, picture.dtype)
+        return round_to(result, picture.dtype)
 
     return {"SciPy's transforms": bloom}

@@ -47,7 +47,7 @@ uint32_t vkb_add_bevy_method(struct vkb_levels *levels)
     vkb_levels_reduce_rest(levels, x, y);
     for (uint32_t level = 0; level + 1 < levels->count; ++level) {
         const double factor = blend_factor(settings, level + 1, levels->count);
-        combination.own[level] = mixed ? 1.0 - factor : 1.0;
+        combination.same_size[level] = mixed ? 1.0 - factor : 1.0;
         combination.coarse[level] = factor;
     }
     combination.radius_x = x;

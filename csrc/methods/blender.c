@@ -239,7 +239,7 @@ static uint32_t add_line(struct vkb_levels *levels, int direction, int step_x, i
         struct vkb_pass_row row =
             vkb_row_of_lines(levels, &vkb_shader_simple_star_comp, lines, from, to);
         vkb_read_at(&row, SLOT_BEFORE, adds ? before : VKB_NO_IMAGE);
-        row.constants.add_own = adds;
+        row.constants.adds_image = adds;
         row.block = VKB_BLOCK_star;
         row.params.star = (struct vkb_star_params){
             .step_x = step_x,

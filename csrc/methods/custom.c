@@ -83,7 +83,7 @@ static void add_image(struct vkb_levels *levels, uint32_t *images, uint32_t numb
         FAIL(levels, "passes: there are two images named %s", pass->name);
     name_image(levels, pass, name);
     images[number] =
-        vkb_levels_target(levels, enlarged ? "bloom_own" : name, levels->source->format, size,
+        vkb_levels_target(levels, enlarged ? "bloom_buffer" : name, levels->source->format, size,
                           pass->framebuffer && !enlarged);
 }
 

@@ -70,7 +70,7 @@ static float step_of(double step)
 static void add_before(struct vkb_pass_row *row, uint32_t before)
 {
     vkb_read_at(row, SLOT_BEFORE, before);
-    row->constants.add_own = before != VKB_NO_IMAGE;
+    row->constants.adds_image = before != VKB_NO_IMAGE;
 }
 
 void vkb_add_ray_pass(struct vkb_levels *levels, const struct vkb_ray *ray)

@@ -27,7 +27,7 @@ uint32_t vkb_add_pyramid_method(struct vkb_levels *levels)
     combination.gain = 1.0 / levels->count;
     if (settings->level_weight_count) {
         for (uint32_t level = 0; level < levels->count; ++level)
-            combination.own[level] = settings->level_weights[level];
+            combination.same_size[level] = settings->level_weights[level];
         combination.smallest = settings->level_weights[levels->count - 1];
         combination.gain = 1.0;
     }

@@ -111,7 +111,7 @@ bool vkb_accumulate_cotangent(struct vkb_adjoint *adjoint, const struct vkb_pass
         return false;
     const struct vkb_image_row *forward = &adjoint->graph->images[image];
     const struct vkb_size size = {forward->width, forward->height};
-    row.constants.add_own = *cotangent != VKB_NO_IMAGE;
+    row.constants.adds_image = *cotangent != VKB_NO_IMAGE;
     row.reads[SLOT_ADDED] = *cotangent;
     row.constants.of_source =
         forward->input == VKB_INPUT_IMAGE || forward->input == VKB_INPUT_EMISSION;

@@ -21,21 +21,21 @@ static bool accumulate_all(struct vkb_adjoint *adjoint, uint32_t cotangents, uin
 static bool accumulate_before(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
                               struct vkb_error *error)
 {
-    return !pass->constants.add_own
+    return !pass->constants.adds_image
         || accumulate_all(adjoint, vkb_cotangent_of(adjoint, pass), pass->reads[SLOT_BEFORE],
                           error);
 }
 
 // The row of a pass that has its own transpose: it reads the cotangents in place of its image.
-static struct vkb_pass_row own_row(const struct vkb_adjoint *adjoint,
-                                   const struct vkb_pass_row *pass)
+static struct vkb_pass_row transpose_row(const struct vkb_adjoint *adjoint,
+                                         const struct vkb_pass_row *pass)
 {
     struct vkb_pass_row row = *pass;
 
     row.reads[SLOT_SOURCE] = vkb_cotangent_of(adjoint, pass);
-    if (pass->constants.add_own)
+    if (pass->constants.adds_image)
         row.reads[SLOT_BEFORE] = VKB_NO_IMAGE;
-    row.constants.add_own = 0;
+    row.constants.adds_image = 0;
     row.constants.alpha = ALPHA_BLUR;  // one of a cotangent
     return row;
 }
@@ -77,7 +77,7 @@ static bool accumulate_taps(struct vkb_adjoint *adjoint, const struct vkb_pass_r
         filter.y.origin = (float)tap * params->step_y;
         filter.x.border = filter.y.border = VKB_BORDER_ZERO;
         vkb_filter_next(&filter, params->next[tap]);
-        row.constants.own_tap = tap;
+        row.constants.streak_tap = tap;
         if (!vkb_accumulate_through(adjoint, &row, &filter, source, pass->targets[0], error))
             return false;
     }
@@ -89,7 +89,7 @@ static bool accumulate_taps(struct vkb_adjoint *adjoint, const struct vkb_pass_r
 bool vkb_transpose_streaks(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
                            struct vkb_error *error)
 {
-    struct vkb_pass_row row = own_row(adjoint, pass);
+    struct vkb_pass_row row = transpose_row(adjoint, pass);
     uint32_t moved;
 
     if (!accumulate_before(adjoint, pass, error))
@@ -114,7 +114,7 @@ bool vkb_transpose_streaks(struct vkb_adjoint *adjoint, const struct vkb_pass_ro
 bool vkb_transpose_dirt(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
                         struct vkb_error *error)
 {
-    struct vkb_pass_row row = own_row(adjoint, pass);
+    struct vkb_pass_row row = transpose_row(adjoint, pass);
 
     return accumulate_own_row(adjoint, pass, &row, error);
 }
@@ -124,7 +124,7 @@ bool vkb_transpose_dirt(struct vkb_adjoint *adjoint, const struct vkb_pass_row *
 bool vkb_transpose_star(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
                         struct vkb_error *error)
 {
-    struct vkb_pass_row row = own_row(adjoint, pass);
+    struct vkb_pass_row row = transpose_row(adjoint, pass);
 
     row.shader = &vkb_shader_simple_star_transposed_comp;
     return accumulate_before(adjoint, pass, error)
@@ -134,7 +134,7 @@ bool vkb_transpose_star(struct vkb_adjoint *adjoint, const struct vkb_pass_row *
 bool vkb_transpose_box(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
                        struct vkb_error *error)
 {
-    struct vkb_pass_row row = own_row(adjoint, pass);
+    struct vkb_pass_row row = transpose_row(adjoint, pass);
 
     row.shader = &vkb_shader_box_mean_transposed_comp;
     return accumulate_own_row(adjoint, pass, &row, error);

@@ -83,7 +83,7 @@ static bool accumulate_each(struct vkb_adjoint *adjoint, const struct vkb_pass_r
     struct vkb_filter filter;
 
     for (uint32_t kernel = 0; kernel < count; ++kernel) {
-        row.constants.own_sample = (int32_t)kernel;
+        row.constants.first_sample = (int32_t)kernel;
         begin_filter(adjoint, pass, kernel, 0, &filter);
         if (!vkb_accumulate_through(adjoint, &row, &filter, pass->reads[SLOT_SOURCE],
                                     pass->targets[0], error))

@@ -189,10 +189,11 @@ static struct vkb_pass_row filter_row(const struct vkb_levels *levels,
 }
 
 void vkb_add_mixed_filter_pass(struct vkb_levels *levels, const struct vkb_filter *filter,
-                               uint32_t from, uint32_t own, double own_share, uint32_t to)
+                               uint32_t from, uint32_t same_size, double same_size_share,
+                               uint32_t to)
 {
     struct vkb_filter filters[2] = {*filter};
-    const bool adds_own = own != VKB_NO_IMAGE;
+    const bool adds_image = same_size != VKB_NO_IMAGE;
     uint32_t count;
     struct vkb_pass_row row = filter_row(levels, filter, from, to, &count);
 
@@ -202,14 +203,14 @@ void vkb_add_mixed_filter_pass(struct vkb_levels *levels, const struct vkb_filte
             || !vkb_fail(levels->error, VKB_ERROR_GENERAL,
                          "filter: %s has %u places of taps along an axis, more than %d",
                          vkb_graph_label(levels->graph, row.name), count, MAX_FILTER_TAPS);
-    row.constants.add_own = adds_own;
-    row.params.filter.own = (float)own_share;
-    vkb_read_at(&row, SLOT_OWN, own);
-    if (adds_own) {
-        vkb_filter_begin(levels->graph, own, to, &filters[1]);
-        filters[1].gain = own_share;
+    row.constants.adds_image = adds_image;
+    row.params.filter.same_size = (float)same_size_share;
+    vkb_read_at(&row, SLOT_SAME_SIZE, same_size);
+    if (adds_image) {
+        vkb_filter_begin(levels->graph, same_size, to, &filters[1]);
+        filters[1].gain = same_size_share;
     }
-    vkb_set_filters(levels, &row, filters, adds_own ? 2 : 1);
+    vkb_set_filters(levels, &row, filters, adds_image ? 2 : 1);
     vkb_levels_pass(levels, &row);
 }
 

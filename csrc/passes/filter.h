@@ -27,7 +27,8 @@ void vkb_set_kind(struct vkb_filter *filter, enum vkb_mode kind);
 void vkb_add_filter_pass(struct vkb_levels *levels, const struct vkb_filter *filter, uint32_t from,
                          uint32_t to);
 void vkb_add_mixed_filter_pass(struct vkb_levels *levels, const struct vkb_filter *filter,
-                               uint32_t from, uint32_t own, double own_share, uint32_t to);
+                               uint32_t from, uint32_t same_size, double same_size_share,
+                               uint32_t to);
 
 // Passes of dual Kawase (Bjorge, "Bandwidth-Efficient Rendering", SIGGRAPH 2015). Down: four times
 // the centre, and four diagonal taps at a distance of half a texel times the offset. Up: four axial

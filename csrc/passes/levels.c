@@ -7,7 +7,7 @@
 #include <math.h>
 #include <string.h>
 
-struct vkb_combination vkb_combine(enum vkb_mode kernel, double own, double coarse)
+struct vkb_combination vkb_combine(enum vkb_mode kernel, double same_size, double coarse)
 {
     struct vkb_combination combination = {
         .kernel = kernel,
@@ -19,7 +19,7 @@ struct vkb_combination vkb_combine(enum vkb_mode kernel, double own, double coar
     };
 
     for (int level = 0; level < MAX_LEVELS; ++level) {
-        combination.own[level] = own;
+        combination.same_size[level] = same_size;
         combination.coarse[level] = coarse;
     }
     return combination;
@@ -182,10 +182,10 @@ static struct vkb_filter enlarging(const struct vkb_graph *graph, uint32_t from,
     }
 }
 
-// Upsamples the smaller level `from` to `to`, and adds the level `own`, if there is one.
+// Upsamples the smaller level `from` to `to`, and adds the level `same_size`, if there is one.
 static void add_up(struct vkb_levels *levels, const struct vkb_combination *combination,
-                   enum vkb_mode kernel, uint32_t from, uint32_t to, uint32_t own, double own_share,
-                   double coarse_share)
+                   enum vkb_mode kernel, uint32_t from, uint32_t to, uint32_t same_size,
+                   double same_size_share, double coarse_share)
 {
     const struct vkb_image_row *smaller = &levels->graph->images[from];
     const struct vkb_image_row *larger = &levels->graph->images[to];
@@ -197,7 +197,7 @@ static void add_up(struct vkb_levels *levels, const struct vkb_combination *comb
         y = (double)smaller->height / larger->height;
     }
     const struct vkb_filter filter = enlarging(levels->graph, from, to, kernel, x, y, coarse_share);
-    vkb_add_mixed_filter_pass(levels, &filter, from, own, own_share, to);
+    vkb_add_mixed_filter_pass(levels, &filter, from, same_size, same_size_share, to);
 }
 
 // Adds up levels. In rgba8unorm, whose largest value is 1, each image holds its sum divided by the
@@ -211,12 +211,12 @@ uint32_t vkb_levels_add_up(struct vkb_levels *levels, const struct vkb_combinati
     levels->below = combination->smallest;
     for (uint32_t level = levels->count - 1; level-- > 0;) {
         const uint32_t from = top;
-        const double own = combination->own[level],
+        const double same_size = combination->same_size[level],
                      coarse = combination->coarse[level] * levels->below;
-        const double sum = fabs(own) + fabs(coarse), flat = means && sum > 0.0 ? sum : 1.0;
+        const double sum = fabs(same_size) + fabs(coarse), flat = means && sum > 0.0 ? sum : 1.0;
         top = vkb_levels_image(levels, levels->sizes[level], "up_%u", level);
         add_up(levels, combination, combination->kernel, from, top, levels->downs[level],
-               own / flat, coarse / flat);
+               same_size / flat, coarse / flat);
         levels->below = flat;
     }
     return top;

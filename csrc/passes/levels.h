@@ -12,12 +12,12 @@ struct vkb_combination {
     double radius_x, radius_y;          // of a tent filter, in texels of the smaller level
     bool width_step;                    // the radii are relative to the smaller level's width
     bool target_step;                   // the radii are one texel of the larger level
-    double own[MAX_LEVELS], coarse[MAX_LEVELS];
+    double same_size[MAX_LEVELS], coarse[MAX_LEVELS];
     double smallest, gain;
 };
 
-// A combination with the same `own` and `coarse` for all levels.
-struct vkb_combination vkb_combine(enum vkb_mode kernel, double own, double coarse);
+// A combination with the same `same_size` and `coarse` for all levels.
+struct vkb_combination vkb_combine(enum vkb_mode kernel, double same_size, double coarse);
 
 // The widest level of a method that gives its levels a height and the aspect of the frame: 16384,
 // or the adapter's limit where that is lower.

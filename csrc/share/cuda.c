@@ -193,7 +193,7 @@ static bool find_device(struct vkb_cuda *cuda, const uint8_t uuid[16], const cha
 static _Thread_local int capture_mode;
 
 // Every use of the context is between these two. Waits, imports and frees would else invalidate
-// captures of any thread, which have nothing to do with the own stream.
+// captures of any thread, which have nothing to do with the core's stream.
 static bool enter(struct vkb_cuda *cuda, struct vkb_error *error)
 {
     if (!CU(error, cuda->cuCtxPushCurrent(cuda->context)))
@@ -225,7 +225,7 @@ static bool require_no_capture(struct vkb_cuda *cuda, void *stream, struct vkb_e
                     "recorded; make the call before or after the capture");
 }
 
-// As enter, to give work to the own stream and, unless it is NULL, to another one.
+// As enter, to give work to the core's stream and, unless it is NULL, to another one.
 static bool enter_streams(struct vkb_cuda *cuda, void *other, struct vkb_error *error)
 {
     if (cuda->stuck)

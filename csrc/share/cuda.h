@@ -28,8 +28,8 @@ void vkb_cuda_close(struct vkb_cuda *cuda);
 bool vkb_cuda_enter(struct vkb_cuda *cuda, struct vkb_error *error);
 void vkb_cuda_leave(struct vkb_cuda *cuda);
 
-// Fails if the own stream is captured into a graph, which stays as it is. All functions below that
-// give work to streams do so, too.
+// Fails if the core's stream is captured into a graph, which stays as it is. All functions below
+// that give work to streams do so, too.
 bool vkb_cuda_require_no_capture(struct vkb_cuda *cuda, struct vkb_error *error);
 
 // Imports an exported timeline semaphore. The descriptor belongs to CUDA or is closed.
@@ -39,10 +39,10 @@ void vkb_cuda_free_semaphore(struct vkb_cuda *cuda, void *semaphore);
 // Signals it when the stream has done all work that it has got so far.
 bool vkb_cuda_signal(struct vkb_cuda *cuda, void *semaphore, uint64_t value,
                      struct vkb_error *error);
-// Makes a stream wait for it; NULL: the own one.
+// Makes a stream wait for it; NULL: the core's.
 bool vkb_cuda_wait(struct vkb_cuda *cuda, void *semaphore, uint64_t value, void *stream,
                    struct vkb_error *error);
-// Waits until the own stream has done all work. Both may overlap with other calls.
+// Waits until the core's stream has done all work. Both may overlap with other calls.
 bool vkb_cuda_finish(struct vkb_cuda *cuda, struct vkb_error *error);
 // The same of all streams of the context. Fails, and makes captures of graphs invalid, if a stream
 // is captured.
@@ -66,7 +66,7 @@ bool vkb_cuda_import(struct vkb_cuda *cuda, int descriptor, uint64_t size,
 // Waits for work that uses it. May overlap with other calls.
 void vkb_cuda_free(struct vkb_cuda *cuda, struct vkb_cuda_memory *memory);
 
-// Copies on the own stream between addresses of CUDA's memory and the host's, and waits. May
+// Copies on the core's stream between addresses of CUDA's memory and the host's, and waits. May
 // overlap with other calls.
 bool vkb_cuda_copy(struct vkb_cuda *cuda, vkb_cuda_address to, vkb_cuda_address from, size_t size,
                    struct vkb_error *error);

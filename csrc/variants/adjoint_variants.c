@@ -23,8 +23,8 @@ bool vkb_are_floats(const struct vkb_variant_choice *choice, const struct vkb_pa
 bool vkb_is_factor(const struct vkb_pass_row *pass)
 {
     return vkb_transposes(pass, VKB_BLOCK_composite) && !pass->constants.masked
-        && pass->constants.by == BY_BLOOM && !pass->constants.add_own && !pass->constants.of_source
-        && pass->reads[SLOT_BLOOM] == VKB_NO_IMAGE
+        && pass->constants.by == BY_BLOOM && !pass->constants.adds_image
+        && !pass->constants.of_source && pass->reads[SLOT_BLOOM] == VKB_NO_IMAGE
         && (pass->constants.composite == COMPOSITE_ADD
             || pass->constants.composite == COMPOSITE_MIX);
 }
@@ -235,7 +235,7 @@ static bool add_pictures(struct vkb_variant_choice *choice, const struct vkb_pas
     memcpy(&row, pass, sizeof row);
     row.fused = row.gains_if_finite = true;
     row.reads[SLOT_ADDED] = first->reads[SLOT_ADDED];
-    row.constants.add_own = first->constants.add_own;
+    row.constants.adds_image = first->constants.adds_image;
     row.params.adjoint_filter.share = first->params.adjoint_filter.share;
     for (uint32_t i = 0; i < pass->joined_count; ++i) {
         const struct vkb_readers *x = &pass->joined[i].x.readers, *y = &pass->joined[i].y.readers;

@@ -261,7 +261,7 @@ bool vkb_add_fused_variant(struct vkb_variant_choice *choice, const struct vkb_p
 // Whether the transpose adds nothing else to its result.
 static bool is_alone(const struct vkb_pass_row *pass)
 {
-    return !pass->constants.add_own && !pass->constants.masked;
+    return !pass->constants.adds_image && !pass->constants.masked;
 }
 
 // The transposes of a bloom, of which `pass` is the last one: that of the threshold, or of the
@@ -278,7 +278,7 @@ static bool find_adjoint_bloom(const struct vkb_graph *graph, const struct vkb_p
     uint32_t by_bloom;
 
     if (!(thresholds || pass->block == VKB_BLOCK_adjoint_filter) || !pass->constants.of_source
-        || !pass->constants.add_own)
+        || !pass->constants.adds_image)
         return false;
     *bloom = (struct bloom){
         .last = thresholds ? vkb_writer_of(graph, pass->reads[SLOT_COTANGENTS]) : pass,

@@ -73,7 +73,7 @@ bool vkb_add_gathered_variant(struct vkb_variant_choice *choice, const struct vk
                   && vkb_same_size(&choice->plain, pass->reads[SLOT_LEVELS], pass->targets[0])
                   && vkb_has_format_of(&choice->plain, pass->reads[SLOT_LEVELS], pass->targets[0]);
     memcpy(&row, pass, sizeof row);
-    row.constants.add_own = own;
+    row.constants.adds_image = own;
     row.constants.sampling = 0;
     for (uint32_t level = own; level < levels; ++level)
         row.reads[SLOT_LEVELS + level] = add_rows(choice, pass, level);
@@ -124,8 +124,8 @@ static bool make_filter(const struct vkb_variant_choice *choice, const struct vk
     }
     // Of images with one format.
     if (!vkb_has_format_of(&choice->plain, pass->reads[SLOT_SOURCE], pass->targets[0])
-        || (pass->constants.add_own
-            && !vkb_has_format_of(&choice->plain, pass->reads[SLOT_OWN], pass->targets[0]))
+        || (pass->constants.adds_image
+            && !vkb_has_format_of(&choice->plain, pass->reads[SLOT_SAME_SIZE], pass->targets[0]))
         || !vkb_fits_linear(choice, row))
         return false;
     row->constants.enlarged = source->height <= target->height;
@@ -180,7 +180,7 @@ static struct vkb_pass_row nested_row(const struct vkb_variant_choice *choice,
     memset(&row.params, 0, sizeof row.params);
     row.fused = true;
     vkb_read_only(&row, up->reads[SLOT_SOURCE]);
-    vkb_read_at(&row, SLOT_OWN, pass->reads[SLOT_SCENE]);
+    vkb_read_at(&row, SLOT_SAME_SIZE, pass->reads[SLOT_SCENE]);
     row.block = VKB_BLOCK_filter_final;
     copy_filter(&row.params.filter_final, &up->params.filter);
     copy_composite(&row.params.filter_final, &pass->params.composite);

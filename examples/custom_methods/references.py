@@ -18,7 +18,7 @@ def glow(image: Array) -> Array:
     return np.dstack([image[..., :3], np.ones(image.shape[:2])])
 
 
-def shifted(image: Array, right: int, down: int) -> Array:
+def shift(image: Array, right: int, down: int) -> Array:
     """Return the pixels at a distance, clamped to the edge."""
     height, width = image.shape[:2]
     rows = np.clip(np.arange(height) + down, 0, height - 1)
@@ -35,8 +35,8 @@ def forty_lines(image: Array, settings: Settings) -> dict[str, Any]:
     weights = {i: np.exp(-0.5 * i * i / spread**2) for i in range(-12, 13)}
     total = sum(weights.values())
     half = sampling.sample(source, size)
-    rows = sum(w * shifted(half, i, 0) for i, w in weights.items()) / total
-    columns = sum(w * shifted(rows, 0, i) for i, w in weights.items()) / total
+    rows = sum(w * shift(half, i, 0) for i, w in weights.items()) / total
+    columns = sum(w * shift(rows, 0, i) for i, w in weights.items()) / total
     bloom = sampling.sample(columns, (width, height))
     return {"half": half, "rows": rows, "bloom": bloom}
 
@@ -62,11 +62,11 @@ def karis(image: Array, settings: Settings) -> dict[str, Any]:
 def streak(image: Array, settings: Settings) -> dict[str, Any]:
     """Return the framebuffers of streak.hook."""
     source, fade = glow(image), settings.value_of("fade")
-    near = sum(
-        0.5 * fade**i * shifted(source, side * i, 0) for i in range(8) for side in (-1, 1)
-    ) * (1 - fade)
+    near = sum(0.5 * fade**i * shift(source, side * i, 0) for i in range(8) for side in (-1, 1)) * (
+        1 - fade
+    )
     bloom = sum(
-        0.5 * fade ** (8 * i) * shifted(near, 8 * side * i, 0) for i in range(4) for side in (-1, 1)
+        0.5 * fade ** (8 * i) * shift(near, 8 * side * i, 0) for i in range(4) for side in (-1, 1)
     )
     return {"near": near, "bloom": bloom}
 
@@ -75,4 +75,4 @@ def compute(image: Array, settings: Settings) -> dict[str, Any]:
     """Return the framebuffers of compute.hook."""
     source = glow(image)
     steps = range(-2, 3)
-    return {"bloom": sum(shifted(source, x, y) for y in steps for x in steps) / 25}
+    return {"bloom": sum(shift(source, x, y) for y in steps for x in steps) / 25}

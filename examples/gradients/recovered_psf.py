@@ -29,7 +29,7 @@ def lens() -> NDArray[np.float64]:
     return kernel / kernel.sum()
 
 
-def recovered(
+def recover(
     renderer: vkbloom.Renderer, image: NDArray[Any], picture: NDArray[Any]
 ) -> NDArray[np.float64]:
     """Return the kernel whose bloom of the image is the picture."""
@@ -62,7 +62,7 @@ def main(path: str) -> None:
     with vkbloom.Renderer() as renderer:
         settings = vkbloom.Convolution(truth.astype(np.float32), normalize=False)
         picture = renderer.apply(image, settings, framebuffers="final")["final"]
-        found = recovered(renderer, image, picture)
+        found = recover(renderer, image, picture)
     print(f"largest error: {np.abs(found - truth).max() / truth.max():.4f} of the kernel's maximum")
     both = np.concatenate([found, truth], axis=1)[..., None].repeat(3, axis=2)
     shown = (both / truth.max()).astype(np.float32)

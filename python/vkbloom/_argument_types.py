@@ -129,7 +129,7 @@ def _kinds_of(function: Callable[..., Any]) -> dict[str, _Kind]:
     return kinds
 
 
-def checked(function: _Function) -> _Function:
+def check_arguments(function: _Function) -> _Function:
     """Make a function raise TypeError for an argument that its annotation does not accept.
 
     Checked are annotations of one class, and of built-in types: numbers, texts, paths, functions,

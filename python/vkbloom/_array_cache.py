@@ -63,7 +63,7 @@ _SHARING: Final = ProcessLock()
 _of_renderers: Callable[[], ArrayCache | None] = lambda: None  # noqa: E731  a dead reference
 
 
-def shared() -> ArrayCache:
+def shared_cache() -> ArrayCache:
     """Return the arrays of the open renderers, each of which holds them until it is closed."""
     global _of_renderers  # noqa: PLW0603  a weak reference: the renderers are the owners
     with _SHARING:
@@ -74,7 +74,7 @@ def shared() -> ArrayCache:
     return arrays
 
 
-def kept(make: Callable[..., _Made]) -> Callable[..., _Made]:
+def keep(make: Callable[..., _Made]) -> Callable[..., _Made]:
     """Keep the results of a function of hashable arguments."""
 
     @functools.wraps(make)

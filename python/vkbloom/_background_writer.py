@@ -9,7 +9,7 @@ from typing import TypeVar
 Result = TypeVar("Result")
 
 
-def written_in_background(
+def write_in_background(
     made: Iterable[tuple[Result, Callable[[], object]]],
 ) -> Iterator[Result]:
     """Yield each result when its function, which a thread calls, has written it.

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from vkbloom import _core
-from vkbloom._argument_types import checked
+from vkbloom._argument_types import check_arguments
 from vkbloom._public import public
 from vkbloom._renderer.default import default_renderer
 from vkbloom._renderer.renderer import Renderer
@@ -43,7 +43,7 @@ def _functions() -> Callable[..., int]:
 
 
 @public("vkbloom")
-@checked
+@check_arguments
 def capture(
     path: str | os.PathLike[str], *, renderer: Renderer | None = None
 ) -> AbstractContextManager[None]:
@@ -70,11 +70,11 @@ def capture(
     Messages of the validation layer have them, too. RenderDoc hides VK_EXT_external_memory_host, so
     results are copied through staging memory.
     """
-    return _captured((renderer or default_renderer())._core.instance, path)
+    return _capture_to((renderer or default_renderer())._core.instance, path)
 
 
 @contextmanager
-def _captured(instance: int, path: str | os.PathLike[str]) -> Iterator[None]:
+def _capture_to(instance: int, path: str | os.PathLike[str]) -> Iterator[None]:
     """Write what the devices of an instance do meanwhile to a file."""
     call = _functions()
     target = Path(path)

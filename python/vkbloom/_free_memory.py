@@ -18,7 +18,7 @@ ADVICE: Final = (
 )
 
 
-def address_space_left() -> int | None:
+def free_address_space() -> int | None:
     """Return the bytes below this process's limit of address space; None without a limit."""
     if sys.platform == "win32":
         return None
@@ -32,9 +32,9 @@ def address_space_left() -> int | None:
     return max(limit - used, 0)
 
 
-def memory_left() -> int | None:
+def free_memory() -> int | None:
     """Return the bytes that this process can still allocate; None if this is not known."""
-    left = [] if (space := address_space_left()) is None else [space]
+    left = [] if (space := free_address_space()) is None else [space]
     try:
         for line in Path("/proc/meminfo").read_text("ascii").splitlines():
             if line.startswith("MemAvailable:"):

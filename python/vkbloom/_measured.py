@@ -8,19 +8,19 @@ from typing import Any, cast
 
 import numpy as np
 
-from vkbloom._array_cache import kept
+from vkbloom._array_cache import keep
 from vkbloom._psf.base import Array
 from vkbloom._psf.sampled import SampledPSF
 from vkbloom._public import public
 from vkbloom._settings.fields import value_field
 from vkbloom._settings.registry import METHODS
-from vkbloom._settings.settings import Settings, given_settings
+from vkbloom._settings.settings import Settings, resolve_settings
 
 
 def _read_settings(settings: Any) -> Settings:
     if isinstance(settings, Mapping):
         settings = Settings.from_dict(settings)
-    given = given_settings(settings)
+    given = resolve_settings(settings)
     if given.threshold is not None:
         raise ValueError(
             f"threshold: {given.threshold!r} is not None; a bloom with a threshold is not "
@@ -57,7 +57,7 @@ class measured(SampledPSF):
         return _spread(self)
 
 
-@kept
+@keep
 def _spread(psf: measured) -> Array:
     from vkbloom import reference  # noqa: PLC0415  costs start-up time
 
@@ -67,14 +67,14 @@ def _spread(psf: measured) -> Array:
     point[height // 2, width // 2] = 1
     settings = cast("Settings", psf.settings)
     if METHODS.is_added(settings.method):
-        spread = _rendered(point, settings)
+        spread = _render(point, settings)
     else:
         spread = reference.blur(point, settings, format="rgba32float")
     spread.flags.writeable = False
     return spread
 
 
-def _rendered(point: Array, settings: Settings) -> Array:
+def _render(point: Array, settings: Settings) -> Array:
     """Return the bloom of a custom method."""
     from vkbloom._renderer.default import apply  # noqa: PLC0415  above this floor
 

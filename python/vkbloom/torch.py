@@ -13,7 +13,7 @@ from vkbloom._gradients.operators import (
     number_of,
     refuse_capture,
     refuse_tangents,
-    replaced,
+    replace,
     text_of,
 )
 from vkbloom._renderer.renderer import Renderer
@@ -146,8 +146,8 @@ class Bloom(torch.nn.Module):  # type: ignore[misc]
     @property
     def settings(self) -> Settings:
         """The settings with what was learned."""
-        values = [_held(self._parameter(name), self._ranges[name]) for name in self._names]
-        return replaced(self._start, dict(zip(self._names, values, strict=True)))
+        values = [_clamp(self._parameter(name), self._ranges[name]) for name in self._names]
+        return replace(self._start, dict(zip(self._names, values, strict=True)))
 
     def forward(self, image: Any, *, mask: Any = None, emission: Any = None) -> Any:
         """Add bloom, as `bloom` does."""
@@ -166,7 +166,7 @@ class Bloom(torch.nn.Module):  # type: ignore[misc]
         parameters = [self._parameter(name) for name in self._names]
         with torch.no_grad():
             for name, parameter in zip(self._names, parameters, strict=True):
-                held = _held(parameter, self._ranges[name])
+                held = _clamp(parameter, self._ranges[name])
                 # A write, also of an equal value, makes what earlier calls have saved unusable.
                 # (Compiled code saves copies, and cannot depend on values.)
                 if torch.compiler.is_compiling() or not torch.equal(held, parameter):
@@ -174,7 +174,7 @@ class Bloom(torch.nn.Module):  # type: ignore[misc]
         return parameters
 
 
-def _held(value: Any, ends: tuple[float, float] | None) -> Any:
+def _clamp(value: Any, ends: tuple[float, float] | None) -> Any:
     """Return a value, or the nearest end of its range."""
     return value.detach() if ends is None else value.detach().clamp(*ends)
 

@@ -6,7 +6,7 @@ SAMPLED_IMAGE(SLOT_DIFFERENTIATED, differentiated);
 // The cotangents of this pixel. The image of a source has none at NaN and infinity.
 vec4 gathered(vec4 cotangent)
 {
-    if (ADD_OWN != 0)
+    if (ADDS_IMAGE != 0)
         cotangent += texelFetch(added, PIXEL, 0);
     return OF_SOURCE != 0 ? where_finite(cotangent, texelFetch(differentiated, PIXEL, 0))
                            : cotangent;

@@ -43,9 +43,9 @@ vec4 texel_at(ivec2 texel)
 }
 
 // What other readers of the image have accumulated.
-vec4 own_at(ivec2 pixel)
+vec4 added_at(ivec2 pixel)
 {
-    return ADD_OWN != 0 ? vec4(vec3(share), 1.0) * FETCH(added, SLOT_ADDED, pixel) : vec4(0.0);
+    return ADDS_IMAGE != 0 ? vec4(vec3(share), 1.0) * FETCH(added, SLOT_ADDED, pixel) : vec4(0.0);
 }
 
 // The cotangents of a texel. The image of a source has none at NaN and infinity.

@@ -29,11 +29,11 @@ ivec2 texel_of_target = BEAM_CELL * ivec2(gl_GlobalInvocationID.xy);
 // A sample is part of a cell that is less than this far away from its centre along both axes, but for rounding.
 const float NEAR = 1.0 + 0.5 * float(BEAM_CELL - 1), MARGIN = 1.0 / 64.0;
 // Cells whose longer axis is shorter than this gather from all pixels.
-const float LEAST_LONGER = NEAR + 0.5;
+const float MIN_LONGER = NEAR + 0.5;
 // Steps are at least half a texel long on a pixel's longer axis, but near the sun, where there are no more than two of
 // them. So no more than six samples of a pixel are in the surroundings of a cell; fewer, if steps are not short.
-const float LEAST_STEP = 0.5;
-const int MOST_SAMPLES = 6;
+const float MIN_STEP = 0.5;
+const int MAX_SAMPLES = 6;
 
 // What the texels of a cell have of the samples of a pixel: the sums of their weights. Places are relative to the cell,
 // which needs fewer operations than beam_of(); the number of steps has its bits. Only where a texel is at the edge may
@@ -50,7 +50,7 @@ vec4 weights_for(vec2 pixel, vec2 cell, bool is_at_edge)
     float step = along_x ? way.x : way.y, whole = (along_x ? place.x : place.y) - 0.5 * float(BEAM_CELL - 1);
     float start = 0.0;
     // The first sample that is near.
-    if (abs(step) >= LEAST_STEP) {
+    if (abs(step) >= MIN_STEP) {
         start = -(whole + NEAR * sign(step)) / step;
         start = IS_JITTERED ? start * params.left - offset : start;
         start = ceil(clamp(start - MARGIN, 0.0, last));
@@ -61,9 +61,9 @@ vec4 weights_for(vec2 pixel, vec2 cell, bool is_at_edge)
     way *= apart;
     less *= apart;
     // How many samples are in the surroundings, but for those whose part is rounding.
-    int count = int(2.0 * NEAR / max(abs(step) * apart, LEAST_STEP) + 1.0 + MARGIN);
+    int count = int(2.0 * NEAR / max(abs(step) * apart, MIN_STEP) + 1.0 + MARGIN);
     vec4 sums = vec4(0.0);
-    [[unroll]] for (int i = 0; i < MOST_SAMPLES; ++i) {
+    [[unroll]] for (int i = 0; i < MAX_SAMPLES; ++i) {
         if (i >= count)
             break;
         vec2 first = max(1.0 - abs(place), vec2(0.0)), second = max(1.0 - abs(place - 1.0), vec2(0.0));
@@ -91,7 +91,7 @@ void gather_side(ivec2 cell, vec2 range, float side, int group, int groups)
 {
     ivec2 size = textureSize(cotangents, 0);
     vec2 centre = CENTRE, here = vec2(cell) + 0.5 * float(BEAM_CELL - 1) - centre;
-    bool along_x = abs(here.x) > abs(here.y), is_near = max(abs(here.x), abs(here.y)) < LEAST_LONGER;
+    bool along_x = abs(here.x) > abs(here.y), is_near = max(abs(here.x), abs(here.y)) < MIN_LONGER;
     bool is_at_edge = any(equal(cell, ivec2(0))) || any(greaterThanEqual(cell + BEAM_CELL, size));
     // The longer axis, then the other one.
     vec2 own = along_x ? here.xy : here.yx, sun = along_x ? centre.xy : centre.yx;
@@ -126,10 +126,10 @@ void gather_cell(ivec2 cell, int group, int groups)
     float beyond = !IS_JITTERED ? 0.0 : params.left > 0.0 ? 2.0 / params.left : 2.0;
     float most = params.left > 0.0 ? float(params.most) + 2.0 + beyond : 4.0;
     // The part of a line that is on the longer axis, at most.
-    float slope = longer < LEAST_LONGER ? 0.0 : max(other - around, 0.0) / (longer + around);
+    float slope = longer < MIN_LONGER ? 0.0 : max(other - around, 0.0) / (longer + around);
     float part = inversesqrt(1.0 + slope * slope);
     gather_side(cell, vec2(longer - around, longer + around + most * part), 1.0, group, groups);
-    if (IS_JITTERED && longer >= LEAST_LONGER && longer <= beyond + 2.0 * NEAR)
+    if (IS_JITTERED && longer >= MIN_LONGER && longer <= beyond + 2.0 * NEAR)
         gather_side(cell, vec2(0.0, most), -1.0, group, groups);
 }
 

@@ -30,5 +30,5 @@ vec4 shade()
             sum += weight * cotangent_at(ivec2(columns.x + x, rows.x + y));
         }
     }
-    return shade(own_at(PIXEL), sum, PIXEL);
+    return shade(added_at(PIXEL), sum, PIXEL);
 }

@@ -1,4 +1,4 @@
-// The cotangents of what a pass with PREFILTER_BLOCK combines, of STACKED_SAMPLES from number OWN_SAMPLE on: of its
+// The cotangents of what a pass with PREFILTER_BLOCK combines, of STACKED_SAMPLES from number FIRST_SAMPLE on: of its
 // kernels; with BY_TAPS of its taps, which have point functions or weights of their own; of a mean, whose kernels all
 // have a share of them, of the mean. Or the cotangents of the mask.
 #include "lib/sampling.glsl"
@@ -58,7 +58,7 @@ vec4 shade()
     // What they would be multiplied by may be infinite.
     if (is_mean() || by_combined == vec4(0.0))
         return gathered(by_combined);
-    int number = OWN_SAMPLE + picture;
+    int number = FIRST_SAMPLE + picture;
     if (by_taps())
         return gathered(back_tap(number, by_combined));
     return gathered(back_combined(samples, kernel_count(), number, by_combined));

@@ -1,4 +1,4 @@
-// The cotangents of the samples of tap OWN_TAP of a streak.
+// The cotangents of the samples of tap STREAK_TAP of a streak.
 
 UNIFORM_BLOCK(STREAKS_BLOCK);
 
@@ -9,5 +9,5 @@ SAMPLED_IMAGE(SLOT_COTANGENTS, cotangents);
 
 vec4 shade()
 {
-    return gathered(params.weights[OWN_TAP] * texelFetch(cotangents, PIXEL, 0));
+    return gathered(params.weights[STREAK_TAP] * texelFetch(cotangents, PIXEL, 0));
 }

@@ -4,7 +4,7 @@
 UNIFORM_BLOCK(FILTER_BLOCK);
 
 SAMPLED_IMAGE(SLOT_SOURCE, source);
-SAMPLED_IMAGE(SLOT_OWN, own);
+SAMPLED_IMAGE(SLOT_SAME_SIZE, same_size);
 
 #include "lib/fullscreen.glsl"
 #include "lib/filter.glsl"
@@ -13,7 +13,7 @@ SAMPLED_IMAGE(SLOT_OWN, own);
 vec4 shade()
 {
     vec4 sum = params.coarse * (filtered(source) / params.divisor);
-    if (ADD_OWN != 0)
-        sum += params.own * texelFetch(own, PIXEL, 0);
+    if (ADDS_IMAGE != 0)
+        sum += params.same_size * texelFetch(same_size, PIXEL, 0);
     return stored(sum);
 }

@@ -17,5 +17,5 @@ vec4 shade()
     for (int i = 0; i < params.count; ++i)
         sum += ghost_factor(params.ghosts[i], place) * seen_from_centre(params.ghosts[i].w * place);
     sum *= corner_factor(place);
-    return stored(ADD_OWN != 0 ? texelFetch(before, PIXEL, 0) + sum : sum);
+    return stored(ADDS_IMAGE != 0 ? texelFetch(before, PIXEL, 0) + sum : sum);
 }

@@ -77,7 +77,7 @@ void main()
         mixed[slot] = stored((1.0 - params.fade) * fetch(line, at) + 0.5 * params.fade * ends);
         ivec2 place = line.first + at * line.towards;
         vec4 value = mixed[slot];
-        if (ADD_OWN != 0)
+        if (ADDS_IMAGE != 0)
             value = stored(value + texelFetch(before, place, 0));
         imageStore(target, place, value);
     }

@@ -37,7 +37,7 @@ vec4 sample_moved(int tap)
 
 vec4 shade()
 {
-    vec4 sum = ADD_OWN != 0 ? texelFetch(before, PIXEL, 0) : vec4(0.0);
+    vec4 sum = ADDS_IMAGE != 0 ? texelFetch(before, PIXEL, 0) : vec4(0.0);
     for (int tap = 0; tap < params.count; ++tap)
         sum += params.weights[tap] * sample_moved(tap);
     return stored(sum);

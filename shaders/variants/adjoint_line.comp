@@ -36,6 +36,6 @@ void main()
     [[unroll]] for (int i = 0; i < ADJOINT_SIDE; ++i) {
         ivec2 own = texel + i * next;
         if (i < count)
-            imageStore(target, own, shade(own_at(own), sums[i], own));
+            imageStore(target, own, shade(added_at(own), sums[i], own));
     }
 }

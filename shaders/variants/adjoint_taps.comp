@@ -50,7 +50,7 @@ void store_row(ivec2 first, vec4 sums[COLUMNS])
 
     [[unroll]] for (int i = 0; i < COLUMNS; ++i) {
         ivec2 pixel = ivec2(min(first.x + i, target_shape.x - 1), first.y);
-        raw[i] = floatBitsToUint(shade(own_at(pixel), sums[i], pixel));
+        raw[i] = floatBitsToUint(shade(added_at(pixel), sums[i], pixel));
     }
     store(first.x, first.y, raw);
 }

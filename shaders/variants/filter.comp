@@ -10,7 +10,7 @@ const int COLUMNS = WINDOW_COLUMNS(CHANNEL_BYTES), ROWS = WINDOW_ROWS;
 const int KEPT = IS_INSET ? WINDOW + 2 : WINDOW;
 
 READ_IMAGE(SLOT_SOURCE, source);
-READ_IMAGE(SLOT_OWN, own);
+READ_IMAGE(SLOT_SAME_SIZE, same_size);
 
 // The texels of a row are a run where the ratio of widths is simple. The compiler removes loads that no window needs.
 const int BEFORE = MAX_WINDOW / 2, LOADED = 2 * COLUMNS + MAX_WINDOW;
@@ -21,20 +21,20 @@ const int BEFORE = MAX_WINDOW / 2, LOADED = 2 * COLUMNS + MAX_WINDOW;
 
 #ifdef FINAL
 #include "lib/ended.glsl"
-#define HAS_OWN true
+#define HAS_SAME_SIZE true
 #else
-#define HAS_OWN (ADD_OWN != 0)
+#define HAS_SAME_SIZE (ADDS_IMAGE != 0)
 #endif
 #include "variants/store.glsl"
 
 // What becomes of a filtered pixel.
-uvec4 shade(uvec4 own_pixel, vec4 sum, ivec2 pixel)
+uvec4 shade(uvec4 same_size_pixel, vec4 sum, ivec2 pixel)
 {
 #ifdef FINAL
-    return ended(own_pixel, as_stored(sum, FORMAT), pixel);
+    return ended(same_size_pixel, as_stored(sum, FORMAT), pixel);
 #else
-    if (ADD_OWN != 0)
-        sum += params.own * value_of(own_pixel);
+    if (ADDS_IMAGE != 0)
+        sum += params.same_size * value_of(same_size_pixel);
     return buffer_of(sum);
 #endif
 }
@@ -99,7 +99,7 @@ void write_row(int first, int y, int texel, float part, int phase)
     uvec4 raw[COLUMNS];
 
     [[unroll]] for (int i = 0; i < COLUMNS; ++i)
-        raw[i] = HAS_OWN ? raw_in_run(own, read_shapes[SLOT_OWN], first, i, y) : uvec4(0);
+        raw[i] = HAS_SAME_SIZE ? raw_in_run(same_size, read_shapes[SLOT_SAME_SIZE], first, i, y) : uvec4(0);
     [[unroll]] for (int i = 0; i < COLUMNS; ++i)
         raw[i] = shade(raw[i], coarse * (column_of(window, i) / shares), ivec2(first + i, y));
     store(first, y, raw);

@@ -2,7 +2,7 @@
 #include "variants/nested.glsl"
 
 SAMPLED_IMAGE(SLOT_SOURCE, source);
-SAMPLED_IMAGE(SLOT_OWN, own);
+SAMPLED_IMAGE(SLOT_SAME_SIZE, same_size);
 #ifdef FINAL
 #include "lib/ended.glsl"
 #endif
@@ -20,23 +20,23 @@ vec4 texel_at(ivec2 texel)
     return seen(fetch_clamped(source, texel));
 }
 
-vec4 own_at(ivec2 pixel)
+vec4 added_at(ivec2 pixel)
 {
 #ifndef FINAL
-    if (ADD_OWN == 0)
+    if (ADDS_IMAGE == 0)
         return vec4(0.0);
 #endif
-    return texelFetch(own, pixel, 0);
+    return texelFetch(same_size, pixel, 0);
 }
 
-vec4 shade(vec4 own_pixel, vec4 sum, ivec2 pixel)
+vec4 shade(vec4 same_size_pixel, vec4 sum, ivec2 pixel)
 {
     sum = params.coarse * (sum / params.divisor);
 #ifdef FINAL
-    return ended(own_pixel, as_stored(sum, FORMAT), pixel);
+    return ended(same_size_pixel, as_stored(sum, FORMAT), pixel);
 #else
-    if (ADD_OWN != 0)
-        sum += params.own * own_pixel;
+    if (ADDS_IMAGE != 0)
+        sum += params.same_size * same_size_pixel;
     return stored(sum);
 #endif
 }

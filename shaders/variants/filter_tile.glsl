@@ -16,7 +16,7 @@ layout(local_size_x = FILTER_TILE_COLUMNS, local_size_y = FILTER_TILE_RUNS) in;
 // the image, what is added to a pixel, and the pixel that is stored.
 Window window_at(int picture, int pixel, bool along_x);
 vec4 texel_at(ivec2 texel);
-vec4 own_at(ivec2 pixel);
+vec4 added_at(ivec2 pixel);
 vec4 shade(vec4 own, vec4 sum, ivec2 pixel);
 
 ivec2 turned(ivec2 position)
@@ -198,7 +198,7 @@ void main()
     // First, since they take as long as the rest.
     [[unroll]] for (int i = 0; i < RUN; ++i) {
         pixels[i] = turned(first + ivec2(0, i));
-        own[i] = own_at(min(pixels[i], size - 1));
+        own[i] = added_at(min(pixels[i], size - 1));
         sums[i] = vec4[](vec4(0.0), vec4(0.0), vec4(0.0));
     }
     add_picture(0, tile, run, sums);

@@ -1,5 +1,5 @@
 // Adds up levels of several sizes that gather_rows.comp has filtered along rows: filters each along
-// columns and multiplies it by its weight. With ADD_OWN the first one has the target's size and needs
+// columns and multiplies it by its weight. With ADDS_IMAGE the first one has the target's size and needs
 // no filter. As one fragment shader `godot_4_5` takes 475 ms in place of 130 (processor time of 1920 x
 // 1080 in float16, lavapipe of Mesa 25.0.7, 2026-11-26).
 #include "lib/sampling.glsl"
@@ -29,7 +29,7 @@ Axis row_axis(ivec2 size, int y)
 
 vec4 sums[COLUMNS];
 
-void add_own(int first, int y)
+void add_first_level(int first, int y)
 {
     [[unroll]] for (int i = 0; i < COLUMNS; ++i)
         sums[i] += params.shares[0][0] * value_of(raw_in_run(level_0, read_shapes[SLOT_LEVELS], first, i, y));
@@ -56,8 +56,8 @@ void write_row(int x, int y)
 
     [[unroll]] for (int i = 0; i < COLUMNS; ++i)
         sums[i] = vec4(0.0);
-    if (ADD_OWN != 0)
-        add_own(x, y);
+    if (ADDS_IMAGE != 0)
+        add_first_level(x, y);
     else
         add(level_0, 0, x, y);
     add(level_1, 1, x, y);

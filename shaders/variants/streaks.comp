@@ -54,7 +54,7 @@ void write_block(ivec2 first, int end)
         vec4 sums[COLUMNS];
         [[unroll]] for (int i = 0; i < COLUMNS; ++i) {
             sums[i] = vec4(0.0);
-            if (ADD_OWN != 0)
+            if (ADDS_IMAGE != 0)
                 sums[i] = value_of(raw_in_run(before, read_shapes[SLOT_BEFORE], first.x, i, max(y, 0)));
             sums[i] += weights[0] * seen(raw_in_run(source, read_shapes[SLOT_SOURCE], first.x, i, max(y, 0)));
         }

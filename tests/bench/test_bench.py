@@ -107,7 +107,7 @@ def test_colours_are_compared_and_not_alpha() -> None:
         assert not agreement("", ours, theirs, math.inf, "").agrees
 
 
-def spoiled(image: NDArray[Any], *_: Any) -> dict[str, peers.ImageBloom]:
+def spoil(image: NDArray[Any], *_: Any) -> dict[str, peers.ImageBloom]:
     """A peer that blurs nothing."""
     return {"SciPy": lambda picture: picture.copy()}
 
@@ -115,7 +115,7 @@ def spoiled(image: NDArray[Any], *_: Any) -> dict[str, peers.ImageBloom]:
 def test_a_wrong_peer_is_told_and_not_timed(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    monkeypatch.setattr(scipy_peer, "image_bloom", spoiled)
+    monkeypatch.setattr(scipy_peer, "image_bloom", spoil)
     monkeypatch.setattr(
         "benchmarks.image.run",
         lambda plan, section: _time_one(plan, section, (64, 36), np.dtype("float16"), 4),

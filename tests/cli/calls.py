@@ -13,12 +13,12 @@ from vkbloom._cli.program import program
 __all__ = [
     "COMMANDS",
     "NATURAL",
-    "applied",
     "apply",
-    "done",
+    "apply_settings",
     "one_line",
     "program",
     "run",
+    "succeed",
 ]
 
 COMMANDS = program.list_commands(Context(program))
@@ -29,7 +29,7 @@ def run(*words: object, **options: Any) -> Result:
     return CliRunner().invoke(program, [str(word) for word in words], **options)
 
 
-def done(*words: object) -> Result:
+def succeed(*words: object) -> Result:
     """Run a command that must succeed without output on standard error."""
     result = run(*words)
     assert (result.exit_code, result.stderr) == (0, "")
@@ -45,7 +45,7 @@ def apply(*words: object) -> Result:
     return run("apply", *words, *(() if is_named else ("--preset", "bevy_natural")))
 
 
-def applied(image: Any, settings: vkbloom.Settings = NATURAL, **given: Any) -> Any:
+def apply_settings(image: Any, settings: vkbloom.Settings = NATURAL, **given: Any) -> Any:
     """Return the picture that a renderer makes of an image."""
     with vkbloom.Renderer() as renderer:
         return renderer.apply(image, settings, framebuffers="final", **given)["final"]

@@ -42,7 +42,7 @@ def pixels(path: Path) -> NDArray[Any]:
     return reread(path)[1]
 
 
-def rendered(**arguments: Any) -> vkbloom.Frames:
+def render(**arguments: Any) -> vkbloom.Frames:
     with vkbloom.Renderer() as renderer:
         scene = arguments.pop("scene", None) or Scene.ufo()
         settings = arguments.pop("settings", SMALL_SETTINGS)
@@ -129,17 +129,17 @@ def test_a_mistake_of_the_program_is_not_hidden(failing: Failing) -> None:
 
 @click.command(cls=fields.Command)
 @settings_options
-def chosen(settings: vkbloom.Settings) -> vkbloom.Settings:
+def choose(settings: vkbloom.Settings) -> vkbloom.Settings:
     return settings
 
 
 def settings_from(*arguments: str) -> Any:
-    return chosen.main(list(arguments), standalone_mode=False)
+    return choose.main(list(arguments), standalone_mode=False)
 
 
 @pytest.mark.parametrize("kind", METHODS.values(), ids=list(METHODS))
 def test_every_field_of_every_method_is_an_option(kind: type[vkbloom.Settings]) -> None:
-    parameters = chosen.get_params(click.Context(chosen))
+    parameters = choose.get_params(click.Context(choose))
     names = {option for parameter in parameters for option in parameter.opts}
     assert names >= {f"--{info.option.replace('_', '-')}" for info in fields_of(kind).values()}
 
@@ -272,7 +272,7 @@ def test_the_help_has_general_options_or_those_of_a_method(name: str) -> None:
 def test_render_writes_every_framebuffer(tmp_path: Path) -> None:
     result = vkb("render", "-o", tmp_path / "out.png", *SMALL)
     assert (result.exit_code, result.stderr) == (0, "")
-    expected = rendered()
+    expected = render()
     depths = {"glow_depth", "depth"}
     files = {name: f"out_{name}.{'exr' if name in depths else 'png'}" for name in expected}
     # The picture is the file that was named.
@@ -290,7 +290,7 @@ def test_render_tells_adapter_pass_times_and_files(tmp_path: Path) -> None:
         assert stdout.startswith(f"Rendering on {renderer.info.summary}\n")
         assert f"ms on the {'CPU' if renderer.info.type == 'cpu' else 'GPU'}" in stdout
     times = dict(re.findall(r"^ +(\w+) +(\d+\.\d{3})$", stdout, re.M))
-    assert list(times) == list(rendered().timings)
+    assert list(times) == list(render().timings)
     assert all(0 < float(time) < 60_000 for time in times.values())
     assert stdout.endswith(f"\nwrote {tmp_path / 'out.exr'}\n")
 
@@ -319,10 +319,10 @@ def test_options_of_render(
     out = tmp_path / "out.png"
     result = vkb("render", "-o", out, *SMALL, "--framebuffers", "final", *words.split())
     assert result.exit_code == 0
-    expected = rendered(scene=dataclasses.replace(Scene.ufo(), **scene), **changes)["final"]
+    expected = render(scene=dataclasses.replace(Scene.ufo(), **scene), **changes)["final"]
     assert (rgb(pixels(out)) == rgb(expected)).all()
     # Each of them changes the picture.
-    assert (rgb(expected) != rgb(rendered(**changes)["final"])).any()
+    assert (rgb(expected) != rgb(render(**changes)["final"])).any()
 
 
 def test_render_loads_scenes(tmp_path: Path) -> None:
@@ -342,7 +342,7 @@ def test_render_loads_scenes(tmp_path: Path) -> None:
         wanted = ("--scene", body, "--framebuffers", "final", *options)
         result = vkb("render", "-o", out, *SMALL, *wanted)
         assert (result.exit_code, result.stderr) == (0, "")
-        assert (rgb(pixels(out)) == rgb(rendered(scene=scene)["final"])).all()
+        assert (rgb(pixels(out)) == rgb(render(scene=scene)["final"])).all()
 
 
 def test_render_without_bloom_says_so(tmp_path: Path) -> None:

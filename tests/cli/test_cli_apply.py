@@ -16,7 +16,7 @@ from click.testing import Result
 from numpy.typing import NDArray
 
 import vkbloom
-from tests.cli.calls import NATURAL, applied
+from tests.cli.calls import NATURAL, apply_settings
 from tests.cli.calls import apply as run
 from tests.images import lights
 from tests.io.parts import reread
@@ -28,7 +28,7 @@ oiio = pytest.importorskip("OpenImageIO")
 pytestmark = pytest.mark.usefixtures("kept_renderers")
 
 
-def done(*arguments: str | Path) -> Result:
+def succeed(*arguments: str | Path) -> Result:
     """Run a command that must succeed without output on standard error."""
     result = run(*arguments)
     # Notes with tests of their own: files of integers clip, alpha hides.
@@ -67,9 +67,9 @@ class TestFormats:
         image = lights(30, 20, channels, dtype=dtype)
         image[:, :, 3:] = 1
         path = vkbloom.write(tmp_path / "a.exr", image)
-        result = done(path, tmp_path / "b.exr")
+        result = succeed(path, tmp_path / "b.exr")
         assert pixels(tmp_path / "b.exr").dtype == dtype
-        assert np.array_equal(pixels(tmp_path / "b.exr"), applied(image))
+        assert np.array_equal(pixels(tmp_path / "b.exr"), apply_settings(image))
         assert result.stdout.startswith("Rendering on ")
         assert result.stdout.endswith(f"\nwrote {tmp_path / 'b.exr'}\n")
 
@@ -80,12 +80,12 @@ class TestFormats:
         self, tmp_path: Path, suffix: str, channels: int
     ) -> None:
         image = lights(30, 20, channels, dtype="uint8")
-        done(png(tmp_path / "a.png", image), tmp_path / f"b.{suffix}")
+        succeed(png(tmp_path / "a.png", image), tmp_path / f"b.{suffix}")
         written = pixels(tmp_path / f"b.{suffix}")
         assert written.dtype == np.uint8
         assert written.shape == image.shape
         rgb = linear(np.repeat(image, 3 // channels, axis=2))
-        expected = levels(applied(rgb))[:, :, :channels]
+        expected = levels(apply_settings(rgb))[:, :, :channels]
         assert np.abs(written - expected).max() <= ROUNDING
         assert np.abs(expected - image).max() > 10
 
@@ -97,7 +97,7 @@ class TestFormats:
     ) -> None:
         image = np.random.default_rng(0).integers(0, np.iinfo(dtype).max + 1, (20, 30, channels))
         path = png(tmp_path / "a.png", image.astype(dtype))
-        done(path, tmp_path / "b.png", "--no-bloom")
+        succeed(path, tmp_path / "b.png", "--no-bloom")
         assert np.array_equal(pixels(tmp_path / "b.png"), image)
 
 
@@ -108,8 +108,8 @@ class TestColours:
         path = vkbloom.write(tmp_path / "a.exr", image)
         options = ("--tonemap", "reinhard", "--encoding", encoding)
         for name in ("b.exr", "b.png"):
-            done(path, tmp_path / name, *options)
-        expected = applied(image, NATURAL.replace(tonemap="reinhard", encoding=encoding))
+            succeed(path, tmp_path / name, *options)
+        expected = apply_settings(image, NATURAL.replace(tonemap="reinhard", encoding=encoding))
         assert np.array_equal(pixels(tmp_path / "b.exr"), expected)
         assert np.abs(pixels(tmp_path / "b.png") - expected * 255.0).max() <= ROUNDING
 
@@ -117,14 +117,14 @@ class TestColours:
         image = lights(30, 40, 3)
         path = vkbloom.write(tmp_path / "a.exr", image)
         words = "--method pyramid --levels 3 --threshold 0.5 --knee 0.2 --intensity 0.5"
-        done(path, tmp_path / "b.exr", *words.split())
+        succeed(path, tmp_path / "b.exr", *words.split())
         settings = vkbloom.Pyramid(levels=3, threshold=0.5, knee=0.2, intensity=0.5)
-        assert np.array_equal(pixels(tmp_path / "b.exr"), applied(image, settings))
+        assert np.array_equal(pixels(tmp_path / "b.exr"), apply_settings(image, settings))
         kept = oiio.ImageBuf(str(tmp_path / "b.exr")).spec()["vkbloom:settings"]
         assert json.loads(kept) == json.loads(json.dumps(settings.to_dict()))
-        done(path, tmp_path / "c.exr", "--preset", "outline")
+        succeed(path, tmp_path / "c.exr", "--preset", "outline")
         outline = vkbloom.presets["outline"]
-        assert np.array_equal(pixels(tmp_path / "c.exr"), applied(image, outline))
+        assert np.array_equal(pixels(tmp_path / "c.exr"), apply_settings(image, outline))
 
     def test_nan_and_infinity_are_told(self, tmp_path: Path) -> None:
         image = lights(30, 20, 3)
@@ -160,7 +160,7 @@ def test_a_file_that_is_read_needs_overwrite(tmp_path: Path) -> None:
         assert refused.exit_code == 2
         assert "use --overwrite" in refused.stderr
     assert file.read_bytes() == before
-    done(file, file, "--overwrite")
+    succeed(file, file, "--overwrite")
     assert file.read_bytes() != before
 
 
@@ -178,7 +178,7 @@ def test_no_picture_is_written_to_a_terminal(tmp_path: Path) -> None:
 
 def test_folders_are_made_for_one_picture_and_checked_before(tmp_path: Path) -> None:
     file = picture(tmp_path / "a.png")
-    done(file, f"{tmp_path}/new/")
+    succeed(file, f"{tmp_path}/new/")
     assert (tmp_path / "new/a.png").is_file()
     for target in ("no/b.png", "no/folder/", "a.png/"):
         failed = run(file, f"{tmp_path}/{target}")
@@ -195,7 +195,7 @@ class TestFramebuffers:
     def test_all_are_beside_the_output(self, tmp_path: Path) -> None:
         image = lights(20, 30, 3, dtype="float16")
         path = vkbloom.write(tmp_path / "a.exr", image)
-        result = done(path, tmp_path / "b.exr", "--framebuffers", "all")
+        result = succeed(path, tmp_path / "b.exr", "--framebuffers", "all")
         with vkbloom.Renderer() as renderer:
             frames = renderer.apply(image, NATURAL)
         others = [name for name in frames if name != "final"]
@@ -218,7 +218,7 @@ class TestFramebuffers:
     )
     def test_files_beside_a_png(self, tmp_path: Path, words: str, more: set[str]) -> None:
         path = png(tmp_path / "a.png", lights(20, 30, 3, dtype="uint8"))
-        done(path, tmp_path / "b.png", *words.split())
+        succeed(path, tmp_path / "b.png", *words.split())
         assert {file.name for file in tmp_path.iterdir()} == {"a.png", "b.png", *more}
 
     @pytest.mark.parametrize("names", ["bloom", "all"])
@@ -253,7 +253,7 @@ class TestFramebuffers:
         assert "give --overwrite" in failed.stderr
         assert np.array_equal(pixels(other), image)
         for words in (["--overwrite"], []):
-            done(path, tmp_path / "b.png", "--framebuffers", "glow", *words)
+            succeed(path, tmp_path / "b.png", "--framebuffers", "glow", *words)
         assert not np.array_equal(pixels(other), image)
 
 
@@ -274,19 +274,19 @@ class TestPicturesOfOthers:
         assert f"give it as -o {files[1]}, or --overwrite" in refused.stderr
         assert files[1].read_bytes() == before
         for _ in range(2):
-            done(files[0], files[2])
-        done(files[0], files[1], "--overwrite")
+            succeed(files[0], files[2])
+        succeed(files[0], files[1], "--overwrite")
         vkbloom.write(files[1], image, metadata={"Software": "a camera"})
-        done(files[0], "-o", files[1])
+        succeed(files[0], "-o", files[1])
         assert files[1].read_bytes() != before
         # It is a result now.
-        done(files[0], files[1])
+        succeed(files[0], files[1])
 
     def test_what_python_wrote_is_replaced(self, tmp_path: Path) -> None:
         image = lights(20, 30, 3, dtype="uint8")
         path = png(tmp_path / "a.png", image)
         vkbloom.write(tmp_path / "b.png", image)
-        done(path, tmp_path / "b.png")
+        succeed(path, tmp_path / "b.png")
         # A format that does not hold a name of a program cannot tell.
         vkbloom.write(tmp_path / "b.bmp", image)
-        done(path, tmp_path / "b.bmp")
+        succeed(path, tmp_path / "b.bmp")

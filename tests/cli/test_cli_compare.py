@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 import vkbloom
 from tests.cli import calls
 from tests.framebuffers import make, write_image
-from tests.images import changed, noise_image
+from tests.images import change, noise_image
 from vkbloom._views.comparison import Comparison
 
 oiio = pytest.importorskip("OpenImageIO")
@@ -27,14 +27,14 @@ metrics = pytest.importorskip("skimage.metrics")
 def files(tmp_path: Path) -> dict[str, Path]:
     """Return files by name: two that differ by one level, and some that are no match."""
     a = noise_image(16, 24, 3, dtype="uint8")
-    b = changed(a, (3, 7, 2), int(a[3, 7, 2]) ^ 1)
+    b = change(a, (3, 7, 2), int(a[3, 7, 2]) ^ 1)
     arrays: dict[str, NDArray[Any]] = {
         "a.png": a,
         "b.png": b,
         "small.png": a[:6],
         "alpha.png": np.dstack([a, np.full((16, 24, 1), 255, np.uint8)]),
         "float.exr": noise_image(16, 24, 3),
-        "nan.exr": changed(noise_image(16, 24, 3), (1, 2, 0), math.nan),
+        "nan.exr": change(noise_image(16, 24, 3), (1, 2, 0), math.nan),
     }
     for name, array in arrays.items():
         vkbloom.write(tmp_path / name, array)

@@ -14,7 +14,7 @@ import pytest
 
 import vkbloom
 from tests.cli.calls import run
-from tests.io.parts import reread, written
+from tests.io.parts import reread, write
 from tests.io.profiles import store_png
 
 oiio = pytest.importorskip("OpenImageIO")
@@ -72,14 +72,14 @@ def test_a_signal_leaves_no_file(tmp_path: Path, suffix: str) -> None:
 # ``vkbloom apply`` of large and long pictures, and of half floats.
 
 
-def stored(path: Path, height: int, width: int) -> Path:
+def store(path: Path, height: int, width: int) -> Path:
     values = np.random.default_rng(5).random((height, width, 3)) ** 8
-    return written(path, oiio.ImageSpec(width, height, 3, "uint8"), (255 * values).astype("uint8"))
+    return write(path, oiio.ImageSpec(width, height, 3, "uint8"), (255 * values).astype("uint8"))
 
 
 def test_half_floats(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """By choice, and for large pictures of 8 bits."""
-    path = stored(tmp_path / "a.png", 50, 41)
+    path = store(tmp_path / "a.png", 50, 41)
     made = []
     for limit, words in ((1 << 26, ()), (1 << 26, ("--half",)), (1, ())):
         monkeypatch.setattr("vkbloom._cli.apply._HALVED", limit)
@@ -93,7 +93,7 @@ def test_half_floats(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.parametrize("size", [(2, 32768), (32768, 2)])
 def test_longer_than_an_image_of_the_device(tmp_path: Path, size: tuple[int, int]) -> None:
-    path = stored(tmp_path / "a.png", *size)
+    path = store(tmp_path / "a.png", *size)
     result = apply(path, tmp_path / "b.png")
     assert result.exit_code == 2
     assert "is out of this adapter's range, 1 to " in result.stderr

@@ -9,7 +9,7 @@ import pytest
 from numpy.testing import assert_array_equal
 
 import vkbloom
-from tests.cli.calls import applied, done
+from tests.cli.calls import apply_settings, succeed
 from tests.images import picture
 
 pytestmark = pytest.mark.usefixtures("kept_renderers")
@@ -27,10 +27,10 @@ def test_apply_with_a_mask_and_an_emission(tmp_path: Path) -> None:
     mask = vkbloom.write(tmp_path / "mask.png", np.repeat(levels[..., None], 3, axis=2))
     glow = vkbloom.write(tmp_path / "glow.exr", emission)
     out = tmp_path / "out.exr"
-    done("apply", source, out, *PYRAMID, "--mask", mask)
-    assert_array_equal(vkbloom.read(out), applied(image, SETTINGS, mask=levels))
-    done("apply", source, out, *PYRAMID, "--mask", mask, "--emission", glow)
-    both = applied(image, SETTINGS, mask=levels, emission=emission)
+    succeed("apply", source, out, *PYRAMID, "--mask", mask)
+    assert_array_equal(vkbloom.read(out), apply_settings(image, SETTINGS, mask=levels))
+    succeed("apply", source, out, *PYRAMID, "--mask", mask, "--emission", glow)
+    both = apply_settings(image, SETTINGS, mask=levels, emission=emission)
     assert_array_equal(vkbloom.read(out), both)
 
 
@@ -42,11 +42,11 @@ def test_apply_to_several_images_with_one_emission(tmp_path: Path) -> None:
     for source, image in zip(sources, images, strict=True):
         vkbloom.write(source, image, premultiplied=True)
     glow = vkbloom.write(tmp_path / "glow.exr", emission)
-    done("apply", *sources, tmp_path / "out", *PYRAMID, "--alpha", "max", "--emission", glow)
+    succeed("apply", *sources, tmp_path / "out", *PYRAMID, "--alpha", "max", "--emission", glow)
     alike = np.concatenate([emission, np.ones((16, 24, 1))], axis=2).astype(np.float32)
     for source, image in zip(sources, images, strict=True):
         found = vkbloom.read(tmp_path / "out" / source.name, premultiplied=True)
-        wanted = applied(image, SETTINGS.replace(alpha="max"), emission=alike)
+        wanted = apply_settings(image, SETTINGS.replace(alpha="max"), emission=alike)
         assert_array_equal(found, wanted)
 
 
@@ -54,9 +54,9 @@ def test_straight_colours_are_multiplied_and_divided(tmp_path: Path) -> None:
     levels = picture(24, 16, 4, "uint8")
     levels[:, :12, 3] = 0
     source, out = vkbloom.write(tmp_path / "a.png", levels), tmp_path / "out.png"
-    done("apply", source, out, *PYRAMID, "--alpha", "blur")
+    succeed("apply", source, out, *PYRAMID, "--alpha", "blur")
     image = vkbloom.read(source, premultiplied=True)
-    final = applied(image, SETTINGS.replace(alpha="blur"))
+    final = apply_settings(image, SETTINGS.replace(alpha="blur"))
     vkbloom.write(tmp_path / "own.png", final, premultiplied=True)
     difference = vkbloom.read(out) - vkbloom.read(tmp_path / "own.png")
     assert np.abs(difference).max() <= 0.01

@@ -27,7 +27,7 @@ def run(*arguments: Any) -> Result:
     return calls.run("grid", *words)
 
 
-def done(*arguments: Any) -> str:
+def succeed(*arguments: Any) -> str:
     result = run(*arguments)
     assert (result.exit_code, result.stderr) == (0, "")
     return result.stdout
@@ -66,7 +66,7 @@ class TestStores:
     def test_a_scene(self, tmp_path: Path, renderer: Renderer, scene: vkbloom.Scene) -> None:
         out = tmp_path / "a.zarr"
         words = "--axis time=0,0.25 --axis blur_scale=1:2:2 --size 32x18 --tonemap aces"
-        message = done(words, "--framebuffers final,depth -o", out)
+        message = succeed(words, "--framebuffers final,depth -o", out)
         assert "4 points" in message
         found = xr.open_zarr(out)
         expected = renderer.render(
@@ -77,8 +77,8 @@ class TestStores:
 
     def test_resumed_by_the_same_call(self, tmp_path: Path, image_file: Path) -> None:
         words = [image_file, "--axis", "exposure=0,1", "-o", tmp_path / "a.zarr"]
-        done(*words)
-        done(*words)
+        succeed(*words)
+        succeed(*words)
         other = run(*words, "--intensity", "0.5")
         assert other.exit_code == 1
         assert "settings.intensity: 0.15 in the store, 0.5 requested" in other.stderr
@@ -95,7 +95,7 @@ class TestImageFiles:
     def test_one_a_point_in_the_colours_of_apply(self, tmp_path: Path, image_file: Path) -> None:
         out = tmp_path / "files"
         words = "--axis intensity=0,1 --axis exposure=-1,0 --framebuffers final,bloom -o"
-        done(image_file, words, out)
+        succeed(image_file, words, out)
         assert sorted(path.name for path in out.iterdir()) == sorted(
             f"00{i}_00{j}_{name}"
             for i in (0, 1)
@@ -131,7 +131,7 @@ class TestImageFiles:
         mask = vkbloom.write(tmp_path / "mask.png", np.eye(9, 12, dtype=np.uint8)[..., None] * 255)
         emission = vkbloom.write(tmp_path / "emission.png", noise(9, 12, 3, dtype="uint8"))
         words = ("--mask", mask, "--emission", emission)
-        done(image_file, "--axis intensity=1", *words, "-o", tmp_path / "files")
+        succeed(image_file, "--axis intensity=1", *words, "-o", tmp_path / "files")
         calls.run("apply", image_file, tmp_path / "one.png", "--intensity", 1, *words)
         found = reread(tmp_path / "files" / "000_final.png")[1]
         np.testing.assert_array_equal(found, reread(tmp_path / "one.png")[1])
@@ -146,7 +146,7 @@ class TestImageFiles:
     def test_exr_of_a_scene(self, tmp_path: Path, renderer: Renderer, scene: vkbloom.Scene) -> None:
         out = tmp_path / "files"
         words = "--axis blur_scale=1,2 --size 20x10 --image-format exr --framebuffers final -o"
-        done(words, out)
+        succeed(words, out)
         expected = renderer.render(scene, Separable(blur_scale=2), (20, 10))["final"]
         found = reread(out / "001_final.exr")[1]
         np.testing.assert_array_equal(np.rint(found * np.float32(255)), expected)
@@ -155,4 +155,4 @@ class TestImageFiles:
         words = [image_file, "--axis", "exposure=0", "-o", tmp_path / "g.exr"]
         # Such a folder may exist.
         (tmp_path / "g.exr").mkdir()
-        done(*words)
+        succeed(*words)

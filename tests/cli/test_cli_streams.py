@@ -18,7 +18,7 @@ import vkbloom
 from tests.cli.calls import run
 
 VKBLOOM = f"'{sys.executable}' -m vkbloom"
-LONGEST = 120  # seconds
+MAX_SECONDS = 120  # seconds
 SMALL = "--size 16x16 --bloom-size 8x8"
 
 
@@ -42,7 +42,7 @@ def bash(line: str) -> subprocess.CompletedProcess[str]:
         capture_output=True,
         text=True,
         check=False,
-        timeout=LONGEST,
+        timeout=MAX_SECONDS,
     )
 
 
@@ -63,7 +63,7 @@ def stream_of(file: str, kind: str) -> Iterator[str]:
     writer = threading.Thread(target=write, daemon=True)
     writer.start()
     yield name
-    writer.join(LONGEST)
+    writer.join(MAX_SECONDS)
     if kind == "substitution":
         os.close(reading)
 
@@ -156,7 +156,7 @@ def test_streams_are_written(folder: Path, line: str) -> None:
     done = bash(line)
     assert done.stderr == ""
     if reader.ident is not None:
-        reader.join(LONGEST)
+        reader.join(MAX_SECONDS)
     assert vkbloom.read("got.png").ndim == 3
     # A pipe is not replaced by a file, and nothing is left beside it.
     assert (folder / "out.png").is_fifo()

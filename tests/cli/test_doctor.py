@@ -44,7 +44,7 @@ def renders_of(findings: Iterable[Finding]) -> list[Finding]:
     return [finding for finding in findings if finding.topic == "test render"]
 
 
-def examined(**changes: str) -> tuple[int, dict[str, Any], list[Finding]]:
+def examine(**changes: str) -> tuple[int, dict[str, Any], list[Finding]]:
     """Run ``vkbloom doctor --json``; return its status, its answer and its findings."""
     ended = run("doctor", "--json", env=changes)
     assert ended.stderr == ""
@@ -88,7 +88,7 @@ def remembered(answers: dict[object, child.Answer], monkeypatch: pytest.MonkeyPa
 
 @pytest.mark.usefixtures("remembered")
 def test_this_machine_can_render() -> None:
-    status, answer, findings = examined()
+    status, answer, findings = examine()
     assert status == 0
     chosen = by_topic(findings, "chosen adapter").found
     assert f"VKBLOOM_ADAPTER is {os.environ['VKBLOOM_ADAPTER']!r}" in chosen
@@ -105,7 +105,7 @@ def test_this_machine_can_render() -> None:
 
 @pytest.mark.usefixtures("remembered")
 def test_finding_that_is_not_ok_has_advice_or_an_explanation() -> None:
-    status, _, findings = examined(**PROBLEMS)
+    status, _, findings = examine(**PROBLEMS)
     assert status == 0
     chosen = by_topic(findings, "chosen adapter")
     assert chosen.status == "problem"
@@ -131,7 +131,7 @@ def test_the_table_has_a_line_for_each_finding() -> None:
 @linux_only
 @pytest.mark.usefixtures("remembered", "without_variables")
 def test_no_driver() -> None:
-    status, answer, findings = examined(VK_DRIVER_FILES=ABSENT)
+    status, answer, findings = examine(VK_DRIVER_FILES=ABSENT)
     assert (status, answer["can_render"]) == (1, False)
     assert by_topic(findings, "Vulkan loader").status == "ok"
     manifest = by_topic(findings, "driver absent.json")
@@ -157,7 +157,7 @@ def without_loader(tmp_path: Path) -> dict[str, str]:
 
 @linux_only
 def test_no_loader(without_loader: dict[str, str]) -> None:
-    status, answer, findings = examined(**without_loader)
+    status, answer, findings = examine(**without_loader)
     assert (status, answer["can_render"]) == (1, False)
     loader = by_topic(findings, "Vulkan loader")
     assert loader.status == "problem"
@@ -168,7 +168,7 @@ def test_no_loader(without_loader: dict[str, str]) -> None:
 
 def test_no_process_answers() -> None:
     """Every process fails, here as Python does not start: the doctor still reports."""
-    status, answer, findings = examined(PYTHONHOME="/nowhere")
+    status, answer, findings = examine(PYTHONHOME="/nowhere")
     assert (status, answer["can_render"]) == (1, False)
     found = by_topic(findings, "Vulkan loader").found
     assert found == "not found: the probe process ended without an answer, with exit status 1"
@@ -179,13 +179,13 @@ def test_no_process_answers() -> None:
 def test_wrong_pictures_are_no_rendering(monkeypatch: pytest.MonkeyPatch) -> None:
     ask = child.ask
 
-    def tampered(*question: str, **options: Any) -> child.Answer:
+    def tamper(*question: str, **options: Any) -> child.Answer:
         answer = ask(*question, **options)
         if question[0] == "render" and answer.value is not None:
             return child.Answer({**answer.value, "differences": ["bloom differs by up to 9"]})
         return answer
 
-    monkeypatch.setattr(child, "ask", tampered)
+    monkeypatch.setattr(child, "ask", tamper)
     report = doctor.examine()
     assert not report.can_render
     assert renders_of(report.findings)
@@ -371,7 +371,7 @@ def frames(renderer: vkbloom.Renderer) -> vkbloom.Frames:
     return renderer.apply(probe.IMAGE, probe.SETTINGS)
 
 
-def tampered(frames: vkbloom.Frames, change: Callable[[str, Any], Any]) -> list[str]:
+def tamper(frames: vkbloom.Frames, change: Callable[[str, Any], Any]) -> list[str]:
     """Return the differences that are found in framebuffers after a change."""
     arrays = {name: change(name, array.copy()) for name, array in frames.items()}
     return probe.differences(vkbloom.Frames(arrays, timings={}, settings=frames.settings, info={}))
@@ -381,7 +381,7 @@ def tampered(frames: vkbloom.Frames, change: Callable[[str, Any], Any]) -> list[
     "change", [np.fliplr, np.flipud, lambda array: np.full_like(array, np.nan, np.float32)]
 )
 def test_wrong_framebuffers_are_found(frames: vkbloom.Frames, change: Callable[..., Any]) -> None:
-    found = tampered(frames, lambda _, array: change(array))
+    found = tamper(frames, lambda _, array: change(array))
     assert [sentence.split()[0] for sentence in found] == [*frames]
 
 
@@ -391,7 +391,7 @@ def test_a_wrong_framebuffer_is_found(frames: vkbloom.Frames, wrong: str) -> Non
         array[5, 7] = np.where(array[5, 7] > 99, 0, 199) if name == wrong else array[5, 7]
         return array
 
-    (found,) = tampered(frames, change)
+    (found,) = tamper(frames, change)
     assert found.startswith(f"{wrong} differs by up to ")
 
 

@@ -114,8 +114,8 @@ class Doors:
             return Picture.of_values(final, "float", "linear")
 
         with self.patch.context() as patch:
-            patch.setattr("vkbloom._cli.apply.finished", finish)
-            done("apply", file, "-o", "applied.exr", *words)
+            patch.setattr("vkbloom._cli.apply.finish", finish)
+            succeed("apply", file, "-o", "applied.exr", *words)
         return kept[0]
 
     def explore(self, file: str, words: tuple[str, ...]) -> Pixels:
@@ -127,20 +127,20 @@ class Doors:
 
         with self.patch.context() as patch:
             patch.setattr(live, "_serve", serve)
-            done("explore", "--no-open", file, *words)
-        return self.shown(made[0])
+            succeed("explore", "--no-open", file, *words)
+        return self.show(made[0])
 
     def notebook(self, file: str, settings: Any) -> Pixels:
-        return self.shown(vkbloom.explore(file, settings, renderer=self.renderer)._viewer)
+        return self.show(vkbloom.explore(file, settings, renderer=self.renderer)._viewer)
 
-    def opened(self, file: str) -> Pixels:
+    def open(self, file: str) -> Pixels:
         viewer = Viewer(vkbloom.Scene.ufo(), renderer=self.renderer, size=(8, 8))
         message = {"kind": "open", "name": file}
         answer, _ = viewer.answer(message, [Path(file).read_bytes()])
         assert answer["kind"] == "open", answer
-        return self.shown(viewer)
+        return self.show(viewer)
 
-    def shown(self, viewer: Viewer, expand: Any = None, settings: Any = None) -> Pixels:
+    def show(self, viewer: Viewer, expand: Any = None, settings: Any = None) -> Pixels:
         viewer.renderer = self.renderer
         message: dict[str, Any] = {
             "kind": "frame",
@@ -174,17 +174,17 @@ class Doors:
         held: list[live.Live] = []
         with self.patch.context() as patch:
             patch.setattr(live, "import_extra", lambda *_: _Glfw())
-            patch.setattr(live, "_opened", lambda *_: contextlib.nullcontext())
+            patch.setattr(live, "_open_window", lambda *_: contextlib.nullcontext())
             patch.setattr(live, "_listen", lambda _, __, ___, state: held.append(state))
             patch.setattr(live, "Surface", Surface)
-            done("view", file, *words)
+            succeed("view", file, *words)
         return presented[-1]
 
     def grid(self, file: str, words: tuple[str, ...]) -> Pixels:
         import xarray as xr
 
         shutil.rmtree(f"{file}.zarr", ignore_errors=True)
-        done("grid", file, "-o", f"{file}.zarr", "--axis", "dither_seed=3", *words)
+        succeed("grid", file, "-o", f"{file}.zarr", "--axis", "dither_seed=3", *words)
         with xr.open_zarr(f"{file}.zarr") as grid:
             return np.asarray(grid["final"].values[0])
 
@@ -197,7 +197,7 @@ class Doors:
 
         with self.patch.context() as patch:
             patch.setattr("vkbloom._fit.fit", fit)
-            done("fit", file, file, *words)
+            succeed("fit", file, file, *words)
         return found[0]
 
 
@@ -206,7 +206,7 @@ class _Glfw:
         return lambda *_: False
 
 
-def done(*words: str) -> None:
+def succeed(*words: str) -> None:
     result = run(*words)
     assert result.exit_code == 0, result.stderr
 
@@ -244,7 +244,7 @@ def test_all_doors_start_alike(doors: Doors, file: str) -> None:
             results["notebook"] = doors.notebook(file, settings)
             results["fit"] = doors.fit(file, words)
         if not words:
-            results["opened on the page"] = doors.opened(file)
+            results["opened on the page"] = doors.open(file)
         if found := differing(results):
             wrong[name] = found
     assert wrong == {}
@@ -265,7 +265,7 @@ def test_settings_of_a_result_give_it_again(doors: Doors, file: str) -> None:
     wrong = {}
     for place, (name, words) in enumerate(SAVED.items()):
         made = f"b{('.png', '.exr')[place % 2]}"
-        done("apply", file, "-o", made, *words)
+        succeed("apply", file, "-o", made, *words)
         again = ("--settings", made)
         results = {"first": doors.apply(file, words)}
         for door in ("apply", "explore", "view", "grid", "fit"):
@@ -298,7 +298,7 @@ def test_a_preset_that_is_chosen_later(doors: Doors, file: str) -> None:
     expected = doors.apply(file, words)
     viewer = vkbloom.explore(file, renderer=doors.renderer)._viewer
     streaks = vkbloom.presets["blender_streaks"]
-    assert np.array_equal(doors.shown(viewer, "auto", streaks), expected)
+    assert np.array_equal(doors.show(viewer, "auto", streaks), expected)
     first, second = [*vkbloom.presets][:2]
     pressed = doors.view(file, ("--preset", first), keys="p")
     assert np.array_equal(pressed, doors.apply(file, ("--preset", second)))
@@ -316,13 +316,13 @@ def test_the_picture_of_the_page(doors: Doors, file: str, expand: float | None) 
     message = {"kind": "save", "settings": settings.to_dict(), "expand": expand}
     _, (png,) = viewer.answer(message)
     Path("page.png").write_bytes(png)
-    done("apply", file, "again.png", "--settings", "page.png", "--bits", "8")
+    succeed("apply", file, "again.png", "--settings", "page.png", "--bits", "8")
     found, again = (reread(Path(name))[1][..., :3] for name in ("page.png", "again.png"))
     np.testing.assert_array_equal(found, again)
     # Also the JSON of "Save settings", which says the expansion beside the settings.
     text = settings.to_json()[:-1] + f', "vkbloom:expand": {expand or 1}}}'
     Path("page.json").write_text(text)
-    done("apply", file, "again.png", "--settings", "page.json", "--bits", "8")
+    succeed("apply", file, "again.png", "--settings", "page.json", "--bits", "8")
     np.testing.assert_array_equal(reread(Path("again.png"))[1][..., :3], found)
     assert vkbloom.Settings.from_json(text) == settings
 

@@ -119,7 +119,7 @@ def test_doctor_does_not_blame_the_driver() -> None:
 def test_grids_leave_a_reserve(monkeypatch: pytest.MonkeyPatch, renderer: vkbloom.Renderer) -> None:
     image = np.zeros((16, 16, 4), np.float32)
     size = 2 * image.nbytes
-    monkeypatch.setattr(grid, "memory_left", lambda: size + size // 20)
+    monkeypatch.setattr(grid, "free_memory", lambda: size + size // 20)
     with pytest.raises(MemoryError, match="a tenth as reserve"):
         vkbloom.grid(image, axes={"exposure": [0, 1]}, renderer=renderer)
 

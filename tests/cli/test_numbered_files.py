@@ -11,7 +11,7 @@ import pytest
 import vkbloom
 from tests.cli.calls import run
 from vkbloom._cli.numbered_files import as_frames, gap_note, gaps, missing_count, pattern_of
-from vkbloom._cli.sequences import check_targets, expanded
+from vkbloom._cli.sequences import check_targets, expand
 
 NAMES = {
     "n.%04d.exr": ["n.-002.exr", "n.-001.exr", "n.0000.exr", "n.0001.exr", "n.12345.exr"],
@@ -36,13 +36,13 @@ def test_files_of_a_pattern(tmp_path: Path, pattern: str) -> None:
     for name in [*NAMES[pattern], *(name for name in OTHERS if pattern[0] == "n" == name[0])]:
         (tmp_path / name).touch()
     (tmp_path / "n.0005.exr").mkdir()
-    found = expanded(str(tmp_path / pattern))
+    found = expand(str(tmp_path / pattern))
     assert [Path(path).name for path, _ in found] == NAMES[pattern]
     numbers = [number for _, number in found]
     assert numbers == sorted(numbers, key=lambda number: number or 0)
     form = pattern_of(pattern)
     assert form is not None
-    assert all(form.number_of(form.filled(n)) == n for n in (-12345, -12, -1, 0, 1, 99, 123456))
+    assert all(form.number_of(form.name_of(n)) == n for n in (-12345, -12, -1, 0, 1, 99, 123456))
 
 
 @pytest.mark.parametrize("name", ["photo@2x.png", "c#.png", "a.png", "100%.png", "x#y@.exr"])
@@ -54,7 +54,7 @@ def test_two_files_of_one_number(tmp_path: Path) -> None:
     for name in ("f.1.exr", "f.01.exr"):
         (tmp_path / name).touch()
     with pytest.raises(ValueError, match=r"f\.01\.exr: f\.1\.exr has the same number, 1"):
-        expanded(str(tmp_path / "f.%d.exr"))
+        expand(str(tmp_path / "f.%d.exr"))
 
 
 @pytest.mark.parametrize(

@@ -16,43 +16,43 @@ from vkbloom._cli.live import Live
 NAMES = ["glow", "blur_vertical", "bloom", "scene", "final"]
 
 
-def pressed(live: Live, *keys: str) -> Live:
+def press(live: Live, *keys: str) -> Live:
     for key in keys:
         live.press(key, NAMES)
     return live
 
 
 def test_a_key_turns_bloom_off_and_on() -> None:
-    live = pressed(Live(Separable(), None), "b")
+    live = press(Live(Separable(), None), "b")
     assert live.settings == Separable(bloom=False)
-    assert pressed(live, "b").settings == Separable()
+    assert press(live, "b").settings == Separable()
 
 
 def test_a_key_goes_through_presets() -> None:
     live = Live(Separable(tonemap="aces", encoding="srgb"), None)
-    found = [pressed(live, "p").settings for _ in vkbloom.presets]
+    found = [press(live, "p").settings for _ in vkbloom.presets]
     assert found == list(vkbloom.presets.values())
 
 
 def test_keys_choose_framebuffers() -> None:
-    live = pressed(Live(Pyramid(), None), "3")
+    live = press(Live(Pyramid(), None), "3")
     assert live.framebuffer == "bloom"
-    assert pressed(live, "9").framebuffer == "bloom"
+    assert press(live, "9").framebuffer == "bloom"
     # Other settings may lack the framebuffer.
-    assert [pressed(live, "3", key).framebuffer for key in "bp"] == ["final"] * 2
+    assert [press(live, "3", key).framebuffer for key in "bp"] == ["final"] * 2
     assert not live.closed
-    assert pressed(live, "escape").closed
-    assert pressed(Live(Pyramid(), None), "q").closed
+    assert press(live, "escape").closed
+    assert press(Live(Pyramid(), None), "q").closed
 
 
 def test_time_passes_unless_it_is_paused() -> None:
     live = Live(Separable(), None)
     live.advance(2.0)
     assert live.time == 0.25
-    pressed(live, "space").advance(2.0)
+    press(live, "space").advance(2.0)
     assert live.time == 0.25
     assert "paused" in live.title(0.02)
-    pressed(live, "space").advance(7.0)
+    press(live, "space").advance(7.0)
     assert live.time == 0.125
 
 

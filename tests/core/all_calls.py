@@ -29,7 +29,7 @@ from tests.device.device_work import OnDevice
 from tests.images import picture
 from tests.planned import MESH, scene_source
 from vkbloom import DualKawase, Pyramid, Renderer, Scene, Separable, Settings, _core
-from vkbloom._renderer.device_arrays import placed
+from vkbloom._renderer.device_arrays import place
 from vkbloom._renderer.new_arrays import new_arrays
 
 THREADS: Final = 16
@@ -37,7 +37,7 @@ THREADS: Final = 16
 MANY: Final = 4
 # The arrays of the last one are in the renderer's pages.
 SIZES = ((24, 16), (17, 31), (300, 290))
-OWN: Final = """\
+CUSTOM: Final = """\
 //!PARAM gain
 //!TYPE float
 0.5
@@ -60,7 +60,7 @@ SETTINGS: tuple[Settings, ...] = (
     Separable(),
     Pyramid(levels=3, exposure=0.5, format="rgba32float"),
     DualKawase(levels=2),
-    vkbloom.load_method(OWN, name="own")(),
+    vkbloom.load_method(CUSTOM, name="custom")(),
 )
 IMAGES = [picture(*size) for size in SIZES]
 UFO = Scene.ufo()
@@ -122,14 +122,14 @@ def on_device(renderer: Renderer, which: int, size: int) -> Any:
     handle = renderer.upload(image)
     renderer.apply(handle, SETTINGS[which], out={"final": out})
     again: Any = renderer.apply(final, SETTINGS[which], framebuffers="final")["final"]
-    written = placed(IMAGES[size], "cuda", core)
+    written = place(IMAGES[size], "cuda", core)
     found = [one.numpy() for one in (*frames.values(), again, written)]
     return [*found, out.array, core.cuda(), core.cuda_name(0)]
 
 
 def load(renderer: Renderer, which: int, size: int) -> Any:
     """Load a method while other threads load one of the same name."""
-    text = OWN.replace("0.5", f"0.{which + 1}")
+    text = CUSTOM.replace("0.5", f"0.{which + 1}")
     settings = vkbloom.load_method(text, name=f"own_{which}")()
     return host(renderer.apply(IMAGES[size], settings))
 

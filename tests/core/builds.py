@@ -85,7 +85,7 @@ def succeed(tree: Path, *command: str | Path) -> None:
 
 
 @contextmanager
-def _locked(path: Path) -> Iterator[None]:
+def _lock(path: Path) -> Iterator[None]:
     import fcntl
 
     with path.open("w") as file:
@@ -109,7 +109,7 @@ def core_with_faults(temporary: Path) -> Path:
     volk_folder()
     shared = temporary.parent if "PYTEST_XDIST_WORKER" in os.environ else temporary
     tree, whole = shared / "faults", shared / "faults.whole"
-    with _locked(shared / "faults.lock"):
+    with _lock(shared / "faults.lock"):
         if not whole.exists():
             shutil.rmtree(tree, ignore_errors=True)
             ignored = shutil.ignore_patterns("*.so", "*.pyd", "__pycache__", "*.egg-info")

@@ -52,7 +52,7 @@ def mean(frames: vkbloom.Frames) -> float:
     return float(frames["final"].mean())
 
 
-def textured() -> Scene:
+def make_textured() -> Scene:
     """Return a scene with textures of two meshes, of which one emits."""
     colours = np.random.default_rng(1).random((5, 7, 4)).astype(np.float16)
     body = panel(SIZE, Texture((colours,)), Texture((colours[:3, :3],)), radiance=(1.0, 2.0, 1.0))
@@ -64,7 +64,7 @@ def method(settings: vkbloom.Settings) -> Work:
     return lambda renderer: renderer.apply(picture(*SIZE), settings)
 
 
-def named(results: Mapping[Any, vkbloom.Frames]) -> Arrays:
+def by_name(results: Mapping[Any, vkbloom.Frames]) -> Arrays:
     return {f"{key} {name}": one[name] for key, one in results.items() for name in one}
 
 
@@ -76,7 +76,7 @@ def accompanied(renderer: Renderer) -> Arrays:
     stages = (streaks, vkbloom.Ghosts(), vkbloom.Halo(), vkbloom.Dirt(seed=1))
     settings = vkbloom.Separable(layers=((1, 1), (2, 1)), composite="mix", alpha="blur")
     flaring = vkbloom.Separable(glare=stages)
-    return named(
+    return by_name(
         {
             "first": renderer.apply(image, settings, mask=mask),
             "masked": renderer.apply(image, settings, mask=mask[::-1]),
@@ -88,7 +88,7 @@ def accompanied(renderer: Renderer) -> Arrays:
 
 
 def swept(renderer: Renderer, source: Any, settings: Iterable[Any], **more: Any) -> Arrays:
-    return named(dict(enumerate(renderer.sweep(source, settings, **more))))
+    return by_name(dict(enumerate(renderer.sweep(source, settings, **more))))
 
 
 def batch(renderer: Renderer) -> Arrays:
@@ -221,7 +221,7 @@ def stored_grid(renderer: Renderer) -> Arrays:
 
 
 @functools.cache
-def own_settings() -> tuple[vkbloom.Settings, ...]:
+def custom_settings() -> tuple[vkbloom.Settings, ...]:
     """Return the settings of two custom methods, of draws and of dispatches; compiled once."""
     folder = Path("examples/custom_methods")
     return tuple(vkbloom.load_method(folder / f"{name}.hook")() for name in ("karis", "compute"))
@@ -262,7 +262,9 @@ PRESETS = {
 }
 WORK: dict[str, Work] = {
     "render forward": lambda renderer: renderer.render(UFO, size=SIZE),
-    "render deferred": lambda renderer: renderer.render(textured(), size=SIZE, shading="deferred"),
+    "render deferred": lambda renderer: renderer.render(
+        make_textured(), size=SIZE, shading="deferred"
+    ),
     "mask, emission, glare": accompanied,
     "batch": batch,
     "grid": grid,
@@ -272,7 +274,7 @@ WORK: dict[str, Work] = {
     "histories": histories,
     "gradients": gradients,
     "present": presented,
-    "own passes": lambda renderer: swept(renderer, picture(*SIZE), own_settings()),
+    "custom passes": lambda renderer: swept(renderer, picture(*SIZE), custom_settings()),
     **({"arrays on the device": on_device} if "STAND_IN_UUID" in os.environ else {}),
     **{
         f"apply {preset} {variant}": method(settings)
@@ -477,7 +479,7 @@ def workloads() -> list[str]:
 
 def main(stride: int, names: list[str]) -> None:
     # Objects that a process creates once must exist before the count.
-    own_settings()
+    custom_settings()
     with open_renderer() as renderer:
         WORK["render forward"](renderer)
     try:

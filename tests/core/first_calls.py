@@ -45,19 +45,19 @@ def render(index: int) -> Any:
 def presets(index: int) -> Any:
     """Look up names of presets, in another order in each thread."""
     names = list(vkbloom.presets)
-    return {name: vkbloom.presets[name] for name in shuffled(names, index)} | {"": sorted(names)}
+    return {name: vkbloom.presets[name] for name in shuffle(names, index)} | {"": sorted(names)}
 
 
 def glares(index: int) -> Any:
     """Look up names of glares, in another order in each thread."""
     names = list(vkbloom.glares)
-    return {name: vkbloom.glares[name] for name in shuffled(names, index)} | {"": sorted(names)}
+    return {name: vkbloom.glares[name] for name in shuffle(names, index)} | {"": sorted(names)}
 
 
 def load_method(index: int) -> Any:
     """Load one method everywhere, and one more with a name of the thread's own; both are used."""
-    own = vkbloom.load_method(METHOD, name=f"of_{index}")
-    assert vkbloom.Settings.from_dict(own().to_dict()) == own()
+    custom = vkbloom.load_method(METHOD, name=f"of_{index}")
+    assert vkbloom.Settings.from_dict(custom().to_dict()) == custom()
     kind = vkbloom.load_method(METHOD, name="gained")
     made: Any = kind
     return kind, made(gain=3), vkbloom.Settings.from_dict({"method": "gained", "gain": 3})
@@ -74,11 +74,11 @@ def names(index: int) -> Any:
     every = [f"{module.__name__} {name}" for module in modules for name in module.__all__]
     return {
         name: id(getattr(sys.modules[name.split()[0]], name.split()[1]))
-        for name in shuffled(every, index)
+        for name in shuffle(every, index)
     }
 
 
-def shuffled(names: list[str], seed: int) -> list[str]:
+def shuffle(names: list[str], seed: int) -> list[str]:
     """Return the names in a random order."""
     return random.Random(seed).sample(names, len(names))
 

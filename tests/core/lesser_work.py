@@ -189,7 +189,7 @@ def try_all(renderer: Renderer) -> dict[str, str]:
     return wrong
 
 
-def timed(frames: Frames) -> bool:
+def has_timings(frames: Frames) -> bool:
     return not any(math.isnan(seconds) for seconds in frames.timings.values())
 
 
@@ -198,7 +198,7 @@ def main() -> None:
     wrong = try_all(renderer)
     # Other settings than before, so that passes run.
     frames = renderer.apply(picture(9, 9, 3, "uint8"), Separable(blur_strength=0.125))
-    about = {"type": renderer.info.type, "timed": timed(frames), "passes": PASSES}
+    about = {"type": renderer.info.type, "timed": has_timings(frames), "passes": PASSES}
     print(json.dumps({**about, "wrong": wrong}))
     renderer.close()
 

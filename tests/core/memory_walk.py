@@ -20,14 +20,12 @@ from tests.core.fault_walk import SIZE, core, open_renderer
 from tests.images import picture
 from vkbloom import Renderer, Separable
 from vkbloom._renderer.new_arrays import new_arrays
-from vkbloom._renderer.requests import named
+from vkbloom._renderer.requests import name_outputs
 
 BEYOND = 40  # a frame that does without one refused block may stop at the next
 
 
-def collected(
-    renderer: Renderer, image: NDArray[Any], n: int
-) -> tuple[bool, dict[str, Any] | None]:
+def collect(renderer: Renderer, image: NDArray[Any], n: int) -> tuple[bool, dict[str, Any] | None]:
     """Return whether request n was refused (0: refuse none), and the frame; None after an error."""
     settings = Separable()
     result = submission = None
@@ -39,7 +37,7 @@ def collected(
         plan = renderer._core.plan(source, settings, ("glow", "final"))
         arrays = new_arrays(renderer._core, plan)
         submission = renderer._core.run(source, (plan,), (arrays,), True)
-        frame = named(plan, arrays)
+        frame = name_outputs(plan, arrays)
         submission.wait()
         result = frame
     except MemoryError:
@@ -57,7 +55,7 @@ def walk(image: NDArray[Any]) -> tuple[int, int]:
     """Walk until as many requests as BEYOND in a row were not refused; return both counts."""
     with open_renderer() as renderer:
         # Two at once, as below: with the pages of both.
-        frames = [collected(renderer, image, 0)[1] for _ in range(2)]
+        frames = [collect(renderer, image, 0)[1] for _ in range(2)]
         frame = frames.pop()
         assert frame is not None
         right = {name: array.copy() for name, array in frame.items()}
@@ -66,10 +64,10 @@ def walk(image: NDArray[Any]) -> tuple[int, int]:
         refused = beyond = n = 0
         while beyond < BEYOND:
             n += 1
-            failed, result = collected(renderer, image, n)
+            failed, result = collect(renderer, image, n)
             refused += failed
             beyond = 0 if failed else beyond + 1
-            for frame in (result, collected(renderer, image, 0)[1]):
+            for frame in (result, collect(renderer, image, 0)[1]):
                 if frame is not None:
                     for name, array in right.items():
                         np.testing.assert_array_equal(frame[name], array)

@@ -52,7 +52,7 @@ ACCEPTED: dict[str, set[str]] = {
 TEXTS = (
     r"Literal|Shading|\w*Colour|\w*Encoding|PyramidLoss|Composite|Alpha|ToneMap|\w*Mode|\w*Format"
 )
-CONTAINERS = r"Sequence|Iterable|Mapping|tuple|NDArray|type|Bounds|os\.PathLike|Path|Twin|ArrayLike"
+CONTAINERS = r"Sequence|Iterable|Mapping|tuple|NDArray|type|Bounds|os\.PathLike|Path|ArrayLike"
 #: Sequences of any items.
 SEQUENCES = {"list", "array"}
 CLASSES = r"Settings|Renderer|Scene|Camera|Image|PSF|PSFLike|Probe|(xarray\.)?Dataset"
@@ -62,7 +62,7 @@ SEPARABLE = vkbloom.Separable()
 GAUSSIAN = psf.gaussian(1.0)
 
 
-def blurred(image: Any) -> Any:
+def blur(image: Any) -> Any:
     return image
 
 
@@ -84,7 +84,7 @@ NEEDED: dict[str, Any] = {
     "to": SEPARABLE,
     "vary": ["intensity"],
     "psf": GAUSSIAN,
-    "bloom": blurred,
+    "bloom": blur,
     "argv": ["true", "{input}", "{output}"],
     "path": "a.png",
     "base": "a.gltf",
@@ -146,7 +146,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
 
 
-def accepted(annotation: str) -> set[str] | None:
+def accepted_types(annotation: str) -> set[str] | None:
     """Return the types of values that an annotation accepts; None for one that is unknown."""
     found: set[str] = set()
     for part in re.split(r"\s*\|\s*(?![^\[]*\])", annotation.strip("\"'")):
@@ -155,7 +155,6 @@ def accepted(annotation: str) -> set[str] | None:
             found.add("str")
         elif re.fullmatch(CONTAINERS, name):
             found |= {"class"} if name == "type" else set()
-            found |= {"function", "class"} if name == "Twin" else set()
             found |= SEQUENCES if part == "Sequence[Any]" else set()
         elif name in ACCEPTED:
             found |= ACCEPTED[name]
@@ -170,7 +169,7 @@ def wrong_arguments(function: Callable[..., Any]) -> Iterator[tuple[str, Any]]:
     for place, (name, parameter) in enumerate(inspect.signature(function).parameters.items()):
         if parameter.kind in (parameter.VAR_POSITIONAL, parameter.VAR_KEYWORD):
             continue
-        types = accepted(str(parameter.annotation))
+        types = accepted_types(str(parameter.annotation))
         if types is not None:
             for kind in sorted(set(VALUES) - types):
                 values = VALUES[kind]
@@ -196,7 +195,7 @@ def check(function: Callable[..., Any], arguments: dict[str, Any], name: str, va
             pytest.fail(f"{name}: {value!r} is accepted")
 
 
-def needed(function: Callable[..., Any]) -> dict[str, Any]:
+def required_arguments(function: Callable[..., Any]) -> dict[str, Any]:
     """Return valid values of the parameters without a default."""
     parameters = inspect.signature(function).parameters.items()
     values: dict[str, Any] = NEEDED | OTHERS.get(function.__name__, {})
@@ -214,7 +213,7 @@ def test_a_wrong_type_is_an_error_that_names_the_argument(function: Callable[...
     if not wrong:
         pytest.skip("the function's parameters accept every type")
     for argument in wrong:
-        check(function, needed(function), *argument)
+        check(function, required_arguments(function), *argument)
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -223,13 +222,13 @@ def test_a_wrong_type_is_an_error_of_the_renderers_methods(
 ) -> None:
     function = getattr(renderer, method)
     for argument in wrong_arguments(function):
-        check(function, needed(function), *argument)
+        check(function, required_arguments(function), *argument)
 
 
 def test_an_object_of_another_class_of_the_same_name_is_refused() -> None:
     values = {name: type(name, (), {})() for name in ("Camera", "PSF", "Probe", "Renderer")}
     for call in (
-        lambda: testing.point_spread(blurred, values["Probe"]),
+        lambda: testing.point_spread(blur, values["Probe"]),
         lambda: vkbloom.capture("a.rdc", renderer=values["Renderer"]),
         lambda: vkbloom.fit_pyramid(values["PSF"]),
         lambda: vkbloom.Scene.from_gltf("a.gltf", camera=values["Camera"]),

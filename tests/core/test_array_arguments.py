@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import vkbloom
-from tests.scene.parts import WHITE, Cubemap, Mesh, Surface, Texture, load_sky
+from tests.scene.parts import WHITE, Cubemap, Material, Mesh, Texture, load_sky
 from vkbloom import Convolution, Ghosts, GodotBloom, Pyramid, Renderer, Scene, Separable, psf
 
 Array = np.ndarray[Any, Any]
@@ -25,15 +25,15 @@ MESH: Final[Mapping[str, Array]] = {
 }
 
 
-def shown(
+def draw(
     renderer: Renderer, sky: Cubemap | None = None, texture: Texture = WHITE, **arrays: Any
 ) -> object:
     """Draw a mesh with such arrays."""
-    body = Mesh(**{**MESH, **arrays}, surfaces=(Surface(3, texture),))
+    body = Mesh(**{**MESH, **arrays}, surfaces=(Material(3, texture),))
     return renderer.render(Scene(body, None, sky), Separable(), size=(8, 8))
 
 
-def pulled(renderer: Renderer, cotangent: Any) -> object:
+def pull(renderer: Renderer, cotangent: Any) -> object:
     _, pullback = vkbloom.vjp(IMAGE, Pyramid(levels=2, format="rgba32float"), renderer=renderer)
     return pullback({"final": cotangent})
 
@@ -80,7 +80,7 @@ PLACES: Final[Mapping[str, Place]] = {
         np.zeros_like(IMAGE),
         "out",
     ),
-    "cotangents": Place(pulled, IMAGE, "cotangents", CONVERTED),
+    "cotangents": Place(pull, IMAGE, "cotangents", CONVERTED),
     "weights": Place(
         lambda renderer, array: renderer.apply(IMAGE, Separable(weights=array)),
         np.ones(3, np.float32),
@@ -124,25 +124,25 @@ PLACES: Final[Mapping[str, Place]] = {
         (*COLUMNS, *CONVERTED),
     ),
     "faces": Place(
-        lambda renderer, array: shown(renderer, sky=load_sky(array)),
+        lambda renderer, array: draw(renderer, sky=load_sky(array)),
         np.zeros((6, 2, 2, 4), np.float32),
         "skybox",
         ("float16", "uint8"),
     ),
     "levels of a sky": Place(
-        lambda renderer, array: shown(renderer, sky=Cubemap((array,))),
+        lambda renderer, array: draw(renderer, sky=Cubemap((array,))),
         np.zeros((6, 2, 2, 4), np.float32),
         "levels",
         ("float16", "uint8"),
     ),
     "levels of a texture": Place(
-        lambda renderer, array: shown(renderer, texture=Texture((array,))),
+        lambda renderer, array: draw(renderer, texture=Texture((array,))),
         np.zeros((3, 2, 4), np.float16),
         "levels",
         COLUMNS,
     ),
     "a second level": Place(
-        lambda renderer, array: shown(
+        lambda renderer, array: draw(
             renderer, texture=Texture((np.zeros((7, 4, 4), np.float16), array))
         ),
         np.zeros((3, 2, 4), np.float16),
@@ -150,25 +150,25 @@ PLACES: Final[Mapping[str, Place]] = {
     ),
     # Another number of vertices fits neither the indices nor the other arrays.
     "vertices": Place(
-        lambda renderer, array: shown(renderer, vertices=array),
+        lambda renderer, array: draw(renderer, vertices=array),
         MESH["vertices"],
         "vertices|indices|emission",
         CONVERTED,
     ),
     "indices": Place(
-        lambda renderer, array: shown(renderer, indices=array),
+        lambda renderer, array: draw(renderer, indices=array),
         MESH["indices"],
         "indices",
         ("uint8", "int64"),
     ),
     "emission of a mesh": Place(
-        lambda renderer, array: shown(renderer, emission=array),
+        lambda renderer, array: draw(renderer, emission=array),
         MESH["emission"],
         "emission",
         CONVERTED,
     ),
     "texcoords": Place(
-        lambda renderer, array: shown(renderer, texcoords=array),
+        lambda renderer, array: draw(renderer, texcoords=array),
         MESH["texcoords"],
         "texcoords",
         CONVERTED,
@@ -202,7 +202,7 @@ def variants(array: Array) -> dict[str, Any]:
     return made
 
 
-def refused(call: Call, renderer: Renderer, array: Any) -> str | None:
+def refusal(call: Call, renderer: Renderer, array: Any) -> str | None:
     """Return the text of the error of a wrong argument; None: there was none."""
     try:
         call(renderer, array)
@@ -218,7 +218,7 @@ def test_a_wrong_array_is_refused(renderer: Renderer, name: str) -> None:
     place.call(renderer, place.array.copy())
     taken = []
     for what, array in variants(place.array).items():
-        if (error := refused(place.call, renderer, array)) is None:
+        if (error := refusal(place.call, renderer, array)) is None:
             taken.append(what)
         else:
             assert re.match(rf"({place.begins})\b", error), (what, error)

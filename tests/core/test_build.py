@@ -240,18 +240,18 @@ def test_a_source_is_compiled_again_only_if_it_a_header_or_an_option_has_changed
         Path(name).parent.mkdir(parents=True, exist_ok=True)
         Path(name).touch()
 
-    def compiled(*options: str) -> list[str]:
+    def compile_all(*options: str) -> list[str]:
         compiler = Compiler()
         objects = build.compiled_once(compiler, 1)(sources, str(tmp_path), extra_postargs=options)
         assert objects == [str(tmp_path / name) for name in ("one.o", "other.o")]
         return sorted(compiler.compiled)
 
-    assert compiled() == [one, other]
-    assert compiled() == []
+    assert compile_all() == [one, other]
+    assert compile_all() == []
     Path(other).write_text("changed")
-    assert compiled() == [other]
+    assert compile_all() == [other]
     header.write_text("changed")
-    assert compiled() == [one, other]
-    assert compiled("-O0") == [one, other]
+    assert compile_all() == [one, other]
+    assert compile_all("-O0") == [one, other]
     (tmp_path / "one.o").unlink()
-    assert compiled("-O0") == [one]
+    assert compile_all("-O0") == [one]

@@ -11,13 +11,13 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
-from tests.planned import SCENES, bundled_driver, changed, scene_arguments, scene_plan, scene_source
+from tests.planned import SCENES, bundled_driver, change, scene_arguments, scene_plan, scene_source
 from tests.refusals import assert_refused, rows
 from vkbloom import Renderer, Scene, Separable, _core
 from vkbloom._custom.rows import CoreShader, Row
 from vkbloom._settings.blocks import _CODES, settings_block
 
-_LEAST = {"weights": (1.0,), "layers": ((1.0, 1.0),)}
+_SHORTEST = {"weights": (1.0,), "layers": ((1.0, 1.0),)}
 
 
 class Given:
@@ -31,7 +31,7 @@ class Given:
 
 def settings_with(**fields: Any) -> Given:
     given = Given()
-    vars(given).update(_LEAST | fields)
+    vars(given).update(_SHORTEST | fields)
     return given
 
 
@@ -72,7 +72,7 @@ class Dirty(NamedTuple):
     glare: Any
 
     def _core_block(self) -> bytes:
-        return settings_block("separable", {**_LEAST, "glare": (stage_with(stage="dirt"),)})
+        return settings_block("separable", {**_SHORTEST, "glare": (stage_with(stage="dirt"),)})
 
 
 class Passes(NamedTuple):
@@ -97,27 +97,27 @@ SPIRV = np.array([0x07230203, 0x10300, 0, 1, 0, 1 << 16], np.uint32).tobytes()
 
 def one_pass(code: bytes = SPIRV, resources: Any = (), digest: bytes = bytes(16), **at: int) -> Any:
     """Return a method of one pass, whose block has other numbers at some places."""
-    block, *rest, _ = Row("bloom", CoreShader("one", code, digest), (4, 4), ("MAIN",)).packed()
-    return Passes(((changed(block, **at), *rest, resources),))
+    block, *rest, _ = Row("bloom", CoreShader("one", code, digest), (4, 4), ("MAIN",)).pack()
+    return Passes(((change(block, **at), *rest, resources),))
 
 
 def resource(data: Any = None, owner: Any = None, **at: int) -> Any:
     """Return a texture of 4 bytes, whose block has other numbers at some places."""
-    return changed(struct.pack("=2Q8I", 1, 4, 0, 37, 2, 1, 1, 1, 0, 0), **at), data, owner
+    return change(struct.pack("=2Q8I", 1, 4, 0, 37, 2, 1, 1, 1, 0, 0), **at), data, owner
 
 
-def edited(name: str, *numbers: float, table: Any = None, start: int = 0) -> Block:
+def edit(name: str, *numbers: float, table: Any = None, start: int = 0) -> Block:
     """Return settings whose block has other numbers at a member's place."""
     offset, code, _ = (_core.SETTINGS_BLOCK if table is None else table)[name]
-    block = bytearray(settings_block("separable", {**_LEAST, "glare": (stage_with(),)}))
+    block = bytearray(settings_block("separable", {**_SHORTEST, "glare": (stage_with(),)}))
     struct.pack_into(f"={len(numbers)}{_CODES[code]}", block, start + offset, *numbers)
     return Block(bytes(block))
 
 
-def edited_stage(name: str, *numbers: float) -> Block:
+def edit_stage(name: str, *numbers: float) -> Block:
     """Return settings whose first stage of glare has other numbers at a member's place."""
     start = _core.SETTINGS_BLOCK["stages"][0]
-    return edited(name, *numbers, table=_core.STAGE_BLOCK, start=start)
+    return edit(name, *numbers, table=_core.STAGE_BLOCK, start=start)
 
 
 class Raising(Given):
@@ -162,7 +162,7 @@ def triangle(
     block, _, _ = scene_arguments(SCENES[False], (8, 8), "forward", 0.0)
     # No glow mesh, whose counts are after those of the body, at 34 to 36.
     none = {"at37": 0, "at38": 0, "at39": 0, "at41": textures}
-    block = changed(block, **(none | (at or {})))
+    block = change(block, **(none | (at or {})))
     given = [array for array in arrays.values() if array is not None] + list(sky or ())
     numbers = np.array(pictures or [0] * 9, np.uint32)
     return _core.scene_source(block, numbers.tobytes(), tuple(given))
@@ -184,7 +184,7 @@ def names(renderer: Renderer, scene: Scene) -> dict[str, Any]:
         **globals(),
         **given,
         "raw": raw,
-        "changed": changed,
+        "change": change,
         "scene_source": scene_source,
         "plan": lambda **fields: scene_plan(settings_with(**fields), (16, 16)),
         "ghosts": lambda given: stage_with(stage="ghosts", ghosts=given),
@@ -219,9 +219,9 @@ def test_every_number_of_a_block_is_checked(name: str) -> None:
     for number in wrong:
         value = number if isinstance(number, float) else int(number)
         with pytest.raises(ValueError, match=f"{name}: .* is out of range"):
-            scene_plan(edited(name, value), (16, 16))
+            scene_plan(edit(name, value), (16, 16))
     for number in (default, low, high):
-        scene_plan(edited(name, number), (16, 16))
+        scene_plan(edit(name, number), (16, 16))
 
 
 @pytest.mark.parametrize("name", sorted(_core.GLARE_VALUES))
@@ -229,14 +229,14 @@ def test_every_number_of_a_stage_is_checked(name: str) -> None:
     _, low, high = _core.GLARE_VALUES[name]
     for number in (low - 1, 2 * high + 1):
         with pytest.raises(ValueError, match=f"{name}: .* is out of range"):
-            scene_plan(edited_stage(name, number), (16, 16))
+            scene_plan(edit_stage(name, number), (16, 16))
 
 
 @pytest.mark.parametrize("name", sorted(_core.CHOICES))
 def test_every_choice_is_checked(name: str) -> None:
     for number in (-1, len(_core.CHOICES[name])):
         with pytest.raises(ValueError, match=f"{name}: .* is out of range"):
-            scene_plan(edited(name, number), (16, 16))
+            scene_plan(edit(name, number), (16, 16))
 
 
 @pytest.mark.parametrize("name", sorted(_core.VALUES))

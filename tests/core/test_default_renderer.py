@@ -32,7 +32,7 @@ def test_functions_equal_the_methods(renderer: vkbloom.Renderer) -> None:
 
 @pytest.mark.parametrize("call", ["apply", "map", "sweep", "plan", "vjp", "grid"])
 def test_a_presets_name_is_a_settings(renderer: vkbloom.Renderer, call: str) -> None:
-    def called(settings: Any) -> Any:
+    def call_default(settings: Any) -> Any:
         if call == "vjp":
             return vkbloom.vjp(IMAGE, settings, renderer=renderer)[0]["final"].tobytes()
         if call == "grid":
@@ -45,7 +45,7 @@ def test_a_presets_name_is_a_settings(renderer: vkbloom.Renderer, call: str) -> 
         images, many = ([IMAGE], settings) if call == "map" else (IMAGE, [settings])
         return [frames["final"].tobytes() for frames in getattr(renderer, call)(images, many)]
 
-    found, expected = called("kino"), called(vkbloom.presets["kino"])
+    found, expected = call_default("kino"), call_default(vkbloom.presets["kino"])
     assert found.equals(expected) if call == "grid" else found == expected
 
 

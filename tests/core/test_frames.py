@@ -12,14 +12,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.framebuffers import INFO, TIMINGS, make, mixed
+from tests.framebuffers import INFO, TIMINGS, make, make_mixed
 from tests.images import noise
 from vkbloom import Frames, Separable
 
 
 @pytest.fixture
 def frames() -> Frames:
-    return mixed()
+    return make_mixed()
 
 
 class TestMapping:

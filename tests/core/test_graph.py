@@ -16,7 +16,7 @@ from vkbloom import Separable, _core, presets
 BLOCKS = Path(__file__).with_name("graphs.txt").read_text().strip().split("\n\n")
 
 
-def shown(plan: _core.Plan) -> list[str]:
+def list_lines(plan: _core.Plan) -> list[str]:
     """Return the lines of a block of graphs.txt."""
     lines = []
     for row in rows(plan):
@@ -34,7 +34,7 @@ def test_the_graph_of_a_plan(block: str) -> None:
     shading, text = head.removeprefix("# ").split(" ", 1)
     settings, _, sky = text.partition(" without ")
     given = eval(settings, {"Separable": Separable, "presets": presets})
-    assert shown(scene_plan(given, has_sky=sky != "a sky", shading=shading)) == lines
+    assert list_lines(scene_plan(given, has_sky=sky != "a sky", shading=shading)) == lines
 
 
 def test_no_image_fills_a_slot_of_another_one() -> None:
@@ -146,7 +146,7 @@ const char *keep(int kept)
 """
 
 
-def linked(tree: Path, folder: Path, text: str) -> ctypes.CDLL:
+def link(tree: Path, folder: Path, text: str) -> ctypes.CDLL:
     """Return a library of a text in C and of the core."""
     source, library = folder / "linked.c", folder / "linked.so"
     source.write_text(text)
@@ -160,9 +160,7 @@ def linked(tree: Path, folder: Path, text: str) -> ctypes.CDLL:
 def test_a_filter_with_too_many_places_fails(
     tmp_path_factory: pytest.TempPathFactory, tmp_path: Path
 ) -> None:
-    add_filter = linked(
-        core_with_faults(tmp_path_factory.getbasetemp()), tmp_path, FILTER
-    ).add_filter
+    add_filter = link(core_with_faults(tmp_path_factory.getbasetemp()), tmp_path, FILTER).add_filter
     add_filter.restype = ctypes.c_char_p
     assert add_filter(0) == add_filter(2) == b"added"
     assert add_filter(3) == b"filter: level has 6 places of taps along an axis, more than 5"
@@ -171,7 +169,7 @@ def test_a_filter_with_too_many_places_fails(
 def test_what_has_a_history_is_made_in_each_call(
     tmp_path_factory: pytest.TempPathFactory, tmp_path: Path
 ) -> None:
-    keep = linked(core_with_faults(tmp_path_factory.getbasetemp()), tmp_path, HISTORIES).keep
+    keep = link(core_with_faults(tmp_path_factory.getbasetemp()), tmp_path, HISTORIES).keep
     keep.restype = ctypes.c_char_p
     # Once it ran, all is up to date until the history has another content.
     assert keep(-1) == b"2 2, n n  , nc nc  , n n  "

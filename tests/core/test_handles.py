@@ -243,7 +243,7 @@ def test_one_array_filled_again_and_again(renderer: Renderer) -> None:
     array = np.zeros((21, 33, 4), np.float32)
     asked = given = 0
 
-    def filled() -> Iterator[NDArray[Any]]:
+    def fill() -> Iterator[NDArray[Any]]:
         nonlocal asked
         for level in range(1, 9):
             asked += 1
@@ -252,7 +252,7 @@ def test_one_array_filled_again_and_again(renderer: Renderer) -> None:
             array[:] = -1
 
     settings = Separable(bloom=False)
-    for level, frames in enumerate(renderer.map(filled(), settings), 1):
+    for level, frames in enumerate(renderer.map(fill(), settings), 1):
         given += 1
         assert asked <= given + 2
         assert (frames["final"] == level).all()
@@ -263,14 +263,14 @@ def test_a_generator_gets_its_array_back(renderer: Renderer) -> None:
     """A buffer that is exported could not change its size."""
     buffer = bytearray(4 * 4 * 3)
 
-    def resized() -> Iterator[NDArray[Any]]:
+    def resize() -> Iterator[NDArray[Any]]:
         for _ in range(4):
             yield np.frombuffer(buffer, np.uint8).reshape(4, 4, 3)
             gc.collect()
             buffer.extend(b"\0")
             del buffer[-1]
 
-    assert len(list(renderer.map(resized(), LOW))) == 4
+    assert len(list(renderer.map(resize(), LOW))) == 4
 
 
 def wrong(kind: str) -> Iterator[Any]:

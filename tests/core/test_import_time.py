@@ -28,16 +28,16 @@ LATE = {
 }
 
 
-def loaded(code: str) -> set[str]:
+def load(code: str) -> set[str]:
     code += "; import sys; print(*sys.modules)"
     return set(output("-c", code).split())
 
 
 def test_the_import_loads_what_is_needed() -> None:
     late = {"numpy", "click", "rich", "tqdm", "OpenImageIO"}
-    assert not late & loaded("import vkbloom._cli")
+    assert not late & load("import vkbloom._cli")
     code = "import vkbloom; vkbloom.Renderer, vkbloom.Pyramid"
-    added = loaded(code) - loaded("import numpy, numpy.typing, dataclasses")
+    added = load(code) - load("import numpy, numpy.typing, dataclasses")
     names = [name.split(".")[1:] for name in added if name.startswith("vkbloom.")]
     packages = {module.name for module in pkgutil.iter_modules(vkbloom.__path__) if module.ispkg}
     assert packages & {parts[0] for parts in names} == NEEDED
@@ -56,4 +56,4 @@ def test_every_public_name_is_there_after_the_import(name: str) -> None:
 
 def test_late_modules_are_there_at_the_first_use() -> None:
     code = "import vkbloom; vkbloom.reference.apply; vkbloom.Scene; vkbloom.testing.stability"
-    assert "vkbloom.testing._moving_light" in loaded(code)
+    assert "vkbloom.testing._moving_light" in load(code)

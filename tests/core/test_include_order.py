@@ -43,7 +43,7 @@ def read_map(text: str) -> dict[str, set[str]]:
 ALLOWED = read_map((CORE / "README.md").read_text("utf-8"))
 
 
-def refused_includes(folder: str, text: str, allowed: dict[str, set[str]]) -> list[str]:
+def find_refused_includes(folder: str, text: str, allowed: dict[str, set[str]]) -> list[str]:
     """Return the headers that a file of the folder includes and must not."""
     found = re.findall(r'^\s*#\s*include\s*(["<])([^">]+)', text, re.MULTILINE)
     return [
@@ -60,7 +60,7 @@ def test_folders_include_what_the_map_allows() -> None:
     assert {file.parent.name for file in FILES} == set(ALLOWED)
     for file in FILES:
         text = file.read_text("utf-8")
-        assert refused_includes(file.parent.name, text, ALLOWED) == [], file.relative_to(CORE)
+        assert find_refused_includes(file.parent.name, text, ALLOWED) == [], file.relative_to(CORE)
 
 
 @pytest.mark.parametrize(
@@ -92,7 +92,7 @@ def test_folders_include_what_the_map_allows() -> None:
 )
 def test_planted_includes_are_refused(folder: str, include: str) -> None:
     text = f'#include "vulkan/error.h"\n#include "spirv.h"\n # include {include}\n'
-    assert refused_includes(folder, text, ALLOWED) == [include[1:-1]]
+    assert find_refused_includes(folder, text, ALLOWED) == [include[1:-1]]
 
 
 def test_a_bar_separates_folders_of_a_line() -> None:

@@ -115,7 +115,7 @@ class Case(NamedTuple):
     right: list[NDArray[Any]]
 
     @contextmanager
-    def interrupted(self, seconds: float = 0.1) -> Iterator[None]:
+    def interrupt(self, seconds: float = 0.1) -> Iterator[None]:
         """The alarm ends the work within."""
         self.alarm(seconds)
         with pytest.raises(Alarm):
@@ -160,7 +160,7 @@ def case(
 def test_a_long_frame_is_interrupted(case: Case) -> None:
     case.renderer.apply(picture(8, 8), case.long.settings)
     for _ in range(2):
-        with case.interrupted():
+        with case.interrupt():
             case.long.run(case.renderer)
     case.check()
 
@@ -171,7 +171,7 @@ def test_an_interrupted_frame_keeps_its_arrays(case: Case) -> None:
     renderer, image, settings = case.renderer, case.long.image, case.long.settings
     expected = renderer.apply(image, settings, framebuffers="final")["final"]
     renderer.apply(image[:8, :8], settings)
-    with case.interrupted():
+    with case.interrupt():
         renderer.apply(image, settings, framebuffers="final", out={"final": np.zeros_like(image)})
     gc.collect()
     others = [np.zeros_like(image) for _ in range(4)]
@@ -195,7 +195,7 @@ def test_a_finalizer_of_an_array_may_wait_for_the_renderer(case: Case) -> None:
 
     array = np.zeros_like(image)
     weakref.finalize(array, use_elsewhere)
-    with case.interrupted():
+    with case.interrupt():
         renderer.apply(image, settings, framebuffers="final", out={"final": array})
     del array
     gc.collect()
@@ -211,7 +211,7 @@ def test_a_sequence_is_interrupted(case: Case) -> None:
         case.long.settings.replace(exposure=step / 8, blur_strength=1 + step / 8)
         for step in range(3)
     ]
-    with case.interrupted(0.3):
+    with case.interrupt(0.3):
         for _ in case.renderer.sweep(case.long.image, settings):
             pass
     case.check()
@@ -242,13 +242,13 @@ def test_an_interrupted_store_is_completed(
     closers: list[threading.Thread] = []
     close = Renderer.close
 
-    def noted_close(renderer: Renderer) -> None:
+    def note_close(renderer: Renderer) -> None:
         closers.append(threading.current_thread())
         close(renderer)
 
-    monkeypatch.setattr(Renderer, "close", noted_close)
+    monkeypatch.setattr(Renderer, "close", note_close)
 
-    def made(stopper: Stopper, **more: Any) -> xarray.Dataset:
+    def make(stopper: Stopper, **more: Any) -> xarray.Dataset:
         reduce = {"mean": stopper}
         source, settings = case.long.half, case.long.settings
         return vkbloom.grid(source, settings, STRENGTHS, reduce=reduce, progress=False, **more)
@@ -256,16 +256,16 @@ def test_an_interrupted_store_is_completed(
     stored: dict[str, Any] = {"store": tmp_path / "grid", "chunks": {"blur_strength": 2}}
     first, second = Stopper(case.alarm), Stopper(None)
     with pytest.raises(Alarm):
-        made(first, adapter="auto", **stored)
+        make(first, adapter="auto", **stored)
     # The caller does not wait for pending submissions after an interruption.
     assert threading.main_thread() not in closers
     done = int(xarray.open_zarr(tmp_path / "grid")["done"].sum())
     assert 2 <= done <= first.points < POINTS
-    got = made(second, adapter="auto", **stored)
+    got = make(second, adapter="auto", **stored)
     assert closers[1:] == [threading.main_thread()]
     # And the first point, for its shape. A block may be complete without a mark.
     assert second.points <= POINTS - done + 1
-    right = made(Stopper(None), renderer=case.renderer)
+    right = make(Stopper(None), renderer=case.renderer)
     assert bool(got["done"].all())
     for name in ("final", "mean"):
         np.testing.assert_array_equal(got[name], right[name])
@@ -273,9 +273,9 @@ def test_an_interrupted_store_is_completed(
 
 @UNIX
 def test_an_interrupted_close_leaves_the_renderer_open(case: Case) -> None:
-    with case.interrupted():
+    with case.interrupt():
         case.long.run(case.renderer)
-    with case.interrupted():
+    with case.interrupt():
         case.renderer.close()
     assert not case.renderer.closed
     case.check()
@@ -288,7 +288,7 @@ def test_waiting_for_another_thread_is_interrupted(case: Case) -> None:
     thread = threading.Thread(target=case.long.run, args=(case.renderer,))
     thread.start()
     time.sleep(0.05)
-    with case.interrupted():
+    with case.interrupt():
         list(map(case.renderer.apply, [picture(8, 8)] * 1000))
     thread.join()
     case.check()

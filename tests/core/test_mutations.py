@@ -55,10 +55,10 @@ MUTATIONS = {
     # The centre of the tent, on the way up: 0.25 becomes 0.255.
     "weight wrong by 2 %": Mutation(
         shader="filter.frag",
-        original="    if (ADD_OWN != 0)\n",
+        original="    if (ADDS_IMAGE != 0)\n",
         mutated="    if (KERNELS == 1)\n"
         "        sum += 0.005 * params.coarse * fetch_clamped(source, PLACE_IN(source).texel);\n"
-        "    if (ADD_OWN != 0)\n",
+        "    if (ADDS_IMAGE != 0)\n",
         test=IMAGE.format(settings="Pyramid(levels=3)"),
         equal=("glow", "down_0", "down_1", "down_2"),
         different=("up_1", "up_0", "bloom", "final"),

@@ -52,11 +52,11 @@ def alone() -> Iterator[Alone]:
     before = screen(noise((8, 8)), (33, 17))
     with Renderer() as renderer:
 
-        def rendered(*arguments: Any, **more: Any) -> Frames:
+        def render(*arguments: Any, **more: Any) -> Frames:
             renderer.render(before, Separable(blur_strength=0.9), (33, 17))
             return renderer.render(*arguments, **more)
 
-        yield rendered
+        yield render
 
 
 # What runs after one change

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 import vkbloom
-from tests.framebuffers import assert_same, mixed
+from tests.framebuffers import assert_same, make_mixed
 from tests.kinds import METHODS, STAGES, fields_of
 from vkbloom import psf, reference, testing
 
@@ -46,7 +46,7 @@ def test_a_class_has_its_name_without_the_package() -> None:
 
 
 def fit_result() -> vkbloom.FitResult:
-    frames, image = mixed(), np.zeros((4, 4, 3))
+    frames, image = make_mixed(), np.zeros((4, 4, 3))
     return vkbloom.FitResult(
         settings=frames.settings,
         loss=0.0,
@@ -85,7 +85,7 @@ def test_objects_survive_another_process() -> None:
     sent: dict[str, Any] = {
         "records": records,
         "errors": errors,
-        "frames": mixed(),
+        "frames": make_mixed(),
         "fit": fit_result(),
     }
     data = pickle.dumps(sent)

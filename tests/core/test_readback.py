@@ -19,7 +19,7 @@ from vkbloom import Pyramid, Renderer, Scene, Separable, Settings, _core
 OFF = Separable(bloom=False)
 
 
-def placed(shape: tuple[int, ...], dtype: str, start: int) -> tuple[Any, Any]:
+def place(shape: tuple[int, ...], dtype: str, start: int) -> tuple[Any, Any]:
     """Return an array `start` bytes after a multiple of a page's size, and the bytes around it."""
     page = 4096
     size = int(np.prod(shape)) * np.dtype(dtype).itemsize
@@ -57,7 +57,7 @@ def test_nothing_around_an_array_is_touched(
 ) -> None:
     # The last page is left half-used, too.
     image = picture(701, 603, channels, dtype, 2)
-    out, around = placed(image.shape, dtype, start)
+    out, around = place(image.shape, dtype, start)
     frames = renderer.apply(image, OFF, out={"final": out})
     assert frames["final"] is out
     np.testing.assert_array_equal(out, image)
@@ -69,7 +69,7 @@ def test_nothing_around_an_array_is_touched(
 def test_every_framebuffer_both_ways(renderer: Renderer, scene: Scene, shading: Any) -> None:
     settings, size = Separable(bloom_size=(600, 500)), (640, 480)
     whole = renderer.render(scene, settings, size, shading=shading, time=0.1)
-    out = {name: placed(array.shape, array.dtype.name, 1)[0] for name, array in whole.items()}
+    out = {name: place(array.shape, array.dtype.name, 1)[0] for name, array in whole.items()}
     # Without its alignment an array cannot be the device's.
     apart = renderer.render(scene, settings, size, shading=shading, time=0.1, out=out)
     # (A result that a pass stored to the array is not in the cached image.)
@@ -123,7 +123,7 @@ def test_three_channels_are_stored_without_alpha(
     np.testing.assert_array_equal(new, expected)
     for start in (16, 4):
         renderer.apply(image[::-1], settings, framebuffers=("final",))
-        out, around = placed(image.shape, dtype, start)
+        out, around = place(image.shape, dtype, start)
         renderer.apply(image, settings, framebuffers=("final",), out={"final": out})
         np.testing.assert_array_equal(out, expected)
         out.view(np.uint8)[:] = 0xA5

@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 
 import vkbloom
-from tests.framebuffers import make, mixed
+from tests.framebuffers import make, make_mixed
 from tests.refusals import assert_refused, rows
 from vkbloom import FilamentBloom, Frames, Renderer, Scene, Separable, Settings, _core, presets, psf
 from vkbloom._renderer.surface import Surface
@@ -46,7 +46,7 @@ def names(renderer: Renderer, scene: Scene) -> Iterator[dict[str, Any]]:
             **{"vkbloom": vkbloom, "np": np, "math": math, "copy": copy, "pickle": pickle},
             **{"Decimal": Decimal, "psf": psf, "_core": _core, "Surface": Surface},
             **{"renderer": renderer, "other": other, "closed": closed, "of_closed": of_closed},
-            **{"frames": mixed(), "image": image, "scene": scene},
+            **{"frames": make_mixed(), "image": image, "scene": scene},
             "handle": renderer.upload(image),
             "render": render,
             "filled": lambda array: render(size=SIZE, out={"final": array}),
@@ -138,14 +138,14 @@ def test_own_methods(renderer: vkbloom.Renderer) -> None:
 //!SAVE BLOOM
 vec4 hook() { return GLOW_tex(GLOW_pos) * softness; }
 """
-    own: Any = vkbloom.load_method(text, name="soft_one")
+    custom: Any = vkbloom.load_method(text, name="soft_one")
     with pytest.raises(TypeError, match="did you mean 'softness'\\?"):
-        own(softnes=1)
+        custom(softnes=1)
     with pytest.raises(TypeError, match="did you mean 'softness'\\?"):
-        own().replace(softnes=1)
-    with pytest.raises(ValueError, match=f"give {own.__name__}\\(\\)"):
+        custom().replace(softnes=1)
+    with pytest.raises(ValueError, match=f"give {custom.__name__}\\(\\)"):
         renderer.apply(IMAGE, "soft_one")
-    assert own().replace(softness=1) == pickle.loads(pickle.dumps(own(softness=1)))
+    assert custom().replace(softness=1) == pickle.loads(pickle.dumps(custom(softness=1)))
 
 
 def test_the_signature_is_that_of_the_fields() -> None:

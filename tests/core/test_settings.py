@@ -242,10 +242,10 @@ def test_the_ranges_in_docstrings(kind: type[Settings]) -> None:
     for name, info in fields_of(kind).items():
         if name not in _core.VALUES or info.kind == "flag" or info.range is None:
             continue
-        own = documented_range(kind, name)
+        documented = documented_range(kind, name)
         narrowed = info.range != tuple(_core.VALUES[name][1:])
-        assert own is not None or not narrowed, f"{name}: {kind.__name__} says no range"
-        assert (own or documented_range(Settings, name)) == info.range, name
+        assert documented is not None or not narrowed, f"{name}: {kind.__name__} says no range"
+        assert (documented or documented_range(Settings, name)) == info.range, name
 
 
 @pytest.mark.parametrize("kind", METHODS.values())

@@ -149,7 +149,7 @@ void main()
 """
 
 
-def stored(code: bytes) -> list[int]:
+def store(code: bytes) -> list[int]:
     """The constants that a module stores, but for the first that is no constant."""
     words = np.frombuffer(code, np.uint32)
     constants, found, position = {}, [], 5
@@ -184,11 +184,11 @@ def test_conditions_on_constants_leave_one_way(
         ]
         folded = specialize(inlined.read_bytes(), [a, b])
         assert accepted(folded) == "", (a, b)
-        assert [one for one in stored(folded) if one >= 1000] == expected, (a, b)
+        assert [one for one in store(folded) if one >= 1000] == expected, (a, b)
         # Whose variables are in memory: the function with two returns stays.
         folded = specialize(plain.read_bytes(), [a, b])
         assert accepted(folded) == "", (a, b)
-        assert [one for one in stored(folded) if one >= 1000][:-2] == expected[:-1], (a, b)
+        assert [one for one in store(folded) if one >= 1000][:-2] == expected[:-1], (a, b)
 
 
 @pytest.mark.parametrize("operation", [166, 167, 169])

@@ -17,7 +17,7 @@ from tests.exhaustive import EXHAUSTIVE
 from tests.images import random_image
 from tests.methods.test_adjoint_passes import CASES as DERIVATIVES
 from tests.methods.test_matrix import CASES as FORWARDS
-from tests.variants import VARIANTS, opened
+from tests.variants import VARIANTS, open_variant
 from vkbloom import Renderer, Scene, Settings, _core
 
 core: Any = _core  # fold_by_driver is in test builds only
@@ -57,7 +57,7 @@ def main() -> None:
         found: list[dict[str, Any]] = []
         for by_driver in (False, True):
             core.fold_by_driver(by_driver)
-            with opened(variant, "software", validation=by_driver) as renderer:
+            with open_variant(variant, "software", validation=by_driver) as renderer:
                 found.append(dict(arrays(renderer)))
         compared += len(found[0])
         different += [

@@ -56,7 +56,7 @@ HELD = [
 ]
 
 
-def checked(*words: str) -> tuple[Result, dict[str, Any]]:
+def check(*words: str) -> tuple[Result, dict[str, Any]]:
     """Return the result of the command, and its values, which fit the published schema."""
     done = run("check", *words, "--json")
     assert done.exit_code in {0, 1}, done.output
@@ -69,7 +69,7 @@ def checked(*words: str) -> tuple[Result, dict[str, Any]]:
 def of_text(folder: Path, text: str, *words: str) -> tuple[Result, dict[str, Any]]:
     file = folder / "planted.hook"
     file.write_text(text)
-    return checked(str(file), *SMALL, *words)
+    return check(str(file), *SMALL, *words)
 
 
 @pytest.mark.usefixtures("glslang")
@@ -91,7 +91,7 @@ def test_a_page_and_parameters(tmp_path: Path) -> None:
     page = tmp_path / "page.html"
     words = [str(examples / "forty_lines.hook"), "--spread", "2", *SMALL, "--html", str(page)]
     words += ["--reference", f"{examples / 'references.py'}:forty_lines", "--require", "reference"]
-    done, found = checked(*words)
+    done, found = check(*words)
     assert done.exit_code == 0, done.output
     assert found["settings"]["spread"] == 2
     assert set(found["reference"]) == {"half", "rows", "bloom", "final"}
@@ -100,7 +100,7 @@ def test_a_page_and_parameters(tmp_path: Path) -> None:
     assert "point spread, logarithmic" in text
     wrong = tmp_path / "wrong.py"
     wrong.write_text("def doubled(image, settings):\n    return {'bloom': 2 * image}\n")
-    done, found = checked(*words, "--reference", f"{wrong}:doubled", "--require", "reference")
+    done, found = check(*words, "--reference", f"{wrong}:doubled", "--require", "reference")
     assert done.exit_code == 1
     assert "bloom is off by" in found["laws"]["reference"]["message"]
 
@@ -108,7 +108,7 @@ def test_a_page_and_parameters(tmp_path: Path) -> None:
 def test_a_preset(tmp_path: Path) -> None:
     page = tmp_path / "page.md"
     words = ["--preset", "dual_kawase", *SMALL, "--markdown", str(page)]
-    done, found = checked(*words, "--require", "symmetric,reference")
+    done, found = check(*words, "--require", "symmetric,reference")
     assert done.exit_code == 0, done.output
     assert "| symmetric | yes | " in page.read_text()
     assert found["laws"]["bounded_fireflies"]["held"] is False
@@ -119,7 +119,7 @@ def test_the_stored_blooms_of_presets(renderer: vkbloom.Renderer) -> None:
     with np.load(measuring.PRESET_BLOOMS) as stored:
         assert {*stored} == {*vkbloom.presets}
         for name, settings in vkbloom.presets.items():
-            bloom = measuring.shown(renderer, measuring.exact(settings), "bloom")
+            bloom = measuring.bloom_of(renderer, measuring.exact(settings), "bloom")
             made = measuring.sketch(bloom)
             off = np.abs(made - stored[name]).max() / made.max()
             assert off < 2e-3, f"{name} changed; run python -m tools.preset_blooms"
@@ -188,7 +188,7 @@ def test_a_fault_of_a_program_is_named(
 ) -> None:
     every = "stability,gain,energy,colour,channels,grey,unclamped,finite"
     with engine(tmp_path, bloom) as command:
-        done, found = checked("--command", command, *SMALL, *words, "--require", every)
+        done, found = check("--command", command, *SMALL, *words, "--require", every)
     broken = {name for name in every.split(",") if found["laws"][name]["held"] is False}
     assert broken == laws
     assert all(f"required law {law}" in done.stderr for law in laws)
@@ -196,7 +196,7 @@ def test_a_fault_of_a_program_is_named(
 
 
 def test_programs_and_files_move_the_same_light() -> None:
-    _, found = checked("--command", COPYING, "--measure-size", "32x32", "--size", "64x48")
+    _, found = check("--command", COPYING, "--measure-size", "32x32", "--size", "64x48")
     alone = testing.stability(lambda image: image, steps=2, probe=testing.Probe(size=(32, 32)))
     assert found["stability"]["flicker"] == pytest.approx(alone.flicker)
     assert alone.flicker == pytest.approx(0.75)
@@ -220,7 +220,7 @@ def test_a_program() -> None:
     """A required law that cannot be tested, as that of a reference, is not held."""
     require = "superposition,gain,symmetric,reference"
     words = ["--command", COPYING, "--suffix", ".png", *SMALL, "--require", require]
-    done, found = checked(*words)
+    done, found = check(*words)
     assert done.exit_code == 1
     assert "it writes 8 bits" in done.stderr
     held = {name: found["laws"][name]["held"] for name in require.split(",")}
@@ -333,7 +333,7 @@ def test_changes_of_presets_and_commands() -> None:
     assert (done.exit_code, "broken: " in done.stdout) == (0, True), done.output
     # A law that both break is not newly broken.
     words = ["--preset", "tutorial", "--against", "tutorial", *SMALL, "--require", "resolution"]
-    done, found = checked(*words)
+    done, found = check(*words)
     assert (done.exit_code, found["newly_broken"]) == (0, [])
     assert {one["verdict"] for one in found["changes"] if one["name"] != "together"} == {"same"}
     refused = run("check", *words[:2], "--against", "tutoral")
@@ -357,7 +357,7 @@ def test_a_program_that_fails_later_fails_its_laws(tmp_path: Path) -> None:
         return image
 
     with engine(tmp_path, failing) as command:
-        done, found = checked("--command", command, *SMALL, "--require", "finite")
+        done, found = check("--command", command, *SMALL, "--require", "finite")
     assert done.exit_code == 1
     assert found["laws"]["finite"]["held"] is False
     assert "it failed with exit status 1" in found["laws"]["finite"]["message"]
@@ -367,10 +367,10 @@ def test_a_program_that_fails_later_fails_its_laws(tmp_path: Path) -> None:
 
 def test_8_bits_are_said() -> None:
     words = ["--command", COPYING, *SMALL, "--suffix", ".png"]
-    done, found = checked(*words, "--require", "stability")
+    done, found = check(*words, "--require", "stability")
     assert (done.exit_code, found["bits"], found["stability"]) == (1, 8, None)
     assert "cannot be tested in 8 bits" in found["laws"]["stability"]["message"]
-    assert checked(*words[:-2])[1]["bits"] is None
+    assert check(*words[:-2])[1]["bits"] is None
 
 
 @pytest.mark.parametrize("option", ["--html", "--markdown"])
@@ -391,7 +391,7 @@ def test_each_run_is_shown(monkeypatch: pytest.MonkeyPatch) -> None:
     shown: list[str] = []
     monkeypatch.setattr("rich.status.Status.update", lambda _, text: shown.append(text))
     words = ["--command", COPYING, *SMALL, "--measure-size", "32x32"]
-    done, _ = checked(*words, "--suffix", ".png")
+    done, _ = check(*words, "--suffix", ".png")
     assert done.exit_code == 0
     runs = [text for text in shown if ", run " in text]
     assert f"{COPYING}: gain, run 9 of 90" in runs

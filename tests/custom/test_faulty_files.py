@@ -11,7 +11,7 @@ from vkbloom import ShaderError
 from vkbloom._custom.compiler import compile_shader
 from vkbloom._custom.file import CustomFile, read_file
 from vkbloom._custom.glsl import write_shader
-from vkbloom._custom.source import Source, checked, read_source
+from vkbloom._custom.source import Source, check, read_source
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples" / "custom_methods"
 BODY = "vec4 hook() { return HOOKED_texOff(0); }\n"
@@ -55,10 +55,12 @@ def test_a_faulty_file_is_refused(tmp_path: Path, call: str, error: str) -> None
         file.write_text(text)
         return read_file(read_source(file))
 
-    def compiled(body: str) -> None:
+    def compile_shader(body: str) -> None:
         compile_all(read(f"//!HOOK MAIN\n//!BIND HOOKED\n{body}"))
 
-    message = assert_refused(call, error, {**globals(), "read": read, "compiled": compiled})
+    message = assert_refused(
+        call, error, {**globals(), "read": read, "compile_shader": compile_shader}
+    )
     path, line, _ = message.split(":", 2)
     assert path == str(file)
     quoted = message.rpartition("\n")[2].strip()
@@ -128,7 +130,7 @@ def test_no_mutation_ends_in_another_error(data: st.DataObject) -> None:
         text = text[:start] + data.draw(st.sampled_from(("", *WORDS))) + text[end:]
     message = "mutated:"
     try:
-        file = read_file(checked(Source("mutated", text)))
+        file = read_file(check(Source("mutated", text)))
         values = {one.name: one.default for one in file.params}
         for stage, one in file.runs():
             write_shader(file, one, stage, values)

@@ -19,7 +19,7 @@ from tests.images import hdr_picture
 from tests.methods.cases import METHODS, OTHERS, presets_of_low_levels
 from tests.planned import scene_source
 from tests.tolerance import assert_close, real, tolerance
-from tests.variants import VARIANTS, opened
+from tests.variants import VARIANTS, open_variant
 from vkbloom import (
     BlenderGlare,
     Dirt,
@@ -36,7 +36,7 @@ from vkbloom import (
     reference,
 )
 from vkbloom._custom.shaders import BLACK, package_shader
-from vkbloom.reference._compositing import composite_checked
+from vkbloom.reference._compositing import composite_without_store
 from vkbloom.reference._glare import light as total
 
 Array = NDArray[Any]
@@ -141,7 +141,14 @@ def find_names() -> list[str]:
         plan = _core.plan(sources()[kind], Pyramid(glare=STAGES), None)
         found |= {name for row in plan.passes for name in (*row[2], *row[3])}
     found |= {f"{kind}_{i}" for kind in ("streaks", "ghosts", "halo", "adjoint") for i in range(3)}
-    found |= {"by_image", "cotangents_0", "adjoint_weights", "probed_texels", "bloom_own", "main"}
+    found |= {
+        "by_image",
+        "cotangents_0",
+        "adjoint_weights",
+        "probed_texels",
+        "bloom_buffer",
+        "main",
+    }
     legal = {name.lstrip(".") for name in found}
     legal = {name for name in legal if re.fullmatch(r"[A-Za-z]\w*", name) and "__" not in name}
     legal |= {f"saved_{name}" for name in legal if len(name) < 20}
@@ -227,14 +234,14 @@ def test_derivatives_beside_textures_of_their_names(renderer: Renderer) -> None:
     assert [name for name, _, _ in plan.outputs] == [".by_image"]
 
 
-def twin_of(
+def reference_of(
     passes: list[Pass], glow: Array = IMAGE
 ) -> Callable[[Array, Settings], Mapping[str, Array]]:
     textures = textures_of(passes, glow)
     names = {**names_of(set(textures), set()), "BLOOM": "bloom", "": "final"}
     is_bloom = "BLOOM" in textures
 
-    def twin(image: Array, settings: Settings) -> dict[str, Array]:
+    def render(image: Array, settings: Settings) -> dict[str, Array]:
         return {name: np.dstack([part, np.ones(part.shape[:2])]) for name, part in parts()}
 
     def parts() -> Iterator[tuple[str, Array]]:
@@ -242,7 +249,7 @@ def twin_of(
             if name or not is_bloom:
                 yield names[name], part
 
-    return twin
+    return render
 
 
 #: Names, and glare beside them, in whose graphs images of one name met.
@@ -290,7 +297,7 @@ def settings_of(
 ) -> Settings:
     """Return settings of a method with these passes and a reference, for IMAGE with this glow."""
     text = "\n".join(one.text() for one in passes)
-    method = load_method(text, name=name, reference=twin_of(passes, glow))
+    method = load_method(text, name=name, reference=reference_of(passes, glow))
     return method(glare=glare, format="rgba32float")
 
 
@@ -307,9 +314,9 @@ def test_glare_is_added_to_a_picture_in_each_variant(dtype: str) -> None:
     plain = Pyramid(**{name: getattr(settings, name) for name in ("glare", "exposure", "tonemap")})
     stages = reference.apply(image, Pyramid(glare=glare, threshold=0.5))
     light = total(np.zeros_like(halved), 0.0, [stages["streaks"], stages["ghosts"]], glare)
-    expected = composite_checked(halved, light, plain, np.dtype(dtype))
+    expected = composite_without_store(halved, light, plain, np.dtype(dtype))
     for variant in VARIANTS:
-        with opened(variant) as renderer:
+        with open_variant(variant) as renderer:
             got = renderer.apply(image, settings)["final"]
         limit = tolerance(
             got.dtype, expected, stages_of_8_bits=2, magnitude=np.abs(halved) + np.abs(light)

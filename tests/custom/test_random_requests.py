@@ -22,7 +22,7 @@ from tests.custom.test_names import (
     settings_of,
 )
 from tests.exhaustive import EXHAUSTIVE
-from tests.images import given_of, hdr_picture
+from tests.images import choose_given, hdr_picture
 from tests.tolerance import assert_matches_reference
 from vkbloom import Frames, Renderer, Settings
 
@@ -64,7 +64,7 @@ class Request(NamedTuple):
             assert_matches_reference(frames, self.image, self.settings, **self.given)
 
 
-def changed(settings: Settings, chance: random.Random) -> Settings:
+def change(settings: Settings, chance: random.Random) -> Settings:
     """Change some settings to others that the method takes."""
     for name, values in CHANGES.items():
         if chance.random() < 0.25:
@@ -75,8 +75,8 @@ def changed(settings: Settings, chance: random.Random) -> Settings:
     return settings
 
 
-def random_given(chance: random.Random, image: Array) -> dict[str, Any]:
-    return given_of([name for name in ("mask", "emission") if chance.random() < 0.3], image)
+def choose_inputs(chance: random.Random, image: Array) -> dict[str, Any]:
+    return choose_given([name for name in ("mask", "emission") if chance.random() < 0.3], image)
 
 
 def glow_of(image: Array, mask: Array | None = None, emission: Array | None = None) -> Array:
@@ -91,18 +91,18 @@ def random_request(chance: random.Random, names: list[str] | None) -> Request:
     """
     glare = random_glare(chance)
     if names is not None:
-        given = random_given(chance, IMAGE)
+        given = choose_inputs(chance, IMAGE)
         passes = random_passes(chance, names)
         return Request(IMAGE, settings_of(passes, "random", glare, glow_of(IMAGE, **given)), given)
     image = IMAGE if glare else chance.choice(IMAGES)
-    settings = changed(chance.choice(EVERY), chance)
+    settings = change(chance.choice(EVERY), chance)
     if image is IMAGE:
         # Its light may be near -1, where Reinhard's curve has a pole.
         settings = settings.replace(glare=glare, format="rgba32float", dither=False, tonemap="none")
     elif any(weight < 0 for weight in getattr(settings, "weights", None) or ()):
         # The limits are of the sum, in which these weights cancel rounded values.
         settings = settings.replace(format="rgba32float")
-    return Request(image, settings, random_given(chance, image))
+    return Request(image, settings, choose_inputs(chance, image))
 
 
 def check_request(renderer: Renderer, request: Request) -> None:

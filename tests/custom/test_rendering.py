@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 import vkbloom
 from tests.custom import COUNTER
-from tests.explorer.pages import described
+from tests.explorer.pages import describe
 from tests.images import picture
 from tests.processes import output
 from tests.refusals import assert_refused, rows
@@ -29,7 +29,7 @@ COPY = "//!HOOK MAIN\n//!BIND HOOKED\nvec4 hook() { return HOOKED_texOff(0); }\n
 Array = NDArray[Any]
 
 
-def own(text: str, name: str = "tried", **fields: Any) -> Settings:
+def custom(text: str, name: str = "tried", **fields: Any) -> Settings:
     return load_method(text, name=name)(**{"format": "rgba32float", **fields})
 
 
@@ -53,9 +53,11 @@ def test_frames_that_libplacebo_drew(renderer: Renderer, shared_data: Path) -> N
 
 @pytest.mark.parametrize("name", ["forty_lines", "karis", "streak", "compute"])
 @pytest.mark.parametrize("size", [(40, 24), (33, 17)])
-def test_the_examples_and_their_twins(renderer: Renderer, name: str, size: tuple[int, int]) -> None:
-    twin = runpy.run_path(str(EXAMPLES / "references.py"))[name]
-    settings = load_method(EXAMPLES / f"{name}.hook", reference=twin)(format="rgba32float")
+def test_the_examples_and_their_references(
+    renderer: Renderer, name: str, size: tuple[int, int]
+) -> None:
+    function = runpy.run_path(str(EXAMPLES / "references.py"))[name]
+    settings = load_method(EXAMPLES / f"{name}.hook", reference=function)(format="rgba32float")
     image = picture(*size, highest=2)
     expected = reference.apply(image, settings)
     frames = renderer.apply(image, settings)
@@ -68,7 +70,7 @@ def test_the_examples_and_their_twins(renderer: Renderer, name: str, size: tuple
 
 def test_a_file_without_bloom_makes_the_picture(renderer: Renderer) -> None:
     image = picture(24, 16, highest=2)
-    settings = own(COPY.replace("return", "return 2.0 *"))
+    settings = custom(COPY.replace("return", "return 2.0 *"))
     frames = renderer.apply(image, settings)
     assert difference(frames["final"], 2 * image) < 1e-5
     assert difference(frames["bloom"][..., :3], image[..., :3]) < 1e-5
@@ -81,7 +83,7 @@ def test_saved_textures_are_framebuffers_and_a_param_runs_only_its_passes(
     image = picture(64, 48, highest=2)
     assert list(renderer.apply(image, settings)) == ["glow", "half", "rows", "bloom", "final"]
     again = renderer.apply(image, settings.replace(spread=3.5))
-    assert list(again.timings) == ["rows", "bloom_own", "bloom", "final"]
+    assert list(again.timings) == ["rows", "bloom_buffer", "bloom", "final"]
     again = renderer.apply(image, settings.replace(spread=3.5, exposure=1.0))
     assert list(again.timings) == ["final"]
 
@@ -141,7 +143,7 @@ vec4 hook() {
 
 
 def test_textures_buffers_and_their_state(renderer: Renderer) -> None:
-    settings = own(RESOURCES)
+    settings = custom(RESOURCES)
     image = picture(24, 16, highest=2)
     frames = [one["final"][2, 3] for one in renderer.map([image] * 3, settings)]
     for place, values in enumerate(frames):
@@ -153,7 +155,7 @@ def test_textures_buffers_and_their_state(renderer: Renderer) -> None:
         assert renderer.apply(image, settings)["final"][2, 3, 0] == 3
 
 
-def textured(count: int) -> str:
+def make_textured(count: int) -> str:
     """Return a file of passes that read so many textures."""
     blocks = [f"//!TEXTURE t{i}\n//!SIZE 1\n//!FORMAT r8\nff" for i in range(count)]
     for first in range(0, count, 11):
@@ -166,7 +168,7 @@ def textured(count: int) -> str:
 
 
 def test_the_state_of_a_sequence_outlives_any_number_of_other_methods(renderer: Renderer) -> None:
-    counter, other = own(COUNTER, "counter"), own(textured(33), "textured")
+    counter, other = custom(COUNTER, "counter"), custom(make_textured(33), "textured")
     image = picture(8, 8)
     counts = []
     # Some frames are rendered ahead.
@@ -180,7 +182,7 @@ def test_the_state_of_a_sequence_outlives_any_number_of_other_methods(renderer: 
 
 def test_the_random_number_repeats_and_differs_between_passes(renderer: Renderer) -> None:
     text = "//!HOOK MAIN\n//!SAVE A\nvec4 hook() { return vec4(random); }\n"
-    settings = own(
+    settings = custom(
         text + text.replace("SAVE A", "BIND A").replace("random", "random, A_texOff(0).r, 0, 1")
     )
     image = picture(24, 16)
@@ -215,13 +217,13 @@ hard
 
 @pytest.mark.parametrize(("call", "error"), rows(__file__, "images and values"))
 def test_a_wrong_value_is_refused(renderer: Renderer, call: str, error: str) -> None:
-    def applied(text: str) -> vkbloom.Frames:
-        return renderer.apply(picture(24, 16), own(text))
+    def apply(text: str) -> vkbloom.Frames:
+        return renderer.apply(picture(24, 16), custom(text))
 
     parametrized = load_method(PARAMETERS + COPY, name="tried")
     names = {
-        "applied": applied,
-        "headed": lambda line: applied(COPY.replace("vec4 hook", f"{line}\nvec4 hook")),
+        "apply": apply,
+        "headed": lambda line: apply(COPY.replace("vec4 hook", f"{line}\nvec4 hook")),
         "parametrized": parametrized,
         "STORED": parametrized().to_dict(),
     }
@@ -258,7 +260,7 @@ def test_a_method_is_registered_and_stored() -> None:
 
 def test_a_param_can_be_the_setting_of_the_reference_white(renderer: Renderer) -> None:
     text = "//!PARAM reference_white\n//!TYPE float\n//!MINIMUM 0\n//!MAXIMUM 1000\n100\n"
-    settings = own(text + COPY.replace("return", "return 0.01 * reference_white *"))
+    settings = custom(text + COPY.replace("return", "return 0.01 * reference_white *"))
     image = picture(24, 16, highest=2)
     assert settings.reference_white == 100
     assert difference(renderer.apply(image, settings)["final"], image) < 1e-6
@@ -285,13 +287,13 @@ def test_params_mean_nothing_beyond_the_file(renderer: Renderer) -> None:
     image, settings = picture(24, 16, highest=2), kind(format="rgba32float")
     final = renderer.apply(image, settings)["final"]
     assert difference(final, reference.apply(image, settings)["final"]) < 1e-6
-    everyday = {field["name"] for field in described(kind)["fields"] if field["first"]}
+    everyday = {field["name"] for field in describe(kind)["fields"] if field["first"]}
     assert everyday >= {"weight", "white"}
 
 
 @pytest.mark.parametrize("shading", ["forward", "deferred"])
 def test_a_scene(renderer: Renderer, shading: Any) -> None:
-    settings = own(COPY.replace("return", "return 0.5 *"), format="rgba16float")
+    settings = custom(COPY.replace("return", "return 0.5 *"), format="rgba16float")
     frames = renderer.render(vkbloom.Scene.ufo(), settings, (48, 32), shading=shading)
     scene = frames["scene"][..., :3].astype(np.float64)
     drawn = scene if shading == "forward" else 255 * scene
@@ -335,7 +337,7 @@ vec4 hook() {{ return {up}; }}
 def test_the_filters_of_the_library(renderer: Renderer, down: str, up: str, like: Settings) -> None:
     image = picture(40, 24, highest=2)
     wanted = reference.apply(image, like)["bloom"]
-    got = renderer.apply(image, own(LEVEL.format(down=down, up=up)))["bloom"]
+    got = renderer.apply(image, custom(LEVEL.format(down=down, up=up)))["bloom"]
     assert difference(got[..., :3], wanted[..., :3]) < 3e-4
 
 
@@ -346,5 +348,5 @@ def test_the_threshold_of_the_library(renderer: Renderer) -> None:
         "    return vec4(c.rgb * above_threshold(c.rgb, 1.0, 0.5), 1.0);\n}\n"
     )
     image = picture(24, 16, highest=2)
-    glow = renderer.apply(image, own(text, threshold=1.0, knee=0.5))
+    glow = renderer.apply(image, custom(text, threshold=1.0, knee=0.5))
     assert difference(glow["bloom"][..., :3], glow["glow"][..., :3]) < 1e-5

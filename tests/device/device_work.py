@@ -26,7 +26,7 @@ from tests.device.abilities import infinities
 from tests.exhaustive import EXHAUSTIVE
 from tests.images import picture
 from vkbloom import Convolution, Pyramid, Renderer, Separable
-from vkbloom._renderer.device_arrays import merged
+from vkbloom._renderer.device_arrays import merge
 
 VALIDATION = "validated" in sys.argv
 #: Whether calls return before the device has finished.
@@ -71,7 +71,7 @@ class OnDevice:
         return capsule
 
 
-def strided(rng: np.random.Generator, dtype: str) -> NDArray[Any]:
+def make_strided(rng: np.random.Generator, dtype: str) -> NDArray[Any]:
     """Return an image with one of many layouts."""
     height, width, channels = (
         int(rng.integers(1, 40)),
@@ -111,7 +111,7 @@ def layouts(renderer: Any) -> None:
     methods = (Separable(threshold=0.3), Pyramid(levels=2), Separable(bloom_scale=0.5))
     for step in range(60 if EXHAUSTIVE else 10):
         dtype = ("uint8", "float16", "float32")[step % 3]
-        image = strided(rng, dtype)
+        image = make_strided(rng, dtype)
         if dtype != "uint8" and step % 4 == 0:
             image = image.copy()
             image[0, 0, 0], image[-1, -1, -1] = np.nan, -np.inf
@@ -208,7 +208,7 @@ def layers(renderer: Any) -> None:
     # As PyTorch takes them: with rows of 256 bytes and more they follow one another.
     wide = np.stack([picture(32, 4, 4, "float16", seed=i) for i in range(6)])
     finals = [one["final"] for one in renderer.map(OnDevice(wide), Pyramid(levels=2))]
-    found = merged([*finals, finals[0]])
+    found = merge([*finals, finals[0]])
     assert [len(one) for one in found] == ([6, 1] if renderer.info.type != "cpu" else [1] * 7)
     # The last one comes again; on a CPU each is an array of its own.
     joined = np.concatenate([one.numpy() for one in found])
@@ -386,7 +386,10 @@ def gradients(renderer: Any) -> None:
     rng = np.random.default_rng(2)
     for step in range(18 if EXHAUSTIVE else 6):
         settings = PULLED[step % len(PULLED)]
-        image, cotangent = strided(rng, ("float16", "float32")[step % 2]), strided(rng, "float32")
+        image, cotangent = (
+            make_strided(rng, ("float16", "float32")[step % 2]),
+            make_strided(rng, "float32"),
+        )
         cotangent = np.resize(cotangent, image.shape).astype(("float32", "float16")[step // 2 % 2])
         glowing: dict[str, Any] = {"emission": image[::-1].copy()} if step % 2 == 0 else {}
         expected = vjp(image, settings, **glowing, renderer=renderer)[1]({"final": cotangent})

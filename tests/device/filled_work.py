@@ -17,7 +17,7 @@ import numpy as np
 import vkbloom
 from tests.exhaustive import EXHAUSTIVE
 from tests.methods.test_adjoint_passes import CASES
-from tests.variants import VARIANTS, opened
+from tests.variants import VARIANTS, open_variant
 from vkbloom import Pyramid, Renderer, Scene, glares
 from vkbloom._doctor.cases import METHODS, presets_of_low_levels
 from vkbloom._gradients.passes import DeviceGradients
@@ -40,7 +40,7 @@ def settings_by_name() -> dict[str, Any]:
     }
 
 
-def made(renderer: Renderer, settings: Any, size: tuple[int, int]) -> Iterator[tuple[str, Any]]:
+def make(renderer: Renderer, settings: Any, size: tuple[int, int]) -> Iterator[tuple[str, Any]]:
     """Yield framebuffers, those of fused passes, and derivatives by image, mask and emission."""
     image = np.zeros((*size, 4 if settings.alpha != "keep" else 3), np.float32)
     image[2:5, 3:6] = (4.0, 2.0, 0.5, 1.0)[: image.shape[2]]
@@ -60,7 +60,7 @@ def made(renderer: Renderer, settings: Any, size: tuple[int, int]) -> Iterator[t
                 yield f"by {name}, {len(given)} given", derivatives[name]
 
 
-def drawn(renderer: Renderer) -> Iterator[tuple[str, Any]]:
+def draw(renderer: Renderer) -> Iterator[tuple[str, Any]]:
     for shading in ("forward", "deferred"):
         frames = renderer.render(Scene.ufo(), Pyramid(levels=2), (33, 21), shading=shading)
         yield from frames.items()
@@ -71,15 +71,15 @@ def results(renderer: Renderer, turn: int) -> dict[tuple[str, str], Any]:
     named, found = settings_by_name(), {}
     step = len(VARIANTS) if EXHAUSTIVE else 4 * len(VARIANTS)
     for name, size in zip([*named][turn::step], itertools.cycle(SIZES)):
-        for what, pixels in made(renderer, named[name], size):
+        for what, pixels in make(renderer, named[name], size):
             found[name, what] = np.array(pixels)
-    return found | {("scene", name): np.array(pixels) for name, pixels in drawn(renderer)}
+    return found | {("scene", name): np.array(pixels) for name, pixels in draw(renderer)}
 
 
 def main() -> None:
     wrong, count = [], 0
     for turn, variant in enumerate(VARIANTS):
-        with opened(variant, sys.argv[1], validation=False) as renderer:
+        with open_variant(variant, sys.argv[1], validation=False) as renderer:
             os.environ["VKBLOOM_FILL"] = BYTES[0]
             first = results(renderer, turn)
             os.environ["VKBLOOM_FILL"] = BYTES[1]

@@ -14,7 +14,7 @@ from tests.exhaustive import EXHAUSTIVE
 from tests.images import picture
 from tests.scene.parts import Texture
 from tests.screens import CAMERA, panel
-from tests.variants import VARIANTS, opened
+from tests.variants import VARIANTS, open_variant
 from vkbloom import Scene
 from vkbloom._doctor.cases import FRAME, Case, cases, compare_scene
 from vkbloom._doctor.self_test import judge
@@ -48,7 +48,7 @@ def main() -> None:
     wrong: dict[str, str] = {}
     every = [*(case for case in cases() if case.variant == "auto"), *scenes()]
     for turn, variant in enumerate(VARIANTS):
-        with opened(variant, "software", validation=True) as renderer:
+        with open_variant(variant, "software", validation=True) as renderer:
             for case in every if EXHAUSTIVE else some_of(every, turn):
                 name = f"{case.group}: {case.name}"
                 found = judge(case, renderer)["wrong"]

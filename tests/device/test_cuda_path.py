@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from tests.device import stand_in
-from tests.device.test_watched_device import layer, watched  # noqa: F401  a fixture
+from tests.device.test_watched_device import layer, run_watched  # noqa: F401  a fixture
 from vkbloom import AdapterInfo
 
 
@@ -54,7 +54,7 @@ def test_arrays_on_the_device(
     if "missing" in words:
         variables["STAND_IN_UUID"] = "11" * 16
     # The layer objects to buffers that are acquired from CUDA before they are released to it.
-    said = watched(layer, software, lesser, ("-m", program, *words.split()), variables)
+    said = run_watched(layer, software, lesser, ("-m", program, *words.split()), variables)
     # Before it the validation layer says what a lost device makes right.
     said = said.splitlines()[-1] if "lost" in words else said
     assert json.loads(said) == {}

@@ -14,7 +14,7 @@ import pytest
 import vkbloom
 from tests.cli.calls import run
 from tests.device.exceptions import reason_against
-from tests.variants import opened
+from tests.variants import open_variant
 from vkbloom import Renderer
 from vkbloom._doctor import self_test
 from vkbloom._doctor.cases import Case, cases
@@ -25,7 +25,7 @@ CASES = {f"{case.group}: {case.name}": case for case in cases()}
 
 @pytest.fixture(scope="module")
 def fragment() -> Iterator[Renderer]:
-    with opened("fragment") as renderer:
+    with open_variant("fragment") as renderer:
         yield renderer
 
 

@@ -28,7 +28,7 @@ def layer(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return build_layer(SOURCE, build_layer(LESSER, tmp_path_factory.mktemp("layer")))
 
 
-def watched(
+def run_watched(
     layer: Path,
     software: AdapterInfo,
     lesser: str,
@@ -84,7 +84,7 @@ def test_no_image_has_a_usage_that_no_pass_needs(
     """On several GPUs, images that shaders may store to are not compressed."""
     listed = tmp_path / "usages"
     environment = {"VKBLOOM_USAGES": str(listed), "VKBLOOM_VARIANT": variant}
-    watched(layer, software, "", ("-c", PROGRAM, str(turn)), environment)
+    run_watched(layer, software, "", ("-c", PROGRAM, str(turn)), environment)
     lines = [line.split() for line in listed.read_text().splitlines()]
     needless = {
         (name, usage, used)
@@ -129,5 +129,5 @@ def test_a_gpu_imports_no_memory_that_a_fork_takes_away(
     environment = {"VKBLOOM_USAGES": str(listed)}
     if linux == "old":
         environment["LD_PRELOAD"] = str(library)
-    watched(layer, software, lesser, ("-c", LARGE), environment)
+    run_watched(layer, software, lesser, ("-c", LARGE), environment)
     assert ("imported" in listed.read_text()) == ((lesser, linux) != ("cpu", "old"))

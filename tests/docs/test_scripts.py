@@ -116,7 +116,7 @@ def test_a_script_runs(
     assert not status
 
 
-def listed(*folders: str) -> list[str]:
+def list_scripts(*folders: str) -> list[str]:
     """Return the scripts of folders of the checkout."""
     if not (ROOT / ".git").exists():
         pytest.skip("this is no checkout")
@@ -127,7 +127,7 @@ def listed(*folders: str) -> list[str]:
 
 
 def test_no_script_is_left_out() -> None:
-    every = listed("tools", "benchmarks", "examples")
+    every = list_scripts("tools", "benchmarks", "examples")
     assert [
         name for name in every if name not in RUN and not name.startswith(tuple(ELSEWHERE))
     ] == []
@@ -142,7 +142,7 @@ def test_no_script_is_left_out() -> None:
 
 
 def test_shell_scripts_parse() -> None:
-    for name in listed("tools", "examples", "packaging", ".ci"):
+    for name in list_scripts("tools", "examples", "packaging", ".ci"):
         if not name.endswith(".py"):
             subprocess.run(["bash", "-n", ROOT / name], check=True)
 

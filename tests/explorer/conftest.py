@@ -33,7 +33,7 @@ def pytest_pyfunc_call(pyfuncitem: pytest.Function) -> bool | None:
 
 
 @contextmanager
-def served(new_viewer: Callable[[], Viewer]) -> Iterator[str]:
+def serve_page(new_viewer: Callable[[], Viewer]) -> Iterator[str]:
     """Serve the page from a thread, and yield its address."""
     started: queue.Queue[tuple[str, asyncio.AbstractEventLoop, asyncio.Event]] = queue.Queue()
 
@@ -70,4 +70,4 @@ def browser() -> Iterator[Browser]:
 def serve() -> Iterator[Callable[[Callable[[], Viewer]], str]]:
     """Serves viewers from a thread, and returns where."""
     with ExitStack() as stack:
-        yield lambda new_viewer: stack.enter_context(served(new_viewer))
+        yield lambda new_viewer: stack.enter_context(serve_page(new_viewer))

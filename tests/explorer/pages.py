@@ -6,19 +6,19 @@ viewer itself where the page is not what they are about.
 
 from __future__ import annotations
 
-from vkbloom._explorer.controls import as_code, controls, described, settings_from
+from vkbloom._explorer.controls import as_code, controls, describe, settings_from
 from vkbloom._explorer.fast_pictures import picture_of
 from vkbloom._explorer.server import Server
 from vkbloom._explorer.viewer import Viewer
-from vkbloom._views.pictures import reduced
+from vkbloom._views.pictures import reduce
 
 __all__ = [
     "Server",
     "Viewer",
     "as_code",
     "controls",
-    "described",
+    "describe",
     "picture_of",
-    "reduced",
+    "reduce",
     "settings_from",
 ]

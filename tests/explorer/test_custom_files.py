@@ -57,7 +57,7 @@ def ask(viewer: Viewer, **message: Any) -> dict[str, Any]:
     return found
 
 
-def shown(viewer: Viewer, settings: dict[str, Any]) -> np.ndarray[Any, Any]:
+def show(viewer: Viewer, settings: dict[str, Any]) -> np.ndarray[Any, Any]:
     answer = ask(viewer, kind="frame", sides={"a": settings}, framebuffer="bloom")
     assert "error" not in answer["sides"]["a"], answer
     return viewer.frames["a"]["bloom"]
@@ -116,7 +116,7 @@ class TestChanges:
         setup = ask(viewer, kind="setup")
         assert setup["has_files"]
         settings = setup["sides"]["a"]
-        assert shown(viewer, settings)[0, 0, 0] == 1
+        assert show(viewer, settings)[0, 0, 0] == 1
         unchanged = ask(viewer, kind="methods")
         assert (unchanged["methods"], unchanged["errors"]) == ({}, {})
         save(
@@ -125,7 +125,7 @@ class TestChanges:
         answer = ask(viewer, kind="methods")
         (method,) = answer["methods"].values()
         assert {field["name"]: field for field in method["fields"]}["gain"]["to"] == 9
-        assert shown(viewer, settings)[0, 0, 0] == 3
+        assert show(viewer, settings)[0, 0, 0] == 3
         # Each page is told once.
         assert ask(viewer, kind="methods")["methods"] == {}
 
@@ -140,7 +140,7 @@ class TestChanges:
             text = answer["errors"]["watched"]
             assert text.startswith(f"{file}:15: ")
             assert "GLOW_text" in text.splitlines()[1]
-            assert shown(viewer, settings)[0, 0, 0] == 1
+            assert show(viewer, settings)[0, 0, 0] == 1
         save(file, TEXT)
         assert ask(viewer, kind="methods")["errors"] == {}
         file.unlink()

@@ -15,7 +15,7 @@ import vkbloom
 from tests.explorer.explorer_hosts import CHROMIUM
 from tests.explorer.pages import Viewer
 from tests.explorer.test_custom_files import TEXT, file, save  # noqa: F401
-from tests.explorer.test_explorer_page import field, opened, see
+from tests.explorer.test_explorer_page import field, open_page, see
 from vkbloom import Renderer
 
 if TYPE_CHECKING:
@@ -38,7 +38,7 @@ def test_an_edited_file(
     image = np.full((36, 64, 3), 0.1, np.float32)
     kind: Any = vkbloom.load_method(file)
     begun = kind(gain=3)
-    with opened(browser, serve(lambda: Viewer(image, begun, renderer=renderer))) as page:
+    with open_page(browser, serve(lambda: Viewer(image, begun, renderer=renderer))) as page:
         field(page, "gain").fill("1")
         page.locator(".vkb-foot code", has_text="gain=1.0").wait_for()
         page.wait_for_function(LEVEL_IS, arg=level(0.2))

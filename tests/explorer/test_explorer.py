@@ -18,7 +18,7 @@ import pytest
 import vkbloom
 from tests.device.abilities import infinities
 from tests.exhaustive import some
-from tests.explorer.pages import Viewer, as_code, controls, picture_of, reduced, settings_from
+from tests.explorer.pages import Viewer, as_code, controls, picture_of, reduce, settings_from
 from tests.framebuffers import decode, make
 from tests.images import noise
 from tests.io.parts import facts_in
@@ -190,7 +190,7 @@ class TestViewer:
         assert (answer["kind"], answer["view"], answer["id"], buffers) == ("setup", "v", 4, [])
         assert answer["sides"]["a"] == json.loads(json.dumps(Separable().to_dict()))
         assert answer["sides"]["b"]["bloom"] is False
-        assert (answer["animated"], answer["own_size"]) == (True, [64, 36])
+        assert (answer["animated"], answer["source_size"]) == (True, [64, 36])
 
     def test_the_scene_to_begin_with(self, renderer: Renderer) -> None:
         """Its lights tell all presets apart, by more than 15 levels somewhere: pictures that are
@@ -229,7 +229,7 @@ class TestViewer:
         path = vkbloom.write(tmp_path / "a.png", pixels)
         answer, _ = viewer.answer({"kind": "open", "name": "folder/photo.png"}, [path.read_bytes()])
         assert (answer["kind"], answer["name"]) == ("open", "photo.png")
-        assert (answer["own_size"], answer["shadings"]) == ((34, 21), [])
+        assert (answer["source_size"], answer["shadings"]) == ((34, 21), [])
         # A scene's settings turn photographs white.
         assert settings_from(answer["sides"]["a"]) == presets["photo"]
         assert answer["note"] == "highlights expanded up to 4"
@@ -323,7 +323,7 @@ class TestViewer:
         settings = Pyramid(levels=2)
         facts, _ = frame(viewer, settings, size=[20, 99])
         assert facts["size"] == [20, 15]
-        expected = renderer.apply(reduced(image, (20, 99)), settings)
+        expected = renderer.apply(reduce(image, (20, 99)), settings)
         assert np.array_equal(viewer.frames["a"]["final"], expected["final"])
         for size in (None, [400, 300]):
             facts, picture = frame(viewer, settings, size=size, stops=-2)

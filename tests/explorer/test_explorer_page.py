@@ -39,7 +39,7 @@ def scene_url(
 
 
 @contextmanager
-def shown(page: Page, url: str) -> Iterator[None]:
+def show(page: Page, url: str) -> Iterator[None]:
     """Show an address in a page and wait for its first picture. An error or warning of the page
     fails the test."""
     complaints: list[str] = []
@@ -64,10 +64,10 @@ def shown(page: Page, url: str) -> Iterator[None]:
 
 
 @contextmanager
-def opened(browser: Browser, url: str, **options: Any) -> Iterator[Page]:
+def open_page(browser: Browser, url: str, **options: Any) -> Iterator[Page]:
     """Show an address in a page of its own."""
     page = browser.new_page(**options)
-    with shown(page, url):
+    with show(page, url):
         yield page
     page.close()
 
@@ -80,7 +80,7 @@ def tab(browser: Browser) -> Page:
 
 @pytest.fixture
 def page(tab: Page, scene_url: str) -> Iterator[Page]:
-    with shown(tab, scene_url):
+    with show(tab, scene_url):
         yield tab
 
 
@@ -121,19 +121,19 @@ def test_the_controls_on_its_own_page(
 ) -> None:
     """Move the controls, and compare each picture with the renderer's."""
 
-    def shown() -> NDArray[np.uint8]:
+    def show() -> NDArray[np.uint8]:
         return see(page, tmp_path)
 
-    box = size_of(shown())
+    box = size_of(show())
     assert abs(box[0] / box[1] - ASPECT[0] / ASPECT[1]) < 0.01
-    assert_shows(shown(), renderer, scene, Separable())
+    assert_shows(show(), renderer, scene, Separable())
 
     field(page, "blur_scale").fill("0.1")
     wait_for_code(page, "vkbloom.Separable(blur_scale=0.1)")
-    assert_shows(shown(), renderer, scene, Separable(blur_scale=0.1))
+    assert_shows(show(), renderer, scene, Separable(blur_scale=0.1))
     field(page, "bloom").uncheck()
     wait_for_code(page, "vkbloom.Separable(bloom=False, blur_scale=0.1)")
-    assert_shows(shown(), renderer, scene, Separable(bloom=False))
+    assert_shows(show(), renderer, scene, Separable(bloom=False))
 
     page.get_by_label("method").select_option("pyramid")
     field(page, "bloom").check()
@@ -145,7 +145,7 @@ def test_the_controls_on_its_own_page(
     settings = Pyramid(levels=3, tonemap="aces", exposure=1, threshold=0.5)
     code = 'vkbloom.Pyramid(threshold=0.5, tonemap="aces", exposure=1.0, levels=3)'
     wait_for_code(page, code)
-    assert_shows(shown(), renderer, scene, settings)
+    assert_shows(show(), renderer, scene, settings)
 
     # The half on the right is B's: A as it began, without bloom.
     page.get_by_label("wipe A | B").check()
@@ -155,9 +155,9 @@ def test_the_controls_on_its_own_page(
     expected = renderer.render(scene, settings, box)["final"][:, :, :3].copy()
     expected[:, left:] = renderer.render(scene, Separable(bloom=False), box)["final"][:, left:, :3]
     # B's picture comes on its own.
-    wait_until(lambda: np.array_equal(shown(), expected))
+    wait_until(lambda: np.array_equal(show(), expected))
     page.get_by_label("wipe A | B").uncheck()
-    assert_shows(shown(), renderer, scene, settings)
+    assert_shows(show(), renderer, scene, settings)
 
 
 def test_presets_and_methods(page: Page, renderer: Renderer, scene: Scene, tmp_path: Path) -> None:
@@ -177,7 +177,7 @@ def test_presets_and_methods(page: Page, renderer: Renderer, scene: Scene, tmp_p
 def test_point_spread_functions(tab: Page, serve: Any, renderer: Renderer) -> None:
     # Transforms of a small picture are quick to compile.
     url = serve(lambda: Viewer(np.ones((9, 16, 3), np.float32), renderer=renderer))
-    with shown(tab, url):
+    with show(tab, url):
         choose_point_spread_functions(tab)
 
 
@@ -342,7 +342,7 @@ def test_time_plays_and_pauses(
 
 
 def test_code_is_copied(browser: Browser, scene_url: str) -> None:
-    with opened(browser, scene_url) as page:
+    with open_page(browser, scene_url) as page:
         page.context.grant_permissions(["clipboard-read", "clipboard-write"])
         field(page, "loops").fill("2")
         wait_for_code(page, "vkbloom.Separable(loops=2)")
@@ -396,7 +396,7 @@ def test_an_image(tab: Page, serve: Any, renderer: Renderer, tmp_path: Path) -> 
     image = (np.random.default_rng(3).random((60, 80, 3)) ** 8 * 20).astype(np.float32)
     url = serve(lambda: Viewer(image, KinoBloom(), renderer=renderer))
     page = tab
-    with shown(page, url):
+    with show(page, url):
         assert page.get_by_label("time, in turns").count() == 0
         expected = renderer.apply(image, KinoBloom())["final"]
         # It is smaller than it is shown: rendered as it is, and enlarged with hard pixels.
@@ -422,7 +422,7 @@ def test_a_server_that_stops_is_noticed(tab: Page, serve: Any, renderer: Rendere
             return super().answer(message, files)
 
     image = np.zeros((9, 16, 3), np.uint8)
-    with shown(tab, serve(lambda: Failing(image, renderer=renderer))):
+    with show(tab, serve(lambda: Failing(image, renderer=renderer))):
         field(tab, "bloom").uncheck()
         tab.get_by_role("alert").get_by_text("The server has stopped.").wait_for()
 
@@ -431,7 +431,7 @@ def test_the_address_keeps_the_state(
     tab: Page, scene_url: str, renderer: Renderer, scene: Scene, tmp_path: Path
 ) -> None:
     page = tab
-    with shown(page, scene_url):
+    with show(page, scene_url):
         page.get_by_label("method").select_option("pyramid")
         field(page, "levels").fill("3")
         page.get_by_label("shading").select_option("deferred")
@@ -442,7 +442,7 @@ def test_the_address_keeps_the_state(
         page.wait_for_url("**%22glow%22%3A9**")
         page.wait_for_url("**wipe**")
         link = page.url
-    with shown(page, link):
+    with show(page, link):
         assert_is_as_left(page)
         page.reload()
         page.locator(".vkb-status", has_text="until shown").wait_for()
@@ -459,7 +459,7 @@ def test_the_address_keeps_the_state(
         page.get_by_role("button", name="Reset").click()
         wait_for_code(page, "vkbloom.Separable()")
         page.wait_for_url(scene_url)
-    with shown(page, scene_url + "#%7B%22a%22%3A3%2C%22zoom%22%3A%5B%22x%22%5D%7D"):
+    with show(page, scene_url + "#%7B%22a%22%3A3%2C%22zoom%22%3A%5B%22x%22%5D%7D"):
         wait_for_code(page, "vkbloom.Separable()")
 
 

@@ -46,10 +46,10 @@ def loop() -> Iterator[asyncio.Runner]:
 def server(loop: asyncio.Runner, renderer: Renderer) -> Iterator[Server]:
     image = noise(20, 30, 3, dtype="uint8")
 
-    async def opened() -> Server:
+    async def open_server() -> Server:
         return Server(lambda: Viewer(image, renderer=renderer))
 
-    started = loop.run(opened())
+    started = loop.run(open_server())
 
     async def stop() -> None:
         while OPENED:
@@ -84,7 +84,7 @@ async def answer(connection: WebSocketClientConnection) -> tuple[dict[str, Any],
     return header, buffers
 
 
-def asked(number: int, *sides: str) -> str:
+def ask(number: int, *sides: str) -> str:
     settings = Separable(intensity=number).to_dict()
     return json.dumps({"kind": "frame", "id": number, "sides": dict.fromkeys(sides, settings)})
 
@@ -153,8 +153,8 @@ async def test_frames_come_with_their_pictures(server: Server) -> None:
     page = await connect(server)
     await page.write_message(json.dumps({"kind": "setup"}))
     header, buffers = await answer(page)
-    assert (header["kind"], header["own_size"], buffers) == ("setup", [30, 20], [])
-    await page.write_message(asked(1, "a", "b"))
+    assert (header["kind"], header["source_size"], buffers) == ("setup", [30, 20], [])
+    await page.write_message(ask(1, "a", "b"))
     header, buffers = await answer(page)
     assert header["id"] == 1
     assert [side["picture"] for side in header["sides"].values()] == [0, 1]
@@ -170,21 +170,21 @@ async def test_frames_come_with_their_pictures(server: Server) -> None:
 async def test_the_newest_wins(server: Server) -> None:
     page = await connect(server)
 
-    async def arrived() -> None:
+    async def wait_for() -> None:
         """Wait until the messages before are read: a wrong one is answered by no thread."""
         await page.write_message('{"kind": "probe", "at": NaN}')
         assert (await answer(page))[0]["kind"] == "error"
 
     held = threading.Event()
     server._worker.submit(held.wait)
-    await page.write_message(asked(1, "a", "b"))
+    await page.write_message(ask(1, "a", "b"))
     # The first is being answered when the others come.
-    await arrived()
-    await page.write_message(asked(2, "b"))
+    await wait_for()
+    await page.write_message(ask(2, "b"))
     for number in range(3, 50):
-        await page.write_message(asked(number, "a"))
+        await page.write_message(ask(number, "a"))
     await page.write_message(json.dumps({"kind": "probe", "id": 50, "at": [0, 0]}))
-    await arrived()
+    await wait_for()
     held.set()
     answers = [(await answer(page))[0] for _ in range(3)]
     assert [(header["kind"], header["id"]) for header in answers] == [
@@ -206,7 +206,7 @@ async def test_a_file_comes_as_bytes(server: Server, tmp_path: Any) -> None:
     page = await connect(server)
     await page.write_message(message, binary=True)
     source, _ = await answer(page)
-    assert (source["kind"], source["own_size"]) == ("open", [9, 8])
+    assert (source["kind"], source["source_size"]) == ("open", [9, 8])
 
 
 @pytest.mark.parametrize(

@@ -24,7 +24,7 @@ from vkbloom import (
     reference,
 )
 from vkbloom._fit.losses import Measure, light
-from vkbloom._fit.space import Axis, space_of
+from vkbloom._fit.space import VariedField, space_of
 
 Image = NDArray[Any]
 
@@ -55,7 +55,7 @@ def target_of(settings: Settings, framebuffer: str = "bloom", image: Image = IMA
     return reference.apply(image, settings)[framebuffer]
 
 
-def refused(settings: Settings) -> str:
+def refusal(settings: Settings) -> str:
     """Return what the settings say of a knee, "" where they have one."""
     try:
         settings.replace(knee=0.5)
@@ -148,11 +148,11 @@ class TestFound:
         target = target_of(truth, image=image)
         apply = renderer.apply
 
-        def watched(image: vkbloom.Image, *arguments: Any, **options: Any) -> Any:
+        def watch(image: vkbloom.Image, *arguments: Any, **options: Any) -> Any:
             sizes.append(image.shape[1])
             return apply(image, *arguments, **options)
 
-        monkeypatch.setattr(renderer, "apply", watched)
+        monkeypatch.setattr(renderer, "apply", watch)
         found = fit(
             image,
             target,
@@ -217,7 +217,7 @@ class TestVerdict:
     def truth(self) -> Image:
         return target_of(Pyramid(levels=3, threshold=1.2, knee=0.5, intensity=0.4), "final")
 
-    def fitted(self, fit: Call, target: Image, start: Settings | None = None) -> Any:
+    def fit(self, fit: Call, target: Image, start: Settings | None = None) -> Any:
         return fit(
             IMAGE,
             target,
@@ -227,7 +227,7 @@ class TestVerdict:
         )
 
     def test_good(self, fit: Call, truth: Image) -> None:
-        found = self.fitted(fit, truth)
+        found = self.fit(fit, truth)
         assert (found.framebuffer, found.verdict, found.cause) == ("final", "good", "")
         assert repr(found).endswith("; good>")
 
@@ -246,7 +246,7 @@ class TestVerdict:
         ],
     )
     def test_causes(self, fit: Call, truth: Image, change: Any, words: str) -> None:
-        found = self.fitted(fit, change(truth))
+        found = self.fit(fit, change(truth))
         assert found.verdict == "poor"
         assert words in found.cause
         assert found.cause in found._repr_html_()
@@ -309,7 +309,7 @@ class TestParts:
         assert "intensity" in names
         for one in names:
             value = getattr(settings, one)
-            if value is None or (one == "knee" and "no knee" in refused(settings)):
+            if value is None or (one == "knee" and "no knee" in refusal(settings)):
                 continue
             (axis,) = space_of(settings, [one], {}, 9.0, 512).axes
             assert axis.value(axis.coordinate(value)) == pytest.approx(value)
@@ -339,7 +339,7 @@ class TestParts:
 
     def test_slopes_of_axes_are_those_of_differences(self) -> None:
         for scale in (None, 0.5):
-            axis = Axis(name="threshold", kind="number", low=1.0, high=5.0, scale=scale)
+            axis = VariedField(name="threshold", kind="number", low=1.0, high=5.0, scale=scale)
             ends = [axis.value(0.3 + step) for step in (-1e-6, 1e-6)]
             assert axis.slope(0.3) == pytest.approx((ends[1] - ends[0]) / 2e-6)
 
@@ -354,7 +354,7 @@ class TestParts:
             assert measure(values + 1e-6) < 1e-6
             assert measure(np.where(values == 1, 7.0, values)) < 1e-6
             assert measure(np.where(levels[:, :, :1] == 255, 0.5, values)) < 1e-6
-            held = 255 * encode(measure.compared(np.full_like(values, 0.3)))
+            held = 255 * encode(measure.as_target(np.full_like(values, 0.3)))
             np.testing.assert_allclose(held, np.rint(held), atol=1e-4)
             scales = measure.scales(np.full_like(values, 2.0))
             assert not scales.any()

@@ -18,7 +18,7 @@ from tests.exhaustive import some
 from tests.kinds import METHODS, fields_of
 from vkbloom import DualKawase, Pyramid, Renderer, Separable, Settings, UrpBloom, psf, reference
 from vkbloom._cli import fields, search
-from vkbloom._fit.space import varied_as
+from vkbloom._fit.space import variation_of
 from vkbloom._fit.translating import describe_difference, lights
 
 SIZE = (96, 64)
@@ -45,7 +45,7 @@ def test_every_method_says_what_its_users_turn(kind: type[Settings]) -> None:
     fields = fields_of(kind)
     for name in kind._knobs:
         assert name in fields, f"{kind.__name__}: _knobs has {name!r}, which is no field"
-        assert varied_as(fields[name]), f"{kind.__name__}: {name} of _knobs cannot vary"
+        assert variation_of(fields[name]), f"{kind.__name__}: {name} of _knobs cannot vary"
 
 
 class TestTranslate:
@@ -205,7 +205,7 @@ pairs: Any = importlib.import_module("tools.tables.screenshots")
 def test_settings_are_found_or_the_verdict_is_poor(renderer: Renderer, bloom: Any) -> None:
     image, target = pairs.with_bloom(renderer, bloom)
     assert (target == 255).any(axis=2).mean() <= 0.05
-    found = pairs.fitted(renderer, (image, target), bloom.preset)
+    found = pairs.fit(renderer, (image, target), bloom.preset)
     values = {name: getattr(found.settings, name) for name in ("threshold", "intensity")}
     known = {"threshold": bloom.threshold, "intensity": bloom.intensity}
     assert found.verdict == "poor" or values == pytest.approx(known, rel=0.1), found

@@ -67,7 +67,7 @@ def contents(store: Any) -> dict[str, bytes | None]:
     """Return the bytes of each key; of a folder, of each file below it by its path in it."""
     if not isinstance(store, Path):
         keys = keys_of(store)
-        return {key: keys.read(key) for key in keys.listed()}
+        return {key: keys.read(key) for key in keys.list_keys()}
     return {
         str(path.relative_to(store)): path.read_bytes()
         for path in store.rglob("*")

@@ -338,7 +338,7 @@ def lattices(draw: st.DrawFn) -> tuple[tuple[int, ...], tuple[int, ...], tuple[i
     return shape, chunk, tuple(draw(st.permutations(range(len(shape)))))
 
 
-def visited(
+def visit(
     shape: tuple[int, ...], chunk: tuple[int, ...], ranking: tuple[int, ...]
 ) -> list[tuple[int, ...]]:
     return [index for block in blocks(shape, chunk, ranking) for index in points(block, ranking)]
@@ -348,7 +348,7 @@ def visited(
 def test_every_point_once(
     lattice: tuple[tuple[int, ...], tuple[int, ...], tuple[int, ...]],
 ) -> None:
-    assert sorted(visited(*lattice)) == list(np.ndindex(lattice[0]))
+    assert sorted(visit(*lattice)) == list(np.ndindex(lattice[0]))
 
 
 @given(lattices(), st.integers(1, 40))
@@ -358,5 +358,5 @@ def test_default_chunks_keep_the_order_of_nested_loops(
     shape, _, ranking = lattice
     chunk = default_chunk(shape, ranking, most)
     assert math.prod(chunk) <= most
-    found = visited(shape, chunk, ranking)
+    found = visit(shape, chunk, ranking)
     assert found == sorted(found, key=lambda index: [index[axis] for axis in ranking])

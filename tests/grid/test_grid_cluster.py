@@ -164,11 +164,11 @@ def test_a_worker_with_another_driver_or_version_is_refused(
     """As if the grid were laid out on another machine than the workers."""
     lay_out = cluster.lay_out_there
 
-    def laid_out_elsewhere(*arguments: Any) -> Any:
+    def lay_out_elsewhere(*arguments: Any) -> Any:
         layout = lay_out(*arguments)
         return replace(layout, origin={**layout.origin, what: other})
 
-    monkeypatch.setattr(cluster, "lay_out_there", laid_out_elsewhere)
+    monkeypatch.setattr(cluster, "lay_out_there", lay_out_elsewhere)
     software = next(one for one in vkbloom.adapters() if one.type == "cpu")
     driver = software.driver_info or software.driver
     own = {"adapter": software.name, "driver": driver, "version": vkbloom.__version__}[what]

@@ -68,7 +68,7 @@ def test_ten_parts_of_three_processes_of_which_one_is_killed(tmp_path: Path) -> 
     assert contents(store) == contents(tmp_path / "whole.zarr")
 
 
-def laid_out(intensity: float) -> tuple[Grid, Layout]:
+def lay_out(intensity: float) -> tuple[Grid, Layout]:
     """Return a grid and its variables, without a device."""
     grid = ask(
         np.zeros((4, 4, 3), np.uint8),
@@ -92,8 +92,8 @@ def test_a_store_is_created_at_once(tmp_path: Path, turn: int) -> None:
     grids = (0.25, 0.5, 0.25, 0.5)
     start = threading.Barrier(4)
 
-    def prepared(number: int) -> str:
-        asked = laid_out(grids[number - 1])
+    def prepare_part(number: int) -> str:
+        asked = lay_out(grids[number - 1])
         start.wait(60)
         try:
             prepare(keys_of(tmp_path / "a.zarr"), *asked, (1,), (number, 4), resume=True)
@@ -102,13 +102,13 @@ def test_a_store_is_created_at_once(tmp_path: Path, turn: int) -> None:
         return ""
 
     with ThreadPoolExecutor(4) as pool:
-        said = list(pool.map(prepared, range(1, 5)))
+        said = list(pool.map(prepare_part, range(1, 5)))
     assert said[0] == said[2] == "" or said[1] == said[3] == "", said
     refused = [text for text in said if "contains another grid; settings.intensity" in text]
     assert len(refused) == 2, said
     created = next(grid for grid, text in zip(grids, said, strict=True) if not text)
     for number in (1, 3) if created == 0.25 else (2, 4):
-        prepare(keys_of(tmp_path / "alone"), *laid_out(created), (1,), (number, 4), resume=True)
+        prepare(keys_of(tmp_path / "alone"), *lay_out(created), (1,), (number, 4), resume=True)
     assert contents(tmp_path / "a.zarr") == contents(tmp_path / "alone")
 
 

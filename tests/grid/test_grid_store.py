@@ -112,20 +112,20 @@ class TestWhole:
         levels = np.arange(16 * 21, dtype=np.uint16).reshape(16, 21).astype(np.uint8)
         store = tmp_path / "glow.zarr"
 
-        def made(mask: Any, **more: Any) -> Any:
+        def make(mask: Any, **more: Any) -> Any:
             image = renderer.upload(source(), mask=mask)
             axes = {"exposure": [0.0, 1.0]}
             return vkbloom.grid(image, Pyramid(), axes, renderer=renderer, **more)
 
-        grid = made(levels, store=store)
+        grid = make(levels, store=store)
         expected = renderer.apply(source(), Pyramid(exposure=1.0), mask=levels)["final"]
         assert np.array_equal(grid["final"].isel(exposure=1), expected)
-        assert np.array_equal(made(levels)["final"], grid["final"])
+        assert np.array_equal(make(levels)["final"], grid["final"])
         kept = contents(store)
-        made(levels, store=store)
+        make(levels, store=store)
         assert contents(store) == kept
         with pytest.raises(ValueError, match=r"source\.images"):
-            made(255 - levels, store=store)
+            make(255 - levels, store=store)
 
     def test_masks_and_emissions_beside_an_array(self, tmp_path: Path, renderer: Renderer) -> None:
         levels = np.arange(16 * 21, dtype=np.uint16).reshape(16, 21).astype(np.uint8)
@@ -236,12 +236,12 @@ class TestRefused:
         assert contents(copy) == before
 
     def test_another_version_is_refused(self, copy: Path) -> None:
-        identity_changed(copy, version="9.9")
+        change_identity(copy, version="9.9")
         with pytest.raises(ValueError, match=r'version: "9.9" in the store, "0.1.0" requested'):
             make(copy)
 
     def test_another_format_version_is_refused(self, copy: Path) -> None:
-        identity_changed(copy, format=99)
+        change_identity(copy, format=99)
         for call in (make, check_grid):
             with pytest.raises(ValueError, match="its format version 99 is not 3"):
                 call(copy)
@@ -266,7 +266,7 @@ NAMED = r"exposure=0\.\.2, threshold=0.5, blur_scale=1.5\.\.2"
 NESTED = b'{"attributes": ' + b"[" * 100_000
 
 
-def flipped(content: bytes) -> bytes:
+def flip_bit(content: bytes) -> bytes:
     """Change a bit among the values, where nothing but the checksum can tell."""
     middle = len(content) // 2
     return content[:middle] + bytes([content[middle] ^ 1]) + content[middle + 1 :]
@@ -280,7 +280,7 @@ def of_zeros(size: int) -> bytes:
 #: A file, what becomes of its content (None: it is removed), and what is told.
 DAMAGES: list[tuple[str, Callable[[bytes], bytes] | None, str]] = [
     ("final/c.0.1.1.0.0.0", lambda content: content[:-7], f" is damaged .*, of {NAMED}"),
-    ("final/c.0.1.1.0.0.0", flipped, f" is damaged .*, of {NAMED}"),
+    ("final/c.0.1.1.0.0.0", flip_bit, f" is damaged .*, of {NAMED}"),
     ("final/c.0.1.1.0.0.0", lambda _: of_zeros(0), r" is damaged \(.*"),
     ("done/c.0.0.0", lambda _: of_zeros(100), r" is damaged \(.*"),
     ("channel/c.0", lambda _: of_zeros(100_000), r" is damaged \(.*"),
@@ -324,7 +324,7 @@ def rewritten(path: Path, change: Callable[[dict[str, Any]], object]) -> None:
     path.write_text(json.dumps(metadata))
 
 
-def identity_changed(store: Path, **changes: Any) -> None:
+def change_identity(store: Path, **changes: Any) -> None:
     """Change what a store says of its grid."""
 
     def change(root: dict[str, Any]) -> None:

@@ -10,7 +10,7 @@ import OpenImageIO as oiio
 from numpy.typing import NDArray
 
 
-def written(path: Path, spec: Any, pixels: NDArray[Any]) -> Path:
+def write(path: Path, spec: Any, pixels: NDArray[Any]) -> Path:
     """Write an image as a specification says."""
     writer = oiio.ImageOutput.create(str(path))
     assert writer is not None
@@ -37,7 +37,7 @@ def store_ultra_hdr(path: Path, pixels: NDArray[Any]) -> None:
     spec = oiio.ImageSpec(pixels.shape[1], pixels.shape[0], 3, "half")
     spec.attribute("jpeg:ultrahdr", 1)
     spec.attribute("oiio:ColorSpace", "lin_p3d65_scene")
-    written(path, spec, pixels)
+    write(path, spec, pixels)
 
 
 def store_parts(path: Path, parts: Mapping[str, NDArray[Any]]) -> None:

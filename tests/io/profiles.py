@@ -37,7 +37,7 @@ def curv(*entries: int) -> bytes:
 
 def para(kind: int, *parameters: float) -> bytes:
     """Return a parametric curve."""
-    return b"para\0\0\0\0" + struct.pack(">HH", kind, 0) + b"".join(map(_fixed, parameters))
+    return b"para\0\0\0\0" + struct.pack(">HH", kind, 0) + b"".join(map(_pack_fixed, parameters))
 
 
 def profile(
@@ -72,16 +72,16 @@ def _icc(tags: dict[bytes, bytes], space: bytes) -> bytes:
         body += padded
     head = struct.pack(">I4sI4s4s4s", start + len(body), b"", 0x04300000, b"mntr", space, b"XYZ ")
     head += struct.pack(">6H4s", 2024, 1, 1, 0, 0, 0, b"acsp")
-    head = head.ljust(68, b"\0") + b"".join(map(_fixed, _D50))
+    head = head.ljust(68, b"\0") + b"".join(map(_pack_fixed, _D50))
     return head.ljust(128, b"\0") + table + body
 
 
-def _fixed(value: float) -> bytes:
+def _pack_fixed(value: float) -> bytes:
     return struct.pack(">i", round(value * 65536))
 
 
 def _xyz(values: Any) -> bytes:
-    return b"XYZ \0\0\0\0" + b"".join(map(_fixed, values))
+    return b"XYZ \0\0\0\0" + b"".join(map(_pack_fixed, values))
 
 
 def _text(text: str) -> bytes:

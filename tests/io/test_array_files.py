@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 import vkbloom
-from tests.io.parts import reread, store_parts, written
+from tests.io.parts import reread, store_parts, write
 from tests.io.profiles import (
     DISPLAY_P3,
     REC_709,
@@ -48,7 +48,7 @@ def store_exr(path: Path, **channels: NDArray[Any]) -> Path:
     spec.channelformats = tuple(
         oiio.TypeDesc("half" if part.dtype == np.float16 else "float") for part in channels.values()
     )
-    return written(path, spec, np.stack([*channels.values()], -1).astype(np.float32))
+    return write(path, spec, np.stack([*channels.values()], -1).astype(np.float32))
 
 
 def halves(layer: str, names: str = "RGBA", size: tuple[int, int] = (3, 5)) -> dict[str, Any]:

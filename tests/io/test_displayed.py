@@ -45,11 +45,11 @@ def chunk(file: Path, name: bytes) -> bytes:
     return content[place + 4 : place + 4 + size]
 
 
-def stored(file: Path) -> Any:
+def store(file: Path) -> Any:
     return oiio.ImageBuf(str(file)).get_pixels(oiio.FLOAT)
 
 
-def converted(values: NDArray[Any], source: str, target: str, config: str = BUILT_IN) -> Any:
+def convert(values: NDArray[Any], source: str, target: str, config: str = BUILT_IN) -> Any:
     made = oiio.ImageBufAlgo.colorconvert(
         oiio.ImageBuf(np.ascontiguousarray(values, np.float32)),
         source,
@@ -61,7 +61,7 @@ def converted(values: NDArray[Any], source: str, target: str, config: str = BUIL
     return made.get_pixels(oiio.FLOAT)
 
 
-def shown(values: NDArray[Any], display: str, view: str) -> Any:
+def convert_to_display(values: NDArray[Any], display: str, view: str) -> Any:
     made = oiio.ImageBufAlgo.ociodisplay(
         oiio.ImageBuf(values), display, view, "lin_rec709_scene", "", False, colorconfig=BUILT_IN
     )
@@ -80,11 +80,11 @@ class TestHdr:
     def test_curves_are_opencolorios(self, tmp_path: Path, curves: str, curve: Any) -> None:
         """The reference, what is written, and what a renderer gives."""
         light = RAMP[RAMP < 1 / 0.26496].reshape(1, -1, 3) if curve == "hlg" else RAMP
-        expected = converted(light * np.float32(TO_OPENCOLORIO[curve]), "lin", curve, curves)
+        expected = convert(light * np.float32(TO_OPENCOLORIO[curve]), "lin", curve, curves)
         formula = tone_map.ENCODINGS[curve](light.astype(float), 203.0)
         np.testing.assert_allclose(formula, expected, atol=2e-5)
         file = vkbloom.write(tmp_path / "a.png", light, encoding=curve, bits=16)
-        np.testing.assert_allclose(stored(file), expected, atol=4e-5)
+        np.testing.assert_allclose(store(file), expected, atol=4e-5)
         with vkbloom.Renderer("software") as renderer:
             final = renderer.apply(light, vkbloom.Separable(bloom=False, encoding=curve))["final"]
         np.testing.assert_allclose(final, expected, atol=1e-3)
@@ -128,8 +128,8 @@ class TestHdr:
 
     def test_primaries_are_opencolorios(self, tmp_path: Path) -> None:
         file = vkbloom.write(tmp_path / "a.exr", RAMP, primaries="rec2020")
-        expected = converted(RAMP, "lin_rec709_scene", "lin_rec2020_scene")
-        np.testing.assert_allclose(stored(file), expected, rtol=1e-5)
+        expected = convert(RAMP, "lin_rec709_scene", "lin_rec2020_scene")
+        np.testing.assert_allclose(store(file), expected, rtol=1e-5)
 
 
 @pytest.mark.parametrize("primaries", ["rec2020", "p3"])
@@ -140,9 +140,9 @@ def test_exr_has_chromaticities(tmp_path: Path, primaries: str) -> None:
     red = {"rec2020": (0.708, 0.292), "p3": (0.68, 0.32)}[primaries]
     np.testing.assert_allclose(spec.getattribute("chromaticities")[:2], red, atol=1e-6)
     # White is the same in all of them; red of Rec. 709 lies inside.
-    np.testing.assert_allclose(stored(file), 1, atol=1e-5)
+    np.testing.assert_allclose(store(file), 1, atol=1e-5)
     vkbloom.write(file, white * np.array([1, 0, 0, 1], np.float32), primaries=primaries)
-    assert (stored(file)[0, 0, :3] > 0).all()
+    assert (store(file)[0, 0, :3] > 0).all()
 
 
 VIEWS = [
@@ -159,7 +159,7 @@ VIEWS = [
 def test_views(tmp_path: Path, display: str, view: str, points: tuple[int, int]) -> None:
     file = vkbloom.write(tmp_path / "a.png", RAMP, view=f"{display}/{view}", bits=16)
     assert chunk(file, b"cICP") == bytes([*points, 0, 1])
-    np.testing.assert_allclose(stored(file), shown(RAMP, display, view), atol=1e-4)
+    np.testing.assert_allclose(store(file), convert_to_display(RAMP, display, view), atol=1e-4)
 
 
 @pytest.mark.parametrize(
@@ -184,7 +184,7 @@ def test_the_command_writes_what_python_does(
     made, expected = tmp_path / "a.png", tmp_path / "b.png"
     vkbloom.write(expected, RAMP, bits=bits, **arguments)
     assert oiio.ImageInput.open(str(made)).spec().format == f"uint{bits}"
-    np.testing.assert_allclose(stored(made), stored(expected), atol=1 / (2**bits - 1))
+    np.testing.assert_allclose(store(made), store(expected), atol=1 / (2**bits - 1))
     assert chunk(made, b"cICP") == chunk(expected, b"cICP")
     if options[0] == "--encoding":
         output = run(*given, tmp_path / "c.jpg", *without_bloom, *options).output

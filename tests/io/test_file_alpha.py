@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 import vkbloom
 from tests.io import foreign
-from tests.io.parts import written
+from tests.io.parts import write
 from tests.srgb import decode_srgb
 
 oiio = pytest.importorskip("OpenImageIO")
@@ -197,7 +197,7 @@ def test_floats(tmp_path: Path, is_straight: bool) -> None:
     if is_straight:
         # OpenImageIO keeps its own name to itself.
         spec.attribute("xxxx:UnassociatedAlpha", 1)
-    written(tmp_path / "a.exr", spec, stored)
+    write(tmp_path / "a.exr", spec, stored)
     content = (tmp_path / "a.exr").read_bytes()
     (tmp_path / "a.exr").write_bytes(content.replace(b"xxxx:", b"oiio:"))
     for name in ("a.tif", "a.exr"):

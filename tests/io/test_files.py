@@ -23,7 +23,7 @@ import OpenImageIO as oiio
 import pytest
 
 from tests.exhaustive import by_turns
-from tests.framebuffers import INFO, TIMINGS, make, mixed, names_in, read
+from tests.framebuffers import INFO, TIMINGS, make, make_mixed, names_in, read
 from tests.images import noise
 from vkbloom import Frames, Separable
 from vkbloom._io import safe_writing
@@ -31,7 +31,7 @@ from vkbloom._io import safe_writing
 
 @pytest.fixture
 def frames() -> Frames:
-    return mixed()
+    return make_mixed()
 
 
 class TestExr:
@@ -328,14 +328,14 @@ class TestWriteErrors:
     def test_an_interrupt_leaves_nothing(
         self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        def interrupted(*_: Any) -> None:
+        def interrupt(*_: Any) -> None:
             raise KeyboardInterrupt
 
-        monkeypatch.setattr("vkbloom._io.safe_writing.os.posix_fallocate", interrupted)
+        monkeypatch.setattr("vkbloom._io.safe_writing.os.posix_fallocate", interrupt)
         with pytest.raises(KeyboardInterrupt):
             safe_writing.reserve(tmp_path / "a.png", 9)
         assert names_in(tmp_path) == []
-        monkeypatch.setattr(Path, "replace", interrupted)
+        monkeypatch.setattr(Path, "replace", interrupt)
         with pytest.raises(KeyboardInterrupt):
             safe_writing.write_file(tmp_path / "a.png", b"bytes")
         assert names_in(tmp_path) == []
@@ -363,14 +363,14 @@ class TestWriteErrors:
     def test_space_without_the_systems_help(
         self, reason: int | None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        def unsupported(*_: Any) -> None:
+        def refuse(*_: Any) -> None:
             assert reason is not None
             raise OSError(reason, "not here")
 
         if reason is None:
             monkeypatch.delattr(os, "posix_fallocate")
         else:
-            monkeypatch.setattr(os, "posix_fallocate", unsupported)
+            monkeypatch.setattr(os, "posix_fallocate", refuse)
         size = 3 << 20
         assert safe_writing.reserve(tmp_path / "a.png", size).stat().st_size > size
         file = tmp_path / "b.png"

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 import vkbloom
 from tests.io import foreign
-from tests.io.parts import store_ultra_hdr, written
+from tests.io.parts import store_ultra_hdr, write
 from tests.io.profiles import (
     DISPLAY_P3,
     REC_709,
@@ -43,7 +43,7 @@ MATRICES = {
 }
 
 
-def turned(orientation: int) -> NDArray[Any]:
+def turn(orientation: int) -> NDArray[Any]:
     """Return the pixels that Pillow shows of PIXELS with an orientation."""
     picture = image.fromarray(PIXELS)
     picture.getexif()[274] = orientation
@@ -106,7 +106,7 @@ def test_orientation(tmp_path: Path, name: str, store: Any, orientation: int) ->
             vkbloom.read(path)
         return
     made = vkbloom.read(path)
-    off = np.abs(encode_srgb(made) * 255 - turned(orientation))
+    off = np.abs(encode_srgb(made) * 255 - turn(orientation))
     assert (np.median(off) if name.endswith("jpg") else off.max()) < (3 if "jpg" in name else 0.01)
 
 
@@ -522,6 +522,6 @@ def test_an_orientation_that_is_none(tmp_path: Path, stated: Any) -> None:
     if stated is not None:
         kind = {int: "int", float: "float", str: "string"}.get(type(stated), "int[2]")
         spec.attribute("Orientation", oiio.TypeDesc(kind), stated)
-    written(tmp_path / "a.exr", spec, np.ones((3, 4, 3), np.float16))
+    write(tmp_path / "a.exr", spec, np.ones((3, 4, 3), np.float16))
     with ImageFile(tmp_path / "a.exr") as file:
         assert file.header.orientation == 1

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 import vkbloom
 from tests.io import foreign
-from tests.io.parts import written
+from tests.io.parts import write
 from tests.io.profiles import png_chunk, store_png
 from tests.srgb import decode_srgb, encode_srgb
 from vkbloom._io.formats.jpeg_xl import read_header
@@ -79,7 +79,7 @@ def store_tiff_in_a_larger_one(path: Path) -> None:
 def store_windows(path: Path) -> None:
     spec = oiio.ImageSpec(48, 32, 3, "uint8")
     spec.x, spec.y, spec.full_width, spec.full_height = 8, 4, 96, 64
-    written(path, spec, PIXELS)
+    write(path, spec, PIXELS)
 
 
 def store_jpeg_2000(path: Path) -> None:
@@ -119,7 +119,7 @@ def test_only_openexr_gets_windows(tmp_path: Path, suffix: str) -> None:
     spec = oiio.ImageSpec(48, 32, 3, "half")
     spec.x, spec.y = -8, -4
     spec.full_width, spec.full_height = 32, 24
-    written(tmp_path / "a.exr", spec, (PIXELS / 255).astype(np.float16))
+    write(tmp_path / "a.exr", spec, (PIXELS / 255).astype(np.float16))
     picture = read_picture(tmp_path / "a.exr")
     save(picture, tmp_path / f"a.{suffix}")
     assert read_stored(tmp_path / f"a.{suffix}").pixels.shape == (24, 32, 3)
@@ -243,7 +243,7 @@ def test_tiles_of_doubles_are_refused(tmp_path: Path) -> None:
 # JPEG XL
 
 
-def multiplied() -> bytes:
+def multiply() -> bytes:
     at, bit = MULTIPLIED
     content = bytearray(STRAIGHT)
     content[at] |= bit
@@ -253,7 +253,7 @@ def multiplied() -> bytes:
 @pytest.mark.parametrize("container", ["jxlc", "jxlp", "none", "to the end", "large"])
 @pytest.mark.parametrize("is_multiplied", [False, True])
 def test_alpha_of_jpeg_xl(tmp_path: Path, container: str, is_multiplied: bool) -> None:
-    content = multiplied() if is_multiplied else STRAIGHT
+    content = multiply() if is_multiplied else STRAIGHT
     # Without the box of the level, as other programs write it.
     boxes, codestream = content[:32] + foreign.jpeg_xl_box(b"xml ", b"<a/>"), content[CODESTREAM:]
     parts = [b"\0\0\0\0" + codestream[:20], b"\x80\0\0\1" + codestream[20:]]
@@ -298,7 +298,7 @@ def test_floats_of_jpeg_xl_are_on_their_curve(tmp_path: Path, curve: str, kind: 
     # The format needs as much as 100 for no loss.
     spec.attribute("compression", "jpegxl:100")
     signal = np.linspace(0, 1, 32 * 32 * 3, dtype=np.float32).reshape(32, 32, 3)
-    written(tmp_path / "a.jxl", spec, signal)
+    write(tmp_path / "a.jxl", spec, signal)
     png = vkbloom.read(
         store_png(
             tmp_path / "a.png",

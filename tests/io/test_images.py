@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from tests import images
 from tests.framebuffers import names_in
 from tests.framebuffers import write_image as store
-from tests.io.parts import reread, written
+from tests.io.parts import reread, write
 from tests.srgb import decode_srgb, encode_srgb
 from vkbloom._io import safe_writing
 from vkbloom._io.decoding import decode
@@ -370,7 +370,7 @@ class TestSave:
         spec = oiio.ImageSpec(2, 2, 3, "half")
         spec.attribute("chromaticities", oiio.TypeDesc("float[8]"), chromaticities)
         spec.attribute("PixelAspectRatio", 2.0)
-        written(tmp_path / "a.exr", spec, noise(2, 2, 3, numbers="half"))
+        write(tmp_path / "a.exr", spec, noise(2, 2, 3, numbers="half"))
         save(decode(read_stored(tmp_path / "a.exr")), tmp_path / "b.exr")
         kept, _ = reread(tmp_path / "b.exr")
         assert np.allclose(kept["chromaticities"], chromaticities)

@@ -35,7 +35,7 @@ for path in sys.argv[4:]:
 """
 
 
-def compiled(name: str, folder: Path) -> dict[str, str]:
+def compile_locale(name: str, folder: Path) -> dict[str, str]:
     """Return the environment of a locale: ``language.ENCODING``."""
     if name == "C":
         return {"LC_ALL": "C", **STRICT}
@@ -66,7 +66,7 @@ def compiled(name: str, folder: Path) -> dict[str, str]:
     ],
 )
 def test_files_are_found(tmp_path: Path, locale: str, letter: str, encoding: str) -> None:
-    environment = compiled(locale, tmp_path)
+    environment = compile_locale(locale, tmp_path)
     word = letter.encode(encoding)
     folder = os.fsencode(tmp_path) + b"/" + word
     os.mkdir(folder)

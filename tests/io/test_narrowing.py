@@ -10,7 +10,7 @@ import pytest
 
 import vkbloom
 from tests.cli.calls import run
-from vkbloom._io.narrowing import MAX_RADIANCE, narrowed, narrowing_note
+from vkbloom._io.narrowing import MAX_RADIANCE, narrow, narrowing_note
 
 pytest.importorskip("OpenImageIO")
 
@@ -83,7 +83,7 @@ def test_colours_divided_by_a_small_alpha(tmp_path: Path) -> None:
 
 def test_conversions_that_hold_all_are_left_alone() -> None:
     values = np.array([1, 65504, INF, NAN], np.float16)
-    assert narrowed(values, np.dtype(np.float16)) is values
+    assert narrow(values, np.dtype(np.float16)) is values
     assert narrowing_note(values, np.dtype(np.float32)) is None
 
 

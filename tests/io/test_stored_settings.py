@@ -54,7 +54,7 @@ class TestSettings:
         assert vkbloom.Pyramid.from_dict({"levels": 3}) == vkbloom.Pyramid(levels=3)
 
 
-def packed(shape: list[Any], count: int) -> str:
+def pack(shape: list[Any], count: int) -> str:
     """Return settings with an array that has `count` zeros, and says that it has a shape."""
     data = base64.b64encode(zlib.compress(bytes(4 * count))).decode()
     values = {"shape": shape, "zlib": data}
@@ -77,7 +77,7 @@ class TestPackedArrays:
         ],
     )
     def test_a_short_text_cannot_claim_the_memory(self, shape: list[Any], count: int) -> None:
-        text = packed(shape, count)
+        text = pack(shape, count)
         tracemalloc.start()
         try:
             with pytest.raises((ValueError, TypeError), match="array") as caught:

@@ -14,7 +14,7 @@ from tests.exhaustive import EXHAUSTIVE, some
 from tests.images import random_image
 from tests.methods.cases import METHODS, OTHERS
 from tests.planned import Inputs
-from tests.variants import opened
+from tests.variants import open_variant
 from vkbloom import (
     BevyBloom,
     BlenderGlare,
@@ -157,7 +157,7 @@ CASES: dict[str, Any] = {
 }
 
 
-def pulled(renderer: Any, image: Any, settings: Any, **given: Any) -> Any:
+def pull(renderer: Any, image: Any, settings: Any, **given: Any) -> Any:
     frames, pullback = vkbloom.vjp(image, settings, **given, renderer=renderer)
     random = np.random.default_rng(5)
     cotangents = {
@@ -183,7 +183,7 @@ def test_passes_are_the_transposes_of_the_reference(renderer: Renderer, name: st
     for size in ((4000, 2),) if name == "high" else sizes:
         image = random_image(*size, channels=channels, seed=1).astype(np.float32)
         image -= 0.4 * (name in NEGATIVE)
-        pullback, cotangents, expected = pulled(renderer, image, settings)
+        pullback, cotangents, expected = pull(renderer, image, settings)
         found = pullback(cotangents)
         assert isinstance(found, DeviceGradients)
         assert [*found] == [*expected]
@@ -199,7 +199,7 @@ def test_derivatives_of_a_lamp_on_black_are_finite(renderer: Renderer, name: str
     settings = CASES[name]
     image = np.zeros((11, 14, 3 if settings.alpha == "keep" else 4), np.float32)
     image[5, 7], image[..., 3:] = 4, 1
-    pullback, cotangents, expected = pulled(renderer, image, settings)
+    pullback, cotangents, expected = pull(renderer, image, settings)
     found = pullback(cotangents)
     assert np.isfinite(found["image"]).all()
     # A beam that ends between the lamp and black is one of these by rounding: a kink of saturation.
@@ -211,7 +211,7 @@ def test_derivatives_of_a_lamp_on_black_are_finite(renderer: Renderer, name: str
 def test_infinite_weights_have_no_derivative(renderer: Renderer) -> None:
     """A luminance of -1 makes the divisor 0."""
     image = -np.ones((6, 7, 3), np.float32)
-    pullback, cotangents, expected = pulled(renderer, image, CASES["pygfx karis"])
+    pullback, cotangents, expected = pull(renderer, image, CASES["pygfx karis"])
     check(pullback(cotangents), expected, "image")
 
 
@@ -253,8 +253,8 @@ def test_blender_5_2_reads_the_next_texels(renderer: Renderer, size: Any, type: 
     height, width = size
     image = random_image(height, width).astype(np.float32)
     settings = BlenderGlare(type=type, version="5.2", threshold=0.3, streaks=2)
-    pullback, cotangents, expected = pulled(renderer, image, settings)
-    other = pulled(renderer, image, settings.replace(version="5.0"))[2]["image"]
+    pullback, cotangents, expected = pull(renderer, image, settings)
+    other = pull(renderer, image, settings.replace(version="5.0"))[2]["image"]
     check(pullback(cotangents), expected, "image")
     assert np.abs(other - expected["image"]).max() > 0.1
 
@@ -311,7 +311,7 @@ def test_presets_are_differentiated(renderer: Renderer, name: str) -> None:
         "emission": random_image(33, 48, channels=3, seed=2).astype(np.float32),
     }
     for given in ({}, both):
-        pullback, cotangents, expected = pulled(renderer, image, PRESETS[name], **given)
+        pullback, cotangents, expected = pull(renderer, image, PRESETS[name], **given)
         found = pullback(cotangents)
         assert isinstance(found, DeviceGradients)
         for part in ("image", *given):
@@ -387,7 +387,7 @@ TRANSPOSED: tuple[tuple[str, Any, tuple[int, ...], str, tuple[str, ...]], ...] =
 @pytest.fixture(scope="module")
 def varied(software: Any) -> Iterator[dict[str, Renderer]]:
     renderers = {
-        variant: opened(variant, "software", validation=False) for variant in ("cpu", "gpu")
+        variant: open_variant(variant, "software", validation=False) for variant in ("cpu", "gpu")
     }
     yield renderers
     for renderer in renderers.values():
@@ -425,7 +425,7 @@ def test_variants_are_transposed(varied: dict[str, Renderer], case: tuple[Any, .
 def test_tiles_have_the_derivatives_of_the_reference(varied: Any, name: str) -> None:
     """Among them ghosts, whose weights differ from texel to texel in a window of the usual size."""
     image = random_image(9, 41, channels=4, seed=1).astype(np.float32)
-    pullback, cotangents, expected = pulled(varied["gpu"], image, CASES[name])
+    pullback, cotangents, expected = pull(varied["gpu"], image, CASES[name])
     found = pullback(cotangents)
     assert isinstance(found, DeviceGradients)
     check(found, expected, "image")
@@ -474,7 +474,7 @@ def test_all_inputs_have_derivatives(renderer: Renderer, dtype: Any) -> None:
     both = {"mask": mask, "emission": emission}
     cases = [(separable, {"mask": mask}), *((settings, both) for settings in (separable, *MASKED))]
     for settings, given in cases:
-        pullback, cotangents, expected = pulled(renderer, image, settings, **given)
+        pullback, cotangents, expected = pull(renderer, image, settings, **given)
         found = pullback(cotangents)
         assert isinstance(found, DeviceGradients)
         for name in ("image", *given):
@@ -485,7 +485,7 @@ def test_only_what_is_read_is_computed(renderer: Renderer) -> None:
     """Derivatives by images run no sums, and those of a closed renderer come from the reference."""
     image = random_image(9, 8, seed=1).astype(np.float32)
     with vkbloom.Renderer(renderer.info.name) as own:
-        pullback, cotangents, expected = pulled(own, image, Separable(threshold=0.2, knee=0.5))
+        pullback, cotangents, expected = pull(own, image, Separable(threshold=0.2, knee=0.5))
         found = pullback(cotangents)
     assert isinstance(found, DeviceGradients)
     assert [*found._known] == ["image"]

@@ -36,7 +36,7 @@ OFF = Separable(bloom=False)
 # --- Strides ---
 
 
-def _unaligned(image: Image) -> Image:
+def _unalign(image: Image) -> Image:
     """Return the image as a field of packed records, which begins at odd addresses."""
     pixel = np.dtype((image.dtype, image.shape[2:]))
     records = np.zeros(image.shape[:2], np.dtype([("id", np.uint8), ("colour", pixel)]))
@@ -68,7 +68,7 @@ VIEWS: dict[str, Callable[[Image], Image]] = {
     "one-pixel-repeated": lambda image: np.broadcast_to(image[5, 6], (6, 8, image.shape[2])),
     "grey-repeated": lambda image: np.broadcast_to(image[..., :1], (*image.shape[:2], 3)),
     "read-only": _read_only,
-    "unaligned": _unaligned,
+    "unaligned": _unalign,
     "big-endian": lambda image: image.astype(image.dtype.newbyteorder(">")),
     "big-endian-reversed": lambda image: image.astype(image.dtype.newbyteorder(">"))[:, ::-1],
 }

@@ -37,19 +37,19 @@ def _cube(array: Image) -> Image:
     return array[np.newaxis, :5, :5].repeat(6, axis=0)
 
 
-def _filled(renderer: Renderer, array: Image, given: Image) -> Image:
+def _fill(renderer: Renderer, array: Image, given: Image) -> Image:
     out = np.zeros_like(given)
     assert renderer.apply(array, SETTINGS, out={"final": out})["final"] is out
     return out
 
 
-def _written(array: Image) -> Image:
+def _write(array: Image) -> Image:
     file = Path("image.png" if array.dtype.kind == "u" else "image.exr")
     vkbloom.write(file, array)
     return vkbloom.read(file)
 
 
-def _saved(renderer: Renderer, array: Image, given: Image) -> Image:
+def _save(renderer: Renderer, array: Image, given: Image) -> Image:
     file = Path("final.png" if array.dtype.kind == "u" else "final.exr")
     out = np.zeros_like(given)
     renderer.apply(array, SETTINGS, framebuffers="final", out={"final": out}).save(file)
@@ -71,7 +71,7 @@ CALLS: dict[str, Call] = {
     )["image"],
     "emission": lambda r, array, given: r.apply(array, SETTINGS, emission=given)["final"],
     "mask": lambda r, array, given: r.apply(PLAIN, SETTINGS, mask=_mask(given))["final"],
-    "out": _filled,
+    "out": _fill,
     "psf": lambda r, array, given: r.apply(PLAIN, Convolution(psf=given))["final"],
     # (The order of a sum follows the layout.)
     "fit": lambda r, array, given: np.float32(
@@ -80,8 +80,8 @@ CALLS: dict[str, Call] = {
     "grid": lambda r, array, given: vkbloom.grid(given, SETTINGS, {"intensity": [0.5]}, renderer=r)[
         "final"
     ].to_numpy(),
-    "write": lambda r, array, given: _written(given),
-    "save": _saved,
+    "write": lambda r, array, given: _write(given),
+    "save": _save,
     "reference": lambda r, array, given: reference.apply(given, SETTINGS)["final"],
     "emission of the reference": lambda r, array, given: reference.apply(
         array, SETTINGS, emission=given
@@ -143,7 +143,7 @@ def test_an_order_that_is_named(renderer: Renderer, in_folder: None, call: str, 
         assert_array_equal(CALLS[call](renderer, array, given), expected)
 
 
-class Own(np.ndarray[Any, Any]):
+class Subclass(np.ndarray[Any, Any]):
     """A subclass of which the package knows nothing."""
 
 
@@ -155,7 +155,7 @@ def _on_disk(array: Image) -> Image:
 
 LAYOUTS: dict[str, Callable[[Image], Image]] = {
     "masked, without masked values": np.ma.array,
-    "subclass": lambda array: array.view(Own),
+    "subclass": lambda array: array.view(Subclass),
     "memmap": _on_disk,
     "Fortran": np.asfortranarray,
     "reversed": lambda array: array[::-1, ::-1].copy()[::-1, ::-1],

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from tests.device.abilities import max_side
 from tests.exhaustive import some
-from tests.variants import opened
+from tests.variants import open_variant
 from vkbloom import AdapterInfo, Convolution, Renderer, Settings, psf, reference
-from vkbloom.reference._convolution import prefiltered
+from vkbloom.reference._convolution import filter_bright
 
 BOUNDARIES = ("zero", "edge", "wrap", "wrap_x")
 
@@ -71,7 +71,7 @@ def test_long_lines(renderer: Renderer) -> None:
 @pytest.fixture(scope="module")
 def gpu() -> Iterator[Renderer]:
     """A renderer with the variants of GPUs, which transform complete lines."""
-    with opened("gpu") as renderer:
+    with open_variant("gpu") as renderer:
         yield renderer
 
 
@@ -106,9 +106,9 @@ def test_lines_that_shared_memory_cannot_hold(gpu: Renderer) -> None:
 def test_prefilter(renderer: Renderer) -> None:
     """Of Unreal Engine: luminances above 7 become 15 (L - 7) + 7."""
     image = np.full((8, 8, 3), 8.0, np.float32)
-    filtered = prefiltered(image[:1, :1].astype(float), (7, 15000, 15))
+    filtered = filter_bright(image[:1, :1].astype(float), (7, 15000, 15))
     np.testing.assert_allclose(filtered, 22)
-    np.testing.assert_allclose(prefiltered(image[:1, :1] / 2, (7, 15000, 15)), 4)
+    np.testing.assert_allclose(filter_bright(image[:1, :1] / 2, (7, 15000, 15)), 4)
     kernel = np.pad(np.ones((3, 3), np.float32), 3)
     kernel[4, 4] = 9
     for prefilter in ((7, 15000, 15), (7, 1, 15)):

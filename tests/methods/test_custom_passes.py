@@ -33,7 +33,7 @@ TINT = (
 IMAGE = picture(32, 20)
 
 
-class Own:
+class Custom:
     """Settings of a method whose passes are given."""
 
     def __init__(self, *passes: Row) -> None:
@@ -43,15 +43,15 @@ class Own:
         return settings_block("custom", {"format": "rgba32float"})
 
     def core_passes(self, frame: tuple[int, int], buffers: tuple[int, int]) -> Any:
-        return tuple(one.packed() for one in self.passes)
+        return tuple(one.pack() for one in self.passes)
 
 
 @pytest.fixture(scope="module")
 def spirv(tmp_path_factory: pytest.TempPathFactory) -> bytes:
-    return compiled(tmp_path_factory.mktemp("spirv"), TINT)
+    return compile_pass(tmp_path_factory.mktemp("spirv"), TINT)
 
 
-def compiled(folder: Path, text: str) -> bytes:
+def compile_pass(folder: Path, text: str) -> bytes:
     source, target = folder / "one.frag", folder / "one.spv"
     source.write_text(text)
     assert compiler
@@ -59,7 +59,7 @@ def compiled(folder: Path, text: str) -> bytes:
     return target.read_bytes()
 
 
-def run(renderer: Renderer, settings: Own) -> tuple[dict[str, Any], dict[str, float]]:
+def run(renderer: Renderer, settings: Custom) -> tuple[dict[str, Any], dict[str, float]]:
     """Return all framebuffers, and the times of the passes that ran."""
     source = _core.image_source(IMAGE)
     plan = renderer._core.plan(source, settings, None)
@@ -76,13 +76,13 @@ def row(code: bytes) -> Row:
 def test_another_shader_runs_its_pass_again_and_an_equal_one_does_not(
     renderer: Renderer, spirv: bytes, tmp_path: Path
 ) -> None:
-    other = compiled(tmp_path, TINT.replace("values.tint *", "values.tint + "))
-    run(renderer, Own(row(spirv)))
+    other = compile_pass(tmp_path, TINT.replace("values.tint *", "values.tint + "))
+    run(renderer, Custom(row(spirv)))
     before = renderer._core.pipeline_count
     gc.collect()
-    assert not run(renderer, Own(row(spirv)))[1]
+    assert not run(renderer, Custom(row(spirv)))[1]
     assert renderer._core.pipeline_count == before
-    frames, times = run(renderer, Own(row(other)))
+    frames, times = run(renderer, Custom(row(other)))
     assert set(times) == {"bloom", "final"}
     assert renderer._core.pipeline_count == before + 1
     np.testing.assert_allclose(frames["bloom"][..., :3], IMAGE[..., :3] + 1, rtol=1e-6)
@@ -90,10 +90,10 @@ def test_another_shader_runs_its_pass_again_and_an_equal_one_does_not(
 
 @pytest.mark.parametrize(("call", "error"), rows(__file__, "passes"))
 def test_faulty_pass_is_refused(renderer: Renderer, spirv: bytes, call: str, error: str) -> None:
-    def changed(**fields: Any) -> None:
-        run(renderer, Own(row(spirv)._replace(**fields)))
+    def change(**fields: Any) -> None:
+        run(renderer, Custom(row(spirv)._replace(**fields)))
 
     def twice() -> None:
-        run(renderer, Own(row(spirv), row(spirv)))
+        run(renderer, Custom(row(spirv), row(spirv)))
 
-    assert_refused(call, error, {"changed": changed, "twice": twice, "Resource": Resource})
+    assert_refused(call, error, {"change": change, "twice": twice, "Resource": Resource})

@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 import vkbloom
-from tests.images import given_of, hdr_picture, picture
+from tests.images import choose_given, hdr_picture, picture
 from tests.tolerance import assert_close, tolerance
 from vkbloom import (
     BevyBloom,
@@ -155,7 +155,7 @@ def test_stages(renderer: Renderer, name: str) -> None:
     """All framebuffers agree with the reference."""
     case = CASES[name]
     image = source_of(case)
-    given = given_of(case.given, image)
+    given = choose_given(case.given, image)
     frames = renderer.apply(image, case.settings, **given)
     expected = reference.apply(image, case.settings, **given)
     assert list(frames) == list(expected)

@@ -9,7 +9,7 @@ import pytest
 from numpy.testing import assert_array_equal
 from numpy.typing import NDArray
 
-from tests.images import cut_out, picture
+from tests.images import make_cut_out, picture
 from tests.methods.cases import GIVEN
 from tests.tolerance import assert_matches_reference
 from vkbloom import Pyramid, Renderer, Scene, Separable
@@ -23,7 +23,7 @@ def test_a_mask_of_one_changes_no_bit_and_one_of_zero_leaves_no_bloom(
     renderer: Renderer, name: str
 ) -> None:
     settings, _ = GIVEN[name]
-    image = cut_out(61, 47, "float32")
+    image = make_cut_out(61, 47, "float32")
     ones = np.ones(image.shape[:2], bool)
     plain, full = renderer.apply(image, settings), renderer.apply(image, settings, mask=ones)
     for framebuffer in plain:

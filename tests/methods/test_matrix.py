@@ -12,7 +12,7 @@ from numpy.testing import assert_array_equal
 from tests import variants
 from tests.conftest import SANITIZED
 from tests.exhaustive import EXHAUSTIVE, by_turns
-from tests.images import DTYPES, cut_out, given_of, hdr_picture
+from tests.images import DTYPES, choose_given, hdr_picture, make_cut_out
 from tests.methods.cases import GIVEN, METHODS, OTHERS, WHOLE, presets_of_low_levels
 from tests.tolerance import assert_matches_reference
 from tests.variants import VARIANTS
@@ -79,7 +79,7 @@ def has_equal_bits(settings: Settings) -> bool:
 @pytest.fixture(scope="module")
 def opened() -> Iterator[dict[str, Renderer]]:
     """A renderer for each column of the table of variants."""
-    renderers = {variant: variants.opened(variant) for variant in VARIANTS}
+    renderers = {variant: variants.open_variant(variant) for variant in VARIANTS}
     yield renderers
     for renderer in renderers.values():
         renderer.close()
@@ -109,10 +109,10 @@ def test_every_variant(
 ) -> None:
     """Against the reference and the bits of the others; `final` alone is the `final` of all."""
     settings, names = CASES[name]
-    image = cut_out(*size, dtype)
+    image = make_cut_out(*size, dtype)
     if settings.alpha == "keep":
         image = hdr_picture(*size, 3 + number // 2 % 2, dtype)
-    given = given_of(names, image)
+    given = choose_given(names, image)
     expected = opened["fragment"].apply(image, settings, **given)
     if name not in BITS:
         assert_matches_reference(expected, image, settings, **given)

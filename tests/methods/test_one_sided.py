@@ -88,7 +88,7 @@ def point(random: np.random.Generator, channels: int) -> Array:
     return chosen.astype(np.float32).astype(np.float64)
 
 
-def moved(random: np.random.Generator, shape: tuple[int, ...]) -> Array:
+def random_direction(random: np.random.Generator, shape: tuple[int, ...]) -> Array:
     """Return a direction: of all pixels or of one, of all channels, of one, grey or of two."""
     direction = random.standard_normal(shape)
     kind = random.integers(5)
@@ -112,7 +112,7 @@ def cotangents(random: np.random.Generator, frames: Any) -> dict[str, Array]:
     """Return cotangents of the last framebuffer, or of three."""
     names = [name for name in ("glow", "bloom", "final") if name in frames]
     names = names[-1:] if random.random() < 0.6 else names
-    given = {name: moved(random, frames[name].shape) for name in names}
+    given = {name: random_direction(random, frames[name].shape) for name in names}
     return {name: part.astype(np.float32).astype(np.float64) for name, part in given.items()}
 
 
@@ -147,7 +147,7 @@ def check_points(number: int, count: int) -> int:
         image = image.astype(np.float32).astype(np.float64)
         frames, pullback = reference.vjp(image, settings)
         for _ in range(DIRECTIONS):
-            given, direction = cotangents(random, frames), moved(random, image.shape)
+            given, direction = cotangents(random, frames), random_direction(random, image.shape)
             derivative = pullback(given)["image"]
             assert np.isfinite(derivative).all()
             expected, size = slope(image, settings, given, direction)

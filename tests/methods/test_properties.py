@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 import vkbloom
 from tests.exhaustive import EXHAUSTIVE, by_turns, examples
 from tests.methods.cases import METHODS
-from tests.variants import VARIANTS, opened
+from tests.variants import VARIANTS, open_variant
 from vkbloom import (
     DualKawase,
     FilamentBloom,
@@ -129,7 +129,7 @@ def random_filter(random: np.random.Generator) -> Settings:
 def test_random_filters_and_their_transposes(variant: str) -> None:
     """A x is NumPy's, and <A x, y> = <x, A' y>."""
     random = np.random.default_rng(VARIANTS.index(variant))
-    with opened(variant) as renderer:
+    with open_variant(variant) as renderer:
         for number in range(700 if EXHAUSTIVE else 12):
             settings = random_filter(random)
             image = random.random((*random.integers(3, 48, 2), 3), dtype=np.float32)

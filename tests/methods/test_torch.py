@@ -123,7 +123,7 @@ def test_derivatives_by_parameters_are_those_of_separate_calls(renderer: Rendere
     module = vkbloom_torch.Bloom(settings, learn=fields, renderer=renderer).to(DEVICE)
     images = [tensor(6, 5, 3, seed=seed, requires_grad=False) for seed in (1, 2)]
 
-    def pulled(*parts: Any) -> Any:
+    def pull(*parts: Any) -> Any:
         module.zero_grad()
         finals = [module(image) for image in parts]
         # Calls before one backward keep what they have saved, also if settings are read between.
@@ -131,7 +131,7 @@ def test_derivatives_by_parameters_are_those_of_separate_calls(renderer: Rendere
         sum(final.square().sum() for final in finals).backward()
         return torch.stack([parameter.grad for parameter in module.parameters()])
 
-    assert torch.allclose(pulled(*images), pulled(images[0]) + pulled(images[1]), rtol=1e-5)
+    assert torch.allclose(pull(*images), pull(images[0]) + pull(images[1]), rtol=1e-5)
 
 
 def test_fields_pass_gradcheck() -> None:
@@ -215,7 +215,7 @@ def test_a_forked_worker_opens_a_renderer_of_its_own() -> None:
     assert output("-c", FORKED, VKBLOOM_ADAPTER="software") == "True True\n"
 
 
-def compiled(fullgraph: bool, function: Any) -> Any:
+def compile_call(fullgraph: bool, function: Any) -> Any:
     torch._dynamo.reset()
     return torch.compile(function, fullgraph=fullgraph, backend="aot_eager")
 
@@ -228,7 +228,7 @@ def test_compiled_code_has_the_settings_that_it_is_called_with(
     def of_argument(image: Any, settings: Any) -> Any:
         return vkbloom_torch.bloom(image, settings, renderer=renderer)
 
-    def made_inside(image: Any, settings: Any) -> Any:
+    def make_inside(image: Any, settings: Any) -> Any:
         return vkbloom_torch.bloom(image, settings.replace(intensity=0.25), renderer=renderer)
 
     image = tensor(6, 5, 3)
@@ -244,9 +244,9 @@ def test_compiled_code_has_the_settings_that_it_is_called_with(
     for function, part in (
         (of_argument, cases[:5]),
         (of_argument, cases[5:]),
-        (made_inside, cases[:1]),
+        (make_inside, cases[:1]),
     ):
-        run = compiled(fullgraph, function)
+        run = compile_call(fullgraph, function)
         for settings in part:
             assert torch.equal(run(image, settings), function(image, settings)), settings
 
@@ -258,7 +258,7 @@ def test_a_compiled_module_trains(renderer: Renderer, fullgraph: bool) -> None:
     module = module.to(DEVICE)
     images = [tensor(6, 5, 3, seed=seed) for seed in (1, 2)]
     found = []
-    for call in (compiled(fullgraph, module), module):
+    for call in (compile_call(fullgraph, module), module):
         module.zero_grad()
         with torch.no_grad():
             module.learned["intensity"].fill_(-1.0)

@@ -14,7 +14,7 @@ from tests.framebuffers import assert_same
 from tests.images import hdr_picture
 from tests.methods.cases import OTHERS, WHOLE
 from tests.tolerance import assert_matches_reference, tolerance
-from tests.variants import VARIANTS, opened
+from tests.variants import VARIANTS, open_variant
 from vkbloom import (
     BevyBloom,
     Convolution,
@@ -50,7 +50,7 @@ def variant(request: pytest.FixtureRequest) -> str:
 @pytest.fixture(scope="module")
 def unfused() -> Iterator[Renderer]:
     """A renderer that runs every pass as its method defines it."""
-    with opened("fragment") as renderer:
+    with open_variant("fragment") as renderer:
         yield renderer
 
 
@@ -60,7 +60,7 @@ def varied(variant: str, unfused: Renderer) -> Iterator[Renderer]:
     if variant == "fragment":
         yield unfused
         return
-    with opened(variant) as renderer:
+    with open_variant(variant) as renderer:
         yield renderer
 
 
@@ -111,7 +111,7 @@ def test_large_images(
 ) -> None:
     """Strips, and tiles within the levels and at all their edges."""
     image = hdr_picture(*size, 4, "uint8")
-    with opened(name) as renderer:
+    with open_variant(name) as renderer:
         alone = renderer.apply(image, settings, framebuffers=("final",))
         renderer.apply(image[::-1], settings)
         frames = renderer.apply(image, settings)
@@ -124,7 +124,7 @@ def test_tiles(unfused: Renderer, size: tuple[int, int]) -> None:
     """Several tiles and parts of them, in simple ratios and others; small levels have none."""
     image = hdr_picture(*size, 3, "float16")
     bevy = BevyBloom(max_mip_dimension=max(min(size), 4))
-    with opened("gpu") as renderer:
+    with open_variant("gpu") as renderer:
         for settings in (*TILED, bevy):
             alone = renderer.apply(image, settings, framebuffers=("final",))
             frames = renderer.apply(image, settings.replace(exposure=0.5))

@@ -57,7 +57,7 @@ def build(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def added(sbom: Any, build: Path, folder: Path, *options: str) -> Path:
+def add_sbom(sbom: Any, build: Path, folder: Path, *options: str) -> Path:
     """Return a wheel with its SBOM."""
     wheel = shutil.copy(build / "tiny-1.0-py3-none-any.whl", folder)
     arguments = ["sbom.py", "add", str(wheel), "tiny/tiny", str(build / "map")]
@@ -73,7 +73,7 @@ def test_what_the_linker_used_is_listed(sbom: Any, build: Path, tmp_path: Path) 
     made = build / "made.json"
     made.write_text('{"spirv-opt": "v2023.1"}')
     volk = ("--source", "volk", "-", str(build / "volk.h"), "--properties", str(made))
-    wheel = added(sbom, build, tmp_path, *volk)
+    wheel = add_sbom(sbom, build, tmp_path, *volk)
     with zipfile.ZipFile(wheel) as opened:
         assert opened.testzip() is None
         said = json.loads(opened.read("tiny-1.0.dist-info/sboms/tiny.cdx.json"))
@@ -96,7 +96,7 @@ def test_what_the_linker_used_is_listed(sbom: Any, build: Path, tmp_path: Path) 
     assert listed["volk"]["version"] == "7"
     # Two builds in two folders give the same bytes.
     (tmp_path / "again").mkdir()
-    assert added(sbom, build, tmp_path / "again", *volk).read_bytes() == wheel.read_bytes()
+    assert add_sbom(sbom, build, tmp_path / "again", *volk).read_bytes() == wheel.read_bytes()
 
 
 def test_another_systems_packages(sbom: Any, tmp_path: Path) -> None:
@@ -121,7 +121,7 @@ def test_it_is_valid(sbom: Any, build: Path, tmp_path: Path) -> None:
     """By CycloneDX' own schema; a changed binary is found."""
     pytest.importorskip("cyclonedx.validation.json")
     (build / "made.json").write_text('{"glslang": "12"}')
-    wheel = added(sbom, build, tmp_path, "--properties", str(build / "made.json"))
+    wheel = add_sbom(sbom, build, tmp_path, "--properties", str(build / "made.json"))
     sbom.check(wheel)
     with zipfile.ZipFile(wheel) as opened:
         content = {one: opened.read(one) for one in opened.namelist()}
@@ -141,7 +141,7 @@ def test_a_library_that_only_nm_finds(sbom: Any, build: Path, tmp_path: Path) ->
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(sbom, "used_files", lambda _: [])
         with pytest.raises(SystemExit, match=r"nm finds gcc, glibc, zlib, not in the SBOM"):
-            added(sbom, build, tmp_path)
+            add_sbom(sbom, build, tmp_path)
 
 
 def test_the_core(sbom: Any) -> None:

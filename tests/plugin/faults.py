@@ -16,12 +16,12 @@ Bloom = Callable[..., Image]
 class Fault(NamedTuple):
     """A bloom with a fault, and the law that names it, in words.
 
-    - `fault`, `twin`: Make the blooms: some keep a state.
-    - `others`: Other laws that the fault breaks and the twin does not; None: they are not told.
+    - `fault`, `correct`: Make the blooms: some keep a state.
+    - `others`: Other laws that the fault breaks and the correct does not; None: they are not told.
     """
 
     fault: Callable[[], Bloom]
-    twin: Callable[[], Bloom]
+    correct: Callable[[], Bloom]
     law: str
     words: str
     others: frozenset[str] | None = None
@@ -67,7 +67,7 @@ def across_views(image: Image, *, region: tuple[int, int, int, int] | None = Non
     return gaussian(image)[y : y + height, x : x + width]
 
 
-def stretched(image: Image) -> Image:
+def stretch(image: Image) -> Image:
     """Blur in a buffer whose sides are multiples of 16, with steps of the image's texels."""
     height, width, _ = image.shape
     rows, columns = -(-height // 16) * 16 / height, -(-width // 16) * 16 / width
@@ -79,14 +79,14 @@ def off_at_odd_sizes(image: Image) -> Image:
     return np.asarray(ndimage.shift(gaussian(image), shift, order=1, mode="nearest"))
 
 
-def halved(image: Image) -> Image:
+def halve(image: Image) -> Image:
     height, width, channels = image.shape
     even = np.pad(image, ((0, height % 2), (0, width % 2), (0, 0)), mode="edge")
     boxes = even.reshape((height + 1) // 2, 2, (width + 1) // 2, 2, channels)
     return np.asarray(boxes.mean((1, 3)))
 
 
-def doubled(image: Image, shape: tuple[int, ...]) -> Image:
+def double(image: Image, shape: tuple[int, ...]) -> Image:
     large = ndimage.zoom(image, (2, 2, 1), order=1, grid_mode=True, mode="nearest")
     return np.asarray(large[: shape[0], : shape[1]])
 
@@ -145,7 +145,7 @@ def halves(store: Callable[[Image], Image]) -> Bloom:
     return bloom
 
 
-def truncated(image: Image) -> Image:
+def truncate(image: Image) -> Image:
     return (image.view(np.uint32) & np.uint32(0xFFFFE000)).view(np.float32)
 
 
@@ -187,8 +187,8 @@ def drops_the_last_row(image: Image) -> Image:
 def in_halves(image: Image, *, pads: bool = True) -> Image:
     """Blur an image of half the size; where a side is odd, its last line is repeated or dropped."""
     height, width, _ = image.shape
-    small = halved(image if pads else image[: height // 2 * 2, : width // 2 * 2])
-    large = doubled(gaussian(small), image.shape)
+    small = halve(image if pads else image[: height // 2 * 2, : width // 2 * 2])
+    large = double(gaussian(small), image.shape)
     missing = (height - large.shape[0], width - large.shape[1])
     return np.pad(large, ((0, missing[0]), (0, missing[1]), (0, 0)), mode="edge")
 
@@ -270,9 +270,9 @@ def with_red_in_blue(image: Image) -> Image:
     return gaussian(image @ np.array([[0.75, 0, 0.25], [0, 1, 0], [0, 0, 1]], image.dtype))
 
 
-def of_linear(fault: Bloom, law: str, words: str, *others: str, twin: Bloom = gaussian) -> Fault:
+def of_linear(fault: Bloom, law: str, words: str, *others: str, correct: Bloom = gaussian) -> Fault:
     """Return a fault beside a Gaussian, with all laws that it breaks."""
-    return Fault(lambda: fault, lambda: twin, law, words, frozenset(others))
+    return Fault(lambda: fault, lambda: correct, law, words, frozenset(others))
 
 
 #: Faults whose other broken laws are told, too.
@@ -305,11 +305,11 @@ _LINEAR: dict[str, Fault] = {
         lambda a: np.minimum(gaussian(a), 100), "unclamped", "100 instead of"
     ),
     "clamped above a threshold": of_linear(
-        lambda a: np.minimum(thresholded(a), 30), "unclamped", "30 instead of", twin=thresholded
+        lambda a: np.minimum(thresholded(a), 30), "unclamped", "30 instead of", correct=thresholded
     ),
-    "NaN reaches others": of_linear(gaussian, "finite", "nan at x 32", twin=at_finite),
+    "NaN reaches others": of_linear(gaussian, "finite", "nan at x 32", correct=at_finite),
     "infinity reaches others": of_linear(
-        lambda a: gaussian(np.where(np.isnan(a), 0, a)), "finite", "inf at x 32", twin=at_finite
+        lambda a: gaussian(np.where(np.isnan(a), 0, a)), "finite", "inf at x 32", correct=at_finite
     ),
     "one channel is wider": of_linear(with_wider_blue, "grey", "instead of"),
     "reads every other pixel": of_linear(
@@ -317,7 +317,7 @@ _LINEAR: dict[str, Fault] = {
         "stability",
         "the energy of the bloom changes by",
         *("symmetric", "gain", "no_ringing", "colour", "energy", "border", "sizes", "jitter"),
-        twin=wide,
+        correct=wide,
     ),
     "a curve before the blur": of_linear(
         lambda a: gaussian(np.maximum(a, 0) ** 1.1),
@@ -355,16 +355,16 @@ _LINEAR: dict[str, Fault] = {
         gaussian,
         "bounded_fireflies",
         "brightens others by 1 at most",
-        twin=lambda a: gaussian(np.minimum(a, 8)),
+        correct=lambda a: gaussian(np.minimum(a, 8)),
     ),
     "takes light from bright pixels": of_linear(
         lambda a: np.dstack([a[..., :3] / 2 + of_colours(a) / 2, a[..., 3:]]),
         "additive",
         "light is added, and none is removed",
-        twin=_keeps,
+        correct=_keeps,
     ),
     "a width in pixels": of_linear(
-        gaussian, "resolution", "the radius of 50 %", twin=in_shares_of_the_height
+        gaussian, "resolution", "the radius of 50 %", correct=in_shares_of_the_height
     ),
 }
 
@@ -388,14 +388,14 @@ FAULTS: dict[str, Fault] = {
         lambda: across_views, lambda: of_a_view, "views", "the other view changes the left one"
     ),
     "stretched to multiples of 16": Fault(
-        lambda: stretched, lambda: lambda a: gaussian(a, 3.0), "sizes", "the width differs by"
+        lambda: stretch, lambda: lambda a: gaussian(a, 3.0), "sizes", "the width differs by"
     ),
     "half a texel off at odd sizes": Fault(
         lambda: off_at_odd_sizes, lambda: gaussian, "sizes", "the centroid differs by 0.707 pixels"
     ),
     "threshold after the reduction": Fault(
-        lambda: lambda a: gaussian(doubled(above_one(halved(a)), a.shape)),
-        lambda: lambda a: gaussian(doubled(halved(above_one(a)), a.shape)),
+        lambda: lambda a: gaussian(double(above_one(halve(a)), a.shape)),
+        lambda: lambda a: gaussian(double(halve(above_one(a)), a.shape)),
         "jitter",
         "a lit pixel blooms from 4",
     ),
@@ -425,7 +425,7 @@ FAULTS: dict[str, Fault] = {
         lambda: picture(lambda alpha, _: alpha, of_opaque), lambda: _keeps, "alpha", "is too dark"
     ),
     "truncates half floats": Fault(
-        lambda: halves(truncated),
+        lambda: halves(truncate),
         lambda: halves(lambda a: a.astype(np.float16).astype(np.float32)),
         "gain",
         "the mean gain of 16 values is off by -0.0",

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.images import changed, noise_image
+from tests.images import change, noise_image
 from tests.refusals import assert_refused, rows
 from tests.srgb import decode_srgb
 from vkbloom._cli.compare import tolerances_of
@@ -45,7 +45,7 @@ class TestFigures:
 
     def test_place_and_values(self) -> None:
         a = np.full((12, 20, 4), 0.25, np.float32)
-        b = changed(changed(a, (7, 3, 2), 0.75), (1, 2, 0), 0.5)
+        b = change(change(a, (7, 3, 2), 0.75), (1, 2, 0), 0.5)
         found = compare(a, b)
         assert found.max_error == 0.5
         assert found.max_error_at == (3, 7, 2)
@@ -67,7 +67,7 @@ class TestFigures:
         a = noise_image(16, 16, 3, dtype="uint8")
         b = a.astype(np.uint16) * np.uint16(257)
         assert compare(a, b).identical
-        assert compare(a, changed(b, (0, 0, 0), b[0, 0, 0] ^ 1)).max_error == 1 / 65535
+        assert compare(a, change(b, (0, 0, 0), b[0, 0, 0] ^ 1)).max_error == 1 / 65535
 
     @pytest.mark.parametrize("dtype", ["uint8", "float32"])
     def test_ssim_and_psnr_are_those_of_scikit_image(self, dtype: str) -> None:
@@ -109,7 +109,7 @@ class TestFigures:
 
     def test_alpha_counts_but_for_flip(self) -> None:
         a = noise_image(16, 16, 4)
-        found = compare(a, changed(a, (3, 4, 3), a[3, 4, 3] + 1))
+        found = compare(a, change(a, (3, 4, 3), a[3, 4, 3] + 1))
         assert found.max_error_at == (4, 3, 3)
         assert found.flip == 0
         (reason,) = reasons(found)
@@ -129,7 +129,7 @@ class TestFigures:
         a = noise_image(16, 16, 3, dtype=dtype)
         assert compare(a, a.copy()).flip == 0
         assert not flip_map(a, a.copy()).any()
-        assert compare(a, changed(a, (3, 4, 1), 0)).flip > 1e-6  # type: ignore[operator]
+        assert compare(a, change(a, (3, 4, 1), 0)).flip > 1e-6  # type: ignore[operator]
 
     @pytest.mark.parametrize("shape", [(1, 1, 3), (6, 100, 3), (100, 6, 1)])
     def test_ssim_needs_7_pixels(self, shape: tuple[int, ...]) -> None:
@@ -235,7 +235,7 @@ class TestMismatches:
     @pytest.mark.parametrize("allow_nan", [False, True])
     def test_in_one_image_only(self, one: float, swapped: bool, allow_nan: bool) -> None:
         a = noise_image(10, 12, 3)
-        pair = (a, changed(a, (4, 5, 1), one))
+        pair = (a, change(a, (4, 5, 1), one))
         found = compare(*(pair[::-1] if swapped else pair), allow_nan=allow_nan)
         reason = "NaN or infinity in one image only, 1 values, the first at x 5, y 4, channel 1"
         assert found.mismatches == (reason,)
@@ -248,15 +248,13 @@ class TestMismatches:
     def test_other_kinds_of_not_finite(self) -> None:
         a = noise_image(10, 12, 3)
         for one, other in ((math.inf, -math.inf), (math.nan, math.inf)):
-            found = compare(
-                changed(a, (0, 0, 0), one), changed(a, (0, 0, 0), other), allow_nan=True
-            )
+            found = compare(change(a, (0, 0, 0), one), change(a, (0, 0, 0), other), allow_nan=True)
             assert "in one image only" in reasons(found)[0]
 
     @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
     def test_in_both_images(self, value: float) -> None:
-        a = changed(noise_image(10, 12, 3), (4, 5, 1), value)
-        b = changed(a, (0, 0, 0), a[0, 0, 0] + 0.5)
+        a = change(noise_image(10, 12, 3), (4, 5, 1), value)
+        b = change(a, (0, 0, 0), a[0, 0, 0] + 0.5)
         reason = "NaN or infinity in both images, 1 values, the first at x 5, y 4, channel 1"
         assert reasons(compare(a, a), tolerances_of(max_error=1)) == (reason,)
         assert reasons(compare(a, a)) == (reason,)
@@ -322,7 +320,7 @@ def test_a_wrong_value_is_refused(call: str, error: str) -> None:
 class TestDifference:
     def test_is_scaled_to_the_largest(self) -> None:
         a = np.zeros((2, 3, 3), np.uint8)
-        b = changed(changed(a, (0, 1, 0), 51), (1, 2, 2), 102)
+        b = change(change(a, (0, 1, 0), 51), (1, 2, 2), 102)
         picture, scale = difference(a, b)
         assert scale == pytest.approx(2.5, rel=1e-12)
         assert picture.dtype == np.float32
@@ -333,7 +331,7 @@ class TestDifference:
 
     def test_grey_and_alpha(self) -> None:
         a = np.zeros((1, 2, 2), np.float32)
-        picture, _ = difference(a, changed(changed(a, (0, 0, 0), 1), (0, 1, 1), 0.5))
+        picture, _ = difference(a, change(change(a, (0, 0, 0), 1), (0, 1, 1), 0.5))
         assert picture.tolist() == [[[1, 1, 1], [0.5, 0.5, 0.5]]]
         a = np.zeros((1, 1, 4), np.float32)
         picture, _ = difference(a, np.array([[[1, 0, 0, 0.5]]], np.float32))
@@ -341,11 +339,11 @@ class TestDifference:
 
     def test_nan_in_one_image_is_magenta(self) -> None:
         a = np.zeros((1, 2, 3), np.float32)
-        picture, _ = difference(a, changed(a, (0, 1, 2), math.nan))
+        picture, _ = difference(a, change(a, (0, 1, 2), math.nan))
         assert picture.tolist() == [[[0, 0, 0], [1, 0, 1]]]
 
     def test_nothing_is_black(self) -> None:
-        a = changed(noise_image(4, 4, 3), (0, 0, 0), math.nan)
+        a = change(noise_image(4, 4, 3), (0, 0, 0), math.nan)
         picture, scale = difference(a, a)
         assert scale == 1
         assert not picture.any()

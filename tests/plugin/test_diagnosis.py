@@ -33,7 +33,7 @@ def picture(channels: int = 3, height: int = 48, width: int = 64) -> Image:
     return image
 
 
-def shifted(image: Image, right: float) -> Image:
+def shift(image: Image, right: float) -> Image:
     """Move an image to the right by a part of a pixel, with linear interpolation."""
     moved: Image = (1 - right) * image + right * np.roll(image, 1, axis=1)
     return np.asarray(moved, image.dtype)
@@ -58,7 +58,7 @@ PLANTED: dict[str, tuple[Callable[[Image], Image], Any, str]] = {
         "gain: the second image is the first x 0.97",
     ),
     "shift": (
-        lambda image: shifted(image, 0.5),
+        lambda image: shift(image, 0.5),
         (0.5, 0.0),
         "shift: the second image is 0.5 px right of the first",
     ),
@@ -89,7 +89,7 @@ PLANTED: dict[str, tuple[Callable[[Image], Image], Any, str]] = {
 }
 
 
-def planted(cause: str) -> tuple[Image, Image]:
+def plant(cause: str) -> tuple[Image, Image]:
     image = picture(4 if cause == "alpha" else 3)
     return image, np.ascontiguousarray(PLANTED[cause][0](image))
 
@@ -97,7 +97,7 @@ def planted(cause: str) -> tuple[Image, Image]:
 class TestPlanted:
     @pytest.mark.parametrize("cause", PLANTED)
     def test_in_python(self, cause: str) -> None:
-        found = diagnose(*planted(cause))
+        found = diagnose(*plant(cause))
         _, value, text = PLANTED[cause]
         assert found.cause == cause
         if isinstance(value, (float, tuple)):
@@ -108,7 +108,7 @@ class TestPlanted:
             assert found.residual < 1e-3
 
     def test_in_the_plugin(self, tmp_path: Path) -> None:
-        expected, actual = planted("gain")
+        expected, actual = plant("gain")
         (verdict,) = judge({"bloom": expected}, {"bloom": actual}, Tolerances(atol=0.0))
         assert verdict.diagnosis is not None
         regression = FrameRegression(
@@ -123,7 +123,7 @@ class TestPlanted:
     def test_on_the_command_line(self, cause: str, tmp_path: Path) -> None:
         files = [
             write(tmp_path / f"{name}.exr", image.astype(np.float32), premultiplied=True)
-            for name, image in zip("ab", planted(cause), strict=True)
+            for name, image in zip("ab", plant(cause), strict=True)
         ]
         _, value, text = PLANTED[cause]
         assert f"cause      {text}" in run("compare", *files).output
@@ -141,7 +141,7 @@ class TestFigures:
             ("gain", lambda image: 0.9 * image),
             ("gamma", lambda image: image**0.8),
             ("gamma", encode_srgb),
-            ("shift", lambda image: shifted(image, 0.5)),
+            ("shift", lambda image: shift(image, 0.5)),
             ("flip", lambda image: image[:, ::-1]),
             ("clamp", lambda image: np.minimum(image, 0.6)),
         ],

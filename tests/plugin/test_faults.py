@@ -1,4 +1,4 @@
-"""Each fault of the library breaks the law that names it, and no correct twin breaks a law."""
+"""Each fault of the library breaks the law that names it, and no correct bloom breaks a law."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ SIZE = (64, 64)
 
 @pytest.mark.parametrize("name", FAULTS)
 def test_a_fault_breaks_its_law(name: str) -> None:
-    fault, twin, law, words, _ = FAULTS[name]
+    fault, correct, law, words, _ = FAULTS[name]
     laws = sorted({*NEW, law})
-    right = testing.report(twin(), size=SIZE, laws=laws)
+    right = testing.report(correct(), size=SIZE, laws=laws)
     assert not [row.name for row in right.rows if row.applies and not row.held], right
     found = testing.report(fault(), size=SIZE, laws=laws)
     broken = {row.name: row.message for row in found.rows if row.held is False}
@@ -42,7 +42,7 @@ def test_laws_share_images_and_render_few() -> None:
 
     def bloom(image: Image) -> Image:
         images.append(image)
-        return FAULTS["wraps around"].twin()(image)
+        return FAULTS["wraps around"].correct()(image)
 
     testing.report(bloom, size=SIZE, laws=NEW)
     assert len(images) <= 60

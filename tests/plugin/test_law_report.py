@@ -43,14 +43,14 @@ def row(report: LawReport, name: str) -> LawRow:
     return next(each for each in report.rows if each.name == name)
 
 
-def broken(report: LawReport) -> list[str]:
+def list_broken(report: LawReport) -> list[str]:
     return [each.name for each in report.rows if each.applies and not each.held]
 
 
 def test_a_gaussian() -> None:
     found = testing.report(gaussian, size=(64, 48))
     assert [each.name for each in found.rows] == ALL
-    assert set(broken(found)) == OF_A_BLUR
+    assert set(list_broken(found)) == OF_A_BLUR
     assert found.gain == pytest.approx(1)
     found.assert_held("superposition", "gain", "symmetric", "centroid_kept", "separable")
     for each in found.rows:
@@ -67,14 +67,14 @@ TOLD = {name: fault for name, fault in FAULTS.items() if fault.others is not Non
 
 @functools.cache
 def broken_by(bloom: Bloom) -> set[str]:
-    return set(broken(testing.report(bloom, size=(64, 64))))
+    return set(list_broken(testing.report(bloom, size=(64, 64))))
 
 
 @pytest.mark.parametrize("name", TOLD)
 def test_a_fault_is_named(name: str) -> None:
-    fault, twin, law, _, others = FAULTS[name]
+    fault, correct, law, _, others = FAULTS[name]
     found = testing.report(fault(), size=(64, 64))
-    new = set(broken(found)) - broken_by(twin())
+    new = set(list_broken(found)) - broken_by(correct())
     # Some of these functions mix alpha with colours, too.
     assert new - ({"bounded_fireflies", "alpha"} - {law}) == {law, *(others or ())}, found
 
@@ -82,7 +82,7 @@ def test_a_fault_is_named(name: str) -> None:
 @pytest.mark.parametrize("sigma", [0.5, 1.0, 2.0, 3.0])
 def test_right_blurs_are_not_blamed(sigma: float) -> None:
     found = testing.report(lambda image: gaussian(image, sigma), size=(64, 64))
-    assert set(broken(found)) <= OF_A_BLUR
+    assert set(list_broken(found)) <= OF_A_BLUR
 
 
 @pytest.mark.parametrize(
@@ -128,14 +128,14 @@ def test_a_missing_half_texel_is_no_chain() -> None:
     found = testing.report(
         lambda image: ndimage.uniform_filter(image, (4, 4, 0), mode="nearest"), size=(64, 64)
     )
-    assert {"symmetric", "centroid_kept"} <= set(broken(found))
+    assert {"symmetric", "centroid_kept"} <= set(list_broken(found))
     assert "a shift of half a texel" in row(found, "centroid_kept").why
 
 
 def test_a_threshold_is_tested_above_it() -> None:
     found = testing.report(lambda image: np.maximum(image - 1, 0), size=(32, 32))
     assert found.probe.value == 16
-    assert "superposition" in broken(found)
+    assert "superposition" in list_broken(found)
     assert row(found, "superposition").why.startswith("A threshold, a clamp, a firefly filter")
 
 
@@ -154,7 +154,7 @@ def test_assert_held() -> None:
         found.assert_held()
     lines = str(caught.value).splitlines()
     assert [line for line in lines if line.startswith("additive: ")]
-    assert sum(line.startswith("  why: ") for line in lines) == len(broken(found))
+    assert sum(line.startswith("  why: ") for line in lines) == len(list_broken(found))
     with pytest.raises(ValueError, match="names: 'gian' is not one of superposition, gain"):
         found.assert_held("gian")
 
@@ -190,9 +190,9 @@ def test_a_gain_that_is_promised() -> None:
         return 0.5 * at_finite(image)
 
     testing.report(half, size=(32, 32), gain=0.5).assert_held("gain", "energy")
-    assert {"gain", "energy"} <= set(broken(testing.report(half, size=(32, 32), gain=1.0)))
+    assert {"gain", "energy"} <= set(list_broken(testing.report(half, size=(32, 32), gain=1.0)))
     # A picture with its bloom, or a sum of levels, has one gain, which nobody promised.
-    assert broken(testing.report(half, size=(32, 32), laws=("gain", "energy"))) == ["energy"]
+    assert list_broken(testing.report(half, size=(32, 32), laws=("gain", "energy"))) == ["energy"]
 
 
 def test_a_light_below_the_rounding_is_not_judged() -> None:
@@ -243,7 +243,7 @@ def test_an_error_of_the_bloom_fails_its_law(error: type[Exception]) -> None:
     assert (finite.held, finite.applies) == (False, True)
     assert finite.message == f"the bloom raised {error.__name__}: no finite light"
     right = testing.report(gaussian, size=(32, 32))
-    assert broken(found) == broken(right)
+    assert list_broken(found) == list_broken(right)
 
 
 def test_a_result_of_another_shape_fails_its_law() -> None:

@@ -21,7 +21,7 @@ from vkbloom.testing import LawReport
 from vkbloom.testing._law_report import law_report
 from vkbloom.testing._laws.table import LAWS, merge_limits
 from vkbloom.testing._levels import Levels
-from vkbloom.testing._programs import Program
+from vkbloom.testing._programs import CommandBloom
 
 SIZE = (64, 64)
 #: Without those of a file with NaN, and of what no program takes.
@@ -35,7 +35,7 @@ def in_bits(image: NDArray[Any], bits: int, rounded: Callable[..., Any] = np.rin
     return decode_srgb(rounded(encoded + 1e-9) / most).astype(np.float32)
 
 
-class Quantized(Program):
+class Quantized(CommandBloom):
     """A program without a process: its files are arrays."""
 
     def __init__(
@@ -56,7 +56,7 @@ class Quantized(Program):
         return in_bits(result + given if self._adds else result, bits, self._rounded)
 
 
-def judged(
+def judge(
     bloom: Callable[[Image], Image],
     *,
     less_input: bool,
@@ -69,7 +69,7 @@ def judged(
     return law_report(subject, merge_limits({}, TESTED))
 
 
-def blamed(report: LawReport) -> set[str]:
+def blame(report: LawReport) -> set[str]:
     return {each.name for each in report.rows if each.held is False} - OF_A_BLUR
 
 
@@ -81,19 +81,19 @@ OF_FLOATS = {"rings beside an edge", "takes light from bright pixels"}
 @LESS
 @pytest.mark.parametrize("name", [name for name in TOLD if name not in OF_FLOATS])
 def test_a_fault_is_named_or_cannot_be_tested(name: str, less_input: bool) -> None:
-    fault, twin, law, _, others = FAULTS[name]
+    fault, correct, law, _, others = FAULTS[name]
     laws = {law, *(others or ())}
-    found = judged(fault(), less_input=less_input)
+    found = judge(fault(), less_input=less_input)
     assert not [law for law in laws if row(found, law).held], found
     for each in found.rows:
         if each.name in laws and each.held is None:
             assert "cannot be tested" in each.message
-    assert not blamed_twin(twin(), less_input)
+    assert not blame_correct(correct(), less_input)
 
 
 @functools.cache
-def blamed_twin(twin: Callable[[Image], Image], less_input: bool) -> set[str]:
-    return blamed(judged(twin, less_input=less_input))
+def blame_correct(correct: Callable[[Image], Image], less_input: bool) -> set[str]:
+    return blame(judge(correct, less_input=less_input))
 
 
 @LESS
@@ -104,8 +104,8 @@ def test_half_a_texel_is_seen(along: str, less_input: bool) -> None:
     def off(image: Image) -> Image:
         return np.asarray(ndimage.shift(gaussian(image, 3.0), shift, order=1, mode="nearest"))
 
-    found = judged(off, less_input=less_input)
-    assert {"symmetric", "centroid_kept"} <= blamed(found)
+    found = judge(off, less_input=less_input)
+    assert {"symmetric", "centroid_kept"} <= blame(found)
     assert f"+0.5 pixels from {along}" in row(found, "centroid_kept").message
 
 
@@ -115,39 +115,39 @@ def test_half_a_texel_is_seen(along: str, less_input: bool) -> None:
 def test_right_blurs_are_not_blamed(
     sigma: float, rounded: Callable[..., Any], less_input: bool
 ) -> None:
-    found = judged(lambda a: gaussian(a, sigma), less_input=less_input, rounded=rounded)
-    assert not blamed(found), found
+    found = judge(lambda a: gaussian(a, sigma), less_input=less_input, rounded=rounded)
+    assert not blame(found), found
     held = {"superposition", "gain", "symmetric", "no_ringing", "colour", "grey", "channels"}
     assert all(row(found, name).held for name in held)
 
 
 def test_what_is_too_dim_cannot_be_tested() -> None:
     """A thirtieth of the light beside a picture is two levels."""
-    found = judged(lambda a: gaussian(a) / 30, less_input=True, gain=1 / 30)
-    assert not blamed(found)
+    found = judge(lambda a: gaussian(a) / 30, less_input=True, gain=1 / 30)
+    assert not blame(found)
     for name in ("superposition", "gain", "symmetric", "colour", "grey"):
         each = row(found, name)
         assert (each.held, each.message[:27]) == (None, "cannot be tested in 8 bits:")
 
 
 def test_a_threshold_above_every_value_cannot_be_tested() -> None:
-    found = judged(thresholded, less_input=False)
+    found = judge(thresholded, less_input=False)
     assert {each.held for each in found.rows} == {None}
     assert "the bloom of values up to 1 is black" in found.rows[0].message
     # With one below, a value above it is found.
-    found = judged(lambda a: thresholded(a, 0.7), less_input=False)
+    found = judge(lambda a: thresholded(a, 0.7), less_input=False)
     assert found.probe.value == 1
-    assert {"superposition", "gain"} <= blamed(found)
+    assert {"superposition", "gain"} <= blame(found)
 
 
 @LESS
 def test_lossy_files_hold_flat_images(less_input: bool) -> None:
     right, wrong = (
-        judged(bloom, less_input=less_input, suffix=".jpg")
+        judge(bloom, less_input=less_input, suffix=".jpg")
         for bloom in (gaussian, lambda a: gaussian(a)[..., ::-1])
     )
     assert {each.name for each in right.rows if each.held} <= {"gain", "colour"}
-    assert not blamed(right)
+    assert not blame(right)
     assert row(wrong, "colour").held is False
     assert "in lossy files" in row(right, "symmetric").message
 
@@ -165,11 +165,11 @@ def test_16_bits_are_nearly_floats() -> None:
 def test_a_report_knows_the_levels_of_a_command() -> None:
     found = testing.report(Quantized(gaussian), size=SIZE)
     assert (found.probe.levels, found.probe.value < 0.5) == (Levels(bits=8), True)
-    assert not blamed(found)
+    assert not blame(found)
 
 
 def test_images_have_values_that_files_hold() -> None:
     probe = testing.Probe(size=SIZE, value=0.49, levels=Levels())
     image = probe.noise(0, probe.value)
-    np.testing.assert_allclose(probe.given(image), in_bits(image, 8), atol=1e-7)
+    np.testing.assert_allclose(probe.as_input(image), in_bits(image, 8), atol=1e-7)
     assert len(np.unique(image)) == 2

@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from tests.cli.calls import run
-from tests.custom.test_check import checked
+from tests.custom.test_check import check
 from tests.exhaustive import EXHAUSTIVE
 from tests.srgb import encode_srgb
 from vkbloom import write
@@ -107,7 +107,7 @@ def test_check_judges_files(tmp_path: Path) -> None:
     for number, light in enumerate(flashing(10, 0.4, seconds=0.5)):
         write(tmp_path / f"f.{number:04d}.exr", np.full((4, 6, 3), light, np.float32))
     words = ["check", "--sequence", str(tmp_path / "f.%04d.exr"), "--fps", str(FPS)]
-    done, found = checked(*words[1:])
+    done, found = check(*words[1:])
     assert done.exit_code == 1
     assert (found["frames"], found["flash"]["general"], found["flash"]["red"]) == (120, True, False)
     assert "general flashes: fails" in run(*words).stdout
@@ -122,11 +122,11 @@ def test_gaps_are_time(tmp_path: Path) -> None:
         write(tmp_path / f"f.{number:04d}.png", np.full((4, 6, 3), value, np.float32))
         write(tmp_path / f"slow.{3 * number - 60:04d}.png", np.full((4, 6, 3), value, np.float32))
     words = ["--sequence", str(tmp_path / "f.%04d.png"), "--fps", str(FPS)]
-    done, found = checked(*words)
+    done, found = check(*words)
     assert (done.exit_code, found["missing"], found["gaps"]) == (1, 0, [])
     # Three times as long, beginning with negative numbers: 3.3 Hz.
     words[1] = str(tmp_path / "slow.%04d.png")
-    done, found = checked(*words)
+    done, found = check(*words)
     assert (found["frames"], found["missing"]) == (120, 238)
     assert found["gaps"][:2] == [[-59, -58], [-56, -55]]
     assert found["flash"]["flashes"] <= 4

@@ -26,14 +26,14 @@ def gaussian(image: Image, sigma: float = 3.0) -> Image:
     return np.asarray(ndimage.gaussian_filter(image, (sigma, sigma, 0), mode="nearest"))
 
 
-def halved(image: Image) -> Image:
+def halve(image: Image) -> Image:
     """Reduce by 1 3 3 1, which keeps energy and centroid wherever the light is."""
     for axis in (0, 1):
         image = np.asarray(ndimage.correlate1d(image, TAPS, axis, origin=-1))
     return image[::2, ::2]
 
 
-def doubled(image: Image, off: float = 0.0) -> Image:
+def double(image: Image, off: float = 0.0) -> Image:
     """Enlarge by 2, bilinearly, the samples `off` texels from where they belong."""
     height, width = image.shape[:2]
     places = [(np.arange(2 * side) + 0.5) / 2 - 0.5 + off for side in (height, width)]
@@ -45,9 +45,9 @@ def doubled(image: Image, off: float = 0.0) -> Image:
     return np.stack(planes, axis=-1)
 
 
-def chain(image: Image, reduce: Callable[[Image], Image] = halved, off: float = 0.0) -> Image:
+def chain(image: Image, reduce: Callable[[Image], Image] = halve, off: float = 0.0) -> Image:
     """Two levels down and up."""
-    return gaussian(doubled(doubled(reduce(reduce(image)), off)), 3.0)
+    return gaussian(double(double(reduce(reduce(image)), off)), 3.0)
 
 
 class TestStability:

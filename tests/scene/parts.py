@@ -11,9 +11,9 @@ from typing import Any, Final
 
 from vkbloom import Scene
 from vkbloom._scene import Cubemap, Mesh
-from vkbloom._scene.textures import WHITE, Surface, Texture, mip_levels
+from vkbloom._scene.textures import WHITE, Material, Texture, mip_levels
 
-__all__ = ["WHITE", "Cubemap", "Mesh", "Surface", "Texture", "load_mesh", "load_sky", "mip_levels"]
+__all__ = ["WHITE", "Cubemap", "Material", "Mesh", "Texture", "load_mesh", "load_sky", "mip_levels"]
 
 _TRIANGLE: Final = Path(__file__).with_name("triangle.gltf")
 

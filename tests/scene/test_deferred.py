@@ -12,7 +12,17 @@ import pytest
 from numpy.typing import NDArray
 
 from tests.scene.parts import Mesh
-from tests.screens import BLURRED, DISTANCE, GBUFFER, NOTHING, SIZE, deferred, noise, rgb, screen
+from tests.screens import (
+    BLURRED,
+    DISTANCE,
+    GBUFFER,
+    NOTHING,
+    SIZE,
+    noise,
+    render_deferred,
+    rgb,
+    screen,
+)
 from tests.tolerance import assert_close, tolerance
 from vkbloom import (
     Camera,
@@ -43,7 +53,7 @@ def lamps(scene: Scene) -> Scene:
 
 @pytest.fixture(scope="module")
 def frames(renderer: Renderer, scene: Scene) -> Frames:
-    return deferred(renderer, scene)
+    return render_deferred(renderer, scene)
 
 
 # The G-buffer
@@ -84,7 +94,7 @@ def test_camera_and_animation_place_every_point(renderer: Renderer, turns: float
     mesh = Mesh(vertices, np.array([0, 1, 2, 2, 1, 0], np.uint32))
     camera = Camera(position=(0.3, 0.2, -4.0), rotation=(20.0, -40.0, 30.0), fov=60.0)
     scene = Scene(body=mesh, glow=mesh, camera=camera)
-    seen = deferred(renderer, scene, time=turns)
+    seen = render_deferred(renderer, scene, time=turns)
     body = seen["depth"] < 1
     assert body.mean() > 0.005
     points, normals = rgb(seen["albedo"])[body], rgb(seen["normal"])[body]
@@ -115,7 +125,7 @@ def test_a_body_is_drawn_as_it_is(renderer: Renderer) -> None:
     wall = screen(colours, (8, 4))
     assert wall.glow is not None
     scene = Scene(body=wall.glow, camera=wall.camera)
-    shown = deferred(renderer, scene, None, (8, 4))
+    shown = render_deferred(renderer, scene, None, (8, 4))
     seen = colours.any(axis=2)
     np.testing.assert_allclose(rgb(shown["albedo"]), colours, rtol=HALF, atol=1e-7)
     np.testing.assert_allclose(rgb(shown["position"])[seen][:, 2], -DISTANCE, rtol=1e-3)
@@ -126,7 +136,7 @@ def test_a_body_is_drawn_as_it_is(renderer: Renderer) -> None:
 
 
 def test_the_sky_is_neither_lit_nor_bright(renderer: Renderer, scene: Scene) -> None:
-    shown = deferred(renderer, Scene(body=NOTHING, skybox=scene.skybox))
+    shown = render_deferred(renderer, Scene(body=NOTHING, skybox=scene.skybox))
     forward = renderer.render(Scene(body=NOTHING, skybox=scene.skybox), None, SIZE)
     assert forward["scene"][..., :3].std() > 1
     np.testing.assert_allclose(
@@ -138,7 +148,7 @@ def test_the_sky_is_neither_lit_nor_bright(renderer: Renderer, scene: Scene) -> 
 
 
 def test_nothing_at_all_is_black(renderer: Renderer) -> None:
-    shown = deferred(renderer, Scene(body=NOTHING))
+    shown = render_deferred(renderer, Scene(body=NOTHING))
     for name in set(shown) - {"depth"}:
         assert not rgb(shown[name]).any(), name
     assert (shown["depth"] == 1).all()
@@ -149,7 +159,7 @@ def test_nothing_at_all_is_black(renderer: Renderer) -> None:
 
 def test_brightness_is_rounded_to_the_nearest(renderer: Renderer) -> None:
     colours = noise((16, 9))
-    shown = deferred(
+    shown = render_deferred(
         renderer, dataclasses.replace(screen(colours, (16, 9)), glow_intensity=5), size=(16, 9)
     )
     np.testing.assert_allclose(rgb(shown["brightness"]), 5 * colours, rtol=1.01 * HALF, atol=1e-7)
@@ -158,7 +168,7 @@ def test_brightness_is_rounded_to_the_nearest(renderer: Renderer) -> None:
 def test_the_glow_mesh_changes_nothing_but_the_brightness(
     renderer: Renderer, scene: Scene, frames: Frames
 ) -> None:
-    bare = deferred(renderer, dataclasses.replace(scene, glow=None))
+    bare = render_deferred(renderer, dataclasses.replace(scene, glow=None))
     for name in ("albedo", "normal", "position", "depth"):
         np.testing.assert_array_equal(bare[name], frames[name])
     assert not rgb(bare["brightness"]).any()
@@ -171,13 +181,13 @@ def test_what_the_body_emits_is_bright(renderer: Renderer) -> None:
     assert wall.glow is not None
     emission = np.ascontiguousarray(wall.glow.vertices[:, 6:] * np.float32(7))
     body = dataclasses.replace(wall.glow, emission=emission)
-    shown = deferred(renderer, Scene(body=body, camera=wall.camera), None, (16, 9))
+    shown = render_deferred(renderer, Scene(body=body, camera=wall.camera), None, (16, 9))
     np.testing.assert_allclose(rgb(shown["brightness"]), 7 * colours, rtol=2 * HALF, atol=1e-6)
     # With a glow mesh the two are added, with the bloom off the body's own light stays.
     lit = Scene(body=body, glow=wall.glow, camera=wall.camera, glow_intensity=2)
-    both = deferred(renderer, lit, None, (16, 9))
+    both = render_deferred(renderer, lit, None, (16, 9))
     np.testing.assert_allclose(rgb(both["brightness"]), 9 * colours, rtol=4 * HALF, atol=1e-6)
-    off = deferred(renderer, lit, Separable(bloom=False), (16, 9))
+    off = render_deferred(renderer, lit, Separable(bloom=False), (16, 9))
     np.testing.assert_array_equal(off["brightness"], shown["brightness"])
 
 
@@ -192,7 +202,7 @@ def test_with_a_glow_mesh_emission_is_the_deferred_systems(
 
 @pytest.mark.parametrize("intensity", [7e4, 1e30, 1.7e308])
 def test_no_intensity_is_infinite(renderer: Renderer, scene: Scene, intensity: float) -> None:
-    shown = deferred(renderer, dataclasses.replace(scene, glow_intensity=intensity))
+    shown = render_deferred(renderer, dataclasses.replace(scene, glow_intensity=intensity))
     for name, array in shown.items():
         assert np.isfinite(array).all(), name
     assert shown["brightness"].max() == 65504
@@ -204,7 +214,7 @@ def test_two_lights_are_no_infinite_one(renderer: Renderer) -> None:
     emission = np.full((len(wall.glow.vertices), 3), 3e38, np.float32)
     body = dataclasses.replace(wall.glow, emission=emission)
     scene = Scene(body=body, glow=wall.glow, camera=wall.camera, glow_intensity=1e9)
-    shown = deferred(renderer, scene, presets["deferred"], (16, 9))
+    shown = render_deferred(renderer, scene, presets["deferred"], (16, 9))
     for name, array in shown.items():
         assert np.isfinite(array).all(), name
     np.testing.assert_array_equal(rgb(shown["brightness"]), 65504)
@@ -215,7 +225,7 @@ def test_two_lights_are_no_infinite_one(renderer: Renderer) -> None:
 
 @pytest.mark.parametrize("turns", [0.0, 0.37, 0.81])
 def test_the_scene_is_the_references(renderer: Renderer, scene: Scene, turns: float) -> None:
-    for shown in (deferred(renderer, made, time=turns) for made in (scene, lamps(scene))):
+    for shown in (render_deferred(renderer, made, time=turns) for made in (scene, lamps(scene))):
         gbuffer = (shown[name] for name in ("albedo", "normal", "position", "brightness"))
         expected = reference.shade(*gbuffer)
         error = np.abs(shown["scene"] - expected)
@@ -246,7 +256,7 @@ def test_bloom_and_final_are_the_references(
     renderer: Renderer, scene: Scene, settings: Settings
 ) -> None:
     settings = settings.replace(tonemap="aces", encoding="srgb", exposure=-1.0)
-    shown = deferred(renderer, lamps(scene), settings, (160, 90))
+    shown = render_deferred(renderer, lamps(scene), settings, (160, 90))
     expected = reference.apply(shown["brightness"], settings)
     for name in set(expected) - {"glow", "final"}:
         limit = tolerance(shown[name].dtype, expected[name], stages_of_8_bits=2)
@@ -263,7 +273,7 @@ def test_without_bloom_both_systems_show_the_same(
     renderer: Renderer, scene: Scene, size: tuple[int, int]
 ) -> None:
     forward = renderer.render(scene, Separable(bloom=False), size)
-    shown = deferred(renderer, scene, Separable(bloom=False), size)
+    shown = render_deferred(renderer, scene, Separable(bloom=False), size)
     metrics = pytest.importorskip("skimage.metrics", reason="scikit-image is not installed")
     similarity = metrics.structural_similarity(
         rgb(forward["scene"]) / 255,
@@ -284,7 +294,7 @@ def test_a_lamp_is_one_in_both_systems(renderer: Renderer) -> None:
     wall = screen(colours, (3, 3))
     assert wall.glow is not None
     scene = Scene(body=wall.glow, camera=wall.camera)
-    shown = deferred(renderer, scene, None, (3, 3))
+    shown = render_deferred(renderer, scene, None, (3, 3))
     expected = reference.shade(*(shown[name] for name in GBUFFER[:4]))
     np.testing.assert_allclose(rgb(shown["scene"]), expected[..., :3], rtol=HALF, atol=1e-5)
     forward = rgb(renderer.render(scene, None, (3, 3))["scene"]) / 255
@@ -301,10 +311,10 @@ def test_weights_change_without_a_new_pipeline(
     renderer = new_renderer()
     settings = presets["deferred"]
     assert isinstance(settings, Separable)
-    before = deferred(renderer, scene, settings)
+    before = render_deferred(renderer, scene, settings)
     count = renderer._core.pipeline_count
     weights = tuple(reversed(settings.weights))
-    after = deferred(renderer, scene, settings.replace(weights=weights))
+    after = render_deferred(renderer, scene, settings.replace(weights=weights))
     assert renderer._core.pipeline_count == count > 0
     assert np.abs(rgb(after["bloom"]) - rgb(before["bloom"])).max() > 0.01
     blurs = [f"blur_{way}_0_{loop}" for loop in range(2) for way in ("vertical", "horizontal")]
@@ -324,5 +334,5 @@ CHANGES: list[tuple[dict[str, Any], list[str]]] = [
 def test_change_runs_only_dependent_passes(
     renderer: Renderer, scene: Scene, changes: dict[str, Any], ran: list[str]
 ) -> None:
-    deferred(renderer, scene)
-    assert list(deferred(renderer, scene, Separable(**changes)).timings) == ran
+    render_deferred(renderer, scene)
+    assert list(render_deferred(renderer, scene, Separable(**changes)).timings) == ran

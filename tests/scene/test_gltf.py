@@ -448,15 +448,15 @@ class Damage:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
 
-    def loaded(self, content: bytes) -> Mesh:
+    def load(self, content: bytes) -> Mesh:
         path = self.folder / "mesh.gltf"
         path.write_bytes(content)
         return load_mesh(path)
 
-    def damaged(self, path: str, value: Any) -> Mesh:
+    def damage(self, path: str, value: Any) -> Mesh:
         text = json.loads(nested().as_gltf())
         at(text, path, value)
-        return self.loaded(json.dumps(text).encode())
+        return self.load(json.dumps(text).encode())
 
     def with_values(self, attribute: str, value: float) -> Mesh:
         document = nested()
@@ -480,7 +480,7 @@ class Damage:
     def with_header(self, place: int) -> Mesh:
         content = bytearray(nested().as_glb())
         content[place : place + 4] = struct.pack("<I", 10**6)
-        return self.loaded(bytes(content))
+        return self.load(bytes(content))
 
     def with_uri(self, uri: str) -> Mesh:
         document, folder = triangle(), self.folder / "model"
@@ -492,7 +492,7 @@ class Damage:
         text = json.loads(document.as_gltf("x"))
         text["buffers"][0]["uri"] = uri
         self.folder = folder
-        return self.loaded(json.dumps(text).encode())
+        return self.load(json.dumps(text).encode())
 
 
 @pytest.mark.parametrize(("call", "error"), rows(__file__, "damaged glTF"))

@@ -45,7 +45,7 @@ PLACES = [[0.0, 0.0], [0.0, 1.0], [1.0, 1.0], [1.0, 0.0]]
 FRONT = [0, 1, 2, 0, 2, 3]
 
 
-def encoded(pixels: Array, folder: Path, suffix: str = ".png", **attributes: Any) -> bytes:
+def encode(pixels: Array, folder: Path, suffix: str = ".png", **attributes: Any) -> bytes:
     """Return an image file of pixels (h, w, C), uint8 or uint16."""
     path = write_image(folder / f"encoded{suffix}", pixels, **attributes)
     data = path.read_bytes()
@@ -58,7 +58,7 @@ def linear(pixels: Array) -> NDArray[np.float64]:
     return decode_srgb(pixels[..., :3] / np.iinfo(pixels.dtype).max)
 
 
-def textured(image: dict[str, Any] | None = None, **texture: Any) -> Document:
+def make_textured(image: dict[str, Any] | None = None, **texture: Any) -> Document:
     """Return a square whose base colour has a texture; y is up in the file and down in the mesh."""
     document = Document()
     primitive = document.primitive(CORNERS, indices=document.accessor(FRONT, SHORT), material=0)
@@ -86,7 +86,7 @@ def load(tmp_path: Path) -> Callable[[Document], Mesh]:
 
     def load_it(document: Document) -> Mesh:
         if not (tmp_path / "a.png").exists():
-            (tmp_path / "a.png").write_bytes(encoded(noise(3, 4, 3, dtype="uint8"), tmp_path))
+            (tmp_path / "a.png").write_bytes(encode(noise(3, 4, 3, dtype="uint8"), tmp_path))
         with warnings.catch_warnings():
             warnings.simplefilter("error")
             return document.load(tmp_path)
@@ -107,9 +107,9 @@ def test_images_are_decoded_from_srgb(
 ) -> None:
     pixels = noise(30, 40, channels, dtype=dtype)
     # A file's own words on its colours do not count.
-    data = encoded(pixels, tmp_path, **{"oiio:ColorSpace": "lin_rec709_scene"})
+    data = encode(pixels, tmp_path, **{"oiio:ColorSpace": "lin_rec709_scene"})
     (tmp_path / "a.png").write_bytes(data)
-    level = base(load(textured())).levels[0]
+    level = base(load(make_textured())).levels[0]
     assert level.shape == (30, 40, 4)
     colours = linear(pixels[..., :3] if channels > 2 else pixels[..., [0, 0, 0]])
     np.testing.assert_allclose(level[..., :3], colours, rtol=1.01 * HALF, atol=1e-7)
@@ -120,26 +120,26 @@ def test_jpeg(load: Load, tmp_path: Path) -> None:
     # Smooth, or compression would change much.
     ramp = np.linspace(0, 255, 64).astype(np.uint8)
     pixels = np.stack(np.broadcast_arrays(ramp, ramp[:, np.newaxis], np.uint8(100)), axis=-1)
-    data = encoded(pixels, tmp_path, ".jpg", Compression="jpeg:98", Orientation=6)
+    data = encode(pixels, tmp_path, ".jpg", Compression="jpeg:98", Orientation=6)
     (tmp_path / "a b.jpg").write_bytes(data)
-    level = base(load(textured({"uri": "a%20b.jpg"}))).levels[0]
+    level = base(load(make_textured({"uri": "a%20b.jpg"}))).levels[0]
     # Exif's orientation is no part of glTF: nothing is turned.
     np.testing.assert_allclose(level[..., :3], linear(pixels), atol=0.04)
 
 
 def test_images_wherever_they_lie(load: Load, tmp_path: Path) -> None:
-    data = encoded(noise(4, 5, 3, dtype="uint8"), tmp_path)
+    data = encode(noise(4, 5, 3, dtype="uint8"), tmp_path)
     (tmp_path / "a.png").write_bytes(data)
     (tmp_path / "inner").mkdir()
     # The name and the MIME type say nothing: the first bytes do.
     (tmp_path / "inner" / "b.bin").write_bytes(data)
-    by_view = textured()
+    by_view = make_textured()
     by_view.json["images"] = [{"bufferView": by_view.view(data), "mimeType": "image/jpeg"}]
     (tmp_path / "mesh.glb").write_bytes(by_view.as_glb())
     loaded = [
-        load(textured()),
-        load(textured({"uri": "inner/b.bin"})),
-        load(textured({"uri": "data:image/png;base64," + base64.b64encode(data).decode()})),
+        load(make_textured()),
+        load(make_textured({"uri": "inner/b.bin"})),
+        load(make_textured({"uri": "data:image/png;base64," + base64.b64encode(data).decode()})),
         load(by_view),
         load_mesh(tmp_path / "mesh.glb"),
     ]
@@ -150,7 +150,7 @@ def test_images_wherever_they_lie(load: Load, tmp_path: Path) -> None:
 
 
 def test_an_image_is_read_once(load: Load, monkeypatch: pytest.MonkeyPatch) -> None:
-    document = textured()
+    document = make_textured()
     second = document.primitive(CORNERS, material=1, indices=document.accessor(FRONT, BYTE))
     second["attributes"]["TEXCOORD_0"] = document.accessor(PLACES)
     document.json["materials"].append(
@@ -176,9 +176,9 @@ def test_factor_times_vertex_colour_times_texture(
 ) -> None:
     size = (8, 6)
     colours, lights = noise(*size[::-1], 3, dtype="uint8"), noise(3, 4, 3, dtype="uint8")
-    (tmp_path / "a.png").write_bytes(encoded(colours, tmp_path))
-    (tmp_path / "b.png").write_bytes(encoded(lights, tmp_path))
-    document = textured(sampler=0)
+    (tmp_path / "a.png").write_bytes(encode(colours, tmp_path))
+    (tmp_path / "b.png").write_bytes(encode(lights, tmp_path))
+    document = make_textured(sampler=0)
     wall = panel(size)
     positions = wall.vertices[:, :3] * (1, -1, 1)
     (primitive,) = document.json["meshes"][0]["primitives"]
@@ -213,7 +213,7 @@ def test_factor_times_vertex_colour_times_texture(
 
 
 def test_triangles_without_a_texture_come_first(load: Load) -> None:
-    document = textured()
+    document = make_textured()
     document.primitive([[5.0, 0, 0], [6.0, 0, 0], [5.0, 1, 0]])
     mesh = load(document)
     (surface,) = mesh.surfaces
@@ -224,7 +224,7 @@ def test_triangles_without_a_texture_come_first(load: Load) -> None:
 
 
 def test_flat_normals_take_the_texture_coordinates_with_them(load: Load) -> None:
-    mesh = load(textured())
+    mesh = load(make_textured())
     np.testing.assert_array_equal(places_of(mesh), np.array(PLACES)[FRONT])
     # x = -1 is the left, y = 1 the top, which the mesh has at -1.
     np.testing.assert_array_equal(mesh.vertices[:, :2] / 2 + 0.5, places_of(mesh))
@@ -232,7 +232,7 @@ def test_flat_normals_take_the_texture_coordinates_with_them(load: Load) -> None
 
 @pytest.mark.parametrize("factor", [None, [0.0, 0.0, 0.0]])
 def test_no_emission_needs_no_texture(load: Load, factor: Any) -> None:
-    document = textured()
+    document = make_textured()
     del document.json["materials"][0]["pbrMetallicRoughness"]
     document.json["materials"][0]["emissiveTexture"] = {"index": 0}
     document.json["images"][0]["uri"] = "gone.png"
@@ -265,7 +265,7 @@ def test_no_emission_needs_no_texture(load: Load, factor: Any) -> None:
 def test_samplers(
     load: Load, sampler: Any, address_mode: Any, filters: tuple[str, ...], levels: int
 ) -> None:
-    document = textured() if sampler is None else textured(sampler=0)
+    document = make_textured() if sampler is None else make_textured(sampler=0)
     document.json["samplers"] = [sampler or {}]
     made = base(load(document))
     assert made.address_mode == address_mode
@@ -278,7 +278,7 @@ def test_samplers(
 
 @pytest.mark.parametrize(("component", "full"), [(BYTE, 255), (SHORT, 65535)])
 def test_normalized_integers(load: Load, component: int, full: int) -> None:
-    document = textured()
+    document = make_textured()
     attributes = document.json["meshes"][0]["primitives"][0]["attributes"]
     places = np.array([[0, 0], [0, full], [full, full], [full // 3, 0]])
     attributes["TEXCOORD_0"] = document.accessor(places, component, normalized=True)
@@ -288,7 +288,7 @@ def test_normalized_integers(load: Load, component: int, full: int) -> None:
         load(document)
 
 
-def turned(offset: tuple[float, float], angle: float, scale: tuple[float, float]) -> Array:
+def turn(offset: tuple[float, float], angle: float, scale: tuple[float, float]) -> Array:
     """Scale, then turn counter-clockwise as one sees it with v down, then move."""
     u, v = (np.array(PLACES) * scale).T
     complex_places = (u - 1j * v) * np.exp(1j * angle)
@@ -299,12 +299,12 @@ def turned(offset: tuple[float, float], angle: float, scale: tuple[float, float]
     ("given", "expected"),
     [
         ({}, PLACES),
-        ({"offset": [0.25, -3.0]}, turned((0.25, -3.0), 0, (1, 1))),
-        ({"scale": [2.0, -0.5]}, turned((0, 0), 0, (2, -0.5))),
-        ({"rotation": 0.3}, turned((0, 0), 0.3, (1, 1))),
+        ({"offset": [0.25, -3.0]}, turn((0.25, -3.0), 0, (1, 1))),
+        ({"scale": [2.0, -0.5]}, turn((0, 0), 0, (2, -0.5))),
+        ({"rotation": 0.3}, turn((0, 0), 0.3, (1, 1))),
         (
             {"offset": [0.1, 0.2], "rotation": -2.0, "scale": [3.0, 0.5]},
-            turned((0.1, 0.2), -2.0, (3.0, 0.5)),
+            turn((0.1, 0.2), -2.0, (3.0, 0.5)),
         ),
         # The extension's example: the lower left quarter of the picture.
         (
@@ -314,7 +314,7 @@ def turned(offset: tuple[float, float], angle: float, scale: tuple[float, float]
     ],
 )
 def test_texture_transforms(load: Load, given: dict[str, Any], expected: Any) -> None:
-    document = textured()
+    document = make_textured()
     info = document.json["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"]
     info["extensions"] = {"KHR_texture_transform": given}
     document.json["extensionsUsed"] = ["KHR_texture_transform"]
@@ -324,7 +324,7 @@ def test_texture_transforms(load: Load, given: dict[str, Any], expected: Any) ->
 
 @pytest.mark.parametrize("place", [1, 3])
 def test_other_sets_of_texture_coordinates(load: Load, place: int) -> None:
-    document = textured()
+    document = make_textured()
     info = document.json["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"]
     info["texCoord"] = place
     others = np.array(PLACES) * 0.5
@@ -341,7 +341,7 @@ def test_other_sets_of_texture_coordinates(load: Load, place: int) -> None:
 
 
 def test_other_textures_are_named(load: Load, tmp_path: Path) -> None:
-    document = textured()
+    document = make_textured()
     material = document.json["materials"][0]
     material["normalTexture"] = {"index": 0}
     material["occlusionTexture"] = {"index": 0}
@@ -350,7 +350,7 @@ def test_other_textures_are_named(load: Load, tmp_path: Path) -> None:
     material["emissiveTexture"] = {"index": 1}
     document.json["textures"].append({"extensions": {"KHR_texture_basisu": {"source": 0}}})
     document.json["extensionsUsed"] = ["KHR_texture_basisu"]
-    (tmp_path / "a.png").write_bytes(encoded(noise(3, 4, 3, dtype="uint8"), tmp_path))
+    (tmp_path / "a.png").write_bytes(encode(noise(3, 4, 3, dtype="uint8"), tmp_path))
     with pytest.warns(UserWarning, match="left out") as caught:
         mesh = document.load(tmp_path)
     assert len(caught) == 1
@@ -373,26 +373,26 @@ def test_damage_is_named(tmp_path: Path, call: str, error: str) -> None:
     folder = tmp_path / "model"
     folder.mkdir()
     for file in (folder / "a.png", tmp_path / "a.png"):
-        file.write_bytes(encoded(noise(3, 4, 3, dtype="uint8"), tmp_path))
+        file.write_bytes(encode(noise(3, 4, 3, dtype="uint8"), tmp_path))
     (folder / "link.png").symlink_to(tmp_path / "a.png")
 
-    def damaged(path: str, value: Any) -> Mesh:
-        document = textured()
+    def damage(path: str, value: Any) -> Mesh:
+        document = make_textured()
         if path == "samplers":
             document.json["textures"][0]["sampler"] = 0
         at(document.json, path, value)
         return document.load(folder)
 
-    assert_refused(call, error, {"damaged": damaged, "INFO": INFO})
+    assert_refused(call, error, {"damage": damage, "INFO": INFO})
 
 
 def test_a_missing_image_is_an_os_error_that_names_it(tmp_path: Path) -> None:
     with pytest.raises(FileNotFoundError, match=r"images\[0\] of .*mesh\.gltf.*a\.png"):
-        textured().load(tmp_path)
+        make_textured().load(tmp_path)
 
 
 def test_too_few_texture_coordinates(load: Load) -> None:
-    document = textured()
+    document = make_textured()
     attributes = document.json["meshes"][0]["primitives"][0]["attributes"]
     attributes["TEXCOORD_0"] = document.accessor(PLACES[:3])
     with pytest.raises(ValueError, match=r"mesh\.gltf.*TEXCOORD_0 has 3 entries for 4 vertices"):
@@ -407,11 +407,11 @@ def test_too_few_texture_coordinates(load: Load) -> None:
 
 @pytest.mark.parametrize("suffix", [".png", ".jpg"])
 def test_an_image_cut_anywhere_is_refused(tmp_path: Path, suffix: str) -> None:
-    data = encoded(noise(16, 16, 3, dtype="uint8"), tmp_path, suffix)
+    data = encode(noise(16, 16, 3, dtype="uint8"), tmp_path, suffix)
     for length in [*range(0, len(data) // 2, len(data) // 12), len(data) - 40]:
         (tmp_path / "a.png").write_bytes(data[:length])
         with pytest.raises(ValueError, match=r"mesh\.gltf: images\[0\]") as caught:
-            textured().load(tmp_path)
+            make_textured().load(tmp_path)
         assert "vkbloom-" not in str(caught.value)
 
 
@@ -429,7 +429,7 @@ def huge_png(width: int, height: int) -> bytes:
 def test_huge_images_are_refused_by_their_header(tmp_path: Path, size: tuple[int, int]) -> None:
     (tmp_path / "a.png").write_bytes(huge_png(*size))
     with pytest.raises(ValueError, match=r"mesh\.gltf: images\[0\]"):
-        textured().load(tmp_path)
+        make_textured().load(tmp_path)
 
 
 def test_an_image_file_that_is_too_long(tmp_path: Path) -> None:
@@ -437,16 +437,16 @@ def test_an_image_file_that_is_too_long(tmp_path: Path) -> None:
     with (tmp_path / "a.png").open("wb") as file:
         file.truncate(2**30 + 1)
     with pytest.raises(ValueError, match=r"mesh\.gltf.*images\[0\].*too many"):
-        textured().load(tmp_path)
+        make_textured().load(tmp_path)
 
 
 def test_without_openimageio_the_message_says_what_to_install(
     load: Load, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    load(textured())
+    load(make_textured())
     monkeypatch.setitem(sys.modules, "OpenImageIO", None)
     with pytest.raises(ModuleNotFoundError, match=r"textures.*pip install vkbloom\[images\]"):
-        load(textured())
+        load(make_textured())
 
 
 def test_any_json_value_in_any_place_loads_or_is_refused(tmp_path: Path) -> None:
@@ -458,7 +458,7 @@ def test_any_json_value_in_any_place_loads_or_is_refused(tmp_path: Path) -> None
     }
     (primitive,) = document.json["meshes"][0]["primitives"]
     primitive["attributes"]["TEXCOORD_0"] = document.accessor(PLACES[:3])
-    data = encoded(noise(3, 4, 3, dtype="uint8"), tmp_path)
+    data = encode(noise(3, 4, 3, dtype="uint8"), tmp_path)
     document.json["images"] = [{"bufferView": document.view(data), "mimeType": "image/png"}]
     document.json["samplers"] = [
         {"wrapS": 33071, "wrapT": 33648, "magFilter": 9728, "minFilter": 9986}

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from tests.planned import changed, new_arrays, scene_arguments
+from tests.planned import change, new_arrays, scene_arguments
 from tests.refusals import assert_refused, rows
 from tests.scene.parts import Mesh, Texture, mip_levels
 from tests.screens import CAMERA, NOTHING, panel, rgb
@@ -40,12 +40,12 @@ def texture(colours: NDArray[np.float16], filter: Any = "nearest", **more: Any) 
     return Texture((colours,), mag_filter=filter, min_filter=filter, **more)
 
 
-def deferred(renderer: Renderer, body: Mesh, size: tuple[int, int], **more: Any) -> Frames:
+def render_deferred(renderer: Renderer, body: Mesh, size: tuple[int, int], **more: Any) -> Frames:
     scene = Scene(body=body, camera=CAMERA, **more)
     return renderer.render(scene, None, size, shading="deferred")
 
 
-def wrapped(texel: Array, side: int, mode: str) -> Array:
+def wrap(texel: Array, side: int, mode: str) -> Array:
     """Return the texels in 0..side-1 for any integer coordinates."""
     if mode == "repeat":
         return texel % side
@@ -55,7 +55,7 @@ def wrapped(texel: Array, side: int, mode: str) -> Array:
     return np.where(there < side, there, 2 * side - 1 - there)
 
 
-def sampled(
+def sample(
     colours: Array,
     size: tuple[int, int],
     places: tuple[float, float, float, float],
@@ -76,7 +76,7 @@ def sampled(
             part = centres - 0.5 - first
             parts = [(first, 1 - part), (first + 1, part)]
         for texel, share in parts:
-            at = wrapped(texel.astype(int), side, modes[axis])
+            at = wrap(texel.astype(int), side, modes[axis])
             np.add.at(matrix, (np.arange(pixels), at), share)
         weights.append(matrix)
     shown: NDArray[np.float64] = np.einsum("yh,xw,hwc->yxc", *weights[::-1], rgb(colours))
@@ -93,14 +93,14 @@ def test_texels_are_exact_at_whole_scales(
 ) -> None:
     colours, lights = half_colours(*side), half_colours(*side[::-1], highest=9)
     size = (side[0] * scale[0], side[1] * scale[1])
-    shown = deferred(renderer, panel(size, texture(colours)), size)
+    shown = render_deferred(renderer, panel(size, texture(colours)), size)
     expected = np.repeat(np.repeat(colours, scale[1], axis=0), scale[0], axis=1)
     np.testing.assert_array_equal(shown["albedo"], expected)
     assert not rgb(shown["brightness"]).any()
 
     size = size[::-1]
     emits = panel(size, emission=texture(lights), radiance=(1.0, 1.0, 1.0))
-    shown = deferred(renderer, emits, size)
+    shown = render_deferred(renderer, emits, size)
     expected = np.repeat(np.repeat(lights, scale[0], axis=0), scale[1], axis=1)
     np.testing.assert_array_equal(shown["brightness"], expected)
     assert (rgb(shown["albedo"]) == 1).all()
@@ -113,8 +113,8 @@ def test_wrapping_and_filters(renderer: Renderer, modes: tuple[str, str], filter
     # Over two repetitions to both sides; no pixel's centre is at an edge between two texels.
     places = (-2.137, -1.713, 3.271, 2.609)
     base = texture(colours, filter, address_mode=modes)
-    shown = deferred(renderer, panel(size, base, places=places), size)
-    expected = sampled(colours, size, places, modes, filter)
+    shown = render_deferred(renderer, panel(size, base, places=places), size)
+    expected = sample(colours, size, places, modes, filter)
     error = np.abs(rgb(shown["albedo"]) - expected)
     assert error.max() <= (FILTERED if filter == "linear" else 0), error.max()
 
@@ -123,8 +123,8 @@ def test_without_a_texture_it_is_white(renderer: Renderer) -> None:
     size = (8, 6)
     plain = dataclasses.replace(panel(size, colour=(0.3, 0.2, 0.1)), surfaces=())
     white = panel(size, colour=(0.3, 0.2, 0.1))
-    expected = deferred(renderer, plain, size)
-    for name, array in deferred(renderer, white, size).items():
+    expected = render_deferred(renderer, plain, size)
+    for name, array in render_deferred(renderer, white, size).items():
         np.testing.assert_array_equal(array, expected[name], err_msg=name)
 
 
@@ -132,7 +132,7 @@ def test_both_shadings_show_the_same(renderer: Renderer) -> None:
     size = (64, 48)
     body = panel(size, texture(half_colours(5, 7), "linear"), places=(0, 0, 2, 2))
     forward = renderer.render(Scene(body=body, camera=CAMERA), Separable(bloom=False), size)
-    shown = deferred(renderer, body, size)
+    shown = render_deferred(renderer, body, size)
     difference = np.abs(np.clip(rgb(shown["scene"]), 0, 1) * 255 - forward["scene"][..., :3])
     # Half a level of rounding, and the G-buffer's half floats.
     assert difference.max() <= 0.5 + 255 * 4 * HALF
@@ -203,7 +203,7 @@ def test_what_a_body_hides_of_its_own_emission_does_not_glow(renderer: Renderer)
 # Several textures
 
 
-def joined(parts: list[Mesh]) -> Mesh:
+def join(parts: list[Mesh]) -> Mesh:
     """Return panels as one mesh; those without a surface come first."""
     return Mesh(
         np.concatenate([part.vertices for part in parts]),
@@ -223,7 +223,7 @@ def test_surfaces_with_textures_of_several_sizes_beside_plain_triangles(renderer
         panel(size, texture(pictures[0]), across=(0, 1 / 3)),
         panel(size, texture(pictures[1]), across=(1 / 3, 2 / 3)),
     ]
-    shown = rgb(deferred(renderer, joined(parts), size)["albedo"])
+    shown = rgb(render_deferred(renderer, join(parts), size)["albedo"])
     np.testing.assert_array_equal(shown[:, :10], rgb(pictures[0]))
     np.testing.assert_array_equal(shown[:, 10:20], rgb(pictures[1]).repeat(2, 0).repeat(2, 1))
     np.testing.assert_array_equal(shown[:, 20:], 0.5)
@@ -237,7 +237,7 @@ def test_hundreds_of_textures(renderer: Renderer) -> None:
         panel(size, texture(np.full((1, 1, 4), shade)), across=(i / count, (i + 1) / count))
         for i, shade in enumerate(shades)
     ]
-    shown = deferred(renderer, joined(parts), size)["albedo"]
+    shown = render_deferred(renderer, join(parts), size)["albedo"]
     np.testing.assert_array_equal(shown[..., 0], np.tile(shades, (2, 1)))
 
 
@@ -292,7 +292,7 @@ def test_a_mip_level_is_the_mean_of_what_it_covers(side: tuple[int, int]) -> Non
 def test_a_pixel_is_the_mean_of_its_texels(renderer: Renderer, scale: int) -> None:
     colours, size = half_colours(64, 64), (64 // scale, 64 // scale)
     body = panel(size, Texture(mip_levels(colours)))
-    shown = rgb(deferred(renderer, body, size)["albedo"])
+    shown = rgb(render_deferred(renderer, body, size)["albedo"])
     blocks = rgb(colours).reshape(size[1], scale, size[0], scale, 3)
     # The level is chosen by a logarithm that devices round, so a little of the next ones may come.
     np.testing.assert_allclose(shown, blocks.mean(axis=(1, 3)), atol=0.02)
@@ -305,7 +305,9 @@ def test_filters_between_levels(renderer: Renderer) -> None:
     size = (23, 23)
     shown = {
         filter: rgb(
-            deferred(renderer, panel(size, Texture(levels, mipmap_filter=filter)), size)["albedo"]
+            render_deferred(renderer, panel(size, Texture(levels, mipmap_filter=filter)), size)[
+                "albedo"
+            ]
         )
         for filter in ("nearest", "linear")
     }
@@ -334,7 +336,7 @@ def test_meshes_with_textures_can_be_pickled(renderer: Renderer) -> None:
     (surface,) = again.surfaces
     assert surface.base is surface.emission
     assert surface.base.address_mode == ("clamp-to-edge", "repeat")
-    shown, expected = (deferred(renderer, mesh, size) for mesh in (again, body))
+    shown, expected = (render_deferred(renderer, mesh, size) for mesh in (again, body))
     np.testing.assert_array_equal(shown["brightness"], expected["brightness"])
     assert body.summary == "4 triangles, 4 vertices, textures: 1"
 
@@ -342,16 +344,16 @@ def test_meshes_with_textures_can_be_pickled(renderer: Renderer) -> None:
 BODY = panel((4, 4))
 
 
-def packed(body: Mesh) -> Any:
+def pack(body: Mesh) -> Any:
     return scene_arguments(Scene(body=body, camera=CAMERA), (4, 4), "forward", 0.0)
 
 
 def draw(renderer: Renderer, surfaces: Any = None, **places: int) -> None:
     """Draw a mesh with a texture; the core gets other surfaces and numbers of its pictures."""
-    block, pictures, arrays = packed(BODY)
+    block, pictures, arrays = pack(BODY)
     if surfaces is not None:
         arrays = (*arrays[:3], np.array(surfaces, np.uint32), *arrays[4:])
-    source = _core.scene_source(block, changed(pictures, **places), arrays)
+    source = _core.scene_source(block, change(pictures, **places), arrays)
     plan = renderer._core.plan(source, Separable(), None)
     renderer._core.run(source, (plan,), (new_arrays(renderer._core, plan),))
 

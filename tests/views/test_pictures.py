@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 import vkbloom
 from tests.explorer.pages import picture_of
-from tests.framebuffers import decode, make, mixed
+from tests.framebuffers import decode, make, make_mixed
 from tests.images import noise, noise_image
 from tests.srgb import encode_srgb
 from vkbloom import Frames, Separable
@@ -32,7 +32,7 @@ class Noted(Separable):
 
 @pytest.fixture
 def frames() -> Frames:
-    return mixed()
+    return make_mixed()
 
 
 class TestPng:

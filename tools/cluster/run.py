@@ -109,7 +109,7 @@ PartitionName=main Nodes=ALL Default=YES
         yield
 
 
-def timed(what: str, *command: str) -> None:
+def time_command(what: str, *command: str) -> None:
     """Run a command, and print how long it took."""
     begun = time.perf_counter()
     subprocess.run(command, check=True)
@@ -140,15 +140,15 @@ def main() -> None:
     # The number of parts sets the chunks, which must be equal.
     script = Path("parts.sbatch").read_text().replace("$SLURM_ARRAY_TASK_ID/16", "$part/16")
     script = script.replace("parts.zarr", "whole.zarr")
-    timed("whole", sys.executable, "-c", LOCAL)
-    timed("two workers", sys.executable, "on_this_machine.py")
+    time_command("whole", sys.executable, "-c", LOCAL)
+    time_command("two workers", sys.executable, "on_this_machine.py")
     compare("local.zarr", "alone.zarr")
     parts = f"SLURM_CPUS_PER_TASK=4; for part in $(seq 16); do\n{script}\ndone"
-    timed("parts, local", "sh", "-c", parts)
+    time_command("parts, local", "sh", "-c", parts)
     with slurm(work / "slurm.daemons"):
-        timed("slurm", sys.executable, "on_slurm.py")
+        time_command("slurm", sys.executable, "on_slurm.py")
         compare("slurm.zarr", "alone.zarr")
-        timed("job array", "sbatch", "--wait", "--array=1-16", "parts.sbatch")
+        time_command("job array", "sbatch", "--wait", "--array=1-16", "parts.sbatch")
         compare("parts.zarr", "whole.zarr")
 
 

@@ -46,7 +46,7 @@ class Row(NamedTuple):
     of_device: float
 
 
-def rendered(name: str, python: str, table: list[Any], folder: Path) -> Mapping[str, Any]:
+def render(name: str, python: str, table: list[Any], folder: Path) -> Mapping[str, Any]:
     """Return the arrays of an engine, of which each case has some."""
     (folder / "cases.json").write_text(json.dumps(table))
     out = folder / f"{name}.npz"
@@ -65,7 +65,7 @@ def settings_of(engine: str, fields: dict[str, Any]) -> vkbloom.Settings:
     return vkbloom.BlenderGlare(format="rgba32float", **fields)
 
 
-def compared(frames: Mapping[str, Any], settings: vkbloom.Settings) -> dict[str, Any]:
+def comparable_outputs(frames: Mapping[str, Any], settings: vkbloom.Settings) -> dict[str, Any]:
     """Return what an engine's outputs are compared with, of frames of either kind."""
     outputs = {name: frames[name][..., :3] for name in ("glow", "final")}
     outputs["glare"] = settings.intensity * frames["bloom"][..., :3]
@@ -101,7 +101,7 @@ def differences(
         )
         found = []
         for frames in both:
-            outputs = compared(frames, settings)
+            outputs = comparable_outputs(frames, settings)
             found.append(
                 max(
                     difference(outputs[key], array, settings.format)
@@ -125,7 +125,7 @@ def table_of(rows: list[Row], versions: dict[str, str], adapter: str) -> str:
     lines = ["| engine | cases of | cases | reference | device |", "|---|---|---|---|---|"]
     lines += [
         f"| {row.engine} | {row.what} | {row.cases} "
-        f"| {shown(row, row.of_reference)} | {shown(row, row.of_device)} |"
+        f"| {format_difference(row, row.of_reference)} | {format_difference(row, row.of_device)} |"
         for row in rows
     ]
     said = "; ".join(versions.values())
@@ -142,7 +142,7 @@ def replace_in_page(mark: str, table: str) -> None:
     )
 
 
-def shown(row: Row, number: float) -> str:
+def format_difference(row: Row, number: float) -> str:
     """Return a difference as the table has it."""
     if row.what == "rgba8unorm-srgb":
         return f"{number * LEVELS / LIMIT:.1f} levels"
@@ -177,7 +177,7 @@ def main() -> None:
     with vkbloom.Renderer("software") as renderer, tempfile.TemporaryDirectory() as folder:
         for name, _, python in (engine.partition("=") for engine in arguments.engines):
             table = list(TABLES[name]())
-            arrays = rendered(name, python, table, Path(folder))
+            arrays = render(name, python, table, Path(folder))
             versions[name] = ", ".join(
                 f"{key} {value}" for key, value in json.loads(str(arrays["versions"])).items()
             )

@@ -41,7 +41,7 @@ def program(name: str, python: str, output: str, parameters: dict[str, Any]) -> 
     return [*words, "{input}", "{output}"]
 
 
-def checked(name: str, python: str) -> dict[str, Any]:
+def check_engine(name: str, python: str) -> dict[str, Any]:
     """Return what the check prints of an engine."""
     command = [sys.executable, "-m", "vkbloom", "check", "--json"]
     command += ["--suffix", ".pfm", "--timeout", "300"]
@@ -96,7 +96,7 @@ def main() -> None:
                     lambda image, port=port: renderer.apply(image, port)["bloom"],
                 ),
             ]
-            held += laws(name, checked(name, python))
+            held += laws(name, check_engine(name, python))
     replace_in_page("figures", "\n".join(measured))
     replace_in_page("laws", "\n".join(held))
 

@@ -65,7 +65,7 @@ class Pygfx:
         )
         rgba = np.ones((height, width, 4), np.float32)
         rgba[..., :3] = image
-        texels = rgba if format == "rgba32float" else _encoded(rgba)
+        texels = rgba if format == "rgba32float" else _encode(rgba)
         layout = {"bytes_per_row": texels.strides[0], "rows_per_image": height}
         device.queue.write_texture({"texture": source}, texels, layout, (width, height, 1))
         made = _Pass(
@@ -80,11 +80,11 @@ class Pygfx:
         data = device.queue.read_texture({"texture": target}, layout, (width, height, 1))
         result = np.frombuffer(data, texels.dtype).reshape(texels.shape)
         if format != "rgba32float":
-            texels, result = _decoded(texels), _decoded(result)
+            texels, result = _decode(texels), _decode(result)
         return {"glow": texels.copy(), "final": result.copy()}
 
 
-def _encoded(linear: np.ndarray) -> np.ndarray:
+def _encode(linear: np.ndarray) -> np.ndarray:
     """Return the 8-bit sRGB of linear values of 0 to 1, alpha unchanged."""
     kept = np.clip(linear, 0, 1)
     curve = np.where(kept <= 0.0031308, 12.92 * kept, 1.055 * kept ** (1 / 2.4) - 0.055)
@@ -92,7 +92,7 @@ def _encoded(linear: np.ndarray) -> np.ndarray:
     return np.round(255 * curve).astype(np.uint8)
 
 
-def _decoded(levels: np.ndarray) -> np.ndarray:
+def _decode(levels: np.ndarray) -> np.ndarray:
     share = levels / 255
     linear = np.where(share <= 0.04045, share / 12.92, ((share + 0.055) / 1.055) ** 2.4)
     linear[..., 3] = share[..., 3]

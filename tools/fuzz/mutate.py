@@ -14,7 +14,7 @@ WORDS = (
 )
 
 
-def mutated(data: bytes, dice: random.Random) -> bytes:
+def mutate(data: bytes, dice: random.Random) -> bytes:
     """Return the bytes with a few mutations."""
     changed = bytearray(data)
     for _ in range(dice.choice((1, 1, 2, 4))):
@@ -53,7 +53,7 @@ def inputs(seeds: list[bytes], number: int) -> Iterator[bytes]:
     dice = random.Random(number)
     pool = list(seeds)
     while True:
-        data = mutated(dice.choice(pool), dice)
+        data = mutate(dice.choice(pool), dice)
         if len(data) < 1 << 16 and dice.random() < 0.05:
             pool[len(seeds) :] = [*pool[len(seeds) :], data][-64:]
         yield data

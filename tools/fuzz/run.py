@@ -9,7 +9,7 @@ exception that the reader does not document, more than MIB of additional memory,
 an input that takes more than two minutes. The input is then written to the folder as
 ``finding-TARGET-SEED``.
 
-``python tools/fuzz/run.py own --plain --jobs 0 --executions 1000000 --forks`` tries a million
+``python tools/fuzz/run.py custom --plain --jobs 0 --executions 1000000 --forks`` tries a million
 sources of custom methods on all cores. The compiler of --forks is built from ``forks.cpp``, or
 given.
 """
@@ -33,7 +33,7 @@ Run = Callable[[str, bytes], None]
 
 
 #: Seconds after which an input counts as one that hangs.
-LONGEST = 120
+MAX_SECONDS = 120
 
 
 def limit_memory(more: int) -> None:
@@ -43,7 +43,7 @@ def limit_memory(more: int) -> None:
     resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
 
 
-def kept(target: str) -> list[bytes]:
+def saved_inputs(target: str) -> list[bytes]:
     """Return the inputs that earlier runs saved."""
     path = Path(__file__).parent / "corpus" / f"{target}.zip"
     if not path.exists():
@@ -55,7 +55,7 @@ def kept(target: str) -> list[bytes]:
 def overdue(*_: object) -> None:
     """End an input that hangs."""
     # (Readers may raise TimeoutError, which is an OSError.)
-    raise AssertionError(f"the input takes more than {LONGEST} s")
+    raise AssertionError(f"the input takes more than {MAX_SECONDS} s")
 
 
 def spread(options: argparse.Namespace) -> int:
@@ -87,7 +87,9 @@ def read_options() -> argparse.Namespace:
     parser.add_argument("--plain", action="store_true")
     parser.add_argument("--executions", type=int, help="--plain: how many, in place of --seconds")
     parser.add_argument("--jobs", type=int, default=1, help="--plain: processes; 0: all cores")
-    parser.add_argument("--forks", nargs="?", const="", help="own: compile by forks.cpp, as built")
+    parser.add_argument(
+        "--forks", nargs="?", const="", help="custom: compile by forks.cpp, as built"
+    )
     options = parser.parse_args()
     if not options.plain:
         options.plain = importlib.util.find_spec("atheris") is None
@@ -151,7 +153,7 @@ def main() -> int:
         compiler.run_limited = forks.Forks(Path(options.forks)).run_limited
 
     def run(name: str, data: bytes) -> None:
-        signal.alarm(LONGEST if options.plain else 0)
+        signal.alarm(MAX_SECONDS if options.plain else 0)
         try:
             targets.run(targets.TARGETS[name], data)
         except BaseException:
@@ -163,7 +165,7 @@ def main() -> int:
 
     signal.signal(signal.SIGALRM, overdue)
     # Readers load libraries when they read the first file.
-    inputs = {name: targets.TARGETS[name].seeds() + kept(name) for name in options.targets}
+    inputs = {name: targets.TARGETS[name].seeds() + saved_inputs(name) for name in options.targets}
     # Evenly between the first and the last one.
     inputs = {
         name: seeds[:: -(-len(seeds) // (options.inputs or len(seeds)))]

@@ -261,14 +261,14 @@ vec4 hook() { return LOW_gather(LOW_pos, 0) + HOOKED_texOff(ivec2(1, 0)); }
 """
 
 
-def _own(data: bytes) -> None:
-    kind: Any = vkbloom.load_method(_file("own.hook", data), name="fuzzed")
+def _custom(data: bytes) -> None:
+    kind: Any = vkbloom.load_method(_file("custom.hook", data), name="fuzzed")
     kind().core_passes((16, 12), (8, 6))
 
 
-def _own_seeds() -> list[bytes]:
+def _custom_seeds() -> list[bytes]:
     # Not the user's cache. Passes that a mutation leaves alone are not compiled again.
-    os.environ["VKBLOOM_CACHE_DIR"] = str(FOLDER / "own")
+    os.environ["VKBLOOM_CACHE_DIR"] = str(FOLDER / "custom")
     examples = Path(__file__).parents[2] / "examples" / "custom_methods"
     return [_BLOCKS, *(file.read_bytes() for file in sorted(examples.glob("*.hook")))]
 
@@ -280,7 +280,7 @@ TARGETS = {
     "equirectangular": Target(_equirectangular, lambda: _image_seeds((4, 8, 3))),
     "headers": Target(_headers, _header_seeds),
     "pipelines": Target(_pipelines, _pipeline_seeds),
-    "own": Target(_own, _own_seeds),
+    "custom": Target(_custom, _custom_seeds),
 }
 
 

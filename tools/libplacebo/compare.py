@@ -49,7 +49,7 @@ class RefusedError(Exception):
     """What libplacebo says about a file that it does not run."""
 
 
-def drawn(apply: str, file: Path, image: Array, frames: int, values: Mapping[str, Any]) -> Array:
+def draw(apply: str, file: Path, image: Array, frames: int, values: Mapping[str, Any]) -> Array:
     """Return the picture that libplacebo makes of an image."""
     height, width = image.shape[:2]
     command = [apply, str(file), str(width), str(height), str(frames)]
@@ -79,21 +79,21 @@ def picture() -> Array:
     return np.dstack([colour, np.ones((HEIGHT, WIDTH))]).astype(np.float32)
 
 
-def repeated(apply: str, folder: Path) -> Iterator[tuple[str, float]]:
+def repeat(apply: str, folder: Path) -> Iterator[tuple[str, float]]:
     """Yield name and largest difference of each kept render when it is drawn again."""
     with np.load(folder / "inputs.npz") as inputs, np.load(folder / "outputs.npz") as outputs:
         for case in json.loads((folder / "index.json").read_text())["renders"]:
             image = np.ascontiguousarray(inputs[case["input"]], np.float32)
-            got = drawn(apply, folder / case["hooks"][0], image, case["frames"], case["params"])
+            got = draw(apply, folder / case["hooks"][0], image, case["frames"], case["params"])
             yield case["key"], float(np.abs(got - outputs[case["key"]]).max())
 
 
-def compared(apply: str, folder: Path, file: Path, renderer: vkbloom.Renderer) -> Row:
+def compare(apply: str, folder: Path, file: Path, renderer: vkbloom.Renderer) -> Row:
     """Run a file with both."""
     image = picture()
     name = str(file.relative_to(folder))
     try:
-        want = drawn(apply, file, image, FRAMES, {})
+        want = draw(apply, file, image, FRAMES, {})
         theirs = "unchanged" if np.array_equal(want, image) else "drawn"
     except RefusedError as refused:
         want, theirs = None, f"refused: {refused}"
@@ -164,7 +164,7 @@ def main() -> None:
     parser.add_argument("--only", default="", help="a part of the files' names")
     arguments = parser.parse_args()
     if arguments.kept:
-        for key, error in repeated(arguments.apply, arguments.kept):
+        for key, error in repeat(arguments.apply, arguments.kept):
             print(f"{key}: {error:.1e}")
     files = sorted(file for ends in ENDS for file in arguments.folder.rglob(ends))
     rows = []
@@ -172,7 +172,7 @@ def main() -> None:
         adapter = f"{renderer.info.name}, {renderer.info.driver_info}"
         for file in files:
             if arguments.only in str(file):
-                rows.append(compared(arguments.apply, arguments.folder, file, renderer))
+                rows.append(compare(arguments.apply, arguments.folder, file, renderer))
                 said = f"{verdict(rows[-1]):<8}{line_of(rows[-1])} {rows[-1].seconds:.1f} s"
                 print(said, flush=True)
     counts = collections.Counter(verdict(row) for row in rows)

@@ -12,7 +12,7 @@ def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     return "".join(f"| {' | '.join(line)} |\n" for line in lines)
 
 
-def rounded(number: float | None, factor: float = 1.0) -> str:
+def format_figure(number: float | None, factor: float = 1.0) -> str:
     """Return a figure to two digits; "0" for what is nearly nothing, "none" for none and NaN."""
     if number is None or math.isnan(number):
         return "none"

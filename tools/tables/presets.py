@@ -52,8 +52,8 @@ def check(renderer: vkbloom.Renderer, quick: bool) -> str:
         )
         found = json.loads(done.stdout)
         verdicts = {law: verdict["held"] for law, verdict in found["laws"].items()}
-        broken = listed(law for law, held in verdicts.items() if held is False)
-        untested = listed(law for law, held in verdicts.items() if held is None)
+        broken = list_as_code(law for law, held in verdicts.items() if held is False)
+        untested = list_as_code(law for law, held in verdicts.items() if held is None)
         laws.append([f"`{name}`", broken, untested])
         border = found["laws"]["border"]["figures"]
         spread, steady, near = found["psf"], found["stability"], found["nearest_preset"]
@@ -104,7 +104,7 @@ def _cost(renderer: vkbloom.Renderer, settings: vkbloom.Settings, rounds: int) -
     return median(seconds[3:])
 
 
-def measured(renderer: vkbloom.Renderer, quick: bool) -> str:
+def measure(renderer: vkbloom.Renderer, quick: bool) -> str:
     """Return gain, spread, corner and cost of each preset at 1280 x 720, in half floats."""
     rows = []
     point = np.zeros((FRAME[1], FRAME[0], 3), np.float32)
@@ -141,7 +141,7 @@ def measured(renderer: vkbloom.Renderer, quick: bool) -> str:
     return table([*heads, "passes", "ms"], rows)
 
 
-def listed(names: Iterable[str]) -> str:
+def list_as_code(names: Iterable[str]) -> str:
     """Return names as code."""
     return ", ".join(f"`{name}`" for name in names)
 
@@ -265,11 +265,11 @@ def derivatives(renderer: vkbloom.Renderer, quick: bool) -> str:
             name,
             by_image,
             *(
-                listed(n for n in column if n not in every)
+                list_as_code(n for n in column if n not in every)
                 for column, every in zip(columns, always, strict=True)
             ),
         ]
         for name, by_image, columns in rows
     ]
-    cells.insert(0, ["every method", "", *map(listed, always)])
+    cells.insert(0, ["every method", "", *map(list_as_code, always)])
     return table(["method", "by the image", "linear", "curved or piecewise", "none"], cells)

@@ -45,7 +45,7 @@ BLOOMS: Final = (
 )
 
 
-def decoded(levels: Pixels) -> NDArray[np.float32]:
+def decode(levels: Pixels) -> NDArray[np.float32]:
     """Return sRGB levels as linear light."""
     return decode_srgb((levels / 255).astype(np.float32))
 
@@ -71,7 +71,7 @@ def with_bloom(renderer: vkbloom.Renderer, pair: Bloom) -> tuple[Pixels, Pixels]
     settings = vkbloom.presets[pair.preset].replace(
         threshold=pair.threshold, intensity=pair.intensity
     )
-    return image, levels_of(renderer.apply(decoded(image), settings)["final"])
+    return image, levels_of(renderer.apply(decode(image), settings)["final"])
 
 
 def _noise(image: Pixels) -> NDArray[Any]:
@@ -84,7 +84,7 @@ def _jpeg(image: Pixels) -> NDArray[Any]:
     return np.asarray(Image.open(file))
 
 
-def _saturated(image: Pixels) -> NDArray[Any]:
+def _saturate(image: Pixels) -> NDArray[Any]:
     grey = image.mean(axis=2, keepdims=True)
     return grey + 1.3 * (image - grey)
 
@@ -104,7 +104,7 @@ OTHERS: Final[dict[tuple[str, str], Callable[[Pixels], NDArray[Any]]]] = {
     ("retina", "more contrast"): lambda image: 128 + 1.3 * (image - 128.0),
     ("immunohistochemistry", "shifted by a pixel"): lambda image: np.roll(image, 1, axis=1),
     ("clock", "a gamma of 0.8"): lambda image: 255 * (image / 255) ** 0.8,
-    ("coffee", "more saturation"): _saturated,
+    ("coffee", "more saturation"): _saturate,
     ("moon", "vignette"): _vignette,
 }
 
@@ -116,11 +116,11 @@ def without_bloom(name: str, change: str) -> tuple[Pixels, Pixels]:
     return image, np.rint(np.clip(changed, 0, 255)).astype(np.uint8)
 
 
-def fitted(
+def fit_preset(
     renderer: vkbloom.Renderer, pair: tuple[Pixels, Pixels], preset: str, max_calls: int = 1000
 ) -> vkbloom.FitResult:
     """Return what is found from a preset's settings."""
-    image, target = map(decoded, pair)
+    image, target = map(decode, pair)
     return vkbloom.fit(
         image,
         target,
@@ -146,10 +146,12 @@ def rows(renderer: vkbloom.Renderer, quick: bool) -> Iterator[list[str]]:
     for bloom in BLOOMS[: 1 if quick else None]:
         image, target = with_bloom(renderer, bloom)
         truth = f"`{bloom.preset}`, {bloom.threshold:g}, {bloom.intensity:g}"
-        found = fitted(renderer, (image, target), bloom.preset)
+        found = fit_preset(renderer, (image, target), bloom.preset)
         yield row(bloom.photograph, truth, target, found)
     for name, change in [*OTHERS][: 1 if quick else None]:
         image, target = without_bloom(name, change)
-        founds = [fitted(renderer, (image, target), one) for one in ("bevy_natural", "unity_urp")]
+        founds = [
+            fit_preset(renderer, (image, target), one) for one in ("bevy_natural", "unity_urp")
+        ]
         both = [row(name, change, target, found) for found in founds]
         yield [" / ".join(dict.fromkeys(cells)) for cells in zip(*both, strict=True)]

@@ -18,32 +18,32 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from vkbloom._background_writer import written_in_background
+from vkbloom._background_writer import write_in_background
 from vkbloom._cli import no_bloom
 from vkbloom._cli.fields import Command
 from vkbloom._cli.glows import glow_options, read_glows
 from vkbloom._cli.image_files import (
     check_input_colour,
-    finished,
+    finish,
     input_colour_option,
     note_hidden,
     read_picture,
     reading_options,
-    silenced,
+    silence,
 )
-from vkbloom._cli.program import adapter_option, as_wrong_use, described
-from vkbloom._cli.sequences import PIPE, check_targets, is_stream, pairs, shown
+from vkbloom._cli.program import adapter_option, as_wrong_use, describe
+from vkbloom._cli.sequences import PIPE, check_targets, displayed_name, is_stream, pairs
 from vkbloom._cli.settings_options import StartOptions, start_options
 from vkbloom._cli.terminal import complain, hides_progress, note, say, tell_device
 from vkbloom._io import image_writing, safe_writing
 from vkbloom._io.displayed import PRIMARIES, Saved
-from vkbloom._io.narrowing import narrowed, narrowing_note
+from vkbloom._io.narrowing import narrow, narrowing_note
 from vkbloom._io.picture import Colour, Picture, SavedColour
 from vkbloom._locks import cached_property
 from vkbloom._renderer.added_light import added_share, faint_note
 from vkbloom._renderer.frame_files import settings_facts
 from vkbloom._renderer.frames import Frames
-from vkbloom._renderer.interruptible import opened_renderer
+from vkbloom._renderer.interruptible import open_renderer
 from vkbloom._renderer.renderer import Renderer
 from vkbloom._settings.settings import Settings
 
@@ -137,11 +137,11 @@ class Run:
         """Add bloom to files one after the other; each is written while the next one is made."""
         hidden = hides_progress() if self.several else True
         bar = tqdm(files, unit="image", leave=False, disable=hidden)
-        for texts in written_in_background(self._made(bar)):
+        for texts in write_in_background(self._make(bar)):
             for text in texts:
                 note(text)
 
-    def _made(self, files: Iterable[Pair]) -> Iterator[tuple[list[str], Callable[[], object]]]:
+    def _make(self, files: Iterable[Pair]) -> Iterator[tuple[list[str], Callable[[], object]]]:
         """Yield of each file a list for notes, and the function that writes it and fills the list.
 
         Notes are printed by the thread that reads files, because it silences standard error.
@@ -194,7 +194,7 @@ class Run:
         elif image_writing.is_straight(
             of_format(target, self.options.pipe_format), is_multiplied=picture.is_multiplied
         ):
-            text = no_bloom.hidden(frames["final"], frames.settings)
+            text = no_bloom.describe_hidden(frames["final"], frames.settings)
         is_chosen = self.options.start.is_chosen
         if not text and is_chosen and self.options.mask is None and self.options.emission is None:
             text = faint_note(
@@ -218,7 +218,7 @@ class Run:
         pixels = picture.pixels
         is_large = picture.numbers == "uint8" and pixels[..., 0].size >= _HALVED
         if (options.half or is_large) and pixels.dtype == np.float32:
-            picture = dataclasses.replace(picture, pixels=narrowed(pixels, _HALF))
+            picture = dataclasses.replace(picture, pixels=narrow(pixels, _HALF))
             _tell_narrowing(source, pixels)
         return picture, *start
 
@@ -256,7 +256,7 @@ class Run:
             # Before OUT, so that --skip-existing finds all of them where it finds OUT.
             others = _save_others(frames, file)
             notes += image_writing.save(
-                finished(picture, frames["final"], frames.settings),
+                finish(picture, frames["final"], frames.settings),
                 file,
                 self.options.saved,
                 settings_facts(frames.settings, expand),
@@ -285,7 +285,7 @@ def _save_others(frames: Frames, target: Path) -> list[Path]:
 def _tell_narrowing(source: str, pixels: NDArray[Any]) -> None:
     """Print a note about values that half floats cannot hold."""
     if (text := narrowing_note(pixels, _HALF)) is not None:
-        note(f"{shown(source)}: {text}")
+        note(f"{displayed_name(source)}: {text}")
 
 
 def _send(file: Path, target: str) -> None:
@@ -365,14 +365,14 @@ def command(*, sources: tuple[str, ...], out: str | None, adapter: str, **given:
     """
     options = Options(**given)
     inputs, target = _arguments(sources, out)
-    work = _planned(options, inputs, target, is_named=out is not None)
+    work = _plan(options, inputs, target, is_named=out is not None)
     if not work:
         return 0
     with tempfile.TemporaryDirectory() as folder, ExitStack() as stack:
 
         @functools.cache
         def renderer() -> Renderer:
-            opened = stack.enter_context(opened_renderer(adapter))
+            opened = stack.enter_context(open_renderer(adapter))
             # Standard output may have the picture.
             tell_device(opened, err=is_stream(target))
             return opened
@@ -384,7 +384,7 @@ def command(*, sources: tuple[str, ...], out: str | None, adapter: str, **given:
             folder=Path(folder),
             renderer=renderer,
             several=several,
-            kept=_kept_files(options, work),
+            kept=_find_protected_files(options, work),
             is_careful=not (several or out is not None or options.overwrite),
         )
         run.sequence(work)
@@ -400,13 +400,13 @@ def _tell_failures(failures: Mapping[str, Exception], work: Sequence[Pair]) -> i
         return 0
     for name, _ in work:
         if name in failures:
-            text = described(failures[name])
+            text = describe(failures[name])
             complain(text if name in text else f"{name}: {text}")
     complain(f"{len(failures)} of {len(work)} images failed")
     return 1
 
 
-def _planned(options: Options, sources: list[str], out: str, *, is_named: bool) -> list[Pair]:
+def _plan(options: Options, sources: list[str], out: str, *, is_named: bool) -> list[Pair]:
     """Check the options, and return the files to read, each with the file to write.
 
     `is_named`: OUT was given as --out, and not as the last of several words.
@@ -424,7 +424,7 @@ def _planned(options: Options, sources: list[str], out: str, *, is_named: bool) 
         say(f"skipped {len(work) - len(left)} of {len(work)} images, whose OUT is complete")
         work = left
     elif not (is_named or options.overwrite) and [target for _, target in work] == [out]:
-        _check_own(work[0][0], out)
+        _check_not_replaced(work[0][0], out)
     check_targets(work, out, overwrite=options.overwrite)
     with as_wrong_use():
         for target in {Path(target).suffix: target for _, target in work}.values():
@@ -445,7 +445,7 @@ def _is_done(pair: Pair, options: Options) -> bool:
         names = ["final", "bloom"] if options.start.of_file(source)[0].bloom else ["final"]
     others = [beside(file, name) for name in names if name != "final"]
     # libpng prints what is wrong with a damaged file.
-    with silenced():
+    with silence():
         for other in others:
             there = [one for one in (other, other.with_suffix(".exr")) if one.is_file()]
             if not there or safe_writing.is_damaged(there[0]):
@@ -458,7 +458,7 @@ def _is_done(pair: Pair, options: Options) -> bool:
     return True
 
 
-def _kept_files(options: Options, work: Sequence[Pair]) -> set[str]:
+def _find_protected_files(options: Options, work: Sequence[Pair]) -> set[str]:
     """Return absolute names of files that no framebuffer may replace."""
     names = {target for _, target in work if not is_stream(target)}
     if not options.overwrite:
@@ -478,14 +478,14 @@ def _check_stems(work: Sequence[Pair]) -> None:
             )
 
 
-def _check_own(source: str, out: str) -> None:
+def _check_not_replaced(source: str, out: str) -> None:
     """Raise click.UsageError if OUT, the last word, is a picture that vkbloom did not write.
 
     ``vkbloom apply *.jpg`` of two photographs would otherwise replace the second one.
     """
     if not os.path.isfile(out) or (os.path.isfile(source) and os.path.samefile(source, out)):
         return
-    with silenced():
+    with silence():
         is_of_another = safe_writing.is_of_another_program(Path(out))
     if is_of_another:
         raise click.UsageError(

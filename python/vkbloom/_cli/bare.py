@@ -25,7 +25,7 @@ def run(words: Sequence[str], missing: Sequence[str]) -> int:
         print(f"vkbloom {installed_version()}")
         return 0
     if first == "doctor" and (form == "json" or not options):
-        report = examined()
+        report = examine()
         print(json.dumps(report, indent=2) if form == "json" else "\n".join(lines_of(report)))
         return int(not report["can_render"])
     if first == "adapters" and (form == "json" or not options):
@@ -49,7 +49,7 @@ def list_adapters(form: Literal["text", "json"]) -> int:
     return int(not found)
 
 
-def examined() -> dict[str, Any]:
+def examine() -> dict[str, Any]:
     """Return the doctor's findings as one object."""
     from vkbloom._doctor import examine  # noqa: PLC0415  costs start-up time
 

@@ -177,23 +177,23 @@ def _lines(
 
 
 def _figures(comparison: Comparison, channels: tuple[str, ...]) -> list[str]:
-    largest = _shown(comparison.max_error)
+    largest = _format(comparison.max_error)
     if comparison.max_error_at is not None and comparison.max_error_values is not None:
         x, y, channel = comparison.max_error_at
         values = " against ".join(f"{value:.6g}" for value in comparison.max_error_values)
         largest += f" at x {x}, y {y}, channel {channels[channel]}: {values}"
     rows = {
         "max error": largest,
-        "mean error": _shown(comparison.mean_error),
-        "pixels": f"{_shown(comparison.percent_over)} % differ",
-        "PSNR": f"{_shown(comparison.psnr)} dB" if comparison.psnr is not None else "",
-        "SSIM": _shown(comparison.ssim),
-        "FLIP": _shown(comparison.flip),
+        "mean error": _format(comparison.mean_error),
+        "pixels": f"{_format(comparison.percent_over)} % differ",
+        "PSNR": f"{_format(comparison.psnr)} dB" if comparison.psnr is not None else "",
+        "SSIM": _format(comparison.ssim),
+        "FLIP": _format(comparison.flip),
     }
     for name, reason in comparison.not_computed.items():
         rows[name.upper()] = f"not computed: {reason}"
     return [f"  {label:<11}{text}" for label, text in rows.items()]
 
 
-def _shown(value: float | None) -> str:
+def _format(value: float | None) -> str:
     return "no values to compare" if value is None else f"{value:.6g}"

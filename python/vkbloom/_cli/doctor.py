@@ -43,7 +43,7 @@ def command(compares: bool, adapter: str, as_json: str | None) -> int:
     """
     if as_json not in (None, "-"):
         check_target(as_json)
-    result = _compared(adapter) if compares else bare.examined()
+    result = _compare(adapter) if compares else bare.examine()
     text = json.dumps(result, indent=2)
     if as_json == "-":
         click.echo(text)
@@ -57,7 +57,7 @@ def command(compares: bool, adapter: str, as_json: str | None) -> int:
     return 0 if result["passed" if compares else "can_render"] else 1
 
 
-def _compared(adapter: str) -> dict[str, Any]:
+def _compare(adapter: str) -> dict[str, Any]:
     start, results = time.perf_counter(), []
     with tqdm(unit="case", leave=False, disable=hides_progress()) as bar:
         for item in self_test.run(adapter):

@@ -15,8 +15,8 @@ from click.shell_completion import CompletionItem
 from numpy.typing import NDArray
 
 from vkbloom import psf
-from vkbloom._cli.image_files import silenced
-from vkbloom._cli.program import given
+from vkbloom._cli.image_files import silence
+from vkbloom._cli.program import is_given
 from vkbloom._cli.sequences import as_file
 from vkbloom._io.array_files import read
 from vkbloom._psf.base import PSF, functions
@@ -91,7 +91,7 @@ def _read_psf(word: str) -> PSF:
 def read_colours(path: str) -> NDArray[Any]:
     """Read the colours of an image file, (H, W, 3), or raise OSError or click.ClickException."""
     try:
-        with silenced(), as_file(path) as file:
+        with silence(), as_file(path) as file:
             return read(file)[..., :3]
     except ValueError as error:
         # The file is at fault, and not the use of the option.
@@ -179,7 +179,7 @@ def or_none(kind: _ParamType) -> _ParamType:
     return _Word("|".join([*choices, "none"]), read)
 
 
-def _spelled(value: object, separator: str = ",") -> str:
+def _spell(value: object, separator: str = ",") -> str:
     """Write a default value in the syntax of its option."""
     match value:
         case bool():
@@ -191,7 +191,7 @@ def _spelled(value: object, separator: str = ",") -> str:
         case ():
             return "none"
         case tuple():
-            return separator.join(_spelled(part, ":") for part in value)
+            return separator.join(_spell(part, ":") for part in value)
         case _:
             return str(value).lower()
 
@@ -227,13 +227,13 @@ class FieldOption(click.Option):
     ) -> tuple[Any, list[str]]:
         """Add a value that the user gave to those of the other fields."""
         value, args = super().handle_parse_result(ctx, opts, args)
-        if self.name is not None and given(self.name, ctx):
+        if self.name is not None and is_given(self.name, ctx):
             ctx.params[self.into][self.field] = value
         return value, args
 
 
 def _help(label: str, info: FieldInfo) -> str:
-    default = f"{label and label + ', '}default {_spelled(info.default)}"
+    default = f"{label and label + ', '}default {_spell(info.default)}"
     return f"{info.help} [{default}]".strip()
 
 
@@ -259,12 +259,12 @@ class FieldOptions(click.Option):
         (self.into,) = param_decls
         super().__init__([f"--{self.into}-fields", self.into], hidden=True, expose_value=False)
         self._kinds, self._base, self._prefix = kinds, base, prefix
-        self._made: tuple[dict[str, type[Any]], list[FieldOption]] = {}, []
+        self._make: tuple[dict[str, type[Any]], list[FieldOption]] = {}, []
 
     def options(self) -> list[FieldOption]:
         """Return the options of the classes that there are now."""
         kinds = dict(self._kinds)
-        if kinds != self._made[0]:
+        if kinds != self._make[0]:
             inherited = fields_of(self._base) if self._base else {}
             fields: dict[str, dict[str, FieldInfo]] = {}
             for label, kind in kinds.items():
@@ -280,8 +280,8 @@ class FieldOptions(click.Option):
                         del fields[info.option]
                     fields.setdefault(info.option, {})[label] = info
             made = [FieldOption(infos, self.into, self._prefix) for infos in fields.values()]
-            self._made = kinds, made
-        return self._made[1]
+            self._make = kinds, made
+        return self._make[1]
 
 
 # Where a call keeps the method that its help is about.

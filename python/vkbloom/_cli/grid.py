@@ -20,7 +20,7 @@ from vkbloom._io.picture import Picture
 from vkbloom._presets.start import Start
 from vkbloom._renderer.frame_files import settings_facts
 from vkbloom._renderer.frames import Frames
-from vkbloom._renderer.interruptible import opened_renderer
+from vkbloom._renderer.interruptible import open_renderer
 from vkbloom._renderer.renderer import Renderer
 from vkbloom._settings.fields import fields_of
 from vkbloom._settings.settings import SHADINGS, Settings, field_info, presets
@@ -80,7 +80,7 @@ def command(
             raise click.UsageError("--axis preset sets all settings; leave out options of settings")
         settings = None
     # The presets of an axis differ in whether they expand.
-    expand: float | None = given["expand"] if settings or program.given("expand") else None
+    expand: float | None = given["expand"] if settings or program.is_given("expand") else None
     picture = None
     shared = {name: given[name] for name in ("size", "shading", "time")}
     if source is None:
@@ -100,7 +100,7 @@ def command(
     shared["framebuffers"] = "all" if names == ["all"] else names
     with program.as_wrong_use():
         grid = layout.ask(looked_at, settings, axes, reduce=None, **shared)
-    with opened_renderer(given["adapter"]) as renderer:
+    with open_renderer(given["adapter"]) as renderer:
         _note_no_bloom(grid, renderer)
         if folder is None:
             shared |= {"part": part, "progress": not terminal.is_quiet()}
@@ -222,7 +222,7 @@ def _save(
     """Write a framebuffer of a point; `final` in the colours of the image's file."""
     settings = frames.settings
     if name == "final" and picture is not None:
-        final = image_files.finished(picture, frames[name], settings)
+        final = image_files.finish(picture, frames[name], settings)
         image_writing.save(final, path, None, settings_facts(settings, expand))
     else:
         # Without the timings, so that the same call writes the same file.

@@ -13,14 +13,14 @@ import click
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom._cli.program import given
-from vkbloom._cli.sequences import as_file, shown
+from vkbloom._cli.program import is_given
+from vkbloom._cli.sequences import as_file, displayed_name
 from vkbloom._cli.terminal import note
-from vkbloom._io.alpha import divided, hidden_notes
+from vkbloom._io.alpha import divide, hidden_notes
 from vkbloom._io.decoding import check_space
 from vkbloom._io.expansion import PHOTO_EXPANSION
 from vkbloom._io.image_file import ImageFile
-from vkbloom._io.picture import Colour, Highlights, Picture, listed
+from vkbloom._io.picture import Colour, Highlights, Picture, list_all
 from vkbloom._settings.settings import Settings
 
 #: Encodings of a written file.
@@ -61,7 +61,7 @@ def reading_options(command: Callable[..., Any]) -> Callable[..., Any]:
 @contextmanager
 def opened(source: str, subimage: int, layer: str | None = None) -> Iterator[ImageFile]:
     """Open an image file; libraries print no messages of their own."""
-    with silenced(), as_file(source) as file, ImageFile(file, subimage, layer) as image:
+    with silence(), as_file(source) as file, ImageFile(file, subimage, layer) as image:
         yield image
 
 
@@ -74,9 +74,9 @@ def read(source: str, subimage: int) -> Picture:
 def other_parts(picture: Picture) -> str:
     """Return the parts of a file of several if neither --subimage nor the file chooses one."""
     parts = picture.parts
-    if len(parts) < 2 or given("subimage") or picture.header.part:
+    if len(parts) < 2 or is_given("subimage") or picture.header.part:
         return ""
-    names = listed(f"{index} {name}" for index, name in enumerate(parts) if name)
+    names = list_all(f"{index} {name}" for index, name in enumerate(parts) if name)
     return f"parts {names}" if names else f"{len(parts)} parts"
 
 
@@ -101,7 +101,7 @@ def read_picture(
     check_input_colour(colour)
     with opened(source, subimage, layer) as file:
         picture = file.picture(colour)
-    source = shown(source)
+    source = displayed_name(source)
     if layer is None and (parts := other_parts(picture)):
         note(f"{source}: read the first of its {parts}; --subimage reads another")
     nan, infinite = (int(test(picture.values).sum()) for test in (np.isnan, np.isinf))
@@ -118,7 +118,7 @@ def read_picture(
 def note_hidden(picture: Picture, source: str) -> None:
     """Print a note if light where alpha is 0 blooms like visible light."""
     for text in hidden_notes(picture):
-        note(f"{shown(source)}: {text}")
+        note(f"{displayed_name(source)}: {text}")
 
 
 def highlights_of_file(
@@ -133,16 +133,16 @@ def highlights_of_file(
     return Highlights.STORED
 
 
-def finished(picture: Picture, final: NDArray[Any], settings: Settings) -> Picture:
+def finish(picture: Picture, final: NDArray[Any], settings: Settings) -> Picture:
     """Return a picture with the pixels of `final`, and their alpha and encoding as in its file."""
     if settings.alpha != "keep" and picture.has_straight:
-        final = divided(final)
+        final = divide(final)
     encoding = picture.encoding if settings.encoding == "none" else settings.encoding
     return dataclasses.replace(picture, pixels=final, encoding=encoding)
 
 
 @contextmanager
-def silenced() -> Iterator[None]:
+def silence() -> Iterator[None]:
     """Suppress what C libraries print on standard error, and this process meanwhile.
 
     libpng prints messages about damaged files, instead of passing them to OpenImageIO.

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from vkbloom._cli.fields import SIZE, Command
 from vkbloom._cli.image_files import read_picture, reading_options
 from vkbloom._cli.interrupts import INTERRUPTED
-from vkbloom._cli.program import adapter_option, as_wrong_use, given
+from vkbloom._cli.program import adapter_option, as_wrong_use, is_given
 from vkbloom._cli.scene_options import scene_options
 from vkbloom._cli.sequences import is_stream
 from vkbloom._cli.settings_options import STARTS, settings_options
@@ -28,7 +28,7 @@ from vkbloom._explorer.viewer import GLOW, Viewer
 from vkbloom._extras import import_extra
 from vkbloom._io.picture import Picture
 from vkbloom._presets.start import PRESET_OF_SCENES, Start, start_of
-from vkbloom._renderer.interruptible import opened_renderer
+from vkbloom._renderer.interruptible import open_renderer
 from vkbloom._renderer.renderer import Renderer
 from vkbloom._renderer.surface import Surface
 from vkbloom._scene import Scene
@@ -44,7 +44,7 @@ Space          pauses the animation
 Q, Escape      close\
 """
 _TURN_SECONDS: Final = 8.0
-_LARGEST: Final = (1600, 900)  # size of a window for an image
+_MAX_WINDOW: Final = (1600, 900)  # size of a window for an image
 _TITLE_SECONDS: Final = 0.5  # between updates of the title
 _WAIT_SECONDS: Final = 0.1  # while the window is hidden
 _KEYS: Final = ("SPACE", "ESCAPE", *"BPQ", *"123456789")
@@ -94,21 +94,21 @@ def _live_options(command: Callable[..., Any]) -> Callable[..., Any]:
         **arguments: Any,
     ) -> Any:
         if source is None:
-            if given("expand"):
+            if is_given("expand"):
                 raise click.UsageError("--expand is only for an IMAGE")
             return command(opened=None, settings=settings, **arguments)
         for name, option in _OF_SCENE.items():
             _check_is_scene(name, option)
         picture = read_picture(source, subimage, None, layer=layer)
         file = "" if is_stream(source) else source
-        opened = Opened(picture, file, expand, is_fixed=given("expand"))
+        opened = Opened(picture, file, expand, is_fixed=is_given("expand"))
         return command(opened=opened, settings=settings, **arguments)
 
     return run
 
 
 def _check_is_scene(name: str, option: str) -> None:
-    if given(name):
+    if is_given(name):
         raise click.UsageError(f"{option} is only for scenes; leave it out with an IMAGE")
 
 
@@ -185,8 +185,10 @@ def view(
     height, width = (720, 1280) if opened is None else opened.picture.pixels.shape[:2]
     loaded = scene() if opened is None else None
     with (
-        _opened(glfw, size or (min(width, _LARGEST[0]), min(height, _LARGEST[1]))) as window,
-        opened_renderer(adapter) as renderer,
+        _open_window(
+            glfw, size or (min(width, _MAX_WINDOW[0]), min(height, _MAX_WINDOW[1]))
+        ) as window,
+        open_renderer(adapter) as renderer,
         Surface(renderer, window) as surface,
     ):
         live = Live(settings, loaded, shading, opened=opened)
@@ -221,7 +223,7 @@ def _show(live: Live, renderer: Renderer, uploaded: object) -> object:
 
 
 @contextlib.contextmanager
-def _opened(glfw: Any, size: tuple[int, int]) -> Iterator[Any]:
+def _open_window(glfw: Any, size: tuple[int, int]) -> Iterator[Any]:
     """Open a window without an OpenGL context."""
     glfw.ERROR_REPORTING = "ignore"  # The last error is asked for.
     try:
@@ -291,11 +293,11 @@ def explore(
         of_file = {"file": opened.file, "expand": opened.expand}
     else:
         looked_at = scene()
-        if not any(given(name) for name in ("base", "glow", "glow_intensity")):
+        if not any(is_given(name) for name in ("base", "glow", "glow_intensity")):
             looked_at = dataclasses.replace(looked_at, glow_intensity=GLOW)
-        if settings == presets[PRESET_OF_SCENES] and not any(given(name) for name in STARTS):
+        if settings == presets[PRESET_OF_SCENES] and not any(is_given(name) for name in STARTS):
             begun = None
-    with opened_renderer(adapter) as renderer:
+    with open_renderer(adapter) as renderer:
 
         def new_viewer() -> Viewer:
             how: dict[str, Any] = {"size": size, "shading": shading, "renderer": renderer}

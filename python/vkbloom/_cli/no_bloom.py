@@ -38,7 +38,7 @@ def is_without(frames: Frames) -> bool:
     return "bloom" in frames and not frames["bloom"][:, :, :3].any()
 
 
-def hidden(final: NDArray[Any], settings: Settings) -> str:
+def describe_hidden(final: NDArray[Any], settings: Settings) -> str:
     """Return a text if light lies on transparent pixels of a file with straight alpha; else ""."""
     if not settings.bloom or settings.alpha != "keep" or final.shape[2] != 4:
         return ""

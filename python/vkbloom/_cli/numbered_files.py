@@ -33,7 +33,7 @@ class Pattern:
     width: int
     fill: str
 
-    def filled(self, number: int) -> str:
+    def name_of(self, number: int) -> str:
         """Return the name of the file with this number, as printf does: -1 becomes -001."""
         return f"{self.before}{self._digits(number)}{self.after}"
 
@@ -44,7 +44,7 @@ class Pattern:
         """Return the number in a file name of this pattern, or None."""
         end = len(name) - len(self.after)
         digits = name[len(self.before) : end]
-        if self.filled_with(digits) != name or re.fullmatch("-?[0-9]+", digits) is None:
+        if self.name_with(digits) != name or re.fullmatch("-?[0-9]+", digits) is None:
             return None
         number = int(digits)
         if digits == self._digits(number):
@@ -55,7 +55,7 @@ class Pattern:
             return number if is_sign and len(digits) > self.width else None
         return number if len(digits) >= self.width else None
 
-    def filled_with(self, digits: str) -> str:
+    def name_with(self, digits: str) -> str:
         """Return the name of the file with this text in the place of the number."""
         return f"{self.before}{digits}{self.after}"
 
@@ -139,14 +139,14 @@ def gap_note(files: Sequence[NumberedFile]) -> str | None:
     missing = gaps(files)
     if not missing:
         return None
-    shown = list(itertools.islice(_shown(missing), _MAX_NUMBERS + 1))
+    shown = list(itertools.islice(_format(missing), _MAX_NUMBERS + 1))
     names = ", ".join([*shown[:_MAX_NUMBERS], *["..."] * (len(shown) > _MAX_NUMBERS)])
     count = missing_count(files)
     total = count + sum(number is not None for _, number in files)
     return f"{count} of {total} frames {'is' if count == 1 else 'are'} missing: {names}"
 
 
-def _shown(missing: Iterable[range]) -> Iterator[str]:
+def _format(missing: Iterable[range]) -> Iterator[str]:
     for gap in missing:
         last = gap.stop - 1
         yield str(gap.start) if gap.start == last else f"{gap.start} to {last}"

@@ -16,7 +16,7 @@ from click.core import ParameterSource
 from vkbloom._cli import terminal
 from vkbloom._cli.interrupts import INTERRUPTED, raise_interrupts
 from vkbloom._errors import Error
-from vkbloom._free_memory import ADVICE, memory_left
+from vkbloom._free_memory import ADVICE, free_memory
 from vkbloom._lazy_modules import own_module
 from vkbloom._settings.registry import METHODS
 from vkbloom._spelling import did_you_mean
@@ -138,9 +138,9 @@ class Program(click.Group):
                 _exit(INTERRUPTED, "interrupted")
             no_memory = {RuntimeError: _NO_THREAD, ImportError: _NO_LIBRARY}.get(type(error), ())
             if any(item in str(error) for item in no_memory):
-                _exit(1, described(MemoryError(str(error))))
+                _exit(1, describe(MemoryError(str(error))))
             if isinstance(error, _FAILURES):
-                _exit(1, described(error))
+                _exit(1, describe(error))
             raise
         sys.exit(status)
 
@@ -170,7 +170,7 @@ def _is_from_interrupt(error: BaseException | None) -> bool:
     return error is not None
 
 
-def described(error: BaseException) -> str:
+def describe(error: BaseException) -> str:
     """Return an error in one sentence, with the name of its file."""
     if isinstance(error, click.ClickException):
         return error.format_message()
@@ -183,7 +183,7 @@ def described(error: BaseException) -> str:
         return f"{error.filename}: {error.strerror}"
     text = str(error) or type(error).__name__
     if isinstance(error, MemoryError) and "memory is short" not in text:
-        left = memory_left()
+        left = free_memory()
         free = "" if left is None else f" ({left >> 20} MiB are free)"
         return f"memory is short{free}: {text}; {ADVICE}"
     return text
@@ -203,7 +203,7 @@ def as_wrong_use() -> Iterator[None]:
         raise click.UsageError(str(error)) from error
 
 
-def given(name: str, context: click.Context | None = None) -> bool:
+def is_given(name: str, context: click.Context | None = None) -> bool:
     """Return whether the user set a parameter of the running command, or of another context's."""
     source = (context or click.get_current_context()).get_parameter_source(name)
     return source not in (None, ParameterSource.DEFAULT, ParameterSource.DEFAULT_MAP)

@@ -14,7 +14,7 @@ from vkbloom._cli.settings_options import settings_options
 from vkbloom._cli.terminal import note, say, tell_device
 from vkbloom._framebuffers import leading
 from vkbloom._renderer import frame_files
-from vkbloom._renderer.interruptible import opened_renderer
+from vkbloom._renderer.interruptible import open_renderer
 from vkbloom._scene import Scene
 from vkbloom._settings.settings import SHADINGS, Settings, Shading
 
@@ -56,7 +56,7 @@ def command(
         raise click.UsageError("render does not write to a pipe; give --out a file or a folder")
     names = "all" if framebuffers == "all" else framebuffers.split(",")
     loaded = scene()
-    with opened_renderer(adapter) as renderer:
+    with open_renderer(adapter) as renderer:
         tell_device(renderer)
         with as_wrong_use():
             frames = renderer.render(

@@ -14,7 +14,7 @@ from rich.console import Console
 from vkbloom import _fit
 from vkbloom._cli.fields import SIZE, Command, NameOf
 from vkbloom._cli.image_files import input_colour_option, read_picture
-from vkbloom._cli.program import adapter_option, as_wrong_use, given
+from vkbloom._cli.program import adapter_option, as_wrong_use, is_given
 from vkbloom._cli.settings_options import STARTS, read_settings, settings_options
 from vkbloom._cli.terminal import Form, is_quiet, json_option, note
 from vkbloom._explorer.controls import as_code
@@ -28,7 +28,7 @@ from vkbloom._presets.start import (
     Start,
     start_of,
 )
-from vkbloom._renderer.interruptible import opened_renderer
+from vkbloom._renderer.interruptible import open_renderer
 from vkbloom._settings.registry import METHODS
 from vkbloom._settings.settings import Settings, presets
 
@@ -176,7 +176,7 @@ def fit(
     """
     picture = read_picture(image, 0, input_colour)
     wanted = read_picture(target, 0, input_colour).pixels
-    begun = _begun(picture.highlights, presets, kinds, stored)
+    begun = _list_starts(picture.highlights, presets, kinds, stored)
     searches: list[tuple[Picture, Any]] = []
     if "all" in presets:
         searches.append((picture, "all"))
@@ -188,7 +188,7 @@ def fit(
             method = start.settings.method
             note(f"{image}: its highlights are expanded to {start.expand:g} for {method}")
         searches.append((start.develop(picture), [start.settings]))
-    with opened_renderer(adapter) as renderer, as_wrong_use():
+    with open_renderer(adapter) as renderer, as_wrong_use():
         results = [
             item
             for source, settings in searches
@@ -197,7 +197,7 @@ def fit(
     return sorted(results, key=lambda item: item.loss)
 
 
-def _begun(
+def _list_starts(
     highlights: Highlights, presets: Sequence[str], kinds: Sequence[str], stored: str | None
 ) -> list[Start]:
     """Return where the searches start that are named one by one."""
@@ -236,10 +236,10 @@ def translate(
     as Python code, with numbers of four digits, its loss, a verdict (good, fair or poor, by the
     loss alone) and what differs.
     """
-    if not any(given(name) for name in STARTS):
+    if not any(is_given(name) for name in STARTS):
         raise click.UsageError(
             "give what to translate: --preset NAME, --method NAME or --settings FILE"
         )
     start = presets[target] if target in presets else METHODS[target]()
-    with opened_renderer(adapter) as renderer, as_wrong_use():
+    with open_renderer(adapter) as renderer, as_wrong_use():
         return [_fit.translate(settings, start, size=size, renderer=renderer, **search)]

@@ -35,7 +35,7 @@ def is_stream(name: str) -> bool:
     return name == PIPE or safe_writing.is_stream(name)
 
 
-def shown(name: str) -> str:
+def displayed_name(name: str) -> str:
     """Return the name of a file in a message."""
     return "standard input" if name == PIPE else name
 
@@ -55,10 +55,10 @@ def as_file(name: str) -> Iterator[str]:
     except OSError as error:
         if error.filename is None:
             raise
-        file = str(error.filename).replace(copy, shown(name))
+        file = str(error.filename).replace(copy, displayed_name(name))
         raise OSError(error.errno, error.strerror, file) from error
     except ValueError as error:
-        raise ValueError(str(error).replace(copy, shown(name))) from error
+        raise ValueError(str(error).replace(copy, displayed_name(name))) from error
 
 
 def _copy_of(name: str) -> str:
@@ -68,18 +68,18 @@ def _copy_of(name: str) -> str:
     # The name is kept, because some formats are known by it.
     file = os.path.join(context.meta[_FOLDER], name.replace("%", "%25").replace(os.sep, "%2F"))
     if not os.path.exists(file):
-        with _opened(name) as stream, open(file, "wb") as copy:
+        with _open(name) as stream, open(file, "wb") as copy:
             shutil.copyfileobj(stream, copy)
     return file
 
 
 @contextmanager
-def _opened(name: str) -> Iterator[BinaryIO]:
+def _open(name: str) -> Iterator[BinaryIO]:
     if name != PIPE:
         with open(name, "rb") as stream:
             yield stream
     elif sys.stdin is None:
-        raise OSError(errno.EBADF, "is closed", shown(name))
+        raise OSError(errno.EBADF, "is closed", displayed_name(name))
     else:
         yield sys.stdin.buffer
 
@@ -88,7 +88,7 @@ def pairs(sources: Sequence[str], target: str) -> list[tuple[str, str]]:
     """Return the files to read, each with the file to write."""
     results: list[NumberedFile] = []
     for source in sources:
-        files = expanded(source)
+        files = expand(source)
         results += files
         if (missing := gap_note(files)) is not None:
             note(f"{source}: {missing}")
@@ -101,7 +101,7 @@ def pairs(sources: Sequence[str], target: str) -> list[tuple[str, str]]:
     elif pattern is not None:
         numbers = [number for _, number in results if number is not None]
         counted = numbers if len(numbers) == len(results) else range(len(results))
-        written = [os.path.join(folder, pattern.filled(number)) for number in counted]
+        written = [os.path.join(folder, pattern.name_of(number)) for number in counted]
     elif len(results) == 1:
         written = [target]
     else:
@@ -149,7 +149,7 @@ def is_terminal() -> bool:
     return sys.stdout is not None and sys.stdout.isatty()
 
 
-def expanded(source: str) -> list[NumberedFile]:
+def expand(source: str) -> list[NumberedFile]:
     """Return the files of a word, with their numbers if the word is a pattern."""
     # The name of an existing file may look like a pattern.
     if source == PIPE or os.path.isfile(source):

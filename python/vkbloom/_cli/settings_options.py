@@ -12,8 +12,8 @@ from typing import Any, Final
 import click
 
 from vkbloom._cli import fields
-from vkbloom._cli.image_files import highlights_of_file, silenced
-from vkbloom._cli.program import as_wrong_use, given
+from vkbloom._cli.image_files import highlights_of_file, silence
+from vkbloom._cli.program import as_wrong_use, is_given
 from vkbloom._cli.sequences import as_file
 from vkbloom._io.expansion import check_expansion
 from vkbloom._io.picture import Highlights
@@ -132,12 +132,12 @@ class StartOptions:
         expand = self.expand
         if expand is None and self.stored is not None:
             expand = self.stored[1]
-        begun = self._begun() or start_of(highlights).settings
+        begun = self._find_start() or start_of(highlights).settings
         _check_declared(begun, self.changes)
         with as_wrong_use():
             return start_of(highlights, begun, self.changes, expand=expand)
 
-    def _begun(self) -> Settings | None:
+    def _find_start(self) -> Settings | None:
         """Return what the settings start from; None: the default for the source."""
         if self.stored is not None:
             begun = self.stored[0]
@@ -153,7 +153,7 @@ class StartOptions:
 
 def read_settings(name: str) -> tuple[Settings, float | None]:
     """Return the settings of a file, and what the highlights of its picture were expanded up to."""
-    with silenced(), as_file(name) as file:
+    with silence(), as_file(name) as file:
         try:
             with open(file, "rb") as stream:
                 is_json = stream.read(64).lstrip(b"\xef\xbb\xbf \r\n\t").startswith(b"{")
@@ -177,7 +177,7 @@ def read_settings(name: str) -> tuple[Settings, float | None]:
 
 def _check_declared(begun: Settings, changes: Mapping[str, Any]) -> None:
     """Raise click.UsageError for options that the settings' method does not have."""
-    used = {name: _used(name) for name in changes}
+    used = {name: _option_that_set(name) for name in changes}
     foreign = [name for name in changes if _option_of(type(begun), name) != used[name]]
     if not foreign:
         return
@@ -194,10 +194,10 @@ def _check_declared(begun: Settings, changes: Mapping[str, Any]) -> None:
     )
 
 
-def _used(name: str) -> str:
+def _option_that_set(name: str) -> str:
     """Return the option that set a field; fields of one name may have several."""
     options = [_option_of(kind, name) for kind in METHODS.values()]
-    return next(option for option in options if option and given(option))
+    return next(option for option in options if option and is_given(option))
 
 
 def _option_of(kind: type[Settings], name: str) -> str:

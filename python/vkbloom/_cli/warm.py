@@ -13,7 +13,7 @@ from vkbloom._cli.fields import SIZE, NameOf
 from vkbloom._cli.program import adapter_option
 from vkbloom._cli.terminal import hides_progress, say
 from vkbloom._formats import IMAGE_DTYPES
-from vkbloom._renderer.interruptible import opened_renderer
+from vkbloom._renderer.interruptible import open_renderer
 from vkbloom._scene import Scene
 from vkbloom._settings.registry import METHODS
 from vkbloom._settings.settings import presets as known_presets
@@ -58,7 +58,7 @@ def command(
     warmed = [known_presets[name] for name in (known_presets if everything else presets)]
     warmed += [METHODS[name]() for name in methods]
     calls = list(itertools.product(sizes or (_USUAL_SIZE,), IMAGE_DTYPES, (3, 4), warmed, _KEPT))
-    with opened_renderer(adapter) as renderer:
+    with open_renderer(adapter) as renderer:
         if everything:
             scene = Scene.ufo()
             for shading in ("forward", "deferred"):

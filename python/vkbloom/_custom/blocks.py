@@ -46,16 +46,16 @@ class Directive:
         if not self.value:
             raise self.fault("the name is missing")
         if not re.fullmatch(r"[A-Za-z_]\w*", self.value, re.ASCII):
-            raise self.refused("is not a name; it needs letters, digits and _")
+            raise self.refusal("is not a name; it needs letters, digits and _")
         if self.value.startswith("gl_") or "__" in self.value:
-            raise self.refused("is reserved in GLSL")
+            raise self.refusal("is reserved in GLSL")
         return self.value
 
     def fault(self, cause: object) -> ValueError:
         """Return the error of the line."""
         return self.source.fault(self.line, f"{self.name}: {cause}")
 
-    def refused(self, cause: str) -> ValueError:
+    def refusal(self, cause: str) -> ValueError:
         """Return the error of the value."""
         return self.fault(f"{self.value!r} {cause}")
 

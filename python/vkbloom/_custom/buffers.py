@@ -18,15 +18,15 @@ TYPES: Final = {
     **{f"mat{c}x{r}": (r, c) for c in (2, 3, 4) for r in (2, 3, 4)},
 }
 #: What every device of Vulkan 1.1 allows for a uniform buffer.
-LARGEST_UNIFORM: Final = 16384
-LARGEST_STORAGE: Final = 1 << 27
+MAX_UNIFORM_BYTES: Final = 16384
+MAX_STORAGE_BYTES: Final = 1 << 27
 
 #: Rules of GLSL for the places of variables in a buffer.
 Packing: TypeAlias = Literal["std140", "std430"]
 
 
 @dataclasses.dataclass(frozen=True)
-class Variable:
+class BufferVariable:
     """A variable of a buffer; `count` is None if it is no array."""
 
     type: str
@@ -34,7 +34,7 @@ class Variable:
     count: int | None
 
     @property
-    def declared(self) -> str:
+    def declaration(self) -> str:
         """The declaration in GLSL."""
         return f"{self.type} {self.name}" + ("" if self.count is None else f"[{self.count}]")
 
@@ -44,14 +44,14 @@ class Buffer:
     """A buffer with its size in bytes, and its data (None: zero)."""
 
     name: str
-    variables: tuple[Variable, ...]
+    variables: tuple[BufferVariable, ...]
     storage: bool
     size: int
     data: bytes | None
     line: int
 
 
-def packed_size(variables: tuple[Variable, ...], packing: Packing) -> int:
+def packed_size(variables: tuple[BufferVariable, ...], packing: Packing) -> int:
     """Return the size of a buffer up to its last number."""
     end = 0
     for variable in variables:
@@ -73,7 +73,7 @@ def read_buffer(block: Block) -> Buffer:
     if not variables:
         raise block.fault(line, "the block has no //!VAR")
     size = packed_size(variables, "std430" if storage else "std140")
-    largest = LARGEST_STORAGE if storage else LARGEST_UNIFORM
+    largest = MAX_STORAGE_BYTES if storage else MAX_UNIFORM_BYTES
     if size > largest:
         raise block.fault(line, f"{size} bytes are more than {largest}")
     data = read_hex(block)
@@ -82,16 +82,16 @@ def read_buffer(block: Block) -> Buffer:
     return Buffer(name, variables, storage, size, data or None, line)
 
 
-def read_variable(directive: Directive) -> Variable:
+def read_variable(directive: Directive) -> BufferVariable:
     """Read a directive VAR: a type, a name, and for an array its length."""
     match = re.fullmatch(r"(\S+)\s+([A-Za-z_]\w*)\s*(\[\s*(\S*?)\s*\])?", directive.value, re.ASCII)
     if not match:
-        raise directive.refused("is not 'type name' or 'type name[count]'")
+        raise directive.refusal("is not 'type name' or 'type name[count]'")
     kind, name, array, length = match.groups()
     if kind not in TYPES:
         raise directive.fault(f"{kind!r} is not one of {', '.join(TYPES)}")
     if array is None:
-        return Variable(kind, name, None)
+        return BufferVariable(kind, name, None)
     if not re.fullmatch(r"\d{1,9}", length or "", re.ASCII) or int(length) < 1:
         raise directive.fault(f"{length!r} is not an array's length, 1 or more")
-    return Variable(kind, name, int(length))
+    return BufferVariable(kind, name, int(length))

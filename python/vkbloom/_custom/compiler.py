@@ -1,4 +1,4 @@
-"""The compiler of own shaders: glslang as a process of its own, with limits, and a cache."""
+"""The compiler of custom shaders: glslang as a child process, with limits, and a cache."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ if sys.platform == "linux":
 MAX_PROCESSOR_SECONDS: Final = 20
 MAX_SECONDS: Final = 60.0
 MAX_MEMORY: Final = 2 << 30
-LARGEST_RESULT: Final = 64 << 20
+MAX_RESULT_BYTES: Final = 64 << 20
 
 #: The package's GLSL that `#include` finds.
 LIBRARY: Final = Path(__file__).parent / "glsl"
@@ -74,7 +74,7 @@ def compile_shader(file: CustomFile, item: CustomPass, shader: Shader) -> bytes:
     """Return the SPIR-V of a pass, from the cache where it is there."""
     code = cached_code(shader)
     if code is None:
-        code = compiled(file, item, shader)
+        code = compile_pass(file, item, shader)
         CACHE.write(_key(shader), code)
     return code
 
@@ -88,7 +88,7 @@ def _key(shader: Shader) -> bytes:
     return hashlib.sha256(identity() + bytes([shader.compute]) + shader.text.encode()).digest()
 
 
-def compiled(file: CustomFile, item: CustomPass, shader: Shader) -> bytes:
+def compile_pass(file: CustomFile, item: CustomPass, shader: Shader) -> bytes:
     """Run the compiler; raise ShaderError with the user's file and line if it refuses."""
     with tempfile.TemporaryDirectory(prefix="vkbloom") as folder:
         target = Path(folder) / "shader.spv"
@@ -97,7 +97,7 @@ def compiled(file: CustomFile, item: CustomPass, shader: Shader) -> bytes:
         status, text = run_limited(command, shader.text, folder)
         code = target.read_bytes() if status == 0 and target.exists() else b""
     if not code:
-        raise ShaderError(explained(file, item, status, text))
+        raise ShaderError(explain(file, item, status, text))
     words = np.frombuffer(code, "=u4")
     if len(code) % 4 or len(words) < 6 or words[0] != SPIRV_MAGIC:
         raise ShaderError(file.source.where(item.line, "the compiler's result is not SPIR-V"))
@@ -140,14 +140,14 @@ def limit(process: int) -> None:
     for which, most in (
         (resource.RLIMIT_CPU, MAX_PROCESSOR_SECONDS),
         (resource.RLIMIT_AS, MAX_MEMORY),
-        (resource.RLIMIT_FSIZE, LARGEST_RESULT),
+        (resource.RLIMIT_FSIZE, MAX_RESULT_BYTES),
         (resource.RLIMIT_CORE, 0),
     ):
         with contextlib.suppress(ProcessLookupError, ValueError, PermissionError):
             resource.prlimit(process, which, (most, most))
 
 
-def explained(file: CustomFile, item: CustomPass, status: int, text: str) -> str:
+def explain(file: CustomFile, item: CustomPass, status: int, text: str) -> str:
     """Return the message of a pass that does not compile."""
     source = file.source
     if status < 0 or status > 128:
@@ -164,7 +164,7 @@ def explained(file: CustomFile, item: CustomPass, status: int, text: str) -> str
         if part == str(BODY):
             bound = [stage_of(binding.value) for binding in item.bindings]
             saved = [each.save.value for each in file.passes if each.save is not None]
-            textures = [HOOKED, GLOW, *STAGES, *saved, *file.given]
+            textures = [HOOKED, GLOW, *STAGES, *saved, *file.embedded]
             hint = hints.for_undeclared(cause, bound, textures)
             return source.where(min(max(int(number), 1), last), cause.strip() + hint)
     if "'hook'" in text:
@@ -173,7 +173,7 @@ def explained(file: CustomFile, item: CustomPass, status: int, text: str) -> str
     match = MESSAGE.search(text)
     cause = match[3].strip() if match else text.strip().split("\n")[-1]
     # A name of a block that GLSL does not accept, in the lines before the body.
-    lines = {block.name: block.line for block in (*file.params, *file.given.values())}
+    lines = {block.name: block.line for block in (*file.params, *file.embedded.values())}
     for name in re.findall(r"'(\w+)'", cause):
         if name in lines:
             return source.where(lines[name], f"{name!r} is not possible as a name: {cause}")

@@ -125,6 +125,6 @@ def unknown_word(token: str, values: Values) -> str:
     )
 
 
-def rounded(value: float) -> int:
+def round_half_away(value: float) -> int:
     """Round half away from zero."""
     return int(math.copysign(math.floor(abs(value) + 0.5), value))

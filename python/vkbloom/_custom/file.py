@@ -13,7 +13,7 @@ from vkbloom._custom.names import BLOOM, GLOW, HISTORY, HOOKED, STAGES, stage_of
 from vkbloom._custom.params import Param, read_param
 from vkbloom._custom.passes import CustomPass, read_pass
 from vkbloom._custom.source import Source
-from vkbloom._custom.textures import Texture, read_texture
+from vkbloom._custom.textures import FileTexture, read_texture
 
 #: Sizes that every expression may name, beside those of stages and saved textures.
 KNOWN_SIZES = (HOOKED, GLOW, "OUTPUT", "NATIVE_CROPPED")
@@ -25,14 +25,14 @@ class CustomFile:
 
     source: Source
     params: tuple[Param, ...]
-    textures: tuple[Texture, ...]
+    textures: tuple[FileTexture, ...]
     buffers: tuple[Buffer, ...]
     passes: tuple[CustomPass, ...]
 
     @property
-    def given(self) -> dict[str, Texture | Buffer]:
+    def embedded(self) -> dict[str, FileTexture | Buffer]:
         """The textures and buffers whose data is in the file, by name."""
-        blocks: dict[str, Texture | Buffer] = {block.name: block for block in self.textures}
+        blocks: dict[str, FileTexture | Buffer] = {block.name: block for block in self.textures}
         return {**blocks, **{block.name: block for block in self.buffers}}
 
     @property
@@ -41,18 +41,18 @@ class CustomFile:
 
         A texture that is itself saved, or given, under such a name is what it says.
         """
-        saved = {item.saved_at(stage) for stage, item in self.runs()}
+        saved = {item.result_at(stage) for stage, item in self.runs()}
         bound = {binding.value for item in self.passes for binding in item.bindings}
         return {
             f"{HISTORY}{name}": name
             for name in sorted(saved - {None}, key=str)
-            if name and f"{HISTORY}{name}" in bound - saved - self.given.keys()
+            if name and f"{HISTORY}{name}" in bound - saved - self.embedded.keys()
         }
 
     @property
     def saves_bloom(self) -> bool:
         """Whether the file gives the bloom, and leaves the composite to the package."""
-        return any(item.saved_at(stage) == BLOOM for stage, item in self.runs())
+        return any(item.result_at(stage) == BLOOM for stage, item in self.runs())
 
     def runs(self) -> Iterator[tuple[str, CustomPass]]:
         """Return each pass with its stage, in the order in which they run."""
@@ -72,7 +72,7 @@ class CustomFile:
 def read_file(source: Source) -> CustomFile:
     """Read a file; raise ValueError if it is not valid."""
     params: list[Param] = []
-    textures: list[Texture] = []
+    textures: list[FileTexture] = []
     buffers: list[Buffer] = []
     passes: list[CustomPass] = []
     for block in read_blocks(source):
@@ -96,7 +96,7 @@ def read_file(source: Source) -> CustomFile:
 def check_unique(file: CustomFile) -> None:
     """Check that no two blocks have the same name."""
     seen: dict[str, int] = {}
-    blocks: list[Param | Texture | Buffer] = [*file.params, *file.textures, *file.buffers]
+    blocks: list[Param | FileTexture | Buffer] = [*file.params, *file.textures, *file.buffers]
     for block in blocks:
         if block.name in seen:
             raise file.source.fault(
@@ -114,20 +114,20 @@ def check_names(file: CustomFile) -> None:
         reached = {*STAGES[: STAGES.index(stage) + 1], *known}
         for binding in item.bindings:
             name = stage_of(binding.value)
-            if name not in {*reached, *file.given, *file.histories, HOOKED, GLOW}:
+            if name not in {*reached, *file.embedded, *file.histories, HOOKED, GLOW}:
                 raise binding.fault(unknown_texture(file, number, stage, binding.value))
         sizes = dict.fromkeys({*reached, *KNOWN_SIZES, "MAINPRESUB"}, (7, 5))
         if "MAIN" not in reached:
             del sizes["MAINPRESUB"]
         for expression in (item.when, item.width, item.height):
             check_expression(expression, Values(sizes, words))
-        if saved := item.saved_at(stage):
+        if saved := item.result_at(stage):
             known.add(saved)
 
 
 def unknown_texture(file: CustomFile, index: int, stage: str, name: str) -> str:
     """Return why a texture is not known to a pass."""
-    later = [item for at, item in list(file.runs())[index:] if item.saved_at(at) == stage_of(name)]
+    later = [item for at, item in list(file.runs())[index:] if item.result_at(at) == stage_of(name)]
     if later:
         return f"{name!r} is saved only by a later pass, in line {later[0].line}"
     if name.startswith(HISTORY):
@@ -135,7 +135,7 @@ def unknown_texture(file: CustomFile, index: int, stage: str, name: str) -> str:
     if stage_of(name) in STAGES:
         return f"the stage {name} comes after the pass's own, {stage}"
     saved = [item.save.value for _, item in list(file.runs())[:index] if item.save]
-    known = dict.fromkeys([HOOKED, GLOW, *saved, *file.given])
+    known = dict.fromkeys([HOOKED, GLOW, *saved, *file.embedded])
     return f"{name!r} is not a texture here; known are {', '.join(known)} and the stages"
 
 
@@ -151,7 +151,7 @@ def check_expression(expression: Directive | None, values: Values) -> None:
 
 def check_picture(file: CustomFile) -> None:
     """Check that the file gives a bloom or a picture."""
-    if not any(item.saved_at(stage) in (None, BLOOM) for stage, item in file.runs()):
+    if not any(item.result_at(stage) in (None, BLOOM) for stage, item in file.runs()):
         raise file.source.fault(
             file.passes[-1].line,
             "no pass writes the picture or saves BLOOM; let the last pass replace the picture "

@@ -18,7 +18,7 @@ from vkbloom._custom.file import CustomFile
 from vkbloom._custom.names import HOOKED, stage_of
 from vkbloom._custom.params import Param
 from vkbloom._custom.passes import CustomPass
-from vkbloom._custom.textures import Texture
+from vkbloom._custom.textures import FileTexture
 
 #: Numbers of the parts of a shader in the compiler's messages.
 BODY: Final = 1
@@ -75,10 +75,10 @@ class Shader:
     compute: bool
     members: tuple[Member, ...]
     images: tuple[str, ...]
-    textures: tuple[Texture, ...]
+    textures: tuple[FileTexture, ...]
     buffers: tuple[Buffer, ...]
 
-    def packed(self, given: Mapping[str, object]) -> bytes:
+    def pack(self, given: Mapping[str, object]) -> bytes:
         """Return the block of parameters in std140; vectors are first, so there are no gaps."""
         kinds = {"int": "<i4", "uint": "<u4"}
         return b"".join(
@@ -183,7 +183,7 @@ def write_shader(
         stage if binding.value == HOOKED else stage_of(binding.value)
         # Images of this frame first, as in Row.
         for binding in sorted(item.bindings, key=lambda binding: binding.value in file.histories)
-        if binding.value not in file.given
+        if binding.value not in file.embedded
     )
     images = [(image, names_of(image, stage, bound)) for image in names_bound]
     without_remarks = re.sub(r"//[^\n]*|/\*.*?\*/", " ", item.body, flags=re.DOTALL)
@@ -229,20 +229,20 @@ def write_shader(
     )
 
 
-def texture_lines(texture: Texture, binding: int) -> str:
+def texture_lines(texture: FileTexture, binding: int) -> str:
     """Return the declaration of a texture."""
     if texture.storage:
         qualifiers = f"binding = {binding}, {texture.format.layout}"
-        return f"layout({qualifiers}) uniform {texture.declared} {texture.name};"
+        return f"layout({qualifiers}) uniform {texture.declaration} {texture.name};"
     return (
-        f"layout(binding = {binding}) uniform {texture.declared} {texture.name};\n"
+        f"layout(binding = {binding}) uniform {texture.declaration} {texture.name};\n"
         f"#define {texture.name}_tex(p) texture({texture.name}, p)"
     )
 
 
 def buffer_lines(buffer: Buffer, binding: int) -> str:
     """Return the declaration of a buffer."""
-    inside = " ".join(f"{variable.declared};" for variable in buffer.variables)
+    inside = " ".join(f"{variable.declaration};" for variable in buffer.variables)
     packing, kind = ("std430", "buffer") if buffer.storage else ("std140", "uniform")
     return f"layout(binding = {binding}, {packing}) {kind} vkb_of_{buffer.name} {{ {inside} }};"
 

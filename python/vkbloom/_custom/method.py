@@ -15,10 +15,10 @@ from typing import Any, ClassVar, Final, Literal, Self
 from numpy.typing import NDArray
 
 from vkbloom import _core
-from vkbloom._argument_types import checked
+from vkbloom._argument_types import check_arguments
 from vkbloom._custom.file import CustomFile, read_file
 from vkbloom._custom.params import RANGES, Param
-from vkbloom._custom.planning import Request, planned
+from vkbloom._custom.planning import FrameValues, plan_rows
 from vkbloom._custom.rows import changing_resources
 from vkbloom._custom.shaders import Shaders
 from vkbloom._custom.source import Source, read_source
@@ -87,7 +87,7 @@ class CustomMethod(Settings, metaclass=CustomType):
             changed = changing_resources(self.file)
         elif (changed := self._state.get(type(self), {})) == {}:
             changed = self._state[type(self)] = changing_resources(self.file)
-        request = Request(
+        request = FrameValues(
             frame,
             buffers,
             self.numbers(),
@@ -95,12 +95,12 @@ class CustomMethod(Settings, metaclass=CustomType):
             self._place,
             {**self.shaders.resources, **changed},
         )
-        return tuple(row.packed() for row in planned(self.file, self.shaders, request))
+        return tuple(row.pack() for row in plan_rows(self.file, self.shaders, request))
 
     @property
     def _has_state(self) -> bool:
         """Whether passes change textures or buffers, so that frames depend on those before."""
-        return any(block.storage for block in self.file.given.values())
+        return any(block.storage for block in self.file.embedded.values())
 
     def _in_sequence(self, index: int, state: dict[Any, Any]) -> Self:
         """Return a copy for a frame of a sequence, which counts the frames before it."""
@@ -144,21 +144,21 @@ def class_of(name: str, source: Source, reference: Reference | None) -> type[Cus
             known = METHODS[name]
             if isinstance(known, CustomType) and known.file.source == source:
                 return known
-        return registered(name, source, reference)
+        return register(name, source, reference)
 
 
-def reduced(kind: CustomType) -> Any:
+def reduce(kind: CustomType) -> Any:
     """Return how a class is made again; for pickle."""
     if kind is CustomMethod:
         return kind.__name__
     return class_of, (kind.method, kind.file.source, kind.numpy_reference)
 
 
-copyreg.pickle(CustomType, reduced)
+copyreg.pickle(CustomType, reduce)
 
 
 @public("vkbloom")
-@checked
+@check_arguments
 def load_method(
     source: str | os.PathLike[str],
     *,
@@ -173,7 +173,7 @@ def load_method(
         The file, or its text, which contains a line feed.
     name : str, optional
         The method's name, an identifier that no method of the package has. Default: the file's stem
-        with _ in place of other characters, "own" for a text. A method that was loaded under this
+        with _ for other characters, "custom" for a text. A method that was loaded under this
         name is replaced.
     reference : callable, optional
         A reference in NumPy: ``reference(image, settings)`` gets an array (H, W, 4) in float64 and
@@ -220,12 +220,12 @@ def load_method(
     """
     read = read_source(source)
     if name is None:
-        name = identifier_of(Path(read.name).stem if read.name != "<text>" else "own")
+        name = identifier_of(Path(read.name).stem if read.name != "<text>" else "custom")
     elif not isinstance(name, str) or not name.isidentifier() or keyword.iskeyword(name):
         raise ValueError(f"name: {name!r} is not an identifier")
     with _LOADING:
         known = class_of(name, read, reference)
-        return known if known.numpy_reference is reference else registered(name, read, reference)
+        return known if known.numpy_reference is reference else register(name, read, reference)
 
 
 def identifier_of(stem: str) -> str:
@@ -234,7 +234,7 @@ def identifier_of(stem: str) -> str:
     return name if name.isidentifier() and not keyword.iskeyword(name) else f"_{name}"
 
 
-def registered(name: str, source: Source, reference: Reference | None) -> type[CustomMethod]:
+def register(name: str, source: Source, reference: Reference | None) -> type[CustomMethod]:
     """Make the class of a text, and register it; with the lock of loading."""
     if name in METHODS and not isinstance(METHODS[name], CustomType):
         raise ValueError(f"name: {name!r} is a method of vkbloom; give another name=")
@@ -266,7 +266,7 @@ def registered(name: str, source: Source, reference: Reference | None) -> type[C
 def class_name(name: str) -> str:
     """Return the name of a method's class: soft_bloom is SoftBloom."""
     joined = "".join(part[:1].upper() + part[1:] for part in name.split("_"))
-    return joined if joined.isidentifier() else f"Own{joined}"
+    return joined if joined.isidentifier() else f"Custom{joined}"
 
 
 def field_of(file: CustomFile, param: Param) -> tuple[Any, Any]:

@@ -24,7 +24,7 @@ BLOOM: Final = "BLOOM"
 #: Before the name of a saved texture: what the frame before has saved under it.
 HISTORY: Final = "HISTORY_"
 #: The longest name that a framebuffer has.
-LONGEST: Final = 31
+MAX_NAME_LENGTH: Final = 31
 
 
 def stage_of(name: str) -> str:

@@ -86,7 +86,7 @@ def read_type(block: Block) -> tuple[Number, Use, bool]:
     for number in get_args(Number):
         if kinds == [number]:
             return number, use, False
-    raise declared.refused(
+    raise declared.refusal(
         "is not one of float, int, uint, DYNAMIC or CONSTANT with one of these, DEFINE, ENUM int, "
         "ENUM DEFINE"
     )

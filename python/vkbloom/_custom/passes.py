@@ -8,13 +8,13 @@ from typing import Final
 
 from vkbloom._custom.blocks import Block, Directive
 from vkbloom._custom.expressions import ExpressionError, tokens
-from vkbloom._custom.names import GLOW, HOOKED, LONGEST, STAGES, stage_of
+from vkbloom._custom.names import GLOW, HOOKED, MAX_NAME_LENGTH, STAGES, stage_of
 
 MAX_STAGES: Final = 16
 MAX_BINDINGS: Final = 16
 #: Threads of a workgroup: what every device of Vulkan has.
 MAX_THREADS: Final = 1024
-LARGEST_BLOCK: Final = 16384
+MAX_BLOCK_SIDE: Final = 16384
 
 
 @dataclasses.dataclass(frozen=True)
@@ -41,7 +41,7 @@ class CustomPass:
     body_line: int
     line: int
 
-    def saved_at(self, stage: str) -> str | None:
+    def result_at(self, stage: str) -> str | None:
         """Return the name of the result at a stage; None if it replaces the picture."""
         if self.save is None or stage_of(self.save.value) in (HOOKED, stage):
             return None
@@ -55,8 +55,8 @@ def read_pass(block: Block) -> CustomPass:
         name = save.identifier()
         if stage_of(name) == GLOW:
             raise save.fault("GLOW is what glows; save under another name")
-        if len(name) > LONGEST:
-            raise save.refused(f"is longer than {LONGEST} characters")
+        if len(name) > MAX_NAME_LENGTH:
+            raise save.refusal(f"is longer than {MAX_NAME_LENGTH} characters")
     check_ignored(block)
     bindings = block.all("BIND")
     if len(bindings) > MAX_BINDINGS:
@@ -123,11 +123,11 @@ def read_compute(block: Block) -> Compute | None:
         return None
     given = numbers(directive)
     if given is None or len(given) not in (2, 4):
-        raise directive.refused("is not two or four numbers")
+        raise directive.refusal("is not two or four numbers")
     width, height = given[:2]
     threads = (given[-2], given[-1])
-    if not (1 <= width <= LARGEST_BLOCK and 1 <= height <= LARGEST_BLOCK):
-        cause = f"pixels are out of range, 1 to {LARGEST_BLOCK}"
+    if not (1 <= width <= MAX_BLOCK_SIDE and 1 <= height <= MAX_BLOCK_SIDE):
+        cause = f"pixels are out of range, 1 to {MAX_BLOCK_SIDE}"
         raise directive.fault(f"{width} x {height} {cause}")
     if min(threads) < 1 or threads[0] * threads[1] > MAX_THREADS:
         cause = f"threads are out of range, 1 to {MAX_THREADS}"
@@ -140,11 +140,11 @@ def check_ignored(block: Block) -> None:
     for directive in block.all("COMPONENTS"):
         given = numbers(directive)
         if given is None or len(given) != 1 or not 1 <= given[0] <= 4:
-            raise directive.refused("is not a number, 1 to 4")
+            raise directive.refusal("is not a number, 1 to 4")
     for directive in block.all("OFFSET"):
         words = directive.value.split()
         number = r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?"
         if words != ["ALIGN"] and not (
             len(words) == 2 and all(re.fullmatch(number, word, re.ASCII) for word in words)
         ):
-            raise directive.refused("is not two numbers or ALIGN")
+            raise directive.refusal("is not two numbers or ALIGN")

@@ -10,13 +10,13 @@ from typing import Final
 
 from vkbloom._custom.blocks import Directive
 from vkbloom._custom.buffers import Buffer
-from vkbloom._custom.expressions import ExpressionError, Values, evaluate, rounded
+from vkbloom._custom.expressions import ExpressionError, Values, evaluate, round_half_away
 from vkbloom._custom.file import CustomFile
-from vkbloom._custom.names import BLOOM, GLOW, HOOKED, LONGEST, RESIZING, STAGES
+from vkbloom._custom.names import BLOOM, GLOW, HOOKED, MAX_NAME_LENGTH, RESIZING, STAGES
 from vkbloom._custom.passes import CustomPass
 from vkbloom._custom.rows import Resources, Row
 from vkbloom._custom.shaders import BLACK, COPY, DIFFERENCE, Shaders, package_shader
-from vkbloom._custom.textures import Texture
+from vkbloom._custom.textures import FileTexture
 
 Size = tuple[int, int]
 #: A pass that changes a resource has another turn in each request.
@@ -24,7 +24,7 @@ TURNS: Final = itertools.count(1)
 #: What the core calls the finished picture and the bloom.
 PICTURE: Final = "main"
 BLOOM_IMAGE: Final = "bloom"
-LARGEST_SIDE: Final = 16384
+MAX_SIDE: Final = 16384
 #: Names that no saved texture has: of images of the package, whether the frame has them or not. The
 #: core renames those of its other images, in the same way.
 TAKEN: Final = {
@@ -34,7 +34,7 @@ TAKEN: Final = {
 
 
 @dataclasses.dataclass(frozen=True)
-class Image:
+class PassImage:
     """An image that passes read: its name, and its size."""
 
     name: str
@@ -42,7 +42,7 @@ class Image:
 
 
 @dataclasses.dataclass(frozen=True)
-class Request:
+class FrameValues:
     """What a frame has: sizes, the parameters' numbers, and the number of frames before it."""
 
     frame: Size
@@ -60,21 +60,21 @@ class Step:
     item: CustomPass
     stage: str
     saved: str | None
-    image: Image
-    sizes: Mapping[str, Image]
+    image: PassImage
+    sizes: Mapping[str, PassImage]
 
 
 class Planner:
     """Goes through the passes of a file in the order in which they run."""
 
-    def __init__(self, file: CustomFile, request: Request) -> None:
+    def __init__(self, file: CustomFile, request: FrameValues) -> None:
         self._file = file
         self._request = request
         self._words = file.words(dict(request.values))
-        self._picture = Image("MAIN", request.frame)
-        self._saved: dict[str, Image] = {}
+        self._picture = PassImage("MAIN", request.frame)
+        self._saved: dict[str, PassImage] = {}
         # The picture as each stage left it.
-        self._left: dict[str, Image] = {}
+        self._left: dict[str, PassImage] = {}
         self.steps: list[Step] = []
         for stage in STAGES:
             self._saved.pop(stage, None)
@@ -87,26 +87,26 @@ class Planner:
     def _run(self, stage: str, item: CustomPass) -> None:
         images = self._images(stage)
         for binding in item.bindings:
-            if binding.value not in {*images, *self._file.given, *self._file.histories}:
-                raise binding.refused("was not saved, since the WHEN of its pass is 0")
+            if binding.value not in {*images, *self._file.embedded, *self._file.histories}:
+                raise binding.refusal("was not saved, since the WHEN of its pass is 0")
         size = (self._side(item.width, stage, 0), self._side(item.height, stage, 1))
-        saved = item.saved_at(stage)
+        saved = item.result_at(stage)
         if saved is None and stage not in RESIZING and size != self._picture.size:
             raise self._file.source.fault(
                 item.line,
                 f"the picture's size is {size} after this pass, not {self._picture.size}; only the "
                 f"stages {', '.join(RESIZING)} can change it",
             )
-        image = Image(f"{len(self.steps)}.{saved or PICTURE}"[:LONGEST], size)
+        image = PassImage(f"{len(self.steps)}.{saved or PICTURE}"[:MAX_NAME_LENGTH], size)
         self.steps.append(Step(item, stage, saved, image, images))
         if saved is None:
             self._picture = self._left[stage] = image
         else:
             self._saved[saved] = image
 
-    def _images(self, stage: str) -> dict[str, Image]:
+    def _images(self, stage: str) -> dict[str, PassImage]:
         """Return the images that a pass of a stage finds, by name."""
-        images = {GLOW: Image(GLOW, self._request.buffers), **self._left, **self._saved}
+        images = {GLOW: PassImage(GLOW, self._request.buffers), **self._left, **self._saved}
         images[HOOKED] = images[stage] = self._picture
         if "MAIN" in images:
             images["MAINPRESUB"] = images["MAIN"]
@@ -125,9 +125,9 @@ class Planner:
         """Return a side of a pass's result."""
         if expression is None:
             return self._picture.size[axis]
-        side = rounded(self._value(expression, stage))
-        if not 1 <= side <= LARGEST_SIDE:
-            raise expression.fault(f"a side of {side} pixels is out of range, 1 to {LARGEST_SIDE}")
+        side = round_half_away(self._value(expression, stage))
+        if not 1 <= side <= MAX_SIDE:
+            raise expression.fault(f"a side of {side} pixels is out of range, 1 to {MAX_SIDE}")
         return side
 
     def _check_size(self) -> None:
@@ -141,7 +141,7 @@ class Planner:
         )
 
 
-def planned(file: CustomFile, shaders: Shaders, request: Request) -> tuple[Row, ...]:
+def plan_rows(file: CustomFile, shaders: Shaders, request: FrameValues) -> tuple[Row, ...]:
     """Return the rows of a frame."""
     steps = Planner(file, request).steps
     names = framebuffers(file, steps)
@@ -164,8 +164,8 @@ def planned(file: CustomFile, shaders: Shaders, request: Request) -> tuple[Row, 
         reads = tuple(names.get(image, image) for image in images)
         before = tuple(names[kept[image].name] for image in shader.images if image in kept)
         block = step.item.compute.block if step.item.compute else None
-        params = shader.packed(given)
-        blocks: list[Texture | Buffer] = [*shader.textures, *shader.buffers]
+        params = shader.pack(given)
+        blocks: list[FileTexture | Buffer] = [*shader.textures, *shader.buffers]
         bound = tuple(request.resources[given_block.name] for given_block in blocks)
         turn = next(TURNS) if any(given_block.storage for given_block in blocks) else 0
         size = step.image.size
@@ -181,13 +181,13 @@ def planned(file: CustomFile, shaders: Shaders, request: Request) -> tuple[Row, 
     return tuple(rows)
 
 
-def histories(file: CustomFile, steps: list[Step]) -> dict[str, Image]:
+def histories(file: CustomFile, steps: list[Step]) -> dict[str, PassImage]:
     """Return the images whose content the next frame reads, by the names that passes bind."""
     saved = {step.saved: step.image for step in steps}
     for step in steps:
         for binding in step.item.bindings:
             if file.histories.get(binding.value, step.saved) not in saved:
-                raise binding.refused("was not saved, since the WHEN of its pass is 0")
+                raise binding.refusal("was not saved, since the WHEN of its pass is 0")
     return {name: saved[of] for name, of in file.histories.items() if of in saved}
 
 
@@ -203,7 +203,7 @@ def framebuffers(file: CustomFile, steps: list[Step]) -> dict[str, str]:
     """
     last = {step.saved: step.image.name for step in steps}
     picture = last.pop(None, None)
-    labels = labels_of({saved for stage, item in file.runs() if (saved := item.saved_at(stage))})
+    labels = labels_of({saved for stage, item in file.runs() if (saved := item.result_at(stage))})
     names = {image: labels[saved] for saved, image in last.items() if saved}
     if picture is not None and not file.saves_bloom:
         names[picture] = PICTURE

@@ -10,7 +10,7 @@ from typing import Any, Final, NamedTuple
 from vkbloom import _core
 from vkbloom._custom.buffers import Buffer
 from vkbloom._custom.file import CustomFile
-from vkbloom._custom.textures import Texture
+from vkbloom._custom.textures import FileTexture
 
 #: The most images that a pass reads, textures and buffers that it binds, bytes of parameters.
 MAX_READS: Final = 16
@@ -66,7 +66,7 @@ class Row(NamedTuple):
     turn: int = 0
     histories: tuple[str, ...] = ()
 
-    def packed(self) -> tuple[Any, ...]:
+    def pack(self) -> tuple[Any, ...]:
         """Return it as the core takes it; ValueError where the core has no room."""
         for what, count, most in (
             ("images read", len(self.reads) + len(self.histories), MAX_READS),
@@ -104,24 +104,24 @@ Resources = dict[str, Resource]
 
 def constant_resources(file: CustomFile) -> Resources:
     """Return new resources by name, of those that no pass changes."""
-    return {name: resource_of(block) for name, block in file.given.items() if not block.storage}
+    return {name: resource_of(block) for name, block in file.embedded.items() if not block.storage}
 
 
 def changing_resources(file: CustomFile) -> Resources:
     """Return new resources by name, of those that passes change; they have an owner."""
-    made = {name: resource_of(block) for name, block in file.given.items() if block.storage}
+    made = {name: resource_of(block) for name, block in file.embedded.items() if block.storage}
     if not made:
         return made
     owner = _core.resource_owner()
     return {name: resource._replace(owner=owner) for name, resource in made.items()}
 
 
-def resource_of(block: Texture | Buffer) -> Resource:
+def resource_of(block: FileTexture | Buffer) -> Resource:
     """Return a texture or a buffer as a resource."""
-    return texture_resource(block) if isinstance(block, Texture) else buffer_resource(block)
+    return texture_resource(block) if isinstance(block, FileTexture) else buffer_resource(block)
 
 
-def texture_resource(texture: Texture) -> Resource:
+def texture_resource(texture: FileTexture) -> Resource:
     """Return a texture as a resource."""
     texel = len(texture.format.read(bytes(texture.format.file_bytes)).tobytes())
     block = struct.pack(

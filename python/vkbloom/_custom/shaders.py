@@ -96,4 +96,4 @@ class Shaders:
 def package_shader(index: int) -> CoreShader:
     """Return the shader of one of the package's passes."""
     file = read_file(Source("vkbloom", PACKAGE_PASSES))
-    return Shaders("own", file).of(file.passes[index], "MAIN", {})[1]
+    return Shaders("custom", file).of(file.passes[index], "MAIN", {})[1]

@@ -11,7 +11,7 @@ from typing import Final
 from vkbloom._custom import hints
 
 #: No file of passes is larger; a picture that was given by mistake is.
-LARGEST_FILE: Final = 1 << 26
+MAX_FILE_BYTES: Final = 1 << 26
 #: Of a line that a message quotes.
 QUOTED_CHARACTERS: Final = 160
 
@@ -28,7 +28,7 @@ class Source:
         """The SHA-256 of the text."""
         return hashlib.sha256(self.text.encode()).hexdigest()
 
-    def quoted(self, line: int) -> str:
+    def quote(self, line: int) -> str:
         """Return a line of the file, counted from 1, as messages quote it."""
         lines = self.text.split("\n")
         text = lines[line - 1].strip() if 0 < line <= len(lines) else ""
@@ -36,7 +36,7 @@ class Source:
 
     def where(self, line: int, cause: str) -> str:
         """Return a message that names file, line and cause, and quotes the line."""
-        return f"{self.name}:{line}: {cause}\n    {self.quoted(line)}"
+        return f"{self.name}:{line}: {cause}\n    {self.quote(line)}"
 
     def fault(self, line: int, cause: str) -> ValueError:
         """Return the error of a line."""
@@ -46,12 +46,12 @@ class Source:
 def read_source(source: str | os.PathLike[str]) -> Source:
     """Read a file, or take a text: what contains a line feed is one."""
     if isinstance(source, str) and "\n" in source:
-        return checked(Source("<text>", source.replace("\r\n", "\n")))
+        return check(Source("<text>", source.replace("\r\n", "\n")))
     if not isinstance(source, str | os.PathLike):
         raise TypeError(f"source: {source!r} is neither a path nor a text")
     path = Path(source)
-    if path.stat().st_size > LARGEST_FILE:
-        raise ValueError(f"{path}: {path.stat().st_size} bytes are more than {LARGEST_FILE}")
+    if path.stat().st_size > MAX_FILE_BYTES:
+        raise ValueError(f"{path}: {path.stat().st_size} bytes are more than {MAX_FILE_BYTES}")
     data = path.read_bytes().replace(b"\r\n", b"\n")
     try:
         text = data.decode("utf-8-sig")
@@ -61,10 +61,10 @@ def read_source(source: str | os.PathLike[str]) -> Source:
             f"{path}:{line}: byte {data[error.start]:#04x} is not UTF-8; "
             f"{hints.for_bytes(path.name, data)}"
         ) from None
-    return checked(Source(str(path), text))
+    return check(Source(str(path), text))
 
 
-def checked(source: Source) -> Source:
+def check(source: Source) -> Source:
     """Return the source; raise ValueError if it has a null character."""
     if (offset := source.text.find("\0")) >= 0:
         raise source.fault(source.text.count("\n", 0, offset) + 1, "the line has a null character")

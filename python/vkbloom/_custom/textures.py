@@ -20,7 +20,7 @@ Word = TypeVar("Word", bound=str)
 FILTERS: Final[tuple[Filter, ...]] = get_args(Filter)
 BORDERS: Final[tuple[Border, ...]] = get_args(Border)
 #: Of a side, in each number of dimensions: what every device of Vulkan 1.1 has.
-LARGEST_SIDES: Final = {1: 4096, 2: 4096, 3: 256}
+MAX_SIDES: Final = {1: 4096, 2: 4096, 3: 256}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -57,14 +57,14 @@ def as_channels(
     return read
 
 
-def packed_565(data: bytes) -> np.ndarray:
+def unpack_565(data: bytes) -> np.ndarray:
     """Read texels of 16 bits with red in the upper 5 as floats."""
     words = np.frombuffer(data, "<u2").astype(np.uint32)
     channels = [(words >> 11) / 31, (words >> 5 & 63) / 63, (words & 31) / 31, np.ones(len(words))]
     return np.stack(channels, axis=1).astype("f4")
 
 
-def packed_10(data: bytes) -> np.ndarray:
+def unpack_10(data: bytes) -> np.ndarray:
     """Read texels of 32 bits, 10 for each colour with red in the lower ones, as floats."""
     words = np.frombuffer(data, "<u4")
     channels = [(words & 1023) / 1023, (words >> 10 & 1023) / 1023, (words >> 20 & 1023) / 1023]
@@ -91,7 +91,7 @@ SCALARS: Final[dict[str, Number]] = {"u": "uint", "i": "int"}
 RGBA32_FLOAT: Final = 109
 
 
-def numbered(bits: int, kind: str, channels: int, file: str) -> TextureFormat:
+def numeric_format(bits: int, kind: str, channels: int, file: str) -> TextureFormat:
     """Return a format of the table; `file` is the type of a channel in the file."""
     index = {1: 0, 2: 1, 3: 2, 4: 2}[channels]
     letter = {"": "u", "s": "i"}.get(kind, kind) + str(bits // 8)
@@ -105,7 +105,7 @@ def numbered(bits: int, kind: str, channels: int, file: str) -> TextureFormat:
     )
 
 
-def made_formats() -> dict[str, TextureFormat]:
+def make_formats() -> dict[str, TextureFormat]:
     """Return the formats by the names that files use."""
     formats = {}
     for bits, kind in NUMBERS:
@@ -113,24 +113,26 @@ def made_formats() -> dict[str, TextureFormat]:
             if channels == 3 and (bits, kind) not in {(8, ""), (16, ""), (32, "f")}:
                 continue
             letter = {"": "u", "s": "i"}.get(kind, kind)
-            formats[f"{names}{bits}{kind}"] = numbered(bits, kind, channels, f"{letter}{bits // 8}")
+            formats[f"{names}{bits}{kind}"] = numeric_format(
+                bits, kind, channels, f"{letter}{bits // 8}"
+            )
     # Of half floats the file has single ones, unless the name says otherwise.
     for channels, names in ((1, "r"), (2, "rg"), (4, "rgba")):
-        formats[f"{names}16f"] = numbered(16, "f", channels, "f4")
-        formats[f"{names}16hf"] = numbered(16, "f", channels, "f2")
+        formats[f"{names}16f"] = numeric_format(16, "f", channels, "f4")
+        formats[f"{names}16hf"] = numeric_format(16, "f", channels, "f2")
     formats["bgra8"] = dataclasses.replace(
         formats["rgba8"], layout="", read=as_channels("u1", 4, "u1", "bgra")
     )
-    formats["rgb565"] = TextureFormat(RGBA32_FLOAT, "", "float", 3, 2, packed_565)
-    formats["rgb10a2"] = TextureFormat(RGBA32_FLOAT, "", "float", 4, 4, packed_10)
+    formats["rgb565"] = TextureFormat(RGBA32_FLOAT, "", "float", 3, 2, unpack_565)
+    formats["rgb10a2"] = TextureFormat(RGBA32_FLOAT, "", "float", 4, 4, unpack_10)
     return formats
 
 
-FORMATS: Final = made_formats()
+FORMATS: Final = make_formats()
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Texture:
+class FileTexture:
     """A texture: one to three sides, and texels (None: zero)."""
 
     name: str
@@ -143,13 +145,13 @@ class Texture:
     line: int
 
     @property
-    def declared(self) -> str:
+    def declaration(self) -> str:
         """The type of the sampler or image in GLSL."""
         prefix = {"float": "", "int": "i", "uint": "u"}[self.format.scalar]
         return f"{prefix}{'image' if self.storage else 'sampler'}{len(self.sides)}D"
 
 
-def read_texture(block: Block) -> Texture:
+def read_texture(block: Block) -> FileTexture:
     """Read a block TEXTURE."""
     name = block.head.identifier()
     storage = block.last("STORAGE") is not None
@@ -158,7 +160,7 @@ def read_texture(block: Block) -> Texture:
     if directive is None:
         raise block.fault(block.line, "the block has no //!FORMAT")
     if directive.value not in FORMATS:
-        raise directive.refused(f"is not one of {', '.join(FORMATS)}")
+        raise directive.refusal(f"is not one of {', '.join(FORMATS)}")
     texels = FORMATS[directive.value]
     if storage and not texels.layout:
         raise directive.fault(f"{directive.value} has no STORAGE; use rgba8 or rgba32f")
@@ -172,7 +174,7 @@ def read_texture(block: Block) -> Texture:
         wanted = f"{' x '.join(map(str, sides))} texels of {texels.file_bytes} ({directive.value})"
         cause = f"the data has {len(data)} bytes, not {size}: {wanted}"
         raise block.fault(block.body_line, cause)
-    return Texture(
+    return FileTexture(
         name,
         sides,
         texels,
@@ -191,9 +193,9 @@ def read_sides(block: Block) -> tuple[int, ...]:
         return (1, 1)
     words = directive.value.split()
     if not 1 <= len(words) <= 3 or not all(re.fullmatch(r"\d+", word, re.ASCII) for word in words):
-        raise directive.refused("is not one, two or three numbers")
+        raise directive.refusal("is not one, two or three numbers")
     sides = tuple(int(word) for word in words)
-    largest = LARGEST_SIDES[len(sides)]
+    largest = MAX_SIDES[len(sides)]
     if not all(1 <= side <= largest for side in sides):
         cause = f"is out of range, 1 to {largest} in {len(sides)} dimensions"
         raise directive.fault(f"{directive.value} {cause}")
@@ -208,7 +210,7 @@ def read_word(block: Block, name: str, words: tuple[Word, ...]) -> Word:
     for word in words:
         if directive.value == word:
             return word
-    raise directive.refused(f"is not one of {', '.join(words)}")
+    raise directive.refusal(f"is not one of {', '.join(words)}")
 
 
 def read_hex(block: Block) -> bytes:

@@ -41,7 +41,7 @@ def examine() -> Report:
         *installation.environment(),
         _adapters(listed, loading),
         *installation.gpu_nodes(adapters),
-        *([_chosen(chosen)] if adapters else []),
+        *([_report_choice(chosen)] if adapters else []),
         *(_test_render(name, answer) for name, answer in renders.items()),
         *installation.caches(),
         *installation.extras(),
@@ -75,7 +75,7 @@ def _adapters(listed: child.Answer, loading: Sequence[Finding]) -> Finding:
     return Finding("adapters", "problem", f"none: {reason}{said}", advice)
 
 
-def _chosen(chosen: child.Answer) -> Finding:
+def _report_choice(chosen: child.Answer) -> Finding:
     topic, wanted = "chosen adapter", os.environ.get("VKBLOOM_ADAPTER")
     reason = (
         '"auto" prefers discrete, integrated, virtual, cpu, in that order, and any of them to '

@@ -201,17 +201,17 @@ def compare_scene(
 def _derivatives(renderer: Renderer, settings: Settings, given: bool) -> Iterator[Deviation]:
     values = np.random.default_rng(1).random((4, 11, 14, 3), np.float32)
     arrays: dict[str, Any] = {"mask": values[1, ..., 0], "emission": values[2]} if given else {}
-    yield from _pulled(renderer, settings, values[0], values[3], **arrays)
+    yield from _pull(renderer, settings, values[0], values[3], **arrays)
 
 
 def _derivatives_of_a_lamp(renderer: Renderer, settings: Settings) -> Iterator[Deviation]:
     image, cotangent = np.zeros((2, 11, 14, 4), np.float32)
     image[5, 7], image[..., 3] = (4, 2, 1, 1), 1
     cotangent[:] = np.random.default_rng(1).random(cotangent.shape)
-    yield from _pulled(renderer, settings, image, cotangent)
+    yield from _pull(renderer, settings, image, cotangent)
 
 
-def _pulled(
+def _pull(
     renderer: Renderer,
     settings: Settings,
     image: NDArray[Any],

@@ -25,7 +25,7 @@ _SINGLE: Final = 1e-4
 # What rounding to the nearest half float is off by: relative to the value, and below the smallest
 # normal half, 2 ** -14.
 _HALF_ROUNDING: Final = 2.0**-11
-_HALF_LEAST: Final = 2.0**-25
+_MIN_HALF: Final = 2.0**-25
 
 
 class Deviation(NamedTuple):
@@ -67,7 +67,7 @@ def tolerance(
         return (1.5 if stages_of_8_bits == 1 else 2.5) / 255
     if name == "float16":
         size = np.nan_to_num(np.abs(expected if magnitude is None else magnitude), posinf=0.0)
-        return stages * (_HALF_ROUNDING * size + _HALF_LEAST)
+        return stages * (_HALF_ROUNDING * size + _MIN_HALF)
     finite = np.abs(expected[np.isfinite(expected)])
     return _SINGLE * float(finite.max(initial=0.0))
 

@@ -14,7 +14,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from vkbloom import _core
-from vkbloom._free_memory import ADVICE, address_space_left
+from vkbloom._free_memory import ADVICE, free_address_space
 from vkbloom._io import disk_cache
 
 # Address space of a render of a small image on lavapipe, with the interpreter.
@@ -67,7 +67,7 @@ def core() -> list[Finding]:
 
 def memory() -> list[Finding]:
     """Report a limit of address space under which drivers fail or crash."""
-    left = address_space_left()
+    left = free_address_space()
     if left is None or left >= _AMPLE:
         return []
     text = f"memory is short: a limit leaves {left >> 20} MiB of address space to each process"

@@ -18,7 +18,7 @@ from vkbloom._doctor.child import ANSWER_MARK
 from vkbloom._errors import AdapterNotFoundError, Error
 from vkbloom._renderer.adapter import bundled_driver, from_core
 from vkbloom._renderer.frames import Frames
-from vkbloom._renderer.interruptible import opened_renderer
+from vkbloom._renderer.interruptible import open_renderer
 from vkbloom._settings.settings import check_settings
 
 SETTINGS: Final = check_settings(None).replace(bloom_size=(32, 24))
@@ -60,7 +60,7 @@ def adapters(which: str) -> dict[str, Any]:
 
 def render(adapter: str) -> dict[str, Any]:
     """Make the test render."""
-    with opened_renderer(adapter) as renderer:
+    with open_renderer(adapter) as renderer:
         info, results = renderer.info, differences(renderer.apply(IMAGE, SETTINGS))
         return {"name": info.name, "summary": info.summary, "differences": results}
 

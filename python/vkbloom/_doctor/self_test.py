@@ -20,7 +20,7 @@ from vkbloom._doctor.cases import Case, cases
 from vkbloom._doctor.child import SAFE_PATH
 from vkbloom._doctor.deviations import Deviation
 from vkbloom._errors import Error
-from vkbloom._renderer.interruptible import opened_renderer
+from vkbloom._renderer.interruptible import open_renderer
 from vkbloom._renderer.renderer import Renderer
 from vkbloom._version import installed_version
 
@@ -95,7 +95,7 @@ class _Renderers(contextlib.ExitStack):
         if variant not in self.opened:
             if variant != "auto":
                 os.environ["VKBLOOM_VARIANT"] = variant
-            self.opened[variant] = self.enter_context(opened_renderer(self.adapter))
+            self.opened[variant] = self.enter_context(open_renderer(self.adapter))
         return self.opened[variant]
 
 

@@ -34,7 +34,7 @@ def controls() -> dict[str, Any]:
     another preset or method is selected.
     """
     return {
-        "methods": {name: described(kind) for name, kind in METHODS.items()},
+        "methods": {name: describe(kind) for name, kind in METHODS.items()},
         "functions": {
             type(function).__name__: {
                 "defaults": function.to_dict(),
@@ -54,7 +54,7 @@ def controls() -> dict[str, Any]:
     }
 
 
-def described(kind: type[Settings]) -> dict[str, Any]:
+def describe(kind: type[Settings]) -> dict[str, Any]:
     """Describe a method: its defaults and its fields."""
     return {"defaults": as_fields(kind()), "fields": _fields_of_method(kind)}
 

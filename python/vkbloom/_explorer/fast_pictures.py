@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom._io.displayed import scaled_to_1
+from vkbloom._io.displayed import scale_to_1
 from vkbloom._views import pictures
 
 if TYPE_CHECKING:
@@ -24,10 +24,10 @@ def picture_of(array: NDArray[Any], name: str, *, encoding: Encoding, stops: flo
 
     `encoding`: That of `final` in the settings.
     """
-    return pictures.png(shown_pixels(array, name, encoding=encoding, stops=stops), _LEVEL)
+    return pictures.png(picture_levels(array, name, encoding=encoding, stops=stops), _LEVEL)
 
 
-def shown_pixels(
+def picture_levels(
     array: NDArray[Any], name: str, *, encoding: Encoding, stops: float
 ) -> NDArray[np.uint8]:
     """Return the 8-bit levels of `picture_of`."""
@@ -37,7 +37,7 @@ def shown_pixels(
         encoding = encoding if name == "final" else "none"
         colours = array[:, :, :3]
         if encoding == "none":
-            colours = scaled_to_1(colours, 2.0**-stops)
+            colours = scale_to_1(colours, 2.0**-stops)
         with np.errstate(over="ignore"):
             halves = np.ascontiguousarray(colours).astype(np.float16, copy=False)
         picture = _levels(stops, encoding)[halves.view(np.uint16)]

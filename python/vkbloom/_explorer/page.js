@@ -4,11 +4,11 @@
 // address. vkbloom/_explorer/viewer.py documents the messages.
 
 const TURNS_PER_SECOND = 0.25; // of the forward system's animation
-const HIGHEST = 0.72; // the largest part of the window's height for the picture
-const HIGHEST_NARROW = 0.45; // the same if the controls are below the picture
+const MAX_HEIGHT = 0.72; // the largest part of the window's height for the picture
+const MAX_HEIGHT_NARROW = 0.45; // the same if the controls are below the picture
 const NARROW = 720; // CSS pixels, as in page.css
 const WATCH = 200; // milliseconds between two looks at the files of custom methods
-const LARGEST_ZOOM = 64; // device pixels of a framebuffer's pixel
+const MAX_ZOOM = 64; // device pixels of a framebuffer's pixel
 const SIDES = ["a", "b"];
 // The key of stored settings that says what the highlights of their picture were expanded up to.
 const EXPANDED = "vkbloom:expand";
@@ -131,7 +131,7 @@ export function mount(parent, send, { store = null, heading = "h2" } = {}) {
   let time = 0;
   let playing = 0; // the request of the next animation frame, 0: paused
   let stops = 0;
-  let ownSize = false;
+  let isSourceSize = false;
   let shading = null; // of a scene
   let glow = null;
   let expand = { a: null, b: null }; // of a photograph, by side; null: not expanded
@@ -253,7 +253,7 @@ export function mount(parent, send, { store = null, heading = "h2" } = {}) {
       id: waiting,
       sides: Object.fromEntries(sides.map((side) => [side, settings[side]])),
       framebuffer,
-      size: ownSize ? null : box.map((length) => Math.max(1, Math.round(length * ratio))),
+      size: isSourceSize ? null : box.map((length) => Math.max(1, Math.round(length * ratio))),
       ...lookedAt(),
       ...(setup.expand ? { expand: Object.fromEntries(sides.map((side) => [side, expand[side]])) } : {}),
       at: pointer,
@@ -405,7 +405,7 @@ export function mount(parent, send, { store = null, heading = "h2" } = {}) {
   function zoomTo(next, at = centre) {
     const whole = 1 / ratioOf() / fitting(); // the zoom of 100 %
     const before = zoom;
-    zoom = clamp(next, Math.min(1, whole), Math.max(1, LARGEST_ZOOM * whole));
+    zoom = clamp(next, Math.min(1, whole), Math.max(1, MAX_ZOOM * whole));
     centre = centre.map((middle, axis) => at[axis] + ((middle - at[axis]) * before) / zoom);
     place();
     keep();
@@ -710,7 +710,7 @@ export function mount(parent, send, { store = null, heading = "h2" } = {}) {
     if (comparing) kept.wipe = Number(wipe.toFixed(3));
     if (editing !== "a") kept.editing = editing;
     if (framebuffer !== "final") kept.framebuffer = framebuffer;
-    if (ownSize) kept.size = "own";
+    if (isSourceSize) kept.size = "own";
     if (stops) kept.stops = stops;
     if (time && !playing) kept.time = Number(time.toFixed(3));
     if (shading !== setup.shading) kept.shading = shading;
@@ -746,7 +746,7 @@ export function mount(parent, send, { store = null, heading = "h2" } = {}) {
     wipe = clamp(numberOf(kept.wipe, 0.5), 0, 1);
     editing = comparing && kept.editing === "b" ? "b" : "a";
     framebuffer = typeof kept.framebuffer === "string" ? kept.framebuffer : "final";
-    ownSize = kept.size === "own";
+    isSourceSize = kept.size === "own";
     stops = clamp(numberOf(kept.stops, 0), -16, 16);
     time = clamp(numberOf(kept.time, 0), 0, 1);
     shading = setup.shadings.includes(kept.shading) ? kept.shading : setup.shading;
@@ -831,16 +831,16 @@ export function mount(parent, send, { store = null, heading = "h2" } = {}) {
     const sizeSelect = choose(
       [
         ["shown", "as it fits"],
-        ["own", setup.own_size.join(" × ")],
+        ["own", setup.source_size.join(" × ")],
       ],
       () => {
-        ownSize = sizeSelect.value === "own";
+        isSourceSize = sizeSelect.value === "own";
         // The source's own size: one screen pixel for each pixel of the picture.
-        nextZoom = ownSize ? showPixels : showWhole;
+        nextZoom = isSourceSize ? showPixels : showWhole;
         request(...visible());
       },
     );
-    sizeSelect.value = ownSize ? "own" : "shown";
+    sizeSelect.value = isSourceSize ? "own" : "shown";
     const exposure = make("input", { type: "number", min: -16, max: 16, step: 0.5, value: stops });
     exposure.addEventListener("input", () => {
       if (Number.isNaN(exposure.valueAsNumber)) return;
@@ -1090,8 +1090,8 @@ export function mount(parent, send, { store = null, heading = "h2" } = {}) {
 
   function measure() {
     if (!setup) return;
-    const [width, height] = setup.own_size;
-    const highest = layout.clientWidth < NARROW ? HIGHEST_NARROW : HIGHEST;
+    const [width, height] = setup.source_size;
+    const highest = layout.clientWidth < NARROW ? MAX_HEIGHT_NARROW : MAX_HEIGHT;
     const room = [seen.clientWidth, Math.max(160, highest * window.innerHeight)];
     const scale = Math.min(room[0] / width, room[1] / height);
     const next = [Math.floor(width * scale), Math.floor(height * scale)].map((side) =>
@@ -1103,7 +1103,7 @@ export function mount(parent, send, { store = null, heading = "h2" } = {}) {
     box = next;
     if (kept) zoom = kept / fitting();
     place();
-    if (!ownSize || !shown.a) {
+    if (!isSourceSize || !shown.a) {
       request(...visible());
     }
   }

@@ -55,8 +55,8 @@ _REDIRECT: Final = (
     '<p><a href="{url}">The explorer</a></p>\n'
 )
 # The longest text message in bytes. Settings are shorter. Files are sent as binary messages.
-_LARGEST_MESSAGE: Final = 1 << 16
-_LARGEST_FILE: Final = 1 << 30
+_MAX_MESSAGE_BYTES: Final = 1 << 16
+_MAX_FILE_BYTES: Final = 1 << 30
 
 
 class _RefusedNumber(ValueError):
@@ -95,7 +95,7 @@ class Server:
                     (r"/([^/]+)/socket", _Socket, shared),
                     (r"/([^/]+)/([a-z.]*)", _File, {"server": self}),
                 ],
-                websocket_max_message_size=_LARGEST_FILE,
+                websocket_max_message_size=_MAX_FILE_BYTES,
                 log_function=lambda handler: None,
             )
         )
@@ -176,11 +176,11 @@ class _Socket(WebSocketHandler):
         self._viewer = self._new_viewer()
 
     def on_message(self, message: str | bytes) -> None:
-        if isinstance(message, str) and len(message) > _LARGEST_MESSAGE:
+        if isinstance(message, str) and len(message) > _MAX_MESSAGE_BYTES:
             self.close(1009, "the message is too long")
             return
         try:
-            text, files = (message, []) if isinstance(message, str) else _unpacked(message)
+            text, files = (message, []) if isinstance(message, str) else _unpack(message)
             asked = json.loads(text, parse_float=_finite, parse_constant=_finite)
             kind = str(asked["kind"])
         except (_RefusedNumber, RecursionError) as error:
@@ -208,7 +208,7 @@ class _Socket(WebSocketHandler):
         reason = "lists and objects are nested too deeply" if is_deep else str(error)
         header = {"kind": "error", "error": f"message: {reason}"}
         with contextlib.suppress(WebSocketClosedError):
-            self.write_message(_packed(header, []), binary=True)
+            self.write_message(_pack(header, []), binary=True)
 
     async def _answer(self) -> None:
         loop = asyncio.get_running_loop()
@@ -221,7 +221,7 @@ class _Socket(WebSocketHandler):
                 )
                 if files is self._files:
                     self._files = []
-                await self.write_message(_packed(header, pictures), binary=True)
+                await self.write_message(_pack(header, pictures), binary=True)
         except WebSocketClosedError:
             self._waiting.clear()
         except Exception:
@@ -240,15 +240,15 @@ def _finite(text: str) -> float:
     return number
 
 
-def _unpacked(message: bytes) -> tuple[bytes, list[bytes]]:
-    """Return the header and the file of a message from `_packed`."""
+def _unpack(message: bytes) -> tuple[bytes, list[bytes]]:
+    """Return the header and the file of a message from `_pack`."""
     (length,) = struct.unpack_from("<I", message)
-    if length > _LARGEST_MESSAGE:
+    if length > _MAX_MESSAGE_BYTES:
         raise ValueError(f"message: the length {length} of its header is out of range")
     return message[4 : 4 + length], [message[4 + length :]]
 
 
-def _packed(header: dict[str, Any], buffers: list[bytes]) -> bytes:
+def _pack(header: dict[str, Any], buffers: list[bytes]) -> bytes:
     """Return a message: the header's length (uint32, little-endian), the header, the buffers."""
     text = json.dumps(
         {**header, "buffers": [len(buffer) for buffer in buffers]}, allow_nan=False

@@ -39,16 +39,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom import _core
-from vkbloom._custom.method import CustomType, registered
+from vkbloom._custom.method import CustomType, register
 from vkbloom._custom.source import read_source
 from vkbloom._explorer.controls import (
     as_fields,
     code_with_image,
     controls,
-    described,
+    describe,
     settings_from,
 )
-from vkbloom._explorer.fast_pictures import picture_of, shown_pixels
+from vkbloom._explorer.fast_pictures import picture_levels, picture_of
 from vkbloom._image_arguments import check_image
 from vkbloom._io.expansion import check_expansion
 from vkbloom._io.image_file import read_picture
@@ -64,7 +64,7 @@ from vkbloom._scene import Scene
 from vkbloom._settings.fields import fields_of
 from vkbloom._settings.registry import METHODS
 from vkbloom._settings.settings import SHADINGS, check_settings, check_shading
-from vkbloom._views.pictures import png, reduced
+from vkbloom._views.pictures import png, reduce
 
 if TYPE_CHECKING:
     from vkbloom._renderer.frames import Frames
@@ -77,7 +77,7 @@ SIDES: Final = ("a", "b")
 #: presets' blooms.
 GLOW: Final = 6.0
 
-_LARGEST_SIDE: Final = 8192
+_MAX_SIDE: Final = 8192
 # Views do not say when they are closed. The framebuffers of the oldest ones are dropped.
 _VIEWS_KEPT: Final = 8
 _FAILURES: Final = (_core.Error, OSError, TypeError, ValueError, MemoryError, RecursionError)
@@ -85,7 +85,7 @@ _FAILURES: Final = (_core.Error, OSError, TypeError, ValueError, MemoryError, Re
 _AUTOMATIC: Final = "auto"
 # Images that are kept: those of both sides, whole and reduced.
 _IMAGES_KEPT: Final = 4
-_LARGEST_GLOW: Final = 1e4
+_MAX_GLOW: Final = 1e4
 # A deferred scene has light above white, which needs a tone map.
 _DEVELOPED: Final = {"tonemap": "aces", "encoding": "srgb"}
 
@@ -127,7 +127,7 @@ class Viewer:
         if against is not None:
             self.settings["b"] = check_settings(against)
         if isinstance(source, Scene):
-            self._own_size = check_size("size", size)
+            self._source_size = check_size("size", size)
         elif isinstance(source, Picture):
             self._show_image(self._start_of("a").develop(source).pixels)
         else:
@@ -168,7 +168,7 @@ class Viewer:
         # A copy, since the caller may change the array while the page is open.
         image = np.array(check_image(source), order="C")
         self._scene = None
-        self._own_size = (image.shape[1], image.shape[0])
+        self._source_size = (image.shape[1], image.shape[0])
         self._images = {self._key_of(self.settings["a"], self.expand["a"]): image}
 
     def answer(self, message: object, files: Sequence[bytes] = ()) -> Answer:
@@ -197,7 +197,7 @@ class Viewer:
         try:
             body, buffers = kinds[kind](message)
         except _FAILURES as error:
-            kind, body, buffers = "error", {"error": _described(error)}, []
+            kind, body, buffers = "error", {"error": _describe(error)}, []
         return {"kind": kind, **asked, **body}, buffers
 
     def _setup(self, message: Mapping[str, Any]) -> Answer:
@@ -212,7 +212,7 @@ class Viewer:
     def _methods(self, message: Mapping[str, Any]) -> Answer:
         new, errors = self._files.changes()
         return {
-            "methods": {name: described(kind) for name, kind in new.items()},
+            "methods": {name: describe(kind) for name, kind in new.items()},
             "errors": errors,
         }, []
 
@@ -227,7 +227,7 @@ class Viewer:
             "name": self._name,
             "note": f"highlights expanded up to {expand:g}" if can_expand and expand else "",
             "animated": scene is not None,
-            "own_size": self._own_size,
+            "source_size": self._source_size,
             "shadings": [] if scene is None else list(SHADINGS),
             "shading": self._shading,
             "glow": None if scene is None or scene.glow is None else scene.glow_intensity,
@@ -253,14 +253,14 @@ class Viewer:
     def _save(self, message: Mapping[str, Any]) -> Answer:
         settings = settings_from(message.get("settings"))
         expand = _expansion(message.get("expand", self.expand["a"]))
-        frames, *_ = self._render(settings, expand, self._own_size, message)
+        frames, *_ = self._render(settings, expand, self._source_size, message)
         (shown,) = frames
-        stops = self._looked_at(message)[-1]
+        stops = self._read_view(message)[-1]
         if self._scene is None and shown == "final" and stops == 0:
             # With the levels of the file that vkbloom apply writes.
             pixels = levels_of(frames[shown], settings.encoding)[:, :, :3]
         else:
-            pixels = shown_pixels(frames[shown], shown, encoding=settings.encoding, stops=stops)
+            pixels = picture_levels(frames[shown], shown, encoding=settings.encoding, stops=stops)
         is_expanded = self._highlights is Highlights.CLIPPED
         facts = settings_facts(settings, (expand or 1.0) if is_expanded else None)
         return {"framebuffer": shown}, [png(np.ascontiguousarray(pixels), texts=facts)]
@@ -270,9 +270,9 @@ class Viewer:
         if not isinstance(asked, Mapping) or not set(asked) <= set(SIDES):
             raise ValueError(f"sides: {asked!r:.80} are not settings of a or b")
         size = message.get("size")
-        size = self._own_size if size is None else check_size("size", size)
-        size = (min(size[0], _LARGEST_SIDE), min(size[1], _LARGEST_SIDE))
-        self._looked_at(message)
+        size = self._source_size if size is None else check_size("size", size)
+        size = (min(size[0], _MAX_SIDE), min(size[1], _MAX_SIDE))
+        self._read_view(message)
         at = None if message.get("at") is None else _position(message["at"])
         arrays = self._arrays_of(message.get("view"))
         sides: dict[str, Any] = {}
@@ -286,7 +286,7 @@ class Viewer:
                 frames, picture, names, plan = self._render(settings, expand, size, message)
             except _FAILURES as error:
                 # The other side is still shown.
-                sides[side] = {"error": _described(error)}
+                sides[side] = {"error": _describe(error)}
                 continue
             self.settings[side], self.frames[side] = settings, frames
             self.expand[side] = expand
@@ -306,16 +306,16 @@ class Viewer:
                 "picture": len(buffers),
             }
             if at is not None:
-                sides[side]["probe"] = _probed(frames[shown], at)
+                sides[side]["probe"] = _probe(frames[shown], at)
             buffers.append(picture)
         return {"sides": sides}, buffers
 
     def _probe(self, message: Mapping[str, Any]) -> Answer:
         at = _position(message.get("at"))
         arrays = self._arrays_of(message.get("view"))
-        return {"sides": {side: {"probe": _probed(arrays[side], at)} for side in arrays}}, []
+        return {"sides": {side: {"probe": _probe(arrays[side], at)} for side in arrays}}, []
 
-    def _looked_at(self, message: Mapping[str, Any]) -> tuple[float, Shading, float, float]:
+    def _read_view(self, message: Mapping[str, Any]) -> tuple[float, Shading, float, float]:
         """Return time, shading, glow and stops of a message; missing ones stay as they are."""
         usual = 1.0 if self._scene is None else self._scene.glow_intensity
         time = check_number("time", message.get("time", 0.0), -1e9, 1e9)
@@ -323,7 +323,7 @@ class Viewer:
         return (
             time,
             self._shading if shading is None else check_shading(shading),
-            usual if glow is None else check_number("glow", glow, 0, _LARGEST_GLOW),
+            usual if glow is None else check_number("glow", glow, 0, _MAX_GLOW),
             check_number("stops", message.get("stops", 0.0), -32, 32),
         )
 
@@ -358,7 +358,7 @@ class Viewer:
     ) -> tuple[Frames, bytes, list[str], list[Pass]]:
         """Return the named framebuffer, or `final`; its picture; all names; the planned passes."""
         name = message.get("framebuffer", "final")
-        time, self._shading, glow, stops = self._looked_at(message)
+        time, self._shading, glow, stops = self._read_view(message)
         source: Any = self._scene
         draw: Any = self.renderer.apply
         how: dict[str, Any] = {}
@@ -391,9 +391,9 @@ class Viewer:
             assert self._picture is not None  # An array is always kept.
             return Start(settings, expand).develop(self._picture).pixels
 
-        return self._kept((size, key), lambda: reduced(self._kept(key, whole), size))
+        return self._remember((size, key), lambda: reduce(self._remember(key, whole), size))
 
-    def _kept(self, key: object, make: Callable[[], NDArray[Any]]) -> NDArray[Any]:
+    def _remember(self, key: object, make: Callable[[], NDArray[Any]]) -> NDArray[Any]:
         """Return an image that was made before, or make it and drop the one not used longest."""
         image = self._images.pop(key) if key in self._images else make()
         self._images[key] = image
@@ -444,7 +444,7 @@ def _finite(timings: Mapping[str, float]) -> dict[str, float]:
     return {name: seconds for name, seconds in timings.items() if math.isfinite(seconds)}
 
 
-def _described(error: BaseException) -> str:
+def _describe(error: BaseException) -> str:
     return str(error) or type(error).__name__
 
 
@@ -456,7 +456,7 @@ def _position(at: object) -> tuple[float, float]:
     return float(at[0]), float(at[1])
 
 
-def _probed(array: NDArray[Any], at: tuple[float, float]) -> dict[str, Any]:
+def _probe(array: NDArray[Any], at: tuple[float, float]) -> dict[str, Any]:
     height, width = array.shape[:2]
     # A position of 1 is the far edge of the last pixel.
     x, y = min(int(at[0] * width), width - 1), min(int(at[1] * height), height - 1)
@@ -503,7 +503,7 @@ class CustomFiles:
             self._read[name] = stamp
             source = read_source(kind.file.source.name)
             if source != kind.file.source:
-                registered(name, source, kind.numpy_reference)
+                register(name, source, kind.numpy_reference)
             self._errors.pop(name, None)
         except (_core.Error, OSError, ValueError) as error:
             self._errors[name] = str(error)

@@ -62,10 +62,10 @@ class Explorer(anywidget.AnyWidget):
         self._viewer = viewer
         self._still: Any = None
         super().__init__(settings=viewer.settings["a"], against=viewer.settings["b"])
-        self.on_msg(self._received)
+        self.on_msg(self._receive)
         self.observe(self._set, list(_TRAITS))
 
-    def _received(self, widget: object, message: Any, buffers: list[Any]) -> None:
+    def _receive(self, widget: object, message: Any, buffers: list[Any]) -> None:
         self._remove_still()
         # Where binary buffers do not arrive, files are text.
         is_text = isinstance(message, Mapping) and bool(message.get("text"))
@@ -82,7 +82,7 @@ class Explorer(anywidget.AnyWidget):
         self.send(header, pictures)
 
     @traitlets.validate("settings", "against")
-    def _checked(self, proposal: Any) -> Settings:
+    def _check(self, proposal: Any) -> Settings:
         return check_settings(proposal["value"])
 
     def _set(self, change: Any) -> None:

@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom import _core
-from vkbloom._argument_types import checked
+from vkbloom._argument_types import check_arguments
 from vkbloom._extras import import_extra
 from vkbloom._fit.descent import Descent, check_derivatives
-from vkbloom._fit.losses import Loss, Measure, light, loss_named, reduced
+from vkbloom._fit.losses import Loss, Measure, find_loss, light, reduce
 from vkbloom._fit.result import FitResult, loss_text
 from vkbloom._fit.search import CLOSE, ENOUGH, Search
 from vkbloom._fit.space import Bounds, Space, space_of, spaces_of_all
@@ -84,7 +84,7 @@ def fit(
     progress: bool = ...,
 ) -> list[FitResult]: ...
 @public("vkbloom")
-@checked
+@check_arguments
 def fit(
     image: NDArray[Any] | Image,
     target: NDArray[Any],
@@ -169,7 +169,7 @@ def fit(
     is_all = isinstance(settings, str) and settings == "all"
     is_many = is_all or not isinstance(settings, Settings | str)
     candidates = _candidates(settings)
-    names = _checked_names(vary)
+    names = _check_names(vary)
     check_index("max_calls", max_calls, 1, 10_000_000)
     if not isinstance(bounds, Mapping | None):
         raise TypeError(f"bounds: {bounds!r} is not a mapping of fields to their bounds")
@@ -179,7 +179,7 @@ def fit(
     if renderer is None and isinstance(image, Image):
         raise ValueError("renderer: an uploaded image needs the renderer that has it")
     pixels = None if isinstance(image, Image) else check_image(image)
-    measure = Measure.of(check_image(target, "target"), loss_named(loss))
+    measure = Measure.of(check_image(target, "target"), find_loss(loss))
     brightest = math.inf if pixels is None else float(light(pixels).max())
     limits = (bounds or {}, brightest, len(measure.target))
     if is_all:
@@ -202,7 +202,7 @@ def fit(
             bar = _bar(space.start.method, max_calls)
         with bar as on_loss:
             new_search = _descent_of if gradient else _search_of
-            results.append(_fitted(stages, space, max_calls, on_loss, new_search))
+            results.append(_fit_from(stages, space, max_calls, on_loss, new_search))
     results.sort(key=lambda item: item.loss)
     return results if is_many else results[0]
 
@@ -230,14 +230,14 @@ class _Stage:
     measure: Measure
     factor: int
 
-    def rendered(self, settings: Settings) -> NDArray[np.float64]:
+    def render(self, settings: Settings) -> NDArray[np.float64]:
         """Return the light of the framebuffer with settings for the image's own size."""
         smaller, names = _smaller(settings, self.factor), [self.framebuffer]
         frames = self.renderer.apply(self.image, smaller, framebuffers=names)
         return light(frames[self.framebuffer])
 
 
-def _checked_names(vary: str | Sequence[str]) -> tuple[str, ...]:
+def _check_names(vary: str | Sequence[str]) -> tuple[str, ...]:
     names = (vary,) if isinstance(vary, str) else tuple(vary)
     if not names:
         raise ValueError("vary: there are no fields; name at least one")
@@ -264,7 +264,7 @@ def _stages(
     stages = [_Stage(renderer, framebuffer, handle, pixels, measure, 1)]
     factor = 2 ** max(0, math.ceil(math.log2(max(target.shape) / _COARSE_SIDE)))
     if pixels is not None and factor > 1 and min(target.shape[:2]) >= 16 * factor:
-        small, target_of_small = reduced(pixels, factor), measure.reduced(factor)
+        small, target_of_small = reduce(pixels, factor), measure.reduce(factor)
         on_device = renderer.upload(small)
         stages.insert(0, _Stage(renderer, framebuffer, on_device, small, target_of_small, factor))
     return stages
@@ -335,7 +335,7 @@ def _descent_of(stage: _Stage) -> Callable[..., Descent]:
     return partial(Descent, partial(_derivatives, stage))
 
 
-def _fitted(
+def _fit_from(
     stages: list[_Stage],
     space: Space,
     max_calls: int,
@@ -350,7 +350,7 @@ def _fitted(
         search = new_search(stage)(
             space,
             stage.measure,
-            stage.rendered,
+            stage.render,
             max_calls=max_calls - len(history) if is_last else round(_COARSE_CALLS * max_calls),
             on_loss=on_loss,
             close=_close(stage),
@@ -375,7 +375,7 @@ def _result(stage: _Stage, space: Space, last: Search, history: list[float]) -> 
         bare = settings.replace(bloom=False, glare=())
         plain = light(renderer.apply(stage.image, bare, framebuffers=["final"])["final"])
     with _one_thread():
-        explained = measure.explained(last.loss, plain)
+        explained = measure.explained_share(last.loss, plain)
     return FitResult(
         settings=settings,
         loss=last.loss,
@@ -387,8 +387,8 @@ def _result(stage: _Stage, space: Space, last: Search, history: list[float]) -> 
         vary=tuple(axis.name for axis in space.axes),
         frames=frames,
         target=measure.target,
-        residual=measure.compared(light(frames[framebuffer])) - measure.target,
-        plain=measure.compared(plain),
+        residual=measure.as_target(light(frames[framebuffer])) - measure.target,
+        plain=measure.as_target(plain),
         explained=explained,
     )
 

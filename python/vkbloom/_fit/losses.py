@@ -32,7 +32,7 @@ class Curve(NamedTuple):
     encode: Callable[[NDArray[np.float64]], NDArray[np.float64]]
     decode: Callable[[NDArray[np.float64]], NDArray[np.float64]] | None
 
-    def rounded(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def quantize(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return values of 0 to 1 at their nearest levels."""
         if self.decode is None:
             return values
@@ -77,15 +77,15 @@ class Measure:
         whole = cls(values, loss, curve)
         return whole if curve is None else whole._without(values.max(axis=2) >= 1)
 
-    def reduced(self, factor: int) -> Measure:
+    def reduce(self, factor: int) -> Measure:
         """Return the measure for an image that is reduced by boxes."""
         # Means of levels are not levels, but they are still at most 1.
         curve = None if self.curve is None else _CONTINUOUS
-        target = reduced(self.target, factor)
+        target = reduce(self.target, factor)
         smaller = dataclasses.replace(self, target=target, curve=curve, saturated=None)
         if self.saturated is None:
             return smaller
-        shares = reduced(self.saturated[:, :, np.newaxis].astype(np.float64), factor)
+        shares = reduce(self.saturated[:, :, np.newaxis].astype(np.float64), factor)
         return smaller._without(shares[:, :, 0] > 0)
 
     def _without(self, saturated: NDArray[np.bool_]) -> Measure:
@@ -93,11 +93,11 @@ class Measure:
         is_partial = saturated.any() and not saturated.all()
         return dataclasses.replace(self, saturated=saturated) if is_partial else self
 
-    def compared(self, array: NDArray[np.float64]) -> NDArray[np.float64]:
+    def as_target(self, array: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return a framebuffer as a target of 8 bits has it, equal to it where it is saturated."""
         if self.curve is None:
             return array
-        held = self.curve.rounded(np.clip(array, 0.0, 1.0))
+        held = self.curve.quantize(np.clip(array, 0.0, 1.0))
         if self.saturated is not None:
             held[self.saturated] = self.target[self.saturated]
         return held
@@ -119,13 +119,11 @@ class Measure:
         values take longer than the renders.
         """
         factor = math.ceil(math.sqrt(array.shape[0] * array.shape[1] / _MAX_PIXELS))
-        return self._differences(
-            reduced(self.compared(array), factor), reduced(self.target, factor)
-        )
+        return self._differences(reduce(self.as_target(array), factor), reduce(self.target, factor))
 
     def differences(self, array: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the differences of all values, of the array's shape, whose norm is the loss."""
-        return self._differences(self.compared(array), self.target).reshape(array.shape)
+        return self._differences(self.as_target(array), self.target).reshape(array.shape)
 
     def scales(self, array: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the derivative of each difference by its value."""
@@ -155,7 +153,7 @@ class Measure:
 
     def __call__(self, array: NDArray[np.float64]) -> float:
         """Return the loss of a framebuffer; what is not finite counts as the largest float."""
-        array = self.compared(array)
+        array = self.as_target(array)
         if self.is_sum:
             with np.errstate(over="ignore"):
                 value = float(np.linalg.norm(self._differences(array, self.target)))
@@ -166,13 +164,13 @@ class Measure:
             value = float(self.loss(array, self.target))
         return value if math.isfinite(value) else float(np.finfo(np.float64).max)
 
-    def explained(self, loss: float, plain: NDArray[np.float64]) -> float:
+    def explained_share(self, loss: float, plain: NDArray[np.float64]) -> float:
         """Return the share of the loss of a picture without bloom that is gone."""
         without = self(plain)
         return 1 - loss / without if without > 0 else 0.0
 
 
-def loss_named(loss: Any) -> Loss:
+def find_loss(loss: Any) -> Loss:
     """Return a loss, or raise ValueError."""
     if callable(loss):
         return loss  # type: ignore[no-any-return]
@@ -189,7 +187,7 @@ def _curve_of(target: NDArray[Any]) -> Curve | None:
     if not (values.min() >= 0 and values.max() <= 1):  # also NaN
         return None
     return next(
-        (item for item in _CURVES if np.abs(item.rounded(values) - values).max() < _LEVEL), None
+        (item for item in _CURVES if np.abs(item.quantize(values) - values).max() < _LEVEL), None
     )
 
 
@@ -201,7 +199,7 @@ def light(array: NDArray[Any]) -> NDArray[np.float64]:
     return np.nan_to_num(values, copy=False, nan=0.0, posinf=0.0, neginf=0.0)
 
 
-def reduced(array: NDArray[Any], factor: int) -> NDArray[Any]:
+def reduce(array: NDArray[Any], factor: int) -> NDArray[Any]:
     """Return the means of boxes of factor x factor pixels, without what is left at the end."""
     if factor == 1:
         return array

@@ -8,7 +8,7 @@ from typing import Any, Final, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom._argument_types import checked
+from vkbloom._argument_types import check_arguments
 from vkbloom._extras import import_extra
 from vkbloom._fit.losses import Measure, light
 from vkbloom._fit.result import FitResult
@@ -25,7 +25,7 @@ _DARK: Final = 1e-4
 
 
 @public("vkbloom")
-@checked
+@check_arguments
 def fit_pyramid(
     psf: PSF,
     levels: int = 8,
@@ -116,7 +116,7 @@ def fit_pyramid(
         target=measure.target,
         residual=fitted - measure.target,
         plain=plain,
-        explained=measure.explained(losses[1], plain),
+        explained=measure.explained_share(losses[1], plain),
     )
 
 

@@ -22,7 +22,7 @@ NOTHING_FOUND: Final = "no bloom was found"
 _BEYOND_COLOURS: Final = 0.8
 # The least share of the difference that a wrong bloom explains of another one, the least that a
 # change of colours explains where there is no other change, and the least that is added light.
-_SOME, _MOST, _LIGHTER = 0.2, 0.9, 0.2
+_SOME, _MAX_COLOUR_SHARE, _LIGHTER = 0.2, 0.9, 0.2
 # Fewer values that differ from the image do not tell where a threshold is.
 _FEW_VALUES: Final = 64
 # A target is clipped if at least this share of its pixels has its largest value.
@@ -40,10 +40,10 @@ def is_found(target: Array, residual: Array, plain: Array) -> bool:
         return False
     remaining = float(np.linalg.norm(residual)) / _BEYOND_COLOURS
     changed = float(np.linalg.norm(target - plain))
-    return remaining < changed and remaining < _recoloured(plain, target)
+    return remaining < changed and remaining < _distance_after_recolouring(plain, target)
 
 
-def _recoloured(image: Array, target: Array) -> float:
+def _distance_after_recolouring(image: Array, target: Array) -> float:
     """Return how far an image is from a target after the best change of each pixel's colour.
 
     Least squares over polynomials of the square roots of red, green and blue, which have
@@ -95,7 +95,7 @@ def _is_bloom(target: Array, residual: Array, plain: Array) -> bool:
     changed = float(np.linalg.norm(added))
     is_lighter = np.maximum(added, 0).sum() > _LIGHTER * np.abs(added).sum()
     explains_some = np.linalg.norm(residual) < (1 - _SOME) * changed
-    is_recoloured = _recoloured(plain, target) < (1 - _MOST) * changed
+    is_recoloured = _distance_after_recolouring(plain, target) < (1 - _MAX_COLOUR_SHARE) * changed
     return bool(is_lighter and explains_some and not is_recoloured)
 
 
@@ -176,7 +176,7 @@ class FitResult:
     explained: float
 
     def __repr__(self) -> str:
-        values = ", ".join(f"{name}={_shown(getattr(self.settings, name))}" for name in self.vary)
+        values = ", ".join(f"{name}={_format(getattr(self.settings, name))}" for name in self.vary)
         return (
             f"<vkbloom.FitResult of {self.settings.method}: {values}; loss {self.loss:.4g} after "
             f"{self.calls} calls; {self.verdict}>"
@@ -232,5 +232,5 @@ def loss_text(loss: Loss) -> str:
     return loss if isinstance(loss, str) else getattr(loss, "__name__", type(loss).__name__)
 
 
-def _shown(value: Any) -> str:
+def _format(value: Any) -> str:
     return f"{value:.4g}" if isinstance(value, float) else repr(value)

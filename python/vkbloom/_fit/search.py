@@ -174,13 +174,13 @@ class Search:
                 columns.append(change / (moved[index] - part[index]))
             return np.stack(columns, axis=1)
 
-        def remembered(part: Point) -> NDArray[np.float64]:
+        def remember(part: Point) -> NDArray[np.float64]:
             known.clear()
             known[part.tobytes()] = result = residual(part)
             return result
 
         optimize.least_squares(
-            remembered,
+            remember,
             np.clip(point[free], 1e-9, 1 - 1e-9),
             jacobian,
             bounds=(0.0, 1.0),

@@ -27,7 +27,7 @@ _WIDE: Final = 4.0
 
 
 @dataclass(frozen=True, kw_only=True)
-class Axis:
+class VariedField:
     """One varied field.
 
     - `low`, `high`: Of a number.
@@ -47,7 +47,7 @@ class Axis:
         """Return the field's value at a coordinate."""
         if self.kind == "choice":
             return self.choices[min(int(coordinate * len(self.choices)), len(self.choices) - 1)]
-        number = self.low + self._unwarped(min(max(coordinate, 0.0), 1.0) * self._length)
+        number = self.low + self._unwarp(min(max(coordinate, 0.0), 1.0) * self._length)
         number = min(max(number, self.low), self.high)
         return round(number) if self.kind == "integer" else number
 
@@ -63,16 +63,16 @@ class Axis:
         if self._length == 0:
             return 0.0
         number = min(max(float(value), self.low), self.high)
-        return self._warped(number - self.low) / self._length
+        return self._warp(number - self.low) / self._length
 
     @property
     def _length(self) -> float:
-        return self._warped(self.high - self.low)
+        return self._warp(self.high - self.low)
 
-    def _warped(self, distance: float) -> float:
+    def _warp(self, distance: float) -> float:
         return distance if self.scale is None else math.log1p(distance / self.scale)
 
-    def _unwarped(self, position: float) -> float:
+    def _unwarp(self, position: float) -> float:
         return position if self.scale is None else self.scale * math.expm1(position)
 
 
@@ -84,12 +84,14 @@ class Space:
     """
 
     start: Settings
-    axes: tuple[Axis, ...]
+    axes: tuple[VariedField, ...]
 
     @property
     def origin(self) -> Point:
         """The coordinates of the start."""
-        return np.array([axis.coordinate(_begun(self.start, axis.name)) for axis in self.axes])
+        return np.array(
+            [axis.coordinate(_start_value(self.start, axis.name)) for axis in self.axes]
+        )
 
     @property
     def is_number(self) -> NDArray[np.bool_]:
@@ -115,7 +117,7 @@ def spaces_of_all(
     """Return the space of each candidate that has some of the varied fields."""
     spaces, refused = [], None
     for item in candidates:
-        axes: list[Axis] = []
+        axes: list[VariedField] = []
         for name in names:
             try:
                 axes += space_of(item, [name], bounds, brightest, height).axes
@@ -136,12 +138,12 @@ def space_of(
     axes = []
     for name in vary:
         if name not in fields:
-            known = ", ".join(item for item in fields if varied_as(fields[item]))
+            known = ", ".join(item for item in fields if variation_of(fields[item]))
             raise ValueError(
                 f"vary: the method {settings.method} has no field {name!r}"
                 f"{did_you_mean(name, fields) or ';'} it can vary {known}"
             )
-        kind = varied_as(fields[name])
+        kind = variation_of(fields[name])
         if kind is None:
             raise ValueError(
                 f"vary: {name!r} is not a number, a flag or a choice; fit weights by "
@@ -163,13 +165,13 @@ def space_of(
     return space
 
 
-def _begun(settings: Settings, name: str) -> Any:
+def _start_value(settings: Settings, name: str) -> Any:
     """Return the value that the search starts from: no threshold is one of 0."""
     value = getattr(settings, name)
     return 0.0 if value is None and name == "threshold" else value
 
 
-def varied_as(info: FieldInfo) -> AxisKind | None:
+def variation_of(info: FieldInfo) -> AxisKind | None:
     """Return how a field varies; None if it cannot."""
     match info.kind:
         case "flag":
@@ -182,7 +184,7 @@ def varied_as(info: FieldInfo) -> AxisKind | None:
             return None
 
 
-def _choice(settings: Settings, info: FieldInfo, bounds: Bounds) -> Axis:
+def _choice(settings: Settings, info: FieldInfo, bounds: Bounds) -> VariedField:
     name = info.name
     declared = info.choices or (False, True)
     choices = tuple(bounds.get(name, declared))
@@ -192,7 +194,7 @@ def _choice(settings: Settings, info: FieldInfo, bounds: Bounds) -> Axis:
         )
     if getattr(settings, name) not in choices:
         choices = (getattr(settings, name), *choices)
-    return Axis(name=name, kind="choice", choices=choices)
+    return VariedField(name=name, kind="choice", choices=choices)
 
 
 def _number(
@@ -201,7 +203,7 @@ def _number(
     kind: Literal["number", "integer"],
     bounds: Bounds,
     limits: tuple[float, int],
-) -> Axis:
+) -> VariedField:
     name = info.name
     low, high = info.range or (0.0, 1.0)
     if name in bounds:
@@ -215,10 +217,10 @@ def _number(
         high = min(high, max(limits[0], 1e-3))
     elif info.unit == "pixel":
         high = min(high, max(limits[1], low + 1))
-    value = _begun(settings, name)
+    value = _start_value(settings, name)
     if value is None:
         raise ValueError(f"vary: {name}: None is not a number; set a number to start from")
     default = info.default if isinstance(info.default, int | float) else 0.0
     usual = max(abs(float(default)), abs(float(value))) or 1.0
     is_wide = low >= 0 and high - low > _WIDE * usual
-    return Axis(name=name, kind=kind, low=low, high=high, scale=usual if is_wide else None)
+    return VariedField(name=name, kind=kind, low=low, high=high, scale=usual if is_wide else None)

@@ -9,11 +9,11 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom._argument_types import checked
+from vkbloom._argument_types import check_arguments
 from vkbloom._fit.fitting import fit
 from vkbloom._fit.losses import DARK, Loss
 from vkbloom._fit.result import FitResult, Verdict
-from vkbloom._fit.space import Bounds, varied_as
+from vkbloom._fit.space import Bounds, variation_of
 from vkbloom._locks import cached_property
 from vkbloom._numbers import check_size
 from vkbloom._public import public
@@ -115,7 +115,7 @@ def _off(what: str, factor: float, word: str) -> str:
 
 
 @public("vkbloom")
-@checked
+@check_arguments
 def translate(
     settings: Settings | str | Maker,
     to: Settings | str | type[Settings],
@@ -207,7 +207,7 @@ def lights(size: tuple[int, int]) -> NDArray[np.float32]:
 def _knobs(settings: Settings) -> tuple[str, ...]:
     """Return the fields that vary by default; others of `to` stay as they are."""
     fields = fields_of(type(settings))
-    names = (name for name in settings._knobs if varied_as(fields[name]) is not None)
+    names = (name for name in settings._knobs if variation_of(fields[name]) is not None)
     threshold = ("threshold",) if settings.threshold is not None else ()
     return tuple(dict.fromkeys((*threshold, *names, "intensity")))
 

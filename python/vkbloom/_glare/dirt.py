@@ -8,7 +8,7 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom._array_cache import kept
+from vkbloom._array_cache import keep
 from vkbloom._core_kernel import CoreKernel
 from vkbloom._numbers import check_number
 from vkbloom._psf.core_kernels import WithKernel
@@ -68,7 +68,7 @@ class Dirt(WithKernel, Glare):
     @property
     def pixels(self) -> NDArray[np.float32]:
         """The picture, shape (H, W) or (H, W, 3)."""
-        return _made_dirt(self.seed) if self.image is None else self.image.array
+        return _make_dirt(self.seed) if self.image is None else self.image.array
 
     def core_kernel(self, frame: object, buffers: object) -> CoreKernel:
         """Return the picture as the core reads a kernel."""
@@ -78,8 +78,8 @@ class Dirt(WithKernel, Glare):
         return self.pixels
 
 
-@kept
-def _made_dirt(seed: int) -> NDArray[np.float32]:
+@keep
+def _make_dirt(seed: int) -> NDArray[np.float32]:
     """Return soft discs and specks of 0 to 1, (270, 480)."""
     random = np.random.default_rng(seed)
     y, x = np.indices((270, 480), np.float32)

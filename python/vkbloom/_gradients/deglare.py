@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom._argument_types import checked
+from vkbloom._argument_types import check_arguments
 from vkbloom._gradients.pulling import vjp
 from vkbloom._image_arguments import check_image
 from vkbloom._methods.convolution import Convolution, PSFLike, read_psf
@@ -18,7 +18,7 @@ from vkbloom._renderer.renderer import Renderer
 
 
 @public("vkbloom")
-@checked
+@check_arguments
 def deglare(
     image: NDArray[Any],
     psf: PSFLike,

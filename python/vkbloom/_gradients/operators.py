@@ -18,9 +18,9 @@ from vkbloom._gradients.pulling import pull_each, pullback_of
 from vkbloom._image_arguments import check_mask
 from vkbloom._psf.values import ARRAYS, ArrayValue
 from vkbloom._renderer.default import default_renderer, renderer_on
-from vkbloom._renderer.device_arrays import DeviceArray, merged, take
+from vkbloom._renderer.device_arrays import DeviceArray, merge, take
 from vkbloom._renderer.renderer import RENDERERS, Renderer
-from vkbloom._renderer.sources import Inputs, checked_inputs
+from vkbloom._renderer.sources import Inputs, check_inputs
 from vkbloom._settings.fields import fields_of
 from vkbloom._settings.records import Record
 from vkbloom._settings.settings import Settings
@@ -89,7 +89,7 @@ def _settings(text: str) -> Settings:
     return Settings.from_json(text)
 
 
-def replaced(settings: Settings, values: Mapping[str, Any]) -> Settings:
+def replace(settings: Settings, values: Mapping[str, Any]) -> Settings:
     """Return settings with the values of tensors."""
     if not values:
         return settings
@@ -159,20 +159,20 @@ class _Call(NamedTuple):
         arrays = {
             name: part.detach().cpu().contiguous().numpy() for name, part in self.images.items()
         }
-        settings = replaced(_settings(self.settings), self.fields)
+        settings = replace(_settings(self.settings), self.fields)
         for index in np.ndindex(tuple(self.image.shape[:-3])):
             yield index, {name: part[index] for name, part in arrays.items()}, settings
 
 
-def _pulled(arrays: dict[str, Any], settings: Settings, renderer: int, cotangent: Any) -> Any:
+def _pull(arrays: dict[str, Any], settings: Settings, renderer: int, cotangent: Any) -> Any:
     """Return the derivatives: of the reference for float64, else of the renderer."""
     if arrays["image"].dtype == np.float64:
         return reference_vjp(settings=settings, **arrays)[1]({"final": cotangent})
-    pullback = pullback_of(_renderer(renderer), checked_inputs(**arrays), settings)
+    pullback = pullback_of(_renderer(renderer), check_inputs(**arrays), settings)
     return pullback(check_cotangents({"final": cotangent}, {"final": cotangent}))
 
 
-def _pulled_on_device(call: _Call, cotangent: Any) -> Iterator[Any]:
+def _pull_on_device(call: _Call, cotangent: Any) -> Iterator[Any]:
     """Yield the derivatives of each image, with those by images as tensors of the GPU."""
     renderer, mask = _renderer(call.renderer, call.image), call.mask
     core = renderer._core
@@ -197,7 +197,7 @@ def _pulled_on_device(call: _Call, cotangent: Any) -> Iterator[Any]:
         )
         for index in range(images.shape[0])
     )
-    settings = replaced(_settings(call.settings), call.fields)
+    settings = replace(_settings(call.settings), call.fields)
     yield from pull_each(renderer, settings, sequence, "cuda")
 
 
@@ -260,7 +260,7 @@ def _bloom(*given: Any) -> Any:
 
 def _on_device(call: _Call) -> Any:
     """Run the operator without the host; a batch without masks changes the context once."""
-    settings = replaced(in_floats(_settings(call.settings)), call.fields)
+    settings = replace(in_floats(_settings(call.settings)), call.fields)
     renderer, images = _renderer(call.renderer, call.image), _batch(call.image)
     if call.mask is None and call.emission is None and len(images) > 1:
         frames = renderer.map(images, settings, framebuffers="final")
@@ -278,8 +278,8 @@ def _on_device(call: _Call) -> Any:
             for i, tensor in enumerate(images)
         )
     # The images of a batch are in the same memory.
-    batches = merged([cast("DeviceArray", tensor["final"]) for tensor in frames])
-    return _joined([torch.from_dlpack(tensor) for tensor in batches], call.image, torch.cat)
+    batches = merge([cast("DeviceArray", tensor["final"]) for tensor in frames])
+    return _join([torch.from_dlpack(tensor) for tensor in batches], call.image, torch.cat)
 
 
 @_bloom.register_fake  # type: ignore[untyped-decorator]
@@ -299,18 +299,18 @@ def _backward(cotangent: Any, *given: Any) -> list[Any]:
     derivatives: dict[str, list[Any]] = {name: [] for name in (*images, *fields)}
     # An empty batch has nothing to take to the device.
     if call.on_device and call.image.numel() > 0:
-        pulled = _pulled_on_device(call, cotangent)
+        pulled = _pull_on_device(call, cotangent)
     else:
         wanted = cotangent.detach().cpu().numpy()
         pulled = (
-            _pulled(arrays, chosen, call.renderer, wanted[index])
+            _pull(arrays, chosen, call.renderer, wanted[index])
             for index, arrays, chosen in call.each()
         )
     for gradients in pulled:
         for name, parts in derivatives.items():
             parts.append(_as_tensor(gradients[name]))
     return [
-        *(_joined(derivatives[name], part) for name, part in images.items()),
+        *(_join(derivatives[name], part) for name, part in images.items()),
         *(
             sum(derivatives[name], torch.zeros(part.shape)).to(part)
             for name, part in fields.items()
@@ -325,7 +325,7 @@ def _as_tensor(part: Any) -> Any:
     return torch.from_numpy(np.array(part, np.float64))
 
 
-def _joined(parts: list[Any], like: Any, join: Any = None) -> Any:
+def _join(parts: list[Any], like: Any, join: Any = None) -> Any:
     """Return images, or with `join` batches, as a tensor of the kind of another one."""
     if not parts:
         return like.new_zeros(like.shape)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from vkbloom import _core
 from vkbloom._locks import ProcessLock
 from vkbloom._renderer import requests
-from vkbloom._renderer.device_arrays import Destination, ImportedArray, placed
+from vkbloom._renderer.device_arrays import Destination, ImportedArray, place
 from vkbloom._renderer.new_arrays import new_arrays
 from vkbloom._renderer.renderer import DerivativeKind, Renderer
 from vkbloom._renderer.sources import Inputs
@@ -52,27 +52,27 @@ class Running:
     destination: Destination
     submission: _core.Submission | None
 
-    def named(self) -> dict[str, NDArray[Any]]:
+    def by_name(self) -> dict[str, NDArray[Any]]:
         """Wait, and return the framebuffers."""
         counts = self.submission.wait()[1] if self.submission else (1, 0)
         # The device counts what is not finite in all inputs together.
         if any(counts):
             check_finite(self.passes.cotangents)
-        return requests.named(self.plan, self.arrays, self.destination)
+        return requests.name_outputs(self.plan, self.arrays, self.destination)
 
     def images(self) -> dict[str, NDArray[Any]]:
         """Wait, and return the derivatives by image, mask and emission."""
-        framebuffers = self.named()
+        framebuffers = self.by_name()
         return {
             name: framebuffers[f".by_{name}"]
             if f".by_{name}" in framebuffers
             else self._zeros(part.shape)
-            for name, part in self.passes.inputs.named().items()
+            for name, part in self.passes.inputs.by_name().items()
         }
 
     def _zeros(self, shape: tuple[int, ...]) -> NDArray[Any]:
         core = self.passes.renderer._core
-        return cast("NDArray[Any]", placed(np.zeros(shape, np.float32), self.destination, core))
+        return cast("NDArray[Any]", place(np.zeros(shape, np.float32), self.destination, core))
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,7 +115,7 @@ class Passes:
         """Return the derivatives by fields that are exact to single floats."""
         wanted = device_fields(self.settings)
         running = self.submit("sums") if wanted else None
-        totals = running.named() if running else {}
+        totals = running.by_name() if running else {}
         results: dict[str, NDArray[np.float32]] = {}
         for kind, names in _SUMS.items():
             if kind not in totals:

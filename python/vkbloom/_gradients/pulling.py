@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom._argument_types import checked
+from vkbloom._argument_types import check_arguments
 from vkbloom._gradients.passes import DeviceGradients, Passes, check_finite, in_floats
 from vkbloom._public import public
 from vkbloom._renderer.default import default_renderer
@@ -20,15 +20,15 @@ from vkbloom._renderer.device_arrays import (
     ImportedArray,
     on_cuda,
     on_host,
+    place,
     place_of,
-    placed,
     take,
 )
 from vkbloom._renderer.frames import Frames
 from vkbloom._renderer.image import Image
 from vkbloom._renderer.renderer import Renderer
 from vkbloom._renderer.requests import IMAGES_AHEAD
-from vkbloom._renderer.sources import Inputs, checked_inputs, image_source, uploaded_inputs
+from vkbloom._renderer.sources import Inputs, check_inputs, image_source, uploaded_inputs
 from vkbloom._settings.settings import Settings, check_settings
 from vkbloom.reference import vjp as reference_vjp
 from vkbloom.reference._derivatives import Gradients, check_cotangents, check_shape, differentiable
@@ -44,7 +44,7 @@ Checked = Mapping[str, NDArray[Any] | ImportedArray]
 
 
 @public("vkbloom")
-@checked
+@check_arguments
 def vjp(
     image: NDArray[Any] | Image,
     settings: Settings | str | None = None,
@@ -116,7 +116,7 @@ def vjp(
         )
         uploaded = image
     else:
-        inputs = checked_inputs(image, mask, emission, core).kept()
+        inputs = check_inputs(image, mask, emission, core).freeze()
         source = inputs.source()
         shape, dtype = source.kind
         uploaded = Image(source, shape, np.dtype(dtype))
@@ -147,14 +147,14 @@ class ImagePullback:
     destination: Destination = "host"
 
     def __call__(self, cotangents: Mapping[str, NDArray[Any]]) -> Derivatives:
-        return self._pulled(_checked(cotangents, self.frames, self._renderer._core))
+        return self._pull(_check(cotangents, self.frames, self._renderer._core))
 
     @functools.cached_property
     def _renderer(self) -> Renderer:
         return self.renderer or default_renderer()
 
     @functools.cached_property
-    def _pulled(self) -> Callable[[Checked], Derivatives]:
+    def _pull(self) -> Callable[[Checked], Derivatives]:
         return pullback_of(self._renderer, self.inputs, self.settings, self.destination)
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -167,7 +167,7 @@ class ImagePullback:
         return self
 
 
-def _checked(cotangents: Any, frames: Mapping[str, Any], core: Any) -> Checked:
+def _check(cotangents: Any, frames: Mapping[str, Any], core: Any) -> Checked:
     """Check cotangents, and copy those that are on the renderer's device.
 
     Whether these are finite is known when the passes have run.
@@ -216,7 +216,7 @@ def _starter(
     """Return a function that submits passes, and returns one that waits for the derivatives."""
     floats = in_floats(settings)
     recorded = functools.cache(lambda: reference_vjp(settings=settings, **inputs.on_host())[1])
-    names = (*inputs.named(), *_names(settings))
+    names = (*inputs.by_name(), *_names(settings))
 
     def by_reference(cotangents: Checked) -> Gradients:
         check_finite(cotangents)
@@ -229,7 +229,7 @@ def _starter(
 
         def end() -> Derivatives:
             if running is None:
-                return _placed(by_reference(cotangents), inputs, destination, renderer)
+                return _place(by_reference(cotangents), inputs, destination, renderer)
             return DeviceGradients(
                 running.images(), names, passes.fields, lambda: by_reference(cotangents)
             )
@@ -246,12 +246,12 @@ def _names(settings: Settings) -> tuple[str, ...]:
     return (*differentiable(settings), *(("kernel",) if has_kernel else ()))
 
 
-def _placed(
+def _place(
     derivatives: Gradients, inputs: Inputs, destination: Destination, renderer: Renderer
 ) -> Gradients:
     """Move the derivatives by images to where those of the device would be."""
     core = renderer._core
     if not core.closed:
-        for name in inputs.named():
-            derivatives[name] = cast("NDArray[Any]", placed(derivatives[name], destination, core))
+        for name in inputs.by_name():
+            derivatives[name] = cast("NDArray[Any]", place(derivatives[name], destination, core))
     return derivatives

@@ -14,7 +14,13 @@ from numpy.typing import NDArray
 from vkbloom._numbers import check_time
 from vkbloom._settings.fields import fields_of
 from vkbloom._settings.records import plain_value
-from vkbloom._settings.settings import Settings, check_settings, field_info, given_settings, presets
+from vkbloom._settings.settings import (
+    Settings,
+    check_settings,
+    field_info,
+    presets,
+    resolve_settings,
+)
 from vkbloom._spelling import did_you_mean
 
 Kind = Literal["settings", "time", "preset"]
@@ -92,7 +98,7 @@ def _whole_axis(name: str, values: object) -> Axis:
             except TypeError:
                 raise TypeError(f"axes: preset: {value!r} is not a name") from None
         return Axis(name, tuple(listed), "preset", "", "The name of the settings")
-    listed = [given_settings(value, "axes: settings") for value in listed]
+    listed = [resolve_settings(value, "axes: settings") for value in listed]
     return Axis(name, tuple(listed), "preset", "", "The settings as JSON")
 
 

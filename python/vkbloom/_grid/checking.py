@@ -8,11 +8,11 @@ from collections.abc import Iterable, Mapping, Set
 from dataclasses import dataclass
 from typing import Any
 
-from vkbloom._argument_types import checked
+from vkbloom._argument_types import check_arguments
 from vkbloom._grid.axes import Axis
 from vkbloom._grid.keys import Keys, open_keys
-from vkbloom._grid.order import Block, blocks
-from vkbloom._grid.store import DONE, METADATA, MISSING, Chunks, checked_identity
+from vkbloom._grid.order import GridBlock, blocks
+from vkbloom._grid.store import DONE, METADATA, MISSING, Chunks, check_identity
 from vkbloom._public import public
 
 
@@ -45,7 +45,7 @@ class GridReport:
 
 
 @public("vkbloom")
-@checked
+@check_arguments
 def check_grid(store: Any) -> GridReport:
     """Check a grid's store for missing and damaged data, without changing it.
 
@@ -69,10 +69,10 @@ def check_grid(store: Any) -> GridReport:
         The store cannot be read.
     """
     keys = open_keys(store)
-    held = keys.listed()
+    held = keys.list_keys()
     if not held:
         raise FileNotFoundError(f"{keys.name}: the store does not exist or is empty")
-    identity = checked_identity(keys)
+    identity = check_identity(keys)
     try:
         return _report(identity, keys, held)
     except (KeyError, TypeError, AttributeError) as error:
@@ -106,7 +106,7 @@ def _report(identity: Mapping[str, Any], keys: Keys, held: Set[str]) -> GridRepo
     return GridReport(math.prod(shape), done, tuple(problems))
 
 
-def describe(axes: Iterable[Axis], block: Block) -> str:
+def describe(axes: Iterable[Axis], block: GridBlock) -> str:
     """Return the points of a block as text: the value, or first and last value, of each axis."""
     parts = []
     for axis, start, stop in zip(axes, block.start, block.stop, strict=True):

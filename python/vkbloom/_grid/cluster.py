@@ -16,7 +16,7 @@ from vkbloom._core import Error
 from vkbloom._extras import import_extra
 from vkbloom._grid.filling import Filler, progress_bar
 from vkbloom._grid.layout import Grid, Layout, lay_out, origin
-from vkbloom._grid.order import Block
+from vkbloom._grid.order import GridBlock
 from vkbloom._grid.store import Chunks, GridStore
 from vkbloom._renderer.default import renderer_on
 from vkbloom._renderer.renderer import Renderer
@@ -33,7 +33,7 @@ _RUNS_A_WORKER: Final = 16
 _RETRIES: Final = 2
 
 
-def _unpickled(pickled: bytes) -> Grid:
+def _unpickle(pickled: bytes) -> Grid:
     grid: Grid = pickle.loads(pickled)
     return grid
 
@@ -54,7 +54,7 @@ def _refusal(renderer: Renderer, layout: Layout) -> str:
 
 
 def _render(
-    blocks: tuple[Block, ...], grid: Grid, layout: Layout, chunks: Chunks, adapter: str
+    blocks: tuple[GridBlock, ...], grid: Grid, layout: Layout, chunks: Chunks, adapter: str
 ) -> int | str:
     """Render and write a run of blocks; called in a worker. Text: why this worker may not."""
     renderer = renderer_on(adapter)
@@ -65,7 +65,7 @@ def _render(
     return sum(block.count for block in blocks)
 
 
-def _shared_grid(client: Client, grid: Grid) -> Future:
+def _share_grid(client: Client, grid: Grid) -> Future:
     """Send a grid to a cluster, as the result of a task.
 
     Unlike scattered data, the result is computed again if the worker that holds it dies.
@@ -73,7 +73,7 @@ def _shared_grid(client: Client, grid: Grid) -> Future:
     cloudpickle = import_extra("cloudpickle", "grid", _PURPOSE)
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="Sending large graph", category=UserWarning)
-        return client.submit(_unpickled, cloudpickle.dumps(grid), pure=False, retries=_RETRIES)
+        return client.submit(_unpickle, cloudpickle.dumps(grid), pure=False, retries=_RETRIES)
 
 
 def lay_out_there(client: Client, shared: Future, adapter: str) -> Layout:
@@ -82,10 +82,12 @@ def lay_out_there(client: Client, shared: Future, adapter: str) -> Layout:
     return laid
 
 
-def _runs(todo: Iterable[Block], layout: Layout, points: int) -> Iterator[tuple[Block, ...]]:
+def _runs(
+    todo: Iterable[GridBlock], layout: Layout, points: int
+) -> Iterator[tuple[GridBlock, ...]]:
     """Yield runs of neighbouring blocks, each of about `points` points."""
     most = max(1, min(points, _RUN_POINTS, _RUN_BYTES // max(layout.point_size, 1)))
-    run: list[Block] = []
+    run: list[GridBlock] = []
     count = 0
     for block in todo:
         run.append(block)
@@ -110,7 +112,7 @@ def fill_there(
         raise TypeError(f"client: {client!r} is not a dask.distributed.Client")
     if client.asynchronous:
         raise TypeError("client: it is asynchronous; pass one made with asynchronous=False")
-    shared = _shared_grid(client, grid)
+    shared = _share_grid(client, grid)
     store = prepared(lay_out_there(client, shared, adapter))
     missing = store.total - store.done
     points = math.ceil(missing / (max(1, len(client.nthreads())) * _RUNS_A_WORKER))

@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom._background_writer import written_in_background
+from vkbloom._background_writer import write_in_background
 from vkbloom._extras import import_extra
-from vkbloom._grid.layout import Grid, Layout, checked_value
-from vkbloom._grid.order import Block, Index, points
+from vkbloom._grid.layout import Grid, Layout, check_value
+from vkbloom._grid.order import GridBlock, Index, points
 from vkbloom._grid.sources import visit
 from vkbloom._grid.store import Chunks
 from vkbloom._renderer.frames import Frames
@@ -26,7 +26,7 @@ from vkbloom._renderer.renderer import Renderer
 Count = Callable[[int], object]
 
 
-def _ignored(points: int) -> None:
+def _ignore(points: int) -> None:
     """Count nothing."""
 
 
@@ -37,9 +37,9 @@ class Filler:
     grid: Grid
     layout: Layout
     renderer: Renderer
-    count: Count = _ignored
+    count: Count = _ignore
 
-    def fill(self, block: Block, arrays: Mapping[str, NDArray[Any]]) -> None:
+    def fill(self, block: GridBlock, arrays: Mapping[str, NDArray[Any]]) -> None:
         """Render the points of a block."""
         grid = self.grid
         path = map(grid.point, points(block, self.layout.ranking))
@@ -52,20 +52,20 @@ class Filler:
     def _value(self, name: str, index: Index, frames: Frames) -> NDArray[Any]:
         variable = self.layout.variables[name]
         reduction = self.grid.reduce.get(name)
-        value = frames[name] if reduction is None else checked_value(name, reduction(frames))
+        value = frames[name] if reduction is None else check_value(name, reduction(frames))
         if value.shape != variable.shape or not np.can_cast(
             value.dtype, variable.dtype, "same_kind"
         ):
             raise ValueError(
-                f"{name}: {value.shape} {value.dtype} at {self.grid.named(index)} is not "
+                f"{name}: {value.shape} {value.dtype} at {self.grid.describe_point(index)} is not "
                 f"{variable.shape} {variable.dtype} as at the grid's first point"
             )
         return value
 
-    def store(self, todo: Iterable[Block], chunks: Chunks) -> None:
+    def store(self, todo: Iterable[GridBlock], chunks: Chunks) -> None:
         """Render blocks, and write each while the next one is rendered."""
 
-        def made() -> Iterator[tuple[None, Callable[[], None]]]:
+        def make() -> Iterator[tuple[None, Callable[[], None]]]:
             for block in todo:
                 arrays = {
                     name: np.empty((*block.shape, *variable.shape), variable.dtype)
@@ -74,7 +74,7 @@ class Filler:
                 self.fill(block, arrays)
                 yield None, functools.partial(chunks.write, block, arrays)
 
-        for _ in written_in_background(made()):
+        for _ in write_in_background(make()):
             pass
 
 
@@ -97,7 +97,7 @@ def progress_bar(total: int, done: int = 0, *, shown: bool | None = None) -> Ite
     - `shown`: None: if tqdm is installed.
     """
     if shown is False or (shown is None and find_spec("tqdm") is None):
-        yield _ignored
+        yield _ignore
         return
     tqdm = import_extra("tqdm.auto", "grid", "A progress bar").tqdm
     hidden = not _is_watched()

@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom._argument_types import checked
+from vkbloom._argument_types import check_arguments
 from vkbloom._extras import import_extra
-from vkbloom._free_memory import memory_left
+from vkbloom._free_memory import free_memory
 from vkbloom._grid import cluster
 from vkbloom._grid.filling import Filler, progress_bar
 from vkbloom._grid.keys import Keys, open_keys
-from vkbloom._grid.layout import Grid, Layout, Variable, ask, lay_out, made_dataset
-from vkbloom._grid.order import Block, Index, default_chunk, read_part
+from vkbloom._grid.layout import Grid, Layout, Variable, ask, lay_out, make_dataset
+from vkbloom._grid.order import GridBlock, Index, default_chunk, read_part
 from vkbloom._grid.sources import ImageSource
 from vkbloom._grid.store import IDENTITY, GridStore, chunk_in, prepare, stored_identity
 from vkbloom._numbers import check_index
@@ -26,7 +26,7 @@ from vkbloom._public import public
 from vkbloom._renderer.default import default_renderer
 from vkbloom._renderer.frames import Frames
 from vkbloom._renderer.image import Image
-from vkbloom._renderer.interruptible import opened_renderer
+from vkbloom._renderer.interruptible import open_renderer
 from vkbloom._renderer.renderer import Renderer
 from vkbloom._settings.settings import Settings, Shading
 
@@ -44,7 +44,7 @@ _MARGIN = 10
 
 
 @public("vkbloom")
-@checked
+@check_arguments
 def grid(
     source: Scene | NDArray[Any] | Image,
     settings: Settings | str | None = None,
@@ -181,7 +181,7 @@ def grid(
     )
     with ExitStack() as stack:
         if client is None and adapter is not None:
-            renderer = stack.enter_context(opened_renderer(adapter))
+            renderer = stack.enter_context(open_renderer(adapter))
         if keys is None:
             return in_memory(asked, renderer or default_renderer(), progress)
         numbers = read_part(part)
@@ -190,15 +190,15 @@ def grid(
             keys.check_shared()
         _check_stored(asked, chunks, is_shared=client is not None)
 
-        def prepared(layout: Layout) -> GridStore:
+        def prepare_store(layout: Layout) -> GridStore:
             chunk = _chunk(asked, layout, chunks, keys, numbers[1])
             return prepare(keys, asked, layout, chunk, numbers, resume=resume)
 
         if client is not None:
-            cluster.fill_there(client, asked, prepared, adapter or "auto", progress)
+            cluster.fill_there(client, asked, prepare_store, adapter or "auto", progress)
         else:
             renderer = renderer or default_renderer()
-            stored = prepared(lay_out(asked, renderer))
+            stored = prepare_store(lay_out(asked, renderer))
             with progress_bar(stored.total, stored.done, shown=progress) as count:
                 filler = Filler(asked, stored.layout, renderer, count)
                 filler.store(stored.missing, stored.chunks)
@@ -245,7 +245,7 @@ def check_fits(grid: Grid, variables: Mapping[str, Variable]) -> None:
     """Raise MemoryError for a grid that does not fit into the free memory."""
     points = math.prod(grid.shape)
     size = points * sum(variable.size for variable in variables.values())
-    left = memory_left()
+    left = free_memory()
     # NumPy, the device and the results that are reduced need memory, too.
     if left is not None and size + size // _MARGIN > left:
         raise MemoryError(
@@ -268,5 +268,5 @@ def in_memory(grid: Grid, renderer: Renderer, progress: bool | None) -> xarray.D
         for name, variable in layout.variables.items()
     }
     with progress_bar(math.prod(shape), shown=progress) as count:
-        Filler(grid, layout, renderer, count).fill(Block((0,) * len(shape), shape), arrays)
-    return made_dataset(grid, layout, arrays)
+        Filler(grid, layout, renderer, count).fill(GridBlock((0,) * len(shape), shape), arrays)
+    return make_dataset(grid, layout, arrays)

@@ -58,19 +58,19 @@ class Keys:
         if self.folder is not None and not self.folder.is_dir():
             # LocalStore would make the folder.
             return None
-        with self.named(key):
+        with self.name_errors(key):
             content = _run(self.store.get(key, _buffers()))
         return None if content is None else bytes(content.to_bytes())
 
     def write(self, key: str, content: bytes) -> None:
         """Write a key."""
-        with self.named(key):
+        with self.name_errors(key):
             _run(self.store.set(key, _buffers().buffer.from_bytes(content)))
 
     def create(self, key: str, content: bytes) -> None:
         """Write a key unless it exists: of several processes one does, where the store can."""
         try:
-            _run(self._created(key, content))
+            _run(self._create(key, content))
         except FileExistsError:
             pass
         except Exception:
@@ -78,7 +78,7 @@ class Keys:
             if self.read(key) is None:
                 self.write(key, content)
 
-    def _created(self, key: str, content: bytes) -> Coroutine[Any, Any, Any]:
+    def _create(self, key: str, content: bytes) -> Coroutine[Any, Any, Any]:
         if isinstance(self.store, import_extra("zarr", "grid", PURPOSE).storage.FsspecStore):
             # Its own method asks whether the key exists, and then writes.
             path = f"{self.store.path.rstrip('/')}/{key}"
@@ -90,10 +90,10 @@ class Keys:
 
     def remove(self, key: str) -> None:
         """Remove a key, which may be missing."""
-        with self.named(key):
+        with self.name_errors(key):
             _run(self.store.delete(key))
 
-    def listed(self) -> set[str]:
+    def list_keys(self) -> set[str]:
         """Return all keys, without the temporary files of other processes."""
         if isinstance(self.store, import_extra("zarr", "grid", PURPOSE).storage.FsspecStore):
             # Another process may have written since this one listed them.
@@ -106,12 +106,12 @@ class Keys:
                 if not _PARTIAL.fullmatch(key.rpartition("/")[2])
             }
 
-        with self.named():
+        with self.name_errors():
             keys: set[str] = _run(collect())
         return keys
 
     @contextmanager
-    def named(self, key: str = "") -> Iterator[None]:
+    def name_errors(self, key: str = "") -> Iterator[None]:
         """Name the store and the key in the error of a read or a write that failed."""
         where = f"{self.name}/{key}" if key else self.name
         try:

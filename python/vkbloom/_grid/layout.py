@@ -76,7 +76,7 @@ class Grid:
                 time = axis.values[number]
         return Point(index, base.replace(**changes) if changes else base, time)
 
-    def named(self, index: Index) -> str:
+    def describe_point(self, index: Index) -> str:
         """Return a point's axis values as text for messages."""
         values = (f"{axis.name}={axis.label(i)}" for axis, i in zip(self.axes, index, strict=True))
         return ", ".join(values) or "the only point"
@@ -171,7 +171,7 @@ def lay_out(
     if grid.reduce:
         sample = _sample(grid, renderer)
         for name, reduction in grid.reduce.items():
-            value = checked_value(name, reduction(sample))
+            value = check_value(name, reduction(sample))
             dims = tuple(f"{name}_dim_{number}" for number in range(value.ndim))
             attributes = {"long_name": name, "units": "1"}
             variables[name] = Variable(dims, value.shape, value.dtype, attributes)
@@ -201,14 +201,14 @@ def ranking(grid: Grid) -> tuple[int, ...]:
         # blur while the bloom is off.
         for backwards in (False, True):
             steps = list(walk(grid.shape, backwards=backwards))
-            passes = _core.dry_run(_planned(grid, [index for _, index in steps]))
+            passes = _core.dry_run(_plan_points(grid, [index for _, index in steps]))
             for (stepped, _), ran in zip(steps, passes, strict=True):
                 if stepped is not None:
                     costs[stepped] += len({name for name, *_ in ran})
     return ranking_of(costs, [axis.kind in ("settings", "preset") for axis in grid.axes])
 
 
-def _planned(grid: Grid, path: list[Index]) -> tuple[tuple[_core.Source, _core.Plan], ...]:
+def _plan_points(grid: Grid, path: list[Index]) -> tuple[tuple[_core.Source, _core.Plan], ...]:
     """Return the points of a path with plans for all framebuffers, so that no pass is fused."""
     points = [grid.point(index) for index in path]
     sources = {time: grid.source.for_core(time) for time in {point.time for point in points}}
@@ -315,7 +315,7 @@ def _sample(grid: Grid, renderer: Renderer) -> Frames:
     return frames
 
 
-def checked_value(name: str, value: Any) -> NDArray[Any]:
+def check_value(name: str, value: Any) -> NDArray[Any]:
     """Convert the value of a reduction to an array of numbers."""
     array = np.asarray(value)
     if array.dtype.kind not in "biuf":
@@ -325,7 +325,7 @@ def checked_value(name: str, value: Any) -> NDArray[Any]:
     return array.astype(widest)
 
 
-def made_dataset(grid: Grid, layout: Layout, arrays: Mapping[str, Any]) -> xarray.Dataset:
+def make_dataset(grid: Grid, layout: Layout, arrays: Mapping[str, Any]) -> xarray.Dataset:
     """Return the grid's Dataset with these arrays."""
     xr = import_extra("xarray", "grid", "grid")
     dims = tuple(axis.name for axis in grid.axes)

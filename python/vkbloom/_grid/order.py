@@ -22,7 +22,7 @@ WHOLE: Final[Part] = (1, 1)
 
 
 @dataclass(frozen=True)
-class Block:
+class GridBlock:
     """Neighbouring points of a grid: a box along its axes, from `start` to `stop` by axis."""
 
     start: Index
@@ -46,7 +46,7 @@ class Block:
 
 def blocks(
     shape: Index, chunk: Index, ranking: Sequence[int], part: Part = WHOLE
-) -> Iterator[Block]:
+) -> Iterator[GridBlock]:
     """Return the blocks of a part of a grid in the order in which they are visited.
 
     A part is a run of neighbouring blocks, so that its points share passes.
@@ -57,10 +57,10 @@ def blocks(
     for starts in itertools.islice(every, *ends):
         start = _in_order(starts, ranking)
         sides = zip(start, chunk, shape, strict=True)
-        yield Block(start, tuple(min(first + size, end) for first, size, end in sides))
+        yield GridBlock(start, tuple(min(first + size, end) for first, size, end in sides))
 
 
-def points(block: Block, ranking: Sequence[int]) -> Iterator[Index]:
+def points(block: GridBlock, ranking: Sequence[int]) -> Iterator[Index]:
     """Yield the points of a block in the order in which they are visited."""
     ranges = (range(block.start[axis], block.stop[axis]) for axis in ranking)
     for numbers in itertools.product(*ranges):

@@ -24,7 +24,7 @@ from vkbloom._renderer.requests import Request
 from vkbloom._renderer.sources import (
     SCENE_SIZE,
     Inputs,
-    checked_inputs,
+    check_inputs,
     image_source,
     is_image,
     scene_source,
@@ -99,17 +99,17 @@ class ImageSource(Constructed):
     @cached_property
     def description(self) -> dict[str, Any]:
         """The identity of the source: shape, dtype and digests."""
-        return {"kind": "image", "images": [_described(self.image)]}
+        return {"kind": "image", "images": [_describe(self.image)]}
 
 
-def _described(image: Inputs | Image) -> dict[str, Any]:
+def _describe(image: Inputs | Image) -> dict[str, Any]:
     """Return the identity of an image; of an uploaded one what is on the host: mask, emission."""
     pixels: Any = image if isinstance(image, Image) else image.image
     if isinstance(image, Image):
         arrays = image._inputs
     else:
         arrays = {
-            "sha256" if name == "image" else name: part for name, part in image.named().items()
+            "sha256" if name == "image" else name: part for name, part in image.by_name().items()
         }
     return {
         "shape": list(pixels.shape),
@@ -192,7 +192,7 @@ def read_source(
         # Raises if there is a mask or an emission, too.
         image_source(source, mask, emission)
         return ImageSource(source)
-    return ImageSource(checked_inputs(source, mask, emission, name="source"))
+    return ImageSource(check_inputs(source, mask, emission, name="source"))
 
 
 def digest(value: object) -> str:

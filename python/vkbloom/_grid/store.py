@@ -27,14 +27,14 @@ from numpy.typing import NDArray
 
 from vkbloom._extras import import_extra
 from vkbloom._grid.keys import PURPOSE, Keys
-from vkbloom._grid.layout import Grid, Layout, Variable, made_dataset
-from vkbloom._grid.order import WHOLE, Block, Index, Part, blocks
+from vkbloom._grid.layout import Grid, Layout, Variable, make_dataset
+from vkbloom._grid.order import WHOLE, GridBlock, Index, Part, blocks
 from vkbloom._settings.records import plain_value
 
 #: Version of the store's layout. A store with another version cannot be read.
 FORMAT: Final = 3
 
-_LONGEST: Final = 60  # characters of a value in a message
+_MAX_CHARACTERS: Final = 60  # characters of a value in a message
 DONE: Final = "done"
 METADATA: Final = "zarr.json"
 MISSING: Final = "missing"
@@ -60,7 +60,7 @@ def identity(grid: Grid, layout: Layout, chunk: Index) -> dict[str, Any]:
             name: {"shape": variable.shape, "dtype": variable.dtype.name}
             for name, variable in layout.variables.items()
         },
-        "reduce": {name: _named(reduction) for name, reduction in grid.reduce.items()},
+        "reduce": {name: _name_of(reduction) for name, reduction in grid.reduce.items()},
         "chunk": chunk,
     }
     # The same conversion as by storing it in JSON, which turns tuples into lists.
@@ -82,7 +82,7 @@ def chunk_in(stored: Mapping[str, Any], shape: Index) -> Index | None:
     return tuple(held)
 
 
-def _named(reduction: Any) -> str:
+def _name_of(reduction: Any) -> str:
     kind = reduction if hasattr(reduction, "__qualname__") else type(reduction)
     return f"{kind.__module__}.{kind.__qualname__}"
 
@@ -105,9 +105,9 @@ def differences(stored: Any, asked: Any, name: str = "") -> Iterator[str]:
 def short(value: Any) -> str:
     """Return any JSON value as a short text for a message."""
     text = json.dumps(value)
-    if len(text) <= _LONGEST:
+    if len(text) <= _MAX_CHARACTERS:
         return text
-    return f"{text[: _LONGEST - 20]} ... {text[-12:]}"
+    return f"{text[: _MAX_CHARACTERS - 20]} ... {text[-12:]}"
 
 
 @dataclass
@@ -133,35 +133,35 @@ class Chunks:
             self._opened[name] = array.with_config({"write_empty_chunks": True})
         return self._opened[name]
 
-    def key(self, name: str, block: Block) -> str:
+    def key(self, name: str, block: GridBlock) -> str:
         """Return the key of a block's chunk of a variable."""
         numbers = (start // size for start, size in zip(block.start, self.chunk, strict=True))
         # An array without dimensions has the key "c".
         trailing = "0" * self.trailing.get(name, 0)
         return f"{name}/" + ".".join(["c", *map(str, numbers), *trailing])
 
-    def write(self, block: Block, arrays: Mapping[str, NDArray[Any]]) -> None:
+    def write(self, block: GridBlock, arrays: Mapping[str, NDArray[Any]]) -> None:
         """Write a block's variables, then mark it as done."""
         for name, values in {**arrays, DONE: np.True_}.items():
-            with self.keys.named(name):
+            with self.keys.name_errors(name):
                 self._array(name)[block.slices] = values
 
     def problems(
-        self, examined: Sequence[Block], held: Container[str]
+        self, examined: Sequence[GridBlock], held: Container[str]
     ) -> Iterator[Mapping[str, str | None]]:
         """Yield what is wrong with each block's chunks by variable: missing, damaged or None.
 
         `held` has the keys of the store.
         """
 
-        def examine(block: Block) -> Mapping[str, str | None]:
+        def examine(block: GridBlock) -> Mapping[str, str | None]:
             return {name: self._problem(name, block, held) for name in (DONE, *self.trailing)}
 
         with ThreadPoolExecutor(_READERS, "vkbloom-read") as pool:
             for first in range(0, len(examined), _READERS):
                 yield from pool.map(examine, examined[first : first + _READERS])
 
-    def _problem(self, name: str, block: Block, held: Container[str]) -> str | None:
+    def _problem(self, name: str, block: GridBlock, held: Container[str]) -> str | None:
         key = self.key(name, block)
         return self._damage(name, key, block.slices) if key in held else MISSING
 
@@ -199,7 +199,7 @@ def expected_keys(grid: Grid, layout: Layout, chunk: Index) -> dict[str, bytes]:
     dask = import_extra("dask.array", "grid", PURPOSE)
     facts = {"description": "Whether the point is done"}
     marked = {**layout.variables, DONE: Variable((), (), np.dtype(np.bool_), facts)}
-    dataset = made_dataset(
+    dataset = make_dataset(
         grid,
         replace(layout, variables=marked),
         {
@@ -245,7 +245,7 @@ class GridStore:
 
     chunks: Chunks
     layout: Layout
-    missing: list[Block]
+    missing: list[GridBlock]
     total: int
 
     @property
@@ -263,7 +263,7 @@ def prepare(
     another grid; nothing is written.
     """
     expected = expected_keys(grid, layout, chunk)
-    held = keys.listed()
+    held = keys.list_keys()
     if held and not resume:
         raise FileExistsError(
             f"{keys.name}: the store already has a grid; resume it, or name another store"
@@ -271,7 +271,7 @@ def prepare(
     if not held:
         # Of processes that start at once, one decides which grid this is.
         keys.create(METADATA, expected[METADATA])
-    if changed := [*differences(checked_identity(keys), identity(grid, layout, chunk))]:
+    if changed := [*differences(check_identity(keys), identity(grid, layout, chunk))]:
         told = "; ".join(changed)
         raise ValueError(f"{keys.name}: contains another grid; {told}; delete it or name another")
     if part == WHOLE:
@@ -302,7 +302,7 @@ def stored_identity(keys: Keys) -> dict[str, Any] | None:
     return held if isinstance(held, dict) else None
 
 
-def checked_identity(keys: Keys) -> dict[str, Any]:
+def check_identity(keys: Keys) -> dict[str, Any]:
     """Return the grid's identity, or raise ValueError if there is none of this version."""
     held = stored_identity(keys)
     if held is None:

@@ -8,19 +8,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom._arrays import saturate
-from vkbloom._io.narrowing import narrowed
+from vkbloom._io.narrowing import narrow
 from vkbloom._io.picture import Picture
 
 # Hidden light of less than this share of the visible light does not show.
 _TRIFLE: Final = 0.05
 
 
-def multiplied(values: NDArray[Any]) -> NDArray[Any]:
+def multiply(values: NDArray[Any]) -> NDArray[Any]:
     """Return colours multiplied by alpha, in the same dtype."""
     return _with_alpha(values, values[:, :, -1:])
 
 
-def divided(values: NDArray[Any]) -> NDArray[Any]:
+def divide(values: NDArray[Any]) -> NDArray[Any]:
     """Return colours divided by alpha, in the same dtype; unchanged where alpha is 0."""
     alpha = values[:, :, -1:].astype(np.float32)
     unit = np.float32(1 if values.dtype.kind == "f" else np.iinfo(values.dtype).max)
@@ -39,7 +39,7 @@ def _with_alpha(values: NDArray[Any], factor: NDArray[Any]) -> NDArray[Any]:
         made[:, :, :-1] = np.rint(np.minimum(made[:, :, :-1] / largest, largest))
         return made.astype(values.dtype)
     # Colours divided by a small alpha may be beyond the range of their type.
-    return narrowed(saturate(made, np.isfinite(values)), values.dtype)
+    return narrow(saturate(made, np.isfinite(values)), values.dtype)
 
 
 def hidden_notes(picture: Picture) -> tuple[str, ...]:

@@ -12,15 +12,15 @@ from typing import Any, Final, Literal, get_args, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom._argument_types import checked
+from vkbloom._argument_types import check_arguments
 from vkbloom._extras import import_extra
 from vkbloom._io import image_writing, safe_writing
-from vkbloom._io.alpha import divided, hidden_notes, multiplied
+from vkbloom._io.alpha import divide, hidden_notes, multiply
 from vkbloom._io.displayed import Saved, check_saved
 from vkbloom._io.expansion import check_expansion, expand_photograph
 from vkbloom._io.image_file import read_picture
-from vkbloom._io.narrowing import narrowed
-from vkbloom._io.picture import PIXEL_TYPES, Picture, SavedColour, checked_pixels, is_exr
+from vkbloom._io.narrowing import narrow
+from vkbloom._io.picture import PIXEL_TYPES, Picture, SavedColour, check_pixels, is_exr
 from vkbloom._io.readers import check_name
 from vkbloom._numbers import check_index
 from vkbloom._public import public
@@ -54,7 +54,7 @@ def read(
     metadata: Literal[True],
 ) -> tuple[NDArray[Any], dict[str, Any]]: ...
 @public("vkbloom")
-@checked
+@check_arguments
 def read(
     path: str | os.PathLike[str],
     *,
@@ -123,7 +123,7 @@ def read(
     pixels = picture.pixels
     has_alpha = pixels.shape[2] == 4
     if has_alpha and picture.is_multiplied is not premultiplied:
-        pixels = multiplied(pixels) if premultiplied else divided(pixels)
+        pixels = multiply(pixels) if premultiplied else divide(pixels)
     if not metadata:
         return pixels
     facts: dict[str, Any] = {
@@ -159,7 +159,7 @@ def _check_conversions(values: NDArray[Any], saved: Saved, bits: int | None) -> 
 
 
 @public("vkbloom")
-@checked
+@check_arguments
 def write(
     path: str | os.PathLike[str],
     array: NDArray[Any],
@@ -230,22 +230,22 @@ def write(
     """
     oiio = import_extra("OpenImageIO", "images", "Writing images")
     target = Path(check_name(path))
-    given = _checked(array)
+    given = _check(array)
     # No format has more than 32 bits.
-    values = narrowed(given, np.dtype(np.float32)) if given.dtype.name == "float64" else given
+    values = narrow(given, np.dtype(np.float32)) if given.dtype.name == "float64" else given
     is_float = values.dtype.kind == "f"
     saved = Saved(encoding, primaries, view)
     _check_conversions(values, saved, bits)
     safe_writing.writer_of(target)
     if values.shape[2] in (2, 4) and premultiplied is not is_exr(target):
-        values = divided(values) if premultiplied else multiplied(values)
+        values = divide(values) if premultiplied else multiply(values)
     numbers = PIXEL_TYPES[values.dtype.name]
     encoded: SavedColour | None = "linear" if is_float else None
-    picture = Picture.of_values(values, numbers, encoded, _typed(oiio, metadata or {}))
+    picture = Picture.of_values(values, numbers, encoded, _add_types(oiio, metadata or {}))
     bits = bits if is_float else None
     # (Of 32 bits, `chosen_layout` says that the format has no floats.)
     image_writing.check_options(target, saved, quality, None if bits == 32 else bits)
-    layout = image_writing.chosen_layout(picture, target, is_hdr=False, bits=bits)
+    layout = image_writing.choose_layout(picture, target, is_hdr=False, bits=bits)
     if (channels := layout[0].shape[2]) != values.shape[2]:
         raise ValueError(f"{target}: its format has no alpha; write array[..., :{channels}]")
     if not is_float and layout[1] != numbers:
@@ -263,13 +263,13 @@ def write(
     return target
 
 
-def _checked(array: NDArray[Any]) -> NDArray[Any]:
+def _check(array: NDArray[Any]) -> NDArray[Any]:
     """Return the array as (H, W, C), after a check of its shape and dtype."""
     try:
         values = np.asanyarray(array)
     except (TypeError, ValueError) as error:
         raise TypeError(f"array: an array is needed; NumPy: {error}") from None
-    values = checked_pixels("array", values)
+    values = check_pixels("array", values)
     if values.shape[2] > 4:
         raise ValueError(f"array: {values.shape[2]} channels are not 1 to 4")
     return values
@@ -282,7 +282,7 @@ def _plain(value: Any) -> Any:
     return value
 
 
-def _typed(oiio: ModuleType, metadata: Mapping[str, Any]) -> dict[str, tuple[Any, Any]]:
+def _add_types(oiio: ModuleType, metadata: Mapping[str, Any]) -> dict[str, tuple[Any, Any]]:
     """Return attributes with OpenImageIO's types."""
     typed: dict[str, tuple[Any, Any]] = {}
     for name, value in metadata.items():

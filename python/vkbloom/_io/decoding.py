@@ -16,14 +16,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom._extras import import_extra
-from vkbloom._io.alpha import divided
+from vkbloom._io.alpha import divide
 from vkbloom._io.attributes import without_colours
 from vkbloom._io.chromaticities import CHROMATICITIES, name_of
 from vkbloom._io.displayed import CONFIGURATION, PRIMARIES, between
 from vkbloom._io.formats.tiff import LAB
 from vkbloom._io.hdr_curves import DECODERS
 from vkbloom._io.icc import from_chromaticities, from_lab, read_profile
-from vkbloom._io.narrowing import narrowed
+from vkbloom._io.narrowing import narrow
 from vkbloom._io.picture import (
     SPACES,
     Alpha,
@@ -33,7 +33,7 @@ from vkbloom._io.picture import (
     Header,
     Picture,
     StatedColours,
-    listed,
+    list_all,
 )
 from vkbloom._io.srgb import decode_srgb
 
@@ -64,7 +64,7 @@ def decode(stored: Picture, colour: Colour | None = None) -> Picture:
     `colour`: A colour space instead of the one that the file states.
     """
     header = stored.header
-    chosen, left_out = _chosen_channels(header.channels)
+    chosen, left_out = _choose_channels(header.channels)
     values = stored.pixels[:, :, chosen]
     kinds = {header.numbers[index] for index in chosen}
     numbers = kinds.pop() if len(kinds) == 1 else "float"
@@ -73,7 +73,7 @@ def decode(stored: Picture, colour: Colour | None = None) -> Picture:
         values = values.astype(np.float16, copy=False)
     notes = [*stored.notes]
     if left_out:
-        notes.append(f"left out the channels {listed(left_out)}")
+        notes.append(f"left out the channels {list_all(left_out)}")
     if is_grey := len(chosen) < 3:
         values = values[:, :, [0, 0, 0, *range(1, len(chosen))]]
     is_encoded = values.dtype.kind == "u" or header.colours.is_encoded
@@ -102,7 +102,7 @@ def decode(stored: Picture, colour: Colour | None = None) -> Picture:
     )
 
 
-def _chosen_channels(names: tuple[str, ...]) -> tuple[list[int], list[str]]:
+def _choose_channels(names: tuple[str, ...]) -> tuple[list[int], list[str]]:
     """Return the indices of the colour and alpha channels, and the names of the other channels."""
     layers = dict.fromkeys(name.rpartition(".")[0] for name in names)
     # If all channels have the same layer, its name is not needed.
@@ -116,11 +116,11 @@ def _chosen_channels(names: tuple[str, ...]) -> tuple[list[int], list[str]]:
         chosen = [min(grey, key=lambda index: bool(_UNNAMED.match(names[index]))), *alpha]
     elif len(layers) > 1:
         raise ValueError(
-            f"the layers are {listed(filter(None, layers))}; name one as the layer to read"
+            f"the layers are {list_all(filter(None, layers))}; name one as the layer to read"
         )
     else:
         raise ValueError(
-            f"the channels {listed(names)} are not R, G, B or a single one, with or without alpha"
+            f"the channels {list_all(names)} are not R, G, B or a single one, with or without alpha"
         )
     return chosen, [name for index, name in enumerate(names) if name and index not in chosen]
 
@@ -130,7 +130,7 @@ def _divide_by_alpha(values: NDArray[Any]) -> NDArray[Any]:
     if values.dtype.kind == "u":
         scale = 65535 // np.iinfo(values.dtype).max
         values = values.astype(np.uint16) * np.uint16(scale)
-    return divided(values)
+    return divide(values)
 
 
 def _linear(
@@ -139,13 +139,13 @@ def _linear(
     """Return the assumed colour space, the linear floats, and notes; alpha is only scaled."""
     stated = header.colours
     if stated.space in LAB:
-        made = _scaled(values)
+        made = _scale(values)
         made[:, :, :3] = from_lab(values[:, :, :3], stated.space)
         return stated.space, made, []
     if colour is not None:
         if colour not in ("linear", "srgb"):
             check_space(colour)
-        return colour, _decoded(values, colour), []
+        return colour, _decode(values, colour), []
     if stated.has_gain_map:
         return _of_gain_map(values, stated)
     if stated.code_points is None:
@@ -167,8 +167,8 @@ def _by_profile(
         space, made, _ = _by_space(values, stated)
         return space, made, [f"{said} is not one of RGB by a matrix and curves; taken as {space}"]
     if profile.is_srgb:
-        return "srgb", _decoded(values, "srgb"), []
-    made = _scaled(values)
+        return "srgb", _decode(values, "srgb"), []
+    made = _scale(values)
     made[:, :, :3] = profile.decode(values[:, :, :3])
     name = stated.profile_name or "ICC profile"
     return name, made, [f"converted to linear Rec. 709 by {said}"]
@@ -187,7 +187,7 @@ def _of_gain_map(
     made = values.astype(np.float32)
     made[:, :, :3] = made[:, :, :3] @ profile.matrix.T.astype(np.float32)
     said = "converted to linear Rec. 709 from the primaries of its ICC profile "
-    return "linear", narrowed(made, values.dtype), [f"{said}{stated.profile_name!r}"]
+    return "linear", narrow(made, values.dtype), [f"{said}{stated.profile_name!r}"]
 
 
 def _by_space(values: NDArray[Any], stated: StatedColours) -> tuple[str, NDArray[Any], list[str]]:
@@ -196,21 +196,21 @@ def _by_space(values: NDArray[Any], stated: StatedColours) -> tuple[str, NDArray
         return _by_code_points(values, stated, stated.code_points)
     if stated.gamma is not None:
         if stated.gamma == 1:
-            return "linear", _decoded(values, "linear"), []
+            return "linear", _decode(values, "linear"), []
         is_known = stated.space in _EXPONENTS
         space = stated.space if is_known else f"gamma {stated.gamma:.4g}"
-        made = _decoded(values, space, stated.gamma)
+        made = _decode(values, space, stated.gamma)
         return space, made, [f"the file says {space} of its colours; converted to linear Rec. 709"]
     # PNM's standard has the curve of BT.709. Programs write sRGB.
     named = "" if stated.space == _OF_PNM else stated.space
     space = {name: plain for plain, name in SPACES.items()}.get(named, named)
     if space in ("", "srgb", "linear"):
-        return space or "srgb", _decoded(values, space or "srgb"), []
+        return space or "srgb", _decode(values, space or "srgb"), []
     said = f"the file says {stated.space} of its colours"
     try:
-        made = _decoded(values, stated.space)
+        made = _decode(values, stated.space)
     except ValueError:
-        return "srgb", _decoded(values, "srgb"), [f"{said}, which is not known; taken as srgb"]
+        return "srgb", _decode(values, "srgb"), [f"{said}, which is not known; taken as srgb"]
     return stated.space, made, [f"{said}; converted to linear Rec. 709"]
 
 
@@ -221,7 +221,7 @@ def _by_primaries(
     gamma = header.colours.gamma
     space = name_of(primaries, gamma if is_encoded else 1)
     curve = "srgb" if gamma is None else ""
-    made = _decoded(values, curve if is_encoded else "linear", gamma).astype(np.float32)
+    made = _decode(values, curve if is_encoded else "linear", gamma).astype(np.float32)
     made[:, :, :3] = made[:, :, :3] @ from_chromaticities(primaries).T.astype(np.float32)
     made = made.astype(values.dtype if values.dtype.kind == "f" else np.float32, copy=False)
     said = f"the file says {space} of its colours; converted to linear Rec. 709"
@@ -233,7 +233,7 @@ def _by_code_points(
 ) -> tuple[str, NDArray[Any], list[str]]:
     """As `_linear`. OpenImageIO takes several of these spaces as sRGB."""
     primaries, curve, is_narrow = points
-    made = _decoded(values, _CURVES.get(curve, curve), is_narrow=is_narrow)
+    made = _decode(values, _CURVES.get(curve, curve), is_narrow=is_narrow)
     if primaries == "rec709" and curve in ("srgb", "linear"):
         return curve, made, []
     is_named = stated.space not in ("", SPACES["srgb"])
@@ -263,7 +263,7 @@ def _notes_of_floats(header: Header) -> list[str]:
     return notes
 
 
-def _decoded(
+def _decode(
     values: NDArray[Any], space: str, exponent: float | None = None, *, is_narrow: bool = False
 ) -> NDArray[Any]:
     """Return linear floats from colours of a space; alpha is only scaled."""
@@ -274,8 +274,8 @@ def _decoded(
         made = values.astype(np.float32)
         with np.errstate(over="ignore"):
             made[:, :, :3] = _to_light(made[:, :, :3], space, exponent)
-            return narrowed(made, values.dtype)
-    made = _scaled(values)
+            return narrow(made, values.dtype)
+    made = _scale(values)
     if space in ("srgb", *DECODERS) or exponent is not None or is_narrow:
         # A table with one entry per integer value, computed in float64.
         scale = np.iinfo(values.dtype).max
@@ -290,7 +290,7 @@ def _decoded(
     return made
 
 
-def _scaled(values: NDArray[Any]) -> NDArray[Any]:
+def _scale(values: NDArray[Any]) -> NDArray[Any]:
     """Return integers as floats of 0..1; floats as they are."""
     if values.dtype.kind == "f":
         return values.copy()

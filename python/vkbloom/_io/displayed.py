@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from vkbloom._extras import import_extra
 from vkbloom._io.chromaticities import CHROMATICITIES
 from vkbloom._io.hdr_curves import ENCODERS, HDR_CURVES
-from vkbloom._io.narrowing import narrowed
+from vkbloom._io.narrowing import narrow
 from vkbloom._io.picture import SPACES, Attributes, CodePoints
 from vkbloom._io.srgb import encode_srgb
 
@@ -83,7 +83,7 @@ def is_hdr(saved: Saved) -> bool:
     return curve in (_CURVE_POINTS[name] for name in HDR_CURVES)
 
 
-def converted(
+def convert(
     oiio: ModuleType, values: NDArray[Any], saved: Saved, curve: str, *, is_integer: bool
 ) -> tuple[NDArray[Any], tuple[str, str] | str]:
     """Return linear Rec. 709 floats (H, W, C) as a file has them, and what they are then."""
@@ -92,13 +92,13 @@ def converted(
         return _by_ocio(values, "ociodisplay", display, view, *_FROM_LINEAR), display
     if curve != "none" and saved.primaries != "rec709":
         ends = PRIMARIES["rec709"], PRIMARIES[saved.primaries]
-        values = narrowed(between(values, *ends), values.dtype)
+        values = narrow(between(values, *ends), values.dtype)
     if is_integer and curve in _ENDING_AT_1:
-        values = scaled_to_1(values)
-    return encoded(values, curve), (saved.primaries, curve)
+        values = scale_to_1(values)
+    return encode(values, curve), (saved.primaries, curve)
 
 
-def scaled_to_1(values: NDArray[Any], limit: float = 1.0) -> NDArray[Any]:
+def scale_to_1(values: NDArray[Any], limit: float = 1.0) -> NDArray[Any]:
     """Return linear floats (H, W, C), in which no component of a colour is above the limit.
 
     A factor keeps the hue: Naik and Murthy, "Hue-preserving color image enhancement without gamut
@@ -116,7 +116,7 @@ def scaled_to_1(values: NDArray[Any], limit: float = 1.0) -> NDArray[Any]:
     return made
 
 
-def encoded(values: NDArray[Any], curve: str) -> NDArray[Any]:
+def encode(values: NDArray[Any], curve: str) -> NDArray[Any]:
     """Return linear floats (H, W, C) with their colours on a curve; alpha does not change."""
     if curve in ("none", "linear"):
         return values

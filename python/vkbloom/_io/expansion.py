@@ -15,15 +15,15 @@ from vkbloom._numbers import check_number
 KNEE: Final = 0.8
 #: What photographs are expanded to for the preset "photo".
 PHOTO_EXPANSION: Final = 4.0
-_LARGEST: Final = 1024.0
+_MAX_EXPANSION: Final = 1024.0
 
 
 def check_expansion(expand: float | None) -> float:
     """Return the value that 1 becomes; None is 1."""
-    return 1.0 if expand is None else check_number("expand", expand, 1, _LARGEST)
+    return 1.0 if expand is None else check_number("expand", expand, 1, _MAX_EXPANSION)
 
 
-def expanded(image: NDArray[Any], expand: float | None) -> NDArray[Any]:
+def expand_highlights(image: NDArray[Any], expand: float | None) -> NDArray[Any]:
     """Return an image whose highlights reach up to `expand`, with the hue of each pixel.
 
     With m = max(r, g, b), limited to 1, the knee a and the expansion E:
@@ -54,4 +54,4 @@ def expand_photograph(picture: Picture, expand: float | None) -> Picture:
     """Return a decoded picture with its highlights expanded, if the file has clipped ones."""
     if picture.highlights is not Highlights.CLIPPED:
         return picture
-    return replace(picture, pixels=expanded(picture.pixels, expand))
+    return replace(picture, pixels=expand_highlights(picture.pixels, expand))

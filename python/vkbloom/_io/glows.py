@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom._io.narrowing import narrowed
+from vkbloom._io.narrowing import narrow
 
 
 def grey_mask(pixels: NDArray[Any], file: str) -> NDArray[Any]:
@@ -23,4 +23,4 @@ def alike(emission: NDArray[Any], image: NDArray[Any]) -> NDArray[Any]:
     if emission.shape[2] < channels:
         alpha = np.ones((*emission.shape[:2], 1), emission.dtype)
         emission = np.concatenate([emission, alpha], axis=2)
-    return narrowed(emission[..., :channels], image.dtype)
+    return narrow(emission[..., :channels], image.dtype)

@@ -148,7 +148,7 @@ def _tags(content: bytes) -> dict[bytes, bytes]:
     return tags
 
 
-def _fixed(content: bytes, start: int, count: int) -> tuple[float, ...]:
+def _read_fixed(content: bytes, start: int, count: int) -> tuple[float, ...]:
     """Return numbers of the type s15Fixed16."""
     return tuple(value / 65536 for value in struct.unpack_from(f">{count}i", content, start))
 
@@ -156,7 +156,7 @@ def _fixed(content: bytes, start: int, count: int) -> tuple[float, ...]:
 def _xyz(content: bytes) -> tuple[float, ...]:
     if content[:4] != b"XYZ ":
         raise ValueError("the profile's matrix is damaged")
-    return _fixed(content, 8, 3)
+    return _read_fixed(content, 8, 3)
 
 
 def _curve(content: bytes) -> Curve:
@@ -172,7 +172,7 @@ def _curve(content: bytes) -> Curve:
     if content[:4] != b"para" or kind not in _PARAMETRIC:
         raise ValueError("the profile's curves are of an unknown type")
     count, seven = _PARAMETRIC[kind]
-    return _parametric(seven(*_fixed(content, 12, count)))
+    return _parametric(seven(*_read_fixed(content, 12, count)))
 
 
 def _parametric(seven: tuple[float, ...]) -> Curve:

@@ -23,7 +23,7 @@ from vkbloom._io.picture import (
     Picture,
     StatedColours,
 )
-from vkbloom._io.readers import choose_part, names_of_parts, opened, place_upright, read_values
+from vkbloom._io.readers import choose_part, names_of_parts, open_image, place_upright, read_values
 
 # The code point of an unspecified curve.
 _UNSPECIFIED: Final = 2
@@ -45,7 +45,7 @@ class ImageFile:
     ) -> None:
         self._name, self._layer = os.fspath(path), layer
         with ExitStack() as stack:
-            self._reader = stack.enter_context(opened(path, "Reading images"))
+            self._reader = stack.enter_context(open_image(path, "Reading images"))
             self._part = choose_part(self._reader, self._name, subimage, layer)
             self._kind: str = self._reader.format_name()
             with open(self._name, "rb") as stream:

@@ -18,7 +18,7 @@ from vkbloom._extras import import_extra
 from vkbloom._io import displayed, safe_writing
 from vkbloom._io.attributes import without_colours, write_exr_attributes
 from vkbloom._io.displayed import Saved
-from vkbloom._io.narrowing import file_note, for_radiance, narrowed
+from vkbloom._io.narrowing import file_note, for_radiance, narrow
 from vkbloom._io.picture import DTYPES, PIXEL_TYPES, SPACES, WITH_WINDOWS, Picture, is_exr
 from vkbloom._numbers import check_index
 
@@ -113,8 +113,8 @@ def save(
     if saved.view is not None or saved.primaries != "rec709":
         picture = dataclasses.replace(picture, grey=False)
     if layout is None:
-        layout = chosen_layout(picture, target, is_hdr=displayed.is_hdr(saved), bits=bits)
-    values, described, notes = _prepared(oiio, picture, layout, saved, target)
+        layout = choose_layout(picture, target, is_hdr=displayed.is_hdr(saved), bits=bits)
+    values, described, notes = _prepare(oiio, picture, layout, saved, target)
     part = Part(values, described, {**(attributes or {}), **added})
     with safe_writing.replacing(oiio, {target: values.nbytes}) as (temporary,):
         put(oiio, [part], temporary, target)
@@ -124,11 +124,11 @@ def save(
 def levels_of(final: NDArray[Any], encoding: str) -> NDArray[np.uint8]:
     """Return the levels that `save` writes of a `final` to an sRGB file of 8 bits."""
     if encoding == "none" and final.dtype.kind == "f":
-        final = displayed.encoded(displayed.scaled_to_1(final), "srgb")
+        final = displayed.encode(displayed.scale_to_1(final), "srgb")
     return _as_numbers(final, "uint8")
 
 
-def _prepared(
+def _prepare(
     oiio: ModuleType, picture: Picture, layout: Layout, saved: Saved, target: Path
 ) -> tuple[NDArray[Any], Picture, tuple[str, ...]]:
     """Return the values to write in a layout, what describes them, and notes about losses."""
@@ -148,9 +148,9 @@ def _prepared(
         if saved.view is not None and not integer:
             raise ValueError(f"view: {target} has linear floats; write a file of integers")
         curve = saved.curve or ("srgb" if integer else "linear")
-        values, what = displayed.converted(oiio, values, saved, curve, is_integer=integer)
+        values, what = displayed.convert(oiio, values, saved, curve, is_integer=integer)
     try:
-        described = described_as(oiio, picture, target, what)
+        described = describe_as(oiio, picture, target, what)
     except ValueError as error:
         if picture.encoding == "linear":
             raise
@@ -166,7 +166,7 @@ def _is_above_1(pixels: NDArray[Any]) -> bool:
     return bool((colours[np.isfinite(colours)] > 1.001).any())
 
 
-def described_as(
+def describe_as(
     oiio: ModuleType, picture: Picture, target: Path, what: tuple[str, str] | str
 ) -> Picture:
     """Return a picture whose attributes name colours; `what` as for `displayed.with_names`."""
@@ -186,7 +186,7 @@ def put(oiio: ModuleType, parts: Sequence[Part], temporary: Path, target: Path) 
     """Write the parts of a file to its temporary file; only OpenEXR has more than one."""
     writer = oiio.ImageOutput.create(temporary.name)
     if writer.format_name() not in WITH_WINDOWS:
-        parts = [part._replace(values=_displayed(part)) for part in parts]
+        parts = [part._replace(values=_crop_to_display(part)) for part in parts]
     if writer.format_name() == "hdr":
         parts = [part._replace(values=for_radiance(part.values)) for part in parts]
     specs = [_spec_of(oiio, writer, part, target) for part in parts]
@@ -209,7 +209,7 @@ def put(oiio: ModuleType, parts: Sequence[Part], temporary: Path, target: Path) 
     writer.geterror()
 
 
-def _displayed(part: Part) -> NDArray[Any]:
+def _crop_to_display(part: Part) -> NDArray[Any]:
     """Return the values inside the display window."""
     header = part.picture.header
     x, y, width, height = header.display
@@ -242,7 +242,7 @@ def _spec_of(
     return spec
 
 
-def chosen_layout(picture: Picture, target: Path, *, is_hdr: bool, bits: int | None) -> Layout:
+def choose_layout(picture: Picture, target: Path, *, is_hdr: bool, bits: int | None) -> Layout:
     """Return the closest channels and number type that the format supports."""
     wanted = _DEEP if is_hdr else _PREFERENCES[picture.numbers]
     if bits is not None:
@@ -305,7 +305,7 @@ def _as_numbers(values: NDArray[Any], numbers: str) -> NDArray[Any]:
             return values
         values = values / np.float32(np.iinfo(values.dtype).max)
     if dtype.kind == "f":
-        return narrowed(values, dtype)
+        return narrow(values, dtype)
     clipped = np.clip(np.nan_to_num(values.astype(np.float32), nan=0.0), 0.0, 1.0)
     integers: NDArray[Any] = np.rint(clipped * np.float32(np.iinfo(dtype).max)).astype(dtype)
     return integers

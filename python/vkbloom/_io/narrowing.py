@@ -14,7 +14,7 @@ MAX_RADIANCE: Final = 255 / 256 * 2.0**127
 _NAMES: Final = {"float16": "half float", "float32": "float"}
 
 
-def narrowed(values: NDArray[Any], dtype: np.dtype[Any]) -> NDArray[Any]:
+def narrow(values: NDArray[Any], dtype: np.dtype[Any]) -> NDArray[Any]:
     """Return floats in another float type; finite ones beyond its range saturate.
 
     Infinity and NaN stay.
@@ -32,7 +32,7 @@ def for_radiance(values: NDArray[Any]) -> NDArray[Any]:
     OpenImageIO's writer makes infinity and NaN 0, and of negative numbers, which the format does
     not have, others: 0.7 of -0.3.
     """
-    single = narrowed(values, np.dtype(np.float32))
+    single = narrow(values, np.dtype(np.float32))
     made: NDArray[Any] = np.nan_to_num(single, nan=0.0, posinf=MAX_RADIANCE, neginf=0.0)
     np.clip(made, 0, np.float32(MAX_RADIANCE), out=made)
     return made

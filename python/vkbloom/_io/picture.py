@@ -249,7 +249,7 @@ class Picture:
         return self.pixels[:, :, [0, *range(3, self.pixels.shape[2])] if self.grey else slice(None)]
 
 
-def checked_pixels(name: str, image: NDArray[Any]) -> NDArray[Any]:
+def check_pixels(name: str, image: NDArray[Any]) -> NDArray[Any]:
     """Return an array of an image file's values as (H, W, C)."""
     if not isinstance(image, np.ndarray):
         raise TypeError(f"{name}: an array is needed, not {type(image).__name__}")
@@ -263,7 +263,7 @@ def checked_pixels(name: str, image: NDArray[Any]) -> NDArray[Any]:
     return np.atleast_3d(native_order(image))
 
 
-def listed(names: Iterable[str]) -> str:
+def list_all(names: Iterable[str]) -> str:
     """Return names of a file in a message: a file may have thousands, of any length."""
     chosen = [*names]
     shown = [

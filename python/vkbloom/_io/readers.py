@@ -22,7 +22,7 @@ from vkbloom._extras import import_extra
 from vkbloom._io.formats import jpeg_xl, photoshop, pnm
 from vkbloom._io.formats.fits import SIGNED
 from vkbloom._io.formats.tiff import LAB, RAW_ADVICE, full_picture, is_raw
-from vkbloom._io.picture import DTYPES, NUMBERS_ADVICE, WITH_WINDOWS, Window, listed
+from vkbloom._io.picture import DTYPES, NUMBERS_ADVICE, WITH_WINDOWS, Window, list_all
 
 if TYPE_CHECKING:
     import OpenImageIO
@@ -36,13 +36,13 @@ _HEIF_ADVICE: Final = (
 _HEIF_BRANDS: Final = b"avif avis heic heix hevc heim heis hevx mif1 msf1".split()
 # Bytes of a file that say what it is.
 _MIN_HEAD: Final = 32
-_LARGEST_SIDE: Final = 65536
+_MAX_SIDE: Final = 65536
 # Pixels of the largest texture, 16384 x 16384. A damaged header may claim more.
-_LARGEST_AREA: Final = 1 << 28
+_MAX_AREA: Final = 1 << 28
 # Above this size in bytes, the pixels must be plausible for the size of the file. Deflate, which
 # PNG, TIFF and OpenEXR use, expands one byte to at most 1032 (RFC 1951: 258 bytes from two bits).
 _LARGE: Final = 1 << 28
-_LARGEST_RATIO: Final = 4096
+_MAX_RATIO: Final = 4096
 # The most parts that are listed. Some files have thousands, and each takes time.
 _MAX_PARTS: Final = 100
 # libjpeg's warning about bytes after the pixels of a scan. Before a restart marker, 0xd0 to 0xd7,
@@ -68,7 +68,7 @@ def check_name(path: str | os.PathLike[str]) -> str:
     return name
 
 
-class Part(NamedTuple):
+class FilePart(NamedTuple):
     """A part of a file.
 
     - `number`: From 0.
@@ -83,7 +83,7 @@ class Part(NamedTuple):
 
 
 @contextmanager
-def opened(path: str | os.PathLike[str], purpose: str) -> Iterator[OpenImageIO.ImageInput]:
+def open_image(path: str | os.PathLike[str], purpose: str) -> Iterator[OpenImageIO.ImageInput]:
     """Open an image file; the context closes it."""
     oiio = import_extra("OpenImageIO", "images", purpose)
     name = check_name(path)
@@ -176,7 +176,7 @@ def readable_extensions() -> set[str]:
 def check_plausible(spec: OpenImageIO.ImageSpec, path: str | os.PathLike[str]) -> None:
     """Raise ValueError if a file is far too short for the pixels that its header claims."""
     size = spec.image_bytes()
-    if size > max(_LARGE, _LARGEST_RATIO * os.path.getsize(path)):
+    if size > max(_LARGE, _MAX_RATIO * os.path.getsize(path)):
         raise ValueError(
             f"{os.fspath(path)}: damaged: {os.path.getsize(path)} bytes cannot hold "
             f"{spec.width} x {spec.height} pixels"
@@ -185,7 +185,7 @@ def check_plausible(spec: OpenImageIO.ImageSpec, path: str | os.PathLike[str]) -
 
 def choose_part(
     reader: OpenImageIO.ImageInput, name: str, subimage: int, layer: str | None
-) -> Part:
+) -> FilePart:
     """Make the part to read the current one; ValueError if it is not supported."""
     notes: list[str] = []
     if reader.format_name() == "tiff":
@@ -204,7 +204,7 @@ def choose_part(
         raise ValueError(f"{name}: there are no pixels in this part of the file{more}")
     _check_readable(spec, reader.format_name(), name)
     kept = [index for index, part in enumerate(_layers_of(spec)) if layer in (None, part)]
-    return Part(subimage, spec, kept, notes)
+    return FilePart(subimage, spec, kept, notes)
 
 
 def _seek(reader: OpenImageIO.ImageInput, subimage: int) -> bool:
@@ -226,11 +226,11 @@ def _check_readable(spec: OpenImageIO.ImageSpec, kind: str, name: str) -> None:
     if kind == "tiff" and str(spec.format) == "double" and spec.tile_width:
         # OpenImageIO 3.2 returns memory that it has not written.
         raise ValueError(f"{name}: tiles of doubles are not supported; use strips, or floats")
-    width, height = _covered(spec) if kind in WITH_WINDOWS else (spec.width, spec.height)
-    if max(width, height) > _LARGEST_SIDE or width * height > _LARGEST_AREA:
+    width, height = _union_size(spec) if kind in WITH_WINDOWS else (spec.width, spec.height)
+    if max(width, height) > _MAX_SIDE or width * height > _MAX_AREA:
         raise ValueError(
-            f"{name}: {width} x {height} is larger than {_LARGEST_SIDE} pixels on a side or "
-            f"{_LARGEST_AREA} in all"
+            f"{name}: {width} x {height} is larger than {_MAX_SIDE} pixels on a side or "
+            f"{_MAX_AREA} in all"
         )
     check_plausible(spec, name)
 
@@ -271,7 +271,7 @@ def _in_windows(
     """Return the pixels of the data window and the display window, the origin, and the latter."""
     display = (spec.full_x, spec.full_y, spec.full_width, spec.full_height)
     left, top = min(spec.x, display[0]), min(spec.y, display[1])
-    width, height = _covered(spec)
+    width, height = _union_size(spec)
     if pixels.shape[:2] != (height, width):
         row, column = spec.y - top, spec.x - left
         whole = np.zeros((height, width, spec.nchannels), pixels.dtype)
@@ -280,7 +280,7 @@ def _in_windows(
     return pixels, (left, top), display
 
 
-def _covered(spec: OpenImageIO.ImageSpec) -> tuple[int, int]:
+def _union_size(spec: OpenImageIO.ImageSpec) -> tuple[int, int]:
     """Return the size of the area of the data window and the display window."""
     right = max(spec.x + spec.width, spec.full_x + spec.full_width)
     bottom = max(spec.y + spec.height, spec.full_y + spec.full_height)
@@ -317,7 +317,7 @@ def _part_with(reader: OpenImageIO.ImageInput, name: str, subimage: int, layer: 
         if layer in layers:
             return index
         known.update(dict.fromkeys(filter(None, layers)))
-    said = f"its layers are {listed(known)}" if known else "it has no named layers"
+    said = f"its layers are {list_all(known)}" if known else "it has no named layers"
     raise ValueError(f"{name}: there is no layer {layer!r}; {said}")
 
 

@@ -38,7 +38,7 @@ _MISSING: Final = dict.fromkeys(
 #: What the attribute "Software" of files begins with.
 PROGRAM: Final = "vkbloom"
 _TOLD_BY: Final = 16  # bytes that tell text from what is left of an image
-_LARGEST_HEADER: Final = 65536  # bytes of a file in addition to its pixels
+_MAX_HEADER_BYTES: Final = 65536  # bytes of a file in addition to its pixels
 _TEMPORARY: Final = ".vkbloom-"  # the beginning of the names of temporary files
 _TRIED: Final = 32  # pixels on a side that every format can have
 _ZEROS: Final = 1 << 20  # bytes written at a time
@@ -69,7 +69,7 @@ def reserve(file: Path, size: int) -> Path:
     A failure here has the system's own reason, which OpenImageIO does not report. On a full disk,
     OpenImageIO's JPEG writer would end the process, and its WebP writer would not return.
     """
-    return _filled(file, lambda stream: _allocate(stream, _LARGEST_HEADER + size))
+    return _fill(file, lambda stream: _allocate(stream, _MAX_HEADER_BYTES + size))
 
 
 def has_alpha(writer: OpenImageIO.ImageOutput) -> bool:
@@ -116,7 +116,7 @@ def check_complete(oiio: ModuleType, temporary: Path, file: Path) -> None:
     if reason is None:
         return
     reason = reason.replace(str(temporary), file.name)
-    if shutil.disk_usage(temporary.parent).free < _LARGEST_HEADER:
+    if shutil.disk_usage(temporary.parent).free < _MAX_HEADER_BYTES:
         raise OSError(errno.ENOSPC, f"not written completely: {reason}", str(file))
     # Some formats cannot hold a few pixels, or OpenImageIO cannot read such files.
     raise OSError(
@@ -223,7 +223,7 @@ def _backup_of(target: Path) -> tuple[Path, Path | None] | None:
 
 def write_file(file: Path, content: bytes) -> None:
     """Write a file atomically."""
-    temporary = _filled(file, lambda stream: stream.write(content))
+    temporary = _fill(file, lambda stream: stream.write(content))
     try:
         put_in_place(temporary, file)
     finally:
@@ -308,7 +308,7 @@ def is_temporary(path: Path) -> bool:
     return path.name.startswith(_TEMPORARY)
 
 
-def _filled(file: Path, fill: Callable[[BinaryIO], object]) -> Path:
+def _fill(file: Path, fill: Callable[[BinaryIO], object]) -> Path:
     """Create a temporary file beside a file and fill it; remove it if that fails."""
     check_name(file)
     target = _link_target(file)

@@ -196,8 +196,8 @@ def kernel_of(settings: BlenderGlare, buffers: tuple[int, int]) -> NDArray[np.fl
         psf = cast("PSF | None", settings.kernel)
         image = np.ones((1, 1, 3)) if psf is None else psf.kernel(size)
         if settings.version == "5.2" and settings.quality != "high":
-            image = _reduced(image, FACTORS[settings.quality])
-        return _turned(_normalized(image))
+            image = _reduce(image, FACTORS[settings.quality])
+        return _rotate(_normalize(image))
     values = (_fog_glow_of_4_3 if settings.version == "4.3" else _fog_glow)(size, settings.size)
     return np.repeat(values[..., np.newaxis], 3, axis=2)
 
@@ -256,17 +256,17 @@ def _fog_glow_of_4_3(size: tuple[int, int], share: float) -> NDArray[np.float64]
     radius = (u**2 + u[:, np.newaxis] ** 2) * side / 4
     window = (1 + np.cos(np.pi * u)) / 2
     values = np.exp(-9 * radius**0.125) * window * window[:, np.newaxis]
-    return _normalized(values)
+    return _normalize(values)
 
 
-def _normalized(values: NDArray[np.float64]) -> NDArray[np.float64]:
+def _normalize(values: NDArray[np.float64]) -> NDArray[np.float64]:
     """Divide each channel by its sum, if that is not 0."""
     sums = values.sum(axis=(0, 1))
     result: NDArray[np.float64] = values / np.where(sums == 0, 1, sums)
     return result
 
 
-def _reduced(image: NDArray[np.float64], factor: int) -> NDArray[np.float64]:
+def _reduce(image: NDArray[np.float64], factor: int) -> NDArray[np.float64]:
     """Return the image bilinearly at the centres of fewer pixels; black, if there are none."""
     for length in image.shape[:2]:
         count = length // factor
@@ -280,7 +280,7 @@ def _reduced(image: NDArray[np.float64], factor: int) -> NDArray[np.float64]:
     return image
 
 
-def _turned(kernel: NDArray[np.float64]) -> NDArray[np.float64]:
+def _rotate(kernel: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the image turned by 180 degrees.
 
     Blender counts rows from the bottom and takes the pixel [h // 2, w // 2] for the point. Turned,

@@ -59,7 +59,7 @@ class Convolution(WithKernel, Settings):
     pixels_per_degree : float or None
         Scale of functions whose unit is "degree". None: the frame's longer side spans 50 degrees.
     kernel_size : (int, int) or None
-        Width and height of the kernel in pixels of ``final``. None: the own size of an array;
+        Width and height of the kernel in pixels of ``final``. None: the size of an array;
         otherwise (2 W - 1, 2 H - 1) for a frame of W x H, so that the light of every pixel reaches
         every other pixel.
     **settings

@@ -7,7 +7,7 @@ import math
 from typing import ClassVar, Literal
 
 from vkbloom import _core
-from vkbloom._argument_types import checked
+from vkbloom._argument_types import check_arguments
 from vkbloom._formats import MAX_FLOAT
 from vkbloom._numbers import check_above, check_index
 from vkbloom._public import public
@@ -87,7 +87,7 @@ class Separable(Settings):
 
 
 @public("vkbloom")
-@checked
+@check_arguments
 def gaussian_weights(sigma: float, radius: int | None = None) -> tuple[float, ...]:
     """Make a normalized Gaussian half-kernel.
 

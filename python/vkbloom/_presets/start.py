@@ -23,7 +23,7 @@ from dataclasses import replace
 from types import MappingProxyType
 from typing import Any, Final, NamedTuple
 
-from vkbloom._io.alpha import multiplied
+from vkbloom._io.alpha import multiply
 from vkbloom._io.expansion import PHOTO_EXPANSION, expand_photograph
 from vkbloom._io.image_file import read_picture
 from vkbloom._io.picture import PHOTOGRAPHS, Highlights, Picture
@@ -110,4 +110,4 @@ def multiply_by_alpha(picture: Picture) -> Picture:
     """
     if not picture.has_straight:
         return picture
-    return replace(picture, pixels=multiplied(picture.pixels))
+    return replace(picture, pixels=multiply(picture.pixels))

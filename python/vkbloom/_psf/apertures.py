@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from vkbloom._array_cache import kept
+from vkbloom._array_cache import keep
 from vkbloom._numbers import check_size
-from vkbloom._psf.base import Array, centred, check_wavelengths
+from vkbloom._psf.base import Array, check_wavelengths, crop_or_pad
 from vkbloom._psf.sampled import SampledPSF
 from vkbloom._psf.values import ArrayValue
 from vkbloom._public import public
@@ -87,7 +87,7 @@ class iris:
         return dataclasses.asdict(self)
 
 
-@kept
+@keep
 def _mask(made: iris) -> NDArray[np.float32]:
     fine = 4 * made.size
     positions = (np.arange(fine) + 0.5) * 2 / fine - 1
@@ -198,7 +198,7 @@ class aperture(SampledPSF):
         # Patterns of small apertures are much larger than frames.
         width, height = check_size("size", size)
         reach = _reach(self)
-        return centred(_pattern(self, min(reach, height // 2), min(reach, width // 2)), size)
+        return crop_or_pad(_pattern(self, min(reach, height // 2), min(reach, width // 2)), size)
 
 
 def _lengths(psf: aperture) -> tuple[float, ...]:
@@ -215,7 +215,7 @@ def _reach(psf: aperture) -> int:
     return max(1, math.ceil(_scale(psf, max(_lengths(psf))) * int(np.shape(psf.mask)[0]) / 2))
 
 
-@kept
+@keep
 def _pattern(psf: aperture, up: int, across: int) -> Array:
     """Return the sum over the wavelengths, as far as some rows and columns from the centre."""
     lengths = _lengths(psf)

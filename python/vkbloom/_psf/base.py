@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vkbloom._argument_types import checked
+from vkbloom._argument_types import check_arguments
 from vkbloom._arrays import plain_array
 from vkbloom._numbers import check_floats, check_number, check_size
 from vkbloom._public import public
@@ -48,7 +48,7 @@ class PSF(Record, abc.ABC):
     def __init_subclass__(cls) -> None:
         # A class that is defined in pixels has no other use for `pixels_per_degree`.
         if "array" in vars(cls):
-            cls.array = checked(cls.array)  # type: ignore[method-assign]
+            cls.array = check_arguments(cls.array)  # type: ignore[method-assign]
 
     @abc.abstractmethod
     def array(self, size: tuple[int, int], pixels_per_degree: float | None = None) -> Array:
@@ -207,7 +207,7 @@ def in_grey(values: Array) -> Array:
     return np.repeat(values[..., np.newaxis], 3, axis=-1)
 
 
-def centred(array: Array, size: tuple[int, int]) -> Array:
+def crop_or_pad(array: Array, size: tuple[int, int]) -> Array:
     """Return the array cropped, or extended by zeros, around its centre [h // 2, w // 2]."""
     width, height = check_size("size", size)
     result = np.zeros((height, width, *array.shape[2:]))

@@ -20,7 +20,7 @@ from typing import Any, ClassVar, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom._array_cache import kept
+from vkbloom._array_cache import keep
 from vkbloom._core_kernel import CoreKernel, core_kernel
 from vkbloom._io.disk_cache import DiskCache
 from vkbloom._public import defining_module
@@ -64,7 +64,7 @@ class WithKernel:
         return _core_kernel(shape, frame, buffers)._replace(prefilter=self.prefilter)
 
 
-@kept
+@keep
 def _core_kernel(shape: WithKernel, frame: Size, buffers: Size) -> CoreKernel:
     fields = tuple(getattr(shape, name) for name in shape.shaping)
     kind = type(shape)

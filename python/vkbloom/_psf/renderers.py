@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from vkbloom._array_cache import kept
+from vkbloom._array_cache import keep
 from vkbloom._formats import LUMINANCE, MAX_FLOAT
-from vkbloom._psf.base import PSF, Array, centred, in_grey
+from vkbloom._psf.base import PSF, Array, crop_or_pad, in_grey
 from vkbloom._psf.resampling import box_resample
 from vkbloom._psf.sampled import SampledPSF, check_values, rgb
 from vkbloom._public import public
@@ -106,7 +106,7 @@ class unreal(SampledPSF):
 
     def native_array(self) -> Array:
         height, width = _image_of(self).shape[:2]
-        return _scattered(self, max(width, height) / self.size)
+        return _scatter(self, max(width, height) / self.size)
 
     def array(self, size: tuple[int, int], pixels_per_degree: float | None = None) -> Array:
         return self.kernel(size, size)
@@ -118,11 +118,11 @@ class unreal(SampledPSF):
         pixels_per_degree: float | None = None,
     ) -> Array:
         width, height = size or (2 * frame[0] - 1, 2 * frame[1] - 1)
-        return centred(_scattered(self, max(frame), (height, width)), (width, height))
+        return crop_or_pad(_scatter(self, max(frame), (height, width)), (width, height))
 
 
-@kept
-def _scattered(psf: unreal, longer_side: float, room: tuple[int, int] | None = None) -> Array:
+@keep
+def _scatter(psf: unreal, longer_side: float, room: tuple[int, int] | None = None) -> Array:
     """Return the kernel for a frame with this longer side, of at most this height and width.
 
     The kernel of a frame of 16384 x 1 would have 16384 rows, of which one counts.

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
-from vkbloom._psf.base import PSF, Array, centred, check_radii, in_grey
+from vkbloom._psf.base import PSF, Array, check_radii, crop_or_pad, in_grey
 from vkbloom._psf.values import ArrayValue
 from vkbloom._public import public
 from vkbloom._settings.fields import value_field
@@ -27,7 +27,7 @@ class SampledPSF(PSF):
         """Return the energy per pixel in the function's own size, (h, w, 3). Outside it is 0."""
 
     def array(self, size: tuple[int, int], pixels_per_degree: float | None = None) -> Array:
-        return centred(self.native_array(), size)
+        return crop_or_pad(self.native_array(), size)
 
     def energy(self) -> Array:
         return np.asarray(self.native_array().sum(axis=(0, 1)))
@@ -103,7 +103,7 @@ class samples(SampledPSF):
         size: tuple[int, int] | None = None,
         pixels_per_degree: float | None = None,
     ) -> Array:
-        return self.native_array() if size is None else centred(self.native_array(), size)
+        return self.native_array() if size is None else crop_or_pad(self.native_array(), size)
 
 
 def rgb(values: ArrayValue) -> Array:

@@ -57,7 +57,7 @@ class _Adapter(NamedTuple):
             return False
         return [int(a or "0", 16) for a in given.groups()] == [int(a, 16) for a in address.groups()]
 
-    def described(self, choice: str) -> str:
+    def describe(self, choice: str) -> str:
         """Return name, type and what selects it, for messages."""
         parts = [self.info.type, *["bundled"] * self.info.bundled]
         if self.info.type != "cpu" or _is_device(choice):
@@ -69,7 +69,7 @@ def _is_device(choice: str) -> bool:
     return choice.lower().startswith(("uuid:", "pci:"))
 
 
-def _listed(driver: str) -> list[_Adapter]:
+def _list_adapters(driver: str) -> list[_Adapter]:
     return [
         _Adapter(driver, number, from_core(adapter), adapter[9], adapter[10])
         for number, adapter in enumerate(_core.adapters(in_utf8(driver) or driver))
@@ -109,7 +109,7 @@ def _best(choice: str, adapters: Sequence[_Adapter]) -> _Adapter | None:
     # Two drivers may offer one device.
     uuids = {adapter.info.uuid for adapter in equal if adapter.info.type != "cpu"}
     if uuids - {best.info.uuid}:
-        names = ", ".join(adapter.described(choice) for adapter in equal)
+        names = ", ".join(adapter.describe(choice) for adapter in equal)
         raise ValueError(
             f'adapter: "{choice}" fits several equal GPUs: {names}. Name one, such as '
             f'"uuid:{best.info.uuid}", or set CUDA_VISIBLE_DEVICES'
@@ -117,7 +117,7 @@ def _best(choice: str, adapters: Sequence[_Adapter]) -> _Adapter | None:
     return best
 
 
-def chosen_adapter(choice: str, driver: str) -> tuple[int, str]:
+def choose_adapter(choice: str, driver: str) -> tuple[int, str]:
     """Return the number of the adapter that a name selects, and the path of its driver.
 
     `driver` is that of a bundled driver, "" for none; "" is returned for the system's. A bundled
@@ -127,18 +127,18 @@ def chosen_adapter(choice: str, driver: str) -> tuple[int, str]:
     best: _Adapter | None = None
     if not driver or choice != "software":
         try:
-            adapters = _listed("")
+            adapters = _list_adapters("")
         except _core.AdapterNotFoundError:
             if not driver:
                 raise
         best = _best(choice, adapters)
     if driver and (best is None or best.rank >= (False, _TYPES.index("cpu"))):
-        bundled = _listed(driver)
+        bundled = _list_adapters(driver)
         adapters += bundled
         best = _best(choice, bundled) or best
     if best is not None:
         return best.number, in_utf8(best.driver) or best.driver
-    names = ", ".join(adapter.described(choice) for adapter in adapters) or "none"
+    names = ", ".join(adapter.describe(choice) for adapter in adapters) or "none"
     is_limited = _limiting(choice) is not None
     among = " among the GPUs that CUDA_VISIBLE_DEVICES names" * is_limited
     _core.fail_without_adapter(f'no Vulkan adapter for "{choice}"{among}; found: {names}')

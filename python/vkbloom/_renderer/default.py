@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 from numpy.typing import NDArray
 
 from vkbloom import _core
-from vkbloom._argument_types import checked
+from vkbloom._argument_types import check_arguments
 from vkbloom._public import public
 from vkbloom._renderer.device_arrays import Device
 from vkbloom._renderer.frames import Frames
@@ -78,7 +78,7 @@ def default_renderer() -> Renderer:
 
 
 @public("vkbloom")
-@checked
+@check_arguments
 def apply(
     image: NDArray[Any] | Image | str | os.PathLike[str],
     settings: Settings | str | None = None,
@@ -126,7 +126,7 @@ def apply(
     given: dict[str, Any] = {"mask": mask, "emission": emission, "framebuffers": framebuffers}
     given |= {"out": out, "device": device}
     if not isinstance(image, str | os.PathLike):
-        chosen = _changed(settings, fields, of_image=True)
+        chosen = _change(settings, fields, of_image=True)
         return (renderer or default_renderer()).apply(image, chosen, **given)
     from vkbloom._presets.start import start_file  # noqa: PLC0415  costs start-up time
 
@@ -138,7 +138,7 @@ def apply(
     return frames
 
 
-def _changed(
+def _change(
     settings: Settings | str | None, fields: dict[str, Any], *, of_image: bool = False
 ) -> Settings:
     chosen = check_settings(settings, of_image=of_image)
@@ -146,7 +146,7 @@ def _changed(
 
 
 @public("vkbloom")
-@checked
+@check_arguments
 def render(
     scene: Scene,
     settings: Settings | str | None = None,
@@ -186,7 +186,7 @@ def render(
     """
     return (renderer or default_renderer()).render(
         scene,
-        _changed(settings, fields),
+        _change(settings, fields),
         size,
         shading=shading,
         time=time,

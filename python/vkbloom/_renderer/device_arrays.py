@@ -176,7 +176,7 @@ class DeviceArray:
         }
 
 
-def merged(images: Iterable[DeviceArray]) -> list[DeviceArray]:
+def merge(images: Iterable[DeviceArray]) -> list[DeviceArray]:
     """Return images as batches: those that follow one another in the same memory are one."""
     batches: list[tuple[DeviceArray, int]] = []
     for image in images:
@@ -230,7 +230,7 @@ def memory_for(core: _core.Renderer, size: int) -> _core.Exported:
     return core.export(size)
 
 
-def placed(
+def place(
     array: NDArray[Any], destination: Destination, core: _core.Renderer
 ) -> NDArray[Any] | DeviceArray:
     """Return an array of the host as if it were a framebuffer at that place."""

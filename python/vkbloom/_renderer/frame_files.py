@@ -22,13 +22,13 @@ from vkbloom._formats import IMAGE_DTYPES
 from vkbloom._framebuffers import leading
 from vkbloom._io import safe_writing
 from vkbloom._io.hdr_curves import HDR_CURVES
-from vkbloom._io.image_writing import Part, described_as, put
+from vkbloom._io.image_writing import Part, describe_as, put
 from vkbloom._io.picture import PIXEL_TYPES, Picture, is_exr
-from vkbloom._io.readers import check_name, check_plausible, complete, opened
+from vkbloom._io.readers import check_name, check_plausible, complete, open_image
 from vkbloom._renderer.frame_saves import (
     FACT,
     check_alone,
-    chosen_files,
+    choose_files,
     fact_of,
     is_of,
     obsolete_files,
@@ -101,12 +101,12 @@ def _beside(target: Path, files: Iterable[Path]) -> list[Path]:
     if not target.is_dir():
         exact = [file for file in (target, target.with_suffix(".exr")) if file.is_file()]
         return [*exact, *_split_files_of(target)]
-    replaced = _facts_of_all(_named(target, (file.stem for file in files)))
+    replaced = _facts_of_all(_find_files(target, (file.stem for file in files)))
     saves = map(save_of, replaced.values())
-    return [*replaced, *_named(target, (name for save in saves for name in save.framebuffers))]
+    return [*replaced, *_find_files(target, (name for save in saves for name in save.framebuffers))]
 
 
-def _named(folder: Path, names: Iterable[str]) -> list[Path]:
+def _find_files(folder: Path, names: Iterable[str]) -> list[Path]:
     """Return the files of framebuffers that exist in a folder."""
     files = (folder / f"{name}{suffix}" for name in dict.fromkeys(names) for suffix in _IN_FOLDERS)
     return [file for file in files if file.is_file()]
@@ -135,12 +135,14 @@ def load(path: str | os.PathLike[str]) -> tuple[dict[str, NDArray[Any]], dict[st
         }
         check_alone(target, said, saves)
         # The command `render` writes the picture to the path, and the others beside it.
-        own = save_of(said)
-        beside = [file for file, save in saves.items() if save == own and own.suffix is not None]
+        named = save_of(said)
+        beside = [
+            file for file, save in saves.items() if save == named and named.suffix is not None
+        ]
         files = [target, *beside]
     else:
         listed = {file: facts_of(file) for file in _files_of(target)}
-        files = chosen_files(
+        files = choose_files(
             target, {f: said for f, said in listed.items() if is_of(target, f, said)}
         )
     for file in files:
@@ -173,7 +175,7 @@ def load(path: str | os.PathLike[str]) -> tuple[dict[str, NDArray[Any]], dict[st
 
 def _parts_of(file: Path, target: Path | None) -> Iterator[tuple[NDArray[Any], dict[str, str]]]:
     """Yield the pixels of each part without the padding of its window, and its attributes."""
-    with opened(file, "Frames.load") as reader:
+    with open_image(file, "Frames.load") as reader:
         for index in itertools.count():
             if not reader.seek_subimage(index, 0):
                 return
@@ -189,7 +191,7 @@ def _parts_of(file: Path, target: Path | None) -> Iterator[tuple[NDArray[Any], d
 
 def facts_of(path: str | os.PathLike[str]) -> dict[str, str]:
     """Return what vkbloom wrote into an image file: "settings" and others, as text."""
-    with opened(path, "Reading settings") as reader:
+    with open_image(path, "Reading settings") as reader:
         return _facts(reader.spec())
 
 
@@ -207,10 +209,10 @@ def _facts(spec: OpenImageIO.ImageSpec) -> dict[str, str]:
         attribute.name.removeprefix("vkbloom:"): str(attribute.value)
         for attribute in spec.extra_attribs
         if attribute.name.startswith("vkbloom:")
-    } or _described(spec.get_string_attribute("ImageDescription"))
+    } or _describe(spec.get_string_attribute("ImageDescription"))
 
 
-def _described(text: str) -> dict[str, str]:
+def _describe(text: str) -> dict[str, str]:
     """Return the attributes from a description, for formats without other attributes (TIFF)."""
     with contextlib.suppress(ValueError, AttributeError):
         return {
@@ -277,7 +279,7 @@ def _image_part(
     picture = Picture.of_values(pixels, numbers)
     encoding = frames.settings.encoding
     if name == "final" and encoding in HDR_CURVES and writer.supports("cicp"):
-        picture = described_as(oiio, picture, file, ("rec709", encoding))
+        picture = describe_as(oiio, picture, file, ("rec709", encoding))
     return Part(pixels, picture, _attributes(frames, name, file, saved))
 
 

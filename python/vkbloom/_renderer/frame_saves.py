@@ -72,7 +72,7 @@ def is_of(target: Path, file: Path, said: Mapping[str, str]) -> bool:
     )
 
 
-def chosen_files(target: Path, facts: Mapping[Path, Mapping[str, str]]) -> list[Path]:
+def choose_files(target: Path, facts: Mapping[Path, Mapping[str, str]]) -> list[Path]:
     """Return the files of the one save to a path; `facts`: of all that may be of it.
 
     Raises
@@ -82,18 +82,18 @@ def chosen_files(target: Path, facts: Mapping[Path, Mapping[str, str]]) -> list[
     """
     saves = {file: save_of(said) for file, said in facts.items()}
     suffix = "" if target.is_dir() else target.suffix
-    # A folder may have files that were saved under their own names.
-    own = [file for file, save in saves.items() if save.suffix in (None, suffix)] or [*saves]
-    if len({saves[file].identity for file in own}) > 1:
-        raise ValueError(_mixture(target, {file: saves[file] for file in own}))
+    # A folder may have files that were saved under their matching names.
+    matching = [file for file, save in saves.items() if save.suffix in (None, suffix)] or [*saves]
+    if len({saves[file].identity for file in matching}) > 1:
+        raise ValueError(_mixture(target, {file: saves[file] for file in matching}))
     # The last file to be written. (Users may have removed others.)
-    last = [saves[file].framebuffers[-1] for file in own[:1] if saves[file].suffix == suffix]
-    if last and last[0] not in {facts[file]["framebuffer"] for file in own}:
+    last = [saves[file].framebuffers[-1] for file in matching[:1] if saves[file].suffix == suffix]
+    if last and last[0] not in {facts[file]["framebuffer"] for file in matching}:
         raise ValueError(
             f"{target}: the file of {last[0]} is missing, which a save writes last; it may have "
-            f"been interrupted: save again, or load {_listed(own)} by name"
+            f"been interrupted: save again, or load {_list_files(matching)} by name"
         )
-    return own
+    return matching
 
 
 def check_alone(target: Path, said: Mapping[str, str], others: Mapping[Path, Save]) -> None:
@@ -113,14 +113,14 @@ def _mixture(target: Path, saves: Mapping[Path, Save]) -> str:
     groups: dict[str, list[Path]] = {}
     for file in sorted(saves, key=lambda file: file.stat().st_mtime_ns, reverse=True):
         groups.setdefault(saves[file].identity, []).append(file)
-    newest, *older = (_listed(files) for files in groups.values())
+    newest, *older = (_list_files(files) for files in groups.values())
     return (
         f"{target}: holds files of {len(groups)} saves; the newest: {newest}; older: "
         f"{'; '.join(older)}; remove those of all saves but one"
     )
 
 
-def _listed(files: Iterable[Path]) -> str:
+def _list_files(files: Iterable[Path]) -> str:
     names = sorted(file.name for file in files)
     return ", ".join([*names[:_MAX_NAMES], *["..."] * (len(names) > _MAX_NAMES)])
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom._argument_types import checked
+from vkbloom._argument_types import check_arguments
 from vkbloom._extras import import_extra
 from vkbloom._formats import IMAGE_DTYPES
 from vkbloom._framebuffers import dimensions
@@ -62,7 +62,7 @@ class Frames(Framebuffers):
         settings: Settings,
         info: Mapping[str, Any],
     ) -> None:
-        self._arrays = {name: _checked(name, array) for name, array in arrays.items()}
+        self._arrays = {name: _check(name, array) for name, array in arrays.items()}
         self._timings = {name: float(seconds) for name, seconds in timings.items()}
         self._settings = settings
         self._info = dict(info)
@@ -189,7 +189,7 @@ class Frames(Framebuffers):
         )
         return dataset
 
-    @checked
+    @check_arguments
     def save(self, path: str | os.PathLike[str]) -> list[Path]:
         """Write the framebuffers to image files without loss.
 
@@ -235,7 +235,7 @@ class Frames(Framebuffers):
         return frame_files.save(self._on_host(), path)
 
     @classmethod
-    @checked
+    @check_arguments
     def load(cls, path: str | os.PathLike[str]) -> Self:
         """Read framebuffers from files that `save` wrote.
 
@@ -275,7 +275,7 @@ class Frames(Framebuffers):
         return contact_sheet.contact_sheet_html(self._on_host())
 
 
-def _checked(name: str, array: NDArray[Any]) -> NDArray[Any]:
+def _check(name: str, array: NDArray[Any]) -> NDArray[Any]:
     if not isinstance(name, str):
         raise TypeError(f"arrays: {name!r} is not a name; use a str")
     if not name.isidentifier():

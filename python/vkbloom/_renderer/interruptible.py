@@ -10,7 +10,7 @@ from vkbloom._renderer.renderer import Renderer
 
 
 @contextmanager
-def opened_renderer(adapter: str) -> Iterator[Renderer]:
+def open_renderer(adapter: str) -> Iterator[Renderer]:
     """Open a renderer; if a signal ends the work, close it without waiting for the device."""
     renderer = Renderer(adapter)
     try:

@@ -15,14 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom import _core
-from vkbloom._argument_types import checked
-from vkbloom._array_cache import ArrayCache, shared
+from vkbloom._argument_types import check_arguments
+from vkbloom._array_cache import ArrayCache, shared_cache
 from vkbloom._framebuffers import check_framebuffers
 from vkbloom._numbers import check_size
 from vkbloom._public import public
 from vkbloom._renderer import requests
 from vkbloom._renderer.adapter import bundled_driver, bundled_hash, from_core
-from vkbloom._renderer.adapter_choice import chosen_adapter
+from vkbloom._renderer.adapter_choice import choose_adapter
 from vkbloom._renderer.batches import Batches
 from vkbloom._renderer.device_arrays import (
     Destination,
@@ -39,7 +39,7 @@ from vkbloom._renderer.sources import (
     SCENE_SIZE,
     any_source,
     batch_sources,
-    checked_inputs,
+    check_inputs,
     image_source,
     is_image,
     scene_source,
@@ -142,7 +142,7 @@ def _sources(images: Iterable[Any], core: _core.Renderer) -> Iterator[_core.Sour
         del source
 
 
-def _paired(
+def _pair(
     sources: Iterable[_core.Source], settings: Settings | Sequence[Settings]
 ) -> Iterator[requests.Request]:
     """Yield each source with its settings. Errors are raised in order."""
@@ -239,7 +239,7 @@ class Renderer:
     True
     """
 
-    @checked
+    @check_arguments
     def __init__(self, adapter: str = "auto", *, validation: bool = False) -> None:
         if not adapter:
             raise ValueError('adapter: "" is not a part of a name; use "auto" for the best adapter')
@@ -251,7 +251,7 @@ class Renderer:
 
         self._pipelines = DiskCache("pipelines")
         self._core = _core.Renderer(
-            *chosen_adapter(adapter, bundled_driver()),
+            *choose_adapter(adapter, bundled_driver()),
             bool(validation),
             os.environ.get("VKBLOOM_VARIANT") or "auto",
             _frame_seconds(),
@@ -273,7 +273,7 @@ class Renderer:
         self._batches = Batches(self._core, self._pending)
         # What map has checked last.
         self._named: tuple[object, tuple[str, ...]] = None, ()
-        self._kept: ArrayCache | None = shared()
+        self._remember: ArrayCache | None = shared_cache()
         self._number = next(_numbers)
         RENDERERS[self._number] = self
 
@@ -285,7 +285,7 @@ class Renderer:
     def close(self) -> None:
         """Release the device and everything on it. May be called twice."""
         self._planned = {}
-        self._kept = None
+        self._remember = None
         try:
             self._pending.wait()
         except ValueError:  # the device belongs to the process that this one was forked from
@@ -308,7 +308,7 @@ class Renderer:
     def __repr__(self) -> str:
         return f"<vkbloom.Renderer on {self.info.summary}{', closed' if self.closed else ''}>"
 
-    @checked
+    @check_arguments
     def render(
         self,
         scene: Scene,
@@ -379,7 +379,7 @@ class Renderer:
         names = check_framebuffers(framebuffers)
         return self._run_one(source, settings, names, out, device, state=state)
 
-    @checked
+    @check_arguments
     def apply(
         self,
         image: NDArray[Any] | Image,
@@ -445,7 +445,7 @@ class Renderer:
         names = check_framebuffers(framebuffers)
         return self._run_one(source, settings, names, out, device, state=state)
 
-    @checked
+    @check_arguments
     def map(
         self,
         images: Iterable[NDArray[Any] | Image],
@@ -530,14 +530,14 @@ class Renderer:
         if names and not (checked_settings is chosen and checked_names == names):
             self._check_names(image_source(_ANY_IMAGE), chosen, names)
             self._named = chosen, names
-        destination = self._placed(device)
+        destination = self._choose_destination(device)
         begun = _as_state(state)
         if on_cuda(images) and device != "host" and isinstance(chosen, Settings):
             return self._run_batch(images, chosen, names, destination, begun)
-        sequence = requests.uploaded(self._core, _paired(_sources(images, self._core), chosen))
+        sequence = requests.upload_each(self._core, _pair(_sources(images, self._core), chosen))
         return self._run_requests(sequence, names, destination, begun)
 
-    @checked
+    @check_arguments
     def upload(
         self,
         image: NDArray[Any],
@@ -561,22 +561,22 @@ class Renderer:
         """
         if isinstance(image, Image):
             raise TypeError("image: the image was uploaded already; pass it to apply")
-        inputs = checked_inputs(image, mask, emission, self._core)
+        inputs = check_inputs(image, mask, emission, self._core)
         source = inputs.source()
         shape, dtype = source.kind
         if source.exported:
             # It is a copy already, but for what is on the host.
-            inputs = inputs.kept()
-            return Image(inputs.source(), shape, np.dtype(dtype), inputs.named())
+            inputs = inputs.freeze()
+            return Image(inputs.source(), shape, np.dtype(dtype), inputs.by_name())
         uploaded = self._core.upload(source, None, False)
         # `vjp` reads the pixels of the image from the device.
-        named = inputs.named()
+        named = inputs.by_name()
         beside: dict[str, Any] = {
             name: np.array(named[name]) for name in ("mask", "emission") if name in named
         }
         return Image(uploaded, shape, np.dtype(dtype), beside)
 
-    @checked
+    @check_arguments
     def sweep(
         self,
         source: Scene | NDArray[Any] | Image,
@@ -620,7 +620,7 @@ class Renderer:
         frame_source = any_source(source, size, shading, time, self._core)
         return self._run_many(frame_source, settings, check_framebuffers(framebuffers), device)
 
-    @checked
+    @check_arguments
     def plan(
         self,
         source: Scene | NDArray[Any] | Image,
@@ -700,7 +700,7 @@ class Renderer:
         *,
         state: Mapping[str, NDArray[Any]] | None,
     ) -> Frames:
-        destination = self._placed(device)(source)
+        destination = self._choose_destination(device)(source)
         self._pending.wait()
         plan = self._plan_of(source, settings, names)
         before = _as_state(state)
@@ -709,8 +709,8 @@ class Renderer:
         histories = before.histories(self._core, plan)
         submission = self._core.run(source, (plan,), (arrays,), True, None, histories)
         # While the device works.
-        after = before.continued(self._core, plan, submission)
-        frames = self._frames(settings, requests.named(plan, arrays, destination), after)
+        after = before.advance(self._core, plan, submission)
+        frames = self._frames(settings, requests.name_outputs(plan, arrays, destination), after)
         if not out and submission.ordered:
             frames._finish_later(self._pending.add(submission).of_request)
             self._save_pipelines()
@@ -719,7 +719,7 @@ class Renderer:
         for name, target in (out or {}).items():
             if on_cuda(target):
                 fill(target, f"out: {name}", cast("DeviceArray", frames[name]), self._core)
-        return self._finished(frames, timings, *counts)
+        return self._finish(frames, timings, *counts)
 
     def _run_batch(
         self,
@@ -733,7 +733,7 @@ class Renderer:
         batch = take_batch(images, self._core)
 
         def rest(first: int) -> Iterator[Frames]:
-            sequence = _paired(batch_sources(batch, first), settings)
+            sequence = _pair(batch_sources(batch, first), settings)
             return self._run_requests(sequence, names, destination, state)
 
         def plan_of(source: _core.Source) -> _core.Plan:
@@ -743,7 +743,7 @@ class Renderer:
             self._save_pipelines()
             yield frames
 
-    def _placed(self, device: Device | None) -> Callable[[_core.Source], Destination]:
+    def _choose_destination(self, device: Device | None) -> Callable[[_core.Source], Destination]:
         """Return where the framebuffers of a source go."""
         if device not in (None, "host", "device"):
             raise ValueError(f"device: {device!r} is not 'host' or 'device'")
@@ -763,7 +763,7 @@ class Renderer:
 
         For small images, making a plan takes most of the time of a call.
         """
-        return cast("_core.Plan", self._kept_plan(source, settings, names))
+        return cast("_core.Plan", self._find_plan(source, settings, names))
 
     def _plan_derivatives(
         self,
@@ -773,9 +773,9 @@ class Renderer:
         results: DerivativeKind,
     ) -> _core.Plan | None:
         """Return the plan of derivatives, or None if a pass has none; the last one if it fits."""
-        return self._kept_plan(source, settings, None, cotangents, results == "sums")
+        return self._find_plan(source, settings, None, cotangents, results == "sums")
 
-    def _kept_plan(
+    def _find_plan(
         self,
         source: _core.Source,
         settings: Settings,
@@ -801,7 +801,7 @@ class Renderer:
         names: tuple[str, ...] | None,
         device: Device | None = None,
     ) -> Iterator[Frames]:
-        destination = self._placed(device)
+        destination = self._choose_destination(device)
         # Not a generator, so that arguments are checked at the call and not with the first frame.
         if not isinstance(settings, Iterable) or isinstance(settings, str | bytes):
             raise TypeError(f"settings: {settings!r} is not an iterable of Settings")
@@ -848,7 +848,7 @@ class Renderer:
         self._pending.wait()
         results = requests.run(sequence, self._core, names, state=state, destination=destination)
         return (
-            self._finished(self._frames(settings, arrays, after), *known)
+            self._finish(self._frames(settings, arrays, after), *known)
             for settings, arrays, known, after in results
         )
 
@@ -860,7 +860,7 @@ class Renderer:
             frames._state = state
         return frames
 
-    def _finished(self, frames: Frames, timings: dict[str, float], nan: int, inf: int) -> Frames:
+    def _finish(self, frames: Frames, timings: dict[str, float], nan: int, inf: int) -> Frames:
         self._save_pipelines()
         frames._finish(timings, nan, inf)
         return frames

@@ -113,7 +113,7 @@ class PendingSubmissions:
         self._pending.clear()
 
 
-def uploaded(core: _core.Renderer, sequence: Iterable[Request]) -> Iterator[Request]:
+def upload_each(core: _core.Renderer, sequence: Iterable[Request]) -> Iterator[Request]:
     """Copy each image to the device before the next one is taken.
 
     Images reuse the device memory of earlier ones whose submissions have finished.
@@ -131,7 +131,7 @@ def uploaded(core: _core.Renderer, sequence: Iterable[Request]) -> Iterator[Requ
         yield Request(kept[-1], settings)
 
 
-def named(
+def name_outputs(
     plan: _core.Plan,
     arrays: tuple[NDArray[Any] | _core.Exported, ...],
     destination: Destination = "host",
@@ -164,7 +164,7 @@ class _Planned(NamedTuple):
     def result(
         self, timings: dict[str, float], counts: tuple[int, ...], state: State | None
     ) -> Result:
-        arrays = named(self.plan, self.arrays, self.destination)
+        arrays = name_outputs(self.plan, self.arrays, self.destination)
         return self.request.settings, arrays, (timings, counts[0], counts[1]), state
 
 
@@ -217,7 +217,7 @@ class _Requests:
             else:
                 histories = self._state.histories(self._core, plans[0])
                 submission = self._core.run(source, plans, arrays, False, None, histories)
-                self._state = self._state.continued(self._core, plans[0], submission)
+                self._state = self._state.advance(self._core, plans[0], submission)
         except Exception as error:
             self._fail(error)
             return None

@@ -32,11 +32,11 @@ class Inputs(NamedTuple):
     emission: NDArray[Any] | ImportedArray | None = None
     mask: NDArray[np.float32] | None = None
 
-    def named(self) -> dict[str, NDArray[Any] | ImportedArray]:
+    def by_name(self) -> dict[str, NDArray[Any] | ImportedArray]:
         """Return those that are there by name."""
         return {name: part for name, part in self._asdict().items() if part is not None}
 
-    def kept(self) -> Inputs:
+    def freeze(self) -> Inputs:
         """Return inputs that the caller cannot change."""
         copies: list[Any] = [
             part if part is None or isinstance(part, ImportedArray) else part.copy()
@@ -46,24 +46,27 @@ class Inputs(NamedTuple):
 
     def on_host(self) -> dict[str, NDArray[Any]]:
         """Return the arrays by name, in the host's memory."""
-        return {name: on_host(part) for name, part in self.named().items()}
+        return {name: on_host(part) for name, part in self.by_name().items()}
 
     def source(self, levels: tuple[NDArray[Any] | ImportedArray, ...] = ()) -> _core.Source:
         """Return the core's Source. The arrays must not change while it is used."""
         return _core.image_source(
-            _as_read(self.image), _as_read(self.emission), self.mask, tuple(map(_as_read, levels))
+            _import_image(self.image),
+            _import_image(self.emission),
+            self.mask,
+            tuple(map(_import_image, levels)),
         )
 
 
-def _as_read(array: Any) -> Any:
+def _import_image(array: Any) -> Any:
     return array.image() if isinstance(array, ImportedArray) else array
 
 
-def _taken(image: object, name: str, core: _core.Renderer | None) -> Any:
+def _take(image: object, name: str, core: _core.Renderer | None) -> Any:
     return take(image, name, core) if core and on_cuda(image) else check_image(image, name)
 
 
-def checked_inputs(
+def check_inputs(
     image: object,
     mask: object | None = None,
     emission: Any = None,
@@ -71,10 +74,10 @@ def checked_inputs(
     name: str = "image",
 ) -> Inputs:
     """Check the arrays of an image, and copy those that are on the renderer's device."""
-    pixels = _taken(image, name, core)
+    pixels = _take(image, name, core)
     glowing = emission
     if emission is not None:
-        glowing = check_emission(_taken(emission, "emission", core), pixels)
+        glowing = check_emission(_take(emission, "emission", core), pixels)
     if core and on_cuda(mask):
         # Its values are checked on the host; it has one channel of the image's three or four.
         mask = take(mask, "mask", core, (2,)).numpy()
@@ -101,7 +104,7 @@ def image_source(
                     f"{what}: the image was uploaded already; upload it together with its {what}"
                 )
         return image._source
-    return checked_inputs(image, mask, emission, core, name).source()
+    return check_inputs(image, mask, emission, core, name).source()
 
 
 def uploaded_inputs(image: Image, pixels: Callable[[], NDArray[Any]]) -> Inputs:

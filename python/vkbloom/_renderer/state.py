@@ -125,7 +125,7 @@ class State(Mapping[str, "NDArray[Any]"]):
             return image.source
         return core.upload(image_source(self[name], name=f"state: {name}"), None, False)
 
-    def continued(
+    def advance(
         self, core: _core.Renderer, plan: _core.Plan, submission: _core.Submission
     ) -> State:
         """Return the state after a call: what it does not write stays."""

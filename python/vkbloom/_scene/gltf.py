@@ -27,7 +27,7 @@ from vkbloom._scene.gltf_file import (
 )
 from vkbloom._scene.gltf_textures import TextureReader, TextureUse
 from vkbloom._scene.mesh import Mesh
-from vkbloom._scene.textures import WHITE, Surface, Texture
+from vkbloom._scene.textures import WHITE, Material, Texture
 
 _LINE_MODES: Final = {0: "points", 1: "lines", 2: "line loops", 3: "line strips"}
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6
@@ -72,7 +72,7 @@ class _Material:
 
     @property
     def textures(self) -> tuple[Texture, Texture] | None:
-        """The two textures of a `Surface`; None if the material has none."""
+        """The two textures of a `Material`; None if the material has none."""
         uses = (self.base_texture, self.emission_texture)
         if uses == (None, None):
             return None
@@ -106,7 +106,7 @@ class _Loader:
 
     # Nodes
 
-    def _placed_meshes(self) -> Iterator[tuple[int, Floats, str]]:
+    def _place_meshes(self) -> Iterator[tuple[int, Floats, str]]:
         """Yield the index, the world matrix and the node of every mesh of the scene."""
         count = len(self._file.items("nodes"))
         shown = self._file.root.scene
@@ -192,7 +192,7 @@ class _Loader:
         emission: list[NDArray[np.float32]] = []
         read: dict[tuple[int, int], _Geometry | None] = {}
         total = corners = 0
-        for mesh_index, world, user in self._placed_meshes():
+        for mesh_index, world, user in self._place_meshes():
             mesh = self._file.item("meshes", mesh_index, user)
             if not isinstance(mesh.primitives, list):
                 self._file.fail(f"meshes[{mesh_index}].primitives is not a list")
@@ -222,15 +222,15 @@ class _Loader:
             self._file.fail("has no triangles")
         emits = any(rows[0].any() for rows in emission)
         surfaces = tuple(
-            Surface(sum(map(len, parts)), *textures)
+            Material(sum(map(len, parts)), *textures)
             for textures, parts in indices.items()
             if textures is not None
         )
         return Mesh(
-            _joined(vertices),
-            _joined([part for parts in indices.values() for part in parts]),
-            _joined(emission) if emits else None,
-            _joined(texcoords) if surfaces else None,
+            _join(vertices),
+            _join([part for parts in indices.values() for part in parts]),
+            _join(emission) if emits else None,
+            _join(texcoords) if surfaces else None,
             surfaces,
         )
 
@@ -329,7 +329,7 @@ class _Loader:
                     f"where the textures of materials[{primitive.material}] are looked up"
                 )
             read = self._file.vectors(index, f"{what}.{use.coordinates}", count)
-            texcoords[:, column : column + 2] = use.placed(read)
+            texcoords[:, column : column + 2] = use.map_coordinates(read)
         return texcoords
 
     def _triangles(self, corners: NDArray[np.int64], mode: int, what: str) -> NDArray[np.int64]:
@@ -389,7 +389,7 @@ class _Loader:
         return emission
 
 
-def _joined(parts: list[NDArray[Any]]) -> NDArray[Any]:
+def _join(parts: list[NDArray[Any]]) -> NDArray[Any]:
     """Join arrays into a read-only one that owns its memory, which Mesh does not copy."""
     joined = np.concatenate(parts)
     joined.flags.writeable = False

@@ -65,7 +65,7 @@ class GltfFile:
         self._buffers: dict[object, bytes] = {}
         data = path.read_bytes()
         text, self._blob = self._split_glb(data) if data[:4] == b"glTF" else (data, None)
-        self.root = self._parsed(text)
+        self.root = self._parse(text)
 
     def fail(self, what: str) -> NoReturn:
         """Raise a ValueError that names the file and what is wrong with it."""
@@ -73,7 +73,7 @@ class GltfFile:
 
     # The container and its header
 
-    def _parsed(self, text: bytes) -> Parsed:
+    def _parse(self, text: bytes) -> Parsed:
         try:
             # Some exporters pad the JSON chunk with NUL, where 4.4.3.2 requires spaces.
             document = json.loads(

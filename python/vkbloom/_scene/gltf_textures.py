@@ -14,7 +14,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom._io.readers import check_plausible, failure_of, opened
+from vkbloom._io.readers import check_plausible, failure_of, open_image
 from vkbloom._io.srgb import decode_srgb
 from vkbloom._scene.arrays import MAX_SIDE
 from vkbloom._scene.gltf_file import TEXTURE_TRANSFORM, Floats, GltfFile, Parsed
@@ -51,7 +51,7 @@ class TextureUse:
     coordinates: str  # the attribute, TEXCOORD_0 and so on
     transform: Floats  # (2, 3): applied to (u, v, 1)
 
-    def placed(self, coordinates: Floats) -> Floats:
+    def map_coordinates(self, coordinates: Floats) -> Floats:
         """Return the transformed texture coordinates ``(n, 2)``."""
         with np.errstate(over="ignore", invalid="ignore"):
             placed: Floats = coordinates @ self.transform[:, :2].T + self.transform[:, 2]
@@ -110,7 +110,7 @@ class TextureReader:
         if texture.sampler is not None:
             sampler = file.item("samplers", texture.sampler, user)
 
-        def named(name: str, names: dict[int, Any], usual: int) -> Any:
+        def look_up(name: str, names: dict[int, Any], usual: int) -> Any:
             what = f"samplers[{texture.sampler}].{name}"
             value = getattr(sampler, name, None)
             value = file.integer(usual if value is None else value, what, 0, 2**31 - 1)
@@ -118,10 +118,10 @@ class TextureReader:
                 file.fail(f"{what} is {value}; {', '.join(map(str, names))} are possible")
             return names[value]
 
-        wraps = (named("wrapS", _ADDRESS_MODES, 10497), named("wrapT", _ADDRESS_MODES, 10497))
-        mag_filter = named("magFilter", _MAG_FILTERS, 9729)
+        wraps = (look_up("wrapS", _ADDRESS_MODES, 10497), look_up("wrapT", _ADDRESS_MODES, 10497))
+        mag_filter = look_up("magFilter", _MAG_FILTERS, 9729)
         # The default is the filter with the least aliasing.
-        min_filter, mipmap_filter = named("minFilter", _MIN_FILTERS, 9987)
+        min_filter, mipmap_filter = look_up("minFilter", _MIN_FILTERS, 9987)
         picture = self._picture(texture.source, user)
         levels = (picture,) if mipmap_filter is None else mip_levels(picture)
         return Texture(levels, wraps, mag_filter, min_filter, mipmap_filter or "nearest")
@@ -137,7 +137,7 @@ class TextureReader:
         suffix = next((end for start, end in _KINDS.items() if data.startswith(start)), None)
         if suffix is None:
             self._file.fail(f"{what} is neither PNG nor JPEG")
-        stored = self._decoded(data, suffix, what)
+        stored = self._decode(data, suffix, what)
         scale = np.iinfo(stored.dtype).max
         # A table, since there are only a few values.
         table = decode_srgb(np.arange(scale + 1) / scale).astype(np.float16)
@@ -145,14 +145,14 @@ class TextureReader:
         picture[:, :, :3] = table[stored[:, :, :3] if stored.shape[2] > 2 else stored[:, :, :1]]
         return picture
 
-    def _decoded(self, data: bytes, suffix: str, what: str) -> NDArray[Any]:
+    def _decode(self, data: bytes, suffix: str, what: str) -> NDArray[Any]:
         """Return an image's values ``(h, w, C)``: uint8 or uint16, C 1 to 4."""
         with tempfile.TemporaryDirectory(prefix="vkbloom-") as folder:
             # OpenImageIO's Python module can only read files.
             path = Path(folder) / f"image{suffix}"
             path.write_bytes(data)
             try:
-                with opened(path, "Reading textures") as reader:
+                with open_image(path, "Reading textures") as reader:
                     spec = reader.spec()
                     width, height, channels = spec.width, spec.height, spec.nchannels
                     self._texels += width * height

@@ -32,7 +32,7 @@ _TEXELS: Final[dict[tuple[int, int, int], tuple[int, str]]] = {
 }
 
 
-def _aligned(size: int) -> int:
+def _align(size: int) -> int:
     """Round a size in bytes up to a multiple of 4: KTX 1 aligns rows and images to 4 bytes."""
     return (size + 3) & ~3
 
@@ -102,7 +102,7 @@ def _level(
     level, side = shape
     channels, kind = texel
     stored = np.dtype(kind).newbyteorder(order)  # type: ignore[arg-type]
-    row = _aligned(side * channels * stored.itemsize)
+    row = _align(side * channels * stored.itemsize)
     face = row * side
     end = offset + 4 + 6 * face
     if end > len(data):

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from vkbloom._locks import cached_property
 from vkbloom._scene.arrays import Constructed, check_indices, check_rows, read_only
-from vkbloom._scene.textures import WHITE, Surface
+from vkbloom._scene.textures import WHITE, Material
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -33,7 +33,7 @@ class Mesh(Constructed):
     indices: NDArray[np.uint32]
     emission: NDArray[np.float32] | None = None
     texcoords: NDArray[np.float32] | None = None
-    surfaces: tuple[Surface, ...] = ()
+    surfaces: tuple[Material, ...] = ()
 
     def __post_init__(self) -> None:
         count = len(check_rows("vertices", self.vertices, 9))
@@ -48,7 +48,7 @@ class Mesh(Constructed):
 
     def _check_surfaces(self) -> None:
         for surface in self.surfaces:
-            if not isinstance(surface, Surface):
+            if not isinstance(surface, Material):
                 raise TypeError(f"surfaces: {type(surface).__name__} is not a Surface")
         textured = sum(surface.index_count for surface in self.surfaces)
         if textured > len(self.indices):

@@ -17,7 +17,7 @@ from typing import Final
 
 import numpy as np
 
-from vkbloom._argument_types import checked
+from vkbloom._argument_types import check_arguments
 from vkbloom._numbers import check_above, check_floats, check_number
 from vkbloom._public import public
 from vkbloom._scene import gltf
@@ -148,7 +148,7 @@ class Scene(Constructed):
             return cls(body, glow, sky.from_array(arrays["sky"]))
 
     @classmethod
-    @checked
+    @check_arguments
     def from_gltf(
         cls,
         base: str | os.PathLike[str],

@@ -21,7 +21,7 @@ from vkbloom._formats import IMAGE_DTYPES
 from vkbloom._io.image_file import read_stored
 from vkbloom._scene import ktx
 from vkbloom._scene.arrays import MAX_SIDE, Constructed, check_levels
-from vkbloom._scene.textures import finite_floats, mip_levels, rounded_to
+from vkbloom._scene.textures import finite_floats, mip_levels, round_to
 
 FACES: Final = ("+x", "-x", "+y", "-y", "+z", "-z")
 
@@ -182,7 +182,7 @@ def project_equirectangular(panorama: NDArray[Any], side: int) -> NDArray[Any]:
         top, bottom = np.clip(row, 0, height - 1), np.clip(row + 1, 0, height - 1)
         above = source[top, left] * (1.0 - across) + source[top, right] * across
         below = source[bottom, left] * (1.0 - across) + source[bottom, right] * across
-        face[...] = rounded_to(above * (1.0 - down) + below * down, panorama.dtype)
+        face[...] = round_to(above * (1.0 - down) + below * down, panorama.dtype)
     return faces
 
 

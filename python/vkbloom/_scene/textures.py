@@ -63,7 +63,7 @@ WHITE: Final = Texture((np.ones((1, 1, 4), np.float16),), mag_filter="nearest")
 
 
 @dataclass(frozen=True)
-class Surface:
+class Material:
     """The textures of some of a mesh's triangles.
 
     - `index_count`: Entries of the mesh's indices, a positive multiple of 3.
@@ -102,8 +102,8 @@ def mip_levels(picture: NDArray[Any]) -> tuple[NDArray[Any], ...]:
     levels = [picture]
     mean = finite_floats(picture)
     while max(mean.shape[:2]) > 1:
-        mean = _halved(_halved(mean, 0), 1)
-        levels.append(rounded_to(mean, picture.dtype))
+        mean = _halve(_halve(mean, 0), 1)
+        levels.append(round_to(mean, picture.dtype))
     return tuple(levels)
 
 
@@ -115,12 +115,12 @@ def finite_floats(image: NDArray[Any]) -> NDArray[np.float32]:
     return values
 
 
-def rounded_to(values: NDArray[Any], dtype: np.dtype[Any]) -> NDArray[Any]:
+def round_to(values: NDArray[Any], dtype: np.dtype[Any]) -> NDArray[Any]:
     """Return floats as numbers of a dtype: integers are rounded to the nearest."""
     return (np.rint(values) if dtype == np.uint8 else values).astype(dtype)
 
 
-def _halved(picture: NDArray[np.float32], axis: int) -> NDArray[np.float32]:
+def _halve(picture: NDArray[np.float32], axis: int) -> NDArray[np.float32]:
     """Return the picture with one of its first two sides halved."""
     side = picture.shape[axis]
     if side == 1:

@@ -16,14 +16,14 @@ _DEGREE: Final = math.pi / 180.0
 _TURN: Final = 2.0 * math.pi
 
 
-def _moved(offset: Sequence[float]) -> NDArray[np.float64]:
+def _translation(offset: Sequence[float]) -> NDArray[np.float64]:
     """Return the matrix of a translation."""
     matrix = np.eye(4)
     matrix[:3, 3] = offset
     return matrix
 
 
-def _turned(axis: int, angle: float) -> NDArray[np.float64]:
+def _rotation(axis: int, angle: float) -> NDArray[np.float64]:
     """Return the matrix of a rotation by an angle in radians around an axis."""
     a, b = (axis + 1) % 3, (axis + 2) % 3
     matrix = np.eye(4)
@@ -45,12 +45,12 @@ def matrices(camera: Camera, turns: float, aspect: float) -> NDArray[np.float32]
     tangent = math.tan(camera.fov * _DEGREE / 2.0)
     focal = 1.0 / tangent if tangent else math.inf
     depth = camera.near - camera.far
-    view = _moved(camera.position)
+    view = _translation(camera.position)
     for axis, angle in enumerate(camera.rotation):
-        view = view @ _turned(axis, angle * _DEGREE)
+        view = view @ _rotation(axis, angle * _DEGREE)
     angle = _TURN * turns
     place = (0.25 * math.sin(angle), -1.0, 0.25 * math.cos(angle))
-    model = _moved(place) @ _turned(0, -0.15 * math.sin(angle)) @ _turned(1, angle)
+    model = _translation(place) @ _rotation(0, -0.15 * math.sin(angle)) @ _rotation(1, angle)
     rows = np.zeros((7, 4))
     rows[0] = focal / aspect, focal, camera.far / depth, camera.near * camera.far / depth
     rows[1:4] = (view @ model)[:3]

@@ -103,10 +103,10 @@ class FieldInfo:
     @property
     def help(self) -> str:
         """The first sentence about the parameter in the docstring of the class, or of a base."""
-        from vkbloom._views.descriptions import described_parameters  # noqa: PLC0415  rarely needed
+        from vkbloom._views.descriptions import parameter_descriptions  # noqa: PLC0415  rarely needed
 
         texts = (
-            described_parameters(kind.__doc__ or "").get(self.name) for kind in self.owner.__mro__
+            parameter_descriptions(kind.__doc__ or "").get(self.name) for kind in self.owner.__mro__
         )
         return self.text or next(filter(None, texts), "")
 
@@ -337,7 +337,7 @@ def _fields_of(kind: type[Any]) -> Mapping[str, FieldInfo]:
     annotations = inspect.get_annotations(kind, eval_str=True)
     return types.MappingProxyType(
         {
-            field.name: _described(kind, field, annotations[field.name], inherited.get(field.name))
+            field.name: _describe(kind, field, annotations[field.name], inherited.get(field.name))
             if field.name in annotations
             else dataclasses.replace(inherited[field.name], owner=kind)
             for field in dataclasses.fields(kind)
@@ -345,7 +345,7 @@ def _fields_of(kind: type[Any]) -> Mapping[str, FieldInfo]:
     )
 
 
-def _described(
+def _describe(
     owner: type, field: dataclasses.Field[Any], annotation: Any, base: FieldInfo | None
 ) -> FieldInfo:
     """Return the description of a field that a class declares; `base` is that of its base class."""

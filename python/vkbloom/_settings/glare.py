@@ -112,7 +112,7 @@ def stage_field_of(glare: tuple[Glare, ...], name: str) -> tuple[int, str]:
     )
 
 
-def replaced_stages(glare: tuple[Glare, ...], changes: Mapping[str, Any]) -> tuple[Glare, ...]:
+def replace_stages(glare: tuple[Glare, ...], changes: Mapping[str, Any]) -> tuple[Glare, ...]:
     """Return stages with some fields changed, by names such as "glare.0.intensity"."""
     stages_now = list(glare)
     for name, value in changes.items():

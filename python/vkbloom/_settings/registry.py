@@ -17,7 +17,7 @@ class Registry(Named[type[Any]]):
     """Classes by name. Those of the package are imported on first use, since some import much."""
 
     def __init__(self, kind: str) -> None:
-        super().__init__(kind, self._imported)
+        super().__init__(kind, self._import)
         self._package = ""
 
     def supply(self, package: str, sources: Mapping[str, str]) -> None:
@@ -28,7 +28,7 @@ class Registry(Named[type[Any]]):
         self._package = package
         self.fill(lambda: sources)
 
-    def _imported(self, entry: str | type[Any]) -> type[Any]:
+    def _import(self, entry: str | type[Any]) -> type[Any]:
         if isinstance(entry, type):
             return entry
         module, _, kind = entry.partition(":")
@@ -36,7 +36,7 @@ class Registry(Named[type[Any]]):
 
     def _object(self, name: str, entry: str | type[Any]) -> type[Any]:
         """Return the class of an entry. None is kept, since a registered class may be replaced."""
-        return self._imported(entry)
+        return self._import(entry)
 
     def _rows(self) -> list[tuple[str, ...]]:
         return [

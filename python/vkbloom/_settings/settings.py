@@ -23,7 +23,7 @@ from vkbloom._settings.fields import (
     number_field,
     value_field,
 )
-from vkbloom._settings.glare import Glare, check_glare, glares, replaced_stages, stage_field_of
+from vkbloom._settings.glare import Glare, check_glare, glares, replace_stages, stage_field_of
 from vkbloom._settings.records import Record
 from vkbloom._settings.registry import METHODS, NAMED_SETTINGS, Presets
 from vkbloom._spelling import describe_unknown, did_you_mean
@@ -200,7 +200,7 @@ class Settings(Record):
         nested = {name: changes.pop(name) for name in [*changes] if "." in name}
         if nested:
             glare = _read_glare(changes.get("glare", self.glare))
-            changes["glare"] = replaced_stages(glare, nested)
+            changes["glare"] = replace_stages(glare, nested)
         return dataclasses.replace(self, **changes)
 
     def value_of(self, name: str) -> Any:
@@ -308,7 +308,7 @@ def check_settings(
     raise ValueError(describe_unknown(f"{name}: unknown preset", settings, presets))
 
 
-def given_settings(settings: Settings | str, name: str = "settings") -> Settings:
+def resolve_settings(settings: Settings | str, name: str = "settings") -> Settings:
     """Return the settings, or those of a preset, of a function that has no default for them."""
     if settings is None:
         raise TypeError(f"{name}: None is not a Settings")

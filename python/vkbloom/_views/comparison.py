@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from vkbloom._extras import import_extra
 from vkbloom._formats import MAX_FLOAT
-from vkbloom._io.picture import checked_pixels
+from vkbloom._io.picture import check_pixels
 from vkbloom._io.srgb import decode_srgb
 
 Metric = Literal["ssim", "psnr", "flip"]
@@ -97,7 +97,7 @@ def compare(
     of 7 x 7), FLIP is OpenImageIO's: LDR-FLIP of integers, HDR-FLIP of floats.
     Values that are not finite count as 0 in SSIM and FLIP only.
     """
-    a, b = checked_pixels("a", a), checked_pixels("b", b)
+    a, b = check_pixels("a", a), check_pixels("b", b)
     mismatches = _mismatches(a, b)
     if mismatches:
         return Comparison(
@@ -167,7 +167,7 @@ def _mismatches(a: NDArray[Any], b: NDArray[Any]) -> tuple[str, ...]:
 
 def _comparable(a: NDArray[Any], b: NDArray[Any]) -> Pair:
     """Return a pair, or raise ValueError for images that cannot be compared value by value."""
-    a, b = checked_pixels("a", a), checked_pixels("b", b)
+    a, b = check_pixels("a", a), check_pixels("b", b)
     if mismatches := _mismatches(a, b):
         raise ValueError(f"a, b: not comparable: {'; '.join(mismatches)}")
     return pair_of(a, b)

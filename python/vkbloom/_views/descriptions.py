@@ -11,7 +11,7 @@ from collections.abc import Mapping
 
 # By the text, not the class: a class of a file that is loaded again must not be kept.
 @functools.lru_cache(maxsize=128)
-def described_parameters(docstring: str) -> Mapping[str, str]:
+def parameter_descriptions(docstring: str) -> Mapping[str, str]:
     """Return the first sentence about each parameter of a numpydoc docstring."""
     lines = inspect.cleandoc(docstring).splitlines()
     texts: dict[str, list[str]] = {}

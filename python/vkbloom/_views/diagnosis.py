@@ -11,7 +11,7 @@ from typing import Any, Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom._io.picture import checked_pixels
+from vkbloom._io.picture import check_pixels
 from vkbloom._io.srgb import decode_srgb, encode_srgb
 from vkbloom._public import public
 from vkbloom._views.comparison import pair_of
@@ -121,7 +121,7 @@ def diagnose(a: NDArray[Any], b: NDArray[Any]) -> Diagnosis:
     >>> testing.diagnose(image, np.roll(image, 3, 1)).value
     (3.0, 0.0)
     """
-    a, b = checked_pixels("a", a), checked_pixels("b", b)
+    a, b = check_pixels("a", a), check_pixels("b", b)
     if a.shape != b.shape:
         return _of_shapes(a, b)
     pair = pair_of(a, b)
@@ -140,7 +140,7 @@ def diagnose(a: NDArray[Any], b: NDArray[Any]) -> Diagnosis:
     result = _of_rounding(a, b, plain_a, plain_b)
     if result is None:
         for candidate in _candidates(plain_a, plain_b):
-            result = _judged(candidate, plain_a, plain_b, step, tiny)
+            result = _judge(candidate, plain_a, plain_b, step, tiny)
             if result is not None:
                 break
     return result or _of_shift(plain_a, plain_b, step)
@@ -223,8 +223,8 @@ def _candidates(a: _Image, b: _Image) -> Iterator[_Candidate]:
                 yield _Candidate("channels", name, text, partial(np.take, indices=channels, axis=2))
     if a.shape[2] == 4:
         text = "the second image is multiplied by alpha"
-        yield _Candidate("alpha", "premultiplied", text, _multiplied)
-        yield _Candidate("alpha", "straight", "the second image is divided by alpha", _divided)
+        yield _Candidate("alpha", "premultiplied", text, _multiply)
+        yield _Candidate("alpha", "straight", "the second image is divided by alpha", _divide)
     yield from _limits(a, b)
     yield from _curves(a, b, colours)
 
@@ -284,7 +284,7 @@ def _of_colours(curve: _Map, colours: int, image: _Image) -> _Image:
     return np.concatenate([curve(image[:, :, :colours]), image[:, :, colours:]], axis=2)
 
 
-def _judged(
+def _judge(
     candidate: _Candidate, a: _Image, b: _Image, step: float, tiny: float
 ) -> Diagnosis | None:
     """Return the diagnosis if the cause explains the difference."""
@@ -332,11 +332,11 @@ def _direction(shift: tuple[float, float]) -> str:
     return " and ".join(parts)
 
 
-def _multiplied(image: _Image) -> _Image:
+def _multiply(image: _Image) -> _Image:
     return np.concatenate([image[:, :, :3] * image[:, :, 3:], image[:, :, 3:]], axis=2)
 
 
-def _divided(image: _Image) -> _Image:
+def _divide(image: _Image) -> _Image:
     alpha = image[:, :, 3:]
     colours = np.where(alpha > 0, image[:, :, :3] / np.where(alpha > 0, alpha, 1), image[:, :, :3])
     return np.concatenate([colours, alpha], axis=2)

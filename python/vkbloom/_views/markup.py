@@ -31,7 +31,7 @@ class Markup(str):
     __slots__ = ()
 
 
-def joined(parts: Iterable[object]) -> Markup:
+def join(parts: Iterable[object]) -> Markup:
     """Return HTML as it is, and other values as escaped text, one after the other."""
     return Markup(
         "".join(part if isinstance(part, Markup) else html.escape(str(part)) for part in parts)
@@ -49,7 +49,7 @@ def element(name: str, *content: object, **attributes: object) -> Markup:
         if value is not None
     )
     end = "" if name in ("br", "hr", "img", "meta") else f"</{name}>"
-    return Markup(f"<{name}{written}>{joined(content)}{end}")
+    return Markup(f"<{name}{written}>{join(content)}{end}")
 
 
 def image(png: bytes, alt: str, **attributes: object) -> Markup:
@@ -97,7 +97,7 @@ def table(
 
 def page(title: str, *content: object) -> str:
     """Return a complete document."""
-    head = joined(
+    head = join(
         (
             element("meta", charset="utf-8"),
             element("meta", name_="viewport", content="width=device-width"),

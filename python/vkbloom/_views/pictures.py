@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom._io.displayed import scaled_to_1
+from vkbloom._io.displayed import scale_to_1
 from vkbloom._io.srgb import encode_srgb
 from vkbloom._views import markup
 from vkbloom._views.markup import element
@@ -25,7 +25,7 @@ _THUMBNAIL_SIDE = 320  # pixels; keeps the page of a whole frame under about 1 M
 def thumbnail_size(array: NDArray[Any]) -> tuple[int, int]:
     """Return the size of a small picture of an image, at most its own."""
     height, width = array.shape[:2]
-    return scaled(width, height, min(1.0, _THUMBNAIL_SIDE / max(width, height)))
+    return scale_size(width, height, min(1.0, _THUMBNAIL_SIDE / max(width, height)))
 
 
 def thumbnails(shown: Iterable[tuple[str, NDArray[np.uint8], str]]) -> markup.Markup:
@@ -63,46 +63,46 @@ def picture(
     if array.dtype.kind == "u":
         shown = values / np.float32(np.iinfo(array.dtype).max)
     elif array.ndim == 2:
-        shown = np.float32(1) - _stretched(values)
+        shown = np.float32(1) - _stretch(values)
     elif name == "position":
-        shown = _stretched(values)
+        shown = _stretch(values)
     elif name == "normal":
-        shown = _clipped(values * np.float32(0.5) + np.float32(0.5))
+        shown = _clip(values * np.float32(0.5) + np.float32(0.5))
     else:
         if stops != 0:
             values[:, :, :3] *= np.float32(2.0**stops)
         linear = encoding == "none"
-        shown = _clipped(scaled_to_1(values) if linear else values)
+        shown = _clip(scale_to_1(values) if linear else values)
     if size is not None:
-        shown = resized(shown, *size)
+        shown = resize(shown, *size)
     if linear:
         shown[:, :, :3] = encode_srgb(shown[:, :, :3])
     pixels: NDArray[np.uint8] = np.rint(shown * np.float32(255)).astype(np.uint8)
     return pixels
 
 
-def _clipped(values: NDArray[np.float32]) -> NDArray[np.float32]:
+def _clip(values: NDArray[np.float32]) -> NDArray[np.float32]:
     """Clip to 0..1; NaN gives 0."""
     finite = np.nan_to_num(values, nan=0.0, posinf=1.0, neginf=0.0)
     return np.clip(finite, 0.0, 1.0)
 
 
-def _stretched(values: NDArray[np.float32]) -> NDArray[np.float32]:
+def _stretch(values: NDArray[np.float32]) -> NDArray[np.float32]:
     """Map the finite range of each channel to 0..1; one value gives 0."""
     finite = np.isfinite(values)
     low: NDArray[np.float32] = values.min(axis=(0, 1), where=finite, initial=np.inf)
     high: NDArray[np.float32] = values.max(axis=(0, 1), where=finite, initial=-np.inf)
     # Stays positive if no value is finite and the range is inf to -inf.
     span = np.maximum(high - low, np.finfo(np.float32).tiny)
-    return _clipped((np.clip(values, low, high) - low) / span)
+    return _clip((np.clip(values, low, high) - low) / span)
 
 
-def scaled(width: int, height: int, factor: float) -> tuple[int, int]:
+def scale_size(width: int, height: int, factor: float) -> tuple[int, int]:
     """Return a size times a factor; each side is at least one pixel."""
     return max(1, round(width * factor)), max(1, round(height * factor))
 
 
-def resized(image: NDArray[np.float32], width: int, height: int) -> NDArray[np.float32]:
+def resize(image: NDArray[np.float32], width: int, height: int) -> NDArray[np.float32]:
     """Resize an (H, W, C) image: average groups of pixels to reduce, repeat pixels to enlarge."""
     for axis, wanted in ((0, height), (1, width)):
         count = image.shape[axis]
@@ -116,14 +116,14 @@ def resized(image: NDArray[np.float32], width: int, height: int) -> NDArray[np.f
     return image
 
 
-def reduced(image: NDArray[Any], size: tuple[int, int]) -> NDArray[Any]:
+def reduce(image: NDArray[Any], size: tuple[int, int]) -> NDArray[Any]:
     """Return an (H, W, C) image whose pixels are averaged until it fits into (width, height)."""
     height, width = image.shape[:2]
     shrink = min(size[0] / width, size[1] / height)
     if shrink >= 1:
         return image
     with np.errstate(invalid="ignore"):
-        small = resized(image.astype(np.float32), *scaled(width, height, shrink))
+        small = resize(image.astype(np.float32), *scale_size(width, height, shrink))
     return np.rint(small).astype(np.uint8) if image.dtype == np.uint8 else small.astype(image.dtype)
 
 

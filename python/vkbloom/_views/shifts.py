@@ -19,7 +19,7 @@ MIN_SHIFT: Final = 1 / 64
 # a pixel, the image may have been interpolated by another filter.
 _REMAINS: Final = 0.1
 _REMAINS_OF_WHOLE: Final = 0.02
-_LONGEST: Final = 0.25  # of the image's side
+_MAX_SHIFT: Final = 0.25  # of the image's side
 # Shifts by quarters and eighths are tried, too: the estimate is less exact than its judgement.
 _PARTS: Final = (4, 8)
 
@@ -36,14 +36,14 @@ def find_shift(a: _Image, b: _Image, step: float) -> tuple[_Shift, float] | None
         return None
     # Bright lights alone would decide otherwise, and interpolations differ in high frequencies.
     grey_a, grey_b = (
-        ndimage.gaussian_filter(_compressed(image).mean(axis=2), 1, mode="wrap") for image in (a, b)
+        ndimage.gaussian_filter(_compress(image).mean(axis=2), 1, mode="wrap") for image in (a, b)
     )
     (y, x), *_ = registration.phase_cross_correlation(
         grey_b, grey_a, upsample_factor=64, normalization=None
     )
     rounded = [(round(n * x) / n + 0.0, round(n * y) / n + 0.0) for n in _PARTS]
     for shift in dict.fromkeys((*rounded, (float(x), float(y)))):
-        is_short = max(abs(shift[0]) / a.shape[1], abs(shift[1]) / a.shape[0]) <= _LONGEST
+        is_short = max(abs(shift[0]) / a.shape[1], abs(shift[1]) / a.shape[0]) <= _MAX_SHIFT
         if is_short and max(map(abs, shift)) >= MIN_SHIFT:
             residual = _residual(a, b, shift, step)
             if residual is not None:
@@ -58,7 +58,7 @@ def _residual(a: _Image, b: _Image, shift: _Shift, step: float) -> float | None:
     best: float | None = None
     for moved, target, reference in _interpolations(a, b, shift):
         images = [image[inner] for image in (moved, target, reference)]
-        small = [_compressed(image) for image in images]
+        small = [_compress(image) for image in images]
         if all(_is_explained(*three, share=share, step=step) for three in (images, small)):
             residual = rms((target - moved)[inner])
             best = residual if best is None else min(best, residual)
@@ -90,7 +90,7 @@ def _is_explained(
     return difference > 2 * step and rms(target - moved) <= share * difference + step / 2
 
 
-def _compressed(image: _Image) -> _Image:
+def _compress(image: _Image) -> _Image:
     compressed: _Image = image / (1 + np.abs(image))
     return compressed
 

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ._image import BlurInput
-from ._sampling import Array, sample, scaled, size_of
-from ._threshold import luminance, masked
+from ._sampling import Array, sample, scale_size, size_of
+from ._threshold import apply_mask, luminance
 
 if TYPE_CHECKING:
     from vkbloom._methods.babylon import BabylonBloom
@@ -27,8 +27,8 @@ def passes(source: BlurInput, settings: BabylonBloom) -> dict[str, Array]:
     its luminance is at least threshold^(1 / 2.2). down_0 is "bright", blurred along x, then along
     y; each sample is two taps of a Gaussian. The bloom is down_0, bilinear.
     """
-    size = scaled(size_of(source.image), settings.scale)
-    bright = source.store(masked(_prefilter(sample(source.image, size), settings), source.mask))
+    size = scale_size(size_of(source.image), settings.scale)
+    bright = source.store(apply_mask(_prefilter(sample(source.image, size), settings), source.mask))
     taps = _taps(settings)
     horizontal = source.store(sample(bright, size, x_taps=taps))
     blurred = source.store(sample(horizontal, size, y_taps=taps))

@@ -15,7 +15,7 @@ import numpy as np
 from ._image import BlurInput
 from ._pyramid import downsample, groups
 from ._sampling import WIDEST_LEVEL, Array
-from ._threshold import luminance, masked, soften
+from ._threshold import apply_mask, luminance, soften
 from ._upsampling import Shares, combine, flat_gain, halvings, tent
 
 if TYPE_CHECKING:
@@ -38,7 +38,7 @@ def passes(source: BlurInput, settings: BevyBloom) -> dict[str, Array]:
     scale = (settings.scale_x, settings.scale_y)
     up = partial(tent, x_step=settings.scale_x, y_step=settings.scale_y)
     level = (min(max(1, math.floor(width * limit / height + 0.5)), WIDEST_LEVEL), limit)
-    first = source.store(masked(_prefilter(source.image, level, settings), source.mask))
+    first = source.store(apply_mask(_prefilter(source.image, level, settings), source.mask))
     shrink = partial(downsample, scale=scale)
     downs = halvings(first, _level_count(settings), source.store, shrink)
     return combine(downs, source, shares=_shares(settings), upsample=up, last=up)

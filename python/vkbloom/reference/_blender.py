@@ -15,9 +15,9 @@ from ._blender_lights import FACTORS, GAINS, LIGHTS, reads_next
 from ._blending import develop
 from ._image import BlurInput, Storage, finite, storage
 from ._pyramid import GROUPS, downsample
-from ._sampling import Array, halved, sample, size_of, weighted_mean
+from ._sampling import Array, halve_size, sample, size_of, weighted_mean
 from ._tape import value_of
-from ._threshold import brightest, masked
+from ._threshold import apply_mask, brightest
 from ._upsampling import combine, halvings, linear, tent_of_target
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ def passes(source: BlurInput, settings: BlenderGlare) -> dict[str, Array]:
     size = size_of(source.image)
     factor = FACTORS[settings.quality]
     reduced = _means(source.image, factor)
-    bright = source.store(masked(_highlights(reduced, settings), source.mask))
+    bright = source.store(apply_mask(_highlights(reduced, settings), source.mask))
     framebuffers = {"glow": bright}
     if factor > 1:
         framebuffers = {"highlights": bright, "glow": source.store(sample(bright, size))}
@@ -42,9 +42,9 @@ def passes(source: BlurInput, settings: BlenderGlare) -> dict[str, Array]:
     exact = source.store.high > 65024
     store = source.store if exact or settings.type == "bloom" else storage("rgba16float")
     images = _TYPES[settings.type](bright, settings, store, size)
-    light = _enlarged(images.pop("light"), source.size, settings.version)
+    light = _enlarge(images.pop("light"), source.size, settings.version)
     rounding = 1e-6 if settings.type in ("fog_glow", "kernel") else 1e-14
-    rgb = np.multiply(_settled(light[..., :3], settings.saturation, rounding), settings.tint)
+    rgb = np.multiply(_settle(light[..., :3], settings.saturation, rounding), settings.tint)
     alpha = light[..., 3:] * (sum(settings.tint[i] for i in range(3)) / 3)
     bloom = source.store.end(np.concatenate([rgb, alpha], axis=2))
     return {**framebuffers, **images, "bloom": bloom}
@@ -55,7 +55,7 @@ def composite(scene: Array, light: Array, settings: BlenderGlare, share: float |
     return develop((scene + np.abs(scene)) / 2 + light, settings)
 
 
-def _enlarged(light: Array, size: tuple[int, int], version: str) -> Array:
+def _enlarge(light: Array, size: tuple[int, int], version: str) -> Array:
     """Return the light in another size."""
     if version != "5.2":
         return sample(light, size)
@@ -77,11 +77,11 @@ def gain(settings: BlenderGlare, size: tuple[int, int]) -> Any:
     """
     bright = float(_highlights(np.ones((1, 1, 1)), settings)[0, 0, 0])
     levels = bright * GAINS.get(settings.type, lambda *_: np.ones(3))(settings, size)
-    tinted = saturated(levels, settings.saturation) * np.array(settings.tint)
+    tinted = saturate(levels, settings.saturation) * np.array(settings.tint)
     return float(tinted[0]) if (tinted == tinted[0]).all() else tinted
 
 
-def saturated(rgb: Array, saturation: float) -> Array:
+def saturate(rgb: Array, saturation: float) -> Array:
     """Return colours whose saturation s = (max - min) / max is clamp(saturation s, 0, 1).
 
     The largest channel does not change. Where it is not above 0, the others become equal to it.
@@ -97,7 +97,7 @@ def saturated(rgb: Array, saturation: float) -> Array:
     return result
 
 
-def _settled(rgb: Array, saturation: float, rounding: float) -> Array:
+def _settle(rgb: Array, saturation: float, rounding: float) -> Array:
     """Return saturated colours, derived as if channels were equal, or 0, that are but for rounding.
 
     The roundings of a convolution are those of the single floats of renderers, so that the kinks
@@ -105,13 +105,13 @@ def _settled(rgb: Array, saturation: float, rounding: float) -> Array:
     """
     values = value_of(rgb)
     if values is rgb:
-        return saturated(rgb, saturation)
+        return saturate(rgb, saturation)
     near = np.where(np.abs(values) <= rounding, 0.0, values)
     for extreme in (near.max(axis=-1, keepdims=True), near.min(axis=-1, keepdims=True)):
         least = rounding * (1 + 10 * np.abs(extreme))
         near = np.where(np.abs(near - extreme) <= least, extreme, near)
-    result: Array = saturated(rgb + (near - values), saturation)
-    result = result + (saturated(values, value_of(saturation)) - value_of(result))
+    result: Array = saturate(rgb + (near - values), saturation)
+    result = result + (saturate(values, value_of(saturation)) - value_of(result))
     return result
 
 
@@ -136,13 +136,13 @@ def _bloom(
     each of their groups of four are weighted by 1 / (1 + brightest channel).
     up_k = down_k + tent(up_k+1) with a tent of one pixel of the larger level.
     """
-    own = size_of(bright)
-    count = max(1, math.floor(math.log2(max(1.0, min(own) * settings.size))))
+    size = size_of(bright)
+    count = max(1, math.floor(math.log2(max(1.0, min(size) * settings.size))))
     downs = [bright]
     if count > 1:
-        second = store(_weighted_taps(bright, halved(own)))
+        second = store(_weighted_taps(bright, halve_size(size)))
         downs += halvings(second, count - 1, store, downsample)
-    given, up = BlurInput(bright, own, store), tent_of_target
+    given, up = BlurInput(bright, size, store), tent_of_target
     levels = combine(
         downs, given, upsample=up, last=linear, gain=1 / count, end=lambda image: image
     )

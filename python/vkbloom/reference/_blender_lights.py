@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from ._convolution import convolve
-from ._glare import moved_by, places, read, tap_colours, texels_at
+from ._glare import places, read, shift_image, tap_colours, texels_at
 from ._image import Storage
 from ._sampling import Array
 from ._tape import value_of
@@ -45,7 +45,7 @@ def _tap(light: Array, version: str, angle: float, distance: float, tap: int) ->
     """Return the light at a tap of a streak: at `tap` times a distance along an angle."""
     x, y = tap * distance * np.cos(angle), tap * distance * np.sin(angle)
     if version != "5.2":
-        return moved_by(light, x, -y)
+        return shift_image(light, x, -y)
     height, width, _ = light.shape
     single = np.float32(value_of(angle))
     direction = np.array([np.cos(single), np.sin(single)])
@@ -102,7 +102,7 @@ def _gaussian(image: Array, radius: float) -> Array:
     return image
 
 
-def _scaled(image: Array, scale: float) -> Array:
+def _scale(image: Array, scale: float) -> Array:
     """Return the image scaled about its centre, falling to 0 at half a side from it."""
     x, y = places(image)
     left = np.maximum(0.0, 1 - 2 * abs(scale) * np.hypot(x, y))
@@ -124,13 +124,13 @@ def _ghost_tint(modulation: float, ghost: int, channels: int) -> Array:
 def _ghosts(bright: Array, settings: BlenderGlare, store: Storage, size: Any) -> Images:
     """Return the ghosts of two blurs; each iteration adds four ghosts of the sum so far."""
     radius = 16 / FACTORS[settings.quality]
-    small = store(_scaled(store(_gaussian(bright, radius)), 2.13))
-    light = store(small + _scaled(store(_gaussian(bright, 2 * radius)), -0.97))
+    small = store(_scale(store(_gaussian(bright, radius)), 2.13))
+    light = store(small + _scale(store(_gaussian(bright, 2 * radius)), -0.97))
     total: Any = 0.0
     for i in range(1, settings.iterations):
         for ghost, scale in enumerate(_ghost_scales(settings.iterations, i)):
             tint = _ghost_tint(settings.color_modulation, ghost, bright.shape[2])
-            total = total + tint * _scaled(light, scale)
+            total = total + tint * _scale(light, scale)
         light = total = store(total)
     return {"light": total}
 
@@ -142,7 +142,7 @@ def _ghosts_gain(settings: BlenderGlare, size: Any) -> Array:
     return value
 
 
-def _convolved(
+def _convolve(
     bright: Array, settings: BlenderGlare, store: Storage, size: tuple[int, int]
 ) -> Images:
     """Return the convolution with the kernel, a fourth channel with the mean of its channels."""
@@ -152,7 +152,7 @@ def _convolved(
     return {"kernel": kernel, "light": store(convolve(bright, used, "zero"))}
 
 
-def _recursed(lines: Array, inside: Array, settings: BlenderGlare, store: Storage) -> Array:
+def _recurse(lines: Array, inside: Array, settings: BlenderGlare, store: Storage) -> Array:
     """Filter along the first axis, forwards and backwards, with results of earlier pixels.
 
     `inside` is 1 inside of the image, and 0 where a line has no pixel.
@@ -180,33 +180,33 @@ def _simple_star(bright: Array, settings: BlenderGlare, store: Storage, size: An
     upwards = bright[::-1]
     if not settings.diagonal:
         unit = np.ones((max(height, width), 1, 1))
-        across = _recursed(upwards.swapaxes(0, 1), unit, settings, store).swapaxes(0, 1)
-        return {"light": store(_recursed(upwards, unit, settings, store) + across)[::-1]}
+        across = _recurse(upwards.swapaxes(0, 1), unit, settings, store).swapaxes(0, 1)
+        return {"light": store(_recurse(upwards, unit, settings, store) + across)[::-1]}
     total: Any = 0.0
     rows = np.arange(height)[:, np.newaxis]
     for shift in (height - 1 - rows, rows):
         column = np.arange(width + height - 1) - shift
         inside = ((column >= 0) & (column < width)).astype(np.float64)[..., np.newaxis]
         lines = inside * upwards[rows, np.clip(column, 0, width - 1)]
-        filtered = _recursed(lines, inside, settings, store)
+        filtered = _recurse(lines, inside, settings, store)
         total = total + filtered[rows, np.arange(width) + shift]
     return {"light": store(total)[::-1]}
 
 
-def _hashed(x: Any, y: Any) -> Array:
+def _hash(x: Any, y: Any) -> Array:
     """Return numbers of 0 to 1 from pairs of integers: the end of Bob Jenkins' lookup3."""
     start = np.uint32(0xDEADBEEF + (2 << 2) + 13)
     a, b = start + x.astype(np.uint32), start + y.astype(np.uint32)
     c = np.full(a.shape, start)
     parts = [a, b, c]
 
-    def turned(value: Any, count: int) -> Any:
+    def rotate(value: Any, count: int) -> Any:
         return (value << np.uint32(count)) | (value >> np.uint32(32 - count))
 
     for step, count in enumerate((14, 11, 25, 16, 4, 14, 24)):
         # c from b, a from c, b from a, and again.
         changed, other = (step + 2) % 3, (step + 1) % 3
-        parts[changed] = (parts[changed] ^ parts[other]) - turned(parts[other], count)
+        parts[changed] = (parts[changed] ^ parts[other]) - rotate(parts[other], count)
     numbers: Array = parts[2].astype(np.float64) / 0xFFFFFFFF
     return numbers
 
@@ -233,7 +233,7 @@ def _sun_beams(bright: Array, settings: BlenderGlare, store: Storage, size: Any)
     for i in range(int(count.max()) + 1):
         step: Any = np.full((height, width), float(i))
         if jitter > 0:
-            step = (i + _hashed(x, y)) / (1 - jitter) if jitter < 1 else 0 * step
+            step = (i + _hash(x, y)) / (1 - jitter) if jitter < 1 else 0 * step
         at_x, at_y = share_x + step * step_x, share_y + step * step_y
         going &= (at_x >= 0) & (at_y >= 0) & (at_x <= 1) & (at_y <= 1)
         weight = np.where(going & (i <= count.astype(int)), (1 - step / steps) ** 2, 0.0)
@@ -247,8 +247,8 @@ def _sun_beams(bright: Array, settings: BlenderGlare, store: Storage, size: Any)
 LIGHTS: Final[dict[str, Any]] = {
     "streaks": _streaks,
     "ghosts": _ghosts,
-    "fog_glow": _convolved,
-    "kernel": _convolved,
+    "fog_glow": _convolve,
+    "kernel": _convolve,
     "simple_star": _simple_star,
     "sun_beams": _sun_beams,
 }

@@ -7,22 +7,22 @@ from typing import Any
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from vkbloom._argument_types import checked
+from vkbloom._argument_types import check_arguments
 from vkbloom._arrays import check_dtype
 from vkbloom._public import public
-from vkbloom._settings.settings import Settings, given_settings
+from vkbloom._settings.settings import Settings, resolve_settings
 
 from . import _blending as blending
 from ._blending import develop
 from ._image import as_float, format_of, storage
 from ._lookup import reference_of
 from ._sampling import Array
-from ._tape import joined
+from ._tape import join_curves
 from ._tone_map import ENCODINGS
 
 
 @public("vkbloom.reference")
-@checked
+@check_arguments
 def composite(
     scene: NDArray[Any],
     bloom: NDArray[Any] | None,
@@ -70,11 +70,11 @@ def composite(
     ValueError
         An image has another shape, or the sizes differ.
     """
-    settings = given_settings(settings)
+    settings = resolve_settings(settings)
     image = as_float(scene, "scene", (3, 4))
     stored = np.asarray(scene).dtype if dtype is None else check_dtype("dtype", dtype)
     if not settings.bloom:
-        return composite_checked(image, None, settings, stored)
+        return composite_without_store(image, None, settings, stored)
     if bloom is None:
         raise TypeError("bloom: None is not an array; settings.bloom is True")
     light = as_float(bloom, "bloom", (3, 4)) * strength_of(settings)
@@ -82,22 +82,22 @@ def composite(
         raise ValueError(
             f"bloom: height and width {light.shape[:2]} are not the scene's {image.shape[:2]}"
         )
-    return composite_checked(image, light, settings, stored, share)
+    return composite_without_store(image, light, settings, stored, share)
 
 
 def strength_of(settings: Settings) -> Any:
     """Return the factor of the bloom: the intensity, unless the method says more."""
-    strength = _declared("strength", settings)
+    strength = _function_of("strength", settings)
     return settings.intensity if strength is None else strength(settings)
 
 
 def slope_of(scene: Array, settings: Settings) -> float | Array:
     """Return the largest derivative of the composite by the light, before exposure and curve."""
-    slope = _declared("slope", settings)
+    slope = _function_of("slope", settings)
     return 1.0 if slope is None else slope(scene, settings)
 
 
-def _declared(name: str, settings: Settings) -> Any:
+def _function_of(name: str, settings: Settings) -> Any:
     """Return a function of the method's module; None if there is none, as for custom methods."""
     try:
         module = reference_of(settings.method)
@@ -106,7 +106,7 @@ def _declared(name: str, settings: Settings) -> Any:
     return getattr(module, name, None)
 
 
-def composite_checked(
+def composite_without_store(
     image: Array,
     light: Array | None,
     settings: Settings,
@@ -119,7 +119,7 @@ def composite_checked(
     if light is None:
         rgb = develop(rgb, settings)
     else:
-        method = _declared("composite", settings) or blending.composite
+        method = _function_of("composite", settings) or blending.composite
         rgb = method(rgb, light[..., :3], settings, share)
         alpha = _blend_alpha(alpha, light, settings.alpha)
     rgb = ENCODINGS[settings.encoding](rgb, settings.reference_white)
@@ -138,7 +138,7 @@ def _blend_alpha(alpha: Array, light: Array, mode: str) -> Array:
     if mode == "max":
         largest = np.clip(light[..., :3].max(axis=-1, keepdims=True), 0, 1)
         # The maximum, of which light that is 0 at an alpha of 0 has the side of its clamp.
-        larger: Array = joined(largest - alpha, 0.0, alpha, largest)
+        larger: Array = join_curves(largest - alpha, 0.0, alpha, largest)
         return larger
     if mode == "blur":
         if light.shape[2] == 3:

@@ -8,7 +8,7 @@ import numpy as np
 
 from ._image import BlurInput
 from ._sampling import Array, sample, size_of
-from ._tape import joined, operation, value_of
+from ._tape import join_curves, operation, value_of
 from ._threshold import luminance
 
 if TYPE_CHECKING:
@@ -26,18 +26,18 @@ def passes(source: BlurInput, settings: Convolution) -> dict[str, Array]:
     mean = kernel.mean(axis=2, keepdims=True)
     colours = kernel if channels in (3, 4) else mean
     used = np.concatenate([colours, *[mean] * (channels - colours.shape[2])], axis=2)
-    spread = convolve(prefiltered(source.image, settings.prefilter), used, settings.boundary)
+    spread = convolve(filter_bright(source.image, settings.prefilter), used, settings.boundary)
     return {"kernel": kernel, "bloom": source.store(sample(spread, source.size))}
 
 
 def gain(settings: Convolution, size: tuple[int, int]) -> Array:
     """Return the bloom of a flat image of 1 far from a boundary of zeros: the kernel's sums."""
-    flat = prefiltered(np.ones((1, 1, 3)), settings.prefilter)[0, 0]
+    flat = filter_bright(np.ones((1, 1, 3)), settings.prefilter)[0, 0]
     sums: Array = flat * settings.kernel(size).sum(axis=(0, 1))
     return sums
 
 
-def prefiltered(glow: Array, prefilter: tuple[float, float, float]) -> Array:
+def filter_bright(glow: Array, prefilter: tuple[float, float, float]) -> Array:
     """Return the glow past Unreal Engine's filter of bright colours.
 
     A colour whose luminance L is above min gets the luminance min(mult (L - min) + min, max).
@@ -48,7 +48,7 @@ def prefiltered(glow: Array, prefilter: tuple[float, float, float]) -> Array:
     light = luminance(glow[..., :3])
     wanted = np.minimum(factor * (light - low) + low, high)
     scale = np.where(light > 0, wanted / np.maximum(light, 1e-30), factor)
-    rgb = joined(light, low, glow[..., :3], glow[..., :3] * scale)
+    rgb = join_curves(light, low, glow[..., :3], glow[..., :3] * scale)
     return np.concatenate([rgb, glow[..., 3:]], axis=2)
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ._compositing import composite, composite_checked, strength_of
+from ._compositing import composite, composite_without_store, strength_of
 from ._glare import light
 from ._image import as_float
 from ._sampling import Array
@@ -32,7 +32,7 @@ def framebuffers(
     the light of the glare is added to "final".
     """
     if not settings.bloom:
-        return {"final": composite_checked(scene, None, settings, dtype)}
+        return {"final": composite_without_store(scene, None, settings, dtype)}
     height, width, channels = scene.shape
     image = scene if channels == 4 else np.dstack([scene, np.ones((height, width))])
     result = {
@@ -52,7 +52,7 @@ def framebuffers(
         bloom = as_float(result["bloom"], "bloom", (3, 4))
         whole = bloom if bloom.shape[2] == 4 else np.dstack([bloom, image[..., 3:] * 0 + 1])
         total = light(whole, strength_of(settings), list(stages.values()), settings.glare)
-        final = composite_checked(scene, total, settings, dtype)
+        final = composite_without_store(scene, total, settings, dtype)
     else:
         raise ValueError(
             f"reference: it returned {', '.join(result) or 'nothing'}; it must return 'bloom' "
@@ -76,6 +76,6 @@ def _lit(
             "but glare is added before them; leave these as they are, or let it return 'bloom'"
         )
     none = np.zeros((*final.shape[:2], 4))
-    return composite_checked(
+    return composite_without_store(
         final, light(none, 0.0, list(stages.values()), settings.glare), settings, dtype
     )

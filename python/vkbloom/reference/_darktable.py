@@ -13,7 +13,7 @@ from ._blending import develop
 from ._image import BlurInput
 from ._sampling import Array, sample
 from ._tape import contiguous, operation, value_of
-from ._threshold import masked
+from ._threshold import apply_mask
 
 if TYPE_CHECKING:
     from vkbloom._methods.darktable import DarktableBloom
@@ -35,7 +35,7 @@ def passes(source: BlurInput, settings: DarktableBloom) -> dict[str, Array]:
     rgb, alpha = source.image[..., :3], source.image[..., 3:]
     light = _bright(rgb, settings)
     kept = np.concatenate([light, light, light, alpha * (value_of(light) != 0)], axis=-1)
-    bright = source.store(masked(kept, source.mask))
+    bright = source.store(apply_mask(kept, source.mask))
     image = bright
     for _ in range(8):
         for _ in range(2):

@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom._argument_types import checked
+from vkbloom._argument_types import check_arguments
 from vkbloom._arrays import plain_array
 from vkbloom._public import public
 from vkbloom._settings.fields import fields_of
-from vkbloom._settings.settings import Settings, given_settings
+from vkbloom._settings.settings import Settings, resolve_settings
 
-from ._framebuffers import checked_image, framebuffers
+from ._framebuffers import check_scene, framebuffers
 from ._sampling import Array
 from ._tape import Traced, gradients, value_of
 
@@ -34,7 +34,7 @@ def check_known(name: str, names: Collection[str]) -> None:
 
 
 @public("vkbloom.reference")
-@checked
+@check_arguments
 def vjp(
     image: NDArray[Any],
     settings: Settings | str,
@@ -86,12 +86,12 @@ def vjp(
     The formulas of the reference run on arrays that record each operation with its derivative; the
     records are applied in reverse order (Griewank and Walther, "Evaluating Derivatives", 2008).
     """
-    settings = given_settings(settings)
+    settings = resolve_settings(settings)
     if hasattr(settings, "numpy_reference"):
         raise ValueError(
             f"method: {settings.method!r} has no derivative, since its passes come from a file"
         )
-    scene, source, weights, _ = checked_image(image, settings, mask, emission)
+    scene, source, weights, _ = check_scene(image, settings, mask, emission)
     inputs: dict[str, Traced] = {"image": Traced(scene)}
     if emission is not None:
         inputs["emission"] = Traced(source)
@@ -223,7 +223,7 @@ def check_cotangents(
             f"cotangents: {type(cotangents).__name__} is not a mapping of framebuffer to array; "
             'give {"final": array}'
         )
-    return {name: _checked_cotangent(name, part, values) for name, part in cotangents.items()}
+    return {name: _check_cotangent(name, part, values) for name, part in cotangents.items()}
 
 
 def check_shape(name: str, shape: tuple[int, ...], values: Mapping[str, Any]) -> None:
@@ -235,7 +235,7 @@ def check_shape(name: str, shape: tuple[int, ...], values: Mapping[str, Any]) ->
         raise ValueError(f"cotangents: the shape of {name!r} is {shape}, not {values[name].shape}")
 
 
-def _checked_cotangent(name: str, cotangent: NDArray[Any], values: Mapping[str, Any]) -> Array:
+def _check_cotangent(name: str, cotangent: NDArray[Any], values: Mapping[str, Any]) -> Array:
     given = plain_array(cotangent, f"cotangents: {name!r}")
     check_shape(name, given.shape, values)
     if given.dtype.kind not in "fiub":

@@ -14,8 +14,8 @@ import numpy as np
 
 from ._image import BlurInput
 from ._pyramid import downsample
-from ._sampling import WIDEST_LEVEL, Array, halved, sample, size_of, weighted_mean
-from ._threshold import brightest, firefly_weight, masked
+from ._sampling import WIDEST_LEVEL, Array, halve_size, sample, size_of, weighted_mean
+from ._threshold import apply_mask, brightest, firefly_weight
 from ._upsampling import combine, halvings, linear, tent_of_target
 
 if TYPE_CHECKING:
@@ -37,10 +37,10 @@ def passes(source: BlurInput, settings: FilamentBloom) -> dict[str, Array]:
     level = 16 * max(1, math.floor(across / 16)), 16 * max(1, math.floor(top / 16))
     threshold, mask = settings.threshold, source.mask
     while level[0] * 2 < above[0] or level[1] * 2 < above[1]:
-        above = halved(above)
-        image = source.store(masked(_reduce(image, above, threshold, settings.highlight), mask))
+        above = halve_size(above)
+        image = source.store(apply_mask(_reduce(image, above, threshold, settings.highlight), mask))
         threshold = mask = None
-    first = source.store(masked(_reduce(image, level, threshold, settings.highlight), mask))
+    first = source.store(apply_mask(_reduce(image, level, threshold, settings.highlight), mask))
     longer = math.floor(max(across, top))
     count = min(settings.levels, math.floor(math.log2(longer)) + 1)
 

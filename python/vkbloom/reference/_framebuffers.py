@@ -7,23 +7,23 @@ from typing import Any
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from vkbloom._argument_types import checked
+from vkbloom._argument_types import check_arguments
 from vkbloom._arrays import native_order, view_image
 from vkbloom._image_arguments import check_emission, check_mask
 from vkbloom._public import public
-from vkbloom._settings.settings import Settings, given_settings
+from vkbloom._settings.settings import Settings, resolve_settings
 
 from . import _custom as custom
 from . import _glare as glare
-from ._compositing import composite_checked, strength_of
+from ._compositing import composite_without_store, strength_of
 from ._image import BlurInput, as_float, finite, format_of, storage
 from ._lookup import Reference, reference_of
-from ._sampling import Array, sample, scaled, size_of
-from ._threshold import apply_threshold, masked
+from ._sampling import Array, sample, scale_size, size_of
+from ._threshold import apply_mask, apply_threshold
 
 
 @public("vkbloom.reference")
-@checked
+@check_arguments
 def apply(
     image: NDArray[Any],
     settings: Settings | str,
@@ -74,8 +74,8 @@ def apply(
         The image has another shape; the mask another size or other values; the emission another
         shape or dtype; or ``settings.alpha`` is "max" or "blur" and there is no alpha.
     """
-    settings = given_settings(settings)
-    scene, source, weights, format = checked_image(image, settings, mask, emission)
+    settings = resolve_settings(settings)
+    scene, source, weights, format = check_scene(image, settings, mask, emission)
     dtype = np.asarray(image).dtype
     if (function := getattr(settings, "numpy_reference", None)) is None:
         return framebuffers(scene, source, settings, mask=weights, format=format, dtype=dtype)
@@ -84,7 +84,7 @@ def apply(
     return custom.framebuffers(function, scene, settings, dtype, stages)
 
 
-def checked_image(
+def check_scene(
     image: NDArray[Any],
     settings: Settings,
     mask: NDArray[Any] | None,
@@ -117,7 +117,7 @@ def framebuffers(
     """Return the framebuffers of `apply`; without an emission, `source` is `scene`."""
     method = _method(settings)
     if not settings.bloom:
-        return {"final": composite_checked(scene, None, settings, dtype)}
+        return {"final": composite_without_store(scene, None, settings, dtype)}
     glow, seen = _first_buffer(source, settings, mask, format)
     given = BlurInput(glow, size_of(scene), storage(format), mask)
     blurred = method.passes(given, settings)
@@ -131,7 +131,7 @@ def framebuffers(
         light = results["bloom"] * strength
     # The share of the scene that is the source of the bloom.
     share = 0.0 if source is not scene else 1.0 if mask is None else mask
-    results["final"] = composite_checked(scene, light, settings, dtype, share)
+    results["final"] = composite_without_store(scene, light, settings, dtype, share)
     return results
 
 
@@ -142,20 +142,20 @@ def _first_buffer(
     store = storage(format)
     channels = 4 if settings.alpha == "blur" else 3
 
-    def thresholded(colours: Array) -> Array:
-        return masked(apply_threshold(colours, settings.threshold, settings.knee), mask)
+    def threshold_light(colours: Array) -> Array:
+        return apply_mask(apply_threshold(colours, settings.threshold, settings.knee), mask)
 
-    buffers = settings.bloom_size or scaled(size_of(source), settings.bloom_scale)
+    buffers = settings.bloom_size or scale_size(size_of(source), settings.bloom_scale)
     reduced = sample(finite(source[..., :channels]), buffers)
     if settings.published:
         glow: Array = store.first(reduced)
-        return glow, thresholded(glow)
-    glow = store(thresholded(reduced))
+        return glow, threshold_light(glow)
+    glow = store(threshold_light(reduced))
     return glow, glow
 
 
 @public("vkbloom.reference")
-@checked
+@check_arguments
 def passes(
     glow: NDArray[Any],
     settings: Settings | str,
@@ -195,7 +195,7 @@ def passes(
     ValueError
         The glow has another shape, the size is below 1, or the format is unknown.
     """
-    settings = given_settings(settings)
+    settings = resolve_settings(settings)
     method = _method(settings)
     values = finite(as_float(glow, "glow"))
     channels = values.shape[2]
@@ -213,7 +213,7 @@ def passes(
 
 
 @public("vkbloom.reference")
-@checked
+@check_arguments
 def blur(
     glow: NDArray[Any],
     settings: Settings | str,
@@ -236,7 +236,7 @@ def blur(
 
 
 @public("vkbloom.reference")
-@checked
+@check_arguments
 def gain(settings: Settings | str, size: tuple[int, int] = (1280, 720)) -> Any:
     """Return the bloom of a flat image of 1, without clamps and before the intensity.
 
@@ -253,7 +253,7 @@ def gain(settings: Settings | str, size: tuple[int, int] = (1280, 720)) -> Any:
     float, or ndarray of float64, shape (3,)
         For `vkbloom.Convolution` one number for each channel, without the effect of the boundary.
     """
-    settings = given_settings(settings)
+    settings = resolve_settings(settings)
     method = _method(settings)
     threshold = None if settings.published else settings.threshold
     glow = float(apply_threshold(np.ones((1, 1, 3)), threshold, settings.knee)[0, 0, 0])

@@ -67,7 +67,7 @@ def _above(image: Array, threshold: float) -> Array:
     return above
 
 
-def moved_by(image: Array, x: float, y: float) -> Array:
+def shift_image(image: Array, x: float, y: float) -> Array:
     """Return the image shifted by (x, y) texels, bilinearly, with 0 outside of the image."""
     rows, columns = (np.arange(side, dtype=np.float64) for side in image.shape[:2])
     return texels_at(image, columns[np.newaxis] + x, rows[:, np.newaxis] + y)
@@ -93,7 +93,9 @@ def _streaks(image: Array, stage: Any, store: Storage) -> Array:
                 sum(
                     weight
                     * tap_colours(tap, less, image.shape[2])
-                    * moved_by(ray_image, -tap * step * np.cos(angle), tap * step * np.sin(angle))
+                    * shift_image(
+                        ray_image, -tap * step * np.cos(angle), tap * step * np.sin(angle)
+                    )
                     for tap, weight in enumerate(weights)
                 )
             )
@@ -154,7 +156,7 @@ def _between(image: Array, column: Array, row: Array, left: Array, top: Array) -
     return result
 
 
-def _seen(image: Array, stage: Any, x: Array, y: Array) -> Array:
+def _read_input(image: Array, stage: Any, x: Array, y: Array) -> Array:
     """Return the input of a ghost or halo: red and blue are shifted, the threshold subtracted."""
     length = np.hypot(x, y)
     moved = stage.aberration / np.where(length > 0, length, np.inf)
@@ -175,7 +177,7 @@ def _ghosts(image: Array, stage: Any, store: Storage) -> Array:
         distance = np.abs(scale) * np.hypot(x, y)
         weight = np.maximum(0, 1 - distance / stage.radius) ** stage.falloff
         factors = np.concatenate([tint, np.sum(tint, axis=0, keepdims=True) / 3])[: image.shape[2]]
-        total += weight[..., np.newaxis] * factors * _seen(image, stage, scale * x, scale * y)
+        total += weight[..., np.newaxis] * factors * _read_input(image, stage, scale * x, scale * y)
     corner = np.minimum(((2 * x) ** 2 + (2 * y) ** 2) ** 2, 1)
     total *= (1 + stage.vignette * (corner - 1))[..., np.newaxis]
     return total
@@ -188,7 +190,7 @@ def _halo(image: Array, stage: Any, store: Storage) -> Array:
     across, down = x * width / height, y
     distance = np.hypot(across, down)
     step = stage.radius / np.where(distance > 0, distance, np.inf)
-    light = _seen(image, stage, x - step * x, y - step * y)
+    light = _read_input(image, stage, x - step * x, y - step * y)
     part = np.minimum(np.abs(distance - stage.radius) / stage.width, 1)
     light *= (1 - part * part * (3 - 2 * part))[..., np.newaxis]
     return light

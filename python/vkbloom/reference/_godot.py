@@ -13,8 +13,8 @@ import numpy as np
 from ._blending import blend
 from ._image import BlurInput
 from ._sampling import Array, sample
-from ._tape import contiguous, joined
-from ._threshold import brightest, luminance, masked
+from ._tape import contiguous, join_curves
+from ._threshold import apply_mask, brightest, luminance
 from ._tone_map import TONE_MAPS
 from ._upsampling import cubic, linear
 
@@ -47,7 +47,7 @@ def passes(source: BlurInput, settings: GodotBloom) -> dict[str, Array]:
         level_size = (max(1, width // 2 >> level), max(1, height // 2 >> level))
         samples = sample(image, level_size)
         if level == 0:
-            image = source.store(masked(_first(samples, settings), source.mask))
+            image = source.store(apply_mask(_first(samples, settings), source.mask))
         else:
             image = source.store(_later(samples, settings))
         framebuffers[f"down_{level}"] = image
@@ -75,7 +75,7 @@ def composite(scene: Array, light: Array, settings: GodotBloom, share: float | A
         soft, toned = np.clip(curve(light), 0, 1), curve(scene)
         dark = ((16 * toned - 12) * toned + 4) * toned
         full = np.where(toned <= 0.25, dark, np.sqrt(np.maximum(toned, 0)))
-        lit: Array = joined(toned, 1.0, toned + soft * (full - toned), toned)
+        lit: Array = join_curves(toned, 1.0, toned + soft * (full - toned), toned)
         return lit
     if settings.composite == "screen":
         light = np.clip(light, 0, settings.white)

@@ -19,8 +19,8 @@ from vkbloom._formats import LUMINANCE_7_DIGITS
 from ._image import BlurInput, Storage
 from ._sampling import Array, read_rows, sample, size_of, weighted_mean
 from ._tape import contiguous
-from ._threshold import firefly_weight, luminance, masked
-from ._upsampling import combine, cubic, cubic_rows, mixed
+from ._threshold import apply_mask, firefly_weight, luminance
+from ._upsampling import combine, cubic, cubic_rows, mix
 
 if TYPE_CHECKING:
     from vkbloom._methods.unity import HdrpBloom
@@ -55,13 +55,13 @@ def passes(source: BlurInput, settings: HdrpBloom) -> dict[str, Array]:
         (max(1, round(reduced_width / 2 ** (k + 1))), max(1, round(reduced_height / 2 ** (k + 1))))
         for k in range(count)
     ]
-    reduced = source.store(masked(_prefilter(source.image, sizes[0]), source.mask))
+    reduced = source.store(apply_mask(_prefilter(source.image, sizes[0]), source.mask))
     downs = [_along_both(reduced, sizes[0], _blur_rows, source.store)]
     for level in sizes[1:]:
         downs.append(_along_both(downs[-1], level, _shrink_rows, source.store))
     is_cubic = settings.high_quality_filtering and width >= 800 and height >= 450
     rows = _cubic_rows if is_cubic else _linear_rows
-    shares = mixed(0.05 + (0.95 - 0.05) * settings.scatter, count)
+    shares = mix(0.05 + (0.95 - 0.05) * settings.scatter, count)
     up = partial(_along_both, rows=rows)
     return combine(downs, source, shares, upsample=up, last=cubic)
 

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ._image import BlurInput
-from ._sampling import Array, halved, sample, size_of, weighted_mean
-from ._threshold import brightest, firefly_weight, masked, soften
+from ._sampling import Array, halve_size, sample, size_of, weighted_mean
+from ._threshold import apply_mask, brightest, firefly_weight, soften
 from ._upsampling import combine, halvings, tent
 
 if TYPE_CHECKING:
@@ -30,9 +30,9 @@ def passes(source: BlurInput, settings: KinoBloom) -> dict[str, Array]:
     """
     size = size_of(source.image)
     count, step = _count_and_step(settings, size[1])
-    bright = source.store(masked(_prefilter(source.image, settings), source.mask))
+    bright = source.store(apply_mask(_prefilter(source.image, settings), source.mask))
     reduce = _firefly_box if settings.anti_flicker else _box
-    first = source.store(reduce(bright, halved(size)))
+    first = source.store(reduce(bright, halve_size(size)))
     downs = halvings(first, count, source.store, _box)
     up = partial(tent, x_step=step, y_step=step)
     ups = combine(downs, source, upsample=up, last=up)

@@ -13,9 +13,9 @@ import numpy as np
 from . import _blending as blending
 from ._blending import develop
 from ._image import BlurInput
-from ._sampling import Array, halved, sample, size_of
-from ._threshold import luminance, masked, smooth_step
-from ._upsampling import combine, flat_gain, linear, mixed, tent
+from ._sampling import Array, halve_size, sample, size_of
+from ._threshold import apply_mask, luminance, smooth_step
+from ._upsampling import combine, flat_gain, linear, mix, tent
 
 if TYPE_CHECKING:
     from vkbloom._methods.pmndrs import PmndrsBloom
@@ -33,15 +33,15 @@ def passes(source: BlurInput, settings: PmndrsBloom) -> dict[str, Array]:
     down_k with the tent of up_k+1 by the radius; a single level is mixed with its own tent. The
     bloom is up_0, bilinear.
     """
-    bright = source.store(masked(_prefilter(source.image, settings), source.mask))
+    bright = source.store(apply_mask(_prefilter(source.image, settings), source.mask))
     image, downs = bright, []
     for _ in range(settings.levels):
-        image = source.store(_down(image, halved(size_of(image), 1)))
+        image = source.store(_down(image, halve_size(size_of(image), 1)))
         downs.append(image)
     if settings.levels == 1:
         # The second level is the first one again.
         downs.append(downs[0])
-    shares = mixed(settings.radius, len(downs))
+    shares = mix(settings.radius, len(downs))
     framebuffers = combine(downs, source, shares, upsample=tent, last=linear)
     if settings.levels == 1:
         del framebuffers["down_1"]
@@ -55,7 +55,7 @@ def gain(settings: PmndrsBloom, size: tuple[int, int]) -> float:
     for _ in range(settings.levels):
         level *= sum(weight * len(offsets) ** 2 for weight, offsets in _DOWN)
         downs.append(level)
-    return flat_gain(mixed(settings.radius, len(downs)), downs)
+    return flat_gain(mix(settings.radius, len(downs)), downs)
 
 
 def composite(scene: Array, light: Array, settings: PmndrsBloom, share: float | Array) -> Array:

@@ -17,8 +17,8 @@ from vkbloom._formats import MAX_HALF
 from ._image import BlurInput
 from ._pyramid import downsample
 from ._sampling import Array, box, size_of
-from ._tape import joined
-from ._threshold import masked, soften, with_alpha
+from ._tape import join_curves
+from ._threshold import apply_mask, soften, with_alpha
 from ._upsampling import Filter, combine, halvings, tent
 
 if TYPE_CHECKING:
@@ -42,7 +42,7 @@ def passes(source: BlurInput, settings: PostProcessingBloom) -> dict[str, Array]
     if settings.fast:
         reduced, enlarged = box, partial(box, distance=radius / 2)
     bright = _prefilter(reduced(source.image, first), settings)
-    bright = source.store(masked(bright * with_alpha(settings.color, channels), source.mask))
+    bright = source.store(apply_mask(bright * with_alpha(settings.color, channels), source.mask))
     downs = halvings(bright, count, source.store, reduced)
     return combine(downs, source, upsample=enlarged, last=enlarged)
 
@@ -76,5 +76,5 @@ def _prefilter(rgb: Array, settings: PostProcessingBloom) -> Array:
 
 def linear_light(value: Any) -> Any:
     """Return the light of a value in sRGB; above 1 it is a power of 2.2, as Unity converts it."""
-    power = joined(value, 1.0, ((value + 0.055) / 1.055) ** 2.4, value**2.2)
-    return joined(value, 0.04045, value / 12.92, power)
+    power = join_curves(value, 1.0, ((value + 0.055) / 1.055) ** 2.4, value**2.2)
+    return join_curves(value, 0.04045, value / 12.92, power)

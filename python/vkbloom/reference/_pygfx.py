@@ -13,8 +13,8 @@ import numpy as np
 
 from ._image import BlurInput, finite
 from ._pyramid import downsample, groups
-from ._sampling import Array, halved, size_of, weighted_mean
-from ._threshold import luminance, masked
+from ._sampling import Array, halve_size, size_of, weighted_mean
+from ._threshold import apply_mask, luminance
 from ._upsampling import combine, halvings, linear, tent
 
 if TYPE_CHECKING:
@@ -30,10 +30,10 @@ def passes(source: BlurInput, settings: PygfxBloom) -> dict[str, Array]:
     both axes; the bloom is up_0, bilinear. The levels are clamped to at least 0.
     """
     size = size_of(source.image)
-    shrink = _averaged if settings.karis_average else downsample
-    first = np.maximum(shrink(source.image, halved(size)), 0)
+    shrink = _average if settings.karis_average else downsample
+    first = np.maximum(shrink(source.image, halve_size(size)), 0)
     downs = halvings(
-        source.store(masked(first, source.mask)),
+        source.store(apply_mask(first, source.mask)),
         _level_count(settings, size),
         source.store,
         lambda image, size: np.maximum(downsample(image, size), 0),
@@ -52,7 +52,7 @@ def _level_count(settings: PygfxBloom, size: tuple[int, int]) -> int:
     return min(settings.levels, math.floor(math.log2(longer)) + 1)
 
 
-def _averaged(image: Array, size: tuple[int, int]) -> Array:
+def _average(image: Array, size: tuple[int, int]) -> Array:
     """Weight the groups by 1 / (1 + luminance), also of negative ones; 0 where it is undefined."""
     with np.errstate(divide="ignore", invalid="ignore"):
         return finite(

@@ -72,7 +72,7 @@ class Traced(np.lib.mixins.NDArrayOperatorsMixin):
             return result
 
         self_value = self.value
-        return _traced(value, (self, back))
+        return _trace(value, (self, back))
 
     def __setitem__(self, index: Any, part: Any) -> None:
         """Replace a part. The node before stays as it was, for what was computed from it."""
@@ -86,19 +86,19 @@ class Traced(np.lib.mixins.NDArrayOperatorsMixin):
             return rest
 
         before = Traced(self.value, self.node)
-        new = _traced(value, (before, back), (part, lambda d: _summed(d[index], np.shape(part))))
+        new = _trace(value, (before, back), (part, lambda d: _sum_to(d[index], np.shape(part))))
         assert value[index].shape == shape
         self.value, self.node = new.value, new.node
 
     def swapaxes(self, first: int, second: int) -> Traced:
         """Exchange two axes."""
-        return _traced(
+        return _trace(
             self.value.swapaxes(first, second), (self, lambda d: d.swapaxes(first, second))
         )
 
     def reshape(self, *shape: Any) -> Traced:
         """Give the array another shape."""
-        return _traced(self.value.reshape(*shape), (self, lambda d: d.reshape(self.value.shape)))
+        return _trace(self.value.reshape(*shape), (self, lambda d: d.reshape(self.value.shape)))
 
     def astype(self, dtype: Any) -> Traced:
         """Return the array itself: all are of float64."""
@@ -109,7 +109,7 @@ class Traced(np.lib.mixins.NDArrayOperatorsMixin):
         total = np.sum(self.value, axis=axis, keepdims=True)
         kept = total if keepdims else np.sum(self.value, axis=axis)
         shape = self.value.shape
-        return _traced(kept, (self, lambda d: np.broadcast_to(d.reshape(total.shape), shape)))
+        return _trace(kept, (self, lambda d: np.broadcast_to(d.reshape(total.shape), shape)))
 
     def mean(self, axis: Any = None, keepdims: bool = False) -> Traced:
         """Average along axes."""
@@ -129,7 +129,7 @@ class Traced(np.lib.mixins.NDArrayOperatorsMixin):
         share = (self.value == extreme).astype(np.float64)
         share /= share.sum(axis=axis, keepdims=True)
         value = extreme if keepdims else function(self.value, axis=axis)
-        return _traced(value, (self, lambda d: share * d.reshape(extreme.shape)))
+        return _trace(value, (self, lambda d: share * d.reshape(extreme.shape)))
 
     def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, **options: Any) -> Any:
         values = [value_of(part) for part in inputs]
@@ -142,7 +142,7 @@ class Traced(np.lib.mixins.NDArrayOperatorsMixin):
         with np.errstate(all="ignore"):
             result = ufunc(*values)
             if ufunc is np.matmul:
-                return _traced(result, (inputs[0], lambda d: d @ values[1].T))
+                return _trace(result, (inputs[0], lambda d: d @ values[1].T))
             factors = _UFUNCS[ufunc](result, *values)
         apart = None
         if ufunc in _KINKS and not (
@@ -150,10 +150,10 @@ class Traced(np.lib.mixins.NDArrayOperatorsMixin):
         ):
             ties = np.equal(*values) if len(values) == 2 else np.equal(values[0], 0)
             apart = _KINKS[ufunc] * ties if ties.any() else None
-        return _traced(
+        return _trace(
             result,
             *(
-                (part, _scaled(part, factor, apart))
+                (part, _scale(part, factor, apart))
                 for part, factor in zip(inputs, factors, strict=True)
             ),
         )
@@ -180,7 +180,7 @@ def operation(value: Any, *arguments: tuple[Any, Rule | Sides]) -> Any:
     """
     if not any(isinstance(argument, Traced) for argument, _ in arguments):
         return value
-    return _traced(value, *arguments)
+    return _trace(value, *arguments)
 
 
 def contiguous(array: Array) -> Array:
@@ -189,18 +189,18 @@ def contiguous(array: Array) -> Array:
     return same
 
 
-def joined(position: Any, at: float, below: Any, above: Any) -> Any:
+def join_curves(position: Any, at: float, below: Any, above: Any) -> Any:
     """Return one curve up to a place and another above it, which have equal values there."""
     value = value_of(position)
     falling, growing = np.less_equal(value, at), np.less(value, at)
     return operation(
         np.where(falling, value_of(below), value_of(above)),
-        (below, (_chosen(below, growing), _chosen(below, falling))),
-        (above, (_chosen(above, ~growing), _chosen(above, ~falling))),
+        (below, (_choose(below, growing), _choose(below, falling))),
+        (above, (_choose(above, ~growing), _choose(above, ~falling))),
     )
 
 
-def _traced(value: Any, *arguments: tuple[Any, Rule | Sides]) -> Traced:
+def _trace(value: Any, *arguments: tuple[Any, Rule | Sides]) -> Traced:
     return Traced(
         value, _Node([(part.node, rule) for part, rule in arguments if isinstance(part, Traced)])
     )
@@ -250,20 +250,20 @@ def _times(derivative: Array, factor: Any) -> Array:
     return product
 
 
-def _scaled(part: Any, factor: Any, apart: Any) -> Rule | Sides:
+def _scale(part: Any, factor: Any, apart: Any) -> Rule | Sides:
     """Return the rules of an argument by its factor, which differs so much on both sides."""
 
     def rule(scale: Any) -> Rule:
-        return lambda d: _summed(_times(d, scale), np.shape(part))
+        return lambda d: _sum_to(_times(d, scale), np.shape(part))
 
     return rule(factor) if apart is None else (rule(factor + apart), rule(factor - apart))
 
 
-def _chosen(part: Any, mask: Any) -> Rule:
-    return lambda d: _summed(np.where(mask, d, 0.0), np.shape(part))
+def _choose(part: Any, mask: Any) -> Rule:
+    return lambda d: _sum_to(np.where(mask, d, 0.0), np.shape(part))
 
 
-def _summed(derivative: Array, shape: tuple[int, ...]) -> Array:
+def _sum_to(derivative: Array, shape: tuple[int, ...]) -> Array:
     """Return the derivative by an argument that NumPy has broadcast from a shape."""
     extra = derivative.ndim - len(shape)
     derivative = derivative.sum(axis=tuple(range(extra)))
@@ -325,20 +325,20 @@ def _where(condition: Any, first: Any, second: Any) -> Any:
     mask = value_of(condition)
     value = np.where(mask, value_of(first), value_of(second))
     return operation(
-        value, (first, _chosen(first, mask)), (second, _chosen(second, np.logical_not(mask)))
+        value, (first, _choose(first, mask)), (second, _choose(second, np.logical_not(mask)))
     )
 
 
 def _clip(array: Any, low: Any, high: Any) -> Any:
     value, least, most = map(value_of, (array, low, high))
     above, from_low, below, to_high = value > least, value >= least, value < most, value <= most
-    growing, falling = _chosen(array, from_low & below), _chosen(array, above & to_high)
+    growing, falling = _choose(array, from_low & below), _choose(array, above & to_high)
     at_ends = np.any((above != from_low) | (below != to_high))
     return operation(
         np.clip(value, least, most),
         (array, (growing, falling) if at_ends else growing),
-        (low, (_chosen(low, ~above), _chosen(low, ~from_low))),
-        (high, (_chosen(high, ~to_high), _chosen(high, ~below))),
+        (low, (_choose(low, ~above), _choose(low, ~from_low))),
+        (high, (_choose(high, ~to_high), _choose(high, ~below))),
     )
 
 
@@ -367,7 +367,7 @@ def _pad(array: Any, widths: Any, mode: str = "constant") -> Any:
         )
         return sums.reshape(array.shape)
 
-    return _traced(value, (array, back))
+    return _trace(value, (array, back))
 
 
 def _polyval(coefficients: Sequence[float], x: Any) -> Any:

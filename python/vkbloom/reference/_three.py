@@ -16,8 +16,8 @@ import numpy as np
 from vkbloom._formats import LUMINANCE, LUMINANCE_7_DIGITS
 
 from ._image import BlurInput
-from ._sampling import Array, halved, sample, scaled, size_of
-from ._threshold import luminance, masked, smooth_step, with_alpha
+from ._sampling import Array, halve_size, sample, scale_size, size_of
+from ._threshold import apply_mask, luminance, smooth_step, with_alpha
 
 if TYPE_CHECKING:
     from vkbloom._methods.three import ThreeBloom
@@ -40,13 +40,13 @@ def passes(source: BlurInput, settings: ThreeBloom) -> dict[str, Array]:
     """
     channels, is_node = source.image.shape[2], settings.variant == "node"
     frame = size_of(source.image)
-    size = scaled(frame, settings.resolution_scale) if is_node else halved(frame, 1)
-    image = source.store(masked(_prefilter(sample(source.image, size), settings), source.mask))
+    size = scale_size(frame, settings.resolution_scale) if is_node else halve_size(frame, 1)
+    image = source.store(apply_mask(_prefilter(sample(source.image, size), settings), source.mask))
     framebuffers = {"bright": image}
     total = np.zeros_like(image)
     level = size
     for k, factor in enumerate(_factors(settings.radius)):
-        level = halved(level, 0 if is_node else 1) if k else size
+        level = halve_size(level, 0 if is_node else 1) if k else size
         ratio = image.shape[1] / level[0]
         taps = _taps(k, settings)
         x_taps = [(offset * ratio, weight) for offset, weight in taps]

@@ -9,7 +9,7 @@ import numpy as np
 from vkbloom._formats import LUMINANCE
 
 from ._sampling import Array, sample, size_of
-from ._tape import joined
+from ._tape import join_curves
 
 # Rec. 709 luma coefficients of linear rgb.
 _LUMINANCE = np.array(LUMINANCE)
@@ -34,7 +34,7 @@ def brightest(image: Array) -> Array:
     return largest
 
 
-def masked(image: Array, mask: Array | None) -> Array:
+def apply_mask(image: Array, mask: Array | None) -> Array:
     """Return the image times the mask, which is read bilinearly at the image's pixel centres."""
     if mask is None:
         return image
@@ -96,5 +96,5 @@ def soften(
     brightness, half_width = brightest(rgb), threshold * knee + wider
     above = brightness - threshold
     soft = np.clip(above + half_width, 0, 2 * half_width) ** 2 / (4 * half_width + added)
-    scale: Array = joined(above - soft, 0.0, soft, above) / np.maximum(brightness, least)
+    scale: Array = join_curves(above - soft, 0.0, soft, above) / np.maximum(brightness, least)
     return rgb * scale

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from ._sampling import Array
-from ._tape import joined
+from ._tape import join_curves
 
 
 def _reinhard(rgb: Array) -> Array:
@@ -102,7 +102,7 @@ def _srgb(rgb: Array) -> Array:
     """Apply the piecewise curve of IEC 61966-2-1, negative values as 0."""
     positive = np.maximum(rgb, 0.0)
     bright = 1.055 * positive ** (1 / 2.4) - 0.055
-    encoded: Array = joined(positive, 0.0031308, 12.92 * positive, bright)
+    encoded: Array = join_curves(positive, 0.0031308, 12.92 * positive, bright)
     return encoded
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from . import _convolution as convolution
 from ._image import BlurInput
 from ._sampling import Array
-from ._threshold import luminance, masked
+from ._threshold import apply_mask, luminance
 
 
 def gain(settings: Any, size: tuple[int, int]) -> float:
@@ -23,7 +23,7 @@ def passes(source: BlurInput, settings: Any) -> dict[str, Array]:
     """Return "kernel" and "bloom"."""
     if source.mask is None and settings.threshold in (None, -1):
         return convolution.passes(source, settings)
-    image = masked(_prefilter(source.image, settings), source.mask)
+    image = apply_mask(_prefilter(source.image, settings), source.mask)
     return convolution.passes(dataclasses.replace(source, image=source.store(image)), settings)
 
 

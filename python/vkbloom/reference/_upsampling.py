@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from ._image import BlurInput
-from ._sampling import Array, halved, read_rows, sample, size_of
+from ._sampling import Array, halve_size, read_rows, sample, size_of
 from ._tape import contiguous
 
 # (image, size of the result) -> the image in this size
@@ -68,7 +68,7 @@ def halvings(
     """Return an image, and smaller ones that have half the size of the one before."""
     downs = [first]
     while len(downs) < count:
-        downs.append(store(shrink(downs[-1], halved(size_of(downs[-1])))))
+        downs.append(store(shrink(downs[-1], halve_size(size_of(downs[-1])))))
     return downs
 
 
@@ -105,7 +105,7 @@ def combine(
     return framebuffers
 
 
-def mixed(share: float, count: int) -> Shares:
+def mix(share: float, count: int) -> Shares:
     """Return the shares of a chain in which each level is mixed with the smaller one."""
     return [1 - share] * count, [share] * count
 

@@ -21,10 +21,10 @@ from . import _dual_kawase as dual_kawase
 from ._image import BlurInput
 from ._post_processing import linear_light
 from ._pyramid import downsample
-from ._sampling import Array, box, halved, read_rows, sample, size_of
+from ._sampling import Array, box, halve_size, read_rows, sample, size_of
 from ._tape import contiguous
-from ._threshold import masked, soften, with_alpha
-from ._upsampling import Shares, combine, cubic, flat_gain, halvings, linear, mixed
+from ._threshold import apply_mask, soften, with_alpha
+from ._upsampling import Shares, combine, cubic, flat_gain, halvings, linear, mix
 
 if TYPE_CHECKING:
     from vkbloom._methods.unity import UrpBloom
@@ -49,7 +49,7 @@ def passes(source: BlurInput, settings: UrpBloom) -> dict[str, Array]:
         aspect = height / width if settings.version == "12" else 1.0
         reduced = source.store(downsample(source.image, level, scale=(0.5, 0.5 * aspect)))
     bright = _prefilter(reduced, settings) * with_alpha(_tint(settings), channels)
-    first, count = source.store(masked(bright, source.mask)), _level_count(settings, level)
+    first, count = source.store(apply_mask(bright, source.mask)), _level_count(settings, level)
     if settings.filter == "kawase":
         return _kawase(source, settings, first, count)
     if settings.filter == "dual":
@@ -102,7 +102,7 @@ def _kernel(settings: UrpBloom) -> Callable[[Array, tuple[int, int]], Array]:
 
 
 def _first_size(size: tuple[int, int], settings: UrpBloom) -> tuple[int, int]:
-    return halved(halved(size)) if settings.downscale == "quarter" else halved(size)
+    return halve_size(halve_size(size)) if settings.downscale == "quarter" else halve_size(size)
 
 
 def _tint(settings: UrpBloom) -> Any:
@@ -128,7 +128,7 @@ def _level_count(settings: UrpBloom, size: tuple[int, int]) -> int:
 
 
 def _shares(settings: UrpBloom, count: int) -> Shares:
-    return mixed(0.05 + (0.95 - 0.05) * settings.scatter, count)
+    return mix(0.05 + (0.95 - 0.05) * settings.scatter, count)
 
 
 def _prefilter(rgb: Array, settings: UrpBloom) -> Array:

@@ -20,7 +20,7 @@ _SEEN: Final = 0.1
 
 
 @dataclass(frozen=True)
-class Deviation:
+class LawDeviation:
     """A deviation from a law, and the largest that is allowed; infinity for a mere figure."""
 
     law: str
@@ -33,13 +33,13 @@ class Deviation:
 #: the error of the deviation, where the levels of values matter.
 Measured = tuple[str, float, float, str] | tuple[str, float, float, str, float]
 
-_measured: ContextVar[list[Deviation] | None] = ContextVar("measured", default=None)
+_measured: ContextVar[list[LawDeviation] | None] = ContextVar("measured", default=None)
 
 
 @contextmanager
-def measuring() -> Iterator[list[Deviation]]:
+def measuring() -> Iterator[list[LawDeviation]]:
     """Collect the deviations of all assertions inside, up to the first one that fails."""
-    results: list[Deviation] = []
+    results: list[LawDeviation] = []
     token = _measured.set(results)
     try:
         yield results
@@ -51,7 +51,7 @@ def is_within(law: str, off: float, allowed: float, name: str = "off") -> bool:
     """Return whether a deviation is within its limit; NaN is not, unless the limit is infinity."""
     result = _measured.get()
     if result is not None:
-        result.append(Deviation(law, off, allowed, name))
+        result.append(LawDeviation(law, off, allowed, name))
     return off <= allowed or math.isinf(allowed)
 
 

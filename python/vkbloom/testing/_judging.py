@@ -56,7 +56,7 @@ def judge(
         )
         if name not in expected or name not in actual
         else _judge_image(name, expected[name], actual[name], tolerances)
-        for name in _merged(list(expected), list(actual))
+        for name in _merge(list(expected), list(actual))
     )
 
 
@@ -102,7 +102,7 @@ def _judge_image(
     )
 
 
-def _merged(expected: list[str], actual: list[str]) -> list[str]:
+def _merge(expected: list[str], actual: list[str]) -> list[str]:
     """Return the names of `actual`, with each missing one of `expected` after its predecessor."""
     names = list(actual)
     for index, name in enumerate(expected):

@@ -31,7 +31,7 @@ class LastPixel:
     light: float
     error: float
 
-    def measured(self, energy: float, allowed: float) -> Measured:
+    def measure(self, energy: float, allowed: float) -> Measured:
         """Return what its light lacks of a quarter; `energy`: of a pixel of 1 in the middle."""
         share = self.light / energy
         # Of a linear bloom. A pixel in the middle decides only if this one has too little.

@@ -10,7 +10,7 @@ from typing import Final
 
 import numpy as np
 
-from vkbloom._argument_types import checked
+from vkbloom._argument_types import check_arguments
 from vkbloom._numbers import check_number
 from vkbloom._public import public
 from vkbloom._views import markup
@@ -166,7 +166,7 @@ class LawReport:
             rows.append(
                 (
                     element("span", row.name, title=row.law, **kind),
-                    markup.joined((words, required)),
+                    markup.join((words, required)),
                     *cells(row),
                     element("span", *why, style="text-align:left"),
                 )
@@ -183,7 +183,7 @@ def cells(row: LawRow) -> tuple[str, str]:
 
 
 @public("vkbloom.testing")
-@checked
+@check_arguments
 def report(
     bloom: Bloom,
     *,

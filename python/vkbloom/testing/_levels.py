@@ -43,7 +43,7 @@ class Levels:
         """What the files hold, in words."""
         return "lossy files" if self.is_lossy else f"{self.bits} bits"
 
-    def stored(self, image: NDArray[np.float64]) -> NDArray[np.float64]:
+    def quantize(self, image: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the nearest values that a file holds."""
         most = 2**self.bits - 1
         encoded = encode_srgb(np.clip(image, 0, 1).astype(np.float64))

@@ -9,7 +9,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom._argument_types import checked
+from vkbloom._argument_types import check_arguments
 from vkbloom._numbers import check_index, check_number
 from vkbloom._public import public
 from vkbloom.testing._point_spread import border_share
@@ -90,7 +90,7 @@ class Stability:
 
 
 @public("vkbloom.testing")
-@checked
+@check_arguments
 def stability(
     bloom: Bloom,
     *,
@@ -163,7 +163,7 @@ def stability(
     )
 
 
-def area_sampled(
+def sample_area(
     size: tuple[int, int], centre: tuple[float, float], sides: tuple[float, float]
 ) -> Image:
     """Return the share of each pixel that a rectangle covers."""
@@ -181,11 +181,11 @@ def _wide(texel: int) -> Probe:
 
 def _light(probe: Probe, position: NDArray[np.float64]) -> NDArray[Any]:
     """Return the image of the light in the probe's dtype."""
-    share = area_sampled(probe.size, (position[0], position[1]), (_LIGHT, _LIGHT)) / _LIGHT**2
-    return probe.given(probe.value * np.repeat(share[:, :, np.newaxis], probe.colours, axis=2))
+    share = sample_area(probe.size, (position[0], position[1]), (_LIGHT, _LIGHT)) / _LIGHT**2
+    return probe.as_input(probe.value * np.repeat(share[:, :, np.newaxis], probe.colours, axis=2))
 
 
-def _convolved_peak(spread: Image, image: Image) -> float:
+def _convolution_peak(spread: Image, image: Image) -> float:
     """Return the largest value of the convolution of a plane with a light; 1 if it is black."""
     lit = np.argwhere(image)
     # (Where the peak lies does not matter.)
@@ -206,7 +206,7 @@ def _figures(bloom: Image, probe: Probe, given: NDArray[Any], spread: Image) -> 
         position[0] - from_place[0],
         position[1] - from_place[1],
         float(bloom.max()),
-        _convolved_peak(spread, image),
+        _convolution_peak(spread, image),
         math.sqrt(left) if left >= 0 else math.nan,
         border_share(bloom),
     )

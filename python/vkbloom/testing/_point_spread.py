@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from vkbloom._argument_types import checked
+from vkbloom._argument_types import check_arguments
 from vkbloom._numbers import check_number, check_size
 from vkbloom._public import public
 from vkbloom.testing._deviations import fail
@@ -21,7 +21,7 @@ _AT_THE_BORDER: Final = 1e-3
 
 
 @public("vkbloom.testing")
-@checked
+@check_arguments
 def point_spread(
     bloom: Bloom, probe: Probe = DEFAULT, *, at: tuple[int, int] | None = None
 ) -> Image:
@@ -55,11 +55,11 @@ def point_spread(
            [0.125 , 0.25  , 0.125 ],
            [0.0625, 0.125 , 0.0625]])
     """
-    return measured_spread(bloom, probe, at)[0]
+    return measure_spread(bloom, probe, at)[0]
 
 
 @public("vkbloom.testing")
-@checked
+@check_arguments
 def veiling_glare_index(
     bloom: Bloom,
     *,
@@ -102,7 +102,7 @@ def veiling_glare_index(
     return 100 * float(probe.apply(bloom, field)[0][inside].mean()) / value
 
 
-def measured_spread(
+def measure_spread(
     bloom: Bloom,
     probe: Probe,
     at: tuple[int, int] | None = None,
@@ -118,7 +118,7 @@ def measured_spread(
     if not all(0 <= number < side for number, side in zip(position, probe.size, strict=True)):
         raise ValueError(f"at: {at!r} is not inside an image of {probe.size}")
     first = (position[0] - side // 2, position[1] - side // 2)
-    image = probe.stored(probe.point(first, probe.value, (side, side)))
+    image = probe.quantize(probe.point(first, probe.value, (side, side)))
     lit, lit_error = probe.apply(bloom, image)
     black, dark_error = dark or probe.apply(bloom, probe.flat(0.0))
     value = float(image.max())

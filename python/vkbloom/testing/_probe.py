@@ -59,7 +59,7 @@ def call(bloom: Bloom, given: NDArray[Any], **options: Any) -> NDArray[Any]:
     return bloom(given.copy(), **options)
 
 
-def checked_result(result: object, given: NDArray[Any], colours: int) -> NDArray[Any]:
+def check_result(result: object, given: NDArray[Any], colours: int) -> NDArray[Any]:
     """Return the result of a bloom for an image as (H, W, C), after a check of dtype and shape."""
     if isinstance(result, Mapping):
         raise TypeError(
@@ -77,7 +77,7 @@ def checked_result(result: object, given: NDArray[Any], colours: int) -> NDArray
     return whole
 
 
-def guarded(bloom: Bloom) -> Bloom:
+def guard(bloom: Bloom) -> Bloom:
     """Return a bloom whose errors, and results that are no image of the same size, are BloomErrors.
 
     So a report tells them from its own, such as a probe that a law cannot be tested with.
@@ -88,7 +88,7 @@ def guarded(bloom: Bloom) -> Bloom:
         try:
             result = bloom(given, **options)
             if not options.get("region"):
-                checked_result(result, given, 1)
+                check_result(result, given, 1)
         except Exception as error:
             raise BloomError(f"the bloom raised {type(error).__name__}: {error}") from error
         return result
@@ -205,9 +205,9 @@ class Probe:
         """Return random values of 0 to `highest`, rounded to what the bloom can be given."""
         generator = np.random.default_rng((self.seed, index))
         if self.is_coarse:
-            return self.stored(self._squares(generator) * highest)
+            return self.quantize(self._squares(generator) * highest)
         image = generator.random((self.size[1], self.size[0], self.colours)) * highest
-        return self.stored(image)
+        return self.quantize(image)
 
     def _squares(self, generator: np.random.Generator) -> Image:
         """Return squares of 0 and 1, since a blur of noise has few levels."""
@@ -216,9 +216,9 @@ class Probe:
         squares = generator.integers(0, 2, counts).repeat(side, axis=0).repeat(side, axis=1)
         return np.asarray(squares[: self.size[1], : self.size[0]], np.float64)
 
-    def stored(self, image: Image) -> Image:
+    def quantize(self, image: Image) -> Image:
         """Return the values that the bloom is given for an image, in real units."""
-        return self._real(self._stored(image))
+        return self._real(self._store(image))
 
     def apply(
         self, bloom: Bloom, image: Image, *, exempt: tuple[int, int] | None = None
@@ -229,12 +229,12 @@ class Probe:
         """
         if not callable(bloom):
             raise TypeError(f"bloom: {bloom!r} is not callable")
-        given = self.given(image)
+        given = self.as_input(image)
         return self.values(call(bloom, given), given, exempt=exempt)
 
-    def given(self, image: Image) -> NDArray[Any]:
+    def as_input(self, image: Image) -> NDArray[Any]:
         """Return an image in the probe's dtype and number of channels, as input of a bloom."""
-        stored = self._stored(image)
+        stored = self._store(image)
         if self.levels is not None and self.levels.is_lossy and np.ptp(stored, axis=(0, 1)).any():
             raise ValueError(
                 "cannot be tested in lossy files, which change every image but a flat one; use "
@@ -249,8 +249,8 @@ class Probe:
     def values(
         self, result: object, given: NDArray[Any], *, exempt: tuple[int, int] | None = None
     ) -> tuple[Image, Error]:
-        """Check the result of a bloom for the input `given`, and return the same as `apply`."""
-        whole = checked_result(result, given, self.colours)
+        """Check the result of a bloom for the input `as_input`, and return the same as `apply`."""
+        whole = check_result(result, given, self.colours)
         real = self._real(whole[:, :, : self.colours])
         if exempt is not None:
             real[exempt[1], exempt[0]] = 0
@@ -272,9 +272,9 @@ class Probe:
         whole = given[:, :, np.newaxis] if given.ndim == 2 else given
         return self._real(whole[:, :, : self.colours])
 
-    def _stored(self, image: Image) -> NDArray[Any]:
+    def _store(self, image: Image) -> NDArray[Any]:
         if self.levels is not None:
-            image = self.levels.stored(image)
+            image = self.levels.quantize(image)
         if self.dtype.kind == "u":
             largest = np.iinfo(self.dtype).max
             rounded: NDArray[Any] = np.rint(np.clip(image, 0, 1) * largest).astype(self.dtype)

@@ -16,7 +16,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom._argument_types import checked
+from vkbloom._argument_types import check_arguments
 from vkbloom._io.array_files import read, write
 from vkbloom._numbers import check_number
 from vkbloom._public import public
@@ -40,7 +40,7 @@ _LAST_WORDS: Final = 300  # characters of a failed program's output that an erro
 
 
 @public("vkbloom.testing")
-@checked
+@check_arguments
 def command(argv: Sequence[str], *, suffix: str = ".exr", timeout: float = 60.0) -> Bloom:
     """Make a bloom for the laws out of a program.
 
@@ -70,10 +70,10 @@ def command(argv: Sequence[str], *, suffix: str = ".exr", timeout: float = 60.0)
     >>> bloom = testing.command(["cp", "{input}", "{output}"])
     >>> testing.report(bloom, size=(32, 32)).assert_held("superposition", "gain", "symmetric")
     """
-    return Program(argv, suffix, timeout)
+    return CommandBloom(argv, suffix, timeout)
 
 
-class Program:
+class CommandBloom:
     """The callable of `command`.
 
     `bits` is 8 or 16 if its files hold such integers, by the suffix; once it has run, by what it
@@ -153,7 +153,7 @@ class Program:
         if running.returncode:
             last = _last_words(said.decode(errors="replace"))
             raise ChildProcessError(
-                f"{self._name}: it {_ended(running.returncode)}; it said: {last or 'nothing'}"
+                f"{self._name}: it {_end_text(running.returncode)}; it said: {last or 'nothing'}"
             )
 
     def _read(self, target: Path) -> NDArray[Any]:
@@ -181,7 +181,7 @@ def levels_of(bloom: Bloom, size: tuple[int, int]) -> Levels | None:
 
     A bloom of another kind may declare it, too, as its attribute `levels`.
     """
-    if isinstance(bloom, Program):
+    if isinstance(bloom, CommandBloom):
         bloom(np.zeros((size[1], size[0], 3), np.float32))
     levels = getattr(bloom, "levels", None)
     return levels if isinstance(levels, Levels) else None
@@ -197,7 +197,7 @@ def _last_words(said: str) -> str:
     return " ".join(said.split())[-_LAST_WORDS:]
 
 
-def _ended(status: int) -> str:
+def _end_text(status: int) -> str:
     if status > 0:
         return f"failed with exit status {status}"
     try:

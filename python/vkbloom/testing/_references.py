@@ -50,7 +50,7 @@ class Origin:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Reference:
+class StoredReference:
     """Images, of a reference or of a check, and their origin.
 
     `images`: Images by framebuffer, in the order of the data flow.
@@ -73,20 +73,20 @@ class ReferenceFolder:
         """Return the file that lists the images of a name."""
         return self.path / f"{name}.json"
 
-    def load(self, name: str) -> Reference | None:
+    def load(self, name: str) -> StoredReference | None:
         """Read the reference of a name; None if there is none."""
-        listed, file = self._listed(name), self.file(name)
+        listed, file = self._read_list(name), self.file(name)
         if listed is None:
             return None
         images = {entry["name"]: self._image(entry, file) for entry in listed["framebuffers"]}
-        return Reference(images=images, origin=Origin(**listed["origin"]))
+        return StoredReference(images=images, origin=Origin(**listed["origin"]))
 
     def write(self, name: str, images: Mapping[str, NDArray[Any]], origin: Origin) -> None:
         """Write a reference, and remove files of the one before."""
         check_name(name)
         for framebuffer, image in images.items():
             _check_image(framebuffer, image)
-        before = (self._listed(name) or {"framebuffers": []})["framebuffers"]
+        before = (self._read_list(name) or {"framebuffers": []})["framebuffers"]
         self.path.mkdir(parents=True, exist_ok=True)
         entries = [
             self._write_image(name, framebuffer, image) for framebuffer, image in images.items()
@@ -96,7 +96,7 @@ class ReferenceFolder:
         for file in {entry["file"] for entry in before} - {entry["file"] for entry in entries}:
             (self.path / file).unlink(missing_ok=True)
 
-    def _listed(self, name: str) -> dict[str, Any] | None:
+    def _read_list(self, name: str) -> dict[str, Any] | None:
         file = self.file(name)
         try:
             stored = file.read_bytes()

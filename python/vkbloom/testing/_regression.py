@@ -17,7 +17,7 @@ from vkbloom._renderer.frames import Frames
 from vkbloom._version import installed_version
 from vkbloom._views.tolerances import Tolerances
 from vkbloom.testing._judging import Verdict, first_failure, judge
-from vkbloom.testing._references import Origin, Reference, ReferenceFolder, check_name
+from vkbloom.testing._references import Origin, ReferenceFolder, StoredReference, check_name
 
 __tracebackhide__ = True
 
@@ -106,8 +106,8 @@ class FrameRegression:
             decide.
         """
         tolerances = Tolerances(**limits)
-        name = self._chosen_name(name)
-        given = Reference(images=_images("frames", frames), origin=_origin(frames, info))
+        name = self._choose_name(name)
+        given = StoredReference(images=_images("frames", frames), origin=_origin(frames, info))
         file = self._folder.file(name)
         reference = self._folder.load(name)
         if reference is None and not self._update:
@@ -133,7 +133,11 @@ class FrameRegression:
         self._written.append(file)
 
     def _check_unused(
-        self, name: str, given: Reference, reference: Reference, verdicts: tuple[Verdict, ...]
+        self,
+        name: str,
+        given: StoredReference,
+        reference: StoredReference,
+        verdicts: tuple[Verdict, ...],
     ) -> None:
         """Raise AssertionError if another check of this run has used or written a reference.
 
@@ -176,14 +180,14 @@ class FrameRegression:
         tolerances = Tolerances(**limits)
         if name is not None:
             check_name(name)
-        given = Reference(images=_images("actual", actual), origin=_origin(actual, info))
-        reference = Reference(
+        given = StoredReference(images=_images("actual", actual), origin=_origin(actual, info))
+        reference = StoredReference(
             images=_images("expected", expected), origin=_origin(expected, expected_info)
         )
         verdicts = judge(reference.images, given.images, tolerances)
         self._conclude(name or self._name, given, reference, verdicts)
 
-    def _chosen_name(self, name: str | None) -> str:
+    def _choose_name(self, name: str | None) -> str:
         if name is not None:
             check_name(name)
             return name
@@ -195,7 +199,11 @@ class FrameRegression:
         return self._name
 
     def _conclude(
-        self, name: str, given: Reference, reference: Reference, verdicts: tuple[Verdict, ...]
+        self,
+        name: str,
+        given: StoredReference,
+        reference: StoredReference,
+        verdicts: tuple[Verdict, ...],
     ) -> None:
         """Raise AssertionError if a framebuffer failed."""
         if first_failure(verdicts) is None:
@@ -207,7 +215,7 @@ class FrameRegression:
             message += f"\n  the images are not saved: {error}"
         raise AssertionError(message)
 
-    def _write_images(self, name: str, given: Reference, reference: Reference) -> None:
+    def _write_images(self, name: str, given: StoredReference, reference: StoredReference) -> None:
         if self._save is None:
             return
         for kind, made in (("expected", reference), ("actual", given)):
@@ -253,7 +261,7 @@ def _origin(frames: object, info: Mapping[str, Any] | None) -> Origin:
 
 
 def _message(
-    name: str, given: Reference, verdicts: tuple[Verdict, ...], reference: Reference
+    name: str, given: StoredReference, verdicts: tuple[Verdict, ...], reference: StoredReference
 ) -> str:
     before: list[str] = []
     for verdict in verdicts:

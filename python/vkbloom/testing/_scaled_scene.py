@@ -11,10 +11,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom._argument_types import checked
+from vkbloom._argument_types import check_arguments
 from vkbloom._numbers import check_number
 from vkbloom._public import public
-from vkbloom.testing._moving_light import area_sampled, moments
+from vkbloom.testing._moving_light import moments, sample_area
 from vkbloom.testing._probe import Bloom, Image, Probe
 
 __tracebackhide__ = True
@@ -55,7 +55,7 @@ class ResolutionResponse:
 
 
 @public("vkbloom.testing")
-@checked
+@check_arguments
 def resolution_response(
     bloom: Bloom,
     scales: Sequence[float] = _SCALES,
@@ -89,7 +89,7 @@ def resolution_response(
     for width, height in sizes:
         sized = dataclasses.replace(probe, size=(width, height))
         side = light * height
-        share = area_sampled(sized.size, ((width - 1) / 2, (height - 1) / 2), (side, side))
+        share = sample_area(sized.size, ((width - 1) / 2, (height - 1) / 2), (side, side))
         scene = probe.value * np.repeat(share[:, :, np.newaxis], sized.colours, axis=2)
         result, error = sized.apply(bloom, scene)
         lit = result[:, :, 0] - sized.apply(bloom, sized.flat(0.0))[0][:, :, 0]
@@ -119,7 +119,7 @@ def _sizes(scales: Sequence[float], size: tuple[int, int]) -> tuple[tuple[int, i
         width, height = (float(side * scale) for side in size)
         if not (width.is_integer() and height.is_integer() and min(width, height) >= 1):
             raise ValueError(
-                f"scales: {scale!r} makes {width:g} x {height:g} of an image of {_shown(size)}, "
+                f"scales: {scale!r} makes {width:g} x {height:g} of an image of {_format(size)}, "
                 "not integers; choose a scale or a size with integer sides"
             )
         results.append((int(width), int(height)))
@@ -143,5 +143,5 @@ def _radii(plane: Image, shares: Sequence[float]) -> list[float]:
     return [float((np.argmax(held >= share) + 1) / _RINGS / fine) for share in shares]
 
 
-def _shown(size: tuple[int, int]) -> str:
+def _format(size: tuple[int, int]) -> str:
     return f"{size[0]} x {size[1]}"

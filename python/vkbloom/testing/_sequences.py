@@ -11,7 +11,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom._argument_types import checked
+from vkbloom._argument_types import check_arguments
 from vkbloom._arrays import plain_array
 from vkbloom._extras import import_extra
 from vkbloom._formats import LUMINANCE
@@ -97,7 +97,7 @@ class Flicker:
 
 
 @public("vkbloom.testing")
-@checked
+@check_arguments
 def flash(frames: Iterable[NDArray[Any]], fps: float, *, degrees: float) -> Flash:
     """Judge a sequence by the general and the red flash thresholds of WCAG 2.2.
 
@@ -230,7 +230,7 @@ def _lights(frames: Iterable[NDArray[Any]], degrees: float) -> Iterator[NDArray[
         if shape not in (None, array.shape):
             raise ValueError(f"frames: shape {array.shape} after {shape}; all must be the same")
         shape = array.shape
-        yield _reduced(_linear(array[..., :3]), degrees)
+        yield _reduce(_linear(array[..., :3]), degrees)
     if count < 2:
         raise ValueError(f"frames: {count} given; a sequence has at least 2")
 
@@ -241,7 +241,7 @@ def _linear(colours: NDArray[Any]) -> NDArray[np.float64]:
     return decode_srgb(colours / np.iinfo(colours.dtype).max)
 
 
-def _reduced(light: NDArray[np.float64], degrees: float) -> NDArray[np.float64]:
+def _reduce(light: NDArray[np.float64], degrees: float) -> NDArray[np.float64]:
     """Return the means of square boxes, so that a field has about `_FIELD_PIXELS` boxes."""
     height, width, _ = light.shape
     side = max(1, int(width * _FIELD / degrees / _FIELD_PIXELS))
@@ -253,7 +253,7 @@ def _reduced(light: NDArray[np.float64], degrees: float) -> NDArray[np.float64]:
 
 
 @public("vkbloom.testing")
-@checked
+@check_arguments
 def flicker(frames: Iterable[NDArray[Any]], fps: float) -> Flicker:
     """Measure how visible the flicker of a sequence is.
 

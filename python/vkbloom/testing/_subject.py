@@ -12,8 +12,8 @@ import numpy as np
 from vkbloom._locks import cached_property
 from vkbloom.testing._last_pixel import LastPixel, last_pixel
 from vkbloom.testing._moving_light import Stability, stability
-from vkbloom.testing._point_spread import measured_spread, point_spread, sum_error
-from vkbloom.testing._probe import Bloom, Error, Image, Probe, guarded
+from vkbloom.testing._point_spread import measure_spread, point_spread, sum_error
+from vkbloom.testing._probe import Bloom, Error, Image, Probe, guard
 from vkbloom.testing._scaled_scene import ResolutionResponse, resolution_response
 
 # A threshold of 1, the usual one, lets nothing of an image of 1 through.
@@ -56,9 +56,9 @@ class Subject:
 
     def __post_init__(self) -> None:
         """Tell errors of the blooms from those of the report."""
-        self.bloom = guarded(self.bloom)
+        self.bloom = guard(self.bloom)
         if self.picture is not None:
-            self.picture = guarded(self.picture)
+            self.picture = guard(self.picture)
 
     @cached_property
     def measured_gain(self) -> float:
@@ -119,7 +119,7 @@ class Subject:
     @cached_property
     def pixel(self) -> tuple[Image, Error]:
         """The point spread of the probe's brightest value, and the error of its values."""
-        return measured_spread(self.bloom, self.probe, dark=self.dark)
+        return measure_spread(self.bloom, self.probe, dark=self.dark)
 
     @cached_property
     def light(self) -> tuple[Image, Error]:
@@ -127,7 +127,7 @@ class Subject:
         side = self.probe.light_side
         if side == 1:
             return self.pixel
-        return measured_spread(self.bloom, self.probe, dark=self.dark, side=side)
+        return measure_spread(self.bloom, self.probe, dark=self.dark, side=side)
 
     @property
     def energy(self) -> tuple[float, tuple[float, float]]:
@@ -146,7 +146,7 @@ class Subject:
         lamp = self.lamp
         if lamp is self.probe:
             return self.pixel[0]
-        return measured_spread(self.bloom, lamp, dark=self.dark)[0]
+        return measure_spread(self.bloom, lamp, dark=self.dark)[0]
 
     @cached_property
     def last_pixel(self) -> LastPixel:
@@ -173,19 +173,19 @@ class Subject:
 def fitting_probe(bloom: Bloom, probe: Probe) -> Probe:
     """Return the probe with a value whose bloom is neither black nor clipped."""
     if probe.levels is not None:
-        return _unclipped(bloom, probe)
+        return _avoid_clipping(bloom, probe)
     if probe.dtype.kind == "u" or probe.apply(bloom, probe.noise(0, probe.value))[0].any():
         return probe
     return dataclasses.replace(probe, value=_BRIGHT * probe.value)
 
 
-def _unclipped(bloom: Bloom, probe: Probe) -> Probe:
+def _avoid_clipping(bloom: Bloom, probe: Probe) -> Probe:
     """Return the probe with a value up to a half whose flat image has a bloom below 1.
 
     With 1, if the bloom of a half is black.
     """
     for value in _LEVELS:
-        image = probe.stored(probe.flat(value))
+        image = probe.quantize(probe.flat(value))
         result, error = probe.apply(bloom, image)
         if not (np.abs(result) > error).any():
             return dataclasses.replace(probe, value=1.0 if value == _LEVELS[0] else 2 * value)

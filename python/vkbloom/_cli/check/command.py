@@ -25,22 +25,22 @@ from vkbloom import testing
 from vkbloom._cli.check import comparing, measuring, showing
 from vkbloom._cli.fields import SIZE, Command
 from vkbloom._cli.numbered_files import NumberedFile, as_frames, gap_note, gaps
-from vkbloom._cli.program import adapter_option, as_wrong_use, given
-from vkbloom._cli.sequences import expanded
+from vkbloom._cli.program import adapter_option, as_wrong_use, is_given
+from vkbloom._cli.sequences import expand
 from vkbloom._cli.settings_options import settings_options
 from vkbloom._cli.targets import check_target
 from vkbloom._cli.terminal import is_quiet, note, say
 from vkbloom._custom.method import CustomMethod, identifier_of, load_method
 from vkbloom._io import safe_writing
 from vkbloom._io.array_files import read
-from vkbloom._renderer.interruptible import opened_renderer
+from vkbloom._renderer.interruptible import open_renderer
 from vkbloom._renderer.renderer import Renderer
 from vkbloom._settings.settings import Settings, presets
 from vkbloom._spelling import did_you_mean
 from vkbloom._views.plain_values import plain
 from vkbloom.testing._law_report import LawReport, law_report
 from vkbloom.testing._laws.table import find_law, merge_limits
-from vkbloom.testing._programs import Program
+from vkbloom.testing._programs import CommandBloom
 from vkbloom.testing._subject import Subject
 
 # Runs whose times are measured; of two blooms, in turns.
@@ -149,13 +149,13 @@ def check(
         if target is not None:
             check_target(target)
     if sequence is not None:
-        if file or program or against or given("preset") or given("method"):
+        if file or program or against or is_given("preset") or is_given("method"):
             raise click.UsageError("--sequence judges files alone, without a bloom")
         return judge(sequence, how["fps"], how["degrees"], as_json=as_json)
     params = click.get_current_context().params
     _check_choice(params)
     console = Console(stderr=True, quiet=is_quiet())
-    with opened_renderer(adapter) as renderer, console.status("") as bar:
+    with open_renderer(adapter) as renderer, console.status("") as bar:
         if reference is not None:
             _add_reference(settings, reference)
         sources = {program or params["preset"] or settings.method: program or settings}
@@ -163,8 +163,8 @@ def check(
             sources[against if against not in sources else f"{against} (against)"] = _other(
                 against, settings
             )
-        opened = [_opened(renderer, *source, how, bar) for source in sources.items()]
-        blooms = _measured(opened, how, bar)
+        opened = [_open_bloom(renderer, *source, how, bar) for source in sources.items()]
+        blooms = _measure(opened, how, bar)
         (values, report, subject), *others = blooms
         name = values["name"]
         if page is not None:
@@ -177,7 +177,7 @@ def check(
     else:
         before = others[0][0]
         changes = comparing.changes(before, values)
-        failed = comparing.newly_broken(changes, how["require"])
+        failed = comparing.find_newly_broken(changes, how["require"])
         names = (before["name"], name)
         text = comparing.as_text(changes, names)
         table = comparing.as_markdown(changes, names, values["adapter"])
@@ -201,7 +201,7 @@ class _Opened:
     subject: Subject
     timer: Callable[[], Mapping[str, float]]
     device: str
-    program: Program | None = None
+    program: CommandBloom | None = None
     settings: Settings | None = None
     law: str = "first run"
 
@@ -216,7 +216,7 @@ class _Opened:
         bar.update(f"{self.name}: {self.law}{runs}")
 
 
-def _opened(
+def _open_bloom(
     renderer: Renderer,
     name: str,
     source: str | Settings,
@@ -233,7 +233,7 @@ def _opened(
 
         return _Opened(name, subject, passes, renderer.info.summary, settings=source)
     with as_wrong_use():
-        run = Program(shlex.split(source), how["suffix"], how["timeout"])
+        run = CommandBloom(shlex.split(source), how["suffix"], how["timeout"])
     with _notes():
         subject = measuring.of_program(
             run, how["measured"], how["gain"], less_input=how["less_input"]
@@ -245,7 +245,7 @@ def _opened(
     return opened
 
 
-def _measured(
+def _measure(
     opened: list[_Opened], how: Mapping[str, Any], bar: Status
 ) -> list[tuple[dict[str, Any], LawReport, Subject]]:
     """Return what is measured of blooms, as the options say."""
@@ -301,7 +301,7 @@ def _check_choice(params: Mapping[str, Any]) -> None:
         raise click.UsageError(f"{params['file']}: there is no such file")
     if params["against"] is not None and params["page"] is not None:
         raise click.UsageError("--html shows one bloom; --against writes --markdown")
-    chosen = [name for name in ("preset", "method") if given(name)]
+    chosen = [name for name in ("preset", "method") if is_given(name)]
     if program is not None and chosen:
         raise click.UsageError(f"--command cannot be combined with --{chosen[0]} or FILE")
     if program is not None and params["reference"] is not None:
@@ -335,8 +335,8 @@ def _add_reference(settings: Settings, where: str) -> None:
 
 def judge(pattern: str, fps: float, degrees: float, *, as_json: bool) -> int:
     """Print flashes and flicker of a sequence of files; return 1 if it fails WCAG 2.2, else 0."""
-    files = as_frames(expanded(pattern))
-    shown = _frames_shown(pattern, files)
+    files = as_frames(expand(pattern))
+    shown = _count_frames(pattern, files)
 
     def frames() -> Iterator[NDArray[Any]]:
         for (file, _), count in zip(files, shown, strict=True):
@@ -372,7 +372,7 @@ def judge(pattern: str, fps: float, degrees: float, *, as_json: bool) -> int:
     return int(flashes.general or flashes.red)
 
 
-def _frames_shown(pattern: str, files: list[NumberedFile]) -> list[int]:
+def _count_frames(pattern: str, files: list[NumberedFile]) -> list[int]:
     """Return for how many frames each file is shown: until the number of the next one."""
     numbers = [number for _, number in files if number is not None]
     if len(numbers) < len(files):

@@ -40,7 +40,7 @@ def changes(before: Mapping[str, Any], after: Mapping[str, Any]) -> tuple[Change
     return (*_laws(before, after), *_figures(before, after), *_times(before, after))
 
 
-def newly_broken(changes: Sequence[Change], required: Sequence[str]) -> list[str]:
+def find_newly_broken(changes: Sequence[Change], required: Sequence[str]) -> list[str]:
     """Return the required laws that the second bloom breaks and the first did not."""
     broken = [each.name for each in changes if each.verdict == "broken"]
     return [name for name in broken if name in required]
@@ -57,7 +57,9 @@ def _laws(before: Mapping[str, Any], after: Mapping[str, Any]) -> Iterator[Chang
             verdict = "broken" if new["held"] is False else "changed"
             if old["held"] is False and new["held"]:
                 verdict = "mended"
-        yield Change("law", name, was, now, (_held(old), _held(new)), verdict)
+        yield Change(
+            "law", name, was, now, (_describe_verdict(old), _describe_verdict(new)), verdict
+        )
 
 
 def _share(law: Mapping[str, Any]) -> float | None:
@@ -65,7 +67,7 @@ def _share(law: Mapping[str, Any]) -> float | None:
     return None if off is None or limit is None else off / max(limit, 1e-300)
 
 
-def _held(law: Mapping[str, Any]) -> str:
+def _describe_verdict(law: Mapping[str, Any]) -> str:
     words = {True: "yes", False: "**no**", None: "not tested"}[law["held"]]
     return words if law["held"] is not False or law["off"] is None else f"{words}, {law['off']:.3g}"
 

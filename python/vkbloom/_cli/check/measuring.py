@@ -23,7 +23,7 @@ from vkbloom._views.plain_values import plain
 from vkbloom.testing._law_report import LawReport
 from vkbloom.testing._point_spread import border_share, veiling_glare_index
 from vkbloom.testing._probe import Bloom, Probe
-from vkbloom.testing._programs import Program, levels_of
+from vkbloom.testing._programs import CommandBloom, levels_of
 from vkbloom.testing._subject import Subject, fitting_probe
 
 Array = NDArray[np.float64]
@@ -107,7 +107,7 @@ def exact(settings: Settings) -> Settings:
     return plain if plain.format is not None else plain.replace(format="rgba32float")
 
 
-def shown(renderer: Renderer, settings: Settings, framebuffer: str) -> Bloom:
+def bloom_of(renderer: Renderer, settings: Settings, framebuffer: str) -> Bloom:
     """Return the colours of a framebuffer as a function of the image."""
 
     def bloom(image: NDArray[Any]) -> NDArray[Any]:
@@ -126,11 +126,11 @@ def of_settings(
     gain that a flat image gets in its middle.
     """
     used = exact(settings)
-    bloom = shown(renderer, used, "bloom")
+    bloom = bloom_of(renderer, used, "bloom")
     subject = Subject(
         bloom=bloom,
         probe=fitting_probe(bloom, Probe(size=size)),
-        picture=shown(renderer, used, "final"),
+        picture=bloom_of(renderer, used, "final"),
         intensity=used.intensity if used.composite == "add" else None,
         gain=gain,
         differences=None if _lacks_reference(used) else lambda: differences(renderer, used),
@@ -142,7 +142,7 @@ def of_settings(
 
 
 def of_program(
-    program: Program, size: tuple[int, int], gain: float | None, *, less_input: bool
+    program: CommandBloom, size: tuple[int, int], gain: float | None, *, less_input: bool
 ) -> Subject:
     """Return the bloom of a program, which is run once to see what it writes."""
     levels = levels_of(program, size)

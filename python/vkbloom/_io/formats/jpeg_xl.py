@@ -42,7 +42,7 @@ _NAME: Final[_Choices] = ((0, 0), (4, 0), (5, 16), (10, 48))
 _MOSAIC_CHANNEL: Final[_Choices] = ((0, 1), (2, 0), (4, 3), (8, 19))
 
 
-class Header(NamedTuple):
+class SizeHeader(NamedTuple):
     """What the header says.
 
     - `is_multiplied`: Whether colours are multiplied by alpha.
@@ -107,17 +107,17 @@ def _with_note(pixels: NDArray[Any]) -> Corrected:
     return Corrected(pixels, (said,))
 
 
-def read_header(stream: BinaryIO) -> Header:
+def read_header(stream: BinaryIO) -> SizeHeader:
     """Return what the header of a file says; a header that is cut off says nothing."""
     start = _codestream_at(stream)
     if start is None:
-        return Header()
+        return SizeHeader()
     stream.seek(start)
     content = stream.read(_MAX_HEADER)
     try:
         return _header(_Bits(content[2:]), 8 * (start + 2))
     except EOFError:
-        return Header()
+        return SizeHeader()
 
 
 def _codestream_at(stream: BinaryIO) -> int | None:
@@ -144,12 +144,12 @@ def _codestream_at(stream: BinaryIO) -> int | None:
     return None
 
 
-def _header(bits: _Bits, start: int) -> Header:
+def _header(bits: _Bits, start: int) -> SizeHeader:
     """Return the header; `start`: position in bits of its first bit in the file."""
     _skip_size(bits)
     if bits.take(1):
         # All values are the default ones.
-        return Header()
+        return SizeHeader()
     if bits.take(1):
         bits.take(3)
         if bits.take(1):
@@ -166,7 +166,7 @@ def _header(bits: _Bits, start: int) -> Header:
     alphas = [_is_multiplied_alpha(bits) for _ in range(bits.number(_CHANNELS))]
     is_xyb = bool(bits.take(1))
     has_profile = bool(not bits.take(1) and bits.take(1))
-    return Header(
+    return SizeHeader(
         is_multiplied=next((alpha for alpha in alphas if alpha is not None), False),
         is_xyb=is_xyb,
         has_profile=has_profile,
@@ -236,7 +236,7 @@ def readable_content(path: str) -> bytes | None:
     return _of_16_bits(content, header).ljust(_MIN_BYTES, b"\0")
 
 
-def _of_16_bits(content: bytes, header: Header) -> bytes:
+def _of_16_bits(content: bytes, header: SizeHeader) -> bytes:
     """Return a file whose header says 12 or 16 bits, if it would give coarse light."""
     if not header.has_coarse_light or header.bits_at is None:
         return content

@@ -24,7 +24,7 @@ _LIGHT: Final = 3
 _PERIOD: Final = 16
 # The largest share of the light in the outermost pixels with which the bloom of a light in the
 # middle counts as complete.
-_OUTERMOST: Final = 0.01
+_MAX_OUTER_SHARE: Final = 0.01
 
 
 @dataclasses.dataclass(frozen=True)
@@ -76,19 +76,19 @@ def _test_border(subject: Subject, limits: Limits) -> None:
     law = "a light at the border has the bloom of a light far from it, cut off by the frame"
     _check_stale(bloom, probe, dark, limits["stale"])
     lights = _Lights(bloom, probe, dark)
-    share = border_share(_expected(lights, probe.centre)[0])
-    complete = share <= _OUTERMOST
+    share = border_share(_expect(lights, probe.centre)[0])
+    complete = share <= _MAX_OUTER_SHARE
     findings = Findings(law, probe)
     if complete:
         findings.add(_near_the_border(lights, limits))
     findings.add(_at_the_border(lights, limits, complete=complete))
     findings.add([_black(dark, probe, limits["dark"])])
-    inner = _expected(lights, probe.centre)[1] / lights.side**2
+    inner = _expect(lights, probe.centre)[1] / lights.side**2
     findings.add(_last_column(lights, inner, limits["column"]))
     last = subject.last_pixel
-    findings.add([last.measured(inner / probe.colours / probe.value, limits["last"])])
+    findings.add([last.measure(inner / probe.colours / probe.value, limits["last"])])
     if not findings.broken:
-        check_inside(share, probe.size, _OUTERMOST)
+        check_inside(share, probe.size, _MAX_OUTER_SHARE)
     findings.conclude()
 
 
@@ -105,7 +105,7 @@ def _near_the_border(lights: _Lights, limits: Limits) -> Iterator[Measured]:
     """Measure how lights 1.5 standard deviations from an edge differ from one in the middle."""
     for name, at in _near(lights).items():
         spread, error = lights.spread(at)
-        expected, energy = _expected(lights, at)
+        expected, energy = _expect(lights, at)
         excess = np.abs(spread - expected) / energy
         excess[excess <= (error + _expected_error(lights, at)) / energy] = 0
         profile = excess.sum(axis=(1 - int(name == "left"), 2))
@@ -124,7 +124,7 @@ def _at_the_border(lights: _Lights, limits: Limits, *, complete: bool) -> Iterat
     """Measure lights in the outermost pixels."""
     x, y = lights.probe.centre
     for name, at in {"left": (0, y), "top": (x, 0), "corner": (0, 0)}.items():
-        expected, energy = _expected(lights, at)
+        expected, energy = _expect(lights, at)
         light, error = lights.energy(at)
         share, error = light / energy, 2 * error / energy
         inside = float(expected.sum()) / energy
@@ -171,7 +171,7 @@ def _check_stale(bloom: Bloom, probe: Probe, dark: Image, allowed: float) -> Non
 def _near(lights: _Lights) -> dict[str, tuple[int, int]]:
     """Return places 1.5 standard deviations from an edge, at most a quarter of a side."""
     probe = lights.probe
-    spread, energy = _expected(lights, probe.centre)
+    spread, energy = _expect(lights, probe.centre)
     near: list[int] = []
     for axis, side in enumerate(probe.size):
         profile = np.abs(spread.mean(axis=2)).sum(axis=axis)
@@ -181,21 +181,21 @@ def _near(lights: _Lights) -> dict[str, tuple[int, int]]:
     return {"left": (near[0], probe.centre[1]), "top": (probe.centre[0], near[1])}
 
 
-def _expected(lights: _Lights, at: tuple[int, int]) -> tuple[Image, float]:
+def _expect(lights: _Lights, at: tuple[int, int]) -> tuple[Image, float]:
     """Return the bloom of a light near the middle, moved to another place, and its energy."""
     start = _start(lights, at)
     spread = lights.spread(start)[0]
     energy = float(spread.sum())
     if not energy > 0:
         fail("the bloom of a lit pixel is not black", f"its energy is {energy:.3g}")
-    return _moved(spread, start, at), energy
+    return _move(spread, start, at), energy
 
 
 def _expected_error(lights: _Lights, at: tuple[int, int]) -> Error:
-    """Return the errors of the values of `_expected`."""
+    """Return the errors of the values of `_expect`."""
     start = _start(lights, at)
     error = lights.spread(start)[1]
-    return error if np.ndim(error) == 0 else _moved(np.asarray(error), start, at)
+    return error if np.ndim(error) == 0 else _move(np.asarray(error), start, at)
 
 
 def _start(lights: _Lights, at: tuple[int, int]) -> tuple[int, int]:
@@ -210,7 +210,7 @@ def _start(lights: _Lights, at: tuple[int, int]) -> tuple[int, int]:
     return x, y
 
 
-def _moved(spread: Image, start: tuple[int, int], to: tuple[int, int]) -> Image:
+def _move(spread: Image, start: tuple[int, int], to: tuple[int, int]) -> Image:
     """Return an image moved by whole pixels, with black where it has none."""
     x, y = np.subtract(to, start)
     moved = np.roll(spread, (y, x), (0, 1))

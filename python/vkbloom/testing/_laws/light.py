@@ -63,7 +63,7 @@ def _check_coloured(probe: Probe) -> None:
 def _test_colour(subject: Subject, limits: Limits) -> None:
     probe = subject.probe
     _check_coloured(probe)
-    image = probe.stored(probe.flat(probe.value) * np.array(_COLOUR))
+    image = probe.quantize(probe.flat(probe.value) * np.array(_COLOUR))
     result, error = probe.apply(subject.bloom, image)
     expected = image * (result.mean() / image.mean())
     # The mean has an error of its own, where values have few levels.

@@ -41,8 +41,11 @@ def _mixture(probe: Probe) -> tuple[Image, Image, tuple[float, float]]:
     """Return two images and their shares in a mixture, all of which the bloom can be given."""
     if probe.is_coarse:
         # Where one is lit, the other is black, so that the mixture has no values but these.
-        lit, value = probe.noise(0, probe.value), float(probe.stored(probe.flat(probe.value)).max())
-        shares = [float(probe.stored(probe.flat(value * x)).max()) / value for x in (0.5, 0.25)]
+        lit, value = (
+            probe.noise(0, probe.value),
+            float(probe.quantize(probe.flat(probe.value)).max()),
+        )
+        shares = [float(probe.quantize(probe.flat(value * x)).max()) / value for x in (0.5, 0.25)]
         return lit, value - lit, (shares[0], shares[1])
     # Otherwise the dtype would round halves and quarters of the values in the test images.
     a, b = (_divisible_by_four(probe, probe.noise(index, probe.value)) for index in (0, 1))
@@ -82,7 +85,7 @@ def _test_gain(subject: Subject, limits: Limits) -> None:
     accuracy = subject.gain_error if subject.gain is None else 0.0
     probe = subject.probe
     for part, seen in ((1.0, _SEEN_GAIN), (0.5, math.inf), (0.25, math.inf)):
-        image = probe.stored(_divisible_by_four(probe, probe.flat(probe.value)) * part)
+        image = probe.quantize(_divisible_by_four(probe, probe.flat(probe.value)) * part)
         result, error = probe.apply(subject.bloom, image)
         law = f"B(v) = {gain:.6g} v, for a flat image of v = {image.flat[0]:.6g}"
         error = error + accuracy * image
@@ -94,14 +97,14 @@ def _test_gain(subject: Subject, limits: Limits) -> None:
 def _compare_mean_gain(subject: Subject, promised: float, limit: float) -> None:
     """Compare the mean gain of many values, since truncated half floats lose light in each pass."""
     probe = subject.probe
-    flat = probe.given(probe.flat(probe.value))
+    flat = probe.as_input(probe.flat(probe.value))
     if not promised or np.asarray(call(subject.bloom, flat)).dtype != np.float16:
         return
     shares = np.random.default_rng(probe.seed).uniform(0.5, 1.0, _VALUES)
     gains = []
     x, y = probe.centre
     for value in shares * probe.value:
-        given = probe.given(probe.flat(value))
+        given = probe.as_input(probe.flat(value))
         result, _ = probe.values(call(subject.bloom, given), given)
         gains.append(float(result[y, x].mean()) / float(probe.values_of(given)[y, x].mean()))
     off = float(np.mean(gains)) / promised - 1

@@ -104,8 +104,8 @@ def _test_resolution(subject: Subject, limits: Limits) -> None:
         change = float((values[high] - values[low]) / values.mean())
         law = f"{what} is the same share of {share} at all sizes"
         text = (
-            f"{what} is {values[low]:.4g} of {share} at {_shown(result.sizes[low])} and "
-            f"{values[high]:.4g} at {_shown(result.sizes[high])}: off by {change:.3g} of the "
+            f"{what} is {values[low]:.4g} of {share} at {_format(result.sizes[low])} and "
+            f"{values[high]:.4g} at {_format(result.sizes[high])}: off by {change:.3g} of the "
             f"mean, {limits[name]:.3g} allowed"
         )
         errors = result.errors.get(name, np.zeros(len(values)))
@@ -113,7 +113,7 @@ def _test_resolution(subject: Subject, limits: Limits) -> None:
         judge(law, (name, change, limits[name], text, error), probe=probe)
 
 
-def _shown(size: tuple[int, int]) -> str:
+def _format(size: tuple[int, int]) -> str:
     return f"{size[0]} x {size[1]}"
 
 

@@ -25,7 +25,7 @@ LEVELS: Final = (0.5, 0.1, 0.01)
 _MIN_RADIUS: Final = 3.0
 _ANGLES: Final = 90
 # The largest share of the light of a square in the outermost pixels.
-_OUTERMOST: Final = 0.01
+_MAX_OUTER_SHARE: Final = 0.01
 _SQUARE: Final = 16
 # One pixel more or less, which is farthest from the next multiple, is most likely to differ.
 _STEPS: Final = (1, -1, 3, -3, 2, -2)
@@ -50,10 +50,10 @@ def _test_sizes(subject: Subject, limits: Limits) -> None:
         findings, share = _compare_sizes(bloom, sized, dark, limits, last, is_small=is_small)
         if not (findings.broken or findings.undecided):
             return
-        if findings.is_at_border or share <= _OUTERMOST:
+        if findings.is_at_border or share <= _MAX_OUTER_SHARE:
             break
     else:
-        check_inside(share, sized.size, _OUTERMOST)
+        check_inside(share, sized.size, _MAX_OUTER_SHARE)
     findings.conclude()
 
 
@@ -106,7 +106,7 @@ def _compare_sizes(
             if np.abs(flat - 1).max() > limits["flat"] / 10:
                 flat += 1 - _flatness(bloom, probe)
             off["flat"] = float(np.abs(flat - 1).max()), 0.0
-            findings.add_first(last.measured(base[1] / _SQUARE**2 / probe.value, limits["last"]))
+            findings.add_first(last.measure(base[1] / _SQUARE**2 / probe.value, limits["last"]))
             findings.is_at_border = bool(findings.broken) or off["flat"][0] > limits["flat"]
         for name, (value, uncertain) in off.items():
             unit = " pixels" if name == "centroid" else " of it"
@@ -116,7 +116,7 @@ def _compare_sizes(
                 f"from that at {width} x {height}: {limits[name]:.3g} allowed"
             )
             findings.add_first((name, value, limits[name], text, uncertain))
-        if is_small and findings.named and outside > _OUTERMOST:
+        if is_small and findings.named and outside > _MAX_OUTER_SHARE:
             break
     return findings, outside
 

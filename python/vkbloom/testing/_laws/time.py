@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from vkbloom.testing._deviations import fail, figure, is_within, judge
 from vkbloom.testing._laws.law import Figure, Law, Limits
-from vkbloom.testing._moving_light import area_sampled
+from vkbloom.testing._moving_light import sample_area
 from vkbloom.testing._probe import Bloom, Image, Probe, small_probe, takes
 from vkbloom.testing._subject import Subject
 
@@ -32,7 +32,7 @@ _FRAMES: Final = 60
 _FEW_FRAMES: Final = 7
 # Accuracy of a threshold, and the lowest value that is tried, as a share of the probe's.
 _ACCURACY: Final = 1.1
-_LEAST: Final = 2.0**-12
+_MIN_LEVEL: Final = 2.0**-12
 
 
 def halton(count: int) -> NDArray[np.float64]:
@@ -133,26 +133,26 @@ def _flicker(lights: list[float]) -> float:
 
 
 def _point(probe: Probe, x: float, y: float) -> Image:
-    return area_sampled(probe.size, (probe.centre[0] + x, probe.centre[1] + y), (0.5, 0.5))
+    return sample_area(probe.size, (probe.centre[0] + x, probe.centre[1] + y), (0.5, 0.5))
 
 
 def _line(probe: Probe, x: float, y: float) -> Image:
     """Return a line of 24 pixels along x."""
-    return area_sampled(probe.size, (probe.centre[0] + x, probe.centre[1] + y), (24.0, 0.5))
+    return sample_area(probe.size, (probe.centre[0] + x, probe.centre[1] + y), (24.0, 0.5))
 
 
-def _angled(probe: Probe, x: float, y: float) -> Image:
+def _draw_oblique_line(probe: Probe, x: float, y: float) -> Image:
     """Return a line at an angle, as squares whose centres are a quarter of a pixel apart."""
     steps = np.arange(-12, 12, 0.25)
     centres = zip(probe.centre[0] + x + steps, probe.centre[1] + y + steps / 3, strict=True)
-    squares = [area_sampled(probe.size, centre, (0.25, 0.5)) for centre in centres]
+    squares = [sample_area(probe.size, centre, (0.25, 0.5)) for centre in centres]
     return np.asarray(np.sum(squares, axis=0))
 
 
 _SCENES: Final[dict[str, Callable[[Probe, float, float], Image]]] = {
     "point": _point,
     "line": _line,
-    "angled line": _angled,
+    "angled line": _draw_oblique_line,
 }
 
 
@@ -188,7 +188,7 @@ def _threshold_ratio(bloom: Bloom, probe: Probe, limit: float) -> float:
             low, high = (low, middle) if blooms(middle, pixel) else (middle, high)
         return high
 
-    least = _LEAST * probe.value
+    least = _MIN_LEVEL * probe.value
     if blooms(least, False):
         return 1.0
     flat = first(False, least)

@@ -29,7 +29,7 @@ def _test_finite(subject: Subject, limits: Limits) -> None:
         image = probe.noise(0, probe.value)
         image[y, x] = value
         for name, bloom in blooms.items():
-            result = np.asarray(call(bloom, probe.given(image)))
+            result = np.asarray(call(bloom, probe.as_input(image)))
             reached = ~np.isfinite(result.reshape(*result.shape[:2], -1)).all(axis=2)
             reached[y, x] = False
             count, limit = int(reached.sum()), limits[name]

@@ -32,12 +32,12 @@ def _test_views(subject: Subject, limits: Limits) -> None:
         results = []
         for other in (probe.flat(0.0), noise[1 - second]):
             views = [other, noise[second]] if second else [noise[second], other]
-            given = probe.given(np.concatenate(views, axis=axis))
+            given = probe.as_input(np.concatenate(views, axis=axis))
             region = (*map(int, corner), *probe.size)
             result = np.asarray(call(bloom, given, region=region))
             if result.shape[:2] == given.shape[:2]:
                 result = np.split(result, 2, axis=axis)[second]
-            results.append(probe.values(result, probe.given(noise[second])))
+            results.append(probe.values(result, probe.as_input(noise[second])))
         (alone, error), (beside, _) = results
         off = np.abs(beside - alone)
         largest = float(np.abs(alone).max()) or 1.0

@@ -1,4 +1,4 @@
-// The nearest values that the formats of images hold. Both the package's shaders and own methods
+// The nearest values that the formats of images hold. Both the package's shaders and custom methods
 // include this.
 //
 //   nearest_half(vec3)    the nearest half floats, ties to even; at most 65504
@@ -58,12 +58,12 @@ vec3 nearest_ufloat(vec3 value)
 {
     const uvec3 dropped = uvec3(17, 17, 18);
     // The smallest normal value, 2^-14. Below it the steps are constant.
-    const float LEAST = 6.103515625e-5;
+    const float MIN_NORMAL = 6.103515625e-5;
     const vec3 steps = vec3(1048576.0, 1048576.0, 524288.0);
     vec3 kept = mix(vec3(0.0), min(value, vec3(65024.0, 65024.0, 64512.0)),
                     greaterThan(value, vec3(0.0)));
     uvec3 bits = floatBitsToUint(kept);
     bits += (uvec3(1) << (dropped - 1u)) - 1u + ((bits >> dropped) & 1u);
     vec3 normal = uintBitsToFloat((bits >> dropped) << dropped);
-    return mix(normal, roundEven(kept * steps) / steps, lessThan(kept, vec3(LEAST)));
+    return mix(normal, roundEven(kept * steps) / steps, lessThan(kept, vec3(MIN_NORMAL)));
 }
