@@ -41,8 +41,8 @@ static struct vkb_pass_row transpose_row(const struct vkb_adjoint *adjoint,
 }
 
 // Adds the row with an image like the pass's own.
-static bool add_own_row(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
-                        struct vkb_pass_row *row, uint32_t *image, struct vkb_error *error)
+static bool add_transpose_row(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
+                              struct vkb_pass_row *row, uint32_t *image, struct vkb_error *error)
 {
     const struct vkb_image_row *source = &adjoint->graph->images[pass->reads[SLOT_SOURCE]];
     const struct vkb_size size = {source->width, source->height};
@@ -51,12 +51,12 @@ static bool add_own_row(struct vkb_adjoint *adjoint, const struct vkb_pass_row *
 }
 
 // The same, and accumulates its result.
-static bool accumulate_own_row(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
-                               struct vkb_pass_row *row, struct vkb_error *error)
+static bool accumulate_transpose_row(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
+                                     struct vkb_pass_row *row, struct vkb_error *error)
 {
     uint32_t image;
 
-    return add_own_row(adjoint, pass, row, &image, error)
+    return add_transpose_row(adjoint, pass, row, &image, error)
         && accumulate_all(adjoint, image, pass->reads[SLOT_SOURCE], error);
 }
 
@@ -102,8 +102,8 @@ bool vkb_transpose_streaks(struct vkb_adjoint *adjoint, const struct vkb_pass_ro
     row.params.streaks.step_x = -pass->params.streaks.step_x;
     row.params.streaks.step_y = -pass->params.streaks.step_y;
     if (!pass->constants.part_above)
-        return accumulate_own_row(adjoint, pass, &row, error);
-    if (!add_own_row(adjoint, pass, &row, &moved, error))
+        return accumulate_transpose_row(adjoint, pass, &row, error);
+    if (!add_transpose_row(adjoint, pass, &row, &moved, error))
         return false;
     row = vkb_slope_row(adjoint, pass, &vkb_shader_adjoint_above_frag);
     row.reads[SLOT_COTANGENTS] = moved;
@@ -116,7 +116,7 @@ bool vkb_transpose_dirt(struct vkb_adjoint *adjoint, const struct vkb_pass_row *
 {
     struct vkb_pass_row row = transpose_row(adjoint, pass);
 
-    return accumulate_own_row(adjoint, pass, &row, error);
+    return accumulate_transpose_row(adjoint, pass, &row, error);
 }
 
 // Blender's recursive filter. Its pixels depend on those before them, the transpose's on those
@@ -128,7 +128,7 @@ bool vkb_transpose_star(struct vkb_adjoint *adjoint, const struct vkb_pass_row *
 
     row.shader = &vkb_shader_simple_star_transposed_comp;
     return accumulate_before(adjoint, pass, error)
-        && accumulate_own_row(adjoint, pass, &row, error);
+        && accumulate_transpose_row(adjoint, pass, &row, error);
 }
 
 bool vkb_transpose_box(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
@@ -137,7 +137,7 @@ bool vkb_transpose_box(struct vkb_adjoint *adjoint, const struct vkb_pass_row *p
     struct vkb_pass_row row = transpose_row(adjoint, pass);
 
     row.shader = &vkb_shader_box_mean_transposed_comp;
-    return accumulate_own_row(adjoint, pass, &row, error);
+    return accumulate_transpose_row(adjoint, pass, &row, error);
 }
 
 // An axis that is scaled about its centre.

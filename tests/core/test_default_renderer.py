@@ -138,7 +138,7 @@ child = os.fork()
 if child == 0:
     signal.alarm(30)  # of a deadlock
     array_cache._IN_PROCESS.find(1)
-    array_cache.shared().find(1)
+    array_cache.shared_cache().find(1)
     pending.complete()
     assert MESH.packed.shape == (3, 3, 4)
     assert gradients["exposure"] is image
