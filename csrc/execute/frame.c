@@ -245,7 +245,7 @@ static void fail_frame(struct vkb_device *device, struct vkb_frame *frame,
                        struct vkb_submission *submission, const struct vkb_error *error)
 {
     frame->stale = true;
-    device->lost = device->lost || error->kind == VKB_ERROR_DEVICE_LOST;
+    vkb_device_remember_loss(device, error);
     if (!submission->pending)
         vkb_commands_destroy(device, &submission->commands);
 }
@@ -380,7 +380,9 @@ bool vkb_frame_end(struct vkb_device *device, struct vkb_frame *frame, struct vk
     if (!vkb_submissions_end(device, &frame->submissions, error))
         return false;
     // A lost device has ended everything, except one that is lost because it does not end.
-    if (!frame->screens || (device->lost && !device->timed_out))
+    if (device->lost && !device->timed_out)
+        return vkb_device_end_idle(device, error);
+    if (!frame->screens)
         return true;
     // The first wait may fail for lack of memory, too.
     return vkb_device_wait_idle(device, error)

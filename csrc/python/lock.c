@@ -225,7 +225,5 @@ bool vkb_require_open(const struct vkb_renderer *self, struct vkb_error *error)
         return vkb_fail(error, VKB_ERROR_VALUE, "the renderer is closed");
     if (!require_ours(self, error))
         return false;
-    if (self->device.lost)
-        return vkb_fail(error, VKB_ERROR_DEVICE_LOST, "the device was lost; close the renderer");
-    return true;
+    return vkb_device_require(&self->device, error);
 }

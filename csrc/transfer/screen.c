@@ -265,9 +265,11 @@ static bool present(struct vkb_device *device, struct vkb_screen *screen, struct
     const VkResult result = VK_RESULT(device->vk.vkQueuePresentKHR(device->queue, &info));
 
     screen->stale = result != VK_SUCCESS;
-    device->lost = device->lost || result == VK_ERROR_DEVICE_LOST;
-    return result == VK_SUBOPTIMAL_KHR || result == VK_ERROR_OUT_OF_DATE_KHR
-        || vkb_check(error, result, "vkQueuePresentKHR");
+    if (result == VK_SUBOPTIMAL_KHR || result == VK_ERROR_OUT_OF_DATE_KHR
+        || vkb_check(error, result, "vkQueuePresentKHR"))
+        return true;
+    vkb_device_remember_loss(device, error);
+    return false;
 }
 
 static bool prepare(struct vkb_run *run, struct vkb_request *requests, uint32_t request_count,

@@ -325,10 +325,31 @@ bool vkb_device_supports(const struct vkb_device *device, enum vkb_format format
     return (device->features[format] & features) == features;
 }
 
+void vkb_device_remember_loss(struct vkb_device *device, const struct vkb_error *error)
+{
+    if (error->kind != VKB_ERROR_DEVICE_LOST || device->lost)
+        return;
+    memcpy(device->lost_call, error->call, sizeof device->lost_call);
+    device->lost = true;
+}
+
+bool vkb_device_require(const struct vkb_device *device, struct vkb_error *error)
+{
+    if (!device->lost)
+        return true;
+    vkb_fail(error, VKB_ERROR_DEVICE_LOST, "the device was lost; close the renderer");
+    if (device->lost_call[0]) {
+        vkb_add_words(error, ". %s reported it", device->lost_call);
+        memcpy(error->call, device->lost_call, sizeof error->call);
+        error->result = VK_ERROR_DEVICE_LOST;
+    }
+    return false;
+}
+
 static bool remember_loss(struct vkb_device *device, bool done, const struct vkb_error *error)
 {
-    if (!done && error->kind == VKB_ERROR_DEVICE_LOST)
-        device->lost = true;
+    if (!done)
+        vkb_device_remember_loss(device, error);
     return done;
 }
 
@@ -451,6 +472,11 @@ static bool finish_idle(struct vkb_device *device, struct vkb_error *error)
 {
     device->idle_pending = device->idle_pending && !vkb_device_wait(device, device->idle, 1, error);
     return !device->idle_pending;
+}
+
+bool vkb_device_end_idle(struct vkb_device *device, struct vkb_error *error)
+{
+    return finish_idle(device, error) || error->result == VK_ERROR_DEVICE_LOST;
 }
 
 bool vkb_device_wait_idle(struct vkb_device *device, struct vkb_error *error)

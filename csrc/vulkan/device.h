@@ -47,11 +47,12 @@ struct vkb_device {
     bool presents;  // VK_KHR_swapchain is there
     // Imported host memory starts and ends at multiples of this; 0: import is not supported.
     VkDeviceSize import_alignment;
-    bool exports;      // buffers can be exported as descriptors
-    bool timelines;    // so can timeline semaphores
-    atomic_bool lost;  // other threads read it while the device is in use
-    bool timed_out;    // lost because a wait took too long; it may still be busy
-    VkFence idle;      // of vkb_device_wait_idle; null: not needed so far
+    bool exports;        // buffers can be exported as descriptors
+    bool timelines;      // so can timeline semaphores
+    atomic_bool lost;    // other threads read it while the device is in use
+    char lost_call[64];  // the Vulkan call that reported it first, or ""
+    bool timed_out;      // lost because a wait took too long; it may still be busy
+    VkFence idle;        // of vkb_device_wait_idle; null: not needed so far
     bool idle_pending;
     // Called between the slices of a long wait; true ends the wait. May be NULL.
     bool (*interrupted)(void *context);
@@ -89,9 +90,15 @@ bool vkb_device_submit(struct vkb_device *device, VkCommandBuffer commands,
 // be busy.
 bool vkb_device_wait(struct vkb_device *device, VkFence fence, uint32_t frames,
                      struct vkb_error *error);
+// Remembers that the device was lost if an error says so.
+void vkb_device_remember_loss(struct vkb_device *device, const struct vkb_error *error);
+// Fails if the device was lost, with the call that reported it.
+bool vkb_device_require(const struct vkb_device *device, struct vkb_error *error);
 // Waits until the queue has done everything, as long as a frame may take after the submissions,
 // which must be over.
 bool vkb_device_wait_idle(struct vkb_device *device, struct vkb_error *error);
+// Ends such a wait that failed, so that its fence can be destroyed.
+bool vkb_device_end_idle(struct vkb_device *device, struct vkb_error *error);
 
 // Creates a timeline semaphore at 0, which other interfaces of the same GPU can import. *descriptor
 // is a new descriptor of it, which belongs to the caller. Needs device->timelines.
