@@ -15,7 +15,7 @@ import vkbloom
 from tests import images
 from tests.io.parts import store_ultra_hdr
 from vkbloom._io.decoding import decode
-from vkbloom._io.image_file import ImageFile, read_picture
+from vkbloom._io.image_file import ImageFile, read_picture, read_stored
 from vkbloom._presets.start import start_file
 
 IMAGE = images.noise(24, 32, 4, dtype="float32", seed=2)
@@ -81,6 +81,7 @@ def test_the_header_says_what_the_picture_is(file: Path) -> None:
     picture = decode(stored)
     assert header.highlights() is picture.highlights
     assert picture.is_photograph is FILES[file.name][1]
+    assert read_stored(file).is_photograph is picture.is_photograph
     assert (header.channels, header.numbers) == (stored.header.channels, stored.header.numbers)
     assert np.array_equal(read_picture(file).pixels, picture.pixels)
     assert np.array_equal(vkbloom.read(file, premultiplied=picture.is_multiplied), picture.pixels)

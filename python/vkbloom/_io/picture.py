@@ -194,7 +194,7 @@ class Picture:
     - `colour`: The colour space from which colours were decoded: "linear", "srgb", the name of
       another space or of the file's profile; "" if the values were not decoded.
     - `grey`: Whether the file has one colour channel instead of three.
-    - `highlights`: What the file has of light above white.
+    - `highlights`: What the file has of light above white; of decoded pictures.
     - `parts`: The names of the file's parts (the first 100), of which the pixels are one; "" for a
       part without a name.
     - `notes`: Notes for the user about how the file was read and interpreted.
@@ -231,7 +231,9 @@ class Picture:
     @property
     def is_photograph(self) -> bool:
         """Whether the file is a photograph for SDR, with or without a gain map."""
-        return self.highlights in PHOTOGRAPHS
+        # Only decoding knows the colour space that a caller gives in place of the file's own.
+        highlights = self.highlights if self.colour else self.header.highlights()
+        return highlights in PHOTOGRAPHS
 
     @property
     def is_multiplied(self) -> bool:
