@@ -379,12 +379,9 @@ bool vkb_frame_end(struct vkb_device *device, struct vkb_frame *frame, struct vk
 {
     if (!vkb_submissions_end(device, &frame->submissions, error))
         return false;
-    // A lost device has ended everything, except one that is lost because it does not end.
-    if (device->lost && !device->timed_out)
-        return vkb_device_end_idle(device, error);
     if (!frame->screens)
-        return true;
-    // The first wait may fail for lack of memory, too.
+        return !device->lost || vkb_device_end_idle(device, error);
+    // The first wait may fail for lack of memory, too. A lost device has ended everything.
     return vkb_device_wait_idle(device, error)
         || (error->kind != VKB_ERROR_INTERRUPTED && error->result != VK_TIMEOUT
             && (vkb_device_wait_idle(device, error) || error->result == VK_ERROR_DEVICE_LOST));

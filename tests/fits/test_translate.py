@@ -205,7 +205,7 @@ pairs: Any = importlib.import_module("tools.tables.screenshots")
 def test_settings_are_found_or_the_verdict_is_poor(renderer: Renderer, bloom: Any) -> None:
     image, target = pairs.with_bloom(renderer, bloom)
     assert (target == 255).any(axis=2).mean() <= 0.05
-    found = pairs.fit(renderer, (image, target), bloom.preset)
+    found = pairs.fit_preset(renderer, (image, target), bloom.preset)
     values = {name: getattr(found.settings, name) for name in ("threshold", "intensity")}
     known = {"threshold": bloom.threshold, "intensity": bloom.intensity}
     assert found.verdict == "poor" or values == pytest.approx(known, rel=0.1), found
