@@ -33,6 +33,22 @@ void vkb_axis_move(struct vkb_axis *axis, uint32_t from, uint32_t to, double ori
     axis->step = 1.0;
 }
 
+void vkb_axis_align(struct vkb_axis *axis, double step, int32_t first)
+{
+    axis->step = step;
+    axis->origin = 0.5 * step - 0.5 + first;
+}
+
+int32_t vkb_axis_first(const struct vkb_axis *axis)
+{
+    return (int32_t)(axis->origin - (0.5 * axis->step - 0.5));
+}
+
+bool vkb_axis_is_moved(const struct vkb_axis *axis)
+{
+    return vkb_axis_first(axis) != 0 || axis->step != (double)axis->from / axis->to;
+}
+
 void vkb_axis_set(struct vkb_axis *axis, const struct vkb_tap *taps, uint32_t count)
 {
     memcpy(axis->taps, taps, count * sizeof *taps);
@@ -84,6 +100,14 @@ int32_t vkb_ratio_of(uint32_t source, uint32_t target)
          : source == target     ? EXACT_SAME
          : 2 * source == target ? EXACT_DOUBLE
                                 : 0;
+}
+
+int32_t vkb_axis_ratio(const struct vkb_axis *axis)
+{
+    return axis->step == 2.0 ? EXACT_HALF
+         : axis->step == 1.0 ? EXACT_SAME
+         : axis->step == 0.5 ? EXACT_DOUBLE
+                             : 0;
 }
 
 bool vkb_axis_is_identity(const struct vkb_axis *axis)

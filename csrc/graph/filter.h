@@ -83,6 +83,12 @@ void vkb_filter_begin(const struct vkb_graph *graph, uint32_t from, uint32_t to,
 
 // An axis on which pixel i is at texel `origin` + i.
 void vkb_axis_move(struct vkb_axis *axis, uint32_t from, uint32_t to, double origin);
+// Makes the positions of an axis those of a ratio of sides alone, 2, 1 or 1/2 texels apart, in a
+// source that begins at its texel `first`. Beyond the edges are the outermost texels.
+void vkb_axis_align(struct vkb_axis *axis, double step, int32_t first);
+// The texel at which the source begins for the positions, and whether it is moved at all.
+int32_t vkb_axis_first(const struct vkb_axis *axis);
+bool vkb_axis_is_moved(const struct vkb_axis *axis);
 // Replaces the taps of an axis.
 void vkb_axis_set(struct vkb_axis *axis, const struct vkb_tap *taps, uint32_t count);
 
@@ -97,8 +103,9 @@ void vkb_axis_take(struct vkb_axis *axis, uint32_t kernel);
 // from the bottom.
 void vkb_filter_next(struct vkb_filter *filter, const float next[4]);
 
-// Whether sides are in a simple ratio: EXACT_*; 0: they are not.
+// Whether sides, or positions, are in a simple ratio: EXACT_*; 0: they are not.
 int32_t vkb_ratio_of(uint32_t source, uint32_t target);
+int32_t vkb_axis_ratio(const struct vkb_axis *axis);
 
 // Whether the axis leaves an image as it is.
 bool vkb_axis_is_identity(const struct vkb_axis *axis);

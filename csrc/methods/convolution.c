@@ -15,7 +15,7 @@
 // as many zeros.
 #include "methods/convolution.h"
 #include "methods/methods.h"
-#include "passes/prefilter.h"
+#include "passes/levels.h"
 
 #include <stdio.h>
 
@@ -111,7 +111,7 @@ static uint32_t add_kernel(struct vkb_levels *levels)
         .width = kernel->width,
         .height = kernel->height,
         .channels = 3,
-        .framebuffer = true,
+        .framebuffer = !vkb_method_of(levels->settings)->sums_gaussians,
         .pixels = kernel->pixels,
         .serial = kernel->serial,
     };
@@ -356,28 +356,4 @@ uint32_t vkb_add_convolution_method(struct vkb_levels *levels)
     const uint32_t convolved = vkb_convolve(levels, same ? &whole : &part);
 
     return same ? convolved : vkb_levels_enlarge(levels, UPSAMPLE_LINEAR, convolved, 1.0);
-}
-
-// Film's halation: the kernel is a sum of Gaussians, too.
-uint32_t vkb_add_halation_method(struct vkb_levels *levels)
-{
-    return vkb_add_unreal_method(levels);
-}
-
-// Unreal Engine's standard bloom, by its documentation: the kernel is a sum of Gaussians.
-uint32_t vkb_add_unreal_method(struct vkb_levels *levels)
-{
-    const struct vkb_bloom_source *source = levels->source;
-    struct vkb_bloom_source masked = *source;
-
-    if (source->mask != VKB_NO_IMAGE || levels->settings->thresholded) {
-        masked.glow = vkb_levels_step(levels, source->buffers, "highlights");
-        struct vkb_pass_row row =
-            vkb_describe_prefilter(levels, VKB_PREFILTER_unreal, source->glow, masked.glow);
-        vkb_levels_masked(levels, &row);
-    }
-    levels->source = &masked;
-    const uint32_t bloom = vkb_add_convolution_method(levels);
-    levels->source = source;
-    return bloom;
 }

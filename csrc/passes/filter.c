@@ -93,6 +93,11 @@ void vkb_filter_three(struct vkb_filter *filter, double distance, double side)
     set_kernels(filter, kernels, 1);
 }
 
+bool vkb_is_moved(const struct vkb_filter *filter)
+{
+    return vkb_axis_is_moved(&filter->x) || vkb_axis_is_moved(&filter->y);
+}
+
 void vkb_set_kind(struct vkb_filter *filter, enum vkb_mode kind)
 {
     filter->x.kind = filter->y.kind = kind;
@@ -138,14 +143,15 @@ static int32_t taken_at(int32_t window, float place)
 
 // TAKEN_* of an axis. Positions are between texels, at the centres of these, a quarter beside them,
 // or anywhere.
-static int32_t taken(float (*taps)[4], int32_t window, uint32_t source, uint32_t target)
+static int32_t taken(float (*taps)[4], int32_t window, const struct vkb_axis *axis)
 {
     static const float half[] = {0.5f}, same[] = {0.0f}, twice[] = {0.25f, 0.75f},
                        any[] = {0.0f, 0.99999994f};
-    const float *parts = source == 2 * target ? half
-                       : source == target     ? same
-                       : 2 * source == target ? twice
-                                              : any;
+    const int32_t ratio = vkb_axis_ratio(axis);
+    const float *parts = ratio == EXACT_HALF   ? half
+                       : ratio == EXACT_SAME   ? same
+                       : ratio == EXACT_DOUBLE ? twice
+                                               : any;
     const int count = parts == half || parts == same ? 1 : 2;
     int32_t bits = 0;
 
@@ -174,6 +180,12 @@ static struct vkb_pass_row filter_row(const struct vkb_levels *levels,
     VKB_SET_TARGET(&row, filter, &levels->graph->images[to]);
     params->coarse = (float)filter->gain;
     params->divisor = (float)filter->divisor;
+    if (vkb_is_moved(filter)) {
+        params->first_x = vkb_axis_first(&filter->x);
+        params->first_y = vkb_axis_first(&filter->y);
+        constants->exact = vkb_axis_ratio(&filter->x);
+        constants->exact_rows = vkb_axis_ratio(&filter->y);
+    }
     constants->tap_count = (int32_t)*count;
     constants->kernels = (int32_t)filter->kernels;
     constants->upsample = filter->x.kind;
@@ -182,8 +194,8 @@ static struct vkb_pass_row filter_row(const struct vkb_levels *levels,
                       : window <= MAX_WINDOW                  ? window
                                                               : 0;
     if (constants->upsample == UPSAMPLE_LINEAR && constants->window) {
-        constants->taken_x = taken(params->taps_x, window, filter->x.from, filter->x.to);
-        constants->taken_y = taken(params->taps_y, window, filter->y.from, filter->y.to);
+        constants->taken_x = taken(params->taps_x, window, &filter->x);
+        constants->taken_y = taken(params->taps_y, window, &filter->y);
     }
     return row;
 }

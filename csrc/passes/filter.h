@@ -19,6 +19,9 @@ struct vkb_filter vkb_make_filter(const struct vkb_graph *graph, uint32_t from, 
 // along an axis.
 void vkb_filter_three(struct vkb_filter *filter, double distance, double side);
 
+// Whether the positions of a filter are not those of the images' sizes (vkb_axis_align).
+bool vkb_is_moved(const struct vkb_filter *filter);
+
 // Sets what the taps of a filter sample, of UPSAMPLE_*.
 void vkb_set_kind(struct vkb_filter *filter, enum vkb_mode kind);
 

@@ -24,7 +24,8 @@
            .composite_add = COMPOSITE_ADD_TO_POSITIVE) \
     METHOD(PYGFX, pygfx, .published = true) \
     METHOD(POST_PROCESSING, post_processing, .published = true) \
-    METHOD(UNREAL, unreal, .published = true, .kernel_types = VKB_ALL_TYPES) \
+    METHOD(UNREAL, unreal, .published = true, .kernel_types = VKB_ALL_TYPES, \
+           .sums_gaussians = true) \
     METHOD(HALATION, halation, .published = true, .kernel_types = VKB_ALL_TYPES) \
     METHOD(PMNDRS, pmndrs, .published = true, .composite_screen = COMPOSITE_UNCLAMPED_SCREEN) \
     METHOD(BABYLON, babylon, .published = true, .min_weights = 1) \
@@ -46,6 +47,9 @@ struct vkb_method_row {
     const char *first;
     // A bit for each type (VKB_CHOICE_type) that convolves with a kernel that Python makes.
     uint32_t kernel_types;
+    // The kernel is the sum of the Gaussians of the settings. It is no framebuffer, since the bloom
+    // has none where it is made of levels (methods/unreal.h).
+    bool sums_gaussians;
     // The formulas of the composites "add" and "screen"; 0: those of their names.
     int composite_add, composite_screen;
     // The least number of weights and of layers that its settings have.
@@ -134,9 +138,11 @@ struct vkb_settings {
     struct vkb_layer layers[MAX_LAYERS];
     uint32_t layer_count;
     float level_weights[MAX_LEVELS];
-    uint32_t level_weight_count;          // 0: none are given
-    float tint[3];                        // of the bloom, and the position of Blender's sun
-    float sun_position[2];                // as shares of the sides from the lower left
+    uint32_t level_weight_count;           // 0: none are given
+    float tint[3];                         // of the bloom, and the position of Blender's sun
+    float sun_position[2];                 // as shares of the sides from the lower left
+    double gaussian_sizes[MAX_GAUSSIANS];  // of Unreal's bloom, in percent of the frame's width
+    double gaussian_tints[MAX_GAUSSIANS];
     struct vkb_stage stages[MAX_STAGES];  // of glare
     uint32_t stage_count;
     // Python packs what is before here.

@@ -35,6 +35,8 @@ static const struct member settings_members[] = {
     MEMBER(vkb_settings, level_weight_count, "u4"),
     MEMBER(vkb_settings, tint, "f4"),
     MEMBER(vkb_settings, sun_position, "f4"),
+    MEMBER(vkb_settings, gaussian_sizes, "f8"),
+    MEMBER(vkb_settings, gaussian_tints, "f8"),
     // Structs, which the other table describes.
     MEMBER(vkb_settings, stages, ""),
     MEMBER(vkb_settings, stage_count, "u4"),

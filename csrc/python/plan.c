@@ -5,6 +5,7 @@
 #include "execute/limits.h"
 #include "graph/dry_run.h"
 #include "methods/adjoint.h"
+#include "methods/unreal.h"
 
 #include <stdio.h>
 
@@ -208,6 +209,8 @@ static bool hold_kernel(const struct vkb_module_state *state, const struct vkb_d
     if (!vkb_needs_kernel(settings))
         return true;
     if (vkb_source_sizes(&self->source, settings, device->max_side, &frame, &buffers, &error)) {
+        if (vkb_has_gaussian_levels(settings, frame, buffers))
+            return true;
         if (!vkb_read_kernel_size(settings_object, frame, buffers, &settings->kernel))
             return false;
         const bool fits = build_graph(device, VKB_VARIANTS_FRAGMENT, &self->source, settings, NULL,

@@ -30,9 +30,11 @@ static struct vkb_pass_row line_row(const struct vkb_variant_choice *choice,
                       vertical ? LINE_OUTPUTS : 1);
     row.reading = VKB_READING_LOADED;
     row.targets[0] = target;
-    row.constants.unrolled_radius = radius <= LINE_SHORT_RADIUS ? radius : 0;
-    row.constants.rolled = choice->variants == VKB_VARIANTS_CPU && row.constants.unrolled_radius > 0
-                        && (uint64_t)image->width * image->height <= ROLLED_PIXELS;
+    const bool is_short = radius <= LINE_SHORT_RADIUS;
+    row.constants.rolled = choice->variants == VKB_VARIANTS_CPU && radius > 0
+                        && radius <= LINE_ROLLED_RADIUS
+                        && (!is_short || (uint64_t)image->width * image->height <= ROLLED_PIXELS);
+    row.constants.unrolled_radius = is_short || row.constants.rolled ? radius : 0;
     if (!row.constants.rolled) {
         row.constants.direction = vertical ? DIRECTION_VERTICAL : DIRECTION_HORIZONTAL;
     } else {

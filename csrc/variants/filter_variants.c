@@ -83,11 +83,8 @@ bool vkb_add_gathered_variant(struct vkb_variant_choice *choice, const struct vk
 }
 
 // Gives `row` the constants of the filter `pass`.
-static void take_filter(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
-                        struct vkb_pass_row *row)
+static void take_filter(const struct vkb_pass_row *pass, struct vkb_pass_row *row)
 {
-    const struct vkb_image_row *source = &choice->plain.images[pass->reads[SLOT_SOURCE]];
-    const struct vkb_image_row *target = &choice->plain.images[pass->targets[0]];
     const int32_t upsample = pass->constants.upsample;
 
     row->constants.sampling = 0;
@@ -97,10 +94,10 @@ static void take_filter(const struct vkb_variant_choice *choice, const struct vk
     row->constants.window = pass->constants.window;
     row->constants.taken_x = pass->constants.taken_x;
     row->constants.taken_y = pass->constants.taken_y;
-    row->constants.exact = vkb_ratio_of(source->width, target->width);
+    row->constants.exact = vkb_axis_ratio(&pass->filters->x);
     // The weights of others depend on how far away the edges are, too.
     if (upsample == UPSAMPLE_LINEAR || upsample == UPSAMPLE_CUBIC)
-        row->constants.exact_rows = vkb_ratio_of(source->height, target->height);
+        row->constants.exact_rows = vkb_axis_ratio(&pass->filters->y);
 }
 
 // The shaders of a filter: strips by format, and tiles.
@@ -112,12 +109,14 @@ struct filter_shaders {
 static bool make_filter(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
                         struct filter_shaders shaders, struct vkb_pass_row *row)
 {
-    // Its taps are in a window.
-    if (!vkb_is_filter(pass) || pass->constants.window == 0)
+    // Its taps are in a window. Tiles of a device with little shared memory have no ratio.
+    if (!vkb_is_filter(pass) || pass->constants.window == 0
+        || (vkb_is_moved(pass->filters)
+            && choice->device->limits.maxComputeSharedMemorySize < FILTER_TILE_SHARED))
         return false;
     const struct vkb_image_row *source = &choice->plain.images[pass->reads[SLOT_SOURCE]];
     const struct vkb_image_row *target = &choice->plain.images[pass->targets[0]];
-    take_filter(choice, pass, row);
+    take_filter(pass, row);
     if (choice->variants == VKB_VARIANTS_GPU) {
         vkb_make_tiles(choice, row, shaders.tiles, pass->constants.window, pass->constants.window);
         return true;

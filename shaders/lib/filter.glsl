@@ -23,6 +23,21 @@ struct Axis {
     float ratio;
 };
 
+// Sides of the source and of the target that give the positions of pixels. In a simple ratio (EXACT) these are the
+// ratio alone, since the target of a moved filter may reach beyond the image.
+ivec2 sides_of(int ratio, int size, int target_size)
+{
+    if (ratio == 0)
+        return ivec2(size, target_size);
+    return ivec2(ratio == EXACT_HALF ? 2 : 1, ratio == EXACT_DOUBLE ? 2 : 1);
+}
+
+Place position_of(ivec2 size, ivec2 pixel, ivec2 target_size)
+{
+    ivec2 x = sides_of(EXACT, size.x, target_size.x), y = sides_of(EXACT_ROWS, size.y, target_size.y);
+    return place_in_size(ivec2(x.x, y.x), pixel, ivec2(x.y, y.y));
+}
+
 // Along x for 0, along y for 1.
 Axis axis_of(Place place, ivec2 size, vec2 ratio, int along)
 {
@@ -114,7 +129,7 @@ Window window_of(Axis axis, int count, bool along_x)
 Window window_in(ivec2 size, ivec2 pixel, bool along_x)
 {
     ivec2 target_size = ivec2(params.target_width, params.target_height);
-    Place place = place_in_size(size, pixel, target_size);
+    Place place = position_of(size, pixel, target_size);
     vec2 ratio = vec2(size) / vec2(target_size);
     Axis axis = axis_of(place, size, ratio, along_x ? 0 : 1);
     return window_of(settled(axis), WINDOW, along_x);

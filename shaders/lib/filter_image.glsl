@@ -35,9 +35,10 @@ vec4 sparse(sampler2D image, Axis row, Axis column)
 
 vec4 filtered(sampler2D image)
 {
-    Place place = PLACE_IN(image);
-    ivec2 size = textureSize(image, 0);
-    vec2 ratio = vec2(size) / vec2(params.target_width, params.target_height);
+    ivec2 size = textureSize(image, 0), target_size = ivec2(params.target_width, params.target_height);
+    Place place = position_of(size, PIXEL, target_size);
+    vec2 ratio = vec2(size) / vec2(target_size);
+    place.texel += ivec2(params.first_x, params.first_y);
     Axis row = settled(axis_of(place, size, ratio, 0)), column = settled(axis_of(place, size, ratio, 1));
     if (WINDOW == 0)
         return sparse(image, row, column);

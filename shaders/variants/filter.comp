@@ -58,14 +58,14 @@ int first_in_run(int column)
 void keep_row(int first, int row)
 {
     ivec2 last = READ_SIZE(SLOT_SOURCE) - 1;
-    int line = clamp(row, 0, last.y);
+    int line = clamp(row + params.first_y, 0, last.y);
     uvec4 raw[LOADED];
 
     [[unroll]] for (int kept = KERNELS; kept < KEPT * KERNELS; ++kept)
         [[unroll]] for (int i = 0; i < COLUMNS; ++i)
             rows[kept - KERNELS][i] = rows[kept][i];
     if (EXACT != 0)
-        load_run(WINDOW_OFFSET(EXACT, first), line, raw);
+        load_run(WINDOW_OFFSET(EXACT, first) + params.first_x, line, raw);
     [[unroll]] for (int i = 0; i < COLUMNS; ++i) {
         vec4 sums[3] = vec4[](vec4(0.0), vec4(0.0), vec4(0.0));
         [[unroll]] for (int at = 0; at < KEPT; ++at) {
@@ -112,11 +112,11 @@ void start_columns(ivec2 first)
     coarse = params.coarse;
     shares = params.divisor;
     [[unroll]] for (int i = 0; i < PHASES; ++i) {
-        Place place = place_in_size(source_size, ivec2(first.x + i, 0), TARGET_SIZE());
+        Place place = position_of(source_size, ivec2(first.x + i, 0), TARGET_SIZE());
         windows[i] = window_of(within_border(axis_of(place, source_size, ratio, 0)), KEPT, true);
     }
     [[unroll]] for (int i = 0; i < ROW_PHASES; ++i) {
-        Place place = place_in_size(source_size, ivec2(0, i), TARGET_SIZE());
+        Place place = position_of(source_size, ivec2(0, i), TARGET_SIZE());
         row_windows[i] = window_of(axis_of(place, source_size, ratio, 1), KEPT, false);
     }
     [[unroll]] for (int i = 0; i < COLUMNS; ++i)

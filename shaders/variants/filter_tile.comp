@@ -17,7 +17,7 @@ Window window_at(int picture, int pixel, bool along_x)
 
 vec4 texel_at(ivec2 texel)
 {
-    return seen(fetch_clamped(source, texel));
+    return seen(fetch_clamped(source, texel + ivec2(params.first_x, params.first_y)));
 }
 
 vec4 added_at(ivec2 pixel)

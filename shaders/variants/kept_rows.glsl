@@ -25,13 +25,14 @@ float exact_part(int phase)
     return EXACT_ROWS == EXACT_HALF ? 0.5 : 0.0;
 }
 
-// Each round keeps ROWS_IN rows and writes ROWS_OUT. The rounds before the first pixel only keep rows.
+// Each round keeps ROWS_IN rows and writes ROWS_OUT. The rounds before the first pixel only keep rows. A moved filter
+// may double to an odd number of rows.
 void write_exact_rows(ivec2 first, int end)
 {
     const int ROUNDS_BEFORE = KEPT / ROWS_IN + ROWS_OUT - 2;
-    int start = first.y / ROWS_OUT;
+    int start = first.y / ROWS_OUT, rounds = (end + ROWS_OUT - 1) / ROWS_OUT;
 
-    for (int round = start - ROUNDS_BEFORE; round < end / ROWS_OUT; ++round) {
+    for (int round = start - ROUNDS_BEFORE; round < rounds; ++round) {
         int texel = ROWS_IN * round, new_row = texel - ROWS_IN + KEPT / 2 + 1;
         [[unroll]] for (int phase = 0; phase < ROWS_OUT; ++phase) {
             // The first of two pixels is before the centre of this texel: it needs no new row.
@@ -39,7 +40,7 @@ void write_exact_rows(ivec2 first, int end)
             if (is_last)
                 [[unroll]] for (int i = 0; i < ROWS_IN; ++i)
                     keep_row(first.x, new_row + i);
-            if (round >= start)
+            if (round >= start && (ROWS_OUT == 1 || ROWS_OUT * round + phase < end))
                 write_row(first.x, ROWS_OUT * round + phase, is_last ? texel : texel - 1, exact_part(phase), phase);
         }
     }

@@ -77,7 +77,8 @@ void blur_rolled()
     ivec2 size = imageSize(target), last = imageSize(source) - 1;
     ivec2 texel = first + (params.origin - UNROLLED_RADIUS) * direction;
     ivec2 pixel = first - 2 * UNROLLED_RADIUS * direction;
-    int number = 0, count = ROLLED_OUTPUTS + 2 * params.radius;
+    ivec2 left = (size - first) * direction;
+    int number = 0, count = min(ROLLED_OUTPUTS, max(left.x, left.y)) + 2 * params.radius;
     bool levels = params.levels != 0;
     float weights[2 * UNROLLED_RADIUS + 1];
     // Alpha apart: compilers do not remove a part of a vector that lives over an iteration.

@@ -183,6 +183,7 @@ OTHERS: dict[str, Settings] = {
     "tints": ThreeBloom(tints=((1, 1, 1), (0.5, 0.2, 1), (1, 1, 1), (0, 2, 1), (1, 1, 1))),
     "node-small": ThreeBloom(variant="node", resolution_scale=0.3, intensity=1.0),
     "unreal-threshold": UnrealBloom(threshold=-0.7, size_scale=1.0),
+    "unreal-one": UnrealBloom(tints=(0.8, 0, 0, 0, 0, 0), size_scale=8.0),
     "halation-wide": Halation(pixel_size=3.0),
     "ppv2-fast": PostProcessingBloom(fast=True, anamorphic_ratio=-0.6, threshold=0.4, diffusion=9),
     "ppv2-wide": PostProcessingBloom(threshold=None, anamorphic_ratio=1.0, clamp=1.5, diffusion=10),

@@ -29,7 +29,6 @@ from vkbloom import (
     Settings,
     Streaks,
     ThreeBloom,
-    UnrealBloom,
     UrpBloom,
 )
 
@@ -70,8 +69,7 @@ def has_equal_bits(settings: Settings) -> bool:
         is_resized = settings.bloom_size is not None or settings.bloom_scale != 1
         return not is_resized and min(settings.weights) >= 0
     is_transformed = (
-        isinstance(settings, Convolution | UnrealBloom | Halation)
-        or settings == PRESETS["blender_fog_glow"]
+        isinstance(settings, Convolution | Halation) or settings == PRESETS["blender_fog_glow"]
     )
     return not is_transformed and not isinstance(settings, UrpBloom | ThreeBloom)
 

@@ -151,6 +151,11 @@ def _limits(
         elif settings._is_transform:
             # So in halves it has some more than the rounding, where that is next to nothing.
             limits[name] = limits[name] + 0.01 * tolerance(np.float32, expected["glow"])
+    if settings._bloom_error:
+        error = settings._bloom_error * np.abs(expected["bloom"]).max()
+        limits["bloom"] = limits["bloom"] + error
+        slope = settings.intensity * slope_of(real(image), settings)
+        limits["final"] = limits["final"] + slope * error
     if settings.bloom and _DTYPES[format] != image.dtype:
         # The coarser bloom's rounding goes through the composite into a finer final.
         of_bloom = np.broadcast_to(limits["bloom"], frames["bloom"].shape)[..., : image.shape[2]]

@@ -38,11 +38,18 @@ class UnrealBloom(GaussianSum):
 
     Notes
     -----
-    ``bloom`` is the convolution of the frame, times clamp(luminance - threshold, 0, 1), with
-    ``kernel``, the sum of the tints times Gaussians whose sums are 1. The standard deviation is a
-    sixth of the diameter, which is this project's reading of it, and each is cut off at three
+    ``bloom`` is the convolution of the frame, times clamp(luminance - threshold, 0, 1), with what
+    `kernel` returns, the sum of the tints times Gaussians whose sums are 1. The standard deviation
+    is a sixth of the diameter, which is this project's reading of it, and each is cut off at three
     standard deviations, rounded up to pixels. Outside of the frame are its outermost pixels. The
-    engine blurs at reduced sizes and limits its kernels; this is the formula that it documents.
+    engine limits its kernels; this is the formula that it documents.
+
+    As in the engine, large Gaussians are blurs of reduced images, which are no framebuffers.
+    ``bloom`` differs from the formula by at most 6e-5 of its largest value for pictures, and by up
+    to 1.4e-4 for a frame with one lit pixel. A Gaussian whose cut is higher than 4.5e-4 of the
+    kernel's largest value is a blur at the size of the bloom buffers. If its standard deviation is
+    more than 19 pixels there, as with a single large tint, ``bloom`` is a convolution by Fourier
+    transforms.
 
     Source: Epic Games, "Bloom" (Unreal Engine 4.27), GaussianSumBloomSettings (Python API 5.0).
     """
@@ -60,7 +67,11 @@ class UnrealBloom(GaussianSum):
     tints: tuple[float, ...] = numbers_field(
         (0.3465, 0.138, 0.1176, 0.066, 0.066, 0.061), low=-MAX_HALF, differentiable=False
     )
-    size_scale: float = number_field(default=4.0, range=(0, 64), differentiable=False)
+    size_scale: float = number_field(differentiable=False)
+
+    @property
+    def _bloom_error(self) -> float:
+        return 1.5e-4
 
     def core_kernel_size(self, frame: tuple[int, int], buffers: tuple[int, int]) -> tuple[int, int]:
         """Return the kernel's width and height, without the kernel."""
@@ -77,7 +88,12 @@ class UnrealBloom(GaussianSum):
     def _core_values(self) -> dict[str, Any]:
         """Return what the core names or counts otherwise."""
         threshold = None if self.threshold in {None, -1.0} else self.threshold + 1
-        return {"threshold": threshold, "boundary": self.boundary}
+        return {
+            "threshold": threshold,
+            "boundary": self.boundary,
+            "gaussian_sizes": self.sizes,
+            "gaussian_tints": self.tints,
+        }
 
 
 def _line(deviation: float, length: int) -> NDArray[np.float64]:

@@ -180,6 +180,11 @@ class Settings(Record):
         return False
 
     @property
+    def _bloom_error(self) -> float:
+        """How far the passes may be from the formula, as a share of the bloom's largest value."""
+        return 0.0
+
+    @property
     def _first_stages(self) -> tuple[str, ...]:
         """The framebuffers in which the rounding of one 8-bit store arrives, or of `glow`, too."""
         return "glow", "down_0"

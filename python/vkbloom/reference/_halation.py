@@ -9,8 +9,8 @@ from typing import Any
 
 from . import _unreal
 
-# The passes of Unreal's bloom, with other kernels.
-passes = _unreal.passes
+# The convolution of Unreal's bloom, with other kernels.
+passes = _unreal.spread
 
 
 def gain(settings: Any, size: tuple[int, int]) -> float:

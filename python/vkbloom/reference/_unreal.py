@@ -20,6 +20,11 @@ def gain(settings: Any, size: tuple[int, int]) -> float:
 
 
 def passes(source: BlurInput, settings: Any) -> dict[str, Array]:
+    """Return "bloom"."""
+    return {"bloom": spread(source, settings)["bloom"]}
+
+
+def spread(source: BlurInput, settings: Any) -> dict[str, Array]:
     """Return "kernel" and "bloom"."""
     if source.mask is None and settings.threshold in (None, -1):
         return convolution.passes(source, settings)
