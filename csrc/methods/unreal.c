@@ -18,8 +18,6 @@
 #include "passes/prefilter.h"
 
 #include <math.h>
-#include <stdarg.h>
-#include <stdio.h>
 #include <string.h>
 
 // (An enlargement reads two texels beyond half of the margin of the larger level.)
@@ -188,19 +186,6 @@ static struct vkb_kernel level_kernel(double deviation, uint32_t level)
     return kernel;
 }
 
-// An image of floats, whatever the format of the bloom buffers is.
-__attribute__((format(printf, 3, 4))) static uint32_t
-add_image(struct vkb_levels *levels, struct vkb_size size, const char *format, ...)
-{
-    char name[VKB_NAME_SIZE];
-    va_list arguments;
-
-    va_start(arguments, format);
-    vsnprintf(name, sizeof name, format, arguments);
-    va_end(arguments);
-    return vkb_levels_target(levels, name, VKB_FORMAT_RGBA32_FLOAT, size, false);
-}
-
 static void align(struct vkb_filter *filter, double step, int32_t first)
 {
     vkb_axis_align(&filter->x, step, first);
@@ -222,7 +207,7 @@ static void add_levels(struct vkb_levels *levels, uint32_t count)
         levels->sizes[level] =
             (struct vkb_size){inner.width + 2 * MARGIN, inner.height + 2 * MARGIN};
         const uint32_t from = levels->downs[level - 1];
-        const uint32_t to = add_image(levels, levels->sizes[level], "level_%u", level);
+        const uint32_t to = vkb_levels_step(levels, levels->sizes[level], "level_%u", level);
         struct vkb_filter filter = vkb_make_filter(levels->graph, from, to, kernels, 1, 1.0);
         align(&filter, 2.0, level == 1 ? -2 * MARGIN : -MARGIN);
         vkb_add_filter_pass(levels, &filter, from, to);
@@ -236,7 +221,7 @@ static void add_gaussian(struct vkb_levels *levels, const struct gaussian *gauss
 {
     const uint32_t from = levels->downs[gaussian->level];
     const uint32_t between =
-        add_image(levels, levels->sizes[gaussian->level], "gaussian_%u_down", number);
+        vkb_levels_step(levels, levels->sizes[gaussian->level], "gaussian_%u_down", number);
     struct vkb_filter columns, rows;
 
     vkb_filter_begin(levels->graph, from, between, &columns);
@@ -278,8 +263,9 @@ static uint32_t add_level_sum(struct vkb_levels *levels, const struct gaussians 
     for (uint32_t i = 0; i < gaussians->count; ++i)
         left += gaussians->all[i].level == level;
     if (!left && enlarged) {
-        const uint32_t to =
-            end == VKB_NO_IMAGE ? add_image(levels, levels->sizes[level], "sum_%u", level) : end;
+        const uint32_t to = end == VKB_NO_IMAGE
+                              ? vkb_levels_step(levels, levels->sizes[level], "sum_%u", level)
+                              : end;
         add_sum(levels, level, true, sum, VKB_NO_IMAGE, to);
         return to;
     }
@@ -290,13 +276,13 @@ static uint32_t add_level_sum(struct vkb_levels *levels, const struct gaussians 
             continue;
         const bool last = --left == 0 && end != VKB_NO_IMAGE;
         const uint32_t blurred =
-            last && sum == VKB_NO_IMAGE ? end : add_image(levels, size, "gaussian_%u", i);
+            last && sum == VKB_NO_IMAGE ? end : vkb_levels_step(levels, size, "gaussian_%u", i);
         add_gaussian(levels, gaussian, i, blurred);
         if (sum == VKB_NO_IMAGE) {
             sum = blurred;
             continue;
         }
-        const uint32_t to = last ? end : add_image(levels, size, "sum_%u_%u", level, i);
+        const uint32_t to = last ? end : vkb_levels_step(levels, size, "sum_%u_%u", level, i);
         add_sum(levels, level, enlarged, sum, blurred, to);
         sum = to;
         enlarged = false;
@@ -315,11 +301,16 @@ static uint32_t add_gaussians(struct vkb_levels *levels, const struct gaussians 
     const bool direct = same && source->format == VKB_FORMAT_RGBA32_FLOAT;
     uint32_t sum = VKB_NO_IMAGE;
 
+    // Levels are floats, whatever the format of the bloom buffers is.
+    struct vkb_bloom_source floats = *source;
+    floats.format = VKB_FORMAT_RGBA32_FLOAT;
+    levels->source = &floats;
     add_levels(levels, gaussians->levels);
     const uint32_t end = direct ? vkb_levels_target(levels, "bloom", source->format, size, true)
-                                : add_image(levels, size, "convolved");
+                                : vkb_levels_step(levels, size, "convolved");
     for (uint32_t level = gaussians->levels + 1; level-- > 0;)
         sum = add_level_sum(levels, gaussians, level, sum, level ? VKB_NO_IMAGE : end);
+    levels->source = source;
     if (direct)
         return sum;
     if (!same)

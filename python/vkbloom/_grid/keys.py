@@ -25,6 +25,10 @@ PURPOSE: Final = "A grid in a store"
 _PARTIAL: Final = re.compile(r"(?:zarr|c(?:\.[0-9]+)*)\.[0-9a-f]+\.partial")
 
 
+def _zarr() -> Any:
+    return import_extra("zarr", "grid", PURPOSE)
+
+
 def _run(coroutine: Coroutine[Any, Any, Any]) -> Any:
     """Run a store's coroutine on Zarr's event loop, to which connections are bound."""
     return import_extra("zarr.core.sync", "grid", PURPOSE).sync(coroutine)
@@ -47,8 +51,7 @@ class Keys:
     @property
     def folder(self) -> Path | None:
         """The folder of a local store; None for other stores."""
-        zarr = import_extra("zarr", "grid", PURPOSE)
-        if not isinstance(self.store, zarr.storage.LocalStore):
+        if not isinstance(self.store, _zarr().storage.LocalStore):
             return None
         folder: Path = self.store.root
         return folder
@@ -79,7 +82,7 @@ class Keys:
                 self.write(key, content)
 
     def _create(self, key: str, content: bytes) -> Coroutine[Any, Any, Any]:
-        if isinstance(self.store, import_extra("zarr", "grid", PURPOSE).storage.FsspecStore):
+        if isinstance(self.store, _zarr().storage.FsspecStore):
             # Its own method asks whether the key exists, and then writes.
             path = f"{self.store.path.rstrip('/')}/{key}"
             creation: Coroutine[Any, Any, Any] = self.store.fs._pipe_file(
@@ -95,7 +98,7 @@ class Keys:
 
     def list_keys(self) -> set[str]:
         """Return all keys, without the temporary files of other processes."""
-        if isinstance(self.store, import_extra("zarr", "grid", PURPOSE).storage.FsspecStore):
+        if isinstance(self.store, _zarr().storage.FsspecStore):
             # Another process may have written since this one listed them.
             self.store.fs.invalidate_cache()
 
@@ -137,8 +140,7 @@ class Keys:
 
     def check_shared(self) -> None:
         """Raise ValueError for a store that is in the memory of this process."""
-        zarr = import_extra("zarr", "grid", PURPOSE)
-        is_here = isinstance(self.store, zarr.storage.MemoryStore)
+        is_here = isinstance(self.store, _zarr().storage.MemoryStore)
         is_here |= "memory" in _protocols(self.store)
         try:
             pickle.dumps(self.store)
@@ -174,7 +176,7 @@ def open_keys(store: object) -> Keys:
 
     Nothing is read or written.
     """
-    zarr = import_extra("zarr", "grid", PURPOSE)
+    zarr = _zarr()
     name = str(store)
     if isinstance(store, str) and "://" in store:
         store = _store_of(store)
@@ -190,7 +192,7 @@ def open_keys(store: object) -> Keys:
 
 def _store_of(url: str) -> Any:
     """Return the store of a URL."""
-    zarr = import_extra("zarr", "grid", PURPOSE)
+    zarr = _zarr()
     try:
         store = zarr.storage.FsspecStore.from_url(url)
     except ImportError as error:
