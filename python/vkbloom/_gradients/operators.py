@@ -14,7 +14,7 @@ import numpy as np
 
 from vkbloom._extras import import_extra
 from vkbloom._gradients.passes import in_floats
-from vkbloom._gradients.pulling import pull_each, pullback_of
+from vkbloom._gradients.pulling import pull_each, pullback_of, undefined
 from vkbloom._image_arguments import check_mask
 from vkbloom._psf.values import ARRAYS, ArrayValue
 from vkbloom._renderer.default import default_renderer, renderer_on
@@ -166,6 +166,8 @@ class _Call(NamedTuple):
 
 def _pull(arrays: dict[str, Any], settings: Settings, renderer: int, cotangent: Any) -> Any:
     """Return the derivatives: of the reference for float64, else of the renderer."""
+    if not np.isfinite(cotangent).all():
+        return undefined(arrays, settings)
     if arrays["image"].dtype == np.float64:
         return reference_vjp(settings=settings, **arrays)[1]({"final": cotangent})
     pullback = pullback_of(_renderer(renderer), check_inputs(**arrays), settings)
@@ -175,6 +177,8 @@ def _pull(arrays: dict[str, Any], settings: Settings, renderer: int, cotangent: 
 def _pull_on_device(call: _Call, cotangent: Any) -> Iterator[Any]:
     """Yield the derivatives of each image, with those by images as tensors of the GPU."""
     renderer, mask = _renderer(call.renderer, call.image), call.mask
+    # CUDA copies what `take` gets.
+    renderer._pending.wait()
     core = renderer._core
     masks = None if mask is None else mask.detach().reshape(-1, *mask.shape[-2:]).cpu().numpy()
     images, emissions, cotangents = (

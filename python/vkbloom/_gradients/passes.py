@@ -50,18 +50,23 @@ class Running:
     plan: _core.Plan
     arrays: tuple[NDArray[Any] | _core.Exported, ...]
     destination: Destination
-    submission: _core.Submission | None
+    submission: requests.PendingSubmission | None
 
-    def by_name(self) -> dict[str, NDArray[Any]]:
-        """Wait, and return the framebuffers."""
+    def check(self) -> None:
+        """Wait, and raise ValueError if a cotangent is not finite."""
         counts = self.submission.wait()[1] if self.submission else (1, 0)
         # The device counts what is not finite in all inputs together.
         if any(counts):
             check_finite(self.passes.cotangents)
+
+    def by_name(self) -> dict[str, NDArray[Any]]:
+        """Return the framebuffers; wait for those that no stream of a GPU waits for."""
+        if self.submission and not self.submission.ordered:
+            self.submission.complete()
         return requests.name_outputs(self.plan, self.arrays, self.destination)
 
     def images(self) -> dict[str, NDArray[Any]]:
-        """Wait, and return the derivatives by image, mask and emission."""
+        """Return the derivatives by image, mask and emission, as `by_name` does."""
         framebuffers = self.by_name()
         return {
             name: framebuffers[f".by_{name}"]
@@ -108,7 +113,11 @@ class Passes:
             return None
         destination: Destination = self.destination if results == "images" else "host"
         arrays = new_arrays(core, plan, destination)
-        submission = core.run(source, (plan,), (arrays,)) if plan.outputs else None
+        if not plan.outputs:
+            return Running(self, plan, arrays, destination, None)
+        submission = requests.PendingSubmission(core.run(source, (plan,), (arrays,)))
+        if submission.ordered:
+            self.renderer._pending.add(submission)
         return Running(self, plan, arrays, destination, submission)
 
     def fields(self) -> dict[str, NDArray[np.float32]]:

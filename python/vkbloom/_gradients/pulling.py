@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom._argument_types import check_arguments
-from vkbloom._gradients.passes import DeviceGradients, Passes, check_finite, in_floats
+from vkbloom._gradients.passes import DeviceGradients, Passes, Running, check_finite, in_floats
 from vkbloom._public import public
 from vkbloom._renderer.default import default_renderer
 from vkbloom._renderer.device_arrays import (
@@ -190,8 +190,17 @@ def pullback_of(
     renderer: Renderer, inputs: Inputs, settings: Settings, destination: Destination = "host"
 ) -> Callable[[Checked], Derivatives]:
     """Return the pullback alone, of arrays that do not change, and checked cotangents."""
-    start = _starter(renderer, inputs, settings, destination)
-    return lambda cotangents: start(cotangents)()
+    adjoint = _Adjoint(renderer, inputs, settings, destination)
+
+    def pull(cotangents: Checked) -> Derivatives:
+        running = adjoint.passes(cotangents).submit()
+        if running is None:
+            check_finite(cotangents)
+        else:
+            running.check()
+        return adjoint.derivatives(cotangents, running)
+
+    return pull
 
 
 def pull_each(
@@ -200,43 +209,62 @@ def pull_each(
     sequence: Iterable[tuple[Inputs, Checked]],
     destination: Destination = "host",
 ) -> Iterator[Derivatives]:
-    """Yield the derivatives of each image. The device works on later ones meanwhile."""
+    """Yield the derivatives of each image. The device works on later ones meanwhile.
+
+    The host does not wait for those on a GPU. So cotangents may be NaN and infinite there, and so
+    are the derivatives then.
+    """
     started: deque[Callable[[], Derivatives]] = deque()
     for inputs, cotangents in sequence:
-        started.append(_starter(renderer, inputs, settings, destination)(cotangents))
+        adjoint = _Adjoint(renderer, inputs, settings, destination)
+        running = adjoint.passes(cotangents).submit()
+        started.append(functools.partial(adjoint.derivatives, cotangents, running))
         if len(started) == IMAGES_AHEAD:
             yield started.popleft()()
     while started:
         yield started.popleft()()
 
 
-def _starter(
-    renderer: Renderer, inputs: Inputs, settings: Settings, destination: Destination
-) -> Callable[[Checked], Callable[[], Derivatives]]:
-    """Return a function that submits passes, and returns one that waits for the derivatives."""
-    floats = in_floats(settings)
-    recorded = functools.cache(lambda: reference_vjp(settings=settings, **inputs.on_host())[1])
-    names = (*inputs.by_name(), *_names(settings))
+@dataclass(frozen=True, eq=False)
+class _Adjoint:
+    """The adjoint of an image's bloom. Its arrays do not change."""
 
-    def by_reference(cotangents: Checked) -> Gradients:
-        check_finite(cotangents)
-        derivatives = recorded()({name: on_host(part) for name, part in cotangents.items()})
+    renderer: Renderer
+    inputs: Inputs
+    settings: Settings
+    destination: Destination
+
+    def passes(self, cotangents: Checked) -> Passes:
+        """Return the passes that take cotangents back."""
+        floats = in_floats(self.settings)
+        return Passes(self.renderer, self.inputs, floats, cotangents, self.destination)
+
+    def derivatives(self, cotangents: Checked, running: Running | None) -> Derivatives:
+        """Return the derivatives of passes; None: those of the reference."""
+        if running is None:
+            made = self._by_reference(cotangents)
+            return _place(made, self.inputs, self.destination, self.renderer)
+        names = (*self.inputs.by_name(), *_names(self.settings))
+        every = functools.partial(self._by_reference, cotangents)
+        return DeviceGradients(running.images(), names, running.passes.fields, every)
+
+    @functools.cached_property
+    def _recorded(self) -> Callable[[Mapping[str, NDArray[Any]]], Gradients]:
+        return reference_vjp(settings=self.settings, **self.inputs.on_host())[1]
+
+    def _by_reference(self, cotangents: Checked) -> Gradients:
+        arrays = {name: on_host(part) for name, part in cotangents.items()}
+        if not all(np.isfinite(part).all() for part in arrays.values()):
+            return undefined(self.inputs.by_name(), self.settings)
+        derivatives = self._recorded(arrays)
         return Gradients((name, part.astype(np.float32)) for name, part in derivatives.items())
 
-    def start(cotangents: Checked) -> Callable[[], Derivatives]:
-        passes = Passes(renderer, inputs, floats, cotangents, destination)
-        running = passes.submit()
 
-        def end() -> Derivatives:
-            if running is None:
-                return _place(by_reference(cotangents), inputs, destination, renderer)
-            return DeviceGradients(
-                running.images(), names, passes.fields, lambda: by_reference(cotangents)
-            )
-
-        return end
-
-    return start
+def undefined(images: Mapping[str, Any], settings: Settings) -> Gradients:
+    """Return the derivatives of cotangents that are not finite: NaN."""
+    shapes = {name: part.shape for name, part in images.items()}
+    shapes |= {name: np.shape(value) for name, value in differentiable(settings).items()}
+    return Gradients((name, np.full(shape, np.nan, np.float32)) for name, shape in shapes.items())
 
 
 @functools.lru_cache(16)

@@ -11,6 +11,7 @@ import numpy as np
 
 from vkbloom import _core
 from vkbloom._renderer.device_arrays import DeviceArray, memory_for
+from vkbloom._renderer.requests import PendingSubmission
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -96,8 +97,9 @@ class Batches:
                     return
                 part = pending.popleft()
                 done = part.first + part.layers
-                submission = self._pending.add(part.submission)
-                if not part.submission.ordered:
+                submission = PendingSubmission(part.submission)
+                self._pending.add(submission)
+                if not submission.ordered:
                     submission.complete()
                 while part.frames:
                     # Yielded frames are not kept, so that the caller is their only owner.

@@ -712,7 +712,9 @@ class Renderer:
         after = before.advance(self._core, plan, submission)
         frames = self._frames(settings, requests.name_outputs(plan, arrays, destination), after)
         if not out and submission.ordered:
-            frames._finish_later(self._pending.add(submission).of_request)
+            pending = requests.PendingSubmission(submission)
+            self._pending.add(pending)
+            frames._finish_later(pending.of_request)
             self._save_pipelines()
             return frames
         (timings,), counts = submission.wait()

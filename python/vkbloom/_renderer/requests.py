@@ -46,6 +46,8 @@ class PendingSubmission:
     """
 
     def __init__(self, submission: _core.Submission) -> None:
+        #: Whether streams of the GPU wait for all of its arrays, so that the host need not.
+        self.ordered = submission.ordered
         self._lock = ProcessLock()
         self._submission: _core.Submission | None = submission
         self._results: tuple[list[dict[str, float]], tuple[int, ...]] | None = None
@@ -95,11 +97,9 @@ class PendingSubmissions:
     def __init__(self) -> None:
         self._pending: deque[PendingSubmission] = deque()
 
-    def add(self, submission: _core.Submission) -> PendingSubmission:
+    def add(self, submission: PendingSubmission) -> None:
         """Add a submission."""
-        pending = PendingSubmission(submission)
-        self._pending.append(pending)
-        return pending
+        self._pending.append(submission)
 
     def wait(self) -> None:
         """Wait until all are complete."""
