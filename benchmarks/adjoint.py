@@ -104,7 +104,7 @@ def _calls(
         return _pull(renderer, settings, images[turn % 3], cotangents[turn % 3])[1]
 
     source = _core.image_source(images[0], None, None, (cotangents[0],))
-    if renderer._core.plan(source, settings, None, ("final",), False) is None:
+    if renderer._core.plan(source, settings, None, ("final",), "images") is None:
         return None
     return {"forward": forward, "backward": backward}
 
@@ -127,7 +127,7 @@ def _pull(
     """Return the derivatives by the image, and the seconds of the passes."""
     core = renderer._core
     source = _core.image_source(image, None, None, (cotangent,))
-    plan = core.plan(source, settings, None, ("final",), False)
+    plan = core.plan(source, settings, None, ("final",), "images")
     assert plan is not None
     arrays = new_arrays(core, plan)
     (timings,), _ = core.run(source, (plan,), (arrays,)).wait()

@@ -149,7 +149,7 @@ bool vkb_build_adjoint(const struct vkb_source *source, const struct vkb_setting
     *possible = true;
     done = done && add_passes(&adjoint, settings, possible, error)
         && vkb_table_end(&adjoint.table, graph, adjoint.table_image, error)
-        && (cotangents->sums || show_results(&adjoint, image_count, error));
+        && (!cotangents->images || show_results(&adjoint, image_count, error));
     vkb_free(adjoint.table.texels);
     vkb_free(adjoint.cotangents);
     return done;

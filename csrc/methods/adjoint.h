@@ -11,11 +11,12 @@
 struct vkb_cotangents {
     vkb_image_name names[GATHERED_LEVELS];
     uint32_t count;
-    bool sums;  // the derivatives by fields are wanted, not those by images
+    bool images;  // the derivatives by images are wanted
+    bool sums;    // those by fields
 };
 
 // Adds the framebuffers ".by_image", ".by_emission" and ".by_mask", of those that the source has
-// and that the cotangents depend on. Or, as sums of one pixel, ".by_composite" (intensity,
+// and that the cotangents depend on, and, as sums of one pixel, ".by_composite" (intensity,
 // exposure, reference white) and ".by_threshold" (threshold, knee), where the passes read these,
 // and the same with "_squares". *first is the index of the first image that is added. *possible
 // becomes false if a pass has no adjoint.

@@ -8,6 +8,7 @@
 #include "methods/unreal.h"
 
 #include <stdio.h>
+#include <string.h>
 
 // The derivatives that a plan is of.
 struct portion {
@@ -284,6 +285,16 @@ static bool read_cotangents(PyObject *tuple, struct vkb_cotangents *cotangents)
     return true;
 }
 
+static bool read_results(const char *name, struct vkb_cotangents *cotangents)
+{
+    const bool all = strcmp(name, "all") == 0;
+
+    cotangents->images = all || strcmp(name, "images") == 0;
+    cotangents->sums = all || strcmp(name, "sums") == 0;
+    return cotangents->images || cotangents->sums
+        || vkb_refuse("results: '%s' is not 'images', 'sums' or 'all'", name);
+}
+
 PyObject *vkb_renderer_plan(PyObject *object, PyObject *arguments)
 {
     struct vkb_renderer *renderer = (struct vkb_renderer *)object;
@@ -293,14 +304,13 @@ PyObject *vkb_renderer_plan(PyObject *object, PyObject *arguments)
     struct portion portion = {.renderer = renderer, .cotangents = &given, .is_possible = true};
     struct vkb_settings settings;
     struct vkb_error error = {0};
-    int sums = false;
+    const char *results = "images";
 
-    if (!PyArg_ParseTuple(arguments, "O!OO|O!p:plan", state->source_type, &source, &settings_object,
-                          &names, &PyTuple_Type, &cotangents, &sums)
+    if (!PyArg_ParseTuple(arguments, "O!OO|O!s:plan", state->source_type, &source, &settings_object,
+                          &names, &PyTuple_Type, &cotangents, &results)
         || !vkb_read_settings(settings_object, &settings)
-        || (cotangents && !read_cotangents(cotangents, &given)))
+        || (cotangents && !read_cotangents(cotangents, &given)) || !read_results(results, &given))
         return NULL;
-    given.sums = sums;
     if (cotangents && ((struct vkb_source_object *)source)->source.kind != VKB_SOURCE_IMAGE) {
         vkb_refuse("cotangents: the source is not an image");
         return NULL;

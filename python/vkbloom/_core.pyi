@@ -90,7 +90,7 @@ class Renderer:
         settings: object,
         names: None,
         cotangents: tuple[str, ...],
-        sums: bool,
+        results: str,
         /,
     ) -> Plan | None: ...
     @overload

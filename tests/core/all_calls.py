@@ -168,7 +168,7 @@ def adjoint(renderer: Renderer, which: int, size: int) -> Any:
     core = renderer._core
     image = IMAGES[size].astype(np.float32)
     source = _core.image_source(image, None, None, (image,))
-    plan = core.plan(source, SETTINGS[1], None, ("final",), False)
+    plan = core.plan(source, SETTINGS[1], None, ("final",), "images")
     return [] if plan is None else run(core, source, plan)
 
 

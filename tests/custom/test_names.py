@@ -229,7 +229,7 @@ def test_derivatives_beside_textures_of_their_names(renderer: Renderer) -> None:
     passes = [Pass("GLOW", name, 1, 0) for name in (*names, "BLOOM")]
     settings = load_method("\n".join(one.text() for one in passes), name="derived")()
     source = _core.image_source(IMAGE, None, None, (np.zeros_like(IMAGE),))
-    plan = renderer._core.plan(source, settings, None, ("glow",), False)
+    plan = renderer._core.plan(source, settings, None, ("glow",), "images")
     assert plan is not None
     assert [name for name, _, _ in plan.outputs] == [".by_image"]
 

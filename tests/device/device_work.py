@@ -26,7 +26,9 @@ from tests.device.abilities import infinities
 from tests.exhaustive import EXHAUSTIVE
 from tests.images import picture
 from vkbloom import Convolution, Pyramid, Renderer, Separable
+from vkbloom._gradients.pulling import pull_each
 from vkbloom._renderer.device_arrays import merge
+from vkbloom._renderer.sources import check_inputs
 
 VALIDATION = "validated" in sys.argv
 #: Whether calls return before the device has finished.
@@ -449,6 +451,12 @@ def gradient_places(renderer: Any) -> None:
     ]
     for name, given, kind, part in refused:
         raises(kind, part, functools.partial(pullback, {name: given}))
+    # An operator of PyTorch does not look at them, since the host does not wait.
+    pulled = (check_inputs(OnDevice(image), core=renderer._core), {"final": wrong})
+    for fields in ((), ("threshold", "intensity")):
+        (derivatives,) = pull_each(renderer, settings, [pulled], fields, "cuda")
+        assert not np.isfinite(np.asarray(derivatives["image"])[3, 4]).all()
+        assert all(np.isnan(derivatives[name]) for name in fields)
     # NaN of the image is not the cotangent's.
     spoilt = vjp(wrong, settings, renderer=renderer)[1]({"final": image})
     equal_gradients(

@@ -236,7 +236,7 @@ def test_nothing_built_in_is_left_to_the_reference(renderer: Renderer, name: str
     settings = BUILT_IN[name].replace(**SINGLE)
     image = np.zeros((64, 80, 4), np.float32)
     source = Inputs(image).source((image,))
-    assert renderer._core.plan(source, settings, None, ("final",), False) is not None
+    assert renderer._core.plan(source, settings, None, ("final",), "images") is not None
 
 
 def test_all_methods_and_stages_are_among_them() -> None:
@@ -290,7 +290,7 @@ def test_groups_of_pixels_are_added_up(
     off = products.sum() - (found.astype(np.float64) * image).sum()
     assert abs(off) <= 1e-7 * np.abs(products).sum()
     source = Inputs(image).source((cotangent,))
-    plan = renderer._core.plan(source, settings.replace(**SINGLE), None, (name,), False)
+    plan = renderer._core.plan(source, settings.replace(**SINGLE), None, (name,), "images")
     assert plan
     shaders = [shader for _, shader, *_ in plan.passes]
     gathering = sum(shader.startswith(("adjoint_beams", "adjoint_moved")) for shader in shaders)
@@ -409,11 +409,15 @@ def test_variants_are_transposed(varied: dict[str, Renderer], case: tuple[Any, .
         found = vkbloom.vjp(image, settings, renderer=renderer)[1](cotangents)
         check(found, reference.vjp(image, settings)[1](cotangents), "image")
         # The sums need the images between; the other derivatives keep their bits.
-        Passes(renderer, Inputs(image), floats, cotangents).fields()
+        running = Passes(renderer, Inputs(image), floats, cotangents).submit("all")
+        assert running
+        assert np.allclose(running.images()["image"], found["image"], rtol=0, atol=1e-5)
+        for name, value in running.fields().items():
+            assert np.allclose(value, found[name], rtol=1e-5, atol=0), name
         again = vkbloom.vjp(image, settings, renderer=renderer)[1](cotangents)
         assert np.array_equal(again["image"], found["image"])
     source = Inputs(image).source((cotangents["final"],))
-    plan = renderer._core.plan(source, floats, None, ("final",), False)
+    plan = renderer._core.plan(source, floats, None, ("final",), "images")
     assert plan
     shaders = [shader for _, shader, *_ in plan.passes]
     if variant == "gpu" or has_linear_texels(renderer):

@@ -158,6 +158,20 @@ def test_wrong_arguments_are_named(call: str, error: str) -> None:
     assert_refused(call, error, {**globals(), **names})
 
 
+@pytest.mark.parametrize("dtype", [torch.float32, torch.float64])
+@pytest.mark.parametrize("value", [float("nan"), float("inf")])
+def test_cotangents_that_are_not_finite_reach_the_derivatives(
+    renderer: Renderer, value: float, dtype: Any
+) -> None:
+    # As a scaler of gradients expects, which then skips the step.
+    image, cotangent = tensor(7, 9, 3, dtype=dtype), torch.ones(7, 9, 3, dtype=dtype)
+    cotangent[3, 4, 1] = value
+    module = vkbloom_torch.Bloom(SETTINGS, learn=("intensity", "knee"), renderer=renderer)
+    module(image).backward(cotangent.to(DEVICE))
+    assert not image.grad[3, 4].isfinite().all()
+    assert not any(parameter.grad.isfinite() for parameter in module.parameters())
+
+
 def test_an_empty_batch_is_empty(renderer: Renderer) -> None:
     image, mask = tensor(2, 0, 4, 5, 3), tensor(2, 0, 4, 5)
     module = vkbloom_torch.Bloom(SETTINGS, learn=("intensity",), renderer=renderer).to(DEVICE)

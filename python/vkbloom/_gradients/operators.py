@@ -202,7 +202,7 @@ def _pull_on_device(call: _Call, cotangent: Any) -> Iterator[Any]:
         for index in range(images.shape[0])
     )
     settings = replace(_settings(call.settings), call.fields)
-    yield from pull_each(renderer, settings, sequence, "cuda")
+    yield from pull_each(renderer, settings, sequence, call.fields, "cuda")
 
 
 def _batch(tensor: Any) -> Any:

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from vkbloom import _core
 from vkbloom._locks import ProcessLock
 from vkbloom._renderer import requests
-from vkbloom._renderer.device_arrays import Destination, ImportedArray, place
-from vkbloom._renderer.new_arrays import new_arrays
+from vkbloom._renderer.device_arrays import Destination, ImportedArray, on_host, place
+from vkbloom._renderer.new_arrays import new_memory
 from vkbloom._renderer.renderer import DerivativeKind, Renderer
 from vkbloom._renderer.sources import Inputs
 from vkbloom.reference._derivatives import Gradients, check_known, differentiable
@@ -24,13 +24,15 @@ if TYPE_CHECKING:
 
 #: The most framebuffers with cotangents that a source can bring.
 _MAX_LEVELS: Final = 7
+#: The framebuffers of derivatives by images.
+_BY_IMAGES: Final = (".by_image", ".by_emission", ".by_mask")
 #: The fields whose derivatives are the channels of a sum.
 _SUMS: Final = {
     ".by_composite": ("intensity", "exposure", "reference_white"),
     ".by_threshold": ("threshold", "knee"),
 }
 #: A sum that is less than this, relative to the root of the sum of its squares, has lost digits.
-_MIN_SHARE: Final = 0.3
+MIN_SHARE: Final = 0.3
 #: Curves that magnify the rounding of a float.
 _STEEP: Final = {"aces", "agx", "pq", "hlg"}
 
@@ -49,8 +51,8 @@ class Running:
     passes: Passes
     plan: _core.Plan
     arrays: tuple[NDArray[Any] | _core.Exported, ...]
-    destination: Destination
     submission: requests.PendingSubmission | None
+    has_sums: bool
 
     def check(self) -> None:
         """Wait, and raise ValueError if a cotangent is not finite."""
@@ -63,7 +65,7 @@ class Running:
         """Return the framebuffers; wait for those that no stream of a GPU waits for."""
         if self.submission and not self.submission.ordered:
             self.submission.complete()
-        return requests.name_outputs(self.plan, self.arrays, self.destination)
+        return requests.name_outputs(self.plan, self.arrays, self.passes.destination)
 
     def images(self) -> dict[str, NDArray[Any]]:
         """Return the derivatives by image, mask and emission, as `by_name` does."""
@@ -75,9 +77,29 @@ class Running:
             for name, part in self.passes.inputs.by_name().items()
         }
 
+    def fields(self, min_share: float = MIN_SHARE) -> dict[str, NDArray[np.float32]]:
+        """Return the derivatives by fields that the device has.
+
+        A sum that is less than `min_share` of the root of the sum of its squares is left out.
+        """
+        wanted = device_fields(self.passes.settings)
+        if not wanted:
+            return {}
+        running = self if self.has_sums else self.passes.submit("sums")
+        totals = running.by_name() if running else {}
+        results: dict[str, NDArray[np.float32]] = {}
+        for kind, names in _SUMS.items():
+            if kind not in totals:
+                continue
+            sums, squares = (on_host(totals[key])[0, 0] for key in (kind, f"{kind}_squares"))
+            for name, total, square in zip(names, sums, squares, strict=False):
+                if name in wanted and abs(total) >= min_share * np.sqrt(square):
+                    results[name] = np.asarray(total)
+        return results
+
     def _zeros(self, shape: tuple[int, ...]) -> NDArray[Any]:
-        core = self.passes.renderer._core
-        return cast("NDArray[Any]", place(np.zeros(shape, np.float32), self.destination, core))
+        zeros, passes = np.zeros(shape, np.float32), self.passes
+        return cast("NDArray[Any]", place(zeros, passes.destination, passes.renderer._core))
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,7 +117,7 @@ class Passes:
     destination: Destination = "host"
 
     def submit(self, results: DerivativeKind = "images") -> Running | None:
-        """Submit the passes of the derivatives by images, or the sums of those by fields.
+        """Submit the passes of the derivatives by images, the sums of those by fields, or all.
 
         None: a pass has no adjoint, or the renderer is closed.
         """
@@ -111,29 +133,17 @@ class Passes:
         )
         if plan is None:
             return None
-        destination: Destination = self.destination if results == "images" else "host"
-        arrays = new_arrays(core, plan, destination)
-        if not plan.outputs:
-            return Running(self, plan, arrays, destination, None)
-        submission = requests.PendingSubmission(core.run(source, (plan,), (arrays,)))
-        if submission.ordered:
-            self.renderer._pending.add(submission)
-        return Running(self, plan, arrays, destination, submission)
-
-    def fields(self) -> dict[str, NDArray[np.float32]]:
-        """Return the derivatives by fields that are exact to single floats."""
-        wanted = device_fields(self.settings)
-        running = self.submit("sums") if wanted else None
-        totals = running.by_name() if running else {}
-        results: dict[str, NDArray[np.float32]] = {}
-        for kind, names in _SUMS.items():
-            if kind not in totals:
-                continue
-            sums, squares = (totals[key][0, 0] for key in (kind, f"{kind}_squares"))
-            for name, total, square in zip(names, sums, squares, strict=False):
-                if name in wanted and abs(total) >= _MIN_SHARE * np.sqrt(square):
-                    results[name] = np.asarray(total)
-        return results
+        # The host reads the sums.
+        arrays = tuple(
+            new_memory(core, shape, dtype, self.destination if name in _BY_IMAGES else "host")
+            for name, shape, dtype in plan.outputs
+        )
+        submission = None
+        if arrays:
+            submission = requests.PendingSubmission(core.run(source, (plan,), (arrays,)))
+            if submission.ordered:
+                self.renderer._pending.add(submission)
+        return Running(self, plan, arrays, submission, results != "images")
 
 
 def _level(cotangent: NDArray[Any] | ImportedArray) -> NDArray[Any] | ImportedArray:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
@@ -12,7 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom._argument_types import check_arguments
-from vkbloom._gradients.passes import DeviceGradients, Passes, Running, check_finite, in_floats
+from vkbloom._gradients.passes import (
+    MIN_SHARE,
+    DeviceGradients,
+    Passes,
+    Running,
+    check_finite,
+    device_fields,
+    in_floats,
+)
 from vkbloom._public import public
 from vkbloom._renderer.default import default_renderer
 from vkbloom._renderer.device_arrays import (
@@ -26,7 +34,7 @@ from vkbloom._renderer.device_arrays import (
 )
 from vkbloom._renderer.frames import Frames
 from vkbloom._renderer.image import Image
-from vkbloom._renderer.renderer import Renderer
+from vkbloom._renderer.renderer import DerivativeKind, Renderer
 from vkbloom._renderer.requests import IMAGES_AHEAD
 from vkbloom._renderer.sources import Inputs, check_inputs, image_source, uploaded_inputs
 from vkbloom._settings.settings import Settings, check_settings
@@ -207,17 +215,20 @@ def pull_each(
     renderer: Renderer,
     settings: Settings,
     sequence: Iterable[tuple[Inputs, Checked]],
+    fields: Collection[str],
     destination: Destination = "host",
 ) -> Iterator[Derivatives]:
     """Yield the derivatives of each image. The device works on later ones meanwhile.
 
-    The host does not wait for those on a GPU. So cotangents may be NaN and infinite there, and so
-    are the derivatives then.
+    The host waits for those on a GPU only if some by `fields` are there, too. So cotangents may be
+    NaN and infinite, and so are the derivatives then. A sum by a field has the accuracy of single
+    floats relative to the root of the sum of its squares.
     """
+    kind: DerivativeKind = "images" if device_fields(settings).isdisjoint(fields) else "all"
     started: deque[Callable[[], Derivatives]] = deque()
     for inputs, cotangents in sequence:
-        adjoint = _Adjoint(renderer, inputs, settings, destination)
-        running = adjoint.passes(cotangents).submit()
+        adjoint = _Adjoint(renderer, inputs, settings, destination, min_share=0.0)
+        running = adjoint.passes(cotangents).submit(kind)
         started.append(functools.partial(adjoint.derivatives, cotangents, running))
         if len(started) == IMAGES_AHEAD:
             yield started.popleft()()
@@ -233,6 +244,7 @@ class _Adjoint:
     inputs: Inputs
     settings: Settings
     destination: Destination
+    min_share: float = MIN_SHARE
 
     def passes(self, cotangents: Checked) -> Passes:
         """Return the passes that take cotangents back."""
@@ -246,7 +258,8 @@ class _Adjoint:
             return _place(made, self.inputs, self.destination, self.renderer)
         names = (*self.inputs.by_name(), *_names(self.settings))
         every = functools.partial(self._by_reference, cotangents)
-        return DeviceGradients(running.images(), names, running.passes.fields, every)
+        fields = functools.partial(running.fields, self.min_share)
+        return DeviceGradients(running.images(), names, fields, every)
 
     @functools.cached_property
     def _recorded(self) -> Callable[[Mapping[str, NDArray[Any]]], Gradients]:
@@ -257,7 +270,9 @@ class _Adjoint:
         if not all(np.isfinite(part).all() for part in arrays.values()):
             return undefined(self.inputs.by_name(), self.settings)
         derivatives = self._recorded(arrays)
-        return Gradients((name, part.astype(np.float32)) for name, part in derivatives.items())
+        # A value beyond single floats becomes infinite, as on the device.
+        with np.errstate(over="ignore"):
+            return Gradients((name, part.astype(np.float32)) for name, part in derivatives.items())
 
 
 def undefined(images: Mapping[str, Any], settings: Settings) -> Gradients:

@@ -65,7 +65,7 @@ RENDERERS: Final[weakref.WeakValueDictionary[int, Renderer]] = weakref.WeakValue
 _numbers = itertools.count(1)
 
 #: What adjoint passes compute: derivatives by images, or sums of derivatives by fields.
-DerivativeKind = Literal["images", "sums"]
+DerivativeKind = Literal["images", "sums", "all"]
 
 
 def _frame_seconds() -> float:
@@ -775,7 +775,7 @@ class Renderer:
         results: DerivativeKind,
     ) -> _core.Plan | None:
         """Return the plan of derivatives, or None if a pass has none; the last one if it fits."""
-        return self._find_plan(source, settings, None, cotangents, results == "sums")
+        return self._find_plan(source, settings, None, cotangents, results)
 
     def _find_plan(
         self,
