@@ -308,16 +308,16 @@ STEPS: dict[str, Settings] = {
 
 
 def plan_derivatives(
-    renderer: Renderer, settings: Settings, size: tuple[int, int], *sums: bool
+    renderer: Renderer, settings: Settings, size: tuple[int, int], results: str | None = None
 ) -> tuple[Any, Any]:
     """Return a source and its plan: of frames, or of derivatives by images or by fields."""
     pixels = picture(*size, 3, dtype="float32")
     floats = settings.replace(format="rgba32float")
-    if not sums:
+    if results is None:
         source = Inputs(pixels).source()
         return source, renderer._core.plan(source, floats, None)
     source = Inputs(pixels).source((pixels,))
-    return source, renderer._core.plan(source, floats, None, ("final",), *sums)
+    return source, renderer._core.plan(source, floats, None, ("final",), results)
 
 
 @pytest.mark.parametrize("name", STEPS)
@@ -325,7 +325,7 @@ def test_a_training_step_computes_no_transposes_again(renderer: Renderer, name: 
     """Also with other settings, after another size."""
     settings, counts = STEPS[name], []
     for size, intensity in (((37, 22), 0.5), ((37, 22), 0.6), ((22, 37), 0.6), ((37, 22), 0.7)):
-        plan_derivatives(renderer, settings.replace(intensity=intensity), size, False)
+        plan_derivatives(renderer, settings.replace(intensity=intensity), size, "images")
         counts.append(renderer._core.transposes[0])
     assert counts[0] == counts[1]
     assert counts[2] == counts[3]
@@ -336,7 +336,7 @@ def test_transposes_that_are_kept_are_few(renderer: Renderer) -> None:
     with Renderer(renderer.info.name) as own:
         sizes: list[int] = []
         for width in range(16_000, 16_040):
-            plan_derivatives(own, Pyramid(levels=12), (width, 1), False)
+            plan_derivatives(own, Pyramid(levels=12), (width, 1), "images")
             sizes.append(own._core.transposes[1])
         assert max(sizes) <= 32 << 20
         assert any(after < before for before, after in itertools.pairwise(sizes))
@@ -363,9 +363,9 @@ def test_plans_of_derivatives_are_kept(renderer: Renderer) -> None:
         assert other is not plans[2][1]
 
 
-def passes_of(renderer: Renderer, settings: Settings, *sums: bool) -> set[str]:
+def passes_of(renderer: Renderer, settings: Settings, results: str | None = None) -> set[str]:
     """Run a plan of plan_derivatives(); return the names of the passes that ran."""
-    source, plan = plan_derivatives(renderer, settings, (19, 12), *sums)
+    source, plan = plan_derivatives(renderer, settings, (19, 12), results)
     arrays = new_arrays(renderer._core, plan, "host")
     return {*renderer._core.run(source, (plan,), (arrays,), True).wait()[0][0]}
 
@@ -378,7 +378,7 @@ def test_a_convolution_and_its_transpose_have_one_spectrum(
     kernel = np.random.default_rng(1).random((5, 4, 3))
     settings = Convolution(kernel, boundary=boundary, tonemap="reinhard")
     assert "kernel" in passes_of(renderer, settings)
-    ran = passes_of(renderer, settings, False)
+    ran = passes_of(renderer, settings, "images")
     assert "spectrum" in ran
     assert "kernel" not in ran
 
@@ -386,7 +386,7 @@ def test_a_convolution_and_its_transpose_have_one_spectrum(
 def test_sums_find_the_cotangents_of_images(renderer: Renderer) -> None:
     """What the derivatives by images need is not computed again for those by fields."""
     settings = Pyramid(levels=3, threshold=0.3, knee=0.2)
-    images, sums = (passes_of(renderer, settings, wanted) for wanted in (False, True))
+    images, sums = (passes_of(renderer, settings, wanted) for wanted in ("images", "sums"))
     assert any(name.startswith("adjoint") for name in images)
     assert not any(name.startswith("adjoint") for name in sums)
     # On GPUs they are named by what is added up.

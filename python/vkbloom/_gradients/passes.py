@@ -93,7 +93,8 @@ class Running:
                 continue
             sums, squares = (on_host(totals[key])[0, 0] for key in (kind, f"{kind}_squares"))
             for name, total, square in zip(names, sums, squares, strict=False):
-                if name in wanted and abs(total) >= min_share * np.sqrt(square):
+                # Infinite sums are left to the reference.
+                if name in wanted and np.isfinite(square) and total**2 >= min_share**2 * square:
                     results[name] = np.asarray(total)
         return results
 

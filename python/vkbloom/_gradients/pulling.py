@@ -224,7 +224,9 @@ def pull_each(
     NaN and infinite, and so are the derivatives then. A sum by a field has the accuracy of single
     floats relative to the root of the sum of its squares.
     """
-    kind: DerivativeKind = "images" if device_fields(settings).isdisjoint(fields) else "all"
+    kind: DerivativeKind = "images"
+    if fields and not device_fields(settings).isdisjoint(fields):
+        kind = "all"
     started: deque[Callable[[], Derivatives]] = deque()
     for inputs, cotangents in sequence:
         adjoint = _Adjoint(renderer, inputs, settings, destination, min_share=0.0)
