@@ -13,15 +13,15 @@ Curve = Callable[[NDArray[Any]], NDArray[np.float64]]
 # Table 4, PQ; and Rec. ITU-R BT.2408: the luminance of diffuse white in cd/m2.
 _M1, _M2 = 2610 / 16384, 2523 / 32
 _C1, _C2, _C3 = 3424 / 4096, 2413 / 128, 2392 / 128
-_WHITE: Final = 203.0
+WHITE: Final = 203.0
 # Table 5, HLG: its bright part is a ln(12 E - b) + c. A value of 1 is this E, the signal 0.75.
 _A, _B = 0.17883277, 0.28466892
 _C = 0.5 - _A * np.log(4 * _A)
-_SCENE: Final = 0.26496
+SCENE: Final = 0.26496
 
 
 def _pq(colours: NDArray[Any]) -> NDArray[np.float64]:
-    luminance = np.clip(np.nan_to_num(colours.astype(float)) * (_WHITE / 1e4), 0, 1)
+    luminance = np.clip(np.nan_to_num(colours.astype(float)) * (WHITE / 1e4), 0, 1)
     power = luminance**_M1
     signal: NDArray[np.float64] = ((_C1 + _C2 * power) / (1 + _C3 * power)) ** _M2
     return signal
@@ -30,12 +30,12 @@ def _pq(colours: NDArray[Any]) -> NDArray[np.float64]:
 def _from_pq(signal: NDArray[Any]) -> NDArray[np.float64]:
     power = signal.astype(float) ** (1 / _M2)
     share: NDArray[np.float64] = np.maximum(power - _C1, 0) / (_C2 - _C3 * power)
-    luminance: NDArray[np.float64] = share ** (1 / _M1) * (1e4 / _WHITE)
+    luminance: NDArray[np.float64] = share ** (1 / _M1) * (1e4 / WHITE)
     return luminance
 
 
 def _hlg(colours: NDArray[Any]) -> NDArray[np.float64]:
-    light = np.clip(_SCENE * np.nan_to_num(colours.astype(float)), 0, 1)
+    light = np.clip(SCENE * np.nan_to_num(colours.astype(float)), 0, 1)
     bright = _A * np.log(np.maximum(12 * light - _B, 1e-9)) + _C
     signal: NDArray[np.float64] = np.where(light <= 1 / 12, np.sqrt(3 * light), bright)
     return signal
@@ -44,7 +44,7 @@ def _hlg(colours: NDArray[Any]) -> NDArray[np.float64]:
 def _from_hlg(signal: NDArray[Any]) -> NDArray[np.float64]:
     values = signal.astype(float)
     bright = (np.exp((values - _C) / _A) + _B) / 12
-    return np.where(values <= 0.5, values**2 / 3, bright) / _SCENE
+    return np.where(values <= 0.5, values**2 / 3, bright) / SCENE
 
 
 def _from_rec709(signal: NDArray[Any]) -> NDArray[np.float64]:

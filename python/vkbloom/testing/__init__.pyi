@@ -1,4 +1,7 @@
 # The public names of `vkbloom.testing`; lazy_loader reads them, and imports what is asked for.
+from ._bt1702 import FlashVerdict
+from ._display import Display
+from ._flash_rules import FlashRules, FlashTransitions
 from ._judging import Diagnosis, Tolerances, diagnose
 from ._law_report import LawReport, assert_laws, report
 from ._moving_light import Stability, stability
@@ -11,7 +14,11 @@ from ._sequences import Flash, Flicker, flash, flicker
 
 __all__ = [
     "Diagnosis",
+    "Display",
     "Flash",
+    "FlashRules",
+    "FlashTransitions",
+    "FlashVerdict",
     "Flicker",
     "FrameRegression",
     "LawReport",

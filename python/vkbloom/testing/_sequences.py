@@ -1,4 +1,4 @@
-"""Sequences of pictures: flashes that harm, and flicker that is seen."""
+"""Sequences of pictures: flashes that harm by WCAG 2.2, and flicker that is seen."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from importlib.util import find_spec
-from typing import Any, Final
+from typing import Any, Final, Literal, get_args, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,13 @@ from vkbloom._formats import LUMINANCE
 from vkbloom._io.srgb import decode_srgb, encode_srgb
 from vkbloom._numbers import check_number
 from vkbloom._public import public
+from vkbloom._spelling import did_you_mean
+from vkbloom.testing._bt1702 import FlashVerdict, judge_flashes
+from vkbloom.testing._display import Display, Encoding, as_display
+from vkbloom.testing._flash_rules import FlashRules
+
+#: Rules by which sequences are judged: WCAG 2.2, Rec. ITU-R BT.1702, and BT.1702 as IRIS has it.
+Standard = Literal["wcag22", "bt1702", "iris"]
 
 # WCAG 2.2, "general flash and red flash thresholds": changes of at least a tenth of the largest
 # relative luminance, the darker of which is below 0.8; more than three flashes within a second, on
@@ -62,6 +69,11 @@ class Flash:
     red_area: float
     second: float
 
+    @property
+    def failed(self) -> bool:
+        """Whether the sequence fails."""
+        return self.general or self.red
+
     def __str__(self) -> str:
         """Return a line for each kind of flash."""
         return "\n".join(
@@ -96,38 +108,110 @@ class Flicker:
     contrast: NDArray[np.float64]
 
 
+@overload
+def flash(
+    frames: Iterable[NDArray[Any]],
+    fps: float,
+    *,
+    degrees: float | None = None,
+    standard: Literal["wcag22"] = "wcag22",
+    display: None = None,
+) -> Flash: ...
+@overload
+def flash(
+    frames: Iterable[NDArray[Any]],
+    fps: float,
+    *,
+    degrees: float | None = None,
+    standard: Literal["bt1702", "iris"] | FlashRules,
+    display: Display | Encoding | None = None,
+) -> FlashVerdict: ...
 @public("vkbloom.testing")
 @check_arguments
-def flash(frames: Iterable[NDArray[Any]], fps: float, *, degrees: float) -> Flash:
-    """Judge a sequence by the general and the red flash thresholds of WCAG 2.2.
+def flash(
+    frames: Iterable[NDArray[Any]],
+    fps: float,
+    *,
+    degrees: float | None = None,
+    standard: Standard | FlashRules = "wcag22",
+    display: Display | Encoding | None = None,
+) -> Flash | FlashVerdict:
+    """Judge flashes of a sequence by WCAG 2.2 or by Rec. ITU-R BT.1702.
 
-    A general flash is a pair of opposing changes of relative luminance by at least 0.1, where the
-    darker picture is below 0.8. A red flash is a pair of opposing changes of max(0, R - G - B) by
-    more than 20 / 320, one of whose pictures is a saturated red: R / (R + G + B) of at least 0.8. A
-    sequence fails if a quarter of any field of ten degrees has more than three flashes within a
-    second.
+    By WCAG 2.2, a general flash is a pair of opposing changes of relative luminance by at least
+    0.1, where the darker picture is below 0.8. A red flash is a pair of opposing changes of
+    max(0, R - G - B) by more than 20 / 320, one of whose pictures is a saturated red: R / (R + G +
+    B) of at least 0.8. A sequence fails if a quarter of any field of ten degrees has more than
+    three flashes within a second.
+
+    By BT.1702, luminance is absolute: changes of 20 cd/m2 and more, whose darker picture is below
+    160 cd/m2, or with a Michelson contrast of at least 1 / 17 above it on displays of HDR. More
+    than six changes within a second that oppose each other, each of a quarter of the picture at
+    the same time, fail, and so do six stripes or more on a quarter of the picture for half a
+    second. `FlashRules` has all numbers, with sources.
 
     Parameters
     ----------
     frames : iterable of ndarray, shape (H, W, 3) or (H, W, 4)
-        Integers are in sRGB; floats are linear light, and 1 is the white of the display. What is
-        beyond 0..1 is clamped.
+        Integers are in sRGB, or the signal of `display`; floats are linear light, and 1 is the
+        white of the display. What the display does not show is clamped.
     fps : float
         Frames per second.
-    degrees : float
-        Width of the picture in degrees of the field of view, such as 40 for a monitor.
+    degrees : float, optional
+        Width of the picture in degrees of the field of view, such as 40 for a monitor. WCAG 2.2
+        needs it; BT.1702 judges shares of the picture.
+    standard : {"wcag22", "bt1702", "iris"} or FlashRules
+        The rules. "iris" has those of EA's IRIS in its own configuration, which judges the mean of
+        the picture: ``FlashRules.iris()``.
+    display : Display or {"srgb", "pq", "hlg"}, optional
+        What BT.1702 judges by; a name has the defaults of `Display`. Default: SDR with a white of
+        200 cd/m2. WCAG 2.2 takes none.
 
     Returns
     -------
-    Flash
+    Flash or FlashVerdict
+        `Flash` by WCAG 2.2, else `FlashVerdict`. Both have `general` and `red`: whether it fails.
 
     Notes
     -----
-    Source: W3C, Web Content Accessibility Guidelines 2.2, success criterion 2.3.1 and "general
-    flash and red flash thresholds". 0.006 steradians are a quarter of a field of ten degrees.
+    Sources: W3C, Web Content Accessibility Guidelines 2.2, success criterion 2.3.1 and "general
+    flash and red flash thresholds"; 0.006 steradians are a quarter of a field of ten degrees. Rec.
+    ITU-R BT.1702.
     """
     check_number("fps", fps, 1e-3, 1e5)
-    check_number("degrees", degrees, 1e-3, 360.0)
+    if degrees is not None:
+        check_number("degrees", degrees, 1e-3, 360.0)
+    if standard != "wcag22":
+        return judge_flashes(_checked(frames), fps, _rules_of(standard), as_display(display))
+    if degrees is None:
+        raise ValueError(
+            "degrees: WCAG 2.2 judges fields of ten degrees; give the width of the picture, such "
+            "as degrees=40"
+        )
+    if display is not None:
+        raise ValueError(
+            'display: WCAG 2.2 judges relative luminance; give standard="bt1702" for luminance in '
+            "cd/m2"
+        )
+    return _judge_by_wcag(frames, fps, degrees)
+
+
+def _rules_of(standard: str | FlashRules) -> FlashRules:
+    """Return the rules of a name."""
+    if isinstance(standard, FlashRules):
+        return standard
+    if standard == "bt1702":
+        return FlashRules()
+    if standard == "iris":
+        return FlashRules.iris()
+    known = get_args(Standard)
+    text = f"standard: {standard!r} is not one of {', '.join(known)}, or a FlashRules"
+    if not isinstance(standard, str):
+        raise TypeError(text)
+    raise ValueError(f"{text}{did_you_mean(standard, known)}")
+
+
+def _judge_by_wcag(frames: Iterable[NDArray[Any]], fps: float, degrees: float) -> Flash:
     luminances, reds, saturated = [], [], []
     for light in _lights(frames, degrees):
         luminances.append(light @ _LUMINANCE)
@@ -216,6 +300,12 @@ def _largest_share(flashing: NDArray[np.bool_], field: float) -> float:
 
 def _lights(frames: Iterable[NDArray[Any]], degrees: float) -> Iterator[NDArray[np.float64]]:
     """Yield the linear light of each frame, reduced to about the pixels that a field needs."""
+    for frame in _checked(frames):
+        yield _reduce(_linear(frame[..., :3]), degrees)
+
+
+def _checked(frames: Iterable[NDArray[Any]]) -> Iterator[NDArray[Any]]:
+    """Yield frames that are images of one shape, at least 2."""
     if not isinstance(frames, Iterable):
         raise TypeError(f"frames: {frames!r} is not a sequence of images")
     shape: tuple[int, ...] | None = None
@@ -230,7 +320,7 @@ def _lights(frames: Iterable[NDArray[Any]], degrees: float) -> Iterator[NDArray[
         if shape not in (None, array.shape):
             raise ValueError(f"frames: shape {array.shape} after {shape}; all must be the same")
         shape = array.shape
-        yield _reduce(_linear(array[..., :3]), degrees)
+        yield array
     if count < 2:
         raise ValueError(f"frames: {count} given; a sequence has at least 2")
 

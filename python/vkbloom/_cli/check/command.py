@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-import itertools
 import json
 import os
 import runpy
@@ -16,28 +15,22 @@ from pathlib import Path
 from typing import Any, Final
 
 import click
-import numpy as np
-from numpy.typing import NDArray
 from rich.console import Console
 from rich.status import Status
 
-from vkbloom import testing
 from vkbloom._cli.check import comparing, measuring, showing
+from vkbloom._cli.check.sequences import check_unused, judge, sequence_options
 from vkbloom._cli.fields import SIZE, Command
-from vkbloom._cli.numbered_files import NumberedFile, as_frames, gap_note, gaps
 from vkbloom._cli.program import adapter_option, as_wrong_use, is_given
-from vkbloom._cli.sequences import expand
 from vkbloom._cli.settings_options import settings_options
 from vkbloom._cli.targets import check_target
 from vkbloom._cli.terminal import is_quiet, note, say
 from vkbloom._custom.method import CustomMethod, identifier_of, load_method
 from vkbloom._io import safe_writing
-from vkbloom._io.array_files import read
 from vkbloom._renderer.interruptible import open_renderer
 from vkbloom._renderer.renderer import Renderer
 from vkbloom._settings.settings import Settings, presets
 from vkbloom._spelling import did_you_mean
-from vkbloom._views.plain_values import plain
 from vkbloom.testing._law_report import LawReport, law_report
 from vkbloom.testing._laws.table import find_law, merge_limits
 from vkbloom.testing._programs import CommandBloom
@@ -45,8 +38,6 @@ from vkbloom.testing._subject import Subject
 
 # Runs whose times are measured; of two blooms, in turns.
 _RUNS: Final = 5
-#: The most frames from the first to the last number of a sequence: half an hour at 60 a second.
-MAX_FRAMES: Final = 108_000
 _ABOVE_0: Final = click.FloatRange(0, min_open=True)
 
 
@@ -107,10 +98,7 @@ def _laws(_: click.Context, __: click.Parameter, text: str) -> tuple[str, ...]:
 @click.option(
     "--sequence", metavar="PATTERN", help="Judge frames in time instead, such as f.%04d.exr."
 )
-@click.option("--fps", type=_ABOVE_0, default=60.0, help="Frames a second of --sequence.")
-@click.option(
-    "--degrees", type=_ABOVE_0, default=40.0, help="Width of --sequence in the field of view."
-)
+@sequence_options
 @click.option("--json", "as_json", is_flag=True, help="Print one object.")
 @click.option(
     "--html", "page", metavar="FILE", type=click.Path(), help="Write a page with pictures."
@@ -151,7 +139,8 @@ def check(
     if sequence is not None:
         if file or program or against or is_given("preset") or is_given("method"):
             raise click.UsageError("--sequence judges files alone, without a bloom")
-        return judge(sequence, how["fps"], how["degrees"], as_json=as_json)
+        return judge(sequence, how, as_json=as_json)
+    check_unused()
     params = click.get_current_context().params
     _check_choice(params)
     console = Console(stderr=True, quiet=is_quiet())
@@ -331,55 +320,3 @@ def _add_reference(settings: Settings, where: str) -> None:
     if not callable(reference):
         raise click.UsageError(f"--reference: {path} has no function {function!r}")
     type(settings).numpy_reference = staticmethod(reference)
-
-
-def judge(pattern: str, fps: float, degrees: float, *, as_json: bool) -> int:
-    """Print flashes and flicker of a sequence of files; return 1 if it fails WCAG 2.2, else 0."""
-    files = as_frames(expand(pattern))
-    shown = _count_frames(pattern, files)
-
-    def frames() -> Iterator[NDArray[Any]]:
-        for (file, _), count in zip(files, shown, strict=True):
-            picture = read(file)[..., :3].astype(np.float32)
-            yield from itertools.repeat(picture, count)
-
-    flashes = testing.flash(frames(), fps, degrees=degrees)
-    seen = testing.flicker(frames(), fps)
-    strongest = int(seen.contrast.argmax())
-    missing = gap_note(files)
-    if as_json:
-        values = {
-            "frames": len(files),
-            "missing": sum(shown) - len(files),
-            "gaps": [(gap.start, gap.stop - 1) for gap in gaps(files)],
-            "fps": fps,
-            "flash": flashes,
-            "flicker": seen,
-        }
-        click.echo(json.dumps(plain(values), indent=2))
-    else:
-        click.echo(f"{len(files)} frames at {fps:g} a second, {degrees:g} degrees wide")
-        if missing is not None:
-            click.echo(f"{missing}; the frame before each is shown until the next one")
-        click.echo(str(flashes))
-        click.echo(
-            f"flicker: contrast up to {seen.contrast[strongest]:.3g}, at "
-            f"{seen.frequencies[strongest]:.3g} Hz"
-            + ("" if seen.jod is None else f"; {seen.jod:.2f} JOD beside a still")
-        )
-    if missing is not None:
-        note(f"{pattern}: {missing}; what they show is not judged")
-    return int(flashes.general or flashes.red)
-
-
-def _count_frames(pattern: str, files: list[NumberedFile]) -> list[int]:
-    """Return for how many frames each file is shown: until the number of the next one."""
-    numbers = [number for _, number in files if number is not None]
-    if len(numbers) < len(files):
-        return [1] * len(files)
-    if numbers[-1] - numbers[0] >= MAX_FRAMES:
-        raise ValueError(
-            f"{pattern}: the numbers {numbers[0]} to {numbers[-1]} are not of one sequence; at "
-            f"most {MAX_FRAMES} frames are judged"
-        )
-    return [after - before for before, after in itertools.pairwise(numbers)] + [1]
