@@ -45,6 +45,7 @@ from ._renderer.image import Image
 from ._renderer.plans import Plan
 from ._renderer.renderer import Renderer
 from ._scene import Camera, Scene
+from ._sequence import Sequence, sequence
 from ._settings.glare import Glare, glares
 from ._settings.settings import Settings, presets
 
@@ -84,6 +85,7 @@ __all__ = [
     "Renderer",
     "Scene",
     "Separable",
+    "Sequence",
     "Settings",
     "ShaderError",
     "Streaks",
@@ -109,6 +111,7 @@ __all__ = [
     "read",
     "reference",
     "render",
+    "sequence",
     "testing",
     "translate",
     "vjp",

@@ -10,7 +10,7 @@ import pytest
 
 import vkbloom
 from tests.cli.calls import run
-from vkbloom._cli.numbered_files import as_frames, gap_note, gaps, missing_count, pattern_of
+from vkbloom._io.numbered_files import as_frames, gap_note, gaps, missing_count, pattern_of
 from vkbloom._cli.sequences import check_targets, expand
 
 NAMES = {

@@ -10,6 +10,7 @@ import shutil
 import tempfile
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
+from fractions import Fraction
 from pathlib import Path
 from typing import Any, Final, TypeAlias, get_args
 
@@ -19,7 +20,7 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from vkbloom._background_writer import write_in_background
-from vkbloom._cli import no_bloom
+from vkbloom._cli import no_bloom, videos
 from vkbloom._cli.fields import Command
 from vkbloom._cli.glows import glow_options, read_glows
 from vkbloom._cli.image_files import (
@@ -38,7 +39,9 @@ from vkbloom._cli.terminal import complain, hides_progress, note, say, tell_devi
 from vkbloom._io import image_writing, safe_writing
 from vkbloom._io.displayed import PRIMARIES, Saved
 from vkbloom._io.narrowing import narrow, narrowing_note
-from vkbloom._io.picture import Colour, Picture, SavedColour
+from vkbloom._io.picture import Colour, Highlights, Picture, SavedColour
+from vkbloom._io.video.coding import Codec
+from vkbloom._io.video.reading import is_video
 from vkbloom._locks import cached_property
 from vkbloom._renderer.added_light import added_share, faint_note
 from vkbloom._renderer.frame_files import settings_facts
@@ -301,7 +304,10 @@ def _send(file: Path, target: str) -> None:
     "-o", "--out", metavar="OUT", type=click.Path(), help="The file to write, instead of OUT."
 )
 @click.option(
-    "--quality", metavar="N", type=click.IntRange(1, 100), help="Of JPEG, WebP and JPEG XL."
+    "--quality",
+    metavar="N",
+    type=click.IntRange(1, 100),
+    help="Of JPEG, WebP, JPEG XL and videos; of h264 and h265, 100 is lossless [default 70].",
 )
 @click.option(
     "--pipe-format", metavar="EXTENSION", default="png", help="Format of standard output."
@@ -312,6 +318,18 @@ def _send(file: Path, target: str) -> None:
     default="final",
     help="What to write. final is OUT; each other framebuffer is a file beside OUT, with _NAME "
     "after OUT's stem, its values unchanged; .exr if OUT's format cannot hold them.",
+)
+@click.option(
+    "--fps",
+    type=videos.Rate(),
+    metavar="N",
+    help="Frames per second of images in a video [default 24]; of a video, instead of its times.",
+)
+@click.option(
+    "--codec",
+    type=click.Choice(get_args(Codec)),
+    help="Of a video [default ffv1, which is lossless, for .mkv; else h264, or h265 for more than "
+    "8 bits]",
 )
 @input_colour_option
 @click.option(
@@ -328,7 +346,7 @@ def _send(file: Path, target: str) -> None:
 @click.option("--half", is_flag=True, help="Hold pictures in half floats, in half the memory.")
 @click.option(
     "--bits",
-    type=click.Choice(["8", "16", "32"]),
+    type=click.Choice(["8", "10", "12", "16", "32"]),
     callback=lambda _, __, value: value and int(value),
     help="Size of a number in OUT [default that of IN]",
 )
@@ -363,8 +381,14 @@ def command(*, sources: tuple[str, ...], out: str | None, adapter: str, **given:
     not write, only as --out OUT or with --overwrite. Of several images, those that fail are listed
     at the end, and the exit status is 1. See docs/command-line.md.
     """
-    options = Options(**given)
     inputs, target = _arguments(sources, out)
+    fps, codec = given.pop("fps"), given.pop("codec")
+    options = Options(**given)
+    if any(map(is_video, (*inputs, target))):
+        _apply_to_videos(options, inputs, target, adapter, fps, codec, is_named=out is not None)
+        return 0
+    if fps is not None or codec is not None:
+        raise click.UsageError(f"--{'fps' if fps else 'codec'} is only for videos")
     work = _plan(options, inputs, target, is_named=out is not None)
     if not work:
         return 0
@@ -392,6 +416,36 @@ def command(*, sources: tuple[str, ...], out: str | None, adapter: str, **given:
     if len(work) > 1 and written:
         say(f"wrote {len(written)} images, {written[0]} to {written[-1]}")
     return _tell_failures(run.failures, work)
+
+
+def _apply_to_videos(
+    options: Options,
+    sources: list[str],
+    out: str,
+    adapter: str,
+    fps: Fraction | None,
+    codec: Codec | None,
+    *,
+    is_named: bool,
+) -> None:
+    """Do what the command does if IN or OUT is a video."""
+    if options.names != ["final"] or options.skip_existing:
+        name = "skip-existing" if options.skip_existing else "framebuffers"
+        raise click.UsageError(f"--{name} is only for images; leave it out")
+    check_input_colour(options.input_colour)
+    names = {field.name for field in dataclasses.fields(videos.Job)}
+    shared = {name: value for name, value in vars(options).items() if name in names}
+    job = videos.Job(
+        **shared,
+        sources=sources,
+        out=out,
+        fps=fps,
+        codec=codec,
+        saved=options.saved,
+        is_named=is_named,
+    )
+    _check_colours(options.start.of(Highlights.STORED).settings, options)
+    videos.run(job, adapter)
 
 
 def _tell_failures(failures: Mapping[str, Exception], work: Sequence[Pair]) -> int:

@@ -102,6 +102,11 @@ class CustomMethod(Settings, metaclass=CustomType):
         """Whether passes change textures or buffers, so that frames depend on those before."""
         return any(block.storage for block in self.file.embedded.values())
 
+    @property
+    def _continues(self) -> bool:
+        """Whether a call reads what an earlier one has left: a state, or framebuffers."""
+        return self._has_state or bool(self.file.histories)
+
     def _in_sequence(self, index: int, state: dict[Any, Any]) -> Self:
         """Return a copy for a frame of a sequence, which counts the frames before it."""
         copied = copy.copy(self)

@@ -39,7 +39,7 @@ _READ_CURVES: Final = {
 # Curves that readers know or assume without code points.
 _PLAIN: Final = ("linear", "srgb", "gamma22", "none")
 # Curves whose values end at 1 in files of integers.
-_ENDING_AT_1: Final = ("linear", "srgb", "gamma22")
+_ENDING_AT_1: Final = ("linear", "srgb", "gamma22", "rec709")
 # Code points of the built-in displays; the others have none.
 _DISPLAYS: Final[Mapping[str, tuple[int, int]]] = {
     "sRGB - Display": (1, 13),
@@ -194,6 +194,17 @@ def _display_of(oiio: ModuleType, view: str) -> tuple[str, str]:
 def between(values: NDArray[Any], old: str, new: str) -> NDArray[np.float32]:
     """Return colours (H, W, 3 or 4), not clipped, of one space of OpenColorIO's in another."""
     return _by_ocio(values, "colorconvert", old, new, False)
+
+
+def names_of_points(primaries: int, curve: int) -> tuple[str, str]:
+    """Return the names of code points that are known."""
+    known = {point: name for name, point in _PRIMARY_POINTS.items()}
+    return known[primaries], _READ_CURVES[curve]
+
+
+def points_of_names(primaries: str, curve: str) -> tuple[int, int]:
+    """Return the code points of primaries and of a curve that files are written with."""
+    return _PRIMARY_POINTS[primaries], _CURVE_POINTS[curve]
 
 
 def _by_ocio(values: NDArray[Any], conversion: str, *how: Any) -> NDArray[np.float32]:

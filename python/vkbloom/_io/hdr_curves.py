@@ -47,6 +47,13 @@ def _from_hlg(signal: NDArray[Any]) -> NDArray[np.float64]:
     return np.where(values <= 0.5, values**2 / 3, bright) / SCENE
 
 
+def _rec709(colours: NDArray[Any]) -> NDArray[np.float64]:
+    """Rec. ITU-R BT.709-6, item 1.2, for 0 and above."""
+    light = np.maximum(np.nan_to_num(colours.astype(float)), 0)
+    signal: NDArray[np.float64] = np.where(light < 0.018, 4.5 * light, 1.099 * light**0.45 - 0.099)
+    return signal
+
+
 def _from_rec709(signal: NDArray[Any]) -> NDArray[np.float64]:
     """Rec. ITU-R BT.709-6, item 1.2."""
     values = signal.astype(float)
@@ -54,9 +61,9 @@ def _from_rec709(signal: NDArray[Any]) -> NDArray[np.float64]:
 
 
 #: From linear colours to the signal, 0..1.
-ENCODERS: Final[Mapping[str, Curve]] = {"pq": _pq, "hlg": _hlg}
+ENCODERS: Final[Mapping[str, Curve]] = {"pq": _pq, "hlg": _hlg, "rec709": _rec709}
 #: Curves for displays of HDR.
-HDR_CURVES: Final = tuple(ENCODERS)
+HDR_CURVES: Final = ("pq", "hlg")
 #: From a signal of 0..1 to linear colours.
 DECODERS: Final[Mapping[str, Curve]] = {
     "pq": _from_pq,

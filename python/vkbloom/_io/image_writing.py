@@ -72,7 +72,7 @@ def check_options(
             raise ValueError(f"quality: {kind} has no quality; {', '.join(_LOSSY)} have one")
     if bits is not None:
         suffix = Path(path).suffix
-        if not any(safe_writing.holds(suffix, 3, numbers) for numbers in BITS[bits]):
+        if not any(safe_writing.holds(suffix, 3, numbers) for numbers in BITS.get(bits, ())):
             raise ValueError(f"bits: {kind} has no numbers of {bits} bits; write another format")
 
 

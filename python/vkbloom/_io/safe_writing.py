@@ -72,6 +72,21 @@ def reserve(file: Path, size: int) -> Path:
     return _fill(file, lambda stream: _allocate(stream, _MAX_HEADER_BYTES + size))
 
 
+@contextlib.contextmanager
+def replacing_stream(file: Path) -> Iterator[BinaryIO]:
+    """Yield a new temporary file to be written in place of a file, of any size.
+
+    At the end of the block it is renamed. If the block raises, it is removed.
+    """
+    temporary = _fill(file, lambda _: None)
+    try:
+        with temporary.open("r+b") as stream:
+            yield stream
+        put_in_place(temporary, file)
+    finally:
+        remove(temporary)
+
+
 def has_alpha(writer: OpenImageIO.ImageOutput) -> bool:
     """Return whether a format keeps alpha. OpenImageIO says so of GIF, and writes it opaque."""
     return writer.supports("alpha") != 0 and writer.format_name() != "gif"

@@ -46,7 +46,12 @@ _DESCRIBED = ", all of it: "
 # Extensions of files in a folder.
 _IN_FOLDERS = (".png", ".exr")
 # Entries of `info` that are numbers.
-_NUMBERS: Mapping[str, type[int | float]] = {"nan": int, "inf": int, "expand": float}
+_NUMBERS: Mapping[str, type[int | float]] = {
+    "nan": int,
+    "inf": int,
+    "expand": float,
+    "time": float,
+}
 # Attributes that `_attributes` writes in addition to the entries of `info`.
 _OWN = ("settings", "timings", "dtype", "framebuffer", "place", FACT)
 

@@ -244,6 +244,11 @@ class Settings(Record):
         """Whether frames depend on those before; only custom methods can."""
         return False
 
+    @property
+    def _continues(self) -> bool:
+        """Whether a call reads what an earlier one has left; only custom methods can."""
+        return False
+
     def _in_sequence(self, index: int, state: dict[Any, Any]) -> Self:
         """Return the settings for a frame of a sequence, whose frames share the state."""
         return self

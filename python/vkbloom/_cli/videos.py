@@ -1,0 +1,313 @@
+"""``vkbloom apply`` of videos: from a video or images to a video or images."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+import re
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, closing
+from fractions import Fraction
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+import click
+import numpy as np
+from tqdm import tqdm
+
+from vkbloom._background_writer import write_in_background
+from vkbloom._cli import no_bloom
+from vkbloom._cli.glows import read_glows
+from vkbloom._cli.image_files import finish, read_picture
+from vkbloom._cli.program import as_wrong_use
+from vkbloom._cli.sequences import PIPE, expand, is_stream
+from vkbloom._cli.settings_options import StartOptions
+from vkbloom._cli.targets import check_target
+from vkbloom._cli.terminal import hides_progress, note, say, tell_device
+from vkbloom._io import image_writing, safe_writing
+from vkbloom._io.displayed import Saved
+from vkbloom._io.narrowing import narrow
+from vkbloom._io.numbered_files import Pattern, gap_note, pattern_of
+from vkbloom._io.picture import Colour, Picture
+from vkbloom._io.video import writing
+from vkbloom._io.video.coding import Codec, Coding
+from vkbloom._io.video.reading import VideoFile, is_video
+from vkbloom._presets.start import Start
+from vkbloom._renderer.frame_files import settings_facts
+from vkbloom._renderer.interruptible import open_renderer
+from vkbloom._renderer.renderer import Renderer
+
+# Frames per second of images.
+_DEFAULT_RATE: Final = Fraction(24)
+_MAX_DENOMINATOR: Final = 1001 * 1000
+_RATE: Final = re.compile(r"[0-9]+(\.[0-9]+|/[0-9]+)?\Z")
+
+
+class Rate(click.ParamType):
+    """Frames per second: 24, 23.976 or 24000/1001."""
+
+    name = "rate"
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> Fraction:
+        """Return the rate as a fraction; 23.976 and its like are those of NTSC."""
+        if isinstance(value, Fraction):
+            return value
+        try:
+            rate = Fraction(value) if _RATE.match(value) else Fraction(0)
+        except (ValueError, ZeroDivisionError):
+            rate = Fraction(0)
+        if not Fraction(1, 1000) <= rate <= 100_000:
+            self.fail(f"{value!r} is not a number of frames per second, such as 24 or 30000/1001")
+        whole = Fraction(round(rate * Fraction(1001, 1000)) * 1000, 1001)
+        return whole if rate.denominator > 1 and abs(rate - whole) < Fraction(1, 1000) else rate
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Job:
+    """What a call does; names are those of the options.
+
+    `is_named`: OUT was given as --out.
+    """
+
+    sources: list[str]
+    out: str
+    fps: Fraction | None
+    codec: Codec | None
+    saved: Saved
+    quality: int | None
+    bits: int | None
+    start: StartOptions
+    input_colour: Colour | None
+    subimage: int
+    layer: str | None
+    half: bool
+    mask: str | None
+    emission: str | None
+    overwrite: bool
+    is_named: bool
+
+
+class _Frame(NamedTuple):
+    """A picture, decoded, and what is known of it.
+
+    - `place`: Its number, counted from the first.
+    - `coding`: That of a video; None: of an image.
+    """
+
+    picture: Picture
+    place: int
+    time: Fraction
+    duration: Fraction
+    coding: Coding | None
+    aspect: Fraction
+
+
+class _Clip(NamedTuple):
+    """What is read: frames, about how many, their rate, the unit of time, a file with audio."""
+
+    frames: Iterator[_Frame]
+    count: int | None
+    rate: Fraction
+    time_base: Fraction
+    audio: str
+
+
+def check(job: Job) -> None:
+    """Raise an error for files and options that do not go together."""
+    videos = [source for source in job.sources if is_video(source)]
+    if videos and len(job.sources) > 1:
+        raise click.UsageError(f"{videos[0]}: a video is a whole IN; leave out the others")
+    if is_stream(job.out) and job.out != os.devnull and not is_video(job.out):
+        raise click.UsageError("a video needs a file or a pattern of numbers as OUT")
+    if PIPE in job.sources:
+        raise click.UsageError("standard input has one image; name the files of a video")
+    with as_wrong_use():
+        if is_video(job.out):
+            writing.check_options(job.out, job.codec, job.saved, job.quality, job.bits)
+        else:
+            _pattern_of(job.out)
+            if job.codec is not None:
+                raise ValueError("codec: OUT is no video")
+            image_writing.check_options(job.out, job.saved, job.quality, job.bits)
+    if is_video(job.out):
+        _check_target(job)
+
+
+def _check_target(job: Job) -> None:
+    check_target(job.out)
+    if not os.path.isfile(job.out) or job.overwrite:
+        return
+    for source in job.sources:
+        if os.path.isfile(source) and os.path.samefile(source, job.out):
+            raise click.UsageError(f"{job.out}: is read as IN; use --overwrite to replace it")
+    if job.is_named:
+        return
+    try:
+        with VideoFile(job.out) as file:
+            is_own = file.comment == safe_writing.PROGRAM
+    except (OSError, ValueError):
+        is_own = False
+    if not is_own:
+        raise click.UsageError(
+            f"{job.out}: is a file that vkbloom did not write; to replace it, give it as "
+            f"-o {job.out}, or --overwrite"
+        )
+
+
+def _pattern_of(out: str) -> Pattern:
+    pattern = pattern_of(os.path.basename(out))
+    if pattern is None:
+        raise ValueError(
+            f"{out}: one file cannot hold the frames of a video; name a video such as out.mp4, or "
+            "a pattern such as f.%04d.png"
+        )
+    return pattern
+
+
+def run(job: Job, adapter: str) -> None:
+    """Add bloom to the frames, one after the other."""
+    check(job)
+    with ExitStack() as stack:
+        clip = _open(job, stack)
+        bar = tqdm(
+            closing_iterator(clip.frames, stack),
+            total=clip.count,
+            unit="frame",
+            leave=False,
+            disable=hides_progress(),
+        )
+        made = _make(job, bar, clip, adapter, stack)
+        count = sum(1 for _ in write_in_background(made))
+    if is_video(job.out):
+        say(f"wrote {job.out}, {count} frames")
+    else:
+        say(f"wrote {count} images of the pattern {job.out}")
+
+
+def closing_iterator(frames: Iterator[_Frame], stack: ExitStack) -> Iterator[_Frame]:
+    """Return the frames, whose files are closed with the stack."""
+    close = getattr(frames, "close", None)
+    if close is not None:
+        stack.callback(close)
+    return frames
+
+
+def _open(job: Job, stack: ExitStack) -> _Clip:
+    """Return the frames that are read."""
+    if not is_video(job.sources[0]):
+        return _open_images(job)
+    source = job.sources[0]
+    file = stack.enter_context(VideoFile(source))
+    rate = job.fps or file.rate
+    is_copied = file.has_audio and is_video(job.out) and job.fps is None
+    if file.has_audio and is_video(job.out) and not is_copied:
+        note(f"{source}: its audio is left out, since --fps changes the times")
+
+    def frames() -> Iterator[_Frame]:
+        with closing(file.frames()) as read:
+            for place, frame in enumerate(read):
+                picture = frame.decode(job.input_colour)
+                if place == 0:
+                    for text in picture.notes:
+                        note(f"{source}: {text}")
+                time, duration = frame.time, frame.duration
+                if job.fps is not None:
+                    time, duration = place / rate, 1 / rate
+                yield _Frame(picture, place, time, duration, frame.coding, frame.aspect)
+
+    unit = file.time_base if job.fps is None else 1 / rate
+    return _Clip(frames(), file.frames_expected, rate, unit, source if is_copied else "")
+
+
+def _open_images(job: Job) -> _Clip:
+    files = [file for source in job.sources for file in expand(source)]
+    if (missing := gap_note(files)) is not None:
+        note(f"{job.sources[0]}: {missing}; they are time in which the frame before stays")
+    rate = job.fps or _DEFAULT_RATE
+    numbers = [number for _, number in files if number is not None]
+    is_numbered = len(numbers) == len(files) and len(job.sources) == 1
+    places = [number - numbers[0] for number in numbers] if is_numbered else range(len(files))
+
+    def frames() -> Iterator[_Frame]:
+        following = [*places[1:], places[-1] + 1]
+        for (name, _), place, after in zip(files, places, following, strict=True):
+            picture = read_picture(name, job.subimage, job.input_colour, layer=job.layer)
+            duration = (after - place) / rate
+            yield _Frame(picture, place, place / rate, duration, None, Fraction(1))
+
+    return _Clip(frames(), len(files), rate, 1 / rate, "")
+
+
+def _make(
+    job: Job, frames: Iterator[_Frame], clip: _Clip, adapter: str, stack: ExitStack
+) -> Iterator[tuple[None, Callable[[], object]]]:
+    """Yield of each frame the function that writes it."""
+    start: Start | None = None
+    renderer: Renderer | None = None
+    write: Callable[[_Frame, Picture], object] | None = None
+    glow: Any = None
+    for frame in frames:
+        if start is None:
+            # Those of the first frame are those of all, so that nothing jumps.
+            start = job.start.of(frame.picture.highlights)
+        picture = start.develop(frame.picture)
+        if job.half:
+            picture = dataclasses.replace(
+                picture, pixels=narrow(picture.pixels, np.dtype(np.float16))
+            )
+        if renderer is None:
+            renderer = stack.enter_context(open_renderer(adapter))
+            tell_device(renderer)
+            is_blended = start.settings.alpha != "keep"
+            glows = read_glows(job.mask, job.emission, job.input_colour, is_blended=is_blended)
+            glow = glows.of
+        wanted = ["final"] if write else no_bloom.with_bloom(["final"], start.settings)
+        chosen = start.settings._in_sequence(frame.place, {})
+        with as_wrong_use():
+            made = renderer.apply(
+                picture.pixels, chosen, **glow(picture.pixels), framebuffers=wanted
+            )
+        if no_bloom.is_without(made):
+            note(f"in the first frame, {no_bloom.reason(start.settings)}")
+        final = finish(picture, made["final"], start.settings)
+        if write is None:
+            write = _writer_of(job, clip, frame, final, start, stack)
+        yield None, _bind(write, frame, final)
+
+
+def _bind(
+    write: Callable[[_Frame, Picture], object], frame: _Frame, final: Picture
+) -> Callable[[], object]:
+    return lambda: write(frame, final)
+
+
+def _writer_of(
+    job: Job, clip: _Clip, first: _Frame, final: Picture, start: Start, stack: ExitStack
+) -> Callable[[_Frame, Picture], object]:
+    """Return the function that writes a frame."""
+    if not is_video(job.out):
+        pattern, folder = _pattern_of(job.out), os.path.dirname(job.out)
+        facts = settings_facts(start.settings, start.expand)
+
+        def save(frame: _Frame, picture: Picture) -> None:
+            file = Path(folder, pattern.name_of(frame.place))
+            file.parent.mkdir(exist_ok=True)
+            image_writing.save(picture, file, job.saved, facts, job.quality, bits=job.bits)
+
+        return save
+    codec, coding = writing.choose_coding(
+        job.out, final, first.coding, codec=job.codec, saved=job.saved, bits=job.bits
+    )
+    height, width = final.pixels.shape[:2]
+    layout = writing.Layout(
+        size=(width, height),
+        rate=clip.rate.limit_denominator(_MAX_DENOMINATOR),
+        time_base=clip.time_base,
+        coding=coding,
+        codec=codec,
+        aspect=first.aspect,
+        quality=job.quality,
+        audio=clip.audio,
+    )
+    video = stack.enter_context(writing.writing(job.out, layout))
+    return lambda frame, picture: video.write(picture, frame.time, frame.duration)

@@ -1,0 +1,1 @@
+"""Videos, by PyAV: frames as pictures, and pictures as frames."""
