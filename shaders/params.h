@@ -232,6 +232,7 @@
     INPUT(B, int, span_y) \
     INPUT(B, float, gain) \
     INPUT(B, float, share) \
+    INPUT(B, float, share_of_mask) \
     VEC4S(B, pictures, MAX_PICTURES) \
     VEC4S(B, inner_x, FILTER_TILE_WINDOW / 2) \
     VEC4S(B, inner_y, FILTER_TILE_WINDOW / 2)

@@ -68,8 +68,8 @@ static bool add_sum_pass(struct vkb_adjoint *adjoint, struct vkb_pass_row *row,
     return add_numbered_pass(adjoint, "sum", adjoint->summed++, row, size, image, error);
 }
 
-void vkb_delay_scene(struct vkb_adjoint *adjoint, const struct vkb_pass_row *row, double share,
-                     uint32_t image)
+void vkb_delay_scene(struct vkb_adjoint *adjoint, const struct vkb_pass_row *row,
+                     struct vkb_share share, uint32_t image)
 {
     adjoint->scene = image;
     adjoint->share = share;
@@ -88,14 +88,20 @@ bool vkb_end_scene(struct vkb_adjoint *adjoint, struct vkb_error *error)
     return vkb_accumulate_cotangent(adjoint, &adjoint->scene_row, image, error);
 }
 
-// Has the row add what the composite has left to the next pass. Only filters have a factor for it.
+// Has the row add what the composite has left to the next pass. Only filters have a share for it.
 static bool take_scene(struct vkb_adjoint *adjoint, struct vkb_pass_row *row,
                        struct vkb_error *error)
 {
-    if (row->block == VKB_BLOCK_adjoint_filter)
-        row->params.adjoint_filter.share = (float)adjoint->share;
-    else if (adjoint->share != 1.0)
+    const struct vkb_share share = adjoint->share;
+
+    if (row->block == VKB_BLOCK_adjoint_filter) {
+        row->params.adjoint_filter.share = (float)share.factor;
+        row->params.adjoint_filter.share_of_mask = (float)share.by_mask;
+        row->constants.masked = adjoint->scene_row.constants.masked;
+        row->reads[SLOT_MASK] = adjoint->scene_row.reads[SLOT_MASK];
+    } else if (share.factor != 1.0 || adjoint->scene_row.constants.masked) {
         return vkb_end_scene(adjoint, error);
+    }
     adjoint->scene = VKB_NO_IMAGE;
     return true;
 }

@@ -7,6 +7,11 @@
 #include "passes/pass.h"
 #include "passes/transposes.h"
 
+// A factor of all colours, less `by_mask` times the mask of the row.
+struct vkb_share {
+    double factor, by_mask;
+};
+
 struct vkb_adjoint {
     struct vkb_graph *graph;
     struct vkb_table table;  // of all filters
@@ -17,10 +22,10 @@ struct vkb_adjoint {
     uint32_t added, summed;
     uint32_t max_side;
     bool sums;  // the derivatives by fields are wanted
-    // The cotangents of the scene of a composite without a curve are `share` times those that the
+    // The cotangents of the scene of a composite without a curve are a share of those that the
     // composite has. The next pass that accumulates cotangents of the scene adds them itself.
     uint32_t scene;  // VKB_NO_IMAGE: there is no such composite, or its row was added
-    double share;
+    struct vkb_share share;
     struct vkb_pass_row scene_row;  // the composite's own pass, for the case that none adds them
     // A bloom source that is the image but for NaN and infinity: its cotangents are the image's.
     uint32_t glow, image;  // VKB_NO_IMAGE: there is none
@@ -46,10 +51,10 @@ struct vkb_pass_row vkb_slope_row(const struct vkb_adjoint *adjoint,
 bool vkb_accumulate_cotangent(struct vkb_adjoint *adjoint, const struct vkb_pass_row *row,
                               uint32_t image, struct vkb_error *error);
 
-// Accumulates what the row computes, which is `share` times its cotangents, together with those of
+// Accumulates what the row computes, which is `share` of its cotangents, together with those of
 // the next pass, or by vkb_end_scene().
-void vkb_delay_scene(struct vkb_adjoint *adjoint, const struct vkb_pass_row *row, double share,
-                     uint32_t image);
+void vkb_delay_scene(struct vkb_adjoint *adjoint, const struct vkb_pass_row *row,
+                     struct vkb_share share, uint32_t image);
 bool vkb_end_scene(struct vkb_adjoint *adjoint, struct vkb_error *error);
 
 // Accumulates the transpose of a filter of an image.

@@ -24,21 +24,23 @@ static bool depends_on_bloom(const struct vkb_pass_row *row)
         || row->params.composite.limit < (float)SINGLE_LIMIT;
 }
 
-// Whether the derivatives by the scene are a factor of all colours.
+// Whether the derivatives by the scene are a share of all colours.
 static bool scales_scene(const struct vkb_pass_row *row)
 {
     const int32_t composite = row->constants.composite;
 
-    return !row->constants.masked && !depends_on_bloom(row)
+    return !depends_on_bloom(row)
         && (composite == COMPOSITE_ADD || composite == COMPOSITE_MIX);
 }
 
-static double share_of_scene(const struct vkb_pass_row *row)
+static struct vkb_share share_of_scene(const struct vkb_pass_row *row)
 {
     const struct vkb_composite_params *params = &row->params.composite;
+    const double exposed = exp2(params->exposure);
+    const double lost = row->constants.composite == COMPOSITE_MIX ? exposed * params->intensity : 0;
 
-    return exp2(params->exposure)
-         * (row->constants.composite == COMPOSITE_MIX ? 1.0 - params->intensity : 1.0);
+    return row->constants.masked ? (struct vkb_share){exposed, lost}
+                                 : (struct vkb_share){exposed - lost, 0.0};
 }
 
 // By scene, bloom and mask, with the row of a shader that reads these and the cotangents.

@@ -13,17 +13,20 @@ bool vkb_are_floats(const struct vkb_variant_choice *choice, const struct vkb_pa
 {
     bool fits = vkb_fits_linear(choice, pass);
 
-    for (uint32_t i = 0; i < pass->read_count; ++i)
+    for (uint32_t i = 0; i < pass->read_count; ++i) {
+        const enum vkb_format format =
+            i == SLOT_MASK ? VKB_FORMAT_R32_FLOAT : VKB_FORMAT_RGBA32_FLOAT;
         fits = fits
             && (pass->reads[i] == VKB_NO_IMAGE
-                || choice->graph->images[pass->reads[i]].format == VKB_FORMAT_RGBA32_FLOAT);
+                || choice->graph->images[pass->reads[i]].format == format);
+    }
     return fits;
 }
 
 bool vkb_is_factor(const struct vkb_pass_row *pass)
 {
-    return vkb_transposes(pass, VKB_BLOCK_composite) && !pass->constants.masked
-        && pass->constants.by == BY_BLOOM && !pass->constants.adds_image
+    return vkb_transposes(pass, VKB_BLOCK_composite) && pass->constants.by == BY_BLOOM
+        && !pass->constants.adds_image
         && !pass->constants.of_source && pass->reads[SLOT_BLOOM] == VKB_NO_IMAGE
         && (pass->constants.composite == COMPOSITE_ADD
             || pass->constants.composite == COMPOSITE_MIX);
@@ -235,8 +238,11 @@ static bool add_pictures(struct vkb_variant_choice *choice, const struct vkb_pas
     memcpy(&row, pass, sizeof row);
     row.fused = row.gains_if_finite = true;
     row.reads[SLOT_ADDED] = first->reads[SLOT_ADDED];
+    row.reads[SLOT_MASK] = first->reads[SLOT_MASK];
     row.constants.adds_image = first->constants.adds_image;
+    row.constants.masked = first->constants.masked;
     row.params.adjoint_filter.share = first->params.adjoint_filter.share;
+    row.params.adjoint_filter.share_of_mask = first->params.adjoint_filter.share_of_mask;
     for (uint32_t i = 0; i < pass->joined_count; ++i) {
         const struct vkb_readers *x = &pass->joined[i].x.readers, *y = &pass->joined[i].y.readers;
         width = x->most > width ? x->most : width;

@@ -8,19 +8,22 @@ UNIFORM_BLOCK(ADJOINT_FILTER_BLOCK);
 // themselves, and no column is before the first.)
 #ifdef LINEAR_TEXELS
 #define FETCH(name, slot, texel) load_floats(name, read_shapes[slot], (texel).x, (texel).y)
+#define FETCH_MASK(texel) load_float(mask, read_shapes[SLOT_MASK], (texel).x, (texel).y)
 #define NEAREST(texel) ivec2(min((texel).x, READ_SIZE(SLOT_COTANGENTS).x - 1), (texel).y)
 #else
 #define FETCH(name, slot, texel) texelFetch(name, texel, 0)
+#define FETCH_MASK(texel) texelFetch(mask, texel, 0).r
 #define READ_IMAGE(slot, name) SAMPLED_IMAGE(slot, name)
 #define NEAREST(texel) clamp(texel, ivec2(0), textureSize(cotangents, 0) - 1)
 #endif
 
 // Copies of parameters (see pixels.glsl).
-float gain = params.gain, share = params.share;
+float gain = params.gain, share = params.share, share_of_mask = params.share_of_mask;
 
 READ_IMAGE(SLOT_COTANGENTS, cotangents);
 READ_IMAGE(SLOT_WEIGHTS, table);
 READ_IMAGE(SLOT_SCENE, scene);
+READ_IMAGE(SLOT_MASK, mask);
 READ_IMAGE(SLOT_ADDED, added);
 READ_IMAGE(SLOT_DIFFERENTIATED, differentiated);
 
@@ -42,10 +45,14 @@ vec4 texel_at(ivec2 texel)
     return cotangent_at(NEAREST(texel));
 }
 
-// What other readers of the image have accumulated.
+// What other readers of the image have accumulated, or a share of a composite's cotangents. With a mask its scene has lost
+// some of its light by that.
 vec4 added_at(ivec2 pixel)
 {
-    return ADDS_IMAGE != 0 ? vec4(vec3(share), 1.0) * FETCH(added, SLOT_ADDED, pixel) : vec4(0.0);
+    if (ADDS_IMAGE == 0)
+        return vec4(0.0);
+    float own = MASKED != 0 ? share - share_of_mask * FETCH_MASK(pixel) : share;
+    return vec4(vec3(own), 1.0) * FETCH(added, SLOT_ADDED, pixel);
 }
 
 // The cotangents of a texel. The image of a source has none at NaN and infinity.

@@ -200,6 +200,12 @@ vec4 load_pixel(usamplerBuffer image, ivec4 shape, int at, int row)
     return value_of(raw_pixel(image, shape, at, row));
 }
 
+// A pixel of an image of one single float each.
+float load_float(usamplerBuffer image, ivec4 shape, int x, int row)
+{
+    return uintBitsToFloat(texelFetch(image, row * shape.z + (x >> 2))[x & 3]);
+}
+
 // A pixel of an image of single floats. Above and below the image, the outermost rows are repeated.
 vec4 load_floats(usamplerBuffer image, ivec4 shape, int x, int row)
 {

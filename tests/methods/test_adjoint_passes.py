@@ -425,6 +425,43 @@ def test_variants_are_transposed(varied: dict[str, Renderer], case: tuple[Any, .
         assert tuple(shader for shader in shaders if shader in special) == passes
 
 
+#: Settings that mix with a mask, the image's sides, and how many passes of the composite the
+#: derivatives by image and mask have. Filters take the cotangents of its bloom, and those of its
+#: scene where they are the first to add to these: of one kernel, of pictures, and of kernels.
+MIXED: tuple[tuple[Any, tuple[int, int], int], ...] = (
+    (BEVY.replace(exposure=0.5), (33, 67), 1),
+    (BEVY.replace(intensity=0.7), (9, 14), 1),
+    (PygfxBloom(levels=2, exposure=-0.5), (33, 66), 1),
+    # A pass before the filters adds to the scene's, and a curve needs the bloom.
+    (Separable(composite="mix", intensity=0.4, threshold=0.3), (20, 35), 2),
+    (BEVY.replace(tonemap="aces"), (33, 67), 3),
+)
+
+
+@pytest.mark.parametrize("variant", ["cpu", "gpu"])
+@pytest.mark.parametrize("case", MIXED, ids=str)
+def test_filters_take_a_composite_with_a_mask(
+    varied: dict[str, Renderer], variant: str, case: tuple[Any, ...]
+) -> None:
+    settings, size, passes = case
+    image = random_image(*size, channels=4, seed=1).astype(np.float32)
+    image[0, 0, 0], image[1, 2, 1] = np.nan, np.inf
+    mask = np.random.default_rng(3).random(size, np.float32)
+    settings = settings.replace(**SINGLE)
+    renderer = varied[variant]
+    pullback, cotangents, expected = pull(renderer, image, settings, ("final",), mask=mask)
+    found = pullback(cotangents)
+    for name in ("image", "mask"):
+        check(found, expected, name)
+    source = Inputs(image, mask=mask).source((cotangents["final"],))
+    plan = renderer._core.plan(source, settings, None, ("final",), False)
+    assert plan
+    shaders = [shader for _, shader, *_ in plan.passes]
+    assert sum(shader.startswith("adjoint_composite") for shader in shaders) == passes
+    if variant == "cpu" and passes == 1 and has_linear_texels(renderer):
+        assert not any(shader.startswith("adjoint_filter") for shader in shaders)
+
+
 @pytest.mark.parametrize("name", CASES if EXHAUSTIVE else ("blender ghosts", "prefilter edge"))
 def test_tiles_have_the_derivatives_of_the_reference(varied: Any, name: str) -> None:
     """Among them ghosts, whose weights differ from texel to texel in a window of the usual size."""
