@@ -439,7 +439,7 @@ MIXED: tuple[tuple[Any, tuple[int, int], int], ...] = (
 
 
 @pytest.mark.parametrize("variant", ["cpu", "gpu"])
-@pytest.mark.parametrize("case", MIXED, ids=str)
+@pytest.mark.parametrize("case", MIXED)
 def test_filters_take_a_composite_with_a_mask(
     varied: dict[str, Renderer], variant: str, case: tuple[Any, ...]
 ) -> None:
