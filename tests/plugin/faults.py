@@ -270,6 +270,26 @@ def with_red_in_blue(image: Image) -> Image:
     return gaussian(image @ np.array([[0.75, 0, 0.25], [0, 1, 0], [0, 0, 1]], image.dtype))
 
 
+def soft_light(image: Image, light: Image) -> Image:
+    """Godot's up to 4.5: colours above 1 stay as they are."""
+    full = np.where(image <= 0.25, ((16 * image - 12) * image + 4) * image, np.sqrt(image))
+    return np.where(image > 1, image, image + np.clip(light, 0, 1) * (full - image))
+
+
+def composed(compose: Callable[[Image, Image], Image]) -> Bloom:
+    """Return the picture of an image and its glow."""
+
+    def bloom(image: Image) -> Image:
+        colours = compose(image[..., :3], of_colours(image))
+        return np.dstack([colours, image[..., 3:]]).astype(image.dtype)
+
+    return bloom
+
+
+def of_composite(compose: Callable[[Image, Image], Image], words: str) -> Fault:
+    return Fault(lambda: composed(compose), lambda: _keeps, "composite", words)
+
+
 def of_linear(fault: Bloom, law: str, words: str, *others: str, correct: Bloom = gaussian) -> Fault:
     """Return a fault beside a Gaussian, with all laws that it breaks."""
     return Fault(lambda: fault, lambda: correct, law, words, frozenset(others))
@@ -475,6 +495,16 @@ FAULTS: dict[str, Fault] = {
         lambda: _keeps,
         "alpha",
         "is too bright",
+    ),
+    "soft light": of_composite(soft_light, "on black, a light adds 0 of"),
+    "light above 1 is lost": of_composite(
+        lambda a, light: a + np.where(light > 1, 0, light), "a brighter light adds less"
+    ),
+    "light jumps at 1": of_composite(
+        lambda a, light: a + light + 30 * (light > 0.5), "the bloom jumps by"
+    ),
+    "no light on colours above 1": of_composite(
+        lambda a, light: a + light * (a <= 1), "on backdrops of 0.99 and 1.01"
     ),
     "a frame late": Fault(a_frame_late, lambda: at_present, "history", "and 1 frames are above"),
 }

@@ -10,7 +10,7 @@ from statistics import median
 from typing import Any
 
 import numpy as np
-from cells import rounded, table
+from cells import format_figure, table
 from click.testing import CliRunner
 from numpy.typing import NDArray
 from tqdm import tqdm
@@ -60,16 +60,16 @@ def check(renderer: vkbloom.Renderer, quick: bool) -> str:
         figures.append(
             [
                 f"`{name}`",
-                rounded(found["gain"]),
-                rounded(found["energy"]),
-                *(rounded(border.get(f"energy_{place}")) for place in ("left", "corner")),
-                *(rounded(spread[key]) for key in ("r50", "r90")),
-                rounded(steady["ripple"], 100),
-                rounded(steady["jitter"]),
-                rounded(steady["shimmer"], 100),
-                rounded(found["veiling_glare_index"]),
+                format_figure(found["gain"]),
+                format_figure(found["energy"]),
+                *(format_figure(border.get(f"energy_{place}")) for place in ("left", "corner")),
+                *(format_figure(spread[key]) for key in ("r50", "r90")),
+                format_figure(steady["ripple"], 100),
+                format_figure(steady["jitter"]),
+                format_figure(steady["shimmer"], 100),
+                format_figure(found["veiling_glare_index"]),
                 f"{max(found['reference'].values()):.1g}",
-                f"`{near['name']}`, {rounded(near['difference'], 100)} %",
+                f"`{near['name']}`, {format_figure(near['difference'], 100)} %",
             ]
         )
     heads = "preset|gain|energy|at an edge|in a corner|50 % within, pixels|90 % within, pixels|"
@@ -174,7 +174,7 @@ def stability(renderer: vkbloom.Renderer, quick: bool) -> str:
             for size in SIZES[: 1 if quick else None]
         ]
         cells = (
-            " / ".join(rounded(getattr(one, figure), unit) for one in found)
+            " / ".join(format_figure(getattr(one, figure), unit) for one in found)
             for figure, unit in units.items()
         )
         rows.append([f"`{name}`", *cells])
@@ -197,7 +197,7 @@ def resolution(renderer: vkbloom.Renderer, quick: bool) -> str:
             except vkbloom.OutOfMemoryError:
                 scales.pop()
         cells = (
-            " / ".join([rounded(value, 100) for value in values] + ["memory"] * missing)
+            " / ".join([format_figure(value, 100) for value in values] + ["memory"] * missing)
             for values in (found.r50, found.r90, found.peak)
             for missing in (len(SCALES) - len(scales),)
         )

@@ -21,7 +21,7 @@ import vkbloom
 TABLES: Final = {
     "check": presets.check,
     "derivatives": presets.derivatives,
-    "measured": presets.measured,
+    "measured": presets.measure,
     "stability": presets.stability,
     "resolution": presets.resolution,
     "psf": psfs.functions,

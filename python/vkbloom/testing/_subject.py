@@ -39,6 +39,7 @@ class Subject:
 
     - `bloom`: The bloom alone; or the picture with it, where the bloom is not known apart.
     - `picture`: The picture with its bloom, if both are known.
+    - `toned`: The same after the tone curve "reinhard", where there is one to choose.
     - `intensity`: The factor of the bloom in `picture`; None: it is not simply added.
     - `gain`: What flat images should get. None: it is not promised.
     - `highest`: The largest value of an image that the bloom can be given.
@@ -49,6 +50,7 @@ class Subject:
     bloom: Bloom
     probe: Probe
     picture: Bloom | None = None
+    toned: Bloom | None = None
     intensity: float | None = None
     gain: float | None = None
     highest: float = 1024.0
@@ -59,6 +61,8 @@ class Subject:
         self.bloom = guard(self.bloom)
         if self.picture is not None:
             self.picture = guard(self.picture)
+        if self.toned is not None:
+            self.toned = guard(self.toned)
 
     @cached_property
     def measured_gain(self) -> float:

@@ -30,7 +30,7 @@ Array = NDArray[np.float64]
 T = TypeVar("T")
 
 #: About how often a program is run, in files of floats and in those of 8 bits.
-RUNS: Final = {False: 220, True: 90}
+RUNS: Final = {False: 240, True: 90}
 
 VIEW: Final = (256, 144)
 #: The `sketch` of each preset's bloom, as `python -m tools.preset_blooms` writes them.
@@ -131,6 +131,7 @@ def of_settings(
         bloom=bloom,
         probe=fitting_probe(bloom, Probe(size=size)),
         picture=bloom_of(renderer, used, "final"),
+        toned=bloom_of(renderer, used.replace(tonemap="reinhard"), "final"),
         intensity=used.intensity if used.composite == "add" else None,
         gain=gain,
         differences=None if _lacks_reference(used) else lambda: differences(renderer, used),
