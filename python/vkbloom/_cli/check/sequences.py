@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom import testing
-from vkbloom._cli.numbered_files import NumberedFile, as_frames, gap_note, gaps
 from vkbloom._cli.program import as_wrong_use, is_given
 from vkbloom._cli.sequences import expand
 from vkbloom._cli.terminal import note
 from vkbloom._io.array_files import read
+from vkbloom._io.numbered_files import NumberedFile, as_frames, gap_note, gaps
 from vkbloom._views.plain_values import plain
 from vkbloom.testing._display import Display, Encoding
 from vkbloom.testing._sequences import Standard
