@@ -222,9 +222,9 @@
 #define COMPOSITE_BLOCK(B, READS, INPUT, VEC4S) COMPOSITE_ROWS(B, READS, INPUT)
 
 // The transpose of a filter (adjoint_filter.frag): where the tables of both axes start, in texels;
-// the factor of the colours of what is added. For tiles: where the tables of each picture start;
-// in a simple ratio the weights of texels that are not near an edge, of even ones, then of odd
-// ones.
+// the factor of the colours of what is added, and how much less it is for each unit of a mask. For
+// tiles: where the tables of each picture start; in a simple ratio the weights of texels that are
+// not near an edge, of even ones, then of odd ones.
 #define ADJOINT_FILTER_BLOCK(B, READS, INPUT, VEC4S) \
     INPUT(B, int, start_x) \
     INPUT(B, int, start_y) \

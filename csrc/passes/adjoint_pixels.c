@@ -29,8 +29,7 @@ static bool scales_scene(const struct vkb_pass_row *row)
 {
     const int32_t composite = row->constants.composite;
 
-    return !depends_on_bloom(row)
-        && (composite == COMPOSITE_ADD || composite == COMPOSITE_MIX);
+    return !depends_on_bloom(row) && (composite == COMPOSITE_ADD || composite == COMPOSITE_MIX);
 }
 
 static struct vkb_share share_of_scene(const struct vkb_pass_row *row)

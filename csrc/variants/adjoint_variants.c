@@ -26,8 +26,8 @@ bool vkb_are_floats(const struct vkb_variant_choice *choice, const struct vkb_pa
 bool vkb_is_factor(const struct vkb_pass_row *pass)
 {
     return vkb_transposes(pass, VKB_BLOCK_composite) && pass->constants.by == BY_BLOOM
-        && !pass->constants.adds_image
-        && !pass->constants.of_source && pass->reads[SLOT_BLOOM] == VKB_NO_IMAGE
+        && !pass->constants.adds_image && !pass->constants.of_source
+        && pass->reads[SLOT_BLOOM] == VKB_NO_IMAGE
         && (pass->constants.composite == COMPOSITE_ADD
             || pass->constants.composite == COMPOSITE_MIX);
 }

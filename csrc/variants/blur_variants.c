@@ -293,8 +293,7 @@ static bool find_adjoint_bloom(const struct vkb_graph *graph, const struct vkb_p
     const struct vkb_pass_row *by_scene = vkb_writer_of(graph, added);
     bloom->composite = vkb_writer_of(graph, by_bloom);
     return bloom->composite && vkb_is_factor(bloom->composite)
-        && !bloom->composite->constants.masked
-        && bloom->composite->reads[SLOT_SCENE] == image
+        && !bloom->composite->constants.masked && bloom->composite->reads[SLOT_SCENE] == image
         && (added == bloom->composite->reads[SLOT_COTANGENTS]
             || (by_scene && vkb_transposes(by_scene, VKB_BLOCK_composite) && is_alone(by_scene)
                 && by_scene->constants.by == BY_SCENE));

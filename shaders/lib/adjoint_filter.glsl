@@ -45,8 +45,8 @@ vec4 texel_at(ivec2 texel)
     return cotangent_at(NEAREST(texel));
 }
 
-// What other readers of the image have accumulated, or a share of a composite's cotangents. With a mask its scene has lost
-// some of its light by that.
+// What other readers of the image have accumulated, or a share of a composite's cotangents. With a mask its scene
+// has lost some of its light by that.
 vec4 added_at(ivec2 pixel)
 {
     if (ADDS_IMAGE == 0)
