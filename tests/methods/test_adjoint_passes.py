@@ -469,7 +469,7 @@ def test_filters_take_a_composite_with_a_mask(
     for name in ("image", "mask"):
         check(found, expected, name)
     source = Inputs(image, mask=mask).source((cotangents["final"],))
-    plan = renderer._core.plan(source, settings, None, ("final",), False)
+    plan = renderer._core.plan(source, settings, None, ("final",), "images")
     assert plan
     shaders = [shader for _, shader, *_ in plan.passes]
     assert sum(shader.startswith("adjoint_composite") for shader in shaders) == passes
