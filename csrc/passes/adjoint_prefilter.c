@@ -46,8 +46,9 @@ static bool accumulate_mean(struct vkb_adjoint *adjoint, const struct vkb_pass_r
     if (!constants->mean_side
         && !vkb_filter_mean(&filter, constants->tap_set, params->step_x, params->step_y))
         return vkb_fail(error, VKB_ERROR_GENERAL,
-                        "%s: the mean of its taps has more than %d kernels", pass->name,
-                        MAX_KERNELS);
+                        "%s: the mean of its taps has more than %d kernels, or more than %d taps "
+                        "along an axis",
+                        pass->name, MAX_KERNELS, VKB_MAX_TAPS);
     if (vkb_is_linear(pass))
         return vkb_accumulate_filter(adjoint, &filter, vkb_cotangent_of(adjoint, pass), source,
                                      error);

@@ -225,6 +225,18 @@ static void take_line(struct vkb_axis *axis, const struct line *line, uint32_t k
     }
 }
 
+// Whether a filter has space for the kernels and their taps.
+static bool are_few(const struct product *products, uint32_t count)
+{
+    uint32_t taps_x = 0, taps_y = 0;
+
+    for (uint32_t i = 0; i < count; ++i) {
+        taps_x += products[i].x.count;
+        taps_y += products[i].y.count;
+    }
+    return count <= MAX_KERNELS && taps_x <= VKB_MAX_TAPS && taps_y <= VKB_MAX_TAPS;
+}
+
 bool vkb_filter_mean(struct vkb_filter *filter, int32_t set, double step_x, double step_y)
 {
     static const struct line tent = {
@@ -239,7 +251,7 @@ bool vkb_filter_mean(struct vkb_filter *filter, int32_t set, double step_x, doub
                 set, i, tap_sets[set].four_count ? tap_sets[set].fours[i].share : 1.0 / kernels);
         count = merge(products, merge(products, kernels, true), false);
     }
-    if (count > MAX_KERNELS)
+    if (!are_few(products, count))
         return false;
     filter->kernels = count;
     filter->x.count = filter->y.count = 0;

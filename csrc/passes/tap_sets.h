@@ -27,7 +27,8 @@ void vkb_filter_kernel(struct vkb_filter *filter, int32_t set, uint32_t kernel, 
 void vkb_filter_tap(struct vkb_filter *filter, int32_t set, uint32_t tap, double step_x,
                     double step_y);
 
-// The same of the mean of all kernels by their shares. False: it has more kernels than a filter.
+// The same of the mean of all kernels by their shares. False: a filter has no space for its
+// kernels, or for its taps.
 bool vkb_filter_mean(struct vkb_filter *filter, int32_t set, double step_x, double step_y);
 
 #endif
