@@ -196,13 +196,11 @@
     VEC4S(B, next, 1)
 
 // Blender's recursive filter along lines (simple_star.comp), each of which an invocation follows
-// from its end at the left or right or at the bottom, or back from its other end. `distance` is
-// that of the pixels that are mixed.
+// from its end at the left or right or at the bottom, or back from its other end.
 #define STAR_BLOCK(B, READS, INPUT, VEC4S) \
     INPUT(B, int, step_x) \
     INPUT(B, int, step_y) \
     INPUT(B, int, backwards) \
-    INPUT(B, int, distance) \
     INPUT(B, float, fade)
 
 // A mean of pixels along rows or columns (box_mean.comp).
@@ -593,7 +591,7 @@
     CONSTANT(14, UPSAMPLE, upsample) /* what a tap samples: UPSAMPLE_* */ \
     CONSTANT(15, FROM_IMAGE, from_image) /* a variant reads the threshold pass's image */ \
     CONSTANT(16, EMITTERS, emitters)     /* how many passes add up in the target by blending */ \
-    CONSTANT(17, PART_ABOVE, part_above) /* a streak reads what is above its threshold */ \
+    CONSTANT(17, PART_ABOVE, part_above) /* a streak or a flare reads what is above its threshold */ \
     CONSTANT(18, LEVELS, levels)         /* how many levels are added up */ \
     CONSTANT(19, TAP_SET, tap_set)       /* where a pass samples: TAPS_* */ \
     CONSTANT(20, COMBINE, combine)       /* what it makes of the samples: COMBINE_* */ \
@@ -634,13 +632,16 @@
     CONSTANT(55, PICTURES, pictures)           /* of tiles: pictures that are added up */ \
     CONSTANT(56, SPAN_WIDTH, span_width)       /* pixels along x that a block is read by */ \
     CONSTANT(57, SPAN_HEIGHT, span_height)     /* the same along y */ \
+    CONSTANT(58, DISTANCE, distance)           /* of the pixels that a star mixes */ \
     CONSTANT(59, PLACED, placed)               /* the taps of a blur are at its `offsets` */ \
     CONSTANT(60, PARTIAL_SUMS, partial_sums)   /* of SUMMED_ROWS: adds up for another pass */ \
     CONSTANT(61, OF_SOURCE, of_source)         /* its cotangents are of an image that is given */ \
+    CONSTANT(62, ABERRATED, aberrated)         /* red and blue of a flare are moved */ \
     CONSTANT(63, THROUGH_COMPOSITE, through_composite) /* a composite's cotangents are read */ \
     CONSTANT(64, SQUARED, squared)             /* of adjoint_sum.frag: squares are added up */ \
     CONSTANT(65, POINT_AFTER, after)           /* of the combination: POINT_* */ \
-    CONSTANT(66, EXPOSED_SCENE, exposed_scene) /* a composite's scene is exposed before it */
+    CONSTANT(66, EXPOSED_SCENE, exposed_scene) /* a composite's scene is exposed before it */ \
+    CONSTANT(67, JITTERED, jittered)           /* samples of beams are between steps */
 
 // The names that a setting can have. Each list is a setting and a specialization constant.
 #define COMPOSITE_NAMES(NAME) \

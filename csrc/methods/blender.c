@@ -240,12 +240,12 @@ static uint32_t add_line(struct vkb_levels *levels, int direction, int step_x, i
             vkb_row_of_lines(levels, &vkb_shader_simple_star_comp, lines, from, to);
         vkb_read_at(&row, SLOT_BEFORE, adds ? before : VKB_NO_IMAGE);
         row.constants.adds_image = adds;
+        row.constants.distance = i / 2 + 1;
         row.block = VKB_BLOCK_star;
         row.params.star = (struct vkb_star_params){
             .step_x = step_x,
             .step_y = step_y,
             .backwards = i % 2,
-            .distance = i / 2 + 1,
             .fade = (float)values->fade,
         };
         vkb_levels_pass(levels, &row);
@@ -273,6 +273,7 @@ static uint32_t add_sun_beams(struct vkb_levels *levels)
     const uint32_t light = vkb_levels_step(levels, levels->sizes[0], "beams");
     struct vkb_pass_row row =
         vkb_fetching_row(levels, &vkb_shader_sun_beams_frag, levels->downs[0], light);
+    row.constants.jittered = settings->values.jitter > 0.0;
     row.block = VKB_BLOCK_sun_beams;
     row.params.sun_beams = (struct vkb_sun_beams_params){
         .most = most,

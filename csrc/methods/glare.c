@@ -145,6 +145,8 @@ void vkb_add_flare_pass(struct vkb_levels *levels, const struct vkb_stage *stage
 
     if (ghosts)
         add_before(&row, before);
+    row.constants.part_above = values->threshold > 0.0f;
+    row.constants.aberrated = values->aberration > 0.0f;
     row.block = VKB_BLOCK_flare;
     row.params.flare = (struct vkb_flare_params){
         .threshold = values->threshold,

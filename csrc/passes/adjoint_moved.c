@@ -213,6 +213,7 @@ bool vkb_accumulate_moved(struct vkb_adjoint *adjoint, const struct vkb_pass_row
     struct vkb_pass_row moved = vkb_adjoint_row(&vkb_shader_adjoint_moved_frag, VKB_NO_IMAGE);
     // The shader samples them as the forward pass samples the source.
     moved.reads[SLOT_SOURCE] = sampled;
+    moved.constants.aberrated = row->constants.aberrated;
     moved.block = row->block;
     moved.params = row->params;
     return accumulate_summed(adjoint, &moved, &gathering, source, error);
@@ -255,6 +256,7 @@ bool vkb_transpose_sun_beams(struct vkb_adjoint *adjoint, const struct vkb_pass_
     struct vkb_pass_row row = vkb_adjoint_row(&vkb_shader_adjoint_beam_means_frag, cotangents);
     uint32_t sums;
 
+    row.constants.jittered = pass->constants.jittered;
     row.block = VKB_BLOCK_sun_beams;
     row.params = pass->params;
     if (!vkb_add_adjoint_pass(adjoint, &row, gathering.size, &sums, error))

@@ -26,7 +26,7 @@ struct Beam {
 };
 
 // With jitter the samples are between steps.
-#define IS_JITTERED (params.left < 1.0)
+#define IS_JITTERED (JITTERED != 0)
 
 Beam beam_of(ivec2 pixel, ivec2 size)
 {

@@ -20,7 +20,7 @@ vec4 sample_from_centre(vec2 offset)
 // Whether red (-1) and blue (1) are sampled at other places than green, and the place of each.
 bool is_aberrated(vec2 offset)
 {
-    return params.aberration > 0.0 && length(offset / vec2(textureSize(source, 0))) > 0.0;
+    return ABERRATED != 0 && length(offset / vec2(textureSize(source, 0))) > 0.0;
 }
 
 vec2 aberrated(vec2 offset, float side)
@@ -44,7 +44,7 @@ vec4 colours_from_centre(vec2 offset)
 vec4 seen_from_centre(vec2 offset)
 {
     vec4 above = colours_from_centre(offset);
-    if (params.threshold > 0.0)
+    if (PART_ABOVE != 0)
         above = part_above(above, params.threshold);
     return vec4(min(above.rgb, vec3(params.maximum)), above.a);
 }

@@ -18,9 +18,9 @@ vec4 shade()
                                    : ghost_factor(params.ghosts[0], place) * corner_factor(place);
     if (ALPHA != ALPHA_BLUR)
         cotangent.a = 0.0;
-    vec4 above = params.threshold > 0.0 ? part_above(value, params.threshold) : value;
+    vec4 above = PART_ABOVE != 0 ? part_above(value, params.threshold) : value;
     cotangent.rgb *= larger(vec4(params.maximum), above).rgb;
-    if (params.threshold > 0.0)
+    if (PART_ABOVE != 0)
         cotangent = back_part_above(value, cotangent, params.threshold);
     return gathered(cotangent);
 }

@@ -52,34 +52,45 @@ vec4 fetch(Line line, int at)
 void main()
 {
     Line line = line_of(int(gl_GlobalInvocationID.x), textureSize(source, 0));
+    float own = 1.0 - params.fade, end = 0.5 * params.fade;
     vec4 mixed[STAR_ITERATIONS - 1];
 
+    // As many pixels at a time as a pixel is away from the one that it is mixed with. So each has its own element.
 #ifdef TRANSPOSED
-    float own = 1.0 - params.fade, end = 0.5 * params.fade;
-    for (int at = line.count - 1; at >= 0; --at) {
-        int slot = at % params.distance;
-        ivec2 place = line.first + at * line.towards;
-        vec4 cotangent = texelFetch(source, place, 0);
-        if (at + params.distance < line.count) {
-            cotangent += end * mixed[slot];
-            imageStore(target, place + params.distance * line.towards, own * mixed[slot] + end * cotangent);
+    for (int first = (line.count - 1) / DISTANCE * DISTANCE; first >= 0; first -= DISTANCE)
+        [[unroll]] for (int slot = 0; slot < DISTANCE; ++slot) {
+            ivec2 place = line.first + (first + slot) * line.towards;
+            if (first + slot < line.count) {
+                vec4 cotangent = texelFetch(source, place, 0);
+                if (first + slot + DISTANCE < line.count) {
+                    cotangent += end * mixed[slot];
+                    imageStore(target, place + DISTANCE * line.towards, own * mixed[slot] + end * cotangent);
+                }
+                mixed[slot] = cotangent;
+            }
         }
-        mixed[slot] = cotangent;
-    }
-    for (int at = 0; at < min(params.distance, line.count); ++at)
-        imageStore(target, line.first + at * line.towards, own * mixed[at]);
+    [[unroll]] for (int slot = 0; slot < DISTANCE; ++slot)
+        if (slot < line.count)
+            imageStore(target, line.first + slot * line.towards, own * mixed[slot]);
 #else
-    for (int at = 0; at < line.count; ++at) {
-        int slot = at % params.distance;
-        vec4 ends = fetch(line, at + params.distance);
-        if (at >= params.distance)
-            ends += mixed[slot];
-        mixed[slot] = stored((1.0 - params.fade) * fetch(line, at) + 0.5 * params.fade * ends);
-        ivec2 place = line.first + at * line.towards;
-        vec4 value = mixed[slot];
-        if (ADDS_IMAGE != 0)
-            value = stored(value + texelFetch(before, place, 0));
-        imageStore(target, place, value);
+    vec4 values[STAR_ITERATIONS - 1];
+
+    [[unroll]] for (int slot = 0; slot < DISTANCE; ++slot) {
+        mixed[slot] = vec4(0.0);
+        values[slot] = fetch(line, slot);
     }
+    for (int first = 0; first < line.count; first += DISTANCE)
+        [[unroll]] for (int slot = 0; slot < DISTANCE; ++slot) {
+            vec4 next = fetch(line, first + slot + DISTANCE);
+            mixed[slot] = stored(own * values[slot] + end * (next + mixed[slot]));
+            values[slot] = next;
+            ivec2 place = line.first + (first + slot) * line.towards;
+            if (first + slot < line.count) {
+                vec4 value = mixed[slot];
+                if (ADDS_IMAGE != 0)
+                    value = stored(value + texelFetch(before, place, 0));
+                imageStore(target, place, value);
+            }
+        }
 #endif
 }
