@@ -405,6 +405,13 @@
 #define MAX_SUMMED 12
 #define BEAM_CELL  2
 
+// Samples of sun beams that are passed over together where there is no light, and the side of the
+// blocks of texels for which this is known (beam_dark.frag). With the half texel by which Blender
+// measures the way to the sun from another place, samples that follow one are less than BEAM_RUN
+// texels away from it.
+#define BEAM_RUN   8
+#define BEAM_BLOCK 16
+
 // The most iterations of Blender's streaks and of its star, whose distances are fewer by one.
 #define STAR_ITERATIONS 5
 
@@ -447,7 +454,8 @@
 
 #define GLARE_SLOTS(SLOT) \
     SLOT(SLOT_BEFORE, 1) /* the light that a ray, ghosts or a star is added to */ \
-    SLOT(SLOT_DIRT, 1)   /* the picture of dirt */
+    SLOT(SLOT_DIRT, 1)   /* the picture of dirt */ \
+    SLOT(SLOT_DARK, 1)   /* where sun beams need no samples */
 
 #define TRANSFORM_SLOTS(SLOT) SLOT(SLOT_SPECTRUM, 1) /* of the kernel, for the product */
 

@@ -262,6 +262,22 @@ static uint32_t add_simple_star(struct vkb_levels *levels)
     return add_line(levels, 1, diagonal ? -1 : 0, -1, before);
 }
 
+// Adds the pass that finds where there is no light.
+static uint32_t add_dark(struct vkb_levels *levels)
+{
+    const struct vkb_size blocks = {
+        .width = (levels->sizes[0].width + BEAM_BLOCK - 1) / BEAM_BLOCK,
+        .height = (levels->sizes[0].height + BEAM_BLOCK - 1) / BEAM_BLOCK,
+    };
+    const uint32_t dark = vkb_levels_step(levels, blocks, "beams_dark");
+    struct vkb_pass_row row =
+        vkb_fetching_row(levels, &vkb_shader_beam_dark_frag, levels->downs[0], dark);
+
+    row.block = VKB_BLOCK_sun_beams;
+    vkb_levels_pass(levels, &row);
+    return dark;
+}
+
 static uint32_t add_sun_beams(struct vkb_levels *levels)
 {
     const struct vkb_settings *settings = levels->settings;
@@ -274,6 +290,8 @@ static uint32_t add_sun_beams(struct vkb_levels *levels)
     struct vkb_pass_row row =
         vkb_fetching_row(levels, &vkb_shader_sun_beams_frag, levels->downs[0], light);
     row.constants.jittered = settings->values.jitter > 0.0;
+    if (!row.constants.jittered)
+        vkb_read_at(&row, SLOT_DARK, add_dark(levels));
     row.block = VKB_BLOCK_sun_beams;
     row.params.sun_beams = (struct vkb_sun_beams_params){
         .most = most,

@@ -14,7 +14,7 @@ Place place_from_centre(vec2 offset)
 vec4 sample_from_centre(vec2 offset)
 {
     Place place = place_from_centre(offset);
-    return bilinear(fetch_four_inside(source, place.texel), place.part);
+    return bilinear_inside(source, place.texel, place.part);
 }
 
 // Whether red (-1) and blue (1) are sampled at other places than green, and the place of each.

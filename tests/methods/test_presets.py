@@ -148,6 +148,18 @@ def test_blenders_gain(settings: BlenderGlare, inside: tuple[slice, ...]) -> Non
     assert_allclose(bloom, np.broadcast_to(gain, bloom.shape), rtol=2e-3)
 
 
+@pytest.mark.parametrize("sun", [(0.5, 0.5), (-0.25, 1.1)], ids=["inside", "outside"])
+@pytest.mark.parametrize("alpha", ["keep", "blur"])
+def test_beams_of_single_lamps(renderer: Renderer, sun: Any, alpha: Any) -> None:
+    """Runs of samples in the dark are passed over, but none that sees a lamp."""
+    settings = BlenderGlare(type="sun_beams", sun_position=sun, alpha=alpha, format="rgba32float")
+    for row, column in ((1, 2), (31, 47), (32, 48), (47, 80), (79, 110), (40, 63)):
+        image = np.zeros((81, 113, 4), np.float32)
+        image[..., 3] = 1.0
+        image[row, column] = (5.0, 3.0, 9.0, 0.5)
+        assert_matches_reference(renderer.apply(image, settings), image, settings)
+
+
 def test_kinos_threshold_is_0_8_in_srgb() -> None:
     assert KinoBloom().threshold == pytest.approx(0.6038273, abs=1e-7)
 
