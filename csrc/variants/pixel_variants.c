@@ -5,6 +5,8 @@
 #include <string.h>
 
 static const struct vkb_shader *const blend_shaders[VKB_FORMAT_COUNT] = VKB_LINEAR_BY_FORMAT(blend);
+static const struct vkb_shader *const blender_end_shaders[VKB_FORMAT_COUNT] =
+    VKB_LINEAR_BY_FORMAT(blender_end);
 static const struct vkb_shader *const threshold_shaders[VKB_FORMAT_COUNT] =
     VKB_LINEAR_BY_FORMAT(threshold);
 
@@ -16,6 +18,14 @@ static bool blends(const struct vkb_graph *graph, const struct vkb_pass_row *pas
         && vkb_same_size(graph, pass->reads[SLOT_BLOOM], pass->targets[0])
         && vkb_has_format_of(graph, pass->reads[SLOT_SCENE], pass->reads[SLOT_BLOOM])
         && vkb_has_format_of(graph, pass->reads[SLOT_SCENE], pass->targets[0]);
+}
+
+// Whether the pass is the end of Blender's glare, which it need not enlarge.
+static bool ends_glare(const struct vkb_graph *graph, const struct vkb_pass_row *pass)
+{
+    return vkb_computes(pass, VKB_BLOCK_blender_end) && !pass->params.blender_end.reads_next
+        && vkb_same_size(graph, pass->reads[SLOT_SOURCE], pass->targets[0])
+        && vkb_has_format_of(graph, pass->reads[SLOT_SOURCE], pass->targets[0]);
 }
 
 // Turns a pass that reads only the pixel at its own position into one that loads it.
@@ -38,6 +48,8 @@ bool vkb_add_fullscreen_variant(struct vkb_variant_choice *choice, const struct 
         vkb_make_dispatch(&row, pass->shader->dispatch, PIXEL_INVOCATIONS, PIXEL_INVOCATIONS);
     else if (vkb_fits_linear(choice, pass) && blends(graph, pass))
         load_pixels(graph, &row, blend_shaders);
+    else if (vkb_fits_linear(choice, pass) && ends_glare(graph, pass))
+        load_pixels(graph, &row, blender_end_shaders);
     else if (vkb_fits_linear(choice, pass) && vkb_is_threshold(pass)
              && vkb_has_format_of(graph, pass->reads[SLOT_SOURCE], pass->targets[0]))
         load_pixels(graph, &row, threshold_shaders);

@@ -55,7 +55,9 @@ void main()
     float own = 1.0 - params.fade, end = 0.5 * params.fade;
     vec4 mixed[STAR_ITERATIONS - 1];
 
-    // As many pixels at a time as a pixel is away from the one that it is mixed with. So each has its own element.
+    // As many pixels at a time as a pixel is away from the one that it is mixed with. So each has its own element: llvmpipe
+    // loads and stores arrays with computed indices lane by lane, with which `blender_simple_star` takes 413 ms in place of
+    // 186 (processor time of 1920 x 1080, lavapipe of Mesa 22.3.6, 2026-11-29).
 #ifdef TRANSPOSED
     for (int first = (line.count - 1) / DISTANCE * DISTANCE; first >= 0; first -= DISTANCE)
         [[unroll]] for (int slot = 0; slot < DISTANCE; ++slot) {
