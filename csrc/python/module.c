@@ -35,6 +35,16 @@ static PyObject *adapters(PyObject *module, PyObject *arguments)
     return list;
 }
 
+static PyObject *end_instances(PyObject *module, PyObject *unused)
+{
+    (void)module;
+    (void)unused;
+    Py_BEGIN_ALLOW_THREADS
+    vkb_instances_end();
+    Py_END_ALLOW_THREADS
+    return Py_NewRef(Py_None);
+}
+
 static PyObject *fail_without_adapter(PyObject *module, PyObject *text)
 {
     struct vkb_error error;
@@ -96,6 +106,8 @@ static PyMethodDef functions[] = {
      "fail_without_adapter(text): raises AdapterNotFoundError, with what to install."},
     {"adapters", adapters, METH_VARARGS,
      "adapters(driver): describes those that can run vkbloom; \"\": the loader's."},
+    {"end_instances", end_instances, METH_NOARGS,
+     "end_instances(): destroys the Vulkan instances without users, before the process exits."},
     {"image_source", vkb_image_source, METH_VARARGS,
      "image_source(image, emission=None, mask=None, levels=()) -> Source. The levels are images "
      "that another part of a graph has made."},

@@ -315,6 +315,8 @@ void vkb_device_destroy(struct vkb_device *device)
     if (device->instance)
         vkb_instance_close(device->instance);
     device->instance = NULL;
+    if (device->adapter.device_type == VK_PHYSICAL_DEVICE_TYPE_CPU)
+        vkb_return_freed();
     vkb_messages_end(before);
     vkb_messages_close(&device->messages);
 }

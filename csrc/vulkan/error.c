@@ -7,6 +7,9 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#ifdef __GLIBC__
+#include <malloc.h>
+#endif
 
 #ifdef __linux__
 #include <sys/mman.h>
@@ -175,6 +178,13 @@ void vkb_free(void *memory)
 {
     COUNT_BLOCKS(-(memory != NULL));
     free(memory);
+}
+
+void vkb_return_freed(void)
+{
+#ifdef __GLIBC__
+    (void)malloc_trim(0);
+#endif
 }
 
 bool vkb_has_room(size_t mib)

@@ -421,6 +421,34 @@ void vkb_instance_close(struct vkb_instance *instance)
     leave_instance(instance);
 }
 
+// Takes the handle of an instance of this process without users; false: there is none.
+static bool take_unused(struct vkb_instance *unused)
+{
+    const long process = vkb_current_process();
+    bool found = false;
+
+    vkb_lock_acquire(&lock);
+    for (struct vkb_instance *instance = instances; instance && !found; instance = instance->next)
+        if (instance->process == process && instance->handle && instance->users == 0) {
+            *unused = *instance;
+            instance->messenger = VK_NULL_HANDLE;
+            instance->handle = VK_NULL_HANDLE;
+            found = true;
+        }
+    vkb_lock_release(&lock);
+    return found;
+}
+
+void vkb_instances_end(void)
+{
+    struct vkb_instance unused;
+
+    vkb_lock_acquire(&creation);
+    while (take_unused(&unused))
+        destroy_instance(&unused);
+    vkb_lock_release(&creation);
+}
+
 bool vkb_instance_require_room(const struct vkb_instance *instance, bool lavapipe,
                                struct vkb_error *error)
 {

@@ -73,6 +73,11 @@ struct vkb_instance *vkb_instance_open(const char *driver, bool validation,
                                        struct vkb_error *error);
 void vkb_instance_close(struct vkb_instance *instance);
 
+// Destroys those of this process that have no user, before the process exits. Mesa writes its cache
+// of shaders in threads, which end at exit with what they have not written yet, unless the instance
+// is destroyed before.
+void vkb_instances_end(void);
+
 // Replaces the instance by one that no other device has claimed, as a device of lavapipe does. The
 // devices of an instance share one llvmpipe, which looks for the users of an image in the scenes of
 // all of them, while their threads free these: 16 threads with a device each ended the process 3

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 import vkbloom
+from tests.core.builds import compiler
 from tests.exhaustive import EXHAUSTIVE
 from tests.processes import output, python
 from vkbloom._grid import grid
@@ -148,6 +149,32 @@ with vkbloom.Renderer("software") as renderer:
 """
 
 
+# Mesa writes its files in threads, which end with the process: here each file takes long.
+SLOW_FILES = """
+#define _GNU_SOURCE
+#include <dlfcn.h>
+#include <string.h>
+#include <unistd.h>
+
+int rename(const char *from, const char *to)
+{
+    int (*next)(const char *, const char *) = dlsym(RTLD_NEXT, "rename");
+    if (strstr(to, "/mesa_shader_cache/"))
+        usleep(300000);
+    return next(from, to);
+}
+"""
+
+
+def slow_files(folder: Path) -> Path:
+    """Return a library for LD_PRELOAD."""
+    source, library = folder / "slow.c", folder / "slow.so"
+    source.write_text(SLOW_FILES)
+    command = [*compiler(), "-shared", "-fPIC", "-o", library, source, "-ldl"]
+    subprocess.run(command, check=True)
+    return library
+
+
 def warm_files(folder: Path) -> set[Path]:
     return {path for path in folder.rglob("*") if path.is_file() and path.suffix != ".tmp"}
 
@@ -161,7 +188,9 @@ def test_a_later_process_compiles_nothing(tmp_path: Path) -> None:
     drivers.mkdir()
     cached = {"VKBLOOM_CACHE_DIR": str(ours), "MESA_SHADER_CACHE_DIR": str(drivers)}
     words = ["-m", "vkbloom", "warm", "--preset", "kino", "--size", "32x24"]
-    assert "12 kinds of calls on" in output(*words, "--adapter", "software", **cached)
+    words += ["--adapter", "software"]
+    slow = {"LD_PRELOAD": str(slow_files(tmp_path))} if sys.platform == "linux" else {}
+    assert "12 kinds of calls on" in output(*words, **cached, **slow)
     filled = {path: path.stat().st_size for path in warm_files(drivers)}
     assert filled
     assert warm_files(ours)

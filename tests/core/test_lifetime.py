@@ -75,6 +75,34 @@ assert in_use() == before
 """
 
 
+# Pipelines are blocks of the C library, which keeps what it has been given back.
+RETURNED = """
+import numpy as np
+import vkbloom
+
+def resident():
+    with open("/proc/self/statm") as file:
+        return int(file.read().split()[1])
+
+image = np.ones((24, 32, 3), np.float32)
+with vkbloom.Renderer("software") as renderer:
+    renderer.apply(image, "tutorial")
+before = resident()
+with vkbloom.Renderer("software") as renderer:
+    for name in ("bevy_natural", "kino", "unity_hdrp", "threejs_unreal", "iris_6", "filament"):
+        renderer.apply(image, name)
+    most = resident()
+assert resident() - before < (most - before) / 2, (before, most, resident())
+"""
+
+
+@LINUX
+def test_close_returns_memory(software: AdapterInfo) -> None:
+    if "Mesa" not in software.driver_info:
+        pytest.skip("no Mesa")
+    output("-c", RETURNED)
+
+
 @LINUX
 def test_what_is_collected_or_fails_leaves_nothing() -> None:
     """A renderer that is not closed, queries, and renderers that do not open."""

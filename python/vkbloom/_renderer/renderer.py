@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import contextlib
 import itertools
 import math
@@ -63,6 +64,14 @@ _NUMBER = re.compile(r"\d+")
 #: take numbers only.
 RENDERERS: Final[weakref.WeakValueDictionary[int, Renderer]] = weakref.WeakValueDictionary()
 _numbers = itertools.count(1)
+
+
+@atexit.register
+def _end_instances() -> None:
+    """Let the driver write what it has compiled: it does so in threads, which end at exit."""
+    with contextlib.suppress(_core.Error):  # There is no core.
+        _core.end_instances()
+
 
 #: What adjoint passes compute: derivatives by images, or sums of derivatives by fields.
 DerivativeKind = Literal["images", "sums", "all"]
