@@ -4,6 +4,7 @@
 #include "execute/transient.h"
 #include "share/exported_images.h"
 #include "transfer/sources.h"
+#include "vulkan/parts.h"
 
 #include <string.h>
 
@@ -69,18 +70,54 @@ static bool load_scene(struct vkb_run *run, const struct vkb_scene_data *data,
     return true;
 }
 
-// The bytes of the image in the staging memory, if the host fills it once and it does not hold its
-// pixels yet; else 0. Offsets of copies are multiples of a pixel.
-static size_t missing_size(const struct vkb_run *run, uint32_t index)
+// Whether the host fills the image once, and it does not hold its pixels yet.
+static bool is_missing(const struct vkb_run *run, uint32_t index)
 {
     const struct vkb_image_row *row = &run->graph->images[index];
     const struct vkb_content *content = run->contents[index];
 
     // The content of a history may be what a call before has made.
     return row->serial && !run->inputs[row->input].image
-                && !(content->valid && content->version == row->serial)
-             ? ((size_t)vkb_image_size(row) + 15) & ~(size_t)15
-             : 0;
+        && !(content->valid && content->version == row->serial);
+}
+
+// The bytes of the image in the staging memory. Offsets of copies are multiples of a pixel.
+static size_t staged_size(const struct vkb_run *run, uint32_t index)
+{
+    return run->images[index]->image.mapped
+             ? 0
+             : ((size_t)vkb_image_size(&run->graph->images[index]) + 15) & ~(size_t)15;
+}
+
+struct given {
+    const struct vkb_image_row *row;
+    unsigned char *to;
+    size_t pitch;
+};
+
+static void copy_part(void *context, uint32_t part, uint32_t first, uint32_t end)
+{
+    const struct given *given = context;
+
+    (void)part;
+    for (; first < end; ++first)
+        vkb_copy_given_row(given->row, first, vkb_formats[given->row->format].channels,
+                           given->to + first * given->pitch);
+}
+
+// Writes the pixels to a mapped image, or to the staging memory.
+static void copy_given(const struct vkb_run *run, uint32_t index, void *staged)
+{
+    const struct vkb_image_row *row = &run->graph->images[index];
+    const struct vkb_image *image = &run->images[index]->image;
+    struct given given = {
+        .row = row,
+        .to = staged ? staged : image->mapped,
+        .pitch = staged ? (size_t)row->width * vkb_pixel_size(row->format) : image->row_pitch,
+    };
+
+    vkb_in_parts(run->device->workers, copy_part, NULL, &given, 0, row->height,
+                 (size_t)vkb_image_size(row));
 }
 
 // Fills the images whose pixels the graph has: a kernel, a picture of dirt, weights.
@@ -89,34 +126,36 @@ static bool fill_constants(struct vkb_run *run, struct vkb_error *error)
     const struct vkb_graph *graph = run->graph;
     struct vkb_buffer *staging = &run->frame->constants;
     VkDeviceSize size = 0, start = 0;
+    bool missing = false;
 
     for (uint32_t i = 0; i < graph->image_count; ++i) {
         if (graph->images[i].serial && !vkb_run_resolve(run, i, error))
             return false;
-        size += missing_size(run, i);
+        if (is_missing(run, i)) {
+            size += staged_size(run, i);
+            missing = true;
+        }
     }
-    if (size == 0)
+    if (!missing)
         return true;
     if (!vkb_submissions_wait(run->device, &run->frame->submissions, error)
-        || !vkb_buffer_reserve(run->device, VKB_MEMORY_UPLOAD, VK_BUFFER_USAGE_TRANSFER_SRC_BIT,
-                               size, staging, error))
+        || (size > 0
+            && !vkb_buffer_reserve(run->device, VKB_MEMORY_UPLOAD, VK_BUFFER_USAGE_TRANSFER_SRC_BIT,
+                                   size, staging, error)))
         return false;
     for (uint32_t i = 0; i < graph->image_count; ++i) {
-        const size_t missing = missing_size(run, i);
-        if (missing == 0)
+        if (!is_missing(run, i))
             continue;
-        if (graph->images[i].pixels)
-            memcpy((char *)staging->mapped + start, graph->images[i].pixels,
-                   (size_t)vkb_image_size(&graph->images[i]));
-        else
-            memset((char *)staging->mapped + start, 0, missing);
-        vkb_image_fill(run->device, run->submission->commands.buffer, &run->images[i]->image,
-                       staging->handle, start);
+        const size_t staged = staged_size(run, i);
+        copy_given(run, i, staged ? (char *)staging->mapped + start : NULL);
+        if (staged)
+            vkb_image_fill(run->device, run->submission->commands.buffer, &run->images[i]->image,
+                           staging->handle, start);
         run->contents[i]->version = graph->images[i].serial;
         run->contents[i]->valid = true;
-        start += missing;
+        start += staged;
     }
-    return vkb_buffer_flush(run->device, staging, error);
+    return size == 0 || vkb_buffer_flush(run->device, staging, error);
 }
 
 // `next` is the following request; NULL: `request` is the last one.
@@ -345,7 +384,7 @@ static void fetch(const struct vkb_device *device, const struct vkb_submission *
             request->timings[timing].seconds =
                 vkb_timer_seconds(device, &submission->timer, request->first_span + timing);
         for (uint32_t output = 0; output < request->plan->output_count; ++output)
-            vkb_readback_fetch(&submission->readback, &request->outputs[output]);
+            vkb_readback_fetch(device, &submission->readback, &request->outputs[output]);
     }
 }
 

@@ -238,6 +238,37 @@ uint64_t vkb_image_size(const struct vkb_image_row *row)
     return (uint64_t)row->width * row->height * vkb_pixel_size(row->format);
 }
 
+// Compiled once for each number of channels.
+static inline void repeat_grey(float *to, const float *from, uint32_t width, uint32_t channels)
+{
+    for (uint32_t x = 0; x < width; ++x)
+        for (uint32_t channel = 0; channel < channels; ++channel)
+            to[x * channels + channel] = from[x];
+}
+
+void vkb_copy_given_row(const struct vkb_image_row *image, uint32_t y, uint32_t channels, void *to)
+{
+    const size_t pixel = vkb_pixel_size(image->format), size = image->width * pixel;
+    const size_t kept = channels * vkb_formats[image->format].channel_size;
+
+    if (!image->pixels) {
+        memset(to, 0, image->width * kept);
+        return;
+    }
+    if (image->grey) {
+        const float *from = (const float *)image->pixels + (size_t)y * image->width;
+        channels == 3 ? repeat_grey(to, from, image->width, 3)
+                      : repeat_grey(to, from, image->width, 4);
+        return;
+    }
+    const unsigned char *from = (const unsigned char *)image->pixels + y * size;
+    if (kept == pixel)
+        memcpy(to, from, size);
+    else
+        for (uint32_t x = 0; x < image->width; ++x)
+            memcpy((unsigned char *)to + x * kept, from + x * pixel, kept);
+}
+
 bool vkb_images_alike(const struct vkb_image_row *a, const struct vkb_image_row *b)
 {
     return a->format == b->format && a->width == b->width && a->height == b->height

@@ -63,8 +63,10 @@ struct vkb_image_row {
     uint32_t history_of;      // of VKB_INPUT_HISTORY: the framebuffer (vkb_graph_add_history)
     VkImageUsageFlags usage;  // that the graph's passes need (vkb_graph_set_usages)
     // Filled by the host once: the pixels, without gaps (NULL: zeros), and their number; 0: it is
-    // not. A history holds them if no call before has made it.
+    // not. A history holds them if no call before has made it. Grey ones of single floats are one
+    // float each, which all channels have.
     const void *pixels;
+    bool grey;
     uint64_t serial;
 };
 
@@ -244,6 +246,10 @@ bool vkb_images_alike(const struct vkb_image_row *a, const struct vkb_image_row 
 
 // Bytes of an image, and of all images that passes use, without layers.
 uint64_t vkb_image_size(const struct vkb_image_row *row);
+
+// Copies the first `channels` (all, or three) of a row of the pixels that the graph has; zeros
+// without pixels.
+void vkb_copy_given_row(const struct vkb_image_row *image, uint32_t y, uint32_t channels, void *to);
 uint64_t vkb_graph_size(const struct vkb_graph *graph);
 
 // Whether both graphs have the same images in the same order; their passes may differ.

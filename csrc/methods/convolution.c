@@ -113,6 +113,7 @@ static uint32_t add_kernel(struct vkb_levels *levels)
         .channels = 3,
         .framebuffer = !vkb_method_of(levels->settings)->sums_gaussians,
         .pixels = kernel->pixels,
+        .grey = kernel->grey,
         .serial = kernel->serial,
     };
 

@@ -262,6 +262,7 @@ static uint32_t add_dirty_light(struct vkb_levels *levels, const struct vkb_glar
         .width = data->width,
         .height = data->height,
         .pixels = data->pixels,
+        .grey = data->grey,
         .serial = data->serial,
     };
     const uint32_t dirt = vkb_levels_add(levels, &picture);

@@ -73,10 +73,10 @@ struct vkb_layer {
 // The kernel of a convolution in pixels of the bloom buffers: four floats each, row by row, which
 // the owner of the settings keeps.
 struct vkb_kernel_data {
-    const float *pixels;
+    const float *pixels;  // of four channels, or grey ones of one
     uint32_t width, height;
-    uint64_t serial;     // equal only for equal pixels
-    bool grey;           // all channels are equal
+    uint64_t serial;  // equal only for equal pixels
+    bool grey;
     float prefilter[3];  // min, max, factor; min above max: none
 };
 

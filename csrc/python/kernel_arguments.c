@@ -1,21 +1,20 @@
 // The kernels of convolutions and the picture of dirt, which are Python's arrays.
 #include "python/arguments.h"
 
-// (array (h, w, 4) of float32, serial, whether it is grey, (min, max, factor))
+// (array (h, w, 4) of float32, of a grey kernel (h, w, 1), serial, (min, max, factor))
 static bool read_kernel_tuple(PyObject *tuple, Py_buffer *view, struct vkb_kernel_data *kernel)
 {
     PyObject *pixels;
     unsigned long long serial;
-    int grey;
 
     if (!vkb_require_tuple(tuple, "kernel")
-        || !PyArg_ParseTuple(tuple, "OKp(fff):core_kernel", &pixels, &serial, &grey,
-                             &kernel->prefilter[0], &kernel->prefilter[1], &kernel->prefilter[2])
+        || !PyArg_ParseTuple(tuple, "OK(fff):core_kernel", &pixels, &serial, &kernel->prefilter[0],
+                             &kernel->prefilter[1], &kernel->prefilter[2])
         || !vkb_hold_array(pixels, "kernel", VKB_FLOAT32, 0, view))
         return false;
-    if (view->ndim != 3 || view->shape[2] != 4 || view->len == 0)
-        return vkb_refuse("kernel: an array with %d dimensions and %zd bytes is not (h, w, 4) with "
-                          "sides of at least 1",
+    if (view->ndim != 3 || (view->shape[2] != 4 && view->shape[2] != 1) || view->len == 0)
+        return vkb_refuse("kernel: an array with %d dimensions and %zd bytes is not (h, w, 4) or "
+                          "(h, w, 1) with sides of at least 1",
                           view->ndim, view->len);
     // Images that are filled once have one; 0: the others.
     if (serial == 0)
@@ -24,7 +23,7 @@ static bool read_kernel_tuple(PyObject *tuple, Py_buffer *view, struct vkb_kerne
     kernel->pixels = view->buf;
     kernel->height = vkb_side(view->shape[0]);
     kernel->width = vkb_side(view->shape[1]);
-    kernel->grey = grey;
+    kernel->grey = view->shape[2] == 1;
     return true;
 }
 

@@ -1,6 +1,7 @@
 #include "transfer/readback.h"
 
 #include "execute/record.h"
+#include "vulkan/parts.h"
 
 #include <string.h>
 
@@ -65,19 +66,24 @@ static bool import(const struct vkb_device *device, struct vkb_readback *readbac
     return true;
 }
 
-// Selects how the output, which is rows of an image of this format and width, is copied.
+// Selects how the output, which is rows of an image, is copied.
 static bool plan_output(const struct vkb_device *device, struct vkb_readback *readback,
-                        enum vkb_format format, uint32_t width, struct vkb_output *output,
+                        const struct vkb_image_row *image, struct vkb_output *output,
                         struct vkb_error *error)
 {
-    output->format = format;
-    output->width = width;
+    output->format = image->format;
+    output->width = image->width;
+    output->image = image;
     output->imported = VK_NULL_HANDLE;
     output->sink = VKB_SINK_NONE;
     if (output->exported)
         output->sink = VKB_SINK_EXPORTED;
     if (!output->memory)
         return true;
+    if (image->pixels && !image->input && output->channels >= 3) {
+        output->sink = VKB_SINK_GIVEN;
+        return true;
+    }
     const size_t size = row_size(output) * output->row_count;
     const size_t output_size = output_row_size(output) * output->row_count;
     if (output_size >= VKB_IMPORTED_BYTES) {
@@ -118,8 +124,7 @@ static bool prepare(struct vkb_run *run, struct vkb_request *requests, uint32_t 
     for (uint32_t i = 0; i < request_count; ++i) {
         const struct vkb_plan *plan = requests[i].plan;
         for (uint32_t output = 0; output < plan->output_count; ++output) {
-            const struct vkb_image_row *row = &plan->graph.images[plan->outputs[output]];
-            if (!plan_output(run->device, readback, row->format, row->width,
+            if (!plan_output(run->device, readback, &plan->graph.images[plan->outputs[output]],
                              &requests[i].outputs[output], error))
                 return false;
         }
@@ -193,10 +198,24 @@ static void take_first(unsigned char *to, const unsigned char *from, size_t pixe
         memcpy(to + i * size, from + i * pixel, size);
 }
 
-void vkb_readback_fetch(const struct vkb_readback *readback, const struct vkb_output *output)
+static void copy_part(void *context, uint32_t part, uint32_t first, uint32_t end)
+{
+    const struct vkb_output *output = context;
+
+    (void)part;
+    for (; first < end; ++first)
+        vkb_copy_given_row(output->image, first, output->channels,
+                           (unsigned char *)output->memory + first * output_row_size(output));
+}
+
+void vkb_readback_fetch(const struct vkb_device *device, const struct vkb_readback *readback,
+                        const struct vkb_output *output)
 {
     const size_t pixels = (size_t)output->width * output->row_count;
 
+    if (output->sink == VKB_SINK_GIVEN)
+        vkb_in_parts(device->workers, copy_part, NULL, (void *)output, 0, output->row_count,
+                     output_row_size(output) * output->row_count);
     if (output->sink != VKB_SINK_STAGING)
         return;
     const unsigned char *from = (const unsigned char *)readback->staging.mapped + output->offset;

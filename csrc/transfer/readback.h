@@ -15,6 +15,7 @@ enum { VKB_IMPORTED_BYTES = 1 << 20 };
 // How the pixels of an output leave the device.
 enum vkb_sink_kind {
     VKB_SINK_NONE,      // they do not
+    VKB_SINK_GIVEN,     // the host copies them from the pixels that the graph has
     VKB_SINK_STAGING,   // the device copies to staging memory, and the host from there
     VKB_SINK_PAGES,     // the device copies to the caller's memory, which it has imported
     VKB_SINK_EXPORTED,  // they are copied to memory that CUDA shares (exported.h)
@@ -33,6 +34,7 @@ struct vkb_output {
     // Set before the recording (vkb_host_sink).
     enum vkb_format format;
     uint32_t width;
+    const struct vkb_image_row *image;
     enum vkb_sink_kind sink;
     VkBuffer imported;  // the caller's memory as a buffer; VK_NULL_HANDLE: it is none
     VkDeviceSize imported_offset;
@@ -65,7 +67,8 @@ bool vkb_readback_end(const struct vkb_device *device, const struct vkb_readback
                       struct vkb_error *error);
 
 // Gives the caller the pixels that are not in its memory yet. The image is no longer needed.
-void vkb_readback_fetch(const struct vkb_readback *readback, const struct vkb_output *output);
+void vkb_readback_fetch(const struct vkb_device *device, const struct vkb_readback *readback,
+                        const struct vkb_output *output);
 
 // Destroys the imported buffers and discards the plan. The device must have finished.
 void vkb_readback_release(const struct vkb_device *device, struct vkb_readback *readback);

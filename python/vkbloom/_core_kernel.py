@@ -13,15 +13,13 @@ class CoreKernel(NamedTuple):
     """A kernel as the core reads it.
 
     - `pixels`: ndarray of float32, shape (h, w, 4); Linear RGB, and the mean of the three channels
-      for alpha.
+      for alpha. Shape (h, w, 1) if all channels are equal.
     - `serial`: A hash of the pixels, so that a kernel that is made again is known to the device.
-    - `is_grey`: Whether all channels are equal.
     - `prefilter`: min, max and mult of Unreal Engine's prefilter; no prefilter if min is above max.
     """
 
     pixels: NDArray[np.float32]
     serial: int
-    is_grey: bool = False
     prefilter: tuple[float, float, float] = (1.0, 0.0, 1.0)
 
     @property
@@ -32,10 +30,12 @@ class CoreKernel(NamedTuple):
 
 def core_kernel(values: NDArray[Any]) -> CoreKernel:
     """Return the kernel of an array, shape (h, w) or (h, w, 3)."""
-    pixels = np.empty((*values.shape[:2], 4), np.float32)
-    pixels[..., :3] = values if values.ndim == 3 else values[..., np.newaxis]
-    pixels[..., 3] = values.mean(axis=2) if values.ndim == 3 else values
+    pixels = values.astype(np.float32, order="C")
+    if pixels.ndim == 2 or (pixels == pixels[..., :1]).all():
+        pixels = pixels.reshape(*pixels.shape[:2], -1)[..., :1].copy()
+    else:
+        pixels = np.concatenate([pixels, values.mean(axis=2, keepdims=True)], 2, dtype=np.float32)
     digest = hashlib.blake2b(pixels.data, digest_size=8, key=repr(pixels.shape).encode()).digest()
     # 0 and the largest number are reserved.
     serial = min(max(int.from_bytes(digest, "little"), 1), 2**64 - 2)
-    return CoreKernel(pixels, serial, bool((pixels == pixels[..., :1]).all()))
+    return CoreKernel(pixels, serial)

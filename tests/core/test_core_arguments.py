@@ -88,7 +88,7 @@ class Passes(NamedTuple):
 
 
 def kernel(array: Any, serial: int = 1) -> Any:
-    return Kernel((array, serial, False, (0.0, 0.0, 0.0)))
+    return Kernel((array, serial, (0.0, 0.0, 0.0)))
 
 
 #: SPIR-V of no instruction but one of a word.
@@ -265,7 +265,7 @@ class Ends(Given):
         return 5, 5
 
     def core_kernel(self, frame: object, buffers: object) -> Any:
-        return np.ones((5, 5, 4), np.float32), 1, False, (0.0, 0.0, 0.0)
+        return np.ones((5, 5, 4), np.float32), 1, (0.0, 0.0, 0.0)
 
 
 #: Some fields at an end, and one value of one choice.

@@ -135,7 +135,7 @@ def _pack(kernel: CoreKernel) -> bytes:
     height, width = kernel.pixels.shape[:2]
     filled = np.asarray(kernel.pixels.any(axis=2))
     rows, columns = _extent(filled, 1), _extent(filled, 0)
-    part = kernel.pixels[rows, columns, : 1 if kernel.is_grey else 4]
+    part = kernel.pixels[rows, columns]
     sides = width, height, columns.start, rows.start, part.shape[1], part.shape[0], part.shape[2]
     return _HEADER.pack(kernel.serial, *sides) + part.tobytes()
 
@@ -149,7 +149,10 @@ def _extent(filled: NDArray[np.bool_], axis: int) -> slice:
 def _unpack(data: bytes) -> CoreKernel:
     """Return the kernel of a file."""
     serial, width, height, left, top, across, down, channels = _HEADER.unpack_from(data)
-    pixels = np.zeros((height, width, 4), np.float32)
     values: NDArray[np.float32] = np.frombuffer(data, np.float32, offset=_HEADER.size)
-    pixels[top : top + down, left : left + across] = values.reshape(down, across, channels)
-    return CoreKernel(pixels, serial, channels == 1)
+    part = values.reshape(down, across, channels)
+    if (down, across) == (height, width):
+        return CoreKernel(part, serial)
+    pixels = np.zeros((height, width, channels), np.float32)
+    pixels[top : top + down, left : left + across] = part
+    return CoreKernel(pixels, serial)
