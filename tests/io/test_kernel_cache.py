@@ -32,10 +32,18 @@ PADDED = np.pad(COLOURS, ((3, 0), (1, 2), (0, 0)))
 
 
 @pytest.mark.parametrize(
-    "values", [COLOURS, PADDED, COLOURS[..., 0], PADDED[..., 0], np.zeros((3, 2))]
+    ("values", "channels"),
+    [
+        (COLOURS, 4),
+        (PADDED, 4),
+        (COLOURS[..., 0], 1),
+        (np.repeat(PADDED[..., :1], 3, axis=2), 1),
+        (np.zeros((3, 2)), 1),
+    ],
 )
-def test_what_is_read_is_what_was_written(values: np.ndarray[Any, Any]) -> None:
+def test_what_is_read_is_what_was_written(values: np.ndarray[Any, Any], channels: int) -> None:
     made = core_kernel(values)
+    assert made.pixels.shape == (*values.shape[:2], channels)
     found = kernels._unpack(kernels._pack(made))
     assert np.array_equal(found.pixels, made.pixels)
     assert found[1:] == made[1:]

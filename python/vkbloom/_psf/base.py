@@ -207,6 +207,11 @@ def in_grey(values: Array) -> Array:
     return np.repeat(values[..., np.newaxis], 3, axis=-1)
 
 
+def seen_in_grey(values: Array) -> Array:
+    """Return a read-only view of values, with three equal channels as the last axis."""
+    return np.broadcast_to(values[..., np.newaxis], (*values.shape, 3))
+
+
 def crop_or_pad(array: Array, size: tuple[int, int]) -> Array:
     """Return the array cropped, or extended by zeros, around its centre [h // 2, w // 2]."""
     width, height = check_size("size", size)

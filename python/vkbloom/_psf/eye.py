@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vkbloom._psf.base import Array, in_grey
+from vkbloom._psf.base import Array, seen_in_grey
 from vkbloom._psf.radial import RadialPSF
 from vkbloom._public import public
 from vkbloom._settings.fields import number_field, numbers_field
@@ -64,7 +64,7 @@ class spencer(RadialPSF):
         total = shares[0] * core + shares[1] * near + shares[2] * wide
         lengths = np.array(self.wavelengths)
         if shares[3] == 0:
-            return np.broadcast_to(total, (*total.shape[:-1], 3))
+            return seen_in_grey(total[..., 0])
         halo = 436.9 * (568 / lengths) * np.exp(-19.75 * (angle - 3 * lengths / 568) ** 2)
         return np.asarray(total + shares[3] * halo)
 
@@ -100,7 +100,7 @@ class cie_general(RadialPSF):
         angle = np.maximum(np.asarray(theta, np.float64), 0.1)
         old = 1 + (self.age / 62.5) ** 4
         veil = (5 / angle**2 + 0.1 * self.pigment / angle) * old
-        return in_grey(10 / angle**3 + veil + 0.0025 * self.pigment)
+        return seen_in_grey(10 / angle**3 + veil + 0.0025 * self.pigment)
 
 
 @public("vkbloom.psf")
@@ -139,4 +139,4 @@ class cie_total(RadialPSF):
         core += 1.5e5 * (1 + (angle / 0.045) ** 2) ** -1.5
         veil = 400 / wide + 3e-8 * angle**2 + p * (1300 * wide**-1.5 + 0.8 * wide**-0.5)
         total = (1 - 0.08 * old) * core + (1 + 1.6 * old) * veil + 0.0025 * p
-        return in_grey(total / (1 + p * (0.0417 + 0.055 * old)))
+        return seen_in_grey(total / (1 + p * (0.0417 + 0.055 * old)))

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vkbloom._numbers import check_size
-from vkbloom._psf.base import PSF, Array, check_radii, in_grey
+from vkbloom._psf.base import PSF, Array, check_radii, in_grey, seen_in_grey
 from vkbloom._psf.radial import RadialPSF, bessel, integrate_pixels
 from vkbloom._public import public
 from vkbloom._settings.fields import number_field
@@ -155,4 +155,4 @@ class harvey_shack(RadialPSF):
         peak = self.surfaces * self.b * (100 * self.l) ** self.s
         scatter = peak * (1 + (np.sin(angle) / self.l) ** 2) ** (self.s / 2)
         # cos(pi / 2) is not quite 0 in floats.
-        return in_grey(scatter * np.maximum(np.cos(angle), 0))
+        return seen_in_grey(scatter * np.maximum(np.cos(angle), 0))

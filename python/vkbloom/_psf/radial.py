@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vkbloom._numbers import check_above, check_size
-from vkbloom._psf.base import FRAME_DEGREES, PSF, Array, check_radii
+from vkbloom._psf.base import FRAME_DEGREES, PSF, Array, check_radii, in_grey
 
 # (first distance in pixels, nodes along a side of a pixel). The outer parts are smooth and need
 # few nodes. The inner parts may have a core or a halo that is narrower than a pixel.
@@ -110,9 +110,12 @@ class RadialPSF(PSF):
             # of the same radius in a plane.
             ring = np.sinc(theta / 180) * (_DEGREE / scale) ** 2
             values = np.moveaxis(self.density(np.minimum(theta, 90)), -1, 0)
+            # One channel of a grey density is computed for all three.
+            values = values[:1] if values.strides[0] == 0 else values
             return values * np.where(theta <= 90, ring, 0)
 
-        return integrate_pixels(per_pixel, size)
+        pixels = integrate_pixels(per_pixel, size)
+        return in_grey(pixels[..., 0]) if pixels.shape[2] == 1 else pixels
 
     def energy(self) -> Array:
         return np.asarray(self.encircled_energy([90.0])[0])
