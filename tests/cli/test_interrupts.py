@@ -170,7 +170,7 @@ def slow_files(folder: Path) -> Path:
     """Return a library for LD_PRELOAD."""
     source, library = folder / "slow.c", folder / "slow.so"
     source.write_text(SLOW_FILES)
-    command = [*compiler(), "-shared", "-fPIC", "-o", library, source, "-ldl"]
+    command = [*compiler(), "-shared", "-fPIC", "-o", str(library), str(source), "-ldl"]
     subprocess.run(command, check=True)
     return library
 
