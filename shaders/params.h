@@ -219,6 +219,43 @@
 
 #define COMPOSITE_BLOCK(B, READS, INPUT, VEC4S) COMPOSITE_ROWS(B, READS, INPUT)
 
+// The numbers of an exposure that Python packs in this order, each of which some engines have: ends
+// of what is metered in log2, shares of the histogram that count, limits of the value adapted to;
+// what a step of the time multiplies the distance from a goal by that is above or below, or how far
+// it goes at the most; how the mean becomes the goal; the weights of HDRP's metering; the ends of
+// the luminances of the table. EXPOSURE_BLOCK has the sizes of what is metered beside these.
+#define EXPOSURE_NUMBER_ROWS(B, INPUT) \
+    INPUT(B, float, low) \
+    INPUT(B, float, high) \
+    INPUT(B, float, cut_low) \
+    INPUT(B, float, cut_high) \
+    INPUT(B, float, minimum) \
+    INPUT(B, float, maximum) \
+    INPUT(B, float, step_up) \
+    INPUT(B, float, step_down) \
+    INPUT(B, float, scale) \
+    INPUT(B, float, compensation) \
+    INPUT(B, float, grey) \
+    INPUT(B, float, masked) \
+    INPUT(B, float, metering) \
+    INPUT(B, float, centre_x) \
+    INPUT(B, float, centre_y) \
+    INPUT(B, float, radius_x) \
+    INPUT(B, float, radius_y) \
+    INPUT(B, float, power) \
+    INPUT(B, float, least) \
+    INPUT(B, float, most) \
+    INPUT(B, float, table_low) \
+    INPUT(B, float, table_high)
+
+#define EXPOSURE_BLOCK(B, READS, INPUT, VEC4S) \
+    EXPOSURE_NUMBER_ROWS(B, INPUT) \
+    INPUT(B, int, width) \
+    INPUT(B, int, height) \
+    INPUT(B, int, columns) \
+    INPUT(B, int, channel) \
+    VEC4S(B, table, EXPOSURE_TABLE / 4)
+
 // The transpose of a filter (adjoint_filter.frag): where the tables of both axes start, in texels;
 // the factor of the colours of what is added, and how much less it is for each unit of a mask. For
 // tiles: where the tables of each picture start; in a simple ratio the weights of texels that are
@@ -308,7 +345,8 @@
     BLOCK(fft, FFT_BLOCK) \
     BLOCK(fft_kernel, FFT_KERNEL_BLOCK) \
     BLOCK(composite, COMPOSITE_BLOCK) \
-    BLOCK(adjoint_filter, ADJOINT_FILTER_BLOCK)
+    BLOCK(adjoint_filter, ADJOINT_FILTER_BLOCK) \
+    BLOCK(exposure, EXPOSURE_BLOCK)
 
 // Settings that no shader reads, because they shape the graph. Integers: COUNT(name, default, min,
 // max); a flag is one of 0 and 1.
@@ -412,6 +450,37 @@
 #define BEAM_RUN   8
 #define BEAM_BLOCK 16
 
+// Of exposures: the numbers of a table; the samples along both sides of a tile whose histogram a
+// workgroup makes, which single floats count, and its invocations along these; the most bins; the
+// points along both sides of HDRP's automatic metering, and of a tile of them; the side of a block
+// of a mean.
+#define EXPOSURE_TABLE       256
+#define METER_TILE           64
+#define METER_INVOCATIONS    8
+#define METER_BINS           128
+#define METER_POINTS         1024
+#define METER_TILE_POINTS    32
+#define METER_BLOCK          8
+#define METER_SUM_INVOCATIONS 64
+
+// The engines of exposures: EXPOSURE(name, value, name in Python, bins, apart, exposes). A histogram
+// has `bins`, of samples that are `apart` pixels apart along both axes; 0: there is none. `exposes`
+// are EXPOSES_*: the light that the bloom reads, the picture with its bloom, which METERS_BLOOM
+// meters, too. 0: there is no exposure.
+#define EXPOSES_BLOOM   1
+#define EXPOSES_PICTURE 2
+#define METERS_BLOOM    4
+#define EXPOSURES(EXPOSURE) \
+    EXPOSURE(EXPOSURE_FIXED, 1, fixed, 0, 0, EXPOSES_BLOOM) \
+    EXPOSURE(EXPOSURE_KEYFRAMED, 2, keyframed, 0, 0, EXPOSES_BLOOM) \
+    EXPOSURE(EXPOSURE_BEVY, 3, bevy, 64, 1, EXPOSES_PICTURE) \
+    EXPOSURE(EXPOSURE_HDRP, 4, hdrp, 128, 2, EXPOSES_BLOOM) \
+    EXPOSURE(EXPOSURE_AUTOMATIC, 5, hdrp_automatic, 0, 0, EXPOSES_BLOOM) \
+    EXPOSURE(EXPOSURE_PPV2, 6, ppv2, 128, 2, EXPOSES_BLOOM) \
+    EXPOSURE(EXPOSURE_GODOT, 7, godot, 0, 0, EXPOSES_BLOOM) \
+    EXPOSURE(EXPOSURE_O3DE, 8, o3de, 0, 0, EXPOSES_PICTURE | METERS_BLOOM) \
+    EXPOSURE(EXPOSURE_GRANITE, 9, granite, 0, 0, EXPOSES_BLOOM | EXPOSES_PICTURE)
+
 // The most iterations of Blender's streaks and of its star, whose distances are fewer by one.
 #define STAR_ITERATIONS 5
 
@@ -425,6 +494,7 @@
     FUSED_SLOTS(SLOT) \
     FILTER_SLOTS(SLOT) \
     GLARE_SLOTS(SLOT) \
+    EXPOSURE_SLOTS(SLOT) \
     TRANSFORM_SLOTS(SLOT) \
     LIGHTING_SLOTS(SLOT)
 
@@ -456,6 +526,10 @@
     SLOT(SLOT_BEFORE, 1) /* the light that a ray, ghosts or a star is added to */ \
     SLOT(SLOT_DIRT, 1)   /* the picture of dirt */ \
     SLOT(SLOT_DARK, 1)   /* where sun beams need no samples */
+
+#define EXPOSURE_SLOTS(SLOT) \
+    SLOT(SLOT_EXPOSURE, 1) /* of this frame, or of the one before */ \
+    SLOT(SLOT_METER_MASK, 1)
 
 #define TRANSFORM_SLOTS(SLOT) SLOT(SLOT_SPECTRUM, 1) /* of the kernel, for the product */
 
@@ -649,7 +723,9 @@
     CONSTANT(64, SQUARED, squared)             /* of adjoint_sum.frag: squares are added up */ \
     CONSTANT(65, POINT_AFTER, after)           /* of the combination: POINT_* */ \
     CONSTANT(66, EXPOSED_SCENE, exposed_scene) /* a composite's scene is exposed before it */ \
-    CONSTANT(67, JITTERED, jittered)           /* samples of beams are between steps */
+    CONSTANT(67, JITTERED, jittered)           /* samples of beams are between steps */ \
+    CONSTANT(68, ENGINE, engine)               /* of an exposure: EXPOSURE_* */ \
+    CONSTANT(69, METER, meter)                 /* what meter.frag makes: METER_* */
 
 // The names that a setting can have. Each list is a setting and a specialization constant.
 #define COMPOSITE_NAMES(NAME) \
@@ -765,6 +841,14 @@
     NAME(BY_MASK, 3, by_mask) \
     NAME(BY_VALUES, 4, by_values) \
     NAME(BY_MIXED, 5, by_mixed) \
+    NAME(METER_LIGHT, 1, light) \
+    NAME(METER_SUM, 2, sum) \
+    NAME(METER_LEVEL, 3, level) \
+    NAME(METER_SAMPLES, 4, samples) \
+    NAME(METERING_SPOT, 1, spot) \
+    NAME(METERING_CENTER, 2, center_weighted) \
+    NAME(METERING_MASK, 3, metering_mask) \
+    NAME(METERING_PROCEDURAL, 4, procedural) \
     NAME(STAGE_FIRST, 1, first_stage) \
     NAME(STAGE_PRODUCT, 2, product) \
     NAME(STAGE_LAST, 3, last_stage) \

@@ -33,33 +33,21 @@ static struct vkb_composite_source composited(const struct vkb_levels *levels,
     } : *source;
 }
 
-void vkb_add_composite_pass(struct vkb_levels *levels, const struct vkb_composite_source *given,
-                            enum vkb_format format)
+// Adds the image of a composite, and describes the pass with scene, bloom and mask.
+static struct vkb_pass_row describe_composite(struct vkb_levels *levels,
+                                              const struct vkb_composite_source *source,
+                                              struct vkb_image_row *image, uint32_t *index)
 {
     const struct vkb_settings *settings = levels->settings;
-    const struct vkb_graph *graph = levels->graph;
-    if (levels->failed)
-        return;
-    const struct vkb_composite_source own = composited(levels, given), *source = &own;
-    const struct vkb_image_row *scene = &graph->images[given->scene];
-    struct vkb_image_row image = {
-        .name = "final",
-        .format = format,
-        .width = scene->width,
-        .height = scene->height,
-        .channels = scene->channels,
-        .framebuffer = true,
-    };
+    const struct vkb_image_row *scene = &levels->graph->images[source->scene];
 
-    const uint32_t final = vkb_levels_add(levels, &image);
-    struct vkb_pass_row row = vkb_fullscreen_row("final", &vkb_shader_composite_frag, final);
+    image->width = scene->width;
+    image->height = scene->height;
+    image->channels = scene->channels;
+    *index = vkb_levels_add(levels, image);
+    struct vkb_pass_row row = vkb_fullscreen_row(image->name, &vkb_shader_composite_frag, *index);
     const bool off = source->bloom == VKB_NO_IMAGE;
-    // Float formats have no quantization levels to dither.
-    const bool dither = settings->values.dither && format == VKB_FORMAT_RGBA8_UNORM;
     row.constants.composite = composite_of(settings, source);
-    row.constants.tonemap = settings->choices[VKB_CHOICE_tonemap];
-    row.constants.encoding = settings->choices[VKB_CHOICE_encoding];
-    row.constants.dither = dither;
     row.constants.alpha = off ? ALPHA_KEEP : source->alpha;
     row.constants.masked = row.constants.composite == COMPOSITE_MIX && source->mask != VKB_NO_IMAGE;
     row.constants.lit = source->lit;
@@ -69,9 +57,41 @@ void vkb_add_composite_pass(struct vkb_levels *levels, const struct vkb_composit
     vkb_read_at(&row, SLOT_BLOOM, source->bloom);
     row.block = VKB_BLOCK_composite;
     vkb_params_read(row.block, &settings->values, &row.params);
-    row.params.composite.limit = vkb_formats[image.format].limit;
+    row.params.composite.limit = vkb_formats[image->format].limit;
+    row.params.composite.noise_seed = 0;
+    return row;
+}
+
+void vkb_add_composite_pass(struct vkb_levels *levels, const struct vkb_composite_source *given,
+                            enum vkb_format format)
+{
+    const struct vkb_settings *settings = levels->settings;
+    struct vkb_image_row image = {.name = "final", .format = format, .framebuffer = true};
+    uint32_t final;
+    if (levels->failed)
+        return;
+    const struct vkb_composite_source source = composited(levels, given);
+    struct vkb_pass_row row = describe_composite(levels, &source, &image, &final);
+    // Float formats have no quantization levels to dither.
+    const bool dither = settings->values.dither && format == VKB_FORMAT_RGBA8_UNORM;
+    row.constants.tonemap = settings->choices[VKB_CHOICE_tonemap];
+    row.constants.encoding = settings->choices[VKB_CHOICE_encoding];
+    row.constants.dither = dither;
     row.params.composite.noise_seed = dither ? settings->values.dither_seed : 0;
     vkb_levels_pass(levels, &row);
+}
+
+uint32_t vkb_add_combining_pass(struct vkb_levels *levels, const struct vkb_composite_source *given)
+{
+    struct vkb_image_row image = {.name = "combined", .format = VKB_FORMAT_RGBA32_FLOAT};
+    uint32_t combined = 0;
+    if (levels->failed)
+        return 0;
+    const struct vkb_composite_source source = composited(levels, given);
+    struct vkb_pass_row row = describe_composite(levels, &source, &image, &combined);
+    row.params.composite.exposure = 0.0f;
+    vkb_levels_pass(levels, &row);
+    return combined;
 }
 
 bool vkb_is_composite(const struct vkb_pass_row *pass)

@@ -18,6 +18,12 @@ struct vkb_composite_source {
 void vkb_add_composite_pass(struct vkb_levels *levels, const struct vkb_composite_source *source,
                             enum vkb_format format);
 
+// Adds a pass that only combines scene and bloom, into an image of single floats that is no
+// framebuffer. Exposure, curve and encoding of the settings are left to a composite of it without a
+// bloom.
+uint32_t vkb_add_combining_pass(struct vkb_levels *levels,
+                                const struct vkb_composite_source *source);
+
 // Whether the row is a composite that adds a bloom.
 bool vkb_is_composite(const struct vkb_pass_row *pass);
 // The same, or the row that takes cotangents back through exposure and curves of one, its last

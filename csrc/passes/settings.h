@@ -122,6 +122,13 @@ struct vkb_custom_pass {
     uint32_t resource_count;
 };
 
+#define VKB_ADD_NUMBER(B, type, name) +1
+enum { VKB_EXPOSURE_NUMBERS = 0 EXPOSURE_NUMBER_ROWS(, VKB_ADD_NUMBER) };
+
+#define VKB_EXPOSURE_ENUM(constant, value, ...) constant = value,
+enum vkb_exposure_engine { EXPOSURES(VKB_EXPOSURE_ENUM) VKB_EXPOSURE_END };
+#undef VKB_EXPOSURE_ENUM
+
 struct vkb_settings {
     enum vkb_method method;
     struct vkb_values values;  // the numbers, at the offsets of vkb_value_rows
@@ -145,9 +152,14 @@ struct vkb_settings {
     double gaussian_tints[MAX_GAUSSIANS];
     struct vkb_stage stages[MAX_STAGES];  // of glare
     uint32_t stage_count;
+    uint32_t exposure_engine;                      // of EXPOSURE_*; 0: there is no exposure
+    float exposure_numbers[VKB_EXPOSURE_NUMBERS];  // in the order of EXPOSURE_NUMBER_ROWS
+    float exposure_table[EXPOSURE_TABLE];
+    uint32_t exposure_key_count;
     // Python packs what is before here.
     struct vkb_kernel_data kernel;
     struct vkb_kernel_data dirt;           // the picture of the stage of dirt
+    struct vkb_kernel_data exposure_mask;  // of the meter
     const struct vkb_custom_pass *passes;  // of a custom method
     uint32_t pass_count;
 };

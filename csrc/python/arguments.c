@@ -40,6 +40,10 @@ static const struct member settings_members[] = {
     // Structs, which the other table describes.
     MEMBER(vkb_settings, stages, ""),
     MEMBER(vkb_settings, stage_count, "u4"),
+    MEMBER(vkb_settings, exposure_engine, "u4"),
+    MEMBER(vkb_settings, exposure_numbers, "f4"),
+    MEMBER(vkb_settings, exposure_table, "f4"),
+    MEMBER(vkb_settings, exposure_key_count, "u4"),
     {"", "", 0, BLOCK_SIZE},
 };
 
@@ -172,6 +176,14 @@ static bool check_stages(const struct vkb_settings *settings)
     return true;
 }
 
+static bool check_exposure(const struct vkb_settings *settings)
+{
+    return check_count("exposure_engine", settings->exposure_engine, 0, VKB_EXPOSURE_END - 1)
+        && check_finite("exposure_numbers", settings->exposure_numbers, VKB_EXPOSURE_NUMBERS)
+        && check_finite("exposure_table", settings->exposure_table, EXPOSURE_TABLE)
+        && check_count("exposure_key_count", settings->exposure_key_count, 0, EXPOSURE_TABLE / 2);
+}
+
 static bool check_settings(const struct vkb_settings *settings)
 {
     return check_choices(settings)
@@ -185,7 +197,8 @@ static bool check_settings(const struct vkb_settings *settings)
         && check_count("level_weights", settings->level_weight_count, 0, MAX_LEVELS)
         && check_finite("level_weights", settings->level_weights, settings->level_weight_count)
         && check_finite("tint", settings->tint, 3)
-        && check_finite("sun_position", settings->sun_position, 2) && check_stages(settings);
+        && check_finite("sun_position", settings->sun_position, 2) && check_stages(settings)
+        && check_exposure(settings);
 }
 
 bool vkb_read_settings(PyObject *object, struct vkb_settings *settings)

@@ -37,6 +37,8 @@ bool vkb_read_kernel_size(PyObject *object, struct vkb_size frame, struct vkb_si
 bool vkb_read_kernel(PyObject *object, struct vkb_size frame, struct vkb_size buffers,
                      Py_buffer *view, struct vkb_kernel_data *kernel);
 
+// Asks settings with an exposure for the mask of its meter, which is a kernel or None.
+bool vkb_read_exposure_mask(PyObject *object, Py_buffer *view, struct vkb_settings *settings);
 // Asks the stage of dirt, if there is one, for its picture.
 bool vkb_read_dirt(PyObject *object, Py_buffer *view, struct vkb_settings *settings);
 

@@ -56,6 +56,21 @@ bool vkb_read_kernel(PyObject *object, struct vkb_size frame, struct vkb_size bu
     return done;
 }
 
+bool vkb_read_exposure_mask(PyObject *object, Py_buffer *view, struct vkb_settings *settings)
+{
+    const struct vkb_size any = {0};
+    PyObject *mask =
+        settings->exposure_engine ? PyObject_GetAttrString(object, "meter_mask") : NULL;
+
+    if (!settings->exposure_engine)
+        return true;
+    const bool done =
+        mask
+        && (mask == Py_None || vkb_read_kernel(mask, any, any, view, &settings->exposure_mask));
+    Py_XDECREF(mask);
+    return done;
+}
+
 bool vkb_read_dirt(PyObject *object, Py_buffer *view, struct vkb_settings *settings)
 {
     const struct vkb_size any = {0};

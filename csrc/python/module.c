@@ -182,6 +182,12 @@ static PyObject *method_tuple(void)
 #define STAGE_NAME(constant, name) [VKB_STAGE_##constant] = #name,
 static const char *const stages[] = {VKB_STAGES(STAGE_NAME)};
 
+// The first one stands for none.
+#define EXPOSURE_NAME(constant, value, name, ...) [value] = #name,
+static const char *const exposures[] = {[0] = "none", EXPOSURES(EXPOSURE_NAME)};
+#define NUMBER_NAME(B, type, name) #name,
+static const char *const exposure_numbers[] = {EXPOSURE_NUMBER_ROWS(, NUMBER_NAME)};
+
 static PyObject *format_tuple(void)
 {
     const char *names[VKB_FORMAT_COUNT];
@@ -233,6 +239,10 @@ static int execute(PyObject *module)
                 && add_steal(module, "CHOICES", choice_table())
                 && add_steal(module, "METHODS", method_tuple())
                 && add_steal(module, "STAGES", name_tuple(stages, VKB_STAGE_COUNT))
+                && add_steal(module, "EXPOSURES",
+                             name_tuple(exposures, sizeof exposures / sizeof exposures[0]))
+                && add_steal(module, "EXPOSURE_NUMBERS",
+                             name_tuple(exposure_numbers, VKB_EXPOSURE_NUMBERS))
                 && add_steal(module, "FORMATS", format_tuple())
                 && add_steal(module, "SETTINGS_BLOCK", vkb_settings_block_table())
                 && add_steal(module, "STAGE_BLOCK", vkb_stage_block_table())

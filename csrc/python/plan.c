@@ -240,6 +240,7 @@ static PyObject *new_plan(const struct vkb_module_state *state, const struct vkb
         return NULL;
     self->source = ((struct vkb_source_object *)source)->source;
     if ((settings->values.bloom && !vkb_read_dirt(settings_object, &self->dirt, settings))
+        || !vkb_read_exposure_mask(settings_object, &self->meter_mask, settings)
         || !hold_kernel(state, device, settings_object, settings, self)
         || !vkb_hold_passes(state, settings_object, device->max_side, &self->source, &self->passes,
                             settings)) {
@@ -255,6 +256,7 @@ static PyObject *new_plan(const struct vkb_module_state *state, const struct vkb
     if (device->adapter.physical == VK_NULL_HANDLE) {
         PyBuffer_Release(&self->kernel);
         PyBuffer_Release(&self->dirt);
+        PyBuffer_Release(&self->meter_mask);
     }
     if (!choose_outputs(state, &self->plan, portion ? portion->first : 0, names)
         || !(self->outputs = describe_outputs(&self->plan))) {
@@ -468,6 +470,7 @@ static int traverse(PyObject *object, visitproc visit, void *arg)
     Py_VISIT(self->outputs);
     Py_VISIT(self->kernel.obj);
     Py_VISIT(self->dirt.obj);
+    Py_VISIT(self->meter_mask.obj);
     Py_VISIT(self->passes.tuple);
     return 0;
 }
@@ -480,6 +483,7 @@ static void dealloc(PyObject *object)
     vkb_plan_destroy(&self->plan);
     PyBuffer_Release(&self->kernel);
     PyBuffer_Release(&self->dirt);
+    PyBuffer_Release(&self->meter_mask);
     vkb_release_passes(&self->passes);
     Py_XDECREF(self->outputs);
     vkb_free_object(object);

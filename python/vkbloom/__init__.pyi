@@ -11,6 +11,12 @@ from ._core import (
 )
 from ._custom.method import load_method
 from ._explorer import explore
+from ._exposure.bevy import BevyExposure
+from ._exposure.fixed import FixedExposure, KeyframedExposure
+from ._exposure.godot import GodotExposure
+from ._exposure.granite import GraniteExposure
+from ._exposure.o3de import O3deExposure
+from ._exposure.unity import HdrpExposure, PostProcessingExposure
 from ._fit import FitResult, fit, fit_pyramid, translate
 from ._glare.dirt import Dirt
 from ._glare.flares import Ghosts, Halo
@@ -46,6 +52,7 @@ from ._renderer.plans import Plan
 from ._renderer.renderer import Renderer
 from ._scene import Camera, Scene
 from ._sequence import Sequence, sequence
+from ._settings.exposure import Exposure, exposures
 from ._settings.glare import Glare, glares
 from ._settings.settings import Settings, presets
 
@@ -54,6 +61,7 @@ __all__ = [
     "AdapterNotFoundError",
     "BabylonBloom",
     "BevyBloom",
+    "BevyExposure",
     "BlenderGlare",
     "Camera",
     "Convolution",
@@ -63,23 +71,31 @@ __all__ = [
     "Dirt",
     "DualKawase",
     "Error",
+    "Exposure",
     "FilamentBloom",
     "FitResult",
+    "FixedExposure",
     "Frames",
     "Ghosts",
     "Glare",
     "GodotBloom",
+    "GodotExposure",
+    "GraniteExposure",
     "GridReport",
     "Halation",
     "Halo",
     "HdrpBloom",
+    "HdrpExposure",
     "Image",
+    "KeyframedExposure",
     "KinoBloom",
+    "O3deExposure",
     "OutOfMemoryError",
     "Plan",
     "PlayCanvasBloom",
     "PmndrsBloom",
     "PostProcessingBloom",
+    "PostProcessingExposure",
     "PygfxBloom",
     "Pyramid",
     "Renderer",
@@ -100,6 +116,7 @@ __all__ = [
     "default_renderer",
     "deglare",
     "explore",
+    "exposures",
     "fit",
     "fit_pyramid",
     "gaussian_weights",

@@ -81,6 +81,7 @@ NEEDED: dict[str, Any] = {
     "a": IMAGE,
     "b": IMAGE,
     "settings": SEPARABLE,
+    "exposure": "bevy",
     "to": SEPARABLE,
     "vary": ["intensity"],
     "psf": GAUSSIAN,

@@ -12,9 +12,15 @@ import vkbloom
 from tests.processes import output
 
 #: The packages that a program needs to render one frame. Every other one is loaded later.
-NEEDED = {"_glare", "_methods", "_presets", "_psf", "_renderer", "_settings"}
+NEEDED = {"_exposure", "_glare", "_methods", "_presets", "_psf", "_renderer", "_settings"}
 #: Packages of which it needs these modules alone.
-FEW = {"_glare": set(), "_methods": {"mip_chain"}, "_presets": set(), "_psf": set()}
+FEW = {
+    "_exposure": set(),
+    "_glare": set(),
+    "_methods": {"mip_chain"},
+    "_presets": set(),
+    "_psf": set(),
+}
 # NumPy loads some of the standard library itself, differently by version.
 LATE = {
     "vkbloom._renderer.plans",

@@ -324,7 +324,7 @@ def test_glare_is_added_to_a_picture_in_each_variant(dtype: str) -> None:
         assert_close(variant, got, expected, limit)
 
 
-def check_frames(frames: Frames, settings: Settings, **given: Array) -> None:
+def check_frames(frames: Frames, settings: Settings, **given: Any) -> None:
     """Compare all framebuffers of IMAGE with the reference."""
     expected = reference.apply(IMAGE, settings, **given)
     assert set(frames) == {"glow", *expected}

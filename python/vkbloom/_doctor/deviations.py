@@ -165,7 +165,7 @@ def _limits(
 
 
 def deviations(
-    frames: Frames, image: NDArray[Any], settings: Settings, **given: NDArray[Any] | None
+    frames: Frames, image: NDArray[Any], settings: Settings, **given: Any
 ) -> Iterator[Deviation]:
     """Compare names, dtypes, shapes, values and alpha of all framebuffers, in their order."""
     expected = reference.apply(image, settings, **given)

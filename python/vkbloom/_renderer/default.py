@@ -19,6 +19,7 @@ from vkbloom._renderer.frames import Frames
 from vkbloom._renderer.image import Image
 from vkbloom._renderer.renderer import Renderer
 from vkbloom._renderer.sources import SCENE_SIZE
+from vkbloom._settings.exposure import Exposure
 from vkbloom._settings.settings import Settings, Shading, check_settings
 
 if TYPE_CHECKING:
@@ -88,6 +89,9 @@ def apply(
     framebuffers: Literal["all"] | str | Sequence[str] = "all",
     out: Mapping[str, Any] | None = None,
     device: Device | None = None,
+    exposure: Exposure | str | float | None = None,
+    dt: float | None = None,
+    state: Mapping[str, Any] | None = None,
     renderer: Renderer | None = None,
     **fields: Any,
 ) -> Frames:
@@ -103,8 +107,10 @@ def apply(
         Settings, or the name of a preset. Default: ``presets["bevy_natural"]``. For a photograph,
         which is a file of integers for SDR, ``presets["photo"]``, for which its highlights are
         expanded to 4. With other settings they are not; ``vkbloom.read(path, expand=4)`` does it.
-    mask, emission, framebuffers, out, device
+    mask, emission, framebuffers, out, device, dt, state
         As for `Renderer.apply`.
+    exposure : Exposure, str or float, optional
+        As for `Renderer.apply`. A number is the field `exposure` of the settings, in stops.
     renderer : Renderer, optional
         Default: `default_renderer`.
     **fields
@@ -124,7 +130,11 @@ def apply(
     (16, 16, 4)
     """
     given: dict[str, Any] = {"mask": mask, "emission": emission, "framebuffers": framebuffers}
-    given |= {"out": out, "device": device}
+    given |= {"out": out, "device": device, "dt": dt, "state": state}
+    if exposure is None or isinstance(exposure, Exposure | str):
+        given["exposure"] = exposure
+    else:
+        fields["exposure"] = exposure
     if not isinstance(image, str | os.PathLike):
         chosen = _change(settings, fields, of_image=True)
         return (renderer or default_renderer()).apply(image, chosen, **given)

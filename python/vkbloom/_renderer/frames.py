@@ -68,6 +68,7 @@ class Frames(Framebuffers):
         self._info = dict(info)
         self._end: Callable[[], tuple[dict[str, float], int, int]] | None = None
         self._state = State()
+        self._is_exposed = "exposure" in self._arrays
 
     def _finish(self, timings: dict[str, float], nan: int, inf: int) -> None:
         """Add what is known when the device has finished."""
@@ -116,6 +117,22 @@ class Frames(Framebuffers):
         renderer, when it is first taken.
         """
         return self._state
+
+    @property
+    def exposure(self) -> float:
+        """The stops that ``final`` has, before its tone curve.
+
+        The field `exposure` of the settings, plus those of an exposure that has been applied. It
+        is infinite where an engine's multiplier is. It is read from the device when it is first
+        asked for.
+        """
+        stops = self._settings.exposure
+        if not self._is_exposed:
+            return stops
+        adapted = self._state["exposure"] if "exposure" in self._state else self["exposure"]
+        before, after = np.asarray(adapted, np.float64)[0, 0, 1:3]
+        with np.errstate(divide="ignore"):
+            return stops + float(np.log2(before) + np.log2(after))
 
     @property
     def info(self) -> dict[str, Any]:

@@ -19,7 +19,7 @@ from vkbloom import _core
 from vkbloom._argument_types import check_arguments
 from vkbloom._array_cache import ArrayCache, shared_cache
 from vkbloom._framebuffers import check_framebuffers
-from vkbloom._numbers import check_size
+from vkbloom._numbers import check_number, check_size
 from vkbloom._public import public
 from vkbloom._renderer import requests
 from vkbloom._renderer.adapter import bundled_driver, bundled_hash, from_core
@@ -47,6 +47,8 @@ from vkbloom._renderer.sources import (
     take_batch,
 )
 from vkbloom._renderer.state import State
+from vkbloom._settings.exposed import ExposedSettings
+from vkbloom._settings.exposure import MAX_SECONDS, Exposure, check_exposure
 from vkbloom._settings.settings import Settings, Shading, check_settings
 from vkbloom._spelling import describe_unknown
 from vkbloom._version import installed_version
@@ -158,7 +160,7 @@ def _pair(
     count = 0
     state: dict[Any, Any] = {}
     for source in sources:
-        if isinstance(settings, Settings):
+        if not isinstance(settings, Sequence):
             chosen = settings
         elif count < len(settings):
             chosen = settings[count]
@@ -169,7 +171,7 @@ def _pair(
         yield request
         del request
         count += 1
-    if not isinstance(settings, Settings) and count < len(settings):
+    if isinstance(settings, Sequence) and count < len(settings):
         raise ValueError(f"settings: {len(settings)} Settings are more than the {count} images")
 
 
@@ -282,6 +284,8 @@ class Renderer:
         self._batches = Batches(self._core, self._pending)
         # What map has checked last.
         self._named: tuple[object, tuple[str, ...]] = None, ()
+        # What was exposed last.
+        self._exposed: ExposedSettings | None = None
         self._remember: ArrayCache | None = shared_cache()
         self._number = next(_numbers)
         RENDERERS[self._number] = self
@@ -399,6 +403,8 @@ class Renderer:
         framebuffers: Literal["all"] | str | Sequence[str] = "all",
         out: Mapping[str, Any] | None = None,
         device: Device | None = None,
+        exposure: Exposure | str | None = None,
+        dt: float | None = None,
         state: Mapping[str, Any] | None = None,
     ) -> Frames:
         """Add bloom to an image.
@@ -424,8 +430,15 @@ class Renderer:
             mesh in a scene. It is added to the image in ``final``.
         framebuffers, out, device
             As for `render`. Arrays of `out` may be on the GPU.
+        exposure : Exposure or str, optional
+            How the exposure follows the light: an exposure, or the name of one of
+            `vkbloom.exposures`. It is applied before or after the bloom, as its engine does. None:
+            only the field `exposure` of the settings is applied, after the bloom.
+        dt : float, optional
+            Seconds since the frame before, 0 to 86400. Default: 1/60. It matters only with an
+            exposure.
         state : mapping of str to ndarray, optional
-            As for `render`.
+            As for `render`. An exposure continues from its framebuffer ``exposure``.
 
         Returns
         -------
@@ -435,6 +448,12 @@ class Renderer:
             of the bloom buffers, and ``final``, which has the image's shape and dtype. With
             ``bloom=False`` there is only ``final``. ``info`` has the numbers of "nan" and "inf" in
             the image and the emission.
+
+            With an exposure also ``exposure``, (1, 1, 4) float32: what has been adapted to, the
+            multiplier of the light that the bloom reads, that of the picture with its bloom, and 1.
+            ``histogram``, (1, bins, 4) float32, has the weights of the bins in r, g and b, if the
+            engine has a histogram. ``exposed``, float32 of the image's shape, is what the bloom
+            reads, if the engine exposes it.
 
         Notes
         -----
@@ -448,7 +467,7 @@ class Renderer:
         The composite "mix" subtracts only the part of the scene s that is the source of the bloom.
         With a mask m the result is s + i (b - m s), with an emission s + i b.
         """
-        settings = check_settings(settings, of_image=True)
+        settings = self._expose(check_settings(settings, of_image=True), exposure, dt)
         self._pending.wait()
         source = image_source(image, mask, emission, self._core)
         names = check_framebuffers(framebuffers)
@@ -462,6 +481,8 @@ class Renderer:
         *,
         framebuffers: Literal["all"] | str | Sequence[str] = "all",
         device: Device | None = None,
+        exposure: Exposure | str | None = None,
+        dt: float | None = None,
         state: Mapping[str, Any] | None = None,
     ) -> Iterator[Frames]:
         """Add bloom to many images.
@@ -476,6 +497,8 @@ class Renderer:
             For all images, or one for each image. Default: ``presets["bevy_natural"]``.
         framebuffers, device
             As for `apply`.
+        exposure, dt
+            As for `apply`; `dt` is the time from each image to the next one.
         state : mapping of str to ndarray, optional
             What the first image continues from, as for `apply`. Each other one continues from the
             image before, whatever settings either has; after an image of another size, what has
@@ -533,6 +556,10 @@ class Renderer:
                 )
         else:
             chosen = check_settings(settings, of_image=True)
+        if isinstance(chosen, Sequence):
+            chosen = [self._expose(item, exposure, dt) for item in chosen]
+        else:
+            chosen = self._expose(chosen, exposure, dt)
         if self.closed:
             raise ValueError("the renderer is closed")
         checked_settings, checked_names = self._named
@@ -541,7 +568,7 @@ class Renderer:
             self._named = chosen, names
         destination = self._choose_destination(device)
         begun = _as_state(state)
-        if on_cuda(images) and device != "host" and isinstance(chosen, Settings):
+        if on_cuda(images) and device != "host" and not isinstance(chosen, Sequence):
             return self._run_batch(images, chosen, names, destination, begun)
         sequence = requests.upload_each(self._core, _pair(_sources(images, self._core), chosen))
         return self._run_requests(sequence, names, destination, begun)
@@ -699,6 +726,19 @@ class Renderer:
             passes,
         )
 
+    def _expose(
+        self, settings: Settings, exposure: Exposure | str | None, dt: float | None
+    ) -> Settings:
+        """Return the settings with an exposure, which the rest of a renderer takes for settings."""
+        seconds = check_number("dt", 1 / 60 if dt is None else dt, 0, MAX_SECONDS)
+        if exposure is None:
+            return settings
+        made = ExposedSettings(settings, check_exposure(exposure), seconds)
+        # The same object as in the last call, since the last plan is kept for that.
+        if made != self._exposed:
+            self._exposed = made
+        return cast("Settings", self._exposed)
+
     def _run_one(
         self,
         source: _core.Source,
@@ -839,10 +879,11 @@ class Renderer:
     ) -> None:
         """Raise ValueError for framebuffers that none of the settings has, at any size."""
         known: dict[str, None] = {}
-        for item in [settings] if isinstance(settings, Settings) else settings:
+        for item in settings if isinstance(settings, Sequence) else [settings]:
             # An error of these settings is raised in their turn, after the frames of earlier ones.
             with contextlib.suppress(_core.Error, TypeError, ValueError):
-                plan = self._core.plan(source, check_settings(item), None)
+                chosen = item if isinstance(item, ExposedSettings) else check_settings(item)
+                plan = self._core.plan(source, chosen, None)
                 known.update((name, None) for name, _, _ in plan.outputs)
         kinds = {_NUMBER.sub("#", name) for name in known}
         for name in names or ():
@@ -866,7 +907,10 @@ class Renderer:
     def _frames(
         self, settings: Settings, arrays: Mapping[str, NDArray[Any]], state: State | None = None
     ) -> Frames:
-        frames = Frames(arrays, timings={}, settings=settings, info=self._made_by)
+        exposed = settings if isinstance(settings, ExposedSettings) else None
+        plain = exposed.settings if exposed else settings
+        frames = Frames(arrays, timings={}, settings=plain, info=self._made_by)
+        frames._is_exposed = exposed is not None
         if state is not None:
             frames._state = state
         return frames

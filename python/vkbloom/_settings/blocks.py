@@ -93,6 +93,23 @@ def _stage_block(stage: Glare) -> bytearray:
     return block
 
 
+def exposure_block(
+    settings: bytes, engine: str, numbers: Mapping[str, float], values: Sequence[float]
+) -> bytes:
+    """Return the block of settings with an exposure; `values` is its table."""
+    table, block = _core.SETTINGS_BLOCK, bytearray(settings)
+    ordered = [numbers.get(name, 0.0) for name in _core.EXPOSURE_NUMBERS]
+    if unknown := set(numbers) - set(_core.EXPOSURE_NUMBERS):
+        raise ValueError(f"exposure: the core has no {', '.join(sorted(unknown))}")
+    if len(values) > table["exposure_table"][2]:
+        raise ValueError(f"exposure: a table of {len(values)} numbers is too long")
+    _pack(block, table, "exposure_engine", _index("exposure", engine, _core.EXPOSURES))
+    _pack(block, table, "exposure_numbers", *ordered)
+    _pack(block, table, "exposure_table", *values)
+    _pack(block, table, "exposure_key_count", len(values) // 2)
+    return bytes(block)
+
+
 def settings_block(method: str, fields: Mapping[str, Any]) -> bytes:
     """Return the block of a method with these fields; those that it lacks have their defaults.
 

@@ -1,4 +1,4 @@
-"""The registries of methods and of stages of glare: their classes by name.
+"""The registries of methods, of stages of glare and of exposures: their classes by name.
 
 All parts of the package read a registry at the time of use, so that a class that is registered
 later has options, controls, axes, fits and JSON like the others.
@@ -87,6 +87,10 @@ METHODS: Final = Methods("method")
 FUNCTIONS: Final[Named[type[Any]]] = Named("psf", lambda kind: kind)
 #: The stages of glare, which `vkbloom._glare` supplies.
 STAGES: Final = Registry("glare")
+#: The classes of exposure, which `vkbloom._exposure` supplies.
+EXPOSURES: Final = Registry("exposure")
+#: What `vkbloom.exposures` is, which `vkbloom._exposure` supplies.
+NAMED_EXPOSURES: Final[Named[Any]] = Named("exposure", lambda entry: entry.make())
 #: What `vkbloom.presets` and `vkbloom.glares` are, which `vkbloom._presets` supplies.
 NAMED_SETTINGS: Final[Presets[Any]] = Presets()
 NAMED_STAGES: Final[Named[Any]] = Named("glare", lambda glare: glare.stages)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -11,11 +12,13 @@ from vkbloom._argument_types import check_arguments
 from vkbloom._arrays import native_order, view_image
 from vkbloom._image_arguments import check_emission, check_mask
 from vkbloom._public import public
+from vkbloom._settings.exposure import Exposure, check_exposure
 from vkbloom._settings.settings import Settings, resolve_settings
 
 from . import _custom as custom
 from . import _glare as glare
 from ._compositing import composite_without_store, strength_of
+from ._exposure import Exposing
 from ._image import BlurInput, as_float, finite, format_of, storage
 from ._lookup import Reference, reference_of
 from ._sampling import Array, sample, scale_size, size_of
@@ -30,6 +33,9 @@ def apply(
     *,
     mask: NDArray[Any] | None = None,
     emission: NDArray[Any] | None = None,
+    exposure: Exposure | str | None = None,
+    dt: float | None = None,
+    state: Mapping[str, Any] | None = None,
 ) -> dict[str, Array]:
     """Return what `vkbloom.Renderer.apply` returns, computed in float64.
 
@@ -59,6 +65,10 @@ def apply(
         uint8 (read as value / 255), bool, or floats in 0..1.
     emission : ndarray, optional
         Of the image's shape and dtype.
+    exposure : Exposure or str, optional
+        An exposure, or the name of one of `vkbloom.exposures`: the formulas of `expose`.
+    dt, state
+        As for `expose`; a `dt` of None is 1/60 s.
 
     Returns
     -------
@@ -77,11 +87,48 @@ def apply(
     settings = resolve_settings(settings)
     scene, source, weights, format = check_scene(image, settings, mask, emission)
     dtype = np.asarray(image).dtype
-    if (function := getattr(settings, "numpy_reference", None)) is None:
-        return framebuffers(scene, source, settings, mask=weights, format=format, dtype=dtype)
-    _, seen = _first_buffer(source, settings, weights, format)
-    stages = _with_alphas(glare.stages(seen, settings.glare, format))
-    return custom.framebuffers(function, scene, settings, dtype, stages)
+
+    def bloom(
+        scene: Array, source: Array, settings: Settings, dtype: DTypeLike
+    ) -> dict[str, Array]:
+        if (function := getattr(settings, "numpy_reference", None)) is None:
+            return framebuffers(scene, source, settings, mask=weights, format=format, dtype=dtype)
+        _, seen = _first_buffer(source, settings, weights, format)
+        stages = _with_alphas(glare.stages(seen, settings.glare, format))
+        return custom.framebuffers(function, scene, settings, np.dtype(dtype), stages)
+
+    if exposure is None:
+        return bloom(scene, source, settings, dtype)
+    stage = Exposing(check_exposure(exposure), 1 / 60 if dt is None else dt, state)
+    return _expose(stage, bloom, (scene, source), settings, dtype)
+
+
+def _expose(
+    stage: Exposing,
+    bloom: Callable[[Array, Array, Settings, DTypeLike], dict[str, Array]],
+    images: tuple[Array, Array],
+    settings: Settings,
+    dtype: DTypeLike,
+) -> dict[str, Array]:
+    """Return the framebuffers of a bloom with an exposure before or after it."""
+    exposure, first = stage.exposure, {}
+    scene, source = images
+    if not exposure._meters_bloom:
+        first = stage.adapt(scene)
+    if exposure._exposes_bloom:
+        is_own = source is scene
+        scene = first["exposed"] = stage.multiply(scene, stage.adapted.before)
+        source = scene if is_own else stage.multiply(source, stage.adapted.before)
+    if not exposure._exposes_picture:
+        return first | bloom(scene, source, settings, dtype)
+    plain = settings.replace(exposure=0.0, tonemap="none", encoding="none", dither=False)
+    results = first | bloom(scene, source, plain, np.float64)
+    combined = results.pop("final")
+    if exposure._meters_bloom:
+        results |= stage.adapt(combined)
+    picture = stage.multiply(combined, stage.adapted.after)
+    results["final"] = composite_without_store(picture, None, settings, dtype)
+    return results
 
 
 def check_scene(

@@ -1,0 +1,58 @@
+"""Settings with an exposure, as the core reads them."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import TYPE_CHECKING, Any
+
+from vkbloom._settings.blocks import exposure_block
+
+if TYPE_CHECKING:
+    from vkbloom._core_kernel import CoreKernel
+    from vkbloom._settings.exposure import Exposure
+    from vkbloom._settings.settings import Settings
+
+
+class MeterMask:
+    """The mask of a meter, which the core asks for its pixels."""
+
+    def __init__(self, mask: Any) -> None:
+        self._mask = mask
+
+    def core_kernel(self, frame: object, buffers: object) -> CoreKernel:
+        """Return the mask as the core reads a kernel."""
+        from vkbloom._core_kernel import core_kernel  # noqa: PLC0415  costs start-up time
+
+        return core_kernel(self._mask.array)
+
+
+@dataclasses.dataclass(frozen=True)
+class ExposedSettings:
+    """Settings, an exposure, and the seconds since the frame before.
+
+    Everything else that a renderer asks settings for is that of the settings.
+    """
+
+    settings: Settings
+    exposure: Exposure
+    dt: float
+
+    def __getattr__(self, name: str) -> Any:
+        # copy and pickle ask for methods before there are fields.
+        if name == "settings":
+            raise AttributeError(name)
+        return getattr(self.settings, name)
+
+    @property
+    def meter_mask(self) -> MeterMask | None:
+        """The mask of the meter, for the core."""
+        mask = getattr(self.exposure, "mask", None)
+        return None if mask is None else MeterMask(mask)
+
+    def _core_block(self) -> bytes:
+        exposure = self.exposure
+        numbers, table = exposure._numbers_of_step(self.dt), exposure._core_table()
+        return exposure_block(self.settings._core_block(), exposure._core_engine, numbers, table)
+
+    def _in_sequence(self, index: int, state: dict[Any, Any]) -> ExposedSettings:
+        return dataclasses.replace(self, settings=self.settings._in_sequence(index, state))

@@ -1,0 +1,87 @@
+"""The base classes of exposures, and the mapping of their presets."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar, Final, NamedTuple
+
+from vkbloom._public import public
+from vkbloom._settings.named import Named
+from vkbloom._settings.records import Record
+from vkbloom._settings.registry import EXPOSURES, NAMED_EXPOSURES
+from vkbloom._spelling import describe_unknown
+
+
+@public("vkbloom")
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class Exposure(Record):
+    """Base class of exposures; use an engine's class, such as `BevyExposure`.
+
+    Exposures are frozen and hashable. One that adapts meters the frame, and moves what it has
+    adapted to towards the goal, by the seconds since the frame before. `vkbloom.exposures` has
+    those of engines by name.
+    """
+
+    _class_key: ClassVar[str] = "engine"
+    _subject: ClassVar[str] = "exposure"
+    _example: ClassVar[str] = "an exposure of an engine, such as BevyExposure"
+    engine: ClassVar[str]
+    #: Whether the light that the bloom reads is exposed; whether the picture with its bloom is;
+    #: whether that is what is metered.
+    _exposes_bloom: ClassVar[bool] = False
+    _exposes_picture: ClassVar[bool] = False
+    _meters_bloom: ClassVar[bool] = False
+
+    @property
+    def _core_engine(self) -> str:
+        """The name of the engine in `_core.EXPOSURES`."""
+        return self.engine
+
+    def _numbers_of_step(self, dt: float) -> dict[str, float]:
+        """Return the numbers of `_core.EXPOSURE_NUMBERS` for a step of time; others are 0."""
+        raise NotImplementedError
+
+    def _core_table(self) -> Sequence[float]:
+        """Return the table that the core reads, if there is one."""
+        return ()
+
+    @classmethod
+    def _classes(cls) -> Mapping[str, type[Exposure]]:
+        return EXPOSURES
+
+
+def half_lives(dt: float, rate: float) -> float:
+    """Return the share of a distance that is left behind if half is left after 1 / rate seconds."""
+    return 1.0 - math.exp2(-dt * rate)
+
+
+class NamedExposure(NamedTuple):
+    """An entry of `exposures`."""
+
+    make: Any
+    what: str
+    whose: str
+
+
+#: The longest step of time.
+MAX_SECONDS: Final = 86400.0
+
+#: Name to exposure, for ``exposure=vkbloom.exposures[name]``, or ``exposure=name``.
+#: ``docs/exposure.md`` lists what they are, with their sources.
+exposures: Final[Named[Exposure]] = NAMED_EXPOSURES
+
+
+def check_exposure(exposure: object) -> Exposure:
+    """Return the exposure, or that of a preset; raise TypeError or ValueError for what is none."""
+    if isinstance(exposure, Exposure):
+        return exposure
+    if isinstance(exposure, str):
+        if exposure not in exposures:
+            raise ValueError(describe_unknown("exposure: unknown preset", exposure, exposures))
+        return exposures[exposure]
+    hint = ""
+    if isinstance(exposure, type) and issubclass(exposure, Exposure):
+        hint = f"; give {exposure.__name__}()"
+    raise TypeError(f"exposure: {exposure!r} is not an Exposure or the name of one{hint}")
