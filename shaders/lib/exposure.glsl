@@ -33,6 +33,16 @@ float larger_number(float a, float b)
     return is_nan(a) ? b : is_nan(b) ? a : max(a, b);
 }
 
+// log2(), whose results for infinity, NaN and negative numbers are the driver's.
+float logarithm(float value)
+{
+    if (is_nan(value) || value < 0.0)
+        return uintBitsToFloat(0x7fc00000u);
+    if (value == 0.0)
+        return uintBitsToFloat(0xff800000u);
+    return is_number(value) ? log2(value) : value;
+}
+
 float brightest(vec3 colour)
 {
     return larger_number(colour.r, larger_number(colour.g, colour.b));
@@ -48,7 +58,7 @@ float luminance(vec3 colour)
 
 float ev100(float light)
 {
-    return log2(100.0 * light / params.grey);
+    return logarithm(100.0 * light / params.grey);
 }
 
 // How much HDRP counts a pixel of a grid of that size, whose light this is. `masked` is the mask there.

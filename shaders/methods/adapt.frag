@@ -102,8 +102,7 @@ vec4 o3de(vec4 last)
 {
     float mean = texelFetch(metered, ivec2(0), 0).r / (float(params.width) * float(params.height));
     float ratio = is_number(mean) ? mean / 0.18 : 1.0;
-    // (The logarithm of 0 is not defined.)
-    float goal = ratio > 0.0 ? limit(log2(ratio), params.minimum, params.maximum) : params.minimum;
+    float goal = limit(logarithm(ratio), params.minimum, params.maximum);
     float value = last.a != 0.0 ? last.r : 0.0;
     value += (goal - value) * (goal > value ? params.step_up : params.step_down);
     return vec4(value, 1.0, exp2(-value), 1.0);

@@ -20,11 +20,11 @@ vec3 corner(ivec2 at)
 int bin_of(float light)
 {
     if (ENGINE == EXPOSURE_BEVY) {
-        if (light < exp2(params.low))
+        if (!is_nan(light) && light < exp2(params.low))
             return 0;
-        return int(1.0 + 62.0 * saturate((log2(light) - params.low) / (params.high - params.low)));
+        return int(1.0 + 62.0 * saturate((logarithm(light) - params.low) / (params.high - params.low)));
     }
-    float value = ENGINE == EXPOSURE_HDRP ? ev100(light) : log2(light);
+    float value = ENGINE == EXPOSURE_HDRP ? ev100(light) : logarithm(light);
     return int(127.0 * saturate((value - params.low) / (params.high - params.low)));
 }
 

@@ -11,7 +11,7 @@ float measure(vec3 colour)
 {
     if (ENGINE == EXPOSURE_O3DE)
         return luminance(colour);
-    return ENGINE == EXPOSURE_GRANITE ? log2(brightest(colour) + 1e-4) : brightest(colour);
+    return ENGINE == EXPOSURE_GRANITE ? logarithm(brightest(colour) + 1e-4) : brightest(colour);
 }
 
 // The sum of a block, or its mean, by rows: fewer numbers are added to large sums.
