@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import math
 import os
 from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
@@ -61,7 +60,7 @@ class _Clock(NamedTuple):
     times: tuple[float, ...] | None
 
     def at(self, place: int) -> float | None:
-        """Return a time in seconds; None: it is not given. `place`: that of a frame, or of a gap."""
+        """Return the time in seconds of a frame or a gap; None: it is not given."""
         if self.times is not None:
             return self.times[place]
         return None if self.rate is None else place / self.rate
@@ -99,7 +98,8 @@ class _Arrays:
     @cached_property
     def _start(self) -> Start | None:
         """Where the first item starts, if it is a file."""
-        first = self._images[0] if hasattr(self._images, "__getitem__") and len(self._images) else None
+        has_items = hasattr(self._images, "__getitem__") and len(self._images) > 0
+        first = self._images[0] if has_items else None
         if not isinstance(first, str | os.PathLike):
             return None
         return self._chosen.of_file(_highlights_of(first))
@@ -215,8 +215,8 @@ class _Turns:
         self._clock, self.settings = clock, chosen.of_arrays(of_image=False)
 
     def read(self, first: int) -> _Timed:
-        numbers = itertools.count(first)
-        for number in itertools.takewhile(lambda number: number < (self.count() or math.inf), numbers):
+        count = self.count()
+        for number in itertools.count(first) if count is None else range(first, count):
             time = self._clock.at(number)
             assert time is not None
             yield time / _TURN_SECONDS, time

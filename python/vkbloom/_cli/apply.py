@@ -10,7 +10,6 @@ import shutil
 import tempfile
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
-from fractions import Fraction
 from pathlib import Path
 from typing import Any, Final, TypeAlias, get_args
 
@@ -385,7 +384,8 @@ def command(*, sources: tuple[str, ...], out: str | None, adapter: str, **given:
     fps, codec = given.pop("fps"), given.pop("codec")
     options = Options(**given)
     if any(map(is_video, (*inputs, target))):
-        _apply_to_videos(options, inputs, target, adapter, fps, codec, is_named=out is not None)
+        how = {"fps": fps, "codec": codec, "is_named": out is not None}
+        videos.run(_job_of(options, inputs, target, **how), adapter)
         return 0
     if fps is not None or codec is not None:
         raise click.UsageError(f"--{'fps' if fps else 'codec'} is only for videos")
@@ -418,34 +418,16 @@ def command(*, sources: tuple[str, ...], out: str | None, adapter: str, **given:
     return _tell_failures(run.failures, work)
 
 
-def _apply_to_videos(
-    options: Options,
-    sources: list[str],
-    out: str,
-    adapter: str,
-    fps: Fraction | None,
-    codec: Codec | None,
-    *,
-    is_named: bool,
-) -> None:
-    """Do what the command does if IN or OUT is a video."""
+def _job_of(options: Options, sources: list[str], out: str, **given: Any) -> videos.Job:
+    """Return what the command does if IN or OUT is a video."""
     if options.names != ["final"] or options.skip_existing:
         name = "skip-existing" if options.skip_existing else "framebuffers"
         raise click.UsageError(f"--{name} is only for images; leave it out")
     check_input_colour(options.input_colour)
     names = {field.name for field in dataclasses.fields(videos.Job)}
     shared = {name: value for name, value in vars(options).items() if name in names}
-    job = videos.Job(
-        **shared,
-        sources=sources,
-        out=out,
-        fps=fps,
-        codec=codec,
-        saved=options.saved,
-        is_named=is_named,
-    )
     _check_colours(options.start.of(Highlights.STORED).settings, options)
-    videos.run(job, adapter)
+    return videos.Job(**shared, sources=sources, out=out, saved=options.saved, **given)
 
 
 def _tell_failures(failures: Mapping[str, Exception], work: Sequence[Pair]) -> int:

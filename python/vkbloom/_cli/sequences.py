@@ -15,10 +15,10 @@ from typing import BinaryIO, Final
 
 import click
 
-from vkbloom._io.numbered_files import NumberedFile, files_of, gap_note, pattern_of
 from vkbloom._cli.targets import check_folder, check_new_folder
 from vkbloom._cli.terminal import note
 from vkbloom._io import safe_writing
+from vkbloom._io.numbered_files import NumberedFile, files_of, gap_note, pattern_of
 from vkbloom._io.readers import readable_extensions
 
 #: Stands for standard input and standard output.

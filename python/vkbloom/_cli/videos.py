@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, closing
 from fractions import Fraction
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import click
 import numpy as np
@@ -37,13 +37,18 @@ from vkbloom._renderer.frame_files import settings_facts
 from vkbloom._renderer.interruptible import open_renderer
 from vkbloom._renderer.renderer import Renderer
 
+if TYPE_CHECKING:
+    _ParamType = click.ParamType[Fraction]
+else:
+    _ParamType = click.ParamType
+
 # Frames per second of images.
 _DEFAULT_RATE: Final = Fraction(24)
 _MAX_DENOMINATOR: Final = 1001 * 1000
 _RATE: Final = re.compile(r"[0-9]+(\.[0-9]+|/[0-9]+)?\Z")
 
 
-class Rate(click.ParamType):
+class Rate(_ParamType):
     """Frames per second: 24, 23.976 or 24000/1001."""
 
     name = "rate"
@@ -102,11 +107,19 @@ class _Frame(NamedTuple):
     aspect: Fraction
 
 
+class _First(NamedTuple):
+    """The first frame, its result, and where all start."""
+
+    frame: _Frame
+    final: Picture
+    start: Start
+
+
 class _Clip(NamedTuple):
     """What is read: frames, about how many, their rate, the unit of time, a file with audio."""
 
     frames: Iterator[_Frame]
-    count: int | None
+    expected: int | None
     rate: Fraction
     time_base: Fraction
     audio: str
@@ -170,8 +183,8 @@ def run(job: Job, adapter: str) -> None:
     with ExitStack() as stack:
         clip = _open(job, stack)
         bar = tqdm(
-            closing_iterator(clip.frames, stack),
-            total=clip.count,
+            _close_later(clip.frames, stack),
+            total=clip.expected,
             unit="frame",
             leave=False,
             disable=hides_progress(),
@@ -184,7 +197,7 @@ def run(job: Job, adapter: str) -> None:
         say(f"wrote {count} images of the pattern {job.out}")
 
 
-def closing_iterator(frames: Iterator[_Frame], stack: ExitStack) -> Iterator[_Frame]:
+def _close_later(frames: Iterator[_Frame], stack: ExitStack) -> Iterator[_Frame]:
     """Return the frames, whose files are closed with the stack."""
     close = getattr(frames, "close", None)
     if close is not None:
@@ -271,7 +284,7 @@ def _make(
             note(f"in the first frame, {no_bloom.reason(start.settings)}")
         final = finish(picture, made["final"], start.settings)
         if write is None:
-            write = _writer_of(job, clip, frame, final, start, stack)
+            write = _writer_of(job, clip, _First(frame, final, start), stack)
         yield None, _bind(write, frame, final)
 
 
@@ -282,12 +295,12 @@ def _bind(
 
 
 def _writer_of(
-    job: Job, clip: _Clip, first: _Frame, final: Picture, start: Start, stack: ExitStack
+    job: Job, clip: _Clip, first: _First, stack: ExitStack
 ) -> Callable[[_Frame, Picture], object]:
     """Return the function that writes a frame."""
     if not is_video(job.out):
         pattern, folder = _pattern_of(job.out), os.path.dirname(job.out)
-        facts = settings_facts(start.settings, start.expand)
+        facts = settings_facts(first.start.settings, first.start.expand)
 
         def save(frame: _Frame, picture: Picture) -> None:
             file = Path(folder, pattern.name_of(frame.place))
@@ -296,16 +309,16 @@ def _writer_of(
 
         return save
     codec, coding = writing.choose_coding(
-        job.out, final, first.coding, codec=job.codec, saved=job.saved, bits=job.bits
+        job.out, first.final, first.frame.coding, codec=job.codec, saved=job.saved, bits=job.bits
     )
-    height, width = final.pixels.shape[:2]
+    height, width = first.final.pixels.shape[:2]
     layout = writing.Layout(
         size=(width, height),
         rate=clip.rate.limit_denominator(_MAX_DENOMINATOR),
         time_base=clip.time_base,
         coding=coding,
         codec=codec,
-        aspect=first.aspect,
+        aspect=first.frame.aspect,
         quality=job.quality,
         audio=clip.audio,
     )

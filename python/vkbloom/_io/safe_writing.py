@@ -80,9 +80,14 @@ def replacing_stream(file: Path) -> Iterator[BinaryIO]:
     """
     temporary = _fill(file, lambda _: None)
     try:
+        # Buffered: a short write of an unbuffered file is no error.
         with temporary.open("r+b") as stream:
             yield stream
         put_in_place(temporary, file)
+    except OSError as error:
+        if error.filename is not None:
+            raise
+        raise OSError(error.errno, error.strerror or str(error), str(file)) from error
     finally:
         remove(temporary)
 

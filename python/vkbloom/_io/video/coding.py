@@ -165,8 +165,8 @@ def _as_codes(
     values: NDArray[np.float32], scale: float, offset: float, coding: Coding
 ) -> NDArray[Any]:
     codes = np.rint(values * np.float32(scale) + np.float32(offset))
-    codes = np.clip(codes, 0, (1 << coding.bits) - 1)
-    return codes.astype(np.uint8 if coding.bits == 8 else np.uint16)
+    made: NDArray[Any] = np.clip(codes, 0, (1 << coding.bits) - 1)
+    return made.astype(np.uint8 if coding.bits == 8 else np.uint16)
 
 
 def _enlarge(plane: NDArray[Any], coding: Coding) -> NDArray[Any]:

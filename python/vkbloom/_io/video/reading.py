@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import errno
 import os
-from collections.abc import Generator, Iterator
+from collections.abc import Generator, Iterable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, Self
+from typing import TYPE_CHECKING, Any, Final, Self, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,13 +31,16 @@ from vkbloom._io.video.coding import (
 
 if TYPE_CHECKING:
     import av
+    from av.container import InputContainer
     from av.video.frame import VideoFrame
     from av.video.stream import VideoStream
 
 #: The extensions of videos.
 EXTENSIONS: Final = frozenset(
-    ".3gp .avi .flv .m2ts .m4v .mkv .mov .mp4 .mpeg .mpg .mts .mxf .nut .ogv .ts .webm .wmv "
-    ".y4m".split()
+    (
+        *(".3gp", ".avi", ".flv", ".m2ts", ".m4v", ".mkv", ".mov", ".mp4", ".mpeg", ".mpg"),
+        *(".mts", ".mxf", ".nut", ".ogv", ".ts", ".webm", ".wmv", ".y4m"),
+    )
 )
 # Containers whose headers state how long they are.
 _WITH_DURATION: Final = ("mov,mp4,m4a,3gp,3g2,mj2", "matroska,webm")
@@ -89,10 +92,17 @@ def naming(path: str) -> Iterator[None]:
         if isinstance(error, MemoryError):
             raise
         reason = error.strerror or str(error)
-        # FFmpeg's own EIO is that of a file that ends in its header; the system's is no FFmpegError.
+        # FFmpeg has EIO where a file ends in its header. The system's is another exception.
         if isinstance(error, OSError) and error.errno != errno.EIO:
             raise OSError(error.errno, reason, path) from error
         raise ValueError(f"{path}: damaged, or not a video: {reason}") from error
+    except OSError as error:
+        # Of the file object, which PyAV calls.
+        if error.filename is not None:
+            raise
+        if error.errno == errno.EINVAL:
+            raise ValueError(f"{path}: damaged: it names a place outside of itself") from error
+        raise OSError(error.errno, error.strerror or str(error), path) from error
 
 
 class VideoFile:
@@ -112,7 +122,7 @@ class VideoFile:
         with ExitStack() as stack, naming(self._name):
             # A file object, so that any name is a file, and errors of reading are the system's.
             stream = stack.enter_context(open(self._name, "rb"))
-            self._container: av.container.InputContainer = stack.enter_context(av.open(stream))
+            self._container: InputContainer = stack.enter_context(av.open(stream))
             self._stream = self._choose_stream()
             self.rate = Fraction(self._stream.average_rate or self._stream.guessed_rate or 25)
             self.time_base = Fraction(self._stream.time_base or 1 / self.rate)
@@ -168,7 +178,7 @@ class VideoFile:
                     continue
                 if packet.is_corrupt:
                     raise ValueError(f"{self._name}: damaged: frame {number} is not complete")
-                for frame in packet.decode():
+                for frame in cast("list[VideoFrame]", packet.decode()):
                     made = self._picture_of(frame, number)
                     last, number = made.duration, number + 1
                     end = max(end, made.time + last)
@@ -178,6 +188,7 @@ class VideoFile:
             self._check_end(end, last)
 
     def _choose_stream(self) -> VideoStream:
+        stream: VideoStream
         for stream in self._container.streams.video:
             # (The cover of an album is a stream of one picture.)
             if not stream.disposition.value & stream.disposition.__class__.attached_pic.value:
@@ -320,10 +331,10 @@ def _values_of(plane: Any, dtype: np.dtype[Any]) -> NDArray[Any]:
 
 def _matrix_of(frame: VideoFrame) -> NDArray[np.int32] | None:
     """Return the part of the display matrix that turns and mirrors; None: there is none."""
-    for data in frame.side_data:
+    for data in cast("Iterable[Any]", frame.side_data):
         if data.type.name == "DISPLAYMATRIX":
-            numbers = np.frombuffer(data, np.int32)
-            return numbers[:9].reshape(3, 3)[:2, :2]
+            numbers: NDArray[np.int32] = np.frombuffer(data, np.int32)[:9].reshape(3, 3)
+            return numbers[:2, :2]
     return None
 
 

@@ -28,7 +28,7 @@ from vkbloom._io.video.reading import naming, plane_format
 from vkbloom._numbers import check_index
 
 if TYPE_CHECKING:
-    import av
+    from av.container import OutputContainer
 
 # FFmpeg's names of the encoders.
 _ENCODERS: Final[Mapping[Codec, str]] = {"ffv1": "ffv1", "h264": "libx264", "h265": "libx265"}
@@ -194,17 +194,12 @@ def writing(path: str | os.PathLike[str], layout: Layout) -> Iterator[VideoWrite
     check_writable(path)
     name = os.fspath(path)
     with safe_writing.replacing_stream(Path(path)) as stream, naming(name):
+        writer = VideoWriter(stream, name, layout)
         try:
-            writer = VideoWriter(stream, name, layout)
-            try:
-                yield writer
-                writer.finish()
-            finally:
-                writer.close()
-        except OSError as error:
-            if error.filename is not None:
-                raise
-            raise OSError(error.errno, error.strerror or str(error), name) from error
+            yield writer
+            writer.finish()
+        finally:
+            writer.close()
 
 
 class VideoWriter:
@@ -218,9 +213,7 @@ class VideoWriter:
         self._last: int | None = None
         self._durations: dict[int, int] = {}
         self._audio: _AudioCopy | None = None
-        self._container: av.container.OutputContainer = av.open(
-            stream, "w", format=_FORMATS[suffix]
-        )
+        self._container: OutputContainer = av.open(stream, "w", format=_FORMATS[suffix])
         # By it the command knows its own files.
         self._container.metadata["comment"] = safe_writing.PROGRAM
         try:
@@ -249,7 +242,7 @@ class VideoWriter:
         try:
             self._container.start_encoding()
         except self._av.error.FFmpegError as error:
-            what = self._layout.codec
+            what: str = self._layout.codec
             if self._audio is not None:
                 what += f" with audio of {', '.join(self._audio.codecs)}"
             reason = error.strerror or str(error)
@@ -316,7 +309,9 @@ class VideoWriter:
             planes = [packed.reshape(packed.shape[0], -1)]
         for plane, values in zip(frame.planes, planes, strict=True):
             rows = np.frombuffer(plane, np.uint8).reshape(-1, plane.line_size)
-            content = np.ascontiguousarray(values.astype(values.dtype.newbyteorder("<"), copy=False))
+            content = np.ascontiguousarray(
+                values.astype(values.dtype.newbyteorder("<"), copy=False)
+            )
             content = content.view(np.uint8)
             rows[: content.shape[0], : content.shape[1]] = content
         frame.color_primaries, frame.color_trc = coding.primaries, coding.curve
@@ -344,7 +339,7 @@ def _options_of(layout: Layout) -> dict[str, str]:
 class _AudioCopy:
     """The audio of a file, copied to a container as it is coded."""
 
-    def __init__(self, source: str, output: av.container.OutputContainer) -> None:
+    def __init__(self, source: str, output: OutputContainer) -> None:
         av = import_extra("av", "video", "Copying audio")
         self._output = output
         self._opened = contextlib.ExitStack()
