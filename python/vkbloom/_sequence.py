@@ -14,13 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom._argument_types import check_arguments
+from vkbloom._image_arguments import check_image, check_mask
 from vkbloom._io.numbered_files import files_of, gap_note, pattern_of
 from vkbloom._io.video.reading import VideoFile, is_video
 from vkbloom._locks import cached_property
 from vkbloom._numbers import check_above, check_floats, check_index
 from vkbloom._public import public
 from vkbloom._renderer.default import default_renderer
-from vkbloom._renderer.device_arrays import Device
+from vkbloom._renderer.device_arrays import Device, on_cuda
 from vkbloom._renderer.frames import Frames
 from vkbloom._renderer.renderer import Renderer
 from vkbloom._renderer.sources import SCENE_SIZE
@@ -442,8 +443,13 @@ def sequence(
             raise ValueError("mask: a scene takes neither a mask nor an emission")
         work = _work_of_scene(renderer, frames, how | {"size": size, "shading": shading})
         return Sequence(_Turns(clock, chosen), work, clock)
-    # Wrong settings fail at the call.
+    # Wrong settings, masks and emissions fail at the call; their sizes with the first frame.
     chosen.of_arrays(of_image=True)
+    if mask is not None and not on_cuda(mask):
+        height, width = (*np.shape(mask), 0, 0)[:2]
+        check_mask(mask, (height, width))
+    if emission is not None and not on_cuda(emission):
+        check_image(emission, "emission")
     source = _input_of(frames, chosen, gaps)
     if clock.times is not None and not isinstance(source, _Video):
         count = source.count()

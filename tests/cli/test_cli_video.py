@@ -85,13 +85,14 @@ def write_clip(
             frame.pts, frame.time_base = (times or range(count))[number], 1 / RATE
             container.mux(stream.encode(frame))
         container.mux(stream.encode())
-        for number in range(2 * count if sound else 0):
+        for number in range(2 * count if sound is not None else 0):
             samples = av.AudioFrame("fltp", "mono", 1024)
             samples.sample_rate, samples.pts = 48000, number * 1024
             samples.time_base = Fraction(1, 48000)
             samples.planes[0].update(np.zeros(1024, np.float32).tobytes())
             container.mux(sound.encode(samples))
-        container.mux(sound.encode() if sound else [])
+        if sound is not None:
+            container.mux(sound.encode())
     return path
 
 
@@ -118,6 +119,12 @@ def apply(source: object, target: Path, *options: object) -> None:
     """Copy a video, or more, by the command; that must succeed."""
     result = run("apply", source, "-o", target, "-q", *options)
     assert (result.exit_code, result.stderr) == (0, "")
+
+
+def command(source: Path, target: Path) -> list[str]:
+    """Return the words of `apply` as a process of its own."""
+    words = ("-m", "vkbloom", "apply", str(source), "-o", str(target), "-q")
+    return [sys.executable, *words]
 
 
 PQ, HLG = (9, 16, 9, 1), (9, 18, 9, 1)
@@ -281,7 +288,16 @@ def test_a_disk_that_fills_up(tmp_path: Path) -> None:
         signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
         resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
 
-    words = [sys.executable, "-m", "vkbloom", "apply", source, "-o", tmp_path / "out.mkv", "-q"]
+    words = [
+        sys.executable,
+        "-m",
+        "vkbloom",
+        "apply",
+        str(source),
+        "-o",
+        str(tmp_path / "out.mkv"),
+        "-q",
+    ]
     ended = subprocess.run(
         words, preexec_fn=limit_files, capture_output=True, text=True, check=False
     )
@@ -292,7 +308,16 @@ def test_a_disk_that_fills_up(tmp_path: Path) -> None:
 
 def test_interrupt_leaves_no_file(tmp_path: Path) -> None:
     source = write_clip(tmp_path / "a.mkv", "ffv1", "yuv420p", count=2000)
-    words = [sys.executable, "-m", "vkbloom", "apply", source, "-o", tmp_path / "out.mkv", "-q"]
+    words = [
+        sys.executable,
+        "-m",
+        "vkbloom",
+        "apply",
+        str(source),
+        "-o",
+        str(tmp_path / "out.mkv"),
+        "-q",
+    ]
     with subprocess.Popen(words, stderr=subprocess.PIPE, text=True) as process:
         until = time.monotonic() + 60
         while not list(tmp_path.glob(".vkbloom-*")) and time.monotonic() < until:

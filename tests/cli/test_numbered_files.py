@@ -10,8 +10,8 @@ import pytest
 
 import vkbloom
 from tests.cli.calls import run
-from vkbloom._io.numbered_files import as_frames, gap_note, gaps, missing_count, pattern_of
 from vkbloom._cli.sequences import check_targets, expand
+from vkbloom._io.numbered_files import as_frames, gap_note, gaps, missing_count, pattern_of
 
 NAMES = {
     "n.%04d.exr": ["n.-002.exr", "n.-001.exr", "n.0000.exr", "n.0001.exr", "n.12345.exr"],

@@ -211,6 +211,7 @@ class VideoWriter:
         coding = layout.coding
         suffix = Path(name).suffix.lower()
         self._last: int | None = None
+        self._count = 0
         self._durations: dict[int, int] = {}
         self._audio: _AudioCopy | None = None
         self._container: OutputContainer = av.open(stream, "w", format=_FORMATS[suffix])
@@ -269,7 +270,7 @@ class VideoWriter:
             raise ValueError(
                 f"{self._name}: a frame at {float(time):.6g} s is not later than the one before"
             )
-        self._last = number
+        self._last, self._count = number, self._count + 1
         if duration is not None:
             self._durations[number] = max(1, round(duration / base))
         frame = self._frame_of(picture)
@@ -297,6 +298,9 @@ class VideoWriter:
             duration = self._durations.pop(packet.pts, None)
             if duration is not None and packet.time_base == self._layout.time_base:
                 packet.duration = duration
+            if self._count == 1:
+                # x265 gives a sole frame a random decoding time (4.2 in FFmpeg 8.1).
+                packet.dts = packet.pts
             self._container.mux_one(packet)
 
     def _frame_of(self, picture: Picture) -> Any:
