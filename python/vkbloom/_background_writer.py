@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import TypeVar
 
@@ -11,12 +11,15 @@ Result = TypeVar("Result")
 
 def write_in_background(
     made: Iterable[tuple[Result, Callable[[], object]]],
-) -> Iterator[Result]:
+) -> Generator[Result, None, None]:
     """Yield each result when its function, which a thread calls, has written it.
 
     An exception of `made` is raised after the results before it are written and yielded.
     """
     with ThreadPoolExecutor(1, "vkbloom-write") as pool:
+        # The thread starts before there is something to write: the pool does not wait for one whose
+        # start Ctrl-C interrupts.
+        pool.submit(lambda: None).result()
         behind: tuple[Result, Future[object]] | None = None
         failure: Exception | None = None
         following = iter(made)

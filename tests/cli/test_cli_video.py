@@ -74,7 +74,7 @@ def write_clip(
         context.color_primaries, context.color_trc, context.colorspace, context.color_range = tags
         if matrix is not None:
             stream.set_display_matrix(matrix)
-        sound = container.add_stream("aac", rate=48000, layout="mono") if audio else None
+        sound: Any = container.add_stream("aac", rate=48000, layout="mono") if audio else None
         container.start_encoding()
         for number in range(count):
             frame = av.VideoFrame(WIDTH, HEIGHT, name)

@@ -190,7 +190,9 @@ def run(job: Job, adapter: str) -> None:
             disable=hides_progress(),
         )
         made = _make(job, bar, clip, adapter, stack)
-        count = sum(1 for _ in write_in_background(made))
+        # Closed before the files are: Ctrl-C waits for the frame that the thread writes.
+        with closing(write_in_background(made)) as written:
+            count = sum(1 for _ in written)
     if is_video(job.out):
         say(f"wrote {job.out}, {count} frames")
     else:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import threading
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from fractions import Fraction
@@ -212,6 +213,7 @@ class VideoWriter:
         suffix = Path(name).suffix.lower()
         self._last: int | None = None
         self._count = 0
+        self._lock, self._is_closed = threading.Lock(), False
         self._durations: dict[int, int] = {}
         self._audio: _AudioCopy | None = None
         self._container: OutputContainer = av.open(stream, "w", format=_FORMATS[suffix])
@@ -275,9 +277,12 @@ class VideoWriter:
             self._durations[number] = max(1, round(duration / base))
         frame = self._frame_of(picture)
         frame.pts, frame.time_base = number, base
-        self._mux(self._stream.encode(frame))
-        if self._audio is not None:
-            self._audio.copy(until=time)
+        with self._lock:
+            if self._is_closed:
+                raise ValueError(f"{self._name}: the video is closed")
+            self._mux(self._stream.encode(frame))
+            if self._audio is not None:
+                self._audio.copy(until=time)
 
     def finish(self) -> None:
         """Write what is left, and the end of the container."""
@@ -288,10 +293,13 @@ class VideoWriter:
 
     def close(self) -> None:
         """Close the files, of a video that is complete or given up."""
-        if self._audio is not None:
-            self._audio.close()
-        with contextlib.suppress(self._av.error.FFmpegError, OSError, ValueError):
-            self._container.close()
+        # FFmpeg crashes if a thread writes to what another one closes.
+        with self._lock:
+            self._is_closed = True
+            if self._audio is not None:
+                self._audio.close()
+            with contextlib.suppress(self._av.error.FFmpegError, OSError, ValueError):
+                self._container.close()
 
     def _mux(self, packets: list[Any]) -> None:
         for packet in packets:
