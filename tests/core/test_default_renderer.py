@@ -126,7 +126,7 @@ image = np.ones((8, 8, 3), np.float32)
 settings = vkbloom.Convolution(vkbloom.psf.gaussian(2))
 renderer = vkbloom.Renderer()
 renderer.apply(image, settings)
-pending = PendingSubmission(types.SimpleNamespace(wait=lambda: ([], ())))
+pending = PendingSubmission(types.SimpleNamespace(ordered=True, wait=lambda: ([], ())))
 gradients = DeviceGradients({}, ("exposure",), lambda: {"exposure": image}, dict)
 held = [*(one._lock for one in locks._locks), *(one.lock for one in locks._properties)]
 assert len(held) >= 3

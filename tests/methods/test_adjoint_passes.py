@@ -161,7 +161,7 @@ PARTS = ("glow", "blur_vertical", "bloom", "final")
 
 
 def pull(
-    renderer: Any, image: Any, settings: Any, names: tuple[str, ...] = PARTS, **given: Any
+    renderer: Any, image: Any, settings: Any, names: tuple[str, ...] = PARTS, /, **given: Any
 ) -> Any:
     frames, pullback = vkbloom.vjp(image, settings, **given, renderer=renderer)
     random = np.random.default_rng(5)
@@ -459,7 +459,7 @@ def test_filters_take_a_composite_with_a_mask(
     varied: dict[str, Renderer], variant: str, case: tuple[Any, ...]
 ) -> None:
     settings, size, passes = case
-    image = random_image(*size, channels=4, seed=1).astype(np.float32)
+    image = random_image(size[0], size[1], 4).astype(np.float32)
     image[0, 0, 0], image[1, 2, 1] = np.nan, np.inf
     mask = np.random.default_rng(3).random(size, np.float32)
     settings = settings.replace(**SINGLE)

@@ -54,13 +54,6 @@ def _rec709(colours: NDArray[Any]) -> NDArray[np.float64]:
     return signal
 
 
-def _rec709(colours: NDArray[Any]) -> NDArray[np.float64]:
-    """Rec. ITU-R BT.709-6, item 1.2, for 0 and above."""
-    light = np.maximum(np.nan_to_num(colours.astype(float)), 0)
-    signal: NDArray[np.float64] = np.where(light < 0.018, 4.5 * light, 1.099 * light**0.45 - 0.099)
-    return signal
-
-
 def _from_rec709(signal: NDArray[Any]) -> NDArray[np.float64]:
     """Rec. ITU-R BT.709-6, item 1.2."""
     values = signal.astype(float)
