@@ -73,6 +73,7 @@ static uint32_t add_mask(struct vkb_levels *levels, uint32_t other)
         .width = data->width,
         .height = data->height,
         .pixels = data->pixels,
+        .grey = data->grey,
         .serial = data->serial,
     };
 
