@@ -235,7 +235,8 @@ static void find_usages(struct vkb_run *run, const struct vkb_frame_source *sour
             const struct vkb_image_row *row = &plan->graph.images[image];
             const struct vkb_input *input = source->inputs[row->input];
             run->usages[image] |= row->usage;
-            if (row->input && !run->device->linear_texels)
+            // The host writes what it has given to linear texels itself.
+            if ((row->input || row->serial) && !run->device->linear_texels)
                 run->usages[image] |= vkb_access_usage(VKB_ACCESS_COPY_TARGET);
             if (input && input->exported)
                 run->usages[image] |= vkb_access_usage(VKB_ACCESS_DISPATCH_STORED);

@@ -414,12 +414,13 @@ void vkb_graph_set_usages(struct vkb_graph *graph)
     for (uint32_t i = 0; i < graph->image_count; ++i) {
         struct vkb_image_row *row = &graph->images[i];
         const bool kept = vkb_graph_history(graph, i) != VKB_NO_IMAGE;
-        row->usage = (row->framebuffer ? vkb_access_usage(VKB_ACCESS_COPY_SOURCE) : 0)
-                   | (row->serial ? vkb_access_usage(VKB_ACCESS_COPY_TARGET) : 0)
-                   // The next call may read it in another way, or use it as a source.
-                   | (kept ? vkb_access_usage(VKB_ACCESS_SAMPLED)
-                                 | vkb_access_usage(VKB_ACCESS_DISPATCH_LOADED)
-                           : 0);
+        // What the host has given is not read back.
+        row->usage =
+            (row->framebuffer && !row->serial ? vkb_access_usage(VKB_ACCESS_COPY_SOURCE) : 0)
+            // The next call may read it in another way, or use it as a source.
+            | (kept ? vkb_access_usage(VKB_ACCESS_SAMPLED)
+                          | vkb_access_usage(VKB_ACCESS_DISPATCH_LOADED)
+                    : 0);
     }
     for (uint32_t i = 0; i < graph->pass_count; ++i) {
         const struct vkb_pass_row *pass = &graph->passes[i];

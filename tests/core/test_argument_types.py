@@ -106,6 +106,7 @@ NEEDED: dict[str, Any] = {
     ),
 }
 OTHERS: dict[str, dict[str, Any]] = {
+    "flash": {"degrees": 40.0},
     "load_method": {"source": "//!HOOK MAIN\n//!BIND HOOKED\nvec4 hook() { return vec4(1); }\n"},
     "unreal": {"image": np.ones((3, 3))},
     "shade": dict.fromkeys(("albedo", "normal", "position", "brightness"), IMAGE),
@@ -197,13 +198,14 @@ def check(function: Callable[..., Any], arguments: dict[str, Any], name: str, va
 
 
 def required_arguments(function: Callable[..., Any]) -> dict[str, Any]:
-    """Return valid values of the parameters without a default."""
+    """Return valid values of the parameters without a default, and those of OTHERS."""
     parameters = inspect.signature(function).parameters.items()
-    values: dict[str, Any] = NEEDED | OTHERS.get(function.__name__, {})
+    others = OTHERS.get(function.__name__, {})
+    values: dict[str, Any] = NEEDED | others
     return {
         name: values[name]
         for name, parameter in parameters
-        if parameter.default is parameter.empty
+        if (parameter.default is parameter.empty or name in others)
         and parameter.kind not in (parameter.VAR_POSITIONAL, parameter.VAR_KEYWORD)
     }
 
