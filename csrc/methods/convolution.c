@@ -104,19 +104,10 @@ void vkb_transpose_axes(struct vkb_convolution *convolution)
 // The kernel as the host gives it.
 static uint32_t add_kernel(struct vkb_levels *levels)
 {
-    const struct vkb_kernel_data *kernel = &levels->settings->kernel;
-    const struct vkb_image_row row = {
-        .name = "kernel",
-        .format = VKB_FORMAT_RGBA32_FLOAT,
-        .width = kernel->width,
-        .height = kernel->height,
-        .channels = 3,
-        .framebuffer = !vkb_method_of(levels->settings)->sums_gaussians,
-        .pixels = kernel->pixels,
-        .grey = kernel->grey,
-        .serial = kernel->serial,
-    };
+    struct vkb_image_row row = vkb_given_image("kernel", &levels->settings->kernel);
 
+    row.channels = 3;
+    row.framebuffer = !vkb_method_of(levels->settings)->sums_gaussians;
     return vkb_levels_add(levels, &row);
 }
 

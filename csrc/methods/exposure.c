@@ -67,15 +67,7 @@ static void make_dispatch(struct vkb_pass_row *row, uint32_t across, uint32_t do
 static uint32_t add_mask(struct vkb_levels *levels, uint32_t other)
 {
     const struct vkb_kernel_data *data = &levels->settings->exposure_mask;
-    const struct vkb_image_row mask = {
-        .name = "meter_mask",
-        .format = VKB_FORMAT_RGBA32_FLOAT,
-        .width = data->width,
-        .height = data->height,
-        .pixels = data->pixels,
-        .grey = data->grey,
-        .serial = data->serial,
-    };
+    const struct vkb_image_row mask = vkb_given_image("meter_mask", data);
 
     return data->serial ? vkb_levels_add(levels, &mask) : other;
 }

@@ -255,16 +255,7 @@ void vkb_add_glare_stages(struct vkb_levels *levels, uint32_t *stages)
 static uint32_t add_dirty_light(struct vkb_levels *levels, const struct vkb_glare_values *values,
                                 uint32_t light)
 {
-    const struct vkb_kernel_data *data = &levels->settings->dirt;
-    const struct vkb_image_row picture = {
-        .name = "dirt",
-        .format = VKB_FORMAT_RGBA32_FLOAT,
-        .width = data->width,
-        .height = data->height,
-        .pixels = data->pixels,
-        .grey = data->grey,
-        .serial = data->serial,
-    };
+    const struct vkb_image_row picture = vkb_given_image("dirt", &levels->settings->dirt);
     const uint32_t dirt = vkb_levels_add(levels, &picture);
     const uint32_t dirty = vkb_levels_step(levels, levels->source->final, "dirty_light");
     struct vkb_pass_row row = vkb_fetching_row(levels, &vkb_shader_dirt_frag, light, dirty);

@@ -82,6 +82,21 @@ enum vkb_format vkb_end_format(const struct vkb_settings *settings, enum vkb_for
              : buffers;
 }
 
+struct vkb_image_row vkb_given_image(const char *name, const struct vkb_kernel_data *data)
+{
+    struct vkb_image_row row = {
+        .format = VKB_FORMAT_RGBA32_FLOAT,
+        .width = data->width,
+        .height = data->height,
+        .pixels = data->pixels,
+        .grey = data->grey,
+        .serial = data->serial,
+    };
+
+    snprintf(row.name, sizeof row.name, "%s", name);
+    return row;
+}
+
 uint32_t vkb_levels_add(struct vkb_levels *levels, const struct vkb_image_row *row)
 {
     uint32_t image = 0;

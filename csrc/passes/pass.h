@@ -73,6 +73,9 @@ struct vkb_levels {
     double below;  // the factor of the smaller level while levels are added up
 };
 
+// An image of what Python gives: a kernel, a picture of dirt, the mask of a meter.
+struct vkb_image_row vkb_given_image(const char *name, const struct vkb_kernel_data *data);
+
 // Adds an image that has pixels; an image that passes write.
 uint32_t vkb_levels_add(struct vkb_levels *levels, const struct vkb_image_row *row);
 uint32_t vkb_levels_target(struct vkb_levels *levels, const char *name, enum vkb_format format,

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from vkbloom._exposure.mask import read_mask
 from vkbloom._public import public
-from vkbloom._settings.exposure import Exposure
+from vkbloom._settings.exposure import Exposure, check_ends
 from vkbloom._settings.fields import number_field, numbers_field, value_field
 
 
@@ -98,10 +98,3 @@ class BevyExposure(Exposure):
         stops = np.interp(np.linspace(x[0], x[-1], 256), x, y)
         levels = (stops - y.min()) / spread * 255 if spread > 0 else np.zeros(256)
         return levels.astype(np.uint8), x[0], x[-1], y.min(), spread
-
-
-def check_ends(settings: Any, low: str, high: str, *, apart: bool = False) -> None:
-    """Raise ValueError if a field is above another one; with `apart` if it is not below."""
-    least, most = getattr(settings, low), getattr(settings, high)
-    if least > most or (apart and least == most):
-        raise ValueError(f"{low}: {least!r} is not below {high}, {most!r}")

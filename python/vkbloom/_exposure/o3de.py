@@ -5,9 +5,8 @@ from __future__ import annotations
 import dataclasses
 from typing import ClassVar
 
-from vkbloom._exposure.bevy import check_ends
 from vkbloom._public import public
-from vkbloom._settings.exposure import Exposure
+from vkbloom._settings.exposure import Exposure, check_ends
 from vkbloom._settings.fields import number_field
 
 

@@ -5,10 +5,9 @@ from __future__ import annotations
 import dataclasses
 from typing import Any, ClassVar, Final, Literal, get_args
 
-from vkbloom._exposure.bevy import check_ends
 from vkbloom._exposure.mask import read_mask
 from vkbloom._public import public
-from vkbloom._settings.exposure import Exposure, half_lives
+from vkbloom._settings.exposure import Exposure, check_ends, half_lives
 from vkbloom._settings.fields import number_field, value_field
 
 Mode = Literal["histogram", "automatic"]

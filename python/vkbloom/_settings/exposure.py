@@ -57,6 +57,13 @@ def half_lives(dt: float, rate: float) -> float:
     return 1.0 - math.exp2(-dt * rate)
 
 
+def check_ends(settings: Any, low: str, high: str, *, apart: bool = False) -> None:
+    """Raise ValueError if a field is above another one; with `apart` if it is not below."""
+    least, most = getattr(settings, low), getattr(settings, high)
+    if least > most or (apart and least == most):
+        raise ValueError(f"{low}: {least!r} is not below {high}, {most!r}")
+
+
 class NamedExposure(NamedTuple):
     """An entry of `exposures`."""
 
