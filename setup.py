@@ -84,6 +84,7 @@ WORDS = {
     "final": "-DFINAL",
     "mixed": "-DMIXED=1",
     "transposed": "-DTRANSPOSED=1",
+    "sums": "-DSUMS",
     "linear": "-DLINEAR_TEXELS -DCHANNEL_BYTES={bytes}",
     "packed": "-DLINEAR_TEXELS -DCHANNEL_BYTES={bytes} -DTARGET_CHANNELS=3",
     "rgb": "-DRGB",

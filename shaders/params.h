@@ -510,6 +510,7 @@
     SLOT(SLOT_COTANGENTS, 3)     /* of what the forward pass has written */ \
     SLOT(SLOT_WEIGHTS, 4)        /* of transposed filters: the table of their weights */ \
     SLOT(SLOT_SUMS, 4)           /* of SUMMED_ROWS: the sums of groups of rows */ \
+    SLOT(SLOT_SQUARES, 4)        /* of sums: those of squares */ \
     SLOT(SLOT_ADDED, 5)          /* what other readers of the image have accumulated */ \
     SLOT(SLOT_DIFFERENTIATED, 6) /* the image itself, if it is a source's */
 
@@ -627,8 +628,8 @@
 #define FFT_USUAL_GROUP_RADIX 10
 #define FFT_LIMIT             1e28
 
-// Adjoint passes: the pixels of a row of the table of weights, and the side of a block of pixels
-// that is added up at once.
+// Adjoint passes: the pixels of a row of the table of weights, and the root of the number of pixels
+// that are added up at once.
 #define TABLE_WIDTH 1024
 #define SUM_SIDE    8
 // Transposed filters in blocks: the texels along an axis whose weights are together in the table,
@@ -720,12 +721,11 @@
     CONSTANT(61, OF_SOURCE, of_source)         /* its cotangents are of an image that is given */ \
     CONSTANT(62, ABERRATED, aberrated)         /* red and blue of a flare are moved */ \
     CONSTANT(63, THROUGH_COMPOSITE, through_composite) /* a composite's cotangents are read */ \
-    CONSTANT(64, SQUARED, squared)             /* of adjoint_sum.frag: squares are added up */ \
-    CONSTANT(65, POINT_AFTER, after)           /* of the combination: POINT_* */ \
-    CONSTANT(66, EXPOSED_SCENE, exposed_scene) /* a composite's scene is exposed before it */ \
-    CONSTANT(67, JITTERED, jittered)           /* samples of beams are between steps */ \
-    CONSTANT(68, ENGINE, engine)               /* of an exposure: EXPOSURE_* */ \
-    CONSTANT(69, METER, meter)                 /* what meter.frag makes: METER_* */
+    CONSTANT(64, POINT_AFTER, after)           /* of the combination: POINT_* */ \
+    CONSTANT(65, EXPOSED_SCENE, exposed_scene) /* a composite's scene is exposed before it */ \
+    CONSTANT(66, JITTERED, jittered)           /* samples of beams are between steps */ \
+    CONSTANT(67, ENGINE, engine)               /* of an exposure: EXPOSURE_* */ \
+    CONSTANT(68, METER, meter)                 /* what meter.frag makes: METER_* */
 
 // The names that a setting can have. Each list is a setting and a specialization constant.
 #define COMPOSITE_NAMES(NAME) \

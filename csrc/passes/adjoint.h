@@ -97,10 +97,12 @@ bool vkb_accumulate_moved(struct vkb_adjoint *adjoint, const struct vkb_pass_row
 bool vkb_accumulate_mask(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
                          struct vkb_pass_row *row, struct vkb_error *error);
 
-// If sums are wanted: adds the row of an image of values, and the passes that add these up to one
-// pixel, the framebuffer `name`; and the same for their squares, which tell how exact the sum is.
+// If sums are wanted: adds the row with a shader of lib/sums.glsl, and the passes that add its sums
+// up to one pixel, the framebuffer `name`; and the same for the squares, which tell how exact the
+// sum is.
 bool vkb_add_sum_passes(struct vkb_adjoint *adjoint, const struct vkb_pass_row *row,
-                        struct vkb_size size, const char *name, struct vkb_error *error);
+                        const struct vkb_shader *shader, struct vkb_size size, const char *name,
+                        struct vkb_error *error);
 
 // The families of passes. Of what is linear: by the filters of the row.
 vkb_transpose vkb_transpose_filters;

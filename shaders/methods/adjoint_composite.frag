@@ -10,14 +10,40 @@ SAMPLED_IMAGE(SLOT_BLOOM, bloom);
 SAMPLED_IMAGE(SLOT_MASK, mask);
 SAMPLED_IMAGE(SLOT_COTANGENTS, cotangents);
 
+#ifdef SUMS
+#include "lib/sums.glsl"
+#else
 #include "lib/fullscreen.glsl"
 #include "lib/adjoint.glsl"
+#endif
 #include "lib/adjoint_composite.glsl"
 
-vec4 shade()
+vec4 cotangent_by(int by)
 {
     vec4 light = COMPOSITE == COMPOSITE_OFF ? vec4(0.0) : texelFetch(bloom, PIXEL, 0);
     float share = MASKED != 0 ? texelFetch(mask, PIXEL, 0).r : 1.0;
-    return gathered(back_composite(texelFetch(scene, PIXEL, 0), light, share,
-                                   texelFetch(cotangents, PIXEL, 0), BY));
+    return back_composite(texelFetch(scene, PIXEL, 0), light, share, texelFetch(cotangents, PIXEL, 0), by);
 }
+
+#ifdef SUMS
+
+ivec2 summed_size()
+{
+    return textureSize(cotangents, 0);
+}
+
+void add_pixel(inout vec4 sum, inout vec4 squares)
+{
+    vec4 values = cotangent_by(BY_VALUES);
+    sum += values;
+    squares += values * values;
+}
+
+#else
+
+vec4 shade()
+{
+    return gathered(cotangent_by(BY));
+}
+
+#endif

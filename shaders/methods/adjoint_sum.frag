@@ -1,20 +1,17 @@
-// Adds up the pixels of an image, or their squares, in blocks of SUM_SIDE x SUM_SIDE, always in the same order.
+// Adds up an image of sums and one of sums of squares.
 
-SAMPLED_IMAGE(SLOT_SOURCE, source);
+SAMPLED_IMAGE(SLOT_SOURCE, sums);
+SAMPLED_IMAGE(SLOT_SQUARES, sums_of_squares);
 
-#include "lib/fullscreen.glsl"
+#include "lib/sums.glsl"
 
-vec4 shade()
+ivec2 summed_size()
 {
-    ivec2 first = PIXEL * SUM_SIDE, end = min(first + SUM_SIDE, textureSize(source, 0));
-    vec4 sum = vec4(0.0);
-    for (int y = first.y; y < end.y; ++y) {
-        vec4 row = vec4(0.0);
-        for (int x = first.x; x < end.x; ++x) {
-            vec4 value = texelFetch(source, ivec2(x, y), 0);
-            row += SQUARED != 0 ? value * value : value;
-        }
-        sum += row;
-    }
-    return sum;
+    return textureSize(sums, 0);
+}
+
+void add_pixel(inout vec4 sum, inout vec4 squares)
+{
+    sum += texelFetch(sums, PIXEL, 0);
+    squares += texelFetch(sums_of_squares, PIXEL, 0);
 }

@@ -9,8 +9,12 @@ UNIFORM_BLOCK(THRESHOLD_BLOCK);
 SAMPLED_IMAGE(SLOT_SOURCE, image);
 SAMPLED_IMAGE(SLOT_COTANGENTS, cotangents);
 
+#ifdef SUMS
+#include "lib/sums.glsl"
+#else
 #include "lib/fullscreen.glsl"
 #include "lib/adjoint.glsl"
+#endif
 #include "lib/mask.glsl"
 
 vec4 reduced()
@@ -20,17 +24,35 @@ vec4 reduced()
     return within ? fetch_within(image, place) : sample_at(image, place, vec2(0.0), SAMPLING);
 }
 
+vec4 cotangent_of_target()
+{
+    vec4 cotangent = texelFetch(cotangents, PIXEL, 0);
+    return ALPHA == ALPHA_BLUR ? cotangent : vec4(cotangent.rgb, 0.0);
+}
+
+#ifdef SUMS
+
+ivec2 summed_size()
+{
+    return ivec2(params.target_width, params.target_height);
+}
+
+void add_pixel(inout vec4 sum, inout vec4 squares)
+{
+    vec4 colour = reduced();
+    float width = params.threshold * params.knee;
+    Soft soft = soft_threshold(largest(colour.rgb), params.threshold, width, 4.0 * width + 1e-5, 1e-5);
+    vec2 values = vec2(soft.by_threshold + params.knee * soft.by_width, params.threshold * soft.by_width);
+    values *= inner_product(cotangent_of_target(), colour) * mask_value();
+    sum.xy += values;
+    squares.xy += values * values;
+}
+
+#else
+
 vec4 shade()
 {
-    vec4 colour = reduced(), cotangent = texelFetch(cotangents, PIXEL, 0);
-    if (ALPHA != ALPHA_BLUR)
-        cotangent.a = 0.0;
-    if (BY == BY_VALUES) {
-        float width = params.threshold * params.knee;
-        Soft soft = soft_threshold(largest(colour.rgb), params.threshold, width, 4.0 * width + 1e-5, 1e-5);
-        vec2 values = vec2(soft.by_threshold + params.knee * soft.by_width, params.threshold * soft.by_width);
-        return vec4(values * inner_product(cotangent, colour) * mask_value(), 0.0, 0.0);
-    }
+    vec4 colour = reduced(), cotangent = cotangent_of_target();
     if (BY == BY_MASK) {
         vec4 kept = apply_threshold(colour, THRESHOLD_MODE, params.threshold, params.knee);
         return gathered(vec4(inner_product(kept, cotangent), 0.0, 0.0, 0.0));
@@ -38,3 +60,5 @@ vec4 shade()
     return gathered(back_through_threshold(colour, mask_value() * cotangent, THRESHOLD_MODE,
                                            params.threshold, params.knee));
 }
+
+#endif
