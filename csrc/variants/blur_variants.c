@@ -268,7 +268,8 @@ static bool is_alone(const struct vkb_pass_row *pass)
 
 // The transposes of a bloom, of which `pass` is the last one: that of the threshold, or of the
 // filter, if there is no threshold. Its composite is a factor. The cotangents of the scene are an
-// image, or left to the last pass.
+// image, or left to the last pass. Or `pass` is that of the filter alone, whose result others read,
+// too: sums and masks.
 static bool find_adjoint_bloom(const struct vkb_graph *graph, const struct vkb_pass_row *pass,
                                int radius, struct bloom *bloom)
 {
@@ -277,10 +278,12 @@ static bool find_adjoint_bloom(const struct vkb_graph *graph, const struct vkb_p
                          && pass->constants.sampling == SAMPLING_TEXEL && !pass->constants.masked
                          && !pass->constants.alpha;
     const uint32_t added = pass->reads[SLOT_ADDED], image = pass->reads[SLOT_DIFFERENTIATED];
+    const bool ends = pass->constants.of_source && pass->constants.adds_image;
     uint32_t by_bloom;
 
-    if (!(thresholds || pass->block == VKB_BLOCK_adjoint_filter) || !pass->constants.of_source
-        || !pass->constants.adds_image)
+    if (!((thresholds && ends)
+          || (pass->block == VKB_BLOCK_adjoint_filter
+              && (ends || (is_alone(pass) && !pass->constants.of_source)))))
         return false;
     *bloom = (struct bloom){
         .last = thresholds ? vkb_writer_of(graph, pass->reads[SLOT_COTANGENTS]) : pass,
@@ -292,16 +295,18 @@ static bool find_adjoint_bloom(const struct vkb_graph *graph, const struct vkb_p
         return false;
     const struct vkb_pass_row *by_scene = vkb_writer_of(graph, added);
     bloom->composite = vkb_writer_of(graph, by_bloom);
-    return bloom->composite && vkb_is_factor(bloom->composite)
-        && !bloom->composite->constants.masked && bloom->composite->reads[SLOT_SCENE] == image
-        && (added == bloom->composite->reads[SLOT_COTANGENTS]
-            || (by_scene && vkb_transposes(by_scene, VKB_BLOCK_composite) && is_alone(by_scene)
-                && by_scene->constants.by == BY_SCENE));
+    if (!bloom->composite || !vkb_is_factor(bloom->composite) || bloom->composite->constants.masked)
+        return false;
+    return !ends
+        || (bloom->composite->reads[SLOT_SCENE] == image
+            && (added == bloom->composite->reads[SLOT_COTANGENTS]
+                || (by_scene && vkb_transposes(by_scene, VKB_BLOCK_composite) && is_alone(by_scene)
+                    && by_scene->constants.by == BY_SCENE)));
 }
 
-// A fused row of the derivatives by the image, which replaces the composite's passes, the blurs'
-// and the threshold's. It reads the image and the composite's cotangents. Nothing is rounded
-// between the passes, whatever the formats are.
+// A fused row of the derivatives by the image or the glow, which replaces the composite's passes,
+// the blurs' and the threshold's. It reads the image and the composite's cotangents. Nothing is
+// rounded between the passes, whatever the formats are.
 static struct vkb_pass_row adjoint_row(const struct vkb_variant_choice *choice,
                                        const struct vkb_pass_row *pass, const struct bloom *bloom)
 {
@@ -312,6 +317,7 @@ static struct vkb_pass_row adjoint_row(const struct vkb_variant_choice *choice,
     vkb_read_at(&row, SLOT_ENDED, bloom->composite->reads[SLOT_SCENE]);
     row.targets[0] = pass->targets[0];
     row.constants.format = STORED_SINGLE;
+    row.constants.adds_image = pass->constants.adds_image;
     // Its sums have another order, so it is taken always: all runs have the same bits.
     row.fused = false;
     row.gains_if_finite = true;

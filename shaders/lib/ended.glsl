@@ -1,6 +1,7 @@
 // How a fused pass ends a bloom: with the finished picture; with MIXED, with the cotangents of the picture before
 // exposure and curves, from those of the finished one; with TRANSPOSED, with the derivatives by the image, from the
-// cotangents of a composite without a curve, which is a factor, and their transposed blur. The image of SLOT_ENDED
+// cotangents of a composite without a curve, which is a factor, and their transposed blur, or, unless ADDS_IMAGE, with
+// those by the glow, which are the blur's. The image of SLOT_ENDED
 // is then these cotangents or the image. The including shader has composite.glsl and, for linear texels, pixels.glsl.
 #ifndef TRANSPOSED
 #define TRANSPOSED 0
@@ -39,6 +40,8 @@ float threshold = params.threshold, knee = params.knee;
 vec4 ended(vec4 own, vec4 blurred, ivec2 pixel)
 {
     vec4 scene = other_at(pixel), found = vec4(gain * blurred.rgb, 0.0);
+    if (ADDS_IMAGE == 0)
+        return found;
     found = back_through_threshold(finite_or_zero(scene), found, THRESHOLD_MODE, threshold, knee);
     return where_finite(found + vec4(vec3(share), 1.0) * own, scene);
 }
