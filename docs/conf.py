@@ -77,7 +77,7 @@ def setup(app: Sphinx) -> None:
 html_theme = "furo"
 html_title = f"vkbloom {release}"
 html_static_path: list[str] = []
-# The schema of `vkbloom check --json`, beside the pages.
-html_extra_path = ["../python/vkbloom/testing/check.schema.json"]
+# The schemas of `vkbloom check --json` and `vkbloom flare --json`, beside the pages.
+html_extra_path = [f"../python/vkbloom/testing/{name}.schema.json" for name in ("check", "flare")]
 html_copy_source = False
 html_theme_options = {"navigation_with_keys": True}

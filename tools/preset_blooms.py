@@ -8,7 +8,8 @@ from __future__ import annotations
 import numpy as np
 
 import vkbloom
-from vkbloom._cli.check.measuring import PRESET_BLOOMS, bloom_of, exact, sketch
+from vkbloom._cli.check.measuring import PRESET_BLOOMS, sketch
+from vkbloom.testing._blooms import bloom_of, exact
 
 
 def main() -> None:

@@ -18,6 +18,7 @@ from tests.cli.calls import run
 from tests.custom.engines import engine
 from vkbloom import Renderer, testing
 from vkbloom._cli.check import comparing, measuring
+from vkbloom.testing._blooms import bloom_of, exact
 from vkbloom.testing._law_report import law_report
 from vkbloom.testing._laws.table import LAWS, merge_limits
 
@@ -119,7 +120,7 @@ def test_the_stored_blooms_of_presets(renderer: vkbloom.Renderer) -> None:
     with np.load(measuring.PRESET_BLOOMS) as stored:
         assert {*stored} == {*vkbloom.presets}
         for name, settings in vkbloom.presets.items():
-            bloom = measuring.bloom_of(renderer, measuring.exact(settings), "bloom")
+            bloom = bloom_of(renderer, exact(settings), "bloom")
             made = measuring.sketch(bloom)
             off = np.abs(made - stored[name]).max() / made.max()
             assert off < 2e-3, f"{name} changed; run python -m tools.preset_blooms"

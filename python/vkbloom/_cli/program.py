@@ -31,6 +31,7 @@ COMMANDS: Final = {
     "fit": "Find the settings whose bloom matches a picture",
     "translate": "Find another method's parameters whose bloom comes closest to settings",
     "check": "Measure a bloom by every law",
+    "flare": "Report the flare of a camera or a bloom by the standards",
     "compare": "Measure the differences of two image files",
     "presets": "List the presets",
     "glares": "List the stages and published names of glare",

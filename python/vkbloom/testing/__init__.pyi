@@ -1,6 +1,9 @@
 # The public names of `vkbloom.testing`; lazy_loader reads them, and imports what is asked for.
 from ._bt1702 import FlashVerdict
 from ._display import Display
+from ._flare.chart import FlareChart
+from ._flare.figures import FlareFigure
+from ._flare.report import FlareReport, flare
 from ._flash_rules import FlashRules, FlashTransitions
 from ._judging import Diagnosis, Tolerances, diagnose
 from ._law_report import LawReport, assert_laws, report
@@ -15,6 +18,9 @@ from ._sequences import Flash, Flicker, flash, flicker
 __all__ = [
     "Diagnosis",
     "Display",
+    "FlareChart",
+    "FlareFigure",
+    "FlareReport",
     "Flash",
     "FlashRules",
     "FlashTransitions",
@@ -29,6 +35,7 @@ __all__ = [
     "assert_laws",
     "command",
     "diagnose",
+    "flare",
     "flash",
     "flicker",
     "point_spread",

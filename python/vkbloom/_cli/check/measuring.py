@@ -20,6 +20,7 @@ from vkbloom._psf.sampled import samples
 from vkbloom._renderer.renderer import Renderer
 from vkbloom._settings.settings import Settings
 from vkbloom._views.plain_values import plain
+from vkbloom.testing._blooms import bloom_of, exact
 from vkbloom.testing._law_report import LawReport
 from vkbloom.testing._point_spread import border_share, veiling_glare_index
 from vkbloom.testing._probe import Bloom, Probe
@@ -99,22 +100,6 @@ def _figure(measure: Callable[[], T]) -> T | None:
         return measure()
     except Exception:
         return None
-
-
-def exact(settings: Settings) -> Settings:
-    """Return the settings with buffers of floats, and nothing after the composite."""
-    plain = settings.replace(tonemap="none", encoding="none", exposure=0.0, dither=False)
-    return plain if plain.format is not None else plain.replace(format="rgba32float")
-
-
-def bloom_of(renderer: Renderer, settings: Settings, framebuffer: str) -> Bloom:
-    """Return the colours of a framebuffer as a function of the image."""
-
-    def bloom(image: NDArray[Any]) -> NDArray[Any]:
-        result = renderer.apply(image, settings, framebuffers=framebuffer)[framebuffer]
-        return result[..., : image.shape[2]]
-
-    return bloom
 
 
 def of_settings(

@@ -1,0 +1,1 @@
+"""Flare reports by the standards: charts, pictures of them, figures, and the report."""
