@@ -107,6 +107,7 @@ NEEDED: dict[str, Any] = {
 }
 OTHERS: dict[str, dict[str, Any]] = {
     "flash": {"degrees": 40.0},
+    "flare": {"source": blur, "chart": testing.FlareChart(size=(36, 24))},
     "load_method": {"source": "//!HOOK MAIN\n//!BIND HOOKED\nvec4 hook() { return vec4(1); }\n"},
     "unreal": {"image": np.ones((3, 3))},
     "shade": dict.fromkeys(("albedo", "normal", "position", "brightness"), IMAGE),

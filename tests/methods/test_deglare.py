@@ -43,6 +43,19 @@ def test_the_image_is_found(
     assert left < 1e-4 * glare, (left, glare)
 
 
+def test_a_scale_in_degrees(renderer: vkbloom.Renderer) -> None:
+    """A function of the angle is as wide in pixels as in the picture's own lens."""
+    psf, scale = vkbloom.psf.harvey_shack(), 20.0
+    lens = vkbloom.Convolution(psf, composite="mix", intensity=0.3, pixels_per_degree=scale)
+    picture = vkbloom.reference.apply(POINTS, lens)["final"].astype(np.float32)
+    given = {"share": 0.3, "renderer": renderer}
+    right = vkbloom.deglare(picture, psf, pixels_per_degree=scale, **given)
+    other = vkbloom.deglare(picture, psf, **given)
+    glare, left, wrong = (np.linalg.norm(one - POINTS) for one in (picture, right, other))
+    assert left < 1e-4 * glare
+    assert wrong > 0.1 * glare
+
+
 def test_no_value_is_negative(renderer: vkbloom.Renderer) -> None:
     psf = vkbloom.psf.gaussian(sigma=3)
     truth = np.where(POINTS > 1, POINTS, 0)

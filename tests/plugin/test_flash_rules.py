@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+import vkbloom
 from tests.cli.calls import run
 from tests.custom.test_check import check
 from tests.srgb import encode_srgb
@@ -370,6 +371,8 @@ def test_luminance_of_displays() -> None:
     # A white of 4000 cd/m2 by PQ is clamped at the peak of the display.
     bright = np.full((1, 1, 3), 4000 / 203, np.float32)
     assert Display(encoding="pq", peak=1000).light_of(bright).max() == 1000
+    # The signal is absolute: a white that floats are relative to does not change it.
+    np.testing.assert_allclose(Display(encoding="pq", white=100).light_of(grey), 100, rtol=1e-4)
     # The red of Rec. 2020 is outside of Rec. 709 and has the luminance 0.2627 there.
     red = np.array([[[65535, 0, 0]]], np.uint16)
     light = Display(encoding="pq", peak=1e4).light_of(red)
@@ -377,6 +380,20 @@ def test_luminance_of_displays() -> None:
     np.testing.assert_allclose(
         Display(white=300).light_of(np.full((1, 1, 3), 188, np.uint8)), 300 * 0.5029, rtol=1e-3
     )
+
+
+@pytest.mark.parametrize("encoding", ["pq", "srgb"])
+def test_luminances_stay_from_the_scene_to_the_display(encoding: Any) -> None:
+    """A scene in cd/m2, divided by the white of settings and display, is shown as it is."""
+    scene, white = np.array([[[0.5, 20.0, 96.0]]]), 100.0
+    settings = vkbloom.Convolution(
+        vkbloom.psf.cie_total(), intensity=0, encoding=encoding, reference_white=white
+    )
+    signal = vkbloom.reference.apply(scene / white, settings)["final"]
+    display = Display(encoding=encoding, white=white, primaries="rec709")
+    shown = display.light_of(np.rint(65535 * signal).astype(np.uint16))
+    np.testing.assert_allclose(shown, scene, rtol=2e-3)
+    np.testing.assert_allclose(display.light_of(scene / white), scene)
 
 
 def test_memory_does_not_grow() -> None:

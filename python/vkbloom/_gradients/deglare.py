@@ -24,6 +24,7 @@ def deglare(
     psf: PSFLike,
     *,
     share: float | None = None,
+    pixels_per_degree: float | None = None,
     iterations: int = 50,
     renderer: Renderer | None = None,
 ) -> NDArray[np.float32]:
@@ -38,6 +39,9 @@ def deglare(
     share : float, optional
         The share of the light that is spread, 0 to 1; the rest stays at its pixel. Default: the
         energy of the PSF, at most 1.
+    pixels_per_degree : float, optional
+        Scale of a PSF whose unit is "degree", as of `Convolution`. Default: the picture's longer
+        side spans 50 degrees.
     iterations : int
         At most so many steps, which take two convolutions each.
     renderer : Renderer, optional
@@ -77,7 +81,13 @@ def deglare(
     picture = np.divide(given[..., :3], levels, dtype=np.float32)
     if not np.isfinite(picture).all():
         raise ValueError("image: a value is not finite")
-    lens = Convolution(psf, composite="mix", intensity=share, format="rgba32float")
+    lens = Convolution(
+        psf,
+        composite="mix",
+        intensity=share,
+        pixels_per_degree=pixels_per_degree,
+        format="rgba32float",
+    )
     # A is linear: its pullback is the same for each image.
     _, pullback = vjp(picture, lens, renderer=renderer)
 

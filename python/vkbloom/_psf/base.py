@@ -132,7 +132,7 @@ class PSF(Record, abc.ABC):
         ndarray of float64, shape (height, width, 3)
         """
         width, height = frame
-        scale = pixels_per_degree or max(frame) / FRAME_DEGREES
+        scale = max(frame) / FRAME_DEGREES if pixels_per_degree is None else pixels_per_degree
         return self.array(size or (2 * width - 1, 2 * height - 1), scale)
 
     def save(

@@ -124,8 +124,10 @@ class cie_total(RadialPSF):
     / (1 + p (0.0417 + 0.055 a)).
 
     Source: CIE 135/1, "Disability Glare"; Vos and van den Berg, 1999. The formula is a
-    reconstruction, which was not compared with the printed text. Its energy is 1 within 3.2 %. Its
-    ratio to the general disability glare is 1.26 at 1 degree and 0.83 at 30 degrees.
+    reconstruction, which was not compared with the printed text. All of its constants are those of
+    HDR-VDP 3.0.7 (utils/hdrvdp_otf_cie99.m), which has its Fourier transform along a line. `mtf` is
+    that of the plane. The energy is 1 within 3.2 %. The ratio to the general disability glare is
+    1.26 at 1 degree and 0.83 at 30 degrees.
     """
 
     age: float = number_field(default=35.0, range=(0, 120), unit="year")

@@ -37,14 +37,15 @@ class Display:
     """The display that shows a sequence.
 
     Integers are its signal. Floats are linear light in Rec. 709 primaries, where 1 is the white.
+    The signal of PQ stands for absolute luminances, whatever the white is.
 
     Parameters
     ----------
     encoding : {"srgb", "pq", "hlg"}
         Curve of integers: that of sRGB, or PQ or HLG of Rec. ITU-R BT.2100.
     white : float, optional
-        Luminance of a value of 1 in cd/m2, 1 to 10000. Default: 200 for "srgb", 203 for "pq". It
-        follows from `peak` for "hlg", where 1 has the signal 0.75.
+        Luminance of a value of 1 in cd/m2, 1 to 10000, as `Settings.reference_white`. Default: 200
+        for "srgb", 203 for "pq". It follows from `peak` for "hlg", where 1 has the signal 0.75.
     peak : float, optional
         The largest luminance in cd/m2, 1 to 10000; what is above it is clamped. Default: the white
         for "srgb", 10000 for "pq", and 1000 for "hlg", where the gamma of the system follows from
@@ -111,7 +112,8 @@ class Display:
             shared = luminance ** (_system_gamma(self.highest) - 1)
             shown = self.highest * shared[..., np.newaxis] * scene
         else:
-            shown = self.white_luminance * light
+            is_absolute = self.encoding == "pq" and colours.dtype.kind != "f"
+            shown = (WHITE if is_absolute else self.white_luminance) * light
         return np.asarray(np.minimum(shown, self.highest), np.float64)
 
 

@@ -46,6 +46,7 @@ from vkbloom.testing._flare.shots import (
     shots_of_bloom,
     shots_of_pictures,
 )
+from vkbloom.testing._probe import Bloom
 
 _SIZE: Final = (480, 320)
 # Decades of a picture on a logarithmic scale.
@@ -206,12 +207,12 @@ def _flat(values: Mapping[str, Any], above: str = "") -> list[tuple[str, str]]:
 @public("vkbloom.testing")
 @check_arguments
 def flare(
-    source: Any,
+    source: Mapping[str, Any] | Bloom | Settings | str,
     *,
     standard: str | Sequence[str] = "all",
     chart: FlareChart | None = None,
     exposures: Mapping[str, float] = {},
-    dark: Any = 0.0,
+    dark: float | Sequence[float] = 0.0,
     saturation: float | None = None,
     raw: bool = False,
     pixels_per_degree: float | None = None,
