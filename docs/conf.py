@@ -23,7 +23,7 @@ extensions = [
     "sphinx_copybutton",
     "sphinxcontrib.mermaid",
 ]
-exclude_patterns = ["README.md", "evidence/*_table.md", "examples/faults.md", "examples/laws.md"]
+exclude_patterns = ["README.md", "evidence/*_table.md", "examples/*.md"]
 
 # Sphinx reads what is in this folder alone. The notebooks are shown with the outputs that they are
 # stored with (tools/run_notebooks.py).
@@ -32,6 +32,7 @@ _here = Path(__file__).parent
 for _notebook in (_here.parent / "examples").glob("*.ipynb"):
     shutil.copy(_notebook, _here / "examples")
 runpy.run_path(str(_here / "fault_pictures.py"))["write"](_here / "examples" / "faults")
+runpy.run_path(str(_here / "flare_pictures.py"))["write"](_here / "examples" / "flare")
 runpy.run_path(str(_here / "law_table.py"))["write"](_here / "examples" / "laws.md")
 nb_execution_mode = "off"
 nb_merge_streams = True

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.resources
 import json
+import runpy
 from pathlib import Path
 from typing import Any
 
@@ -142,3 +143,13 @@ def test_charts_have_the_values_that_they_say() -> None:
     grown = chart.scaled((240, 160))
     assert (grown.radius, grown.contrast) == (6.0, 40)
     assert grown.positions[4] == (120.5, 80.5)
+
+
+def test_the_picture_of_the_docs(tmp_path: Path) -> None:
+    """docs/conf.py runs it, for docs/flare.md."""
+    docs = Path(__file__).parents[2] / "docs"
+    runpy.run_path(str(docs / "flare_pictures.py"))["write"](tmp_path / "examples" / "flare")
+    text = (tmp_path / "examples" / "flare.md").read_text()
+    assert "| iso9358.veiling_glare_index | 7.6" in text
+    assert vkbloom.read(tmp_path / "examples" / "flare" / "report.png").shape == (240, 1096, 3)
+    assert "(examples/flare/report.png)" in text

@@ -10,6 +10,7 @@ import pytest
 from tests.docs.pages import ROOT, blocks
 from vkbloom import write
 from vkbloom._cli.check import measuring
+from vkbloom.testing import FlareChart
 
 
 @pytest.fixture
@@ -23,6 +24,13 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     write("photo.exr", photo)
     write("photo.jpg", photo.astype(np.float32))
     np.save("picture.npy", photo)
+    chart = FlareChart(size=(72, 48))
+    for name, drawn, exposure in (
+        ("chart", "chart", 0.7),
+        ("long", "chart", 1.0),
+        ("black", "black", 1.0),
+    ):
+        write(f"{name}.png", np.float32(exposure) * chart.draw(drawn))
     custom = ROOT / "docs" / "custom_methods.md"
     (passes,) = blocks(custom, "glsl")
     for name in ("soft.hook", "old/soft.hook", "new/soft.hook"):

@@ -42,6 +42,7 @@ NOT_RUN: Final = {
 # Options for the same in less time, by command.
 FASTER: Final = {
     "check": ["--measure-size", "64x64", "--size", "64x48"],
+    "flare": ["--size", "72x48"],
     "fit": ["--max-calls", "3"],
 }
 PROGRAMS = ("vkbloom", "pip", "python", "pytest", "make", "apt", "source", "python3")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -63,6 +64,20 @@ def test_links_lead_somewhere(page: Path) -> None:
     for target in re.findall(r"\]\(([^)\s]+)\)", page.read_text()):
         if not target.startswith(("http:", "https:", "#")):
             assert (page.parent / target.partition("#")[0]).exists(), target
+
+
+@pytest.mark.parametrize("page", ["README.md", "docs/index.md"])
+def test_how_to_cite(page: str) -> None:
+    """The first pages, CITATION.cff and the package say the same."""
+    yaml = pytest.importorskip("yaml")
+    cited = yaml.safe_load((ROOT / "CITATION.cff").read_text())
+    assert {"cff-version", "message", "title", "authors", "abstract"} <= {*cited}
+    package = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    assert (cited["version"], cited["license"]) == (package["version"], package["license"])
+    (entry,) = blocks(ROOT / page, "bibtex")
+    for name in ("title", "version", "license"):
+        assert f"  {name} = {{{cited[name]}}}" in entry
+    assert f"{{{{{cited['authors'][0]['name']}}}}}" in entry
 
 
 def test_the_flowchart_is_the_plan_s(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -51,7 +51,7 @@ from vkbloom.testing._probe import Bloom
 _SIZE: Final = (480, 320)
 # Decades of a picture on a logarithmic scale.
 _DECADES: Final = 6
-_CURVES: Final = (360, 200)
+_CURVES: Final = (360, 240)
 
 
 @public("vkbloom.testing")
@@ -79,6 +79,8 @@ class FlareReport:
     standards : mapping of str to mapping
         Of each standard its "title", the "sources" of the formulas, and what was "not_seen" of its
         text.
+    pictures : mapping of str to ndarray of uint8, shape (H, W, 1) or (H, W, 3)
+        What the page shows, by caption.
     """
 
     name: str
@@ -276,7 +278,7 @@ def flare(
     ...     return 0.96 * picture + 0.04 * picture.mean(axis=(0, 1))
     >>> found = testing.flare(veil, standard="iso18844")
     >>> round(found.figures["iso18844.type_a"].value, 2)
-    3.82
+    3.8
     """
     return report_flare(
         source,
@@ -451,19 +453,21 @@ def _logarithmic(plane: NDArray[Any]) -> NDArray[Any]:
 
 
 def _curves(spread: Mapping[str, Any]) -> NDArray[np.uint8]:
-    """Return a picture of the glare spread function over the radius, a grey curve a position."""
+    """Return a picture of the glare spread function over the radius, a curve for each position."""
     width, height = _CURVES
     canvas = np.full((height, width, 1), 255, np.uint8)
-    radii, values = np.log(spread["radii"]), spread["per_pixel"]
-    highest = float(np.nanmax(values)) if np.isfinite(values).any() else 0.0
-    if not highest > 0 or len(radii) < 2:
+    radii, values = np.log(spread["radii"]), np.maximum(spread["per_pixel"], 0)
+    seen = values[values > 0]
+    if not seen.size or len(radii) < 2:
         return canvas
+    high = float(np.log(seen.max()))
+    low = max(float(np.log(seen.min())), high - _DECADES * np.log(10))
     columns = np.linspace(radii[0], radii[-1], width)
     for row in values:
-        known = np.isfinite(row)
-        if known.sum() < 2:
-            continue
-        shares = np.interp(columns, radii[known], _logarithmic(row[known] / highest))
-        places = np.rint((height - 1) * (1 - shares)).astype(int)
-        canvas[np.clip(places, 0, height - 1), np.arange(width)] = 40
+        known = row > 0
+        if known.sum() > 1:
+            curve = np.interp(columns, radii[known], np.log(row[known]), np.nan, np.nan)
+            chosen = np.flatnonzero(curve >= low)
+            places = (height - 1) * (high - curve[chosen]) / max(high - low, 1e-9)
+            canvas[np.rint(places).astype(int), chosen] = 40
     return canvas
