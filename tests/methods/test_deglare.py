@@ -48,7 +48,7 @@ def test_a_scale_in_degrees(renderer: vkbloom.Renderer) -> None:
     psf, scale = vkbloom.psf.harvey_shack(), 20.0
     lens = vkbloom.Convolution(psf, composite="mix", intensity=0.3, pixels_per_degree=scale)
     picture = vkbloom.reference.apply(POINTS, lens)["final"].astype(np.float32)
-    given = {"share": 0.3, "renderer": renderer}
+    given: dict[str, Any] = {"share": 0.3, "renderer": renderer}
     right = vkbloom.deglare(picture, psf, pixels_per_degree=scale, **given)
     other = vkbloom.deglare(picture, psf, **given)
     glare, left, wrong = (np.linalg.norm(one - POINTS) for one in (picture, right, other))

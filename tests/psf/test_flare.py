@@ -360,6 +360,8 @@ def test_what_is_saturated_is_no_figure() -> None:
     said = found.conditions["pictures"]
     assert said["chart"]["saturated_pixels"] == [55 * WIDTH]
     assert min(said["lights"]["saturated_pixels"]) > 5
+    white = np.array(type_c.statistics["white"])
+    np.testing.assert_allclose(type_c.statistics["black"] / white, np.array(type_c.positions) / 100)
     # What a pixel can hold above its dark level, by the exposure.
     assert said["lights"]["highest_measurable"] == pytest.approx((1 - DARK) / 100, rel=1e-6)
 
@@ -369,7 +371,15 @@ def test_light_beside_a_source_that_is_saturated_is_at_least_this() -> None:
     pictures = lens.pictures()
     for index in (2, 5):
         pictures["lights"][index][:3, :4] = 65535
-    (note,) = measure(pictures, dark=DARK).figures["ieee2020.normalized_flare"].notes
+    figure = measure(pictures, dark=DARK).figures["ieee2020.normalized_flare"]
+    level = with_luminance(lens.beside(4)[2])[3]
+    assert figure.statistics["normalization"] == pytest.approx([level] * 9, rel=0.01)
+    most = (1 - DARK) / 100 / level
+    assert figure.statistics["maximum_measurable"] == pytest.approx([most] * 9, rel=0.01)
+    assert figure.statistics["maximum"][2] == pytest.approx(most, rel=0.01)
+    decibels = -10 * np.log10(figure.positions)
+    assert figure.statistics["attenuation_db"] == pytest.approx(decibels)
+    (note,) = figure.notes
     told = "24 pixels beside the light are saturated; the figure is at least this"
     assert note == f"positions 2, 5: {told}"
 

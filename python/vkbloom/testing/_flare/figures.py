@@ -125,7 +125,9 @@ class FlareFigure:
     channels : mapping of str to tuple of float
         The same for "R", "G", "B" and "Y"; of grey pictures, for "Y" alone.
     statistics : mapping of str to tuple of float
-        Further summaries of Y at the nine positions.
+        Further values of Y at the nine positions: "black" and "white" of spots; of the light beside
+        a source, summaries, its "normalization", what it is divided by, and the
+        "maximum_measurable" value of the figure.
     formula : str
     notes : tuple of str
         What is to be known about this measurement.
@@ -233,19 +235,47 @@ def _areas(
     return dark, np.mean([mean for mean, _ in sides], axis=0), cut
 
 
-def _by_position(
-    measure: Callable[[int], tuple[Array, list[str]]],
-) -> tuple[Array, list[str]]:
-    """Return what is measured at each position, and notes on saturated areas, which give NaN."""
-    rows: list[Array] = []
+@dataclasses.dataclass(frozen=True)
+class _Spots:
+    """What is measured of black spots, (9, C); NaN where an area is saturated."""
+
+    black: Array
+    white: Array
+    notes: list[str]
+
+    @property
+    def percent(self) -> Array:
+        """Black as a share of white."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.asarray(np.where(self.white > 0, 100 * self.black / self.white, math.nan))
+
+    @property
+    def statistics(self) -> dict[str, Array]:
+        """The levels of Y."""
+        return {"black": self.black[:, -1], "white": self.white[:, -1]}
+
+
+def _measure_spots(
+    chart: FlareChart, spots: Sequence[Shot], whites: Sequence[Shot], zero: Shot | None
+) -> _Spots:
+    """Measure the spots of each position, less the light that black has without white."""
+    levels: list[tuple[Array, Array]] = []
     saturated: dict[str, list[int]] = {}
     for index in range(COUNT):
-        values, cut = measure(index)
+        dark, beside, cut = _areas(chart, spots[index], whites[index], index)
+        if zero is not None:
+            inner = chart.spot_radius * INNER
+            own, is_cut = mean_of_disc(zero, chart.positions[index], inner)
+            dark, cut = dark - own, cut + ["picture of black"] * is_cut
         for area in cut:
             saturated.setdefault(area, []).append(index)
-        rows.append(np.full_like(values, math.nan) if cut else values)
+        unknown = math.nan if cut else 0.0
+        levels.append((dark + unknown, beside + unknown))
     notes = [f"{positions(where)}: the {area} is saturated" for area, where in saturated.items()]
-    return np.array(rows), notes
+    if zero is None and math.isfinite(chart.contrast):
+        notes.insert(0, f"{100 / chart.contrast:.3g} % of it is the light of the chart's black")
+    black, white = (np.array(one) for one in zip(*levels, strict=True))
+    return _Spots(black, white, notes)
 
 
 def positions(numbers: Iterable[int]) -> str:
@@ -259,27 +289,14 @@ def _flare_type(name: str, black_role: str, zero_role: str | None, formula: str)
 
     def measure(shots: Shots, chart: FlareChart, _: Light) -> FlareFigure:
         _need(shots, *dict.fromkeys(("chart", black_role, *((zero_role,) if zero_role else ()))))
-        chosen, white = shots[black_role][0], shots["chart"][0]
-
-        def at(index: int) -> tuple[Array, list[str]]:
-            black, beside, cut = _areas(chart, chosen, white, index)
-            if zero_role is not None:
-                inner = chart.spot_radius * INNER
-                zero, is_cut = mean_of_disc(shots[zero_role][0], chart.positions[index], inner)
-                black, cut = black - zero, cut + ["picture of black"] * is_cut
-            return 100 * _ratio(black, beside), cut
-
-        values, notes = _by_position(at)
-        if zero_role is None and math.isfinite(chart.contrast):
-            notes.append(f"{100 / chart.contrast:.3g} % of it is the light of the chart's black")
-        return _figure(name, "%", values, formula, notes=notes)
+        black, white = shots[black_role][0], shots["chart"][0]
+        zero = None if zero_role is None else shots[zero_role][0]
+        found = _measure_spots(chart, [black] * COUNT, [white] * COUNT, zero)
+        return _figure(
+            name, "%", found.percent, formula, statistics=found.statistics, notes=found.notes
+        )
 
     return measure
-
-
-def _ratio(part: Array, whole: Array) -> Array:
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.asarray(np.where(whole > 0, part / whole, math.nan))
 
 
 def veiling_glare_index(shots: Shots, chart: FlareChart, _: Light) -> FlareFigure:
@@ -292,18 +309,15 @@ def veiling_glare_index(shots: Shots, chart: FlareChart, _: Light) -> FlareFigur
         several = [shots["chart"][0]] * COUNT
         notes.append("there are no pictures of one spot each; nine spots have less white")
     zero = shots["black"][0] if "black" in shots and math.isfinite(chart.contrast) else None
-
-    def at(index: int) -> tuple[Array, list[str]]:
-        black, white, cut = _areas(chart, several[index], several[index], index)
-        if zero is not None:
-            black = black - mean_of_disc(zero, chart.positions[index], chart.spot_radius * INNER)[0]
-        return 100 * _ratio(black, white), cut
-
-    values, saturated = _by_position(at)
-    if zero is None and math.isfinite(chart.contrast):
-        notes.append(f"{100 / chart.contrast:.3g} % of it is the light of the chart's black")
-    formula = "100 E(black spot) / E(white beside it)"
-    return _figure("iso9358.veiling_glare_index", "%", values, formula, notes=notes + saturated)
+    found = _measure_spots(chart, several, several, zero)
+    return _figure(
+        "iso9358.veiling_glare_index",
+        "%",
+        found.percent,
+        "100 E(black spot) / E(white beside it)",
+        statistics=found.statistics,
+        notes=notes + found.notes,
+    )
 
 
 @dataclasses.dataclass(frozen=True)
@@ -357,13 +371,14 @@ def _beside_lights(
         percentiles = np.percentile(light[:, -1], PERCENTILES)
         with np.errstate(divide="ignore", invalid="ignore"):
             attenuation = -10 * np.log10(max(float(means[-1][-1]), 0.0))
-        rows.append([*percentiles, light[:, -1].max(), attenuation])
+        most = shot.highest / float(scale[-1])
+        rows.append([*percentiles, light[:, -1].max(), attenuation, float(scale[-1]), most])
         cut = int((shot.saturated & mask).sum())
         if cut:
             cuts[index] = cut
-    names = ("median", *(f"percentile_{rank:g}" for rank in PERCENTILES[1:]))
-    columns = np.array(rows).T
-    statistics = dict(zip((*names, "maximum", "attenuation_db"), columns, strict=True))
+    names = ("median", *(f"percentile_{rank:g}" for rank in PERCENTILES[1:]), "maximum")
+    names += ("attenuation_db", "normalization", "maximum_measurable")
+    statistics = dict(zip(names, np.array(rows).T, strict=True))
     notes = [
         f"{positions(cuts)}: {sum(cuts.values())} pixels beside the light are saturated; the "
         "figure is at least this"
@@ -430,7 +445,7 @@ def glare_share(shots: Shots, chart: FlareChart, _: Light) -> FlareFigure:
     for index, shot in enumerate(shots["lights"]):
         mask = mask_of(chart, index)
         outside = shot.values[mask].sum(axis=0)
-        rows.append(100 * _ratio(outside, outside + _direct(shots, chart, index).flux))
+        rows.append(100 * outside / (outside + _direct(shots, chart, index).flux))
         if (shot.saturated & mask).any():
             cuts.append(index)
     notes = [f"{positions(cuts)}: pixels beside the light are saturated"] if cuts else []
