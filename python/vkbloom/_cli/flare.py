@@ -23,9 +23,9 @@ from vkbloom._io.array_files import write
 from vkbloom._renderer.interruptible import open_renderer
 from vkbloom._settings.settings import Settings
 from vkbloom.testing._flare.chart import FlareChart
-from vkbloom.testing._flare.figures import NAMES
 from vkbloom.testing._flare.report import FlareReport, report_flare
 from vkbloom.testing._flare.shots import ROLES, SEVERAL
+from vkbloom.testing._flare.standards import NAMES
 
 _ABOVE_0: Final = click.FloatRange(0, min_open=True)
 #: The file of the charts' geometry, beside the charts.

@@ -27,10 +27,8 @@ from vkbloom.testing._blooms import bloom_of, exact
 from vkbloom.testing._flare.chart import COUNT, FlareChart
 from vkbloom.testing._flare.figures import (
     FIGURES,
-    NAMES,
     PERCENTILES,
     ROLES_OF,
-    STANDARDS,
     FlareFigure,
     Light,
     Missing,
@@ -46,6 +44,7 @@ from vkbloom.testing._flare.shots import (
     shots_of_bloom,
     shots_of_pictures,
 )
+from vkbloom.testing._flare.standards import NAMES, STANDARDS
 from vkbloom.testing._probe import Bloom
 
 _SIZE: Final = (480, 320)
