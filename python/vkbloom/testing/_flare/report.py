@@ -427,7 +427,9 @@ def _pictures(
     shown = {}
     if "chart" in shots:
         plane = shots["chart"][0].values[..., -1]
-        shown["chart, black spots times 10"] = _grey(10 * plane / max(float(plane.max()), 1e-30))
+        spots = [plane[round(y), round(x)] for x, y in chart.positions]
+        brightest = min(max(*map(float, spots), float(plane.max()) / 1000), float(plane.max()))
+        shown["chart, its black brightened"] = _grey(0.7 * plane / max(brightest, 1e-30))
     if "lights" in shots:
         index = COUNT // 2
         plane = shots["lights"][index].values[..., -1]
