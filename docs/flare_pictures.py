@@ -33,7 +33,8 @@ def write(folder: Path) -> None:
     vkbloom.write(place, np.concatenate(cells[:-1], axis=1))
     text = [
         f"![{'; '.join(found.pictures)}]({'/'.join(place.parts[-3:])})\n",
-        f"From the left: {'; '.join(found.pictures)}. The figures of this bloom:\n",
+        f"A report of the glare of {found.name}, `psf.cie_total`. From the left: "
+        f"{'; '.join(found.pictures)}.\n",
         *found.to_markdown().splitlines()[2:],
     ]
     folder.with_suffix(".md").write_text("\n".join((*text, "")), encoding="utf-8")
