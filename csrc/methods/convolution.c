@@ -32,15 +32,8 @@ static uint32_t least(uint32_t a, uint32_t b)
     return a < b ? a : b;
 }
 
-// The largest radix for an image. The pipelines of larger ones take a new process longer than the
-// stages that they save in small images.
-static uint32_t most_radix(struct vkb_size size)
-{
-    return (uint64_t)size.width * size.height <= FFT_SMALL_PIXELS ? FFT_SMALL_RADIX : FFT_MAX_RADIX;
-}
-
 static struct vkb_fft_axis make_axis(enum vkb_mode direction, enum vkb_boundary boundary,
-                                     uint32_t extent, uint32_t most, struct vkb_reach *reach)
+                                     uint32_t extent, struct vkb_reach *reach)
 {
     const uint32_t kernel = reach->kernel;
     struct vkb_fft_axis axis = {.direction = direction, .boundary = boundary, .extent = extent};
@@ -53,12 +46,12 @@ static struct vkb_fft_axis make_axis(enum vkb_mode direction, enum vkb_boundary 
         reach->after = extent - 1 - extent / 2;
         padding = extent - 1;
     }
-    if (boundary == BOUNDARY_WRAP && vkb_fft_line(extent, most).length == extent)
+    if (boundary == BOUNDARY_WRAP && vkb_fft_line(extent).length == extent)
         padding = 0;
     if (boundary == BOUNDARY_ZERO)
         padding = reach->before > reach->after ? reach->before : reach->after;
     axis.before = reach->before;
-    axis.line = vkb_fft_line(extent + padding, most);
+    axis.line = vkb_fft_line(extent + padding);
     return axis;
 }
 
@@ -74,9 +67,9 @@ struct vkb_convolution vkb_describe_convolution(const struct vkb_settings *setti
     };
 
     convolution.x = make_axis(DIRECTION_HORIZONTAL, wrap_x ? BOUNDARY_WRAP : boundary, size.width,
-                              most_radix(size), &convolution.reach_x);
+                              &convolution.reach_x);
     convolution.y = make_axis(DIRECTION_VERTICAL, wrap_x ? BOUNDARY_EDGE : boundary, size.height,
-                              most_radix(size), &convolution.reach_y);
+                              &convolution.reach_y);
     convolution.pads_rows = convolution.x.line.length > convolution.x.extent;
     convolution.pads_columns = convolution.y.line.length > convolution.y.extent;
     return convolution;

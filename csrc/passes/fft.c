@@ -2,8 +2,8 @@
 
 #include <string.h>
 
-// The radices of a stage: products of two that the shader has.
-static const uint32_t radices[] = {64, 40, 32, 25, 24, 20, 16, 15, 12, 10, 9, 8, 6, 5, 4, 3, 2, 1};
+// The radices of a stage: products of two that the shader has, up to FFT_MAX_RADIX.
+static const uint32_t radices[] = {16, 15, 12, 10, 9, 8, 6, 5, 4, 3, 2, 1};
 
 enum { RADIX_COUNT = sizeof radices / sizeof radices[0] };
 
@@ -15,12 +15,10 @@ static bool is_smooth(uint32_t length)
     return length == 1;
 }
 
-// The largest radix for a length. Compilers take long for large ones (lavapipe 0.8 seconds for 64,
-// 0.3 for 32), so that they are used where they save a stage of a long line. Short lines share the
-// pipelines of a few small radices.
+// The largest radix for a length. Short lines share the pipelines of a few small radices.
 static uint32_t most_radix(uint32_t length)
 {
-    return length <= 64 ? 8 : length <= 1024 || length > 4096 ? 32 : FFT_MAX_RADIX;
+    return length <= 64 ? 8 : FFT_MAX_RADIX;
 }
 
 // Splits the length into so many stages, the longest first, whose radices have the least sum:
@@ -56,7 +54,7 @@ static uint32_t least_stages(uint32_t length)
     return stages;
 }
 
-struct vkb_fft_line vkb_fft_line(uint32_t least, uint32_t most)
+struct vkb_fft_line vkb_fft_line(uint32_t least)
 {
     struct vkb_fft_line best = {0};
     uint64_t best_cost = UINT64_MAX;
@@ -69,7 +67,7 @@ struct vkb_fft_line vkb_fft_line(uint32_t least, uint32_t most)
         // Longer ones take at least as long.
         if ((uint64_t)length * (least_stages(length) + 1) >= best_cost)
             break;
-        while (radices[first] > most || radices[first] > most_radix(length))
+        while (radices[first] > most_radix(length))
             ++first;
         while (is_smooth(length) && !found && line.stage_count < VKB_FFT_STAGES) {
             ++line.stage_count;
@@ -104,7 +102,7 @@ bool vkb_fft_group_radices(uint32_t length, uint32_t *found)
 {
     return is_smooth(length)
         && (split_group(length, FFT_USUAL_GROUP_RADIX, found)
-            || split_group(length, FFT_MAX_GROUP_RADIX, found));
+            || split_group(length, FFT_MAX_RADIX, found));
 }
 
 static const struct vkb_shader *const shaders[VKB_FORMAT_COUNT] = VKB_BY_FORMAT(fft_image);
@@ -130,7 +128,9 @@ struct vkb_pass_row vkb_fft_row(const struct vkb_graph *graph, const struct vkb_
     row.reading = VKB_READING_LOADED;
     row.variant = "dispatch";
     row.block_width = row.block_height = 1;
-    row.constants.group_width = horizontal ? FFT_ROW_COLUMNS : FFT_INVOCATIONS;
+    // Neighbours along a row: places in memory that are far apart are few.
+    row.constants.group_width =
+        !horizontal || count >= FFT_INVOCATIONS ? FFT_INVOCATIONS : FFT_ROW_COLUMNS;
     row.constants.group_height = FFT_INVOCATIONS / row.constants.group_width;
     row.groups_width =
         groups(horizontal ? count : stage->lines, (uint32_t)row.constants.group_width);

@@ -13,12 +13,11 @@ struct vkb_fft_line {
     uint32_t radices[VKB_FFT_STAGES];  // then 1
 };
 
-// The line of at least `least` elements, up to 32768, that takes the least time with radices of up
-// to `most`.
-struct vkb_fft_line vkb_fft_line(uint32_t least, uint32_t most);
+// The line of at least `least` elements, up to 32768, that takes the least time.
+struct vkb_fft_line vkb_fft_line(uint32_t least);
 
-// The radices of a length for stages in shared memory, VKB_FFT_STAGES of up to FFT_MAX_GROUP_RADIX
-// each, the longest first. False: there are none.
+// The radices of a length for stages in shared memory, VKB_FFT_STAGES of up to FFT_MAX_RADIX each,
+// the longest first. False: there are none.
 bool vkb_fft_group_radices(uint32_t length, uint32_t *found);
 
 // How the lines lie, and which of their elements exist before the transform.

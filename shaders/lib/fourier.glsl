@@ -17,11 +17,19 @@ vec4 rotated(vec4 value, vec2 angle)
     return vec4(product(value.xy, angle), product(value.zw, angle));
 }
 
+// a / b, rounded down, for 0 <= a < 2^22 and b > 0. CPUs divide integers lane by lane. A sum with 3 * 2^22
+// is rounded to the nearest integer, also that of a negative number; half of 1 / b, the least distance to the
+// middle of two integers, is above its error.
+int quotient(int a, int b)
+{
+    return floatBitsToInt((float(a) + 0.5) * (1.0 / float(b)) - 0.5 + 12582912.0) & 0x3fffff;
+}
+
 // exp(-2 pi i k / n) for 0 <= k < n: by octants, of which polynomials are exact to the last bits of a
 // float. A device's own sine may be good to 11 bits.
 vec2 turn(int k, int n)
 {
-    int octant = 8 * k / n;
+    int octant = quotient(8 * k, n);
     float part = float(8 * k - octant * n) / float(n);
     float x = 0.78539816339744831 * ((octant & 1) == 1 ? 1.0 - part : part), x2 = x * x;
     float sine = x + x * x2 * (-1.0 / 6.0 + x2 * (1.0 / 120.0 + x2 * (-1.0 / 5040.0 + x2 / 362880.0)));

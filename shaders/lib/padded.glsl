@@ -5,7 +5,8 @@
 
 vec4 glow_of(vec4 texel)
 {
-    vec4 kept = clamp(finite_or_zero(texel), -FFT_LIMIT, FFT_LIMIT);
+    vec4 finite = finite_or_zero(texel);
+    vec4 kept = vec4(limited(finite.rgb, FFT_LIMIT), limited(finite.aaa, FFT_LIMIT).r);
     return vec4(PREFILTERED != 0 ? prefiltered(kept.rgb) : kept.rgb, ALPHA == ALPHA_BLUR ? kept.a : 0.0);
 }
 

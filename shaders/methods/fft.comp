@@ -34,9 +34,9 @@ READ_IMAGE(SLOT_SPECTRUM, factor);
 #ifndef LINEAR_TEXELS
 layout(set = 0, binding = TARGET_BINDING) uniform writeonly image2D target;
 #elif TARGET_BYTES == 4
-layout(set = 0, binding = TARGET_BINDING, std430) writeonly buffer Target { uvec4 texels[]; } target;
+layout(set = 0, binding = TARGET_BINDING, std430) writeonly buffer Target { u64vec2 texels[]; } target;
 #elif TARGET_BYTES == 2
-layout(set = 0, binding = TARGET_BINDING, std430) writeonly buffer Target { uvec2 texels[]; } target;
+layout(set = 0, binding = TARGET_BINDING, std430) writeonly buffer Target { uint64_t texels[]; } target;
 #else
 layout(set = 0, binding = TARGET_BINDING, std430) writeonly buffer Target { uint texels[]; } target;
 #endif
@@ -57,7 +57,7 @@ ivec2 texel_at(int along, int across)
 vec4 load_source(ivec2 at)
 {
 #ifdef LINEAR_TEXELS
-    return load_pixel(source, shapes.reads[SLOT_SOURCE], at.x, at.y);
+    return load_pixel(source, read_shapes[SLOT_SOURCE], at.x, at.y);
 #else
     return imageLoad(source, at);
 #endif
@@ -66,7 +66,7 @@ vec4 load_source(ivec2 at)
 vec4 load_factor(ivec2 at)
 {
 #ifdef LINEAR_TEXELS
-    return uintBitsToFloat(texelFetch(factor, at.y * shapes.reads[SLOT_SPECTRUM].z + at.x));
+    return uintBitsToFloat(texelFetch(factor, at.y * read_shapes[SLOT_SPECTRUM].z + at.x));
 #else
     return imageLoad(factor, at);
 #endif
@@ -78,14 +78,15 @@ void store(ivec2 at, vec4 value)
     imageStore(target, at, value);
 #elif TARGET_BYTES == 4
     // (Without the maximum LLVM packs lane by lane.)
-    target.texels[at.y * shapes.target.z + at.x] = max(floatBitsToUint(value), uvec4(shapes.reads[SLOT_SOURCE].w));
+    uvec4 bits = floatBitsToUint(value);
+    target.texels[at.y * target_shape.z + at.x] = u64vec2(eighth(bits.xy), eighth(bits.zw));
 #elif TARGET_BYTES == 2
     uvec2 bits = uvec2(packHalf2x16(value.rg), packHalf2x16(value.ba));
-    target.texels[2 * at.y * shapes.target.z + at.x] = max(bits, uvec2(shapes.reads[SLOT_SOURCE].w));
+    target.texels[2 * at.y * target_shape.z + at.x] = eighth(bits);
 #else
     // A sum with 2^23 is rounded to an integer, which its last bits are.
     uvec4 level = floatBitsToUint(value * 255.0 + 8388608.0) & 255u;
-    target.texels[4 * at.y * shapes.target.z + at.x] =
+    target.texels[4 * at.y * target_shape.z + at.x] =
         level.r | level.g << 8 | level.b << 16 | level.a << 24;
 #endif
 }
@@ -124,7 +125,8 @@ bool has_butterfly(int number, int radix)
 // The place of element i of a butterfly whose elements are `step` apart.
 int place_at(int number, int i, int radix, int step)
 {
-    return number / step * step * radix + number % step + i * step;
+    int block = quotient(number, step);
+    return number + block * step * (radix - 1) + i * step;
 }
 
 // The place in the image: of an element before the pass, and of a result after it.
@@ -221,7 +223,8 @@ void load_line(int number, int across, int radix)
     }
 }
 
-// Whether the invocation stores nothing. Of complete lines, all of a group reach its barriers.
+// Whether the invocation stores nothing. None returns: of complete lines, all of a group reach its barriers, and
+// after a return Mesa 22.3 loads parameters lane by lane.
 bool idle;
 
 void store_line(int number, int across, int radix)
@@ -282,12 +285,11 @@ void multiply_each(int number, int across)
 // The frequency at a place, and the place of a frequency: digits of the radices a to d.
 int frequency_at(int place, ivec4 radices)
 {
-    int frequency = place % radices.w;
-    place /= radices.w;
-    frequency = frequency * radices.z + place % radices.z;
-    place /= radices.z;
-    frequency = frequency * radices.y + place % radices.y;
-    return frequency * radices.x + place / radices.y;
+    int w = quotient(place, radices.w), z = quotient(w, radices.z), y = quotient(z, radices.y);
+    int frequency = place - w * radices.w;
+    frequency = frequency * radices.z + w - z * radices.z;
+    frequency = frequency * radices.y + z - y * radices.y;
+    return frequency * radices.x + y;
 }
 
 // The place of the frequency with the opposite sign.
@@ -316,8 +318,7 @@ vec4 channels(vec4 value, vec4 mirror, vec4 kernel, vec4 kernel_mirror)
 
 // Multiplies by the kernel, whose spectrum has two channels in each complex number, too. The product at a
 // frequency needs the spectra at the frequency with the opposite sign, so that an invocation computes the
-// lines of both. The dispatch leaves most of the second lines out; invocations for the others return at
-// once.
+// lines of both. The dispatch leaves most of the second lines out; invocations for the others store nothing.
 void multiply(int block, int index)
 {
     const int RADIX = RADIX_1;
@@ -325,30 +326,33 @@ void multiply(int block, int index)
     // The numbers of the blocks before this last stage have reversed digits, too.
     ivec4 blocks = ivec4(params.block_a, params.block_b, params.block_c, 1);
     int run = params.row_last / 2 + 1;
-    int across = index / run * params.row_last + index % run;
+    int across = index + quotient(index, run) * (params.row_last - run);
     int other_across = mirrored(across, rows, params.row_length);
     int other_block = mirrored(block, blocks, params.count);
-    int frequency = frequency_at(across, rows), other = (params.row_length - frequency) % params.row_length;
+    int frequency = frequency_at(across, rows), other = frequency == 0 ? 0 : params.row_length - frequency;
     bool own = block == 0;
     // The conjugate spectrum of a real channel is that at the opposite frequency.
     bool conjugates = params.kernel_sign < 0.0;
-    vec4 values[FFT_MAX_RADIX], others[FFT_MAX_RADIX];
+    vec4 values[FFT_MAX_RADIX], others[FFT_MAX_RADIX], here[FFT_MAX_RADIX], there[FFT_MAX_RADIX];
 
-    if (frequency > other || (frequency == other && block > other_block))
-        return;
+    idle = idle || frequency > other || (frequency == other && block > other_block);
+    // Before the transforms: between them CPUs wait for memory, and the pass takes 1.6 times as long.
+    int first = block * RADIX, first_other = other_block * RADIX + (own ? RADIX : RADIX - 1);
+    [[unroll]] for (int i = 0; i < RADIX; ++i) {
+        here[i] = load_factor(texel_at(first + i, across));
+        // In the block of frequency 0, the opposite frequency is in the same block.
+        there[i] = load_factor(texel_at(own && i == 0 ? 0 : first_other - i, other_across));
+    }
     load_line(block, across, RADIX);
     transform_held(RADIX, false);
     [[unroll]] for (int i = 0; i < RADIX; ++i)
         values[i] = held[place_of(i, RADIX)];
     load_line(other_block, other_across, RADIX);
     transform_held(RADIX, false);
-    // In the block of frequency 0, the opposite frequency is in the same block.
     [[unroll]] for (int i = 0; i < RADIX; ++i) {
         int j = RADIX - 1 - i, own_j = (RADIX - i) % RADIX;
         vec4 mirror = own ? held[place_of(own_j, RADIX)] : held[place_of(j, RADIX)];
-        vec4 here = load_factor(texel_at(block * RADIX + i, across));
-        vec4 there = load_factor(texel_at(other_block * RADIX + (own ? own_j : j), other_across));
-        vec4 kernel = conjugates ? there : here, kernel_mirror = conjugates ? here : there;
+        vec4 kernel = conjugates ? there[i] : here[i], kernel_mirror = conjugates ? here[i] : there[i];
         others[i] = channels(mirror, values[i], kernel_mirror, kernel);
         values[i] = channels(values[i], mirror, kernel, kernel_mirror);
     }
@@ -368,9 +372,12 @@ void main()
     ivec2 id = ivec2(gl_GlobalInvocationID.xy);
     int number = IS_ROW ? id.x : id.y, across = IS_ROW ? id.y : id.x;
     idle = across >= params.across || (!COMPLETE && number >= params.count);
-    if (!COMPLETE && idle)
-        return;
     across = min(across, params.across - 1);
+    if (!COMPLETE)
+        number = min(number, params.count - 1);
+#ifdef LINEAR_TEXELS
+    copy_shapes();
+#endif
     if (!COMPLETE && STAGE == STAGE_PRODUCT) {
         multiply(number, across);
         return;
