@@ -25,20 +25,23 @@ int quotient(int a, int b)
     return floatBitsToInt((float(a) + 0.5) * (1.0 / float(b)) - 0.5 + 12582912.0) & 0x3fffff;
 }
 
-// exp(-2 pi i k / n) for 0 <= k < n: by octants, of which polynomials are exact to the last bits of a
-// float. A device's own sine may be good to 11 bits.
+// exp(-i pi p / 4) for -1 <= p <= 1, to the last bits of floats: the polynomials are within 2e-9, and pi / 4 is the sum of
+// two floats. A device's own sine may be good to 11 bits.
+vec2 small_turn(float p)
+{
+    float p2 = p * p;
+    float rest = -2.1855694e-8 + p2 * (-0.0807454347 + p2 * (0.00248998972 - p2 * 3.59390410e-5));
+    float less = -0.308425136 + p2 * (0.0158543278 + p2 * (-0.000325942007 + p2 * 3.53133426e-6));
+    return vec2(fma(p2, less, 1.0), -fma(p, 0.78539816339744831, p * rest));
+}
+
+// exp(-2 pi i k / n) for 0 <= k < n < 2^18, by quarters.
 vec2 turn(int k, int n)
 {
-    int octant = quotient(8 * k, n);
-    float part = float(8 * k - octant * n) / float(n);
-    float x = 0.78539816339744831 * ((octant & 1) == 1 ? 1.0 - part : part), x2 = x * x;
-    float sine = x + x * x2 * (-1.0 / 6.0 + x2 * (1.0 / 120.0 + x2 * (-1.0 / 5040.0 + x2 / 362880.0)));
-    float cosine =
-        1.0 + x2 * (-0.5 + x2 * (1.0 / 24.0 + x2 * (-1.0 / 720.0 + x2 * (1.0 / 40320.0))));
-    // Octants 1, 2, 5 and 6 are near the axis of the sine.
-    bool swapped = octant == 1 || octant == 2 || octant == 5 || octant == 6;
-    float c = swapped ? sine : cosine, s = swapped ? cosine : sine;
-    return vec2(octant >= 2 && octant <= 5 ? -c : c, octant >= 4 ? s : -s);
+    int quarters = quotient(8 * k + n, 2 * n);
+    vec2 small = small_turn(float(8 * k - 2 * n * quarters) * (1.0 / float(n)));
+    vec2 turned = (quarters & 1) == 1 ? vec2(small.y, -small.x) : small;
+    return (quarters & 2) == 2 ? -turned : turned;
 }
 
 // Multiplies both numbers by -i, or by i in the inverse transform.

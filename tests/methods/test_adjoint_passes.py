@@ -167,7 +167,7 @@ def pull(
     random = np.random.default_rng(5)
     cotangents = {
         name: random.standard_normal(frames[name].shape).astype(np.float32)
-        for name in ("glow", "blur_vertical", "bloom", "final")
+        for name in names
         if name in frames
     }
     return pullback, cotangents, reference.vjp(image, settings, **given)[1](cotangents)
@@ -321,6 +321,16 @@ def test_presets_are_differentiated(renderer: Renderer, name: str) -> None:
         assert isinstance(found, DeviceGradients)
         for part in ("image", *given):
             check(found, expected, part)
+
+
+def test_a_mask_of_what_is_mixed_is_a_small_difference(renderer: Renderer) -> None:
+    """Film keeps most light where it is, so that the parts by scene and by bloom nearly cancel."""
+    image = random_image(97, 131, channels=3, seed=1).astype(np.float32)
+    mask = np.random.default_rng(3).random((97, 131), np.float32)
+    pullback, cotangents, expected = pull(
+        renderer, image, vkbloom.presets["halation"], ("final",), mask=mask
+    )
+    check(pullback(cotangents), expected, "mask")
 
 
 SINGLE: Any = {"format": "rgba32float"}
