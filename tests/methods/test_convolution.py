@@ -62,7 +62,7 @@ def test_convolution(
 
 
 def test_long_lines(renderer: Renderer) -> None:
-    """Lines of more than 1024 elements have larger radices, of more than 4096 three stages."""
+    """Lines of more than 256 elements have three stages, of more than 4096 four."""
     assert_close(renderer, image_of(4201, 3), Convolution(kernel_of(101, 2), boundary="edge"))
     # In colour: the frequencies of the other sign lie elsewhere.
     assert_close(renderer, image_of(4, 1100), Convolution(kernel_of(3, 99)))
