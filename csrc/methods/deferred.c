@@ -83,7 +83,8 @@ static uint32_t add_bloom(struct vkb_levels *levels, struct vkb_size size, uint3
     };
     const enum vkb_format extracted = vkb_first_format(settings, source.format);
     const bool as_it_is = source.buffers.width == size.width && source.buffers.height == size.height
-                       && extracted == HDR && vkb_threshold_mode(settings) == THRESHOLD_NONE;
+                       && extracted == HDR && vkb_threshold_mode(settings) == THRESHOLD_NONE
+                       && !vkb_begin_exposure(settings).before;
 
     if (!as_it_is) {
         source.glow = vkb_levels_target(levels, "extracted", extracted, source.buffers, false);
@@ -116,7 +117,8 @@ void vkb_build_deferred(struct vkb_levels *levels, const struct vkb_scene_source
         .mask = VKB_NO_IMAGE,
         .lit = vkb_has_glare(settings),
     };
-    const bool scene_first = vkb_method_of(settings)->custom;
+    struct vkb_exposed exposed = vkb_begin_exposure(settings);
+    const bool scene_first = vkb_method_of(settings)->custom || settings->exposure_engine;
     uint32_t glow = VKB_NO_IMAGE;
 
     if (settings->values.bloom && source->has_glow) {
@@ -127,10 +129,12 @@ void vkb_build_deferred(struct vkb_levels *levels, const struct vkb_scene_source
     const struct gbuffer gbuffer = add_gbuffer(levels, source, &params, glow);
     if (scene_first)
         composite.scene = add_lighting(levels, &gbuffer, source->size);
+    uint32_t brightness = gbuffer.colours[BRIGHTNESS];
+    vkb_expose_inputs(levels, &exposed, &composite.scene, &brightness);
     if (settings->values.bloom)
-        composite.bloom =
-            add_bloom(levels, source->size, composite.scene, gbuffer.colours[BRIGHTNESS]);
+        composite.bloom = add_bloom(levels, source->size, composite.scene, brightness);
     if (!scene_first)
         composite.scene = add_lighting(levels, &gbuffer, source->size);
+    vkb_expose_picture(levels, &exposed, &composite);
     vkb_add_composite_pass(levels, &composite, VKB_FORMAT_RGBA8_UNORM);
 }

@@ -94,9 +94,9 @@ static uint32_t add_histogram(struct vkb_levels *levels, uint32_t from, uint32_t
     return histogram;
 }
 
-// Adds a step of a mean.
-static uint32_t add_step(struct vkb_levels *levels, int meter, uint32_t from, uint32_t mask,
-                         struct vkb_size size)
+// Adds a step of a mean. `of_logarithms`: samples are of those, and not of light.
+static uint32_t add_step_of(struct vkb_levels *levels, int meter, bool of_logarithms, uint32_t from,
+                            uint32_t mask, struct vkb_size size)
 {
     char name[VKB_NAME_SIZE];
 
@@ -108,12 +108,16 @@ static uint32_t add_step(struct vkb_levels *levels, int meter, uint32_t from, ui
     row.constants.meter = meter;
     row.params.exposure.width = (int)size.width;
     row.params.exposure.height = (int)size.height;
-    // Samples after the first step are of logarithms.
-    row.params.exposure.channel =
-        meter == METER_SAMPLES && !vkb_is_given(&levels->graph->images[from]);
+    row.params.exposure.channel = of_logarithms;
     vkb_read_at(&row, SLOT_METER_MASK, mask);
     vkb_levels_pass(levels, &row);
     return to;
+}
+
+static uint32_t add_step(struct vkb_levels *levels, int meter, uint32_t from, uint32_t mask,
+                         struct vkb_size size)
+{
+    return add_step_of(levels, meter, false, from, mask, size);
 }
 
 // Adds sums of blocks, or means, until one texel is left. Godot leaves out what fills no block.
@@ -153,7 +157,7 @@ static uint32_t add_logarithms(struct vkb_levels *levels, uint32_t from)
         image = add_step(levels, METER_LEVEL, image, from, size);
     }
     size = (struct vkb_size){at_least_one(size.width / 2), at_least_one(size.height / 2)};
-    return add_step(levels, METER_SAMPLES, image, from, size);
+    return add_step_of(levels, METER_SAMPLES, true, image, from, size);
 }
 
 // Adds what the engine meters in an image; `counted` gets the size of what sums are of.
@@ -180,12 +184,14 @@ static uint32_t add_meter(struct vkb_levels *levels, uint32_t from, struct vkb_s
     return add_sums(levels, METER_SUM, logarithms, from);
 }
 
-bool vkb_exposure_has(const struct vkb_settings *settings, uint32_t what)
+static bool has(const struct vkb_settings *settings, uint32_t what)
 {
     return settings->exposure_engine && (engines[settings->exposure_engine].exposes & what);
 }
 
-uint32_t vkb_add_exposure(struct vkb_levels *levels, uint32_t metered)
+// Adds what meters an image, and the image "exposure", which has what the exposure adapts to and
+// its multipliers. Returns this image.
+static uint32_t add_exposure(struct vkb_levels *levels, uint32_t metered)
 {
     const struct vkb_settings *settings = levels->settings;
     const struct vkb_size one = {1, 1};
@@ -208,8 +214,9 @@ uint32_t vkb_add_exposure(struct vkb_levels *levels, uint32_t metered)
     return exposure;
 }
 
-uint32_t vkb_add_exposed(struct vkb_levels *levels, const char *name, bool framebuffer,
-                         uint32_t image, uint32_t exposure, bool after)
+// Adds an image times the multiplier before the bloom, or with `after` times the one after it.
+static uint32_t add_exposed(struct vkb_levels *levels, const char *name, bool framebuffer,
+                            uint32_t image, uint32_t exposure, bool after)
 {
     if (levels->failed)
         return 0;
@@ -230,4 +237,46 @@ uint32_t vkb_add_exposed(struct vkb_levels *levels, const char *name, bool frame
     pass.params.exposure.channel = after ? 2 : 1;
     vkb_levels_pass(levels, &pass);
     return exposed;
+}
+
+struct vkb_exposed vkb_begin_exposure(const struct vkb_settings *settings)
+{
+    return (struct vkb_exposed){
+        .image = VKB_NO_IMAGE,
+        .before = has(settings, EXPOSES_BLOOM),
+        .after = has(settings, EXPOSES_PICTURE),
+        .meters_bloom = has(settings, METERS_BLOOM),
+    };
+}
+
+void vkb_expose_inputs(struct vkb_levels *levels, struct vkb_exposed *exposed, uint32_t *scene,
+                       uint32_t *glow)
+{
+    const bool one = *scene == *glow;
+
+    if (levels->settings->exposure_engine && !exposed->meters_bloom)
+        exposed->image = add_exposure(levels, *scene);
+    if (!exposed->before)
+        return;
+    *scene = add_exposed(levels, "exposed", true, *scene, exposed->image, false);
+    *glow =
+        one ? *scene : add_exposed(levels, "exposed_emission", false, *glow, exposed->image, false);
+}
+
+void vkb_expose_picture(struct vkb_levels *levels, struct vkb_exposed *exposed,
+                        struct vkb_composite_source *source)
+{
+    const bool has_bloom = source->bloom != VKB_NO_IMAGE || levels->picture;
+
+    if (!exposed->after)
+        return;
+    const uint32_t picture = has_bloom ? vkb_add_combining_pass(levels, source) : source->scene;
+    if (exposed->meters_bloom)
+        exposed->image = add_exposure(levels, picture);
+    *source = (struct vkb_composite_source){
+        .scene = add_exposed(levels, "exposed_picture", false, picture, exposed->image, true),
+        .bloom = VKB_NO_IMAGE,
+        .mask = VKB_NO_IMAGE,
+    };
+    levels->picture = 0;
 }

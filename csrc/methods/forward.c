@@ -47,6 +47,10 @@ void vkb_build_forward(struct vkb_levels *levels, const struct vkb_scene_source 
 
     const bool scene_first = vkb_method_of(settings)->custom;
 
+    if (settings->exposure_engine)
+        levels->failed = !vkb_fail(levels->error, VKB_ERROR_VALUE,
+                                   "exposure: a forward scene has 8 bits, and no light above 1; "
+                                   "shading 'deferred' has it");
     if (scene_first)
         composite.scene = add_scene(levels, source, &params);
     if (settings->values.bloom) {

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import itertools
 import os
+from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
 from collections.abc import Sequence as AnySequence
 from contextlib import closing
-from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple, Protocol, TypeAlias
+from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,11 +21,12 @@ from vkbloom._io.video.reading import VideoFile, is_video
 from vkbloom._locks import cached_property
 from vkbloom._numbers import check_above, check_floats, check_index
 from vkbloom._public import public
-from vkbloom._renderer.default import default_renderer
+from vkbloom._renderer.default import default_renderer, take_exposure
 from vkbloom._renderer.device_arrays import Device, on_cuda
 from vkbloom._renderer.frames import Frames
 from vkbloom._renderer.renderer import Renderer
 from vkbloom._renderer.sources import SCENE_SIZE
+from vkbloom._settings.exposure import Exposure, check_exposure
 from vkbloom._settings.settings import Settings, Shading, check_settings
 
 if TYPE_CHECKING:
@@ -34,8 +36,23 @@ if TYPE_CHECKING:
 # The seconds in which the animation of a scene runs once, as in a window.
 _TURN_SECONDS: Final = 8.0
 
-#: Images with their own times in seconds; None: they have none.
-_Timed: TypeAlias = Generator[tuple[Any, float | None], None, None]
+
+class Taken(NamedTuple):
+    """A frame that was read.
+
+    - `image`: Its pixels; of a scene, the periods of its animation.
+    - `time`, `duration`: Its own, in seconds; None: it has none.
+    - `origin`: What it was read from, for who reads it.
+    """
+
+    image: Any
+    time: float | None = None
+    duration: float | None = None
+    origin: Any = None
+
+
+#: Frames as they are read.
+_Reading: TypeAlias = Generator[Taken, None, None]
 
 
 class _Chosen(NamedTuple):
@@ -54,7 +71,14 @@ class _Chosen(NamedTuple):
         return start_of(highlights, self.settings, self.fields)
 
 
-class _Clock(NamedTuple):
+class Moment(NamedTuple):
+    """When a frame is: its place at constant frames per second, and its time in seconds."""
+
+    place: int
+    time: float | None
+
+
+class Clock(NamedTuple):
     """The times of frames that a call gives: frames per second, or each one."""
 
     rate: float | None
@@ -66,30 +90,52 @@ class _Clock(NamedTuple):
             return self.times[place]
         return None if self.rate is None else place / self.rate
 
+    def step(self, before: Moment | None, now: Moment, duration: float | None) -> float | None:
+        """Return the seconds before a frame; None: as of a call that gives none.
 
-class _Input(Protocol):
+        - `before`: That of the frame before. None: there is none. Then it is the time to the next.
+        - `duration`: The frame's own.
+        """
+        if self.rate is not None:
+            return (1 if before is None else now.place - before.place) / self.rate
+        if before is not None and before.time is not None and now.time is not None:
+            return max(0.0, now.time - before.time)
+        if self.times is not None and len(self.times) > 1:
+            return self.times[1] - self.times[0]
+        return duration
+
+
+class Input(ABC):
     """What a sequence reads.
 
     - `is_repeatable`: Whether it can be read more than once, and from any frame on.
     """
 
-    is_repeatable: bool
+    is_repeatable: bool = True
 
     @property
+    @abstractmethod
     def settings(self) -> Settings:
         """The settings of all frames."""
 
-    def read(self, first: int) -> _Timed:
-        """Yield from a frame on each image."""
+    @abstractmethod
+    def read(self, first: int) -> _Reading:
+        """Yield from a frame on each one."""
 
+    @abstractmethod
     def count(self) -> int | None:
-        """Return how many images there are; None: endless, or not known."""
+        """Return how many frames there are; None: endless, or not known."""
 
     def place_of(self, number: int) -> int:
         """Return the place in time of a frame at constant frames per second."""
+        return number
+
+    def time_of(self, number: int) -> float | None:
+        """Return the time that a frame has by itself, in seconds; None: it has none."""
+        return None
 
 
-class _Arrays:
+class _Arrays(Input):
     """Images, or paths of image files, in any iterable."""
 
     def __init__(self, images: Any, chosen: _Chosen) -> None:
@@ -111,7 +157,7 @@ class _Arrays:
             return self._start.settings
         return self._chosen.of_arrays(of_image=True)
 
-    def read(self, first: int) -> _Timed:
+    def read(self, first: int) -> _Reading:
         images = self._images
         if first and hasattr(images, "__getitem__"):
             # A list of lazily read images reads only those.
@@ -120,19 +166,14 @@ class _Arrays:
             read = itertools.islice(images, first, None)
         for image in read:
             is_file = isinstance(image, str | os.PathLike)
-            yield (_read(image, self._start) if is_file else image), None
+            yield Taken(_read(image, self._start) if is_file else image)
 
     def count(self) -> int | None:
         return len(self._images) if hasattr(self._images, "__len__") else None
 
-    def place_of(self, number: int) -> int:
-        return number
 
-
-class _Files:
+class _Files(Input):
     """The files of a pattern."""
-
-    is_repeatable = True
 
     def __init__(self, pattern: str, chosen: _Chosen, gaps: str) -> None:
         folder, name = os.path.split(pattern)
@@ -158,21 +199,19 @@ class _Files:
     def settings(self) -> Settings:
         return self._start.settings
 
-    def read(self, first: int) -> _Timed:
+    def read(self, first: int) -> _Reading:
         for file in self._files[first:]:
-            yield _read(file, self._start), None
+            yield Taken(_read(file, self._start))
 
     def count(self) -> int | None:
         return len(self._files)
 
     def place_of(self, number: int) -> int:
-        return self._numbers[number] - self._numbers[0]
+        return self._numbers[min(number, len(self._numbers) - 1)] - self._numbers[0]
 
 
-class _Video:
+class _Video(Input):
     """The frames of a video."""
-
-    is_repeatable = True
 
     def __init__(self, path: str, chosen: _Chosen) -> None:
         self._path, self._chosen = path, chosen
@@ -190,10 +229,11 @@ class _Video:
     def settings(self) -> Settings:
         return self._start.settings
 
-    def read(self, first: int) -> _Timed:
+    def read(self, first: int) -> _Reading:
         with VideoFile(self._path) as file, closing(file.frames()) as frames:
             for frame in itertools.islice(frames, first, None):
-                yield self._start.develop(frame.decode()).pixels, float(frame.time)
+                pixels = self._start.develop(frame.decode()).pixels
+                yield Taken(pixels, float(frame.time), float(frame.duration))
 
     @cached_property
     def _times(self) -> list[float]:
@@ -203,30 +243,29 @@ class _Video:
     def count(self) -> int | None:
         return len(self._times)
 
-    def place_of(self, number: int) -> int:
-        return number
+    def time_of(self, number: int) -> float | None:
+        return self._times[number] if number < len(self._times) else None
 
 
-class _Turns:
+class _Turns(Input):
     """The times of a scene, whose images are periods of its animation."""
 
-    is_repeatable = True
+    def __init__(self, clock: Clock, chosen: _Chosen) -> None:
+        self._clock, self._settings = clock, chosen.of_arrays(of_image=False)
 
-    def __init__(self, clock: _Clock, chosen: _Chosen) -> None:
-        self._clock, self.settings = clock, chosen.of_arrays(of_image=False)
+    @property
+    def settings(self) -> Settings:
+        return self._settings
 
-    def read(self, first: int) -> _Timed:
+    def read(self, first: int) -> _Reading:
         count = self.count()
         for number in itertools.count(first) if count is None else range(first, count):
             time = self._clock.at(number)
             assert time is not None
-            yield time / _TURN_SECONDS, time
+            yield Taken(time / _TURN_SECONDS, time)
 
     def count(self) -> int | None:
         return None if self._clock.times is None else len(self._clock.times)
-
-    def place_of(self, number: int) -> int:
-        return number
 
 
 def _highlights_of(path: str | os.PathLike[str]) -> Any:
@@ -243,35 +282,88 @@ def _read(path: str | os.PathLike[str], start: Start | None) -> NDArray[Any]:
     return picture.pixels if start is None else start.develop(picture).pixels
 
 
-class _Work(NamedTuple):
-    """What computes the frames of images or of a scene's times, and that of one."""
+class Work(NamedTuple):
+    """What computes frames.
 
-    all: Callable[[Iterator[Any], Settings], Iterator[Frames]]
-    one: Callable[[Any, Settings], Frames]
+    - `all`: Those of a sequence, from its settings, their images, the seconds before each, a state,
+      and the number of the first one.
+    - `one`: A frame alone.
+    - `stages`: Keywords of a call for its stages in time; None: a stage that it lacks.
+    """
+
+    all: Callable[
+        [Settings, Iterator[Any], Iterator[float | None], Mapping[str, Any] | None, int],
+        Iterator[Frames],
+    ]
+    one: Callable[[Settings, Any], Frames]
+    stages: Mapping[str, Any]
+
+    @property
+    def has_stages(self) -> bool:
+        """Whether there is a stage in time."""
+        return any(stage is not None for stage in self.stages.values())
+
+    @property
+    def continues(self) -> str:
+        """What hands something on to the next frame; "": nothing does."""
+        for name, stage in self.stages.items():
+            if stage is not None and getattr(stage, "_adapts", True):
+                return name
+        return ""
 
 
-def _work_of_images(
-    renderer: Renderer | None, glow: Mapping[str, Any], how: Mapping[str, Any]
-) -> _Work:
-    def compute_all(images: Iterator[Any], settings: Settings) -> Iterator[Frames]:
-        opened = renderer or default_renderer()
-        if any(array is not None for array in glow.values()):
-            images = (opened.upload(image, **glow) for image in images)
-        return opened.map(images, settings, **how)
+def work_of_images(
+    renderer: Callable[[], Renderer],
+    glow_of: Callable[[Any], Mapping[str, Any]],
+    how: Mapping[str, Any],
+    stages: Mapping[str, Any],
+) -> Work:
+    """Return what adds bloom to images; `glow_of`: the mask and the emission of each."""
 
-    def compute_one(image: Any, settings: Settings) -> Frames:
-        return (renderer or default_renderer()).apply(image, settings, **glow, **how)
+    def upload_glow(image: Any) -> Any:
+        glow = glow_of(image)
+        return renderer().upload(image, **glow) if glow else image
 
-    return _Work(compute_all, compute_one)
+    def compute_all(
+        settings: Settings,
+        images: Iterator[Any],
+        steps: Iterator[float | None],
+        state: Mapping[str, Any] | None,
+        first: int,
+    ) -> Iterator[Frames]:
+        given = {**how, **stages, "state": state, "first": first}
+        return renderer()._map(map(upload_glow, images), settings, dt=steps, **given)
+
+    def compute_one(settings: Settings, image: Any) -> Frames:
+        return renderer().apply(image, settings, **glow_of(image), **how, **stages)
+
+    return Work(compute_all, compute_one, stages)
 
 
-def _work_of_scene(renderer: Renderer | None, scene: Scene, how: Mapping[str, Any]) -> _Work:
-    def compute_one(turns: float, settings: Settings) -> Frames:
-        return (renderer or default_renderer()).render(scene, settings, time=turns, **how)
+def _work_of_scene(
+    renderer: Callable[[], Renderer],
+    scene: Scene,
+    how: Mapping[str, Any],
+    stages: Mapping[str, Any],
+) -> Work:
+    def compute_all(
+        settings: Settings,
+        turns: Iterator[float],
+        steps: Iterator[float | None],
+        state: Mapping[str, Any] | None,
+        first: int,
+    ) -> Iterator[Frames]:
+        for number, time in enumerate(turns, first):
+            chosen = settings._in_sequence(number, {})
+            given = {**how, **stages, "dt": next(steps), "state": state}
+            frames = renderer().render(scene, chosen, time=time, **given)
+            state = frames.state
+            yield frames
 
-    return _Work(
-        lambda times, settings: (compute_one(turns, settings) for turns in times), compute_one
-    )
+    def compute_one(settings: Settings, turns: float) -> Frames:
+        return renderer().render(scene, settings, time=turns, **how, **stages)
+
+    return Work(compute_all, compute_one, stages)
 
 
 @public("vkbloom")
@@ -281,14 +373,25 @@ class Sequence(Iterable[Frames]):
     It iterates over `Frames`; each iteration begins with the first frame. Its length is that of its
     input, and a TypeError where that has none (a generator, a scene without `times`).
     ``sequence[i]`` computes one frame alone. It is a TypeError where frames depend on those before
-    (custom methods with a history or a storage), or the input is an iterator.
+    (an exposure that adapts, custom methods with a history or a storage), or the input is an
+    iterator.
 
     ``frames.info["time"]`` is the time of a frame in seconds, if it is known. Memory does not
     grow with the number of frames.
     """
 
-    def __init__(self, source: _Input, work: _Work, clock: _Clock) -> None:
+    def __init__(
+        self,
+        source: Input,
+        work: Work,
+        clock: Clock,
+        *,
+        start: int = 0,
+        state: Mapping[str, Any] | None = None,
+    ) -> None:
         self._source, self._work, self._clock = source, work, clock
+        self._start, self._begun_with = start, state
+        self._state: Mapping[str, Any] = {} if state is None else state
         self._is_begun = False
 
     @property
@@ -296,58 +399,99 @@ class Sequence(Iterable[Frames]):
         """The settings of all frames. Those of files can follow from the first one."""
         return self._source.settings
 
+    @property
+    def state(self) -> Mapping[str, Any]:
+        """`Frames.state` of the frame that was taken last; before the first, what was given.
+
+        Another sequence, in any process, continues from it: with `start`, the number of the next
+        frame.
+        """
+        return self._state
+
     def __iter__(self) -> Iterator[Frames]:
+        return (frames for frames, _ in self._iterate())
+
+    def _iterate(self) -> Iterator[tuple[Frames, Any]]:
+        """Return an iterator over frames, each with the origin of what was read of it."""
         if self._is_begun and not self._source.is_repeatable:
             raise ValueError("frames: this iterator has been read; give a list of images")
         self._is_begun = True
-        return self._iterate()
+        return self._compute()
 
-    def _iterate(self) -> Iterator[Frames]:
-        times: deque[float | None] = deque()
+    def _compute(self) -> Iterator[tuple[Frames, Any]]:
+        # Several frames are read before the first of them is complete.
+        read: deque[tuple[float | None, Any]] = deque()
+        steps: deque[float | None] = deque()
 
         def images() -> Iterator[Any]:
-            with closing(self._read(0)) as read:
-                for image, time in read:
-                    times.append(time)
-                    yield image
+            with closing(self._read(self._start)) as reading:
+                for taken, step in reading:
+                    read.append((taken.time, taken.origin))
+                    steps.append(step)
+                    yield taken.image
 
-        for frames in self._work.all(images(), self.settings):
-            yield _at(frames, times.popleft())
+        def take_steps() -> Iterator[float | None]:
+            while True:
+                yield steps.popleft()
+
+        given = self._begun_with, self._start
+        for frames in self._work.all(self.settings, images(), take_steps(), *given):
+            time, origin = read.popleft()
+            self._state = frames.state
+            yield _at(frames, time), origin
 
     def __len__(self) -> int:
         count = self._source.count()
         if count is None:
             raise TypeError("this sequence has no length: its input has none")
-        return count
+        return max(0, count - self._start)
 
     def __getitem__(self, index: int) -> Frames:
         if not self._source.is_repeatable:
             raise TypeError("an iterator cannot be indexed; give a list of images")
-        if self.settings._continues:
-            raise TypeError(
-                f"frames of the method {self.settings.method} depend on those before; iterate"
-            )
+        self._check_alone()
         number = check_index("index", index, -_MAX_INDEX, _MAX_INDEX)
         number += len(self) if number < 0 else 0
         if number >= 0:
-            with closing(self._read(number)) as read:
-                for image, time in read:
+            number += self._start
+            with closing(self._read(number)) as reading:
+                for taken, _ in reading:
                     chosen = self.settings._in_sequence(number, {})
-                    return _at(self._work.one(image, chosen), time)
+                    return _at(self._work.one(chosen, taken.image), taken.time)
         raise IndexError(f"index: {index} is not in this sequence")
 
-    def _read(self, first: int) -> _Timed:
-        """Yield from a frame on each image with its time."""
+    def _check_alone(self) -> None:
+        """Raise TypeError if frames depend on those before."""
+        which = ""
+        if self.settings._continues:
+            which = f"the method {self.settings.method}"
+        elif self._work.continues:
+            which = f"an {self._work.continues} that adapts"
+        if which:
+            raise TypeError(f"frames of {which} depend on those before; iterate")
+
+    def _read(self, first: int) -> Generator[tuple[Taken, float | None], None, None]:
+        """Yield from a frame on each one at its time, and the seconds before it."""
         number, times = first - 1, self._clock.times
-        with closing(self._source.read(first)) as images:
-            for number, (image, own) in enumerate(images, first):
+        before: Moment | None = None
+        if first and self._work.has_stages:
+            before = self._moment(first - 1, self._source.time_of(first - 1))
+        with closing(self._source.read(first)) as reading:
+            for number, taken in enumerate(reading, first):
                 if times is not None and number >= len(times):
                     raise ValueError(f"times: there are more frames than the {len(times)} times")
-                place = number if times is not None else self._source.place_of(number)
-                time = self._clock.at(place)
-                yield image, own if time is None else time
+                now = self._moment(number, taken.time)
+                step = self._clock.step(before, now, taken.duration)
+                before = now
+                yield taken._replace(time=now.time), step
         if times is not None and first <= number + 1 < len(times):
             raise ValueError(f"times: {len(times)} times do not match {number + 1} frames")
+
+    def _moment(self, number: int, own: float | None) -> Moment:
+        """Return when a frame is; `own`: the time that it has if the call gives none."""
+        place = number if self._clock.times is not None else self._source.place_of(number)
+        time = self._clock.at(place)
+        return Moment(place, own if time is None else time)
 
 
 _MAX_INDEX: Final = 1 << 62
@@ -368,6 +512,9 @@ def sequence(
     fps: float | None = None,
     times: AnySequence[float] | None = None,
     gaps: Literal["error", "time"] = "error",
+    start: int = 0,
+    exposure: Exposure | str | float | None = None,
+    state: Mapping[str, Any] | None = None,
     mask: NDArray[Any] | None = None,
     emission: NDArray[Any] | None = None,
     size: tuple[int, int] = SCENE_SIZE,
@@ -396,6 +543,14 @@ def sequence(
     gaps : {"error", "time"}
         Numbers that a pattern lacks: an error that names them, or time in which no frame is. With
         `fps`, a number is a frame's time.
+    start : int
+        The number of the first frame that is computed, from 0. Those before it are left out, and
+        times are counted from the first one.
+    exposure : Exposure, str or float, optional
+        As for `apply`. Its `dt` is the time since the frame before. That of frame 0 is the time to
+        the next one.
+    state : mapping of str to ndarray, optional
+        What the first frame continues from: `Frames.state` of the one before it.
     mask, emission
         As for `Renderer.apply`, for all frames.
     size, shading
@@ -417,8 +572,14 @@ def sequence(
     FileNotFoundError
         No file has the pattern's name.
     ValueError
-        A file cannot be read, numbers are missing, a scene has neither `fps` nor `times`, both are
-        given, or an argument is out of range. Of the frames themselves when they are taken.
+        A file cannot be read, numbers are missing, a scene or an exposure of images has neither
+        `fps` nor `times`, both are given, or an argument is out of range. Of the frames themselves
+        when they are taken.
+
+    Notes
+    -----
+    A sequence with an exposure can be cut at any frame, also between processes: the rest, with
+    `start` and the `state` of the frame before, has equal bits.
 
     Examples
     --------
@@ -434,15 +595,26 @@ def sequence(
         raise ValueError(f"gaps: {gaps!r} is not one of error, time")
     from vkbloom._scene import Scene  # noqa: PLC0415  costs start-up time
 
+    stage = take_exposure(exposure, fields)
+    # Stages in time: each is a keyword of `Renderer.apply` and `Renderer.render`.
+    stages: dict[str, Any] = {
+        "exposure": None if stage is None else check_exposure(stage),
+    }
     chosen = _Chosen(settings, fields)
     how: dict[str, Any] = {"framebuffers": framebuffers, "device": device}
+    begun: dict[str, Any] = {"start": check_index("start", start, 0, _MAX_INDEX), "state": state}
+
+    def opened() -> Renderer:
+        return renderer or default_renderer()
+
     if isinstance(frames, Scene):
-        if clock == _Clock(None, None):
+        if clock == Clock(None, None):
             raise ValueError("fps: a scene needs frames per second, or times")
         if mask is not None or emission is not None:
             raise ValueError("mask: a scene takes neither a mask nor an emission")
-        work = _work_of_scene(renderer, frames, how | {"size": size, "shading": shading})
-        return Sequence(_Turns(clock, chosen), work, clock)
+        how |= {"size": size, "shading": shading}
+        work = _work_of_scene(opened, frames, how, stages)
+        return Sequence(_Turns(clock, chosen), work, clock, **begun)
     # Wrong settings, masks and emissions fail at the call; their sizes with the first frame.
     chosen.of_arrays(of_image=True)
     if mask is not None and not on_cuda(mask):
@@ -455,22 +627,26 @@ def sequence(
         count = source.count()
         if count not in (None, len(clock.times)):
             raise ValueError(f"times: {len(clock.times)} times do not match {count} frames")
-    work = _work_of_images(renderer, {"mask": mask, "emission": emission}, how)
-    return Sequence(source, work, clock)
+    given = {"mask": mask, "emission": emission}
+    glow = {name: array for name, array in given.items() if array is not None}
+    work = work_of_images(opened, lambda _: glow, how, stages)
+    if work.has_stages and clock == Clock(None, None) and not isinstance(source, _Video):
+        raise ValueError("fps: an exposure needs frames per second, or times")
+    return Sequence(source, work, clock, **begun)
 
 
-def _clock_of(fps: float | None, times: AnySequence[float] | None) -> _Clock:
+def _clock_of(fps: float | None, times: AnySequence[float] | None) -> Clock:
     if times is None:
-        return _Clock(None if fps is None else check_above("fps", fps), None)
+        return Clock(None if fps is None else check_above("fps", fps), None)
     if fps is not None:
         raise ValueError("times: fps is given as well; leave one of them out")
     moments = check_floats("times", times)
     if not moments or any(later <= now for now, later in itertools.pairwise(moments)):
         raise ValueError("times: each one must be later than the one before")
-    return _Clock(None, moments)
+    return Clock(None, moments)
 
 
-def _input_of(frames: Any, chosen: _Chosen, gaps: str) -> _Input:
+def _input_of(frames: Any, chosen: _Chosen, gaps: str) -> Input:
     if isinstance(frames, str | os.PathLike):
         path = os.fspath(frames)
         return _Video(path, chosen) if is_video(path) else _Files(path, chosen, gaps)

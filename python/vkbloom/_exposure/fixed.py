@@ -41,6 +41,7 @@ class FixedExposure(Exposure):
     """
 
     engine: ClassVar[str] = "fixed"
+    _adapts: ClassVar[bool] = False
     _exposes_bloom: ClassVar[bool] = True
 
     value: float = number_field(default=0.0, range=(-32.0, 32.0), unit="stop", slider=(-8, 8))

@@ -131,10 +131,7 @@ def apply(
     """
     given: dict[str, Any] = {"mask": mask, "emission": emission, "framebuffers": framebuffers}
     given |= {"out": out, "device": device, "dt": dt, "state": state}
-    if exposure is None or isinstance(exposure, Exposure | str):
-        given["exposure"] = exposure
-    else:
-        fields["exposure"] = exposure
+    given["exposure"] = take_exposure(exposure, fields)
     if not isinstance(image, str | os.PathLike):
         chosen = _change(settings, fields, of_image=True)
         return (renderer or default_renderer()).apply(image, chosen, **given)
@@ -146,6 +143,16 @@ def apply(
     if start.expand is not None:
         frames._info["expand"] = start.expand
     return frames
+
+
+def take_exposure(
+    exposure: Exposure | str | float | None, fields: dict[str, Any]
+) -> Exposure | str | None:
+    """Return the exposure of a call; a number is a field of its settings."""
+    if exposure is None or isinstance(exposure, Exposure | str):
+        return exposure
+    fields["exposure"] = exposure
+    return None
 
 
 def _change(
@@ -167,6 +174,9 @@ def render(
     framebuffers: Literal["all"] | str | Sequence[str] = "all",
     out: Mapping[str, Any] | None = None,
     device: Device | None = None,
+    exposure: Exposure | str | float | None = None,
+    dt: float | None = None,
+    state: Mapping[str, Any] | None = None,
     renderer: Renderer | None = None,
     **fields: Any,
 ) -> Frames:
@@ -174,8 +184,10 @@ def render(
 
     Parameters
     ----------
-    scene, size, shading, time, framebuffers, out, device
+    scene, size, shading, time, framebuffers, out, device, dt, state
         As for `Renderer.render`.
+    exposure : Exposure, str or float, optional
+        As for `apply`.
     settings : Settings or str, optional
         Settings, or the name of a preset. Default: ``presets["tutorial"]``.
     renderer : Renderer, optional
@@ -194,6 +206,7 @@ def render(
     >>> frames["final"].shape
     (48, 64, 4)
     """
+    chosen_exposure = take_exposure(exposure, fields)
     return (renderer or default_renderer()).render(
         scene,
         _change(settings, fields),
@@ -203,4 +216,7 @@ def render(
         framebuffers=framebuffers,
         out=out,
         device=device,
+        exposure=chosen_exposure,
+        dt=dt,
+        state=state,
     )

@@ -19,7 +19,7 @@ from vkbloom import _core
 from vkbloom._argument_types import check_arguments
 from vkbloom._array_cache import ArrayCache, shared_cache
 from vkbloom._framebuffers import check_framebuffers
-from vkbloom._numbers import check_number, check_size
+from vkbloom._numbers import check_size
 from vkbloom._public import public
 from vkbloom._renderer import requests
 from vkbloom._renderer.adapter import bundled_driver, bundled_hash, from_core
@@ -46,9 +46,9 @@ from vkbloom._renderer.sources import (
     scene_source,
     take_batch,
 )
-from vkbloom._renderer.state import State
+from vkbloom._renderer.state import Continued, State
 from vkbloom._settings.exposed import ExposedSettings
-from vkbloom._settings.exposure import MAX_SECONDS, Exposure, check_exposure
+from vkbloom._settings.exposure import Exposure, check_exposure, check_seconds
 from vkbloom._settings.settings import Settings, Shading, check_settings
 from vkbloom._spelling import describe_unknown
 from vkbloom._version import installed_version
@@ -154,9 +154,16 @@ def _sources(images: Iterable[Any], core: _core.Renderer) -> Iterator[_core.Sour
 
 
 def _pair(
-    sources: Iterable[_core.Source], settings: Settings | Sequence[Settings]
+    sources: Iterable[_core.Source],
+    settings: Settings | Sequence[Settings],
+    steps: Iterator[float | None] | None = None,
+    first: int = 0,
 ) -> Iterator[requests.Request]:
-    """Yield each source with its settings. Errors are raised in order."""
+    """Yield each source with its settings. Errors are raised in order.
+
+    - `steps`: The seconds before each image, if they differ; None: `DEFAULT_SECONDS`.
+    - `first`: The number of the first image in its sequence.
+    """
     count = 0
     state: dict[Any, Any] = {}
     for source in sources:
@@ -166,13 +173,23 @@ def _pair(
             chosen = settings[count]
         else:
             raise ValueError(f"settings: {len(settings)} Settings are fewer than the images")
-        request = requests.Request(source, chosen._in_sequence(count, state))
+        chosen = chosen._in_sequence(first + count, state)
+        if steps is not None:
+            chosen = chosen._after(_take_step(steps, count))
+        request = requests.Request(source, chosen)
         del source
         yield request
         del request
         count += 1
     if isinstance(settings, Sequence) and count < len(settings):
         raise ValueError(f"settings: {len(settings)} Settings are more than the {count} images")
+
+
+def _take_step(steps: Iterator[float | None], count: int) -> float:
+    """Return the seconds before an image; `count`: how many images there were before."""
+    for seconds in steps:
+        return check_seconds(f"dt[{count}]", seconds)
+    raise ValueError(f"dt: {count} steps of time are fewer than the images")
 
 
 def _as_state(state: Mapping[str, Any] | None) -> State:
@@ -333,6 +350,8 @@ class Renderer:
         framebuffers: Literal["all"] | str | Sequence[str] = "all",
         out: Mapping[str, Any] | None = None,
         device: Device | None = None,
+        exposure: Exposure | str | None = None,
+        dt: float | None = None,
         state: Mapping[str, Any] | None = None,
     ) -> Frames:
         """Render a scene with its bloom.
@@ -360,6 +379,9 @@ class Renderer:
         device : {"host", "device"}, optional
             Where the framebuffers go: arrays of NumPy, or `DeviceArray` objects. Default: "device"
             if an array of the source is on the GPU, else "host".
+        exposure, dt
+            As for `apply`, with deferred shading: a forward scene has 8 bits. What is metered is
+            ``scene``. `time` and `dt` are apart: a turn of the animation is no number of seconds.
         state : mapping of str to ndarray, optional
             For settings whose passes read framebuffers of the call before: `Frames.state` of that
             call, or arrays by the names of these framebuffers, of their shapes and dtypes. Names
@@ -387,7 +409,7 @@ class Renderer:
         A pass runs only if its inputs, its settings or its size have changed since its last run.
         The ``timings`` of the result name the passes that ran.
         """
-        settings = check_settings(settings)
+        settings = self._expose(check_settings(settings), exposure, dt)
         source = scene_source(scene, size, shading, time)
         names = check_framebuffers(framebuffers)
         return self._run_one(source, settings, names, out, device, state=state)
@@ -482,7 +504,7 @@ class Renderer:
         framebuffers: Literal["all"] | str | Sequence[str] = "all",
         device: Device | None = None,
         exposure: Exposure | str | None = None,
-        dt: float | None = None,
+        dt: float | Iterable[float] | None = None,
         state: Mapping[str, Any] | None = None,
     ) -> Iterator[Frames]:
         """Add bloom to many images.
@@ -498,7 +520,8 @@ class Renderer:
         framebuffers, device
             As for `apply`.
         exposure, dt
-            As for `apply`; `dt` is the time from each image to the next one.
+            As for `apply`; `dt` is the time before each image, the same of all or an iterable, of
+            which an item is taken after each image.
         state : mapping of str to ndarray, optional
             What the first image continues from, as for `apply`. Each other one continues from the
             image before, whatever settings either has; after an image of another size, what has
@@ -536,6 +559,22 @@ class Renderer:
         1.0
         2.0
         """
+        given: Any = {"framebuffers": framebuffers, "device": device, "state": state}
+        return self._map(images, settings, exposure=exposure, dt=dt, **given)
+
+    def _map(
+        self,
+        images: Iterable[Any],
+        settings: Settings | str | Sequence[Settings | str] | None,
+        *,
+        framebuffers: Literal["all"] | str | Sequence[str],
+        device: Device | None,
+        exposure: Exposure | str | None,
+        dt: float | Iterable[float | None] | None,
+        state: Mapping[str, Any] | None,
+        first: int = 0,
+    ) -> Iterator[Frames]:
+        """Return what `map` does; `first` is the number of the first image in its sequence."""
         names = check_framebuffers(framebuffers)
         is_one = isinstance(images, str | bytes) or (
             isinstance(images, np.ndarray) and images.ndim != 4
@@ -556,6 +595,9 @@ class Renderer:
                 )
         else:
             chosen = check_settings(settings, of_image=True)
+        steps: Iterator[float | None] | None = None
+        if isinstance(dt, Iterable) and not isinstance(dt, str):
+            steps, dt = iter(dt), None
         if isinstance(chosen, Sequence):
             chosen = [self._expose(item, exposure, dt) for item in chosen]
         else:
@@ -568,10 +610,12 @@ class Renderer:
             self._named = chosen, names
         destination = self._choose_destination(device)
         begun = _as_state(state)
-        if on_cuda(images) and device != "host" and not isinstance(chosen, Sequence):
-            return self._run_batch(images, chosen, names, destination, begun)
-        sequence = requests.upload_each(self._core, _pair(_sources(images, self._core), chosen))
-        return self._run_requests(sequence, names, destination, begun)
+        is_same = steps is None and not isinstance(chosen, Sequence)
+        if on_cuda(images) and device != "host" and is_same:
+            return self._run_batch(images, cast("Settings", chosen), names, destination, begun)
+        pairs = _pair(_sources(images, self._core), chosen, steps, first)
+        sequence = requests.upload_each(self._core, pairs)
+        return self._run_requests(sequence, names, destination, Continued(begun))
 
     @check_arguments
     def upload(
@@ -623,6 +667,9 @@ class Renderer:
         time: float = 0.0,
         framebuffers: Literal["all"] | str | Sequence[str] = "all",
         device: Device | None = None,
+        exposure: Exposure | str | None = None,
+        dt: float | None = None,
+        state: Mapping[str, Any] | None = None,
     ) -> Iterator[Frames]:
         """Render one scene, or add bloom to one image, with many settings.
 
@@ -636,8 +683,11 @@ class Renderer:
             Width and height of a scene's frames. Default: (1280, 720). Not for an image.
         shading, time
             Of a scene, as for `render`.
-        framebuffers, device
+        framebuffers, device, exposure, dt
             As for `apply`.
+        state : mapping of str to ndarray, optional
+            What all frames continue from: each is the frame `dt` seconds after it, and none
+            continues that of other settings. Only with an exposure.
 
         Yields
         ------
@@ -654,7 +704,19 @@ class Renderer:
         """
         self._pending.wait()
         frame_source = any_source(source, size, shading, time, self._core)
-        return self._run_many(frame_source, settings, check_framebuffers(framebuffers), device)
+        names = check_framebuffers(framebuffers)
+
+        def expose(chosen: Settings) -> Settings:
+            return self._expose(chosen, exposure, dt)
+
+        if exposure is None:
+            check_seconds("dt", dt)
+            if state is not None:
+                raise ValueError("state: only an exposure continues one; give exposure, too")
+            return self._run_many(frame_source, settings, names, device)
+        before = Continued(_as_state(state), is_chain=False)
+        how: Any = {"expose": expose, "before": before}
+        return self._run_many(frame_source, settings, names, device, **how)
 
     @check_arguments
     def plan(
@@ -665,6 +727,7 @@ class Renderer:
         *,
         shading: Shading = "forward",
         framebuffers: Literal["all"] | str | Sequence[str] = "all",
+        exposure: Exposure | str | None = None,
     ) -> Plan:
         """Return the framebuffers and the passes of a call, without rendering.
 
@@ -678,8 +741,8 @@ class Renderer:
             Width and height of a scene's frame. Default: (1280, 720). Not for an image.
         shading : {"forward", "deferred"}
             Of a scene.
-        framebuffers
-            As for `render`.
+        framebuffers, exposure
+            As for `apply`.
 
         Returns
         -------
@@ -709,7 +772,7 @@ class Renderer:
             kind, dtype = "image", np.dtype(name)
         else:
             width, height = check_size("size", SCENE_SIZE if size is None else size)
-        plan = self._core.plan(planned, settings, names)
+        plan = self._core.plan(planned, self._expose(settings, exposure, None), names)
         passes = tuple(
             Pass(name, shader, tuple(dict.fromkeys(reads)), writes, variant)
             for name, shader, reads, writes, variant, _ in plan.passes
@@ -730,7 +793,7 @@ class Renderer:
         self, settings: Settings, exposure: Exposure | str | None, dt: float | None
     ) -> Settings:
         """Return the settings with an exposure, which the rest of a renderer takes for settings."""
-        seconds = check_number("dt", 1 / 60 if dt is None else dt, 0, MAX_SECONDS)
+        seconds = check_seconds("dt", dt)
         if exposure is None:
             return settings
         made = ExposedSettings(settings, check_exposure(exposure), seconds)
@@ -785,7 +848,7 @@ class Renderer:
 
         def rest(first: int) -> Iterator[Frames]:
             sequence = _pair(batch_sources(batch, first), settings)
-            return self._run_requests(sequence, names, destination, state)
+            return self._run_requests(sequence, names, destination, Continued(state))
 
         def plan_of(source: _core.Source) -> _core.Plan:
             return self._plan_of(source, settings, names)
@@ -851,6 +914,9 @@ class Renderer:
         settings: Iterable[Settings | str],
         names: tuple[str, ...] | None,
         device: Device | None = None,
+        *,
+        expose: Callable[[Settings], Settings] = lambda chosen: chosen,
+        before: Continued | None = None,
     ) -> Iterator[Frames]:
         destination = self._choose_destination(device)
         # Not a generator, so that arguments are checked at the call and not with the first frame.
@@ -861,14 +927,15 @@ class Renderer:
         if isinstance(settings, Sequence):
             settings = tuple(settings)
             if names:
-                self._check_names(source, settings, names)
+                self._check_names(source, settings, names, expose)
         return self._run_requests(
             (
-                requests.Request(source, check_settings(item, f"settings[{number}]"))
+                requests.Request(source, expose(check_settings(item, f"settings[{number}]")))
                 for number, item in enumerate(settings)
             ),
             names,
             destination,
+            before,
         )
 
     def _check_names(
@@ -876,13 +943,15 @@ class Renderer:
         source: _core.Source,
         settings: Settings | Sequence[Settings | str],
         names: tuple[str, ...] | None,
+        expose: Callable[[Settings], Settings] = lambda chosen: chosen,
     ) -> None:
         """Raise ValueError for framebuffers that none of the settings has, at any size."""
         known: dict[str, None] = {}
         for item in settings if isinstance(settings, Sequence) else [settings]:
             # An error of these settings is raised in their turn, after the frames of earlier ones.
             with contextlib.suppress(_core.Error, TypeError, ValueError):
-                chosen = item if isinstance(item, ExposedSettings) else check_settings(item)
+                is_exposed = isinstance(item, ExposedSettings)
+                chosen = cast("Settings", item) if is_exposed else expose(check_settings(item))
                 plan = self._core.plan(source, chosen, None)
                 known.update((name, None) for name, _, _ in plan.outputs)
         kinds = {_NUMBER.sub("#", name) for name in known}
@@ -895,10 +964,10 @@ class Renderer:
         sequence: Iterable[requests.Request],
         names: tuple[str, ...] | None,
         destination: Callable[[_core.Source], Destination] = lambda _: "host",
-        state: State | None = None,
+        before: Continued | None = None,
     ) -> Iterator[Frames]:
         self._pending.wait()
-        results = requests.run(sequence, self._core, names, state=state, destination=destination)
+        results = requests.run(sequence, self._core, names, before=before, destination=destination)
         return (
             self._finish(self._frames(settings, arrays, after), *known)
             for settings, arrays, known, after in results

@@ -11,7 +11,7 @@ from vkbloom import _core
 from vkbloom._locks import ProcessLock
 from vkbloom._renderer.device_arrays import Destination, DeviceArray
 from vkbloom._renderer.new_arrays import array_bytes, new_arrays
-from vkbloom._renderer.state import State
+from vkbloom._renderer.state import Continued, State
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
@@ -178,8 +178,7 @@ class _Submitted(NamedTuple):
 class _Requests:
     """Divides a sequence of requests into submissions, in order.
 
-    - `state`: That the first one continues, as each one that of the one before; so each is a
-      submission of its own. None: they are independent.
+    - `before`: What they continue; so each is a submission of its own. None: nothing.
     - `failure`: To be raised after the results of everything that was submitted.
     """
 
@@ -188,14 +187,14 @@ class _Requests:
         sequence: Iterable[Request],
         core: _core.Renderer,
         names: tuple[str, ...] | None,
-        state: State | None,
+        before: Continued | None,
         destination: Callable[[_core.Source], Destination],
     ) -> None:
         self._sequence = iter(sequence)
         self._core = core
         self._names = names
-        self._state = state
-        self._ever = MAX_REQUESTS if state is None else 1
+        self._before = before
+        self._ever = MAX_REQUESTS if before is None else 1
         self._destination = destination
         self._waiting: deque[Request] = deque()  # taken from the sequence, not submitted yet
         self._limit = 1
@@ -211,20 +210,24 @@ class _Requests:
         plans = tuple(planned.plan for planned in requests)
         arrays = tuple(planned.arrays for planned in requests)
         source = requests[0].request.source
+        after: State | None = None
         try:
-            if self._state is None:
+            if self._before is None:
                 submission = self._core.run(source, plans, arrays)
             else:
-                histories = self._state.histories(self._core, plans[0])
+                state, is_chain = self._before
+                histories = state.histories(self._core, plans[0])
                 submission = self._core.run(source, plans, arrays, False, None, histories)
-                self._state = self._state.advance(self._core, plans[0], submission)
+                after = state.advance(self._core, plans[0], submission)
+                if is_chain:
+                    self._before = Continued(after)
         except Exception as error:
             self._fail(error)
             return None
         # Double the number, starting with one request. So the first frame waits for no other, and
         # a caller that stops early wastes little work.
         self._limit = min(2 * len(requests), MAX_REQUESTS)
-        return _Submitted(submission, requests, time.perf_counter(), self._state)
+        return _Submitted(submission, requests, time.perf_counter(), after)
 
     def took(self, seconds: float, count: int) -> None:
         """Update the limit after a submission of `count` requests that took at most `seconds`."""
@@ -284,19 +287,18 @@ def run(
     core: _core.Renderer,
     names: tuple[str, ...] | None,
     *,
-    state: State | None = None,
+    before: Continued | None = None,
     destination: Callable[[_core.Source], Destination] = lambda _: "host",
 ) -> Iterator[Result]:
     """Yield the result of each request, in their order.
 
     Work is taken before earlier results are yielded, so that the device is busy while the caller
-    uses results: none before the first result, then enough for `AHEAD` submissions. With a `state`,
-    each request continues that of the one before.
+    uses results: none before the first result, then enough for `AHEAD` submissions.
     """
-    waiting = _Requests(sequence, core, names, state, destination)
+    waiting = _Requests(sequence, core, names, before, destination)
     submitted: deque[_Submitted] = deque()
     ahead = 1
-    before = 0.0  # when the last submission ended
+    ended = 0.0  # when the last submission ended
     try:
         while True:
             while len(submitted) < ahead and (added := waiting.submit()) is not None:
@@ -308,14 +310,14 @@ def run(
             del submission
             # The device started it after it was submitted and the one before had ended.
             end = time.perf_counter()
-            waiting.took(end - max(since, before), len(requests))
-            before = end
+            waiting.took(end - max(since, ended), len(requests))
+            ended = end
             # Yielded results are not kept, so that the caller is their only owner.
             requests.reverse()
             timings.reverse()
             while requests:
                 yield requests.pop().result(timings.pop(), counts, after)
-            ahead = AHEAD if state is None else IMAGES_AHEAD
+            ahead = AHEAD if before is None else IMAGES_AHEAD
     finally:
         # Waits here for submissions whose results nobody takes, not at the next garbage
         # collection.

@@ -141,3 +141,13 @@ class State(Mapping[str, "NDArray[Any]"]):
 def is_alike(image: NDArray[Any] | Kept, shape: tuple[int, ...], dtype: str) -> bool:
     """Return whether an image has a shape and a type."""
     return image.shape == shape and image.dtype == np.dtype(dtype)
+
+
+class Continued(NamedTuple):
+    """The state that requests continue.
+
+    - `is_chain`: Whether each continues that of the one before; else all continue this one.
+    """
+
+    state: State
+    is_chain: bool = True

@@ -54,5 +54,14 @@ class ExposedSettings:
         numbers, table = exposure._numbers_of_step(self.dt), exposure._core_table()
         return exposure_block(self.settings._core_block(), exposure._core_engine, numbers, table)
 
+    @property
+    def _continues(self) -> bool:
+        """Whether a frame depends on those before."""
+        return self.exposure._adapts or self.settings._continues
+
+    def _after(self, seconds: float) -> ExposedSettings:
+        """Return the same with other seconds since the frame before."""
+        return self if seconds == self.dt else dataclasses.replace(self, dt=seconds)
+
     def _in_sequence(self, index: int, state: dict[Any, Any]) -> ExposedSettings:
         return dataclasses.replace(self, settings=self.settings._in_sequence(index, state))

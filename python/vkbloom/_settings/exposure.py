@@ -7,6 +7,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, Final, NamedTuple
 
+from vkbloom._numbers import check_number
 from vkbloom._public import public
 from vkbloom._settings.named import Named
 from vkbloom._settings.records import Record
@@ -28,6 +29,8 @@ class Exposure(Record):
     _subject: ClassVar[str] = "exposure"
     _example: ClassVar[str] = "an exposure of an engine, such as BevyExposure"
     engine: ClassVar[str]
+    #: Whether a frame depends on those before.
+    _adapts: ClassVar[bool] = True
     #: Whether the light that the bloom reads is exposed; whether the picture with its bloom is;
     #: whether that is what is metered.
     _exposes_bloom: ClassVar[bool] = False
@@ -72,8 +75,9 @@ class NamedExposure(NamedTuple):
     whose: str
 
 
-#: The longest step of time.
+#: The longest step of time, and that of a call that gives none.
 MAX_SECONDS: Final = 86400.0
+DEFAULT_SECONDS: Final = 1 / 60
 
 #: Name to exposure, for ``exposure=vkbloom.exposures[name]``, or ``exposure=name``.
 #: ``docs/exposure.md`` lists what they are, with their sources.
@@ -92,3 +96,8 @@ def check_exposure(exposure: object) -> Exposure:
     if isinstance(exposure, type) and issubclass(exposure, Exposure):
         hint = f"; give {exposure.__name__}()"
     raise TypeError(f"exposure: {exposure!r} is not an Exposure or the name of one{hint}")
+
+
+def check_seconds(name: str, seconds: float | None) -> float:
+    """Return a step of time; raise TypeError or ValueError. None: `DEFAULT_SECONDS`."""
+    return DEFAULT_SECONDS if seconds is None else check_number(name, seconds, 0, MAX_SECONDS)

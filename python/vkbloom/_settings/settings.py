@@ -249,6 +249,10 @@ class Settings(Record):
         """Whether a call reads what an earlier one has left; only custom methods can."""
         return False
 
+    def _after(self, seconds: float) -> Self:
+        """Return the settings for a frame so many seconds after the one before: these."""
+        return self
+
     def _in_sequence(self, index: int, state: dict[Any, Any]) -> Self:
         """Return the settings for a frame of a sequence, whose frames share the state."""
         return self

@@ -13,9 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom._argument_types import check_arguments
-from vkbloom._numbers import check_number
 from vkbloom._public import public
-from vkbloom._settings.exposure import MAX_SECONDS, Exposure, check_exposure
+from vkbloom._settings.exposure import DEFAULT_SECONDS, Exposure, check_exposure, check_seconds
 
 from ._image import as_float
 from ._sampling import Array, sample
@@ -55,7 +54,7 @@ def expose(
     image: NDArray[Any],
     exposure: Exposure | str,
     *,
-    dt: float = 1 / 60,
+    dt: float = DEFAULT_SECONDS,
     state: Mapping[str, Any] | None = None,
 ) -> dict[str, Array]:
     """Meter a frame and adapt to it, in float64.
@@ -101,9 +100,11 @@ def expose(
 class Exposing:
     """An exposure of a frame that continues a state."""
 
-    def __init__(self, exposure: Exposure, dt: float, state: Mapping[str, Any] | None) -> None:
+    def __init__(
+        self, exposure: Exposure, dt: float | None, state: Mapping[str, Any] | None
+    ) -> None:
         self.exposure = exposure
-        self._seconds = check_number("dt", dt, 0, MAX_SECONDS)
+        self._seconds = check_seconds("dt", dt)
         self._last = _last_value(state)
         self.adapted = Adapted(0.0, 1.0, 1.0)
 

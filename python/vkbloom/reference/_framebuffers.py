@@ -99,7 +99,7 @@ def apply(
 
     if exposure is None:
         return bloom(scene, source, settings, dtype)
-    stage = Exposing(check_exposure(exposure), 1 / 60 if dt is None else dt, state)
+    stage = Exposing(check_exposure(exposure), dt, state)
     return _expose(stage, bloom, (scene, source), settings, dtype)
 
 
