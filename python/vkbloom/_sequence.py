@@ -26,7 +26,7 @@ from vkbloom._renderer.device_arrays import Device, on_cuda
 from vkbloom._renderer.frames import Frames
 from vkbloom._renderer.renderer import Renderer
 from vkbloom._renderer.sources import SCENE_SIZE
-from vkbloom._settings.exposure import Exposure, check_exposure
+from vkbloom._settings.exposure import Exposure
 from vkbloom._settings.settings import Settings, Shading, check_settings
 
 if TYPE_CHECKING:
@@ -409,9 +409,9 @@ class Sequence(Iterable[Frames]):
         return self._state
 
     def __iter__(self) -> Iterator[Frames]:
-        return (frames for frames, _ in self._iterate())
+        return (frames for frames, _ in self.with_origins())
 
-    def _iterate(self) -> Iterator[tuple[Frames, Any]]:
+    def with_origins(self) -> Iterator[tuple[Frames, Any]]:
         """Return an iterator over frames, each with the origin of what was read of it."""
         if self._is_begun and not self._source.is_repeatable:
             raise ValueError("frames: this iterator has been read; give a list of images")
@@ -595,10 +595,9 @@ def sequence(
         raise ValueError(f"gaps: {gaps!r} is not one of error, time")
     from vkbloom._scene import Scene  # noqa: PLC0415  costs start-up time
 
-    stage = take_exposure(exposure, fields)
     # Stages in time: each is a keyword of `Renderer.apply` and `Renderer.render`.
     stages: dict[str, Any] = {
-        "exposure": None if stage is None else check_exposure(stage),
+        "exposure": take_exposure(exposure, fields),
     }
     chosen = _Chosen(settings, fields)
     how: dict[str, Any] = {"framebuffers": framebuffers, "device": device}

@@ -152,13 +152,14 @@ def test_errors_are_one_line_and_leave_nothing(words: str, error: str) -> None:
     assert_matches(f"{result.exit_code}: {one_line(result.stderr)}", error)
 
 
-# ``vkbloom presets``, ``psfs`` and ``glares``: one line each, JSON.
+# ``vkbloom presets``, ``psfs``, ``glares`` and ``exposures``: one line each, JSON.
 
 
 PUBLISHED = {
     "presets": {*vkbloom.presets},
     "glares": {*STAGES, *vkbloom.glares},
     "psfs": {*psf.__all__} - {"PSF", "iris"},
+    "exposures": {*vkbloom.exposures},
 }
 ENTRIES = {command: json.loads(run(command, "--json").stdout) for command in PUBLISHED}
 NAMES = {command: [one["name"] for one in entries] for command, entries in ENTRIES.items()}
@@ -170,11 +171,12 @@ def test_one_line_each(command: str) -> None:
     assert result.exit_code == 0
     lines = [line.split() for line in result.stdout.splitlines() if line.strip()]
     confirmed = ["confirmed", "by"] if command == "presets" else []
-    assert lines[0] == ["name", "composite", "needs", "HDR", *confirmed, "what", "whose"]
+    kind = ["composite", "needs", "HDR"] if command != "exposures" else ["bloom", "reads"]
+    assert lines[0] == ["name", *kind, *confirmed, "what", "whose"]
     # Below the heading and its rule. Names of engines end with a colon.
     rows = [words for words in lines[2:] if not words[-1].endswith(":")]
     assert [words[0] for words in rows] == NAMES[command]
-    assert all(len(words) >= 5 for words in rows)
+    assert all(len(words) >= 4 for words in rows)
 
 
 def test_presets_are_grouped_by_engine() -> None:
@@ -208,7 +210,8 @@ def test_json(command: str) -> None:
     found = ENTRIES[command]
     assert sorted(NAMES[command]) == sorted(PUBLISHED[command])
     for one in found:
-        assert {"what", "whose", "composite", "needs_hdr"} <= set(one)
+        kind = {"bloom_reads"} if command == "exposures" else {"composite", "needs_hdr"}
+        assert {"what", "whose", *kind} <= set(one)
         assert one["what"]
         assert one["whose"]
     if command == "presets":

@@ -10,6 +10,7 @@ import shutil
 import tempfile
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
+from fractions import Fraction
 from pathlib import Path
 from typing import Any, Final, TypeAlias, get_args
 
@@ -33,8 +34,9 @@ from vkbloom._cli.image_files import (
 )
 from vkbloom._cli.program import adapter_option, as_wrong_use, describe
 from vkbloom._cli.sequences import PIPE, check_targets, displayed_name, is_stream, pairs
-from vkbloom._cli.settings_options import StartOptions, start_options
+from vkbloom._cli.settings_options import StartOptions, timed_start_options
 from vkbloom._cli.terminal import complain, hides_progress, note, say, tell_device
+from vkbloom._cli.time_steps import Pair, TimeSteps, order_in_time
 from vkbloom._io import image_writing, safe_writing
 from vkbloom._io.displayed import PRIMARIES, Saved
 from vkbloom._io.narrowing import narrow, narrowing_note
@@ -49,8 +51,6 @@ from vkbloom._renderer.interruptible import open_renderer
 from vkbloom._renderer.renderer import Renderer
 from vkbloom._settings.settings import Settings
 
-#: A file to read, and the file to write.
-Pair: TypeAlias = tuple[str, str]
 #: From an image to its mask and emission.
 Glow: TypeAlias = Callable[[NDArray[Any]], dict[str, Any]]
 
@@ -82,6 +82,7 @@ class Options:
     skip_existing: bool
     expand: float | None
     start: StartOptions
+    fps: Fraction | None
 
     @property
     def saved(self) -> Saved:
@@ -123,6 +124,7 @@ class Run:
     several: bool
     kept: Collection[str]
     is_careful: bool
+    steps: TimeSteps
     failures: dict[str, Exception] = dataclasses.field(default_factory=dict)
 
     @contextlib.contextmanager
@@ -162,7 +164,9 @@ class Run:
                 with as_wrong_use():
                     glow = glow_of(picture.pixels)
                     wanted = no_bloom.with_bloom(self.options.names, settings)
-                    frames = renderer.apply(picture.pixels, settings, **glow, framebuffers=wanted)
+                    given = {**glow, **self.steps.of(pair[1]), "framebuffers": wanted}
+                    frames = renderer.apply(picture.pixels, settings, **given)
+                self.steps.advance(pair[1], frames)
                 self._tell(pair, picture, frames, expand)
                 kept = no_bloom.only(frames, self.options.names)
                 self._check_beside(pair[1], kept)
@@ -197,7 +201,8 @@ class Run:
             of_format(target, self.options.pipe_format), is_multiplied=picture.is_multiplied
         ):
             text = no_bloom.describe_hidden(frames["final"], frames.settings)
-        is_chosen = self.options.start.is_chosen
+        # (An exposure changes the picture's light as well.)
+        is_chosen = self.options.start.is_chosen and not self.options.start.stages
         if not text and is_chosen and self.options.mask is None and self.options.emission is None:
             text = faint_note(
                 added_share(picture.pixels, frames),
@@ -261,7 +266,7 @@ class Run:
                 finish(picture, frames["final"], frames.settings),
                 file,
                 self.options.saved,
-                settings_facts(frames.settings, expand),
+                settings_facts(frames.settings, expand, frames),
                 self.options.quality,
                 bits=self.options.bits,
             )
@@ -277,10 +282,7 @@ def _save_others(frames: Frames, target: Path) -> list[Path]:
     written: list[Path] = []
     for name, array in frames.items():
         if name != "final":
-            alone = Frames(
-                {name: array}, timings=frames.timings, settings=frames.settings, info=frames.info
-            )
-            written += alone.save(beside(target, name))
+            written += frames._with({name: array}).save(beside(target, name))
     return written
 
 
@@ -322,7 +324,8 @@ def _send(file: Path, target: str) -> None:
     "--fps",
     type=videos.Rate(),
     metavar="N",
-    help="Frames per second of images in a video [default 24]; of a video, instead of its times.",
+    help="Frames per second of images in a video, or with an exposure [default 24]; of a video, "
+    "instead of its times.",
 )
 @click.option(
     "--codec",
@@ -360,7 +363,7 @@ def _send(file: Path, target: str) -> None:
 @reading_options
 @glow_options
 @adapter_option
-@start_options
+@timed_start_options
 def command(*, sources: tuple[str, ...], out: str | None, adapter: str, **given: Any) -> int:
     """Add bloom to the image IN and write the result to OUT.
 
@@ -381,17 +384,20 @@ def command(*, sources: tuple[str, ...], out: str | None, adapter: str, **given:
     at the end, and the exit status is 1. See docs/command-line.md.
     """
     inputs, target = _arguments(sources, out)
-    fps, codec = given.pop("fps"), given.pop("codec")
+    codec = given.pop("codec")
     options = Options(**given)
     if any(map(is_video, (*inputs, target))):
-        how = {"fps": fps, "codec": codec, "is_named": out is not None}
+        how = {"codec": codec, "is_named": out is not None}
         videos.run(_job_of(options, inputs, target, **how), adapter)
         return 0
-    if fps is not None or codec is not None:
-        raise click.UsageError(f"--{'fps' if fps else 'codec'} is only for videos")
+    _check_only_of_videos(options, codec)
     work = _plan(options, inputs, target, is_named=out is not None)
     if not work:
         return 0
+    numbers: list[int] = []
+    if options.start.stages:
+        work, numbers = order_in_time(work)
+    by_target = {target: number for (_, target), number in zip(work, numbers, strict=False)}
     with tempfile.TemporaryDirectory() as folder, ExitStack() as stack:
 
         @functools.cache
@@ -410,12 +416,27 @@ def command(*, sources: tuple[str, ...], out: str | None, adapter: str, **given:
             several=several,
             kept=_find_protected_files(options, work),
             is_careful=not (several or out is not None or options.overwrite),
+            steps=TimeSteps(
+                options.start.stages, by_target, float(options.fps or videos.DEFAULT_RATE)
+            ),
         )
         run.sequence(work)
     written = [target for name, target in work if name not in run.failures]
     if len(work) > 1 and written:
         say(f"wrote {len(written)} images, {written[0]} to {written[-1]}")
     return _tell_failures(run.failures, work)
+
+
+def _check_only_of_videos(options: Options, codec: str | None) -> None:
+    """Raise click.UsageError for options of videos, or of frames in time, in a call for images."""
+    if codec is not None:
+        raise click.UsageError("--codec is only for videos")
+    if options.fps is not None and not options.start.stages:
+        raise click.UsageError("--fps is only for videos, and for images with --exposure NAME")
+    if options.skip_existing and options.start.stages:
+        raise click.UsageError(
+            "--skip-existing: each image continues the exposure of the one before; leave it out"
+        )
 
 
 def _job_of(options: Options, sources: list[str], out: str, **given: Any) -> videos.Job:

@@ -8,6 +8,8 @@ import json
 import os
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final
 
 import click
@@ -19,10 +21,12 @@ from vkbloom._cli.image_files import silence
 from vkbloom._cli.program import is_given
 from vkbloom._cli.sequences import as_file
 from vkbloom._io.array_files import read
+from vkbloom._io.glows import grey_mask
 from vkbloom._psf.base import PSF, functions
+from vkbloom._settings.exposure import Exposure, exposures
 from vkbloom._settings.fields import FieldInfo, Kind, fields_of
 from vkbloom._settings.glare import Glare, glares
-from vkbloom._settings.registry import METHODS, STAGES
+from vkbloom._settings.registry import EXPOSURES, METHODS, STAGES
 from vkbloom._settings.settings import Settings, presets
 from vkbloom._spelling import describe_unknown, did_you_mean, nearest
 
@@ -145,6 +149,28 @@ def _read_glare(word: str) -> tuple[Glare, ...]:
     return tuple(results)
 
 
+def _read_exposure(word: str) -> Exposure | float:
+    """Parse stops, or the name of an exposure or of a class of them with fields."""
+    with suppress(ValueError):
+        return float(word)
+    name, _, rest = word.partition(":")
+    name, fields = name.lower(), _read_fields(rest)
+    if isinstance(file := fields.get("mask"), str):
+        fields["mask"] = grey_mask(read_colours(file), file)
+    if name in exposures:
+        with_names = exposures[name].to_dict() | fields
+        return Exposure.from_dict(with_names) if fields else exposures[name]
+    if name in EXPOSURES:
+        return Exposure.from_dict({"engine": name} | fields)
+    known = dict.fromkeys([*exposures, *EXPOSURES])
+    raise ValueError(
+        f"is neither a number of stops nor one of {', '.join(known)}{did_you_mean(name, known)}"
+    )
+
+
+#: The type of an option for the field `exposure` that takes a stage in time, too.
+EXPOSURE: Final = _ExplainedWord("STOPS|NAME[:A=1,...]", _read_exposure)
+
 _OPTION_TYPES: Final[Mapping[Kind, _ParamType]] = {
     "psf": _ExplainedWord("NAME[:A=1,...]|FILE", _read_psf),
     "glare": _ExplainedWord("NAME[:A=1,...]+...", _read_glare),
@@ -202,7 +228,13 @@ class FieldOption(click.Option):
     `Command` lists it under the labels of the classes that have it; None: with its own options.
     """
 
-    def __init__(self, infos: Mapping[str, FieldInfo], into: str, prefix: str) -> None:
+    def __init__(
+        self,
+        infos: Mapping[str, FieldInfo],
+        into: str,
+        prefix: str,
+        kind: tuple[_ParamType, str] | None = None,
+    ) -> None:
         first = next(iter(infos.values()))
         kinds = {(info.kind, info.choices) for info in infos.values()}
         if len(kinds) > 1:
@@ -211,11 +243,12 @@ class FieldOption(click.Option):
         widest = next((info for info in infos.values() if info.optional), first)
         option = f"{prefix}{first.option}".replace("_", "-")
         is_flag = first.kind == "flag"
+        more = [kind[1]] if kind else []
         super().__init__(
             [f"--{option}/--no-{option}" if is_flag else f"--{option}", option.replace("-", "_")],
             default=None,
-            type=None if is_flag else option_type(widest),
-            help=" ".join(_help(label, info) for label, info in infos.items()),
+            type=None if is_flag else kind[0] if kind else option_type(widest),
+            help=" ".join([*(_help(label, info) for label, info in infos.items()), *more]),
             expose_value=False,
         )
         self.field = first.name
@@ -247,6 +280,8 @@ class FieldOptions(click.Option):
       call.
     - `base`: A dataclass whose fields get no options.
     - `prefix`: Of the options' names, as in "camera-".
+    - `types`: Types of options by field, other than those of their fields, each with a sentence for
+      the help.
     """
 
     def __init__(
@@ -255,10 +290,11 @@ class FieldOptions(click.Option):
         kinds: Mapping[str, type[Any]],
         base: type[Any] | None = None,
         prefix: str = "",
+        types: Mapping[str, tuple[_ParamType, str]] = MappingProxyType({}),
     ) -> None:
         (self.into,) = param_decls
         super().__init__([f"--{self.into}-fields", self.into], hidden=True, expose_value=False)
-        self._kinds, self._base, self._prefix = kinds, base, prefix
+        self._kinds, self._base, self._prefix, self._types = kinds, base, prefix, types
         self._make: tuple[dict[str, type[Any]], list[FieldOption]] = {}, []
 
     def options(self) -> list[FieldOption]:
@@ -279,7 +315,10 @@ class FieldOptions(click.Option):
                         # A custom method was loaded for this call: its field has the option.
                         del fields[info.option]
                     fields.setdefault(info.option, {})[label] = info
-            made = [FieldOption(infos, self.into, self._prefix) for infos in fields.values()]
+            made = [
+                FieldOption(infos, self.into, self._prefix, self._types.get(option))
+                for option, infos in fields.items()
+            ]
             self._make = kinds, made
         return self._make[1]
 
@@ -370,10 +409,16 @@ def _records(ctx: click.Context, options: Iterable[click.Option]) -> list[tuple[
 
 
 def options(
-    kinds: Mapping[str, type[Any]], into: str, *, base: type[Any] | None = None, prefix: str = ""
+    kinds: Mapping[str, type[Any]],
+    into: str,
+    *,
+    base: type[Any] | None = None,
+    prefix: str = "",
+    types: Mapping[str, tuple[_ParamType, str]] = MappingProxyType({}),
 ) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-    """Return a decorator that adds `FieldOptions` to a `Command`."""
-    return click.option(into, cls=FieldOptions, kinds=kinds, base=base, prefix=prefix)
+    """Return a decorator that adds `FieldOptions` to a `Command`; `types`: as of it."""
+    how = {"kinds": kinds, "base": base, "prefix": prefix, "types": types}
+    return click.option(into, cls=FieldOptions, **how)
 
 
 class NameOf(_ParamType):

@@ -223,8 +223,7 @@ def _save(
     settings = frames.settings
     if name == "final" and picture is not None:
         final = image_files.finish(picture, frames[name], settings)
-        image_writing.save(final, path, None, settings_facts(settings, expand))
+        image_writing.save(final, path, None, settings_facts(settings, expand, frames))
     else:
         # Without the timings, so that the same call writes the same file.
-        alone = {name: frames[name]}
-        Frames(alone, timings={}, settings=settings, info=frames.info).save(path)
+        frames._with({name: frames[name]}, timings={}).save(path)

@@ -15,6 +15,7 @@ from rich.table import Table
 from rich.text import Text
 
 from vkbloom._cli.terminal import Form, json_option
+from vkbloom._exposure.presets import PRESETS as PRESET_EXPOSURES
 from vkbloom._presets.named_glares import GLARES
 from vkbloom._presets.named_settings import PRESETS, Engine
 from vkbloom._psf.base import functions
@@ -24,11 +25,19 @@ from vkbloom._settings.registry import STAGES
 
 # Console width for output to a file or another program, where lines must not be wrapped.
 _UNBROKEN: Final = 4096
+# The columns of a table before those that are cut, by title.
+_TITLES: Final = {
+    "name": "name",
+    "composite": "composite",
+    "needs HDR": "needs_hdr",
+    "bloom reads": "bloom_reads",
+    "confirmed by": "confirmed",
+}
 
 
 #: What has a published name, as --json prints it: "name"; "what" it looks like; "whose" it is, its
-#: source; "composite", how its light comes into the picture; "needs_hdr", whether only values above
-#: 1 glow; and further keys.
+#: source; of blooms "composite", how its light comes into the picture, and "needs_hdr", whether
+#: only values above 1 glow; of exposures "bloom_reads", which light; and further keys.
 Entry: TypeAlias = dict[str, Any]
 
 
@@ -49,9 +58,9 @@ def _command(entries: Callable[[], Iterable[Entry]]) -> click.Command:
 def _table(entries: Iterable[Entry]) -> Table:
     """Return a table of one line for each entry; a narrow terminal cuts the last two columns."""
     listed = list(entries)
-    is_grouped = any("engine" in item for item in listed)
+    titles = {title: key for title, key in _TITLES.items() if any(key in item for item in listed)}
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-    for title in ("name", "composite", "needs HDR", *["confirmed by"] * is_grouped):
+    for title in titles:
         table.add_column(title, no_wrap=True)
     # Columns that rich makes narrower, with texts that it does not wrap.
     table.add_column("what")
@@ -62,10 +71,12 @@ def _table(entries: Iterable[Entry]) -> Table:
             engine = item["engine"]
             table.add_row(Text(f"{engine}:", style="bold"))
         cut = (Text(item[key], no_wrap=True, overflow="ellipsis") for key in ("what", "whose"))
-        confirmed = [item["confirmed"]] if is_grouped else []
-        hdr = "yes" if item["needs_hdr"] else "no"
-        table.add_row(item["name"], item["composite"], hdr, *confirmed, *cut)
+        table.add_row(*(_word_of(item[key]) for key in titles.values()), *cut)
     return table
+
+
+def _word_of(value: str | bool) -> str:
+    return value if isinstance(value, str) else "yes" if value else "no"
 
 
 def _show(table: Table) -> None:
@@ -144,4 +155,20 @@ def psf_entries() -> Iterator[Entry]:
         }
 
 
-presets, glares, psfs = map(_command, (preset_entries, glare_entries, psf_entries))
+def exposure_entries() -> Iterator[Entry]:
+    """List the exposures that --exposure takes: how engines meter a frame and adapt to it.
+
+    What they meter, how they follow it, and which light the bloom reads.
+    """
+    for name, item in PRESET_EXPOSURES.items():
+        exposure = item.make()
+        light = "exposed light" if exposure._exposes_bloom else "light"
+        yield {
+            **{"name": name, "what": item.what, "whose": item.whose},
+            **{"bloom_reads": light, "exposure": exposure.to_dict()},
+        }
+
+
+presets, glares, psfs, exposures = map(
+    _command, (preset_entries, glare_entries, psf_entries, exposure_entries)
+)

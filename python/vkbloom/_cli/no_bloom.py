@@ -25,12 +25,7 @@ def only(frames: Frames, names: str | Sequence[str]) -> Frames:
     """Return frames with only these framebuffers; "all": with all."""
     if isinstance(names, str) or set(frames) == set(names):
         return frames
-    return Frames(
-        {name: array for name, array in frames.items() if name in names},
-        timings=frames.timings,
-        settings=frames.settings,
-        info=frames.info,
-    )
+    return frames._with({name: array for name, array in frames.items() if name in names})
 
 
 def is_without(frames: Frames) -> bool:

@@ -36,6 +36,7 @@ COMMANDS: Final = {
     "presets": "List the presets",
     "glares": "List the stages and published names of glare",
     "psfs": "List the point-spread functions",
+    "exposures": "List the exposures of engines",
     "adapters": "List the Vulkan adapters that vkbloom can use",
     "doctor": "Check whether this machine can render, and explain what prevents it",
     "warm": "Fill the caches of pipelines and kernels before the first call needs them",
@@ -44,7 +45,7 @@ COMMANDS: Final = {
 # Modules of several commands, and of a command's package.
 _MODULES: Final = {
     "check": "check.command",
-    **dict.fromkeys(("presets", "glares", "psfs"), "listing"),
+    **dict.fromkeys(("presets", "glares", "psfs", "exposures"), "listing"),
     **dict.fromkeys(("fit", "translate"), "search"),
     **dict.fromkeys(("view", "explore"), "live"),
     "adapters": "doctor",

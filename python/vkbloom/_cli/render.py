@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import click
 
@@ -10,7 +11,7 @@ from vkbloom._cli import no_bloom
 from vkbloom._cli.fields import SIZE, Command
 from vkbloom._cli.program import adapter_option, as_wrong_use
 from vkbloom._cli.scene_options import scene_options
-from vkbloom._cli.settings_options import settings_options
+from vkbloom._cli.settings_options import timed_settings_options
 from vkbloom._cli.terminal import note, say, tell_device
 from vkbloom._framebuffers import leading
 from vkbloom._renderer import frame_files
@@ -36,7 +37,7 @@ from vkbloom._settings.settings import SHADINGS, Settings, Shading
 @click.option("--framebuffers", metavar="all|NAME,...", default="all", help="What to write.")
 @adapter_option
 @scene_options
-@settings_options
+@timed_settings_options
 def command(
     *,
     out: str,
@@ -47,6 +48,7 @@ def command(
     adapter: str,
     scene: Callable[[], Scene],
     settings: Settings,
+    stages: dict[str, Any],
 ) -> None:
     """Render a scene with its bloom and write the framebuffers.
 
@@ -66,6 +68,7 @@ def command(
                 time=time,
                 framebuffers=no_bloom.with_bloom(names, settings),
                 shading=shading,
+                **stages,
             )
             if loaded.glow is not None and no_bloom.is_without(frames):
                 note(no_bloom.reason(settings))

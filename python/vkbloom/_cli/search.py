@@ -204,8 +204,8 @@ def _list_starts(
     begun = [start_of(highlights, METHODS[kind]()) for kind in kinds]
     begun += [start_of(highlights, name) for name in presets if name != "all"]
     if stored is not None:
-        settings, expand = read_settings(stored)
-        begun.append(start_of(highlights, settings, expand=expand))
+        held = read_settings(stored)
+        begun.append(start_of(highlights, held.settings, expand=held.expand))
     return begun if begun or "all" in presets else [start_of(highlights)]
 
 

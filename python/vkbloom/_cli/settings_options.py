@@ -7,7 +7,7 @@ import functools
 import json
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import click
 
@@ -24,10 +24,13 @@ from vkbloom._presets.start import (
     Start,
     start_of,
 )
+from vkbloom._renderer.default import take_exposure
 from vkbloom._renderer.frame_files import facts_of
+from vkbloom._settings.exposed import read_record
+from vkbloom._settings.exposure import MAX_SECONDS, Exposure
 from vkbloom._settings.fields import fields_of
 from vkbloom._settings.registry import METHODS
-from vkbloom._settings.settings import EXPANDED, Settings, presets
+from vkbloom._settings.settings import EXPANDED, STAGES_IN_TIME, Settings, presets
 
 #: The presets that a call without --preset and --method may start from.
 DEFAULT_PRESETS: Final = (PRESET_OF_IMAGES, PRESET_OF_PHOTOS, PRESET_OF_SCENES)
@@ -39,16 +42,53 @@ def settings_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """Add the options of the settings to a command; its argument `settings` has the result."""
 
     def run(*, start: StartOptions, **rest: Any) -> Any:
-        settings, expand = start.of_file(str(rest.get("source") or ""))
-        if "expand" in rest:
-            rest["expand"] = expand
-        return command(settings=settings, **rest)
+        return command(**_settings_of(start, rest), **rest)
 
     return start_options(functools.update_wrapper(run, command))
 
 
-def start_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add the options of the settings to a command; its argument `start` has them."""
+def timed_settings_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Add the same, and options of stages in time; the argument `stages` has keywords of a call."""
+
+    @click.option(
+        "--dt",
+        metavar="SECONDS",
+        type=click.FloatRange(0, MAX_SECONDS),
+        help="Time since the frame before, with an exposure [default 1/60]",
+    )
+    def run(*, start: StartOptions, dt: float | None, **rest: Any) -> Any:
+        stages = dict(start.stages)
+        if dt is not None:
+            if not stages:
+                raise click.UsageError("--dt is the step of an exposure; give --exposure NAME")
+            stages["dt"] = dt
+        return command(**_settings_of(start, rest), stages=stages, **rest)
+
+    return start_options(functools.update_wrapper(run, command), is_timed=True)
+
+
+def _settings_of(start: StartOptions, rest: dict[str, Any]) -> dict[str, Any]:
+    """Return the settings of a call; the argument `expand` of the others gets its value."""
+    settings, expand = start.of_file(str(rest.get("source") or ""))
+    if "expand" in rest:
+        rest["expand"] = expand
+    return {"settings": settings}
+
+
+#: What --exposure takes in commands with stages in time.
+_TIMED: Final = {
+    "exposure": (
+        fields.EXPOSURE,
+        "Or the exposure of an engine, which follows the light; vkbloom exposures lists them.",
+    )
+}
+
+
+def start_options(command: Callable[..., Any], *, is_timed: bool = False) -> Callable[..., Any]:
+    """Add the options of the settings to a command; its argument `start` has them.
+
+    `is_timed`: The command has stages in time.
+    """
 
     @click.option(
         "--preset",
@@ -62,7 +102,7 @@ def start_options(command: Callable[..., Any]) -> Callable[..., Any]:
         type=fields.NameOf("method", METHODS),
         help="The method of the blur, with its defaults, or a file of a custom method.",
     )
-    @fields.options({"": Settings}, "shared")
+    @fields.options({"": Settings}, "shared", types=_TIMED if is_timed else {})
     @fields.options(METHODS, "of_method", base=Settings)
     @click.option(
         "--settings",
@@ -83,7 +123,9 @@ def start_options(command: Callable[..., Any]) -> Callable[..., Any]:
     ) -> Any:
         if stored is not None and preset is not None:
             raise click.UsageError("--settings and --preset exclude each other; leave one out")
+        exposure = take_exposure(shared.pop("exposure", None), shared)
         start = StartOptions(
+            exposure=exposure,
             preset=preset,
             method=method,
             stored=None if stored is None else read_settings(stored),
@@ -98,20 +140,26 @@ def start_options(command: Callable[..., Any]) -> Callable[..., Any]:
     return run
 
 
+#: The same for a command with stages in time, whose frames it reads.
+timed_start_options: Final = functools.partial(start_options, is_timed=True)
+
+
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class StartOptions:
     """What the options of a call say of its settings, for `start_of`.
 
-    - `stored`: Settings of a file, and what its picture was expanded up to.
+    - `stored`: What a file holds of settings.
+    - `exposure`: A stage in time.
     - `expand`: What highlights are expanded up to, if the call says it.
     - `subimage`, `layer`, `colour`: How image files are read.
     """
 
     preset: str | None
     method: str | None
-    stored: tuple[Settings, float | None] | None
+    stored: Stored | None
     changes: dict[str, Any]
     expand: float | None
+    exposure: Exposure | None = None
     subimage: int = 0
     layer: str | None = None
     colour: str | None = None
@@ -120,6 +168,13 @@ class StartOptions:
     def is_chosen(self) -> bool:
         """Whether the call names what it starts from."""
         return self.preset is not None or self.method is not None or self.stored is not None
+
+    @property
+    def stages(self) -> Mapping[str, Any]:
+        """The keywords of a call for its stages in time."""
+        if self.exposure is not None:
+            return {"exposure": self.exposure}
+        return {} if self.stored is None else self.stored.stages
 
     def of_file(self, image: str) -> Start:
         """Return where an image file starts; "": a scene."""
@@ -131,7 +186,7 @@ class StartOptions:
         """Return where an image with these highlights starts; None: a scene."""
         expand = self.expand
         if expand is None and self.stored is not None:
-            expand = self.stored[1]
+            expand = self.stored.expand
         begun = self._find_start() or start_of(highlights).settings
         _check_declared(begun, self.changes)
         with as_wrong_use():
@@ -140,7 +195,7 @@ class StartOptions:
     def _find_start(self) -> Settings | None:
         """Return what the settings start from; None: the default for the source."""
         if self.stored is not None:
-            begun = self.stored[0]
+            begun = self.stored.settings
         elif self.preset is not None:
             begun = presets[self.preset]
         else:
@@ -151,8 +206,20 @@ class StartOptions:
         return begun
 
 
-def read_settings(name: str) -> tuple[Settings, float | None]:
-    """Return the settings of a file, and what the highlights of its picture were expanded up to."""
+class Stored(NamedTuple):
+    """What a file holds of settings.
+
+    - `expand`: What the highlights of its picture were expanded up to.
+    - `stages`: Keywords of a call for its stages in time.
+    """
+
+    settings: Settings
+    expand: float | None
+    stages: Mapping[str, Any]
+
+
+def read_settings(name: str) -> Stored:
+    """Return the settings of a file, and what else it holds of them."""
     with silence(), as_file(name) as file:
         try:
             with open(file, "rb") as stream:
@@ -160,7 +227,8 @@ def read_settings(name: str) -> tuple[Settings, float | None]:
             if is_json or name.lower().endswith(".json"):
                 text = Path(file).read_text(encoding="utf-8-sig")
                 settings = Settings.from_json(text)
-                expand = json.loads(text).get(EXPANDED)
+                values = json.loads(text)
+                expand, stages = values.get(EXPANDED), values.get(STAGES_IN_TIME)
             else:
                 facts = facts_of(file)
                 if "settings" not in facts:
@@ -168,8 +236,12 @@ def read_settings(name: str) -> tuple[Settings, float | None]:
                         "holds no settings; PNG and OpenEXR files of vkbloom hold them"
                     )
                 settings = Settings.from_json(facts["settings"])
-                expand = facts.get("expand")
-            return settings, None if expand is None else check_expansion(float(expand))
+                expand, stages = facts.get("expand"), json.loads(facts.get("stages", "null"))
+            return Stored(
+                settings,
+                None if expand is None else check_expansion(float(expand)),
+                {} if stages is None else read_record(stages),
+            )
         except (TypeError, ValueError) as error:
             reason = str(error)
             raise ValueError(reason if file in reason else f"{file}: {reason}") from error

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
+import itertools
 import os
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator, Mapping
+from collections.abc import Sequence as AnySequence
 from contextlib import ExitStack, closing
 from fractions import Fraction
 from pathlib import Path
@@ -13,6 +16,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import click
 import numpy as np
+from numpy.typing import NDArray
 from tqdm import tqdm
 
 from vkbloom._background_writer import write_in_background
@@ -34,16 +38,19 @@ from vkbloom._io.video.coding import Codec, Coding
 from vkbloom._io.video.reading import VideoFile, is_video
 from vkbloom._presets.start import Start
 from vkbloom._renderer.frame_files import settings_facts
+from vkbloom._renderer.frames import Frames
 from vkbloom._renderer.interruptible import open_renderer
 from vkbloom._renderer.renderer import Renderer
+from vkbloom._sequence import Clock, Input, Sequence, Taken, work_of_images
+from vkbloom._settings.settings import Settings
 
 if TYPE_CHECKING:
     _ParamType = click.ParamType[Fraction]
 else:
     _ParamType = click.ParamType
 
-# Frames per second of images.
-_DEFAULT_RATE: Final = Fraction(24)
+#: Frames per second of images.
+DEFAULT_RATE: Final = Fraction(24)
 _MAX_DENOMINATOR: Final = 1001 * 1000
 _RATE: Final = re.compile(r"[0-9]+(\.[0-9]+|/[0-9]+)?\Z")
 
@@ -116,13 +123,19 @@ class _First(NamedTuple):
 
 
 class _Clip(NamedTuple):
-    """What is read: frames, about how many, their rate, the unit of time, a file with audio."""
+    """What is read: frames, about how many, their rate, the unit of time, a file with audio.
+
+    - `steps`: Frames per second in which stages in time count; None: frames have their own times.
+    - `places`: The number of each frame, counted from the first; None: none is missing.
+    """
 
     frames: Iterator[_Frame]
     expected: int | None
     rate: Fraction
     time_base: Fraction
     audio: str
+    steps: float | None
+    places: AnySequence[int] | None = None
 
 
 def check(job: Job) -> None:
@@ -189,7 +202,7 @@ def run(job: Job, adapter: str) -> None:
             leave=False,
             disable=hides_progress(),
         )
-        made = _make(job, bar, clip, adapter, stack)
+        made = _make(job, iter(bar), clip, adapter, stack)
         # Closed before the files are: Ctrl-C waits for the frame that the thread writes.
         with closing(write_in_background(made)) as written:
             count = sum(1 for _ in written)
@@ -231,14 +244,15 @@ def _open(job: Job, stack: ExitStack) -> _Clip:
                 yield _Frame(picture, place, time, duration, frame.coding, frame.aspect)
 
     unit = file.time_base if job.fps is None else 1 / rate
-    return _Clip(frames(), file.frames_expected, rate, unit, source if is_copied else "")
+    steps = None if job.fps is None else float(rate)
+    return _Clip(frames(), file.frames_expected, rate, unit, source if is_copied else "", steps)
 
 
 def _open_images(job: Job) -> _Clip:
     files = [file for source in job.sources for file in expand(source)]
     if (missing := gap_note(files)) is not None:
         note(f"{job.sources[0]}: {missing}; they are time in which the frame before stays")
-    rate = job.fps or _DEFAULT_RATE
+    rate = job.fps or DEFAULT_RATE
     numbers = [number for _, number in files if number is not None]
     is_numbered = len(numbers) == len(files) and len(job.sources) == 1
     places = [number - numbers[0] for number in numbers] if is_numbered else range(len(files))
@@ -250,61 +264,91 @@ def _open_images(job: Job) -> _Clip:
             duration = (after - place) / rate
             yield _Frame(picture, place, place / rate, duration, None, Fraction(1))
 
-    return _Clip(frames(), len(files), rate, 1 / rate, "")
+    return _Clip(frames(), len(files), rate, 1 / rate, "", float(rate), places)
+
+
+class _Reading(Input):
+    """Frames as a sequence reads them, once; the origin of each is the frame and its picture."""
+
+    is_repeatable = False
+
+    def __init__(self, frames: Iterator[_Frame], clip: _Clip, start: Start, job: Job) -> None:
+        self._frames, self._clip, self._start, self._job = frames, clip, start, job
+
+    @property
+    def settings(self) -> Settings:
+        return self._start.settings
+
+    def read(self, first: int) -> Generator[Taken, None, None]:
+        for frame in itertools.islice(self._frames, first, None):
+            picture = self.develop(frame)
+            time, duration = float(frame.time), float(frame.duration)
+            yield Taken(picture.pixels, time, duration, (frame, picture))
+
+    def develop(self, frame: _Frame) -> Picture:
+        """Return the picture whose pixels the bloom reads."""
+        picture = self._start.develop(frame.picture)
+        if not self._job.half:
+            return picture
+        return dataclasses.replace(picture, pixels=narrow(picture.pixels, np.dtype(np.float16)))
+
+    def count(self) -> int | None:
+        return None
+
+    def place_of(self, number: int) -> int:
+        return number if self._clip.places is None else self._clip.places[number]
 
 
 def _make(
     job: Job, frames: Iterator[_Frame], clip: _Clip, adapter: str, stack: ExitStack
 ) -> Iterator[tuple[None, Callable[[], object]]]:
     """Yield of each frame the function that writes it."""
-    start: Start | None = None
-    renderer: Renderer | None = None
-    write: Callable[[_Frame, Picture], object] | None = None
-    glow: Any = None
-    for frame in frames:
-        if start is None:
-            # Those of the first frame are those of all, so that nothing jumps.
-            start = job.start.of(frame.picture.highlights)
-        picture = start.develop(frame.picture)
-        if job.half:
-            picture = dataclasses.replace(
-                picture, pixels=narrow(picture.pixels, np.dtype(np.float16))
-            )
-        if renderer is None:
-            renderer = stack.enter_context(open_renderer(adapter))
-            tell_device(renderer)
-            is_blended = start.settings.alpha != "keep"
-            glows = read_glows(job.mask, job.emission, job.input_colour, is_blended=is_blended)
-            glow = glows.of
-        wanted = ["final"] if write else no_bloom.with_bloom(["final"], start.settings)
-        chosen = start.settings._in_sequence(frame.place, {})
-        with as_wrong_use():
-            made = renderer.apply(
-                picture.pixels, chosen, **glow(picture.pixels), framebuffers=wanted
-            )
-        if no_bloom.is_without(made):
-            note(f"in the first frame, {no_bloom.reason(start.settings)}")
+    begun = next(frames, None)
+    if begun is None:
+        return
+    # Those of the first frame are those of all, so that nothing jumps.
+    start = job.start.of(begun.picture.highlights)
+    renderer = stack.enter_context(open_renderer(adapter))
+    tell_device(renderer)
+    is_blended = start.settings.alpha != "keep"
+    glows = read_glows(job.mask, job.emission, job.input_colour, is_blended=is_blended)
+    reading = _Reading(itertools.chain([begun], frames), clip, start, job)
+    given = job.start.stages
+    stages = {"exposure": given.get("exposure")}
+    how = {"framebuffers": ["final"]}
+    work = work_of_images(lambda: renderer, glows.of, how, stages)
+    state = given.get("state")
+    first = Taken(reading.develop(begun).pixels)
+    _check_first(renderer, first.image, start.settings, {**glows.of(first.image), **given})
+    write: Callable[[_Frame, Picture, Frames], object] | None = None
+    sequence = Sequence(reading, work, Clock(clip.steps, None), state=state)
+    for made, (frame, picture) in sequence.with_origins():
         final = finish(picture, made["final"], start.settings)
         if write is None:
             write = _writer_of(job, clip, _First(frame, final, start), stack)
-        yield None, _bind(write, frame, final)
+        yield None, functools.partial(write, frame, final, made)
 
 
-def _bind(
-    write: Callable[[_Frame, Picture], object], frame: _Frame, final: Picture
-) -> Callable[[], object]:
-    return lambda: write(frame, final)
+def _check_first(
+    renderer: Renderer, image: NDArray[Any], settings: Settings, given: Mapping[str, Any]
+) -> None:
+    """Compute the first frame, so that wrong options fail, and print a note if it has no bloom."""
+    names = no_bloom.with_bloom(["final"], settings)
+    with as_wrong_use():
+        made = renderer.apply(image, settings, **given, framebuffers=names)
+    if no_bloom.is_without(made):
+        note(f"in the first frame, {no_bloom.reason(settings)}")
 
 
 def _writer_of(
     job: Job, clip: _Clip, first: _First, stack: ExitStack
-) -> Callable[[_Frame, Picture], object]:
+) -> Callable[[_Frame, Picture, Frames], object]:
     """Return the function that writes a frame."""
     if not is_video(job.out):
         pattern, folder = _pattern_of(job.out), os.path.dirname(job.out)
-        facts = settings_facts(first.start.settings, first.start.expand)
 
-        def save(frame: _Frame, picture: Picture) -> None:
+        def save(frame: _Frame, picture: Picture, made: Frames) -> None:
+            facts = settings_facts(first.start.settings, first.start.expand, made)
             file = Path(folder, pattern.name_of(frame.place))
             file.parent.mkdir(exist_ok=True)
             image_writing.save(picture, file, job.saved, facts, job.quality, bits=job.bits)
@@ -325,4 +369,4 @@ def _writer_of(
         audio=clip.audio,
     )
     video = stack.enter_context(writing.writing(job.out, layout))
-    return lambda frame, picture: video.write(picture, frame.time, frame.duration)
+    return lambda frame, picture, _: video.write(picture, frame.time, frame.duration)

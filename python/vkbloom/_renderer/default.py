@@ -19,7 +19,7 @@ from vkbloom._renderer.frames import Frames
 from vkbloom._renderer.image import Image
 from vkbloom._renderer.renderer import Renderer
 from vkbloom._renderer.sources import SCENE_SIZE
-from vkbloom._settings.exposure import Exposure
+from vkbloom._settings.exposure import Exposure, check_exposure
 from vkbloom._settings.settings import Settings, Shading, check_settings
 
 if TYPE_CHECKING:
@@ -147,10 +147,10 @@ def apply(
 
 def take_exposure(
     exposure: Exposure | str | float | None, fields: dict[str, Any]
-) -> Exposure | str | None:
+) -> Exposure | None:
     """Return the exposure of a call; a number is a field of its settings."""
     if exposure is None or isinstance(exposure, Exposure | str):
-        return exposure
+        return None if exposure is None else check_exposure(exposure)
     fields["exposure"] = exposure
     return None
 

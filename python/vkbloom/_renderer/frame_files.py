@@ -200,12 +200,19 @@ def facts_of(path: str | os.PathLike[str]) -> dict[str, str]:
         return _facts(reader.spec())
 
 
-def settings_facts(settings: Settings, expand: float | None) -> dict[str, str]:
-    """Return what an image file holds of the settings that made it, for `facts_of`."""
+def settings_facts(
+    settings: Settings, expand: float | None, frames: Framebuffers | None = None
+) -> dict[str, str]:
+    """Return what an image file holds of the settings that made it, for `facts_of`.
+
+    - `frames`: The call's, whose stages in time the file holds as well.
+    """
     facts = {
         "Software": f"vkbloom {installed_version()}",
         "vkbloom:settings": json.dumps(settings.to_dict()),
     }
+    if frames is not None:
+        facts |= {f"vkbloom:{name}": text for name, text in frames._stages().items()}
     return facts if expand is None else {**facts, "vkbloom:expand": f"{expand:g}"}
 
 
@@ -309,6 +316,7 @@ def _attributes(frames: Framebuffers, name: str, file: Path, saved: str) -> dict
     adapter = frames.info.get("adapter", "an unnamed adapter")
     facts = {
         **{key: str(value) for key, value in frames.info.items()},
+        **frames._stages(),
         "settings": settings,
         "timings": json.dumps(dict(frames.timings)),
         "dtype": str(frames[name].dtype),

@@ -28,3 +28,7 @@ class Framebuffers(Mapping[str, NDArray[Any]]):
     @abc.abstractmethod
     def info(self) -> dict[str, Any]:
         """Adapter, driver and version, and the numbers of "nan" and "inf" values in the input."""
+
+    def _stages(self) -> dict[str, str]:
+        """Return the stages in time of a call that had some, as JSON by the key "stages"."""
+        return {name: text for name, text in self.info.items() if name == "stages"}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 from collections.abc import Callable, Iterator, Mapping
 from types import MappingProxyType
@@ -11,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom._argument_types import check_arguments
+from vkbloom._errors import Error
 from vkbloom._extras import import_extra
 from vkbloom._formats import IMAGE_DTYPES
 from vkbloom._framebuffers import dimensions
@@ -25,6 +27,7 @@ if TYPE_CHECKING:
 
     import xarray
 
+    from vkbloom._settings.exposed import ExposedSettings
     from vkbloom._settings.settings import Settings
 
 _CHANNELS = ("r", "g", "b", "a")
@@ -69,6 +72,7 @@ class Frames(Framebuffers):
         self._end: Callable[[], tuple[dict[str, float], int, int]] | None = None
         self._state = State()
         self._is_exposed = "exposure" in self._arrays
+        self._exposed: ExposedSettings | None = None
 
     def _finish(self, timings: dict[str, float], nan: int, inf: int) -> None:
         """Add what is known when the device has finished."""
@@ -88,8 +92,28 @@ class Frames(Framebuffers):
         """Return the same with arrays of NumPy: this object, if it has no others."""
         if not any(isinstance(array, DeviceArray) for array in self._arrays.values()):
             return self
-        arrays = {name: on_host(array) for name, array in self._arrays.items()}
-        return Frames(arrays, timings=self.timings, settings=self._settings, info=self.info)
+        return self._with({name: on_host(array) for name, array in self._arrays.items()})
+
+    def _with(
+        self, arrays: Mapping[str, NDArray[Any]], timings: Mapping[str, float] | None = None
+    ) -> Frames:
+        """Return frames of the same call with other arrays."""
+        times = self.timings if timings is None else timings
+        made = Frames(arrays, timings=times, settings=self._settings, info=self.info)
+        made._state, made._exposed = self._state, self._exposed
+        made._is_exposed = self._is_exposed
+        return made
+
+    def _stages(self) -> dict[str, str]:
+        if self._exposed is None:
+            return super()._stages()
+        import json  # noqa: PLC0415  costs start-up time
+
+        # (It is not read if the renderer is closed.)
+        before = None
+        with contextlib.suppress(Error, ValueError):
+            before = self._state.before()
+        return {"stages": json.dumps(self._exposed.to_record(before))}
 
     @property
     def timings(self) -> Mapping[str, float]:

@@ -568,10 +568,10 @@ class Renderer:
         settings: Settings | str | Sequence[Settings | str] | None,
         *,
         framebuffers: Literal["all"] | str | Sequence[str],
-        device: Device | None,
-        exposure: Exposure | str | None,
-        dt: float | Iterable[float | None] | None,
-        state: Mapping[str, Any] | None,
+        device: Device | None = None,
+        exposure: Exposure | str | None = None,
+        dt: float | Iterable[float | None] | None = None,
+        state: Mapping[str, Any] | None = None,
         first: int = 0,
     ) -> Iterator[Frames]:
         """Return what `map` does; `first` is the number of the first image in its sequence."""
@@ -979,7 +979,7 @@ class Renderer:
         exposed = settings if isinstance(settings, ExposedSettings) else None
         plain = exposed.settings if exposed else settings
         frames = Frames(arrays, timings={}, settings=plain, info=self._made_by)
-        frames._is_exposed = exposed is not None
+        frames._is_exposed, frames._exposed = exposed is not None, exposed
         if state is not None:
             frames._state = state
         return frames

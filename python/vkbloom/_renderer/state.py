@@ -59,14 +59,11 @@ class State(Mapping[str, "NDArray[Any]"]):
             copied = np.array(array, order="C")
             copied.flags.writeable = False
             self._images[name] = copied
+        #: Images of one texel that the call before continued.
+        self._before: dict[str, NDArray[Any] | Kept] = {}
 
     def __getitem__(self, name: str) -> NDArray[Any]:
-        image = self._images[name]
-        if isinstance(image, Kept):
-            array = image.read()
-            array.flags.writeable = False
-            self._images[name] = image = array
-        return image
+        return _read(self._images, name)
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._images)
@@ -91,6 +88,10 @@ class State(Mapping[str, "NDArray[Any]"]):
 
     def __reduce__(self) -> tuple[Any, ...]:
         return State, (dict(self),)
+
+    def before(self) -> dict[str, Any]:
+        """Return what the call before continued, of one texel each, as lists of numbers."""
+        return {name: _read(self._before, name).tolist() for name in self._before}
 
     def check(self, plan: _core.Plan) -> None:
         """Raise ValueError for an image that a call of the plan cannot continue."""
@@ -133,9 +134,22 @@ class State(Mapping[str, "NDArray[Any]"]):
             return self
         after = State()
         after._images = dict(self._images)
+        after._before = {
+            name: image for name, image in self._images.items() if image.shape[:2] == (1, 1)
+        }
         for (name, shape, dtype), source in zip(plan.histories, submission.histories, strict=True):
             after._images[name] = Kept(core, source, shape, dtype)
         return after
+
+
+def _read(images: dict[str, NDArray[Any] | Kept], name: str) -> NDArray[Any]:
+    """Return the pixels of an image, which replace it."""
+    image = images[name]
+    if isinstance(image, Kept):
+        array = image.read()
+        array.flags.writeable = False
+        images[name] = image = array
+    return image
 
 
 def is_alike(image: NDArray[Any] | Kept, shape: tuple[int, ...], dtype: str) -> bool:

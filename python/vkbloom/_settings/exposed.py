@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from vkbloom._settings.blocks import exposure_block
+from vkbloom._settings.exposure import Exposure, check_seconds
 
 if TYPE_CHECKING:
     from vkbloom._core_kernel import CoreKernel
-    from vkbloom._settings.exposure import Exposure
     from vkbloom._settings.settings import Settings
 
 
@@ -43,6 +46,13 @@ class ExposedSettings:
             raise AttributeError(name)
         return getattr(self.settings, name)
 
+    def to_record(self, before: Mapping[str, Any] | None) -> dict[str, Any]:
+        """Return the stages in time as JSON has them.
+
+        - `before`: What the frame continued, as lists of numbers; None: it is not known.
+        """
+        return {"exposure": self.exposure.to_dict(), "dt": self.dt, "state": before}
+
     @property
     def meter_mask(self) -> MeterMask | None:
         """The mask of the meter, for the core."""
@@ -65,3 +75,23 @@ class ExposedSettings:
 
     def _in_sequence(self, index: int, state: dict[Any, Any]) -> ExposedSettings:
         return dataclasses.replace(self, settings=self.settings._in_sequence(index, state))
+
+
+def read_record(record: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the keywords of a call from the result of `to_record`; raise TypeError or ValueError.
+
+    Without a state that is not known.
+    """
+    if not isinstance(record, Mapping):
+        raise TypeError(f"stages: {record!r} is not a mapping")
+    keywords: dict[str, Any] = {}
+    if "exposure" in record:
+        keywords["exposure"] = Exposure.from_dict(record["exposure"])
+    if "dt" in record:
+        keywords["dt"] = check_seconds("dt", record["dt"])
+    state = record.get("state")
+    if state is not None:
+        keywords["state"] = {
+            name: np.array(values, np.float32) for name, values in dict(state).items()
+        }
+    return keywords

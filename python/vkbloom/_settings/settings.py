@@ -37,8 +37,10 @@ BloomFormat = Literal[
     "rgba8unorm", "rgba16float", "rgba32float", "rg11b10ufloat", "rgba8unorm-srgb"
 ]
 
-#: A key of stored settings: what the highlights of their picture were expanded up to.
+#: Keys of stored settings: what the highlights of their picture were expanded up to, and the stages
+#: in time of a frame, as `ExposedSettings.to_record` has them.
 EXPANDED: Final = "vkbloom:expand"
+STAGES_IN_TIME: Final = "vkbloom:stages"
 SHADINGS: tuple[Shading, ...] = get_args(Shading)
 
 
@@ -264,7 +266,8 @@ class Settings(Record):
     @classmethod
     def _check_stored(cls, values: dict[str, Any]) -> None:
         # Of the picture, not of the settings.
-        values.pop(EXPANDED, None)
+        for key in (EXPANDED, STAGES_IN_TIME):
+            values.pop(key, None)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
