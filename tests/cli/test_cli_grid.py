@@ -51,6 +51,16 @@ class TestAxes:
             ("loops=1,2", [1, 2]),
             ("tonemap=none,aces", ["none", "aces"]),
             ("threshold=none,0.5", [None, 0.5]),
+            ("exposure=-1:1:3", [-1, 0, 1]),
+            ("exposure=bevy,2", [vkbloom.exposures["bevy"], 2]),
+            (
+                "exposure=bevy:speed_brighten=1,speed_darken=2;godot",
+                [
+                    vkbloom.BevyExposure(speed_brighten=1, speed_darken=2),
+                    vkbloom.exposures["godot"],
+                ],
+            ),
+            ("dt=0.1,1", [0.1, 1]),
             ("direct=off,on", [False, True]),
             ("bloom_size=none,64x32", [None, (64, 32)]),
             ("weights=0.5,0.25;1;", [(0.5, 0.25), (1.0,)]),
@@ -156,3 +166,11 @@ class TestImageFiles:
         # Such a folder may exist.
         (tmp_path / "g.exr").mkdir()
         succeed(*words)
+
+
+def test_exposures_are_in_the_records_of_files(tmp_path: Path, image_file: Path) -> None:
+    axis = "--axis exposure=bevy;hdrp:limit_min=-3"
+    succeed(image_file, "-o", tmp_path / "g", axis, "--dt 0.5 --image-format exr")
+    made = tmp_path / "g" / "001_final.exr"
+    calls.succeed("apply", image_file, "-o", tmp_path / "b.exr", "-q", "--settings", made)
+    np.testing.assert_array_equal(vkbloom.read(tmp_path / "b.exr"), vkbloom.read(made))

@@ -320,6 +320,56 @@ class TestExtras:
         assert not (tmp_path / "a.zarr").exists()
 
 
+class TestExposures:
+    """Points are no frames in time: each continues the grid's state."""
+
+    def test_axes(self, filled: Call, image: Any, renderer: Renderer) -> None:
+        state = renderer.apply(image, exposure="bevy", dt=1).state
+        exposures: list[Any] = ["bevy", "o3de", vkbloom.FixedExposure(value=1)]
+        axes = {"exposure": exposures, "dt": [0.0, 0.5], "intensity": [0.1, 0.4]}
+
+        def stops(frames: Frames) -> float:
+            return frames.exposure
+
+        grid = filled(image, "kino", axes, state=state, reduce={"stops": stops})
+        assert json.loads(grid.attrs["stages"]) == {
+            "state": {"exposure": np.asarray(state["exposure"]).tolist()}
+        }
+        assert "exposure" in json.loads(grid.attrs["settings"])
+        for index, exposure in enumerate(exposures):
+            for dt in axes["dt"]:
+                for intensity in axes["intensity"]:
+                    settings = vkbloom.presets["kino"].replace(intensity=intensity)
+                    given: Any = {"exposure": exposure, "dt": dt, "state": state}
+                    frames = renderer.apply(image, settings, **given)
+                    point = grid.isel(exposure=index).sel(dt=dt, intensity=intensity)
+                    np.testing.assert_array_equal(point["final"], frames["final"])
+                    assert float(point["stops"]) == frames.exposure
+
+    def test_stops_beside_an_exposure(self, filled: Call, tmp_path: Path, image: Any) -> None:
+        """Numbers are the settings' own; a store of another exposure is another grid."""
+        axes = {"exposure": [-1.0, 1.0]}
+        given: Any = {"store": tmp_path / "a.zarr", "dt": 0.5}
+        grid = filled(image, None, axes, exposure="hdrp", **given)
+        alone = vkbloom.apply(image, exposure=1.0)["final"]
+        one = filled(image, None, axes, exposure=vkbloom.FixedExposure())["final"]
+        np.testing.assert_allclose(one.sel(exposure=1.0), alone, rtol=1e-6)
+        np.testing.assert_allclose(
+            4 * grid["final"].sel(exposure=-1.0), grid["final"].sel(exposure=1.0), rtol=1e-6
+        )
+        with pytest.raises(ValueError, match=r"stages.exposure.engine: .hdrp. in the store"):
+            filled(image, None, axes, exposure="godot", **given)
+
+    def test_a_scene(self, filled: Call, renderer: Renderer) -> None:
+        given: Any = {"size": (32, 24), "shading": "deferred"}
+        axes = {"time": [0.0, 0.25], "exposure": ["godot"]}
+        grid = filled(Scene.ufo(), Separable(), axes, **given)
+        expected = renderer.render(Scene.ufo(), Separable(), time=0.25, exposure="godot", **given)
+        np.testing.assert_array_equal(
+            grid["final"].sel(time=0.25, exposure="godot"), expected["final"]
+        )
+
+
 class TestProgress:
     def test_a_terminal_sees_points(
         self, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]

@@ -12,7 +12,7 @@ import numpy as np
 
 from vkbloom._cli import fields, glows, image_files, no_bloom, program, terminal
 from vkbloom._cli.scene_options import scene_options
-from vkbloom._cli.settings_options import DEFAULT_PRESETS, settings_options
+from vkbloom._cli.settings_options import DEFAULT_PRESETS, timed_settings_options
 from vkbloom._grid import filling, layout, order, sources
 from vkbloom._grid.grid import grid as render_grid
 from vkbloom._io import image_writing, safe_writing
@@ -47,7 +47,7 @@ _PRESETS: Final = fields.NameOf("preset", presets)
 @glows.glow_options
 @program.adapter_option
 @scene_options
-@settings_options
+@timed_settings_options
 def command(
     *, source: str | None, out: str | None, store: str | None, words: tuple[str, ...], **given: Any
 ) -> None:
@@ -59,9 +59,10 @@ def command(
     written. The same call again continues a store whose process was killed, and gives the same
     result. In a folder, files are replaced.
 
-    The NAME of an axis is a settings field, time or preset. Its values are FIRST:LAST:COUNT, or
-    A,B,... (A;B;... if values contain commas). Repeat --axis for more axes; the dimensions have
-    the order of the options.
+    The NAME of an axis is a settings field, time, preset, exposure (of names) or dt. Its values are
+    FIRST:LAST:COUNT, or A,B,... (A;B;... if values contain commas). Repeat --axis for more axes;
+    the dimensions have the order of the options. With an exposure, points are no frames in time:
+    each is one frame, --dt after the start.
 
     Other processes may render other parts at the same time.
     """
@@ -82,7 +83,7 @@ def command(
     # The presets of an axis differ in whether they expand.
     expand: float | None = given["expand"] if settings or program.is_given("expand") else None
     picture = None
-    shared = {name: given[name] for name in ("size", "shading", "time")}
+    shared = {name: given[name] for name in ("size", "shading", "time")} | given["stages"]
     if source is None:
         for name in ("mask", "emission"):
             if given[name] is not None:
@@ -153,8 +154,9 @@ def axis_values(words: Sequence[str], settings: Settings) -> dict[str, Sequence[
 
 def _type_of(name: str, begun: Sequence[Settings]) -> Any:
     """Return the type of a field's option, so that axes and options have one syntax."""
-    if name in ("preset", "time"):
-        return click.FLOAT if name == "time" else _PRESETS
+    others = {"preset": _PRESETS, "time": click.FLOAT, "dt": click.FLOAT}
+    if name in others | {"exposure": fields.EXPOSURE}:
+        return others.get(name, fields.EXPOSURE)
     lacking = [settings for settings in begun if name not in fields_of(type(settings))]
     if lacking and not name.startswith("glare."):
         near = did_you_mean(name, fields_of(type(lacking[0])))
@@ -183,7 +185,9 @@ def _note_no_bloom(grid: layout.Grid, renderer: Renderer) -> None:
     """Print a note if the first and the last point of a grid have no bloom."""
     corners = {tuple(0 for _ in grid.shape), tuple(count - 1 for count in grid.shape)}
     lit = [point for point in map(grid.point, sorted(corners)) if point.settings.bloom]
-    frames = [frames for _, frames in sources.visit(renderer, grid.source, lit, ("bloom",))]
+    frames = [
+        frames for _, frames in sources.visit(renderer, grid.source, lit, ("bloom",), grid.before)
+    ]
     if lit and all(map(no_bloom.is_without, frames)):
         terminal.note(f"at the first and the last point, {no_bloom.reason(lit[-1].settings)}")
 
@@ -209,7 +213,7 @@ def _write_images(
     digits = [max(3, len(str(count - 1))) for count in grid.shape]
     with filling.progress_bar(len(points), shown=not terminal.is_quiet()) as count:
         path = map(grid.point, points)
-        for index, frames in sources.visit(renderer, grid.source, path, grid.wanted):
+        for index, frames in sources.visit(renderer, grid.source, path, grid.wanted, grid.before):
             stem = "".join(map("{:0{}}_".format, index, digits))
             for name in frames:
                 _save(frames, name, folder / f"{stem}{name}{suffix}", picture, expand)

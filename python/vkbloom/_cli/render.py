@@ -56,6 +56,8 @@ def command(
     """
     if out == "-":
         raise click.UsageError("render does not write to a pipe; give --out a file or a folder")
+    if "dt" in stages and "exposure" not in stages:
+        raise click.UsageError("--dt is the step of an exposure; give --exposure NAME")
     names = "all" if framebuffers == "all" else framebuffers.split(",")
     loaded = scene()
     with open_renderer(adapter) as renderer:

@@ -59,8 +59,6 @@ def timed_settings_options(command: Callable[..., Any]) -> Callable[..., Any]:
     def run(*, start: StartOptions, dt: float | None, **rest: Any) -> Any:
         stages = dict(start.stages)
         if dt is not None:
-            if not stages:
-                raise click.UsageError("--dt is the step of an exposure; give --exposure NAME")
             stages["dt"] = dt
         return command(**_settings_of(start, rest), stages=stages, **rest)
 

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom._numbers import check_time
+from vkbloom._settings.exposure import Exposure, check_exposure, check_seconds
 from vkbloom._settings.fields import fields_of
 from vkbloom._settings.records import plain_value
 from vkbloom._settings.settings import (
@@ -23,7 +24,7 @@ from vkbloom._settings.settings import (
 )
 from vkbloom._spelling import did_you_mean
 
-Kind = Literal["settings", "time", "preset"]
+Kind = Literal["settings", "time", "preset", "stage"]
 
 #: Axes whose values are settings of any methods, on which the other axes' fields are changed.
 WHOLE: Final = ("preset", "settings")
@@ -36,7 +37,8 @@ class Axis:
     """One axis of a grid: a settings field, "time", "preset" or "settings".
 
     - `values`: As the settings store them; names of presets.
-    - `kind`: The axis "settings" has the kind "preset": its values are settings of any methods.
+    - `kind`: The axis "settings" has the kind "preset": its values are settings of any methods. A
+      "stage" is a keyword of a call for a stage in time.
     - `unit`: "1" for a number without a unit.
     """
 
@@ -102,6 +104,23 @@ def _whole_axis(name: str, values: object) -> Axis:
     return Axis(name, tuple(listed), "preset", "", "The settings as JSON")
 
 
+def _stage_axis(name: str, values: list[Any]) -> Axis | None:
+    """Check an axis of exposures or of steps of time; None: it is of neither."""
+    if name == "dt":
+        steps = tuple(check_seconds("axes: dt", value) for value in values)
+        return Axis(name, steps, "stage", "s", "Seconds since the frame before")
+    if name != "exposure" or not any(isinstance(value, str | Exposure) for value in values):
+        return None
+    for value in values:
+        if not isinstance(value, str | Exposure):
+            raise TypeError(
+                f"axes: exposure: {value!r} is not an exposure, as other values are; stops of the "
+                "settings are an axis of their own grid"
+            )
+        check_exposure(value)
+    return Axis(name, tuple(values), "stage", "", "The exposure that follows the light")
+
+
 def _sequence(name: str, values: object) -> list[Any]:
     if isinstance(values, str | bytes | Mapping) or not isinstance(values, Iterable):
         raise TypeError(f"axes: {name}: {values!r} is not a sequence of values")
@@ -135,6 +154,9 @@ def read_axes(
     for name, values in axes.items():
         if name in whole:
             read.append(whole[name])
+            continue
+        if (stage := _stage_axis(name, _sequence(name, values))) is not None:
+            read.append(stage)
             continue
         if name == "time" and has_time:
             times = tuple(check_time(value) for value in _sequence(name, values))

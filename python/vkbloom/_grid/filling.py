@@ -43,7 +43,7 @@ class Filler:
         """Render the points of a block."""
         grid = self.grid
         path = map(grid.point, points(block, self.layout.ranking))
-        for index, frames in visit(self.renderer, grid.source, path, grid.wanted):
+        for index, frames in visit(self.renderer, grid.source, path, grid.wanted, grid.before):
             inside = tuple(i - start for i, start in zip(index, block.start, strict=True))
             for name, array in arrays.items():
                 array[inside] = self._value(name, index, frames)

@@ -28,6 +28,7 @@ from vkbloom._renderer.frames import Frames
 from vkbloom._renderer.image import Image
 from vkbloom._renderer.interruptible import open_renderer
 from vkbloom._renderer.renderer import Renderer
+from vkbloom._settings.exposure import Exposure
 from vkbloom._settings.settings import Settings, Shading
 
 if TYPE_CHECKING:
@@ -55,6 +56,9 @@ def grid(
     time: float = 0.0,
     mask: NDArray[Any] | None = None,
     emission: NDArray[Any] | None = None,
+    exposure: Exposure | str | None = None,
+    dt: float | None = None,
+    state: Mapping[str, Any] | None = None,
     framebuffers: Literal["all"] | str | Sequence[str] = ("final",),
     reduce: Mapping[str, Callable[[Frames], Any]] | None = None,
     store: Any = None,
@@ -87,6 +91,9 @@ def grid(
         Of a scene, as for `render`.
     mask, emission : ndarray, optional
         As for `apply`, the same at all points. An uploaded image has its own.
+    exposure, dt, state
+        As for `Renderer.sweep`: points are no frames in time, and each is the one `dt` seconds
+        after `state`. An axis "exposure" of names or exposures, and an axis "dt", vary them.
     framebuffers : "all" or sequence of str
         The framebuffers to keep. Each must have the same shape at all points. Its dtype must be
         uint8 at all points, or a float type at all points. Floats are stored in the largest of
@@ -178,6 +185,9 @@ def grid(
         reduce=reduce,
         mask=mask,
         emission=emission,
+        exposure=exposure,
+        dt=dt,
+        state=state,
     )
     with ExitStack() as stack:
         if client is None and adapter is not None:

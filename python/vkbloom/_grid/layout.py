@@ -20,6 +20,9 @@ from vkbloom._grid.sources import Point, Source, read_source, visit
 from vkbloom._renderer.frames import Frames
 from vkbloom._renderer.plans import Framebuffer
 from vkbloom._renderer.renderer import Renderer
+from vkbloom._renderer.state import Continued, State
+from vkbloom._settings.exposed import expose
+from vkbloom._settings.exposure import Exposure, check_exposure, check_seconds
 from vkbloom._settings.settings import Settings, check_settings
 from vkbloom._version import installed_version
 
@@ -38,6 +41,8 @@ class Grid:
     - `settings`: The settings that the axes change, unless an axis has the settings.
     - `axes`: The axes, in the order of the result's dimensions.
     - `framebuffers`: The framebuffers to keep.
+    - `exposure`, `dt`: Those of all points, unless an axis has them.
+    - `before`: The state that each point continues; None: there is no exposure.
     """
 
     source: Source
@@ -45,6 +50,9 @@ class Grid:
     axes: tuple[Axis, ...]
     framebuffers: str | tuple[str, ...]
     reduce: Reduce
+    exposure: Exposure | None
+    dt: float
+    before: Continued | None
 
     @property
     def shape(self) -> Index:
@@ -67,14 +75,20 @@ class Grid:
         time = self.source.time
         base = self.settings
         changes = {}
+        stages: dict[str, Any] = {"exposure": self.exposure, "dt": self.dt}
         for axis, number in zip(self.axes, index, strict=True):
             if axis.kind == "preset":
                 base = settings_of(axis)[number]
             elif axis.kind == "settings":
                 changes[axis.name] = axis.values[number]
+            elif axis.kind == "stage":
+                stages[axis.name] = axis.values[number]
             else:
                 time = axis.values[number]
-        return Point(index, base.replace(**changes) if changes else base, time)
+        chosen = base.replace(**changes) if changes else base
+        if stages["exposure"] is not None:
+            stages["exposure"] = check_exposure(stages["exposure"])
+        return Point(index, expose(chosen, **stages), time)
 
     def describe_point(self, index: Index) -> str:
         """Return a point's axis values as text for messages."""
@@ -86,8 +100,19 @@ class Grid:
         """The settings that no axis changes, and the method; empty if an axis has the settings."""
         if any(axis.kind == "preset" for axis in self.axes):
             return {}
-        varied = {axis.name for axis in self.axes}
+        varied = {axis.name for axis in self.axes if axis.kind == "settings"}
         return {k: v for k, v in self.settings.to_dict().items() if k not in varied}
+
+    @property
+    def remaining_stages(self) -> dict[str, Any]:
+        """The stages in time that no axis changes, as JSON has them; empty if there are none."""
+        if self.before is None:
+            return {}
+        varied = {axis.name for axis in self.axes if axis.kind == "stage"}
+        exposure = None if self.exposure is None else self.exposure.to_dict()
+        state = {name: array.tolist() for name, array in self.before.state.items()}
+        record = {"exposure": exposure, "dt": self.dt, "state": state}
+        return {name: value for name, value in record.items() if name not in varied}
 
 
 @dataclass(frozen=True)
@@ -135,6 +160,9 @@ def ask(
     reduce: Reduce | None,
     mask: object = None,
     emission: object = None,
+    exposure: Exposure | str | None = None,
+    dt: float | None = None,
+    state: Mapping[str, Any] | None = None,
 ) -> Grid:
     """Check the arguments that all grids share."""
     if settings is not None:
@@ -151,13 +179,34 @@ def ask(
             raise TypeError(f"reduce: {name}: {reduction!r} is not callable")
     if names == () and not reductions:
         raise ValueError("framebuffers: there are no framebuffers and no reductions; request some")
+    given = {"exposure": exposure, "dt": dt, "state": state}
     return Grid(
         checked,
         check_settings(settings, of_image=not checked.has_time),
         grid_axes,
         "all" if names is None else names,
         reductions,
+        None if exposure is None else check_exposure(exposure),
+        check_seconds("dt", dt),
+        _read_before({name: value is not None for name, value in given.items()}, grid_axes, state),
     )
+
+
+def _read_before(
+    is_given: Mapping[str, bool], axes: Sequence[Axis], state: Mapping[str, Any] | None
+) -> Continued | None:
+    """Return what each point continues; raise ValueError for arguments that do not fit."""
+    varied = {axis.name for axis in axes if axis.kind == "stage"}
+    for name in varied:
+        if is_given[name]:
+            raise ValueError(f"{name}: an axis has it; leave the argument out")
+    if is_given["exposure"] or "exposure" in varied:
+        # Its arrays, so that the grid can be sent to other processes.
+        return Continued(State(dict(state or {})), is_chain=False)
+    for name in ("dt", "state"):
+        if is_given[name] or name in varied:
+            raise ValueError(f"{name}: only an exposure has it; give exposure, too")
+    return None
 
 
 def lay_out(
@@ -167,6 +216,12 @@ def lay_out(
 ) -> Layout:
     """Determine the layout of a grid on a renderer before its points are rendered."""
     variables = _frame_variables(_survey(grid, renderer))
+    for axis in grid.axes:
+        if axis.name in variables:
+            raise ValueError(
+                f"framebuffers: {axis.name!r} is an axis of this grid as well; name the "
+                "framebuffers to keep without it"
+            )
     check(variables)
     if grid.reduce:
         sample = _sample(grid, renderer)
@@ -205,7 +260,7 @@ def ranking(grid: Grid) -> tuple[int, ...]:
             for (stepped, _), ran in zip(steps, passes, strict=True):
                 if stepped is not None:
                     costs[stepped] += len({name for name, *_ in ran})
-    return ranking_of(costs, [axis.kind in ("settings", "preset") for axis in grid.axes])
+    return ranking_of(costs, [axis.kind != "time" for axis in grid.axes])
 
 
 def _plan_points(grid: Grid, path: list[Index]) -> tuple[tuple[_core.Source, _core.Plan], ...]:
@@ -311,7 +366,7 @@ def _frame_variables(framebuffers: Mapping[str, Framebuffer]) -> dict[str, Varia
 def _sample(grid: Grid, renderer: Renderer) -> Frames:
     """Render the first point."""
     first = tuple(0 for _ in grid.axes)
-    ((_, frames),) = visit(renderer, grid.source, [grid.point(first)], grid.wanted)
+    ((_, frames),) = visit(renderer, grid.source, [grid.point(first)], grid.wanted, grid.before)
     return frames
 
 
@@ -349,6 +404,7 @@ def make_dataset(grid: Grid, layout: Layout, arrays: Mapping[str, Any]) -> xarra
             **layout.origin,
             "axes": json.dumps(dims),
             "settings": json.dumps(grid.remaining_settings),
+            **({"stages": json.dumps(stages)} if (stages := grid.remaining_stages) else {}),
             "source": json.dumps(facts),
         },
     )

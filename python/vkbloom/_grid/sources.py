@@ -29,8 +29,10 @@ from vkbloom._renderer.sources import (
     is_image,
     scene_source,
 )
+from vkbloom._renderer.state import Continued
 from vkbloom._scene import Scene
 from vkbloom._scene.arrays import Constructed
+from vkbloom._settings.exposed import keywords_of
 from vkbloom._settings.settings import Settings, check_shading
 
 if TYPE_CHECKING:
@@ -53,8 +55,9 @@ def visit(
     source: ImageSource | SceneSource,
     points: Iterable[Point],
     framebuffers: str | Sequence[str],
+    before: Continued | None,
 ) -> Iterator[tuple[Index, Frames]]:
-    """Render points in the given order."""
+    """Render points in the given order; `before`: what each of them continues."""
     drawn: deque[Index] = deque()
 
     def work() -> Iterator[Request]:
@@ -62,7 +65,8 @@ def visit(
             drawn.append(point.index)
             yield Request(source.on(renderer, point.time), point.settings)
 
-    for frames in renderer._run_requests(work(), check_framebuffers(framebuffers)):
+    names = check_framebuffers(framebuffers)
+    for frames in renderer._run_requests(work(), names, before=before):
         yield drawn.popleft(), frames
 
 
@@ -90,7 +94,7 @@ class ImageSource(Constructed):
     def plan(self, renderer: Renderer, settings: Settings) -> Plan:
         """Return the plan of the image."""
         pixels: Any = self.image if isinstance(self.image, Image) else self.image.image
-        return renderer.plan(pixels, settings)
+        return renderer.plan(pixels, **keywords_of(settings))
 
     def for_core(self, time: float) -> _core.Source:
         """Return the core's Source of the image."""
@@ -142,7 +146,8 @@ class SceneSource(Constructed):
 
     def plan(self, renderer: Renderer, settings: Settings) -> Plan:
         """Return the plan of the scene."""
-        return renderer.plan(self.scene, settings, self.size, shading=self.shading)
+        given = keywords_of(settings)
+        return renderer.plan(self.scene, size=self.size, shading=self.shading, **given)
 
     def for_core(self, time: float) -> _core.Source:
         """Return the core's Source of the scene at a time."""

@@ -54,6 +54,7 @@ def identity(grid: Grid, layout: Layout, chunk: Index) -> dict[str, Any]:
         **layout.origin,
         "source": grid.source.description,
         "settings": grid.remaining_settings,
+        **({"stages": stages} if (stages := grid.remaining_stages) else {}),
         "axes": {axis.name: [plain_value(value) for value in axis.values] for axis in grid.axes},
         "order of axes": [axis.name for axis in grid.axes],
         "variables": {

@@ -47,7 +47,7 @@ from vkbloom._renderer.sources import (
     take_batch,
 )
 from vkbloom._renderer.state import Continued, State
-from vkbloom._settings.exposed import ExposedSettings
+from vkbloom._settings.exposed import ExposedSettings, expose
 from vkbloom._settings.exposure import Exposure, check_exposure, check_seconds
 from vkbloom._settings.settings import Settings, Shading, check_settings
 from vkbloom._spelling import describe_unknown
@@ -302,7 +302,7 @@ class Renderer:
         # What map has checked last.
         self._named: tuple[object, tuple[str, ...]] = None, ()
         # What was exposed last.
-        self._exposed: ExposedSettings | None = None
+        self._exposed: Settings | None = None
         self._remember: ArrayCache | None = shared_cache()
         self._number = next(_numbers)
         RENDERERS[self._number] = self
@@ -706,7 +706,7 @@ class Renderer:
         frame_source = any_source(source, size, shading, time, self._core)
         names = check_framebuffers(framebuffers)
 
-        def expose(chosen: Settings) -> Settings:
+        def expose_each(chosen: Settings) -> Settings:
             return self._expose(chosen, exposure, dt)
 
         if exposure is None:
@@ -715,7 +715,7 @@ class Renderer:
                 raise ValueError("state: only an exposure continues one; give exposure, too")
             return self._run_many(frame_source, settings, names, device)
         before = Continued(_as_state(state), is_chain=False)
-        how: Any = {"expose": expose, "before": before}
+        how: Any = {"prepare": expose_each, "before": before}
         return self._run_many(frame_source, settings, names, device, **how)
 
     @check_arguments
@@ -796,11 +796,11 @@ class Renderer:
         seconds = check_seconds("dt", dt)
         if exposure is None:
             return settings
-        made = ExposedSettings(settings, check_exposure(exposure), seconds)
+        made = expose(settings, check_exposure(exposure), seconds)
         # The same object as in the last call, since the last plan is kept for that.
         if made != self._exposed:
             self._exposed = made
-        return cast("Settings", self._exposed)
+        return self._exposed
 
     def _run_one(
         self,
@@ -915,7 +915,7 @@ class Renderer:
         names: tuple[str, ...] | None,
         device: Device | None = None,
         *,
-        expose: Callable[[Settings], Settings] = lambda chosen: chosen,
+        prepare: Callable[[Settings], Settings] = lambda chosen: chosen,
         before: Continued | None = None,
     ) -> Iterator[Frames]:
         destination = self._choose_destination(device)
@@ -927,10 +927,10 @@ class Renderer:
         if isinstance(settings, Sequence):
             settings = tuple(settings)
             if names:
-                self._check_names(source, settings, names, expose)
+                self._check_names(source, settings, names, prepare)
         return self._run_requests(
             (
-                requests.Request(source, expose(check_settings(item, f"settings[{number}]")))
+                requests.Request(source, prepare(check_settings(item, f"settings[{number}]")))
                 for number, item in enumerate(settings)
             ),
             names,
@@ -943,7 +943,7 @@ class Renderer:
         source: _core.Source,
         settings: Settings | Sequence[Settings | str],
         names: tuple[str, ...] | None,
-        expose: Callable[[Settings], Settings] = lambda chosen: chosen,
+        prepare: Callable[[Settings], Settings] = lambda chosen: chosen,
     ) -> None:
         """Raise ValueError for framebuffers that none of the settings has, at any size."""
         known: dict[str, None] = {}
@@ -951,7 +951,7 @@ class Renderer:
             # An error of these settings is raised in their turn, after the frames of earlier ones.
             with contextlib.suppress(_core.Error, TypeError, ValueError):
                 is_exposed = isinstance(item, ExposedSettings)
-                chosen = cast("Settings", item) if is_exposed else expose(check_settings(item))
+                chosen = cast("Settings", item) if is_exposed else prepare(check_settings(item))
                 plan = self._core.plan(source, chosen, None)
                 known.update((name, None) for name, _, _ in plan.outputs)
         kinds = {_NUMBER.sub("#", name) for name in known}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
@@ -75,6 +75,20 @@ class ExposedSettings:
 
     def _in_sequence(self, index: int, state: dict[Any, Any]) -> ExposedSettings:
         return dataclasses.replace(self, settings=self.settings._in_sequence(index, state))
+
+
+def expose(settings: Settings, exposure: Exposure | None, dt: float) -> Settings:
+    """Return settings with an exposure, which renderers take for settings; None: as they are."""
+    if exposure is None:
+        return settings
+    return cast("Settings", ExposedSettings(settings, exposure, dt))
+
+
+def keywords_of(settings: Settings) -> dict[str, Any]:
+    """Return settings, and their stages in time, as keywords of a call that takes no steps."""
+    if isinstance(settings, ExposedSettings):
+        return {"settings": settings.settings, "exposure": settings.exposure}
+    return {"settings": settings}
 
 
 def read_record(record: Mapping[str, Any]) -> dict[str, Any]:
