@@ -184,14 +184,12 @@ static uint32_t add_meter(struct vkb_levels *levels, uint32_t from, struct vkb_s
     return add_sums(levels, METER_SUM, logarithms, from);
 }
 
-static bool has(const struct vkb_settings *settings, uint32_t what)
+bool vkb_exposure_has(const struct vkb_settings *settings, uint32_t what)
 {
     return settings->exposure_engine && (engines[settings->exposure_engine].exposes & what);
 }
 
-// Adds what meters an image, and the image "exposure", which has what the exposure adapts to and
-// its multipliers. Returns this image.
-static uint32_t add_exposure(struct vkb_levels *levels, uint32_t metered)
+uint32_t vkb_add_exposure(struct vkb_levels *levels, uint32_t metered)
 {
     const struct vkb_settings *settings = levels->settings;
     const struct vkb_size one = {1, 1};
@@ -214,9 +212,8 @@ static uint32_t add_exposure(struct vkb_levels *levels, uint32_t metered)
     return exposure;
 }
 
-// Adds an image times the multiplier before the bloom, or with `after` times the one after it.
-static uint32_t add_exposed(struct vkb_levels *levels, const char *name, bool framebuffer,
-                            uint32_t image, uint32_t exposure, bool after)
+uint32_t vkb_add_exposed(struct vkb_levels *levels, const char *name, bool framebuffer,
+                         uint32_t image, uint32_t exposure, bool after)
 {
     if (levels->failed)
         return 0;
@@ -237,46 +234,4 @@ static uint32_t add_exposed(struct vkb_levels *levels, const char *name, bool fr
     pass.params.exposure.channel = after ? 2 : 1;
     vkb_levels_pass(levels, &pass);
     return exposed;
-}
-
-struct vkb_exposed vkb_begin_exposure(const struct vkb_settings *settings)
-{
-    return (struct vkb_exposed){
-        .image = VKB_NO_IMAGE,
-        .before = has(settings, EXPOSES_BLOOM),
-        .after = has(settings, EXPOSES_PICTURE),
-        .meters_bloom = has(settings, METERS_BLOOM),
-    };
-}
-
-void vkb_expose_inputs(struct vkb_levels *levels, struct vkb_exposed *exposed, uint32_t *scene,
-                       uint32_t *glow)
-{
-    const bool one = *scene == *glow;
-
-    if (levels->settings->exposure_engine && !exposed->meters_bloom)
-        exposed->image = add_exposure(levels, *scene);
-    if (!exposed->before)
-        return;
-    *scene = add_exposed(levels, "exposed", true, *scene, exposed->image, false);
-    *glow =
-        one ? *scene : add_exposed(levels, "exposed_emission", false, *glow, exposed->image, false);
-}
-
-void vkb_expose_picture(struct vkb_levels *levels, struct vkb_exposed *exposed,
-                        struct vkb_composite_source *source)
-{
-    const bool has_bloom = source->bloom != VKB_NO_IMAGE || levels->picture;
-
-    if (!exposed->after)
-        return;
-    const uint32_t picture = has_bloom ? vkb_add_combining_pass(levels, source) : source->scene;
-    if (exposed->meters_bloom)
-        exposed->image = add_exposure(levels, picture);
-    *source = (struct vkb_composite_source){
-        .scene = add_exposed(levels, "exposed_picture", false, picture, exposed->image, true),
-        .bloom = VKB_NO_IMAGE,
-        .mask = VKB_NO_IMAGE,
-    };
-    levels->picture = 0;
 }

@@ -62,7 +62,16 @@ void vkb_add_flare_pass(struct vkb_levels *levels, const struct vkb_stage *stage
 // Adds the rows of the method that the settings name, and those of glare. Returns the last image.
 uint32_t vkb_add_bloom(struct vkb_levels *levels, const struct vkb_bloom_source *source);
 
-// The frame of an exposure: what the bloom reads is exposed before it, the picture with its bloom
+// Adds what meters an image, and the image "exposure", which has what the exposure adapts to and
+// its multipliers. Returns this image.
+uint32_t vkb_add_exposure(struct vkb_levels *levels, uint32_t metered);
+// Adds an image times the multiplier before the bloom, or with `after` times the one after it.
+uint32_t vkb_add_exposed(struct vkb_levels *levels, const char *name, bool framebuffer,
+                         uint32_t image, uint32_t exposure, bool after);
+// Whether the settings have an exposure with one of EXPOSES_* or METERS_BLOOM.
+bool vkb_exposure_has(const struct vkb_settings *settings, uint32_t what);
+
+// The frame with an exposure: what the bloom reads is exposed before, the picture with its bloom
 // after it.
 struct vkb_exposed {
     uint32_t image;  // with the multipliers; VKB_NO_IMAGE: there is none, or none yet
@@ -70,10 +79,10 @@ struct vkb_exposed {
 };
 struct vkb_exposed vkb_begin_exposure(const struct vkb_settings *settings);
 // Meters the scene, and replaces the scene and what glows by images that are exposed.
-void vkb_expose_inputs(struct vkb_levels *levels, struct vkb_exposed *exposed, uint32_t *scene,
+void vkb_expose_inputs(struct vkb_levels *levels, struct vkb_exposed *exposure, uint32_t *scene,
                        uint32_t *glow);
 // Combines scene and bloom, and exposes the picture, which is then the scene without a bloom.
-void vkb_expose_picture(struct vkb_levels *levels, struct vkb_exposed *exposed,
+void vkb_expose_picture(struct vkb_levels *levels, struct vkb_exposed *exposure,
                         struct vkb_composite_source *source);
 
 // Each method adds its rows, and returns the last image.
