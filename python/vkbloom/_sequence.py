@@ -464,11 +464,11 @@ class Sequence(Iterable[Frames]):
         """Raise TypeError if frames depend on those before."""
         which = ""
         if self.settings._continues:
-            which = f"the method {self.settings.method}"
+            which = f"of the method {self.settings.method}"
         elif self._work.continues:
-            which = f"an {self._work.continues} that adapts"
+            which = f"with {self._work.continues}="
         if which:
-            raise TypeError(f"frames of {which} depend on those before; iterate")
+            raise TypeError(f"frames {which} depend on those before; iterate")
 
     def _read(self, first: int) -> Generator[tuple[Taken, float | None], None, None]:
         """Yield from a frame on each one at its time, and the seconds before it."""

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 import vkbloom
+from tests.variants import VARIANTS, open_variant
 from vkbloom import Renderer
 
 from .test_device import COPY, picture
@@ -94,7 +95,7 @@ def test_steps_of_map(renderer: Renderer) -> None:
 
 def test_a_frame_alone(renderer: Renderer) -> None:
     given: Any = {"fps": 24, "renderer": renderer}
-    with pytest.raises(TypeError, match="frames of an exposure that adapts depend on those before"):
+    with pytest.raises(TypeError, match="frames with exposure= depend on those before"):
         vkbloom.sequence(IMAGES, COPY, exposure="bevy", **given)[1]
     fixed = vkbloom.FixedExposure(value=2)
     assert vkbloom.sequence(IMAGES, COPY, exposure=fixed, **given)[1].exposure == 2
@@ -126,6 +127,17 @@ def test_a_scene(renderer: Renderer, name: str) -> None:
     np.testing.assert_allclose(adapted, wanted, rtol=2e-4, atol=2e-5)
     again = renderer.render(SCENE, SETTINGS, exposure=name, dt=0, state=frames.state, **DEFERRED)
     assert again["exposure"][0, 0, 0] == adapted[0, 0, 0]
+
+
+@pytest.mark.parametrize("name", VARIANTS)
+def test_a_scene_in_each_variant(renderer: Renderer, name: str) -> None:
+    with open_variant(name) as opened:
+        for exposure in ("hdrp", "o3de", "granite"):
+            given: Any = {"exposure": exposure, "dt": 0.5, **DEFERRED}
+            made, expected = (one.render(SCENE, SETTINGS, **given) for one in (opened, renderer))
+            assert list(made) == list(expected)
+            np.testing.assert_allclose(made["exposure"], expected["exposure"], rtol=1e-3)
+            np.testing.assert_allclose(made["bloom"], expected["bloom"], rtol=1e-2, atol=1e-3)
 
 
 def test_a_scene_is_exposed_before_or_after_its_bloom(renderer: Renderer) -> None:

@@ -196,7 +196,8 @@ class Run:
         if no_bloom.is_without(frames):
             colours = picture.pixels[:, :, :3]
             brightest = float(np.max(colours, initial=0, where=np.isfinite(colours)))
-            text = no_bloom.reason(frames.settings, brightest)
+            is_exposed = bool(self.options.start.stages)
+            text = no_bloom.reason(frames.settings, None if is_exposed else brightest)
         elif image_writing.is_straight(
             of_format(target, self.options.pipe_format), is_multiplied=picture.is_multiplied
         ):

@@ -226,6 +226,7 @@ class Frames(Framebuffers):
                 **{k: v if isinstance(v, int | float) else str(v) for k, v in self.info.items()},
                 "settings": json.dumps(self._settings.to_dict()),
                 "timings": json.dumps(dict(self.timings)),
+                **self._stages(),
             },
         )
         return dataset
@@ -254,8 +255,10 @@ class Frames(Framebuffers):
 
         If the format has such attributes, ``Software`` and ``ImageDescription`` (``Description``
         in PNG) contain the version, the adapter and the settings, and ``vkbloom:<key>`` contains
-        each entry of `info`, and the settings and timings as JSON. In TIFF and JPEG the
-        ``ImageDescription`` contains all of it.
+        each entry of `info`, and the settings and timings as JSON. With an exposure,
+        ``vkbloom:stages`` has it, its step of time, and what it continued, as JSON; the state is
+        null if the renderer was closed. In TIFF and JPEG the ``ImageDescription`` contains all of
+        it.
 
         Parameters
         ----------
