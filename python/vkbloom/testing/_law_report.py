@@ -6,19 +6,21 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Final
+from typing import Any, Final, cast
 
 import numpy as np
 
 from vkbloom._argument_types import check_arguments
 from vkbloom._numbers import check_number
 from vkbloom._public import public
+from vkbloom._settings.exposure import Exposure
 from vkbloom._views import markup
 from vkbloom._views.markup import element
+from vkbloom.testing._adaptation import SIZE, Adaptation, Meter, is_meter, meter_of
 from vkbloom.testing._deviations import measuring
 from vkbloom.testing._laws.law import Law, Limits
 from vkbloom.testing._laws.table import LAWS, find_law, merge_limits
-from vkbloom.testing._probe import Bloom, BloomError, NotTaken, Probe, takes
+from vkbloom.testing._probe import Bloom, BloomError, NotTaken, Probe
 from vkbloom.testing._programs import levels_of
 from vkbloom.testing._subject import Subject, fitting_probe
 
@@ -26,6 +28,13 @@ __tracebackhide__ = True
 
 #: Colours of the rows: of a law that was promised and is broken, and of one that was not promised.
 COLOURS: Final = {"required": "#c33", "broken": "#b60", "untested": "#888", "held": "inherit"}
+
+
+# Why a law of the other kind of subject is not tested.
+_NOT_OF: Final = {
+    Subject: "this is a law of a bloom, and not of an exposure, which takes dt",
+    Adaptation: "this is a law of an exposure, which takes dt, and not of a bloom",
+}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,7 +83,7 @@ class LawRow:
 @public("vkbloom.testing")
 @dataclass(frozen=True, eq=False, kw_only=True)
 class LawReport:
-    """Which laws a bloom holds.
+    """Which laws a bloom or an exposure holds.
 
     Attributes
     ----------
@@ -86,19 +95,21 @@ class LawReport:
         law; and `applies`, whether the bloom takes what the law needs.
     probe : Probe
         The test images: size, dtype and brightest value.
-    gain : float
+    gain : float or None
         Of a flat image of that value, in its middle. Where none is promised, the law of the gain is
-        tested with it.
+        tested with it. None: this is an exposure.
     required : tuple of str
         Names of the laws that the bloom promises.
     untaken : tuple of str
-        What the bloom does not take, of "region" and "time": `views` is not tested without a
-        region; without a time, `history` tests the order of the images alone.
+        What is not taken, of "region", "time" and "dt": `views` is not tested without a region;
+        without a time, `history` tests the order of the images alone; without "dt", the seconds
+        since the frame before, no law of an exposure is tested. Of an exposure, "state": it keeps
+        its state itself, and a test begins where the one before has left it.
     """
 
     rows: tuple[LawRow, ...]
     probe: Probe
-    gain: float
+    gain: float | None
     required: tuple[str, ...] = ()
     untaken: tuple[str, ...] = ()
 
@@ -132,10 +143,16 @@ class LawReport:
     def __str__(self) -> str:
         """Return a table, and below it the reasons for broken laws."""
         width, height = self.probe.size
+        images = f"on {self.probe.dtype} images of {width} x {height}"
+        about = f"Laws of an exposure, {images}"
+        if self.gain is not None:
+            values = f"with values up to {self.probe.value:g}; gain {self.gain:.4g}"
+            about = f"Laws of a bloom, {images} {values}"
+        if self.untaken:
+            what = "exposure" if self.gain is None else "bloom"
+            about += f"; the {what} takes no {' and no '.join(self.untaken)}"
         lines = [
-            f"Laws of a bloom, on {self.probe.dtype} images of {width} x {height} with values up "
-            f"to {self.probe.value:g}; gain {self.gain:.4g}"
-            + (f"; the bloom takes no {' and no '.join(self.untaken)}" if self.untaken else ""),
+            about,
             f"{'law':<18} {'held':<11} {'off by':>9} {'allowed':>9}",
         ]
         for row in self.rows:
@@ -185,9 +202,9 @@ def cells(row: LawRow) -> tuple[str, str]:
 @public("vkbloom.testing")
 @check_arguments
 def report(
-    bloom: Bloom,
+    bloom: Bloom | Meter | Exposure | str,
     *,
-    size: tuple[int, int] = (256, 256),
+    size: tuple[int, int] | None = None,
     laws: str | Sequence[str] = "all",
     limits: Mapping[str, Mapping[str, float]] = {},
     gain: float | None = None,
@@ -195,15 +212,24 @@ def report(
     intensity: float | None = None,
     probe: Probe | None = None,
 ) -> LawReport:
-    """Test a bloom against every law.
+    """Test a bloom, or an exposure, against every law.
 
     Parameters
     ----------
-    bloom : callable
-        Takes an image and returns one of the same height and width: the bloom alone, or the
+    bloom : callable, Exposure or str
+        A bloom takes an image and returns one of the same height and width: the bloom alone, or the
         picture with its bloom.
-    size : (int, int)
-        Width and height of the test images. A wide bloom needs a large one.
+
+        An exposure is one of the package, or its name in `vkbloom.exposures`, which runs on
+        `default_renderer`; or a callable with the keywords `dt` and `state`, which is called as
+        ``bloom(image, dt=seconds, state=state)``. The image is (H, W, 3) in float32, linear light;
+        `dt` is the time since the frame before, and `state` what the call before has returned, or
+        None, to begin anew. It returns (stops, next state), where the exposed picture may stand for
+        its stops, or `Frames`. A callable without the keyword `state` keeps its state itself, and
+        returns the stops or the picture.
+    size : (int, int), optional
+        Width and height of the test images. A wide bloom needs a large one. Default: 256 x 256; of
+        an exposure, 96 x 64.
     laws : "all" or sequence of str
         Names of the laws to test; they are promised: `LawReport.required`.
     limits : mapping of str to mapping of str to float
@@ -236,6 +262,12 @@ def report(
     >>> found = testing.report(bloom, size=(64, 64))
     >>> [row.name for row in found.rows if row.held][:3]
     ['superposition', 'gain', 'symmetric']
+    >>> def meter(image, *, dt, state):
+    ...     goal = -np.log2(max(image.mean(), 1e-4) / 0.18)
+    ...     now = goal if state is None else goal + (state - goal) * 2.0**-dt
+    ...     return now, now
+    >>> [row.name for row in testing.report(meter).rows if not row.held]
+    ['finite_state']
     """
     for name, value in (("gain", gain), ("intensity", intensity)):
         if value is not None:
@@ -248,6 +280,13 @@ def report(
     except ValueError as error:
         raise ValueError(f"laws: {error}") from None
     merged = merge_limits(limits, required or LAWS.keys())
+    if is_meter(bloom):
+        given = {"gain": gain, "picture": picture, "probe": probe}
+        for name in (name for name, value in given.items() if value is not None):
+            raise ValueError(f"{name}: an exposure has none")
+        meter = meter_of(bloom) if isinstance(bloom, Exposure | str) else bloom
+        return law_report(Adaptation(meter=meter, size=size or SIZE), merged, required)
+    bloom, size = cast("Bloom", bloom), size or (256, 256)
     used = probe or fitting_probe(bloom, Probe(size=size, levels=levels_of(bloom, size)))
     subject = Subject(bloom=bloom, probe=used, picture=picture, intensity=intensity, gain=gain)
     return law_report(subject, merged, required)
@@ -255,23 +294,23 @@ def report(
 
 @public("vkbloom.testing")
 def assert_laws(
-    bloom: Bloom,
+    bloom: Bloom | Meter | Exposure | str,
     *names: str,
     limits: Mapping[str, Mapping[str, float]] = {},
-    size: tuple[int, int] = (256, 256),
+    size: tuple[int, int] | None = None,
     gain: float | None = None,
     picture: Bloom | None = None,
     intensity: float | None = None,
     probe: Probe | None = None,
 ) -> None:
-    """Assert that a bloom holds laws.
+    """Assert that a bloom, or an exposure, holds laws.
 
     Parameters
     ----------
-    bloom : callable
+    bloom : callable, Exposure or str
         As for `report`.
     *names : str
-        Names of laws; without a name, all that apply to the bloom.
+        Names of laws; without a name, all that apply.
     limits, size, gain, picture, intensity, probe
         As for `report`.
 
@@ -312,33 +351,37 @@ def assert_laws(
 
 
 def law_report(
-    subject: Subject,
+    subject: Subject | Adaptation,
     limits: Mapping[str, Limits],
     required: tuple[str, ...] = (),
     progress: Callable[[str], None] = lambda _: None,
 ) -> LawReport:
-    """Test a bloom against the laws whose limits are given.
+    """Test a bloom or an exposure against the laws whose limits are given.
 
     Those that do not apply to it are tested only if they are required.
     """
     try:
-        gain = subject.measured_gain
+        subject.try_once()
     except BloomError as error:
         raise (error.__cause__ or error) from None
     rows = []
     for law in (LAWS[name] for name in LAWS if name in limits):
-        if law.name in required or law.applies(subject):
+        is_of_subject = isinstance(subject, law.subject)
+        if law.name in required or (is_of_subject and law.applies(cast("Any", subject))):
             progress(law.name)
             rows.append(_test(law, subject, limits[law.name]))
-    untaken = tuple(name for name in ("region", "time") if not takes(subject.bloom, name))
     return LawReport(
-        rows=tuple(rows), probe=subject.probe, gain=gain, required=required, untaken=untaken
+        rows=tuple(rows),
+        probe=subject.probe,
+        gain=subject.measured_gain if isinstance(subject, Subject) else None,
+        required=required,
+        untaken=subject.untaken,
     )
 
 
-def _explain(law: Law, subject: Subject) -> str:
+def _explain(law: Law, subject: Subject | Adaptation) -> str:
     """Return why a law is broken, where that can be measured."""
-    if law.explain is None:
+    if law.explain is None or not isinstance(subject, Subject):
         return law.why
     try:
         return law.explain(subject, law.why)
@@ -346,13 +389,15 @@ def _explain(law: Law, subject: Subject) -> str:
         return law.why
 
 
-def _test(law: Law, subject: Subject, limits: Limits) -> LawRow:
+def _test(law: Law, subject: Subject | Adaptation, limits: Limits) -> LawRow:
     """Test a law."""
     message, why, applies = "", law.why, True
     held: bool | None = True
     # NaN and infinity among the test images are no fault of the caller's arithmetic.
     with measuring() as deviations, np.errstate(all="ignore"):
         try:
+            if not isinstance(subject, law.subject):
+                raise NotTaken(_NOT_OF[law.subject])
             subject.check_visible()
             law.test(subject, limits)
         except AssertionError as error:

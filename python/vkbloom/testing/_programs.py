@@ -1,4 +1,4 @@
-"""A program that reads and writes image files as a bloom for the laws."""
+"""A program that reads and writes image files as a bloom or an exposure for the laws."""
 
 from __future__ import annotations
 
@@ -20,13 +20,15 @@ from vkbloom._argument_types import check_arguments
 from vkbloom._io.array_files import read, write
 from vkbloom._numbers import check_number
 from vkbloom._public import public
+from vkbloom.testing._adaptation import Meter
 from vkbloom.testing._levels import Levels
 from vkbloom.testing._probe import Bloom
 
 __tracebackhide__ = True
 
 _PLACEHOLDERS: Final = ("{input}", "{output}")
-_PLACEHOLDER: Final = re.compile("|".join(map(re.escape, _PLACEHOLDERS)))
+_DT, _STATE = "{dt}", "{state}"
+_PLACEHOLDER: Final = re.compile("|".join(map(re.escape, (*_PLACEHOLDERS, _DT, _STATE))))
 #: Bits of the integers in a file, by OpenImageIO's name of the type.
 _BITS: Final = {"uint8": 8, "uint16": 16}
 _COARSE: Final = 8
@@ -41,8 +43,8 @@ _LAST_WORDS: Final = 300  # characters of a failed program's output that an erro
 
 @public("vkbloom.testing")
 @check_arguments
-def command(argv: Sequence[str], *, suffix: str = ".exr", timeout: float = 60.0) -> Bloom:
-    """Make a bloom for the laws out of a program.
+def command(argv: Sequence[str], *, suffix: str = ".exr", timeout: float = 60.0) -> Bloom | Meter:
+    """Make a bloom, or an exposure, for the laws out of a program.
 
     For each image the program is run once. It reads a file and writes another one of the same size.
 
@@ -50,6 +52,10 @@ def command(argv: Sequence[str], *, suffix: str = ".exr", timeout: float = 60.0)
     ----------
     argv : sequence of str
         The program and its arguments. ``{input}`` and ``{output}`` in them stand for the files.
+        With ``{dt}``, the seconds since the frame before, the program is an exposure, which writes
+        the exposed picture. ``{state}`` stands for a file of any kind, in which it keeps what it
+        has adapted to: it reads the file if there is one, and writes it anew. Without ``{state}``
+        it keeps that elsewhere.
     suffix : str
         The type of both files. EXR files have linear floats. Files of integers, such as ".png",
         are written and read as sRGB.
@@ -59,7 +65,8 @@ def command(argv: Sequence[str], *, suffix: str = ".exr", timeout: float = 60.0)
     Returns
     -------
     callable
-        Takes an image (H, W, 3) or (H, W, 4), and returns an image in float32. Its errors name the
+        Takes an image (H, W, 3) or (H, W, 4), and returns an image in float32; an exposure as
+        `report` calls it. Its errors name the
         program: TimeoutError if it hangs, ChildProcessError if it fails, FileNotFoundError if it
         does not exist or writes nothing, ValueError if its file cannot be read, has another size,
         or has NaN or infinity where the image has none. A file of 8 bits is a UserWarning, once.
@@ -70,11 +77,17 @@ def command(argv: Sequence[str], *, suffix: str = ".exr", timeout: float = 60.0)
     >>> bloom = testing.command(["cp", "{input}", "{output}"])
     >>> testing.report(bloom, size=(32, 32)).assert_held("superposition", "gain", "symmetric")
     """
-    return CommandBloom(argv, suffix, timeout)
+    return command_of(argv, suffix, timeout)
 
 
-class CommandBloom:
-    """The callable of `command`.
+def command_of(argv: Sequence[str], suffix: str, timeout: float) -> CommandBloom | CommandMeter:
+    """Return the callable of a program: an exposure, if its arguments have {dt}."""
+    kind = CommandMeter if any(_DT in word for word in argv) else CommandBloom
+    return kind(argv, suffix, timeout)
+
+
+class _Program:
+    """A program that reads an image file and writes another one.
 
     `bits` is 8 or 16 if its files hold such integers, by the suffix; once it has run, by what it
     has written. `runs` counts its runs, and `on_run` is called before each.
@@ -101,15 +114,15 @@ class CommandBloom:
         """What the files hold; None: floats."""
         return None if self.bits is None else Levels(bits=self.bits, is_lossy=self._is_lossy)
 
-    def __call__(self, image: NDArray[Any]) -> NDArray[Any]:
-        """Run the program once."""
+    def run(self, image: NDArray[Any], values: Mapping[str, str] = {}) -> NDArray[Any]:
+        """Run the program once; `values`: of placeholders beside those of the images."""
         self.runs += 1
         self.on_run(self.runs)
         height, width = image.shape[:2]
         with tempfile.TemporaryDirectory(prefix="vkbloom-") as folder:
             source, target = (Path(folder) / f"{name}{self._suffix}" for name in ("in", "out"))
             write(source, np.ascontiguousarray(image, np.float32), premultiplied=True)
-            self._run(dict(zip(_PLACEHOLDERS, (str(source), str(target)), strict=True)))
+            self._run({**values, "{input}": str(source), "{output}": str(target)})
             if not target.exists():
                 raise FileNotFoundError(f"{self._name}: it wrote no file for {_PLACEHOLDERS[1]}")
             result = self._read(target)
@@ -117,13 +130,6 @@ class CommandBloom:
             raise ValueError(
                 f"{self._name}: it wrote {result.shape[1]} x {result.shape[0]} pixels for "
                 f"{width} x {height}; both files must have the same size"
-            )
-        wrong = ~np.isfinite(result)
-        if wrong.any() and np.isfinite(image).all():
-            y, x, channel = (int(position) for position in np.argwhere(wrong)[0])
-            raise ValueError(
-                f"{self._name}: it wrote {result[y, x, channel]} at x {x}, y {y}, channel "
-                f"{channel} for an image of finite values ({int(wrong.sum())} such values)"
             )
         return result
 
@@ -171,9 +177,54 @@ class CommandBloom:
                 "testing.report and testing.assert_laws know; measure with "
                 f"Probe(atol={COARSE_ERROR:g}), or let it write EXR",
                 UserWarning,
-                stacklevel=3,
+                stacklevel=4,
             )
         return pixels
+
+
+class CommandBloom(_Program):
+    """A program as a bloom."""
+
+    def __call__(self, image: NDArray[Any]) -> NDArray[Any]:
+        """Return what the program makes of an image."""
+        result = self.run(image)
+        wrong = ~np.isfinite(result)
+        if wrong.any() and np.isfinite(image).all():
+            y, x, channel = (int(position) for position in np.argwhere(wrong)[0])
+            raise ValueError(
+                f"{self._name}: it wrote {result[y, x, channel]} at x {x}, y {y}, channel "
+                f"{channel} for an image of finite values ({int(wrong.sum())} such values)"
+            )
+        return result
+
+
+class CommandMeter(_Program):
+    """A program as an exposure. Its state is what it writes into the file {state}."""
+
+    @property
+    def keeps_state(self) -> bool:
+        """Whether the program keeps its state elsewhere."""
+        return not any(_STATE in word for word in self._argv)
+
+    def __call__(self, image: NDArray[Any], *, dt: float, state: bytes | None = None) -> Any:
+        """Return what the program makes of a frame; with a state, also the next one."""
+        with tempfile.TemporaryDirectory(prefix="vkbloom-") as folder:
+            file = Path(folder) / "state"
+            if state is not None:
+                file.write_bytes(state)
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", UserWarning)
+                picture = self.run(image, {_DT: f"{dt:.9g}", _STATE: str(file)})
+            if self.bits is not None:
+                raise ValueError(
+                    f"{self._name}: it writes integers, which end at 1; an exposure is measured in "
+                    "files of floats, such as .exr"
+                )
+            if self.keeps_state:
+                return picture
+            if not file.exists():
+                raise FileNotFoundError(f"{self._name}: it wrote no file for {_STATE}")
+            return picture, file.read_bytes()
 
 
 def levels_of(bloom: Bloom, size: tuple[int, int]) -> Levels | None:

@@ -13,7 +13,7 @@ from vkbloom._locks import cached_property
 from vkbloom.testing._last_pixel import LastPixel, last_pixel
 from vkbloom.testing._moving_light import Stability, stability
 from vkbloom.testing._point_spread import measure_spread, point_spread, sum_error
-from vkbloom.testing._probe import Bloom, Error, Image, Probe, guard
+from vkbloom.testing._probe import Bloom, Error, Image, Probe, guard, takes
 from vkbloom.testing._scaled_scene import ResolutionResponse, resolution_response
 
 # A threshold of 1, the usual one, lets nothing of an image of 1 through.
@@ -70,6 +70,15 @@ class Subject:
         flat = self.probe.apply(self.bloom, self.probe.flat(self.probe.value))[0]
         x, y = self.probe.centre
         return max(0.0, float(flat[y, x].mean()) / self.probe.value)
+
+    @property
+    def untaken(self) -> tuple[str, ...]:
+        """What the bloom does not take of what laws can give; "dt" is for exposures alone."""
+        return (*(name for name in ("region", "time") if not takes(self.bloom, name)), "dt")
+
+    def try_once(self) -> None:
+        """Run the bloom, so that one that cannot run at all fails."""
+        _ = self.measured_gain
 
     def check_visible(self) -> None:
         """Raise ValueError if a bloom that needs values above 1 cannot be given any."""

@@ -12,7 +12,7 @@ import warnings
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NamedTuple, TypeAlias
 
 import click
 from rich.console import Console
@@ -20,7 +20,7 @@ from rich.status import Status
 
 from vkbloom._cli.check import comparing, measuring, showing
 from vkbloom._cli.check.sequences import check_unused, judge, sequence_options
-from vkbloom._cli.fields import SIZE, Command
+from vkbloom._cli.fields import SIZE, Command, FieldOption, NameOf
 from vkbloom._cli.program import adapter_option, as_wrong_use, is_given
 from vkbloom._cli.settings_options import settings_options
 from vkbloom._cli.targets import check_target
@@ -29,11 +29,14 @@ from vkbloom._custom.method import CustomMethod, identifier_of, load_method
 from vkbloom._io import safe_writing
 from vkbloom._renderer.interruptible import open_renderer
 from vkbloom._renderer.renderer import Renderer
+from vkbloom._settings.exposure import Exposure, exposures
 from vkbloom._settings.settings import Settings, presets
-from vkbloom._spelling import did_you_mean
+from vkbloom._spelling import describe_unknown, did_you_mean
+from vkbloom.testing._adaptation import NO_BLOOM, Adaptation, meter_of
+from vkbloom.testing._adaptation import SIZE as EXPOSURE_SIZE
 from vkbloom.testing._law_report import LawReport, law_report
 from vkbloom.testing._laws.table import find_law, merge_limits
-from vkbloom.testing._programs import CommandBloom
+from vkbloom.testing._programs import CommandBloom, CommandMeter, command_of
 from vkbloom.testing._subject import Subject
 
 # Runs whose times are measured; of two blooms, in turns.
@@ -41,8 +44,42 @@ _RUNS: Final = 5
 _ABOVE_0: Final = click.FloatRange(0, min_open=True)
 
 
+class _Exposed(NamedTuple):
+    """An exposure of the package.
+
+    - `settings`: Of the bloom that the picture has. None: it has none.
+    """
+
+    exposure: Exposure
+    settings: Settings | None
+
+
+#: What is measured: a command, the bloom of settings, or an exposure.
+_Source: TypeAlias = str | Settings | _Exposed
+
+
+class _ExposureName(NameOf):
+    """The name of an exposure; "" for stops of the settings, which no law measures."""
+
+    def convert(self, value: str, param: click.Parameter | None, ctx: click.Context | None) -> str:
+        """Return the name as it was published."""
+        try:
+            float(value)
+        except ValueError:
+            return super().convert(value, param, ctx)
+        return ""
+
+
 class CheckCommand(Command):
     """A command whose argument is a file of a custom method, which adds options."""
+
+    def get_params(self, ctx: click.Context) -> list[click.Parameter]:
+        """Leave out the field `exposure`: laws are measured without it, and an exposure has one."""
+        return [
+            param
+            for param in super().get_params(ctx)
+            if not (isinstance(param, FieldOption) and param.field == "exposure")
+        ]
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Load the file before the options are parsed, so that its parameters are options."""
@@ -72,7 +109,15 @@ def _laws(_: click.Context, __: click.Parameter, text: str) -> tuple[str, ...]:
 @click.command(cls=CheckCommand)
 @click.argument("file", required=False, metavar="[FILE]")
 @click.option(
-    "--command", "program", metavar="'PROGRAM {input} {output}'", help="Measure a program."
+    "--command",
+    "program",
+    metavar="'PROGRAM {input} {output}'",
+    help="Measure a program; with {dt} and {state} it is an exposure.",
+)
+@click.option(
+    "--exposure",
+    type=_ExposureName("exposure", exposures),
+    help="Measure an exposure, alone or beside the bloom of --preset or --method.",
 )
 @click.option("--suffix", default=".exr", help="The type of the program's image files.")
 @click.option(
@@ -115,6 +160,7 @@ def check(
     reference: str | None,
     against: str | None,
     sequence: str | None,
+    exposure: str | None,
     as_json: bool,
     page: str | None,
     markdown: str | None,
@@ -122,10 +168,10 @@ def check(
     settings: Settings,
     **how: Any,
 ) -> int:
-    """Measure what a bloom is worth.
+    """Measure what a bloom or an exposure is worth.
 
-    FILE is a custom method; its parameters are options. Or give --preset, --method, --command, or
-    --sequence.
+    FILE is a custom method; its parameters are options. Or give --preset, --method, --exposure,
+    --command, or --sequence.
     Prints the passes and their times; each law, held or by how much it is not; energy, point
     spread, stability of a moving light, response to the resolution, veiling glare index, the
     differences from the reference, and the nearest preset. Laws are measured with buffers of 32-bit
@@ -137,7 +183,8 @@ def check(
         if target is not None:
             check_target(target)
     if sequence is not None:
-        if file or program or against or is_given("preset") or is_given("method"):
+        given = (file, program, against, exposure, is_given("preset"), is_given("method"))
+        if any(given):
             raise click.UsageError("--sequence judges files alone, without a bloom")
         return judge(sequence, how, as_json=as_json)
     check_unused()
@@ -147,12 +194,13 @@ def check(
     with open_renderer(adapter) as renderer, console.status("") as bar:
         if reference is not None:
             _add_reference(settings, reference)
-        sources = {program or params["preset"] or settings.method: program or settings}
+        sources = dict([_source_of(params, settings)])
         if against is not None:
+            (first,) = sources.values()
             sources[against if against not in sources else f"{against} (against)"] = _other(
-                against, settings
+                against, first, settings
             )
-        opened = [_open_bloom(renderer, *source, how, bar) for source in sources.items()]
+        opened = [_open(renderer, *source, how, bar) for source in sources.items()]
         blooms = _measure(opened, how, bar)
         (values, report, subject), *others = blooms
         name = values["name"]
@@ -184,14 +232,17 @@ def check(
 
 @dataclasses.dataclass
 class _Opened:
-    """A bloom that has run once. `program`, `settings`: one is None; `law`: what is tested."""
+    """What has run once: a bloom or an exposure. One of `program` and `source` is None.
+
+    - `law`: What is tested.
+    """
 
     name: str
-    subject: Subject
+    subject: Subject | Adaptation
     timer: Callable[[], Mapping[str, float]]
     device: str
-    program: CommandBloom | None = None
-    settings: Settings | None = None
+    program: CommandBloom | CommandMeter | None = None
+    source: Settings | _Exposed | None = None
     law: str = "first run"
 
     def show(self, bar: Status, law: str | None = None) -> None:
@@ -201,32 +252,64 @@ class _Opened:
         if self.program is not None:
             levels = self.program.levels
             total = measuring.RUNS[levels is not None and levels.is_coarse]
+            if isinstance(self.subject, Adaptation):
+                total = measuring.RUNS_OF_EXPOSURE
             runs = f", run {self.program.runs} of {max(total, self.program.runs)}"
         bar.update(f"{self.name}: {self.law}{runs}")
 
+    def values_of(self, report: LawReport, **about: Any) -> dict[str, Any]:
+        """Return all that is measured as plain values."""
+        if isinstance(self.subject, Subject):
+            settings = self.source if isinstance(self.source, Settings) else None
+            return measuring.values_of(self.subject, report, settings, **about)
+        exposed = self.source if isinstance(self.source, _Exposed) else (None, None)
+        return measuring.values_of_exposure(report, *exposed, **about)
 
-def _open_bloom(
-    renderer: Renderer,
-    name: str,
-    source: str | Settings,
-    how: Mapping[str, Any],
-    bar: Status,
+
+def _source_of(params: Mapping[str, Any], settings: Settings) -> tuple[str, _Source]:
+    """Return the name and the source of what the options name."""
+    name = params["preset"] or settings.method
+    if params["program"] is not None:
+        return params["program"], params["program"]
+    if not params["exposure"]:
+        return name, settings
+    has_bloom = is_given("preset") or is_given("method")
+    exposed = _Exposed(exposures[params["exposure"]], settings if has_bloom else None)
+    return f"{params['exposure']}, {name}" if has_bloom else params["exposure"], exposed
+
+
+def _open(
+    renderer: Renderer, name: str, source: _Source, how: Mapping[str, Any], bar: Status
 ) -> _Opened:
-    """Return the bloom of settings, or of a command, which is run to see what it writes."""
-    size = how["size"]
-    if not isinstance(source, str):
-        subject = measuring.of_settings(renderer, source, how["measured"], how["gain"])
+    """Return a bloom or an exposure of the package, or of a command, which is run to see."""
+    size, measured = how["size"], how["measured"]
+    frame = measured if is_given("measured") else EXPOSURE_SIZE
+    if isinstance(source, _Exposed):
+        exposed = source
+        bloom = None if exposed.settings is None else measuring.exact(exposed.settings)
+        meter = meter_of(exposed.exposure, renderer, bloom)
+        subject: Subject | Adaptation = Adaptation(meter=meter, size=frame)
 
         def passes() -> Mapping[str, float]:
-            return measuring.pass_times(renderer, source, size)
+            shown = exposed.settings or NO_BLOOM
+            return measuring.pass_times(renderer, shown, size, exposure=exposed.exposure)
 
-        return _Opened(name, subject, passes, renderer.info.summary, settings=source)
+        return _Opened(name, subject, passes, renderer.info.summary, source=source)
+    if isinstance(source, Settings):
+        settings = source
+        subject = measuring.of_settings(renderer, settings, measured, how["gain"])
+
+        def passes() -> Mapping[str, float]:
+            return measuring.pass_times(renderer, settings, size)
+
+        return _Opened(name, subject, passes, renderer.info.summary, source=source)
     with as_wrong_use():
-        run = CommandBloom(shlex.split(source), how["suffix"], how["timeout"])
+        run = command_of(shlex.split(source), how["suffix"], how["timeout"])
     with _notes():
-        subject = measuring.of_program(
-            run, how["measured"], how["gain"], less_input=how["less_input"]
-        )
+        if isinstance(run, CommandMeter):
+            subject = Adaptation(meter=run, size=frame)
+        else:
+            subject = measuring.of_program(run, measured, how["gain"], less_input=how["less_input"])
     opened = _Opened(
         name, subject, lambda: measuring.run_time(run, size), "this machine", program=run
     )
@@ -236,8 +319,8 @@ def _open_bloom(
 
 def _measure(
     opened: list[_Opened], how: Mapping[str, Any], bar: Status
-) -> list[tuple[dict[str, Any], LawReport, Subject]]:
-    """Return what is measured of blooms, as the options say."""
+) -> list[tuple[dict[str, Any], LawReport, Subject | Adaptation]]:
+    """Return what is measured of blooms and exposures, as the options say."""
     # Of one program, a run is long, and its time is only shown.
     is_compared = len(opened) > 1
     runs = _RUNS if is_compared or opened[0].program is None else 1
@@ -250,20 +333,27 @@ def _measure(
             )
             each.law = "figures"
             about = {"name": each.name, "adapter": each.device, "size": how["size"]}
-            values = measuring.values_of(each.subject, report, each.settings, **about, **seconds)
+            values = each.values_of(report, **about, **seconds)
             results.append((values, report, each.subject))
         except AssertionError as error:
             raise click.ClickException(f"{each.name}: {error}") from error
     return results
 
 
-def _other(against: str, settings: Settings) -> str | Settings:
-    """Return what --against names: a command, or settings.
+def _other(against: str, first: _Source, settings: Settings) -> _Source:
+    """Return what --against names: a command, settings, or beside an exposure another one.
 
     Of a file, parameters have the values that differ from the defaults of the first bloom.
     """
+    is_exposure = isinstance(first, _Exposed) or (isinstance(first, str) and "{dt}" in first)
     if "{input}" in against:
+        if is_exposure != ("{dt}" in against):
+            raise click.UsageError("--against: a bloom and an exposure cannot be compared")
         return against
+    if is_exposure:
+        if against not in exposures:
+            raise click.UsageError(f"--against: {describe_unknown('exposure', against, exposures)}")
+        return _Exposed(exposures[against], first.settings if isinstance(first, _Exposed) else None)
     if os.path.isfile(against):
         # Another name, so that it does not replace a file of the same name.
         kind = load_method(against, name=f"{identifier_of(Path(against).stem)}_against")
@@ -293,10 +383,18 @@ def _check_choice(params: Mapping[str, Any]) -> None:
     chosen = [name for name in ("preset", "method") if is_given(name)]
     if program is not None and chosen:
         raise click.UsageError(f"--command cannot be combined with --{chosen[0]} or FILE")
+    if params["exposure"] or "{dt}" in (program or ""):
+        for name in ("reference", "gain", "less_input"):
+            if is_given(name):
+                raise click.UsageError(f"--{name.replace('_', '-')} is of a bloom, not an exposure")
+    if program is not None and params["exposure"]:
+        raise click.UsageError("--command cannot be combined with --exposure")
     if program is not None and params["reference"] is not None:
         raise click.UsageError("--reference needs FILE; a program has one framebuffer")
-    if program is None and not chosen:
-        raise click.UsageError("give FILE, --preset NAME, --method NAME or --command PROGRAM")
+    if program is None and not chosen and not params["exposure"]:
+        raise click.UsageError(
+            "give FILE, --preset NAME, --method NAME, --exposure NAME or --command PROGRAM"
+        )
 
 
 @contextmanager

@@ -73,6 +73,8 @@ def _describe_verdict(law: Mapping[str, Any]) -> str:
 
 
 def _figures(before: Mapping[str, Any], after: Mapping[str, Any]) -> Iterator[Change]:
+    if "energy" not in after:  # of an exposure
+        return
     for name, (keys, less) in FIGURES.items():
         old, new = (figure_of(side, keys) for side in (before, after))
         verdict = _verdict(old, new, *_FIGURE, less=less)
@@ -130,7 +132,7 @@ def _ratio(time: Change) -> str:
 def as_text(changes: Sequence[Change], names: tuple[str, str]) -> str:
     """Return a table for a terminal: before, after, and what became of it."""
     lines = [f"{names[1]}, against {names[0]}: {summary(changes)}", ""]
-    for kind in ("law", "figure", "time"):
+    for kind in dict.fromkeys(each.kind for each in changes):
         lines.append(f"{kind:<24} {'against':>22} {'now':>22}")
         for each in changes:
             if each.kind == kind:

@@ -18,20 +18,22 @@ from vkbloom._custom.method import CustomMethod
 from vkbloom._fit.translating import lights
 from vkbloom._psf.sampled import samples
 from vkbloom._renderer.renderer import Renderer
+from vkbloom._settings.exposure import Exposure
 from vkbloom._settings.settings import Settings
 from vkbloom._views.plain_values import plain
 from vkbloom.testing._blooms import bloom_of, exact
 from vkbloom.testing._law_report import LawReport
 from vkbloom.testing._point_spread import border_share, veiling_glare_index
 from vkbloom.testing._probe import Bloom, Probe
-from vkbloom.testing._programs import CommandBloom, levels_of
+from vkbloom.testing._programs import CommandBloom, CommandMeter, levels_of
 from vkbloom.testing._subject import Subject, fitting_probe
 
 Array = NDArray[np.float64]
 T = TypeVar("T")
 
-#: About how often a program is run, in files of floats and in those of 8 bits.
+#: About how often a program is run, in files of floats and in those of 8 bits; as an exposure.
 RUNS: Final = {False: 240, True: 90}
+RUNS_OF_EXPOSURE: Final = 850
 
 VIEW: Final = (256, 144)
 #: The `sketch` of each preset's bloom, as `python -m tools.preset_blooms` writes them.
@@ -76,9 +78,7 @@ def values_of(
         | {
             "settings": None if settings is None else exact(settings).to_dict(),
             "bits": None if levels is None else levels.bits,
-            "laws": {
-                row.name: {name: getattr(row, name) for name in _OF_A_LAW} for row in report.rows
-            },
+            "laws": _laws_of(report),
             "untaken": report.untaken,
             "gain": report.gain,
             "stability": stability and {name: getattr(stability, name) for name in _OF_STABILITY},
@@ -88,10 +88,36 @@ def values_of(
             "reference": reference or None,
             "nearest_preset": {"name": name or None, "difference": difference},
             "required": report.required,
-            "passed": all(row.held for row in report.rows if row.name in report.required),
+            "passed": _is_passed(report),
         }
     )
     return values
+
+
+def values_of_exposure(
+    report: LawReport, exposure: Exposure | None, settings: Settings | None, **about: Any
+) -> dict[str, Any]:
+    """Return all that is measured of an exposure as plain values, as `values_of` does."""
+    values: dict[str, Any] = plain(
+        about
+        | {
+            "exposure": None if exposure is None else exposure.to_dict(),
+            "settings": None if settings is None else settings.to_dict(),
+            "laws": _laws_of(report),
+            "untaken": report.untaken,
+            "required": report.required,
+            "passed": _is_passed(report),
+        }
+    )
+    return values
+
+
+def _laws_of(report: LawReport) -> dict[str, Any]:
+    return {row.name: {name: getattr(row, name) for name in _OF_A_LAW} for row in report.rows}
+
+
+def _is_passed(report: LawReport) -> bool:
+    return all(row.held for row in report.rows if row.name in report.required)
 
 
 def _figure(measure: Callable[[], T]) -> T | None:
@@ -148,16 +174,22 @@ def of_program(
 
 
 def pass_times(
-    renderer: Renderer, settings: Settings, size: tuple[int, int], repeats: int = 1
+    renderer: Renderer,
+    settings: Settings,
+    size: tuple[int, int],
+    repeats: int = 1,
+    exposure: Exposure | None = None,
 ) -> dict[str, float]:
     """Return the shortest time of each pass in seconds, for an image of 16-bit floats.
 
     The first run, of another image, is not counted.
     """
+    how: dict[str, Any] = {} if exposure is None else {"exposure": exposure, "dt": 1 / 60}
     images = _images(size)
     results: dict[str, float] = {}
     for turn in range(repeats + 1):
-        timings = renderer.apply(images[turn % 2], settings, framebuffers=("final",)).timings
+        image = images[turn % 2]
+        timings = renderer.apply(image, settings, framebuffers=("final",), **how).timings
         if turn:
             results = {name: min(time, results.get(name, time)) for name, time in timings.items()}
     return results
@@ -169,11 +201,14 @@ def _images(size: tuple[int, int]) -> tuple[NDArray[np.float16], NDArray[np.floa
     return first, second
 
 
-def run_time(program: Bloom, size: tuple[int, int]) -> dict[str, float]:
+def run_time(program: CommandBloom | CommandMeter, size: tuple[int, int]) -> dict[str, float]:
     """Return the time of one run of a program in seconds, with reading and writing of files."""
     image = noise(size, 0).astype(np.float32)
     begun = time.perf_counter()
-    program(image)
+    if isinstance(program, CommandMeter):
+        program(image, dt=1 / 60)
+    else:
+        program(image)
     return {"program": time.perf_counter() - begun}
 
 

@@ -14,6 +14,7 @@ from vkbloom._psf.sampled import samples
 from vkbloom._views import markup
 from vkbloom._views.markup import Markup, element
 from vkbloom._views.pictures import picture, png
+from vkbloom.testing._adaptation import Adaptation
 from vkbloom.testing._law_report import LawReport, cells
 from vkbloom.testing._laws.shape import LEVELS
 from vkbloom.testing._probe import BloomError, call
@@ -65,6 +66,8 @@ def _tables(values: Values) -> Iterator[tuple[str, list[tuple[str, str]]]]:
     width, height = values["size"]
     rows = [(name, f"{1e3 * seconds:.3f} ms") for name, seconds in times(values).items()]
     yield f"Passes at {width} x {height}", rows
+    if "energy" not in values:  # of an exposure
+        return
     rows = [(name, words(figure_of(values, keys))) for name, (keys, _) in FIGURES.items()]
     near = values["nearest_preset"]
     if near["name"]:
@@ -98,21 +101,9 @@ def as_markdown(values: Values, report: LawReport) -> str:
     return "\n".join((*lines, ""))
 
 
-def as_page(values: Values, report: LawReport, subject: Subject) -> str:
-    """Return a page with tables, the point spread, and pictures."""
-    scene, shown = lights(VIEW), {}
-    if values["energy"]:
-        shown["point spread, logarithmic"] = samples(subject.spread)._repr_png_()
-    for name, bloom in (("picture", subject.picture or subject.bloom), ("bloom", subject.bloom)):
-        # A bloom that fails here has failed in the laws, too.
-        with contextlib.suppress(BloomError):
-            shown[name] = png(picture(call(bloom, scene), name))
-    images = [
-        markup.figure(
-            markup.image(data, name, width=384 if name in ("picture", "bloom") else 256), name
-        )
-        for name, data in shown.items()
-    ]
+def as_page(values: Values, report: LawReport, subject: Subject | Adaptation) -> str:
+    """Return a page with tables; of a bloom also with the point spread and pictures."""
+    images = _draw(values, subject) if isinstance(subject, Subject) else []
     tables = [
         part
         for title, rows in _tables(values)
@@ -122,9 +113,25 @@ def as_page(values: Values, report: LawReport, subject: Subject) -> str:
         f"vkbloom check: {values['name']}",
         element("h1", values["name"]),
         element("p", f"On {values['adapter']}."),
-        element("h2", "Pictures"),
-        *images,
+        *([element("h2", "Pictures"), *images] if images else []),
         element("h2", "Laws"),
         Markup(report._repr_html_()),
         *tables,
     )
+
+
+def _draw(values: Values, subject: Subject) -> list[Markup]:
+    """Return the point spread and pictures of a bloom."""
+    scene, shown = lights(VIEW), {}
+    if values["energy"]:
+        shown["point spread, logarithmic"] = samples(subject.spread)._repr_png_()
+    for name, bloom in (("picture", subject.picture or subject.bloom), ("bloom", subject.bloom)):
+        # A bloom that fails here has failed in the laws, too.
+        with contextlib.suppress(BloomError):
+            shown[name] = png(picture(call(bloom, scene), name))
+    return [
+        markup.figure(
+            markup.image(data, name, width=384 if name in ("picture", "bloom") else 256), name
+        )
+        for name, data in shown.items()
+    ]

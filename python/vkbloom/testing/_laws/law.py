@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 from vkbloom.testing._subject import Subject
 
@@ -27,8 +27,9 @@ class Figure:
 
 @dataclass(frozen=True, kw_only=True)
 class Law:
-    """A law of a bloom, which `report`, `assert_laws`, `vkbloom check` and the docs read.
+    """A law of a bloom or an exposure, which the reports and the docs read.
 
+    - `subject`: The class of what is tested: `Subject`, a bloom, or `Adaptation`, an exposure.
     - `test`: Takes the subject and the limits by figure; a limit of infinity leaves its figure out.
       Raises AssertionError if the law does not hold, and ValueError or TypeError if it cannot be
       tested.
@@ -40,12 +41,13 @@ class Law:
     """
 
     name: str
-    test: Callable[[Subject, Limits], None]
+    test: Callable[[Any, Limits], None]
     formula: str
     figures: Mapping[str, Figure]
     why: str
     explain: Callable[[Subject, str], str] | None = None
     applies: Callable[[Subject], bool] = lambda _: True
+    subject: type = Subject
 
     @property
     def sentence(self) -> str:

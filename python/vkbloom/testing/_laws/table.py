@@ -9,6 +9,7 @@ from typing import Final
 from vkbloom._numbers import check_number
 from vkbloom._spelling import did_you_mean
 from vkbloom.testing._laws import (
+    adaptation,
     alpha,
     border,
     bounds,
@@ -40,6 +41,7 @@ _MODULES: Final = (
     alpha,
     time,
     values,
+    adaptation,
 )
 
 #: The laws by name.
