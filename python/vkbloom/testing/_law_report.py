@@ -19,7 +19,7 @@ from vkbloom._views.markup import element
 from vkbloom.testing._adaptation import SIZE, Adaptation, Meter, is_meter, meter_of
 from vkbloom.testing._deviations import measuring
 from vkbloom.testing._laws.law import Law, Limits
-from vkbloom.testing._laws.table import LAWS, find_law, merge_limits
+from vkbloom.testing._laws.table import ALL_LAWS, find_law, merge_limits
 from vkbloom.testing._probe import Bloom, BloomError, NotTaken, Probe
 from vkbloom.testing._programs import levels_of
 from vkbloom.testing._subject import Subject, fitting_probe
@@ -101,10 +101,9 @@ class LawReport:
     required : tuple of str
         Names of the laws that the bloom promises.
     untaken : tuple of str
-        What is not taken, of "region", "time" and "dt": `views` is not tested without a region;
-        without a time, `history` tests the order of the images alone; without "dt", the seconds
-        since the frame before, no law of an exposure is tested. Of an exposure, "state": it keeps
-        its state itself, and a test begins where the one before has left it.
+        What the bloom does not take, of "region" and "time": `views` is not tested without a
+        region; without a time, `history` tests the order of the images alone. Of an exposure,
+        "state": it keeps its state itself, and a test begins where the one before has left it.
     """
 
     rows: tuple[LawRow, ...]
@@ -151,6 +150,8 @@ class LawReport:
         if self.untaken:
             what = "exposure" if self.gain is None else "bloom"
             about += f"; the {what} takes no {' and no '.join(self.untaken)}"
+        if self.gain is not None:
+            about += "; without dt, the laws of exposures are not tested"
         lines = [
             about,
             f"{'law':<18} {'held':<11} {'off by':>9} {'allowed':>9}",
@@ -279,13 +280,15 @@ def report(
         required = tuple(dict.fromkeys(find_law(name) for name in names))
     except ValueError as error:
         raise ValueError(f"laws: {error}") from None
-    merged = merge_limits(limits, required or LAWS.keys())
+    merged = merge_limits(limits, required or ALL_LAWS.keys())
     if is_meter(bloom):
         given = {"gain": gain, "picture": picture, "probe": probe}
         for name in (name for name, value in given.items() if value is not None):
             raise ValueError(f"{name}: an exposure has none")
         meter = meter_of(bloom) if isinstance(bloom, Exposure | str) else bloom
         return law_report(Adaptation(meter=meter, size=size or SIZE), merged, required)
+    if not callable(bloom):
+        raise TypeError(f"bloom: {bloom!r} is not callable")
     bloom, size = cast("Bloom", bloom), size or (256, 256)
     used = probe or fitting_probe(bloom, Probe(size=size, levels=levels_of(bloom, size)))
     subject = Subject(bloom=bloom, probe=used, picture=picture, intensity=intensity, gain=gain)
@@ -365,7 +368,7 @@ def law_report(
     except BloomError as error:
         raise (error.__cause__ or error) from None
     rows = []
-    for law in (LAWS[name] for name in LAWS if name in limits):
+    for law in (ALL_LAWS[name] for name in ALL_LAWS if name in limits):
         is_of_subject = isinstance(subject, law.subject)
         if law.name in required or (is_of_subject and law.applies(cast("Any", subject))):
             progress(law.name)

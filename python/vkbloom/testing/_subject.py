@@ -73,8 +73,8 @@ class Subject:
 
     @property
     def untaken(self) -> tuple[str, ...]:
-        """What the bloom does not take of what laws can give; "dt" is for exposures alone."""
-        return (*(name for name in ("region", "time") if not takes(self.bloom, name)), "dt")
+        """What the bloom does not take of what laws can give."""
+        return tuple(name for name in ("region", "time") if not takes(self.bloom, name))
 
     def try_once(self) -> None:
         """Run the bloom, so that one that cannot run at all fails."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping
+from types import ModuleType
 from typing import Final
 
 from vkbloom._numbers import check_number
@@ -27,7 +28,7 @@ from vkbloom.testing._laws.law import Law, Limits
 
 __tracebackhide__ = True
 
-#: Modules whose objects of the class `Law` are the laws, in the order of the report.
+#: Modules whose objects of the class `Law` are the laws of a bloom, in the order of the report.
 _MODULES: Final = (
     linear,
     spread,
@@ -41,16 +42,23 @@ _MODULES: Final = (
     alpha,
     time,
     values,
-    adaptation,
 )
 
-#: The laws by name.
-LAWS: Final[Mapping[str, Law]] = {
-    law.name: law for module in _MODULES for law in vars(module).values() if isinstance(law, Law)
-}
+
+def _laws_of(*modules: ModuleType) -> dict[str, Law]:
+    laws = (law for module in modules for law in vars(module).values() if isinstance(law, Law))
+    return {law.name: law for law in laws}
 
 
-def find_law(name: str, known: Collection[str] = LAWS.keys()) -> str:
+#: The laws of a bloom by name.
+LAWS: Final[Mapping[str, Law]] = _laws_of(*_MODULES)
+#: Those of an exposure.
+EXPOSURE_LAWS: Final[Mapping[str, Law]] = _laws_of(adaptation)
+#: Both.
+ALL_LAWS: Final[Mapping[str, Law]] = {**LAWS, **EXPOSURE_LAWS}
+
+
+def find_law(name: str, known: Collection[str] = ALL_LAWS.keys()) -> str:
     """Return the name of a known law; a hyphen stands for an underscore.
 
     - Raises TypeError if it is no text, and ValueError if there is no such law.
@@ -64,7 +72,7 @@ def find_law(name: str, known: Collection[str] = LAWS.keys()) -> str:
 
 
 def merge_limits(
-    given: Mapping[str, Mapping[str, float]], tested: Collection[str] = LAWS.keys()
+    given: Mapping[str, Mapping[str, float]], tested: Collection[str] = ALL_LAWS.keys()
 ) -> dict[str, Limits]:
     """Return the limits of the laws to test, with the given ones in place of their own.
 
@@ -73,7 +81,7 @@ def merge_limits(
     """
     if not isinstance(given, Mapping):
         raise TypeError(f"limits: {given!r} is not a mapping of laws to mappings of figures")
-    results: dict[str, Limits] = {name: LAWS[name].limits for name in tested}
+    results: dict[str, Limits] = {name: ALL_LAWS[name].limits for name in tested}
     for key, changes in given.items():
         try:
             name = find_law(key)
