@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import resource
 import signal
@@ -10,6 +11,7 @@ import sys
 import time
 from collections.abc import Callable, Sequence
 from fractions import Fraction
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -464,3 +466,42 @@ def test_times_of_an_iterator_are_compared_when_it_ends(renderer: vkbloom.Render
     for times in ([0, 1], [0, 1, 2, 3]):
         with pytest.raises(ValueError, match=f"{len(times)} times"):
             list(vkbloom.sequence(iter(images()), times=times, renderer=renderer))
+
+
+def flashing(name: str, number: int) -> list[NDArray[Any]]:
+    """Return planes that are bright and dark in turns of two frames, 6 Hz at 24 a second.
+
+    Those of 10 bits are 240 and 1000 cd/m2 by PQ.
+    """
+    scale, dark, bright = (4, 150, 180) if "10" in name else (1, 30, 150)
+    light = (dark, dark, bright, bright)[number % 4] * scale
+    grey = np.full((HEIGHT // 2, WIDTH // 2), 128 * scale)
+    planes = [np.full((HEIGHT, WIDTH), light), grey, grey]
+    return [plane.astype(np.uint8 if scale == 1 else np.uint16) for plane in planes]
+
+
+def check_clip(path: Path, *words: object) -> tuple[int, dict[str, Any]]:
+    done = run("check", "--sequence", path, "--json", *words)
+    assert done.exit_code in {0, 1}, done.output
+    return done.exit_code, json.loads(done.stdout)
+
+
+def test_check_judges_a_video(tmp_path: Path) -> None:
+    write = partial(write_clip, codec="ffv1", name="yuv420p", count=36, planes=flashing)
+    status, found = check_clip(write(tmp_path / "clip.mkv"))
+    assert (status, found["frames"], found["fps"]) == (1, 36, 24)
+    assert found["flash"]["flashes"] == 6
+    # Its own times, some of which are longer: a third as fast as at a constant rate.
+    times = [number // 4 * 12 + number % 4 for number in range(36)]
+    status, found = check_clip(write(tmp_path / "slow.mkv", times=times))
+    assert (status, found["frames"], found["missing"]) == (0, 36, 0)
+    assert found["fps"] == pytest.approx(24, rel=0.05)
+    assert found["flash"]["flashes"] == 2
+    assert check_clip(tmp_path / "slow.mkv", "--fps", 24)[0] == 1
+    # The display follows from the tags; that of SDR shows both lights as its white.
+    write_clip(tmp_path / "pq.mkv", "ffv1", "yuv420p10le", PQ, count=36, planes=flashing)
+    for words, failed in ((), True), (("--display", "srgb"), False):
+        status, found = check_clip(tmp_path / "pq.mkv", "--standard", "bt1702", *words)
+        assert status == failed, words
+    missing = run("check", "--sequence", tmp_path / "none.mp4")
+    assert (missing.exit_code, "No such file" in one_line(missing.stderr)) == (1, True)

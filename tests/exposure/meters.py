@@ -92,4 +92,4 @@ class Meter:
         if self.fault == "a share speed * dt":
             return speed * dt
         sign = 1 if self.fault == "the exponent has the wrong sign" else -1
-        return 1 - 2.0 ** (sign * min(speed * dt, 500.0))
+        return 1 - math.exp2(sign * min(speed * dt, 500.0))

@@ -170,6 +170,7 @@ def test_programs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         testing.report(testing.command(words, suffix=".png"), laws=["still"])
 
 
+@pytest.mark.usefixtures("kept_renderers")
 def test_the_command(tmp_path: Path) -> None:
     words = ["check", "--exposure", "godot", "--size", "64x36", "--json"]
     done = run(*words, "--require", "still,mirror", "--html", tmp_path / "page.html")
@@ -183,7 +184,8 @@ def test_the_command(tmp_path: Path) -> None:
     jsonschema.validate(values, schema)
     assert "point spread" not in (tmp_path / "page.html").read_text()
 
-    done = run(*words, "--preset", "bevy_natural", "--against", "hdrp", "--require", "mirror,scale")
+    words += ["--preset", "bevy_natural", "--measure-size", "32x24"]
+    done = run(*words, "--against", "hdrp", "--require", "mirror,scale")
     assert done.exit_code == 0
     values = json.loads(done.stdout)
     jsonschema.validate(values, schema)

@@ -141,7 +141,9 @@ def _laws(_: click.Context, __: click.Parameter, text: str) -> tuple[str, ...]:
     "--against", metavar="FILE|PRESET|COMMAND", help="Another bloom, and what changed since then."
 )
 @click.option(
-    "--sequence", metavar="PATTERN", help="Judge frames in time instead, such as f.%04d.exr."
+    "--sequence",
+    metavar="PATTERN|VIDEO",
+    help="Judge frames in time instead, such as f.%04d.exr or clip.mp4.",
 )
 @sequence_options
 @click.option("--json", "as_json", is_flag=True, help="Print one object.")

@@ -31,8 +31,10 @@ MATRICES: Final[Mapping[int, tuple[float, float]]] = {
 UNSPECIFIED: Final = 2
 #: Matrices of BT.709, BT.601 and BT.2020 (non-constant luminance).
 BT709, BT601, BT2020 = 1, 6, 9
+PQ: Final = 16
+HLG: Final = 18
 #: The curves PQ and HLG.
-HDR_CURVES: Final = (16, 18)
+HDR_CURVES: Final = (PQ, HLG)
 # Names of curves and primaries in messages.
 _CURVE_NAMES: Final = {16: "BT.2100 PQ", 18: "BT.2100 HLG", 13: "sRGB", 8: "linear", 4: "gamma 2.2"}
 _PRIMARY_NAMES: Final = {9: "BT.2020", 12: "Display P3"}
