@@ -33,7 +33,9 @@ for _notebook in (_here.parent / "examples").glob("*.ipynb"):
     shutil.copy(_notebook, _here / "examples")
 runpy.run_path(str(_here / "fault_pictures.py"))["write"](_here / "examples" / "faults")
 runpy.run_path(str(_here / "flare_pictures.py"))["write"](_here / "examples" / "flare")
-runpy.run_path(str(_here / "law_table.py"))["write"](_here / "examples" / "laws.md")
+_write_laws = runpy.run_path(str(_here / "law_table.py"))["write"]
+_write_laws(_here / "examples" / "laws.md")
+_write_laws(_here / "examples" / "exposure_laws.md", "exposure")
 nb_execution_mode = "off"
 nb_merge_streams = True
 default_role = "py:obj"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import sys
 from pathlib import Path
 from typing import Any
@@ -69,6 +70,20 @@ def test_engines(renderer: vkbloom.Renderer, exposure: Any) -> None:
             assert least <= rows[law].figures[name] <= most, (law, name)
     untested = {row.name for row in found.rows if row.held is None}
     assert untested == ({"speeds", "scale", "dark_pixels"} if exposure == "fixed" else set())
+
+
+def test_the_table_of_the_docs() -> None:
+    """It is what the laws found (tools/tables/write.py exposures)."""
+    table = Path(__file__).parents[2] / "docs" / "evidence" / "exposures_table.md"
+    rows = re.findall(r"^\| `(\w+)` \| (.*) \| (.*) \|$", table.read_text(), re.MULTILINE)
+    assert [law for law, _, _ in rows] == NAMES
+    for law, _, broken in rows:
+        expected = {
+            exposure if isinstance(exposure, str) else "ppv2"
+            for exposure, laws in ENGINES.items()
+            if law in laws
+        }
+        assert {*re.findall("`(\\w+)`", broken)} == expected
 
 
 @pytest.mark.parametrize("fault", FAULTS)

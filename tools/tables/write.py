@@ -11,6 +11,7 @@ import argparse
 from pathlib import Path
 from typing import Final
 
+import exposures
 import fits
 import presets
 import psfs
@@ -20,6 +21,7 @@ import vkbloom
 #: Functions of a renderer and of whether to measure a part only, by the name of the table's file.
 TABLES: Final = {
     "check": presets.check,
+    "exposures": exposures.laws,
     "derivatives": presets.derivatives,
     "measured": presets.measure,
     "stability": presets.stability,

@@ -12,13 +12,14 @@ import warnings
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Final, NamedTuple, TypeAlias
+from typing import Any, Final, TypeAlias
 
 import click
 from rich.console import Console
 from rich.status import Status
 
 from vkbloom._cli.check import comparing, measuring, showing
+from vkbloom._cli.check.measuring import Exposed
 from vkbloom._cli.check.sequences import check_unused, judge, sequence_options
 from vkbloom._cli.fields import SIZE, Command, FieldOption, NameOf
 from vkbloom._cli.program import adapter_option, as_wrong_use, is_given
@@ -29,11 +30,11 @@ from vkbloom._custom.method import CustomMethod, identifier_of, load_method
 from vkbloom._io import safe_writing
 from vkbloom._renderer.interruptible import open_renderer
 from vkbloom._renderer.renderer import Renderer
-from vkbloom._settings.exposure import Exposure, exposures
+from vkbloom._settings.exposure import exposures
 from vkbloom._settings.settings import Settings, presets
 from vkbloom._spelling import describe_unknown, did_you_mean
-from vkbloom.testing._adaptation import NO_BLOOM, Adaptation, meter_of
 from vkbloom.testing._adaptation import SIZE as EXPOSURE_SIZE
+from vkbloom.testing._adaptation import Adaptation, meter_of
 from vkbloom.testing._law_report import LawReport, law_report
 from vkbloom.testing._laws.table import find_law, merge_limits
 from vkbloom.testing._programs import CommandBloom, CommandMeter, command_of
@@ -44,18 +45,8 @@ _RUNS: Final = 5
 _ABOVE_0: Final = click.FloatRange(0, min_open=True)
 
 
-class _Exposed(NamedTuple):
-    """An exposure of the package.
-
-    - `settings`: Of the bloom that the picture has. None: it has none.
-    """
-
-    exposure: Exposure
-    settings: Settings | None
-
-
 #: What is measured: a command, the bloom of settings, or an exposure.
-_Source: TypeAlias = str | Settings | _Exposed
+_Source: TypeAlias = str | Settings | Exposed
 
 
 class _ExposureName(NameOf):
@@ -244,7 +235,7 @@ class _Opened:
     timer: Callable[[], Mapping[str, float]]
     device: str
     program: CommandBloom | CommandMeter | None = None
-    source: Settings | _Exposed | None = None
+    source: Settings | Exposed | None = None
     law: str = "first run"
 
     def show(self, bar: Status, law: str | None = None) -> None:
@@ -264,8 +255,8 @@ class _Opened:
         if isinstance(self.subject, Subject):
             settings = self.source if isinstance(self.source, Settings) else None
             return measuring.values_of(self.subject, report, settings, **about)
-        exposed = self.source if isinstance(self.source, _Exposed) else (None, None)
-        return measuring.values_of_exposure(report, *exposed, **about)
+        exposed = self.source if isinstance(self.source, Exposed) else None
+        return measuring.values_of_exposure(report, exposed, **about)
 
 
 def _source_of(params: Mapping[str, Any], settings: Settings) -> tuple[str, _Source]:
@@ -276,7 +267,7 @@ def _source_of(params: Mapping[str, Any], settings: Settings) -> tuple[str, _Sou
     if not params["exposure"]:
         return name, settings
     has_bloom = is_given("preset") or is_given("method")
-    exposed = _Exposed(exposures[params["exposure"]], settings if has_bloom else None)
+    exposed = Exposed(exposures[params["exposure"]], settings if has_bloom else None)
     return f"{params['exposure']}, {name}" if has_bloom else params["exposure"], exposed
 
 
@@ -286,15 +277,14 @@ def _open(
     """Return a bloom or an exposure of the package, or of a command, which is run to see."""
     size, measured = how["size"], how["measured"]
     frame = measured if is_given("measured") else EXPOSURE_SIZE
-    if isinstance(source, _Exposed):
+    if isinstance(source, Exposed):
         exposed = source
         bloom = None if exposed.settings is None else measuring.exact(exposed.settings)
         meter = meter_of(exposed.exposure, renderer, bloom)
         subject: Subject | Adaptation = Adaptation(meter=meter, size=frame)
 
         def passes() -> Mapping[str, float]:
-            shown = exposed.settings or NO_BLOOM
-            return measuring.pass_times(renderer, shown, size, exposure=exposed.exposure)
+            return measuring.pass_times(renderer, exposed, size)
 
         return _Opened(name, subject, passes, renderer.info.summary, source=source)
     if isinstance(source, Settings):
@@ -347,7 +337,7 @@ def _other(against: str, first: _Source, settings: Settings) -> _Source:
 
     Of a file, parameters have the values that differ from the defaults of the first bloom.
     """
-    is_exposure = isinstance(first, _Exposed) or (isinstance(first, str) and "{dt}" in first)
+    is_exposure = isinstance(first, Exposed) or (isinstance(first, str) and "{dt}" in first)
     if "{input}" in against:
         if is_exposure != ("{dt}" in against):
             raise click.UsageError("--against: a bloom and an exposure cannot be compared")
@@ -355,7 +345,7 @@ def _other(against: str, first: _Source, settings: Settings) -> _Source:
     if is_exposure:
         if against not in exposures:
             raise click.UsageError(f"--against: {describe_unknown('exposure', against, exposures)}")
-        return _Exposed(exposures[against], first.settings if isinstance(first, _Exposed) else None)
+        return Exposed(exposures[against], first.settings if isinstance(first, Exposed) else None)
     if os.path.isfile(against):
         # Another name, so that it does not replace a file of the same name.
         kind = load_method(against, name=f"{identifier_of(Path(against).stem)}_against")

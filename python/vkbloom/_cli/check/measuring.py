@@ -8,7 +8,7 @@ import math
 import time
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Final, TypeVar
+from typing import Any, Final, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,7 @@ from vkbloom._renderer.renderer import Renderer
 from vkbloom._settings.exposure import Exposure
 from vkbloom._settings.settings import Settings
 from vkbloom._views.plain_values import plain
+from vkbloom.testing._adaptation import NO_BLOOM
 from vkbloom.testing._blooms import bloom_of, exact
 from vkbloom.testing._law_report import LawReport
 from vkbloom.testing._point_spread import border_share, veiling_glare_index
@@ -30,6 +31,17 @@ from vkbloom.testing._subject import Subject, fitting_probe
 
 Array = NDArray[np.float64]
 T = TypeVar("T")
+
+
+class Exposed(NamedTuple):
+    """An exposure of the package.
+
+    - `settings`: Of the bloom that the picture has. None: it has none.
+    """
+
+    exposure: Exposure
+    settings: Settings | None
+
 
 #: About how often a program is run, in files of floats and in those of 8 bits; as an exposure.
 RUNS: Final = {False: 240, True: 90}
@@ -94,10 +106,12 @@ def values_of(
     return values
 
 
-def values_of_exposure(
-    report: LawReport, exposure: Exposure | None, settings: Settings | None, **about: Any
-) -> dict[str, Any]:
-    """Return all that is measured of an exposure as plain values, as `values_of` does."""
+def values_of_exposure(report: LawReport, exposed: Exposed | None, **about: Any) -> dict[str, Any]:
+    """Return all that is measured of an exposure as plain values, as `values_of` does.
+
+    - `exposed`: None: a program.
+    """
+    exposure, settings = exposed or (None, None)
     values: dict[str, Any] = plain(
         about
         | {
@@ -174,17 +188,18 @@ def of_program(
 
 
 def pass_times(
-    renderer: Renderer,
-    settings: Settings,
-    size: tuple[int, int],
-    repeats: int = 1,
-    exposure: Exposure | None = None,
+    renderer: Renderer, source: Settings | Exposed, size: tuple[int, int], repeats: int = 1
 ) -> dict[str, float]:
     """Return the shortest time of each pass in seconds, for an image of 16-bit floats.
 
     The first run, of another image, is not counted.
     """
-    how: dict[str, Any] = {} if exposure is None else {"exposure": exposure, "dt": 1 / 60}
+    how: dict[str, Any] = {}
+    if isinstance(source, Exposed):
+        how = {"exposure": source.exposure, "dt": 1 / 60}
+        settings: Settings = source.settings or NO_BLOOM
+    else:
+        settings = source
     images = _images(size)
     results: dict[str, float] = {}
     for turn in range(repeats + 1):
