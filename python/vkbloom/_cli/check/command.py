@@ -30,7 +30,7 @@ from vkbloom._custom.method import CustomMethod, identifier_of, load_method
 from vkbloom._io import safe_writing
 from vkbloom._renderer.interruptible import open_renderer
 from vkbloom._renderer.renderer import Renderer
-from vkbloom._settings.exposure import exposures
+from vkbloom._settings.exposure import Exposure, exposures
 from vkbloom._settings.settings import Settings, presets
 from vkbloom._spelling import describe_unknown, did_you_mean
 from vkbloom.testing._adaptation import SIZE as EXPOSURE_SIZE
@@ -50,15 +50,14 @@ _Source: TypeAlias = str | Settings | Exposed
 
 
 class _ExposureName(NameOf):
-    """The name of an exposure; "" for stops of the settings, which no law measures."""
+    """The name of an exposure, or stops of the settings, which no law measures."""
 
-    def convert(self, value: str, param: click.Parameter | None, ctx: click.Context | None) -> str:
-        """Return the name as it was published."""
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Return the exposure, or the stops."""
         try:
-            float(value)
+            return float(value)
         except ValueError:
-            return super().convert(value, param, ctx)
-        return ""
+            return exposures[super().convert(value, param, ctx)]
 
 
 class CheckCommand(Command):
@@ -153,7 +152,7 @@ def check(
     reference: str | None,
     against: str | None,
     sequence: str | None,
-    exposure: str | None,
+    exposure: Exposure | float | None,
     as_json: bool,
     page: str | None,
     markdown: str | None,
@@ -176,8 +175,8 @@ def check(
         if target is not None:
             check_target(target)
     if sequence is not None:
-        given = (file, program, against, exposure, is_given("preset"), is_given("method"))
-        if any(given):
+        given = (file, program, against, isinstance(exposure, Exposure))
+        if any((*given, is_given("preset"), is_given("method"))):
             raise click.UsageError("--sequence judges files alone, without a bloom")
         return judge(sequence, how, as_json=as_json)
     check_unused()
@@ -261,14 +260,15 @@ class _Opened:
 
 def _source_of(params: Mapping[str, Any], settings: Settings) -> tuple[str, _Source]:
     """Return the name and the source of what the options name."""
-    name = params["preset"] or settings.method
+    name, exposure = params["preset"] or settings.method, params["exposure"]
     if params["program"] is not None:
         return params["program"], params["program"]
-    if not params["exposure"]:
+    if not isinstance(exposure, Exposure):
         return name, settings
-    has_bloom = is_given("preset") or is_given("method")
-    exposed = Exposed(exposures[params["exposure"]], settings if has_bloom else None)
-    return f"{params['exposure']}, {name}" if has_bloom else params["exposure"], exposed
+    called = next((name for name in exposures if exposures[name] == exposure), exposure.engine)
+    if is_given("preset") or is_given("method"):
+        return f"{called}, {name}", Exposed(exposure, settings)
+    return called, Exposed(exposure, None)
 
 
 def _open(
@@ -375,15 +375,16 @@ def _check_choice(params: Mapping[str, Any]) -> None:
     chosen = [name for name in ("preset", "method") if is_given(name)]
     if program is not None and chosen:
         raise click.UsageError(f"--command cannot be combined with --{chosen[0]} or FILE")
-    if params["exposure"] or "{dt}" in (program or ""):
+    is_exposure = isinstance(params["exposure"], Exposure)
+    if is_exposure or "{dt}" in (program or ""):
         for name in ("reference", "gain", "less_input"):
             if is_given(name):
                 raise click.UsageError(f"--{name.replace('_', '-')} is of a bloom, not an exposure")
-    if program is not None and params["exposure"]:
+    if program is not None and is_exposure:
         raise click.UsageError("--command cannot be combined with --exposure")
     if program is not None and params["reference"] is not None:
         raise click.UsageError("--reference needs FILE; a program has one framebuffer")
-    if program is None and not chosen and not params["exposure"]:
+    if program is None and not chosen and not is_exposure:
         raise click.UsageError(
             "give FILE, --preset NAME, --method NAME, --exposure NAME or --command PROGRAM"
         )
