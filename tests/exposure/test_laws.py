@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy import ndimage
 
 import vkbloom
 from tests.cli.calls import one_line, run
@@ -18,9 +19,11 @@ from vkbloom.testing._laws.table import EXPOSURE_LAWS
 
 from .meters import FAULTS, Meter
 
-NAMES = [*EXPOSURE_LAWS]
+NAMES = [name for name in EXPOSURE_LAWS if name != "shimmer"]
 COPY = vkbloom.Pyramid(bloom=False)
 OPEN = vkbloom.PostProcessingExposure(minimum=-9, maximum=9)
+#: What an exposure holds that does nothing.
+HELD_BY_ALL = {"monotone", "mirror", "finite_state"}
 #: The laws that engines break, by the formula sheet, and what they measure: least and most.
 ENGINES: dict[Any, dict[str, dict[str, tuple[float, float]]]] = {
     "bevy": {
@@ -69,7 +72,7 @@ def test_engines(renderer: vkbloom.Renderer, exposure: Any) -> None:
         for name, (least, most) in figures.items():
             assert least <= rows[law].figures[name] <= most, (law, name)
     untested = {row.name for row in found.rows if row.held is None}
-    assert untested == ({"speeds", "scale", "dark_pixels"} if exposure == "fixed" else set())
+    assert untested == ({*NAMES} - HELD_BY_ALL if exposure == "fixed" else set())
 
 
 def test_the_table_of_the_docs() -> None:
@@ -113,6 +116,35 @@ def test_a_right_exposure() -> None:
 
 def test_each_law_of_an_exposure_names_a_fault() -> None:
     assert {laws[0] for laws in FAULTS.values()} == {*NAMES}
+
+
+def taa_and_bloom(order: str) -> Any:
+    """Return a bloom with a TAA that limits its history by the range of 3 x 3 pixels."""
+    side = (3, 3, 1)
+
+    def bloom(image: Any) -> Any:
+        return image + 0.2 * ndimage.gaussian_filter(image, (6, 6, 0))
+
+    def resolve(image: Any, before: Any) -> Any:
+        least, most = ndimage.minimum_filter(image, side), ndimage.maximum_filter(image, side)
+        return image if before is None else 0.9 * np.clip(before, least, most) + 0.1 * image
+
+    def step(image: Any, *, dt: float, state: Any) -> tuple[Any, Any]:
+        if order == "bloom first":
+            resolved = resolve(bloom(image), state)
+            return resolved, resolved
+        resolved = resolve(image, state)
+        return bloom(resolved), resolved
+
+    return step
+
+
+def test_the_order_of_bloom_and_taa() -> None:
+    testing.assert_laws(taa_and_bloom("TAA first"), "shimmer")
+    assert broken(testing.report(taa_and_bloom("bloom first"), laws=["shimmer"])) == {"shimmer"}
+    for meter, text in ((Meter(), "no pictures"), (Meter(gives_picture=True), "has no bloom")):
+        (row,) = testing.report(meter, laws=["shimmer"]).rows
+        assert (row.held, row.applies, text in row.message) == (None, False, True)
 
 
 def test_a_bloom_with_an_exposure(renderer: vkbloom.Renderer) -> None:

@@ -21,7 +21,7 @@ _EXPOSURES = {
 def laws(renderer: vkbloom.Renderer, quick: bool) -> str:
     """Return which exposures hold each law, and which break it, with their figures."""
     bloom = vkbloom.Pyramid(bloom=False)
-    rows: dict[str, tuple[list[str], list[str]]] = {name: ([], []) for name in EXPOSURE_LAWS}
+    rows: dict[str, tuple[list[str], list[str]]] = {}
     for name, exposure in _EXPOSURES.items():
         if quick and name == "hdrp_automatic":  # takes ten times as long as the others
             continue
@@ -31,7 +31,7 @@ def laws(renderer: vkbloom.Renderer, quick: bool) -> str:
             return renderer.apply(image, bloom, dt=dt, state=state, **how)
 
         for row in testing.report(meter).rows:
-            held, broken = rows[row.name]
+            held, broken = rows.setdefault(row.name, ([], []))
             if row.held:
                 held.append(f"`{name}`")
                 continue
@@ -42,5 +42,9 @@ def laws(renderer: vkbloom.Renderer, quick: bool) -> str:
                 if not value <= limits.get(figure, -1)
             )
             broken.append(f"`{name}` ({figures})")
-    cells = ([f"`{law}`", *(", ".join(names) for names in sides)] for law, sides in rows.items())
+    cells = (
+        [f"`{law}`", *(", ".join(names) for names in sides)]
+        for law, sides in rows.items()
+        if any(sides)
+    )
     return table(["law", "held by", "broken by"], cells)

@@ -53,10 +53,14 @@ class UnsettledError(ValueError):
 
 
 class Adapted(NamedTuple):
-    """What follows from frames: the stops that the picture has, and what the next one needs."""
+    """What follows from frames: the stops that the picture has, and what the next one needs.
+
+    - `picture`: (H, W, 3) or (H, W, 4), if there is one.
+    """
 
     stops: float
     state: Any
+    picture: NDArray[Any] | None = None
 
 
 def is_meter(subject: object) -> TypeGuard[Meter | Exposure | str]:
@@ -93,10 +97,12 @@ class Adaptation:
 
     - `meter`: See `Meter`.
     - `size`: Width and height of the test images.
+    - `gives_pictures`: Whether it returns pictures, as `try_once` has found.
     """
 
     meter: Meter
     size: tuple[int, int] = SIZE
+    gives_pictures: bool = field(default=False, init=False)
     _first_step: int = 0
     _goals: dict[bytes, Adapted] = field(default_factory=dict)
 
@@ -118,7 +124,8 @@ class Adaptation:
 
     def try_once(self) -> None:
         """Show a grey frame, so that what cannot run at all fails."""
-        self.step(np.full((self.size[1], self.size[0], 3), 0.18, np.float32), 1 / 60, None)
+        grey = np.full((self.size[1], self.size[0], 3), 0.18, np.float32)
+        self.gives_pictures = self.step(grey, 1 / 60, None).picture is not None
 
     def check_visible(self) -> None:
         """Frames are floats, which show all."""
@@ -129,12 +136,16 @@ class Adaptation:
         try:
             result = self.meter(image.copy(), dt=dt, **given)
             if isinstance(result, Frames):
-                return Adapted(result.exposure, result.state)
+                return Adapted(result.exposure, result.state, result.get("final"))
             if self.keeps_state:
-                return Adapted(_stops_of(result, image), None)
+                result = result, None
             if not (isinstance(result, tuple) and len(result) == 2):
                 raise TypeError(f"it returns {type(result).__name__}, not a tuple (stops, state)")
-            return Adapted(_stops_of(result[0], image), result[1])
+            first, after = result
+            if np.ndim(first) == 0:
+                return Adapted(float(first), after)
+            picture = _real_values(first, image)
+            return Adapted(_stops_of(picture, image), after, picture)
         except Exception as error:
             raise BloomError(f"the exposure raised {type(error).__name__}: {error}") from error
 
@@ -200,20 +211,19 @@ class Adaptation:
         return None
 
 
-def _stops_of(result: object, image: Frame) -> float:
-    """Return the stops of a result: a number, or a picture beside the image that was given."""
-    if isinstance(result, int | float | np.generic) or np.ndim(result) == 0:  # type: ignore[arg-type]
-        return float(result)  # type: ignore[arg-type]
+def _real_values(result: object, image: Frame) -> NDArray[np.float64]:
+    """Return the colours of a picture beside the image that was given, in real units."""
     picture = plain_array(result, "its picture")
     if picture.ndim != 3 or picture.shape[:2] != image.shape[:2] or picture.shape[2] < 3:
         raise ValueError(f"its picture has shape {picture.shape} for {image.shape}")
     made = picture[..., :3].astype(np.float64)
-    if np.issubdtype(picture.dtype, np.integer):
-        made /= np.iinfo(picture.dtype).max
-    seen = np.isfinite(made) & np.isfinite(image)
-    if not seen.any():
-        return math.nan
+    return made / np.iinfo(picture.dtype).max if picture.dtype.kind in "ui" else made
+
+
+def _stops_of(picture: NDArray[np.float64], image: Frame) -> float:
+    """Return the stops of a picture beside the image that was given; NaN: not known."""
+    seen = np.isfinite(picture) & np.isfinite(image)
     # All pixels: a bloom takes light from lit ones to black ones. Of black, nothing is known.
     light = image[seen].astype(np.float64).sum()
     with np.errstate(all="ignore"):
-        return float(np.log2(made[seen].sum() / light)) if light > 0 else math.nan
+        return float(np.log2(picture[seen].sum() / light)) if light > 0 else math.nan

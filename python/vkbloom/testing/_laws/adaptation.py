@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vkbloom.testing._adaptation import Adaptation, Frame, UnsettledError
 from vkbloom.testing._deviations import Measured, figure, judge
 from vkbloom.testing._laws.law import Figure, Law, Limits
+from vkbloom.testing._laws.time import halton
 from vkbloom.testing._probe import NotTaken
 
 __tracebackhide__ = True
@@ -53,9 +55,16 @@ def grains(size: tuple[int, int], mean: float) -> Frame:
     return np.repeat(light * (mean / light.mean()), 3, axis=2).astype(np.float32)
 
 
+def _four_stops(subject: Adaptation) -> tuple[Frame, Frame]:
+    """Return a dark and a bright image; raise NotTaken if both get the same exposure."""
+    dark, bright = (grains(subject.size, mean) for mean in (_DARK, _BRIGHT))
+    _check_follows(*(subject.settle(frame).stops for frame in (dark, bright)))
+    return dark, bright
+
+
 def _test_frame_rate(subject: Adaptation, limits: Limits) -> None:
     """Let the light rise and fall by four stops, and wait a second at 10, 60 and 240 Hz."""
-    dark, bright = (grains(subject.size, mean) for mean in (_DARK, _BRIGHT))
+    dark, bright = _four_stops(subject)
     measured: list[Measured] = []
     for name, before, after in (("up", dark, bright), ("down", bright, dark)):
         stops = []
@@ -87,7 +96,7 @@ FRAME_RATE: Final = Law(
 
 def _test_no_overshoot(subject: Adaptation, limits: Limits) -> None:
     """Let the light change by four stops, and show six frames with steps of up to 3 seconds."""
-    dark, bright = (grains(subject.size, mean) for mean in (_DARK, _BRIGHT))
+    dark, bright = _four_stops(subject)
     beyond: dict[float, float] = {}
     for before, after in ((dark, bright), (bright, dark)):
         goal = subject.settle(after).stops
@@ -123,7 +132,7 @@ NO_OVERSHOOT: Final = Law(
 
 def _test_still(subject: Adaptation, limits: Limits) -> None:
     """Show frames of four stops more and less light, no time after the one before."""
-    dark, bright = (grains(subject.size, mean) for mean in (_DARK, _BRIGHT))
+    dark, bright = _four_stops(subject)
     most = 0.0
     for before, after in ((dark, bright), (bright, dark)):
         start = subject.settle(before)
@@ -364,4 +373,101 @@ FINITE_STATE: Final = Law(
     },
     why="A mean with NaN is NaN, and what stands for it is another goal. The multiplier of a mean "
     "of 0 is infinite, unless the mean has a lower limit.",
+)
+
+
+def _test_shimmer(subject: Adaptation, limits: Limits) -> None:
+    """Show lights of half a pixel to a camera that jitters, and measure the light beside them.
+
+    The frames are not smoothed: a light is in a pixel whose centre it covers, or in none.
+    """
+    if not subject.gives_pictures:
+        raise NotTaken("it returns stops, and no pictures")
+    width, height = subject.size
+    if min(width, height) < _MIN_SIDE:
+        raise ValueError(f"images of {width} x {height} are too small for the lights; use 96 x 64")
+    frames = [_draw_lights(subject.size, x, y) for x, y in halton(_PHASES)]
+    is_beside = _are_beside(subject.size)
+
+    def glow(frame: Frame, state: Any) -> tuple[float, Any]:
+        now = subject.step(frame, 1 / 60, state)
+        assert now.picture is not None
+        return float(now.picture[is_beside][..., :3].sum(dtype=np.float64)), now.state
+
+    stills = []
+    for frame in frames:
+        # Some histories begin as black; in others, a light of one pixel fades.
+        most, state = 0.0, None
+        for _ in range(_STILL_FRAMES):
+            one, state = glow(frame, state)
+            most = max(most, one)
+        stills.append(most)
+    mean = sum(stills) / len(stills)
+    if not mean > 0:
+        raise NotTaken("the picture has no bloom")
+    state, seen = None, []
+    for number in range(5 * _PHASES):
+        one, state = glow(frames[number % _PHASES], state)
+        seen.append(one)
+    off = _range(seen[-2 * _PHASES :]) / mean
+    figure("stills", _range(stills) / mean)
+    text = f"the bloom of lights of half a pixel changes by {off:.3g} of that of still frames"
+    law = "the bloom of a camera that jitters does not flicker"
+    judge(law, ("flicker", off, limits["flicker"], text))
+
+
+def _positions(size: tuple[int, int]) -> list[tuple[float, float]]:
+    """Return the lights' centres, at different parts of pixels."""
+    return [
+        (size[0] / 2 - 20 + 5.3 * number + 0.37, size[1] / 2 - 6 + 1.7 * number + 0.21)
+        for number in range(_LIGHTS)
+    ]
+
+
+def _distances(size: tuple[int, int], x: float, y: float) -> NDArray[np.float64]:
+    """Return how far each pixel's centre is from each light, along the axis where it is more."""
+    columns, rows = np.arange(size[0]) + 0.5, np.arange(size[1])[:, np.newaxis] + 0.5
+    return np.array(
+        [
+            np.maximum(np.abs(columns - x - left), np.abs(rows - y - top))
+            for left, top in _positions(size)
+        ]
+    )
+
+
+def _draw_lights(size: tuple[int, int], x: float, y: float) -> Frame:
+    is_lit: NDArray[np.bool_] = np.any(_distances(size, x, y) < _HALF_SIDE, axis=0)
+    return np.dstack([np.where(is_lit, np.float32(_LIGHT), np.float32(0))] * 3)
+
+
+def _are_beside(size: tuple[int, int]) -> NDArray[np.bool_]:
+    """Return the pixels that only a bloom reaches, and not the filters of a TAA."""
+    return np.asarray((_distances(size, 0, 0) > _REACH).all(axis=0))
+
+
+# Lights of 0.6 pixels, which each frame of the jitter sees or misses; pixels within 5 of them are
+# not measured. The engines' cameras repeat 8 offsets.
+_LIGHTS, _HALF_SIDE, _LIGHT, _REACH = 8, 0.3, 16.0, 5.0
+_PHASES: Final = 8
+_STILL_FRAMES: Final = 12
+_MIN_SIDE: Final = 48
+# A mean over frames by shares of 0.1 leaves a fifth of what flickers by itself; bloom before TAA
+# two thirds and more.
+_RESOLVED: Final = 0.3
+
+SHIMMER: Final = Law(
+    name="shimmer",
+    subject=Adaptation,
+    applies=lambda subject: subject.gives_pictures,
+    test=_test_shimmer,
+    formula="with anti-aliasing over frames (TAA), the bloom of small lights does not flicker as a "
+    "camera moves by parts of a pixel",
+    figures={
+        "flicker": Figure(
+            "(largest - smallest) light of the bloom, by the mean of still frames", _RESOLVED
+        ),
+        "stills": Figure("the same of still frames, without help by other frames"),
+    },
+    why="There is no TAA, or it runs after the bloom: a history that is limited by the colours "
+    "around a pixel keeps nothing of a glow, which has nearly one colour there.",
 )

@@ -46,7 +46,7 @@ class Law:
     figures: Mapping[str, Figure]
     why: str
     explain: Callable[[Subject, str], str] | None = None
-    applies: Callable[[Subject], bool] = lambda _: True
+    applies: Callable[[Any], bool] = lambda _: True
     subject: type = Subject
 
     @property
