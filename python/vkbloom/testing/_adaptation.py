@@ -142,7 +142,7 @@ class Adaptation:
             if not (isinstance(result, tuple) and len(result) == 2):
                 raise TypeError(f"it returns {type(result).__name__}, not a tuple (stops, state)")
             first, after = result
-            if np.ndim(first) == 0:
+            if isinstance(first, int | float | np.generic) or np.ndim(first) == 0:
                 return Adapted(float(first), after)
             picture = _real_values(first, image)
             return Adapted(_stops_of(picture, image), after, picture)

@@ -82,7 +82,10 @@ def command(argv: Sequence[str], *, suffix: str = ".exr", timeout: float = 60.0)
 
 def command_of(argv: Sequence[str], suffix: str, timeout: float) -> CommandBloom | CommandMeter:
     """Return the callable of a program: an exposure, if its arguments have {dt}."""
-    kind = CommandMeter if any(_DT in word for word in argv) else CommandBloom
+    has_dt, has_state = (any(name in word for word in argv) for name in (_DT, _STATE))
+    if has_state and not has_dt:
+        raise ValueError(f"argv: {' '.join(argv)!r} has {_STATE} but no {_DT}")
+    kind = CommandMeter if has_dt else CommandBloom
     return kind(argv, suffix, timeout)
 
 
