@@ -35,6 +35,7 @@ from vkbloom._settings.settings import Settings, presets
 from vkbloom._spelling import describe_unknown, did_you_mean
 from vkbloom.testing._adaptation import SIZE as EXPOSURE_SIZE
 from vkbloom.testing._adaptation import Adaptation, meter_of
+from vkbloom.testing._blooms import exact
 from vkbloom.testing._law_report import LawReport, law_report
 from vkbloom.testing._laws.table import find_law, merge_limits
 from vkbloom.testing._programs import CommandBloom, CommandMeter, command_of
@@ -279,7 +280,7 @@ def _open(
     frame = measured if is_given("measured") else EXPOSURE_SIZE
     if isinstance(source, Exposed):
         exposed = source
-        bloom = None if exposed.settings is None else measuring.exact(exposed.settings)
+        bloom = None if exposed.settings is None else exact(exposed.settings)
         meter = meter_of(exposed.exposure, renderer, bloom)
         subject: Subject | Adaptation = Adaptation(meter=meter, size=frame)
 
