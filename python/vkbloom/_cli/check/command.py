@@ -21,7 +21,7 @@ from rich.status import Status
 from vkbloom._cli.check import comparing, measuring, showing
 from vkbloom._cli.check.measuring import Exposed
 from vkbloom._cli.check.sequences import check_unused, judge, sequence_options
-from vkbloom._cli.fields import SIZE, Command, FieldOption, NameOf
+from vkbloom._cli.fields import EXPOSURE, SIZE, Command, FieldOption
 from vkbloom._cli.program import adapter_option, as_wrong_use, is_given
 from vkbloom._cli.settings_options import settings_options
 from vkbloom._cli.targets import check_target
@@ -48,17 +48,6 @@ _ABOVE_0: Final = click.FloatRange(0, min_open=True)
 
 #: What is measured: a command, the bloom of settings, or an exposure.
 _Source: TypeAlias = str | Settings | Exposed
-
-
-class _ExposureName(NameOf):
-    """The name of an exposure, or stops of the settings, which no law measures."""
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """Return the exposure, or the stops."""
-        try:
-            return float(value)
-        except ValueError:
-            return exposures[super().convert(value, param, ctx)]
 
 
 class CheckCommand(Command):
@@ -107,7 +96,7 @@ def _laws(_: click.Context, __: click.Parameter, text: str) -> tuple[str, ...]:
 )
 @click.option(
     "--exposure",
-    type=_ExposureName("exposure", exposures),
+    type=EXPOSURE,
     help="Measure an exposure, alone or beside the bloom of --preset or --method.",
 )
 @click.option("--suffix", default=".exr", help="The type of the program's image files.")
