@@ -2,8 +2,8 @@
 
 There are functions of the eye (`spencer`, `cie_general`, `cie_total`), of lenses (`harvey_shack`,
 `airy`, `aperture` with `iris`), of renderers (`fog_glow`, `unreal`) and of settings (`measured`).
-`gaussian` and `samples` are general. All are subclasses of `PSF`. `vkbloom.Convolution` convolves
-an image with any of them.
+`gaussian` and `samples` are general. `Varying` depends on the place in the picture. All are
+subclasses of `PSF`. `vkbloom.Convolution` convolves an image with any of them.
 """
 
 # ruff: noqa: F403, F405  the names are imported at the first use
@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
 __all__ = [
     "PSF",
+    "Gathered",
+    "Varying",
     "airy",
     "aperture",
     "cie_general",

@@ -10,15 +10,17 @@ from typing import Any, ClassVar, Literal, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vkbloom._psf.base import PSF
+from vkbloom._psf.base import PSF, in_grey
 from vkbloom._psf.core_kernels import WithKernel
 from vkbloom._psf.eye import spencer
 from vkbloom._psf.resampling import box_resample
 from vkbloom._psf.sampled import samples
+from vkbloom._psf.varying import Varying
 from vkbloom._public import public
 from vkbloom._settings.fields import choice_field, number_field
 from vkbloom._settings.settings import Settings
 
+Size = tuple[int, int]
 Boundary = Literal["zero", "edge", "wrap", "wrap_x"]
 #: The types of a kernel: a function, the result of its `to_dict`, or an array.
 PSFLike = PSF | Mapping[str, Any] | ArrayLike
@@ -50,9 +52,11 @@ class Convolution(WithKernel, Settings):
     ----------
     psf : PSF, or array-like, shape (h, w) or (h, w, 3)
         The point-spread function; by default `vkbloom.psf.spencer`. An array is copied to float32
-        and becomes a `vkbloom.psf.samples`. Its point is at [h // 2, w // 2].
+        and becomes a `vkbloom.psf.samples`. Its point is at [h // 2, w // 2]. A
+        `vkbloom.psf.Varying` spreads each pixel by the kernel of its own place.
     normalize : bool
-        Whether each channel of the kernel is divided by its sum.
+        Whether each channel of the kernel is divided by its sum. The kernels of a
+        `vkbloom.psf.Varying` are taken as they are.
     boundary : {"zero", "edge", "wrap", "wrap_x"}
         The texels outside of the bloom buffers. "zero": black. "edge": the nearest texel. "wrap":
         the buffers are repeated. "wrap_x": repeated along x and "edge" along y, for panoramas.
@@ -112,9 +116,24 @@ class Convolution(WithKernel, Settings):
         Returns
         -------
         ndarray of float64, shape (h, w, 3)
-            The kernel in pixels of the bloom buffers.
+            The kernel in pixels of the bloom buffers. Of a `vkbloom.psf.Varying` the kernels of its
+            grid, shape (gy, gx, h, w, 3).
+
+        Raises
+        ------
+        ValueError
+            The `vkbloom.psf.Varying` has a function, which has a kernel for each pixel.
         """
+        if isinstance(self.psf, Varying):
+            return self._grid_kernels(self.psf, frame, buffers or frame)
         return self._kernel(frame, buffers or frame)
+
+    def _grid_kernels(self, psf: Varying, frame: Size, buffers: Size) -> NDArray[np.float64]:
+        if psf.function is not None:
+            raise ValueError("psf: a function has a kernel for each pixel; use psf.at(x, y, frame)")
+        kernels = psf.grid_kernels(frame)
+        grid = in_grey(kernels) if kernels.ndim == 4 else kernels
+        return np.array([[_for_buffers(kernel, frame, buffers) for kernel in row] for row in grid])
 
     @property
     def _is_transform(self) -> bool:
@@ -134,9 +153,7 @@ class Convolution(WithKernel, Settings):
     def _kernel(self, frame: tuple[int, int], buffers: tuple[int, int]) -> NDArray[np.float64]:
         psf = cast("PSF", self.psf)
         kernel = psf.kernel(frame, self.kernel_size, self.pixels_per_degree)
-        if buffers != frame:
-            scale = buffers[1] / frame[1], buffers[0] / frame[0]
-            kernel = box_resample(kernel, (kernel.shape[0] // 2, kernel.shape[1] // 2), scale)
+        kernel = _for_buffers(kernel, frame, buffers)
         if self.normalize:
             sums = kernel.sum(axis=(0, 1))
             for name, total in zip(("red", "green", "blue"), sums, strict=True):
@@ -146,3 +163,11 @@ class Convolution(WithKernel, Settings):
                     )
             kernel = kernel / sums
         return kernel
+
+
+def _for_buffers(kernel: NDArray[np.float64], frame: Size, buffers: Size) -> NDArray[np.float64]:
+    """Return a kernel (h, w, 3) of the frame's pixels for those of the bloom buffers."""
+    if buffers == frame:
+        return kernel
+    scale = buffers[1] / frame[1], buffers[0] / frame[0]
+    return box_resample(kernel, (kernel.shape[0] // 2, kernel.shape[1] // 2), scale)

@@ -11,3 +11,5 @@ from .lens import harvey_shack as harvey_shack
 from .renderers import fog_glow as fog_glow
 from .renderers import unreal as unreal
 from .sampled import samples as samples
+from .varying import Gathered as Gathered
+from .varying import Varying as Varying

@@ -6,32 +6,41 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from vkbloom._psf.varying import Varying
+
 from ._image import BlurInput
 from ._sampling import Array, sample, size_of
 from ._tape import join_curves, operation, value_of
 from ._threshold import luminance
+from ._varying import channel_kernels, spread_field
 
 if TYPE_CHECKING:
     from vkbloom._methods.convolution import Convolution
 
 
 def passes(source: BlurInput, settings: Convolution) -> dict[str, Array]:
-    """Return "kernel" and "bloom".
+    """Return "kernel" and "bloom"; a kernel that depends on the place is no framebuffer.
 
     Three channels are convolved with the channels of the kernel. A fourth channel is convolved with
     the mean of these, and so is every channel of an image with another number of channels.
     """
-    channels = source.image.shape[2]
+    if isinstance(getattr(settings, "psf", None), Varying):
+        spread = spread_field(source.image, settings, source.size, convolve)
+        return {"bloom": source.store(sample(spread, source.size))}
     kernel = settings.kernel(source.size, size_of(source.image))
-    mean = kernel.mean(axis=2, keepdims=True)
-    colours = kernel if channels in (3, 4) else mean
-    used = np.concatenate([colours, *[mean] * (channels - colours.shape[2])], axis=2)
+    used = channel_kernels(kernel, source.image.shape[2])
     spread = convolve(filter_bright(source.image, settings.prefilter), used, settings.boundary)
     return {"kernel": kernel, "bloom": source.store(sample(spread, source.size))}
 
 
 def gain(settings: Convolution, size: tuple[int, int]) -> Array:
-    """Return the bloom of a flat image of 1 far from a boundary of zeros: the kernel's sums."""
+    """Return the bloom of a flat image of 1 far from a boundary of zeros: the kernel's sums.
+
+    Of a kernel that depends on the place: the mean.
+    """
+    psf = getattr(settings, "psf", None)
+    if isinstance(psf, Varying):
+        return psf.energy()
     flat = filter_bright(np.ones((1, 1, 3)), settings.prefilter)[0, 0]
     sums: Array = flat * settings.kernel(size).sum(axis=(0, 1))
     return sums

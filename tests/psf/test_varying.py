@@ -1,0 +1,203 @@
+"""Kernels that depend on the place, against the sum over all pixels."""
+
+from __future__ import annotations
+
+import pickle
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+import vkbloom
+from tests.psf.fields import (
+    FIELDS,
+    Array,
+    Field,
+    bilinear,
+    field_of,
+    off_centre,
+    round_spot,
+    scatter,
+    vignetted,
+)
+from vkbloom import psf, reference
+
+FRAME = 21, 15
+BOUNDARIES = "zero", "edge", "wrap"
+
+
+def picture(frame: tuple[int, int] = FRAME, seed: int = 5) -> Array:
+    """Return a dark picture with some lights, one of them at the edge."""
+    draw = np.random.default_rng(seed)
+    image = 0.1 * draw.random((frame[1], frame[0], 3))
+    image[2, 3] = 5, 3, 1
+    image[-1, -4] = 2
+    return image
+
+
+def grid(rows: int = 3, columns: int = 4, colours: bool = False) -> Array:
+    """Return kernels that have nothing in common."""
+    draw = np.random.default_rng(7)
+    kernels = draw.random((rows, columns, 5, 8, *[3] * colours)).astype(np.float32)
+    return np.asarray(kernels / kernels.sum(axis=(2, 3), keepdims=True))
+
+
+POSITIONS = (1.5, 6.0, 14.25, 18.0), (2.0, 7.5, 13.0)
+Case = tuple[psf.Varying, Callable[[float, float], Array]]
+
+
+def of_function(function: Field, kind: type[psf.Varying] = psf.Varying) -> Case:
+    return kind(function=function), lambda x, y: function(*field_of(x, y, FRAME))
+
+
+def of_grid(kernels: Array, kind: type[psf.Varying] = psf.Varying) -> Case:
+    return kind(kernels, POSITIONS), bilinear(kernels, *map(np.array, POSITIONS))
+
+
+@pytest.mark.parametrize("boundary", BOUNDARIES)
+@pytest.mark.parametrize(
+    "case",
+    [
+        of_function(off_centre),
+        of_function(off_centre, psf.Gathered),
+        of_grid(grid()),
+        of_grid(grid(colours=True), psf.Gathered),
+    ],
+    ids=["function", "gathered", "grid", "gathered_grid"],
+)
+def test_reference_is_the_sum_over_all_pixels(case: Case, boundary: Any) -> None:
+    lens, kernel_at = case
+    image = picture()
+    bloom = reference.apply(image, vkbloom.Convolution(lens, boundary=boundary))["bloom"]
+    exact = scatter(image, kernel_at, boundary, gathers=lens.gathers)
+    np.testing.assert_allclose(bloom[..., :3], exact, rtol=0, atol=1e-7 * exact.max())
+
+
+@pytest.mark.parametrize("function", FIELDS)
+@pytest.mark.parametrize("frame", [FRAME, (190, 160)], ids=["each_pixel", "between"])
+def test_components_are_within_the_tolerance(function: Field, frame: tuple[int, int]) -> None:
+    """The error is reported, and the kernels after those of the mean have no flux."""
+    lens = psf.Varying(function=function, tolerance=3e-3)
+    made = lens.components(frame)
+    assert made.error <= 3e-3
+    draw = np.random.default_rng(3)
+    xs, ys = (draw.integers(0, side, 20).astype(float) for side in frame)
+    for x, y, kernel in zip(xs, ys, made.at(xs, ys), strict=True):
+        exact = function(*field_of(x, y, frame))
+        assert np.abs(kernel - exact).max() <= 3e-3 * exact.max()
+    sums = made.kernels.sum(axis=(1, 2)).reshape(len(made.kernels), -1)
+    np.testing.assert_allclose(sums[1:], 0, atol=1e-13)
+
+
+def test_a_grid_is_exact() -> None:
+    """A grid needs as many kernels as it has, or fewer if these are alike."""
+    kernels = grid()
+    assert len(psf.Varying(kernels, POSITIONS).components(FRAME).kernels) == 12
+    alike = kernels[:1, :1] * np.linspace(1, 0.5, 12).reshape(3, 4, 1, 1).astype(np.float32)
+    made = psf.Varying(alike, POSITIONS).components(FRAME)
+    assert len(made.kernels) == 1
+    assert made.error <= 1e-7
+    same = psf.Varying(np.broadcast_to(kernels[1, 2], kernels.shape)).components(FRAME)
+    np.testing.assert_array_equal(same.kernels, kernels[1:2, 2])
+    np.testing.assert_array_equal(same.weights, 1)
+
+
+def test_places() -> None:
+    """Positions are spread from edge to edge, and kernels outside of them are the nearest ones."""
+    kernels = grid()
+    frame = 31, 21
+    lens = psf.Varying(kernels)
+    np.testing.assert_allclose(lens.at(0, 20, frame)[..., 1], kernels[2, 0])
+    between = (kernels[1, 0] + kernels[1, 1]) / 2
+    np.testing.assert_allclose(lens.at(5, 10, frame)[..., 0], between, rtol=1e-6)
+    lens = psf.Varying(kernels, POSITIONS)
+    np.testing.assert_allclose(lens.at(30, -5, frame)[..., 2], kernels[0, 3])
+    points = np.stack(np.meshgrid(*POSITIONS), axis=-1)
+    assert psf.Varying(kernels, points) == lens == psf.Varying(kernels, points.reshape(-1, 2))
+    assert lens != psf.Varying(kernels)
+    assert lens != psf.Gathered(kernels, POSITIONS)
+
+
+def test_arguments_of_functions() -> None:
+    """A function may name what it needs."""
+    seen: list[tuple[float, ...]] = []
+
+    def spot(radius: float, angle: float, aspect: float) -> Array:
+        seen.append((radius, angle, aspect))
+        return np.ones((3, 3))
+
+    lens = psf.Varying(function=spot, size=(3, 3))
+    lens.at(39.5, 29.5, (40, 30))
+    # The corner of the picture, half a pixel outside of the last one's centre.
+    np.testing.assert_allclose(seen[-1], (1, np.arctan2(30, 40), 4 / 3))
+    assert psf.Varying(function=lambda x, y: [[x, y]]).at(0, 0, (2, 2)).shape == (1, 2, 3)
+
+
+def test_chromatic_fields() -> None:
+    """Widths are scaled and spots are shifted outwards, channel by channel, with their sums."""
+    scales, lateral = (1.2, 1.0, 0.9), (-1.5, 0.0, 2.0)
+    lens = psf.Varying(function=round_spot, scales=scales, lateral=lateral)
+    frame = 40, 30
+    u, v = field_of(36, 25, frame)
+    kernel = lens.at(36, 25, frame)
+    y, x = np.mgrid[-10:11, -10:11].astype(float)
+    deviation = 0.9 * (1 + 2 * np.hypot(u, v))
+    for c in range(3):
+        width = deviation * scales[c]
+        wanted = np.exp(-((x - lateral[c] * u) ** 2 + (y - lateral[c] * v) ** 2) / (2 * width**2))
+        np.testing.assert_allclose(kernel[..., c], wanted / wanted.sum(), atol=1e-4 * kernel.max())
+    np.testing.assert_allclose(kernel.sum(axis=(0, 1)), 1)
+
+
+class Gridded:
+    """What is used of photutils' GriddedPSFModel, with positions in another order."""
+
+    grid_xypos = (18.0, 2.0), (4.0, 2.0), (4.0, 12.0), (18.0, 12.0)
+    oversampling = np.array([2, 2])
+    data = np.zeros((4, 13, 13))
+
+    def evaluate(self, x: Array, y: Array, flux: float, x_0: float, y_0: float) -> Array:
+        return np.asarray(flux * np.exp(-((x - x_0) ** 2) - (y - y_0) ** 2) * (x_0 + 100 * y_0))
+
+
+def test_models_of_photutils() -> None:
+    lens = psf.Varying(Gridded())
+    assert lens.positions == ((4.0, 18.0), (2.0, 12.0))
+    assert lens.kernel_size == (7, 7)
+    for x, y in Gridded.grid_xypos:
+        peak = lens.at(x, y, FRAME)[3, 3, 0]
+        assert peak == np.float32(x + 100 * y)
+
+
+def test_storage(tmp_path: Any) -> None:
+    """A grid is stored as JSON, and in a Zarr array; a function is only pickled."""
+    zarr = pytest.importorskip("zarr", reason="the extra grid is not installed")
+    patches = zarr.create_array(tmp_path / "patches", data=grid())
+    lens = psf.Varying(patches, POSITIONS, scales=(1, 1, 0.9))
+    assert lens == psf.Varying(grid(), POSITIONS, scales=(1, 1, 0.9))
+    assert psf.PSF.from_json(lens.to_json()) == lens
+    assert hash(psf.PSF.from_dict(lens.to_dict())) == hash(lens)
+    assert pickle.loads(pickle.dumps(lens)) == lens
+    of_function = psf.Varying(function=round_spot)
+    assert pickle.loads(pickle.dumps(of_function)) == of_function
+    with pytest.raises(TypeError, match=r"cannot be stored; .* sampled\(frame, places\)"):
+        of_function.to_dict()
+    stored = of_function.sampled(FRAME, (5, 4))
+    np.testing.assert_allclose(stored.at(20, 14, FRAME), of_function.at(20, 14, FRAME), atol=1e-8)
+
+
+def test_facts() -> None:
+    """Energies are means over the field, and the atlas shows kernels at their places."""
+    lens = psf.Varying(grid(), POSITIONS)
+    np.testing.assert_allclose(lens.energy(), 1, rtol=1e-6)
+    np.testing.assert_allclose(lens.encircled_energy([0, 100])[1], 1, rtol=1e-6)
+    np.testing.assert_allclose(lens.mtf([0.0]), 1)
+    assert 0.75 < psf.Varying(function=vignetted).energy()[0] < 0.9
+    drawn = lens.array((40, 30))
+    assert drawn.shape == (30, 40, 3)
+    # 5 x 6 kernels, each of a sum of 1.
+    np.testing.assert_allclose(drawn.sum(axis=(0, 1)), 30, rtol=1e-5)
+    np.testing.assert_allclose(lens.array((7, 3)).shape, (3, 7, 3))
+    with pytest.raises(ValueError, match="not one kernel"):
+        lens.kernel(FRAME)
