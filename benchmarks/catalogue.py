@@ -29,6 +29,7 @@ BENCHMARKS: Final[Mapping[str, str]] = MappingProxyType(
         "startup": "import, renderer and first frame, in fresh processes",
         "convolution": "convolution with large kernels against SciPy's transforms",
         "convolution-gpu": "convolution at 4K and 1080p on a GPU, against torch.fft",
+        "field": "a kernel that depends on the place against optiland and photutils",
         "adjoint": "derivatives by the image against the framebuffer and against PyTorch",
         "image-gpu": "an image's bloom at 4K on a GPU, against CUDA",
     }

@@ -323,6 +323,31 @@
     INPUT(B, int, grey) \
     INPUT(B, float, gain)
 
+// The sum of products of spectra (products.frag). Where the spectra of coloured kernels are in
+// stages, the radices of both axes, as above; `kernel_sign` as above.
+#define PRODUCTS_BLOCK(B, READS, INPUT, VEC4S) \
+    INPUT(B, float, kernel_sign) \
+    INPUT(B, int, row_length) \
+    INPUT(B, int, row_a) \
+    INPUT(B, int, row_b) \
+    INPUT(B, int, row_c) \
+    INPUT(B, int, row_d) \
+    INPUT(B, int, column_length) \
+    INPUT(B, int, column_a) \
+    INPUT(B, int, column_b) \
+    INPUT(B, int, column_c) \
+    INPUT(B, int, column_d)
+
+// The weights of a field at each pixel (field_weights.frag): which four of them, columns and rows of
+// the grid of weights, and how many grids are side by side. Multiplies an image by one of them
+// (weigh.frag).
+#define FIELD_WEIGHTS_BLOCK(B, READS, INPUT, VEC4S) \
+    INPUT(B, int, grid) \
+    INPUT(B, int, columns) \
+    INPUT(B, int, rows) \
+    INPUT(B, int, grids)
+#define WEIGH_BLOCK(B, READS, INPUT, VEC4S) INPUT(B, int, channel)
+
 // Of a pass that was given at run time: bytes whose layout only its shader knows.
 #define CUSTOM_BLOCK(B, READS, INPUT, VEC4S) VEC4S(B, values, 64)
 
@@ -344,6 +369,9 @@
     BLOCK(sun_beams, SUN_BEAMS_BLOCK) \
     BLOCK(fft, FFT_BLOCK) \
     BLOCK(fft_kernel, FFT_KERNEL_BLOCK) \
+    BLOCK(products, PRODUCTS_BLOCK) \
+    BLOCK(field_weights, FIELD_WEIGHTS_BLOCK) \
+    BLOCK(weigh, WEIGH_BLOCK) \
     BLOCK(composite, COMPOSITE_BLOCK) \
     BLOCK(adjoint_filter, ADJOINT_FILTER_BLOCK) \
     BLOCK(exposure, EXPOSURE_BLOCK)
@@ -532,7 +560,11 @@
     SLOT(SLOT_EXPOSURE, 1) /* of this frame, or of the one before */ \
     SLOT(SLOT_METER_MASK, 1)
 
-#define TRANSFORM_SLOTS(SLOT) SLOT(SLOT_SPECTRUM, 1) /* of the kernel, for the product */
+// Fields of kernels have SLOT_WEIGHTS and SLOT_ADDED of the adjoint passes, too.
+#define TRANSFORM_SLOTS(SLOT) \
+    SLOT(SLOT_SPECTRUM, 1) /* of the kernel, for the product */ \
+    SLOT(SLOT_FACTORS, 1)  /* of up to MAX_PRODUCTS: the spectra of glow and kernel in turns */ \
+    SLOT(SLOT_PLACES, 1)   /* where columns and rows are in the grid of weights */
 
 // The G-buffer.
 #define LIGHTING_SLOTS(SLOT) \
@@ -624,6 +656,9 @@
 // run at a time: radices up to FFT_USUAL_GROUP_RADIX if the length has such factors.
 #define FFT_USUAL_GROUP_RADIX 10
 #define FFT_LIMIT             1e28
+
+// Products of spectra that one pass adds up.
+#define MAX_PRODUCTS 3
 
 // Adjoint passes: the pixels of a row of the table of weights, and the root of the number of pixels
 // that are added up at once.
@@ -722,7 +757,8 @@
     CONSTANT(65, EXPOSED_SCENE, exposed_scene) /* a composite's scene is exposed before it */ \
     CONSTANT(66, JITTERED, jittered)           /* samples of beams are between steps */ \
     CONSTANT(67, ENGINE, engine)               /* of an exposure: EXPOSURE_* */ \
-    CONSTANT(68, METER, meter)                 /* what meter.frag makes: METER_* */
+    CONSTANT(68, METER, meter)                 /* what meter.frag makes: METER_* */ \
+    CONSTANT(69, PRODUCTS, products)           /* of spectra, that are added up */
 
 // The names that a setting can have. Each list is a setting and a specialization constant.
 #define COMPOSITE_NAMES(NAME) \

@@ -30,6 +30,8 @@ PEERS: Final = MappingProxyType(
         "CuPy": "cupy",
         "pygfx": "pygfx",
         "wgpu": "wgpu",
+        "optiland": "optiland",
+        "photutils": "photutils",
     }
 )
 

@@ -72,7 +72,8 @@ static bool add_passes(struct vkb_adjoint *adjoint, const struct vkb_settings *s
         vkb_transpose *transpose = transposes[pass.block];
         if (pass.target_count != 1 || vkb_cotangent_of(adjoint, &pass) == VKB_NO_IMAGE)
             continue;
-        const bool convolved = pass.block == VKB_BLOCK_fft;
+        // (A field whose pixels collect by their own kernels ends with its weights.)
+        const bool convolved = pass.block == VKB_BLOCK_fft || pass.block == VKB_BLOCK_weigh;
         *possible = convolved || transpose;
         if (convolved ? !vkb_transpose_convolution(adjoint, settings, &pass, error)
                       : transpose && !transpose(adjoint, &pass, error))

@@ -2,6 +2,7 @@
 // its result has beyond edges that are repeated folds back to these.
 #include "methods/adjoint.h"
 #include "methods/convolution.h"
+#include "methods/field.h"
 #include "passes/adjoint.h"
 #include "passes/levels.h"
 
@@ -51,6 +52,8 @@ static bool accumulate_bright(struct vkb_adjoint *adjoint, const struct vkb_pass
 bool vkb_transpose_convolution(struct vkb_adjoint *adjoint, const struct vkb_settings *settings,
                                const struct vkb_pass_row *pass, struct vkb_error *error)
 {
+    if (settings->field.count)
+        return vkb_transpose_field(adjoint, settings, pass, error);
     struct vkb_graph *graph = adjoint->graph;
     const struct vkb_pass_row first_stage = find_first(graph);
     const uint32_t glow = first_stage.reads[SLOT_SOURCE];

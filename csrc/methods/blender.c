@@ -1,7 +1,7 @@
 // Blender's Glare node: formulas of the compositor of Blender 5.0 (node_composite_glare.cc). From
 // the frame come the highlights, in the size of the quality; from these a glare of the same size,
 // by the type; and from this the bloom.
-#include "methods/convolution.h"
+#include "methods/convolve.h"
 #include "methods/methods.h"
 #include "passes/blur.h"
 #include "passes/levels.h"

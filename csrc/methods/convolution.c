@@ -14,18 +14,14 @@
 // is repeated have cotangents of their own, so the result has these, too, and the lines begin with
 // as many zeros.
 #include "methods/convolution.h"
-#include "methods/methods.h"
-#include "passes/levels.h"
 
 #include <stdio.h>
 
-// What the passes of a convolution are added with.
-struct passes {
-    struct vkb_levels *levels;
-    const struct vkb_convolution *convolution;
-    const char *prefix;  // of the names of images
-    bool transposed;
-};
+bool vkb_conjugates(const struct vkb_convolving *passes)
+{
+    // A mirror's kernel is symmetric, as in transpose_axis().
+    return passes->transposed && passes->convolution->x.boundary != BOUNDARY_MIRROR;
+}
 
 static uint32_t least(uint32_t a, uint32_t b)
 {
@@ -94,25 +90,16 @@ void vkb_transpose_axes(struct vkb_convolution *convolution)
     transpose_axis(&convolution->y, &convolution->reach_y, &convolution->result.height);
 }
 
-// The kernel as the host gives it.
-static uint32_t add_kernel(struct vkb_levels *levels)
-{
-    struct vkb_image_row row = vkb_given_image("kernel", &levels->settings->kernel);
-
-    row.channels = 3;
-    row.framebuffer = !vkb_method_of(levels->settings)->sums_gaussians;
-    return vkb_levels_add(levels, &row);
-}
-
-static uint32_t add_spectrum(const struct passes *passes, const char *name, struct vkb_size size)
+uint32_t vkb_add_spectrum(const struct vkb_convolving *passes, const char *name,
+                          struct vkb_size size)
 {
     char named[VKB_NAME_SIZE];
 
-    snprintf(named, sizeof named, "%s%s", passes->prefix, name);
+    snprintf(named, sizeof named, "%s%s%s", passes->prefix, name, passes->suffix);
     return vkb_levels_target(passes->levels, named, VKB_FORMAT_RGBA32_FLOAT, size, false);
 }
 
-static struct vkb_transform transform_of(const struct vkb_convolution *convolution, uint32_t stages)
+struct vkb_transform vkb_transform_of(const struct vkb_convolution *convolution, uint32_t stages)
 {
     return (struct vkb_transform){
         .width = convolution->x.line.length,
@@ -124,7 +111,7 @@ static struct vkb_transform transform_of(const struct vkb_convolution *convoluti
 }
 
 // The pass that puts the kernel to its places in the padded lines.
-static void add_placing(const struct passes *passes, uint32_t kernel, uint32_t spectrum)
+static void add_placing(const struct vkb_convolving *passes, uint32_t kernel, uint32_t spectrum)
 {
     const struct vkb_convolution *convolution = passes->convolution;
     const struct vkb_fft_axis *x = &convolution->x, *y = &convolution->y;
@@ -137,7 +124,7 @@ static void add_placing(const struct passes *passes, uint32_t kernel, uint32_t s
     row.block_width = row.block_height = PIXEL_INVOCATIONS;
     vkb_read_only(&row, kernel);
     row.block = VKB_BLOCK_fft_kernel;
-    row.transform = transform_of(convolution, 0);
+    row.transform = vkb_transform_of(convolution, 0);
     *params = (struct vkb_fft_kernel_params){
         .padded_x = (int)x->line.length,
         .boundary_x = x->boundary,
@@ -159,12 +146,12 @@ static void add_placing(const struct passes *passes, uint32_t kernel, uint32_t s
 }
 
 // The row of a stage, of `stages` that follow each other from this one on; 0: from one before.
-static struct vkb_pass_row stage_row(const struct passes *passes, const struct vkb_fft_stage *stage,
-                                     uint32_t stages)
+static struct vkb_pass_row stage_row(const struct vkb_convolving *passes,
+                                     const struct vkb_fft_stage *stage, uint32_t stages)
 {
     struct vkb_pass_row row = vkb_fft_row(passes->levels->graph, stage);
 
-    row.transform = transform_of(passes->convolution, stages);
+    row.transform = vkb_transform_of(passes->convolution, stages);
     // The alpha is one of a cotangent, not 1.
     if (passes->transposed)
         row.constants.alpha = ALPHA_BLUR;
@@ -172,7 +159,7 @@ static struct vkb_pass_row stage_row(const struct passes *passes, const struct v
 }
 
 // The kernel's spectrum, in place.
-static void add_kernel_spectrum(const struct passes *passes, uint32_t spectrum)
+static void add_kernel_stages(const struct vkb_convolving *passes, uint32_t spectrum)
 {
     const struct vkb_fft_axis *axes[] = {&passes->convolution->x, &passes->convolution->y};
 
@@ -196,8 +183,18 @@ static void add_kernel_spectrum(const struct passes *passes, uint32_t spectrum)
     }
 }
 
+uint32_t vkb_add_kernel_spectrum(const struct vkb_convolving *passes, uint32_t kernel)
+{
+    const uint32_t spectrum =
+        vkb_add_spectrum(passes, "kernel_spectrum", vkb_padded_size(passes->convolution));
+
+    add_placing(passes, kernel, spectrum);
+    add_kernel_stages(passes, spectrum);
+    return spectrum;
+}
+
 // The glow's transform along its rows.
-static void add_rows(const struct passes *passes, uint32_t rows)
+static void add_rows(const struct vkb_convolving *passes, uint32_t from, uint32_t rows)
 {
     const struct vkb_convolution *convolution = passes->convolution;
     const float *prefilter = passes->levels->settings->kernel.prefilter;
@@ -206,7 +203,7 @@ static void add_rows(const struct passes *passes, uint32_t rows)
         .axis = &convolution->x,
         .lines = convolution->y.extent,
         .padded = convolution->x.line.length > convolution->x.extent,
-        .from = passes->levels->source->glow,
+        .from = from,
         .to = rows,
     };
     const uint32_t count = stage.axis->line.stage_count;
@@ -228,16 +225,16 @@ static void add_rows(const struct passes *passes, uint32_t rows)
     }
 }
 
-// Along the columns forth and back, with the product between.
-static void add_columns(const struct passes *passes, uint32_t rows, uint32_t spectrum,
+// Along the columns forth; if there is a kernel's spectrum, with the product and the first stage
+// back.
+static void add_columns(const struct vkb_convolving *passes, uint32_t rows, uint32_t spectrum,
                         uint32_t columns)
 {
     const struct vkb_convolution *convolution = passes->convolution;
-    // A mirror's kernel is symmetric, as in transpose_axis().
-    const bool conjugate = passes->transposed && convolution->x.boundary != BOUNDARY_MIRROR;
     const uint32_t last = convolution->y.line.stage_count - 1;
+    const bool multiplies = spectrum != VKB_NO_IMAGE;
     struct vkb_fft_stage stage = {
-        .name = "bloom",
+        .name = multiplies ? "bloom" : "spectrum",
         .axis = &convolution->y,
         .lines = convolution->x.line.length,
         .padded = convolution->y.line.length > convolution->y.extent,
@@ -246,25 +243,44 @@ static void add_columns(const struct passes *passes, uint32_t rows, uint32_t spe
     };
 
     for (; stage.number <= last; ++stage.number) {
-        struct vkb_pass_row row = stage_row(passes, &stage, stage.number == 0 ? 2 * last + 1 : 0);
-        if (stage.number == last)
+        const uint32_t stages = multiplies ? 2 * last + 1 : last + 1;
+        struct vkb_pass_row row = stage_row(passes, &stage, stage.number == 0 ? stages : 0);
+        if (multiplies && stage.number == last)
             vkb_fft_multiply(&convolution->x, &convolution->y, spectrum,
-                             passes->levels->settings->kernel.grey, conjugate, &row);
+                             passes->levels->settings->kernel.grey, vkb_conjugates(passes), &row);
         vkb_levels_pass(passes->levels, &row);
         stage.padded = false;
         stage.from = columns;
     }
-    stage.inverse = true;
-    for (stage.number = last; stage.number-- > 0;) {
-        struct vkb_pass_row row = stage_row(passes, &stage, 0);
+}
+
+// Along the columns back, without the first stage if that was part of the product.
+static void add_columns_back(const struct vkb_convolving *passes, uint32_t from, uint32_t columns,
+                             bool multiplied)
+{
+    const struct vkb_convolution *convolution = passes->convolution;
+    const uint32_t count = convolution->y.line.stage_count;
+    struct vkb_fft_stage stage = {
+        .name = "bloom",
+        .axis = &convolution->y,
+        .lines = convolution->x.line.length,
+        .inverse = true,
+        .from = from,
+        .to = columns,
+    };
+
+    for (stage.number = multiplied ? count - 1 : count; stage.number-- > 0;) {
+        const bool first = !multiplied && stage.number == count - 1;
+        struct vkb_pass_row row = stage_row(passes, &stage, first ? count : 0);
         // The rows back need no other.
         if (stage.number == 0)
             row.params.fft.kept = (int)convolution->result.height;
         vkb_levels_pass(passes->levels, &row);
+        stage.from = columns;
     }
 }
 
-static void add_rows_back(const struct passes *passes, uint32_t columns, uint32_t target)
+static void add_rows_back(const struct vkb_convolving *passes, uint32_t columns, uint32_t target)
 {
     const struct vkb_convolution *convolution = passes->convolution;
     struct vkb_fft_stage stage = {
@@ -285,60 +301,73 @@ static void add_rows_back(const struct passes *passes, uint32_t columns, uint32_
     }
 }
 
-static struct vkb_size padded_size(const struct vkb_convolution *convolution)
+struct vkb_size vkb_padded_size(const struct vkb_convolution *convolution)
 {
     return (struct vkb_size){convolution->x.line.length, convolution->y.line.length};
 }
 
-// The glow's transform, the product and the way back; returns the image of the result.
-static uint32_t add_product(const struct passes *passes, uint32_t spectrum,
-                            const struct vkb_image_row *result)
+// The image of the transform along rows.
+static uint32_t add_rows_spectrum(const struct vkb_convolving *passes, uint32_t from)
 {
-    const struct vkb_convolution *convolution = passes->convolution;
-    const struct vkb_size size = convolution->result;
-    const struct vkb_size lines = {convolution->x.line.length, size.height};
-    const uint32_t rows = add_spectrum(passes, "rows_spectrum", lines);
-    const uint32_t columns = add_spectrum(passes, "spectrum", padded_size(convolution));
-    const uint32_t target =
-        vkb_levels_target(passes->levels, result->name, result->format, size, result->framebuffer);
+    // Variants transform the columns in place, whose result may be longer.
+    const struct vkb_size lines = {passes->convolution->x.line.length,
+                                   passes->convolution->result.height};
+    const uint32_t rows = vkb_add_spectrum(passes, "rows_spectrum", lines);
 
-    add_rows(passes, rows);
-    add_columns(passes, rows, spectrum, columns);
+    add_rows(passes, from, rows);
+    return rows;
+}
+
+static uint32_t add_result(const struct vkb_convolving *passes, const struct vkb_image_row *result)
+{
+    return vkb_levels_target(passes->levels, result->name, result->format,
+                             passes->convolution->result, result->framebuffer);
+}
+
+uint32_t vkb_add_forth(const struct vkb_convolving *passes, uint32_t from)
+{
+    const uint32_t rows = add_rows_spectrum(passes, from);
+    const uint32_t columns =
+        vkb_add_spectrum(passes, "spectrum", vkb_padded_size(passes->convolution));
+
+    add_columns(passes, rows, VKB_NO_IMAGE, columns);
+    return columns;
+}
+
+uint32_t vkb_add_back(const struct vkb_convolving *passes, uint32_t spectrum,
+                      const struct vkb_image_row *result)
+{
+    const uint32_t columns =
+        vkb_add_spectrum(passes, "columns", vkb_padded_size(passes->convolution));
+    const uint32_t target = add_result(passes, result);
+
+    add_columns_back(passes, spectrum, columns, false);
     add_rows_back(passes, columns, target);
     return target;
 }
 
-uint32_t vkb_convolve(struct vkb_levels *levels, const struct vkb_image_row *result)
+uint32_t vkb_add_product(const struct vkb_convolving *passes, uint32_t spectrum,
+                         const struct vkb_image_row *result)
 {
-    const struct vkb_convolution convolution =
-        vkb_describe_convolution(levels->settings, levels->source->buffers);
-    const struct passes passes = {.levels = levels, .convolution = &convolution, .prefix = ""};
-    const uint32_t kernel = add_kernel(levels);
-    const uint32_t spectrum = add_spectrum(&passes, "kernel_spectrum", padded_size(&convolution));
+    const uint32_t rows = add_rows_spectrum(passes, passes->levels->source->glow);
+    const uint32_t columns =
+        vkb_add_spectrum(passes, "spectrum", vkb_padded_size(passes->convolution));
+    const uint32_t target = add_result(passes, result);
 
-    add_placing(&passes, kernel, spectrum);
-    add_kernel_spectrum(&passes, spectrum);
-    return add_product(&passes, spectrum, result);
+    add_columns(passes, rows, spectrum, columns);
+    add_columns_back(passes, columns, columns, true);
+    add_rows_back(passes, columns, target);
+    return target;
 }
 
 uint32_t vkb_convolve_back(struct vkb_levels *levels, const struct vkb_convolution *convolution,
                            uint32_t spectrum, const struct vkb_image_row *result)
 {
-    const struct passes passes = {
-        .levels = levels, .convolution = convolution, .prefix = "adjoint_", .transposed = true};
+    const struct vkb_convolving passes = {.levels = levels,
+                                          .convolution = convolution,
+                                          .prefix = "adjoint_",
+                                          .suffix = "",
+                                          .transposed = true};
 
-    return add_product(&passes, spectrum, result);
-}
-
-uint32_t vkb_add_convolution_method(struct vkb_levels *levels)
-{
-    const struct vkb_bloom_source *source = levels->source;
-    const struct vkb_size size = source->buffers;
-    const bool same = size.width == source->final.width && size.height == source->final.height;
-    const struct vkb_image_row whole = {
-        .name = "bloom", .format = source->format, .framebuffer = true};
-    const struct vkb_image_row part = {.name = "convolved", .format = VKB_FORMAT_RGBA32_FLOAT};
-    const uint32_t convolved = vkb_convolve(levels, same ? &whole : &part);
-
-    return same ? convolved : vkb_levels_enlarge(levels, UPSAMPLE_LINEAR, convolved, 1.0);
+    return vkb_add_product(&passes, spectrum, result);
 }

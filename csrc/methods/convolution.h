@@ -3,6 +3,7 @@
 #define VKB_METHODS_CONVOLUTION_H
 
 #include "passes/fft.h"
+#include "passes/levels.h"
 
 // Of the kernel along an axis: its pixels, and the offsets that count.
 struct vkb_reach {
@@ -17,13 +18,17 @@ struct vkb_convolution {
     bool pads_rows, pads_columns;  // the kernel's lines
 };
 
+// What the passes of a convolution are added with.
+struct vkb_convolving {
+    struct vkb_levels *levels;
+    const struct vkb_convolution *convolution;
+    const char *prefix, *suffix;  // of the names of images
+    bool transposed;
+};
+
 // The convolution of an image of that size with the kernel of the settings.
 struct vkb_convolution vkb_describe_convolution(const struct vkb_settings *settings,
                                                 struct vkb_size size);
-
-// Adds the convolution of the source's glow with the kernel of the settings. `result` has the name
-// and the format of the image that it writes and returns, and whether this is a framebuffer.
-uint32_t vkb_convolve(struct vkb_levels *levels, const struct vkb_image_row *result);
 
 // Makes a description that of the transpose. The result has texels beyond edges that are repeated,
 // too, and begins `first` texels before the image.
@@ -33,5 +38,22 @@ void vkb_transpose_axes(struct vkb_convolution *convolution);
 // has.
 uint32_t vkb_convolve_back(struct vkb_levels *levels, const struct vkb_convolution *convolution,
                            uint32_t spectrum, const struct vkb_image_row *result);
+
+// The parts of a convolution. The size of the padded lines; an image of a spectrum; what a pass of
+// a transform has for variants; whether products are with the conjugate spectrum.
+struct vkb_size vkb_padded_size(const struct vkb_convolution *convolution);
+uint32_t vkb_add_spectrum(const struct vkb_convolving *passes, const char *name,
+                          struct vkb_size size);
+struct vkb_transform vkb_transform_of(const struct vkb_convolution *convolution, uint32_t stages);
+bool vkb_conjugates(const struct vkb_convolving *passes);
+
+// Adds the spectrum of a kernel, which is an image of the host; that of an image; and the way back
+// from a spectrum to the result. Or of the source's glow all but the kernel's.
+uint32_t vkb_add_kernel_spectrum(const struct vkb_convolving *passes, uint32_t kernel);
+uint32_t vkb_add_forth(const struct vkb_convolving *passes, uint32_t from);
+uint32_t vkb_add_back(const struct vkb_convolving *passes, uint32_t spectrum,
+                      const struct vkb_image_row *result);
+uint32_t vkb_add_product(const struct vkb_convolving *passes, uint32_t spectrum,
+                         const struct vkb_image_row *result);
 
 #endif

@@ -80,6 +80,20 @@ struct vkb_kernel_data {
     float prefilter[3];  // min, max, factor; min above max: none
 };
 
+enum { VKB_MAX_FIELD = 512 };  // kernels
+
+// A field of kernels (methods/field.c): how many the kernel's pixels have below each other, and
+// their weights at the places of a grid.
+struct vkb_field {
+    uint32_t count;          // 0: there is one kernel without weights
+    int gathers;             // weights are multiplied after the convolution
+    int first_unweighted;    // the weight of the first kernel is 1
+    uint32_t columns, rows;  // of the grid
+    // Four weights a texel; for each column of the buffers, then for each row, the place in the
+    // grid before it and the share of the next one.
+    struct vkb_kernel_data weights, places;
+};
+
 // Every stage of glare: STAGE(name in C, name in Python, of its framebuffer and of its add_
 // function in methods/glare.c). Dirt is a stage without a framebuffer: it changes the sum of the
 // others.
@@ -157,7 +171,8 @@ struct vkb_settings {
     float exposure_table[EXPOSURE_TABLE];
     uint32_t exposure_key_count;
     // Python packs what is before here.
-    struct vkb_kernel_data kernel;
+    struct vkb_kernel_data kernel;  // of a field: the size is that of one
+    struct vkb_field field;
     struct vkb_kernel_data dirt;           // the picture of the stage of dirt
     struct vkb_kernel_data exposure_mask;  // of the meter
     const struct vkb_custom_pass *passes;  // of a custom method

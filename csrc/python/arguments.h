@@ -37,6 +37,10 @@ bool vkb_read_kernel_size(PyObject *object, struct vkb_size frame, struct vkb_si
 bool vkb_read_kernel(PyObject *object, struct vkb_size frame, struct vkb_size buffers,
                      Py_buffer *view, struct vkb_kernel_data *kernel);
 
+// Asks the same settings for the weights of a field, whose kernels are those that were read.
+bool vkb_read_field(PyObject *object, struct vkb_size frame, struct vkb_size buffers,
+                    Py_buffer *weights, Py_buffer *places, struct vkb_settings *settings);
+
 // Asks settings with an exposure for the mask of its meter, which is a kernel or None.
 bool vkb_read_exposure_mask(PyObject *object, Py_buffer *view, struct vkb_settings *settings);
 // Asks the stage of dirt, if there is one, for its picture.

@@ -56,6 +56,53 @@ bool vkb_read_kernel(PyObject *object, struct vkb_size frame, struct vkb_size bu
     return done;
 }
 
+// (kernels, whether they gather, whether the first has no weights, columns and rows of the grid,
+// weights and places as kernels)
+static bool read_field_tuple(PyObject *tuple, struct vkb_size buffers, Py_buffer *weights,
+                             Py_buffer *places, struct vkb_settings *settings)
+{
+    struct vkb_field *field = &settings->field;
+    PyObject *of_weights, *of_places;
+
+    if (!vkb_require_tuple(tuple, "field")
+        || !PyArg_ParseTuple(tuple, "IppIIOO:core_field", &field->count, &field->gathers,
+                             &field->first_unweighted, &field->columns, &field->rows, &of_weights,
+                             &of_places)
+        || !read_kernel_tuple(of_weights, weights, &field->weights)
+        || !read_kernel_tuple(of_places, places, &field->places))
+        return false;
+    const uint64_t grids = field->columns ? field->weights.width / field->columns : 0;
+    if (field->count > VKB_MAX_FIELD)
+        return vkb_refuse("psf: a field of %u kernels is out of range, up to %d", field->count,
+                          VKB_MAX_FIELD);
+    if (!field->count || settings->kernel.height % field->count != 0)
+        return vkb_refuse("field: %u kernels are not in %u rows", field->count,
+                          settings->kernel.height);
+    if (field->weights.grey || field->places.grey || !field->rows
+        || 4 * grids * (field->weights.height / field->rows) < field->count)
+        return vkb_refuse(
+            "field: %u x %u texels are not the weights of %u kernels at %u x %u places",
+            field->weights.width, field->weights.height, field->count, field->columns, field->rows);
+    if (field->places.width < buffers.width || field->places.width < buffers.height
+        || field->places.height != 2)
+        return vkb_refuse("field: %u x %u texels are not the places of %u columns and %u rows",
+                          field->places.width, field->places.height, buffers.width, buffers.height);
+    settings->kernel.height /= field->count;
+    return true;
+}
+
+bool vkb_read_field(PyObject *object, struct vkb_size frame, struct vkb_size buffers,
+                    Py_buffer *weights, Py_buffer *places, struct vkb_settings *settings)
+{
+    PyObject *tuple = PyObject_CallMethod(object, "core_field", "(II)(II)", frame.width,
+                                          frame.height, buffers.width, buffers.height);
+    const bool done =
+        tuple && (tuple == Py_None || read_field_tuple(tuple, buffers, weights, places, settings));
+
+    Py_XDECREF(tuple);
+    return done;
+}
+
 bool vkb_read_exposure_mask(PyObject *object, Py_buffer *view, struct vkb_settings *settings)
 {
     const struct vkb_size any = {0};

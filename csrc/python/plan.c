@@ -220,7 +220,9 @@ static bool hold_kernel(const struct vkb_module_state *state, const struct vkb_d
         vkb_graph_destroy(&graph);
         if (fits)
             return vkb_read_kernel(settings_object, frame, buffers, &self->kernel,
-                                   &settings->kernel);
+                                   &settings->kernel)
+                && vkb_read_field(settings_object, frame, buffers, &self->field_weights,
+                                  &self->field_places, settings);
         if (error.kind == VKB_ERROR_VALUE)
             vkb_add_words(&error, ". A smaller bloom_scale or kernel_size makes it so");
     }
@@ -255,6 +257,8 @@ static PyObject *new_plan(const struct vkb_module_state *state, const struct vkb
     // A plan without a renderer cannot be run: it needs only the serials.
     if (device->adapter.physical == VK_NULL_HANDLE) {
         PyBuffer_Release(&self->kernel);
+        PyBuffer_Release(&self->field_weights);
+        PyBuffer_Release(&self->field_places);
         PyBuffer_Release(&self->dirt);
         PyBuffer_Release(&self->meter_mask);
     }
@@ -469,6 +473,8 @@ static int traverse(PyObject *object, visitproc visit, void *arg)
     Py_VISIT(Py_TYPE(object));
     Py_VISIT(self->outputs);
     Py_VISIT(self->kernel.obj);
+    Py_VISIT(self->field_weights.obj);
+    Py_VISIT(self->field_places.obj);
     Py_VISIT(self->dirt.obj);
     Py_VISIT(self->meter_mask.obj);
     Py_VISIT(self->passes.tuple);
@@ -482,6 +488,8 @@ static void dealloc(PyObject *object)
     PyObject_GC_UnTrack(object);
     vkb_plan_destroy(&self->plan);
     PyBuffer_Release(&self->kernel);
+    PyBuffer_Release(&self->field_weights);
+    PyBuffer_Release(&self->field_places);
     PyBuffer_Release(&self->dirt);
     PyBuffer_Release(&self->meter_mask);
     vkb_release_passes(&self->passes);

@@ -26,7 +26,7 @@ struct vkb_plan_object {
     struct vkb_plan plan;
     uint64_t renderer;  // the number of that for which it is; 0: none
     PyObject *outputs;  // ((name, shape, dtype), ...)
-    Py_buffer kernel, dirt, meter_mask;
+    Py_buffer kernel, field_weights, field_places, dirt, meter_mask;
     struct vkb_held_passes passes;
 };
 

@@ -91,6 +91,11 @@ static bool holds_lines(const struct vkb_variant_choice *choice, const struct vk
         && make_group(choice->device, line_length(choice, pass, DIRECTION_VERTICAL), &group);
 }
 
+static bool multiplies(const struct vkb_pass_row *pass)
+{
+    return pass->constants.stage == STAGE_PRODUCT || pass->constants.stage == STAGE_GREY;
+}
+
 // The row for all stages along an axis, from `first` to before `end`.
 static struct vkb_pass_row make_row(const struct vkb_variant_choice *choice,
                                     const struct vkb_pass_row *first,
@@ -106,23 +111,29 @@ static struct vkb_pass_row make_row(const struct vkb_variant_choice *choice,
     memcpy(&row, first, sizeof row);
     if (first->constants.stage != STAGE_FIRST)
         row.reads[SLOT_SOURCE] = graph->passes[graph->pass_count - 1].targets[0];
-    // Columns are transformed in place.
-    row.targets[0] = first->constants.inverse ? last->targets[0]
-                   : horizontal               ? first->targets[0]
-                                              : row.reads[SLOT_SOURCE];
-    if (first->constants.inverse)
+    row.targets[0] = first->constants.inverse ? last->targets[0] : first->targets[0];
+    if (first->constants.inverse && horizontal)
         row.constants.stage = STAGE_LAST;
     for (const struct vkb_pass_row *pass = first; pass < end; ++pass)
-        if (pass->constants.stage == STAGE_PRODUCT || pass->constants.stage == STAGE_GREY) {
+        if (multiplies(pass)) {
+            // Columns are transformed in place, forth and back.
+            row.targets[0] = row.reads[SLOT_SOURCE];
             row.constants.stage = STAGE_PRODUCT;
             row.reads[SLOT_SPECTRUM] = pass->reads[SLOT_SPECTRUM];
             row.params.fft.kernel_sign = pass->params.fft.kernel_sign;
         }
     row.constants.rotated = 0;
     row.params.fft.padded = (int)length;
+    // Without a product, columns forth and back have images of their own.
+    if (!horizontal && row.targets[0] != row.reads[SLOT_SOURCE]) {
+        struct vkb_image_row *columns = &graph->images[row.targets[0]];
+        columns->width = graph->images[row.reads[SLOT_SOURCE]].width;
+        columns->height = first->constants.inverse ? (uint32_t)last->params.fft.kept : length;
+    }
     const struct vkb_image_row *spectra =
         &graph->images[first->constants.inverse ? row.reads[SLOT_SOURCE] : row.targets[0]];
-    row.params.fft.kept = horizontal ? last->params.fft.kept : (int)spectra->height;
+    row.params.fft.kept =
+        horizontal ? last->params.fft.kept : (int)graph->images[row.targets[0]].height;
     // The kernel's rows are as many as the columns' elements, which are more here.
     row.params.fft.across = !horizontal ? (int)spectra->width
                           : first->constants.inverse || row.constants.stage == STAGE_FIRST
@@ -177,6 +188,15 @@ bool vkb_add_transform_lines_variant(struct vkb_variant_choice *choice,
         row = make_placing(choice, pass);
         return vkb_add_variant_pass(choice, &row);
     }
+    if (pass->block == VKB_BLOCK_products) {
+        // Channels are separated, so that each frequency is multiplied by its own.
+        memcpy(&row, pass, sizeof row);
+        row.constants.stage = STAGE_GREY;
+        hold_spectra(choice, pass);
+        choice->graph->images[row.targets[0]].height =
+            line_length(choice, pass, DIRECTION_VERTICAL);
+        return vkb_add_fullscreen_variant(choice, &row);
+    }
     // The first stage along an axis stands for all.
     if (pass->transform.stages == 0)
         return true;
@@ -194,6 +214,35 @@ static bool reaches(const struct vkb_device *device, const struct vkb_image_row 
 {
     return (uint64_t)vkb_image_row_pitch(row->format, row->width) * row->height
         <= device->limits.maxStorageBufferRange;
+}
+
+static const struct vkb_shader *const weigh_shaders[VKB_FORMAT_COUNT] = VKB_LINEAR_BY_FORMAT(weigh);
+
+// The row of a field's weights or products, whose target has single floats; NULL: there is none.
+static const struct vkb_shader *field_shader(const struct vkb_variant_choice *choice,
+                                             const struct vkb_pass_row *pass)
+{
+    const struct vkb_graph *graph = choice->graph;
+
+    if (vkb_computes(pass, VKB_BLOCK_products))
+        return &vkb_shader_products_linear_rgba32float;
+    return vkb_computes(pass, VKB_BLOCK_weigh) && !pass->constants.adds_image
+                && graph->images[pass->targets[0]].format == VKB_FORMAT_RGBA32_FLOAT
+             ? weigh_shaders[graph->images[pass->reads[SLOT_SOURCE]].format]
+             : NULL;
+}
+
+bool vkb_add_field_variant(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
+{
+    const struct vkb_shader *shader = field_shader(choice, pass);
+    struct vkb_pass_row row;
+
+    if (!shader || !vkb_fits_linear(choice, pass)
+        || !reaches(choice->device, &choice->graph->images[pass->targets[0]]))
+        return false;
+    memcpy(&row, pass, sizeof row);
+    vkb_make_linear(&row, shader, 1, TEXEL_ROWS);
+    return vkb_add_variant_pass(choice, &row);
 }
 
 bool vkb_add_transform_variant(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)

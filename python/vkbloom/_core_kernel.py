@@ -35,6 +35,12 @@ def core_kernel(values: NDArray[Any]) -> CoreKernel:
         pixels = pixels.reshape(*pixels.shape[:2], -1)[..., :1].copy()
     else:
         pixels = np.concatenate([pixels, values.mean(axis=2, keepdims=True)], 2, dtype=np.float32)
+    return core_image(pixels)
+
+
+def core_image(pixels: NDArray[Any]) -> CoreKernel:
+    """Return pixels, shape (h, w, 4) or (h, w, 1), as the core reads them."""
+    pixels = np.ascontiguousarray(pixels, np.float32)
     digest = hashlib.blake2b(pixels.data, digest_size=8, key=repr(pixels.shape).encode()).digest()
     # 0 and the largest number are reserved.
     serial = min(max(int.from_bytes(digest, "little"), 1), 2**64 - 2)

@@ -112,7 +112,8 @@ OTHERS: dict[str, dict[str, Any]] = {
     "unreal": {"image": np.ones((3, 3))},
     "shade": dict.fromkeys(("albedo", "normal", "position", "brightness"), IMAGE),
     "response": {"bloom": lambda image, intensity: image},
-    **dict.fromkeys(("Gathered", "Varying"), {"kernels": np.ones((1, 1, 3, 3))}),
+    "Gathered": {"kernels": np.ones((1, 1, 3, 3))},
+    "Varying": {"kernels": np.ones((1, 1, 3, 3))},
     "samples": {"values": np.ones((3, 3))},
     "sweep": {"settings": [SEPARABLE]},
 }

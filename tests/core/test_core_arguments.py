@@ -267,6 +267,9 @@ class Ends(Given):
     def core_kernel(self, frame: object, buffers: object) -> Any:
         return np.ones((5, 5, 4), np.float32), 1, (0.0, 0.0, 0.0)
 
+    def core_field(self, frame: object, buffers: object) -> None:
+        return None
+
 
 #: Some fields at an end, and one value of one choice.
 CHOSEN = [{}, *({name: one} for name, names in _core.CHOICES.items() for one in names)]

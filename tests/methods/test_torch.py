@@ -49,6 +49,31 @@ def test_result_is_that_of_the_renderer(renderer: Renderer) -> None:
     assert torch.equal(first.movedim(-3, -1), final)
 
 
+def spot(u: float, v: float) -> np.ndarray[Any, Any]:
+    y, x = np.mgrid[-3:4, -3:4]
+    kernel = np.exp(-((x - u) ** 2 + (y - v) ** 2) / 2)
+    return np.asarray(kernel / kernel.sum())
+
+
+@pytest.mark.parametrize(
+    "lens",
+    [vkbloom.psf.Varying(function=spot), vkbloom.psf.Gathered([[np.eye(3), np.ones((3, 3))]])],
+)
+def test_kernels_may_depend_on_the_place(renderer: Renderer, lens: Any) -> None:
+    """A function is known to the operator by its name. The sum over both is the same."""
+    settings = vkbloom.Convolution(lens, composite="mix", intensity=1)
+    image, cotangent = tensor(2, 7, 9, 3), tensor(2, 7, 9, 3, seed=2).detach()
+    final = vkbloom_torch.bloom(image, settings, renderer=renderer)
+    frames = renderer.apply(image[0].detach().cpu().numpy(), settings)
+    assert np.array_equal(final[0].detach().cpu().numpy(), frames["final"])
+    (final * cotangent).sum().backward()
+    forth, back = (
+        float((one * other).sum().detach())
+        for one, other in ((final, cotangent), (image, image.grad))
+    )
+    assert back == pytest.approx(forth, rel=1e-6)
+
+
 def test_derivatives_are_those_of_the_renderer(renderer: Renderer) -> None:
     image, cotangent = tensor(2, 7, 9, 3), tensor(2, 7, 9, 3, seed=2).detach()
     module = vkbloom_torch.Bloom(SETTINGS, learn=("intensity", "threshold"), renderer=renderer)

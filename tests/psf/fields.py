@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -81,7 +82,10 @@ def bilinear(kernels: Array, xs: Array, ys: Array) -> Callable[[float, float], A
 
 
 def scatter(
-    image: Array, kernel_at: Callable[[float, float], Array], boundary: str, gathers: bool = False
+    image: NDArray[np.floating[Any]],
+    kernel_at: Callable[[float, float], Array],
+    boundary: str,
+    gathers: bool = False,
 ) -> Array:
     """Return sum over q of image(q) K_q(p - q), where K_q is `kernel_at(x, y)`.
 

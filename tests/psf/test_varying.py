@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import functools
 import pickle
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from tests.psf.fields import (
     FIELDS,
     Array,
     Field,
+    as_colours,
     bilinear,
     field_of,
     off_centre,
@@ -21,6 +23,7 @@ from tests.psf.fields import (
     scatter,
     vignetted,
 )
+from tests.variants import VARIANTS, open_variant
 from vkbloom import psf, reference
 
 FRAME = 21, 15
@@ -47,8 +50,10 @@ POSITIONS = (1.5, 6.0, 14.25, 18.0), (2.0, 7.5, 13.0)
 Case = tuple[psf.Varying, Callable[[float, float], Array]]
 
 
-def of_function(function: Field, kind: type[psf.Varying] = psf.Varying) -> Case:
-    return kind(function=function), lambda x, y: function(*field_of(x, y, FRAME))
+def of_function(
+    function: Field, kind: type[psf.Varying] = psf.Varying, frame: tuple[int, int] = FRAME
+) -> Case:
+    return kind(function=function), lambda x, y: function(*field_of(x, y, frame))
 
 
 def of_grid(kernels: Array, kind: type[psf.Varying] = psf.Varying) -> Case:
@@ -171,7 +176,7 @@ def test_models_of_photutils() -> None:
 
 
 def test_storage(tmp_path: Any) -> None:
-    """A grid is stored as JSON, and in a Zarr array; a function is only pickled."""
+    """A grid is stored as JSON, and in a Zarr array; a function is known to its process."""
     zarr = pytest.importorskip("zarr", reason="the extra grid is not installed")
     patches = zarr.create_array(tmp_path / "patches", data=grid())
     lens = psf.Varying(patches, POSITIONS, scales=(1, 1, 0.9))
@@ -181,8 +186,13 @@ def test_storage(tmp_path: Any) -> None:
     assert pickle.loads(pickle.dumps(lens)) == lens
     of_function = psf.Varying(function=round_spot)
     assert pickle.loads(pickle.dumps(of_function)) == of_function
-    with pytest.raises(TypeError, match=r"cannot be stored; .* sampled\(frame, places\)"):
-        of_function.to_dict()
+    text = of_function.to_json()
+    assert psf.PSF.from_json(text) == of_function
+    other = psf.Varying(function=functools.partial(round_spot))
+    assert psf.PSF.from_dict(other.to_dict()) == other != of_function
+    unknown = text.replace("round_spot", "square_spot")
+    with pytest.raises(ValueError, match=r"of another process; .* sampled\(frame, places\)"):
+        psf.PSF.from_json(unknown)
     stored = of_function.sampled(FRAME, (5, 4))
     np.testing.assert_allclose(stored.at(20, 14, FRAME), of_function.at(20, 14, FRAME), atol=1e-8)
 
@@ -201,3 +211,158 @@ def test_facts() -> None:
     np.testing.assert_allclose(lens.array((7, 3)).shape, (3, 7, 3))
     with pytest.raises(ValueError, match="not one kernel"):
         lens.kernel(FRAME)
+
+
+@pytest.fixture(scope="module", params=VARIANTS)
+def any_renderer(request: pytest.FixtureRequest) -> Iterator[vkbloom.Renderer]:
+    with open_variant(request.param) as opened:
+        yield opened
+
+
+SMALL = 17, 12
+#: Each field with the function of a place in pixels of a picture of SMALL.
+CASES: dict[str, Case] = {
+    **{function.__name__: of_function(function, frame=SMALL) for function in FIELDS},
+    "grid": of_grid(grid()),
+    "coloured_grid": of_grid(grid(colours=True)),
+    "vignetted_grid": of_grid(grid() * np.linspace(1, 0.3, 12).reshape(3, 4, 1, 1)),
+    "gathered": of_grid(grid(colours=True), psf.Gathered),
+}
+
+
+@functools.cache
+def exact_sum(name: str, boundary: str) -> Array:
+    lens, kernel_at = CASES[name]
+    image = picture(SMALL).astype(np.float32)
+    return scatter(image, kernel_at, boundary, gathers=lens.gathers)
+
+
+@functools.cache
+def exact_derivative(name: str, boundary: Any) -> Array:
+    settings = vkbloom.Convolution(CASES[name][0], boundary=boundary, composite="mix", intensity=1)
+    _, pullback = reference.vjp(picture(SMALL).astype(np.float32).astype(np.float64), settings)
+    cotangents = picture(SMALL, seed=8).astype(np.float32)
+    return pullback({"final": cotangents.astype(np.float64)})["image"]
+
+
+@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("boundary", BOUNDARIES)
+def test_the_device_computes_the_sum_over_all_pixels(
+    any_renderer: vkbloom.Renderer, name: str, boundary: Any
+) -> None:
+    """A grid is exact, a function within its tolerance; "wrap" has kernels larger than the picture.
+
+    The flux of each light is that of its own kernel.
+    """
+    lens, _ = CASES[name]
+    image = picture(SMALL).astype(np.float32)
+    settings = vkbloom.Convolution(lens, boundary=boundary, format="rgba32float")
+    frames = any_renderer.apply(image, settings)
+    exact = exact_sum(name, boundary)
+    limit = 1e-6 if lens.function is None else lens.tolerance
+    off = np.abs(frames["bloom"][..., :3] - exact).max() / exact.max()
+    assert off <= limit
+    assert frames.info["psf_error"] <= limit
+    if boundary == "wrap":
+        flux = frames["bloom"][..., :3].sum(axis=(0, 1), dtype=np.float64)
+        np.testing.assert_allclose(flux, exact.sum(axis=(0, 1)), rtol=1e-6)
+
+
+@pytest.mark.parametrize("name", ["coma", "chromatic", "coloured_grid", "gathered"])
+@pytest.mark.parametrize("boundary", BOUNDARIES)
+def test_the_adjoint_is_the_transpose(
+    any_renderer: vkbloom.Renderer, name: str, boundary: Any
+) -> None:
+    lens, _ = CASES[name]
+    image = picture(SMALL).astype(np.float32)
+    cotangents = picture(SMALL, seed=8).astype(np.float32)
+    settings = vkbloom.Convolution(lens, boundary=boundary, composite="mix", intensity=1)
+    frames, pullback = vkbloom.vjp(image, settings, renderer=any_renderer)
+    derivative = pullback({"final": cotangents})["image"]
+    forth = np.vdot(frames["final"].astype(np.float64), cotangents)
+    assert np.vdot(image.astype(np.float64), derivative) == pytest.approx(forth, rel=1e-6)
+    wanted = exact_derivative(name, boundary)
+    limit = 1e-5 if lens.function is None else 10 * lens.tolerance
+    np.testing.assert_allclose(derivative, wanted, rtol=0, atol=limit * np.abs(wanted).max())
+
+
+@pytest.mark.parametrize("place", [(0, 0), (16, 3), (8, 11)])
+@pytest.mark.parametrize("name", ["chromatic", "vignetted", "grid"])
+def test_a_light_shows_the_kernel_of_its_place(
+    renderer: vkbloom.Renderer, name: str, place: tuple[int, int]
+) -> None:
+    lens, kernel_at = CASES[name]
+    image = np.zeros((SMALL[1], SMALL[0], 3), np.float32)
+    image[place[1], place[0]] = 1
+    settings = vkbloom.Convolution(lens, format="rgba32float", boundary="wrap")
+    bloom = renderer.apply(image, settings)["bloom"][..., :3]
+    kernel = as_colours(kernel_at(*place))
+    np.testing.assert_allclose(
+        bloom.sum(axis=(0, 1), dtype=np.float64), kernel.sum(axis=(0, 1)), rtol=1e-6
+    )
+    alone = scatter(image, kernel_at, "wrap")
+    np.testing.assert_allclose(bloom, alone, rtol=0, atol=1e-3 * kernel.max())
+
+
+def test_a_constant_field_is_a_convolution(any_renderer: vkbloom.Renderer) -> None:
+    kernel = grid()[1, 2]
+    image = picture().astype(np.float32)
+    plain, *fields = (
+        any_renderer.apply(image, vkbloom.Convolution(lens, normalize=False), framebuffers="final")
+        for lens in (
+            kernel,
+            psf.Varying(np.broadcast_to(kernel, (2, 3, 5, 8))),
+            psf.Varying(function=lambda u, v: kernel),
+        )
+    )
+    for field in fields:
+        np.testing.assert_array_equal(field["final"], plain["final"])
+
+
+def test_bloom_buffers_of_another_size_and_format(renderer: vkbloom.Renderer) -> None:
+    """Places are those of the frame's pixels, and kernels are resampled."""
+    image = picture((40, 30)).astype(np.float32)
+    for lens in (psf.Varying(grid(), POSITIONS), psf.Varying(function=vignetted)):
+        settings = vkbloom.Convolution(lens, bloom_scale=0.5, threshold=0.3, boundary="edge")
+        bloom = renderer.apply(image, settings)["bloom"].astype(np.float64)
+        exact = reference.apply(image, settings)["bloom"]
+        np.testing.assert_allclose(bloom, exact, rtol=0, atol=2e-3 * exact.max())
+
+
+def test_batches_masks_and_emission(renderer: vkbloom.Renderer) -> None:
+    settings = vkbloom.Convolution(psf.Varying(grid(), POSITIONS), composite="mix", intensity=0.5)
+    images = np.stack([picture(seed=seed) for seed in (1, 2, 3)]).astype(np.float32)
+    mask, emission = images[1, ..., 0] * 5, images[2]
+    for image, frames in zip(images, renderer.map(images, settings), strict=True):
+        alone = renderer.apply(image, settings)["final"]
+        np.testing.assert_array_equal(frames["final"], alone)
+    frames = renderer.apply(images[0], settings, mask=mask.clip(0, 1), emission=emission)
+    exact = reference.apply(images[0], settings, mask=mask.clip(0, 1), emission=emission)
+    np.testing.assert_allclose(frames["final"], exact["final"], rtol=0, atol=1e-5)
+
+
+def test_plans_say_what_is_not_exact(renderer: vkbloom.Renderer) -> None:
+    image = picture().astype(np.float32)
+    lens = psf.Varying(function=vignetted, tolerance=0.01)
+    made = lens.components(FRAME)
+    count = len(made.kernels)
+    plan = renderer.plan(image, vkbloom.Convolution(lens))
+    assert plan.notes == (f"psf: {count} kernels, with an error of {made.error:.2g}",)
+    info = renderer.apply(image, vkbloom.Convolution(lens)).info
+    assert (info["psf_kernels"], info["psf_error"]) == (count, made.error)
+    assert renderer.plan(image, vkbloom.Convolution()).notes == ()
+
+
+def test_a_lens_is_removed(renderer: vkbloom.Renderer) -> None:
+    """The error of what is found is below a tenth of that of the picture."""
+
+    def lens_of(u: float, v: float) -> Array:
+        kernel = 0.4 * vignetted(u, v)
+        kernel[10, 10] += 0.6 * (1 - 0.5 * (u * u + v * v))
+        return kernel
+
+    truth = picture((30, 20))
+    kernel_at = lambda x, y: lens_of(*field_of(x, y, (30, 20)))  # noqa: E731
+    glared = scatter(truth, kernel_at, "zero").astype(np.float32)
+    found = vkbloom.deglare(glared, psf.Varying(function=lens_of), renderer=renderer)
+    assert np.linalg.norm(found - truth) < 0.1 * np.linalg.norm(glared - truth)

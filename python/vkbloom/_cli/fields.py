@@ -84,11 +84,13 @@ def _read_pairs(word: str) -> tuple[tuple[float, ...], ...]:
 def _read_psf(word: str) -> PSF:
     """Parse a function with its parameters, such as spencer:state=scotopic, or an image file."""
     name, _, rest = word.partition(":")
-    if name.lower() in functions():
+    # A word has no space for a field of kernels.
+    known = [one for one in functions() if one.islower()]
+    if name.lower() in known:
         return PSF.from_dict({"psf": name.lower()} | _read_fields(rest))
     if not os.path.exists(word):
-        near = did_you_mean(name, functions())
-        raise ValueError(f"is neither a file nor one of {', '.join(functions())}{near}")
+        near = did_you_mean(name, known)
+        raise ValueError(f"is neither a file nor one of {', '.join(known)}{near}")
     return psf.samples(read_colours(word))
 
 

@@ -12,6 +12,7 @@ from vkbloom._gradients.pulling import vjp
 from vkbloom._image_arguments import check_image
 from vkbloom._methods.convolution import Convolution, PSFLike, read_psf
 from vkbloom._numbers import check_number
+from vkbloom._psf.varying import Varying
 from vkbloom._public import public
 from vkbloom._renderer.default import default_renderer
 from vkbloom._renderer.renderer import Renderer
@@ -35,10 +36,11 @@ def deglare(
     image : array-like, shape (H, W, 3) or (H, W, 4)
         The picture with glare, in linear light. uint8 is read as value / 255. Alpha is kept.
     psf : PSF or array-like, shape (h, w) or (h, w, 3)
-        How the light of a point is spread, as for `Convolution`, which normalizes it.
+        How the light of a point is spread, as for `Convolution`, which normalizes it, but for a
+        `psf.Varying`.
     share : float, optional
         The share of the light that is spread, 0 to 1; the rest stays at its pixel. Default: the
-        energy of the PSF, at most 1.
+        energy of the PSF, at most 1; of a `psf.Varying`, 1.
     pixels_per_degree : float, optional
         Scale of a PSF whose unit is "degree", as of `Convolution`. Default: the picture's longer
         side spans 50 degrees.
@@ -73,7 +75,9 @@ def deglare(
     [0.0576, 0.0]
     """
     renderer, psf = renderer or default_renderer(), read_psf(psf)
-    share = min(float(psf.energy().mean()), 1.0) if share is None else share
+    if share is None:
+        # A field's kernels are taken as they are.
+        share = 1.0 if isinstance(psf, Varying) else min(float(psf.energy().mean()), 1.0)
     share = check_number("share", share, 0, 1)
     check_number("iterations", iterations, 1, 100_000)
     given = check_image(image)

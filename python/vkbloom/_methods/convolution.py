@@ -11,6 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from vkbloom._psf.base import PSF, in_grey
+from vkbloom._psf.components import facts_of
+from vkbloom._psf.core_fields import core_field
 from vkbloom._psf.core_kernels import WithKernel
 from vkbloom._psf.eye import spencer
 from vkbloom._psf.resampling import box_resample
@@ -135,6 +137,12 @@ class Convolution(WithKernel, Settings):
         grid = in_grey(kernels) if kernels.ndim == 4 else kernels
         return np.array([[_for_buffers(kernel, frame, buffers) for kernel in row] for row in grid])
 
+    def _facts(self, frame: Size) -> dict[str, float]:
+        if not isinstance(self.psf, Varying) or not self.bloom:
+            return {}
+        count, error = facts_of(self.psf, frame)
+        return {"psf_kernels": count, "psf_error": error}
+
     @property
     def _is_transform(self) -> bool:
         return True
@@ -145,13 +153,24 @@ class Convolution(WithKernel, Settings):
         if self.kernel_size is None and isinstance(self.psf, samples):
             height, width = np.shape(self.psf.values.array)[:2]
             sides = width, height
+        if isinstance(self.psf, Varying):
+            sides = self.psf.kernel_size
         width, height = (
             max(side * to // of, 1) for side, to, of in zip(sides, buffers, frame, strict=True)
         )
         return width, height
 
+    def core_field(self, frame: Size, buffers: Size) -> tuple[Any, ...] | None:
+        """Return the weights of a field of kernels as the core reads them; None: there is none."""
+        return core_field(self.psf, frame, buffers) if isinstance(self.psf, Varying) else None
+
     def _kernel(self, frame: tuple[int, int], buffers: tuple[int, int]) -> NDArray[np.float64]:
         psf = cast("PSF", self.psf)
+        if isinstance(psf, Varying):
+            # Below each other, as the core reads them.
+            kernels = psf.components(frame).kernels
+            each = in_grey(kernels) if kernels.ndim == 3 else kernels
+            return np.concatenate([_for_buffers(kernel, frame, buffers) for kernel in each])
         kernel = psf.kernel(frame, self.kernel_size, self.pixels_per_degree)
         kernel = _for_buffers(kernel, frame, buffers)
         if self.normalize:

@@ -7,6 +7,7 @@ between these are near enough to the function's.
 
 from __future__ import annotations
 
+import functools
 import math
 from typing import Any, Final, NamedTuple, Protocol
 
@@ -96,6 +97,13 @@ class Components(NamedTuple):
 def components_of(psf: Field, frame: Size) -> Components:
     """Return the components of a field for a picture."""
     return _of_grid(psf, frame) if psf.function is None else _of_function(psf, frame)
+
+
+@functools.lru_cache(256)
+def facts_of(psf: Field, frame: Size) -> tuple[int, float]:
+    """Return the number of kernels for a picture, and their error."""
+    made = components_of(psf, frame)
+    return len(made.kernels), made.error
 
 
 def _of_grid(psf: Field, frame: Size) -> Components:

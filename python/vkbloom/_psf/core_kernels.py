@@ -63,6 +63,10 @@ class WithKernel:
         shape = type(self)(**{name: getattr(self, name) for name in self.shaping})
         return _core_kernel(shape, frame, buffers)._replace(prefilter=self.prefilter)
 
+    def core_field(self, frame: Size, buffers: Size) -> tuple[Any, ...] | None:
+        """Return the weights of a field of kernels as the core reads them; None: there is none."""
+        return None
+
 
 @keep
 def _core_kernel(shape: WithKernel, frame: Size, buffers: Size) -> CoreKernel:

@@ -6,6 +6,7 @@ import math
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vkbloom._psf.base import Array
 
@@ -19,19 +20,26 @@ def field_of(x: float, y: float, frame: Size) -> tuple[float, float]:
     return (x - (width - 1) / 2) / radius, (y - (height - 1) / 2) / radius
 
 
-def hat_weights(nodes: Array, places: Any) -> Array:
-    """Return the shares of nodes at places, linear between them and constant outside."""
+def places_before(nodes: Array, places: Any) -> tuple[NDArray[np.intp], Array]:
+    """Return the index of the node before each place, and the share of the next node.
+
+    Places outside of the nodes are at the nearest one.
+    """
     at = np.asarray(places, np.float64)
-    weights = np.zeros((len(at), len(nodes)))
     if len(nodes) == 1:
-        weights[:] = 1
-        return weights
+        return np.zeros(len(at), np.intp), np.zeros(len(at))
     inside = np.clip(at, nodes[0], nodes[-1])
     lower = np.clip(np.searchsorted(nodes, inside, side="right") - 1, 0, len(nodes) - 2)
-    part = (inside - nodes[lower]) / (nodes[lower + 1] - nodes[lower])
-    lines = np.arange(len(at))
+    return lower, (inside - nodes[lower]) / (nodes[lower + 1] - nodes[lower])
+
+
+def hat_weights(nodes: Array, places: Any) -> Array:
+    """Return the shares of nodes at places, linear between them and constant outside."""
+    lower, part = places_before(nodes, places)
+    weights = np.zeros((len(lower), len(nodes)))
+    lines = np.arange(len(lower))
     weights[lines, lower] = 1 - part
-    weights[lines, lower + 1] = part
+    weights[lines, np.minimum(lower + 1, len(nodes) - 1)] += part
     return weights
 
 

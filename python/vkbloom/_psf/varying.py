@@ -6,6 +6,7 @@ import dataclasses
 import inspect
 import itertools
 import math
+import weakref
 from collections.abc import Callable, Mapping
 from typing import Any, ClassVar, Final, cast
 
@@ -48,9 +49,38 @@ def _read_kernels(kernels: Any) -> ArrayValue:
     return held
 
 
+class _Functions:
+    """The functions of this process by names, which stand for them in text."""
+
+    def __init__(self) -> None:
+        self._functions: weakref.WeakValueDictionary[str, Function] = weakref.WeakValueDictionary()
+
+    def name_of(self, function: Function) -> str:
+        """Return the name of a function, of which another one of the same name has a number."""
+        own = getattr(function, "__qualname__", type(function).__qualname__)
+        name = f"{getattr(function, '__module__', '')}.{own}"
+        names = itertools.chain([name], (f"{name} {number}" for number in itertools.count(2)))
+        return next(one for one in names if self._functions.setdefault(one, function) == function)
+
+    def find(self, name: str) -> Function:
+        if (found := self._functions.get(name)) is None:
+            raise ValueError(
+                f"function: {name!r} was a function of another process; store kernels on a grid "
+                "in its place: sampled(frame, places)"
+            )
+        return found
+
+
+_FUNCTIONS: Final = _Functions()
+
+
 def _read_function(function: Any) -> Function:
+    if isinstance(function, str):
+        return _FUNCTIONS.find(function)
     if isinstance(function, Mapping) or not callable(function):
         raise TypeError(f"function: {function!r} is not a function of u and v")
+    # Settings are found by their values.
+    hash(function)
     return cast("Function", function)
 
 
@@ -168,12 +198,16 @@ class Varying(PSF):
             object.__setattr__(self, "positions", _read_positions(self.positions, *grid))
 
     def to_dict(self) -> dict[str, Any]:
-        if self.function is not None:
-            raise TypeError(
-                f"function: {self.function!r} cannot be stored; store its kernels on a grid: "
-                "sampled(frame, places)"
-            )
-        return super().to_dict()
+        """Return the name of the class, and the fields by name.
+
+        Returns
+        -------
+        dict
+            Values that JSON can represent. A function is its name, by which only this process knows
+            it; `sampled` makes what others can read.
+        """
+        named = {} if self.function is None else {"function": _FUNCTIONS.name_of(self.function)}
+        return super().to_dict() | named
 
     @property
     def kernel_size(self) -> Size:

@@ -54,7 +54,8 @@ class Frames(Framebuffers):
         The settings of the request.
     info : mapping of str to object
         "adapter", "driver", "version", and the numbers of "nan" and "inf" values in the input;
-        "driver_sha256", where the driver is that of ``vkbloom-lavapipe``.
+        "driver_sha256", where the driver is that of ``vkbloom-lavapipe``; "psf_kernels" and
+        "psf_error", where a `psf.Varying` is computed by so many kernels with this error.
     """
 
     def __init__(

@@ -96,6 +96,16 @@ class Plan:
         )
 
     @property
+    def notes(self) -> tuple[str, ...]:
+        """What is not exact: of a `psf.Varying` the number of kernels and their error."""
+        facts = self.settings._facts(self.size)
+        if "psf_error" not in facts:
+            return ()
+        return (
+            f"psf: {facts['psf_kernels']:g} kernels, with an error of {facts['psf_error']:.2g}",
+        )
+
+    @property
     def _title(self) -> str:
         width, height = self.size
         kind = f"{self.dtype} image" if self.source == "image" else f"{self.source} scene"
@@ -120,7 +130,8 @@ class Plan:
     def _repr_html_(self) -> str:
         """Return a table of the passes."""
         rows = [[_text(part) for part in step] for step in self.passes]
-        return str(markup.table(rows, Pass._fields, caption=self._title))
+        caption = "; ".join((self._title, *self.notes))
+        return str(markup.table(rows, Pass._fields, caption=caption))
 
 
 def framebuffers_of(plan: _core.Plan) -> dict[str, Framebuffer]:

@@ -978,7 +978,9 @@ class Renderer:
     ) -> Frames:
         exposed = settings if isinstance(settings, ExposedSettings) else None
         plain = exposed.settings if exposed else settings
-        frames = Frames(arrays, timings={}, settings=plain, info=self._made_by)
+        sizes = [arrays[name].shape[1::-1] for name in ("final", "bloom") if name in arrays]
+        facts = plain._facts(sizes[0]) if sizes else {}
+        frames = Frames(arrays, timings={}, settings=plain, info=self._made_by | facts)
         frames._is_exposed, frames._exposed = exposed is not None, exposed
         if state is not None:
             frames._state = state

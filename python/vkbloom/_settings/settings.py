@@ -176,6 +176,10 @@ class Settings(Record):
         is_frame = not self._has_threshold_pass and self.threshold is not None
         return "the frame before its threshold" if is_frame else ""
 
+    def _facts(self, frame: tuple[int, int]) -> dict[str, float]:
+        """Return what `Frames.info` says about the settings for a frame's size."""
+        return {}
+
     @property
     def _is_transform(self) -> bool:
         """Whether light passes a transform, whose error is relative to the largest value."""
