@@ -55,6 +55,7 @@ class Kernel(NamedTuple):
 
     kernel: Any
     size: Any = (1, 1)
+    field: Any = None
 
     def _core_block(self) -> bytes:
         return settings_block("convolution", {})
@@ -64,6 +65,9 @@ class Kernel(NamedTuple):
 
     def core_kernel(self, frame: object, buffers: object) -> Any:
         return self.kernel
+
+    def core_field(self, frame: object, buffers: object) -> Any:
+        return self.field
 
 
 class Dirty(NamedTuple):
@@ -89,6 +93,13 @@ class Passes(NamedTuple):
 
 def kernel(array: Any, serial: int = 1) -> Any:
     return Kernel((array, serial, (0.0, 0.0, 0.0)))
+
+
+def field(*fields: Any, weights: Any = (2, 3, 4), places: Any = (2, 4, 4)) -> Any:
+    """Return a convolution with two kernels of one pixel, with such weights and places."""
+    images = [(np.zeros(shape, np.float32), 1, (1.0, 0.0, 1.0)) for shape in (weights, places)]
+    kernels = np.ones((2, 1, 1), np.float32), 1, (1.0, 0.0, 1.0)
+    return Kernel(kernels, field=(*(fields or (2, False, True, 3, 2)), *images))
 
 
 #: SPIR-V of no instruction but one of a word.
