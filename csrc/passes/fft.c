@@ -56,7 +56,9 @@ static uint32_t least_stages(uint32_t length)
 
 struct vkb_fft_line vkb_fft_line(uint32_t least)
 {
-    struct vkb_fft_line best = {0};
+    // A line that is too long for the stages is too long for images, too, whose sizes are checked
+    // when the graph is complete.
+    struct vkb_fft_line best = {.length = least, .stage_count = 1, .radices = {least, 1, 1, 1}};
     uint64_t best_cost = UINT64_MAX;
 
     // A power of two is among these.
