@@ -68,10 +68,12 @@ def as_fields(settings: Settings) -> dict[str, Any]:
 
 def _functions() -> list[PSF]:
     """Return the functions that can be made without arguments, and the examples of others."""
+    # (A field of kernels needs an array or a function of Python's.)
     made = [
         kind()
         for kind in functions().values()
-        if all(info.default is not dataclasses.MISSING for info in fields_of(kind).values())
+        if not issubclass(kind, psf.Varying)
+        and all(info.default is not dataclasses.MISSING for info in fields_of(kind).values())
     ]
     return [*made, *_EXAMPLES]
 
