@@ -33,8 +33,8 @@ else:
     from vkbloom._spelling import describe_unknown
 
     _core.connect(_errors, describe_unknown)
-# These supply the registries of methods, stages of glare, exposures, presets and point spreads.
-from vkbloom import _exposure, _glare, _methods, _presets, psf  # noqa: F401
+# These supply the registries of methods, glare, exposures, anti-aliasing, presets, point spreads.
+from vkbloom import _antialiasing, _exposure, _glare, _methods, _presets, psf  # noqa: F401
 from vkbloom._version import installed_version
 
 _attribute, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,5 +1,9 @@
 # The public names of the package; lazy_loader reads them, and imports what is asked for.
 from . import psf, reference, testing
+from ._antialiasing.bevy import BevyAntialiasing
+from ._antialiasing.godot import GodotAntialiasing
+from ._antialiasing.o3de import O3deAntialiasing
+from ._antialiasing.unity import HdrpAntialiasing
 from ._capture import capture
 from ._core import (
     AdapterNotFoundError,
@@ -52,6 +56,7 @@ from ._renderer.plans import Plan
 from ._renderer.renderer import Renderer
 from ._scene import Camera, Scene
 from ._sequence import Sequence, sequence
+from ._settings.antialiasing import Antialiasing, antialiasing
 from ._settings.exposure import Exposure, exposures
 from ._settings.glare import Glare, glares
 from ._settings.settings import Settings, presets
@@ -59,7 +64,9 @@ from ._settings.settings import Settings, presets
 __all__ = [
     "AdapterInfo",
     "AdapterNotFoundError",
+    "Antialiasing",
     "BabylonBloom",
+    "BevyAntialiasing",
     "BevyBloom",
     "BevyExposure",
     "BlenderGlare",
@@ -78,17 +85,20 @@ __all__ = [
     "Frames",
     "Ghosts",
     "Glare",
+    "GodotAntialiasing",
     "GodotBloom",
     "GodotExposure",
     "GraniteExposure",
     "GridReport",
     "Halation",
     "Halo",
+    "HdrpAntialiasing",
     "HdrpBloom",
     "HdrpExposure",
     "Image",
     "KeyframedExposure",
     "KinoBloom",
+    "O3deAntialiasing",
     "O3deExposure",
     "OutOfMemoryError",
     "Plan",
@@ -110,6 +120,7 @@ __all__ = [
     "UrpBloom",
     "ValidationError",
     "adapters",
+    "antialiasing",
     "apply",
     "capture",
     "check_grid",

@@ -1,4 +1,4 @@
-"""Check the images, masks and emissions that callers give.
+"""Check the images, masks, emissions, motions and depths that callers give.
 
 Each function returns the array to use, or raises an error that names the argument, says what is
 wrong, and how to convert it.
@@ -9,10 +9,10 @@ from __future__ import annotations
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import DTypeLike, NDArray
 
 from vkbloom._arrays import native_order, pil_mode, saturate, view_image
-from vkbloom._formats import IMAGE_DTYPES
+from vkbloom._formats import IMAGE_DTYPES, MAX_FLOAT
 
 # Fast path for native byte order.
 _DTYPES: Final = frozenset(map(np.dtype, IMAGE_DTYPES))
@@ -112,3 +112,33 @@ def check_mask(mask: object, size: tuple[int, int], dtype: Any = np.float32) -> 
         wrong = float(array[~((array >= 0) & (array <= 1))][0])
         raise ValueError(f"mask: {wrong} is out of range, 0 to 1; clip it: mask.clip(0, 1)")
     return values
+
+
+def check_motion(motion: object, size: tuple[int, int], dtype: Any = np.float32) -> NDArray[Any]:
+    """Return the motion as floats, (H, W, 2), if it has that height and width and is finite."""
+    values = _check_geometry("motion", motion, (*size, 2), dtype)
+    # Not the other way round, so that NaN fails too.
+    if not (values.min() >= -MAX_FLOAT and values.max() <= MAX_FLOAT):
+        raise ValueError("motion: some values are not finite; set them to 0")
+    return values
+
+
+def check_depth(depth: object, size: tuple[int, int], dtype: Any = np.float32) -> NDArray[Any]:
+    """Return the depth as floats, (H, W), if it has that height and width and has no NaN."""
+    values = _check_geometry("depth", depth, size, dtype)
+    if np.isnan(values.min()):
+        raise ValueError("depth: some values are NaN; set them to that of the farthest surface")
+    return values
+
+
+def _check_geometry(
+    name: str, given: object, shape: tuple[int, ...], dtype: DTypeLike
+) -> NDArray[Any]:
+    array = view_image(given, name, ("y", "x", "channel")[: len(shape)])
+    if array.dtype.name not in ("float16", "float32", "float64"):
+        raise TypeError(f"{name}: dtype {array.dtype} is not one of float16, float32, float64")
+    if array.shape != shape:
+        hint = "; take one channel: depth[..., 0]" * (array.shape == (*shape, 1))
+        raise ValueError(f"{name}: shape {array.shape} is not {shape}, as the image needs{hint}")
+    with np.errstate(over="ignore"):
+        return array.astype(dtype, copy=False)

@@ -61,6 +61,7 @@ class HdrpExposure(Exposure):
 
     engine: ClassVar[str] = "hdrp"
     _exposes_bloom: ClassVar[bool] = True
+    _is_before_taa: ClassVar[bool] = True
 
     mode: Mode = "histogram"
     metering: Metering = value_field("center_weighted", kind="choice")

@@ -32,10 +32,11 @@ class Exposure(Record):
     #: Whether a frame depends on those before.
     _adapts: ClassVar[bool] = True
     #: Whether the light that the bloom reads is exposed; whether the picture with its bloom is;
-    #: whether that is what is metered.
+    #: whether that is what is metered; whether the stage comes before temporal anti-aliasing.
     _exposes_bloom: ClassVar[bool] = False
     _exposes_picture: ClassVar[bool] = False
     _meters_bloom: ClassVar[bool] = False
+    _is_before_taa: ClassVar[bool] = False
 
     @property
     def _core_engine(self) -> str:

@@ -1,4 +1,4 @@
-"""The registries of methods, of stages of glare and of exposures: their classes by name.
+"""The registries of methods, stages of glare, exposures and anti-aliasing: their classes by name.
 
 All parts of the package read a registry at the time of use, so that a class that is registered
 later has options, controls, axes, fits and JSON like the others.
@@ -91,6 +91,10 @@ STAGES: Final = Registry("glare")
 EXPOSURES: Final = Registry("exposure")
 #: What `vkbloom.exposures` is, which `vkbloom._exposure` supplies.
 NAMED_EXPOSURES: Final[Named[Any]] = Named("exposure", lambda entry: entry.make())
+#: The classes of temporal anti-aliasing, which `vkbloom._antialiasing` supplies.
+ANTIALIASINGS: Final = Registry("antialiasing")
+#: What `vkbloom.antialiasing` is, which `vkbloom._antialiasing` supplies.
+NAMED_ANTIALIASINGS: Final[Named[Any]] = Named("antialiasing", lambda entry: entry.make())
 #: What `vkbloom.presets` and `vkbloom.glares` are, which `vkbloom._presets` supplies.
 NAMED_SETTINGS: Final[Presets[Any]] = Presets()
 NAMED_STAGES: Final[Named[Any]] = Named("glare", lambda glare: glare.stages)

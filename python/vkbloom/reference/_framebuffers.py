@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
@@ -12,11 +12,13 @@ from vkbloom._argument_types import check_arguments
 from vkbloom._arrays import native_order, view_image
 from vkbloom._image_arguments import check_emission, check_mask
 from vkbloom._public import public
+from vkbloom._settings.antialiasing import Antialiasing, check_antialiasing
 from vkbloom._settings.exposure import Exposure, check_exposure
 from vkbloom._settings.settings import Settings, resolve_settings
 
 from . import _custom as custom
 from . import _glare as glare
+from ._antialiasing import Resolving
 from ._compositing import composite_without_store, strength_of
 from ._exposure import Exposing
 from ._image import BlurInput, as_float, finite, format_of, storage
@@ -34,7 +36,10 @@ def apply(
     mask: NDArray[Any] | None = None,
     emission: NDArray[Any] | None = None,
     exposure: Exposure | str | None = None,
+    taa: Antialiasing | str | None = None,
     dt: float | None = None,
+    motion: NDArray[Any] | None = None,
+    depth: NDArray[Any] | None = None,
     state: Mapping[str, Any] | None = None,
 ) -> dict[str, Array]:
     """Return what `vkbloom.Renderer.apply` returns, computed in float64.
@@ -67,8 +72,17 @@ def apply(
         Of the image's shape and dtype.
     exposure : Exposure or str, optional
         An exposure, or the name of one of `vkbloom.exposures`: the formulas of `expose`.
-    dt, state
-        As for `expose`; a `dt` of None is 1/60 s.
+    taa : Antialiasing or str, optional
+        Temporal anti-aliasing, or the name of one of `vkbloom.antialiasing`.
+    dt
+        As for `expose`; None is 1/60 s.
+    motion : ndarray, shape (H, W, 2), optional
+        As for `vkbloom.Renderer.apply`; None: 0.
+    depth : ndarray, shape (H, W), optional
+        As for `vkbloom.Renderer.apply`; None: each pixel has its own motion.
+    state : mapping of str to ndarray, optional
+        The result of the frame before. Only its "exposure", "history" and "history_motion" are
+        read. None: the first frame.
 
     Returns
     -------
@@ -97,38 +111,71 @@ def apply(
         stages = _with_alphas(glare.stages(seen, settings.glare, format))
         return custom.framebuffers(function, scene, settings, np.dtype(dtype), stages)
 
-    if exposure is None:
-        return bloom(scene, source, settings, dtype)
-    stage = Exposing(check_exposure(exposure), dt, state)
-    return _expose(stage, bloom, (scene, source), settings, dtype)
+    stages = _Stages(
+        None if exposure is None else Exposing(check_exposure(exposure), dt, state),
+        None if taa is None else Resolving(check_antialiasing(taa), motion, depth, state),
+        {},
+    )
+    return stages.run(bloom, (scene, source), settings, dtype)
 
 
-def _expose(
-    stage: Exposing,
-    bloom: Callable[[Array, Array, Settings, DTypeLike], dict[str, Array]],
-    images: tuple[Array, Array],
-    settings: Settings,
-    dtype: DTypeLike,
-) -> dict[str, Array]:
-    """Return the framebuffers of a bloom with an exposure before or after it."""
-    exposure, first = stage.exposure, {}
-    scene, source = images
-    if not exposure._meters_bloom:
-        first = stage.adapt(scene)
-    if exposure._exposes_bloom:
-        is_own = source is scene
-        scene = first["exposed"] = stage.multiply(scene, stage.adapted.before)
-        source = scene if is_own else stage.multiply(source, stage.adapted.before)
-    if not exposure._exposes_picture:
-        return first | bloom(scene, source, settings, dtype)
-    plain = settings.replace(exposure=0.0, tonemap="none", encoding="none", dither=False)
-    results = first | bloom(scene, source, plain, np.float64)
-    combined = results.pop("final")
-    if exposure._meters_bloom:
-        results |= stage.adapt(combined)
-    picture = stage.multiply(combined, stage.adapted.after)
-    results["final"] = composite_without_store(picture, None, settings, dtype)
-    return results
+class _Stages(NamedTuple):
+    """The stages in time around a bloom, and the framebuffers before it."""
+
+    exposing: Exposing | None
+    resolving: Resolving | None
+    first: dict[str, Array]
+
+    def run(
+        self,
+        bloom: Callable[[Array, Array, Settings, DTypeLike], dict[str, Array]],
+        images: tuple[Array, Array],
+        settings: Settings,
+        dtype: DTypeLike,
+    ) -> dict[str, Array]:
+        """Return the framebuffers of the bloom and of the stages."""
+        exposing, resolving = self.exposing, self.resolving
+        is_first = exposing is not None and exposing.exposure._is_before_taa
+        images = self._expose(images) if is_first else images
+        images = self._resolve(images)
+        images = images if is_first else self._expose(images)
+        resolves = resolving is not None and resolving.antialiasing.order == "after"
+        exposes = exposing is not None and exposing.exposure._exposes_picture
+        if not resolves and not exposes:
+            return self.first | bloom(*images, settings, dtype)
+        plain = settings.replace(exposure=0.0, tonemap="none", encoding="none", dither=False)
+        results = self.first | bloom(*images, plain, np.float64)
+        picture = results.pop("final")
+        if resolving is not None and resolves:
+            picture, kept = resolving.resolve(picture)
+            results |= kept | {"resolved": picture}
+        if exposing is not None and exposes:
+            if exposing.exposure._meters_bloom:
+                results |= exposing.adapt(picture)
+            picture = exposing.multiply(picture, exposing.adapted.after)
+        results["final"] = composite_without_store(picture, None, settings, dtype)
+        return results
+
+    def _resolve(self, images: tuple[Array, Array]) -> tuple[Array, Array]:
+        """Return the scene resolved; an emission stays as it is."""
+        scene, source = images
+        if self.resolving is None or self.resolving.antialiasing.order == "after":
+            return images
+        resolved, kept = self.resolving.resolve(scene)
+        self.first.update(kept | {"resolved": resolved})
+        return resolved, resolved if source is scene else source
+
+    def _expose(self, images: tuple[Array, Array]) -> tuple[Array, Array]:
+        """Return scene and source of the bloom, exposed if the engine does so before the bloom."""
+        scene, source = images
+        if self.exposing is None or self.exposing.exposure._meters_bloom:
+            return images
+        self.first.update(self.exposing.adapt(scene))
+        if not self.exposing.exposure._exposes_bloom:
+            return images
+        before = self.exposing.adapted.before
+        exposed = self.first["exposed"] = self.exposing.multiply(scene, before)
+        return exposed, exposed if source is scene else self.exposing.multiply(source, before)
 
 
 def check_scene(
