@@ -256,6 +256,28 @@
     INPUT(B, int, channel) \
     VEC4S(B, table, EXPOSURE_TABLE / 4)
 
+// The numbers of temporal anti-aliasing that Python packs in this order, each of which some engines
+// have. TAA_BLOCK has the weights of 3 x 3 pixels by rows beside these, for `phases` frames: twelve
+// numbers each.
+#define TAA_NUMBER_ROWS(B, INPUT) \
+    INPUT(B, float, weight) \
+    INPUT(B, float, min_weight) \
+    INPUT(B, float, still) \
+    INPUT(B, float, frames) \
+    INPUT(B, float, moving_box) \
+    INPUT(B, float, disocclusion) \
+    INPUT(B, float, gamma) \
+    INPUT(B, float, damping) \
+    INPUT(B, float, sharpening) \
+    INPUT(B, float, sharpness) \
+    INPUT(B, float, flicker) \
+    INPUT(B, float, contrast) \
+    INPUT(B, float, phases)
+
+#define TAA_BLOCK(B, READS, INPUT, VEC4S) \
+    TAA_NUMBER_ROWS(B, INPUT) \
+    VEC4S(B, weights, 3 * TAA_PHASES)
+
 // The transpose of a filter (adjoint_filter.frag): where the tables of both axes start, in texels;
 // the factor of the colours of what is added, and how much less it is for each unit of a mask. For
 // tiles: where the tables of each picture start; in a simple ratio the weights of texels that are
@@ -374,7 +396,8 @@
     BLOCK(weigh, WEIGH_BLOCK) \
     BLOCK(composite, COMPOSITE_BLOCK) \
     BLOCK(adjoint_filter, ADJOINT_FILTER_BLOCK) \
-    BLOCK(exposure, EXPOSURE_BLOCK)
+    BLOCK(exposure, EXPOSURE_BLOCK) \
+    BLOCK(taa, TAA_BLOCK)
 
 // Settings that no shader reads, because they shape the graph. Integers: COUNT(name, default, min,
 // max); a flag is one of 0 and 1.
@@ -494,20 +517,32 @@
 // The engines of exposures: EXPOSURE(name, value, name in Python, bins, apart, exposes). A histogram
 // has `bins`, of samples that are `apart` pixels apart along both axes; 0: there is none. `exposes`
 // are EXPOSES_*: the light that the bloom reads, the picture with its bloom, which METERS_BLOOM
-// meters, too. 0: there is no exposure.
+// meters, too; EXPOSES_FIRST: before temporal anti-aliasing. 0: there is no exposure.
 #define EXPOSES_BLOOM   1
 #define EXPOSES_PICTURE 2
 #define METERS_BLOOM    4
+#define EXPOSES_FIRST   8
 #define EXPOSURES(EXPOSURE) \
     EXPOSURE(EXPOSURE_FIXED, 1, fixed, 0, 0, EXPOSES_BLOOM) \
     EXPOSURE(EXPOSURE_KEYFRAMED, 2, keyframed, 0, 0, EXPOSES_BLOOM) \
     EXPOSURE(EXPOSURE_BEVY, 3, bevy, 64, 1, EXPOSES_PICTURE) \
-    EXPOSURE(EXPOSURE_HDRP, 4, hdrp, 128, 2, EXPOSES_BLOOM) \
-    EXPOSURE(EXPOSURE_AUTOMATIC, 5, hdrp_automatic, 0, 0, EXPOSES_BLOOM) \
+    EXPOSURE(EXPOSURE_HDRP, 4, hdrp, 128, 2, EXPOSES_BLOOM | EXPOSES_FIRST) \
+    EXPOSURE(EXPOSURE_AUTOMATIC, 5, hdrp_automatic, 0, 0, EXPOSES_BLOOM | EXPOSES_FIRST) \
     EXPOSURE(EXPOSURE_PPV2, 6, ppv2, 128, 2, EXPOSES_BLOOM) \
     EXPOSURE(EXPOSURE_GODOT, 7, godot, 0, 0, EXPOSES_BLOOM) \
     EXPOSURE(EXPOSURE_O3DE, 8, o3de, 0, 0, EXPOSES_PICTURE | METERS_BLOOM) \
     EXPOSURE(EXPOSURE_GRANITE, 9, granite, 0, 0, EXPOSES_BLOOM | EXPOSES_PICTURE)
+
+// The engines of temporal anti-aliasing: TAA(name, value, name in Python, its shader). Weights of a
+// filter of the frame repeat after TAA_PHASES frames at the most.
+#define TAA_PHASES 16
+#define TAAS(TAA) \
+    TAA(TAA_BEVY, 1, bevy, taa_bevy) \
+    TAA(TAA_GODOT, 2, godot, taa_godot) \
+    TAA(TAA_O3DE, 3, o3de, taa_o3de) \
+    TAA(TAA_HDRP_LOW, 4, hdrp_low, taa_hdrp) \
+    TAA(TAA_HDRP_MEDIUM, 5, hdrp_medium, taa_hdrp) \
+    TAA(TAA_HDRP_HIGH, 6, hdrp_high, taa_hdrp)
 
 // The most iterations of Blender's streaks and of its star, whose distances are fewer by one.
 #define STAR_ITERATIONS 5
@@ -523,6 +558,7 @@
     FILTER_SLOTS(SLOT) \
     GLARE_SLOTS(SLOT) \
     EXPOSURE_SLOTS(SLOT) \
+    TAA_SLOTS(SLOT) \
     TRANSFORM_SLOTS(SLOT) \
     LIGHTING_SLOTS(SLOT)
 
@@ -559,6 +595,15 @@
 #define EXPOSURE_SLOTS(SLOT) \
     SLOT(SLOT_EXPOSURE, 1) /* of this frame, or of the one before */ \
     SLOT(SLOT_METER_MASK, 1)
+
+// Temporal anti-aliasing: what it has kept of this frame, or of the one before; the motion of the
+// frame before; what the caller gives.
+#define TAA_SLOTS(SLOT) \
+    SLOT(SLOT_HISTORY, 1) \
+    SLOT(SLOT_LAST_MOTION, 2) \
+    SLOT(SLOT_MOTION_X, 3) \
+    SLOT(SLOT_MOTION_Y, 4) \
+    SLOT(SLOT_DEPTH, 5)
 
 // Fields of kernels have SLOT_WEIGHTS and SLOT_ADDED of the adjoint passes, too.
 #define TRANSFORM_SLOTS(SLOT) \
@@ -756,9 +801,11 @@
     CONSTANT(64, POINT_AFTER, after)           /* of the combination: POINT_* */ \
     CONSTANT(65, EXPOSED_SCENE, exposed_scene) /* a composite's scene is exposed before it */ \
     CONSTANT(66, JITTERED, jittered)           /* samples of beams are between steps */ \
-    CONSTANT(67, ENGINE, engine)               /* of an exposure: EXPOSURE_* */ \
+    CONSTANT(67, ENGINE, engine) /* of an exposure: EXPOSURE_*; of anti-aliasing: TAA_* */ \
     CONSTANT(68, METER, meter)                 /* what meter.frag makes: METER_* */ \
-    CONSTANT(69, PRODUCTS, products)           /* of spectra, that are added up */
+    CONSTANT(69, PRODUCTS, products)           /* of spectra, that are added up */ \
+    CONSTANT(70, MOVING, moving)               /* there is an image of the motion */ \
+    CONSTANT(71, DEEP, deep)                   /* there is an image of the depth */
 
 // The names that a setting can have. Each list is a setting and a specialization constant.
 #define COMPOSITE_NAMES(NAME) \

@@ -16,7 +16,7 @@ enum {
     // Storage images. With the target, one less than the four that every device supports.
     VKB_MAX_LOADS = 2,
     VKB_MAX_TARGETS = 4,
-    VKB_MAX_HISTORIES = 4,
+    VKB_MAX_HISTORIES = 8,
     // That a method brings along, and that a pass binds.
     VKB_MAX_RESOURCES = 16,
     // Of a pass, beside its parameters.
@@ -31,17 +31,28 @@ typedef char vkb_image_name[VKB_NAME_SIZE];
 // named by users, who cannot write it.
 #define VKB_INTERNAL_NAME '.'
 
-// Which of its data the host writes to an image: the image of a source, its emission, its mask, an
-// image that another part of the graph has made, or what a call before has made.
+// Which of its data the host writes to an image: the image of a source, its emission, its mask, its
+// motion along both axes, its depth, an image that another part of the graph has made, or what a
+// call before has made.
 enum vkb_input_kind {
     VKB_INPUT_NONE,
     VKB_INPUT_IMAGE,
     VKB_INPUT_EMISSION,
     VKB_INPUT_MASK,
+    VKB_INPUT_MOTION_X,
+    VKB_INPUT_MOTION_Y,
+    VKB_INPUT_DEPTH,
     VKB_INPUT_LEVEL,
     VKB_INPUT_HISTORY = VKB_INPUT_LEVEL + GATHERED_LEVELS,
     VKB_INPUT_COUNT = VKB_INPUT_HISTORY + VKB_MAX_HISTORIES,
 };
+
+// Whether it has one channel of single floats, whatever the image has; it is no light, so that its
+// NaN and infinity are not counted.
+static inline bool vkb_is_grey(enum vkb_input_kind kind)
+{
+    return kind >= VKB_INPUT_MASK && kind < VKB_INPUT_LEVEL;
+}
 
 // FNV-1a by words of 64 bits.
 #define VKB_HASH_START UINT64_C(0xcbf29ce484222325)

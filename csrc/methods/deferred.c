@@ -84,7 +84,7 @@ static uint32_t add_bloom(struct vkb_levels *levels, struct vkb_size size, uint3
     const enum vkb_format extracted = vkb_first_format(settings, source.format);
     const bool as_it_is = source.buffers.width == size.width && source.buffers.height == size.height
                        && extracted == HDR && vkb_threshold_mode(settings) == THRESHOLD_NONE
-                       && !vkb_begin_exposure(settings).before;
+                       && !vkb_begin_time_stages(settings).exposes_bloom;
 
     if (!as_it_is) {
         source.glow = vkb_levels_target(levels, "extracted", extracted, source.buffers, false);
@@ -117,7 +117,7 @@ void vkb_build_deferred(struct vkb_levels *levels, const struct vkb_scene_source
         .mask = VKB_NO_IMAGE,
         .lit = vkb_has_glare(settings),
     };
-    struct vkb_exposed exposed = vkb_begin_exposure(settings);
+    struct vkb_time_stages stages = vkb_begin_time_stages(settings);
     const bool scene_first = vkb_method_of(settings)->custom || settings->exposure_engine;
     uint32_t glow = VKB_NO_IMAGE;
 
@@ -130,11 +130,11 @@ void vkb_build_deferred(struct vkb_levels *levels, const struct vkb_scene_source
     if (scene_first)
         composite.scene = add_lighting(levels, &gbuffer, source->size);
     uint32_t brightness = gbuffer.colours[BRIGHTNESS];
-    vkb_expose_inputs(levels, &exposed, &composite.scene, &brightness);
+    vkb_add_time_stages_before(levels, &stages, &composite.scene, &brightness);
     if (settings->values.bloom)
         composite.bloom = add_bloom(levels, source->size, composite.scene, brightness);
     if (!scene_first)
         composite.scene = add_lighting(levels, &gbuffer, source->size);
-    vkb_expose_picture(levels, &exposed, &composite);
+    vkb_add_time_stages_after(levels, &stages, &composite);
     vkb_add_composite_pass(levels, &composite, VKB_FORMAT_RGBA8_UNORM);
 }

@@ -9,15 +9,16 @@ static uint32_t add_input(struct vkb_levels *levels, const struct vkb_image_sour
                           enum vkb_input_kind kind)
 {
     static const char *const names[VKB_INPUT_COUNT] = {
-        [VKB_INPUT_IMAGE] = "image",
-        [VKB_INPUT_EMISSION] = "emission",
-        [VKB_INPUT_MASK] = "mask",
+        [VKB_INPUT_IMAGE] = "image",       [VKB_INPUT_EMISSION] = "emission",
+        [VKB_INPUT_MASK] = "mask",         [VKB_INPUT_MOTION_X] = "motion_x",
+        [VKB_INPUT_MOTION_Y] = "motion_y", [VKB_INPUT_DEPTH] = "depth",
     };
+    const bool grey = vkb_is_grey(kind);
     struct vkb_image_row row = {
-        .format = kind == VKB_INPUT_MASK ? VKB_FORMAT_R32_FLOAT : image->format,
+        .format = grey ? VKB_FORMAT_R32_FLOAT : image->format,
         .width = image->size.width,
         .height = image->size.height,
-        .channels = kind == VKB_INPUT_MASK ? 1 : image->channels,
+        .channels = grey ? 1 : image->channels,
         .input = kind,
     };
 
@@ -68,46 +69,17 @@ static uint32_t add_bloom(struct vkb_levels *levels, const struct vkb_image_sour
     return bloom;
 }
 
-struct vkb_exposed vkb_begin_exposure(const struct vkb_settings *settings)
+static void add_geometry(struct vkb_levels *levels, const struct vkb_image_source *image,
+                         struct vkb_taa_inputs *inputs)
 {
-    return (struct vkb_exposed){
-        .image = VKB_NO_IMAGE,
-        .before = vkb_exposure_has(settings, EXPOSES_BLOOM),
-        .after = vkb_exposure_has(settings, EXPOSES_PICTURE),
-        .meters_bloom = vkb_exposure_has(settings, METERS_BLOOM),
-    };
-}
-
-void vkb_expose_inputs(struct vkb_levels *levels, struct vkb_exposed *exposure, uint32_t *scene,
-                       uint32_t *glow)
-{
-    const bool one = *scene == *glow;
-
-    if (levels->settings->exposure_engine && !exposure->meters_bloom)
-        exposure->image = vkb_add_exposure(levels, *scene);
-    if (!exposure->before)
+    if (!levels->settings->taa_engine)
         return;
-    *scene = vkb_add_exposed(levels, "exposed", true, *scene, exposure->image, false);
-    *glow = one ? *scene
-                : vkb_add_exposed(levels, "exposed_emission", false, *glow, exposure->image, false);
-}
-
-void vkb_expose_picture(struct vkb_levels *levels, struct vkb_exposed *exposure,
-                        struct vkb_composite_source *source)
-{
-    const bool has_bloom = source->bloom != VKB_NO_IMAGE || levels->picture;
-
-    if (!exposure->after)
-        return;
-    const uint32_t picture = has_bloom ? vkb_add_combining_pass(levels, source) : source->scene;
-    if (exposure->meters_bloom)
-        exposure->image = vkb_add_exposure(levels, picture);
-    *source = (struct vkb_composite_source){
-        .scene = vkb_add_exposed(levels, "exposed_picture", false, picture, exposure->image, true),
-        .bloom = VKB_NO_IMAGE,
-        .mask = VKB_NO_IMAGE,
-    };
-    levels->picture = 0;
+    if (image->has_motion) {
+        inputs->motion_x = add_input(levels, image, VKB_INPUT_MOTION_X);
+        inputs->motion_y = add_input(levels, image, VKB_INPUT_MOTION_Y);
+    }
+    if (image->has_depth)
+        inputs->depth = add_input(levels, image, VKB_INPUT_DEPTH);
 }
 
 void vkb_build_image(struct vkb_levels *levels, const struct vkb_image_source *image)
@@ -120,7 +92,7 @@ void vkb_build_image(struct vkb_levels *levels, const struct vkb_image_source *i
         .lit = vkb_has_glare(settings),
         .alpha = (enum vkb_alpha)settings->choices[VKB_CHOICE_alpha],
     };
-    struct vkb_exposed exposure = vkb_begin_exposure(settings);
+    struct vkb_time_stages stages = vkb_begin_time_stages(settings);
 
     levels->failed = !check_alpha(settings, image, levels->error);
     uint32_t glow = source.scene = add_input(levels, image, VKB_INPUT_IMAGE);
@@ -128,9 +100,10 @@ void vkb_build_image(struct vkb_levels *levels, const struct vkb_image_source *i
         glow = add_input(levels, image, VKB_INPUT_EMISSION);
     if (image->has_mask)
         source.mask = add_input(levels, image, VKB_INPUT_MASK);
-    vkb_expose_inputs(levels, &exposure, &source.scene, &glow);
+    add_geometry(levels, image, &stages.taa);
+    vkb_add_time_stages_before(levels, &stages, &source.scene, &glow);
     if (settings->values.bloom)
         source.bloom = add_bloom(levels, image, source.scene, glow, source.mask);
-    vkb_expose_picture(levels, &exposure, &source);
+    vkb_add_time_stages_after(levels, &stages, &source);
     vkb_add_composite_pass(levels, &source, image->format);
 }

@@ -13,6 +13,7 @@ struct vkb_image_source {
     uint32_t channels;  // 3 or 4
     uint32_t layers;    // of a batch; 0: it is one image
     bool has_emission, has_mask;
+    bool has_motion, has_depth;  // for temporal anti-aliasing
     // Images that another part of the graph has made.
     struct vkb_level {
         enum vkb_format format;
@@ -71,19 +72,32 @@ uint32_t vkb_add_exposed(struct vkb_levels *levels, const char *name, bool frame
 // Whether the settings have an exposure with one of EXPOSES_* or METERS_BLOOM.
 bool vkb_exposure_has(const struct vkb_settings *settings, uint32_t what);
 
-// The frame with an exposure: what the bloom reads is exposed before, the picture with its bloom
-// after it.
-struct vkb_exposed {
-    uint32_t image;  // with the multipliers; VKB_NO_IMAGE: there is none, or none yet
-    bool before, after, meters_bloom;
+// The images of the motion along x and y, and of the depth; VKB_NO_IMAGE: none is given.
+struct vkb_taa_inputs {
+    uint32_t motion_x, motion_y, depth;
 };
-struct vkb_exposed vkb_begin_exposure(const struct vkb_settings *settings);
-// Meters the scene, and replaces the scene and what glows by images that are exposed.
-void vkb_expose_inputs(struct vkb_levels *levels, struct vkb_exposed *exposure, uint32_t *scene,
-                       uint32_t *glow);
-// Combines scene and bloom, and exposes the picture, which is then the scene without a bloom.
-void vkb_expose_picture(struct vkb_levels *levels, struct vkb_exposed *exposure,
-                        struct vkb_composite_source *source);
+// Adds the temporal anti-aliasing of the settings: "history", what is kept for the next frame, and
+// "resolved", the light of this, which it returns.
+uint32_t vkb_add_taa(struct vkb_levels *levels, const struct vkb_taa_inputs *inputs,
+                     uint32_t image);
+
+// The stages in time around a bloom: an exposure, of what the bloom reads or of the picture with
+// its bloom, and temporal anti-aliasing of one of these.
+struct vkb_time_stages {
+    uint32_t exposure;  // with the multipliers; VKB_NO_IMAGE: there is none, or none yet
+    bool exposes_bloom, exposes_picture, exposes_first, meters_bloom;
+    bool resolves_scene, resolves_picture;
+    struct vkb_taa_inputs taa;
+};
+struct vkb_time_stages vkb_begin_time_stages(const struct vkb_settings *settings);
+// Meters and resolves the scene, and replaces the scene and what glows by images that are resolved
+// and exposed. Only what is the scene itself is resolved.
+void vkb_add_time_stages_before(struct vkb_levels *levels, struct vkb_time_stages *stages,
+                                uint32_t *scene, uint32_t *glow);
+// Combines scene and bloom, resolves and exposes the picture, which is then the scene without a
+// bloom.
+void vkb_add_time_stages_after(struct vkb_levels *levels, struct vkb_time_stages *stages,
+                               struct vkb_composite_source *source);
 
 // Each method adds its rows, and returns the last image.
 #define VKB_METHOD_FUNCTION(constant, name, ...) \

@@ -67,6 +67,7 @@ static bool same_image(const struct vkb_image_source *one, const struct vkb_imag
     bool same = one->format == other->format && one->channels == other->channels
              && one->layers == other->layers && same_size(one->size, other->size)
              && one->has_emission == other->has_emission && one->has_mask == other->has_mask
+             && one->has_motion == other->has_motion && one->has_depth == other->has_depth
              && one->level_count == other->level_count;
 
     for (uint32_t i = 0; same && i < one->level_count; ++i)

@@ -139,9 +139,12 @@ struct vkb_custom_pass {
 #define VKB_ADD_NUMBER(B, type, name) +1
 enum { VKB_EXPOSURE_NUMBERS = 0 EXPOSURE_NUMBER_ROWS(, VKB_ADD_NUMBER) };
 
-#define VKB_EXPOSURE_ENUM(constant, value, ...) constant = value,
-enum vkb_exposure_engine { EXPOSURES(VKB_EXPOSURE_ENUM) VKB_EXPOSURE_END };
-#undef VKB_EXPOSURE_ENUM
+enum { VKB_TAA_NUMBERS = 0 TAA_NUMBER_ROWS(, VKB_ADD_NUMBER) };
+
+#define VKB_ENGINE_ENUM(constant, value, ...) constant = value,
+enum vkb_exposure_engine { EXPOSURES(VKB_ENGINE_ENUM) VKB_EXPOSURE_END };
+enum vkb_taa_engine { TAAS(VKB_ENGINE_ENUM) VKB_TAA_END };
+#undef VKB_ENGINE_ENUM
 
 struct vkb_settings {
     enum vkb_method method;
@@ -170,6 +173,10 @@ struct vkb_settings {
     float exposure_numbers[VKB_EXPOSURE_NUMBERS];  // in the order of EXPOSURE_NUMBER_ROWS
     float exposure_table[EXPOSURE_TABLE];
     uint32_t exposure_key_count;
+    uint32_t taa_engine;                   // of TAA_*; 0: there is no temporal anti-aliasing
+    uint32_t taa_after;                    // 1: the picture is resolved with its bloom
+    float taa_numbers[VKB_TAA_NUMBERS];    // in the order of TAA_NUMBER_ROWS
+    float taa_weights[3 * TAA_PHASES][4];  // of 3 x 3 pixels for each phase
     // Python packs what is before here.
     struct vkb_kernel_data kernel;  // of a field: the size is that of one
     struct vkb_field field;

@@ -44,6 +44,10 @@ static const struct member settings_members[] = {
     MEMBER(vkb_settings, exposure_numbers, "f4"),
     MEMBER(vkb_settings, exposure_table, "f4"),
     MEMBER(vkb_settings, exposure_key_count, "u4"),
+    MEMBER(vkb_settings, taa_engine, "u4"),
+    MEMBER(vkb_settings, taa_after, "u4"),
+    MEMBER(vkb_settings, taa_numbers, "f4"),
+    MEMBER(vkb_settings, taa_weights, "f4"),
     {"", "", 0, BLOCK_SIZE},
 };
 
@@ -184,6 +188,20 @@ static bool check_exposure(const struct vkb_settings *settings)
         && check_count("exposure_key_count", settings->exposure_key_count, 0, EXPOSURE_TABLE / 2);
 }
 
+static bool check_taa(const struct vkb_settings *settings)
+{
+    // The last of the numbers.
+    const float phases = settings->taa_numbers[VKB_TAA_NUMBERS - 1];
+
+    return check_count("taa_engine", settings->taa_engine, 0, VKB_TAA_END - 1)
+        && check_count("taa_after", settings->taa_after, 0, 1)
+        && check_finite("taa_numbers", settings->taa_numbers, VKB_TAA_NUMBERS)
+        && check_finite("taa_weights", settings->taa_weights[0],
+                        sizeof settings->taa_weights / sizeof(float))
+        && (!settings->taa_engine || (phases >= 1.0f && phases <= TAA_PHASES)
+            || vkb_refuse("phases: %g is out of range, 1 to %d", phases, TAA_PHASES));
+}
+
 static bool check_settings(const struct vkb_settings *settings)
 {
     return check_choices(settings)
@@ -198,7 +216,7 @@ static bool check_settings(const struct vkb_settings *settings)
         && check_finite("level_weights", settings->level_weights, settings->level_weight_count)
         && check_finite("tint", settings->tint, 3)
         && check_finite("sun_position", settings->sun_position, 2) && check_stages(settings)
-        && check_exposure(settings);
+        && check_exposure(settings) && check_taa(settings);
 }
 
 bool vkb_read_settings(PyObject *object, struct vkb_settings *settings)

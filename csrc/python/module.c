@@ -183,10 +183,12 @@ static PyObject *method_tuple(void)
 static const char *const stages[] = {VKB_STAGES(STAGE_NAME)};
 
 // The first one stands for none.
-#define EXPOSURE_NAME(constant, value, name, ...) [value] = #name,
-static const char *const exposures[] = {[0] = "none", EXPOSURES(EXPOSURE_NAME)};
+#define ENGINE_NAME(constant, value, name, ...) [value] = #name,
+static const char *const exposures[] = {[0] = "none", EXPOSURES(ENGINE_NAME)};
 #define NUMBER_NAME(B, type, name) #name,
 static const char *const exposure_numbers[] = {EXPOSURE_NUMBER_ROWS(, NUMBER_NAME)};
+static const char *const taas[] = {[0] = "none", TAAS(ENGINE_NAME)};
+static const char *const taa_numbers[] = {TAA_NUMBER_ROWS(, NUMBER_NAME)};
 
 static PyObject *format_tuple(void)
 {
@@ -243,6 +245,8 @@ static int execute(PyObject *module)
                              name_tuple(exposures, sizeof exposures / sizeof exposures[0]))
                 && add_steal(module, "EXPOSURE_NUMBERS",
                              name_tuple(exposure_numbers, VKB_EXPOSURE_NUMBERS))
+                && add_steal(module, "TAAS", name_tuple(taas, sizeof taas / sizeof taas[0]))
+                && add_steal(module, "TAA_NUMBERS", name_tuple(taa_numbers, VKB_TAA_NUMBERS))
                 && add_steal(module, "FORMATS", format_tuple())
                 && add_steal(module, "SETTINGS_BLOCK", vkb_settings_block_table())
                 && add_steal(module, "STAGE_BLOCK", vkb_stage_block_table())
@@ -250,6 +254,7 @@ static int execute(PyObject *module)
                 && PyModule_AddIntMacro(module, MAX_LAYERS) == 0
                 && PyModule_AddIntMacro(module, MAX_STAGES) == 0
                 && PyModule_AddIntMacro(module, MAX_GHOSTS) == 0
+                && PyModule_AddIntMacro(module, TAA_PHASES) == 0
              ? 0
              : -1;
 }

@@ -38,6 +38,15 @@ static bool check_part(const struct vkb_held_image *part, const char *name,
                       vkb_formats[other->format].dtype);
 }
 
+// A part of one channel. False with an exception set.
+static bool read_grey(PyObject *part, const char *name, enum vkb_input_kind kind,
+                      struct vkb_held_image *images)
+{
+    return part == Py_None
+        || (vkb_read_mask(part, name, &images[kind])
+            && check_part(&images[kind], name, &images[VKB_INPUT_IMAGE]));
+}
+
 // `emission` and `mask` may be None.
 static bool read_parts(PyObject *image, PyObject *emission, PyObject *mask,
                        struct vkb_held_image *images)
@@ -48,22 +57,32 @@ static bool read_parts(PyObject *image, PyObject *emission, PyObject *mask,
         && (emission == Py_None
             || (vkb_read_image(emission, "emission", &images[VKB_INPUT_EMISSION])
                 && check_part(&images[VKB_INPUT_EMISSION], "emission", first)))
-        && (mask == Py_None
-            || (vkb_read_mask(mask, "mask", &images[VKB_INPUT_MASK])
-                && check_part(&images[VKB_INPUT_MASK], "mask", first)));
+        && read_grey(mask, "mask", VKB_INPUT_MASK, images);
+}
+
+// Motion along x and y, and depth. Motions are both there or not.
+static bool read_geometry(PyObject *const parts[3], struct vkb_held_image *images)
+{
+    if ((parts[0] == Py_None) != (parts[1] == Py_None))
+        return vkb_refuse("motion: it has one axis and not two");
+    return read_grey(parts[0], "motion", VKB_INPUT_MOTION_X, images)
+        && read_grey(parts[1], "motion", VKB_INPUT_MOTION_Y, images)
+        && read_grey(parts[2], "depth", VKB_INPUT_DEPTH, images);
 }
 
 PyObject *vkb_image_source(PyObject *module, PyObject *arguments)
 {
     PyObject *image, *emission = Py_None, *mask = Py_None, *levels = NULL;
+    PyObject *geometry[3] = {Py_None, Py_None, Py_None};
 
-    if (!PyArg_ParseTuple(arguments, "O|OOO!:image_source", &image, &emission, &mask, &PyTuple_Type,
-                          &levels))
+    if (!PyArg_ParseTuple(arguments, "O|OOO!OOO:image_source", &image, &emission, &mask,
+                          &PyTuple_Type, &levels, &geometry[0], &geometry[1], &geometry[2]))
         return NULL;
     struct vkb_source_object *self = vkb_new_object(vkb_module_state(module)->source_type);
     if (!self)
         return NULL;
-    if (!read_parts(image, emission, mask, self->images)) {
+    if (!read_parts(image, emission, mask, self->images)
+        || !read_geometry(geometry, self->images)) {
         Py_DECREF(self);
         return NULL;
     }
@@ -78,6 +97,8 @@ PyObject *vkb_image_source(PyObject *module, PyObject *arguments)
                 .layers = input->layers,
                 .has_emission = emission != Py_None,
                 .has_mask = mask != Py_None,
+                .has_motion = geometry[0] != Py_None,
+                .has_depth = geometry[2] != Py_None,
             },
     };
     if (levels && !read_levels(levels, self)) {

@@ -121,6 +121,7 @@ bool vkb_resident_fill(struct vkb_device *device, struct vkb_resident *resident,
     cached->content.valid = true;
     resident->non_finite = (struct vkb_non_finite){0};
     for (int i = 0; i < VKB_INPUT_COUNT; ++i)
-        vkb_add_non_finite(&resident->non_finite, resident->inputs[i].upload.non_finite);
+        if (!vkb_is_grey((enum vkb_input_kind)i))
+            vkb_add_non_finite(&resident->non_finite, resident->inputs[i].upload.non_finite);
     return true;
 }

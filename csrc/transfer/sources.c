@@ -211,7 +211,8 @@ static bool stage_in_place(struct vkb_run *run, const struct pixels *pixels, boo
         return true;
     run->inputs[pixels->kind].image = &place->cached;
     run->submission->inputs[pixels->kind] = place->cached.image;
-    vkb_add_non_finite(&run->frame->non_finite, place->non_finite);
+    if (!vkb_is_grey(pixels->kind))
+        vkb_add_non_finite(&run->frame->non_finite, place->non_finite);
     return true;
 }
 
@@ -260,7 +261,8 @@ static bool stage_upload(struct vkb_run *run, const struct pixels *pixels, bool 
     staged->image = image;
     staged->upload = upload;
     staged->send = changed;
-    vkb_add_non_finite(&run->frame->non_finite, upload->non_finite);
+    if (!vkb_is_grey(pixels->kind))
+        vkb_add_non_finite(&run->frame->non_finite, upload->non_finite);
     return !staged->send
         || vkb_content_begin_writing(&image->content, &run->frame->cache.clock, NULL, 0, error);
 }

@@ -18,6 +18,9 @@ CHOICES: dict[str, tuple[str, ...]]
 METHODS: tuple[str, ...]
 STAGES: tuple[str, ...]
 EXPOSURES: tuple[str, ...]
+TAAS: tuple[str, ...]
+TAA_NUMBERS: tuple[str, ...]
+TAA_PHASES: int
 EXPOSURE_NUMBERS: tuple[str, ...]
 FORMATS: tuple[str, ...]
 SETTINGS_BLOCK: dict[str, tuple[int, str, int]]
@@ -46,6 +49,9 @@ def image_source(
     emission: _Array | _ExportedImage | None = None,
     mask: NDArray[np.float32] | None = None,
     levels: tuple[_Array | _ExportedImage, ...] = (),
+    motion_x: NDArray[np.float32] | None = None,
+    motion_y: NDArray[np.float32] | None = None,
+    depth: NDArray[np.float32] | None = None,
     /,
 ) -> Source: ...
 def scene_source(block: bytes, pictures: bytes, arrays: tuple[NDArray[Any], ...], /) -> Source: ...

@@ -19,6 +19,7 @@ from vkbloom._renderer.frames import Frames
 from vkbloom._renderer.image import Image
 from vkbloom._renderer.renderer import Renderer
 from vkbloom._renderer.sources import SCENE_SIZE
+from vkbloom._settings.antialiasing import Antialiasing
 from vkbloom._settings.exposure import Exposure, check_exposure
 from vkbloom._settings.settings import Settings, Shading, check_settings
 
@@ -90,7 +91,10 @@ def apply(
     out: Mapping[str, Any] | None = None,
     device: Device | None = None,
     exposure: Exposure | str | float | None = None,
+    taa: Antialiasing | str | None = None,
     dt: float | None = None,
+    motion: NDArray[Any] | None = None,
+    depth: NDArray[Any] | None = None,
     state: Mapping[str, Any] | None = None,
     renderer: Renderer | None = None,
     **fields: Any,
@@ -107,7 +111,7 @@ def apply(
         Settings, or the name of a preset. Default: ``presets["bevy_natural"]``. For a photograph,
         which is a file of integers for SDR, ``presets["photo"]``, for which its highlights are
         expanded to 4. With other settings they are not; ``vkbloom.read(path, expand=4)`` does it.
-    mask, emission, framebuffers, out, device, dt, state
+    mask, emission, framebuffers, out, device, taa, dt, motion, depth, state
         As for `Renderer.apply`.
     exposure : Exposure, str or float, optional
         As for `Renderer.apply`. A number is the field `exposure` of the settings, in stops.
@@ -130,7 +134,8 @@ def apply(
     (16, 16, 4)
     """
     given: dict[str, Any] = {"mask": mask, "emission": emission, "framebuffers": framebuffers}
-    given |= {"out": out, "device": device, "dt": dt, "state": state}
+    given |= {"out": out, "device": device, "taa": taa, "dt": dt, "motion": motion}
+    given |= {"depth": depth, "state": state}
     given["exposure"] = take_exposure(exposure, fields)
     if not isinstance(image, str | os.PathLike):
         chosen = _change(settings, fields, of_image=True)

@@ -378,7 +378,11 @@ def fill(target: Any, name: str, made: DeviceArray, core: _core.Renderer) -> Non
 
 
 def take(
-    image: Any, name: str, core: _core.Renderer, sides: tuple[int, ...] = (3,)
+    image: Any,
+    name: str,
+    core: _core.Renderer,
+    sides: tuple[int, ...] = (3,),
+    channels: tuple[int, ...] = (3, 4),
 ) -> ImportedArray:
     """Copy an array of CUDA to memory that Vulkan shares, ordered after its producer's work."""
     _require_no_capture()
@@ -390,9 +394,10 @@ def take(
         raise TypeError(f"{on_another_device(image, name)} ({error})") from None
     array = _from_dlpack(image, name, core)
     shape = array.shape
-    if len(shape) not in sides or 0 in shape or (len(shape) > 2 and shape[-1] not in (3, 4)):
+    if len(shape) not in sides or 0 in shape or (len(shape) > 2 and shape[-1] not in channels):
+        wanted = " or ".join(f"(H, W, {count})" for count in channels) if 3 in sides else "(H, W)"
         raise ValueError(
-            f"{name}: shape {shape} is not (H, W, 3) or (H, W, 4) with sides of at least 1"
+            f"{name}: shape {shape} is not {wanted} with sides of at least 1"
             + (f"; for a batch, call map({name})" if len(shape) == 4 else "")
             + (
                 f"; move the channels last: {name}.permute(1, 2, 0)"

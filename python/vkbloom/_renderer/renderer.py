@@ -37,7 +37,9 @@ from vkbloom._renderer.frames import Frames
 from vkbloom._renderer.image import Image
 from vkbloom._renderer.new_arrays import new_arrays, new_memory
 from vkbloom._renderer.sources import (
+    NO_GEOMETRY,
     SCENE_SIZE,
+    Geometry,
     any_source,
     batch_sources,
     check_inputs,
@@ -47,6 +49,7 @@ from vkbloom._renderer.sources import (
     take_batch,
 )
 from vkbloom._renderer.state import Continued, State
+from vkbloom._settings.antialiasing import Antialiasing, check_antialiasing, check_use
 from vkbloom._settings.exposed import ExposedSettings, expose
 from vkbloom._settings.exposure import Exposure, check_exposure, check_seconds
 from vkbloom._settings.settings import Settings, Shading, check_settings
@@ -138,19 +141,52 @@ def _arrays_for(
     )
 
 
-def _sources(images: Iterable[Any], core: _core.Renderer) -> Iterator[_core.Source]:
-    """Yield the Source of each image; a batch on the device is copied at once."""
-    if on_cuda(images):
+def _sources(
+    images: Iterable[Any], core: _core.Renderer, geometries: Iterator[Geometry]
+) -> Iterator[_core.Source]:
+    """Yield the Source of each image; a batch on the device without geometry is copied at once."""
+    if on_cuda(images) and geometries is _NO_GEOMETRIES:
         yield from batch_sources(take_batch(images, core))
         return
     # Not by enumerate(), which keeps a reference to the image.
     numbers = itertools.count()
     for image in images:
-        source = image_source(image, core=core, name=f"images[{next(numbers)}]")
+        name = f"images[{next(numbers)}]"
+        source = image_source(image, core=core, name=name, geometry=next(geometries))
         # The iterable may overwrite the array when it yields the next image.
         del image
         yield source
         del source
+
+
+_NO_GEOMETRIES: Final = itertools.repeat(NO_GEOMETRY)
+
+
+def _geometries(taa: object, motion: Any, depth: Any) -> Iterator[Geometry]:
+    """Return an iterator of what belongs to each image of a sequence."""
+    for name, given in (("motion", motion), ("depth", depth)):
+        if given is not None and not isinstance(given, Iterable) and not on_cuda(given):
+            raise TypeError(
+                f"{name}: {type(given).__name__} is not an iterable with an array for each image"
+            )
+    if motion is None and depth is None:
+        return _NO_GEOMETRIES
+    check_use(taa, motion=motion, depth=depth)
+    return _each_geometry(motion, depth)
+
+
+def _each_geometry(motion: Any, depth: Any) -> Iterator[Geometry]:
+    motions, depths = (
+        itertools.repeat(None) if given is None else iter(given) for given in (motion, depth)
+    )
+    for number in itertools.count():
+        parts = []
+        for name, given in (("motion", motions), ("depth", depths)):
+            try:
+                parts.append(next(given))
+            except StopIteration:
+                raise ValueError(f"{name}: {number} arrays are fewer than the images") from None
+        yield Geometry(*parts)
 
 
 def _pair(
@@ -426,7 +462,10 @@ class Renderer:
         out: Mapping[str, Any] | None = None,
         device: Device | None = None,
         exposure: Exposure | str | None = None,
+        taa: Antialiasing | str | None = None,
         dt: float | None = None,
+        motion: NDArray[Any] | None = None,
+        depth: NDArray[Any] | None = None,
         state: Mapping[str, Any] | None = None,
     ) -> Frames:
         """Add bloom to an image.
@@ -456,11 +495,23 @@ class Renderer:
             How the exposure follows the light: an exposure, or the name of one of
             `vkbloom.exposures`. It is applied before or after the bloom, as its engine does. None:
             only the field `exposure` of the settings is applied, after the bloom.
+        taa : Antialiasing or str, optional
+            Temporal anti-aliasing: that of an engine, or the name of one of `vkbloom.antialiasing`.
+            The image is mixed with the history before it is metered and the bloom is made of it;
+            HDRP meters it before. An emission is not mixed.
         dt : float, optional
             Seconds since the frame before, 0 to 86400. Default: 1/60. It matters only with an
             exposure.
+        motion : ndarray, shape (H, W, 2), optional
+            For `taa`: where the surface of each pixel is minus where it was in the frame before, in
+            shares of width and height, to the right and down; finite floats. Default: 0.
+        depth : ndarray, shape (H, W), optional
+            For `taa`: the depth buffer, as the engine has it; the class says whether near surfaces
+            have large or small values. Pixels take the motion of the nearest one around them.
+            Default: each pixel takes its own.
         state : mapping of str to ndarray, optional
-            As for `render`. An exposure continues from its framebuffer ``exposure``.
+            As for `render`. An exposure continues from its framebuffer ``exposure``, `taa` from
+            ``history`` and ``history_motion``.
 
         Returns
         -------
@@ -477,6 +528,11 @@ class Renderer:
             engine has a histogram. ``exposed``, float32 of the image's shape, is what the bloom
             reads, if the engine exposes it.
 
+            With `taa` also ``history``, (H, W, 4) float32, what the next frame is mixed with, as
+            the engine keeps it; ``resolved``, float32 of the image's shape, the light of that; and
+            of Godot ``history_motion``. NaN and infinity count as 0 there, and stay at their pixels
+            of ``resolved``.
+
         Notes
         -----
         An image with the same bytes as before is not uploaded again. Passes run only if their
@@ -489,9 +545,11 @@ class Renderer:
         The composite "mix" subtracts only the part of the scene s that is the source of the bloom.
         With a mask m the result is s + i (b - m s), with an emission s + i b.
         """
-        settings = self._expose(check_settings(settings, of_image=True), exposure, dt)
+        settings = self._expose(check_settings(settings, of_image=True), exposure, dt, taa)
+        check_use(taa, motion=motion, depth=depth)
+        geometry = Geometry(motion, depth)
         self._pending.wait()
-        source = image_source(image, mask, emission, self._core)
+        source = image_source(image, mask, emission, self._core, geometry=geometry)
         names = check_framebuffers(framebuffers)
         return self._run_one(source, settings, names, out, device, state=state)
 
@@ -504,7 +562,10 @@ class Renderer:
         framebuffers: Literal["all"] | str | Sequence[str] = "all",
         device: Device | None = None,
         exposure: Exposure | str | None = None,
+        taa: Antialiasing | str | None = None,
         dt: float | Iterable[float] | None = None,
+        motion: Iterable[NDArray[Any] | None] | None = None,
+        depth: Iterable[NDArray[Any] | None] | None = None,
         state: Mapping[str, Any] | None = None,
     ) -> Iterator[Frames]:
         """Add bloom to many images.
@@ -519,9 +580,11 @@ class Renderer:
             For all images, or one for each image. Default: ``presets["bevy_natural"]``.
         framebuffers, device
             As for `apply`.
-        exposure, dt
+        exposure, taa, dt
             As for `apply`; `dt` is the time before each image, the same of all or an iterable, of
             which an item is taken after each image.
+        motion, depth : iterable of ndarray, optional
+            As for `apply`, one for each image.
         state : mapping of str to ndarray, optional
             What the first image continues from, as for `apply`. Each other one continues from the
             image before, whatever settings either has; after an image of another size, what has
@@ -560,6 +623,7 @@ class Renderer:
         2.0
         """
         given: Any = {"framebuffers": framebuffers, "device": device, "state": state}
+        given |= {"taa": taa, "motion": motion, "depth": depth}
         return self._map(images, settings, exposure=exposure, dt=dt, **given)
 
     def _map(
@@ -570,7 +634,10 @@ class Renderer:
         framebuffers: Literal["all"] | str | Sequence[str],
         device: Device | None = None,
         exposure: Exposure | str | None = None,
+        taa: Antialiasing | str | None = None,
         dt: float | Iterable[float | None] | None = None,
+        motion: Iterable[NDArray[Any] | None] | None = None,
+        depth: Iterable[NDArray[Any] | None] | None = None,
         state: Mapping[str, Any] | None = None,
         first: int = 0,
     ) -> Iterator[Frames]:
@@ -599,9 +666,10 @@ class Renderer:
         if isinstance(dt, Iterable) and not isinstance(dt, str):
             steps, dt = iter(dt), None
         if isinstance(chosen, Sequence):
-            chosen = [self._expose(item, exposure, dt) for item in chosen]
+            chosen = [self._expose(item, exposure, dt, taa) for item in chosen]
         else:
-            chosen = self._expose(chosen, exposure, dt)
+            chosen = self._expose(chosen, exposure, dt, taa)
+        geometries = _geometries(taa, motion, depth)
         if self.closed:
             raise ValueError("the renderer is closed")
         checked_settings, checked_names = self._named
@@ -611,10 +679,11 @@ class Renderer:
         destination = self._choose_destination(device)
         begun = _as_state(state)
         is_same = steps is None and not isinstance(chosen, Sequence)
-        if on_cuda(images) and device != "host" and is_same:
+        is_batch = on_cuda(images) and geometries is _NO_GEOMETRIES
+        if is_batch and device != "host" and is_same:
             return self._run_batch(images, cast("Settings", chosen), names, destination, begun)
-        pairs = _pair(_sources(images, self._core), chosen, steps, first)
-        sequence = requests.upload_each(self._core, pairs)
+        sources = _sources(images, self._core, geometries)
+        sequence = requests.upload_each(self._core, _pair(sources, chosen, steps, first))
         return self._run_requests(sequence, names, destination, Continued(begun))
 
     @check_arguments
@@ -790,13 +859,22 @@ class Renderer:
         )
 
     def _expose(
-        self, settings: Settings, exposure: Exposure | str | None, dt: float | None
+        self,
+        settings: Settings,
+        exposure: Exposure | str | None,
+        dt: float | None,
+        taa: Antialiasing | str | None = None,
     ) -> Settings:
-        """Return the settings with an exposure, which the rest of a renderer takes for settings."""
+        """Return settings with the stages in time, which the rest of a renderer takes for settings.
+
+        None: there is no such stage.
+        """
         seconds = check_seconds("dt", dt)
-        if exposure is None:
+        if exposure is None and taa is None:
             return settings
-        made = expose(settings, check_exposure(exposure), seconds)
+        checked = None if exposure is None else check_exposure(exposure)
+        antialiasing = None if taa is None else check_antialiasing(taa)
+        made = expose(settings, checked, seconds, antialiasing)
         # The same object as in the last call, since the last plan is kept for that.
         if made != self._exposed:
             self._exposed = made
@@ -981,7 +1059,8 @@ class Renderer:
         sizes = [arrays[name].shape[1::-1] for name in ("final", "bloom") if name in arrays]
         facts = plain._facts(sizes[0]) if sizes else {}
         frames = Frames(arrays, timings={}, settings=plain, info=self._made_by | facts)
-        frames._is_exposed, frames._exposed = exposed is not None, exposed
+        frames._is_exposed = exposed is not None and exposed.exposure is not None
+        frames._exposed = exposed
         if state is not None:
             frames._state = state
         return frames

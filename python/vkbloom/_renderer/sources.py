@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple, cast
+from typing import TYPE_CHECKING, Any, Final, NamedTuple, cast
 
 from vkbloom import _core
-from vkbloom._image_arguments import check_emission, check_image, check_mask
+from vkbloom._image_arguments import (
+    check_depth,
+    check_emission,
+    check_image,
+    check_mask,
+    check_motion,
+)
 from vkbloom._numbers import check_size, check_time
 from vkbloom._renderer.device_arrays import ImportedArray, on_cuda, on_host, take
 from vkbloom._renderer.image import Image
@@ -23,6 +29,34 @@ if TYPE_CHECKING:
 
 #: Width and height of a scene's frame, where none are given.
 SCENE_SIZE = (1280, 720)
+
+
+class Geometry(NamedTuple):
+    """What temporal anti-aliasing reads beside an image, as the caller gives it."""
+
+    motion: Any = None
+    depth: Any = None
+
+    def check(self, size: tuple[int, int], core: _core.Renderer | None) -> Geometry:
+        """Return the arrays for an image of that height and width, in the host's memory."""
+        motion, depth = self
+        if core and on_cuda(motion):
+            motion = take(motion, "motion", core, (3,), (2,)).numpy()
+        if core and on_cuda(depth):
+            depth = take(depth, "depth", core, (2,)).numpy()
+        return Geometry(
+            None if motion is None else check_motion(motion, size),
+            None if depth is None else check_depth(depth, size),
+        )
+
+    def core_arguments(self) -> tuple[Any, ...]:
+        """Return motion along x and y and depth."""
+        if self.motion is None:
+            return None, None, self.depth
+        return self.motion[..., 0], self.motion[..., 1], self.depth
+
+
+NO_GEOMETRY: Final = Geometry()
 
 
 class Inputs(NamedTuple):
@@ -48,13 +82,18 @@ class Inputs(NamedTuple):
         """Return the arrays by name, in the host's memory."""
         return {name: on_host(part) for name, part in self.by_name().items()}
 
-    def source(self, levels: tuple[NDArray[Any] | ImportedArray, ...] = ()) -> _core.Source:
+    def source(
+        self,
+        levels: tuple[NDArray[Any] | ImportedArray, ...] = (),
+        geometry: Geometry = NO_GEOMETRY,
+    ) -> _core.Source:
         """Return the core's Source. The arrays must not change while it is used."""
         return _core.image_source(
             _import_image(self.image),
             _import_image(self.emission),
             self.mask,
             tuple(map(_import_image, levels)),
+            *geometry.core_arguments(),
         )
 
 
@@ -91,6 +130,8 @@ def image_source(
     emission: object | None = None,
     core: _core.Renderer | None = None,
     name: str = "image",
+    *,
+    geometry: Geometry = NO_GEOMETRY,
 ) -> _core.Source:
     """Return the core's Source of an image. Its arrays must not change while it is used.
 
@@ -103,8 +144,13 @@ def image_source(
                 raise ValueError(
                     f"{what}: the image was uploaded already; upload it together with its {what}"
                 )
+        for what, given in geometry._asdict().items():
+            if given is not None:
+                raise ValueError(f"{what}: the image was uploaded already; give the array instead")
         return image._source
-    return check_inputs(image, mask, emission, core, name).source()
+    inputs = check_inputs(image, mask, emission, core, name)
+    height, width, _ = inputs.image.shape
+    return inputs.source(geometry=geometry.check((height, width), core))
 
 
 def uploaded_inputs(image: Image, pixels: Callable[[], NDArray[Any]]) -> Inputs:

@@ -9,7 +9,7 @@ from typing import Any, ClassVar, Final, Literal, NamedTuple
 
 from vkbloom._numbers import check_floats, check_number
 from vkbloom._public import public
-from vkbloom._settings.fields import choice_field
+from vkbloom._settings.fields import value_field
 from vkbloom._settings.named import Named
 from vkbloom._settings.records import Record
 from vkbloom._settings.registry import ANTIALIASINGS, NAMED_ANTIALIASINGS
@@ -43,7 +43,7 @@ class Antialiasing(Record):
     #: How many frames the offsets of the engine's camera repeat after.
     phases: ClassVar[int] = 8
 
-    order: Order = choice_field(("before", "after"))
+    order: Order = value_field("before", kind="choice")
 
     def offset(self, frame: int) -> tuple[float, float]:
         """Return the offset of the engine's camera in a frame.
@@ -103,7 +103,7 @@ def read_jitter(value: Any) -> tuple[float, float]:
 def gaussian_weights(
     offsets: Sequence[tuple[float, float]], falloff: float, scale: float
 ) -> list[list[float]]:
-    """Return exp(-falloff d^2) / sum of each neighbour; d is from `scale` times the offset to it."""
+    """Return each neighbour's share of exp(-falloff d^2); d begins at `scale` times an offset."""
     rows = []
     for x, y in offsets:
         row = [
@@ -139,3 +139,10 @@ def check_antialiasing(taa: object) -> Antialiasing:
     if isinstance(taa, type) and issubclass(taa, Antialiasing):
         hint = f"; give {taa.__name__}()"
     raise TypeError(f"taa: {taa!r} is not an Antialiasing or the name of one{hint}")
+
+
+def check_use(taa: object, **geometry: object) -> None:
+    """Raise ValueError for a motion or a depth that nothing reads."""
+    for name, given in geometry.items():
+        if taa is None and given is not None:
+            raise ValueError(f"{name}: only temporal anti-aliasing reads it; give taa=, too")

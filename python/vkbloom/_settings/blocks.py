@@ -110,6 +110,30 @@ def exposure_block(
     return bytes(block)
 
 
+def antialiasing_block(
+    settings: bytes,
+    engine: str,
+    numbers: Mapping[str, float],
+    weights: Sequence[Sequence[float]],
+    *,
+    after: bool,
+) -> bytes:
+    """Return the block of settings with temporal anti-aliasing; `weights` has a row a phase."""
+    table, block = _core.SETTINGS_BLOCK, bytearray(settings)
+    if unknown := set(numbers) - set(_core.TAA_NUMBERS):
+        raise ValueError(f"taa: the core has no {', '.join(sorted(unknown))}")
+    if len(weights) > _core.TAA_PHASES:
+        raise ValueError(f"taa: {len(weights)} phases are out of range, 1 to {_core.TAA_PHASES}")
+    given = {**numbers, "phases": max(1, len(weights))}
+    _pack(block, table, "taa_engine", _index("taa", engine, _core.TAAS))
+    _pack(block, table, "taa_after", after)
+    _pack(block, table, "taa_numbers", *(given.get(name, 0.0) for name in _core.TAA_NUMBERS))
+    # A row has 9 numbers, and begins at a multiple of 12.
+    padded = [number for row in weights for number in (*row, 0.0, 0.0, 0.0)]
+    _pack(block, table, "taa_weights", *padded)
+    return bytes(block)
+
+
 def settings_block(method: str, fields: Mapping[str, Any]) -> bytes:
     """Return the block of a method with these fields; those that it lacks have their defaults.
 

@@ -1,4 +1,4 @@
-"""Settings with an exposure, as the core reads them."""
+"""Settings with the stages in time, as the core reads them."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from vkbloom._settings.blocks import exposure_block
+from vkbloom._settings.antialiasing import Antialiasing
+from vkbloom._settings.blocks import antialiasing_block, exposure_block
 from vkbloom._settings.exposure import Exposure, check_seconds
 
 if TYPE_CHECKING:
@@ -31,14 +32,15 @@ class MeterMask:
 
 @dataclasses.dataclass(frozen=True)
 class ExposedSettings:
-    """Settings, an exposure, and the seconds since the frame before.
+    """Settings, an exposure, the seconds since the frame before, and temporal anti-aliasing.
 
     Everything else that a renderer asks settings for is that of the settings.
     """
 
     settings: Settings
-    exposure: Exposure
+    exposure: Exposure | None
     dt: float
+    antialiasing: Antialiasing | None = None
 
     def __getattr__(self, name: str) -> Any:
         # copy and pickle ask for methods before there are fields.
@@ -51,7 +53,13 @@ class ExposedSettings:
 
         - `before`: What the frame continued, as lists of numbers; None: it is not known.
         """
-        return {"exposure": self.exposure.to_dict(), "dt": self.dt, "state": before}
+        stages = {"exposure": self.exposure, "taa": self.antialiasing}
+        record: dict[str, Any] = {
+            name: stage.to_dict() for name, stage in stages.items() if stage is not None
+        }
+        # A history is too long for a record.
+        known = before if self.antialiasing is None else None
+        return record | {"dt": self.dt, "state": known}
 
     @property
     def meter_mask(self) -> MeterMask | None:
@@ -60,14 +68,21 @@ class ExposedSettings:
         return None if mask is None else MeterMask(mask)
 
     def _core_block(self) -> bytes:
-        exposure = self.exposure
-        numbers, table = exposure._numbers_of_step(self.dt), exposure._core_table()
-        return exposure_block(self.settings._core_block(), exposure._core_engine, numbers, table)
+        block, exposure, taa = self.settings._core_block(), self.exposure, self.antialiasing
+        if exposure is not None:
+            numbers, table = exposure._numbers_of_step(self.dt), exposure._core_table()
+            block = exposure_block(block, exposure._core_engine, numbers, table)
+        if taa is not None:
+            numbers, weights = taa._core_numbers_of_frame(), taa.filter_weights()
+            after = taa.order == "after"
+            block = antialiasing_block(block, taa._core_engine, numbers, weights, after=after)
+        return block
 
     @property
     def _continues(self) -> bool:
         """Whether a frame depends on those before."""
-        return self.exposure._adapts or self.settings._continues
+        adapts = self.exposure is not None and self.exposure._adapts
+        return adapts or self.antialiasing is not None or self.settings._continues
 
     def _after(self, seconds: float) -> ExposedSettings:
         """Return the same with other seconds since the frame before."""
@@ -77,17 +92,25 @@ class ExposedSettings:
         return dataclasses.replace(self, settings=self.settings._in_sequence(index, state))
 
 
-def expose(settings: Settings, exposure: Exposure | None, dt: float) -> Settings:
-    """Return settings with an exposure, which renderers take for settings; None: as they are."""
-    if exposure is None:
+def expose(
+    settings: Settings,
+    exposure: Exposure | None,
+    dt: float,
+    taa: Antialiasing | None = None,
+) -> Settings:
+    """Return settings with stages in time, which renderers take for settings; None: without it."""
+    if exposure is None and taa is None:
         return settings
-    return cast("Settings", ExposedSettings(settings, exposure, dt))
+    return cast("Settings", ExposedSettings(settings, exposure, dt, taa))
 
 
 def keywords_of(settings: Settings) -> dict[str, Any]:
     """Return settings, and their stages in time, as keywords of a call that takes no steps."""
     if isinstance(settings, ExposedSettings):
-        return {"settings": settings.settings, "exposure": settings.exposure}
+        stages = {"exposure": settings.exposure, "taa": settings.antialiasing}
+        return {"settings": settings.settings} | {
+            name: stage for name, stage in stages.items() if stage is not None
+        }
     return {"settings": settings}
 
 
@@ -101,6 +124,8 @@ def read_record(record: Mapping[str, Any]) -> dict[str, Any]:
     keywords: dict[str, Any] = {}
     if "exposure" in record:
         keywords["exposure"] = Exposure.from_dict(record["exposure"])
+    if "taa" in record:
+        keywords["taa"] = Antialiasing.from_dict(record["taa"])
     if "dt" in record:
         keywords["dt"] = check_seconds("dt", record["dt"])
     state = record.get("state")

@@ -16,8 +16,8 @@ from ._sampling import Array, size_of
 
 #: Half floats beyond which HDRP clamps.
 _MAX_LIGHT: Final = 65472.0
-#: HDRP adds it to both chromas.
-_BIAS: Final = 128 / 255
+#: HDRP adds them to a colour.
+_BIASES: Final = np.array([0.0, 128 / 255, 128 / 255])
 
 
 class _Frame(NamedTuple):
@@ -130,8 +130,10 @@ def _bilinear(image: Array, place: Array) -> Array:
     at = place - 0.5
     first = np.floor(at).astype(np.intp)
     x, y = np.moveaxis(at - first, -1, 0)[..., np.newaxis]
-    upper = _read(image, first) * (1 - x) + _read(image, first + [1, 0]) * x
-    lower = _read(image, first + [0, 1]) * (1 - x) + _read(image, first + [1, 1]) * x
+    steps = np.array([[0, 0], [1, 0], [0, 1], [1, 1]])
+    four = [_read(image, first + step) for step in steps]
+    upper = four[0] * (1 - x) + four[1] * x
+    lower = four[2] * (1 - x) + four[3] * x
     return np.asarray(upper * (1 - y) + lower * y)
 
 
@@ -214,8 +216,7 @@ def _nearest(
     for offset, depth in zip(offsets, depths, strict=True):
         nearer = is_nearer(depth, best)
         best = np.where(nearer, depth, best)
-        offset = np.broadcast_to(np.asarray(offset, np.intp), chosen.shape)
-        chosen = np.where(nearer[..., np.newaxis], offset, chosen)
+        chosen = np.where(nearer[..., np.newaxis], np.asarray(offset, np.intp), chosen)
     return chosen
 
 
@@ -261,7 +262,7 @@ def _reinhard(light: Array) -> Array:
 def _resolve_godot(frame: _Frame, settings: Any) -> Array:
     if frame.first:
         return np.dstack([frame.light, np.zeros(frame.light.shape[:2])])
-    width, height = frame.size
+    height = frame.size[1]
     chosen = np.zeros(frame.motion.shape, np.intp)
     if frame.depth is not None:
         depths = [_read(frame.depth, frame.pixels() + offset) for offset in NEIGHBOURS]
@@ -362,7 +363,7 @@ def _weights_of_frame(frame: _Frame, settings: Antialiasing) -> tuple[Array, flo
 
 
 def _biased(light: Array) -> Array:
-    return _ycocg(light) + [0.0, _BIAS, _BIAS]
+    return np.asarray(_ycocg(light) + _BIASES)
 
 
 def _compressed(light: Array) -> Array:
@@ -373,7 +374,7 @@ def _compressed(light: Array) -> Array:
 
 def _expanded(colour: Array) -> Array:
     """Return the light of such a colour."""
-    return _rgb(colour / (1 - colour[..., :1]) - [0.0, _BIAS, _BIAS])
+    return _rgb(colour / (1 - colour[..., :1]) - _BIASES)
 
 
 def _fetch(image: Array, place: Array) -> Array:
@@ -396,8 +397,8 @@ def _motion_hdrp(frame: _Frame) -> Array:
     # Of equal depths the last one counts.
     best, chosen = frame.depth, np.zeros(pixels.shape, np.intp)
     corners = (((-1, -1), own), ((1, 1), None), ((1, -1), None), ((-1, 1), None))
-    for step, depth in corners:
-        depth = depth_at(*step) if depth is None else depth
+    for step, given in corners:
+        depth = depth_at(*step) if given is None else given
         nearer = depth >= best
         best = np.where(nearer, depth, best)
         chosen = np.where(nearer[..., np.newaxis], quad * step, chosen)

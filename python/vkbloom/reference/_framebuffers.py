@@ -12,7 +12,7 @@ from vkbloom._argument_types import check_arguments
 from vkbloom._arrays import native_order, view_image
 from vkbloom._image_arguments import check_emission, check_mask
 from vkbloom._public import public
-from vkbloom._settings.antialiasing import Antialiasing, check_antialiasing
+from vkbloom._settings.antialiasing import Antialiasing, check_antialiasing, check_use
 from vkbloom._settings.exposure import Exposure, check_exposure
 from vkbloom._settings.settings import Settings, resolve_settings
 
@@ -111,6 +111,7 @@ def apply(
         stages = _with_alphas(glare.stages(seen, settings.glare, format))
         return custom.framebuffers(function, scene, settings, np.dtype(dtype), stages)
 
+    check_use(taa, motion=motion, depth=depth)
     stages = _Stages(
         None if exposure is None else Exposing(check_exposure(exposure), dt, state),
         None if taa is None else Resolving(check_antialiasing(taa), motion, depth, state),
