@@ -12,9 +12,19 @@ import vkbloom
 from tests.processes import output
 
 #: The packages that a program needs to render one frame. Every other one is loaded later.
-NEEDED = {"_exposure", "_glare", "_methods", "_presets", "_psf", "_renderer", "_settings"}
+NEEDED = {
+    "_antialiasing",
+    "_exposure",
+    "_glare",
+    "_methods",
+    "_presets",
+    "_psf",
+    "_renderer",
+    "_settings",
+}
 #: Packages of which it needs these modules alone.
 FEW = {
+    "_antialiasing": set(),
     "_exposure": set(),
     "_glare": set(),
     "_methods": {"mip_chain"},

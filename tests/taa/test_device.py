@@ -187,11 +187,11 @@ def test_a_sequence_that_is_cut(
 ) -> None:
     """State is a value: another device continues it with equal bits, and so does map."""
     frames = frames_of(name, 6)
-    given = {"settings": BLOOM, "taa": name, "exposure": "hdrp", "dt": 0.1}
+    given: dict[str, Any] = {"settings": BLOOM, "taa": name, "exposure": "hdrp", "dt": 0.1}
 
     def run(renderer: Renderer, first: int, state: Any) -> list[vkbloom.Frames]:
         images, motions, depths = zip(*frames[first:], strict=True)
-        return list(renderer.map(images, motion=motions, depth=depths, state=state, **given))  # type: ignore[arg-type]
+        return list(renderer.map(images, motion=motions, depth=depths, state=state, **given))
 
     whole = run(renderer, 0, {})
     rest = run(new_renderer(), 3, pickle.loads(pickle.dumps(whole[2].state)))

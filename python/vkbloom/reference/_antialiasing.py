@@ -40,11 +40,11 @@ class _Frame(NamedTuple):
     def size(self) -> Array:
         return np.array(size_of(self.light), np.float64)
 
-    def pixels(self) -> Array:
+    def pixels(self) -> NDArray[np.intp]:
         """Return column and row of each pixel."""
         height, width = self.light.shape[:2]
         rows, columns = np.mgrid[:height, :width]
-        return np.stack([columns, rows], axis=-1)
+        return np.stack([columns, rows], axis=-1).astype(np.intp)
 
 
 class Resolving:
@@ -113,12 +113,12 @@ def _rgb(colour: Array) -> Array:
     return np.stack([y + co - cg, y + cg, y - co - cg], axis=-1)
 
 
-def _read(image: Array, at: NDArray[np.intp], outside: float | None = None) -> Array:
+def _read(image: Array, at: NDArray[Any], outside: float | None = None) -> Array:
     """Return texels; beyond the edges the edge's, or `outside`."""
     height, width = image.shape[:2]
     last = np.array([width - 1, height - 1])
     columns, rows = np.moveaxis(np.clip(at, 0, last), -1, 0)
-    values = image[rows, columns]
+    values: Array = image[rows, columns]
     if outside is None:
         return values
     is_inside = ((at >= 0) & (at <= last)).all(axis=-1)
@@ -144,8 +144,8 @@ def _before(frame: _Frame, motion: Array) -> Array:
     return np.clip(place, -8.0, frame.size + 8)
 
 
-def _is_outside(frame: _Frame, place: Array) -> Array:
-    return ((place < 0) | (place > frame.size)).any(axis=-1)
+def _is_outside(frame: _Frame, place: Array) -> NDArray[np.bool_]:
+    return np.asarray(((place < 0) | (place > frame.size)).any(axis=-1))
 
 
 class _Cubic(NamedTuple):
@@ -249,7 +249,7 @@ def _resolve_bevy(frame: _Frame, settings: Any) -> Array:
 
 
 def _show_bevy(kept: Array) -> Array:
-    return kept / np.maximum(1 - kept.max(axis=-1, keepdims=True), 2.0**-24)
+    return np.asarray(kept / np.maximum(1 - kept.max(axis=-1, keepdims=True), 2.0**-24))
 
 
 # Godot.
@@ -351,7 +351,7 @@ def _resolve_o3de(frame: _Frame, settings: Any) -> Array:
 
 def _weights_of_frame(frame: _Frame, settings: Antialiasing) -> tuple[Array, float]:
     """Return the weights of the neighbours in this frame, and the number of frames with it."""
-    rows = np.array(settings.filter_weights() or [np.zeros(9)])
+    rows = np.array(settings.filter_weights() or [[0.0] * 9])
     before = int(frame.history[0, 0, 3])
     after = before + 1
     # The number stays small, and not 0.
@@ -418,9 +418,12 @@ def _resolve_hdrp(frame: _Frame, settings: Any) -> Array:
     margin = 0.5
     off_screen = ((place <= margin) | (place >= frame.size - margin)).any(axis=-1, keepdims=True)
 
-    centres = frame.pixels() + 0.5
+    centres: Array = frame.pixels() + 0.5
     around = np.stack(
-        [np.clip(_fetch(frame.light, centres + offset), 0, _MAX_LIGHT) for offset in NEIGHBOURS]
+        [
+            np.clip(_fetch(frame.light, centres + np.array(offset)), 0, _MAX_LIGHT)
+            for offset in NEIGHBOURS
+        ]
     )
     if settings.quality == "low":
         resolved = _resolve_hdrp_low(around[[1, 3, 5, 7]], around[4], history, off_screen, settings)
@@ -465,11 +468,11 @@ def _deviations(now: Array, history: Array, motion: Array, size: Array, settings
 def _blend_hdrp(history: Array, contrast: Array, settings: Any) -> Array:
     """Return this frame's share; NaN counts as 0."""
     share = (1 - settings.base_blend) / (1 + np.maximum(contrast, 0) / history)
-    return np.maximum(np.fmin(np.fmax(share, 0), 1), 0.03)[..., np.newaxis]
+    return np.asarray(np.maximum(np.fmin(np.fmax(share, 0), 1), 0.03)[..., np.newaxis])
 
 
 def _resolve_hdrp_low(
-    others: Array, now: Array, history: Array, off_screen: Array, settings: Any
+    others: Array, now: Array, history: Array, off_screen: Any, settings: Any
 ) -> Array:
     def luminance(colour: Array) -> Array:
         return np.asarray(colour @ np.array([0.2126729, 0.7151522, 0.0721750]))
