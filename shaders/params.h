@@ -63,6 +63,8 @@
     VEC4S(B, projection, 1) \
     VEC4S(B, model_view, 3) \
     VEC4S(B, sky, 3) \
+    VEC4S(B, before, 3) \
+    VEC4S(B, jitter, 1) \
     INPUT(B, float, glow_intensity) \
     THRESHOLD_ROWS(B, READS)
 
@@ -804,7 +806,7 @@
     CONSTANT(67, ENGINE, engine) /* of an exposure: EXPOSURE_*; of anti-aliasing: TAA_* */ \
     CONSTANT(68, METER, meter)                 /* what meter.frag makes: METER_* */ \
     CONSTANT(69, PRODUCTS, products)           /* of spectra, that are added up */ \
-    CONSTANT(70, MOVING, moving)               /* there is an image of the motion */ \
+    CONSTANT(70, MOVING, moving)               /* how the motion is given: MOTION_*; 0: none */ \
     CONSTANT(71, DEEP, deep)                   /* there is an image of the depth */
 
 // The names that a setting can have. Each list is a setting and a specialization constant.
@@ -921,6 +923,8 @@
     NAME(BY_MASK, 3, by_mask) \
     NAME(BY_VALUES, 4, by_values) \
     NAME(BY_MIXED, 5, by_mixed) \
+    NAME(MOTION_PLANES, 1, planes) \
+    NAME(MOTION_PACKED, 2, packed) \
     NAME(METER_LIGHT, 1, light) \
     NAME(METER_SUM, 2, sum) \
     NAME(METER_LEVEL, 3, level) \

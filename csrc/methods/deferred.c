@@ -69,8 +69,8 @@ static struct gbuffer add_gbuffer(struct vkb_levels *levels, const struct vkb_sc
     return gbuffer;
 }
 
-static uint32_t add_bloom(struct vkb_levels *levels, struct vkb_size size, uint32_t scene,
-                          uint32_t brightness)
+static uint32_t add_bloom(struct vkb_levels *levels, const struct vkb_time_stages *stages,
+                          struct vkb_size size, uint32_t scene, uint32_t brightness)
 {
     const struct vkb_settings *settings = levels->settings;
     struct vkb_bloom_source source = {
@@ -84,7 +84,7 @@ static uint32_t add_bloom(struct vkb_levels *levels, struct vkb_size size, uint3
     const enum vkb_format extracted = vkb_first_format(settings, source.format);
     const bool as_it_is = source.buffers.width == size.width && source.buffers.height == size.height
                        && extracted == HDR && vkb_threshold_mode(settings) == THRESHOLD_NONE
-                       && !vkb_begin_time_stages(settings).exposes_bloom;
+                       && !stages->exposes_bloom && !stages->resolves_scene;
 
     if (!as_it_is) {
         source.glow = vkb_levels_target(levels, "extracted", extracted, source.buffers, false);
@@ -107,6 +107,27 @@ static uint32_t add_lighting(struct vkb_levels *levels, const struct gbuffer *gb
     return scene;
 }
 
+// The motion and the depth of the surfaces, which temporal anti-aliasing reads.
+static void add_motion(struct vkb_levels *levels, const struct vkb_scene_source *source,
+                       const struct gbuffer *gbuffer, struct vkb_time_stages *stages)
+{
+    if (!levels->settings->taa_engine)
+        return;
+    const uint32_t motion =
+        vkb_levels_target(levels, "motion", VKB_FORMAT_RGBA32_FLOAT, source->size, true);
+    if (levels->failed)
+        return;
+    struct vkb_pass_row row = vkb_fullscreen_row("motion", &vkb_shader_motion_frag, motion);
+    row.constants.engine = (int)levels->settings->taa_engine;
+    row.block = VKB_BLOCK_mesh;
+    row.params.mesh = vkb_scene_params(source);
+    vkb_read_only(&row, gbuffer->colours[POSITION]);
+    vkb_levels_pass(levels, &row);
+    stages->taa.motion_x = motion;
+    stages->taa.packed = true;
+    stages->resolves_glow = true;
+}
+
 void vkb_build_deferred(struct vkb_levels *levels, const struct vkb_scene_source *source)
 {
     const struct vkb_settings *settings = levels->settings;
@@ -118,7 +139,8 @@ void vkb_build_deferred(struct vkb_levels *levels, const struct vkb_scene_source
         .lit = vkb_has_glare(settings),
     };
     struct vkb_time_stages stages = vkb_begin_time_stages(settings);
-    const bool scene_first = vkb_method_of(settings)->custom || settings->exposure_engine;
+    const bool scene_first =
+        vkb_method_of(settings)->custom || settings->exposure_engine || settings->taa_engine;
     uint32_t glow = VKB_NO_IMAGE;
 
     if (settings->values.bloom && source->has_glow) {
@@ -130,9 +152,10 @@ void vkb_build_deferred(struct vkb_levels *levels, const struct vkb_scene_source
     if (scene_first)
         composite.scene = add_lighting(levels, &gbuffer, source->size);
     uint32_t brightness = gbuffer.colours[BRIGHTNESS];
+    add_motion(levels, source, &gbuffer, &stages);
     vkb_add_time_stages_before(levels, &stages, &composite.scene, &brightness);
     if (settings->values.bloom)
-        composite.bloom = add_bloom(levels, source->size, composite.scene, brightness);
+        composite.bloom = add_bloom(levels, &stages, source->size, composite.scene, brightness);
     if (!scene_first)
         composite.scene = add_lighting(levels, &gbuffer, source->size);
     vkb_add_time_stages_after(levels, &stages, &composite);

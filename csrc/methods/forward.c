@@ -51,6 +51,9 @@ void vkb_build_forward(struct vkb_levels *levels, const struct vkb_scene_source 
         levels->failed = !vkb_fail(levels->error, VKB_ERROR_VALUE,
                                    "exposure: a forward scene has 8 bits, and no light above 1; "
                                    "shading 'deferred' has it");
+    if (settings->taa_engine)
+        levels->failed = !vkb_fail(levels->error, VKB_ERROR_VALUE,
+                                   "taa: a forward scene has no motion; shading 'deferred' has it");
     if (scene_first)
         composite.scene = add_scene(levels, source, &params);
     if (settings->values.bloom) {

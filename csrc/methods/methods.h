@@ -72,14 +72,17 @@ uint32_t vkb_add_exposed(struct vkb_levels *levels, const char *name, bool frame
 // Whether the settings have an exposure with one of EXPOSES_* or METERS_BLOOM.
 bool vkb_exposure_has(const struct vkb_settings *settings, uint32_t what);
 
-// The images of the motion along x and y, and of the depth; VKB_NO_IMAGE: none is given.
+// The images of the motion along x and y, and of the depth; VKB_NO_IMAGE: none is given. `packed`:
+// the first one has all of them as its channels.
 struct vkb_taa_inputs {
     uint32_t motion_x, motion_y, depth;
+    bool packed;
+    uint32_t last_motion;  // of the frame before; VKB_NO_IMAGE: there is none, or none yet
 };
 // Adds the temporal anti-aliasing of the settings: "history", what is kept for the next frame, and
-// "resolved", the light of this, which it returns.
-uint32_t vkb_add_taa(struct vkb_levels *levels, const struct vkb_taa_inputs *inputs,
-                     uint32_t image);
+// "resolved", the light of this, which it returns. `what` is added to both names.
+uint32_t vkb_add_taa(struct vkb_levels *levels, struct vkb_taa_inputs *inputs, uint32_t image,
+                     const char *what);
 
 // The stages in time around a bloom: an exposure, of what the bloom reads or of the picture with
 // its bloom, and temporal anti-aliasing of one of these.
@@ -87,11 +90,12 @@ struct vkb_time_stages {
     uint32_t exposure;  // with the multipliers; VKB_NO_IMAGE: there is none, or none yet
     bool exposes_bloom, exposes_picture, exposes_first, meters_bloom;
     bool resolves_scene, resolves_picture;
+    bool resolves_glow;  // what glows is resolved, too, where it is not the scene
     struct vkb_taa_inputs taa;
 };
 struct vkb_time_stages vkb_begin_time_stages(const struct vkb_settings *settings);
 // Meters and resolves the scene, and replaces the scene and what glows by images that are resolved
-// and exposed. Only what is the scene itself is resolved.
+// and exposed.
 void vkb_add_time_stages_before(struct vkb_levels *levels, struct vkb_time_stages *stages,
                                 uint32_t *scene, uint32_t *glow);
 // Combines scene and bloom, resolves and exposes the picture, which is then the scene without a

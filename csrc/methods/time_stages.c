@@ -11,7 +11,7 @@ struct vkb_time_stages vkb_begin_time_stages(const struct vkb_settings *settings
         .meters_bloom = vkb_exposure_has(settings, METERS_BLOOM),
         .resolves_scene = settings->taa_engine && !settings->taa_after,
         .resolves_picture = settings->taa_engine && settings->taa_after,
-        .taa = {VKB_NO_IMAGE, VKB_NO_IMAGE, VKB_NO_IMAGE},
+        .taa = {VKB_NO_IMAGE, VKB_NO_IMAGE, VKB_NO_IMAGE, false, VKB_NO_IMAGE},
     };
 }
 
@@ -30,15 +30,18 @@ static void expose(struct vkb_levels *levels, struct vkb_time_stages *stages, ui
               : vkb_add_exposed(levels, "exposed_emission", false, *glow, stages->exposure, false);
 }
 
-static void resolve(struct vkb_levels *levels, const struct vkb_time_stages *stages,
-                    uint32_t *scene, uint32_t *glow)
+static void resolve(struct vkb_levels *levels, struct vkb_time_stages *stages, uint32_t *scene,
+                    uint32_t *glow)
 {
     const bool one = *scene == *glow;
 
     if (!stages->resolves_scene)
         return;
-    *scene = vkb_add_taa(levels, &stages->taa, *scene);
-    *glow = one ? *scene : *glow;
+    *scene = vkb_add_taa(levels, &stages->taa, *scene, "");
+    if (one)
+        *glow = *scene;
+    else if (stages->resolves_glow)
+        *glow = vkb_add_taa(levels, &stages->taa, *glow, "_glow");
 }
 
 void vkb_add_time_stages_before(struct vkb_levels *levels, struct vkb_time_stages *stages,
@@ -60,7 +63,7 @@ void vkb_add_time_stages_after(struct vkb_levels *levels, struct vkb_time_stages
         return;
     uint32_t picture = has_bloom ? vkb_add_combining_pass(levels, source) : source->scene;
     if (stages->resolves_picture)
-        picture = vkb_add_taa(levels, &stages->taa, picture);
+        picture = vkb_add_taa(levels, &stages->taa, picture, "");
     if (stages->meters_bloom)
         stages->exposure = vkb_add_exposure(levels, picture);
     if (stages->exposes_picture)

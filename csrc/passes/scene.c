@@ -10,6 +10,8 @@ struct vkb_mesh_params vkb_scene_params(const struct vkb_scene_source *source)
     memcpy(params.projection, source->projection, sizeof params.projection);
     memcpy(params.model_view, source->model_view, sizeof params.model_view);
     memcpy(params.sky, source->sky, sizeof params.sky);
+    memcpy(params.before, source->before, sizeof params.before);
+    memcpy(params.jitter, source->jitter, sizeof params.jitter);
     return params;
 }
 

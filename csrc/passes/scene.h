@@ -8,6 +8,9 @@
 struct vkb_scene_source {
     // Those of the camera and of the body (python/vkbloom/_scene/view.py).
     float projection[1][4], model_view[3][4], sky[3][4];
+    // From the place of the body in the view to that in the frame before; by how much the picture
+    // is moved, in units of which it has two along each side.
+    float before[3][4], jitter[1][4];
     struct vkb_size size;
     double glow_intensity;
     bool has_sky, has_glow, has_emission;  // the body's materials emit

@@ -3,11 +3,11 @@
 
 #include <string.h>
 
-// In Python "Qd28f10I32s".
+// In Python "Qd44f10I32s".
 struct scene_block {
     uint64_t serial;
     double glow_intensity;
-    float projection[1][4], model_view[3][4], sky[3][4];
+    float projection[1][4], model_view[3][4], sky[3][4], before[3][4], jitter[1][4];
     uint32_t size[2];
     // Numbers of vertices, indices and surfaces; no vertices: there is no such mesh.
     uint32_t body[3], glow[3];
@@ -241,6 +241,8 @@ bool vkb_read_scene(PyObject *bytes, PyObject *pictures, PyObject *arrays,
     memcpy(source->scene.projection, block.projection, sizeof block.projection);
     memcpy(source->scene.model_view, block.model_view, sizeof block.model_view);
     memcpy(source->scene.sky, block.sky, sizeof block.sky);
+    memcpy(source->scene.before, block.before, sizeof block.before);
+    memcpy(source->scene.jitter, block.jitter, sizeof block.jitter);
     memcpy(source->shading, block.shading, sizeof source->shading);
     return done;
 }

@@ -9,6 +9,7 @@ from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
 from collections.abc import Sequence as AnySequence
 from contextlib import closing
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple, TypeAlias
 
 import numpy as np
@@ -26,6 +27,7 @@ from vkbloom._renderer.device_arrays import Device, on_cuda
 from vkbloom._renderer.frames import Frames
 from vkbloom._renderer.renderer import Renderer
 from vkbloom._renderer.sources import SCENE_SIZE
+from vkbloom._settings.antialiasing import Antialiasing, check_antialiasing, check_use
 from vkbloom._settings.exposure import Exposure
 from vkbloom._settings.settings import Settings, Shading, check_settings
 
@@ -317,8 +319,12 @@ def work_of_images(
     glow_of: Callable[[Any], Mapping[str, Any]],
     how: Mapping[str, Any],
     stages: Mapping[str, Any],
+    geometry: Mapping[str, Any] = MappingProxyType({}),
 ) -> Work:
-    """Return what adds bloom to images; `glow_of`: the mask and the emission of each."""
+    """Return what adds bloom to images; `glow_of`: the mask and the emission of each.
+
+    - `geometry`: Motions and depths of all, as for `Renderer.map`.
+    """
 
     def upload_glow(image: Any) -> Any:
         glow = glow_of(image)
@@ -331,7 +337,7 @@ def work_of_images(
         state: Mapping[str, Any] | None,
         first: int,
     ) -> Iterator[Frames]:
-        given = {**how, **stages, "state": state, "first": first}
+        given = {**how, **stages, **geometry, "state": state, "first": first}
         return renderer()._map(map(upload_glow, images), settings, dt=steps, **given)
 
     def compute_one(settings: Settings, image: Any) -> Frames:
@@ -514,6 +520,9 @@ def sequence(
     gaps: Literal["error", "time"] = "error",
     start: int = 0,
     exposure: Exposure | str | float | None = None,
+    taa: Antialiasing | str | None = None,
+    motion: Iterable[NDArray[Any] | None] | None = None,
+    depth: Iterable[NDArray[Any] | None] | None = None,
     state: Mapping[str, Any] | None = None,
     mask: NDArray[Any] | None = None,
     emission: NDArray[Any] | None = None,
@@ -549,6 +558,10 @@ def sequence(
     exposure : Exposure, str or float, optional
         As for `apply`. Its `dt` is the time since the frame before. That of frame 0 is the time to
         the next one.
+    taa : Antialiasing or str, optional
+        As for `apply`, and for `render` of a scene.
+    motion, depth : iterable of ndarray, optional
+        As for `Renderer.map`, of images: one for each frame from `start` on.
     state : mapping of str to ndarray, optional
         What the first frame continues from: `Frames.state` of the one before it.
     mask, emission
@@ -598,7 +611,9 @@ def sequence(
     # Stages in time: each is a keyword of `Renderer.apply` and `Renderer.render`.
     stages: dict[str, Any] = {
         "exposure": take_exposure(exposure, fields),
+        "taa": None if taa is None else check_antialiasing(taa),
     }
+    check_use(taa, motion=motion, depth=depth)
     chosen = _Chosen(settings, fields)
     how: dict[str, Any] = {"framebuffers": framebuffers, "device": device}
     begun: dict[str, Any] = {"start": check_index("start", start, 0, _MAX_INDEX), "state": state}
@@ -611,6 +626,8 @@ def sequence(
             raise ValueError("fps: a scene needs frames per second, or times")
         if mask is not None or emission is not None:
             raise ValueError("mask: a scene takes neither a mask nor an emission")
+        if motion is not None or depth is not None:
+            raise ValueError("motion: a scene has its own motion and depth; leave them out")
         how |= {"size": size, "shading": shading}
         work = _work_of_scene(opened, frames, how, stages)
         return Sequence(_Turns(clock, chosen), work, clock, **begun)
@@ -628,8 +645,13 @@ def sequence(
             raise ValueError(f"times: {len(clock.times)} times do not match {count} frames")
     given = {"mask": mask, "emission": emission}
     glow = {name: array for name, array in given.items() if array is not None}
-    work = work_of_images(opened, lambda _: glow, how, stages)
-    if work.has_stages and clock == Clock(None, None) and not isinstance(source, _Video):
+    geometry = {"motion": motion, "depth": depth}
+    work = work_of_images(opened, lambda _: glow, how, stages, geometry)
+    if (
+        stages["exposure"] is not None
+        and clock == Clock(None, None)
+        and not isinstance(source, _Video)
+    ):
         raise ValueError("fps: an exposure needs frames per second, or times")
     return Sequence(source, work, clock, **begun)
 

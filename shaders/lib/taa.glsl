@@ -32,12 +32,14 @@ vec3 light_at(ivec2 at)
 
 float depth_at(ivec2 at)
 {
-    return fetch_clamped(depth, at).r;
+    return MOVING == MOTION_PACKED ? fetch_clamped(motion_x, at).b : fetch_clamped(depth, at).r;
 }
 
 // Now minus before, in shares of the sides.
 vec2 motion_at(ivec2 at)
 {
+    if (MOVING == MOTION_PACKED)
+        return fetch_clamped(motion_x, at).rg;
     return MOVING != 0 ? vec2(fetch_clamped(motion_x, at).r, fetch_clamped(motion_y, at).r) : vec2(0.0);
 }
 

@@ -19,6 +19,7 @@ void main()
     vec4 projection = params.projection[0];
     vec3 in_view = vec4(position.xyz, 1.0) * model_view;
     gl_Position = vec4(in_view * projection.xyz + vec3(0.0, 0.0, projection.w), -in_view.z);
+    gl_Position.xy += params.jitter[0].xy * gl_Position.w;
     vertex_colour = colour.rgb;
 #ifdef TEXTURED
     surface_texcoords = texcoords;

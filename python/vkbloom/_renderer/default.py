@@ -180,6 +180,7 @@ def render(
     out: Mapping[str, Any] | None = None,
     device: Device | None = None,
     exposure: Exposure | str | float | None = None,
+    taa: Antialiasing | str | None = None,
     dt: float | None = None,
     state: Mapping[str, Any] | None = None,
     renderer: Renderer | None = None,
@@ -189,7 +190,7 @@ def render(
 
     Parameters
     ----------
-    scene, size, shading, time, framebuffers, out, device, dt, state
+    scene, size, shading, time, framebuffers, out, device, taa, dt, state
         As for `Renderer.render`.
     exposure : Exposure, str or float, optional
         As for `apply`.
@@ -222,6 +223,7 @@ def render(
         out=out,
         device=device,
         exposure=chosen_exposure,
+        taa=taa,
         dt=dt,
         state=state,
     )

@@ -19,7 +19,7 @@ from vkbloom import _core
 from vkbloom._argument_types import check_arguments
 from vkbloom._array_cache import ArrayCache, shared_cache
 from vkbloom._framebuffers import check_framebuffers
-from vkbloom._numbers import check_size
+from vkbloom._numbers import check_size, check_time
 from vkbloom._public import public
 from vkbloom._renderer import requests
 from vkbloom._renderer.adapter import bundled_driver, bundled_hash, from_core
@@ -37,9 +37,11 @@ from vkbloom._renderer.frames import Frames
 from vkbloom._renderer.image import Image
 from vkbloom._renderer.new_arrays import new_arrays, new_memory
 from vkbloom._renderer.sources import (
+    ANIMATION,
     NO_GEOMETRY,
     SCENE_SIZE,
     Geometry,
+    Moment,
     any_source,
     batch_sources,
     check_inputs,
@@ -387,6 +389,7 @@ class Renderer:
         out: Mapping[str, Any] | None = None,
         device: Device | None = None,
         exposure: Exposure | str | None = None,
+        taa: Antialiasing | str | None = None,
         dt: float | None = None,
         state: Mapping[str, Any] | None = None,
     ) -> Frames:
@@ -418,6 +421,10 @@ class Renderer:
         exposure, dt
             As for `apply`, with deferred shading: a forward scene has 8 bits. What is metered is
             ``scene``. `time` and `dt` are apart: a turn of the animation is no number of seconds.
+        taa
+            As for `apply`, with deferred shading, and with the scene's own motion and depth: from
+            the time of the frame that `state` is of. The picture is moved by the engine's offset of
+            its frame. ``scene`` is resolved, and the light that glows apart from it.
         state : mapping of str to ndarray, optional
             For settings whose passes read framebuffers of the call before: `Frames.state` of that
             call, or arrays by the names of these framebuffers, of their shapes and dtypes. Names
@@ -440,15 +447,25 @@ class Renderer:
             With ``direct=True`` there is no ``blur_vertical``. With ``bloom=False`` there are no
             bloom buffers, and the glow mesh is left out.
 
+            With `taa` also ``motion``, (H, W, 4) float32: the motion in shares of width and height,
+            the depth as the engine has it, and 1; ``history`` and ``resolved`` as of `apply`, and
+            the same of the light that glows, ``history_glow`` and ``resolved_glow``.
+
         Notes
         -----
         A pass runs only if its inputs, its settings or its size have changed since its last run.
         The ``timings`` of the result name the passes that ran.
         """
-        settings = self._expose(check_settings(settings), exposure, dt)
-        source = scene_source(scene, size, shading, time)
+        settings = self._expose(check_settings(settings), exposure, dt, taa)
+        before, moment = _as_state(state), None
+        if taa is not None:
+            moment = Moment.after(before, check_time(time), check_antialiasing(taa))
+        source = scene_source(scene, size, shading, time, moment=moment)
         names = check_framebuffers(framebuffers)
-        return self._run_one(source, settings, names, out, device, state=state)
+        frames = self._run_one(source, settings, names, out, device, state=before)
+        if moment is not None:
+            frames._state = frames._state.replace(ANIMATION, moment.array())
+        return frames
 
     @check_arguments
     def apply(

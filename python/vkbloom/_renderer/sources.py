@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final, NamedTuple, cast
+
+import numpy as np
 
 from vkbloom import _core
 from vkbloom._image_arguments import (
@@ -20,11 +24,50 @@ from vkbloom._settings.settings import check_shading
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    import numpy as np
     from numpy.typing import NDArray
 
     from vkbloom._scene import Scene
+    from vkbloom._settings.antialiasing import Antialiasing
     from vkbloom._settings.settings import Shading
+
+
+#: The array of a state that says which frame of a scene it is of.
+ANIMATION: Final = "animation"
+
+
+class Moment(NamedTuple):
+    """A frame of a scene's animation with temporal anti-aliasing, and what it continues.
+
+    - `turns`: Its time. `before`: that of the frame before. Both are of one period.
+    - `number`: How many frames there were before.
+    """
+
+    turns: float
+    before: float
+    number: int
+    antialiasing: Antialiasing
+
+    @classmethod
+    def after(cls, state: Mapping[str, Any], time: float, antialiasing: Antialiasing) -> Moment:
+        """Return the moment of a frame that continues a state."""
+        turns = math.fmod(time, 1.0)
+        if ANIMATION not in state:
+            return cls(turns, turns, 0, antialiasing)
+        numbers = np.asarray(state[ANIMATION], np.float64)
+        if numbers.shape != (1, 1, 4) or not np.isfinite(numbers).all():
+            raise ValueError(f"state: {ANIMATION} is not (1, 1, 4) finite numbers")
+        before, number, _, _ = numbers[0, 0]
+        return cls(turns, float(before), int(number), antialiasing)
+
+    def offset(self, size: tuple[int, int]) -> tuple[float, float]:
+        """Return by how much the picture is moved, in units of which it has two along each side."""
+        own = getattr(self.antialiasing, "jitter", None)
+        x, y = self.antialiasing.offset(self.number) if own is None else own
+        return 2.0 * x / size[0], 2.0 * y / size[1]
+
+    def array(self) -> NDArray[np.float32]:
+        """Return what the next frame continues."""
+        return np.array([[[self.turns, self.number + 1, 0.0, 1.0]]], np.float32)
 
 
 #: Width and height of a scene's frame, where none are given.
@@ -199,7 +242,13 @@ def any_source(
 
 
 def scene_source(
-    scene: Scene, size: tuple[int, int], shading: Shading, time: float, name: str = "scene"
+    scene: Scene,
+    size: tuple[int, int],
+    shading: Shading,
+    time: float,
+    name: str = "scene",
+    *,
+    moment: Moment | None = None,
 ) -> _core.Source:
     """Return the core's Source of a scene's frame. Errors of the scene start with `name`."""
     check_shading(shading)
@@ -210,5 +259,8 @@ def scene_source(
         raise TypeError(f"{name}: {type(scene).__name__} is not a Scene")
     # Imported here, for the same reason.
     from vkbloom._scene.blocks import scene_arguments  # noqa: PLC0415
+    from vkbloom._scene.view import ALONE, Step  # noqa: PLC0415
 
-    return _core.scene_source(*scene_arguments(scene, check_size("size", size), shading, turns))
+    pixels = check_size("size", size)
+    step = ALONE if moment is None else Step(moment.before, moment.offset(pixels))
+    return _core.scene_source(*scene_arguments(scene, pixels, shading, turns, step))

@@ -83,6 +83,13 @@ class State(Mapping[str, "NDArray[Any]"]):
 
     __hash__ = None  # type: ignore[assignment]  # as other mappings of arrays
 
+    def replace(self, name: str, array: NDArray[Any]) -> State:
+        """Return the state with another array."""
+        after = State({name: array})
+        after._images = {**self._images, **after._images}
+        after._before = self._before
+        return after
+
     def __repr__(self) -> str:
         return f"<vkbloom state of {', '.join(self) or 'nothing'}>"
 

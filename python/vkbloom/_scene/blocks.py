@@ -14,7 +14,7 @@ from vkbloom._formats import FORMATS_BY_DTYPE
 from vkbloom._scene.mesh import Mesh
 from vkbloom._scene.scene import Scene
 from vkbloom._scene.textures import Texture
-from vkbloom._scene.view import matrices
+from vkbloom._scene.view import ALONE, Step, matrices
 
 #: As Vulkan numbers them.
 _ADDRESS_MODES: Final = ("repeat", "mirror-repeat", "clamp-to-edge")
@@ -24,7 +24,9 @@ _FILTERS: Final = ("nearest", "linear")
 Arguments = tuple[bytes, bytes, tuple[NDArray[Any], ...]]
 
 
-def scene_arguments(scene: Scene, size: tuple[int, int], shading: str, turns: float) -> Arguments:
+def scene_arguments(
+    scene: Scene, size: tuple[int, int], shading: str, turns: float, step: Step = ALONE
+) -> Arguments:
     """Return the arguments of the core's scene_source, from checked values."""
     # Textures by identity, not by content: each is uploaded once.
     numbers: dict[Texture, int] = {}
@@ -32,11 +34,11 @@ def scene_arguments(scene: Scene, size: tuple[int, int], shading: str, turns: fl
     glow, glow_counts = ([], (0, 0, 0)) if scene.glow is None else _mesh(scene.glow, numbers)
     sky = () if scene.skybox is None else scene.skybox.levels
     block = struct.pack(
-        "=Qd112s10I32s",
+        "=Qd176s10I32s",
         scene.contents_serial,
         scene.glow_intensity,
         # `turns` has period 1. It is reduced first, so that large times keep their precision.
-        matrices(scene.camera, math.fmod(turns, 1.0), size[0] / size[1]).tobytes(),
+        matrices(scene.camera, math.fmod(turns, 1.0), size[0] / size[1], step).tobytes(),
         *size,
         *body_counts,
         *glow_counts,
