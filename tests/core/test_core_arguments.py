@@ -171,8 +171,8 @@ def triangle(
         **parts,
     }
     block, _, _ = scene_arguments(SCENES[False], (8, 8), "forward", 0.0)
-    # No glow mesh, whose counts are after those of the body, at 34 to 36.
-    none = {"at37": 0, "at38": 0, "at39": 0, "at41": textures}
+    # No glow mesh, whose counts are after those of the body, at 50 to 52.
+    none = {"at53": 0, "at54": 0, "at55": 0, "at57": textures}
     block = change(block, **(none | (at or {})))
     given = [array for array in arrays.values() if array is not None] + list(sky or ())
     numbers = np.array(pictures or [0] * 9, np.uint32)

@@ -418,7 +418,7 @@ def _resolve_hdrp(frame: _Frame, settings: Any) -> Array:
     margin = 0.5
     off_screen = ((place <= margin) | (place >= frame.size - margin)).any(axis=-1, keepdims=True)
 
-    centres: Array = frame.pixels() + 0.5
+    centres = np.asarray(frame.pixels() + 0.5, np.float64)
     around = np.stack(
         [
             np.clip(_fetch(frame.light, centres + np.array(offset)), 0, _MAX_LIGHT)
