@@ -41,6 +41,20 @@ def follow(**given: Any) -> list[NDArray[Any]]:
     return [made["final"] for made in sequence]
 
 
+def test_images_have_temporal_anti_aliasing(tmp_path: Path, frames: list[Path]) -> None:
+    words = ("--taa", "godot:frames=8", "--exposure", "hdrp", "--fps", "10")
+    result = apply(tmp_path / "f.%d.exr", tmp_path / "g.%d.exr", *words)
+    assert result.exit_code == 0, result.stderr
+    expected = follow(taa=vkbloom.GodotAntialiasing(frames=8))
+    for number, wanted in zip(NUMBERS, expected, strict=True):
+        np.testing.assert_allclose(vkbloom.read(tmp_path / f"g.{number}.exr"), wanted, rtol=1e-6)
+    # Such a file starts anew, since its history is not in it.
+    result = apply(frames[0], tmp_path / "again.exr", "--settings", tmp_path / "g.10.exr")
+    assert result.exit_code == 0, result.stderr
+    assert run("render", "-o", tmp_path / "a.png", "--taa", "bevi").exit_code == 2
+    assert "did you mean 'bevy'" in run("render", "-o", tmp_path / "a.png", "--taa", "bevi").stderr
+
+
 @pytest.mark.parametrize("how", ["files", "folder", "glob", "pattern"])
 def test_images_are_frames_in_time(tmp_path: Path, frames: list[Path], how: str) -> None:
     """Their numbers are their times, however they are named."""

@@ -34,7 +34,7 @@ from vkbloom._cli.image_files import (
 )
 from vkbloom._cli.program import adapter_option, as_wrong_use, describe
 from vkbloom._cli.sequences import PIPE, check_targets, displayed_name, is_stream, pairs
-from vkbloom._cli.settings_options import StartOptions, timed_start_options
+from vkbloom._cli.settings_options import StartOptions, taa_option, timed_start_options
 from vkbloom._cli.terminal import complain, hides_progress, note, say, tell_device
 from vkbloom._cli.time_steps import Pair, TimeSteps, order_in_time
 from vkbloom._io import image_writing, safe_writing
@@ -364,6 +364,7 @@ def _send(file: Path, target: str) -> None:
 @reading_options
 @glow_options
 @adapter_option
+@taa_option
 @timed_start_options
 def command(*, sources: tuple[str, ...], out: str | None, adapter: str, **given: Any) -> int:
     """Add bloom to the image IN and write the result to OUT.
@@ -433,11 +434,11 @@ def _check_only_of_videos(options: Options, codec: str | None) -> None:
     if codec is not None:
         raise click.UsageError("--codec is only for videos")
     if options.fps is not None and not options.start.stages:
-        raise click.UsageError("--fps is only for videos, and for images with --exposure NAME")
-    if options.skip_existing and options.start.stages:
         raise click.UsageError(
-            "--skip-existing: each image continues the exposure of the one before; leave it out"
+            "--fps is only for videos, and for images with --exposure NAME or --taa"
         )
+    if options.skip_existing and options.start.stages:
+        raise click.UsageError("--skip-existing: each image continues the one before; leave it out")
 
 
 def _job_of(options: Options, sources: list[str], out: str, **given: Any) -> videos.Job:

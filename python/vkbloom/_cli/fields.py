@@ -23,6 +23,7 @@ from vkbloom._cli.sequences import as_file
 from vkbloom._io.array_files import read
 from vkbloom._io.glows import grey_mask
 from vkbloom._psf.base import PSF, functions
+from vkbloom._settings.antialiasing import Antialiasing, antialiasing
 from vkbloom._settings.exposure import Exposure, exposures
 from vkbloom._settings.fields import FieldInfo, Kind, fields_of
 from vkbloom._settings.glare import Glare, glares
@@ -172,6 +173,20 @@ def _read_exposure(word: str) -> Exposure | float:
 
 #: The type of an option for the field `exposure` that takes a stage in time, too.
 EXPOSURE: Final = _ExplainedWord("STOPS|NAME[:A=1,...]", _read_exposure)
+
+
+def _read_antialiasing(word: str) -> Antialiasing:
+    """Parse the name of temporal anti-aliasing, with fields."""
+    name, _, rest = word.partition(":")
+    name, fields = name.lower(), _read_fields(rest)
+    if name not in antialiasing:
+        known = [*antialiasing]
+        raise ValueError(f"is not one of {', '.join(known)}{did_you_mean(name, known)}")
+    return Antialiasing.from_dict(antialiasing[name].to_dict() | fields)
+
+
+#: The type of an option for temporal anti-aliasing.
+TAA: Final = _ExplainedWord("NAME[:A=1,...]", _read_antialiasing)
 
 _OPTION_TYPES: Final[Mapping[Kind, _ParamType]] = {
     "psf": _ExplainedWord("NAME[:A=1,...]|FILE", _read_psf),

@@ -11,7 +11,7 @@ from vkbloom._cli import no_bloom
 from vkbloom._cli.fields import SIZE, Command
 from vkbloom._cli.program import adapter_option, as_wrong_use
 from vkbloom._cli.scene_options import scene_options
-from vkbloom._cli.settings_options import timed_settings_options
+from vkbloom._cli.settings_options import taa_option, timed_settings_options
 from vkbloom._cli.terminal import note, say, tell_device
 from vkbloom._framebuffers import leading
 from vkbloom._renderer import frame_files
@@ -37,6 +37,7 @@ from vkbloom._settings.settings import SHADINGS, Settings, Shading
 @click.option("--framebuffers", metavar="all|NAME,...", default="all", help="What to write.")
 @adapter_option
 @scene_options
+@taa_option
 @timed_settings_options
 def command(
     *,

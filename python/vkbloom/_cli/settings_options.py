@@ -26,6 +26,7 @@ from vkbloom._presets.start import (
 )
 from vkbloom._renderer.default import take_exposure
 from vkbloom._renderer.frame_files import facts_of
+from vkbloom._settings.antialiasing import Antialiasing, antialiasing
 from vkbloom._settings.exposed import read_record
 from vkbloom._settings.exposure import MAX_SECONDS, Exposure
 from vkbloom._settings.fields import fields_of
@@ -71,6 +72,16 @@ def _settings_of(start: StartOptions, rest: dict[str, Any]) -> dict[str, Any]:
     if "expand" in rest:
         rest["expand"] = expand
     return {"settings": settings}
+
+
+def taa_option(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Add the option --taa to a command with stages in time."""
+    return click.option(
+        "--taa",
+        type=fields.TAA,
+        help="Temporal anti-aliasing of an engine, which mixes each frame with those before: "
+        f"{', '.join(antialiasing)}.",
+    )(command)
 
 
 #: What --exposure takes in commands with stages in time.
@@ -124,6 +135,7 @@ def start_options(command: Callable[..., Any], *, is_timed: bool = False) -> Cal
         exposure = take_exposure(shared.pop("exposure", None), shared)
         start = StartOptions(
             exposure=exposure,
+            taa=rest.pop("taa", None),
             preset=preset,
             method=method,
             stored=None if stored is None else read_settings(stored),
@@ -147,7 +159,7 @@ class StartOptions:
     """What the options of a call say of its settings, for `start_of`.
 
     - `stored`: What a file holds of settings.
-    - `exposure`: A stage in time.
+    - `exposure`, `taa`: Stages in time.
     - `expand`: What highlights are expanded up to, if the call says it.
     - `subimage`, `layer`, `colour`: How image files are read.
     """
@@ -158,6 +170,7 @@ class StartOptions:
     changes: dict[str, Any]
     expand: float | None
     exposure: Exposure | None = None
+    taa: Antialiasing | None = None
     subimage: int = 0
     layer: str | None = None
     colour: str | None = None
@@ -170,9 +183,9 @@ class StartOptions:
     @property
     def stages(self) -> Mapping[str, Any]:
         """The keywords of a call for its stages in time."""
-        if self.exposure is not None:
-            return {"exposure": self.exposure}
-        return {} if self.stored is None else self.stored.stages
+        given = {"exposure": self.exposure, "taa": self.taa}
+        stages = {name: stage for name, stage in given.items() if stage is not None}
+        return stages or ({} if self.stored is None else self.stored.stages)
 
     def of_file(self, image: str) -> Start:
         """Return where an image file starts; "": a scene."""

@@ -314,7 +314,7 @@ def _make(
     glows = read_glows(job.mask, job.emission, job.input_colour, is_blended=is_blended)
     reading = _Reading(itertools.chain([begun], frames), clip, start, job)
     given = job.start.stages
-    stages = {"exposure": given.get("exposure")}
+    stages = {name: given.get(name) for name in ("exposure", "taa")}
     how = {"framebuffers": ["final"]}
     work = work_of_images(lambda: renderer, glows.of, how, stages)
     state = given.get("state")
