@@ -49,7 +49,7 @@ def test_images_have_temporal_anti_aliasing(tmp_path: Path, frames: list[Path]) 
     for number, wanted in zip(NUMBERS, expected, strict=True):
         np.testing.assert_allclose(vkbloom.read(tmp_path / f"g.{number}.exr"), wanted, rtol=1e-6)
     # Such a file starts anew, since its history is not in it.
-    result = apply(frames[0], tmp_path / "again.exr", "--settings", tmp_path / "g.10.exr")
+    result = run("apply", frames[0], tmp_path / "again.exr", "--settings", tmp_path / "g.10.exr")
     assert result.exit_code == 0, result.stderr
     assert run("render", "-o", tmp_path / "a.png", "--taa", "bevi").exit_code == 2
     assert "did you mean 'bevy'" in run("render", "-o", tmp_path / "a.png", "--taa", "bevi").stderr

@@ -52,14 +52,14 @@ def test_the_motion_is_that_of_the_body(renderer: Renderer) -> None:
     assert 0.02 < surface.mean() < 0.98
     view = np.eye(4)
     view[:3, 3] = camera.position
-    now, before = (view @ model_view(turns) for turns in (0.2 + STEP, np.float32(0.2)))
+    now, before = (view @ model_view(turns) for turns in (0.2 + STEP, float(np.float32(0.2))))
     back = before @ np.linalg.inv(now)
     moved = position @ back[:3, :3].T + back[:3, 3]
     focal = 1 / math.tan(math.radians(camera.fov) / 2)
     scale = np.array([focal * SIZE[1] / SIZE[0], focal])
 
     def project(at: NDArray[np.float64]) -> NDArray[np.float64]:
-        return at[..., :2] * scale / -at[..., 2:]
+        return np.asarray(at[..., :2] * scale / -at[..., 2:])
 
     wanted = (project(position) - project(moved)) / 2
     found = second["motion"]
