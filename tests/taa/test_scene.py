@@ -154,6 +154,14 @@ def test_sequences_of_images(renderer: Renderer) -> None:
     assert frames[-1].state == mapped[-1].state
 
 
+def test_a_plan_has_the_stage(renderer: Renderer) -> None:
+    image = np.zeros((8, 12, 3), np.float32)
+    for source, given in ((image, {}), (SCENE, DEFERRED)):
+        plan = renderer.plan(source, BLOOM, taa="godot", **given)
+        call = renderer.render if source is SCENE else renderer.apply
+        assert list(plan.framebuffers) == list(call(source, BLOOM, taa="godot", **given))
+
+
 @pytest.mark.parametrize(("call", "error"), rows(__file__, "scenes"))
 def test_refused(renderer: Renderer, call: str, error: str) -> None:
     names = {"vkbloom": vkbloom, "renderer": renderer, "np": np, "SCENE": SCENE}

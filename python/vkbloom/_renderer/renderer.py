@@ -814,6 +814,7 @@ class Renderer:
         shading: Shading = "forward",
         framebuffers: Literal["all"] | str | Sequence[str] = "all",
         exposure: Exposure | str | None = None,
+        taa: Antialiasing | str | None = None,
     ) -> Plan:
         """Return the framebuffers and the passes of a call, without rendering.
 
@@ -827,8 +828,8 @@ class Renderer:
             Width and height of a scene's frame. Default: (1280, 720). Not for an image.
         shading : {"forward", "deferred"}
             Of a scene.
-        framebuffers, exposure
-            As for `apply`.
+        framebuffers, exposure, taa
+            As for `apply`; of images without motion and depth.
 
         Returns
         -------
@@ -858,7 +859,7 @@ class Renderer:
             kind, dtype = "image", np.dtype(name)
         else:
             width, height = check_size("size", SCENE_SIZE if size is None else size)
-        plan = self._core.plan(planned, self._expose(settings, exposure, None), names)
+        plan = self._core.plan(planned, self._expose(settings, exposure, None, taa), names)
         passes = tuple(
             Pass(name, shader, tuple(dict.fromkeys(reads)), writes, variant)
             for name, shader, reads, writes, variant, _ in plan.passes
