@@ -13,9 +13,8 @@ from numpy.typing import NDArray
 import vkbloom
 from tests.refusals import assert_refused, rows
 from vkbloom import Renderer
-from vkbloom.reference._antialiasing import Resolving
 
-from .test_device import ENGINES, share_of_close
+from .test_device import COPY, ENGINES, share_of_close
 
 SCENE = vkbloom.Scene.ufo()
 SIZE = (96, 64)
@@ -91,8 +90,10 @@ def test_the_reference(renderer: Renderer, name: str) -> None:
                 for other in before
                 if other in (f"history{what}", "history_motion")
             }
-            resolving = Resolving(taa, motion, depth, given)
-            wanted, kept = resolving.resolve(frames[source].astype(np.float64))
+            expected = vkbloom.reference.apply(
+                frames[source], COPY, taa=taa, motion=motion, depth=depth, state=given
+            )
+            wanted, kept = expected["resolved"], expected
             # Surfaces of one light have boxes without extent (see the module of moving frames).
             assert share_of_close(frames[f"resolved{what}"], wanted, 2e-3) >= 0.99
             assert frames[f"history{what}"].shape == kept["history"].shape
@@ -156,10 +157,10 @@ def test_sequences_of_images(renderer: Renderer) -> None:
 
 def test_a_plan_has_the_stage(renderer: Renderer) -> None:
     image = np.zeros((8, 12, 3), np.float32)
-    for source, given in ((image, {}), (SCENE, DEFERRED)):
-        plan = renderer.plan(source, BLOOM, taa="godot", **given)
-        call = renderer.render if source is SCENE else renderer.apply
-        assert list(plan.framebuffers) == list(call(source, BLOOM, taa="godot", **given))
+    plan = renderer.plan(image, BLOOM, taa="godot")
+    assert list(plan.framebuffers) == list(renderer.apply(image, BLOOM, taa="godot"))
+    plan = renderer.plan(SCENE, BLOOM, taa="godot", **DEFERRED)
+    assert list(plan.framebuffers) == list(renderer.render(SCENE, BLOOM, taa="godot", **DEFERRED))
 
 
 @pytest.mark.parametrize(("call", "error"), rows(__file__, "scenes"))
