@@ -21,7 +21,7 @@ from ._exposure.godot import GodotExposure
 from ._exposure.granite import GraniteExposure
 from ._exposure.o3de import O3deExposure
 from ._exposure.unity import HdrpExposure, PostProcessingExposure
-from ._fit import FitResult, fit, fit_pyramid, translate
+from ._fit import FitResult, RecoveredPSF, fit, fit_pyramid, recover_psf, translate
 from ._glare.dirt import Dirt
 from ._glare.flares import Ghosts, Halo
 from ._glare.streaks import Streaks
@@ -108,6 +108,7 @@ __all__ = [
     "PostProcessingExposure",
     "PygfxBloom",
     "Pyramid",
+    "RecoveredPSF",
     "Renderer",
     "Scene",
     "Separable",
@@ -137,6 +138,7 @@ __all__ = [
     "presets",
     "psf",
     "read",
+    "recover_psf",
     "reference",
     "render",
     "sequence",

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import functools
 import json
+import math
 from collections.abc import Callable, Sequence
 from typing import Any, get_args
 
@@ -83,7 +84,12 @@ def _search_options(
 def _show_results(fits: Sequence[FitResult], form: Form) -> None:
     """Print results, the best one first."""
     if form == "json":
-        click.echo(json.dumps([_object(item) for item in fits], indent=2))
+        objects = [_object(item) for item in fits]
+        for item, one in zip(fits, objects, strict=True):
+            if _has_intervals(item, fits):
+                one["intervals"] = _intervals_of(item)
+                one["undetermined"] = list(item.undetermined) if one["intervals"] else []
+        click.echo(json.dumps(objects, indent=2))
     else:
         for item in fits:
             click.echo(
@@ -94,6 +100,32 @@ def _show_results(fits: Sequence[FitResult], form: Form) -> None:
             settings = _in_four_digits(item) if is_translation else item.settings
             click.echo(f"  {as_code(settings)}")
             click.echo(f"  {item.words}")
+            if _has_intervals(item, fits):
+                click.echo(f"  {item.summary}")
+
+
+def _has_intervals(fit: FitResult, fits: Sequence[FitResult]) -> bool:
+    """Return whether intervals are printed: of what is close, and of the best."""
+    return fit is fits[0] or fit.verdict != "poor"
+
+
+def _find_intervals(fits: Sequence[FitResult]) -> list[FitResult]:
+    """Return results, sorted by loss, whose intervals are known before the renderer is closed."""
+    ordered = sorted(fits, key=lambda item: item.loss)
+    for item in ordered:
+        if _has_intervals(item, ordered):
+            _ = item.summary, _intervals_of(item)
+    return ordered
+
+
+def _intervals_of(fit: FitResult) -> dict[str, list[float | None]]:
+    """Return the intervals of 95 % as JSON has them: None for an end that is not determined."""
+    intervals: dict[str, list[float | None]] = {}
+    for name in fit.vary:
+        with contextlib.suppress(ValueError):  # a choice, or a loss without intervals
+            ends = fit.interval(name)
+            intervals[name] = [end if math.isfinite(end) else None for end in ends]
+    return intervals
 
 
 def _in_four_digits(fit: FitResult) -> Settings:
@@ -111,7 +143,7 @@ def _object(fit: FitResult) -> dict[str, Any]:
     """Return the object of one result that --json prints."""
     return {
         "settings": fit.settings.to_dict(),
-        "varied": {name: getattr(fit.settings, name) for name in fit.vary},
+        "varied": {name: fit.settings.value_of(name) for name in fit.vary},
         "loss": fit.loss,
         "start_loss": fit.start_loss,
         "loss_name": fit.loss_name,
@@ -172,7 +204,7 @@ def fit(
     There is one search for each preset and method, and for --settings, which starts from its
     settings. --vary names the settings that may change. The results are printed as Python code,
     sorted by loss, with a verdict (good, fair or poor) and the likely cause, such as a target
-    without bloom.
+    without bloom, and with the intervals of 95 % of the settings that were varied.
     """
     picture = read_picture(image, 0, input_colour)
     wanted = read_picture(target, 0, input_colour).pixels
@@ -189,12 +221,13 @@ def fit(
             note(f"{image}: its highlights are expanded to {start.expand:g} for {method}")
         searches.append((start.develop(picture), [start.settings]))
     with open_renderer(adapter) as renderer, as_wrong_use():
-        results = [
-            item
-            for source, settings in searches
-            for item in _fit.fit(source.pixels, wanted, settings, renderer=renderer, **search)
-        ]
-    return sorted(results, key=lambda item: item.loss)
+        return _find_intervals(
+            [
+                item
+                for source, settings in searches
+                for item in _fit.fit(source.pixels, wanted, settings, renderer=renderer, **search)
+            ]
+        )
 
 
 def _list_starts(
@@ -242,4 +275,5 @@ def translate(
         )
     start = presets[target] if target in presets else METHODS[target]()
     with open_renderer(adapter) as renderer, as_wrong_use():
-        return [_fit.translate(settings, start, size=size, renderer=renderer, **search)]
+        found = _fit.translate(settings, start, size=size, renderer=renderer, **search)
+        return _find_intervals([found])

@@ -17,13 +17,18 @@ from vkbloom import _core
 from vkbloom._argument_types import check_arguments
 from vkbloom._extras import import_extra
 from vkbloom._fit.descent import Descent, check_derivatives
+from vkbloom._fit.intervals import Intervals
+from vkbloom._fit.likelihood import Likelihood, Noise
 from vkbloom._fit.losses import Loss, Measure, find_loss, light, reduce
+from vkbloom._fit.rendering import Rendering
 from vkbloom._fit.result import FitResult, loss_text
 from vkbloom._fit.search import CLOSE, ENOUGH, Search
-from vkbloom._fit.space import Bounds, Space, space_of, spaces_of_all
+from vkbloom._fit.space import Bounds, Point, Space, space_of, spaces_of_all
+from vkbloom._fit.threads import one_thread
 from vkbloom._gradients import pullback_of
 from vkbloom._image_arguments import check_image
-from vkbloom._numbers import check_index
+from vkbloom._numbers import check_above, check_index
+from vkbloom._psf.base import PSF
 from vkbloom._public import public
 from vkbloom._renderer.default import default_renderer
 from vkbloom._renderer.image import Image
@@ -51,6 +56,7 @@ def fit(  # type: ignore[overload-overlap]  # "all" is a str, too
     renderer: Renderer | None = ...,
     max_calls: int = ...,
     gradient: bool = ...,
+    noise: float | NDArray[Any] | None = ...,
     progress: bool = ...,
 ) -> list[FitResult]: ...
 @overload
@@ -66,6 +72,7 @@ def fit(  # type: ignore[overload-overlap]  # a str is a sequence of str, too
     renderer: Renderer | None = ...,
     max_calls: int = ...,
     gradient: bool = ...,
+    noise: float | NDArray[Any] | None = ...,
     progress: bool = ...,
 ) -> FitResult: ...
 @overload
@@ -81,6 +88,7 @@ def fit(
     renderer: Renderer | None = ...,
     max_calls: int = ...,
     gradient: bool = ...,
+    noise: float | NDArray[Any] | None = ...,
     progress: bool = ...,
 ) -> list[FitResult]: ...
 @public("vkbloom")
@@ -97,6 +105,7 @@ def fit(
     renderer: Renderer | None = None,
     max_calls: int = 1000,
     gradient: bool = False,
+    noise: float | NDArray[Any] | None = None,
     progress: bool = False,
 ) -> FitResult | list[FitResult]:
     """Find the settings that make a given picture of an image.
@@ -136,6 +145,9 @@ def fit(
         Whether to search by the derivatives of `vjp`: fewer renders for many fields, but
         pullbacks take longer than renders. The varied fields must have a derivative and the loss
         must be "relative", "l2" or "log".
+    noise : float or ndarray, shape (H, W) or (H, W, 3), optional
+        The standard deviation of the target's values, for the intervals of the result; it does not
+        change what is found. Default: that of the residual, or that of rounding to 8 bits.
     progress : bool
         Whether to show a progress bar.
 
@@ -188,8 +200,10 @@ def fit(
         spaces = [space_of(each, names, *limits) for each in candidates]
     if gradient:
         check_derivatives(spaces, measure.loss, pixels)
+    deviation = _check_noise(noise, measure.target.shape)
     renderer = renderer or default_renderer()
     stages = _stages(renderer, framebuffer, image, pixels, measure)
+    rendering = Rendering(renderer, stages[-1].image, pixels, framebuffer)
     # All of them before the first is searched: the most likely failures come at once.
     narrow = _drop_ineffective if is_all else _refuse_ineffective
     spaces = [narrow(stages[-1], space) for space in spaces]
@@ -202,7 +216,11 @@ def fit(
             bar = _bar(space.start.method, max_calls)
         with bar as on_loss:
             new_search = _descent_of if gradient else _search_of
-            results.append(_fit_from(stages, space, max_calls, on_loss, new_search))
+            found, point = _fit_from(stages, space, max_calls, on_loss, new_search)
+        if measure.is_sum:
+            likelihood = Likelihood(space, measure, rendering, point, deviation)
+            found = dataclasses.replace(found, _intervals=Intervals(likelihood))
+        results.append(found)
     results.sort(key=lambda item: item.loss)
     return results if is_many else results[0]
 
@@ -244,6 +262,20 @@ def _check_names(vary: str | Sequence[str]) -> tuple[str, ...]:
     if len(set(names)) < len(names):
         raise ValueError(f"vary: {', '.join(names)} has a field twice")
     return names
+
+
+def _check_noise(noise: Any, shape: tuple[int, ...]) -> Noise | None:
+    """Return the standard deviation of a target's values, or raise TypeError or ValueError."""
+    if noise is None:
+        return None
+    if isinstance(noise, int | float):
+        return check_above("noise", noise, 0)
+    deviations = np.asarray(noise, np.float64)
+    if deviations.shape not in (shape, shape[:2]):
+        raise ValueError(f"noise: shape {deviations.shape} is not {shape[:2]} or {shape}")
+    if not (np.isfinite(deviations).all() and (deviations > 0).all()):
+        raise ValueError("noise: some values are not finite numbers above 0")
+    return deviations.copy()
 
 
 def _stages(
@@ -311,22 +343,6 @@ def _has_effect(stage: _Stage, space: Space, index: int) -> bool:
     return any(_core.dry_run(tuple(steps))[1:])
 
 
-@contextlib.contextmanager
-def _one_thread() -> Iterator[None]:
-    """Let BLAS compute in one thread.
-
-    Its other threads wait for work in a loop after each call. These are small here, and on a CPU
-    such threads take the cores from the device.
-    """
-    try:
-        import threadpoolctl  # noqa: PLC0415  an extra
-    except ModuleNotFoundError:  # only time is lost
-        yield
-        return
-    with threadpoolctl.threadpool_limits(1, user_api="blas"):
-        yield
-
-
 def _search_of(_: _Stage) -> type[Search]:
     return Search
 
@@ -341,8 +357,11 @@ def _fit_from(
     max_calls: int,
     on_loss: Callable[[float], None],
     new_search: Callable[[_Stage], Any],
-) -> FitResult:
-    """Return what is found from one start; `new_search` gives the class of search of a stage."""
+) -> tuple[FitResult, Point]:
+    """Return what is found from one start, and its coordinates.
+
+    `new_search` gives the class of search of a stage.
+    """
     history: list[float] = []
     best = None
     for stage in stages:
@@ -355,14 +374,14 @@ def _fit_from(
             on_loss=on_loss,
             close=_close(stage),
         )
-        with _one_thread():
+        with one_thread():
             if best is None:
                 search.run()
             else:
                 search.refine(best)
         history += search.history
         best = search.best
-    return _result(stages[-1], space, search, history)
+    return _result(stages[-1], space, search, history), search.best
 
 
 def _result(stage: _Stage, space: Space, last: Search, history: list[float]) -> FitResult:
@@ -374,7 +393,7 @@ def _result(stage: _Stage, space: Space, last: Search, history: list[float]) -> 
     if framebuffer == "final":
         bare = settings.replace(bloom=False, glare=())
         plain = light(renderer.apply(stage.image, bare, framebuffers=["final"])["final"])
-    with _one_thread():
+    with one_thread():
         explained = measure.explained_share(last.loss, plain)
     return FitResult(
         settings=settings,
@@ -397,7 +416,7 @@ def _close(stage: _Stage) -> float:
     """Return the loss below which a search only polishes, less for a faint bloom."""
     if stage.framebuffer != "final" or stage.pixels is None:
         return CLOSE
-    with _one_thread():
+    with one_thread():
         return float(np.clip(_FAINT * stage.measure(light(stage.pixels)), ENOUGH, CLOSE))
 
 
@@ -420,13 +439,19 @@ def _derivatives(stage: _Stage, settings: Settings) -> Callable[[NDArray[np.floa
     return back
 
 
-def _smaller(settings: Settings, factor: int) -> Settings:
+def _smaller(settings: Any, factor: int) -> Any:
     """Return settings that blur a reduced image as far as a share of its size."""
     if factor == 1:
         return settings
     changes: dict[str, Any] = {}
     if hasattr(settings, "blur_scale"):
         changes["blur_scale"] = settings.blur_scale / factor
+    if isinstance(psf := getattr(settings, "psf", None), PSF):
+        changes["psf"] = psf._in_larger_pixels(factor)
+    if getattr(settings, "pixels_per_degree", None) is not None:
+        changes["pixels_per_degree"] = settings.pixels_per_degree / factor
+    if getattr(settings, "kernel_size", None) is not None:
+        changes["kernel_size"] = tuple(max(1, side // factor) for side in settings.kernel_size)
     if settings.bloom_size is not None:
         changes["bloom_size"] = tuple(max(1, side // factor) for side in settings.bloom_size)
     return settings.replace(**changes)

@@ -88,6 +88,23 @@ class Measure:
         shares = reduce(self.saturated[:, :, np.newaxis].astype(np.float64), factor)
         return smaller._without(shares[:, :, 0] > 0)
 
+    def in_floats(self) -> Measure:
+        """Return the measure of framebuffers that are clipped like the target, but not rounded."""
+        return self if self.curve is None else dataclasses.replace(self, curve=_CONTINUOUS)
+
+    def level_deviations(self) -> NDArray[np.float64] | None:
+        """Return the standard deviation of each value of a target of 8 bits by its rounding.
+
+        The error of rounding is uniform over a level, so its variance is 1/12 of the level's
+        square: Bennett, "Spectra of Quantized Signals", Bell System Technical Journal 27(3), 1948.
+        """
+        if self.curve is None or self.curve.decode is None:
+            return None
+        level = self.curve.encode(np.clip(self.target, 0.0, 1.0))
+        ends = (np.clip(level + half / 255, 0.0, 1.0) for half in (-0.5, 0.5))
+        low, high = (self.curve.decode(end) for end in ends)
+        return np.asarray((high - low) / math.sqrt(12))
+
     def _without(self, saturated: NDArray[np.bool_]) -> Measure:
         """Return the measure without some pixels, or with all if nothing else would be left."""
         is_partial = saturated.any() and not saturated.all()

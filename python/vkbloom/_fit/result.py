@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Final, Literal
@@ -9,8 +10,11 @@ from typing import Any, Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from vkbloom._fit.intervals import Intervals
 from vkbloom._fit.losses import Loss
+from vkbloom._fit.threads import one_thread
 from vkbloom._locks import cached_property
+from vkbloom._numbers import check_number
 from vkbloom._public import public
 from vkbloom._renderer.frames import Frames
 from vkbloom._settings.settings import Settings
@@ -28,6 +32,8 @@ _FEW_VALUES: Final = 64
 # A target is clipped if at least this share of its pixels has its largest value.
 _CLIPPED: Final = 1e-3
 _PIXELS: Final = 2**16
+# Powers of fields that differ by less are equal.
+_ROUND: Final = 0.1
 
 Array = NDArray[np.float64]
 #: Whether a search came close to its target.
@@ -152,6 +158,18 @@ class FitResult:
     explained : float
         The share of the difference between target and `plain` that the bloom explains: 1 less the
         ratio of `loss` to the loss of `plain`. At most 1, and 0 or less if it explains nothing.
+    covariance : ndarray of float64, shape (n, n)
+        Of the n varied fields in the order of `vary`: infinite variances of those that are not
+        determined, NaN for flags, choices and integers. It and what follows take some renders when
+        they are asked for, by the default renderer if that of the fit is closed.
+    correlation : ndarray of float64, shape (n, n)
+        1 or -1 for fields of which only a combination is determined.
+    undetermined : tuple of dict of str to float
+        Combinations of fields that can change without a change of the picture. The weights are
+        relative changes of fields that are searched on logarithmic scales, such as 1 and -1 where
+        only the product of two counts; of others, changes as a share of their range.
+    summary : str
+        The intervals of 95 % and what is not determined in words.
     verdict : {"good", "fair", "poor"}
         Good: at least 0.95 are explained. Fair: 0.8. Poor: less, or no more than a change of each
         pixel's colour explains, such as brightness or contrast.
@@ -174,9 +192,10 @@ class FitResult:
     residual: NDArray[np.float64]
     plain: NDArray[np.float64]
     explained: float
+    _intervals: Intervals | None = None
 
     def __repr__(self) -> str:
-        values = ", ".join(f"{name}={_format(getattr(self.settings, name))}" for name in self.vary)
+        values = ", ".join(f"{name}={_format(self.settings.value_of(name))}" for name in self.vary)
         return (
             f"<vkbloom.FitResult of {self.settings.method}: {values}; loss {self.loss:.4g} after "
             f"{self.calls} calls; {self.verdict}>"
@@ -195,6 +214,91 @@ class FitResult:
         if self.verdict == "good":
             return ""
         return likely_cause(self.target, self.residual, self.plain, self.settings.method, self.vary)
+
+    @cached_property
+    def covariance(self) -> NDArray[np.float64]:
+        """The covariance of the varied fields, in the order of `vary`."""
+        with one_thread():
+            return self._known_intervals.covariance()
+
+    @cached_property
+    def correlation(self) -> NDArray[np.float64]:
+        """The correlation of the varied fields, -1 to 1, in the order of `vary`."""
+        with one_thread():
+            return self._known_intervals.correlation()
+
+    @cached_property
+    def undetermined(self) -> tuple[dict[str, float], ...]:
+        """The combinations of fields that the picture does not determine."""
+        with one_thread():
+            return self._known_intervals.undetermined()
+
+    def interval(self, name: str, level: float = 0.95) -> tuple[float, float]:
+        """Return the values of a varied field that the picture allows.
+
+        Parameters
+        ----------
+        name : str
+            A number or an integer of `vary`.
+        level : float
+            The share of pictures with other noise whose interval has the true value, between 0 and
+            1.
+
+        Returns
+        -------
+        (float, float)
+            An end is infinite if the picture does not determine it.
+
+        Raises
+        ------
+        ValueError
+            The field was not varied, or is a flag or a choice; the loss is "flip" or a callable,
+            which have no likelihood; or the image was an `Image` of a renderer that is closed.
+
+        Notes
+        -----
+        The estimate plus and minus quantiles of Student's distribution times the standard
+        deviation, where the sum of squares has that form. Elsewhere, as near the end of a range,
+        the profile likelihood: the values for which the least sum of squares over the other fields
+        is at most the quantile's square, in variances of the noise, above the least of all. Venzon
+        and Moolgavkar, Applied Statistics 37(1), 1988.
+        """
+        if name not in self.vary:
+            raise ValueError(f"name: {name!r} was not varied; these were: {', '.join(self.vary)}")
+        level = check_number("level", level, 0, 1)
+        if not 0 < level < 1:
+            raise ValueError(f"level: {level:g} is not between 0 and 1")
+        with one_thread():
+            return self._known_intervals.interval(name, level)
+
+    @cached_property
+    def summary(self) -> str:
+        """The intervals of 95 % of the varied fields, and what is not determined, as one line.
+
+        Where there are none, why.
+        """
+        try:
+            numbers = [name for name in self.vary if not self._known_intervals.is_choice(name)]
+            ends = {name: self.interval(name) for name in numbers}
+            groups = [group for group in self.undetermined if len(group) > 1]
+        except ValueError as error:
+            return str(error)
+        parts = [f"{name} {_interval_text(*pair)}" for name, pair in ends.items()]
+        free = [name for name, pair in ends.items() if not any(map(math.isfinite, pair))]
+        combined = {name for group in groups for name in group}
+        words = [name for name in free if name not in combined] + [*map(_product, groups)]
+        known = ", ".join(part for part, name in zip(parts, ends, strict=True) if name not in free)
+        texts = [f"95 %: {known}"] if known else []
+        return "; ".join([*texts, f"not determined: {', '.join(words)}"] if words else texts)
+
+    @property
+    def _known_intervals(self) -> Intervals:
+        if self._intervals is None:
+            raise ValueError(
+                f"loss: {self.loss_name!r} has no likelihood, so there are no intervals; fit with "
+                "'relative', 'l2' or 'log'"
+            )
+        return self._intervals
 
     @property
     def words(self) -> str:
@@ -220,6 +324,7 @@ class FitResult:
             "div",
             element("div", element("b", repr(self)[1:-1]), summary),
             element("div", self.words),
+            element("div", self.summary),
             pictures.thumbnails((name, pixels, f"1 is {unit:.4g}") for name, pixels, unit in shown),
             element("code", repr(self.settings), style=pictures.CODE),
             style="color:inherit;font-size:13px;max-width:68em",
@@ -230,6 +335,24 @@ class FitResult:
 def loss_text(loss: Loss) -> str:
     """Return the name of a loss."""
     return loss if isinstance(loss, str) else getattr(loss, "__name__", type(loss).__name__)
+
+
+def _interval_text(low: float, high: float) -> str:
+    if math.isinf(high):
+        return f"at least {low:.4g}"
+    return f"at most {high:.4g}" if math.isinf(low) else f"{low:.4g} to {high:.4g}"
+
+
+def _product(group: dict[str, float]) -> str:
+    """Return the powers of fields that can change together, as a product."""
+    least = min(map(abs, group.values()))
+    powers = {name: weight / least for name, weight in group.items()}
+    text = ""
+    for name, power in sorted(powers.items(), key=lambda item: item[1] < 0):
+        exponent = "" if abs(abs(power) - 1) < _ROUND else f"^{abs(power):.2g}"
+        sign = " * " if power > 0 else " / "
+        text += f"{sign if text else ''}{name}{exponent}"
+    return text
 
 
 def _format(value: Any) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 
 from vkbloom._numbers import check_number
 from vkbloom._settings.fields import FieldInfo, fields_of
-from vkbloom._settings.settings import Settings
+from vkbloom._settings.settings import Settings, field_info
 from vkbloom._spelling import did_you_mean
 
 #: Coordinates, 0 to 1, one for each axis.
@@ -24,6 +25,10 @@ AxisKind = Literal["number", "integer", "choice"]
 
 # A range this many times as wide as its scale is searched on a logarithmic scale.
 _WIDE: Final = 4.0
+# Numbers from one end to the other that is larger by this factor count by their size.
+_DECADE: Final = 10.0
+# A range without an end has the start this many times over and under.
+_AROUND: Final = 4.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,6 +39,8 @@ class VariedField:
     - `scale`: A number x is at log(1 + (x - low) / scale), so that steps are relative to x above
       the scale; None: at x.
     - `choices`: Of a choice or a flag.
+    - `ends_with_picture`: Whether values above `high` have the effect of `high`: a threshold above
+      the brightest value.
     """
 
     name: str
@@ -42,6 +49,13 @@ class VariedField:
     high: float = 1.0
     scale: float | None = None
     choices: tuple[Any, ...] = ()
+    ends_with_picture: bool = False
+
+    @property
+    def is_relative(self) -> bool:
+        """Whether changes of the number count by its size, as those of a factor."""
+        is_wide = self.scale is not None or self.high > _DECADE * self.low > 0
+        return self.kind == "number" and self.low >= 0 and is_wide
 
     def value(self, coordinate: float) -> Any:
         """Return the field's value at a coordinate."""
@@ -137,22 +151,23 @@ def space_of(
     fields = fields_of(type(settings))
     axes = []
     for name in vary:
-        if name not in fields:
+        if "." not in name and name not in fields:
             known = ", ".join(item for item in fields if variation_of(fields[item]))
             raise ValueError(
                 f"vary: the method {settings.method} has no field {name!r}"
                 f"{did_you_mean(name, fields) or ';'} it can vary {known}"
             )
-        kind = variation_of(fields[name])
+        info = _info_of(settings, name)
+        kind = variation_of(info)
         if kind is None:
             raise ValueError(
                 f"vary: {name!r} is not a number, a flag or a choice; fit weights by "
                 "vkbloom.fit_pyramid"
             )
         if kind == "choice":
-            axes.append(_choice(settings, fields[name], bounds))
+            axes.append(_choice(settings, info, bounds))
         else:
-            axes.append(_number(settings, fields[name], kind, bounds, (brightest, height)))
+            axes.append(_number(settings, info, kind, bounds, (brightest, height)))
     space = Space(start=settings, axes=tuple(axes))
     try:
         for end in (0.0, 1.0):
@@ -167,8 +182,16 @@ def space_of(
 
 def _start_value(settings: Settings, name: str) -> Any:
     """Return the value that the search starts from: no threshold is one of 0."""
-    value = getattr(settings, name)
+    value = settings.value_of(name)
     return 0.0 if value is None and name == "threshold" else value
+
+
+def _info_of(settings: Settings, name: str) -> FieldInfo:
+    """Return the description of a field by its whole name, or raise ValueError."""
+    try:
+        return dataclasses.replace(field_info(settings, name), name=name)
+    except ValueError as error:
+        raise ValueError(f"vary: {error}") from None
 
 
 def variation_of(info: FieldInfo) -> AxisKind | None:
@@ -179,7 +202,7 @@ def variation_of(info: FieldInfo) -> AxisKind | None:
         case "choice":
             return None if info.optional else "choice"
         case "number" | "integer":
-            return info.kind if info.is_bounded else None
+            return info.kind if info.ends is not None or info.is_bounded else None
         case _:
             return None
 
@@ -192,9 +215,17 @@ def _choice(settings: Settings, info: FieldInfo, bounds: Bounds) -> VariedField:
         raise ValueError(
             f"bounds: {name}: {unknown[0]!r} is not one of {', '.join(map(str, declared))}"
         )
-    if getattr(settings, name) not in choices:
-        choices = (getattr(settings, name), *choices)
+    if settings.value_of(name) not in choices:
+        choices = (settings.value_of(name), *choices)
     return VariedField(name=name, kind="choice", choices=choices)
+
+
+def _usual_range(info: FieldInfo, start: Any) -> tuple[float, float]:
+    """Return the range of a number without a largest value: its slider's, and around the start."""
+    low, high = info.ends or (0.0, 1.0)
+    if start is None:
+        return low, high
+    return min(low, start / _AROUND), max(high, start * _AROUND)
 
 
 def _number(
@@ -206,6 +237,7 @@ def _number(
 ) -> VariedField:
     name = info.name
     low, high = info.range or (0.0, 1.0)
+    ends_with_picture = False
     if name in bounds:
         given = bounds[name]
         if isinstance(given, str) or len(given) != 2:
@@ -213,8 +245,11 @@ def _number(
         low, high = (check_number(f"bounds: {name}", end, low, high) for end in given)
         if not low < high:
             raise ValueError(f"bounds: {name}: {low:g} is not less than {high:g}")
+    elif not info.is_bounded:
+        low, high = _usual_range(info, _start_value(settings, name))
     elif name == "threshold":
-        high = min(high, max(limits[0], 1e-3))
+        brightest = max(limits[0], 1e-3)
+        high, ends_with_picture = min(high, brightest), brightest < high
     elif info.unit == "pixel":
         high = min(high, max(limits[1], low + 1))
     value = _start_value(settings, name)
@@ -223,4 +258,11 @@ def _number(
     default = info.default if isinstance(info.default, int | float) else 0.0
     usual = max(abs(float(default)), abs(float(value))) or 1.0
     is_wide = low >= 0 and high - low > _WIDE * usual
-    return VariedField(name=name, kind=kind, low=low, high=high, scale=usual if is_wide else None)
+    return VariedField(
+        name=name,
+        kind=kind,
+        low=low,
+        high=high,
+        scale=usual if is_wide else None,
+        ends_with_picture=ends_with_picture,
+    )

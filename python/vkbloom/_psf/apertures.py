@@ -11,7 +11,7 @@ from numpy.typing import DTypeLike, NDArray
 
 from vkbloom._array_cache import keep
 from vkbloom._numbers import check_size
-from vkbloom._psf.base import Array, check_wavelengths, crop_or_pad
+from vkbloom._psf.base import PSF, Array, check_wavelengths, crop_or_pad
 from vkbloom._psf.sampled import SampledPSF
 from vkbloom._psf.values import ArrayValue
 from vkbloom._public import public
@@ -190,6 +190,9 @@ class aperture(SampledPSF):
     f_number: float = number_field(default=8.0, range=(0, math.inf), slider=(2, 64))
     pixel_pitch: float = number_field(default=4.0, range=(0, math.inf), unit="um", slider=(1, 20))
     wavelengths: tuple[float, ...] | None = value_field(None, unit="nm", read=_check_wavelengths)
+
+    def _in_larger_pixels(self, factor: float) -> PSF:
+        return dataclasses.replace(self, pixel_pitch=self.pixel_pitch * factor)
 
     def native_array(self) -> Array:
         return _pattern(self, _reach(self), _reach(self))

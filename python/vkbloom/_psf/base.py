@@ -135,6 +135,10 @@ class PSF(Record, abc.ABC):
         scale = max(frame) / FRAME_DEGREES if pixels_per_degree is None else pixels_per_degree
         return self.array(size or (2 * width - 1, 2 * height - 1), scale)
 
+    def _in_larger_pixels(self, factor: float) -> PSF:
+        """Return the function for pixels that are so many times as large, if it is known."""
+        return self
+
     def save(
         self,
         path: str | os.PathLike[str],

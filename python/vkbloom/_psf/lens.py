@@ -35,6 +35,9 @@ class gaussian(PSF):
 
     sigma: float = number_field(range=(0, math.inf), unit="pixel", slider=(0.1, 64))
 
+    def _in_larger_pixels(self, factor: float) -> PSF:
+        return dataclasses.replace(self, sigma=self.sigma / factor)
+
     def array(self, size: tuple[int, int], pixels_per_degree: float | None = None) -> Array:
         columns, rows = (self._shares(side) for side in check_size("size", size))
         return in_grey(np.outer(rows, columns))
@@ -94,6 +97,9 @@ class airy(PSF):
     def _scale(self) -> float:
         """Wavelength times f-number in pixels."""
         return self.wavelength * self.f_number / (1000 * self.pixel_pitch)
+
+    def _in_larger_pixels(self, factor: float) -> PSF:
+        return dataclasses.replace(self, pixel_pitch=self.pixel_pitch * factor)
 
     def array(self, size: tuple[int, int], pixels_per_degree: float | None = None) -> Array:
         peak = math.pi / (4 * self._scale**2)

@@ -41,6 +41,8 @@ BloomFormat = Literal[
 #: in time of a frame, as `ExposedSettings.to_record` has them.
 EXPANDED: Final = "vkbloom:expand"
 STAGES_IN_TIME: Final = "vkbloom:stages"
+#: How the names of a point-spread function's fields begin.
+_PSF: Final = "psf."
 SHADINGS: tuple[Shading, ...] = get_args(Shading)
 
 
@@ -206,20 +208,23 @@ class Settings(Record):
         ----------
         **changes
             New values by field. Those of a stage of `glare` have names such as
-            "glare.0.intensity": ``replace(**{"glare.0.intensity": 2})``.
+            "glare.0.intensity": ``replace(**{"glare.0.intensity": 2})``. Those of a point-spread
+            function have names such as "psf.sigma".
         """
         nested = {name: changes.pop(name) for name in [*changes] if "." in name}
+        of_psf = {name: nested.pop(name) for name in [*nested] if name.startswith(_PSF)}
+        if of_psf:
+            given: Any = changes.get("psf", getattr(self, "psf", None))
+            values = {_field_of_psf(given, name): value for name, value in of_psf.items()}
+            changes["psf"] = dataclasses.replace(given, **values)
         if nested:
             glare = _read_glare(changes.get("glare", self.glare))
             changes["glare"] = replace_stages(glare, nested)
         return dataclasses.replace(self, **changes)
 
     def value_of(self, name: str) -> Any:
-        """Return the value of a field, or of a stage's field, such as "glare.0.intensity"."""
-        if "." not in name:
-            return getattr(self, name)
-        index, field = stage_field_of(self.glare, name)
-        return getattr(self.glare[index], field)
+        """Return the value of a field, also of a stage's or a function's: "glare.0.intensity"."""
+        return getattr(*_owner_of(self, name))
 
     def _repr_html_(self) -> str:
         """Return a table of the fields that differ from the method's defaults."""
@@ -292,11 +297,31 @@ presets: Final[Presets[Settings]] = NAMED_SETTINGS
 
 
 def field_info(settings: Settings, name: str) -> FieldInfo:
-    """Return the description of a field, or of a stage's field, such as "glare.0.intensity"."""
+    """Return the description of a field, also of a stage's or a function's: "psf.sigma"."""
+    owner, field = _owner_of(settings, name)
+    return fields_of(type(owner))[field]
+
+
+def _owner_of(settings: Settings, name: str) -> tuple[Any, str]:
+    """Return the settings, stage or point-spread function that has a field, and its name there."""
     if "." not in name:
-        return fields_of(type(settings))[name]
+        return settings, name
+    if name.startswith(_PSF):
+        psf = getattr(settings, "psf", None)
+        return psf, _field_of_psf(psf, name)
     index, field = stage_field_of(settings.glare, name)
-    return fields_of(type(settings.glare[index]))[field]
+    return settings.glare[index], field
+
+
+def _field_of_psf(psf: Any, name: str) -> str:
+    """Return the field of a name such as "psf.sigma", or raise ValueError."""
+    field = name.removeprefix(_PSF)
+    known = fields_of(type(psf)) if isinstance(psf, Record) else {}
+    if field not in known:
+        near = did_you_mean(field, known) or f": {', '.join(known) or 'none'}"
+        of = type(psf).__name__ if known else "the method, which has no function"
+        raise ValueError(f"psf: {name!r} is not a field of {of}{near}")
+    return field
 
 
 def check_shading(shading: str) -> Shading:
