@@ -1,7 +1,6 @@
 """Recover the kernel of a lens from a pair: an image, and its picture through the lens.
 
-The bloom is linear in the kernel, so a pullback gives the derivative by each of its values, and
-L-BFGS finds the values, which are not negative.
+`vkbloom.recover_psf` finds the values, which are not negative, and how sure each of them is.
 
 python examples/gradients/recovered_psf.py recovered_psf.png
 """
@@ -9,11 +8,9 @@ python examples/gradients/recovered_psf.py recovered_psf.png
 from __future__ import annotations
 
 import sys
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import optimize
 
 import vkbloom
 
@@ -29,41 +26,17 @@ def lens() -> NDArray[np.float64]:
     return kernel / kernel.sum()
 
 
-def recover(
-    renderer: vkbloom.Renderer, image: NDArray[Any], picture: NDArray[Any]
-) -> NDArray[np.float64]:
-    """Return the kernel whose bloom of the image is the picture."""
-
-    def loss(values: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
-        kernel = values.reshape(SIDE, SIDE).astype(np.float32)
-        settings = vkbloom.Convolution(kernel, normalize=False)
-        frames, pullback = vkbloom.vjp(image, settings, renderer=renderer)
-        residual = frames["final"] - picture
-        slope = pullback({"final": residual})["kernel"].sum(axis=2)
-        return 0.5 * float(np.vdot(residual, residual)), slope.ravel().astype(np.float64)
-
-    start = np.full(SIDE * SIDE, 1 / SIDE**2)
-    found = optimize.minimize(
-        loss,
-        start,
-        jac=True,
-        method="L-BFGS-B",
-        bounds=[(1e-9, None)] * start.size,
-        options={"maxiter": 60},
-    )
-    kernel: NDArray[np.float64] = found.x.reshape(SIDE, SIDE)
-    return kernel
-
-
 def main(path: str) -> None:
     """Write the kernel that was found and the true one side by side."""
     truth = lens()
     image = (np.random.default_rng(2).random((48, 64, 3), np.float32) ** 10 * 10).astype(np.float32)
     with vkbloom.Renderer() as renderer:
         settings = vkbloom.Convolution(truth.astype(np.float32), normalize=False)
-        picture = renderer.apply(image, settings, framebuffers="final")["final"]
-        found = recover(renderer, image, picture)
+        picture = renderer.apply(image, settings, framebuffers="bloom")["bloom"][..., :3]
+    result = vkbloom.recover_psf(image, picture, size=(SIDE, SIDE))
+    found = result.kernels[0, 0].mean(axis=2)
     print(f"largest error: {np.abs(found - truth).max() / truth.max():.4f} of the kernel's maximum")
+    print(f"largest standard deviation: {result.error.max() / truth.max():.4f}")
     both = np.concatenate([found, truth], axis=1)[..., None].repeat(3, axis=2)
     shown = (both / truth.max()).astype(np.float32)
     vkbloom.write(path, np.clip(shown, 0, 1).repeat(16, axis=0).repeat(16, axis=1))

@@ -36,7 +36,8 @@ def test_best_first(files: tuple[str, str]) -> None:
     assert lines[0].startswith("separable: relative loss 0.")
     assert lines[1].startswith("  vkbloom.Separable(threshold=")
     assert lines[2].strip().partition(":")[0] in ("good", "fair")
-    assert lines[3].startswith("dual_kawase: ")
+    assert lines[3].startswith("  95 %: threshold ")
+    assert lines[4].startswith("dual_kawase: ")
 
 
 def test_a_poor_fit_says_so(files: tuple[str, str]) -> None:

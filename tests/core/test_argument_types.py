@@ -77,6 +77,7 @@ NEEDED: dict[str, Any] = {
     "source": IMAGE,
     "target": IMAGE,
     "glow": IMAGE,
+    "glared": IMAGE,
     "scene": IMAGE,
     "a": IMAGE,
     "b": IMAGE,

@@ -98,34 +98,39 @@ def test_a_field_of_kernels() -> None:
         scipy_signal.fftconvolve(share * image, kernel, mode="same")
         for share, kernel in zip(shares, truth, strict=True)
     )
-    noisy = clean + 0.01 * np.random.default_rng(5).standard_normal(image.shape)
-    found = vkbloom.recover_psf(
-        rgb(image), rgb(noisy), size=(side, side), positions=places, noise=0.01
-    )
-    assert found.kernels.shape == found.error.shape == (3, 3, side, side)
-    assert found.positions == tuple(tuple(map(float, one)) for one in places)
-    flat = found.kernels.reshape(9, side, side)
-    assert np.abs(flat - truth).max() < 0.15 * truth.max()
-    # The plain kernel of the middle is far from those of the corners.
-    assert np.abs(flat - truth).mean() < 0.2 * np.abs(truth[4] - truth[0]).mean()
-    within = np.abs(flat - truth) <= 1.96 * found.error.reshape(flat.shape)
-    assert 0.93 <= within.mean() <= 0.98
+    within = []
+    for seed in range(4):
+        noisy = clean + 0.01 * np.random.default_rng([seed, 5]).standard_normal(image.shape)
+        found = vkbloom.recover_psf(
+            rgb(image), rgb(noisy), size=(side, side), positions=places, noise=0.01
+        )
+        assert found.kernels.shape == found.error.shape == (3, 3, side, side)
+        assert found.positions == tuple(tuple(map(float, one)) for one in places)
+        errors = np.abs(found.kernels.reshape(9, side, side) - truth)
+        assert errors.max() < 0.1 * truth.max()
+        # Each position has its own kernel, not the mean of all.
+        assert errors.mean() < 0.4 * np.abs(truth - truth.mean(axis=0)).mean()
+        within.append(errors <= 1.96 * found.error.reshape(errors.shape))
+    assert 0.92 <= np.mean(within) <= 0.98
 
 
 def test_ignored_pixels_and_channels() -> None:
-    """Masked and non-finite pixels have no effect; each channel has its own kernel."""
+    """Masked and non-finite pixels have no effect; each channel has its own kernel.
+
+    Its orientation and centre are those of `Convolution`.
+    """
     image = np.stack([photograph(64, 48, seed) for seed in (1, 2, 3)], axis=2)
-    made = kernels(5)
-    names = ("glare", "blur", "star")
-    picture = np.stack(
-        [glare(image[..., i], made[name], i, 1e-3) for i, name in enumerate(names)], axis=2
-    )
+    truth = np.random.default_rng(2).random((4, 5, 3)) ** 4
+    lens = vkbloom.Convolution(truth, normalize=False, composite="mix", intensity=1.0)
+    picture = vkbloom.reference.apply(image.astype(np.float32), lens)["final"]
+    exact = vkbloom.recover_psf(image, picture, size=(5, 4))
+    np.testing.assert_allclose(exact.psf.values.array, truth, atol=1e-3)
+    picture += 1e-3 * np.random.default_rng(4).standard_normal(picture.shape)
     mask = np.zeros(image.shape[:2], np.bool_)
     mask[10:14, 20:30] = True
     picture[mask] = 100
     picture[30, 30] = np.nan
-    found = vkbloom.recover_psf(image, picture, size=(5, 5), mask=mask)
-    truth = np.stack([made[name] for name in names], axis=2)
+    found = vkbloom.recover_psf(image, picture, size=(5, 4), mask=mask)
     np.testing.assert_allclose(found.psf.values.array, truth, atol=0.02)
     assert found.error.shape == truth.shape
     assert not found.residual[mask].any()

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from vkbloom import _core
 from vkbloom._argument_types import check_arguments
+from vkbloom._arrays import plain_array
 from vkbloom._extras import import_extra
 from vkbloom._fit.descent import Descent, check_derivatives
 from vkbloom._fit.intervals import Intervals
@@ -124,7 +125,8 @@ def fit(
         every preset; of a preset those of the varied fields vary that it has and that have an
         effect.
     vary : str or sequence of str
-        The fields to find: numbers, integers, flags and choices.
+        The fields to find: numbers, integers, flags and choices, also of stages and point-spread
+        functions: "glare.0.intensity", "psf.sigma".
     framebuffer : str
         The framebuffer to compare. ``final`` is the picture with its bloom, ``bloom`` the bloom
         alone before `intensity`.
@@ -176,7 +178,7 @@ def fit(
 
     A bloom may not tell its parameters: a threshold under all light, a knee without a threshold, or
     a product of two factors. Then the loss is small, and the parameters are some of those that
-    have it.
+    have it. `FitResult.interval` and `FitResult.undetermined` say so.
     """
     is_all = isinstance(settings, str) and settings == "all"
     is_many = is_all or not isinstance(settings, Settings | str)
@@ -191,7 +193,9 @@ def fit(
     if renderer is None and isinstance(image, Image):
         raise ValueError("renderer: an uploaded image needs the renderer that has it")
     pixels = None if isinstance(image, Image) else check_image(image)
-    measure = Measure.of(check_image(target, "target"), find_loss(loss))
+    wanted = check_image(target, "target")
+    deviation = _check_noise(noise, wanted.shape[:2])
+    measure = Measure.of(wanted, find_loss(loss))
     brightest = math.inf if pixels is None else float(light(pixels).max())
     limits = (bounds or {}, brightest, len(measure.target))
     if is_all:
@@ -200,7 +204,6 @@ def fit(
         spaces = [space_of(each, names, *limits) for each in candidates]
     if gradient:
         check_derivatives(spaces, measure.loss, pixels)
-    deviation = _check_noise(noise, measure.target.shape)
     renderer = renderer or default_renderer()
     stages = _stages(renderer, framebuffer, image, pixels, measure)
     rendering = Rendering(renderer, stages[-1].image, pixels, framebuffer)
@@ -264,18 +267,21 @@ def _check_names(vary: str | Sequence[str]) -> tuple[str, ...]:
     return names
 
 
-def _check_noise(noise: Any, shape: tuple[int, ...]) -> Noise | None:
+def _check_noise(noise: Any, size: tuple[int, ...]) -> Noise | None:
     """Return the standard deviation of a target's values, or raise TypeError or ValueError."""
     if noise is None:
         return None
     if isinstance(noise, int | float):
         return check_above("noise", noise, 0)
-    deviations = np.asarray(noise, np.float64)
-    if deviations.shape not in (shape, shape[:2]):
-        raise ValueError(f"noise: shape {deviations.shape} is not {shape[:2]} or {shape}")
+    given = plain_array(noise, "noise")
+    if given.dtype.kind not in "fiu":
+        raise TypeError(f"noise: {given.dtype} is not a type of real numbers")
+    deviations = given.astype(np.float64)
+    if deviations.shape not in (size, (*size, 3)):
+        raise ValueError(f"noise: shape {deviations.shape} is not {size} or {(*size, 3)}")
     if not (np.isfinite(deviations).all() and (deviations > 0).all()):
         raise ValueError("noise: some values are not finite numbers above 0")
-    return deviations.copy()
+    return deviations
 
 
 def _stages(

@@ -15,7 +15,7 @@ from vkbloom._argument_types import check_arguments
 from vkbloom._extras import import_extra
 from vkbloom._fit.losses import light
 from vkbloom._image_arguments import check_image
-from vkbloom._numbers import check_above, check_size
+from vkbloom._numbers import check_above, check_floats, check_size
 from vkbloom._psf.base import PSF, functions
 from vkbloom._psf.sampled import samples
 from vkbloom._public import public
@@ -25,6 +25,8 @@ Array = NDArray[np.float64]
 _TILE: Final = 64
 # Exponents of the strength of the regularization, beside the mean of the picture's products.
 _STRENGTHS: Final = (-10.0, 4.0)
+# The least share of the picture's square that is noise: single floats round.
+_ROUNDED: Final = 1e-13
 # How many values are drawn to scale the errors, in how many pictures at least.
 _DRAWN: Final = 8000
 _MIN_DRAWS: Final = 2
@@ -181,11 +183,11 @@ def _weights_of(
     """Return the share of each kernel at each pixel, (gy * gx, H, W), and the positions."""
     if positions is None:
         return np.ones((1, *shape)), ((), ())
-    if len(positions) != 2:
+    if not hasattr(positions, "__len__") or len(positions) != 2:
         raise ValueError("positions: it is not a pair, the x of columns and the y of rows")
     shares, grid = [], []
     for name, given, side in zip("xy", positions, shape[::-1], strict=True):
-        places = np.asarray(given, np.float64)
+        places = np.array(check_floats("positions", given))
         if places.ndim != 1 or not len(places) or not (np.diff(places) > 0).all():
             raise ValueError(f"positions: those along {name} are not numbers that increase")
         hats = [np.interp(np.arange(side), places, row) for row in np.eye(len(places))]
@@ -286,9 +288,8 @@ class _Equations:
             rest = self.total - float(self.products @ linalg.cho_solve(factor, self.products))
             volume = 2 * float(np.log(np.diag(factor[0])).sum())
             volume -= len(self.square) * np.log(10) * strength
-            return volume + (
-                rest / noise**2 if noise else self.count * float(np.log(max(rest, 1e-300)))
-            )
+            rest = max(rest, _ROUNDED * self.total)
+            return volume + (rest / noise**2 if noise else self.count * float(np.log(rest)))
 
         best = optimize.minimize_scalar(
             misfit, bounds=_STRENGTHS, method="bounded", options={"xatol": 0.1}
@@ -306,7 +307,7 @@ class _Equations:
     def deviation(self, inverse: Array) -> float:
         """Return the standard deviation of what the kernels do not explain."""
         rest = self.total - float(self.products @ inverse @ self.products)
-        return float(np.sqrt(max(rest, 0.0) / self.count))
+        return float(np.sqrt(max(rest, _ROUNDED * self.total) / self.count))
 
 
 def _roughness(size: tuple[int, int]) -> Array:
