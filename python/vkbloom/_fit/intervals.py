@@ -293,6 +293,7 @@ class _Side:
         point[self._index] = coordinate
         residual = self._likelihood.residual(point)
         point, residual = self._likelihood.minimize(point, residual, self._others, jacobian)
+        point, residual = self._without_bloom(point, residual)
         above = (float(residual @ residual) - optimum.square) / self._variance
         if above < -_LOWER:
             raise _LowerError(point)
@@ -300,6 +301,21 @@ class _Side:
         self._visited.append((coordinate, profile))
         self._last = point
         return profile
+
+    def _without_bloom(self, point: Point, residual: Array) -> tuple[Point, Array]:
+        """Return a place, or that with a threshold above every pixel if it is better.
+
+        No derivative leads there.
+        """
+        for index in self._others:
+            is_above = float(residual @ residual) > self._optimum.square + self._variance
+            if is_above and self._likelihood.space.axes[index].ends_with_picture:
+                other = point.copy()
+                other[index] = 1 - EDGE
+                there = self._likelihood.residual(other)
+                if there @ there < residual @ residual:
+                    point, residual = other, there
+        return point, residual
 
     @property
     def is_quadratic(self) -> bool:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any, Final, cast
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -185,9 +185,10 @@ def _weights_of(
         return np.ones((1, *shape)), ((), ())
     if not hasattr(positions, "__len__") or len(positions) != 2:
         raise ValueError("positions: it is not a pair, the x of columns and the y of rows")
-    shares, grid = [], []
+    shares: list[Array] = []
+    grid: list[tuple[float, ...]] = []
     for name, given, side in zip("xy", positions, shape[::-1], strict=True):
-        places = np.array(check_floats("positions", given))
+        places: Array = np.array(check_floats("positions", cast("Any", given)), np.float64)
         if places.ndim != 1 or not len(places) or not (np.diff(places) > 0).all():
             raise ValueError(f"positions: those along {name} are not numbers that increase")
         hats = [np.interp(np.arange(side), places, row) for row in np.eye(len(places))]
@@ -208,7 +209,7 @@ def _recover(
     square, products = _normal_equations(sources, target, used, size)
     facts = _Equations(square, products, float(target[used] @ target[used]), count, size)
     regular = facts.regular(noise)
-    inverse = np.linalg.inv(regular)
+    inverse: Array = np.asarray(np.linalg.inv(regular), np.float64)
     deviation: float = noise or facts.deviation(inverse)
     values = _nonnegative(regular, products, inverse @ products)
     error = deviation * np.sqrt(np.diag(inverse))
@@ -289,7 +290,8 @@ class _Equations:
             volume = 2 * float(np.log(np.diag(factor[0])).sum())
             volume -= len(self.square) * np.log(10) * strength
             rest = max(rest, _ROUNDED * self.total)
-            return volume + (rest / noise**2 if noise else self.count * float(np.log(rest)))
+            fit = rest / noise**2 if noise else self.count * float(np.log(rest))
+            return float(volume + fit)
 
         best = optimize.minimize_scalar(
             misfit, bounds=_STRENGTHS, method="bounded", options={"xatol": 0.1}
