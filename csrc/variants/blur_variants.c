@@ -130,6 +130,15 @@ struct bloom {
     double gain;
 };
 
+// Whether the transpose of a filter is this one row: the first of two has one of the axes.
+static bool runs_whole(const struct vkb_pass_row *row, const struct vkb_filter *filter)
+{
+    const int32_t direction = row->constants.direction;
+
+    return direction == DIRECTION_BOTH
+        || vkb_axis_is_identity(direction == DIRECTION_VERTICAL ? &filter->x : &filter->y);
+}
+
 // Whether the row ends a filter along both axes by kernels that are not longer than `radius`, of an
 // image of the target's size: *from. It sets the kernels.
 static bool find_kernels(const struct vkb_pass_row *last, int radius, struct bloom *bloom,
@@ -138,7 +147,8 @@ static bool find_kernels(const struct vkb_pass_row *last, int radius, struct blo
     const struct vkb_filter *filter = last->joined_count == 1 ? last->joined : last->filters;
 
     if (!filter || filter->kernels > 1 || filter->x.from != filter->x.to
-        || filter->y.from != filter->y.to)
+        || filter->y.from != filter->y.to
+        || (last->transposed && last->joined_count != 1 && !runs_whole(last, filter)))
         return false;
     bloom->rows = vkb_texel_kernel(&filter->x, (uint32_t)radius);
     bloom->columns = vkb_texel_kernel(&filter->y, (uint32_t)radius);

@@ -369,6 +369,9 @@ TRANSPOSED: tuple[tuple[str, Any, tuple[int, ...], str, tuple[str, ...]], ...] =
     ("gpu", Separable(bloom_scale=0.5), (66, 134, 3), "f4", (LEVELS,) * 4),
     ("gpu", Separable(bloom_scale=0.25, blur_scale=2), (66, 135, 3), "f4", (LEVELS,)),
     ("gpu", ThreeBloom(), (72, 140, 4), "f4", (LEVELS,) * 18),
+    # Short kernels along one axis, of a filter with two rows.
+    ("gpu", vkbloom.presets["unreal"], (40, 60, 3), "f4", (TILES[1], *(LEVELS,) * 7)),
+    ("cpu", vkbloom.presets["unreal"], (40, 60, 3), "f4", (TAPS,) * 17),
     # Pictures of groups of taps, in one pass.
     ("gpu", Pyramid(levels=1, firefly_filter=True), (34, 70, 3), "f4", (LEVELS,) * 2),
     ("gpu", KinoBloom(radius=1.0), (20, 36, 3), "f4", (LEVELS,) * 3),
