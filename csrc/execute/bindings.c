@@ -72,7 +72,8 @@ static bool create_layouts(const struct vkb_device *device, struct vkb_pass_layo
     };
 
     for (uint32_t i = 0; i < layouts->count; ++i) {
-        const uint32_t number = layouts->draw || i + 1 < layouts->count ? i + 1 : TARGET_BINDING;
+        const uint32_t read = layouts->count - layouts->stored;
+        const uint32_t number = i < read ? i + 1 : TARGET_BINDING + i - read;
         rows[i + 1] = (VkDescriptorSetLayoutBinding){
             .binding = number,
             .descriptorType = layouts->descriptors[number - 1],
@@ -90,21 +91,29 @@ void vkb_bindings_destroy(const struct vkb_device *device, struct vkb_bindings *
     for (size_t i = 0; i < bindings->layout_count; ++i)
         vkb_layouts_destroy(device, &bindings->layouts[i].made);
     vkb_free(bindings->layouts);
-    device->vk.vkDestroySampler(device->handle, bindings->filter, NULL);
-    device->vk.vkDestroySampler(device->handle, bindings->nearest, NULL);
+    for (size_t i = 0; i < VKB_SAMPLINGS; ++i)
+        device->vk.vkDestroySampler(device->handle, bindings->samplers[i], NULL);
     *bindings = (struct vkb_bindings){0};
 }
 
 bool vkb_bindings_sampler(const struct vkb_device *device, struct vkb_bindings *bindings,
-                          enum vkb_format format, VkSampler *sampler, struct vkb_error *error)
+                          enum vkb_format format, uint32_t sampling, VkSampler *sampler,
+                          struct vkb_error *error)
 {
+    static const VkSamplerAddressMode borders[] = {
+        VK_SAMPLER_ADDRESS_MODE_CLAMP_TO_EDGE,
+        VK_SAMPLER_ADDRESS_MODE_REPEAT,
+        VK_SAMPLER_ADDRESS_MODE_MIRRORED_REPEAT,
+        VK_SAMPLER_ADDRESS_MODE_CLAMP_TO_BORDER,  // zeros by default
+    };
     const bool filters =
-        vkb_device_supports(device, format, VK_FORMAT_FEATURE_SAMPLED_IMAGE_FILTER_LINEAR_BIT);
-    VkSampler *kept = filters ? &bindings->filter : &bindings->nearest;
+        !(sampling & VKB_SAMPLING_NEAREST)
+        && vkb_device_supports(device, format, VK_FORMAT_FEATURE_SAMPLED_IMAGE_FILTER_LINEAR_BIT);
+    VkSampler *kept = &bindings->samplers[filters ? sampling : sampling | VKB_SAMPLING_NEAREST];
 
     if (!*kept
         && !vkb_sampler_create(device, filters ? VK_FILTER_LINEAR : VK_FILTER_NEAREST,
-                               VK_SAMPLER_ADDRESS_MODE_CLAMP_TO_EDGE, kept, error))
+                               borders[sampling / VKB_SAMPLING_REPEAT], kept, error))
         return false;
     *sampler = *kept;
     return true;
@@ -129,10 +138,10 @@ VkPipelineBindPoint vkb_pass_bind_point(const struct vkb_pass_row *pass)
                                                    : VK_PIPELINE_BIND_POINT_GRAPHICS;
 }
 
-// The descriptors after the parameters: the images read, the resources, the target of a dispatch.
+// The descriptors after the parameters: the images read, the resources, a dispatch's targets.
 static struct vkb_pass_layouts described(const struct vkb_pass_row *pass)
 {
-    // Of the images read and of the target.
+    // Of the images read and of the targets.
     static const VkDescriptorType types[][2] = {
         [VKB_READING_SAMPLED] = {VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER,
                                  VK_DESCRIPTOR_TYPE_STORAGE_IMAGE},
@@ -155,10 +164,10 @@ static struct vkb_pass_layouts described(const struct vkb_pass_row *pass)
         layouts.descriptors[layouts.count++] = types[pass->reading][0];
     for (uint32_t i = 0; i < pass->resource_count; ++i)
         layouts.descriptors[layouts.count++] = resource_types[pass->resources[i]->kind];
-    if (!layouts.draw) {
-        layouts.descriptors[TARGET_BINDING - 1] = types[pass->reading][1];
-        ++layouts.count;
-    }
+    layouts.stored = layouts.draw ? 0 : pass->target_count;
+    for (uint32_t i = 0; i < layouts.stored; ++i)
+        layouts.descriptors[TARGET_BINDING - 1 + i] = types[pass->reading][1];
+    layouts.count += layouts.stored;
     return layouts;
 }
 

@@ -30,6 +30,7 @@ bool vkb_sampler_create(const struct vkb_device *device, VkFilter filter,
 // The layouts for passes with these descriptors after the parameters.
 struct vkb_pass_layouts {
     bool draw;
+    uint32_t stored;  // targets of a dispatch
     enum vkb_reading reading;
     VkDescriptorType descriptors[VKB_MAX_DESCRIPTORS];
     uint32_t count;
@@ -37,7 +38,7 @@ struct vkb_pass_layouts {
 };
 
 struct vkb_bindings {
-    VkSampler filter, nearest;
+    VkSampler samplers[VKB_SAMPLINGS];
     struct vkb_pass_layouts *layouts;
     size_t layout_count, layout_capacity;
 };
@@ -46,9 +47,10 @@ struct vkb_bindings {
 void vkb_bindings_destroy(const struct vkb_device *device, struct vkb_bindings *bindings);
 
 // The sampler for images of the format. If the device cannot filter the format, shaders only fetch
-// texels from it.
+// texels from it. `sampling`: of VKB_SAMPLING_*.
 bool vkb_bindings_sampler(const struct vkb_device *device, struct vkb_bindings *bindings,
-                          enum vkb_format format, VkSampler *sampler, struct vkb_error *error);
+                          enum vkb_format format, uint32_t sampling, VkSampler *sampler,
+                          struct vkb_error *error);
 
 // Creates the layouts of a pass, if they are not there. *number differs between layouts.
 bool vkb_bindings_prepare(const struct vkb_device *device, struct vkb_bindings *bindings,

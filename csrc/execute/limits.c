@@ -34,8 +34,8 @@ static bool check_needs(const struct vkb_device *device, const struct vkb_pass_r
     const uint32_t *threads = pass->shader->threads, *size = limits->maxComputeWorkGroupSize;
     uint32_t counts[VKB_RESOURCE_KINDS] = {
         [VKB_RESOURCE_TEXTURE] = pass->read_count,
-        [VKB_RESOURCE_IMAGE] = dispatch,  // the target
-        [VKB_RESOURCE_UNIFORM] = 1,       // the parameters
+        [VKB_RESOURCE_IMAGE] = dispatch ? pass->target_count : 0,
+        [VKB_RESOURCE_UNIFORM] = 1,  // the parameters
     };
     for (uint32_t i = 0; i < pass->resource_count; ++i)
         ++counts[pass->resources[i]->kind];

@@ -135,7 +135,8 @@ static bool create_module(const struct vkb_device *device, const struct vkb_shad
     uint32_t *folded = NULL;
     size_t size = shader->size;
 
-    if (!vkb_driver_folds && !vkb_specialize(shader, constants, &folded, &size, error))
+    if (!vkb_driver_folds && vkb_has_constants(shader)
+        && !vkb_specialize(shader, constants, &folded, &size, error))
         return false;
     const bool done =
         VK(error,

@@ -27,7 +27,7 @@ static bool record(struct vkb_run *run, struct vkb_image *image, struct vkb_erro
 
     vkb_image_fill(device, commands, image, frame->constants.handle, 0);
     vkb_image_transition(device, commands, image, VKB_ACCESS_DISPATCH_SAMPLED);
-    if (!vkb_bindings_sampler(device, &frame->pipelines.bindings, image->format,
+    if (!vkb_bindings_sampler(device, &frame->pipelines.bindings, image->format, 0,
                               &work.image.sampler, error)
         || !vkb_strided_copy_create(device, frame->pipelines.cache, work.kind,
                                     &frame->strided_copies, error)

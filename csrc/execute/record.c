@@ -43,7 +43,7 @@ static bool read_image(struct vkb_run *run, const struct vkb_pass_row *pass,
     };
     return texture || pass->reading != VKB_READING_SAMPLED
         || vkb_bindings_sampler(run->device, &run->frame->pipelines.bindings, image->format,
-                                &info->sampler, error);
+                                pass->sampling[index], &info->sampler, error);
 }
 
 // Rows of a dispatch's target that one storage buffer descriptor covers, and their place.
@@ -95,7 +95,7 @@ static bool write_read(struct vkb_run *run, const struct binding *binding, uint3
     return vkb_image_linear_texels(run->device, image, error);
 }
 
-// Fills the set with the parameters, the images read, the resources and the target of a dispatch.
+// Fills the set with the parameters, the images read, the resources, and a dispatch's targets.
 static bool write_descriptors(struct vkb_run *run, const struct binding *binding,
                               const struct vkb_pass_layouts *layouts, VkDescriptorSet set,
                               struct vkb_error *error)
@@ -125,15 +125,15 @@ static bool write_descriptors(struct vkb_run *run, const struct binding *binding
         ++write_count;
     }
     const uint32_t last = image_count + pass->resource_count;
-    if (pass->geometry == VKB_GEOMETRY_DISPATCH) {
-        const struct vkb_image *target = &run->images[pass->targets[0]]->image;
-        images[last] = (VkDescriptorImageInfo){
+    for (uint32_t i = 0; i < layouts->stored; ++i) {
+        const struct vkb_image *target = &run->images[pass->targets[i]]->image;
+        images[last + i] = (VkDescriptorImageInfo){
             .imageView = target->view,
             .imageLayout = vkb_image_layout(target, VKB_ACCESS_DISPATCH_STORED),
         };
         writes[write_count++] = (VkWriteDescriptorSet){
-            .dstBinding = TARGET_BINDING,
-            .pImageInfo = &images[last],
+            .dstBinding = TARGET_BINDING + i,
+            .pImageInfo = &images[last + i],
             .pBufferInfo = binding->band ? &binding->band->buffer : NULL,
         };
     }
@@ -453,8 +453,8 @@ static bool record_passes(struct vkb_run *run, uint32_t first, uint32_t end,
     transition_reads(run, first, end);
     if (draws)
         begin_rendering(run, pass);
-    else
-        vkb_image_transition(device, commands, &run->images[pass->targets[0]]->image,
+    for (uint32_t i = 0; !draws && i < pass->target_count; ++i)
+        vkb_image_transition(device, commands, &run->images[pass->targets[i]]->image,
                              vkb_pass_in_place(pass) ? VKB_ACCESS_DISPATCH_CHANGED
                                                      : VKB_ACCESS_DISPATCH_STORED);
     for (uint32_t i = first; i < end; ++i)

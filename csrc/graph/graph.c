@@ -190,7 +190,7 @@ static void pack_hash(const struct vkb_shader *shader, unsigned char *bytes, siz
 // clang-format off
 #define PACKED_FIELDS(PACK) \
     PACK(name) PACK(geometry) PACK(textured) PACK(constants) PACK(reads) PACK(read_count) \
-    PACK(reading) PACK(fused) PACK(block_width) PACK(block_height) PACK(groups_width) \
+    PACK(sampling) PACK(reading) PACK(fused) PACK(block_width) PACK(block_height) PACK(groups_width) \
     PACK(groups_height) PACK(targets) PACK(target_count) PACK(depth) PACK(load) PACK(blend) \
     PACK(turn) PACK(block)
 // clang-format on

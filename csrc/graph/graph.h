@@ -20,7 +20,7 @@ enum {
     // That a method brings along, and that a pass binds.
     VKB_MAX_RESOURCES = 16,
     // Of a pass, beside its parameters.
-    VKB_MAX_DESCRIPTORS = VKB_MAX_READS + VKB_MAX_RESOURCES + 1,
+    VKB_MAX_DESCRIPTORS = VKB_MAX_READS + VKB_MAX_RESOURCES + VKB_MAX_TARGETS,
 };
 
 #define VKB_NO_IMAGE UINT32_MAX
@@ -116,6 +116,16 @@ enum vkb_reading {
                                 // the host
 };
 
+// How a sampler reads an image: filtered where the device can, and clamped to the edge; or as these
+// bits say. What is beyond the edge is repeated, mirrored, or zero.
+enum {
+    VKB_SAMPLING_NEAREST = 1,
+    VKB_SAMPLING_REPEAT = 2,
+    VKB_SAMPLING_MIRROR = 4,
+    VKB_SAMPLING_ZERO = 6,
+    VKB_SAMPLINGS = 8,
+};
+
 enum vkb_load { VKB_LOAD_DISCARD, VKB_LOAD_CLEAR };
 enum vkb_blend {
     VKB_BLEND_NONE,
@@ -132,8 +142,9 @@ struct vkb_transform {
     uint32_t stages;
 };
 
-// Bindings: 0 is the parameter block, then the images read, by slot, then the target of a
-// dispatch, which can be among the images read: each invocation then stores where it has loaded. A
+// Bindings: 0 is the parameter block, then the images read, by slot, then the targets of a
+// dispatch, of which one can be among the images read: each invocation then stores where it has
+// loaded. A
 // skybox reads the scene's cubemap at binding 1; textured triangles read the textures
 // of base colour and emission. Consecutive draws with the same targets share a render pass, with
 // the load operation of the first.
@@ -144,8 +155,9 @@ struct vkb_pass_row {
     bool textured;  // draws the mesh's triangles that have textures, not those that have none
     const struct vkb_shader *vertex, *shader;  // a dispatch has no vertex shader
     struct vkb_constants constants;
-    uint32_t reads[VKB_MAX_READS];  // by slot (SLOT_*); VKB_NO_IMAGE: the pass reads none there
-    uint32_t read_count;            // slots
+    uint32_t reads[VKB_MAX_READS];    // by slot (SLOT_*); VKB_NO_IMAGE: the pass reads none there
+    uint32_t read_count;              // slots
+    uint8_t sampling[VKB_MAX_READS];  // by slot, of VKB_SAMPLING_*
     enum vkb_reading reading;
     bool fused;            // a fused pass: may replace the pass before it, with the same target
     bool gains_if_finite;  // is compiled a second time, for sources without NaN and infinity

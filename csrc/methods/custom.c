@@ -83,8 +83,9 @@ static void add_image(struct vkb_levels *levels, uint32_t *images, uint32_t numb
         FAIL(levels, "passes: there are two images named %s", pass->name);
     name_image(levels, pass, name);
     images[number] =
-        vkb_levels_target(levels, enlarged ? "bloom_buffer" : name, levels->source->format, size,
-                          pass->framebuffer && !enlarged);
+        vkb_levels_target(levels, enlarged ? "bloom_buffer" : name,
+                          pass->format ? (enum vkb_format)pass->format : levels->source->format,
+                          size, pass->framebuffer && !enlarged);
 }
 
 // The history of the framebuffer that a pass writes, maybe a later one.
@@ -104,6 +105,23 @@ static uint32_t find_history(struct vkb_levels *levels, uint32_t *images, const 
     return vkb_levels_history(levels, images[number]);
 }
 
+// Adds the images of the rows after pass `number` that are joined to it as its targets.
+static void add_targets(struct vkb_levels *levels, uint32_t *images, uint32_t number,
+                        struct vkb_pass_row *row)
+{
+    const struct vkb_settings *settings = levels->settings;
+    const struct vkb_custom_pass *pass = &settings->passes[number];
+
+    for (uint32_t i = number + 1; i < settings->pass_count && settings->passes[i].joined; ++i) {
+        if (row->target_count == VKB_MAX_TARGETS)
+            FAIL(levels, "passes: %s writes more than %d images", pass->name, VKB_MAX_TARGETS);
+        if (levels->failed)
+            return;
+        add_image(levels, images, i);
+        row->targets[row->target_count++] = images[i];
+    }
+}
+
 // Adds pass `number`. `images` has those of the passes before.
 static void add_pass(struct vkb_levels *levels, uint32_t *images, uint32_t number)
 {
@@ -121,6 +139,10 @@ static void add_pass(struct vkb_levels *levels, uint32_t *images, uint32_t numbe
             FAIL(levels, "passes: %s reads %s, which no pass before it writes", pass->name, read);
         row.reads[row.read_count] = found;
     }
+    memcpy(row.sampling, pass->sampling, sizeof row.sampling);
+    if (pass->vertex || pass->positions)
+        row.vertex = pass->vertex ? pass->vertex : &vkb_shader_positions_vert;
+    add_targets(levels, images, number, &row);
     if (pass->block_width) {
         row.geometry = VKB_GEOMETRY_DISPATCH;
         row.vertex = NULL;
@@ -148,7 +170,8 @@ static uint32_t add_passes(struct vkb_levels *levels, uint32_t *images)
         const struct vkb_custom_pass *pass = &settings->passes[i];
         const bool is_bloom = strcmp(pass->name, BLOOM) == 0, fits = has_size(pass, final);
         const bool is_picture = strcmp(pass->name, PICTURE) == 0;
-        add_pass(levels, images, i);
+        if (!pass->joined)
+            add_pass(levels, images, i);
         if (is_bloom)
             bloom = fits ? images[i] : vkb_levels_enlarge(levels, UPSAMPLE_LINEAR, images[i], 1.0);
         if (is_picture)

@@ -127,11 +127,16 @@ struct vkb_custom_pass {
     uint32_t block_width, block_height;
     uint32_t framebuffer, read_count;
     uint32_t histories;  // bit i: it reads the history of reads[i], not what this frame has made
-    uint32_t unused;
+    uint32_t format;     // of the image that it writes; 0: that of the bloom buffers
+    // Not a pass, but one more image that the pass before it writes: its next target.
+    uint32_t joined;
+    // Whether the fragment shader gets its position in the target, 0 to 1, as its first input.
+    uint32_t positions;
     char name[VKB_NAME_SIZE];  // of the image that it writes
     char reads[VKB_MAX_READS][VKB_NAME_SIZE];
-    // Python packs what is before here, as "1024sQ8I32s512s".
-    const struct vkb_shader *shader;
+    uint8_t sampling[VKB_MAX_READS];  // of VKB_SAMPLING_*
+    // Python packs what is before here, as "1024sQ10I32s512s16s".
+    const struct vkb_shader *shader, *vertex;  // no vertex shader: that of the package
     const struct vkb_resource *resources[VKB_MAX_RESOURCES];
     uint32_t resource_count;
 };

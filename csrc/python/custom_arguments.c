@@ -15,7 +15,7 @@ enum {
 
 // What the rows of passes refer to; its content belongs to Python's objects.
 struct vkb_pass_content {
-    struct vkb_shader shader;
+    struct vkb_shader shader, vertex;
     struct vkb_resource resources[VKB_MAX_RESOURCES];
 };
 
@@ -149,6 +149,14 @@ static bool check_code(const struct vkb_shader *shader)
                       shader->name, shader->threads[0], shader->threads[1]);
 }
 
+// Refers to the code and copies its hash.
+static bool read_code(PyObject *code, PyObject *hash, struct vkb_shader *shader)
+{
+    shader->code = (const void *)PyBytes_AsString(code);
+    shader->size = (size_t)PyBytes_Size(code);
+    return copy_block(hash, shader->hash.bytes, sizeof shader->hash.bytes) && check_code(shader);
+}
+
 static bool check_pass(const struct vkb_custom_pass *pass)
 {
     if (pass->read_count > VKB_MAX_READS)
@@ -159,31 +167,38 @@ static bool check_pass(const struct vkb_custom_pass *pass)
     for (uint32_t i = 0; i < pass->read_count; ++i)
         if (!memchr(pass->reads[i], 0, sizeof pass->reads[i]))
             return vkb_refuse("passes: a name is longer than %d bytes", VKB_NAME_SIZE - 1);
+    for (uint32_t i = 0; i < VKB_MAX_READS; ++i)
+        if (pass->sampling[i] >= VKB_SAMPLINGS)
+            return vkb_refuse("passes: %u is no sampling", pass->sampling[i]);
+    if (pass->format > VKB_FORMAT_RGBA8_SRGB)
+        return vkb_refuse("passes: %u is no format of an image", pass->format);
     return !pass->block_width == !pass->block_height
         || vkb_refuse("passes: a workgroup of %u x %u pixels is none", pass->block_width,
                       pass->block_height);
 }
 
 // (block, name of the shader, its SPIR-V, its hash, its threads along x and y, its bytes of shared
-// memory, (resource, ...))
+// memory, (resource, ...)[, SPIR-V and hash of a vertex shader])
 static bool read_pass(PyObject *tuple, struct vkb_pass_content *content,
                       struct vkb_custom_pass *pass)
 {
     struct vkb_shader *shader = &content->shader;
-    PyObject *block, *code, *hash, *resources;
+    PyObject *block, *code, *hash, *resources, *vertex = NULL, *vertex_hash = NULL;
 
     if (!vkb_require_tuple(tuple, "passes")
-        || !PyArg_ParseTuple(tuple, "SsSSIIIO!:core_passes", &block, &shader->name, &code, &hash,
+        || !PyArg_ParseTuple(tuple, "SsSSIIIO!|SS:core_passes", &block, &shader->name, &code, &hash,
                              &shader->threads[0], &shader->threads[1], &shader->shared,
-                             &PyTuple_Type, &resources)
-        || !copy_block(block, pass, PASS_SIZE)
-        || !copy_block(hash, shader->hash.bytes, sizeof shader->hash.bytes))
+                             &PyTuple_Type, &resources, &vertex, &vertex_hash)
+        || !copy_block(block, pass, PASS_SIZE) || !read_code(code, hash, shader)
+        || !check_pass(pass))
         return false;
-    shader->code = (const void *)PyBytes_AsString(code);
-    shader->size = (size_t)PyBytes_Size(code);
     pass->shader = shader;
-    if (!check_code(shader) || !check_pass(pass))
-        return false;
+    if (vertex_hash) {
+        content->vertex = (struct vkb_shader){.name = shader->name, .threads = {1, 1}};
+        pass->vertex = &content->vertex;
+        if (!read_code(vertex, vertex_hash, &content->vertex))
+            return false;
+    }
     if (PyTuple_Size(resources) > VKB_MAX_RESOURCES)
         return vkb_refuse("passes: %zd textures and buffers are more than %d",
                           PyTuple_Size(resources), VKB_MAX_RESOURCES);

@@ -255,7 +255,7 @@ static bool copy_output(struct vkb_run *run, struct vkb_image *image,
 
     vkb_image_transition(run->device, run->submission->commands.buffer, image,
                          VKB_ACCESS_DISPATCH_SAMPLED);
-    return vkb_bindings_sampler(run->device, &run->frame->pipelines.bindings, image->format,
+    return vkb_bindings_sampler(run->device, &run->frame->pipelines.bindings, image->format, 0,
                                 &work.image.sampler, error)
         && copy_strided(run, &work, error);
 }

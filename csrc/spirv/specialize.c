@@ -318,6 +318,19 @@ static void write_functions(struct module *module)
     }
 }
 
+bool vkb_has_constants(const struct vkb_shader *shader)
+{
+    const uint32_t *end = shader->code + shader->size / sizeof *shader->code;
+
+    for (const uint32_t *at = shader->code + SPV_HEADER_WORDS; at < end; at = vkb_next(at)) {
+        if (vkb_opcode(at) == SPV_DECORATE && at[2] == SPV_SPEC_ID)
+            return true;
+        if (vkb_opcode(at) == SPV_FUNCTION)
+            return false;
+    }
+    return false;
+}
+
 bool vkb_specialize(const struct vkb_shader *shader, const struct vkb_constants *constants,
                     uint32_t **code, size_t *size, struct vkb_error *error)
 {

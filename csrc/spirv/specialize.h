@@ -7,6 +7,10 @@
 #include "graph/shader.h"
 #include "vulkan/error.h"
 
+// Whether it has specialization constants. Shaders of others come without: their modules, which may
+// be of later versions of SPIR-V than those of the package, stay as they are.
+bool vkb_has_constants(const struct vkb_shader *shader);
+
 // Makes `*code`, which the caller frees with vkb_free, and its `*size` in bytes. The module has no
 // specialization constants and no debug information.
 bool vkb_specialize(const struct vkb_shader *shader, const struct vkb_constants *constants,

@@ -146,11 +146,16 @@ static bool create_logical(struct vkb_device *device, struct vkb_error *error)
     VkPhysicalDeviceVulkan13Features vulkan13 = {
         .sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_3_FEATURES,
         .dynamicRendering = VK_TRUE,
+        // For passes that are given at run time: an input can have fewer components than the
+        // vertex shader's output, which every device can do.
+        .maintenance4 = VK_TRUE,
+        .shaderDemoteToHelperInvocation = VK_TRUE,
     };
     VkPhysicalDeviceVulkan12Features vulkan12 = {
         .sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_FEATURES,
         .pNext = &vulkan13,
         .scalarBlockLayout = available12.scalarBlockLayout,
+        .shaderFloat16 = available12.shaderFloat16,
         .timelineSemaphore = VK_TRUE,
     };
     return VK(error,
@@ -168,6 +173,9 @@ static bool create_logical(struct vkb_device *device, struct vkb_error *error)
                               .shaderStorageImageExtendedFormats =
                                   available->shaderStorageImageExtendedFormats,
                               .shaderImageGatherExtended = available->shaderImageGatherExtended,
+                              .shaderStorageImageReadWithoutFormat =
+                                  available->shaderStorageImageReadWithoutFormat,
+                              .shaderInt16 = available->shaderInt16,
                           },
                       .queueCreateInfoCount = 1,
                       .pQueueCreateInfos =

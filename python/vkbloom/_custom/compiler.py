@@ -147,18 +147,24 @@ def limit(process: int) -> None:
             resource.prlimit(process, which, (most, most))
 
 
+def was_ended(status: int) -> str:
+    """Return why a compiler has no result that a signal ended; "" if it ended by itself."""
+    if 0 <= status <= 128:
+        return ""
+    number = -status if status < 0 else status - 128
+    known = number in set(signal.Signals)
+    name = signal.Signals(number).name if known else f"status {status}"
+    return (
+        f"the compiler was ended by {name}: it may take {MAX_PROCESSOR_SECONDS} s and "
+        f"{MAX_MEMORY >> 20} MiB for a pass"
+    )
+
+
 def explain(file: CustomFile, item: CustomPass, status: int, text: str) -> str:
     """Return the message of a pass that does not compile."""
     source = file.source
-    if status < 0 or status > 128:
-        number = -status if status < 0 else status - 128
-        known = number in set(signal.Signals)
-        name = signal.Signals(number).name if known else f"status {status}"
-        return source.where(
-            item.line,
-            f"the compiler was ended by {name}: it may take {MAX_PROCESSOR_SECONDS} s and "
-            f"{MAX_MEMORY >> 20} MiB for a pass",
-        )
+    if ended := was_ended(status):
+        return source.where(item.line, ended)
     last = item.body_line + item.body.count("\n")
     for part, number, cause in MESSAGE.findall(text):
         if part == str(BODY):

@@ -16,10 +16,17 @@ from numpy.typing import NDArray
 
 from vkbloom import _core
 from vkbloom._argument_types import check_arguments
+from vkbloom._custom.described.schema import Description
+from vkbloom._custom.described.source import (
+    DescribedSource,
+    Programs,
+    open_described,
+    read_described,
+)
 from vkbloom._custom.file import CustomFile, read_file
 from vkbloom._custom.params import RANGES, Param
 from vkbloom._custom.planning import FrameValues, plan_rows
-from vkbloom._custom.rows import changing_resources
+from vkbloom._custom.rows import Resources, changing_resources
 from vkbloom._custom.shaders import Shaders
 from vkbloom._custom.source import Source, read_source
 from vkbloom._formats import MAX_FLOAT
@@ -43,7 +50,7 @@ class CustomType(type):
     """The type of the classes, which are pickled as the text that they are made of."""
 
     method: str
-    file: CustomFile
+    file: CustomFile | Description
     numpy_reference: Reference | None
 
 
@@ -51,8 +58,8 @@ class CustomType(type):
 class CustomMethod(Settings, metaclass=CustomType):
     """Base class of the settings of custom methods."""
 
-    file: ClassVar[CustomFile]
-    shaders: ClassVar[Shaders]
+    file: ClassVar[CustomFile | Description]
+    shaders: ClassVar[Shaders | Programs]
     numpy_reference: ClassVar[Reference | None] = None
     _place: ClassVar[int] = 0
     _state: ClassVar[dict[Any, Any] | None] = None
@@ -83,19 +90,25 @@ class CustomMethod(Settings, metaclass=CustomType):
 
     def core_passes(self, frame: tuple[int, int], buffers: tuple[int, int]) -> tuple[Any, ...]:
         """Return the passes of a frame, as the core takes them."""
+        request = FrameValues(
+            frame, buffers, self.numbers(), self.dither_seed, self._place, self._resources()
+        )
+        if isinstance(self.shaders, Programs):
+            rows = self.shaders.plan(request)
+        else:
+            assert isinstance(self.file, CustomFile)
+            rows = plan_rows(self.file, self.shaders, request)
+        return tuple(row.pack() for row in rows)
+
+    def _resources(self) -> Resources:
+        """Return the textures and buffers of the file; those that passes change are new ones."""
+        if not isinstance(self.file, CustomFile) or not isinstance(self.shaders, Shaders):
+            return {}
         if self._state is None:
             changed = changing_resources(self.file)
         elif (changed := self._state.get(type(self), {})) == {}:
             changed = self._state[type(self)] = changing_resources(self.file)
-        request = FrameValues(
-            frame,
-            buffers,
-            self.numbers(),
-            self.dither_seed,
-            self._place,
-            {**self.shaders.resources, **changed},
-        )
-        return tuple(row.pack() for row in plan_rows(self.file, self.shaders, request))
+        return {**self.shaders.resources, **changed}
 
     @property
     def _has_state(self) -> bool:
@@ -223,7 +236,7 @@ def load_method(
     >>> Gained(gain=3).gain
     3.0
     """
-    read = read_source(source)
+    read = read_method(source)
     if name is None:
         name = identifier_of(Path(read.name).stem if read.name != "<text>" else "custom")
     elif not isinstance(name, str) or not name.isidentifier() or keyword.iskeyword(name):
@@ -231,6 +244,13 @@ def load_method(
     with _LOADING:
         known = class_of(name, read, reference)
         return known if known.numpy_reference is reference else register(name, read, reference)
+
+
+def read_method(source: str | os.PathLike[str]) -> Source:
+    """Read the file of a method: of passes, or a description, whose shaders it compiles."""
+    if Path(source).suffix == ".toml" and "\n" not in str(source):
+        return read_described(source)
+    return read_source(source)
 
 
 def identifier_of(stem: str) -> str:
@@ -243,9 +263,14 @@ def register(name: str, source: Source, reference: Reference | None) -> type[Cus
     """Make the class of a text, and register it; with the lock of loading."""
     if name in METHODS and not isinstance(METHODS[name], CustomType):
         raise ValueError(f"name: {name!r} is a method of vkbloom; give another name=")
-    file = read_file(source)
-    shaders = Shaders(name, file)
-    shaders.compile_all({param.name: param.default for param in file.params})
+    file: CustomFile | Description
+    shaders: Shaders | Programs
+    if isinstance(source, DescribedSource):
+        file, shaders = open_described(name, source)
+    else:
+        file = read_file(source)
+        shaders = Shaders(name, file)
+        shaders.compile_all({param.name: param.default for param in file.params})
     fields = [(param.name, *field_of(file, param)) for param in file.params]
     kind: Any = dataclasses.make_dataclass(
         class_name(name),
@@ -274,7 +299,7 @@ def class_name(name: str) -> str:
     return joined if joined.isidentifier() else f"Custom{joined}"
 
 
-def field_of(file: CustomFile, param: Param) -> tuple[Any, Any]:
+def field_of(file: CustomFile | Description, param: Param) -> tuple[Any, Any]:
     """Return type and declaration of a parameter's field."""
     low, high = max(param.low, -MAX_FLOAT), min(param.high, MAX_FLOAT)
     shared = param.name == SHARED and param.number == "float"
@@ -283,8 +308,9 @@ def field_of(file: CustomFile, param: Param) -> tuple[Any, Any]:
         low, high = max(low, least), min(high, most)
     elif hasattr(CustomMethod, param.name) or keyword.iskeyword(param.name) or param.name in TAKEN:
         owner = "Python reserves" if keyword.iskeyword(param.name) else "all settings have"
+        kind = "PARAM" if isinstance(file, CustomFile) else "settings"
         raise file.source.fault(
-            param.line, f"PARAM: {param.name!r} is a name that {owner}; rename it"
+            param.line, f"{kind}: {param.name!r} is a name that {owner}; rename it"
         )
     if param.names:
         read = EnumReader(param.name, param.names)

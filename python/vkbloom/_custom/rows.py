@@ -53,6 +53,11 @@ class Row(NamedTuple):
     - `group`: The pixels of a compute shader's workgroup. None: it is a fragment shader.
     - `turn`: Another number for each run of a pass that changes a resource; 0 for others.
     - `histories`: The framebuffers that it reads as the call before left them, after `reads`.
+    - `sampling`: How it samples each image that it reads, of `SAMPLINGS`; the default is 0.
+    - `format`: The core's number of the format of its image; 0: that of the bloom buffers.
+    - `joined`: It is no pass, but one more image that the pass before it writes.
+    - `vertex`: Its vertex shader. None: the package's.
+    - `positions`: Whether the package's gives the fragment shader its position, 0 to 1.
     """
 
     name: str
@@ -65,6 +70,11 @@ class Row(NamedTuple):
     resources: tuple[Resource, ...] = ()
     turn: int = 0
     histories: tuple[str, ...] = ()
+    sampling: tuple[int, ...] = ()
+    format: int = 0
+    joined: bool = False
+    positions: bool = False
+    vertex: CoreShader | None = None
 
     def pack(self) -> tuple[Any, ...]:
         """Return it as the core takes it; ValueError where the core has no room."""
@@ -77,7 +87,7 @@ class Row(NamedTuple):
                 raise ValueError(f"passes: {self.name}: {count} {what} are more than {most}")
         reads = (*self.reads, *self.histories)
         block = struct.pack(
-            f"={MAX_PARAMETERS}sQ8I{NAME_SIZE}s{MAX_READS * NAME_SIZE}s",
+            f"={MAX_PARAMETERS}sQ10I{NAME_SIZE}s{MAX_READS * NAME_SIZE}s{MAX_READS}s",
             self.params,
             self.turn,
             *self.size,
@@ -85,11 +95,15 @@ class Row(NamedTuple):
             self.framebuffer,
             len(reads),
             (1 << len(reads)) - (1 << len(self.reads)),
-            0,
+            self.format,
+            self.joined,
+            self.positions,
             self.name.encode(),
             b"".join(read.encode().ljust(NAME_SIZE, b"\0") for read in reads),
+            bytes(self.sampling),
         )
-        return block, *self.shader, self.resources
+        vertex = () if self.vertex is None else (self.vertex.code, self.vertex.hash)
+        return block, *self.shader, self.resources, *vertex
 
 
 #: Kinds of the core's resources, and Vulkan's address modes.

@@ -18,7 +18,7 @@ from vkbloom._custom.rows import CoreShader, constant_resources
 from vkbloom._custom.source import Source
 from vkbloom._custom.spirv import shared_bytes
 
-#: Passes that the package adds: a copy, the difference of two pictures, and black.
+#: Passes that the package adds: a copy, the difference of two pictures, black, a sum of two.
 PACKAGE_PASSES: Final = """\
 //!HOOK MAIN
 //!BIND HOOKED
@@ -33,8 +33,19 @@ vec4 hook()
 }
 //!HOOK MAIN
 vec4 hook() { return vec4(0.0, 0.0, 0.0, 1.0); }
+//!HOOK MAIN
+//!BIND HOOKED
+//!BIND GLOW
+vec4 hook()
+{
+    ivec2 at = ivec2(gl_FragCoord.xy);
+    return vec4(of_r, of_g, of_b, of_a) * texelFetch(HOOKED_raw, at, 0)
+        + vec4(by_r, by_g, by_b, by_a) * texelFetch(GLOW_raw, at, 0);
+}
 """
-COPY, DIFFERENCE, BLACK = range(3)
+#: The factors of blending, of what is drawn and of what is there.
+FACTORS: Final = tuple(f"{of}_{channel}" for of in ("of", "by") for channel in "rgba")
+COPY, DIFFERENCE, BLACK, BLEND = range(4)
 
 
 class Shaders:
@@ -92,8 +103,22 @@ class Shaders:
         return made
 
 
-@functools.cache
 def package_shader(index: int) -> CoreShader:
     """Return the shader of one of the package's passes."""
-    file = read_file(Source("vkbloom", PACKAGE_PASSES))
-    return Shaders("custom", file).of(file.passes[index], "MAIN", {})[1]
+    return _package_shaders(index)[1]
+
+
+def package_blend(
+    drawn: tuple[float, ...], there: tuple[float, ...]
+) -> tuple[CoreShader, bytes]:
+    """Return the shader that blends two images, and its parameters: four factors of each."""
+    shader, core_shader = _package_shaders(BLEND)
+    return core_shader, shader.pack(dict(zip(FACTORS, (*drawn, *there), strict=True)))
+
+
+@functools.cache
+def _package_shaders(index: int) -> tuple[Shader, CoreShader]:
+    factors = "".join(f"//!PARAM {name}\n//!TYPE float\n1\n" for name in FACTORS)
+    file = read_file(Source("vkbloom", factors + PACKAGE_PASSES))
+    values = dict.fromkeys(FACTORS, 1.0)
+    return Shaders("custom", file).of(file.passes[index], "MAIN", values)

@@ -24,6 +24,11 @@ class Source:
     text: str
 
     @property
+    def files(self) -> tuple[str, ...]:
+        """The paths of all files that it was read from."""
+        return () if self.name == "<text>" else (self.name,)
+
+    @property
     def digest(self) -> str:
         """The SHA-256 of the text."""
         return hashlib.sha256(self.text.encode()).hexdigest()

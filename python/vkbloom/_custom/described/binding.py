@@ -1,0 +1,579 @@
+"""What the shaders of a pass are bound to: images, samplers, numbers, outputs, by their names."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import struct
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Final
+
+from vkbloom._custom.described import slang
+from vkbloom._custom.described.arithmetic import parse
+from vkbloom._custom.described.arithmetic import Source as ImageName
+from vkbloom._custom.described.module import (
+    INPUT,
+    OUTPUT,
+    SPEC_ID,
+    UNIFORM_CONSTANT,
+    Entry,
+    Module,
+    ModuleFault,
+    Type,
+    Variable,
+)
+from vkbloom._custom.described.placing import Places, place
+from vkbloom._custom.described.programs import Program
+from vkbloom._custom.described.schema import (
+    GLOW,
+    DescribedPass,
+    Description,
+    Output,
+    Sampling,
+    Texture,
+    Value,
+)
+from vkbloom._custom.glsl import TARGET
+from vkbloom._custom.rows import MAX_PARAMETERS, MAX_READS, CoreShader
+from vkbloom._custom.spirv import shared_bytes
+from vkbloom._spelling import did_you_mean
+
+MAX_TARGETS: Final = 4
+#: Locations of inputs that a fragment shader finds without a vertex shader of its own.
+POSITIONS: Final = range(4)
+MAX_BLOCK_BYTES: Final = 65536
+MAX_BUFFER_BYTES: Final = 1 << 24
+#: Of SPIR-V: what the core's devices have where their driver has it.
+CAPABILITIES: Final = {
+    *(0, 1, 9, 11, 22, 25, 49, 50, 51, 55, 56, 61, 62, 63, 64, 65, 66, 67, 68, 5379, 4427, 4433),
+    *(5345, 4437, 5301, 5302),
+}
+#: What ShaderToy gives to each shader.
+_SHADERTOY: Final = {
+    "iResolution": ("width(target)", "height(target)", "1"),
+    "iTime": ("index / 60",),
+    "iTimeDelta": ("1 / 60",),
+    "iFrameRate": ("60",),
+    "iFrame": ("index",),
+    "iMouse": ("0",),
+    "iDate": ("0",),
+    "iSampleRate": ("44100",),
+    "iChannelTime": ("index / 60",),
+}
+
+
+@dataclasses.dataclass(frozen=True)
+class Number:
+    """A value of a member: where it is in its block, and what it is."""
+
+    key: str
+    type: Type
+    offset: int
+    value: Value
+    line: int
+
+
+@dataclasses.dataclass(frozen=True)
+class Block:
+    """A uniform block or a buffer that is a resource of its own; `size` 0: as its data."""
+
+    numbers: tuple[Number, ...]
+    size: int
+    storage: bool
+    changes: bool
+
+
+@dataclasses.dataclass(frozen=True)
+class BoundPass:
+    """A pass whose shaders are in place.
+
+    - `reads`: The images that it reads, in the order of their bindings, and how.
+    - `numbers`: Those of its parameters, `size` bytes in all.
+    - `outputs`: The images that it writes, in the order of its targets.
+    """
+
+    item: DescribedPass
+    shader: CoreShader
+    vertex: CoreShader | None
+    positions: bool
+    reads: tuple[tuple[Texture, int], ...]
+    numbers: tuple[Number, ...]
+    size: int
+    blocks: tuple[Block, ...]
+    outputs: tuple[Output, ...]
+    group: tuple[int, int] | None
+
+
+def bind(description: Description, item: DescribedPass, program: Program, name: str) -> BoundPass:
+    """Bind a pass; raise ValueError with file and line where something is missing."""
+    return _Binder(description, item, program).bind(name)
+
+
+@dataclasses.dataclass
+class _Stage:
+    """An entry point, with what it uses."""
+
+    module: Module
+    entry: Entry
+    variables: list[Variable]
+    places: Places
+
+
+class _Binder:
+    """Binds one pass."""
+
+    def __init__(
+        self, description: Description, item: DescribedPass, program: Program
+    ) -> None:
+        self._description = description
+        self._item = item
+        self._program = program
+        self._slots: list[tuple[Texture, Sampling | None]] = []
+        self._numbers: list[Number] = []
+        self._size = 0
+        self._blocks: list[tuple[Block, _Stage, int]] = []
+        self._used_keys: set[tuple[str, str]] = set()
+        self._structs: set[int] = set()
+
+    def fault(self, cause: str, line: int | None = None) -> ValueError:
+        """Return the error of a line, by default that of the pass's file."""
+        source = self._description.source
+        return source.fault(self._item.shader.line if line is None else line, cause)
+
+    def bind(self, name: str) -> BoundPass:
+        """Return the pass with its shaders in place."""
+        item, program = self._item, self._program
+        try:
+            stage = self._open(program.code, program.entry, program.stage)
+            if stage.entry.stage == "vertex":
+                raise self.fault("entry: a vertex shader is no pass; name it vertex = \"NAME\"")
+            vertex = None
+            if program.vertex is not None:
+                vertex = self._open(program.vertex, None, "vertex")
+            self._bind_resources(stage, vertex)
+            outputs = self._bind_outputs(stage)
+            positions = self._check_inputs(stage, vertex)
+            self._check_keys()
+            code = self._code(stage, name)
+            group = None
+            if stage.entry.stage == "compute":
+                threads = stage.module.workgroup(stage.entry)
+                group = item.tile or threads[:2]
+                words = struct.unpack(f"={len(code.code) // 4}I", code.code)
+                code = CoreShader(*code[:3], threads[0], threads[1], shared_bytes(words))
+            return BoundPass(
+                item,
+                code,
+                None if vertex is None else self._code(vertex, name),
+                positions,
+                tuple((texture, (how or Sampling()).core) for texture, how in self._slots),
+                tuple(self._numbers),
+                self._size,
+                tuple(block for block, _, _ in self._blocks),
+                outputs,
+                group,
+            )
+        except ModuleFault as error:
+            raise self.fault(f"{item.shader.file}: {error}") from None
+
+    def _open(self, code: bytes, entry: str | None, stage: str | None) -> _Stage:
+        module = Module(code)
+        if len(module.entries) == 1 and entry is not None:
+            entry = module.entries[0].name
+        found = module.entry(entry, stage)
+        for number, name in self._program.names:
+            _rename(module, number, name)
+        unknown = module.capabilities - CAPABILITIES
+        if unknown:
+            raise ModuleFault(f"the shader needs the capability {min(unknown)} of SPIR-V")
+        if module.is_endless(found):
+            raise ModuleFault(f"the shader has a loop that never ends, in {found.name}")
+        places = Places(constants=self._constants(module))
+        return _Stage(module, found, module.variables(found), places)
+
+    def _constants(self, module: Module) -> dict[int, int]:
+        """Return the words of the specialization constants that the pass names."""
+        known = {}
+        for identity, marks in module.decorations.items():
+            if SPEC_ID in marks and identity in module.defined:
+                known[module.names.get(identity, "")] = known[str(marks[SPEC_ID])] = identity
+        made = {}
+        for key, (value, line) in self._item.constants.items():
+            if key not in known:
+                raise self._unknown("constants", key, known, line)
+            word = module.defined[known[key]]
+            kind = module.type(word[1]).kind
+            data = struct.pack("<f", value) if kind == "float" else struct.pack("<q", int(value))[:4]
+            made[known[key]] = struct.unpack("<I", data)[0]
+        return made
+
+    def _unknown(self, what: str, key: str, known: Sequence[str] | Mapping[str, object], line: int) -> ValueError:
+        names = ", ".join(each for each in known if each) or "none"
+        near = did_you_mean(key, known)
+        return self.fault(f"{what}: the shader has no {key!r}; it has {names}{near}", line)
+
+    def _labels(self, variable: Variable) -> list[str]:
+        """Return the names under which a description can mention a variable."""
+        labels = [variable.name, variable.place]
+        if self._program.shift and variable.storage != 9:
+            for kind, shift in slang.SHIFTS.items():
+                if shift <= variable.binding < shift + 100:
+                    labels.append(f"{kind}{variable.binding - shift}")
+        return [label for label in labels if label]
+
+    def _find(self, what: str, keys: Mapping[str, object], variable: Variable) -> str | None:
+        """Return the key that names a variable."""
+        found = [key for key in self._labels(variable) if key in keys]
+        if len(found) > 1:
+            raise self.fault(f"{what}: {found[0]} and {found[1]} are the same one")
+        if found:
+            self._used_keys.add((what, found[0]))
+        return found[0] if found else None
+
+    def _show(self, variable: Variable) -> str:
+        labels = self._labels(variable)
+        return f"{labels[0]!r}" + (f" ({', '.join(labels[1:])})" if labels[1:] else "")
+
+    def _bind_resources(self, stage: _Stage, vertex: _Stage | None) -> None:
+        self._check_places(stage)
+        for kind in ("sampled", "image"):
+            for variable in stage.variables:
+                if variable.storage == UNIFORM_CONSTANT and variable.type.kind == kind:
+                    if kind == "image" and variable.type.image[4] == 2:
+                        continue
+                    self._bind_texture(stage, variable)
+        for variable in stage.variables:
+            if variable.storage == UNIFORM_CONSTANT and variable.type.kind == "sampler":
+                self._bind_sampler(stage, variable)
+            elif variable.storage == UNIFORM_CONSTANT and variable.type.kind not in ("sampled", "image"):
+                raise self.fault(f"{self._show(variable)}: arrays of textures cannot be bound")
+        for each in (stage, vertex) if vertex else (stage,):
+            for variable in each.variables:
+                if variable.is_block or variable.is_buffer:
+                    self._bind_block(each, variable)
+                elif each is vertex and variable.storage == UNIFORM_CONSTANT:
+                    raise self.fault(f"the vertex shader reads {self._show(variable)}")
+        # Resources come after the images read.
+        for number, (_, owner, identity) in enumerate(self._blocks):
+            owner.places.bindings[identity] = len(self._slots) + number + 1
+
+    def _check_places(self, stage: _Stage) -> None:
+        """Check that no two variables have one place."""
+        seen: dict[str, Variable] = {}
+        for variable in stage.variables:
+            if variable.storage in (INPUT, OUTPUT, 9) or variable.storage not in (0, 2, 12):
+                continue
+            other = seen.setdefault(variable.place, variable)
+            if other is not variable:
+                raise self.fault(
+                    f"{self._item.shader.file}: {other.name!r} and {variable.name!r} have the same "
+                    f"binding, {variable.place}"
+                )
+
+    def _bind_texture(self, stage: _Stage, variable: Variable) -> None:
+        kind = variable.type
+        image = kind.of if kind.kind == "sampled" else kind
+        assert image is not None
+        if not _is_plain(image):
+            raise self.fault(
+                f"textures: {self._show(variable)} is no texture of two dimensions with floats"
+            )
+        key = self._find("textures", self._item.textures, variable)
+        texture = self._item.textures[key] if key else self._default_texture(variable)
+        if texture is None:
+            name = self._labels(variable)[0]
+            shown = name if name.isidentifier() else f'"{name}"'
+            raise self.fault(
+                f"textures: the shader reads {self._show(variable)}, which the pass does not name; "
+                f'add {shown} = "glow", or another image, below [passes.textures]'
+            )
+        stage.places.bindings[variable.id] = len(self._slots) + 1
+        self._slots.append((texture, texture.sampling if kind.kind == "sampled" else None))
+        if len(self._slots) > MAX_READS:
+            raise self.fault(f"textures: the shader reads more than {MAX_READS}")
+
+    def _default_texture(self, variable: Variable) -> Texture | None:
+        if self._item.shader.language == "shadertoy" and variable.name == "iChannel0":
+            return Texture((ImageName((GLOW, None)),), Sampling(), self._item.line)
+        return None
+
+    def _bind_sampler(self, stage: _Stage, variable: Variable) -> None:
+        """Bind a sampler to an image whose own sampler is like it, or is not used."""
+        key = self._find("samplers", self._item.samplers, variable)
+        sampling = self._item.samplers[key][0] if key else Sampling()
+        for number, (texture, how) in enumerate(self._slots):
+            if how in (None, sampling):
+                self._slots[number] = (texture, sampling)
+                stage.places.bindings[variable.id] = number + 1
+                return
+        if not self._slots:
+            raise self.fault(f"samplers: {self._show(variable)} samples no texture")
+        self._slots.append((self._slots[0][0], sampling))
+        stage.places.bindings[variable.id] = len(self._slots)
+
+    def _bind_block(self, stage: _Stage, variable: Variable) -> None:
+        """Give a place to a block, and values to its members."""
+        numbers = tuple(self._members(variable))
+        kind, size = variable.type, variable.type.size
+        begin = -(-self._size // 16) * 16
+        most = MAX_BUFFER_BYTES if variable.is_buffer else MAX_BLOCK_BYTES
+        if kind.kind != "struct" or size > most:
+            raise self.fault(f"values: {self._show(variable)} cannot be bound: {size} bytes")
+        if variable.is_block and kind.id not in self._structs and begin + size <= MAX_PARAMETERS:
+            self._structs.add(kind.id)
+            stage.places.bindings[variable.id] = 0
+            stage.places.offsets[kind.id] = begin
+            self._size = begin + size
+            self._numbers += [
+                dataclasses.replace(each, offset=each.offset + begin) for each in numbers
+            ]
+            return
+        changes = variable.is_buffer and not variable.read_only
+        self._blocks.append(
+            (Block(numbers, size, variable.is_buffer, changes), stage, variable.id)
+        )
+
+    def _members(self, variable: Variable) -> Iterator[Number]:
+        """Return the values of a block's members; raise ValueError if one has none."""
+        given = dict(self._given(variable))
+        found = []
+        for path, kind, offset in paths(variable.type):
+            if path in given:
+                key, value, line = given.pop(path)
+                found.append((path, Number(key, kind, offset, value, line)))
+        if given:
+            path, (key, _, line) = next(iter(given.items()))
+            names = [each for each, _, _ in paths(variable.type) if each]
+            raise self.fault(
+                f"values: {self._show(variable)} has no {path!r}; it has {', '.join(names[:40])}"
+                f"{did_you_mean(path, names)}",
+                line,
+            )
+        if variable.is_buffer and not found:
+            if variable.read_only:
+                raise self.fault(
+                    f"values: the shader reads the buffer {self._show(variable)}, which has no data"
+                )
+            return
+        covered = [path for path, _ in found]
+        for index, member in enumerate(variable.type.members):
+            if variable.members is not None and index not in variable.members:
+                continue
+            for path, kind, _ in paths(member.type, member.name or str(index)):
+                if not kind.members and not any(is_within(path, each) for each in covered):
+                    self._check_missing(variable, path, covered)
+        yield from (number for _, number in found)
+
+    def _check_missing(self, variable: Variable, path: str, covered: list[str]) -> None:
+        within = any(is_within(each, path) for each in covered)
+        if within or path.rpartition(".")[2].lower().lstrip("_").startswith("pad"):
+            return
+        raise self.fault(
+            f"values: the shader reads {path!r} of {self._show(variable)}, which the pass does not "
+            f"give; add {path} = 1.0, or an expression, below [passes.values]"
+        )
+
+    def _given(self, variable: Variable) -> Iterator[tuple[str, tuple[str, Value, int]]]:
+        """Return what the description gives of a block: path, key, value and line."""
+        names = {path for path, _, _ in paths(variable.type)}
+        if self._item.shader.language == "shadertoy":
+            yield from self._shadertoy(names)
+        for key, (value, line) in self._item.values.items():
+            for label in self._labels(variable):
+                if key == label or key.startswith((f"{label}.", f"{label}[")):
+                    self._used_keys.add(("values", key))
+                    yield key[len(label) :].lstrip("."), (key, value, line)
+                    break
+            else:
+                if key in names and key:
+                    if ("values", key) in self._used_keys:
+                        raise self.fault(f"values: {key!r} is in several blocks; say BLOCK.{key}", line)
+                    self._used_keys.add(("values", key))
+                    yield key, (key, value, line)
+
+    def _shadertoy(self, names: set[str]) -> Iterator[tuple[str, tuple[str, Value, int]]]:
+        for key, texts in _SHADERTOY.items():
+            if key in names and key not in self._item.values:
+                yield key, (key, tuple(map(parse, texts)), self._item.line)
+        if "iChannelResolution" in names and "iChannelResolution" not in self._item.values:
+            parts: list[str] = []
+            for number in range(4):
+                texture = self._item.textures.get(f"iChannel{number}")
+                image = texture.sources[0].name if texture else GLOW
+                level = texture and texture.sources[0].level
+                shown = image if level is None else GLOW
+                parts += [f"width({shown})", f"height({shown})", "1"]
+            key = "iChannelResolution"
+            yield key, (key, tuple(map(parse, parts)), self._item.line)
+
+    def _bind_outputs(self, stage: _Stage) -> tuple[Output, ...]:
+        """Return the outputs in the order of the targets; place storage images."""
+        compute = stage.entry.stage == "compute"
+        if compute:
+            targets = [
+                each
+                for each in stage.variables
+                if each.storage == UNIFORM_CONSTANT
+                and each.type.kind == "image"
+                and each.type.image[4] == 2
+            ]
+            for each in targets:
+                if not _is_plain(each.type):
+                    raise self.fault(f"outputs: {self._show(each)} is no image of two dimensions with floats")
+        else:
+            targets = [
+                each
+                for each in stage.variables
+                if each.storage == OUTPUT and each.location is not None
+            ]
+            targets.sort(key=lambda each: each.location or 0)
+        outputs = self._item.outputs
+        if not targets:
+            raise self.fault("output: the shader writes no image")
+        if len(targets) > MAX_TARGETS:
+            raise self.fault(f"outputs: {len(targets)} are more than {MAX_TARGETS}")
+        if "" in outputs:
+            if len(targets) > 1:
+                names = ", ".join(self._show(each) for each in targets)
+                raise self.fault(
+                    f"output: the shader writes {len(targets)} images, {names}; name all of them "
+                    "below [passes.outputs]",
+                    outputs[""].line,
+                )
+            found = {"": targets[0]}
+        else:
+            found = self._match_outputs(targets, compute=compute)
+        order = list(outputs) if compute else sorted(outputs, key=lambda k: found[k].location or 0)
+        for number, key in enumerate(order):
+            if compute:
+                stage.places.bindings[found[key].id] = TARGET + number
+            elif (found[key].location or 0) != number:
+                raise self.fault("outputs: their locations are not 0, 1, 2 without gaps")
+        return tuple(outputs[key] for key in order)
+
+    def _match_outputs(self, targets: list[Variable], *, compute: bool) -> dict[str, Variable]:
+        found = {}
+        for target in targets:
+            labels = self._labels(target) if compute else [str(target.location), target.name]
+            key = next((label for label in labels if label in self._item.outputs), None)
+            if key is None:
+                raise self.fault(
+                    f"outputs: the shader writes {labels[0]!r}, which the pass does not name"
+                )
+            found[key] = target
+        for key, output in self._item.outputs.items():
+            if key not in found:
+                known = {label: 0 for each in targets for label in (
+                    self._labels(each) if compute else [str(each.location), each.name])}
+                raise self._unknown("outputs", key, known, output.line)
+        return found
+
+    def _check_inputs(self, stage: _Stage, vertex: _Stage | None) -> bool:
+        """Check that a fragment shader finds its inputs; return whether it reads positions."""
+        wanted = {
+            each.location: each
+            for each in stage.variables
+            if each.storage == INPUT and each.location is not None
+        }
+        if vertex is not None:
+            given = {each.location for each in vertex.variables if each.storage == OUTPUT}
+            attributes = [
+                each
+                for each in vertex.variables
+                if each.storage == INPUT and each.location is not None
+            ]
+            if attributes:
+                raise self.fault(
+                    f"vertex: the vertex shader reads the attribute {attributes[0].name!r}, and "
+                    "there are no vertices; leave vertex out: a triangle covers the target, and "
+                    "inputs are the position in it"
+                )
+            for location, each in wanted.items():
+                if location not in given:
+                    raise self.fault(f"vertex: it does not write the input {each.name!r}")
+            return False
+        for location, each in wanted.items():
+            if location not in POSITIONS or each.type.kind not in ("vector", "float"):
+                raise self.fault(
+                    f"vertex: the shader reads {each.name!r} at location {location}; without "
+                    "vertex = \"NAME\" there are positions at locations 0 to 3 alone"
+                )
+        return bool(wanted)
+
+    def _check_keys(self) -> None:
+        """Check that the shaders have all that the description names."""
+        for what in ("textures", "samplers", "values"):
+            given: Mapping[str, object] = getattr(self._item, what)
+            for key in given:
+                if (what, key) not in self._used_keys:
+                    entry = given[key]
+                    line = entry.line if isinstance(entry, Texture) else entry[1]  # type: ignore[index]
+                    raise self.fault(f"{what}: the shader does not use {key!r}", line)
+
+    def _code(self, stage: _Stage, name: str) -> CoreShader:
+        code = place(stage.module, stage.entry, stage.places)
+        return CoreShader(name, code, hashlib.sha256(code).digest()[:16])
+
+
+def _is_plain(image: Type) -> bool:
+    """Whether an image has two dimensions, one layer, one sample, and floats."""
+    dimensions, _, arrayed, multisampled = image.image[:4]
+    return dimensions == 1 and not arrayed | multisampled and image.of is not None and image.of.kind == "float"
+
+
+def _rename(module: Module, number: str, name: str) -> None:
+    """Give a name to a variable, set.binding, or to a member of its block, set.binding.member."""
+    parts = number.split(".")
+    for identity, marks in module.decorations.items():
+        if [str(marks.get(34)), str(marks.get(33))] != parts[:2] or identity not in module.defined:
+            continue
+        if len(parts) == 2:
+            module.names[identity] = name
+            continue
+        word = module.defined.get(module.defined[identity][1], ())
+        kind = word[3] if len(word) > 3 else 0
+        for index in parts[2:-1]:
+            kind = (*module.defined.get(kind, ()), *[0] * 64)[2 + int(index)]
+        module.member_names[kind, int(parts[-1])] = name
+
+
+def is_within(path: str, outer: str) -> bool:
+    """Whether a path is another one, or a part of it."""
+    return outer == "" or path == outer or path.startswith((f"{outer}.", f"{outer}["))
+
+
+def paths(kind: Type, path: str = "", offset: int = 0) -> Iterator[tuple[str, Type, int]]:
+    """Return all parts of a type that a description can name, with their offsets."""
+    yield path, kind, offset
+    if kind.kind == "struct":
+        for index, member in enumerate(kind.members):
+            name = member.name or str(index)
+            inner = f"{path}.{name}" if path else name
+            yield from paths(member.type, inner, offset + member.offset)
+    elif kind.kind == "array" and kind.count <= 256:
+        assert kind.of is not None
+        for index in range(kind.count):
+            yield from paths(kind.of, f"{path}[{index}]", offset + index * kind.stride)
+
+
+def scalars(kind: Type, offset: int = 0) -> Iterator[tuple[str, int, int]]:
+    """Return kind, bits and offset of each number of a type, in order."""
+    if kind.kind in ("bool", "int", "uint", "float"):
+        yield kind.kind, kind.count, offset
+        return
+    if kind.kind == "struct":
+        for member in kind.members:
+            yield from scalars(member.type, offset + member.offset)
+        return
+    if kind.of is None:
+        raise ModuleFault("a member of a block has no numbers")
+    if kind.kind == "matrix" and kind.row_major:
+        of = kind.of.of
+        assert of is not None
+        for column in range(kind.count):
+            for row in range(kind.of.count):
+                yield from scalars(of, offset + row * kind.stride + column * of.size)
+        return
+    step = kind.of.size if kind.kind == "vector" else kind.stride
+    for index in range(kind.count):
+        yield from scalars(kind.of, offset + index * step)

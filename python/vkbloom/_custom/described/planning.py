@@ -1,0 +1,379 @@
+"""The passes of a described method for one frame, as rows for the core."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import struct
+from collections import OrderedDict
+from collections.abc import Iterator
+from typing import Any, Final
+
+from vkbloom import _core
+from vkbloom._custom.described.arithmetic import (
+    ArithmeticFault,
+    Expression,
+    Numbers,
+    evaluate,
+)
+from vkbloom._custom.described.arithmetic import Source as ImageName
+from vkbloom._custom.described.binding import Block, BoundPass, Number, scalars
+from vkbloom._custom.described.module import Type
+from vkbloom._custom.described.schema import (
+    FRAME,
+    GLOW,
+    INDEX,
+    LEVEL,
+    TARGET,
+    Description,
+    Loop,
+    Output,
+    Value,
+)
+from vkbloom._custom.names import MAX_NAME_LENGTH
+from vkbloom._custom.planning import (
+    BLOOM_IMAGE,
+    MAX_SIDE,
+    PICTURE,
+    TAKEN,
+    TURNS,
+    FrameValues,
+    PassImage,
+    package_row,
+)
+from vkbloom._custom.rows import MAX_PARAMETERS, SERIALS, STORAGE, UNIFORM, Resource, Row
+from vkbloom._custom.shaders import BLEND, COPY, DIFFERENCE, package_blend
+from vkbloom._locks import ProcessLock
+
+#: Of one frame.
+MAX_RUNS: Final = 256
+MAX_LEVELS: Final = 64
+_MAX_DEPTH: Final = 16
+
+Key = tuple[str, int | None]
+
+#: Blocks that are too large for the parameters, by their content.
+_KEPT_BLOCKS: Final = 64
+_BLOCKS: OrderedDict[bytes, Resource] = OrderedDict()
+_BLOCKS_LOCK: Final = ProcessLock()
+
+
+class Plan:
+    """Goes through the passes of a description for one frame."""
+
+    def __init__(
+        self, description: Description, passes: list[BoundPass], request: FrameValues
+    ) -> None:
+        self._description = description
+        self._request = request
+        self._passes = iter(passes)
+        self._images: dict[Key, PassImage] = {}
+        self._level: int | None = None
+        self._target: tuple[int, int] | None = None
+        self._depth = 0
+        self._owner: Any = None
+        self._line = 1
+        self._by_item = {id(each.item): each for each in passes}
+        self.rows: list[Row] = []
+
+    # The scope of expressions.
+
+    def number(self, name: str) -> Numbers:
+        """Return the value of a name."""
+        if name == LEVEL:
+            if self._level is None:
+                raise ArithmeticFault("'level' has a value in loops alone")
+            return (float(self._level),)
+        if name == INDEX:
+            return (float(self._request.index),)
+        if name in self._description.numbers:
+            self._depth += 1
+            if self._depth > _MAX_DEPTH:
+                raise ArithmeticFault(f"{name!r} depends on itself")
+            found = self._numbers(self._description.numbers[name][0])
+            self._depth -= 1
+            return found
+        return (float(self._request.values[name]),)
+
+    def size(self, source: ImageName) -> tuple[int, int]:
+        """Return the size of an image."""
+        if source.name == TARGET and self._target is not None:
+            return self._target
+        found = self._find(source)
+        if found is None:
+            raise ArithmeticFault(f"{self._shown(source)} is not written before this")
+        return found.size
+
+    def _numbers(self, value: Value) -> Numbers:
+        if isinstance(value, float):
+            return (value,)
+        if isinstance(value, tuple):
+            return tuple(part for each in value for part in self._numbers(each))
+        return evaluate(value, self)
+
+    def _value(self, value: Value, line: int) -> Numbers:
+        self._depth = 0
+        try:
+            return self._numbers(value)
+        except ArithmeticFault as error:
+            raise self._description.source.fault(line, str(error)) from None
+
+    def _whole(self, value: Value, line: int) -> int:
+        found = self._value(value, line)
+        if len(found) != 1:
+            raise self._description.source.fault(line, f"{len(found)} numbers are not one")
+        return int(found[0] // 1)
+
+    def _shown(self, source: ImageName) -> str:
+        level = "" if source.level is None else f"[{self._index(source)}]"
+        return f"{source.name}{level}"
+
+    def _index(self, source: ImageName) -> int | None:
+        if source.level is None:
+            return None
+        found = evaluate(source.level, self)
+        return int(found[0] // 1)
+
+    def _find(self, source: ImageName) -> PassImage | None:
+        """Return an image; None if it was not written."""
+        if source.name == FRAME:
+            return PassImage("MAIN", self._request.frame)
+        if source.name == GLOW:
+            return PassImage("GLOW", self._request.buffers)
+        return self._images.get((source.name, self._index(source)))
+
+    # The passes.
+
+    def run(self) -> tuple[Row, ...]:
+        """Return the rows."""
+        for step in self._description.steps:
+            if not isinstance(step, Loop):
+                self._run(self._by_item[id(step)])
+                continue
+            for level in self._levels(step):
+                self._level = level
+                for item in step.passes:
+                    self._run(self._by_item[id(item)])
+            self._level = None
+        return self._finish()
+
+    def _levels(self, loop: Loop) -> range:
+        first, last = (self._whole(each, loop.line) for each in (loop.first, loop.last))
+        levels = range(first, last + loop.step, loop.step)
+        if len(levels) > MAX_LEVELS:
+            cause = f"{len(levels)} levels are more than {MAX_LEVELS}"
+            raise self._description.source.fault(loop.line, cause)
+        return levels
+
+    def _run(self, each: BoundPass) -> None:
+        item = each.item
+        self._target = None
+        if item.when is not None and not any(self._value(item.when, item.line)):
+            return
+        if len(self.rows) >= MAX_RUNS:
+            cause = f"the passes run more than {MAX_RUNS} times in a frame"
+            raise self._description.source.fault(item.line, cause)
+        sizes = [self._side(output) for output in each.outputs]
+        self._target = sizes[0]
+        reads, sampling = [], []
+        for texture, how in each.reads:
+            reads.append(self._read(texture.sources, texture.line).name)
+            sampling.append(how)
+        params = self._pack(each.numbers, each.size)
+        resources = tuple(self._resource(block) for block in each.blocks)
+        turn = next(TURNS) if any(block.changes for block in each.blocks) else 0
+        made = [self._image(o, s) for o, s in zip(each.outputs, sizes, strict=True)]
+        self.rows.append(
+            Row(
+                made[0].name,
+                each.shader,
+                made[0].size,
+                tuple(reads),
+                params=params,
+                group=each.group,
+                resources=resources,
+                turn=turn,
+                sampling=tuple(sampling),
+                format=_format(each.outputs[0]),
+                vertex=each.vertex,
+                positions=each.positions,
+            )
+        )
+        for output, image in zip(each.outputs[1:], made[1:], strict=True):
+            self.rows.append(
+                Row(image.name, each.shader, image.size, format=_format(output), joined=True)
+            )
+        for number, output in enumerate(each.outputs):
+            image = made[number]
+            if item.blend is not None and number == 0:
+                image = self._blended(each, output, image)
+            self._images[output.image.name, self._index(output.image)] = image
+
+    def _side(self, output: Output) -> tuple[int, int]:
+        """Return the size of an output: a share of the frame, or one or two numbers of pixels."""
+        if isinstance(output.size, float):
+            found: Numbers = tuple(output.size * side for side in self._request.frame)
+        else:
+            found = self._value(output.size, output.line)
+        if len(found) not in (1, 2):
+            cause = f"size: {len(found)} numbers are not width and height"
+            raise self._description.source.fault(output.line, cause)
+        sides = tuple(max(int(each // 1), 1) for each in found)
+        if max(sides) > MAX_SIDE:
+            cause = f"size: a side of {max(sides)} pixels is out of range, 1 to {MAX_SIDE}"
+            raise self._description.source.fault(output.line, cause)
+        return sides[0], sides[-1]
+
+    def _read(self, sources: tuple[ImageName, ...], line: int) -> PassImage:
+        try:
+            for source in sources:
+                if (found := self._find(source)) is not None:
+                    return found
+            shown = " and ".join(self._shown(source) for source in sources)
+        except ArithmeticFault as error:
+            raise self._description.source.fault(line, str(error)) from None
+        cause = f"{shown} is not written before this pass"
+        raise self._description.source.fault(line, cause)
+
+    def _image(self, output: Output, size: tuple[int, int]) -> PassImage:
+        name = f"{len(self.rows)}.{len(self._images)}.{output.image.name}"
+        return PassImage(name[:MAX_NAME_LENGTH], size)
+
+    def _blended(self, each: BoundPass, output: Output, drawn: PassImage) -> PassImage:
+        """Return what blending makes of what a pass drew, and of what is there."""
+        blend = each.item.blend
+        assert blend is not None
+        there = self._read((blend.image or output.image,), blend.line)
+        if there.size != drawn.size:
+            cause = f"blend: {there.size} is not the size of the output, {drawn.size}"
+            raise self._description.source.fault(blend.line, cause)
+        factors = [self._value(part, blend.line) for part in (blend.source, blend.target)]
+        image = self._image(output, drawn.size)
+        shader, params = package_blend(*(_four(each) for each in factors))
+        self.rows.append(
+            Row(
+                image.name,
+                shader,
+                image.size,
+                (drawn.name, there.name),
+                params=params,
+                format=_format(output),
+            )
+        )
+        return image
+
+    def _pack(self, numbers: tuple[Number, ...], size: int) -> bytes:
+        data = bytearray(size)
+        for number in numbers:
+            self._write(data, number)
+        return bytes(data)
+
+    def _write(self, data: bytearray, number: Number) -> None:
+        given = self._value(number.value, number.line)
+        places = _places(number.type) if number.type.count or number.type.kind == "struct" else ()
+        if number.type.kind == "array" and number.type.count == 0:
+            assert number.type.of is not None
+            places = _runtime_places(number.type, len(given))
+        if len(given) == 1:
+            given *= len(places)
+        if len(given) != len(places):
+            raise self._description.source.fault(
+                number.line, f"{number.key}: it takes {len(places)} numbers, not {len(given)}"
+            )
+        for (kind, bits, offset), value in zip(places, given, strict=True):
+            packed = _packed(kind, bits, value)
+            at = number.offset + offset
+            if at + len(packed) > len(data):
+                data.extend(bytes(at + len(packed) - len(data)))
+            data[at : at + len(packed)] = packed
+
+    def _resource(self, block: Block) -> Resource:
+        if block.changes:
+            if self._owner is None:
+                self._owner = _core.resource_owner()
+            size = -(-max(block.size, 16) // 16) * 16
+            header = struct.pack("=2Q8I", next(SERIALS), size, STORAGE, *(0,) * 7)
+            return Resource(header, self._data(block, size), self._owner)
+        data = self._data(block, 16)
+        kind = STORAGE if block.storage else UNIFORM
+        key = bytes([kind]) + data
+        with _BLOCKS_LOCK:
+            if key not in _BLOCKS:
+                header = struct.pack("=2Q8I", next(SERIALS), len(data), kind, *(0,) * 7)
+                _BLOCKS[key] = Resource(header, data)
+                if len(_BLOCKS) > _KEPT_BLOCKS:
+                    _BLOCKS.popitem(last=False)
+            _BLOCKS.move_to_end(key)
+            return _BLOCKS[key]
+
+    def _data(self, block: Block, least: int) -> bytes:
+        data = self._pack(block.numbers, block.size)
+        return data.ljust(max(-(-len(data) // 16) * 16, least), b"\0")
+
+    # The names of the images.
+
+    def _finish(self) -> tuple[Row, ...]:
+        """Return the rows with the names of framebuffers, of the bloom, and of the picture."""
+        description, frame = self._description, self._request.frame
+        result = self._read((description.result,), description.result_line)
+        names = {result.name: BLOOM_IMAGE if description.saves_bloom else PICTURE}
+        if not description.saves_bloom and result.size != frame:
+            cause = f"the picture's size is {result.size} at the end, not the frame's, {frame}"
+            raise description.source.fault(description.result_line, cause)
+        taken = set(TAKEN)
+        for (name, level), image in self._images.items():
+            label = name.lower() if level is None else f"{name.lower()}_{level}"
+            label = f"saved_{label}" if label in TAKEN else label
+            if image.name not in names and label not in taken and image.name != "MAIN":
+                names[image.name] = label[:MAX_NAME_LENGTH]
+                taken.add(label)
+        rows = [
+            row._replace(
+                name=names.get(row.name, row.name),
+                reads=tuple(names.get(read, read) for read in row.reads),
+                framebuffer=row.name in names and names[row.name] != PICTURE,
+            )
+            for row in self.rows
+        ]
+        if result.name in ("MAIN", "GLOW"):
+            name = names[result.name]
+            rows.append(package_row(COPY, name, result.size, (result.name,)))
+        if not description.saves_bloom:
+            rows.append(package_row(DIFFERENCE, BLOOM_IMAGE, frame, (PICTURE, "MAIN")))
+        return tuple(rows)
+
+
+def _format(output: Output) -> int:
+    return _core.FORMATS.index(output.format) if output.format else 0
+
+
+def _four(value: Numbers) -> tuple[float, float, float, float]:
+    """Return four factors: one for all, three with the last one for alpha as 1, or four."""
+    if len(value) == 1:
+        value *= 4
+    return (*value, 1.0, 1.0, 1.0)[:4]  # type: ignore[return-value]
+
+
+@functools.lru_cache(maxsize=256)
+def _places(kind: Type) -> tuple[tuple[str, int, int], ...]:
+    return tuple(scalars(kind))
+
+
+def _runtime_places(kind: Type, count: int) -> tuple[tuple[str, int, int], ...]:
+    """Return the places of so many numbers in an array that is as long as they need."""
+    assert kind.of is not None
+    each = _places(kind.of)
+    rows: Iterator[tuple[str, int, int]] = (
+        (name, bits, offset + index * kind.stride)
+        for index in range(-(-count // len(each)))
+        for name, bits, offset in each
+    )
+    return tuple(rows)
+
+
+def _packed(kind: str, bits: int, value: float) -> bytes:
+    """Return a number as it is in a buffer."""
+    if kind == "float":
+        return struct.pack({16: "=e", 32: "=f", 64: "=d"}[bits], value)
+    whole = int(value) & ((1 << bits) - 1)
+    return whole.to_bytes(bits // 8, "little")

@@ -1,0 +1,223 @@
+"""The compiled shaders of a description: by each language's tool, with a cache."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import os
+import tempfile
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Final
+
+from vkbloom._core import ShaderError
+from vkbloom._custom import compiler
+from vkbloom._custom.compiler import CACHE, run_limited
+from vkbloom._custom.described import glslang, shaderlab, slang, wgsl
+from vkbloom._custom.described.files import Files, collect
+from vkbloom._custom.described.schema import Description, Shader
+
+#: Of all results together with what is before them.
+_VERSION: Final = b"1"
+
+
+@dataclasses.dataclass(frozen=True)
+class Program:
+    """A compiled shader.
+
+    - `code`: SPIR-V, with the entry point `entry`; None: there is one.
+    - `vertex`: SPIR-V of its vertex shader; None: a triangle that covers the target.
+    - `names`: Of modules without names, those of the source: place and member, and name.
+    - `shift`: Whether bindings are HLSL's registers.
+    """
+
+    code: bytes
+    entry: str | None
+    stage: str | None
+    vertex: bytes | None = None
+    names: tuple[tuple[str, str], ...] = ()
+    shift: bool = False
+
+
+def compile_all(description: Description, home: Path) -> tuple[dict[Shader, Program], list[str]]:
+    """Compile all shaders of a description; return them, and the paths of all files read.
+
+    Raises ShaderError or ValueError with file and line, also for files that cannot be read.
+    """
+    shaders = list(dict.fromkeys(each.shader for each in description.passes))
+    prepared = [_prepare(description, shader, home) for shader in shaders]
+    with ThreadPoolExecutor(os.cpu_count()) as threads:
+        futures = [threads.submit(_compile, *each) for each in zip(shaders, prepared, strict=True)]
+    programs = dict(zip(shaders, (future.result() for future in futures), strict=True))
+    return programs, list(dict.fromkeys(path for files in prepared for path in files.paths))
+
+
+def _prepare(description: Description, shader: Shader, home: Path) -> Files:
+    path = home / shader.file
+    folders = []
+    for name in shader.include:
+        folder = home / name
+        if not folder.is_dir():
+            raise description.source.fault(shader.line, f"include: there is no folder {folder}")
+        folders.append(folder.resolve())
+    try:
+        if shader.language == "spirv":
+            return _binary(path)
+        if shader.language in ("wgsl", "wesl"):
+            return wgsl.collect(path, _dependencies(description, shader, home))
+        return collect(path.absolute(), tuple(folders), home)
+    except OSError as error:
+        cause = f"file: {path}: {error.strerror or error}"
+        raise description.source.fault(shader.line, cause) from None
+
+
+def _dependencies(description: Description, shader: Shader, home: Path) -> dict[str, Path]:
+    made = {}
+    for name, folder in shader.dependencies:
+        if not (home / folder).is_dir():
+            cause = f"dependencies: there is no folder {home / folder}"
+            raise description.source.fault(shader.line, cause)
+        made[name] = (home / folder).resolve()
+    return made
+
+
+def _binary(path: Path) -> Files:
+    """Return a file of SPIR-V, whose bytes are characters of its text."""
+    from vkbloom._custom.source import Source  # noqa: PLC0415  only here
+
+    if path.stat().st_size > 4 << 20:
+        raise ValueError(f"{path}:1: {path.stat().st_size} bytes of SPIR-V are more than {4 << 20}")
+    return Files(Source(str(path), path.read_bytes().decode("latin-1")), (), ())
+
+
+def _compile(shader: Shader, files: Files) -> Program:
+    """Return a program, from the cache where it is there."""
+    key = hashlib.sha256(_VERSION + _tool(shader.language) + files.digest)
+    key.update(repr(dataclasses.replace(shader, line=0)).encode())
+    key.update(repr(files.folders).encode())
+    stored = CACHE.read(key.digest())
+    if stored is not None and (program := _unpack(stored)) is not None:
+        return program
+    program = _COMPILERS[shader.language](shader, files)
+    CACHE.write(key.digest(), _pack(program))
+    return program
+
+
+def _pack(program: Program) -> bytes:
+    import json  # noqa: PLC0415  only here
+
+    fields = dataclasses.asdict(program)
+    for name in ("code", "vertex"):
+        fields[name] = None if fields[name] is None else fields[name].hex()
+    return json.dumps(fields).encode()
+
+
+def _unpack(data: bytes) -> Program | None:
+    import json  # noqa: PLC0415  only here
+
+    try:
+        fields = json.loads(data)
+        for name in ("code", "vertex"):
+            fields[name] = None if fields[name] is None else bytes.fromhex(fields[name])
+        fields["names"] = tuple((place, name) for place, name in fields["names"])
+        return Program(**fields)
+    except (ValueError, TypeError):
+        return None
+
+
+def _tool(language: str) -> bytes:
+    """Return bytes that differ between compilers."""
+    if language in ("glsl", "shadertoy"):
+        return compiler.identity()
+    if language in ("wgsl", "wesl"):
+        return wgsl.identity(language)
+    if language == "spirv":
+        return b"spirv"
+    names = (slang.find_slangc(), slang.find_tool("spirv-opt") or "")
+    states = [os.stat(name) for name in names if name]
+    return repr([names, [(each.st_size, each.st_mtime_ns) for each in states]]).encode()
+
+
+def _defines(shader: Shader) -> list[str]:
+    return [f"-D{name}={value}" for name, value in shader.defines]
+
+
+def _glsl(shader: Shader, files: Files) -> Program:
+    suffix = shader.file.rpartition(".")[2]
+    stage = shader.stage or ("compute" if suffix == "comp" else "fragment")
+    code = glslang.compile_glsl(files, stage, shader.entry, _defines(shader))
+    if shader.vertex is None:
+        return Program(code, None, stage)
+    path = Path(files.main.name).parent / shader.vertex
+    vertex = collect(path, files.folders, path.parent)
+    return Program(
+        code, None, stage, glslang.compile_glsl(vertex, "vertex", None, _defines(shader))
+    )
+
+
+def _shadertoy(shader: Shader, files: Files) -> Program:
+    return Program(glslang.compile_shadertoy(files, _defines(shader)), None, "fragment")
+
+
+def _slang(shader: Shader, files: Files) -> Program:
+    stage, entry = shader.stage or "fragment", shader.entry or "main"
+    if shader.stage is None and f"[numthreads" in files.main.text and not shader.vertex:
+        head = files.main.text.partition(f" {entry}(")[0].rpartition("[numthreads")[2]
+        stage = "compute" if entry in files.main.text and "}" not in head else stage
+    arguments = [*_defines(shader), *shader.options]
+    code = slang.compile_slang(files, shader.language, stage, entry, arguments)
+    vertex = None
+    if shader.vertex is not None:
+        arguments = [*arguments, "-fvk-invert-y"]
+        vertex = slang.compile_slang(files, shader.language, "vertex", shader.vertex, arguments)
+    return Program(code, None, stage, vertex, shift=shader.language == "hlsl")
+
+
+def _shaderlab(shader: Shader, files: Files) -> Program:
+    program = shaderlab.read_program(files, shader.number)
+    entry = shader.entry or program.fragment
+    if entry is None:
+        raise files.fault("", 1, f"program {shader.number} has no #pragma fragment; give entry")
+    arguments = ["-DSHADER_API_VULKAN=1", "-DSHADER_TARGET=45", *_defines(shader), *shader.options]
+    code = slang.compile_slang(files, "hlsl", "fragment", entry, arguments, text=program.text)
+    vertex = None
+    if shader.vertex is not None:
+        arguments = [*arguments, "-fvk-invert-y"]
+        vertex = slang.compile_slang(
+            files, "hlsl", "vertex", shader.vertex, arguments, text=program.text
+        )
+    return Program(code, None, "fragment", vertex, shift=True)
+
+
+def _wgsl(shader: Shader, files: Files) -> Program:
+    code, names = wgsl.compile_wgsl(shader, files)
+    return Program(code, shader.entry, shader.stage, names=names)
+
+
+def _spirv(shader: Shader, files: Files) -> Program:
+    code = files.main.text.encode("latin-1")
+    validator = slang.find_tool("spirv-val")
+    if validator is None:
+        raise ShaderError(f"SPIR-V: {slang.MISSING_TOOLS.format('spirv-val')}")
+    with tempfile.TemporaryDirectory(prefix="vkbloom") as folder:
+        file = Path(folder) / "shader.spv"
+        file.write_bytes(code)
+        command = [validator, "--target-env", "vulkan1.3", "--scalar-block-layout", str(file)]
+        status, output = run_limited(command, "", folder)
+    if status:
+        lines = output.strip().split("\n")
+        cause = lines[0].replace(f"{file}:", "").replace("error:", "").strip()
+        raise ShaderError(f"{files.main.name}:1: the SPIR-V is not valid: {cause}")
+    return Program(code, shader.entry, shader.stage)
+
+
+_COMPILERS: Final = {
+    "glsl": _glsl,
+    "shadertoy": _shadertoy,
+    "hlsl": _slang,
+    "slang": _slang,
+    "shaderlab": _shaderlab,
+    "wgsl": _wgsl,
+    "wesl": _wgsl,
+    "spirv": _spirv,
+}

@@ -1,0 +1,562 @@
+"""The description of a method, bloom.toml: what an engine's CPU code does."""
+
+from __future__ import annotations
+
+import dataclasses
+import keyword
+from collections.abc import Iterator, Mapping
+from typing import Any, Final
+
+from vkbloom._custom.described.arithmetic import (
+    ArithmeticFault,
+    Expression,
+    Source as ImageName,
+    names_in,
+    parse,
+    source_of,
+)
+from vkbloom._custom.described.tables import Table, read_tables
+from vkbloom._custom.params import RANGES, Param
+from vkbloom._custom.source import Source
+
+#: Images that every pass can read.
+FRAME: Final = "frame"
+GLOW: Final = "glow"
+#: Numbers that every expression can have: the number of a run in a loop, of the frame before this
+#: one, and the target of the pass.
+LEVEL: Final = "level"
+INDEX: Final = "index"
+TARGET: Final = "target"
+
+FILTERS: Final = ("linear", "nearest")
+BORDERS: Final = ("clamp", "repeat", "mirror", "zero")
+LANGUAGES: Final = {
+    "glsl": (".glsl", ".frag", ".comp", ".vert", ".fs", ".fsh"),
+    "shadertoy": (".shadertoy",),
+    "hlsl": (".hlsl", ".fx", ".hlsli", ".cginc", ".compute", ".usf"),
+    "slang": (".slang",),
+    "shaderlab": (".shader",),
+    "wgsl": (".wgsl",),
+    "wesl": (".wesl",),
+    "spirv": (".spv",),
+}
+STAGES: Final = ("fragment", "compute")
+#: Formats of outputs; "" is the setting `format`.
+FORMATS: Final = ("", "rgba8unorm", "rgba16float", "rgba32float")
+MAX_LOOP_STEPS: Final = 64
+MAX_PASSES: Final = 64
+MAX_SETTINGS: Final = 64
+
+Value = Expression | float | tuple[Expression | float, ...]
+
+
+@dataclasses.dataclass(frozen=True)
+class Sampling:
+    """How a sampler reads."""
+
+    filter: str = "linear"
+    border: str = "clamp"
+
+    @property
+    def core(self) -> int:
+        """The core's number: VKB_SAMPLING_*."""
+        return (self.filter == "nearest") + 2 * BORDERS.index(self.border)
+
+
+@dataclasses.dataclass(frozen=True)
+class Texture:
+    """What a texture of a shader is: the first of some images that there is."""
+
+    sources: tuple[ImageName, ...]
+    sampling: Sampling
+    line: int
+
+
+@dataclasses.dataclass(frozen=True)
+class Output:
+    """An image that a pass writes. `size` is an expression, or a share of the frame."""
+
+    image: ImageName
+    size: Value
+    format: str
+    line: int
+
+
+@dataclasses.dataclass(frozen=True)
+class Blend:
+    """Factors of what the shader gives and of what is there."""
+
+    source: Value
+    target: Value
+    image: ImageName | None
+    line: int
+
+
+@dataclasses.dataclass(frozen=True)
+class Shader:
+    """A shader of a pass: what is compiled."""
+
+    file: str
+    language: str
+    entry: str | None
+    stage: str | None
+    vertex: str | None
+    include: tuple[str, ...]
+    defines: tuple[tuple[str, str], ...]
+    features: tuple[tuple[str, bool], ...]
+    dependencies: tuple[tuple[str, str], ...]
+    options: tuple[str, ...]
+    number: int
+    line: int
+
+
+@dataclasses.dataclass(frozen=True)
+class DescribedPass:
+    """A pass."""
+
+    shader: Shader
+    textures: Mapping[str, Texture]
+    samplers: Mapping[str, tuple[Sampling, int]]
+    values: Mapping[str, tuple[Value, int]]
+    constants: Mapping[str, tuple[float, int]]
+    outputs: Mapping[str, Output]
+    blend: Blend | None
+    when: Expression | None
+    tile: tuple[int, int] | None
+    line: int
+
+
+@dataclasses.dataclass(frozen=True)
+class Loop:
+    """Passes that run for each of some levels. `step` is 1 down the levels, -1 up."""
+
+    passes: tuple[DescribedPass, ...]
+    first: Value
+    last: Value
+    step: int
+    line: int
+
+
+@dataclasses.dataclass(frozen=True)
+class Description:
+    """All of a description."""
+
+    source: Source
+    params: tuple[Param, ...]
+    numbers: Mapping[str, tuple[Value, int]]
+    steps: tuple[DescribedPass | Loop, ...]
+    result: ImageName
+    saves_bloom: bool
+    result_line: int
+
+    @property
+    def passes(self) -> Iterator[DescribedPass]:
+        """All passes, in order."""
+        for step in self.steps:
+            yield from step.passes if isinstance(step, Loop) else (step,)
+
+    #: A description has no textures and buffers of its own, and reads no frame before.
+    embedded: Mapping[str, Any] = dataclasses.field(default_factory=dict)
+    histories: Mapping[str, str] = dataclasses.field(default_factory=dict)
+
+
+def read_schema(source: Source) -> Description:
+    """Read a description; raise ValueError with file and line if it is not valid."""
+    table = read_tables(source)
+    params = tuple(_read_settings(table.table("settings")))
+    numbers = _read_values(table.table("numbers"))
+    shared = _read_shared(table)
+    steps = tuple(_read_step(each, shared) for each in table.tables("passes"))
+    if not steps:
+        raise table.fault("passes: the description has none; a pass begins with [[passes]]")
+    key = "bloom" if "bloom" in table else "picture"
+    if ("bloom" in table) == ("picture" in table):
+        raise table.fault(
+            'give either bloom = "IMAGE", which is added to the picture, or picture = "IMAGE", '
+            "which replaces it",
+            key,
+        )
+    result = _image(table, key, table.text(key))
+    line = table.line(key)
+    table.finish("a description")
+    made = Description(source, params, numbers, steps, result, key == "bloom", line)
+    if len(list(made.passes)) > MAX_PASSES:
+        raise source.fault(1, f"more than {MAX_PASSES} passes")
+    _check_names(made)
+    return made
+
+
+def _read_settings(table: Table) -> Iterator[Param]:
+    if len(list(table)) > MAX_SETTINGS:
+        raise table.fault(f"settings: more than {MAX_SETTINGS}")
+    for name in table:
+        each = table.table(name)
+        line = table.line(name)
+        if not name.isidentifier() or keyword.iskeyword(name) or not name.isascii():
+            raise table.fault(f"settings: {name!r} is not a name", name)
+        text = each.get("text", str, "")
+        names = each.texts("choices")
+        if names:
+            default = each.choice("default", names, names[0])
+            last = len(names) - 1
+            each.finish("a setting with choices")
+            yield Param(name, text, "int", "uniform", 0, last, names.index(default), names, line)
+            continue
+        number = each.choice("type", ("float", "int"), "float")
+        kinds = int if number == "int" else (int, float)
+        if "default" not in each:
+            raise table.fault(f"{name}: the setting has no default", name)
+        value = each.get("default", kinds)
+        low, high = RANGES["int" if number == "int" else "float"]
+        span = each.get("range", list, [low, high])
+        if len(span) != 2 or not all(type(end) in (int, float) for end in span):
+            each.refuse("range", span, "is not two numbers")
+        if not span[0] <= value <= span[1]:
+            each.refuse("default", value, f"is out of range, {span[0]} to {span[1]}")
+        each.finish("a setting")
+        kind = "int" if number == "int" else "float"
+        yield Param(name, text, kind, "uniform", max(low, span[0]), min(high, span[1]), float(value), (), line)  # type: ignore[arg-type]  # noqa: E501
+
+
+def _image(table: Table, key: str, text: str | None) -> ImageName:
+    try:
+        return source_of(text or "")
+    except ArithmeticFault as error:
+        raise table.fault(f"{key}: {error}", key) from None
+
+
+def _value(table: Table, key: str, value: object) -> Value:
+    """Return a number, an expression, or several."""
+    if isinstance(value, bool | int | float):
+        if abs(value) > 1e30:
+            table.refuse(key, value, "is too large")
+        return float(value)
+    if isinstance(value, str):
+        try:
+            return parse(value)
+        except ArithmeticFault as error:
+            raise table.fault(f"{key}: {error}", key) from None
+    if isinstance(value, list) and value and len(value) <= 4096:
+        parts = [part for each in value for part in _parts(_value(table, key, each))]
+        return tuple(parts)
+    table.refuse(key, value, "is not a number, an expression, or a list of them")
+
+
+def _parts(value: Value) -> tuple[Expression | float, ...]:
+    return value if isinstance(value, tuple) else (value,)
+
+
+def _read_values(table: Table) -> dict[str, tuple[Value, int]]:
+    return {
+        key: (_value(table, key, table.get(key, object)), table.line(key)) for key in table
+    }
+
+
+@dataclasses.dataclass(frozen=True)
+class _Shared:
+    """What a description says for all of its passes."""
+
+    include: tuple[str, ...]
+    defines: dict[str, str]
+    features: dict[str, bool]
+    dependencies: dict[str, str]
+    options: tuple[str, ...]
+
+
+def _read_shared(table: Table, above: _Shared | None = None) -> _Shared:
+    known = above or _Shared((), {}, {}, {}, ())
+    features = table.table("features")
+    dependencies = table.table("dependencies")
+    return _Shared(
+        (*table.texts("include"), *known.include),
+        {**known.defines, **_read_defines(table)},
+        {**known.features, **{key: features.get(key, bool) for key in features}},
+        {**known.dependencies, **{key: dependencies.text(key) or "" for key in dependencies}},
+        (*known.options, *table.texts("options")),
+    )
+
+
+def _read_defines(table: Table) -> dict[str, str]:
+    made = {}
+    defines = table.table("defines")
+    for key in defines:
+        value = defines.get(key, (str, int, float, bool))
+        if not key.isidentifier() or not key.isascii():
+            raise defines.fault(f"defines: {key!r} is not a name", key)
+        text = str(int(value)) if isinstance(value, bool) else str(value)
+        if "\n" in text or len(text) > 200:
+            defines.refuse(key, value, "is not one line")
+        made[key] = text
+    return made
+
+
+def _read_step(table: Table, shared: _Shared) -> DescribedPass | Loop:
+    """Read a pass, or a loop of one or several."""
+    keys = [key for key in ("down", "up") if key in table]
+    if not keys:
+        if "steps" in table:
+            raise table.fault("steps: they need down = [first, last] or up = [first, last]", "steps")
+        return _read_pass(table, shared)
+    if len(keys) == 2:
+        raise table.fault("a pass goes either down or up", "up")
+    key = keys[0]
+    ends = table.get(key, list)
+    if len(ends) != 2:
+        table.refuse(key, ends, "is not [first level, last level]")
+    first, last = (_value(table, key, end) for end in ends)
+    line = table.line(key)
+    if "steps" in table:
+        passes = tuple(_read_pass(each, shared) for each in table.tables("steps"))
+        if not passes:
+            raise table.fault("steps: the loop has none", "steps")
+        table.finish("a loop")
+    else:
+        passes = (_read_pass(table, shared),)
+    return Loop(passes, first, last, 1 if key == "down" else -1, line)
+
+
+def _read_pass(table: Table, above: _Shared) -> DescribedPass:
+    shared = _read_shared(table, above)
+    shader = _read_shader(table, shared)
+    samplers = table.table("samplers")
+    constants = table.table("constants")
+    tile = table.get("tile", list)
+    if tile is not None and (
+        len(tile) != 2 or not all(type(each) is int and 1 <= each <= 16384 for each in tile)
+    ):
+        table.refuse("tile", tile, "is not the two sides in pixels that a workgroup covers")
+    when = table.text("when")
+    made = DescribedPass(
+        shader,
+        _read_textures(table.table("textures")),
+        {key: (_read_sampler(samplers, key), samplers.line(key)) for key in samplers},
+        _read_values(table.table("values")),
+        {
+            key: (float(constants.get(key, (int, float, bool))), constants.line(key))
+            for key in constants
+        },
+        _read_outputs(table),
+        _read_blend(table),
+        None if when is None else _expression(table, "when", when),
+        None if tile is None else (tile[0], tile[1]),
+        table.line(),
+    )
+    table.get("name", str)
+    table.finish("a pass")
+    return made
+
+
+def _expression(table: Table, key: str, text: str) -> Expression:
+    try:
+        return parse(text)
+    except ArithmeticFault as error:
+        raise table.fault(f"{key}: {error}", key) from None
+
+
+def _read_shader(table: Table, shared: _Shared) -> Shader:
+    file = table.text("file")
+    if file is None:
+        raise table.fault("file: the pass has none; give the file of its shader")
+    suffix = "." + file.rpartition(".")[2].lower()
+    language = next((name for name, suffixes in LANGUAGES.items() if suffix in suffixes), "")
+    if "language" in table or not language:
+        if "language" not in table:
+            table.refuse("file", file, "does not tell its language; give language = \"hlsl\"")
+        language = table.choice("language", LANGUAGES, language)
+    stage = table.choice("stage", STAGES, "") if "stage" in table else None
+    if stage is None and suffix in (".frag", ".comp"):
+        stage = "fragment" if suffix == ".frag" else "compute"
+    number = table.get("program", int, 0)
+    if not 0 <= number < 100:
+        table.refuse("program", number, "is not the number of a pass in the file, 0 to 99")
+    return Shader(
+        file,
+        language,
+        table.text("entry"),
+        stage,
+        table.text("vertex"),
+        shared.include,
+        tuple(shared.defines.items()),
+        tuple(shared.features.items()),
+        tuple(shared.dependencies.items()),
+        shared.options,
+        number,
+        table.line("file"),
+    )
+
+
+def _read_sampler(table: Table, key: str) -> Sampling:
+    value = table.get(key, (str, dict))
+    if isinstance(value, str):
+        return Sampling(table.choice(key, FILTERS, "linear"))
+    each = table.table(key)
+    made = _sampling(each)
+    each.finish("a sampler")
+    return made
+
+
+def _sampling(table: Table) -> Sampling:
+    return Sampling(
+        table.choice("filter", FILTERS, "linear"), table.choice("border", BORDERS, "clamp")
+    )
+
+
+def _read_textures(table: Table) -> dict[str, Texture]:
+    made = {}
+    for key in table:
+        value = table.get(key, (str, list, dict))
+        sampling = Sampling()
+        names = table.texts(key) if not isinstance(value, dict) else ()
+        if isinstance(value, dict):
+            each = table.table(key)
+            names = each.texts("source")
+            sampling = _sampling(each)
+            each.finish("a texture")
+        if not names:
+            raise table.fault(f"{key}: the texture has no source", key)
+        sources = tuple(_image(table, key, name) for name in names)
+        made[key] = Texture(sources, sampling, table.line(key))
+    return made
+
+
+def _read_outputs(table: Table) -> dict[str, Output]:
+    """Read `output`, or `outputs`: what the shader's targets are. The key "" stands for one."""
+    if ("output" in table) == ("outputs" in table):
+        raise table.fault(
+            'output: the pass has none; give output = "IMAGE"'
+            if "output" not in table
+            else "output: give output or outputs",
+        )
+    size = _size(table, parse(f"size({FRAME})"))
+    format = table.choice("format", FORMATS, "")
+    if "output" in table:
+        image = _image(table, "output", table.text("output"))
+        return {"": Output(_writable(table, "output", image), size, format, table.line("output"))}
+    outputs = table.table("outputs")
+    made = {}
+    for key in outputs:
+        value = outputs.get(key, (str, dict))
+        if isinstance(value, str):
+            image = _image(outputs, key, value)
+            made[key] = Output(_writable(outputs, key, image), size, format, outputs.line(key))
+            continue
+        each = outputs.table(key)
+        image = _image(each, "image", each.text("image"))
+        made[key] = Output(
+            _writable(each, "image", image),
+            _size(each, size),
+            each.choice("format", FORMATS, format),
+            outputs.line(key),
+        )
+        each.finish("an output")
+    if not made:
+        raise table.fault("outputs: the pass has none", "outputs")
+    return made
+
+
+def _writable(table: Table, key: str, image: ImageName) -> ImageName:
+    name = image.name
+    if name in (FRAME, GLOW, TARGET) or "__" in name or len(name) > 24 or not name.isascii():
+        table.refuse(key, name, "is not possible as the name of an output; it is up to 24 letters")
+    return image
+
+
+def _size(table: Table, default: Value) -> Value:
+    if "size" not in table:
+        return default
+    value = table.get("size", (int, float, str, list))
+    return _value(table, "size", value)
+
+
+def _read_blend(table: Table) -> Blend | None:
+    value = table.get("blend", (str, dict))
+    if value is None:
+        return None
+    line = table.line("blend")
+    if isinstance(value, str):
+        table.choice("blend", ("add",), "add")
+        return Blend(1.0, 1.0, None, line)
+    each = table.table("blend")
+    image = each.text("image")
+    made = Blend(
+        _value(each, "source", each.get("source", object, 1)),
+        _value(each, "target", each.get("target", object, 1)),
+        None if image is None else _image(each, "image", image),
+        line,
+    )
+    each.finish("blend")
+    return made
+
+
+def _check_names(made: Description) -> None:
+    """Check the names in all expressions: settings, numbers and images."""
+    known = {param.name for param in made.params} | made.numbers.keys()
+    outputs = {out.image.name for each in made.passes for out in each.outputs.values()}
+    images = outputs | {FRAME, GLOW}
+    for name in (param.name for param in made.params):
+        if name in made.numbers:
+            line = made.numbers[name][1]
+            raise made.source.fault(line, f"numbers: {name!r} is also a setting")
+    check = _NameCheck(made.source, known | {INDEX}, images)
+    for value, line in made.numbers.values():
+        check.value(value, line, level=True)
+    for step in made.steps:
+        is_loop = isinstance(step, Loop)
+        if isinstance(step, Loop):
+            check.value(step.first, step.line)
+            check.value(step.last, step.line)
+        for each in step.passes if isinstance(step, Loop) else (step,):
+            check.check_pass(each, level=is_loop)
+    check.image(made.result, made.result_line)
+    if made.result.name not in outputs:
+        raise made.source.fault(made.result_line, f"no pass writes {made.result.name!r}")
+
+
+@dataclasses.dataclass(frozen=True)
+class _NameCheck:
+    """Checks that names are known."""
+
+    source: Source
+    numbers: set[str]
+    images: set[str]
+
+    def value(self, value: Value | None, line: int, *, level: bool = False) -> None:
+        """Check a value; `level`: whether it can have the level of a loop."""
+        for part in _parts(value) if value is not None else ():
+            if isinstance(part, float):
+                continue
+            numbers, images = names_in(part)
+            known = self.numbers | ({LEVEL} if level else set())
+            for name in numbers - known:
+                self._fail(name, known, "a number", line)
+            for name in images - self.images - {TARGET}:
+                self._fail(name, self.images, "an image", line)
+
+    def _fail(self, name: str, known: set[str], what: str, line: int) -> None:
+        where = "; only loops have levels" if name == LEVEL else ""
+        raise self.source.fault(
+            line, f"{name!r} is not {what} here{where}; known are {', '.join(sorted(known))}"
+        )
+
+    def image(self, image: ImageName, line: int, *, level: bool = False) -> None:
+        """Check the name of an image and its level."""
+        if image.name not in self.images:
+            self._fail(image.name, self.images, "an image", line)
+        self.value(image.level, line, level=level)
+
+    def check_pass(self, each: DescribedPass, *, level: bool) -> None:
+        """Check all names of a pass."""
+        for texture in each.textures.values():
+            for source in texture.sources:
+                self.image(source, texture.line, level=level)
+        for value, line in each.values.values():
+            self.value(value, line, level=level)
+        for output in each.outputs.values():
+            self.image(output.image, output.line, level=level)
+            self.value(output.size, output.line, level=level)
+        if each.blend is not None:
+            self.value(each.blend.source, each.blend.line, level=level)
+            self.value(each.blend.target, each.blend.line, level=level)
+            if each.blend.image is not None:
+                self.image(each.blend.image, each.blend.line, level=level)
+        self.value(each.when, each.line, level=level)

@@ -1,0 +1,113 @@
+"""HLSL and Slang: by Slang's command slangc, and SPIRV-Tools' spirv-opt."""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import importlib.util
+import os
+import re
+import shutil
+import sys
+import tempfile
+from pathlib import Path
+from typing import Final
+
+from vkbloom._core import ShaderError
+from vkbloom._custom.compiler import run_limited, was_ended
+from vkbloom._custom.described.files import Files
+
+#: The first binding of each kind of HLSL's registers: b, t, s, u.
+SHIFTS: Final = {"b": 0, "t": 100, "s": 200, "u": 300}
+MISSING: Final = (
+    "HLSL and Slang need the compiler slangc: pip install --no-deps slangtorch (15 MB), or set "
+    "VKBLOOM_SLANGC to its path"
+)
+MISSING_TOOLS: Final = "{} is needed: pip install vkbloom[slang] (SPIRV-Tools, 8 MB)"
+_MESSAGE: Final = re.compile(
+    r"^error(?:\[\w+\])?: (.*)\n\s*--> (.*?):(\d+):\d+"
+    r"|^(.*?)\((\d+)\): (?:fatal )?error(?: \w+)?: (.*)$",
+    re.MULTILINE,
+)
+
+
+@functools.cache
+def find_slangc() -> str:
+    """Return the path of slangc: of VKBLOOM_SLANGC, the system's, or that of the package slangtorch."""
+    given = os.environ.get("VKBLOOM_SLANGC") or shutil.which("slangc")
+    if given:
+        return given
+    # Its files alone: the package itself needs PyTorch.
+    with contextlib.suppress(ImportError, ValueError):
+        spec = importlib.util.find_spec("slangtorch")
+        for folder in (spec.submodule_search_locations or []) if spec else []:
+            if os.path.isfile(program := os.path.join(folder, "bin", "slangc")):
+                return program
+    raise ShaderError(MISSING)
+
+
+def find_tool(name: str) -> str | None:
+    """Return the path of a command of SPIRV-Tools: that of the extra, or the system's."""
+    for folder in sys.path:
+        if os.path.isfile(program := os.path.join(folder, "cmeel.prefix", "bin", name)):
+            return program
+    return shutil.which(name)
+
+
+def compile_slang(
+    files: Files,
+    language: str,
+    stage: str,
+    entry: str,
+    arguments: list[str],
+    *,
+    text: str | None = None,
+) -> bytes:
+    """Return the SPIR-V of an entry point. `text`: what is compiled in place of the file."""
+    optimizer = find_tool("spirv-opt")
+    with tempfile.TemporaryDirectory(prefix="vkbloom") as folder:
+        target = Path(folder) / "shader.spv"
+        file = Path(files.main.name)
+        if text is not None:
+            file = Path(folder) / f"shader.{language}"
+            file.write_text(text, encoding="utf-8")
+        command = [find_slangc(), str(file), "-lang", language, "-target", "spirv"]
+        command += ["-stage", stage, "-entry", entry, "-o", str(target), *arguments]
+        command += [f"-I{each}" for each in (Path(files.main.name).parent, *files.folders)]
+        command += ["-warnings-disable", "39001,39029,39013,30081,15205,41018"]
+        if language == "hlsl":
+            for kind, shift in SHIFTS.items():
+                command += [f"-fvk-{kind}-shift", str(shift), "all"]
+        # slangc of slangtorch comes without its optimizer.
+        command += ["-O0"] if optimizer else []
+        status, output = run_limited(command, "", folder)
+        code = target.read_bytes() if status == 0 and target.exists() else b""
+        if not code:
+            raise _explain(files, str(file), status, output, entry)
+        return optimize(optimizer, code, folder) if optimizer else code
+
+
+def optimize(program: str, code: bytes, folder: str) -> bytes:
+    """Return SPIR-V with loops unrolled, constants folded, and what is not used left out."""
+    source, target = Path(folder) / "before.spv", Path(folder) / "after.spv"
+    source.write_bytes(code)
+    command = [program, "--skip-validation", "-O", str(source), "-o", str(target)]
+    status, _ = run_limited(command, "", folder)
+    return target.read_bytes() if status == 0 and target.exists() else code
+
+
+def _explain(files: Files, file: str, status: int, output: str, entry: str) -> ShaderError:
+    if ended := was_ended(status):
+        return files.fault("", 1, ended)
+    if "downstream compiler" in output:
+        return ShaderError(MISSING_TOOLS.format("spirv-opt"))
+    for match in _MESSAGE.finditer(output):
+        cause, name, line = match[1], match[2], match[3]
+        if cause is None:
+            name, line, cause = match[4], match[5], match[6]
+        name = "" if name == file or not name else name
+        return files.fault(name, int(line), cause.strip())
+    if "entry point" in output or "E38000" in output:
+        return files.fault("", 1, f"the file has no entry point {entry!r}; give entry = \"NAME\"")
+    lines = [line for line in output.strip().split("\n") if "rror" in line] or [f"status {status}"]
+    return files.fault("", 1, f"slangc refused the file: {lines[0].strip()}")
