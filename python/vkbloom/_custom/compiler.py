@@ -12,6 +12,7 @@ import signal
 import subprocess
 import sys
 import tempfile
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Final
 
@@ -104,14 +105,23 @@ def compile_pass(file: CustomFile, item: CustomPass, shader: Shader) -> bytes:
     return np.array(without_contraction(tuple(words.tolist())), "=u4").tobytes()
 
 
-def run_limited(command: list[str], text: str, folder: str) -> tuple[int, str]:
+def run_limited(
+    command: list[str],
+    text: str,
+    folder: str,
+    variables: Mapping[str, str] | None = None,
+    memory: int = MAX_MEMORY,
+) -> tuple[int, str]:
     """Run a process that reads a text; return its exit status and its output.
+
+    It has the environment variables of this process, and `variables`.
 
     The limits are set after the process started and before it gets the text, so that nothing of
     this process runs between fork and exec. What is preloaded into this process stays out: a
     sanitizer needs more address space than the limit.
     """
     environment = {name: os.environ[name] for name in os.environ if name != "LD_PRELOAD"}
+    environment.update(variables or {})
     with subprocess.Popen(
         command,
         stdin=subprocess.PIPE,
@@ -120,7 +130,7 @@ def run_limited(command: list[str], text: str, folder: str) -> tuple[int, str]:
         cwd=folder,
         env=environment,
     ) as process:
-        limit(process.pid)
+        limit(process.pid, memory)
         try:
             output, _ = process.communicate(text.encode(), timeout=MAX_SECONDS)
         except subprocess.TimeoutExpired:
@@ -133,13 +143,13 @@ def run_limited(command: list[str], text: str, folder: str) -> tuple[int, str]:
         return process.returncode, output.decode(errors="replace")
 
 
-def limit(process: int) -> None:
+def limit(process: int, memory: int) -> None:
     """Set the limits of a process, where the system can."""
     if sys.platform != "linux":
         return
     for which, most in (
         (resource.RLIMIT_CPU, MAX_PROCESSOR_SECONDS),
-        (resource.RLIMIT_AS, MAX_MEMORY),
+        (resource.RLIMIT_AS, memory),
         (resource.RLIMIT_FSIZE, MAX_RESULT_BYTES),
         (resource.RLIMIT_CORE, 0),
     ):

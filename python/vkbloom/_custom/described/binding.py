@@ -198,9 +198,11 @@ class _Binder:
             if SPEC_ID in marks and identity in module.defined:
                 known[module.names.get(identity, "")] = known[str(marks[SPEC_ID])] = identity
         made = {}
-        for key, (value, line) in self._item.constants.items():
+        if self._program.names:
+            return {}  # naga has put them in their places
+        for key, value in self._item.shader.constants:
             if key not in known:
-                raise self._unknown("constants", key, known, line)
+                raise self._unknown("constants", key, known, self._item.shader.line)
             word = module.defined[known[key]]
             kind = module.type(word[1]).kind
             data = struct.pack("<f", value) if kind == "float" else struct.pack("<q", int(value))[:4]
@@ -214,7 +216,8 @@ class _Binder:
 
     def _labels(self, variable: Variable) -> list[str]:
         """Return the names under which a description can mention a variable."""
-        labels = [variable.name, variable.place]
+        # Slang puts parameters of an entry point and of a file into structures.
+        labels = [variable.name.removeprefix("entryPointParams."), variable.place]
         if self._program.shift and variable.storage != 9:
             for kind, shift in slang.SHIFTS.items():
                 if shift <= variable.binding < shift + 100:
@@ -356,17 +359,19 @@ class _Binder:
                 )
             return
         covered = [path for path, _ in found]
-        for index, member in enumerate(variable.type.members):
-            if variable.members is not None and index not in variable.members:
-                continue
-            for path, kind, _ in paths(member.type, member.name or str(index)):
-                if not kind.members and not any(is_within(path, each) for each in covered):
-                    self._check_missing(variable, path, covered)
+        for index, path, kind in _leaves(variable.type):
+            used = variable.members is None or any(
+                index[: len(each)] == each[: len(index)] for each in variable.members
+            )
+            if used and not any(is_within(path, each) for each in covered):
+                self._check_missing(variable, path, kind, covered)
         yield from (number for _, number in found)
 
-    def _check_missing(self, variable: Variable, path: str, covered: list[str]) -> None:
+    def _check_missing(
+        self, variable: Variable, path: str, kind: Type, covered: list[str]
+    ) -> None:
         within = any(is_within(each, path) for each in covered)
-        if within or path.rpartition(".")[2].lower().lstrip("_").startswith("pad"):
+        if within or not kind.size or path.rpartition(".")[2].lower().lstrip("_").startswith("pad"):
             return
         raise self.fault(
             f"values: the shader reads {path!r} of {self._show(variable)}, which the pass does not "
@@ -385,11 +390,12 @@ class _Binder:
                     yield key[len(label) :].lstrip("."), (key, value, line)
                     break
             else:
-                if key in names and key:
+                path = _path_of(key, names)
+                if path:
                     if ("values", key) in self._used_keys:
                         raise self.fault(f"values: {key!r} is in several blocks; say BLOCK.{key}", line)
                     self._used_keys.add(("values", key))
-                    yield key, (key, value, line)
+                    yield path, (key, value, line)
 
     def _shadertoy(self, names: set[str]) -> Iterator[tuple[str, tuple[str, Value, int]]]:
         for key, texts in _SHADERTOY.items():
@@ -537,6 +543,14 @@ def _rename(module: Module, number: str, name: str) -> None:
         module.member_names[kind, int(parts[-1])] = name
 
 
+def _path_of(key: str, names: set[str]) -> str:
+    """Return the path that a key means: itself, or the only one that ends with it; "" for none."""
+    if key in names:
+        return key
+    found = [name for name in names if name.endswith(f".{key}")]
+    return found[0] if len(found) == 1 else ""
+
+
 def is_within(path: str, outer: str) -> bool:
     """Whether a path is another one, or a part of it."""
     return outer == "" or path == outer or path.startswith((f"{outer}.", f"{outer}["))
@@ -547,13 +561,28 @@ def paths(kind: Type, path: str = "", offset: int = 0) -> Iterator[tuple[str, Ty
     yield path, kind, offset
     if kind.kind == "struct":
         for index, member in enumerate(kind.members):
-            name = member.name or str(index)
-            inner = f"{path}.{name}" if path else name
+            inner = _inner(path, member.name, index)
             yield from paths(member.type, inner, offset + member.offset)
     elif kind.kind == "array" and kind.count <= 256:
         assert kind.of is not None
         for index in range(kind.count):
             yield from paths(kind.of, f"{path}[{index}]", offset + index * kind.stride)
+
+
+def _leaves(
+    kind: Type, index: tuple[int, ...] = (), path: str = ""
+) -> Iterator[tuple[tuple[int, ...], str, Type]]:
+    """Return the parts that are no structures, by the numbers of members that lead to them."""
+    if kind.kind != "struct":
+        yield index, path, kind
+    for number, member in enumerate(kind.members):
+        yield from _leaves(member.type, (*index, number), _inner(path, member.name, number))
+
+
+def _inner(path: str, name: str, number: int) -> str:
+    """Return the path of a member; one that naga has added has no name of its own."""
+    name = name or str(number)
+    return path if name == "*" else f"{path}.{name}" if path else name
 
 
 def scalars(kind: Type, offset: int = 0) -> Iterator[tuple[str, int, int]]:

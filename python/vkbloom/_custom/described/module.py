@@ -123,7 +123,10 @@ class Member:
 
 @dataclasses.dataclass(frozen=True)
 class Variable:
-    """A variable of a module. `members`: those that the entry point uses; None: all."""
+    """A variable of a module.
+
+    `members`: Those that the entry point uses, by the numbers that lead to them; None: all.
+    """
 
     id: int
     name: str
@@ -134,7 +137,7 @@ class Variable:
     location: int | None
     built_in: bool
     read_only: bool
-    members: frozenset[int] | None
+    members: frozenset[tuple[int, ...]] | None
 
     @property
     def place(self) -> str:
@@ -313,7 +316,7 @@ class Module:
         return sorted(found, key=lambda each: (each.storage, each.set, each.binding))
 
     def _variable(
-        self, identity: int, storage: int, kind: int, members: frozenset[int] | None
+        self, identity: int, storage: int, kind: int, members: frozenset[tuple[int, ...]] | None
     ) -> Variable:
         marks = self.decorations.get(identity, {})
         kind_marks = self.decorations.get(kind, {})
@@ -340,29 +343,33 @@ class Module:
             BUFFER_BLOCK in kind_marks,
         )
 
-    def _used(self, entry: Entry) -> dict[int, frozenset[int] | None]:
+    def _used(self, entry: Entry) -> dict[int, frozenset[tuple[int, ...]] | None]:
         """Return what the call tree of an entry point uses, with the members of blocks."""
-        used: dict[int, set[int] | None] = {}
+        used: dict[int, set[tuple[int, ...]] | None] = {}
         for function in self.reached(entry):
             for word in self.functions[function]:
                 opcode = word[0] & 0xFFFF
                 first, more = _POINTERS.get(opcode, (len(word), False))
                 for index in range(first, len(word) if more else min(first + 1, len(word))):
                     if opcode in ACCESS_CHAINS and index == 3 and len(word) > 4:
-                        self._use_member(used, word[3], word[4])
+                        self._use_member(used, word[3], word[4:])
                     else:
                         used[word[index]] = None
         return {key: None if each is None else frozenset(each) for key, each in used.items()}
 
-    def _use_member(self, used: dict[int, set[int] | None], base: int, index: int) -> None:
-        try:
-            member = self.constant(index)
-        except ModuleFault:
-            used[base] = None
-            return
+    def _use_member(
+        self, used: dict[int, set[tuple[int, ...]] | None], base: int, indices: Instruction
+    ) -> None:
+        """Note the member that constants at the begin of an access chain lead to."""
+        path: list[int] = []
+        for index in indices:
+            try:
+                path.append(self.constant(index))
+            except ModuleFault:
+                break
         known = used.setdefault(base, set())
         if known is not None:
-            known.add(member)
+            known.add(tuple(path))
 
     def reached(self, entry: Entry) -> list[int]:
         """Return the functions that an entry point calls, itself the first."""

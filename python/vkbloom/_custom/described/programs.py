@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import dataclasses
 import hashlib
+import json
 import os
+import re
 import tempfile
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -16,7 +18,12 @@ from vkbloom._custom.compiler import CACHE, run_limited
 from vkbloom._custom.described import glslang, shaderlab, slang, wgsl
 from vkbloom._custom.described.files import Files, collect
 from vkbloom._custom.described.schema import Description, Shader
+from vkbloom._custom.source import Source
 
+#: The attribute of a compute shader before an entry point of HLSL or Slang.
+_COMPUTE: Final = (
+    r"(?i:\[\s*numthreads)\b[^\]]*\]\s*(?:\[[^\]]*\]\s*)*(?:public\s+)?void\s+{}\s*\("
+)
 #: Of all results together with what is before them.
 _VERSION: Final = b"1"
 
@@ -45,9 +52,10 @@ def compile_all(description: Description, home: Path) -> tuple[dict[Shader, Prog
     Raises ShaderError or ValueError with file and line, also for files that cannot be read.
     """
     shaders = list(dict.fromkeys(each.shader for each in description.passes))
+    placed = [_with_folders(description, shader, home) for shader in shaders]
     prepared = [_prepare(description, shader, home) for shader in shaders]
     with ThreadPoolExecutor(os.cpu_count()) as threads:
-        futures = [threads.submit(_compile, *each) for each in zip(shaders, prepared, strict=True)]
+        futures = [threads.submit(_compile, *each) for each in zip(placed, prepared, strict=True)]
     programs = dict(zip(shaders, (future.result() for future in futures), strict=True))
     return programs, list(dict.fromkeys(path for files in prepared for path in files.paths))
 
@@ -64,27 +72,26 @@ def _prepare(description: Description, shader: Shader, home: Path) -> Files:
         if shader.language == "spirv":
             return _binary(path)
         if shader.language in ("wgsl", "wesl"):
-            return wgsl.collect(path, _dependencies(description, shader, home))
+            folders = [Path(each) for _, each in _with_folders(description, shader, home).dependencies]
+            return wgsl.collect(path, folders)
         return collect(path.absolute(), tuple(folders), home)
     except OSError as error:
         cause = f"file: {path}: {error.strerror or error}"
         raise description.source.fault(shader.line, cause) from None
 
 
-def _dependencies(description: Description, shader: Shader, home: Path) -> dict[str, Path]:
-    made = {}
-    for name, folder in shader.dependencies:
+def _with_folders(description: Description, shader: Shader, home: Path) -> Shader:
+    """Return a shader with the whole paths of its dependencies."""
+    for _, folder in shader.dependencies:
         if not (home / folder).is_dir():
             cause = f"dependencies: there is no folder {home / folder}"
             raise description.source.fault(shader.line, cause)
-        made[name] = (home / folder).resolve()
-    return made
+    paths = tuple((name, str((home / each).resolve())) for name, each in shader.dependencies)
+    return dataclasses.replace(shader, dependencies=paths)
 
 
 def _binary(path: Path) -> Files:
     """Return a file of SPIR-V, whose bytes are characters of its text."""
-    from vkbloom._custom.source import Source  # noqa: PLC0415  only here
-
     if path.stat().st_size > 4 << 20:
         raise ValueError(f"{path}:1: {path.stat().st_size} bytes of SPIR-V are more than {4 << 20}")
     return Files(Source(str(path), path.read_bytes().decode("latin-1")), (), ())
@@ -104,8 +111,6 @@ def _compile(shader: Shader, files: Files) -> Program:
 
 
 def _pack(program: Program) -> bytes:
-    import json  # noqa: PLC0415  only here
-
     fields = dataclasses.asdict(program)
     for name in ("code", "vertex"):
         fields[name] = None if fields[name] is None else fields[name].hex()
@@ -113,8 +118,6 @@ def _pack(program: Program) -> bytes:
 
 
 def _unpack(data: bytes) -> Program | None:
-    import json  # noqa: PLC0415  only here
-
     try:
         fields = json.loads(data)
         for name in ("code", "vertex"):
@@ -161,9 +164,8 @@ def _shadertoy(shader: Shader, files: Files) -> Program:
 
 def _slang(shader: Shader, files: Files) -> Program:
     stage, entry = shader.stage or "fragment", shader.entry or "main"
-    if shader.stage is None and f"[numthreads" in files.main.text and not shader.vertex:
-        head = files.main.text.partition(f" {entry}(")[0].rpartition("[numthreads")[2]
-        stage = "compute" if entry in files.main.text and "}" not in head else stage
+    if shader.stage is None and re.search(_COMPUTE.format(re.escape(entry)), files.main.text):
+        stage = "compute"
     arguments = [*_defines(shader), *shader.options]
     code = slang.compile_slang(files, shader.language, stage, entry, arguments)
     vertex = None
@@ -190,8 +192,9 @@ def _shaderlab(shader: Shader, files: Files) -> Program:
 
 
 def _wgsl(shader: Shader, files: Files) -> Program:
-    code, names = wgsl.compile_wgsl(shader, files)
-    return Program(code, shader.entry, shader.stage, names=names)
+    dependencies = {name: Path(folder) for name, folder in shader.dependencies}
+    code, stage, names = wgsl.compile_wgsl(shader, files, dependencies)
+    return Program(code, None, stage, names=names)
 
 
 def _spirv(shader: Shader, files: Files) -> Program:

@@ -106,6 +106,7 @@ class Shader:
     features: tuple[tuple[str, bool], ...]
     dependencies: tuple[tuple[str, str], ...]
     options: tuple[str, ...]
+    constants: tuple[tuple[str, float], ...]
     number: int
     line: int
 
@@ -118,7 +119,6 @@ class DescribedPass:
     textures: Mapping[str, Texture]
     samplers: Mapping[str, tuple[Sampling, int]]
     values: Mapping[str, tuple[Value, int]]
-    constants: Mapping[str, tuple[float, int]]
     outputs: Mapping[str, Output]
     blend: Blend | None
     when: Expression | None
@@ -319,7 +319,6 @@ def _read_pass(table: Table, above: _Shared) -> DescribedPass:
     shared = _read_shared(table, above)
     shader = _read_shader(table, shared)
     samplers = table.table("samplers")
-    constants = table.table("constants")
     tile = table.get("tile", list)
     if tile is not None and (
         len(tile) != 2 or not all(type(each) is int and 1 <= each <= 16384 for each in tile)
@@ -331,10 +330,6 @@ def _read_pass(table: Table, above: _Shared) -> DescribedPass:
         _read_textures(table.table("textures")),
         {key: (_read_sampler(samplers, key), samplers.line(key)) for key in samplers},
         _read_values(table.table("values")),
-        {
-            key: (float(constants.get(key, (int, float, bool))), constants.line(key))
-            for key in constants
-        },
         _read_outputs(table),
         _read_blend(table),
         None if when is None else _expression(table, "when", when),
@@ -366,6 +361,7 @@ def _read_shader(table: Table, shared: _Shared) -> Shader:
     stage = table.choice("stage", STAGES, "") if "stage" in table else None
     if stage is None and suffix in (".frag", ".comp"):
         stage = "fragment" if suffix == ".frag" else "compute"
+    constants = table.table("constants")
     number = table.get("program", int, 0)
     if not 0 <= number < 100:
         table.refuse("program", number, "is not the number of a pass in the file, 0 to 99")
@@ -380,6 +376,7 @@ def _read_shader(table: Table, shared: _Shared) -> Shader:
         tuple(shared.features.items()),
         tuple(shared.dependencies.items()),
         shared.options,
+        tuple((key, float(constants.get(key, (int, float, bool)))) for key in constants),
         number,
         table.line("file"),
     )

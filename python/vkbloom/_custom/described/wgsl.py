@@ -1,9 +1,253 @@
-"""WGSL and WESL."""
+"""WGSL by naga, of the package wgpu; WESL by wesl-py, which makes WGSL of it."""
+
+from __future__ import annotations
+
+import functools
+import importlib.metadata
+import importlib.util
+import json
+import os
+import re
+import sys
+import tempfile
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from vkbloom._custom.described.files import Files
-def collect(path, dependencies):
-    raise NotImplementedError
-def identity(language):
-    return b""
-def compile_wgsl(shader, files):
-    raise NotImplementedError
+from typing import Final
+
+from vkbloom import _core
+from vkbloom._core import ShaderError
+from vkbloom._custom.compiler import run_limited, was_ended
+from vkbloom._custom.described.files import MAX_BYTES, MAX_FILES, Files, read_text
+from vkbloom._custom.described.schema import Shader
+from vkbloom._custom.source import Source
+
+MISSING: Final = "WGSL needs naga: pip install vkbloom[wgsl] (wgpu, 4 MB)"
+MISSING_WESL: Final = (
+    "WESL needs wesl-py: pip install vkbloom[wgsl] with Python 3.12 or later (this is {}.{}); or give "
+    "the WGSL that it becomes, or set VKBLOOM_WESL_PYTHON to a Python that has it"
+)
+#: Virtual memory, of which a driver and a compiler reserve more than they use.
+MAX_MEMORY: Final = 16 << 30
+
+_REMARK: Final = re.compile(r"/\*.*?\*/|//[^\n]*", re.DOTALL)
+_VARIABLE: Final = re.compile(
+    r"@group\s*\(\s*(\d+)u?\s*\)\s*@binding\s*\(\s*(\d+)u?\s*\)\s*var\s*(<[^>]*>)?\s*(\w+)\s*:\s*([\w<>, ]+?)\s*;"
+)
+_STRUCT: Final = re.compile(r"\bstruct\s+(\w+)\s*\{([^}]*)\}")
+_MEMBER: Final = re.compile(r"(?:@\w+\s*(?:\([^)]*\))?\s*)*(\w+)\s*:\s*([^,;]+(?:<[^>]*>)?)")
+_LOCATION: Final = re.compile(r"@location\s*\(\s*(\d+)u?\s*\)")
+_INTERPOLATE: Final = re.compile(r"@interpolate\s*\(\s*([^)]*?)\s*\)")
+_MESSAGE_LINE: Final = re.compile(r"wgsl:(\d+):\d+")
+
+
+def collect(path: Path, dependencies: Sequence[Path]) -> Files:
+    """Read a file; of WESL, all files that it may import: of its folder and of dependencies."""
+    main = read_text(path.absolute())
+    if path.suffix != ".wesl" and "import " not in main.text:
+        return Files(main, (), ())
+    found: dict[Path, Source] = {}
+    total = 0
+    for folder in (path.absolute().parent, *dependencies):
+        for each in sorted(folder.rglob("*.w[eg]sl")):
+            if each.is_file() and each.resolve() != path.resolve():
+                found[each] = read_text(each)
+                total += len(found[each].text)
+            if len(found) > MAX_FILES or total > MAX_BYTES:
+                raise ValueError(f"{folder}:1: the folder has too many files to import from")
+    return Files(main, (), tuple(found.values()))
+
+
+@functools.cache
+def identity(language: str) -> bytes:
+    """Return bytes that differ between compilers; ShaderError without one."""
+    if importlib.util.find_spec("wgpu") is None:
+        raise ShaderError(MISSING)
+    versions = [importlib.metadata.version("wgpu"), _core.__file__]
+    if language == "wesl":
+        versions.append(find_wesl())
+    return repr(versions).encode()
+
+
+def compile_wgsl(
+    shader: Shader, files: Files, dependencies: Mapping[str, Path]
+) -> tuple[bytes, str, tuple[tuple[str, str], ...]]:
+    """Return the SPIR-V of an entry point, its stage, and the names of what it binds."""
+    text = files.main.text
+    if shader.language == "wesl":
+        text = _from_wesl(shader, files, dependencies)
+    for name, value in shader.defines:
+        # What engines put into WGSL before they compile it.
+        text = text.replace(f"##{name}##", value).replace(f"{{{name}}}", value)
+    plain = _REMARK.sub(lambda match: re.sub(r"[^\n]", " ", match[0]), text)
+    stage, entry, inputs, outputs = _interface(shader, files, plain)
+    asked = {
+        "code": text,
+        "entry": entry,
+        "stage": stage,
+        "inputs": inputs,
+        "outputs": outputs,
+        "constants": dict(shader.constants),
+    }
+    code = _run(files, asked, translated=shader.language == "wesl")
+    return code, stage, tuple(_names(plain))
+
+
+def _interface(
+    shader: Shader, files: Files, text: str
+) -> tuple[str, str, list[tuple[str, str, str]], int]:
+    """Return stage and name of the entry point, its inputs, and the number of its outputs."""
+    found = [
+        (match[1], match[2], match[3], match[4] or "")
+        for match in re.finditer(
+            r"@(vertex|fragment|compute)\b[^{}]*?\bfn\s+(\w+)\s*\(((?:[^()]|\([^()]*\))*)\)\s*(?:->\s*([^{]*))?\{",
+            text,
+        )
+        if match[1] != "vertex"
+    ]
+    wanted = [
+        each
+        for each in found
+        if shader.entry in (None, each[1]) and shader.stage in (None, each[0])
+    ]
+    if len(wanted) != 1:
+        known = ", ".join(f"{each[1]} ({each[0]})" for each in found) or "none"
+        cause = f"entry: {shader.entry!r} is not one" if shader.entry else "entry: give one"
+        raise files.fault("", 1, f"{cause} of the file's entry points: {known}")
+    stage, entry, given, returned = wanted[0]
+    structs = {match[1]: match[2] for match in _STRUCT.finditer(text)}
+    inputs = list(_locations(given, structs))
+    outputs = len(list(_locations(f"x: {returned}" if "@" not in returned else returned.replace(")", ") x:", 1), structs)))
+    return stage, entry, inputs, outputs
+
+
+def _locations(text: str, structs: Mapping[str, str]) -> Iterator[tuple[str, str, str]]:
+    """Return location, interpolation and type of parameters, or of members of their types."""
+    for part in re.split(r",(?![^<(]*[>)])", text):
+        name, _, kind = part.rpartition(":")
+        kind = kind.strip()
+        if match := _LOCATION.search(name):
+            how = _INTERPOLATE.search(name)
+            yield match[1], how[1] if how else "", kind
+        elif kind in structs:
+            yield from _locations(structs[kind], {})
+
+
+def _names(text: str) -> Iterator[tuple[str, str]]:
+    """Return names by place: naga's modules have none."""
+    structs = {
+        match[1]: [(each[1], each[2].strip()) for each in _MEMBER.finditer(match[2])]
+        for match in _STRUCT.finditer(text)
+    }
+    for group, binding, space, name, kind in _VARIABLE.findall(text):
+        place = f"{group}.{binding}"
+        yield place, name
+        if not space:
+            continue
+        # Naga puts what is bound into a structure, unless that ends with an array of any length.
+        members = structs.get(kind.strip())
+        last = members[-1][1] if members else ""
+        if not (last.startswith("array") and "," not in last):
+            yield f"{place}.0", "*"
+            place += ".0"
+        yield from _member_names(place, members or [], structs, 0)
+
+
+def _member_names(
+    place: str,
+    members: list[tuple[str, str]],
+    structs: Mapping[str, list[tuple[str, str]]],
+    depth: int,
+) -> Iterator[tuple[str, str]]:
+    for number, (name, kind) in enumerate(members):
+        yield f"{place}.{number}", name
+        if kind in structs and depth < 8:
+            yield from _member_names(f"{place}.{number}", structs[kind], structs, depth + 1)
+
+
+def _run(files: Files, asked: dict[str, object], *, translated: bool) -> bytes:
+    """Compile in a process of its own; return the module with the entry point."""
+    with tempfile.TemporaryDirectory(prefix="vkbloom") as folder:
+        layer = {
+            "name": "VK_LAYER_VKBLOOM_modules",
+            "type": "GLOBAL",
+            "library_path": _core.__file__,
+            "api_version": "1.3.0",
+            "implementation_version": "1",
+            "description": "Writes shader modules to files",
+        }
+        manifest = {"file_format_version": "1.2.0", "layer": layer}
+        (Path(folder) / "layer.json").write_text(json.dumps(manifest))
+        environment = {
+            "VK_LAYER_PATH": folder,
+            "VK_INSTANCE_LAYERS": layer["name"],
+            "VKBLOOM_MODULES": folder,
+            "WGPU_BACKEND_TYPE": "Vulkan",
+            "MESA_SHADER_CACHE_DISABLE": "1",
+        }
+        script = str(Path(__file__).with_name("naga.py"))
+        command = [sys.executable, "-I", script]
+        text = json.dumps(asked)
+        status, output = run_limited(command, text, folder, environment, MAX_MEMORY)
+        if status:
+            raise _explain(files, status, output, translated=translated)
+        for file in sorted(Path(folder).glob("*.spv"), key=lambda each: -int(each.stem)):
+            code = file.read_bytes()
+            name = str(asked["entry"]).encode()
+            model = 5 if asked["stage"] == "compute" else 4
+            if _has_entry(code, name, model):
+                return code
+    raise files.fault("", 1, "naga gave no SPIR-V; is the Vulkan loader installed?")
+
+
+def _has_entry(code: bytes, name: bytes, model: int) -> bool:
+    from vkbloom._custom.described.module import STAGES, Module, ModuleFault  # noqa: PLC0415
+
+    try:
+        entries = Module(code).entries
+    except ModuleFault:
+        return False
+    return any(each.name == name.decode() and each.stage == STAGES[model] for each in entries)
+
+
+def _explain(files: Files, status: int, output: str, *, translated: bool) -> ShaderError:
+    if ended := was_ended(status):
+        return files.fault("", 1, ended)
+    text = output.partition("VKBLOOM-ERROR\n")[2] or output
+    match = _MESSAGE_LINE.search(text)
+    lines = [line.strip(" │─┌└\t") for line in text.split("\n")]
+    causes = [line for line in lines if line and "wgsl:" not in line and not line[0].isdigit()]
+    named = [line.partition("error:")[2].strip() for line in lines if "error:" in line]
+    cause = (named or causes or ["no message"])[-1 if named else 0]
+    if "adapter" in cause.lower() and match is None:
+        cause = f"naga finds no Vulkan driver: {cause}"
+    if match is None or translated:
+        return files.fault("", 1, cause)
+    return files.fault("", int(match[1]), cause)
+
+
+def _from_wesl(shader: Shader, files: Files, dependencies: Mapping[str, Path]) -> str:
+    """Return WGSL, which a process of its own makes of WESL."""
+    asked = {
+        "file": files.main.name,
+        "features": dict(shader.features),
+        "dependencies": {name: str(folder) for name, folder in dependencies.items()},
+    }
+    with tempfile.TemporaryDirectory(prefix="vkbloom") as folder:
+        script = str(Path(__file__).with_name("wesl_child.py"))
+        command = [find_wesl(), "-I", script]
+        status, output = run_limited(command, json.dumps(asked), folder)
+    if not status:
+        return output
+    if ended := was_ended(status):
+        raise files.fault("", 1, ended)
+    name, line, cause = (*output.partition("VKBLOOM-ERROR\n")[2].split("\n", 2), "", "")[:3]
+    raise files.fault(name, int(line or 1), cause.strip().split("\n")[0] or "wesl-py failed")
+
+
+def find_wesl() -> str:
+    """Return the Python that has wesl-py: this one, or that of VKBLOOM_WESL_PYTHON."""
+    if given := os.environ.get("VKBLOOM_WESL_PYTHON"):
+        return given
+    if importlib.util.find_spec("wesl") is None:
+        raise ShaderError(MISSING_WESL.format(*sys.version_info[:2]))
+    return sys.executable

@@ -1,0 +1,62 @@
+"""Run in a process of its own: naga, of the package wgpu, makes SPIR-V of WGSL.
+
+The process gets JSON on its standard input, and a Vulkan layer that writes each shader module to a
+file. It prints an error, or nothing. This file imports nothing of the package.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import sys
+from typing import Any
+
+import wgpu
+
+_LOCATION = re.compile(
+    r"@location\s*\(\s*(\d+)\s*\)(?:\s*@interpolate\s*\(([^)]*)\))?\s*(?:(\w+)\s*:\s*)?([\w<>]+)"
+)
+
+
+def main() -> None:
+    """Compile what the standard input says."""
+    asked = json.loads(sys.stdin.read())
+    adapter = wgpu.gpu.request_adapter_sync(power_preference="low-power")
+    wanted = [name for name in adapter.features if name.startswith(("shader", "float32", "subgroup"))]
+    device = adapter.request_device_sync(
+        required_features=[name for name in wanted if "atomic" not in name and "barycentric" not in name]
+        + [name for name in adapter.features if "adapter-specific" in name or "norm" in name]
+    )
+    module = device.create_shader_module(code=asked["code"])
+    constants = asked["constants"]
+    stage = {"module": module, "entry_point": asked["entry"], "constants": constants}
+    if asked["stage"] == "compute":
+        device.create_compute_pipeline(layout="auto", compute=stage)
+        return
+    inputs, outputs = asked["inputs"], asked["outputs"]
+    vertex = device.create_shader_module(code=vertex_text(inputs))
+    device.create_render_pipeline(
+        layout="auto",
+        vertex={"module": vertex, "entry_point": "main"},
+        fragment={**stage, "targets": [{"format": "rgba16float"} for _ in range(outputs)]},
+    )
+
+
+def vertex_text(inputs: list[list[str]]) -> str:
+    """Return a vertex shader that writes the inputs of a fragment shader."""
+    members = "".join(
+        f"@location({number}) {f'@interpolate({how}) ' if how else ''}m{number}: {kind}, "
+        for number, how, kind in inputs
+    )
+    return (
+        f"struct Made {{ @builtin(position) position: vec4<f32>, {members} }}\n"
+        "@vertex fn main() -> Made { var made: Made; return made; }\n"
+    )
+
+
+if __name__ == "__main__":
+    try:
+        main()
+    except Exception as error:  # noqa: BLE001  of any kind: the other process shows it
+        print(f"VKBLOOM-ERROR\n{error}", flush=True)
+        sys.exit(1)
