@@ -32,6 +32,7 @@ COMMANDS: Final = {
     "translate": "Find another method's parameters whose bloom comes closest to settings",
     "check": "Measure a bloom by every law",
     "flare": "Report the flare of a camera or a bloom by the standards",
+    "describe": "Write the description of shaders, bloom.toml",
     "compare": "Measure the differences of two image files",
     "presets": "List the presets",
     "glares": "List the stages and published names of glare",

@@ -8,7 +8,7 @@ import dataclasses
 import keyword
 import os
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, ClassVar, Final, Literal, Self
 
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from vkbloom import _core
 from vkbloom._argument_types import check_arguments
+from vkbloom._custom.described.generate import is_shader, read_shaders
 from vkbloom._custom.described.schema import Description
 from vkbloom._custom.described.source import (
     DescribedSource,
@@ -247,10 +248,25 @@ def load_method(
 
 
 def read_method(source: str | os.PathLike[str]) -> Source:
-    """Read the file of a method: of passes, or a description, whose shaders it compiles."""
-    if Path(source).suffix == ".toml" and "\n" not in str(source):
+    """Read the file of a method: of passes; a description, whose shaders it compiles; a shader."""
+    if isinstance(source, str) and "\n" in source:
+        return read_source(source)
+    if Path(source).suffix.lower() == ".toml":
         return read_described(source)
-    return read_source(source)
+    return read_shaders([source]) if is_shader(source) else read_source(source)
+
+
+def read_again(source: Source) -> Source:
+    """Read the files of a source again, as they are now."""
+    if isinstance(source, DescribedSource) and Path(source.name).suffix.lower() != ".toml":
+        return read_shaders(source.shaders)
+    return read_method(source.name)
+
+
+def load_shaders(files: Sequence[str]) -> type[CustomMethod]:
+    """Load a method from shaders that together tell all that a description says."""
+    with _LOADING:
+        return class_of(identifier_of(Path(files[0]).stem), read_shaders(files), None)
 
 
 def identifier_of(stem: str) -> str:

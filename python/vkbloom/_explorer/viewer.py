@@ -39,8 +39,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom import _core
-from vkbloom._custom.method import CustomType, register
-from vkbloom._custom.source import read_source
+from vkbloom._custom.method import CustomType, read_again, register
 from vkbloom._explorer.controls import (
     as_fields,
     code_with_image,
@@ -471,7 +470,7 @@ class CustomFiles:
 
     def __init__(self) -> None:
         self._known = {name: METHODS[name] for name in METHODS if METHODS.is_added(name)}
-        self._read: dict[str, tuple[int, int]] = {}
+        self._read: dict[str, tuple[tuple[int, int], ...]] = {}
         self._errors: dict[str, str] = {}
 
     def __bool__(self) -> bool:
@@ -493,15 +492,15 @@ class CustomFiles:
     def _load(self, name: str) -> None:
         """Load a method's file again if it is another than before."""
         kind = METHODS.get(name)
-        if not isinstance(kind, CustomType) or kind.file.source.name == "<text>":
+        if not isinstance(kind, CustomType) or not kind.file.source.files:
             return
         try:
-            result = os.stat(kind.file.source.name)
-            stamp = (result.st_mtime_ns, result.st_size)
+            results = [os.stat(file) for file in kind.file.source.files]
+            stamp = tuple((result.st_mtime_ns, result.st_size) for result in results)
             if self._read.get(name) == stamp:
                 return
             self._read[name] = stamp
-            source = read_source(kind.file.source.name)
+            source = read_again(kind.file.source)
             if source != kind.file.source:
                 register(name, source, kind.numpy_reference)
             self._errors.pop(name, None)

@@ -26,7 +26,8 @@ from vkbloom._cli.program import adapter_option, as_wrong_use, is_given
 from vkbloom._cli.settings_options import settings_options
 from vkbloom._cli.targets import check_target
 from vkbloom._cli.terminal import is_quiet, note, say
-from vkbloom._custom.method import CustomMethod, identifier_of, load_method
+from vkbloom._custom.described.generate import is_shader
+from vkbloom._custom.method import CustomMethod, identifier_of, load_method, load_shaders
 from vkbloom._io import safe_writing
 from vkbloom._renderer.interruptible import open_renderer
 from vkbloom._renderer.renderer import Renderer
@@ -51,7 +52,7 @@ _Source: TypeAlias = str | Settings | Exposed
 
 
 class CheckCommand(Command):
-    """A command whose argument is a file of a custom method, which adds options."""
+    """A command whose argument is a custom method, of one file or several, which adds options."""
 
     def get_params(self, ctx: click.Context) -> list[click.Parameter]:
         """Leave out the field `exposure`: laws are measured without it, and an exposure has one."""
@@ -74,7 +75,12 @@ class CheckCommand(Command):
             if word.startswith("-") or (index and words[index - 1] in taking):
                 continue
             if os.path.isfile(word):
-                words[index : index + 1] = ["--method", load_method(word).method]
+                end = index + 1
+                while end < len(words) and is_shader(word) and is_shader(words[end]):
+                    end += 1
+                files = words[index:end]
+                kind = load_method(word) if len(files) == 1 else load_shaders(files)
+                words[index:end] = ["--method", kind.method]
                 break
         return super().parse_args(ctx, words)
 
@@ -87,7 +93,7 @@ def _laws(_: click.Context, __: click.Parameter, text: str) -> tuple[str, ...]:
 
 
 @click.command(cls=CheckCommand)
-@click.argument("file", required=False, metavar="[FILE]")
+@click.argument("file", required=False, metavar="[FILE...]")
 @click.option(
     "--command",
     "program",
@@ -152,8 +158,8 @@ def check(
 ) -> int:
     """Measure what a bloom or an exposure is worth.
 
-    FILE is a custom method; its parameters are options. Or give --preset, --method, --exposure,
-    --command, or --sequence.
+    FILE is a custom method; its parameters are options: passes (.hook), a description (.toml), or
+    shaders that need none. Or give --preset, --method, --exposure, --command, or --sequence.
     Prints the passes and their times; each law, held or by how much it is not; energy, point
     spread, stability of a moving light, response to the resolution, veiling glare index, the
     differences from the reference, and the nearest preset. Laws are measured with buffers of 32-bit

@@ -182,7 +182,7 @@ class _Binder:
             entry = module.entries[0].name
         found = module.entry(entry, stage)
         for number, name in self._program.names:
-            _rename(module, number, name)
+            rename(module, number, name)
         unknown = module.capabilities - CAPABILITIES
         if unknown:
             raise ModuleFault(f"the shader needs the capability {min(unknown)} of SPIR-V")
@@ -527,7 +527,7 @@ def _is_plain(image: Type) -> bool:
     return dimensions == 1 and not arrayed | multisampled and image.of is not None and image.of.kind == "float"
 
 
-def _rename(module: Module, number: str, name: str) -> None:
+def rename(module: Module, number: str, name: str) -> None:
     """Give a name to a variable, set.binding, or to a member of its block, set.binding.member."""
     parts = number.split(".")
     for identity, marks in module.decorations.items():

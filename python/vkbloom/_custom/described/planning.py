@@ -70,6 +70,8 @@ class Plan:
         self._images: dict[Key, PassImage] = {}
         self._level: int | None = None
         self._target: tuple[int, int] | None = None
+        # The textures of the pass, by their names in its shader.
+        self._bound: dict[str, PassImage] = {}
         self._depth = 0
         self._owner: Any = None
         self._line = 1
@@ -99,6 +101,8 @@ class Plan:
         """Return the size of an image."""
         if source.name == TARGET and self._target is not None:
             return self._target
+        if source.level is None and source.name in self._bound:
+            return self._bound[source.name].size
         found = self._find(source)
         if found is None:
             raise ArithmeticFault(f"{self._shown(source)} is not written before this")
@@ -167,12 +171,16 @@ class Plan:
 
     def _run(self, each: BoundPass) -> None:
         item = each.item
-        self._target = None
+        self._target, self._bound = None, {}
         if item.when is not None and not any(self._value(item.when, item.line)):
             return
         if len(self.rows) >= MAX_RUNS:
             cause = f"the passes run more than {MAX_RUNS} times in a frame"
             raise self._description.source.fault(item.line, cause)
+        self._bound = {
+            key: self._read(texture.sources, texture.line)
+            for key, texture in item.textures.items()
+        }
         sizes = [self._side(output) for output in each.outputs]
         self._target = sizes[0]
         reads, sampling = [], []

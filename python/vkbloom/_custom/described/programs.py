@@ -52,40 +52,45 @@ def compile_all(description: Description, home: Path) -> tuple[dict[Shader, Prog
     Raises ShaderError or ValueError with file and line, also for files that cannot be read.
     """
     shaders = list(dict.fromkeys(each.shader for each in description.passes))
-    placed = [_with_folders(description, shader, home) for shader in shaders]
-    prepared = [_prepare(description, shader, home) for shader in shaders]
+    placed = [_with_folders(description.source, shader, home) for shader in shaders]
+    prepared = [_prepare(description.source, shader, home) for shader in shaders]
     with ThreadPoolExecutor(os.cpu_count()) as threads:
         futures = [threads.submit(_compile, *each) for each in zip(placed, prepared, strict=True)]
     programs = dict(zip(shaders, (future.result() for future in futures), strict=True))
     return programs, list(dict.fromkeys(path for files in prepared for path in files.paths))
 
 
-def _prepare(description: Description, shader: Shader, home: Path) -> Files:
+def compile_one(shader: Shader, source: Source) -> Program:
+    """Compile a shader whose paths begin in the current folder; `source` is what errors name."""
+    return _compile(shader, _prepare(source, shader, Path()))
+
+
+def _prepare(source: Source, shader: Shader, home: Path) -> Files:
     path = home / shader.file
     folders = []
     for name in shader.include:
         folder = home / name
         if not folder.is_dir():
-            raise description.source.fault(shader.line, f"include: there is no folder {folder}")
+            raise source.fault(shader.line, f"include: there is no folder {folder}")
         folders.append(folder.resolve())
     try:
         if shader.language == "spirv":
             return _binary(path)
         if shader.language in ("wgsl", "wesl"):
-            folders = [Path(each) for _, each in _with_folders(description, shader, home).dependencies]
+            folders = [Path(each) for _, each in _with_folders(source, shader, home).dependencies]
             return wgsl.collect(path, folders)
-        return collect(path.absolute(), tuple(folders), home)
+        return collect(path.absolute(), tuple(folders), home.absolute())
     except OSError as error:
         cause = f"file: {path}: {error.strerror or error}"
-        raise description.source.fault(shader.line, cause) from None
+        raise source.fault(shader.line, cause) from None
 
 
-def _with_folders(description: Description, shader: Shader, home: Path) -> Shader:
+def _with_folders(source: Source, shader: Shader, home: Path) -> Shader:
     """Return a shader with the whole paths of its dependencies."""
     for _, folder in shader.dependencies:
         if not (home / folder).is_dir():
             cause = f"dependencies: there is no folder {home / folder}"
-            raise description.source.fault(shader.line, cause)
+            raise source.fault(shader.line, cause)
     paths = tuple((name, str((home / each).resolve())) for name, each in shader.dependencies)
     return dataclasses.replace(shader, dependencies=paths)
 

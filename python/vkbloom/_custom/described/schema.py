@@ -542,18 +542,19 @@ class _NameCheck:
         self.value(image.level, line, level=level)
 
     def check_pass(self, each: DescribedPass, *, level: bool) -> None:
-        """Check all names of a pass."""
+        """Check all names of a pass; sizes can be those of its textures."""
+        inner = dataclasses.replace(self, images=self.images | each.textures.keys())
         for texture in each.textures.values():
             for source in texture.sources:
                 self.image(source, texture.line, level=level)
         for value, line in each.values.values():
-            self.value(value, line, level=level)
+            inner.value(value, line, level=level)
         for output in each.outputs.values():
             self.image(output.image, output.line, level=level)
-            self.value(output.size, output.line, level=level)
+            inner.value(output.size, output.line, level=level)
         if each.blend is not None:
-            self.value(each.blend.source, each.blend.line, level=level)
-            self.value(each.blend.target, each.blend.line, level=level)
+            inner.value(each.blend.source, each.blend.line, level=level)
+            inner.value(each.blend.target, each.blend.line, level=level)
             if each.blend.image is not None:
                 self.image(each.blend.image, each.blend.line, level=level)
         self.value(each.when, each.line, level=level)

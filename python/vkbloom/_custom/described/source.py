@@ -28,6 +28,11 @@ class DescribedSource(Source):
     read: tuple[str, ...] = dataclasses.field(default=(), compare=False)
 
     @property
+    def shaders(self) -> tuple[str, ...]:
+        """The paths of the passes' shaders, as they are given."""
+        return tuple(dict.fromkeys(shader.file for shader, _ in self.programs))
+
+    @property
     def files(self) -> tuple[str, ...]:
         """The paths of all files that it was read from."""
         return (*super().files, *self.read)
