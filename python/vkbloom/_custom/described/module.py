@@ -345,31 +345,34 @@ class Module:
 
     def _used(self, entry: Entry) -> dict[int, frozenset[tuple[int, ...]] | None]:
         """Return what the call tree of an entry point uses, with the members of blocks."""
-        used: dict[int, set[tuple[int, ...]] | None] = {}
+        used: dict[int, set[tuple[int, ...]]] = {}
+        # Pointers to parts of variables, by the members that lead there.
+        parts: dict[int, tuple[int, tuple[int, ...]]] = {}
         for function in self.reached(entry):
             for word in self.functions[function]:
                 opcode = word[0] & 0xFFFF
                 first, more = _POINTERS.get(opcode, (len(word), False))
-                for index in range(first, len(word) if more else min(first + 1, len(word))):
-                    if opcode in ACCESS_CHAINS and index == 3 and len(word) > 4:
-                        self._use_member(used, word[3], word[4:])
+                for identity in word[first : len(word) if more else first + 1]:
+                    base, path = parts.get(identity, (identity, ()))
+                    if opcode in ACCESS_CHAINS:
+                        known = self._constants(word[4:])
+                        parts[word[2]] = base, path + known
+                        used.setdefault(base, set())
+                        if len(known) < len(word) - 4:
+                            used[base].add(path + known)
                     else:
-                        used[word[index]] = None
-        return {key: None if each is None else frozenset(each) for key, each in used.items()}
+                        used.setdefault(base, set()).add(path)
+        return {key: None if () in each else frozenset(each) for key, each in used.items()}
 
-    def _use_member(
-        self, used: dict[int, set[tuple[int, ...]] | None], base: int, indices: Instruction
-    ) -> None:
-        """Note the member that constants at the begin of an access chain lead to."""
+    def _constants(self, indices: Instruction) -> tuple[int, ...]:
+        """Return the constants at the begin of the indices of an access chain."""
         path: list[int] = []
         for index in indices:
             try:
                 path.append(self.constant(index))
             except ModuleFault:
                 break
-        known = used.setdefault(base, set())
-        if known is not None:
-            known.add(tuple(path))
+        return tuple(path)
 
     def reached(self, entry: Entry) -> list[int]:
         """Return the functions that an entry point calls, itself the first."""

@@ -25,7 +25,7 @@ _COMPUTE: Final = (
     r"(?i:\[\s*numthreads)\b[^\]]*\]\s*(?:\[[^\]]*\]\s*)*(?:public\s+)?void\s+{}\s*\("
 )
 #: Of all results together with what is before them.
-_VERSION: Final = b"1"
+_VERSION: Final = b"2"
 
 
 @dataclasses.dataclass(frozen=True)

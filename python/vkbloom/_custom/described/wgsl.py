@@ -8,6 +8,7 @@ import importlib.util
 import json
 import os
 import re
+import struct
 import sys
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
@@ -18,8 +19,10 @@ from vkbloom import _core
 from vkbloom._core import ShaderError
 from vkbloom._custom.compiler import run_limited, was_ended
 from vkbloom._custom.described.files import MAX_BYTES, MAX_FILES, Files, read_text
+from vkbloom._custom.described.module import BINDING, DECORATE, SET, STAGES, Module, ModuleFault
 from vkbloom._custom.described.schema import Shader
 from vkbloom._custom.source import Source
+from vkbloom._custom.spirv import HEADER_WORDS
 
 MISSING: Final = "WGSL needs naga: pip install vkbloom[wgsl] (wgpu, 4 MB)"
 MISSING_WESL: Final = (
@@ -89,7 +92,61 @@ def compile_wgsl(
         "constants": dict(shader.constants),
     }
     code = _run(files, asked, translated=shader.language == "wesl")
+    code = _with_bindings(files, code, _used_places(plain, entry))
     return code, stage, tuple(_names(plain))
+
+
+def _used_places(text: str, entry: str) -> dict[int, list[int]]:
+    """Return the bindings of each group that an entry point uses, also by what it calls."""
+    bodies = {}
+    for match in re.finditer(r"\bfn\s+(\w+)\s*\(", text):
+        bodies[match[1]] = set(re.findall(r"[A-Za-z_]\w*", _body(text, match.end())))
+    words: set[str] = set()
+    waiting = [entry]
+    while waiting:
+        found = bodies.pop(waiting.pop(), set())
+        words |= found
+        waiting += found & bodies.keys()
+    used: dict[int, list[int]] = {}
+    for group, binding, _, name, _ in _VARIABLE.findall(text):
+        if name in words:
+            used.setdefault(int(group), []).append(int(binding))
+    return {group: sorted(bindings) for group, bindings in used.items()}
+
+
+def _body(text: str, start: int) -> str:
+    """Return the text from a position to the end of the braces that follow it."""
+    at = text.find("{", start)
+    depth = 0
+    for end in range(max(at, start), len(text)):
+        depth += {"{": 1, "}": -1}.get(text[end], 0)
+        if depth == 0 and end > at >= 0:
+            return text[at:end]
+    return text[start:]
+
+
+def _with_bindings(files: Files, code: bytes, used: Mapping[int, list[int]]) -> bytes:
+    """Return a module with the bindings of the source: wgpu numbers those that are used."""
+    module = Module(code)
+    places = {
+        identity: (marks[SET], marks[BINDING])
+        for identity, marks in module.decorations.items()
+        if SET in marks and BINDING in marks
+    }
+    changed = {}
+    for group in {place[0] for place in places.values()}:
+        found = sorted({place[1] for place in places.values() if place[0] == group})
+        wanted = used.get(group, [])
+        if len(found) != len(wanted):
+            raise files.fault("", 1, f"naga binds {len(found)} of group {group}, not {len(wanted)}")
+        changed.update({(group, a): b for a, b in zip(found, wanted, strict=True)})
+    words = list(module.words)
+    position = HEADER_WORDS
+    for word in module.instructions:
+        if word[0] == 4 << 16 | DECORATE and word[2] == BINDING and word[1] in places:
+            words[position + 3] = changed[places[word[1]]]
+        position += len(word)
+    return struct.pack(f"={len(words)}I", *words)
 
 
 def _interface(
@@ -200,8 +257,6 @@ def _run(files: Files, asked: dict[str, object], *, translated: bool) -> bytes:
 
 
 def _has_entry(code: bytes, name: bytes, model: int) -> bool:
-    from vkbloom._custom.described.module import STAGES, Module, ModuleFault  # noqa: PLC0415
-
     try:
         entries = Module(code).entries
     except ModuleFault:
