@@ -125,8 +125,12 @@ static bool create_logical(struct vkb_device *device, struct vkb_error *error)
     const struct vkb_instance_table *vk = &device->instance->vk;
     const char *extensions[EXTENSION_COUNT];
     uint32_t extension_count;
+    VkPhysicalDeviceVulkan11Features available11 = {
+        .sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_1_FEATURES,
+    };
     VkPhysicalDeviceVulkan12Features available12 = {
         .sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_FEATURES,
+        .pNext = &available11,
     };
     VkPhysicalDeviceFeatures2 available2 = {
         .sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2,
@@ -151,9 +155,14 @@ static bool create_logical(struct vkb_device *device, struct vkb_error *error)
         .maintenance4 = VK_TRUE,
         .shaderDemoteToHelperInvocation = VK_TRUE,
     };
+    VkPhysicalDeviceVulkan11Features vulkan11 = {
+        .sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_1_FEATURES,
+        .pNext = &vulkan13,
+        .shaderDrawParameters = available11.shaderDrawParameters,
+    };
     VkPhysicalDeviceVulkan12Features vulkan12 = {
         .sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_FEATURES,
-        .pNext = &vulkan13,
+        .pNext = &vulkan11,
         .scalarBlockLayout = available12.scalarBlockLayout,
         .shaderFloat16 = available12.shaderFloat16,
         .timelineSemaphore = VK_TRUE,

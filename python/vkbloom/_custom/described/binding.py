@@ -134,6 +134,7 @@ class _Binder:
         self._blocks: list[tuple[Block, _Stage, int]] = []
         self._used_keys: set[tuple[str, str]] = set()
         self._structs: set[int] = set()
+        self._known: set[str] = set()
 
     def fault(self, cause: str, line: int | None = None) -> ValueError:
         """Return the error of a line, by default that of the pass's file."""
@@ -227,6 +228,7 @@ class _Binder:
     def _find(self, what: str, keys: Mapping[str, object], variable: Variable) -> str | None:
         """Return the key that names a variable."""
         found = [key for key in self._labels(variable) if key in keys]
+        self._known |= {*self._labels(variable)}
         if len(found) > 1:
             raise self.fault(f"{what}: {found[0]} and {found[1]} are the same one")
         if found:
@@ -339,6 +341,7 @@ class _Binder:
     def _members(self, variable: Variable) -> Iterator[Number]:
         """Return the values of a block's members; raise ValueError if one has none."""
         given = dict(self._given(variable))
+        self._known |= {path for path, _, _ in paths(variable.type)}
         found = []
         for path, kind, offset in paths(variable.type):
             if path in given:
@@ -499,7 +502,8 @@ class _Binder:
                     raise self.fault(f"vertex: it does not write the input {each.name!r}")
             return False
         for location, each in wanted.items():
-            if location not in POSITIONS or each.type.kind not in ("vector", "float"):
+            kind = each.type.of if each.type.kind == "vector" else each.type
+            if location not in POSITIONS or kind is None or kind.kind != "float":
                 raise self.fault(
                     f"vertex: the shader reads {each.name!r} at location {location}; without "
                     "vertex = \"NAME\" there are positions at locations 0 to 3 alone"
@@ -514,7 +518,8 @@ class _Binder:
                 if (what, key) not in self._used_keys:
                     entry = given[key]
                     line = entry.line if isinstance(entry, Texture) else entry[1]  # type: ignore[index]
-                    raise self.fault(f"{what}: the shader does not use {key!r}", line)
+                    near = did_you_mean(key, self._known)
+                    raise self.fault(f"{what}: the shader does not use {key!r}{near}", line)
 
     def _code(self, stage: _Stage, name: str) -> CoreShader:
         code = place(stage.module, stage.entry, stage.places)

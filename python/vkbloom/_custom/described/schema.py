@@ -428,7 +428,8 @@ def _read_outputs(table: Table) -> dict[str, Output]:
     format = table.choice("format", FORMATS, "")
     if "output" in table:
         image = _image(table, "output", table.text("output"))
-        return {"": Output(_writable(table, "output", image), size, format, table.line("output"))}
+        line = table.line("size" if "size" in table else "output")
+        return {"": Output(_writable(table, "output", image), size, format, line)}
     outputs = table.table("outputs")
     made = {}
     for key in outputs:
@@ -443,7 +444,7 @@ def _read_outputs(table: Table) -> dict[str, Output]:
             _writable(each, "image", image),
             _size(each, size),
             each.choice("format", FORMATS, format),
-            outputs.line(key),
+            each.line("size") if "size" in each else outputs.line(key),
         )
         each.finish("an output")
     if not made:

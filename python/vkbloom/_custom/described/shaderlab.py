@@ -9,8 +9,7 @@ from typing import Final
 from vkbloom._custom.described.files import Files
 
 _BLOCK: Final = re.compile(
-    r"^[ \t]*(HLSLINCLUDE|CGINCLUDE|HLSLPROGRAM|CGPROGRAM)\b(.*?)^[ \t]*(ENDHLSL|ENDCG)\b",
-    re.MULTILINE | re.DOTALL,
+    r"\b(HLSLINCLUDE|CGINCLUDE|HLSLPROGRAM|CGPROGRAM)\b(.*?)\b(ENDHLSL|ENDCG)\b", re.DOTALL
 )
 _PRAGMA: Final = re.compile(r"^[ \t]*#[ \t]*pragma[ \t]+(vertex|fragment|kernel)[ \t]+(\w+)", re.MULTILINE)
 _SUBSHADER: Final = re.compile(r"\bSubShader\b")

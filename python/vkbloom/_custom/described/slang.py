@@ -29,6 +29,17 @@ _MESSAGE: Final = re.compile(
     r"|^(.*?)\((\d+)\): (?:fatal )?error(?: \w+)?: (.*)$",
     re.MULTILINE,
 )
+#: What a message says below the line that it quotes.
+_SAID: Final = re.compile(r"^\s*\|\s*\^+ (.+)$", re.MULTILINE)
+#: Names of Direct3D 9, which Unity's shaders have and Slang has not.
+_D3D9: Final = """\
+#define sampler2D Sampler2D<float4>
+float4 tex2D(Sampler2D<float4> image, float2 at) { return image.Sample(at); }
+float4 tex2Dlod(Sampler2D<float4> image, float4 at) { return image.SampleLevel(at.xy, at.w); }
+float4 tex2Dbias(Sampler2D<float4> image, float4 at) { return image.SampleBias(at.xy, at.w); }
+"""
+#: Unity's own header UnityCG.cginc is no part of its projects: a small one in its place.
+UNITY: Final = Path(__file__).with_name("unity")
 
 
 @functools.cache
@@ -68,12 +79,15 @@ def compile_slang(
     with tempfile.TemporaryDirectory(prefix="vkbloom") as folder:
         target = Path(folder) / "shader.spv"
         file = Path(files.main.name)
+        if text is None and language == "hlsl" and is_old(files):
+            text = f'#line 1 "{file}"\n{files.main.text}'
         if text is not None:
+            text = f"{_D3D9 if is_old(files) else ''}{text}"
             file = Path(folder) / f"shader.{language}"
             file.write_text(text, encoding="utf-8")
         command = [find_slangc(), str(file), "-lang", language, "-target", "spirv"]
         command += ["-stage", stage, "-entry", entry, "-o", str(target), *arguments]
-        command += [f"-I{each}" for each in (Path(files.main.name).parent, *files.folders)]
+        command += [f"-I{each}" for each in (Path(files.main.name).parent, *files.folders, UNITY)]
         command += ["-warnings-disable", "39001,39029,39013,30081,15205,41018"]
         if language == "hlsl":
             for kind, shift in SHIFTS.items():
@@ -87,6 +101,11 @@ def compile_slang(
         return optimize(optimizer, code, folder) if optimizer else code
 
 
+def is_old(files: Files) -> bool:
+    """Whether a file has the names of Direct3D 9."""
+    return any(re.search(r"\btex2D(?:lod|bias)?\s*\(", each.text) for each in (files.main, *files.others))
+
+
 def optimize(program: str, code: bytes, folder: str) -> bytes:
     """Return SPIR-V with loops unrolled, constants folded, and what is not used left out."""
     source, target = Path(folder) / "before.spv", Path(folder) / "after.spv"
@@ -97,7 +116,8 @@ def optimize(program: str, code: bytes, folder: str) -> bytes:
 
 
 def _explain(files: Files, file: str, status: int, output: str, entry: str) -> ShaderError:
-    if ended := was_ended(status):
+    # Its own status is -1, which is 255.
+    if ended := was_ended(min(status, 0)):
         return files.fault("", 1, ended)
     if "downstream compiler" in output:
         return ShaderError(MISSING_TOOLS.format("spirv-opt"))
@@ -106,7 +126,8 @@ def _explain(files: Files, file: str, status: int, output: str, entry: str) -> S
         if cause is None:
             name, line, cause = match[4], match[5], match[6]
         name = "" if name == file or not name else name
-        return files.fault(name, int(line), cause.strip())
+        said = _SAID.search(output, match.end())
+        return files.fault(name, int(line), (said[1] if said else cause).strip().rstrip("."))
     if "entry point" in output or "E38000" in output:
         return files.fault("", 1, f"the file has no entry point {entry!r}; give entry = \"NAME\"")
     lines = [line for line in output.strip().split("\n") if "rror" in line] or [f"status {status}"]

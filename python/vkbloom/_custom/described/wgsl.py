@@ -276,7 +276,7 @@ def _explain(files: Files, status: int, output: str, *, translated: bool) -> Sha
     if "adapter" in cause.lower() and match is None:
         cause = f"naga finds no Vulkan driver: {cause}"
     if match is None or translated:
-        return files.fault("", 1, cause)
+        return files.fault("", _line_of_word(files, cause), cause)
     return files.fault("", int(match[1]), cause)
 
 
@@ -296,7 +296,16 @@ def _from_wesl(shader: Shader, files: Files, dependencies: Mapping[str, Path]) -
     if ended := was_ended(status):
         raise files.fault("", 1, ended)
     name, line, cause = (*output.partition("VKBLOOM-ERROR\n")[2].split("\n", 2), "", "")[:3]
-    raise files.fault(name, int(line or 1), cause.strip().split("\n")[0] or "wesl-py failed")
+    cause = cause.strip().split("\n")[0] or "wesl-py failed"
+    raise files.fault(name, int(line) if line > "1" else _line_of_word(files, cause), cause)
+
+
+def _line_of_word(files: Files, cause: str) -> int:
+    """Return the first line that has a word of a message without a place; 1 if there is none."""
+    text = files.main.text
+    word = re.search(r"`(\w+)`", cause)
+    at = re.search(rf"\b{word[1]}\b", text) if word else None
+    return text.count("\n", 0, at.start()) + 1 if at else 1
 
 
 def find_wesl() -> str:

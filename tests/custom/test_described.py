@@ -1,0 +1,482 @@
+"""Shaders as engines ship them, with a description: one bloom in each language."""
+
+from __future__ import annotations
+
+import pickle
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import vkbloom
+from tests.images import picture
+from vkbloom import Renderer, Settings, ShaderError, load_method, reference, testing
+from vkbloom._custom.described import slang, wgsl
+from vkbloom._custom.described.generate import describe
+from vkbloom._settings.registry import METHODS
+
+pytestmark = pytest.mark.usefixtures("glslang")
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples" / "languages"
+LANGUAGES = ("glsl", "hlsl", "slang", "wgsl", "wesl")
+
+Array = NDArray[Any]
+
+
+def require(language: str) -> None:
+    """Skip the test where the language's compiler is not installed."""
+    try:
+        if language in ("hlsl", "slang"):
+            slang.find_slangc()
+        elif language in ("wgsl", "wesl"):
+            wgsl.identity(language)
+    except ShaderError as error:
+        pytest.skip(str(error))
+
+
+def write(folder: Path, description: str, **files: str) -> Path:
+    """Write a description and its shaders; names have _ in place of the dot."""
+    for name, text in files.items():
+        (folder / ".".join(name.rsplit("_", 1))).write_text(text)
+    path = folder / "bloom.toml"
+    path.write_text(description)
+    return path
+
+
+def bloom(renderer: Renderer, path: Path, image: Array, **fields: Any) -> Array:
+    settings = load_method(path)(format="rgba32float", **fields)
+    result: Array = renderer.apply(image, settings)["bloom"]
+    return result
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_one_bloom_in_each_language(renderer: Renderer, language: str) -> None:
+    """It is the preset's, and its reference's."""
+    require(language)
+    image = picture(70, 54, highest=20)
+    method = load_method(EXAMPLES / language / "bloom.toml", name=f"in_{language}")
+    settings = method(format="rgba32float", radius=1.25)
+    preset = vkbloom.Pyramid(format="rgba32float", levels=settings.count, radius=1.25)
+    frames = renderer.apply(image, settings)
+    levels = [f"{way}_{level}" for way, ends in (("down", (0, 5, 1)), ("up", (3, -1, -1)))
+              for level in range(*ends)]
+    assert list(frames) == ["glow", *levels, "bloom", "final"]
+    wanted = renderer.apply(image, preset)
+    expected = reference.apply(image, preset)
+    # GPUs filter with positions of 8 fractional bits.
+    limit = 1e-4 if renderer.info.type == "cpu" else 20 * 2.0**-8
+    for name in ("down_4", "up_1", "bloom", "final"):
+        assert np.abs(frames[name] - wanted[name])[..., :3].max() < limit, name
+        assert np.abs(frames[name] - expected[name])[..., :3].max() < limit, name
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_the_half_texel_fault_is_found_in_each_language(
+    renderer: Renderer, tmp_path: Path, language: str
+) -> None:
+    require(language)
+    shutil.copytree(EXAMPLES / language, tmp_path, dirs_exist_ok=True)
+    changed = 0
+    for file in tmp_path.iterdir():
+        text = file.read_text()
+        if file.suffix == ".toml":
+            continue
+        for right, faulty in (
+            ("uv + vec2(x, y) * texel", "uv + (vec2(x, y) + 0.5) * texel"),
+            ("uv + float2(x, y) * Texel", "uv + (float2(x, y) + 0.5) * Texel"),
+            ("uv + vec2f(x, y) * levels.texel", "uv + (vec2f(x, y) + 0.5) * levels.texel"),
+            ("corner = float2(i % 2, i / 2) * 2 - 1", "corner = float2(i % 2, i / 2) * 2 - 0.5"),
+        ):
+            changed += text.count(right)
+            text = text.replace(right, faulty)
+        file.write_text(text)
+    assert changed == 1
+    settings = load_method(tmp_path / "bloom.toml", name="faulty")(format="rgba32float", count=2)
+
+    def apply(image: Array) -> Array:
+        result: Array = renderer.apply(np.asarray(image, np.float32), settings)["bloom"]
+        return result
+
+    report = testing.report(apply, size=(32, 32))
+    held = {row.name: row.held for row in report.rows}
+    assert not held["symmetric"]
+    assert not held["centroid_kept"]
+    assert held["gain"]
+
+
+TWICE = "void mainImage(out vec4 c, vec2 p) { c = 2.0 * texture(iChannel0, p / iResolution.xy); }\n"
+
+
+def test_shadertoy(renderer: Renderer, tmp_path: Path) -> None:
+    """A file with mainImage needs no description."""
+    path = tmp_path / "toy.frag"
+    path.write_text(TWICE)
+    image = picture(20, 12)
+    assert np.abs(bloom(renderer, path, image)[..., :3] - 2 * image[..., :3]).max() < 1e-5
+
+
+COPY = """\
+#version 450
+layout(location = 0) in vec2 uv;
+layout(location = 0) out vec4 result;
+uniform sampler2D image;
+uniform Values { float gain; vec4 more[80]; mat2 turn; int whole; };
+void main()
+{
+    result = texture(image, uv) * gain + vec4(more[79].xy, (turn * vec2(1.0, 2.0)))
+        + float(whole);
+}
+"""
+COPY_PASS = """\
+bloom = "out"
+[[passes]]
+file = "copy.frag"
+output = "out"
+textures = { image = "glow" }
+[passes.values]
+gain = "1 / 2"
+more = 0
+"more[79]" = [1, 2, 0, 0]
+turn = [3, 4, 5, 6]
+whole = -1
+"""
+
+
+def test_numbers_of_a_large_block(renderer: Renderer, tmp_path: Path) -> None:
+    """A block that is larger than the parameters, with an array, a matrix and an int."""
+    path = write(tmp_path, COPY_PASS, copy_frag=COPY)
+    image = picture(9, 7)
+    result = bloom(renderer, path, image)
+    expected = image[..., :3] / 2 + np.array([1, 2, 3 + 2 * 5]) - 1
+    assert np.abs(result[..., :3] - expected).max() < 1e-5
+
+
+TWO = """\
+#version 450
+layout(local_size_x = 4, local_size_y = 4) in;
+layout(binding = 3, rgba16f) uniform writeonly image2D half_image;
+layout(binding = 2, rgba16f) uniform writeonly image2D whole_image;
+layout(binding = 1) buffer readonly Weights { float weights[]; };
+layout(binding = 0) uniform sampler2D image;
+void main()
+{
+    ivec2 at = ivec2(gl_GlobalInvocationID.xy);
+    imageStore(whole_image, at, weights[1] * texelFetch(image, at, 0));
+    imageStore(half_image, at / 2, weights[2] * texelFetch(image, at / 2, 0));
+}
+"""
+TWO_PASS = """\
+bloom = "whole"
+[[passes]]
+file = "two.comp"
+textures = { image = { source = "glow", filter = "nearest", border = "zero" } }
+values = { weights = [1, 2, "1 + 2"] }
+[passes.outputs]
+whole_image = "whole"
+half_image = { image = "half", size = "size(glow) / 2", format = "rgba16float" }
+"""
+
+
+def test_a_compute_shader_writes_two_images(renderer: Renderer, tmp_path: Path) -> None:
+    path = write(tmp_path, TWO_PASS, two_comp=TWO)
+    image = picture(14, 10)
+    frames = renderer.apply(image, load_method(path)(format="rgba32float"))
+    assert list(frames) == ["glow", "bloom", "half", "final"]
+    assert np.abs(frames["bloom"][..., :3] - 2 * image[..., :3]).max() < 1e-5
+    assert frames["half"].dtype == np.float16
+    assert np.abs(frames["half"][..., :3] - 3 * image[:5, :7, :3]).max() < 4e-3
+
+
+TARGETS = """\
+#version 450
+layout(location = 0) out vec4 first;
+layout(location = 1) out vec4 second;
+layout(constant_id = 7) const float SHARE = 0.5;
+uniform sampler2D image;
+void main()
+{
+    first = vec4(SHARE);
+    second = texture(image, gl_FragCoord.xy / vec2(textureSize(image, 0)) + 1.0);
+}
+"""
+TARGETS_PASS = """\
+bloom = "out"
+[[passes]]
+file = "targets.frag"
+textures = { image = { source = "frame", border = "repeat" } }
+constants = { SHARE = 0.25 }
+outputs = { 0 = "out", 1 = "other" }
+[[passes]]
+file = "targets.frag"
+textures = { image = "other" }
+outputs = { 0 = { image = "out" }, second = "last" }
+blend = { source = [1, 1, 1, 0], target = "2 * 2" }
+"""
+
+
+def test_two_targets_borders_constants_and_blending(renderer: Renderer, tmp_path: Path) -> None:
+    path = write(tmp_path, TARGETS_PASS, targets_frag=TARGETS)
+    image = picture(8, 6)
+    frames = renderer.apply(image, load_method(path)(format="rgba32float"))
+    assert np.abs(frames["bloom"] - [1.5, 1.5, 1.5, 1.0]).max() < 1e-6
+    assert np.abs(frames["other"][..., :3] - image[..., :3]).max() < 1e-5
+    # Beyond the edge: the last texel.
+    assert np.abs(frames["last"] - frames["other"][-1, -1]).max() < 1e-6
+
+
+def test_a_picture_replaces_the_scene(renderer: Renderer, tmp_path: Path) -> None:
+    path = write(tmp_path, COPY_PASS.replace("bloom =", "picture ="), copy_frag=COPY)
+    image = picture(9, 7)
+    frames = renderer.apply(image, load_method(path)(format="rgba32float"))
+    expected = image[..., :3] / 2 + np.array([1, 2, 3 + 2 * 5]) - 1
+    assert np.abs(frames["final"][..., :3] - expected).max() < 1e-5
+    assert np.abs(frames["bloom"][..., :3] - (expected - image[..., :3])).max() < 1e-5
+
+
+def test_spirv_is_taken_as_it_is(renderer: Renderer, tmp_path: Path) -> None:
+    """That of another description's pass, which names nothing: bound by group and binding."""
+    if slang.find_tool("spirv-val") is None:
+        pytest.skip("spirv-val is not installed")
+    kind: Any = load_method(write(tmp_path, COPY_PASS, copy_frag=COPY), name="of_glsl")
+    ((_, program),) = kind.file.source.programs
+    (tmp_path / "copy.spv").write_bytes(program.code)
+    path = write(tmp_path, COPY_PASS.replace("copy.frag", "copy.spv"))
+    image = picture(9, 7)
+    method = load_method(path, name="of_spirv")
+    first, second = (
+        renderer.apply(image, each(format="rgba32float"))["bloom"] for each in (kind, method)
+    )
+    np.testing.assert_array_equal(first, second)
+
+
+def test_a_vertex_shader_of_its_own(renderer: Renderer, tmp_path: Path) -> None:
+    """In HLSL, where clip space has y up and textures begin at the top."""
+    require("hlsl")
+    text = """
+    Texture2D Image; SamplerState Point;
+    struct Varyings { float4 position : SV_Position; float2 uv : TEXCOORD0; };
+    Varyings Vertex(uint id : SV_VertexID)
+    {
+        Varyings made;
+        made.uv = float2(id & 1, id >> 1) * 2;
+        made.position = float4(made.uv * float2(2, -2) + float2(-1, 1), 0, 1);
+        return made;
+    }
+    float4 Fragment(Varyings i) : SV_Target { return Image.Sample(Point, i.uv); }
+    """
+    description = """
+    bloom = "out"
+    [[passes]]
+    file = "own.hlsl"
+    entry = "Fragment"
+    vertex = "Vertex"
+    output = "out"
+    textures = { Image = "glow" }
+    samplers = { Point = "nearest" }
+    """
+    image = picture(9, 7)
+    result = bloom(renderer, write(tmp_path, description, own_hlsl=text), image)
+    assert np.abs(result[..., :3] - image[..., :3]).max() < 1e-5
+
+
+def test_programs_of_a_shaderlab_file(renderer: Renderer, tmp_path: Path) -> None:
+    require("hlsl")
+    (tmp_path / "lib").mkdir()
+    (tmp_path / "lib" / "Shared.hlsl").write_text("#define GAIN 3.0\n")
+    text = """Shader "Own" {
+    HLSLINCLUDE
+    #include "lib/Shared.hlsl"
+    sampler2D _MainTex;
+    ENDHLSL
+    SubShader {
+        Pass { HLSLPROGRAM
+            #pragma vertex Vert
+            #pragma fragment First
+            float4 First(float2 uv : TEXCOORD0) : SV_Target { return tex2D(_MainTex, uv); }
+        ENDHLSL }
+        Pass { HLSLPROGRAM
+            #pragma fragment Second
+            float4 Second(float2 uv : TEXCOORD0) : SV_Target { return GAIN * tex2D(_MainTex, uv); }
+        ENDHLSL }
+    } }
+    """
+    description = """
+    bloom = "out"
+    [[passes]]
+    file = "own.shader"
+    program = 1
+    output = "out"
+    textures = { _MainTex = "glow" }
+    """
+    image = picture(9, 7)
+    result = bloom(renderer, write(tmp_path, description, own_shader=text), image)
+    assert np.abs(result[..., :3] - 3 * image[..., :3]).max() < 1e-5
+
+
+def test_a_class_travels_without_compilers(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its pickle has the compiled shaders."""
+    kind: Any = load_method(write(tmp_path, COPY_PASS, copy_frag=COPY), name="travels")
+    data = pickle.dumps(kind(intensity=0.5))
+    METHODS.unregister("travels")
+    (tmp_path / "copy.frag").unlink()
+    loaded: Settings = pickle.loads(data)
+    assert loaded.intensity == 0.5
+    assert loaded.to_dict()["sha256"] == kind.file.source.digest
+
+
+def test_a_description_is_written_from_reflection(tmp_path: Path) -> None:
+    for name in ("down.frag", "up.frag"):
+        shutil.copy(EXAMPLES / "glsl" / name, tmp_path)
+    path = tmp_path / "bloom.toml"
+    path.write_text(describe([tmp_path / "down.frag", tmp_path / "up.frag"]))
+    kind = load_method(path, name="described")
+    assert {"levels", "radius", "gain", "share"} <= {*kind().to_dict()}
+
+
+def broken(line: str, by: str = "", text: str = COPY_PASS) -> str:
+    """Return the description with a line replaced."""
+    assert line in text
+    return text.replace(line, by, 1)
+
+
+REFUSED: tuple[tuple[str, int, str], ...] = (
+    ("passes = 1\nbloom = 1", 1, "passes: 1 is not a list"),
+    ("bloom = ", 1, "this is not TOML: Invalid value"),
+    ('bloom = "out"', 1, "passes: the description has none"),
+    (broken("bloom =", "blom ="), 1, "give either bloom"),
+    (broken('bloom = "out"', 'bloom = "other"'), 1, "'other' is not an image here"),
+    (broken('bloom = "out"', 'bloom = "out"\nbloms = 1'), 2, "'bloms' is not a key of a descri"),
+    (broken('file = "copy.frag"', 'file = "none.frag"'), 3, "file: "),
+    (broken('file = "copy.frag"', 'file = "copy.xyz"'), 3, "does not tell its language"),
+    (broken('file = "copy.frag"'), 2, "file: the pass has none"),
+    (broken('"copy.frag"', '"copy.frag"\nlanguage = "glsn"'), 4, "did you mean 'glsl'"),
+    (broken('output = "out"'), 2, "output: the pass has none"),
+    (broken('output = "out"', 'output = "glow"'), 4, "not possible as the name of an output"),
+    (broken('output = "out"', 'output = "out"\nsize = "glow"'), 5, "'glow' is not a number"),
+    (broken('output = "out"', 'output = "out"\nsize = "1 +"'), 5, "'1 +' is not an expression"),
+    (broken('output = "out"', 'output = "out"\nsize = 1e9'), 5, "size: a side of"),
+    (broken('output = "out"', 'output = "out"\nformat = "r8"'), 5, "'r8' is not one of"),
+    (broken('output = "out"', 'output = "out"\nblend = "add"'), 5, "out is not written before"),
+    (broken('{ image = "glow" }', "{ }"), 3, "the shader reads 'image'"),
+    (broken('{ image = "glow" }', '{ image = "out" }'), 5, "out is not written before this pass"),
+    (broken('{ image = "glow" }', '{ image = "gow" }'), 5, "'gow' is not an image here"),
+    (broken('{ image = "glow" }', '{ image = "glow", b = "glow" }'), 5, "does not use 'b'"),
+    (broken('{ image = "glow" }', '{ image = "glow", "0.0" = "glow" }'), 3, "are the same one"),
+    (broken('{ image = "glow" }', '{ image = { source = "glow", border = "x" } }'), 5, "border"),
+    (broken('gain = "1 / 2"'), 3, "the shader reads 'gain'"),
+    (broken('gain = "1 / 2"', 'gain = "1 / 0"'), 7, "'1 / 0' has no value"),
+    (broken('gain = "1 / 2"', 'gain = "levl"'), 7, "'levl' is not a number here"),
+    (broken('gain = "1 / 2"', 'gain = "level"'), 7, "only loops have levels"),
+    (broken('gain = "1 / 2"', "gain = [1, 2]"), 7, "gain: it takes 1 numbers, not 2"),
+    (broken('gain = "1 / 2"', 'gain = "f(1)"'), 7, "'f' is not a function"),
+    (broken('gain = "1 / 2"', "gain = \"().__class__\""), 7, "is not arithmetic"),
+    (broken('gain = "1 / 2"', 'gain = "10 ** 99"'), 7, "too large"),
+    (broken("more = 0", "mor = 0"), 8, "does not use 'mor'; did you mean 'more'?"),
+    (broken("whole = -1", 'whole = -1\n"Values.x" = 1'), 12, "'Values' (0.1) has no 'x'"),
+    (broken("[[passes]]", "[settings.gain]\nrange = [0, 1]\n[[passes]]"), 2, "has no default"),
+    (broken("[[passes]]", "[settings.a]\ndefault = 2\nrange = [0, 1]\n[[passes]]"), 3, "default: 2"),
+    (broken("[[passes]]", "[settings.intensity]\ndefault = 2\n[[passes]]"), 2, "all settings have"),
+    (broken("[[passes]]", '[numbers]\na = "b"\nb = "a"\n[[passes]]\nwhen = "a"'), 5, "on itself"),
+    (broken("[[passes]]", '[[passes]]\ndown = [0, 99]'), 3, "100 levels are more than 64"),
+    (broken("[[passes]]", '[[passes]]\ndown = [0]'), 3, "is not [first level, last level]"),
+    (broken("[[passes]]", '[[passes]]\ninclude = ["nowhere"]'), 4, "there is no folder"),
+    (broken("[[passes]]", '[[passes]]\ntile = [0, 1]'), 3, "is not the two sides"),
+)
+
+
+@pytest.mark.parametrize(("text", "line", "cause"), REFUSED)
+def test_a_broken_description_is_refused(
+    tmp_path: Path, text: str, line: int, cause: str
+) -> None:
+    path = write(tmp_path, text, copy_frag=COPY)
+    with pytest.raises(ValueError, match=f"^{path}:{line}: ") as caught:
+        load_method(path, name="broken")
+    assert cause in str(caught.value), str(caught.value)
+
+
+SHADERS: tuple[tuple[str, int, str], ...] = (
+    (COPY.replace("* gain", "* gane"), 8, "'gane' : undeclared identifier"),
+    (COPY.replace("* gain", "* gain)"), 8, "syntax error"),
+    (COPY.replace("texture(", "texture2D("), 8, "Vulkan's GLSL is that of version 1.40"),
+    (COPY.replace("#version 450", '#version 450\n#include "../x.glsl"'), 2, "lies outside of"),
+    (COPY.replace("#version 450", '#version 450\n#include "y.glsl"'), 2, "y.glsl"),
+    (COPY.replace("#version 450", "#version 450\n#include X"), 2, "is not a path in quotes"),
+    ("#version 450\n\0", 2, "null character"),
+    ("//" + "x" * (5 << 20), 1, "bytes are more than"),
+    ("", 1, "glslang refused the file"),
+)
+
+
+@pytest.mark.parametrize(("text", "line", "cause"), SHADERS, ids=range(len(SHADERS)))
+def test_a_broken_shader_is_refused(tmp_path: Path, text: str, line: int, cause: str) -> None:
+    folder = tmp_path / "inner"
+    folder.mkdir()
+    (tmp_path / "x.glsl").write_text("")
+    path = write(folder, COPY_PASS, copy_frag=text)
+    with pytest.raises((ValueError, ShaderError), match=f"^{folder}/copy.frag:{line}: ") as caught:
+        load_method(path, name="broken")
+    assert cause in str(caught.value), str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "cause"),
+    [
+        (COPY.replace("result =", "for (;;) result +="), "a loop that never ends"),
+        (COPY.replace("in vec2 uv", "flat in ivec2 number").replace("uv", "vec2(number)"), ""),
+        (COPY.replace("sampler2D image", "sampler3D image").replace("uv)", "uv.xyx)"), "'image'"),
+        (
+            COPY.replace("uniform sampler2D image", "layout(binding = 1) uniform sampler2D image")
+            .replace("uniform Values", "layout(binding = 1) uniform Values"),
+            "have the same binding, 0.1",
+        ),
+        ("#version 450\nvoid main() {}\n", "the shader writes no image"),
+    ],
+)
+def test_a_shader_that_is_no_pass_is_refused(tmp_path: Path, text: str, cause: str) -> None:
+    path = write(tmp_path, COPY_PASS, copy_frag=text)
+    with pytest.raises(ValueError, match=f"^{path}:3: ") as caught:
+        load_method(path, name="broken")
+    assert cause in str(caught.value), str(caught.value)
+
+
+@pytest.mark.parametrize("language", ["hlsl", "slang", "wgsl", "wesl"])
+def test_errors_of_compilers_name_file_and_line(tmp_path: Path, language: str) -> None:
+    require(language)
+    shutil.copytree(EXAMPLES / language, tmp_path, dirs_exist_ok=True)
+    file = tmp_path / f"bloom.{language}"
+    lines = file.read_text().split("\n")
+    line = next(number for number, text in enumerate(lines, 1) if "16.0" in text)
+    lines[line - 1] = lines[line - 1].replace("sum", "sun")
+    file.write_text("\n".join(lines))
+    with pytest.raises(ShaderError, match=f"^{file}:{line}: .*sun") as caught:
+        load_method(tmp_path / "bloom.toml", name="broken")
+    assert str(caught.value).count("\n") == 1
+
+
+@pytest.mark.parametrize("language", ["hlsl", "wgsl", "spirv"])
+def test_a_missing_compiler_is_named_in_one_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, language: str
+) -> None:
+    def missing(*_: Any) -> None:
+        return None
+
+    def none(*_: Any) -> str:
+        raise ShaderError(slang.MISSING)
+
+    monkeypatch.setattr(slang, "find_slangc", none)
+    monkeypatch.setattr(slang, "find_tool", missing)
+    monkeypatch.setattr(wgsl.importlib.util, "find_spec", missing)
+    wgsl.identity.cache_clear()
+    name = "copy.spv" if language == "spirv" else f"copy.{language}"
+    path = write(tmp_path, COPY_PASS.replace("copy.frag", name))
+    (tmp_path / name).write_text("// nothing\n")
+    with pytest.raises(ShaderError, match="pip install") as caught:
+        load_method(path, name="broken")
+    wgsl.identity.cache_clear()
+    assert "\n" not in str(caught.value)
