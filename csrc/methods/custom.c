@@ -148,6 +148,8 @@ static void add_pass(struct vkb_levels *levels, uint32_t *images, uint32_t numbe
         row.vertex = NULL;
         row.block_width = pass->block_width;
         row.block_height = pass->block_height;
+        row.groups_width = pass->groups_width;
+        row.groups_height = pass->groups_height;
     }
     row.block = VKB_BLOCK_custom;
     row.params.custom = pass->params;

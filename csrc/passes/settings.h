@@ -125,6 +125,7 @@ struct vkb_custom_pass {
     uint32_t width, height;
     // Of a compute shader: pixels of a workgroup; 0: a fragment shader.
     uint32_t block_width, block_height;
+    uint32_t groups_width, groups_height;  // numbers of workgroups; 0: what covers the target
     uint32_t framebuffer, read_count;
     uint32_t histories;  // bit i: it reads the history of reads[i], not what this frame has made
     uint32_t format;     // of the image that it writes; 0: that of the bloom buffers
@@ -135,7 +136,7 @@ struct vkb_custom_pass {
     char name[VKB_NAME_SIZE];  // of the image that it writes
     char reads[VKB_MAX_READS][VKB_NAME_SIZE];
     uint8_t sampling[VKB_MAX_READS];  // of VKB_SAMPLING_*
-    // Python packs what is before here, as "1024sQ10I32s512s16s".
+    // Python packs what is before here, as "1024sQ12I32s512s16s".
     const struct vkb_shader *shader, *vertex;  // no vertex shader: that of the package
     const struct vkb_resource *resources[VKB_MAX_RESOURCES];
     uint32_t resource_count;

@@ -11,6 +11,7 @@
 enum {
     PASS_SIZE = offsetof(struct vkb_custom_pass, shader),
     RESOURCE_SIZE = offsetof(struct vkb_resource, data),
+    VKB_MAX_GROUPS = 65535,  // every device dispatches as many
 };
 
 // What the rows of passes refer to; its content belongs to Python's objects.
@@ -172,6 +173,10 @@ static bool check_pass(const struct vkb_custom_pass *pass)
             return vkb_refuse("passes: %u is no sampling", pass->sampling[i]);
     if (pass->format > VKB_FORMAT_RGBA8_SRGB)
         return vkb_refuse("passes: %u is no format of an image", pass->format);
+    if (!pass->groups_width != !pass->groups_height || pass->groups_width > VKB_MAX_GROUPS
+        || pass->groups_height > VKB_MAX_GROUPS)
+        return vkb_refuse("passes: %u x %u workgroups are none, or more than %d along a side",
+                          pass->groups_width, pass->groups_height, VKB_MAX_GROUPS);
     return !pass->block_width == !pass->block_height
         || vkb_refuse("passes: a workgroup of %u x %u pixels is none", pass->block_width,
                       pass->block_height);

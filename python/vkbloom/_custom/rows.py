@@ -51,6 +51,7 @@ class Row(NamedTuple):
     - `framebuffer`: Whether the image that it writes is one.
     - `params`: The bytes of its parameters.
     - `group`: The pixels of a compute shader's workgroup. None: it is a fragment shader.
+    - `groups`: How many workgroups run; None: as many as cover the image.
     - `turn`: Another number for each run of a pass that changes a resource; 0 for others.
     - `histories`: The framebuffers that it reads as the call before left them, after `reads`.
     - `sampling`: How it samples each image that it reads, of `SAMPLINGS`; the default is 0.
@@ -73,6 +74,7 @@ class Row(NamedTuple):
     sampling: tuple[int, ...] = ()
     format: int = 0
     joined: bool = False
+    groups: tuple[int, int] | None = None
     positions: bool = False
     vertex: CoreShader | None = None
 
@@ -87,11 +89,12 @@ class Row(NamedTuple):
                 raise ValueError(f"passes: {self.name}: {count} {what} are more than {most}")
         reads = (*self.reads, *self.histories)
         block = struct.pack(
-            f"={MAX_PARAMETERS}sQ10I{NAME_SIZE}s{MAX_READS * NAME_SIZE}s{MAX_READS}s",
+            f"={MAX_PARAMETERS}sQ12I{NAME_SIZE}s{MAX_READS * NAME_SIZE}s{MAX_READS}s",
             self.params,
             self.turn,
             *self.size,
             *(self.group or (0, 0)),
+            *(self.groups or (0, 0)),
             self.framebuffer,
             len(reads),
             (1 << len(reads)) - (1 << len(self.reads)),

@@ -18,7 +18,7 @@ from vkbloom._custom.rows import CoreShader, constant_resources
 from vkbloom._custom.source import Source
 from vkbloom._custom.spirv import shared_bytes
 
-#: Passes that the package adds: a copy, the difference of two pictures, black, a sum of two.
+#: Passes that the package adds: a copy, the difference of two pictures, black, a sum of two, white.
 PACKAGE_PASSES: Final = """\
 //!HOOK MAIN
 //!BIND HOOKED
@@ -42,10 +42,12 @@ vec4 hook()
     return vec4(of_r, of_g, of_b, of_a) * texelFetch(HOOKED_raw, at, 0)
         + vec4(by_r, by_g, by_b, by_a) * texelFetch(GLOW_raw, at, 0);
 }
+//!HOOK MAIN
+vec4 hook() { return vec4(1.0); }
 """
 #: The factors of blending, of what is drawn and of what is there.
 FACTORS: Final = tuple(f"{of}_{channel}" for of in ("of", "by") for channel in "rgba")
-COPY, DIFFERENCE, BLACK, BLEND = range(4)
+COPY, DIFFERENCE, BLACK, BLEND, WHITE = range(5)
 
 
 class Shaders:

@@ -26,6 +26,7 @@ from vkbloom._custom.described.placing import Places, place
 from vkbloom._custom.described.programs import Program
 from vkbloom._custom.described.schema import (
     GLOW,
+    DISCARD,
     DescribedPass,
     Description,
     Output,
@@ -90,6 +91,7 @@ class BoundPass:
     - `reads`: The images that it reads, in the order of their bindings, and how.
     - `numbers`: Those of its parameters, `size` bytes in all.
     - `outputs`: The images that it writes, in the order of its targets.
+    - `discarded`: Images that it writes and nobody reads, with the kind of their numbers.
     """
 
     item: DescribedPass
@@ -101,6 +103,7 @@ class BoundPass:
     size: int
     blocks: tuple[Block, ...]
     outputs: tuple[Output, ...]
+    discarded: tuple[tuple[Output, str], ...]
     group: tuple[int, int] | None
 
 
@@ -132,6 +135,7 @@ class _Binder:
         self._numbers: list[Number] = []
         self._size = 0
         self._blocks: list[tuple[Block, _Stage, int]] = []
+        self._discarded: list[tuple[Output, str, int]] = []
         self._used_keys: set[tuple[str, str]] = set()
         self._structs: set[int] = set()
         self._known: set[str] = set()
@@ -153,6 +157,10 @@ class _Binder:
                 vertex = self._open(program.vertex, None, "vertex")
             self._bind_resources(stage, vertex)
             outputs = self._bind_outputs(stage)
+            # Images that are discarded are resources, after the others.
+            for number, (_, _, identity) in enumerate(self._discarded):
+                binding = len(self._slots) + len(self._blocks) + number + 1
+                stage.places.bindings[identity] = binding
             positions = self._check_inputs(stage, vertex)
             self._check_keys()
             code = self._code(stage, name)
@@ -172,6 +180,7 @@ class _Binder:
                 self._size,
                 tuple(block for block, _, _ in self._blocks),
                 outputs,
+                tuple((output, kind) for output, kind, _ in self._discarded),
                 group,
             )
         except ModuleFault as error:
@@ -346,6 +355,10 @@ class _Binder:
         for path, kind, offset in paths(variable.type):
             if path in given:
                 key, value, line = given.pop(path)
+                while len(kind.members) == 1:
+                    # Of a structure around an array, its numbers are the array's.
+                    offset += kind.members[0].offset
+                    kind = kind.members[0].type
                 found.append((path, Number(key, kind, offset, value, line)))
         if given:
             path, (key, _, line) = next(iter(given.items()))
@@ -427,7 +440,7 @@ class _Binder:
                 and each.type.image[4] == 2
             ]
             for each in targets:
-                if not _is_plain(each.type):
+                if not _is_plain(each.type) and self._discards(each) is None:
                     raise self.fault(f"outputs: {self._show(each)} is no image of two dimensions with floats")
         else:
             targets = [
@@ -436,7 +449,18 @@ class _Binder:
                 if each.storage == OUTPUT and each.location is not None
             ]
             targets.sort(key=lambda each: each.location or 0)
-        outputs = self._item.outputs
+        for target in targets if compute else []:
+            key = self._discards(target)
+            if key is not None:
+                assert target.type.of is not None
+                self._discarded.append((self._item.outputs[key], target.type.of.kind, target.id))
+        gone = {identity for _, _, identity in self._discarded}
+        targets = [target for target in targets if target.id not in gone]
+        outputs = {
+            key: output
+            for key, output in self._item.outputs.items()
+            if output.image.name != DISCARD
+        }
         if not targets:
             raise self.fault("output: the shader writes no image")
         if len(targets) > MAX_TARGETS:
@@ -451,7 +475,7 @@ class _Binder:
                 )
             found = {"": targets[0]}
         else:
-            found = self._match_outputs(targets, compute=compute)
+            found = self._match_outputs(targets, outputs, compute=compute)
         order = list(outputs) if compute else sorted(outputs, key=lambda k: found[k].location or 0)
         for number, key in enumerate(order):
             if compute:
@@ -460,17 +484,27 @@ class _Binder:
                 raise self.fault("outputs: their locations are not 0, 1, 2 without gaps")
         return tuple(outputs[key] for key in order)
 
-    def _match_outputs(self, targets: list[Variable], *, compute: bool) -> dict[str, Variable]:
+    def _discards(self, target: Variable) -> str | None:
+        """Return the key of an output that is discarded."""
+        for label in self._labels(target):
+            output = self._item.outputs.get(label)
+            if output is not None and output.image.name == DISCARD:
+                return label
+        return None
+
+    def _match_outputs(
+        self, targets: list[Variable], outputs: Mapping[str, Output], *, compute: bool
+    ) -> dict[str, Variable]:
         found = {}
         for target in targets:
             labels = self._labels(target) if compute else [str(target.location), target.name]
-            key = next((label for label in labels if label in self._item.outputs), None)
+            key = next((label for label in labels if label in outputs), None)
             if key is None:
                 raise self.fault(
                     f"outputs: the shader writes {labels[0]!r}, which the pass does not name"
                 )
             found[key] = target
-        for key, output in self._item.outputs.items():
+        for key, output in outputs.items():
             if key not in found:
                 known = {label: 0 for each in targets for label in (
                     self._labels(each) if compute else [str(each.location), each.name])}
@@ -503,12 +537,16 @@ class _Binder:
             return False
         for location, each in wanted.items():
             kind = each.type.of if each.type.kind == "vector" else each.type
+            if kind is not None and kind.kind in ("int", "uint"):
+                # Such as the layer of an array, which there is not.
+                stage.places.zeros.add(each.id)
+                continue
             if location not in POSITIONS or kind is None or kind.kind != "float":
                 raise self.fault(
                     f"vertex: the shader reads {each.name!r} at location {location}; without "
                     "vertex = \"NAME\" there are positions at locations 0 to 3 alone"
                 )
-        return bool(wanted)
+        return any(each.id not in stage.places.zeros for each in wanted.values())
 
     def _check_keys(self) -> None:
         """Check that the shaders have all that the description names."""

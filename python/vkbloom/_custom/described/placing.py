@@ -41,6 +41,9 @@ _READ_ANY, _WRITE_ANY = 55, 56
 #: OpSpecConstantTrue to OpSpecConstantComposite become constants.
 _SPECIALIZED: Final = {48: 41, 49: 42, 50: 43, 51: 44}
 #: Types of which a module has each but once.
+#: The storage class of a module's own variables, and OpConstantNull.
+PRIVATE: Final = 6
+CONSTANT_NULL: Final = 46
 _UNIQUE: Final = (TYPE_IMAGE, 27, TYPE_POINTER)
 
 
@@ -51,11 +54,13 @@ class Places:
     - `bindings`: By variable.
     - `offsets`: Bytes before the members of a structure, by its type.
     - `constants`: Words of specialization constants, by id.
+    - `zeros`: Inputs that are 0.
     """
 
     bindings: dict[int, int] = dataclasses.field(default_factory=dict)
     offsets: dict[int, int] = dataclasses.field(default_factory=dict)
     constants: dict[int, int] = dataclasses.field(default_factory=dict)
+    zeros: set[int] = dataclasses.field(default_factory=set)
 
 
 def place(module: Module, entry: Entry, places: Places) -> bytes:
@@ -64,6 +69,9 @@ def place(module: Module, entry: Entry, places: Places) -> bytes:
     replaced: dict[int, int] = {}
     known: dict[Instruction, int] = {}
     unused = _unused(module, entry)
+    if module.words[1] < 0x10400:
+        # Before version 1.4 of SPIR-V an interface has inputs and outputs alone.
+        unused |= places.zeros
     reads = any(
         word[0] & 0xFFFF == IMAGE_READ
         for function in module.reached(entry)
@@ -90,6 +98,14 @@ def place(module: Module, entry: Entry, places: Places) -> bytes:
             for identity, binding in places.bindings.items():
                 made += [4 << 16 | DECORATE, identity, SET, 0]
                 made += [4 << 16 | DECORATE, identity, BINDING, binding]
+        if word[0] & 0xFFFF == VARIABLE and word[2] in places.zeros:
+            # A variable of its own, with the value 0: three new ids and instructions.
+            pointer, null, kind = made[3], made[3] + 1, module.defined[word[1]][3]
+            made[3] += 2
+            made += [4 << 16 | TYPE_POINTER, pointer, PRIVATE, kind]
+            made += [3 << 16 | CONSTANT_NULL, kind, null]
+            made += [5 << 16 | VARIABLE, pointer, word[2], PRIVATE, null]
+            continue
         written = _declaration(word, entry, places, unused)
         if not written:
             continue
@@ -174,7 +190,7 @@ def _entry_point(word: Instruction, entry: Entry, unused: set[int]) -> Instructi
 
 def _decoration(word: Instruction, places: Places) -> Instruction:
     target, kind = word[1], word[2]
-    if kind == SPEC_ID:
+    if kind == SPEC_ID or target in places.zeros:
         return ()
     return () if target in places.bindings and kind in (SET, BINDING) else word
 

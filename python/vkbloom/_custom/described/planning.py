@@ -24,6 +24,7 @@ from vkbloom._custom.described.schema import (
     GLOW,
     INDEX,
     LEVEL,
+    PLAIN,
     TARGET,
     Description,
     Loop,
@@ -41,13 +42,15 @@ from vkbloom._custom.planning import (
     PassImage,
     package_row,
 )
-from vkbloom._custom.rows import MAX_PARAMETERS, SERIALS, STORAGE, UNIFORM, Resource, Row
-from vkbloom._custom.shaders import BLEND, COPY, DIFFERENCE, package_blend
+from vkbloom._custom.rows import IMAGE, SERIALS, STORAGE, UNIFORM, Resource, Row
+from vkbloom._custom.shaders import BLACK, COPY, DIFFERENCE, WHITE, package_blend
+from vkbloom._custom.textures import FORMATS
 from vkbloom._locks import ProcessLock
 
 #: Of one frame.
 MAX_RUNS: Final = 256
 MAX_LEVELS: Final = 64
+MAX_GROUPS: Final = 65535
 _MAX_DEPTH: Final = 16
 
 Key = tuple[str, int | None]
@@ -72,6 +75,7 @@ class Plan:
         self._target: tuple[int, int] | None = None
         # The textures of the pass, by their names in its shader.
         self._bound: dict[str, PassImage] = {}
+        self._plain: dict[str, PassImage] = {}
         self._depth = 0
         self._owner: Any = None
         self._line = 1
@@ -144,6 +148,13 @@ class Plan:
             return PassImage("MAIN", self._request.frame)
         if source.name == GLOW:
             return PassImage("GLOW", self._request.buffers)
+        if source.name in PLAIN and source.name not in self._plain:
+            image = PassImage(f"{len(self.rows)}.{source.name}", (1, 1))
+            shader = BLACK if source.name == "black" else WHITE
+            self.rows.append(package_row(shader, image.name, image.size, ()))
+            self._plain[source.name] = image
+        if source.name in PLAIN:
+            return self._plain[source.name]
         return self._images.get((source.name, self._index(source)))
 
     # The passes.
@@ -188,8 +199,10 @@ class Plan:
             reads.append(self._read(texture.sources, texture.line).name)
             sampling.append(how)
         params = self._pack(each.numbers, each.size)
-        resources = tuple(self._resource(block) for block in each.blocks)
-        turn = next(TURNS) if any(block.changes for block in each.blocks) else 0
+        resources = [self._resource(block) for block in each.blocks]
+        resources += [self._scratch(output, kind) for output, kind in each.discarded]
+        changes = each.discarded or any(block.changes for block in each.blocks)
+        turn = next(TURNS) if changes else 0
         made = [self._image(o, s) for o, s in zip(each.outputs, sizes, strict=True)]
         self.rows.append(
             Row(
@@ -199,7 +212,8 @@ class Plan:
                 tuple(reads),
                 params=params,
                 group=each.group,
-                resources=resources,
+                groups=self._groups(each),
+                resources=tuple(resources),
                 turn=turn,
                 sampling=tuple(sampling),
                 format=_format(each.outputs[0]),
@@ -216,6 +230,16 @@ class Plan:
             if item.blend is not None and number == 0:
                 image = self._blended(each, output, image)
             self._images[output.image.name, self._index(output.image)] = image
+
+    def _groups(self, each: BoundPass) -> tuple[int, int] | None:
+        """Return how many workgroups a pass has; None: as many as cover its first output."""
+        if each.item.groups is None:
+            return None
+        found = self._value(each.item.groups, each.item.line)
+        if len(found) != 2 or not all(1 <= number <= MAX_GROUPS for number in found):
+            cause = f"groups: {found} are not two numbers, 1 to {MAX_GROUPS}"
+            raise self._description.source.fault(each.item.line, cause)
+        return int(found[0]), int(found[1])
 
     def _side(self, output: Output) -> tuple[int, int]:
         """Return the size of an output: a share of the frame, or one or two numbers of pixels."""
@@ -313,6 +337,18 @@ class Plan:
                     _BLOCKS.popitem(last=False)
             _BLOCKS.move_to_end(key)
             return _BLOCKS[key]
+
+    def _scratch(self, output: Output, kind: str) -> Resource:
+        """Return a new image that nobody reads."""
+        if self._owner is None:
+            self._owner = _core.resource_owner()
+        width, height = self._side(output)
+        bits, name = (32, {"int": "i", "uint": "u"}.get(kind, "f"))
+        layout = FORMATS[f"rgba{bits}{name}"].vulkan
+        header = struct.pack(
+            "=2Q8I", next(SERIALS), 16 * width * height, IMAGE, layout, 2, width, height, 1, 0, 2
+        )
+        return Resource(header, None, self._owner)
 
     def _data(self, block: Block, least: int) -> bytes:
         data = self._pack(block.numbers, block.size)

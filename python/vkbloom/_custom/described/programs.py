@@ -25,7 +25,7 @@ _COMPUTE: Final = (
     r"(?i:\[\s*numthreads)\b[^\]]*\]\s*(?:\[[^\]]*\]\s*)*(?:public\s+)?void\s+{}\s*\("
 )
 #: Of all results together with what is before them.
-_VERSION: Final = b"2"
+_VERSION: Final = b"3"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -133,6 +133,15 @@ def _unpack(data: bytes) -> Program | None:
         return None
 
 
+#: What Unity's compiler defines where a description does not; on desktops its half is float.
+_UNITY: Final = {
+    "SHADER_API_VULKAN": "1",
+    "SHADER_TARGET": "45",
+    **{f"{kind}{count}": f"float{count}" for kind in ("half", "fixed") for count in ("", 2, 3, 4)},
+    **{f"half{n}x{n}": f"float{n}x{n}" for n in (2, 3, 4)},
+}
+
+
 def _tool(language: str) -> bytes:
     """Return bytes that differ between compilers."""
     if language in ("glsl", "shadertoy"):
@@ -177,7 +186,7 @@ def _slang(shader: Shader, files: Files) -> Program:
     if shader.vertex is not None:
         arguments = [*arguments, "-fvk-invert-y"]
         vertex = slang.compile_slang(files, shader.language, "vertex", shader.vertex, arguments)
-    return Program(code, None, stage, vertex, shift=shader.language == "hlsl")
+    return Program(code, None, stage, vertex, shift=shader.language == "hlsl" and slang.has_registers(files))
 
 
 def _shaderlab(shader: Shader, files: Files) -> Program:
@@ -185,7 +194,9 @@ def _shaderlab(shader: Shader, files: Files) -> Program:
     entry = shader.entry or program.fragment
     if entry is None:
         raise files.fault("", 1, f"program {shader.number} has no #pragma fragment; give entry")
-    arguments = ["-DSHADER_API_VULKAN=1", "-DSHADER_TARGET=45", *_defines(shader), *shader.options]
+    given = dict(shader.defines)
+    usual = [f"-D{name}={value}" for name, value in _UNITY.items() if name not in given]
+    arguments = [*usual, *_defines(shader), *shader.options]
     code = slang.compile_slang(files, "hlsl", "fragment", entry, arguments, text=program.text)
     vertex = None
     if shader.vertex is not None:
@@ -193,7 +204,7 @@ def _shaderlab(shader: Shader, files: Files) -> Program:
         vertex = slang.compile_slang(
             files, "hlsl", "vertex", shader.vertex, arguments, text=program.text
         )
-    return Program(code, None, "fragment", vertex, shift=True)
+    return Program(code, None, "fragment", vertex, shift=slang.has_registers(files))
 
 
 def _wgsl(shader: Shader, files: Files) -> Program:

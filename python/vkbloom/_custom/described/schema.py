@@ -22,6 +22,10 @@ from vkbloom._custom.source import Source
 #: Images that every pass can read.
 FRAME: Final = "frame"
 GLOW: Final = "glow"
+#: Images of one texel, which engines bind where there is nothing else.
+PLAIN: Final = ("black", "white")
+#: An output that nobody reads.
+DISCARD: Final = "discard"
 #: Numbers that every expression can have: the number of a run in a loop, of the frame before this
 #: one, and the target of the pass.
 LEVEL: Final = "level"
@@ -123,6 +127,7 @@ class DescribedPass:
     blend: Blend | None
     when: Expression | None
     tile: tuple[int, int] | None
+    groups: Value | None
     line: int
 
 
@@ -334,6 +339,7 @@ def _read_pass(table: Table, above: _Shared) -> DescribedPass:
         _read_blend(table),
         None if when is None else _expression(table, "when", when),
         None if tile is None else (tile[0], tile[1]),
+        _value(table, "groups", table.get("groups", list)) if "groups" in table else None,
         table.line(),
     )
     table.get("name", str)
@@ -454,7 +460,7 @@ def _read_outputs(table: Table) -> dict[str, Output]:
 
 def _writable(table: Table, key: str, image: ImageName) -> ImageName:
     name = image.name
-    if name in (FRAME, GLOW, TARGET) or "__" in name or len(name) > 24 or not name.isascii():
+    if name in (FRAME, GLOW, TARGET, *PLAIN) or "__" in name or len(name) > 24 or not name.isascii():
         table.refuse(key, name, "is not possible as the name of an output; it is up to 24 letters")
     return image
 
@@ -490,7 +496,8 @@ def _check_names(made: Description) -> None:
     """Check the names in all expressions: settings, numbers and images."""
     known = {param.name for param in made.params} | made.numbers.keys()
     outputs = {out.image.name for each in made.passes for out in each.outputs.values()}
-    images = outputs | {FRAME, GLOW}
+    outputs -= {DISCARD}
+    images = outputs | {FRAME, GLOW, *PLAIN}
     for name in (param.name for param in made.params):
         if name in made.numbers:
             line = made.numbers[name][1]
@@ -551,7 +558,8 @@ class _NameCheck:
         for value, line in each.values.values():
             inner.value(value, line, level=level)
         for output in each.outputs.values():
-            self.image(output.image, output.line, level=level)
+            if output.image.name != DISCARD:
+                self.image(output.image, output.line, level=level)
             inner.value(output.size, output.line, level=level)
         if each.blend is not None:
             inner.value(each.blend.source, each.blend.line, level=level)
@@ -559,3 +567,4 @@ class _NameCheck:
             if each.blend.image is not None:
                 self.image(each.blend.image, each.blend.line, level=level)
         self.value(each.when, each.line, level=level)
+        inner.value(each.groups, each.line, level=level)

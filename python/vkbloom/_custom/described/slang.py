@@ -89,7 +89,8 @@ def compile_slang(
         command += ["-stage", stage, "-entry", entry, "-o", str(target), *arguments]
         command += [f"-I{each}" for each in (Path(files.main.name).parent, *files.folders, UNITY)]
         command += ["-warnings-disable", "39001,39029,39013,30081,15205,41018"]
-        if language == "hlsl":
+        if language == "hlsl" and has_registers(files):
+            command += ["-fvk-bind-globals", "99", "0"]
             for kind, shift in SHIFTS.items():
                 command += [f"-fvk-{kind}-shift", str(shift), "all"]
         # slangc of slangtorch comes without its optimizer.
@@ -99,6 +100,11 @@ def compile_slang(
         if not code:
             raise _explain(files, str(file), status, output, entry)
         return optimize(optimizer, code, folder) if optimizer else code
+
+
+def has_registers(files: Files) -> bool:
+    """Whether a file names registers; without them Slang gives each binding its own number."""
+    return any(re.search(r"\bregister\s*\(", each.text) for each in (files.main, *files.others))
 
 
 def is_old(files: Files) -> bool:

@@ -92,12 +92,17 @@ def compile_wgsl(
         "constants": dict(shader.constants),
     }
     code = _run(files, asked, translated=shader.language == "wesl")
-    code = _with_bindings(files, code, _used_places(plain, entry))
-    return code, stage, tuple(_names(plain))
+    words = _words_of(plain, entry)
+    used: dict[int, list[int]] = {}
+    for group, binding, _, name, _ in _VARIABLE.findall(plain):
+        if name in words:
+            used.setdefault(int(group), []).append(int(binding))
+    code = _with_bindings(files, code, {group: sorted(each) for group, each in used.items()})
+    return code, stage, tuple(_names(plain, words))
 
 
-def _used_places(text: str, entry: str) -> dict[int, list[int]]:
-    """Return the bindings of each group that an entry point uses, also by what it calls."""
+def _words_of(text: str, entry: str) -> set[str]:
+    """Return the words in an entry point, and in the functions that it calls."""
     bodies = {}
     for match in re.finditer(r"\bfn\s+(\w+)\s*\(", text):
         bodies[match[1]] = set(re.findall(r"[A-Za-z_]\w*", _body(text, match.end())))
@@ -107,11 +112,7 @@ def _used_places(text: str, entry: str) -> dict[int, list[int]]:
         found = bodies.pop(waiting.pop(), set())
         words |= found
         waiting += found & bodies.keys()
-    used: dict[int, list[int]] = {}
-    for group, binding, _, name, _ in _VARIABLE.findall(text):
-        if name in words:
-            used.setdefault(int(group), []).append(int(binding))
-    return {group: sorted(bindings) for group, bindings in used.items()}
+    return words
 
 
 def _body(text: str, start: int) -> str:
@@ -189,13 +190,15 @@ def _locations(text: str, structs: Mapping[str, str]) -> Iterator[tuple[str, str
             yield from _locations(structs[kind], {})
 
 
-def _names(text: str) -> Iterator[tuple[str, str]]:
-    """Return names by place: naga's modules have none."""
+def _names(text: str, words: set[str]) -> Iterator[tuple[str, str]]:
+    """Return names by place, of what an entry point uses: naga's modules have none."""
     structs = {
         match[1]: [(each[1], each[2].strip()) for each in _MEMBER.finditer(match[2])]
         for match in _STRUCT.finditer(text)
     }
     for group, binding, space, name, kind in _VARIABLE.findall(text):
+        if name not in words:
+            continue
         place = f"{group}.{binding}"
         yield place, name
         if not space:

@@ -3,10 +3,6 @@
 #ifndef VKBLOOM_UNITY_CG
 #define VKBLOOM_UNITY_CG
 
-#define fixed float
-#define fixed2 float2
-#define fixed3 float3
-#define fixed4 float4
 #define UNITY_DECLARE_SCREENSPACE_TEXTURE(name) sampler2D name
 #define UNITY_SAMPLE_SCREENSPACE_TEXTURE(name, uv) tex2D(name, uv)
 #define UNITY_SETUP_STEREO_EYE_INDEX_POST_VERTEX(x)
