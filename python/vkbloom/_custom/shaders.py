@@ -110,9 +110,7 @@ def package_shader(index: int) -> CoreShader:
     return _package_shaders(index)[1]
 
 
-def package_blend(
-    drawn: tuple[float, ...], there: tuple[float, ...]
-) -> tuple[CoreShader, bytes]:
+def package_blend(drawn: tuple[float, ...], there: tuple[float, ...]) -> tuple[CoreShader, bytes]:
     """Return the shader that blends two images, and its parameters: four factors of each."""
     shader, core_shader = _package_shaders(BLEND)
     return core_shader, shader.pack(dict(zip(FACTORS, (*drawn, *there), strict=True)))

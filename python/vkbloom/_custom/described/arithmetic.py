@@ -136,7 +136,7 @@ def _check(tree: Expression) -> None:
         _check(node)
 
 
-def _parts(tree: Expression) -> list[Expression]:
+def _parts(tree: Expression) -> list[Expression]:  # noqa: PLR0911  one for each kind
     """Return the expressions in an expression; raise ArithmeticFault if it is not arithmetic."""
     match tree:
         case ast.Constant(value=bool() | int() | float()) | ast.Name():
@@ -207,7 +207,7 @@ def evaluate(tree: Expression, scope: Scope) -> Numbers:
     return value
 
 
-def _evaluate(tree: Expression, scope: Scope) -> Numbers:
+def _evaluate(tree: Expression, scope: Scope) -> Numbers:  # noqa: PLR0911  one for each kind
     match tree:
         case ast.Constant():
             return (float(tree.value),)  # type: ignore[arg-type]

@@ -9,8 +9,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Final
 
 from vkbloom._custom.described import slang
-from vkbloom._custom.described.arithmetic import parse
 from vkbloom._custom.described.arithmetic import Source as ImageName
+from vkbloom._custom.described.arithmetic import parse
 from vkbloom._custom.described.module import (
     INPUT,
     OUTPUT,
@@ -25,8 +25,8 @@ from vkbloom._custom.described.module import (
 from vkbloom._custom.described.placing import Places, place
 from vkbloom._custom.described.programs import Program
 from vkbloom._custom.described.schema import (
-    GLOW,
     DISCARD,
+    GLOW,
     DescribedPass,
     Description,
     Output,
@@ -125,9 +125,7 @@ class _Stage:
 class _Binder:
     """Binds one pass."""
 
-    def __init__(
-        self, description: Description, item: DescribedPass, program: Program
-    ) -> None:
+    def __init__(self, description: Description, item: DescribedPass, program: Program) -> None:
         self._description = description
         self._item = item
         self._program = program
@@ -151,7 +149,7 @@ class _Binder:
         try:
             stage = self._open(program.code, program.entry, program.stage)
             if stage.entry.stage == "vertex":
-                raise self.fault("entry: a vertex shader is no pass; name it vertex = \"NAME\"")
+                raise self.fault('entry: a vertex shader is no pass; name it vertex = "NAME"')
             vertex = None
             if program.vertex is not None:
                 vertex = self._open(program.vertex, None, "vertex")
@@ -214,12 +212,16 @@ class _Binder:
             if key not in known:
                 raise self._unknown("constants", key, known, self._item.shader.line)
             word = module.defined[known[key]]
-            kind = module.type(word[1]).kind
-            data = struct.pack("<f", value) if kind == "float" else struct.pack("<q", int(value))[:4]
+            kind = module.type_of(word[1]).kind
+            data = (
+                struct.pack("<f", value) if kind == "float" else struct.pack("<q", int(value))[:4]
+            )
             made[known[key]] = struct.unpack("<I", data)[0]
         return made
 
-    def _unknown(self, what: str, key: str, known: Sequence[str] | Mapping[str, object], line: int) -> ValueError:
+    def _unknown(
+        self, what: str, key: str, known: Sequence[str] | Mapping[str, object], line: int
+    ) -> ValueError:
         names = ", ".join(each for each in known if each) or "none"
         near = did_you_mean(key, known)
         return self.fault(f"{what}: the shader has no {key!r}; it has {names}{near}", line)
@@ -253,13 +255,16 @@ class _Binder:
         for kind in ("sampled", "image"):
             for variable in stage.variables:
                 if variable.storage == UNIFORM_CONSTANT and variable.type.kind == kind:
-                    if kind == "image" and variable.type.image[4] == 2:
+                    if is_stored(variable):
                         continue
                     self._bind_texture(stage, variable)
         for variable in stage.variables:
             if variable.storage == UNIFORM_CONSTANT and variable.type.kind == "sampler":
                 self._bind_sampler(stage, variable)
-            elif variable.storage == UNIFORM_CONSTANT and variable.type.kind not in ("sampled", "image"):
+            elif variable.storage == UNIFORM_CONSTANT and variable.type.kind not in (
+                "sampled",
+                "image",
+            ):
                 raise self.fault(f"{self._show(variable)}: arrays of textures cannot be bound")
         for each in (stage, vertex) if vertex else (stage,):
             for variable in each.variables:
@@ -343,9 +348,7 @@ class _Binder:
             ]
             return
         changes = variable.is_buffer and not variable.read_only
-        self._blocks.append(
-            (Block(numbers, size, variable.is_buffer, changes), stage, variable.id)
-        )
+        self._blocks.append((Block(numbers, size, variable.is_buffer, changes), stage, variable.id))
 
     def _members(self, variable: Variable) -> Iterator[Number]:
         """Return the values of a block's members; raise ValueError if one has none."""
@@ -354,14 +357,9 @@ class _Binder:
         found = []
         for path, kind, offset in paths(variable.type):
             if path in given:
-                key, value, line = given.pop(path)
-                while len(kind.members) == 1:
-                    # Of a structure around an array, its numbers are the array's.
-                    offset += kind.members[0].offset
-                    kind = kind.members[0].type
-                found.append((path, Number(key, kind, offset, value, line)))
+                found.append((path, _number(kind, offset, *given.pop(path))))
         if given:
-            path, (key, _, line) = next(iter(given.items()))
+            path, (_, _, line) = next(iter(given.items()))
             names = [each for each, _, _ in paths(variable.type) if each]
             raise self.fault(
                 f"values: {self._show(variable)} has no {path!r}; it has {', '.join(names[:40])}"
@@ -383,9 +381,7 @@ class _Binder:
                 self._check_missing(variable, path, kind, covered)
         yield from (number for _, number in found)
 
-    def _check_missing(
-        self, variable: Variable, path: str, kind: Type, covered: list[str]
-    ) -> None:
+    def _check_missing(self, variable: Variable, path: str, kind: Type, covered: list[str]) -> None:
         within = any(is_within(each, path) for each in covered)
         if within or not kind.size or path.rpartition(".")[2].lower().lstrip("_").startswith("pad"):
             return
@@ -409,7 +405,9 @@ class _Binder:
                 path = _path_of(key, names)
                 if path:
                     if ("values", key) in self._used_keys:
-                        raise self.fault(f"values: {key!r} is in several blocks; say BLOCK.{key}", line)
+                        raise self.fault(
+                            f"values: {key!r} is in several blocks; say BLOCK.{key}", line
+                        )
                     self._used_keys.add(("values", key))
                     yield path, (key, value, line)
 
@@ -431,36 +429,8 @@ class _Binder:
     def _bind_outputs(self, stage: _Stage) -> tuple[Output, ...]:
         """Return the outputs in the order of the targets; place storage images."""
         compute = stage.entry.stage == "compute"
-        if compute:
-            targets = [
-                each
-                for each in stage.variables
-                if each.storage == UNIFORM_CONSTANT
-                and each.type.kind == "image"
-                and each.type.image[4] == 2
-            ]
-            for each in targets:
-                if not _is_plain(each.type) and self._discards(each) is None:
-                    raise self.fault(f"outputs: {self._show(each)} is no image of two dimensions with floats")
-        else:
-            targets = [
-                each
-                for each in stage.variables
-                if each.storage == OUTPUT and each.location is not None
-            ]
-            targets.sort(key=lambda each: each.location or 0)
-        for target in targets if compute else []:
-            key = self._discards(target)
-            if key is not None:
-                assert target.type.of is not None
-                self._discarded.append((self._item.outputs[key], target.type.of.kind, target.id))
-        gone = {identity for _, _, identity in self._discarded}
-        targets = [target for target in targets if target.id not in gone]
-        outputs = {
-            key: output
-            for key, output in self._item.outputs.items()
-            if output.image.name != DISCARD
-        }
+        targets = self._targets(stage)
+        targets, outputs = self._without_discarded(targets, compute=compute)
         if not targets:
             raise self.fault("output: the shader writes no image")
         if len(targets) > MAX_TARGETS:
@@ -484,6 +454,42 @@ class _Binder:
                 raise self.fault("outputs: their locations are not 0, 1, 2 without gaps")
         return tuple(outputs[key] for key in order)
 
+    def _targets(self, stage: _Stage) -> list[Variable]:
+        """Return the storage images of a compute shader, or the outputs of a fragment shader."""
+        if stage.entry.stage != "compute":
+            found = [
+                each
+                for each in stage.variables
+                if each.storage == OUTPUT and each.location is not None
+            ]
+            return sorted(found, key=lambda each: each.location or 0)
+        found = [each for each in stage.variables if is_stored(each)]
+        for each in found:
+            if not _is_plain(each.type) and self._discards(each) is None:
+                raise self.fault(
+                    f"outputs: {self._show(each)} is no image of two dimensions with floats"
+                )
+        return found
+
+    def _without_discarded(
+        self, targets: list[Variable], *, compute: bool
+    ) -> tuple[list[Variable], dict[str, Output]]:
+        """Return the targets and the outputs that are read; note the others."""
+        outputs = {
+            key: output
+            for key, output in self._item.outputs.items()
+            if output.image.name != DISCARD
+        }
+        kept = []
+        for target in targets:
+            key = self._discards(target) if compute else None
+            if key is None:
+                kept.append(target)
+                continue
+            assert target.type.of is not None
+            self._discarded.append((self._item.outputs[key], target.type.of.kind, target.id))
+        return kept, outputs
+
     def _discards(self, target: Variable) -> str | None:
         """Return the key of an output that is discarded."""
         for label in self._labels(target):
@@ -506,8 +512,13 @@ class _Binder:
             found[key] = target
         for key, output in outputs.items():
             if key not in found:
-                known = {label: 0 for each in targets for label in (
-                    self._labels(each) if compute else [str(each.location), each.name])}
+                known = {
+                    label: 0
+                    for each in targets
+                    for label in (
+                        self._labels(each) if compute else [str(each.location), each.name]
+                    )
+                }
                 raise self._unknown("outputs", key, known, output.line)
         return found
 
@@ -544,7 +555,7 @@ class _Binder:
             if location not in POSITIONS or kind is None or kind.kind != "float":
                 raise self.fault(
                     f"vertex: the shader reads {each.name!r} at location {location}; without "
-                    "vertex = \"NAME\" there are positions at locations 0 to 3 alone"
+                    'vertex = "NAME" there are positions at locations 0 to 3 alone'
                 )
         return any(each.id not in stage.places.zeros for each in wanted.values())
 
@@ -564,10 +575,29 @@ class _Binder:
         return CoreShader(name, code, hashlib.sha256(code).digest()[:16])
 
 
+def is_stored(variable: Variable) -> bool:
+    """Whether a variable is a storage image."""
+    kind = variable.type
+    return variable.storage == UNIFORM_CONSTANT and kind.kind == "image" and kind.image[4] == 2
+
+
 def _is_plain(image: Type) -> bool:
     """Whether an image has two dimensions, one layer, one sample, and floats."""
     dimensions, _, arrayed, multisampled = image.image[:4]
-    return dimensions == 1 and not arrayed | multisampled and image.of is not None and image.of.kind == "float"
+    return (
+        dimensions == 1
+        and not arrayed | multisampled
+        and image.of is not None
+        and image.of.kind == "float"
+    )
+
+
+def _number(kind: Type, offset: int, key: str, value: Value, line: int) -> Number:
+    """Return the value of a part; of a structure around an array, its numbers are the array's."""
+    while len(kind.members) == 1:
+        offset += kind.members[0].offset
+        kind = kind.members[0].type
+    return Number(key, kind, offset, value, line)
 
 
 def rename(module: Module, number: str, name: str) -> None:
@@ -596,7 +626,7 @@ def _path_of(key: str, names: set[str]) -> str:
 
 def is_within(path: str, outer: str) -> bool:
     """Whether a path is another one, or a part of it."""
-    return outer == "" or path == outer or path.startswith((f"{outer}.", f"{outer}["))
+    return outer in ("", path) or path.startswith((f"{outer}.", f"{outer}["))
 
 
 def paths(kind: Type, path: str = "", offset: int = 0) -> Iterator[tuple[str, Type, int]]:

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
-from vkbloom._custom.described.binding import paths, rename
+from vkbloom._custom.described.binding import is_stored, paths, rename
 from vkbloom._custom.described.module import INPUT, OUTPUT, UNIFORM_CONSTANT, Module, Variable
 from vkbloom._custom.described.programs import Program, compile_one
 from vkbloom._custom.described.schema import LANGUAGES, Shader
@@ -71,9 +71,9 @@ def read_shaders(files: Sequence[str | os.PathLike[str]]) -> DescribedSource:
         if TODO in line:
             names = " ".join(str(file) for file in files)
             raise ValueError(
-                f"{first}: the shaders do not tell all: {line.partition(TODO)[2].strip(': ')} (line "
-                f"{number} of 'vkbloom describe {names}'); write this into a file, complete it, and "
-                "give that file"
+                f"{first}: the shaders do not tell all: {line.partition(TODO)[2].strip(': ')} "
+                f"(line {number} of 'vkbloom describe {names}'); write this into a file, complete "
+                "it, and give that file"
             )
     return compile_described(Source(str(first), text), Path())
 
@@ -89,7 +89,9 @@ def _reflect(path: Path) -> list[_Found]:
     """Compile a file, and return what its entry points use."""
     language = SUFFIXES.get(path.suffix.lower())
     if language is None:
-        raise ValueError(f"{path}: the name does not tell the language; known are {', '.join(SUFFIXES)}")
+        raise ValueError(
+            f"{path}: the name does not tell the language; known are {', '.join(SUFFIXES)}"
+        )
     text = path.read_bytes().decode("latin-1")
     if language == "glsl" and re.search(r"\bvoid\s+mainImage\s*\(", text):
         language = "shadertoy"
@@ -180,14 +182,12 @@ class _Writer:
             variable
             for variable in each.variables
             if (variable.storage == OUTPUT and variable.location is not None and not compute)
-            or (_is_stored(variable) and compute)
+            or (is_stored(variable) and compute)
         ]
         sized = f'size = "{size}"'
         if len(targets) <= 1:
             return [f'output = "{each.name}{level}"', sized]
-        names = [
-            (_label(variable) if compute else str(variable.location)) for variable in targets
-        ]
+        names = [(_label(variable) if compute else str(variable.location)) for variable in targets]
         inside = ", ".join(
             f'{_key(name)} = "{each.name}_{number}{level}"' for number, name in enumerate(names)
         )
@@ -199,7 +199,7 @@ class _Writer:
             for variable in each.variables
             if variable.storage == UNIFORM_CONSTANT
             and variable.type.kind in ("sampled", "image")
-            and not _is_stored(variable)
+            and not is_stored(variable)
         ]
         if each.language == "shadertoy":
             names = [name for name in names if name != "iChannel0"]
@@ -225,7 +225,9 @@ class _Writer:
         low = f'["{up}[level + 1]", "{down}[level + 1]"]'
         here = f'"{down}[level]"'
         if len(names) == 1:
-            return [(names[0], f"{low}  {TODO}: an up pass that reads one image needs blend = \"add\"")]
+            return [
+                (names[0], f'{low}  {TODO}: an up pass that reads one image needs blend = "add"')
+            ]
         small = [name for name in names if _SMALL.search(name)]
         if len(names) == 2 and len(small) == 1:
             return [(name, low if name in small else here) for name in names]
@@ -243,7 +245,9 @@ class _Writer:
                 continue
             if variable.is_buffer:
                 if variable.read_only:
-                    lines.append(f"{_key(_label(variable))} = 0  {TODO}: the numbers of this buffer")
+                    lines.append(
+                        f"{_key(_label(variable))} = 0  {TODO}: the numbers of this buffer"
+                    )
                 continue
             lines += self._members(variable, image)
         return lines
@@ -254,7 +258,11 @@ class _Writer:
             if not path or kind.kind == "struct" or "[" in path:
                 continue
             if variable.members is not None and len(variable.type.members) > 1:
-                top = [index for index, member in enumerate(variable.type.members) if path.split(".")[0] == member.name]
+                top = [
+                    index
+                    for index, member in enumerate(variable.type.members)
+                    if path.split(".")[0] == member.name
+                ]
                 if top and not any(used[:1] == (top[0],) for used in variable.members):
                     continue
             lines.append(f"{_key(path)} = {self._value(path, kind.kind, kind.count, image)}")
@@ -277,11 +285,6 @@ class _Writer:
             return f'"{setting}"'
         entries = count if kind in ("vector", "array") else 1
         return f"0  {TODO}: the {entries} numbers of {path}"
-
-
-def _is_stored(variable: Variable) -> bool:
-    kind = variable.type
-    return variable.storage == UNIFORM_CONSTANT and kind.kind == "image" and kind.image[4] == 2
 
 
 def _label(variable: Variable) -> str:

@@ -88,10 +88,17 @@ def _explain(files: Files, status: int, output: str) -> ShaderError:
         hint = ""
         lines = files.main.text.split("\n")
         quoted = lines[int(line) - 1] if 0 < int(line) <= len(lines) else ""
-        if _OLD.search(cause) or "texture2D(" in quoted or "not supported for this version" in cause:
+        if (
+            _OLD.search(cause)
+            or "texture2D(" in quoted
+            or "not supported for this version" in cause
+        ):
             hint = "; Vulkan's GLSL is that of version 1.40 and later: texture(), in, out"
         if name == "1":
-            cause, line = "the file has no function 'void mainImage(out vec4, in vec2)'", "1"
-        return files.fault("" if name in ("0", "1", "stdin") else name, int(line), f"{cause.strip()}{hint}")
+            missing = "the file has no function 'void mainImage(out vec4, in vec2)'"
+            return files.fault("", 1, missing)
+        return files.fault(
+            "" if name in ("0", "stdin") else name, int(line), f"{cause.strip()}{hint}"
+        )
     lines = [line for line in output.strip().split("\n") if line.strip() not in ("", "stdin")]
     return files.fault("", 1, f"glslang refused the file: {lines[-1].strip() if lines else status}")

@@ -90,7 +90,7 @@ class Type:
     image: tuple[int, ...] = ()
 
     @property
-    def size(self) -> int:
+    def size(self) -> int:  # noqa: PLR0911  one for each kind
         """The bytes up to the last one."""
         match self.kind:
             case "bool":
@@ -147,9 +147,7 @@ class Variable:
     @property
     def is_block(self) -> bool:
         """Whether it is a uniform block or push constants."""
-        return self.storage == PUSH_CONSTANT or (
-            self.storage == UNIFORM and not self.is_buffer
-        )
+        return self.storage == PUSH_CONSTANT or (self.storage == UNIFORM and not self.is_buffer)
 
     @property
     def is_buffer(self) -> bool:
@@ -186,7 +184,7 @@ class Module:
         self._types: dict[tuple[int, bool, int], Type] = {}
         self._read()
 
-    def _read(self) -> None:
+    def _read(self) -> None:  # noqa: PLR0912  one for each instruction
         body: list[Instruction] | None = None
         for word in self.instructions:
             opcode, length = word[0] & 0xFFFF, len(word)
@@ -238,13 +236,16 @@ class Module:
         """Return the threads of a workgroup of a compute shader."""
         for identity, decorations in self.decorations.items():
             if decorations.get(BUILT_IN) == WORKGROUP_SIZE and identity in self.defined:
-                parts = tuple(self.constant(part) for part in self.defined[identity][3:6])
-                return (*parts, 1, 1, 1)[:3]
+                return self._three(self.defined[identity][3:6])
         found = self.threads.get(entry.id)
         if found is None:
             raise ModuleFault("the compute shader states no size of its workgroups")
-        parts = tuple(self.constant(-part) if part < 0 else part for part in found)
-        return (*parts, 1, 1, 1)[:3]
+        return (found[0], found[1], found[2]) if min(found) >= 0 else self._three(found)
+
+    def _three(self, identities: tuple[int, ...]) -> tuple[int, int, int]:
+        """Return three constants; their ids may be negative."""
+        parts = [self.constant(abs(identity)) for identity in (*identities, 0, 0, 0)[:3]]
+        return parts[0], parts[1], parts[2]
 
     def constant(self, identity: int) -> int:
         """Return the value of a constant integer."""
@@ -253,7 +254,9 @@ class Module:
             raise ModuleFault("a length is not a constant")
         return word[3]
 
-    def type(self, identity: int, *, row_major: bool = False, stride: int = 0, depth: int = 0) -> Type:
+    def type_of(
+        self, identity: int, *, row_major: bool = False, stride: int = 0, depth: int = 0
+    ) -> Type:
         """Return a type."""
         key = identity, row_major, stride
         if key not in self._types:
@@ -262,7 +265,7 @@ class Module:
             self._types[key] = self._read_type(identity, row_major, stride, depth + 1)
         return self._types[key]
 
-    def _read_type(self, identity: int, row_major: bool, stride: int, depth: int) -> Type:
+    def _read_type(self, identity: int, row_major: bool, stride: int, depth: int) -> Type:  # noqa: PLR0911
         word = self.defined.get(identity, (0,))
         opcode, rest = word[0] & 0xFFFF, (*word[2:], 0, 0, 0)
         match opcode:
@@ -274,16 +277,18 @@ class Module:
                 return Type(identity, "float", rest[0])
             case 23 | 24:
                 kind = "vector" if opcode == TYPE_VECTOR else "matrix"
-                of = self.type(rest[0], depth=depth)
+                of = self.type_of(rest[0], depth=depth)
                 return Type(identity, kind, rest[1], of, stride, row_major)
             case 25:
-                return Type(identity, "image", 0, self.type(rest[0], depth=depth), image=word[3:9])
+                return Type(
+                    identity, "image", 0, self.type_of(rest[0], depth=depth), image=word[3:9]
+                )
             case 26:
                 return Type(identity, "sampler")
             case 27:
-                return Type(identity, "sampled", 0, self.type(rest[0], depth=depth))
+                return Type(identity, "sampled", 0, self.type_of(rest[0], depth=depth))
             case 28 | 29:
-                of = self.type(rest[0], row_major=row_major, stride=stride, depth=depth)
+                of = self.type_of(rest[0], row_major=row_major, stride=stride, depth=depth)
                 step = self.decorations.get(identity, {}).get(ARRAY_STRIDE, of.size)
                 count = self.constant(rest[1]) if opcode == TYPE_ARRAY else 0
                 return Type(identity, "array", count, of, step)
@@ -291,14 +296,14 @@ class Module:
                 members = []
                 for index, member in enumerate(word[2:]):
                     marks = self.member_decorations.get((identity, index), {})
-                    kind = self.type(
+                    of_member = self.type_of(
                         member,
                         row_major=ROW_MAJOR in marks,
                         stride=marks.get(MATRIX_STRIDE, 0),
                         depth=depth,
                     )
                     name = self.member_names.get((identity, index), "")
-                    members.append(Member(name, marks.get(OFFSET, 0), kind))
+                    members.append(Member(name, marks.get(OFFSET, 0), of_member))
                 return Type(identity, "struct", members=tuple(members))
         return Type(identity, "other")
 
@@ -320,13 +325,16 @@ class Module:
     ) -> Variable:
         marks = self.decorations.get(identity, {})
         kind_marks = self.decorations.get(kind, {})
-        made = self.type(kind)
+        made = self.type_of(kind)
         name = self.names.get(identity, "")
         if made.kind == "struct" and (not name or name.startswith("_")):
             name = self.names.get(kind, name)
-        read_only = NON_WRITABLE in marks or bool(made.members) and all(
-            NON_WRITABLE in self.member_decorations.get((kind, index), {})
-            for index in range(len(made.members))
+        read_only = NON_WRITABLE in marks or (
+            bool(made.members)
+            and all(
+                NON_WRITABLE in self.member_decorations.get((kind, index), {})
+                for index in range(len(made.members))
+            )
         )
         location = marks.get(LOCATION)
         return Variable(
@@ -337,7 +345,12 @@ class Module:
             marks.get(SET, 0),
             marks.get(BINDING, 0),
             location,
-            BUILT_IN in marks or any((kind, i) in self.member_decorations and BUILT_IN in self.member_decorations[kind, i] for i in range(len(made.members))),
+            BUILT_IN in marks
+            or any(
+                (kind, i) in self.member_decorations
+                and BUILT_IN in self.member_decorations[kind, i]
+                for i in range(len(made.members))
+            ),
             read_only,
             members,
             BUFFER_BLOCK in kind_marks,

@@ -9,7 +9,6 @@ from __future__ import annotations
 import json
 import re
 import sys
-from typing import Any
 
 import wgpu
 
@@ -22,9 +21,13 @@ def main() -> None:
     """Compile what the standard input says."""
     asked = json.loads(sys.stdin.read())
     adapter = wgpu.gpu.request_adapter_sync(power_preference="low-power")
-    wanted = [name for name in adapter.features if name.startswith(("shader", "float32", "subgroup"))]
+    wanted = [
+        name for name in adapter.features if name.startswith(("shader", "float32", "subgroup"))
+    ]
     device = adapter.request_device_sync(
-        required_features=[name for name in wanted if "atomic" not in name and "barycentric" not in name]
+        required_features=[
+            name for name in wanted if "atomic" not in name and "barycentric" not in name
+        ]
         + [name for name in adapter.features if "adapter-specific" in name or "norm" in name]
     )
     module = device.create_shader_module(code=asked["code"])
@@ -57,6 +60,6 @@ def vertex_text(inputs: list[list[str]]) -> str:
 if __name__ == "__main__":
     try:
         main()
-    except Exception as error:  # noqa: BLE001  of any kind: the other process shows it
+    except Exception as error:
         print(f"VKBLOOM-ERROR\n{error}", flush=True)
         sys.exit(1)

@@ -148,7 +148,7 @@ def _retyped(word: Instruction, replaced: Mapping[int, int]) -> Instruction:
     return word
 
 
-def _declaration(
+def _declaration(  # noqa: PLR0911  one for each kind
     word: Instruction, entry: Entry, places: Places, unused: set[int]
 ) -> Instruction:
     """Return a declaration as it is in the new module; empty if it is left out."""

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import dataclasses
 import functools
+import itertools
 import struct
 from collections import OrderedDict
 from collections.abc import Iterator
@@ -12,7 +12,6 @@ from typing import Any, Final
 from vkbloom import _core
 from vkbloom._custom.described.arithmetic import (
     ArithmeticFault,
-    Expression,
     Numbers,
     evaluate,
 )
@@ -76,6 +75,7 @@ class Plan:
         # The textures of the pass, by their names in its shader.
         self._bound: dict[str, PassImage] = {}
         self._plain: dict[str, PassImage] = {}
+        self._numbered = itertools.count()
         self._depth = 0
         self._owner: Any = None
         self._line = 1
@@ -149,7 +149,7 @@ class Plan:
         if source.name == GLOW:
             return PassImage("GLOW", self._request.buffers)
         if source.name in PLAIN and source.name not in self._plain:
-            image = PassImage(f"{len(self.rows)}.{source.name}", (1, 1))
+            image = PassImage(f"{next(self._numbered)}.{source.name}", (1, 1))
             shader = BLACK if source.name == "black" else WHITE
             self.rows.append(package_row(shader, image.name, image.size, ()))
             self._plain[source.name] = image
@@ -189,8 +189,7 @@ class Plan:
             cause = f"the passes run more than {MAX_RUNS} times in a frame"
             raise self._description.source.fault(item.line, cause)
         self._bound = {
-            key: self._read(texture.sources, texture.line)
-            for key, texture in item.textures.items()
+            key: self._read(texture.sources, texture.line) for key, texture in item.textures.items()
         }
         sizes = [self._side(output) for output in each.outputs]
         self._target = sizes[0]
@@ -268,7 +267,7 @@ class Plan:
         raise self._description.source.fault(line, cause)
 
     def _image(self, output: Output, size: tuple[int, int]) -> PassImage:
-        name = f"{len(self.rows)}.{len(self._images)}.{output.image.name}"
+        name = f"{next(self._numbered)}.{output.image.name}"
         return PassImage(name[:MAX_NAME_LENGTH], size)
 
     def _blended(self, each: BoundPass, output: Output, drawn: PassImage) -> PassImage:

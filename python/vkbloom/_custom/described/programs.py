@@ -21,9 +21,7 @@ from vkbloom._custom.described.schema import Description, Shader
 from vkbloom._custom.source import Source
 
 #: The attribute of a compute shader before an entry point of HLSL or Slang.
-_COMPUTE: Final = (
-    r"(?i:\[\s*numthreads)\b[^\]]*\]\s*(?:\[[^\]]*\]\s*)*(?:public\s+)?void\s+{}\s*\("
-)
+_COMPUTE: Final = r"(?i:\[\s*numthreads)\b[^\]]*\]\s*(?:\[[^\]]*\]\s*)*(?:public\s+)?void\s+{}\s*\("
 #: Of all results together with what is before them.
 _VERSION: Final = b"3"
 
@@ -186,7 +184,9 @@ def _slang(shader: Shader, files: Files) -> Program:
     if shader.vertex is not None:
         arguments = [*arguments, "-fvk-invert-y"]
         vertex = slang.compile_slang(files, shader.language, "vertex", shader.vertex, arguments)
-    return Program(code, None, stage, vertex, shift=shader.language == "hlsl" and slang.has_registers(files))
+    return Program(
+        code, None, stage, vertex, shift=shader.language == "hlsl" and slang.has_registers(files)
+    )
 
 
 def _shaderlab(shader: Shader, files: Files) -> Program:

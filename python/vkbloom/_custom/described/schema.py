@@ -10,13 +10,15 @@ from typing import Any, Final
 from vkbloom._custom.described.arithmetic import (
     ArithmeticFault,
     Expression,
-    Source as ImageName,
     names_in,
     parse,
     source_of,
 )
+from vkbloom._custom.described.arithmetic import (
+    Source as ImageName,
+)
 from vkbloom._custom.described.tables import Table, read_tables
-from vkbloom._custom.params import RANGES, Param
+from vkbloom._custom.params import RANGES, Number, Param
 from vkbloom._custom.source import Source
 
 #: Images that every pass can read.
@@ -219,8 +221,18 @@ def _read_settings(table: Table) -> Iterator[Param]:
         if not span[0] <= value <= span[1]:
             each.refuse("default", value, f"is out of range, {span[0]} to {span[1]}")
         each.finish("a setting")
-        kind = "int" if number == "int" else "float"
-        yield Param(name, text, kind, "uniform", max(low, span[0]), min(high, span[1]), float(value), (), line)  # type: ignore[arg-type]  # noqa: E501
+        kind: Number = "int" if number == "int" else "float"
+        yield Param(
+            name,
+            text,
+            kind,
+            "uniform",
+            max(low, span[0]),
+            min(high, span[1]),
+            float(value),
+            (),
+            line,
+        )
 
 
 def _image(table: Table, key: str, text: str | None) -> ImageName:
@@ -252,9 +264,7 @@ def _parts(value: Value) -> tuple[Expression | float, ...]:
 
 
 def _read_values(table: Table) -> dict[str, tuple[Value, int]]:
-    return {
-        key: (_value(table, key, table.get(key, object)), table.line(key)) for key in table
-    }
+    return {key: (_value(table, key, table.get(key, object)), table.line(key)) for key in table}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -300,7 +310,9 @@ def _read_step(table: Table, shared: _Shared) -> DescribedPass | Loop:
     keys = [key for key in ("down", "up") if key in table]
     if not keys:
         if "steps" in table:
-            raise table.fault("steps: they need down = [first, last] or up = [first, last]", "steps")
+            raise table.fault(
+                "steps: they need down = [first, last] or up = [first, last]", "steps"
+            )
         return _read_pass(table, shared)
     if len(keys) == 2:
         raise table.fault("a pass goes either down or up", "up")
@@ -362,7 +374,7 @@ def _read_shader(table: Table, shared: _Shared) -> Shader:
     language = next((name for name, suffixes in LANGUAGES.items() if suffix in suffixes), "")
     if "language" in table or not language:
         if "language" not in table:
-            table.refuse("file", file, "does not tell its language; give language = \"hlsl\"")
+            table.refuse("file", file, 'does not tell its language; give language = "hlsl"')
         language = table.choice("language", LANGUAGES, language)
     stage = table.choice("stage", STAGES, "") if "stage" in table else None
     if stage is None and suffix in (".frag", ".comp"):
@@ -460,7 +472,12 @@ def _read_outputs(table: Table) -> dict[str, Output]:
 
 def _writable(table: Table, key: str, image: ImageName) -> ImageName:
     name = image.name
-    if name in (FRAME, GLOW, TARGET, *PLAIN) or "__" in name or len(name) > 24 or not name.isascii():
+    if (
+        name in (FRAME, GLOW, TARGET, *PLAIN)
+        or "__" in name
+        or len(name) > 24
+        or not name.isascii()
+    ):
         table.refuse(key, name, "is not possible as the name of an output; it is up to 24 letters")
     return image
 

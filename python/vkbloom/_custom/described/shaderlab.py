@@ -11,7 +11,9 @@ from vkbloom._custom.described.files import Files
 _BLOCK: Final = re.compile(
     r"\b(HLSLINCLUDE|CGINCLUDE|HLSLPROGRAM|CGPROGRAM)\b(.*?)\b(ENDHLSL|ENDCG)\b", re.DOTALL
 )
-_PRAGMA: Final = re.compile(r"^[ \t]*#[ \t]*pragma[ \t]+(vertex|fragment|kernel)[ \t]+(\w+)", re.MULTILINE)
+_PRAGMA: Final = re.compile(
+    r"^[ \t]*#[ \t]*pragma[ \t]+(vertex|fragment|kernel)[ \t]+(\w+)", re.MULTILINE
+)
 _SUBSHADER: Final = re.compile(r"\bSubShader\b")
 
 
@@ -27,18 +29,25 @@ class Program:
 def read_program(files: Files, number: int) -> Program:
     """Return a program of a file by its number, counted from 0."""
     text = files.main.text
-    shared, programs = [], []
+    shared: list[tuple[int, str]] = []
+    programs: list[tuple[int, str]] = []
     for match in _BLOCK.finditer(text):
         line = text.count("\n", 0, match.start(2)) + 1
-        part = f'#line {line} "{files.main.name}"{match[2]}' if match[2].startswith("\n") else match[2]
+        part = (
+            f'#line {line} "{files.main.name}"{match[2]}' if match[2].startswith("\n") else match[2]
+        )
         (shared if match[1].endswith("INCLUDE") else programs).append((match.start(), part))
     if number >= len(programs):
         raise files.fault(
-            "", 1, f"program: the file has {len(programs)} programs in HLSL, and so no number {number}"
+            "",
+            1,
+            f"program: the file has {len(programs)} programs in HLSL, and so no number {number}",
         )
     place, program = programs[number]
     # What the SubShader of the program shares, or what is before all of them.
-    begun = max((each.start() for each in _SUBSHADER.finditer(text) if each.start() < place), default=0)
+    begun = max(
+        (each.start() for each in _SUBSHADER.finditer(text) if each.start() < place), default=0
+    )
     first = min((each.start() for each in _SUBSHADER.finditer(text)), default=0)
     parts = [part for start, part in shared if start < place and (start > begun or start < first)]
     names = dict(_PRAGMA.findall(program))

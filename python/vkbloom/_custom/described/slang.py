@@ -44,7 +44,7 @@ UNITY: Final = Path(__file__).with_name("unity")
 
 @functools.cache
 def find_slangc() -> str:
-    """Return the path of slangc: of VKBLOOM_SLANGC, the system's, or that of the package slangtorch."""
+    """Return the path of slangc: of VKBLOOM_SLANGC, the system's, or the package slangtorch's."""
     given = os.environ.get("VKBLOOM_SLANGC") or shutil.which("slangc")
     if given:
         return given
@@ -109,7 +109,9 @@ def has_registers(files: Files) -> bool:
 
 def is_old(files: Files) -> bool:
     """Whether a file has the names of Direct3D 9."""
-    return any(re.search(r"\btex2D(?:lod|bias)?\s*\(", each.text) for each in (files.main, *files.others))
+    return any(
+        re.search(r"\btex2D(?:lod|bias)?\s*\(", each.text) for each in (files.main, *files.others)
+    )
 
 
 def optimize(program: str, code: bytes, folder: str) -> bytes:
@@ -135,6 +137,6 @@ def _explain(files: Files, file: str, status: int, output: str, entry: str) -> S
         said = _SAID.search(output, match.end())
         return files.fault(name, int(line), (said[1] if said else cause).strip().rstrip("."))
     if "entry point" in output or "E38000" in output:
-        return files.fault("", 1, f"the file has no entry point {entry!r}; give entry = \"NAME\"")
+        return files.fault("", 1, f'the file has no entry point {entry!r}; give entry = "NAME"')
     lines = [line for line in output.strip().split("\n") if "rror" in line] or [f"status {status}"]
     return files.fault("", 1, f"slangc refused the file: {lines[0].strip()}")

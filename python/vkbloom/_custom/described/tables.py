@@ -13,9 +13,17 @@ from vkbloom._spelling import did_you_mean
 Path = tuple[str | int, ...]
 
 #: The names of types in messages.
-_KINDS: Final = {str: "a text", bool: "true or false", int: "a whole number", dict: "a table", list: "a list"}
+_KINDS: Final = {
+    str: "a text",
+    bool: "true or false",
+    int: "a whole number",
+    dict: "a table",
+    list: "a list",
+}
 _HEADER: Final = re.compile(r"\s*(\[\[?)\s*(.+?)\s*\]\]?\s*(#.*)?")
-_KEY: Final = re.compile(r"""\s*((?:[\w-]+|"[^"]*"|'[^']*')(?:\s*\.\s*(?:[\w-]+|"[^"]*"|'[^']*'))*)\s*=""")
+_KEY: Final = re.compile(
+    r"""\s*((?:[\w-]+|"[^"]*"|'[^']*')(?:\s*\.\s*(?:[\w-]+|"[^"]*"|'[^']*'))*)\s*="""
+)
 _WORD: Final = re.compile(r"""[\w-]+|"[^"]*"|'[^']*'""")
 _AT_LINE: Final = re.compile(r"(.*) \(at line (\d+), column \d+\)", re.DOTALL)
 
@@ -130,14 +138,16 @@ class Table:
             return default
         value = self._data[key]
         allowed = kinds if isinstance(kinds, tuple) else (kinds,)
-        if not isinstance(value, allowed) or (type(value) is bool and not {bool, object} & {*allowed}):
+        if not isinstance(value, allowed) or (
+            type(value) is bool and not {bool, object} & {*allowed}
+        ):
             names = " or ".join(dict.fromkeys(_KINDS.get(kind, "a number") for kind in allowed))
             self.refuse(key, value, f"is not {names}")
         return value
 
     def text(self, key: str, default: str | None = None) -> str | None:
         """Return a text that is not empty."""
-        value = self.get(key, str, default)
+        value: str | None = self.get(key, str, default)
         if value == "":
             self.refuse(key, value, "is empty")
         return value
@@ -178,5 +188,8 @@ class Table:
         """Raise ValueError if a key was not taken."""
         for key in self._data:
             if key not in self._taken:
-                near = did_you_mean(key, self._taken) or f"; known are {', '.join(sorted(self._taken))}"
+                near = (
+                    did_you_mean(key, self._taken)
+                    or f"; known are {', '.join(sorted(self._taken))}"
+                )
                 raise self.fault(f"{key!r} is not a key of {what}{near}", key)

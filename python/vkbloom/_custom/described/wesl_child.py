@@ -26,6 +26,6 @@ if __name__ == "__main__":
         first = error.diagnostics[0]
         print(f"VKBLOOM-ERROR\n{first.filename or ''}\n{first.line or 1}\n{first.message}")
         sys.exit(1)
-    except Exception as error:  # noqa: BLE001  of any kind: the other process shows it
+    except Exception as error:
         print(f"VKBLOOM-ERROR\n\n1\n{error}")
         sys.exit(1)

@@ -26,15 +26,16 @@ from vkbloom._custom.spirv import HEADER_WORDS
 
 MISSING: Final = "WGSL needs naga: pip install vkbloom[wgsl] (wgpu, 4 MB)"
 MISSING_WESL: Final = (
-    "WESL needs wesl-py: pip install vkbloom[wgsl] with Python 3.12 or later (this is {}.{}); or give "
-    "the WGSL that it becomes, or set VKBLOOM_WESL_PYTHON to a Python that has it"
+    "WESL needs wesl-py: pip install vkbloom[wgsl] with Python 3.12 or later (this is {}.{}), or "
+    "set VKBLOOM_WESL_PYTHON to a Python that has it; or give the WGSL that it becomes"
 )
 #: Virtual memory, of which a driver and a compiler reserve more than they use.
 MAX_MEMORY: Final = 16 << 30
 
 _REMARK: Final = re.compile(r"/\*.*?\*/|//[^\n]*", re.DOTALL)
 _VARIABLE: Final = re.compile(
-    r"@group\s*\(\s*(\d+)u?\s*\)\s*@binding\s*\(\s*(\d+)u?\s*\)\s*var\s*(<[^>]*>)?\s*(\w+)\s*:\s*([\w<>, ]+?)\s*;"
+    r"@group\s*\(\s*(\d+)u?\s*\)\s*@binding\s*\(\s*(\d+)u?\s*\)"
+    r"\s*var\s*(<[^>]*>)?\s*(\w+)\s*:\s*([\w<>, ]+?)\s*;"
 )
 _STRUCT: Final = re.compile(r"\bstruct\s+(\w+)\s*\{([^}]*)\}")
 _MEMBER: Final = re.compile(r"(?:@\w+\s*(?:\([^)]*\))?\s*)*(\w+)\s*:\s*([^,;]+(?:<[^>]*>)?)")
@@ -174,7 +175,14 @@ def _interface(
     stage, entry, given, returned = wanted[0]
     structs = {match[1]: match[2] for match in _STRUCT.finditer(text)}
     inputs = list(_locations(given, structs))
-    outputs = len(list(_locations(f"x: {returned}" if "@" not in returned else returned.replace(")", ") x:", 1), structs)))
+    outputs = len(
+        list(
+            _locations(
+                f"x: {returned}" if "@" not in returned else returned.replace(")", ") x:", 1),
+                structs,
+            )
+        )
+    )
     return stage, entry, inputs, outputs
 
 
