@@ -119,12 +119,17 @@ static bool choose_extensions(struct vkb_device *device, const char *names[EXTEN
     return true;
 }
 
-// Sets linear_texels if the device has the features that its shaders need.
-static bool create_logical(struct vkb_device *device, struct vkb_error *error)
+// The features that are enabled, of each version of Vulkan. They point to each other.
+struct features {
+    VkPhysicalDeviceFeatures base;
+    VkPhysicalDeviceVulkan11Features vulkan11;
+    VkPhysicalDeviceVulkan12Features vulkan12;
+    VkPhysicalDeviceVulkan13Features vulkan13;
+};
+
+// Sets dispatch and linear_texels if the device has the features that their shaders need.
+static void choose_features(struct vkb_device *device, struct features *chosen)
 {
-    const struct vkb_instance_table *vk = &device->instance->vk;
-    const char *extensions[EXTENSION_COUNT];
-    uint32_t extension_count;
     VkPhysicalDeviceVulkan11Features available11 = {
         .sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_1_FEATURES,
     };
@@ -138,66 +143,72 @@ static bool create_logical(struct vkb_device *device, struct vkb_error *error)
     };
     const VkPhysicalDeviceFeatures *available = &available2.features;
 
-    if (!choose_extensions(device, extensions, &extension_count, error))
-        return false;
-    vk->vkGetPhysicalDeviceFeatures2(device->adapter.physical, &available2);
+    device->instance->vk.vkGetPhysicalDeviceFeatures2(device->adapter.physical, &available2);
     device->dispatch = available->shaderStorageImageWriteWithoutFormat;
     // Of the drivers for CPUs, llvmpipe alone does with linear tiling all that it does with optimal
     // tiling.
     device->linear_texels = device->adapter.device_type == VK_PHYSICAL_DEVICE_TYPE_CPU
                          && device->adapter.driver_id == VK_DRIVER_ID_MESA_LLVMPIPE
                          && available->shaderInt64 && available12.scalarBlockLayout;
-    VkPhysicalDeviceVulkan13Features vulkan13 = {
-        .sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_3_FEATURES,
-        .dynamicRendering = VK_TRUE,
-        // For passes that are given at run time: an input can have fewer components than the
-        // vertex shader's output, which every device can do.
-        .maintenance4 = VK_TRUE,
-        .shaderDemoteToHelperInvocation = VK_TRUE,
+    // Those without a reason are for passes that are given at run time.
+    chosen->base = (VkPhysicalDeviceFeatures){
+        .shaderStorageImageWriteWithoutFormat = device->dispatch,
+        .shaderStorageImageReadWithoutFormat = available->shaderStorageImageReadWithoutFormat,
+        .shaderInt64 = available->shaderInt64,  // linear texels
+        .shaderInt16 = available->shaderInt16,
+        .fragmentStoresAndAtomics = available->fragmentStoresAndAtomics,
+        .shaderStorageImageExtendedFormats = available->shaderStorageImageExtendedFormats,
+        .shaderImageGatherExtended = available->shaderImageGatherExtended,
     };
-    VkPhysicalDeviceVulkan11Features vulkan11 = {
+    chosen->vulkan13 = (VkPhysicalDeviceVulkan13Features){
+        .sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_3_FEATURES,
+        .dynamicRendering = VK_TRUE,  // all passes
+        // An input can have fewer components than the vertex shader's output. Every device has it.
+        .maintenance4 = VK_TRUE,
+        .shaderDemoteToHelperInvocation = VK_TRUE,  // has every device
+    };
+    chosen->vulkan11 = (VkPhysicalDeviceVulkan11Features){
         .sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_1_FEATURES,
-        .pNext = &vulkan13,
+        .pNext = &chosen->vulkan13,
         .shaderDrawParameters = available11.shaderDrawParameters,
     };
-    VkPhysicalDeviceVulkan12Features vulkan12 = {
+    chosen->vulkan12 = (VkPhysicalDeviceVulkan12Features){
         .sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_FEATURES,
-        .pNext = &vulkan11,
+        .pNext = &chosen->vulkan11,
         .scalarBlockLayout = available12.scalarBlockLayout,
         .shaderFloat16 = available12.shaderFloat16,
-        .timelineSemaphore = VK_TRUE,
+        .timelineSemaphore = VK_TRUE,  // submissions
     };
+}
+
+static bool create_logical(struct vkb_device *device, struct vkb_error *error)
+{
+    const struct vkb_instance_table *vk = &device->instance->vk;
+    const char *extensions[EXTENSION_COUNT];
+    uint32_t extension_count;
+    struct features features;
+
+    if (!choose_extensions(device, extensions, &extension_count, error))
+        return false;
+    choose_features(device, &features);
     return VK(error,
-              vk->vkCreateDevice(
-                  device->adapter.physical,
-                  &(VkDeviceCreateInfo){
-                      .sType = VK_STRUCTURE_TYPE_DEVICE_CREATE_INFO,
-                      .pNext = &vulkan12,
-                      .pEnabledFeatures =
-                          &(VkPhysicalDeviceFeatures){
-                              .shaderStorageImageWriteWithoutFormat = device->dispatch,
-                              .shaderInt64 = available->shaderInt64,
-                              // For passes that are given at run time.
-                              .fragmentStoresAndAtomics = available->fragmentStoresAndAtomics,
-                              .shaderStorageImageExtendedFormats =
-                                  available->shaderStorageImageExtendedFormats,
-                              .shaderImageGatherExtended = available->shaderImageGatherExtended,
-                              .shaderStorageImageReadWithoutFormat =
-                                  available->shaderStorageImageReadWithoutFormat,
-                              .shaderInt16 = available->shaderInt16,
-                          },
-                      .queueCreateInfoCount = 1,
-                      .pQueueCreateInfos =
-                          &(VkDeviceQueueCreateInfo){
-                              .sType = VK_STRUCTURE_TYPE_DEVICE_QUEUE_CREATE_INFO,
-                              .queueFamilyIndex = device->adapter.queue_family,
-                              .queueCount = 1,
-                              .pQueuePriorities = &(float){1.0f},
-                          },
-                      .enabledExtensionCount = extension_count,
-                      .ppEnabledExtensionNames = extensions,
-                  },
-                  NULL, &device->handle));
+              vk->vkCreateDevice(device->adapter.physical,
+                                 &(VkDeviceCreateInfo){
+                                     .sType = VK_STRUCTURE_TYPE_DEVICE_CREATE_INFO,
+                                     .pNext = &features.vulkan12,
+                                     .pEnabledFeatures = &features.base,
+                                     .queueCreateInfoCount = 1,
+                                     .pQueueCreateInfos =
+                                         &(VkDeviceQueueCreateInfo){
+                                             .sType = VK_STRUCTURE_TYPE_DEVICE_QUEUE_CREATE_INFO,
+                                             .queueFamilyIndex = device->adapter.queue_family,
+                                             .queueCount = 1,
+                                             .pQueuePriorities = &(float){1.0f},
+                                         },
+                                     .enabledExtensionCount = extension_count,
+                                     .ppEnabledExtensionNames = extensions,
+                                 },
+                                 NULL, &device->handle));
 }
 
 static uint32_t smallest(uint32_t a, uint32_t b)

@@ -38,4 +38,6 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         Path(name).write_text(passes)
     (function,) = [text for text in blocks(custom, "python") if "def soft" in text]
     Path("soft_reference.py").write_text(function)
+    for file in (ROOT / "examples" / "languages" / "glsl").iterdir():
+        Path(file.name).write_text(file.read_text())
     return tmp_path

@@ -42,6 +42,7 @@ from vkbloom._spelling import did_you_mean
 MAX_TARGETS: Final = 4
 #: Locations of inputs that a fragment shader finds without a vertex shader of its own.
 POSITIONS: Final = range(4)
+MAX_PATHS: Final = 1024
 MAX_BLOCK_BYTES: Final = 65536
 MAX_BUFFER_BYTES: Final = 1 << 24
 #: Of SPIR-V: what the core's devices have where their driver has it.
@@ -183,6 +184,8 @@ class _Binder:
             )
         except ModuleFault as error:
             raise self.fault(f"{item.shader.file}: {error}") from None
+        except (IndexError, KeyError, struct.error):
+            raise self.fault(f"{item.shader.file}: the SPIR-V is not valid") from None
 
     def _open(self, code: bytes, entry: str | None, stage: str | None) -> _Stage:
         module = Module(code)
@@ -583,13 +586,10 @@ def is_stored(variable: Variable) -> bool:
 
 def _is_plain(image: Type) -> bool:
     """Whether an image has two dimensions, one layer, one sample, and floats."""
+    if image.kind != "image" or image.of is None:
+        return False
     dimensions, _, arrayed, multisampled = image.image[:4]
-    return (
-        dimensions == 1
-        and not arrayed | multisampled
-        and image.of is not None
-        and image.of.kind == "float"
-    )
+    return dimensions == 1 and not arrayed | multisampled and image.of.kind == "float"
 
 
 def _number(kind: Type, offset: int, key: str, value: Value, line: int) -> Number:
@@ -629,17 +629,23 @@ def is_within(path: str, outer: str) -> bool:
     return outer in ("", path) or path.startswith((f"{outer}.", f"{outer}["))
 
 
-def paths(kind: Type, path: str = "", offset: int = 0) -> Iterator[tuple[str, Type, int]]:
-    """Return all parts of a type that a description can name, with their offsets."""
+def paths(
+    kind: Type, path: str = "", offset: int = 0, most: int = MAX_PATHS
+) -> Iterator[tuple[str, Type, int]]:
+    """Return all parts of a type that a description can name, with their offsets.
+
+    `most`: Those of arrays together; the entries of longer ones have no names.
+    """
     yield path, kind, offset
     if kind.kind == "struct":
         for index, member in enumerate(kind.members):
             inner = _inner(path, member.name, index)
-            yield from paths(member.type, inner, offset + member.offset)
-    elif kind.kind == "array" and kind.count <= 256:
+            yield from paths(member.type, inner, offset + member.offset, most)
+    elif kind.kind == "array" and 0 < kind.count <= most:
         assert kind.of is not None
         for index in range(kind.count):
-            yield from paths(kind.of, f"{path}[{index}]", offset + index * kind.stride)
+            inner = f"{path}[{index}]"
+            yield from paths(kind.of, inner, offset + index * kind.stride, most // kind.count)
 
 
 def _leaves(

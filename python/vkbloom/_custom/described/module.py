@@ -14,6 +14,10 @@ MAX_BYTES: Final = 4 << 20
 MAX_BOUND: Final = 1 << 20
 #: Of arrays and structures within others.
 MAX_DEPTH: Final = 8
+#: Of an array, and of a vector; the bits of a number.
+MAX_LENGTH: Final = 1 << 20
+MAX_ROWS: Final = 4
+BITS: Final = (8, 16, 32, 64)
 
 STAGES: Final = {0: "vertex", 4: "fragment", 5: "compute"}
 
@@ -265,12 +269,14 @@ class Module:
             self._types[key] = self._read_type(identity, row_major, stride, depth + 1)
         return self._types[key]
 
-    def _read_type(self, identity: int, row_major: bool, stride: int, depth: int) -> Type:  # noqa: PLR0911
+    def _read_type(self, identity: int, row_major: bool, stride: int, depth: int) -> Type:  # noqa: PLR0911, PLR0912
         word = self.defined.get(identity, (0,))
         opcode, rest = word[0] & 0xFFFF, (*word[2:], 0, 0, 0)
         match opcode:
             case 20:
                 return Type(identity, "bool", 32)
+            case 21 | 22 if rest[0] not in BITS:
+                raise ModuleFault(f"numbers of {rest[0]} bits")
             case 21:
                 return Type(identity, "int" if rest[1] else "uint", rest[0])
             case 22:
@@ -278,8 +284,10 @@ class Module:
             case 23 | 24:
                 kind = "vector" if opcode == TYPE_VECTOR else "matrix"
                 of = self.type_of(rest[0], depth=depth)
+                if not 2 <= rest[1] <= MAX_ROWS:
+                    raise ModuleFault(f"a {kind} of {rest[1]} entries")
                 return Type(identity, kind, rest[1], of, stride, row_major)
-            case 25:
+            case 25 if len(word) >= 9:
                 return Type(
                     identity, "image", 0, self.type_of(rest[0], depth=depth), image=word[3:9]
                 )
@@ -291,6 +299,8 @@ class Module:
                 of = self.type_of(rest[0], row_major=row_major, stride=stride, depth=depth)
                 step = self.decorations.get(identity, {}).get(ARRAY_STRIDE, of.size)
                 count = self.constant(rest[1]) if opcode == TYPE_ARRAY else 0
+                if count > MAX_LENGTH or (of.size and step < of.size):
+                    raise ModuleFault(f"an array of {count} entries, {step} bytes apart")
                 return Type(identity, "array", count, of, step)
             case 30:
                 members = []

@@ -10,8 +10,6 @@ import json
 import re
 import sys
 
-import wgpu
-
 _LOCATION = re.compile(
     r"@location\s*\(\s*(\d+)\s*\)(?:\s*@interpolate\s*\(([^)]*)\))?\s*(?:(\w+)\s*:\s*)?([\w<>]+)"
 )
@@ -19,6 +17,8 @@ _LOCATION = re.compile(
 
 def main() -> None:
     """Compile what the standard input says."""
+    import wgpu  # noqa: PLC0415  in this process alone
+
     asked = json.loads(sys.stdin.read())
     adapter = wgpu.gpu.request_adapter_sync(power_preference="low-power")
     wanted = [

@@ -5,27 +5,29 @@ from __future__ import annotations
 import json
 import sys
 
-import wesl
 
+def main() -> int:
+    """Print the WGSL of what the standard input says, or an error; return the status."""
+    import wesl  # noqa: PLC0415  in this process alone
 
-def main() -> None:
-    """Print the WGSL of what the standard input says."""
     asked = json.loads(sys.stdin.read())
-    made = wesl.compile_file(
-        asked["file"],
-        features=asked["features"],
-        dependencies=asked["dependencies"] or None,
-    )
+    try:
+        made = wesl.compile_file(
+            asked["file"],
+            features=asked["features"],
+            dependencies=asked["dependencies"] or None,
+        )
+    except wesl.CompileError as error:
+        first = error.diagnostics[0]
+        print(f"VKBLOOM-ERROR\n{first.filename or ''}\n{first.line or 1}\n{first.message}")
+        return 1
     print(made.wgsl)
+    return 0
 
 
 if __name__ == "__main__":
     try:
-        main()
-    except wesl.CompileError as error:
-        first = error.diagnostics[0]
-        print(f"VKBLOOM-ERROR\n{first.filename or ''}\n{first.line or 1}\n{first.message}")
-        sys.exit(1)
-    except Exception as error:
+        sys.exit(main())
+    except Exception as error:  # of any kind: the other process shows it
         print(f"VKBLOOM-ERROR\n\n1\n{error}")
         sys.exit(1)
