@@ -234,7 +234,8 @@ static bool read_passes(struct vkb_held_passes *held, struct vkb_settings *setti
         if (!read_pass(PyTuple_GetItem(held->tuple, settings->pass_count),
                        &held->content[settings->pass_count], &held->rows[settings->pass_count]))
             return false;
-    return true;
+    return count == 0 || !held->rows[0].joined
+        || vkb_refuse("passes: the first one is joined to none");
 }
 
 bool vkb_hold_passes(const struct vkb_module_state *state, PyObject *object, uint32_t max_side,
