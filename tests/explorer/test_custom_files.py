@@ -129,6 +129,25 @@ class TestChanges:
         # Each page is told once.
         assert ask(viewer, kind="methods")["methods"] == {}
 
+    def test_a_saved_shader_of_a_description_is_loaded_again(
+        self, tmp_path: Path, renderer: Renderer
+    ) -> None:
+        shader, path = tmp_path / "gain.frag", tmp_path / "gain.toml"
+        text = "uniform sampler2D image;\nout vec4 made;\n"
+        text += "void main() { made = 2.0 * texelFetch(image, ivec2(0), 0); }\n"
+        shader.write_text(text)
+        path.write_text(
+            'bloom = "made"\n[[passes]]\nfile = "gain.frag"\noutput = "made"\n'
+            'textures = { image = "glow" }\n'
+        )
+        image = np.full((8, 8, 3), 0.5, np.float32)
+        viewer = Viewer(image, vkbloom.load_method(path)(), renderer=renderer)
+        settings = ask(viewer, kind="setup")["sides"]["a"]
+        assert show(viewer, settings)[0, 0, 0] == 1
+        save(shader, text.replace("2.0", "4.0"))
+        assert [*ask(viewer, kind="methods")["methods"]] == ["gain"]
+        assert show(viewer, settings)[0, 0, 0] == 2
+
     def test_a_broken_file_says_the_line_and_the_method_stays(
         self, file: Path, viewer: Viewer
     ) -> None:

@@ -24,7 +24,7 @@ def test_a_short_run(tmp_path: Path) -> None:
     # In one process, since most of a short run would be imports.
     names = ["gltf", "ktx", "faces", "equirectangular", "headers", "pipelines"]
     # tests/custom tests mutations of custom methods without the compiler, which takes longest.
-    names += ["custom"] if EXHAUSTIVE and GLSLANG else []
+    names += ["custom", "described"] if EXHAUSTIVE and GLSLANG else []
     amount = ["--seconds", "2"] if EXHAUSTIVE else ["--seconds", "0.2", "--inputs", "10"]
     printed = output(RUN, *names, "--plain", *amount, cwd=tmp_path)
     assert printed.count("nothing found") == len(names)

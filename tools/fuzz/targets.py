@@ -273,6 +273,20 @@ def _custom_seeds() -> list[bytes]:
     return [_BLOCKS, *(file.read_bytes() for file in sorted(examples.glob("*.hook")))]
 
 
+def _described(data: bytes) -> None:
+    # Shaders stand beside it, so that those that a mutation leaves alone are found.
+    kind: Any = vkbloom.load_method(_file("bloom.toml", data), name="fuzzed")
+    kind().core_passes((16, 12), (8, 6))
+
+
+def _described_seeds() -> list[bytes]:
+    os.environ["VKBLOOM_CACHE_DIR"] = str(FOLDER / "described")
+    folder = Path(__file__).parents[2] / "examples" / "languages" / "glsl"
+    for name in ("down.frag", "up.frag"):
+        _file(name, (folder / name).read_bytes())
+    return [(folder / "bloom.toml").read_bytes()]
+
+
 TARGETS = {
     "gltf": Target(_gltf, _gltf_seeds),
     "ktx": Target(_ktx, _ktx_seeds),
@@ -281,6 +295,7 @@ TARGETS = {
     "headers": Target(_headers, _header_seeds),
     "pipelines": Target(_pipelines, _pipeline_seeds),
     "custom": Target(_custom, _custom_seeds),
+    "described": Target(_described, _described_seeds),
 }
 
 

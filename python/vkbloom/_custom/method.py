@@ -184,12 +184,13 @@ def load_method(
     name: str | None = None,
     reference: Reference | None = None,
 ) -> type[Settings]:
-    """Load a method from a file of passes in the syntax of mpv's user shaders.
+    """Load a method from a file of passes in the syntax of mpv's user shaders, or a description.
 
     Parameters
     ----------
     source : path or str
-        The file, or its text, which contains a line feed.
+        The file, or its text, which contains a line feed. A file ``.toml`` is a description of
+        shaders in GLSL, HLSL, Slang, WGSL, WESL or SPIR-V; a shader needs none if it tells all.
     name : str, optional
         The method's name, an identifier that no method of the package has. Default: the file's stem
         with _ for other characters, "custom" for a text. A method that was loaded under this
@@ -201,8 +202,8 @@ def load_method(
     Returns
     -------
     type
-        A class of settings with the fields of all settings, and one for each ``//!PARAM``. An ENUM
-        is a choice of its names.
+        A class of settings with the fields of all settings, and one for each ``//!PARAM`` or table
+        ``settings``. An ENUM is a choice of its names.
 
     Raises
     ------
@@ -210,7 +211,8 @@ def load_method(
         The file is not valid; the message names file and line, and quotes the line. Or the name is
         not possible, or a PARAM has the name of a field of all settings.
     ShaderError
-        A pass does not compile; the message names file and line. Or the compiler is missing.
+        A pass does not compile; the message names file and line. Or the compiler is missing: the
+        message says how to install it.
     OSError
         The file cannot be read.
 
