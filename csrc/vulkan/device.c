@@ -130,8 +130,12 @@ struct features {
 // Sets dispatch and linear_texels if the device has the features that their shaders need.
 static void choose_features(struct vkb_device *device, struct features *chosen)
 {
+    VkPhysicalDeviceVulkan13Features available13 = {
+        .sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_3_FEATURES,
+    };
     VkPhysicalDeviceVulkan11Features available11 = {
         .sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_1_FEATURES,
+        .pNext = &available13,
     };
     VkPhysicalDeviceVulkan12Features available12 = {
         .sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_FEATURES,
@@ -163,9 +167,11 @@ static void choose_features(struct vkb_device *device, struct features *chosen)
     chosen->vulkan13 = (VkPhysicalDeviceVulkan13Features){
         .sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_3_FEATURES,
         .dynamicRendering = VK_TRUE,  // all passes
-        // An input can have fewer components than the vertex shader's output. Every device has it.
-        .maintenance4 = VK_TRUE,
-        .shaderDemoteToHelperInvocation = VK_TRUE,  // has every device
+        // An input can have fewer components than the vertex shader's output.
+        .maintenance4 = available13.maintenance4,
+        .shaderDemoteToHelperInvocation = available13.shaderDemoteToHelperInvocation,
+        // Texels beyond the edge are zero.
+        .robustImageAccess = available13.robustImageAccess,
     };
     chosen->vulkan11 = (VkPhysicalDeviceVulkan11Features){
         .sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_1_FEATURES,

@@ -52,7 +52,7 @@ def for_text(name: str, text: str) -> str:
             "; a fragment shader becomes a pass: begin with the lines //!HOOK MAIN, //!BIND GLOW "
             "and //!SAVE BLOOM, write 'vec4 hook()' that returns the colour in place of 'void "
             "main()', read GLOW_tex(GLOW_pos) in place of texture(sampler, uv), and leave out "
-            "#version, in, out and sampler2D"
+            "#version, in, out and sampler2D; or name the file .frag, and it is taken as it is"
         )
     return ""
 
