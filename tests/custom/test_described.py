@@ -256,6 +256,29 @@ def test_spirv_is_taken_as_it_is(renderer: Renderer, tmp_path: Path) -> None:
     np.testing.assert_array_equal(first, second)
 
 
+def test_an_entry_point_in_an_included_file(renderer: Renderer, tmp_path: Path) -> None:
+    """As engines have variants of a shader: a file that defines something and includes another."""
+    require("hlsl")
+    inner = """
+    Texture2D Image : register(t0);
+    RWTexture2D<float4> Made : register(u0);
+    [numthreads(8, 8, 1)]
+    void main(uint3 at : SV_DispatchThreadID) { Made[at.xy] = GAIN * Image[at.xy]; }
+    """
+    outer = '#define GAIN 2.0\n#include "inner.hlsl"\n'
+    description = """
+    bloom = "out"
+    [[passes]]
+    file = "outer.hlsl"
+    output = "out"
+    textures = { t0 = "glow" }
+    """
+    path = write(tmp_path, description, outer_hlsl=outer, inner_hlsl=inner)
+    image = picture(9, 7)
+    result = bloom(renderer, path, image)
+    assert np.abs(result[..., :3] - 2 * image[..., :3]).max() < 1e-5
+
+
 def test_a_vertex_shader_of_its_own(renderer: Renderer, tmp_path: Path) -> None:
     """In HLSL, where clip space has y up and textures begin at the top."""
     require("hlsl")

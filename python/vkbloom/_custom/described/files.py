@@ -44,6 +44,11 @@ class Files:
         return known.digest()
 
     @property
+    def texts(self) -> tuple[str, ...]:
+        """The texts of all files."""
+        return tuple(each.text for each in (self.main, *self.others))
+
+    @property
     def paths(self) -> tuple[str, ...]:
         """The paths of all files."""
         return tuple(each.name for each in (self.main, *self.others))

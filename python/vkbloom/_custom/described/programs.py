@@ -176,7 +176,9 @@ def _shadertoy(shader: Shader, files: Files) -> Program:
 
 def _slang(shader: Shader, files: Files) -> Program:
     stage, entry = shader.stage or "fragment", shader.entry or "main"
-    if shader.stage is None and re.search(_COMPUTE.format(re.escape(entry)), files.main.text):
+    # The entry point may be in a file that this one includes.
+    known = re.compile(_COMPUTE.format(re.escape(entry)))
+    if shader.stage is None and any(known.search(text) for text in files.texts):
         stage = "compute"
     arguments = [*_defines(shader), *shader.options]
     code = slang.compile_slang(files, shader.language, stage, entry, arguments)

@@ -104,7 +104,7 @@ def compile_slang(
 
 def has_registers(files: Files) -> bool:
     """Whether a file names registers; without them Slang gives each binding its own number."""
-    return any(re.search(r"\bregister\s*\(", each.text) for each in (files.main, *files.others))
+    return any(re.search(r"\bregister\s*\(", text) for text in files.texts)
 
 
 def is_old(files: Files) -> bool:
