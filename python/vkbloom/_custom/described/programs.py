@@ -21,7 +21,9 @@ from vkbloom._custom.described.schema import Description, Shader
 from vkbloom._custom.source import Source
 
 #: The attribute of a compute shader before an entry point of HLSL or Slang.
-_COMPUTE: Final = r"(?i:\[\s*numthreads)\b[^\]]*\]\s*(?:\[[^\]]*\]\s*)*(?:public\s+)?void\s+{}\s*\("
+_COMPUTE: Final = (
+    r"(?i:\[\s*numthreads)\b[^\]]*\]\s*(?:\[[^\]]*\]\s*|#[^\n]*\n\s*)*(?:public\s+)?void\s+{}\s*\("
+)
 #: Of all results together with what is before them.
 _VERSION: Final = b"3"
 
