@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import functools
 import importlib.util
 import os
 import re
@@ -42,7 +41,6 @@ float4 tex2Dbias(Sampler2D<float4> image, float4 at) { return image.SampleBias(a
 UNITY: Final = Path(__file__).with_name("unity")
 
 
-@functools.cache
 def find_slangc() -> str:
     """Return the path of slangc: of VKBLOOM_SLANGC, the system's, or the package slangtorch's."""
     given = os.environ.get("VKBLOOM_SLANGC") or shutil.which("slangc")

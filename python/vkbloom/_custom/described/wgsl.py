@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import importlib.metadata
 import importlib.util
 import json
@@ -61,7 +60,6 @@ def collect(path: Path, dependencies: Sequence[Path]) -> Files:
     return Files(main, (), tuple(found.values()))
 
 
-@functools.cache
 def identity(language: str) -> bytes:
     """Return bytes that differ between compilers; ShaderError without one."""
     if importlib.util.find_spec("wgpu") is None:
