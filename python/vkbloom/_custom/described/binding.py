@@ -11,6 +11,7 @@ from typing import Final
 from vkbloom._custom.described import slang
 from vkbloom._custom.described.arithmetic import Source as ImageName
 from vkbloom._custom.described.arithmetic import parse
+from vkbloom._custom.described.layout import is_within, leaves, path_of, paths
 from vkbloom._custom.described.module import (
     INPUT,
     OUTPUT,
@@ -42,7 +43,6 @@ from vkbloom._spelling import did_you_mean
 MAX_TARGETS: Final = 4
 #: Locations of inputs that a fragment shader finds without a vertex shader of its own.
 POSITIONS: Final = range(4)
-MAX_PATHS: Final = 1024
 MAX_BLOCK_BYTES: Final = 65536
 MAX_BUFFER_BYTES: Final = 1 << 24
 #: Of SPIR-V: what the core's devices have where their driver has it.
@@ -376,7 +376,7 @@ class _Binder:
                 )
             return
         covered = [path for path, _ in found]
-        for index, path, kind in _leaves(variable.type):
+        for index, path, kind in leaves(variable.type):
             used = variable.members is None or any(
                 index[: len(each)] == each[: len(index)] for each in variable.members
             )
@@ -405,7 +405,7 @@ class _Binder:
                     yield key[len(label) :].lstrip("."), (key, value, line)
                     break
             else:
-                path = _path_of(key, names)
+                path = path_of(key, names)
                 if path:
                     if ("values", key) in self._used_keys:
                         raise self.fault(
@@ -614,74 +614,3 @@ def rename(module: Module, number: str, name: str) -> None:
         for index in parts[2:-1]:
             kind = (*module.defined.get(kind, ()), *[0] * 64)[2 + int(index)]
         module.member_names[kind, int(parts[-1])] = name
-
-
-def _path_of(key: str, names: set[str]) -> str:
-    """Return the path that a key means: itself, or the only one that ends with it; "" for none."""
-    if key in names:
-        return key
-    found = [name for name in names if name.endswith(f".{key}")]
-    return found[0] if len(found) == 1 else ""
-
-
-def is_within(path: str, outer: str) -> bool:
-    """Whether a path is another one, or a part of it."""
-    return outer in ("", path) or path.startswith((f"{outer}.", f"{outer}["))
-
-
-def paths(
-    kind: Type, path: str = "", offset: int = 0, most: int = MAX_PATHS
-) -> Iterator[tuple[str, Type, int]]:
-    """Return all parts of a type that a description can name, with their offsets.
-
-    `most`: Those of arrays together; the entries of longer ones have no names.
-    """
-    yield path, kind, offset
-    if kind.kind == "struct":
-        for index, member in enumerate(kind.members):
-            inner = _inner(path, member.name, index)
-            yield from paths(member.type, inner, offset + member.offset, most)
-    elif kind.kind == "array" and 0 < kind.count <= most:
-        assert kind.of is not None
-        for index in range(kind.count):
-            inner = f"{path}[{index}]"
-            yield from paths(kind.of, inner, offset + index * kind.stride, most // kind.count)
-
-
-def _leaves(
-    kind: Type, index: tuple[int, ...] = (), path: str = ""
-) -> Iterator[tuple[tuple[int, ...], str, Type]]:
-    """Return the parts that are no structures, by the numbers of members that lead to them."""
-    if kind.kind != "struct":
-        yield index, path, kind
-    for number, member in enumerate(kind.members):
-        yield from _leaves(member.type, (*index, number), _inner(path, member.name, number))
-
-
-def _inner(path: str, name: str, number: int) -> str:
-    """Return the path of a member; one that naga has added has no name of its own."""
-    name = name or str(number)
-    return path if name == "*" else f"{path}.{name}" if path else name
-
-
-def scalars(kind: Type, offset: int = 0) -> Iterator[tuple[str, int, int]]:
-    """Return kind, bits and offset of each number of a type, in order."""
-    if kind.kind in ("bool", "int", "uint", "float"):
-        yield kind.kind, kind.count, offset
-        return
-    if kind.kind == "struct":
-        for member in kind.members:
-            yield from scalars(member.type, offset + member.offset)
-        return
-    if kind.of is None:
-        raise ModuleFault("a member of a block has no numbers")
-    if kind.kind == "matrix" and kind.row_major:
-        of = kind.of.of
-        assert of is not None
-        for column in range(kind.count):
-            for row in range(kind.of.count):
-                yield from scalars(of, offset + row * kind.stride + column * of.size)
-        return
-    step = kind.of.size if kind.kind == "vector" else kind.stride
-    for index in range(kind.count):
-        yield from scalars(kind.of, offset + index * step)

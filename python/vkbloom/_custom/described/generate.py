@@ -10,7 +10,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
-from vkbloom._custom.described.binding import is_stored, paths, rename
+from vkbloom._custom.described.binding import is_stored, rename
+from vkbloom._custom.described.layout import paths
 from vkbloom._custom.described.module import INPUT, OUTPUT, UNIFORM_CONSTANT, Module, Variable
 from vkbloom._custom.described.programs import Program, compile_one
 from vkbloom._custom.described.schema import LANGUAGES, Shader

@@ -16,7 +16,8 @@ from vkbloom._custom.described.arithmetic import (
     evaluate,
 )
 from vkbloom._custom.described.arithmetic import Source as ImageName
-from vkbloom._custom.described.binding import Block, BoundPass, Number, scalars
+from vkbloom._custom.described.binding import Block, BoundPass, Number
+from vkbloom._custom.described.layout import scalars
 from vkbloom._custom.described.module import Type
 from vkbloom._custom.described.schema import (
     FRAME,
