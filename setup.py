@@ -264,7 +264,7 @@ def write_spirv(jobs: int) -> None:
         arrays += f"static const uint32_t {module.name}[] = {{{words}}};\n"
         hashed = ", ".join(map(str, hashlib.sha256(code).digest()[:16]))
         siblings = (
-            f"{module.shader.stem}_dispatch",
+            re.sub("_frag$", "_dispatch", module.name),
             module.name.replace("_linear_", "_packed_"),
             module.name.replace("_linear_", "_linear_rgb_"),
             f"{module.name}_layers",

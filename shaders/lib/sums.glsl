@@ -13,13 +13,17 @@ ivec2 pixel;
 
 void main()
 {
-    ivec2 size = summed_size(), distance = (size + SUM_SIDE - 1) / SUM_SIDE, first = ivec2(gl_FragCoord.xy);
-    all_sum = all_squares = vec4(0.0);
-    for (pixel.y = first.y; pixel.y < size.y; pixel.y += distance.y) {
-        vec4 sum = vec4(0.0), squares = vec4(0.0);
-        for (pixel.x = first.x; pixel.x < size.x; pixel.x += distance.x)
-            add_pixel(sum, squares);
-        all_sum += sum;
-        all_squares += squares;
+    ivec2 size = summed_size(), apart = (size + SUM_SIDE - 1) / SUM_SIDE, first = ivec2(gl_FragCoord.xy);
+    vec4 sum = vec4(0.0), squares = vec4(0.0);
+    for (int y = first.y; y < size.y; y += apart.y) {
+        vec4 row = vec4(0.0), row_squares = vec4(0.0);
+        for (int x = first.x; x < size.x; x += apart.x) {
+            pixel = ivec2(x, y);
+            add_pixel(row, row_squares);
+        }
+        sum += row;
+        squares += row_squares;
     }
+    all_sum = sum;
+    all_squares = squares;
 }

@@ -425,13 +425,14 @@ def test_variants_are_transposed(varied: dict[str, Renderer], case: tuple[Any, .
         pixels[0, 0, :2] = values
         image = pixels.astype(dtype)
         found = vkbloom.vjp(image, settings, renderer=renderer)[1](cotangents)
-        check(found, reference.vjp(image, settings)[1](cotangents), "image")
+        expected = reference.vjp(image, settings)[1](cotangents)
+        check(found, expected, "image")
         # The sums need the images between; the other derivatives keep their bits.
         running = Passes(renderer, Inputs(image), floats, cotangents).submit("all")
         assert running
         assert np.allclose(running.images()["image"], found["image"], rtol=0, atol=1e-5)
         for name, value in running.fields().items():
-            assert np.allclose(value, found[name], rtol=1e-5, atol=0), name
+            assert np.allclose(value, expected[name], rtol=1e-4, atol=0), name
         again = vkbloom.vjp(image, settings, renderer=renderer)[1](cotangents)
         assert np.array_equal(again["image"], found["image"])
     source = Inputs(image).source((cotangents["final"],))
