@@ -1,9 +1,9 @@
 """Point-spread functions: how the light of a point is distributed over a picture.
 
 There are functions of the eye (`spencer`, `cie_general`, `cie_total`), of lenses (`harvey_shack`,
-`airy`, `aperture` with `iris`), of renderers (`fog_glow`, `unreal`) and of settings (`measured`).
-`gaussian` and `samples` are general. `Varying` depends on the place in the picture. All are
-subclasses of `PSF`. `vkbloom.Convolution` convolves an image with any of them.
+`airy`, `aperture` with `iris`, `star`), of renderers (`fog_glow`, `unreal`) and of settings
+(`measured`). `gaussian` and `samples` are general. `Varying` depends on the place in the picture.
+All are subclasses of `PSF`. `vkbloom.Convolution` convolves an image with any of them.
 """
 
 # ruff: noqa: F403, F405  the names are imported at the first use
@@ -35,6 +35,7 @@ __all__ = [
     "measured",
     "samples",
     "spencer",
+    "star",
     "unreal",
 ]
 

@@ -81,6 +81,7 @@ class Options:
     overwrite: bool
     skip_existing: bool
     expand: float | None
+    amount: float
     start: StartOptions
     fps: Fraction | None
 
@@ -204,7 +205,8 @@ class Run:
             text = no_bloom.describe_hidden(frames["final"], frames.settings)
         # (An exposure changes the picture's light as well.)
         is_chosen = self.options.start.is_chosen and not self.options.start.stages
-        if not text and is_chosen and self.options.mask is None and self.options.emission is None:
+        has_glow = self.options.mask is not None or self.options.emission is not None
+        if not text and is_chosen and not has_glow and self.options.amount:
             text = faint_note(
                 added_share(picture.pixels, frames),
                 frames.settings,
@@ -304,6 +306,13 @@ def _send(file: Path, target: str) -> None:
 @click.argument("sources", metavar="IN... OUT", nargs=-1, required=True, type=click.Path())
 @click.option(
     "-o", "--out", metavar="OUT", type=click.Path(), help="The file to write, instead of OUT."
+)
+@click.option(
+    "--amount",
+    metavar="A",
+    type=click.FloatRange(0, 2),
+    default=1.0,
+    help="Strength of the bloom: 1: as the preset has it; 0: none; 2: twice.",
 )
 @click.option(
     "--quality",

@@ -103,8 +103,7 @@ def preset_entries() -> Iterator[Entry]:
     order = get_args(Engine)
     for name, item in sorted(PRESETS.items(), key=lambda row: order.index(row[1].engine)):
         settings = item.make()
-        # The command line expands the highlights of a photograph for the one that it starts from.
-        needs_hdr = (settings.threshold or 0) >= 1 and item.starts != "photographs"
+        needs_hdr = (settings.threshold or 0) >= 1 and not item.expands
         yield {
             **{"name": name, "what": item.what, "whose": item.whose},
             **{"composite": settings.composite, "needs_hdr": needs_hdr},

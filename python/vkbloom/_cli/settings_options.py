@@ -141,6 +141,7 @@ def start_options(command: Callable[..., Any], *, is_timed: bool = False) -> Cal
             stored=None if stored is None else read_settings(stored),
             changes={**shared, **of_method},
             expand=rest.get("expand"),
+            amount=rest.get("amount", 1.0),
             subimage=rest.get("subimage") or 0,
             layer=rest.get("layer"),
             colour=rest.get("input_colour"),
@@ -161,6 +162,7 @@ class StartOptions:
     - `stored`: What a file holds of settings.
     - `exposure`, `taa`: Stages in time.
     - `expand`: What highlights are expanded up to, if the call says it.
+    - `amount`: A factor of the strength of all that it starts from.
     - `subimage`, `layer`, `colour`: How image files are read.
     """
 
@@ -171,6 +173,7 @@ class StartOptions:
     expand: float | None
     exposure: Exposure | None = None
     taa: Antialiasing | None = None
+    amount: float = 1.0
     subimage: int = 0
     layer: str | None = None
     colour: str | None = None
@@ -201,7 +204,7 @@ class StartOptions:
         begun = self._find_start() or start_of(highlights).settings
         _check_declared(begun, self.changes)
         with as_wrong_use():
-            return start_of(highlights, begun, self.changes, expand=expand)
+            return start_of(highlights, begun, self.changes, expand=expand, amount=self.amount)
 
     def _find_start(self) -> Settings | None:
         """Return what the settings start from; None: the default for the source."""

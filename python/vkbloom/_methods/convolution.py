@@ -149,12 +149,10 @@ class Convolution(WithKernel, Settings):
 
     def core_kernel_size(self, frame: tuple[int, int], buffers: tuple[int, int]) -> tuple[int, int]:
         """Return estimates of the kernel's width and height, without the kernel."""
-        sides = self.kernel_size or tuple(2 * side - 1 for side in frame)
-        if self.kernel_size is None and isinstance(self.psf, samples):
-            height, width = np.shape(self.psf.values.array)[:2]
-            sides = width, height
         if isinstance(self.psf, Varying):
             sides = self.psf.kernel_size
+        else:
+            sides = self.kernel_size or cast("PSF", self.psf).default_size(frame)
         width, height = (
             max(side * to // of, 1) for side, to, of in zip(sides, buffers, frame, strict=True)
         )

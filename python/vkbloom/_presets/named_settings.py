@@ -41,6 +41,7 @@ class Preset(NamedTuple):
 
     - `starts`: The sources that start from the preset if a call gives no settings: "images" whose
       highlights are stored, "photographs", which are files of integers for SDR, or "scenes".
+    - `expands`: Whether the highlights of photographs are expanded for it.
     """
 
     fields: Mapping[str, Any]
@@ -49,6 +50,7 @@ class Preset(NamedTuple):
     engine: Engine
     confirmed: Confirmed
     starts: Literal["images", "photographs", "scenes", ""] = ""
+    expands: bool = False
 
     def make(self) -> Settings:
         """Return the settings; only now is their method imported."""
@@ -57,6 +59,17 @@ class Preset(NamedTuple):
 
 #: An iris as a mapping of JSON, since point-spread functions cost start-up time.
 _IRIS_6: Final = {"psf": "aperture", "mask": {"blades": 6}}
+
+
+
+def _star(rays: int, angle: float, **further: Any) -> Mapping[str, Any]:
+    """Return settings whose small lights have rays. Only "screen" has none of the surround."""
+    star = {"psf": "star", "rays": rays, "angle": angle, "surround": 1.2}
+    return {
+        **{"method": "convolution", "psf": star | further, "normalize": False},
+        **{"composite": "screen", "threshold": 0.8, "knee": 0.2},
+    }
+
 
 #: The presets by name.
 PRESETS: Final[Mapping[str, Preset]] = {
@@ -337,5 +350,70 @@ PRESETS: Final[Mapping[str, Preset]] = {
         engine="vkbloom",
         confirmed="formula",
         starts="photographs",
+        expands=True,
+    ),
+    "mist": Preset(
+        {"method": "bevy", "low_frequency_boost": 0.9, "intensity": 0.15},
+        "a mist filter: wide glows around lights, and softer contrast",
+        "vkbloom, for photographs; Bevy's chain",
+        engine="vkbloom",
+        confirmed="formula",
+        expands=True,
+    ),
+    "soft": Preset(
+        {
+            **{"method": "bevy", "low_frequency_boost": 0.2, "high_pass_frequency": 0.3},
+            "intensity": 0.4,
+        },
+        "a soft-focus lens: fine glows over a sharp picture",
+        "vkbloom, for photographs; Bevy's chain",
+        engine="vkbloom",
+        confirmed="formula",
+    ),
+    "dreamy": Preset(
+        {
+            **{"method": "bevy", "low_frequency_boost": 0.3, "high_pass_frequency": 0.5},
+            "intensity": 0.3,
+        },
+        "a dream: soft details in bright glows",
+        "vkbloom, for photographs; Bevy's chain",
+        engine="vkbloom",
+        confirmed="formula",
+        expands=True,
+    ),
+    "film_halation": Preset(
+        {
+            **{"method": "halation", "strength": (1.0, 0.15, 0.02), "sizes": (350, 350, 350)},
+            "intensity": 0.5,
+        },
+        "film without an anti-halation layer: red and orange rims around lights",
+        "vkbloom, for photographs; the method of halation, stronger and wider",
+        engine="vkbloom",
+        confirmed="formula",
+        expands=True,
+    ),
+    "star4": Preset(
+        {**_star(4, 45), "intensity": 25.0},
+        "a star filter: four rays of small lights",
+        "vkbloom, for photographs",
+        engine="vkbloom",
+        confirmed="formula",
+    ),
+    "star6": Preset(
+        {**_star(6, 30), "intensity": 35.0},
+        "a star filter: six rays of small lights",
+        "vkbloom, for photographs",
+        engine="vkbloom",
+        confirmed="formula",
+    ),
+    "anamorphic": Preset(
+        {
+            **_star(2, 0, length=0.35, width=0.0012, tint=(0.35, 0.6, 1.0), surround=1.8),
+            "intensity": 30.0,
+        },
+        "an anamorphic lens: long blue streaks of small lights",
+        "vkbloom, for photographs",
+        engine="vkbloom",
+        confirmed="formula",
     ),
 }

@@ -10,8 +10,8 @@ integers for SDR with a gain map          photo          not
 integers on the curves PQ and HLG, floats bevy_natural   not
 ========================================= ============== ==================
 
-With settings that are given, the first kind is expanded if they start from the preset photo, which
-is made for it. An expansion that is given replaces this, such as that of --expand, or of the file
+With settings that are given, the first kind is expanded if they start from a preset that is made
+for it, such as photo or mist. An expansion that is given replaces this, such as that of --expand, or of the file
 that the settings came from.
 """
 
@@ -27,6 +27,7 @@ from vkbloom._io.alpha import multiply
 from vkbloom._io.expansion import PHOTO_EXPANSION, expand_photograph
 from vkbloom._io.image_file import read_picture
 from vkbloom._io.picture import PHOTOGRAPHS, Highlights, Picture
+from vkbloom._settings.fields import fields_of
 from vkbloom._settings.settings import Settings, check_settings, presets
 
 #: The preset of images whose highlights are stored.
@@ -37,8 +38,6 @@ PRESET_OF_PHOTOS: Final = presets.start("photographs")
 PRESET_OF_SCENES: Final = presets.start("scenes")
 
 _NONE: Final[Mapping[str, Any]] = MappingProxyType({})
-# What makes a glow that needs the expansion. The other fields may differ.
-_OF_PHOTOS: Final = ("method", "composite", "threshold", "knee")
 
 
 class Start(NamedTuple):
@@ -76,25 +75,37 @@ def start_of(
     changes: Mapping[str, Any] = _NONE,
     *,
     expand: float | None = None,
+    amount: float = 1.0,
 ) -> Start:
     """Return where an image file with these highlights starts; None: a scene.
 
-    `changes`: fields of the settings that are changed.
+    `changes`: fields of the settings that are changed. `amount`: a factor of their strength; with
+    0 a picture stays as it is.
     """
     if settings is None:
         settings = _default_preset(highlights)
     begun = check_settings(settings)
     changed = begun.replace(**changes) if changes else begun
     if expand is None and highlights is Highlights.CLIPPED:
-        is_made_for_it = _is_of_photos(begun) or _is_of_photos(changed)
+        is_made_for_it = presets.expands(begun) or presets.expands(changed)
         expand = PHOTO_EXPANSION if is_made_for_it else None
+    if amount != 1:
+        changed = _scale_strength(changed, amount)
+        # An expansion to 1 changes nothing.
+        expand = expand if amount or expand is None else 1.0
     return Start(changed, expand)
 
 
-def _is_of_photos(settings: Settings) -> bool:
-    """Whether settings are the preset for photographs, or differ only in strength and look."""
-    photo = presets[PRESET_OF_PHOTOS]
-    return all(getattr(settings, name) == getattr(photo, name) for name in _OF_PHOTOS)
+def _scale_strength(settings: Settings, amount: float) -> Settings:
+    """Return settings whose intensities are multiplied, as far as their ranges allow."""
+    glare = tuple(_scale(stage, amount) for stage in settings.glare)
+    return _scale(settings.replace(glare=glare), amount)
+
+
+def _scale(owner: Any, amount: float) -> Any:
+    if (info := fields_of(type(owner)).get("intensity")) is None:
+        return owner
+    return owner.replace(intensity=min(owner.intensity * amount, info.range[1]))
 
 
 def _default_preset(highlights: Highlights | None) -> str:

@@ -11,5 +11,6 @@ from .lens import harvey_shack as harvey_shack
 from .renderers import fog_glow as fog_glow
 from .renderers import unreal as unreal
 from .sampled import samples as samples
+from .stars import star as star
 from .varying import Gathered as Gathered
 from .varying import Varying as Varying

@@ -131,9 +131,23 @@ class PSF(Record, abc.ABC):
         -------
         ndarray of float64, shape (height, width, 3)
         """
-        width, height = frame
         scale = max(frame) / FRAME_DEGREES if pixels_per_degree is None else pixels_per_degree
-        return self.array(size or (2 * width - 1, 2 * height - 1), scale)
+        return self.array(size or self.default_size(frame), scale)
+
+    def default_size(self, frame: tuple[int, int]) -> tuple[int, int]:
+        """Return the width and height that `kernel` has by default, without the kernel.
+
+        Parameters
+        ----------
+        frame : (int, int)
+            Width and height of the frame in pixels.
+
+        Returns
+        -------
+        (int, int)
+        """
+        width, height = frame
+        return 2 * width - 1, 2 * height - 1
 
     def _in_larger_pixels(self, factor: float) -> PSF:
         """Return the function for pixels that are so many times as large, if it is known."""

@@ -37,7 +37,7 @@ _PACKAGE: Final = Path(__file__).parents[1]
 # Modules whose functions follow from their fields alone. Those of users may change at any time.
 _OURS: Final = ("vkbloom._methods.", "vkbloom._glare.")
 _PURE_MODULES: Final = {
-    f"vkbloom._psf.{name}" for name in ("apertures", "eye", "lens", "renderers")
+    f"vkbloom._psf.{name}" for name in ("apertures", "eye", "lens", "renderers", "stars")
 }
 
 

@@ -97,6 +97,10 @@ class samples(SampledPSF):
     def native_array(self) -> Array:
         return rgb(self.values)
 
+    def default_size(self, frame: tuple[int, int]) -> tuple[int, int]:
+        height, width = self.values.array.shape[:2]
+        return width, height
+
     def kernel(
         self,
         frame: tuple[int, int],

@@ -61,8 +61,14 @@ def added_share(
     is_linear = (settings.tonemap, settings.encoding, settings.exposure) == ("none", "none", 0)
     if settings.composite == "add" and is_linear and "final" in frames:
         return (light_of(frames["final"]) - light) / light
+    if "bloom" not in frames:
+        return None
     # Other composites take light, too: what counts is what they spread.
-    return settings.intensity * light_of(frames["bloom"]) / light if "bloom" in frames else None
+    bloom = frames["bloom"]
+    if settings.composite == "screen":
+        # It clamps.
+        return light_of(np.clip(settings.intensity * bloom[:, :, :3], 0, 1)) / light
+    return settings.intensity * light_of(bloom) / light
 
 
 def light_of(image: NDArray[Any]) -> float:

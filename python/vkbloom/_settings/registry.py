@@ -66,6 +66,16 @@ class Methods(Registry):
             self._filled = {other: kind for other, kind in self._entries.items() if other != name}
 
 
+def _has_fields(settings: Any, row: Any) -> bool:
+    """Whether settings have the method of a preset and what it sets, but for the intensity."""
+    if settings.method != row.fields["method"]:
+        return False
+    made = row.make()
+    return all(
+        getattr(settings, name) == getattr(made, name) for name in {*row.fields} - {"intensity"}
+    )
+
+
 class Presets(Named[T]):
     """Settings by their published names."""
 
@@ -78,6 +88,13 @@ class Presets(Named[T]):
         if sources not in self._starts:
             self._starts = {preset.starts: name for name, preset in self._entries.items()}
         return self._starts[sources]
+
+    def expands(self, settings: Any) -> bool:
+        """Whether photographs are expanded for settings: a preset's for which they are.
+
+        The intensity, and fields that the preset does not set, may differ.
+        """
+        return any(_has_fields(settings, row) for row in self._entries.values() if row.expands)
 
 
 #: The methods, which `vkbloom._methods` supplies, in the order of ``VKB_METHODS`` in the core.
