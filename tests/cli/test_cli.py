@@ -249,14 +249,15 @@ def options_in(text: str) -> set[str]:
 
 @pytest.mark.parametrize("name", ["apply", "render", "grid", "explore", "translate"])
 def test_the_help_has_general_options_or_those_of_a_method(name: str) -> None:
-    general = vkb(name, "--help").output
+    asked = "--help-all" if name == "apply" else "--help"
+    general = vkb(name, asked).output
     assert {"--adapter", "--threshold", "--quiet"} <= options_in(general)
     assert not {"--blur-scale", "--levels"} & options_in(general)
-    assert f"{name} --method NAME --help lists the settings of:" in general
+    assert f"{name} --method NAME {asked} lists the settings of:" in general
     forms = (("--method", "kino"), ("--method=Kino",), ("--preset", "kino"))
     for words in forms if name == "apply" else forms[:1]:
-        text = vkb(name, *words, "--help").output
-        names, described = text.split("Settings of the method kino:")
+        text = vkb(name, *words, asked).output
+        names, described = re.split("Settings of the (?:preset kino, of the )?method kino:", text)
         # Kino's bloom is always added.
         fields = [one for one in fields_of(vkbloom.KinoBloom).values() if one.name != "composite"]
         assert options_in(described) == {f"--{one.option.replace('_', '-')}" for one in fields}
@@ -264,6 +265,32 @@ def test_the_help_has_general_options_or_those_of_a_method(name: str) -> None:
         assert "[default 2.5]" in described
         # A screen of 50 lines also has the call and the prompt.
         assert len(text.splitlines()) < 50
+
+
+@pytest.mark.parametrize(
+    ("words", "values"),
+    [
+        ((), {"intensity": "0.15", "threshold": "1", "low-frequency-boost": "0.7"}),
+        (("--preset", "mist"), {"intensity": "0.15", "low-frequency-boost": "0.9"}),
+        (("--preset", "film_halation"), {"halation-strength": "1,0.15,0.02"}),
+        (("--preset", "star6"), {"psf": "star:rays=6,angle=30.0,surround=1.2"}),
+        (("--preset", "iris_6"), {"psf": "aperture", "composite": "mix"}),
+        (("--method", "pyramid"), {"levels": "6"}),
+    ],
+)
+def test_the_short_help_has_the_values_that_a_call_starts_from(
+    words: tuple[str, ...], values: dict[str, str]
+) -> None:
+    text = vkb("apply", *words, "--help").output
+    assert len(text.splitlines()) < 60
+    assert {"--preset", "--amount", "--help-all"} <= options_in(text)
+    assert not {"--subimage", "--format", "--bloom-size"} & options_in(text)
+    assert "mist, soft, dreamy" in text
+    lines = " ".join(text.split())
+    for name, value in values.items():
+        assert re.search(
+            rf"--{name} [^\[]*(\[[^\]]*\][^\[]*)?\[default {re.escape(value)}\]", lines
+        ), name
 
 
 # render

@@ -249,3 +249,92 @@ class TestFaintBlooms:
         assert result.exit_code == 0, result.stderr
         assert ("the bloom adds" in result.stderr) is bool(told)
         assert told in result.stderr
+
+
+LOOKS = ("mist", "soft", "dreamy", "film_halation", "star4", "star6", "anamorphic")
+# Of 255, in one channel: a change that an eye finds beside the picture before.
+VISIBLE = 4
+
+
+PICTURES: dict[str, Callable[[], Image]] = {
+    "rocket": data.rocket,
+    "hubble": data.hubble_deep_field,
+    "motorcycle": lambda: data.stereo_motorcycle()[0],
+    "coffee": data.coffee,
+    "astronaut": data.astronaut,
+    "chelsea": data.chelsea,
+}
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory: pytest.TempPathFactory) -> dict[Path, Image]:
+    folder = tmp_path_factory.mktemp("photographs")
+    images = {}
+    for name, load in PICTURES.items():
+        image = load()
+        step = max(image.shape) // 320
+        images[png(folder / f"{name}.png", image[::step, ::step])] = image[::step, ::step]
+    return images
+
+
+class TestLooks:
+    """Each look is visible and breaks nothing, on photographs that scikit-image has."""
+
+    @pytest.mark.parametrize("amount", [1, 2])
+    @pytest.mark.parametrize("look", LOOKS)
+    def test_visible(
+        self, files: dict[Path, Image], look: str, amount: float, tmp_path: Path
+    ) -> None:
+        result = apply(*files, "-o", f"{tmp_path}/", "--preset", look, "--amount", amount)
+        assert result.exit_code == 0, result.stderr
+        for file, image in files.items():
+            after = reread(tmp_path / file.name)[1].astype(int)
+            changed = (np.abs(after - image).max(axis=2) > VISIBLE).mean()
+            if look not in ("star4", "star6", "anamorphic"):
+                assert changed > 0.07, file.stem
+            elif file.stem == "chelsea":
+                # It has no lights.
+                assert changed < 0.01
+            else:
+                # Rays are narrow, and a picture stays between them.
+                assert 0.015 < changed < 0.35, file.stem
+            new_white = (after.min(axis=2) >= 250).mean() - (image.min(axis=2) >= 250).mean()
+            assert new_white < 0.02, file.stem
+
+    @pytest.mark.parametrize("look", ["photo", *LOOKS])
+    def test_an_amount_of_0_changes_nothing(self, look: str, tmp_path: Path) -> None:
+        image = PHOTOS["astronaut"]()
+        words = ("--preset", look, "--amount", "0")
+        result = apply(png(tmp_path / "a.png", image), tmp_path / "b.png", *words)
+        assert (result.exit_code, result.stderr) == (0, "")
+        np.testing.assert_array_equal(reread(tmp_path / "b.png")[1], image)
+
+    @pytest.mark.parametrize(
+        ("preset", "amount", "intensity"),
+        [("mist", 0.5, 0.075), ("star4", 2, 50), ("halation", 2, 1), ("photo", 1.5, 0.225)],
+    )
+    def test_the_amount_is_a_factor_of_intensities(
+        self, preset: str, amount: float, intensity: float, tmp_path: Path
+    ) -> None:
+        file = png(tmp_path / "a.png", PHOTOS["room"]())
+        words = ("--preset", preset, "--amount", amount, "--glare", "streaks:intensity=0.5")
+        assert apply(file, tmp_path / "b.png", *words).exit_code == 0
+        made = json.loads(facts_in(tmp_path / "b.png")["settings"])
+        assert made["intensity"] == pytest.approx(intensity)
+        assert made["glare"][0]["intensity"] == 0.5 * amount
+        # The settings of the file have it.
+        assert apply(file, tmp_path / "c.png", "--settings", tmp_path / "b.png").exit_code == 0
+        np.testing.assert_array_equal(*(reread(tmp_path / name)[1] for name in ("b.png", "c.png")))
+
+    def test_which_looks_are_expanded(self, tmp_path: Path) -> None:
+        file = png(tmp_path / "a.png", PHOTOS["room"]()[::4, ::4])
+        found = set()
+        for look in ("photo", *LOOKS, "bevy_natural", "halation"):
+            assert apply(file, tmp_path / "b.png", "--preset", look).exit_code == 0
+            found |= {look} if facts_in(tmp_path / "b.png").get("expand") == "4" else set()
+        assert found == {"photo", "mist", "dreamy", "film_halation"}
+
+    def test_amounts_beyond_2_are_refused(self, tmp_path: Path) -> None:
+        result = apply("a.png", tmp_path / "b.png", "--amount", "3")
+        assert result.exit_code == 2
+        assert "--amount" in result.stderr

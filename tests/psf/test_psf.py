@@ -16,6 +16,7 @@ from scipy.special import kn
 import vkbloom
 from tests.refusals import assert_refused, rows
 from vkbloom import psf
+from vkbloom._psf.base import crop_or_pad
 from vkbloom._psf.eye import cie_general, cie_total
 from vkbloom._psf.radial import bessel
 from vkbloom._psf.resampling import box_resample
@@ -32,6 +33,7 @@ ALL: list[psf.PSF] = [
     psf.aperture(psf.iris(blades=5, size=32), wavelengths=(500, 600)),
     psf.aperture(np.ones((8, 8))),
     psf.fog_glow(16),
+    psf.star(rays=3, angle=20, tint=(0.5, 1, 0)),
     psf.unreal(KERNEL, center=(0.5, 0.5), scatter=0.5),
     psf.measured(vkbloom.Separable(blur_strength=0.5), size=(17, 16)),
     psf.samples([[1, 2, 3]]),
@@ -54,7 +56,7 @@ def test_arrays(one: psf.PSF, size: tuple[int, int]) -> None:
     array = one.array(size, 3.0)
     assert array.shape == (size[1], size[0], 3)
     assert array.dtype == np.float64
-    if isinstance(one, psf.unreal):
+    if isinstance(one, psf.unreal | psf.star):
         return  # resized with the frame
     large = one.array((41, 41), 3.0)
     top, left = 20 - size[1] // 2, 20 - size[0] // 2
@@ -89,6 +91,42 @@ def test_values(one: psf.PSF) -> None:
     assert pickle.loads(pickle.dumps(one)) == one
     assert one != psf.gaussian(7)
     assert len(repr(one)) < 600
+
+
+class TestStar:
+    def test_it_is_the_same_in_pictures_of_all_sizes(self) -> None:
+        one = psf.star(rays=4, angle=30, length=0.2, width=0.01, surround=1.2)
+        small, large = (
+            one.kernel((side, side * 2 // 3), (side - 1, side - 1)) for side in (80, 240)
+        )
+        reduced = box_resample(large, (large.shape[0] // 2, large.shape[1] // 2), (1 / 3, 1 / 3))
+        reduced = crop_or_pad(reduced, (79, 79))
+        # A coarse grid samples the fall of the rays otherwise.
+        assert np.abs(reduced - small).max() < 0.05 * np.abs(small).max()
+        np.testing.assert_allclose(small.sum(axis=(0, 1)), -0.2, atol=1e-9)
+
+    def test_formula(self) -> None:
+        """One ray to the right: p(d) along it, a Gaussian across it."""
+        values = psf.star(1, length=0.5, width=0.02).kernel((200, 200))[..., 0]
+        assert values.sum() == pytest.approx(1)
+        row, column = (side // 2 for side in values.shape)
+        distances = np.array([5, 20, 60, 90])
+        along = values[:, column + distances].sum(axis=0)
+        np.testing.assert_allclose(along / along[0], ((100 - distances) / 95) ** 2, rtol=1e-3)
+        across = values[row - 8 : row + 9, column + 20]
+        expected = np.exp(-(np.arange(-8, 9) ** 2) / 32)
+        np.testing.assert_allclose(across / across.max(), expected, rtol=1e-3)
+
+    @pytest.mark.parametrize("name", ["star4", "star6", "anamorphic"])
+    def test_large_areas_have_no_rays(self, name: str, renderer: vkbloom.Renderer) -> None:
+        image = np.full((120, 180, 3), 0.01, np.float32)
+        image[:60] = 1.0
+        sky = renderer.apply(image, vkbloom.presets[name], framebuffers="final")["final"]
+        assert np.abs(sky[66:, 20:-20, :3] - 0.01).max() < 0.02
+        image[:] = 0.01
+        image[60:62, 90:92] = 1.0
+        light = renderer.apply(image, vkbloom.presets[name], framebuffers="final")["final"]
+        assert (light[..., 2] > 0.03).sum() > 30
 
 
 def test_spencer_terms() -> None:

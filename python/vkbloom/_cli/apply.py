@@ -44,6 +44,7 @@ from vkbloom._io.picture import Colour, Highlights, Picture, SavedColour
 from vkbloom._io.video.coding import Codec
 from vkbloom._io.video.reading import is_video
 from vkbloom._locks import cached_property
+from vkbloom._presets.start import PRESET_OF_PHOTOS
 from vkbloom._renderer.added_light import added_share, faint_note
 from vkbloom._renderer.frame_files import settings_facts
 from vkbloom._renderer.frames import Frames
@@ -302,7 +303,21 @@ def _send(file: Path, target: str) -> None:
         stream.flush()
 
 
-@click.command(cls=Command)
+@click.command(
+    cls=Command,
+    everyday=(
+        "preset",
+        "amount",
+        "out",
+        "quality",
+        "expand",
+        "mask",
+        "framebuffers",
+        "adapter",
+        "quiet",
+    ),
+    begins=PRESET_OF_PHOTOS,
+)
 @click.argument("sources", metavar="IN... OUT", nargs=-1, required=True, type=click.Path())
 @click.option(
     "-o", "--out", metavar="OUT", type=click.Path(), help="The file to write, instead of OUT."

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import inspect
 import itertools
 import json
@@ -10,7 +11,7 @@ import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import click
 from click.shell_completion import CompletionItem
@@ -230,13 +231,27 @@ def _spell(value: object, separator: str = ",") -> str:
         case float():
             return f"{value:.12g}"
         case PSF():
-            return type(value).__name__
+            return _spell_psf(value)
         case ():
             return "none"
         case tuple():
             return separator.join(_spell(part, ":") for part in value)
         case _:
             return str(value).lower()
+
+
+def _spell_psf(psf: PSF) -> str:
+    """Write a function in the syntax of its option; only its name if a value has no word there."""
+    name = type(psf).__name__
+    changed = {
+        info.name: value
+        for info in fields_of(type(psf)).values()
+        if (value := getattr(psf, info.name)) != info.default
+    }
+    if not all(isinstance(value, int | float | str | tuple) for value in changed.values()):
+        return name
+    words = [f"{key}={json.dumps(value, separators=(',', ':'))}" for key, value in changed.items()]
+    return f"{name}:{','.join(words)}" if words else name
 
 
 class FieldOption(click.Option):
@@ -340,14 +355,46 @@ class FieldOptions(click.Option):
         return self._make[1]
 
 
-# Where a call keeps the method that its help is about.
-_METHOD: Final = "vkbloom.method"
+# Where a call keeps what its help is about: a title, and the settings with their values.
+_STARTED: Final = "vkbloom.started"
+# Whether a call asked for all options.
+_ALL: Final = "vkbloom.all"
 # Width of the options' names in the help of a method, which fits on a screen of 50 lines.
 _NARROW: Final = 24
+# Fields of everyday use that have no slider.
+_EVERYDAY: Final = ("composite", "psf")
+
+
+class _Started(NamedTuple):
+    """What the settings of a help are called, and their values."""
+
+    title: str
+    settings: Settings
 
 
 class Command(click.Command):
-    """A command with options of fields; its help lists those of a method that the call names."""
+    """A command with options of fields; its help lists those of a method that the call names.
+
+    `everyday`: The options that ``--help`` describes, in its order; ``--help-all`` then describes
+    all. Empty: ``--help`` does. `begins`: The preset whose values ``--help`` shows if a call names none.
+    """
+
+    def __init__(
+        self, *args: Any, everyday: Sequence[str] = (), begins: str = "", **given: Any
+    ) -> None:
+        super().__init__(*args, **given)
+        self._everyday, self._begins = everyday, begins
+        if everyday:
+            self.params.append(
+                click.Option(
+                    ["--help-all"],
+                    is_flag=True,
+                    is_eager=True,
+                    expose_value=False,
+                    callback=_show_all,
+                    help="Describe all options: files, colours, buffers and formats.",
+                )
+            )
 
     def get_params(self, ctx: click.Context) -> list[click.Parameter]:
         """Return the parameters, with the options of fields in the place of each `FieldOptions`."""
@@ -358,14 +405,17 @@ class Command(click.Command):
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Begin with no values of fields."""
-        ctx.meta[_METHOD] = _method_of(args)
+        ctx.meta[_STARTED] = _started_by(args)
         options = (param for param in self.params if isinstance(param, FieldOptions))
         ctx.params.update({option.into: {} for option in options})
         return super().parse_args(ctx, args)
 
+    def _is_short(self, ctx: click.Context) -> bool:
+        return bool(self._everyday) and not ctx.meta.get(_ALL)
+
     def format_help_text(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """Write the description; with a method only its first paragraph."""
-        if ctx.meta.get(_METHOD):
+        """Write the description; with a method, or a short one, only its first paragraph."""
+        if ctx.meta.get(_STARTED) or self._is_short(ctx):
             formatter.write_paragraph()
             with formatter.indentation():
                 formatter.write_text(inspect.cleandoc(self.help or "").partition("\n\n")[0])
@@ -384,12 +434,16 @@ class Command(click.Command):
                 shared += [] if param.labels else [param]
             elif isinstance(param, click.Option):
                 general.append(param)
-        method = ctx.meta.get(_METHOD)
-        if method:
-            with formatter.section(f"Options ({ctx.command_path} --help describes them)"):
+        if self._is_short(ctx):
+            self._format_short(ctx, formatter, general)
+            return
+        started: _Started | None = ctx.meta.get(_STARTED)
+        asked = "--help-all" if self._everyday else "--help"
+        if started:
+            with formatter.section(f"Options ({ctx.command_path} {asked} describes them)"):
                 formatter.write_text(" ".join(max(item.opts, key=len) for item in general))
-            with formatter.section(f"Settings of the method {method}"):
-                formatter.write_dl(_records(ctx, _options_of(method)), col_max=_NARROW)
+            with formatter.section(f"Settings of {started.title}"):
+                formatter.write_dl(_records(ctx, _options_of(started)), col_max=_NARROW)
             return
         with formatter.section("Options"):
             formatter.write_dl(_records(ctx, general))
@@ -397,26 +451,68 @@ class Command(click.Command):
             with formatter.section("Settings of every method"):
                 formatter.write_dl(_records(ctx, shared))
         if any(item.type.name == "method" for item in general):
-            call = f"{ctx.command_path} --method NAME --help"
+            call = f"{ctx.command_path} --method NAME {asked}"
             with formatter.section(f"{call} lists the settings of"):
                 formatter.write_text(", ".join(METHODS))
 
+    def _format_short(
+        self, ctx: click.Context, formatter: click.HelpFormatter, general: Iterable[click.Option]
+    ) -> None:
+        """Write the options of everyday use, and the values of what the call starts from."""
+        options = {max(item.opts, key=len).lstrip("-"): item for item in general}
+        described = [options[name] for name in (*self._everyday, "help-all", "help")]
+        with formatter.section("Options"):
+            formatter.write_dl(_records(ctx, described), col_max=_NARROW)
+        started: _Started = ctx.meta.get(_STARTED) or _of_preset(self._begins)
+        with formatter.section(f"Settings of {started.title}"):
+            formatter.write_dl(_records(ctx, _options_of(started, _is_everyday)), col_max=_NARROW)
+        named = ", ".join(name for name, engine in presets.engines() if engine == "vkbloom")
+        with formatter.section("Presets for photographs (vkbloom presets describes all)"):
+            formatter.write_text(named)
 
-def _method_of(args: Sequence[str]) -> str | None:
-    """Return the method that the words of a call name, by --method or --preset."""
+
+def _show_all(ctx: click.Context, _: click.Parameter, value: bool) -> None:
+    """Print the help of all options."""
+    if value and not ctx.resilient_parsing:
+        ctx.meta[_ALL] = True
+        click.echo(ctx.get_help())
+        ctx.exit()
+
+
+def _started_by(args: Sequence[str]) -> _Started | None:
+    """Return what the words of a call start from, by --method or --preset."""
     for option, value in itertools.pairwise(args):
         if option == "--method" and (name := nearest(value, METHODS)):
-            return name
+            return _Started(f"the method {name}", METHODS[name]())
         if option == "--preset" and (name := nearest(value, presets)):
-            return presets[name].method
+            return _of_preset(name)
     return None
 
 
-def _options_of(method: str) -> list[click.Option]:
-    """Return options of what a method has, with its own defaults; those of all methods last."""
-    fields = fields_of(METHODS[method]).values()
+def _of_preset(name: str) -> _Started:
+    settings = presets[name]
+    return _Started(f"the preset {name}, of the method {settings.method}", settings)
+
+
+def _is_everyday(info: FieldInfo) -> bool:
+    """Whether the short help describes a field."""
+    is_own = info.name not in fields_of(Settings)
+    if info.everyday is not None:
+        return info.everyday != 0
+    return info.name in _EVERYDAY or (is_own and (info.ends is not None or info.kind == "vector"))
+
+
+def _options_of(
+    started: _Started, is_wanted: Callable[[FieldInfo], bool] = lambda _: True
+) -> list[click.Option]:
+    """Return options of what settings have, with their values; those of all methods last."""
+    fields = fields_of(type(started.settings)).values()
     # A field with one value is none to choose.
-    infos = [info for info in fields if not info.fixed and len(info.choices) != 1]
+    infos = [
+        dataclasses.replace(info, default=getattr(started.settings, info.name))
+        for info in fields
+        if not info.fixed and len(info.choices) != 1 and is_wanted(info)
+    ]
     infos.sort(key=lambda info: info.name in fields_of(Settings))
     return [FieldOption({"": info}, "", "") for info in infos]
 

@@ -61,7 +61,6 @@ class Preset(NamedTuple):
 _IRIS_6: Final = {"psf": "aperture", "mask": {"blades": 6}}
 
 
-
 def _star(rays: int, angle: float, **further: Any) -> Mapping[str, Any]:
     """Return settings whose small lights have rays. Only "screen" has none of the surround."""
     star = {"psf": "star", "rays": rays, "angle": angle, "surround": 1.2}

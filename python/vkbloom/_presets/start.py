@@ -105,7 +105,7 @@ def _scale_strength(settings: Settings, amount: float) -> Settings:
 def _scale(owner: Any, amount: float) -> Any:
     if (info := fields_of(type(owner)).get("intensity")) is None:
         return owner
-    return owner.replace(intensity=min(owner.intensity * amount, info.range[1]))
+    return replace(owner, intensity=min(owner.intensity * amount, info.range[1]))
 
 
 def _default_preset(highlights: Highlights | None) -> str:

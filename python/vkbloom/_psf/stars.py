@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from vkbloom._array_cache import keep
 from vkbloom._numbers import check_size
-from vkbloom._psf.base import Array, check_radii, crop_or_pad
+from vkbloom._psf.base import Array, check_radii, crop_or_pad, in_grey
 from vkbloom._psf.sampled import SampledPSF
 from vkbloom._public import public
 from vkbloom._settings.fields import number_field, numbers_field
@@ -52,8 +52,8 @@ class star(SampledPSF):
     Notes
     -----
     With the length L in pixels, the light along a ray falls as p(d) = 3 (1 - d / L)^2 / L, and
-    across it as a Gaussian. The sum of all rays is 1. The surround is p(r) / (2 pi r), whose sum is
-    1, too. `array` is that of a frame of its size. `energy`, `encircled_energy` and `mtf` are those
+    across it as a Gaussian with the standard deviation s. The sum of all rays is 1. The surround is
+    p(r) / sqrt(r^2 + s^2), divided by its sum. `array` is that of a frame of its size. `energy`, `encircled_energy` and `mtf` are those
     of a frame of 1024 pixels; `mtf` is divided by the energy of the rays.
     """
 
@@ -71,11 +71,10 @@ class star(SampledPSF):
         return self.kernel(size, size)
 
     def mtf(self, frequencies: ArrayLike) -> Array:
-        lines = self.native_array().sum(axis=0)
+        lines = _plane(self, (_FRAME, _FRAME)).sum(axis=0)
         positions = np.arange(len(lines)) - len(lines) // 2
         waves = np.exp(-2j * np.pi * np.outer(check_radii("frequencies", frequencies), positions))
-        tint = np.array(self.tint)
-        return np.asarray(np.abs(waves @ lines) / np.where(tint > 0, tint, 1))
+        return in_grey(np.abs(waves @ lines))
 
     def default_size(self, frame: tuple[int, int]) -> tuple[int, int]:
         reach = math.ceil(self.length * max(frame) + _CUT * _deviation(self, frame))
@@ -112,7 +111,7 @@ def _plane(psf: star, frame: tuple[int, int]) -> Array:
             rays += weight * _rays(psf, x, y, length, deviation)
             if psf.surround:
                 distance = np.hypot(x, y)
-                surround += weight * _along(distance, length) / np.maximum(distance, 0.25)
+                surround += weight * _along(distance, length) / np.hypot(distance, deviation)
     plane = rays / rays.sum()
     if psf.surround:
         plane -= psf.surround * surround / surround.sum()

@@ -89,6 +89,10 @@ class Presets(Named[T]):
             self._starts = {preset.starts: name for name, preset in self._entries.items()}
         return self._starts[sources]
 
+    def engines(self) -> list[tuple[str, str]]:
+        """Return the name of each preset, and whose it is."""
+        return [(name, preset.engine) for name, preset in self._entries.items()]
+
     def expands(self, settings: Any) -> bool:
         """Whether photographs are expanded for settings: a preset's for which they are.
 
