@@ -34,6 +34,7 @@ for _notebook in (_here.parent / "examples").glob("*.ipynb"):
 runpy.run_path(str(_here / "fault_pictures.py"))["write"](_here / "examples" / "faults")
 runpy.run_path(str(_here / "field_pictures.py"))["write"](_here / "examples" / "field")
 runpy.run_path(str(_here / "flare_pictures.py"))["write"](_here / "examples" / "flare")
+runpy.run_path(str(_here / "look_pictures.py"))["write"](_here / "examples" / "looks")
 _write_laws = runpy.run_path(str(_here / "law_table.py"))["write"]
 _write_laws(_here / "examples" / "laws.md")
 _write_laws(_here / "examples" / "exposure_laws.md", "exposure")

@@ -6,6 +6,7 @@ python tools/docs_pictures.py docs/pictures
 - presets.png, profiles.png: how the light of a point spreads with each preset
 - psf_presets.png: the functions of docs/evidence/psf_atlas.md
 - hero.jpg: the saucer without bloom beside the saucer with bloom
+- measured.jpg: a photograph, its glow, the bloom alone, and its contour lines
 - the flowchart of docs/plans.md, from a plan
 """
 
@@ -14,20 +15,26 @@ from __future__ import annotations
 import dataclasses
 import os
 import sys
+import tempfile
 from pathlib import Path
 
 import matplotlib as mpl
 import numpy as np
+from skimage import data
 
 import vkbloom
+from vkbloom._io.srgb import encode_srgb
 from vkbloom._views import pictures
 
 mpl.use("agg")
+from matplotlib import patheffects
 from matplotlib import pyplot as plt
 
 SIZE = (640, 360)
 CELL = (480, 270)
 HERO = (1280, 640)
+# The intensity of the first picture of README, in which a glance finds the bloom.
+MEASURED = 0.55
 # The square around a point in pixels, and the range of its logarithmic scale.
 SIDE, DECADES = 240, 5
 
@@ -48,6 +55,30 @@ def draw_hero(renderer: vkbloom.Renderer, path: Path) -> None:
     axes.axvline(half - 0.5, color="white", linewidth=3)
     axes.text(24, 60, "no bloom", color="white", fontsize=34)
     axes.text(width - 24, 60, "bloom", color="white", fontsize=34, ha="right")
+    figure.savefig(path, dpi=100, pil_kwargs={"quality": 88})
+    plt.close(figure)
+
+
+def draw_measured(renderer: vkbloom.Renderer, path: Path) -> None:
+    """Draw the first picture of README, which can be read on a telephone: scikit-image's rocket."""
+    with tempfile.TemporaryDirectory() as folder:
+        photograph = vkbloom.write(Path(folder) / "rocket.png", data.rocket())
+        before = vkbloom.read(photograph, expand=4)
+    frames = renderer.apply(before, vkbloom.presets["photo"].replace(intensity=MEASURED))
+    part = np.s_[177:427, 60:560]
+    bloom = frames["bloom"][part][..., :3] * MEASURED
+    stops = np.log2(np.maximum(bloom @ (0.2126, 0.7152, 0.0722), 1e-6))
+    figure, cells = plt.subplots(2, 2, figsize=(HERO[0] / 100, HERO[1] / 100), facecolor="black")
+    figure.subplots_adjust(0, 0, 1, 1, 0.006, 0.012)
+    shown = before[part], frames["final"][part], bloom, 0.1 * bloom
+    outline = patheffects.withStroke(linewidth=5, foreground="black")
+    texts = "a photograph", "with bloom", "the bloom alone", "measured, in stops"
+    for axes, light, text in zip(cells.flat, shown, texts, strict=True):
+        axes.set_axis_off()
+        axes.imshow(encode_srgb(np.clip(light[..., :3], 0, 1)), aspect="auto")
+        axes.text(9, 9, text, color="white", fontsize=34, va="top", path_effects=[outline])
+    lines = cells[1, 1].contour(stops, levels=range(-9, 1), cmap="plasma", linewidths=2.5)
+    cells[1, 1].clabel(lines, levels=range(-8, 1, 2), fontsize=20)
     figure.savefig(path, dpi=100, pil_kwargs={"quality": 88})
     plt.close(figure)
 
@@ -208,6 +239,7 @@ def main(folder: Path) -> None:
     write_flowchart(folder.parent / "plans.md")
     with vkbloom.Renderer("software") as renderer:
         draw_hero(renderer, folder / "hero.jpg")
+        draw_measured(renderer, folder / "measured.jpg")
         draw_gallery(renderer, folder / "gallery.jpg")
         draw_points(renderer, folder)
         draw_functions(renderer, folder / "psf_presets.png")

@@ -16,7 +16,6 @@ from scipy.special import kn
 import vkbloom
 from tests.refusals import assert_refused, rows
 from vkbloom import psf
-from vkbloom._psf.base import crop_or_pad
 from vkbloom._psf.eye import cie_general, cie_total
 from vkbloom._psf.radial import bessel
 from vkbloom._psf.resampling import box_resample
@@ -100,7 +99,7 @@ class TestStar:
             one.kernel((side, side * 2 // 3), (side - 1, side - 1)) for side in (80, 240)
         )
         reduced = box_resample(large, (large.shape[0] // 2, large.shape[1] // 2), (1 / 3, 1 / 3))
-        reduced = crop_or_pad(reduced, (79, 79))
+        reduced = reduced[1:-1, 1:-1]
         # A coarse grid samples the fall of the rays otherwise.
         assert np.abs(reduced - small).max() < 0.05 * np.abs(small).max()
         np.testing.assert_allclose(small.sum(axis=(0, 1)), -0.2, atol=1e-9)

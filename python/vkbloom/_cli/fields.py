@@ -376,7 +376,8 @@ class Command(click.Command):
     """A command with options of fields; its help lists those of a method that the call names.
 
     `everyday`: The options that ``--help`` describes, in its order; ``--help-all`` then describes
-    all. Empty: ``--help`` does. `begins`: The preset whose values ``--help`` shows if a call names none.
+    all. Empty: ``--help`` does. `begins`: The preset whose values ``--help`` shows if a call names
+    none.
     """
 
     def __init__(

@@ -42,7 +42,8 @@ expand_option: Final = click.option(
     metavar="X",
     type=click.FloatRange(1, 1024),
     help="What the highlights of a file of integers are expanded up to, so that they can glow; "
-    f"1: they stay as they are [default {PHOTO_EXPANSION:g} with presets such as photo and mist, else 1]",
+    f"1: they stay as they are [default {PHOTO_EXPANSION:g} with presets such as photo and mist, "
+    "else 1]",
 )
 input_colour_option: Final = click.option(
     "--input-colour",

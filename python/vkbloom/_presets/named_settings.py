@@ -382,7 +382,7 @@ PRESETS: Final[Mapping[str, Preset]] = {
     ),
     "film_halation": Preset(
         {
-            **{"method": "halation", "strength": (1.0, 0.15, 0.02), "sizes": (350, 350, 350)},
+            **{"method": "halation", "strength": (1.4, 0.2, 0.03), "sizes": (400, 400, 400)},
             "intensity": 0.5,
         },
         "film without an anti-halation layer: red and orange rims around lights",
@@ -408,7 +408,7 @@ PRESETS: Final[Mapping[str, Preset]] = {
     "anamorphic": Preset(
         {
             **_star(2, 0, length=0.35, width=0.0012, tint=(0.35, 0.6, 1.0), surround=1.8),
-            "intensity": 30.0,
+            **{"threshold": 0.9, "knee": 0.1, "intensity": 60.0},
         },
         "an anamorphic lens: long blue streaks of small lights",
         "vkbloom, for photographs",

@@ -11,8 +11,8 @@ integers on the curves PQ and HLG, floats bevy_natural   not
 ========================================= ============== ==================
 
 With settings that are given, the first kind is expanded if they start from a preset that is made
-for it, such as photo or mist. An expansion that is given replaces this, such as that of --expand, or of the file
-that the settings came from.
+for it, such as photo or mist. An expansion that is given replaces this, such as that of --expand,
+or of the file that the settings came from.
 """
 
 from __future__ import annotations

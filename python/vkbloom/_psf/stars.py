@@ -53,8 +53,9 @@ class star(SampledPSF):
     -----
     With the length L in pixels, the light along a ray falls as p(d) = 3 (1 - d / L)^2 / L, and
     across it as a Gaussian with the standard deviation s. The sum of all rays is 1. The surround is
-    p(r) / sqrt(r^2 + s^2), divided by its sum. `array` is that of a frame of its size. `energy`, `encircled_energy` and `mtf` are those
-    of a frame of 1024 pixels; `mtf` is divided by the energy of the rays.
+    p(r) / sqrt(r^2 + s^2), divided by its sum. `array` is that of a frame of its size. `energy`,
+    `encircled_energy` and `mtf` are those of a frame of 1024 pixels; `mtf` is divided by the energy
+    of the rays.
     """
 
     rays: int = number_field(default=4, range=(1, 32))

@@ -1,0 +1,62 @@
+"""Draw photographs before and after each look, for the page on looks; called by conf.py."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from click.testing import CliRunner
+from numpy.typing import NDArray
+from skimage import data, transform
+
+import vkbloom
+from vkbloom._cli.program import program
+from vkbloom._presets.named_settings import PRESETS
+
+#: Of the presets, those that are made for photographs.
+LOOKS = [name for name, preset in PRESETS.items() if preset.engine == "vkbloom"]
+#: By what they show: the name in scikit-image, and the first row of what is shown.
+PHOTOGRAPHS = {
+    "a launch pad": ("rocket", 0),
+    "a cup": ("coffee", 0),
+    "galaxies": ("hubble_deep_field", 0),
+    "an astronaut": ("astronaut", 0),
+}
+CELL = (240, 160)
+
+
+def cell(path: Path, row: int) -> NDArray[np.float64]:
+    """Return a part of a picture with the sides of a cell, as linear light."""
+    image = vkbloom.read(path)[..., :3]
+    height = image.shape[1] * CELL[1] // CELL[0]
+    return transform.resize(image[row : row + height], CELL[::-1], anti_aliasing=True)
+
+
+def write(folder: Path) -> None:
+    """Write a picture of each look, and the text that shows them."""
+    folder.mkdir(parents=True, exist_ok=True)
+    files = [folder / f"{name}.png" for name, _ in PHOTOGRAPHS.values()]
+    for file in files:
+        vkbloom.write(file, np.ascontiguousarray(getattr(data, file.stem)()))
+    rows = [row for _, row in PHOTOGRAPHS.values()]
+    before = np.concatenate([*map(cell, files, rows)], axis=1)
+    text: list[str] = []
+    for look in LOOKS:
+        made = folder / look
+        words = ["apply", *map(str, files), "-o", f"{made}/", "--preset", look]
+        result = CliRunner().invoke(program, [*words, "--adapter", "software"])
+        if result.exit_code:
+            raise RuntimeError(f"{look}: {result.output}")
+        after = np.concatenate([*map(cell, (made / file.name for file in files), rows)], axis=1)
+        place = folder / f"{look}.jpg"
+        gap = np.ones((6, before.shape[1], 3))
+        sheet = np.concatenate([before, gap, after]).astype(np.float32)
+        vkbloom.write(place, sheet, quality=90)
+        text += [
+            f"### {look}\n",
+            f"{PRESETS[look].what[:1].upper()}{PRESETS[look].what[1:]}.\n",
+            f"```sh\nvkbloom apply photo.jpg bloom.jpg --preset {look}\n```\n",
+            f"![{', '.join(PHOTOGRAPHS)}: above as they are, below with {look}]"
+            f"({'/'.join(place.parts[-3:])})\n",
+        ]
+    folder.with_suffix(".md").write_text("\n".join(text), encoding="utf-8")
