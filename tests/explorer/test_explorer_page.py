@@ -506,7 +506,11 @@ def test_files(page: Page, tmp_path: Path) -> None:
     wait_for_code(page, f'{read}\nsettings = vkbloom.presets["photo"]')
     page.locator(".vkb-status", has_text="highlights expanded up to 4").wait_for()
     assert page.get_by_label("shading").count() == 0
+    preset = page.get_by_label("preset")
+    assert preset.input_value() == "photo"
+    assert "soft glow of highlights" in (preset.get_attribute("title") or "")
     field(page, "bloom").uncheck()
+    assert preset.input_value() == ""
     wait_for_code(page, f'{read}\nsettings = vkbloom.presets["photo"].replace(bloom=False)')
     with page.expect_download() as download:
         page.get_by_role("button", name="Save picture").click()

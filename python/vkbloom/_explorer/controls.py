@@ -30,8 +30,8 @@ def controls() -> dict[str, Any]:
 
     Of each field with a control: its "name", "kind" ("bool", "number", "choice"), "help", whether
     it comes "first" and may be None ("optional"). Numbers have "from", "to" and "step" of their
-    slider, and the accepted range "low" to "high". "look": the fields that keep their values when
-    another preset or method is selected.
+    slider, and the accepted range "low" to "high". "descriptions": what each preset looks like.
+    "look": the fields that keep their values when another preset or method is selected.
     """
     return {
         "methods": {name: describe(kind) for name, kind in METHODS.items()},
@@ -50,6 +50,7 @@ def controls() -> dict[str, Any]:
             "presets": {name: [item.to_dict() for item in some] for name, some in glares.items()},
         },
         "presets": {name: settings.to_dict() for name, settings in presets.items()},
+        "descriptions": presets.descriptions(),
         "look": _LOOK,
     }
 

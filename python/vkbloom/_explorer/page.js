@@ -899,11 +899,13 @@ export function mount(parent, send, { store = null, heading = "h2" } = {}) {
       const look = setup.look.filter((name) => name !== "bloom" && preset[name] === defaults[name]);
       const kept = Object.fromEntries(look.map((name) => [name, settings[editing][name]]));
       use({ ...preset, ...kept }, AUTOMATIC);
+      showPreset(presetSelect.value);
     });
+    for (const option of presetSelect.options) option.title = setup.descriptions[option.value] ?? "";
     presetSelect.ariaLabel = "preset";
     methodSelect = choose(plainly(Object.keys(setup.methods)), () => {
       const carried = setup.look.map((name) => [name, settings[editing][name]]);
-      presetSelect.value = "";
+      showPreset("");
       const { defaults } = setup.methods[methodSelect.value];
       use({ ...defaults, ...Object.fromEntries(carried) }, AUTOMATIC);
     });
@@ -953,6 +955,21 @@ export function mount(parent, send, { store = null, heading = "h2" } = {}) {
     request(editing);
   }
 
+  // The preset whose values settings have, but for those that only change the look; "": none.
+  function presetOf(shown) {
+    const has = (preset) =>
+      preset.method === shown.method &&
+      Object.entries(preset).every(
+        ([name, value]) => setup.look.includes(name) || JSON.stringify(value) === JSON.stringify(shown[name]),
+      );
+    return Object.keys(setup.presets).find((name) => has(setup.presets[name])) ?? "";
+  }
+
+  function showPreset(name) {
+    presetSelect.value = name;
+    presetSelect.title = setup.descriptions[name] ?? "";
+  }
+
   function edit(side) {
     editing = sideSelect.value = side;
     buildFields();
@@ -966,7 +983,7 @@ export function mount(parent, send, { store = null, heading = "h2" } = {}) {
     const [parts, show, first] = control(field, (next) => {
       change(next);
       touched = first;
-      presetSelect.value = "";
+      showPreset("");
       request(editing);
     });
     show(value);
@@ -1063,7 +1080,7 @@ export function mount(parent, send, { store = null, heading = "h2" } = {}) {
 
   function buildFields({ keepPreset = false } = {}) {
     const wasOpen = fields.querySelector("details")?.open ?? false;
-    if (!keepPreset) presetSelect.value = "";
+    if (!keepPreset) showPreset(presetOf(settings[editing]));
     const current = settings[editing];
     methodSelect.value = current.method;
     const rows = { true: [], false: [] };

@@ -89,6 +89,10 @@ class Presets(Named[T]):
             self._starts = {preset.starts: name for name, preset in self._entries.items()}
         return self._starts[sources]
 
+    def descriptions(self) -> dict[str, str]:
+        """Return what each preset looks like, by its name."""
+        return {name: preset.what for name, preset in self._entries.items()}
+
     def engines(self) -> list[tuple[str, str]]:
         """Return the name of each preset, and whose it is."""
         return [(name, preset.engine) for name, preset in self._entries.items()]
