@@ -324,7 +324,8 @@ class TestLooks:
         assert made["glare"][0]["intensity"] == 0.5 * amount
         # The settings of the file have it.
         assert apply(file, tmp_path / "c.png", "--settings", tmp_path / "b.png").exit_code == 0
-        np.testing.assert_array_equal(*(reread(tmp_path / name)[1] for name in ("b.png", "c.png")))
+        first, again = (reread(tmp_path / name)[1] for name in ("b.png", "c.png"))
+        np.testing.assert_array_equal(first, again)
 
     def test_which_looks_are_expanded(self, tmp_path: Path) -> None:
         file = png(tmp_path / "a.png", PHOTOS["room"]()[::4, ::4])

@@ -62,11 +62,15 @@ _IRIS_6: Final = {"psf": "aperture", "mask": {"blades": 6}}
 
 
 def _star(rays: int, angle: float, **further: Any) -> Mapping[str, Any]:
-    """Return settings whose small lights have rays. Only "screen" has none of the surround."""
+    """Return settings whose small lights have rays.
+
+    Only "screen" has none of the surround. Large intensities would magnify steps of other formats.
+    """
     star = {"psf": "star", "rays": rays, "angle": angle, "surround": 1.2}
     return {
         **{"method": "convolution", "psf": star | further, "normalize": False},
         **{"composite": "screen", "threshold": 0.8, "knee": 0.2},
+        "format": "rgba32float",
     }
 
 

@@ -99,11 +99,14 @@ def start_of(
 def _scale_strength(settings: Settings, amount: float) -> Settings:
     """Return settings whose intensities are multiplied, as far as their ranges allow."""
     glare = tuple(_scale(stage, amount) for stage in settings.glare)
-    return _scale(settings.replace(glare=glare), amount)
+    scaled: Settings = _scale(settings.replace(glare=glare), amount)
+    return scaled
 
 
 def _scale(owner: Any, amount: float) -> Any:
-    if (info := fields_of(type(owner)).get("intensity")) is None:
+    """Return settings or a stage of glare; dirt has no intensity."""
+    info = fields_of(type(owner)).get("intensity")
+    if info is None or info.range is None:
         return owner
     return replace(owner, intensity=min(owner.intensity * amount, info.range[1]))
 

@@ -113,7 +113,7 @@ def _plane(psf: star, frame: tuple[int, int]) -> Array:
             if psf.surround:
                 distance = np.hypot(x, y)
                 surround += weight * _along(distance, length) / np.hypot(distance, deviation)
-    plane = rays / rays.sum()
+    plane: Array = rays / rays.sum()
     if psf.surround:
         plane -= psf.surround * surround / surround.sum()
     plane.flags.writeable = False
