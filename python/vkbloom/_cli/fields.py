@@ -326,7 +326,7 @@ class FieldOptions(click.Option):
     ) -> None:
         (self.into,) = param_decls
         super().__init__([f"--{self.into}-fields", self.into], hidden=True, expose_value=False)
-        self._kinds, self._base, self._prefix, self._types = kinds, base, prefix, types
+        self._kinds, self._base, self._prefix, self.types = kinds, base, prefix, types
         self._make: tuple[dict[str, type[Any]], list[FieldOption]] = {}, []
 
     def options(self) -> list[FieldOption]:
@@ -348,7 +348,7 @@ class FieldOptions(click.Option):
                         del fields[info.option]
                     fields.setdefault(info.option, {})[label] = info
             made = [
-                FieldOption(infos, self.into, self._prefix, self._types.get(option))
+                FieldOption(infos, self.into, self._prefix, self.types.get(option))
                 for option, infos in fields.items()
             ]
             self._make = kinds, made
@@ -444,7 +444,7 @@ class Command(click.Command):
             with formatter.section(f"Options ({ctx.command_path} {asked} describes them)"):
                 formatter.write_text(" ".join(max(item.opts, key=len) for item in general))
             with formatter.section(f"Settings of {started.title}"):
-                formatter.write_dl(_records(ctx, _options_of(started)), col_max=_NARROW)
+                formatter.write_dl(_records(ctx, self._options_of(started)), col_max=_NARROW)
             return
         with formatter.section("Options"):
             formatter.write_dl(_records(ctx, general))
@@ -466,10 +466,29 @@ class Command(click.Command):
             formatter.write_dl(_records(ctx, described), col_max=_NARROW)
         started: _Started = ctx.meta.get(_STARTED) or _of_preset(self._begins)
         with formatter.section(f"Settings of {started.title}"):
-            formatter.write_dl(_records(ctx, _options_of(started, _is_everyday)), col_max=_NARROW)
+            formatter.write_dl(
+                _records(ctx, self._options_of(started, _is_everyday)), col_max=_NARROW
+            )
         named = ", ".join(name for name, engine in presets.engines() if engine == "vkbloom")
         with formatter.section("Presets for photographs (vkbloom presets describes all)"):
             formatter.write_text(named)
+
+    def _options_of(
+        self, started: _Started, is_wanted: Callable[[FieldInfo], bool] | None = None
+    ) -> list[click.Option]:
+        """Return options of what settings have, with their values; those of all methods last."""
+        types: dict[str, tuple[_ParamType, str]] = {}
+        # (All settings of a method are to fit on a screen.)
+        for param in self.params if is_wanted else ():
+            types |= param.types if isinstance(param, FieldOptions) else {}
+        # A field with one value is none to choose.
+        infos = [
+            dataclasses.replace(info, default=getattr(started.settings, info.name))
+            for info in fields_of(type(started.settings)).values()
+            if not info.fixed and len(info.choices) != 1 and (not is_wanted or is_wanted(info))
+        ]
+        infos.sort(key=lambda info: info.name in fields_of(Settings))
+        return [FieldOption({"": info}, "", "", types.get(info.option)) for info in infos]
 
 
 def _show_all(ctx: click.Context, _: click.Parameter, value: bool) -> None:
@@ -501,21 +520,6 @@ def _is_everyday(info: FieldInfo) -> bool:
     if info.everyday is not None:
         return info.everyday != 0
     return info.name in _EVERYDAY or (is_own and (info.ends is not None or info.kind == "vector"))
-
-
-def _options_of(
-    started: _Started, is_wanted: Callable[[FieldInfo], bool] = lambda _: True
-) -> list[click.Option]:
-    """Return options of what settings have, with their values; those of all methods last."""
-    fields = fields_of(type(started.settings)).values()
-    # A field with one value is none to choose.
-    infos = [
-        dataclasses.replace(info, default=getattr(started.settings, info.name))
-        for info in fields
-        if not info.fixed and len(info.choices) != 1 and is_wanted(info)
-    ]
-    infos.sort(key=lambda info: info.name in fields_of(Settings))
-    return [FieldOption({"": info}, "", "") for info in infos]
 
 
 def _records(ctx: click.Context, options: Iterable[click.Option]) -> list[tuple[str, str]]:
