@@ -6,10 +6,11 @@ import asyncio
 import contextlib
 import dataclasses
 import functools
+import math
 import signal
 import time
 import webbrowser
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, Final, NamedTuple
 
 import click
@@ -22,7 +23,7 @@ from vkbloom._cli.program import adapter_option, as_wrong_use, is_given
 from vkbloom._cli.scene_options import scene_options
 from vkbloom._cli.sequences import is_stream
 from vkbloom._cli.settings_options import STARTS, settings_options
-from vkbloom._cli.terminal import tell_device
+from vkbloom._cli.terminal import is_quiet, say, tell_device
 from vkbloom._errors import Error
 from vkbloom._explorer.viewer import GLOW, Viewer
 from vkbloom._extras import import_extra
@@ -43,6 +44,7 @@ P              the next preset
 Space          pauses the animation
 Q, Escape      close\
 """
+_STORED: Final = (640, 640)  # what the frames of a page of stored pictures fit into
 _TURN_SECONDS: Final = 8.0
 _MAX_WINDOW: Final = (1600, 900)  # size of a window for an image
 _TITLE_SECONDS: Final = 0.5  # between updates of the title
@@ -257,6 +259,20 @@ def _listen(glfw: Any, window: Any, renderer: Renderer, live: Live) -> None:
 
 @click.command(cls=Command)
 @click.option(
+    "--static",
+    "out",
+    metavar="OUT",
+    type=click.Path(),
+    help="Write a page of stored pictures, to send to others: a new folder, or a file NAME.html.",
+)
+@click.option(
+    "--axis",
+    "words",
+    metavar="NAME=VALUES",
+    multiple=True,
+    help="With --static: a slider and its values, as of vkbloom grid.  [default: three sliders]",
+)
+@click.option(
     "--port", type=click.IntRange(0, 65535), default=0, help="Of 127.0.0.1; 0: any free port."
 )
 @click.option("--open/--no-open", "opens", default=True, help="Whether to open a browser.")
@@ -268,6 +284,8 @@ def _listen(glfw: Any, window: Any, renderer: Renderer, live: Live) -> None:
 def explore(
     *,
     opened: Opened | None,
+    out: str | None,
+    words: tuple[str, ...],
     port: int,
     opens: bool,
     size: tuple[int, int],
@@ -282,13 +300,20 @@ def explore(
     is decoded as vkbloom apply decodes it. The built-in scene has lights 6 times as bright as
     white, unless --glow-intensity says otherwise. Without options of settings, a scene in deferred
     shading begins with the tone map "aces" and the encoding "srgb".
+
+    With --static, nothing is served: OUT is the same page with stored pictures, which opens in any
+    browser. Its sliders have a few values; the frame fits into 640 x 640 pixels, or into --size.
     """
-    import_extra("tornado", "notebook", "explore")
+    if out is None:
+        import_extra("tornado", "notebook", "explore")
+        if words:
+            raise click.UsageError("--axis is only for a page of stored pictures; give --static")
     looked_at: Scene | Picture
     begun: Settings | None = settings
     of_file: dict[str, Any] = {}
     if opened is not None:
-        _check_is_scene("size", "--size")
+        if out is None:
+            _check_is_scene("size", "--size")
         looked_at = opened.picture
         of_file = {"file": opened.file, "expand": opened.expand}
     else:
@@ -305,12 +330,38 @@ def explore(
 
         with as_wrong_use():
             # Checks the arguments, so that an error appears here and not on the page.
-            new_viewer()
+            viewer = new_viewer()
         tell_device(renderer)
+        if out is not None:
+            _store(viewer, out, words, size if is_given("size") else _STORED)
+            return 0
         try:
             return asyncio.run(_serve(new_viewer, port, webbrowser.open if opens else _ignore))
         except KeyboardInterrupt:
             return INTERRUPTED
+
+
+def _store(viewer: Viewer, out: str, words: Sequence[str], size: tuple[int, int]) -> None:
+    """Write a page of stored pictures, with the axes that the call names."""
+    from vkbloom._cli.grid import axis_values  # noqa: PLC0415  costs start-up time
+    from vkbloom._explorer.stored import (  # noqa: PLC0415  costs start-up time
+        StoredGrid,
+        StoredSource,
+        choose_axes,
+        fit_size,
+        write_stored,
+    )
+
+    settings = viewer.settings["a"]
+    if taken := {"time", "preset", "bloom"} & {word.partition("=")[0].strip() for word in words}:
+        raise click.UsageError(f"--axis: {taken.pop()} is no slider of a page of stored pictures")
+    size = fit_size(viewer, size)
+    axes = axis_values(words, settings) if words else choose_axes(viewer, settings, size)
+    name = next((name for name, preset in presets.items() if preset == settings), "")
+    source = StoredSource(viewer.name, viewer, [StoredGrid(settings, axes, name)])
+    with as_wrong_use():
+        write_stored(out, [source], size=size, progress=not is_quiet())
+    say(f"wrote {out}, {math.prod(map(len, axes.values()))} points")
 
 
 def _ignore(_: str) -> None:

@@ -1,7 +1,7 @@
 // The explorer's page: a picture, and the controls that change it. `mount` puts it into an element.
-// It is used by a notebook's widget (the default export) and by the stand-alone page (start.js).
-// They differ in how messages are sent, and only the stand-alone page stores its state in its
-// address. vkbloom/_explorer/viewer.py documents the messages.
+// It is used by a notebook's widget (the default export), by the stand-alone page (start.js) and by a
+// page of stored pictures (stored.js). They differ in how messages are sent, and pages store their
+// state in their address. vkbloom/_explorer/viewer.py documents the messages.
 
 const TURNS_PER_SECOND = 0.25; // of the forward system's animation
 const MAX_HEIGHT = 0.72; // the largest part of the window's height for the picture
@@ -38,8 +38,32 @@ function choose(names, listener, properties = {}) {
 
 const plainly = (names) => names.map((name) => [name, name]);
 
+// The index of a stored value: the nearest number, or an equal value, else the first.
+export function nearestIndex(values, value) {
+  const away = (one) =>
+    typeof one === "number" && typeof value === "number" ? Math.abs(one - value) : one === value ? 0 : Infinity;
+  return values.reduce((best, one, index) => (away(one) < away(values[best]) ? index : best), 0);
+}
+
+// A slider that has only stored values.
+function storedControl({ values }, changed) {
+  const slider = make("input", { type: "range", min: 0, max: values.length - 1, step: 1 });
+  const text = make("output", { className: "vkb-value" });
+  const show = (value) => {
+    slider.value = nearestIndex(values, value);
+    slider.ariaValueText = text.value = String(values[slider.value] ?? "automatic");
+  };
+  slider.addEventListener("input", () => {
+    const value = values[slider.value];
+    show(value);
+    changed(value);
+  });
+  return [[slider, text], show, slider];
+}
+
 // A control of one field: an element to show, and a function that shows a value.
 function control(field, changed) {
+  if (field.values) return storedControl(field, changed);
   if (field.kind === "bool") {
     const box = make("input", { type: "checkbox" });
     box.addEventListener("input", () => changed(box.checked));
@@ -107,10 +131,33 @@ function download(blob, name) {
   setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
 }
 
+const decodePng = (content) =>
+  createImageBitmap(new Blob([content], { type: "image/png" }), { colorSpaceConversion: "none" });
+
+// The page's state in the fragment of its address, which is not sent to a server.
+export const addressStore = {
+  read() {
+    try {
+      return JSON.parse(decodeURIComponent(location.hash.slice(1)));
+    } catch {
+      return null;
+    }
+  },
+  write(state) {
+    const text = JSON.stringify(state);
+    const fragment = text === "{}" ? "" : `#${encodeURIComponent(text)}`;
+    history.replaceState(null, "", location.pathname + fragment);
+  },
+  watch(listener) {
+    window.addEventListener("hashchange", () => listener(addressStore.read()));
+  },
+};
+
 // `send(message, files)` sends a message with the contents of files. `store` keeps the page's
 // state: `read()` returns an object or null, `write(object)` stores one, and `watch(listener)`
-// reports changes by the user. `heading` is the tag of the title.
-export function mount(parent, send, { store = null, heading = "h2" } = {}) {
+// reports changes by the user. `heading` is the tag of the title. `decode` makes a picture of a
+// buffer of an answer.
+export function mount(parent, send, { store = null, heading = "h2", decode = decodePng } = {}) {
   const view = Math.random().toString(36).slice(2);
   const root = make("div", { className: "vkbloom" });
   const layout = make("div", { className: "vkb-layout" });
@@ -202,13 +249,17 @@ export function mount(parent, send, { store = null, heading = "h2" } = {}) {
     if (picker.files.length) openFile(picker.files[0]);
     picker.value = "";
   });
+  const opening = button("Open …", () => picker.click(), {
+    title: "An image, or settings that were saved here; files can be dropped on the page, too",
+  });
+  const saving = button("Save picture", savePicture, {
+    title: "As PNG, in the source's own size",
+  });
   const files = make(
     "div",
     { className: "vkb-bar vkb-files" },
-    button("Open …", () => picker.click(), {
-      title: "An image, or settings that were saved here; files can be dropped on the page, too",
-    }),
-    button("Save picture", savePicture, { title: "As PNG, in the source's own size" }),
+    opening,
+    saving,
     button("Save settings", () => {
       const kept = { ...settings[editing] };
       if (setup.expand) kept[EXPANDED] = shown[editing]?.expand ?? 1;
@@ -226,10 +277,20 @@ export function mount(parent, send, { store = null, heading = "h2" } = {}) {
     make("div", { className: "vkb-bar" }, copying),
   );
   const title = make(heading, { className: "vkb-title", textContent: "vkbloom explorer" });
-  const panel = make("div", { className: "vkb-panel" }, head, fileError, files, fields, foot);
+  const storedNote = make("p", { className: "vkb-stored", hidden: true });
+  const panel = make("div", { className: "vkb-panel" }, storedNote, head, fileError, files, fields, foot);
   layout.append(title, seen, below, panel);
 
   const visible = () => (comparing ? SIDES : ["a"]);
+
+  // Disable the inputs of a control for which there are no stored pictures, and say why.
+  function lock(element) {
+    if (!setup.stored) return;
+    const inputs = "input, select, button";
+    const all = element.matches(inputs) ? [element] : element.querySelectorAll(inputs);
+    for (const input of all) input.disabled = true;
+    element.title = [element.title, setup.stored.reason].filter(Boolean).join(". ");
+  }
 
   // --- asking ---------------------------------------------------------------------------------
 
@@ -266,7 +327,7 @@ export function mount(parent, send, { store = null, heading = "h2" } = {}) {
   }
 
   function probe() {
-    if (!pointer || !shown.a) return;
+    if (!pointer || !shown.a || setup.stored) return;
     probeAgain = probing;
     if (probing) return;
     probing = true;
@@ -317,9 +378,7 @@ export function mount(parent, send, { store = null, heading = "h2" } = {}) {
       sides.map(([, side]) =>
         "error" in side
           ? null
-          : createImageBitmap(new Blob([buffers[side.picture]], { type: "image/png" }), {
-              colorSpaceConversion: "none",
-            }),
+          : decode(buffers[side.picture]),
       ),
     );
     const began = sent.get(message.id);
@@ -429,9 +488,11 @@ export function mount(parent, send, { store = null, heading = "h2" } = {}) {
       canvas.ariaLabel = `picture: ${a.framebuffer}, ${a.size[0]} × ${a.size[1]}`;
       const passes = Object.entries(a.passes);
       const device = passes.reduce((sum, [, seconds]) => sum + 1e3 * seconds, 0);
-      const ran = passes.length
-        ? `${passes.map(([name]) => name).join(", ")}: ${device.toFixed(1)} ms`
-        : "nothing had to run";
+      const ran = setup.stored
+        ? "stored picture"
+        : passes.length
+          ? `${passes.map(([name]) => name).join(", ")}: ${device.toFixed(1)} ms`
+          : "nothing had to run";
       const expanded = a.expand > 1 ? `highlights expanded up to ${a.expand}` : "";
       status.textContent =
         `${[a.note, a.faint, expanded, setup.adapter].filter(Boolean).join(" · ")} · ${a.size[0]} × ${a.size[1]} ${a.dtype} · ${ran} · ` +
@@ -475,7 +536,8 @@ export function mount(parent, send, { store = null, heading = "h2" } = {}) {
     if (!plan.open || !shown[editing]) return;
     const rows = shown[editing].plan;
     const longest = Math.max(...Object.values(shown[editing].passes), 1e-9);
-    const head = ["pass", "time", "shader", "variant", "reads", "writes"];
+    const timed = setup.stored ? [] : ["time"];
+    const head = ["pass", ...timed, "what it does", "shader", "variant", "reads", "writes"];
     const cell = (tag, textContent, more = {}) => make(tag, { textContent, ...more });
     passes.replaceChildren(
       make("thead", {}, make("tr", {}, ...head.map((text) => cell("th", text, { scope: "col" })))),
@@ -487,11 +549,14 @@ export function mount(parent, send, { store = null, heading = "h2" } = {}) {
           const rowSpan = others < 0 ? rows.length - place : others;
           const seconds = shown[editing].passes[row.name];
           const time = seconds === undefined ? "up to date" : `${(1e3 * seconds).toFixed(2)} ms`;
-          const timed = cell("td", time, { rowSpan });
           const bar = make("div", { className: "vkb-pass-time" });
           bar.style.width = `${(100 * (seconds ?? 0)) / longest}%`;
-          timed.append(bar);
-          cells.unshift(cell("th", row.name, { scope: "rowgroup", rowSpan }), timed);
+          cells.unshift(cell("td", row.sentence, { className: "vkb-sentence", rowSpan }));
+          if (timed.length) {
+            cells.unshift(cell("td", time, { rowSpan }));
+            cells[0].append(bar);
+          }
+          cells.unshift(cell("th", row.name, { scope: "rowgroup", rowSpan }));
         }
         return make("tr", {}, ...cells);
       })),
@@ -506,7 +571,10 @@ export function mount(parent, send, { store = null, heading = "h2" } = {}) {
         const name = comparing ? `${side.toUpperCase()} ` : "";
         return `${name}${shown[side].framebuffer}[${y}, ${x}] = ${values.join("  ")}`;
       });
-    readout.textContent = lines.join("\n") || "Point at the picture to read its values.";
+    const hint = setup?.stored
+      ? "Values under the pointer are not stored; vkbloom explore shows them."
+      : "Point at the picture to read its values.";
+    readout.textContent = lines.join("\n") || hint;
   }
 
   function fail(text) {
@@ -686,6 +754,7 @@ export function mount(parent, send, { store = null, heading = "h2" } = {}) {
     root.addEventListener(name, (event) => {
       if (![...event.dataTransfer.types].includes("Files")) return;
       event.preventDefault();
+      if (setup?.stored) return;
       root.classList.toggle("vkb-over", name === "dragover");
       if (name === "drop" && event.dataTransfer.files.length) openFile(event.dataTransfer.files[0]);
     });
@@ -822,6 +891,12 @@ export function mount(parent, send, { store = null, heading = "h2" } = {}) {
     setup = message;
     restore(store?.read());
     store?.watch(restore);
+    if (setup.stored) {
+      storedNote.textContent = setup.stored.note;
+      storedNote.hidden = false;
+      for (const one of [opening, saving]) lock(one);
+      showReadout();
+    }
     measure();
     if (setup.has_files) watchFiles();
   }
@@ -848,10 +923,13 @@ export function mount(parent, send, { store = null, heading = "h2" } = {}) {
       request(...visible());
     });
     exposure.title = "Stops that floats are shown with; the framebuffer stays as it is";
-    bar.replaceChildren(
-      make("label", {}, "framebuffer ", frameSelect),
+    const locked = [
       make("label", {}, "size ", sizeSelect),
       make("label", {}, "view exposure ", exposure),
+    ];
+    bar.replaceChildren(
+      make("label", {}, "framebuffer ", frameSelect),
+      ...locked,
       make(
         "span",
         { className: "vkb-time", role: "group", ariaLabel: "zoom" },
@@ -862,8 +940,10 @@ export function mount(parent, send, { store = null, heading = "h2" } = {}) {
         button("1:1", showPixels, { ariaLabel: "100 %" }),
       ),
     );
-    if (setup.animated) bar.append(make("span", { className: "vkb-time" }, playButton, timeSlider));
-    if (setup.glow !== null) bar.append(...sceneControls());
+    if (setup.animated) locked.push(make("span", { className: "vkb-time" }, playButton, timeSlider));
+    if (setup.glow !== null) locked.push(...sceneControls());
+    bar.append(...locked.slice(2));
+    locked.forEach(lock);
   }
 
   // The controls of a scene. The glow mesh's brightness has an effect only in deferred shading.
@@ -938,7 +1018,13 @@ export function mount(parent, send, { store = null, heading = "h2" } = {}) {
     compareBox.checked = comparing;
     sideSelect.value = editing;
     sideSelect.disabled = swap.disabled = !comparing;
+    const pictures = setup.stored?.sources ?? [];
+    const sourceSelect = choose(plainly(pictures), () =>
+      send({ kind: "open", view, name: sourceSelect.value }),
+    );
+    sourceSelect.value = setup.name;
     head.replaceChildren(
+      ...(pictures.length > 1 ? [make("label", {}, "picture ", sourceSelect)] : []),
       make("label", {}, "method ", methodSelect),
       presetSelect,
       make("label", {}, compareBox, " wipe A | B"),
@@ -1070,7 +1156,7 @@ export function mount(parent, send, { store = null, heading = "h2" } = {}) {
       const value = expand[editing];
       on.checked = value > 1;
       for (const input of numbers) {
-        input.disabled = !on.checked;
+        input.disabled = !on.checked || Boolean(setup.stored);
         input.value = on.checked ? value : 4;
       }
     };
@@ -1101,6 +1187,11 @@ export function mount(parent, send, { store = null, heading = "h2" } = {}) {
       ...rows.true,
       make("details", { open: wasOpen }, make("summary", { textContent: "More" }), ...rows.false),
     );
+    const known = setup.methods[current.method].fields;
+    const stored = new Set(known.filter((field) => field.stored).map((field) => field.name));
+    for (const row of fields.querySelectorAll(".vkb-field")) {
+      if (!stored.has(row.querySelector("[data-field]").dataset.field)) lock(row);
+    }
   }
 
   // --- size -----------------------------------------------------------------------------------

@@ -1,6 +1,6 @@
 // The stand-alone page: its messages go through a socket to its server.
 
-import { mount } from "./page.js";
+import { addressStore, mount } from "./page.js";
 
 const address = new URL("socket", location.href);
 address.protocol = "ws:";
@@ -30,29 +30,10 @@ function pack(message, [file]) {
   return packed;
 }
 
-// The page's state is in the fragment of its address, which is not sent to the server.
-const store = {
-  read() {
-    try {
-      return JSON.parse(decodeURIComponent(location.hash.slice(1)));
-    } catch {
-      return null;
-    }
-  },
-  write(state) {
-    const text = JSON.stringify(state);
-    const fragment = text === "{}" ? "" : `#${encodeURIComponent(text)}`;
-    history.replaceState(null, "", location.pathname + fragment);
-  },
-  watch(listener) {
-    window.addEventListener("hashchange", () => listener(store.read()));
-  },
-};
-
 socket.addEventListener("open", () => {
   const send = (message, files = []) =>
     socket.send(files.length ? pack(message, files) : JSON.stringify(message));
-  const page = mount(explorer, send, { store, heading: "h1" });
+  const page = mount(explorer, send, { store: addressStore, heading: "h1" });
   socket.addEventListener("message", (event) => page.receive(...unpack(event.data)));
   socket.addEventListener("close", () => page.fail("The server has stopped."));
 });

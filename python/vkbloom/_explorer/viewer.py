@@ -57,7 +57,6 @@ from vkbloom._numbers import check_number, check_size
 from vkbloom._presets.start import Start, start_of
 from vkbloom._renderer.added_light import added_share, faint_note
 from vkbloom._renderer.frame_files import settings_facts
-from vkbloom._renderer.plans import Pass
 from vkbloom._renderer.renderer import Renderer
 from vkbloom._scene import Scene
 from vkbloom._settings.fields import fields_of
@@ -67,6 +66,7 @@ from vkbloom._views.pictures import png, reduce
 
 if TYPE_CHECKING:
     from vkbloom._renderer.frames import Frames
+    from vkbloom._renderer.plans import Plan
     from vkbloom._scene import Scene
     from vkbloom._settings.settings import Settings, Shading
 
@@ -97,6 +97,7 @@ class Viewer:
     Arguments are those of `vkbloom.explore`; of an image file the source is its decoded picture,
     and there are the file and what its highlights are expanded up to (None: as the settings say).
 
+    - `name`: That of the image file.
     - `settings`, `expand`, `frames`: The latest ones of the sides "a" and "b".
     """
 
@@ -115,7 +116,7 @@ class Viewer:
         if source is None:
             source = dataclasses.replace(Scene.ufo(), glow_intensity=GLOW)
         self._shading: Shading = check_shading(shading)
-        self._file, self._name = file, PurePath(file).name
+        self._file, self.name = file, PurePath(file).name
         self._picture = source if isinstance(source, Picture) else None
         self._scene = source if isinstance(source, Scene) else None
         self.settings: dict[str, Settings] = {}
@@ -203,7 +204,7 @@ class Viewer:
         self._files = CustomFiles()
         return {
             **controls(),
-            **self._source(),
+            **self.describe_source(),
             "adapter": self.renderer.info.summary,
             "has_files": bool(self._files),
         }, []
@@ -215,7 +216,7 @@ class Viewer:
             "errors": errors,
         }, []
 
-    def _source(self) -> dict[str, Any]:
+    def describe_source(self) -> dict[str, Any]:
         """Return a description of the source, and the initial settings."""
         scene = self._scene
         expand = self.expand["a"]
@@ -223,7 +224,7 @@ class Viewer:
         return {
             "sides": {side: as_fields(current(item)) for side, item in self.settings.items()},
             "expand": self.expand if can_expand else None,
-            "name": self._name,
+            "name": self.name,
             "note": f"highlights expanded up to {expand:g}" if can_expand and expand else "",
             "animated": scene is not None,
             "source_size": self._source_size,
@@ -238,7 +239,7 @@ class Viewer:
         picture = _read(name, files)
         check_image(picture.pixels)
         was_scene, self._scene = self._scene is not None, None
-        self._picture, self._file, self._name = picture, name, name
+        self._picture, self._file, self.name = picture, name, name
         self._shown.clear()
         # With a scene's settings a photograph would be white.
         if was_scene or self.settings["a"] == self._default:
@@ -247,7 +248,7 @@ class Viewer:
             expand = start_of(picture.highlights, self.settings["a"]).expand
             self.expand = dict.fromkeys(SIDES, expand)
         self._show_image(self._start_of("a").develop(picture).pixels)
-        return self._source(), []
+        return self.describe_source(), []
 
     def _save(self, message: Mapping[str, Any]) -> Answer:
         settings = settings_from(message.get("settings"))
@@ -292,15 +293,9 @@ class Viewer:
             (shown,) = frames
             arrays[side] = frames[shown]
             sides[side] = {
-                "framebuffer": shown,
+                **self.describe(frames, shown, expand, size),
                 "names": names,
-                "size": [frames[shown].shape[1], frames[shown].shape[0]],
-                "dtype": str(frames[shown].dtype),
-                "note": _note_of(settings, shown),
-                "expand": expand,
-                "faint": self._faint_note(frames, expand, size),
-                "code": code_with_image(settings, self._file, expand),
-                "plan": [item._asdict() for item in plan],
+                "plan": rows_of(plan),
                 "passes": _finite(frames.timings),
                 "picture": len(buffers),
             }
@@ -308,6 +303,29 @@ class Viewer:
                 sides[side]["probe"] = _probe(frames[shown], at)
             buffers.append(picture)
         return {"sides": sides}, buffers
+
+    def describe(
+        self, frames: Frames, shown: str, expand: float | None, size: tuple[int, int]
+    ) -> dict[str, Any]:
+        """Return what a page says of a framebuffer, besides its plan and times."""
+        settings = frames.settings
+        return {
+            "framebuffer": shown,
+            "size": [frames[shown].shape[1], frames[shown].shape[0]],
+            "dtype": str(frames[shown].dtype),
+            "note": _note_of(settings, shown),
+            "expand": expand,
+            "faint": self._faint_note(frames, expand, size) if shown == "final" else "",
+            "code": code_with_image(settings, self._file, expand),
+        }
+
+    def source_at(
+        self, size: tuple[int, int], settings: Settings, expand: float | None
+    ) -> tuple[Any, dict[str, Any]]:
+        """Return the scene, or the image at a size, and the arguments of a scene's frame."""
+        if self._scene is None:
+            return self._image_of(size, settings, expand), {}
+        return self._scene, {"size": size, "shading": self._shading}
 
     def _probe(self, message: Mapping[str, Any]) -> Answer:
         at = _position(message.get("at"))
@@ -354,27 +372,23 @@ class Viewer:
         expand: float | None,
         size: tuple[int, int],
         message: Mapping[str, Any],
-    ) -> tuple[Frames, bytes, list[str], list[Pass]]:
-        """Return the named framebuffer, or `final`; its picture; all names; the planned passes."""
+    ) -> tuple[Frames, bytes, list[str], Plan]:
+        """Return the named framebuffer, or `final`; its picture; all names; its plan."""
         name = message.get("framebuffer", "final")
         time, self._shading, glow, stops = self._read_view(message)
-        source: Any = self._scene
         draw: Any = self.renderer.apply
-        how: dict[str, Any] = {}
-        if self._scene is None:
-            source = self._image_of(size, settings, expand)
-        else:
+        if self._scene is not None:
             if glow != self._scene.glow_intensity:
-                source = self._scene = dataclasses.replace(self._scene, glow_intensity=glow)
+                self._scene = dataclasses.replace(self._scene, glow_intensity=glow)
             draw = partial(self.renderer.render, time=time)
-            how = {"size": size, "shading": self._shading}
+        source, how = self.source_at(size, settings, expand)
         names = list(self.renderer.plan(source, settings, **how).framebuffers)
         shown = str(name) if name in names else "final"
         how["framebuffers"] = [shown]
-        passes = self.renderer.plan(source, settings, **how).passes
+        plan = self.renderer.plan(source, settings, **how)
         frames = draw(source, settings, **how)
         picture = picture_of(frames[shown], shown, encoding=settings.encoding, stops=stops)
-        return frames, picture, names, list(passes)
+        return frames, picture, names, plan
 
     def _key_of(self, settings: Settings, expand: float | None) -> object:
         """Return what the pixels of the image depend on."""
@@ -436,6 +450,11 @@ def _note_of(settings: Settings, shown: str) -> str:
     if shown != "final" or settings.encoding not in ("pq", "hlg"):
         return ""
     return f"this page shows SDR: final's {settings.encoding} signal is shown as sRGB"
+
+
+def rows_of(plan: Plan) -> list[dict[str, Any]]:
+    """Return what a page says of the passes of a plan."""
+    return [{**one._asdict(), "sentence": plan.sentences[one.name]} for one in plan.passes]
 
 
 def _finite(timings: Mapping[str, float]) -> dict[str, float]:

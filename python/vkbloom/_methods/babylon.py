@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any, ClassVar
 
 from vkbloom._formats import MAX_HALF
 from vkbloom._public import public
 from vkbloom._settings.fields import number_field
+from vkbloom._settings.pass_sentences import BLURRED_DOWN
 from vkbloom._settings.settings import PublishedSettings
 
 
@@ -50,6 +53,7 @@ class BabylonBloom(PublishedSettings):
 
     method: ClassVar[str] = "babylon"
     _knobs: ClassVar[tuple[str, ...]] = ("threshold", "kernel")
+    _pass_sentences: ClassVar[Mapping[str, str]] = MappingProxyType({"down": BLURRED_DOWN})
 
     threshold: float | None = number_field(default=0.9, slider=(0, 4))
     kernel: float = number_field(

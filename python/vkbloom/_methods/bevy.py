@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import ClassVar
 
 from vkbloom._public import public
 from vkbloom._settings.fields import choice_field, number_field
+from vkbloom._settings.pass_sentences import HALVED_BY_13
 from vkbloom._settings.settings import Composite, PublishedSettings
 
 
@@ -61,6 +64,7 @@ class BevyBloom(PublishedSettings):
     method: ClassVar[str] = "bevy"
     _level_height: ClassVar[str] = "max_mip_dimension"
     _knobs: ClassVar[tuple[str, ...]] = ("low_frequency_boost", "max_mip_dimension")
+    _pass_sentences: ClassVar[Mapping[str, str]] = MappingProxyType({"down": HALVED_BY_13})
 
     knee: float = number_field(fixed="")
     composite: Composite = choice_field(("mix", "add"))

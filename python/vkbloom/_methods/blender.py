@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any, ClassVar, Final, Literal, cast
 
 import numpy as np
@@ -20,6 +22,7 @@ from vkbloom._settings.fields import (
     numbers_field,
     value_field,
 )
+from vkbloom._settings.pass_sentences import HALVED_BY_13
 from vkbloom._settings.settings import PublishedSettings
 
 GlareType = Literal["bloom", "ghosts", "streaks", "fog_glow", "simple_star", "sun_beams", "kernel"]
@@ -132,6 +135,7 @@ class BlenderGlare(WithKernel, PublishedSettings):
 
     method: ClassVar[str] = "blender"
     _knobs: ClassVar[tuple[str, ...]] = ("threshold", "size")
+    _pass_sentences: ClassVar[Mapping[str, str]] = MappingProxyType({"down": HALVED_BY_13})
     shaping: ClassVar[tuple[str, ...]] = ("type", "quality", "version", "size", "kernel")
     #: `glow` is the node's output Highlights.
     _has_threshold_pass: ClassVar[bool] = True

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any, ClassVar, Literal, cast
 
 import numpy as np
@@ -82,6 +83,9 @@ class Convolution(WithKernel, Settings):
     method: ClassVar[str] = "convolution"
     # Its width is that of the function.
     _knobs: ClassVar[tuple[str, ...]] = ()
+    _pass_sentences: ClassVar[Mapping[str, str]] = MappingProxyType(
+        {"bloom": "multiplies by the kernel's frequencies and transforms back to pixels"}
+    )
     shaping: ClassVar[tuple[str, ...]] = ("psf", "normalize", "pixels_per_degree", "kernel_size")
 
     psf: PSFLike = dataclasses.field(

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import ClassVar
 
 from vkbloom._public import public
 from vkbloom._settings.fields import number_field
+from vkbloom._settings.pass_sentences import HALVED_BY_13
 from vkbloom._settings.settings import PublishedSettings
 
 
@@ -53,6 +56,7 @@ class FilamentBloom(PublishedSettings):
     method: ClassVar[str] = "filament"
     _level_height: ClassVar[str] = "resolution"
     _knobs: ClassVar[tuple[str, ...]] = ("levels", "resolution")
+    _pass_sentences: ClassVar[Mapping[str, str]] = MappingProxyType({"down": HALVED_BY_13})
 
     threshold: float | None = 1.0
     intensity: float = number_field(default=0.1, range=(0, 1))

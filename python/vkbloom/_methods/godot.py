@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import ClassVar
 
 from vkbloom._formats import MAX_FLOAT
 from vkbloom._public import public
 from vkbloom._settings.fields import choice_field, flag_field, number_field, numbers_field
+from vkbloom._settings.pass_sentences import BLURRED_DOWN
 from vkbloom._settings.settings import Composite, PublishedSettings
 
 #: Number of levels that have a weight in Godot.
@@ -69,6 +72,7 @@ class GodotBloom(PublishedSettings):
 
     method: ClassVar[str] = "godot"
     _knobs: ClassVar[tuple[str, ...]] = ("threshold", "strength", "glow_bloom")
+    _pass_sentences: ClassVar[Mapping[str, str]] = MappingProxyType({"down": BLURRED_DOWN})
 
     threshold: float | None = 1.0
     composite: Composite = choice_field(("screen", "soft_light", "add", "replace", "mix"))

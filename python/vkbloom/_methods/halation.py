@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any, ClassVar
 
 import numpy as np
@@ -53,6 +55,9 @@ class Halation(GaussianSum):
 
     method: ClassVar[str] = "halation"
     _knobs: ClassVar[tuple[str, ...]] = ("pixel_size",)
+    _pass_sentences: ClassVar[Mapping[str, str]] = MappingProxyType(
+        {"bloom": "multiplies by the kernel's frequencies and transforms back to pixels"}
+    )
     boundary: ClassVar[str] = "mirror"
     shaping: ClassVar[tuple[str, ...]] = (
         *("strength", "sizes", "scattering_strength", "scattering_sizes"),

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import ClassVar
 
 from vkbloom._public import public
@@ -46,6 +48,9 @@ class KinoBloom(PublishedSettings):
 
     method: ClassVar[str] = "kino"
     _knobs: ClassVar[tuple[str, ...]] = ("threshold", "radius")
+    _pass_sentences: ClassVar[Mapping[str, str]] = MappingProxyType(
+        {"down": "halves the size by the mean of four taps"}
+    )
 
     threshold: float | None = ((0.8 + 0.055) / 1.055) ** 2.4  # 0.8 in sRGB
     knee: float = number_field(fixed="", default=0.5)

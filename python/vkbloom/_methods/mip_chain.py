@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import ClassVar
 
 from vkbloom._numbers import check_floats
 from vkbloom._public import public
 from vkbloom._settings.fields import flag_field, number_field
+from vkbloom._settings.pass_sentences import HALVED_BY_13
 from vkbloom._settings.settings import Settings
 
 
@@ -58,6 +61,7 @@ class Pyramid(Settings):
 
     method: ClassVar[str] = "pyramid"
     _knobs: ClassVar[tuple[str, ...]] = ("levels", "radius")
+    _pass_sentences: ClassVar[Mapping[str, str]] = MappingProxyType({"down": HALVED_BY_13})
 
     levels: int = number_field(slider=(1, 10))
     radius: float = number_field(unit="texel", slider=(0, 4))
@@ -107,6 +111,9 @@ class DualKawase(Settings):
 
     method: ClassVar[str] = "dual_kawase"
     _knobs: ClassVar[tuple[str, ...]] = ("levels", "offset")
+    _pass_sentences: ClassVar[Mapping[str, str]] = MappingProxyType(
+        {"down": "halves the size with five taps", "up": "doubles the size with eight taps"}
+    )
 
     levels: int = number_field(default=4, slider=(1, 10))
     offset: float = number_field(slider=(0, 8))

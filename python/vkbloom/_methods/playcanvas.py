@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any, ClassVar
 
 from vkbloom._public import public
 from vkbloom._settings.fields import number_field
+from vkbloom._settings.pass_sentences import HALVED_BY_13
 from vkbloom._settings.settings import PublishedSettings
 
 
@@ -42,6 +45,7 @@ class PlayCanvasBloom(PublishedSettings):
 
     method: ClassVar[str] = "playcanvas"
     _knobs: ClassVar[tuple[str, ...]] = ("threshold", "blur_level")
+    _pass_sentences: ClassVar[Mapping[str, str]] = MappingProxyType({"down": HALVED_BY_13})
 
     intensity: float = number_field(default=0.01, slider=(0, 0.1))
     blur_level: int = number_field(default=16, range=(1, 16))

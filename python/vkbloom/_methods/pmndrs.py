@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any, ClassVar
 
 from vkbloom._formats import MAX_HALF
 from vkbloom._public import public
 from vkbloom._settings.fields import choice_field, number_field
+from vkbloom._settings.pass_sentences import HALVED_BY_13
 from vkbloom._settings.settings import Composite, PublishedSettings
 
 
@@ -46,6 +49,7 @@ class PmndrsBloom(PublishedSettings):
 
     method: ClassVar[str] = "pmndrs"
     _knobs: ClassVar[tuple[str, ...]] = ("threshold", "radius")
+    _pass_sentences: ClassVar[Mapping[str, str]] = MappingProxyType({"down": HALVED_BY_13})
 
     threshold: float | None = number_field(default=1.0, slider=(0, 4))
     composite: Composite = choice_field(("screen", "add"))

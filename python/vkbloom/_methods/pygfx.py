@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import ClassVar
 
 from vkbloom._public import public
 from vkbloom._settings.fields import choice_field, flag_field, number_field, value_field
+from vkbloom._settings.pass_sentences import HALVED_BY_13
 from vkbloom._settings.settings import Composite, PublishedSettings
 
 
@@ -47,6 +50,7 @@ class PygfxBloom(PublishedSettings):
 
     method: ClassVar[str] = "pygfx"
     _knobs: ClassVar[tuple[str, ...]] = ("levels", "filter_radius")
+    _pass_sentences: ClassVar[Mapping[str, str]] = MappingProxyType({"down": HALVED_BY_13})
 
     threshold: float | None = value_field(None, fixed="pygfx has no threshold")
     composite: Composite = choice_field(("mix",))

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import ClassVar, Literal
 
 from vkbloom import _core
@@ -61,6 +63,9 @@ class Separable(Settings):
 
     method: ClassVar[str] = "separable"
     _knobs: ClassVar[tuple[str, ...]] = ("blur_scale", "blur_strength")
+    _pass_sentences: ClassVar[Mapping[str, str]] = MappingProxyType(
+        {"bloom": "blurs along the rows, which completes the blur"}
+    )
 
     blur_scale: float = number_field(unit="texel", slider=(0.1, 2))
     blur_strength: float = number_field(slider=(0, 4))

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any, ClassVar, Literal
 
 from vkbloom._public import public
 from vkbloom._settings.fields import choice_field, number_field, numbers_field
+from vkbloom._settings.pass_sentences import BLURRED_DOWN
 from vkbloom._settings.settings import PublishedSettings
 
 Variant = Literal["r185", "r187", "node"]
@@ -64,6 +67,7 @@ class ThreeBloom(PublishedSettings):
 
     method: ClassVar[str] = "three"
     _knobs: ClassVar[tuple[str, ...]] = ("threshold", "radius")
+    _pass_sentences: ClassVar[Mapping[str, str]] = MappingProxyType({"down": BLURRED_DOWN})
 
     threshold: float | None = 0.0
     intensity: float = number_field(default=3.0)

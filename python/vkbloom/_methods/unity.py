@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any, ClassVar, Literal
 
 from vkbloom._formats import LUMINANCE_7_DIGITS, MAX_HALF
@@ -15,6 +17,7 @@ from vkbloom._settings.fields import (
     numbers_field,
     value_field,
 )
+from vkbloom._settings.pass_sentences import BLURRED_DOWN, HALVED_BY_13
 from vkbloom._settings.settings import Composite, PublishedSettings
 
 BlurFilter = Literal["gaussian", "kawase", "dual"]
@@ -86,6 +89,9 @@ class UrpBloom(PublishedSettings):
 
     method: ClassVar[str] = "urp"
     _knobs: ClassVar[tuple[str, ...]] = ("threshold", "scatter")
+    _pass_sentences: ClassVar[Mapping[str, str]] = MappingProxyType(
+        {"down": "makes the next smaller level and blurs it"}
+    )
 
     threshold: float | None = ((0.9 + 0.055) / 1.055) ** 2.4  # 0.9 in sRGB
     knee: float = number_field(fixed="", default=0.5)
@@ -155,6 +161,7 @@ class HdrpBloom(PublishedSettings):
 
     method: ClassVar[str] = "hdrp"
     _knobs: ClassVar[tuple[str, ...]] = ("scatter",)
+    _pass_sentences: ClassVar[Mapping[str, str]] = MappingProxyType({"down": BLURRED_DOWN})
 
     threshold: float | None = value_field(
         None, fixed="the composite that HDRP uses with a threshold is not supported"
@@ -211,6 +218,7 @@ class PostProcessingBloom(PublishedSettings):
 
     method: ClassVar[str] = "post_processing"
     _knobs: ClassVar[tuple[str, ...]] = ("threshold", "diffusion")
+    _pass_sentences: ClassVar[Mapping[str, str]] = MappingProxyType({"down": HALVED_BY_13})
 
     threshold: float | None = number_field(default=1.0, slider=(0, 4))
     knee: float = number_field(fixed="", default=0.5)

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from vkbloom._framebuffers import leading
 from vkbloom._renderer.framebuffers import Framebuffers
+from vkbloom._renderer.plans import sentence_of
 from vkbloom._views import markup, pictures
 from vkbloom._views.markup import element
 
@@ -36,10 +37,15 @@ def contact_sheet_html(frames: Framebuffers) -> str:
     )
     longest = max((seconds for seconds in frames.timings.values() if seconds > 0), default=0.0)
     times = [
-        (name, f"{1e3 * seconds:.3f} ms", _bar(seconds, longest))
+        (
+            name,
+            f"{1e3 * seconds:.3f} ms",
+            _bar(seconds, longest),
+            sentence_of(frames.settings, name),
+        )
         for name, seconds in frames.timings.items()
     ]
-    head = ("pass", f"time on {frames.info.get('adapter', 'the device')}", "")
+    head = ("pass", f"time on {frames.info.get('adapter', 'the device')}", "", "what it does")
     facts = ", ".join(f"{key} {value}" for key, value in frames.info.items())
     sheet = element(
         "div",

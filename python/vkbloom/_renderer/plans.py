@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from vkbloom._public import public
+from vkbloom._settings.pass_sentences import pass_sentence
+from vkbloom._settings.registry import METHODS
 from vkbloom._settings.settings import Settings
 from vkbloom._views import markup
 
@@ -89,6 +91,11 @@ class Plan:
         fields = {**vars(self), "framebuffers": dict(self.framebuffers)}
         return type(self), tuple(fields.values())
 
+    @property
+    def sentences(self) -> Mapping[str, str]:
+        """What each pass does, in one sentence, by the pass's name."""
+        return {one.name: sentence_of(self.settings, one.name) for one in self.passes}
+
     def __repr__(self) -> str:
         return (
             f"<vkbloom.Plan of {self._title}: {len(self.passes)} passes, "
@@ -129,9 +136,16 @@ class Plan:
 
     def _repr_html_(self) -> str:
         """Return a table of the passes."""
-        rows = [[_text(part) for part in step] for step in self.passes]
+        sentences = self.sentences
+        rows = [[*(_text(part) for part in step), sentences[step.name]] for step in self.passes]
+        head = (*Pass._fields, "what it does")
         caption = "; ".join((self._title, *self.notes))
-        return str(markup.table(rows, Pass._fields, caption=caption))
+        return str(markup.table(rows, head, caption=caption))
+
+
+def sentence_of(settings: Settings, name: str) -> str:
+    """Return what a pass does, in one sentence, by its name."""
+    return pass_sentence(settings, name, is_custom=METHODS.is_added(settings.method))
 
 
 def framebuffers_of(plan: _core.Plan) -> dict[str, Framebuffer]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any, ClassVar, Final, Literal, Self, get_args
 
 from vkbloom import _core
@@ -154,6 +155,8 @@ class Settings(Record):
     _level_height: ClassVar[str] = ""
     #: Whether `glow` is what has passed the threshold; other methods apply it in a later pass.
     _has_threshold_pass: ClassVar[bool] = True
+    #: What the method's passes do, where that differs from `PASS_SENTENCES`.
+    _pass_sentences: ClassVar[Mapping[str, str]] = MappingProxyType({})
 
     bloom: bool = flag_field(everyday=-3)
     threshold: float | None = number_field(default=None, slider=(0, 4), everyday=-1)

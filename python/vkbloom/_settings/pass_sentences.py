@@ -1,0 +1,83 @@
+"""What each pass does, in one sentence: shown in plans, contact sheets and the explorer.
+
+A sentence belongs to a name of passes, whose numbers are left out: "down" is that of ``down_0``. A
+method's class replaces those that it computes otherwise (``_pass_sentences``).
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Final
+
+if TYPE_CHECKING:
+    from vkbloom._settings.settings import Settings
+
+HALVED_BY_13: Final = "halves the size with 13 taps, so that small lights do not flicker"
+BLURRED_DOWN: Final = "blurs the smaller level along its columns, so that it is blurred along both"
+
+_COMPLETE: Final = "takes the complete frame; the method applies its threshold later"
+_CUSTOM: Final = "is a pass of the method's own file"
+# Passes that a custom method has in common with others.
+_SHARED: Final = ("scene", "glow", "final", "albedo")
+
+PASS_SENTENCES: Final[Mapping[str, str]] = MappingProxyType(
+    {
+        "scene": "draws the picture without bloom",
+        "albedo": "draws colours, normals, positions and depths of what is visible",
+        "glow": "takes the light that will glow: above the threshold, or of a scene's lights",
+        "exposure": "measures the brightness of the frame and adapts the exposure to it",
+        "histogram": "adds the counts of all tiles of the frame",
+        "histogram_tiles": "counts how many pixels of a tile have each brightness",
+        "meter": "averages the brightness of the frame, level by level",
+        "exposed": "multiplies the picture by the exposure",
+        "exposed_emission": "multiplies the light that glows by the exposure",
+        "exposed_picture": "multiplies the picture by the exposure",
+        "frame": "takes the frame as the method's input",
+        "bright": "keeps the pixels that are brighter than the threshold",
+        "half": "halves the size of the frame with one sample a pixel",
+        "reduced": "reduces the frame to the size of the first level",
+        "down": "halves the size, so that a few taps reach twice as far",
+        "down_across": "blurs the smaller level along its rows",
+        "blur_vertical": "blurs along the columns, the first half of a blur in two passes",
+        "blur_horizontal": "blurs along the rows",
+        "kawase": "averages four samples at the corners of a square that grows from pass to pass",
+        "star": "spreads bright light along two lines, from pixel to pixel",
+        "ray": "spreads bright light along one ray, farther from pass to pass",
+        "beams": "spreads bright light away from the sun",
+        "beams_dark": "takes away what is too dark for beams",
+        "ghost": "blurs the bright light that becomes ghosts",
+        "ghost_down": "blurs the bright light of ghosts along its columns",
+        "ghosts_of_blur": "mirrors the blurred light through the middle of the frame",
+        "level": "halves the size, since a wide Gaussian needs no small pixels",
+        "gaussian": "blurs a level with one of the Gaussians whose sum is the bloom",
+        "gaussian_down": "blurs a level along its columns with one of the Gaussians",
+        "sum": "enlarges the sum of the wider Gaussians and adds this one",
+        "box": "averages along rows and columns again and again, which is nearly a Gaussian",
+        "kernel": "transforms the point-spread function to frequencies, once for many frames",
+        "spectrum": "transforms the light to frequencies, where any blur is one product",
+        "up": "enlarges the smaller level and combines it with this one: wide and narrow glow",
+        "bloom": "brings the blurred light to the size of the frame: what is added",
+        "light": "adds what the stages of glare have made to the bloom",
+        "glare_down": "halves the size for a stage of glare with 13 taps",
+        "streaks": "spreads bright light along the rays of a star",
+        "halo": "draws a ring around the middle of the frame from its bright light",
+        "ghosts": "mirrors bright light through the middle of the frame, as lenses do",
+        "dirty_light": "multiplies the light by a picture of dirt on the lens",
+        "final": "adds the bloom to the picture, and applies tone map and encoding",
+    }
+)
+
+
+def pass_sentence(settings: Settings, name: str, *, is_custom: bool) -> str:
+    """Return the sentence of a pass by its name; "" if there is none.
+
+    - `is_custom`: Whether the method is a user's, whose passes have any names.
+    """
+    stem = re.sub(r"^\.|_?\d+", "", name)
+    if is_custom and stem not in _SHARED:
+        return _CUSTOM
+    if stem == "glow" and settings.glow_note:
+        return _COMPLETE
+    return settings._pass_sentences.get(stem, PASS_SENTENCES.get(stem, ""))
