@@ -9,11 +9,15 @@ from __future__ import annotations
 from vkbloom._explorer.controls import as_code, controls, describe, settings_from
 from vkbloom._explorer.fast_pictures import picture_of
 from vkbloom._explorer.server import Server
+from vkbloom._explorer.stored import Pictures, StoredGrid, StoredSource, write_stored
 from vkbloom._explorer.viewer import Viewer
 from vkbloom._views.pictures import reduce
 
 __all__ = [
+    "Pictures",
     "Server",
+    "StoredGrid",
+    "StoredSource",
     "Viewer",
     "as_code",
     "controls",
@@ -21,4 +25,5 @@ __all__ = [
     "picture_of",
     "reduce",
     "settings_from",
+    "write_stored",
 ]

@@ -11,6 +11,7 @@ import signal
 import time
 import webbrowser
 from collections.abc import Callable, Iterator, Sequence
+from pathlib import PurePath
 from typing import Any, Final, NamedTuple
 
 import click
@@ -315,7 +316,9 @@ def explore(
         if out is None:
             _check_is_scene("size", "--size")
         looked_at = opened.picture
-        of_file = {"file": opened.file, "expand": opened.expand}
+        # A page for others has no path of this machine.
+        file = opened.file if out is None else PurePath(opened.file).name
+        of_file = {"file": file, "expand": opened.expand}
     else:
         looked_at = scene()
         if not any(is_given(name) for name in ("base", "glow", "glow_intensity")):
@@ -348,14 +351,12 @@ def _store(viewer: Viewer, out: str, words: Sequence[str], size: tuple[int, int]
         StoredGrid,
         StoredSource,
         choose_axes,
-        fit_size,
         write_stored,
     )
 
     settings = viewer.settings["a"]
     if taken := {"time", "preset", "bloom"} & {word.partition("=")[0].strip() for word in words}:
         raise click.UsageError(f"--axis: {taken.pop()} is no slider of a page of stored pictures")
-    size = fit_size(viewer, size)
     axes = axis_values(words, settings) if words else choose_axes(viewer, settings, size)
     name = next((name for name, preset in presets.items() if preset == settings), "")
     source = StoredSource(viewer.name, viewer, [StoredGrid(settings, axes, name)])

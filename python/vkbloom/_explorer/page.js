@@ -221,6 +221,7 @@ export function mount(parent, send, { store = null, heading = "h2", decode = dec
   );
   const seen = make("div", { className: "vkb-view" }, stage);
   const readout = make("output", { className: "vkb-readout" });
+  const caption = make("p", { className: "vkb-caption" });
   const bar = make("div", { className: "vkb-bar" });
   const status = make("div", { className: "vkb-status" });
   const passes = make("table");
@@ -230,7 +231,7 @@ export function mount(parent, send, { store = null, heading = "h2", decode = dec
     make("summary", { textContent: "Plan" }),
     make("div", { tabIndex: 0, role: "region", ariaLabel: "plan" }, passes),
   );
-  const below = make("div", { className: "vkb-below" }, readout, bar, status, plan);
+  const below = make("div", { className: "vkb-below" }, readout, caption, bar, status, plan);
   const head = make("div", { className: "vkb-head" });
   const fields = make("div", { className: "vkb-fields" });
   const complaint = make("div", { className: "vkb-error", role: "alert" });
@@ -486,6 +487,8 @@ export function mount(parent, send, { store = null, heading = "h2", decode = dec
       if (wanted === framebuffer) framebuffer = a.framebuffer;
       frameSelect.value = framebuffer;
       canvas.ariaLabel = `picture: ${a.framebuffer}, ${a.size[0]} × ${a.size[1]}`;
+      const { sentence } = a.plan.find(({ writes }) => writes.includes(a.framebuffer)) ?? {};
+      caption.textContent = sentence ? `${a.framebuffer}: ${sentence}` : "";
       const passes = Object.entries(a.passes);
       const device = passes.reduce((sum, [, seconds]) => sum + 1e3 * seconds, 0);
       const ran = setup.stored

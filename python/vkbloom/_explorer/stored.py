@@ -1,7 +1,7 @@
 """A page of stored pictures: the explorer's page without a server, which opens as a file.
 
 A grid renders all combinations of a few values of each slider. The page has a table of what the
-server would answer for each framebuffer of each point, and its pictures as WebP files. `stored.js`
+server would answer for each framebuffer of each point, and its pictures as files. `stored.js`
 answers the page's messages from the table.
 """
 
@@ -37,6 +37,8 @@ from vkbloom._views.pictures import scale_size
 
 #: Quality of the WebP files, 1 to 100.
 QUALITY: Final = 80
+#: Smaller pictures are PNG: they are shown enlarged, and WebP blurs the colours of their pixels.
+_MAX_PNG_PIXELS: Final = 2048
 #: The sliders that the page of one picture has, if the call names none.
 _SLIDERS: Final = 3
 
@@ -79,7 +81,7 @@ def write_stored(
 
     - `out`: A new folder, which gets ``index.html`` and ``pictures``; or a file ``NAME.html``,
       which holds the pictures, too. A file is replaced.
-    - `size`: The width and height of the frames; an image is reduced until it fits.
+    - `size`: The width and height into which the frames fit; they are not enlarged.
     """
     target = Path(out)
     is_file = target.suffix.lower() in (".html", ".htm")
@@ -112,32 +114,32 @@ def _temporary_folder(target: Path) -> Iterator[Path]:
 
 
 def _data_address(file: Path) -> str:
-    return f"data:image/webp;base64,{base64.b64encode(file.read_bytes()).decode()}"
+    return f"data:image/{file.suffix[1:]};base64,{base64.b64encode(file.read_bytes()).decode()}"
 
 
 class Pictures:
-    """WebP files of pictures, each once: those with the same pixels are one file."""
+    """Files of pictures, each once: those with the same pixels are one file."""
 
     def __init__(self, folder: Path, quality: int = QUALITY) -> None:
         self.folder, self._quality = folder, quality
-        self._known: dict[str, int] = {}
+        #: The files' names, in the order of their indices.
+        self.names: list[str] = []
+        self._indices: dict[str, int] = {}
         folder.mkdir()
-
-    @property
-    def names(self) -> list[str]:
-        """The files' names, in the order of their indices."""
-        return [f"{key}.webp" for key in self._known]
 
     def add(self, levels: NDArray[np.uint8]) -> int:
         """Write a picture unless it is there, and return its index."""
-        pixels = np.ascontiguousarray(levels)
+        # WebP has no grey pictures.
+        pixels = np.ascontiguousarray(np.broadcast_to(levels, (*levels.shape[:2], 3)))
         digest = hashlib.sha256(str(pixels.shape).encode() + pixels.tobytes())
         key = digest.hexdigest()[:16]
-        if key not in self._known:
-            file = self.folder / f"{key}.webp"
-            image_writing.save(Picture.of_values(pixels), file, quality=self._quality)
-            self._known[key] = len(self._known)
-        return self._known[key]
+        if key not in self._indices:
+            is_small = pixels.shape[0] * pixels.shape[1] <= _MAX_PNG_PIXELS
+            name, quality = (f"{key}.png", None) if is_small else (f"{key}.webp", self._quality)
+            image_writing.save(Picture.of_values(pixels), self.folder / name, quality=quality)
+            self._indices[key] = len(self.names)
+            self.names.append(name)
+        return self._indices[key]
 
 
 class _Interned:
@@ -195,7 +197,8 @@ class _Table:
             method = one.settings.method
             if method in grids:
                 raise ValueError(f"grids: there are two of the method {method!r}; give one")
-            fields = as_fields(one.settings)
+            begun = _move_onto(one.settings, one.axes)
+            fields = as_fields(begun)
             described = known[method]["fields"]
             methods[method] = {
                 "defaults": fields,
@@ -207,12 +210,14 @@ class _Table:
                 "on": self._render(source.viewer, one.settings.replace(bloom=True), one.axes),
                 "off": self._render(source.viewer, one.settings, {"bloom": [False]}),
             }
-        first = source.grids[0].settings
+        first = _move_onto(source.grids[0].settings, source.grids[0].axes)
         about = {
             **source.viewer.describe_source(),
             "name": source.name,
             "methods": methods,
-            "presets": {one.name: as_fields(one.settings) for one in source.grids if one.name},
+            "presets": {
+                one.name: grids[one.settings.method]["defaults"] for one in source.grids if one.name
+            },
             "sides": {"a": as_fields(first), "b": as_fields(first.replace(bloom=False))},
         }
         return {"source": about, "grids": grids}
@@ -220,7 +225,7 @@ class _Table:
     def _render(self, viewer: Viewer, settings: Settings, axes: Axes) -> dict[str, Any]:
         """Render a grid; return the framebuffers, and facts, code and picture of each."""
         expand = viewer.expand["a"]
-        source, how = viewer.source_at(self._size, settings, expand)
+        source, how = viewer.source_at(_fit(viewer, self._size), settings, expand)
         at = settings.replace(**{name: values[0] for name, values in axes.items()})
         names = list(viewer.renderer.plan(source, at, **how).framebuffers)
         plans = {
@@ -247,11 +252,24 @@ class _Table:
         self, viewer: Viewer, frames: Frames, name: str, plan: list[dict[str, Any]]
     ) -> list[int]:
         """Return the indices of a framebuffer's facts, code and picture."""
-        facts = viewer.describe(frames, name, viewer.expand["a"], self._size)
+        facts = viewer.describe(frames, name, viewer.expand["a"], _fit(viewer, self._size))
         code = self._codes.add(facts.pop("code"))
         facts["plan"] = self._plans.add(plan)
         levels = picture_levels(frames[name], name, encoding=frames.settings.encoding, stops=0.0)
         return [self._facts.add(facts), code, self._pictures.add(levels)]
+
+
+def _move_onto(settings: Settings, axes: Axes) -> Settings:
+    """Return the point of a grid that is nearest to settings, with which a page begins."""
+
+    def nearest(value: Any, values: Sequence[Any]) -> Any:
+        if value in values or isinstance(value, str) or value is None:
+            return value if value in values else values[0]
+        return min(values, key=lambda one: abs(value - one))
+
+    return settings.replace(
+        **{name: nearest(getattr(settings, name), values) for name, values in axes.items()}
+    )
 
 
 def _with_values(field: dict[str, Any], axes: Axes) -> dict[str, Any]:
@@ -289,12 +307,12 @@ def _page(table: Mapping[str, Any]) -> str:
 
 
 def choose_axes(viewer: Viewer, settings: Settings, size: tuple[int, int]) -> dict[str, list[Any]]:
-    """Return three values for each of up to three fields: what the settings have, less and more.
+    """Return values of up to three fields: that of the settings, and less and more.
 
     These are the method's everyday sliders. A field that changes the sizes of framebuffers has
     none, since the points of a grid have the same framebuffers.
     """
-    source, how = viewer.source_at(size, settings, viewer.expand["a"])
+    source, how = viewer.source_at(_fit(viewer, size), settings, viewer.expand["a"])
 
     def framebuffers(changed: Settings) -> object:
         return dict(viewer.renderer.plan(source, changed, **how).framebuffers)
@@ -315,7 +333,7 @@ def choose_axes(viewer: Viewer, settings: Settings, size: tuple[int, int]) -> di
     return axes or {"intensity": [settings.intensity]}
 
 
-def fit_size(viewer: Viewer, size: tuple[int, int]) -> tuple[int, int]:
+def _fit(viewer: Viewer, size: tuple[int, int]) -> tuple[int, int]:
     """Return the size of the source's frame where it fits into a size, at most its own."""
     own: tuple[int, int] = viewer.describe_source()["source_size"]
     factor = min(1.0, *(side / length for side, length in zip(size, own, strict=True)))
