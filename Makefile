@@ -103,6 +103,8 @@ check: build/stamp/core build/stamp/test build/stamp/lint
 docs: build/stamp/core build/stamp/docs
 	rm -rf docs/api docs/examples
 	$(PYTHON) -m sphinx -q -W --keep-going -b html docs build/docs
+	rm -rf build/docs/explorer_stored
+	$(PYTHON) -m tools.static_explorer build/docs/explorer_stored
 
 first-page: docs build/stamp/test
 	$(PYTHON) -m pytest -q tests/docs/test_first_page.py

@@ -33,8 +33,8 @@ AXES: Final[dict[str, dict[str, list[Any]]]] = {
         "intensity": [0.08, 0.15, 0.3],
     },
     "tutorial": {
+        "threshold": [0.5, 1.0],
         "blur_scale": [1.0, 4.0, 8.0],
-        "blur_strength": [1.0, 1.5],
         "intensity": [0.25, 0.5, 1.0],
     },
     "unity_urp": {
@@ -60,6 +60,13 @@ AXES: Final[dict[str, dict[str, list[Any]]]] = {
 }
 
 
+#: Where the page begins with another value: these presets blur the whole picture, too brightly.
+BEGUN: Final[dict[str, dict[str, Any]]] = {
+    "tutorial": {"threshold": 1.0},
+    "threejs_r187": {"threshold": 1.0, "intensity": 1.0},
+}
+
+
 def sources(renderer: vkbloom.Renderer, *, is_quick: bool) -> list[StoredSource]:
     """Return the photographs and the saucer, each with the grid of each preset."""
     folder = Path(skimage.__file__).parent / "data"
@@ -78,7 +85,11 @@ def _source(renderer: vkbloom.Renderer, file: Path | None, *, is_quick: bool) ->
         name = file.stem.replace("_", " ")
     look = {field: getattr(viewer.settings["a"], field) for field in ("tonemap", "encoding")}
     grids = [
-        StoredGrid(vkbloom.presets[preset].replace(**look), _fewer(axes, is_quick), preset)
+        StoredGrid(
+            vkbloom.presets[preset].replace(**look, **BEGUN.get(preset, {})),
+            _fewer(axes, is_quick),
+            preset,
+        )
         for preset, axes in list(AXES.items())[: 1 if is_quick else None]
     ]
     return StoredSource(name, viewer, grids)

@@ -31,6 +31,7 @@ from vkbloom import (
     Separable,
     Settings,
     _core,
+    glares,
     presets,
 )
 from vkbloom._renderer.new_arrays import new_arrays
@@ -282,12 +283,35 @@ def test_mermaid_has_every_pass_and_image(renderer: Renderer, scene: Scene) -> N
 def test_html_and_repr(renderer: Renderer, plain: Any) -> None:
     plan = renderer.plan(plain, Separable())
     table = plan._repr_html_()
+    assert ">keeps the light that will glow: what is above the threshold</td>" in table
     assert table.count("<tr>") == 1 + len(plan.passes)
     for one in plan.passes:
         assert f">{one.shader}</td>" in table
     assert repr(plan) == (
         "<vkbloom.Plan of float32 image, 16 x 9, separable: 4 passes, 4 framebuffers>"
     )
+
+
+def test_every_pass_has_a_sentence(renderer: Renderer, plain: Any, scene: Scene) -> None:
+    image = np.zeros((1080, 1920, 3), np.float32)
+    settings = [*presets.values(), *(Pyramid(glare=glare) for glare in glares.values())]
+    plans = [renderer.plan(image, one) for one in settings]
+    plans += [renderer.plan(scene, Separable(), shading=one) for one in ("forward", "deferred")]
+    missing = {name for plan in plans for name, text in plan.sentences.items() if not text}
+    assert missing == set()
+    for plan in plans:
+        assert list(plan.sentences) == list(dict.fromkeys(one.name for one in plan.passes))
+    # By the method, by the source, and of passes that have a number in their name.
+    texts = {
+        one.method: renderer.plan(image, one).sentences["down_1"]
+        for one in (Pyramid(), DualKawase())
+    }
+    assert texts["pyramid"] == "halves the size with 13 taps, so that small lights do not flicker"
+    assert texts["dual_kawase"] == "halves the size with five taps"
+    before = renderer.plan(image, presets["kino"]).sentences["glow"]
+    assert before == "takes the complete frame; the method applies its threshold later"
+    drawn = renderer.plan(scene, presets["kino"]).sentences["glow"]
+    assert drawn == "draws the lights of the scene, which will glow"
 
 
 def test_a_plan_is_not_refused_for_its_memory(renderer: Renderer) -> None:

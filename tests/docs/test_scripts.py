@@ -38,6 +38,7 @@ RUN: Final[dict[str, tuple[str, str]]] = {
     "tools/line_counts.py": ("", "numpy"),
     "tools/requirements.py": ("all", "numpy"),
     "tools/run_notebooks.py": ("", "nbclient"),
+    "tools/static_explorer.py": ("page --quick", "skimage"),
     "tools/where_it_has_run.py": ("--out .", "numpy"),
     "tools/tables/write.py": ("--quick --out .", "skimage"),
 }

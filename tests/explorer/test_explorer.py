@@ -295,7 +295,8 @@ class TestViewer:
         assert facts["code"] == "vkbloom.Separable(blur_scale=1.5)"
         assert set(facts["passes"]) <= {"glow", "blur_vertical", "bloom", "scene", "final"}
         plan = renderer.plan(scene, settings, (80, 45), framebuffers="final")
-        assert facts["plan"] == [json.loads(json.dumps(one._asdict())) for one in plan.passes]
+        rows = [{**one._asdict(), "sentence": plan.sentences[one.name]} for one in plan.passes]
+        assert json.loads(json.dumps(facts["plan"])) == json.loads(json.dumps(rows))
         assert viewer.settings["a"] == settings
         assert np.array_equal(viewer.frames["a"]["final"], expected["final"])
         # Without a size, the scene's own.

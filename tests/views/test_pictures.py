@@ -164,6 +164,8 @@ class TestHtml:
     def test_pass_times(self, frames: Frames) -> None:
         page = frames._repr_html_()
         assert re.findall(r"([\d.]+) ms", page) == ["1.000", "4.000", "2.000"]
+        assert ">what it does</th>" in page
+        assert ">blurs along the columns, the first half of a blur in two passes</td>" in page
 
     @pytest.mark.parametrize("timings", [{}, {"glow": 0.0}, {"glow": float("nan")}])
     def test_pass_times_that_tell_nothing(self, timings: dict[str, float]) -> None:

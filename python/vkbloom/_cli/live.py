@@ -355,7 +355,9 @@ def _store(viewer: Viewer, out: str, words: Sequence[str], size: tuple[int, int]
     )
 
     settings = viewer.settings["a"]
-    if taken := {"time", "preset", "bloom"} & {word.partition("=")[0].strip() for word in words}:
+    if taken := {"alpha", "bloom", "preset", "time"} & {
+        word.partition("=")[0].strip() for word in words
+    }:
         raise click.UsageError(f"--axis: {taken.pop()} is no slider of a page of stored pictures")
     axes = axis_values(words, settings) if words else choose_axes(viewer, settings, size)
     name = next((name for name, preset in presets.items() if preset == settings), "")

@@ -228,13 +228,14 @@ class _Table:
         source, how = viewer.source_at(_fit(viewer, self._size), settings, expand)
         at = settings.replace(**{name: values[0] for name, values in axes.items()})
         names = list(viewer.renderer.plan(source, at, **how).framebuffers)
-        plans = {
-            name: rows_of(viewer.renderer.plan(source, at, **how, framebuffers=[name]))
-            for name in names
-        }
+
+        def answer(frames: Frames, name: str) -> list[int]:
+            # Values of a field may differ in the variants of passes.
+            plan = viewer.renderer.plan(source, frames.settings, **how, framebuffers=[name])
+            return self._answer(viewer, frames, name, rows_of(plan))
 
         def answers(frames: Frames) -> list[list[int]]:
-            return [self._answer(viewer, frames, name, plans[name]) for name in names]
+            return [answer(frames, name) for name in names]
 
         dataset = grid(
             source,

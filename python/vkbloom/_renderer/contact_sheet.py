@@ -36,12 +36,13 @@ def contact_sheet_html(frames: Framebuffers) -> str:
         for name, array in frames.items()
     )
     longest = max((seconds for seconds in frames.timings.values() if seconds > 0), default=0.0)
+    of_scene = not {"scene", "albedo"}.isdisjoint(frames.timings)
     times = [
         (
             name,
             f"{1e3 * seconds:.3f} ms",
             _bar(seconds, longest),
-            sentence_of(frames.settings, name),
+            sentence_of(frames.settings, name, of_scene=of_scene),
         )
         for name, seconds in frames.timings.items()
     ]

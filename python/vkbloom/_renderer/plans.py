@@ -94,7 +94,10 @@ class Plan:
     @property
     def sentences(self) -> Mapping[str, str]:
         """What each pass does, in one sentence, by the pass's name."""
-        return {one.name: sentence_of(self.settings, one.name) for one in self.passes}
+        of_scene = self.source != "image"
+        return {
+            one.name: sentence_of(self.settings, one.name, of_scene=of_scene) for one in self.passes
+        }
 
     def __repr__(self) -> str:
         return (
@@ -143,9 +146,10 @@ class Plan:
         return str(markup.table(rows, head, caption=caption))
 
 
-def sentence_of(settings: Settings, name: str) -> str:
+def sentence_of(settings: Settings, name: str, *, of_scene: bool) -> str:
     """Return what a pass does, in one sentence, by its name."""
-    return pass_sentence(settings, name, is_custom=METHODS.is_added(settings.method))
+    is_custom = METHODS.is_added(settings.method)
+    return pass_sentence(settings, name, of_scene=of_scene, is_custom=is_custom)
 
 
 def framebuffers_of(plan: _core.Plan) -> dict[str, Framebuffer]:

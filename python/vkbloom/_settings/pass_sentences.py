@@ -18,6 +18,7 @@ HALVED_BY_13: Final = "halves the size with 13 taps, so that small lights do not
 BLURRED_DOWN: Final = "blurs the smaller level along its columns, so that it is blurred along both"
 
 _COMPLETE: Final = "takes the complete frame; the method applies its threshold later"
+_LIGHTS: Final = "draws the lights of the scene, which will glow"
 _CUSTOM: Final = "is a pass of the method's own file"
 # Passes that a custom method has in common with others.
 _SHARED: Final = ("scene", "glow", "final", "albedo")
@@ -26,7 +27,7 @@ PASS_SENTENCES: Final[Mapping[str, str]] = MappingProxyType(
     {
         "scene": "draws the picture without bloom",
         "albedo": "draws colours, normals, positions and depths of what is visible",
-        "glow": "takes the light that will glow: above the threshold, or of a scene's lights",
+        "glow": "keeps the light that will glow: what is above the threshold",
         "exposure": "measures the brightness of the frame and adapts the exposure to it",
         "histogram": "adds the counts of all tiles of the frame",
         "histogram_tiles": "counts how many pixels of a tile have each brightness",
@@ -70,14 +71,15 @@ PASS_SENTENCES: Final[Mapping[str, str]] = MappingProxyType(
 )
 
 
-def pass_sentence(settings: Settings, name: str, *, is_custom: bool) -> str:
+def pass_sentence(settings: Settings, name: str, *, of_scene: bool, is_custom: bool) -> str:
     """Return the sentence of a pass by its name; "" if there is none.
 
+    - `of_scene`: Whether the source is a scene, whose lights are drawn.
     - `is_custom`: Whether the method is a user's, whose passes have any names.
     """
     stem = re.sub(r"^\.|_?\d+", "", name)
     if is_custom and stem not in _SHARED:
         return _CUSTOM
-    if stem == "glow" and settings.glow_note:
-        return _COMPLETE
+    if stem == "glow" and (of_scene or settings.glow_note):
+        return _LIGHTS if of_scene else _COMPLETE
     return settings._pass_sentences.get(stem, PASS_SENTENCES.get(stem, ""))
