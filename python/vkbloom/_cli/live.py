@@ -359,7 +359,7 @@ def _store(viewer: Viewer, out: str, words: Sequence[str], size: tuple[int, int]
         word.partition("=")[0].strip() for word in words
     }:
         raise click.UsageError(f"--axis: {taken.pop()} is no slider of a page of stored pictures")
-    axes = axis_values(words, settings) if words else choose_axes(viewer, settings, size)
+    axes = axis_values(words, settings) if words else choose_axes(settings)
     name = next((name for name, preset in presets.items() if preset == settings), "")
     source = StoredSource(viewer.name, viewer, [StoredGrid(settings, axes, name)])
     with as_wrong_use():

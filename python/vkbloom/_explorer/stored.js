@@ -32,15 +32,19 @@ function snap(fields) {
 
 function sideOf(fields, framebuffer) {
   const { axes, on, off } = current.grids[fields.method];
-  const { names, answers } = fields.bloom ? on : off;
-  const shown = names.includes(framebuffer) ? framebuffer : "final";
+  const { names: every, answers } = fields.bloom ? on : off;
   const steps = fields.bloom ? axes : [];
   const point = steps.reduce(
     (index, [name, stored]) => index * stored.length + nearestIndex(stored, fields[name]),
     0,
   );
-  const first = 3 * (point * names.length + names.indexOf(shown));
-  const [facts, code, picture] = answers.slice(first, first + 3);
+  // Facts, code and picture of each framebuffer; -1 of one that this point lacks.
+  const row = (name) => {
+    const first = 3 * (point * every.length + every.indexOf(name));
+    return answers.slice(first, first + 3);
+  };
+  const names = every.filter((name) => row(name)[0] >= 0);
+  const [facts, code, picture] = row(names.includes(framebuffer) ? framebuffer : "final");
   const { plan, ...others } = table.facts[facts];
   return [{ ...others, names, plan: table.plans[plan], code: table.codes[code], passes: {} }, picture];
 }

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import base64
 import hashlib
+import itertools
 import json
 import os
 import shutil
@@ -22,7 +23,6 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom import _core
 from vkbloom._explorer.controls import as_fields, controls
 from vkbloom._explorer.fast_pictures import picture_levels
 from vkbloom._explorer.viewer import Viewer, rows_of
@@ -30,7 +30,6 @@ from vkbloom._grid.grid import grid
 from vkbloom._io import image_writing
 from vkbloom._io.picture import Picture
 from vkbloom._renderer.frames import Frames
-from vkbloom._settings.fields import fields_of
 from vkbloom._settings.settings import Settings
 from vkbloom._version import installed_version
 from vkbloom._views.pictures import scale_size
@@ -43,6 +42,8 @@ _MAX_PNG_PIXELS: Final = 2048
 _SLIDERS: Final = 3
 
 _FILES: Final = resources.files("vkbloom._explorer")
+# Of a framebuffer that a point of a grid lacks.
+_NO_ANSWER: Final = [-1, -1, -1]
 _REASON: Final = "Not among the stored pictures; vkbloom explore changes it"
 # Nothing is loaded but the pictures beside the page, or in it.
 _POLICY: Final = (
@@ -226,10 +227,18 @@ class _Table:
         """Render a grid; return the framebuffers, and facts, code and picture of each."""
         expand = viewer.expand["a"]
         source, how = viewer.source_at(_fit(viewer, self._size), settings, expand)
-        at = settings.replace(**{name: values[0] for name, values in axes.items()})
-        names = list(viewer.renderer.plan(source, at, **how).framebuffers)
+        points = [
+            settings.replace(**dict(zip(axes, point, strict=True)))
+            for point in itertools.product(*axes.values())
+        ]
+        plans = [list(viewer.renderer.plan(source, point, **how).framebuffers) for point in points]
+        # Points may have framebuffers that others lack, such as those of more levels.
+        longest = max(plans, key=len)
+        names = list(dict.fromkeys(name for plan in (longest, *plans) for name in plan))
 
         def answer(frames: Frames, name: str) -> list[int]:
+            if name not in frames:
+                return _NO_ANSWER
             # Values of a field may differ in the variants of passes.
             plan = viewer.renderer.plan(source, frames.settings, **how, framebuffers=[name])
             return self._answer(viewer, frames, name, rows_of(plan))
@@ -307,30 +316,19 @@ def _page(table: Mapping[str, Any]) -> str:
     return page
 
 
-def choose_axes(viewer: Viewer, settings: Settings, size: tuple[int, int]) -> dict[str, list[Any]]:
+def choose_axes(settings: Settings) -> dict[str, list[Any]]:
     """Return values of up to three fields: that of the settings, and less and more.
 
-    These are the method's everyday sliders. A field that changes the sizes of framebuffers has
-    none, since the points of a grid have the same framebuffers.
+    These are the method's everyday sliders.
     """
-    source, how = viewer.source_at(_fit(viewer, size), settings, viewer.expand["a"])
-
-    def framebuffers(changed: Settings) -> object:
-        return dict(viewer.renderer.plan(source, changed, **how).framebuffers)
-
-    wanted = framebuffers(settings)
     axes: dict[str, list[Any]] = {}
     for field in controls()["methods"][settings.method]["fields"]:
-        value = getattr(settings, field["name"])
-        if field["kind"] != "number" or not field["first"] or value is None:
+        name, value = field["name"], getattr(settings, field["name"])
+        if field["kind"] != "number" or not field["first"] or name == "exposure" or value is None:
             continue
-        values = [
-            one
-            for one in _values_around(value, field)
-            if _can_be(settings, field["name"], one, lambda new: framebuffers(new) == wanted)
-        ]
-        if len(values) > 1 and len(axes) < _SLIDERS and field["name"] != "exposure":
-            axes[field["name"]] = values
+        values = [one for one in _values_around(value, field) if _can_be(settings, name, one)]
+        if len(values) > 1 and len(axes) < _SLIDERS:
+            axes[name] = values
     return axes or {"intensity": [settings.intensity]}
 
 
@@ -355,10 +353,9 @@ def _values_around(value: float, field: Mapping[str, Any]) -> list[Any]:
     return sorted({value, *map(number, around)})
 
 
-def _can_be(
-    settings: Settings, name: str, value: Any, is_alike: Callable[[Settings], bool]
-) -> bool:
+def _can_be(settings: Settings, name: str, value: Any) -> bool:
     try:
-        return name in fields_of(type(settings)) and is_alike(settings.replace(**{name: value}))
-    except (ValueError, _core.Error):
+        settings.replace(**{name: value})
+    except ValueError:
         return False
+    return True
