@@ -15,7 +15,7 @@ import pytest
 from numpy.typing import NDArray
 
 from tests.cli.calls import run
-from tests.explorer.explorer_hosts import CHROMIUM, PATIENCE
+from tests.explorer.explorer_hosts import CHROMIUM, PATIENCE, wait_until
 from tests.explorer.pages import Pictures, StoredGrid, StoredSource, Viewer, write_stored
 from tests.framebuffers import decode
 from vkbloom import Pyramid, Renderer, Scene, Separable
@@ -209,7 +209,7 @@ def picture_in(page: Page, folder: Path) -> NDArray[np.uint8]:
 
 
 def assert_shows(
-    page: Page, folder: Path, code: str, name: str, tmp_path: Path, columns: slice = slice(None)
+    page: Page, folder: Path, code: str, name: str, columns: slice = slice(None)
 ) -> None:
     """The page shows the stored picture of a framebuffer of the settings with this code."""
     from playwright.sync_api import expect
@@ -236,7 +236,7 @@ def assert_shows(
         and table["facts"][facts]["framebuffer"] == name
     }
     stored = levels_in(folder / table["pictures"][picture])
-    shown = picture_in(page, tmp_path)
+    shown = picture_in(page, folder.parent)
     assert shown.shape == stored.shape
     # Chromium and OpenImageIO decode with the same library, but may enlarge colours otherwise.
     away = np.abs(shown.astype(int) - stored.astype(int))
@@ -244,17 +244,17 @@ def assert_shows(
 
 
 @needs_chromium
-def test_a_file_answers_by_keyboard_and_quickly(page: Page, folder: Path, tmp_path: Path) -> None:
+def test_a_file_answers_by_keyboard_and_quickly(page: Page, folder: Path) -> None:
     first = 'vkbloom.Pyramid(tonemap="aces", levels=3'
-    assert_shows(page, folder, first + ")", "final", tmp_path)
+    assert_shows(page, folder, first + ")", "final")
     slider = page.locator('[data-field="radius"]')
     assert slider.get_attribute("aria-valuetext") == "1"
     slider.focus()
     page.keyboard.press("ArrowRight")
-    assert_shows(page, folder, f"{first}, radius=2.0)", "final", tmp_path)
+    assert_shows(page, folder, f"{first}, radius=2.0)", "final")
     assert slider.get_attribute("aria-valuetext") == "2"
     page.get_by_label("framebuffer").select_option("down_1")
-    assert_shows(page, folder, f"{first}, radius=2.0)", "down_1", tmp_path)
+    assert_shows(page, folder, f"{first}, radius=2.0)", "down_1")
     assert "13 taps" in page.locator(".vkb-caption").inner_text()
     took = []
     for key in ("ArrowLeft", "ArrowRight", "ArrowLeft"):
@@ -266,23 +266,23 @@ def test_a_file_answers_by_keyboard_and_quickly(page: Page, folder: Path, tmp_pa
     assert min(took) < 100
     page.locator('[data-field="bloom"]').uncheck()
     page.get_by_label("method").select_option("separable")
-    assert_shows(page, folder, 'vkbloom.Separable(bloom=False, tonemap="aces")', "final", tmp_path)
+    assert_shows(page, folder, 'vkbloom.Separable(bloom=False, tonemap="aces")', "final")
 
 
 @needs_chromium
-def test_another_picture_and_the_address(page: Page, folder: Path, tmp_path: Path) -> None:
+def test_another_picture_and_the_address(page: Page, folder: Path) -> None:
     page.get_by_label("method").select_option("separable")
     page.locator('[data-field="composite"]').focus()
     page.keyboard.press("ArrowRight")
     page.get_by_role("combobox", name="picture").select_option("saucer")
     code = 'vkbloom.Separable(composite="mix", tonemap="aces")'
-    assert_shows(page, folder, code, "final", tmp_path)
-    page.wait_for_function("location.hash.includes('saucer')")
+    assert_shows(page, folder, code, "final")
+    wait_until(lambda: "saucer" in page.evaluate("location.hash"))
     page.get_by_label("wipe A | B").check()
-    page.wait_for_function("location.hash.includes('wipe')")
+    wait_until(lambda: "wipe" in page.evaluate("location.hash"))
     page.reload()
     # Right of the middle is B, without bloom.
-    assert_shows(page, folder, code, "final", tmp_path, slice(0, 48))
+    assert_shows(page, folder, code, "final", slice(0, 48))
     assert page.get_by_role("combobox", name="picture").input_value() == "saucer"
 
 
