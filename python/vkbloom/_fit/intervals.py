@@ -23,6 +23,8 @@ _EXACT: Final = 0.02
 _MAX_STEPS: Final = 30
 # How much lower another place must be, in variances, to be the optimum.
 _LOWER: Final = 0.01
+# An exact fit has places that are lower by roundings everywhere: so often the optimum moves.
+_MAX_MOVES: Final = 4
 # Where the profile ends at less than such a share of the quadratic form's distance, it may fall
 # again: so many places further out are looked at.
 _STEEP: Final = 0.5
@@ -54,6 +56,12 @@ class Intervals:
     def __init__(self, likelihood: Likelihood) -> None:
         self._likelihood = likelihood
         self._known: dict[tuple[str, float], Interval] = {}
+        self._moves = 0
+
+    @property
+    def may_move(self) -> bool:
+        """Whether a lower place than the optimum becomes it."""
+        return self._moves < _MAX_MOVES
 
     @property
     def _axes(self) -> tuple[VariedField, ...]:
@@ -70,6 +78,7 @@ class Intervals:
             try:
                 self._known[name, level] = self._find(index, level)
             except _LowerError as lower:
+                self._moves += 1
                 self._known.clear()
                 self._likelihood.move(lower.point)
         return self._known[name, level]
@@ -295,7 +304,7 @@ class _Side:
         point, residual = self._likelihood.minimize(point, residual, self._others, jacobian)
         point, residual = self._without_bloom(point, residual)
         above = (float(residual @ residual) - optimum.square) / self._variance
-        if above < -_LOWER:
+        if above < -_LOWER and self._intervals.may_move:
             raise _LowerError(point)
         profile = math.sqrt(max(above, 0.0))
         self._visited.append((coordinate, profile))
