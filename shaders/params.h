@@ -576,7 +576,6 @@
     SLOT(SLOT_COTANGENTS, 3)     /* of what the forward pass has written */ \
     SLOT(SLOT_WEIGHTS, 4)        /* of transposed filters: the table of their weights */ \
     SLOT(SLOT_SUMS, 4)           /* of SUMMED_ROWS: the sums of groups of rows */ \
-    SLOT(SLOT_SQUARES, 4)        /* of sums: those of squares */ \
     SLOT(SLOT_ADDED, 5)          /* what other readers of the image have accumulated */ \
     SLOT(SLOT_DIFFERENTIATED, 6) /* the image itself, if it is a source's */
 

@@ -41,24 +41,25 @@ struct vkb_pass_row vkb_slope_row(const struct vkb_adjoint *adjoint,
     return row;
 }
 
-static bool add_numbered_image(struct vkb_adjoint *adjoint, const char *prefix, uint32_t number,
-                               struct vkb_size size, uint32_t *image, struct vkb_error *error)
+static bool add_numbered_pass(struct vkb_adjoint *adjoint, const char *prefix, uint32_t number,
+                              struct vkb_pass_row *row, struct vkb_size size, uint32_t *image,
+                              struct vkb_error *error)
 {
     char name[VKB_NAME_SIZE];
 
     snprintf(name, sizeof name, "%s_%u", prefix, number);
-    return vkb_add_target_image(adjoint->graph, name, VKB_FORMAT_RGBA32_FLOAT, size, false, image,
-                                error);
+    if (!vkb_add_target_image(adjoint->graph, name, VKB_FORMAT_RGBA32_FLOAT, size, false, image,
+                              error))
+        return false;
+    snprintf(row->name, sizeof row->name, "%s", name);
+    row->targets[0] = *image;
+    return vkb_graph_add_pass(adjoint->graph, row, error);
 }
 
 bool vkb_add_adjoint_pass(struct vkb_adjoint *adjoint, struct vkb_pass_row *row,
                           struct vkb_size size, uint32_t *image, struct vkb_error *error)
 {
-    if (!add_numbered_image(adjoint, "adjoint", adjoint->added, size, image, error))
-        return false;
-    snprintf(row->name, sizeof row->name, "adjoint_%u", adjoint->added++);
-    row->targets[0] = *image;
-    return vkb_graph_add_pass(adjoint->graph, row, error);
+    return add_numbered_pass(adjoint, "adjoint", adjoint->added++, row, size, image, error);
 }
 
 void vkb_delay_scene(struct vkb_adjoint *adjoint, const struct vkb_pass_row *row,
@@ -345,26 +346,15 @@ bool vkb_accumulate_mask(struct vkb_adjoint *adjoint, const struct vkb_pass_row 
         || vkb_accumulate_sampled(adjoint, row, pass->reads[SLOT_MASK], pass->targets[0], error);
 }
 
-static struct vkb_size divided_size(struct vkb_size size)
-{
-    return (struct vkb_size){(size.width + SUM_SIDE - 1) / SUM_SIDE,
-                             (size.height + SUM_SIDE - 1) / SUM_SIDE};
-}
-
-// Adds a pass of lib/sums.glsl over a picture, whose size becomes that of the two images.
+// Adds a pass of lib/sums.glsl over a picture, whose size becomes that of the sums.
 static bool add_sum_pass(struct vkb_adjoint *adjoint, struct vkb_pass_row *row,
-                         struct vkb_size *size, uint32_t images[2], struct vkb_error *error)
+                         struct vkb_size *size, uint32_t *image, struct vkb_error *error)
 {
-    *size = divided_size(*size);
-    row->target_count = 2;
-    for (int i = 0; i < 2; ++i) {
-        if (!add_numbered_image(adjoint, i ? "squares" : "sum", adjoint->summed, *size, &images[i],
-                                error))
-            return false;
-        row->targets[i] = images[i];
-    }
-    snprintf(row->name, sizeof row->name, "sum_%u", adjoint->summed++);
-    return vkb_graph_add_pass(adjoint->graph, row, error);
+    size->width = (size->width + SUM_SIDE - 1) / SUM_SIDE;
+    size->height = (size->height + SUM_SIDE - 1) / SUM_SIDE;
+    // The squares are below the sums.
+    const struct vkb_size both = {size->width, 2 * size->height};
+    return add_numbered_pass(adjoint, "sum", adjoint->summed++, row, both, image, error);
 }
 
 bool vkb_add_sum_passes(struct vkb_adjoint *adjoint, const struct vkb_pass_row *given,
@@ -372,23 +362,20 @@ bool vkb_add_sum_passes(struct vkb_adjoint *adjoint, const struct vkb_pass_row *
                         struct vkb_error *error)
 {
     struct vkb_pass_row row = *given;
-    char squares[VKB_NAME_SIZE];
-    uint32_t images[2];
+    uint32_t image;
 
     if (!adjoint->sums)
         return true;
     row.shader = shader;
-    if (!add_sum_pass(adjoint, &row, &size, images, error))
+    row.constants.by = BY_VALUES;
+    if (!add_sum_pass(adjoint, &row, &size, &image, error))
         return false;
     while (size.width > 1 || size.height > 1) {
         row = vkb_fullscreen_row("", &vkb_shader_adjoint_sum_frag, VKB_NO_IMAGE);
         row.transposed = true;
-        vkb_read_only(&row, images[0]);
-        vkb_read_at(&row, SLOT_SQUARES, images[1]);
-        if (!add_sum_pass(adjoint, &row, &size, images, error))
+        vkb_read_only(&row, image);
+        if (!add_sum_pass(adjoint, &row, &size, &image, error))
             return false;
     }
-    snprintf(squares, sizeof squares, "%s_squares", name);
-    return vkb_graph_show_image(adjoint->graph, images[0], name, error)
-        && vkb_graph_show_image(adjoint->graph, images[1], squares, error);
+    return vkb_graph_show_image(adjoint->graph, image, name, error);
 }

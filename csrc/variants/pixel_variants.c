@@ -44,7 +44,8 @@ bool vkb_add_fullscreen_variant(struct vkb_variant_choice *choice, const struct 
     struct vkb_pass_row row;
 
     memcpy(&row, pass, sizeof row);
-    if (choice->variants == VKB_VARIANTS_GPU)
+    // An invocation computes sums and squares together, which fragments would do one by one.
+    if (choice->variants == VKB_VARIANTS_GPU || pass->constants.by == BY_VALUES)
         vkb_make_dispatch(&row, pass->shader->dispatch, PIXEL_INVOCATIONS, PIXEL_INVOCATIONS);
     else if (vkb_fits_linear(choice, pass) && blends(graph, pass))
         load_pixels(graph, &row, blend_shaders);

@@ -1,29 +1,36 @@
-// A pass that adds up values and squares over the pixels of a picture, always in the same order, for two
-// targets: each of their pixels has those at distances of the targets' size, SUM_SIDE x SUM_SIDE at most. So
-// neighbouring invocations read neighbouring pixels. The including shader defines summed_size(), the size
-// of the picture, and add_pixel(), which adds what PIXEL has.
+// A pass that adds up values over the pixels of a picture, always in the same order, and their squares, a second
+// picture below that of the sums (fullscreen.glsl). A pixel of both has those at distances of their size, SUM_SIDE x
+// SUM_SIDE at most. So neighbouring invocations read neighbouring pixels. The including shader defines summed_size(),
+// the size of the picture that is added up, and add_pixel(), which adds what PIXEL has.
 ivec2 summed_size();
 void add_pixel(inout vec4 sum, inout vec4 squares);
 
-layout(location = 0) out vec4 all_sum;
-layout(location = 1) out vec4 all_squares;
+#define STACKED 2
+#define STACKED_HEIGHT ((summed_size().y + SUM_SIDE - 1) / SUM_SIDE)
+#include "lib/fullscreen.glsl"
 
 ivec2 pixel;
-#define PIXEL pixel
+vec4 sums[STACKED];
 
-void main()
+void start()
 {
-    ivec2 size = summed_size(), apart = (size + SUM_SIDE - 1) / SUM_SIDE, first = ivec2(gl_FragCoord.xy);
-    vec4 sum = vec4(0.0), squares = vec4(0.0);
+    ivec2 size = summed_size(), apart = (size + SUM_SIDE - 1) / SUM_SIDE, first = PIXEL;
+    sums[0] = sums[1] = vec4(0.0);
     for (int y = first.y; y < size.y; y += apart.y) {
-        vec4 row = vec4(0.0), row_squares = vec4(0.0);
+        vec4 row = vec4(0.0), squares = vec4(0.0);
         for (int x = first.x; x < size.x; x += apart.x) {
             pixel = ivec2(x, y);
-            add_pixel(row, row_squares);
+            add_pixel(row, squares);
         }
-        sum += row;
-        squares += row_squares;
+        sums[0] += row;
+        sums[1] += squares;
     }
-    all_sum = sum;
-    all_squares = squares;
 }
+
+vec4 shade()
+{
+    return sums[picture];
+}
+
+#undef PIXEL
+#define PIXEL pixel

@@ -1,17 +1,16 @@
-// Adds up an image of sums and one of sums of squares.
+// Adds up an image of sums, and one of squares below it.
 
-SAMPLED_IMAGE(SLOT_SOURCE, sums);
-SAMPLED_IMAGE(SLOT_SQUARES, sums_of_squares);
+SAMPLED_IMAGE(SLOT_SOURCE, source);
 
 #include "lib/sums.glsl"
 
 ivec2 summed_size()
 {
-    return textureSize(sums, 0);
+    return textureSize(source, 0) / ivec2(1, STACKED);
 }
 
 void add_pixel(inout vec4 sum, inout vec4 squares)
 {
-    sum += texelFetch(sums, PIXEL, 0);
-    squares += texelFetch(sums_of_squares, PIXEL, 0);
+    sum += texelFetch(source, PIXEL, 0);
+    squares += texelFetch(source, PIXEL + ivec2(0, summed_size().y), 0);
 }

@@ -91,7 +91,7 @@ class Running:
         for kind, names in _SUMS.items():
             if kind not in totals:
                 continue
-            sums, squares = (on_host(totals[key])[0, 0] for key in (kind, f"{kind}_squares"))
+            sums, squares = on_host(totals[kind])[:, 0]
             for name, total, square in zip(names, sums, squares, strict=False):
                 # Infinite sums are left to the reference.
                 if name in wanted and np.isfinite(square) and total**2 >= min_share**2 * square:
