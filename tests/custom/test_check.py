@@ -133,6 +133,14 @@ BY_FORMULA = {
     "bevy_natural": FIREFLIES,
     "unity_hdrp": FIREFLIES,
     "photo": FIREFLIES,
+    "mist": FIREFLIES,
+    "soft": FIREFLIES,
+    "dreamy": FIREFLIES,
+    "film_halation": {"grey"},
+    # A screen, whose colours are clamped; the streak is blue.
+    "star4": {"unclamped", "colour"},
+    "star6": {"unclamped", "colour"},
+    "anamorphic": {"unclamped", "colour", "grey"},
     # A limit for each channel, or a scale by the largest one.
     "filament": {"unclamped", "colour"},
     "godot_4_5": {"unclamped", "colour"},

@@ -178,7 +178,7 @@ class _Table:
         known = controls()
         return {
             "setup": {
-                **{name: known[name] for name in ("functions", "glare", "look")},
+                **{name: known[name] for name in ("functions", "glare", "descriptions", "look")},
                 "adapter": sources[0].viewer.renderer.info.summary,
                 "has_files": False,
                 "stored": stored,
