@@ -97,8 +97,9 @@ class TestTranslate:
             assert re.search(r"halo|lights", found.cause), found.cause
             for number in re.findall(r"\d[\d.]*", found.words):
                 assert len(re.sub(r"^0\.0*|\.", "", number)) <= 4, found.words
-            assert found.words in found._repr_html_()
             losses[found.verdict].append(found.loss)
+        # One page, since its intervals take many renders.
+        assert found.words in found._repr_html_()
         assert max(losses["good"]) <= 0.1 < min(losses["fair"])
         assert max(losses["fair"]) <= 0.3 < min(losses["poor"])
 
