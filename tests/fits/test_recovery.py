@@ -107,6 +107,7 @@ def test_a_field_of_kernels() -> None:
         )
         assert found.kernels.shape == found.error.shape == (3, 3, side, side)
         assert found.positions == tuple(tuple(map(float, one)) for one in places)
+        assert found.psf == vkbloom.psf.Varying(found.kernels, places)
         errors = np.abs(found.kernels.reshape(9, side, side) - truth)
         assert errors.max() < 0.1 * truth.max()
         # Each position has its own kernel, not the mean of all.

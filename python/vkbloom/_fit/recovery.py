@@ -16,8 +16,9 @@ from vkbloom._extras import import_extra
 from vkbloom._fit.losses import light
 from vkbloom._image_arguments import check_image
 from vkbloom._numbers import check_above, check_floats, check_size
-from vkbloom._psf.base import PSF, functions
+from vkbloom._psf.base import PSF
 from vkbloom._psf.sampled import samples
+from vkbloom._psf.varying import Varying
 from vkbloom._public import public
 
 Array = NDArray[np.float64]
@@ -133,7 +134,7 @@ def recover_psf(
     deviation = given or float(np.sqrt(np.mean([part[3] ** 2 for part in found])))
     is_field = positions is not None
     return RecoveredPSF(
-        psf=_field(kernels, grid) if is_field else samples(kernels[0, 0]),
+        psf=Varying(kernels, grid) if is_field else samples(kernels[0, 0]),
         kernels=kernels,
         error=error if is_field else error[0, 0],
         residual=residual,
@@ -166,15 +167,6 @@ def _check_pictures(
             raise ValueError(f"mask: {ignored.dtype} {ignored.shape} is not bool {shape}")
         used &= ~ignored
     return light(given[0]), light(given[1]), used
-
-
-def _field(kernels: Array, grid: tuple[tuple[float, ...], tuple[float, ...]]) -> PSF:
-    """Return the function of a field of kernels; without one, the kernel in the middle."""
-    kind: Any = functions().get("Varying")
-    if kind is None:
-        return samples(kernels[len(kernels) // 2, kernels.shape[1] // 2])
-    field: PSF = kind(kernels, grid)
-    return field
 
 
 def _weights_of(
