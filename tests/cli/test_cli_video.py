@@ -277,6 +277,11 @@ def test_a_full_disk(tmp_path: Path) -> None:
     assert one_line(result.stderr) == f"{tmp_path / 'full.mkv'}: No space left on device\n"
 
 
+def words_of(source: Path, out: Path) -> list[str]:
+    """Return the words of the command in a process of its own."""
+    return [sys.executable, "-m", "vkbloom", "apply", str(source), "-o", str(out), "-q"]
+
+
 def test_a_disk_that_fills_up(tmp_path: Path) -> None:
     rng = np.random.default_rng(1)
 
@@ -290,16 +295,7 @@ def test_a_disk_that_fills_up(tmp_path: Path) -> None:
         signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
         resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
 
-    words = [
-        sys.executable,
-        "-m",
-        "vkbloom",
-        "apply",
-        str(source),
-        "-o",
-        str(tmp_path / "out.mkv"),
-        "-q",
-    ]
+    words = words_of(source, tmp_path / "out.mkv")
     ended = subprocess.run(
         words, preexec_fn=limit_files, capture_output=True, text=True, check=False
     )
@@ -310,16 +306,7 @@ def test_a_disk_that_fills_up(tmp_path: Path) -> None:
 
 def test_interrupt_leaves_no_file(tmp_path: Path) -> None:
     source = write_clip(tmp_path / "a.mkv", "ffv1", "yuv420p", count=2000)
-    words = [
-        sys.executable,
-        "-m",
-        "vkbloom",
-        "apply",
-        str(source),
-        "-o",
-        str(tmp_path / "out.mkv"),
-        "-q",
-    ]
+    words = words_of(source, tmp_path / "out.mkv")
     with subprocess.Popen(words, stderr=subprocess.PIPE, text=True) as process:
         until = time.monotonic() + 60
         while not list(tmp_path.glob(".vkbloom-*")) and time.monotonic() < until:
