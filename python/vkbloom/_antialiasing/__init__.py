@@ -12,7 +12,7 @@ from vkbloom._settings.registry import ANTIALIASINGS, NAMED_ANTIALIASINGS
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from vkbloom._settings.antialiasing import NamedAntialiasing
+    from vkbloom._settings.named import NamedEntry
 
 ANTIALIASINGS.supply(
     __package__,
@@ -25,7 +25,7 @@ ANTIALIASINGS.supply(
 )
 
 
-def _presets() -> Mapping[str, NamedAntialiasing]:
+def _presets() -> Mapping[str, NamedEntry]:
     from vkbloom._antialiasing.presets import PRESETS  # noqa: PLC0415  costs start-up time
 
     return PRESETS

@@ -12,7 +12,7 @@ from vkbloom._settings.registry import EXPOSURES, NAMED_EXPOSURES
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from vkbloom._settings.exposure import NamedExposure
+    from vkbloom._settings.named import NamedEntry
 
 EXPOSURES.supply(
     __package__,
@@ -29,7 +29,7 @@ EXPOSURES.supply(
 )
 
 
-def _presets() -> Mapping[str, NamedExposure]:
+def _presets() -> Mapping[str, NamedEntry]:
     from vkbloom._exposure.presets import PRESETS  # noqa: PLC0415  costs start-up time
 
     return PRESETS

@@ -5,15 +5,14 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar, Final, Literal, NamedTuple
+from typing import Any, ClassVar, Final, Literal
 
 from vkbloom._numbers import check_floats, check_number
 from vkbloom._public import public
 from vkbloom._settings.fields import value_field
-from vkbloom._settings.named import Named
+from vkbloom._settings.named import Named, check_named
 from vkbloom._settings.records import Record
 from vkbloom._settings.registry import ANTIALIASINGS, NAMED_ANTIALIASINGS
-from vkbloom._spelling import describe_unknown
 
 #: Whether frames are resolved before the bloom is made of them, or with their bloom.
 Order = Literal["before", "after"]
@@ -114,14 +113,6 @@ def gaussian_weights(
     return rows
 
 
-class NamedAntialiasing(NamedTuple):
-    """An entry of `antialiasing`."""
-
-    make: Any
-    what: str
-    whose: str
-
-
 #: Name to temporal anti-aliasing, for ``taa=vkbloom.antialiasing[name]``, or ``taa=name``.
 #: ``docs/exposure.md`` lists what they are, with their sources.
 antialiasing: Final[Named[Antialiasing]] = NAMED_ANTIALIASINGS
@@ -129,16 +120,7 @@ antialiasing: Final[Named[Antialiasing]] = NAMED_ANTIALIASINGS
 
 def check_antialiasing(taa: object) -> Antialiasing:
     """Return the anti-aliasing, or that of a preset; raise TypeError or ValueError for others."""
-    if isinstance(taa, Antialiasing):
-        return taa
-    if isinstance(taa, str):
-        if taa not in antialiasing:
-            raise ValueError(describe_unknown("taa: unknown preset", taa, antialiasing))
-        return antialiasing[taa]
-    hint = ""
-    if isinstance(taa, type) and issubclass(taa, Antialiasing):
-        hint = f"; give {taa.__name__}()"
-    raise TypeError(f"taa: {taa!r} is not an Antialiasing or the name of one{hint}")
+    return check_named("taa", taa, Antialiasing, antialiasing)
 
 
 def check_use(taa: object, **geometry: object) -> None:

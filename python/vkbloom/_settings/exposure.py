@@ -5,14 +5,13 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar, Final, NamedTuple
+from typing import Any, ClassVar, Final
 
 from vkbloom._numbers import check_number
 from vkbloom._public import public
-from vkbloom._settings.named import Named
+from vkbloom._settings.named import Named, check_named
 from vkbloom._settings.records import Record
 from vkbloom._settings.registry import EXPOSURES, NAMED_EXPOSURES
-from vkbloom._spelling import describe_unknown
 
 
 @public("vkbloom")
@@ -68,14 +67,6 @@ def check_ends(settings: Any, low: str, high: str, *, apart: bool = False) -> No
         raise ValueError(f"{low}: {least!r} is not below {high}, {most!r}")
 
 
-class NamedExposure(NamedTuple):
-    """An entry of `exposures`."""
-
-    make: Any
-    what: str
-    whose: str
-
-
 #: The longest step of time, and that of a call that gives none.
 MAX_SECONDS: Final = 86400.0
 DEFAULT_SECONDS: Final = 1 / 60
@@ -87,16 +78,7 @@ exposures: Final[Named[Exposure]] = NAMED_EXPOSURES
 
 def check_exposure(exposure: object) -> Exposure:
     """Return the exposure, or that of a preset; raise TypeError or ValueError for what is none."""
-    if isinstance(exposure, Exposure):
-        return exposure
-    if isinstance(exposure, str):
-        if exposure not in exposures:
-            raise ValueError(describe_unknown("exposure: unknown preset", exposure, exposures))
-        return exposures[exposure]
-    hint = ""
-    if isinstance(exposure, type) and issubclass(exposure, Exposure):
-        hint = f"; give {exposure.__name__}()"
-    raise TypeError(f"exposure: {exposure!r} is not an Exposure or the name of one{hint}")
+    return check_named("exposure", exposure, Exposure, exposures)
 
 
 def check_seconds(name: str, seconds: float | None) -> float:

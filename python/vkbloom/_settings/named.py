@@ -3,11 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 from vkbloom._spelling import describe_unknown
 
 T = TypeVar("T")
+
+
+class NamedEntry(NamedTuple):
+    """How the object of a name is made, what it is, and whose."""
+
+    make: Callable[[], Any]
+    what: str
+    whose: str
 
 
 class Named(Mapping[str, T]):
@@ -86,3 +94,20 @@ class Named(Mapping[str, T]):
 
         left = {"style": "text-align:left"}
         return str(table(self._rows(), (self._kind, "what", "whose"), name=left, cell=left))
+
+
+def check_named(name: str, given: object, kind: type[T], entries: Named[T]) -> T:
+    """Return an object of a class, or that of a preset; raise TypeError or ValueError for others.
+
+    `name`: that of the argument.
+    """
+    if isinstance(given, kind):
+        return given
+    if isinstance(given, str):
+        if given not in entries:
+            raise ValueError(describe_unknown(f"{name}: unknown preset", given, entries))
+        return entries[given]
+    hint = ""
+    if isinstance(given, type) and issubclass(given, kind):
+        hint = f"; give {given.__name__}()"
+    raise TypeError(f"{name}: {given!r} is not an {kind.__name__} or the name of one{hint}")
