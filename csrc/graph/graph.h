@@ -144,10 +144,9 @@ struct vkb_transform {
 
 // Bindings: 0 is the parameter block, then the images read, by slot, then the targets of a
 // dispatch, of which one can be among the images read: each invocation then stores where it has
-// loaded. A
-// skybox reads the scene's cubemap at binding 1; textured triangles read the textures
-// of base colour and emission. Consecutive draws with the same targets share a render pass, with
-// the load operation of the first.
+// loaded. A skybox reads the scene's cubemap at binding 1; textured triangles read the textures of
+// base colour and emission. Consecutive draws with the same targets share a render pass, with the
+// load operation of the first.
 struct vkb_pass_row {
     char name[VKB_NAME_SIZE];
     const char *variant;  // name of the variant that replaces the method's pass; NULL: none
