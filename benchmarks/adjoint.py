@@ -4,7 +4,8 @@ Forward are the passes of "final", backward those from its cotangents to the ima
 turns with three images and cotangents, all RGB in single floats. Without a curve the backward
 passes need nothing of the forward ones. On a GPU the times are those of the passes on the device;
 on a CPU they are the processor time of the complete calls, which other work on the machine does
-not change much, at a smaller size. PyTorch's is the same `Pyramid` in convolutions, with autograd;
+not change much, at a smaller size. The derivatives of a small image are compared with those of the
+fragment variant first. PyTorch's is the same `Pyramid` in convolutions, with autograd;
 its memory is the most that it had allocated, without the images that wait for their turn, that of
 vkbloom all of its images.
 """
@@ -12,7 +13,6 @@ vkbloom all of its images.
 from __future__ import annotations
 
 import importlib
-import time
 from collections.abc import Callable
 from typing import Any, Final
 
@@ -21,9 +21,19 @@ from numpy.typing import NDArray
 
 import vkbloom
 from benchmarks.inputs import pictures
+from benchmarks.ours import OURS
+from benchmarks.peers import pytorch
 from benchmarks.plan import Plan
-from benchmarks.results import Goal, Section, Table, agreement, side_by_side
-from benchmarks.timing import alternate_seconds, wall_clock
+from benchmarks.results import Agreement, Goal, Section, agreement, side_by_side
+from benchmarks.timing import (
+    PASSES,
+    PROCESSOR,
+    WALL,
+    alternate_seconds,
+    estimate,
+    processor_clock,
+    wall_clock,
+)
 from vkbloom import _core
 from vkbloom._renderer import requests
 from vkbloom._renderer.new_arrays import new_arrays
@@ -42,16 +52,11 @@ SETTINGS: Final[dict[str, vkbloom.Settings]] = {
     "Pyramid": PYRAMID,
     "Pyramid, threshold, ACES": PYRAMID.replace(threshold=0.5, tonemap="aces"),
     "DualKawase": vkbloom.DualKawase(levels=LEVELS, threshold=0.5),
-    "BevyBloom": vkbloom.presets["bevy_natural"],
     "KinoBloom": vkbloom.KinoBloom(),
-    "UrpBloom": vkbloom.presets["unity_urp"],
-    "ThreeBloom": vkbloom.presets["threejs_unreal"],
-    "HdrpBloom": vkbloom.presets["unity_hdrp"],
-    "GodotBloom": vkbloom.presets["godot_4_6"],
-    "BlenderGlare": vkbloom.presets["blender_bloom"],
-}
+} | dict(vkbloom.presets)
 #: The most that a pullback may cost, times the framebuffer.
 MAX_RATIO: Final = 2.5
+PYTORCH: Final = "PyTorch"
 #: How much faster than PyTorch, and in which part of its memory.
 FASTER, PART_OF_MEMORY = 5.0, 0.25
 
@@ -65,27 +70,44 @@ def run(plan: Plan, section: Section) -> None:
     images = [np.ascontiguousarray(one[..., :3]) for one in pictures(size, np.float32)]
     random = np.random.default_rng(0)
     cotangents = [random.standard_normal(one.shape, np.float32) for one in images]
-    times: dict[str, Any] = {}
+    small = size[0] // 4, size[1] // 4
     for name, chosen in SETTINGS.items():
         plan.tell(f"adjoint: {name}")
-        # The levels of Bevy have a size of their own.
-        small = {"max_mip_dimension": 16} if plan.quick and name == "BevyBloom" else {}
-        settings = chosen.replace(format="rgba32float", **small)
+        settings = chosen.replace(format="rgba32float")
         with plan.renderer() as renderer:
             ours = _calls(renderer, settings, images, cotangents)
             if ours is None:
                 section.missing.append(f"{name}: the reference computes its derivatives")
                 continue
-            if on_cpu:
-                ours = {name: _processor_time(call) for name, call in ours.items()}
-            times[name] = alternate_seconds(ours, plan.times(ROUNDS), warm_up=3)
-            memory = renderer._core.cached[1]
-        backward = times[name]["backward"].over(times[name]["forward"]).value
+            section.agreements.append(_beside_fragment(plan, name, settings, small))
+            if not section.agreements[-1].agrees:
+                continue
+            clocks = {one: processor_clock(call) for one, call in ours.items()} if on_cpu else ours
+            warm_up = 1 if on_cpu else 3
+            times = alternate_seconds(clocks, plan.times(ROUNDS), warm_up=warm_up)
+            if name == "Pyramid":
+                memory = renderer._core.cached[1]
+                _beside_torch(plan, section, (images, cotangents), clocks, memory)
+        backward = times["backward"].over(times["forward"])
         section.goals.append(Goal(f"{name}: backward / forward", backward, MAX_RATIO, at_most=True))
-        section.times[name] = times[name]
-        section.tables.append(side_by_side(name, times[name], "forward"))
-        if name == "Pyramid":
-            _beside_torch(plan, section, (images, cotangents), times[name], memory)
+        section.add_times(name, times, PROCESSOR if on_cpu else PASSES, "forward")
+        section.tables.append(side_by_side(name, times, "forward"))
+
+
+def _beside_fragment(
+    plan: Plan, name: str, settings: vkbloom.Settings, size: tuple[int, int]
+) -> Agreement:
+    """Compare the derivatives of a small image with those of the fragment variant."""
+    image = np.ascontiguousarray(pictures(size, np.float32)[0][..., :3])
+    cotangent = np.random.default_rng(1).standard_normal(image.shape, np.float32)
+    found = []
+    for variant in ("fragment", "auto"):
+        with plan.renderer(variant) as renderer:
+            found.append(_pull(renderer, settings, image, cotangent)[0])
+    expected, made = found
+    most = 1e-5 * float(np.abs(expected).max())
+    reason = "a hundred-thousandth of the largest derivative"
+    return agreement(f"{name}: derivatives of fragment", expected, made, most, reason)
 
 
 def _calls(
@@ -109,15 +131,6 @@ def _calls(
     return {"forward": forward, "backward": backward}
 
 
-def _processor_time(call: Callable[[int], float]) -> Callable[[int], float]:
-    def time_turn(turn: int) -> float:
-        start = time.process_time()
-        call(turn)
-        return time.process_time() - start
-
-    return time_turn
-
-
 def _pull(
     renderer: vkbloom.Renderer,
     settings: vkbloom.Settings,
@@ -138,7 +151,7 @@ def _beside_torch(
     plan: Plan,
     section: Section,
     inputs: tuple[list[NDArray[Any]], list[NDArray[Any]]],
-    ours: dict[str, Any],
+    ours: dict[str, Callable[[int], float]],
     memory: int,
 ) -> None:
     try:
@@ -158,7 +171,7 @@ def _beside_torch(
 
     def pull(turn: int) -> Any:
         image = given[0][turn % 3].detach().requires_grad_()
-        final = image + _pyramid(torch, image)
+        final = image + pytorch.pyramid(image, LEVELS)
         return torch.autograd.grad(final, image, given[1][turn % 3])[0]
 
     with plan.renderer() as renderer:
@@ -168,37 +181,40 @@ def _beside_torch(
     reason = "a hundred-thousandth of the largest derivative"
     what = "Pyramid: derivatives of PyTorch"
     section.agreements.append(agreement(what, expected, found, most, reason))
-    both = alternate_seconds({"PyTorch": _time(torch, device, pull)}, plan.times(ROUNDS))
-    seconds = ours["forward"].median + ours["backward"].median
-    theirs = both["PyTorch"].median
-    rows = [
-        ("vkbloom", f"{1e3 * seconds:.3f}", f"{memory / 2**20:.0f}"),
-        (f"PyTorch on {device}", f"{1e3 * theirs:.3f}", ""),
-    ]
-    goals = [
-        Goal("Pyramid, both directions: vkbloom / PyTorch", seconds / theirs, 1 / FASTER, True)
-    ]
-    if device == "cuda":
+    on_device = device == "cuda"
+    calls = {
+        OURS: lambda turn: ours["forward"](turn) + ours["backward"](turn),
+        PYTORCH: _time(torch, device, pull),
+    }
+    clocks = {OURS: PASSES, PYTORCH: PASSES} if on_device else {OURS: PROCESSOR, PYTORCH: PROCESSOR}
+    if on_device:
+        wait = pytorch.synchronized(pull, device)
+        calls[f"{PYTORCH}, its wall clock"] = wall_clock(wait)
+        clocks[f"{PYTORCH}, its wall clock"] = WALL
+    both = alternate_seconds(calls, plan.times(ROUNDS), warm_up=3)
+    group = "Pyramid, both directions"
+    section.add_times(group, both, clocks, OURS)
+    section.tables.append(side_by_side(group, both, OURS))
+    section.add_memory(group, f"{OURS}, memory", [memory / 2**20])
+    if on_device:
+        faster = both[OURS].over(both[PYTORCH])
+        section.goals.append(Goal(f"{group}: {OURS} / {PYTORCH}", faster, 1 / FASTER, True))
         torch.cuda.reset_peak_memory_stats()
         pull(1)
         # One image and its cotangents belong to the work, the others wait for their turn.
         waiting = 2 * sum(kind[0].nbytes for kind in given)
         most = torch.cuda.max_memory_allocated() - waiting
-        rows[1] = (*rows[1][:2], f"{most / 2**20:.0f}")
-        goals.append(
-            Goal("Pyramid: memory of vkbloom / PyTorch", memory / most, PART_OF_MEMORY, True)
+        section.add_memory(group, f"{PYTORCH}, memory", [most / 2**20])
+        part = estimate([memory / most])
+        section.goals.append(
+            Goal("Pyramid: memory of vkbloom / PyTorch", part, PART_OF_MEMORY, at_most=True)
         )
-        section.goals += goals
-    section.times["Pyramid, PyTorch"] = both
-    section.tables.append(
-        Table("Pyramid, forward and backward", ("", "median, ms", "MiB"), tuple(rows))
-    )
 
 
 def _time(torch: Any, device: str, call: Callable[[int], Any]) -> Callable[[int], float]:
     """Return a call that returns its seconds on the device."""
     if device == "cpu":
-        return wall_clock(call)
+        return processor_clock(call)
 
     def on_device(turn: int) -> float:
         start, end = (torch.cuda.Event(enable_timing=True) for _ in range(2))
@@ -209,38 +225,3 @@ def _time(torch: Any, device: str, call: Callable[[int], Any]) -> Callable[[int]
         return 1e-3 * float(start.elapsed_time(end))
 
     return on_device
-
-
-def _pyramid(torch: Any, image: Any) -> Any:
-    """Return the bloom of `PYRAMID`: sides are halved without a rest."""
-    functional = torch.nn.functional
-    outer, inner = (
-        torch.tensor(one, device=image.device) for one in (_line(2.0, 0.25, 0.5), _line(1.0, 0.5))
-    )
-    down = 0.5 * (torch.outer(outer, outer) + torch.outer(inner, inner))
-    tent = torch.tensor([0.25, 0.5, 0.25], device=image.device)
-    kernels = [one.expand(3, 1, *one.shape).contiguous() for one in (down, torch.outer(tent, tent))]
-    levels = [image]
-    for _ in range(LEVELS):
-        padded = functional.pad(levels[-1], (2, 2, 2, 2), mode="replicate")
-        levels.append(functional.conv2d(padded, kernels[0], stride=2, groups=3))
-
-    def enlarge(level: Any) -> Any:
-        padded = functional.pad(level, (2, 2, 2, 2), mode="replicate")
-        filtered = functional.conv2d(padded, kernels[1], groups=3)
-        double = functional.interpolate(filtered, scale_factor=2, mode="bilinear")
-        return double[..., 2:-2, 2:-2]
-
-    up = levels[-1]
-    for level in levels[-2:0:-1]:
-        up = level + enlarge(up)
-    return enlarge(up) / LEVELS
-
-
-def _line(distance: float, side: float, middle: float = 0.0) -> list[float]:
-    """Return the weights of six texels for taps between the middle two and beside them."""
-    weights = [0.0] * 6
-    for offset, share in ((-distance, side), (0.0, middle), (distance, side)):
-        for texel in (2, 3):
-            weights[texel + int(offset)] += share / 2
-    return weights

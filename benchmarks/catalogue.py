@@ -7,31 +7,52 @@ import inspect
 import os
 from collections.abc import Iterator, Mapping
 from types import MappingProxyType
-from typing import Final
+from typing import Final, NamedTuple
 
 import vkbloom
 from benchmarks.machine import describe
 from benchmarks.plan import Plan
 from benchmarks.results import Report, Section
 
-__all__ = ["BENCHMARKS", "run"]
+__all__ = ["BENCHMARKS", "Benchmark", "run"]
 
-#: What each benchmark times, by its id. Each is a module of this package (with _ in place of -).
-#: The paragraphs of its docstring, after the first, begin `Section.about`. Its function
-#: ``run(plan, section)`` adds the rest.
-BENCHMARKS: Final[Mapping[str, str]] = MappingProxyType(
+
+class Benchmark(NamedTuple):
+    """A benchmark: a module of this package with the name of its id (with _ in place of -).
+
+    The paragraphs of the module's docstring, after the first, begin `Section.about`. Its function
+    ``run(plan, section)`` adds the rest.
+
+    - `what`: What it times.
+    - `shown`: Patterns of the contenders that docs/performance.md shows; empty: all.
+    """
+
+    what: str
+    shown: tuple[str, ...] = ()
+
+
+#: All benchmarks by their ids.
+BENCHMARKS: Final[Mapping[str, Benchmark]] = MappingProxyType(
     {
-        "image": "an image's bloom, NumPy in and out, against image libraries",
-        "pyramid": "a pyramid of five levels against pygfx and a Gaussian of the same spread",
-        "forward": "the time that bloom adds to a forward frame, against the source's variant",
-        "requests": "many requests with one image, against single calls",
-        "cost": "cost against pixels, kernel length and levels",
-        "startup": "import, renderer and first frame, in fresh processes",
-        "convolution": "convolution with large kernels against SciPy's transforms",
-        "convolution-gpu": "convolution at 4K and 1080p on a GPU, against torch.fft",
-        "field": "a kernel that depends on the place against optiland and photutils",
-        "adjoint": "derivatives by the image against the framebuffer and against PyTorch",
-        "image-gpu": "an image's bloom at 4K on a GPU, against CUDA",
+        "image": Benchmark(
+            "an image's bloom, NumPy in and out, against image libraries",
+            ("vkbloom", "vkbloom, the source's.*", "OpenCV", "SciPy", "scikit-image", "PyTorch"),
+        ),
+        "presets": Benchmark("each preset, the adapter's variant beside fragment"),
+        "pyramid": Benchmark("a pyramid of five levels against pygfx and a Gaussian of its spread"),
+        "forward": Benchmark("the time that bloom adds to a forward frame, against fragment"),
+        "requests": Benchmark("many requests with one image, against single calls"),
+        "cost": Benchmark("cost against pixels, kernel length and levels"),
+        "startup": Benchmark("import, renderer and first frame, in fresh processes"),
+        "first-call": Benchmark("the first call of each preset, in fresh processes"),
+        "memory": Benchmark("memory of a process and of its renderers"),
+        "transfers": Benchmark("calls at 4K and 1080p against the bare transfers of their bytes"),
+        "convolution": Benchmark("convolution with large kernels against transforms on the host"),
+        "adjoint": Benchmark("derivatives of each preset by the image against the framebuffer"),
+        "training": Benchmark("training steps by the wall clock, against PyTorch"),
+        "image-gpu": Benchmark("an image's bloom at 4K on a GPU, against CUDA"),
+        "convolution-gpu": Benchmark("convolution at 4K and 1080p on a GPU, against torch.fft"),
+        "field": Benchmark("a kernel that depends on the place against optiland and photutils"),
     }
 )
 

@@ -1,9 +1,9 @@
-"""Convolution with large kernels on a GPU, half-float RGBA in and out, against torch.fft.
+"""Convolution with large kernels on a GPU, half-float RGBA, against torch.fft and VkFFT.
 
-Times on the device: for vkbloom the timestamps of its passes, for torch CUDA events. The complete
-bloom is a hard threshold, the convolution in single floats and the sum; alone are the transforms
-and the product, from half floats to half floats. All keep the kernel's spectrum. The images of
-torch stay on the device.
+Times on the device: for vkbloom the timestamps of its passes, for the others CUDA events. The
+complete bloom is a hard threshold, the convolution in single floats and the sum; alone are the
+transforms and the product, from half floats to half floats. All keep the kernel's spectrum. The
+images of the others stay on the device.
 """
 
 from __future__ import annotations
@@ -29,6 +29,7 @@ ROUNDS: Final = 25
 OURS_ALONE: Final = "vkbloom, convolution alone"
 STAGES: Final = "vkbloom, stage by stage"
 TORCH: Final = "torch.fft"
+VKFFT: Final = "VkFFT"
 TORCH_ALONE: Final = "torch.fft, convolution alone"
 #: The passes of the convolution itself, by the names of their times.
 PASSES: Final = ("spectrum", "bloom")
@@ -62,7 +63,7 @@ def _time_one(
 ) -> None:
     (group, settings), (height, width) = work, images[0].shape[:2]
     theirs: dict[str, peers.GpuWork] = peers.gather(
-        ("PyTorch",),
+        ("PyTorch", "VkFFT"),
         lambda peer: peer.gpu_convolution(images[0], *place(settings, (width, height)), THRESHOLD),
         section.missing,
     )
@@ -108,7 +109,8 @@ def _time_one(
         group,
         times,
         (OURS, TORCH, 1.0, True),
+        (OURS, VKFFT, 1.0, True),
         (OURS_ALONE, TORCH_ALONE, 1.0, True),
     )
-    names = (peers.COPY, OURS, OURS_ALONE, TORCH, TORCH_ALONE)
+    names = (peers.COPY, OURS, OURS_ALONE, TORCH, TORCH_ALONE, VKFFT)
     section.tables += peers.bandwidths(group, times, images[0].nbytes, names)

@@ -37,6 +37,7 @@ SIDE: Final = 1024
 SMALL: Final = 256
 SEPARABLE: Final = "vkbloom, 9 taps"
 FRAGMENT: Final = "vkbloom, 9 taps, fragment variant"
+OURS: Final = "vkbloom, Separable"
 PYRAMID: Final = "vkbloom, Pyramid(levels=5)"
 
 
@@ -100,7 +101,9 @@ def _over_pixels(
             *_peer_contenders(plan, section, images, full_kernel(SETTINGS), "OpenCV, 9 taps"),
         ]
         times = alternate(contenders, plan.times(25 if side < 1024 else 9))
-        section.times[f"{side} x {side}"] = times
+        section.add_times(
+            f"{side} x {side}", times, {each.name: each.clock for each in contenders}, SEPARABLE
+        )
         for name, measured in times.items():
             found.setdefault(name, []).append(measured)
     axis = CostAxis(
@@ -125,11 +128,13 @@ def _over_taps(plan: Plan, section: Section, ours: vkbloom.Renderer) -> None:
         weights = vkbloom.gaussian_weights(max(radius / 2, 0.5), radius)
         settings = SETTINGS.replace(weights=weights, blur_strength=1.0)
         contenders = [
-            contender("vkbloom, Separable", ours, itertools.cycle(images), settings),
+            contender(OURS, ours, itertools.cycle(images), settings),
             *_peer_contenders(plan, section, images, full_kernel(settings), "OpenCV, sepFilter2D"),
         ]
         times = alternate(contenders, plan.times(9))
-        section.times[f"{2 * radius + 1} taps"] = times
+        section.add_times(
+            f"{2 * radius + 1} taps", times, {each.name: each.clock for each in contenders}, OURS
+        )
         for name, measured in times.items():
             found.setdefault(name, []).append(measured)
     taps = tuple(2 * radius + 1 for radius in radii)
@@ -151,11 +156,12 @@ def _over_levels(plan: Plan, section: Section, ours: vkbloom.Renderer) -> None:
     levels = LEVELS[:3] if plan.quick else LEVELS
     plan.tell("cost: levels")
     settings = {count: vkbloom.Pyramid(levels=count, threshold=THRESHOLD) for count in levels}
+    contenders = [contender(str(count), ours, images, each) for count, each in settings.items()]
     times = alternate(
-        [contender(str(count), ours, images, each) for count, each in settings.items()],
+        contenders,
         plan.times(9),
     )
-    section.times["levels"] = times
+    section.add_times("levels", times, {each.name: each.clock for each in contenders}, "")
     # The first two levels hold nearly all pixels. Each further level costs only its passes.
     first = min(2, len(levels) - 2)
     axis = CostAxis(

@@ -76,16 +76,15 @@ def run(plan: Plan, section: Section) -> None:
         name: times[f"{name}, bloom on"].minus(times[f"{name}, bloom off"])
         for name in NAMES.values()
     }
-    section.times["bloom alone"] = extra
+    section.add_times("bloom alone", extra, ours=NAMES["auto"])
     rows = []
     for name, each in extra.items():
-        low, high = each.quartiles()
+        _, low, high = each.estimate()
         rows.append((name, f"{1e3 * each.median:.2f}", f"{1e3 * low:.2f} to {1e3 * high:.2f}"))
     section.tables.append(
-        Table("Bloom alone", ("", "median of the differences, ms", "quartiles"), tuple(rows))
+        Table("Bloom alone", ("", "median of the differences, ms", "interval"), tuple(rows))
     )
-    cost, source_cost = (each.median for each in extra.values())
-    ratio = cost / source_cost if source_cost > 0 else float("nan")
+    ratio = extra[NAMES["auto"]].over(extra[NAMES["fragment"]])
     if all(found.agrees for found in section.agreements):
         what = "forward frame: bloom's cost / that of the source's variant"
         section.goals.append(Goal(what, ratio, 1 / 3, at_most=True))

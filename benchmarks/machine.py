@@ -57,6 +57,8 @@ def command(plan: Plan) -> str:
         words.append("--quick")
     if plan.rounds is not None:
         words += ["--rounds", str(plan.rounds)]
+    if plan.seconds != Plan.seconds:
+        words += ["--seconds", f"{plan.seconds:g}"]
     if plan.requests != Plan.requests:
         words += ["--requests", str(plan.requests)]
     if plan.threads != usable_cores():

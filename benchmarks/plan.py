@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 import vkbloom
+from benchmarks.timing import Rounds
 
 #: Selects the variants of passes for renderers that are made while it is set.
 VARIANTS_VARIABLE = "VKBLOOM_VARIANT"
@@ -35,7 +37,10 @@ class Plan:
     quick : bool
         Small images and few rounds: a check that everything runs. The figures mean nothing.
     rounds : int or None
-        Rounds for each contender, at least 3. None: the benchmark's own number.
+        Rounds for each contender, at least 3. None: the benchmark's own number, and up to four
+        times as many while intervals are wide.
+    seconds : float
+        A group of contenders begins no round after so many seconds, but the first three.
     requests : int
         Number of requests of the benchmark "requests", at least 1.
     threads : int
@@ -54,6 +59,7 @@ class Plan:
     adapter: str = "auto"
     quick: bool = False
     rounds: int | None = None
+    seconds: float = 10.0
     requests: int = 10_000
     threads: int = field(default_factory=usable_cores)
     only: tuple[str, ...] = ()
@@ -65,9 +71,12 @@ class Plan:
             if value is not None and value < least:
                 raise ValueError(f"{name}: {value!r} is out of range, {least} or more")
 
-    def times(self, usual: int) -> int:
-        """Return the number of rounds; `usual` is the benchmark's own number."""
-        return self.rounds or (3 if self.quick else usual)
+    def times(self, usual: int) -> Rounds:
+        """Return the number of rounds; `usual` is the least number of the benchmark itself."""
+        if self.quick or self.rounds is not None:
+            count = self.rounds or 3
+            return Rounds(count, count, math.inf)
+        return Rounds(usual, 4 * usual, self.seconds)
 
     def size(self, width: int, height: int) -> tuple[int, int]:
         """Return the size to run at; --quick reduces it to about 256 a side."""

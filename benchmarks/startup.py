@@ -8,22 +8,19 @@ system's page cache, so that the disk is not measured.
 from __future__ import annotations
 
 import json
-import os
-import subprocess
-import sys
 import tempfile
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
+from benchmarks.ours import prepare_child
 from benchmarks.plan import Plan
 from benchmarks.results import Section, Table
-from benchmarks.timing import Contender, Times, alternate
+from benchmarks.timing import Contender, Rounds, Times, alternate
 
 __all__ = ["run"]
 
 ROUNDS: Final = 9
 SIZE: Final = (1280, 720)
-MAX_SECONDS: Final = 120
 
 _FIRST_FRAMES: Final = """
 import json, sys, time
@@ -57,26 +54,12 @@ def run(plan: Plan, section: Section) -> None:
     """Time the imports and the first frame of fresh processes."""
     size = plan.size(*SIZE)
     section.title = f"Start-up, in fresh processes; frames of {size[0]} x {size[1]}"
-    rounds = 1 if plan.quick else plan.times(ROUNDS)
+    rounds = Rounds(1, 1, 0.0) if plan.quick else plan.times(ROUNDS)
     _imports(plan, section, rounds)
     _frames(plan, section, rounds, size)
 
 
-def _child(arguments: list[str], environment: dict[str, str] | None = None) -> Any:
-    done = subprocess.run(
-        [sys.executable, *arguments],
-        env=environment,
-        capture_output=True,
-        text=True,
-        timeout=MAX_SECONDS,
-        check=False,
-    )
-    if done.returncode != 0:
-        raise RuntimeError(f"a child process failed: {done.stderr.strip()[-500:]}")
-    return done
-
-
-def _imports(plan: Plan, section: Section, rounds: int) -> None:
+def _imports(plan: Plan, section: Section, rounds: Rounds) -> None:
     """Add the times of imports as complete processes."""
     plan.tell("startup: imports")
     statements = {
@@ -84,15 +67,16 @@ def _imports(plan: Plan, section: Section, rounds: int) -> None:
         "import numpy": "import numpy",
         "import vkbloom": "import vkbloom",
     }
+    calls = {name: prepare_child(statement, ()) for name, statement in statements.items()}
     times = alternate(
         [
-            Contender(name, lambda _, code=statement: _child(["-c", code]))  # type: ignore[misc]
-            for name, statement in statements.items()
+            Contender(name, lambda _, call=call: call())  # type: ignore[misc]
+            for name, call in calls.items()
         ],
         rounds,
         warm_up=0 if plan.quick else 1,
     )
-    section.times["processes"] = times
+    section.add_times("processes", times)
     bare = times["Python alone"]
     rows = tuple(
         (
@@ -107,7 +91,7 @@ def _imports(plan: Plan, section: Section, rounds: int) -> None:
     section.tables.append(Table("Imports, from start to exit of a process", header, rows))
 
 
-def _frames(plan: Plan, section: Section, rounds: int, size: tuple[int, int]) -> None:
+def _frames(plan: Plan, section: Section, rounds: Rounds, size: tuple[int, int]) -> None:
     """Add the times of the renderer and the first frames, by the state of the caches."""
     plan.tell("startup: first frames")
     steps: dict[str, dict[str, list[float]]] = {name: {} for name in _CACHES}
@@ -115,7 +99,7 @@ def _frames(plan: Plan, section: Section, rounds: int, size: tuple[int, int]) ->
         for name in _CACHES[1:]:
             # Fill the caches.
             _first_frames(plan, name, Path(folder), size)
-        for turn in range(rounds):
+        for turn in range(rounds.least):
             for name in _CACHES:
                 place = Path(folder)
                 if name == _CACHES[0]:
@@ -128,7 +112,7 @@ def _frames(plan: Plan, section: Section, rounds: int, size: tuple[int, int]) ->
         until = zip(*(found[step] for step in list(found)[:-1]), strict=True)
         measured["total to the first frame"] = Times(tuple(sum(parts) for parts in until))
         columns[name] = measured
-        section.times[f"first frames, {name}"] = measured
+        section.add_times(f"first frames, {name}", measured)
     rows = tuple(
         (step, *(f"{1e3 * columns[name][step].median:.1f}" for name in _CACHES))
         for step in columns[_CACHES[0]]
@@ -138,16 +122,7 @@ def _frames(plan: Plan, section: Section, rounds: int, size: tuple[int, int]) ->
 
 
 def _first_frames(plan: Plan, caches: str, folder: Path, size: tuple[int, int]) -> dict[str, float]:
-    environment = dict(os.environ)
-    ours, drivers = folder / "vkbloom", folder / "driver"
-    environment["VKBLOOM_CACHE_DIR"] = str(ours)
-    # For Mesa and NVIDIA.
-    for variable in ("MESA_SHADER_CACHE_DIR", "__GL_SHADER_DISK_CACHE_PATH"):
-        environment[variable] = str(drivers)
-    if caches != _CACHES[2]:
-        environment["MESA_SHADER_CACHE_DISABLE"] = "true"
-        environment["__GL_SHADER_DISK_CACHE"] = "0"
-    drivers.mkdir(parents=True, exist_ok=True)
-    done = _child(["-c", _FIRST_FRAMES, plan.adapter, json.dumps(size)], environment)
-    steps: dict[str, float] = json.loads(done.stdout)
+    arguments = plan.adapter, json.dumps(size)
+    call = prepare_child(_FIRST_FRAMES, arguments, folder, of_driver=caches == _CACHES[2])
+    steps: dict[str, float] = json.loads(call())
     return steps

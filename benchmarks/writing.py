@@ -10,8 +10,9 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from benchmarks.results import Report, Section, Table
+from benchmarks.timing import Estimate
 
-__all__ = ["Earlier", "as_json", "as_markdown", "read_earlier", "write"]
+__all__ = ["Earlier", "as_json", "as_markdown", "lines_of", "read_earlier", "write"]
 
 
 class Earlier(NamedTuple):
@@ -27,7 +28,7 @@ def read_earlier(path: Path) -> Earlier:
         report = json.loads(path.read_text(encoding="utf-8"))
         goals = [goal for section in report["sections"] for goal in section["goals"]]
         ratios = {
-            str(goal["what"]): "nan" if goal["ratio"] is None else f"{goal['ratio']:.3g}"
+            str(goal["what"]): str(Estimate(*(math.nan if n is None else n for n in goal["ratio"])))
             for goal in goals
         }
         return Earlier(str(report["machine"]["driver"]), ratios)
@@ -64,7 +65,7 @@ def as_json(report: Report) -> dict[str, Any]:
                 name: {
                     "median": times.median,
                     "least": times.least,
-                    "quartiles": times.quartiles(),
+                    "interval": times.estimate()[1:],
                     "seconds": times.seconds,
                 }
                 for name, times in measured.items()
@@ -95,14 +96,14 @@ def as_markdown(report: Report, beside: Sequence[Earlier] = ()) -> str:
             "peers use. They say nothing about a GPU.",
             "",
         ]
-    lines += _table(_machine_table(machine))
+    lines += lines_of(_machine_table(machine))
     goals = [(section.id, goal) for section in report.sections for goal in section.goals]
     if goals:
         rows = tuple(
             (
                 goal.what,
                 f"{'at most' if goal.at_most else 'at least'} {goal.wanted:.3g}",
-                f"{goal.ratio:.3g}",
+                str(goal.ratio),
                 "yes" if goal.met else "no",
                 *(other.ratios.get(goal.what, "not measured") for other in beside),
                 name,
@@ -110,8 +111,8 @@ def as_markdown(report: Report, beside: Sequence[Earlier] = ()) -> str:
             for name, goal in goals
         )
         drivers = tuple(f"with {other.driver}" for other in beside)
-        header = ("ratio of medians", "wanted", "measured", "met", *drivers, "benchmark")
-        lines += ["## Goals", "", *_table(Table("", header, rows))]
+        header = ("ratio (interval)", "wanted", "measured", "met", *drivers, "benchmark")
+        lines += ["## Goals", "", *lines_of(Table("", header, rows))]
     for section in report.sections:
         lines += _section(section)
     return "\n".join(lines).rstrip() + "\n"
@@ -132,7 +133,7 @@ def _section(section: Section) -> list[str]:
     for paragraph in section.about:
         lines += [paragraph, ""]
     for table in section.tables:
-        lines += _table(table)
+        lines += lines_of(table)
     if section.agreements:
         rows = tuple(
             (
@@ -144,15 +145,16 @@ def _section(section: Section) -> list[str]:
             for found in section.agreements
         )
         header = ("same picture?", "largest difference", "allowed", "agrees")
-        lines += _table(Table("", header, rows))
-        reasons = dict.fromkeys((found.allowed, found.reason) for found in section.agreements)
-        lines += [*(f"- Allowed {allowed:.3g}: {reason}." for allowed, reason in reasons), ""]
+        lines += lines_of(Table("", header, rows))
+        reasons = dict.fromkeys(found.reason for found in section.agreements)
+        lines += ["What is allowed:", "", *(f"- {reason}." for reason in reasons), ""]
     if section.missing:
         lines += ["Not run:", "", *(f"- {text}" for text in section.missing), ""]
     return lines
 
 
-def _table(table: Table) -> list[str]:
+def lines_of(table: Table) -> list[str]:
+    """Return a table as lines of Markdown."""
     lines = [f"**{table.caption}**", ""] if table.caption else []
     lines.append(f"| {' | '.join(table.header)} |")
     lines.append("|---" * len(table.header) + "|")

@@ -25,9 +25,12 @@ PEERS: Final = MappingProxyType(
     {
         "OpenCV": "cv2",
         "SciPy": "scipy",
+        "ducc0": "ducc0",
         "scikit-image": "skimage",
         "PyTorch": "torch",
         "CuPy": "cupy",
+        "VkFFT": "pyvkfft",
+        "CV-CUDA": "cvcuda",
         "pygfx": "pygfx",
         "wgpu": "wgpu",
         "optiland": "optiland",
@@ -39,6 +42,10 @@ ImageBloom = Callable[[NDArray[Any]], NDArray[Any]]
 
 #: The contender that copies an image's bytes from device memory to device memory.
 COPY: Final = "plain copy on the device"
+
+
+# What a peer raises with a broken installation, without a device, or in another version.
+_BROKEN: Final = (ImportError, OSError, RuntimeError, AttributeError, TypeError, ValueError)
 
 
 class GpuWork(NamedTuple):
@@ -98,8 +105,8 @@ def gather(
         module = name.lower().replace("-", "_")
         try:
             found.update(make(importlib.import_module(f"{__name__}.{module}")))
-        except (ImportError, OSError, RuntimeError, AttributeError) as error:
-            # A peer with a broken installation or without a device must not stop the others.
+        except _BROKEN as error:
+            # It must not stop the others.
             missing.append(f"{name} does not run here: {' '.join(str(error).split())[:200]}")
     return found
 

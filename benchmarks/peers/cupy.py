@@ -19,14 +19,15 @@ TILE = (64, 32)
 STRIP = 8
 
 
-def _cupy() -> Any:
+def find_cupy() -> Any:
+    """Return the module; RuntimeError: it finds no device."""
     cupy = importlib.import_module("cupy")
     if cupy.cuda.runtime.getDeviceCount() == 0:
         raise RuntimeError("CuPy finds no CUDA device")
     return cupy
 
 
-def _time(cupy: Any, work: Any) -> GpuWork:
+def time_by_events(cupy: Any, work: Any) -> GpuWork:
     """Return work on the device, timed by events."""
 
     def call(_: int) -> Any:
@@ -51,7 +52,7 @@ def gpu_bloom(
     image: NDArray[np.float16], kernel: NDArray[np.float32], threshold: float
 ) -> dict[str, GpuWork]:
     """Return blooms of an image (H, W, 4) on the GPU, each also with its blur alone."""
-    cupy = _cupy()
+    cupy = find_cupy()
     ndimage = importlib.import_module("cupyx.scipy.ndimage")
     source = cupy.asarray(image)
     weights = cupy.asarray(kernel)
@@ -82,9 +83,9 @@ def gpu_bloom(
     brighter(source, np.float32(threshold), bright)
     fused = _run_fused(cupy, source, kernel, threshold)
     return {
-        "cupyx correlate1d twice": _time(cupy, bloom),
-        "cupyx correlate1d twice, blur alone": _time(cupy, blur),
-        "a CUDA kernel of our own": _time(cupy, fused),
+        "cupyx correlate1d twice": time_by_events(cupy, bloom),
+        "cupyx correlate1d twice, blur alone": time_by_events(cupy, blur),
+        "a CUDA kernel of our own": time_by_events(cupy, fused),
     }
 
 
@@ -113,7 +114,7 @@ def _run_fused(cupy: Any, source: Any, kernel: NDArray[np.float32], threshold: f
 
 def gpu_copy(image: NDArray[Any]) -> dict[str, GpuWork]:
     """Return a copy of an image's bytes from device memory to device memory."""
-    cupy = _cupy()
+    cupy = find_cupy()
     source = cupy.asarray(image)
     target = cupy.empty_like(source)
 
@@ -121,7 +122,7 @@ def gpu_copy(image: NDArray[Any]) -> dict[str, GpuWork]:
         target.data.copy_from_device_async(source.data, source.nbytes, cupy.cuda.Stream.null)
         return target
 
-    return {COPY: _time(cupy, copy)}
+    return {COPY: time_by_events(cupy, copy)}
 
 
 def transfers(image: NDArray[Any]) -> dict[str, GpuWork]:
@@ -129,7 +130,7 @@ def transfers(image: NDArray[Any]) -> dict[str, GpuWork]:
 
     The memory is allocated once and not used otherwise. Wall-clock time.
     """
-    cupy = _cupy()
+    cupy = find_cupy()
     runtime = cupy.cuda.runtime
     source = cupy.asarray(image)
     pinned = cupy.cuda.alloc_pinned_memory(source.nbytes)
@@ -146,6 +147,9 @@ def transfers(image: NDArray[Any]) -> dict[str, GpuWork]:
 
         return call
 
+    def both(turn: int) -> float:
+        return upload(turn) + readback(turn)
+
     def fetch(_: Any) -> NDArray[Any]:
         return held.copy()
 
@@ -155,4 +159,5 @@ def transfers(image: NDArray[Any]) -> dict[str, GpuWork]:
     return {
         "bare upload from pinned memory": GpuWork(upload, float, fetch),
         "bare readback into pinned memory": GpuWork(readback, float, fetch),
+        "both bare transfers": GpuWork(both, float, fetch),
     }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -55,6 +56,20 @@ def image_bloom(
         return round_to(values, picture.dtype)
 
     return {"PyTorch": bloom}
+
+
+def synchronized(call: Callable[[int], Any], device: str) -> Callable[[int], Any]:
+    """Return a call that waits for the device, so that the wall clock counts all of its work."""
+    if device == "cpu":
+        return call
+    wait = importlib.import_module("torch").cuda.synchronize
+
+    def once(turn: int) -> Any:
+        result = call(turn)
+        wait()
+        return result
+
+    return once
 
 
 def _on_device(torch: Any, work: Any, fetch: Any) -> GpuWork:
@@ -156,3 +171,42 @@ def gpu_convolution(
         "torch.fft, convolution alone": _on_device(torch, alone, fetch),
         COPY: _on_device(torch, copy, fetch),
     }
+
+
+def pyramid(image: Any, levels: int) -> Any:
+    """Return the bloom of ``Pyramid(levels)`` of a tensor (1, 3, H, W).
+
+    Its sides are multiples of two to the power of `levels`.
+    """
+    torch = importlib.import_module("torch")
+    functional = torch.nn.functional
+    outer, inner = (
+        torch.tensor(one, device=image.device) for one in (_line(2.0, 0.25, 0.5), _line(1.0, 0.5))
+    )
+    down = 0.5 * (torch.outer(outer, outer) + torch.outer(inner, inner))
+    tent = torch.tensor([0.25, 0.5, 0.25], device=image.device)
+    kernels = [one.expand(3, 1, *one.shape).contiguous() for one in (down, torch.outer(tent, tent))]
+    chain = [image]
+    for _ in range(levels):
+        padded = functional.pad(chain[-1], (2, 2, 2, 2), mode="replicate")
+        chain.append(functional.conv2d(padded, kernels[0], stride=2, groups=3))
+
+    def enlarge(level: Any) -> Any:
+        padded = functional.pad(level, (2, 2, 2, 2), mode="replicate")
+        filtered = functional.conv2d(padded, kernels[1], groups=3)
+        double = functional.interpolate(filtered, scale_factor=2, mode="bilinear")
+        return double[..., 2:-2, 2:-2]
+
+    up = chain[-1]
+    for level in chain[-2:0:-1]:
+        up = level + enlarge(up)
+    return enlarge(up) / levels
+
+
+def _line(distance: float, side: float, middle: float = 0.0) -> list[float]:
+    """Return the weights of six texels for taps between the middle two and beside them."""
+    weights = [0.0] * 6
+    for offset, share in ((-distance, side), (0.0, middle), (distance, side)):
+        for texel in (2, 3):
+            weights[texel + int(offset)] += share / 2
+    return weights

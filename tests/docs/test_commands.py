@@ -32,6 +32,8 @@ NOT_RUN: Final = {
     "python -m benchmarks --adapter": "the same",
     "python -m benchmarks --beside": "the same",
     "python -m benchmarks --quick": "the same",
+    "python -m benchmarks --keep": "writes a page; tests/bench/test_page.py does",
+    "python -m benchmarks --page": "the same",
     "vkbloom fit photo.jpg photo.jpg --preset all": "takes seconds; tests/fits/test_fit.py does",
     "vkbloom doctor": "takes seconds; tests/cli/test_doctor.py does",
     "vkbloom check --preset unity_urp --against": "needs an engine; test_check.py does",

@@ -1,0 +1,146 @@
+"""Tensors in and out by the wall clock: `vkbloom.torch.bloom` and training steps beside PyTorch.
+
+RGB in single floats, another image in each round, on the GPU of the adapter or on the CPU at a
+smaller size; each call is waited for. A step is the bloom and the derivatives by the image from
+given cotangents. PyTorch's pyramid is the same `Pyramid` in convolutions, by autograd, and compiled
+by `torch.compile`. Tensors of vkbloom have their channels last, those of PyTorch first.
+"""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+import vkbloom
+from benchmarks.inputs import pictures
+from benchmarks.ours import OURS, ratios
+from benchmarks.peers import pytorch
+from benchmarks.plan import Plan
+from benchmarks.results import Section, agreement, side_by_side
+from benchmarks.timing import Times, alternate_seconds, wall_clock
+from vkbloom.psf import gaussian
+
+__all__ = ["run"]
+
+SIZE: Final = (3840, 2160)
+SIZE_ON_CPU: Final = (960, 544)
+ROUNDS: Final = 15
+LEVELS: Final = 4
+FORWARD: Final = "forward"
+STEP: Final = "a step"
+AUTOGRAD: Final = "PyTorch with autograd"
+COMPILED: Final = "PyTorch, compiled"
+PYRAMID: Final = "Pyramid(levels=4)"
+METHODS: Final[dict[str, vkbloom.Settings]] = {
+    PYRAMID: vkbloom.Pyramid(levels=LEVELS),
+    "Separable": vkbloom.Separable(threshold=0.5, knee=0.5),
+    "Pyramid(levels=5)": vkbloom.Pyramid(levels=5),
+    "DualKawase": vkbloom.DualKawase(levels=LEVELS, threshold=0.5),
+    "Convolution, a Gaussian of 40": vkbloom.Convolution(gaussian(40)),
+}
+
+Inputs = tuple[list[Any], list[Any]]
+
+
+def run(plan: Plan, section: Section) -> None:
+    """Time the operator and steps of each method, on a GPU of each preset, too."""
+    section.title = "Training steps by the wall clock"
+    try:
+        torch = importlib.import_module("torch")
+        operator = importlib.import_module("vkbloom.torch")
+    except (ImportError, OSError):
+        section.missing.append("PyTorch is not installed")
+        return
+    with plan.renderer() as renderer:
+        on_cpu = renderer.info.type == "cpu"
+        if not on_cpu and not torch.cuda.is_available():
+            section.missing.append("PyTorch finds no CUDA device")
+            return
+        device = "cpu" if on_cpu else "cuda"
+        torch.set_num_threads(plan.threads)
+        size = plan.size(*(SIZE_ON_CPU if on_cpu else SIZE))
+        # Both sides are multiples of the smallest level's texel.
+        width, height = (side - side % 2**LEVELS for side in size)
+        images = [np.ascontiguousarray(one[..., :3]) for one in pictures((width, height), "f4")]
+        random = np.random.default_rng(0)
+        cotangents = [random.standard_normal(one.shape, np.float32) for one in images]
+        last = tuple([torch.from_numpy(one).to(device) for one in k] for k in (images, cotangents))
+        first = tuple([one.movedim(-1, 0)[None].contiguous() for one in kind] for kind in last)
+        for name, settings in (METHODS if on_cpu else METHODS | dict(vkbloom.presets)).items():
+            plan.tell(f"training: {name}")
+
+            def bloom(image: Any, settings: vkbloom.Settings = settings) -> Any:
+                return operator.bloom(image, settings, renderer=renderer)
+
+            forward = _waiting(bloom, last, device)
+            steps = {OURS: _step(torch, bloom, last, device)}
+            if name == PYRAMID:
+                steps |= _peers(torch, first, device)
+            _time_steps(plan, section, name, forward, steps)
+
+
+def _waiting(call: Callable[[Any], Any], inputs: Any, device: str) -> Callable[[int], Any]:
+    return pytorch.synchronized(lambda turn: call(inputs[0][turn % 3]), device)
+
+
+def _step(torch: Any, call: Callable[[Any], Any], inputs: Any, device: str) -> Callable[[int], Any]:
+    """Return a call that waits for the derivatives by the image of its round."""
+
+    def step(turn: int) -> Any:
+        image = inputs[0][turn % 3].detach().requires_grad_()
+        return torch.autograd.grad(call(image), image, inputs[1][turn % 3])[0]
+
+    return pytorch.synchronized(step, device)
+
+
+def _peers(torch: Any, inputs: Any, device: str) -> dict[str, Callable[[int], Any]]:
+    def bloom(image: Any) -> Any:
+        return image + pytorch.pyramid(image, LEVELS)
+
+    return {
+        AUTOGRAD: _step(torch, bloom, inputs, device),
+        COMPILED: _step(torch, torch.compile(bloom), inputs, device),
+    }
+
+
+def _time_steps(
+    plan: Plan,
+    section: Section,
+    name: str,
+    forward: Callable[[int], Any],
+    steps: dict[str, Callable[[int], Any]],
+) -> None:
+    """Compare the derivatives of all, then time those that agree in turn."""
+    expected = _array(steps[OURS](0))
+    most = 1e-5 * float(np.abs(expected).max())
+    calls = {FORWARD: forward, STEP: steps[OURS]}
+    for peer, step in steps.items():
+        if peer == OURS:
+            continue
+        try:
+            made = np.moveaxis(_array(step(0))[0], 0, -1)
+        except Exception as error:
+            section.missing.append(
+                f"{peer} does not run here: {' '.join(str(error).split())[:200]}"
+            )
+            continue
+        reason = "a hundred-thousandth of the largest derivative"
+        section.agreements.append(agreement(f"{name}: {peer}", expected, made, most, reason))
+        if section.agreements[-1].agrees:
+            calls[peer] = step
+    rounds = plan.times(ROUNDS)
+    times: dict[str, Times] = alternate_seconds(
+        {one: wall_clock(call) for one, call in calls.items()}, rounds, warm_up=3
+    )
+    section.add_times(name, times, ours=STEP)
+    section.tables.append(side_by_side(name, times, STEP))
+    ratios(section, name, times, (STEP, AUTOGRAD, 0.6, True), (STEP, COMPILED, 0.75, True))
+
+
+def _array(tensor: Any) -> NDArray[np.float32]:
+    array: NDArray[np.float32] = tensor.cpu().numpy()
+    return array
