@@ -23,6 +23,12 @@ RESULTS: Final = Path(__file__).with_name("results")
 #: The name of a mark whose tables have the goals of all benchmarks.
 GOALS: Final = "goals"
 
+#: A table has so many columns more than rows.
+MOST_COLUMNS: Final = 3
+
+#: A record as JSON has it.
+Record = Mapping[str, Any]
+
 _MARKED: Final = re.compile(r"(<!-- figures of ([\w-]+) -->\n).*?(<!-- end of figures -->)", re.S)
 #: What results depend on for all benchmarks; a file has one value of each.
 _DEVICE: Final = ("adapter", "adapter type", "driver", "CPU", "cores")
@@ -57,8 +63,9 @@ def keep(report: Path, folder: Path = RESULTS) -> Path:
         machine, sections = found["machine"], found["sections"]
         device = {name: machine[name] for name in _DEVICE}
         rows = {section["id"]: _rounded(section) for section in sections}
-        about = {name: machine[name] for name in ("date", "command", "vkbloom")}
-        is_quick = "--quick" in machine["command"].split()
+        about = {name: machine[name] for name in ("date", "vkbloom")}
+        command = re.sub(r" --only [\w-]+", "", machine["command"])
+        is_quick = "--quick" in command.split()
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise ValueError(f"{report.name} is not a result of the benchmarks") from error
     if is_quick:
@@ -72,7 +79,9 @@ def keep(report: Path, folder: Path = RESULTS) -> Path:
     if path.exists():
         kept = json.loads(path.read_text(encoding="utf-8"))
         kept["device"] = device
-    kept["benchmarks"] |= {id: about | row for id, row in rows.items()}
+    for id, row in rows.items():
+        # The command that runs this one alone.
+        kept["benchmarks"][id] = about | {"command": f"{command} --only {id}"} | row
     folder.mkdir(parents=True, exist_ok=True)
     path.write_text(json.dumps(kept, indent=1) + "\n", encoding="utf-8")
     return path
@@ -138,7 +147,8 @@ def _of_device(name: str, results: Mapping[str, Any]) -> Iterator[str]:
     said = f", {_CLOCKS[next(iter(clocks))]}" if len(clocks) == 1 else ""
     yield f"{_title(device)}, {row['date'].split()[0]}, `{row['command']}`{said}:"
     yield ""
-    yield from lines_of(_table_of(records, many_clocks=len(clocks) > 1))
+    for table in _tables_of(records, many_clocks=len(clocks) > 1):
+        yield from lines_of(table)
     for lacking in row["missing"]:
         yield f"- {lacking}."
     if row["missing"]:
@@ -158,47 +168,52 @@ def _title(device: Mapping[str, Any]) -> str:
     return f"**{device['adapter']}, {device['driver']}**"
 
 
-def _is_shown(record: Mapping[str, Any], shown: Iterable[str]) -> bool:
+def _is_shown(record: Record, shown: Iterable[str]) -> bool:
     return not shown or any(re.fullmatch(pattern, record["name"]) for pattern in shown)
 
 
-def _table_of(records: Sequence[Mapping[str, Any]], *, many_clocks: bool) -> Table:
-    """Return a table with a row for each group, or for each record if contenders are many."""
-    groups = list(dict.fromkeys(one["group"] for one in records))
-    names = list(dict.fromkeys(one["name"] for one in records))
-    by_place = {(one["group"], one["name"]): one for one in records}
+def _tables_of(records: Sequence[Record], *, many_clocks: bool) -> Iterator[Table]:
+    """Yield tables of groups that have the same contenders.
 
-    def head(name: str, unit: str) -> str:
-        clock = {one["clock"] for one in records if one["name"] == name} - {""}
-        said = f", {_CLOCKS[next(iter(clock))]}" if many_clocks and len(clock) == 1 else ""
-        return f"{name}{said}, {unit}"
+    A row is a group; where contenders are many more than groups, it is one of these.
+    """
+    contenders: dict[str, tuple[str, ...]] = {}
+    for one in records:
+        contenders[one["group"]] = (*contenders.get(one["group"], ()), one["name"])
+    for names in dict.fromkeys(contenders.values()):
+        groups = [group for group, found in contenders.items() if found == names]
+        place = {(one["group"], one["name"]): one for one in records}
+        rows = [[place[group, name] for name in names] for group in groups]
 
-    of = {one["of"] for one in records} - {""}
-    if len(of) > 1 or len(names) > len(groups) + 3:
-        rows = tuple(
-            (
-                one["group"],
-                one["name"] if not many_clocks else f"{one['name']}, {_CLOCKS[one['clock']]}",
-                f"{_text(one['value'])} {one['unit']}",
-                f"{_text(one['ratio'])} of {one['of']}" if one["ratio"] else "",
-            )
-            for one in records
+        def head(one: Record) -> str:
+            said = f", {_CLOCKS[one['clock']]}" if many_clocks and one["clock"] else ""
+            return f"{one['name']}{said}"
+
+        if len(names) > len(groups) + MOST_COLUMNS:
+            for group, row in zip(groups, rows, strict=True):
+                # (The column is there even if nothing has a ratio.)
+                of = next((f"times {one['of']}" for one in row if one["of"]), "")
+                cells = tuple(
+                    (
+                        head(one),
+                        f"{_text(one['value'])} {one['unit']}",
+                        _text(one["ratio"]) if one["ratio"] else "",
+                    )
+                    for one in row
+                )
+                yield Table("", (group, "median (interval)", of), cells)
+            continue
+        heads = (
+            f"{head(one)}, {'times ' + one['of'] if one['of'] else one['unit']}" for one in rows[0]
         )
-        return Table("", ("", "", "median (interval)", "times as long as"), rows)
-    heads = []
-    for name in names:
-        one = next(one for one in records if one["name"] == name)
-        heads.append(head(name, f"times {one['of']}" if one["of"] else one["unit"]))
-    cells = []
-    for group in groups:
-        found = [by_place.get((group, name)) for name in names]
-        cells.append(
-            (
-                group,
-                *("" if one is None else _text(one["ratio"] or one["value"]) for one in found),
-            )
+        yield Table(
+            "",
+            ("", *heads),
+            tuple(
+                (group, *(_text(one["ratio"] or one["value"]) for one in row))
+                for group, row in zip(groups, rows, strict=True)
+            ),
         )
-    return Table("", ("", *heads), tuple(cells))
 
 
 def _text(estimate: Sequence[float | None]) -> str:
