@@ -39,6 +39,7 @@ BENCHMARKS: Final[Mapping[str, Benchmark]] = MappingProxyType(
             ("vkbloom", "vkbloom, the source's.*", "OpenCV", "SciPy", "scikit-image", "PyTorch"),
         ),
         "presets": Benchmark("each preset, the adapter's variant beside fragment"),
+        "variants": Benchmark("each preset with and without each variant of its passes"),
         "pyramid": Benchmark("a pyramid of five levels against pygfx and a Gaussian of its spread"),
         "forward": Benchmark("the time that bloom adds to a forward frame, against fragment"),
         "requests": Benchmark("many requests with one image, against single calls"),

@@ -177,7 +177,7 @@ static bool build_adjoint(const struct vkb_source *source, const struct vkb_sett
 }
 
 // `portion` may be NULL.
-static bool build_graph(const struct vkb_device *device, enum vkb_variants variants,
+static bool build_graph(const struct vkb_device *device, struct vkb_variants variants,
                         const struct vkb_source *source, const struct vkb_settings *settings,
                         struct portion *portion, struct vkb_graph *graph, struct vkb_error *error)
 {
@@ -214,8 +214,8 @@ static bool hold_kernel(const struct vkb_module_state *state, const struct vkb_d
             return true;
         if (!vkb_read_kernel_size(settings_object, frame, buffers, &settings->kernel))
             return false;
-        const bool fits = build_graph(device, VKB_VARIANTS_FRAGMENT, &self->source, settings, NULL,
-                                      &graph, &error)
+        const bool fits = build_graph(device, (struct vkb_variants){0}, &self->source, settings,
+                                      NULL, &graph, &error)
                        && vkb_limits_check_memory(device, &graph, vkb_graph_size(&graph), &error);
         vkb_graph_destroy(&graph);
         if (fits)
@@ -232,7 +232,7 @@ static bool hold_kernel(const struct vkb_module_state *state, const struct vkb_d
 
 // `portion` may be NULL.
 static PyObject *new_plan(const struct vkb_module_state *state, const struct vkb_device *device,
-                          enum vkb_variants variants, PyObject *source, PyObject *settings_object,
+                          struct vkb_variants variants, PyObject *source, PyObject *settings_object,
                           struct vkb_settings *settings, struct portion *portion, PyObject *names)
 {
     struct vkb_plan_object *self = vkb_new_object(state->plan_type);
@@ -342,7 +342,7 @@ PyObject *vkb_any_plan(PyObject *module, PyObject *arguments)
     struct vkb_settings settings;
     struct vkb_device device = any_device;
     struct vkb_error error = {0};
-    enum vkb_variants variants;
+    struct vkb_variants variants;
     const char *name = "fragment";
 
     if (!PyArg_ParseTuple(arguments, "O!OO|s:plan", state->source_type, &source, &settings_object,
@@ -352,7 +352,7 @@ PyObject *vkb_any_plan(PyObject *module, PyObject *arguments)
     if (!vkb_variants_by_name(name, &device, &variants, &error))
         return vkb_raise(state, &error);
     // What the variant is for.
-    device.adapter.device_type = variants == VKB_VARIANTS_CPU
+    device.adapter.device_type = variants.column == VKB_VARIANTS_CPU
                                    ? VK_PHYSICAL_DEVICE_TYPE_CPU
                                    : VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU;
     return new_plan(state, &device, variants, source, settings_object, &settings, NULL, names);

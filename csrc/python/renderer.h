@@ -51,7 +51,7 @@ struct vkb_renderer {
     size_t pipeline_count;  // created so far
     struct vkb_cached cached;
     struct vkb_transposes transposes;  // of plans of derivatives
-    enum vkb_variants variants;
+    struct vkb_variants variants;
     struct vkb_device device;
     struct vkb_frame frame;
 };

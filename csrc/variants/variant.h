@@ -11,7 +11,7 @@
 // The choice of variants for one graph: from the passes of `plain` to those of `graph`. It keeps
 // the first failure.
 struct vkb_variant_choice {
-    enum vkb_variants variants;
+    enum vkb_column variants;
     const struct vkb_device *device;
     struct vkb_graph plain;
     struct vkb_graph *graph;

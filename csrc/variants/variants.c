@@ -8,32 +8,8 @@ static const char *const variant_names[VKB_VARIANTS_COUNT] = {
     [VKB_VARIANTS_GPU] = "gpu",
 };
 
-bool vkb_variants_by_name(const char *name, const struct vkb_device *device,
-                          enum vkb_variants *variants, struct vkb_error *error)
-{
-    int found = 0;
-
-    if (strcmp(name, "auto") == 0)
-        found = !device->dispatch                                          ? VKB_VARIANTS_FRAGMENT
-              : device->adapter.device_type == VK_PHYSICAL_DEVICE_TYPE_CPU ? VKB_VARIANTS_CPU
-                                                                           : VKB_VARIANTS_GPU;
-    else
-        while (found < VKB_VARIANTS_COUNT && strcmp(variant_names[found], name) != 0)
-            ++found;
-    if (found == VKB_VARIANTS_COUNT)
-        return vkb_fail(error, VKB_ERROR_VALUE,
-                        "VKBLOOM_VARIANT: %s is not one of auto, fragment, cpu, gpu", name);
-    if (found != VKB_VARIANTS_FRAGMENT && !device->dispatch)
-        return vkb_fail(error, VKB_ERROR_VALUE,
-                        "VKBLOOM_VARIANT: the compute shaders of %s cannot write images, which %s "
-                        "needs; use auto or fragment",
-                        device->adapter.name, name);
-    *variants = (enum vkb_variants)found;
-    return true;
-}
-
 struct variant {
-    enum vkb_variants variants;
+    enum vkb_column variants;
     const char *name;
     vkb_variant_add *add;
     uint32_t least_pixels;  // of the target
@@ -72,6 +48,60 @@ static const struct variant variants_table[] = {
     {VKB_VARIANTS_GPU, "pixels", vkb_add_pixels_variant, 0},
 };
 
+// Whether the first `length` characters of a text are this name.
+static bool is_name(const char *text, size_t length, const char *name)
+{
+    return strlen(name) == length && strncmp(text, name, length) == 0;
+}
+
+// The bits of the rows that the names behind a column leave out: "-filtered-strips".
+static bool read_without(const char *names, struct vkb_variants *variants, struct vkb_error *error)
+{
+    const size_t rows = sizeof variants_table / sizeof variants_table[0];
+
+    _Static_assert(sizeof variants_table / sizeof variants_table[0] <= 32, "a bit for each row");
+    while (*names != '\0') {
+        const char *name = names + 1;
+        const size_t length = strcspn(name, "-");
+        uint32_t found = 0;
+        for (size_t i = 0; i < rows; ++i)
+            if (variants_table[i].variants == variants->column
+                && is_name(name, length, variants_table[i].name))
+                found |= UINT32_C(1) << i;
+        if (found == 0)
+            return vkb_fail(error, VKB_ERROR_VALUE, "VKBLOOM_VARIANT: %s has no variant %.*s",
+                            variant_names[variants->column], (int)length, name);
+        variants->without |= found;
+        names = name + length;
+    }
+    return true;
+}
+
+bool vkb_variants_by_name(const char *name, const struct vkb_device *device,
+                          struct vkb_variants *variants, struct vkb_error *error)
+{
+    const size_t length = strcspn(name, "-");
+    int found = 0;
+
+    if (is_name(name, length, "auto"))
+        found = !device->dispatch                                          ? VKB_VARIANTS_FRAGMENT
+              : device->adapter.device_type == VK_PHYSICAL_DEVICE_TYPE_CPU ? VKB_VARIANTS_CPU
+                                                                           : VKB_VARIANTS_GPU;
+    else
+        while (found < VKB_VARIANTS_COUNT && !is_name(name, length, variant_names[found]))
+            ++found;
+    if (found == VKB_VARIANTS_COUNT)
+        return vkb_fail(error, VKB_ERROR_VALUE,
+                        "VKBLOOM_VARIANT: %s is not one of auto, fragment, cpu, gpu", name);
+    if (found != VKB_VARIANTS_FRAGMENT && !device->dispatch)
+        return vkb_fail(error, VKB_ERROR_VALUE,
+                        "VKBLOOM_VARIANT: the compute shaders of %s cannot write images, which %s "
+                        "needs; use auto or fragment",
+                        device->adapter.name, name);
+    *variants = (struct vkb_variants){.column = (enum vkb_column)found};
+    return read_without(name + length, variants, error);
+}
+
 // Names the rows from `first` on after the table's variant. A row before a fused pass is the
 // method's own pass.
 static void name_variant(struct vkb_graph *graph, uint32_t first, const char *name)
@@ -83,14 +113,15 @@ static void name_variant(struct vkb_graph *graph, uint32_t first, const char *na
     }
 }
 
-static void add_variant(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
+static void add_variant(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
+                        uint32_t without)
 {
     const struct vkb_image_row *target = &choice->plain.images[pass->targets[0]];
     const uint64_t pixels = (uint64_t)target->width * target->height;
 
     for (size_t i = 0; i < sizeof variants_table / sizeof variants_table[0]; ++i) {
         const uint32_t first = choice->graph->pass_count;
-        if (variants_table[i].variants != choice->variants
+        if (variants_table[i].variants != choice->variants || (without >> i & 1) != 0
             || pixels < variants_table[i].least_pixels || !variants_table[i].add(choice, pass))
             continue;
         name_variant(choice->graph, first, variants_table[i].name);
@@ -99,18 +130,18 @@ static void add_variant(struct vkb_variant_choice *choice, const struct vkb_pass
     vkb_add_variant_pass(choice, pass);
 }
 
-bool vkb_variants_choose(enum vkb_variants variants, const struct vkb_device *device,
+bool vkb_variants_choose(struct vkb_variants variants, const struct vkb_device *device,
                          struct vkb_graph *graph, struct vkb_error *error)
 {
     struct vkb_variant_choice choice = {
-        .variants = variants,
+        .variants = variants.column,
         .device = device,
         .plain = *graph,
         .graph = graph,
         .error = error,
     };
 
-    if (variants == VKB_VARIANTS_FRAGMENT)
+    if (variants.column == VKB_VARIANTS_FRAGMENT)
         return true;
     // The graph keeps its images and gets new passes.
     graph->passes = NULL;
@@ -119,7 +150,7 @@ bool vkb_variants_choose(enum vkb_variants variants, const struct vkb_device *de
     for (uint32_t i = 0; !choice.failed && i < choice.plain.pass_count; ++i) {
         // Adding an image may move the array.
         choice.plain.images = graph->images;
-        add_variant(&choice, &choice.plain.passes[i]);
+        add_variant(&choice, &choice.plain.passes[i], variants.without);
     }
     vkb_free(choice.plain.passes);
     return !choice.failed;

@@ -220,10 +220,41 @@ def test_the_forward_frame(
         assert (off > 1).mean() < 1e-5, name
 
 
-def test_unknown_variants_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("VKBLOOM_VARIANT", "quick")
-    with pytest.raises(ValueError, match="VKBLOOM_VARIANT: quick is not one of auto, fragment"):
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("quick", "quick is not one of auto, fragment"),
+        ("cp-filtered", "cp-filtered is not one of auto, fragment"),
+        ("cpu-quick", "cpu has no variant quick"),
+        ("cpu-filtered-", "cpu has no variant $"),
+        ("cpu-tiles", "cpu has no variant tiles"),
+        ("fragment-pixels", "fragment has no variant pixels"),
+    ],
+)
+def test_unknown_variants_are_refused(
+    monkeypatch: pytest.MonkeyPatch, name: str, message: str
+) -> None:
+    monkeypatch.setenv("VKBLOOM_VARIANT", name)
+    with pytest.raises(ValueError, match=f"VKBLOOM_VARIANT: {message}"):
         Renderer()
+
+
+@pytest.mark.parametrize("column", ["cpu", "gpu"])
+def test_variants_can_be_left_out(column: str, unfused: Renderer) -> None:
+    """Each variant of a preset; the picture stays, whatever runs in its place."""
+    image, settings = hdr_picture(70, 50, 4, "float16"), presets["bevy_natural"]
+    drawn = unfused.apply(image, settings)
+    with open_variant(column) as renderer:
+        names = {one.variant for one in renderer.plan(image, settings).passes} - {"fragment"}
+    assert names == {"pixels", "filtered" if column == "cpu" else "tiles"}
+    for left_out in (*((name,) for name in names), names):
+        with open_variant("-".join((column, *left_out))) as renderer:
+            left = {one.variant for one in renderer.plan(image, settings).passes}
+            # A dispatch before a fused pass is the method's own, but called so.
+            assert not left & {*left_out} - {"pixels"}
+            frames = renderer.apply(image, settings)
+        for name, array in frames.items():
+            np.testing.assert_array_equal(array, drawn[name], err_msg=name)
 
 
 def test_a_cpu_enlarges_in_strips_that_have_each_rows_taps_once(renderer: Renderer) -> None:
