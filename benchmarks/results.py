@@ -228,7 +228,9 @@ def side_by_side(caption: str, times: dict[str, Times], ours: str) -> Table:
     """Make a table of contenders that took turns, with their ratios to one of them."""
     rows = []
     for name, measured in times.items():
-        ratio = "1" if name == ours else str(measured.over(times[ours]))
+        ratio = "1" if name == ours else ""
+        if name != ours and ours in times:
+            ratio = str(measured.over(times[ours]))
         value, low, high = (f"{1e3 * each:.3f}" for each in measured.estimate())
         rows.append((name, f"{value} ({low} to {high})", f"{1e3 * measured.least:.3f}", ratio))
     header = ("", "median (interval), ms", "least, ms", f"times as long as {ours} (interval)")
