@@ -72,8 +72,9 @@ def versions() -> dict[str, str | None]:
     found: dict[str, str | None] = {}
     for name, package in PEERS.items():
         try:
-            found[name] = version(distributions[package][0])
-        except (KeyError, PackageNotFoundError):
+            # A package that is one extension module has no entry.
+            found[name] = version(distributions.get(package, [package])[0])
+        except PackageNotFoundError:
             found[name] = None
     return found
 
