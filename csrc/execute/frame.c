@@ -190,6 +190,13 @@ static bool record_request(struct vkb_run *run, struct vkb_request *request,
     for (uint32_t i = 0; !run->shares && i < graph->image_count; ++i)
         if (frame->planner.wanted[i] && !vkb_run_resolve(run, i, error))
             return false;
+#ifndef VKBLOOM_FAULTS
+    // (Faults are counted in one thread.)
+    if (graph != frame->compiled) {
+        vkb_record_pipelines(run);
+        frame->compiled = graph;
+    }
+#endif
     if (!vkb_planner_run(&frame->planner, &step, &frame->cache.clock, vkb_record_group, run, error))
         return false;
     for (size_t i = 0; i < SINK_COUNT; ++i)

@@ -35,7 +35,8 @@ struct vkb_frame {
     struct vkb_image_cache cache;
     struct vkb_resources resources;
     struct vkb_planner planner;
-    uint64_t submitted;  // submissions so far
+    const void *compiled;  // the address of the graph whose pipelines were last created together
+    uint64_t submitted;    // submissions so far
     struct vkb_screen *screens;
     bool stale;  // after a failure: the images are created again before the next recording
 };

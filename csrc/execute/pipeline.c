@@ -2,6 +2,7 @@
 
 #include "scene/scene.h"
 #include "spirv/specialize.h"
+#include "vulkan/parts.h"
 
 #include <string.h>
 
@@ -330,42 +331,154 @@ static bool has_room_to_compile(const struct vkb_device *device, struct vkb_erro
     return false;
 }
 
+// Fills the key of a pass, whose layouts are created.
+static bool make_key(const struct vkb_device *device, struct vkb_pipelines *pipelines,
+                     const struct vkb_graph *graph, const struct vkb_pass_row *pass,
+                     struct pipeline_key *key, struct vkb_error *error)
+{
+    const bool draws = pass->geometry != VKB_GEOMETRY_DISPATCH;
+
+    memset(key, 0, sizeof *key);
+    if (!vkb_bindings_prepare(device, &pipelines->bindings, pass, &key->layout, error))
+        return false;
+    key->vertex = vkb_shader_hash(pass->vertex);
+    key->shader = vkb_shader_hash(pass->shader);
+    key->geometry = pass->geometry;
+    key->textured = pass->textured;
+    key->blend = pass->blend;
+    key->constants = pass->constants;
+    for (uint32_t i = 0; draws && i < pass->target_count; ++i)
+        key->formats[i] = graph->images[pass->targets[i]].format;
+    if (pass->depth != VKB_NO_IMAGE)
+        key->formats[VKB_MAX_TARGETS] = graph->images[pass->depth].format;
+    return true;
+}
+
+static struct vkb_pipeline_entry *find_entry(const struct vkb_pipelines *pipelines,
+                                             const struct pipeline_key *key)
+{
+    for (size_t i = 0; i < pipelines->entry_count; ++i)
+        if (memcmp(&pipelines->entries[i].key, key, sizeof *key) == 0)
+            return &pipelines->entries[i];
+    return NULL;
+}
+
+// There is space for it.
+static void add_entry(struct vkb_pipelines *pipelines, const struct pipeline_key *key,
+                      VkPipeline handle)
+{
+    struct vkb_pipeline_entry *entry = &pipelines->entries[pipelines->entry_count++];
+
+    memcpy(&entry->key, key, sizeof *key);
+    entry->handle = handle;
+    entry->used = pipelines->now;
+    ++pipelines->created;
+}
+
+static bool make_space(struct vkb_pipelines *pipelines, size_t more, struct vkb_error *error)
+{
+    return vkb_grow(error, &pipelines->entries, &pipelines->entry_capacity,
+                    pipelines->entry_count + more, sizeof *pipelines->entries);
+}
+
 bool vkb_pipelines_get(const struct vkb_device *device, struct vkb_pipelines *pipelines,
                        const struct vkb_graph *graph, const struct vkb_pass_row *pass,
                        VkPipeline *pipeline, struct vkb_error *error)
 {
-    const bool draws = pass->geometry != VKB_GEOMETRY_DISPATCH;
     struct pipeline_key key;
 
-    memset(&key, 0, sizeof key);
-    if (!vkb_bindings_prepare(device, &pipelines->bindings, pass, &key.layout, error))
+    if (!make_key(device, pipelines, graph, pass, &key, error))
         return false;
-    key.vertex = vkb_shader_hash(pass->vertex);
-    key.shader = vkb_shader_hash(pass->shader);
-    key.geometry = pass->geometry;
-    key.textured = pass->textured;
-    key.blend = pass->blend;
-    key.constants = pass->constants;
-    for (uint32_t i = 0; draws && i < pass->target_count; ++i)
-        key.formats[i] = graph->images[pass->targets[i]].format;
-    if (pass->depth != VKB_NO_IMAGE)
-        key.formats[VKB_MAX_TARGETS] = graph->images[pass->depth].format;
-
-    for (size_t i = 0; i < pipelines->entry_count; ++i)
-        if (memcmp(&pipelines->entries[i].key, &key, sizeof key) == 0) {
-            *pipeline = pipelines->entries[i].handle;
-            pipelines->entries[i].used = pipelines->now;
-            return true;
-        }
-    if (!vkb_grow(error, &pipelines->entries, &pipelines->entry_capacity,
-                  pipelines->entry_count + 1, sizeof *pipelines->entries)
-        || !has_room_to_compile(device, error)
+    struct vkb_pipeline_entry *entry = find_entry(pipelines, &key);
+    if (entry) {
+        *pipeline = entry->handle;
+        entry->used = pipelines->now;
+        return true;
+    }
+    if (!make_space(pipelines, 1, error) || !has_room_to_compile(device, error)
         || !create_pipeline(device, pipelines, &key, pass, pipeline, error))
         return false;
-    struct vkb_pipeline_entry *entry = &pipelines->entries[pipelines->entry_count++];
-    memcpy(&entry->key, &key, sizeof key);
-    entry->handle = *pipeline;
-    entry->used = pipelines->now;
-    ++pipelines->created;
+    add_entry(pipelines, &key, *pipeline);
     return true;
+}
+
+// A pipeline that does not exist yet.
+struct missing {
+    struct pipeline_key key;
+    const struct vkb_pass_row *pass;
+    VkPipeline handle;  // VK_NULL_HANDLE: it was not created
+};
+
+struct creation {
+    struct vkb_device *device;
+    const struct vkb_pipelines *pipelines;
+    struct missing *missing;
+};
+
+static void create_part(void *context, uint32_t part, uint32_t first, uint32_t end)
+{
+    const struct creation *creation = context;
+    const struct vkb_messages *before = vkb_messages_begin(&creation->device->messages);
+    struct vkb_error error;
+
+    (void)part;
+    for (uint32_t i = first; i < end; ++i) {
+        struct missing *one = &creation->missing[i];
+        if (!create_pipeline(creation->device, creation->pipelines, &one->key, one->pass,
+                             &one->handle, &error))
+            one->handle = VK_NULL_HANDLE;
+    }
+    vkb_messages_end(before);
+}
+
+// Finds the different pipelines of the rows that do not exist; returns their number.
+static uint32_t find_missing(const struct vkb_device *device, struct vkb_pipelines *pipelines,
+                             const struct vkb_graph *graph, const struct vkb_pass_row *rows,
+                             uint32_t count, struct missing *missing)
+{
+    struct vkb_error error;
+    uint32_t found = 0;
+
+    for (uint32_t i = 0; i < count; ++i) {
+        struct missing *one = &missing[found];
+        uint32_t same = 0;
+        if (!make_key(device, pipelines, graph, &rows[i], &one->key, &error))
+            return 0;
+        while (same < found && memcmp(&missing[same].key, &one->key, sizeof one->key) != 0)
+            ++same;
+        one->pass = &rows[i];
+        found += same == found && !find_entry(pipelines, &one->key);
+    }
+    return found;
+}
+
+// Whether several may be compiled at the same time. (lavapipe ends the process where memory ends.)
+static bool has_room_for_all(const struct vkb_device *device, uint32_t count)
+{
+    const uint32_t cores = vkb_core_count();
+    const size_t threads = count < cores ? count : cores;
+
+    return device->adapter.device_type != VK_PHYSICAL_DEVICE_TYPE_CPU
+        || vkb_has_room(threads * COMPILE_MIB);
+}
+
+void vkb_pipelines_create_together(struct vkb_device *device, struct vkb_pipelines *pipelines,
+                                   const struct vkb_graph *graph, const struct vkb_pass_row *rows,
+                                   uint32_t count)
+{
+    struct vkb_error error;
+    struct missing *missing = vkb_alloc(&error, count, sizeof *missing);
+    const struct creation creation = {device, pipelines, missing};
+    const uint32_t found =
+        missing ? find_missing(device, pipelines, graph, rows, count, missing) : 0;
+
+    if (found > 1 && has_room_for_all(device, found) && make_space(pipelines, found, &error)) {
+        // The size makes each one a chunk of work.
+        vkb_in_parts(device->workers, create_part, NULL, (void *)&creation, 0, found,
+                     (size_t)found << 20);
+        for (uint32_t i = 0; i < found; ++i)
+            if (missing[i].handle)
+                add_entry(pipelines, &missing[i].key, missing[i].handle);
+    }
+    vkb_free(missing);
 }

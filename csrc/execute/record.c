@@ -343,31 +343,60 @@ static bool keeps_levels(const struct vkb_run *run, const struct vkb_pass_row *p
         && run->device->texels == VKB_TEXELS_SCALED;
 }
 
-static bool record_pass(struct vkb_run *run, uint32_t index, struct vkb_error *error)
+// The row of a pass as it runs: its shader and constants depend on the source, and on where the
+// result goes. *output: where a dispatch stores it; NULL: in an image.
+static struct vkb_pass_row make_row(const struct vkb_run *run, uint32_t index,
+                                    struct vkb_output **output)
 {
     struct vkb_pass_row row = run->graph->passes[index];
-    const struct vkb_pass_row *pass = &row;
+    const bool linear = row.reading == VKB_READING_LINEAR_TEXELS;
+
+    *output = linear ? find_stored(run, &row) : NULL;
+    if (linear && run->images[vkb_pass_bound_image(&row, SLOT_SOURCE)]->image.channels == 3)
+        row.shader = row.shader->rgb;
+    if (*output && !vkb_readback_is_complete(*output))
+        row.shader = row.shader->packed;
+    row.constants.finite = reads_finite(run, &row);
+    if (keeps_levels(run, &row))
+        row.constants.format = STORED_UNORM8_SCALED;
+    return row;
+}
+
+static bool record_pass(struct vkb_run *run, uint32_t index, struct vkb_error *error)
+{
+    struct vkb_output *output;
+    const struct vkb_pass_row row = make_row(run, index, &output), *pass = &row;
     VkCommandBuffer commands = run->submission->commands.buffer;
-    const bool linear = pass->reading == VKB_READING_LINEAR_TEXELS;
-    struct vkb_output *output = linear ? find_stored(run, pass) : NULL;
     VkPipeline pipeline;
 
-    if (linear && run->images[vkb_pass_bound_image(pass, SLOT_SOURCE)]->image.channels == 3)
-        row.shader = row.shader->rgb;
-    if (output && !vkb_readback_is_complete(output))
-        row.shader = row.shader->packed;
-    row.constants.finite = reads_finite(run, pass);
-    if (keeps_levels(run, pass))
-        row.constants.format = STORED_UNORM8_SCALED;
     if (!vkb_pipelines_get(run->device, &run->frame->pipelines, run->graph, pass, &pipeline, error))
         return false;
     vkb_label_begin(run->device, commands, vkb_graph_label(run->graph, pass->name));
     run->device->vk.vkCmdBindPipeline(commands, vkb_pass_bind_point(pass), pipeline);
-    const bool done = linear
+    const bool done = pass->reading == VKB_READING_LINEAR_TEXELS
                         ? dispatch_linear_texels(run, pass, write_params(run, pass), output, error)
                         : draw(run, pass, write_params(run, pass), error);
     vkb_label_end(run->device, commands);
     return done;
+}
+
+void vkb_record_pipelines(struct vkb_run *run)
+{
+    const struct vkb_planner *planner = &run->frame->planner;
+    const uint32_t count = run->graph->pass_count;
+    struct vkb_error error;
+    struct vkb_pass_row *rows = vkb_alloc(&error, count, sizeof *rows);
+    uint32_t running = 0;
+
+    for (uint32_t i = 0; rows && i < count; ++i)
+        if (planner->needed[i] && !planner->current[i]) {
+            struct vkb_output *output;
+            rows[running++] = make_row(run, i, &output);
+        }
+    if (rows)
+        vkb_pipelines_create_together(run->device, &run->frame->pipelines, run->graph, rows,
+                                      running);
+    vkb_free(rows);
 }
 
 static void transition_reads(struct vkb_run *run, uint32_t first, uint32_t end)

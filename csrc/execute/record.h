@@ -45,6 +45,9 @@ struct vkb_sink {
 };
 extern const struct vkb_sink vkb_host_sink, vkb_cuda_sink, vkb_screen_sink;
 
+// Creates the pipelines of the request's passes that are going to run, at the same time.
+void vkb_record_pipelines(struct vkb_run *run);
+
 // The planner calls this for each group of passes that has to run. `context` is a struct vkb_run.
 vkb_record vkb_record_group;
 
