@@ -45,7 +45,7 @@ static bool add_pool(const struct vkb_device *device, struct vkb_descriptors *de
                             {VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER,
                              sets * VKB_MAX_READS + resources},
                             {VK_DESCRIPTOR_TYPE_STORAGE_IMAGE,
-                             sets * (VKB_MAX_LOADS + 1) + resources},
+                             sets * (VKB_MAX_LOADS + VKB_MAX_TARGETS) + resources},
                             {VK_DESCRIPTOR_TYPE_UNIFORM_TEXEL_BUFFER, sets * VKB_MAX_LINEAR_TEXELS},
                             // Of a strided copy three.
                             {VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, 3 * sets + resources},

@@ -20,7 +20,7 @@ static bool check(const struct vkb_device *device, const struct vkb_pass_row *pa
     return true;
 }
 
-enum { DRAW_NEEDS = 7 };  // the others are of dispatches
+enum { DRAW_NEEDS = 8 };  // the others are of dispatches
 
 // A row of needs: what a pass needs this many of, and the limit of Vulkan of this name.
 #define NEED(what, needed, limits, name) {what, #name, needed, (limits)->name}
@@ -51,6 +51,7 @@ static bool check_needs(const struct vkb_device *device, const struct vkb_pass_r
         NEED("storage buffers", storage, limits, maxPerStageDescriptorStorageBuffers),
         NEED("outputs", outputs, limits, maxFragmentCombinedOutputResources),
         NEED("bindings", bindings, limits, maxPerStageResources),
+        NEED("targets", targets, limits, maxColorAttachments),
         NEED("threads of a workgroup", (uint64_t)threads[0] * threads[1], limits,
              maxComputeWorkGroupInvocations),
         {"threads along x", "maxComputeWorkGroupSize", threads[0], size[0]},

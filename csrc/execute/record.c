@@ -319,7 +319,7 @@ static bool draw(struct vkb_run *run, const struct vkb_pass_row *pass, VkDeviceS
     if (pass->geometry == VKB_GEOMETRY_DISPATCH) {
         dispatch(run, pass, run->graph->images[pass->targets[0]].height);
     } else if (!vkb_is_mesh(pass->geometry)) {
-        vk->vkCmdDraw(commands, 3, 1, 0, 0);
+        vk->vkCmdDraw(commands, pass->vertices ? pass->vertices : 3, 1, 0, 0);
     } else if (mesh->plain_count > 0) {
         bind_mesh(run, mesh, false);
         vk->vkCmdDrawIndexed(commands, mesh->plain_count, 1, 0, 0, 0);

@@ -191,7 +191,7 @@ static void pack_hash(const struct vkb_shader *shader, unsigned char *bytes, siz
 #define PACKED_FIELDS(PACK) \
     PACK(name) PACK(geometry) PACK(textured) PACK(constants) PACK(reads) PACK(read_count) \
     PACK(sampling) PACK(reading) PACK(fused) PACK(block_width) PACK(block_height) PACK(groups_width) \
-    PACK(groups_height) PACK(targets) PACK(target_count) PACK(depth) PACK(load) PACK(blend) \
+    PACK(groups_height) PACK(vertices) PACK(targets) PACK(target_count) PACK(depth) PACK(load) PACK(blend) \
     PACK(turn) PACK(block)
 // clang-format on
 

@@ -15,7 +15,8 @@ enum {
     VKB_MAX_LINEAR_TEXELS = GATHERED_LEVELS,  // images that are read as linear texels
     // Storage images. With the target, one less than the four that every device supports.
     VKB_MAX_LOADS = 2,
-    VKB_MAX_TARGETS = 4,
+    // Of a dispatch; a draw has as many as the device has attachments.
+    VKB_MAX_TARGETS = 16,
     VKB_MAX_HISTORIES = 8,
     // That a method brings along, and that a pass binds.
     VKB_MAX_RESOURCES = 16,
@@ -162,6 +163,7 @@ struct vkb_pass_row {
     bool gains_if_finite;  // is compiled a second time, for sources without NaN and infinity
     uint32_t block_width, block_height;    // of a dispatch: pixels of a workgroup
     uint32_t groups_width, groups_height;  // number of workgroups; 0: what covers the target
+    uint32_t vertices;                     // of a draw without a mesh; 0: of one triangle
     uint32_t targets[VKB_MAX_TARGETS];
     uint32_t target_count;
     uint32_t depth;  // VKB_NO_IMAGE: none

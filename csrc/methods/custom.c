@@ -142,6 +142,7 @@ static void add_pass(struct vkb_levels *levels, uint32_t *images, uint32_t numbe
     memcpy(row.sampling, pass->sampling, sizeof row.sampling);
     if (pass->vertex || pass->positions)
         row.vertex = pass->vertex ? pass->vertex : &vkb_shader_positions_vert;
+    row.vertices = pass->vertices;
     add_targets(levels, images, number, &row);
     if (pass->block_width) {
         row.geometry = VKB_GEOMETRY_DISPATCH;

@@ -133,10 +133,11 @@ struct vkb_custom_pass {
     uint32_t joined;
     // Whether the fragment shader gets its position in the target, 0 to 1, as its first input.
     uint32_t positions;
+    uint32_t vertices;         // of its own vertex shader; 0: of one triangle
     char name[VKB_NAME_SIZE];  // of the image that it writes
     char reads[VKB_MAX_READS][VKB_NAME_SIZE];
     uint8_t sampling[VKB_MAX_READS];  // of VKB_SAMPLING_*
-    // Python packs what is before here, as "1024sQ12I32s512s16s".
+    // Python packs what is before here, as "1024sQ13I32s512s16s4x".
     const struct vkb_shader *shader, *vertex;  // no vertex shader: that of the package
     const struct vkb_resource *resources[VKB_MAX_RESOURCES];
     uint32_t resource_count;

@@ -12,6 +12,7 @@ enum {
     PASS_SIZE = offsetof(struct vkb_custom_pass, shader),
     RESOURCE_SIZE = offsetof(struct vkb_resource, data),
     VKB_MAX_GROUPS = 65535,  // every device dispatches as many
+    VKB_MAX_VERTICES = 1 << 16,
 };
 
 // What the rows of passes refer to; its content belongs to Python's objects.
@@ -177,6 +178,8 @@ static bool check_pass(const struct vkb_custom_pass *pass)
         || pass->groups_height > VKB_MAX_GROUPS)
         return vkb_refuse("passes: %u x %u workgroups are none, or more than %d along a side",
                           pass->groups_width, pass->groups_height, VKB_MAX_GROUPS);
+    if (pass->vertices > VKB_MAX_VERTICES)
+        return vkb_refuse("passes: %u vertices are more than %d", pass->vertices, VKB_MAX_VERTICES);
     return !pass->block_width == !pass->block_height
         || vkb_refuse("passes: a workgroup of %u x %u pixels is none", pass->block_width,
                       pass->block_height);

@@ -59,6 +59,7 @@ class Row(NamedTuple):
     - `joined`: It is no pass, but one more image that the pass before it writes.
     - `vertex`: Its vertex shader. None: the package's.
     - `positions`: Whether the package's gives the fragment shader its position, 0 to 1.
+    - `vertices`: How many its own has; 0: of one triangle.
     """
 
     name: str
@@ -77,6 +78,7 @@ class Row(NamedTuple):
     groups: tuple[int, int] | None = None
     positions: bool = False
     vertex: CoreShader | None = None
+    vertices: int = 0
 
     def pack(self) -> tuple[Any, ...]:
         """Return it as the core takes it; ValueError where the core has no room."""
@@ -89,7 +91,7 @@ class Row(NamedTuple):
                 raise ValueError(f"passes: {self.name}: {count} {what} are more than {most}")
         reads = (*self.reads, *self.histories)
         block = struct.pack(
-            f"={MAX_PARAMETERS}sQ12I{NAME_SIZE}s{MAX_READS * NAME_SIZE}s{MAX_READS}s",
+            f"={MAX_PARAMETERS}sQ13I{NAME_SIZE}s{MAX_READS * NAME_SIZE}s{MAX_READS}s4x",
             self.params,
             self.turn,
             *self.size,
@@ -101,6 +103,7 @@ class Row(NamedTuple):
             self.format,
             self.joined,
             self.positions,
+            self.vertices,
             self.name.encode(),
             b"".join(read.encode().ljust(NAME_SIZE, b"\0") for read in reads),
             bytes(self.sampling),

@@ -14,6 +14,8 @@ Expression = ast.expr
 
 MAX_CHARACTERS: Final = 1000
 MAX_NUMBERS: Final = 4096
+MAX_ZEROS: Final = 1 << 16
+ZEROS: Final = "zeros"
 #: Exponents that give no integer or float of great size.
 MAX_VALUE: Final = 1e30
 
@@ -166,8 +168,11 @@ def _arguments(tree: ast.Call) -> list[Expression]:
     if name in SIZES:
         if len(tree.args) != 1 or not _is_source(tree.args[0]):
             raise ArithmeticFault(f"{ast.unparse(tree)!r}: {name} takes an image, such as glow")
+    elif name == ZEROS:
+        if len(tree.args) != 1:
+            raise ArithmeticFault(f"{ZEROS} takes a number, of how many there are")
     elif name not in FUNCTIONS:
-        known = ", ".join((*SIZES, *FUNCTIONS))
+        known = ", ".join((*SIZES, *FUNCTIONS, ZEROS))
         raise ArithmeticFault(f"{name!r} is not a function; known are {known}")
     elif len(tree.args) != FUNCTIONS[name][0]:
         raise ArithmeticFault(f"{name} takes {FUNCTIONS[name][0]} numbers, not {len(tree.args)}")
@@ -241,9 +246,18 @@ def _evaluate(tree: Expression, scope: Scope) -> Numbers:  # noqa: PLR0911  one 
             assert isinstance(tree.func, ast.Name)
             if tree.func.id in SIZES:
                 return SIZES[tree.func.id](*scope.size(_as_source(tree.args[0])))
+            if tree.func.id == ZEROS:
+                return _zeros(_evaluate(tree.args[0], scope))
             function = FUNCTIONS[tree.func.id][1]
             return _each(function, *(_evaluate(each, scope) for each in tree.args))
     raise ArithmeticFault(f"{ast.unparse(tree)!r} is an image, not a number")
+
+
+def _zeros(count: Numbers) -> Numbers:
+    """Return so many zeros, as content of a buffer."""
+    if len(count) != 1 or not 1 <= count[0] <= MAX_ZEROS:
+        raise ArithmeticFault(f"{ZEROS}: {count[0]:g} is out of range, 1 to {MAX_ZEROS}")
+    return (0.0,) * int(count[0])
 
 
 def _each(function: Callable[..., float], *values: Numbers) -> Numbers:

@@ -12,6 +12,7 @@ from vkbloom._custom.described import slang
 from vkbloom._custom.described.arithmetic import Source as ImageName
 from vkbloom._custom.described.arithmetic import parse
 from vkbloom._custom.described.layout import is_within, leaves, path_of, paths
+from vkbloom._custom.described.lowering import TEXTURE, ImageKind, read_back, with_kinds
 from vkbloom._custom.described.module import (
     INPUT,
     OUTPUT,
@@ -22,6 +23,7 @@ from vkbloom._custom.described.module import (
     ModuleFault,
     Type,
     Variable,
+    element_of,
 )
 from vkbloom._custom.described.placing import Places, place
 from vkbloom._custom.described.programs import Program
@@ -40,10 +42,14 @@ from vkbloom._custom.rows import MAX_PARAMETERS, MAX_READS, CoreShader
 from vkbloom._custom.spirv import shared_bytes
 from vkbloom._spelling import did_you_mean
 
+#: Of a fragment shader, and of a compute shader.
 MAX_TARGETS: Final = 4
+MAX_IMAGES: Final = 16
 #: Locations of inputs that a fragment shader finds without a vertex shader of its own.
 POSITIONS: Final = range(4)
 MAX_BLOCK_BYTES: Final = 65536
+#: Formats of storage images that a shader reads, in SPIR-V.
+_READ_FORMATS: Final = {"rgba32float": 1, "rgba16float": 2, "rgba8unorm": 4}
 MAX_BUFFER_BYTES: Final = 1 << 24
 #: Of SPIR-V: what the core's devices have where their driver has it.
 CAPABILITIES: Final = {
@@ -86,25 +92,52 @@ class Block:
 
 
 @dataclasses.dataclass(frozen=True)
+class Read:
+    """An image that a pass reads: what it is, how, and the number of an element of an array."""
+
+    texture: Texture
+    sampling: Sampling | None
+    element: int | None
+    is_history: bool
+
+
+@dataclasses.dataclass(frozen=True)
+class Written:
+    """An image that a pass writes, and the number of an element of an array."""
+
+    output: Output
+    element: int | None
+
+
+@dataclasses.dataclass(frozen=True)
+class Discarded(Written):
+    """An image that a pass writes and nobody reads; `kind`: of its numbers."""
+
+    kind: str
+    variable: int
+
+
+@dataclasses.dataclass(frozen=True)
 class BoundPass:
     """A pass whose shaders are in place.
 
-    - `reads`: The images that it reads, in the order of their bindings, and how.
+    - `reads`: The images that it reads, in the order of their bindings.
+    - `arrays`: The names of those that are arrays.
     - `numbers`: Those of its parameters, `size` bytes in all.
     - `outputs`: The images that it writes, in the order of its targets.
-    - `discarded`: Images that it writes and nobody reads, with the kind of their numbers.
     """
 
     item: DescribedPass
     shader: CoreShader
     vertex: CoreShader | None
     positions: bool
-    reads: tuple[tuple[Texture, int], ...]
+    reads: tuple[Read, ...]
+    arrays: frozenset[str]
     numbers: tuple[Number, ...]
     size: int
     blocks: tuple[Block, ...]
-    outputs: tuple[Output, ...]
-    discarded: tuple[tuple[Output, str], ...]
+    outputs: tuple[Written, ...]
+    discarded: tuple[Discarded, ...]
     group: tuple[int, int] | None
 
 
@@ -117,10 +150,13 @@ def bind(description: Description, item: DescribedPass, program: Program, name: 
 class _Stage:
     """An entry point, with what it uses."""
 
+    code: bytes
     module: Module
     entry: Entry
     variables: list[Variable]
     places: Places
+    # Storage images that are declared otherwise.
+    kinds: dict[int, ImageKind] = dataclasses.field(default_factory=dict)
 
 
 class _Binder:
@@ -128,13 +164,15 @@ class _Binder:
 
     def __init__(self, description: Description, item: DescribedPass, program: Program) -> None:
         self._description = description
+        self._histories = description.histories
         self._item = item
         self._program = program
-        self._slots: list[tuple[Texture, Sampling | None]] = []
+        self._slots: list[Read] = []
+        self._arrays: set[str] = set()
         self._numbers: list[Number] = []
         self._size = 0
         self._blocks: list[tuple[Block, _Stage, int]] = []
-        self._discarded: list[tuple[Output, str, int]] = []
+        self._discarded: list[Discarded] = []
         self._used_keys: set[tuple[str, str]] = set()
         self._structs: set[int] = set()
         self._known: set[str] = set()
@@ -157,9 +195,9 @@ class _Binder:
             self._bind_resources(stage, vertex)
             outputs = self._bind_outputs(stage)
             # Images that are discarded are resources, after the others.
-            for number, (_, _, identity) in enumerate(self._discarded):
+            for number, each in enumerate(self._discarded):
                 binding = len(self._slots) + len(self._blocks) + number + 1
-                stage.places.bindings[identity] = binding
+                stage.places.bindings[each.variable] = binding
             positions = self._check_inputs(stage, vertex)
             self._check_keys()
             code = self._code(stage, name)
@@ -174,12 +212,13 @@ class _Binder:
                 code,
                 None if vertex is None else self._code(vertex, name),
                 positions,
-                tuple((texture, (how or Sampling()).core) for texture, how in self._slots),
+                tuple(self._slots),
+                frozenset(self._arrays),
                 tuple(self._numbers),
                 self._size,
                 tuple(block for block, _, _ in self._blocks),
                 outputs,
-                tuple((output, kind) for output, kind, _ in self._discarded),
+                tuple(self._discarded),
                 group,
             )
         except ModuleFault as error:
@@ -194,13 +233,20 @@ class _Binder:
         found = module.entry(entry, stage)
         for number, name in self._program.names:
             rename(module, number, name)
+        textures = {
+            each.id
+            for each in module.variables(found)
+            if is_stored(each) and self._key(self._item.textures, each)
+        }
+        if textures:
+            return self._open(with_kinds(code, dict.fromkeys(textures, TEXTURE)), entry, stage)
         unknown = module.capabilities - CAPABILITIES
         if unknown:
             raise ModuleFault(f"the shader needs the capability {min(unknown)} of SPIR-V")
         if module.is_endless(found):
             raise ModuleFault(f"the shader has a loop that never ends, in {found.name}")
         places = Places(constants=self._constants(module))
-        return _Stage(module, found, module.variables(found), places)
+        return _Stage(code, module, found, module.variables(found), places)
 
     def _constants(self, module: Module) -> dict[int, int]:
         """Return the words of the specialization constants that the pass names."""
@@ -233,21 +279,37 @@ class _Binder:
         """Return the names under which a description can mention a variable."""
         # Slang puts parameters of an entry point and of a file into structures.
         labels = [variable.name.removeprefix("entryPointParams."), variable.place]
+        array = element_of(variable.binding)
+        binding, suffix = (variable.binding, "") if array is None else (array[0], f"[{array[1]}]")
         if self._program.shift and variable.storage != 9:
             for kind, shift in slang.SHIFTS.items():
-                if shift <= variable.binding < shift + 100:
-                    labels.append(f"{kind}{variable.binding - shift}")
+                if shift <= binding < shift + 100:
+                    labels.append(f"{kind}{binding - shift}{suffix}")
         return [label for label in labels if label]
 
+    def _array_labels(self, variable: Variable) -> list[str]:
+        """Return the names of the array of which a variable is an element."""
+        if variable.element is None:
+            return []
+        return [label.removesuffix(f"[{variable.element}]") for label in self._labels(variable)]
+
+    def _key(self, keys: Mapping[str, object], variable: Variable) -> str | None:
+        """Return the key that names a variable, or the array of which it is an element."""
+        labels = (*self._labels(variable), *self._array_labels(variable))
+        return next((label for label in labels if label in keys), None)
+
     def _find(self, what: str, keys: Mapping[str, object], variable: Variable) -> str | None:
-        """Return the key that names a variable."""
+        """Return the key that names a variable, and note that it is used."""
+        self._known |= {*self._labels(variable), *self._array_labels(variable)}
         found = [key for key in self._labels(variable) if key in keys]
-        self._known |= {*self._labels(variable)}
         if len(found) > 1:
             raise self.fault(f"{what}: {found[0]} and {found[1]} are the same one")
-        if found:
-            self._used_keys.add((what, found[0]))
-        return found[0] if found else None
+        key = self._key(keys, variable)
+        if key:
+            self._used_keys.add((what, key))
+        if key and not found:
+            self._arrays.add(key)
+        return key
 
     def _show(self, variable: Variable) -> str:
         labels = self._labels(variable)
@@ -268,7 +330,8 @@ class _Binder:
                 "sampled",
                 "image",
             ):
-                raise self.fault(f"{self._show(variable)}: arrays of textures cannot be bound")
+                raise self.fault(f"{self._show(variable)}: it is neither a texture nor a sampler")
+        self._order_slots(stage)
         for each in (stage, vertex) if vertex else (stage,):
             for variable in each.variables:
                 if variable.is_block or variable.is_buffer:
@@ -278,6 +341,13 @@ class _Binder:
         # Resources come after the images read.
         for number, (_, owner, identity) in enumerate(self._blocks):
             owner.places.bindings[identity] = len(self._slots) + number + 1
+
+    def _order_slots(self, stage: _Stage) -> None:
+        """Put images of the frame before after the others, as in Row."""
+        order = sorted(range(len(self._slots)), key=lambda slot: self._slots[slot].is_history)
+        self._slots = [self._slots[slot] for slot in order]
+        for identity, binding in stage.places.bindings.items():
+            stage.places.bindings[identity] = order.index(binding - 1) + 1
 
     def _check_places(self, stage: _Stage) -> None:
         """Check that no two variables have one place."""
@@ -310,7 +380,9 @@ class _Binder:
                 f'add {shown} = "glow", or another image, below [passes.textures]'
             )
         stage.places.bindings[variable.id] = len(self._slots) + 1
-        self._slots.append((texture, texture.sampling if kind.kind == "sampled" else None))
+        how = texture.sampling if kind.kind == "sampled" else None
+        is_history = texture.sources[0].name in self._histories
+        self._slots.append(Read(texture, how, variable.element, is_history))
         if len(self._slots) > MAX_READS:
             raise self.fault(f"textures: the shader reads more than {MAX_READS}")
 
@@ -323,14 +395,14 @@ class _Binder:
         """Bind a sampler to an image whose own sampler is like it, or is not used."""
         key = self._find("samplers", self._item.samplers, variable)
         sampling = self._item.samplers[key][0] if key else Sampling()
-        for number, (texture, how) in enumerate(self._slots):
-            if how in (None, sampling):
-                self._slots[number] = (texture, sampling)
+        for number, read in enumerate(self._slots):
+            if read.sampling in (None, sampling):
+                self._slots[number] = dataclasses.replace(read, sampling=sampling)
                 stage.places.bindings[variable.id] = number + 1
                 return
         if not self._slots:
             raise self.fault(f"samplers: {self._show(variable)} samples no texture")
-        self._slots.append((self._slots[0][0], sampling))
+        self._slots.append(dataclasses.replace(self._slots[0], sampling=sampling))
         stage.places.bindings[variable.id] = len(self._slots)
 
     def _bind_block(self, stage: _Stage, variable: Variable) -> None:
@@ -351,6 +423,8 @@ class _Binder:
             ]
             return
         changes = variable.is_buffer and not variable.read_only
+        if changes:
+            size += _last_stride(kind)
         self._blocks.append((Block(numbers, size, variable.is_buffer, changes), stage, variable.id))
 
     def _members(self, variable: Variable) -> Iterator[Number]:
@@ -429,15 +503,16 @@ class _Binder:
             key = "iChannelResolution"
             yield key, (key, tuple(map(parse, parts)), self._item.line)
 
-    def _bind_outputs(self, stage: _Stage) -> tuple[Output, ...]:
+    def _bind_outputs(self, stage: _Stage) -> tuple[Written, ...]:
         """Return the outputs in the order of the targets; place storage images."""
         compute = stage.entry.stage == "compute"
         targets = self._targets(stage)
         targets, outputs = self._without_discarded(targets, compute=compute)
         if not targets:
             raise self.fault("output: the shader writes no image")
-        if len(targets) > MAX_TARGETS:
-            raise self.fault(f"outputs: {len(targets)} are more than {MAX_TARGETS}")
+        most = MAX_IMAGES if compute else MAX_TARGETS
+        if len(targets) > most:
+            raise self.fault(f"outputs: {len(targets)} are more than {most}")
         if "" in outputs:
             if len(targets) > 1:
                 names = ", ".join(self._show(each) for each in targets)
@@ -446,16 +521,25 @@ class _Binder:
                     "below [passes.outputs]",
                     outputs[""].line,
                 )
-            found = {"": targets[0]}
+            found = [("", targets[0])]
         else:
             found = self._match_outputs(targets, outputs, compute=compute)
-        order = list(outputs) if compute else sorted(outputs, key=lambda k: found[k].location or 0)
-        for number, key in enumerate(order):
+        made = []
+        read = read_back(stage.module, stage.entry) if compute else set()
+        for number, (key, target) in enumerate(found):
+            output = outputs[key]
             if compute:
-                stage.places.bindings[found[key].id] = TARGET + number
-            elif (found[key].location or 0) != number:
+                stage.places.bindings[target.id] = TARGET + number
+            elif (target.location or 0) != number:
                 raise self.fault("outputs: their locations are not 0, 1, 2 without gaps")
-        return tuple(outputs[key] for key in order)
+            if target.id in read:
+                # Few devices read storage images without a format.
+                declared = {number: name for name, number in _READ_FORMATS.items()}
+                format = output.format or declared.get(target.type.image[5], "rgba32float")
+                stage.kinds[target.id] = ImageKind(2, _READ_FORMATS[format])
+                output = dataclasses.replace(output, format=format)
+            made.append(Written(output, target.element))
+        return tuple(made)
 
     def _targets(self, stage: _Stage) -> list[Variable]:
         """Return the storage images of a compute shader, or the outputs of a fragment shader."""
@@ -490,40 +574,44 @@ class _Binder:
                 kept.append(target)
                 continue
             assert target.type.of is not None
-            self._discarded.append((self._item.outputs[key], target.type.of.kind, target.id))
+            output = self._item.outputs[key]
+            self._discarded.append(
+                Discarded(output, target.element, target.type.of.kind, target.id)
+            )
         return kept, outputs
 
     def _discards(self, target: Variable) -> str | None:
         """Return the key of an output that is discarded."""
-        for label in self._labels(target):
-            output = self._item.outputs.get(label)
-            if output is not None and output.image.name == DISCARD:
-                return label
-        return None
+        key = self._key(self._item.outputs, target)
+        return key if key and self._item.outputs[key].image.name == DISCARD else None
 
     def _match_outputs(
         self, targets: list[Variable], outputs: Mapping[str, Output], *, compute: bool
-    ) -> dict[str, Variable]:
-        found = {}
+    ) -> list[tuple[str, Variable]]:
+        """Return keys with their targets: in the order of locations, or of the description."""
+
+        def labels(target: Variable) -> list[str]:
+            if not compute:
+                return [str(target.location), target.name]
+            return [*self._labels(target), *self._array_labels(target)]
+
+        found = []
         for target in targets:
-            labels = self._labels(target) if compute else [str(target.location), target.name]
-            key = next((label for label in labels if label in outputs), None)
+            key = next((label for label in labels(target) if label in outputs), None)
             if key is None:
                 raise self.fault(
-                    f"outputs: the shader writes {labels[0]!r}, which the pass does not name"
+                    f"outputs: the shader writes {labels(target)[0]!r}, which the pass does not "
+                    "name"
                 )
-            found[key] = target
+            found.append((key, target))
+        order = list(outputs)
         for key, output in outputs.items():
-            if key not in found:
-                known = {
-                    label: 0
-                    for each in targets
-                    for label in (
-                        self._labels(each) if compute else [str(each.location), each.name]
-                    )
-                }
+            if key not in dict(found):
+                known = {label: 0 for each in targets for label in labels(each)}
                 raise self._unknown("outputs", key, known, output.line)
-        return found
+        if not compute:
+            return sorted(found, key=lambda each: each[1].location or 0)
+        return sorted(found, key=lambda each: (order.index(each[0]), each[1].element or 0))
 
     def _check_inputs(self, stage: _Stage, vertex: _Stage | None) -> bool:
         """Check that a fragment shader finds its inputs; return whether it reads positions."""
@@ -574,7 +662,11 @@ class _Binder:
                     raise self.fault(f"{what}: the shader does not use {key!r}{near}", line)
 
     def _code(self, stage: _Stage, name: str) -> CoreShader:
-        code = place(stage.module, stage.entry, stage.places)
+        module = stage.module
+        if stage.kinds:
+            module = Module(with_kinds(stage.code, stage.kinds))
+            stage.places.formatted = range(stage.module.words[3], module.words[3])
+        code = place(module, stage.entry, stage.places)
         return CoreShader(name, code, hashlib.sha256(code).digest()[:16])
 
 
@@ -590,6 +682,12 @@ def _is_plain(image: Type) -> bool:
         return False
     dimensions, _, arrayed, multisampled = image.image[:4]
     return dimensions == 1 and not arrayed | multisampled and image.of.kind == "float"
+
+
+def _last_stride(kind: Type) -> int:
+    """Return the bytes of an element of an array without a length, at the end of a structure."""
+    last = kind.members[-1].type if kind.members else kind
+    return last.stride if last.kind == "array" and last.count == 0 else 0
 
 
 def _number(kind: Type, offset: int, key: str, value: Value, line: int) -> Number:

@@ -188,9 +188,13 @@ class _Writer:
         sized = f'size = "{size}"'
         if len(targets) <= 1:
             return [f'output = "{each.name}{level}"', sized]
-        names = [(_label(variable) if compute else str(variable.location)) for variable in targets]
+        names = dict.fromkeys(
+            _array_label(variable) if compute else str(variable.location) for variable in targets
+        )
+        arrays = {_array_label(variable) for variable in targets if variable.element is not None}
         inside = ", ".join(
-            f'{_key(name)} = "{each.name}_{number}{level}"' for number, name in enumerate(names)
+            f'{_key(name)} = "{each.name}_{number}{"[element]" if name in arrays else level}"'
+            for number, name in enumerate(names)
         )
         return [f"outputs = {{ {inside} }}  {TODO}: which of them is what, and its size", sized]
 
@@ -290,6 +294,11 @@ class _Writer:
 
 def _label(variable: Variable) -> str:
     return variable.name.removeprefix("entryPointParams.") or variable.place
+
+
+def _array_label(variable: Variable) -> str:
+    """Return the name of a variable, or of the array of which it is an element."""
+    return _label(variable).removesuffix(f"[{variable.element}]")
 
 
 def _key(name: str) -> str:

@@ -27,6 +27,8 @@ uniform sampler2D iChannel0;
 uniform sampler2D iChannel1;
 uniform sampler2D iChannel2;
 uniform sampler2D iChannel3;
+#define texture2D texture
+#define texture2DLodEXT textureLod
 """
 SHADERTOY_MAIN: Final = """
 #line 1 1

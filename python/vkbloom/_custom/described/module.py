@@ -42,6 +42,7 @@ ACCESS_CHAINS: Final = (65, 66)
 DECORATE, MEMBER_DECORATE, EXECUTION_MODE_ID = 71, 72, 331
 LABEL, BRANCH, BRANCH_CONDITIONAL, SWITCH = 248, 249, 250, 251
 EXITS: Final = (252, 253, 254, 255, 4416)
+LOAD: Final = 61
 IMAGE_READ: Final = 98
 
 #: Where instructions of functions name variables: their first operand that may, and whether all
@@ -61,6 +62,20 @@ _POINTERS: Final[Mapping[int, tuple[int, bool]]] = {
     228: (1, False),  # OpAtomicStore
     **dict.fromkeys((227, *range(229, 243)), (3, False)),
 }
+
+
+#: The bindings of the elements of an array of textures, after it is split: its own in hundreds, from
+#: here on, and the number of the element.
+FIRST_ELEMENT: Final = 100_000
+MAX_ELEMENTS: Final = 100
+
+
+def element_of(binding: int) -> tuple[int, int] | None:
+    """Return the binding of an array and the number of its element; None: it is of none."""
+    if binding < FIRST_ELEMENT:
+        return None
+    array, element = divmod(binding - FIRST_ELEMENT, MAX_ELEMENTS)
+    return array, element
 
 
 class ModuleFault(ValueError):
@@ -145,8 +160,17 @@ class Variable:
 
     @property
     def place(self) -> str:
-        """Group and binding."""
-        return f"{self.set}.{self.binding}"
+        """Group and binding; of an element of an array those of the array, and its number."""
+        array = element_of(self.binding)
+        return (
+            f"{self.set}.{self.binding}" if array is None else f"{self.set}.{array[0]}[{array[1]}]"
+        )
+
+    @property
+    def element(self) -> int | None:
+        """The number of an element of an array of textures; None: it is of none."""
+        array = element_of(self.binding)
+        return None if array is None else array[1]
 
     @property
     def is_block(self) -> bool:

@@ -37,10 +37,13 @@ def main() -> None:
         device.create_compute_pipeline(layout="auto", compute=stage)
         return
     inputs, outputs = asked["inputs"], asked["outputs"]
-    vertex = device.create_shader_module(code=vertex_text(inputs))
+    vertex = {"module": module, "entry_point": asked["vertex"]}
+    if asked["vertex"] is None:
+        made = device.create_shader_module(code=vertex_text(inputs))
+        vertex = {"module": made, "entry_point": "main"}
     device.create_render_pipeline(
         layout="auto",
-        vertex={"module": vertex, "entry_point": "main"},
+        vertex=vertex,
         fragment={**stage, "targets": [{"format": "rgba16float"} for _ in range(outputs)]},
     )
 

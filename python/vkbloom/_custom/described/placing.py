@@ -16,6 +16,7 @@ from vkbloom._custom.described.module import (
     EXECUTION_MODE_ID,
     FUNCTION,
     IMAGE_READ,
+    LOAD,
     MEMBER_DECORATE,
     OFFSET,
     PUSH_CONSTANT,
@@ -55,12 +56,14 @@ class Places:
     - `offsets`: Bytes before the members of a structure, by its type.
     - `constants`: Words of specialization constants, by id.
     - `zeros`: Inputs that are 0.
+    - `formatted`: The types of storage images that keep their format, by id.
     """
 
     bindings: dict[int, int] = dataclasses.field(default_factory=dict)
     offsets: dict[int, int] = dataclasses.field(default_factory=dict)
     constants: dict[int, int] = dataclasses.field(default_factory=dict)
     zeros: set[int] = dataclasses.field(default_factory=set)
+    formatted: range = range(0)
 
 
 def place(module: Module, entry: Entry, places: Places) -> bytes:
@@ -72,19 +75,8 @@ def place(module: Module, entry: Entry, places: Places) -> bytes:
     if module.words[1] < 0x10400:
         # Before version 1.4 of SPIR-V an interface has inputs and outputs alone.
         unused |= places.zeros
-    reads = any(
-        word[0] & 0xFFFF == IMAGE_READ
-        for function in module.reached(entry)
-        for word in module.functions[function]
-    )
-    stored = any(
-        word[0] & 0xFFFF == TYPE_IMAGE and len(word) > 8 and word[7] == 2
-        for word in module.defined.values()
-    )
-    needed = [_WRITE_ANY] * stored + [_READ_ANY] * (stored and reads)
-    for capability in needed:
-        if capability not in module.capabilities:
-            made += [2 << 16 | CAPABILITY, capability]
+    for capability in _needed(module, entry, places) - module.capabilities:
+        made += [2 << 16 | CAPABILITY, capability]
     in_functions = decorated = False
     for word in module.instructions:
         in_functions = in_functions or word[0] & 0xFFFF == FUNCTION
@@ -119,6 +111,25 @@ def place(module: Module, entry: Entry, places: Places) -> bytes:
         made += written
     words = without_contraction(tuple(made))
     return struct.pack(f"={len(words)}I", *words)
+
+
+def _needed(module: Module, entry: Entry, places: Places) -> set[int]:
+    """Return the capabilities that storage images without a format need."""
+    stored = {
+        identity
+        for identity, word in module.defined.items()
+        if word[0] & 0xFFFF == TYPE_IMAGE and len(word) > 8 and word[7] == 2
+    }
+    loaded = {}
+    reads = False
+    for function in module.reached(entry):
+        for word in module.functions[function]:
+            if word[0] & 0xFFFF == LOAD:
+                loaded[word[2]] = word[1]
+            elif word[0] & 0xFFFF == IMAGE_READ:
+                reads = reads or loaded.get(word[3], 0) not in places.formatted
+    needed = {_WRITE_ANY} if stored else set()
+    return needed | {_READ_ANY} if stored and reads else needed
 
 
 def _unused(module: Module, entry: Entry) -> set[int]:
@@ -163,7 +174,7 @@ def _declaration(  # noqa: PLR0911  one for each kind
         return _decoration(word, places)
     if opcode == MEMBER_DECORATE and word[3] == OFFSET:
         return (*word[:4], word[4] + places.offsets.get(word[1], 0))
-    if opcode == TYPE_IMAGE and len(word) > 8 and word[7] == 2:
+    if opcode == TYPE_IMAGE and len(word) > 8 and word[7] == 2 and word[1] not in places.formatted:
         return (9 << 16 | TYPE_IMAGE, *word[1:8], 0)
     if opcode == TYPE_POINTER and word[2] == PUSH_CONSTANT:
         return (word[0], word[1], UNIFORM, word[3])

@@ -6,7 +6,7 @@ import functools
 import itertools
 import struct
 from collections import OrderedDict
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any, Final
 
 from vkbloom import _core
@@ -16,10 +16,18 @@ from vkbloom._custom.described.arithmetic import (
     evaluate,
 )
 from vkbloom._custom.described.arithmetic import Source as ImageName
-from vkbloom._custom.described.binding import Block, BoundPass, Number
+from vkbloom._custom.described.binding import (
+    Block,
+    BoundPass,
+    Discarded,
+    Number,
+    Read,
+    Written,
+)
 from vkbloom._custom.described.layout import scalars
 from vkbloom._custom.described.module import Type
 from vkbloom._custom.described.schema import (
+    ELEMENT,
     FRAME,
     GLOW,
     INDEX,
@@ -29,6 +37,7 @@ from vkbloom._custom.described.schema import (
     Description,
     Loop,
     Output,
+    Sampling,
     Value,
 )
 from vkbloom._custom.names import MAX_NAME_LENGTH
@@ -65,13 +74,22 @@ class Plan:
     """Goes through the passes of a description for one frame."""
 
     def __init__(
-        self, description: Description, passes: list[BoundPass], request: FrameValues
+        self,
+        description: Description,
+        passes: list[BoundPass],
+        request: FrameValues,
+        before: Mapping[Key, PassImage],
     ) -> None:
         self._description = description
         self._request = request
         self._passes = iter(passes)
         self._images: dict[Key, PassImage] = {}
+        # Those that the frame before has left, with the keys of images that are read of these.
+        self._before = before
+        self._histories: dict[str, tuple[Key, int]] = {}
         self._level: int | None = None
+        # Of an array of textures of the pass, while its images are found.
+        self._element: int | None = None
         self._target: tuple[int, int] | None = None
         # The textures of the pass, by their names in its shader.
         self._bound: dict[str, PassImage] = {}
@@ -91,6 +109,10 @@ class Plan:
             if self._level is None:
                 raise ArithmeticFault("'level' has a value in loops alone")
             return (float(self._level),)
+        if name == ELEMENT and name not in self._request.values:
+            if self._element is None:
+                raise ArithmeticFault("'element' has a value in arrays of textures alone")
+            return (float(self._element),)
         if name == INDEX:
             return (float(self._request.index),)
         if name in self._description.numbers:
@@ -156,9 +178,24 @@ class Plan:
             self._plain[source.name] = image
         if source.name in PLAIN:
             return self._plain[source.name]
+        if source.name in self._description.histories:
+            return self._find_before(source)
         return self._images.get((source.name, self._index(source)))
 
+    def _find_before(self, source: ImageName) -> PassImage:
+        """Return what the frame before has left, with the size that it has in this frame, too."""
+        key = self._description.histories[source.name], self._index(source)
+        size = self._before[key].size if key in self._before else self._request.frame
+        name = f"{source.name}[{key[1]}]"
+        self._histories[name] = key, self._line
+        return PassImage(name, size)
+
     # The passes.
+
+    @property
+    def images(self) -> Mapping[Key, PassImage]:
+        """The images that the outputs are at the end."""
+        return self._images
 
     def run(self) -> tuple[Row, ...]:
         """Return the rows."""
@@ -190,46 +227,67 @@ class Plan:
             cause = f"the passes run more than {MAX_RUNS} times in a frame"
             raise self._description.source.fault(item.line, cause)
         self._bound = {
-            key: self._read(texture.sources, texture.line) for key, texture in item.textures.items()
+            key: self._read(texture.sources, texture.line)
+            for key, texture in item.textures.items()
+            if key not in each.arrays
         }
-        sizes = [self._side(output) for output in each.outputs]
+        sizes = [self._side(written) for written in each.outputs]
         self._target = sizes[0]
-        reads, sampling = [], []
-        for texture, how in each.reads:
-            reads.append(self._read(texture.sources, texture.line).name)
-            sampling.append(how)
+        reads = [(self._read_element(read).name, read.is_history) for read in each.reads]
         params = self._pack(each.numbers, each.size)
         resources = [self._resource(block) for block in each.blocks]
-        resources += [self._scratch(output, kind) for output, kind in each.discarded]
+        resources += [self._scratch(written) for written in each.discarded]
         changes = each.discarded or any(block.changes for block in each.blocks)
         turn = next(TURNS) if changes else 0
-        made = [self._image(o, s) for o, s in zip(each.outputs, sizes, strict=True)]
+        made = [self._image(w.output, s) for w, s in zip(each.outputs, sizes, strict=True)]
         self.rows.append(
             Row(
                 made[0].name,
                 each.shader,
                 made[0].size,
-                tuple(reads),
+                tuple(name for name, is_history in reads if not is_history),
                 params=params,
+                histories=tuple(name for name, is_history in reads if is_history),
                 group=each.group,
                 groups=self._groups(each),
                 resources=tuple(resources),
                 turn=turn,
-                sampling=tuple(sampling),
-                format=_format(each.outputs[0]),
+                sampling=tuple((read.sampling or Sampling()).core for read in each.reads),
+                format=_format(each.outputs[0].output),
                 vertex=each.vertex,
+                vertices=item.vertices,
                 positions=each.positions,
             )
         )
-        for output, image in zip(each.outputs[1:], made[1:], strict=True):
-            self.rows.append(
-                Row(image.name, each.shader, image.size, format=_format(output), joined=True)
-            )
-        for number, output in enumerate(each.outputs):
+        for written, image in zip(each.outputs[1:], made[1:], strict=True):
+            format = _format(written.output)
+            self.rows.append(Row(image.name, each.shader, image.size, format=format, joined=True))
+        for number, written in enumerate(each.outputs):
             image = made[number]
             if item.blend is not None and number == 0:
-                image = self._blended(each, output, image)
-            self._images[output.image.name, self._index(output.image)] = image
+                image = self._blended(each, written.output, image)
+            self._keep(written, image)
+
+    def _keep(self, written: Written, image: PassImage) -> None:
+        """Note the image that an output now is."""
+        self._element = written.element
+        output = written.output
+        if output.when is None or any(self._value(output.when, output.line)):
+            key = output.image.name, self._index_at(output.image, output.line)
+            self._images[key] = image
+        self._element = None
+
+    def _index_at(self, source: ImageName, line: int) -> int | None:
+        try:
+            return self._index(source)
+        except ArithmeticFault as error:
+            raise self._description.source.fault(line, str(error)) from None
+
+    def _read_element(self, read: Read) -> PassImage:
+        self._element = read.element
+        found = self._read(read.texture.sources, read.texture.line)
+        self._element = None
+        return found
 
     def _groups(self, each: BoundPass) -> tuple[int, int] | None:
         """Return how many workgroups a pass has; None: as many as cover its first output."""
@@ -241,12 +299,15 @@ class Plan:
             raise self._description.source.fault(each.item.line, cause)
         return int(found[0]), int(found[1])
 
-    def _side(self, output: Output) -> tuple[int, int]:
+    def _side(self, written: Written) -> tuple[int, int]:
         """Return the size of an output: a share of the frame, or one or two numbers of pixels."""
+        output = written.output
+        self._element = written.element
         if isinstance(output.size, float):
             found: Numbers = tuple(output.size * side for side in self._request.frame)
         else:
             found = self._value(output.size, output.line)
+        self._element = None
         if len(found) not in (1, 2):
             cause = f"size: {len(found)} numbers are not width and height"
             raise self._description.source.fault(output.line, cause)
@@ -257,6 +318,7 @@ class Plan:
         return sides[0], sides[-1]
 
     def _read(self, sources: tuple[ImageName, ...], line: int) -> PassImage:
+        self._line = line
         try:
             for source in sources:
                 if (found := self._find(source)) is not None:
@@ -323,9 +385,9 @@ class Plan:
         if block.changes:
             if self._owner is None:
                 self._owner = _core.resource_owner()
-            size = -(-max(block.size, 16) // 16) * 16
-            header = struct.pack("=2Q8I", next(SERIALS), size, STORAGE, *(0,) * 7)
-            return Resource(header, self._data(block, size), self._owner)
+            data = self._data(block, 16)
+            header = struct.pack("=2Q8I", next(SERIALS), len(data), STORAGE, *(0,) * 7)
+            return Resource(header, data, self._owner)
         data = self._data(block, 16)
         kind = STORAGE if block.storage else UNIFORM
         key = bytes([kind]) + data
@@ -338,12 +400,12 @@ class Plan:
             _BLOCKS.move_to_end(key)
             return _BLOCKS[key]
 
-    def _scratch(self, output: Output, kind: str) -> Resource:
+    def _scratch(self, written: Discarded) -> Resource:
         """Return a new image that nobody reads."""
         if self._owner is None:
             self._owner = _core.resource_owner()
-        width, height = self._side(output)
-        bits, name = (32, {"int": "i", "uint": "u"}.get(kind, "f"))
+        width, height = self._side(written)
+        bits, name = (32, {"int": "i", "uint": "u"}.get(written.kind, "f"))
         layout = FORMATS[f"rgba{bits}{name}"].vulkan
         header = struct.pack(
             "=2Q8I", next(SERIALS), 16 * width * height, IMAGE, layout, 2, width, height, 1, 0, 2
@@ -371,10 +433,12 @@ class Plan:
             if image.name not in names and label not in taken and image.name != "MAIN":
                 names[image.name] = label[:MAX_NAME_LENGTH]
                 taken.add(label)
+        names |= self._names_before(names)
         rows = [
             row._replace(
                 name=names.get(row.name, row.name),
                 reads=tuple(names.get(read, read) for read in row.reads),
+                histories=tuple(names[read] for read in row.histories),
                 framebuffer=row.name in names and names[row.name] != PICTURE,
             )
             for row in self.rows
@@ -385,6 +449,22 @@ class Plan:
         if not description.saves_bloom:
             rows.append(package_row(DIFFERENCE, BLOOM_IMAGE, frame, (PICTURE, "MAIN")))
         return tuple(rows)
+
+    def _names_before(self, names: Mapping[str, str]) -> dict[str, str]:
+        """Return the names of the framebuffers that are read of the frame before."""
+        made = {}
+        for name, (key, line) in self._histories.items():
+            shown = f"{key[0]}[{key[1]}]" if key[1] is not None else key[0]
+            image = self._images.get(key)
+            if image is None:
+                raise self._description.source.fault(line, f"{shown} is not written in this frame")
+            made[name] = names.get(image.name, PICTURE)
+            if made[name] == PICTURE:
+                cause = (
+                    f"{shown} is the picture, of which the frame before leaves none; write it twice"
+                )
+                raise self._description.source.fault(line, cause)
+        return made
 
 
 def _format(output: Output) -> int:

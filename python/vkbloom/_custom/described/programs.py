@@ -7,6 +7,7 @@ import hashlib
 import json
 import os
 import re
+import struct
 import tempfile
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -15,8 +16,9 @@ from typing import Final
 from vkbloom._core import ShaderError
 from vkbloom._custom import compiler
 from vkbloom._custom.compiler import CACHE, run_limited
-from vkbloom._custom.described import glslang, shaderlab, slang, wgsl
+from vkbloom._custom.described import glslang, lowering, shaderlab, slang, wgsl
 from vkbloom._custom.described.files import Files, collect
+from vkbloom._custom.described.module import ModuleFault
 from vkbloom._custom.described.schema import Description, Shader
 from vkbloom._custom.source import Source
 
@@ -25,7 +27,7 @@ _COMPUTE: Final = (
     r"(?i:\[\s*numthreads)\b[^\]]*\]\s*(?:\[[^\]]*\]\s*|#[^\n]*\n\s*)*(?:public\s+)?void\s+{}\s*\("
 )
 #: Of all results together with what is before them.
-_VERSION: Final = b"3"
+_VERSION: Final = b"4"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -111,8 +113,21 @@ def _compile(shader: Shader, files: Files) -> Program:
     if stored is not None and (program := _unpack(stored)) is not None:
         return program
     program = _COMPILERS[shader.language](shader, files)
+    try:
+        program = dataclasses.replace(program, code=_lower(program.code))
+    except ModuleFault as error:
+        raise files.fault("", 1, str(error)) from None
+    except (IndexError, KeyError, struct.error):
+        raise files.fault("", 1, "the SPIR-V is not valid") from None
     CACHE.write(key.digest(), _pack(program))
     return program
+
+
+def _lower(code: bytes) -> bytes:
+    """Return a module without arrays of textures, and without layers of them."""
+    if lowering.has_arrays(code):
+        code = lowering.split_arrays(code, slang.split_arrays)
+    return lowering.without_layers(code)
 
 
 def _pack(program: Program) -> bytes:
@@ -213,8 +228,8 @@ def _shaderlab(shader: Shader, files: Files) -> Program:
 
 def _wgsl(shader: Shader, files: Files) -> Program:
     dependencies = {name: Path(folder) for name, folder in shader.dependencies}
-    code, stage, names = wgsl.compile_wgsl(shader, files, dependencies)
-    return Program(code, None, stage, names=names)
+    code, vertex, stage, names = wgsl.compile_wgsl(shader, files, dependencies)
+    return Program(code, None, stage, vertex, names=names)
 
 
 def _spirv(shader: Shader, files: Files) -> Program:

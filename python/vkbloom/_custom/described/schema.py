@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import keyword
 from collections.abc import Iterator, Mapping
 from typing import Any, Final
@@ -18,6 +19,7 @@ from vkbloom._custom.described.arithmetic import (
     Source as ImageName,
 )
 from vkbloom._custom.described.tables import Table, read_tables
+from vkbloom._custom.names import HISTORY
 from vkbloom._custom.params import RANGES, Number, Param
 from vkbloom._custom.source import Source
 
@@ -32,6 +34,8 @@ DISCARD: Final = "discard"
 #: one, and the target of the pass.
 LEVEL: Final = "level"
 INDEX: Final = "index"
+#: The number of an image in an array of the shader, in what is said of the whole array.
+ELEMENT: Final = "element"
 TARGET: Final = "target"
 
 FILTERS: Final = ("linear", "nearest")
@@ -49,7 +53,7 @@ LANGUAGES: Final = {
 STAGES: Final = ("fragment", "compute")
 #: Formats of outputs; "" is the setting `format`.
 FORMATS: Final = ("", "rgba8unorm", "rgba16float", "rgba32float")
-MAX_LOOP_STEPS: Final = 64
+MAX_VERTICES: Final = 1 << 16
 MAX_PASSES: Final = 64
 MAX_SETTINGS: Final = 64
 
@@ -80,12 +84,16 @@ class Texture:
 
 @dataclasses.dataclass(frozen=True)
 class Output:
-    """An image that a pass writes. `size` is an expression, or a share of the frame."""
+    """An image that a pass writes. `size` is an expression, or a share of the frame.
+
+    `when`: Where this is 0, the pass has a place to write to, and nobody reads it.
+    """
 
     image: ImageName
     size: Value
     format: str
     line: int
+    when: Expression | None = None
 
 
 @dataclasses.dataclass(frozen=True)
@@ -130,6 +138,7 @@ class DescribedPass:
     when: Expression | None
     tile: tuple[int, int] | None
     groups: Value | None
+    vertices: int
     line: int
 
 
@@ -162,9 +171,26 @@ class Description:
         for step in self.steps:
             yield from step.passes if isinstance(step, Loop) else (step,)
 
-    #: A description has no textures and buffers of its own, and reads no frame before.
+    @functools.cached_property
+    def histories(self) -> dict[str, str]:
+        """The outputs that passes read as the frame before left them, by the name there."""
+        read = {
+            source.name
+            for each in self.passes
+            for texture in each.textures.values()
+            for source in texture.sources
+            if source.name not in self.outputs
+        }
+        return {name: name.removeprefix(HISTORY) for name in sorted(read) if HISTORY in name}
+
+    @functools.cached_property
+    def outputs(self) -> set[str]:
+        """The names of all outputs that are read."""
+        names = {out.image.name for each in self.passes for out in each.outputs.values()}
+        return names - {DISCARD}
+
+    #: A description has no textures and buffers of its own.
     embedded: Mapping[str, Any] = dataclasses.field(default_factory=dict)
-    histories: Mapping[str, str] = dataclasses.field(default_factory=dict)
 
 
 def read_schema(source: Source) -> Description:
@@ -341,7 +367,6 @@ def _read_pass(table: Table, above: _Shared) -> DescribedPass:
         len(tile) != 2 or not all(type(each) is int and 1 <= each <= 16384 for each in tile)
     ):
         table.refuse("tile", tile, "is not the two sides in pixels that a workgroup covers")
-    when = table.text("when")
     made = DescribedPass(
         shader,
         _read_textures(table.table("textures")),
@@ -349,9 +374,10 @@ def _read_pass(table: Table, above: _Shared) -> DescribedPass:
         _read_values(table.table("values")),
         _read_outputs(table),
         _read_blend(table),
-        None if when is None else _expression(table, "when", when),
+        _when(table),
         None if tile is None else (tile[0], tile[1]),
         _value(table, "groups", table.get("groups", list)) if "groups" in table else None,
+        _vertices(table, shader),
         table.line(),
     )
     table.get("name", str)
@@ -359,11 +385,22 @@ def _read_pass(table: Table, above: _Shared) -> DescribedPass:
     return made
 
 
-def _expression(table: Table, key: str, text: str) -> Expression:
+def _vertices(table: Table, shader: Shader) -> int:
+    """Read how many vertices are drawn: three of each triangle; 0 for the package's own."""
+    count: int = table.get("vertices", int, 0)
+    if "vertices" in table and (count % 3 or not 3 <= count <= MAX_VERTICES):
+        table.refuse("vertices", count, f"is not a multiple of 3, 3 to {MAX_VERTICES}")
+    if count and shader.vertex is None:
+        raise table.fault("vertices: the pass has no vertex shader of its own", "vertices")
+    return count
+
+
+def _when(table: Table) -> Expression | None:
+    text = table.text("when")
     try:
-        return parse(text)
+        return None if text is None else parse(text)
     except ArithmeticFault as error:
-        raise table.fault(f"{key}: {error}", key) from None
+        raise table.fault(f"when: {error}", "when") from None
 
 
 def _read_shader(table: Table, shared: _Shared) -> Shader:
@@ -463,6 +500,7 @@ def _read_outputs(table: Table) -> dict[str, Output]:
             _size(each, size),
             each.choice("format", FORMATS, format),
             each.line("size") if "size" in each else outputs.line(key),
+            _when(each),
         )
         each.finish("an output")
     if not made:
@@ -512,14 +550,15 @@ def _read_blend(table: Table) -> Blend | None:
 def _check_names(made: Description) -> None:
     """Check the names in all expressions: settings, numbers and images."""
     known = {param.name for param in made.params} | made.numbers.keys()
-    outputs = {out.image.name for each in made.passes for out in each.outputs.values()}
-    outputs -= {DISCARD}
+    outputs = made.outputs
     images = outputs | {FRAME, GLOW, *PLAIN}
     for name in (param.name for param in made.params):
         if name in made.numbers:
             line = made.numbers[name][1]
             raise made.source.fault(line, f"numbers: {name!r} is also a setting")
-    check = _NameCheck(made.source, known | {INDEX}, images)
+    check = _NameCheck(
+        made.source, known | {INDEX}, images, {f"{HISTORY}{name}" for name in outputs}
+    )
     for value, line in made.numbers.values():
         check.value(value, line, level=True)
     for step in made.steps:
@@ -541,14 +580,18 @@ class _NameCheck:
     source: Source
     numbers: set[str]
     images: set[str]
+    histories: set[str]
 
-    def value(self, value: Value | None, line: int, *, level: bool = False) -> None:
-        """Check a value; `level`: whether it can have the level of a loop."""
+    def value(
+        self, value: Value | None, line: int, *, level: bool = False, element: bool = False
+    ) -> None:
+        """Check a value; `level`, `element`: whether it can have that of a loop, of an array."""
         for part in _parts(value) if value is not None else ():
             if isinstance(part, float):
                 continue
             numbers, images = names_in(part)
             known = self.numbers | ({LEVEL} if level else set())
+            known |= {ELEMENT} if element else set()
             for name in numbers - known:
                 self._fail(name, known, "a number", line)
             for name in images - self.images - {TARGET}:
@@ -560,24 +603,36 @@ class _NameCheck:
             line, f"{name!r} is not {what} here{where}; known are {', '.join(sorted(known))}"
         )
 
-    def image(self, image: ImageName, line: int, *, level: bool = False) -> None:
+    def image(
+        self, image: ImageName, line: int, *, level: bool = False, element: bool = False
+    ) -> None:
         """Check the name of an image and its level."""
         if image.name not in self.images:
             self._fail(image.name, self.images, "an image", line)
-        self.value(image.level, line, level=level)
+        self.value(image.level, line, level=level, element=element)
+
+    def _texture(self, texture: Texture, *, level: bool) -> None:
+        """Check the sources of a texture: several, or what the frame before has left."""
+        known = dataclasses.replace(self, images=self.images | self.histories)
+        for source in texture.sources:
+            known.image(source, texture.line, level=level, element=True)
+            if source.name in self.histories - self.images and len(texture.sources) > 1:
+                raise self.source.fault(
+                    texture.line, f"{source.name!r} is always there, and so the only source"
+                )
 
     def check_pass(self, each: DescribedPass, *, level: bool) -> None:
         """Check all names of a pass; sizes can be those of its textures."""
         inner = dataclasses.replace(self, images=self.images | each.textures.keys())
         for texture in each.textures.values():
-            for source in texture.sources:
-                self.image(source, texture.line, level=level)
+            self._texture(texture, level=level)
         for value, line in each.values.values():
             inner.value(value, line, level=level)
         for output in each.outputs.values():
             if output.image.name != DISCARD:
-                self.image(output.image, output.line, level=level)
-            inner.value(output.size, output.line, level=level)
+                self.image(output.image, output.line, level=level, element=True)
+            inner.value(output.size, output.line, level=level, element=True)
+            inner.value(output.when, output.line, level=level, element=True)
         if each.blend is not None:
             inner.value(each.blend.source, each.blend.line, level=level)
             inner.value(each.blend.target, each.blend.line, level=level)

@@ -112,11 +112,31 @@ def is_old(files: Files) -> bool:
     )
 
 
+def split_arrays(code: bytes) -> bytes:
+    """Return SPIR-V in which each element of an array of textures is a variable."""
+    program = find_tool("spirv-opt")
+    if program is None:
+        raise ShaderError(f"arrays of textures: {MISSING_TOOLS.format('spirv-opt')}")
+    passes = [
+        "-O",
+        "--replace-desc-array-access-using-var-index",
+        "--eliminate-dead-code-aggressive",
+    ]
+    passes += ["--descriptor-array-scalar-replacement", "-O"]
+    with tempfile.TemporaryDirectory(prefix="vkbloom") as folder:
+        return _run_optimizer(program, code, folder, passes)
+
+
 def optimize(program: str, code: bytes, folder: str) -> bytes:
     """Return SPIR-V with loops unrolled, constants folded, and what is not used left out."""
+    return _run_optimizer(program, code, folder, ["-O"])
+
+
+def _run_optimizer(program: str, code: bytes, folder: str, passes: list[str]) -> bytes:
+    """Return SPIR-V after some passes of SPIRV-Tools; as it was where these fail."""
     source, target = Path(folder) / "before.spv", Path(folder) / "after.spv"
     source.write_bytes(code)
-    command = [program, "--skip-validation", "-O", str(source), "-o", str(target)]
+    command = [program, "--skip-validation", *passes, str(source), "-o", str(target)]
     status, _ = run_limited(command, "", folder)
     return target.read_bytes() if status == 0 and target.exists() else code
 

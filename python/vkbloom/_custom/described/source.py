@@ -74,7 +74,12 @@ class Programs:
 
     def plan(self, request: FrameValues) -> tuple[Row, ...]:
         """Return the rows of a frame."""
-        return Plan(self._description, self._passes, request).run()
+        plan = Plan(self._description, self._passes, request, {})
+        rows = plan.run()
+        if not self._description.histories:
+            return rows
+        # What the frame before has left has the sizes that this one turns out to have.
+        return Plan(self._description, self._passes, request, plan.images).run()
 
     def try_plan(self) -> None:
         """Plan a frame with the defaults; raise ValueError where that fails."""

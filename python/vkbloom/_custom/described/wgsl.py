@@ -18,7 +18,8 @@ from vkbloom import _core
 from vkbloom._core import ShaderError
 from vkbloom._custom.compiler import run_limited, was_ended
 from vkbloom._custom.described.files import MAX_BYTES, MAX_FILES, Files, read_text
-from vkbloom._custom.described.module import BINDING, DECORATE, SET, STAGES, Module, ModuleFault
+from vkbloom._custom.described.lowering import with_y_down
+from vkbloom._custom.described.module import BINDING, DECORATE, SET, Module, ModuleFault
 from vkbloom._custom.described.schema import Shader
 from vkbloom._custom.source import Source
 from vkbloom._custom.spirv import HEADER_WORDS
@@ -72,8 +73,11 @@ def identity(language: str) -> bytes:
 
 def compile_wgsl(
     shader: Shader, files: Files, dependencies: Mapping[str, Path]
-) -> tuple[bytes, str, tuple[tuple[str, str], ...]]:
-    """Return the SPIR-V of an entry point, its stage, and the names of what it binds."""
+) -> tuple[bytes, bytes | None, str, tuple[tuple[str, str], ...]]:
+    """Return the SPIR-V of an entry point, that of its vertex shader, its stage, and the names.
+
+    The names are those of what it binds.
+    """
     text = files.main.text
     if shader.language == "wesl":
         text = _from_wesl(shader, files, dependencies)
@@ -88,16 +92,36 @@ def compile_wgsl(
         "stage": stage,
         "inputs": inputs,
         "outputs": outputs,
+        "vertex": shader.vertex,
         "constants": dict(shader.constants),
     }
-    code = _run(files, asked, translated=shader.language == "wesl")
+    wanted = {entry: stage}
     words = _words_of(plain, entry)
+    if shader.vertex is not None:
+        _check_vertex(shader.vertex, files, plain, stage)
+        wanted[shader.vertex] = "vertex"
+        words |= _words_of(plain, shader.vertex)
+    made = _run(files, asked, wanted, translated=shader.language == "wesl")
     used: dict[int, list[int]] = {}
     for group, binding, _, name, _ in _VARIABLE.findall(plain):
         if name in words:
             used.setdefault(int(group), []).append(int(binding))
-    code = _with_bindings(files, code, {group: sorted(each) for group, each in used.items()})
-    return code, stage, tuple(_names(plain, words))
+    code, *vertex = _with_bindings(
+        files, made, {group: sorted(each) for group, each in used.items()}
+    )
+    # WebGPU has y upwards, and Vulkan downwards.
+    flipped = with_y_down(vertex[0]) if vertex else None
+    return code, flipped, stage, tuple(_names(plain, words))
+
+
+def _check_vertex(name: str, files: Files, text: str, stage: str) -> None:
+    """Check that a file has a vertex shader of that name, for a fragment shader."""
+    known = re.findall(r"@vertex\b[^{}]*?\bfn\s+(\w+)", text)
+    if stage != "fragment":
+        raise files.fault("", 1, "vertex: a compute shader has none")
+    if name not in known:
+        cause = f"vertex: {name!r} is not one of the file's: {', '.join(known) or 'none'}"
+        raise files.fault("", 1, cause)
 
 
 def _words_of(text: str, entry: str) -> set[str]:
@@ -125,26 +149,37 @@ def _body(text: str, start: int) -> str:
     return text[start:]
 
 
-def _with_bindings(files: Files, code: bytes, used: Mapping[int, list[int]]) -> bytes:
-    """Return a module with the bindings of the source: wgpu numbers those that are used."""
-    module = Module(code)
-    places = {
-        identity: (marks[SET], marks[BINDING])
-        for identity, marks in module.decorations.items()
-        if SET in marks and BINDING in marks
-    }
+def _with_bindings(files: Files, codes: list[bytes], used: Mapping[int, list[int]]) -> list[bytes]:
+    """Return the modules of a pipeline with the bindings of the source: wgpu numbers them."""
+    modules = [Module(code) for code in codes]
+    places = [
+        {
+            identity: (marks[SET], marks[BINDING])
+            for identity, marks in module.decorations.items()
+            if SET in marks and BINDING in marks
+        }
+        for module in modules
+    ]
+    all_places = {place for each in places for place in each.values()}
     changed = {}
-    for group in {place[0] for place in places.values()}:
-        found = sorted({place[1] for place in places.values() if place[0] == group})
+    for group in {place[0] for place in all_places}:
+        found = sorted({place[1] for place in all_places if place[0] == group})
         wanted = used.get(group, [])
         if len(found) != len(wanted):
             raise files.fault("", 1, f"naga binds {len(found)} of group {group}, not {len(wanted)}")
         changed.update({(group, a): b for a, b in zip(found, wanted, strict=True)})
+    return [
+        _renumber(module, {key: changed[place] for key, place in each.items()})
+        for module, each in zip(modules, places, strict=True)
+    ]
+
+
+def _renumber(module: Module, bindings: Mapping[int, int]) -> bytes:
     words = list(module.words)
     position = HEADER_WORDS
     for word in module.instructions:
-        if word[0] == 4 << 16 | DECORATE and word[2] == BINDING and word[1] in places:
-            words[position + 3] = changed[places[word[1]]]
+        if word[0] == 4 << 16 | DECORATE and word[2] == BINDING and word[1] in bindings:
+            words[position + 3] = bindings[word[1]]
         position += len(word)
     return struct.pack(f"={len(words)}I", *words)
 
@@ -230,8 +265,10 @@ def _member_names(
             yield from _member_names(f"{place}.{number}", structs[kind], structs, depth + 1)
 
 
-def _run(files: Files, asked: dict[str, object], *, translated: bool) -> bytes:
-    """Compile in a process of its own; return the module with the entry point."""
+def _run(
+    files: Files, asked: dict[str, object], wanted: Mapping[str, str], *, translated: bool
+) -> list[bytes]:
+    """Compile in a process of its own; return the modules of entry points, given with stages."""
     with tempfile.TemporaryDirectory(prefix="vkbloom") as folder:
         layer = {
             "name": "VK_LAYER_VKBLOOM_modules",
@@ -256,21 +293,24 @@ def _run(files: Files, asked: dict[str, object], *, translated: bool) -> bytes:
         status, output = run_limited(command, text, folder, environment, MAX_MEMORY)
         if status:
             raise _explain(files, status, output, translated=translated)
-        for file in sorted(Path(folder).glob("*.spv"), key=lambda each: -int(each.stem)):
-            code = file.read_bytes()
-            name = str(asked["entry"]).encode()
-            model = 5 if asked["stage"] == "compute" else 4
-            if _has_entry(code, name, model):
-                return code
-    raise files.fault("", 1, "naga gave no SPIR-V; is the Vulkan loader installed?")
+        order = sorted(Path(folder).glob("*.spv"), key=lambda each: -int(each.stem))
+        made = [file.read_bytes() for file in order]
+    found = [
+        next((code for code in made if _has_entry(code, name, stage)), None)
+        for name, stage in wanted.items()
+    ]
+    codes = [code for code in found if code is not None]
+    if len(codes) < len(found):
+        raise files.fault("", 1, "naga gave no SPIR-V; is the Vulkan loader installed?")
+    return codes
 
 
-def _has_entry(code: bytes, name: bytes, model: int) -> bool:
+def _has_entry(code: bytes, name: str, stage: str) -> bool:
     try:
         entries = Module(code).entries
     except ModuleFault:
         return False
-    return any(each.name == name.decode() and each.stage == STAGES[model] for each in entries)
+    return any(each.name == name and each.stage == stage for each in entries)
 
 
 def _explain(files: Files, status: int, output: str, *, translated: bool) -> ShaderError:
