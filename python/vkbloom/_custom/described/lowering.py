@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Final
 
 from vkbloom._custom.described.module import (
+    ARRAY_STRIDE,
     BINDING,
     BUILT_IN,
     CAPABILITY,
@@ -22,8 +23,13 @@ from vkbloom._custom.described.module import (
     FUNCTION_CALL,
     IMAGE_READ,
     LOAD,
+    MATRIX_STRIDE,
     MAX_ELEMENTS,
+    MEMBER_DECORATE,
+    OFFSET,
+    SPEC_CONSTANT,
     TYPE_ARRAY,
+    TYPE_FLOAT,
     TYPE_IMAGE,
     TYPE_INT,
     TYPE_POINTER,
@@ -47,6 +53,9 @@ _FETCH, _WRITE, _SIZE_LOD, _SIZE = 95, 99, 103, 104
 #: OpImageFetch to OpImageWrite.
 _WITH_LAYER: Final = {*range(87, 91), *range(_FETCH, _WRITE + 1)}
 _STORE: Final = 62
+_CONVERT, _COPY = 115, 83
+#: Capabilities of floats of 16 bits: in general, and in what is bound.
+_OF_HALVES: Final = {9, *range(4433, 4437)}
 _EXTRACT, _INSERT, _SHUFFLE, _CONSTRUCT, _NEGATE = 81, 82, 79, 80, 127
 _POSITION: Final = 0
 #: Of an image type: Dim2D.
@@ -56,7 +65,7 @@ _OF_STORED: Final = range(19, 26)
 _LOD: Final = 2
 #: What else is done with storage images, and the first operand that may be one: OpFunctionCall,
 #: OpImageTexelPointer, OpCopyObject, OpImageWrite.
-_OTHER_USES: Final = {FUNCTION_CALL: 4, 60: 3, 83: 3, _WRITE: 1}
+_OTHER_USES: Final = {FUNCTION_CALL: 4, 60: 3, _COPY: 3, _WRITE: 1}
 
 
 def has_arrays(code: bytes) -> bool:
@@ -170,6 +179,42 @@ class _Types:
         if word[0] & 0xFFFF != TYPE_VECTOR:
             raise ModuleFault("a coordinate of an image is not a vector")
         return word[2]
+
+
+def without_halves(code: bytes) -> bytes:
+    """Return a module whose floats of 16 bits have 32: HLSL's half is no other one on desktops."""
+    module = Module(code)
+    halves = {
+        identity
+        for identity, word in module.defined.items()
+        if word[0] & 0xFFFF == TYPE_FLOAT and word[2] == 16
+    }
+    if not halves:
+        return code
+    types = _Types(module)
+
+    def is_double(value: int) -> bool:
+        kind = module.type_of(types.of_value.get(value, 0))
+        return (kind.of or kind).count == 64
+
+    def changed(word: Instruction) -> Iterator[Instruction]:
+        opcode = word[0] & 0xFFFF
+        if opcode == TYPE_FLOAT and word[1] in halves:
+            yield (*word[:2], 32, *word[3:])
+        elif opcode in (CONSTANT, SPEC_CONSTANT) and word[1] in halves:
+            (value,) = struct.unpack("<e", struct.pack("<H", word[3] & 0xFFFF))
+            yield (*word[:3], *struct.unpack("<I", struct.pack("<f", value)))
+        elif opcode == _CONVERT and not is_double(word[2]) and not is_double(word[3]):
+            yield _instruction(_COPY, *word[1:])
+        elif opcode == MEMBER_DECORATE and word[3] in (OFFSET, MATRIX_STRIDE):
+            # There must be room for numbers of twice the size.
+            yield (*word[:4], 2 * word[4])
+        elif opcode == DECORATE and word[2] == ARRAY_STRIDE:
+            yield (*word[:3], 2 * word[3])
+        elif not (opcode == CAPABILITY and word[1] in _OF_HALVES):
+            yield word
+
+    return _rewrite(module, changed, types)
 
 
 def without_layers(code: bytes) -> bytes:

@@ -45,7 +45,7 @@ _SPECIALIZED: Final = {48: 41, 49: 42, 50: 43, 51: 44}
 #: The storage class of a module's own variables, and OpConstantNull.
 PRIVATE: Final = 6
 CONSTANT_NULL: Final = 46
-_UNIQUE: Final = (TYPE_IMAGE, 27, TYPE_POINTER)
+_UNIQUE: Final = (22, 23, 24, TYPE_IMAGE, 27, TYPE_POINTER, 33)
 
 
 @dataclasses.dataclass

@@ -9,6 +9,7 @@ import os
 import re
 import struct
 import tempfile
+from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Final
@@ -114,7 +115,9 @@ def _compile(shader: Shader, files: Files) -> Program:
         return program
     program = _COMPILERS[shader.language](shader, files)
     try:
-        program = dataclasses.replace(program, code=_lower(program.code))
+        vertex = None if program.vertex is None else _lower(program.vertex, shader.language)
+        code = _lower(program.code, shader.language)
+        program = dataclasses.replace(program, code=code, vertex=vertex)
     except ModuleFault as error:
         raise files.fault("", 1, str(error)) from None
     except (IndexError, KeyError, struct.error):
@@ -123,8 +126,10 @@ def _compile(shader: Shader, files: Files) -> Program:
     return program
 
 
-def _lower(code: bytes) -> bytes:
+def _lower(code: bytes, language: str) -> bytes:
     """Return a module without arrays of textures, and without layers of them."""
+    if language in ("hlsl", "shaderlab"):
+        code = lowering.without_halves(code)
     if lowering.has_arrays(code):
         code = lowering.split_arrays(code, slang.split_arrays)
     return lowering.without_layers(code)
@@ -148,12 +153,26 @@ def _unpack(data: bytes) -> Program | None:
         return None
 
 
-#: What Unity's compiler defines where a description does not; on desktops its half is float.
+_COUNTS: Final = ("", "2", "3", "4")
+#: What Unity's compiler defines where a description does not.
 _UNITY: Final = {
     "SHADER_API_VULKAN": "1",
     "SHADER_TARGET": "45",
-    **{f"{kind}{count}": f"float{count}" for kind in ("half", "fixed") for count in ("", 2, 3, 4)},
+    **{f"fixed{count}": f"float{count}" for count in _COUNTS},
+}
+#: On desktops its half is float.
+_FLOATS: Final = {
+    **{f"half{count}": f"float{count}" for count in _COUNTS},
     **{f"half{n}x{n}": f"float{n}x{n}" for n in (2, 3, 4)},
+}
+#: Types of HLSL that Slang does not know: of at least so many bits.
+_AT_LEAST: Final = {
+    f"{name}{count}": f"{kind}{count}"
+    for name, kind in (
+        *(("min16float", "half"), ("min10float", "half")),
+        *(("min16int", "int"), ("min12int", "int"), ("min16uint", "uint")),
+    )
+    for count in _COUNTS
 }
 
 
@@ -198,6 +217,8 @@ def _slang(shader: Shader, files: Files) -> Program:
     if shader.stage is None and any(known.search(text) for text in files.texts):
         stage = "compute"
     arguments = [*_defines(shader), *shader.options]
+    if shader.language == "hlsl":
+        arguments = [*(f"-D{name}={kind}" for name, kind in _AT_LEAST.items()), *arguments]
     code = slang.compile_slang(files, shader.language, stage, entry, arguments)
     vertex = None
     if shader.vertex is not None:
@@ -214,16 +235,26 @@ def _shaderlab(shader: Shader, files: Files) -> Program:
     if entry is None:
         raise files.fault("", 1, f"program {shader.number} has no #pragma fragment; give entry")
     given = dict(shader.defines)
-    usual = [f"-D{name}={value}" for name, value in _UNITY.items() if name not in given]
-    arguments = [*usual, *_defines(shader), *shader.options]
-    code = slang.compile_slang(files, "hlsl", "fragment", entry, arguments, text=program.text)
-    vertex = None
-    if shader.vertex is not None:
-        arguments = [*arguments, "-fvk-invert-y"]
-        vertex = slang.compile_slang(
-            files, "hlsl", "vertex", shader.vertex, arguments, text=program.text
-        )
-    return Program(code, None, "fragment", vertex, shift=slang.has_registers(files))
+
+    def compile(usual: Mapping[str, str]) -> Program:
+        known = [f"-D{name}={value}" for name, value in usual.items() if name not in given]
+        arguments = [*known, *_defines(shader), *shader.options]
+        code = slang.compile_slang(files, "hlsl", "fragment", entry, arguments, text=program.text)
+        vertex = None
+        if shader.vertex is not None:
+            arguments = [*arguments, "-fvk-invert-y"]
+            vertex = slang.compile_slang(
+                files, "hlsl", "vertex", shader.vertex, arguments, text=program.text
+            )
+        return Program(code, None, "fragment", vertex, shift=slang.has_registers(files))
+
+    try:
+        return compile({**_UNITY, **_FLOATS})
+    except ShaderError as error:
+        # Functions for half beside the same ones for float.
+        if not any(word in str(error) for word in ("redeclar", "redefin", "ambiguous")):
+            raise
+    return compile(_UNITY)
 
 
 def _wgsl(shader: Shader, files: Files) -> Program:
