@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.custom.test_described import Array, bloom, load, require, write
+from tests.custom.test_described import Array, bloom, require, write
 from tests.images import picture
 from vkbloom import Renderer, ShaderError, load_method
 
@@ -50,7 +50,7 @@ void main()
 }
 """
 CHAIN_PASS = """\
-bloom = "level[1]"
+bloom = "mip[1]"
 [settings.count]
 type = "int"
 default = 3
@@ -59,8 +59,8 @@ file = "chain.comp"
 [passes.textures]
 "levels[0]" = "glow"
 [passes.outputs]
-levels = { image = "level[element]", size = "size(glow) // 2 ** element", when = "element <= count" }
-second = { image = "level[2]", size = "size(glow) // 4" }
+levels = { image = "mip[element]", size = "size(glow) // 2 ** element", when = "element <= count" }
+second = { image = "mip[2]", size = "size(glow) // 4" }
 [passes.values]
 groups = 2
 done = "zeros(6)"
@@ -82,14 +82,14 @@ def test_one_dispatch_writes_all_levels_of_an_array(renderer: Renderer, tmp_path
     image = picture(32, 16)
     for _ in range(2):
         frames = renderer.apply(image, method(format="rgba32float"))
-        assert list(frames) == ["glow", "level_3", "level_2", "bloom", "final"]
+        assert list(frames) == ["glow", "mip_3", "mip_2", "bloom", "final"]
         wanted = image[..., :3].astype(np.float64)
         for level in (1, 2, 3):
             height, width = wanted.shape[0] // 2, wanted.shape[1] // 2
             wanted = wanted.reshape(height, 2, width, 2, 3).mean(axis=(1, 3))
             if level > 1:
-                assert np.abs(frames[f"level_{level}"][..., :3] - wanted).max() < 1e-5
-    assert "level_3" not in renderer.apply(image, method(format="rgba32float", count=2))
+                assert np.abs(frames[f"mip_{level}"][..., :3] - wanted).max() < 1e-5
+    assert "mip_3" not in renderer.apply(image, method(format="rgba32float", count=2))
 
 
 SAMPLED = """\
@@ -126,6 +126,41 @@ def test_arrays_and_layers_of_textures(renderer: Renderer, tmp_path: Path) -> No
     image = picture(9, 7)
     result = bloom(renderer, write(tmp_path, SAMPLED_PASS, sampled_frag=SAMPLED), image)
     assert np.abs(result[..., :3] - 3 * image[..., :3]).max() < 1e-4
+
+
+#: As Unity's headers have functions for half beside those for float.
+HALVES = """\
+Shader "Own" { SubShader { Pass { HLSLPROGRAM
+#pragma fragment Share
+Texture2D Image; SamplerState Linear;
+half4 _Shares[2]; half3 _More; float _Last;
+half Twice(half x) { return 2 * x; }
+float Twice(float x) { return 2 * x; }
+half4 Share(float2 uv : TEXCOORD0) : SV_Target
+{
+    half4 sum = Image.Sample(Linear, uv) * _Shares[1];
+    return sum + half4(_More, 0) + _Last + Twice(half(0.1)) + Twice(0.05);
+}
+ENDHLSL } } }
+"""
+HALVES_PASS = """\
+bloom = "out"
+[[passes]]
+file = "halves.shader"
+output = "out"
+textures = { Image = "glow" }
+values = { _Shares = [9, 9, 9, 9, 0.1, 0.2, 0.3, 0.4], _More = [0.1, 0.2, 0.3], _Last = 0.7 }
+"""
+
+
+def test_half_is_float(renderer: Renderer, tmp_path: Path) -> None:
+    """Also where it is a type of its own: with all digits, and in the members of blocks."""
+    require("hlsl")
+    image = picture(9, 7)
+    result = bloom(renderer, write(tmp_path, HALVES_PASS, halves_shader=HALVES), image)
+    # 0.1 is rounded to 11 bits, since it is half(0.1).
+    expected = image[..., :3] * [0.1, 0.2, 0.3] + [0.1, 0.2, 0.3] + 0.7 + 0.3
+    assert np.abs(result[..., :3] - expected).max() < 1e-4
 
 
 ECHO = """\
@@ -180,6 +215,11 @@ struct Corner { @builtin(position) position: vec4f, @location(0) uv: vec2f }
 @fragment fn colour(given: Corner) -> @location(0) vec4f {
     return textureSample(image, point, given.uv);
 }
+@fragment fn endless(given: Corner) -> @location(0) vec4f {
+    var sum = vec4f();
+    loop { sum += textureSampleLevel(image, point, given.uv, width); }
+    return sum;
+}
 """
 QUAD_PASS = """\
 bloom = "out"
@@ -223,7 +263,7 @@ REFUSED: tuple[tuple[str, int, str], ...] = (
     (changed(CHAIN_PASS, "levels = {", '"levels[1]" = {'), 6, "the shader writes 'levels[3]'"),
     (changed(CHAIN_PASS, "levels = {", "lvls = {"), 6, "the shader writes 'levels[1]'"),
     (changed(CHAIN_PASS, '"element <= count"', '"elem <= count"'), 10, "'elem' is not a number"),
-    (changed(CHAIN_PASS, '"level[2]"', '"level[element]"'), 11, "in arrays of textures alone"),
+    (changed(CHAIN_PASS, '"mip[2]"', '"mip[element]"'), 11, "in arrays of textures alone"),
     (changed(CHAIN_PASS, "zeros(6)", "zeros(1e9)"), 14, "zeros: 1e+09 is out of range"),
     (changed(CHAIN_PASS, "zeros(6)", "zeros(1, 2)"), 14, "zeros takes a number"),
     (changed(CHAIN_PASS, "file =", "vertices = 6\nfile ="), 6, "no vertex shader of its own"),
@@ -232,6 +272,7 @@ REFUSED: tuple[tuple[str, int, str], ...] = (
     (changed(ECHO_PASS, '"HISTORY_echo[0]"', '"HISTORY_echo[1]"'), 6, "echo[1] is not written in"),
     (changed(QUAD_PASS, '"corner"', '"corners"'), 0, "'corners' is not one of the file's: corner"),
     (changed(QUAD_PASS, "vertices = 6", "vertices = 4"), 6, "is not a multiple of 3"),
+    (changed(QUAD_PASS, '"colour"', '"endless"'), 3, "a loop that never ends"),
 )
 
 

@@ -246,11 +246,13 @@ def _evaluate(tree: Expression, scope: Scope) -> Numbers:  # noqa: PLR0911  one 
             assert isinstance(tree.func, ast.Name)
             if tree.func.id in SIZES:
                 return SIZES[tree.func.id](*scope.size(_as_source(tree.args[0])))
-            if tree.func.id == ZEROS:
-                return _zeros(_evaluate(tree.args[0], scope))
-            function = FUNCTIONS[tree.func.id][1]
-            return _each(function, *(_evaluate(each, scope) for each in tree.args))
+            values = [_evaluate(each, scope) for each in tree.args]
+            return _zeros(*values) if tree.func.id == ZEROS else _call(tree.func.id, values)
     raise ArithmeticFault(f"{ast.unparse(tree)!r} is an image, not a number")
+
+
+def _call(name: str, values: list[Numbers]) -> Numbers:
+    return _each(FUNCTIONS[name][1], *values)
 
 
 def _zeros(count: Numbers) -> Numbers:

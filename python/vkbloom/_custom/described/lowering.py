@@ -53,7 +53,7 @@ _FETCH, _WRITE, _SIZE_LOD, _SIZE = 95, 99, 103, 104
 #: OpImageFetch to OpImageWrite.
 _WITH_LAYER: Final = {*range(87, 91), *range(_FETCH, _WRITE + 1)}
 _STORE: Final = 62
-_CONVERT, _COPY = 115, 83
+_CONVERT, _BITCAST, _COPY = 115, 124, 83
 #: Capabilities of floats of 16 bits: in general, and in what is bound.
 _OF_HALVES: Final = {9, *range(4433, 4437)}
 _EXTRACT, _INSERT, _SHUFFLE, _CONSTRUCT, _NEGATE = 81, 82, 79, 80, 127
@@ -182,7 +182,10 @@ class _Types:
 
 
 def without_halves(code: bytes) -> bytes:
-    """Return a module whose floats of 16 bits have 32: HLSL's half is no other one on desktops."""
+    """Return a module whose floats of 16 bits have 32: HLSL's half is no other one on desktops.
+
+    One that takes bits of such floats, as f32tof16 does, keeps them.
+    """
     module = Module(code)
     halves = {
         identity
@@ -192,6 +195,14 @@ def without_halves(code: bytes) -> bytes:
     if not halves:
         return code
     types = _Types(module)
+
+    def is_half(value: int) -> bool:
+        kind = module.type_of(types.of_value.get(value, 0))
+        return (kind.of or kind).id in halves
+
+    casts = [word for word in module.instructions if word[0] & 0xFFFF == _BITCAST]
+    if any(is_half(word[2]) or is_half(word[3]) for word in casts):
+        return code
 
     def is_double(value: int) -> bool:
         kind = module.type_of(types.of_value.get(value, 0))

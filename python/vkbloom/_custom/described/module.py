@@ -64,8 +64,8 @@ _POINTERS: Final[Mapping[int, tuple[int, bool]]] = {
 }
 
 
-#: The bindings of the elements of an array of textures, after it is split: its own in hundreds, from
-#: here on, and the number of the element.
+#: The bindings of the elements of an array of textures, after it is split: from here on, a hundred
+#: for each binding, and the number of the element.
 FIRST_ELEMENT: Final = 100_000
 MAX_ELEMENTS: Final = 100
 

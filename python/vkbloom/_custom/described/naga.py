@@ -6,10 +6,13 @@ file. It prints an error, or nothing. This file imports nothing of the package.
 
 from __future__ import annotations
 
+import contextlib
 import json
 import re
 import sys
 
+#: WGPUShaderRuntimeChecks_BoundsChecks.
+BOUNDS_CHECKS = 1
 _LOCATION = re.compile(
     r"@location\s*\(\s*(\d+)\s*\)(?:\s*@interpolate\s*\(([^)]*)\))?\s*(?:(\w+)\s*:\s*)?([\w<>]+)"
 )
@@ -19,6 +22,9 @@ def main() -> None:
     """Compile what the standard input says."""
     import wgpu  # noqa: PLC0415  in this process alone
 
+    # Where this version of wgpu has it.
+    with contextlib.suppress(ImportError, AttributeError):
+        leave_loops()
     asked = json.loads(sys.stdin.read())
     adapter = wgpu.gpu.request_adapter_sync(power_preference="low-power")
     wanted = [
@@ -46,6 +52,21 @@ def main() -> None:
         vertex=vertex,
         fragment={**stage, "targets": [{"format": "rgba16float"} for _ in range(outputs)]},
     )
+
+
+def leave_loops() -> None:
+    """Have shaders made without a counter in each loop, which ends it after 2**64 runs.
+
+    It makes loops slower, and hides those that have no way out. Bounds stay checked.
+    """
+    from wgpu.backends.wgpu_native import _api  # noqa: PLC0415  in this process alone
+
+    calls = _api.libf
+    made = getattr(calls, "wgpuDeviceCreateShaderModuleTrusted", None)
+    if made is not None:
+        calls.wgpuDeviceCreateShaderModule = lambda device, described: made(
+            device, described, BOUNDS_CHECKS
+        )
 
 
 def vertex_text(inputs: list[list[str]]) -> str:
