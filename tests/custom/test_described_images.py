@@ -131,17 +131,20 @@ def test_arrays_and_layers_of_textures(renderer: Renderer, tmp_path: Path) -> No
 #: As Unity's headers have functions for half beside those for float.
 HALVES = """\
 Shader "Own" { SubShader { Pass { HLSLPROGRAM
+#include_with_pragmas "Twice.hlsl"
 #pragma fragment Share
 Texture2D Image; SamplerState Linear;
 half4 _Shares[2]; half3 _More; float _Last;
-half Twice(half x) { return 2 * x; }
-float Twice(float x) { return 2 * x; }
 half4 Share(float2 uv : TEXCOORD0) : SV_Target
 {
     half4 sum = Image.Sample(Linear, uv) * _Shares[1];
     return sum + half4(_More, 0) + _Last + Twice(half(0.1)) + Twice(0.05);
 }
 ENDHLSL } } }
+"""
+TWICE = """\
+half Twice(half x) { return 2 * x; }
+float Twice(float x) { return 2 * x; }
 """
 HALVES_PASS = """\
 bloom = "out"
@@ -157,7 +160,8 @@ def test_half_is_float(renderer: Renderer, tmp_path: Path) -> None:
     """Also where it is a type of its own: with all digits, and in the members of blocks."""
     require("hlsl")
     image = picture(9, 7)
-    result = bloom(renderer, write(tmp_path, HALVES_PASS, halves_shader=HALVES), image)
+    path = write(tmp_path, HALVES_PASS, halves_shader=HALVES, Twice_hlsl=TWICE)
+    result = bloom(renderer, path, image)
     # 0.1 is rounded to 11 bits, since it is half(0.1).
     expected = image[..., :3] * [0.1, 0.2, 0.3] + [0.1, 0.2, 0.3] + 0.7 + 0.3
     assert np.abs(result[..., :3] - expected).max() < 1e-4

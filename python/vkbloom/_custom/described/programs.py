@@ -28,7 +28,7 @@ _COMPUTE: Final = (
     r"(?i:\[\s*numthreads)\b[^\]]*\]\s*(?:\[[^\]]*\]\s*|#[^\n]*\n\s*)*(?:public\s+)?void\s+{}\s*\("
 )
 #: Of all results together with what is before them.
-_VERSION: Final = b"6"
+_VERSION: Final = b"7"
 
 
 @dataclasses.dataclass(frozen=True)

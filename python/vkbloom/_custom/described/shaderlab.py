@@ -14,6 +14,8 @@ _BLOCK: Final = re.compile(
 _PRAGMA: Final = re.compile(
     r"^[ \t]*#[ \t]*pragma[ \t]+(vertex|fragment|kernel)[ \t]+(\w+)", re.MULTILINE
 )
+#: Unity's own compiler also takes the #pragma lines of what it includes.
+_WITH_PRAGMAS: Final = re.compile(r"^([ \t]*#[ \t]*include)_with_pragmas\b", re.MULTILINE)
 _SUBSHADER: Final = re.compile(r"\bSubShader\b")
 
 
@@ -51,4 +53,5 @@ def read_program(files: Files, number: int) -> Program:
     first = min((each.start() for each in _SUBSHADER.finditer(text)), default=0)
     parts = [part for start, part in shared if start < place and (start > begun or start < first)]
     names = dict(_PRAGMA.findall(program))
-    return Program("\n".join((*parts, program)), names.get("vertex"), names.get("fragment"))
+    joined = _WITH_PRAGMAS.sub(r"\1", "\n".join((*parts, program)))
+    return Program(joined, names.get("vertex"), names.get("fragment"))
