@@ -143,6 +143,9 @@ static void add_pass(struct vkb_levels *levels, uint32_t *images, uint32_t numbe
     if (pass->vertex || pass->positions)
         row.vertex = pass->vertex ? pass->vertex : &vkb_shader_positions_vert;
     row.vertices = pass->vertices;
+    // A vertex shader of its own may leave pixels out.
+    if (pass->vertex)
+        row.load = VKB_LOAD_CLEAR;
     add_targets(levels, images, number, &row);
     if (pass->block_width) {
         row.geometry = VKB_GEOMETRY_DISPATCH;

@@ -239,12 +239,21 @@ values = { width = 1 }
 """
 
 
-def test_a_file_of_wgsl_with_both_stages(renderer: Renderer, tmp_path: Path) -> None:
-    """Six vertices of two triangles; y runs upwards in WebGPU's clip space."""
+@pytest.mark.parametrize("vertex", ["corner", "corner.wgsl"])
+def test_vertex_shaders_of_wgsl(renderer: Renderer, tmp_path: Path, vertex: str) -> None:
+    """In the same file, or in another one; y runs upwards in WebGPU's clip space."""
     require("wgsl")
     image = picture(9, 7)
-    result = bloom(renderer, write(tmp_path, QUAD_PASS, quad_wgsl=QUAD), image)
+    own = QUAD.partition("@fragment")[0].replace("fn corner", "fn colour")
+    text = QUAD_PASS.replace('"corner"', f'"{vertex}"')
+    path = write(tmp_path, text, quad_wgsl=QUAD, corner_wgsl=own)
+    result = bloom(renderer, path, image)
     assert np.abs(result[..., :3] - image[..., :3]).max() < 1e-5
+    if vertex != "corner":
+        # The kept result is that of the old file. Pixels that it leaves out are black.
+        (tmp_path / "corner.wgsl").write_text(own.replace("width * (", "0.5 * width * ("))
+        result = bloom(renderer, path, image)
+        assert np.abs(result[0, :, :3]).max() == 0 < np.abs(result[3, 4, :3]).max()
 
 
 OLD = "void mainImage(out vec4 c, vec2 p) { c = texture2D(iChannel0, p / iResolution.xy); }\n"

@@ -43,10 +43,10 @@ def main() -> None:
         device.create_compute_pipeline(layout="auto", compute=stage)
         return
     inputs, outputs = asked["inputs"], asked["outputs"]
-    vertex = {"module": module, "entry_point": asked["vertex"]}
-    if asked["vertex"] is None:
-        made = device.create_shader_module(code=vertex_text(inputs))
-        vertex = {"module": made, "entry_point": "main"}
+    vertex = {**stage, "entry_point": asked.get("vertex", "main")}
+    if asked.get("vertex_code") != asked["code"]:
+        code = asked.get("vertex_code") or vertex_text(inputs)
+        vertex["module"], vertex["constants"] = device.create_shader_module(code=code), {}
     device.create_render_pipeline(
         layout="auto",
         vertex=vertex,

@@ -28,7 +28,7 @@ _COMPUTE: Final = (
     r"(?i:\[\s*numthreads)\b[^\]]*\]\s*(?:\[[^\]]*\]\s*|#[^\n]*\n\s*)*(?:public\s+)?void\s+{}\s*\("
 )
 #: Of all results together with what is before them.
-_VERSION: Final = b"7"
+_VERSION: Final = b"8"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -81,8 +81,14 @@ def _prepare(source: Source, shader: Shader, home: Path) -> Files:
             return _binary(path)
         if shader.language in ("wgsl", "wesl"):
             folders = [Path(each) for _, each in _with_folders(source, shader, home).dependencies]
-            return wgsl.collect(path, folders)
-        return collect(path.absolute(), tuple(folders), home.absolute())
+            files = wgsl.collect(path, folders)
+        else:
+            files = collect(path.absolute(), tuple(folders), home.absolute())
+        vertex = wgsl.vertex_file(shader)
+        if vertex is None:
+            return files
+        other = collect(path.absolute().parent / vertex, tuple(folders), home.absolute())
+        return dataclasses.replace(files, others=(*files.others, other.main, *other.others))
     except OSError as error:
         cause = f"file: {path}: {error.strerror or error}"
         raise source.fault(shader.line, cause) from None

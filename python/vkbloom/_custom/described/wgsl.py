@@ -81,10 +81,8 @@ def compile_wgsl(
     text = files.main.text
     if shader.language == "wesl":
         text = _from_wesl(shader, files, dependencies)
-    for name, value in shader.defines:
-        # What engines put into WGSL before they compile it.
-        text = text.replace(f"##{name}##", value).replace(f"{{{name}}}", value)
-    plain = _REMARK.sub(lambda match: re.sub(r"[^\n]", " ", match[0]), text)
+    text = _with_defines(text, shader)
+    plain = without_remarks(text)
     stage, entry, inputs, outputs = _interface(shader, files, plain)
     asked = {
         "code": text,
@@ -92,36 +90,61 @@ def compile_wgsl(
         "stage": stage,
         "inputs": inputs,
         "outputs": outputs,
-        "vertex": shader.vertex,
         "constants": dict(shader.constants),
     }
-    wanted = {entry: stage}
-    words = _words_of(plain, entry)
+    wanted, parts = [(entry, stage)], [(plain, _words_of(plain, entry))]
     if shader.vertex is not None:
-        _check_vertex(shader.vertex, files, plain, stage)
-        wanted[shader.vertex] = "vertex"
-        words |= _words_of(plain, shader.vertex)
+        asked["vertex_code"], asked["vertex"] = _find_vertex(shader, files, text, stage)
+        other = without_remarks(str(asked["vertex_code"]))
+        wanted.append((str(asked["vertex"]), "vertex"))
+        parts.append((other, _words_of(other, str(asked["vertex"]))))
     made = _run(files, asked, wanted, translated=shader.language == "wesl")
-    used: dict[int, list[int]] = {}
-    for group, binding, _, name, _ in _VARIABLE.findall(plain):
-        if name in words:
-            used.setdefault(int(group), []).append(int(binding))
+    used: dict[int, set[int]] = {}
+    for part, words in parts:
+        for group, binding, _, name, _ in _VARIABLE.findall(part):
+            if name in words:
+                used.setdefault(int(group), set()).add(int(binding))
     code, *vertex = _with_bindings(
         files, made, {group: sorted(each) for group, each in used.items()}
     )
     # WebGPU has y upwards, and Vulkan downwards.
     flipped = with_y_down(vertex[0]) if vertex else None
-    return code, flipped, stage, tuple(_names(plain, words))
+    names = dict(each for part, words in parts for each in _names(part, words))
+    return code, flipped, stage, tuple(names.items())
 
 
-def _check_vertex(name: str, files: Files, text: str, stage: str) -> None:
-    """Check that a file has a vertex shader of that name, for a fragment shader."""
-    known = re.findall(r"@vertex\b[^{}]*?\bfn\s+(\w+)", text)
+def _with_defines(text: str, shader: Shader) -> str:
+    """Return WGSL with what engines put into it before they compile it."""
+    for name, value in shader.defines:
+        text = text.replace(f"##{name}##", value).replace(f"{{{name}}}", value)
+    return text
+
+
+def without_remarks(text: str) -> str:
+    """Return WGSL with blanks in place of remarks."""
+    return _REMARK.sub(lambda match: re.sub(r"[^\n]", " ", match[0]), text)
+
+
+def _find_vertex(shader: Shader, files: Files, text: str, stage: str) -> tuple[str, str]:
+    """Return the text that has the vertex shader of a fragment shader, and its entry point."""
     if stage != "fragment":
         raise files.fault("", 1, "vertex: a compute shader has none")
-    if name not in known:
-        cause = f"vertex: {name!r} is not one of the file's: {', '.join(known) or 'none'}"
-        raise files.fault("", 1, cause)
+    name, source = str(shader.vertex), files.main
+    if vertex_file(shader) is not None:
+        source = next(each for each in files.others if Path(each.name).name == Path(name).name)
+        text, name = _with_defines(source.text, shader), ""
+    known = re.findall(r"@vertex\b[^{}]*?\bfn\s+(\w+)", without_remarks(text))
+    if name not in (known if name or len(known) != 1 else ("",)):
+        cause = f"vertex: {name!r} is not one" if name else "vertex: there is not just one"
+        listed = ", ".join(known) or "none"
+        raise files.fault(source.name, 1, f"{cause} of the file's: {listed}")
+    return text, name or known[0]
+
+
+def vertex_file(shader: Shader) -> str | None:
+    """Return the file of a vertex shader that is not in that of the fragment shader."""
+    own = shader.language == "glsl" or str(shader.vertex).endswith(".wgsl")
+    return shader.vertex if own else None
 
 
 def _words_of(text: str, entry: str) -> set[str]:
@@ -266,7 +289,7 @@ def _member_names(
 
 
 def _run(
-    files: Files, asked: dict[str, object], wanted: Mapping[str, str], *, translated: bool
+    files: Files, asked: dict[str, object], wanted: list[tuple[str, str]], *, translated: bool
 ) -> list[bytes]:
     """Compile in a process of its own; return the modules of entry points, given with stages."""
     with tempfile.TemporaryDirectory(prefix="vkbloom") as folder:
@@ -297,7 +320,7 @@ def _run(
         made = [file.read_bytes() for file in order]
     found = [
         next((code for code in made if _has_entry(code, name, stage)), None)
-        for name, stage in wanted.items()
+        for name, stage in wanted
     ]
     codes = [code for code in found if code is not None]
     if len(codes) < len(found):
