@@ -246,8 +246,8 @@ def _evaluate(tree: Expression, scope: Scope) -> Numbers:  # noqa: PLR0911  one 
             assert isinstance(tree.func, ast.Name)
             if tree.func.id in SIZES:
                 return SIZES[tree.func.id](*scope.size(_as_source(tree.args[0])))
-            values = [_evaluate(each, scope) for each in tree.args]
-            return _zeros(*values) if tree.func.id == ZEROS else _call(tree.func.id, values)
+            given = [_evaluate(each, scope) for each in tree.args]
+            return _zeros(*given) if tree.func.id == ZEROS else _call(tree.func.id, given)
     raise ArithmeticFault(f"{ast.unparse(tree)!r} is an image, not a number")
 
 
