@@ -271,6 +271,7 @@ def changed(text: str, old: str, new: str) -> str:
     return text.replace(old, new, 1)
 
 
+AGAIN = CHAIN_PASS + CHAIN_PASS[CHAIN_PASS.index("[[passes]]") :]
 REFUSED: tuple[tuple[str, int, str], ...] = (
     (changed(CHAIN_PASS, '"levels[0]" = "glow"', '"levels[1]" = "glow"'), 6, "does not only read"),
     (changed(CHAIN_PASS, "levels = {", '"levels[1]" = {'), 6, "the shader writes 'levels[3]'"),
@@ -280,6 +281,7 @@ REFUSED: tuple[tuple[str, int, str], ...] = (
     (changed(CHAIN_PASS, "zeros(6)", "zeros(1e9)"), 14, "zeros: 1e+09 is out of range"),
     (changed(CHAIN_PASS, "zeros(6)", "zeros(1, 2)"), 14, "zeros takes a number"),
     (changed(CHAIN_PASS, "file =", "vertices = 6\nfile ="), 6, "no vertex shader of its own"),
+    (AGAIN, 21, "the shader reads mip[2], which an earlier pass wrote"),
     (changed(ECHO_PASS, '"HISTORY_echo[0]"', '"HISTORY_ech[0]"'), 6, "is not an image here"),
     (changed(ECHO_PASS, '"HISTORY_echo[0]"', '["HISTORY_echo[0]", "glow"]'), 6, "the only source"),
     (changed(ECHO_PASS, '"HISTORY_echo[0]"', '"HISTORY_echo[1]"'), 6, "echo[1] is not written in"),

@@ -103,10 +103,14 @@ class Read:
 
 @dataclasses.dataclass(frozen=True)
 class Written:
-    """An image that a pass writes, and the number of an element of an array."""
+    """An image that a pass writes, and the number of an element of an array.
+
+    `is_read`: Whether the shader also reads it.
+    """
 
     output: Output
     element: int | None
+    is_read: bool
 
 
 @dataclasses.dataclass(frozen=True)
@@ -538,7 +542,7 @@ class _Binder:
                 format = output.format or declared.get(target.type.image[5], "rgba32float")
                 stage.kinds[target.id] = ImageKind(2, _READ_FORMATS[format])
                 output = dataclasses.replace(output, format=format)
-            made.append(Written(output, target.element))
+            made.append(Written(output, target.element, target.id in read))
         return tuple(made)
 
     def _targets(self, stage: _Stage) -> list[Variable]:
@@ -576,7 +580,7 @@ class _Binder:
             assert target.type.of is not None
             output = self._item.outputs[key]
             self._discarded.append(
-                Discarded(output, target.element, target.type.of.kind, target.id)
+                Discarded(output, target.element, False, target.type.of.kind, target.id)
             )
         return kept, outputs
 

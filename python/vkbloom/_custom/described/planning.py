@@ -274,6 +274,13 @@ class Plan:
         output = written.output
         if output.when is None or any(self._value(output.when, output.line)):
             key = output.image.name, self._index_at(output.image, output.line)
+            if written.is_read and key in self._images:
+                cause = (
+                    f"outputs: the shader reads {self._shown(output.image)}, which an earlier pass "
+                    "wrote and this one writes anew; write another image, and name this one among "
+                    "the textures"
+                )
+                raise self._description.source.fault(output.line, cause)
             self._images[key] = image
         self._element = None
 
