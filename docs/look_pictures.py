@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 import numpy as np
-from click.testing import CliRunner
 from numpy.typing import NDArray
 from skimage import data, transform
 
 import vkbloom
-from vkbloom._cli.program import program
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from tools.look_sheet import LOOKS, apply_look, levels_of, measure
+
 from vkbloom._presets.named_settings import PRESETS
 
-#: Of the presets, those that are made for photographs.
-LOOKS = [name for name, preset in PRESETS.items() if preset.engine == "vkbloom"]
 #: By what they show: the name in scikit-image, and the first row of what is shown.
 PHOTOGRAPHS = {
     "a launch pad": ("rocket", 0),
@@ -42,12 +43,9 @@ def write(folder: Path) -> None:
     before = np.concatenate([*map(cell, files, rows)], axis=1)
     text: list[str] = []
     for look in LOOKS:
-        made = folder / look
-        words = ["apply", *map(str, files), "-o", f"{made}/", "--preset", look]
-        result = CliRunner().invoke(program, [*words, "--adapter", "software"])
-        if result.exit_code:
-            raise RuntimeError(f"{look}: {result.output}")
-        after = np.concatenate([*map(cell, (made / file.name for file in files), rows)], axis=1)
+        made = apply_look(files, look, folder / look)
+        changes = [measure(*map(levels_of, pair)) for pair in zip(files, made, strict=True)]
+        after = np.concatenate([*map(cell, made, rows)], axis=1)
         place = folder / f"{look}.jpg"
         gap = np.ones((6, before.shape[1], 3))
         sheet = np.concatenate([before, gap, after]).astype(np.float32)
@@ -58,5 +56,11 @@ def write(folder: Path) -> None:
             f"```sh\nvkbloom apply photo.jpg bloom.jpg --preset {look}\n```\n",
             f"![{', '.join(PHOTOGRAPHS)}: above as they are, below with {look}]"
             f"({'/'.join(place.parts[-3:])})\n",
+            "Pixels that differ by more than 4 levels of 255: "
+            + ", ".join(
+                f"{name} {change.seen:.0%}"
+                for name, change in zip(PHOTOGRAPHS, changes, strict=True)
+            )
+            + f". Pixels that became white: at most {max(one.white for one in changes):.1%}.\n",
         ]
     folder.with_suffix(".md").write_text("\n".join(text), encoding="utf-8")

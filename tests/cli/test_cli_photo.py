@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from tools.look_sheet import WITH_RAYS, measure
 
 import vkbloom
 from tests.cli.calls import run
@@ -252,8 +253,6 @@ class TestFaintBlooms:
 
 
 LOOKS = ("mist", "soft", "dreamy", "film_halation", "star4", "star6", "anamorphic")
-# Of 255, in one channel: a change that an eye finds beside the picture before.
-VISIBLE = 4
 
 
 PICTURES: dict[str, Callable[[], Image]] = {
@@ -288,18 +287,17 @@ class TestLooks:
         result = apply(*files, "-o", f"{tmp_path}/", "--preset", look, "--amount", amount)
         assert result.exit_code == 0, result.stderr
         for file, image in files.items():
-            after = reread(tmp_path / file.name)[1].astype(int)
-            changed = (np.abs(after - image).max(axis=2) > VISIBLE).mean()
-            if look not in ("star4", "star6", "anamorphic"):
-                assert changed > 0.07, file.stem
+            change = measure(image, reread(tmp_path / file.name)[1])
+            if look not in WITH_RAYS:
+                assert change.seen > 0.07, file.stem
             elif file.stem == "chelsea":
                 # It has no lights.
-                assert changed < 0.01
+                assert change.seen < 0.01
             else:
                 # Rays are narrow, and a picture stays between them.
-                assert 0.015 < changed < 0.35, file.stem
-            new_white = (after.min(axis=2) >= 250).mean() - (image.min(axis=2) >= 250).mean()
-            assert new_white < 0.02, file.stem
+                assert 0.015 < change.seen < 0.35, file.stem
+            assert change.white < 0.02, file.stem
+            assert change.fault(look) == "", file.stem
 
     @pytest.mark.parametrize("look", ["photo", *LOOKS])
     def test_an_amount_of_0_changes_nothing(self, look: str, tmp_path: Path) -> None:

@@ -281,7 +281,7 @@ def test_mermaid_has_every_pass_and_image(renderer: Renderer, scene: Scene) -> N
 
 
 def test_html_and_repr(renderer: Renderer, plain: Any) -> None:
-    plan = renderer.plan(plain, Separable())
+    plan = renderer.plan(plain, Separable(threshold=1.0))
     table = plan._repr_html_()
     assert ">keeps the light that will glow: what is above the threshold</td>" in table
     assert table.count("<tr>") == 1 + len(plan.passes)
@@ -301,13 +301,18 @@ def test_every_pass_has_a_sentence(renderer: Renderer, plain: Any, scene: Scene)
     assert missing == set()
     for plan in plans:
         assert list(plan.sentences) == list(dict.fromkeys(one.name for one in plan.passes))
+        # The explorer shows that of the pass which writes a framebuffer, or which reads a kernel.
+        shown = {name for one in plan.passes for name in (*one.reads, *one.writes)}
+        assert {*plan.framebuffers} <= shown
     # By the method, by the source, and of passes that have a number in their name.
-    texts = {
-        one.method: renderer.plan(image, one).sentences["down_1"]
-        for one in (Pyramid(), DualKawase())
-    }
-    assert texts["pyramid"] == "halves the size with 13 taps, so that small lights do not flicker"
-    assert texts["dual_kawase"] == "halves the size with five taps"
+    for one, name, text in (
+        (Pyramid(), "down_1", "halves the size with 13 taps, so that small lights do not flicker"),
+        (DualKawase(), "down_1", "halves the size with five taps"),
+        (presets["unity_urp_dual"], "down_1", "halves the size with five taps"),
+        (Separable(direct=True), "bloom", "blurs along rows and columns at once, with N x N taps"),
+        (Pyramid(), "glow", "takes the complete frame: without a threshold all of it glows"),
+    ):
+        assert renderer.plan(image, one).sentences[name] == text
     before = renderer.plan(image, presets["kino"]).sentences["glow"]
     assert before == "takes the complete frame; the method applies its threshold later"
     drawn = renderer.plan(scene, presets["kino"]).sentences["glow"]

@@ -66,6 +66,32 @@ def test_links_lead_somewhere(page: Path) -> None:
             assert (page.parent / target.partition("#")[0]).exists(), target
 
 
+def test_titles_name_a_task() -> None:
+    """A title says what its page is for, not only what it is about."""
+    docs = (one for one in TEXTS if one.is_relative_to(ROOT / "docs"))
+    pages = [one for one in docs if one.name not in ("index.md", "README.md")]
+    titles = [
+        text.partition("\n")[0]
+        for one in pages
+        for text in [one.read_text()]
+        if text.startswith("# ")  # tables that pages include have none
+    ]
+    assert len(set(titles)) == len(titles) > 40
+    assert [title for title in titles if len(title.split()) < 4] == []
+
+
+def test_the_notebook_for_class_has_six_answers() -> None:
+    """Each is between its question and its check, and has the tag by which it can be removed."""
+    cells = json.loads((ROOT / "examples" / "exercises.ipynb").read_text())["cells"]
+    text = "".join("".join(cell["source"]) + "\n" for cell in cells)
+    assert re.findall(r"^## (\d)\.", text, re.MULTILINE) == [*"123456"]
+    answers = [at for at, one in enumerate(cells) if "answer" in one["metadata"].get("tags", ())]
+    assert len(answers) == 6
+    assert all("assert " in "".join(cells[at + 1]["source"]) for at in answers)
+    page = (ROOT / "docs" / "class.md").read_text()
+    assert re.findall(r"^\| (\d)\. ", page, re.MULTILINE) == [*"123456"]
+
+
 @pytest.mark.parametrize("page", ["README.md", "docs/index.md"])
 def test_how_to_cite(page: str) -> None:
     """The first pages, CITATION.cff and the package say the same."""

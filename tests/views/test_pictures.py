@@ -163,7 +163,8 @@ class TestHtml:
 
     def test_pass_times(self, frames: Frames) -> None:
         page = frames._repr_html_()
-        assert re.findall(r"([\d.]+) ms", page) == ["1.000", "4.000", "2.000"]
+        assert re.findall(r"([\d.]+) ms", page) == ["7.000", "1.000", "4.000", "2.000"]
+        assert re.findall(r"(\d+) %<", page) == ["14", "57", "29"]
         assert ">what it does</th>" in page
         assert ">blurs along the columns, the first half of a blur in two passes</td>" in page
 
@@ -194,9 +195,12 @@ def test_the_sheet_says_where_glow_is_not_thresholded(
     settings = vkbloom.presets[name]
     with contextlib.suppress(ValueError):  # two methods have no threshold
         settings = settings.replace(threshold=1.0)
-    frames = renderer.apply(image, settings, framebuffers=["glow"])
+    frames = renderer.apply(image, settings)
     is_frame = settings.threshold is not None and bool(frames["glow"].min(initial=1.0) > 0.2)
-    assert ("the frame before its threshold" in frames._repr_html_()) == is_frame
+    page = frames._repr_html_()
+    assert ("the frame before its threshold" in page) == is_frame
+    # And what each pass does.
+    assert len(re.findall(r"<td[^>]*>[a-z][^<]+</td></tr>", page)) == len(frames.timings)
 
 
 @pytest.mark.parametrize("dtype", ["float16", "float32"])
@@ -234,11 +238,17 @@ def test_notebooks_get_plain_text_with_padded_cells(renderer: vkbloom.Renderer) 
 
 
 def test_times_are_bars() -> None:
+    """Of their share of the whole, which is text, too; a screen reader skips the bars."""
     frames = make({"final": np.zeros((2, 2, 3), np.uint8)}, timings={"glow": 1e-3, "bloom": 4e-3})
     page = frames._repr_html_()
-    assert [float(width) for width in re.findall(r"width:([\d.]+)%\"", page)[-2:]] == [25, 100]
+    bars = re.findall(r'<div[^>]* aria-hidden="true"><div style="[^"]*width:([\d.]+)%', page)
+    assert [float(width) for width in bars] == [20, 80]
+    assert re.findall(r"(\d+) %<", page) == ["20", "80"]
+    assert ">2 passes, 5.000 ms together</caption>" in page
     unknown = make({"final": frames["final"]}, timings={"glow": np.nan})._repr_html_()
-    assert "width:0.0%" in unknown
+    assert ">not measured</td>" in unknown
+    assert ">1 pass</caption>" in unknown
+    assert "width:" not in unknown.partition("<table")[2]
 
 
 def test_settings_show_what_differs() -> None:

@@ -10,7 +10,7 @@ from statistics import median
 from typing import Any
 
 import numpy as np
-from cells import format_figure, table
+from cells import format_figure, shown_presets, table
 from click.testing import CliRunner
 from numpy.typing import NDArray
 from tqdm import tqdm
@@ -45,7 +45,7 @@ def check(renderer: vkbloom.Renderer, quick: bool) -> str:
     """Return the laws and the figures of `vkbloom check` for each preset."""
     size = "128x128" if quick else "256x256"  # wide blooms need larger images, and minutes
     laws, figures = [], []
-    for name in tqdm(vkbloom.presets):
+    for name in tqdm(shown_presets()):
         words = ["check", "--preset", name, "--json", "--measure-size", size]
         done = CliRunner().invoke(
             program, [*words, "--adapter", renderer.info.name], catch_exceptions=False
@@ -110,7 +110,8 @@ def measure(renderer: vkbloom.Renderer, quick: bool) -> str:
     point = np.zeros((FRAME[1], FRAME[0], 3), np.float32)
     y, x = FRAME[1] // 2, FRAME[0] // 2
     point[y - 1 : y + 2, x - 1 : x + 2] = VALUE
-    for name, item in PRESETS.items():
+    for name in shown_presets():
+        item = PRESETS[name]
         settings = item.make()
         exact = settings.replace(format="rgba32float")
         bloom = renderer.apply(point, exact)["bloom"]
@@ -162,7 +163,8 @@ def stability(renderer: vkbloom.Renderer, quick: bool) -> str:
     """Return the figures of moving lights."""
     units = {"ripple": 100, "jitter": 1, "flicker": 100, "growth": 100}
     rows = []
-    for name, settings in tqdm(vkbloom.presets.items(), "stability"):
+    for name in tqdm(shown_presets(), "stability"):
+        settings = vkbloom.presets[name]
         bloom = _bloom_of(renderer, settings.replace(format="rgba32float"))
         found = [
             testing.stability(
@@ -186,7 +188,8 @@ def resolution(renderer: vkbloom.Renderer, quick: bool) -> str:
     size = (320, 180) if quick else FRAME
     probe = testing.Probe(size=size, channels=1, dtype="float16", value=LAMP)
     rows = []
-    for name, settings in tqdm(vkbloom.presets.items(), "resolution"):
+    for name in tqdm(shown_presets(), "resolution"):
+        settings = vkbloom.presets[name]
         bloom = _bloom_of(renderer, settings)
         scales = list(SCALES)
         # A convolution needs as much memory at 4K as some adapters have.

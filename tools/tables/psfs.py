@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from cells import table
+from cells import shown_presets, table
 
 import vkbloom
 from vkbloom import psf
@@ -62,8 +62,8 @@ def pyramids(renderer: vkbloom.Renderer, quick: bool) -> str:
 def of_presets(_: vkbloom.Renderer, quick: bool) -> str:
     """Return the figures of each preset's point spread, without its threshold."""
     rows = []
-    for name, settings in vkbloom.presets.items():
-        linear = settings.replace(threshold=None)
+    for name in shown_presets():
+        linear = vkbloom.presets[name].replace(threshold=None)
         size = (64, 64) if quick else PRESET_SIZE
         # Bevy's prefilter makes 0.0001 of black.
         black = vkbloom.reference.blur(np.zeros((*size, 3)), linear, format="rgba32float")

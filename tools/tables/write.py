@@ -1,8 +1,8 @@
 """Write the tables of docs/evidence, which pages include: ``make tables``.
 
 ``python tools/tables/write.py [--out docs/evidence] [NAME ...]``; without names all of them, which
-takes an hour on two cores. Names are those of `TABLES`. Costs are wall-clock times: run nothing
-else then.
+takes an hour on two cores. Names are those of `TABLES`. With ``--presets mist,soft`` the tables of
+presets keep their rows, and those of these presets replace them or are added.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ import argparse
 from pathlib import Path
 from typing import Final
 
+import cells
 import exposures
 import fits
 import presets
@@ -33,6 +34,8 @@ TABLES: Final = {
     "fit_screenshots": fits.screenshots,
     "translate": fits.translations,
 }
+#: Those with a row for each preset.
+OF_PRESETS: Final = ("check", "measured", "stability", "resolution", "psf_presets")
 
 
 def main() -> None:
@@ -41,13 +44,19 @@ def main() -> None:
     parser.add_argument("names", nargs="*", metavar="NAME", help=", ".join(TABLES))
     parser.add_argument("--out", type=Path, default=Path("docs/evidence"))
     parser.add_argument("--adapter", default="software")
+    parser.add_argument("--presets", metavar="NAME,...", help="rows of these presets alone")
     parser.add_argument("--quick", action="store_true", help="a part of each, as a check only")
     arguments = parser.parse_args()
+    if arguments.presets:
+        cells.ONLY += arguments.presets.split(",")
+    names = arguments.names or (OF_PRESETS if cells.ONLY else TABLES)
     with vkbloom.Renderer(arguments.adapter) as renderer:
-        for name in arguments.names or TABLES:
+        for name in names:
             file = arguments.out / f"{name}_table.md"
-            text = TABLES[name](renderer, arguments.quick)
-            file.write_text(f"On {renderer.info.summary}.\n\n{text}", encoding="utf-8")
+            text = f"On {renderer.info.summary}.\n\n{TABLES[name](renderer, arguments.quick)}"
+            if cells.ONLY:
+                text = cells.merge_rows(file.read_text(encoding="utf-8"), text)
+            file.write_text(text, encoding="utf-8")
             print(file, flush=True)
 
 

@@ -487,8 +487,14 @@ export function mount(parent, send, { store = null, heading = "h2", decode = dec
       if (wanted === framebuffer) framebuffer = a.framebuffer;
       frameSelect.value = framebuffer;
       canvas.ariaLabel = `picture: ${a.framebuffer}, ${a.size[0]} × ${a.size[1]}`;
-      const { sentence } = a.plan.find(({ writes }) => writes.includes(a.framebuffer)) ?? {};
-      caption.textContent = sentence ? `${a.framebuffer}: ${sentence}` : "";
+      const writer = a.plan.find(({ writes }) => writes.includes(a.framebuffer));
+      // No pass writes the kernel of a convolution.
+      const reader = a.plan.find(({ reads }) => reads.includes(a.framebuffer));
+      caption.textContent = writer
+        ? `${a.framebuffer}: ${writer.sentence}`
+        : reader
+          ? `${a.framebuffer} is read by the pass ${reader.name}, which ${reader.sentence}`
+          : "";
       const passes = Object.entries(a.passes);
       const device = passes.reduce((sum, [, seconds]) => sum + 1e3 * seconds, 0);
       const ran = setup.stored
@@ -538,7 +544,7 @@ export function mount(parent, send, { store = null, heading = "h2", decode = dec
   function showPlan() {
     if (!plan.open || !shown[editing]) return;
     const rows = shown[editing].plan;
-    const longest = Math.max(...Object.values(shown[editing].passes), 1e-9);
+    const whole = Object.values(shown[editing].passes).reduce((sum, one) => sum + one, 0) || 1;
     const timed = setup.stored ? [] : ["time"];
     const head = ["pass", ...timed, "what it does", "shader", "variant", "reads", "writes"];
     const cell = (tag, textContent, more = {}) => make(tag, { textContent, ...more });
@@ -551,9 +557,13 @@ export function mount(parent, send, { store = null, heading = "h2", decode = dec
           const others = rows.slice(place).findIndex(({ name }) => name !== row.name);
           const rowSpan = others < 0 ? rows.length - place : others;
           const seconds = shown[editing].passes[row.name];
-          const time = seconds === undefined ? "up to date" : `${(1e3 * seconds).toFixed(2)} ms`;
-          const bar = make("div", { className: "vkb-pass-time" });
-          bar.style.width = `${(100 * (seconds ?? 0)) / longest}%`;
+          const percent = (100 * (seconds ?? 0)) / whole;
+          const time =
+            seconds === undefined
+              ? "up to date"
+              : `${(1e3 * seconds).toFixed(2)} ms, ${percent.toFixed(0)} %`;
+          const bar = make("div", { className: "vkb-pass-time", "aria-hidden": "true" });
+          bar.style.width = `${percent}%`;
           cells.unshift(cell("td", row.sentence, { className: "vkb-sentence", rowSpan }));
           if (timed.length) {
             cells.unshift(cell("td", time, { rowSpan }));

@@ -9,7 +9,6 @@ from typing import ClassVar
 
 from vkbloom._public import public
 from vkbloom._settings.fields import number_field
-from vkbloom._settings.pass_sentences import HALVED_BY_13
 from vkbloom._settings.settings import PublishedSettings
 
 
@@ -56,7 +55,9 @@ class FilamentBloom(PublishedSettings):
     method: ClassVar[str] = "filament"
     _level_height: ClassVar[str] = "resolution"
     _knobs: ClassVar[tuple[str, ...]] = ("levels", "resolution")
-    _pass_sentences: ClassVar[Mapping[str, str]] = MappingProxyType({"down": HALVED_BY_13})
+    _pass_sentences: ClassVar[Mapping[str, str]] = MappingProxyType(
+        {"down": "halves the size with 9 taps, or 13 of an odd size: small lights do not flicker"}
+    )
 
     threshold: float | None = 1.0
     intensity: float = number_field(default=0.1, range=(0, 1))

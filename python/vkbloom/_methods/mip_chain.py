@@ -10,7 +10,7 @@ from typing import ClassVar
 from vkbloom._numbers import check_floats
 from vkbloom._public import public
 from vkbloom._settings.fields import flag_field, number_field
-from vkbloom._settings.pass_sentences import HALVED_BY_13
+from vkbloom._settings.pass_sentences import DOUBLED_BY_8, HALVED_BY_5, HALVED_BY_13
 from vkbloom._settings.settings import Settings
 
 
@@ -112,7 +112,7 @@ class DualKawase(Settings):
     method: ClassVar[str] = "dual_kawase"
     _knobs: ClassVar[tuple[str, ...]] = ("levels", "offset")
     _pass_sentences: ClassVar[Mapping[str, str]] = MappingProxyType(
-        {"down": "halves the size with five taps", "up": "doubles the size with eight taps"}
+        {"down": HALVED_BY_5, "up": DOUBLED_BY_8}
     )
 
     levels: int = number_field(default=4, slider=(1, 10))

@@ -80,6 +80,11 @@ class Separable(Settings):
     texel: Texel = choice_field()
     direct: bool = flag_field()
 
+    def _pass_sentence(self, stem: str) -> str:
+        if stem == "bloom" and self.direct:
+            return "blurs along rows and columns at once, with N x N taps"
+        return super()._pass_sentence(stem)
+
     @property
     def _first_stages(self) -> tuple[str, ...]:
         return ("glow", "blur_vertical") if self.loops == 1 else ("glow",)

@@ -17,7 +17,12 @@ from vkbloom._settings.fields import (
     numbers_field,
     value_field,
 )
-from vkbloom._settings.pass_sentences import BLURRED_DOWN, HALVED_BY_13
+from vkbloom._settings.pass_sentences import (
+    BLURRED_DOWN,
+    DOUBLED_BY_8,
+    HALVED_BY_5,
+    HALVED_BY_13,
+)
 from vkbloom._settings.settings import Composite, PublishedSettings
 
 BlurFilter = Literal["gaussian", "kawase", "dual"]
@@ -103,6 +108,10 @@ class UrpBloom(PublishedSettings):
     tint: tuple[float, float, float] = numbers_field((1.0, 1.0, 1.0))
     clamp: float = number_field(core="clamp_max", slider=(0, 100), everyday=0)
     version: Literal["17", "12"] = choice_field(("17", "12"))
+
+    def _pass_sentence(self, stem: str) -> str:
+        dual = {"down": HALVED_BY_5, "up": DOUBLED_BY_8} if self.filter == "dual" else {}
+        return dual.get(stem) or super()._pass_sentence(stem)
 
     def _core_values(self) -> dict[str, Any]:
         """Return what the core names or counts otherwise."""

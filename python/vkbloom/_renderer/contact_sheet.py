@@ -35,23 +35,11 @@ def contact_sheet_html(frames: Framebuffers) -> str:
         )
         for name, array in frames.items()
     )
-    longest = max((seconds for seconds in frames.timings.values() if seconds > 0), default=0.0)
-    of_scene = not {"scene", "albedo"}.isdisjoint(frames.timings)
-    times = [
-        (
-            name,
-            f"{1e3 * seconds:.3f} ms",
-            _bar(seconds, longest),
-            sentence_of(frames.settings, name, of_scene=of_scene),
-        )
-        for name, seconds in frames.timings.items()
-    ]
-    head = ("pass", f"time on {frames.info.get('adapter', 'the device')}", "", "what it does")
     facts = ", ".join(f"{key} {value}" for key, value in frames.info.items())
     sheet = element(
         "div",
         pictures.thumbnails(shown),
-        *([markup.table(times, head)] if times else []),
+        *([_times(frames)] if frames.timings else []),
         element(
             "div",
             facts,
@@ -64,11 +52,29 @@ def contact_sheet_html(frames: Framebuffers) -> str:
     return str(sheet)
 
 
-def _bar(seconds: float, longest: float) -> markup.Markup:
-    """Return a time as a bar; NaN, of a queue without timestamps, has none."""
-    percent = 100 * seconds / longest if seconds > 0 else 0.0
-    bar = "height:.7em;background:currentColor;opacity:.5"
-    return element("div", element("div", style=f"{bar};width:{percent:.1f}%"), style="width:16em")
+def _times(frames: Framebuffers) -> markup.Markup:
+    """Return a table of the passes that ran: time, share of the whole, and what each does.
+
+    Times are NaN on a queue without timestamps.
+    """
+    whole = sum(seconds for seconds in frames.timings.values() if seconds > 0)
+    of_scene = not {"scene", "albedo"}.isdisjoint(frames.timings)
+    rows = [
+        (
+            name,
+            f"{1e3 * seconds:.3f} ms" if seconds >= 0 else "not measured",
+            markup.share_bar(seconds / whole) if seconds > 0 else "",
+            sentence_of(frames.settings, name, of_scene=of_scene),
+        )
+        for name, seconds in frames.timings.items()
+    ]
+    head = ("pass", f"time on {frames.info.get('adapter', 'the device')}", "share", "what it does")
+    total = f", {1e3 * whole:.3f} ms together" if whole else ""
+    return markup.table(rows, head, caption=f"{_count(len(rows))}{total}")
+
+
+def _count(passes: int) -> str:
+    return "1 pass" if passes == 1 else f"{passes} passes"
 
 
 def _picture(

@@ -1,7 +1,8 @@
 """What each pass does, in one sentence: shown in plans, contact sheets and the explorer.
 
 A sentence belongs to a name of passes, whose numbers are left out: "down" is that of ``down_0``. A
-method's class replaces those that it computes otherwise (``_pass_sentences``).
+method's class replaces those that it computes otherwise (``_pass_sentences``), and those that
+depend on its fields (``_pass_sentence``).
 """
 
 from __future__ import annotations
@@ -15,9 +16,12 @@ if TYPE_CHECKING:
     from vkbloom._settings.settings import Settings
 
 HALVED_BY_13: Final = "halves the size with 13 taps, so that small lights do not flicker"
+HALVED_BY_5: Final = "halves the size with five taps"
+DOUBLED_BY_8: Final = "doubles the size with eight taps"
 BLURRED_DOWN: Final = "blurs the smaller level along its columns, so that it is blurred along both"
 
 _COMPLETE: Final = "takes the complete frame; the method applies its threshold later"
+_ALL: Final = "takes the complete frame: without a threshold all of it glows"
 _LIGHTS: Final = "draws the lights of the scene, which will glow"
 _CUSTOM: Final = "is a pass of the method's own file"
 # Passes that a custom method has in common with others.
@@ -80,7 +84,7 @@ PASS_SENTENCES: Final[Mapping[str, str]] = MappingProxyType(
         "halo": "draws a ring around the middle of the frame from its bright light",
         "ghosts": "mirrors bright light through the middle of the frame, as lenses do",
         "dirty_light": "multiplies the light by a picture of dirt on the lens",
-        "final": "adds the bloom to the picture, and applies tone map and encoding",
+        "final": "combines picture and bloom, and applies exposure, tone map and encoding",
     }
 )
 
@@ -96,4 +100,6 @@ def pass_sentence(settings: Settings, name: str, *, of_scene: bool, is_custom: b
         return _CUSTOM
     if stem == "glow" and (of_scene or settings.glow_note):
         return _LIGHTS if of_scene else _COMPLETE
-    return settings._pass_sentences.get(stem, PASS_SENTENCES.get(stem, ""))
+    if stem == "glow" and settings.threshold is None:
+        return _ALL
+    return settings._pass_sentence(stem) or PASS_SENTENCES.get(stem, "")

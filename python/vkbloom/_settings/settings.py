@@ -175,6 +175,10 @@ class Settings(Record):
     format: BloomFormat | None = None
     glare: tuple[Glare, ...] = value_field((), kind="glare", read=_read_glare)
 
+    def _pass_sentence(self, stem: str) -> str:
+        """Return what passes of a name do where that differs from `PASS_SENTENCES`; else ""."""
+        return self._pass_sentences.get(stem, "")
+
     @property
     def glow_note(self) -> str:
         """What `glow` shows if it is not the light above the threshold; empty if it is."""

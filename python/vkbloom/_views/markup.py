@@ -95,6 +95,20 @@ def table(
     )
 
 
+def share_bar(share: float) -> Markup:
+    """Return a share of a whole, 0 to 1, as a bar and as text; a screen reader reads the text."""
+    bar = element(
+        "div",
+        style=f"height:.7em;width:{100 * share:.1f}%;background:currentColor;opacity:.5",
+    )
+    return element(
+        "div",
+        element("div", bar, style="flex:1 1 auto;min-width:8em", aria_hidden="true"),
+        element("span", f"{100 * share:.0f} %", style="flex:none;width:3.5em;text-align:right"),
+        style="display:flex;align-items:center",
+    )
+
+
 def page(title: str, *content: object) -> str:
     """Return a complete document."""
     head = join(

@@ -1,0 +1,117 @@
+"""Write a sheet of photographs with each look, and how much of each it changes.
+
+python -m tools.look_sheet OUT PHOTO ... [--looks mist,star4] [--amount 1]
+
+Below each picture stand the share of pixels that an eye sees changed, and the share that became
+white. A look that is invisible or clips is named at the end, with the exit status 1.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+from click.testing import CliRunner
+from numpy.typing import NDArray
+
+import vkbloom
+from vkbloom._cli.program import program
+from vkbloom._presets.named_settings import PRESETS
+from vkbloom._views import pictures
+
+#: Of the presets, those that are made for photographs; photo is the default.
+LOOKS: Final = [name for name, one in PRESETS.items() if one.engine == "vkbloom"]
+#: Looks that are seen where small lights are, and nowhere else.
+WITH_RAYS: Final = ("star4", "star6", "anamorphic")
+CELL: Final = (240, 160)
+Pixels = NDArray[Any]
+
+
+class Change(NamedTuple):
+    """What a look does to an 8-bit picture, in shares of its pixels.
+
+    - `seen`: A component differs by more than 4 levels, which an eye finds beside the picture.
+    - `white`: All components have become 250 or more, less those that were.
+    """
+
+    seen: float
+    white: float
+
+    @property
+    def words(self) -> str:
+        """Both in percent."""
+        return f"{self.seen:.0%} seen, {max(self.white, 0):.1%} white"
+
+    def fault(self, look: str) -> str:
+        """Return what is wrong; "" if nothing is. Rays need lights, which a picture may lack."""
+        if self.white > 0.02:
+            return "clips to white"
+        return "invisible" if self.seen < (0.0 if look in WITH_RAYS else 0.05) else ""
+
+
+def measure(before: Pixels, after: Pixels) -> Change:
+    """Return what has changed between two 8-bit pictures (H, W, 3)."""
+    difference = np.abs(after.astype(int) - before.astype(int)).max(axis=2)
+    white = (after.min(axis=2) >= 250).mean() - (before.min(axis=2) >= 250).mean()
+    return Change(float((difference > 4).mean()), float(white))
+
+
+def levels_of(path: Path) -> Pixels:
+    """Return an image file as 8-bit levels in sRGB, (H, W, 3)."""
+    return pictures.picture(vkbloom.read(path)[..., :3])
+
+
+def tile_of(levels: Pixels) -> Pixels:
+    """Return a picture reduced to a cell, in its middle."""
+    small = pictures.reduce(levels, CELL)
+    tile = np.full((CELL[1], CELL[0], 3), 34, np.uint8)
+    top, left = (CELL[1] - small.shape[0]) // 2, (CELL[0] - small.shape[1]) // 2
+    tile[top : top + small.shape[0], left : left + small.shape[1]] = small
+    return tile
+
+
+def apply_look(files: Sequence[Path], look: str, folder: Path, amount: float = 1) -> list[Path]:
+    """Add a look to photographs, as the command does, and return the files."""
+    words = ["apply", *map(str, files), "-o", f"{folder}/", "--preset", look, "-q", "--overwrite"]
+    words += ["--adapter", "software", "--amount", str(amount)]
+    done = CliRunner().invoke(program, words)
+    if done.exit_code:
+        raise RuntimeError(f"{look}: {done.output}")
+    return [folder / file.name for file in files]
+
+
+def main() -> None:
+    """Write the sheet, and print what is wrong."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("out", type=Path)
+    parser.add_argument("photographs", nargs="+", type=Path)
+    parser.add_argument("--looks", default=",".join(LOOKS))
+    parser.add_argument("--amount", type=float, default=1)
+    arguments = parser.parse_args()
+    files, looks = arguments.photographs, arguments.looks.split(",")
+    before = [levels_of(file) for file in files]
+    rows = [[(tile_of(levels), file.stem)] for file, levels in zip(files, before, strict=True)]
+    faults = []
+    for look in looks:
+        with tempfile.TemporaryDirectory() as folder:
+            made = apply_look(files, look, Path(folder), arguments.amount)
+            for file, levels, row, name in zip(made, before, rows, files, strict=True):
+                after = levels_of(file)
+                change = measure(levels, after)
+                row.append((tile_of(after), f"{look}: {change.words}"))
+                if fault := change.fault(look):
+                    faults.append(f"{name}: {look}: {fault}")
+    from tools.docs_pictures import write_sheet
+
+    write_sheet(arguments.out, [tile for row in rows for tile in row], 1 + len(looks))
+    print("\n".join((*faults, str(arguments.out))))
+    sys.exit(bool(faults))
+
+
+if __name__ == "__main__":
+    main()
