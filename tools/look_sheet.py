@@ -28,6 +28,11 @@ from vkbloom._views import pictures
 LOOKS: Final = [name for name, one in PRESETS.items() if one.engine == "vkbloom"]
 #: Looks that are seen where small lights are, and nowhere else.
 WITH_RAYS: Final = ("star4", "star6", "anamorphic")
+#: With them, a photograph without highlights stays as it is.
+OF_HIGHLIGHTS: Final = ("photo", *WITH_RAYS)
+#: A bright sky of which 2.7 % became white has kept its clouds.
+MAX_WHITE: Final = 0.03
+MIN_SEEN: Final = 0.05
 CELL: Final = (240, 160)
 Pixels = NDArray[Any]
 
@@ -44,14 +49,15 @@ class Change(NamedTuple):
 
     @property
     def words(self) -> str:
-        """Both in percent."""
-        return f"{self.seen:.0%} seen, {max(self.white, 0):.1%} white"
+        """The first in percent, and the second if it is not 0."""
+        white = f", white {self.white:.1%}" if self.white >= 0.0005 else ""
+        return f"{self.seen:.0%}{white}"
 
     def fault(self, look: str) -> str:
-        """Return what is wrong; "" if nothing is. Rays need lights, which a picture may lack."""
-        if self.white > 0.02:
+        """Return what is wrong with a look; "" if nothing is."""
+        if self.white > MAX_WHITE:
             return "clips to white"
-        return "invisible" if self.seen < (0.0 if look in WITH_RAYS else 0.05) else ""
+        return "invisible" if look not in OF_HIGHLIGHTS and self.seen < MIN_SEEN else ""
 
 
 def measure(before: Pixels, after: Pixels) -> Change:

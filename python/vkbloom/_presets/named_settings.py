@@ -386,14 +386,13 @@ PRESETS: Final[Mapping[str, Preset]] = {
     ),
     "film_halation": Preset(
         {
-            **{"method": "halation", "strength": (1.4, 0.2, 0.03), "sizes": (400, 400, 400)},
-            "intensity": 0.5,
+            **{"method": "halation", "strength": (1.2, 0.15, 0.015), "sizes": (600, 450, 300)},
+            "intensity": 0.7,
         },
         "film without an anti-halation layer: red and orange rims around lights",
         "vkbloom, for photographs; the method of halation, stronger and wider",
         engine="vkbloom",
         confirmed="formula",
-        expands=True,
     ),
     "star4": Preset(
         {**_star(4, 45), "intensity": 25.0},
