@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
 import re
 from pathlib import Path
 from typing import Any
@@ -23,8 +25,10 @@ Array = NDArray[Any]
 def run(page: Path) -> dict[str, Any]:
     """Return the variables of a page's code, run from top to bottom."""
     names: dict[str, Any] = {"__name__": "page"}
-    for block in re.findall(r"^```python\n(.*?)^```", page.read_text(), re.DOTALL | re.MULTILINE):
-        exec(block, names)
+    blocks = re.findall(r"^```python\n(.*?)^```", page.read_text(), re.DOTALL | re.MULTILINE)
+    with contextlib.redirect_stdout(io.StringIO()):
+        for block in blocks:
+            exec(block, names)
     return names
 
 

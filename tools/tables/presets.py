@@ -86,9 +86,10 @@ def spread(bloom: NDArray[np.float64], light: float) -> tuple[float, list[float]
     y, x = np.mgrid[:height, :width]
     radius = np.hypot(y - height // 2, x - width // 2).ravel()
     order = np.argsort(radius)
-    held = np.cumsum(bloom.ravel()[order])
+    # What is negative around a star's rays becomes 0 when it is added.
+    held = np.cumsum(np.maximum(bloom.ravel(), 0)[order])
     radii = [float(radius[order][np.searchsorted(held, share * held[-1])]) for share in SHARES]
-    return float(held[-1] / light), radii
+    return float(bloom.sum() / light), radii
 
 
 def _cost(renderer: vkbloom.Renderer, settings: vkbloom.Settings, rounds: int) -> float:

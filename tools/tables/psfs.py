@@ -68,8 +68,8 @@ def of_presets(_: vkbloom.Renderer, quick: bool) -> str:
         # Bevy's prefilter makes 0.0001 of black.
         black = vkbloom.reference.blur(np.zeros((*size, 3)), linear, format="rgba32float")
         spread = psf.measured(linear, size).native_array() - black
-        # KinoBloom removes a single pixel as a firefly.
-        if spread.max() > 0:
+        # KinoBloom removes a single pixel as a firefly. Stars take away more light than they add.
+        if spread.sum() > 0:
             one = psf.samples(spread)
             rows.append([f"`{name}`", *_figures(one, one.array(size)[..., 1].max(), 1.0)])
     return table(["preset", *FIGURES], rows)

@@ -213,7 +213,7 @@ PRESETS: Final[Mapping[str, Preset]] = {
     ),
     "halation": Preset(
         {"method": "halation"},
-        "film: a red glow of the complete picture, and its softness",
+        "film as measured: a faint red glow and softness; film_halation is stronger",
         "andreavolpato/agx-emulsion @ 0e0baf2e3dd5",
         engine="Film",
         confirmed="frames",
