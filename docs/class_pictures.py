@@ -58,8 +58,8 @@ def draw_profiles(path: Path, profiles: dict[str, Array]) -> None:
         figure, axes = plt.subplots(figsize=(7, 3), layout="constrained", facecolor=DARK)
         axes.set_facecolor(DARK)
         for (name, values), style in zip(profiles.items(), ("-", "--", "-."), strict=True):
-            axes.semilogy(np.where(values > 1e-8, values, np.nan), style, label=name, linewidth=2)
-        axes.set(xlabel="distance in pixels", ylabel="brightness", ylim=(1e-8, 1))
+            axes.semilogy(np.where(values > 1e-7, values, np.nan), style, label=name, linewidth=2)
+        axes.set(xlabel="distance in pixels", ylabel="brightness", ylim=(1e-6, 1))
         axes.legend()
         figure.savefig(path, dpi=100)
         plt.close(figure)
