@@ -132,7 +132,7 @@ def measure(renderer: vkbloom.Renderer, quick: bool) -> str:
                 f"{gain:.3g}",
                 f"{settings.intensity * gain:.3g}" if adds else settings.composite,
                 f"{share:.3g}",
-                f"{border.figures['corner']:.2g}",
+                format_figure(border.figures.get("corner")),
                 *(f"{radius:.0f}" for radius in radii),
                 str(len(flat.timings)),
                 f"{1e3 * _cost(renderer, settings, 1 if quick else 15):.1f}",
