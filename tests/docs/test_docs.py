@@ -9,9 +9,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from tools.tables.cells import merge_rows
 
 from tests.docs.pages import ROOT, TEXTS, blocks
-from vkbloom import Renderer, Scene, Separable
+from vkbloom import Renderer, Scene, Separable, presets
 
 # test_guide.py runs the code of testing.md, which is files of tests.
 PAGES = [
@@ -64,6 +65,23 @@ def test_links_lead_somewhere(page: Path) -> None:
     for target in re.findall(r"\]\(([^)\s]+)\)", page.read_text()):
         if not target.startswith(("http:", "https:", "#")):
             assert (page.parent / target.partition("#")[0]).exists(), target
+
+
+@pytest.mark.parametrize("name", ["check", "measured", "stability", "resolution"])
+def test_every_preset_has_a_row(name: str) -> None:
+    """tools/tables/write.py --presets adds those that are missing."""
+    text = (ROOT / "docs" / "evidence" / f"{name}_table.md").read_text()
+    assert {*re.findall(r"^\| `(\w+)` \|", text, re.MULTILINE)} == {*presets}
+
+
+def test_rows_of_chosen_presets_replace_theirs() -> None:
+    head = "On a CPU.\n\n| preset | gain |\n| --- | --- |\n"
+    old = f"{head}| `a` | 1 |\n| `b` | 2 |\n"
+    new = f"{head}| `b` | 3 |\n| `c` | 4 |\n"
+    assert merge_rows(old, new) == f"{head}| `a` | 1 |\n| `b` | 3 |\n| `c` | 4 |\n"
+    for wrong in (new.replace("CPU", "GPU"), new.replace("gain", "light")):
+        with pytest.raises(ValueError, match=r"another device|not the head"):
+            merge_rows(old, wrong)
 
 
 def test_titles_name_a_task() -> None:

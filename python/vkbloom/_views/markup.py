@@ -103,7 +103,7 @@ def share_bar(share: float) -> Markup:
     )
     return element(
         "div",
-        element("div", bar, style="flex:1 1 auto;min-width:8em", aria_hidden="true"),
+        element("div", bar, style="flex:none;width:12em", aria_hidden="true"),
         element("span", f"{100 * share:.0f} %", style="flex:none;width:3.5em;text-align:right"),
         style="display:flex;align-items:center",
     )
