@@ -20,6 +20,7 @@ from pathlib import Path
 
 import matplotlib as mpl
 import numpy as np
+from picture_sheet import write_sheet
 from skimage import data
 
 import vkbloom
@@ -80,23 +81,6 @@ def draw_measured(renderer: vkbloom.Renderer, path: Path) -> None:
     lines = cells[1, 1].contour(stops, levels=range(-9, 1), cmap="plasma", linewidths=2.5)
     cells[1, 1].clabel(lines, levels=range(-8, 1, 2), fontsize=20)
     figure.savefig(path, dpi=100, pil_kwargs={"quality": 88})
-    plt.close(figure)
-
-
-def write_sheet(path: Path, tiles: list[tuple[np.ndarray, str]], columns: int) -> None:
-    """Write pictures in rows, with their names below, for light and dark pages."""
-    height, width = tiles[0][0].shape[:2]
-    rows, margin, name = -(-len(tiles) // columns), 6, 26
-    size = columns * (width + margin) + margin, rows * (height + name) + margin
-    figure = plt.figure(figsize=(size[0] / 100, size[1] / 100), facecolor="#222222")
-    for index, (tile, text) in enumerate(tiles):
-        x = margin + index % columns * (width + margin)
-        y = size[1] - margin - index // columns * (height + name)
-        # Pixel by pixel.
-        figure.figimage(tile, x, y - height)
-        place = (x + width / 2) / size[0], (y - height - name / 2) / size[1]
-        figure.text(*place, text, color="white", fontsize=12, ha="center", va="center")
-    figure.savefig(path, dpi=100, facecolor="#222222")
     plt.close(figure)
 
 

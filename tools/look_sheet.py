@@ -112,7 +112,7 @@ def main() -> None:
                 row.append((tile_of(after), f"{look}: {change.words}"))
                 if fault := change.fault(look):
                     faults.append(f"{name}: {look}: {fault}")
-    from tools.docs_pictures import write_sheet
+    from tools.picture_sheet import write_sheet
 
     write_sheet(arguments.out, [tile for row in rows for tile in row], 1 + len(looks))
     print("\n".join((*faults, str(arguments.out))))

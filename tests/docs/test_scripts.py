@@ -57,6 +57,7 @@ ELSEWHERE: Final = {
     "examples/training_pairs.py": "tests/device/test_training_pairs.py",
     "tools/cluster/": "Makefile",
     "tools/core_tables.py": "tests/core/test_no_core.py",
+    "tools/picture_sheet.py": "tools/docs_pictures.py",
     "tools/preset_blooms.py": "tests/custom/test_check.py",
     "tools/coverage.sh": "docs/robustness.md",  # compiles and runs for minutes
     "tools/coverage_report.py": "tools/coverage.sh",
