@@ -79,9 +79,8 @@ def test_rows_of_chosen_presets_replace_theirs() -> None:
     old = f"{head}| `a` | 1 |\n| `b` | 2 |\n"
     new = f"{head}| `b` | 3 |\n| `c` | 4 |\n"
     assert merge_rows(old, new) == f"{head}| `a` | 1 |\n| `b` | 3 |\n| `c` | 4 |\n"
-    for wrong in (new.replace("CPU", "GPU"), new.replace("gain", "light")):
-        with pytest.raises(ValueError, match=r"another device|not the head"):
-            merge_rows(old, wrong)
+    with pytest.raises(ValueError, match="not the head"):
+        merge_rows(old, new.replace("gain", "light"))
 
 
 def test_titles_name_a_task() -> None:

@@ -199,8 +199,32 @@ def test_the_sheet_says_where_glow_is_not_thresholded(
     is_frame = settings.threshold is not None and bool(frames["glow"].min(initial=1.0) > 0.2)
     page = frames._repr_html_()
     assert ("the frame before its threshold" in page) == is_frame
-    # And what each pass does.
-    assert len(re.findall(r"<td[^>]*>[a-z][^<]+</td></tr>", page)) == len(frames.timings)
+    assert_each_pass_has_a_sentence(frames)
+
+
+def assert_each_pass_has_a_sentence(frames: Frames) -> None:
+    """Of the rows of passes, the last cell says what they do."""
+    sentences = re.findall(r"<td[^>]*>([a-z][^<]+)</td></tr>", frames._repr_html_())
+    assert len(sentences) == len(frames.timings) > 0
+
+
+PASSES: dict[str, tuple[vkbloom.Settings, dict[str, Any]]] = {
+    **{f"exposure {one}": (vkbloom.presets.kino, {"exposure": one}) for one in vkbloom.exposures},
+    **{f"taa {one}": (vkbloom.presets.kino, {"taa": one}) for one in vkbloom.antialiasing},
+    "direct": (Separable(direct=True, loops=2), {}),
+    "layers": (Separable(layers=((1, 1), (2, 0.5)), loops=2), {}),
+    "field": (
+        vkbloom.Convolution(vkbloom.psf.Varying(function=lambda u, v: np.ones((3, 3)))),
+        {},
+    ),
+}
+
+
+@pytest.mark.parametrize("name", PASSES)
+def test_the_sheet_says_what_passes_of_all_stages_do(renderer: vkbloom.Renderer, name: str) -> None:
+    settings, given = PASSES[name]
+    image = np.full((16, 16, 3), 0.3, np.float32)
+    assert_each_pass_has_a_sentence(renderer.apply(image, settings, **given))
 
 
 @pytest.mark.parametrize("dtype", ["float16", "float32"])

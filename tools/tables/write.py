@@ -53,10 +53,12 @@ def main() -> None:
     with vkbloom.Renderer(arguments.adapter) as renderer:
         for name in names:
             file = arguments.out / f"{name}_table.md"
-            text = f"On {renderer.info.summary}.\n\n{TABLES[name](renderer, arguments.quick)}"
-            if cells.ONLY:
-                text = cells.merge_rows(file.read_text(encoding="utf-8"), text)
-            file.write_text(text, encoding="utf-8")
+            head = f"On {renderer.info.summary}.\n"
+            old = file.read_text(encoding="utf-8") if cells.ONLY else head
+            if not old.startswith(head):
+                raise SystemExit(f"{file} is of another device: {old.partition(chr(10))[0]}")
+            text = f"{head}\n{TABLES[name](renderer, arguments.quick)}"
+            file.write_text(cells.merge_rows(old, text) if cells.ONLY else text, encoding="utf-8")
             print(file, flush=True)
 
 

@@ -14,6 +14,7 @@ from vkbloom._formats import MAX_FLOAT
 from vkbloom._numbers import check_above, check_index
 from vkbloom._public import public
 from vkbloom._settings.fields import choice_field, flag_field, number_field, numbers_field
+from vkbloom._settings.pass_sentences import BLURRED_AT_ONCE
 from vkbloom._settings.settings import Settings
 
 Texel = Literal["own", "x"]
@@ -82,7 +83,7 @@ class Separable(Settings):
 
     def _pass_sentence(self, stem: str) -> str:
         if stem == "bloom" and self.direct:
-            return "blurs along rows and columns at once, with N x N taps"
+            return BLURRED_AT_ONCE
         return super()._pass_sentence(stem)
 
     @property

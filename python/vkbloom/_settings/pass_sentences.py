@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 HALVED_BY_13: Final = "halves the size with 13 taps, so that small lights do not flicker"
 HALVED_BY_5: Final = "halves the size with five taps"
 DOUBLED_BY_8: Final = "doubles the size with eight taps"
+BLURRED_AT_ONCE: Final = "blurs along rows and columns at once, with N x N taps"
 BLURRED_DOWN: Final = "blurs the smaller level along its columns, so that it is blurred along both"
 
 _COMPLETE: Final = "takes the complete frame; the method applies its threshold later"
@@ -59,6 +60,7 @@ PASS_SENTENCES: Final[Mapping[str, str]] = MappingProxyType(
         "reduced": "reduces the frame to the size of the first level",
         "down": "halves the size, so that a few taps reach twice as far",
         "down_across": "blurs the smaller level along its rows",
+        "blur": BLURRED_AT_ONCE,
         "blur_vertical": "blurs along the columns, the first half of a blur in two passes",
         "blur_horizontal": "blurs along the rows",
         "kawase": "averages four samples at the corners of a square that grows from pass to pass",
@@ -84,6 +86,7 @@ PASS_SENTENCES: Final[Mapping[str, str]] = MappingProxyType(
         "halo": "draws a ring around the middle of the frame from its bright light",
         "ghosts": "mirrors bright light through the middle of the frame, as lenses do",
         "dirty_light": "multiplies the light by a picture of dirt on the lens",
+        "combined": "combines picture and bloom, whose brightness the exposure measures",
         "final": "combines picture and bloom, and applies exposure, tone map and encoding",
     }
 )
