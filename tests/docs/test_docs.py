@@ -109,6 +109,14 @@ def test_the_notebook_for_class_has_six_answers() -> None:
     assert re.findall(r"^\| (\d)\. ", page, re.MULTILINE) == [*"123456"]
 
 
+def test_the_first_commands_overwrite_nothing() -> None:
+    """Who pastes all of them has a picture of each."""
+    lines = blocks(ROOT / "README.md", "sh")[0].splitlines()
+    written = [line.split()[3] for line in lines]
+    assert len(written) == len({*written}) > 3
+    assert {"mist", "star6", "film_halation"} <= {*" ".join(lines).split()}
+
+
 @pytest.mark.parametrize("page", ["README.md", "docs/index.md"])
 def test_how_to_cite(page: str) -> None:
     """The first pages, CITATION.cff and the package say the same."""
