@@ -206,7 +206,8 @@ def resolution(renderer: vkbloom.Renderer, quick: bool) -> str:
             for missing in (len(SCALES) - len(scales),)
         )
         kept = all(np.ptp(radii) < KEPT * radii.mean() for radii in (found.r50, found.r90))
-        rows.append([f"`{name}`", *cells, "yes" if kept else "no"])
+        is_known = np.isfinite([found.r50, found.r90]).all()
+        rows.append([f"`{name}`", *cells, ("yes" if kept else "no") if is_known else "none"])
     return table(["preset", "50 % within, %", "90 % within, %", "peak, %", "keeps"], rows)
 
 
