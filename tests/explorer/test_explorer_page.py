@@ -197,6 +197,9 @@ def choose_point_spread_functions(page: Page) -> None:
     page.get_by_label("preset").select_option("iris_6")
     wait_for_code(page, 'vkbloom.presets["iris_6"]')
     assert field(page, "mask.blades").input_value() == "6"
+    # No pass writes the kernel.
+    page.get_by_label("framebuffer").select_option("kernel")
+    page.get_by_text("kernel is the point-spread function, which no pass writes").wait_for()
 
 
 def test_stages_of_glare(page: Page) -> None:

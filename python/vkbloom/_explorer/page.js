@@ -487,14 +487,8 @@ export function mount(parent, send, { store = null, heading = "h2", decode = dec
       if (wanted === framebuffer) framebuffer = a.framebuffer;
       frameSelect.value = framebuffer;
       canvas.ariaLabel = `picture: ${a.framebuffer}, ${a.size[0]} × ${a.size[1]}`;
-      const writer = a.plan.find(({ writes }) => writes.includes(a.framebuffer));
-      // No pass writes the kernel of a convolution.
-      const reader = a.plan.find(({ reads }) => reads.includes(a.framebuffer));
-      caption.textContent = writer
-        ? `${a.framebuffer}: ${writer.sentence}`
-        : reader
-          ? `${a.framebuffer} is read by the pass ${reader.name}, which ${reader.sentence}`
-          : "";
+      const { sentence } = a.plan.find(({ writes }) => writes.includes(a.framebuffer)) ?? {};
+      caption.textContent = sentence ? `${a.framebuffer}: ${sentence}` : "";
       const passes = Object.entries(a.passes);
       const device = passes.reduce((sum, [, seconds]) => sum + 1e3 * seconds, 0);
       const ran = setup.stored

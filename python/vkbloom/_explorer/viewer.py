@@ -447,6 +447,8 @@ def _note_of(settings: Settings, shown: str) -> str:
     """Return what a page says of a framebuffer that is not what its name or its colours tell."""
     if shown == "glow":
         return settings.glow_note and f"glow is {settings.glow_note}"
+    if shown == "kernel" and not METHODS.is_added(settings.method):
+        return "kernel is the point-spread function, which no pass writes: it is computed once"
     if shown != "final" or settings.encoding not in ("pq", "hlg"):
         return ""
     return f"this page shows SDR: final's {settings.encoding} signal is shown as sRGB"
