@@ -32,6 +32,7 @@ _here = Path(__file__).parent
 for _notebook in (_here.parent / "examples").glob("*.ipynb"):
     shutil.copy(_notebook, _here / "examples")
 runpy.run_path(str(_here / "class_pictures.py"))["write"](_here / "examples" / "class")
+runpy.run_path(str(_here / "exposure_pictures.py"))["write"](_here / "examples" / "exposure")
 runpy.run_path(str(_here / "fault_pictures.py"))["write"](_here / "examples" / "faults")
 runpy.run_path(str(_here / "field_pictures.py"))["write"](_here / "examples" / "field")
 runpy.run_path(str(_here / "flare_pictures.py"))["write"](_here / "examples" / "flare")

@@ -8,7 +8,7 @@ from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
 from collections.abc import Sequence as AnySequence
-from contextlib import closing
+from contextlib import ExitStack, closing, suppress
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple, TypeAlias
 
@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 
 from vkbloom._argument_types import check_arguments
 from vkbloom._image_arguments import check_image, check_mask
-from vkbloom._io.numbered_files import files_of, gap_note, pattern_of
-from vkbloom._io.video.reading import VideoFile, is_video
+from vkbloom._io.numbered_files import NumberedFile, files_of, gap_note, pattern_of
+from vkbloom._io.picture import Picture
+from vkbloom._io.video.reading import VideoFile, VideoPicture, is_video
 from vkbloom._locks import cached_property
 from vkbloom._numbers import check_above, check_floats, check_index
 from vkbloom._public import public
@@ -35,8 +36,10 @@ if TYPE_CHECKING:
     from vkbloom._presets.start import Start
     from vkbloom._scene import Scene
 
-# The seconds in which the animation of a scene runs once, as in a window.
-_TURN_SECONDS: Final = 8.0
+#: The seconds in which the animation of a scene runs once, as in a window.
+TURN_SECONDS: Final = 8.0
+# Frames of a video before this one are decoded from the begin on.
+_MIN_SOUGHT: Final = 24
 
 
 class Taken(NamedTuple):
@@ -128,6 +131,10 @@ class Input(ABC):
     def count(self) -> int | None:
         """Return how many frames there are; None: endless, or not known."""
 
+    def decoded(self, first: int) -> _Reading:
+        """Yield the same before they are developed for their bloom: of a file its `Picture`."""
+        return self.read(first)
+
     def place_of(self, number: int) -> int:
         """Return the place in time of a frame at constant frames per second."""
         return number
@@ -137,7 +144,33 @@ class Input(ABC):
         return None
 
 
-class _Arrays(Input):
+def moment_of(source: Input, clock: Clock, number: int, own: float | None) -> Moment:
+    """Return when a frame is; `own`: the time that it has if the call gives none."""
+    place = number if clock.times is not None else source.place_of(number)
+    time = clock.at(place)
+    return Moment(place, own if time is None else time)
+
+
+class _Decoded(Input):
+    """Frames that are decoded, by `decoded`, before they are developed for their bloom."""
+
+    @property
+    @abstractmethod
+    def _start(self) -> Start | None:
+        """Where all files start; None: the first item is none."""
+
+    def read(self, first: int) -> _Reading:
+        with closing(self.decoded(first)) as frames:
+            for taken in frames:
+                yield taken._replace(image=self._develop(taken.image))
+
+    def _develop(self, decoded: Any) -> Any:
+        if not isinstance(decoded, Picture):
+            return decoded
+        return (decoded if self._start is None else self._start.develop(decoded)).pixels
+
+
+class _Arrays(_Decoded):
     """Images, or paths of image files, in any iterable."""
 
     def __init__(self, images: Any, chosen: _Chosen) -> None:
@@ -146,7 +179,6 @@ class _Arrays(Input):
 
     @cached_property
     def _start(self) -> Start | None:
-        """Where the first item starts, if it is a file."""
         has_items = hasattr(self._images, "__getitem__") and len(self._images) > 0
         first = self._images[0] if has_items else None
         if not isinstance(first, str | os.PathLike):
@@ -159,7 +191,7 @@ class _Arrays(Input):
             return self._start.settings
         return self._chosen.of_arrays(of_image=True)
 
-    def read(self, first: int) -> _Reading:
+    def decoded(self, first: int) -> _Reading:
         images = self._images
         if first and hasattr(images, "__getitem__"):
             # A list of lazily read images reads only those.
@@ -167,31 +199,27 @@ class _Arrays(Input):
         else:
             read = itertools.islice(images, first, None)
         for image in read:
-            is_file = isinstance(image, str | os.PathLike)
-            yield Taken(_read(image, self._start) if is_file else image)
+            yield Taken(_read(image) if isinstance(image, str | os.PathLike) else image)
 
     def count(self) -> int | None:
         return len(self._images) if hasattr(self._images, "__len__") else None
 
 
-class _Files(Input):
-    """The files of a pattern."""
+class _Files(_Decoded):
+    """Files, each with the number of its frame; `read_file` decodes one."""
 
-    def __init__(self, pattern: str, chosen: _Chosen, gaps: str) -> None:
-        folder, name = os.path.split(pattern)
-        found = pattern_of(name)
-        if found is None:
-            raise ValueError(
-                f"frames: {pattern!r} is neither a video nor a pattern of numbers, such as "
-                "f.%04d.exr"
-            )
-        files = files_of(folder, found)
-        if not files:
-            raise FileNotFoundError(f"{pattern}: no file was found")
-        if gaps == "error" and (missing := gap_note(files)) is not None:
-            raise ValueError(f'{pattern}: {missing}; gaps="time" takes them as time')
+    def __init__(
+        self,
+        files: AnySequence[NumberedFile],
+        chosen: _Chosen,
+        read_file: Callable[[str], Picture] | None = None,
+    ) -> None:
         self._files, self._chosen = [name for name, _ in files], chosen
-        self._numbers = [number or 0 for _, number in files]
+        numbers = [number for _, number in files if number is not None]
+        # Without numbers, files are counted.
+        is_numbered = len(numbers) == len(files)
+        self._numbers: AnySequence[int] = numbers if is_numbered else range(len(files))
+        self._read_file = read_file or _read
 
     @cached_property
     def _start(self) -> Start:
@@ -201,9 +229,9 @@ class _Files(Input):
     def settings(self) -> Settings:
         return self._start.settings
 
-    def read(self, first: int) -> _Reading:
+    def decoded(self, first: int) -> _Reading:
         for file in self._files[first:]:
-            yield Taken(_read(file, self._start))
+            yield Taken(self._read_file(file))
 
     def count(self) -> int | None:
         return len(self._files)
@@ -212,7 +240,21 @@ class _Files(Input):
         return self._numbers[min(number, len(self._numbers) - 1)] - self._numbers[0]
 
 
-class _Video(Input):
+def files_of_pattern(pattern: str) -> list[NumberedFile]:
+    """Return the files of a pattern by their numbers; ValueError or OSError if there are none."""
+    folder, name = os.path.split(pattern)
+    found = pattern_of(name)
+    if found is None:
+        raise ValueError(
+            f"frames: {pattern!r} is neither a video nor a pattern of numbers, such as f.%04d.exr"
+        )
+    files = files_of(folder, found)
+    if not files:
+        raise FileNotFoundError(f"{pattern}: no file was found")
+    return files
+
+
+class _Video(_Decoded):
     """The frames of a video."""
 
     def __init__(self, path: str, chosen: _Chosen) -> None:
@@ -222,20 +264,38 @@ class _Video(Input):
 
     @cached_property
     def _start(self) -> Start:
-        with VideoFile(self._path) as file, closing(file.frames()) as frames:
-            for frame in frames:
-                return self._chosen.of_file(frame.picture.header.highlights())
+        with closing(self.decoded(0)) as frames:
+            for taken in frames:
+                return self._chosen.of_file(taken.image.highlights)
         raise AssertionError("a video without frames is an error")
 
     @property
     def settings(self) -> Settings:
         return self._start.settings
 
-    def read(self, first: int) -> _Reading:
-        with VideoFile(self._path) as file, closing(file.frames()) as frames:
-            for frame in itertools.islice(frames, first, None):
-                pixels = self._start.develop(frame.decode()).pixels
-                yield Taken(pixels, float(frame.time), float(frame.duration))
+    def decoded(self, first: int) -> _Reading:
+        with ExitStack() as stack:
+            for frame in self._frames(first, stack):
+                yield Taken(frame.decode(), float(frame.time), float(frame.duration))
+
+    def _frames(self, first: int, stack: ExitStack) -> Iterator[VideoPicture]:
+        """Return the frames from one on; the stack closes their file."""
+        file = stack.enter_context(VideoFile(self._path))
+        time = self.time_of(first) if first > _MIN_SOUGHT else None
+        if time is not None:
+            frames, begun = stack.enter_context(closing(file.frames())), None
+            with suppress(OSError, ValueError):
+                file.seek(time)
+                begun = next(frames, None)
+            # Half of a unit: times are whole numbers of units.
+            exact = time - float(file.time_base) / 2
+            if begun is not None and begun.time <= time + float(file.time_base) / 2:
+                every = itertools.chain([begun], frames)
+                return itertools.dropwhile(lambda frame: frame.time < exact, every)
+            # Its index is wrong: from the begin on.
+            file = stack.enter_context(VideoFile(self._path))
+        frames = stack.enter_context(closing(file.frames()))
+        return itertools.islice(frames, first, None)
 
     @cached_property
     def _times(self) -> list[float]:
@@ -264,7 +324,7 @@ class _Turns(Input):
         for number in itertools.count(first) if count is None else range(first, count):
             time = self._clock.at(number)
             assert time is not None
-            yield Taken(time / _TURN_SECONDS, time)
+            yield Taken(time / TURN_SECONDS, time)
 
     def count(self) -> int | None:
         return None if self._clock.times is None else len(self._clock.times)
@@ -277,11 +337,10 @@ def _highlights_of(path: str | os.PathLike[str]) -> Any:
         return file.header.highlights()
 
 
-def _read(path: str | os.PathLike[str], start: Start | None) -> NDArray[Any]:
+def _read(path: str | os.PathLike[str]) -> Picture:
     from vkbloom._io.image_file import read_picture  # noqa: PLC0415  costs start-up time
 
-    picture = read_picture(path)
-    return picture.pixels if start is None else start.develop(picture).pixels
+    return read_picture(path)
 
 
 class Work(NamedTuple):
@@ -494,10 +553,7 @@ class Sequence(Iterable[Frames]):
             raise ValueError(f"times: {len(times)} times do not match {number + 1} frames")
 
     def _moment(self, number: int, own: float | None) -> Moment:
-        """Return when a frame is; `own`: the time that it has if the call gives none."""
-        place = number if self._clock.times is not None else self._source.place_of(number)
-        time = self._clock.at(place)
-        return Moment(place, own if time is None else time)
+        return moment_of(self._source, self._clock, number, own)
 
 
 _MAX_INDEX: Final = 1 << 62
@@ -670,7 +726,12 @@ def _clock_of(fps: float | None, times: AnySequence[float] | None) -> Clock:
 def _input_of(frames: Any, chosen: _Chosen, gaps: str) -> Input:
     if isinstance(frames, str | os.PathLike):
         path = os.fspath(frames)
-        return _Video(path, chosen) if is_video(path) else _Files(path, chosen, gaps)
+        if is_video(path):
+            return _Video(path, chosen)
+        files = files_of_pattern(path)
+        if gaps == "error" and (missing := gap_note(files)) is not None:
+            raise ValueError(f'{path}: {missing}; gaps="time" takes them as time')
+        return _Files(files, chosen)
     is_one = isinstance(frames, bytes) or (isinstance(frames, np.ndarray) and frames.ndim != 4)
     if is_one or not (isinstance(frames, Iterable) or hasattr(frames, "__getitem__")):
         raise TypeError(
@@ -678,3 +739,21 @@ def _input_of(frames: Any, chosen: _Chosen, gaps: str) -> Input:
             "video or a scene"
         )
     return _Arrays(frames, chosen)
+
+
+def open_input(
+    frames: Any, clock: Clock, read_file: Callable[[str], Picture] | None = None
+) -> Input:
+    """Return what reads frames as for `sequence`, for who develops what is decoded.
+
+    - `frames`: Also files with their numbers. Numbers that are missing are time.
+    - `read_file`: Decodes one of these files.
+    """
+    from vkbloom._scene import Scene  # noqa: PLC0415  costs start-up time
+
+    chosen = _Chosen(None, {})
+    if isinstance(frames, Scene):
+        return _Turns(clock, chosen)
+    if read_file is not None:
+        return _Files(frames, chosen, read_file)
+    return _input_of(frames, chosen, "time")

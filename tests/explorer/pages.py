@@ -8,12 +8,15 @@ from __future__ import annotations
 
 from vkbloom._explorer.controls import as_code, controls, describe, settings_from
 from vkbloom._explorer.fast_pictures import picture_of
+from vkbloom._explorer.playing import Chain, NotReached, open_clip
 from vkbloom._explorer.server import Server
 from vkbloom._explorer.stored import Pictures, StoredGrid, StoredSource, write_stored
 from vkbloom._explorer.viewer import Viewer
 from vkbloom._views.pictures import reduce
 
 __all__ = [
+    "Chain",
+    "NotReached",
     "Pictures",
     "Server",
     "StoredGrid",
@@ -22,6 +25,7 @@ __all__ = [
     "as_code",
     "controls",
     "describe",
+    "open_clip",
     "picture_of",
     "reduce",
     "settings_from",

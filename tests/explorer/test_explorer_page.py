@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 import vkbloom
 from tests.exhaustive import by_turns
 from tests.explorer.explorer_hosts import CHROMIUM, PATIENCE, wait_until
-from tests.explorer.pages import Viewer, picture_of
+from tests.explorer.pages import Viewer, open_clip, picture_of
 from tests.framebuffers import decode
 from vkbloom import KinoBloom, Pyramid, Renderer, Scene, Separable, presets
 
@@ -345,6 +345,71 @@ def test_time_plays_and_pauses(
     wait_until(lambda: np.array_equal(see(page, tmp_path), expected[:, :, :3]))
 
 
+#: The frames of a sequence, whose light changes.
+CLIP = [
+    (np.random.default_rng(3).random((30, 40, 3)) ** 8 * 20 * 4.0 ** (number > 5)).astype("float16")
+    for number in range(12)
+]
+
+
+@pytest.fixture(scope="module")
+def clip_url(serve: Callable[[Callable[[], Viewer]], str], renderer: Renderer) -> str:
+    def new_viewer() -> Viewer:
+        clip = open_clip(CLIP, fps=24, exposure="bevy")
+        return Viewer(CLIP[0], KinoBloom(), renderer=renderer, clip=clip)
+
+    return serve(new_viewer)
+
+
+def test_a_sequence(tab: Page, clip_url: str, renderer: Renderer, tmp_path: Path) -> None:
+    """It is scrubbed and played; the curve of its exposure grows to its end by itself."""
+    from playwright.sync_api import expect
+
+    page = tab
+
+    def middles(seen: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        """Return the middle of each pixel, which is enlarged."""
+        rows, columns = (
+            ((np.arange(count) + 0.5) * side / count).astype(int)
+            for count, side in zip((30, 40), seen.shape[:2], strict=True)
+        )
+        return seen[np.ix_(rows, columns)]
+
+    def assert_shows_frame(number: int, exposure: Any = "bevy") -> None:
+        how: dict[str, Any] = {"fps": 24, "renderer": renderer, "exposure": exposure}
+        made = [*vkbloom.sequence(CLIP, KinoBloom(), **how)][number]["final"]
+        shown = picture_of(made, "final", encoding="none", stops=0.0)
+        page.locator(".vkb-moment", has_text=f"frame {number + 1} of 12").wait_for()
+        wait_until(lambda: np.array_equal(middles(see(page, tmp_path)), decode(shown, tmp_path)))
+
+    with show(page, clip_url):
+        assert_shows_frame(0)
+        slider = page.get_by_label("frame", exact=True)
+        page.get_by_role("img", name="exposure of 12 of 12 frames").wait_for()
+        slider.fill("8")
+        assert_shows_frame(8)
+        assert slider.evaluate("one => one.ariaValueText") == "0.33 s, frame 9 of 12"
+        page.locator(".vkb-stage").press(".")
+        assert_shows_frame(9)
+        exposure = page.get_by_role("combobox", name="exposure of")
+        exposure.select_option("granite")
+        assert_shows_frame(9, "granite")
+        page.wait_for_url("**granite**")
+        link = page.url
+        exposure.select_option("")
+        assert_shows_frame(9, None)
+        expect(page.locator(".vkb-curve")).to_be_hidden()
+        exposure.select_option("bevy")
+        page.get_by_label("speed").select_option("0.1")
+        page.locator(".vkb-stage").press(" ")
+        page.locator(".vkb-moment", has_text="frame 11 of 12").wait_for()
+        page.get_by_role("button", name="Pause").click()
+        page.locator(".vkb-curve").click(position={"x": 9, "y": 20})
+        assert_shows_frame(0)
+    with show(page, link):
+        assert_shows_frame(9, "granite")
+
+
 def test_code_is_copied(browser: Browser, scene_url: str) -> None:
     with open_page(browser, scene_url) as page:
         page.context.grant_permissions(["clipboard-read", "clipboard-write"])
@@ -601,3 +666,16 @@ def test_no_rule_of_accessibility_is_broken(page: Page, theme: Any, width: int) 
     page.wait_for_timeout(300)
     found = axe.run(page)
     assert found.violations_count == 0, found.generate_report()
+
+
+@pytest.mark.parametrize(("theme", "width"), by_turns(["light", "dark"], turns=[980, 390]))
+def test_a_sequence_is_accessible(tab: Page, clip_url: str, theme: Any, width: int) -> None:
+    axe = pytest.importorskip("axe_playwright_python.sync_playwright").Axe()
+    with show(tab, clip_url):
+        tab.emulate_media(color_scheme=theme)
+        tab.get_by_label("wipe A | B").check()
+        tab.set_viewport_size({"width": width, "height": 844})
+        tab.wait_for_timeout(300)
+        assert tab.evaluate("document.documentElement.scrollWidth") <= width
+        found = axe.run(tab)
+        assert found.violations_count == 0, found.generate_report()

@@ -10,25 +10,37 @@ import math
 import signal
 import time
 import webbrowser
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from fractions import Fraction
 from pathlib import PurePath
 from typing import Any, Final, NamedTuple
 
 import click
 from numpy.typing import NDArray
 
+from vkbloom._cli import sequences
 from vkbloom._cli.fields import SIZE, Command
 from vkbloom._cli.image_files import read_picture, reading_options
 from vkbloom._cli.interrupts import INTERRUPTED
 from vkbloom._cli.program import adapter_option, as_wrong_use, is_given
 from vkbloom._cli.scene_options import scene_options
 from vkbloom._cli.sequences import is_stream
-from vkbloom._cli.settings_options import STARTS, settings_options
-from vkbloom._cli.terminal import is_quiet, say, tell_device
+from vkbloom._cli.settings_options import (
+    STARTS,
+    StartOptions,
+    start_options,
+    taa_option,
+)
+from vkbloom._cli.terminal import is_quiet, note, say, tell_device
+from vkbloom._cli.videos import Rate
 from vkbloom._errors import Error
+from vkbloom._explorer.playing import ONLY_OF_SEQUENCES, Clip, open_clip
 from vkbloom._explorer.viewer import GLOW, Viewer
 from vkbloom._extras import import_extra
+from vkbloom._io import image_file
+from vkbloom._io.numbered_files import as_frames, gap_note
 from vkbloom._io.picture import Picture
+from vkbloom._io.video.reading import is_video
 from vkbloom._presets.start import PRESET_OF_SCENES, Start, start_of
 from vkbloom._renderer.interruptible import open_renderer
 from vkbloom._renderer.renderer import Renderer
@@ -57,12 +69,14 @@ class Opened(NamedTuple):
     """An IMAGE: as decoded, its file ("" for a stream), and what it is expanded up to.
 
     - `is_fixed`: Whether the call says the expansion, so that another preset does not change it.
+    - `clip`: The frames in time of which the picture is the first; None: it is a still.
     """
 
     picture: Picture
     file: str
     expand: float | None
     is_fixed: bool
+    clip: Clip | None = None
 
     def pixels(self, settings: Settings) -> NDArray[Any]:
         """Return what a renderer gets with these settings."""
@@ -75,17 +89,22 @@ class Opened(NamedTuple):
         return self._replace(expand=start_of(self.picture.highlights, settings).expand)
 
 
-def _live_options(command: Callable[..., Any]) -> Callable[..., Any]:
+def _live_options(command: Callable[..., Any], *, plays: bool = False) -> Callable[..., Any]:
     """Add IMAGE and its options, and those of the device, the scene and the settings.
 
     The command gets as `opened` IMAGE, or None for a scene.
+
+    - `plays`: IMAGE may be a sequence; the command gets as `timing` the keywords of `open_clip`.
     """
+
+    def add_settings(run: Callable[..., Any]) -> Callable[..., Any]:
+        return start_options(run, is_timed=plays)
 
     @click.argument("source", metavar="[IMAGE]", required=False, type=click.Path())
     @reading_options
     @adapter_option
     @scene_options
-    @settings_options
+    @add_settings
     @functools.wraps(command)
     def run(
         *,
@@ -93,21 +112,56 @@ def _live_options(command: Callable[..., Any]) -> Callable[..., Any]:
         subimage: int,
         layer: str | None,
         expand: float | None,
-        settings: Settings,
+        start: StartOptions,
         **arguments: Any,
     ) -> Any:
+        timing: dict[str, Any] | None = None
+        if plays:
+            timing = arguments["timing"] = _timing_of(start, arguments.pop("fps"))
         if source is None:
             if is_given("expand"):
                 raise click.UsageError("--expand is only for an IMAGE")
-            return command(opened=None, settings=settings, **arguments)
+            return command(opened=None, settings=start.of_file("").settings, **arguments)
         for name, option in _OF_SCENE.items():
             _check_is_scene(name, option)
-        picture = read_picture(source, subimage, None, layer=layer)
+        clip = None
+        if timing is not None:
+            read_file = functools.partial(image_file.read_picture, subimage=subimage, layer=layer)
+            clip = _open_clip(source, timing, read_file)
+        if clip is None:
+            begun = start.of_file(source)
+            picture = read_picture(source, subimage, None, layer=layer)
+        else:
+            picture = clip.decoded(0)
+            begun = start.of(picture.highlights)
         file = "" if is_stream(source) else source
-        opened = Opened(picture, file, expand, is_fixed=is_given("expand"))
-        return command(opened=opened, settings=settings, **arguments)
+        opened = Opened(picture, file, begun.expand, is_given("expand"), clip)
+        return command(opened=opened, settings=begun.settings, **arguments)
 
     return run
+
+
+def _open_clip(
+    source: str, timing: Mapping[str, Any], read_file: Callable[[str], Picture]
+) -> Clip | None:
+    """Return the frames of a video, a pattern, a folder or a glob; None: IMAGE is a still."""
+    if is_video(source):
+        return open_clip(source, **timing)
+    files = as_frames(sequences.expand(source))
+    if files == [(source, None)]:
+        for name, value in timing.items():
+            if value is not None and is_given(name):
+                raise click.UsageError(f"--{name}: {ONLY_OF_SEQUENCES}")
+        return None
+    if (missing := gap_note(files)) is not None:
+        note(f"{source}: {missing}; they are time in which the frame before stays")
+    return open_clip(files, **timing, read_file=read_file)
+
+
+def _timing_of(start: StartOptions, fps: Fraction | None) -> dict[str, Any]:
+    """Return the keywords of `open_clip` that a call gives, or the file of its settings."""
+    stages = {name: start.stages.get(name) for name in ("exposure", "taa")}
+    return {**stages, "fps": None if fps is None else float(fps)}
 
 
 def _check_is_scene(name: str, option: str) -> None:
@@ -281,7 +335,14 @@ def _listen(glfw: Any, window: Any, renderer: Renderer, live: Live) -> None:
     "--size", type=SIZE, default="1280x720", help="Of a scene's frame, which gives its aspect."
 )
 @click.option("--shading", type=click.Choice(SHADINGS), default="deferred")
-@_live_options
+@click.option(
+    "--fps",
+    type=Rate(),
+    metavar="N",
+    help="Frames per second of a sequence [default 24]; of a video, instead of its times.",
+)
+@taa_option
+@functools.partial(_live_options, plays=True)
 def explore(
     *,
     opened: Opened | None,
@@ -294,11 +355,14 @@ def explore(
     adapter: str,
     scene: Callable[[], Scene],
     settings: Settings,
+    timing: dict[str, Any],
 ) -> int:
     """Explore the bloom of IMAGE, or of a scene, in a browser with controls for all settings.
 
     The page is served on 127.0.0.1 until Ctrl-C, to every program that knows its address. IMAGE
-    is decoded as vkbloom apply decodes it. The built-in scene has lights 6 times as bright as
+    is decoded as vkbloom apply decodes it. It may be a sequence, which the page plays: a video, a
+    pattern of numbers (f.%04d.exr), a folder or a glob. With --exposure NAME, --taa or --fps a
+    scene is one, too: its animation. The built-in scene has lights 6 times as bright as
     white, unless --glow-intensity says otherwise. Without options of settings, a scene in deferred
     shading begins with the tone map "aces" and the encoding "srgb".
 
@@ -309,6 +373,8 @@ def explore(
         import_extra("tornado", "notebook", "explore")
         if words:
             raise click.UsageError("--axis is only for a page of stored pictures; give --static")
+    elif timing["fps"] or (timing["exposure"] or timing["taa"]) or (opened and opened.clip):
+        raise click.UsageError("--static: a page of stored pictures has stills; name an image")
     looked_at: Scene | Picture
     begun: Settings | None = settings
     of_file: dict[str, Any] = {}
@@ -318,11 +384,12 @@ def explore(
         looked_at = opened.picture
         # A page for others has no path of this machine.
         file = opened.file if out is None else PurePath(opened.file).name
-        of_file = {"file": file, "expand": opened.expand}
+        of_file = {"file": file, "expand": opened.expand, "clip": opened.clip}
     else:
         looked_at = scene()
         if not any(is_given(name) for name in ("base", "glow", "glow_intensity")):
             looked_at = dataclasses.replace(looked_at, glow_intensity=GLOW)
+        of_file = {"clip": open_clip(looked_at, **timing)}
         if settings == presets[PRESET_OF_SCENES] and not any(is_given(name) for name in STARTS):
             begun = None
     with open_renderer(adapter) as renderer:

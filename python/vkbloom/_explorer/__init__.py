@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from vkbloom._extras import import_extra
@@ -14,17 +15,22 @@ if TYPE_CHECKING:
     from vkbloom._explorer.widget import Explorer
     from vkbloom._renderer.renderer import Renderer
     from vkbloom._scene import Scene
+    from vkbloom._settings.antialiasing import Antialiasing
+    from vkbloom._settings.exposure import Exposure
     from vkbloom._settings.settings import Settings, Shading
 
 
 @public("vkbloom")
 def explore(
-    source: Scene | NDArray[Any] | str | os.PathLike[str] | None = None,
+    source: Scene | NDArray[Any] | Sequence[Any] | str | os.PathLike[str] | None = None,
     settings: Settings | str | None = None,
     *,
     against: Settings | str | None = None,
     size: tuple[int, int] = (1280, 720),
     shading: Shading = "deferred",
+    fps: float | None = None,
+    exposure: Exposure | str | None = None,
+    taa: Antialiasing | str | None = None,
     renderer: Renderer | None = None,
 ) -> Explorer:
     """Explore a bloom in a notebook, with controls for all settings.
@@ -35,11 +41,12 @@ def explore(
 
     Parameters
     ----------
-    source : Scene, ndarray, str or path-like, optional
+    source : Scene, ndarray, str, path-like or a sequence, optional
         The scene, an image as `Renderer.apply` takes it, or the path of an image file, which is
         read as by `vkbloom.apply`. An image that is larger than it is shown is reduced first by
-        averaging, unless the page selects its own size. Default: ``Scene.ufo()`` with lights 6
-        times as bright as white.
+        averaging, unless the page selects its own size. Frames in time, which the page plays: a
+        list of images, an array (N, H, W, C), a pattern of files or a video, as for `sequence`.
+        Default: ``Scene.ufo()`` with lights 6 times as bright as white.
     settings : Settings or str, optional
         The initial settings, or the name of a preset. Default: for an image those of
         `vkbloom.apply`, for a scene ``presets["tutorial"]``, with ``tonemap="aces"`` and
@@ -51,6 +58,11 @@ def explore(
         selects the source's own size. Not used for an image.
     shading : {"deferred", "forward"}
         Initial shading of a scene. The page has a control for it.
+    fps : float, optional
+        Frames per second of frames in time. Default: 24; a video has its own times.
+    exposure, taa
+        As for `sequence`, with which the page begins. With one of them, or `fps`, a scene is played
+        as frames of its animation, whose deferred shading has light to meter.
     renderer : Renderer, optional
         Default: a new renderer, which `Explorer.close` closes.
 
@@ -63,7 +75,8 @@ def explore(
     Raises
     ------
     ValueError
-        An argument is out of range, or the renderer is closed.
+        An argument is out of range, the renderer is closed, or a still has `fps`, `exposure` or
+        `taa`.
 
     Notes
     -----
@@ -71,13 +84,18 @@ def explore(
     texels looks wider in a reduced frame.
     """
     import_extra("anywidget", "notebook", "explore")
-    from vkbloom._explorer.viewer import Viewer  # noqa: PLC0415  see vkbloom.reference
+    from vkbloom._explorer.playing import open_clip  # noqa: PLC0415  see vkbloom.reference
+    from vkbloom._explorer.viewer import Viewer, default_scene  # noqa: PLC0415
     from vkbloom._explorer.widget import Explorer  # noqa: PLC0415  needs anywidget
 
     how: dict[str, Any] = {"against": against, "size": size, "shading": shading}
-    looked_at: Any = source
+    looked_at: Any = default_scene() if source is None else source
+    clip = open_clip(looked_at, fps=fps, exposure=exposure, taa=taa)
     if isinstance(source, str | os.PathLike):
         from vkbloom._io.image_file import read_picture  # noqa: PLC0415  costs start-up time
 
-        looked_at, how["file"] = read_picture(source), os.fspath(source)
-    return Explorer(Viewer(looked_at, settings, renderer=renderer, **how))
+        looked_at = read_picture(source) if clip is None else clip.decoded(0)
+        how["file"] = os.fspath(source)
+    elif clip is not None and not clip.is_scene:
+        looked_at = clip.decoded(0)
+    return Explorer(Viewer(looked_at, settings, clip=clip, renderer=renderer, **how))

@@ -10,6 +10,10 @@ const NARROW = 720; // CSS pixels, as in page.css
 const WATCH = 200; // milliseconds between two looks at the files of custom methods
 const MAX_ZOOM = 64; // device pixels of a framebuffer's pixel
 const SIDES = ["a", "b"];
+const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4];
+const CURVE_HEIGHT = 92; // of the exposure of a clip, in CSS pixels
+const CURVE_LABEL = 18; // above and below it
+const CURVE_MARGIN = 8; // on the left and the right: half of a slider's thumb
 // The key of stored settings that says what the highlights of their picture were expanded up to.
 const EXPANDED = "vkbloom:expand";
 // What a side is expanded up to if that follows from its settings: the server answers a number.
@@ -27,6 +31,15 @@ function make(tag, properties = {}, ...children) {
     } else if (name in element) element[name] = value;
     else element.setAttribute(name, value);
   }
+  element.append(...children);
+  return element;
+}
+
+function draw2d(tag, attributes = {}, ...children) {
+  // (An address in this file would look like something that it loads.)
+  const { namespaceURI } = make("template", { innerHTML: "<svg></svg>" }).content.firstChild;
+  const element = document.createElementNS(namespaceURI, tag);
+  for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, value);
   element.append(...children);
   return element;
 }
@@ -177,6 +190,14 @@ export function mount(parent, send, { store = null, heading = "h2", decode = dec
   let framebuffer = "final";
   let time = 0;
   let playing = 0; // the request of the next animation frame, 0: paused
+  let number = 0; // the frame of a clip
+  let moment = 0; // while it plays, in seconds
+  let speed = 1;
+  let stages = { exposure: null, taa: null }; // of a clip: the names of those in time
+  const curves = {}; // by side: the exposures of a clip's frames, as far as they are known
+  const reached = new Map(); // by side: the frame up to which those before are computed
+  let filling = false; // a longer curve is asked for
+  let curveFailed = false;
   let stops = 0;
   let isSourceSize = false;
   let shading = null; // of a scene
@@ -231,7 +252,8 @@ export function mount(parent, send, { store = null, heading = "h2", decode = dec
     make("summary", { textContent: "Plan" }),
     make("div", { tabIndex: 0, role: "region", ariaLabel: "plan" }, passes),
   );
-  const below = make("div", { className: "vkb-below" }, readout, caption, bar, status, plan);
+  const timeline = make("div", { className: "vkb-timeline", hidden: true });
+  const below = make("div", { className: "vkb-below" }, timeline, readout, caption, bar, status, plan);
   const head = make("div", { className: "vkb-head" });
   const fields = make("div", { className: "vkb-fields" });
   const complaint = make("div", { className: "vkb-error", role: "alert" });
@@ -296,6 +318,7 @@ export function mount(parent, send, { store = null, heading = "h2", decode = dec
   // --- asking ---------------------------------------------------------------------------------
 
   function request(...sides) {
+    curveFailed = false;
     for (const side of sides) outdated.add(side);
     flush();
   }
@@ -308,23 +331,40 @@ export function mount(parent, send, { store = null, heading = "h2", decode = dec
     for (const side of sides) outdated.delete(side);
     waiting = ++asked;
     sent.set(waiting, { when: performance.now(), pointer, framebuffer });
-    const ratio = window.devicePixelRatio || 1;
-    send({
-      kind: "frame",
-      view,
-      id: waiting,
-      sides: Object.fromEntries(sides.map((side) => [side, settings[side]])),
-      framebuffer,
-      size: isSourceSize ? null : box.map((length) => Math.max(1, Math.round(length * ratio))),
-      ...lookedAt(),
-      ...(setup.expand ? { expand: Object.fromEntries(sides.map((side) => [side, expand[side]])) } : {}),
-      at: pointer,
-    });
+    send({ kind: "frame", id: waiting, framebuffer, at: pointer, ...askedFor(sides) });
     keep();
   }
 
+  // What the pictures and the curves of sides depend on.
+  function askedFor(sides) {
+    const bySide = (values) => Object.fromEntries(sides.map((side) => [side, values(side)]));
+    const ratio = window.devicePixelRatio || 1;
+    return {
+      view,
+      sides: bySide((side) => settings[side]),
+      size: isSourceSize ? null : box.map((length) => Math.max(1, Math.round(length * ratio))),
+      ...lookedAt(),
+      ...(setup.expand ? { expand: bySide((side) => expand[side]) } : {}),
+      ...(setup.clip ? { curve: bySide((side) => [curves[side]?.chain ?? 0, curves[side]?.stops.length ?? 0]) } : {}),
+    };
+  }
+
   function lookedAt() {
-    return setup.shadings.length ? { time, stops, shading, glow } : { time, stops };
+    return {
+      time,
+      stops,
+      ...(setup.shadings.length ? { shading, glow } : {}),
+      ...(setup.clip ? { number, ...stages } : {}),
+    };
+  }
+
+  // The rest of a clip's curve is computed while nothing else is asked for, which also makes every
+  // frame quick to reach.
+  function fillCurve() {
+    const sides = visible().filter((side) => curves[side] && !curves[side].isDone);
+    if (!sides.length || filling || waiting || playing || curveFailed || document.hidden) return;
+    filling = true;
+    send({ kind: "curve", ...askedFor(sides) });
   }
 
   function probe() {
@@ -345,6 +385,14 @@ export function mount(parent, send, { store = null, heading = "h2", decode = dec
       opened(message);
     } else if (message.kind === "methods") {
       methodsChanged(message);
+    } else if (message.kind === "curve") {
+      filling = false;
+      for (const [side, { curve }] of Object.entries(message.sides)) mergeCurve(side, curve);
+      drawCurve();
+      fillCurve();
+    } else if (message.kind === "save" && message.reached !== undefined) {
+      showReached(message.reached);
+      savePicture();
     } else if (message.kind === "save") {
       download(new Blob([buffers[0]], { type: "image/png" }), `${message.framebuffer}.png`);
     } else if (message.kind === "settings") {
@@ -362,12 +410,21 @@ export function mount(parent, send, { store = null, heading = "h2", decode = dec
     } else if (message.kind === "frame") {
       // The next one may be rendered while this one is decoded.
       waiting = 0;
+      for (const [side, facts] of Object.entries(message.sides)) {
+        if (setup.clip) mergeCurve(side, facts.curve);
+        if (facts.reached === undefined) reached.delete(side);
+        else reached.set(side, facts.reached);
+        // It is asked for again, until the frames before it are computed.
+        if (facts.reached !== undefined) outdated.add(side);
+      }
       flush();
       await showFrame(message, buffers);
+      fillCurve();
     } else {
       // The error of a requested frame, or of a file.
       if (message.id) waiting = 0;
-      probing = false;
+      probing = filling = false;
+      curveFailed = true;
       pause();
       complaint.textContent = message.error;
     }
@@ -377,7 +434,7 @@ export function mount(parent, send, { store = null, heading = "h2", decode = dec
     const sides = Object.entries(message.sides);
     const pictures = await Promise.all(
       sides.map(([, side]) =>
-        "error" in side
+        "error" in side || "reached" in side
           ? null
           : decode(buffers[side.picture]),
       ),
@@ -397,6 +454,10 @@ export function mount(parent, send, { store = null, heading = "h2", decode = dec
       shown[side]?.picture.close();
       shown[side] = { ...facts, picture: pictures[index] };
     });
+    showMoment();
+    if (reached.size) showReached(Math.min(...reached.values()));
+    // Nothing is new while all of them are waited for.
+    if (sides.every(([, facts]) => "reached" in facts)) return;
     draw();
     nextZoom?.();
     nextZoom = null;
@@ -584,6 +645,10 @@ export function mount(parent, send, { store = null, heading = "h2", decode = dec
     readout.textContent = lines.join("\n") || hint;
   }
 
+  function showReached(frame) {
+    status.textContent = `computing the frames before: ${frame} of ${number}`;
+  }
+
   function fail(text) {
     pause();
     complaint.textContent = text;
@@ -649,6 +714,9 @@ export function mount(parent, send, { store = null, heading = "h2", decode = dec
     if (event.key === "+" || event.key === "=") zoomTo(zoom * 1.5);
     else if (event.key === "-") zoomTo(zoom / 1.5);
     else if (event.key === "0") showWhole();
+    else if (event.key === " " && (setup.clip || setup.animated)) playButton.click();
+    else if (event.key === "," && setup.clip) goToFrame(number - 1);
+    else if (event.key === "." && setup.clip) goToFrame(number + 1);
     else if (event.key in moves && zoom > 1) {
       centre = centre.map((middle, axis) => middle + (0.1 * moves[event.key][axis]) / zoom);
       place();
@@ -712,6 +780,7 @@ export function mount(parent, send, { store = null, heading = "h2", decode = dec
     zoom = 1;
     centre = [0.5, 0.5];
     buildBar();
+    buildTimeline();
     buildFields();
     for (const side of SIDES) outdated.add(side);
     measure();
@@ -789,6 +858,13 @@ export function mount(parent, send, { store = null, heading = "h2", decode = dec
     if (isSourceSize) kept.size = "own";
     if (stops) kept.stops = stops;
     if (time && !playing) kept.time = Number(time.toFixed(3));
+    if (setup.clip) {
+      if (number && !playing) kept.number = number;
+      if (speed !== 1) kept.speed = speed;
+      const begun = Object.entries(setup.clip.stages);
+      const changed = begun.filter(([name, stage]) => stages[name] !== stage.begun);
+      if (changed.length) kept.stages = Object.fromEntries(changed.map(([name]) => [name, stages[name]]));
+    }
     if (shading !== setup.shading) kept.shading = shading;
     if (glow !== setup.glow) kept.glow = glow;
     if (setup.expand && SIDES.some((side) => expand[side] !== setup.expand[side])) kept.expand = expand;
@@ -825,6 +901,12 @@ export function mount(parent, send, { store = null, heading = "h2", decode = dec
     isSourceSize = kept.size === "own";
     stops = clamp(numberOf(kept.stops, 0), -16, 16);
     time = clamp(numberOf(kept.time, 0), 0, 1);
+    number = clamp(Math.round(numberOf(kept.number, 0)), 0, (setup.clip?.times.length ?? 1) - 1);
+    speed = SPEEDS.includes(kept.speed) ? kept.speed : 1;
+    for (const [name, stage] of Object.entries(setup.clip?.stages ?? {})) {
+      const value = kept.stages?.[name];
+      stages[name] = value === null || stage.choices.includes(value) ? value : stage.begun;
+    }
     shading = setup.shadings.includes(kept.shading) ? kept.shading : setup.shading;
     glow = setup.glow === null ? null : Math.max(0, numberOf(kept.glow, setup.glow));
     expand = { a: null, b: null, ...setup.expand };
@@ -838,6 +920,7 @@ export function mount(parent, send, { store = null, heading = "h2", decode = dec
     pause();
     timeSlider.value = time;
     buildBar();
+    buildTimeline();
     buildHead();
     buildFields();
     if (shown.a) draw();
@@ -857,16 +940,19 @@ export function mount(parent, send, { store = null, heading = "h2", decode = dec
   timeSlider.ariaLabel = "time, in turns";
   const playButton = make("button", { type: "button", className: "vkb-play", textContent: "Play" });
 
-  function goTo(moment) {
-    time = moment;
-    timeSlider.value = moment;
+  function goTo(turns) {
+    time = turns;
+    timeSlider.value = turns;
     request(...visible());
   }
   function play() {
     let before = performance.now();
+    moment = setup.clip?.times[number] ?? 0;
     const step = (now) => {
-      goTo((time + (Math.max(0, now - before) / 1e3) * TURNS_PER_SECOND) % 1);
+      const seconds = Math.max(0, now - before) / 1e3;
       before = now;
+      if (setup.clip) playOn(seconds * speed);
+      else goTo((time + seconds * TURNS_PER_SECOND) % 1);
       playing = requestAnimationFrame(step);
     };
     playing = requestAnimationFrame(step);
@@ -882,7 +968,184 @@ export function mount(parent, send, { store = null, heading = "h2", decode = dec
     if (playing) pause();
     else play();
     keep();
+    fillCurve();
   });
+
+  // --- clips ----------------------------------------------------------------------------------
+
+  const frameSlider = make("input", { type: "range", min: 0, step: 1, ariaLabel: "frame" });
+  const momentText = make("span", { className: "vkb-moment" });
+  const curve = draw2d("svg", { class: "vkb-curve", role: "img" });
+  frameSlider.addEventListener("input", () => goToFrame(Number(frameSlider.value)));
+
+  // Time waits for frames that take longer to compute than to show.
+  function playOn(seconds) {
+    const { times } = setup.clip;
+    if (reached.size) return;
+    moment += seconds;
+    const last = times.at(-1);
+    if (moment >= last + (last - (times.at(-2) ?? last - 1))) moment = times[0];
+    let next = times.findLastIndex((one) => one <= moment);
+    if (next < 0) next = 0;
+    if (next !== number) showFrameOf(next);
+  }
+
+  function goToFrame(next) {
+    next = clamp(next, 0, setup.clip.times.length - 1);
+    moment = setup.clip.times[next];
+    if (next !== number) showFrameOf(next);
+  }
+
+  function showFrameOf(next) {
+    number = next;
+    showMoment();
+    request(...visible());
+  }
+
+  function buildTimeline() {
+    timeline.hidden = !setup.clip;
+    if (!setup.clip) return;
+    const { times, stages: known } = setup.clip;
+    frameSlider.max = times.length - 1;
+    const keys = "space plays, comma and full stop step";
+    stage.ariaLabel = `picture: plus and minus zoom, arrows move, 0 fits, ${keys}`;
+    const speeds = choose(SPEEDS.map((one) => [String(one), `× ${one}`]), () => {
+      speed = Number(speeds.value);
+      keep();
+    });
+    speeds.value = String(speed);
+    const pick = (name, text) => {
+      const names = [["", "none"], ...plainly(known[name].choices)];
+      const select = choose(names, () => {
+        stages[name] = select.value || null;
+        request(...SIDES);
+      });
+      select.value = stages[name] ?? "";
+      return make("label", {}, text, select);
+    };
+    timeline.replaceChildren(
+      frameSlider,
+      make(
+        "div",
+        { className: "vkb-bar" },
+        playButton,
+        make("label", {}, "speed ", speeds),
+        momentText,
+        pick("exposure", "exposure of "),
+        pick("taa", "TAA of "),
+      ),
+      curve,
+    );
+    showMoment();
+  }
+
+  // The sides whose curves differ. Those of most exposures do not depend on the bloom.
+  function drawnCurves() {
+    const sides = visible().filter((side) => curves[side]);
+    return sides.filter((side) => side === sides[0] || curves[side].chain !== curves[sides[0]].chain);
+  }
+
+  const signed = (value) => `${value < 0 ? "−" : "+"}${Math.abs(value).toFixed(2)}`;
+
+  // The exposure of a frame in words; "": it is not known.
+  function exposureText(side) {
+    const value = curves[side]?.stops[number];
+    if (value === undefined) return "";
+    return value === null ? "infinite" : `${signed(value)} stops, × ${(2 ** value).toPrecision(3)}`;
+  }
+
+  function showMoment() {
+    if (!setup.clip) return;
+    const { times } = setup.clip;
+    frameSlider.value = number;
+    const place = `${times[number].toFixed(2)} s, frame ${number + 1} of ${times.length}`;
+    const sides = drawnCurves();
+    const exposures = sides
+      .filter((side) => exposureText(side))
+      .map((side) => `${sides.length > 1 ? `${side.toUpperCase()} ` : ""}${exposureText(side)}`);
+    frameSlider.ariaValueText = place;
+    momentText.textContent = [place, ...exposures].join(" · ");
+    drawCurve();
+  }
+
+  function mergeCurve(side, part) {
+    if (!part) {
+      curves[side] = null;
+      return;
+    }
+    const known = curves[side]?.chain === part.chain ? curves[side].stops.slice(0, part.from) : [];
+    curves[side] = { chain: part.chain, stops: known.concat(part.stops), isDone: part.is_done };
+  }
+
+  // The exposure by time, of B dashed; the present frame is marked.
+  function drawCurve() {
+    if (!setup.clip) return;
+    const { times } = setup.clip;
+    const sides = drawnCurves();
+    curve.toggleAttribute("hidden", !sides.length);
+    if (!sides.length || !box[0]) return;
+    const finite = sides.flatMap((side) => curves[side].stops.filter((one) => one !== null));
+    const lowest = finite.reduce((least, one) => Math.min(least, one), Infinity);
+    const highest = finite.reduce((most, one) => Math.max(most, one), -Infinity);
+    const [middle, half] = finite.length
+      ? [(lowest + highest) / 2, Math.max(0.5, (highest - lowest) / 2)]
+      : [0, 0.5];
+    const [width, height] = [seen.clientWidth, CURVE_HEIGHT];
+    const seconds = Math.max(times.at(-1) - times[0], 1e-9);
+    const x = (frame) => CURVE_MARGIN + ((times[frame] - times[0]) / seconds) * (width - 2 * CURVE_MARGIN);
+    const y = (value) => height / 2 - ((value - middle) / half) * (height / 2 - CURVE_LABEL);
+    const line = (values) =>
+      values
+        .map((value, frame) => {
+          if (value === null) return "";
+          const isFirst = (values[frame - 1] ?? null) === null;
+          return `${isFirst ? "M" : "L"}${x(frame).toFixed(1)} ${y(value).toFixed(1)}`;
+        })
+        .join("");
+    const parts = [];
+    if (Math.abs(middle) <= half) {
+      parts.push(draw2d("line", { class: "vkb-zero", x1: 0, x2: width, y1: y(0), y2: y(0) }));
+    }
+    for (const side of sides) {
+      const { stops: values } = curves[side];
+      parts.push(draw2d("path", { class: `vkb-line vkb-line-${side}`, d: line(values) }));
+      const value = values[number];
+      if (value !== undefined && value !== null) {
+        parts.push(draw2d("circle", { cx: x(number), cy: y(value), r: 4 }));
+      }
+    }
+    const now = { class: "vkb-now", x1: x(number), x2: x(number), y1: 0, y2: height };
+    const label = (text, place, anchor) => {
+      parts.push(draw2d("text", { x: anchor === "end" ? width - 2 : 2, y: place, "text-anchor": anchor }, text));
+    };
+    parts.push(draw2d("line", now));
+    if (finite.length) {
+      label(`${signed(highest)} stops`, 12, "start");
+      label(`${signed(lowest)} stops`, height - 4, "start");
+    }
+    label(`${times.at(-1).toFixed(2)} s`, height - 4, "end");
+    curve.setAttribute("viewBox", `0 0 ${width} ${height}`);
+    curve.replaceChildren(...parts);
+    const count = Math.max(...sides.map((side) => curves[side].stops.length));
+    const range = finite.length ? `, from ${signed(lowest)} to ${signed(highest)} stops` : "";
+    const here = sides.map((side) => exposureText(side)).filter(Boolean);
+    curve.ariaLabel =
+      `exposure of ${count} of ${times.length} frames${range}` + (here.length ? `; here ${here.join(" and ")}` : "");
+  }
+
+  // The curve is a place to point at, beside the slider, which keys move.
+  for (const name of ["pointerdown", "pointermove"]) {
+    curve.addEventListener(name, (event) => {
+      if (name === "pointerdown") curve.setPointerCapture(event.pointerId);
+      else if (!curve.hasPointerCapture(event.pointerId)) return;
+      const { times } = setup.clip;
+      const area = curve.getBoundingClientRect();
+      const share = (event.clientX - area.left - CURVE_MARGIN) / (area.width - 2 * CURVE_MARGIN);
+      const at = times[0] + clamp(share, 0, 1) * (times.at(-1) - times[0]);
+      pause();
+      goToFrame(times.findLastIndex((one) => one <= at + 1e-9));
+    });
+  }
 
   // --- controls -------------------------------------------------------------------------------
 
@@ -1021,6 +1284,7 @@ export function mount(parent, send, { store = null, heading = "h2", decode = dec
       request();
       keep();
       showReadout();
+      showMoment();
     });
     compareBox.checked = comparing;
     sideSelect.value = editing;
@@ -1218,6 +1482,7 @@ export function mount(parent, send, { store = null, heading = "h2", decode = dec
     box = next;
     if (kept) zoom = kept / fitting();
     place();
+    drawCurve();
     if (!isSourceSize || !shown.a) {
       request(...visible());
     }

@@ -25,7 +25,8 @@ from numpy.typing import NDArray
 
 from vkbloom._explorer.controls import as_fields, controls
 from vkbloom._explorer.fast_pictures import picture_levels
-from vkbloom._explorer.viewer import Viewer, rows_of
+from vkbloom._explorer.saying import rows_of
+from vkbloom._explorer.viewer import Viewer
 from vkbloom._grid.grid import grid
 from vkbloom._io import image_writing
 from vkbloom._io.picture import Picture

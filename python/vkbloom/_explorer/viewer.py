@@ -11,7 +11,9 @@ frame    sides: settings of "a", "b" or both;          of each side: a picture (
          framebuffer, size, time, stops; at; of a      framebuffer's facts, the plan's passes and
          scene shading, glow; of a photograph          the times of those that ran, settings as
          expand: what "a", "b" are expanded up         code, the expansion, the values under the
-         to, or "auto"                                 pointer; or an error
+         to, or "auto"; of a clip number,              pointer; of a clip its curve, or "reached"
+         exposure, taa, curve                          if it has to be asked again; or an error
+curve    as of frame                                   of each side the curve, which has grown
 probe    at: the pointer's place, 0..1 across, down    of each side: pixel and values
 open     name; the content of a file as a buffer       source, and the settings to begin with
 save     settings; expand of them; else as of frame    a picture of the source's own size, which
@@ -20,6 +22,10 @@ methods                                                the custom methods whose 
                                                        setup, and the errors of their files
 ======== ============================================= =========================================
 
+A frame of a clip is reached when those before it are computed. A curve has the exposures of frames
+that the page does not know: its message has of each side the chain of states that it knows, and how
+many of its exposures.
+
 ``view`` and ``id`` are returned as they were sent. A page asks for its next frame when it has
 received the one before. Of the changes in between, only the newest one is rendered.
 """
@@ -27,30 +33,36 @@ received the one before. Of the changes in between, only the newest one is rende
 from __future__ import annotations
 
 import dataclasses
-import math
-import os
-import tempfile
 from collections.abc import Callable, Mapping, Sequence
-from functools import partial
-from pathlib import Path, PurePath
-from typing import TYPE_CHECKING, Any, Final
+from pathlib import PurePath
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom import _core
-from vkbloom._custom.method import CustomType, read_again, register
 from vkbloom._explorer.controls import (
+    as_code,
     as_fields,
     code_with_image,
     controls,
     describe,
     settings_from,
 )
+from vkbloom._explorer.custom_files import CustomFiles, current
 from vkbloom._explorer.fast_pictures import picture_levels, picture_of
+from vkbloom._explorer.playing import PATIENCE, STATES, Chain, Chains, Clip, NotReached, Stages
+from vkbloom._explorer.saying import (
+    describe_error,
+    finite,
+    note_of,
+    position,
+    probe,
+    read_opened,
+    rows_of,
+)
 from vkbloom._image_arguments import check_image
 from vkbloom._io.expansion import check_expansion
-from vkbloom._io.image_file import read_picture
 from vkbloom._io.image_writing import levels_of
 from vkbloom._io.picture import Highlights, Picture
 from vkbloom._numbers import check_number, check_size
@@ -59,8 +71,6 @@ from vkbloom._renderer.added_light import added_share, faint_note
 from vkbloom._renderer.frame_files import settings_facts
 from vkbloom._renderer.renderer import Renderer
 from vkbloom._scene import Scene
-from vkbloom._settings.fields import fields_of
-from vkbloom._settings.registry import METHODS
 from vkbloom._settings.settings import SHADINGS, check_settings, check_shading
 from vkbloom._views.pictures import png, reduce
 
@@ -91,11 +101,42 @@ _DEVELOPED: Final = {"tonemap": "aces", "encoding": "srgb"}
 Answer = tuple[dict[str, Any], list[bytes]]
 
 
+class _Shot(NamedTuple):
+    """What a frame of one side is made of.
+
+    - `time`: Of a scene, in periods of its animation.
+    - `number`: Of a frame of a clip. `stages`: those of a clip in time.
+    """
+
+    settings: Settings
+    expand: float | None
+    size: tuple[int, int]
+    time: float
+    number: int = 0
+    stages: Stages = Stages()
+
+
+class _Drawn(NamedTuple):
+    """A framebuffer, its picture, the names of all, the plan, and the states of a clip."""
+
+    frames: Frames
+    picture: bytes
+    names: list[str]
+    plan: Plan
+    chain: Chain | None
+
+
+def default_scene() -> Scene:
+    """Return the scene that is shown if there is no other source."""
+    return dataclasses.replace(Scene.ufo(), glow_intensity=GLOW)
+
+
 class Viewer:
     """A source and the settings of both sides.
 
     Arguments are those of `vkbloom.explore`; of an image file the source is its decoded picture,
     and there are the file and what its highlights are expanded up to (None: as the settings say).
+    Of a clip, which no other viewer reads, the source is the first frame, or the scene.
 
     - `name`: That of the image file.
     - `settings`, `expand`, `frames`: The latest ones of the sides "a" and "b".
@@ -112,11 +153,13 @@ class Viewer:
         renderer: Renderer | None = None,
         file: str = "",
         expand: float | None = None,
+        clip: Clip | None = None,
     ) -> None:
         if source is None:
-            source = dataclasses.replace(Scene.ufo(), glow_intensity=GLOW)
+            source = default_scene()
         self._shading: Shading = check_shading(shading)
         self._file, self.name = file, PurePath(file).name
+        self._clip, self._chains = clip, Chains()
         self._picture = source if isinstance(source, Picture) else None
         self._scene = source if isinstance(source, Scene) else None
         self.settings: dict[str, Settings] = {}
@@ -140,7 +183,9 @@ class Viewer:
         self._shown: dict[object, dict[str, NDArray[Any]]] = {}
 
     def close(self) -> None:
-        """Close the renderer, unless the caller passed it. May be called twice."""
+        """Close the renderer, unless the caller passed it, and a video. May be called twice."""
+        if self._clip is not None:
+            self._clip.close()
         if self._owned:
             self.renderer.close()
 
@@ -185,6 +230,7 @@ class Viewer:
             "probe": self._probe,
             "open": lambda message: self._open(message, files),
             "save": self._save,
+            "curve": self._extend_curve,
             "methods": self._methods,
         }
         kind = message.get("kind") if isinstance(message, Mapping) else None
@@ -197,7 +243,7 @@ class Viewer:
         try:
             body, buffers = kinds[kind](message)
         except _FAILURES as error:
-            kind, body, buffers = "error", {"error": _describe(error)}, []
+            kind, body, buffers = "error", {"error": describe_error(error)}, []
         return {"kind": kind, **asked, **body}, buffers
 
     def _setup(self, message: Mapping[str, Any]) -> Answer:
@@ -226,7 +272,8 @@ class Viewer:
             "expand": self.expand if can_expand else None,
             "name": self.name,
             "note": f"highlights expanded up to {expand:g}" if can_expand and expand else "",
-            "animated": scene is not None,
+            "animated": scene is not None and self._clip is None,
+            "clip": None if self._clip is None else self._clip.describe(),
             "source_size": self._source_size,
             "shadings": [] if scene is None else list(SHADINGS),
             "shading": self._shading,
@@ -236,9 +283,9 @@ class Viewer:
     def _open(self, message: Mapping[str, Any], files: Sequence[bytes]) -> Answer:
         """Replace the source by an image file."""
         name = PurePath(str(message.get("name", ""))).name
-        picture = _read(name, files)
+        picture = read_opened(name, files)
         check_image(picture.pixels)
-        was_scene, self._scene = self._scene is not None, None
+        was_scene, self._scene, self._clip = self._scene is not None, None, None
         self._picture, self._file, self.name = picture, name, name
         self._shown.clear()
         # With a scene's settings a photograph would be white.
@@ -253,7 +300,12 @@ class Viewer:
     def _save(self, message: Mapping[str, Any]) -> Answer:
         settings = settings_from(message.get("settings"))
         expand = _expansion(message.get("expand", self.expand["a"]))
-        frames, *_ = self._render(settings, expand, self._source_size, message)
+        try:
+            shot = self._shot_of(settings, expand, self._source_size, message)
+            drawn = self._render(shot, message)
+        except NotReached as not_yet:
+            return {"reached": not_yet.number}, []
+        frames = drawn.frames
         (shown,) = frames
         stops = self._read_view(message)[-1]
         if self._scene is None and shown == "final" and stops == 0:
@@ -262,18 +314,12 @@ class Viewer:
         else:
             pixels = picture_levels(frames[shown], shown, encoding=settings.encoding, stops=stops)
         is_expanded = self._highlights is Highlights.CLIPPED
-        facts = settings_facts(settings, (expand or 1.0) if is_expanded else None)
+        facts = settings_facts(settings, (expand or 1.0) if is_expanded else None, frames)
         return {"framebuffer": shown}, [png(np.ascontiguousarray(pixels), texts=facts)]
 
     def _frame(self, message: Mapping[str, Any]) -> Answer:
-        asked = message.get("sides")
-        if not isinstance(asked, Mapping) or not set(asked) <= set(SIDES):
-            raise ValueError(f"sides: {asked!r:.80} are not settings of a or b")
-        size = message.get("size")
-        size = self._source_size if size is None else check_size("size", size)
-        size = (min(size[0], _MAX_SIDE), min(size[1], _MAX_SIDE))
-        self._read_view(message)
-        at = None if message.get("at") is None else _position(message["at"])
+        asked, size = self._asked(message)
+        at = None if message.get("at") is None else position(message["at"])
         arrays = self._arrays_of(message.get("view"))
         sides: dict[str, Any] = {}
         buffers: list[bytes] = []
@@ -283,26 +329,67 @@ class Viewer:
             try:
                 settings = settings_from(asked[side])
                 expand = self._expansion_of(side, settings, message)
-                frames, picture, names, plan = self._render(settings, expand, size, message)
+                shot = self._shot_of(settings, expand, size, message)
+                drawn = self._render(shot, message)
+            except NotReached as not_yet:
+                curve = self._curve_of(not_yet.chain, side, message)
+                sides[side] = {"reached": not_yet.number, **curve}
+                continue
             except _FAILURES as error:
                 # The other side is still shown.
-                sides[side] = {"error": _describe(error)}
+                sides[side] = {"error": describe_error(error)}
                 continue
+            frames = drawn.frames
             self.settings[side], self.frames[side] = settings, frames
             self.expand[side] = expand
             (shown,) = frames
             arrays[side] = frames[shown]
             sides[side] = {
                 **self.describe(frames, shown, expand, size),
-                "names": names,
-                "plan": rows_of(plan),
-                "passes": _finite(frames.timings),
+                "names": drawn.names,
+                "plan": rows_of(drawn.plan),
+                "passes": finite(frames.timings),
                 "picture": len(buffers),
+                **self._curve_of(drawn.chain, side, message),
             }
+            if self._clip is not None:
+                code = self._clip.code(self._file, shot.stages)
+                sides[side]["code"] = f"settings = {as_code(settings)}\n{code}"
             if at is not None:
-                sides[side]["probe"] = _probe(frames[shown], at)
-            buffers.append(picture)
+                sides[side]["probe"] = probe(frames[shown], at)
+            buffers.append(drawn.picture)
         return {"sides": sides}, buffers
+
+    def _asked(self, message: Mapping[str, Any]) -> tuple[Mapping[str, Any], tuple[int, int]]:
+        """Return the settings by side, and the size, that a message asks for."""
+        asked = message.get("sides")
+        if not isinstance(asked, Mapping) or not set(asked) <= set(SIDES):
+            raise ValueError(f"sides: {asked!r:.80} are not settings of a or b")
+        size = message.get("size")
+        size = self._source_size if size is None else check_size("size", size)
+        self._read_view(message)
+        return asked, (min(size[0], _MAX_SIDE), min(size[1], _MAX_SIDE))
+
+    def _extend_curve(self, message: Mapping[str, Any]) -> Answer:
+        asked, size = self._asked(message)
+        sides = {}
+        for side in asked:
+            settings = settings_from(asked[side])
+            expand = self._expansion_of(side, settings, message)
+            chain = self._chain_of(self._shot_of(settings, expand, size, message))
+            if chain is not None:
+                chain.extend(PATIENCE / len(asked))
+                sides[side] = self._curve_of(chain, side, message)
+        return {"sides": sides}, []
+
+    def _curve_of(
+        self, chain: Chain | None, side: str, message: Mapping[str, Any]
+    ) -> dict[str, Any]:
+        """Return the part of a clip's exposure that a page does not know."""
+        known = message.get("curve")
+        if chain is None or not chain.has_exposure:
+            return {}
+        return {"curve": chain.curve(known.get(side) if isinstance(known, Mapping) else None)}
 
     def describe(
         self, frames: Frames, shown: str, expand: float | None, size: tuple[int, int]
@@ -313,7 +400,7 @@ class Viewer:
             "framebuffer": shown,
             "size": [frames[shown].shape[1], frames[shown].shape[0]],
             "dtype": str(frames[shown].dtype),
-            "note": _note_of(settings, shown),
+            "note": note_of(settings, shown),
             "expand": expand,
             "faint": self._faint_note(frames, expand, size) if shown == "final" else "",
             "code": code_with_image(settings, self._file, expand),
@@ -323,14 +410,17 @@ class Viewer:
         self, size: tuple[int, int], settings: Settings, expand: float | None
     ) -> tuple[Any, dict[str, Any]]:
         """Return the scene, or the image at a size, and the arguments of a scene's frame."""
+        return self._source_of(_Shot(settings, expand, size, 0.0))
+
+    def _source_of(self, shot: _Shot) -> tuple[Any, dict[str, Any]]:
         if self._scene is None:
-            return self._image_of(size, settings, expand), {}
-        return self._scene, {"size": size, "shading": self._shading}
+            return self._image_of(shot), {}
+        return self._scene, {"size": shot.size, "shading": self._shading}
 
     def _probe(self, message: Mapping[str, Any]) -> Answer:
-        at = _position(message.get("at"))
+        at = position(message.get("at"))
         arrays = self._arrays_of(message.get("view"))
-        return {"sides": {side: {"probe": _probe(arrays[side], at)} for side in arrays}}, []
+        return {"sides": {side: {"probe": probe(arrays[side], at)} for side in arrays}}, []
 
     def _read_view(self, message: Mapping[str, Any]) -> tuple[float, Shading, float, float]:
         """Return time, shading, glow and stops of a message; missing ones stay as they are."""
@@ -360,50 +450,103 @@ class Viewer:
     def _faint_note(self, frames: Frames, expand: float | None, size: tuple[int, int]) -> str:
         """Return what a page says of a bloom that adds hardly any light to an image; else ""."""
         settings = frames.settings
-        if self._scene is not None or "final" not in frames or not settings.bloom:
+        # (An exposure changes the picture's light as well.)
+        is_other = self._scene is not None or self._clip is not None
+        if is_other or "final" not in frames or not settings.bloom:
             return ""
-        image = self._image_of(size, settings, expand)
+        image = self._image_of(_Shot(settings, expand, size, 0.0))
         share = added_share(image, frames)
         return faint_note(share, settings, highlights=self._highlights, expand=expand)
 
-    def _render(
+    def _shot_of(
         self,
         settings: Settings,
         expand: float | None,
         size: tuple[int, int],
         message: Mapping[str, Any],
-    ) -> tuple[Frames, bytes, list[str], Plan]:
-        """Return the named framebuffer, or `final`; its picture; all names; its plan."""
-        name = message.get("framebuffer", "final")
-        time, self._shading, glow, stops = self._read_view(message)
-        draw: Any = self.renderer.apply
-        if self._scene is not None:
-            if glow != self._scene.glow_intensity:
-                self._scene = dataclasses.replace(self._scene, glow_intensity=glow)
-            draw = partial(self.renderer.render, time=time)
-        source, how = self.source_at(size, settings, expand)
+    ) -> _Shot:
+        """Return what a message asks for; a scene gets its shading and glow."""
+        time, self._shading, glow, _ = self._read_view(message)
+        if self._scene is not None and glow != self._scene.glow_intensity:
+            self._scene = dataclasses.replace(self._scene, glow_intensity=glow)
+        shot = _Shot(settings, expand, size, time)
+        if self._clip is None:
+            return shot
+        return shot._replace(number=self._clip.number(message), stages=self._clip.stages(message))
+
+    def _render(self, shot: _Shot, message: Mapping[str, Any]) -> _Drawn:
+        """Return the named framebuffer, or `final`; raise NotReached for a frame of a clip."""
+        name, settings = message.get("framebuffer", "final"), shot.settings
+        stops = self._read_view(message)[-1]
+        chain = self._chain_of(shot)
+        state = None if chain is None else chain.state(shot.number, PATIENCE)
+        source, how = self._source_of(shot)
+        how |= shot.stages.keywords()
         names = list(self.renderer.plan(source, settings, **how).framebuffers)
         shown = str(name) if name in names else "final"
-        how["framebuffers"] = [shown]
-        plan = self.renderer.plan(source, settings, **how)
-        frames = draw(source, settings, **how)
+        plan = self.renderer.plan(source, settings, **how, framebuffers=[shown])
+        frames = self._draw(shot, [shown], state)
+        if chain is not None and shown == "final":
+            # What it leaves to the next frame is complete.
+            chain.advance(shot.number, frames)
         picture = picture_of(frames[shown], shown, encoding=settings.encoding, stops=stops)
-        return frames, picture, names, plan
+        return _Drawn(frames, picture, names, plan, chain)
+
+    def _draw(
+        self, shot: _Shot, names: Sequence[str], state: Mapping[str, Any] | None = None
+    ) -> Frames:
+        """Return framebuffers; of a clip, as a sequence computes this frame."""
+        source, how = self._source_of(shot)
+        settings, time = shot.settings, shot.time
+        if self._clip is not None:
+            settings = settings._in_sequence(shot.number, {})
+            time = self._clip.turns(shot.number)
+            how |= {"dt": self._clip.step(shot.number), "state": state}
+        how |= {**shot.stages.keywords(), "framebuffers": names}
+        if self._scene is None:
+            return self.renderer.apply(source, settings, **how)
+        return self.renderer.render(source, settings, time=time, **how)
+
+    def _chain_of(self, shot: _Shot) -> Chain | None:
+        """Return the states of a clip's frames; None: a frame does not depend on those before."""
+        clip, settings, stages = self._clip, shot.settings, shot.stages
+        if clip is None or not stages.continues(settings):
+            return None
+        needed = settings if stages.needs_bloom(settings) else None
+        glow = None if self._scene is None else self._scene.glow_intensity
+        key = self._key_of(settings, shot.expand), shot.size, stages, needed, self._shading, glow
+
+        def compute(number: int, state: Mapping[str, Any]) -> Frames:
+            frame = shot._replace(number=number)
+            names = ["final"]
+            if not settings._continues:
+                source, how = self._source_of(frame)
+                how |= stages.keywords()
+                known = self.renderer.plan(source, settings, **how).framebuffers
+                names = [name for name in STATES if name in known]
+            return self._draw(frame, names, state)
+
+        has_exposure = stages.exposure is not None
+        return self._chains.find(key, lambda: Chain(compute, clip.count, has_exposure=has_exposure))
 
     def _key_of(self, settings: Settings, expand: float | None) -> object:
         """Return what the pixels of the image depend on."""
         return None if self._picture is None else (expand or 1.0, settings.alpha != "keep")
 
-    def _image_of(
-        self, size: tuple[int, int], settings: Settings, expand: float | None
-    ) -> NDArray[Any]:
+    def _image_of(self, shot: _Shot) -> NDArray[Any]:
         """Return the image at the size at which it is shown, as it starts with the settings."""
-        key = self._key_of(settings, expand)
+        clip, size = self._clip, shot.size
+        key = self._key_of(shot.settings, shot.expand)
 
         def whole() -> NDArray[Any]:
-            assert self._picture is not None  # An array is always kept.
-            return Start(settings, expand).develop(self._picture).pixels
+            picture = self._picture if clip is None else clip.decoded(shot.number)
+            if not isinstance(picture, Picture):
+                # (Of a still, an array is always kept.)
+                return check_image(picture)
+            return Start(shot.settings, shot.expand).develop(picture).pixels
 
+        if clip is not None:
+            return clip.image((shot.number, size, key), lambda: reduce(whole(), size))
         return self._remember((size, key), lambda: reduce(self._remember(key, whole), size))
 
     def _remember(self, key: object, make: Callable[[], NDArray[Any]]) -> NDArray[Any]:
@@ -423,125 +566,6 @@ class Viewer:
         return arrays
 
 
-def _read(name: str, files: Sequence[bytes]) -> Picture:
-    """Return the picture of a file."""
-    if len(files) != 1:
-        raise ValueError("open: the message does not have the content of one file")
-    with tempfile.TemporaryDirectory() as folder:
-        # The file name may be anything. Only its extension is used, for the format.
-        path = Path(folder, f"image{PurePath(name).suffix[:8]}")
-        path.write_bytes(files[0])
-        try:
-            return read_picture(path)
-        except (OSError, ValueError) as error:
-            text = str(error).replace(str(path), name)
-            raise ValueError(text if name in text else f"{name}: {text}") from error
-
-
 def _expansion(asked: Any) -> float | None:
     """Return what a page asks to expand highlights up to."""
     return None if asked is None else check_expansion(asked)
-
-
-def _note_of(settings: Settings, shown: str) -> str:
-    """Return what a page says of a framebuffer that is not what its name or its colours tell."""
-    if shown == "glow":
-        return settings.glow_note and f"glow is {settings.glow_note}"
-    if shown == "kernel" and not METHODS.is_added(settings.method):
-        return "kernel is the point-spread function, which no pass writes: it is computed once"
-    if shown != "final" or settings.encoding not in ("pq", "hlg"):
-        return ""
-    return f"this page shows SDR: final's {settings.encoding} signal is shown as sRGB"
-
-
-def rows_of(plan: Plan) -> list[dict[str, Any]]:
-    """Return what a page says of the passes of a plan."""
-    return [{**one._asdict(), "sentence": plan.sentences[one.name]} for one in plan.passes]
-
-
-def _finite(timings: Mapping[str, float]) -> dict[str, float]:
-    """Return the times that are finite, which JSON requires."""
-    return {name: seconds for name, seconds in timings.items() if math.isfinite(seconds)}
-
-
-def _describe(error: BaseException) -> str:
-    return str(error) or type(error).__name__
-
-
-def _position(at: object) -> tuple[float, float]:
-    if not (isinstance(at, list | tuple) and len(at) == 2):
-        raise TypeError(f"at: {at!r:.80} is not (x, y)")
-    for part in at:
-        check_number("at", part, 0, 1)
-    return float(at[0]), float(at[1])
-
-
-def _probe(array: NDArray[Any], at: tuple[float, float]) -> dict[str, Any]:
-    height, width = array.shape[:2]
-    # A position of 1 is the far edge of the last pixel.
-    x, y = min(int(at[0] * width), width - 1), min(int(at[1] * height), height - 1)
-    number = int if array.dtype.kind == "u" else float
-    # NumPy's text of a value has the digits that tell it apart from others of its dtype.
-    values = [str(number(str(value))) for value in np.atleast_1d(array[y, x])]
-    return {"x": x, "y": y, "values": values}
-
-
-class CustomFiles:
-    """The custom methods that a page knows, and the errors of their files."""
-
-    def __init__(self) -> None:
-        self._known = {name: METHODS[name] for name in METHODS if METHODS.is_added(name)}
-        self._read: dict[str, tuple[tuple[int, int], ...]] = {}
-        self._errors: dict[str, str] = {}
-
-    def __bool__(self) -> bool:
-        return bool(self._known)
-
-    def changes(self) -> tuple[dict[str, type[Settings]], dict[str, str]]:
-        """Load changed files again.
-
-        Returns: the classes that are new since the last call, and the errors of all files that do
-        not load, by the names of the methods. A method whose file does not load stays as it was.
-        """
-        new: dict[str, type[Settings]] = {}
-        for name in self._known:
-            self._load(name)
-            if name in METHODS and METHODS[name] is not self._known[name]:
-                new[name] = self._known[name] = METHODS[name]
-        return new, self._errors
-
-    def _load(self, name: str) -> None:
-        """Load a method's file again if it is another than before."""
-        kind = METHODS.get(name)
-        if not isinstance(kind, CustomType) or not kind.file.source.files:
-            return
-        try:
-            results = [os.stat(file) for file in kind.file.source.files]
-            stamp = tuple((result.st_mtime_ns, result.st_size) for result in results)
-            if self._read.get(name) == stamp:
-                return
-            self._read[name] = stamp
-            source = read_again(kind.file.source)
-            if source != kind.file.source:
-                register(name, source, kind.numpy_reference)
-            self._errors.pop(name, None)
-        except (_core.Error, OSError, ValueError) as error:
-            self._errors[name] = str(error)
-
-
-def current(settings: Settings) -> Settings:
-    """Return settings of a custom method as those of the class that is loaded now.
-
-    Fields that the class does not have, or whose values it does not accept, are its defaults.
-    """
-    kind = METHODS.get(settings.method)
-    if kind is None or isinstance(settings, kind):
-        return settings
-    begun: Settings = kind()
-    for name in fields_of(kind):
-        if hasattr(settings, name):
-            try:
-                begun = begun.replace(**{name: getattr(settings, name)})
-            except (TypeError, ValueError):
-                continue
-    return begun

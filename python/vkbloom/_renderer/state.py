@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -70,6 +71,14 @@ class State(Mapping[str, "NDArray[Any]"]):
 
     def __len__(self) -> int:
         return len(self._images)
+
+    @property
+    def nbytes(self) -> int:
+        """The bytes of all images, on the host or on the device."""
+        return sum(
+            math.prod(image.shape) * np.dtype(image.dtype).itemsize
+            for image in self._images.values()
+        )
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, State):

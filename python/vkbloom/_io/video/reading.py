@@ -42,11 +42,13 @@ EXTENSIONS: Final = frozenset(
         *(".mts", ".mxf", ".nut", ".ogv", ".ts", ".webm", ".wmv", ".y4m"),
     )
 )
-# Containers whose headers state how long they are.
+# Containers whose headers state how long they are, and which have an index of their frames.
 _WITH_DURATION: Final = ("mov,mp4,m4a,3gp,3g2,mj2", "matroska,webm")
 # Of the stated duration: how many of the last frame's durations, and seconds, may be missing.
 _MISSING_FRAMES, _MISSING_SECONDS = 0.9, 0.002
 _MICROSECONDS: Final = 1_000_000
+# The longest time between the places of a frame in the file and on the screen.
+_REORDERED_SECONDS: Final = 1.0
 # FFmpeg's code points: of AVColorRange full; of side data, 9 numbers of 32 bits.
 _FULL: Final = 2
 _MAX_BITS: Final = 16
@@ -167,6 +169,19 @@ class VideoFile:
                 for packet in self._container.demux(self._stream)
                 if packet.pts is not None
             )
+
+    def seek(self, time: float) -> None:
+        """Let `frames` begin at a frame from which that of a time can be decoded.
+
+        Where the container's index is wrong it begins later: who needs a frame looks at the time
+        of the first one. A container without an index stays at its begin.
+        """
+        if self._container.format.name not in _WITH_DURATION:
+            return
+        # Frames are in the file in another order than they are shown.
+        place = max(0.0, time - _REORDERED_SECONDS)
+        with naming(self._name):
+            self._container.seek(int(place / float(self.time_base)), stream=self._stream)
 
     def frames(self) -> Generator[VideoPicture, None, None]:
         """Yield the frames; ValueError where the file is damaged or ends too early."""
