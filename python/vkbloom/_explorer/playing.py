@@ -301,12 +301,15 @@ class Chain:
 
     def advance(self, number: int, frames: Frames) -> State:
         """Keep what a frame has left, and its exposure; return the state."""
-        if number == len(self.stops):
-            # (This also reads the state of an exposure from the device.)
-            stops = frames.exposure - frames.settings.exposure
-            self.stops.append(stops if math.isfinite(stops) else None)
         state = frames.state
         assert isinstance(state, State)
+        if self.has_exposure:
+            # What is read here does not stay on the device.
+            stops = frames.exposure - frames.settings.exposure
+            if number == len(self.stops):
+                self.stops.append(stops if math.isfinite(stops) else None)
+            if "exposure" in frames:
+                state = state.replace("exposure", frames["exposure"])
         number += 1
         if number % self._spacing == 0:
             self._states[number] = state

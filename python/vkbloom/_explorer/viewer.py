@@ -512,6 +512,11 @@ class Viewer:
         clip, settings, stages = self._clip, shot.settings, shot.stages
         if clip is None or not stages.continues(settings):
             return None
+        if getattr(settings, "_has_state", False):
+            raise ValueError(
+                f"method: {settings.method} has a storage, which cannot be kept for each frame; "
+                "vkbloom.sequence computes its frames one after the other"
+            )
         needed = settings if stages.needs_bloom(settings) else None
         glow = None if self._scene is None else self._scene.glow_intensity
         key = self._key_of(settings, shot.expand), shot.size, stages, needed, self._shading, glow

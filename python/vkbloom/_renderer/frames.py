@@ -154,7 +154,8 @@ class Frames(Framebuffers):
         stops = self._settings.exposure
         if not self._is_exposed:
             return stops
-        adapted = self._state["exposure"] if "exposure" in self._state else self["exposure"]
+        # (That of the state is on the device.)
+        adapted = self["exposure"] if "exposure" in self._arrays else self._state["exposure"]
         before, after = np.asarray(adapted, np.float64)[0, 0, 1:3]
         with np.errstate(divide="ignore"):
             return stops + float(np.log2(before) + np.log2(after))
