@@ -171,16 +171,16 @@ def test_files_are_reduced_and_gaps_are_time(
     for number, image in zip((1, 2, 5), images[2:], strict=False):
         vkbloom.write(tmp_path / f"f.{number:02d}.exr", image)
     pattern = str(tmp_path / "f.%02d.exr")
-    viewer = play(pattern, renderer, fps=10, exposure="godot")
+    viewer = play(pattern, renderer, fps=10, exposure="bevy")
     answer, _ = ask(viewer, kind="setup")
     assert answer["clip"]["times"] == [0, 0.1, 0.4]
-    assert answer["clip"]["stages"]["exposure"]["begun"] == "godot"
+    assert answer["clip"]["stages"]["exposure"]["begun"] == "bevy"
     assert answer["clip"]["stages"]["taa"]["begun"] is None
     assert (answer["animated"], answer["source_size"]) == (False, [32, 18])
     facts = frame(viewer, 2)
-    made = vkbloom.sequence(pattern, fps=10, gaps="time", exposure="godot", renderer=renderer)
+    made = vkbloom.sequence(pattern, fps=10, gaps="time", exposure="bevy", renderer=renderer)
     assert np.array_equal(viewer.frames["a"]["final"], [*made][2]["final"])
-    assert facts["code"].endswith('.exr", settings, fps=10, exposure="godot")')
+    assert facts["code"].endswith('.exr", settings, fps=10, exposure="bevy")')
     assert frame(viewer, 2, size=[16, 9])["size"] == [16, 9]
     # The picture in its own size holds what its frame continued.
     asked = {"settings": BEGUN.to_dict(), "number": 2, "framebuffer": "final"}
