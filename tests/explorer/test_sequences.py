@@ -228,7 +228,10 @@ def test_a_scene(scene: Scene, renderer: Renderer) -> None:
     viewer = play(scene, renderer, presets["tutorial"], fps=2, taa="bevy", exposure="godot")
     answer, _ = ask(viewer, kind="setup")
     assert len(answer["clip"]["times"]) == 16
-    frame(viewer, 3, presets["tutorial"])
+    code = frame(viewer, 3, presets["tutorial"])["code"]
+    assert code.endswith(
+        '(scene, settings, fps=2, exposure="godot", taa="bevy", shading="deferred")'
+    )
     how: dict[str, Any] = {"size": (48, 27), "shading": "deferred", "renderer": renderer}
     stages: dict[str, Any] = {"taa": "bevy", "exposure": "godot"}
     frames = vkbloom.sequence(scene, "tutorial", fps=2, **stages, **how)

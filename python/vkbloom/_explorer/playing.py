@@ -146,15 +146,22 @@ class Clip:
                 found[name] = begun if asked == self._labels[name] else _STAGES[name].check(asked)
         return Stages(**found)
 
-    def code(self, file: str, stages: Stages) -> str:
-        """Return Python code of its frames; `file`: the pattern or the video, "": it is none."""
-        words = [json.dumps(file) if file else "images", "settings"]
+    def code(self, file: str, stages: Stages, shading: str) -> str:
+        """Return Python code of its frames.
+
+        - `file`: The pattern or the video; "": there are arrays.
+        - `shading`: Of a scene.
+        """
+        source = "scene" if self.is_scene else json.dumps(file) if file else "images"
+        words = [source, "settings"]
         if self._clock.rate is not None:
             words.append(f"fps={self._clock.rate:.10g}")
         for name, stage in stages.keywords().items():
             label = _label_of(name, stage)
             is_preset = label in _STAGES[name].presets
             words.append(f'{name}="{label}"' if is_preset else f"{name}=vkbloom.{stage!r}")
+        if self.is_scene:
+            words.append(f'shading="{shading}"')
         return f"frames = vkbloom.sequence({', '.join(words)})"
 
     def step(self, number: int) -> float | None:

