@@ -9,6 +9,7 @@ from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
 from collections.abc import Sequence as AnySequence
 from contextlib import ExitStack, closing, suppress
+from fractions import Fraction
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple, TypeAlias
 
@@ -38,6 +39,8 @@ if TYPE_CHECKING:
 
 #: The seconds in which the animation of a scene runs once, as in a window.
 TURN_SECONDS: Final = 8.0
+#: Frames per second of images where a program gives none.
+DEFAULT_RATE: Final = Fraction(24)
 # Frames of a video before this one are decoded from the begin on.
 _MIN_SOUGHT: Final = 24
 

@@ -257,7 +257,17 @@ def test_what_is_wrong_is_said(
     assert error in (answer.get("error") or answer["sides"]["a"]["error"])
 
 
-def test_only_sequences_have_stages(images: Any, scene: Scene, tmp_path: Path) -> None:
+def test_in_a_notebook(images: Any, renderer: Renderer) -> None:
+    pytest.importorskip("anywidget")
+    explorer = vkbloom.explore(np.stack(images), BEGUN, exposure="bevy", renderer=renderer)
+    message = {"kind": "frame", "sides": {"a": BEGUN.to_dict()}, "number": 4}
+    explorer._handle_custom_msg(message, [])
+    made = vkbloom.sequence(images, BEGUN, fps=24, exposure="bevy", renderer=renderer)
+    assert explorer.frames is not None
+    assert np.array_equal(explorer.frames["final"], [*made][4]["final"])
+
+
+def test_only_sequences_have_stages(images: Any, tmp_path: Path) -> None:
     pytest.importorskip("anywidget")
     with pytest.raises(ValueError, match=r"exposure: only a sequence has it"):
         vkbloom.explore(images[0], exposure="bevy")

@@ -50,6 +50,7 @@ from vkbloom._renderer.frame_files import settings_facts
 from vkbloom._renderer.frames import Frames
 from vkbloom._renderer.interruptible import open_renderer
 from vkbloom._renderer.renderer import Renderer
+from vkbloom._sequence import DEFAULT_RATE
 from vkbloom._settings.settings import Settings
 
 #: From an image to its mask and emission.
@@ -442,9 +443,7 @@ def command(*, sources: tuple[str, ...], out: str | None, adapter: str, **given:
             several=several,
             kept=_find_protected_files(options, work),
             is_careful=not (several or out is not None or options.overwrite),
-            steps=TimeSteps(
-                options.start.stages, by_target, float(options.fps or videos.DEFAULT_RATE)
-            ),
+            steps=TimeSteps(options.start.stages, by_target, float(options.fps or DEFAULT_RATE)),
         )
         run.sequence(work)
     written = [target for name, target in work if name not in run.failures]

@@ -46,6 +46,7 @@ from vkbloom._renderer.interruptible import open_renderer
 from vkbloom._renderer.renderer import Renderer
 from vkbloom._renderer.surface import Surface
 from vkbloom._scene import Scene
+from vkbloom._sequence import TURN_SECONDS
 from vkbloom._settings.settings import SHADINGS, Settings, Shading, presets
 
 #: Options of a scene, by the names of their parameters.
@@ -58,7 +59,6 @@ Space          pauses the animation
 Q, Escape      close\
 """
 _STORED: Final = (640, 640)  # what the frames of a page of stored pictures fit into
-_TURN_SECONDS: Final = 8.0
 _MAX_WINDOW: Final = (1600, 900)  # size of a window for an image
 _TITLE_SECONDS: Final = 0.5  # between updates of the title
 _WAIT_SECONDS: Final = 0.1  # while the window is hidden
@@ -211,7 +211,7 @@ class Live:
     def advance(self, seconds: float) -> None:
         """Let time pass."""
         if not self.paused:
-            self.time = (self.time + seconds / _TURN_SECONDS) % 1.0
+            self.time = (self.time + seconds / TURN_SECONDS) % 1.0
 
     def title(self, seconds: float) -> str:
         """Return the text of the title; `seconds` is the time of a frame."""

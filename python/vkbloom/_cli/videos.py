@@ -41,7 +41,7 @@ from vkbloom._renderer.frame_files import settings_facts
 from vkbloom._renderer.frames import Frames
 from vkbloom._renderer.interruptible import open_renderer
 from vkbloom._renderer.renderer import Renderer
-from vkbloom._sequence import Clock, Input, Sequence, Taken, work_of_images
+from vkbloom._sequence import DEFAULT_RATE, Clock, Input, Sequence, Taken, work_of_images
 from vkbloom._settings.settings import Settings
 
 if TYPE_CHECKING:
@@ -49,8 +49,6 @@ if TYPE_CHECKING:
 else:
     _ParamType = click.ParamType
 
-#: Frames per second of images.
-DEFAULT_RATE: Final = Fraction(24)
 _MAX_DENOMINATOR: Final = 1001 * 1000
 _RATE: Final = re.compile(r"[0-9]+(\.[0-9]+|/[0-9]+)?\Z")
 

@@ -10,6 +10,8 @@ const NARROW = 720; // CSS pixels, as in page.css
 const WATCH = 200; // milliseconds between two looks at the files of custom methods
 const MAX_ZOOM = 64; // device pixels of a framebuffer's pixel
 const SIDES = ["a", "b"];
+const KEYS = "picture: plus and minus zoom, arrows move, 0 fits";
+const KEYS_OF_CLIP = `${KEYS}, space plays, comma and full stop step`;
 const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4];
 const CURVE_HEIGHT = 92; // of the exposure of a clip, in CSS pixels
 const CURVE_LABEL = 18; // above and below it
@@ -235,7 +237,7 @@ export function mount(parent, send, { store = null, heading = "h2", decode = dec
       className: "vkb-stage",
       tabIndex: 0,
       role: "group",
-      ariaLabel: "picture: plus and minus zoom, arrows move, 0 fits",
+      ariaLabel: KEYS,
     },
     canvas,
     divider,
@@ -361,6 +363,7 @@ export function mount(parent, send, { store = null, heading = "h2", decode = dec
   // The rest of a clip's curve is computed while nothing else is asked for, which also makes every
   // frame quick to reach.
   function fillCurve() {
+    if (!setup?.clip) return;
     const sides = visible().filter((side) => curves[side] && !curves[side].isDone);
     if (!sides.length || filling || waiting || playing || curveFailed || document.hidden) return;
     filling = true;
@@ -1004,11 +1007,10 @@ export function mount(parent, send, { store = null, heading = "h2", decode = dec
 
   function buildTimeline() {
     timeline.hidden = !setup.clip;
+    stage.ariaLabel = setup.clip ? KEYS_OF_CLIP : KEYS;
     if (!setup.clip) return;
     const { times, stages: known } = setup.clip;
     frameSlider.max = times.length - 1;
-    const keys = "space plays, comma and full stop step";
-    stage.ariaLabel = `picture: plus and minus zoom, arrows move, 0 fits, ${keys}`;
     const speeds = choose(SPEEDS.map((one) => [String(one), `× ${one}`]), () => {
       speed = Number(speeds.value);
       keep();
@@ -1487,6 +1489,7 @@ export function mount(parent, send, { store = null, heading = "h2", decode = dec
       request(...visible());
     }
   }
+  document.addEventListener("visibilitychange", fillCurve);
   const observer = new ResizeObserver(measure);
   observer.observe(seen);
 
@@ -1500,6 +1503,7 @@ export function mount(parent, send, { store = null, heading = "h2", decode = dec
       pause();
       clearTimeout(watching);
       observer.disconnect();
+      document.removeEventListener("visibilitychange", fillCurve);
       root.remove();
     },
   };

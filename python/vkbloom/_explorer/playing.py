@@ -24,7 +24,7 @@ from vkbloom._io.video.reading import is_video
 from vkbloom._numbers import check_above, check_index
 from vkbloom._renderer.state import State
 from vkbloom._scene import Scene
-from vkbloom._sequence import TURN_SECONDS, Clock, Input, Taken, moment_of, open_input
+from vkbloom._sequence import DEFAULT_RATE, TURN_SECONDS, Clock, Input, Taken, moment_of, open_input
 from vkbloom._settings.antialiasing import Antialiasing, antialiasing, check_antialiasing
 from vkbloom._settings.exposure import Exposure, check_exposure, exposures
 
@@ -33,8 +33,6 @@ if TYPE_CHECKING:
     from vkbloom._renderer.frames import Frames
     from vkbloom._settings.settings import Settings
 
-#: Frames per second where a call gives none, as of `vkbloom apply`.
-DEFAULT_RATE: Final = 24.0
 #: The framebuffers that have what stages in time leave to the next frame.
 STATES: Final = ("exposure", "history", "history_motion")
 #: What is wrong with a stage in time, or a rate, of a still.
@@ -376,7 +374,9 @@ def open_clip(
                 raise ValueError(f"{name}: {ONLY_OF_SEQUENCES}")
         return None
     has_times = is_file and is_video(source)
-    rate = check_above("fps", fps) if fps is not None else None if has_times else DEFAULT_RATE
+    rate = (
+        check_above("fps", fps) if fps is not None else None if has_times else float(DEFAULT_RATE)
+    )
     clock = Clock(rate, None)
     reading = open_input(source, clock, read_file)
     return Clip(reading, clock, exposure, taa, is_scene=isinstance(source, Scene))
