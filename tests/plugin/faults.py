@@ -7,7 +7,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
+from scipy import ndimage, signal
+
+from vkbloom import psf
 
 Image = NDArray[Any]
 Bloom = Callable[..., Image]
@@ -18,6 +20,7 @@ class Fault(NamedTuple):
 
     - `fault`, `correct`: Make the blooms: some keep a state.
     - `others`: Other laws that the fault breaks and the correct does not; None: they are not told.
+    - `field`: The kernels that the correct one promises.
     """
 
     fault: Callable[[], Bloom]
@@ -25,6 +28,7 @@ class Fault(NamedTuple):
     law: str
     words: str
     others: frozenset[str] | None = None
+    field: psf.Varying | None = None
 
 
 def gaussian(image: Image, sigma: float = 2.0, mode: str = "nearest") -> Image:
@@ -235,6 +239,32 @@ def a_frame_late() -> Bloom:
         shown = image if last is None or last.shape != image.shape else last
         last = image
         return gaussian(shown)
+
+    return bloom
+
+
+def growing(u: float, v: float) -> Image:
+    """A round spot whose width grows to the corner."""
+    square = np.add.outer(np.arange(-6, 7) ** 2, np.arange(-6, 7) ** 2)
+    spot = np.exp(-square / (2 * (1 + u * u + v * v) ** 2))
+    return np.asarray(spot / spot.sum())
+
+
+LENS = psf.Varying(function=growing)
+
+
+def varying(count: int | None = None, *, gathers: bool = False) -> Bloom:
+    """Spread each pixel by the kernel of its place, by all components or so many."""
+
+    def bloom(image: Image) -> Image:
+        # A small picture has weights for each pixel.
+        made, result = LENS.components(image.shape[1::-1]), np.zeros(image.shape)
+        for kernel, own in zip(made.kernels[:count], made.weights, strict=False):
+            weights = own[..., np.newaxis]
+            given = image if gathers else weights * image
+            spread = signal.fftconvolve(given, kernel[..., np.newaxis], "same", axes=(0, 1))
+            result += weights * spread if gathers else spread
+        return result
 
     return bloom
 
@@ -505,6 +535,12 @@ FAULTS: dict[str, Fault] = {
     ),
     "no light on colours above 1": of_composite(
         lambda a, light: a + light * (a <= 1), "on backdrops of 0.99 and 1.01"
+    ),
+    "too few components of a field": Fault(
+        lambda: varying(2), varying, "field", "in place of its kernel's", field=LENS
+    ),
+    "each pixel collects by its own kernel": Fault(
+        lambda: varying(gathers=True), varying, "field", "is off by", field=LENS
     ),
     "a frame late": Fault(a_frame_late, lambda: at_present, "history", "and 1 frames are above"),
 }

@@ -72,7 +72,7 @@ def broken_by(bloom: Bloom) -> set[str]:
 
 @pytest.mark.parametrize("name", TOLD)
 def test_a_fault_is_named(name: str) -> None:
-    fault, correct, law, _, others = FAULTS[name]
+    fault, correct, law, _, others, _ = FAULTS[name]
     found = testing.report(fault(), size=(64, 64))
     new = set(list_broken(found)) - broken_by(correct())
     # Some of these functions mix alpha with colours, too.

@@ -81,7 +81,7 @@ OF_FLOATS = {"rings beside an edge", "takes light from bright pixels"}
 @LESS
 @pytest.mark.parametrize("name", [name for name in TOLD if name not in OF_FLOATS])
 def test_a_fault_is_named_or_cannot_be_tested(name: str, less_input: bool) -> None:
-    fault, correct, law, _, others = FAULTS[name]
+    fault, correct, law, _, others, _ = FAULTS[name]
     laws = {law, *(others or ())}
     found = judge(fault(), less_input=less_input)
     assert not [law for law in laws if row(found, law).held], found

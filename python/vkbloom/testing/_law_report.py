@@ -12,6 +12,7 @@ import numpy as np
 
 from vkbloom._argument_types import check_arguments
 from vkbloom._numbers import check_number
+from vkbloom._psf.varying import Varying
 from vkbloom._public import public
 from vkbloom._settings.exposure import Exposure
 from vkbloom._views import markup
@@ -211,6 +212,7 @@ def report(
     gain: float | None = None,
     picture: Bloom | None = None,
     intensity: float | None = None,
+    field: Varying | None = None,
     probe: Probe | None = None,
 ) -> LawReport:
     """Test a bloom, or an exposure, against every law.
@@ -246,6 +248,9 @@ def report(
     intensity : float, optional
         The factor by which the bloom is added in `picture`, 0 or more. Default: `additive` tests
         only that no light is removed.
+    field : psf.Varying, optional
+        The kernels that lights show at their places, where the bloom promises them: the law
+        `field`.
     probe : Probe, optional
         Replaces `size`. Default: float32 with values up to 1, or up to 16 where a bloom of 1 is
         black, as after a threshold. For a `command` whose files hold integers, values up to 1/2
@@ -282,7 +287,7 @@ def report(
         raise ValueError(f"laws: {error}") from None
     merged = merge_limits(limits, required or ALL_LAWS.keys())
     if is_meter(bloom):
-        given = {"gain": gain, "picture": picture, "probe": probe}
+        given = {"gain": gain, "picture": picture, "field": field, "probe": probe}
         for name in (name for name, value in given.items() if value is not None):
             raise ValueError(f"{name}: an exposure has none")
         meter = meter_of(bloom) if isinstance(bloom, Exposure | str) else bloom
@@ -291,7 +296,9 @@ def report(
         raise TypeError(f"bloom: {bloom!r} is not callable")
     bloom, size = cast("Bloom", bloom), size or (256, 256)
     used = probe or fitting_probe(bloom, Probe(size=size, levels=levels_of(bloom, size)))
-    subject = Subject(bloom=bloom, probe=used, picture=picture, intensity=intensity, gain=gain)
+    subject = Subject(
+        bloom=bloom, probe=used, picture=picture, intensity=intensity, gain=gain, field=field
+    )
     return law_report(subject, merged, required)
 
 
@@ -304,6 +311,7 @@ def assert_laws(
     gain: float | None = None,
     picture: Bloom | None = None,
     intensity: float | None = None,
+    field: Varying | None = None,
     probe: Probe | None = None,
 ) -> None:
     """Assert that a bloom, or an exposure, holds laws.
@@ -314,7 +322,7 @@ def assert_laws(
         As for `report`.
     *names : str
         Names of laws; without a name, all that apply.
-    limits, size, gain, picture, intensity, probe
+    limits, size, gain, picture, intensity, field, probe
         As for `report`.
 
     Raises
@@ -348,6 +356,7 @@ def assert_laws(
         gain=gain,
         picture=picture,
         intensity=intensity,
+        field=field,
         probe=probe,
     )
     found.assert_held(*laws)

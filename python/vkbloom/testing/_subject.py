@@ -10,6 +10,7 @@ from typing import Final
 import numpy as np
 
 from vkbloom._locks import cached_property
+from vkbloom._psf.varying import Varying
 from vkbloom.testing._last_pixel import LastPixel, last_pixel
 from vkbloom.testing._moving_light import Stability, stability
 from vkbloom.testing._point_spread import measure_spread, point_spread, sum_error
@@ -42,6 +43,7 @@ class Subject:
     - `toned`: The same after the tone curve "reinhard", where there is one to choose.
     - `intensity`: The factor of the bloom in `picture`; None: it is not simply added.
     - `gain`: What flat images should get. None: it is not promised.
+    - `field`: The kernels of all places that lights should show. None: they are not promised.
     - `highest`: The largest value of an image that the bloom can be given.
     - `differences`: Returns the difference from a reference by framebuffer, as a share of its
       largest value. None: there is no reference.
@@ -53,6 +55,7 @@ class Subject:
     toned: Bloom | None = None
     intensity: float | None = None
     gain: float | None = None
+    field: Varying | None = None
     highest: float = 1024.0
     differences: Callable[[], Mapping[str, float]] | None = None
 

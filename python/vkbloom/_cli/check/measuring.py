@@ -17,6 +17,7 @@ from vkbloom import reference
 from vkbloom._custom.method import CustomMethod
 from vkbloom._fit.translating import lights
 from vkbloom._psf.sampled import samples
+from vkbloom._psf.varying import Varying
 from vkbloom._renderer.renderer import Renderer
 from vkbloom._settings.exposure import Exposure
 from vkbloom._settings.settings import Settings
@@ -159,12 +160,19 @@ def of_settings(
         toned=bloom_of(renderer, used.replace(tonemap="reinhard"), "final"),
         intensity=used.intensity if used.composite == "add" else None,
         gain=gain,
+        field=_field_of(used),
         differences=None if _lacks_reference(used) else lambda: differences(renderer, used),
     )
     if gain is None:
         keeps_light = isinstance(used, CustomMethod) and used.file.saves_bloom
         subject.gain = 1.0 if keeps_light else subject.measured_gain
     return subject
+
+
+def _field_of(settings: Settings) -> Varying | None:
+    """Return the field of kernels that each light shows; None: there is none."""
+    found = getattr(settings, "psf", None)
+    return found if isinstance(found, Varying) and not found.gathers else None
 
 
 def of_program(
