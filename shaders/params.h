@@ -304,7 +304,9 @@
 // the transpose of the convolution. That with a kernel with colours reads the frequency of the
 // opposite sign. To find it, it needs the radices of the rows' stages (`row_a` to `row_d`;
 // `row_last` is the last one that is used), the rows' number of elements, and the radices of the
-// columns' stages without the last one.
+// columns' stages without the last one. WEIGHTED: what is read on the way forth, or what is stored
+// on the way back, is multiplied by the channel `weight` of the weights; along columns by those of
+// the first column. The result has so many texels before the first one of the weights.
 #define FFT_BLOCK(B, READS, INPUT, VEC4S) \
     INPUT(B, int, count) \
     INPUT(B, int, across) \
@@ -326,7 +328,10 @@
     INPUT(B, int, block_c) \
     INPUT(B, float, prefilter_min) \
     INPUT(B, float, prefilter_max) \
-    INPUT(B, float, prefilter_factor)
+    INPUT(B, float, prefilter_factor) \
+    INPUT(B, int, weight) \
+    INPUT(B, int, before_x) \
+    INPUT(B, int, before_y)
 
 // Writes the kernel into padded lines (fft_kernel.comp). For each axis: the kernel's number of
 // texels, how many of them before and after its centre count, and the period of the line. `grey`:
@@ -363,14 +368,12 @@
     INPUT(B, int, column_d)
 
 // The weights of a field at each pixel (field_weights.frag): which four of them, columns and rows of
-// the grid of weights, and how many grids are side by side. Multiplies an image by one of them
-// (weigh.frag).
+// the grid of weights, and how many grids are side by side.
 #define FIELD_WEIGHTS_BLOCK(B, READS, INPUT, VEC4S) \
     INPUT(B, int, grid) \
     INPUT(B, int, columns) \
     INPUT(B, int, rows) \
     INPUT(B, int, grids)
-#define WEIGH_BLOCK(B, READS, INPUT, VEC4S) INPUT(B, int, channel)
 
 // Of a pass that was given at run time: bytes whose layout only its shader knows.
 #define CUSTOM_BLOCK(B, READS, INPUT, VEC4S) VEC4S(B, values, 64)
@@ -395,7 +398,6 @@
     BLOCK(fft_kernel, FFT_KERNEL_BLOCK) \
     BLOCK(products, PRODUCTS_BLOCK) \
     BLOCK(field_weights, FIELD_WEIGHTS_BLOCK) \
-    BLOCK(weigh, WEIGH_BLOCK) \
     BLOCK(composite, COMPOSITE_BLOCK) \
     BLOCK(adjoint_filter, ADJOINT_FILTER_BLOCK) \
     BLOCK(exposure, EXPOSURE_BLOCK) \
@@ -606,7 +608,7 @@
     SLOT(SLOT_MOTION_Y, 4) \
     SLOT(SLOT_DEPTH, 5)
 
-// Fields of kernels have SLOT_WEIGHTS and SLOT_ADDED of the adjoint passes, too.
+// Of fields of kernels they have SLOT_WEIGHTS and SLOT_ADDED of the adjoint passes, too.
 #define TRANSFORM_SLOTS(SLOT) \
     SLOT(SLOT_SPECTRUM, 1) /* of the kernel, for the product */ \
     SLOT(SLOT_FACTORS, 1)  /* of up to MAX_PRODUCTS: the spectra of glow and kernel in turns */ \
@@ -806,7 +808,8 @@
     CONSTANT(68, METER, meter)                 /* what meter.frag makes: METER_* */ \
     CONSTANT(69, PRODUCTS, products)           /* of spectra, that are added up */ \
     CONSTANT(70, MOVING, moving)               /* how the motion is given: MOTION_*; 0: none */ \
-    CONSTANT(71, DEEP, deep)                   /* there is an image of the depth */
+    CONSTANT(71, DEEP, deep)                   /* there is an image of the depth */ \
+    CONSTANT(72, WEIGHTED, weighted)           /* a stage of a transform multiplies by weights */
 
 // The names that a setting can have. Each list is a setting and a specialization constant.
 #define COMPOSITE_NAMES(NAME) \

@@ -72,8 +72,7 @@ static bool add_passes(struct vkb_adjoint *adjoint, const struct vkb_settings *s
         vkb_transpose *transpose = transposes[pass.block];
         if (pass.target_count != 1 || vkb_cotangent_of(adjoint, &pass) == VKB_NO_IMAGE)
             continue;
-        // (A field whose pixels collect by their own kernels ends with its weights.)
-        const bool convolved = pass.block == VKB_BLOCK_fft || pass.block == VKB_BLOCK_weigh;
+        const bool convolved = pass.block == VKB_BLOCK_fft;
         *possible = convolved || transpose;
         if (convolved ? !vkb_transpose_convolution(adjoint, settings, &pass, error)
                       : transpose && !transpose(adjoint, &pass, error))
@@ -132,6 +131,7 @@ bool vkb_build_adjoint(const struct vkb_source *source, const struct vkb_setting
         .table = {.transposes = transposes, .hash = VKB_HASH_START},
         .max_side = max_side,
         .sums = cotangents->sums,
+        .weights = cotangents->weights,
         .scene = VKB_NO_IMAGE,
         .glow = VKB_NO_IMAGE,
         .image = VKB_NO_IMAGE,

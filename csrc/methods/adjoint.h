@@ -13,12 +13,14 @@ struct vkb_cotangents {
     uint32_t count;
     bool images;  // the derivatives by images are wanted
     bool sums;    // those by fields
+    bool weights;  // those by the weights of a field of kernels
 };
 
 // Adds the framebuffers ".by_image", ".by_emission" and ".by_mask", of those that the source has
 // and that the cotangents depend on, and, as sums of one pixel with those of the squares below,
 // ".by_composite" (intensity, exposure, reference white) and ".by_threshold" (threshold, knee),
-// where the passes read these. *first is the index of the first image that is added. *possible
+// where the passes read these, and ".by_weights_0" and so on, of four weights each.
+// *first is the index of the first image that is added. *possible
 // becomes false if a pass has no adjoint.
 bool vkb_build_adjoint(const struct vkb_source *source, const struct vkb_settings *settings,
                        const struct vkb_cotangents *cotangents, uint32_t max_side,

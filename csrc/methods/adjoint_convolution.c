@@ -6,18 +6,6 @@
 #include "passes/adjoint.h"
 #include "passes/levels.h"
 
-// The first stage of the transform, which reads what is convolved. A copy: adding passes moves
-// those of the graph.
-static struct vkb_pass_row find_first(const struct vkb_graph *graph)
-{
-    uint32_t pass = 0;
-
-    while (!vkb_computes(&graph->passes[pass], VKB_BLOCK_fft)
-           || graph->passes[pass].constants.stage != STAGE_FIRST)
-        ++pass;
-    return graph->passes[pass];
-}
-
 // The kernel's spectrum, which the first product reads.
 static uint32_t find_spectrum(const struct vkb_graph *graph)
 {
@@ -55,7 +43,7 @@ bool vkb_transpose_convolution(struct vkb_adjoint *adjoint, const struct vkb_set
     if (settings->field.count)
         return vkb_transpose_field(adjoint, settings, pass, error);
     struct vkb_graph *graph = adjoint->graph;
-    const struct vkb_pass_row first_stage = find_first(graph);
+    const struct vkb_pass_row first_stage = vkb_find_transform(graph);
     const uint32_t glow = first_stage.reads[SLOT_SOURCE];
     const struct vkb_size size = {graph->images[glow].width, graph->images[glow].height};
     struct vkb_convolution convolution = vkb_describe_convolution(settings, size);

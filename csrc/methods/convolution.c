@@ -158,6 +158,19 @@ static struct vkb_pass_row stage_row(const struct vkb_convolving *passes,
     return row;
 }
 
+// Makes a stage multiply by weights and, on the way back, add an image.
+static void set_weighing(const struct vkb_convolving *passes, const struct vkb_weighing *weighing,
+                         struct vkb_pass_row *row)
+{
+    row->reads[SLOT_WEIGHTS] = weighing->weights;
+    row->reads[SLOT_ADDED] = weighing->added;
+    row->constants.weighted = weighing->weights != VKB_NO_IMAGE;
+    row->constants.adds_image = weighing->added != VKB_NO_IMAGE;
+    row->params.fft.weight = (int)weighing->channel;
+    row->params.fft.before_x = (int)passes->convolution->x.first;
+    row->params.fft.before_y = (int)passes->convolution->y.first;
+}
+
 // The kernel's spectrum, in place.
 static void add_kernel_stages(const struct vkb_convolving *passes, uint32_t spectrum)
 {
@@ -194,7 +207,8 @@ uint32_t vkb_add_kernel_spectrum(const struct vkb_convolving *passes, uint32_t k
 }
 
 // The glow's transform along its rows.
-static void add_rows(const struct vkb_convolving *passes, uint32_t from, uint32_t rows)
+static void add_rows(const struct vkb_convolving *passes, uint32_t from,
+                     const struct vkb_weighing *weighing, uint32_t rows)
 {
     const struct vkb_convolution *convolution = passes->convolution;
     const float *prefilter = passes->levels->settings->kernel.prefilter;
@@ -210,8 +224,10 @@ static void add_rows(const struct vkb_convolving *passes, uint32_t from, uint32_
 
     for (; stage.number < count; ++stage.number) {
         struct vkb_pass_row row = stage_row(passes, &stage, stage.number == 0 ? count : 0);
-        if (stage.number == 0)
+        if (stage.number == 0) {
             row.constants.stage = STAGE_FIRST;
+            set_weighing(passes, weighing, &row);
+        }
         // Cotangents pass the filter of bright colours after the transpose.
         if (stage.number == 0 && !passes->transposed) {
             row.constants.prefiltered = prefilter[1] >= prefilter[0];
@@ -227,8 +243,8 @@ static void add_rows(const struct vkb_convolving *passes, uint32_t from, uint32_
 
 // Along the columns forth; if there is a kernel's spectrum, with the product and the first stage
 // back.
-static void add_columns(const struct vkb_convolving *passes, uint32_t rows, uint32_t spectrum,
-                        uint32_t columns)
+static void add_columns(const struct vkb_convolving *passes, uint32_t rows,
+                        const struct vkb_weighing *weighing, uint32_t spectrum, uint32_t columns)
 {
     const struct vkb_convolution *convolution = passes->convolution;
     const uint32_t last = convolution->y.line.stage_count - 1;
@@ -245,6 +261,8 @@ static void add_columns(const struct vkb_convolving *passes, uint32_t rows, uint
     for (; stage.number <= last; ++stage.number) {
         const uint32_t stages = multiplies ? 2 * last + 1 : last + 1;
         struct vkb_pass_row row = stage_row(passes, &stage, stage.number == 0 ? stages : 0);
+        if (stage.number == 0)
+            set_weighing(passes, weighing, &row);
         if (multiplies && stage.number == last)
             vkb_fft_multiply(&convolution->x, &convolution->y, spectrum,
                              passes->levels->settings->kernel.grey, vkb_conjugates(passes), &row);
@@ -254,12 +272,14 @@ static void add_columns(const struct vkb_convolving *passes, uint32_t rows, uint
     }
 }
 
-// Along the columns back, without the first stage if that was part of the product.
-static void add_columns_back(const struct vkb_convolving *passes, uint32_t from, uint32_t columns,
-                             bool multiplied)
+// Along the columns back. In place: without the first stage, which was part of the product; else
+// with the product with a kernel's spectrum, if there is one.
+static void add_columns_back(const struct vkb_convolving *passes, uint32_t from, uint32_t spectrum,
+                             const struct vkb_weighing *weighing, uint32_t columns)
 {
     const struct vkb_convolution *convolution = passes->convolution;
     const uint32_t count = convolution->y.line.stage_count;
+    const bool multiplied = from == columns;
     struct vkb_fft_stage stage = {
         .name = "bloom",
         .axis = &convolution->y,
@@ -272,15 +292,21 @@ static void add_columns_back(const struct vkb_convolving *passes, uint32_t from,
     for (stage.number = multiplied ? count - 1 : count; stage.number-- > 0;) {
         const bool first = !multiplied && stage.number == count - 1;
         struct vkb_pass_row row = stage_row(passes, &stage, first ? count : 0);
-        // The rows back need no other.
-        if (stage.number == 0)
+        if (first && spectrum != VKB_NO_IMAGE)
+            vkb_fft_multiply(&convolution->x, &convolution->y, spectrum, true,
+                             vkb_conjugates(passes), &row);
+        if (stage.number == 0) {
+            // The rows back need no other.
             row.params.fft.kept = (int)convolution->result.height;
+            set_weighing(passes, weighing, &row);
+        }
         vkb_levels_pass(passes->levels, &row);
         stage.from = columns;
     }
 }
 
-static void add_rows_back(const struct vkb_convolving *passes, uint32_t columns, uint32_t target)
+static void add_rows_back(const struct vkb_convolving *passes, uint32_t columns,
+                          const struct vkb_weighing *weighing, uint32_t target)
 {
     const struct vkb_convolution *convolution = passes->convolution;
     struct vkb_fft_stage stage = {
@@ -295,8 +321,10 @@ static void add_rows_back(const struct vkb_convolving *passes, uint32_t columns,
     for (stage.number = count; stage.number-- > 0;) {
         stage.to = stage.number ? columns : target;
         struct vkb_pass_row row = stage_row(passes, &stage, stage.number == count - 1 ? count : 0);
-        if (stage.number == 0)
+        if (stage.number == 0) {
             row.constants.stage = STAGE_LAST;
+            set_weighing(passes, weighing, &row);
+        }
         vkb_levels_pass(passes->levels, &row);
     }
 }
@@ -306,15 +334,15 @@ struct vkb_size vkb_padded_size(const struct vkb_convolution *convolution)
     return (struct vkb_size){convolution->x.line.length, convolution->y.line.length};
 }
 
-// The image of the transform along rows.
-static uint32_t add_rows_spectrum(const struct vkb_convolving *passes, uint32_t from)
+uint32_t vkb_add_rows(const struct vkb_convolving *passes, uint32_t from,
+                      const struct vkb_weighing *weighing)
 {
     // Variants transform the columns in place, whose result may be longer.
     const struct vkb_size lines = {passes->convolution->x.line.length,
                                    passes->convolution->result.height};
     const uint32_t rows = vkb_add_spectrum(passes, "rows_spectrum", lines);
 
-    add_rows(passes, from, rows);
+    add_rows(passes, from, weighing, rows);
     return rows;
 }
 
@@ -324,40 +352,57 @@ static uint32_t add_result(const struct vkb_convolving *passes, const struct vkb
                              passes->convolution->result, result->framebuffer);
 }
 
-uint32_t vkb_add_forth(const struct vkb_convolving *passes, uint32_t from)
+uint32_t vkb_add_columns(const struct vkb_convolving *passes, uint32_t rows,
+                         const struct vkb_weighing *weighing)
 {
-    const uint32_t rows = add_rows_spectrum(passes, from);
     const uint32_t columns =
         vkb_add_spectrum(passes, "spectrum", vkb_padded_size(passes->convolution));
 
-    add_columns(passes, rows, VKB_NO_IMAGE, columns);
+    add_columns(passes, rows, weighing, VKB_NO_IMAGE, columns);
     return columns;
 }
 
-uint32_t vkb_add_back(const struct vkb_convolving *passes, uint32_t spectrum,
-                      const struct vkb_image_row *result)
+uint32_t vkb_add_columns_back(const struct vkb_convolving *passes, uint32_t spectrum,
+                              uint32_t kernel, const struct vkb_weighing *weighing)
 {
     const uint32_t columns =
         vkb_add_spectrum(passes, "columns", vkb_padded_size(passes->convolution));
+
+    add_columns_back(passes, spectrum, kernel, weighing, columns);
+    return columns;
+}
+
+uint32_t vkb_add_rows_back(const struct vkb_convolving *passes, uint32_t columns,
+                           const struct vkb_weighing *weighing, const struct vkb_image_row *result)
+{
     const uint32_t target = add_result(passes, result);
 
-    add_columns_back(passes, spectrum, columns, false);
-    add_rows_back(passes, columns, target);
+    add_rows_back(passes, columns, weighing, target);
     return target;
 }
 
 uint32_t vkb_add_product(const struct vkb_convolving *passes, uint32_t spectrum,
                          const struct vkb_image_row *result)
 {
-    const uint32_t rows = add_rows_spectrum(passes, passes->levels->source->glow);
+    const uint32_t rows = vkb_add_rows(passes, passes->levels->source->glow, &vkb_unweighted);
     const uint32_t columns =
         vkb_add_spectrum(passes, "spectrum", vkb_padded_size(passes->convolution));
     const uint32_t target = add_result(passes, result);
 
-    add_columns(passes, rows, spectrum, columns);
-    add_columns_back(passes, columns, columns, true);
-    add_rows_back(passes, columns, target);
+    add_columns(passes, rows, &vkb_unweighted, spectrum, columns);
+    add_columns_back(passes, columns, spectrum, &vkb_unweighted, columns);
+    add_rows_back(passes, columns, &vkb_unweighted, target);
     return target;
+}
+
+struct vkb_pass_row vkb_find_transform(const struct vkb_graph *graph)
+{
+    uint32_t pass = 0;
+
+    while (!vkb_computes(&graph->passes[pass], VKB_BLOCK_fft)
+           || graph->passes[pass].constants.stage != STAGE_FIRST)
+        ++pass;
+    return graph->passes[pass];
 }
 
 uint32_t vkb_convolve_back(struct vkb_levels *levels, const struct vkb_convolution *convolution,

@@ -6,6 +6,11 @@
 // are added up, so that there is one way back. Where each pixel collects by its own kernel, they
 // are multiplied after it: sum of w_k (K_k * x). Then there is one transform, and a way back for
 // each kernel. Each is the transpose of the other one, with conjugate spectra.
+//
+// Transforms multiply by weights where they read or store pixels. The weights of a grid are products
+// of one of its column and one of its row, w_k = a_i(x) b_j(y). Then a transform along rows, of
+// a_i x, is shared by the kernels of a column of the grid, whose transforms along columns begin with
+// b_j; on the way back these end with b_j and are added up before the rows.
 #include "methods/field.h"
 
 #include <stdio.h>
@@ -27,9 +32,24 @@ struct field {
     snprintf(suffix_of_##of, sizeof suffix_of_##of, "_%u", (k)); \
     of.suffix = suffix_of_##of
 
-static bool is_weighted(const struct vkb_field *field, uint32_t k)
+// Of column i of a grid, or of kernel i.
+static struct vkb_weighing weigh_column(const struct vkb_field *data, const struct field *field,
+                                        uint32_t i)
 {
-    return k > 0 || !field->first_unweighted;
+    if (i == 0 && data->first_unweighted)
+        return vkb_unweighted;
+    return (struct vkb_weighing){field->weights[i / 4], i % 4, VKB_NO_IMAGE};
+}
+
+// Of row j of a grid.
+static struct vkb_weighing weigh_row(const struct vkb_field *data, const struct field *field,
+                                     uint32_t j)
+{
+    const uint32_t number = data->count / data->down + j;
+
+    if (data->down == 1)
+        return vkb_unweighted;
+    return (struct vkb_weighing){field->weights[number / 4], number % 4, VKB_NO_IMAGE};
 }
 
 // Kernel k as the host gives it.
@@ -56,7 +76,7 @@ static void add_weights(struct vkb_levels *levels, uint32_t *weights)
     const uint32_t grid = vkb_levels_add(levels, &of_grid);
     const uint32_t places = vkb_levels_add(levels, &of_places);
 
-    for (uint32_t i = 0; i < (data->count + 3) / 4; ++i) {
+    for (uint32_t i = 0; i < (vkb_count_weights(data) + 3) / 4; ++i) {
         char name[VKB_NAME_SIZE];
         snprintf(name, sizeof name, "field_weights_%u", i);
         weights[i] = vkb_levels_target(levels, name, VKB_FORMAT_RGBA32_FLOAT,
@@ -86,37 +106,6 @@ static struct field add_images(const struct vkb_convolving *passes)
         field.spectra[k] = vkb_add_kernel_spectrum(&own, add_kernel(passes->levels, k));
     }
     return field;
-}
-
-// The row that multiplies an image by weight k.
-static struct vkb_pass_row weigh_row(const struct field *field, uint32_t k, uint32_t source,
-                                     uint32_t target)
-{
-    struct vkb_pass_row row = vkb_fullscreen_row("weights", &vkb_shader_weigh_frag, target);
-
-    vkb_read_only(&row, source);
-    vkb_read_at(&row, SLOT_WEIGHTS, field->weights[k / 4]);
-    vkb_read_at(&row, SLOT_ADDED, VKB_NO_IMAGE);
-    row.block = VKB_BLOCK_weigh;
-    row.params.weigh.channel = (int)(k % 4);
-    return row;
-}
-
-// Adds the image times weight k, where that is not 1.
-static uint32_t add_weighted(const struct vkb_convolving *passes, const struct field *field,
-                             uint32_t k, uint32_t image)
-{
-    struct vkb_levels *levels = passes->levels;
-
-    if (!is_weighted(&levels->settings->field, k) || levels->failed)
-        return image;
-    const struct vkb_size size = {levels->graph->images[image].width,
-                                  levels->graph->images[image].height};
-    VKB_OF_KERNEL(own, passes, k);
-    const uint32_t target = vkb_add_spectrum(&own, "weighted", size);
-    const struct vkb_pass_row row = weigh_row(field, k, image, target);
-    vkb_levels_pass(levels, &row);
-    return target;
 }
 
 static void set_radices(const struct vkb_convolution *convolution,
@@ -167,59 +156,76 @@ static uint32_t add_products(const struct vkb_convolving *passes, const uint32_t
 static uint32_t add_spread(const struct vkb_convolving *passes, const struct field *field,
                            uint32_t image, const struct vkb_image_row *result)
 {
-    const uint32_t count = passes->levels->settings->field.count;
-    uint32_t sum = VKB_NO_IMAGE, images[VKB_MAX_FIELD];
+    const struct vkb_field *data = &passes->levels->settings->field;
+    uint32_t sum = VKB_NO_IMAGE, rows = VKB_NO_IMAGE, images[VKB_MAX_FIELD];
 
-    for (uint32_t k = 0; k < count; ++k) {
+    for (uint32_t k = 0; k < data->count; ++k) {
         VKB_OF_KERNEL(own, passes, k);
-        images[k] = vkb_add_forth(&own, add_weighted(passes, field, k, image));
+        const struct vkb_weighing column = weigh_column(data, field, k / data->down);
+        const struct vkb_weighing row = weigh_row(data, field, k % data->down);
+        if (k % data->down == 0)
+            rows = vkb_add_rows(&own, image, &column);
+        images[k] = vkb_add_columns(&own, rows, &row);
     }
-    for (uint32_t k = 0; k < count; k += MAX_PRODUCTS) {
-        const uint32_t some = count - k < MAX_PRODUCTS ? count - k : MAX_PRODUCTS;
+    for (uint32_t k = 0; k < data->count; k += MAX_PRODUCTS) {
+        const uint32_t some = data->count - k < MAX_PRODUCTS ? data->count - k : MAX_PRODUCTS;
         VKB_OF_KERNEL(own, passes, k);
         sum = add_products(&own, images + k, field->spectra + k, some, sum);
     }
-    return vkb_add_back(passes, sum, result);
+    const uint32_t columns = vkb_add_columns_back(passes, sum, VKB_NO_IMAGE, &vkb_unweighted);
+    return vkb_add_rows_back(passes, columns, &vkb_unweighted, result);
 }
 
-// Adds K_k * image of each kernel.
-static void add_each(const struct vkb_convolving *passes, const struct field *field, uint32_t image,
-                     uint32_t *results)
+// Adds the product of a spectrum and a kernel's, and its way back along columns.
+static uint32_t add_product_back(const struct vkb_convolving *passes, uint32_t spectrum,
+                                 uint32_t kernel, const struct vkb_weighing *weighing)
 {
-    const uint32_t spectrum = vkb_add_forth(passes, image);
-
-    for (uint32_t k = 0; k < passes->levels->settings->field.count; ++k) {
-        struct vkb_image_row result = {.format = VKB_FORMAT_RGBA32_FLOAT};
-        VKB_OF_KERNEL(own, passes, k);
-        snprintf(result.name, sizeof result.name, "%scollected_%u", passes->prefix, k);
-        const uint32_t product = add_products(&own, &spectrum, field->spectra + k, 1, VKB_NO_IMAGE);
-        results[k] = vkb_add_back(&own, product, &result);
-    }
+    if (passes->levels->settings->kernel.grey)
+        return vkb_add_columns_back(passes, spectrum, kernel, weighing);
+    const uint32_t product = add_products(passes, &spectrum, &kernel, 1, VKB_NO_IMAGE);
+    return vkb_add_columns_back(passes, product, VKB_NO_IMAGE, weighing);
 }
 
 // Adds the sum of w_k (K_k * image).
 static uint32_t add_gathered(const struct vkb_convolving *passes, const struct field *field,
                              uint32_t image, const struct vkb_image_row *result)
 {
-    struct vkb_levels *levels = passes->levels;
-    const struct vkb_size size = passes->convolution->result;
-    const uint32_t count = levels->settings->field.count;
-    uint32_t sum = VKB_NO_IMAGE, each[VKB_MAX_FIELD];
+    const struct vkb_field *data = &passes->levels->settings->field;
+    const uint32_t rows = vkb_add_rows(passes, image, &vkb_unweighted);
+    const uint32_t spectrum = vkb_add_columns(passes, rows, &vkb_unweighted);
+    uint32_t sum = VKB_NO_IMAGE, columns = VKB_NO_IMAGE;
 
-    add_each(passes, field, image, each);
-    for (uint32_t k = 0; k < count; ++k) {
+    for (uint32_t k = 0; k < data->count; ++k) {
         VKB_OF_KERNEL(own, passes, k);
-        const uint32_t target = k < count - 1
-                                  ? vkb_add_spectrum(&own, "gathered", size)
-                                  : vkb_levels_target(levels, result->name, result->format, size,
-                                                      result->framebuffer);
-        struct vkb_pass_row row = weigh_row(field, k, each[k], target);
-        row.constants.adds_image = sum != VKB_NO_IMAGE;
-        row.reads[SLOT_ADDED] = sum;
-        vkb_levels_pass(levels, &row);
-        sum = target;
+        struct vkb_weighing column = weigh_column(data, field, k / data->down);
+        struct vkb_weighing row = weigh_row(data, field, k % data->down);
+        row.added = k % data->down > 0 ? columns : VKB_NO_IMAGE;
+        columns = add_product_back(&own, spectrum, field->spectra[k], &row);
+        if (k % data->down < data->down - 1)
+            continue;
+        struct vkb_image_row part = {.format = VKB_FORMAT_RGBA32_FLOAT};
+        snprintf(part.name, sizeof part.name, "%sgathered_%u", passes->prefix, k);
+        column.added = sum;
+        sum = vkb_add_rows_back(&own, columns, &column, k == data->count - 1 ? result : &part);
     }
     return sum;
+}
+
+// Adds K_k * image of each kernel.
+static void add_each(const struct vkb_convolving *passes, const struct field *field, uint32_t image,
+                     uint32_t *results)
+{
+    const uint32_t rows = vkb_add_rows(passes, image, &vkb_unweighted);
+    const uint32_t spectrum = vkb_add_columns(passes, rows, &vkb_unweighted);
+
+    for (uint32_t k = 0; k < passes->levels->settings->field.count; ++k) {
+        struct vkb_image_row result = {.format = VKB_FORMAT_RGBA32_FLOAT};
+        VKB_OF_KERNEL(own, passes, k);
+        snprintf(result.name, sizeof result.name, "%sconvolved_%u", passes->prefix, k);
+        const uint32_t columns =
+            add_product_back(&own, spectrum, field->spectra[k], &vkb_unweighted);
+        results[k] = vkb_add_rows_back(&own, columns, &vkb_unweighted, &result);
+    }
 }
 
 uint32_t vkb_convolve_field(const struct vkb_convolving *passes, const struct vkb_image_row *result)
@@ -244,20 +250,10 @@ static struct field find_images(const struct vkb_graph *graph)
         if (vkb_computes(pass, VKB_BLOCK_products))
             for (int32_t k = 0; k < pass->constants.products; ++k)
                 field.spectra[count++] = pass->reads[SLOT_FACTORS + 2 * k + 1];
+        if (vkb_computes(pass, VKB_BLOCK_fft) && pass->constants.stage == STAGE_GREY)
+            field.spectra[count++] = pass->reads[SLOT_SPECTRUM];
     }
     return field;
-}
-
-// The image that is convolved: what the first weight multiplies, or the first transform reads.
-static uint32_t find_glow(const struct vkb_graph *graph, bool gathers)
-{
-    for (uint32_t i = 0; i < graph->pass_count; ++i) {
-        const struct vkb_pass_row *pass = &graph->passes[i];
-        if (vkb_computes(pass, gathers ? VKB_BLOCK_fft : VKB_BLOCK_weigh)
-            && (!gathers || pass->constants.stage == STAGE_FIRST))
-            return pass->reads[SLOT_SOURCE];
-    }
-    return VKB_NO_IMAGE;
 }
 
 // The filter by which what lies beyond edges that are repeated folds back to these.
@@ -271,39 +267,59 @@ static struct vkb_filter fold_of(const struct vkb_convolution *convolution, stru
     return filter;
 }
 
-// Accumulates w_k of what was folded from the results of all kernels.
-static bool accumulate_weighted(struct vkb_adjoint *adjoint, const struct vkb_settings *settings,
-                                const struct field *field, const struct vkb_filter *fold,
-                                const uint32_t *each, uint32_t glow, struct vkb_error *error)
+// Adds the framebuffers of the cotangents of the weights, four in each: the image times what the
+// kernels make of the cotangents; or the cotangents times what they make of the image, if pixels
+// collect.
+static bool add_by_weights(struct vkb_adjoint *adjoint, const struct vkb_convolving *transposed,
+                           const struct field *field, const struct vkb_filter *fold, uint32_t glow,
+                           uint32_t cotangents, struct vkb_error *error)
 {
-    const struct vkb_size size = {adjoint->graph->images[glow].width,
-                                  adjoint->graph->images[glow].height};
+    struct vkb_levels *levels = transposed->levels;
+    const struct vkb_settings *settings = levels->settings;
+    const struct vkb_size size = levels->source->buffers;
+    const struct vkb_convolution forward = vkb_describe_convolution(settings, size);
+    const bool gathers = settings->field.gathers;
+    struct vkb_convolving passes = *transposed;
+    uint32_t each[VKB_MAX_FIELD];
 
-    for (uint32_t k = 0; k < settings->field.count; ++k) {
-        uint32_t folded;
-        if (!is_weighted(&settings->field, k)) {
-            if (!vkb_accumulate_filter(adjoint, fold, each[k], glow, error))
-                return false;
-            continue;
-        }
-        if (!vkb_filter_to_image(adjoint, fold, each[k], size, &folded, error))
-            return false;
-        struct vkb_pass_row row = vkb_adjoint_row(&vkb_shader_adjoint_weigh_frag, folded);
-        row.reads[SLOT_WEIGHTS] = field->weights[k / 4];
-        row.block = VKB_BLOCK_weigh;
-        row.params.weigh.channel = (int)(k % 4);
-        if (!vkb_accumulate_cotangent(adjoint, &row, glow, error))
+    // The passes of other derivatives have the prefix, too.
+    passes.prefix = "adjoint_weights_";
+    if (gathers) {
+        passes.convolution = &forward;
+        passes.transposed = false;
+    }
+    add_each(&passes, field, gathers ? glow : cotangents, each);
+    for (uint32_t k = 0; k < settings->field.count && !levels->failed; ++k) {
+        const bool moved = !vkb_axis_is_identity(&fold->x) || !vkb_axis_is_identity(&fold->y);
+        if (moved && !gathers && !vkb_filter_to_image(adjoint, fold, each[k], size, each + k, error))
             return false;
     }
-    return true;
+    for (uint32_t k = 0; k < settings->field.count; k += 4) {
+        const uint32_t some = settings->field.count - k < 4 ? settings->field.count - k : 4;
+        char name[VKB_NAME_SIZE];
+        snprintf(name, sizeof name, ".by_weights_%u", k / 4);
+        const uint32_t target =
+            vkb_levels_target(levels, name, VKB_FORMAT_RGBA32_FLOAT, size, true);
+        struct vkb_pass_row row =
+            vkb_fullscreen_row("weights", &vkb_shader_adjoint_weights_frag, target);
+        row.transposed = true;
+        vkb_read_only(&row, gathers ? cotangents : glow);
+        vkb_read_at(&row, (enum vkb_slot)(SLOT_FACTORS + 3), VKB_NO_IMAGE);
+        for (uint32_t i = 0; i < some; ++i)
+            row.reads[SLOT_FACTORS + i] = each[k + i];
+        row.constants.products = (int32_t)some;
+        row.constants.alpha = vkb_find_transform(adjoint->graph).constants.alpha;
+        vkb_levels_pass(levels, &row);
+    }
+    return !levels->failed;
 }
 
 bool vkb_transpose_field(struct vkb_adjoint *adjoint, const struct vkb_settings *settings,
                          const struct vkb_pass_row *pass, struct vkb_error *error)
 {
     struct vkb_graph *graph = adjoint->graph;
-    const bool gathers = settings->field.gathers;
-    const uint32_t glow = find_glow(graph, gathers), cotangents = vkb_cotangent_of(adjoint, pass);
+    const uint32_t glow = vkb_find_transform(graph).reads[SLOT_SOURCE];
+    const uint32_t cotangents = vkb_cotangent_of(adjoint, pass);
     const struct field field = find_images(graph);
     const struct vkb_size size = {graph->images[glow].width, graph->images[glow].height};
     struct vkb_convolution convolution = vkb_describe_convolution(settings, size);
@@ -317,15 +333,14 @@ bool vkb_transpose_field(struct vkb_adjoint *adjoint, const struct vkb_settings 
                                           .prefix = "adjoint_",
                                           .suffix = "",
                                           .transposed = true};
-    uint32_t each[VKB_MAX_FIELD];
 
     vkb_transpose_axes(&convolution);
     const struct vkb_filter fold = fold_of(&convolution, size);
-    if (gathers) {
-        const uint32_t spread = add_spread(&passes, &field, cotangents, &result);
-        return !levels.failed && vkb_accumulate_filter(adjoint, &fold, spread, glow, error);
-    }
-    add_each(&passes, &field, cotangents, each);
-    return !levels.failed
-        && accumulate_weighted(adjoint, settings, &field, &fold, each, glow, error);
+    if (adjoint->weights
+        && !add_by_weights(adjoint, &passes, &field, &fold, glow, cotangents, error))
+        return false;
+    const uint32_t convolved = settings->field.gathers
+                                 ? add_spread(&passes, &field, cotangents, &result)
+                                 : add_gathered(&passes, &field, cotangents, &result);
+    return !levels.failed && vkb_accumulate_filter(adjoint, &fold, convolved, glow, error);
 }

@@ -139,7 +139,7 @@ struct vkb_pass_row vkb_fft_row(const struct vkb_graph *graph, const struct vkb_
     row.groups_height =
         groups(horizontal ? stage->lines : count, (uint32_t)row.constants.group_height);
     vkb_read_only(&row, stage->from);
-    vkb_read_at(&row, SLOT_SPECTRUM, VKB_NO_IMAGE);
+    vkb_read_at(&row, SLOT_ADDED, VKB_NO_IMAGE);
     row.constants.direction = axis->direction;
     row.constants.inverse = stage->inverse;
     row.constants.padded = stage->padded;

@@ -83,16 +83,24 @@ struct vkb_kernel_data {
 enum { VKB_MAX_FIELD = 512 };  // kernels
 
 // A field of kernels (methods/field.c): how many the kernel's pixels have below each other, and
-// their weights at the places of a grid.
+// their weights at the places of a grid. With `down` above 1 the kernels are a grid, whose columns
+// are one after the other, and the weights are those of its columns, then those of its rows.
 struct vkb_field {
     uint32_t count;          // 0: there is one kernel without weights
+    uint32_t down;           // kernels in a column of a grid; 1: each has weights of its own
     int gathers;             // weights are multiplied after the convolution
-    int first_unweighted;    // the weight of the first kernel is 1
+    int first_unweighted;    // the first weight is 1
     uint32_t columns, rows;  // of the grid
     // Four weights a texel; for each column of the buffers, then for each row, the place in the
     // grid before it and the share of the next one.
     struct vkb_kernel_data weights, places;
 };
+
+// How many weights a field has.
+static inline uint32_t vkb_count_weights(const struct vkb_field *field)
+{
+    return field->count / field->down + (field->down > 1 ? field->down : 0);
+}
 
 // Every stage of glare: STAGE(name in C, name in Python, of its framebuffer and of its add_
 // function in methods/glare.c). Dirt is a stage without a framebuffer: it changes the sum of the

@@ -56,8 +56,8 @@ bool vkb_read_kernel(PyObject *object, struct vkb_size frame, struct vkb_size bu
     return done;
 }
 
-// (kernels, whether they gather, whether the first has no weights, columns and rows of the grid,
-// weights and places as kernels)
+// (kernels, those in a column of a grid, whether they gather, whether the first has no weights,
+// columns and rows of the weights, weights and places as kernels)
 static bool read_field_tuple(PyObject *tuple, struct vkb_size buffers, Py_buffer *weights,
                              Py_buffer *places, struct vkb_settings *settings)
 {
@@ -65,7 +65,7 @@ static bool read_field_tuple(PyObject *tuple, struct vkb_size buffers, Py_buffer
     PyObject *of_weights, *of_places;
 
     if (!vkb_require_tuple(tuple, "field")
-        || !PyArg_ParseTuple(tuple, "IppIIOO:core_field", &field->count, &field->gathers,
+        || !PyArg_ParseTuple(tuple, "IIppIIOO:core_field", &field->count, &field->down, &field->gathers,
                              &field->first_unweighted, &field->columns, &field->rows, &of_weights,
                              &of_places)
         || !read_kernel_tuple(of_weights, weights, &field->weights)
@@ -78,8 +78,10 @@ static bool read_field_tuple(PyObject *tuple, struct vkb_size buffers, Py_buffer
     if (!field->count || settings->kernel.height % field->count != 0)
         return vkb_refuse("field: %u kernels are not in %u rows", field->count,
                           settings->kernel.height);
+    if (!field->down || field->count % field->down != 0)
+        return vkb_refuse("field: %u kernels are not columns of %u", field->count, field->down);
     if (field->weights.grey || field->places.grey || !field->rows
-        || 4 * grids * (field->weights.height / field->rows) < field->count)
+        || 4 * grids * (field->weights.height / field->rows) < vkb_count_weights(field))
         return vkb_refuse(
             "field: %u x %u texels are not the weights of %u kernels at %u x %u places",
             field->weights.width, field->weights.height, field->count, field->columns, field->rows);

@@ -297,8 +297,9 @@ static bool read_results(const char *name, struct vkb_cotangents *cotangents)
 
     cotangents->images = all || strcmp(name, "images") == 0;
     cotangents->sums = all || strcmp(name, "sums") == 0;
-    return cotangents->images || cotangents->sums
-        || vkb_refuse("results: '%s' is not 'images', 'sums' or 'all'", name);
+    cotangents->weights = strcmp(name, "weights") == 0;
+    return cotangents->images || cotangents->sums || cotangents->weights
+        || vkb_refuse("results: '%s' is not 'images', 'sums', 'all' or 'weights'", name);
 }
 
 PyObject *vkb_renderer_plan(PyObject *object, PyObject *arguments)

@@ -109,15 +109,27 @@ static struct vkb_pass_row make_row(const struct vkb_variant_choice *choice,
     struct group group;
 
     memcpy(&row, first, sizeof row);
-    if (first->constants.stage != STAGE_FIRST)
+    // Columns may have been transformed in place.
+    if (first->constants.inverse && horizontal)
         row.reads[SLOT_SOURCE] = graph->passes[graph->pass_count - 1].targets[0];
     row.targets[0] = first->constants.inverse ? last->targets[0] : first->targets[0];
+    // What comes back is weighted by its last stage.
+    if (first->constants.inverse) {
+        row.constants.weighted = last->constants.weighted;
+        row.constants.adds_image = last->constants.adds_image;
+        row.reads[SLOT_WEIGHTS] = last->reads[SLOT_WEIGHTS];
+        row.reads[SLOT_ADDED] = last->reads[SLOT_ADDED];
+        row.params.fft.weight = last->params.fft.weight;
+        row.params.fft.before_x = last->params.fft.before_x;
+        row.params.fft.before_y = last->params.fft.before_y;
+    }
     if (first->constants.inverse && horizontal)
         row.constants.stage = STAGE_LAST;
     for (const struct vkb_pass_row *pass = first; pass < end; ++pass)
         if (multiplies(pass)) {
             // Columns are transformed in place, forth and back.
-            row.targets[0] = row.reads[SLOT_SOURCE];
+            if (!first->constants.inverse)
+                row.targets[0] = row.reads[SLOT_SOURCE];
             row.constants.stage = STAGE_PRODUCT;
             row.reads[SLOT_SPECTRUM] = pass->reads[SLOT_SPECTRUM];
             row.params.fft.kernel_sign = pass->params.fft.kernel_sign;
@@ -216,32 +228,15 @@ static bool reaches(const struct vkb_device *device, const struct vkb_image_row 
         <= device->limits.maxStorageBufferRange;
 }
 
-static const struct vkb_shader *const weigh_shaders[VKB_FORMAT_COUNT] = VKB_LINEAR_BY_FORMAT(weigh);
-
-// The row of a field's weights or products, whose target has single floats; NULL: there is none.
-static const struct vkb_shader *field_shader(const struct vkb_variant_choice *choice,
-                                             const struct vkb_pass_row *pass)
-{
-    const struct vkb_graph *graph = choice->graph;
-
-    if (vkb_computes(pass, VKB_BLOCK_products))
-        return &vkb_shader_products_linear_rgba32float;
-    return vkb_computes(pass, VKB_BLOCK_weigh) && !pass->constants.adds_image
-                && graph->images[pass->targets[0]].format == VKB_FORMAT_RGBA32_FLOAT
-             ? weigh_shaders[graph->images[pass->reads[SLOT_SOURCE]].format]
-             : NULL;
-}
-
 bool vkb_add_field_variant(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
 {
-    const struct vkb_shader *shader = field_shader(choice, pass);
     struct vkb_pass_row row;
 
-    if (!shader || !vkb_fits_linear(choice, pass)
+    if (!vkb_computes(pass, VKB_BLOCK_products) || !vkb_fits_linear(choice, pass)
         || !reaches(choice->device, &choice->graph->images[pass->targets[0]]))
         return false;
     memcpy(&row, pass, sizeof row);
-    vkb_make_linear(&row, shader, 1, TEXEL_ROWS);
+    vkb_make_linear(&row, &vkb_shader_products_linear_rgba32float, 1, TEXEL_ROWS);
     return vkb_add_variant_pass(choice, &row);
 }
 

@@ -1,5 +1,5 @@
 // The elements of the lines that a Fourier transform starts from: the glow, and what lies beyond its
-// edges. Include this after a function `load_source(ivec2)` and `texel_at`.
+// edges. Include this after the functions `load_source(ivec2)`, `texel_at` and `weight_at`.
 
 #include "lib/bright.glsl"
 
@@ -8,6 +8,14 @@ vec4 glow_of(vec4 texel)
     vec4 finite = finite_or_zero(texel);
     vec4 kept = vec4(limited(finite.rgb, FFT_LIMIT), limited(finite.aaa, FFT_LIMIT).r);
     return vec4(PREFILTERED != 0 ? prefiltered(kept.rgb) : kept.rgb, ALPHA == ALPHA_BLUR ? kept.a : 0.0);
+}
+
+vec4 load_lit(int along, int across)
+{
+    vec4 texel = load_source(texel_at(along, across));
+    if (STAGE == STAGE_FIRST)
+        texel = glow_of(texel);
+    return WEIGHTED != 0 && INVERSE == 0 ? weight_at(along, across) * texel : texel;
 }
 
 // What the transform has at a place of the padded line. Where that lies before the source's first texel
@@ -24,12 +32,11 @@ vec4 load_padded(int along, int across)
     else
         place = behind ? params.extent - 1 : 0;
     place = inside ? texel_place : clamp(place, 0, params.extent - 1);
-    vec4 texel = load_source(texel_at(place, across));
+    vec4 texel = load_lit(place, across);
     return inside || BOUNDARY != BOUNDARY_ZERO ? texel : vec4(0.0);
 }
 
 vec4 load(int along, int across)
 {
-    vec4 texel = PADDED != 0 ? load_padded(along, across) : load_source(texel_at(along, across));
-    return STAGE == STAGE_FIRST ? glow_of(texel) : texel;
+    return PADDED != 0 ? load_padded(along, across) : load_lit(along, across);
 }

@@ -13,7 +13,7 @@
 //
 // STAGE_FIRST reads the glow, STAGE_LAST stores to an image of the bloom's format. STAGE_PRODUCT is the
 // last stage forth along columns, the product with the kernel's spectrum and the first stage back; so is
-// STAGE_GREY in stages.
+// STAGE_GREY in stages. On the way back the product comes first.
 // PADDED reads what lies beyond the source's edges by the boundary.
 
 UNIFORM_BLOCK(FFT_BLOCK);
@@ -22,16 +22,20 @@ UNIFORM_BLOCK(FFT_BLOCK);
 #endif
 #ifdef LINEAR_TEXELS
 #include "variants/pixels.glsl"
+#define READ_FLOATS READ_IMAGE
 #else
 #define READ_IMAGE(slot, name) \
     layout(set = 0, binding = BINDING_OF(slot), SOURCE_FORMAT) uniform readonly image2D name
+#define READ_FLOATS(slot, name) layout(set = 0, binding = BINDING_OF(slot), rgba32f) uniform readonly image2D name
 #endif
 #include "lib/fourier.glsl"
 #include "lib/frequencies.glsl"
 
 layout(local_size_x_id = 34, local_size_y_id = 35) in;
 READ_IMAGE(SLOT_SOURCE, source);
-READ_IMAGE(SLOT_SPECTRUM, factor);
+READ_FLOATS(SLOT_SPECTRUM, factor);
+READ_FLOATS(SLOT_WEIGHTS, weights);
+READ_FLOATS(SLOT_ADDED, added);
 #ifndef LINEAR_TEXELS
 layout(set = 0, binding = TARGET_BINDING) uniform writeonly image2D target;
 #elif TARGET_BYTES == 4
@@ -64,13 +68,25 @@ vec4 load_source(ivec2 at)
 #endif
 }
 
+#ifdef LINEAR_TEXELS
+#define LOAD_FLOATS(name, slot, at) load_floats(name, read_shapes[slot], (at).x, (at).y)
+#define WEIGHTS_SIZE                READ_SIZE(SLOT_WEIGHTS)
+#else
+#define LOAD_FLOATS(name, slot, at) imageLoad(name, at)
+#define WEIGHTS_SIZE                imageSize(weights)
+#endif
+
 vec4 load_factor(ivec2 at)
 {
-#ifdef LINEAR_TEXELS
-    return uintBitsToFloat(texelFetch(factor, at.y * read_shapes[SLOT_SPECTRUM].z + at.x));
-#else
-    return imageLoad(factor, at);
-#endif
+    return LOAD_FLOATS(factor, SLOT_SPECTRUM, at);
+}
+
+// The weight of a field's kernel at a pixel.
+float weight_at(int along, int across)
+{
+    ivec2 place = IS_ROW ? ivec2(along, across) : ivec2(0, along);
+    vec4 four = LOAD_FLOATS(weights, SLOT_WEIGHTS, clamp(place, ivec2(0), WEIGHTS_SIZE - 1));
+    return inner_product(four, vec4(equal(ivec4(0, 1, 2, 3), ivec4(params.weight))));
 }
 
 void store(ivec2 at, vec4 value)
@@ -232,6 +248,19 @@ void load_line(int number, int across, int radix)
     }
 }
 
+// Multiplies a line that came back by weights, and adds another image's.
+void add_weighted(int number, int across, int radix)
+{
+    [[unroll]] for (int i = 0; i < radix; ++i) {
+        int along = min(place_in_line(number, i, radix), params.kept - 1), at = place_of(i, radix);
+        ivec2 place = texel_at(along, across) - ivec2(params.before_x, params.before_y);
+        if (WEIGHTED != 0)
+            held[at] *= IS_ROW ? weight_at(place.x, place.y) : weight_at(place.y, 0);
+        if (ADDS_IMAGE != 0)
+            held[at] += LOAD_FLOATS(added, SLOT_ADDED, texel_at(along, across));
+    }
+}
+
 // Whether the invocation stores nothing. None returns: of complete lines, all of a group reach its barriers, and
 // after a return Mesa 22.3 loads parameters lane by lane.
 bool idle;
@@ -283,7 +312,7 @@ void multiply_each(int number, int across)
     vec4 values[FFT_MAX_RADIX];
     vec4 signs = vec2(1.0, params.kernel_sign).xyxy;
     [[unroll]] for (int i = 0; i < LAST_RADIX; ++i) {
-        vec4 value = held[place_of(i, LAST_RADIX)];
+        vec4 value = held[INVERSE != 0 ? i : place_of(i, LAST_RADIX)];
         vec4 by = signs * load_factor(ivec2(across, place_in_line(number, i, LAST_RADIX)));
         values[i] = vec4(product(value.xy, by.xy), product(value.zw, by.zw));
     }
@@ -364,6 +393,8 @@ void main()
         multiply_each(number, across);
     if (RETURNS)
         transform_back(number);
+    if (INVERSE != 0 && (WEIGHTED != 0 || ADDS_IMAGE != 0))
+        add_weighted(number, across, RADIX_1);
     if (COMPLETE && IS_ROW && !RETURNS)
         store_separated(number, across);
     else

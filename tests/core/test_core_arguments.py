@@ -99,7 +99,7 @@ def field(*fields: Any, weights: Any = (2, 3, 4), places: Any = (2, 4, 4)) -> An
     """Return a convolution with two kernels of one pixel, with such weights and places."""
     images = [(np.zeros(shape, np.float32), 1, (1.0, 0.0, 1.0)) for shape in (weights, places)]
     kernels = np.ones((2, 1, 1), np.float32), 1, (1.0, 0.0, 1.0)
-    return Kernel(kernels, field=(*(fields or (2, False, True, 3, 2)), *images))
+    return Kernel(kernels, field=(*(fields or (2, 1, False, True, 3, 2)), *images))
 
 
 #: SPIR-V of no instruction but one of a word.

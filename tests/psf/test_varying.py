@@ -193,6 +193,8 @@ def test_storage(tmp_path: Any) -> None:
     unknown = text.replace("round_spot", "square_spot")
     with pytest.raises(ValueError, match=r"of another process; .* sampled\(frame, places\)"):
         psf.PSF.from_json(unknown)
+    lens = weighted()
+    assert psf.PSF.from_json(lens.to_json()) == lens != weighted(seed=10)
     stored = of_function.sampled(FRAME, (5, 4))
     np.testing.assert_allclose(stored.at(20, 14, FRAME), of_function.at(20, 14, FRAME), atol=1e-8)
 
@@ -219,6 +221,18 @@ def any_renderer(request: pytest.FixtureRequest) -> Iterator[vkbloom.Renderer]:
         yield opened
 
 
+def weighted(kind: type[psf.Varying] = psf.Varying, seed: int = 9) -> psf.Varying:
+    """Return five kernels, each with weights at the places of a grid."""
+    weights = np.random.default_rng(seed).random((5, 3, 4)) - 0.2
+    return kind(grid(1, 5, colours=True)[0], POSITIONS, weights=weights)
+
+
+def of_weights(kind: type[psf.Varying] = psf.Varying) -> Case:
+    lens = weighted(kind)
+    kernels = np.tensordot(lens.weights.array, lens.kernels.array, (0, 0))
+    return lens, bilinear(kernels, *map(np.array, POSITIONS))
+
+
 SMALL = 17, 12
 #: Each field with the function of a place in pixels of a picture of SMALL.
 CASES: dict[str, Case] = {
@@ -227,6 +241,7 @@ CASES: dict[str, Case] = {
     "coloured_grid": of_grid(grid(colours=True)),
     "vignetted_grid": of_grid(grid() * np.linspace(1, 0.3, 12).reshape(3, 4, 1, 1)),
     "gathered": of_grid(grid(colours=True), psf.Gathered),
+    "weighted": of_weights(),
 }
 
 
@@ -284,6 +299,30 @@ def test_the_adjoint_is_the_transpose(
     wanted = exact_derivative(name, boundary)
     limit = 1e-5 if lens.function is None else 10 * lens.tolerance
     np.testing.assert_allclose(derivative, wanted, rtol=0, atol=limit * np.abs(wanted).max())
+
+
+@pytest.mark.parametrize("boundary", BOUNDARIES)
+@pytest.mark.parametrize("kind", [psf.Varying, psf.Gathered])
+def test_derivatives_by_weights(
+    any_renderer: vkbloom.Renderer, kind: type[psf.Varying], boundary: Any
+) -> None:
+    """The bloom is linear in the weights, so that each derivative is the bloom of others."""
+    image, cotangents = (picture(SMALL, seed=seed).astype(np.float32) for seed in (5, 8))
+    settings, others = (
+        vkbloom.Convolution(
+            weighted(kind, seed), boundary=boundary, composite="mix", intensity=1, threshold=0.05
+        )
+        for seed in (9, 10)
+    )
+    pullback = reference.vjp(image, settings)[1]
+    exact = pullback({"final": cotangents})["psf.weights"]
+    of_others = np.vdot(reference.apply(image, others)["final"], cotangents)
+    weights = others.value_of("psf.weights").array
+    assert np.vdot(exact, weights) == pytest.approx(of_others, rel=1e-9)
+    derivatives = vkbloom.vjp(image, settings, renderer=any_renderer)[1]({"final": cotangents})
+    made = derivatives["psf.weights"]
+    assert made.shape == weights.shape == exact.shape
+    np.testing.assert_allclose(made, exact, rtol=0, atol=1e-5 * np.abs(exact).max())
 
 
 @pytest.mark.parametrize("place", [(0, 0), (16, 3), (8, 11)])

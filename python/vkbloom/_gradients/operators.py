@@ -94,12 +94,17 @@ def replace(settings: Settings, values: Mapping[str, Any]) -> Settings:
     if not values:
         return settings
     return settings.replace(
-        **{name: _field_value(value.detach().cpu().tolist()) for name, value in values.items()}
+        **{name: _field_value(value.detach().cpu()) for name, value in values.items()}
     )
 
 
 def _field_value(value: Any) -> Any:
-    return tuple(map(_field_value, value)) if isinstance(value, list) else value
+    """Return a tensor as an array if it is that of weights, or as numbers."""
+    return value.numpy() if value.ndim == 3 else _numbers(value.tolist())
+
+
+def _numbers(value: Any) -> Any:
+    return tuple(map(_numbers, value)) if isinstance(value, list) else value
 
 
 #: The number that stands for the default renderer. Those of others begin at 1.

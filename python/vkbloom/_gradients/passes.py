@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from vkbloom import _core
 from vkbloom._locks import ProcessLock
+from vkbloom._psf.places import hat_weights, pixel_places
 from vkbloom._renderer import requests
 from vkbloom._renderer.device_arrays import Destination, ImportedArray, on_host, place
 from vkbloom._renderer.new_arrays import new_memory
@@ -82,12 +83,12 @@ class Running:
 
         A sum that is less than `min_share` of the root of the sum of its squares is left out.
         """
+        results = self._by_weights()
         wanted = device_fields(self.passes.settings)
         if not wanted:
-            return {}
+            return results
         running = self if self.has_sums else self.passes.submit("sums")
         totals = running.by_name() if running else {}
-        results: dict[str, NDArray[np.float32]] = {}
         for kind, names in _SUMS.items():
             if kind not in totals:
                 continue
@@ -97,6 +98,26 @@ class Running:
                 if name in wanted and np.isfinite(square) and total**2 >= min_share**2 * square:
                     results[name] = np.asarray(total)
         return results
+
+    def _by_weights(self) -> dict[str, NDArray[np.float32]]:
+        """Return the derivative by the weights of a field of kernels, if it has weights."""
+        passes, name = self.passes, "psf.weights"
+        if name not in differentiable(passes.settings):
+            return {}
+        running = passes.submit("weights")
+        images = list(running.by_name().values()) if running else []
+        if not images:
+            return {}
+        psf = passes.settings.value_of("psf")
+        of_pixels = np.concatenate([on_host(image) for image in images], axis=2)
+        of_pixels = of_pixels[..., : len(psf.weights.array)]
+        height, width = passes.inputs.image.shape[:2]
+        frame = width, height
+        xs, ys = pixel_places(frame, of_pixels.shape[1::-1])
+        columns, rows = psf.grid_of(frame)
+        down, across = hat_weights(rows, ys), hat_weights(columns, xs)
+        made = np.einsum("yxk,yj,xi->kji", of_pixels, down, across, optimize=True)
+        return {name: made.astype(np.float32)}
 
     def _zeros(self, shape: tuple[int, ...]) -> NDArray[Any]:
         zeros, passes = np.zeros(shape, np.float32), self.passes

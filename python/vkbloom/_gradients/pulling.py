@@ -83,9 +83,9 @@ def vjp(
         the GPU, as an image. With S the sum over all of them of (framebuffer . cotangent), it
         returns the derivatives of S as float32: by "image", "mask" (H, W) and "emission" if
         they were given, by "kernel" (of `Convolution`), and by each real field under its name,
-        such as "intensity" or "glare.0.intensity". Those by fields and kernel are arrays of
-        NumPy. Those of a uint8 image are by value / 255. At NaN and infinity of the image they
-        are 0.
+        such as "intensity", "glare.0.intensity" or "psf.weights". Those by fields and kernel
+        are arrays of NumPy. Those of a uint8 image are by value / 255. At NaN and infinity of
+        the image they are 0.
 
     Raises
     ------

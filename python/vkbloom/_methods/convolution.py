@@ -166,13 +166,17 @@ class Convolution(WithKernel, Settings):
         """Return the weights of a field of kernels as the core reads them; None: there is none."""
         return core_field(self.psf, frame, buffers) if isinstance(self.psf, Varying) else None
 
+    def _component_kernels(self, frame: Size, buffers: Size) -> list[NDArray[np.float64]]:
+        """Return the kernels (h, w, 3) of a field that have weights, for the bloom buffers."""
+        kernels = cast("Varying", self.psf).components(frame).kernels
+        each = in_grey(kernels) if kernels.ndim == 3 else kernels
+        return [_for_buffers(kernel, frame, buffers) for kernel in each]
+
     def _kernel(self, frame: tuple[int, int], buffers: tuple[int, int]) -> NDArray[np.float64]:
         psf = cast("PSF", self.psf)
         if isinstance(psf, Varying):
             # Below each other, as the core reads them.
-            kernels = psf.components(frame).kernels
-            each = in_grey(kernels) if kernels.ndim == 3 else kernels
-            return np.concatenate([_for_buffers(kernel, frame, buffers) for kernel in each])
+            return np.concatenate(self._component_kernels(frame, buffers))
         kernel = psf.kernel(frame, self.kernel_size, self.pixels_per_degree)
         kernel = _for_buffers(kernel, frame, buffers)
         if self.normalize:

@@ -42,6 +42,14 @@ class Field(Protocol):
         """None: the field is a grid."""
 
     @property
+    def kernels(self) -> Any:
+        """The kernels of a grid, or those that have weights."""
+
+    @property
+    def weights(self) -> Any:
+        """The weights of kernels at a grid's places; None: a kernel is at each place."""
+
+    @property
     def tolerance(self) -> float:
         """The accepted error of a function."""
 
@@ -107,17 +115,38 @@ def facts_of(psf: Field, frame: Size) -> tuple[int, float]:
 
 
 def _of_grid(psf: Field, frame: Size) -> Components:
+    if psf.weights is not None:
+        kernels, weights = (
+            np.asarray(part.array, np.float64) for part in (psf.kernels, psf.weights)
+        )
+        return Components(kernels, weights, *psf.grid_of(frame), 0.0)
     kernels = psf.grid_kernels(frame)
     rows, columns = kernels.shape[:2]
     count = rows * columns
     kernels = _without_colour(kernels)
     field = kernels.reshape(count, *kernels.shape[2:])
     found, weights = _decompose(field, _EXACT, count)
-    if len(found) >= count:
-        found, weights = field, np.eye(count)
     xs, ys = psf.grid_of(frame)
+    # The columns of a grid share the transforms along rows.
+    if columns + count <= 2 * len(found):
+        # Column by column, as `grid_rows` has it.
+        found, weights = kernels.swapaxes(0, 1).reshape(field.shape), _one_each(rows, columns)
+        return Components(found, weights, xs, ys, 0.0)
     made = Components(found, weights.T.reshape(-1, rows, columns), xs, ys, 0.0)
     return made._replace(error=_error(np.tensordot(weights, found, 1), field))
+
+
+def _one_each(rows: int, columns: int) -> Array:
+    """Return the weights of a grid's kernels, column by column: 1 at their own place."""
+    weights = np.eye(rows * columns).reshape(columns, rows, columns, rows)
+    return weights.swapaxes(2, 3).reshape(-1, rows, columns)
+
+
+def grid_rows(made: Components) -> int:
+    """Return how many kernels are below each other in a grid of kernels; 1: they are no grid."""
+    count, rows, columns = made.weights.shape
+    is_grid = count == rows * columns and np.array_equal(made.weights, _one_each(rows, columns))
+    return rows if is_grid else 1
 
 
 def _of_function(psf: Field, frame: Size) -> Components:

@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 
 from vkbloom._array_cache import keep
 from vkbloom._core_kernel import CoreKernel, core_image
+from vkbloom._psf.base import Array
+from vkbloom._psf.components import Components, grid_rows
 from vkbloom._psf.places import Size, pixel_places, places_before
 from vkbloom._psf.varying import Varying
 
@@ -19,24 +21,39 @@ _WIDTH: Final = 4096
 def core_field(psf: Varying, frame: Size, buffers: Size) -> tuple[Any, ...] | None:
     """Return a field as the core reads it; None if its only kernel has no weights.
 
-    - The number of kernels, and whether they gather.
-    - Whether the weight of the first kernel is 1.
+    - The number of kernels, how many of them are below each other in a grid, and whether they
+      gather.
+    - Whether the first weight is 1.
     - Columns and rows of the grid of weights.
     - Images of the weights and of the buffers' places in the grid.
     """
     made = psf.components(frame)
-    unweighted = bool((made.weights[0] == 1).all())
+    down, weights = _factors(made)
+    unweighted = bool((weights[0] == 1).all())
     if len(made.kernels) == 1 and unweighted:
         return None
-    rows, columns = made.weights.shape[1:]
-    places = _places(psf, frame, buffers)
-    return (len(made.kernels), psf.gathers, unweighted, columns, rows, _weights(psf, frame), places)
+    rows, columns = weights.shape[1:]
+    kernels = len(made.kernels), down, psf.gathers
+    images = _weights(psf, frame), _places(psf, frame, buffers)
+    return (*kernels, unweighted, columns, rows, *images)
+
+
+def _factors(made: Components) -> tuple[int, Array]:
+    """Return the rows of a grid of kernels, and the weights of its columns and then of its rows.
+
+    Or 1, and the weights of each kernel.
+    """
+    if (down := grid_rows(made)) == 1:
+        return 1, made.weights
+    count, rows, columns = made.weights.shape
+    of_kernels = made.weights.reshape(count // down, down, rows, columns)
+    return down, np.concatenate([of_kernels.sum(axis=1), of_kernels.sum(axis=0)])
 
 
 @keep
 def _weights(psf: Varying, frame: Size) -> CoreKernel:
     """Return the weights, four in each texel: grids side by side and below each other."""
-    weights = psf.components(frame).weights
+    weights = _factors(psf.components(frame))[1]
     count, rows, columns = weights.shape
     grids = -(-count // 4)
     across = max(min(_WIDTH // columns, grids), 1)

@@ -34,19 +34,24 @@ _NAMED: Final = frozenset({"u", "v", "radius", "angle", "aspect"})
 _PLACES: Final = 9
 
 
-def _read_kernels(kernels: Any) -> ArrayValue:
-    """Return an array (gy, gx, h, w) or (gy, gx, h, w, 3), or raise TypeError or ValueError."""
+def _read_array(name: str, values: Any) -> ArrayValue:
     # Zarr arrays are not arrays of NumPy, but convert to these.
-    held = ArrayValue(kernels, "kernels")
-    shape = held.array.shape
-    if len(shape) not in (4, 5) or shape[4:] not in ((), (3,)) or 0 in shape:
-        raise ValueError(
-            f"kernels: shape {shape} is not (gy, gx, h, w) or (gy, gx, h, w, 3) with sides of at "
-            "least 1"
-        )
+    held = ArrayValue(values, name)
     if not np.isfinite(held.array).all():
-        raise ValueError("kernels: some numbers are not finite as float32")
+        raise ValueError(f"{name}: some numbers are not finite as float32")
     return held
+
+
+def _check_shapes(kernels: tuple[int, ...], weights: tuple[int, ...] | None) -> None:
+    """Raise ValueError unless kernels are those of a grid, or have weights of such a shape."""
+    form = "(gy, gx, h, w)" if weights is None else "(K, h, w)"
+    sides = form.count(",") + 1
+    if len(kernels) not in (sides, sides + 1) or kernels[sides:] not in ((), (3,)) or 0 in kernels:
+        raise ValueError(
+            f"kernels: shape {kernels} is not {form} or {form[:-1]}, 3) with sides of at least 1"
+        )
+    if weights is not None and (len(weights) != 3 or 0 in weights or weights[0] != kernels[0]):
+        raise ValueError(f"weights: shape {weights} is not ({kernels[0]}, gy, gx)")
 
 
 class _Functions:
@@ -129,6 +134,9 @@ class Varying(PSF):
         Factors of the widths of red, green and blue, above 0.
     lateral : (float, float, float), optional
         Lateral colour: red, green and blue are shifted outwards by these pixels times the radius.
+    weights : array-like, shape (K, gy, gx), optional
+        The weights of K kernels, of shape (K, h, w) or (K, h, w, 3), at the positions: the kernel
+        of a place is the sum over k of weights[k] kernels[k]. They have derivatives, "psf.weights".
     tolerance : float
         Of a function: the error of the result that is accepted, above 0 up to 1. See Notes.
 
@@ -136,7 +144,7 @@ class Varying(PSF):
     ------
     TypeError, ValueError
         An argument has another type, shape or range, both or neither of `kernels` and `function`
-        are given, or the positions are not a grid.
+        are given, the positions are not a grid, or there are weights and no kernels, or scales.
 
     Notes
     -----
@@ -170,13 +178,14 @@ class Varying(PSF):
     #: Whether each pixel collects light by its own kernel, instead of spreading it.
     gathers: ClassVar[bool] = False
 
-    kernels: Any = value_field(None, read=_read_kernels)
+    kernels: Any = value_field(None, read=lambda given: _read_array("kernels", given))
     positions: Any = value_field(None)
     _: dataclasses.KW_ONLY
     function: Any = value_field(None, read=_read_function)
     size: Any = value_field(None, read=lambda size: check_size("size", size))
     scales: Any = value_field(None, read=lambda given: _read_three("scales", given, 0.0))
     lateral: Any = value_field(None, read=lambda given: _read_three("lateral", given, -math.inf))
+    weights: Any = value_field(None, read=lambda given: _read_array("weights", given))
     tolerance: float = value_field(1e-3, read=_read_tolerance)
 
     def __post_init__(self) -> None:
@@ -188,14 +197,19 @@ class Varying(PSF):
             raise TypeError(f"{type(self).__name__}: either kernels or function is needed")
         super().__post_init__()
         if self.function is not None:
-            if self.positions is not None:
-                raise TypeError("positions: those of kernels; a function has none")
+            for name in ("positions", "weights"):
+                if getattr(self, name) is not None:
+                    raise TypeError(f"{name}: those of kernels; a function has none")
             return
         if self.size is not None:
             raise TypeError("size: that of a function's kernels; an array has its own")
+        _check_shapes(self.kernels.array.shape, self.weights and self.weights.array.shape)
+        for name in ("scales", "lateral"):
+            if self.weights is not None and getattr(self, name) is not None:
+                raise TypeError(f"{name}: kernels with weights are not changed by the place")
         if self.positions is not None:
-            grid = self.kernels.array.shape[:2]
-            object.__setattr__(self, "positions", _read_positions(self.positions, *grid))
+            positions = _read_positions(self.positions, *self._grid_shape)
+            object.__setattr__(self, "positions", positions)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the name of the class, and the fields by name.
@@ -353,6 +367,9 @@ class Varying(PSF):
 
     @property
     def _mean(self) -> samples:
+        if self.weights is not None:
+            shares = self.weights.array.mean(axis=(1, 2), dtype=np.float64)
+            return samples(np.tensordot(shares, self._kernels, 1))
         side = 1001  # of a picture in which the places of `kernels` without positions do not matter
         if self.kernels is not None and self.scales is None and self.lateral is None:
             kernels = in_grey(self._kernels) if self._kernels.ndim == 4 else self._kernels
@@ -369,18 +386,27 @@ class Varying(PSF):
     def _middle(self) -> NDArray[Any]:
         """The kernel of the field's centre, or of the grid's first position."""
         if self.kernels is not None:
-            return cast("NDArray[Any]", self.kernels.array[0, 0])
+            given = self.kernels.array[0]
+            return cast("NDArray[Any]", given if self.weights is not None else given[0])
         return self._evaluate(0.0, 0.0, 1.0)
+
+    @property
+    def _grid_shape(self) -> tuple[int, int]:
+        """Rows and columns of the grid of kernels, or of weights."""
+        own = self.kernels.array.shape[:2] if self.weights is None else self.weights.array.shape[1:]
+        return int(own[0]), int(own[1])
 
     def grid_of(self, frame: Size) -> tuple[Array, Array]:
         """Return the x of the grid's columns and the y of its rows for a picture, in pixels."""
         if self.positions is not None:
             return np.array(self.positions[0]), np.array(self.positions[1])
-        rows, columns = self.kernels.array.shape[:2]
+        rows, columns = self._grid_shape
         return np.linspace(0, frame[0] - 1, columns), np.linspace(0, frame[1] - 1, rows)
 
     def grid_kernels(self, frame: Size) -> Array:
         """Return the kernels at the grid's positions, (gy, gx, h, w) or (gy, gx, h, w, 3)."""
+        if self.weights is not None:
+            return np.tensordot(self.weights.array.astype(np.float64), self._kernels, (0, 0))
         if self.scales is None and self.lateral is None:
             return self._kernels
         xs, ys = self.grid_of(frame)

@@ -81,7 +81,7 @@ def _end_instances() -> None:
 
 
 #: What adjoint passes compute: derivatives by images, or sums of derivatives by fields.
-DerivativeKind = Literal["images", "sums", "all"]
+DerivativeKind = Literal["images", "sums", "all", "weights"]
 
 
 def _frame_seconds() -> float:

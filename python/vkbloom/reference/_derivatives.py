@@ -70,9 +70,10 @@ def vjp(
         ``pullback(cotangents)`` takes arrays by framebuffer, of their shapes. With S the sum over
         all framebuffers of (framebuffer . cotangent), it returns the derivatives of S: by "image",
         "mask" (H, W) and "emission" if they were given, by "kernel" (of `vkbloom.Convolution`), and
-        by each real field under its name. Fields of glare have names such as "glare.0.intensity".
-        Values are derivatives by real units: for uint8, by value / 255. At NaN and infinity of the
-        image they are 0. Any other name, such as that of an integer field, raises ValueError.
+        by each real field under its name. Fields of glare have names such as "glare.0.intensity",
+        the weights of a `vkbloom.psf.Varying` "psf.weights". Values are derivatives by real units:
+        for uint8, by value / 255. At NaN and infinity of the image they are 0. Any other name, such
+        as that of an integer field, raises ValueError.
 
     Raises
     ------
@@ -120,6 +121,9 @@ def vjp(
                 results[name] = np.where(np.isfinite(pixels), results[name], 0.0)
         if "mask" in results:
             results["mask"] = results["mask"][..., 0]
+        known = differentiable(settings)
+        if "psf.weights" in known:
+            results["psf.weights"] = traced.by_weights(results, known["psf.weights"].shape)
         return results
 
     given = {"image": image, "mask": mask, "emission": emission}
@@ -163,6 +167,9 @@ def differentiable(settings: Any) -> dict[str, Any]:
         for name, info in fields_of(type(settings)).items()
         if info.differentiable and not info.fixed and _is_real(getattr(settings, name))
     }
+    weights = getattr(getattr(settings, "psf", None), "weights", None)
+    if weights is not None:
+        fields["psf.weights"] = weights.array
     for index, stage in enumerate(getattr(settings, "glare", ())):
         fields |= {f"glare.{index}.{name}": value for name, value in differentiable(stage).items()}
     return fields
@@ -207,8 +214,17 @@ class _TracedSettings:
             self.kernel = self._kernel
 
     def _kernel(self, *sizes: tuple[int, int]) -> Traced:
+        self._sizes = sizes
         self._inputs["kernel"] = Traced(self._settings.kernel(*sizes))
         return self._inputs["kernel"]
+
+    def by_weights(self, derivatives: Mapping[str, Array], shape: tuple[int, ...]) -> Array:
+        """Return derivatives by the weights of a field from those by the kernels of its grid."""
+        if "kernel" not in derivatives:
+            return np.zeros(shape)
+        kernels = np.array(self._settings._component_kernels(*self._sizes))
+        made: Array = np.einsum("jihwc,khwc->kji", derivatives["kernel"], kernels, optimize=True)
+        return made
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._settings, name)
