@@ -74,6 +74,23 @@ def test_kernels_may_depend_on_the_place(renderer: Renderer, lens: Any) -> None:
     assert back == pytest.approx(forth, rel=1e-6)
 
 
+def test_weights_of_kernels_are_learned(renderer: Renderer) -> None:
+    """They are a tensor whose derivative is that of the reference."""
+    kernels = np.stack([spot(0, 0), spot(1, -1)])
+    lens = vkbloom.psf.Varying(kernels, weights=np.linspace(0, 1, 12).reshape(2, 2, 3))
+    settings = vkbloom.Convolution(lens, composite="mix", intensity=1)
+    module = vkbloom_torch.Bloom(settings, learn=("psf.weights",), renderer=renderer)
+    image = tensor(9, 12, 3)
+    final = module(image)
+    final.sum().backward()
+    exact = vkbloom.reference.vjp(image.detach().cpu().numpy(), settings)[1](
+        {"final": np.ones(image.shape)}
+    )["psf.weights"]
+    made = module.learned["psf_weights"].grad.cpu().numpy()
+    np.testing.assert_allclose(made, exact, rtol=0, atol=1e-5 * abs(exact).max())
+    assert module.settings.value_of("psf.weights") == lens.weights
+
+
 def test_derivatives_are_those_of_the_renderer(renderer: Renderer) -> None:
     image, cotangent = tensor(2, 7, 9, 3), tensor(2, 7, 9, 3, seed=2).detach()
     module = vkbloom_torch.Bloom(SETTINGS, learn=("intensity", "threshold"), renderer=renderer)
