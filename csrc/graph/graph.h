@@ -136,11 +136,12 @@ enum vkb_blend {
 
 // Of a pass of a convolution by transforms: the lengths of its lines along rows and columns,
 // whether these are padded, so that they may be longer, and how many stages along the same axis
-// follow each other from this one on; 0: it is not the first of them.
+// follow each other from this one on; 0: it is not the first of them. `last_radix`: of a last stage
+// along columns whose results only products read, and of these products, which may do that stage.
 struct vkb_transform {
     uint32_t width, height;
     bool pads_rows, pads_columns;
-    uint32_t stages;
+    uint32_t stages, last_radix;
 };
 
 // Bindings: 0 is the parameter block, then the images read, by slot, then the targets of a

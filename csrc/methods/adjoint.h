@@ -11,8 +11,8 @@
 struct vkb_cotangents {
     vkb_image_name names[GATHERED_LEVELS];
     uint32_t count;
-    bool images;  // the derivatives by images are wanted
-    bool sums;    // those by fields
+    bool images;   // the derivatives by images are wanted
+    bool sums;     // those by fields
     bool weights;  // those by the weights of a field of kernels
 };
 

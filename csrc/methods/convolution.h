@@ -43,8 +43,8 @@ struct vkb_convolution vkb_describe_convolution(const struct vkb_settings *setti
 // too, and begins `first` texels before the image.
 void vkb_transpose_axes(struct vkb_convolution *convolution);
 
-// The first stage of the first transform, which reads what is convolved. A copy: adding passes moves
-// those of the graph.
+// The first stage of the first transform, which reads what is convolved. A copy: adding passes
+// moves those of the graph.
 struct vkb_pass_row vkb_find_transform(const struct vkb_graph *graph);
 
 // Adds the transpose of a convolution of the source's glow, with the spectrum that the convolution

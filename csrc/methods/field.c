@@ -7,10 +7,10 @@
 // are multiplied after it: sum of w_k (K_k * x). Then there is one transform, and a way back for
 // each kernel. Each is the transpose of the other one, with conjugate spectra.
 //
-// Transforms multiply by weights where they read or store pixels. The weights of a grid are products
-// of one of its column and one of its row, w_k = a_i(x) b_j(y). Then a transform along rows, of
-// a_i x, is shared by the kernels of a column of the grid, whose transforms along columns begin with
-// b_j; on the way back these end with b_j and are added up before the rows.
+// Transforms multiply by weights where they read or store pixels. The weights of a grid are
+// products of one of its column and one of its row, w_k = a_i(x) b_j(y). Then a transform along
+// rows, of a_i x, is shared by the kernels of a column of the grid, whose transforms along columns
+// begin with b_j; on the way back these end with b_j and are added up before the rows.
 #include "methods/field.h"
 
 #include <stdio.h>
@@ -75,12 +75,15 @@ static void add_weights(struct vkb_levels *levels, uint32_t *weights)
     const struct vkb_image_row of_places = vkb_given_image("field_places", &data->places);
     const uint32_t grid = vkb_levels_add(levels, &of_grid);
     const uint32_t places = vkb_levels_add(levels, &of_places);
+    const struct vkb_size *buffers = &levels->source->buffers;
+    // Along an axis with one place they are the same. Transforms read the nearest pixel.
+    const struct vkb_size size = {data->columns > 1 ? buffers->width : 1,
+                                  data->rows > 1 ? buffers->height : 1};
 
     for (uint32_t i = 0; i < (vkb_count_weights(data) + 3) / 4; ++i) {
         char name[VKB_NAME_SIZE];
         snprintf(name, sizeof name, "field_weights_%u", i);
-        weights[i] = vkb_levels_target(levels, name, VKB_FORMAT_RGBA32_FLOAT,
-                                       levels->source->buffers, false);
+        weights[i] = vkb_levels_target(levels, name, VKB_FORMAT_RGBA32_FLOAT, size, false);
         struct vkb_pass_row row =
             vkb_fullscreen_row("kernel", &vkb_shader_field_weights_frag, weights[i]);
         vkb_read_only(&row, grid);
@@ -126,9 +129,10 @@ static void set_radices(const struct vkb_convolution *convolution,
 }
 
 // Adds the sum of products of spectra of images and kernels. `added` is a sum that is added;
-// VKB_NO_IMAGE: none.
+// VKB_NO_IMAGE: none. `last_radix`: as in struct vkb_transform.
 static uint32_t add_products(const struct vkb_convolving *passes, const uint32_t *images,
-                             const uint32_t *kernels, uint32_t count, uint32_t added)
+                             const uint32_t *kernels, uint32_t count, uint32_t last_radix,
+                             uint32_t added)
 {
     const uint32_t target =
         vkb_add_spectrum(passes, "product", vkb_padded_size(passes->convolution));
@@ -145,6 +149,7 @@ static uint32_t add_products(const struct vkb_convolving *passes, const uint32_t
     row.constants.stage = passes->levels->settings->kernel.grey ? STAGE_GREY : STAGE_PRODUCT;
     row.block = VKB_BLOCK_products;
     row.transform = vkb_transform_of(passes->convolution, 0);
+    row.transform.last_radix = last_radix;
     row.params.products.kernel_sign = vkb_conjugates(passes) ? -1.0f : 1.0f;
     if (!passes->levels->settings->kernel.grey)
         set_radices(passes->convolution, &row.params.products);
@@ -157,7 +162,12 @@ static uint32_t add_spread(const struct vkb_convolving *passes, const struct fie
                            uint32_t image, const struct vkb_image_row *result)
 {
     const struct vkb_field *data = &passes->levels->settings->field;
+    const struct vkb_fft_line *line = &passes->convolution->y.line;
+    struct vkb_graph *graph = passes->levels->graph;
     uint32_t sum = VKB_NO_IMAGE, rows = VKB_NO_IMAGE, images[VKB_MAX_FIELD];
+    // The first stage pads. A kernel with colours needs a frequency of another block, too.
+    const bool joins = line->stage_count > 1 && passes->levels->settings->kernel.grey;
+    const uint32_t last_radix = joins ? line->radices[line->stage_count - 1] : 0;
 
     for (uint32_t k = 0; k < data->count; ++k) {
         VKB_OF_KERNEL(own, passes, k);
@@ -166,11 +176,13 @@ static uint32_t add_spread(const struct vkb_convolving *passes, const struct fie
         if (k % data->down == 0)
             rows = vkb_add_rows(&own, image, &column);
         images[k] = vkb_add_columns(&own, rows, &row);
+        if (!passes->levels->failed)
+            graph->passes[graph->pass_count - 1].transform.last_radix = last_radix;
     }
     for (uint32_t k = 0; k < data->count; k += MAX_PRODUCTS) {
         const uint32_t some = data->count - k < MAX_PRODUCTS ? data->count - k : MAX_PRODUCTS;
         VKB_OF_KERNEL(own, passes, k);
-        sum = add_products(&own, images + k, field->spectra + k, some, sum);
+        sum = add_products(&own, images + k, field->spectra + k, some, last_radix, sum);
     }
     const uint32_t columns = vkb_add_columns_back(passes, sum, VKB_NO_IMAGE, &vkb_unweighted);
     return vkb_add_rows_back(passes, columns, &vkb_unweighted, result);
@@ -182,7 +194,7 @@ static uint32_t add_product_back(const struct vkb_convolving *passes, uint32_t s
 {
     if (passes->levels->settings->kernel.grey)
         return vkb_add_columns_back(passes, spectrum, kernel, weighing);
-    const uint32_t product = add_products(passes, &spectrum, &kernel, 1, VKB_NO_IMAGE);
+    const uint32_t product = add_products(passes, &spectrum, &kernel, 1, 0, VKB_NO_IMAGE);
     return vkb_add_columns_back(passes, product, VKB_NO_IMAGE, weighing);
 }
 
@@ -291,7 +303,8 @@ static bool add_by_weights(struct vkb_adjoint *adjoint, const struct vkb_convolv
     add_each(&passes, field, gathers ? glow : cotangents, each);
     for (uint32_t k = 0; k < settings->field.count && !levels->failed; ++k) {
         const bool moved = !vkb_axis_is_identity(&fold->x) || !vkb_axis_is_identity(&fold->y);
-        if (moved && !gathers && !vkb_filter_to_image(adjoint, fold, each[k], size, each + k, error))
+        if (moved && !gathers
+            && !vkb_filter_to_image(adjoint, fold, each[k], size, each + k, error))
             return false;
     }
     for (uint32_t k = 0; k < settings->field.count; k += 4) {

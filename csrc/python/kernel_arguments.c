@@ -65,9 +65,9 @@ static bool read_field_tuple(PyObject *tuple, struct vkb_size buffers, Py_buffer
     PyObject *of_weights, *of_places;
 
     if (!vkb_require_tuple(tuple, "field")
-        || !PyArg_ParseTuple(tuple, "IIppIIOO:core_field", &field->count, &field->down, &field->gathers,
-                             &field->first_unweighted, &field->columns, &field->rows, &of_weights,
-                             &of_places)
+        || !PyArg_ParseTuple(tuple, "IIppIIOO:core_field", &field->count, &field->down,
+                             &field->gathers, &field->first_unweighted, &field->columns,
+                             &field->rows, &of_weights, &of_places)
         || !read_kernel_tuple(of_weights, weights, &field->weights)
         || !read_kernel_tuple(of_places, places, &field->places))
         return false;

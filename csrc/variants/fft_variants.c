@@ -236,7 +236,9 @@ bool vkb_add_field_variant(struct vkb_variant_choice *choice, const struct vkb_p
         || !reaches(choice->device, &choice->graph->images[pass->targets[0]]))
         return false;
     memcpy(&row, pass, sizeof row);
-    vkb_make_linear(&row, &vkb_shader_products_linear_rgba32float, 1, TEXEL_ROWS);
+    row.constants.radix_1 = (int32_t)pass->transform.last_radix;
+    vkb_make_linear(&row, &vkb_shader_products_linear_rgba32float, 1,
+                    pass->transform.last_radix ? pass->transform.last_radix : TEXEL_ROWS);
     return vkb_add_variant_pass(choice, &row);
 }
 
@@ -248,6 +250,9 @@ bool vkb_add_transform_variant(struct vkb_variant_choice *choice, const struct v
     if (!(vkb_computes(pass, VKB_BLOCK_fft) && vkb_fits_linear(choice, pass)
           && reaches(choice->device, target)))
         return false;
+    // The products, whose images are alike, do this stage.
+    if (pass->transform.last_radix)
+        return true;
     const struct vkb_image_row *from = &choice->graph->images[pass->reads[SLOT_SOURCE]];
     memcpy(&row, pass, sizeof row);
     row.reading = VKB_READING_LINEAR_TEXELS;

@@ -73,6 +73,7 @@ def simulate(
     seed: int,
     *,
     noise: float = 0.01,
+    max_calls: int = 60,
     level: float = 0.95,
     spoil: Callable[[NDArray[Any], float, np.random.Generator], NDArray[Any]] | None = None,
     **options: Any,
@@ -92,7 +93,7 @@ def simulate(
         study.start.replace(**middle),
         list(truth),
         renderer=renderer,
-        max_calls=60,
+        max_calls=max_calls,
         **options,
     )
     return {name: (value, found.interval(name, level)) for name, value in truth.items()}

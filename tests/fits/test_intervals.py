@@ -55,16 +55,27 @@ def noisy(truth: Settings, noise: float = 0.01, image: Image = IMAGE) -> Image:
 
 
 def test_intervals_have_the_truth(renderer: Renderer) -> None:
-    """Of 500 simulated fits of 2 to 5 fields, 93 to 97 %; of the 42 of a usual run, most."""
-    count = 84 if EXHAUSTIVE else 7
-    run = functools.partial(simulate, renderer, IMAGE)
-    hits = [
-        low <= truth <= high
-        for study in STUDIES.values()
-        for seed in range(count)
-        for truth, (low, high) in run(study, seed).values()
-    ]
+    """Of 500 simulated fits of 2 to 5 fields, 93 to 97 %; of the 42 of a usual run, most.
+
+    Of each method 90 %: the two to five fields of a fit err together. Of `Separable`, 60 calls from
+    a blur scale of 2, which often lies between two minima of the loss, are too few: then they have
+    84 %.
+    """
+    count, calls = (84, 120) if EXHAUSTIVE else (7, 60)
+    run = functools.partial(simulate, renderer, IMAGE, max_calls=calls)
+    by_method = {
+        name: [
+            low <= truth <= high
+            for seed in range(count)
+            for truth, (low, high) in run(study, seed).values()
+        ]
+        for name, study in STUDIES.items()
+    }
+    hits = [hit for found in by_method.values() for hit in found]
     assert len(hits) == 19 * count
+    if EXHAUSTIVE:
+        shares = {name: np.mean(found) for name, found in by_method.items()}
+        assert min(shares.values()) >= 0.9, shares
     share = np.mean(hits)
     # The fields of a fit err together. 0.86 is less than one of a thousand runs has.
     low, high = (0.93, 0.97) if EXHAUSTIVE else (0.86, 1.0)
