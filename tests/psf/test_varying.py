@@ -24,7 +24,7 @@ from tests.psf.fields import (
     vignetted,
 )
 from tests.variants import VARIANTS, open_variant
-from vkbloom import psf, reference
+from vkbloom import psf, reference, testing
 
 FRAME = 21, 15
 BOUNDARIES = "zero", "edge", "wrap"
@@ -341,6 +341,17 @@ def test_a_light_shows_the_kernel_of_its_place(
     )
     alone = scatter(image, kernel_at, "wrap")
     np.testing.assert_allclose(bloom, alone, rtol=0, atol=1e-3 * kernel.max())
+
+
+def test_the_law_of_a_field(renderer: vkbloom.Renderer) -> None:
+    """Lights at nine places show their kernels; those of another field do not."""
+    lens = psf.Varying(function=off_centre)
+    settings = vkbloom.Convolution(lens, format="rgba32float")
+    law: dict[str, Any] = {"size": (48, 40), "field": lens}
+    testing.assert_laws(lambda a: renderer.apply(a, settings)["bloom"][..., :3], "field", **law)
+    others = settings.replace(psf=psf.Varying(function=round_spot))
+    with pytest.raises(AssertionError, match="in place of its kernel's"):
+        testing.assert_laws(lambda a: renderer.apply(a, others)["bloom"][..., :3], "field", **law)
 
 
 def test_a_constant_field_is_a_convolution(any_renderer: vkbloom.Renderer) -> None:
