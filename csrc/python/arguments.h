@@ -67,10 +67,11 @@ struct vkb_held_image {
 };
 
 // An array (H, W, 3) or (H, W, 4) of uint8, float16 or float32, any strides; or (Exported, offset,
-// (H, W, C), strides, bytes of an element). A mask is an array (H, W) of float32. False with an
-// exception set, which begins with the name; the image may be held then, too.
+// (H, W, C), strides, bytes of an element). What has one channel (`vkb_is_grey`) is an array (H, W)
+// of float32, or a tuple as above. False with an exception set, which begins with the name; the
+// image may be held then, too.
 bool vkb_read_image(PyObject *array, const char *name, struct vkb_held_image *image);
-bool vkb_read_mask(PyObject *array, const char *name, struct vkb_held_image *image);
+bool vkb_read_grey(PyObject *array, const char *name, struct vkb_held_image *image);
 
 // Whether the object is memory that CUDA shares; that memory, and to what it belongs.
 bool vkb_is_exported(PyObject *object);

@@ -10,10 +10,11 @@ static enum vkb_format pixel_format(Py_ssize_t channel_size)
                              : VKB_FORMAT_NONE;
 }
 
-static bool check_channels(const char *name, Py_ssize_t channels)
+static bool check_channels(const char *name, Py_ssize_t channels, bool grey)
 {
-    return channels == 3 || channels == 4
-        || vkb_refuse("%s: the number of channels, %zd, is not 3 or 4", name, channels);
+    return (grey ? channels == 1 : channels == 3 || channels == 4)
+        || vkb_refuse("%s: the number of channels, %zd, is not %s", name, channels,
+                      grey ? "1" : "3 or 4");
 }
 
 // Whether all elements lie in the memory. In doubles, since products of strides may not fit.
@@ -35,7 +36,8 @@ static bool check_span(const char *name, const struct vkb_input *input)
 }
 
 // (Exported, offset, shape, strides, bytes of an element[, images of a batch, their stride])
-static bool read_exported(PyObject *tuple, const char *name, struct vkb_held_image *image)
+static bool read_exported(PyObject *tuple, const char *name, bool grey,
+                          struct vkb_held_image *image)
 {
     static VKB_ATOMIC(uint64_t) last_serial;
     struct vkb_input *input = &image->input;
@@ -63,49 +65,55 @@ static bool read_exported(PyObject *tuple, const char *name, struct vkb_held_ima
     if (input->width == 0 || input->height == 0)
         return vkb_refuse("%s: a size of %u x %u is out of range, sides of at least 1", name,
                           input->width, input->height);
-    return check_channels(name, input->channels) && check_span(name, input);
+    return check_channels(name, input->channels, grey) && check_span(name, input);
 }
 
-static bool check_numbers(const char *name, const Py_buffer *view, bool mask)
+static bool check_numbers(const char *name, const Py_buffer *view, bool grey)
 {
     const bool right =
         vkb_is_number(view, VKB_FLOAT32)
-        || (!mask && (vkb_is_number(view, VKB_UINT8) || vkb_is_number(view, VKB_FLOAT16)));
+        || (!grey && (vkb_is_number(view, VKB_UINT8) || vkb_is_number(view, VKB_FLOAT16)));
 
-    return (right && view->ndim == (mask ? 2 : 3))
+    return (right && view->ndim == (grey ? 2 : 3))
         || vkb_refuse("%s: an array with %d dimensions of type '%s' is not %s", name, view->ndim,
                       view->format ? view->format : "B",
-                      mask ? "(H, W) of float32"
+                      grey ? "(H, W) of float32"
                            : "(H, W, 3) or (H, W, 4) of uint8, float16 or float32");
 }
 
-static bool hold_image(PyObject *array, const char *name, bool mask, struct vkb_held_image *image)
+static bool hold_image(PyObject *array, const char *name, bool grey, struct vkb_held_image *image)
 {
     const Py_buffer *view = &image->view;
 
     if (PyObject_GetBuffer(array, &image->view, PyBUF_RECORDS_RO) < 0
-        || !check_numbers(name, view, mask) || !(mask || check_channels(name, view->shape[2])))
+        || !check_numbers(name, view, grey)
+        || !(grey || check_channels(name, view->shape[2], false)))
         return false;
     image->input = (struct vkb_input){
         .memory = view->buf,
         .row_stride = view->strides[0],
         .pixel_stride = view->strides[1],
-        .channel_stride = mask ? view->itemsize : view->strides[2],
-        .format = mask ? VKB_FORMAT_R32_FLOAT : pixel_format(view->itemsize),
+        .channel_stride = grey ? view->itemsize : view->strides[2],
+        .format = grey ? VKB_FORMAT_R32_FLOAT : pixel_format(view->itemsize),
         .width = vkb_side(view->shape[1]),
         .height = vkb_side(view->shape[0]),
-        .channels = mask ? 1 : (uint32_t)view->shape[2],
+        .channels = grey ? 1 : (uint32_t)view->shape[2],
     };
     return true;
 }
 
-bool vkb_read_image(PyObject *array, const char *name, struct vkb_held_image *image)
+static bool read_any(PyObject *array, const char *name, bool grey, struct vkb_held_image *image)
 {
-    return PyTuple_Check(array) ? read_exported(array, name, image)
-                                : hold_image(array, name, false, image);
+    return PyTuple_Check(array) ? read_exported(array, name, grey, image)
+                                : hold_image(array, name, grey, image);
 }
 
-bool vkb_read_mask(PyObject *array, const char *name, struct vkb_held_image *image)
+bool vkb_read_image(PyObject *array, const char *name, struct vkb_held_image *image)
 {
-    return hold_image(array, name, true, image);
+    return read_any(array, name, false, image);
+}
+
+bool vkb_read_grey(PyObject *array, const char *name, struct vkb_held_image *image)
+{
+    return read_any(array, name, true, image);
 }

@@ -21,16 +21,16 @@ static bool read_levels(PyObject *levels, struct vkb_source_object *self)
     return true;
 }
 
-// Whether a part has the size of the image and, unless it is a mask, its format and channels.
+// Whether a part has the size of the image and, unless it has one channel, its format and channels.
 static bool check_part(const struct vkb_held_image *part, const char *name,
                        const struct vkb_held_image *image)
 {
     const struct vkb_input *one = &part->input, *other = &image->input;
-    const bool mask = one->format == VKB_FORMAT_R32_FLOAT;
+    const bool grey = one->channels == 1;
 
     return (one->width == other->width && one->height == other->height
             && one->layers == other->layers
-            && (mask || (one->format == other->format && one->channels == other->channels)))
+            && (grey || (one->format == other->format && one->channels == other->channels)))
         || vkb_refuse("%s: %u x %u with %u channels of %s is not the image's, %u x %u with %u of "
                       "%s",
                       name, one->width, one->height, one->channels, vkb_formats[one->format].dtype,
@@ -39,11 +39,11 @@ static bool check_part(const struct vkb_held_image *part, const char *name,
 }
 
 // A part of one channel. False with an exception set.
-static bool read_grey(PyObject *part, const char *name, enum vkb_input_kind kind,
+static bool read_part(PyObject *part, const char *name, enum vkb_input_kind kind,
                       struct vkb_held_image *images)
 {
     return part == Py_None
-        || (vkb_read_mask(part, name, &images[kind])
+        || (vkb_read_grey(part, name, &images[kind])
             && check_part(&images[kind], name, &images[VKB_INPUT_IMAGE]));
 }
 
@@ -57,7 +57,7 @@ static bool read_parts(PyObject *image, PyObject *emission, PyObject *mask,
         && (emission == Py_None
             || (vkb_read_image(emission, "emission", &images[VKB_INPUT_EMISSION])
                 && check_part(&images[VKB_INPUT_EMISSION], "emission", first)))
-        && read_grey(mask, "mask", VKB_INPUT_MASK, images);
+        && read_part(mask, "mask", VKB_INPUT_MASK, images);
 }
 
 // Motion along x and y, and depth. Motions are both there or not.
@@ -65,9 +65,9 @@ static bool read_geometry(PyObject *const parts[3], struct vkb_held_image *image
 {
     if ((parts[0] == Py_None) != (parts[1] == Py_None))
         return vkb_refuse("motion: it has one axis and not two");
-    return read_grey(parts[0], "motion", VKB_INPUT_MOTION_X, images)
-        && read_grey(parts[1], "motion", VKB_INPUT_MOTION_Y, images)
-        && read_grey(parts[2], "depth", VKB_INPUT_DEPTH, images);
+    return read_part(parts[0], "motion", VKB_INPUT_MOTION_X, images)
+        && read_part(parts[1], "motion", VKB_INPUT_MOTION_Y, images)
+        && read_part(parts[2], "depth", VKB_INPUT_DEPTH, images);
 }
 
 PyObject *vkb_image_source(PyObject *module, PyObject *arguments)

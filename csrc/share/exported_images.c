@@ -76,13 +76,19 @@ static bool copy_strided(struct vkb_run *run, struct vkb_strided_copy_work *work
         VKB_COUNTS_SIZE * (work->layers ? work->layers : 1),
     };
     // All add to the same counts.
-    vkb_barrier_record(run->device, run->submission->commands.buffer, NULL, true,
-                       VKB_ACCESS_DISPATCH_CHANGED, VKB_ACCESS_DISPATCH_CHANGED);
+    if (work->layout.non_finite == VKB_NON_FINITE_COUNTED)
+        vkb_barrier_record(run->device, run->submission->commands.buffer, NULL, true,
+                           VKB_ACCESS_DISPATCH_CHANGED, VKB_ACCESS_DISPATCH_CHANGED);
     return vkb_strided_copy_create(run->device, run->frame->pipelines.cache, work->kind,
                                    &run->frame->strided_copies, error)
         && vkb_strided_copy_record(run->device, &run->frame->strided_copies,
                                    run->submission->commands.buffer, &run->submission->descriptors,
                                    work, error);
+}
+
+static enum vkb_input_kind kind_of(const struct vkb_run *run, const struct vkb_staged_input *staged)
+{
+    return (enum vkb_input_kind)(staged - run->inputs);
 }
 
 // Whether each pixel can be read as words, without gaps.
@@ -93,6 +99,15 @@ static bool is_aligned(const struct vkb_input *input)
     return input->channels == 4 && input->channel_stride == (ptrdiff_t)element_size(input->format)
         && input->offset % 4 == 0 && input->row_stride % 4 == 0 && input->pixel_stride % 4 == 0
         && layer_stride % 4 == 0;
+}
+
+// The host refuses a depth of NaN and a motion that is not finite; of memory of the device it does
+// not know them.
+static enum vkb_non_finite_use non_finite_of(enum vkb_input_kind kind)
+{
+    return !vkb_is_grey(kind)      ? VKB_NON_FINITE_COUNTED
+         : kind == VKB_INPUT_DEPTH ? VKB_NON_FINITE_NAN_IS_ZERO
+                                   : VKB_NON_FINITE_IS_ZERO;
 }
 
 static bool copy_input(struct vkb_run *run, const struct vkb_staged_input *staged,
@@ -119,6 +134,7 @@ static bool copy_input(struct vkb_run *run, const struct vkb_staged_input *stage
                 .stores = staged->send,
                 .layer_stride = (int32_t)input->layer_stride,
                 .aligned = is_aligned(input),
+                .non_finite = non_finite_of(kind_of(run, staged)),
             },
         .from = {input->exported->buffer.handle, span.start, span.end - span.start},
     };
@@ -126,23 +142,38 @@ static bool copy_input(struct vkb_run *run, const struct vkb_staged_input *stage
     return copy_strided(run, &work, error);
 }
 
+// Whether an input of the kinds from `first` to before `end` lies in that memory: both axes of a
+// motion do.
+static bool has_input(const struct vkb_run *run, const struct vkb_export *exported, int first,
+                      int end)
+{
+    for (int kind = first; kind < end; ++kind)
+        if (run->inputs[kind].input && run->inputs[kind].input->exported == exported)
+            return true;
+    return false;
+}
+
 bool vkb_exported_record_input(struct vkb_run *run, struct vkb_staged_input *staged,
                                struct vkb_error *error)
 {
     const VkCommandBuffer commands = run->submission->commands.buffer;
-    const VkBuffer buffer = staged->input->exported->buffer.handle;
+    const struct vkb_export *exported = staged->input->exported;
+    const VkBuffer buffer = exported->buffer.handle;
+    const enum vkb_input_kind kind = kind_of(run, staged);
+    const bool counts = !vkb_is_grey(kind) && staged->input->format != VKB_FORMAT_RGBA8_UNORM;
 
-    vkb_barrier_record_owner(run->device, commands, buffer, VKB_ACCESS_NONE,
-                             VKB_ACCESS_DISPATCH_LOADED);
+    if (!has_input(run, exported, 0, kind))
+        vkb_barrier_record_owner(run->device, commands, buffer, VKB_ACCESS_NONE,
+                                 VKB_ACCESS_DISPATCH_LOADED);
     vkb_image_transition(run->device, commands, &staged->image->image, VKB_ACCESS_DISPATCH_STORED);
     // Non-finite elements are counted again in each submission.
-    if ((staged->send || staged->input->format != VKB_FORMAT_RGBA8_UNORM)
-        && !copy_input(run, staged, error))
+    if ((staged->send || counts) && !copy_input(run, staged, error))
         return false;
     staged->image->content.valid = true;
     // CUDA may fill it again, and another submission acquire it.
-    vkb_barrier_record_owner(run->device, commands, buffer, VKB_ACCESS_DISPATCH_LOADED,
-                             VKB_ACCESS_PRESENTED);
+    if (!has_input(run, exported, kind + 1, VKB_INPUT_COUNT))
+        vkb_barrier_record_owner(run->device, commands, buffer, VKB_ACCESS_DISPATCH_LOADED,
+                                 VKB_ACCESS_PRESENTED);
     return true;
 }
 

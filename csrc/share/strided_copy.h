@@ -29,6 +29,13 @@ bool vkb_strided_copy_create(const struct vkb_device *device, VkPipelineCache ca
                              struct vkb_error *error);
 void vkb_strided_copy_destroy(const struct vkb_device *device, struct vkb_strided_copies *copies);
 
+// What becomes of NaN and infinity in a copy to an image.
+enum vkb_non_finite_use {
+    VKB_NON_FINITE_COUNTED,
+    VKB_NON_FINITE_NAN_IS_ZERO,
+    VKB_NON_FINITE_IS_ZERO,
+};
+
 // The push constants of strided_copy.glsl: the layout of the buffer, strides in bytes. A copy from
 // an image is dense.
 struct vkb_strided_copy_layout {
@@ -37,6 +44,7 @@ struct vkb_strided_copy_layout {
     uint32_t size, stores;
     int32_t layer_stride;  // a multiple of 16 where a copy is from images
     uint32_t aligned;      // pixels of four channels that begin with words, without gaps
+    uint32_t non_finite;   // enum vkb_non_finite_use
 };
 
 // By its kind, `image` stands in place of `from` or `to`.

@@ -233,7 +233,7 @@ static bool stage_exported(struct vkb_run *run, const struct pixels *pixels, boo
     staged->input = input;
     staged->send =
         !vkb_content_holds(&staged->image->content, &input->serial, sizeof input->serial);
-    run->unknown_non_finite = true;
+    run->unknown_non_finite = run->unknown_non_finite || !vkb_is_grey(pixels->kind);
     return !staged->send
         || vkb_content_begin_writing(&staged->image->content, &run->frame->cache.clock,
                                      &input->serial, sizeof input->serial, error);

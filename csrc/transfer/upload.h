@@ -11,7 +11,7 @@
 #include <stddef.h>
 
 // The caller's pixels, with any strides (in bytes): in host memory, or in memory that CUDA shares,
-// from byte `offset` on. Then `serial` is the pixels' own.
+// from byte `offset` on. Then `serial` is the pixels' own, and `format` one with such elements.
 struct vkb_input {
     const void *memory;
     struct vkb_export *exported;  // NULL: in host memory

@@ -49,9 +49,9 @@ def image_source(
     emission: _Array | _ExportedImage | None = None,
     mask: NDArray[np.float32] | None = None,
     levels: tuple[_Array | _ExportedImage, ...] = (),
-    motion_x: NDArray[np.float32] | None = None,
-    motion_y: NDArray[np.float32] | None = None,
-    depth: NDArray[np.float32] | None = None,
+    motion_x: NDArray[np.float32] | _ExportedImage | None = None,
+    motion_y: NDArray[np.float32] | _ExportedImage | None = None,
+    depth: NDArray[np.float32] | _ExportedImage | None = None,
     /,
 ) -> Source: ...
 def scene_source(block: bytes, pictures: bytes, arrays: tuple[NDArray[Any], ...], /) -> Source: ...

@@ -116,7 +116,7 @@ def check_mask(mask: object, size: tuple[int, int], dtype: Any = np.float32) -> 
 
 def check_motion(motion: object, size: tuple[int, int], dtype: Any = np.float32) -> NDArray[Any]:
     """Return the motion as floats, (H, W, 2), if it has that height and width and is finite."""
-    values = _check_geometry("motion", motion, (*size, 2), dtype)
+    values = _as_geometry("motion", motion, (*size, 2), dtype)
     # Not the other way round, so that NaN fails too.
     if not (values.min() >= -MAX_FLOAT and values.max() <= MAX_FLOAT):
         raise ValueError("motion: some values are not finite; set them to 0")
@@ -125,20 +125,25 @@ def check_motion(motion: object, size: tuple[int, int], dtype: Any = np.float32)
 
 def check_depth(depth: object, size: tuple[int, int], dtype: Any = np.float32) -> NDArray[Any]:
     """Return the depth as floats, (H, W), if it has that height and width and has no NaN."""
-    values = _check_geometry("depth", depth, size, dtype)
+    values = _as_geometry("depth", depth, size, dtype)
     if np.isnan(values.min()):
         raise ValueError("depth: some values are NaN; set them to that of the farthest surface")
     return values
 
 
-def _check_geometry(
-    name: str, given: object, shape: tuple[int, ...], dtype: DTypeLike
-) -> NDArray[Any]:
-    array = view_image(given, name, ("y", "x", "channel")[: len(shape)])
-    if array.dtype.name not in ("float16", "float32", "float64"):
-        raise TypeError(f"{name}: dtype {array.dtype} is not one of float16, float32, float64")
+def check_geometry(name: str, array: Any, shape: tuple[int, ...], dtypes: tuple[str, ...]) -> None:
+    """Raise TypeError or ValueError for a motion or a depth of another dtype or shape."""
+    if np.dtype(array.dtype).name not in dtypes:
+        raise TypeError(f"{name}: dtype {array.dtype} is not one of {', '.join(dtypes)}")
     if array.shape != shape:
         hint = "; take one channel: depth[..., 0]" * (array.shape == (*shape, 1))
         raise ValueError(f"{name}: shape {array.shape} is not {shape}, as the image needs{hint}")
+
+
+def _as_geometry(
+    name: str, given: object, shape: tuple[int, ...], dtype: DTypeLike
+) -> NDArray[Any]:
+    array = view_image(given, name, ("y", "x", "channel")[: len(shape)])
+    check_geometry(name, array, shape, ("float16", "float32", "float64"))
     with np.errstate(over="ignore"):
         return array.astype(dtype, copy=False)

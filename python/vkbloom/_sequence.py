@@ -28,7 +28,7 @@ from vkbloom._renderer.default import default_renderer, take_exposure
 from vkbloom._renderer.device_arrays import Device, on_cuda
 from vkbloom._renderer.frames import Frames
 from vkbloom._renderer.renderer import Renderer
-from vkbloom._renderer.sources import SCENE_SIZE
+from vkbloom._renderer.sources import OF_SCENES, SCENE_SIZE
 from vkbloom._settings.antialiasing import Antialiasing, check_antialiasing, check_use
 from vkbloom._settings.exposure import Exposure
 from vkbloom._settings.settings import Settings, Shading, check_settings
@@ -686,7 +686,7 @@ def sequence(
         if mask is not None or emission is not None:
             raise ValueError("mask: a scene takes neither a mask nor an emission")
         if motion is not None or depth is not None:
-            raise ValueError("motion: a scene has its own motion and depth; leave them out")
+            raise ValueError(f"motion: {OF_SCENES}")
         how |= {"size": size, "shading": shading}
         work = _work_of_scene(opened, frames, how, stages)
         return Sequence(_Turns(clock, chosen), work, clock, **begun)

@@ -13,4 +13,5 @@ layout(push_constant) uniform Layout
     uint stores;  // 0: elements are only counted
     int layer_stride;
     uint aligned;  // pixels of four channels that begin with words, and whose elements are adjacent
+    uint non_finite;  // enum vkb_non_finite_use
 } layout_;

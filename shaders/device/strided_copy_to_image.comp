@@ -1,6 +1,6 @@
-// From a buffer with any strides to an image, and how many elements are NaN or infinite. An
-// invocation moves a pixel: those of a group are a tile, since drivers keep the pixels of a tile
-// together.
+// From a buffer with any strides to an image, and how many elements are NaN or infinite, unless
+// these become 0. An invocation moves a pixel: those of a group are a tile, since drivers keep the
+// pixels of a tile together.
 
 #include "device/strided_copy.glsl"
 
@@ -20,18 +20,27 @@ shared uint sums[2];
 
 const uint COUNTS_WORDS = 64;         // VKB_COUNTS_SIZE
 const ivec2 TILE = ivec2(16, 8);  // as in strided_copy.c
+// enum vkb_non_finite_use
+const uint COUNTED = 0, IS_ZERO = 2;
 
 uint nan = 0, infinite = 0;
 
-void count(uint value)
+// Returns the element that is stored.
+uint count(uint value)
 {
     if (layout_.size == 1)
-        return;
+        return value;
     uint exponent = layout_.size == 4 ? 0x7f800000u : 0x7c00u;
     uint magnitude = value & (layout_.size == 4 ? 0x7fffffffu : 0x7fffu);
 
-    nan += uint(magnitude > exponent);
-    infinite += uint(magnitude == exponent);
+    if (layout_.non_finite == COUNTED) {
+        nan += uint(magnitude > exponent);
+        infinite += uint(magnitude == exponent);
+        return value;
+    }
+    bool is_zero = magnitude > exponent
+                || (magnitude == exponent && layout_.non_finite == IS_ZERO);
+    return is_zero ? 0u : value;
 }
 
 // A channel that the buffer does not have is 1.
@@ -76,7 +85,7 @@ void move()
     uvec4 raw = elements(uint(layout_.offset + int(gl_WorkGroupID.z) * layout_.layer_stride
                               + at.y * layout_.row_stride + at.x * layout_.pixel_stride));
     for (int channel = 0; channel < 4; ++channel)
-        count(raw[channel]);
+        raw[channel] = count(raw[channel]);
     if (layout_.stores != 0)
         imageStore(to_image, at,
                    vec4(number(raw.x), number(raw.y), number(raw.z), number(raw.w)));

@@ -61,6 +61,10 @@ class TestAxes:
                 ],
             ),
             ("dt=0.1,1", [0.1, 1]),
+            (
+                "taa=bevy;o3de:gamma=2",
+                [vkbloom.antialiasing["bevy"], vkbloom.O3deAntialiasing(gamma=2)],
+            ),
             ("direct=off,on", [False, True]),
             ("bloom_size=none,64x32", [None, (64, 32)]),
             ("weights=0.5,0.25;1;", [(0.5, 0.25), (1.0,)]),
@@ -166,6 +170,15 @@ class TestImageFiles:
         # Such a folder may exist.
         (tmp_path / "g.exr").mkdir()
         succeed(*words)
+
+
+def test_points_have_anti_aliasing(tmp_path: Path, image_file: Path) -> None:
+    """The first frame of an engine, which HDRP sharpens."""
+    out = tmp_path / "a.zarr"
+    succeed(image_file, "--taa hdrp --axis intensity=0.1,0.2 --preset kino -o", out)
+    found = xr.open_zarr(out)["final"].sel(intensity=0.2)
+    expected = vkbloom.apply(image_file, "kino", intensity=0.2, taa="hdrp")["final"]
+    np.testing.assert_array_equal(found, expected)
 
 
 def test_exposures_are_in_the_records_of_files(tmp_path: Path, image_file: Path) -> None:

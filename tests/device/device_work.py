@@ -25,6 +25,7 @@ from tests.custom import TRAIL
 from tests.device.abilities import infinities
 from tests.exhaustive import EXHAUSTIVE
 from tests.images import picture
+from tests.taa.moving import moving_frame
 from vkbloom import Convolution, Pyramid, Renderer, Separable
 from vkbloom._gradients.pulling import pull_each
 from vkbloom._renderer.device_arrays import merge
@@ -141,6 +142,60 @@ def histories(renderer: Any) -> None:
     given: Any = {"trail": renderer.apply(OnDevice(images[0]), settings)["trail"]}
     for state in (expected[0].state, given):
         same(renderer.apply(OnDevice(images[1]), settings, state=state), expected[1])
+
+
+def geometries(renderer: Any) -> None:
+    """Motion and depth on the device: the same bits, without a byte through the host."""
+    bytes_so_far = ctypes.CDLL("libcuda.so.1").stand_in_host_bytes
+    bytes_so_far.restype = ctypes.c_long
+    moving = [moving_frame(number, 23, 37, nearest=0.0) for number in range(3)]
+    # Motions of two floats a pixel, of halves whose words hold another pixel's, and turned ones.
+    forms: tuple[Callable[[NDArray[Any]], NDArray[Any]], ...] = (
+        np.asarray,
+        lambda array: array.astype(np.float16),
+        np.asfortranarray,
+    )
+    for step, form in enumerate(forms):
+        given: dict[str, Any] = {"taa": ("godot", "hdrp", "o3de")[step], "exposure": "hdrp"}
+        places = (("image", "motion", "depth"), ("motion",), ("image", "depth"))[step]
+        motions = [form(frame.motion) for frame in moving]
+        depths = [form(frame.depth) for frame in moving]
+        state: Any = {}
+        for frame, motion, depth in zip(moving, motions, depths, strict=True):
+            parts = {"image": frame.image, "motion": motion, "depth": depth}
+            expected = renderer.apply(**parts, **given, settings=LOW, state=state)
+            moved = {
+                name: OnDevice(part) if name in places else part for name, part in parts.items()
+            }
+            before = bytes_so_far()
+            frames = renderer.apply(**moved, **given, settings=LOW, state=state)
+            assert bytes_so_far() == before
+            same(frames, expected)
+            state = expected.state
+        assert frames.state == state
+        images = [OnDevice(frame.image) for frame in moving]
+        beside = {"motion": [OnDevice(part) for part in motions], "depth": depths}
+        last = list(renderer.map(images, LOW, **given, **beside))[-1]
+        assert last.state == state
+    image, motion, depth = (np.array(part) for part in moving[1])
+    wrong = motion.copy()
+    wrong[3, 4, 1], wrong[5, 6, 0], wrong[7, 8] = np.nan, np.inf, -np.inf
+    holes = depth.copy()
+    holes[3, 4], holes[9, 9] = np.nan, np.inf
+    right = np.where(np.isfinite(wrong), wrong, 0), np.nan_to_num(holes, posinf=np.inf)
+    expected = renderer.apply(image, LOW, taa="godot", motion=right[0], depth=right[1])
+    moved = {"motion": OnDevice(wrong), "depth": OnDevice(holes)}
+    same(renderer.apply(OnDevice(image), LOW, taa="godot", **moved), expected)
+    refused: tuple[tuple[str, Any, type[Exception], str], ...] = (
+        ("motion", motion.astype(np.uint8), TypeError, "uint8 is not one of float16, float32"),
+        ("motion", motion[1:], ValueError, "motion: shape (22, 37, 2) is not (23, 37, 2)"),
+        ("motion", depth, ValueError, "motion: shape (23, 37) is not (H, W, 2)"),
+        ("depth", motion, ValueError, "depth: shape (23, 37, 2) is not (H, W)"),
+        ("depth", depth.astype(float), TypeError, "float64 is not one of"),
+    )
+    for name, part, kind, text in refused:
+        call = functools.partial(renderer.apply, image, taa="bevy", **{name: OnDevice(part)})
+        raises(kind, text, call)
 
 
 def streams(renderer: Any) -> None:
@@ -519,7 +574,7 @@ def ranges(renderer: Any) -> None:
 
 WORK = (
     *(layouts, streams, sequences, layers, places, capsules, ends, recycling, lifetime, errors),
-    *(histories, gradients, gradient_places),
+    *(histories, geometries, gradients, gradient_places),
 )
 
 

@@ -25,9 +25,13 @@ RUNS = (
     ("", WORK, "validated"),
     # The same bits with timeline semaphores that CUDA shares, and calls return earlier.
     ("waits", WORK, "validated"),
-    ("waits,cpu", WORK, "validated layouts histories sequences layers ends recycling gradients"),
+    (
+        "waits,cpu",
+        WORK,
+        "validated layouts histories geometries sequences layers ends recycling gradients",
+    ),
     # What reads and writes pixels on an adapter that is not a CPU, as GPUs do it.
-    ("cpu", WORK, "validated layouts histories sequences layers places gradients"),
+    ("cpu", WORK, "validated layouts histories geometries sequences layers places gradients"),
     # What exceeds the range of buffers.
     ("bands", WORK, "validated ranges"),
     ("bands,cpu", WORK, "validated ranges"),

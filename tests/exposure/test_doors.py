@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import pickle
 import subprocess
 import sys
@@ -13,6 +14,8 @@ import numpy as np
 import pytest
 
 import vkbloom
+from tests.core.builds import ROOT
+from tests.exhaustive import witness
 from tests.variants import VARIANTS, open_variant
 from vkbloom import Renderer
 
@@ -188,7 +191,9 @@ def test_a_sweep_continues_one_state(renderer: Renderer) -> None:
         assert frames.state == expected.state
     scene = renderer.sweep(SCENE, [SETTINGS], framebuffers="exposed", exposure="hdrp", **DEFERRED)
     assert list(next(scene)) == ["exposed"]
-    with pytest.raises(ValueError, match="state: only an exposure continues one"):
+    with pytest.raises(
+        ValueError, match="state: only a stage in time continues one; give exposure or taa, too"
+    ):
         renderer.sweep(IMAGES[0], [COPY], state=state)
 
 
@@ -199,42 +204,30 @@ def test_a_plan_has_the_stage(renderer: Renderer) -> None:
     assert plan.settings is SETTINGS
 
 
-PROGRAM = """
-import pickle, resource, sys
-import numpy as np
-import vkbloom
+#: Width, height, frames, after how many the memory is read, and where the sequence is cut.
+LENGTHS = {
+    "short": (160, 90, 320, 80, 7, 123, 256),
+    "long": (640, 360, 10_000, 1_000, 1_234, 5_000, 9_876),
+}
 
-first, last, mark, state = int(sys.argv[1]), int(sys.argv[2]), int(sys.argv[3]), sys.argv[4]
 
-def images():
-    pixels = np.empty((90, 160, 3), np.float16)
-    for number in range(last):
-        pixels[:] = 0.01 + number % 37
-        yield pixels
-
-begun = pickle.loads(bytes.fromhex(state)) if state else None
-settings = vkbloom.Pyramid(levels=2)
-frames = vkbloom.sequence(
-    images(), settings, fps=60, exposure="hdrp", start=first, state=begun, framebuffers="final",
+@pytest.mark.parametrize(
+    "length", ["short", pytest.param("long", marks=witness("the short one shows the same"))]
 )
-for number, made in enumerate(frames, first):
-    if number == mark:
-        before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-grown = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before
-print(grown, made["final"].tobytes()[:32].hex(), pickle.dumps(frames.state).hex())
-"""
+def test_memory_does_not_grow_and_processes_continue(tmp_path: Path, length: str) -> None:
+    """With an exposure, TAA, motion, depth and bloom."""
+    width, height, *more = LENGTHS[length]
 
+    def run(kind: str, *numbers: int) -> Any:
+        words = map(str, (kind, tmp_path, width, height, *numbers))
+        program = [sys.executable, "-m", "tests.exposure.long_sequence", *words]
+        done = subprocess.run(program, cwd=ROOT, stdout=subprocess.PIPE, text=True, check=True)
+        return json.loads(done.stdout)
 
-def test_memory_does_not_grow_and_processes_continue() -> None:
-    """A frame of the sequence is 170 kB as the device has it: 300 would be 50 MB."""
-
-    def run(first: int, last: int, state: str = "") -> list[str]:
-        words = [sys.executable, "-c", PROGRAM, str(first), str(last), str(first + 40), state]
-        ended = subprocess.run(words, capture_output=True, text=True, check=True)
-        return ended.stdout.split()
-
-    grown, *whole = run(0, 340)
-    _, _, state = run(0, 123)
-    _, *rest = run(123, 340, state)
-    assert rest == whole
-    assert int(grown) < 8_000
+    whole = run("whole", *more)
+    for cut in more[2:]:
+        digests = run("rest", cut)["digests"]
+        assert digests == {number: whole["digests"][number] for number in digests}
+    # One frame is 300 bytes a pixel as the device has it.
+    memory = list(whole["memory"].values())
+    assert memory[-1] - memory[0] < 60 * 300 * width * height, whole

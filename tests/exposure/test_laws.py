@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import re
 import sys
@@ -14,6 +15,7 @@ from scipy import ndimage
 
 import vkbloom
 from tests.cli.calls import one_line, run
+from tests.exhaustive import some
 from vkbloom import testing
 from vkbloom.testing._laws.table import EXPOSURE_LAWS
 
@@ -89,6 +91,13 @@ def test_the_table_of_the_docs() -> None:
         assert {*re.findall("`(\\w+)`", broken)} == expected
 
 
+def test_the_table_of_anti_aliasing() -> None:
+    """Of each preset: TAA before bloom is held, the order turned round is not."""
+    table = Path(__file__).parents[2] / "docs" / "evidence" / "antialiasing_table.md"
+    rows = re.findall(r"^\| `(\w+)` .* \| (\w+) \|.* \| (\w+) \|$", table.read_text(), re.MULTILINE)
+    assert rows == [(name, "held", "broken") for name in vkbloom.antialiasing]
+
+
 @pytest.mark.parametrize("fault", FAULTS)
 def test_planted_faults(fault: str) -> None:
     found = testing.report(Meter(fault))
@@ -137,6 +146,33 @@ def taa_and_bloom(order: str) -> Any:
         return bloom(resolved), resolved
 
     return step
+
+
+#: Of presets: the order, this frame's share, and whether the state is handed on.
+ORDERS: dict[str, tuple[Any, float | None, bool]] = {
+    "TAA first": ("before", None, True),
+    "bloom first": ("after", None, True),
+    "nothing of the history": ("before", 1.0, True),
+    "each frame begins anew": ("before", None, False),
+}
+
+
+@pytest.mark.parametrize("fault", ORDERS)
+@pytest.mark.parametrize("name", some(vkbloom.antialiasing, 3))
+def test_the_order_of_presets(renderer: vkbloom.Renderer, name: str, fault: str) -> None:
+    order, weight, continues = ORDERS[fault]
+    taa: Any = dataclasses.replace(vkbloom.antialiasing[name], order=order)
+    if weight is not None:
+        taa = vkbloom.BevyAntialiasing(weight=weight, min_weight=weight)
+
+    def step(image: Any, *, dt: float, state: Any) -> tuple[Any, Any]:
+        bloom = vkbloom.Pyramid(levels=4)
+        frames = renderer.apply(image, bloom, taa=taa, state=state, framebuffers="final")
+        return frames["final"], frames.state if continues else None
+
+    (row,) = testing.report(step, laws=["shimmer"]).rows
+    assert row.held == (fault == "TAA first"), row.message
+    assert (row.figures["kept"] > 0.5) == (not row.held)
 
 
 def test_the_order_of_bloom_and_taa() -> None:

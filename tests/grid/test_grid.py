@@ -370,6 +370,55 @@ class TestExposures:
         )
 
 
+class TestAntialiasing:
+    """Each point is the frame after the grid's state."""
+
+    def test_axes(self, filled: Call, tmp_path: Path, image: Any, renderer: Renderer) -> None:
+        random = np.random.default_rng(0)
+        depth = random.random(image.shape[:2], np.float32)
+        given: Any = {"motion": np.full((*depth.shape, 2), 0.02, np.float32), "depth": depth}
+        state = renderer.apply(image[::-1], "kino", taa="bevy", **given).state
+        given |= {"state": state, "store": tmp_path / "a.zarr"}
+        taa: list[Any] = ["bevy", "hdrp_low", vkbloom.O3deAntialiasing(weight=0.5)]
+        axes = {"taa": taa, "intensity": [0.1, 0.4]}
+        grid = filled(image, "kino", axes, **given)
+        given.pop("store")
+        for index, one in enumerate(taa):
+            settings = vkbloom.presets["kino"].replace(intensity=0.4)
+            frames = renderer.apply(image, settings, taa=one, **given)
+            point = grid.isel(taa=index).sel(intensity=0.4)
+            np.testing.assert_array_equal(point["final"], frames["final"])
+        # Another history or motion is another grid.
+        stages = json.loads(grid.attrs["stages"])
+        assert [len(text) for text in stages["state"].values()] == [64]
+        given["store"] = tmp_path / "a.zarr"
+        with pytest.raises(ValueError, match=r"stages.state.history: "):
+            filled(image, "kino", axes, **given | {"state": {"history": 2 * state["history"]}})
+        with pytest.raises(ValueError, match=r"source.images: "):
+            filled(image, "kino", axes, **given | {"depth": depth / 2})
+
+    def test_a_scene(self, filled: Call, renderer: Renderer) -> None:
+        """It is seen from the engine's camera, and has moved since the state."""
+        given: Any = {"size": (32, 24), "shading": "deferred"}
+        state = renderer.render(Scene.ufo(), Separable(), taa="o3de", **given).state
+        given["state"] = state
+        seen = []
+
+        def number(frames: Frames) -> float:
+            seen.append(frames.state)
+            return float(frames.state["animation"][0, 0, 1])
+
+        times = [0.01, 0.02]
+        axes = {"time": times, "taa": ["o3de", "godot"]}
+        grid = filled(Scene.ufo(), Separable(), axes, reduce={"number": number}, **given)
+        assert (grid["number"] == 2).all()
+        for time in times:
+            expected = renderer.render(Scene.ufo(), Separable(), taa="o3de", time=time, **given)
+            point = grid.sel(time=time, taa="o3de")
+            np.testing.assert_array_equal(point["final"], expected["final"])
+            assert expected.state in seen
+
+
 class TestProgress:
     def test_a_terminal_sees_points(
         self, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]

@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+import vkbloom
 from tests.cli.calls import run
 from tests.custom.test_check import check
 from tests.exhaustive import EXHAUSTIVE
 from tests.srgb import encode_srgb
-from vkbloom import write
+from vkbloom import Pyramid, Renderer, Settings, write
 from vkbloom.testing import flash, flicker
 
 FPS = 240
@@ -111,8 +112,43 @@ def test_check_judges_files(tmp_path: Path) -> None:
     assert done.exit_code == 1
     assert (found["frames"], found["flash"]["general"], found["flash"]["red"]) == (120, True, False)
     assert "general flashes: fails" in run(*words).stdout
-    refused = run(*words, "--preset", "kino")
-    assert (refused.exit_code, "without a bloom" in refused.stderr) == (2, True)
+    refused = run(*words, "--against", "kino")
+    assert (refused.exit_code, "leave --against out" in refused.stderr) == (2, True)
+
+
+#: Options, and what they stand for: settings, and keywords of a call for stages in time.
+MADE: dict[str, tuple[Settings, dict[str, Any]]] = {
+    "--exposure -1": (Pyramid(bloom=False, exposure=-1), {}),
+    "--preset kino --intensity 0.5 --encoding srgb": (
+        vkbloom.presets["kino"].replace(intensity=0.5),
+        {},
+    ),
+    "--exposure hdrp --taa godot:frames=4": (
+        Pyramid(bloom=False),
+        {"exposure": "hdrp", "taa": vkbloom.GodotAntialiasing(frames=4)},
+    ),
+}
+
+
+@pytest.mark.usefixtures("kept_renderers")
+def test_check_judges_what_is_made_of_files(tmp_path: Path, renderer: Renderer) -> None:
+    """In linear light; the frames between two numbers are time."""
+    random = np.random.default_rng(0)
+    pictures = random.uniform(0, 2, (6, 4, 6, 3)).astype(np.float32)
+    for number, picture in enumerate(pictures):
+        write(tmp_path / f"f.{2 * number:02d}.exr", picture)
+    words = ["--sequence", str(tmp_path / "f.%02d.exr"), "--fps", "48"]
+    for options, (settings, stages) in MADE.items():
+        _, found = check(*words, *options.split())
+        made = renderer.map(pictures, settings, dt=1 / 24, framebuffers="final", **stages)
+        shown = np.repeat([frames["final"] for frames in made], 2, axis=0)[:-1]
+        expected = flicker(shown, 48).contrast
+        np.testing.assert_allclose(found["flicker"]["contrast"], expected, rtol=1e-6)
+        assert found["missing"] == 5
+    refused = run("check", *words, "--taa", "bevi")
+    assert (refused.exit_code, "did you mean 'bevy'" in refused.stderr) == (2, True)
+    refused = run("check", "--preset", "kino", "--taa", "bevy")
+    assert (refused.exit_code, "--taa needs --sequence" in refused.stderr) == (2, True)
 
 
 def test_gaps_are_time(tmp_path: Path) -> None:

@@ -14,6 +14,7 @@ import vkbloom
 from tests.refusals import assert_refused, rows
 from vkbloom import Renderer
 
+from .moving import moving_frame
 from .test_device import COPY, ENGINES, share_of_close
 
 SCENE = vkbloom.Scene.ufo()
@@ -153,6 +154,27 @@ def test_sequences_of_images(renderer: Renderer) -> None:
     frames = list(vkbloom.sequence(images, BLOOM, renderer=renderer, **given))
     mapped = list(renderer.map(images, BLOOM, **given))
     assert frames[-1].state == mapped[-1].state
+
+
+def test_a_sweep_continues_one_state(renderer: Renderer) -> None:
+    """Of an image with motion and depth, and of a scene, which has its own."""
+    first, second = (moving_frame(number, 12, 16, nearest=0.0) for number in (0, 1))
+    begun = renderer.apply(first.image, COPY, taa="godot", **first.keywords()).state
+    settings = [COPY, BLOOM, vkbloom.Pyramid(levels=1)]
+    # Arrays of the host are uploaded once for all settings.
+    for state in (begun, dict(begun)):
+        given: Any = {"taa": "godot", "exposure": "bevy", "dt": 0.2, "state": state}
+        given |= second.keywords()
+        swept = renderer.sweep(second.image, settings, **given)
+        for frames, one in zip(swept, settings, strict=True):
+            assert frames.state == renderer.apply(second.image, one, **given).state
+            assert ("bloom" in frames) == one.bloom
+    begun = renderer.render(SCENE, BLOOM, taa="hdrp_high", **DEFERRED).state
+    given = {"taa": "hdrp_high", "time": STEP, "state": begun, **DEFERRED}
+    expected = renderer.render(SCENE, BLOOM, **given)
+    for frames in renderer.sweep(SCENE, [BLOOM, BLOOM.replace(intensity=0.1)], **given):
+        assert frames.state == expected.state
+        np.testing.assert_array_equal(frames["resolved"], expected["resolved"])
 
 
 def test_a_plan_has_the_stage(renderer: Renderer) -> None:

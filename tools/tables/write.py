@@ -11,6 +11,7 @@ import argparse
 from pathlib import Path
 from typing import Final
 
+import antialiasing
 import cells
 import exposures
 import fits
@@ -23,6 +24,7 @@ import vkbloom
 TABLES: Final = {
     "check": presets.check,
     "exposures": exposures.laws,
+    "antialiasing": antialiasing.orders,
     "derivatives": presets.derivatives,
     "measured": presets.measure,
     "stability": presets.stability,

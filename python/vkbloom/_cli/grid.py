@@ -12,7 +12,7 @@ import numpy as np
 
 from vkbloom._cli import fields, glows, image_files, no_bloom, program, terminal
 from vkbloom._cli.scene_options import scene_options
-from vkbloom._cli.settings_options import DEFAULT_PRESETS, timed_settings_options
+from vkbloom._cli.settings_options import DEFAULT_PRESETS, taa_option, timed_settings_options
 from vkbloom._grid import filling, layout, order, sources
 from vkbloom._grid.grid import grid as render_grid
 from vkbloom._io import image_writing, safe_writing
@@ -47,6 +47,7 @@ _PRESETS: Final = fields.NameOf("preset", presets)
 @glows.glow_options
 @program.adapter_option
 @scene_options
+@taa_option
 @timed_settings_options
 def command(
     *, source: str | None, out: str | None, store: str | None, words: tuple[str, ...], **given: Any
@@ -59,10 +60,10 @@ def command(
     written. The same call again continues a store whose process was killed, and gives the same
     result. In a folder, files are replaced.
 
-    The NAME of an axis is a settings field, time, preset, exposure (of names) or dt. Its values are
-    FIRST:LAST:COUNT, or A,B,... (A;B;... if values contain commas). Repeat --axis for more axes;
-    the dimensions have the order of the options. With an exposure, points are no frames in time:
-    each is one frame, --dt after the start.
+    The NAME of an axis is a settings field, time, preset, exposure (of names), taa or dt. Its
+    values are FIRST:LAST:COUNT, or A,B,... (A;B;... if values contain commas). Repeat --axis for
+    more axes; the dimensions have the order of the options. With an exposure or --taa, points are
+    no frames in time: each is one frame, --dt after the start.
 
     Other processes may render other parts at the same time.
     """
@@ -154,9 +155,10 @@ def axis_values(words: Sequence[str], settings: Settings) -> dict[str, Sequence[
 
 def _type_of(name: str, begun: Sequence[Settings]) -> Any:
     """Return the type of a field's option, so that axes and options have one syntax."""
-    others = {"preset": _PRESETS, "time": click.FLOAT, "dt": click.FLOAT}
-    if name in others | {"exposure": fields.EXPOSURE}:
-        return others.get(name, fields.EXPOSURE)
+    others: dict[str, Any] = {"preset": _PRESETS, "time": click.FLOAT, "dt": click.FLOAT}
+    others |= {"exposure": fields.EXPOSURE, "taa": fields.TAA}
+    if name in others:
+        return others[name]
     lacking = [settings for settings in begun if name not in fields_of(type(settings))]
     if lacking and not name.startswith("glare."):
         near = did_you_mean(name, fields_of(type(lacking[0])))

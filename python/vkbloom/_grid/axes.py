@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom._numbers import check_time
+from vkbloom._settings.antialiasing import check_antialiasing
 from vkbloom._settings.exposure import Exposure, check_exposure, check_seconds
 from vkbloom._settings.fields import fields_of
 from vkbloom._settings.records import plain_value
@@ -105,10 +106,14 @@ def _whole_axis(name: str, values: object) -> Axis:
 
 
 def _stage_axis(name: str, values: list[Any]) -> Axis | None:
-    """Check an axis of exposures or of steps of time; None: it is of neither."""
+    """Check an axis of exposures, anti-aliasing or steps of time; None: it is of none of them."""
     if name == "dt":
         steps = tuple(check_seconds("axes: dt", value) for value in values)
         return Axis(name, steps, "stage", "s", "Seconds since the frame before")
+    if name == "taa":
+        for value in values:
+            check_antialiasing(value)
+        return Axis(name, tuple(values), "stage", "", "Temporal anti-aliasing")
     if name != "exposure" or not any(isinstance(value, str | Exposure) for value in values):
         return None
     for value in values:

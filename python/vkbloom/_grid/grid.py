@@ -28,6 +28,7 @@ from vkbloom._renderer.frames import Frames
 from vkbloom._renderer.image import Image
 from vkbloom._renderer.interruptible import open_renderer
 from vkbloom._renderer.renderer import Renderer
+from vkbloom._settings.antialiasing import Antialiasing
 from vkbloom._settings.exposure import Exposure
 from vkbloom._settings.settings import Settings, Shading
 
@@ -57,7 +58,10 @@ def grid(
     mask: NDArray[Any] | None = None,
     emission: NDArray[Any] | None = None,
     exposure: Exposure | str | None = None,
+    taa: Antialiasing | str | None = None,
     dt: float | None = None,
+    motion: NDArray[Any] | None = None,
+    depth: NDArray[Any] | None = None,
     state: Mapping[str, Any] | None = None,
     framebuffers: Literal["all"] | str | Sequence[str] = ("final",),
     reduce: Mapping[str, Callable[[Frames], Any]] | None = None,
@@ -91,9 +95,10 @@ def grid(
         Of a scene, as for `render`.
     mask, emission : ndarray, optional
         As for `apply`, the same at all points. An uploaded image has its own.
-    exposure, dt, state
+    exposure, taa, dt, motion, depth, state
         As for `Renderer.sweep`: points are no frames in time, and each is the one `dt` seconds
-        after `state`. An axis "exposure" of names or exposures, and an axis "dt", vary them.
+        after `state`. An axis "exposure" of names or exposures, an axis "taa" of names or
+        anti-aliasing, and an axis "dt" vary them. Motion and depth are arrays of the host.
     framebuffers : "all" or sequence of str
         The framebuffers to keep. Each must have the same shape at all points. Its dtype must be
         uint8 at all points, or a float type at all points. Floats are stored in the largest of
@@ -186,7 +191,10 @@ def grid(
         mask=mask,
         emission=emission,
         exposure=exposure,
+        taa=taa,
         dt=dt,
+        motion=motion,
+        depth=depth,
         state=state,
     )
     with ExitStack() as stack:

@@ -16,11 +16,13 @@ from vkbloom._extras import import_extra
 from vkbloom._framebuffers import check_framebuffers, dimensions, leading
 from vkbloom._grid.axes import Axis, read_axes, settings_of
 from vkbloom._grid.order import Index, ranking_of, walk
-from vkbloom._grid.sources import Point, Source, read_source, visit
+from vkbloom._grid.sources import Point, Source, digest, read_source, visit
 from vkbloom._renderer.frames import Frames
 from vkbloom._renderer.plans import Framebuffer
 from vkbloom._renderer.renderer import Renderer
-from vkbloom._renderer.state import Continued, State
+from vkbloom._renderer.sources import Geometry
+from vkbloom._renderer.state import Continued, State, moment_of
+from vkbloom._settings.antialiasing import Antialiasing, check_antialiasing, check_use
 from vkbloom._settings.exposed import expose
 from vkbloom._settings.exposure import Exposure, check_exposure, check_seconds
 from vkbloom._settings.settings import Settings, check_settings
@@ -41,8 +43,8 @@ class Grid:
     - `settings`: The settings that the axes change, unless an axis has the settings.
     - `axes`: The axes, in the order of the result's dimensions.
     - `framebuffers`: The framebuffers to keep.
-    - `exposure`, `dt`: Those of all points, unless an axis has them.
-    - `before`: The state that each point continues; None: there is no exposure.
+    - `exposure`, `antialiasing`, `dt`: Those of all points, unless an axis has them.
+    - `before`: The state that each point continues; None: there is no stage in time.
     """
 
     source: Source
@@ -51,6 +53,7 @@ class Grid:
     framebuffers: str | tuple[str, ...]
     reduce: Reduce
     exposure: Exposure | None
+    antialiasing: Antialiasing | None
     dt: float
     before: Continued | None
 
@@ -75,7 +78,8 @@ class Grid:
         time = self.source.time
         base = self.settings
         changes = {}
-        stages: dict[str, Any] = {"exposure": self.exposure, "dt": self.dt}
+        stages: dict[str, Any] = {"exposure": self.exposure, "taa": self.antialiasing}
+        stages["dt"] = self.dt
         for axis, number in zip(self.axes, index, strict=True):
             if axis.kind == "preset":
                 base = settings_of(axis)[number]
@@ -88,7 +92,12 @@ class Grid:
         chosen = base.replace(**changes) if changes else base
         if stages["exposure"] is not None:
             stages["exposure"] = check_exposure(stages["exposure"])
-        return Point(index, expose(chosen, **stages), time)
+        moment = None
+        if stages["taa"] is not None:
+            stages["taa"] = check_antialiasing(stages["taa"])
+            if self.source.has_time and self.before is not None:
+                moment, _ = moment_of(stages["taa"], time, self.before.state)
+        return Point(index, expose(chosen, **stages), time, moment)
 
     def describe_point(self, index: Index) -> str:
         """Return a point's axis values as text for messages."""
@@ -110,8 +119,14 @@ class Grid:
             return {}
         varied = {axis.name for axis in self.axes if axis.kind == "stage"}
         exposure = None if self.exposure is None else self.exposure.to_dict()
-        state = {name: array.tolist() for name, array in self.before.state.items()}
-        record = {"exposure": exposure, "dt": self.dt, "state": state}
+        # Of a history, which is too long, what tells it from others.
+        state = {
+            name: array.tolist() if array.shape[:2] == (1, 1) else digest(np.asarray(array))
+            for name, array in self.before.state.items()
+        }
+        record: dict[str, Any] = {"exposure": exposure, "dt": self.dt, "state": state}
+        if self.antialiasing is not None:
+            record["taa"] = self.antialiasing.to_dict()
         return {name: value for name, value in record.items() if name not in varied}
 
 
@@ -161,13 +176,17 @@ def ask(
     mask: object = None,
     emission: object = None,
     exposure: Exposure | str | None = None,
+    taa: Antialiasing | str | None = None,
     dt: float | None = None,
+    motion: object = None,
+    depth: object = None,
     state: Mapping[str, Any] | None = None,
 ) -> Grid:
     """Check the arguments that all grids share."""
     if settings is not None:
         settings = check_settings(settings)
-    checked = read_source(source, size, shading, time, mask=mask, emission=emission)
+    beside: Any = {"mask": mask, "emission": emission, "geometry": Geometry(motion, depth)}
+    checked = read_source(source, size, shading, time, **beside)
     grid_axes = read_axes(settings, {} if axes is None else axes, has_time=checked.has_time)
     names = check_framebuffers(framebuffers)
     reductions = {} if reduce is None else dict(reduce)
@@ -179,7 +198,9 @@ def ask(
             raise TypeError(f"reduce: {name}: {reduction!r} is not callable")
     if names == () and not reductions:
         raise ValueError("framebuffers: there are no framebuffers and no reductions; request some")
-    given = {"exposure": exposure, "dt": dt, "state": state}
+    has_taa = taa is not None or any(axis.name == "taa" for axis in grid_axes)
+    check_use(True if has_taa else None, motion=motion, depth=depth)
+    given = {"exposure": exposure, "taa": taa, "dt": dt, "state": state}
     return Grid(
         checked,
         check_settings(settings, of_image=not checked.has_time),
@@ -187,6 +208,7 @@ def ask(
         "all" if names is None else names,
         reductions,
         None if exposure is None else check_exposure(exposure),
+        None if taa is None else check_antialiasing(taa),
         check_seconds("dt", dt),
         _read_before({name: value is not None for name, value in given.items()}, grid_axes, state),
     )
@@ -200,12 +222,14 @@ def _read_before(
     for name in varied:
         if is_given[name]:
             raise ValueError(f"{name}: an axis has it; leave the argument out")
-    if is_given["exposure"] or "exposure" in varied:
+    found = {name for name in is_given if is_given[name] or name in varied}
+    if "exposure" not in found and "dt" in found:
+        raise ValueError("dt: only an exposure has it; give exposure, too")
+    if found & {"exposure", "taa"}:
         # Its arrays, so that the grid can be sent to other processes.
         return Continued(State(dict(state or {})), is_chain=False)
-    for name in ("dt", "state"):
-        if is_given[name] or name in varied:
-            raise ValueError(f"{name}: only an exposure has it; give exposure, too")
+    if "state" in found:
+        raise ValueError("state: only a stage in time continues one; give exposure or taa, too")
     return None
 
 
@@ -266,11 +290,14 @@ def ranking(grid: Grid) -> tuple[int, ...]:
 def _plan_points(grid: Grid, path: list[Index]) -> tuple[tuple[_core.Source, _core.Plan], ...]:
     """Return the points of a path with plans for all framebuffers, so that no pass is fused."""
     points = [grid.point(index) for index in path]
-    sources = {time: grid.source.for_core(time) for time in {point.time for point in points}}
-    return tuple(
-        (sources[point.time], _core.plan(sources[point.time], point.settings, None))
-        for point in points
-    )
+    sources: dict[object, _core.Source] = {}
+    planned = []
+    for point in points:
+        time = point.time, point.moment
+        if time not in sources:
+            sources[time] = grid.source.for_core(point)
+        planned.append((sources[time], _core.plan(sources[time], point.settings, None)))
+    return tuple(planned)
 
 
 def _framebuffers_at(grid: Grid, renderer: Renderer, index: Index) -> Mapping[str, Framebuffer]:

@@ -22,8 +22,13 @@ from vkbloom._renderer.image import Image
 from vkbloom._renderer.renderer import Renderer
 from vkbloom._renderer.requests import Request
 from vkbloom._renderer.sources import (
+    ANIMATION,
+    NO_GEOMETRY,
+    OF_SCENES,
     SCENE_SIZE,
+    Geometry,
     Inputs,
+    Moment,
     check_inputs,
     image_source,
     is_image,
@@ -43,11 +48,15 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Point:
-    """A point of a grid: its index, its settings and the time."""
+    """A point of a grid: its index, its settings and the time.
+
+    - `moment`: Of a scene with temporal anti-aliasing; else None.
+    """
 
     index: Index
     settings: Settings
     time: float
+    moment: Moment | None = None
 
 
 def visit(
@@ -58,37 +67,44 @@ def visit(
     before: Continued | None,
 ) -> Iterator[tuple[Index, Frames]]:
     """Render points in the given order; `before`: what each of them continues."""
-    drawn: deque[Index] = deque()
+    drawn: deque[Point] = deque()
 
     def work() -> Iterator[Request]:
         for point in points:
-            drawn.append(point.index)
-            yield Request(source.on(renderer, point.time), point.settings)
+            drawn.append(point)
+            yield Request(source.on(renderer, point), point.settings)
 
     names = check_framebuffers(framebuffers)
     for frames in renderer._run_requests(work(), names, before=before):
-        yield drawn.popleft(), frames
+        point = drawn.popleft()
+        if point.moment is not None:
+            frames._state = frames._state.replace(ANIMATION, point.moment.array())
+        yield point.index, frames
 
 
 @dataclass(eq=False)
 class ImageSource(Constructed):
-    """An image with its mask and emission: arrays, or an uploaded image."""
+    """An image with its mask and emission: arrays, or an uploaded image.
+
+    - `geometry`: What temporal anti-aliasing reads beside it.
+    """
 
     has_time: ClassVar = False
     time: ClassVar = 0.0
 
     image: Inputs | Image
+    geometry: Geometry = NO_GEOMETRY
     _uploaded: tuple[_core.Renderer, _core.Source] | None = dataclasses.field(
         default=None, init=False
     )
 
-    def on(self, renderer: Renderer, time: float) -> _core.Source:
+    def on(self, renderer: Renderer, point: Point) -> _core.Source:
         """Return the image on a renderer's device, where it is kept."""
         if isinstance(self.image, Image):
-            return self.for_core(time)
+            return self.for_core(point)
         if self._uploaded is None or self._uploaded[0] is not renderer._core:
             core = renderer._core
-            self._uploaded = core, core.upload(self.for_core(time), None, True)
+            self._uploaded = core, core.upload(self.for_core(point), None, True)
         return self._uploaded[1]
 
     def plan(self, renderer: Renderer, settings: Settings) -> Plan:
@@ -96,14 +112,18 @@ class ImageSource(Constructed):
         pixels: Any = self.image if isinstance(self.image, Image) else self.image.image
         return renderer.plan(pixels, **keywords_of(settings))
 
-    def for_core(self, time: float) -> _core.Source:
+    def for_core(self, point: Point) -> _core.Source:
         """Return the core's Source of the image."""
-        return image_source(self.image) if isinstance(self.image, Image) else self.image.source()
+        if isinstance(self.image, Image):
+            return image_source(self.image)
+        return self.image.source(geometry=self.geometry)
 
     @cached_property
     def description(self) -> dict[str, Any]:
         """The identity of the source: shape, dtype and digests."""
-        return {"kind": "image", "images": [_describe(self.image)]}
+        parts = self.geometry._asdict().items()
+        beside = {name: digest(part) for name, part in parts if part is not None}
+        return {"kind": "image", "images": [_describe(self.image) | beside]}
 
 
 def _describe(image: Inputs | Image) -> dict[str, Any]:
@@ -135,13 +155,14 @@ class SceneSource(Constructed):
     size: tuple[int, int]
     shading: Shading
     time: float = 0.0
-    _latest: tuple[float, _core.Source] | None = dataclasses.field(default=None, init=False)
+    _latest: tuple[object, _core.Source] | None = dataclasses.field(default=None, init=False)
 
-    def on(self, renderer: Renderer, time: float) -> _core.Source:
-        """Return the scene at a time. The renderer keeps its data on the device."""
+    def on(self, renderer: Renderer, point: Point) -> _core.Source:
+        """Return the scene at a point. The renderer keeps its data on the device."""
         # One object for each time, so that requests of the same time share submissions.
+        time = point.time, point.moment
         if self._latest is None or self._latest[0] != time:
-            self._latest = time, self.for_core(time)
+            self._latest = time, self.for_core(point)
         return self._latest[1]
 
     def plan(self, renderer: Renderer, settings: Settings) -> Plan:
@@ -149,9 +170,10 @@ class SceneSource(Constructed):
         given = keywords_of(settings)
         return renderer.plan(self.scene, size=self.size, shading=self.shading, **given)
 
-    def for_core(self, time: float) -> _core.Source:
-        """Return the core's Source of the scene at a time."""
-        return scene_source(self.scene, self.size, self.shading, time)
+    def for_core(self, point: Point) -> _core.Source:
+        """Return the core's Source of the scene at a point."""
+        how = self.size, self.shading, point.time
+        return scene_source(self.scene, *how, moment=point.moment)
 
     @cached_property
     def description(self) -> dict[str, Any]:
@@ -176,9 +198,11 @@ def read_source(
     *,
     mask: object = None,
     emission: object = None,
+    geometry: Geometry = NO_GEOMETRY,
 ) -> Source:
     """Check the source of a grid."""
     if isinstance(source, Scene):
+        geometry.refuse(OF_SCENES)
         for name, array in (("mask", mask), ("emission", emission)):
             if array is not None:
                 raise ValueError(f"{name}: the source is not an image; leave the argument out")
@@ -194,10 +218,12 @@ def read_source(
     if not is_image(source):
         raise TypeError(f"source: {type(source).__name__} is not a Scene or an image")
     if isinstance(source, Image):
-        # Raises if there is a mask or an emission, too.
-        image_source(source, mask, emission)
+        # Raises if there is a mask, an emission, a motion or a depth, too.
+        image_source(source, mask, emission, geometry=geometry)
         return ImageSource(source)
-    return ImageSource(check_inputs(source, mask, emission, name="source"))
+    inputs = check_inputs(source, mask, emission, name="source")
+    height, width, _ = inputs.image.shape
+    return ImageSource(inputs, geometry.check((height, width), None))
 
 
 def digest(value: object) -> str:

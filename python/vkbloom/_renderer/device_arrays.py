@@ -281,6 +281,13 @@ class ImportedArray(NamedTuple):
         offset = self.offset + index * self.strides[0]
         return self._replace(offset=offset, shape=self.shape[1:], strides=self.strides[1:])
 
+    def plane(self, channel: int = 0) -> ImportedArray:
+        """Return one channel of (H, W, C), or all of (H, W), as an image of one channel."""
+        step = np.dtype(self.dtype).itemsize
+        offset = self.offset + channel * (self.strides[2] if len(self.strides) == 3 else step)
+        shape, strides = (*self.shape[:2], 1), (*self.strides[:2], step)
+        return self._replace(offset=offset, shape=shape, strides=strides)
+
     def image(self) -> Any:
         """Return it as the core reads it."""
         return self.memory, self.offset, self.shape, self.strides, np.dtype(self.dtype).itemsize

@@ -37,11 +37,9 @@ from vkbloom._renderer.frames import Frames
 from vkbloom._renderer.image import Image
 from vkbloom._renderer.new_arrays import new_arrays, new_memory
 from vkbloom._renderer.sources import (
-    ANIMATION,
     NO_GEOMETRY,
     SCENE_SIZE,
     Geometry,
-    Moment,
     any_source,
     batch_sources,
     check_inputs,
@@ -50,7 +48,7 @@ from vkbloom._renderer.sources import (
     scene_source,
     take_batch,
 )
-from vkbloom._renderer.state import Continued, State
+from vkbloom._renderer.state import Continued, State, moment_of
 from vkbloom._settings.antialiasing import Antialiasing, check_antialiasing, check_use
 from vkbloom._settings.exposed import ExposedSettings, expose
 from vkbloom._settings.exposure import Exposure, check_exposure, check_seconds
@@ -457,15 +455,11 @@ class Renderer:
         The ``timings`` of the result name the passes that ran.
         """
         settings = self._expose(check_settings(settings), exposure, dt, taa)
-        before, moment = _as_state(state), None
-        if taa is not None:
-            moment = Moment.after(before, check_time(time), check_antialiasing(taa))
+        antialiasing = None if taa is None else check_antialiasing(taa)
+        moment, before = moment_of(antialiasing, check_time(time), _as_state(state))
         source = scene_source(scene, size, shading, time, moment=moment)
         names = check_framebuffers(framebuffers)
-        frames = self._run_one(source, settings, names, out, device, state=before)
-        if moment is not None:
-            frames._state = frames._state.replace(ANIMATION, moment.array())
-        return frames
+        return self._run_one(source, settings, names, out, device, state=before)
 
     @check_arguments
     def apply(
@@ -525,7 +519,9 @@ class Renderer:
         depth : ndarray, shape (H, W), optional
             For `taa`: the depth buffer, as the engine has it; the class says whether near surfaces
             have large or small values. Pixels take the motion of the nearest one around them.
-            Default: each pixel takes its own.
+            Default: each pixel takes its own. Motion and depth may be on the GPU, as float16 or
+            float32. They stay there, so that nothing checks their values: a motion that is not
+            finite and a depth of NaN count as 0.
         state : mapping of str to ndarray, optional
             As for `render`. An exposure continues from its framebuffer ``exposure``, `taa` from
             ``history`` and ``history_motion``.
@@ -754,7 +750,10 @@ class Renderer:
         framebuffers: Literal["all"] | str | Sequence[str] = "all",
         device: Device | None = None,
         exposure: Exposure | str | None = None,
+        taa: Antialiasing | str | None = None,
         dt: float | None = None,
+        motion: NDArray[Any] | None = None,
+        depth: NDArray[Any] | None = None,
         state: Mapping[str, Any] | None = None,
     ) -> Iterator[Frames]:
         """Render one scene, or add bloom to one image, with many settings.
@@ -771,9 +770,11 @@ class Renderer:
             Of a scene, as for `render`.
         framebuffers, device, exposure, dt
             As for `apply`.
+        taa, motion, depth
+            As for `apply`, and `taa` as for `render` of a scene, which has a motion of its own.
         state : mapping of str to ndarray, optional
             What all frames continue from: each is the frame `dt` seconds after it, and none
-            continues that of other settings. Only with an exposure.
+            continues that of other settings. Only with an exposure or anti-aliasing.
 
         Yields
         ------
@@ -789,19 +790,22 @@ class Renderer:
         of the settings of a sequence has are raised by the call.
         """
         self._pending.wait()
-        frame_source = any_source(source, size, shading, time, self._core)
+        check_use(taa, motion=motion, depth=depth)
+        check_seconds("dt", dt)
+        if exposure is None and taa is None and state is not None:
+            raise ValueError("state: only a stage in time continues one; give exposure or taa, too")
+        antialiasing = None if taa is None or is_image(source) else check_antialiasing(taa)
+        moment, before = moment_of(antialiasing, check_time(time), _as_state(state))
+        of_source: Any = {"geometry": Geometry(motion, depth), "moment": moment}
+        frame_source = any_source(source, size, shading, time, self._core, **of_source)
         names = check_framebuffers(framebuffers)
 
         def expose_each(chosen: Settings) -> Settings:
-            return self._expose(chosen, exposure, dt)
+            return self._expose(chosen, exposure, dt, taa)
 
-        if exposure is None:
-            check_seconds("dt", dt)
-            if state is not None:
-                raise ValueError("state: only an exposure continues one; give exposure, too")
-            return self._run_many(frame_source, settings, names, device)
-        before = Continued(_as_state(state), is_chain=False)
-        how: Any = {"prepare": expose_each, "before": before}
+        how: Any = {}
+        if exposure is not None or taa is not None:
+            how = {"prepare": expose_each, "before": Continued(before, is_chain=False)}
         return self._run_many(frame_source, settings, names, device, **how)
 
     @check_arguments

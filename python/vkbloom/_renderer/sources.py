@@ -12,6 +12,7 @@ from vkbloom import _core
 from vkbloom._image_arguments import (
     check_depth,
     check_emission,
+    check_geometry,
     check_image,
     check_mask,
     check_motion,
@@ -81,25 +82,50 @@ class Geometry(NamedTuple):
     depth: Any = None
 
     def check(self, size: tuple[int, int], core: _core.Renderer | None) -> Geometry:
-        """Return the arrays for an image of that height and width, in the host's memory."""
+        """Return the arrays for an image of that height and width, or copies on the device.
+
+        The values of the latter are not known here: the device takes what is not finite as 0.
+        """
         motion, depth = self
         if core and on_cuda(motion):
-            motion = take(motion, "motion", core, (3,), (2,)).numpy()
+            motion = _take_geometry(motion, "motion", (*size, 2), core)
+        elif motion is not None:
+            motion = check_motion(motion, size)
         if core and on_cuda(depth):
-            depth = take(depth, "depth", core, (2,)).numpy()
-        return Geometry(
-            None if motion is None else check_motion(motion, size),
-            None if depth is None else check_depth(depth, size),
-        )
+            depth = _take_geometry(depth, "depth", size, core)
+        elif depth is not None:
+            depth = check_depth(depth, size)
+        return Geometry(motion, depth)
+
+    def refuse(self, reason: str) -> None:
+        """Raise ValueError if there is a motion or a depth."""
+        for name, given in self._asdict().items():
+            if given is not None:
+                raise ValueError(f"{name}: {reason}")
 
     def core_arguments(self) -> tuple[Any, ...]:
         """Return motion along x and y and depth."""
-        if self.motion is None:
-            return None, None, self.depth
-        return self.motion[..., 0], self.motion[..., 1], self.depth
+        motion, depth = self
+        axes: tuple[Any, Any] = None, None
+        if isinstance(motion, ImportedArray):
+            axes = motion.plane(0).image(), motion.plane(1).image()
+        elif motion is not None:
+            axes = motion[..., 0], motion[..., 1]
+        return *axes, depth.plane().image() if isinstance(depth, ImportedArray) else depth
+
+
+def _take_geometry(
+    given: Any, name: str, shape: tuple[int, ...], core: _core.Renderer
+) -> ImportedArray:
+    """Copy a motion or a depth on the device."""
+    array = take(given, name, core, (len(shape),), shape[2:])
+    check_geometry(name, array, shape, ("float16", "float32"))
+    return array
 
 
 NO_GEOMETRY: Final = Geometry()
+#: Why motion and depth are refused beside a scene.
+OF_SCENES: Final = "a scene has its own motion and depth; leave them out"
 
 
 class Inputs(NamedTuple):
@@ -187,9 +213,7 @@ def image_source(
                 raise ValueError(
                     f"{what}: the image was uploaded already; upload it together with its {what}"
                 )
-        for what, given in geometry._asdict().items():
-            if given is not None:
-                raise ValueError(f"{what}: the image was uploaded already; give the array instead")
+        geometry.refuse("the image was uploaded already; give the array instead")
         return image._source
     inputs = check_inputs(image, mask, emission, core, name)
     height, width, _ = inputs.image.shape
@@ -226,11 +250,15 @@ def any_source(
     shading: Shading,
     time: float,
     core: _core.Renderer | None = None,
+    *,
+    geometry: Geometry = NO_GEOMETRY,
+    moment: Moment | None = None,
 ) -> _core.Source:
     """Return the core's Source of an image, or of a scene's frame of a size, shading and time."""
     if not is_image(source):
         wanted = SCENE_SIZE if size is None else size
-        return scene_source(cast("Scene", source), wanted, shading, time, "source")
+        geometry.refuse(OF_SCENES)
+        return scene_source(cast("Scene", source), wanted, shading, time, "source", moment=moment)
     for name, is_given in (
         ("size", size is not None),
         ("shading", check_shading(shading) != "forward"),
@@ -238,7 +266,7 @@ def any_source(
     ):
         if is_given:
             raise ValueError(f"{name}: the source is not a scene; leave the argument out")
-    return image_source(source, core=core, name="source")
+    return image_source(source, core=core, name="source", geometry=geometry)
 
 
 def scene_source(

@@ -10,13 +10,14 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from vkbloom._renderer.new_arrays import new_arrays
-from vkbloom._renderer.sources import image_source
+from vkbloom._renderer.sources import ANIMATION, Moment, image_source
 from vkbloom._settings.settings import check_settings
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from vkbloom import _core
+    from vkbloom._settings.antialiasing import Antialiasing
 
 #: For each history of a plan what a call before has made; None: zeros.
 Histories = tuple["_core.Source | None", ...]
@@ -62,6 +63,8 @@ class State(Mapping[str, "NDArray[Any]"]):
             self._images[name] = copied
         #: Images of one texel that the call before continued.
         self._before: dict[str, NDArray[Any] | Kept] = {}
+        #: Arrays on the device that has read them last, for calls that continue the same state.
+        self._uploaded: dict[str, tuple[_core.Renderer, _core.Source]] = {}
 
     def __getitem__(self, name: str) -> NDArray[Any]:
         return _read(self._images, name)
@@ -140,7 +143,11 @@ class State(Mapping[str, "NDArray[Any]"]):
         image = self._images[name]
         if isinstance(image, Kept) and image.core is core:
             return image.source
-        return core.upload(image_source(self[name], name=f"state: {name}"), None, False)
+        uploaded = self._uploaded.get(name)
+        if uploaded is None or uploaded[0] is not core:
+            source = image_source(self[name], name=f"state: {name}")
+            uploaded = self._uploaded[name] = core, core.upload(source, None, False)
+        return uploaded[1]
 
     def advance(
         self, core: _core.Renderer, plan: _core.Plan, submission: _core.Submission
@@ -171,6 +178,19 @@ def _read(images: dict[str, NDArray[Any] | Kept], name: str) -> NDArray[Any]:
 def is_alike(image: NDArray[Any] | Kept, shape: tuple[int, ...], dtype: str) -> bool:
     """Return whether an image has a shape and a type."""
     return image.shape == shape and image.dtype == np.dtype(dtype)
+
+
+def moment_of(
+    antialiasing: Antialiasing | None, time: float, state: State
+) -> tuple[Moment | None, State]:
+    """Return the moment of a scene's frame after a state, and the state that the frame advances.
+
+    Without anti-aliasing None and the state.
+    """
+    if antialiasing is None:
+        return None, state
+    moment = Moment.after(state, time, antialiasing)
+    return moment, state.replace(ANIMATION, moment.array())
 
 
 class Continued(NamedTuple):

@@ -20,10 +20,10 @@ from rich.status import Status
 
 from vkbloom._cli.check import comparing, measuring, showing
 from vkbloom._cli.check.measuring import Exposed
-from vkbloom._cli.check.sequences import check_unused, judge, sequence_options
+from vkbloom._cli.check.sequences import Make, check_unused, is_made, judge, sequence_options
 from vkbloom._cli.fields import EXPOSURE, SIZE, Command, FieldOption
 from vkbloom._cli.program import adapter_option, as_wrong_use, is_given
-from vkbloom._cli.settings_options import settings_options
+from vkbloom._cli.settings_options import STARTS, settings_options
 from vkbloom._cli.targets import check_target
 from vkbloom._cli.terminal import is_quiet, note, say
 from vkbloom._custom.described.generate import is_shader
@@ -31,11 +31,12 @@ from vkbloom._custom.method import CustomMethod, identifier_of, load_method, loa
 from vkbloom._io import safe_writing
 from vkbloom._renderer.interruptible import open_renderer
 from vkbloom._renderer.renderer import Renderer
+from vkbloom._settings.antialiasing import Antialiasing
 from vkbloom._settings.exposure import Exposure, exposures
 from vkbloom._settings.settings import Settings, presets
 from vkbloom._spelling import describe_unknown, did_you_mean
+from vkbloom.testing._adaptation import NO_BLOOM, Adaptation, meter_of
 from vkbloom.testing._adaptation import SIZE as EXPOSURE_SIZE
-from vkbloom.testing._adaptation import Adaptation, meter_of
 from vkbloom.testing._blooms import exact
 from vkbloom.testing._law_report import LawReport, law_report
 from vkbloom.testing._laws.table import find_law, merge_limits
@@ -103,7 +104,8 @@ def _laws(_: click.Context, __: click.Parameter, text: str) -> tuple[str, ...]:
 @click.option(
     "--exposure",
     type=EXPOSURE,
-    help="Measure an exposure, alone or beside the bloom of --preset or --method.",
+    help="Measure an exposure, alone or beside the bloom of --preset or --method; or that of "
+    "--sequence.",
 )
 @click.option("--suffix", default=".exr", help="The type of the program's image files.")
 @click.option(
@@ -129,7 +131,8 @@ def _laws(_: click.Context, __: click.Parameter, text: str) -> tuple[str, ...]:
 @click.option(
     "--sequence",
     metavar="PATTERN|VIDEO",
-    help="Judge frames in time instead, such as f.%04d.exr or clip.mp4.",
+    help="Judge frames in time instead, such as f.%04d.exr or clip.mp4: as they are, or with the "
+    "bloom, the exposure and the --taa that are given.",
 )
 @sequence_options
 @click.option("--json", "as_json", is_flag=True, help="Print one object.")
@@ -171,10 +174,11 @@ def check(
         if target is not None:
             check_target(target)
     if sequence is not None:
-        given = (file, program, against, isinstance(exposure, Exposure))
-        if any((*given, is_given("preset"), is_given("method"))):
-            raise click.UsageError("--sequence judges files alone, without a bloom")
-        return judge(sequence, how, as_json=as_json)
+        for name, given in (("FILE", file), ("--command", program), ("--against", against)):
+            if given is not None:
+                raise click.UsageError(f"--sequence judges frames; leave {name} out")
+        with _opened_maker(adapter, settings, exposure, how["antialiasing"]) as make:
+            return judge(sequence, how, as_json=as_json, make=make)
     check_unused()
     params = click.get_current_context().params
     _check_choice(params)
@@ -216,6 +220,33 @@ def check(
         since = "newly broken, " if others else ""
         note(f"{name}: required law {law}: {since}{held[law]}")
     return int(bool(failed))
+
+
+@contextmanager
+def _opened_maker(
+    adapter: str,
+    settings: Settings,
+    exposure: Exposure | float | None,
+    taa: Antialiasing | None,
+) -> Iterator[Make | None]:
+    """Yield what makes the frames of a sequence, in linear light; None: they are judged as given.
+
+    - `exposure`: A number is in stops.
+    """
+    if not is_made():
+        yield None
+        return
+    chosen = settings if any(map(is_given, STARTS)) else NO_BLOOM
+    chosen = chosen.replace(encoding="none", dither=False)
+    stages: dict[str, Any] = {"taa": taa}
+    if isinstance(exposure, Exposure):
+        stages["exposure"] = exposure
+    elif exposure is not None:
+        chosen = chosen.replace(exposure=exposure)
+    with open_renderer(adapter) as renderer:
+        yield lambda images, steps: renderer.map(
+            images, chosen, dt=steps, framebuffers="final", **stages
+        )
 
 
 @dataclasses.dataclass

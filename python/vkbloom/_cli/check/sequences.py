@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import itertools
 import json
+from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing
-from typing import Any, Final, NamedTuple, TypeVar, get_args
+from typing import Any, Final, NamedTuple, TypeAlias, TypeVar, get_args
 
 import click
 import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom import testing
+from vkbloom._cli.fields import TAA
 from vkbloom._cli.program import as_wrong_use, is_given
 from vkbloom._cli.sequences import expand
 from vkbloom._cli.terminal import note
@@ -20,6 +22,7 @@ from vkbloom._io.array_files import read
 from vkbloom._io.numbered_files import NumberedFile, as_frames, gap_note, gaps
 from vkbloom._io.video.coding import HLG, PQ
 from vkbloom._io.video.reading import VideoFile, is_video
+from vkbloom._renderer.frames import Frames
 from vkbloom._views.plain_values import plain
 from vkbloom.testing._display import Display, Encoding
 from vkbloom.testing._sequences import Standard
@@ -41,6 +44,9 @@ _MAX_RATE: Final = 240.0
 _NAMES: Final = {"wcag22": "WCAG 2.2", "bt1702": "ITU-R BT.1702", "iris": "EA's IRIS"}
 
 _Command = TypeVar("_Command", bound=Callable[..., Any])
+
+#: Yields what is made of each image, from the seconds before it on.
+Make: TypeAlias = Callable[[Iterator[NDArray[Any]], Iterator[float]], Iterator[Frames]]
 
 
 def sequence_options(command: _Command) -> _Command:
@@ -71,6 +77,12 @@ def sequence_options(command: _Command) -> _Command:
         ),
         click.option("--display-white", type=_LUMINANCE, help="Of a value of 1, in cd/m2."),
         click.option("--display-peak", type=_LUMINANCE, help="The largest luminance, in cd/m2."),
+        click.option(
+            "--taa",
+            "antialiasing",
+            type=TAA,
+            help="Temporal anti-aliasing of --sequence, of an engine.",
+        ),
     )
     for option in reversed(options):
         command = option(command)
@@ -79,9 +91,15 @@ def sequence_options(command: _Command) -> _Command:
 
 def check_unused() -> None:
     """Raise click.UsageError for options of a sequence where none is judged."""
-    for name in ("standard", *_DISPLAY.values()):
+    options = {name: name.replace("_", "-") for name in ("standard", *_DISPLAY.values())}
+    for name, option in {**options, "antialiasing": "taa"}.items():
         if is_given(name):
-            raise click.UsageError(f"--{name.replace('_', '-')} needs --sequence")
+            raise click.UsageError(f"--{option} needs --sequence")
+
+
+def is_made() -> bool:
+    """Whether the options give the frames of a sequence a bloom, an exposure or anti-aliasing."""
+    return any(map(is_given, ("preset", "method", "stored", "exposure", "antialiasing")))
 
 
 class _Sequence(NamedTuple):
@@ -106,9 +124,37 @@ class _Sequence(NamedTuple):
         for picture, count in self.pictures():
             yield from itertools.repeat(picture, count)
 
+    def made_by(self, make: Make) -> _Sequence:
+        """Return the sequence of what is made of each picture."""
 
-def judge(source: str, how: Mapping[str, Any], *, as_json: bool) -> int:
-    """Print flashes and flicker of files or of a video; return 1 if it fails, else 0."""
+        def pictures() -> Iterator[tuple[NDArray[Any], int]]:
+            # Several are read before the first of them is made.
+            counts: deque[int] = deque()
+            steps: deque[float] = deque()
+
+            def images() -> Iterator[NDArray[Any]]:
+                wait = 0
+                for picture, count in self.pictures():
+                    # Before the first one is as much time as before the next.
+                    steps.append((wait or count) / self.fps)
+                    counts.append(wait := count)
+                    yield picture
+
+            def take_steps() -> Iterator[float]:
+                while True:
+                    yield steps.popleft()
+
+            for made in make(images(), take_steps()):
+                yield np.asarray(made["final"][..., :3], np.float32), counts.popleft()
+
+        return self._replace(pictures=pictures)
+
+
+def judge(source: str, how: Mapping[str, Any], *, as_json: bool, make: Make | None = None) -> int:
+    """Print flashes and flicker of files or of a video; return 1 if it fails, else 0.
+
+    `make`: What gives them a bloom or a stage in time.
+    """
     degrees, standard = how["degrees"], how["standard"]
     if is_video(source):
         shown = _open_video(source, how["fps"] if is_given("fps") else None)
@@ -116,6 +162,8 @@ def judge(source: str, how: Mapping[str, Any], *, as_json: bool) -> int:
         shown = _open_files(source, how["fps"])
     with as_wrong_use():
         display = _display_of(how, shown.encoding)
+    if make is not None:
+        shown = shown.made_by(make)
     fps, frames = shown.fps, shown.frames
     flashes = testing.flash(frames(), fps, degrees=degrees, standard=standard, display=display)
     seen = testing.flicker(frames(), fps)

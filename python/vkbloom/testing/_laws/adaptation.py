@@ -409,8 +409,10 @@ def _test_shimmer(subject: Adaptation, limits: Limits) -> None:
     for number in range(5 * _PHASES):
         one, state = glow(frames[number % _PHASES], state)
         seen.append(one)
-    off = _range(seen[-2 * _PHASES :]) / mean
+    settled = seen[-2 * _PHASES :]
+    off = _range(settled) / mean
     figure("stills", _range(stills) / mean)
+    figure("kept", sum(settled) / len(settled) / mean)
     text = f"the bloom of lights of half a pixel changes by {off:.3g} of that of still frames"
     law = "the bloom of a camera that jitters does not flicker"
     judge(law, ("flicker", off, limits["flicker"], text))
@@ -467,6 +469,9 @@ SHIMMER: Final = Law(
             "(largest - smallest) light of the bloom, by the mean of still frames", _RESOLVED
         ),
         "stills": Figure("the same of still frames, without help by other frames"),
+        "kept": Figure(
+            "light of the bloom, by the mean of still frames: a TAA can take lights out"
+        ),
     },
     why="There is no TAA, or it runs after the bloom: a history that is limited by the colours "
     "around a pixel keeps nothing of a glow, which has nearly one colour there.",
