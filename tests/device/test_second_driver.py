@@ -13,7 +13,9 @@ import pytest
 
 from tests.core.builds import ROOT
 from tests.device.exceptions import EXCEPTIONS
+from tests.exhaustive import some
 from tests.processes import output
+from vkbloom import antialiasing, exposures
 
 #: As Debian's chromium-common installs it.
 MANIFEST = Path("/usr/lib/chromium/vk_swiftshader_icd.json")
@@ -34,6 +36,23 @@ def test_a_part_of_all_workloads() -> None:
     result = json.loads(said.splitlines()[-1])
     assert "SwiftShader" in result["adapter"]
     assert result["wrong"] == {}
+
+
+#: Tests of stages in time, each of a preset.
+STAGES = [
+    *(f"tests/exposure/test_device.py::test_the_reference[{name}]" for name in exposures),
+    *(
+        f"tests/taa/test_device.py::test_the_reference_after_20_frames[{name}]"
+        for name in antialiasing
+    ),
+]
+
+
+def test_stages_in_time() -> None:
+    """Exposures and anti-aliasing equal the reference; `make test-devices` runs all tests."""
+    chosen = some(STAGES, 5)
+    said = output("-m", "pytest", "-q", "-p", "no:cacheprovider", *chosen, cwd=ROOT, **VARIABLES)
+    assert f"{len(chosen)} passed" in said
 
 
 # Prints the processor seconds of the first derivatives, by the image and by the exposure.
