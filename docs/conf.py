@@ -20,10 +20,19 @@ extensions = [
     "numpydoc",
     "sphinx.ext.autodoc",
     "sphinx.ext.autosummary",
+    "sphinx.ext.intersphinx",
     "sphinx_copybutton",
+    "sphinx_gallery.gen_gallery",
     "sphinxcontrib.mermaid",
 ]
-exclude_patterns = ["README.md", "evidence/*_table.md", "examples/*.md"]
+exclude_patterns = [
+    "README.md",
+    "evidence/*_table.md",
+    "examples/*.md",
+    "examples/gallery_source",
+    # Downloads of the gallery.
+    "examples/gallery/**.ipynb",
+]
 
 # Sphinx reads what is in this folder alone. The notebooks are shown with the outputs that they are
 # stored with (tools/run_notebooks.py).
@@ -40,6 +49,45 @@ runpy.run_path(str(_here / "look_pictures.py"))["write"](_here / "examples" / "l
 _write_laws = runpy.run_path(str(_here / "law_table.py"))["write"]
 _write_laws(_here / "examples" / "laws.md")
 _write_laws(_here / "examples" / "exposure_laws.md", "exposure")
+# Links to other projects, and to the source: in the repository if pyproject.toml names one, else on
+# pages of their own.
+_links = runpy.run_path(str(_here / "links.py"))
+intersphinx_mapping = _links["write_inventories"](_here / "examples" / "inventories")
+_repository = _links["repository"]()
+extensions.append("sphinx.ext.linkcode" if _repository else "sphinx.ext.viewcode")
+numpydoc_xref_param_type = True
+numpydoc_xref_ignore = "all"
+numpydoc_xref_aliases = _links["aliases"]()
+
+
+def linkcode_resolve(domain: str, info: dict[str, str]) -> str | None:
+    """Return the address of the lines that define an entry of the API."""
+    page: str | None = _links["source_page"](_repository, info["module"], info["fullname"])
+    return page
+
+
+# The gallery runs in copies, beside which its examples write their files. Cores draw it.
+os.environ["VKBLOOM_ADAPTER"] = "software"
+shutil.copytree(_here.parent / "examples" / "gallery", _here / "examples" / "gallery_source")
+sphinx_gallery_conf = {
+    "examples_dirs": "examples/gallery_source",
+    "gallery_dirs": "examples/gallery",
+    "backreferences_dir": "examples/backreferences",
+    "doc_module": ("vkbloom",),
+    "reference_url": {"vkbloom": None},
+    "filename_pattern": r"\.py",
+    "subsection_order": [
+        f"examples/gallery_source/{name}"
+        for name in ("photography", "games", "research", "teaching")
+    ],
+    "abort_on_example_error": False,
+    "download_all_examples": False,
+    "remove_config_comments": True,
+    "show_memory": False,
+    "show_signature": False,
+    "write_computation_times": False,
+}
+
 nb_execution_mode = "off"
 nb_merge_streams = True
 default_role = "py:obj"
@@ -79,6 +127,8 @@ def setup(app: Sphinx) -> None:
     """Change pages when they are written."""
     # After the theme's own handler, which makes the navigation.
     app.connect("html-page-context", _make_accessible, priority=900)
+    if not _repository:
+        app.connect("viewcode-follow-imported", lambda _, *name: _links["module_of"](*name))
 
 
 html_theme = "furo"

@@ -69,6 +69,13 @@ def capture(
     The names of `Renderer.plan` are the labels of passes and the names of images and buffers.
     Messages of the validation layer have them, too. RenderDoc hides VK_EXT_external_memory_host, so
     results are copied through staging memory.
+
+    Examples
+    --------
+    Under RenderDoc, such as ``renderdoccmd capture python program.py``:
+
+    >>> with vkbloom.capture("bloom.rdc"):  # doctest: +SKIP
+    ...     vkbloom.apply("photo.jpg")
     """
     return _capture_to((renderer or default_renderer())._core.instance, path)
 

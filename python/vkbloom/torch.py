@@ -73,6 +73,13 @@ def bloom(
     -----
     The operator is ``torch.ops.vkbloom.bloom``, with a fake kernel, so `torch.compile` does not
     look into it. Called by itself it does not see tangents of forward mode.
+
+    Examples
+    --------
+    >>> image = torch.rand(16, 16, 3, requires_grad=True)
+    >>> vkbloom.torch.bloom(image, "kino").sum().backward()
+    >>> image.grad.shape
+    torch.Size([16, 16, 3])
     """
     settings = check_settings(settings, of_image=True)
     order: Order = "CHW" if channels_first else "HWC"

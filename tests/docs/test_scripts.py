@@ -52,6 +52,7 @@ LONG: Final = ("tools/tables/write.py",)
 ELSEWHERE: Final = {
     "benchmarks/": "tests/bench/test_bench.py",
     "examples/cluster/": "tools/cluster/run.py",
+    "examples/gallery/": "tests/docs/test_gallery.py",
     "examples/image_quality/": "tests/plugin/test_guide.py",
     "examples/custom_methods/": "tests/custom/test_rendering.py",
     "examples/training_pairs.py": "tests/device/test_training_pairs.py",

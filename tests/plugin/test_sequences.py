@@ -87,8 +87,9 @@ def test_a_quarter_of_a_field_counts(share: float, failed: bool) -> None:
     assert flash(still, FPS, degrees=10).general is failed
 
 
-def test_contrast_at_each_frequency() -> None:
-    found = flicker(frames(flashing(6, 0.06, "sine", seconds=1)), FPS)
+@pytest.mark.parametrize("kind", [list, iter])
+def test_contrast_at_each_frequency(kind: Any) -> None:
+    found = flicker(kind(frames(flashing(6, 0.06, "sine", seconds=1))), FPS)
     peak = int(found.contrast.argmax())
     assert found.frequencies[peak] == pytest.approx(6)
     assert found.contrast[peak] == pytest.approx(0.1, rel=1e-4)

@@ -82,6 +82,12 @@ def explore(
     -----
     ``vkbloom explore`` shows the same page without a notebook. A bloom whose width is given in
     texels looks wider in a reduced frame.
+
+    Examples
+    --------
+    In a cell of a notebook:
+
+    >>> vkbloom.explore("photo.jpg", "mist", against="soft")  # doctest: +SKIP
     """
     import_extra("anywidget", "notebook", "explore")
     from vkbloom._explorer.playing import open_clip  # noqa: PLC0415  see vkbloom.reference

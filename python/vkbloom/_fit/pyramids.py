@@ -74,7 +74,8 @@ def fit_pyramid(
     Notes
     -----
     Lawson and Hanson, "Solving Least Squares Problems", 1974, chapter 23, on non-negative least
-    squares. With "log" the rows are divided by the function: log(a / b) is nearly (a - b) / b.
+    squares (https://doi.org/10.1137/1.9781611971217). With "log" the rows are divided by the
+    function: log(a / b) is nearly (a - b) / b.
     """
     check_index("levels", levels, 1, 16)
     if loss not in get_args(PyramidLoss):

@@ -93,12 +93,14 @@ def recover_psf(
     -----
     Least squares of the pixels whose light comes from inside of the picture, with non-negative
     kernels (Kim and Park, "Fast Nonnegative Matrix Factorization", SIAM Journal on Scientific
-    Computing 33(6), 2011), and a penalty on the square of the kernel's Laplacian. Its strength is
-    that of the largest marginal likelihood: MacKay, "Bayesian Interpolation", Neural Computation
-    4(3), 1992. `error` is the posterior standard deviation, whose intervals hold on the average
-    over the kernel: Wahba, "Bayesian Confidence Intervals for the Cross-Validated Smoothing
-    Spline", Journal of the Royal Statistical Society B 45(1), 1983. Time and memory grow with the
-    square of the number of values of all kernels. Channels that are equal have one kernel.
+    Computing 33(6), 2011, https://doi.org/10.1137/110821172), and a penalty on the square of the
+    kernel's Laplacian. Its strength is that of the largest marginal likelihood: MacKay, "Bayesian
+    Interpolation", Neural Computation 4(3), 1992, https://doi.org/10.1162/neco.1992.4.3.415.
+    `error` is the posterior standard deviation, whose intervals hold on the average over the
+    kernel: Wahba, "Bayesian Confidence Intervals for the Cross-Validated Smoothing Spline", Journal
+    of the Royal Statistical Society B 45(1), 1983,
+    https://doi.org/10.1111/j.2517-6161.1983.tb01239.x. Time and memory grow with the square of the
+    number of values of all kernels. Channels that are equal have one kernel.
     """
     width, height = check_size("size", size)
     sharp, spread, used = _check_pictures(image, glared, mask, (height, width))

@@ -48,7 +48,7 @@ class spencer(RadialPSF):
         0.282 f0 + 0.478 f1 + 0.207 f2 + 0.033 f3   scotopic
 
     Source: Spencer, Shirley, Zimmerman, Greenberg, "Physically-Based Glare Effects for Digital
-    Images", SIGGRAPH 1995.
+    Images", SIGGRAPH 1995, https://doi.org/10.1145/218380.218466.
     """
 
     state: State = "photopic"
@@ -90,7 +90,7 @@ class cie_general(RadialPSF):
 
     Source: CIE 146:2002, "CIE Equations for Disability Glare"; Vos, "On the cause of disability
     glare and its dependence on glare angle, age and ocular pigmentation", Clinical and
-    Experimental Optometry 86(6), 2003.
+    Experimental Optometry 86(6), 2003, https://doi.org/10.1111/j.1444-0938.2003.tb03080.x.
     """
 
     age: float = number_field(default=35.0, range=(0, 120), unit="year")

@@ -146,7 +146,8 @@ class harvey_shack(RadialPSF):
     share as the intensity of a mix.
 
     Source: Ritt, "Laser Safety Calculations for Imaging Sensors" and "Estimation of Lens Stray
-    Light with Regard to the Incapacitation of Imaging Sensors", Sensors 20(21), 6308, 2020.
+    Light with Regard to the Incapacitation of Imaging Sensors", Sensors 20(21), 6308, 2020,
+    https://doi.org/10.3390/s20216308.
     """
 
     s: float = number_field(default=-1.86, range=(-10, 0), slider=(-4, 0))

@@ -110,6 +110,12 @@ def adapters() -> tuple[AdapterInfo, ...]:
     tuple of AdapterInfo
         First those of the system's Vulkan loader, then those of the bundled driver. Empty if no
         driver works.
+
+    Examples
+    --------
+    >>> for adapter in vkbloom.adapters():
+    ...     print(adapter.name)  # doctest: +SKIP
+    llvmpipe (LLVM 19.1.7, 256 bits)
     """
     listed: list[_core._AdapterTuple] = []
     for driver in dict.fromkeys(("", bundled_driver())):

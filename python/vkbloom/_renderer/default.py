@@ -75,6 +75,11 @@ def default_renderer() -> Renderer:
     Renderer
         ``Renderer()``, opened at the first use and closed at exit. A forked child opens its own. If
         it was closed, or its device was lost, the next call opens another one.
+
+    Examples
+    --------
+    >>> vkbloom.default_renderer() is vkbloom.default_renderer()
+    True
     """
     return renderer_on("auto")
 

@@ -51,6 +51,13 @@ class DeviceArray:
     shape : tuple of int
         (H, W, C), or (H, W) for depth.
     dtype : numpy.dtype
+
+    Examples
+    --------
+    >>> image = np.ones((16, 24, 3), np.float32)
+    >>> final = vkbloom.apply(image, "kino", device="device")["final"]
+    >>> final.shape, final.numpy().shape
+    ((16, 24, 3), (16, 24, 3))
     """
 
     def __init__(

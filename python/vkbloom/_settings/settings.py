@@ -104,8 +104,9 @@ class Settings(Record):
         Whether to add noise before ``final`` is rounded to 8 bits, so that dark gradients show
         grain instead of bands. The noise of each channel is uniform over one level, +-1/2. The
         mean over pixels is then the unrounded value (Roberts, "Picture Coding Using Pseudo-Random
-        Noise", IRE Transactions on Information Theory, 1962). Values that 8 bits represent
-        exactly, such as 0 and 1, do not change. A float ``final`` is not dithered.
+        Noise", IRE Transactions on Information Theory 8(2), 1962,
+        https://doi.org/10.1109/TIT.1962.1057702). Values that 8 bits represent exactly, such as 0
+        and 1, do not change. A float ``final`` is not dithered.
     dither_seed : int
         Seed of the noise, 0 to 65535. The noise is a hash of the pixel's position and the seed,
         so that it is the same on every adapter.

@@ -56,6 +56,14 @@ class Tolerances:
     ------
     ValueError
         A number is out of its range; the message names the field, the value and the range.
+
+    Examples
+    --------
+    In place of those of `FrameRegression.check`:
+
+    >>> tolerances = vkbloom.testing.Tolerances(atol=2 / 255, fail_percent=0.1)
+    >>> tolerances.fail_percent
+    0.1
     """
 
     atol: float | None = None

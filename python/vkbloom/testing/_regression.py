@@ -54,6 +54,14 @@ class FrameRegression:
         Name of the test in messages.
     used : dict, optional
         Of all tests of a run, gets the fixture that a reference was held against last, by file.
+
+    Examples
+    --------
+    A test asks for the fixture:
+
+    >>> def test_saucer(bloom_renderer, frame_regression):
+    ...     frames = bloom_renderer.render(vkbloom.Scene.ufo(), "tutorial", (160, 90))
+    ...     frame_regression.check(frames)
     """
 
     def __init__(

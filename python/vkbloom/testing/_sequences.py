@@ -363,10 +363,11 @@ def flicker(frames: Iterable[NDArray[Any]], fps: float) -> Flicker:
     Notes
     -----
     Source: Mantiuk et al., "ColorVideoVDP: A visual difference predictor for image, video and
-    display distortions", SIGGRAPH 2024.
+    display distortions", SIGGRAPH 2024, https://doi.org/10.1145/3658144.
     """
     check_number("fps", fps, 1e-3, 1e5)
-    kept = list(frames) if isinstance(frames, Iterable) and find_spec("pycvvdp") else frames
+    judges = find_spec("pycvvdp") is not None
+    kept = list(frames) if isinstance(frames, Iterable) and judges else frames
     lights = np.stack(list(_lights(kept, _FIELD)))
     luminances = lights @ _LUMINANCE
     mean = luminances.mean(axis=0)
@@ -377,7 +378,7 @@ def flicker(frames: Iterable[NDArray[Any]], fps: float) -> Flicker:
     largest = max(float(mean.max()), 1e-300)
     contrast = (amplitudes / np.maximum(mean, 1e-3 * largest)).max(axis=(1, 2))
     return Flicker(
-        jod=_jod(kept, fps) if isinstance(kept, list) else None,
+        jod=_jod(kept, fps) if judges and isinstance(kept, list) else None,
         frequencies=np.asarray(np.fft.rfftfreq(count, 1 / fps)[1:], np.float64),
         contrast=contrast,
     )
