@@ -76,6 +76,7 @@ sphinx_gallery_conf = {
     "doc_module": ("vkbloom",),
     "reference_url": {"vkbloom": None},
     "filename_pattern": r"\.py",
+    "within_subsection_order": "FileNameSortKey",
     "subsection_order": [
         f"examples/gallery_source/{name}"
         for name in ("photography", "games", "research", "teaching")
@@ -106,17 +107,31 @@ numpydoc_show_class_members = False
 templates_path = ["templates"]
 
 
+# Thumbnails are larger than sphinx-gallery's, and their links have a text for screen readers.
+_THUMBNAILS = """
+.sphx-glr-thumbnails { grid-template-columns: repeat(auto-fill, minmax(13em, 1fr)) }
+.sphx-glr-thumbcontainer img { max-height: none; width: 100%; height: auto }
+.sphx-glr-thumbcontainer p a span { display: block; width: 1px; height: 1px; overflow: hidden;
+  clip-path: inset(50%) }
+"""
+_STYLES = {
+    "api/": _THUMBNAILS,
+    "examples/gallery/": _THUMBNAILS,
+    # Paths in the table may break, so that it is no wider than the page.
+    "presets": """td:nth-child(2):nth-last-child(2), td:nth-child(3):last-child
+{ overflow-wrap: anywhere; min-width: 15em }""",
+}
+
+
 def _make_accessible(*arguments: Any) -> None:
     """Give headings of the navigation a level, and let keys scroll code that is wider than a page.
 
-    Sphinx writes neither; axe-core finds both (tests/docs/test_first_page.py). Paths in the
-    table of presets may break, so that it is no wider than the page.
+    Sphinx writes neither; axe-core finds both (tests/docs/test_first_page.py).
     """
     page, context = arguments[1], arguments[3]
-    if page == "presets":
-        cells = "td:nth-child(2):nth-last-child(2), td:nth-child(3):last-child"
-        style = f"<style>{cells} {{ overflow-wrap: anywhere; min-width: 15em }}</style>"
-        context["metatags"] = context.get("metatags", "") + style
+    for start, style in _STYLES.items():
+        if page.startswith(start):
+            context["metatags"] = context.get("metatags", "") + f"<style>{style}</style>"
     for name in ("furo_navigation_tree", "body"):
         text = context.get(name, "")
         text = text.replace('role="heading">', 'role="heading" aria-level="2">')

@@ -29,7 +29,7 @@ def write_inventories(folder: Path) -> dict[str, tuple[str, tuple[str, ...]]]:
     mapping = {}
     for name, project in tomllib.loads((_HERE / "other_projects.toml").read_text()).items():
         lines = [
-            f"{entry} {role} 1 {page} -\n"
+            f"{entry} {role} 1 {page.replace('$', entry)} -\n"
             for page, roles in project["pages"].items()
             for role, entries in roles.items()
             for entry in entries

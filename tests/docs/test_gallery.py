@@ -185,6 +185,30 @@ def test_docstrings_name_what_other_projects_have(module: str) -> None:
     assert named <= stored
 
 
+def test_the_pages_of_other_projects(tmp_path: Path) -> None:
+    """As Sphinx reads them: the inventories need no network, and name complete addresses."""
+    inventory = pytest.importorskip("sphinx.util.inventory").InventoryFile
+    links = runpy.run_path(str(ROOT / "docs" / "links.py"))
+    pages = set()
+    for name, (url, (file,)) in links["write_inventories"](tmp_path).items():
+        assert Path(file).name == f"{name}.inv"
+        found = inventory.loads(Path(file).read_bytes(), uri=url).data
+        pages |= {item.uri for items in found.values() for item in items.values()}
+    assert not [page for page in pages if "$" in page or not page.startswith("https://")]
+    numpy = "https://numpy.org/doc/stable/reference/generated"
+    assert f"{numpy}/numpy.ndarray.html#numpy.ndarray" in pages
+    assert "https://docs.xarray.dev/en/stable/generated/xarray.Dataset.html#xarray.Dataset" in pages
+    assert "https://docs.pytorch.org/docs/stable/tensors.html#torch.Tensor" in pages
+
+
+def test_every_doi_is_on_the_page_of_literature() -> None:
+    page = (ROOT / "docs" / "literature.md").read_text()
+    texts = [path.read_text() for path in (ROOT / "python" / "vkbloom").rglob("*.py")]
+    found = {one.rstrip(".") for text in texts for one in re.findall(r"doi\.org/([\w./-]+)", text)}
+    assert len(found) >= 8
+    assert {doi for doi in found if f"[{doi}](https://doi.org/{doi})" not in page} == set()
+
+
 def test_links_lead_to_the_source() -> None:
     """Of each public name, to the lines that define it."""
     links = runpy.run_path(str(ROOT / "docs" / "links.py"))
@@ -192,9 +216,9 @@ def test_links_lead_to_the_source() -> None:
     for name in [*names, "vkbloom.Renderer.apply", "vkbloom.Frames.timings"]:
         module = max((one for one in MODULES if name.startswith(f"{one}.")), key=len)
         page = links["source_page"]("https://example.org/x", module, name[len(module) + 1 :])
-        path, first, last = re.fullmatch(
-            r"https://example\.org/x/blob/\w+/(.*)#L(\d+)-L(\d+)", page
-        ).groups()
+        ((path, first, last),) = re.findall(
+            r"^https://example\.org/x/blob/\w+/(.*)#L(\d+)-L(\d+)$", page
+        )
         lines = (ROOT / path).read_text().splitlines()[int(first) - 1 : int(last)]
         kinds = rf"^ *(?:class|def) {name.rpartition('.')[2]}\b"
         assert any(re.match(kinds, line) for line in lines[:12]), name

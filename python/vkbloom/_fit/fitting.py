@@ -168,9 +168,9 @@ def fit(
     Notes
     -----
     Images of more than 384 pixels are reduced first, by boxes. There,
-    ``scipy.optimize.differential_evolution`` searches the whole space, and
-    ``scipy.optimize.least_squares`` starts from the best of its points; "flip" and callables are
-    minimized by ``scipy.optimize.minimize``, with Nelder and Mead's simplex. Larger populations
+    `scipy.optimize.differential_evolution` searches the whole space, and
+    `scipy.optimize.least_squares` starts from the best of its points; "flip" and callables are
+    minimized by `scipy.optimize.minimize`, with Nelder and Mead's simplex. Larger populations
     follow while the loss is not close to 0. The result is refined at the image's own size. With
     `gradient`, the derivatives of the least squares come from pullbacks, which are no calls. If
     that ends far from the target, the search without derivatives follows. The same arguments give

@@ -41,7 +41,7 @@ def fit_pyramid(
 
     Without a threshold and a firefly filter a pyramid is linear in its `level_weights`. So the
     bloom of a point is measured for each level alone, and the weights are the non-negative ones
-    with the smallest sum of squared differences (``scipy.optimize.nnls``).
+    with the smallest sum of squared differences (`scipy.optimize.nnls`).
 
     Parameters
     ----------

@@ -111,7 +111,7 @@ def grid(
         Where to write the grid instead: a folder ``name.zarr``, a URL that fsspec supports, such
         as ``"s3://bucket/name.zarr"`` (the extra ``cloud`` installs S3) or ``"memory://name"``, or
         a Zarr store. With a `client`, all its workers must be able to write to it. It can be opened
-        with ``xarray.open_zarr`` while it is written; its variable ``done`` tells which points are
+        with `xarray.open_zarr` while it is written; its variable ``done`` tells which points are
         complete. If the process is killed, the same call renders only the missing points.
     chunks : mapping of str to int, optional
         Grid points per chunk of the store by axis; 1 for an axis that is not named. Default: chunks
