@@ -101,6 +101,8 @@ if _mermaid := os.environ.get("MERMAID"):
     mermaid_use_local = _mermaid
 
 autosummary_generate = True
+# The build needs no PyTorch for the page of its operators.
+autodoc_mock_imports = ["torch"]
 autodoc_typehints = "none"
 # Members of classes are listed by the template, once.
 numpydoc_show_class_members = False
@@ -109,9 +111,9 @@ templates_path = ["templates"]
 
 # Thumbnails are larger than sphinx-gallery's, and their links have a text for screen readers.
 _THUMBNAILS = """
-.sphx-glr-thumbnails { grid-template-columns: repeat(auto-fill, minmax(13em, 1fr)) }
-.sphx-glr-thumbcontainer img { max-height: none; width: 100%; height: auto }
-.sphx-glr-thumbcontainer p a span { display: block; width: 1px; height: 1px; overflow: hidden;
+body .sphx-glr-thumbnails { grid-template-columns: repeat(auto-fill, minmax(13em, 1fr)) }
+body .sphx-glr-thumbcontainer img { max-height: none; max-width: none; width: 100%; height: auto }
+body .sphx-glr-thumbcontainer p a span { display: block; width: 1px; height: 1px; overflow: hidden;
   clip-path: inset(50%) }
 """
 _STYLES = {

@@ -88,15 +88,21 @@ def _thing(module: str, name: str) -> Any:
 
 def module_of(module: str, name: str) -> str:
     """Return the module that has the source of a public name."""
-    return defining_module(_thing(module, name.partition(".")[0]))
+    try:
+        return defining_module(_thing(module, name.partition(".")[0]))
+    except ImportError:  # PyTorch is not installed
+        return module
 
 
 def lines_of(module: str, name: str) -> Lines | None:
     """Return where a public name, such as "Renderer.apply" of "vkbloom", is defined.
 
-    None: it has no source in Python, such as a mapping.
+    None: it has no source in Python, such as a mapping, or needs a package that is not installed.
     """
-    thing = _thing(module, name)
+    try:
+        thing = _thing(module, name)
+    except ImportError:
+        return None
     if isinstance(thing, type):
         file = Path(str(sys.modules[defining_module(thing)].__file__))
         found = _classes(file).get(thing.__name__)
