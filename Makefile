@@ -8,7 +8,8 @@
 # make exhaustive: the same with every case of the tests that otherwise take a few (tests/exhaustive.py),
 #   such as each fault point; takes hours.
 # make check: for use during development: lints the changed files, runs a fast part of the tests.
-# make docs: builds the documentation into build/docs; a warning is a failure.
+# make docs: builds the documentation into build/docs, and runs the examples of its gallery; a warning
+#   is a failure.
 # make first-page: the same, and runs the test that reads the built pages.
 # make tables: measures again, and writes the tables of docs/evidence, in more than an hour.
 # make wheels: builds the source distribution, and the wheels of vkbloom, its driver and its compiler for

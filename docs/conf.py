@@ -68,7 +68,8 @@ def linkcode_resolve(domain: str, info: dict[str, str]) -> str | None:
 
 # The gallery runs in copies, beside which its examples write their files. Cores draw it.
 os.environ["VKBLOOM_ADAPTER"] = "software"
-shutil.copytree(_here.parent / "examples" / "gallery", _here / "examples" / "gallery_source")
+_examples = _here / "examples" / "gallery_source"
+shutil.copytree(_here.parent / "examples" / "gallery", _examples, dirs_exist_ok=True)
 sphinx_gallery_conf = {
     "examples_dirs": "examples/gallery_source",
     "gallery_dirs": "examples/gallery",
