@@ -97,11 +97,12 @@ def module_of(module: str, name: str) -> str:
 def lines_of(module: str, name: str) -> Lines | None:
     """Return where a public name, such as "Renderer.apply" of "vkbloom", is defined.
 
-    None: it has no source in Python, such as a mapping, or needs a package that is not installed.
+    None: it has no source in Python, such as a mapping or a field, or needs a package that is not
+    installed.
     """
     try:
         thing = _thing(module, name)
-    except ImportError:
+    except (ImportError, AttributeError):
         return None
     if isinstance(thing, type):
         file = Path(str(sys.modules[defining_module(thing)].__file__))
