@@ -39,9 +39,10 @@ class DeviceArray:
     """A framebuffer that stays on the renderer's device.
 
     Other libraries take it without a copy: `torch.from_dlpack`, ``cupy.from_dlpack(array)`` and
-    ``jax.dlpack.from_dlpack(array)``. It stays valid after the renderer is closed. Its memory is used again when this object and all arrays that were made of
-    it are gone, and when the GPU has done all work that it had been given until then. The
-    framebuffers of a batch lie in the same memory.
+    ``jax.dlpack.from_dlpack(array)``. It stays valid after the renderer is closed. Its memory is
+    used again when this object and all arrays that were made of it are gone, and when the GPU has
+    done all work that it had been given until then. The framebuffers of a batch lie in the same
+    memory.
 
     On a CPU adapter the device's memory is the host's: NumPy and the libraries above view it there.
 
