@@ -10,14 +10,18 @@
 # make check: for use during development: lints the changed files, runs a fast part of the tests.
 # make docs: builds the documentation into build/docs, and runs the examples of its gallery; a warning
 #   is a failure.
+# make docs-version: the same, with a choice of versions, into build/versions beside other versions.
 # make first-page: the same, and runs the test that reads the built pages.
 # make tables: measures again, and writes the tables of docs/evidence, in more than an hour.
 # make wheels: builds the source distribution, and the wheels of vkbloom, its driver and its compiler for
 #   x86-64 and aarch64, into dist/ (docs/releasing.md); as root.
+# make release-check: runs the jobs of the release's workflow as for the tag of this version, up to the
+#   upload, and checks the workflows and the conda recipe; as root, on a working tree without changes.
 # make freethreaded: builds Python 3.13 without the GIL, from Debian's source, and the core for it; makes
 #   10,000 calls in 16 threads, and some under ThreadSanitizer; takes half an hour the first time.
 # make try-core: builds the core's wheel from a source distribution, without glslang and spirv-opt, and
 #   tries it in a fresh environment.
+# make test-floors: runs the fast part of the tests with the oldest packages that pyproject.toml allows.
 # make test-pure: runs the tests that need no device with the wheel for all systems, which has no core.
 # make try-wheels: installs the wheels of dist/ in bare roots of Debian, Ubuntu and arm64, and makes an
 #   image in each (ROOTS="bookworm arm64"); as root.
@@ -26,6 +30,8 @@
 # make engine-laws: takes both through all laws, in a quarter of an hour.
 # make libplacebo HOOKS=folder: compares the user shaders of a folder with libplacebo 7 as it runs,
 #   which comes as packages of Debian 13 that are unpacked, not installed.
+# make same-bits: draws with the wheel's driver of dist/ on emulated CPUs, by vkbloom and by pygfx, and
+#   fails where pictures of the frozen code differ; SAME_BITS="--driver system --cpus Haswell"; takes long.
 # make cluster: renders grids under Slurm with two nodes on this machine; installs it (with apt, as root).
 # make bench: times vkbloom beside its peers into out/bench.md, in about a quarter of an hour.
 
@@ -55,6 +61,7 @@ FAST := tests/core/test_settings.py tests/core/test_core_arguments.py tests/core
 	tests/io/test_files.py tests/views
 
 .PHONY: demo test test-devices test-torch exhaustive check docs first-page tables bench engines engine-laws libplacebo cluster wheels lint \
+	docs-version release-check test-floors same-bits \
 	freethreaded try-core try-wheels test-pure test-aarch64 format sanitize clean
 .DELETE_ON_ERROR:
 
@@ -107,6 +114,12 @@ docs: build/stamp/core build/stamp/docs
 	rm -rf build/docs/explorer_stored
 	$(PYTHON) -m tools.static_explorer build/docs/explorer_stored
 
+# VERSIONS: the folder, which can be served as it is.
+VERSIONS := build/versions
+docs-version: export VKBLOOM_DOCS_VERSIONS := 1
+docs-version: docs
+	$(PYTHON) tools/docs_versions.py build/docs $(VERSIONS)
+
 first-page: docs build/stamp/test
 	$(PYTHON) -m pytest -q tests/docs/test_first_page.py
 
@@ -119,6 +132,20 @@ tables: build/stamp/core build/stamp/test build/stamp/peers
 wheels:
 	packaging/wheels.sh
 
+# LEAVE_OUT: steps of the workflow that are not run, by name. MACHINES, STEPS: as of packaging/wheels.sh.
+LEAVE_OUT := Install Debian's packages
+RELEASE := build/release/python/bin
+release-check: build/release/done
+	$(RELEASE)/zizmor --quiet --offline .github action.yml
+	$(RELEASE)/python packaging/conda/check.py
+	$(RELEASE)/python packaging/run_workflow.py .github/workflows/release.yml \
+	    --tag "v$$(sed -n 's/^version = "\(.*\)"/\1/p' pyproject.toml)" --leave-out "$(LEAVE_OUT)"
+
+build/release/done: packaging/release_requirements.txt
+	python3 -m venv build/release/python
+	$(RELEASE)/pip install --quiet --requirement $<
+	touch $@
+
 # Both Pythons are built once, in build/free_threaded. CALLS: how many, and how many of them under the
 # sanitizer.
 freethreaded: build/stamp/core build/stamp/test
@@ -126,6 +153,21 @@ freethreaded: build/stamp/core build/stamp/test
 
 try-core: build/stamp/core
 	packaging/try_core.sh $(PYTHON)
+
+# uv takes the least versions, which pip cannot.
+FLOORS := build/floors/bin/python
+test-floors: build/stamp/core build/floors/done
+	$(FLOORS) -m pytest -q $(FAST)
+
+build/floors/done: pyproject.toml tools/requirements.py | build/stamp/packages
+	$(PYTHON) -m venv --clear build/floors
+	$(PYTHON) -m pip --python $(FLOORS) install --quiet uv setuptools wheel
+	$(PYTHON) tools/requirements.py cli images quality fit pytest >build/floors/requirements.txt
+	UV_DEFAULT_INDEX="$$($(PYTHON) -m pip config get global.index-url 2>/dev/null || \
+	    echo https://pypi.org/simple)" build/floors/bin/uv pip install --quiet --python $(FLOORS) \
+	    --resolution lowest-direct --requirement build/floors/requirements.txt
+	$(PYTHON) -m pip --python $(FLOORS) install --quiet --no-build-isolation --no-deps --editable .
+	touch $@
 
 # The wheel's files are found before those of the checkout.
 PURE := build/pure
@@ -152,6 +194,11 @@ engines: build/stamp/core $(foreach one,blender blender-5.2 pygfx,build/engines/
 	$(PYTHON) tools/engines/compare.py blender=build/engines/blender/bin/python \
 	    blender-5.2=build/engines/blender-5.2/bin/python \
 	    pygfx=build/engines/pygfx/bin/python $(ENGINES)
+
+same-bits: build/stamp/core build/engines/pygfx/done
+	test -n "$$(command -v qemu-x86_64)" || apt-get install --yes qemu-user
+	$(PYTHON) packaging/emulated_cpus.py --program pygfx $(SAME_BITS)
+	$(PYTHON) packaging/emulated_cpus.py --program vkbloom $(SAME_BITS)
 
 # Takes the engines through all laws, in about a hundred runs of each.
 engine-laws: build/stamp/core build/engines/blender/done build/engines/pygfx/done

@@ -155,4 +155,10 @@ html_static_path: list[str] = []
 # The schemas of `vkbloom check --json` and `vkbloom flare --json`, beside the pages.
 html_extra_path = [f"../python/vkbloom/testing/{name}.schema.json" for name in ("check", "flare")]
 html_copy_source = False
+# A choice of versions, for pages that tools/docs_versions.py puts beside those of other versions.
+# (Read the Docs has its own.)
+if os.environ.get("VKBLOOM_DOCS_VERSIONS"):
+    _sidebars = ("brand", "search", "scroll-start", "navigation", "scroll-end", "variant-selector")
+    html_sidebars = {"**": [f"sidebar/{one}.html" for one in _sidebars]}
+    html_sidebars["**"].insert(1, "versions.html")
 html_theme_options = {"navigation_with_keys": True}

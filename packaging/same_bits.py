@@ -9,7 +9,9 @@ from __future__ import annotations
 import argparse
 import hashlib
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,14 +43,22 @@ def image(dtype: type) -> NDArray[np.generic]:
     return pixels.astype(dtype)
 
 
-def renders(renderer: vkbloom.Renderer) -> Iterator[tuple[str, vkbloom.Frames]]:
-    """Render everything, with a name each."""
+def renders(
+    renderer: vkbloom.Renderer, only: Sequence[str] | None
+) -> Iterator[tuple[str, vkbloom.Frames]]:
+    """Render everything, or only what is named, with a name each."""
+
+    def chosen(mapping: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+        return ((name, mapping[name]) for name in mapping if only is None or name in only)
+
     pixels = image(np.float16)
-    for name, settings in vkbloom.presets.items():
+    for name, settings in chosen(vkbloom.presets):
         yield f"{name} float16", renderer.apply(pixels, settings)
-    for name, settings in VARIED.items():
+    for name, settings in chosen(VARIED):
         for dtype in TYPES:
             yield f"{name} {np.dtype(dtype).name}", renderer.apply(image(dtype), settings)
+    if only is not None and "scene" not in only:
+        return
     scene = vkbloom.Scene.ufo()
     aces = vkbloom.Separable(tonemap="aces", encoding="srgb")
     yield "scene forward", renderer.render(scene, aces, SIZE)
@@ -60,14 +70,20 @@ def main() -> None:
     """Print JSON: the adapter, and for each render the digests of its framebuffers."""
     parser = argparse.ArgumentParser(description=main.__doc__)
     parser.add_argument("--adapter", default="software")
-    with vkbloom.Renderer(parser.parse_args().adapter) as renderer:
-        digests = {
-            name: {
-                key: hashlib.sha256(np.ascontiguousarray(array).tobytes()).hexdigest()[:16]
-                for key, array in frames.items()
-            }
-            for name, frames in renders(renderer)
-        }
+    parser.add_argument("--only", nargs="+", help="presets and settings, by name; by default all")
+    parser.add_argument("--arrays", type=Path, help="an NPZ file to write all framebuffers to")
+    options = parser.parse_args()
+    digests: dict[str, dict[str, str]] = {}
+    arrays = {}
+    with vkbloom.Renderer(options.adapter) as renderer:
+        for name, frames in renders(renderer, options.only):
+            digests[name] = {}
+            for key, array in frames.items():
+                digest = hashlib.sha256(np.ascontiguousarray(array).tobytes()).hexdigest()[:16]
+                digests[name][key] = digest
+                arrays[f"{name} {key}"] = array
+        if options.arrays:
+            np.savez(options.arrays, **arrays)
         print(json.dumps({"adapter": renderer.info.summary, "renders": digests}, indent=1))
 
 

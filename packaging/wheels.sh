@@ -1,9 +1,9 @@
 #!/bin/sh
 # Builds the source distribution of vkbloom, and from it and packaging/ the wheels of vkbloom,
-# vkbloom-lavapipe and vkbloom-glslang for x86-64 and aarch64, into dist/; each wheel twice in two
-# folders, which must give equal files; as root on a system with mmdebstrap. The root that they are
-# built in is made once, in build/wheels; so are Mesa and glslang, in all folders. SPIR-V is made here,
-# once, by the versions of glslang and spirv-opt in packaging/versions.sh.
+# vkbloom-lavapipe and vkbloom-glslang for x86-64 and aarch64, into dist/ with their SHA-256; each file
+# twice in two folders, which must give equal files; as root on a system with mmdebstrap. The root that
+# wheels are built in is made once, in build/wheels; so are Mesa and glslang, in all folders. SPIR-V is
+# made here by the versions of glslang and spirv-opt in packaging/versions.sh.
 # STEPS: the scripts to run, MACHINES: which ones to build for; by default all.
 set -eu
 cd "$(dirname "$0")/.."
@@ -50,12 +50,25 @@ chroot "$root" sh -c 'set -- /srv/pypi/pip-*.whl
     /opt/python/bin/python3.11 "$1/pip" install --quiet --no-index --no-deps \
         --root-user-action=ignore --upgrade /srv/pypi/*.whl'
 
-# Both builds are of the same files, which may change meanwhile.
+# Both builds of a wheel are of the same files, which may change meanwhile.
 test -d "$work/check" || python3 -m venv "$work/check"
-"$work/check/bin/pip" install --quiet --requirement packaging/requirements.txt \
+python=$PWD/$work/check/bin/python
+"$python" -m pip install --quiet --requirement packaging/requirements.txt \
     "cyclonedx-python-lib[json-validation]==$CYCLONEDX"
-rm -rf "$work/source"
-DEB_BUILD_OPTIONS="parallel=${JOBS:-2}" packaging/sdist.sh "$work/source" "$PWD/$work/check/bin/python"
+must_be_equal() {
+    cmp "$1" "$2"
+    echo "two builds are equal: $(sha256sum "$1" | cut -d ' ' -f 1) $(basename "$1")"
+}
+# The source distribution, and the wheel for all systems.
+for folder in source again; do
+    rm -rf "${work:?}/$folder"
+    DEB_BUILD_OPTIONS="parallel=${JOBS:-2}" packaging/sdist.sh "$work/$folder" "$python"
+    VKBLOOM_PURE=1 "$python" -m pip wheel --quiet --no-deps --no-build-isolation \
+        --wheel-dir "$work/$folder/dist" "$work/$folder"/dist/*.tar.gz
+done
+for file in "$work"/source/dist/*; do
+    must_be_equal "$file" "$work/again/dist/$(basename "$file")"
+done
 sdist=$(ls "$work"/source/dist/*.tar.gz)
 
 # Builds for a machine in a folder of the root.
@@ -78,11 +91,10 @@ for machine in $machines; do
     build_in "/build/$machine" "$machine"
     build_in "/again/$machine" "$machine"
     for wheel in "$root/build/$machine"/wheels/*.whl; do
-        cmp "$wheel" "$root/again/$machine/wheels/$(basename "$wheel")"
-        echo "two builds are equal: $(sha256sum "$wheel" | cut -d ' ' -f 1) $(basename "$wheel")"
+        must_be_equal "$wheel" "$root/again/$machine/wheels/$(basename "$wheel")"
     done
 done
-"$work/check/bin/python" packaging/sbom.py check "$root"/build/*/wheels/*.whl
+"$python" packaging/sbom.py check "$root"/build/*/wheels/*.whl
 
 # Names that promise more than the files keep must not leave here.
 check_glibc() {
@@ -92,9 +104,7 @@ check_glibc() {
     test "$(printf '%s\n' "$newest" "$most" | sort -V | tail -n 1)" = "$most"
 }
 mkdir -p dist
-cp "$sdist" dist/
-# The wheel for all systems.
-VKBLOOM_PURE=1 "$work/check/bin/python" -m pip wheel --quiet --no-deps --wheel-dir dist "$sdist"
+cp "$work"/source/dist/* dist/
 for MACHINE in $machines; do
     . packaging/machine.sh
     build=/build/$MACHINE
@@ -109,4 +119,5 @@ for MACHINE in $machines; do
     done
     cp "$root$build"/wheels/*.whl dist/
 done
+(cd dist && sha256sum ./*.tar.gz ./*.whl | sed 's,\./,,' >SHA256SUMS)
 ls -l dist

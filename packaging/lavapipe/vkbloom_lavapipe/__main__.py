@@ -9,10 +9,12 @@ import sys
 from vkbloom_lavapipe import environment
 
 if __name__ == "__main__":
-    if sys.argv[1:] == ["--json"]:
-        print(json.dumps(environment(), indent=2))
-    elif sys.argv[1:]:
-        sys.exit("vkbloom_lavapipe: wrong use; --json is the only option")
+    options = sys.argv[1:]
+    if not {*options} <= {"--json", "--frozen"}:
+        sys.exit("vkbloom_lavapipe: wrong use; the options are --json and --frozen")
+    variables = environment(frozen="--frozen" in options)
+    if "--json" in options:
+        print(json.dumps(variables, indent=2))
     else:
         # Lines that bash can read: set -a; eval "$(python -m vkbloom_lavapipe)"
-        print("\n".join(f"{name}={shlex.quote(value)}" for name, value in environment().items()))
+        print("\n".join(f"{name}={shlex.quote(value)}" for name, value in variables.items()))
