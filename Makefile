@@ -132,7 +132,7 @@ tables: build/stamp/core build/stamp/test build/stamp/peers
 wheels:
 	packaging/wheels.sh
 
-# LEAVE_OUT: steps of the workflow that are not run, by name. MACHINES, STEPS: as of packaging/wheels.sh.
+# LEAVE_OUT: steps of the workflow that are not run, by name, between semicolons. MACHINES, STEPS: as of packaging/wheels.sh.
 LEAVE_OUT := Install Debian's packages
 RELEASE := build/release/python/bin
 release-check: build/release/done

@@ -167,7 +167,7 @@ def main() -> None:
     parser.add_argument("workflow", type=Path)
     parser.add_argument("--tag", required=True)
     parser.add_argument("--out", type=Path, default=ROOT / "build" / "release")
-    parser.add_argument("--leave-out", action="append", default=[], metavar="STEP")
+    parser.add_argument("--leave-out", default="", help="steps that are not run, between semicolons")
     options = parser.parse_args()
     for name in ("jobs", "artifacts", "statements"):
         shutil.rmtree(options.out / name, ignore_errors=True)
@@ -177,7 +177,7 @@ def main() -> None:
         matrix = job.get("strategy", {}).get("matrix", {})
         for values in itertools.product(*matrix.values()):
             combination = dict(zip(matrix, values, strict=True))
-            Job(options.out.resolve(), options.tag, name, job, combination).run(options.leave_out)
+            Job(options.out.resolve(), options.tag, name, job, combination).run(options.leave_out.split(";"))
     print(f"nothing was sent; artifacts and statements are in {options.out}")
 
 
