@@ -22,8 +22,6 @@ from pathlib import Path
 from typing import Any, Final
 
 import yaml
-from pypi_attestations import AttestationType, Distribution
-from sigstore.dsse import Statement
 
 ROOT: Final = Path(__file__).resolve().parents[1]
 # The one condition that the workflow may have: what runs here is what runs for a tag.
@@ -38,6 +36,8 @@ def _digest(path: Path) -> str:
 
 def _statement(kind: str, digests: Mapping[str, str]) -> bytes:
     """Return what is signed of files: their names and digests, as in-toto has it."""
+    from sigstore.dsse import Statement  # noqa: PLC0415  (workflows that sign nothing need it not)
+
     subjects = [{"name": name, "digest": {"sha256": one}} for name, one in sorted(digests.items())]
     made: Json = {"_type": "https://in-toto.io/Statement/v1", "subject": subjects}
     text = json.dumps({**made, "predicateType": kind, "predicate": {}}, indent=1).encode()
@@ -131,6 +131,8 @@ class Job:
 
     def pypa_gh_action_pypi_publish(self, options: Json) -> None:
         """Check what would be uploaded, and write the statement of each file that would be signed."""
+        from pypi_attestations import AttestationType, Distribution  # noqa: PLC0415
+
         files = sorted((self.folder / options.get("packages-dir", "dist")).iterdir())
         subprocess.run([sys.executable, "-m", "twine", "check", "--strict", *files], check=True)
         for file in files:

@@ -2,30 +2,42 @@
 
 from __future__ import annotations
 
+import contextlib
+import re
+import sys
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 from tests.docs.pages import ROOT
 from tests.explorer.explorer_hosts import CHROMIUM
+from tools import docs_versions
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not installed")
 
 DOCS = ROOT / "build" / "docs"
 
 
+@contextlib.contextmanager
+def opened(address: str, **options: Any) -> Iterator[Any]:
+    """Open a page."""
+    api = pytest.importorskip("playwright.sync_api")
+    with api.sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
+        page = browser.new_page(**options)
+        page.goto(address)
+        yield page
+        browser.close()
+
+
 @pytest.fixture(params=["light", "dark"])
 def page(request: pytest.FixtureRequest) -> Iterator[Any]:
     if not DOCS.joinpath("index.html").exists():
         pytest.skip("build/docs does not exist: run make docs")
-    api = pytest.importorskip("playwright.sync_api")
-    with api.sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
-        page = browser.new_page(color_scheme=request.param)
-        page.goto(DOCS.joinpath("index.html").as_uri())
+    with opened(DOCS.joinpath("index.html").as_uri(), color_scheme=request.param) as page:
         yield page
-        browser.close()
 
 
 def test_no_rule_of_accessibility_is_broken(page: Any) -> None:
@@ -48,3 +60,29 @@ def test_the_picture_shows_both_sides_on_a_narrow_screen(page: Any) -> None:
     assert box["y"] + box["height"] < 844
     assert hero.evaluate("element => element.naturalWidth") >= box["width"]
     assert "without bloom" in hero.get_attribute("alt")
+
+
+def test_a_page_leads_to_another_version(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    template = (ROOT / "docs" / "templates" / "versions.html").read_text()
+    # The page "guide" of a version, as Sphinx fills the template in.
+    names = {"release": "VERSION", "pagename": "guide", "pathto('.', 1)": "."}
+    names["pathto('../versions.js', 1)"] = "../versions.js"
+    text = re.sub(r"{{ (.+?) }}", lambda found: names[found[1]], template)
+    for version, pages in (("0.2.0", "guide"), ("0.10.0", "guide"), ("0.11.0.dev0", "index")):
+        built = tmp_path / "built" / version
+        built.mkdir(parents=True)
+        for name in {"index", pages}:
+            (built / f"{name}.html").write_text(text.replace("VERSION", version))
+        words = [str(built), str(tmp_path / "all"), "--version", version]
+        monkeypatch.setattr(sys, "argv", ["docs_versions.py", *words])
+        docs_versions.main()
+    with opened((tmp_path / "all" / "index.html").as_uri()) as page:
+        page.wait_for_url("**/0.10.0/index.html")
+        page.goto((tmp_path / "all" / "0.10.0" / "guide.html").as_uri())
+        choice = page.get_by_label("Version")
+        assert choice.input_value() == "0.10.0"
+        assert choice.locator("option").all_text_contents() == ["0.11.0.dev0", "0.10.0", "0.2.0"]
+        choice.select_option("0.2.0")
+        page.wait_for_url("**/0.2.0/guide.html")
+        page.get_by_label("Version").select_option("0.11.0.dev0")
+        page.wait_for_url("**/0.11.0.dev0/index.html")

@@ -57,6 +57,7 @@ ELSEWHERE: Final = {
     "examples/custom_methods/": "tests/custom/test_rendering.py",
     "examples/training_pairs.py": "tests/device/test_training_pairs.py",
     "tools/cluster/": "Makefile",
+    "tools/docs_versions.py": "tests/docs/test_first_page.py",
     "tools/core_tables.py": "tests/core/test_no_core.py",
     "tools/picture_sheet.py": "tools/docs_pictures.py",
     "tools/preset_blooms.py": "tests/custom/test_check.py",

@@ -77,6 +77,19 @@ def test_the_systems_loader_reads_the_manifest(site: Path) -> None:
     assert found.split() == ["cpu"]
 
 
+def test_frozen_code_is_of_the_instructions_of_old_cpus(site: Path) -> None:
+    words = ("-m", "vkbloom_lavapipe", "--json", "--frozen")
+    variables = json.loads(output(*words, PYTHONPATH=str(site)))
+    ask = "import vkbloom; print(vkbloom.adapters()[0].name)"
+    found = output("-c", ask, VKBLOOM_DRIVER="system", **variables)
+    assert re.search(r"llvmpipe .*128 bits", found)
+    chosen = "import vkbloom_lavapipe; vkbloom_lavapipe.activate(frozen=True)\n"
+    assert output("-c", chosen + ask, VKBLOOM_DRIVER="system", PYTHONPATH=str(site)) == found
+    old = "import vkbloom_lavapipe; vkbloom_lavapipe._has_sse4_1 = lambda: False\n"
+    old += "try: vkbloom_lavapipe.environment(frozen=True)\nexcept RuntimeError as e: print(e)"
+    assert "no SSE4.1" in output("-c", old, PYTHONPATH=str(site))
+
+
 def test_it_stands_in_for_a_loader(site: Path) -> None:
     found = output("-c", f"{HIDE}vkbloom_lavapipe.activate()\n{FIND}", PYTHONPATH=str(site))
     assert found.splitlines()[0] == str(site / "vkbloom_lavapipe/loader/libvulkan.so.1")
