@@ -1,7 +1,7 @@
-"""Draw the same pictures on this CPU and on emulated ones, and print how far they differ: make same-bits.
+"""Draw the same pictures on this CPU and on emulated ones, and print how far they differ.
 
-Each program runs with Mesa's choice of instructions and with the frozen one. Emulated CPUs are QEMU's
-(qemu-user). The driver is that of the wheel in dist/, or the system's.
+Each program runs with Mesa's choice of instructions and with the frozen one. Emulated CPUs are
+QEMU's (qemu-user). The driver is that of the wheel in dist/, or the system's. `make same-bits`.
 """
 
 from __future__ import annotations
@@ -36,8 +36,10 @@ FROZEN: Final = {"GALLIUM_OVERRIDE_CPU_CAPS": "sse4.1", "LP_NATIVE_VECTOR_WIDTH"
 
 def _variables(driver: str, frozen: bool, work: Path) -> dict[str, str]:
     """Return the environment of a run."""
+    # OpenBLAS' kernels for this CPU would not run on others.
+    own = {name: value for name, value in os.environ.items() if not name.startswith("OPENBLAS_")}
     found = {
-        **os.environ,
+        **own,
         # What another run has compiled is not used.
         "MESA_SHADER_CACHE_DISABLE": "true",
         "VKBLOOM_CACHE_DIR": str(work / "cache"),
@@ -115,7 +117,10 @@ def main() -> None:
                 count, different, share, levels = differences(native, other)
                 failed |= frozen and different > 0
                 code = "frozen" if frozen else "the CPU's"
-                print(f"| {code} | {cpu} | {different} of {count} | {share:.2g} | {levels} |", flush=True)
+                print(
+                    f"| {code} | {cpu} | {different} of {count} | {share:.2g} | {levels} |",
+                    flush=True,
+                )
     sys.exit(failed)
 
 

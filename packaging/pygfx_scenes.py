@@ -1,6 +1,7 @@
-"""Draw small scenes with pygfx, as its screenshot tests do: lit meshes, a texture, text, lines, a colormap.
+"""Draw scenes with pygfx, as its screenshot tests do: lit meshes, a texture, a colormap, lines.
 
-pygfx draws into sRGB with 8 bits, which Mesa encodes by approximate square roots where the CPU has them.
+pygfx draws into sRGB with 8 bits, which Mesa encodes by approximate square roots where the CPU has
+them.
 """
 
 from __future__ import annotations
@@ -26,7 +27,8 @@ def scenes() -> Iterator[tuple[str, gfx.Scene]]:
     """Yield the scenes, with a name each."""
     lit = gfx.Scene()
     knot = gfx.Mesh(
-        gfx.torus_knot_geometry(1, 0.3, 96, 18), gfx.MeshPhongMaterial(color="#447cff", shininess=40)
+        gfx.torus_knot_geometry(1, 0.3, 96, 18),
+        gfx.MeshPhongMaterial(color="#447cff", shininess=40),
     )
     lit.add(knot, gfx.AmbientLight(intensity=0.4), gfx.DirectionalLight(intensity=2.5))
     yield "phong", lit
@@ -68,7 +70,9 @@ def scenes() -> Iterator[tuple[str, gfx.Scene]]:
     lines = gfx.Scene()
     lines.add(
         gfx.Line(gfx.Geometry(positions=curve), gfx.LineMaterial(thickness=3, color="#33ddaa")),
-        gfx.Points(gfx.Geometry(positions=curve[::9]), gfx.PointsMaterial(size=12, color="#ffffff")),
+        gfx.Points(
+            gfx.Geometry(positions=curve[::9]), gfx.PointsMaterial(size=12, color="#ffffff")
+        ),
     )
     yield "lines", lines
 

@@ -1,9 +1,9 @@
 """Run the jobs of a workflow of GitHub on this machine as for a tag, up to the upload.
 
-`run` steps are run as they are, in the working tree where the job checks it out, else in a folder of
-the job. Of the actions, checkout wants a working tree without changes, and artifacts are folders. What
-would be signed is written as a statement of in-toto, after the files have been compared with their
-digests and checked by twine. What needs a token of GitHub is printed. Nothing is sent.
+`run` steps are run as they are, in the working tree where the job checks it out, else in a folder
+of the job. Of the actions, checkout wants a working tree without changes; artifacts are folders.
+What would be signed is written as a statement of in-toto, after the files have been compared with
+their digests and checked by twine. What needs a token of GitHub is printed. Nothing is sent.
 """
 
 from __future__ import annotations
@@ -48,7 +48,9 @@ def _statement(kind: str, digests: Mapping[str, str]) -> bytes:
 class Job:
     """One job, with one combination of its matrix."""
 
-    def __init__(self, out: Path, tag: str, name: str, job: Json, matrix: Mapping[str, str]) -> None:
+    def __init__(
+        self, out: Path, tag: str, name: str, job: Json, matrix: Mapping[str, str]
+    ) -> None:
         self.out, self.job = out, job
         self.name = "-".join([name, *(re.sub(r"\W+", "", value) for value in matrix.values())])
         self.folder = out / "jobs" / self.name
@@ -119,7 +121,7 @@ class Job:
         shutil.copytree(self.out / "artifacts" / options["name"], self.folder / options["path"])
 
     def actions_attest(self, options: Json) -> None:
-        """Write the provenance's subjects. GitHub adds the predicate: what built them, and where."""
+        """Write the provenance's subjects; GitHub adds what built them, and where."""
         path = self.folder / options["subject-checksums"]
         digests = {}
         for line in path.read_text().splitlines():
@@ -130,7 +132,7 @@ class Job:
         self.write("provenance", _statement("https://slsa.dev/provenance/v1", digests))
 
     def pypa_gh_action_pypi_publish(self, options: Json) -> None:
-        """Check what would be uploaded, and write the statement of each file that would be signed."""
+        """Check what would be uploaded, and write the statement of each file, to be signed."""
         from pypi_attestations import AttestationType, Distribution  # noqa: PLC0415
 
         files = sorted((self.folder / options.get("packages-dir", "dist")).iterdir())
@@ -169,7 +171,9 @@ def main() -> None:
     parser.add_argument("workflow", type=Path)
     parser.add_argument("--tag", required=True)
     parser.add_argument("--out", type=Path, default=ROOT / "build" / "release")
-    parser.add_argument("--leave-out", default="", help="steps that are not run, between semicolons")
+    parser.add_argument(
+        "--leave-out", default="", help="steps that are not run, between semicolons"
+    )
     options = parser.parse_args()
     for name in ("jobs", "artifacts", "statements"):
         shutil.rmtree(options.out / name, ignore_errors=True)
@@ -179,7 +183,9 @@ def main() -> None:
         matrix = job.get("strategy", {}).get("matrix", {})
         for values in itertools.product(*matrix.values()):
             combination = dict(zip(matrix, values, strict=True))
-            Job(options.out.resolve(), options.tag, name, job, combination).run(options.leave_out.split(";"))
+            Job(options.out.resolve(), options.tag, name, job, combination).run(
+                options.leave_out.split(";")
+            )
     print(f"nothing was sent; artifacts and statements are in {options.out}")
 
 

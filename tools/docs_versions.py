@@ -1,8 +1,8 @@
 """Put built pages beside those of other versions: tools/docs_versions.py BUILT FOLDER.
 
 FOLDER/VERSION has the pages of a version, FOLDER/versions.js the choice that each page shows, and
-FOLDER/index.html leads to the newest release. `make docs-version` builds pages that show the choice.
-They can be read from a server or from the disk.
+FOLDER/index.html leads to the newest release. `make docs-version` builds pages that show the
+choice. They can be read from a server or from the disk.
 """
 
 from __future__ import annotations

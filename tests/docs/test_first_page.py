@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from tools import docs_versions
 
 from tests.docs.pages import ROOT
 from tests.explorer.explorer_hosts import CHROMIUM
-from tools import docs_versions
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not installed")
 

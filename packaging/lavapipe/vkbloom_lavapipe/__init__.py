@@ -17,8 +17,8 @@ __all__ = ["LIBRARY", "LLVM", "MANIFEST", "MESA", "SHA256", "activate", "environ
 LIBRARY: Final = Path(__file__).parent / "libvulkan_lvp.so"
 #: The driver's manifest, which the Vulkan loader reads.
 MANIFEST: Final = LIBRARY.with_name("lvp_icd.json")
-# With instructions that every CPU of x86-64 since 2011 has, and vectors of four numbers, Mesa generates
-# the same code on all of them.
+# With instructions that every CPU of x86-64 since 2011 has, and vectors of four numbers, Mesa
+# generates the same code on all of them.
 _FROZEN: Final = {"GALLIUM_OVERRIDE_CPU_CAPS": "sse4.1", "LP_NATIVE_VECTOR_WIDTH": "128"}
 # In place of the system's loader, where there is none.
 _LOADER: Final = LIBRARY.parent / "loader" / "libvulkan.so.1"
@@ -27,8 +27,8 @@ _LOADER: Final = LIBRARY.parent / "loader" / "libvulkan.so.1"
 def environment(*, frozen: bool = False) -> dict[str, str]:
     """Return the environment variables with which Vulkan programs use this driver alone.
 
-    `frozen`: with the same code on every x86-64 CPU with SSE4.1, and so the same bits. Without it, the
-    code uses what the CPU has, and is faster. Raises RuntimeError on a CPU without SSE4.1.
+    `frozen`: with the same code on every x86-64 CPU with SSE4.1, and so the same bits. Without it,
+    the code uses what the CPU has, and is faster. Raises RuntimeError on a CPU without SSE4.1.
     """
     # Loaders before 1.3.207 know only the second.
     found = dict.fromkeys(("VK_DRIVER_FILES", "VK_ICD_FILENAMES"), str(MANIFEST))
@@ -59,7 +59,7 @@ def _has_sse4_1() -> bool:
     if platform.machine() != "x86_64":
         return True
     try:
-        # QEMU shows the flags of the machine, and Mesa asks the CPU: an emulated one is not refused.
+        # QEMU shows the flags of the machine; Mesa asks the emulated CPU.
         return " sse4_1 " in Path("/proc/cpuinfo").read_text()
     except OSError:
         return True
