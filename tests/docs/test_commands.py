@@ -26,6 +26,7 @@ NOT_RUN: Final = {
     "make demo": ".ci/run does, on a fresh system",
     "make test": "it runs this test",
     "make bench": "installs the peers; tests/bench/test_bench.py runs the benchmarks",
+    "make release-check": "takes an hour, as root; test_release.py runs a workflow",
     "pytest": "tests/plugin/test_guide.py does, on the files of that page",
     "python -m benchmarks -o": "takes minutes; tests/bench/test_bench.py runs the benchmarks",
     "python -m benchmarks --only": "the same",
