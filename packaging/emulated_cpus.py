@@ -45,8 +45,9 @@ def _variables(driver: str, frozen: bool, work: Path) -> dict[str, str]:
         "VKBLOOM_CACHE_DIR": str(work / "cache"),
         "VKBLOOM_DRIVER": "system",
     }
-    if driver == "system":
-        return {**found, **(FROZEN if frozen else {})}
+    if driver != "wheel":
+        given = dict.fromkeys(("VK_DRIVER_FILES", "VK_ICD_FILENAMES"), driver)
+        return {**found, **(FROZEN if frozen else {}), **(given if driver != "system" else {})}
     site = work / "site"
     if not site.exists():
         (wheel,) = (ROOT / "dist").glob("vkbloom_lavapipe-*_x86_64.whl")
@@ -99,7 +100,7 @@ def differences(one: Path, other: Path) -> tuple[int, int, float, int]:
 def main() -> None:
     """Print a table."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--driver", choices=["wheel", "system"], default="wheel")
+    parser.add_argument("--driver", default="wheel", help="wheel, system, or a driver's manifest")
     parser.add_argument("--program", choices=list(PROGRAMS), default="vkbloom")
     parser.add_argument("--cpus", nargs="+", default=list(CPUS))
     parser.add_argument("--words", nargs="*", default=[], help="options of the program")
