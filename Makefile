@@ -162,7 +162,7 @@ test-floors: build/stamp/core build/floors/done
 build/floors/done: pyproject.toml tools/requirements.py | build/stamp/packages
 	$(PYTHON) -m venv --clear build/floors
 	$(PYTHON) -m pip --python $(FLOORS) install --quiet --upgrade uv setuptools wheel
-	{ $(PYTHON) tools/requirements.py cli images quality fit notebook pytest; echo "hypothesis >= 6.100"; } \
+	{ $(PYTHON) tools/requirements.py all pytest; echo "hypothesis >= 6.100"; } \
 	    >build/floors/requirements.txt
 	UV_DEFAULT_INDEX="$$($(PYTHON) -m pip config get global.index-url 2>/dev/null || \
 	    echo https://pypi.org/simple)" build/floors/bin/uv pip install --quiet --python $(FLOORS) \
