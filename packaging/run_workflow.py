@@ -40,7 +40,7 @@ def _statement(kind: str, digests: Mapping[str, str]) -> bytes:
 
     subjects = [{"name": name, "digest": {"sha256": one}} for name, one in sorted(digests.items())]
     made: Json = {"_type": "https://in-toto.io/Statement/v1", "subject": subjects}
-    text = json.dumps({**made, "predicateType": kind, "predicate": {}}, indent=1).encode()
+    text = json.dumps({**made, "predicateType": kind, "predicate": None}, indent=1).encode()
     Statement(text)  # raises where it is none
     return text
 
