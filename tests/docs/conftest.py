@@ -38,6 +38,14 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         Path(name).write_text(passes)
     (function,) = [text for text in blocks(custom, "python") if "def soft" in text]
     Path("soft_reference.py").write_text(function)
+    page = ROOT / "docs" / "frag_as_hook.md"
+    for language, files in (
+        ("glsl", ("small.frag", "wide.frag")),
+        ("toml", ("wide.toml",)),
+        ("text", ("wide.hook", "toy.hook")),
+    ):
+        for name, text in zip(files, blocks(page, language), strict=True):
+            Path(name).write_text(text)
     for file in (ROOT / "examples" / "languages" / "glsl").iterdir():
         Path(file.name).write_text(file.read_text())
     return tmp_path

@@ -12,6 +12,7 @@ import signal
 import subprocess
 import sys
 import tempfile
+import threading
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Final
@@ -22,6 +23,7 @@ from vkbloom._core import ShaderError
 from vkbloom._custom import hints
 from vkbloom._custom.file import CustomFile
 from vkbloom._custom.glsl import BODY, Shader
+from vkbloom._custom.loops import has_endless_loop
 from vkbloom._custom.names import GLOW, HOOKED, STAGES, stage_of
 from vkbloom._custom.passes import CustomPass
 from vkbloom._custom.spirv import without_contraction
@@ -30,11 +32,13 @@ from vkbloom._io.disk_cache import DiskCache
 if sys.platform == "linux":
     import resource
 
-#: Of the process: seconds of the processor, seconds in all, bytes of memory, bytes of its result.
+#: Of the process: seconds of the processor, seconds in all, bytes of memory, bytes of its result,
+#: and of what it says.
 MAX_PROCESSOR_SECONDS: Final = 20
 MAX_SECONDS: Final = 60.0
 MAX_MEMORY: Final = 2 << 30
 MAX_RESULT_BYTES: Final = 64 << 20
+MAX_OUTPUT_BYTES: Final = 16 << 20
 
 #: The package's GLSL that `#include` finds.
 LIBRARY: Final = Path(__file__).parent / "glsl"
@@ -102,6 +106,9 @@ def compile_pass(file: CustomFile, item: CustomPass, shader: Shader) -> bytes:
     words = np.frombuffer(code, "=u4")
     if len(code) % 4 or len(words) < 6 or words[0] != SPIRV_MAGIC:
         raise ShaderError(file.source.where(item.line, "the compiler's result is not SPIR-V"))
+    if has_endless_loop(words.tolist()):
+        cause = "the pass has a loop that never ends"
+        raise ShaderError(file.source.where(item.body_line, cause))
     return np.array(without_contraction(tuple(words.tolist())), "=u4").tobytes()
 
 
@@ -116,31 +123,39 @@ def run_limited(
 
     It has the environment variables of this process, and `variables`.
 
+    Its output goes to a file, which has a limit, and for which nobody waits that it left behind.
+
     The limits are set after the process started and before it gets the text, so that nothing of
     this process runs between fork and exec. What is preloaded into this process stays out: a
     sanitizer needs more address space than the limit.
     """
     environment = {name: os.environ[name] for name in os.environ if name != "LD_PRELOAD"}
     environment.update(variables or {})
-    with subprocess.Popen(
-        command,
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        cwd=folder,
-        env=environment,
-    ) as process:
+    with (
+        tempfile.TemporaryFile() as output,
+        subprocess.Popen(
+            command,
+            stdin=subprocess.PIPE,
+            stdout=output,
+            stderr=subprocess.STDOUT,
+            cwd=folder,
+            env=environment,
+        ) as process,
+    ):
         limit(process.pid, memory)
+        # A wait with a timeout looks for the end every 50 ms.
+        timer = threading.Timer(MAX_SECONDS, process.kill)
+        timer.daemon = True
+        timer.start()
         try:
-            output, _ = process.communicate(text.encode(), timeout=MAX_SECONDS)
-        except subprocess.TimeoutExpired:
-            process.kill()
-            process.communicate()
-            return process.returncode, ""
+            process.communicate(text.encode(errors="replace"))
         except BaseException:
             process.kill()
             raise
-        return process.returncode, output.decode(errors="replace")
+        finally:
+            timer.cancel()
+        output.seek(0)
+        return process.returncode, output.read(MAX_OUTPUT_BYTES).decode(errors="replace")
 
 
 def limit(process: int, memory: int) -> None:

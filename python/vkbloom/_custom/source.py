@@ -14,6 +14,8 @@ from vkbloom._custom import hints
 MAX_FILE_BYTES: Final = 1 << 26
 #: Of a line that a message quotes.
 QUOTED_CHARACTERS: Final = 160
+#: Of a cause, which names of a file can make long.
+MAX_CAUSE_CHARACTERS: Final = 2000
 
 
 @dataclasses.dataclass(frozen=True)
@@ -37,15 +39,24 @@ class Source:
         """Return a line of the file, counted from 1, as messages quote it."""
         lines = self.text.split("\n")
         text = lines[line - 1].strip() if 0 < line <= len(lines) else ""
+        text = _printable(text[: QUOTED_CHARACTERS + 1])
         return text if len(text) <= QUOTED_CHARACTERS else text[:QUOTED_CHARACTERS] + "..."
 
     def where(self, line: int, cause: str) -> str:
         """Return a message that names file, line and cause, and quotes the line."""
+        cause = _printable(cause[:MAX_CAUSE_CHARACTERS])
         return f"{self.name}:{line}: {cause}\n    {self.quote(line)}"
 
     def fault(self, line: int, cause: str) -> ValueError:
         """Return the error of a line."""
         return ValueError(self.where(line, cause))
+
+
+def _printable(text: str) -> str:
+    """Return a text of one line, whose characters do nothing to a terminal."""
+    return "".join(
+        each if each.isprintable() or each == "\t" else repr(each)[1:-1] for each in text
+    )
 
 
 def read_source(source: str | os.PathLike[str]) -> Source:
@@ -56,8 +67,9 @@ def read_source(source: str | os.PathLike[str]) -> Source:
         raise TypeError(f"source: {source!r} is neither a path nor a text")
     path = Path(source)
     if path.stat().st_size > MAX_FILE_BYTES:
-        raise ValueError(f"{path}: {path.stat().st_size} bytes are more than {MAX_FILE_BYTES}")
-    data = path.read_bytes().replace(b"\r\n", b"\n")
+        raise ValueError(f"{path}:1: {path.stat().st_size} bytes are more than {MAX_FILE_BYTES}")
+    with path.open("rb") as file:  # a device may have no end
+        data = file.read(MAX_FILE_BYTES).replace(b"\r\n", b"\n")
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:

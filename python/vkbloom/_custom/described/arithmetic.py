@@ -8,20 +8,25 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Final, Protocol
 
+from vkbloom._custom.described.tables import shown
+
 #: Numbers; a single one stands for as many as are needed.
 Numbers = tuple[float, ...]
 Expression = ast.expr
 
 MAX_CHARACTERS: Final = 1000
-MAX_NUMBERS: Final = 4096
 MAX_ZEROS: Final = 1 << 16
 ZEROS: Final = "zeros"
+#: Of operations within others.
+MAX_DEPTH: Final = 100
 #: Exponents that give no integer or float of great size.
 MAX_VALUE: Final = 1e30
 
 
 class ArithmeticFault(ValueError):
-    """An expression that is not valid, or has no value."""
+    """An expression that is not valid, or has no value; `line`: where it is, if that is known."""
+
+    line: int | None = None
 
 
 class Scope(Protocol):
@@ -106,7 +111,7 @@ def parse(text: str) -> Expression:
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
         if isinstance(error, ArithmeticFault):
             raise
-        raise ArithmeticFault(f"{text!r} is not an expression") from None
+        raise ArithmeticFault(f"{shown(text)} is not an expression") from None
     return tree
 
 
@@ -114,8 +119,18 @@ def source_of(text: str) -> Source:
     """Parse the name of an image, with or without a level: down, down[level - 1]."""
     tree = parse(text)
     if not _is_source(tree):
-        raise ArithmeticFault(f"{text!r} is not the name of an image, such as glow or down[level]")
+        raise ArithmeticFault(
+            f"{shown(text)} is not the name of an image, such as glow or down[level]"
+        )
     return _as_source(tree)
+
+
+def _text(tree: Expression) -> str:
+    """Return an expression as messages show it."""
+    try:
+        return ast.unparse(tree)
+    except RecursionError:
+        return "an expression"
 
 
 def _is_source(tree: Expression) -> bool:
@@ -133,9 +148,12 @@ def _as_source(tree: Expression) -> Source:
 
 
 def _check(tree: Expression) -> None:
-    """Check that a tree has nothing but arithmetic."""
-    for node in _parts(tree):
-        _check(node)
+    """Check that a tree has nothing but arithmetic, and ends before recursion must."""
+    waiting = [(tree, 0)]
+    for node, depth in waiting:
+        if depth > MAX_DEPTH:
+            raise ArithmeticFault(f"the expression nests more than {MAX_DEPTH} operations")
+        waiting += [(part, depth + 1) for part in _parts(node)]
 
 
 def _parts(tree: Expression) -> list[Expression]:  # noqa: PLR0911  one for each kind
@@ -159,7 +177,7 @@ def _parts(tree: Expression) -> list[Expression]:  # noqa: PLR0911  one for each
             return [tree.slice]
         case ast.Call(func=ast.Name(), keywords=[]):
             return _arguments(tree)
-    raise ArithmeticFault(f"{ast.unparse(tree)!r} is not arithmetic")
+    raise ArithmeticFault(f"{_text(tree)!r} is not arithmetic")
 
 
 def _arguments(tree: ast.Call) -> list[Expression]:
@@ -167,7 +185,7 @@ def _arguments(tree: ast.Call) -> list[Expression]:
     name = tree.func.id
     if name in SIZES:
         if len(tree.args) != 1 or not _is_source(tree.args[0]):
-            raise ArithmeticFault(f"{ast.unparse(tree)!r}: {name} takes an image, such as glow")
+            raise ArithmeticFault(f"{_text(tree)!r}: {name} takes an image, such as glow")
     elif name == ZEROS:
         if len(tree.args) != 1:
             raise ArithmeticFault(f"{ZEROS} takes a number, of how many there are")
@@ -203,19 +221,22 @@ def evaluate(tree: Expression, scope: Scope) -> Numbers:
     """Return the value of an expression; raise ArithmeticFault if it has none."""
     try:
         value = _evaluate(tree, scope)
+    except RecursionError:
+        raise ArithmeticFault(f"{_text(tree)!r} nests too many operations") from None
     except (ZeroDivisionError, OverflowError, ValueError, TypeError) as error:
         if isinstance(error, ArithmeticFault):
             raise
-        raise ArithmeticFault(f"{ast.unparse(tree)!r} has no value: {error}") from None
+        cause = "it is too large" if isinstance(error, OverflowError) else str(error)
+        raise ArithmeticFault(f"{_text(tree)!r} has no value: {cause}") from None
     if not all(math.isfinite(each) for each in value):
-        raise ArithmeticFault(f"{ast.unparse(tree)!r} has no finite value")
+        raise ArithmeticFault(f"{_text(tree)!r} has no finite value")
     return value
 
 
 def _evaluate(tree: Expression, scope: Scope) -> Numbers:  # noqa: PLR0911  one for each kind
     match tree:
         case ast.Constant():
-            return (float(tree.value),)  # type: ignore[arg-type]
+            return (_checked(tree.value),)  # type: ignore[arg-type]
         case ast.Name():
             return scope.number(tree.id)
         case ast.BinOp():
@@ -240,7 +261,7 @@ def _evaluate(tree: Expression, scope: Scope) -> Numbers:  # noqa: PLR0911  one 
         case ast.Attribute():
             value, index = _evaluate(tree.value, scope), "xyzw".index(tree.attr)
             if index >= len(value):
-                raise ArithmeticFault(f"{ast.unparse(tree)!r}: there is no {tree.attr}")
+                raise ArithmeticFault(f"{_text(tree)!r}: there is no {tree.attr}")
             return (value[index],)
         case ast.Call():
             assert isinstance(tree.func, ast.Name)
@@ -248,7 +269,7 @@ def _evaluate(tree: Expression, scope: Scope) -> Numbers:  # noqa: PLR0911  one 
                 return SIZES[tree.func.id](*scope.size(_as_source(tree.args[0])))
             given = [_evaluate(each, scope) for each in tree.args]
             return _zeros(*given) if tree.func.id == ZEROS else _call(tree.func.id, given)
-    raise ArithmeticFault(f"{ast.unparse(tree)!r} is an image, not a number")
+    raise ArithmeticFault(f"{_text(tree)!r} is an image, not a number")
 
 
 def _call(name: str, values: list[Numbers]) -> Numbers:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import hashlib
+import math
 import struct
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Final
@@ -38,9 +39,10 @@ from vkbloom._custom.described.schema import (
     Value,
 )
 from vkbloom._custom.glsl import TARGET
+from vkbloom._custom.passes import MAX_THREADS
 from vkbloom._custom.rows import MAX_PARAMETERS, MAX_READS, CoreShader
 from vkbloom._custom.spirv import shared_bytes
-from vkbloom._spelling import did_you_mean
+from vkbloom._spelling import did_you_mean, nearest
 
 #: Of a fragment shader, and of a compute shader.
 MAX_TARGETS: Final = 4
@@ -193,6 +195,14 @@ class _Binder:
             stage = self._open(program.code, program.entry, program.stage)
             if stage.entry.stage == "vertex":
                 raise self.fault('entry: a vertex shader is no pass; name it vertex = "NAME"')
+            if stage.entry.stage == "compute" and item.shader.vertex is not None:
+                raise self.fault("vertex: a compute shader has no vertex shader")
+            if stage.entry.stage == "compute" and item.blend is not None:
+                cause = (
+                    "blend: a compute shader writes storage images, which do not blend; let it read"
+                    " the image and add it"
+                )
+                raise self.fault(cause, item.blend.line)
             vertex = None
             if program.vertex is not None:
                 vertex = self._open(program.vertex, None, "vertex")
@@ -208,6 +218,9 @@ class _Binder:
             group = None
             if stage.entry.stage == "compute":
                 threads = stage.module.workgroup(stage.entry)
+                if not 1 <= math.prod(threads) <= MAX_THREADS:
+                    shown = " x ".join(map(str, threads))
+                    raise ModuleFault(f"{shown} threads are out of range, 1 to {MAX_THREADS}")
                 group = item.tile or threads[:2]
                 words = struct.unpack(f"={len(code.code) // 4}I", code.code)
                 code = CoreShader(*code[:3], threads[0], threads[1], shared_bytes(words))
@@ -246,9 +259,13 @@ class _Binder:
             return self._open(with_kinds(code, dict.fromkeys(textures, TEXTURE)), entry, stage)
         unknown = module.capabilities - CAPABILITIES
         if unknown:
-            raise ModuleFault(f"the shader needs the capability {min(unknown)} of SPIR-V")
+            known = {10: " (double)", 2: " (geometry)", 3: " (tessellation)", 34: " (cube arrays)"}
+            least = min(unknown)
+            cause = f"the shader needs the capability {least}{known.get(least, '')} of SPIR-V"
+            raise ModuleFault(cause)
         if module.is_endless(found):
-            raise ModuleFault(f"the shader has a loop that never ends, in {found.name}")
+            what = "vertex shader" if stage == "vertex" else "shader"
+            raise ModuleFault(f"the {what} has a loop that never ends, in {found.name}")
         places = Places(constants=self._constants(module))
         return _Stage(code, module, found, module.variables(found), places)
 
@@ -266,6 +283,9 @@ class _Binder:
                 raise self._unknown("constants", key, known, self._item.shader.line)
             word = module.defined[known[key]]
             kind = module.type_of(word[1]).kind
+            if kind != "float" and not -(2**31) <= value < 2**32:
+                cause = f"constants: {key}: {value:g} does not fit into 32 bits"
+                raise self.fault(cause, self._item.shader.line)
             data = (
                 struct.pack("<f", value) if kind == "float" else struct.pack("<q", int(value))[:4]
             )
@@ -379,9 +399,14 @@ class _Binder:
         if texture is None:
             name = self._labels(variable)[0]
             shown = name if name.isidentifier() else f'"{name}"'
+            others = self._item.textures.keys() - {key for _, key in self._used_keys}
+            near = nearest(name, others)
+            line = None if near is None else self._item.textures[near].line
             raise self.fault(
-                f"textures: the shader reads {self._show(variable)}, which the pass does not name; "
-                f'add {shown} = "glow", or another image, below [passes.textures]'
+                f"textures: the shader reads {self._show(variable)}, which the pass does not name"
+                + (f"; it names {near!r}" if near else "")
+                + f'; add {shown} = "glow", or another image, below [passes.textures]',
+                line,
             )
         stage.places.bindings[variable.id] = len(self._slots) + 1
         how = texture.sampling if kind.kind == "sampled" else None
@@ -416,7 +441,8 @@ class _Binder:
         begin = -(-self._size // 16) * 16
         most = MAX_BUFFER_BYTES if variable.is_buffer else MAX_BLOCK_BYTES
         if kind.kind != "struct" or size > most:
-            raise self.fault(f"values: {self._show(variable)} cannot be bound: {size} bytes")
+            cause = f"{size} bytes are more than {most}" if size > most else "it is no structure"
+            raise self.fault(f"values: {self._show(variable)} cannot be bound: {cause}")
         if variable.is_block and kind.id not in self._structs and begin + size <= MAX_PARAMETERS:
             self._structs.add(kind.id)
             stage.places.bindings[variable.id] = 0
@@ -466,9 +492,12 @@ class _Binder:
         within = any(is_within(each, path) for each in covered)
         if within or not kind.size or path.rpartition(".")[2].lower().lstrip("_").startswith("pad"):
             return
+        near = nearest(path, self._item.values.keys() - {key for _, key in self._used_keys})
         raise self.fault(
             f"values: the shader reads {path!r} of {self._show(variable)}, which the pass does not "
-            f"give; add {path} = 1.0, or an expression, below [passes.values]"
+            "give" + (f"; it gives {near!r}" if near else "") + f"; add {path} = 1.0, or an "
+            "expression, below [passes.values]",
+            None if near is None else self._item.values[near][1],
         )
 
     def _given(self, variable: Variable) -> Iterator[tuple[str, tuple[str, Value, int]]]:
@@ -648,8 +677,9 @@ class _Binder:
                 stage.places.zeros.add(each.id)
                 continue
             if location not in POSITIONS or kind is None or kind.kind != "float":
+                name = f"{each.name!r}" if each.name else "an input"
                 raise self.fault(
-                    f"vertex: the shader reads {each.name!r} at location {location}; without "
+                    f"vertex: the shader reads {name} at location {location}; without "
                     'vertex = "NAME" there are positions at locations 0 to 3 alone'
                 )
         return any(each.id not in stage.places.zeros for each in wanted.values())

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Final
 
 from vkbloom._custom.described.binding import is_stored, rename
+from vkbloom._custom.described.files import read_bytes
 from vkbloom._custom.described.layout import paths
 from vkbloom._custom.described.module import INPUT, OUTPUT, UNIFORM_CONSTANT, Module, Variable
 from vkbloom._custom.described.programs import Program, compile_one
@@ -93,7 +94,7 @@ def _reflect(path: Path) -> list[_Found]:
         raise ValueError(
             f"{path}: the name does not tell the language; known are {', '.join(SUFFIXES)}"
         )
-    text = path.read_bytes().decode("latin-1")
+    text = read_bytes(path).decode("latin-1")
     if language == "glsl" and re.search(r"\bvoid\s+mainImage\s*\(", text):
         language = "shadertoy"
     entries: list[str | None] = [None]

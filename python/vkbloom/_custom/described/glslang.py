@@ -102,5 +102,24 @@ def _explain(files: Files, status: int, output: str) -> ShaderError:
         return files.fault(
             "" if name in ("0", "stdin") else name, int(line), f"{cause.strip()}{hint}"
         )
-    lines = [line for line in output.strip().split("\n") if line.strip() not in ("", "stdin")]
-    return files.fault("", 1, f"glslang refused the file: {lines[-1].strip() if lines else status}")
+    return _explain_whole(files, status, output)
+
+
+def _explain_whole(files: Files, status: int, output: str) -> ShaderError:
+    """Return the error of a file, where glslang names no line."""
+    lines = [line.strip() for line in output.split("\n") if line.strip() not in ("", "stdin")]
+    if "Missing entry point" in output:
+        return files.fault("", 1, "the file has no function 'void main()'")
+    named = [number for number, line in enumerate(lines) if line.startswith("ERROR: ")]
+    if not named:
+        return files.fault("", 1, f"glslang refused the file: {lines[-1] if lines else status}")
+    first = named[0]
+    # What it is about is on the line after it.
+    cause = lines[first].removeprefix("ERROR: ")
+    if cause.endswith(":") and first + 1 < len(lines):
+        cause += f" {lines[first + 1]}"
+    word = re.search(r"(\w+)\(", cause)
+    wanted = re.escape(word[1]) if word else r"#\s*version" if "version" in cause else r"\Z"
+    at = re.search(rf"(?<!\w){wanted}\b", files.main.text)
+    line = files.main.text.count("\n", 0, at.start()) + 1 if at else 1
+    return files.fault("", line, cause)

@@ -7,6 +7,7 @@ import struct
 from collections.abc import Iterator, Mapping
 from typing import Final
 
+from vkbloom._custom.loops import Instruction, is_endless
 from vkbloom._custom.spirv import HEADER_WORDS
 
 MAGIC: Final = 0x07230203
@@ -40,8 +41,6 @@ CONSTANT, CONSTANT_COMPOSITE, SPEC_CONSTANT, SPEC_CONSTANT_COMPOSITE = 43, 44, 5
 FUNCTION, FUNCTION_END, FUNCTION_CALL, VARIABLE = 54, 56, 57, 59
 ACCESS_CHAINS: Final = (65, 66)
 DECORATE, MEMBER_DECORATE, EXECUTION_MODE_ID = 71, 72, 331
-LABEL, BRANCH, BRANCH_CONDITIONAL, SWITCH = 248, 249, 250, 251
-EXITS: Final = (252, 253, 254, 255, 4416)
 LOAD: Final = 61
 IMAGE_READ: Final = 98
 
@@ -80,9 +79,6 @@ def element_of(binding: int) -> tuple[int, int] | None:
 
 class ModuleFault(ValueError):
     """SPIR-V that is not valid, or that has what passes cannot have."""
-
-
-Instruction = tuple[int, ...]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -434,47 +430,8 @@ class Module:
         return found
 
     def is_endless(self, entry: Entry) -> bool:
-        """Whether a function has a block that no way leads out of: a loop without an end."""
-        return any(_is_endless(self, self.functions[each]) for each in self.reached(entry))
-
-
-def _is_endless(module: Module, body: list[Instruction]) -> bool:
-    follow: dict[int, list[int]] = {}
-    leaves = set()
-    block = first = 0
-    for word in body:
-        opcode = word[0] & 0xFFFF
-        if opcode == LABEL and len(word) == 2:
-            block = word[1]
-            first = first or block
-            follow[block] = []
-        elif opcode == BRANCH and len(word) == 2:
-            follow.setdefault(block, []).append(word[1])
-        elif opcode == BRANCH_CONDITIONAL and len(word) > 3:
-            condition = module.defined.get(word[1], (0,))[0] & 0xFFFF
-            targets = {41: word[2:3], 42: word[3:4]}.get(condition, word[2:4])
-            follow.setdefault(block, []).extend(targets)
-        elif opcode == SWITCH and len(word) > 2:
-            follow.setdefault(block, []).extend(word[2::2])
-        elif opcode in EXITS:
-            leaves.add(block)
-    before: dict[int, list[int]] = {}
-    reached = [first] if first else []
-    seen = set(reached)
-    for each in reached:
-        for target in follow.get(each, []):
-            before.setdefault(target, []).append(each)
-            if target not in seen:
-                seen.add(target)
-                reached.append(target)
-    ending = [each for each in reached if each in leaves]
-    known = set(ending)
-    for each in ending:
-        for source in before.get(each, []):
-            if source not in known:
-                known.add(source)
-                ending.append(source)
-    return bool(seen - known)
+        """Whether it has a loop without an end."""
+        return any(is_endless(self.defined, self.functions[each]) for each in self.reached(entry))
 
 
 def read_words(code: bytes) -> tuple[int, ...]:

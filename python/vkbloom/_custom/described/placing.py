@@ -29,9 +29,9 @@ from vkbloom._custom.described.module import (
     UNIFORM,
     VARIABLE,
     Entry,
-    Instruction,
     Module,
 )
+from vkbloom._custom.loops import Instruction
 from vkbloom._custom.spirv import HEADER_WORDS, without_contraction
 
 #: Instructions that only help to debug: OpSourceContinued, OpSource, OpName, OpMemberName, OpLine,

@@ -30,8 +30,7 @@ from vkbloom._custom.described.schema import (
     ELEMENT,
     FRAME,
     GLOW,
-    INDEX,
-    LEVEL,
+    MAX_ENTRIES,
     PLAIN,
     TARGET,
     Description,
@@ -40,6 +39,7 @@ from vkbloom._custom.described.schema import (
     Sampling,
     Value,
 )
+from vkbloom._custom.described.settings import INDEX, LEVEL
 from vkbloom._custom.names import MAX_NAME_LENGTH
 from vkbloom._custom.planning import (
     BLOOM_IMAGE,
@@ -60,7 +60,6 @@ from vkbloom._locks import ProcessLock
 MAX_RUNS: Final = 256
 MAX_LEVELS: Final = 64
 MAX_GROUPS: Final = 65535
-_MAX_DEPTH: Final = 16
 
 Key = tuple[str, int | None]
 
@@ -95,7 +94,8 @@ class Plan:
         self._bound: dict[str, PassImage] = {}
         self._plain: dict[str, PassImage] = {}
         self._numbered = itertools.count()
-        self._depth = 0
+        # The values of the description's numbers, until the level or an image is another one.
+        self._known: dict[str, Numbers] = {}
         self._owner: Any = None
         self._line = 1
         self._by_item = {id(each.item): each for each in passes}
@@ -116,12 +116,14 @@ class Plan:
         if name == INDEX:
             return (float(self._request.index),)
         if name in self._description.numbers:
-            self._depth += 1
-            if self._depth > _MAX_DEPTH:
-                raise ArithmeticFault(f"{name!r} depends on itself")
-            found = self._numbers(self._description.numbers[name][0])
-            self._depth -= 1
-            return found
+            if name not in self._known:
+                value, line = self._description.numbers[name]
+                try:
+                    self._known[name] = self._numbers(value)
+                except ArithmeticFault as error:
+                    error.line = error.line or line
+                    raise
+            return self._known[name]
         return (float(self._request.values[name]),)
 
     def size(self, source: ImageName) -> tuple[int, int]:
@@ -139,15 +141,20 @@ class Plan:
         if isinstance(value, float):
             return (value,)
         if isinstance(value, tuple):
-            return tuple(part for each in value for part in self._numbers(each))
+            found: list[float] = []
+            for each in value:
+                found += self._numbers(each)
+                if len(found) > MAX_ENTRIES:
+                    raise ArithmeticFault(f"{len(found)} numbers are more than {MAX_ENTRIES}")
+            return tuple(found)
         return evaluate(value, self)
 
     def _value(self, value: Value, line: int) -> Numbers:
-        self._depth = 0
         try:
             return self._numbers(value)
         except ArithmeticFault as error:
-            raise self._description.source.fault(line, str(error)) from None
+            needed = "" if error.line in (None, line) else f"; line {line} needs it"
+            raise self._description.source.fault(error.line or line, f"{error}{needed}") from None
 
     def _whole(self, value: Value, line: int) -> int:
         found = self._value(value, line)
@@ -205,23 +212,25 @@ class Plan:
                 continue
             for level in self._levels(step):
                 self._level = level
+                self._known = {}
                 for item in step.passes:
                     self._run(self._by_item[id(item)])
             self._level = None
+            self._known = {}
         return self._finish()
 
     def _levels(self, loop: Loop) -> range:
         first, last = (self._whole(each, loop.line) for each in (loop.first, loop.last))
-        levels = range(first, last + loop.step, loop.step)
-        if len(levels) > MAX_LEVELS:
-            cause = f"{len(levels)} levels are more than {MAX_LEVELS}"
+        count = (last - first) * loop.step + 1
+        if count > MAX_LEVELS:
+            cause = f"{count} levels are more than {MAX_LEVELS}"
             raise self._description.source.fault(loop.line, cause)
-        return levels
+        return range(first, last + loop.step, loop.step)
 
     def _run(self, each: BoundPass) -> None:
         item = each.item
-        self._target, self._bound = None, {}
-        if item.when is not None and not any(self._value(item.when, item.line)):
+        self._target, self._bound, self._known = None, {}, {}
+        if item.when is not None and not any(self._value(*item.when)):
             return
         if len(self.rows) >= MAX_RUNS:
             cause = f"the passes run more than {MAX_RUNS} times in a frame"
@@ -231,8 +240,9 @@ class Plan:
             for key, texture in item.textures.items()
             if key not in each.arrays
         }
+        self._known = {}
         sizes = [self._side(written) for written in each.outputs]
-        self._target = sizes[0]
+        self._target, self._known = sizes[0], {}
         reads = [(self._read_element(read).name, read.is_history) for read in each.reads]
         params = self._pack(each.numbers, each.size)
         resources = [self._resource(block) for block in each.blocks]
@@ -273,7 +283,11 @@ class Plan:
         self._element = written.element
         output = written.output
         if output.when is None or any(self._value(output.when, output.line)):
-            key = output.image.name, self._index_at(output.image, output.line)
+            level = self._index_at(output.image, output.line)
+            if level is not None and not 0 <= level < MAX_LEVELS:
+                cause = f"{output.image.name}: the level {level} is out of range, "
+                raise self._description.source.fault(output.line, f"{cause}0 to {MAX_LEVELS - 1}")
+            key = output.image.name, level
             if written.is_read and key in self._images:
                 cause = (
                     f"outputs: the shader reads {self._shown(output.image)}, which an earlier pass "
@@ -300,10 +314,12 @@ class Plan:
         """Return how many workgroups a pass has; None: as many as cover its first output."""
         if each.item.groups is None:
             return None
-        found = self._value(each.item.groups, each.item.line)
+        value, line = each.item.groups
+        found = self._value(value, line)
         if len(found) != 2 or not all(1 <= number <= MAX_GROUPS for number in found):
-            cause = f"groups: {found} are not two numbers, 1 to {MAX_GROUPS}"
-            raise self._description.source.fault(each.item.line, cause)
+            numbers = ", ".join(f"{number:g}" for number in found)
+            cause = f"groups: {numbers} are not two numbers, 1 to {MAX_GROUPS}"
+            raise self._description.source.fault(line, cause)
         return int(found[0]), int(found[1])
 
     def _side(self, written: Written) -> tuple[int, int]:
@@ -313,15 +329,18 @@ class Plan:
         if isinstance(output.size, float):
             found: Numbers = tuple(output.size * side for side in self._request.frame)
         else:
-            found = self._value(output.size, output.line)
+            found = self._value(output.size, output.size_line)
         self._element = None
         if len(found) not in (1, 2):
             cause = f"size: {len(found)} numbers are not width and height"
-            raise self._description.source.fault(output.line, cause)
+            raise self._description.source.fault(output.size_line, cause)
+        if min(found) < 0:
+            cause = f"size: a side of {min(found):g} pixels is out of range, 1 to {MAX_SIDE}"
+            raise self._description.source.fault(output.size_line, cause)
         sides = tuple(max(int(each // 1), 1) for each in found)
         if max(sides) > MAX_SIDE:
             cause = f"size: a side of {max(sides)} pixels is out of range, 1 to {MAX_SIDE}"
-            raise self._description.source.fault(output.line, cause)
+            raise self._description.source.fault(output.size_line, cause)
         return sides[0], sides[-1]
 
     def _read(self, sources: tuple[ImageName, ...], line: int) -> PassImage:
@@ -333,7 +352,11 @@ class Plan:
             shown = " and ".join(self._shown(source) for source in sources)
         except ArithmeticFault as error:
             raise self._description.source.fault(line, str(error)) from None
+        names = {source.name for source in sources}
+        written = [f"{name}[{at}]" for name, at in self._images if name in names and at is not None]
         cause = f"{shown} is not written before this pass"
+        if written:
+            cause += f"; written are {', '.join(written)}"
         raise self._description.source.fault(line, cause)
 
     def _image(self, output: Output, size: tuple[int, int]) -> PassImage:
@@ -382,7 +405,11 @@ class Plan:
                 number.line, f"{number.key}: it takes {len(places)} numbers, not {len(given)}"
             )
         for (kind, bits, offset), value in zip(places, given, strict=True):
-            packed = _packed(kind, bits, value)
+            try:
+                packed = _packed(kind, bits, value)
+            except (OverflowError, struct.error):
+                cause = f"{number.key}: {value:g} does not fit into {bits} bits"
+                raise self._description.source.fault(number.line, cause) from None
             at = number.offset + offset
             if at + len(packed) > len(data):
                 data.extend(bytes(at + len(packed) - len(data)))
@@ -506,5 +533,7 @@ def _packed(kind: str, bits: int, value: float) -> bytes:
     """Return a number as it is in a buffer."""
     if kind == "float":
         return struct.pack({16: "=e", 32: "=f", 64: "=d"}[bits], value)
-    whole = int(value) & ((1 << bits) - 1)
-    return whole.to_bytes(bits // 8, "little")
+    whole = int(value)
+    if kind == "int" and whole >= 1 << (bits - 1):
+        raise OverflowError
+    return whole.to_bytes(bits // 8, "little", signed=whole < 0)

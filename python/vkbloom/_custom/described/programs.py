@@ -18,7 +18,7 @@ from vkbloom._core import ShaderError
 from vkbloom._custom import compiler
 from vkbloom._custom.compiler import CACHE, run_limited
 from vkbloom._custom.described import glslang, lowering, shaderlab, slang, wgsl
-from vkbloom._custom.described.files import Files, collect
+from vkbloom._custom.described.files import Files, collect, read_bytes
 from vkbloom._custom.described.module import ModuleFault
 from vkbloom._custom.described.schema import Description, Shader
 from vkbloom._custom.source import Source
@@ -70,12 +70,11 @@ def compile_one(shader: Shader, source: Source) -> Program:
 
 def _prepare(source: Source, shader: Shader, home: Path) -> Files:
     path = home / shader.file
+    if "\0" in str(path):
+        raise source.fault(shader.line, "file: the path has a null character")
     folders = []
     for name in shader.include:
-        folder = home / name
-        if not folder.is_dir():
-            raise source.fault(shader.line, f"include: there is no folder {folder}")
-        folders.append(folder.resolve())
+        folders.append(_folder(source, shader, "include", home / name))
     try:
         if shader.language == "spirv":
             return _binary(path)
@@ -96,19 +95,25 @@ def _prepare(source: Source, shader: Shader, home: Path) -> Files:
 
 def _with_folders(source: Source, shader: Shader, home: Path) -> Shader:
     """Return a shader with the whole paths of its dependencies."""
-    for _, folder in shader.dependencies:
-        if not (home / folder).is_dir():
-            cause = f"dependencies: there is no folder {home / folder}"
-            raise source.fault(shader.line, cause)
-    paths = tuple((name, str((home / each).resolve())) for name, each in shader.dependencies)
+    paths = tuple(
+        (name, str(_folder(source, shader, "dependencies", home / each)))
+        for name, each in shader.dependencies
+    )
     return dataclasses.replace(shader, dependencies=paths)
+
+
+def _folder(source: Source, shader: Shader, key: str, path: Path) -> Path:
+    try:
+        if path.is_dir():
+            return path.resolve()
+    except (OSError, ValueError):  # a name that no file can have
+        pass
+    raise source.fault(shader.line, f"{key}: there is no folder {path}")
 
 
 def _binary(path: Path) -> Files:
     """Return a file of SPIR-V, whose bytes are characters of its text."""
-    if path.stat().st_size > 4 << 20:
-        raise ValueError(f"{path}:1: {path.stat().st_size} bytes of SPIR-V are more than {4 << 20}")
-    return Files(Source(str(path), path.read_bytes().decode("latin-1")), (), ())
+    return Files(Source(str(path), read_bytes(path).decode("latin-1")), (), ())
 
 
 def _compile(shader: Shader, files: Files) -> Program:

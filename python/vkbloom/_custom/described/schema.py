@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import ast
 import dataclasses
 import functools
-import keyword
+import re
 from collections.abc import Iterator, Mapping
 from typing import Any, Final
 
@@ -18,10 +19,18 @@ from vkbloom._custom.described.arithmetic import (
 from vkbloom._custom.described.arithmetic import (
     Source as ImageName,
 )
+from vkbloom._custom.described.settings import (
+    INDEX,
+    LEVEL,
+    check_name,
+    read_number,
+    read_settings,
+)
 from vkbloom._custom.described.tables import Table, read_tables
 from vkbloom._custom.names import HISTORY
-from vkbloom._custom.params import RANGES, Number, Param
+from vkbloom._custom.params import Param
 from vkbloom._custom.source import Source
+from vkbloom._spelling import did_you_mean
 
 #: Images that every pass can read.
 FRAME: Final = "frame"
@@ -30,12 +39,9 @@ GLOW: Final = "glow"
 PLAIN: Final = ("black", "white")
 #: An output that nobody reads.
 DISCARD: Final = "discard"
-#: Numbers that every expression can have: the number of a run in a loop, of the frame before this
-#: one, and the target of the pass.
-LEVEL: Final = "level"
-INDEX: Final = "index"
 #: The number of an image in an array of the shader, in what is said of the whole array.
 ELEMENT: Final = "element"
+#: The target of the pass.
 TARGET: Final = "target"
 
 FILTERS: Final = ("linear", "nearest")
@@ -50,12 +56,28 @@ LANGUAGES: Final = {
     "wesl": (".wesl",),
     "spirv": (".spv",),
 }
+#: Entry points of languages that have but one.
+MAINS: Final = {"glsl": "main", "shadertoy": "mainImage"}
 STAGES: Final = ("fragment", "compute")
 #: Formats of outputs; "" is the setting `format`.
 FORMATS: Final = ("", "rgba8unorm", "rgba16float", "rgba32float")
 MAX_VERTICES: Final = 1 << 16
+#: Options of slangc that say how it compiles, and what may follow them. Others name files that it
+#: would write, and libraries that it would load.
+OPTION: Final = re.compile(
+    r"-(?:D\w+(?:=[^\n]*)?|U\w+|O[0-3]?|g[0-3]?|W[\w,-]*|profile|capability|stage-capability|std"
+    r"|matrix-layout-(?:row|column)-major|fvk-[\w-]+|fspv-[\w-]+|emit-spirv-\w+|allow-glsl"
+    r"|fp-mode|floating-point-mode|denorm(?:al)?-mode-fp(?:16|32|64)|no-mangle|HV|warnings-disable"
+    r"|ignore-capabilities|restrictive-capability-check|minimum-slang-optimization"
+    r"|preserve-params|zero-initialize|loop-inversion|unscoped-enum"
+    r"|enable-experimental-\w+|disable-\w+[\w-]*|default-image-format-unknown"
+    r"|force-glsl-scalar-layout|bindless-space-index)"
+    r"|[\w+][\w+.,]*"
+)
 MAX_PASSES: Final = 64
-MAX_SETTINGS: Final = 64
+MAX_NUMBERS: Final = 256
+#: Entries of a list of numbers.
+MAX_ENTRIES: Final = 4096
 
 Value = Expression | float | tuple[Expression | float, ...]
 
@@ -93,6 +115,7 @@ class Output:
     size: Value
     format: str
     line: int
+    size_line: int
     when: Expression | None = None
 
 
@@ -135,9 +158,9 @@ class DescribedPass:
     values: Mapping[str, tuple[Value, int]]
     outputs: Mapping[str, Output]
     blend: Blend | None
-    when: Expression | None
+    when: tuple[Expression, int] | None
     tile: tuple[int, int] | None
-    groups: Value | None
+    groups: tuple[Value, int] | None
     vertices: int
     line: int
 
@@ -196,8 +219,8 @@ class Description:
 def read_schema(source: Source) -> Description:
     """Read a description; raise ValueError with file and line if it is not valid."""
     table = read_tables(source)
-    params = tuple(_read_settings(table.table("settings")))
-    numbers = _read_values(table.table("numbers"))
+    params = tuple(read_settings(table.table("settings")))
+    numbers = _read_numbers(table.table("numbers"))
     shared = _read_shared(table)
     steps = tuple(_read_step(each, shared) for each in table.tables("passes"))
     if not steps:
@@ -219,48 +242,6 @@ def read_schema(source: Source) -> Description:
     return made
 
 
-def _read_settings(table: Table) -> Iterator[Param]:
-    if len(list(table)) > MAX_SETTINGS:
-        raise table.fault(f"settings: more than {MAX_SETTINGS}")
-    for name in table:
-        each = table.table(name)
-        line = table.line(name)
-        if not name.isidentifier() or keyword.iskeyword(name) or not name.isascii():
-            raise table.fault(f"settings: {name!r} is not a name", name)
-        text = each.get("text", str, "")
-        names = each.texts("choices")
-        if names:
-            default = each.choice("default", names, names[0])
-            last = len(names) - 1
-            each.finish("a setting with choices")
-            yield Param(name, text, "int", "uniform", 0, last, names.index(default), names, line)
-            continue
-        number = each.choice("type", ("float", "int"), "float")
-        kinds = int if number == "int" else (int, float)
-        if "default" not in each:
-            raise table.fault(f"{name}: the setting has no default", name)
-        value = each.get("default", kinds)
-        low, high = RANGES["int" if number == "int" else "float"]
-        span = each.get("range", list, [low, high])
-        if len(span) != 2 or not all(type(end) in (int, float) for end in span):
-            each.refuse("range", span, "is not two numbers")
-        if not span[0] <= value <= span[1]:
-            each.refuse("default", value, f"is out of range, {span[0]} to {span[1]}")
-        each.finish("a setting")
-        kind: Number = "int" if number == "int" else "float"
-        yield Param(
-            name,
-            text,
-            kind,
-            "uniform",
-            max(low, span[0]),
-            min(high, span[1]),
-            float(value),
-            (),
-            line,
-        )
-
-
 def _image(table: Table, key: str, text: str | None) -> ImageName:
     try:
         return source_of(text or "")
@@ -271,16 +252,16 @@ def _image(table: Table, key: str, text: str | None) -> ImageName:
 def _value(table: Table, key: str, value: object) -> Value:
     """Return a number, an expression, or several."""
     if isinstance(value, bool | int | float):
-        if abs(value) > 1e30:
-            table.refuse(key, value, "is too large")
-        return float(value)
+        return read_number(table, key, value)
     if isinstance(value, str):
         try:
             return parse(value)
         except ArithmeticFault as error:
             raise table.fault(f"{key}: {error}", key) from None
-    if isinstance(value, list) and value and len(value) <= 4096:
+    if isinstance(value, list) and value:
         parts = [part for each in value for part in _parts(_value(table, key, each))]
+        if len(parts) > MAX_ENTRIES:
+            raise table.fault(f"{key}: {len(parts)} numbers are more than {MAX_ENTRIES}", key)
         return tuple(parts)
     table.refuse(key, value, "is not a number, an expression, or a list of them")
 
@@ -291,6 +272,29 @@ def _parts(value: Value) -> tuple[Expression | float, ...]:
 
 def _read_values(table: Table) -> dict[str, tuple[Value, int]]:
     return {key: (_value(table, key, table.get(key, object)), table.line(key)) for key in table}
+
+
+def _read_numbers(table: Table) -> dict[str, tuple[Value, int]]:
+    if len(list(table)) > MAX_NUMBERS:
+        raise table.fault(f"numbers: more than {MAX_NUMBERS}")
+    for name in table:
+        check_name(table, "numbers", name)
+    numbers = _read_values(table)
+    for name in numbers:
+        _check_cycle(table, numbers, name)
+    return numbers
+
+
+def _check_cycle(table: Table, numbers: Mapping[str, tuple[Value, int]], name: str) -> None:
+    """Check that a number does not depend on itself."""
+    waiting = [name]
+    for each in waiting:
+        value, _ = numbers[each]
+        for part in _parts(value):
+            needed = {*()} if isinstance(part, float) else names_in(part)[0] & numbers.keys()
+            if name in needed:
+                raise table.fault(f"numbers: {name!r} depends on itself", name)
+            waiting += needed - {*waiting}
 
 
 @dataclasses.dataclass(frozen=True)
@@ -313,8 +317,17 @@ def _read_shared(table: Table, above: _Shared | None = None) -> _Shared:
         {**known.defines, **_read_defines(table)},
         {**known.features, **{key: features.get(key, bool) for key in features}},
         {**known.dependencies, **{key: dependencies.text(key) or "" for key in dependencies}},
-        (*known.options, *table.texts("options")),
+        (*known.options, *_read_options(table)),
     )
+
+
+def _read_options(table: Table) -> tuple[str, ...]:
+    """Return options of slangc: those that name no files."""
+    options = table.texts("options")
+    for each in options:
+        if not OPTION.fullmatch(each):
+            table.refuse("options", each, "is not an option that a shader may give to slangc")
+    return options
 
 
 def _read_defines(table: Table) -> dict[str, str]:
@@ -367,6 +380,7 @@ def _read_pass(table: Table, above: _Shared) -> DescribedPass:
         len(tile) != 2 or not all(type(each) is int and 1 <= each <= 16384 for each in tile)
     ):
         table.refuse("tile", tile, "is not the two sides in pixels that a workgroup covers")
+    when, groups = _when(table), table.get("groups", list)
     made = DescribedPass(
         shader,
         _read_textures(table.table("textures")),
@@ -374,14 +388,14 @@ def _read_pass(table: Table, above: _Shared) -> DescribedPass:
         _read_values(table.table("values")),
         _read_outputs(table),
         _read_blend(table),
-        _when(table),
+        None if when is None else (when, table.line("when")),
         None if tile is None else (tile[0], tile[1]),
-        _value(table, "groups", table.get("groups", list)) if "groups" in table else None,
+        None if groups is None else (_value(table, "groups", groups), table.line("groups")),
         _vertices(table, shader),
         table.line(),
     )
     table.get("name", str)
-    table.finish("a pass")
+    table.finish("a pass", "down", "up", "steps")
     return made
 
 
@@ -416,6 +430,9 @@ def _read_shader(table: Table, shared: _Shared) -> Shader:
     stage = table.choice("stage", STAGES, "") if "stage" in table else None
     if stage is None and suffix in (".frag", ".comp"):
         stage = "fragment" if suffix == ".frag" else "compute"
+    entry = table.text("entry")
+    if entry is not None and entry != MAINS.get(language, entry):
+        table.refuse("entry", entry, f"is not {MAINS[language]}, the only one of this language")
     constants = table.table("constants")
     number = table.get("program", int, 0)
     if not 0 <= number < 100:
@@ -423,7 +440,7 @@ def _read_shader(table: Table, shared: _Shared) -> Shader:
     return Shader(
         file,
         language,
-        table.text("entry"),
+        entry,
         stage,
         table.text("vertex"),
         shared.include,
@@ -431,7 +448,10 @@ def _read_shader(table: Table, shared: _Shared) -> Shader:
         tuple(shared.features.items()),
         tuple(shared.dependencies.items()),
         shared.options,
-        tuple((key, float(constants.get(key, (int, float, bool)))) for key in constants),
+        tuple(
+            (key, read_number(constants, key, constants.get(key, (int, float, bool))))
+            for key in constants
+        ),
         number,
         table.line("file"),
     )
@@ -483,28 +503,41 @@ def _read_outputs(table: Table) -> dict[str, Output]:
     format = table.choice("format", FORMATS, "")
     if "output" in table:
         image = _image(table, "output", table.text("output"))
-        line = table.line("size" if "size" in table else "output")
-        return {"": Output(_writable(table, "output", image), size, format, line)}
+        line = table.line("output")
+        size_line = table.line("size" if "size" in table else "output")
+        return {"": Output(_writable(table, "output", image), size, format, line, size_line)}
     outputs = table.table("outputs")
     made = {}
     for key in outputs:
         value = outputs.get(key, (str, dict))
         if isinstance(value, str):
             image = _image(outputs, key, value)
-            made[key] = Output(_writable(outputs, key, image), size, format, outputs.line(key))
+            line = outputs.line(key)
+            size_line = table.line("size") if "size" in table else line
+            made[key] = Output(_writable(outputs, key, image), size, format, line, size_line)
             continue
         each = outputs.table(key)
+        if "image" not in each:
+            raise outputs.fault(f"{key}: the output has no image", key)
         image = _image(each, "image", each.text("image"))
         made[key] = Output(
             _writable(each, "image", image),
             _size(each, size),
             each.choice("format", FORMATS, format),
-            each.line("size") if "size" in each else outputs.line(key),
+            outputs.line(key),
+            (each if "size" in each else table).line("size"),
             _when(each),
         )
         each.finish("an output")
     if not made:
         raise table.fault("outputs: the pass has none", "outputs")
+    seen = set()
+    for key, output in made.items():
+        name, level = output.image
+        place = name, level and ast.dump(level)
+        if place in seen and name != DISCARD:
+            raise outputs.fault(f"outputs: {name!r} is the image of two outputs", key)
+        seen.add(place)
     return made
 
 
@@ -524,7 +557,13 @@ def _size(table: Table, default: Value) -> Value:
     if "size" not in table:
         return default
     value = table.get("size", (int, float, str, list))
-    return _value(table, "size", value)
+    made = _value(table, "size", value)
+    for part in _parts(made):
+        if isinstance(part, float) and part <= 0:
+            table.refuse("size", value, "is not greater than 0")
+        if isinstance(part, float) and isinstance(made, tuple) and part < 1:
+            table.refuse("size", value, "is less than a pixel; a share of the frame is one number")
+    return made
 
 
 def _read_blend(table: Table) -> Blend | None:
@@ -592,13 +631,13 @@ class _NameCheck:
             numbers, images = names_in(part)
             known = self.numbers | ({LEVEL} if level else set())
             known |= {ELEMENT} if element else set()
-            for name in numbers - known:
+            for name in sorted(numbers - known):
                 self._fail(name, known, "a number", line)
-            for name in images - self.images - {TARGET}:
+            for name in sorted(images - self.images - {TARGET}):
                 self._fail(name, self.images, "an image", line)
 
     def _fail(self, name: str, known: set[str], what: str, line: int) -> None:
-        where = "; only loops have levels" if name == LEVEL else ""
+        where = "; only loops have levels" if name == LEVEL else did_you_mean(name, known)
         raise self.source.fault(
             line, f"{name!r} is not {what} here{where}; known are {', '.join(sorted(known))}"
         )
@@ -631,12 +670,14 @@ class _NameCheck:
         for output in each.outputs.values():
             if output.image.name != DISCARD:
                 self.image(output.image, output.line, level=level, element=True)
-            inner.value(output.size, output.line, level=level, element=True)
+            inner.value(output.size, output.size_line, level=level, element=True)
             inner.value(output.when, output.line, level=level, element=True)
         if each.blend is not None:
             inner.value(each.blend.source, each.blend.line, level=level)
             inner.value(each.blend.target, each.blend.line, level=level)
             if each.blend.image is not None:
                 self.image(each.blend.image, each.blend.line, level=level)
-        self.value(each.when, each.line, level=level)
-        inner.value(each.groups, each.line, level=level)
+        if each.when is not None:
+            self.value(*each.when, level=level)
+        if each.groups is not None:
+            inner.value(*each.groups, level=level)

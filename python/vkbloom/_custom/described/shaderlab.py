@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import dataclasses
 import re
+from collections.abc import Iterator
 from typing import Final
 
 from vkbloom._custom.described.files import Files
 
-_BLOCK: Final = re.compile(
-    r"\b(HLSLINCLUDE|CGINCLUDE|HLSLPROGRAM|CGPROGRAM)\b(.*?)\b(ENDHLSL|ENDCG)\b", re.DOTALL
-)
+_BLOCK: Final = re.compile(r"\b(HLSLINCLUDE|CGINCLUDE|HLSLPROGRAM|CGPROGRAM)\b|\b(ENDHLSL|ENDCG)\b")
 _PRAGMA: Final = re.compile(
     r"^[ \t]*#[ \t]*pragma[ \t]+(vertex|fragment|kernel)[ \t]+(\w+)", re.MULTILINE
 )
@@ -33,12 +32,13 @@ def read_program(files: Files, number: int) -> Program:
     text = files.main.text
     shared: list[tuple[int, str]] = []
     programs: list[tuple[int, str]] = []
-    for match in _BLOCK.finditer(text):
-        line = text.count("\n", 0, match.start(2)) + 1
-        part = (
-            f'#line {line} "{files.main.name}"{match[2]}' if match[2].startswith("\n") else match[2]
-        )
-        (shared if match[1].endswith("INCLUDE") else programs).append((match.start(), part))
+    for start, kind, begin, end in _blocks(files):
+        part = text[begin:end]
+        if part.startswith("\n"):
+            # The number of the line after this one.
+            line = text.count("\n", 0, begin) + 2
+            part = f'#line {line} "{files.main.name}"{part}'
+        (shared if kind.endswith("INCLUDE") else programs).append((start, part))
     if number >= len(programs):
         raise files.fault(
             "",
@@ -55,3 +55,19 @@ def read_program(files: Files, number: int) -> Program:
     names = dict(_PRAGMA.findall(program))
     joined = _WITH_PRAGMAS.sub(r"\1", "\n".join((*parts, program)))
     return Program(joined, names.get("vertex"), names.get("fragment"))
+
+
+def _blocks(files: Files) -> Iterator[tuple[int, str, int, int]]:
+    """Return where each block starts, its kind, and where its text begins and ends."""
+    text = files.main.text
+    opened: re.Match[str] | None = None
+    for match in _BLOCK.finditer(text):
+        if opened is None and match[1]:
+            opened = match
+        elif opened is not None and match[2]:
+            yield opened.start(), opened[1], opened.end(), match.start()
+            opened = None
+    if opened is not None:
+        line = text.count("\n", 0, opened.start()) + 1
+        end = "ENDCG" if opened[1].startswith("CG") else "ENDHLSL"
+        raise files.fault("", line, f"{opened[1]} has no end; {end} is missing")

@@ -22,7 +22,7 @@ MISSING: Final = (
     "HLSL and Slang need the compiler slangc: pip install --no-deps slangtorch (15 MB), or set "
     "VKBLOOM_SLANGC to its path"
 )
-MISSING_TOOLS: Final = "{} is needed: pip install vkbloom[slang] (SPIRV-Tools, 8 MB)"
+MISSING_TOOLS: Final = "{} is needed: pip install vkbloom[slang] (SPIRV-Tools, 14 MB)"
 _MESSAGE: Final = re.compile(
     r"^error(?:\[\w+\])?: (.*)\n\s*--> (.*?):(\d+):\d+"
     r"|^(.*?)\((\d+)\): (?:fatal )?error(?: \w+)?: (.*)$",

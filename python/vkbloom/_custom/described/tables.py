@@ -4,13 +4,18 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator
 from typing import Any, Final, NoReturn
 
+from vkbloom._custom.described.lines import Path, find_lines
 from vkbloom._custom.source import Source
 from vkbloom._spelling import did_you_mean
 
-Path = tuple[str | int, ...]
+#: Of a description: characters, and how deeply values are nested.
+MAX_CHARACTERS: Final = 1 << 20
+MAX_DEPTH: Final = 16
+#: Of a value that a message shows.
+MAX_SHOWN: Final = 100
 
 #: The names of types in messages.
 _KINDS: Final = {
@@ -20,66 +25,49 @@ _KINDS: Final = {
     dict: "a table",
     list: "a list",
 }
-_HEADER: Final = re.compile(r"\s*(\[\[?)\s*(.+?)\s*\]\]?\s*(#.*)?")
-_KEY: Final = re.compile(
-    r"""\s*((?:[\w-]+|"[^"]*"|'[^']*')(?:\s*\.\s*(?:[\w-]+|"[^"]*"|'[^']*'))*)\s*="""
-)
-_WORD: Final = re.compile(r"""[\w-]+|"[^"]*"|'[^']*'""")
+_DOTS: Final = re.compile(rf"(?:\.[ \t]*[\w\"'-]{{1,99}}[ \t]*){{{MAX_DEPTH}}}")
 _AT_LINE: Final = re.compile(r"(.*) \(at line (\d+), column \d+\)", re.DOTALL)
 
 
 def read_tables(source: Source) -> Table:
     """Read a description's text; raise ValueError if it is not TOML."""
+    text = source.text
+    if len(text) > MAX_CHARACTERS:
+        raise source.fault(1, f"{len(text)} characters are more than {MAX_CHARACTERS}")
+    if match := _DOTS.search(text):
+        line = text.count("\n", 0, match.start()) + 1
+        raise source.fault(line, f"a key has more than {MAX_DEPTH} parts")
     try:
-        data = tomllib.loads(source.text)
-    except tomllib.TOMLDecodeError as error:
+        data = tomllib.loads(text)
+    except RecursionError:
+        raise source.fault(1, "the file nests its lists too deeply") from None
+    except ValueError as error:  # also of a number of too many digits
         match = _AT_LINE.fullmatch(str(error))
-        last = source.text.rstrip().count("\n") + 1
+        last = text.rstrip().count("\n") + 1
         line = int(match[2]) if match else last
         cause = match[1] if match else str(error).removesuffix(" (at end of document)")
         raise source.fault(line, f"this is not TOML: {cause}") from None
-    except RecursionError:
-        raise source.fault(1, "the file nests its lists too deeply") from None
-    return Table(source, data, (), find_lines(source.text))
+    _check_depth(source, data)
+    return Table(source, data, (), find_lines(text))
 
 
-def find_lines(text: str) -> dict[Path, int]:
-    """Return the lines of headers and of keys that begin a line."""
-    lines: dict[Path, int] = {}
-    above: Path = ()
-    counts: dict[Path, int] = {}
-    quoted = ""
-    for number, line in enumerate(text.split("\n"), 1):
-        if quoted:
-            quoted = "" if quoted in line else quoted
-            continue
-        if header := _HEADER.fullmatch(line):
-            above = _with_numbers(_words(header[2]), counts, is_list=header[1] == "[[")
-            lines.setdefault(above, number)
-        elif key := _KEY.match(line):
-            lines.setdefault((*above, *_words(key[1])), number)
-            rest = line[key.end() :]
-            quoted = next((mark for mark in ('"""', "'''") if rest.count(mark) == 1), "")
-    return lines
+def _check_depth(source: Source, data: dict[str, Any]) -> None:
+    """Check how deeply values are nested, so that recursion ends."""
+    waiting: list[tuple[Any, int]] = [(data, 0)]
+    for value, depth in waiting:
+        if depth > MAX_DEPTH:
+            raise source.fault(1, f"values are nested more than {MAX_DEPTH} times")
+        inner = value.values() if isinstance(value, dict) else value
+        waiting += [(each, depth + 1) for each in inner if isinstance(each, dict | list)]
 
 
-def _words(text: str) -> list[str]:
-    return [word.strip("\"'") for word in _WORD.findall(text)]
-
-
-def _with_numbers(words: Sequence[str], counts: dict[Path, int], *, is_list: bool) -> Path:
-    """Return the path of a header, with the number of each table of a list."""
-    path: Path = ()
-    for index, word in enumerate(words):
-        path = (*path, word)
-        if index == len(words) - 1 and is_list:
-            counts[path] = counts.get(path, -1) + 1
-            for other in [other for other in counts if len(other) > len(path)]:
-                if other[: len(path)] == path:
-                    del counts[other]
-        if path in counts:
-            path = (*path, counts[path])
-    return path
+def shown(value: object) -> str:
+    """Return a value as messages show it: the begin of it, if it is long."""
+    try:
+        text = repr(value)
+    except ValueError:  # a number with more digits than Python shows
+        return "a number of thousands of digits"
+    return text if len(text) <= MAX_SHOWN else f"{text[:MAX_SHOWN]}..."
 
 
 class Table:
@@ -105,23 +93,10 @@ class Table:
         path = (*self._path, *keys)
         if path in self._lines:
             return self._lines[path]
-        for end in range(len(path) - 1, -1, -1):
+        for end in range(len(path) - 1, 0, -1):
             if path[:end] in self._lines:
-                return self._search(self._lines[path[:end]], path[end:])
+                return self._lines[path[:end]]
         return 1
-
-    def _search(self, line: int, keys: Path) -> int:
-        """Return the line, of those of one value, that has the first of its keys."""
-        lines = self.source.text.split("\n")
-        later = [other for other in self._lines.values() if other > line]
-        end = min(later, default=len(lines) + 1)
-        for key in keys:
-            if isinstance(key, str):
-                for number in range(line, end):
-                    if re.search(rf"(?<![\w-]){re.escape(key)}[\"']?\s*=", lines[number - 1]):
-                        line = number
-                        break
-        return line
 
     def fault(self, cause: str, *keys: str | int) -> ValueError:
         """Return the error of a key."""
@@ -129,7 +104,7 @@ class Table:
 
     def refuse(self, key: str, value: object, cause: str) -> NoReturn:
         """Raise the error of a key's value."""
-        raise self.fault(f"{key}: {value!r} {cause}", key)
+        raise self.fault(f"{key}: {shown(value)} {cause}", key)
 
     def get(self, key: str, kinds: type | tuple[type, ...], default: Any = None) -> Any:
         """Return a value of one of some types; the default where there is none."""
@@ -141,7 +116,8 @@ class Table:
         if not isinstance(value, allowed) or (
             type(value) is bool and not {bool, object} & {*allowed}
         ):
-            names = " or ".join(dict.fromkeys(_KINDS.get(kind, "a number") for kind in allowed))
+            named = [kind for kind in allowed if kind is not int or float not in allowed]
+            names = " or ".join(dict.fromkeys(_KINDS.get(kind, "a number") for kind in named))
             self.refuse(key, value, f"is not {names}")
         return value
 
@@ -157,7 +133,7 @@ class Table:
         value: str = self.get(key, str, default)
         if value not in words:
             near = did_you_mean(value, words)
-            self.refuse(key, value, f"is not one of {', '.join(words)}{near}")
+            self.refuse(key, value, f"is not one of {', '.join(filter(None, words))}{near}")
         return value
 
     def table(self, key: str) -> Table:
@@ -169,7 +145,7 @@ class Table:
         found = self.get(key, list, [])
         for number, each in enumerate(found):
             if not isinstance(each, dict):
-                raise self.fault(f"{key}: {each!r} is not a table", key, number)
+                raise self.fault(f"{key}: {shown(each)} is not a table", key, number)
         return [
             Table(self.source, each, (*self._path, key, number), self._lines)
             for number, each in enumerate(found)
@@ -179,17 +155,15 @@ class Table:
         """Return a list of texts; one text is a list of it."""
         value = self.get(key, (str, list), [])
         found = [value] if isinstance(value, str) else value
-        for each in found:
+        for number, each in enumerate(found):
             if not isinstance(each, str) or not each:
-                self.refuse(key, each, "is not a text")
+                raise self.fault(f"{key}: {shown(each)} is not a text", key, number)
         return tuple(found)
 
-    def finish(self, what: str) -> None:
-        """Raise ValueError if a key was not taken."""
+    def finish(self, what: str, *others: str) -> None:
+        """Raise ValueError if a key was not taken; `others` are keys that it could have."""
+        known = {*self._taken, *others}
         for key in self._data:
             if key not in self._taken:
-                near = (
-                    did_you_mean(key, self._taken)
-                    or f"; known are {', '.join(sorted(self._taken))}"
-                )
-                raise self.fault(f"{key!r} is not a key of {what}{near}", key)
+                near = did_you_mean(key, known) or f"; known are {', '.join(sorted(known))}"
+                raise self.fault(f"{shown(key)} is not a key of {what}{near}", key)

@@ -17,7 +17,13 @@ from typing import Final
 from vkbloom import _core
 from vkbloom._core import ShaderError
 from vkbloom._custom.compiler import run_limited, was_ended
-from vkbloom._custom.described.files import MAX_BYTES, MAX_FILES, Files, read_text
+from vkbloom._custom.described.files import (
+    MAX_BYTES,
+    MAX_FILES,
+    Files,
+    read_text,
+    without_remarks,
+)
 from vkbloom._custom.described.lowering import with_y_down
 from vkbloom._custom.described.module import BINDING, DECORATE, SET, Module, ModuleFault
 from vkbloom._custom.described.schema import Shader
@@ -29,19 +35,26 @@ MISSING_WESL: Final = (
     "WESL needs wesl-py: pip install vkbloom[wgsl] with Python 3.12 or later (this is {}.{}), or "
     "set VKBLOOM_WESL_PYTHON to a Python that has it; or give the WGSL that it becomes"
 )
+#: Files of a folder from which WESL imports, of any kind.
+MAX_VISITED: Final = 20000
 #: Virtual memory, of which a driver and a compiler reserve more than they use.
 MAX_MEMORY: Final = 16 << 30
 
-_REMARK: Final = re.compile(r"/\*.*?\*/|//[^\n]*", re.DOTALL)
 _VARIABLE: Final = re.compile(
     r"@group\s*\(\s*(\d+)u?\s*\)\s*@binding\s*\(\s*(\d+)u?\s*\)"
-    r"\s*var\s*(<[^>]*>)?\s*(\w+)\s*:\s*([\w<>, ]+?)\s*;"
+    r"\s*var\s*(<[^<>]*>)?\s*(\w+)\s*:\s*([\w<>, ]+?)\s*;"
 )
-_STRUCT: Final = re.compile(r"\bstruct\s+(\w+)\s*\{([^}]*)\}")
-_MEMBER: Final = re.compile(r"(?:@\w+\s*(?:\([^)]*\))?\s*)*(\w+)\s*:\s*([^,;]+(?:<[^>]*>)?)")
-_LOCATION: Final = re.compile(r"@location\s*\(\s*(\d+)u?\s*\)")
-_INTERPOLATE: Final = re.compile(r"@interpolate\s*\(\s*([^)]*?)\s*\)")
-_MESSAGE_LINE: Final = re.compile(r"wgsl:(\d+):\d+")
+_STRUCT: Final = re.compile(r"\bstruct\s+(\w+)\s*\{([^{}]*)\}")
+_MEMBER: Final = re.compile(r"(?:@\w+\s*+(?:\([^()]*\)\s*+)?)*+(\w+)\s*:\s*([^,;]+(?:<[^>]*>)?)")
+_LOCATION: Final = re.compile(r"@location\s*+\(\s*+(\d+)u?\s*+\)")
+_INTERPOLATE: Final = re.compile(r"@interpolate\s*+\(\s*+([^()]*?)\s*\)")
+_ENTRY: Final = re.compile(
+    r"@(vertex|fragment|compute)\b(?:[^{}@]|@(?!vertex\b|fragment\b|compute\b))*?\bfn\s++(\w++)\s*+"
+    r"\(((?:[^()]|\([^()]*+\))*+)\)\s*+(?:->\s*+([^{]*+))?\{"
+)
+_MESSAGE_LINE: Final = re.compile(r"┌─ (?:wgsl)?:(\d+):\d+")
+#: What is wrong with a part of a module, below what has that part.
+_NOTE: Final = re.compile(r"^\s*= (.+)$", re.MULTILINE)
 
 
 def collect(path: Path, dependencies: Sequence[Path]) -> Files:
@@ -49,16 +62,40 @@ def collect(path: Path, dependencies: Sequence[Path]) -> Files:
     main = read_text(path.absolute())
     if path.suffix != ".wesl" and "import " not in main.text:
         return Files(main, (), ())
+    line = main.text.count("\n", 0, max(main.text.find("import "), 0)) + 1
     found: dict[Path, Source] = {}
+    outside: list[Path] = []
     total = 0
     for folder in (path.absolute().parent, *dependencies):
-        for each in sorted(folder.rglob("*.w[eg]sl")):
-            if each.is_file() and each.resolve() != path.resolve():
+        for each in _sources_in(folder, main, line):
+            if not each.resolve().is_relative_to(folder.resolve()):
+                outside.append(each)
+            elif each.resolve() != path.resolve():
                 found[each] = read_text(each)
                 total += len(found[each].text)
             if len(found) > MAX_FILES or total > MAX_BYTES:
-                raise ValueError(f"{folder}:1: the folder has too many files to import from")
+                raise main.fault(line, f"{folder} has too many files to import from")
+    for each in outside:
+        named = re.compile(rf"\b{re.escape(each.stem)}\b")
+        for source in (main, *found.values()):
+            if match := named.search(source.text):
+                line = source.text.count("\n", 0, match.start()) + 1
+                raise source.fault(line, f"{str(each)!r} leads out of its folder")
     return Files(main, (), tuple(found.values()))
+
+
+def _sources_in(folder: Path, main: Source, line: int) -> Iterator[Path]:
+    """Return the files of a folder and those within it, in order; without end it is refused."""
+    count = 0
+    for root, folders, names in os.walk(folder):
+        folders.sort()
+        count += 1 + len(names)
+        if count > MAX_VISITED:
+            raise main.fault(line, f"{folder} has too many files to import from")
+        for name in sorted(names):
+            each = Path(root) / name
+            if each.suffix in (".wesl", ".wgsl") and each.is_file():
+                yield each
 
 
 def identity(language: str) -> bytes:
@@ -118,11 +155,6 @@ def _with_defines(text: str, shader: Shader) -> str:
     for name, value in shader.defines:
         text = text.replace(f"##{name}##", value).replace(f"{{{name}}}", value)
     return text
-
-
-def without_remarks(text: str) -> str:
-    """Return WGSL with blanks in place of remarks."""
-    return _REMARK.sub(lambda match: re.sub(r"[^\n]", " ", match[0]), text)
 
 
 def _find_vertex(shader: Shader, files: Files, text: str, stage: str) -> tuple[str, str]:
@@ -214,7 +246,7 @@ def _interface(
     found = [
         (match[1], match[2], match[3], match[4] or "")
         for match in re.finditer(
-            r"@(vertex|fragment|compute)\b[^{}]*?\bfn\s+(\w+)\s*\(((?:[^()]|\([^()]*\))*)\)\s*(?:->\s*([^{]*))?\{",
+            _ENTRY,
             text,
         )
         if match[1] != "vertex"
@@ -345,6 +377,8 @@ def _explain(files: Files, status: int, output: str, *, translated: bool) -> Sha
     causes = [line for line in lines if line and "wgsl:" not in line and not line[0].isdigit()]
     named = [line.partition("error:")[2].strip() for line in lines if "error:" in line]
     cause = (named or causes or ["no message"])[-1 if named else 0]
+    if cause.endswith("is invalid") and (notes := _NOTE.findall(text)):
+        cause += f": {notes[-1].strip()}"
     if "adapter" in cause.lower() and match is None:
         cause = f"naga finds no Vulkan driver: {cause}"
     if match is None or translated:
