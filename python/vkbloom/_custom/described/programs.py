@@ -86,7 +86,8 @@ def _prepare(source: Source, shader: Shader, home: Path) -> Files:
         vertex = wgsl.vertex_file(shader)
         if vertex is None:
             return files
-        other = collect(path.absolute().parent / vertex, tuple(folders), home.absolute())
+        path = path.parent / vertex
+        other = collect(path.absolute(), tuple(folders), home.absolute())
         return dataclasses.replace(files, others=(*files.others, other.main, *other.others))
     except OSError as error:
         cause = f"file: {path}: {error.strerror or error}"
