@@ -108,9 +108,10 @@ check: build/stamp/core build/stamp/test build/stamp/lint
 	    test -z "$$changed" || $(VENV)/bin/clang-format --dry-run -Werror $$changed
 	$(PYTHON) -m pytest -q $(PARALLEL) $(FAST)
 
+# DOCS: options for sphinx. With "-D plot_gallery=0" the gallery's examples do not run.
 docs: build/stamp/core build/stamp/docs
 	rm -rf docs/api docs/examples
-	$(PYTHON) -m sphinx -q -W --keep-going -b html docs build/docs
+	$(PYTHON) -m sphinx -q -W --keep-going -b html $(DOCS) docs build/docs
 	rm -rf build/docs/explorer_stored
 	$(PYTHON) -m tools.static_explorer build/docs/explorer_stored
 

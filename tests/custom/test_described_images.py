@@ -277,7 +277,7 @@ REFUSED: tuple[tuple[str, int, str], ...] = (
     (changed(CHAIN_PASS, "levels = {", '"levels[1]" = {'), 6, "the shader writes 'levels[3]'"),
     (changed(CHAIN_PASS, "levels = {", "lvls = {"), 6, "the shader writes 'levels[1]'"),
     (changed(CHAIN_PASS, '"element <= count"', '"elem <= count"'), 10, "'elem' is not a number"),
-    (changed(CHAIN_PASS, '"mip[2]"', '"mip[element]"'), 11, "in arrays of textures alone"),
+    (changed(CHAIN_PASS, '"mip[2]"', '"mip[element + 1]"'), 11, "in arrays of textures alone"),
     (changed(CHAIN_PASS, "zeros(6)", "zeros(1e9)"), 14, "zeros: 1e+09 is out of range"),
     (changed(CHAIN_PASS, "zeros(6)", "zeros(1, 2)"), 14, "zeros takes a number"),
     (changed(CHAIN_PASS, "file =", "vertices = 6\nfile ="), 6, "no vertex shader of its own"),
