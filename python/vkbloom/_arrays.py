@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any, Final
+from typing import Any, Final, cast
 
 import numpy as np
 from numpy.typing import NDArray
+
+from ._array_api import ForeignArray
 
 # The device type kDLCPU of DLPack.
 _DLPACK_CPU: Final = 1
@@ -35,6 +37,22 @@ def plain_array(value: object, name: str) -> NDArray[Any]:
     return np.asarray(array)
 
 
+def copy_to_host(value: Any) -> Any:
+    """Return another library's array as NumPy's, from any device, without what it records.
+
+    Anything else is returned as it is.
+    """
+    value = value.value if isinstance(value, ForeignArray) else value
+    if isinstance(value, np.ndarray) or not hasattr(value, "__dlpack__"):
+        return value
+    value = value.detach() if hasattr(value, "detach") else value
+    if device_kind(value) not in (0, _DLPACK_CPU):
+        # Of PyTorch and of CuPy; JAX copies by itself.
+        method = next((name for name in ("cpu", "get") if hasattr(value, name)), None)
+        value = value if method is None else getattr(value, method)()
+    return np.asarray(value) if hasattr(value, "__array__") else np.from_dlpack(value)
+
+
 def view_image(
     image: object, name: str, dimensions: tuple[str, ...] = ("y", "x", "channel")
 ) -> NDArray[Any]:
@@ -44,6 +62,8 @@ def view_image(
     """
     if isinstance(image, np.ndarray):
         return plain_array(image, name)
+    if isinstance(image, ForeignArray):
+        return cast("NDArray[Any]", image)
     dims = getattr(image, "dims", None)
     if isinstance(dims, tuple) and hasattr(image, "transpose"):
         # A grid's channels are named after their framebuffer, such as "final_channel".

@@ -5,6 +5,9 @@ It is slow, simple and independent of the device code. Tests compare rendered im
 `apply` returns all framebuffers of an image, `passes` and `blur` only those of the blur,
 `composite` the final image, `gain` the bloom of a flat image of 1, `shade` the light of the
 deferred system, and `vjp` the framebuffers with their derivatives.
+
+All but `gain` and `vjp` also run on arrays of other libraries, such as PyTorch, CuPy and JAX, and
+return such arrays, on their device (the extra `arrays`).
 """
 
 from __future__ import annotations

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from vkbloom._argument_types import check_arguments
-from vkbloom._arrays import check_dtype
+from vkbloom._array_api import run_in_other_libraries
+from vkbloom._arrays import check_dtype, view_image
 from vkbloom._public import public
 from vkbloom._settings.settings import Settings, resolve_settings
 
@@ -22,6 +23,7 @@ from ._tone_map import ENCODINGS
 
 
 @public("vkbloom.reference")
+@run_in_other_libraries("scene", "bloom", "share")
 @check_arguments
 def composite(
     scene: NDArray[Any],
@@ -72,7 +74,7 @@ def composite(
     """
     settings = resolve_settings(settings)
     image = as_float(scene, "scene", (3, 4))
-    stored = np.asarray(scene).dtype if dtype is None else check_dtype("dtype", dtype)
+    stored = view_image(scene, "scene").dtype if dtype is None else check_dtype("dtype", dtype)
     if not settings.bloom:
         return composite_without_store(image, None, settings, stored)
     if bloom is None:

@@ -10,7 +10,7 @@ from vkbloom._psf.varying import Varying
 
 from ._image import BlurInput
 from ._sampling import Array, sample, size_of
-from ._tape import join_curves, operation, value_of
+from ._tape import contiguous, join_curves, operation, value_of
 from ._threshold import luminance
 from ._varying import channel_kernels, spread_field
 
@@ -102,7 +102,7 @@ def _valid(image: Array, kernel: Array) -> Array:
     # From the first pixel on whose sum is complete.
     result = spread(values[0] * values[1])[-rows:, -columns:]
     valid: Array = operation(
-        np.ascontiguousarray(result),
+        contiguous(result),
         (image, lambda d: spread(spectrum(d) * values[1].conj())),
         (
             kernel,

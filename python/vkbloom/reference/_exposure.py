@@ -13,6 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom._argument_types import check_arguments
+from vkbloom._array_api import run_in_other_libraries
+from vkbloom._arrays import copy_to_host
 from vkbloom._public import public
 from vkbloom._settings.exposure import DEFAULT_SECONDS, Exposure, check_exposure, check_seconds
 
@@ -49,6 +51,7 @@ class _Engine(NamedTuple):
 
 
 @public("vkbloom.reference")
+@run_in_other_libraries("image")
 @check_arguments
 def expose(
     image: NDArray[Any],
@@ -112,7 +115,8 @@ class Exposing:
         """Meter a picture, and return the framebuffers."""
         engine = _ENGINES[self.exposure.engine]
         with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-            metered = engine.meter(picture[..., :3], self.exposure)
+            light = copy_to_host(picture[..., :3])
+            metered = engine.meter(light, self.exposure)
             self.adapted = engine.adapt(self.exposure, metered.value, self._last, self._seconds)
         framebuffers: dict[str, Array] = {}
         if metered.histogram is not None:
@@ -133,7 +137,7 @@ class Exposing:
 def _last_value(state: Mapping[str, Any] | None) -> float | None:
     if state is None or "exposure" not in state:
         return None
-    values = np.asarray(state["exposure"], np.float64)
+    values = np.asarray(copy_to_host(state["exposure"]), np.float64)
     if values.shape != (1, 1, 4):
         raise ValueError(f"state: exposure has shape {values.shape}, and not (1, 1, 4)")
     return float(values[0, 0, 0]) if values[0, 0, 3] else None

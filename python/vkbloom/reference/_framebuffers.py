@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from vkbloom._argument_types import check_arguments
+from vkbloom._array_api import run_in_other_libraries
 from vkbloom._arrays import native_order, view_image
 from vkbloom._image_arguments import check_emission, check_mask
 from vkbloom._public import public
@@ -28,6 +29,7 @@ from ._threshold import apply_mask, apply_threshold
 
 
 @public("vkbloom.reference")
+@run_in_other_libraries("image", "mask", "emission")
 @check_arguments
 def apply(
     image: NDArray[Any],
@@ -63,7 +65,8 @@ def apply(
     image : ndarray, shape (H, W, 3) or (H, W, 4)
         uint8 (read as value / 255), float16, float32 or float64. The format of the bloom
         buffers follows from it unless ``settings.format`` names one; that of float64 is
-        "rgba32float".
+        "rgba32float". An array of another library (the extra `arrays`), as also mask and emission,
+        gives framebuffers of that library on its device, with its derivatives.
     settings : vkbloom.Settings or str
         Settings, or the name of a preset.
     mask : ndarray, shape (H, W), optional
@@ -100,7 +103,7 @@ def apply(
     """
     settings = resolve_settings(settings)
     scene, source, weights, format = check_scene(image, settings, mask, emission)
-    dtype = np.asarray(image).dtype
+    dtype = view_image(image, "image").dtype
 
     def bloom(
         scene: Array, source: Array, settings: Settings, dtype: DTypeLike
@@ -196,7 +199,8 @@ def check_scene(
     if emission is not None:
         source = as_float(emission, "emission", (3, 4))
         given = (view_image(emission, "emission"), view_image(image, "image"))
-        check_emission(*map(native_order, given))
+        native = (part if part.dtype.isnative else native_order(part) for part in given)
+        check_emission(*native)
     return scene, source, _weights(mask, size_of(scene)), format
 
 
@@ -250,6 +254,7 @@ def _first_buffer(
 
 
 @public("vkbloom.reference")
+@run_in_other_libraries("glow", "mask")
 @check_arguments
 def passes(
     glow: NDArray[Any],
@@ -308,6 +313,7 @@ def passes(
 
 
 @public("vkbloom.reference")
+@run_in_other_libraries("glow")
 @check_arguments
 def blur(
     glow: NDArray[Any],

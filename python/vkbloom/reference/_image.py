@@ -48,7 +48,7 @@ def format_of(image: NDArray[Any], format: str | None) -> str:
     """Return the format of the bloom buffers: `format`, or by default that of the image's dtype."""
     if format is not None:
         return format
-    dtype = np.asarray(image).dtype
+    dtype = view_image(image, "image").dtype
     if dtype.name not in _FORMATS:
         raise TypeError(f"dtype: {dtype} is not one of {', '.join(_FORMATS)}")
     return _FORMATS[dtype.name]

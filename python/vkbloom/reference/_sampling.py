@@ -96,9 +96,8 @@ def _filter_rows(image: Array, count: int, taps: Taps) -> Array:
     if count == length and tuple(taps) == CENTRE and not is_traced:
         return image
     source = values.reshape(length, -1)
-    result = np.empty((count, source.shape[1]))
-    for rows, texels, matrix in _bands(length, count, positions, weights):
-        result[rows] = matrix @ source[texels]
+    blocks = _bands(length, count, positions, weights)
+    result = np.concatenate([matrix @ source[texels] for _, texels, matrix in blocks])
 
     def by_image(derivative: Array) -> Array:
         total: Array = np.zeros(source.shape)

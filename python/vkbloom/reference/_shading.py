@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from vkbloom._array_api import run_in_other_libraries
 from vkbloom._public import public
 
 from ._image import as_float, storage
@@ -21,6 +22,7 @@ _SHININESS = 8
 
 
 @public("vkbloom.reference")
+@run_in_other_libraries("albedo", "normal", "position", "brightness")
 def shade(
     albedo: NDArray[Any],
     normal: NDArray[Any],

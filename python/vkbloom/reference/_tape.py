@@ -185,7 +185,10 @@ def operation(value: Any, *arguments: tuple[Any, Rule | Sides]) -> Any:
 
 def contiguous(array: Array) -> Array:
     """Return the array, traced or not, in C order."""
-    same: Array = operation(np.ascontiguousarray(value_of(array)), (array, lambda d: d))
+    value = value_of(array)
+    # Arrays of other libraries have no order.
+    ordered = np.ascontiguousarray(value) if isinstance(value, np.ndarray) else value
+    same: Array = operation(ordered, (array, lambda d: d))
     return same
 
 

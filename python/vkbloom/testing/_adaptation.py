@@ -12,7 +12,7 @@ from typing import Any, Final, NamedTuple, TypeAlias, TypeGuard
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom._arrays import plain_array
+from vkbloom._arrays import copy_to_host, plain_array
 from vkbloom._methods.mip_chain import Pyramid
 from vkbloom._renderer.default import default_renderer
 from vkbloom._renderer.frames import Frames
@@ -213,7 +213,7 @@ class Adaptation:
 
 def _real_values(result: object, image: Frame) -> NDArray[np.float64]:
     """Return the colours of a picture beside the image that was given, in real units."""
-    picture = plain_array(result, "its picture")
+    picture = plain_array(copy_to_host(result), "its picture")
     if picture.ndim != 3 or picture.shape[:2] != image.shape[:2] or picture.shape[2] < 3:
         raise ValueError(f"its picture has shape {picture.shape} for {image.shape}")
     made = picture[..., :3].astype(np.float64)

@@ -12,7 +12,7 @@ from typing import Any, Final, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom._arrays import check_dtype, plain_array
+from vkbloom._arrays import check_dtype, copy_to_host, plain_array
 from vkbloom._numbers import check_index, check_number, check_size
 from vkbloom._public import public
 from vkbloom.testing._levels import Levels
@@ -55,8 +55,12 @@ class BloomError(Exception):
 
 
 def call(bloom: Bloom, given: NDArray[Any], **options: Any) -> NDArray[Any]:
-    """Return the bloom of a copy of an image: a bloom may work in place."""
-    return bloom(given.copy(), **options)
+    """Return the bloom of a copy of an image: a bloom may work in place.
+
+    An array of another library becomes NumPy's.
+    """
+    result: NDArray[Any] = copy_to_host(bloom(given.copy(), **options))
+    return result
 
 
 def check_result(result: object, given: NDArray[Any], colours: int) -> NDArray[Any]:
@@ -66,7 +70,7 @@ def check_result(result: object, given: NDArray[Any], colours: int) -> NDArray[A
             "bloom: it returns a mapping; name the framebuffer, for example "
             "lambda image: renderer.apply(image, settings)['bloom']"
         )
-    array = plain_array(result, "bloom: its result")
+    array = plain_array(copy_to_host(result), "bloom: its result")
     if array.dtype.name not in _ERRORS:
         raise TypeError(f"bloom: it returns {array.dtype}, not one of {', '.join(_ERRORS)}")
     whole = array[:, :, np.newaxis] if array.ndim == 2 else array

@@ -11,7 +11,7 @@ from typing import Any, TypedDict, Unpack
 import numpy as np
 from numpy.typing import NDArray
 
-from vkbloom._arrays import native_order, plain_array
+from vkbloom._arrays import copy_to_host, native_order, plain_array
 from vkbloom._public import public
 from vkbloom._renderer.frames import Frames
 from vkbloom._version import installed_version
@@ -255,7 +255,7 @@ def _images(field: str, frames: object) -> dict[str, NDArray[Any]]:
     for name, image in frames.items():
         if not isinstance(image, np.ndarray):
             raise TypeError(f"{field}: {name}: {type(image).__name__} is not a NumPy array")
-        images[name] = native_order(plain_array(image, f"{field}: {name}"))
+        images[name] = native_order(plain_array(copy_to_host(image), f"{field}: {name}"))
     return images
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom._argument_types import check_arguments
-from vkbloom._arrays import plain_array
+from vkbloom._arrays import copy_to_host, plain_array
 from vkbloom._extras import import_extra
 from vkbloom._formats import LUMINANCE
 from vkbloom._io.srgb import decode_srgb, encode_srgb
@@ -311,7 +311,7 @@ def _checked(frames: Iterable[NDArray[Any]]) -> Iterator[NDArray[Any]]:
     shape: tuple[int, ...] | None = None
     count = 0
     for count, frame in enumerate(frames, start=1):  # noqa: B007  it is read after the loop
-        array = plain_array(frame, "frames")
+        array = plain_array(copy_to_host(frame), "frames")
         if array.ndim != 3 or array.shape[2] not in (3, 4) or array.dtype.kind not in "uf":
             raise ValueError(
                 f"frames: shape {array.shape} of {array.dtype} is not (H, W, 3) or (H, W, 4) of "
