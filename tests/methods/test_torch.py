@@ -371,7 +371,7 @@ def test_pytorch_derives_the_reference(settings: Any) -> None:
     with torch.no_grad():
         image[1, 2, :3] = 0
         image[3, 4, 0] = float("nan")
-    found = reference.apply(image, settings, mask=mask)
+    found: Any = reference.apply(image, settings, mask=mask)
     arrays = [part.detach().cpu().numpy() for part in (image, mask)]
     expected, pullback = reference.vjp(arrays[0], settings, mask=arrays[1])
     cotangent = np.random.default_rng(1).random((7, 9, 4))
