@@ -357,9 +357,10 @@ def test_a_graph_of_cuda_is_refused(renderer: Renderer) -> None:
 @pytest.mark.parametrize(
     "settings",
     [
-        # Roots and powers of black pixels, and transforms.
-        vkbloom.Pyramid(levels=2, tonemap="agx", encoding="srgb", threshold=0.5, knee=0.5),
-        vkbloom.Separable(encoding="hlg", alpha="blur", glare=(vkbloom.Ghosts(),)),
+        # Powers and roots of black pixels, whose slope is infinite.
+        vkbloom.Pyramid(levels=2, encoding="srgb", intensity=0.0),
+        vkbloom.Separable(encoding="hlg", intensity=0.0, alpha="blur"),
+        vkbloom.DualKawase(levels=2, tonemap="agx", threshold=0.5, glare=(vkbloom.Ghosts(),)),
         vkbloom.BlenderGlare(type="fog_glow", threshold=0.3, saturation=0.5),
         vkbloom.HdrpBloom(alpha="max"),
     ],
