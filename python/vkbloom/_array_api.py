@@ -44,7 +44,11 @@ def run_in_other_libraries(*names: str) -> Callable[[_Function], _Function]:
             __tracebackhide__ = True
             if not any(map(_is_foreign, (*args, *kwargs.values()))):
                 return function(*args, **kwargs)
-            bound = signature.bind(*args, **kwargs)
+            try:
+                bound = signature.bind(*args, **kwargs)
+            except TypeError:
+                # Python's own error names the function.
+                return function(*args, **kwargs)
             others = {
                 name: _wrap(part, name)
                 for name, part in bound.arguments.items()
@@ -114,7 +118,13 @@ class ForeignArray(np.lib.mixins.NDArrayOperatorsMixin):
     @property
     def dtype(self) -> np.dtype[Any]:
         """NumPy's dtype of the same name; TypeError if there is none, as for bfloat16."""
-        return np.dtype(str(self.value.dtype).rpartition(".")[2])
+        try:
+            return np.dtype(str(self.value.dtype).rpartition(".")[2])
+        except TypeError:
+            raise TypeError(
+                f"{_type(self.value)}: {self.value.dtype} is not a dtype of NumPy; convert it to "
+                "float32"
+            ) from None
 
     def __array__(self, *args: Any, **kwargs: Any) -> Any:
         raise TypeError(

@@ -388,6 +388,11 @@ def test_pytorch_derives_the_reference(settings: Any) -> None:
         assert_allclose(derivative, gradients[name], rtol=1e-5, atol=1e-6, err_msg=name)
 
 
+def test_the_reference_refuses_what_numpy_has_not() -> None:
+    with pytest.raises(TypeError, match=r"torch.Tensor: torch.bfloat16 is not a dtype of NumPy"):
+        reference.apply(tensor(4, 5, 3, dtype=torch.bfloat16), "kino")
+
+
 def test_laws_take_tensors_that_record() -> None:
     def halve(image: Any) -> Any:
         return torch.tensor(image, device=DEVICE, requires_grad=True) / 2
