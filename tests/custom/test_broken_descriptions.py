@@ -16,15 +16,10 @@ from typing import Any, Final
 import pytest
 
 from tests.custom.broken import DESCRIPTION, OTHERS, SHADERS, write_all, write_one
+from tests.custom.front_ends import MAX_FILES, Module, Source, compile_all, read_schema, slang, wgsl
 from tests.exhaustive import some
 from tests.refusals import assert_matches
 from vkbloom import ShaderError, load_method
-from vkbloom._custom.described import slang, wgsl
-from vkbloom._custom.described.files import MAX_FILES
-from vkbloom._custom.described.module import Module
-from vkbloom._custom.described.programs import compile_all
-from vkbloom._custom.described.schema import read_schema
-from vkbloom._custom.source import Source
 
 pytestmark = pytest.mark.usefixtures("glslang")
 

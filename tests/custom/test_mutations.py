@@ -18,17 +18,27 @@ from typing import Final
 import pytest
 
 from tests.custom.broken import DESCRIPTION, OTHERS, SHADERS, write_all, write_one
+from tests.custom.front_ends import (
+    Description,
+    Module,
+    Program,
+    Shader,
+    Source,
+    bind,
+    check,
+    compile_all,
+    compile_described,
+    files,
+    find_lines,
+    open_described,
+    read_schema,
+    shaderlab,
+    slang,
+    wgsl,
+)
 from tests.custom.test_described import EXAMPLES
 from tests.exhaustive import EXHAUSTIVE
 from vkbloom import ShaderError
-from vkbloom._custom.described import files, shaderlab, slang, wgsl
-from vkbloom._custom.described.binding import bind
-from vkbloom._custom.described.lines import find_lines
-from vkbloom._custom.described.module import Module
-from vkbloom._custom.described.programs import Program, compile_all
-from vkbloom._custom.described.schema import Description, Shader, read_schema
-from vkbloom._custom.described.source import compile_described, open_described
-from vkbloom._custom.source import Source, check
 
 pytestmark = pytest.mark.usefixtures("glslang")
 

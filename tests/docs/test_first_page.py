@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import contextlib
 import re
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
-from tools import docs_versions
 
 from tests.docs.pages import ROOT
 from tests.explorer.explorer_hosts import CHROMIUM
+from tests.processes import output
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not installed")
 
@@ -62,7 +61,7 @@ def test_the_picture_shows_both_sides_on_a_narrow_screen(page: Any) -> None:
     assert "without bloom" in hero.get_attribute("alt")
 
 
-def test_a_page_leads_to_another_version(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_page_leads_to_another_version(tmp_path: Path) -> None:
     template = (ROOT / "docs" / "templates" / "versions.html").read_text()
     # The page "guide" of a version, as Sphinx fills the template in.
     names = {"release": "VERSION", "pagename": "guide", "pathto('.', 1)": "."}
@@ -74,8 +73,7 @@ def test_a_page_leads_to_another_version(tmp_path: Path, monkeypatch: pytest.Mon
         for name in {"index", pages}:
             (built / f"{name}.html").write_text(text.replace("VERSION", version))
         words = [str(built), str(tmp_path / "all"), "--version", version]
-        monkeypatch.setattr(sys, "argv", ["docs_versions.py", *words])
-        docs_versions.main()
+        output("-m", "tools.docs_versions", *words, cwd=ROOT)
     with opened((tmp_path / "all" / "index.html").as_uri()) as page:
         page.wait_for_url("**/0.10.0/index.html")
         page.goto((tmp_path / "all" / "0.10.0" / "guide.html").as_uri())

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import importlib
 import re
-import sys
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -13,6 +12,7 @@ import pytest
 
 from tests.core.builds import ROOT
 from tests.docs.pages import TEXTS
+from tests.processes import python
 
 yaml = pytest.importorskip("yaml")
 
@@ -64,24 +64,20 @@ jobs:
 """
 
 
-def test_a_workflow_runs_here(
-    packaging: Any,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capfd: pytest.CaptureFixture[str],
-) -> None:
+def test_a_workflow_runs_here(tmp_path: Path) -> None:
     (tmp_path / "a.yml").write_text(WORKFLOW)
     out = tmp_path / "out"
     words = [str(tmp_path / "a.yml"), "--tag", "v1", "--out", str(out), "--leave-out", "left out"]
-    monkeypatch.setattr(sys, "argv", ["run_workflow.py", *words])
-    packaging("run_workflow").main()
+    done = python("packaging/run_workflow.py", *words, cwd=ROOT)
+    assert done.returncode == 0, done.stderr
     assert (out / "jobs/use-one/all/used").read_text() == "one true\nv1\n"
     assert (out / "jobs/use-two/all/used").read_text() == "two* false\nv1\n"
     assert not list(out.rglob("sent"))
-    assert "would run: touch" in capfd.readouterr().out
+    assert "would run: touch" in done.stdout
     (tmp_path / "a.yml").write_text(WORKFLOW.replace("dist/file\n", "dist/file; exit 3\n"))
-    with pytest.raises(SystemExit, match="build: status 3"):
-        packaging("run_workflow").main()
+    done = python("packaging/run_workflow.py", *words, cwd=ROOT)
+    assert done.returncode != 0
+    assert "build: status 3" in done.stderr
 
 
 def test_the_release_has_no_step_that_cannot_be_run_here(packaging: Any) -> None:

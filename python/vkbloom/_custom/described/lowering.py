@@ -38,10 +38,10 @@ from vkbloom._custom.described.module import (
     UNIFORM_CONSTANT,
     VARIABLE,
     Entry,
-    Instruction,
     Module,
     ModuleFault,
 )
+from vkbloom._custom.loops import Instruction
 from vkbloom._custom.spirv import HEADER_WORDS
 
 #: Capabilities of arrays that are indexed by numbers that are not constant.
