@@ -55,13 +55,13 @@ def noisy(truth: Settings, noise: float = 0.01, image: Image = IMAGE) -> Image:
 
 
 def test_intervals_have_the_truth(renderer: Renderer) -> None:
-    """Of 500 simulated fits of 2 to 5 fields, 93 to 97 %; of the 42 of a usual run, most.
+    """Of 500 simulated fits of 2 to 5 fields, 93 to 97 %; of the 24 of a usual run, most.
 
     Of each method 90 %: the two to five fields of a fit err together. Of `Separable`, 60 calls from
     a blur scale of 2, which often lies between two minima of the loss, are too few: then they have
     84 %.
     """
-    count, calls = (84, 120) if EXHAUSTIVE else (7, 60)
+    count, calls = (84, 120) if EXHAUSTIVE else (4, 60)
     run = functools.partial(simulate, renderer, IMAGE, max_calls=calls)
     by_method = {
         name: [
