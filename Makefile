@@ -289,9 +289,12 @@ build/stamp/test-system: | build/stamp/system
 	tools/setup_system.sh test
 	@mkdir -p $(@D) && touch $@
 
-build/stamp/test: pyproject.toml | build/stamp/packages build/stamp/test-system
+build/stamp/test: pyproject.toml | build/stamp/packages build/stamp/test-system build/stamp/slangc
 	$(PYTHON) tools/requirements.py test | $(PIP_INSTALL) -r /dev/stdin
-	@# Its command slangc alone, without PyTorch.
+	@mkdir -p $(@D) && touch $@
+
+# The command slangc of slangtorch alone, without PyTorch.
+build/stamp/slangc: | build/stamp/packages
 	$(PIP_INSTALL) --no-deps slangtorch || echo "Tests of HLSL and Slang will be skipped." >&2
 	@mkdir -p $(@D) && touch $@
 

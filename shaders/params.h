@@ -211,12 +211,15 @@
     INPUT(B, int, radius)
 
 // Blender's sun beams (sun_beams.frag): the most steps; the sun from the upper left, as shares of
-// the sides; the share of the samples that jitter leaves. SUMMED_ROWS are of adjoints.
+// the sides; the share of the samples that jitter leaves. The rest is of adjoints: highlights of
+// blocks of dark_side x dark_side pixels that are all below dark_below are 0, and so is their slope.
 #define SUN_BEAMS_BLOCK(B, READS, INPUT, VEC4S) \
     INPUT(B, int, most) \
     INPUT(B, float, sun_x) \
     INPUT(B, float, sun_y) \
     INPUT(B, float, left) \
+    INPUT(B, float, dark_below) \
+    INPUT(B, int, dark_side) \
     SUMMED_ROWS(B, INPUT, VEC4S)
 
 #define COMPOSITE_BLOCK(B, READS, INPUT, VEC4S) COMPOSITE_ROWS(B, READS, INPUT)

@@ -236,6 +236,27 @@ static double beam_iterations(const struct gathering *gathering, double distance
     return (distance > gathering->beyond ? 1.0 : 2.0) * (4.0 * lines + pixels);
 }
 
+// Lets the row pass over highlights that are 0 without a slope. (By a mask they have one.)
+static void pass_over_dark(const struct vkb_graph *graph, uint32_t highlights,
+                           struct vkb_pass_row *row)
+{
+    for (uint32_t i = 0; i < graph->pass_count; ++i) {
+        const struct vkb_pass_row *pass = &graph->passes[i];
+        const struct vkb_constants *constants = &pass->constants;
+        const float low = pass->params.prefilter.threshold;
+        if (pass->targets[0] != highlights || pass->block != VKB_BLOCK_prefilter
+            || constants->after != POINT_HIGHLIGHTS || !constants->thresholded || constants->masked)
+            continue;
+        row->reads[SLOT_SOURCE] = pass->reads[SLOT_SOURCE];
+        row->constants.thresholded = true;
+        // Where the transition begins (lib/points.glsl).
+        row->params.sun_beams.dark_below =
+            low
+            - fminf(pass->params.prefilter.smoothness, fminf(low, pass->params.prefilter.maximum));
+        row->params.sun_beams.dark_side = constants->mean_side > 1 ? constants->mean_side : 1;
+    }
+}
+
 bool vkb_transpose_sun_beams(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
                              struct vkb_error *error)
 {
@@ -267,5 +288,6 @@ bool vkb_transpose_sun_beams(struct vkb_adjoint *adjoint, const struct vkb_pass_
     row.variant = "dispatch";
     row.block_width = row.block_height = BEAM_CELL * PIXEL_INVOCATIONS;
     row.reads[SLOT_COTANGENTS] = sums;
+    pass_over_dark(adjoint->graph, source, &row);
     return accumulate_summed(adjoint, &row, &gathering, source, error);
 }

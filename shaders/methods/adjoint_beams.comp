@@ -10,6 +10,7 @@
 UNIFORM_BLOCK(SUN_BEAMS_BLOCK);
 #include "lib/beam.glsl"
 
+SAMPLED_IMAGE(SLOT_SOURCE, frame); // of which the highlights are made
 SAMPLED_IMAGE(SLOT_COTANGENTS, cotangents);
 SAMPLED_IMAGE(SLOT_SUMS, partial_sums);
 
@@ -82,6 +83,30 @@ vec4 weights_for(vec2 pixel, vec2 cell, bool is_at_edge)
     return sums;
 }
 
+// Whether the highlights of a texel and their slope are 0: so are those of the pixels in its block (mean_of_texels).
+bool is_dark(ivec2 texel, int height)
+{
+    ivec2 last = textureSize(frame, 0) - 1;
+    ivec2 first = ivec2(params.dark_side * texel.x, last.y - params.dark_side * (height - 1 - texel.y));
+    bool dark = true;
+    for (int y = 0; y < params.dark_side; ++y)
+        for (int x = 0; x < params.dark_side; ++x) {
+            vec4 pixel = texelFetch(frame, clamp(first + ivec2(x, -y), ivec2(0), last), 0);
+            // (NaN is not below.)
+            dark = dark && all(lessThan(pixel.rgb, vec3(params.dark_below)));
+        }
+    return dark;
+}
+
+bool is_dark_cell(ivec2 cell)
+{
+    ivec2 last = textureSize(cotangents, 0) - 1;
+    bool dark = THRESHOLDED != 0;
+    for (int i = 0; dark && i < BEAM_CELL * BEAM_CELL; ++i)
+        dark = is_dark(min(cell + ivec2(i % BEAM_CELL, i / BEAM_CELL), last), last.y + 1);
+    return dark;
+}
+
 // Of the texels of the cell.
 vec4 sums_of_cell[BEAM_CELL * BEAM_CELL];
 
@@ -152,11 +177,14 @@ void main()
     bool is_partial = PARTIAL_SUMS != 0;
     Gathered own = is_partial ? gathered_at(first) : Gathered(first, 0, 1);
     // Blocks have whole cells.
-    if (is_partial ? own.groups > 0 : number_of_block(first) < 0)
-        gather_cell(own.texel, own.group, own.groups);
-    else if (!is_partial)
-        [[unroll]] for (int i = 0; i < BEAM_CELL * BEAM_CELL; ++i)
-            sums_of_cell[i] = sum_of_groups(first + ivec2(i % BEAM_CELL, i / BEAM_CELL));
+    bool gathers = is_partial ? own.groups > 0 : number_of_block(first) < 0;
+    if (!is_dark_cell(own.texel)) {
+        if (gathers)
+            gather_cell(own.texel, own.group, own.groups);
+        else if (!is_partial)
+            [[unroll]] for (int i = 0; i < BEAM_CELL * BEAM_CELL; ++i)
+                sums_of_cell[i] = sum_of_groups(first + ivec2(i % BEAM_CELL, i / BEAM_CELL));
+    }
     [[unroll]] for (int i = 0; i < BEAM_CELL * BEAM_CELL; ++i) {
         PIXEL = first + ivec2(i % BEAM_CELL, i / BEAM_CELL);
         if (all(lessThan(PIXEL, size)))

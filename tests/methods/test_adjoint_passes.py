@@ -142,6 +142,11 @@ CASES: dict[str, Any] = {
     "blender cross": BlenderGlare(type="simple_star", threshold=None, diagonal=False),
     "blender beams": BlenderGlare(type="sun_beams", threshold=None),
     "blender jitter": BlenderGlare(type="sun_beams", threshold=None, jitter=0.4),
+    # Highlights that are 0 without a slope have no cotangents.
+    "blender dark beams": BlenderGlare(type="sun_beams", threshold=1.2, smoothness=0.2),
+    "blender dark blocks": BlenderGlare(
+        type="sun_beams", threshold=0.8, smoothness=0.0, quality="low", jitter=0.3
+    ),
     "halo": Pyramid(levels=1, glare=(vkbloom.Halo(radius=0.4, width=0.3),)),
     "halo aberration": Pyramid(
         levels=1, glare=(vkbloom.Halo(aberration=0.05, halvings=0, threshold=0.2),)
