@@ -1,4 +1,4 @@
-"""A description and its shaders, which the tests of broken ones change."""
+"""A description and its shaders, which tests render, and those of broken ones change."""
 
 from __future__ import annotations
 

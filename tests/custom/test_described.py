@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 import vkbloom
 from tests.cli.calls import succeed
+from tests.custom.broken import SHADERS
 from tests.images import picture
 from vkbloom import Renderer, Settings, ShaderError, load_method, reference, testing
 
@@ -125,18 +126,7 @@ def test_shadertoy(renderer: Renderer, tmp_path: Path) -> None:
     assert np.abs(bloom(renderer, path, image)[..., :3] - 2 * image[..., :3]).max() < 1e-5
 
 
-COPY = """\
-#version 450
-layout(location = 0) in vec2 uv;
-layout(location = 0) out vec4 result;
-uniform sampler2D image;
-uniform Values { float gain; vec4 more[80]; mat2 turn; int whole; };
-void main()
-{
-    result = texture(image, uv) * gain + vec4(more[79].xy, (turn * vec2(1.0, 2.0)))
-        + float(whole);
-}
-"""
+COPY = SHADERS["copy.frag"]
 COPY_PASS = """\
 bloom = "out"
 [[passes]]
@@ -161,20 +151,7 @@ def test_numbers_of_a_large_block(renderer: Renderer, tmp_path: Path) -> None:
     assert np.abs(result[..., :3] - expected).max() < 1e-5
 
 
-TWO = """\
-#version 450
-layout(local_size_x = 4, local_size_y = 4) in;
-layout(binding = 3, rgba16f) uniform writeonly image2D half_image;
-layout(binding = 2, rgba16f) uniform writeonly image2D whole_image;
-layout(binding = 1) buffer readonly Weights { float weights[]; };
-layout(binding = 0) uniform sampler2D image;
-void main()
-{
-    ivec2 at = ivec2(gl_GlobalInvocationID.xy);
-    imageStore(whole_image, at, weights[1] * texelFetch(image, at, 0));
-    imageStore(half_image, at / 2, weights[2] * texelFetch(image, at / 2, 0));
-}
-"""
+TWO = SHADERS["two.comp"]
 TWO_PASS = """\
 bloom = "whole"
 [[passes]]
