@@ -106,7 +106,7 @@ def compile_pass(file: CustomFile, item: CustomPass, shader: Shader) -> bytes:
     words = np.frombuffer(code, "=u4")
     if len(code) % 4 or len(words) < 6 or words[0] != SPIRV_MAGIC:
         raise ShaderError(file.source.where(item.line, "the compiler's result is not SPIR-V"))
-    if has_endless_loop(words.tolist()):
+    if has_endless_loop(tuple(words.tolist())):
         cause = "the pass has a loop that never ends"
         raise ShaderError(file.source.where(item.body_line, cause))
     return np.array(without_contraction(tuple(words.tolist())), "=u4").tobytes()

@@ -3,21 +3,27 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from typing import Final
 
-from vkbloom._custom.spirv import HEADER_WORDS
+from vkbloom._custom.instructions import (
+    ACCESS_CHAINS,
+    CONSTANTS,
+    FUNCTION,
+    FUNCTION_CALL,
+    FUNCTION_END,
+    LOAD,
+    VARIABLE,
+    Instruction,
+    split,
+)
 
-Instruction = tuple[int, ...]
-
-FUNCTION = 54
 LABEL, BRANCH, BRANCH_CONDITIONAL, SWITCH = 248, 249, 250, 251
 CONSTANT_TRUE, CONSTANT_FALSE = 41, 42
-FUNCTION_END, VARIABLE, LOAD, ALL, EQUAL, CALL = 56, 59, 61, 155, 170, 57
+ALL, EQUAL = 155, 170
 #: Constants and variables.
-_DECLARED: Final = (*range(41, 53), VARIABLE)
+_DECLARED: Final = (*CONSTANTS, VARIABLE)
 _RETURNS: Final = (252, 253, 254, 4416)
-CHAINS: Final = (65, 66)
 #: Storage classes: what is the same for all of a run, and what a function may change.
 _STEADY: Final = (0, 1, 2, 9)
 _FUNCTION, _PRIVATE = 7, 6
@@ -37,14 +43,11 @@ class _Function:
     results: dict[int, tuple[int, Instruction]]
 
 
-def has_endless_loop(words: Sequence[int]) -> bool:
+def has_endless_loop(words: tuple[int, ...]) -> bool:
     """Whether a function of a module has a loop that does not end; the module is a compiler's."""
     defined: dict[int, Instruction] = {}
     bodies: list[list[Instruction]] = []
-    position = HEADER_WORDS
-    while position < len(words):
-        word = tuple(words[position : position + max(words[position] >> 16, 1)])
-        position += len(word)
+    for word in split(words):
         if word[0] & 0xFFFF == FUNCTION:
             bodies.append([])
         if bodies:
@@ -169,16 +172,19 @@ class _Check:
         self._loop = loop
         self._seen: dict[int, bool] = {}
         body = [word for block in loop for word in function.blocks[block]]
-        self._calls = any(word[0] & 0xFFFF == CALL for word in body)
+        self._calls = any(word[0] & 0xFFFF == FUNCTION_CALL for word in body)
         #: Ids that instructions of the loop mention, but for reading.
         self._changed = {
-            each for word in body if word[0] & 0xFFFF not in (LOAD, *CHAINS) for each in word[1:]
+            each
+            for word in body
+            if word[0] & 0xFFFF not in (LOAD, *ACCESS_CHAINS)
+            for each in word[1:]
         }
         # A pointer into a variable, which is written, changes the variable.
         waiting = [*self._changed]
         for each in waiting:
             _, word = self._results.get(each, (0, (0,)))
-            if word[0] & 0xFFFF in CHAINS and len(word) > 3 and word[3] not in self._changed:
+            if word[0] & 0xFFFF in ACCESS_CHAINS and len(word) > 3 and word[3] not in self._changed:
                 self._changed.add(word[3])
                 waiting.append(word[3])
 
@@ -200,7 +206,7 @@ class _Check:
     def _is_kept(self, pointer: int, depth: int) -> bool:
         """Whether nothing in the loop writes what a pointer leads to."""
         _, word = self._results.get(pointer, (0, (0,)))
-        if word[0] & 0xFFFF in CHAINS and len(word) > 3:
+        if word[0] & 0xFFFF in ACCESS_CHAINS and len(word) > 3:
             return self._is_kept(word[3], depth) and all(
                 self.is_steady(each, depth) for each in word[4:]
             )

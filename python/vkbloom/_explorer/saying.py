@@ -52,7 +52,7 @@ def rows_of(plan: Plan) -> list[dict[str, Any]]:
     return [{**one._asdict(), "sentence": plan.sentences[one.name]} for one in plan.passes]
 
 
-def finite(timings: Mapping[str, float]) -> dict[str, float]:
+def keep_finite(timings: Mapping[str, float]) -> dict[str, float]:
     """Return the times that are finite, which JSON requires."""
     return {name: seconds for name, seconds in timings.items() if math.isfinite(seconds)}
 
@@ -61,7 +61,7 @@ def describe_error(error: BaseException) -> str:
     return str(error) or type(error).__name__
 
 
-def position(at: object) -> tuple[float, float]:
+def read_position(at: object) -> tuple[float, float]:
     if not (isinstance(at, list | tuple) and len(at) == 2):
         raise TypeError(f"at: {at!r:.80} is not (x, y)")
     for part in at:

@@ -55,11 +55,11 @@ from vkbloom._explorer.images import Images
 from vkbloom._explorer.playing import PATIENCE, STATES, Chain, Chains, Clip, NotReached, Stages
 from vkbloom._explorer.saying import (
     describe_error,
-    finite,
+    keep_finite,
     note_of,
-    position,
     probe,
     read_opened,
+    read_position,
     rows_of,
 )
 from vkbloom._image_arguments import check_image
@@ -323,7 +323,7 @@ class Viewer:
 
     def _frame(self, message: Mapping[str, Any]) -> Answer:
         asked, size = self._asked(message)
-        at = None if message.get("at") is None else position(message["at"])
+        at = None if message.get("at") is None else read_position(message["at"])
         arrays = self._arrays_of(message.get("view"))
         sides: dict[str, Any] = {}
         buffers: list[bytes] = []
@@ -352,7 +352,7 @@ class Viewer:
                 **self.describe(frames, shown, expand, size),
                 "names": drawn.names,
                 "plan": rows_of(drawn.plan),
-                "passes": finite(frames.timings),
+                "passes": keep_finite(frames.timings),
                 "picture": len(buffers),
                 **self._curve_of(drawn.chain, side, message),
             }
@@ -422,7 +422,7 @@ class Viewer:
         return self._scene, {"size": shot.size, "shading": self._shading}
 
     def _probe(self, message: Mapping[str, Any]) -> Answer:
-        at = position(message.get("at"))
+        at = read_position(message.get("at"))
         arrays = self._arrays_of(message.get("view"))
         return {"sides": {side: {"probe": probe(arrays[side], at)} for side in arrays}}, []
 

@@ -21,7 +21,7 @@ from vkbloom._renderer.frames import Frames
 from vkbloom._renderer.plans import Framebuffer
 from vkbloom._renderer.renderer import Renderer
 from vkbloom._renderer.sources import Geometry
-from vkbloom._renderer.state import Continued, State, moment_of
+from vkbloom._renderer.state import Continued, State, advance_moment
 from vkbloom._settings.antialiasing import Antialiasing, check_antialiasing, check_use
 from vkbloom._settings.exposed import expose
 from vkbloom._settings.exposure import Exposure, check_exposure, check_seconds
@@ -96,7 +96,7 @@ class Grid:
         if stages["taa"] is not None:
             stages["taa"] = check_antialiasing(stages["taa"])
             if self.source.has_time and self.before is not None:
-                moment, _ = moment_of(stages["taa"], time, self.before.state)
+                moment, _ = advance_moment(stages["taa"], time, self.before.state)
         return Point(index, expose(chosen, **stages), time, moment)
 
     def describe_point(self, index: Index) -> str:

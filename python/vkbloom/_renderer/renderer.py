@@ -48,7 +48,7 @@ from vkbloom._renderer.sources import (
     scene_source,
     take_batch,
 )
-from vkbloom._renderer.state import Continued, State, moment_of
+from vkbloom._renderer.state import Continued, State, advance_moment
 from vkbloom._settings.antialiasing import Antialiasing, check_antialiasing, check_use
 from vkbloom._settings.exposed import ExposedSettings, expose
 from vkbloom._settings.exposure import Exposure, check_exposure, check_seconds
@@ -456,7 +456,7 @@ class Renderer:
         """
         settings = self._expose(check_settings(settings), exposure, dt, taa)
         antialiasing = None if taa is None else check_antialiasing(taa)
-        moment, before = moment_of(antialiasing, check_time(time), _as_state(state))
+        moment, before = advance_moment(antialiasing, check_time(time), _as_state(state))
         source = scene_source(scene, size, shading, time, moment=moment)
         names = check_framebuffers(framebuffers)
         return self._run_one(source, settings, names, out, device, state=before)
@@ -795,7 +795,7 @@ class Renderer:
         if exposure is None and taa is None and state is not None:
             raise ValueError("state: only a stage in time continues one; give exposure or taa, too")
         antialiasing = None if taa is None or is_image(source) else check_antialiasing(taa)
-        moment, before = moment_of(antialiasing, check_time(time), _as_state(state))
+        moment, before = advance_moment(antialiasing, check_time(time), _as_state(state))
         of_source: Any = {"geometry": Geometry(motion, depth), "moment": moment}
         frame_source = any_source(source, size, shading, time, self._core, **of_source)
         names = check_framebuffers(framebuffers)

@@ -180,7 +180,7 @@ def is_alike(image: NDArray[Any] | Kept, shape: tuple[int, ...], dtype: str) -> 
     return image.shape == shape and image.dtype == np.dtype(dtype)
 
 
-def moment_of(
+def advance_moment(
     antialiasing: Antialiasing | None, time: float, state: State
 ) -> tuple[Moment | None, State]:
     """Return the moment of a scene's frame after a state, and the state that the frame advances.

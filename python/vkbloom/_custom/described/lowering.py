@@ -16,13 +16,9 @@ from vkbloom._custom.described.module import (
     BUILT_IN,
     CAPABILITY,
     CONSTANT,
-    CONSTANTS,
     DECORATE,
     FIRST_ELEMENT,
-    FUNCTION,
-    FUNCTION_CALL,
     IMAGE_READ,
-    LOAD,
     MATRIX_STRIDE,
     MAX_ELEMENTS,
     MEMBER_DECORATE,
@@ -36,12 +32,18 @@ from vkbloom._custom.described.module import (
     TYPE_SAMPLED_IMAGE,
     TYPE_VECTOR,
     UNIFORM_CONSTANT,
-    VARIABLE,
     Entry,
     Module,
     ModuleFault,
 )
-from vkbloom._custom.loops import Instruction
+from vkbloom._custom.instructions import (
+    CONSTANTS,
+    FUNCTION,
+    FUNCTION_CALL,
+    LOAD,
+    VARIABLE,
+    Instruction,
+)
 from vkbloom._custom.spirv import HEADER_WORDS
 
 #: Capabilities of arrays that are indexed by numbers that are not constant.

@@ -4,10 +4,19 @@ from __future__ import annotations
 
 import dataclasses
 import struct
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Final
 
-from vkbloom._custom.loops import Instruction, is_endless
+from vkbloom._custom.instructions import (
+    ACCESS_CHAINS,
+    CONSTANTS,
+    FUNCTION,
+    FUNCTION_CALL,
+    VARIABLE,
+    Instruction,
+    split,
+)
+from vkbloom._custom.loops import is_endless
 from vkbloom._custom.spirv import HEADER_WORDS
 
 MAGIC: Final = 0x07230203
@@ -36,12 +45,8 @@ NAME, MEMBER_NAME, ENTRY_POINT, EXECUTION_MODE, CAPABILITY = 5, 6, 15, 16, 17
 TYPE_BOOL, TYPE_INT, TYPE_FLOAT, TYPE_VECTOR, TYPE_MATRIX = 20, 21, 22, 23, 24
 TYPE_IMAGE, TYPE_SAMPLER, TYPE_SAMPLED_IMAGE = 25, 26, 27
 TYPE_ARRAY, TYPE_RUNTIME_ARRAY, TYPE_STRUCT, TYPE_POINTER = 28, 29, 30, 32
-CONSTANTS: Final = range(41, 53)
 CONSTANT, CONSTANT_COMPOSITE, SPEC_CONSTANT, SPEC_CONSTANT_COMPOSITE = 43, 44, 50, 51
-FUNCTION, FUNCTION_END, FUNCTION_CALL, VARIABLE = 54, 56, 57, 59
-ACCESS_CHAINS: Final = (65, 66)
 DECORATE, MEMBER_DECORATE, EXECUTION_MODE_ID = 71, 72, 331
-LOAD: Final = 61
 IMAGE_READ: Final = 98
 
 #: Where instructions of functions name variables: their first operand that may, and whether all
@@ -195,7 +200,10 @@ class Module:
 
     def __init__(self, code: bytes) -> None:
         self.words = read_words(code)
-        self.instructions = list(split(self.words))
+        try:
+            self.instructions = list(split(self.words))
+        except ValueError as error:
+            raise ModuleFault(str(error)) from None
         self.names: dict[int, str] = {}
         self.member_names: dict[tuple[int, int], str] = {}
         self.decorations: dict[int, dict[int, int]] = {}
@@ -447,17 +455,6 @@ def read_words(code: bytes) -> tuple[int, ...]:
                 raise ModuleFault(f"{words[3]} ids are more than {MAX_BOUND}")
             return words
     raise ModuleFault("the file is not SPIR-V")
-
-
-def split(words: tuple[int, ...]) -> Iterator[Instruction]:
-    """Return the instructions of a module."""
-    position = HEADER_WORDS
-    while position < len(words):
-        end = position + (words[position] >> 16)
-        if end == position or end > len(words):
-            raise ModuleFault("the SPIR-V ends within an instruction")
-        yield words[position:end]
-        position = end
 
 
 def read_text(words: Instruction) -> str:

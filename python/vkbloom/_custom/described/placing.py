@@ -14,9 +14,7 @@ from vkbloom._custom.described.module import (
     ENTRY_POINT,
     EXECUTION_MODE,
     EXECUTION_MODE_ID,
-    FUNCTION,
     IMAGE_READ,
-    LOAD,
     MEMBER_DECORATE,
     OFFSET,
     PUSH_CONSTANT,
@@ -27,11 +25,15 @@ from vkbloom._custom.described.module import (
     TYPE_IMAGE,
     TYPE_POINTER,
     UNIFORM,
-    VARIABLE,
     Entry,
     Module,
 )
-from vkbloom._custom.loops import Instruction
+from vkbloom._custom.instructions import (
+    FUNCTION,
+    LOAD,
+    VARIABLE,
+    Instruction,
+)
 from vkbloom._custom.spirv import HEADER_WORDS, without_contraction
 
 #: Instructions that only help to debug: OpSourceContinued, OpSource, OpName, OpMemberName, OpLine,
