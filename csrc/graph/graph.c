@@ -71,6 +71,16 @@ uint32_t vkb_graph_history(const struct vkb_graph *graph, uint32_t image)
     return VKB_NO_IMAGE;
 }
 
+const struct vkb_pass_row *vkb_graph_writer(const struct vkb_graph *graph, uint32_t image)
+{
+    const struct vkb_pass_row *writer = NULL;
+
+    for (uint32_t i = 0; i < graph->pass_count; ++i)
+        if (graph->passes[i].target_count == 1 && graph->passes[i].targets[0] == image)
+            writer = &graph->passes[i];
+    return writer;
+}
+
 static uint32_t count_histories(const struct vkb_graph *graph)
 {
     uint32_t count = 0;

@@ -236,6 +236,9 @@ bool vkb_graph_add_history(struct vkb_graph *graph, uint32_t image, uint32_t *in
 // The history of an image; VKB_NO_IMAGE: it has none. What has one is made in each call.
 uint32_t vkb_graph_history(const struct vkb_graph *graph, uint32_t image);
 
+// The last pass whose only target is the image; NULL: none.
+const struct vkb_pass_row *vkb_graph_writer(const struct vkb_graph *graph, uint32_t image);
+
 // The copy's constant `stored` is that of its first target. Fails if one of its images is not
 // there.
 bool vkb_graph_add_pass(struct vkb_graph *graph, const struct vkb_pass_row *row,

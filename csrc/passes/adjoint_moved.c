@@ -240,21 +240,18 @@ static double beam_iterations(const struct gathering *gathering, double distance
 static void pass_over_dark(const struct vkb_graph *graph, uint32_t highlights,
                            struct vkb_pass_row *row)
 {
-    for (uint32_t i = 0; i < graph->pass_count; ++i) {
-        const struct vkb_pass_row *pass = &graph->passes[i];
-        const struct vkb_constants *constants = &pass->constants;
-        const float low = pass->params.prefilter.threshold;
-        if (pass->targets[0] != highlights || pass->block != VKB_BLOCK_prefilter
-            || constants->after != POINT_HIGHLIGHTS || !constants->thresholded || constants->masked)
-            continue;
-        row->reads[SLOT_SOURCE] = pass->reads[SLOT_SOURCE];
-        row->constants.thresholded = true;
-        // Where the transition begins (lib/points.glsl).
-        row->params.sun_beams.dark_below =
-            low
-            - fminf(pass->params.prefilter.smoothness, fminf(low, pass->params.prefilter.maximum));
-        row->params.sun_beams.dark_side = constants->mean_side > 1 ? constants->mean_side : 1;
-    }
+    const struct vkb_pass_row *pass = vkb_graph_writer(graph, highlights);
+
+    if (!pass || pass->block != VKB_BLOCK_prefilter || pass->constants.after != POINT_HIGHLIGHTS
+        || !pass->constants.thresholded || pass->constants.masked)
+        return;
+    const struct vkb_prefilter_params *params = &pass->params.prefilter;
+    row->reads[SLOT_SOURCE] = pass->reads[SLOT_SOURCE];
+    row->constants.thresholded = true;
+    // Where the transition begins (lib/points.glsl).
+    row->params.sun_beams.dark_below =
+        params->threshold - fminf(params->smoothness, fminf(params->threshold, params->maximum));
+    row->params.sun_beams.dark_side = pass->constants.mean_side > 1 ? pass->constants.mean_side : 1;
 }
 
 bool vkb_transpose_sun_beams(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,

@@ -35,7 +35,7 @@ bool vkb_is_factor(const struct vkb_pass_row *pass)
 // Reads the cotangents of a composite without a curve in place of those of its bloom.
 static void read_composite(const struct vkb_graph *graph, struct vkb_pass_row *row)
 {
-    const struct vkb_pass_row *pass = vkb_writer_of(graph, row->reads[SLOT_COTANGENTS]);
+    const struct vkb_pass_row *pass = vkb_graph_writer(graph, row->reads[SLOT_COTANGENTS]);
 
     if (!pass || !vkb_is_factor(pass))
         return;

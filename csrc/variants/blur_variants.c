@@ -254,7 +254,7 @@ bool vkb_add_fused_variant(struct vkb_variant_choice *choice, const struct vkb_p
     struct bloom bloom;
 
     if (!(find_bloom(&choice->plain, pass, gpu ? TILE_RADIUS : STRIP_RADIUS,
-                     gpu && pass->transposed ? vkb_writer_of : vkb_threshold_of, &bloom)
+                     gpu && pass->transposed ? vkb_graph_writer : vkb_threshold_of, &bloom)
           && (gpu
               || (vkb_fits_linear(choice, pass)
                   && (!pass->transposed || vkb_are_floats(choice, pass))))))
@@ -296,15 +296,15 @@ static bool find_adjoint_bloom(const struct vkb_graph *graph, const struct vkb_p
               && (ends || (is_alone(pass) && !pass->constants.of_source)))))
         return false;
     *bloom = (struct bloom){
-        .last = thresholds ? vkb_writer_of(graph, pass->reads[SLOT_COTANGENTS]) : pass,
+        .last = thresholds ? vkb_graph_writer(graph, pass->reads[SLOT_COTANGENTS]) : pass,
         .threshold = thresholds ? pass : NULL,
     };
     if (!bloom->last || bloom->last->block != VKB_BLOCK_adjoint_filter
         || (thresholds && !is_alone(bloom->last))
         || !find_kernels(bloom->last, radius, bloom, &by_bloom))
         return false;
-    const struct vkb_pass_row *by_scene = vkb_writer_of(graph, added);
-    bloom->composite = vkb_writer_of(graph, by_bloom);
+    const struct vkb_pass_row *by_scene = vkb_graph_writer(graph, added);
+    bloom->composite = vkb_graph_writer(graph, by_bloom);
     if (!bloom->composite || !vkb_is_factor(bloom->composite) || bloom->composite->constants.masked)
         return false;
     return !ends

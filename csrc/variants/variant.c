@@ -85,28 +85,18 @@ bool vkb_fits_linear(const struct vkb_variant_choice *choice, const struct vkb_p
     return fits;
 }
 
-const struct vkb_pass_row *vkb_writer_of(const struct vkb_graph *graph, uint32_t image)
-{
-    const struct vkb_pass_row *writer = NULL;
-
-    for (uint32_t i = 0; i < graph->pass_count; ++i)
-        if (graph->passes[i].target_count == 1 && graph->passes[i].targets[0] == image)
-            writer = &graph->passes[i];
-    return writer;
-}
-
 const struct vkb_pass_row *vkb_bloom_of(const struct vkb_graph *graph,
                                         const struct vkb_pass_row *composite)
 {
     const struct vkb_pass_row *pass =
-        vkb_ends_bloom(composite) ? vkb_writer_of(graph, composite->reads[SLOT_BLOOM]) : NULL;
+        vkb_ends_bloom(composite) ? vkb_graph_writer(graph, composite->reads[SLOT_BLOOM]) : NULL;
 
     return pass && pass->filter_count == 1 && vkb_computes(pass, VKB_BLOCK_filter) ? pass : NULL;
 }
 
 const struct vkb_pass_row *vkb_threshold_of(const struct vkb_graph *graph, uint32_t image)
 {
-    const struct vkb_pass_row *pass = vkb_writer_of(graph, image);
+    const struct vkb_pass_row *pass = vkb_graph_writer(graph, image);
 
     return pass && vkb_is_threshold(pass)
                 && graph->images[pass->reads[SLOT_SOURCE]].format == graph->images[image].format

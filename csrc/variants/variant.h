@@ -60,8 +60,6 @@ vkb_variant_add vkb_add_pixels_variant;
 bool vkb_has_format_of(const struct vkb_graph *graph, uint32_t a, uint32_t b);
 
 bool vkb_is_written_once(const struct vkb_graph *graph, uint32_t image);
-// The last pass whose only target is the image; NULL: none.
-const struct vkb_pass_row *vkb_writer_of(const struct vkb_graph *graph, uint32_t image);
 // The last pass of the filter that makes the bloom which a composite ends (vkb_ends_bloom); NULL:
 // it is no filter of one image.
 const struct vkb_pass_row *vkb_bloom_of(const struct vkb_graph *graph,
