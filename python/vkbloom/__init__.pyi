@@ -55,7 +55,7 @@ from ._renderer.image import Image
 from ._renderer.plans import Plan
 from ._renderer.renderer import Renderer
 from ._scene import Camera, Scene
-from ._sequence import Sequence, sequence
+from ._sequence.sequence import Sequence, sequence
 from ._settings.antialiasing import Antialiasing, antialiasing
 from ._settings.exposure import Exposure, exposures
 from ._settings.glare import Glare, glares

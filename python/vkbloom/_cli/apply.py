@@ -50,7 +50,7 @@ from vkbloom._renderer.frame_files import settings_facts
 from vkbloom._renderer.frames import Frames
 from vkbloom._renderer.interruptible import open_renderer
 from vkbloom._renderer.renderer import Renderer
-from vkbloom._sequence import DEFAULT_RATE
+from vkbloom._sequence.inputs import DEFAULT_RATE
 from vkbloom._settings.settings import Settings
 
 #: From an image to its mask and emission.

@@ -46,7 +46,7 @@ from vkbloom._renderer.interruptible import open_renderer
 from vkbloom._renderer.renderer import Renderer
 from vkbloom._renderer.surface import Surface
 from vkbloom._scene import Scene
-from vkbloom._sequence import TURN_SECONDS
+from vkbloom._sequence.inputs import TURN_SECONDS
 from vkbloom._settings.settings import SHADINGS, Settings, Shading, presets
 
 #: Options of a scene, by the names of their parameters.

@@ -41,7 +41,9 @@ from vkbloom._renderer.frame_files import settings_facts
 from vkbloom._renderer.frames import Frames
 from vkbloom._renderer.interruptible import open_renderer
 from vkbloom._renderer.renderer import Renderer
-from vkbloom._sequence import DEFAULT_RATE, Clock, Input, Sequence, Taken, work_of_images
+from vkbloom._sequence.inputs import DEFAULT_RATE, Clock, Input, Taken
+from vkbloom._sequence.sequence import Sequence
+from vkbloom._sequence.work import work_of_images
 from vkbloom._settings.settings import Settings
 
 if TYPE_CHECKING:

@@ -24,7 +24,15 @@ from vkbloom._io.video.reading import is_video
 from vkbloom._numbers import check_above, check_index
 from vkbloom._renderer.state import State
 from vkbloom._scene import Scene
-from vkbloom._sequence import DEFAULT_RATE, TURN_SECONDS, Clock, Input, Taken, moment_of, open_input
+from vkbloom._sequence.inputs import (
+    DEFAULT_RATE,
+    TURN_SECONDS,
+    Clock,
+    Input,
+    Taken,
+    moment_of,
+    open_input,
+)
 from vkbloom._settings.antialiasing import Antialiasing, antialiasing, check_antialiasing
 from vkbloom._settings.exposure import Exposure, check_exposure, exposures
 
