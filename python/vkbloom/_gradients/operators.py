@@ -93,9 +93,16 @@ def replace(settings: Settings, values: Mapping[str, Any]) -> Settings:
     """Return settings with the values of tensors."""
     if not values:
         return settings
-    return settings.replace(
-        **{name: _field_value(value.detach().cpu()) for name, value in values.items()}
-    )
+    given = {name: _field_value(value.detach().cpu()) for name, value in values.items()}
+    if any(isinstance(value, np.ndarray) for value in given.values()):
+        return settings.replace(**given)
+    return _replaced(settings, tuple(given.items()))
+
+
+# Both directions of a step have the same values.
+@functools.lru_cache(16)
+def _replaced(settings: Settings, values: tuple[tuple[str, Any], ...]) -> Settings:
+    return settings.replace(**dict(values))
 
 
 def _field_value(value: Any) -> Any:
@@ -206,7 +213,7 @@ def _pull_on_device(call: _Call, cotangent: Any) -> Iterator[Any]:
         )
         for index in range(images.shape[0])
     )
-    settings = replace(_settings(call.settings), call.fields)
+    settings = replace(in_floats(_settings(call.settings)), call.fields)
     yield from pull_each(renderer, settings, sequence, call.fields, "cuda")
 
 
