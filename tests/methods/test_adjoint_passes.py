@@ -256,6 +256,28 @@ def test_all_methods_and_stages_are_among_them() -> None:
     assert stages == {*_core.STAGES}
 
 
+#: One preset of each method, and what has none.
+ONE_OF_EACH = {
+    **{settings.method: settings for settings in vkbloom.presets.values()},
+    "darktable": vkbloom.DarktableBloom(),
+}
+
+
+@pytest.mark.parametrize("method", ONE_OF_EACH)
+def test_fields_of_the_composite_are_sums(renderer: Renderer, method: str) -> None:
+    """But for those that passes before the composite read."""
+    settings = ONE_OF_EACH[method].replace(**SINGLE, exposure=0.3, tonemap="none", encoding="none")
+    image = 4 * random_image(17, 26, channels=3, seed=1).astype(np.float32)
+    cotangents = {"final": np.random.default_rng(2).random(image.shape).astype(np.float32)}
+    running = Passes(renderer, Inputs(image), settings, cotangents).submit("sums")
+    fields = running.fields(min_share=0.0) if running else {}
+    expected = reference.vjp(image, settings)[1](cotangents)
+    for field in ("intensity", "exposure", "reference_white"):
+        assert (field in fields) == (field not in settings._fields_before_composite)
+        if field in fields:
+            assert np.allclose(fields[field], expected[field], rtol=1e-4, atol=1e-4), field
+
+
 @pytest.mark.parametrize("size", [(41, 9), (9, 47)])
 @pytest.mark.parametrize("type", ["bloom", "streaks"])
 def test_blender_5_2_reads_the_next_texels(renderer: Renderer, size: Any, type: Any) -> None:

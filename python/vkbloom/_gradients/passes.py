@@ -192,15 +192,17 @@ def device_fields(settings: Settings) -> frozenset[str]:
     """Return the fields by which the device has the derivatives.
 
     These are what only the composite and the threshold pass read. Published methods have
-    thresholds of their own, and some read the intensity or the exposure before the composite. With
-    glare, the intensity is that of the sum before the composite.
+    thresholds of their own. With glare, the intensity is that of the sum before the composite.
     """
-    if settings.published or {settings.tonemap, settings.encoding} & _STEEP:
+    if {settings.tonemap, settings.encoding} & _STEEP:
         return frozenset()
-    known = frozenset(name for names in _SUMS.values() for name in names)
-    return (known - {"intensity"} if settings.glare else known) & frozenset(
-        differentiable(settings)
-    )
+    composite, threshold = map(frozenset, _SUMS.values())
+    known = composite - settings._fields_before_composite
+    if not settings.published:
+        known |= threshold
+    if settings.glare:
+        known -= {"intensity"}
+    return known & differentiable(settings).keys()
 
 
 class DeviceGradients(Mapping[str, NDArray[Any]]):

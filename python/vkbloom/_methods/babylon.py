@@ -53,6 +53,7 @@ class BabylonBloom(PublishedSettings):
 
     method: ClassVar[str] = "babylon"
     _knobs: ClassVar[tuple[str, ...]] = ("threshold", "kernel")
+    _fields_before_composite: ClassVar[frozenset[str]] = frozenset(("intensity",))
     _pass_sentences: ClassVar[Mapping[str, str]] = MappingProxyType({"down": BLURRED_DOWN})
 
     threshold: float | None = number_field(default=0.9, slider=(0, 4))

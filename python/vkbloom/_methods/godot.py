@@ -72,6 +72,7 @@ class GodotBloom(PublishedSettings):
 
     method: ClassVar[str] = "godot"
     _knobs: ClassVar[tuple[str, ...]] = ("threshold", "strength", "glow_bloom")
+    _fields_before_composite: ClassVar[frozenset[str]] = frozenset(("exposure",))
     _pass_sentences: ClassVar[Mapping[str, str]] = MappingProxyType({"down": BLURRED_DOWN})
 
     threshold: float | None = 1.0
