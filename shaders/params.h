@@ -378,6 +378,13 @@
     INPUT(B, int, rows) \
     INPUT(B, int, grids)
 
+// Sums of pixels between the places of a field's grid (adjoint_weights.frag): the intervals between
+// places, the parts of each, and the lines of a picture of sums.
+#define NODE_SUMS_BLOCK(B, READS, INPUT, VEC4S) \
+    INPUT(B, int, cells) \
+    INPUT(B, int, parts) \
+    INPUT(B, int, lines)
+
 // Of a pass that was given at run time: bytes whose layout only its shader knows.
 #define CUSTOM_BLOCK(B, READS, INPUT, VEC4S) VEC4S(B, values, 64)
 
@@ -401,6 +408,7 @@
     BLOCK(fft_kernel, FFT_KERNEL_BLOCK) \
     BLOCK(products, PRODUCTS_BLOCK) \
     BLOCK(field_weights, FIELD_WEIGHTS_BLOCK) \
+    BLOCK(node_sums, NODE_SUMS_BLOCK) \
     BLOCK(composite, COMPOSITE_BLOCK) \
     BLOCK(adjoint_filter, ADJOINT_FILTER_BLOCK) \
     BLOCK(exposure, EXPOSURE_BLOCK) \
@@ -615,7 +623,8 @@
 #define TRANSFORM_SLOTS(SLOT) \
     SLOT(SLOT_SPECTRUM, 1) /* of the kernel, for the product */ \
     SLOT(SLOT_FACTORS, 1)  /* of up to MAX_PRODUCTS: the spectra of glow and kernel in turns */ \
-    SLOT(SLOT_PLACES, 1)   /* where columns and rows are in the grid of weights */
+    SLOT(SLOT_PLACES, 1)   /* where columns and rows are in the grid of weights */ \
+    SLOT(SLOT_NODES, 5)    /* the same, beside up to four SLOT_FACTORS */
 
 // The G-buffer.
 #define LIGHTING_SLOTS(SLOT) \
@@ -711,10 +720,11 @@
 // Products of spectra that one pass adds up.
 #define MAX_PRODUCTS 3
 
-// Adjoint passes: the pixels of a row of the table of weights, and the root of the number of pixels
-// that are added up at once.
+// Adjoint passes: the pixels of a row of the table of weights, the root of the number of pixels
+// that are added up at once, and how many of a line are, of those between two places of a grid.
 #define TABLE_WIDTH 1024
 #define SUM_SIDE    8
+#define NODE_PIXELS 16
 // Transposed filters in blocks: the texels along an axis whose weights are together in the table,
 // and the rows of an invocation that writes words.
 #define ADJOINT_SIDE 4

@@ -18,11 +18,12 @@
 
 enum { MAX_WEIGHTS_IMAGES = (VKB_MAX_FIELD + 3) / 4 };
 
-// The images of a field: the spectra of its kernels, and the weights of each pixel, four in each
-// image.
+// The images of a field: the spectra of its kernels, the weights of each pixel, four in each image,
+// and the places of the pixels in the grid of weights.
 struct field {
     uint32_t spectra[VKB_MAX_FIELD];
     uint32_t weights[MAX_WEIGHTS_IMAGES];
+    uint32_t places;
 };
 
 // A copy for the images of kernel k.
@@ -68,13 +69,13 @@ static uint32_t add_kernel(struct vkb_levels *levels, uint32_t k)
 }
 
 // Adds the weights of each pixel of the buffers, which depend on no picture.
-static void add_weights(struct vkb_levels *levels, uint32_t *weights)
+static void add_weights(struct vkb_levels *levels, struct field *field)
 {
     const struct vkb_field *data = &levels->settings->field;
     const struct vkb_image_row of_grid = vkb_given_image("field_grid", &data->weights);
     const struct vkb_image_row of_places = vkb_given_image("field_places", &data->places);
     const uint32_t grid = vkb_levels_add(levels, &of_grid);
-    const uint32_t places = vkb_levels_add(levels, &of_places);
+    field->places = vkb_levels_add(levels, &of_places);
     const struct vkb_size *buffers = &levels->source->buffers;
     // Along an axis with one place they are the same. Transforms read the nearest pixel.
     const struct vkb_size size = {data->columns > 1 ? buffers->width : 1,
@@ -83,11 +84,11 @@ static void add_weights(struct vkb_levels *levels, uint32_t *weights)
     for (uint32_t i = 0; i < (vkb_count_weights(data) + 3) / 4; ++i) {
         char name[VKB_NAME_SIZE];
         snprintf(name, sizeof name, "field_weights_%u", i);
-        weights[i] = vkb_levels_target(levels, name, VKB_FORMAT_RGBA32_FLOAT, size, false);
+        field->weights[i] = vkb_levels_target(levels, name, VKB_FORMAT_RGBA32_FLOAT, size, false);
         struct vkb_pass_row row =
-            vkb_fullscreen_row("kernel", &vkb_shader_field_weights_frag, weights[i]);
+            vkb_fullscreen_row("kernel", &vkb_shader_field_weights_frag, field->weights[i]);
         vkb_read_only(&row, grid);
-        vkb_read_at(&row, SLOT_PLACES, places);
+        vkb_read_at(&row, SLOT_PLACES, field->places);
         row.block = VKB_BLOCK_field_weights;
         row.params.field_weights = (struct vkb_field_weights_params){
             .grid = (int)i,
@@ -103,7 +104,7 @@ static struct field add_images(const struct vkb_convolving *passes)
 {
     struct field field = {0};
 
-    add_weights(passes->levels, field.weights);
+    add_weights(passes->levels, &field);
     for (uint32_t k = 0; k < passes->levels->settings->field.count; ++k) {
         VKB_OF_KERNEL(own, passes, k);
         field.spectra[k] = vkb_add_kernel_spectrum(&own, add_kernel(passes->levels, k));
@@ -223,23 +224,6 @@ static uint32_t add_gathered(const struct vkb_convolving *passes, const struct f
     return sum;
 }
 
-// Adds K_k * image of each kernel.
-static void add_each(const struct vkb_convolving *passes, const struct field *field, uint32_t image,
-                     uint32_t *results)
-{
-    const uint32_t rows = vkb_add_rows(passes, image, &vkb_unweighted);
-    const uint32_t spectrum = vkb_add_columns(passes, rows, &vkb_unweighted);
-
-    for (uint32_t k = 0; k < passes->levels->settings->field.count; ++k) {
-        struct vkb_image_row result = {.format = VKB_FORMAT_RGBA32_FLOAT};
-        VKB_OF_KERNEL(own, passes, k);
-        snprintf(result.name, sizeof result.name, "%sconvolved_%u", passes->prefix, k);
-        const uint32_t columns =
-            add_product_back(&own, spectrum, field->spectra[k], &vkb_unweighted);
-        results[k] = vkb_add_rows_back(&own, columns, &vkb_unweighted, &result);
-    }
-}
-
 uint32_t vkb_convolve_field(const struct vkb_convolving *passes, const struct vkb_image_row *result)
 {
     const struct field field = add_images(passes);
@@ -257,8 +241,10 @@ static struct field find_images(const struct vkb_graph *graph)
 
     for (uint32_t i = 0; i < graph->pass_count; ++i) {
         const struct vkb_pass_row *pass = &graph->passes[i];
-        if (vkb_computes(pass, VKB_BLOCK_field_weights))
+        if (vkb_computes(pass, VKB_BLOCK_field_weights)) {
             field.weights[weights++] = pass->targets[0];
+            field.places = pass->reads[SLOT_PLACES];
+        }
         if (vkb_computes(pass, VKB_BLOCK_products))
             for (int32_t k = 0; k < pass->constants.products; ++k)
                 field.spectra[count++] = pass->reads[SLOT_FACTORS + 2 * k + 1];
@@ -279,9 +265,95 @@ static struct vkb_filter fold_of(const struct vkb_convolution *convolution, stru
     return filter;
 }
 
-// Adds the framebuffers of the cotangents of the weights, four in each: the image times what the
-// kernels make of the cotangents; or the cotangents times what they make of the image, if pixels
-// collect.
+// The size of an image of two pictures of sums between places of the grid (adjoint_weights.frag),
+// and what its pass has: of an image of `size`, along one axis.
+static struct vkb_size size_sums(const struct vkb_field *data, struct vkb_size size, bool vertical,
+                                 struct vkb_node_sums_params *params)
+{
+    const uint32_t nodes = vertical ? data->rows : data->columns;
+    const uint32_t side = vertical ? size.height : size.width;
+    const uint32_t cells = nodes > 1 ? nodes - 1 : 1;
+    const uint32_t parts = (side + cells * NODE_PIXELS - 1) / (cells * NODE_PIXELS);
+    const struct vkb_size sums = {vertical ? size.width : cells * parts,
+                                  vertical ? cells * parts : size.height};
+
+    *params = (struct vkb_node_sums_params){
+        .cells = (int)cells, .parts = (int)parts, .lines = (int)sums.height};
+    return (struct vkb_size){sums.width, 2 * sums.height};
+}
+
+// Whether the images of the sums are not too large. Only grids with more places than pixels have
+// such ones.
+static bool fits_sums(const struct vkb_adjoint *adjoint, const struct vkb_field *data,
+                      struct vkb_size size)
+{
+    struct vkb_node_sums_params params;
+    const struct vkb_size above = size_sums(data, size, true, &params);
+    const struct vkb_size below =
+        size_sums(data, (struct vkb_size){size.width, data->rows}, false, &params);
+    const uint32_t max_side = adjoint->max_side;
+
+    return above.height <= max_side && below.width <= max_side && below.height <= max_side;
+}
+
+// Adds the pass of such sums, and the one that adds these up at the places: the image `name`.
+static uint32_t add_node_sums(struct vkb_levels *levels, struct vkb_pass_row row, bool vertical,
+                              const char *name, bool framebuffer)
+{
+    const struct vkb_field *data = &levels->settings->field;
+    const struct vkb_image_row *image = &levels->graph->images[row.reads[SLOT_SOURCE]];
+    const struct vkb_size size = {image->width, image->height};
+    const struct vkb_size nodes = {vertical ? size.width : data->columns, data->rows};
+    struct vkb_node_sums_params *params = &row.params.node_sums;
+    const struct vkb_size of_sums = size_sums(data, size, vertical, params);
+    char of_parts[VKB_NAME_SIZE];
+
+    row.transposed = true;
+    row.block = VKB_BLOCK_node_sums;
+    row.constants.direction = vertical ? DIRECTION_VERTICAL : DIRECTION_HORIZONTAL;
+    row.constants.by = BY_VALUES;
+    snprintf(of_parts, sizeof of_parts, "%s_parts", name);
+    row.targets[0] = vkb_levels_target(levels, of_parts, VKB_FORMAT_RGBA32_FLOAT, of_sums, false);
+    vkb_levels_pass(levels, &row);
+    struct vkb_pass_row last = vkb_fullscreen_row(
+        "weights", &vkb_shader_adjoint_nodes_frag,
+        vkb_levels_target(levels, name, VKB_FORMAT_RGBA32_FLOAT, nodes, framebuffer));
+    last.transposed = true;
+    last.block = row.block;
+    last.constants.direction = row.constants.direction;
+    last.params = row.params;
+    vkb_read_only(&last, row.targets[0]);
+    vkb_levels_pass(levels, &last);
+    return last.targets[0];
+}
+
+// Adds the framebuffer of the cotangents of up to four weights from the kernel `first` on: the sums
+// over pixels, along columns and then along rows, of an image times the images of the kernels.
+static void add_weights_back(struct vkb_levels *levels, uint32_t image, const uint32_t *each,
+                             uint32_t first, uint32_t count, int32_t alpha, uint32_t places)
+{
+    struct vkb_pass_row row =
+        vkb_fullscreen_row("weights", &vkb_shader_adjoint_weights_frag, VKB_NO_IMAGE);
+    char name[VKB_NAME_SIZE];
+
+    vkb_read_only(&row, image);
+    vkb_read_at(&row, SLOT_NODES, places);
+    for (uint32_t i = 0; i < count; ++i)
+        vkb_read_at(&row, (enum vkb_slot)(SLOT_FACTORS + i), each[i]);
+    row.constants.products = (int32_t)count;
+    row.constants.alpha = alpha;
+    snprintf(name, sizeof name, "adjoint_rows_of_weights_%u", first / 4);
+    const uint32_t columns = add_node_sums(levels, row, true, name, false);
+    row = vkb_fullscreen_row("weights", &vkb_shader_adjoint_weights_frag, VKB_NO_IMAGE);
+    vkb_read_only(&row, columns);
+    vkb_read_at(&row, SLOT_NODES, places);
+    snprintf(name, sizeof name, ".by_weights_%u", first / 4);
+    add_node_sums(levels, row, false, name, true);
+}
+
+// Adds the framebuffers of the cotangents of the weights, four in each, at the places of the grid:
+// of the image times what the kernels make of the cotangents; or of the cotangents times what they
+// make of the image, if pixels collect. No more than four such images are needed at a time.
 static bool add_by_weights(struct vkb_adjoint *adjoint, const struct vkb_convolving *transposed,
                            const struct field *field, const struct vkb_filter *fold, uint32_t glow,
                            uint32_t cotangents, struct vkb_error *error)
@@ -291,8 +363,11 @@ static bool add_by_weights(struct vkb_adjoint *adjoint, const struct vkb_convolv
     const struct vkb_size size = levels->source->buffers;
     const struct vkb_convolution forward = vkb_describe_convolution(settings, size);
     const bool gathers = settings->field.gathers;
+    const bool moved = !vkb_axis_is_identity(&fold->x) || !vkb_axis_is_identity(&fold->y);
+    const int32_t alpha = vkb_find_transform(adjoint->graph).constants.alpha;
+    const uint32_t first = adjoint->graph->pass_count;
     struct vkb_convolving passes = *transposed;
-    uint32_t each[VKB_MAX_FIELD];
+    uint32_t each[4];
 
     // The passes of other derivatives have the prefix, too.
     passes.prefix = "adjoint_weights_";
@@ -300,30 +375,26 @@ static bool add_by_weights(struct vkb_adjoint *adjoint, const struct vkb_convolv
         passes.convolution = &forward;
         passes.transposed = false;
     }
-    add_each(&passes, field, gathers ? glow : cotangents, each);
+    const uint32_t rows = vkb_add_rows(&passes, gathers ? glow : cotangents, &vkb_unweighted);
+    const uint32_t spectrum = vkb_add_columns(&passes, rows, &vkb_unweighted);
     for (uint32_t k = 0; k < settings->field.count && !levels->failed; ++k) {
-        const bool moved = !vkb_axis_is_identity(&fold->x) || !vkb_axis_is_identity(&fold->y);
-        if (moved && !gathers
-            && !vkb_filter_to_image(adjoint, fold, each[k], size, each + k, error))
+        struct vkb_image_row result = {.format = VKB_FORMAT_RGBA32_FLOAT};
+        uint32_t *convolved = &each[k % 4];
+        VKB_OF_KERNEL(own, &passes, k);
+        snprintf(result.name, sizeof result.name, "%sconvolved_%u", passes.prefix, k);
+        const uint32_t columns =
+            add_product_back(&own, spectrum, field->spectra[k], &vkb_unweighted);
+        *convolved = vkb_add_rows_back(&own, columns, &vkb_unweighted, &result);
+        if (!levels->failed && moved && !gathers
+            && !vkb_filter_to_image(adjoint, fold, *convolved, size, convolved, error))
             return false;
+        if (k % 4 == 3 || k == settings->field.count - 1)
+            add_weights_back(levels, gathers ? cotangents : glow, each, k - k % 4, k % 4 + 1, alpha,
+                             field->places);
     }
-    for (uint32_t k = 0; k < settings->field.count; k += 4) {
-        const uint32_t some = settings->field.count - k < 4 ? settings->field.count - k : 4;
-        char name[VKB_NAME_SIZE];
-        snprintf(name, sizeof name, ".by_weights_%u", k / 4);
-        const uint32_t target =
-            vkb_levels_target(levels, name, VKB_FORMAT_RGBA32_FLOAT, size, true);
-        struct vkb_pass_row row =
-            vkb_fullscreen_row("weights", &vkb_shader_adjoint_weights_frag, target);
-        row.transposed = true;
-        vkb_read_only(&row, gathers ? cotangents : glow);
-        vkb_read_at(&row, (enum vkb_slot)(SLOT_FACTORS + 3), VKB_NO_IMAGE);
-        for (uint32_t i = 0; i < some; ++i)
-            row.reads[SLOT_FACTORS + i] = each[k + i];
-        row.constants.products = (int32_t)some;
-        row.constants.alpha = vkb_find_transform(adjoint->graph).constants.alpha;
-        vkb_levels_pass(levels, &row);
-    }
+    // What the kernels make of the image has the alpha that the bloom has.
+    for (uint32_t i = first; gathers && i < adjoint->graph->pass_count; ++i)
+        adjoint->graph->passes[i].constants.alpha = alpha;
     return !levels->failed;
 }
 
@@ -349,7 +420,7 @@ bool vkb_transpose_field(struct vkb_adjoint *adjoint, const struct vkb_settings 
 
     vkb_transpose_axes(&convolution);
     const struct vkb_filter fold = fold_of(&convolution, size);
-    if (adjoint->weights
+    if (adjoint->weights && fits_sums(adjoint, &settings->field, size)
         && !add_by_weights(adjoint, &passes, &field, &fold, glow, cotangents, error))
         return false;
     const uint32_t convolved = settings->field.gathers

@@ -92,7 +92,8 @@ struct vkb_field {
     int first_unweighted;    // the first weight is 1
     uint32_t columns, rows;  // of the grid
     // Four weights a texel; for each column of the buffers, then for each row, the place in the
-    // grid before it and the share of the next one.
+    // grid before it and the share of the next one, and for each place the first of those pixels
+    // that it is before.
     struct vkb_kernel_data weights, places;
 };
 

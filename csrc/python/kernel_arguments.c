@@ -86,7 +86,8 @@ static bool read_field_tuple(PyObject *tuple, struct vkb_size buffers, Py_buffer
             "field: %u x %u texels are not the weights of %u kernels at %u x %u places",
             field->weights.width, field->weights.height, field->count, field->columns, field->rows);
     if (field->places.width < buffers.width || field->places.width < buffers.height
-        || field->places.height != 2)
+        || field->places.width < field->columns || field->places.width < field->rows
+        || field->places.width < 2 || field->places.height != 2)
         return vkb_refuse("field: %u x %u texels are not the places of %u columns and %u rows",
                           field->places.width, field->places.height, buffers.width, buffers.height);
     settings->kernel.height /= field->count;

@@ -1,5 +1,6 @@
 // Four weights of a field at each pixel: linear between the places of a grid. `places` has, for each column in
-// its first row and for each row in its second one, the place before it and the share of the next one.
+// its first row and for each row in its second one, the place before it and the share of the next one; its third
+// channel is for adjoint_weights.frag.
 
 UNIFORM_BLOCK(FIELD_WEIGHTS_BLOCK);
 

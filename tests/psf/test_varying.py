@@ -25,6 +25,8 @@ from tests.psf.fields import (
 )
 from tests.variants import VARIANTS, open_variant
 from vkbloom import psf, reference, testing
+from vkbloom._gradients.passes import Passes, in_floats
+from vkbloom._renderer.sources import Inputs
 
 FRAME = 21, 15
 BOUNDARIES = "zero", "edge", "wrap"
@@ -323,6 +325,70 @@ def test_derivatives_by_weights(
     made = derivatives["psf.weights"]
     assert made.shape == weights.shape == exact.shape
     np.testing.assert_allclose(made, exact, rtol=0, atol=1e-5 * np.abs(exact).max())
+
+
+LARGER = 67, 45
+#: Grids of weights: the kind of field, the frame, the places' x and y, and settings. Between two
+#: places are up to three parts of the pixels; some are beyond all places, or fewer than these.
+GRIDS: dict[str, tuple[type[psf.Varying], tuple[int, int], Any, dict[str, Any]]] = {
+    "parts": (psf.Varying, LARGER, ((3.0, 8.5, 60.0), (-5.0, 39.0)), {}),
+    "one_row": (psf.Gathered, LARGER, ((3.0, 8.5, 60.0), (7.0,)), {"alpha": "blur"}),
+    "one_column": (psf.Varying, LARGER, ((7.0,), (0.0, 30.25, 44.0)), {"alpha": "blur"}),
+    "one_place": (psf.Varying, LARGER, ((7.0,), (4.0,)), {}),
+    "outside": (psf.Varying, LARGER, ((-9.0, -4.0), (70.0, 80.0, 90.0)), {}),
+    "fine": (psf.Gathered, (4, 3), (tuple(np.linspace(-1, 4, 9)), (0.0, 0.4, 0.8, 2.0)), {}),
+    "one_pixel": (psf.Varying, (1, 1), ((-1.0, 0.5), (0.0, 3.0)), {}),
+    "smaller": (psf.Varying, LARGER, ((3.0, 8.5, 60.0), (5.0, 39.0)), {"bloom_scale": 0.5}),
+}
+
+
+@functools.cache
+def weights_of_grid(name: str) -> tuple[Any, Array, Array, Array]:
+    """Return settings, an image, cotangents, and the reference's derivative by seven weights."""
+    kind, (width, height), positions, more = GRIDS[name]
+    draw = np.random.default_rng(11)
+    weights = 0.2 * draw.random((7, len(positions[1]), len(positions[0]))) - 0.04
+    lens = kind(grid(1, 7)[0], positions, weights=weights)
+    settings = vkbloom.Convolution(lens, composite="mix", intensity=1, **more)
+    shape = height, width, 4 if "alpha" in more else 3
+    image, cotangents = (draw.random(shape).astype(np.float32) for _ in range(2))
+    pullback = reference.vjp(image, settings)[1]
+    return settings, image, cotangents, pullback({"final": cotangents})["psf.weights"]
+
+
+def check_weights(renderer: vkbloom.Renderer, name: str) -> None:
+    settings, image, cotangents, exact = weights_of_grid(name)
+    passes = Passes(renderer, Inputs(image), in_floats(settings), {"final": cotangents})
+    running = passes.submit("weights")
+    assert running
+    made = running.by_name()
+    assert list(made) == [".by_weights_0", ".by_weights_1"]
+    # The device adds up the pixels: the host gets four weights of the grid's places in each.
+    assert {array.shape for array in made.values()} == {(*exact.shape[1:], 4)}
+    weights = running.fields()["psf.weights"]
+    np.testing.assert_allclose(weights, exact, rtol=0, atol=1e-5 * np.abs(exact).max())
+
+
+@pytest.mark.parametrize("name", GRIDS)
+def test_weights_of_any_grid_have_derivatives(renderer: vkbloom.Renderer, name: str) -> None:
+    check_weights(renderer, name)
+
+
+@pytest.mark.parametrize("name", ["parts", "one_row"])
+def test_variants_add_up_the_pixels_of_a_grid(any_renderer: vkbloom.Renderer, name: str) -> None:
+    check_weights(any_renderer, name)
+
+
+def test_grids_beyond_the_largest_image_are_left_to_the_reference(
+    renderer: vkbloom.Renderer,
+) -> None:
+    """The picture of the sums between places would be twice as high as the grid."""
+    lens = psf.Varying([np.eye(3)], ([0.0], np.arange(9000.0)), weights=np.ones((1, 9000, 1)))
+    image = picture(SMALL).astype(np.float32)
+    settings = vkbloom.Convolution(lens, format="rgba32float")
+    running = Passes(renderer, Inputs(image), settings, {"final": image}).submit("weights")
+    assert running
+    assert not running.by_name()
 
 
 @pytest.mark.parametrize("place", [(0, 0), (16, 3), (8, 11)])

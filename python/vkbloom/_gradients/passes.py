@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from vkbloom import _core
 from vkbloom._locks import ProcessLock
-from vkbloom._psf.places import hat_weights, pixel_places
 from vkbloom._renderer import requests
 from vkbloom._renderer.device_arrays import Destination, ImportedArray, on_host, place
 from vkbloom._renderer.new_arrays import new_memory
@@ -108,16 +107,10 @@ class Running:
         images = list(running.by_name().values()) if running else []
         if not images:
             return {}
-        psf = passes.settings.value_of("psf")
-        of_pixels = np.concatenate([on_host(image) for image in images], axis=2)
-        of_pixels = of_pixels[..., : len(psf.weights.array)]
-        height, width = passes.inputs.image.shape[:2]
-        frame = width, height
-        xs, ys = pixel_places(frame, of_pixels.shape[1::-1])
-        columns, rows = psf.grid_of(frame)
-        down, across = hat_weights(rows, ys), hat_weights(columns, xs)
-        made = np.einsum("yxk,yj,xi->kji", of_pixels, down, across, optimize=True)
-        return {name: made.astype(np.float32)}
+        # Four weights in each, at the places of their grid.
+        made = np.concatenate([on_host(image) for image in images], axis=2)
+        count = len(passes.settings.value_of(name).array)
+        return {name: np.ascontiguousarray(made.transpose(2, 0, 1)[:count])}
 
     def _zeros(self, shape: tuple[int, ...]) -> NDArray[Any]:
         zeros, passes = np.zeros(shape, np.float32), self.passes

@@ -66,11 +66,18 @@ def _weights(psf: Varying, frame: Size) -> CoreKernel:
 
 @keep
 def _places(psf: Varying, frame: Size, buffers: Size) -> CoreKernel:
-    """Return the place before each column, then each row, and the share of the next place."""
+    """Return the place before each column, then each row, and the share of the next place.
+
+    Beside them, of each place, is the first column or row that it is before.
+    """
     made = psf.components(frame)
-    image: NDArray[np.float32] = np.zeros((2, max(buffers), 4), np.float32)
-    for line, nodes, at in zip(
-        image, (made.xs, made.ys), pixel_places(frame, buffers), strict=True
+    # The last place is before none, unless it is the only one.
+    bounds = [max(len(nodes), 2) for nodes in (made.xs, made.ys)]
+    image: NDArray[np.float32] = np.zeros((2, max(*buffers, *bounds), 4), np.float32)
+    for line, nodes, at, count in zip(
+        image, (made.xs, made.ys), pixel_places(frame, buffers), bounds, strict=True
     ):
-        line[: len(at), 0], line[: len(at), 1] = places_before(nodes, at)
+        before, line[: len(at), 1] = places_before(nodes, at)
+        line[: len(at), 0] = before
+        line[:count, 2] = np.searchsorted(before, np.arange(count))
     return core_image(image)
