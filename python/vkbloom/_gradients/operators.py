@@ -20,6 +20,7 @@ from vkbloom._psf.values import ARRAYS, ArrayValue
 from vkbloom._renderer.default import default_renderer, renderer_on
 from vkbloom._renderer.device_arrays import DeviceArray, merge, take
 from vkbloom._renderer.renderer import RENDERERS, Renderer
+from vkbloom._renderer.requests import IMAGES_AHEAD
 from vkbloom._renderer.sources import Inputs, check_inputs
 from vkbloom._settings.fields import fields_of
 from vkbloom._settings.records import Record
@@ -189,8 +190,9 @@ def _pull(arrays: dict[str, Any], settings: Settings, renderer: int, cotangent: 
 def _pull_on_device(call: _Call, cotangent: Any) -> Iterator[Any]:
     """Yield the derivatives of each image, with those by images as tensors of the GPU."""
     renderer, mask = _renderer(call.renderer, call.image), call.mask
-    # CUDA copies what `take` gets.
-    renderer._pending.wait()
+    # PyTorch's stream waits for the framebuffers of the forward pass, and what `take` copies comes
+    # after that.
+    renderer._pending.wait(IMAGES_AHEAD)
     core = renderer._core
     masks = None if mask is None else mask.detach().reshape(-1, *mask.shape[-2:]).cpu().numpy()
     images, emissions, cotangents = (
