@@ -236,14 +236,15 @@ static double beam_iterations(const struct gathering *gathering, double distance
     return (distance > gathering->beyond ? 1.0 : 2.0) * (4.0 * lines + pixels);
 }
 
-// Lets the row pass over highlights that are 0 without a slope. (By a mask they have one.)
+// Lets the row pass over highlights that are 0 without a slope. A mask only multiplies them: its
+// cotangents are products with these zeros.
 static void pass_over_dark(const struct vkb_graph *graph, uint32_t highlights,
                            struct vkb_pass_row *row)
 {
     const struct vkb_pass_row *pass = vkb_graph_writer(graph, highlights);
 
     if (!pass || pass->block != VKB_BLOCK_prefilter || pass->constants.after != POINT_HIGHLIGHTS
-        || !pass->constants.thresholded || pass->constants.masked)
+        || !pass->constants.thresholded)
         return;
     const struct vkb_prefilter_params *params = &pass->params.prefilter;
     row->reads[SLOT_SOURCE] = pass->reads[SLOT_SOURCE];

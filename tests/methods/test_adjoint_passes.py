@@ -350,6 +350,27 @@ def test_presets_are_differentiated(renderer: Renderer, name: str) -> None:
             check(found, expected, part)
 
 
+@pytest.mark.parametrize("name", ["blender dark beams", "blender dark blocks"])
+def test_sun_beams_pass_over_dark_highlights_behind_a_mask(renderer: Renderer, name: str) -> None:
+    """Of the emission, which then is what glows. A mask of 0 has a derivative where there is light.
+
+    The pass reads what the highlights are made of, of which it knows that they are dark.
+    """
+    image, emission = (random_image(24, 32, channels=3, seed=seed) for seed in (1, 2))
+    mask = np.random.default_rng(3).random((24, 32), np.float32)
+    mask[4:14, 6:20] = 0
+    given = {"mask": mask, "emission": emission.astype(np.float32)}
+    pullback, cotangents, expected = pull(renderer, image.astype(np.float32), CASES[name], **given)
+    found = pullback(cotangents)
+    for part in ("image", *given):
+        check(found, expected, part)
+    source = Inputs(given["emission"], mask=mask).source((emission.astype(np.float32),))
+    plan = renderer._core.plan(source, CASES[name].replace(**SINGLE), None, ("bloom",), "images")
+    assert plan
+    reads = {shader: names for _, shader, names, *_ in plan.passes}
+    assert "frame" in reads["adjoint_beams_comp"]
+
+
 def test_a_mask_of_what_is_mixed_is_a_small_difference(renderer: Renderer) -> None:
     """Film keeps most light where it is, so that the parts by scene and by bloom nearly cancel."""
     image = random_image(97, 131, channels=3, seed=1).astype(np.float32)
