@@ -109,6 +109,16 @@ def test_one_pixel_that_is_not_finite(name: str, moved: float, value: float) -> 
     assert np.isfinite(partly[-1]["exposure"][0, 0, 0])
 
 
+def test_an_oscillation_grows_beyond_floats() -> None:
+    """Euler steps of 19 times the distance: multipliers become 0 and infinite, and are no error."""
+    for exposure in (
+        vkbloom.O3deExposure(speed_up=20, speed_down=20),
+        vkbloom.BevyExposure(speed_brighten=20, speed_darken=20, transition=1),
+    ):
+        states = _run(exposure, *[GREY * 8] * 4, dt=1e3)
+        assert {state["exposure"][0, 0, 2] for state in states} & {0.0, np.inf}
+
+
 def test_orders() -> None:
     """HDRP and Granite expose the light of the bloom as of the frame before."""
     frames = [GREY, GREY * 8]

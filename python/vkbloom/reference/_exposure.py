@@ -244,7 +244,7 @@ def _adapt_bevy(exposure: Any, metered: float, last: float | None, dt: float) ->
     else:
         step = exposure.speed_brighten * dt
         value += max(-step, distance * step / exposure.transition)
-    return Adapted(value, 1.0, 2.0**value)
+    return Adapted(value, 1.0, float(np.exp2(value)))
 
 
 # Unity HDRP.
@@ -392,7 +392,7 @@ def _adapt_o3de(exposure: Any, metered: float, last: float | None, dt: float) ->
     value = 0.0 if last is None else last
     speed = exposure.speed_up if goal > value else exposure.speed_down
     value += (goal - value) * min(dt, 1.0) * speed
-    return Adapted(value, 1.0, 2.0**-value)
+    return Adapted(value, 1.0, float(np.exp2(-value)))
 
 
 # Granite.
@@ -415,7 +415,7 @@ def _adapt_granite(exposure: Any, metered: float, last: float | None, dt: float)
     goal = _clamp(metered, low, high) if math.isfinite(metered) else low
     before = 0.0 if last is None else last
     value = before + (goal - before) * _half_lives(dt, 1.0)
-    return Adapted(value, 2.0**-before, 2.0 ** (before - value))
+    return Adapted(value, float(np.exp2(-before)), float(np.exp2(before - value)))
 
 
 def _meter_nothing(light: Array, exposure: Any) -> Metered:
