@@ -141,6 +141,14 @@ def test_arguments_of_functions() -> None:
     assert psf.Varying(function=lambda x, y: [[x, y]]).at(0, 0, (2, 2)).shape == (1, 2, 3)
 
 
+def test_a_side_of_one_pixel() -> None:
+    """A grid from the first pixel to the last shows its middle there."""
+    kernels = grid(2, 3)
+    made = psf.Varying(kernels).at(0, 0, (1, 1))[..., 0]
+    np.testing.assert_allclose(made, kernels[:, 1].mean(axis=0), rtol=1e-6)
+    np.testing.assert_array_equal(psf.Varying(kernels).at(3, 0, (7, 5))[..., 0], kernels[0, 1])
+
+
 def test_chromatic_fields() -> None:
     """Widths are scaled and spots are shifted outwards, channel by channel, with their sums."""
     scales, lateral = (1.2, 1.0, 0.9), (-1.5, 0.0, 2.0)

@@ -20,6 +20,15 @@ def field_of(x: float, y: float, frame: Size) -> tuple[float, float]:
     return (x - (width - 1) / 2) / radius, (y - (height - 1) / 2) / radius
 
 
+def spread_places(side: int, count: int) -> Array:
+    """Return places from the first pixel of a side to the last one; one place is in the middle.
+
+    Of a side of one pixel they are half a pixel before it to half a pixel behind it: nodes differ.
+    """
+    middle, reach = (side - 1) / 2, max(side - 1, 1) / 2 if count > 1 else 0.0
+    return np.linspace(middle - reach, middle + reach, count)
+
+
 def places_before(nodes: Array, places: Any) -> tuple[NDArray[np.intp], Array]:
     """Return the index of the node before each place, and the share of the next node.
 

@@ -17,7 +17,7 @@ from vkbloom._arrays import plain_array
 from vkbloom._numbers import check_floats, check_number, check_size
 from vkbloom._psf.base import PSF, Array, crop_or_pad, in_grey
 from vkbloom._psf.components import Components, components_of
-from vkbloom._psf.places import Size, field_of, hat_weights
+from vkbloom._psf.places import Size, field_of, hat_weights, spread_places
 from vkbloom._psf.sampled import samples
 from vkbloom._psf.splines import moved_and_scaled
 from vkbloom._psf.values import ArrayValue
@@ -275,7 +275,7 @@ class Varying(PSF):
         """
         frame = check_size("frame", frame)
         xs, ys = (
-            tuple(np.linspace(0, side - 1, count) if count > 1 else [(side - 1) / 2])
+            tuple(spread_places(side, count))
             for side, count in zip(frame, check_size("places", places), strict=True)
         )
         return type(self)(self.on_grid(xs, ys, frame), (xs, ys), tolerance=self.tolerance)
@@ -401,7 +401,7 @@ class Varying(PSF):
         if self.positions is not None:
             return np.array(self.positions[0]), np.array(self.positions[1])
         rows, columns = self._grid_shape
-        return np.linspace(0, frame[0] - 1, columns), np.linspace(0, frame[1] - 1, rows)
+        return spread_places(frame[0], columns), spread_places(frame[1], rows)
 
     def grid_kernels(self, frame: Size) -> Array:
         """Return the kernels at the grid's positions, (gy, gx, h, w) or (gy, gx, h, w, 3)."""
