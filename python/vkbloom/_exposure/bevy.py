@@ -97,4 +97,5 @@ class BevyExposure(Exposure):
         spread = y.max() - y.min()
         stops = np.interp(np.linspace(x[0], x[-1], 256), x, y)
         levels = (stops - y.min()) / spread * 255 if spread > 0 else np.zeros(256)
-        return levels.astype(np.uint8), x[0], x[-1], y.min(), spread
+        # Rounded down, but not a whole number that is an error of floats below itself.
+        return (levels + 1e-9).astype(np.uint8), x[0], x[-1], y.min(), spread
