@@ -160,6 +160,14 @@ class TestUndetermined:
         assert both.interval("threshold") == both.interval("intensity") == (-math.inf, math.inf)
         assert both.summary == "not determined: threshold, intensity"
 
+    def test_a_target_that_is_met_in_all_digits(self, renderer: Renderer) -> None:
+        """Differences that are all 0 have a variance, too."""
+        image = np.zeros((8, 12, 3), np.float32)
+        start = Pyramid(levels=2, threshold=0.5)
+        found = vkbloom.fit(image, image, start, ["intensity"], loss="l2", renderer=renderer)
+        assert found.interval("intensity") == (-math.inf, math.inf)
+        assert found.undetermined == ({"intensity": 1.0},)
+
     def test_a_threshold_under_all_light(self, fit: Call) -> None:
         found = fit(
             Pyramid(levels=3, threshold=1.0, intensity=0.3), ["threshold", "intensity"], IMAGE + 2

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom._extras import import_extra
-from vkbloom._fit.likelihood import EDGE, Likelihood, Optimum, invert
+from vkbloom._fit.likelihood import EDGE, Likelihood, Optimum, invert, variance_of
 from vkbloom._fit.space import Point, VariedField
 from vkbloom._locks import cached_property
 
@@ -157,7 +157,7 @@ class Intervals:
         inverse, covariance = np.diag(optimum.inverse), np.diag(optimum.covariance)
         known = inverse > 0
         if not known.any():
-            return optimum.square / optimum.residual.size
+            return variance_of(optimum.residual, optimum.residual.size)
         return float(np.mean(covariance[known] / inverse[known]))
 
     def covariance(self) -> Array:

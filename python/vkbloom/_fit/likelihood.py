@@ -29,6 +29,8 @@ _MAX_STEP: Final = 0.05
 _SINGULAR: Final = 1e-7
 #: Coordinates are from EDGE to 1 - EDGE: at an end itself a method may change, as at a knee of 0.
 EDGE: Final = 1e-6
+# A sum of squares that is far below that of rounding.
+_MIN_SQUARE: Final = 1e-40
 # A minimum is reached where a step would lower the loss by less than this share of the variance.
 _REACHED: Final = 1e-3
 _MAX_STEPS: Final = 25
@@ -58,6 +60,11 @@ class Optimum:
     def square(self) -> float:
         """The sum of squares."""
         return float(self.residual @ self.residual)
+
+
+def variance_of(residual: Array, count: int) -> float:
+    """Return the variance of differences that are as many numbers; above 0, also if all are 0."""
+    return max(float(residual @ residual), _MIN_SQUARE) / count
 
 
 @dataclass(eq=False)
@@ -205,7 +212,7 @@ class Likelihood:
         """
         scales = self._small.scales(self._array_of(residual)).ravel()
         count = max(np.count_nonzero(scales) - jacobian.shape[1], 1)
-        estimated = float(residual @ residual) / count
+        estimated = variance_of(residual, count)
         variances = self._variances(scales)
         if variances is not None and (
             self.noise is not None or variances.sum() >= estimated * count
