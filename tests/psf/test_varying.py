@@ -165,6 +165,25 @@ def test_chromatic_fields() -> None:
     np.testing.assert_allclose(kernel.sum(axis=(0, 1)), 1)
 
 
+def test_lateral_colour_of_a_grid(renderer: vkbloom.Renderer) -> None:
+    """Each place has its own shift, also between the positions of a grid, and of one kernel."""
+    y, x = np.mgrid[-7:8, -7:8].astype(float)
+
+    def spot(u: float, v: float) -> Array:
+        shifts = (-2.0, 0.0, 2.0)
+        spots = [np.exp(-((x - c * u) ** 2 + (y - c * v) ** 2) / 4.5) for c in shifts]
+        return np.stack([spot / spot.sum() for spot in spots], axis=-1)
+
+    image = picture().astype(np.float32)
+    wanted = scatter(image, lambda x, y: spot(*field_of(x, y, FRAME)), "zero")
+    lens = psf.Varying(np.tile(spot(0, 0)[..., 1], (1, 2, 1, 1)), lateral=(-2.0, 0.0, 2.0))
+    settings = vkbloom.Convolution(lens, composite="mix", format="rgba32float")
+    for made in (renderer.apply(image, settings), reference.apply(image, settings)):
+        np.testing.assert_allclose(made["bloom"][..., :3], wanted, atol=2e-3 * wanted.max())
+    with pytest.raises(ValueError, match="lateral colour each pixel"):
+        settings.kernel(FRAME)
+
+
 class Gridded:
     """What is used of photutils' GriddedPSFModel, with positions in another order."""
 

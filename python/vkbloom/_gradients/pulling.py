@@ -287,9 +287,9 @@ def undefined(images: Mapping[str, Any], settings: Settings) -> Gradients:
 @functools.lru_cache(16)
 def _names(settings: Settings) -> tuple[str, ...]:
     """Return the names of the derivatives that are not by images."""
-    # A function of the place has a kernel for each pixel.
-    is_function = getattr(getattr(settings, "psf", None), "function", None) is not None
-    has_kernel = settings.bloom and callable(getattr(settings, "kernel", None)) and not is_function
+    # A field that is no grid has a kernel for each pixel.
+    is_one = getattr(getattr(settings, "psf", None), "has_grid", True)
+    has_kernel = settings.bloom and callable(getattr(settings, "kernel", None)) and is_one
     return (*differentiable(settings), *(("kernel",) if has_kernel else ()))
 
 

@@ -128,15 +128,18 @@ class Convolution(WithKernel, Settings):
         Raises
         ------
         ValueError
-            The `vkbloom.psf.Varying` has a function, which has a kernel for each pixel.
+            The `vkbloom.psf.Varying` has a function or lateral colour: a kernel for each pixel.
         """
         if isinstance(self.psf, Varying):
             return self._grid_kernels(self.psf, frame, buffers or frame)
         return self._kernel(frame, buffers or frame)
 
     def _grid_kernels(self, psf: Varying, frame: Size, buffers: Size) -> NDArray[np.float64]:
-        if psf.function is not None:
-            raise ValueError("psf: a function has a kernel for each pixel; use psf.at(x, y, frame)")
+        if not psf.has_grid:
+            raise ValueError(
+                "psf: with a function or lateral colour each pixel has a kernel of its own; use "
+                "psf.at(x, y, frame)"
+            )
         kernels = psf.grid_kernels(frame)
         grid = in_grey(kernels) if kernels.ndim == 4 else kernels
         return np.array([[_for_buffers(kernel, frame, buffers) for kernel in row] for row in grid])

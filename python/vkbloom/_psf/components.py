@@ -38,8 +38,8 @@ class Field(Protocol):
     """What is used of a `Varying`."""
 
     @property
-    def function(self) -> Any:
-        """None: the field is a grid."""
+    def has_grid(self) -> bool:
+        """Whether all kernels are sums of those of a grid."""
 
     @property
     def kernels(self) -> Any:
@@ -104,7 +104,7 @@ class Components(NamedTuple):
 @keep
 def components_of(psf: Field, frame: Size) -> Components:
     """Return the components of a field for a picture."""
-    return _of_grid(psf, frame) if psf.function is None else _of_function(psf, frame)
+    return _of_grid(psf, frame) if psf.has_grid else _of_function(psf, frame)
 
 
 @functools.lru_cache(256)

@@ -138,7 +138,8 @@ class Varying(PSF):
         The weights of K kernels, of shape (K, h, w) or (K, h, w, 3), at the positions: the kernel
         of a place is the sum over k of weights[k] kernels[k]. They have derivatives, "psf.weights".
     tolerance : float
-        Of a function: the error of the result that is accepted, above 0 up to 1. See Notes.
+        Of a function and of lateral colour: the error of the result that is accepted, above 0 up
+        to 1. See Notes.
 
     Raises
     ------
@@ -154,12 +155,13 @@ class Varying(PSF):
     other meaning, in which each pixel has a blur of its own.
 
     The sum is computed as the sum over k of K_k * (w_k glow), with few kernels K_k and weights w_k
-    that depend on the place. For a grid this is exact. For a function, K_0 is the mean kernel,
-    whose weight is the sum of the place's kernel. The others have a sum of 0, so that flux does not
-    depend on their number. There are as many as are needed so that, at places between those at
-    which the function was called, kernels differ from the function's by at most `tolerance`: each
-    tap relative to the largest one, and the worst picture of 0 to 1 relative to the sum. There are
-    at most 128 beside the mean. `components` returns kernels, weights and the error.
+    that depend on the place. For a grid without lateral colour this is exact. For a function, and
+    with lateral colour, K_0 is the mean kernel, whose weight is the sum of the place's kernel. The
+    others have a sum of 0, so that flux does not depend on their number. There are as many as are
+    needed so that, at places between those at which the function was called, kernels differ from
+    the function's by at most `tolerance`: each tap relative to the largest one, and the worst
+    picture of 0 to 1 relative to the sum. There are at most 128 beside the mean. `components`
+    returns kernels, weights and the error.
 
     Scaled and shifted kernels are interpolated by splines, and keep their sums.
 
@@ -396,6 +398,14 @@ class Varying(PSF):
         own = self.kernels.array.shape[:2] if self.weights is None else self.weights.array.shape[1:]
         return int(own[0]), int(own[1])
 
+    @property
+    def has_grid(self) -> bool:
+        """Whether all kernels are sums of those of a grid; else each place has one of its own.
+
+        Lateral colour shifts kernels by a distance that depends on their place.
+        """
+        return self.function is None and not any(self.lateral or ())
+
     def grid_of(self, frame: Size) -> tuple[Array, Array]:
         """Return the x of the grid's columns and the y of its rows for a picture, in pixels."""
         if self.positions is not None:
@@ -407,29 +417,33 @@ class Varying(PSF):
         """Return the kernels at the grid's positions, (gy, gx, h, w) or (gy, gx, h, w, 3)."""
         if self.weights is not None:
             return np.tensordot(self.weights.array.astype(np.float64), self._kernels, (0, 0))
+        return self._coloured_at(*self.grid_of(frame), self._kernels, frame)
+
+    def on_grid(self, xs: Any, ys: Any, frame: Size) -> Array:
+        """Return the kernels at places, (len(ys), len(xs), h, w, 3)."""
+        if self.function is None:
+            kernels = self._kernels if self.weights is None else self.grid_kernels(frame)
+            columns, rows = self.grid_of(frame)
+            across, down = hat_weights(columns, xs), hat_weights(rows, ys)
+            made = np.einsum("yj,xi,ji...->yx...", down, across, kernels, optimize=True)
+            made = self._coloured_at(xs, ys, made, frame)
+        else:
+            made = np.array([[self._kernel_at(x, y, frame) for x in xs] for y in ys])
+        return in_grey(made) if made.ndim == 4 else made
+
+    def _coloured_at(self, xs: Any, ys: Any, kernels: Array, frame: Size) -> Array:
+        """Return kernels (len(ys), len(xs), h, w) with the scales and shifts of their places."""
         if self.scales is None and self.lateral is None:
-            return self._kernels
-        xs, ys = self.grid_of(frame)
+            return kernels
         return np.array(
             [
                 [
                     self._coloured(kernel, *field_of(x, y, frame))
                     for x, kernel in zip(xs, row, strict=True)
                 ]
-                for y, row in zip(ys, self._kernels, strict=True)
+                for y, row in zip(ys, kernels, strict=True)
             ]
         )
-
-    def on_grid(self, xs: Any, ys: Any, frame: Size) -> Array:
-        """Return the kernels at places, (len(ys), len(xs), h, w, 3)."""
-        if self.function is None:
-            kernels = self.grid_kernels(frame)
-            columns, rows = self.grid_of(frame)
-            across, down = hat_weights(columns, xs), hat_weights(rows, ys)
-            made = np.einsum("yj,xi,ji...->yx...", down, across, kernels, optimize=True)
-        else:
-            made = np.array([[self._kernel_at(x, y, frame) for x in xs] for y in ys])
-        return in_grey(made) if made.ndim == 4 else made
 
     def _kernel_at(self, x: float, y: float, frame: Size) -> Array:
         u, v = field_of(x, y, frame)

@@ -35,7 +35,7 @@ def spread_field(glow: Array, settings: Convolution, frame: Size, convolve: Conv
     psf = settings.psf
     assert isinstance(psf, Varying)
     buffers = size_of(glow)
-    if psf.function is None:
+    if psf.has_grid:
         return _by_grid(glow, settings, psf, frame, convolve)
     return _by_pixel(glow, psf, settings.boundary, frame, buffers)
 
