@@ -109,6 +109,7 @@ autodoc_typehints = "none"
 numpydoc_show_class_members = False
 templates_path = ["templates"]
 
+_navigation = runpy.run_path(str(_here / "navigation.py"))
 
 # Thumbnails are larger than sphinx-gallery's, and their links have a text for screen readers.
 _THUMBNAILS = """
@@ -132,6 +133,7 @@ def _make_accessible(*arguments: Any) -> None:
     Sphinx writes neither; axe-core finds both (tests/docs/test_first_page.py).
     """
     page, context = arguments[1], arguments[3]
+    context["furo_navigation_tree"] = _navigation["mark"](context["furo_navigation_tree"], page)
     for start, style in _STYLES.items():
         if page.startswith(start):
             context["metatags"] = context.get("metatags", "") + f"<style>{style}</style>"
@@ -143,6 +145,8 @@ def _make_accessible(*arguments: Any) -> None:
 
 def setup(app: Sphinx) -> None:
     """Change pages when they are written."""
+    # Before the theme's own handler, which asks for the tree.
+    app.connect("html-page-context", _navigation["share"], priority=400)
     # After the theme's own handler, which makes the navigation.
     app.connect("html-page-context", _make_accessible, priority=900)
     if not _repository:

@@ -96,6 +96,8 @@ def _lock(path: Path) -> Iterator[None]:
 def core_with_faults(temporary: Path) -> Path:
     """Build a core that can be made to fail (VKBLOOM_FAULTS), once for each test run.
 
+    A run with sanitizers skips the test: it would compile all of this core, without them.
+
     Parameters
     ----------
     temporary
@@ -106,6 +108,8 @@ def core_with_faults(temporary: Path) -> Path:
     Path
         The tree with sources, objects and, in ``python``, the package.
     """
+    if "VKBLOOM_SANITIZED" in os.environ:
+        pytest.skip("it has a core of its own, without sanitizers")
     volk_folder()
     shared = temporary.parent if "PYTEST_XDIST_WORKER" in os.environ else temporary
     tree, whole = shared / "faults", shared / "faults.whole"

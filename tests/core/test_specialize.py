@@ -5,7 +5,6 @@ from __future__ import annotations
 import ctypes
 import itertools
 import json
-import os
 import shutil
 import subprocess
 from collections.abc import Callable
@@ -200,9 +199,6 @@ def test_operations_that_lack_operands_are_left(specialize: Specialize, operatio
     assert operation in np.frombuffer(specialize(module.tobytes(), []), np.uint32)
 
 
-@pytest.mark.skipif(
-    "VKBLOOM_SANITIZED" in os.environ, reason="it has a core of its own, without sanitizers"
-)
 def test_drivers_fold_to_the_same_bits(tmp_path_factory: pytest.TempPathFactory) -> None:
     """Shaders do not depend on the core's folding: their constants have the same effect."""
     core = core_with_faults(tmp_path_factory.getbasetemp()) / "python"

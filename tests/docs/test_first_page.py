@@ -61,6 +61,33 @@ def test_the_picture_shows_both_sides_on_a_narrow_screen(page: Any) -> None:
     assert "without bloom" in hero.get_attribute("alt")
 
 
+#: Entries of the navigation that are current, of which the last is the page's own.
+CURRENT = re.compile(
+    r'<li class="toctree-l(\d) current(?: has-children)?(?: (current)-page)?">'
+    r'<a class="(?:current )?reference internal" href="([^"]+)">[^<]*</a>'
+    r"(?:<input [^>]* (checked))?"
+)
+
+
+def test_each_page_is_open_in_the_navigation() -> None:
+    """Pages of a folder share one (docs/navigation.py), in which each has its own place."""
+    if not DOCS.joinpath("index.html").exists():
+        pytest.skip("build/docs does not exist: run make docs")
+    levels = {}
+    for page in (*DOCS.glob("*.html"), *DOCS.glob("api/*.html"), *DOCS.glob("examples/*/*/*.html")):
+        text = page.read_text()
+        found = CURRENT.findall(text[text.index("sidebar-tree") : text.index("</aside>")])
+        if found:
+            *above, (level, own, link, _) = found
+            assert (level, own, link) == (str(len(found)), "current", "#"), page
+            assert {(own, opened) for _, own, _, opened in above} <= {("", "checked")}, page
+            levels[page.relative_to(DOCS).as_posix()] = len(found)
+    assert len(levels) > 200
+    assert (levels["check.html"], levels["reference.html"]) == (1, 1)
+    assert (levels["api/vkbloom.apply.html"], levels["examples/gallery/games/index.html"]) == (2, 2)
+    assert max(levels.values()) == 3
+
+
 def test_a_page_leads_to_another_version(tmp_path: Path) -> None:
     template = (ROOT / "docs" / "templates" / "versions.html").read_text()
     # The page "guide" of a version, as Sphinx fills the template in.
