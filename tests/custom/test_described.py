@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import importlib.util
 import pickle
+import re
 import shutil
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +19,7 @@ from tests.cli.calls import succeed
 from tests.custom.broken import SHADERS
 from tests.images import picture
 from vkbloom import Renderer, Settings, ShaderError, load_method, reference, testing
+from vkbloom._custom.compiler import find_compiler, identity, run_limited
 
 pytestmark = pytest.mark.usefixtures("glslang")
 
@@ -357,7 +360,42 @@ def test_errors_of_compilers_name_file_and_line(tmp_path: Path, language: str) -
     assert str(caught.value).count("\n") == 1
 
 
-@pytest.mark.parametrize("language", ["hlsl", "wgsl", "spirv"])
+def test_one_process_compiles_all_of_wgsl(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each process takes longer to start than all entry points take."""
+    require("wgsl")
+    started = []
+
+    def run(*given: Any) -> tuple[int, str]:
+        started.append(given)
+        return run_limited(*given)
+
+    shutil.copytree(EXAMPLES / "wgsl", tmp_path, dirs_exist_ok=True)
+    text = (tmp_path / "bloom.wgsl").read_text()
+    path = tmp_path / "bloom.toml"
+    before, entry, after = path.read_text().partition('file = "bloom.wgsl"\nentry = "up"')
+    path.write_text(before + entry.replace("bloom", "another") + after)
+    (tmp_path / "another.wgsl").write_text(text)
+    monkeypatch.setenv("VKBLOOM_CACHE_DIR", "")
+    monkeypatch.setattr("vkbloom._custom.described.wgsl.run_limited", run)
+    load_method(path, name="together")
+    assert len(started) == 1
+    # Its second request is the one that fails.
+    (tmp_path / "another.wgsl").write_text(text.replace("16.0", "sun"))
+    with pytest.raises(ShaderError, match=r"another\.wgsl:\d+: .*sun"):
+        load_method(path, name="together")
+
+
+LACKING = {
+    "glsl": "pip install vkbloom[shaders]",
+    "hlsl": "pip install vkbloom[slang] && pip install --no-deps slangtorch",
+    "slang": "pip install vkbloom[slang] && pip install --no-deps slangtorch",
+    "wgsl": "pip install vkbloom[wgsl]",
+    "wesl": "pip install vkbloom[wgsl]",
+    "spirv": "pip install vkbloom[slang]",
+}
+
+
+@pytest.mark.parametrize("language", LACKING)
 def test_a_missing_compiler_is_named_in_one_line(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, language: str
 ) -> None:
@@ -368,10 +406,27 @@ def test_a_missing_compiler_is_named_in_one_line(
     monkeypatch.setattr(f"{folder}.find_tool", missing)
     monkeypatch.setattr(f"{folder}.shutil.which", missing)
     monkeypatch.setattr(importlib.util, "find_spec", missing)
-    monkeypatch.delenv("VKBLOOM_SLANGC", raising=False)
+    monkeypatch.setattr("vkbloom._custom.compiler.find_compiler", find_compiler.__wrapped__)
+    monkeypatch.setattr("vkbloom._custom.compiler.identity", identity.__wrapped__)
+    monkeypatch.setitem(sys.modules, "vkbloom_glslang", None)
+    for variable in ("VKBLOOM_SLANGC", "VKBLOOM_WESL_PYTHON"):
+        monkeypatch.delenv(variable, raising=False)
     name = "copy.spv" if language == "spirv" else f"copy.{language}"
     path = write(tmp_path, COPY_PASS.replace("copy.frag", name))
     (tmp_path / name).write_text("// nothing\n")
-    with pytest.raises(ShaderError, match="pip install") as caught:
+    with pytest.raises(ShaderError, match=re.escape(LACKING[language])) as caught:
         load_method(path, name="broken")
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("language", "variable"), [("hlsl", "VKBLOOM_SLANGC"), ("wesl", "VKBLOOM_WESL_PYTHON")]
+)
+def test_a_program_of_the_environment_that_is_none(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, language: str, variable: str
+) -> None:
+    monkeypatch.setenv(variable, str(tmp_path / "none"))
+    path = write(tmp_path, COPY_PASS.replace("copy.frag", f"copy.{language}"))
+    (tmp_path / f"copy.{language}").write_text("// nothing\n")
+    with pytest.raises(ShaderError, match=rf"^{variable}: '.*none' is not a program$"):
+        load_method(path, name="broken")

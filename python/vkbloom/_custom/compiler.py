@@ -47,8 +47,8 @@ SPIRV_MAGIC: Final = 0x07230203
 MESSAGE: Final = re.compile(r"^ERROR: (?:(\d+):)?(\d+): (.*)$", re.MULTILINE)
 
 MISSING: Final = (
-    "custom methods need the compiler glslang (glslangValidator); on Debian or Ubuntu: apt install "
-    "glslang-tools; or the wheel vkbloom-glslang (extra shaders)"
+    "custom methods need the compiler glslang (glslangValidator): pip install vkbloom[shaders] "
+    "(1 MB), or on Debian or Ubuntu: apt install glslang-tools"
 )
 
 

@@ -14,7 +14,7 @@ from vkbloom._custom.described.binding import is_stored, rename
 from vkbloom._custom.described.files import read_bytes
 from vkbloom._custom.described.layout import paths
 from vkbloom._custom.described.module import INPUT, OUTPUT, UNIFORM_CONSTANT, Module, Variable
-from vkbloom._custom.described.programs import Program, compile_one
+from vkbloom._custom.described.programs import Program, compile_shaders
 from vkbloom._custom.described.schema import LANGUAGES, Shader
 from vkbloom._custom.described.source import DescribedSource, compile_described
 from vkbloom._custom.source import Source
@@ -82,13 +82,21 @@ def read_shaders(files: Sequence[str | os.PathLike[str]]) -> DescribedSource:
 
 def describe(files: Sequence[str | os.PathLike[str]]) -> str:
     """Return the text of a description of shaders; paths are as they are given."""
-    found = [each for file in files for each in _reflect(Path(file))]
+    groups = [_find_shaders(Path(file)) for file in files]
+    shaders = [shader for _, group in groups for shader in group]
+    sources = [source for source, group in groups for _ in group]
+    programs = compile_shaders(shaders, sources)
+    shared = {group[0].file for _, group in groups if len(group) > 1}
+    found = [
+        _open(shader, program, several=shader.file in shared)
+        for shader, program in zip(shaders, programs, strict=True)
+    ]
     writer = _Writer(found)
     return writer.write()
 
 
-def _reflect(path: Path) -> list[_Found]:
-    """Compile a file, and return what its entry points use."""
+def _find_shaders(path: Path) -> tuple[Source, list[Shader]]:
+    """Read a file, and return its entry points."""
     language = SUFFIXES.get(path.suffix.lower())
     if language is None:
         raise ValueError(
@@ -103,16 +111,17 @@ def _reflect(path: Path) -> list[_Found]:
         entries = list(dict.fromkeys(names)) or ["main"]
     elif language in ("wgsl", "wesl"):
         entries = list(dict.fromkeys(_WGSL_ENTRIES.findall(text))) or [None]
-    found = []
-    for entry in entries:
-        stage = {".comp": "compute", ".frag": "fragment"}.get(path.suffix)
-        shader = Shader(str(path), language, entry, stage, None, (), (), (), (), (), (), 0, 1)
-        program = compile_one(shader, Source(str(path), text))
-        found.append(_open(path, shader, program, several=len(entries) > 1))
-    return found
+    stage = {".comp": "compute", ".frag": "fragment"}.get(path.suffix)
+    shaders = [
+        Shader(str(path), language, entry, stage, None, (), (), (), (), (), (), 0, 1)
+        for entry in entries
+    ]
+    return Source(str(path), text), shaders
 
 
-def _open(path: Path, shader: Shader, program: Program, *, several: bool) -> _Found:
+def _open(shader: Shader, program: Program, *, several: bool) -> _Found:
+    """Return what an entry point uses. `several`: its file has others."""
+    path = Path(shader.file)
     module = Module(program.code)
     for place, name in program.names:
         rename(module, place, name)

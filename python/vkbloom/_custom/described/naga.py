@@ -1,15 +1,19 @@
 """Run in a process of its own: naga, of the package wgpu, makes SPIR-V of WGSL.
 
 The process gets JSON on its standard input, and a Vulkan layer that writes each shader module to a
-file. It prints an error, or nothing. This file imports nothing of the package.
+file, in the folder with the number of its request. The process ends at the first error, which it
+prints; else it prints nothing. This file imports nothing of the package.
 """
 
 from __future__ import annotations
 
 import contextlib
 import json
+import os
 import re
 import sys
+from collections.abc import Callable
+from typing import Any
 
 #: WGPUShaderRuntimeChecks_BoundsChecks.
 BOUNDS_CHECKS = 1
@@ -36,7 +40,23 @@ def main() -> None:
         ]
         + [name for name in adapter.features if "adapter-specific" in name or "norm" in name]
     )
-    module = device.create_shader_module(code=asked["code"])
+    modules: dict[str, Any] = {}
+
+    def module_of(code: str) -> Any:
+        if code not in modules:
+            modules[code] = device.create_shader_module(code=code)
+        return modules[code]
+
+    for number, each in enumerate(asked["requests"]):
+        # The layer looks for it at each module.
+        folder = os.environ["VKBLOOM_MODULES"] = os.path.join(asked["folder"], str(number))
+        os.mkdir(folder)
+        make_pipeline(device, module_of, each)
+
+
+def make_pipeline(device: Any, module_of: Callable[[str], Any], asked: dict[str, Any]) -> None:
+    """Make a pipeline, so that naga makes the SPIR-V of its shaders."""
+    module = module_of(asked["code"])
     constants = asked["constants"]
     stage = {"module": module, "entry_point": asked["entry"], "constants": constants}
     if asked["stage"] == "compute":
@@ -46,7 +66,7 @@ def main() -> None:
     vertex = {**stage, "entry_point": asked.get("vertex", "main")}
     if asked.get("vertex_code") != asked["code"]:
         code = asked.get("vertex_code") or vertex_text(inputs)
-        vertex["module"], vertex["constants"] = device.create_shader_module(code=code), {}
+        vertex["module"], vertex["constants"] = module_of(code), {}
     device.create_render_pipeline(
         layout="auto",
         vertex=vertex,

@@ -9,7 +9,7 @@ import os
 import re
 import struct
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Final
@@ -57,15 +57,16 @@ def compile_all(description: Description, home: Path) -> tuple[dict[Shader, Prog
     shaders = list(dict.fromkeys(each.shader for each in description.passes))
     placed = [_with_folders(description.source, shader, home) for shader in shaders]
     prepared = [_prepare(description.source, shader, home) for shader in shaders]
-    with ThreadPoolExecutor(os.cpu_count()) as threads:
-        futures = [threads.submit(_compile, *each) for each in zip(placed, prepared, strict=True)]
-    programs = dict(zip(shaders, (future.result() for future in futures), strict=True))
+    programs = dict(zip(shaders, _compile(placed, prepared), strict=True))
     return programs, list(dict.fromkeys(path for files in prepared for path in files.paths))
 
 
-def compile_one(shader: Shader, source: Source) -> Program:
-    """Compile a shader whose paths begin in the current folder; `source` is what errors name."""
-    return _compile(shader, _prepare(source, shader, Path()))
+def compile_shaders(shaders: Sequence[Shader], sources: Sequence[Source]) -> list[Program]:
+    """Compile shaders whose paths begin in the current folder; errors name their sources."""
+    prepared = [
+        _prepare(source, shader, Path()) for shader, source in zip(shaders, sources, strict=True)
+    ]
+    return _compile(shaders, prepared)
 
 
 def _prepare(source: Source, shader: Shader, home: Path) -> Files:
@@ -117,25 +118,50 @@ def _binary(path: Path) -> Files:
     return Files(Source(str(path), read_bytes(path).decode("latin-1")), (), ())
 
 
-def _compile(shader: Shader, files: Files) -> Program:
-    """Return a program, from the cache where it is there."""
+def _compile(shaders: Sequence[Shader], prepared: Sequence[Files]) -> list[Program]:
+    """Return programs, from the cache where they are there."""
+    keys = [_key(*each) for each in zip(shaders, prepared, strict=True)]
+    programs = {number: stored for number, key in enumerate(keys) if (stored := _read(key))}
+    missing = [number for number in range(len(shaders)) if number not in programs]
+    # One process compiles all of WGSL.
+    together = [n for n in missing if shaders[n].language in ("wgsl", "wesl")]
+    groups = [[n] for n in missing if n not in together] + [together] * bool(together)
+
+    def compile_group(group: list[int]) -> list[Program]:
+        asked = [(shaders[number], prepared[number]) for number in group]
+        return _wgsl(asked) if group is together else [_COMPILERS[asked[0][0].language](*asked[0])]
+
+    with ThreadPoolExecutor(os.cpu_count()) as threads:
+        futures = [threads.submit(compile_group, group) for group in sorted(groups)]
+    for group, future in zip(sorted(groups), futures, strict=True):
+        for number, program in zip(group, future.result(), strict=True):
+            lowered = _lower_program(program, shaders[number], prepared[number])
+            CACHE.write(keys[number], _pack(lowered))
+            programs[number] = lowered
+    return [programs[number] for number in range(len(shaders))]
+
+
+def _key(shader: Shader, files: Files) -> bytes:
     key = hashlib.sha256(_VERSION + _tool(shader.language) + files.digest)
     key.update(repr(dataclasses.replace(shader, line=0)).encode())
     key.update(repr(files.folders).encode())
-    stored = CACHE.read(key.digest())
-    if stored is not None and (program := _unpack(stored)) is not None:
-        return program
-    program = _COMPILERS[shader.language](shader, files)
+    return key.digest()
+
+
+def _read(key: bytes) -> Program | None:
+    stored = CACHE.read(key)
+    return None if stored is None else _unpack(stored)
+
+
+def _lower_program(program: Program, shader: Shader, files: Files) -> Program:
     try:
         vertex = None if program.vertex is None else _lower(program.vertex, shader.language)
         code = _lower(program.code, shader.language)
-        program = dataclasses.replace(program, code=code, vertex=vertex)
     except ModuleFault as error:
         raise files.fault("", 1, str(error)) from None
     except (IndexError, KeyError, struct.error):
         raise files.fault("", 1, "the SPIR-V is not valid") from None
-    CACHE.write(key.digest(), _pack(program))
-    return program
+    return dataclasses.replace(program, code=code, vertex=vertex)
 
 
 def _lower(code: bytes, language: str) -> bytes:
@@ -269,10 +295,11 @@ def _shaderlab(shader: Shader, files: Files) -> Program:
     return compile(_UNITY)
 
 
-def _wgsl(shader: Shader, files: Files) -> Program:
-    dependencies = {name: Path(folder) for name, folder in shader.dependencies}
-    code, vertex, stage, names = wgsl.compile_wgsl(shader, files, dependencies)
-    return Program(code, None, stage, vertex, names=names)
+def _wgsl(asked: list[tuple[Shader, Files]]) -> list[Program]:
+    return [
+        Program(each.code, None, each.stage, each.vertex, names=each.names)
+        for each in wgsl.compile_wgsl(asked)
+    ]
 
 
 def _spirv(shader: Shader, files: Files) -> Program:
@@ -298,7 +325,5 @@ _COMPILERS: Final = {
     "hlsl": _slang,
     "slang": _slang,
     "shaderlab": _shaderlab,
-    "wgsl": _wgsl,
-    "wesl": _wgsl,
     "spirv": _spirv,
 }

@@ -19,8 +19,8 @@ from vkbloom._custom.described.files import Files
 #: The first binding of each kind of HLSL's registers: b, t, s, u.
 SHIFTS: Final = {"b": 0, "t": 100, "s": 200, "u": 300}
 MISSING: Final = (
-    "HLSL and Slang need the compiler slangc: pip install --no-deps slangtorch (15 MB), or set "
-    "VKBLOOM_SLANGC to its path"
+    "HLSL and Slang need the compiler slangc: pip install vkbloom[slang] && pip install --no-deps "
+    "slangtorch (29 MB), or set VKBLOOM_SLANGC to its path"
 )
 MISSING_TOOLS: Final = "{} is needed: pip install vkbloom[slang] (SPIRV-Tools, 14 MB)"
 _MESSAGE: Final = re.compile(
@@ -43,8 +43,9 @@ UNITY: Final = Path(__file__).with_name("unity")
 
 def find_slangc() -> str:
     """Return the path of slangc: of VKBLOOM_SLANGC, the system's, or the package slangtorch's."""
-    given = os.environ.get("VKBLOOM_SLANGC") or shutil.which("slangc")
-    if given:
+    if (chosen := os.environ.get("VKBLOOM_SLANGC")) and shutil.which(chosen) is None:
+        raise ShaderError(f"VKBLOOM_SLANGC: {chosen!r} is not a program")
+    if given := chosen or shutil.which("slangc"):
         return given
     # Its files alone: the package itself needs PyTorch.
     with contextlib.suppress(ImportError, ValueError):

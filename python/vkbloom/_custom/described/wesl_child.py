@@ -7,21 +7,24 @@ import sys
 
 
 def main() -> int:
-    """Print the WGSL of what the standard input says, or an error; return the status."""
+    """Print the WGSL of what the standard input says, a line of JSON each; return the status.
+
+    After an error nothing more is printed.
+    """
     import wesl  # noqa: PLC0415  in this process alone
 
-    asked = json.loads(sys.stdin.read())
-    try:
-        made = wesl.compile_file(
-            asked["file"],
-            features=asked["features"],
-            dependencies=asked["dependencies"] or None,
-        )
-    except wesl.CompileError as error:
-        first = error.diagnostics[0]
-        print(f"VKBLOOM-ERROR\n{first.filename or ''}\n{first.line or 1}\n{first.message}")
-        return 1
-    print(made.wgsl)
+    for asked in json.loads(sys.stdin.read()):
+        try:
+            made = wesl.compile_file(
+                asked["file"],
+                features=asked["features"],
+                dependencies=asked["dependencies"] or None,
+            )
+        except wesl.CompileError as error:
+            first = error.diagnostics[0]
+            print(f"VKBLOOM-ERROR\n{first.filename or ''}\n{first.line or 1}\n{first.message}")
+            return 1
+        print(json.dumps(made.wgsl), flush=True)
     return 0
 
 

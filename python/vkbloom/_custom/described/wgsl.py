@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import dataclasses
 import importlib.metadata
 import importlib.util
 import json
 import os
 import re
+import shutil
 import struct
 import sys
 import tempfile
@@ -32,13 +34,19 @@ from vkbloom._custom.spirv import HEADER_WORDS
 
 MISSING: Final = "WGSL needs naga: pip install vkbloom[wgsl] (wgpu, 4 MB)"
 MISSING_WESL: Final = (
-    "WESL needs wesl-py: pip install vkbloom[wgsl] with Python 3.12 or later (this is {}.{}), or "
-    "set VKBLOOM_WESL_PYTHON to a Python that has it; or give the WGSL that it becomes"
+    "WESL needs wesl-py: pip install vkbloom[wgsl] (6 MB) with Python 3.12 or later (this is "
+    "{}.{}), or set VKBLOOM_WESL_PYTHON to a Python that has it; or give the WGSL that it becomes"
+)
+NO_DRIVER: Final = (
+    "WGSL needs the Vulkan loader and a driver, which naga asks for; on Debian or Ubuntu: apt "
+    "install libvulkan1 mesa-vulkan-drivers"
 )
 #: Files of a folder from which WESL imports, of any kind.
 MAX_VISITED: Final = 20000
 #: Virtual memory, of which a driver and a compiler reserve more than they use.
 MAX_MEMORY: Final = 16 << 30
+#: Entry points that one process compiles: its bounds are those of all of them.
+MAX_TOGETHER: Final = 16
 
 _VARIABLE: Final = re.compile(
     r"@group\s*\(\s*(\d+)u?\s*\)\s*@binding\s*\(\s*(\d+)u?\s*\)"
@@ -100,25 +108,58 @@ def _sources_in(folder: Path, main: Source, line: int) -> Iterator[Path]:
 
 def identity(language: str) -> bytes:
     """Return bytes that differ between compilers; ShaderError without one."""
+    # What says that another Python is needed comes first.
+    wesl = find_wesl() if language == "wesl" else ""
     if importlib.util.find_spec("wgpu") is None:
         raise ShaderError(MISSING)
-    versions = [importlib.metadata.version("wgpu"), _core.__file__]
-    if language == "wesl":
-        versions.append(find_wesl())
-    return repr(versions).encode()
+    return repr((importlib.metadata.version("wgpu"), _core.__file__, wesl)).encode()
 
 
-def compile_wgsl(
-    shader: Shader, files: Files, dependencies: Mapping[str, Path]
-) -> tuple[bytes, bytes | None, str, tuple[tuple[str, str], ...]]:
-    """Return the SPIR-V of an entry point, that of its vertex shader, its stage, and the names.
+@dataclasses.dataclass(frozen=True)
+class Compiled:
+    """The SPIR-V of an entry point, that of its vertex shader, and the names of what it binds."""
 
-    The names are those of what it binds.
+    code: bytes
+    vertex: bytes | None
+    stage: str
+    names: tuple[tuple[str, str], ...]
+
+
+@dataclasses.dataclass(frozen=True)
+class _Request:
+    """A pipeline that naga is asked for.
+
+    - `wanted`: Its entry points, with their stages.
+    - `parts`: The text of each, and the words that it uses.
     """
-    text = files.main.text
-    if shader.language == "wesl":
-        text = _from_wesl(shader, files, dependencies)
-    text = _with_defines(text, shader)
+
+    files: Files
+    asked: dict[str, object]
+    wanted: list[tuple[str, str]]
+    parts: list[tuple[str, set[str]]]
+    translated: bool
+
+
+def compile_wgsl(shaders: Sequence[tuple[Shader, Files]]) -> list[Compiled]:
+    """Compile entry points, with as few processes as there can be.
+
+    To start one takes several times as long as to compile a shader in it.
+    """
+    texts = [files.main.text for _, files in shaders]
+    from_wesl = [number for number, (shader, _) in enumerate(shaders) if shader.language == "wesl"]
+    for number, text in zip(from_wesl, _from_wesl([shaders[n] for n in from_wesl]), strict=True):
+        texts[number] = text
+    requests = [
+        _request(shader, files, _with_defines(text, shader))
+        for (shader, files), text in zip(shaders, texts, strict=True)
+    ]
+    made = []
+    for first in range(0, len(requests), MAX_TOGETHER):
+        made += _run(requests[first : first + MAX_TOGETHER])
+    return [_finish(request, codes) for request, codes in zip(requests, made, strict=True)]
+
+
+def _request(shader: Shader, files: Files, text: str) -> _Request:
     plain = without_remarks(text)
     stage, entry, inputs, outputs = _interface(shader, files, plain)
     asked = {
@@ -135,19 +176,23 @@ def compile_wgsl(
         other = without_remarks(str(asked["vertex_code"]))
         wanted.append((str(asked["vertex"]), "vertex"))
         parts.append((other, _words_of(other, str(asked["vertex"]))))
-    made = _run(files, asked, wanted, translated=shader.language == "wesl")
+    return _Request(files, asked, wanted, parts, translated=shader.language == "wesl")
+
+
+def _finish(request: _Request, made: list[bytes]) -> Compiled:
+    """Return the modules of a pipeline with the bindings and the names of the source."""
     used: dict[int, set[int]] = {}
-    for part, words in parts:
+    for part, words in request.parts:
         for group, binding, _, name, _ in _VARIABLE.findall(part):
             if name in words:
                 used.setdefault(int(group), set()).add(int(binding))
     code, *vertex = _with_bindings(
-        files, made, {group: sorted(each) for group, each in used.items()}
+        request.files, made, {group: sorted(each) for group, each in used.items()}
     )
     # WebGPU has y upwards, and Vulkan downwards.
     flipped = with_y_down(vertex[0]) if vertex else None
-    names = dict(each for part, words in parts for each in _names(part, words))
-    return code, flipped, stage, tuple(names.items())
+    names = dict(each for part, words in request.parts for each in _names(part, words))
+    return Compiled(code, flipped, request.wanted[0][1], tuple(names.items()))
 
 
 def _with_defines(text: str, shader: Shader) -> str:
@@ -320,10 +365,8 @@ def _member_names(
             yield from _member_names(f"{place}.{number}", structs[kind], structs, depth + 1)
 
 
-def _run(
-    files: Files, asked: dict[str, object], wanted: list[tuple[str, str]], *, translated: bool
-) -> list[bytes]:
-    """Compile in a process of its own; return the modules of entry points, given with stages."""
+def _run(requests: Sequence[_Request]) -> list[list[bytes]]:
+    """Compile in a process of its own; return the modules of the entry points of each request."""
     with tempfile.TemporaryDirectory(prefix="vkbloom") as folder:
         layer = {
             "name": "VK_LAYER_VKBLOOM_modules",
@@ -338,25 +381,43 @@ def _run(
         environment = {
             "VK_LAYER_PATH": folder,
             "VK_INSTANCE_LAYERS": layer["name"],
-            "VKBLOOM_MODULES": folder,
             "WGPU_BACKEND_TYPE": "Vulkan",
             "MESA_SHADER_CACHE_DISABLE": "1",
+            **_bundled_driver(),
         }
         script = str(Path(__file__).with_name("naga.py"))
         command = [sys.executable, "-I", script]
-        text = json.dumps(asked)
+        text = json.dumps({"folder": folder, "requests": [each.asked for each in requests]})
         status, output = run_limited(command, text, folder, environment, MAX_MEMORY)
+        # The child makes a folder for each request before it begins with it.
+        begun = sum(each.is_dir() for each in Path(folder).iterdir())
         if status:
-            raise _explain(files, status, output, translated=translated)
-        order = sorted(Path(folder).glob("*.spv"), key=lambda each: -int(each.stem))
-        made = [file.read_bytes() for file in order]
+            raise _explain(requests[max(begun, 1) - 1], status, output)
+        return [
+            _modules_of(each, Path(folder) / str(number)) for number, each in enumerate(requests)
+        ]
+
+
+def _bundled_driver() -> dict[str, str]:
+    """Return what makes the driver of the package ``vkbloom-lavapipe`` that of a process."""
+    try:
+        import vkbloom_lavapipe  # noqa: PLC0415  where it is installed
+    except ModuleNotFoundError:
+        return {}
+    found: dict[str, str] = vkbloom_lavapipe.environment()
+    # Its own loader, for systems without one, has no layers.
+    return found if "LD_LIBRARY_PATH" not in found else {}
+
+
+def _modules_of(request: _Request, folder: Path) -> list[bytes]:
+    made = [file.read_bytes() for file in folder.glob("*.spv")]
     found = [
         next((code for code in made if _has_entry(code, name, stage)), None)
-        for name, stage in wanted
+        for name, stage in request.wanted
     ]
     codes = [code for code in found if code is not None]
     if len(codes) < len(found):
-        raise files.fault("", 1, "naga gave no SPIR-V; is the Vulkan loader installed?")
+        raise request.files.fault("", 1, "naga gave no SPIR-V; does the Vulkan loader have layers?")
     return codes
 
 
@@ -368,7 +429,8 @@ def _has_entry(code: bytes, name: str, stage: str) -> bool:
     return any(each.name == name and each.stage == stage for each in entries)
 
 
-def _explain(files: Files, status: int, output: str, *, translated: bool) -> ShaderError:
+def _explain(request: _Request, status: int, output: str) -> ShaderError:
+    files = request.files
     if ended := was_ended(status):
         return files.fault("", 1, ended)
     text = output.partition("VKBLOOM-ERROR\n")[2] or output
@@ -380,27 +442,36 @@ def _explain(files: Files, status: int, output: str, *, translated: bool) -> Sha
     if cause.endswith("is invalid") and (notes := _NOTE.findall(text)):
         cause += f": {notes[-1].strip()}"
     if "adapter" in cause.lower() and match is None:
-        cause = f"naga finds no Vulkan driver: {cause}"
-    if match is None or translated:
+        return ShaderError(NO_DRIVER)
+    if match is None or request.translated:
         return files.fault("", _line_of_word(files, cause), cause)
     return files.fault("", int(match[1]), cause)
 
 
-def _from_wesl(shader: Shader, files: Files, dependencies: Mapping[str, Path]) -> str:
-    """Return WGSL, which a process of its own makes of WESL."""
-    asked = {
-        "file": files.main.name,
-        "features": dict(shader.features),
-        "dependencies": {name: str(folder) for name, folder in dependencies.items()},
-    }
+def _from_wesl(shaders: Sequence[tuple[Shader, Files]]) -> list[str]:
+    """Return the WGSL that a process of its own makes of WESL."""
+    if not shaders:
+        return []
+    asked = [
+        {
+            "file": files.main.name,
+            "features": dict(shader.features),
+            "dependencies": dict(shader.dependencies),
+        }
+        for shader, files in shaders
+    ]
     with tempfile.TemporaryDirectory(prefix="vkbloom") as folder:
         script = str(Path(__file__).with_name("wesl_child.py"))
         command = [find_wesl(), "-I", script]
         status, output = run_limited(command, json.dumps(asked), folder)
-    if not status:
-        return output
+    made = [json.loads(line) for line in output.split("\n") if line.startswith('"')]
+    if not status and len(made) == len(shaders):
+        return made
+    files = shaders[min(len(made), len(shaders) - 1)][1]
     if ended := was_ended(status):
         raise files.fault("", 1, ended)
+    if "No module named 'wesl'" in output:
+        raise ShaderError(f"{find_wesl()} has no wesl-py: {find_wesl()} -m pip install wesl-py")
     name, line, cause = (*output.partition("VKBLOOM-ERROR\n")[2].split("\n", 2), "", "")[:3]
     cause = cause.strip().split("\n")[0] or "wesl-py failed"
     raise files.fault(name, int(line) if line > "1" else _line_of_word(files, cause), cause)
@@ -417,6 +488,8 @@ def _line_of_word(files: Files, cause: str) -> int:
 def find_wesl() -> str:
     """Return the Python that has wesl-py: this one, or that of VKBLOOM_WESL_PYTHON."""
     if given := os.environ.get("VKBLOOM_WESL_PYTHON"):
+        if shutil.which(given) is None:
+            raise ShaderError(f"VKBLOOM_WESL_PYTHON: {given!r} is not a program")
         return given
     if importlib.util.find_spec("wesl") is None:
         raise ShaderError(MISSING_WESL.format(*sys.version_info[:2]))
