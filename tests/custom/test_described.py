@@ -290,19 +290,23 @@ def test_a_vertex_shader_of_its_own(renderer: Renderer, tmp_path: Path) -> None:
     assert np.abs(result[..., :3] - image[..., :3]).max() < 1e-5
 
 
-def test_programs_of_a_shaderlab_file(renderer: Renderer, tmp_path: Path) -> None:
+@pytest.mark.parametrize(("number", "gain"), [(0, 1), (1, 3)])
+def test_programs_of_a_shaderlab_file(
+    renderer: Renderer, tmp_path: Path, number: int, gain: float
+) -> None:
+    """The first one shares what names its entry point."""
     require("hlsl")
     (tmp_path / "lib").mkdir()
     (tmp_path / "lib" / "Shared.hlsl").write_text("#define GAIN 3.0\n")
     text = """Shader "Own" {
     HLSLINCLUDE
+    #pragma fragment First
     #include "lib/Shared.hlsl"
     sampler2D _MainTex;
     ENDHLSL
     SubShader {
         Pass { HLSLPROGRAM
             #pragma vertex Vert
-            #pragma fragment First
             float4 First(float2 uv : TEXCOORD0) : SV_Target { return tex2D(_MainTex, uv); }
         ENDHLSL }
         Pass { HLSLPROGRAM
@@ -311,17 +315,17 @@ def test_programs_of_a_shaderlab_file(renderer: Renderer, tmp_path: Path) -> Non
         ENDHLSL }
     } }
     """
-    description = """
+    description = f"""
     bloom = "out"
     [[passes]]
     file = "own.shader"
-    program = 1
+    program = {number}
     output = "out"
-    textures = { _MainTex = "glow" }
+    textures = {{ _MainTex = "glow" }}
     """
     image = picture(9, 7)
     result = bloom(renderer, write(tmp_path, description, own_shader=text), image)
-    assert np.abs(result[..., :3] - 3 * image[..., :3]).max() < 1e-5
+    assert np.abs(result[..., :3] - gain * image[..., :3]).max() < 1e-5
 
 
 def test_a_class_travels_without_compilers(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

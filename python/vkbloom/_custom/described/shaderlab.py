@@ -52,8 +52,9 @@ def read_program(files: Files, number: int) -> Program:
     )
     first = min((each.start() for each in _SUBSHADER.finditer(text)), default=0)
     parts = [part for start, part in shared if start < place and (start > begun or start < first)]
-    names = dict(_PRAGMA.findall(program))
     joined = _WITH_PRAGMAS.sub(r"\1", "\n".join((*parts, program)))
+    # The last of each kind: a program's own come after those of what it shares.
+    names = dict(_PRAGMA.findall(joined))
     return Program(joined, names.get("vertex"), names.get("fragment"))
 
 
