@@ -28,8 +28,7 @@ from tests.images import picture
 from tests.taa.moving import moving_frame
 from vkbloom import Convolution, Pyramid, Renderer, Separable
 from vkbloom._gradients.pulling import pull_each
-from vkbloom._renderer.device_arrays import merge, take
-from vkbloom._renderer.requests import IMAGES_AHEAD
+from vkbloom._renderer.device_arrays import merge
 from vkbloom._renderer.sources import check_inputs
 
 VALIDATION = "validated" in sys.argv
@@ -473,29 +472,6 @@ def gradients(renderer: Any) -> None:
     equal_gradients(pullback({"final": OnDevice(one)}), expected)
 
 
-def training(renderer: Any) -> None:
-    """Steps as PyTorch's operator does them: a backward pass follows without a wait.
-
-    The host waits only for what is older than a few submissions.
-    """
-    image, settings, found = picture(24, 16), Pyramid(levels=2), []
-    expected = vjp(image, settings, renderer=renderer)[1]({"final": image})["image"]
-    for _ in range(2):
-        frames = renderer.apply(OnDevice(image), settings, framebuffers="final")
-        for _ in range(3):
-            pending = renderer._pending._pending
-            before = len(pending)
-            renderer._pending.wait(IMAGES_AHEAD)
-            assert len(pending) == min(before, IMAGES_AHEAD)
-            assert not LATE or pending
-            inputs = check_inputs(OnDevice(image), core=renderer._core)
-            cotangents = {"final": take(OnDevice(image), "cotangent", renderer._core)}
-            found += pull_each(renderer, settings, [(inputs, cotangents)], (), "cuda")
-        del frames
-    for derivatives in found:
-        np.testing.assert_array_equal(derivatives["image"].numpy(), expected)
-
-
 def gradient_places(renderer: Any) -> None:
     """Masks, emissions, `device`, levels of bytes, other framebuffers, and what is refused."""
     image = picture(24, 16)
@@ -598,7 +574,7 @@ def ranges(renderer: Any) -> None:
 
 WORK = (
     *(layouts, streams, sequences, layers, places, capsules, ends, recycling, lifetime, errors),
-    *(histories, geometries, gradients, training, gradient_places),
+    *(histories, geometries, gradients, gradient_places),
 )
 
 

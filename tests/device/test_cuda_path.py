@@ -29,8 +29,7 @@ RUNS = (
     (
         "waits,cpu",
         WORK,
-        "validated layouts histories geometries sequences layers places ends recycling gradients "
-        "training",
+        "validated layouts histories geometries sequences layers places ends recycling gradients",
     ),
     *([("waits", WORK, "validated"), ("cpu", WORK, "validated")] if EXHAUSTIVE else []),
     # What exceeds the range of buffers.

@@ -91,8 +91,7 @@ class PendingSubmissions:
 
     A call waits for them before it gives the GPU more to do. If CUDA copied the next image while
     Vulkan works, the GPU would change between both after slices of 2 ms: on an H100, calls in a row
-    took 2.7 ms each instead of 0.7. A call whose copies come after them on a stream need not. The
-    memory of a caller who never waits is bounded, too.
+    took 2.7 ms each instead of 0.7. So the memory of a caller who never waits is bounded, too.
     """
 
     def __init__(self) -> None:
@@ -102,11 +101,11 @@ class PendingSubmissions:
         """Add a submission."""
         self._pending.append(submission)
 
-    def wait(self, ahead: int = 0) -> None:
-        """Wait until all but the last `ahead` are complete."""
+    def wait(self) -> None:
+        """Wait until all are complete."""
         # Another thread may take the last one between the comparison and this one's turn.
         with contextlib.suppress(IndexError):
-            while len(self._pending) > ahead:
+            while self._pending:
                 self._pending.popleft().complete()
 
     def forget(self) -> None:
