@@ -127,7 +127,7 @@ settings = vkbloom.Convolution(vkbloom.psf.gaussian(2))
 renderer = vkbloom.Renderer()
 renderer.apply(image, settings)
 pending = PendingSubmission(types.SimpleNamespace(ordered=True, wait=lambda: ([], ())))
-gradients = DeviceGradients({}, ("exposure",), lambda: {"exposure": image}, dict)
+gradients = DeviceGradients({}, ("exposure",), ({"exposure"}, lambda: {"exposure": image}))
 held = [*(one._lock for one in locks._locks), *(one.lock for one in locks._properties)]
 assert len(held) >= 3
 enter = [gradients._lock.__enter__, *(one.acquire for one in held)]

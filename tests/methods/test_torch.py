@@ -130,7 +130,9 @@ def test_operators_pass_opcheck(name: str) -> None:
         else part
         for part in arguments(dtype)
     ]
-    torch.library.opcheck(torch.ops.vkbloom.bloom_backward.default, (cotangent, *detached))
+    for by_images in (True, False):
+        given = cotangent, by_images, *detached
+        torch.library.opcheck(torch.ops.vkbloom.bloom_backward.default, given)
 
 
 def test_second_derivative_is_refused_with_a_reason(renderer: Renderer) -> None:
@@ -244,7 +246,7 @@ def test_a_renderer_that_was_collected_is_named() -> None:
     with pytest.raises(ValueError, match="renderer: it was collected; keep a reference to it"):
         torch.ops.vkbloom.bloom(*given, number)
     with pytest.raises(ValueError, match="renderer: it was collected; keep a reference to it"):
-        torch.ops.vkbloom.bloom_backward(given[0], *given, number)
+        torch.ops.vkbloom.bloom_backward(given[0], True, *given, number)
 
 
 FORKED = """

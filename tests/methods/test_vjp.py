@@ -14,7 +14,9 @@ import vkbloom
 from tests.images import random_image
 from tests.refusals import assert_refused, rows
 from vkbloom import Renderer, reference
-from vkbloom._gradients.passes import DeviceGradients
+from vkbloom._gradients.passes import DeviceGradients, Passes
+from vkbloom._gradients.pulling import pull_each
+from vkbloom._renderer.sources import Inputs
 
 ONES = np.ones((4, 4, 3), np.float32)
 
@@ -115,7 +117,8 @@ def test_after_an_error_derivatives_are_read_again() -> None:
             raise errors.pop(0)
         return {"exposure": np.float32(2), "radius": np.float32(3)}
 
-    gradients = DeviceGradients({}, ("exposure", "radius"), fields, every)
+    names = ("exposure", "radius")
+    gradients = DeviceGradients({}, names, ({"exposure"}, fields), (names, every))
     with pytest.raises(vkbloom.OutOfMemoryError):
         gradients["radius"]
     assert gradients["exposure"] == 1
@@ -141,6 +144,40 @@ def test_a_field_has_the_same_bits_however_it_is_read(renderer: Renderer) -> Non
     first, *others = (read(pullback(cotangents)) for read in readings)
     for other in others:
         assert all(np.array_equal(part, other[name]) for name, part in first.items())
+
+
+def test_only_what_is_read_is_computed(monkeypatch: pytest.MonkeyPatch, renderer: Renderer) -> None:
+    """Sums, weights of a field of kernels, and derivatives by images have passes of their own."""
+    submitted: list[str] = []
+    submit = Passes.submit
+
+    def watched(passes: Passes, results: Any = "images") -> Any:
+        submitted.append(results)
+        return submit(passes, results)
+
+    monkeypatch.setattr(Passes, "submit", watched)
+    lens = vkbloom.psf.Varying(np.ones((2, 3, 3)), weights=np.ones((2, 2, 2)))
+    settings = vkbloom.Convolution(lens, threshold=0.2, knee=0.5)
+    image, cotangent = (random_image(9, 8, seed=seed).astype(np.float32) for seed in (1, 2))
+    inputs, cotangents = Inputs(image), {"final": cotangent}
+    expected = vkbloom.vjp(image, settings, renderer=renderer)[1](cotangents)
+    table: tuple[tuple[list[str], bool, list[str]], ...] = (
+        (["psf.weights"], True, ["images", "weights"]),
+        (["psf.weights"], False, ["weights"]),
+        (["intensity", "threshold"], True, ["all"]),
+        (["intensity", "threshold"], False, ["sums"]),
+        (["psf.weights", "intensity"], False, ["sums", "weights"]),
+        ([], True, ["images"]),
+    )
+    for names, images, kinds in table:
+        wanted = ["image", *names] if images else names
+        right = {name: expected[name] for name in wanted}
+        submitted.clear()
+        pulled = [(inputs, cotangents)]
+        (found,) = pull_each(renderer, settings, pulled, names, images=images)
+        for name in wanted:
+            np.testing.assert_allclose(found[name], right[name], rtol=1e-5, err_msg=name)
+        assert submitted == kinds
 
 
 @pytest.mark.parametrize(("call", "error"), rows(__file__, "cotangents"))

@@ -370,7 +370,7 @@ GRIDS: dict[str, tuple[type[psf.Varying], tuple[int, int], Any, dict[str, Any]]]
 
 
 @functools.cache
-def weights_of_grid(name: str) -> tuple[Any, Array, Array, Array]:
+def weights_of_grid(name: str) -> tuple[Any, Any, Any, Array]:
     """Return settings, an image, cotangents, and the reference's derivative by seven weights."""
     kind, (width, height), positions, more = GRIDS[name]
     draw = np.random.default_rng(11)
@@ -392,8 +392,10 @@ def check_weights(renderer: vkbloom.Renderer, name: str) -> None:
     assert list(made) == [".by_weights_0", ".by_weights_1"]
     # The device adds up the pixels: the host gets four weights of the grid's places in each.
     assert {array.shape for array in made.values()} == {(*exact.shape[1:], 4)}
-    weights = running.fields()["psf.weights"]
+    weights = running.weights()["psf.weights"]
     np.testing.assert_allclose(weights, exact, rtol=0, atol=1e-5 * np.abs(exact).max())
+    pullback = vkbloom.vjp(image, settings, renderer=renderer)[1]
+    np.testing.assert_array_equal(pullback({"final": cotangents})["psf.weights"], weights)
 
 
 @pytest.mark.parametrize("name", GRIDS)

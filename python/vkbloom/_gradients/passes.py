@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final, cast
 
@@ -31,6 +31,8 @@ _SUMS: Final = {
     ".by_composite": ("intensity", "exposure", "reference_white"),
     ".by_threshold": ("threshold", "knee"),
 }
+#: The weights of a field of kernels.
+WEIGHTS: Final = "psf.weights"
 #: A sum that is less than this, relative to the root of the sum of its squares, has lost digits.
 MIN_SHARE: Final = 0.3
 #: Curves that magnify the rounding of a float.
@@ -52,7 +54,7 @@ class Running:
     plan: _core.Plan
     arrays: tuple[NDArray[Any] | _core.Exported, ...]
     submission: requests.PendingSubmission | None
-    has_sums: bool
+    results: DerivativeKind
 
     def check(self) -> None:
         """Wait, and raise ValueError if a cotangent is not finite."""
@@ -68,7 +70,9 @@ class Running:
         return requests.name_outputs(self.plan, self.arrays, self.passes.destination)
 
     def images(self) -> dict[str, NDArray[Any]]:
-        """Return the derivatives by image, mask and emission, as `by_name` does."""
+        """Return the derivatives by image, mask and emission, as `by_name` does, if it has them."""
+        if self.results not in ("images", "all"):
+            return {}
         framebuffers = self.by_name()
         return {
             name: framebuffers[f".by_{name}"]
@@ -77,16 +81,14 @@ class Running:
             for name, part in self.passes.inputs.by_name().items()
         }
 
-    def fields(self, min_share: float = MIN_SHARE) -> dict[str, NDArray[np.float32]]:
-        """Return the derivatives by fields that the device has.
+    def sums(self, min_share: float = MIN_SHARE) -> dict[str, NDArray[np.float32]]:
+        """Return the derivatives by `device_fields`.
 
         A sum that is less than `min_share` of the root of the sum of its squares is left out.
         """
-        results = self._by_weights()
+        results: dict[str, NDArray[np.float32]] = {}
         wanted = device_fields(self.passes.settings)
-        if not wanted:
-            return results
-        running = self if self.has_sums else self.passes.submit("sums")
+        running = self if self.results in ("sums", "all") else self.passes.submit("sums")
         totals = running.by_name() if running else {}
         for kind, names in _SUMS.items():
             if kind not in totals:
@@ -98,19 +100,16 @@ class Running:
                     results[name] = np.asarray(total)
         return results
 
-    def _by_weights(self) -> dict[str, NDArray[np.float32]]:
-        """Return the derivative by the weights of a field of kernels, if it has weights."""
-        passes, name = self.passes, "psf.weights"
-        if name not in differentiable(passes.settings):
-            return {}
-        running = passes.submit("weights")
+    def weights(self) -> dict[str, NDArray[np.float32]]:
+        """Return the derivative by `WEIGHTS`, unless it is left to the reference."""
+        running = self if self.results == "weights" else self.passes.submit("weights")
         images = list(running.by_name().values()) if running else []
         if not images:
             return {}
         # Four weights in each, at the places of their grid.
         made = np.concatenate([on_host(image) for image in images], axis=2)
-        count = len(passes.settings.value_of(name).array)
-        return {name: np.ascontiguousarray(made.transpose(2, 0, 1)[:count])}
+        count = len(self.passes.settings.value_of(WEIGHTS).array)
+        return {WEIGHTS: np.ascontiguousarray(made.transpose(2, 0, 1)[:count])}
 
     def _zeros(self, shape: tuple[int, ...]) -> NDArray[Any]:
         zeros, passes = np.zeros(shape, np.float32), self.passes
@@ -158,7 +157,7 @@ class Passes:
             submission = requests.PendingSubmission(core.run(source, (plan,), (arrays,)))
             if submission.ordered:
                 self.renderer._pending.add(submission)
-        return Running(self, plan, arrays, submission, results != "images")
+        return Running(self, plan, arrays, submission, results)
 
 
 def _level(cotangent: NDArray[Any] | ImportedArray) -> NDArray[Any] | ImportedArray:
@@ -205,28 +204,30 @@ class DeviceGradients(Mapping[str, NDArray[Any]]):
 
     - `known`: Those by images.
     - `names`: All names, in the order of the reference.
-    - `fields`: Returns those by some of the fields.
-    - `every`: Returns all, from the reference.
+    - `sources`: Names, and what returns their derivatives or leaves some to the reference, which
+      is the last source and has all names.
     """
 
     def __init__(
         self,
         known: Mapping[str, NDArray[Any]],
         names: Iterable[str],
-        fields: Callable[[], Mapping[str, NDArray[Any]]],
-        every: Callable[[], Mapping[str, NDArray[Any]]],
+        *sources: tuple[Container[str], Callable[[], Mapping[str, NDArray[Any]]]],
     ) -> None:
         self._known = dict(known)
         self._names = tuple(names)
-        self._sources = [fields, every]
+        self._sources = list(sources)
         self._lock = ProcessLock()
 
     def __getitem__(self, name: str) -> NDArray[Any]:
         check_known(name, self._names)
         with self._lock:
             while name not in self._known:
-                self._known = {**self._sources[0](), **self._known}
-                del self._sources[0]
+                device = [source for source in self._sources[:-1] if name in source[0]]
+                # The device's come before the reference, so that each has the same bits always.
+                source = (device or self._sources)[0]
+                self._known = {**source[1](), **self._known}
+                self._sources.remove(source)
             return self._known[name]
 
     def __reduce__(self) -> tuple[type[Gradients], tuple[dict[str, NDArray[Any]]]]:

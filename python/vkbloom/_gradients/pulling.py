@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from vkbloom._argument_types import check_arguments
 from vkbloom._gradients.passes import (
     MIN_SHARE,
+    WEIGHTS,
     DeviceGradients,
     Passes,
     Running,
@@ -217,19 +218,25 @@ def pull_each(
     sequence: Iterable[tuple[Inputs, Checked]],
     fields: Collection[str],
     destination: Destination = "host",
+    *,
+    images: bool = True,
+    min_share: float = 0.0,
 ) -> Iterator[Derivatives]:
     """Yield the derivatives of each image. The device works on later ones meanwhile.
+
+    Without `images`, those by images are not computed unless they are read.
 
     The host waits for those on a GPU only if some by `fields` are there, too. So cotangents may be
     NaN and infinite, and so are the derivatives then. A sum by a field has the accuracy of single
     floats relative to the root of the sum of its squares.
     """
-    kind: DerivativeKind = "images"
-    if fields and not device_fields(settings).isdisjoint(fields):
-        kind = "all"
+    has_sums = not device_fields(settings).isdisjoint(fields)
+    kind: DerivativeKind = "all" if has_sums else "images"
+    if not images:
+        kind = "sums" if has_sums else "weights"
     started: deque[Callable[[], Derivatives]] = deque()
     for inputs, cotangents in sequence:
-        adjoint = _Adjoint(renderer, inputs, settings, destination, min_share=0.0)
+        adjoint = _Adjoint(renderer, inputs, settings, destination, min_share)
         running = adjoint.passes(cotangents).submit(kind)
         started.append(functools.partial(adjoint.derivatives, cotangents, running))
         if len(started) == IMAGES_AHEAD:
@@ -259,9 +266,13 @@ class _Adjoint:
             made = self._by_reference(cotangents)
             return _place(made, self.inputs, self.destination, self.renderer)
         names = (*self.inputs.by_name(), *_names(self.settings))
-        every = functools.partial(self._by_reference, cotangents)
-        fields = functools.partial(running.fields, self.min_share)
-        return DeviceGradients(running.images(), names, fields, every)
+        return DeviceGradients(
+            running.images(),
+            names,
+            ({WEIGHTS}, running.weights),
+            (device_fields(self.settings), functools.partial(running.sums, self.min_share)),
+            (names, functools.partial(self._by_reference, cotangents)),
+        )
 
     @functools.cached_property
     def _recorded(self) -> Callable[[Mapping[str, NDArray[Any]]], Gradients]:
