@@ -19,6 +19,7 @@ torch = pytest.importorskip("torch", reason="PyTorch is not installed; run make 
 
 from vkbloom import torch as vkbloom_torch  # noqa: E402
 from vkbloom._gradients import operators  # noqa: E402
+from vkbloom._gradients.passes import Passes  # noqa: E402
 
 #: Tensors are on the GPU where the tests run on one.
 DEVICE = "cuda" if ADAPTER == "hardware" and torch.cuda.is_available() else "cpu"
@@ -75,8 +76,13 @@ def test_kernels_may_depend_on_the_place(renderer: Renderer, lens: Any) -> None:
     assert back == pytest.approx(forth, rel=1e-6)
 
 
-def test_weights_of_kernels_are_learned(renderer: Renderer) -> None:
-    """They are a tensor whose derivative is that of the reference."""
+def test_weights_of_kernels_are_learned(
+    renderer: Renderer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """They are a tensor whose derivative is that of the reference.
+
+    Derivatives by an image that has none are left out.
+    """
     kernels = np.stack([spot(0, 0), spot(1, -1)])
     lens = vkbloom.psf.Varying(kernels, weights=np.linspace(0, 1, 12).reshape(2, 2, 3))
     settings = vkbloom.Convolution(lens, composite="mix", intensity=1)
@@ -90,6 +96,19 @@ def test_weights_of_kernels_are_learned(renderer: Renderer) -> None:
     made = module.learned["psf_weights"].grad.cpu().numpy()
     np.testing.assert_allclose(made, exact, rtol=0, atol=1e-5 * abs(exact).max())
     assert module.settings.value_of("psf.weights") == lens.weights
+    submitted: list[Any] = []
+    submit = Passes.submit
+
+    def watched(passes: Passes, results: Any = "images") -> Any:
+        submitted.append(results)
+        return submit(passes, results)
+
+    monkeypatch.setattr(Passes, "submit", watched)
+    module.zero_grad()
+    module(image.detach()).sum().backward()
+    assert submitted == ["weights"]
+    again = module.learned["psf_weights"].grad.cpu().numpy()
+    np.testing.assert_array_equal(again, made)
 
 
 def test_derivatives_are_those_of_the_renderer(renderer: Renderer) -> None:

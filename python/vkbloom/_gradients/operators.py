@@ -199,8 +199,8 @@ def _pull(
 def _pull_on_device(call: _Call, cotangent: Any, by_images: bool) -> Iterator[Any]:
     """Yield the derivatives of each image, with those by images as tensors of the GPU."""
     renderer, mask = _renderer(call.renderer, call.image), call.mask
-    # CUDA copies what `take` gets. On an H200, a step of a convolution took 10.8 ms without this wait
-    # and 6.5 with it; one of a pyramid 3.0 and 3.1 ms.
+    # CUDA copies what `take` gets. On an H200, a step of a convolution took 10.8 ms without this
+    # wait and 6.5 with it; one of a pyramid 3.0 and 3.1 ms.
     renderer._pending.wait()
     core = renderer._core
     masks = None if mask is None else mask.detach().reshape(-1, *mask.shape[-2:]).cpu().numpy()
