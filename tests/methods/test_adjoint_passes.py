@@ -270,7 +270,7 @@ def test_fields_of_the_composite_are_sums(renderer: Renderer, method: str) -> No
     image = 4 * random_image(17, 26, channels=3, seed=1).astype(np.float32)
     cotangents = {"final": np.random.default_rng(2).random(image.shape).astype(np.float32)}
     running = Passes(renderer, Inputs(image), settings, cotangents).submit("sums")
-    fields = running.fields(min_share=0.0) if running else {}
+    fields = running.sums(min_share=0.0) if running else {}
     expected = reference.vjp(image, settings)[1](cotangents)
     for field in ("intensity", "exposure", "reference_white"):
         assert (field in fields) == (field not in settings._fields_before_composite)

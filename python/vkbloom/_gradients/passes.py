@@ -88,6 +88,8 @@ class Running:
         """
         results: dict[str, NDArray[np.float32]] = {}
         wanted = device_fields(self.passes.settings)
+        if not wanted:
+            return results
         running = self if self.results in ("sums", "all") else self.passes.submit("sums")
         totals = running.by_name() if running else {}
         for kind, names in _SUMS.items():
@@ -101,7 +103,9 @@ class Running:
         return results
 
     def weights(self) -> dict[str, NDArray[np.float32]]:
-        """Return the derivative by `WEIGHTS`, unless it is left to the reference."""
+        """Return the derivative by `WEIGHTS`, if there are any, unless the reference has to."""
+        if WEIGHTS not in differentiable(self.passes.settings):
+            return {}
         running = self if self.results == "weights" else self.passes.submit("weights")
         images = list(running.by_name().values()) if running else []
         if not images:
