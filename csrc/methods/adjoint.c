@@ -131,6 +131,7 @@ bool vkb_build_adjoint(const struct vkb_source *source, const struct vkb_setting
         .table = {.transposes = transposes, .hash = VKB_HASH_START},
         .max_side = max_side,
         .sums = cotangents->sums,
+        .shares = vkb_method_of(settings)->learns_shares,
         .weights = cotangents->weights,
         .scene = VKB_NO_IMAGE,
         .glow = VKB_NO_IMAGE,

@@ -21,8 +21,10 @@ struct vkb_adjoint {
     // so that a plan of sums finds what that of derivatives by images has made.
     uint32_t added, summed;
     uint32_t max_side;
-    bool sums;     // the derivatives by fields are wanted
-    bool weights;  // those by the weights of a field of kernels
+    uint32_t mixed;  // sums of two levels so far
+    bool sums;       // the derivatives by fields are wanted
+    bool shares;     // also those by shares of levels
+    bool weights;    // those by the weights of a field of kernels
     // The cotangents of the scene of a composite without a curve are a share of those that the
     // composite has. The next pass that accumulates cotangents of the scene adds them itself.
     uint32_t scene;  // VKB_NO_IMAGE: there is no such composite, or its row was added

@@ -2,11 +2,33 @@
 #include "passes/adjoint.h"
 #include "passes/filter.h"
 
+#include <stdio.h>
+
+// If they are wanted, the sums by the shares of a level and of a smaller one.
+static bool add_share_sums(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
+                           struct vkb_error *error)
+{
+    const struct vkb_image_row *target = &adjoint->graph->images[pass->targets[0]];
+    const struct vkb_size size = {target->width, target->height};
+    struct vkb_pass_row row =
+        vkb_adjoint_row(&vkb_shader_adjoint_shares_frag, vkb_cotangent_of(adjoint, pass));
+    char name[VKB_NAME_SIZE];
+
+    if (!adjoint->shares || !pass->constants.adds_image)
+        return true;
+    row.reads[SLOT_SOURCE] = pass->targets[0];
+    vkb_read_at(&row, SLOT_SAME_SIZE, pass->reads[SLOT_SAME_SIZE]);
+    snprintf(name, sizeof name, ".by_shares_%u", adjoint->mixed++);
+    return vkb_add_sum_passes(adjoint, &row, row.shader, size, name, error);
+}
+
 bool vkb_transpose_filters(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
                            struct vkb_error *error)
 {
     const uint32_t cotangents = vkb_cotangent_of(adjoint, pass);
 
+    if (!add_share_sums(adjoint, pass, error))
+        return false;
     // The pass before has no cotangents then, unless its result is a framebuffer that has its own.
     if (pass->joined)
         return vkb_accumulate_filter(adjoint, pass->joined, cotangents, pass->joined_from, error);

@@ -12,7 +12,7 @@
     METHOD(PYRAMID, pyramid, .published = false) \
     METHOD(DUAL_KAWASE, dual_kawase, .published = false) \
     METHOD(CONVOLUTION, convolution, .kernel_types = VKB_ALL_TYPES) \
-    METHOD(BEVY, bevy, .published = true) \
+    METHOD(BEVY, bevy, .published = true, .learns_shares = true) \
     METHOD(KINO, kino, .published = true) \
     METHOD(FILAMENT, filament, .published = true) \
     METHOD(URP, urp, .published = true) \
@@ -43,6 +43,8 @@ struct vkb_method_row {
     bool custom;
     // The exposure multiplies the scene before the composite, not the result.
     bool exposes_scene;
+    // Its fields have derivatives by the shares of levels.
+    bool learns_shares;
     // The name of the first image of the bloom, which then is no framebuffer; NULL: it is "glow".
     const char *first;
     // A bit for each type (VKB_CHOICE_type) that convolves with a kernel that Python makes.

@@ -33,6 +33,7 @@ from vkbloom import (
     reference,
 )
 from vkbloom._gradients.passes import DeviceGradients, Passes
+from vkbloom._gradients.shares import share_fields
 
 SIZES = ((11, 14), (16, 32), (7, 1), (1, 9), (1, 1))
 #: Those whose fields are checked, too, and those that are checked in all sizes.
@@ -260,22 +261,23 @@ def test_all_methods_and_stages_are_among_them() -> None:
 ONE_OF_EACH = {
     **{settings.method: settings for settings in vkbloom.presets.values()},
     "darktable": vkbloom.DarktableBloom(),
+    # A share of 0 that changes is left to the reference.
+    "bevy": vkbloom.presets["photo"],
 }
 
 
 @pytest.mark.parametrize("method", ONE_OF_EACH)
 def test_fields_of_the_composite_are_sums(renderer: Renderer, method: str) -> None:
-    """But for those that passes before the composite read."""
+    """And those of shares of levels, but not those that other passes read."""
     settings = ONE_OF_EACH[method].replace(**SINGLE, exposure=0.3, tonemap="none", encoding="none")
     image = 4 * random_image(17, 26, channels=3, seed=1).astype(np.float32)
     cotangents = {"final": np.random.default_rng(2).random(image.shape).astype(np.float32)}
     running = Passes(renderer, Inputs(image), settings, cotangents).submit("sums")
     fields = running.sums(min_share=0.0) if running else {}
     expected = reference.vjp(image, settings)[1](cotangents)
-    for field in ("intensity", "exposure", "reference_white"):
-        assert (field in fields) == (field not in settings._fields_before_composite)
-        if field in fields:
-            assert np.allclose(fields[field], expected[field], rtol=1e-4, atol=1e-4), field
+    composite = {"intensity", "exposure", "reference_white"} - settings._fields_before_composite
+    for field in composite | {*share_fields(settings)}:
+        assert np.allclose(fields[field], expected[field], rtol=1e-4, atol=1e-4), field
 
 
 @pytest.mark.parametrize("size", [(41, 9), (9, 47)])

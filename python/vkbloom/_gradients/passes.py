@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom import _core
+from vkbloom._gradients.shares import share_fields, sums_by_shares
 from vkbloom._locks import ProcessLock
 from vkbloom._renderer import requests
 from vkbloom._renderer.device_arrays import Destination, ImportedArray, on_host, place
@@ -33,6 +34,8 @@ _SUMS: Final = {
 }
 #: The weights of a field of kernels.
 WEIGHTS: Final = "psf.weights"
+#: With the number of the sum of two levels, from the largest on: below 10.
+_BY_SHARES: Final = ".by_shares_"
 #: A sum that is less than this, relative to the root of the sum of its squares, has lost digits.
 MIN_SHARE: Final = 0.3
 #: Curves that magnify the rounding of a float.
@@ -92,14 +95,10 @@ class Running:
             return results
         running = self if self.results in ("sums", "all") else self.passes.submit("sums")
         totals = running.by_name() if running else {}
-        for kind, names in _SUMS.items():
-            if kind not in totals:
-                continue
-            sums, squares = on_host(totals[kind])[:, 0]
-            for name, total, square in zip(names, sums, squares, strict=False):
-                # Infinite sums are left to the reference.
-                if name in wanted and np.isfinite(square) and total**2 >= min_share**2 * square:
-                    results[name] = np.asarray(total)
+        for name, (total, square) in _sums_of(self.passes.settings, totals).items():
+            # Infinite sums are left to the reference.
+            if name in wanted and np.isfinite(square) and total**2 >= min_share**2 * square:
+                results[name] = np.asarray(total, np.float32)
         return results
 
     def weights(self) -> dict[str, NDArray[np.float32]]:
@@ -164,6 +163,24 @@ class Passes:
         return Running(self, plan, arrays, submission, results)
 
 
+def _sums_of(
+    settings: Settings, totals: Mapping[str, NDArray[Any]]
+) -> dict[str, tuple[float, float]]:
+    """Return the sums of the device by field, each with the sum of the squares of its terms."""
+    found: dict[str, tuple[float, float]] = {}
+    for kind, names in _SUMS.items():
+        if kind in totals:
+            sums, squares = on_host(totals[kind])[:, 0].astype(np.float64)
+            found |= zip(names, zip(sums, squares, strict=True), strict=False)
+    shares = [totals[name] for name in sorted(totals) if name.startswith(_BY_SHARES)]
+    if shares:
+        pairs = [on_host(one)[:, 0, :2] for one in shares]
+        for name, pair in sums_by_shares(settings, pairs).items():
+            # The composite reads the field, too.
+            found[name] = tuple(map(sum, zip(pair, found.get(name, (0.0, 0.0)), strict=True)))
+    return found
+
+
 def _level(cotangent: NDArray[Any] | ImportedArray) -> NDArray[Any] | ImportedArray:
     if isinstance(cotangent, ImportedArray):
         return cotangent
@@ -187,8 +204,9 @@ def on_device(renderer: Renderer, settings: Settings) -> bool:
 def device_fields(settings: Settings) -> frozenset[str]:
     """Return the fields by which the device has the derivatives.
 
-    These are what only the composite and the threshold pass read. Published methods have
-    thresholds of their own. With glare, the intensity is that of the sum before the composite.
+    These are what only the composite, the threshold pass, or the shares of levels read. Published
+    methods have thresholds of their own. With glare, the intensity is that of the sum before the
+    composite.
     """
     if {settings.tonemap, settings.encoding} & _STEEP:
         return frozenset()
@@ -196,6 +214,7 @@ def device_fields(settings: Settings) -> frozenset[str]:
     known = composite - settings._fields_before_composite
     if not settings.published:
         known |= threshold
+    known |= {*share_fields(settings)}
     if settings.glare:
         known -= {"intensity"}
     return known & differentiable(settings).keys()

@@ -64,7 +64,6 @@ class BevyBloom(PublishedSettings):
     method: ClassVar[str] = "bevy"
     _level_height: ClassVar[str] = "max_mip_dimension"
     _knobs: ClassVar[tuple[str, ...]] = ("low_frequency_boost", "max_mip_dimension")
-    _fields_before_composite: ClassVar[frozenset[str]] = frozenset(("intensity",))
     _pass_sentences: ClassVar[Mapping[str, str]] = MappingProxyType({"down": HALVED_BY_13})
 
     knee: float = number_field(fixed="")

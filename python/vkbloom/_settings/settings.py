@@ -154,7 +154,7 @@ class Settings(Record):
     published: ClassVar[bool] = False
     #: The field with the height of the first level, if that does not follow from the frame's.
     _level_height: ClassVar[str] = ""
-    #: The fields of the composite that other passes read, too.
+    #: The fields of the composite that other passes read, too, but for shares of levels.
     _fields_before_composite: ClassVar[frozenset[str]] = frozenset()
     #: Whether `glow` is what has passed the threshold; other methods apply it in a later pass.
     _has_threshold_pass: ClassVar[bool] = True

@@ -41,7 +41,7 @@ def passes(source: BlurInput, settings: BevyBloom) -> dict[str, Array]:
     first = source.store(apply_mask(_prefilter(source.image, level, settings), source.mask))
     shrink = partial(downsample, scale=scale)
     downs = halvings(first, _level_count(settings), source.store, shrink)
-    return combine(downs, source, shares=_shares(settings), upsample=up, last=up)
+    return combine(downs, source, shares=shares(settings), upsample=up, last=up)
 
 
 def gain(settings: BevyBloom, size: tuple[int, int]) -> float:
@@ -50,7 +50,7 @@ def gain(settings: BevyBloom, size: tuple[int, int]) -> float:
     The groups' weights darken it to 0.5 / (1 + 0.5 / 4) + 4 * 0.125 / (1 + 0.125 / 4) = 0.929.
     """
     first = _threshold(np.full((1, 1, 3), 0.5 / 1.125 + 0.5 / 1.03125), settings)
-    return float(first[0, 0, 0]) * flat_gain(_shares(settings), [1.0] * _level_count(settings))
+    return float(first[0, 0, 0]) * flat_gain(shares(settings), [1.0] * _level_count(settings))
 
 
 def _level_count(settings: BevyBloom) -> int:
@@ -71,7 +71,7 @@ def _threshold(rgb: Array, settings: BevyBloom) -> Array:
     return soften(rgb, settings.threshold, settings.knee, added=4e-5, least=1e-5)
 
 
-def _shares(settings: BevyBloom) -> Shares:
+def shares(settings: BevyBloom) -> Shares:
     """Return the shares of level k and of level k + 1 in up_k."""
     mixed = settings.composite == "mix"
     last = _level_count(settings) - 1
@@ -81,5 +81,5 @@ def _shares(settings: BevyBloom) -> Shares:
         boost = 1 - (1 - x) ** (1 / (1 - settings.low_frequency_boost_curvature))
         boost *= settings.low_frequency_boost * (1 - settings.intensity if mixed else 1)
         beyond = (x - settings.high_pass_frequency) / settings.high_pass_frequency
-        factors.append((settings.intensity + boost) * (1 - min(max(beyond, 0.0), 1.0)))
+        factors.append((settings.intensity + boost) * (1 - np.clip(beyond, 0.0, 1.0)))
     return [1 - f if mixed else 1.0 for f in factors], factors

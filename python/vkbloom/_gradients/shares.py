@@ -1,0 +1,75 @@
+"""Derivatives by fields that set the shares of levels in their sums, from sums on the device."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from types import SimpleNamespace
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vkbloom._settings.settings import Settings
+from vkbloom.reference import _bevy
+
+# Of a central difference. The truncated terms are 1e-10 of the slope, and so is the rounding.
+_STEP: Final = 1e-5
+
+
+class _Shares(NamedTuple):
+    """The shares of a method, and the fields that only they and the composite read."""
+
+    of: Callable[[Any], Any]
+    fields: tuple[str, ...]
+
+
+# The core has these sums of methods with `learns_shares`.
+_METHODS: Final = {
+    "bevy": _Shares(
+        _bevy.shares,
+        (
+            "intensity",
+            "low_frequency_boost",
+            "low_frequency_boost_curvature",
+            "high_pass_frequency",
+        ),
+    )
+}
+
+
+def share_fields(settings: Settings) -> tuple[str, ...]:
+    """Return the fields that only the shares of levels and the composite read."""
+    method = _METHODS.get(settings.method)
+    return method.fields if method else ()
+
+
+def sums_by_shares(
+    settings: Settings, sums: Sequence[NDArray[Any]]
+) -> dict[str, tuple[float, float]]:
+    """Return the derivatives by these fields, each with the sum of the squares of its terms.
+
+    - `sums`: Of up_0, up_1, ..., each of shape (2, 2): the sums of its cotangents times the level
+      of its size, and times itself; then those of the squares.
+    """
+    method = _METHODS[settings.method]
+    (by_fine, by_sum), (fine_squares, sum_squares) = np.array(sums, np.float64).transpose(1, 2, 0)
+    fine, coarse = _shares(method, settings, {})
+    results = {}
+    for name in method.fields:
+        value = getattr(settings, name)
+        ends = [_shares(method, settings, {name: value + step}) for step in (_STEP, -_STEP)]
+        of_fine, of_coarse = (ends[0] - ends[1]) / (2 * _STEP)
+        # The sum without the level is the smaller one times its share. A share of 0 that changes
+        # leaves nothing to divide: then the derivative is not finite, and the reference has it.
+        with np.errstate(divide="ignore", invalid="ignore"):
+            of_sum = np.where(of_coarse != 0.0, of_coarse / coarse, 0.0)
+            of_level = of_fine - of_sum * fine
+            total = of_level @ by_fine + of_sum @ by_sum
+            squares = of_level**2 @ fine_squares + of_sum**2 @ sum_squares
+        results[name] = float(total), float(squares)
+    return results
+
+
+def _shares(method: _Shares, settings: Settings, changes: dict[str, float]) -> NDArray[np.float64]:
+    """Return the shares of the levels and of the smaller ones, with changed fields."""
+    return np.array(method.of(SimpleNamespace(**vars(settings) | changes)), np.float64)

@@ -1,0 +1,20 @@
+// Of a sum of a level and a smaller one, whose shares settings can change: the sums of the products of its cotangents
+// with the level, and with the sum itself.
+SAMPLED_IMAGE(SLOT_SOURCE, sum);
+SAMPLED_IMAGE(SLOT_SAME_SIZE, level);
+SAMPLED_IMAGE(SLOT_COTANGENTS, cotangents);
+
+#include "lib/sums.glsl"
+
+ivec2 summed_size()
+{
+    return textureSize(cotangents, 0);
+}
+
+void add_pixel(inout vec4 sums, inout vec4 squares)
+{
+    vec4 cotangent = texelFetch(cotangents, PIXEL, 0);
+    vec2 products = vec2(dot(cotangent, texelFetch(level, PIXEL, 0)), dot(cotangent, texelFetch(sum, PIXEL, 0)));
+    sums.xy += products;
+    squares.xy += products * products;
+}
