@@ -144,9 +144,9 @@ def test_exposures_without_a_meter() -> None:
 def test_bytes_of_a_compensation() -> None:
     """Whole numbers stay: those of the engine's table for a line are 0 to 255."""
     for ends in ((0, 2), (-3.4, 3.2), (0.1, 0.7)):
-        rising = vkbloom.BevyExposure(compensation=list(zip((-2.3, 9.9), ends, strict=True)))
+        rising = vkbloom.BevyExposure(compensation=tuple(zip((-2.3, 9.9), ends, strict=True)))
         np.testing.assert_array_equal(rising.compensation_table()[0], np.arange(256))
-        falling = vkbloom.BevyExposure(compensation=list(zip((-8, 8), ends[::-1], strict=True)))
+        falling = vkbloom.BevyExposure(compensation=tuple(zip((-8, 8), ends[::-1], strict=True)))
         np.testing.assert_array_equal(falling.compensation_table()[0], np.arange(256)[::-1])
 
 

@@ -34,7 +34,7 @@ _SUMS: Final = {
 }
 #: The weights of a field of kernels.
 WEIGHTS: Final = "psf.weights"
-#: With the number of the sum of two levels, from the largest on: below 10.
+#: With the number of the sum of two levels, from the largest on.
 _BY_SHARES: Final = ".by_shares_"
 #: A sum that is less than this, relative to the root of the sum of its squares, has lost digits.
 MIN_SHARE: Final = 0.3
@@ -172,12 +172,13 @@ def _sums_of(
         if kind in totals:
             sums, squares = on_host(totals[kind])[:, 0].astype(np.float64)
             found |= zip(names, zip(sums, squares, strict=True), strict=False)
-    shares = [totals[name] for name in sorted(totals) if name.startswith(_BY_SHARES)]
+    shares = {name: on_host(totals[name]) for name in totals if name.startswith(_BY_SHARES)}
     if shares:
-        pairs = [on_host(one)[:, 0, :2] for one in shares]
-        for name, pair in sums_by_shares(settings, pairs).items():
+        pairs = [shares[f"{_BY_SHARES}{number}"][:, 0, :2] for number in range(len(shares))]
+        for name, (total, square) in sums_by_shares(settings, pairs).items():
             # The composite reads the field, too.
-            found[name] = tuple(map(sum, zip(pair, found.get(name, (0.0, 0.0)), strict=True)))
+            others = found.get(name, (0.0, 0.0))
+            found[name] = total + others[0], square + others[1]
     return found
 
 
