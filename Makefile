@@ -109,11 +109,12 @@ check: build/stamp/core build/stamp/test build/stamp/lint
 	$(PYTHON) -m pytest -q $(PARALLEL) $(FAST)
 
 # DOCS: options for sphinx. With "-D plot_gallery=0" the gallery's examples do not run.
+# EXPLORER=--quick: one picture and one preset in the page of stored pictures.
 docs: build/stamp/core build/stamp/docs
 	rm -rf docs/api docs/examples
 	$(PYTHON) -m sphinx -q -W --keep-going -b html $(DOCS) docs build/docs
 	rm -rf build/docs/explorer_stored
-	$(PYTHON) -m tools.static_explorer build/docs/explorer_stored
+	$(PYTHON) -m tools.static_explorer build/docs/explorer_stored $(EXPLORER)
 
 # VERSIONS: the folder, which can be served as it is.
 VERSIONS := build/versions
