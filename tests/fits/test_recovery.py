@@ -116,6 +116,15 @@ def test_a_field_of_kernels() -> None:
     assert 0.92 <= np.mean(within) <= 0.98
 
 
+def test_lights_in_the_dark() -> None:
+    """Parts of a picture without light say nothing, and are no error."""
+    image = np.zeros((90, 160))
+    image[20, 30] = 5
+    kernel = np.random.default_rng(0).random((3, 5))
+    found = vkbloom.recover_psf(rgb(image), rgb(glare(image, kernel, noise=0.0)), size=(5, 3))
+    np.testing.assert_allclose(found.kernels[0, 0], kernel, atol=1e-4)
+
+
 def test_ignored_pixels_and_channels() -> None:
     """Masked and non-finite pixels have no effect; each channel has its own kernel.
 

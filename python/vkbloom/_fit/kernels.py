@@ -43,6 +43,10 @@ def recover_kernels(
     place, total = seen(target.shape, size), float(target[used] @ target[used])
     count = int(np.count_nonzero(used))
     square, products = _normal_equations(sources, target, used, size)
+    is_lit = square.diagonal().reshape(len(sources), -1).any(axis=1)
+    if not is_lit.all():
+        which = f" by the kernel of position {np.argmin(is_lit)}" if len(sources) > 1 else ""
+        raise ValueError(f"image: no pixel that is compared gets light{which}")
 
     def rest(explained: float) -> float:
         return max(total - explained, _ROUNDED * total)
@@ -98,6 +102,8 @@ def _normal_equations(
     for y, x in itertools.product(*(range(0, side, _TILE) for side in wanted.shape)):
         tile = slice(y, y + _TILE), slice(x, x + _TILE)
         near = [i for i, one in enumerate(windows) if one[tile].any()]
+        if not near:
+            continue
         lines = [windows[i][tile][chosen[tile]].reshape(-1, taps) for i in near]
         rows = np.concatenate(lines, axis=1)
         indices = np.concatenate([np.arange(i * taps, (i + 1) * taps) for i in near])
