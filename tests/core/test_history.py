@@ -75,6 +75,7 @@ def test_a_state_is_a_value(renderer: Renderer, new_renderer: Callable[[], Rende
     copied = pickle.loads(pickle.dumps(state))
     expected = follow([first, second])[1]
     given: list[Any] = [state, state, copied, dict(state), {"trail": np.asarray(state["trail"])}]
+    given += [{"trail": state["trail"].astype(np.float64)}]
     after = [renderer.apply(second, method(), state=one) for one in given]
     after += [new_renderer().apply(second, method(), state=one) for one in (copied, state)]
     for frames in after:
@@ -205,8 +206,11 @@ def test_states_outlive_what_made_them() -> None:
     same(read["trail"], frames["trail"])
     renderer.close()
     same(read["trail"], frames["trail"])
-    with pytest.raises(ValueError, match="closed"):
-        unread["trail"]
+    same(unread["trail"], frames["trail"])
+    with Renderer() as other:
+        same(
+            other.apply(image(2), method(), state=unread)["trail"], follow([image(1), image(2)])[1]
+        )
 
 
 @pytest.mark.parametrize(("shading", "glow"), [("forward", "glow"), ("deferred", "brightness")])

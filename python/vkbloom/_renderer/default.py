@@ -51,7 +51,7 @@ class _Default:
     def close(self) -> None:
         with self.lock:
             for renderer in self.renderers.values():
-                renderer.close()
+                renderer._release()  # nobody reads states any more
 
 
 _DEFAULT: Final = _Default()

@@ -138,8 +138,8 @@ class Frames(Framebuffers):
         Those whose content the method's passes read in the next frame, and what earlier calls have
         handed on that this one did not write. Empty for a method that reads none. It does not
         change, can be pickled, and is equal to another one whose arrays have the same bytes. Its
-        images stay on the device until it is collected; an array is read from there, by an open
-        renderer, when it is first taken.
+        images stay on the device until it is collected; an array is read from there when it is
+        first taken, or when the renderer is closed.
         """
         return self._state
 

@@ -48,7 +48,7 @@ from vkbloom._renderer.sources import (
     scene_source,
     take_batch,
 )
-from vkbloom._renderer.state import Continued, State, advance_moment
+from vkbloom._renderer.state import Continued, State, advance_moment, read_kept
 from vkbloom._settings.antialiasing import Antialiasing, check_antialiasing, check_use
 from vkbloom._settings.exposed import ExposedSettings, expose
 from vkbloom._settings.exposure import Exposure, check_exposure, check_seconds
@@ -349,7 +349,15 @@ class Renderer:
         return self._core.closed
 
     def close(self) -> None:
-        """Release the device and everything on it. May be called twice."""
+        """Release the device and everything on it. May be called twice.
+
+        States of frames stay valid: they are read from the device before.
+        """
+        if not self.closed:
+            read_kept(self._core)
+        self._release()
+
+    def _release(self) -> None:
         self._planned = {}
         self._remember = None
         try:

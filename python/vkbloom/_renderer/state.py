@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
+import weakref
 from collections.abc import Iterator, Mapping
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
+from vkbloom import _core
+from vkbloom._locks import ProcessLock
 from vkbloom._renderer.new_arrays import new_arrays
 from vkbloom._renderer.sources import ANIMATION, Moment, image_source
 from vkbloom._settings.settings import check_settings
@@ -16,23 +20,33 @@ from vkbloom._settings.settings import check_settings
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from vkbloom import _core
     from vkbloom._settings.antialiasing import Antialiasing
 
 #: For each history of a plan what a call before has made; None: zeros.
 Histories = tuple["_core.Source | None", ...]
 
 
-class Kept(NamedTuple):
+class Kept:
     """An image on a renderer's device, which nothing changes."""
 
-    core: _core.Renderer
-    source: _core.Source
-    shape: tuple[int, ...]
-    dtype: str
+    __slots__ = ("__weakref__", "_array", "core", "dtype", "shape", "source")
+
+    def __init__(
+        self, core: _core.Renderer, source: _core.Source, shape: tuple[int, ...], dtype: str
+    ) -> None:
+        self.core, self.source, self.shape, self.dtype = core, source, shape, dtype
+        self._array: NDArray[Any] | None = None
+        with _LOCK:
+            _KEPT.add(self)
 
     def read(self) -> NDArray[Any]:
         """Return the pixels."""
+        if self._array is None:
+            self._array = self._read()
+            self._array.flags.writeable = False
+        return self._array
+
+    def _read(self) -> NDArray[Any]:
         # A pass without bloom copies the pixels.
         copy = check_settings(None).replace(bloom=False)
         plan = self.core.plan(self.source, copy, ("final",))
@@ -42,23 +56,40 @@ class Kept(NamedTuple):
         return array
 
 
+_LOCK: Final = ProcessLock()
+_KEPT: Final[weakref.WeakSet[Kept]] = weakref.WeakSet()
+
+
+def read_kept(core: _core.Renderer) -> None:
+    """Read the images of states on a device that is closed next, unless it is lost."""
+    with _LOCK:
+        images = [image for image in _KEPT if image.core is core]
+    # (The device of a parent process gives a ValueError.)
+    with contextlib.suppress(_core.Error, ValueError):
+        for image in images:
+            image.read()
+
+
 class State(Mapping[str, "NDArray[Any]"]):
     """The framebuffers of earlier calls that the next call reads, by name. It never changes.
 
     Images stay on the device of the renderer that made them until this object is collected. They
-    are read when an item is first taken, which needs the renderer to be open. States are equal if
-    their arrays have the same bytes. A pickled state has the arrays.
+    are read when an item is first taken, or when the renderer is closed. States are equal if their
+    arrays have the same bytes. A pickled state has the arrays.
 
     Parameters
     ----------
     arrays : mapping of str to ndarray
-        (H, W, 4) of uint8, float16 or float32, as framebuffers are. They are copied.
+        (H, W, 4) of uint8, float16 or float32, as framebuffers are; float64 becomes float32. They
+        are copied.
     """
 
     def __init__(self, arrays: Mapping[str, NDArray[Any]] = MappingProxyType({})) -> None:
         self._images: dict[str, NDArray[Any] | Kept] = {}
         for name, array in arrays.items():
             copied = np.array(array, order="C")
+            if copied.dtype == np.float64:  # as of images
+                copied = copied.astype(np.float32)
             copied.flags.writeable = False
             self._images[name] = copied
         #: Images of one texel that the call before continued.
@@ -169,9 +200,7 @@ def _read(images: dict[str, NDArray[Any] | Kept], name: str) -> NDArray[Any]:
     """Return the pixels of an image, which replace it."""
     image = images[name]
     if isinstance(image, Kept):
-        array = image.read()
-        array.flags.writeable = False
-        images[name] = image = array
+        images[name] = image = image.read()
     return image
 
 
