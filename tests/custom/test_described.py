@@ -328,6 +328,89 @@ def test_programs_of_a_shaderlab_file(
     assert np.abs(result[..., :3] - gain * image[..., :3]).max() < 1e-5
 
 
+KERNELS = """\
+#pragma kernel Twice  MAIN=Twice GAIN=2  // its name, and its gain
+#pragma kernel Thrice MAIN=Thrice GAIN=3
+Texture2D_float Image;
+RWTexture2D<float4> Made;
+[numthreads(8, 8, 1)]
+void MAIN(uint3 at : SV_DispatchThreadID) { Made[at.xy] = GAIN * Image[at.xy]; }
+"""
+KERNEL_PASS = """
+bloom = "out"
+[[passes]]
+file = "own.compute"
+entry = "Thrice"
+output = "out"
+textures = { Image = "glow" }
+"""
+
+
+def test_kernels_of_a_compute_shader_of_unity(renderer: Renderer, tmp_path: Path) -> None:
+    """Each has definitions of its own."""
+    require("hlsl")
+    image = picture(9, 7)
+    result = bloom(renderer, write(tmp_path, KERNEL_PASS, own_compute=KERNELS), image)
+    assert np.abs(result[..., :3] - 3 * image[..., :3]).max() < 1e-5
+    path = write(tmp_path, KERNEL_PASS.replace('entry = "Thrice"', ""))
+    with pytest.raises(ShaderError, match="entry: give one of the file's kernels: Twice, Thrice"):
+        load_method(path, name="broken")
+    assert 'entry = "Twice"' in succeed("describe", tmp_path / "own.compute").stdout
+
+
+def test_attributes_of_wgsl_in_any_order(renderer: Renderer, tmp_path: Path) -> None:
+    require("wgsl")
+    text = """
+    @binding(0) @group(0) var image: texture_2d<f32>;
+    @group(0) @binding(1) var made: texture_storage_2d<rgba32float, write>;
+    @compute @workgroup_size(8, 8)
+    fn main(@builtin(global_invocation_id) at: vec3u) {
+        textureStore(made, at.xy, 2 * textureLoad(image, at.xy, 0));
+    }
+    """
+    description = """
+    bloom = "out"
+    [[passes]]
+    file = "own.wgsl"
+    output = "out"
+    textures = { image = "glow" }
+    """
+    image = picture(9, 7)
+    result = bloom(renderer, write(tmp_path, description, own_wgsl=text), image)
+    assert np.abs(result[..., :3] - 2 * image[..., :3]).max() < 1e-5
+
+
+def test_a_package_of_wesl(renderer: Renderer, tmp_path: Path) -> None:
+    """Its root is above the file; definitions are constants, and replace words before that."""
+    require("wesl")
+    (tmp_path / "package" / "effects").mkdir(parents=True)
+    (tmp_path / "package" / "gains.wesl").write_text(
+        "import constants::GAIN;\nconst gain = GAIN;\n"
+    )
+    text = """
+    import package::gains::gain;
+    @group(0) @binding(0) var image: texture_2d<f32>;
+    @group(0) @binding(1) var made: texture_storage_2d<##FORMAT##, write>;
+    @compute @workgroup_size(8, 8)
+    fn main(@builtin(global_invocation_id) at: vec3u) {
+        textureStore(made, at.xy, gain * textureLoad(image, at.xy, 0));
+    }
+    """
+    (tmp_path / "package" / "effects" / "own.wesl").write_text(text)
+    description = """
+    bloom = "out"
+    [[passes]]
+    file = "package/effects/own.wesl"
+    dependencies = { package = "package" }
+    defines = { FORMAT = "rgba32float", GAIN = "2.0" }
+    output = "out"
+    textures = { image = "glow" }
+    """
+    image = picture(9, 7)
+    result = bloom(renderer, write(tmp_path, description), image)
+    assert np.abs(result[..., :3] - 2 * image[..., :3]).max() < 1e-5
+
+
 def test_a_class_travels_without_compilers(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Its pickle has the compiled shaders."""
     kind: Any = load_method(write(tmp_path, COPY_PASS, copy_frag=COPY), name="travels")
@@ -348,6 +431,30 @@ def test_a_description_is_written_from_reflection(tmp_path: Path) -> None:
     path.write_text(succeed("describe", *files).stdout)
     kind = load_method(path, name="described")
     assert {"levels", "radius", "gain", "share"} <= {*kind().to_dict()}
+
+
+def test_names_in_a_description_that_is_written(tmp_path: Path) -> None:
+    """Members of two blocks, a setting that all methods have, the first of two images."""
+    text = """\
+    #version 450
+    layout(local_size_x = 8, local_size_y = 8) in;
+    uniform sampler2D image;
+    layout(binding = 1) uniform First { float exposure; } first;
+    layout(binding = 2) uniform Second { float exposure; } second;
+    layout(binding = 3) writeonly uniform image2D one;
+    layout(binding = 4) writeonly uniform image2D two;
+    void main()
+    {
+        ivec2 at = ivec2(gl_GlobalInvocationID);
+        imageStore(one, at, first.exposure * texelFetch(image, at, 0));
+        imageStore(two, at, vec4(second.exposure));
+    }
+    """
+    (tmp_path / "own.comp").write_text(text)
+    path = tmp_path / "bloom.toml"
+    path.write_text(succeed("describe", tmp_path / "own.comp").stdout)
+    kind = load_method(path, name="written")
+    assert "exposure_value" in kind().to_dict()
 
 
 @pytest.mark.parametrize("language", ["hlsl", "slang", "wgsl", "wesl"])

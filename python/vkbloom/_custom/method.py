@@ -25,6 +25,7 @@ from vkbloom._custom.described.source import (
     read_described,
 )
 from vkbloom._custom.file import CustomFile, read_file
+from vkbloom._custom.names import TAKEN
 from vkbloom._custom.params import RANGES, Param
 from vkbloom._custom.planning import FrameValues, plan_rows
 from vkbloom._custom.rows import Resources, changing_resources
@@ -357,8 +358,6 @@ def slider_of(param: Param) -> tuple[float, float] | tuple[()]:
 #: The setting that a PARAM can be: the file gives its default and narrows its range, the body and
 #: the encoding get its value. Published files of tone curves have it with the same meaning.
 SHARED: Final = "reference_white"
-#: Names that classes of settings have beside their attributes.
-TAKEN: Final = {"method", "sha256", "threshold", "self"}
 
 
 @dataclasses.dataclass(frozen=True)

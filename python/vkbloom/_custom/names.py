@@ -25,6 +25,8 @@ BLOOM: Final = "BLOOM"
 HISTORY: Final = "HISTORY_"
 #: The longest name that a framebuffer has.
 MAX_NAME_LENGTH: Final = 31
+#: Names that classes of settings have beside their attributes.
+TAKEN: Final = {"method", "sha256", "threshold", "self"}
 
 
 def stage_of(name: str) -> str:

@@ -72,6 +72,19 @@ _SHADERTOY: Final = {
 }
 
 
+#: What some capabilities of SPIR-V stand for that shaders cannot have here.
+_UNKNOWN: Final = {
+    2: " (geometry)",
+    3: " (tessellation)",
+    10: " (double)",
+    34: " (cube arrays)",
+    43: " (textures of one dimension)",
+    44: " (images of one dimension)",
+    46: ' (texel buffers: defines = { Buffer = "StructuredBuffer" })',
+    47: ' (texel buffers: defines = { RWBuffer = "RWStructuredBuffer" })',
+}
+
+
 @dataclasses.dataclass(frozen=True)
 class Number:
     """A value of a member: where it is in its block, and what it is."""
@@ -259,10 +272,9 @@ class _Binder:
             return self._open(with_kinds(code, dict.fromkeys(textures, TEXTURE)), entry, stage)
         unknown = module.capabilities - CAPABILITIES
         if unknown:
-            known = {10: " (double)", 2: " (geometry)", 3: " (tessellation)", 34: " (cube arrays)"}
             least = min(unknown)
-            cause = f"the shader needs the capability {least}{known.get(least, '')} of SPIR-V"
-            raise ModuleFault(cause)
+            known = _UNKNOWN.get(least, "")
+            raise ModuleFault(f"the shader needs the capability {least}{known} of SPIR-V")
         if module.is_endless(found):
             what = "vertex shader" if stage == "vertex" else "shader"
             raise ModuleFault(f"the {what} has a loop that never ends, in {found.name}")

@@ -4,20 +4,25 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import keyword
 import os
 import re
+from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
+from vkbloom._custom.described import shaderlab
 from vkbloom._custom.described.binding import is_stored, rename
-from vkbloom._custom.described.files import read_bytes
+from vkbloom._custom.described.files import Files, read_bytes
 from vkbloom._custom.described.layout import paths
 from vkbloom._custom.described.module import INPUT, OUTPUT, UNIFORM_CONSTANT, Module, Variable
 from vkbloom._custom.described.programs import Program, compile_shaders
 from vkbloom._custom.described.schema import LANGUAGES, Shader
 from vkbloom._custom.described.source import DescribedSource, compile_described
+from vkbloom._custom.names import TAKEN
 from vkbloom._custom.source import Source
+from vkbloom._settings.settings import Settings
 
 #: Marks what a person must say.
 TODO: Final = "# TODO"
@@ -107,7 +112,10 @@ def _find_shaders(path: Path) -> tuple[Source, list[Shader]]:
         language = "shadertoy"
     entries: list[str | None] = [None]
     if language in ("hlsl", "slang"):
-        names = [next(filter(None, match.groups()[1:])) for match in _ENTRIES.finditer(text)]
+        kernels = shaderlab.read_kernels(Files(Source(str(path), text), (), ()))
+        names = [*kernels] or [
+            next(filter(None, match.groups()[1:])) for match in _ENTRIES.finditer(text)
+        ]
         entries = list(dict.fromkeys(names)) or ["main"]
     elif language in ("wgsl", "wesl"):
         entries = list(dict.fromkeys(_WGSL_ENTRIES.findall(text))) or [None]
@@ -150,8 +158,9 @@ class _Writer:
         """Return the text."""
         for number, each in enumerate(self._found):
             self._write_pass(each, number)
-        last = self._found[-1].name
-        result = f"{last}[0]" if self._is_chain else last
+        last = self._found[-1]
+        several = len(_targets(last)) > 1
+        result = f"{last.name}{'_0' * several}{'[0]' * self._is_chain}"
         lines = ["# What an engine's CPU code does for these shaders.", f'bloom = "{result}"', ""]
         if self._is_chain:
             lines += ["[settings.levels]", 'type = "int"', "default = 5", "range = [2, 10]", ""]
@@ -189,12 +198,7 @@ class _Writer:
 
     def _outputs(self, each: _Found, level: str, size: str) -> list[str]:
         compute = each.stage == "compute"
-        targets = [
-            variable
-            for variable in each.variables
-            if (variable.storage == OUTPUT and variable.location is not None and not compute)
-            or (is_stored(variable) and compute)
-        ]
+        targets = _targets(each)
         sized = f'size = "{size}"'
         if len(targets) <= 1:
             return [f'output = "{each.name}{level}"', sized]
@@ -264,10 +268,11 @@ class _Writer:
                         f"{_key(_label(variable))} = 0  {TODO}: the numbers of this buffer"
                     )
                 continue
-            lines += self._members(variable, image)
+            lines += self._members(variable, image, _shared_members(each))
         return lines
 
-    def _members(self, variable: Variable, image: str) -> list[str]:
+    def _members(self, variable: Variable, image: str, shared: set[str]) -> list[str]:
+        """Return lines of values. `shared`: the members that several blocks have."""
         lines = []
         for path, kind, _ in paths(variable.type):
             if not path or kind.kind == "struct" or "[" in path:
@@ -280,7 +285,8 @@ class _Writer:
                 ]
                 if top and not any(used[:1] == (top[0],) for used in variable.members):
                     continue
-            lines.append(f"{_key(path)} = {self._value(path, kind.kind, kind.count, image)}")
+            key = f"{_label(variable)}.{path}" if path in shared else path
+            lines.append(f"{_key(key)} = {self._value(path, kind.kind, kind.count, image)}")
         return lines
 
     def _value(self, path: str, kind: str, count: int, image: str) -> str:
@@ -295,11 +301,35 @@ class _Writer:
             if name in ("level", "mip", "lod", "i", "index") and self._is_chain:
                 return '"level"'
             setting = re.sub(r"\W|^(?=\d)|^_+", "", name).lower() or "value"
+            if hasattr(Settings, setting) or keyword.iskeyword(setting) or setting in TAKEN:
+                setting += "_value"
             whole = 'type = "int"\n' if kind != "float" else ""
             self._settings.setdefault(setting, f"{whole}default = 1  # a guess; range = [0, 4]")
             return f'"{setting}"'
         entries = count if kind in ("vector", "array") else 1
         return f"0  {TODO}: the {entries} numbers of {path}"
+
+
+def _targets(each: _Found) -> list[Variable]:
+    """Return what a shader writes."""
+    compute = each.stage == "compute"
+    return [
+        variable
+        for variable in each.variables
+        if (variable.storage == OUTPUT and variable.location is not None and not compute)
+        or (is_stored(variable) and compute)
+    ]
+
+
+def _shared_members(each: _Found) -> set[str]:
+    """Return the members that several blocks of a shader have."""
+    names = Counter(
+        path
+        for variable in each.variables
+        if variable.is_block and variable.storage not in (INPUT, OUTPUT)
+        for path, *_ in paths(variable.type)
+    )
+    return {name for name, count in names.items() if count > 1}
 
 
 def _label(variable: Variable) -> str:

@@ -28,7 +28,7 @@ _COMPUTE: Final = (
     r"(?i:\[\s*numthreads)\b[^\]]*\]\s*(?:\[[^\]]*\]\s*|#[^\n]*\n\s*)*(?:public\s+)?void\s+{}\s*\("
 )
 #: Of all results together with what is before them.
-_VERSION: Final = b"8"
+_VERSION: Final = b"9"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -192,17 +192,6 @@ def _unpack(data: bytes) -> Program | None:
 
 
 _COUNTS: Final = ("", "2", "3", "4")
-#: What Unity's compiler defines where a description does not.
-_UNITY: Final = {
-    "SHADER_API_VULKAN": "1",
-    "SHADER_TARGET": "45",
-    **{f"fixed{count}": f"float{count}" for count in _COUNTS},
-}
-#: On desktops its half is float.
-_FLOATS: Final = {
-    **{f"half{count}": f"float{count}" for count in _COUNTS},
-    **{f"half{n}x{n}": f"float{n}x{n}" for n in (2, 3, 4)},
-}
 #: Types of HLSL that Slang does not know: of at least so many bits.
 _AT_LEAST: Final = {
     f"{name}{count}": f"{kind}{count}"
@@ -211,6 +200,27 @@ _AT_LEAST: Final = {
         *(("min16int", "int"), ("min12int", "int"), ("min16uint", "uint")),
     )
     for count in _COUNTS
+}
+#: What Unity's compiler defines where a description does not. A suffix is the precision of what
+#: a texture gives.
+_UNITY: Final = {
+    "SHADER_API_VULKAN": "1",
+    "SHADER_TARGET": "45",
+    **{f"fixed{count}": f"float{count}" for count in _COUNTS},
+    **{
+        f"{kind}_{suffix}": kind
+        for kind in (
+            *("Texture2D", "Texture2DArray", "Texture3D", "TextureCube", "TextureCubeArray"),
+            *("sampler2D", "sampler3D", "samplerCUBE"),
+        )
+        for suffix in ("float", "half")
+    },
+    **_AT_LEAST,
+}
+#: On desktops its half is float.
+_FLOATS: Final = {
+    **{f"half{count}": f"float{count}" for count in _COUNTS},
+    **{f"half{n}x{n}": f"float{n}x{n}" for n in (2, 3, 4)},
 }
 
 
@@ -249,6 +259,9 @@ def _shadertoy(shader: Shader, files: Files) -> Program:
 
 
 def _slang(shader: Shader, files: Files) -> Program:
+    kernels = shaderlab.read_kernels(files) if shader.language == "hlsl" else {}
+    if kernels:
+        return _kernel(shader, files, kernels)
     stage, entry = shader.stage or "fragment", shader.entry or "main"
     # The entry point may be in a file that this one includes.
     known = re.compile(_COMPUTE.format(re.escape(entry)))
@@ -272,19 +285,33 @@ def _shaderlab(shader: Shader, files: Files) -> Program:
     entry = shader.entry or program.fragment
     if entry is None:
         raise files.fault("", 1, f"program {shader.number} has no #pragma fragment; give entry")
-    given = dict(shader.defines)
+    return _unity(shader, files, "fragment", entry, program.text)
+
+
+def _kernel(shader: Shader, files: Files, kernels: Mapping[str, Mapping[str, str]]) -> Program:
+    """Compile a compute shader of Unity."""
+    entry = shader.entry or next(iter(kernels))
+    if entry not in kernels or (shader.entry is None and len(kernels) > 1):
+        named = f"entry: {entry!r} is not one" if shader.entry else "entry: give one"
+        raise files.fault("", 1, f"{named} of the file's kernels: {', '.join(kernels)}")
+    defines = (*kernels[entry].items(), *shader.defines)
+    return _unity(dataclasses.replace(shader, defines=defines), files, "compute", entry, None)
+
+
+def _unity(shader: Shader, files: Files, stage: str, entry: str, text: str | None) -> Program:
+    """Compile as Unity does. `text`: as of `compile_slang`."""
 
     def compile(usual: Mapping[str, str]) -> Program:
-        known = [f"-D{name}={value}" for name, value in usual.items() if name not in given]
-        arguments = [*known, *_defines(shader), *shader.options]
-        code = slang.compile_slang(files, "hlsl", "fragment", entry, arguments, text=program.text)
+        known = [f"-D{name}={value}" for name, value in {**usual, **dict(shader.defines)}.items()]
+        arguments = [*known, *shader.options]
+        code = slang.compile_slang(files, "hlsl", stage, entry, arguments, text=text)
         vertex = None
         if shader.vertex is not None:
             arguments = [*arguments, "-fvk-invert-y"]
             vertex = slang.compile_slang(
-                files, "hlsl", "vertex", shader.vertex, arguments, text=program.text
+                files, "hlsl", "vertex", shader.vertex, arguments, text=text
             )
-        return Program(code, None, "fragment", vertex, shift=slang.has_registers(files))
+        return Program(code, None, stage, vertex, shift=slang.has_registers(files))
 
     try:
         return compile({**_UNITY, **_FLOATS})

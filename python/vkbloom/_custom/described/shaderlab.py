@@ -7,12 +7,11 @@ import re
 from collections.abc import Iterator
 from typing import Final
 
-from vkbloom._custom.described.files import Files
+from vkbloom._custom.described.files import Files, without_remarks
 
 _BLOCK: Final = re.compile(r"\b(HLSLINCLUDE|CGINCLUDE|HLSLPROGRAM|CGPROGRAM)\b|\b(ENDHLSL|ENDCG)\b")
-_PRAGMA: Final = re.compile(
-    r"^[ \t]*#[ \t]*pragma[ \t]+(vertex|fragment|kernel)[ \t]+(\w+)", re.MULTILINE
-)
+_PRAGMA: Final = re.compile(r"^[ \t]*#[ \t]*pragma[ \t]+(vertex|fragment)[ \t]+(\w+)", re.MULTILINE)
+_KERNEL: Final = re.compile(r"^[ \t]*#[ \t]*pragma[ \t]+kernel[ \t]+(\w+)([^\n/]*)", re.MULTILINE)
 #: Unity's own compiler also takes the #pragma lines of what it includes.
 _WITH_PRAGMAS: Final = re.compile(r"^([ \t]*#[ \t]*include)_with_pragmas\b", re.MULTILINE)
 _SUBSHADER: Final = re.compile(r"\bSubShader\b")
@@ -56,6 +55,15 @@ def read_program(files: Files, number: int) -> Program:
     # The last of each kind: a program's own come after those of what it shares.
     names = dict(_PRAGMA.findall(joined))
     return Program(joined, names.get("vertex"), names.get("fragment"))
+
+
+def read_kernels(files: Files) -> dict[str, dict[str, str]]:
+    """Return the entry points of a compute shader of Unity, and what each of them defines."""
+    found = {}
+    for name, words in _KERNEL.findall(without_remarks(files.main.text)):
+        parts = [word.partition("=") for word in words.split()]
+        found[name] = {word: value or "1" for word, _, value in parts}
+    return found
 
 
 def _blocks(files: Files) -> Iterator[tuple[int, str, int, int]]:

@@ -30,6 +30,8 @@ _MESSAGE: Final = re.compile(
 )
 #: What a message says below the line that it quotes.
 _SAID: Final = re.compile(r"^\s*\|\s*\^+ (.+)$", re.MULTILINE)
+#: What is not there in a stage: the place where it is used.
+_USED: Final = re.compile(r"^note: see using of '(\w+)'\n\s*--> (.*?):(\d+):\d+", re.MULTILINE)
 #: Names of Direct3D 9, which Unity's shaders have and Slang has not.
 _D3D9: Final = """\
 #define sampler2D Sampler2D<float4>
@@ -84,7 +86,7 @@ def compile_slang(
             text = f"{_D3D9 if is_old(files) else ''}{text}"
             file = Path(folder) / f"shader.{language}"
             file.write_text(text, encoding="utf-8")
-        command = [find_slangc(), str(file), "-lang", language, "-target", "spirv"]
+        command = [find_slangc(), "-lang", language, str(file), "-target", "spirv"]
         command += ["-stage", stage, "-entry", entry, "-o", str(target), *arguments]
         command += [f"-I{each}" for each in (Path(files.main.name).parent, *files.folders, UNITY)]
         command += ["-warnings-disable", "39001,39029,39013,30081,15205,41018"]
@@ -152,6 +154,11 @@ def _explain(files: Files, file: str, status: int, output: str, entry: str) -> S
         cause, name, line = match[1], match[2], match[3]
         if cause is None:
             name, line, cause = match[4], match[5], match[6]
+        if "uses features that are not available" in output[match.end() :]:
+            used = _USED.search(output, match.end())
+            if used:
+                cause, name, line = f"Slang has no {used[1]!r} for SPIR-V", used[2], used[3]
+                return files.fault("" if name == file else name, int(line), cause)
         name = "" if name == file or not name else name
         said = _SAID.search(output, match.end())
         return files.fault(name, int(line), (said[1] if said else cause).strip().rstrip("."))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+from pathlib import Path
 
 
 def main() -> int:
@@ -15,9 +16,16 @@ def main() -> int:
 
     for asked in json.loads(sys.stdin.read()):
         try:
-            made = wesl.compile_file(
-                asked["file"],
+            path = Path(asked["file"])
+            root = asked["dependencies"].pop("package", path.parent)
+            module = path.relative_to(root).with_suffix("")
+            made = wesl.compile_source(
+                asked["text"],
+                root="::".join(("package", *module.parts)),
+                filename=path,
+                root_directory=root,
                 features=asked["features"],
+                constants=asked["constants"],
                 dependencies=asked["dependencies"] or None,
             )
         except wesl.CompileError as error:

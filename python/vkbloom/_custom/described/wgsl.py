@@ -49,7 +49,7 @@ MAX_MEMORY: Final = 16 << 30
 MAX_TOGETHER: Final = 16
 
 _VARIABLE: Final = re.compile(
-    r"@group\s*\(\s*(\d+)u?\s*\)\s*@binding\s*\(\s*(\d+)u?\s*\)"
+    r"@(group|binding)\s*\(\s*(\d+)u?\s*\)\s*@(?:group|binding)\s*\(\s*(\d+)u?\s*\)"
     r"\s*var\s*(<[^<>]*>)?\s*(\w+)\s*:\s*([\w<>, ]+?)\s*;"
 )
 _STRUCT: Final = re.compile(r"\bstruct\s+(\w+)\s*\{([^{}]*)\}")
@@ -60,6 +60,8 @@ _ENTRY: Final = re.compile(
     r"@(vertex|fragment|compute)\b(?:[^{}@]|@(?!vertex\b|fragment\b|compute\b))*?\bfn\s++(\w++)\s*+"
     r"\(((?:[^()]|\([^()]*+\))*+)\)\s*+(?:->\s*+([^{]*+))?\{"
 )
+#: What WESL's module of constants can have.
+_NUMBER: Final = re.compile(r"-?\d[\w.]*|true|false")
 _MESSAGE_LINE: Final = re.compile(r"┌─ (?:wgsl)?:(\d+):\d+")
 #: What is wrong with a part of a module, below what has that part.
 _NOTE: Final = re.compile(r"^\s*= (.+)$", re.MULTILINE)
@@ -162,6 +164,8 @@ def compile_wgsl(shaders: Sequence[tuple[Shader, Files]]) -> list[Compiled]:
 def _request(shader: Shader, files: Files, text: str) -> _Request:
     plain = without_remarks(text)
     stage, entry, inputs, outputs = _interface(shader, files, plain)
+    if stage == "fragment" and not outputs:
+        raise files.fault("", 1, f"entry: {entry!r} writes no colour")
     asked = {
         "code": text,
         "entry": entry,
@@ -183,9 +187,9 @@ def _finish(request: _Request, made: list[bytes]) -> Compiled:
     """Return the modules of a pipeline with the bindings and the names of the source."""
     used: dict[int, set[int]] = {}
     for part, words in request.parts:
-        for group, binding, _, name, _ in _VARIABLE.findall(part):
+        for group, binding, _, name, _ in _variables(part):
             if name in words:
-                used.setdefault(int(group), set()).add(int(binding))
+                used.setdefault(group, set()).add(binding)
     code, *vertex = _with_bindings(
         request.files, made, {group: sorted(each) for group, each in used.items()}
     )
@@ -193,6 +197,13 @@ def _finish(request: _Request, made: list[bytes]) -> Compiled:
     flipped = with_y_down(vertex[0]) if vertex else None
     names = dict(each for part, words in request.parts for each in _names(part, words))
     return Compiled(code, flipped, request.wanted[0][1], tuple(names.items()))
+
+
+def _variables(text: str) -> Iterator[tuple[int, int, str, str, str]]:
+    """Return group, binding, address space, name and type of what a text binds."""
+    for first, *numbers, space, name, kind in _VARIABLE.findall(text):
+        group, binding = numbers if first == "group" else numbers[::-1]
+        yield int(group), int(binding), space, name, kind
 
 
 def _with_defines(text: str, shader: Shader) -> str:
@@ -337,7 +348,7 @@ def _names(text: str, words: set[str]) -> Iterator[tuple[str, str]]:
         match[1]: [(each[1], each[2].strip()) for each in _MEMBER.finditer(match[2])]
         for match in _STRUCT.finditer(text)
     }
-    for group, binding, space, name, kind in _VARIABLE.findall(text):
+    for group, binding, space, name, kind in _variables(text):
         if name not in words:
             continue
         place = f"{group}.{binding}"
@@ -439,6 +450,8 @@ def _explain(request: _Request, status: int, output: str) -> ShaderError:
     causes = [line for line in lines if line and "wgsl:" not in line and not line[0].isdigit()]
     named = [line.partition("error:")[2].strip() for line in lines if "error:" in line]
     cause = (named or causes or ["no message"])[-1 if named else 0]
+    if cause == "Validation Error":  # what it is about is said last
+        cause = causes[-1]
     if cause.endswith("is invalid") and (notes := _NOTE.findall(text)):
         cause += f": {notes[-1].strip()}"
     if "adapter" in cause.lower() and match is None:
@@ -454,8 +467,12 @@ def _from_wesl(shaders: Sequence[tuple[Shader, Files]]) -> list[str]:
         return []
     asked = [
         {
-            "file": files.main.name,
+            "file": os.path.realpath(files.main.name),
+            "text": _with_defines(files.main.text, shader),
             "features": dict(shader.features),
+            "constants": {
+                name: value for name, value in shader.defines if _NUMBER.fullmatch(value)
+            },
             "dependencies": dict(shader.dependencies),
         }
         for shader, files in shaders
@@ -480,7 +497,7 @@ def _from_wesl(shaders: Sequence[tuple[Shader, Files]]) -> list[str]:
 def _line_of_word(files: Files, cause: str) -> int:
     """Return the first line that has a word of a message without a place; 1 if there is none."""
     text = files.main.text
-    word = re.search(r"`(\w+)`", cause)
+    word = re.search(r"[`'](\w+)[`']", cause)
     at = re.search(rf"\b{word[1]}\b", text) if word else None
     return text.count("\n", 0, at.start()) + 1 if at else 1
 
