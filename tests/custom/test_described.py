@@ -299,6 +299,7 @@ def test_programs_of_a_shaderlab_file(
     (tmp_path / "lib").mkdir()
     (tmp_path / "lib" / "Shared.hlsl").write_text("#define GAIN 3.0\n")
     text = """Shader "Own" {
+    // A SubShader has its HLSLPROGRAM, which CGPROGRAM was before.
     HLSLINCLUDE
     #pragma fragment First
     #include "lib/Shared.hlsl"
@@ -384,16 +385,18 @@ def test_a_package_of_wesl(renderer: Renderer, tmp_path: Path) -> None:
     """Its root is above the file; definitions are constants, and replace words before that."""
     require("wesl")
     (tmp_path / "package" / "effects").mkdir(parents=True)
-    (tmp_path / "package" / "gains.wesl").write_text(
-        "import constants::GAIN;\nconst gain = GAIN;\n"
-    )
+    gains = """
+    import constants::GAIN;
+    const gain = GAIN;
+    @group(0) @binding(0) var source_image: texture_2d<f32>;
+    """
+    (tmp_path / "package" / "gains.wesl").write_text(gains)
     text = """
-    import package::gains::gain;
-    @group(0) @binding(0) var image: texture_2d<f32>;
+    import package::gains::{gain, source_image};
     @group(0) @binding(1) var made: texture_storage_2d<##FORMAT##, write>;
     @compute @workgroup_size(8, 8)
     fn main(@builtin(global_invocation_id) at: vec3u) {
-        textureStore(made, at.xy, gain * textureLoad(image, at.xy, 0));
+        textureStore(made, at.xy, gain * textureLoad(source_image, at.xy, 0));
     }
     """
     (tmp_path / "package" / "effects" / "own.wesl").write_text(text)
@@ -404,7 +407,7 @@ def test_a_package_of_wesl(renderer: Renderer, tmp_path: Path) -> None:
     dependencies = { package = "package" }
     defines = { FORMAT = "rgba32float", GAIN = "2.0" }
     output = "out"
-    textures = { image = "glow" }
+    textures = { source_image = "glow" }
     """
     image = picture(9, 7)
     result = bloom(renderer, write(tmp_path, description), image)

@@ -47,7 +47,9 @@ def compile_all(file: CustomFile) -> None:
     ("call", "error"),
     [*rows(__file__, "faulty files"), *rows(__file__, "passes that do not compile")],
 )
-def test_a_faulty_file_is_refused(tmp_path: Path, call: str, error: str) -> None:
+def test_a_faulty_file_is_refused(
+    request: pytest.FixtureRequest, tmp_path: Path, call: str, error: str
+) -> None:
     """The error also quotes the line that it names."""
     file = tmp_path / "faulty.hook"
 
@@ -56,6 +58,7 @@ def test_a_faulty_file_is_refused(tmp_path: Path, call: str, error: str) -> None
         return read_file(read_source(file))
 
     def compile_shader(body: str) -> None:
+        request.getfixturevalue("glslang")
         compile_all(read(f"//!HOOK MAIN\n//!BIND HOOKED\n{body}"))
 
     message = assert_refused(
@@ -67,6 +70,7 @@ def test_a_faulty_file_is_refused(tmp_path: Path, call: str, error: str) -> None
     assert quoted == file.read_text().split("\n")[int(line) - 1].strip()
 
 
+@pytest.mark.usefixtures("glslang")
 def test_a_name_that_glsl_does_not_accept(tmp_path: Path) -> None:
     file = tmp_path / "faulty.hook"
     text = (

@@ -134,8 +134,8 @@ def _open(shader: Shader, program: Program, *, several: bool) -> _Found:
     for place, name in program.names:
         rename(module, place, name)
     entry = module.entry(None, program.stage)
-    stem = re.sub(r"\W", "_", path.name.partition(".")[0])[:24]
-    name = (shader.entry or stem)[:24] if several else stem
+    stem = re.sub(r"\W", "_", path.name.partition(".")[0])[:20]
+    name = (shader.entry or stem)[:20] if several else stem
     shown = shader.entry if several or shader.entry != "main" else None
     variables = module.variables(entry)
     return _Found(str(path), shader.language, shown, name, module, variables, entry.stage)

@@ -29,6 +29,7 @@ class Program:
 def read_program(files: Files, number: int) -> Program:
     """Return a program of a file by its number, counted from 0."""
     text = files.main.text
+    plain = without_remarks(text)
     shared: list[tuple[int, str]] = []
     programs: list[tuple[int, str]] = []
     for start, kind, begin, end in _blocks(files):
@@ -47,9 +48,9 @@ def read_program(files: Files, number: int) -> Program:
     place, program = programs[number]
     # What the SubShader of the program shares, or what is before all of them.
     begun = max(
-        (each.start() for each in _SUBSHADER.finditer(text) if each.start() < place), default=0
+        (each.start() for each in _SUBSHADER.finditer(plain) if each.start() < place), default=0
     )
-    first = min((each.start() for each in _SUBSHADER.finditer(text)), default=0)
+    first = min((each.start() for each in _SUBSHADER.finditer(plain)), default=0)
     parts = [part for start, part in shared if start < place and (start > begun or start < first)]
     joined = _WITH_PRAGMAS.sub(r"\1", "\n".join((*parts, program)))
     # The last of each kind: a program's own come after those of what it shares.
@@ -68,7 +69,7 @@ def read_kernels(files: Files) -> dict[str, dict[str, str]]:
 
 def _blocks(files: Files) -> Iterator[tuple[int, str, int, int]]:
     """Return where each block starts, its kind, and where its text begins and ends."""
-    text = files.main.text
+    text = without_remarks(files.main.text)
     opened: re.Match[str] | None = None
     for match in _BLOCK.finditer(text):
         if opened is None and match[1]:

@@ -60,6 +60,7 @@ _ENTRY: Final = re.compile(
     r"@(vertex|fragment|compute)\b(?:[^{}@]|@(?!vertex\b|fragment\b|compute\b))*?\bfn\s++(\w++)\s*+"
     r"\(((?:[^()]|\([^()]*+\))*+)\)\s*+(?:->\s*+([^{]*+))?\{"
 )
+_DECLARED: Final = re.compile(r"\bvar\s*+(?:<[^<>]*+>)?+\s*+(\w+)\s*+:")
 #: What WESL's module of constants can have.
 _NUMBER: Final = re.compile(r"-?\d[\w.]*|true|false")
 _MESSAGE_LINE: Final = re.compile(r"┌─ (?:wgsl)?:(\d+):\d+")
@@ -196,7 +197,20 @@ def _finish(request: _Request, made: list[bytes]) -> Compiled:
     # WebGPU has y upwards, and Vulkan downwards.
     flipped = with_y_down(vertex[0]) if vertex else None
     names = dict(each for part, words in request.parts for each in _names(part, words))
+    if request.translated:
+        known = {name for text in request.files.texts for name in _DECLARED.findall(text)}
+        names = {place: _without_module(name, known) for place, name in names.items()}
     return Compiled(code, flipped, request.wanted[0][1], tuple(names.items()))
+
+
+def _without_module(name: str, known: set[str]) -> str:
+    """Return the name that WESL's source has for one that wesl-py has put its module before.
+
+    It is that of the modules and its own, each with an underscore, and the number of its
+    underscores if it has any.
+    """
+    made = (each for each in known if name.endswith(f"_{each.count('_') or ''}{each}"))
+    return max(made, key=len, default=name)
 
 
 def _variables(text: str) -> Iterator[tuple[int, int, str, str, str]]:
