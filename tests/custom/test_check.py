@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.resources
+import importlib.util
 import json
 import sys
 from collections.abc import Callable
@@ -23,6 +24,11 @@ from vkbloom.testing._law_report import law_report
 from vkbloom.testing._laws.table import LAWS, merge_limits
 
 pytestmark = pytest.mark.usefixtures("kept_renderers")
+
+WITH_FILES = pytest.mark.skipif(
+    importlib.util.find_spec("OpenImageIO") is None,
+    reason="programs take and write image files: pip install vkbloom[images]",
+)
 
 # Small images: the figures are the same, the blooms narrow.
 SMALL = ["--measure-size", "64x64", "--size", "64x48"]
@@ -194,6 +200,7 @@ vkbloom.write(sys.argv[2], vkbloom.reference.blur(image, settings).astype("float
         (lambda image: 1.97 * image, ["--less-input", "--gain", "0.97"], set()),
     ],
 )
+@WITH_FILES
 def test_a_fault_of_a_program_is_named(
     tmp_path: Path, bloom: Callable[..., Any], words: list[str], laws: set[str]
 ) -> None:
@@ -206,6 +213,7 @@ def test_a_fault_of_a_program_is_named(
     assert done.exit_code == bool(laws)
 
 
+@WITH_FILES
 def test_programs_and_files_move_the_same_light() -> None:
     _, found = check("--command", COPYING, "--measure-size", "32x32", "--size", "64x48")
     alone = testing.stability(lambda image: image, steps=2, probe=testing.Probe(size=(32, 32)))
@@ -214,6 +222,7 @@ def test_programs_and_files_move_the_same_light() -> None:
     assert found["stability"]["shimmer"] == 0
 
 
+@WITH_FILES
 def test_required_laws_have_another_colour(tmp_path: Path) -> None:
     page = tmp_path / "page.html"
     with engine(tmp_path, lambda image: 0.9 * np.roll(image, 1, 1)) as command:
@@ -227,6 +236,7 @@ def test_required_laws_have_another_colour(tmp_path: Path) -> None:
     assert "+1 pixels along x, on average" in text
 
 
+@WITH_FILES
 def test_a_program() -> None:
     """A required law that cannot be tested, as that of a reference, is not held."""
     require = "superposition,gain,symmetric,reference"
@@ -241,6 +251,7 @@ def test_a_program() -> None:
     assert list(found["passes"][0]) == ["name", "seconds"]
 
 
+@WITH_FILES
 def test_a_program_that_blurs(tmp_path: Path) -> None:
     script = tmp_path / "blur.py"
     script.write_text(PROGRAM)
@@ -267,6 +278,7 @@ def test_a_program_that_blurs(tmp_path: Path) -> None:
         ("cp nan.exr $2", ValueError, "wrote nan at x 2, y 1"),
     ],
 )
+@WITH_FILES
 def test_what_a_program_does_wrong(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, script: str, error: type, words: str
 ) -> None:
@@ -282,12 +294,14 @@ def test_what_a_program_does_wrong(
         bloom(np.ones((8, 8, 3), np.float32))
 
 
+@WITH_FILES
 def test_a_program_of_8_bits_is_noted() -> None:
     bloom = testing.command(COPYING.split(), suffix=".png")
     with pytest.warns(UserWarning, match="8 bits"):
         bloom(np.full((8, 8, 3), 0.5, np.float32))
 
 
+@WITH_FILES
 def test_a_program_that_fails_is_one_line() -> None:
     done = run("check", "--command", "false {input} {output}")
     assert done.exit_code == 1
@@ -338,6 +352,7 @@ def test_a_change_of_a_file(
     assert written.startswith(f"### `planted` against `{before}`")
 
 
+@WITH_FILES
 def test_changes_of_presets_and_commands() -> None:
     words = ["--preset", "dual_kawase", "--against", COPYING, *SMALL]
     done = run("check", *words, "--require", "finite")
@@ -351,6 +366,7 @@ def test_changes_of_presets_and_commands() -> None:
     assert (refused.exit_code, "tutorial" in refused.stderr) == (2, True)
 
 
+@WITH_FILES
 def test_what_a_program_does_not_take_is_not_tested() -> None:
     bloom = testing.command(["cp", "{input}", "{output}"])
     found = testing.report(bloom, size=(16, 16), laws=["views"])
@@ -359,6 +375,7 @@ def test_what_a_program_does_not_take_is_not_tested() -> None:
     assert "takes no region and no time" in str(found)
 
 
+@WITH_FILES
 def test_a_program_that_fails_later_fails_its_laws(tmp_path: Path) -> None:
     """Where it is given NaN, four channels, or the lights of the nearest preset."""
 
@@ -376,6 +393,7 @@ def test_a_program_that_fails_later_fails_its_laws(tmp_path: Path) -> None:
     assert found["nearest_preset"] == {"name": None, "difference": None}
 
 
+@WITH_FILES
 def test_8_bits_are_said() -> None:
     words = ["--command", COPYING, *SMALL, "--suffix", ".png"]
     done, found = check(*words, "--require", "stability")
@@ -398,6 +416,7 @@ def test_files_are_checked_before_the_work(
     assert "command 'cp'" not in done.stderr
 
 
+@WITH_FILES
 def test_each_run_is_shown(monkeypatch: pytest.MonkeyPatch) -> None:
     shown: list[str] = []
     monkeypatch.setattr("rich.status.Status.update", lambda _, text: shown.append(text))
