@@ -2,8 +2,9 @@
 
 python -m tools.look_sheet OUT PHOTO ... [--looks mist,star4] [--amount 1]
 
-Below each picture stand the share of pixels that an eye sees changed, and the share that became
-white. A look that is invisible or clips is named at the end, with the exit status 1.
+Below each picture stand the share of pixels that an eye sees changed, and the shares that became
+white and that were cut off. A look that is invisible, clips or flattens skies is named at the end,
+with the exit status 1.
 """
 
 from __future__ import annotations
@@ -30,8 +31,13 @@ LOOKS: Final = [name for name, one in PRESETS.items() if one.engine == "vkbloom"
 WITH_RAYS: Final = ("star4", "star6", "anamorphic")
 #: With them, a photograph without highlights stays as it is.
 OF_HIGHLIGHTS: Final = ("photo", *WITH_RAYS)
-#: A bright sky of which 2.7 % became white has kept its clouds.
-MAX_WHITE: Final = 0.03
+MAX_WHITE: Final = 0.02
+#: With more, a sky or a flower gets an outline where it is cut off.
+MAX_CUT: Final = 0.03
+#: A window of stained glass that keeps this much still shows its glass, in a strong glow.
+MIN_CONTRAST: Final = 0.35
+_BRIGHT: Final = 200
+_BLOCK: Final = 8
 MIN_SEEN: Final = 0.05
 CELL: Final = (240, 160)
 Pixels = NDArray[Any]
@@ -42,21 +48,33 @@ class Change(NamedTuple):
 
     - `seen`: A component differs by more than 4 levels, which an eye finds beside the picture.
     - `white`: All components have become 250 or more, less those that were.
+    - `cut`: The largest component has become 255 of one below 250: what was there is lost.
+    - `contrast`: What is kept of the local contrast of bright areas, such as skies: of the mean
+      deviation of the largest components in blocks of 8 x 8 that were all above 200. 1 for pictures
+      with less than 1 % of such blocks.
     """
 
     seen: float
     white: float
+    cut: float
+    contrast: float
 
     @property
     def words(self) -> str:
-        """The first in percent, and the second if it is not 0."""
+        """The first in percent, and the others where they are not as before."""
         white = f", white {self.white:.1%}" if self.white >= 0.0005 else ""
-        return f"{self.seen:.0%}{white}"
+        cut = f", cut {self.cut:.1%}" if self.cut >= 0.0005 else ""
+        sky = f", sky {self.contrast:.0%}" if self.contrast < 0.95 else ""
+        return f"{self.seen:.0%}{white}{cut}{sky}"
 
     def fault(self, look: str) -> str:
         """Return what is wrong with a look; "" if nothing is."""
         if self.white > MAX_WHITE:
             return "clips to white"
+        if self.cut > MAX_CUT:
+            return "cuts off highlights"
+        if self.contrast < MIN_CONTRAST:
+            return "flattens skies"
         return "invisible" if look not in OF_HIGHLIGHTS and self.seen < MIN_SEEN else ""
 
 
@@ -64,7 +82,21 @@ def measure(before: Pixels, after: Pixels) -> Change:
     """Return what has changed between two 8-bit pictures (H, W, 3)."""
     difference = np.abs(after.astype(int) - before.astype(int)).max(axis=2)
     white = (after.min(axis=2) >= 250).mean() - (before.min(axis=2) >= 250).mean()
-    return Change(float((difference > 4).mean()), float(white))
+    peaks = before.max(axis=2), after.max(axis=2)
+    cut = (peaks[0] < 250) & (peaks[1] == 255)
+    blocks = [_blocks(one) for one in peaks]
+    is_bright = blocks[0].min(axis=1) > _BRIGHT
+    contrasts = [one[is_bright].std(axis=1).sum() for one in blocks]
+    has_sky = is_bright.mean() > 0.01 and contrasts[0] > 0
+    kept = contrasts[1] / contrasts[0] if has_sky else 1.0
+    return Change(float((difference > 4).mean()), float(white), float(cut.mean()), float(kept))
+
+
+def _blocks(levels: Pixels) -> Pixels:
+    """Return the complete blocks of (H, W) levels, each as a row."""
+    rows, columns = (side // _BLOCK for side in levels.shape)
+    whole = levels[: rows * _BLOCK, : columns * _BLOCK].reshape(rows, _BLOCK, columns, _BLOCK)
+    return whole.swapaxes(1, 2).reshape(-1, _BLOCK * _BLOCK)
 
 
 def levels_of(path: Path) -> Pixels:

@@ -242,6 +242,16 @@ class TestViewer:
         assert np.array_equal(scope["image"], vkbloom.read(path, expand=4))
         assert scope["settings"] == Separable(bloom=False)
         assert np.array_equal(viewer.frames["a"]["final"], vkbloom.read(path, expand=4))
+        # It is saved with the levels of the file that the command writes, and shown with those of
+        # half floats.
+        _, shown = frame(viewer, presets["photo"])
+        _, (saved,) = ask(viewer, kind="save", settings=presets["photo"].to_dict(), expand=4)
+        final = vkbloom.apply(path, "photo")["final"]
+        written = vkbloom.write(tmp_path / "c.png", final, expand=4).read_bytes()
+        expected = decode(written, tmp_path)
+        assert np.array_equal(decode(saved, tmp_path), expected)
+        assert np.abs(decode(shown, tmp_path).astype(int) - expected).max() <= 1
+        frame(viewer, Separable(bloom=False))
         # Of the next image, the settings stay.
         answer, _ = viewer.answer({"kind": "open", "name": "b.png"}, [path.read_bytes()])
         assert settings_from(answer["sides"]["a"]) == Separable(bloom=False)

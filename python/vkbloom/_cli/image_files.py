@@ -21,7 +21,7 @@ from vkbloom._io.decoding import check_space
 from vkbloom._io.expansion import PHOTO_EXPANSION
 from vkbloom._io.image_file import ImageFile
 from vkbloom._io.picture import Colour, Highlights, Picture, list_all
-from vkbloom._settings.settings import Settings
+from vkbloom._settings.settings import Settings, expansion_of_final
 
 #: Encodings of a written file.
 COLOURS: Final = ("linear", "srgb")
@@ -139,7 +139,8 @@ def finish(picture: Picture, final: NDArray[Any], settings: Settings) -> Picture
     if settings.alpha != "keep" and picture.has_straight:
         final = divide(final)
     encoding = picture.encoding if settings.encoding == "none" else settings.encoding
-    return dataclasses.replace(picture, pixels=final, encoding=encoding)
+    expand = expansion_of_final(settings, picture.expand)
+    return dataclasses.replace(picture, pixels=final, encoding=encoding, expand=expand)
 
 
 @contextmanager

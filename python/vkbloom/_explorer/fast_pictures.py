@@ -19,16 +19,20 @@ if TYPE_CHECKING:
 _LEVEL: Final = 1
 
 
-def picture_of(array: NDArray[Any], name: str, *, encoding: Encoding, stops: float) -> bytes:
+def picture_of(
+    array: NDArray[Any], name: str, *, encoding: Encoding, stops: float, expand: float = 1.0
+) -> bytes:
     """Return a framebuffer as PNG, shown as in `pictures.picture`, without alpha.
 
-    `encoding`: That of `final` in the settings.
+    - `encoding`: That of `final` in the settings.
+    - `expand`: What `final` is compressed from. Brightened or darkened, it is shown as light.
     """
-    return pictures.png(picture_levels(array, name, encoding=encoding, stops=stops), _LEVEL)
+    levels = picture_levels(array, name, encoding=encoding, stops=stops, expand=expand)
+    return pictures.png(levels, _LEVEL)
 
 
 def picture_levels(
-    array: NDArray[Any], name: str, *, encoding: Encoding, stops: float
+    array: NDArray[Any], name: str, *, encoding: Encoding, stops: float, expand: float = 1.0
 ) -> NDArray[np.uint8]:
     """Return the 8-bit levels of `picture_of`."""
     if array.dtype == np.uint8:
@@ -37,7 +41,8 @@ def picture_levels(
         encoding = encoding if name == "final" else "none"
         colours = array[:, :, :3]
         if encoding == "none":
-            colours = scale_to_1(colours, 2.0**-stops)
+            is_final = name == "final" and stops == 0
+            colours = scale_to_1(colours, 2.0**-stops, expand=expand if is_final else 1.0)
         with np.errstate(over="ignore"):
             halves = np.ascontiguousarray(colours).astype(np.float16, copy=False)
         picture = _levels(stops, encoding)[halves.view(np.uint16)]

@@ -266,7 +266,10 @@ class _Table:
         facts = viewer.describe(frames, name, viewer.expand["a"], _fit(viewer, self._size))
         code = self._codes.add(facts.pop("code"))
         facts["plan"] = self._plans.add(plan)
-        levels = picture_levels(frames[name], name, encoding=frames.settings.encoding, stops=0.0)
+        settings = frames.settings
+        expand = viewer.compressed_from(settings, viewer.expand["a"])
+        how: dict[str, Any] = {"encoding": settings.encoding, "stops": 0.0, "expand": expand}
+        levels = picture_levels(frames[name], name, **how)
         return [self._facts.add(facts), code, self._pictures.add(levels)]
 
 

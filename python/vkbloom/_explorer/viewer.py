@@ -72,7 +72,12 @@ from vkbloom._renderer.added_light import added_share, faint_note
 from vkbloom._renderer.frame_files import settings_facts
 from vkbloom._renderer.renderer import Renderer
 from vkbloom._scene import Scene
-from vkbloom._settings.settings import SHADINGS, check_settings, check_shading
+from vkbloom._settings.settings import (
+    SHADINGS,
+    check_settings,
+    check_shading,
+    expansion_of_final,
+)
 from vkbloom._views.pictures import png
 
 if TYPE_CHECKING:
@@ -314,7 +319,8 @@ class Viewer:
         stops = self._read_view(message)[-1]
         if self._scene is None and shown == "final" and stops == 0:
             # With the levels of the file that vkbloom apply writes.
-            pixels = levels_of(frames[shown], settings.encoding)[:, :, :3]
+            compressed = self.compressed_from(settings, expand)
+            pixels = levels_of(frames[shown], settings.encoding, compressed)[:, :, :3]
         else:
             pixels = picture_levels(frames[shown], shown, encoding=settings.encoding, stops=stops)
         is_expanded = self._highlights is Highlights.CLIPPED
@@ -451,6 +457,11 @@ class Viewer:
             return start_of(self._highlights, settings).expand
         return _expansion(asked[side])
 
+    def compressed_from(self, settings: Settings, expand: float | None) -> float:
+        """Return what a picture of `final` is compressed from, as in a file of `vkbloom apply`."""
+        is_expanded = self._highlights is Highlights.CLIPPED
+        return expansion_of_final(settings, expand) if is_expanded else 1.0
+
     def _faint_note(self, frames: Frames, expand: float | None, size: tuple[int, int]) -> str:
         """Return what a page says of a bloom that adds hardly any light to an image; else ""."""
         settings = frames.settings
@@ -493,7 +504,8 @@ class Viewer:
         if chain is not None and shown == "final":
             # What it leaves to the next frame is complete.
             chain.advance(shot.number, frames)
-        picture = picture_of(frames[shown], shown, encoding=settings.encoding, stops=stops)
+        how_shown = {"stops": stops, "expand": self.compressed_from(settings, shot.expand)}
+        picture = picture_of(frames[shown], shown, encoding=settings.encoding, **how_shown)
         return _Drawn(frames, picture, names, plan, chain)
 
     def _draw(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import warnings
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 from typing import Any, Final, Literal, get_args, overload
@@ -170,6 +171,7 @@ def write(
     premultiplied: bool = False,
     primaries: str = "rec709",
     view: str | None = None,
+    expand: float | None = None,
     metadata: Mapping[str, Any] | None = None,
 ) -> Path:
     """Write an array to an image file.
@@ -207,6 +209,10 @@ def write(
         (Rec.709)", of the first display that has it, or "DISPLAY/VIEW". It replaces `encoding`
         and `primaries`, and needs linear floats and a file of integers. The error for an unknown
         one lists all.
+    expand : float, optional
+        What `read` expanded the highlights up to, 1 to 1024. Files of integers for SDR get them
+        compressed by the inverse, so that a bright sky keeps its clouds; without it, all above 1 is
+        cut off. Not for a `final` with a `tonemap` or an `encoding`.
     metadata : mapping of str to object, optional
         Metadata from `read`, or attributes by OpenImageIO's names: text, numbers, or sequences of
         them.
@@ -234,6 +240,7 @@ def write(
     # No format has more than 32 bits.
     values = narrow(given, np.dtype(np.float32)) if given.dtype.name == "float64" else given
     is_float = values.dtype.kind == "f"
+    compressed = check_expansion(expand)
     saved = Saved(encoding, primaries, view)
     _check_conversions(values, saved, bits)
     safe_writing.writer_of(target)
@@ -242,6 +249,7 @@ def write(
     numbers = PIXEL_TYPES[values.dtype.name]
     encoded: SavedColour | None = "linear" if is_float else None
     picture = Picture.of_values(values, numbers, encoded, _add_types(oiio, metadata or {}))
+    picture = replace(picture, expand=compressed)
     bits = bits if is_float else None
     # (Of 32 bits, `chosen_layout` says that the format has no floats.)
     image_writing.check_options(target, saved, quality, None if bits == 32 else bits)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from vkbloom._extras import import_extra
 from vkbloom._io.chromaticities import CHROMATICITIES
+from vkbloom._io.expansion import KNEE, compress_peaks
 from vkbloom._io.hdr_curves import ENCODERS, HDR_CURVES
 from vkbloom._io.narrowing import narrow
 from vkbloom._io.picture import SPACES, Attributes, CodePoints
@@ -84,9 +85,18 @@ def is_hdr(saved: Saved) -> bool:
 
 
 def convert(
-    oiio: ModuleType, values: NDArray[Any], saved: Saved, curve: str, *, is_integer: bool
+    oiio: ModuleType,
+    values: NDArray[Any],
+    saved: Saved,
+    curve: str,
+    *,
+    is_integer: bool,
+    expand: float = 1.0,
 ) -> tuple[NDArray[Any], tuple[str, str] | str]:
-    """Return linear Rec. 709 floats (H, W, C) as a file has them, and what they are then."""
+    """Return linear Rec. 709 floats (H, W, C) as a file has them, and what they are then.
+
+    `expand`: What the highlights of the picture were expanded up to.
+    """
     if saved.view is not None:
         display, view = _display_of(oiio, saved.view)
         return _by_ocio(values, "ociodisplay", display, view, *_FROM_LINEAR), display
@@ -94,12 +104,15 @@ def convert(
         ends = PRIMARIES["rec709"], PRIMARIES[saved.primaries]
         values = narrow(between(values, *ends), values.dtype)
     if is_integer and curve in _ENDING_AT_1:
-        values = scale_to_1(values)
+        values = scale_to_1(values, expand=expand)
     return encode(values, curve), (saved.primaries, curve)
 
 
-def scale_to_1(values: NDArray[Any], limit: float = 1.0) -> NDArray[Any]:
+def scale_to_1(values: NDArray[Any], limit: float = 1.0, *, expand: float = 1.0) -> NDArray[Any]:
     """Return linear floats (H, W, C), in which no component of a colour is above the limit.
+
+    Highlights that were expanded are compressed first. Else all of a sky that an expansion takes
+    above 1 would be cut off there, and an outline would show where.
 
     A factor keeps the hue: Naik and Murthy, "Hue-preserving color image enhancement without gamut
     problem", IEEE Transactions on Image Processing 12(12), 2003. A clip of each component makes
@@ -107,12 +120,15 @@ def scale_to_1(values: NDArray[Any], limit: float = 1.0) -> NDArray[Any]:
     """
     count = values.shape[2] - (values.shape[2] in (2, 4))
     peak = values[:, :, :count].max(axis=2, keepdims=True)
-    is_over = np.isfinite(peak) & (peak > limit)
+    is_over = np.isfinite(peak) & (peak > (limit if expand == 1 else KNEE))
     if not is_over.any():
         return values
     # (Half floats are divided as single ones, so that only the result is rounded, to levels.)
     made = values.astype(np.result_type(values.dtype, np.float32))
-    made[:, :, :count] /= np.where(is_over, peak / made.dtype.type(limit), made.dtype.type(1))
+    one = made.dtype.type(1)
+    peak = np.where(is_over, peak, one)
+    wanted = np.minimum(compress_peaks(peak, expand), made.dtype.type(limit))
+    made[:, :, :count] /= np.where(is_over, peak / wanted, one)
     return made
 
 

@@ -1,4 +1,7 @@
-"""Expand the highlights of an image of integers, whose values end at 1, so that they can glow."""
+"""Expand the highlights of an image of integers, whose values end at 1, so that they can glow.
+
+A file of integers gets them compressed again by the inverse.
+"""
 
 from __future__ import annotations
 
@@ -45,15 +48,31 @@ def expand_highlights(image: NDArray[Any], expand: float | None) -> NDArray[Any]
     red, green, blue = np.moveaxis(colours, 2, 0)
     peak = np.clip(np.maximum(np.maximum(red, green), blue)[..., None], KNEE, 1)
     over = peak - image.dtype.type(KNEE)
-    steepness = 1 / (1 - KNEE) - 1 / (limit - KNEE)
-    factor = (KNEE + over / (1 - steepness * over)) / peak
+    factor = (KNEE + over / (1 - _steepness(limit) * over)) / peak
     result = image.copy()
     result[:, :, :3] *= factor.astype(image.dtype)
     return result
+
+
+def compress_peaks(peaks: NDArray[Any], expand: float) -> NDArray[Any]:
+    """Return the largest components of colours as they are before `expand_highlights`.
+
+    Values up to the knee, and all with an expansion of 1, stay as they are. Values above the
+    expansion, which light adds, come out above 1.
+    """
+    if expand == 1:
+        return peaks
+    over = np.maximum(peaks - peaks.dtype.type(KNEE), 0)
+    return np.where(over > 0, KNEE + over / (1 + _steepness(expand) * over), peaks)
+
+
+def _steepness(limit: float) -> float:
+    return 1 / (1 - KNEE) - 1 / (limit - KNEE)
 
 
 def expand_photograph(picture: Picture, expand: float | None) -> Picture:
     """Return a decoded picture with its highlights expanded, if the file has clipped ones."""
     if picture.highlights is not Highlights.CLIPPED:
         return picture
-    return replace(picture, pixels=expand_highlights(picture.pixels, expand))
+    pixels = expand_highlights(picture.pixels, expand)
+    return replace(picture, pixels=pixels, expand=check_expansion(expand))

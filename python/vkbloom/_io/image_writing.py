@@ -121,10 +121,10 @@ def save(
     return notes
 
 
-def levels_of(final: NDArray[Any], encoding: str) -> NDArray[np.uint8]:
+def levels_of(final: NDArray[Any], encoding: str, expand: float) -> NDArray[np.uint8]:
     """Return the levels that `save` writes of a `final` to an sRGB file of 8 bits."""
     if encoding == "none" and final.dtype.kind == "f":
-        final = displayed.encode(displayed.scale_to_1(final), "srgb")
+        final = displayed.encode(displayed.scale_to_1(final, expand=expand), "srgb")
     return _as_numbers(final, "uint8")
 
 
@@ -148,7 +148,9 @@ def _prepare(
         if saved.view is not None and not integer:
             raise ValueError(f"view: {target} has linear floats; write a file of integers")
         curve = saved.curve or ("srgb" if integer else "linear")
-        values, what = displayed.convert(oiio, values, saved, curve, is_integer=integer)
+        values, what = displayed.convert(
+            oiio, values, saved, curve, is_integer=integer, expand=picture.expand
+        )
     try:
         described = describe_as(oiio, picture, target, what)
     except ValueError as error:

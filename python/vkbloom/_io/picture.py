@@ -195,6 +195,8 @@ class Picture:
       another space or of the file's profile; "" if the values were not decoded.
     - `grey`: Whether the file has one colour channel instead of three.
     - `highlights`: What the file has of light above white; of decoded pictures.
+    - `expand`: What clipped highlights were expanded up to. A file of integers gets them
+      compressed.
     - `parts`: The names of the file's parts (the first 100), of which the pixels are one; "" for a
       part without a name.
     - `notes`: Notes for the user about how the file was read and interpreted.
@@ -207,6 +209,7 @@ class Picture:
     colour: str = ""
     grey: bool = False
     highlights: Highlights = Highlights.STORED
+    expand: float = 1.0
     parts: tuple[str, ...] = ("",)
     notes: tuple[str, ...] = ()
 

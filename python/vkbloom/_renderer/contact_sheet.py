@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from vkbloom._framebuffers import leading
 from vkbloom._renderer.framebuffers import Framebuffers
 from vkbloom._renderer.plans import sentence_of
+from vkbloom._settings.settings import expansion_of_final
 from vkbloom._views import markup, pictures
 from vkbloom._views.markup import element
 
@@ -82,7 +83,9 @@ def _picture(
 ) -> NDArray[np.uint8]:
     """Return a framebuffer as an 8-bit (H, W, C) picture, resized to (width, height)."""
     encoding = frames.settings.encoding if name == "final" else "none"
-    return pictures.picture(frames[name], name, encoding=encoding, size=size)
+    is_final = name == "final"
+    expand = expansion_of_final(frames.settings, frames.info.get("expand")) if is_final else 1.0
+    return pictures.picture(frames[name], name, encoding=encoding, size=size, expand=expand)
 
 
 def _facts(frames: Framebuffers, name: str) -> str:

@@ -334,6 +334,15 @@ def _field_of_psf(psf: Any, name: str) -> str:
     return field
 
 
+def expansion_of_final(settings: Settings, expand: float | None) -> float:
+    """Return what `final` is compressed from, for a picture that was expanded up to `expand`.
+
+    It is 1, nothing, where a tone mapping or an encoding has put the values into 0..1.
+    """
+    is_light = (settings.tonemap, settings.encoding) == ("none", "none")
+    return 1.0 if expand is None or not is_light else expand
+
+
 def check_shading(shading: str) -> Shading:
     """Return the shading; raise ValueError if there is no shading of that name."""
     if not isinstance(shading, str) or shading not in SHADINGS:

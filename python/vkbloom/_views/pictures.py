@@ -49,12 +49,14 @@ def picture(
     encoding: str = "none",
     size: tuple[int, int] | None = None,
     stops: float = 0.0,
+    expand: float = 1.0,
 ) -> NDArray[np.uint8]:
     """Convert an image to a viewable 8-bit picture.
 
     8-bit images are shown as stored. Float images are shown with the sRGB curve, unless `encoding`
     says that their colours have a curve; colours with a component above 1 are divided by the
-    largest one, which keeps their hue, others are clipped to 0..1. `normal` is shown as
+    largest one, which keeps their hue, others are clipped to 0..1. Highlights that were expanded up
+    to `expand` are compressed. `normal` is shown as
     (n + 1) / 2, `position` with each axis stretched to 0..1, depth from white (nearest) to black
     (farthest). NaN counts as 0.
     """
@@ -72,7 +74,7 @@ def picture(
         if stops != 0:
             values[:, :, :3] *= np.float32(2.0**stops)
         linear = encoding == "none"
-        shown = _clip(scale_to_1(values) if linear else values)
+        shown = _clip(scale_to_1(values, expand=expand) if linear else values)
     if size is not None:
         shown = resize(shown, *size)
     if linear:

@@ -183,7 +183,8 @@ def encode_signal(picture: Picture, coding: Coding) -> NDArray[np.float32]:
     if picture.encoding == "linear":
         primaries, curve = names_of_points(coding.read_primaries, coding.read_curve)
         oiio = import_extra("OpenImageIO", "images", "Writing videos")
-        values, _ = convert(oiio, values, Saved(curve, primaries), curve, is_integer=True)
+        saved, expand = Saved(curve, primaries), picture.expand
+        values, _ = convert(oiio, values, saved, curve, is_integer=True, expand=expand)
     signal = np.nan_to_num(values.astype(np.float32), nan=0.0, posinf=1.0, neginf=0.0)
     made: NDArray[np.float32] = np.clip(signal, 0, 1)
     return made
