@@ -243,6 +243,9 @@ def test_a_picture_of_a_grid_gives_itself_again(tmp_path: Path) -> None:
     np.testing.assert_array_equal(vkbloom.read(tmp_path / "b.png"), vkbloom.read(made))
 
 
+_TWICE = ("--amount", "2", "--intensity", "0.002")
+
+
 class TestFaintBlooms:
     """A bloom that adds less than 1 % of the light has a note with the remedy."""
 
@@ -256,7 +259,18 @@ class TestFaintBlooms:
             ("a.exr", ("--preset", "kino", "--intensity", "0.002"), "light: lower --threshold\n"),
             ("a.png", ("--preset", "bevy_natural"), ""),
             ("a.png", ("--preset", "bevy_natural", "--intensity", "0.004"), "0.39 % of the"),
-            ("a.exr", ("--method", "pyramid", "--intensity", "0.004"), "light: raise --intensity"),
+            ("a.exr", ("--method", "pyramid", "--intensity", "0.004"), "light: --amount 2\n"),
+            (
+                "a.exr",
+                ("--method", "pyramid", "--amount", "2", "--intensity", "0.002"),
+                "raise --int",
+            ),
+            # Of an expanded picture, "screen" makes white.
+            (
+                "a.png",
+                ("--preset", "star4", "--amount", "0.1"),
+                "threshold, or --amount 2\n",
+            ),
             ("a.png", ("--preset", "kino", "--no-bloom"), ""),
             ("a.png", ("--preset", "blender_streaks", "--mask", "mask.png"), ""),
             ("a.png", (), ""),

@@ -61,6 +61,7 @@ _FAILURES: Final = (OSError, ValueError, MemoryError, click.ClickException)
 # 8-bit pictures of this many pixels or more become half floats, whose steps are finer.
 _HALVED: Final = 1 << 26
 _HALF: Final = np.dtype(np.float16)
+_MAX_AMOUNT: Final = 2
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -209,12 +210,14 @@ class Run:
         is_chosen = self.options.start.is_chosen and not self.options.start.stages
         has_glow = self.options.mask is not None or self.options.emission is not None
         if not text and is_chosen and not has_glow and self.options.amount:
+            is_twice = self.options.amount == _MAX_AMOUNT
             text = faint_note(
                 added_share(picture.pixels, frames),
                 frames.settings,
                 highlights=picture.highlights,
                 expand=expand,
                 option="--{}",
+                stronger="raise --intensity" if is_twice else f"--amount {_MAX_AMOUNT}",
             )
         if text:
             note(f"{name}: {text}" if self.several else text)
@@ -326,7 +329,7 @@ def _send(file: Path, target: str) -> None:
 @click.option(
     "--amount",
     metavar="A",
-    type=click.FloatRange(0, 2),
+    type=click.FloatRange(0, _MAX_AMOUNT),
     default=1.0,
     help="Strength of the bloom: 1: as the preset has it; 0: none; 2: twice.",
 )

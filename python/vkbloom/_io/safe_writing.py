@@ -52,6 +52,8 @@ def writer_of(path: str | os.PathLike[str]) -> OpenImageIO.ImageOutput:
     oiio = import_extra("OpenImageIO", "images", "Writing images")
     suffix = Path(path).suffix
     writer: OpenImageIO.ImageOutput | None = oiio.ImageOutput.create(f"image{suffix}")
+    if not suffix:
+        raise ValueError(f"{os.fspath(path)}: a file needs an extension, such as .png or .exr")
     if writer is None:
         oiio.geterror()
     if writer is None or writer.format_name() in _FORMATS_WITHOUT_A_FILE:

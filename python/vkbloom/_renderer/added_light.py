@@ -25,6 +25,7 @@ def faint_note(
     highlights: Highlights | None,
     expand: float | None = None,
     option: str = "{}",
+    stronger: str = "raise intensity",
 ) -> str:
     """Return a text if a bloom adds less than 1 % of a picture's light, with the remedies; else "".
 
@@ -32,17 +33,19 @@ def faint_note(
     - `highlights`: Those of the picture's file; clipped ones can be expanded, and are up to
       `expand`.
     - `option`: What is written for a setting, such as "--{}".
+    - `stronger`: What is written for a stronger bloom.
     """
     if share is None or share >= _MIN_SHARE or not settings.bloom:
         return ""
     remedies = []
     if settings.threshold:
         remedies.append(f"lower {option.format('threshold')}")
-    if highlights is Highlights.CLIPPED:
+    # (The composite "screen" needs colours up to 1: of expanded ones it makes white.)
+    if highlights is Highlights.CLIPPED and settings.composite != "screen":
         larger = _EXPANDED if expand is None or expand == 1 else _MORE * expand
         remedies.append(f"{option.format('expand')} {larger:g}")
-    if not remedies:
-        remedies.append(f"raise {option.format('intensity')}")
+    elif not remedies or settings.composite == "screen":
+        remedies.append(stronger)
     percent = f"{max(100 * share, 0):.2g}"
     return f"the bloom adds {percent} % of the picture's light: {', or '.join(remedies)}"
 
