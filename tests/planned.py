@@ -1,4 +1,4 @@
-"""Plans of the core without a renderer, and what the package hands to the core."""
+"""Plans of the core without a renderer, what the package hands to the core, and derivatives."""
 
 from __future__ import annotations
 
@@ -8,6 +8,8 @@ import numpy as np
 
 from tests.scene.parts import Cubemap, Mesh
 from vkbloom import Scene, _core
+from vkbloom._gradients.passes import DeviceGradients, Passes, in_floats
+from vkbloom._gradients.pulling import pull_each
 from vkbloom._renderer.adapter import bundled_driver
 from vkbloom._renderer.new_arrays import new_array, new_arrays
 from vkbloom._renderer.sources import Inputs, image_source
@@ -17,13 +19,17 @@ __all__ = [
     "MESH",
     "SCENES",
     "SKY",
+    "DeviceGradients",
     "Inputs",
+    "Passes",
     "Row",
     "bundled_driver",
     "change",
     "image_source",
+    "in_floats",
     "new_array",
     "new_arrays",
+    "pull_each",
     "rows",
     "scene_arguments",
     "scene_plan",

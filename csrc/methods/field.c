@@ -342,7 +342,7 @@ static void add_weights_back(struct vkb_levels *levels, uint32_t image, const ui
         vkb_read_at(&row, (enum vkb_slot)(SLOT_FACTORS + i), each[i]);
     row.constants.products = (int32_t)count;
     row.constants.alpha = alpha;
-    snprintf(name, sizeof name, "adjoint_rows_of_weights_%u", first / 4);
+    snprintf(name, sizeof name, "adjoint_weight_rows_%u", first / 4);
     const uint32_t columns = add_node_sums(levels, row, true, name, false);
     row = vkb_fullscreen_row("weights", &vkb_shader_adjoint_weights_frag, VKB_NO_IMAGE);
     vkb_read_only(&row, columns);

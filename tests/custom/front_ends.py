@@ -5,6 +5,7 @@ Tests that change files by the thousand call it without the compilers behind it.
 
 from __future__ import annotations
 
+from vkbloom._custom.compiler import find_compiler, identity, run_limited
 from vkbloom._custom.described import files, shaderlab, slang, wgsl
 from vkbloom._custom.described.binding import bind
 from vkbloom._custom.described.files import MAX_FILES
@@ -27,9 +28,12 @@ __all__ = [
     "compile_all",
     "compile_described",
     "files",
+    "find_compiler",
     "find_lines",
+    "identity",
     "open_described",
     "read_schema",
+    "run_limited",
     "shaderlab",
     "slang",
     "wgsl",

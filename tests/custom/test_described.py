@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 import vkbloom
 from tests.cli.calls import succeed
 from tests.custom.broken import SHADERS
+from tests.custom.front_ends import find_compiler, identity, run_limited
 from tests.images import picture
 from vkbloom import Renderer, Settings, ShaderError, load_method, reference, testing
-from vkbloom._custom.compiler import find_compiler, identity, run_limited
 
 pytestmark = pytest.mark.usefixtures("glslang")
 

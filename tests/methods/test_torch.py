@@ -17,9 +17,9 @@ from vkbloom import Renderer, reference, testing
 
 torch = pytest.importorskip("torch", reason="PyTorch is not installed; run make test-torch")
 
+from tests.planned import Passes  # noqa: E402
 from vkbloom import torch as vkbloom_torch  # noqa: E402
 from vkbloom._gradients import operators  # noqa: E402
-from vkbloom._gradients.passes import Passes  # noqa: E402
 
 #: Tensors are on the GPU where the tests run on one.
 DEVICE = "cuda" if ADAPTER == "hardware" and torch.cuda.is_available() else "cpu"

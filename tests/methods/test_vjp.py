@@ -12,11 +12,9 @@ import pytest
 
 import vkbloom
 from tests.images import random_image
+from tests.planned import DeviceGradients, Inputs, Passes, pull_each
 from tests.refusals import assert_refused, rows
 from vkbloom import Renderer, reference
-from vkbloom._gradients.passes import DeviceGradients, Passes
-from vkbloom._gradients.pulling import pull_each
-from vkbloom._renderer.sources import Inputs
 
 ONES = np.ones((4, 4, 3), np.float32)
 

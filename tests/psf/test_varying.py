@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import vkbloom
+from tests.planned import Inputs, Passes, in_floats
 from tests.psf.fields import (
     FIELDS,
     Array,
@@ -25,8 +26,6 @@ from tests.psf.fields import (
 )
 from tests.variants import VARIANTS, open_variant
 from vkbloom import psf, reference, testing
-from vkbloom._gradients.passes import Passes, in_floats
-from vkbloom._renderer.sources import Inputs
 
 FRAME = 21, 15
 BOUNDARIES = "zero", "edge", "wrap"
