@@ -48,6 +48,10 @@ def test_no_rule_of_accessibility_is_broken(page: Any) -> None:
         assert page.evaluate("document.documentElement.scrollWidth") <= width
         found = axe.run(page)
         assert found.violations_count == 0, found.generate_report()
+    # With a column of the page's own headings.
+    page.goto(DOCS.joinpath("looks.html").as_uri())
+    found = axe.run(page)
+    assert found.violations_count == 0, found.generate_report()
 
 
 def test_the_picture_shows_both_sides_on_a_narrow_screen(page: Any) -> None:
