@@ -42,6 +42,8 @@ vkb_variant_add vkb_add_nine_variant;
 vkb_variant_add vkb_add_filtered_variant, vkb_add_filtered_final_variant, vkb_add_gathered_variant;
 // Iterations of streaks.
 vkb_variant_add vkb_add_streaks_variant;
+// Sun beams, whose pixels on a line share texels.
+vkb_variant_add vkb_add_beams_variant;
 // Transforms: of complete lines in shared memory; stages of images with linear texels.
 vkb_variant_add vkb_add_transform_lines_variant, vkb_add_transform_variant;
 // Weights and products of a field of kernels.

@@ -160,6 +160,20 @@ def test_beams_of_single_lamps(renderer: Renderer, sun: Any, alpha: Any) -> None
         assert_matches_reference(renderer.apply(image, settings), image, settings)
 
 
+@pytest.mark.parametrize("size", [(61, 93), (97, 40), (3, 70), (1, 1)])
+@pytest.mark.parametrize("sun", [(0.5, 0.5), (0.13, 0.91), (0.99, 0.3)])
+def test_beams_of_dense_light(renderer: Renderer, size: tuple[int, int], sun: Any) -> None:
+    """On CPUs pixels on a line to the sun share texels: around suns near and at edges, without gaps
+    between lines, also where rays are short.
+    """
+    image = np.random.default_rng(1).random((*size, 3), np.float32)
+    for share in (0.5, 0.1):
+        settings = BlenderGlare(
+            type="sun_beams", sun_position=sun, size=share, threshold=None, format="rgba32float"
+        )
+        assert_matches_reference(renderer.apply(image, settings), image, settings)
+
+
 def test_kinos_threshold_is_0_8_in_srgb() -> None:
     assert KinoBloom().threshold == pytest.approx(0.6038273, abs=1e-7)
 
