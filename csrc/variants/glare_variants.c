@@ -47,9 +47,8 @@ bool vkb_add_beams_variant(struct vkb_variant_choice *choice, const struct vkb_p
                                                    : NULL;
     struct vkb_pass_row row;
 
-    if (!(shader && vkb_computes(pass, VKB_BLOCK_sun_beams)
-          && pass->reads[SLOT_DARK] != VKB_NO_IMAGE && pass->constants.alpha != ALPHA_BLUR
-          && has_sun(&pass->params.sun_beams, image)
+    if (!(shader && pass->shader == &vkb_shader_sun_beams_frag && !pass->constants.jittered
+          && pass->constants.alpha != ALPHA_BLUR && has_sun(&pass->params.sun_beams, image)
           && vkb_fits_linear(choice, pass)
           // One storage buffer has all rows.
           && (uint64_t)(width + VKB_WORD_SIZE) * height * VKB_WORD_SIZE

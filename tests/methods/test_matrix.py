@@ -17,6 +17,7 @@ from tests.methods.cases import GIVEN, METHODS, OTHERS, WHOLE, presets_of_low_le
 from tests.tolerance import assert_matches_reference
 from tests.variants import VARIANTS
 from vkbloom import (
+    BlenderGlare,
     Convolution,
     Dirt,
     Ghosts,
@@ -64,13 +65,15 @@ if EXHAUSTIVE:
 
 
 def has_equal_bits(settings: Settings) -> bool:
-    """Whether variants add in one order: not in blurs into another size and in transforms."""
+    """Whether variants add in one order: not in blurs into another size, transforms, sun beams."""
     if isinstance(settings, Separable):
         is_resized = settings.bloom_size is not None or settings.bloom_scale != 1
         return not is_resized and min(settings.weights) >= 0
     is_transformed = (
         isinstance(settings, Convolution | Halation) or settings == PRESETS["blender_fog_glow"]
     )
+    if isinstance(settings, BlenderGlare) and settings.type == "sun_beams":
+        return False
     return not is_transformed and not isinstance(settings, UrpBloom | ThreeBloom)
 
 
