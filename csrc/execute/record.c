@@ -389,7 +389,7 @@ void vkb_record_pipelines(struct vkb_run *run)
     uint32_t running = 0;
 
     for (uint32_t i = 0; rows && i < count; ++i)
-        if (planner->needed[i] && !planner->current[i]) {
+        if (planner->needed[i] && !planner->current[i] && !run->graph->passes[i].host) {
             struct vkb_output *output;
             rows[running++] = make_row(run, i, &output);
         }
@@ -464,6 +464,40 @@ static void begin_rendering(struct vkb_run *run, const struct vkb_pass_row *pass
     vk->vkCmdSetScissor(commands, 0, 1, &area);
 }
 
+// The image's pixels; none where a pass reads or writes no image.
+static struct vkb_host_image host_image(const struct vkb_run *run, uint32_t index)
+{
+    if (index == VKB_NO_IMAGE)
+        return (struct vkb_host_image){0};
+    const struct vkb_image *image = &run->images[index]->image;
+    return (struct vkb_host_image){
+        .pixels = image->mapped,
+        .pitch = image->row_pitch / sizeof(float),
+        .width = image->width,
+        .height = image->height,
+    };
+}
+
+// Submits what is recorded, waits for it and for all submissions before it, and runs the pass. Its
+// time is from the end of one submission to the start of the next.
+static bool run_on_host(struct vkb_run *run, const struct vkb_pass_row *pass,
+                        struct vkb_error *error)
+{
+    struct vkb_device *device = run->device;
+    struct vkb_submission *submission = run->submission;
+    struct vkb_host_image reads[VKB_MAX_READS], target = host_image(run, pass->targets[0]);
+
+    for (uint32_t slot = 0; slot < VKB_MAX_READS; ++slot)
+        reads[slot] = host_image(run, slot < pass->read_count ? pass->reads[slot] : VKB_NO_IMAGE);
+    vkb_barrier_record(device, submission->commands.buffer, NULL, true, VKB_ACCESS_RESOURCE,
+                       VKB_ACCESS_HOST_READ);
+    return vkb_buffer_flush(device, &submission->uniforms, error)
+        && vkb_submission_submit(device, submission, NULL, error)
+        && vkb_submission_wait(device, &run->frame->submissions, submission, error)
+        && pass->host(pass, reads, &target, device->workers, error)
+        && vkb_commands_begin(device, &submission->commands, error);
+}
+
 // Records passes first..end-1, a dispatch or those of a render pass, with one timing. Within a
 // render pass, tiling devices and lavapipe do not keep the order of draws, so single draws cannot
 // be timed.
@@ -487,7 +521,7 @@ static bool record_passes(struct vkb_run *run, uint32_t first, uint32_t end,
                              vkb_pass_in_place(pass) ? VKB_ACCESS_DISPATCH_CHANGED
                                                      : VKB_ACCESS_DISPATCH_STORED);
     for (uint32_t i = first; i < end; ++i)
-        if (!record_pass(run, i, error))
+        if (!(pass->host ? run_on_host(run, pass, error) : record_pass(run, i, error)))
             return false;
     if (draws)
         device->vk.vkCmdEndRendering(commands);

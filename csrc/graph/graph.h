@@ -134,14 +134,30 @@ enum vkb_blend {
     VKB_BLEND_ADD_RGBA,
 };
 
+// The pixels of an image in the host's memory: rows of single floats, `pitch` of them from one row
+// to the next.
+struct vkb_host_image {
+    float *pixels;  // NULL: there is no image
+    size_t pitch;
+    uint32_t width, height;
+};
+
+struct vkb_pass_row;
+struct vkb_workers;
+// A pass that the host runs between two submissions, on devices whose images are in its memory.
+// `reads`: by slot.
+typedef bool vkb_host_pass(const struct vkb_pass_row *pass, const struct vkb_host_image *reads,
+                           const struct vkb_host_image *target, struct vkb_workers *workers,
+                           struct vkb_error *error);
+
 // Of a pass of a convolution by transforms: the lengths of its lines along rows and columns,
 // whether these are padded, so that they may be longer, and how many stages along the same axis
-// follow each other from this one on; 0: it is not the first of them. `last_radix`: of a last stage
-// along columns whose results only products read, and of these products, which may do that stage.
+// follow each other from this one on; 0: it is not the first of them. `channels`: of a pass on the
+// host, that have spectra.
 struct vkb_transform {
     uint32_t width, height;
     bool pads_rows, pads_columns;
-    uint32_t stages, last_radix;
+    uint32_t stages, channels;
 };
 
 // Bindings: 0 is the parameter block, then the images read, by slot, then the targets of a
@@ -160,6 +176,7 @@ struct vkb_pass_row {
     uint32_t read_count;              // slots
     uint8_t sampling[VKB_MAX_READS];  // by slot, of VKB_SAMPLING_*
     enum vkb_reading reading;
+    vkb_host_pass *host;   // of a dispatch that the host runs; NULL: the device does
     bool fused;            // a fused pass: may replace the pass before it, with the same target
     bool gains_if_finite;  // is compiled a second time, for sources without NaN and infinity
     uint32_t block_width, block_height;    // of a dispatch: pixels of a workgroup

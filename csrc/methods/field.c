@@ -130,10 +130,9 @@ static void set_radices(const struct vkb_convolution *convolution,
 }
 
 // Adds the sum of products of spectra of images and kernels. `added` is a sum that is added;
-// VKB_NO_IMAGE: none. `last_radix`: as in struct vkb_transform.
+// VKB_NO_IMAGE: none.
 static uint32_t add_products(const struct vkb_convolving *passes, const uint32_t *images,
-                             const uint32_t *kernels, uint32_t count, uint32_t last_radix,
-                             uint32_t added)
+                             const uint32_t *kernels, uint32_t count, uint32_t added)
 {
     const uint32_t target =
         vkb_add_spectrum(passes, "product", vkb_padded_size(passes->convolution));
@@ -150,7 +149,9 @@ static uint32_t add_products(const struct vkb_convolving *passes, const uint32_t
     row.constants.stage = passes->levels->settings->kernel.grey ? STAGE_GREY : STAGE_PRODUCT;
     row.block = VKB_BLOCK_products;
     row.transform = vkb_transform_of(passes->convolution, 0);
-    row.transform.last_radix = last_radix;
+    // The alpha is one of a cotangent.
+    if (passes->transposed)
+        row.constants.alpha = ALPHA_BLUR;
     row.params.products.kernel_sign = vkb_conjugates(passes) ? -1.0f : 1.0f;
     if (!passes->levels->settings->kernel.grey)
         set_radices(passes->convolution, &row.params.products);
@@ -163,12 +164,7 @@ static uint32_t add_spread(const struct vkb_convolving *passes, const struct fie
                            uint32_t image, const struct vkb_image_row *result)
 {
     const struct vkb_field *data = &passes->levels->settings->field;
-    const struct vkb_fft_line *line = &passes->convolution->y.line;
-    struct vkb_graph *graph = passes->levels->graph;
     uint32_t sum = VKB_NO_IMAGE, rows = VKB_NO_IMAGE, images[VKB_MAX_FIELD];
-    // The first stage pads. A kernel with colours needs a frequency of another block, too.
-    const bool joins = line->stage_count > 1 && passes->levels->settings->kernel.grey;
-    const uint32_t last_radix = joins ? line->radices[line->stage_count - 1] : 0;
 
     for (uint32_t k = 0; k < data->count; ++k) {
         VKB_OF_KERNEL(own, passes, k);
@@ -177,13 +173,11 @@ static uint32_t add_spread(const struct vkb_convolving *passes, const struct fie
         if (k % data->down == 0)
             rows = vkb_add_rows(&own, image, &column);
         images[k] = vkb_add_columns(&own, rows, &row);
-        if (!passes->levels->failed)
-            graph->passes[graph->pass_count - 1].transform.last_radix = last_radix;
     }
     for (uint32_t k = 0; k < data->count; k += MAX_PRODUCTS) {
         const uint32_t some = data->count - k < MAX_PRODUCTS ? data->count - k : MAX_PRODUCTS;
         VKB_OF_KERNEL(own, passes, k);
-        sum = add_products(&own, images + k, field->spectra + k, some, last_radix, sum);
+        sum = add_products(&own, images + k, field->spectra + k, some, sum);
     }
     const uint32_t columns = vkb_add_columns_back(passes, sum, VKB_NO_IMAGE, &vkb_unweighted);
     return vkb_add_rows_back(passes, columns, &vkb_unweighted, result);
@@ -195,7 +189,7 @@ static uint32_t add_product_back(const struct vkb_convolving *passes, uint32_t s
 {
     if (passes->levels->settings->kernel.grey)
         return vkb_add_columns_back(passes, spectrum, kernel, weighing);
-    const uint32_t product = add_products(passes, &spectrum, &kernel, 1, 0, VKB_NO_IMAGE);
+    const uint32_t product = add_products(passes, &spectrum, &kernel, 1, VKB_NO_IMAGE);
     return vkb_add_columns_back(passes, product, VKB_NO_IMAGE, weighing);
 }
 

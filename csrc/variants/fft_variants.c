@@ -1,8 +1,11 @@
-// Fourier transforms of complete lines in shared memory, which a GPU has close to its arithmetic:
-// all stages along an axis are one pass, and along columns those forth, the product and those back.
+// Fourier transforms of complete lines: in shared memory, which a GPU has close to its arithmetic,
+// or on the host, where images are in its memory. All stages along an axis are one pass, and along
+// columns those forth, the product and those back.
 #include "passes/fft.h"
+#include "passes/host_fft.h"
 #include "variants/variant.h"
 
+#include <stdio.h>
 #include <string.h>
 
 // Of a line in a workgroup.
@@ -96,6 +99,18 @@ static bool multiplies(const struct vkb_pass_row *pass)
     return pass->constants.stage == STAGE_PRODUCT || pass->constants.stage == STAGE_GREY;
 }
 
+// What comes back is weighted by its last stage.
+static void copy_weighing(struct vkb_pass_row *row, const struct vkb_pass_row *last)
+{
+    row->constants.weighted = last->constants.weighted;
+    row->constants.adds_image = last->constants.adds_image;
+    row->reads[SLOT_WEIGHTS] = last->reads[SLOT_WEIGHTS];
+    row->reads[SLOT_ADDED] = last->reads[SLOT_ADDED];
+    row->params.fft.weight = last->params.fft.weight;
+    row->params.fft.before_x = last->params.fft.before_x;
+    row->params.fft.before_y = last->params.fft.before_y;
+}
+
 // The row for all stages along an axis, from `first` to before `end`.
 static struct vkb_pass_row make_row(const struct vkb_variant_choice *choice,
                                     const struct vkb_pass_row *first,
@@ -113,16 +128,8 @@ static struct vkb_pass_row make_row(const struct vkb_variant_choice *choice,
     if (first->constants.inverse && horizontal)
         row.reads[SLOT_SOURCE] = graph->passes[graph->pass_count - 1].targets[0];
     row.targets[0] = first->constants.inverse ? last->targets[0] : first->targets[0];
-    // What comes back is weighted by its last stage.
-    if (first->constants.inverse) {
-        row.constants.weighted = last->constants.weighted;
-        row.constants.adds_image = last->constants.adds_image;
-        row.reads[SLOT_WEIGHTS] = last->reads[SLOT_WEIGHTS];
-        row.reads[SLOT_ADDED] = last->reads[SLOT_ADDED];
-        row.params.fft.weight = last->params.fft.weight;
-        row.params.fft.before_x = last->params.fft.before_x;
-        row.params.fft.before_y = last->params.fft.before_y;
-    }
+    if (first->constants.inverse)
+        copy_weighing(&row, last);
     if (first->constants.inverse && horizontal)
         row.constants.stage = STAGE_LAST;
     for (const struct vkb_pass_row *pass = first; pass < end; ++pass)
@@ -218,45 +225,161 @@ bool vkb_add_transform_lines_variant(struct vkb_variant_choice *choice,
     return vkb_add_variant_pass(choice, &row);
 }
 
-static const struct vkb_shader *const stage_shaders[VKB_FORMAT_COUNT] = VKB_LINEAR_BY_FORMAT(fft);
-static const struct vkb_shader *const stored_shaders[VKB_FORMAT_COUNT] = VKB_BY_FORMAT(fft_stored);
+static const struct vkb_shader *const glow_shaders[VKB_FORMAT_COUNT] =
+    VKB_LINEAR_BY_FORMAT(fft_pixels);
+static const struct vkb_shader *const stored_shaders[VKB_FORMAT_COUNT] =
+    VKB_BY_FORMAT(fft_pixels_stored);
 
-// A storage buffer must reach the complete target: an invocation stores to places far apart.
-static bool reaches(const struct vkb_device *device, const struct vkb_image_row *row)
+// Half of the frequencies of each channel.
+static uint32_t spectra_width(const struct vkb_pass_row *pass)
 {
-    return (uint64_t)vkb_image_row_pitch(row->format, row->width) * row->height
-        <= device->limits.maxStorageBufferRange;
+    return 2 * (pass->transform.width / 2 + 1);
 }
 
-bool vkb_add_field_variant(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
+// The same for all passes of a convolution.
+static bool runs_on_host(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
 {
-    struct vkb_pass_row row;
+    return pass->transform.width && choice->device->linear_texels
+        && vkb_image_fits_linear_texels(choice->device, VKB_FORMAT_RGBA32_FLOAT,
+                                        spectra_width(pass), pass->transform.height);
+}
 
-    if (!vkb_computes(pass, VKB_BLOCK_products) || !vkb_fits_linear(choice, pass)
-        || !reaches(choice->device, &choice->graph->images[pass->targets[0]]))
-        return false;
-    memcpy(&row, pass, sizeof row);
-    row.constants.radix_1 = (int32_t)pass->transform.last_radix;
-    vkb_make_linear(&row, &vkb_shader_products_linear_rgba32float, 1,
-                    pass->transform.last_radix ? pass->transform.last_radix : TEXEL_ROWS);
+// The pass that makes single floats of the glow, or stores them as the bloom.
+static bool add_pixels(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
+                       uint32_t from, uint32_t to)
+{
+    const struct vkb_image_row *images = choice->graph->images;
+    const bool last = pass->constants.stage == STAGE_LAST;
+    struct vkb_pass_row row = vkb_fullscreen_row(
+        pass->name, last ? stored_shaders[images[to].format] : glow_shaders[images[from].format],
+        to);
+
+    vkb_read_only(&row, from);
+    vkb_make_linear(&row, row.shader, 1, TEXEL_ROWS);
+    row.constants.stage = pass->constants.stage;
+    row.constants.alpha = pass->constants.alpha;
+    row.constants.prefiltered = pass->constants.prefiltered;
+    row.block = VKB_BLOCK_fft;
+    row.params.fft.prefilter_min = pass->params.fft.prefilter_min;
+    row.params.fft.prefilter_max = pass->params.fft.prefilter_max;
+    row.params.fft.prefilter_factor = pass->params.fft.prefilter_factor;
     return vkb_add_variant_pass(choice, &row);
 }
 
-bool vkb_add_transform_variant(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
+// An image of single floats for another one. True: it is new.
+static bool add_floats(struct vkb_variant_choice *choice, uint32_t of, uint32_t *floats)
 {
-    const struct vkb_image_row *target = &choice->graph->images[pass->targets[0]];
+    const struct vkb_image_row *row = &choice->graph->images[of];
+    const struct vkb_size size = {row->width, row->height};
+    char name[VKB_NAME_SIZE];
+
+    snprintf(name, sizeof name, "%cfloats_of_%.*s", VKB_INTERNAL_NAME, VKB_NAME_SIZE - 12,
+             row->name);
+    *floats = vkb_graph_find(choice->graph, name);
+    if (*floats != VKB_NO_IMAGE)
+        return false;
+    *floats = vkb_add_float_image(choice, name + 1, size);
+    return !choice->failed;
+}
+
+static bool is_single_float(const struct vkb_variant_choice *choice, uint32_t image)
+{
+    return choice->graph->images[image].format == VKB_FORMAT_RGBA32_FLOAT;
+}
+
+// Adds a row as a pass on the host.
+static bool add_host_pass(struct vkb_variant_choice *choice, struct vkb_pass_row *row,
+                          vkb_host_pass *host)
+{
+    static const struct vkb_shader shader = {.name = "host"};
+
+    vkb_make_linear(row, &shader, 1, 1);
+    row->host = host;
+    row->vertex = NULL;
+    // A kernel, which is transformed in place, has those of cotangents, too.
+    const bool kernel = row->reads[SLOT_SOURCE] == row->targets[0];
+    row->transform.channels = kernel || row->constants.alpha == ALPHA_BLUR ? 4 : 3;
+    return vkb_add_variant_pass(choice, row);
+}
+
+static bool add_host_rows_forth(struct vkb_variant_choice *choice, struct vkb_pass_row *row)
+{
+    const bool first = row->constants.stage == STAGE_FIRST;
+
+    if (first
+        && (row->constants.prefiltered || !is_single_float(choice, row->reads[SLOT_SOURCE]))) {
+        // Transforms of one glow by several weights share it.
+        uint32_t floats;
+        if (add_floats(choice, row->reads[SLOT_SOURCE], &floats))
+            add_pixels(choice, row, row->reads[SLOT_SOURCE], floats);
+        row->reads[SLOT_SOURCE] = floats;
+    }
+    choice->graph->images[row->targets[0]].width = spectra_width(row);
+    return add_host_pass(choice, row, vkb_host_rows_forth);
+}
+
+static bool add_host_rows_back(struct vkb_variant_choice *choice, struct vkb_pass_row *row)
+{
+    const uint32_t target = row->targets[0];
+
+    row->constants.stage = STAGE_LAST;
+    row->params.fft.kept = (int)choice->graph->images[target].width;
+    if (is_single_float(choice, target))
+        return add_host_pass(choice, row, vkb_host_rows_back);
+    const struct vkb_pass_row last = *row;
+    row->constants.stage = 0;
+    return !add_floats(choice, target, &row->targets[0])
+        || (add_host_pass(choice, row, vkb_host_rows_back)
+            && add_pixels(choice, &last, row->targets[0], target));
+}
+
+// Columns forth, also with the product and back, or columns back.
+static bool add_host_columns(struct vkb_variant_choice *choice, struct vkb_pass_row *row,
+                             const struct vkb_pass_row *end)
+{
+    struct vkb_image_row *target = &choice->graph->images[row->targets[0]];
+    bool returns = row->constants.inverse;
+
+    for (const struct vkb_pass_row *pass = end - row->transform.stages; pass < end; ++pass)
+        if (multiplies(pass)) {
+            row->reads[SLOT_SPECTRUM] = pass->reads[SLOT_SPECTRUM];
+            row->constants.stage = STAGE_PRODUCT;
+            row->params.fft.kernel_sign = pass->params.fft.kernel_sign;
+            returns = true;
+        }
+    target->width = spectra_width(row);
+    target->height = returns ? (uint32_t)end[-1].params.fft.kept : row->transform.height;
+    row->params.fft.kept = (int)target->height;
+    return add_host_pass(choice, row, vkb_host_columns);
+}
+
+bool vkb_add_host_transform_variant(struct vkb_variant_choice *choice,
+                                    const struct vkb_pass_row *pass)
+{
+    const struct vkb_pass_row *end = pass + pass->transform.stages;
     struct vkb_pass_row row;
 
-    if (!(vkb_computes(pass, VKB_BLOCK_fft) && vkb_fits_linear(choice, pass)
-          && reaches(choice->device, target)))
+    if (!runs_on_host(choice, pass))
         return false;
-    // The products, whose images are alike, do this stage.
-    if (pass->transform.last_radix)
+    memcpy(&row, pass, sizeof row);
+    if (pass->block == VKB_BLOCK_fft_kernel) {
+        row.params.fft_kernel.grey = 0;
+        choice->graph->images[row.targets[0]].width = spectra_width(pass);
+        return vkb_add_variant_pass(choice, &row);
+    }
+    if (pass->block == VKB_BLOCK_products) {
+        choice->graph->images[row.targets[0]].width = spectra_width(pass);
+        return add_host_pass(choice, &row, vkb_host_products);
+    }
+    // The first stage along an axis stands for all.
+    if (pass->transform.stages == 0)
         return true;
-    const struct vkb_image_row *from = &choice->graph->images[pass->reads[SLOT_SOURCE]];
-    memcpy(&row, pass, sizeof row);
-    row.reading = VKB_READING_LINEAR_TEXELS;
-    row.shader = pass->constants.stage == STAGE_LAST ? stored_shaders[target->format]
-                                                     : stage_shaders[from->format];
-    return vkb_add_variant_pass(choice, &row);
+    if (row.constants.inverse) {
+        row.targets[0] = end[-1].targets[0];
+        copy_weighing(&row, end - 1);
+    }
+    if (row.constants.direction == DIRECTION_VERTICAL)
+        return add_host_columns(choice, &row, end);
+    return row.constants.inverse ? add_host_rows_back(choice, &row)
+                                 : add_host_rows_forth(choice, &row);
 }

@@ -44,10 +44,8 @@ vkb_variant_add vkb_add_filtered_variant, vkb_add_filtered_final_variant, vkb_ad
 vkb_variant_add vkb_add_streaks_variant;
 // Sun beams, whose pixels on a line share texels.
 vkb_variant_add vkb_add_beams_variant;
-// Transforms: of complete lines in shared memory; stages of images with linear texels.
-vkb_variant_add vkb_add_transform_lines_variant, vkb_add_transform_variant;
-// Weights and products of a field of kernels.
-vkb_variant_add vkb_add_field_variant;
+// Transforms of complete lines: in shared memory, or on the host.
+vkb_variant_add vkb_add_transform_lines_variant, vkb_add_host_transform_variant;
 // Adjoint passes: of images with linear texels; of kernels; transposed filters in tiles and in
 // lines, fused with the composite's, and with those of the other pictures of an image.
 vkb_variant_add vkb_add_adjoint_linear_variant, vkb_add_adjoint_kernels_variant,

@@ -19,3 +19,11 @@ vec3 back_prefiltered(vec3 colour, vec3 cotangent)
     float slope = params.prefilter_factor * larger(params.prefilter_max, line);
     return ratio * cotangent + LUMINANCE * (dot(cotangent, colour / luminance) * (slope - ratio));
 }
+
+// What a convolution spreads of a texel: finite, and so that sums are, too.
+vec4 glow_of(vec4 texel)
+{
+    vec4 finite = finite_or_zero(texel);
+    vec4 kept = vec4(limited(finite.rgb, FFT_LIMIT), limited(finite.aaa, FFT_LIMIT).r);
+    return vec4(PREFILTERED != 0 ? prefiltered(kept.rgb) : kept.rgb, ALPHA == ALPHA_BLUR ? kept.a : 0.0);
+}

@@ -3,13 +3,6 @@
 
 #include "lib/bright.glsl"
 
-vec4 glow_of(vec4 texel)
-{
-    vec4 finite = finite_or_zero(texel);
-    vec4 kept = vec4(limited(finite.rgb, FFT_LIMIT), limited(finite.aaa, FFT_LIMIT).r);
-    return vec4(PREFILTERED != 0 ? prefiltered(kept.rgb) : kept.rgb, ALPHA == ALPHA_BLUR ? kept.a : 0.0);
-}
-
 vec4 load_lit(int along, int across)
 {
     vec4 texel = load_source(texel_at(along, across));

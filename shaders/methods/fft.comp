@@ -17,17 +17,9 @@
 // PADDED reads what lies beyond the source's edges by the boundary.
 
 UNIFORM_BLOCK(FFT_BLOCK);
-#ifndef TARGET_BYTES
-#define TARGET_BYTES 4
-#endif
-#ifdef LINEAR_TEXELS
-#include "variants/pixels.glsl"
-#define READ_FLOATS READ_IMAGE
-#else
 #define READ_IMAGE(slot, name) \
     layout(set = 0, binding = BINDING_OF(slot), SOURCE_FORMAT) uniform readonly image2D name
 #define READ_FLOATS(slot, name) layout(set = 0, binding = BINDING_OF(slot), rgba32f) uniform readonly image2D name
-#endif
 #include "lib/fourier.glsl"
 #include "lib/frequencies.glsl"
 
@@ -36,22 +28,9 @@ READ_IMAGE(SLOT_SOURCE, source);
 READ_FLOATS(SLOT_SPECTRUM, factor);
 READ_FLOATS(SLOT_WEIGHTS, weights);
 READ_FLOATS(SLOT_ADDED, added);
-#ifndef LINEAR_TEXELS
 layout(set = 0, binding = TARGET_BINDING) uniform writeonly image2D target;
-#elif TARGET_BYTES == 4
-layout(set = 0, binding = TARGET_BINDING, std430) writeonly buffer Target { u64vec2 texels[]; } target;
-#elif TARGET_BYTES == 2
-layout(set = 0, binding = TARGET_BINDING, std430) writeonly buffer Target { uint64_t texels[]; } target;
-#else
-layout(set = 0, binding = TARGET_BINDING, std430) writeonly buffer Target { uint texels[]; } target;
-#endif
 
-#ifdef LINEAR_TEXELS
-// CPUs have no fast shared memory.
-const bool COMPLETE = false;
-#else
 const bool COMPLETE = RADIX_2 > 0;
-#endif
 const bool IS_ROW = DIRECTION == DIRECTION_HORIZONTAL;
 
 ivec2 texel_at(int along, int across)
@@ -61,51 +40,25 @@ ivec2 texel_at(int along, int across)
 
 vec4 load_source(ivec2 at)
 {
-#ifdef LINEAR_TEXELS
-    return load_pixel(source, read_shapes[SLOT_SOURCE], at.x, at.y);
-#else
     return imageLoad(source, at);
-#endif
 }
-
-#ifdef LINEAR_TEXELS
-#define LOAD_FLOATS(name, slot, at) load_floats(name, read_shapes[slot], (at).x, (at).y)
-#define WEIGHTS_SIZE                READ_SIZE(SLOT_WEIGHTS)
-#else
-#define LOAD_FLOATS(name, slot, at) imageLoad(name, at)
-#define WEIGHTS_SIZE                imageSize(weights)
-#endif
 
 vec4 load_factor(ivec2 at)
 {
-    return LOAD_FLOATS(factor, SLOT_SPECTRUM, at);
+    return imageLoad(factor, at);
 }
 
 // The weight of a field's kernel at a pixel.
 float weight_at(int along, int across)
 {
     ivec2 place = IS_ROW ? ivec2(along, across) : ivec2(0, along);
-    vec4 four = LOAD_FLOATS(weights, SLOT_WEIGHTS, clamp(place, ivec2(0), WEIGHTS_SIZE - 1));
+    vec4 four = imageLoad(weights, clamp(place, ivec2(0), imageSize(weights) - 1));
     return inner_product(four, vec4(equal(ivec4(0, 1, 2, 3), ivec4(params.weight))));
 }
 
 void store(ivec2 at, vec4 value)
 {
-#ifndef LINEAR_TEXELS
     imageStore(target, at, value);
-#elif TARGET_BYTES == 4
-    // (Without the maximum LLVM packs lane by lane.)
-    uvec4 bits = floatBitsToUint(value);
-    target.texels[at.y * target_shape.z + at.x] = u64vec2(eighth(bits.xy), eighth(bits.zw));
-#elif TARGET_BYTES == 2
-    uvec2 bits = uvec2(packHalf2x16(value.rg), packHalf2x16(value.ba));
-    target.texels[2 * at.y * target_shape.z + at.x] = eighth(bits);
-#else
-    // A sum with 2^23 is rounded to an integer, which its last bits are.
-    uvec4 level = floatBitsToUint(value * 255.0 + 8388608.0) & 255u;
-    target.texels[4 * at.y * target_shape.z + at.x] =
-        level.r | level.g << 8 | level.b << 16 | level.a << 24;
-#endif
 }
 
 #include "lib/padded.glsl"
@@ -257,7 +210,7 @@ void add_weighted(int number, int across, int radix)
         if (WEIGHTED != 0)
             held[at] *= IS_ROW ? weight_at(place.x, place.y) : weight_at(place.y, 0);
         if (ADDS_IMAGE != 0)
-            held[at] += LOAD_FLOATS(added, SLOT_ADDED, texel_at(along, across));
+            held[at] += imageLoad(added, texel_at(along, across));
     }
 }
 
@@ -379,9 +332,6 @@ void main()
     across = min(across, params.across - 1);
     if (!COMPLETE)
         number = min(number, params.count - 1);
-#ifdef LINEAR_TEXELS
-    copy_shapes();
-#endif
     if (!COMPLETE && STAGE == STAGE_PRODUCT) {
         multiply(number, across);
         return;

@@ -264,16 +264,24 @@ def test_a_cpu_enlarges_in_strips_that_have_each_rows_taps_once(renderer: Render
     assert first.shader.startswith("taps_linear") == linear
 
 
-def test_a_cpu_transforms_lines_of_up_to_256_elements_in_two_stages(renderer: Renderer) -> None:
+def test_lines_of_up_to_256_elements_are_transformed_in_two_stages(unfused: Renderer) -> None:
     """Larger butterflies than 16 elements would save stages, but take longer than these."""
 
     def stages(width: int) -> int:
         image = np.zeros((4, width, 3), np.float32)
-        plan = renderer.plan(image, Convolution(gaussian(2), kernel_size=(9, 1)))
-        return sum(one.shader.startswith("fft_linear") for one in plan.passes)
+        plan = unfused.plan(image, Convolution(gaussian(2), kernel_size=(9, 1)))
+        return sum(one.shader.startswith("fft_image") for one in plan.passes)
 
     # The kernel's rows, and the image's both ways.
-    assert stages(300) - stages(250) == (3 if has_linear_texels(renderer) else 0)
+    assert stages(300) - stages(250) == 3
+
+
+def test_a_cpu_transforms_on_the_host(renderer: Renderer) -> None:
+    """All stages along an axis are one pass; along columns with the product and the way back."""
+    plan = renderer.plan(np.zeros((40, 300, 3), np.float32), Convolution(gaussian(2)))
+    names = [one.name for one in plan.passes if one.shader == "host"]
+    expected = ["kernel", "kernel", "spectrum", "bloom", "bloom"]
+    assert names == (expected if has_linear_texels(renderer) else [])
 
 
 def test_texels_are_what_fused_passes_take_them_for(renderer: Renderer) -> None:

@@ -467,7 +467,9 @@ def test_bloom_buffers_of_another_size_and_format(renderer: vkbloom.Renderer) ->
     """Places are those of the frame's pixels, and kernels are resampled."""
     image = picture((40, 30)).astype(np.float32)
     for lens in (psf.Varying(grid(), POSITIONS), psf.Varying(function=vignetted)):
-        settings = vkbloom.Convolution(lens, bloom_scale=0.5, threshold=0.3, boundary="edge")
+        settings = vkbloom.Convolution(
+            lens, bloom_scale=0.5, threshold=0.3, boundary="edge", format="rgba16float"
+        )
         bloom = renderer.apply(image, settings)["bloom"].astype(np.float64)
         exact = reference.apply(image, settings)["bloom"]
         np.testing.assert_allclose(bloom, exact, rtol=0, atol=2e-3 * exact.max())

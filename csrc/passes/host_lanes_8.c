@@ -1,0 +1,16 @@
+// Vectors of AVX2, without fused products and sums: the bits are those of host_lanes_4.c.
+#if defined __x86_64__
+#ifdef __clang__
+#pragma clang attribute push(__attribute__((target("avx2"))), apply_to = function)
+#else
+#pragma GCC target("avx2")
+#endif
+#define LANES 8
+#define LOOPS vkb_host_loops_8
+#include "passes/host_lanes.h"
+#ifdef __clang__
+#pragma clang attribute pop
+#endif
+#else
+typedef int vkb_no_lanes_of_8;
+#endif
