@@ -126,10 +126,10 @@ bool is_lit(Block block, int column, float row)
 // linear. So with differences of differences of the texels, the sums are those of the weights, of the weights times the
 // row, and of the weights times the part of the row that is above 1, 2 and so on.
 #define ADD_COLUMNS(ROWS, IS_ITS) \
-    for (int first = 0; IS_ITS && first <= last; first += BEAM_RUN) { \
+    [[dont_unroll]] for (int first = 0; IS_ITS && first <= last; first += BEAM_RUN) { \
         int middle = first + BEAM_RUN / 2; \
         bool lit = is_lit(block, block.column - block.direction * middle, float(line) + float(middle) * slope); \
-        for (int at = first; lit && at < first + BEAM_RUN; ++at) { \
+        [[dont_unroll]] for (int at = first; lit && at < first + BEAM_RUN; ++at) { \
             int x = clamp(block.column - block.direction * at, 0, block.size.x - 1); \
             float base = floor(float(line) + float(at) * slope - 0.5 * float(ROWS)) + 1.0; \
             vec3 texels[ROWS]; \
@@ -201,7 +201,7 @@ void main()
             store_pixel(swapped(place, block.swaps), sums[k] * (6.0 * steps / ((steps + 1.0) * (2.0 * steps + 1.0))));
     }
     bool is_near = params.most < NEAR_STEPS || block.outer < float(2 * NEAR_STEPS + PIXELS);
-    for (int k = 0; is_near && k < PIXELS; ++k) {
+    [[dont_unroll]] for (int k = 0; is_near && k < PIXELS; ++k) {
         ivec2 place = ivec2(block.column - block.direction * k, row_of(block, line, k));
         ivec2 pixel = swapped(place, block.swaps);
         Beam beam = beam_of(pixel, shape.xy);
