@@ -23,11 +23,23 @@ def picture() -> np.ndarray:
     return ((index * 2654435761 >> 13) % 256).reshape(64, 64, 3).astype(np.uint8)
 
 
-def scenes() -> Iterator[tuple[str, gfx.Scene]]:
-    """Yield the scenes, with a name each."""
+def kept(name: str, geometry: gfx.Geometry, folder: Path) -> gfx.Geometry:
+    """Return a geometry with the numbers of the first run, since NumPy's sines differ by CPU."""
+    file = folder / f"{name}.npz"
+    parts = {part: getattr(geometry, part).data for part in ("positions", "normals", "texcoords")}
+    if not file.exists():
+        np.savez(file, **parts)
+    with np.load(file) as first:
+        for part, data in parts.items():
+            data[:] = first[part]
+    return geometry
+
+
+def scenes(folder: Path) -> Iterator[tuple[str, gfx.Scene]]:
+    """Yield the scenes, with a name each; meshes are kept in the folder."""
     lit = gfx.Scene()
     knot = gfx.Mesh(
-        gfx.torus_knot_geometry(1, 0.3, 96, 18),
+        kept("knot", gfx.torus_knot_geometry(1, 0.3, 96, 18), folder),
         gfx.MeshPhongMaterial(color="#447cff", shininess=40),
     )
     lit.add(knot, gfx.AmbientLight(intensity=0.4), gfx.DirectionalLight(intensity=2.5))
@@ -36,7 +48,7 @@ def scenes() -> Iterator[tuple[str, gfx.Scene]]:
     physical = gfx.Scene()
     for number in range(3):
         ball = gfx.Mesh(
-            gfx.sphere_geometry(0.6, 32, 16),
+            kept("ball", gfx.sphere_geometry(0.6, 32, 16), folder),
             gfx.MeshStandardMaterial(color="#ff8844", roughness=0.2 + 0.3 * number, metalness=0.6),
         )
         ball.local.x = 1.4 * (number - 1)
@@ -88,7 +100,7 @@ def main() -> None:
     camera = gfx.PerspectiveCamera(50, SIZE[0] / SIZE[1])
     camera.local.z = 5
     drawn = {}
-    for name, scene in scenes():
+    for name, scene in scenes(options.arrays.parent):
         if options.only is None or name in options.only:
 
             def draw(scene: gfx.Scene = scene) -> None:
