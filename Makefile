@@ -17,8 +17,6 @@
 #   x86-64 and aarch64, into dist/ (docs/releasing.md); as root.
 # make release-check: runs the jobs of the release's workflow as for the tag of this version, up to the
 #   upload, and checks the workflows and the conda recipe; as root, on a working tree without changes.
-#   LEAVE_OUT: steps that are not run; by default also that which needs the date of the release.
-#   MACHINES=x86_64 builds for one machine.
 # make freethreaded: builds Python 3.13 without the GIL, from Debian's source, and the core for it; makes
 #   10,000 calls in 16 threads, and some under ThreadSanitizer; takes half an hour the first time.
 # make try-core: builds the core's wheel from a source distribution, without glslang and spirv-opt, and
@@ -137,7 +135,7 @@ wheels:
 	packaging/wheels.sh
 
 # LEAVE_OUT: steps of the workflow that are not run, by name, between semicolons. MACHINES, STEPS: as of packaging/wheels.sh.
-LEAVE_OUT := Install Debian's packages;Let root use the checkout;Compare the tag with the versions in the files
+LEAVE_OUT := Install Debian's packages;Let root use the checkout
 RELEASE := build/release/python/bin
 release-check: build/release/done
 	$(RELEASE)/zizmor --quiet --offline .github action.yml
