@@ -202,6 +202,8 @@ def on_device(renderer: Renderer, settings: Settings) -> bool:
     return Passes(renderer, Inputs(pixels), floats, {"final": pixels}).submit() is not None
 
 
+# Each step of a training loop asks twice.
+@functools.lru_cache(16)
 def device_fields(settings: Settings) -> frozenset[str]:
     """Return the fields by which the device has the derivatives.
 
