@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
+import pytest
 
 from tests.scene.parts import Cubemap, Mesh
 from vkbloom import Scene, _core
@@ -34,11 +35,25 @@ __all__ = [
     "scene_arguments",
     "scene_plan",
     "scene_source",
+    "watch_submissions",
 ]
 
 MESH = Mesh(np.zeros((3, 9), np.float32), np.arange(3, dtype=np.uint32))
 SKY = Cubemap((np.zeros((6, 1, 1, 4), np.uint8),))
 SCENES = {has_sky: Scene(MESH, MESH, SKY if has_sky else None) for has_sky in (False, True)}
+
+
+def watch_submissions(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """Return a list that gets the kind of each submission of passes of derivatives."""
+    submitted: list[str] = []
+    submit = Passes.submit
+
+    def watched(passes: Passes, results: Any = "images") -> Any:
+        submitted.append(results)
+        return submit(passes, results)
+
+    monkeypatch.setattr(Passes, "submit", watched)
+    return submitted
 
 
 def change(block: bytes, **places: int) -> bytes:

@@ -17,7 +17,7 @@ from vkbloom import Renderer, reference, testing
 
 torch = pytest.importorskip("torch", reason="PyTorch is not installed; run make test-torch")
 
-from tests.planned import Passes  # noqa: E402
+from tests.planned import watch_submissions  # noqa: E402
 from vkbloom import torch as vkbloom_torch  # noqa: E402
 from vkbloom._gradients import operators  # noqa: E402
 
@@ -96,14 +96,7 @@ def test_weights_of_kernels_are_learned(
     made = module.learned["psf_weights"].grad.cpu().numpy()
     np.testing.assert_allclose(made, exact, rtol=0, atol=1e-5 * abs(exact).max())
     assert module.settings.value_of("psf.weights") == lens.weights
-    submitted: list[Any] = []
-    submit = Passes.submit
-
-    def watched(passes: Passes, results: Any = "images") -> Any:
-        submitted.append(results)
-        return submit(passes, results)
-
-    monkeypatch.setattr(Passes, "submit", watched)
+    submitted = watch_submissions(monkeypatch)
     module.zero_grad()
     module(image.detach()).sum().backward()
     assert submitted == ["weights"]

@@ -12,7 +12,7 @@ import pytest
 
 import vkbloom
 from tests.images import random_image
-from tests.planned import DeviceGradients, Inputs, Passes, pull_each
+from tests.planned import DeviceGradients, Inputs, pull_each, watch_submissions
 from tests.refusals import assert_refused, rows
 from vkbloom import Renderer, reference
 
@@ -146,14 +146,7 @@ def test_a_field_has_the_same_bits_however_it_is_read(renderer: Renderer) -> Non
 
 def test_only_what_is_read_is_computed(monkeypatch: pytest.MonkeyPatch, renderer: Renderer) -> None:
     """Sums, weights of a field of kernels, and derivatives by images have passes of their own."""
-    submitted: list[str] = []
-    submit = Passes.submit
-
-    def watched(passes: Passes, results: Any = "images") -> Any:
-        submitted.append(results)
-        return submit(passes, results)
-
-    monkeypatch.setattr(Passes, "submit", watched)
+    submitted = watch_submissions(monkeypatch)
     lens = vkbloom.psf.Varying(np.ones((2, 3, 3)), weights=np.ones((2, 2, 2)))
     settings = vkbloom.Convolution(lens, threshold=0.2, knee=0.5)
     image, cotangent = (random_image(9, 8, seed=seed).astype(np.float32) for seed in (1, 2))
