@@ -328,6 +328,7 @@ struct vkb_cached vkb_frame_cached(const struct vkb_frame *frame)
     return (struct vkb_cached){
         .pipelines = frame->pipelines.entry_count,
         .image_bytes = vkb_image_cache_size(&frame->cache),
+        .allocations = frame->cache.spares.missed,
     };
 }
 

@@ -99,10 +99,10 @@ bool vkb_frame_collect(struct vkb_device *device, struct vkb_frame *frame,
 bool vkb_frame_drop(struct vkb_device *device, struct vkb_frame *frame,
                     struct vkb_submission *submission);
 
-// The number of cached objects, and their size.
+// The number of cached objects, their size, and how often memory was allocated for images so far.
 struct vkb_cached {
     size_t pipelines;
-    uint64_t image_bytes;
+    uint64_t image_bytes, allocations;
 };
 struct vkb_cached vkb_frame_cached(const struct vkb_frame *frame);
 

@@ -13,8 +13,10 @@ void vkb_image_cache_destroy(const struct vkb_device *device, struct vkb_image_c
         vkb_free(cached);
     }
     vkb_free(cache->images);
+    vkb_spares_free(device, &cache->spares);
     // The clock continues, so that versions stay unique.
-    *cache = (struct vkb_image_cache){.clock = cache->clock, .now = cache->now};
+    *cache = (struct vkb_image_cache){
+        .clock = cache->clock, .now = cache->now, .spares.missed = cache->spares.missed};
 }
 
 // Destroys the image and keeps its entry, since there are only a few names.
@@ -33,35 +35,64 @@ static uint64_t image_size(const struct vkb_image *image)
 
 uint64_t vkb_image_cache_size(const struct vkb_image_cache *cache)
 {
-    uint64_t size = 0;
+    uint64_t size = cache->spares.size;
 
     for (size_t i = 0; i < cache->count; ++i)
         size += image_size(&cache->images[i]->image);
     return size;
 }
 
+// Spare memory takes at most as much as the images of the last submissions did together.
+static void trim_spares(const struct vkb_device *device, struct vkb_image_cache *cache,
+                        uint64_t images, const struct vkb_age *age)
+{
+    struct vkb_spare *oldest;
+
+    if (images >= cache->peak || cache->peaked + VKB_MIN_AGE < age->now) {
+        cache->peak = images;
+        cache->peaked = age->now;
+    }
+    while (cache->spares.size > cache->peak && (oldest = vkb_spares_oldest(&cache->spares))
+           && oldest->used < age->pending)
+        vkb_spares_free_one(device, &cache->spares, oldest);
+}
+
+static struct vkb_cached_image *find_oldest(const struct vkb_image_cache *cache)
+{
+    struct vkb_cached_image *oldest = NULL;
+
+    for (size_t i = 0; i < cache->count; ++i)
+        if (cache->images[i]->image.handle && (!oldest || cache->images[i]->used < oldest->used))
+            oldest = cache->images[i];
+    return oldest;
+}
+
 void vkb_image_cache_trim(const struct vkb_device *device, struct vkb_image_cache *cache,
                           const struct vkb_age *age)
 {
+    trim_spares(device, cache, vkb_image_cache_size(cache) - cache->spares.size, age);
     uint64_t size = vkb_image_cache_size(cache);
     const uint64_t left = size > VKB_KEPT_IMAGE_BYTES ? VKB_KEPT_IMAGE_BYTES / 2 : size;
 
     cache->now = age->now;
     while (size > left) {
-        struct vkb_cached_image *oldest = NULL;
-        for (size_t i = 0; i < cache->count; ++i)
-            if (cache->images[i]->image.handle
-                && (!oldest || cache->images[i]->used < oldest->used))
-                oldest = cache->images[i];
-        if (!oldest || !vkb_is_old(oldest->used, age))
+        struct vkb_spare *spare = vkb_spares_oldest(&cache->spares);
+        struct vkb_cached_image *image = find_oldest(cache);
+        if (spare && image && spare->used <= image->used)
+            image = NULL;
+        if ((!image && !spare) || !vkb_is_old(image ? image->used : spare->used, age))
             return;
-        size -= image_size(&oldest->image);
-        destroy_image(device, oldest);
+        size -= image ? image_size(&image->image) : spare->size;
+        if (image)
+            destroy_image(device, image);
+        else
+            vkb_spares_free_one(device, &cache->spares, spare);
     }
 }
 
 bool vkb_image_create_row(const struct vkb_device *device, const struct vkb_image_row *row,
-                          struct vkb_image *image, struct vkb_error *error)
+                          struct vkb_spares *spares, struct vkb_image *image,
+                          struct vkb_error *error)
 {
     return vkb_image_create(
         device,
@@ -73,6 +104,7 @@ bool vkb_image_create_row(const struct vkb_device *device, const struct vkb_imag
             .array = row->layers > 0,
             .usage = row->usage,
             .mapped = device->linear_texels && row->format != VKB_FORMAT_DEPTH32_FLOAT,
+            .spares = spares,
         },
         image, error);
 }
@@ -172,8 +204,9 @@ struct vkb_cached_image *vkb_image_cache_add(const struct vkb_device *device,
         return NULL;
     // Also for the plans that it has been for: they may come by turns.
     both.usage |= is_alike(&cached->image, row) ? cached->image.usage : 0;
-    destroy_image(device, cached);
-    if (!vkb_image_create_row(device, &both, &cached->image, error))
+    cached->content.valid = false;
+    vkb_image_spare(device, &cached->image, cached->used, &cache->spares);
+    if (!vkb_image_create_row(device, &both, &cache->spares, &cached->image, error))
         return NULL;
     label(device, cached);
     cached->used = cache->now;

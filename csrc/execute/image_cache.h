@@ -19,15 +19,20 @@ struct vkb_cached_image {
 struct vkb_image_cache {
     struct vkb_cached_image **images;  // pointers, since the elements must not move
     size_t count, capacity;
-    uint64_t clock;  // the last version that was assigned
-    uint64_t now;    // the number of the submission that uses them
+    uint64_t clock;            // the last version that was assigned
+    uint64_t now;              // the number of the submission that uses them
+    struct vkb_spares spares;  // of images that were replaced
+    // The most bytes that images took, and the submission that began with them: one of the last
+    // VKB_MIN_AGE.
+    uint64_t peak, peaked;
 };
 
-// Bytes of all images' pixels.
+// Bytes of all images' pixels, and of spare memory.
 uint64_t vkb_image_cache_size(const struct vkb_image_cache *cache);
 
 // Begins a submission. If the images take more than VKB_KEPT_IMAGE_BYTES, the old ones are
-// destroyed, the oldest first, until they take half of that.
+// destroyed, the oldest first, until they take half of that. Spare memory
+// counts as an image, and takes no more than the most that images took in the last submissions.
 enum { VKB_KEPT_IMAGE_BYTES = 256 << 20 };
 void vkb_image_cache_trim(const struct vkb_device *device, struct vkb_image_cache *cache,
                           const struct vkb_age *age);
@@ -38,7 +43,8 @@ void vkb_image_cache_destroy(const struct vkb_device *device, struct vkb_image_c
 // of the cache.
 bool vkb_image_fits(const struct vkb_image *image, const struct vkb_image_row *row);
 bool vkb_image_create_row(const struct vkb_device *device, const struct vkb_image_row *row,
-                          struct vkb_image *image, struct vkb_error *error);
+                          struct vkb_spares *spares, struct vkb_image *image,
+                          struct vkb_error *error);
 
 // Finds the cached image of a row; NULL if there is none of its size, format and usage.
 struct vkb_cached_image *vkb_image_cache_find(const struct vkb_image_cache *cache,

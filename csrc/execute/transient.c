@@ -33,6 +33,7 @@ bool vkb_begin_sharing(struct vkb_run *run, struct vkb_error *error)
     const struct vkb_graph *graph = run->graph;
     struct vkb_image_cache *cache = &run->frame->cache;
 
+    vkb_spares_free(run->device, &cache->spares);
     // Images that do not fit are destroyed.
     if (!vkb_submissions_wait(run->device, &run->frame->submissions, error))
         return false;

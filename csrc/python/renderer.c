@@ -299,8 +299,9 @@ static PyObject *get_cached(PyObject *object, void *unused)
     VKB_LOCK(self->guard);
     const struct vkb_cached cached = self->cached;
     VKB_UNLOCK(self->guard);
-    return Py_BuildValue("(nK)", (Py_ssize_t)cached.pipelines,
-                         (unsigned long long)cached.image_bytes);
+    return Py_BuildValue("(nKK)", (Py_ssize_t)cached.pipelines,
+                         (unsigned long long)cached.image_bytes,
+                         (unsigned long long)cached.allocations);
 }
 
 static PyMethodDef methods[] = {

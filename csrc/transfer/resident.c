@@ -110,7 +110,7 @@ bool vkb_resident_fill(struct vkb_device *device, struct vkb_resident *resident,
         return false;
     if (!vkb_image_fits(&cached->image, &row)) {
         vkb_image_destroy(device, &cached->image);
-        if (!vkb_image_create_row(device, &row, &cached->image, error))
+        if (!vkb_image_create_row(device, &row, NULL, &cached->image, error))
             return false;
     }
     if (!vkb_upload_stage(device, &resident->inputs[kind].upload, NULL, 0, input, &cached->image,

@@ -72,33 +72,30 @@ static bool allocate(const struct vkb_device *device, const VkMemoryAllocateInfo
     return false;
 }
 
-static void free_memory(const struct vkb_device *device, VkDeviceMemory memory)
-{
-    device->vk.vkFreeMemory(device->handle, memory, NULL);
-    if (memory)
-        atomic_fetch_sub(device->allocations, 1);
-}
-
-// Memory of a kind that fits the requirements; *flags gets the properties of its type. `next`:
-// what extends VkMemoryAllocateInfo.
+// Memory of a kind that fits the requirements. `next`: what extends VkMemoryAllocateInfo.
 static bool allocate_kind(const struct vkb_device *device, enum vkb_memory_kind kind,
                           const VkMemoryRequirements *requirements, const void *next,
-                          VkDeviceMemory *memory, VkMemoryPropertyFlags *flags,
+                          struct vkb_spares *spares, struct vkb_spare *made,
                           struct vkb_error *error)
 {
-    uint32_t type = find_memory_type(device, kind, requirements->memoryTypeBits);
+    const uint32_t type = find_memory_type(device, kind, requirements->memoryTypeBits);
+    const VkMemoryAllocateInfo info = {
+        .sType = VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO,
+        .pNext = next,
+        .allocationSize = requirements->size,
+        .memoryTypeIndex = type,
+    };
 
     if (type == UINT32_MAX)
         return vkb_fail(error, VKB_ERROR_GENERAL, "the adapter has no memory type that fits");
-    *flags = device->memory.memoryTypes[type].propertyFlags;
-    const bool done = allocate(device,
-                               &(VkMemoryAllocateInfo){
-                                   .sType = VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO,
-                                   .pNext = next,
-                                   .allocationSize = requirements->size,
-                                   .memoryTypeIndex = type,
-                               },
-                               memory, error);
+    if (vkb_spares_take(spares, type, requirements->size, made))
+        return true;
+    *made = (struct vkb_spare){.size = requirements->size, .type = type};
+    bool done = allocate(device, &info, &made->memory, error);
+    if (!done && spares && spares->count) {
+        vkb_spares_free(device, spares);
+        done = allocate(device, &info, &made->memory, error);
+    }
     if (!done)
         vkb_add_words(error, ". One image or buffer of this call takes %.4g MiB",
                       (double)requirements->size / (1 << 20));
@@ -143,7 +140,7 @@ static bool create(const struct vkb_device *device, enum vkb_memory_kind kind,
 {
     const struct VolkDeviceTable *vk = &device->vk;
     VkMemoryRequirements requirements;
-    VkMemoryPropertyFlags flags;
+    struct vkb_spare made = {0};
 
     *buffer = (struct vkb_buffer){0};
     if (!create_buffer(device, usage, size, type, &buffer->handle, error))
@@ -158,8 +155,10 @@ static bool create(const struct vkb_device *device, enum vkb_memory_kind kind,
         .pNext = &dedicated,
         .handleTypes = type,
     };
-    if (!allocate_kind(device, kind, &requirements, type ? &exported : NULL, &buffer->memory,
-                       &flags, error)
+    const bool allocated =
+        allocate_kind(device, kind, &requirements, type ? &exported : NULL, NULL, &made, error);
+    buffer->memory = made.memory;
+    if (!allocated
         || !VK(error, vk->vkBindBufferMemory(device->handle, buffer->handle, buffer->memory, 0))
         || (kind != VKB_MEMORY_DEVICE
             && !VK(error, vk->vkMapMemory(device->handle, buffer->memory, 0, VK_WHOLE_SIZE, 0,
@@ -172,7 +171,8 @@ static bool create(const struct vkb_device *device, enum vkb_memory_kind kind,
     vkb_label_object(device, VK_OBJECT_TYPE_BUFFER, (uint64_t)buffer->handle, buffer_name(usage));
     // Only a complete buffer has a size; vkb_buffer_reserve relies on that.
     buffer->size = type ? requirements.size : size;
-    buffer->coherent = flags & VK_MEMORY_PROPERTY_HOST_COHERENT_BIT;
+    buffer->coherent =
+        device->memory.memoryTypes[made.type].propertyFlags & VK_MEMORY_PROPERTY_HOST_COHERENT_BIT;
     return true;
 }
 
@@ -205,7 +205,7 @@ bool vkb_buffer_export(const struct vkb_device *device, VkDeviceSize size,
 void vkb_buffer_destroy(const struct vkb_device *device, struct vkb_buffer *buffer)
 {
     device->vk.vkDestroyBuffer(device->handle, buffer->handle, NULL);
-    free_memory(device, buffer->memory);
+    vkb_memory_free(device, buffer->memory);
     *buffer = (struct vkb_buffer){0};
 }
 
@@ -499,7 +499,7 @@ bool vkb_image_create(const struct vkb_device *device, const struct vkb_image_sp
                                : spec->layers == 6 ? VK_IMAGE_VIEW_TYPE_CUBE
                                                    : (VkImageViewType)image_type(spec);
     VkMemoryRequirements requirements;
-    VkMemoryPropertyFlags flags;
+    struct vkb_spare made = {0};
 
     *image = (struct vkb_image){
         .format = spec->format,
@@ -515,9 +515,14 @@ bool vkb_image_create(const struct vkb_device *device, const struct vkb_image_sp
     if (!create_handle(device, spec, image, error))
         return false;
     vk->vkGetImageMemoryRequirements(device->handle, image->handle, &requirements);
-    if ((spec->mapped && !create_image_buffer(device, image, &requirements, error))
-        || !allocate_kind(device, spec->mapped ? VKB_MEMORY_SHARED : VKB_MEMORY_DEVICE,
-                          &requirements, NULL, &image->memory, &flags, error)
+    const bool allocated =
+        (!spec->mapped || create_image_buffer(device, image, &requirements, error))
+        && allocate_kind(device, spec->mapped ? VKB_MEMORY_SHARED : VKB_MEMORY_DEVICE,
+                         &requirements, NULL, spec->spares, &made, error);
+    image->memory = made.memory;
+    image->memory_size = made.size;
+    image->memory_type = made.type;
+    if (!allocated
         || !VK(error, vk->vkBindImageMemory(device->handle, image->handle, image->memory, 0))
         || (spec->mapped && !map_image(device, image, error))
         || ((spec->usage & VIEWED) && !create_view(device, type, format_of(spec), image, error))) {
@@ -533,8 +538,21 @@ void vkb_image_destroy(const struct vkb_device *device, struct vkb_image *image)
     device->vk.vkDestroyBuffer(device->handle, image->buffer, NULL);
     device->vk.vkDestroyImageView(device->handle, image->view, NULL);
     device->vk.vkDestroyImage(device->handle, image->handle, NULL);
-    free_memory(device, image->memory);
+    vkb_memory_free(device, image->memory);
     *image = (struct vkb_image){0};
+}
+
+void vkb_image_spare(const struct vkb_device *device, struct vkb_image *image, uint64_t used,
+                     struct vkb_spares *spares)
+{
+    const struct vkb_spare spare = {image->memory, image->memory_size, image->memory_type, used};
+
+    if (image->memory && vkb_spares_add(spares, &spare)) {
+        if (image->mapped)
+            device->vk.vkUnmapMemory(device->handle, image->memory);
+        image->memory = VK_NULL_HANDLE;
+    }
+    vkb_image_destroy(device, image);
 }
 
 VkImageLayout vkb_image_layout(const struct vkb_image *image, enum vkb_access access)

@@ -4,6 +4,7 @@
 
 #include "vulkan/barrier.h"
 #include "vulkan/format.h"
+#include "vulkan/spares.h"
 
 enum vkb_memory_kind {
     VKB_MEMORY_DEVICE,    // fast for the device
@@ -27,6 +28,8 @@ struct vkb_buffer {
 struct vkb_image {
     VkImage handle;
     VkDeviceMemory memory;
+    VkDeviceSize memory_size;
+    uint32_t memory_type;
     VkImageView view;  // of all levels
     enum vkb_format format;
     uint32_t width, height, depth, layers, levels;
@@ -52,6 +55,7 @@ struct vkb_image_spec {
     // Of colour images of other formats, whose `format` is NONE: 1 to 3 dimensions, and the third.
     VkFormat other;
     uint32_t dimensions, depth;
+    struct vkb_spares *spares;  // what its memory is taken from, if one fits; NULL: none
 };
 
 // Advises the system to use large pages for memory that has not been written yet.
@@ -90,6 +94,9 @@ bool vkb_buffer_invalidate(const struct vkb_device *device, const struct vkb_buf
 bool vkb_image_create(const struct vkb_device *device, const struct vkb_image_spec *spec,
                       struct vkb_image *image, struct vkb_error *error);
 void vkb_image_destroy(const struct vkb_device *device, struct vkb_image *image);
+// The same, but its memory is left to new images. `used`: the last submission that used it.
+void vkb_image_spare(const struct vkb_device *device, struct vkb_image *image, uint64_t used,
+                     struct vkb_spares *spares);
 
 // Makes a mapped image over the caller's memory, whose words passes can read, and nothing else. The
 // image has its format, size, channels, row pitch and memory; its rows have `row_size` bytes. Both

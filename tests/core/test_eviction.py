@@ -44,11 +44,29 @@ def test_a_thousand_sizes_take_no_more_memory_than_a_few(
         created.append(renderer._core.pipeline_count)
     # Both halves have all sixteen numbers of levels.
     early, late = (np.max(half, axis=0) for half in (cached[:HALF], cached[HALF:]))
-    pipelines, image_bytes = late
+    pipelines, image_bytes, _ = late
     assert pipelines <= early[0]
-    # 3 images of the size and the levels, all of them smaller.
-    assert image_bytes <= 6 * 70 * 70 * 16
+    # 3 images of the size and the levels, all of them smaller, and as much spare memory.
+    assert image_bytes <= 2 * 6 * 70 * 70 * 16
     assert created[-1] == created[HALF - 1]
+
+
+def test_sizes_in_turn_share_memory(new_renderer: Callable[[], Renderer]) -> None:
+    """An allocation takes longer than all passes, so a size that comes again needs none."""
+    renderer = new_renderer()
+    images = [picture(40 * step, 60 * step) for step in (3, 4, 5, 6, 7)]
+    settings = Pyramid(levels=3), Separable(threshold=0.5, bloom_size=(50, 70))
+    expected: list[NDArray[np.float32]] = []
+    counts = []
+    for _ in range(4):
+        made = [finals(renderer, image, settings) for image in images]
+        counts.append(renderer._core.cached[2])
+        finals_of_all = list(itertools.chain.from_iterable(made))
+        expected = expected or finals_of_all
+        for got, right in zip(finals_of_all, expected, strict=True):
+            np.testing.assert_array_equal(got, right)
+    # The second turn begins with the smallest size after the largest.
+    assert counts[1] == counts[3]
 
 
 def test_unused_images_are_freed(new_renderer: Callable[[], Renderer]) -> None:

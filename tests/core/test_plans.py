@@ -196,7 +196,7 @@ def test_planning_makes_nothing(new_renderer: Callable[[], Renderer], plain: Any
     for method in METHODS.values():
         renderer.plan(plain, method)
     assert renderer._core.pipeline_count == 0
-    assert renderer._core.cached == (0, 0)
+    assert renderer._core.cached == (0, 0, 0)
 
 
 # The dry run
