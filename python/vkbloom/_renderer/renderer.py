@@ -69,6 +69,8 @@ _NUMBER = re.compile(r"\d+")
 #: take numbers only.
 RENDERERS: Final[weakref.WeakValueDictionary[int, Renderer]] = weakref.WeakValueDictionary()
 _numbers = itertools.count(1)
+#: Plans that a renderer keeps: two for each size of a training loop over ten.
+_KEPT_PLANS: Final = 24
 
 
 @atexit.register
@@ -331,8 +333,9 @@ class Renderer:
         if self.info.bundled and (sha256 := bundled_hash()):
             self._made_by["driver_sha256"] = sha256
         self._saved_pipelines = 0
-        # The last plan of frames (None), of derivatives by images (False) and of sums (True).
-        self._planned: dict[bool | None, tuple[Settings, Any, _core.Plan]] = {}
+        # The last plans, the latest first, each with its settings and what was wanted of it. Other
+        # threads read the list, so it never changes.
+        self._planned: tuple[tuple[Settings, Any, _core.Plan], ...] = ()
         self._pending = requests.PendingSubmissions()
         self._batches = Batches(self._core, self._pending)
         # What map has checked last.
@@ -358,7 +361,7 @@ class Renderer:
         self._release()
 
     def _release(self) -> None:
-        self._planned = {}
+        self._planned = ()
         self._remember = None
         try:
             self._pending.wait()
@@ -981,7 +984,7 @@ class Renderer:
     def _plan_of(
         self, source: _core.Source, settings: Settings, names: tuple[str, ...] | None
     ) -> _core.Plan:
-        """Return the last plan if it fits, otherwise a new one.
+        """Return the last plan that fits, otherwise a new one.
 
         For small images, making a plan takes most of the time of a call.
         """
@@ -994,7 +997,7 @@ class Renderer:
         cotangents: tuple[str, ...],
         results: DerivativeKind,
     ) -> _core.Plan | None:
-        """Return the plan of derivatives, or None if a pass has none; the last one if it fits."""
+        """Return the plan of derivatives, as `_plan_of` does, or None if a pass has none."""
         return self._find_plan(source, settings, None, cotangents, results)
 
     def _find_plan(
@@ -1004,17 +1007,20 @@ class Renderer:
         names: tuple[str, ...] | None,
         *derivatives: Any,
     ) -> _core.Plan | None:
-        kind = derivatives[-1] if derivatives else None
-        last, wanted, plan = self._planned.get(kind, (None, None, None))
-        is_wanted = last is settings and wanted == (names, derivatives)
-        if plan and is_wanted and plan.is_of_image(source):
-            return plan
+        wanted = names, derivatives
+        for index, (known, others, plan) in enumerate(self._planned):
+            if known is settings and others == wanted and plan.is_of_image(source):
+                if index > 0:
+                    self._keep_plan(settings, wanted, plan)
+                return plan
         made = self._core.plan(source, settings, names, *derivatives)
-        if made is None or settings._has_state:
-            self._planned.pop(kind, None)
-        else:
-            self._planned[kind] = settings, (names, derivatives), made
+        if made is not None and not settings._has_state:
+            self._keep_plan(settings, wanted, made)
         return made
+
+    def _keep_plan(self, settings: Settings, wanted: Any, plan: _core.Plan) -> None:
+        rest = [one for one in self._planned if one[2] is not plan]
+        self._planned = ((settings, wanted, plan), *rest[: _KEPT_PLANS - 1])
 
     def _run_many(
         self,
