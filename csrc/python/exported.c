@@ -365,11 +365,17 @@ static PyObject *copy_between(PyObject *object, PyObject *arguments)
     // One of both ends is this memory.
     const vkb_cuda_address start = address_of(exported_of(object), 0);
     const uint64_t whole = exported_of(object)->run->size;
-    const uint64_t at = to >= start && to - start <= whole ? to - start : from - start;
+    const bool writes = to >= start && to - start <= whole;
+    const uint64_t at = writes ? to - start : from - start;
     if (at > whole || size < 0 || (uint64_t)size > whole - at) {
         vkb_refuse("copy_bytes: %zd bytes lie outside of the memory of %llu bytes", size,
                    (unsigned long long)whole);
         return NULL;
+    }
+    if (writes) {
+        VKB_LOCK(vkb_memory);
+        vkb_export_renew(exported_of(object)->run);
+        VKB_UNLOCK(vkb_memory);
     }
     const bool done = copy_bytes(exported_of(object), to, from, size, &error);
     return finish(object, done, &error);

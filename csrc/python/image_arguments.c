@@ -39,7 +39,6 @@ static bool check_span(const char *name, const struct vkb_input *input)
 static bool read_exported(PyObject *tuple, const char *name, bool grey,
                           struct vkb_held_image *image)
 {
-    static VKB_ATOMIC(uint64_t) last_serial;
     struct vkb_input *input = &image->input;
     const struct vkb_exports *exports;
     PyObject *exported;
@@ -57,7 +56,15 @@ static bool read_exported(PyObject *tuple, const char *name, bool grey,
     // Released as a view of host memory is.
     image->view = (Py_buffer){.obj = Py_NewRef(exported)};
     input->exported = vkb_export_of(exported, &exports);
-    input->serial = ++last_serial;
+    input->pixels = (struct vkb_pixels_key){
+        .serial = input->exported->serial,
+        .offset = input->offset,
+        .row_stride = input->row_stride,
+        .pixel_stride = input->pixel_stride,
+        .channel_stride = input->channel_stride,
+        .layer_stride = input->layers ? input->layer_stride : 0,
+        .channels = input->channels,
+    };
     input->format = pixel_format(size);
     if (input->format == VKB_FORMAT_NONE)
         return vkb_refuse("%s: elements of %zd bytes are not those of uint8, float16 or float32",

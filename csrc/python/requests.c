@@ -398,19 +398,43 @@ static PyObject *wait_for(PyObject *object, PyObject *unused)
     return result;
 }
 
+// The outputs that CUDA shares, and those of them for which its streams wait.
+struct shared_outputs {
+    size_t exported, ordered, all;
+};
+
+static struct shared_outputs count_shared(PyObject *object)
+{
+    const struct submission *self = (struct submission *)object;
+    struct shared_outputs counts = {0};
+
+    VKB_LOCK(vkb_memory);
+    const struct vkb_pending *pending = self->pending;
+    counts.all = pending ? pending->view_count : 0;
+    for (size_t i = 0; i < counts.all; ++i) {
+        const struct vkb_export *exported = pending->outputs[i].exported;
+        counts.exported += exported != NULL;
+        counts.ordered += exported && exported->drawn;
+    }
+    VKB_UNLOCK(vkb_memory);
+    return counts;
+}
+
 // Without outputs, or with one that the host has to wait for, it is not ordered.
 static PyObject *get_ordered(PyObject *object, void *unused)
 {
-    const struct submission *self = (struct submission *)object;
+    const struct shared_outputs counts = count_shared(object);
 
     (void)unused;
-    VKB_LOCK(vkb_memory);
-    const struct vkb_pending *pending = self->pending;
-    bool ordered = pending && pending->view_count > 0;
-    for (size_t i = 0; ordered && i < pending->view_count; ++i)
-        ordered = pending->outputs[i].exported && pending->outputs[i].exported->drawn;
-    VKB_UNLOCK(vkb_memory);
-    return PyBool_FromLong(ordered);
+    return PyBool_FromLong(counts.all > 0 && counts.ordered == counts.all);
+}
+
+static PyObject *get_exports_ordered(PyObject *object, void *unused)
+{
+    const struct shared_outputs counts = count_shared(object);
+
+    (void)unused;
+    return PyBool_FromLong(counts.exported > 0 && counts.ordered == counts.exported);
 }
 
 static PyObject *get_histories(PyObject *object, void *unused)
@@ -459,6 +483,8 @@ static PyMethodDef methods[] = {
 static PyGetSetDef attributes[] = {
     {"ordered", get_ordered, NULL,
      "Whether streams of CUDA wait for all its arrays, so that the host need not.", NULL},
+    {"exports_ordered", get_exports_ordered, NULL,
+     "The same of those that CUDA shares; others are on the host.", NULL},
     {"histories", get_histories, NULL,
      "A Source for each history of the plan: what the next call continues from. None: none is "
      "kept.",

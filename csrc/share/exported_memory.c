@@ -137,7 +137,13 @@ struct vkb_export *vkb_exports_take(struct vkb_exports *exports, uint64_t size,
         return NULL;
     one->marked = false;
     one->filled = one->drawn = 0;
+    vkb_export_renew(one);
     return one;
+}
+
+void vkb_export_renew(struct vkb_export *one)
+{
+    one->serial = ++one->exports->serials;
 }
 
 bool vkb_export_order_copy(struct vkb_export *one)

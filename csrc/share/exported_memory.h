@@ -13,7 +13,8 @@ struct vkb_export {
     struct vkb_cuda_memory memory;
     uint64_t size;
     struct vkb_exports *exports;
-    bool marked;  // of an idle one: its event tells when its last use is over
+    uint64_t serial;  // of its content
+    bool marked;      // of an idle one: its event tells when its last use is over
     // The points at which CUDA has filled it and the device has drawn to it. 0: it was waited for.
     uint64_t filled, drawn;
 };
@@ -32,6 +33,7 @@ struct vkb_exports {
     struct vkb_cuda *cuda;
     struct vkb_export *taken, *idle;  // the latest first
     uint64_t idle_size;
+    uint64_t serials;  // given away so far
     // Signalled by CUDA; and by the device, whose points are given away with the renderer's lock.
     struct vkb_shared_timeline filled, drawn;
 };
@@ -49,6 +51,8 @@ void vkb_exports_free(struct vkb_exports *exports);
 // Takes at least `size` bytes, of undefined content.
 struct vkb_export *vkb_exports_take(struct vkb_exports *exports, uint64_t size,
                                     struct vkb_error *error);
+// Gives it another serial, since its content changes.
+void vkb_export_renew(struct vkb_export *one);
 // Lets CUDA signal that the copy which vkb_cuda_begin_copy has begun is complete. False: the host
 // has to wait, since CUDA cannot order it with the work of other streams.
 bool vkb_export_order_copy(struct vkb_export *one);

@@ -232,11 +232,11 @@ static bool stage_exported(struct vkb_run *run, const struct pixels *pixels, boo
     staged->image = run->images[pixels->image];
     staged->input = input;
     staged->send =
-        !vkb_content_holds(&staged->image->content, &input->serial, sizeof input->serial);
+        !vkb_content_holds(&staged->image->content, &input->pixels, sizeof input->pixels);
     run->unknown_non_finite = run->unknown_non_finite || !vkb_is_grey(pixels->kind);
     return !staged->send
         || vkb_content_begin_writing(&staged->image->content, &run->frame->cache.clock,
-                                     &input->serial, sizeof input->serial, error);
+                                     &input->pixels, sizeof input->pixels, error);
 }
 
 // Stages the image if the device does not have it yet.

@@ -10,13 +10,21 @@
 
 #include <stddef.h>
 
+// Which pixels of exported memory an image has, whose size and format are its own. Compared byte by
+// byte, so it has no padding.
+struct vkb_pixels_key {
+    uint64_t serial, offset;  // of the memory, whose content does not change; in it
+    int64_t row_stride, pixel_stride, channel_stride, layer_stride;
+    uint64_t channels;
+};
+
 // The caller's pixels, with any strides (in bytes): in host memory, or in memory that CUDA shares,
-// from byte `offset` on. Then `serial` is the pixels' own, and `format` one with such elements.
+// from byte `offset` on. Then `format` is one with such elements.
 struct vkb_input {
     const void *memory;
     struct vkb_export *exported;  // NULL: in host memory
     size_t offset;
-    uint64_t serial;
+    struct vkb_pixels_key pixels;  // of exported ones
     ptrdiff_t row_stride, pixel_stride, channel_stride;
     enum vkb_format format;
     uint32_t width, height, channels;

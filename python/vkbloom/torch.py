@@ -11,6 +11,7 @@ from typing import Any, Literal, TypeAlias
 from vkbloom._extras import import_extra
 from vkbloom._gradients.operators import (
     number_of,
+    on_host_together,
     refuse_capture,
     refuse_tangents,
     replace,
@@ -171,12 +172,15 @@ class Bloom(torch.nn.Module):  # type: ignore[misc]
     def _values(self) -> list[Any]:
         """Return the parameters, moved into the ranges of their fields."""
         parameters = [self._parameter(name) for name in self._names]
+        # Compiled code cannot depend on values.
+        compiling = torch.compiler.is_compiling()
+        read = parameters if compiling else on_host_together(parameters)
         with torch.no_grad():
-            for name, parameter in zip(self._names, parameters, strict=True):
-                held = _clamp(parameter, self._ranges[name])
+            for name, parameter, values in zip(self._names, parameters, read, strict=True):
+                held = _clamp(values, self._ranges[name])
                 # A write, also of an equal value, makes what earlier calls have saved unusable.
-                # (Compiled code saves copies, and cannot depend on values.)
-                if torch.compiler.is_compiling() or not torch.equal(held, parameter):
+                # (Compiled code saves copies.)
+                if compiling or not torch.equal(held, values):
                     parameter.copy_(held)
         return parameters
 

@@ -7,6 +7,7 @@ number, is a constant of code that `torch.compile` made.
 from __future__ import annotations
 
 import functools
+import weakref
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, Final, NamedTuple, cast
 
@@ -18,7 +19,8 @@ from vkbloom._gradients.pulling import pull_each, undefined
 from vkbloom._image_arguments import check_mask
 from vkbloom._psf.values import ARRAYS, ArrayValue
 from vkbloom._renderer.default import default_renderer, renderer_on
-from vkbloom._renderer.device_arrays import DeviceArray, merge, take
+from vkbloom._renderer.device_arrays import DeviceArray, ImportedArray, merge, take
+from vkbloom._renderer.frames import Frames
 from vkbloom._renderer.renderer import RENDERERS, Renderer
 from vkbloom._renderer.sources import Inputs, check_inputs
 from vkbloom._settings.fields import fields_of
@@ -89,11 +91,21 @@ def _settings(text: str) -> Settings:
     return Settings.from_json(text)
 
 
+def on_host_together(tensors: Sequence[Any]) -> list[Any]:
+    """Return tensors on the host. Numbers on a GPU are read at once: each wait takes 0.1 ms."""
+    parts = [tensor.detach() for tensor in tensors]
+    kinds = {(part.device, part.dtype, part.shape) for part in parts}
+    if len(parts) > 1 and len(kinds) == 1 and parts[0].is_cuda and parts[0].ndim == 0:
+        return [*torch.stack(parts).cpu()]
+    return [part.cpu() for part in parts]
+
+
 def replace(settings: Settings, values: Mapping[str, Any]) -> Settings:
     """Return settings with the values of tensors."""
     if not values:
         return settings
-    given = {name: _field_value(value.detach().cpu()) for name, value in values.items()}
+    parts = zip(values, on_host_together([*values.values()]), strict=True)
+    given = {name: _field_value(part) for name, part in parts}
     if any(isinstance(value, np.ndarray) for value in given.values()):
         return settings.replace(**given)
     return _replaced(settings, tuple(given.items()))
@@ -196,6 +208,42 @@ def _pull(
     return next(pulled)
 
 
+class _Taken(NamedTuple):
+    """The copy of an image that the last forward pass of a renderer has made."""
+
+    key: tuple[Any, ...]
+    images: ImportedArray
+
+
+#: By renderer, where a backward pass may follow. Each forward pass replaces it, and the backward
+#: pass of an image comes after its forward pass and before its memory is freed: so another image
+#: has another key. On the device, passes find what the forward pass has drawn of the same copy.
+_TAKEN: Final[weakref.WeakKeyDictionary[Renderer, _Taken]] = weakref.WeakKeyDictionary()
+
+
+def _key_of(image: Any) -> tuple[Any, ...]:
+    """Return what two tensors with the same pixels have in common while one of them exists."""
+    return image.data_ptr(), image._version, image.dtype, image.shape, image.stride()
+
+
+def _take_forward(call: _Call, renderer: Renderer) -> ImportedArray:
+    """Copy the images, and keep the copy if a backward pass may follow."""
+    _TAKEN.pop(renderer, None)
+    images = take(_batch(call.image), "image", renderer._core, (4,))
+    # The version of an inference tensor is not known.
+    is_learned = call.image.requires_grad or any(part.requires_grad for part in call.values)
+    if is_learned and not call.image.is_inference():
+        _TAKEN[renderer] = _Taken(_key_of(call.image), images)
+    return images
+
+
+def _take_backward(call: _Call, renderer: Renderer) -> ImportedArray:
+    taken = _TAKEN.pop(renderer, None)
+    if taken and taken.key == _key_of(call.image):
+        return taken.images
+    return take(_batch(call.image), "image", renderer._core, (4,))
+
+
 def _pull_on_device(call: _Call, cotangent: Any, by_images: bool) -> Iterator[Any]:
     """Yield the derivatives of each image, with those by images as tensors of the GPU."""
     renderer, mask = _renderer(call.renderer, call.image), call.mask
@@ -204,14 +252,11 @@ def _pull_on_device(call: _Call, cotangent: Any, by_images: bool) -> Iterator[An
     renderer._pending.wait()
     core = renderer._core
     masks = None if mask is None else mask.detach().reshape(-1, *mask.shape[-2:]).cpu().numpy()
-    images, emissions, cotangents = (
+    images = _take_backward(call, renderer)
+    emissions, cotangents = (
         None if tensor is None else take(_batch(tensor), name, core, (4,))
-        for name, tensor in (
-            *(("image", call.image), ("emission", call.emission)),
-            ("cotangent", cotangent),
-        )
+        for name, tensor in (("emission", call.emission), ("cotangent", cotangent))
     )
-    assert images
     assert cotangents
     sequence = (
         (
@@ -289,9 +334,16 @@ def _on_device(call: _Call) -> Any:
     """Run the operator without the host; a batch without masks changes the context once."""
     settings = replace(in_floats(_settings(call.settings)), call.fields)
     renderer, images = _renderer(call.renderer, call.image), _batch(call.image)
+    frames: Iterable[Frames]
     if call.mask is None and call.emission is None and len(images) > 1:
+        _TAKEN.pop(renderer, None)
         frames = renderer.map(images, settings, framebuffers="final")
+    elif call.mask is None and call.emission is None and len(images) == 1:
+        renderer._pending.wait()
+        inputs = Inputs(_take_forward(call, renderer).at(0))
+        frames = [renderer._apply_inputs(inputs, settings, ("final",))]
     else:
+        _TAKEN.pop(renderer, None)
         masks, emissions = (
             [None] * len(images)
             if tensor is None

@@ -70,13 +70,18 @@ class Running:
         """Return the framebuffers; wait for those that no stream of a GPU waits for."""
         if self.submission and not self.submission.ordered:
             self.submission.complete()
+        return self._named()
+
+    def _named(self) -> dict[str, NDArray[Any]]:
         return requests.name_outputs(self.plan, self.arrays, self.passes.destination)
 
     def images(self) -> dict[str, NDArray[Any]]:
         """Return the derivatives by image, mask and emission, as `by_name` does, if it has them."""
         if self.results not in ("images", "all"):
             return {}
-        framebuffers = self.by_name()
+        # Beside sums on the host: who takes the images goes on while the device works.
+        is_ordered = self.submission is not None and self.submission.exports_ordered
+        framebuffers = self._named() if is_ordered else self.by_name()
         return {
             name: framebuffers[f".by_{name}"]
             if f".by_{name}" in framebuffers
@@ -158,7 +163,7 @@ class Passes:
         submission = None
         if arrays:
             submission = requests.PendingSubmission(core.run(source, (plan,), (arrays,)))
-            if submission.ordered:
+            if submission.exports_ordered:
                 self.renderer._pending.add(submission)
         return Running(self, plan, arrays, submission, results)
 

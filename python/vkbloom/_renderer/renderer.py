@@ -40,6 +40,7 @@ from vkbloom._renderer.sources import (
     NO_GEOMETRY,
     SCENE_SIZE,
     Geometry,
+    Inputs,
     any_source,
     batch_sources,
     check_inputs,
@@ -912,6 +913,12 @@ class Renderer:
         if made != self._exposed:
             self._exposed = made
         return self._exposed
+
+    def _apply_inputs(
+        self, inputs: Inputs, settings: Settings, names: tuple[str, ...] | None
+    ) -> Frames:
+        """As `apply`, of checked arguments, after the wait for pending submissions."""
+        return self._run_one(inputs.source(), settings, names, None, None, state=None)
 
     def _run_one(
         self,

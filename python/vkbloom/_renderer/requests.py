@@ -42,12 +42,14 @@ IMAGES_AHEAD = 3
 class PendingSubmission:
     """A submission whose result is awaited when it is first read.
 
-    Its arrays are on a GPU, whose streams wait for them.
+    Some or all of its arrays are on a GPU, whose streams wait for them.
     """
 
     def __init__(self, submission: _core.Submission) -> None:
         #: Whether streams of the GPU wait for all of its arrays, so that the host need not.
         self.ordered = submission.ordered
+        #: The same of those on the GPU, if others are on the host.
+        self.exports_ordered = submission.exports_ordered
         self._lock = ProcessLock()
         self._submission: _core.Submission | None = submission
         self._results: tuple[list[dict[str, float]], tuple[int, ...]] | None = None
