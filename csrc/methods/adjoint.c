@@ -97,6 +97,27 @@ static void find_glow(struct vkb_adjoint *adjoint, const struct vkb_cotangents *
         }
 }
 
+// Whether "final" alone has cotangents, and adds the bloom times the intensity, which is linear in
+// what the only threshold pass writes. Then no bloom is needed for the derivative by the intensity:
+// a step of Separable that learns threshold and intensity took 1.06 ms of passes with it, and
+// 0.49 without (H200, 3840 x 2160, 2026-11-29).
+static bool scales_light(const struct vkb_graph *graph, const struct vkb_cotangents *cotangents)
+{
+    uint32_t thresholds = 0, composites = 0;
+
+    for (uint32_t i = 0; i < graph->pass_count; ++i) {
+        const struct vkb_pass_row *pass = &graph->passes[i];
+        const bool adds = pass->block == VKB_BLOCK_composite && vkb_adds_bloom(pass);
+        thresholds += pass->block == VKB_BLOCK_threshold;
+        composites += adds;
+        if (!adds && pass->block != VKB_BLOCK_threshold && pass->block != VKB_BLOCK_filter
+            && pass->block != VKB_BLOCK_fft && pass->block != VKB_BLOCK_fft_kernel)
+            return false;
+    }
+    return thresholds == 1 && composites == 1 && cotangents->count == 1
+        && strcmp(cotangents->names[0], "final") == 0;
+}
+
 // Makes the cotangents of the source's images framebuffers. A custom method may have framebuffers
 // of these names, too.
 static bool show_results(struct vkb_adjoint *adjoint, uint32_t image_count, struct vkb_error *error)
@@ -141,6 +162,7 @@ bool vkb_build_adjoint(const struct vkb_source *source, const struct vkb_setting
     if (!vkb_source_build(source, settings, max_side, graph, error))
         return false;
     find_glow(&adjoint, cotangents);
+    adjoint.light = scales_light(graph, cotangents);
     const uint32_t image_count = *first = graph->image_count;
     adjoint.cotangents = vkb_alloc(error, image_count, sizeof *adjoint.cotangents);
     bool done = adjoint.cotangents && add_table(&adjoint, error);

@@ -19,11 +19,13 @@ struct vkb_cotangents {
 // Adds the framebuffers ".by_image", ".by_emission" and ".by_mask", of those that the source has
 // and that the cotangents depend on, and, as sums of one pixel with those of the squares below,
 // ".by_composite" (intensity, exposure, reference white) and ".by_threshold" (threshold, knee),
-// where the passes read these, and ".by_shares_0" and so on (the cotangents of a sum of two levels
-// times the one of its size, and times the sum), where fields are learned by them. Of the weights
-// of a field of kernels: ".by_weights_0" and so on, of four weights each at the places of their
-// grid, unless that has more places than images have pixels. *first is the index of the first image
-// that is added. *possible becomes false if a pass has no adjoint.
+// where the passes read these; ".by_light" in place of the latter has the derivative by a factor of
+// the light above the threshold, too, if that is the intensity's times the intensity; and
+// ".by_shares_0" and so on (the cotangents of a sum of two levels times the one of its size, and
+// times the sum), where fields are learned by them. Of the weights of a field of kernels:
+// ".by_weights_0" and so on, of four weights each at the places of their grid, unless that has more
+// places than images have pixels. *first is the index of the first image that is added. *possible
+// becomes false if a pass has no adjoint.
 bool vkb_build_adjoint(const struct vkb_source *source, const struct vkb_settings *settings,
                        const struct vkb_cotangents *cotangents, uint32_t max_side,
                        struct vkb_transposes *transposes, struct vkb_graph *graph, uint32_t *first,

@@ -24,6 +24,7 @@ struct vkb_adjoint {
     uint32_t mixed;  // sums of two levels so far
     bool sums;       // the derivatives by fields are wanted
     bool shares;     // also those by shares of levels
+    bool light;      // the intensity is a factor of what the threshold pass writes
     bool weights;    // those by the weights of a field of kernels
     // The cotangents of the scene of a composite without a curve are a share of those that the
     // composite has. The next pass that accumulates cotangents of the scene adds them itself.
@@ -106,6 +107,9 @@ bool vkb_accumulate_mask(struct vkb_adjoint *adjoint, const struct vkb_pass_row 
 bool vkb_add_sum_passes(struct vkb_adjoint *adjoint, const struct vkb_pass_row *row,
                         const struct vkb_shader *shader, struct vkb_size size, const char *name,
                         struct vkb_error *error);
+
+// Whether a composite adds the bloom times the intensity, and its cotangents do not depend on it.
+bool vkb_adds_bloom(const struct vkb_pass_row *composite);
 
 // The families of passes. Of what is linear: by the filters of the row.
 vkb_transpose vkb_transpose_filters;

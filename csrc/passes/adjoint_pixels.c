@@ -24,6 +24,12 @@ static bool depends_on_bloom(const struct vkb_pass_row *row)
         || row->params.composite.limit < (float)SINGLE_LIMIT;
 }
 
+bool vkb_adds_bloom(const struct vkb_pass_row *composite)
+{
+    return composite->constants.composite == COMPOSITE_ADD && !depends_on_bloom(composite)
+        && !composite->constants.lit;
+}
+
 // Whether the derivatives by the scene are a share of all colours.
 static bool scales_scene(const struct vkb_pass_row *row)
 {
@@ -149,7 +155,8 @@ bool vkb_transpose_threshold(struct vkb_adjoint *adjoint, const struct vkb_pass_
 
     if (pass->constants.threshold_mode == THRESHOLD_KNEE
         && !vkb_add_sum_passes(adjoint, &row, &vkb_shader_adjoint_threshold_sums_frag,
-                               size_of(adjoint, target), ".by_threshold", error))
+                               size_of(adjoint, target),
+                               adjoint->light ? ".by_light" : ".by_threshold", error))
         return false;
     row.constants.by = BY_SCENE;
     return vkb_accumulate_sampled(adjoint, &row, pass->reads[SLOT_SOURCE], target, error)

@@ -75,11 +75,23 @@ static bool check_names(const struct vkb_module_state *state, PyObject *names, P
     return found > 0;
 }
 
+// The names as `outputs` has them: those of derivatives begin with VKB_INTERNAL_NAME.
+static PyObject *output_names(const struct vkb_plan *plan, uint32_t count)
+{
+    PyObject *tuple = PyTuple_New(count);
+
+    for (uint32_t i = 0; tuple && i < count; ++i)
+        if (!vkb_set_item(tuple, i,
+                          PyUnicode_FromString(plan->graph.images[plan->outputs[i]].name)))
+            Py_CLEAR(tuple);
+    return tuple;
+}
+
 // Keeps of the outputs those whose names are wanted.
 static bool keep_outputs(const struct vkb_module_state *state, struct vkb_plan *plan,
                          uint32_t count, PyObject *names)
 {
-    PyObject *known = image_names(&plan->graph, plan->outputs, count);
+    PyObject *known = output_names(plan, count);
     bool done = known && check_names(state, names, known);
 
     for (uint32_t i = 0; done && i < count; ++i) {

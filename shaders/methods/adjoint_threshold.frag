@@ -1,5 +1,5 @@
 // The cotangents of the threshold pass, at its pixels: of the reduced image, of the mask, or of
-// threshold and knee, whose sums are their derivatives.
+// threshold, knee, and a factor of all light, whose sums are their derivatives.
 
 #define TEXEL(value) finite_or_zero(value)
 #include "lib/sampling.glsl"
@@ -42,10 +42,10 @@ void add_pixel(inout vec4 sum, inout vec4 squares)
     vec4 colour = reduced();
     float width = params.threshold * params.knee;
     Soft soft = soft_threshold(largest(colour.rgb), params.threshold, width, 4.0 * width + 1e-5, 1e-5);
-    vec2 values = vec2(soft.by_threshold + params.knee * soft.by_width, params.threshold * soft.by_width);
+    vec3 values = vec3(soft.by_threshold + params.knee * soft.by_width, params.threshold * soft.by_width, soft.factor);
     values *= inner_product(cotangent_of_target(), colour) * mask_value();
-    sum.xy += values;
-    squares.xy += values * values;
+    sum.rgb += values;
+    squares.rgb += values * values;
 }
 
 #else

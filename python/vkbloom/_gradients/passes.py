@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Container, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Container, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final, cast
 
@@ -27,10 +27,13 @@ if TYPE_CHECKING:
 _MAX_LEVELS: Final = 7
 #: The framebuffers of derivatives by images.
 _BY_IMAGES: Final = (".by_image", ".by_emission", ".by_mask")
-#: The fields whose derivatives are the channels of a sum.
+_BY_LIGHT: Final = ".by_light"
+#: The fields whose derivatives are the channels of a sum. The intensity's is divided by it in the
+#: sum by light.
 _SUMS: Final = {
     ".by_composite": ("intensity", "exposure", "reference_white"),
     ".by_threshold": ("threshold", "knee"),
+    _BY_LIGHT: ("threshold", "knee", "intensity"),
 }
 #: The weights of a field of kernels.
 WEIGHTS: Final = "psf.weights"
@@ -138,10 +141,13 @@ class Passes:
     cotangents: Mapping[str, NDArray[Any] | ImportedArray]
     destination: Destination = "host"
 
-    def submit(self, results: DerivativeKind = "images") -> Running | None:
+    def submit(
+        self, results: DerivativeKind = "images", fields: Collection[str] | None = None
+    ) -> Running | None:
         """Submit the passes of the derivatives by images, the sums of those by fields, or all.
 
-        None: a pass has no adjoint, or the renderer is closed.
+        None: a pass has no adjoint, or the renderer is closed. With `fields`, only the sums that
+        these need.
         """
         core = self.renderer._core
         levels = tuple(map(_level, self.cotangents.values()))
@@ -150,9 +156,16 @@ class Passes:
         if any(len(level.shape) != 3 or level.shape[2] not in (3, 4) for level in levels):
             return None
         source = self.inputs.source(levels)
-        plan = self.renderer._plan_derivatives(
-            source, self.settings, tuple(self.cotangents), results
+        made = functools.partial(
+            self.renderer._plan_derivatives,
+            source,
+            self.settings,
+            tuple(self.cotangents),
+            results,
         )
+        plan = made()
+        if plan is not None and fields is not None:
+            plan = made(_outputs_for(self.settings, plan, fields))
         if plan is None:
             return None
         # The host reads the sums.
@@ -168,6 +181,27 @@ class Passes:
         return Running(self, plan, arrays, submission, results)
 
 
+def _outputs_for(
+    settings: Settings, plan: _core.Plan, fields: Collection[str]
+) -> tuple[str, ...] | None:
+    """Return the names of the images and of the sums that fields need; None: of all sums."""
+    names = tuple([name for name, *_ in plan.outputs])
+    left = device_fields(settings).intersection(fields)
+    if left & {*share_fields(settings)}:
+        return None
+    chosen = []
+    # The sum by light needs no bloom.
+    for kind in reversed(_SUMS):
+        given = left.intersection(_SUMS[kind])
+        if kind == _BY_LIGHT and settings.value_of("intensity") == 0:
+            given -= {"intensity"}
+        if kind in names and given:
+            chosen.append(kind)
+            left -= given
+    wanted = (*_BY_IMAGES, *chosen)
+    return tuple([name for name in names if name in wanted])
+
+
 def _sums_of(
     settings: Settings, totals: Mapping[str, NDArray[Any]]
 ) -> dict[str, tuple[float, float]]:
@@ -175,12 +209,17 @@ def _sums_of(
     found: dict[str, tuple[float, float]] = {}
     for kind, names in _SUMS.items():
         if kind in totals:
-            sums, squares = on_host(totals[kind])[:, 0].astype(np.float64)
-            found |= zip(names, zip(sums, squares, strict=True), strict=False)
+            pairs = on_host(totals[kind])[:, 0].astype(np.float64).T
+            for name, (total, square) in zip(names, pairs, strict=False):
+                scale = 1.0
+                if (kind, name) == (_BY_LIGHT, "intensity"):
+                    scale = settings.value_of("intensity")
+                if scale != 0:
+                    found.setdefault(name, (total / scale, square / scale**2))
     shares = {name: on_host(totals[name]) for name in totals if name.startswith(_BY_SHARES)}
     if shares:
-        pairs = [shares[f"{_BY_SHARES}{number}"][:, 0, :2] for number in range(len(shares))]
-        for name, (total, square) in sums_by_shares(settings, pairs).items():
+        levels = [shares[f"{_BY_SHARES}{number}"][:, 0, :2] for number in range(len(shares))]
+        for name, (total, square) in sums_by_shares(settings, levels).items():
             # The composite reads the field, too.
             others = found.get(name, (0.0, 0.0))
             found[name] = total + others[0], square + others[1]
@@ -218,14 +257,13 @@ def device_fields(settings: Settings) -> frozenset[str]:
     """
     if {settings.tonemap, settings.encoding} & _STEEP:
         return frozenset()
-    composite, threshold = map(frozenset, _SUMS.values())
-    known = composite - settings._fields_before_composite
+    known = {*_SUMS[".by_composite"]} - settings._fields_before_composite
     if not settings.published:
-        known |= threshold
+        known |= {*_SUMS[".by_threshold"]}
     known |= {*share_fields(settings)}
     if settings.glare:
         known -= {"intensity"}
-    return known & differentiable(settings).keys()
+    return frozenset(known & differentiable(settings).keys())
 
 
 class DeviceGradients(Mapping[str, NDArray[Any]]):

@@ -237,7 +237,7 @@ def pull_each(
     started: deque[Callable[[], Derivatives]] = deque()
     for inputs, cotangents in sequence:
         adjoint = _Adjoint(renderer, inputs, settings, destination, min_share)
-        running = adjoint.passes(cotangents).submit(kind)
+        running = adjoint.passes(cotangents).submit(kind, fields if has_sums else None)
         started.append(functools.partial(adjoint.derivatives, cotangents, running))
         if len(started) == IMAGES_AHEAD:
             yield started.popleft()()

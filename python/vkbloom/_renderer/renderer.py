@@ -1003,9 +1003,10 @@ class Renderer:
         settings: Settings,
         cotangents: tuple[str, ...],
         results: DerivativeKind,
+        names: tuple[str, ...] | None = None,
     ) -> _core.Plan | None:
         """Return the plan of derivatives, as `_plan_of` does, or None if a pass has none."""
-        return self._find_plan(source, settings, None, cotangents, results)
+        return self._find_plan(source, settings, names, cotangents, results)
 
     def _find_plan(
         self,
