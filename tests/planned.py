@@ -48,9 +48,9 @@ def watch_submissions(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     submitted: list[str] = []
     submit = Passes.submit
 
-    def watched(passes: Passes, results: Any = "images") -> Any:
+    def watched(passes: Passes, results: Any = "images", fields: Any = None) -> Any:
         submitted.append(results)
-        return submit(passes, results)
+        return submit(passes, results, fields)
 
     monkeypatch.setattr(Passes, "submit", watched)
     return submitted

@@ -472,6 +472,25 @@ def gradients(renderer: Any) -> None:
     equal_gradients(pullback({"final": OnDevice(one)}), expected)
 
 
+def copies(renderer: Any) -> None:
+    """Passes run once for a copy of an array. Other bytes in its memory are another picture."""
+    image, settings = picture(24, 16), Pyramid(levels=2)
+    other = image[::-1].copy()
+    expected = [renderer.apply(part, settings, device="host")["final"] for part in (image, other)]
+    inputs = check_inputs(OnDevice(image), core=renderer._core)
+    calls = []
+    for _ in range(2):
+        frames = renderer._apply_inputs(inputs, settings, None)
+        np.testing.assert_array_equal(frames["final"].numpy(), expected[0])
+        calls.append(frames.timings)
+    assert "final" in calls[0]
+    assert not calls[1]
+    held: Any = inputs.image
+    held.memory.copy_bytes(held.memory.address, other.ctypes.data, other.nbytes)
+    frames = renderer._apply_inputs(inputs, settings, None)
+    np.testing.assert_array_equal(frames["final"].numpy(), expected[1])
+
+
 def gradient_places(renderer: Any) -> None:
     """Masks, emissions, `device`, levels of bytes, other framebuffers, and what is refused."""
     image = picture(24, 16)
@@ -574,7 +593,7 @@ def ranges(renderer: Any) -> None:
 
 WORK = (
     *(layouts, streams, sequences, layers, places, capsules, ends, recycling, lifetime, errors),
-    *(histories, geometries, gradients, gradient_places),
+    *(histories, geometries, copies, gradients, gradient_places),
 )
 
 

@@ -13,7 +13,7 @@ from tests.device.abilities import has_linear_texels
 from tests.exhaustive import EXHAUSTIVE, some
 from tests.images import random_image
 from tests.methods.cases import METHODS, OTHERS
-from tests.planned import DeviceGradients, Inputs, Passes
+from tests.planned import DeviceGradients, Inputs, Passes, in_floats
 from tests.variants import open_variant
 from vkbloom import (
     BevyBloom,
@@ -277,6 +277,67 @@ def test_fields_of_the_composite_are_sums(renderer: Renderer, method: str) -> No
     boosts = ("low_frequency_boost", "low_frequency_boost_curvature", "high_pass_frequency")
     for field in (*composite, *(boosts if method == "bevy" else ())):
         assert np.allclose(fields[field], expected[field], rtol=1e-4, atol=1e-4), field
+
+
+LEARNED: dict[str, Any] = {"threshold": 0.4, "knee": 0.3, "intensity": 0.7}
+EXPOSED = ("threshold", "intensity", "exposure")
+#: Settings, fields that are learned, and the sums that these need. Light is what is above the
+#: threshold: where the bloom is linear in it, the derivative by the intensity needs no bloom.
+SUMS_OF: dict[str, tuple[Any, tuple[str, ...], tuple[str, ...]]] = {
+    "separable": (vkbloom.Separable(**LEARNED), tuple(LEARNED), ("light",)),
+    "pyramid": (vkbloom.Pyramid(levels=3, exposure=1.0, **LEARNED), ("intensity",), ("light",)),
+    "dual": (vkbloom.DualKawase(**LEARNED), EXPOSED, ("composite", "light")),
+    "kernel": (
+        vkbloom.Convolution(vkbloom.psf.gaussian(sigma=3), **LEARNED),
+        tuple(LEARNED),
+        ("light",),
+    ),
+    "zero": (
+        vkbloom.Pyramid(levels=2, **LEARNED | {"intensity": 0.0}),
+        tuple(LEARNED),
+        ("composite", "light"),
+    ),
+    "mix": (
+        vkbloom.Pyramid(levels=2, composite="mix", **LEARNED),
+        tuple(LEARNED),
+        ("composite", "threshold"),
+    ),
+    "firefly": (
+        vkbloom.Pyramid(levels=2, firefly_filter=True, **LEARNED),
+        ("intensity",),
+        ("composite",),
+    ),
+    "curve": (
+        vkbloom.Pyramid(levels=2, tonemap="reinhard", **LEARNED),
+        tuple(LEARNED),
+        ("composite", "threshold"),
+    ),
+    "threshold": (vkbloom.Pyramid(levels=2, **LEARNED), ("knee",), ("light",)),
+    "published": (vkbloom.presets["kino"], ("intensity",), ("composite",)),
+}
+
+
+@pytest.mark.parametrize("name", SUMS_OF)
+def test_only_the_sums_that_fields_need_are_computed(renderer: Renderer, name: str) -> None:
+    settings, fields, kinds = SUMS_OF[name]
+    settings = in_floats(settings)
+    image = 2 * random_image(29, 38, channels=3, seed=1).astype(np.float32)
+    cotangents = {"final": random_image(29, 38, channels=3, seed=2).astype(np.float32) - 0.3}
+    mask = random_image(29, 38, channels=1, seed=3)[..., 0].astype(np.float32)
+    given: Any
+    for given in ({}, {"mask": mask}):
+        running = Passes(renderer, Inputs(image, **given), settings, cotangents).submit(
+            "all", fields
+        )
+        assert running
+        outputs = [output for output, *_ in running.plan.outputs if "image" not in output]
+        assert sorted(outputs) == sorted(
+            [f".by_{kind}" for kind in kinds] + [f".by_{part}" for part in given]
+        )
+        found = running.sums(min_share=0.0)
+        expected = reference.vjp(image, settings, **given)[1](cotangents)
+        for field in fields:
+            assert np.allclose(found[field], expected[field], rtol=1e-5), field
 
 
 @pytest.mark.parametrize("size", [(41, 9), (9, 47)])

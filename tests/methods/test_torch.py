@@ -368,6 +368,33 @@ def test_a_graph_of_cuda_is_refused(renderer: Renderer) -> None:
     assert torch.equal(image.grad, gradient)
 
 
+@pytest.mark.skipif(DEVICE != "cuda", reason="there are no tensors of CUDA here")
+def test_backward_passes_read_the_image_of_their_own_call(renderer: Renderer) -> None:
+    """Also after other calls, after writes to the tensor, and where its memory is used again."""
+    module = vkbloom_torch.Bloom(SETTINGS, learn=("intensity",), renderer=renderer).to(DEVICE)
+
+    def gradients(image: Any, final: Any) -> list[Any]:
+        image.grad = module.learned["intensity"].grad = None
+        final.square().sum().backward()
+        return [image.grad.clone(), module.learned["intensity"].grad.clone()]
+
+    images = [tensor(31, 18, 3, seed=seed).detach().requires_grad_() for seed in (1, 2)]
+    alone = [gradients(image, module(image)) for image in images]
+    finals = [module(image) for image in images]
+    together = [gradients(image, final) for image, final in zip(images, finals, strict=True)]
+    with torch.no_grad():
+        module(images[0])  # no backward pass follows
+        images[0].copy_(images[1])
+    together.append(gradients(images[0], module(images[0])))
+    module(images[0])
+    del finals, images[0]
+    again = torch.empty_like(images[0]).copy_(images[0] * 1).requires_grad_()
+    together.append(gradients(again, module(again)))
+    for found, right in zip(together, [*alone, alone[1], alone[1]], strict=True):
+        for part, other in zip(found, right, strict=True):
+            torch.testing.assert_close(part, other)
+
+
 @pytest.mark.parametrize(
     "settings",
     [

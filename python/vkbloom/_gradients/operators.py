@@ -229,7 +229,7 @@ def _key_of(image: Any) -> tuple[Any, ...]:
 def _take_forward(call: _Call, renderer: Renderer) -> ImportedArray:
     """Copy the images, and keep the copy if a backward pass may follow."""
     _TAKEN.pop(renderer, None)
-    images = take(_batch(call.image), "image", renderer._core, (4,))
+    images = _take_ordered(call.image, "image", renderer)
     # The version of an inference tensor is not known.
     is_learned = call.image.requires_grad or any(part.requires_grad for part in call.values)
     if is_learned and not call.image.is_inference():
@@ -241,20 +241,25 @@ def _take_backward(call: _Call, renderer: Renderer) -> ImportedArray:
     taken = _TAKEN.pop(renderer, None)
     if taken and taken.key == _key_of(call.image):
         return taken.images
-    return take(_batch(call.image), "image", renderer._core, (4,))
+    return _take_ordered(call.image, "image", renderer)
+
+
+def _take_ordered(tensor: Any, name: str, renderer: Renderer) -> ImportedArray:
+    # CUDA copies what `take` gets. On an H200, a step of a convolution took 10.8 ms without this
+    # wait and 6.5 with it; one of a pyramid 3.0 and 3.1 ms.
+    wait = renderer._pending.wait
+    return take(_batch(tensor), name, renderer._core, (4,), before_copy=wait)
 
 
 def _pull_on_device(call: _Call, cotangent: Any, by_images: bool) -> Iterator[Any]:
     """Yield the derivatives of each image, with those by images as tensors of the GPU."""
     renderer, mask = _renderer(call.renderer, call.image), call.mask
-    # CUDA copies what `take` gets. On an H200, a step of a convolution took 10.8 ms without this
-    # wait and 6.5 with it; one of a pyramid 3.0 and 3.1 ms.
-    renderer._pending.wait()
-    core = renderer._core
+    # Before the waits, since the device still works.
+    settings = replace(in_floats(_settings(call.settings)), call.fields)
     masks = None if mask is None else mask.detach().reshape(-1, *mask.shape[-2:]).cpu().numpy()
     images = _take_backward(call, renderer)
     emissions, cotangents = (
-        None if tensor is None else take(_batch(tensor), name, core, (4,))
+        None if tensor is None else _take_ordered(tensor, name, renderer)
         for name, tensor in (("emission", call.emission), ("cotangent", cotangent))
     )
     assert cotangents
@@ -269,7 +274,6 @@ def _pull_on_device(call: _Call, cotangent: Any, by_images: bool) -> Iterator[An
         )
         for index in range(images.shape[0])
     )
-    settings = replace(in_floats(_settings(call.settings)), call.fields)
     yield from pull_each(renderer, settings, sequence, call.fields, "cuda", images=by_images)
 
 
@@ -339,7 +343,6 @@ def _on_device(call: _Call) -> Any:
         _TAKEN.pop(renderer, None)
         frames = renderer.map(images, settings, framebuffers="final")
     elif call.mask is None and call.emission is None and len(images) == 1:
-        renderer._pending.wait()
         inputs = Inputs(_take_forward(call, renderer).at(0))
         frames = [renderer._apply_inputs(inputs, settings, ("final",))]
     else:
