@@ -245,10 +245,11 @@ def _take_backward(call: _Call, renderer: Renderer) -> ImportedArray:
 
 
 def _take_ordered(tensor: Any, name: str, renderer: Renderer) -> ImportedArray:
-    # CUDA copies what `take` gets. On an H200, a step of a convolution took 10.8 ms without this
-    # wait and 6.5 with it; one of a pyramid 3.0 and 3.1 ms.
-    wait = renderer._pending.wait
-    return take(_batch(tensor), name, renderer._core, (4,), before_copy=wait)
+    # CUDA copies what `take` gets, and its stream waits before. Beside Vulkan's work the GPU would
+    # change between both: on an H200, a step of a convolution took 10.8 ms without this wait and
+    # 6.5 with it; steps of a pyramid in a row 3.0 ms with it after the stream's wait, 2.4 before.
+    renderer._pending.wait()
+    return take(_batch(tensor), name, renderer._core, (4,))
 
 
 def _pull_on_device(call: _Call, cotangent: Any, by_images: bool) -> Iterator[Any]:

@@ -15,7 +15,7 @@ from vkbloom._formats import IMAGE_DTYPES
 from vkbloom._public import public
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Iterable
 
     from numpy.typing import NDArray
 
@@ -397,13 +397,8 @@ def take(
     core: _core.Renderer,
     sides: tuple[int, ...] = (3,),
     channels: tuple[int, ...] = (3, 4),
-    *,
-    before_copy: Callable[[], None] = lambda: None,
 ) -> ImportedArray:
-    """Copy an array of CUDA to memory that Vulkan shares, ordered after its producer's work.
-
-    - `before_copy`: What has to be waited for, while the device still works.
-    """
+    """Copy an array of CUDA to memory that Vulkan shares, ordered after its producer's work."""
     _require_no_capture()
     try:
         core.cuda()
@@ -425,6 +420,5 @@ def take(
             )
         )
     low, high = _span(shape, array.strides, array.dtype)
-    before_copy()
     memory = core.snapshot(array.address + low, high - low)
     return ImportedArray(memory, -low, shape, array.strides, array.dtype)
