@@ -44,10 +44,14 @@ uint64_t vkb_image_cache_size(const struct vkb_image_cache *cache)
 
 // Spare memory takes at most as much as the images of the last submissions did together.
 static void trim_spares(const struct vkb_device *device, struct vkb_image_cache *cache,
-                        uint64_t images, const struct vkb_age *age)
+                        const struct vkb_age *age)
 {
     struct vkb_spare *oldest;
+    uint64_t images = 0;
 
+    // Of their memory, which may be larger than their pixels.
+    for (size_t i = 0; i < cache->count; ++i)
+        images += cache->images[i]->image.memory_size;
     if (images >= cache->peak || cache->peaked + VKB_MIN_AGE < age->now) {
         cache->peak = images;
         cache->peaked = age->now;
@@ -70,7 +74,7 @@ static struct vkb_cached_image *find_oldest(const struct vkb_image_cache *cache)
 void vkb_image_cache_trim(const struct vkb_device *device, struct vkb_image_cache *cache,
                           const struct vkb_age *age)
 {
-    trim_spares(device, cache, vkb_image_cache_size(cache) - cache->spares.size, age);
+    trim_spares(device, cache, age);
     uint64_t size = vkb_image_cache_size(cache);
     const uint64_t left = size > VKB_KEPT_IMAGE_BYTES ? VKB_KEPT_IMAGE_BYTES / 2 : size;
 

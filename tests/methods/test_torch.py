@@ -388,7 +388,7 @@ def test_backward_passes_read_the_image_of_their_own_call(renderer: Renderer) ->
     together.append(gradients(images[0], module(images[0])))
     module(images[0])
     del finals, images[0]
-    again = torch.empty_like(images[0]).copy_(images[0] * 1).requires_grad_()
+    again = images[0].detach().clone().requires_grad_()
     together.append(gradients(again, module(again)))
     for found, right in zip(together, [*alone, alone[1], alone[1]], strict=True):
         for part, other in zip(found, right, strict=True):
