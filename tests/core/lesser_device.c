@@ -329,8 +329,9 @@ static VKAPI_ATTR void VKAPI_CALL get_memory(VkPhysicalDevice physical,
     };
 
     below.vkGetPhysicalDeviceMemoryProperties(physical, memory);
-    for (uint32_t i = 0; lacks("heap") && i < memory->memoryHeapCount; ++i)
-        memory->memoryHeaps[i].size = 256 << 20;
+    for (uint32_t i = 0; i < memory->memoryHeapCount; ++i)
+        if (lacks("heap") || lacks("room"))
+            memory->memoryHeaps[i].size = lacks("room") ? 16 << 20 : 256 << 20;
     if (!lacks("memory"))
         return;
     memory->memoryTypeCount = TYPE_COUNT;

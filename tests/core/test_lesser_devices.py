@@ -252,7 +252,7 @@ import os
 import numpy as np
 import vkbloom
 
-image = np.random.default_rng(0).random((512, 1024, 4), np.float32)
+image = np.random.default_rng(0).random((128, 256, 4), np.float32)
 settings = {
     "loops": vkbloom.Separable(loops=3, threshold=0.5),
     "streaks": vkbloom.presets["blender_streaks"].replace(threshold=0.5),
@@ -282,10 +282,10 @@ print(*sizes)
 @pytest.mark.parametrize("variant", ["fragment", "cpu", "gpu"])
 def test_images_share_memory(layer: Path, name: str, variant: str) -> None:
     """Where they take a quarter of it: those that no later pass reads, for `final` alone most."""
-    done = run(layer, name, "heap,cpu", ("-c", SHARED), VKBLOOM_VARIANT=variant)
+    done = run(layer, name, "room,cpu", ("-c", SHARED), VKBLOOM_VARIANT=variant)
     assert done.returncode == 0, done.stderr
     loops, loops_again, all_loops, streaks, *_ = map(int, done.stdout.split())
-    one = 512 * 1024 * 16
+    one = 128 * 256 * 16
     assert loops == loops_again == 3 * one
     assert all_loops > loops
     assert streaks <= 5 * one
@@ -298,9 +298,9 @@ import numpy as np
 import vkbloom
 from tests.custom import TRAIL
 
-image = np.random.default_rng(0).integers(0, 256, (1024, 1024, 4)).astype(np.float32) / 256
+image = np.random.default_rng(0).integers(0, 256, (256, 256, 4)).astype(np.float32) / 256
 settings = vkbloom.load_method(TRAIL, name="trail")()
-trail = np.zeros((1024, 1024, 3), np.float32)
+trail = np.zeros((256, 256, 3), np.float32)
 with vkbloom.Renderer(os.environ["VKBLOOM_TEST_NAME"], validation=True) as renderer:
     for frames in renderer.map([image] * 3, settings, framebuffers="final"):
         trail = (image[..., :3] + trail) / 2
@@ -311,7 +311,7 @@ with vkbloom.Renderer(os.environ["VKBLOOM_TEST_NAME"], validation=True) as rende
 
 @pytest.mark.usefixtures("glslang")
 def test_what_has_a_history_shares_no_memory(layer: Path, name: str) -> None:
-    done = run(layer, name, "heap,cpu", ("-c", HISTORY))
+    done = run(layer, name, "room,cpu", ("-c", HISTORY))
     assert done.returncode == 0, done.stderr
 
 
@@ -324,7 +324,7 @@ import vkbloom
 with vkbloom.Renderer(os.environ["VKBLOOM_TEST_NAME"], validation=True) as renderer:
     for names in (("final",), ("albedo", "final"), "all"):
         frames = renderer.render(
-            vkbloom.Scene.ufo(), "deferred", (2048, 900), shading="deferred", framebuffers=names
+            vkbloom.Scene.ufo(), "deferred", (512, 225), shading="deferred", framebuffers=names
         )
         for name in frames:
             print(name, hashlib.sha256(frames[name].tobytes()).hexdigest())
@@ -333,7 +333,7 @@ with vkbloom.Renderer(os.environ["VKBLOOM_TEST_NAME"], validation=True) as rende
 
 def test_images_of_one_pass_share_no_memory(layer: Path, name: str) -> None:
     short, enough = (
-        run(layer, name, lesser, ("-c", SHARED_SCENE)) for lesser in ("heap,cpu", "cpu")
+        run(layer, name, lesser, ("-c", SHARED_SCENE)) for lesser in ("room,cpu", "cpu")
     )
     assert short.returncode == enough.returncode == 0, short.stderr + enough.stderr
     assert short.stdout == enough.stdout
