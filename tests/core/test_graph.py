@@ -41,7 +41,7 @@ def test_no_image_fills_a_slot_of_another_one() -> None:
     twice = {
         name
         for name, settings in presets.items()
-        for row in rows(scene_plan(settings))
+        for row in rows(scene_plan(settings, (320, 180)))
         if len(set(row.reads)) < len(row.reads)
     }
     # Its ghosts are added to the image that they are of.

@@ -293,7 +293,7 @@ def test_html_and_repr(renderer: Renderer, plain: Any) -> None:
 
 
 def test_every_pass_has_a_sentence(renderer: Renderer, plain: Any, scene: Scene) -> None:
-    image = np.zeros((1080, 1920, 3), np.float32)
+    image = np.zeros((270, 480, 3), np.float32)
     settings = [*presets.values(), *(Pyramid(glare=glare) for glare in glares.values())]
     plans = [renderer.plan(image, one) for one in settings]
     plans += [renderer.plan(scene, Separable(), shading=one) for one in ("forward", "deferred")]
