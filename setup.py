@@ -260,8 +260,9 @@ def write_spirv(jobs: int) -> None:
     names = {module.name for module in built}
     arrays = declared = objects = ""
     for module, code in zip(built, codes, strict=True):
-        words = ",".join(map(str, struct.unpack(f"={len(code) // 4}I", code)))
-        arrays += f"static const uint32_t {module.name}[] = {{{words}}};\n"
+        # A string, which compilers read in a third of the time of a list. It ends with a 0 more.
+        words = "".join(f"\\x{word:x}" for word in struct.unpack(f"={len(code) // 4}I", code))
+        arrays += f'static const uint32_t {module.name}[] = U"{words}";\n'
         hashed = ", ".join(map(str, hashlib.sha256(code).digest()[:16]))
         siblings = (
             re.sub("_frag$", "_dispatch", module.name),
@@ -276,7 +277,7 @@ def write_spirv(jobs: int) -> None:
         declared += f"extern const struct vkb_shader vkb_shader_{module.name};\n"
         objects += (
             f'const struct vkb_shader vkb_shader_{module.name} = {{"{module.name}", {module.name}, '
-            f"sizeof {module.name}, {{{{{hashed}}}}}, {pointers}, {{0, 0}}, 0}};\n"
+            f"{len(code)}, {{{{{hashed}}}}}, {pointers}, {{0, 0}}, 0}};\n"
         )
     (SPIRV / "spirv.h").write_text(
         "// Made by setup.py from shaders/.\n#ifndef VKB_SPIRV_H\n#define VKB_SPIRV_H\n\n"
