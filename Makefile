@@ -238,7 +238,7 @@ lint: build/stamp/core build/stamp/test build/stamp/lint
 	$(VENV)/bin/ruff check .
 	$(VENV)/bin/ruff format --check .
 	$(VENV)/bin/mypy
-	$(PYTHON) -m mypy.stubtest vkbloom --concise --mypy-config-file pyproject.toml \
+	$(PYTHON) -m mypy.stubtest vkbloom --concise --mypy-config-file tools/stubtest.ini \
 	    --allowlist tools/stubtest_allowlist.txt --ignore-unused-allowlist
 	$(VENV)/bin/lint-imports
 	$(PYTHON) -m pytest -q tests/core/test_floors.py
