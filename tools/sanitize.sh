@@ -9,11 +9,13 @@ cd "$(dirname "$0")/.."
 # compared with the reference: tests of these, of Python alone and of other processes are left out.
 # Each preset is in test_matrix.py.
 if [ $# = 0 ]; then
-    for name in adapters array_arguments array_memory batches bundled_driver core_arguments eviction graph refusals \
-        interruption lifetime pipeline_cache plans readback settings threads; do
+    # In this order, the longest first: at the end both processes have work.
+    set -- tests/methods/test_matrix.py tests/core/test_threads.py tests/methods/test_variants.py
+    for name in plans readback interruption batches eviction adapters array_arguments array_memory \
+        bundled_driver core_arguments graph refusals lifetime pipeline_cache settings; do
         set -- "$@" "tests/core/test_$name.py"
     done
-    for name in apply_input dither matrix rg11b10 variants; do
+    for name in apply_input dither rg11b10; do
         set -- "$@" "tests/methods/test_$name.py"
     done
     set -- "$@" tests/methods/test_custom_passes.py tests/custom/test_rendering.py
@@ -24,7 +26,8 @@ if [ $# = 0 ]; then
         variants.py::test_large variants.py::test_the_forward_frame; do
         set -- "$@" --deselect "tests/methods/test_$name"
     done
-    set -- "$@" -k "not count_of_a_point and not dry_run and not is_what_runs" -n 2 --dist loadfile
+    set -- "$@" -k "not count_of_a_point and not dry_run and not is_what_runs" -n 2 --dist loadfile \
+        --no-loadscope-reorder
 fi
 folder=$PWD/build/sanitize
 mkdir -p "$folder"
