@@ -2,7 +2,7 @@
 # Builds the core's wheel with what this system has, from a source distribution and without glslang
 # and spirv-opt, with its SBOM where the system is Debian, and renders with it in a fresh environment:
 # nothing of the working tree is imported. Arguments: the Python
-# that builds, with setuptools; "twice": builds in a second folder, too, and compares the wheels.
+# that builds, with pip and setuptools; "twice": builds in a second folder, too, and compares the wheels.
 set -eu
 python=$(realpath -s "$1")
 cd "$(dirname "$0")/.."
@@ -25,8 +25,10 @@ if test "${2:-}" = twice; then
     cmp "$work"/one/dist/*.whl "$work"/another/dist/*.whl
     echo "two builds are equal: $(sha256sum "$work"/one/dist/*.whl | cut -d ' ' -f 1)"
 fi
-"$python" -m venv "$work/venv"
-"$work/venv/bin/python" -m pip install --quiet "$work"/one/dist/vkbloom-*.whl
+# (A pip of its own takes most of the time of a new environment.)
+"$python" -m venv --without-pip "$work/venv"
+"$python" -m pip --python "$work/venv/bin/python" install --quiet --no-compile \
+    "$work"/one/dist/vkbloom-*.whl
 cd "$work"
 VKBLOOM_CACHE_DIR="$work/cache" venv/bin/python - <<END
 import numpy as np
