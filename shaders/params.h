@@ -512,10 +512,9 @@
 // Samples of sun beams that are passed over together where there is no light, and the side of the
 // blocks of texels for which this is known (beam_dark.frag). With the half texel by which Blender
 // measures the way to the sun from another place, samples that follow one are less than BEAM_RUN
-// texels away from it. On CPUs, the pixels on a line to the sun that share texels (beam_lines.comp).
-#define BEAM_RUN    8
-#define BEAM_BLOCK  16
-#define BEAM_PIXELS 8
+// texels away from it.
+#define BEAM_RUN   8
+#define BEAM_BLOCK 16
 
 // Of exposures: the numbers of a table; the samples along both sides of a tile whose histogram a
 // workgroup makes, which single floats count, and its invocations along these; the most bins; the

@@ -269,7 +269,9 @@ static uint32_t add_dark(struct vkb_levels *levels)
         .width = (levels->sizes[0].width + BEAM_BLOCK - 1) / BEAM_BLOCK,
         .height = (levels->sizes[0].height + BEAM_BLOCK - 1) / BEAM_BLOCK,
     };
-    const uint32_t dark = vkb_levels_step(levels, blocks, "beams_dark");
+    // Of single floats, which passes on the host read.
+    const uint32_t dark =
+        vkb_levels_target(levels, "beams_dark", VKB_FORMAT_RGBA32_FLOAT, blocks, false);
     struct vkb_pass_row row =
         vkb_fetching_row(levels, &vkb_shader_beam_dark_frag, levels->downs[0], dark);
 

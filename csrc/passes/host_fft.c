@@ -1,5 +1,7 @@
 #include "passes/host_fft.h"
 
+#include "passes/host_loops.h"
+
 #include <math.h>
 #include <string.h>
 
@@ -46,15 +48,6 @@ void vkb_host_line_destroy(struct vkb_host_line *line)
     *line = (struct vkb_host_line){0};
 }
 
-static const struct vkb_host_loops *find_loops(void)
-{
-#if defined __x86_64__
-    if (__builtin_cpu_supports("avx2"))
-        return &vkb_host_loops_8;
-#endif
-    return &vkb_host_loops_4;
-}
-
 // The place in the source of an element of a line, as load_padded() has it in padded.glsl.
 static int32_t place_of(const struct vkb_pass_row *pass, int32_t along)
 {
@@ -82,7 +75,7 @@ static bool prepare(const struct vkb_pass_row *pass, const struct vkb_host_image
                     struct vkb_error *error)
 {
     const struct vkb_fft_params *params = &pass->params.fft;
-    const uint32_t length = (uint32_t)params->padded, lanes = find_loops()->lanes;
+    const uint32_t length = (uint32_t)params->padded, lanes = vkb_host_loops()->lanes;
 
     *work = (struct vkb_host_lines){
         .half = pass->transform.width / 2 + 1,
@@ -134,7 +127,8 @@ bool vkb_host_rows_forth(const struct vkb_pass_row *pass, const struct vkb_host_
     const bool prepared = prepare(pass, reads, target, &work, error);
 
     work.cleans = pass->constants.stage == STAGE_FIRST;
-    return run_loop(&work, prepared, find_loops()->rows_forth, (target->height + 3) / 4, workers);
+    return run_loop(&work, prepared, vkb_host_loops()->rows_forth, (target->height + 3) / 4,
+                    workers);
 }
 
 bool vkb_host_columns(const struct vkb_pass_row *pass, const struct vkb_host_image *reads,
@@ -143,11 +137,11 @@ bool vkb_host_columns(const struct vkb_pass_row *pass, const struct vkb_host_ima
 {
     struct vkb_host_lines work;
     const bool prepared = prepare(pass, reads, target, &work, error);
-    const uint32_t lanes = find_loops()->lanes;
+    const uint32_t lanes = vkb_host_loops()->lanes;
 
     work.forth = !pass->constants.inverse;
     work.back = pass->constants.inverse || work.kernel.pixels;
-    return run_loop(&work, prepared, find_loops()->columns,
+    return run_loop(&work, prepared, vkb_host_loops()->columns,
                     (work.half + lanes - 1) / lanes * work.channels, workers);
 }
 
@@ -159,7 +153,8 @@ bool vkb_host_rows_back(const struct vkb_pass_row *pass, const struct vkb_host_i
     const bool prepared = prepare(pass, reads, target, &work, error);
 
     work.stores = pass->constants.stage == STAGE_LAST;
-    return run_loop(&work, prepared, find_loops()->rows_back, (target->height + 3) / 4, workers);
+    return run_loop(&work, prepared, vkb_host_loops()->rows_back, (target->height + 3) / 4,
+                    workers);
 }
 
 // Frequencies of one channel in a row, which are added to what `to` has.

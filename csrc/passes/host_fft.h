@@ -5,9 +5,7 @@
 // channel 0 with the frequencies 0 to n / 2, their imaginary parts, then those of the next channel.
 // The transform of real numbers has no others. It is as wide as an image of four channels of that.
 //
-// host_lanes.h has the loops, which are compiled for vectors of 4 and of 8 floats. All have the
-// same bits: a line is in one lane from its first to its last element, and products and sums are
-// rounded one by one.
+// host_fft_lanes.h has the loops. A line is in one lane from its first to its last element.
 #ifndef VKB_HOST_FFT_H
 #define VKB_HOST_FFT_H
 
@@ -45,17 +43,6 @@ struct vkb_host_lines {
     char *space;  // for each part: two lines
     size_t space_size;
 };
-
-// Functions for vkb_in_parts, whose rows are blocks: of four rows, or of `lanes` columns of a
-// channel.
-struct vkb_host_loops {
-    uint32_t lanes;
-    vkb_rows *rows_forth, *columns, *rows_back;
-};
-extern const struct vkb_host_loops vkb_host_loops_4;
-#if defined __x86_64__
-extern const struct vkb_host_loops vkb_host_loops_8;
-#endif
 
 // Host passes: all stages along an axis, and the sum of products of spectra.
 vkb_host_pass vkb_host_rows_forth, vkb_host_columns, vkb_host_rows_back, vkb_host_products;

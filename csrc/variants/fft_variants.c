@@ -5,7 +5,6 @@
 #include "passes/host_fft.h"
 #include "variants/variant.h"
 
-#include <stdio.h>
 #include <string.h>
 
 // Of a line in a workgroup.
@@ -225,11 +224,6 @@ bool vkb_add_transform_lines_variant(struct vkb_variant_choice *choice,
     return vkb_add_variant_pass(choice, &row);
 }
 
-static const struct vkb_shader *const glow_shaders[VKB_FORMAT_COUNT] =
-    VKB_LINEAR_BY_FORMAT(fft_pixels);
-static const struct vkb_shader *const stored_shaders[VKB_FORMAT_COUNT] =
-    VKB_BY_FORMAT(fft_pixels_stored);
-
 // Half of the frequencies of each channel.
 static uint32_t spectra_width(const struct vkb_pass_row *pass)
 {
@@ -244,93 +238,30 @@ static bool runs_on_host(const struct vkb_variant_choice *choice, const struct v
                                         spectra_width(pass), pass->transform.height);
 }
 
-// The pass that makes single floats of the glow, or stores them as the bloom.
-static bool add_pixels(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
-                       uint32_t from, uint32_t to)
+static bool add_host_transform(struct vkb_variant_choice *choice, struct vkb_pass_row *row,
+                               vkb_host_pass *host)
 {
-    const struct vkb_image_row *images = choice->graph->images;
-    const bool last = pass->constants.stage == STAGE_LAST;
-    struct vkb_pass_row row = vkb_fullscreen_row(
-        pass->name, last ? stored_shaders[images[to].format] : glow_shaders[images[from].format],
-        to);
-
-    vkb_read_only(&row, from);
-    vkb_make_linear(&row, row.shader, 1, TEXEL_ROWS);
-    row.constants.stage = pass->constants.stage;
-    row.constants.alpha = pass->constants.alpha;
-    row.constants.prefiltered = pass->constants.prefiltered;
-    row.block = VKB_BLOCK_fft;
-    row.params.fft.prefilter_min = pass->params.fft.prefilter_min;
-    row.params.fft.prefilter_max = pass->params.fft.prefilter_max;
-    row.params.fft.prefilter_factor = pass->params.fft.prefilter_factor;
-    return vkb_add_variant_pass(choice, &row);
-}
-
-// An image of single floats for another one. True: it is new.
-static bool add_floats(struct vkb_variant_choice *choice, uint32_t of, uint32_t *floats)
-{
-    const struct vkb_image_row *row = &choice->graph->images[of];
-    const struct vkb_size size = {row->width, row->height};
-    char name[VKB_NAME_SIZE];
-
-    snprintf(name, sizeof name, "%cfloats_of_%.*s", VKB_INTERNAL_NAME, VKB_NAME_SIZE - 12,
-             row->name);
-    *floats = vkb_graph_find(choice->graph, name);
-    if (*floats != VKB_NO_IMAGE)
-        return false;
-    *floats = vkb_add_float_image(choice, name + 1, size);
-    return !choice->failed;
-}
-
-static bool is_single_float(const struct vkb_variant_choice *choice, uint32_t image)
-{
-    return choice->graph->images[image].format == VKB_FORMAT_RGBA32_FLOAT;
-}
-
-// Adds a row as a pass on the host.
-static bool add_host_pass(struct vkb_variant_choice *choice, struct vkb_pass_row *row,
-                          vkb_host_pass *host)
-{
-    static const struct vkb_shader shader = {.name = "host"};
-
-    vkb_make_linear(row, &shader, 1, 1);
-    row->host = host;
-    row->vertex = NULL;
     // A kernel, which is transformed in place, has those of cotangents, too.
     const bool kernel = row->reads[SLOT_SOURCE] == row->targets[0];
+
     row->transform.channels = kernel || row->constants.alpha == ALPHA_BLUR ? 4 : 3;
-    return vkb_add_variant_pass(choice, row);
+    return vkb_add_host_pass(choice, row, host);
 }
 
 static bool add_host_rows_forth(struct vkb_variant_choice *choice, struct vkb_pass_row *row)
 {
-    const bool first = row->constants.stage == STAGE_FIRST;
-
-    if (first
-        && (row->constants.prefiltered || !is_single_float(choice, row->reads[SLOT_SOURCE]))) {
-        // Transforms of one glow by several weights share it.
-        uint32_t floats;
-        if (add_floats(choice, row->reads[SLOT_SOURCE], &floats))
-            add_pixels(choice, row, row->reads[SLOT_SOURCE], floats);
-        row->reads[SLOT_SOURCE] = floats;
-    }
+    // Transforms of one glow by several weights share its floats.
+    if (row->constants.stage == STAGE_FIRST)
+        vkb_read_host_floats(choice, row);
     choice->graph->images[row->targets[0]].width = spectra_width(row);
-    return add_host_pass(choice, row, vkb_host_rows_forth);
+    return add_host_transform(choice, row, vkb_host_rows_forth);
 }
 
 static bool add_host_rows_back(struct vkb_variant_choice *choice, struct vkb_pass_row *row)
 {
-    const uint32_t target = row->targets[0];
-
     row->constants.stage = STAGE_LAST;
-    row->params.fft.kept = (int)choice->graph->images[target].width;
-    if (is_single_float(choice, target))
-        return add_host_pass(choice, row, vkb_host_rows_back);
-    const struct vkb_pass_row last = *row;
-    row->constants.stage = 0;
-    return !add_floats(choice, target, &row->targets[0])
-        || (add_host_pass(choice, row, vkb_host_rows_back)
-            && add_pixels(choice, &last, row->targets[0], target));
+    row->params.fft.kept = (int)choice->graph->images[row->targets[0]].width;
+    return add_host_transform(choice, row, vkb_host_rows_back);
 }
 
 // Columns forth, also with the product and back, or columns back.
@@ -350,7 +281,7 @@ static bool add_host_columns(struct vkb_variant_choice *choice, struct vkb_pass_
     target->width = spectra_width(row);
     target->height = returns ? (uint32_t)end[-1].params.fft.kept : row->transform.height;
     row->params.fft.kept = (int)target->height;
-    return add_host_pass(choice, row, vkb_host_columns);
+    return add_host_transform(choice, row, vkb_host_columns);
 }
 
 bool vkb_add_host_transform_variant(struct vkb_variant_choice *choice,
@@ -369,7 +300,7 @@ bool vkb_add_host_transform_variant(struct vkb_variant_choice *choice,
     }
     if (pass->block == VKB_BLOCK_products) {
         choice->graph->images[row.targets[0]].width = spectra_width(pass);
-        return add_host_pass(choice, &row, vkb_host_products);
+        return add_host_transform(choice, &row, vkb_host_products);
     }
     // The first stage along an axis stands for all.
     if (pass->transform.stages == 0)

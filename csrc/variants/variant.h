@@ -42,8 +42,8 @@ vkb_variant_add vkb_add_nine_variant;
 vkb_variant_add vkb_add_filtered_variant, vkb_add_filtered_final_variant, vkb_add_gathered_variant;
 // Iterations of streaks.
 vkb_variant_add vkb_add_streaks_variant;
-// Sun beams, whose pixels on a line share texels.
-vkb_variant_add vkb_add_beams_variant;
+// Sun beams on the host.
+vkb_variant_add vkb_add_host_beams_variant;
 // Transforms of complete lines: in shared memory, or on the host.
 vkb_variant_add vkb_add_transform_lines_variant, vkb_add_host_transform_variant;
 // Adjoint passes: of images with linear texels; of kernels; transposed filters in tiles and in
@@ -81,6 +81,13 @@ bool vkb_is_factor(const struct vkb_pass_row *pass);
 
 // Whether the images that a pass reads have linear texels of single floats.
 bool vkb_are_floats(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass);
+
+// Lets a row read single floats of its source, which a pass makes where it is none of them.
+void vkb_read_host_floats(struct vkb_variant_choice *choice, struct vkb_pass_row *row);
+// Adds a row as a pass on the host. Where its target is none of single floats, another pass stores
+// them.
+bool vkb_add_host_pass(struct vkb_variant_choice *choice, struct vkb_pass_row *row,
+                       vkb_host_pass *host);
 
 // Turns a pass over all pixels into a dispatch.
 void vkb_make_dispatch(struct vkb_pass_row *row, const struct vkb_shader *shader,

@@ -30,7 +30,7 @@ static const struct variant variants_table[] = {
     {VKB_VARIANTS_CPU, "filtered_final", vkb_add_filtered_final_variant, 0},
     {VKB_VARIANTS_CPU, "gathered", vkb_add_gathered_variant, TWO_PASSES},
     {VKB_VARIANTS_CPU, "strips", vkb_add_streaks_variant, 0},
-    {VKB_VARIANTS_CPU, "beams", vkb_add_beams_variant, 0},
+    {VKB_VARIANTS_CPU, "host", vkb_add_host_beams_variant, 0},
     {VKB_VARIANTS_CPU, "host", vkb_add_host_transform_variant, 0},
     {VKB_VARIANTS_CPU, "strips", vkb_add_adjoint_fused_variant, 0},
     {VKB_VARIANTS_CPU, "linear", vkb_add_adjoint_linear_variant, 0},

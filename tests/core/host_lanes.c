@@ -1,6 +1,9 @@
 // Transforms a picture by the loops for 4 and for 8 floats (csrc/passes/host_lanes.h), forth along
-// rows, along columns with a product, and back. Prints the first step whose bits differ, or "same".
+// rows, along columns with a product, and back, and makes its sun beams. Prints the first step
+// whose bits differ, or "same".
+#include "passes/host_beams.h"
 #include "passes/host_fft.h"
+#include "passes/host_loops.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -56,6 +59,25 @@ static void run(const struct vkb_host_loops *loops, uint32_t channels,
     vkb_host_line_destroy(&work.line);
 }
 
+// Of the columns' image, with some dark blocks.
+static void run_beams(const struct vkb_host_loops *loops, bool jittered, float *result)
+{
+    static const struct vkb_sun_beams_params params = {
+        .most = 20, .sun_x = 0.3f, .sun_y = 1.4f, .left = 0.7f};
+    static const float dark[] = {-1.0f, -1.0f, -1.0f, 0.5f, -1.0f, -1.0f, -1.0f, -1.0f};
+    const uint32_t width = PITCH / 4 - 2, height = COLUMN - 2;
+    struct vkb_host_beams work = {
+        .params = &params,
+        .jittered = jittered,
+        .blurs_alpha = true,
+        .source = {kernel[0], PITCH, PITCH / 4, COLUMN},
+        .dark = {jittered ? NULL : (float *)dark, sizeof dark / sizeof *dark, 2, 1},
+        .target = {result, (size_t)4 * width, width, height},
+    };
+
+    loops->beams(&work, 0, 0, (width + VKB_BEAM_TILE - 1) / VKB_BEAM_TILE);
+}
+
 static void fill(float *values, size_t count)
 {
     for (size_t i = 0; i < count; ++i)
@@ -73,6 +95,13 @@ int main(void)
         memset(results, 0, sizeof results);
         run(&vkb_host_loops_4, channels, results[0]);
         run(&vkb_host_loops_8, channels, results[1]);
+        static float beams[2][COLUMN * PITCH];
+        run_beams(&vkb_host_loops_4, channels == 4, beams[0]);
+        run_beams(&vkb_host_loops_8, channels == 4, beams[1]);
+        if (memcmp(beams[0], beams[1], sizeof beams[0]) != 0 || beams[0][3] == 0.0f) {
+            puts("beams");
+            return 0;
+        }
         for (int step = 0; step < 3; ++step)
             if (memcmp(results[0][step], results[1][step], sizeof results[0][step]) != 0) {
                 printf("%s, %u channels\n", steps[step], channels);

@@ -161,15 +161,20 @@ def test_beams_of_single_lamps(renderer: Renderer, sun: Any, alpha: Any) -> None
 
 
 @pytest.mark.parametrize("size", [(61, 93), (97, 40), (3, 70), (1, 1)])
-@pytest.mark.parametrize("sun", [(0.5, 0.5), (0.13, 0.91), (0.99, 0.3)])
+@pytest.mark.parametrize("sun", [(0.5, 0.5), (0.13, 0.91), (0.99, 0.3), (1.3, -0.4)])
 def test_beams_of_dense_light(renderer: Renderer, size: tuple[int, int], sun: Any) -> None:
-    """On CPUs pixels on a line to the sun share texels: around suns near and at edges, without gaps
-    between lines, also where rays are short.
+    """Which the host makes on CPUs: around suns near and at edges, and of those that leave the
+    image, also where rays are short, and with samples between steps.
     """
     image = np.random.default_rng(1).random((*size, 3), np.float32)
-    for share in (0.5, 0.1):
+    for share, jitter in ((0.5, 0.0), (0.1, 0.0), (0.6, 0.4)):
         settings = BlenderGlare(
-            type="sun_beams", sun_position=sun, size=share, threshold=None, format="rgba32float"
+            type="sun_beams",
+            sun_position=sun,
+            size=share,
+            jitter=jitter,
+            threshold=None,
+            format="rgba32float",
         )
         assert_matches_reference(renderer.apply(image, settings), image, settings)
 

@@ -1,5 +1,5 @@
-// The pixels of a convolution whose transforms the host does (csrc/passes/host_fft.h), which takes single floats and
-// leaves single floats: STAGE_FIRST makes them of the glow, STAGE_LAST stores them in the bloom's format.
+// The pixels of passes on the host (csrc/passes/host_fft.h, host_beams.h), which take single floats and leave single
+// floats: STAGE_FIRST makes them of the glow, STAGE_LAST stores them in the target's format.
 
 UNIFORM_BLOCK(FFT_BLOCK);
 #ifndef TARGET_BYTES
