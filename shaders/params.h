@@ -655,7 +655,7 @@
 #define ROLLED_OUTPUTS      128
 #define STRIP_RADIUS        4
 #define STRIP_COLUMNS       240
-#define STRIP_ROWS(CHANNEL) ((CHANNEL) == 1 ? 4 : 8)
+#define STRIP_ROWS          8
 // Blocks of pixels that fill complete words, also with three channels. CHANNEL is the size of a
 // channel in bytes.
 #define TAP_COLUMNS(CHANNEL)    ((CHANNEL) == 2 ? 8 : 4)

@@ -223,12 +223,11 @@ static void make_strips(const struct vkb_variant_choice *choice, struct vkb_pass
                         const struct vkb_shader *shader)
 {
     const struct vkb_image_row *target = &choice->plain.images[row->targets[0]];
-    const uint32_t rows = STRIP_ROWS(vkb_formats[target->format].channel_size);
     const uint32_t columns = strip_columns(target->width);
 
     row->params.fused_bloom.columns = (int32_t)columns;
     row->gains_if_finite = true;
-    vkb_make_linear(row, shader, columns, rows);
+    vkb_make_linear(row, shader, columns, STRIP_ROWS);
 }
 
 // For kernels of up to TILE_RADIUS in three steps.

@@ -102,8 +102,9 @@ uvec4 raw_of(vec4 value)
 {
 #if CHANNEL_BYTES == 1
     // The sum with 2^23 is rounded to an integer, which is in its last bits. A conversion is slow
-    // in Mesa 25, which converts lane by lane.
-    uvec4 level = floatBitsToUint(clamp(value, 0.0, 1.0) * 255.0 + 8388608.0) & 255u;
+    // in Mesa 25, which converts lane by lane. (The limits are those of nearest_level.)
+    vec4 share = intBitsToFloat(clamp(floatBitsToInt(value), ivec4(0), ivec4(floatBitsToInt(1.0))));
+    uvec4 level = floatBitsToUint(share * 255.0 + 8388608.0) & 255u;
     return uvec4(level.r | level.g << 8 | level.b << 16 | level.a << 24, 0, 0, 0);
 #elif CHANNEL_BYTES == 2
     uvec3 colour = nearest_half_bits(value.rgb);

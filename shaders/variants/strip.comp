@@ -14,7 +14,7 @@ const int RUN_WORDS = 3, COLUMNS = 4;
 const int RUN_WORDS = 1, COLUMNS = 4 / CHANNEL_BYTES;
 #endif
 const int COLUMNS_SHIFT = COLUMNS >> 1;  // the logarithm
-const int ROWS = STRIP_ROWS(CHANNEL_BYTES), LOADED = ROWS + 2 * STRIP_RADIUS;
+const int ROWS = STRIP_ROWS, LOADED = ROWS + 2 * STRIP_RADIUS;
 const int KEPT = 2 * STRIP_RADIUS, LINE_TAPS = KEPT + 1;
 const int WAITING = STRIP_RADIUS / COLUMNS;
 const int RUNS_AT_ONCE = 2, STEP = RUNS_AT_ONCE * COLUMNS;

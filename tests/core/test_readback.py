@@ -100,6 +100,14 @@ def test_a_final_that_comes_again_is_kept(
     assert runs[3:] == [[], []]
 
 
+def test_rows_of_three_bytes_are_packed_at_any_width(renderer: Renderer) -> None:
+    """Some pixels are packed at a time, and the last ones one by one."""
+    for width in range(1, 14):
+        image = picture(width, 3, 3, "uint8", width)
+        final = renderer.apply(image, Separable(bloom=False), framebuffers=("final",))["final"]
+        np.testing.assert_array_equal(final, image, err_msg=f"{width}")
+
+
 # A fused pass, an upsampling and a composite store the picture without its alpha. In the second
 # size the rows are complete words but no complete blocks; in the third they are no complete words.
 @pytest.mark.parametrize(

@@ -39,7 +39,14 @@ uvec3 nearest_half_bits(vec3 value)
 // The nearest of the 256 levels, 0 to 255, ties to even.
 vec3 nearest_level(vec3 value)
 {
-    return roundEven(255.0 * clamp(value, 0.0, 1.0));
+#ifdef LINEAR_TEXELS
+    // Shaders of CPUs limit as integers: of floats llvmpipe takes three operations for each minimum and maximum, because
+    // of NaN. Those that x86 makes are negative, so they become 0, too.
+    vec3 share = intBitsToFloat(clamp(floatBitsToInt(value), ivec3(0), ivec3(floatBitsToInt(1.0))));
+#else
+    vec3 share = clamp(value, 0.0, 1.0);
+#endif
+    return roundEven(255.0 * share);
 }
 
 vec3 nearest_srgb(vec3 value)
