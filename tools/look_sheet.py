@@ -29,16 +29,21 @@ from vkbloom._views import pictures
 LOOKS: Final = [name for name, one in PRESETS.items() if one.engine == "vkbloom"]
 #: Looks that are seen where small lights are, and nowhere else.
 WITH_RAYS: Final = ("star4", "star6", "anamorphic")
-#: With them, a photograph without highlights stays as it is.
-OF_HIGHLIGHTS: Final = ("photo", *WITH_RAYS)
+#: Looks that lights get: a photograph without any stays as it is, or nearly so.
+OF_LIGHTS: Final = ("photo", "film_halation", *WITH_RAYS)
+#: With this share of bright pixels, a photograph has lights. Small ones are enough for stars.
+MIN_LIGHTS: Final = 0.001
 MAX_WHITE: Final = 0.02
 #: With more, a sky or a flower gets an outline where it is cut off.
 MAX_CUT: Final = 0.03
 #: A window of stained glass that keeps this much still shows its glass, in a strong glow.
 MIN_CONTRAST: Final = 0.35
 _BRIGHT: Final = 200
+_LIT: Final = 240
 _BLOCK: Final = 8
+#: Of a picture with lights, narrow rays and the glow of small lights change less.
 MIN_SEEN: Final = 0.05
+MIN_SEEN_AT_LIGHTS: Final = 0.005
 CELL: Final = (240, 160)
 Pixels = NDArray[Any]
 
@@ -52,12 +57,14 @@ class Change(NamedTuple):
     - `contrast`: What is kept of the local contrast of bright areas, such as skies: of the mean
       deviation of the largest components in blocks of 8 x 8 that were all above 200. 1 for pictures
       with less than 1 % of such blocks.
+    - `lights`: The largest component was 240 or more.
     """
 
     seen: float
     white: float
     cut: float
     contrast: float
+    lights: float
 
     @property
     def words(self) -> str:
@@ -75,7 +82,10 @@ class Change(NamedTuple):
             return "cuts off highlights"
         if self.contrast < MIN_CONTRAST:
             return "flattens skies"
-        return "invisible" if look not in OF_HIGHLIGHTS and self.seen < MIN_SEEN else ""
+        if look in OF_LIGHTS and self.lights < MIN_LIGHTS:
+            return ""
+        is_narrow = look in ("photo", *WITH_RAYS)
+        return "invisible" if self.seen < (MIN_SEEN_AT_LIGHTS if is_narrow else MIN_SEEN) else ""
 
 
 def measure(before: Pixels, after: Pixels) -> Change:
@@ -89,7 +99,8 @@ def measure(before: Pixels, after: Pixels) -> Change:
     contrasts = [one[is_bright].std(axis=1).sum() for one in blocks]
     has_sky = is_bright.mean() > 0.01 and contrasts[0] > 0
     kept = contrasts[1] / contrasts[0] if has_sky else 1.0
-    return Change(float((difference > 4).mean()), float(white), float(cut.mean()), float(kept))
+    lights = (peaks[0] >= _LIT).mean()
+    return Change(*map(float, ((difference > 4).mean(), white, cut.mean(), kept, lights)))
 
 
 def _blocks(levels: Pixels) -> Pixels:

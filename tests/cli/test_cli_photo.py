@@ -341,6 +341,38 @@ class TestLooks:
                 assert 0.015 < change.seen < 0.35, file.stem
             assert change.fault(look) == "", file.stem
 
+    @pytest.mark.parametrize("look", ["mist", "soft", "dreamy"])
+    @pytest.mark.parametrize("shown", ["a lake before dawn", "a leaf"])
+    def test_a_dim_picture_without_details(self, shown: str, look: str, tmp_path: Path) -> None:
+        """Fine glows alone are invisible where there is neither a light nor an edge."""
+        down, across = np.mgrid[:SIDE, : SIDE * 3 // 2] / SIDE
+        if shown == "a leaf":
+            level = 165 + 60 * np.sin(14 * (across + 0.4 * down))
+            tint = (0.55, 1.0, 0.1)
+        else:
+            # A shore rises into the sky at the right.
+            shore = 1 / (1 + np.exp(-(down - 1.3 + 0.6 * across) / 0.08))
+            level = (110 + 70 * np.cos(1.2 * (down - 0.3))) * (1 - shore) + 25 * shore
+            tint = (0.4, 0.65, 1.0)
+        image = np.rint(level[..., None] * tint).astype(np.uint8)
+        file = png(tmp_path / "a.png", image)
+        assert apply(file, tmp_path / "b.png", "--preset", look).exit_code == 0
+        change = measure(image, reread(tmp_path / "b.png")[1])
+        assert change.seen > 0.07
+        assert change.fault(look) == ""
+
+    @pytest.mark.parametrize("look", WITH_RAYS)
+    def test_a_bright_wall_has_no_rays(self, look: str, tmp_path: Path) -> None:
+        """Neither its corner nor its edge is a small light, of which a part of a star is seen."""
+        image = np.full((SIDE, SIDE, 3), (0, 80, 110), np.uint8)
+        down, across = np.mgrid[:SIDE, :SIDE]
+        image[(across > 80) & (down > 60 + (across - 80) * 0.3)] = (215, 242, 225)
+        file = png(tmp_path / "a.png", image)
+        assert apply(file, tmp_path / "b.png", "--preset", look).exit_code == 0
+        difference = reread(tmp_path / "b.png")[1].astype(int) - image
+        assert (difference.max(axis=2) > 8).mean() < 0.005
+        assert difference.max() < 50
+
     @pytest.mark.parametrize("look", ["photo", *LOOKS])
     def test_a_bright_sky_keeps_its_clouds(self, look: str, tmp_path: Path) -> None:
         """From blue to white, over a dark ground; each step of the sky is there afterwards."""
@@ -382,7 +414,7 @@ class TestLooks:
 
     @pytest.mark.parametrize(
         ("preset", "amount", "intensity"),
-        [("mist", 0.5, 0.075), ("star4", 2, 50), ("halation", 2, 1), ("photo", 1.5, 0.225)],
+        [("mist", 0.5, 0.075), ("star4", 2, 72), ("halation", 2, 1), ("photo", 1.5, 0.225)],
     )
     def test_the_amount_is_a_factor_of_intensities(
         self, preset: str, amount: float, intensity: float, tmp_path: Path

@@ -66,10 +66,10 @@ def _star(rays: int, angle: float, **further: Any) -> Mapping[str, Any]:
 
     Only "screen" has none of the surround. Large intensities would magnify steps of other formats.
     """
-    star = {"psf": "star", "rays": rays, "angle": angle, "surround": 1.2}
+    star = {"psf": "star", "rays": rays, "angle": angle, "surround": 1.5}
     return {
         **{"method": "convolution", "psf": star | further, "normalize": False},
-        **{"composite": "screen", "threshold": 0.8, "knee": 0.2},
+        **{"composite": "screen", "threshold": 0.9, "knee": 0.15},
         "format": "rgba32float",
     }
 
@@ -365,8 +365,8 @@ PRESETS: Final[Mapping[str, Preset]] = {
     ),
     "soft": Preset(
         {
-            **{"method": "bevy", "low_frequency_boost": 0.2, "high_pass_frequency": 0.3},
-            "intensity": 0.4,
+            **{"method": "bevy", "low_frequency_boost": 0.7, "high_pass_frequency": 1.0},
+            "intensity": 0.3,
         },
         "a soft-focus lens: fine glows over a sharp picture",
         "vkbloom, for photographs; Bevy's chain",
@@ -375,8 +375,8 @@ PRESETS: Final[Mapping[str, Preset]] = {
     ),
     "dreamy": Preset(
         {
-            **{"method": "bevy", "low_frequency_boost": 0.3, "high_pass_frequency": 0.5},
-            "intensity": 0.3,
+            **{"method": "bevy", "low_frequency_boost": 0.65, "high_pass_frequency": 1.0},
+            "intensity": 0.35,
         },
         "a dream: soft details in bright glows",
         "vkbloom, for photographs; Bevy's chain",
@@ -395,14 +395,14 @@ PRESETS: Final[Mapping[str, Preset]] = {
         confirmed="formula",
     ),
     "star4": Preset(
-        {**_star(4, 45), "intensity": 25.0},
+        {**_star(4, 45), "intensity": 36.0},
         "a star filter: four rays of small lights",
         "vkbloom, for photographs",
         engine="vkbloom",
         confirmed="formula",
     ),
     "star6": Preset(
-        {**_star(6, 30), "intensity": 35.0},
+        {**_star(6, 30), "intensity": 50.0},
         "a star filter: six rays of small lights",
         "vkbloom, for photographs",
         engine="vkbloom",
@@ -410,8 +410,8 @@ PRESETS: Final[Mapping[str, Preset]] = {
     ),
     "anamorphic": Preset(
         {
-            **_star(2, 0, length=0.35, width=0.0012, tint=(0.35, 0.6, 1.0), surround=1.8),
-            **{"threshold": 0.9, "knee": 0.1, "intensity": 60.0},
+            **_star(2, 0, length=0.35, width=0.0012, tint=(0.35, 0.6, 1.0), surround=2.2),
+            **{"threshold": 0.95, "knee": 0.1, "intensity": 80.0},
         },
         "an anamorphic lens: long blue streaks of small lights",
         "vkbloom, for photographs",
