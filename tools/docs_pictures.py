@@ -132,8 +132,15 @@ def draw_points(renderer: vkbloom.Renderer, folder: Path) -> None:
     # KinoBloom removes a single pixel as a firefly.
     image[y - 1 : y + 2, x - 1 : x + 2] = 1000
     # Six lines in each are as many as the eye tells apart.
+    rows = -(-len(vkbloom.presets) // 18)
     figure, grid = plt.subplots(
-        2, 3, figsize=(11, 7.5), sharex=True, sharey=True, layout="constrained"
+        rows,
+        3,
+        figsize=(11, 3.75 * rows),
+        sharex=True,
+        sharey=True,
+        squeeze=False,
+        layout="constrained",
     )
     random, tiles = np.random.default_rng(1), []
     for index, (name, settings) in enumerate(vkbloom.presets.items()):
@@ -151,6 +158,7 @@ def draw_points(renderer: vkbloom.Renderer, folder: Path) -> None:
     for axes in grid.flat:
         axes.set_ylim(1e-7, 1)
         axes.grid(alpha=0.3)
+        axes.set_visible(bool(axes.lines))
         if axes.lines:
             axes.legend(fontsize=8)
     figure.supxlabel("distance, pixels (+ 0.5)")
@@ -177,7 +185,7 @@ def draw_functions(renderer: vkbloom.Renderer, path: Path) -> None:
     figure, grid = plt.subplots(
         -(-len(blooms) // 6),
         3,
-        figsize=(12, 15),
+        figsize=(12, 2.5 * -(-len(blooms) // 6)),
         sharex="col",
         sharey="col",
         squeeze=False,

@@ -35,7 +35,7 @@ RUN: Final[dict[str, tuple[str, str]]] = {
     "examples/gradients/recovered_psf.py": ("a.png", "scipy"),
     "tools/docs_pictures.py": ("pictures", "matplotlib"),
     "tools/laws.py": ("--out a.md", "cv2"),
-    "tools/look_sheet.py": ("sheet.png photo.jpg --looks star4", "matplotlib"),
+    "tools/look_sheet.py": ("sheet.png photo.jpg --looks soft", "matplotlib"),
     "tools/line_counts.py": ("", "numpy"),
     "tools/requirements.py": ("all", "numpy"),
     "tools/run_notebooks.py": ("", "nbclient"),
