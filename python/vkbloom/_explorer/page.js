@@ -1342,7 +1342,7 @@ export function mount(parent, send, { store = null, heading = "h2", decode = dec
     const [parts, show, first] = control(field, (next) => {
       change(next);
       touched = first;
-      showPreset("");
+      showPreset(presetOf(settings[editing]));
       request(editing);
     });
     show(value);
