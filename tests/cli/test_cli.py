@@ -273,7 +273,7 @@ def test_the_help_has_general_options_or_those_of_a_method(name: str) -> None:
         ((), {"intensity": "0.15", "threshold": "1", "low-frequency-boost": "0.7"}),
         (("--preset", "mist"), {"intensity": "0.15", "low-frequency-boost": "0.9"}),
         (("--preset", "film_halation"), {"halation-strength": "1.2,0.15,0.015"}),
-        (("--preset", "star6"), {"psf": "star:rays=6,angle=30.0,surround=1.2"}),
+        (("--preset", "star6"), {"psf": "star:rays=6,angle=30.0,surround=1.5"}),
         (("--preset", "iris_6"), {"psf": "aperture", "composite": "mix"}),
         (("--method", "pyramid"), {"levels": "6"}),
     ],

@@ -16,6 +16,7 @@ from tools.look_sheet import WITH_RAYS, measure
 import vkbloom
 from tests.cli.calls import run
 from tests.io.parts import facts_in, reread, store_ultra_hdr
+from tests.io.profiles import DISPLAY_P3, REC_709, curv, profile, profile_chunk, store_png
 from tests.srgb import decode_srgb
 
 pytestmark = pytest.mark.usefixtures("kept_renderers")
@@ -116,6 +117,50 @@ def test_the_command_is_the_preset_in_python(tmp_path: Path, renderer: vkbloom.R
     shown = vkbloom.apply(path, renderer=renderer)._repr_png_()
     (tmp_path / "d.png").write_bytes(shown or b"")
     np.testing.assert_array_equal(reread(tmp_path / "b.png")[1], reread(tmp_path / "d.png")[1])
+
+
+@pytest.mark.parametrize("words", [("--amount", "0"), ("--no-bloom",)])
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16])
+@pytest.mark.parametrize(
+    "stored",
+    [
+        profile("Display P3", DISPLAY_P3),
+        profile("a power", DISPLAY_P3, 2.19921875),
+        profile("a table", REC_709, curve=curv(*(i**2 for i in range(256)))),
+    ],
+)
+def test_colours_of_a_profile_come_back(
+    stored: bytes, dtype: type, words: tuple[str, ...], tmp_path: Path
+) -> None:
+    """Photographs of telephones have colours that Rec. 709 has not."""
+    levels = np.random.default_rng(0).integers(0, np.iinfo(dtype).max + 1, (48, 64, 3))
+    levels[0, :3] = np.iinfo(dtype).max * np.eye(3)
+    pixels: Image = levels.astype(dtype)
+    store_png(tmp_path / "a.png", pixels, profile_chunk(stored))
+    # Without bloom, highlights are expanded and compressed, and some levels are one beside. Of a
+    # black component, the matrix leaves 1e-8 in single floats, of which a power makes 15 of 65535.
+    most = 20 if dtype is np.uint16 else int(words[0] == "--no-bloom")
+    for name in ("b.png", "c.tif"):
+        result = apply(tmp_path / "a.png", tmp_path / name, *words)
+        assert result.exit_code == 0, result.stderr
+        spec, after = reread(tmp_path / name)
+        assert np.abs(after.astype(int) - levels).max() <= most
+        assert bytes(spec["ICCProfile"]) == stored
+    # In another encoding, colours are of Rec. 709.
+    other = ("--output-colour", "srgb", *words)
+    assert apply(tmp_path / "a.png", tmp_path / "d.png", *other).exit_code == 0
+    assert reread(tmp_path / "d.png")[0].getattribute("ICCProfile") is None
+
+
+def test_a_bloom_by_a_profile_is_that_of_light(tmp_path: Path, renderer: vkbloom.Renderer) -> None:
+    """The file has the same light as that of Rec. 709, where this has the colours."""
+    image = PHOTOS["astronaut"]()
+    chunk = profile_chunk(profile("Display P3", DISPLAY_P3))
+    path = store_png(tmp_path / "a.png", image // 2, chunk)
+    assert apply(path, tmp_path / "b.png", "--preset", "mist", "--expand", "1").exit_code == 0
+    final = renderer.apply(vkbloom.read(path), vkbloom.presets["mist"])["final"]
+    # Half a level of 8 bits, where the curve is steepest.
+    np.testing.assert_allclose(vkbloom.read(tmp_path / "b.png"), final, atol=0.005)
 
 
 @pytest.mark.parametrize("suffix", [".png", ".exr"])

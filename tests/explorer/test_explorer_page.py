@@ -578,7 +578,7 @@ def test_files(page: Page, tmp_path: Path) -> None:
     preset = page.get_by_label("preset")
     assert preset.input_value() == "photo"
     assert "soft glow of highlights" in (preset.get_attribute("title") or "")
-    # Other settings have no preset until they are its own again, but for how a picture is developed.
+    # The preset is shown where its values are, but for how a picture is developed.
     for key, name in (("ArrowRight", ""), ("ArrowLeft", "photo")):
         field(page, "intensity").press(key)
         assert preset.input_value() == name

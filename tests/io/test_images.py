@@ -395,6 +395,25 @@ class TestSave:
         if is_kept:
             assert np.array_equal(profile, original.getattribute("ICCProfile"))
 
+    @pytest.mark.parametrize(
+        ("space", "channels", "is_kept"),
+        [(b"RGB ", 3, True), (b"GRAY", 1, True), (b"CMYK", 3, False), (b"GRAY", 3, False)],
+    )
+    def test_a_profile_of_other_channels_is_not_kept(
+        self, space: bytes, channels: int, is_kept: bool
+    ) -> None:
+        """OpenImageIO reads CMYK as RGB, and gives its profile, which other programs refuse."""
+        content = (bytes(16) + space + b"Lab ").ljust(128, b"\0")
+        kind = (oiio.TypeDesc("uint8[128]"), np.frombuffer(content, np.uint8))
+        stored = Picture.of_values(
+            noise(2, 2, channels, numbers="uint8"), attributes={"ICCProfile": kind}
+        )
+        colours = stored.header.colours._replace(profile=content)
+        names = ("Y",) if channels == 1 else ("R", "G", "B")
+        header = dataclasses.replace(stored.header, colours=colours, channels=names)
+        made = decode(dataclasses.replace(stored, header=header))
+        assert ("ICCProfile" in made.header.attributes) is is_kept
+
     @pytest.mark.parametrize("name", ["b.png", "b.exr"])
     def test_old_file_stays_until_the_new_one_is_complete(
         self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str

@@ -38,6 +38,7 @@ from vkbloom._cli.settings_options import StartOptions, taa_option, timed_start_
 from vkbloom._cli.terminal import complain, hides_progress, note, say, tell_device
 from vkbloom._cli.time_steps import Pair, TimeSteps, order_in_time
 from vkbloom._io import image_writing, safe_writing
+from vkbloom._io.decoding import keep_profile
 from vkbloom._io.displayed import PRIMARIES, Saved
 from vkbloom._io.narrowing import narrow, narrowing_note
 from vkbloom._io.picture import Colour, Highlights, Picture, SavedColour
@@ -157,7 +158,7 @@ class Run:
         for pair in files:
             read = None
             with self._of_file(pair):
-                read = self._read(pair[0])
+                read = self._read(*pair)
             if read is None:
                 continue
             picture, settings, expand = read
@@ -222,10 +223,13 @@ class Run:
         if text:
             note(f"{name}: {text}" if self.several else text)
 
-    def _read(self, source: str) -> tuple[Picture, Settings, float | None]:
+    def _read(self, source: str, target: str) -> tuple[Picture, Settings, float | None]:
         """Return the picture whose pixels get a bloom, its settings and its expansion."""
         options = self.options
         picture = read_picture(source, options.subimage, options.input_colour, layer=options.layer)
+        file = of_format(target, options.pipe_format)
+        if options.saved == Saved() and image_writing.holds_profile(file):
+            picture = keep_profile(picture)
         start = options.start.of(picture.highlights)
         if start.settings.alpha == "keep":
             note_hidden(picture, source)
@@ -407,11 +411,12 @@ def command(*, sources: tuple[str, ...], out: str | None, adapter: str, **given:
 
     Bloom is computed in linear colours. Files of 8 or 16 bit integers are decoded to 32-bit floats
     with Rec. 709 colours. Files of floats are linear. OUT has the number type of IN, or the closest
-    one of its format. Integers are encoded to sRGB and clipped to 0..1; colours above 1 keep their
-    hue. Floats (as in OpenEXR and Radiance HDR) are written linear. Alpha does not change, unless
-    --alpha is given. OUT is replaced when the new file is complete; with a picture that vkbloom did
-    not write, only as --out OUT or with --overwrite. Of several images, those that fail are listed
-    at the end, and the exit status is 1. See docs/command-line.md.
+    one of its format. Integers are encoded to sRGB, or by the ICC profile of IN if OUT can hold it,
+    and clipped to 0..1; colours above 1 keep their hue. Floats (as in OpenEXR and Radiance HDR) are
+    written linear. Alpha does not change, unless --alpha is given. OUT is replaced when the new
+    file is complete; with a picture that vkbloom did not write, only as --out OUT or with
+    --overwrite. Of several images, those that fail are listed at the end, and the exit status is 1.
+    See docs/command-line.md.
     """
     inputs, target = _arguments(sources, out)
     codec = given.pop("codec")

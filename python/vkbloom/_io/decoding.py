@@ -85,7 +85,10 @@ def decode(stored: Picture, colour: Colour | None = None) -> Picture:
     taken_as, values, said = _linear(values, header, colour, is_encoded=is_encoded)
     # Attributes of the colours before the conversion are untrue now.
     attributes = {**header.attributes}
-    if taken_as != "srgb":
+    profile = header.colours.profile or b""
+    # OpenImageIO makes RGB of CMYK, whose profile stays that of CMYK.
+    is_of_pixels = profile[16:20] in ((b"RGB ", b"GRAY") if is_grey else (b"RGB ",))
+    if taken_as != "srgb" or not is_of_pixels:
         attributes.pop("ICCProfile", None)
     if is_other:
         attributes.pop("chromaticities", None)
@@ -100,6 +103,24 @@ def decode(stored: Picture, colour: Colour | None = None) -> Picture:
         parts=stored.parts,
         notes=(*notes, *said),
     )
+
+
+def keep_profile(picture: Picture) -> Picture:
+    """Return a decoded picture for a file of integers that gets the profile of its own file.
+
+    Else the colours of a camera's profile, such as Display P3, that Rec. 709 has not would be
+    clipped. Pictures that are sRGB or grey stay, as do those without such a profile of RGB.
+    """
+    stated = picture.header.colours
+    if picture.grey or stated.profile is None or picture.colour != _profile_name(stated):
+        return picture
+    profile = read_profile(stated.profile)
+    return replace(picture, profile=profile) if profile.is_invertible else picture
+
+
+def _profile_name(stated: StatedColours) -> str:
+    """Return the colour space of a picture that was decoded by the file's profile."""
+    return stated.profile_name or "ICC profile"
 
 
 def _choose_channels(names: tuple[str, ...]) -> tuple[list[int], list[str]]:
@@ -170,8 +191,7 @@ def _by_profile(
         return "srgb", _decode(values, "srgb"), []
     made = _scale(values)
     made[:, :, :3] = profile.decode(values[:, :, :3])
-    name = stated.profile_name or "ICC profile"
-    return name, made, [f"converted to linear Rec. 709 by {said}"]
+    return _profile_name(stated), made, [f"converted to linear Rec. 709 by {said}"]
 
 
 def _of_gain_map(

@@ -11,6 +11,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from vkbloom._io.icc import Profile
 from vkbloom._io.picture import Highlights, Picture
 from vkbloom._numbers import check_number
 
@@ -26,10 +27,13 @@ def check_expansion(expand: float | None) -> float:
     return 1.0 if expand is None else check_number("expand", expand, 1, _MAX_EXPANSION)
 
 
-def expand_highlights(image: NDArray[Any], expand: float | None) -> NDArray[Any]:
+def expand_highlights(
+    image: NDArray[Any], expand: float | None, profile: Profile | None = None
+) -> NDArray[Any]:
     """Return an image whose highlights reach up to `expand`, with the hue of each pixel.
 
-    With m = max(r, g, b), limited to 1, the knee a and the expansion E:
+    `profile`: The components r, g, b are those of its primaries, in place of Rec. 709. With
+    m = max(r, g, b), limited to 1, the knee a and the expansion E:
 
         m' = a + (m - a) / (1 - k (m - a)) for m > a, with k = 1 / (1 - a) - 1 / (E - a)
 
@@ -44,6 +48,8 @@ def expand_highlights(image: NDArray[Any], expand: float | None) -> NDArray[Any]
     if limit == 1:
         return image
     colours = image[:, :, :3]
+    if profile is not None:
+        colours = profile.from_rec_709(colours)
     # (As colours.max(axis=2), in a fifth of the time.)
     red, green, blue = np.moveaxis(colours, 2, 0)
     peak = np.clip(np.maximum(np.maximum(red, green), blue)[..., None], KNEE, 1)
@@ -74,5 +80,5 @@ def expand_photograph(picture: Picture, expand: float | None) -> Picture:
     """Return a decoded picture with its highlights expanded, if the file has clipped ones."""
     if picture.highlights is not Highlights.CLIPPED:
         return picture
-    pixels = expand_highlights(picture.pixels, expand)
+    pixels = expand_highlights(picture.pixels, expand, picture.profile)
     return replace(picture, pixels=pixels, expand=check_expansion(expand))

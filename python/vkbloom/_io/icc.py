@@ -15,6 +15,8 @@ from vkbloom._io.srgb import decode_srgb
 Curve = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 
 _COLOURS: Final = ("r", "g", "b")
+# Of a curve that is inverted: as fine as numbers of 16 bits.
+_STEPS: Final = 1 << 16
 # Half an 8-bit level, encoded. A profile that differs by less from sRGB counts as sRGB.
 _SAME: Final = 0.5 / 255
 # Tags, of 12 bytes each. Profiles have about 20; a damaged one may claim billions.
@@ -69,6 +71,28 @@ class Profile(NamedTuple):
             linear[:, :, channel] = table[colours[:, :, channel]]
         made: NDArray[np.float32] = linear @ self.matrix.T.astype(np.float32)
         return made
+
+    def from_rec_709(self, light: NDArray[np.floating]) -> NDArray[np.floating]:
+        """Return linear Rec. 709 (H, W, 3) with the profile's own primaries, not clipped."""
+        made: NDArray[np.floating] = light @ np.linalg.inv(self.matrix).T.astype(light.dtype)
+        return made
+
+    def encode(self, light: NDArray[np.floating]) -> NDArray[np.float32]:
+        """Return linear floats (H, W, 3) of the profile's own primaries on its curves, in 0..1."""
+        levels = np.linspace(0, 1, _STEPS + 1)
+        made = np.empty(light.shape, np.float32)
+        for channel, curve in enumerate(self.curves):
+            made[:, :, channel] = np.interp(light[:, :, channel], curve(levels), levels)
+        return made
+
+    @property
+    def is_invertible(self) -> bool:
+        """Whether each curve rises, and the primaries span a space."""
+        levels = np.linspace(0, 1, _STEPS + 1)
+        made = [curve(levels) for curve in self.curves]
+        # (A damaged profile may have a curve that falls, or three equal primaries.)
+        is_rising = all((np.diff(one) >= 0).all() and one[-1] > one[0] for one in made)
+        return is_rising and bool(np.linalg.cond(self.matrix) < 1e6)
 
     @property
     def is_srgb(self) -> bool:

@@ -18,6 +18,7 @@ from vkbloom._extras import import_extra
 from vkbloom._io import displayed, safe_writing
 from vkbloom._io.attributes import without_colours, write_exr_attributes
 from vkbloom._io.displayed import Saved
+from vkbloom._io.icc import Profile
 from vkbloom._io.narrowing import file_note, for_radiance, narrow
 from vkbloom._io.picture import DTYPES, PIXEL_TYPES, SPACES, WITH_WINDOWS, Picture, is_exr
 from vkbloom._numbers import check_index
@@ -46,6 +47,8 @@ BITS: Final[Mapping[int | None, tuple[str, ...]]] = {
 }
 # OpenImageIO's names of the formats that have a quality, 1 to 100.
 _LOSSY: Final = ("jpeg", "webp", "jpegxl")
+# Those with profiles that readers use. (OpenEXR's values are linear, whatever a profile says.)
+_WITH_PROFILES: Final = ("jpeg", "png", "tiff", "webp", "jpegxl", "jpeg2000")
 
 
 #: The values to write, with the file's channels, and the file's number type.
@@ -147,6 +150,9 @@ def _prepare(
             )
         if saved.view is not None and not integer:
             raise ValueError(f"view: {target} has linear floats; write a file of integers")
+        if integer and saved == Saved() and picture.profile is not None:
+            made = _by_profile(values, picture, picture.profile)
+            return _as_numbers(made, numbers), _with_profile(oiio, picture), tuple(notes)
         curve = saved.curve or ("srgb" if integer else "linear")
         values, what = displayed.convert(
             oiio, values, saved, curve, is_integer=integer, expand=picture.expand
@@ -160,6 +166,36 @@ def _prepare(
         described = dataclasses.replace(picture, encoding=None)
         notes.append(str(error))
     return _as_numbers(values, numbers), described, tuple(notes)
+
+
+def holds_profile(path: str | os.PathLike[str]) -> bool:
+    """Return whether files with this name hold an ICC profile that describes integers."""
+    return safe_writing.writer_of(path).format_name() in _WITH_PROFILES
+
+
+def _by_profile(values: NDArray[Any], picture: Picture, profile: Profile) -> NDArray[np.float32]:
+    """Return linear Rec. 709 floats (H, W, 3 or 4) as the profile has them; alpha as it is."""
+    made = values.astype(np.float32)
+    light = profile.from_rec_709(made[:, :, :3])
+    made[:, :, :3] = profile.encode(displayed.scale_to_1(light, expand=picture.expand))
+    return made
+
+
+def _with_profile(oiio: ModuleType, picture: Picture) -> Picture:
+    """Return a picture whose attributes have the profile of its file, which names its colours."""
+    header = picture.header
+    content = np.frombuffer(header.colours.profile or b"", np.uint8)
+    named = {
+        "ICCProfile": (oiio.TypeDesc(f"uint8[{content.size}]"), content),
+        # Else OpenImageIO writes that a PNG file is sRGB.
+        "oiio:ColorSpace": (oiio.TypeDesc("string"), "unknown"),
+    }
+    header = dataclasses.replace(
+        header,
+        attributes={**header.attributes, **named},
+        colours=header.colours._replace(space=""),
+    )
+    return dataclasses.replace(picture, encoding=None, header=header)
 
 
 def _is_above_1(pixels: NDArray[Any]) -> bool:

@@ -6,8 +6,8 @@ integers.
 ==================== ========================= =====================================
 numbers in the file  taken as                  written as
 ==================== ========================= =====================================
-8 or 16 bit integers what the file says (ICC   sRGB
-                     profile, gamma, cICP,
+8 or 16 bit integers what the file says (ICC   by the ICC profile, in the
+                     profile, gamma, cICP,     command apply, else sRGB
                      Exif), else sRGB
 half, float          linear (but JPEG XL: what linear
                      the file says)
@@ -28,6 +28,7 @@ from numpy.typing import NDArray
 from vkbloom._arrays import native_order, plain_array
 from vkbloom._formats import Curve
 from vkbloom._io.hdr_curves import HDR_CURVES
+from vkbloom._io.icc import Profile
 
 #: "linear", "srgb" or the name of a colour space of OpenColorIO.
 Colour: TypeAlias = str
@@ -197,6 +198,8 @@ class Picture:
     - `highlights`: What the file has of light above white; of decoded pictures.
     - `expand`: What clipped highlights were expanded up to. A file of integers gets them
       compressed.
+    - `profile`: Of a decoded picture: the ICC profile that a file of integers gets, in place of
+      sRGB. See `decoding.keep_profile`.
     - `parts`: The names of the file's parts (the first 100), of which the pixels are one; "" for a
       part without a name.
     - `notes`: Notes for the user about how the file was read and interpreted.
@@ -210,6 +213,7 @@ class Picture:
     grey: bool = False
     highlights: Highlights = Highlights.STORED
     expand: float = 1.0
+    profile: Profile | None = None
     parts: tuple[str, ...] = ("",)
     notes: tuple[str, ...] = ()
 
