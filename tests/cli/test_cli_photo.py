@@ -449,9 +449,30 @@ class TestLooks:
         after = reread(tmp_path / "b.png")[1].astype(int)
         assert (after[..., 2] - after[..., 0]).std() < 3
 
+    @pytest.mark.parametrize("look", ["film_halation", "anamorphic", "mist"])
+    def test_a_grey_picture_gets_the_light_of_a_look(
+        self, look: str, tmp_path: Path, renderer: vkbloom.Renderer
+    ) -> None:
+        """Red alone is blurred by halation, and an anamorphic streak is mostly blue."""
+        grey = np.ascontiguousarray(PHOTOS["astronaut"]()[:, :, 1])
+        file = png(tmp_path / "a.png", grey)
+        assert apply(file, tmp_path / "b.png", "--preset", look).exit_code == 0
+        after = reread(tmp_path / "b.png")[1]
+        assert after.shape == (*grey.shape, 1)
+        start = vkbloom.read(file, expand=4 if look == "mist" else None)
+        final = renderer.apply(start, vkbloom.presets[look])["final"][..., :3]
+        light = np.repeat((final @ (0.2126, 0.7152, 0.0722))[..., None], 3, axis=2)
+        expand = 4 if look == "mist" else None
+        vkbloom.write(tmp_path / "c.png", light.astype(np.float32), expand=expand)
+        expected = reread(tmp_path / "c.png")[1][..., :1]
+        assert np.abs(after.astype(int) - expected).max() <= 1
+
     @pytest.mark.parametrize("look", ["photo", *LOOKS])
     def test_an_amount_of_0_changes_nothing(self, look: str, tmp_path: Path) -> None:
         image = PHOTOS["astronaut"]()
+        # Transparent pixels hide a bloom, but not one of none.
+        alpha = np.tile(np.linspace(0, 255, image.shape[1]), (len(image), 1)).astype(np.uint8)
+        image = np.dstack([image, alpha])
         words = ("--preset", look, "--amount", "0")
         result = apply(png(tmp_path / "a.png", image), tmp_path / "b.png", *words)
         assert (result.exit_code, result.stderr) == (0, "")

@@ -203,7 +203,7 @@ class Run:
             brightest = float(np.max(colours, initial=0, where=np.isfinite(colours)))
             is_exposed = bool(self.options.start.stages)
             text = no_bloom.reason(frames.settings, None if is_exposed else brightest)
-        elif image_writing.is_straight(
+        elif self.options.amount and image_writing.is_straight(
             of_format(target, self.options.pipe_format), is_multiplied=picture.is_multiplied
         ):
             text = no_bloom.describe_hidden(frames["final"], frames.settings)

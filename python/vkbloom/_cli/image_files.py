@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from vkbloom._cli.program import is_given
 from vkbloom._cli.sequences import as_file, displayed_name
 from vkbloom._cli.terminal import note
+from vkbloom._formats import LUMINANCE
 from vkbloom._io.alpha import divide, hidden_notes
 from vkbloom._io.decoding import check_space
 from vkbloom._io.expansion import PHOTO_EXPANSION
@@ -138,9 +139,26 @@ def finish(picture: Picture, final: NDArray[Any], settings: Settings) -> Picture
     """Return a picture with the pixels of `final`, and their alpha and encoding as in its file."""
     if settings.alpha != "keep" and picture.has_straight:
         final = divide(final)
+    if picture.grey:
+        final = _in_grey(final)
     encoding = picture.encoding if settings.encoding == "none" else settings.encoding
     expand = expansion_of_final(settings, picture.expand)
     return dataclasses.replace(picture, pixels=final, encoding=encoding, expand=expand)
+
+
+def _in_grey(final: NDArray[Any]) -> NDArray[Any]:
+    """Return floats (H, W, C) with three equal components: their luminance where they differ.
+
+    A look has its own colour: halation blurs red alone, which is not the light of a grey picture.
+    """
+    red = final[:, :, :1]
+    if np.array_equal(np.broadcast_to(red, final[:, :, :3].shape), final[:, :, :3]):
+        return final
+    made = final.copy()
+    light = final[:, :, :3].astype(np.float32) @ np.array(LUMINANCE, np.float32)
+    is_grey = (final[:, :, 1:3] == red).all(axis=2)
+    made[:, :, :3] = np.where(is_grey, red[:, :, 0], light)[:, :, np.newaxis]
+    return made
 
 
 @contextmanager
