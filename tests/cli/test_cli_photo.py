@@ -142,7 +142,7 @@ def test_colours_of_a_profile_come_back(
     most = 20 if dtype is np.uint16 else int(words[0] == "--no-bloom")
     for name in ("b.png", "c.tif"):
         result = apply(tmp_path / "a.png", tmp_path / name, *words)
-        assert result.exit_code == 0, result.stderr
+        assert (result.exit_code, result.stderr) == (0, "")
         spec, after = reread(tmp_path / name)
         assert np.abs(after.astype(int) - levels).max() <= most
         assert bytes(spec["ICCProfile"]) == stored

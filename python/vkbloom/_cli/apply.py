@@ -226,10 +226,15 @@ class Run:
     def _read(self, source: str, target: str) -> tuple[Picture, Settings, float | None]:
         """Return the picture whose pixels get a bloom, its settings and its expansion."""
         options = self.options
-        picture = read_picture(source, options.subimage, options.input_colour, layer=options.layer)
         file = of_format(target, options.pipe_format)
-        if options.saved == Saved() and image_writing.holds_profile(file):
-            picture = keep_profile(picture)
+        can_keep = options.saved == Saved() and image_writing.holds_profile(file)
+        picture = read_picture(
+            source,
+            options.subimage,
+            options.input_colour,
+            layer=options.layer,
+            prepare=keep_profile if can_keep else None,
+        )
         start = options.start.of(picture.highlights)
         if start.settings.alpha == "keep":
             note_hidden(picture, source)

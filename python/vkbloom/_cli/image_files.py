@@ -98,11 +98,16 @@ def read_picture(
     colour: Colour | None,
     *,
     layer: str | None = None,
+    prepare: Callable[[Picture], Picture] | None = None,
 ) -> Picture:
-    """Read an image file, decode it to linear light, and print notes about its contents."""
+    """Read an image file, decode it to linear light, and print notes about its contents.
+
+    `prepare`: What is made of the decoded picture before its notes are printed.
+    """
     check_input_colour(colour)
     with opened(source, subimage, layer) as file:
         picture = file.picture(colour)
+    picture = picture if prepare is None else prepare(picture)
     source = displayed_name(source)
     if layer is None and (parts := other_parts(picture)):
         note(f"{source}: read the first of its {parts}; --subimage reads another")

@@ -115,12 +115,20 @@ def keep_profile(picture: Picture) -> Picture:
     if picture.grey or stated.profile is None or picture.colour != _profile_name(stated):
         return picture
     profile = read_profile(stated.profile)
-    return replace(picture, profile=profile) if profile.is_invertible else picture
+    if not profile.is_invertible:
+        return picture
+    # That colours are converted is no news where they are converted back.
+    notes = tuple(text for text in picture.notes if text != _note_of_profile(stated))
+    return replace(picture, profile=profile, notes=notes)
 
 
 def _profile_name(stated: StatedColours) -> str:
     """Return the colour space of a picture that was decoded by the file's profile."""
     return stated.profile_name or "ICC profile"
+
+
+def _note_of_profile(stated: StatedColours) -> str:
+    return f"converted to linear Rec. 709 by its ICC profile {stated.profile_name!r}"
 
 
 def _choose_channels(names: tuple[str, ...]) -> tuple[list[int], list[str]]:
@@ -181,17 +189,17 @@ def _by_profile(
     values: NDArray[Any], stated: StatedColours, content: bytes
 ) -> tuple[str, NDArray[Any], list[str]]:
     """As `_linear`, of an image of encoded colours with a profile."""
-    said = f"its ICC profile {stated.profile_name!r}"
     try:
         profile = read_profile(content)
     except ValueError:
         space, made, _ = _by_space(values, stated)
+        said = f"its ICC profile {stated.profile_name!r}"
         return space, made, [f"{said} is not one of RGB by a matrix and curves; taken as {space}"]
     if profile.is_srgb:
         return "srgb", _decode(values, "srgb"), []
     made = _scale(values)
     made[:, :, :3] = profile.decode(values[:, :, :3])
-    return _profile_name(stated), made, [f"converted to linear Rec. 709 by {said}"]
+    return _profile_name(stated), made, [_note_of_profile(stated)]
 
 
 def _of_gain_map(
