@@ -159,6 +159,7 @@ def draw_points(renderer: vkbloom.Renderer, folder: Path) -> None:
         axes.set_ylim(1e-7, 1)
         axes.grid(alpha=0.3)
         axes.set_visible(bool(axes.lines))
+        axes.tick_params(labelbottom=True)
         if axes.lines:
             axes.legend(fontsize=8)
     figure.supxlabel("distance, pixels (+ 0.5)")

@@ -146,8 +146,13 @@ def test_colours_of_a_profile_come_back(
         spec, after = reread(tmp_path / name)
         assert np.abs(after.astype(int) - levels).max() <= most
         assert bytes(spec["ICCProfile"]) == stored
+    # So does a picture of a grid.
+    axis = ("-o", tmp_path / "g", "--axis", "intensity=0,0.1")
+    assert run("grid", tmp_path / "a.png", *axis).exit_code == 0
+    spec, _ = reread(tmp_path / "g" / "000_final.png")
+    assert bytes(spec["ICCProfile"]) == stored
     # In another encoding, colours are of Rec. 709.
-    other = ("--output-colour", "srgb", *words)
+    other = ("--output-colour", "srgb")
     assert apply(tmp_path / "a.png", tmp_path / "d.png", *other).exit_code == 0
     assert reread(tmp_path / "d.png")[0].getattribute("ICCProfile") is None
 

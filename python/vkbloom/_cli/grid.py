@@ -16,6 +16,7 @@ from vkbloom._cli.settings_options import DEFAULT_PRESETS, taa_option, timed_set
 from vkbloom._grid import filling, layout, order, sources
 from vkbloom._grid.grid import grid as render_grid
 from vkbloom._io import image_writing, safe_writing
+from vkbloom._io.decoding import keep_profile
 from vkbloom._io.picture import Picture
 from vkbloom._presets.start import Start
 from vkbloom._renderer.frame_files import settings_facts
@@ -92,6 +93,8 @@ def command(
         looked_at = given["scene"]()
     else:
         reading = {name: given[name] for name in ("subimage", "layer")}
+        if folder is not None and image_writing.holds_profile(f"image{suffix}"):
+            reading["prepare"] = keep_profile
         alpha = _alpha_of(axes, settings)
         picture = image_files.read_picture(source, colour=given["input_colour"], **reading)
         picture = Start(given["settings"].replace(alpha=alpha), expand).develop(picture)
