@@ -45,6 +45,7 @@ def write(folder: Path) -> None:
     for look in LOOKS:
         made = apply_look(files, look, folder / look)
         changes = [measure(*map(levels_of, pair)) for pair in zip(files, made, strict=True)]
+        white = max(0.0, *(one.white for one in changes))
         after = np.concatenate([*map(cell, made, rows)], axis=1)
         place = folder / f"{look}.jpg"
         gap = np.ones((6, before.shape[1], 3))
@@ -61,6 +62,6 @@ def write(folder: Path) -> None:
                 f"{name} {change.seen:.0%}"
                 for name, change in zip(PHOTOGRAPHS, changes, strict=True)
             )
-            + f". Pixels that became white: at most {max(one.white for one in changes):.1%}.\n",
+            + f". Pixels that became white: at most {white:.1%}.\n",
         ]
     folder.with_suffix(".md").write_text("\n".join(text), encoding="utf-8")
