@@ -324,6 +324,12 @@ class TestFaintBlooms:
             ("a.png", ("--preset", "kino", "--no-bloom"), ""),
             ("a.png", ("--preset", "blender_streaks", "--mask", "mask.png"), ""),
             ("a.png", (), ""),
+            # Of a picture without lights, that of the default says what shows.
+            ("dim.png", (), "adds 0.19 % of the picture's light; the presets mist"),
+            ("dark.png", (), "the brightest value is 0.212; the presets mist, soft and dreamy"),
+            ("dim.png", ("--intensity", "0.2"), ""),
+            ("dim.png", ("--preset", "mist"), ""),
+            ("dim.png", ("--amount", "0"), ""),
         ],
     )
     def test_note(
@@ -337,11 +343,13 @@ class TestFaintBlooms:
         monkeypatch.chdir(tmp_path)
         image = PHOTOS["astronaut"]()
         png(Path("a.png"), image)
+        png(Path("dim.png"), np.minimum(image, 206))
+        png(Path("dark.png"), image // 2)
         vkbloom.write("a.exr", vkbloom.read("a.png"))
         vkbloom.write("mask.png", np.full(image.shape[:2], 255, np.uint8))
         result = apply(source, "b.exr", *words)
         assert result.exit_code == 0, result.stderr
-        assert ("the bloom adds" in result.stderr) is bool(told)
+        assert ("note: the bloom" in result.stderr) is bool(told)
         assert told in result.stderr
 
 

@@ -63,6 +63,9 @@ _FAILURES: Final = (OSError, ValueError, MemoryError, click.ClickException)
 _HALVED: Final = 1 << 26
 _HALF: Final = np.dtype(np.float16)
 _MAX_AMOUNT: Final = 2
+# Of a photograph without lights the preset photo adds less, and nobody sees it.
+_MIN_SHARE_OF_LIGHTS: Final = 0.005
+_WITHOUT_LIGHTS: Final = "the presets mist, soft and dreamy need no lights"
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -203,6 +206,8 @@ class Run:
             brightest = float(np.max(colours, initial=0, where=np.isfinite(colours)))
             is_exposed = bool(self.options.start.stages)
             text = no_bloom.reason(frames.settings, None if is_exposed else brightest)
+            if self._is_plain(picture):
+                text += f"; {_WITHOUT_LIGHTS}"
         elif self.options.amount and image_writing.is_straight(
             of_format(target, self.options.pipe_format), is_multiplied=picture.is_multiplied
         ):
@@ -220,8 +225,20 @@ class Run:
                 option="--{}",
                 stronger="raise --intensity" if is_twice else f"--amount {_MAX_AMOUNT}",
             )
+        elif not text and self._is_plain(picture):
+            share = added_share(picture.pixels, frames)
+            if share is not None and share < _MIN_SHARE_OF_LIGHTS:
+                text = f"the bloom adds {100 * share:.2g} % of the picture's light; "
+                text += _WITHOUT_LIGHTS
         if text:
             note(f"{name}: {text}" if self.several else text)
+
+    def _is_plain(self, picture: Picture) -> bool:
+        """Whether a photograph gets the preset photo as it is, of which only lights glow."""
+        options, start = self.options, self.options.start
+        is_given = start.is_chosen or start.changes or start.stages or not options.amount
+        has_glow = options.mask is not None or options.emission is not None
+        return picture.is_photograph and not is_given and not has_glow
 
     def _read(self, source: str, target: str) -> tuple[Picture, Settings, float | None]:
         """Return the picture whose pixels get a bloom, its settings and its expansion."""
