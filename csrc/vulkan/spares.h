@@ -1,6 +1,7 @@
 // Memory that replaced images have left, which new images take. An allocation takes longer than a
-// pass. Training steps over ten sizes in turn, around 3800 x 2000 (H200, 2026-11-29): 29 and 67 ms a
-// step with new memory for Pyramid and "kino", 3.5 and 5.2 with this; 2.9 and 4.5 if the size stays.
+// pass. Training steps over ten sizes in turn, around 3800 x 2000 (H200, 2026-11-29): 29 and 67 ms
+// a step with new memory for Pyramid and "kino", 3.5 and 5.2 with this; 2.9 and 4.5 if the size
+// stays.
 #ifndef VKB_SPARES_H
 #define VKB_SPARES_H
 
