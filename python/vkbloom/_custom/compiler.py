@@ -26,6 +26,7 @@ from vkbloom._custom.glsl import BODY, Shader
 from vkbloom._custom.loops import has_endless_loop
 from vkbloom._custom.names import GLOW, HOOKED, STAGES, stage_of
 from vkbloom._custom.passes import CustomPass
+from vkbloom._custom.rounds import limit_rounds
 from vkbloom._custom.spirv import without_contraction
 from vkbloom._io.disk_cache import DiskCache
 
@@ -44,6 +45,8 @@ MAX_OUTPUT_BYTES: Final = 16 << 20
 LIBRARY: Final = Path(__file__).parent / "glsl"
 CACHE: Final = DiskCache("shaders")
 SPIRV_MAGIC: Final = 0x07230203
+#: Of what becomes of the compiler's result.
+_VERSION: Final = b"1"
 MESSAGE: Final = re.compile(r"^ERROR: (?:(\d+):)?(\d+): (.*)$", re.MULTILINE)
 
 MISSING: Final = (
@@ -90,7 +93,8 @@ def cached_code(shader: Shader) -> bytes | None:
 
 
 def _key(shader: Shader) -> bytes:
-    return hashlib.sha256(identity() + bytes([shader.compute]) + shader.text.encode()).digest()
+    known = identity() + _VERSION + bytes([shader.compute])
+    return hashlib.sha256(known + shader.text.encode()).digest()
 
 
 def compile_pass(file: CustomFile, item: CustomPass, shader: Shader) -> bytes:
@@ -109,7 +113,8 @@ def compile_pass(file: CustomFile, item: CustomPass, shader: Shader) -> bytes:
     if has_endless_loop(tuple(words.tolist())):
         cause = "the pass has a loop that never ends"
         raise ShaderError(file.source.where(item.body_line, cause))
-    return np.array(without_contraction(tuple(words.tolist())), "=u4").tobytes()
+    limited = limit_rounds(tuple(words.tolist()))
+    return np.array(without_contraction(limited), "=u4").tobytes()
 
 
 def run_limited(

@@ -13,7 +13,18 @@ Instruction = tuple[int, ...]
 CONSTANTS: Final = range(41, 53)
 FUNCTION, FUNCTION_END, FUNCTION_CALL, VARIABLE = 54, 56, 57, 59
 LOAD: Final = 61
+STORE: Final = 62
 ACCESS_CHAINS: Final = (65, 66)
+
+
+def opcode_of(word: Instruction) -> int:
+    """Return what an instruction is."""
+    return word[0] & 0xFFFF
+
+
+def instruction(opcode: int, *operands: int) -> Instruction:
+    """Return an instruction."""
+    return ((len(operands) + 1) << 16 | opcode, *operands)
 
 
 def split(words: tuple[int, ...]) -> Iterator[Instruction]:

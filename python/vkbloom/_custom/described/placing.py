@@ -27,6 +27,7 @@ from vkbloom._custom.described.module import (
     UNIFORM,
     Entry,
     Module,
+    ModuleFault,
 )
 from vkbloom._custom.instructions import (
     FUNCTION,
@@ -34,6 +35,7 @@ from vkbloom._custom.instructions import (
     VARIABLE,
     Instruction,
 )
+from vkbloom._custom.rounds import limit_rounds
 from vkbloom._custom.spirv import HEADER_WORDS, without_contraction
 
 #: Instructions that only help to debug: OpSourceContinued, OpSource, OpName, OpMemberName, OpLine,
@@ -111,7 +113,10 @@ def place(module: Module, entry: Entry, places: Places) -> bytes:
                 continue
             known[key] = written[1]
         made += written
-    words = without_contraction(tuple(made))
+    try:
+        words = without_contraction(limit_rounds(tuple(made)))
+    except ValueError as error:
+        raise ModuleFault(str(error)) from None
     return struct.pack(f"={len(words)}I", *words)
 
 
