@@ -14,6 +14,8 @@ from vkbloom._custom.described.module import Module
 from vkbloom._custom.described.programs import Program, compile_all
 from vkbloom._custom.described.schema import Description, Shader, read_schema
 from vkbloom._custom.described.source import compile_described, open_described
+from vkbloom._custom.loops import has_endless_loop
+from vkbloom._custom.rounds import limit_rounds
 from vkbloom._custom.source import Source, check
 
 __all__ = [
@@ -30,7 +32,9 @@ __all__ = [
     "files",
     "find_compiler",
     "find_lines",
+    "has_endless_loop",
     "identity",
+    "limit_rounds",
     "open_described",
     "read_schema",
     "run_limited",

@@ -61,6 +61,11 @@ class CustomFile:
                 if stage in item.stages:
                     yield stage, item
 
+    def line_of(self, framebuffer: str) -> int:
+        """Return the line of the first pass that saves a framebuffer; else of the last pass."""
+        lines = [item.line for item in self.passes if item.save and item.save.value == framebuffer]
+        return [*lines, self.passes[-1].line][0]
+
     def words(self, values: dict[str, float]) -> dict[str, float]:
         """Return what the words of expressions mean, for some values of the parameters."""
         indices = {

@@ -316,7 +316,8 @@ def _open(
         return _Opened(name, subject, passes, renderer.info.summary, source=source)
     if isinstance(source, Settings):
         settings = source
-        subject = measuring.of_settings(renderer, settings, measured, how["gain"])
+        with _as_failure(name):
+            subject = measuring.of_settings(renderer, settings, measured, how["gain"])
 
         def passes() -> Mapping[str, float]:
             return measuring.pass_times(renderer, settings, size)
@@ -346,7 +347,7 @@ def _measure(
     times = measuring.in_turns([each.timer for each in opened], runs)
     results = []
     for each, seconds in zip(opened, times, strict=True):
-        try:
+        with _as_failure(each.name):
             report = law_report(
                 each.subject, merge_limits({}), how["require"], functools.partial(each.show, bar)
             )
@@ -354,9 +355,16 @@ def _measure(
             about = {"name": each.name, "adapter": each.device, "size": how["size"]}
             values = each.values_of(report, **about, **seconds)
             results.append((values, report, each.subject))
-        except AssertionError as error:
-            raise click.ClickException(f"{each.name}: {error}") from error
     return results
+
+
+@contextmanager
+def _as_failure(name: str) -> Iterator[None]:
+    """Raise click.ClickException for a bloom that cannot be measured."""
+    try:
+        yield
+    except AssertionError as error:
+        raise click.ClickException(f"{name}: {error}") from error
 
 
 def _other(against: str, first: _Source, settings: Settings) -> _Source:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from vkbloom import reference
 from vkbloom._custom.method import CustomMethod
+from vkbloom._custom.rounds import MAX_ROUNDS
 from vkbloom._fit.translating import lights
 from vkbloom._psf.sampled import samples
 from vkbloom._psf.varying import Varying
@@ -47,6 +48,8 @@ class Exposed(NamedTuple):
 #: About how often a program is run, in files of floats and in those of 8 bits; as an exposure.
 RUNS: Final = {False: 240, True: 90}
 RUNS_OF_EXPOSURE: Final = 850
+#: A picture, in which each pixel of a pass may run to the limit of its loops.
+_SMALL: Final = (32, 24)
 
 VIEW: Final = (256, 144)
 #: The `sketch` of each preset's bloom, as `python -m tools.preset_blooms` writes them.
@@ -152,6 +155,8 @@ def of_settings(
     gain that a flat image gets in its middle.
     """
     used = exact(settings)
+    if isinstance(used, CustomMethod):
+        _check_finite(renderer, used)
     bloom = bloom_of(renderer, used, "bloom")
     subject = Subject(
         bloom=bloom,
@@ -167,6 +172,29 @@ def of_settings(
         keeps_light = isinstance(used, CustomMethod) and used.file.saves_bloom
         subject.gain = 1.0 if keeps_light else subject.measured_gain
     return subject
+
+
+def _check_finite(renderer: Renderer, settings: CustomMethod) -> None:
+    """Raise AssertionError with file and line for a pass that makes NaN or infinity of a picture.
+
+    The picture is small: a loop that ran to its limit in each pixel takes long in a larger one.
+    """
+    try:
+        frames = renderer.apply(noise(_SMALL, 0).astype(np.float32), settings)
+    except ValueError:
+        return  # such as sizes that are 0 there
+    for name, array in frames.items():
+        bad = np.argwhere(~np.isfinite(np.atleast_3d(array)))
+        if len(bad):
+            y, x, channel = (int(index) for index in bad[0])
+            cause = (
+                f"the framebuffer {name!r} is {np.atleast_3d(array)[y, x, channel]} at x {x}, y {y}"
+                f", channel {channel} of a finite picture; loops that run more than {MAX_ROUNDS:,} "
+                "rounds give nan"
+            )
+            raise AssertionError(
+                f"{settings.file.source.name}:{settings.file.line_of(name)}: {cause}"
+            )
 
 
 def _field_of(settings: Settings) -> Varying | None:

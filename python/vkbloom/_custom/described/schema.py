@@ -212,6 +212,16 @@ class Description:
         names = {out.image.name for each in self.passes for out in each.outputs.values()}
         return names - {DISCARD}
 
+    def line_of(self, framebuffer: str) -> int:
+        """Return the line of the first output that a framebuffer shows; else that of the result."""
+        lines: dict[str, int] = {}
+        for each in self.passes:
+            for output in each.outputs.values():
+                lines.setdefault(output.image.name, output.line)
+        level = framebuffer.rpartition("_")
+        name = level[0] if level[0] in lines and level[2].isdecimal() else framebuffer
+        return lines.get(name, lines.get(self.result.name, self.result_line))
+
     #: A description has no textures and buffers of its own.
     embedded: Mapping[str, Any] = dataclasses.field(default_factory=dict)
 
