@@ -113,7 +113,10 @@ def compile_pass(file: CustomFile, item: CustomPass, shader: Shader) -> bytes:
     if has_endless_loop(tuple(words.tolist())):
         cause = "the pass has a loop that never ends"
         raise ShaderError(file.source.where(item.body_line, cause))
-    limited = limit_rounds(tuple(words.tolist()))
+    try:
+        limited = limit_rounds(tuple(words.tolist()))
+    except ValueError as error:
+        raise ShaderError(file.source.where(item.body_line, str(error))) from None
     return np.array(without_contraction(limited), "=u4").tobytes()
 
 
