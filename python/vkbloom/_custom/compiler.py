@@ -23,10 +23,10 @@ from vkbloom._core import ShaderError
 from vkbloom._custom import hints
 from vkbloom._custom.file import CustomFile
 from vkbloom._custom.glsl import BODY, Shader
+from vkbloom._custom.limits import limit_shader
 from vkbloom._custom.loops import has_endless_loop
 from vkbloom._custom.names import GLOW, HOOKED, STAGES, stage_of
 from vkbloom._custom.passes import CustomPass
-from vkbloom._custom.rounds import limit_rounds
 from vkbloom._custom.spirv import without_contraction
 from vkbloom._io.disk_cache import DiskCache
 
@@ -114,7 +114,7 @@ def compile_pass(file: CustomFile, item: CustomPass, shader: Shader) -> bytes:
         cause = "the pass has a loop that never ends"
         raise ShaderError(file.source.where(item.body_line, cause))
     try:
-        limited = limit_rounds(tuple(words.tolist()))
+        limited = limit_shader(tuple(words.tolist()))
     except ValueError as error:
         raise ShaderError(file.source.where(item.body_line, str(error))) from None
     return np.array(without_contraction(limited), "=u4").tobytes()

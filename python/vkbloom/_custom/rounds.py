@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Final
 
-from vkbloom._custom.calls import callees_first, check_length
+from vkbloom._custom.calls import callees_first
 from vkbloom._custom.counter import CountedModule
 from vkbloom._custom.flow import LOOP_MERGE, Dominance, find_loops, read_function
 from vkbloom._custom.instructions import FUNCTION_CALL, opcode_of, split
@@ -31,13 +31,12 @@ def limit_rounds(
 ) -> tuple[int, ...]:
     """Return a module whose invocations run at most so many rounds of loops that are counted.
 
-    ValueError: a loop has not the structure that SPIR-V demands, or the module is too long.
+    ValueError: a loop has not the structure that SPIR-V demands.
     """
     instructions = [word for word in split(words) if opcode_of(word) not in _LINES]
-    module = CountedModule(words, instructions, most)
-    check_length(module.bodies)
     if not any(opcode_of(word) == LOOP_MERGE for word in instructions):
         return words
+    module = CountedModule(words, instructions, most)
     costs: dict[int, int] = {}
     for identity in callees_first(module.bodies):
         costs[identity] = _limit_function(module, identity, costs, uncounted)

@@ -9,8 +9,8 @@ TYPES = range(19, 40)
 FLOAT_ARITHMETIC = {127, 129, 131, 133, 136, 140, 141, *range(142, 149)}
 DECORATE = 3 << 16 | 71
 NO_CONTRACTION = 42
-# The storage class of memory that a workgroup shares.
-WORKGROUP = 4
+# Storage classes: memory that a workgroup shares, and that of an invocation.
+WORKGROUP, PRIVATE, FUNCTION = 4, 6, 7
 
 
 def without_contraction(words: tuple[int, ...]) -> tuple[int, ...]:
@@ -40,6 +40,15 @@ def without_contraction(words: tuple[int, ...]) -> tuple[int, ...]:
 
 def shared_bytes(words: tuple[int, ...]) -> int:
     """Return the size of what a workgroup shares, without padding."""
+    return _bytes(words, {WORKGROUP})
+
+
+def private_bytes(words: tuple[int, ...]) -> int:
+    """Return the size of all variables that each invocation has, without padding."""
+    return _bytes(words, {PRIVATE, FUNCTION})
+
+
+def _bytes(words: tuple[int, ...], storage: set[int]) -> int:
     sizes: dict[int, int] = {}
     pointed: dict[int, int] = {}
     lengths: dict[int, int] = {}
@@ -54,7 +63,7 @@ def shared_bytes(words: tuple[int, ...]) -> int:
             case 21 | 22:  # OpTypeInt, OpTypeFloat
                 sizes[a] = b // 8
             case 23 | 24:  # OpTypeVector, OpTypeMatrix
-                sizes[a] = sizes[b] * c
+                sizes[a] = sizes.get(b, 0) * c
             case 28:  # OpTypeArray
                 sizes[a] = sizes.get(b, 0) * lengths.get(c, 0)
             case 30:  # OpTypeStruct
@@ -63,9 +72,7 @@ def shared_bytes(words: tuple[int, ...]) -> int:
                 pointed[a] = c
             case 43 | 50:  # OpConstant, OpSpecConstant
                 lengths[b] = c
-            case 59 if c == WORKGROUP:  # OpVariable
-                total += sizes.get(pointed[a], 0)
-            case 54:  # OpFunction: there are no declarations after it
-                break
+            case 59 if c in storage:  # OpVariable
+                total += sizes.get(pointed.get(a, 0), 0)
         position = end
     return total

@@ -35,7 +35,7 @@ from vkbloom._custom.instructions import (
     VARIABLE,
     Instruction,
 )
-from vkbloom._custom.rounds import limit_rounds
+from vkbloom._custom.limits import limit_shader
 from vkbloom._custom.spirv import HEADER_WORDS, without_contraction
 
 #: Instructions that only help to debug: OpSourceContinued, OpSource, OpName, OpMemberName, OpLine,
@@ -114,7 +114,7 @@ def place(module: Module, entry: Entry, places: Places) -> bytes:
             known[key] = written[1]
         made += written
     try:
-        words = without_contraction(limit_rounds(tuple(made)))
+        words = without_contraction(limit_shader(tuple(made)))
     except ValueError as error:
         raise ModuleFault(str(error)) from None
     return struct.pack(f"={len(words)}I", *words)
