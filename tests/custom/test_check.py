@@ -95,6 +95,18 @@ def test_a_sound_bloom(tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("glslang")
+def test_what_is_not_finite_is_named(tmp_path: Path) -> None:
+    """With the file, the line of its pass and its framebuffer, which two passes blur after it."""
+    path = tmp_path / "planted.hook"
+    path.write_text("\n" + chain("vec4 none = GLOW_texOff(0) * 0.0; return none / none;"))
+    done = run("check", str(path))
+    assert done.exit_code == 1
+    error = f"vkbloom: planted: {path}:2: the framebuffer 'first' is nan at x 0, y 0, channel 0 of"
+    assert done.stderr.startswith(error), done.output
+    assert done.stderr.count("\n") == 1
+
+
+@pytest.mark.usefixtures("glslang")
 def test_a_page_and_parameters(tmp_path: Path) -> None:
     examples = Path(__file__).resolve().parents[2] / "examples" / "custom_methods"
     page = tmp_path / "page.html"

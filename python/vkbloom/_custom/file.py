@@ -63,7 +63,11 @@ class CustomFile:
 
     def line_of(self, framebuffer: str) -> int:
         """Return the line of the first pass that saves a framebuffer; else of the last pass."""
-        lines = [item.line for item in self.passes if item.save and item.save.value == framebuffer]
+        lines = [
+            item.line
+            for item in self.passes
+            if item.save is not None and item.save.value.lower() == framebuffer
+        ]
         return [*lines, self.passes[-1].line][0]
 
     def words(self, values: dict[str, float]) -> dict[str, float]:

@@ -40,19 +40,20 @@ def without_contraction(words: tuple[int, ...]) -> tuple[int, ...]:
 
 def shared_bytes(words: tuple[int, ...]) -> int:
     """Return the size of what a workgroup shares, without padding."""
-    return _bytes(words, {WORKGROUP})
+    return sum(_bytes(words, {WORKGROUP}))
 
 
-def private_bytes(words: tuple[int, ...]) -> int:
-    """Return the size of all variables that each invocation has, without padding."""
+def private_bytes(words: tuple[int, ...]) -> list[int]:
+    """Return the sizes of the variables that each invocation has, without padding."""
     return _bytes(words, {PRIVATE, FUNCTION})
 
 
-def _bytes(words: tuple[int, ...], storage: set[int]) -> int:
+def _bytes(words: tuple[int, ...], storage: set[int]) -> list[int]:
+    """Return the sizes of the variables of some storage classes."""
     sizes: dict[int, int] = {}
     pointed: dict[int, int] = {}
     lengths: dict[int, int] = {}
-    total = 0
+    found = []
     position = HEADER_WORDS
     while position < len(words):
         opcode, end = words[position] & 0xFFFF, position + (words[position] >> 16)
@@ -73,6 +74,6 @@ def _bytes(words: tuple[int, ...], storage: set[int]) -> int:
             case 43 | 50:  # OpConstant, OpSpecConstant
                 lengths[b] = c
             case 59 if c in storage:  # OpVariable
-                total += sizes.get(pointed.get(a, 0), 0)
+                found.append(sizes.get(pointed.get(a, 0), 0))
         position = end
-    return total
+    return found
