@@ -479,9 +479,9 @@ def test_one_process_compiles_all_of_wgsl(tmp_path: Path, monkeypatch: pytest.Mo
     require("wgsl")
     started = []
 
-    def run(*given: Any) -> tuple[int, str]:
+    def run(*given: Any, **limits: Any) -> tuple[int, str]:
         started.append(given)
-        return run_limited(*given)
+        return run_limited(*given, **limits)
 
     shutil.copytree(EXAMPLES / "wgsl", tmp_path, dirs_exist_ok=True)
     text = (tmp_path / "bloom.wgsl").read_text()

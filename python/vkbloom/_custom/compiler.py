@@ -125,11 +125,14 @@ def run_limited(
     text: str,
     folder: str,
     variables: Mapping[str, str] | None = None,
+    *,
     memory: int = MAX_MEMORY,
+    file: int = MAX_RESULT_BYTES,
 ) -> tuple[int, str]:
     """Run a process that reads a text; return its exit status and its output.
 
-    It has the environment variables of this process, and `variables`.
+    It has the environment variables of this process, and `variables`. `memory` and `file` are the
+    most bytes of its address space and of a file.
 
     Its output goes to a file, which has a limit, and for which nobody waits that it left behind.
 
@@ -150,7 +153,7 @@ def run_limited(
             env=environment,
         ) as process,
     ):
-        limit(process.pid, memory)
+        limit(process.pid, memory, file)
         # A wait with a timeout looks for the end every 50 ms.
         timer = threading.Timer(MAX_SECONDS, process.kill)
         timer.daemon = True
@@ -166,14 +169,14 @@ def run_limited(
         return process.returncode, output.read(MAX_OUTPUT_BYTES).decode(errors="replace")
 
 
-def limit(process: int, memory: int) -> None:
+def limit(process: int, memory: int, file: int) -> None:
     """Set the limits of a process, where the system can."""
     if sys.platform != "linux":
         return
     for which, most in (
         (resource.RLIMIT_CPU, MAX_PROCESSOR_SECONDS),
         (resource.RLIMIT_AS, memory),
-        (resource.RLIMIT_FSIZE, MAX_RESULT_BYTES),
+        (resource.RLIMIT_FSIZE, file),
         (resource.RLIMIT_CORE, 0),
     ):
         with contextlib.suppress(ProcessLookupError, ValueError, PermissionError):

@@ -45,6 +45,9 @@ NO_DRIVER: Final = (
 MAX_VISITED: Final = 20000
 #: Virtual memory, of which a driver and a compiler reserve more than they use.
 MAX_MEMORY: Final = 16 << 30
+#: Of a file: Mesa 25 has the memory of its CPU device in one, in memory, and ends with SIGBUS where
+#: a process may not have 64 MiB of it.
+MAX_FILE: Final = 1 << 30
 #: Entry points that one process compiles: its bounds are those of all of them.
 MAX_TOGETHER: Final = 16
 
@@ -413,7 +416,9 @@ def _run(requests: Sequence[_Request]) -> list[list[bytes]]:
         script = str(Path(__file__).with_name("naga.py"))
         command = [sys.executable, "-I", script]
         text = json.dumps({"folder": folder, "requests": [each.asked for each in requests]})
-        status, output = run_limited(command, text, folder, environment, MAX_MEMORY)
+        status, output = run_limited(
+            command, text, folder, environment, memory=MAX_MEMORY, file=MAX_FILE
+        )
         # The child makes a folder for each request before it begins with it.
         begun = sum(each.is_dir() for each in Path(folder).iterdir())
         if status:
