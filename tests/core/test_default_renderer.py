@@ -126,7 +126,8 @@ image = np.ones((8, 8, 3), np.float32)
 settings = vkbloom.Convolution(vkbloom.psf.gaussian(2))
 renderer = vkbloom.Renderer()
 renderer.apply(image, settings)
-pending = PendingSubmission(types.SimpleNamespace(ordered=True, wait=lambda: ([], ())))
+submission = types.SimpleNamespace(ordered=True, exports_ordered=True, wait=lambda: ([], ()))
+pending = PendingSubmission(submission)
 gradients = DeviceGradients({}, ("exposure",), ({"exposure"}, lambda: {"exposure": image}))
 held = [*(one._lock for one in locks._locks), *(one.lock for one in locks._properties)]
 assert len(held) >= 3

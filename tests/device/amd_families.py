@@ -90,6 +90,8 @@ def record(words: list[str]) -> None:
     """Make the requests on the only adapter; print the failures as JSON."""
     wrong: dict[str, str] = {}
     count = 0
+    # Pipelines are created in threads together, which would mix the lines of their figures.
+    os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
     if "short" in words:  # of address space, for lavapipe's threads alone
         resource.setrlimit(resource.RLIMIT_AS, (5_000_000 << 10,) * 2)
     with Renderer("hardware", validation="validated" in words) as renderer:

@@ -90,6 +90,7 @@ def level(value: float) -> int:
 #: Whether the red level in the middle of the picture is the argument, within rounding.
 LEVEL_IS = """(expected) => {
     const canvas = document.querySelector(".vkbloom canvas");
+    if (!canvas) return false;  // of a page that is loaded again
     const copy = new OffscreenCanvas(1, 1).getContext("2d", { willReadFrequently: true });
     copy.drawImage(canvas, -(canvas.width >> 1), -(canvas.height >> 1));
     const [red] = copy.getImageData(0, 0, 1, 1).data;
