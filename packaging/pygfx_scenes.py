@@ -1,5 +1,8 @@
 """Draw scenes with pygfx, as its screenshot tests do: lit meshes, a texture, a colormap, lines.
 
+With ``--examples`` these are the examples of a checkout of pygfx whose screenshots its own tests
+compare, drawn as those tests draw them.
+
 pygfx draws into sRGB with 8 bits, which Mesa encodes by approximate square roots where the CPU has
 them.
 """
@@ -7,6 +10,10 @@ them.
 from __future__ import annotations
 
 import argparse
+import importlib.util
+import os
+import sys
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -89,12 +96,38 @@ def scenes(folder: Path) -> Iterator[tuple[str, gfx.Scene]]:
     yield "lines", lines
 
 
+def examples(folder: Path) -> Iterator[tuple[str, np.ndarray]]:
+    """Yield the pictures of the examples that pygfx's tests compare, with a name each."""
+    # As those tests have it. An offscreen canvas is chosen at the import.
+    os.environ |= {"WGPU_FORCE_OFFSCREEN": "true", "PYGFX_DEFAULT_PPAA": "none"}
+    # Some are animated, or have random numbers.
+    time.time = lambda: 1.23456
+    for file in sorted(folder.rglob("*.py")):
+        if "pygfx_test = 'compare'" not in file.read_text():
+            continue
+        np.random.seed(0)  # noqa: NPY002  the examples' own
+        spec = importlib.util.spec_from_file_location(file.stem, file)
+        assert spec
+        assert spec.loader
+        module = importlib.util.module_from_spec(spec)
+        try:
+            spec.loader.exec_module(module)
+            yield file.stem, np.asarray(module.renderer.target.draw()).copy()
+        except Exception as error:
+            # Packages, files of the network.
+            print(f"{file.stem}: {type(error).__name__}: {error}", file=sys.stderr, flush=True)
+
+
 def main() -> None:
     """Write the pictures."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--arrays", type=Path, required=True)
     parser.add_argument("--only", nargs="+", help="scenes, by name; by default all")
+    parser.add_argument("--examples", type=Path, help="the examples of a checkout instead")
     options = parser.parse_args()
+    if options.examples:
+        np.savez(options.arrays, **dict(examples(options.examples)))
+        return
     canvas = OffscreenRenderCanvas(size=SIZE, pixel_ratio=1)
     renderer = gfx.renderers.WgpuRenderer(canvas)
     camera = gfx.PerspectiveCamera(50, SIZE[0] / SIZE[1])

@@ -7,7 +7,6 @@ number, is a constant of code that `torch.compile` made.
 from __future__ import annotations
 
 import functools
-import weakref
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, Final, NamedTuple, cast
 
@@ -208,39 +207,31 @@ def _pull(
     return next(pulled)
 
 
-class _Taken(NamedTuple):
-    """The copy of an image that the last forward pass of a renderer has made."""
-
-    key: tuple[Any, ...]
-    images: ImportedArray
-
-
-#: By renderer, where a backward pass may follow. Each forward pass replaces it, and the backward
-#: pass of an image comes after its forward pass and before its memory is freed: so another image
-#: has another key. On the device, passes find what the forward pass has drawn of the same copy.
-_TAKEN: Final[weakref.WeakKeyDictionary[Renderer, _Taken]] = weakref.WeakKeyDictionary()
-
-
 def _key_of(image: Any) -> tuple[Any, ...]:
     """Return what two tensors with the same pixels have in common while one of them exists."""
     return image.data_ptr(), image._version, image.dtype, image.shape, image.stride()
 
 
 def _take_forward(call: _Call, renderer: Renderer) -> ImportedArray:
-    """Copy the images, and keep the copy if a backward pass may follow."""
-    _TAKEN.pop(renderer, None)
+    """Copy the images, and keep the copy if a backward pass may follow.
+
+    Each forward pass replaces it, and the backward pass of an image comes after its forward pass
+    and before its memory is freed: so another image has another key. On the device, passes find
+    what the forward pass has drawn of the same copy.
+    """
+    renderer._taken = None
     images = _take_ordered(call.image, "image", renderer)
     # The version of an inference tensor is not known.
     is_learned = call.image.requires_grad or any(part.requires_grad for part in call.values)
     if is_learned and not call.image.is_inference():
-        _TAKEN[renderer] = _Taken(_key_of(call.image), images)
+        renderer._taken = _key_of(call.image), images
     return images
 
 
 def _take_backward(call: _Call, renderer: Renderer) -> ImportedArray:
-    taken = _TAKEN.pop(renderer, None)
-    if taken and taken.key == _key_of(call.image):
-        return taken.images
+    taken, renderer._taken = renderer._taken, None
+    if taken and taken[0] == _key_of(call.image):
+        return taken[1]
     return _take_ordered(call.image, "image", renderer)
 
 
@@ -341,13 +332,13 @@ def _on_device(call: _Call) -> Any:
     renderer, images = _renderer(call.renderer, call.image), _batch(call.image)
     frames: Iterable[Frames]
     if call.mask is None and call.emission is None and len(images) > 1:
-        _TAKEN.pop(renderer, None)
+        renderer._taken = None
         frames = renderer.map(images, settings, framebuffers="final")
     elif call.mask is None and call.emission is None and len(images) == 1:
         inputs = Inputs(_take_forward(call, renderer).at(0))
         frames = [renderer._apply_inputs(inputs, settings, ("final",))]
     else:
-        _TAKEN.pop(renderer, None)
+        renderer._taken = None
         masks, emissions = (
             [None] * len(images)
             if tensor is None

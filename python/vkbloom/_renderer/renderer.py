@@ -29,6 +29,7 @@ from vkbloom._renderer.device_arrays import (
     Destination,
     Device,
     DeviceArray,
+    ImportedArray,
     fill,
     likeness,
     on_cuda,
@@ -337,6 +338,8 @@ class Renderer:
         # The last plans, the latest first, each with its settings and what was wanted of it. Other
         # threads read the list, so it never changes.
         self._planned: tuple[tuple[Settings, Any, _core.Plan], ...] = ()
+        # The copy of the tensor that PyTorch gave last, by what identifies the tensor.
+        self._taken: tuple[tuple[Any, ...], ImportedArray] | None = None
         self._pending = requests.PendingSubmissions()
         self._batches = Batches(self._core, self._pending)
         # What map has checked last.
@@ -363,6 +366,7 @@ class Renderer:
 
     def _release(self) -> None:
         self._planned = ()
+        self._taken = None
         self._remember = None
         try:
             self._pending.wait()
