@@ -112,9 +112,11 @@ def examples(folder: Path) -> Iterator[tuple[str, np.ndarray]]:
         module = importlib.util.module_from_spec(spec)
         try:
             spec.loader.exec_module(module)
-            yield file.stem, np.asarray(module.renderer.target.draw()).copy()
+            drawn = np.asarray(module.renderer.target.draw()).copy()
+            if drawn.dtype == np.uint8:
+                yield file.stem, drawn
         except Exception as error:
-            # Packages, files of the network.
+            # A package or a file of the network is missing.
             print(f"{file.stem}: {type(error).__name__}: {error}", file=sys.stderr, flush=True)
 
 
