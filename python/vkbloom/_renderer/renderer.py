@@ -71,8 +71,8 @@ _NUMBER = re.compile(r"\d+")
 #: take numbers only.
 RENDERERS: Final[weakref.WeakValueDictionary[int, Renderer]] = weakref.WeakValueDictionary()
 _numbers = itertools.count(1)
-#: Plans that a renderer keeps: two for each size of a training loop over ten.
-_KEPT_PLANS: Final = 24
+#: Plans that a renderer keeps: three for each size of a training loop over ten that learns fields.
+_KEPT_PLANS: Final = 32
 
 
 @atexit.register
