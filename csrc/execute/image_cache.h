@@ -31,8 +31,8 @@ struct vkb_image_cache {
 uint64_t vkb_image_cache_size(const struct vkb_image_cache *cache);
 
 // Begins a submission. If the images take more than VKB_KEPT_IMAGE_BYTES, the old ones are
-// destroyed, the oldest first, until they take half of that. Spare memory
-// counts as an image, and takes no more than the most that images took in the last submissions.
+// destroyed, the oldest first, until they take half of that. Spare memory counts as an image, and
+// takes no more than the most that images took in the last submissions.
 enum { VKB_KEPT_IMAGE_BYTES = 256 << 20 };
 void vkb_image_cache_trim(const struct vkb_device *device, struct vkb_image_cache *cache,
                           const struct vkb_age *age);

@@ -19,7 +19,6 @@ from vkbloom._custom.flow import (
 )
 from vkbloom._custom.instructions import (
     CONSTANTS,
-    FUNCTION,
     FUNCTION_END,
     LOAD,
     STORE,
@@ -27,15 +26,16 @@ from vkbloom._custom.instructions import (
     Instruction,
     instruction,
     opcode_of,
+    split_functions,
 )
-from vkbloom._custom.spirv import HEADER_WORDS
+from vkbloom._custom.spirv import HEADER_WORDS, PRIVATE
 from vkbloom._custom.trips import TYPE_BOOL, TYPE_FLOAT, TYPE_INT
 
 _ENTRY_POINT, _DECORATE, _TYPE_VOID, _TYPE_VECTOR, _TYPE_POINTER = 15, 71, 19, 23, 32
 _CONSTANT, _COMPOSITE, _CONSTANT_NULL, _PHI, _IMAGE_WRITE = 43, 44, 46, 245, 99
 _CONSTRUCT, _EXTRACT, _TO_UNSIGNED = 80, 81, 109
 _ADD, _SELECT, _NOT_LESS, _BIT_AND = 128, 169, 174, 199
-_INPUT, _OUTPUT, _PRIVATE, _BUILT_IN, _LOCATION, _FRAGMENT = 1, 3, 6, 11, 30, 4
+_INPUT, _OUTPUT, _BUILT_IN, _LOCATION, _FRAGMENT = 1, 3, 11, 30, 4
 _TYPES: Final = range(19, 40)
 #: Inputs that are less than 2**31 by execution model, which compilers do not know of them: vertex
 #: index, coordinate of a fragment, id of an invocation; the opcode and operands of the numbers, and
@@ -77,26 +77,18 @@ class CountedModule:
 
     def __init__(self, words: tuple[int, ...], instructions: list[Instruction], most: int) -> None:
         self.most = most
-        self.bodies: dict[int, list[Instruction]] = {}
+        self._declared, self.bodies = split_functions(instructions)
         self.functions: dict[int, Function] = {}
         self.defined: dict[int, Instruction] = {}
         #: The variable that counts; 0: none does.
         self.counter = 0
         self._header = words[:HEADER_WORDS]
         self._next = words[3]
-        self._declared: list[Instruction] = []
         self._added: list[Instruction] = []
         self._decorations: list[Instruction] = []
         self._marks: dict[int, dict[int, int]] = {}
-        body: list[Instruction] | None = None
-        for word in instructions:
+        for word in self._declared:
             opcode = opcode_of(word)
-            if opcode == FUNCTION:
-                body = self.bodies[word[2]] = []
-            if body is not None:
-                body.append(word)
-                continue
-            self._declared.append(word)
             if opcode == _DECORATE:
                 self._marks.setdefault(word[1], {})[word[2]] = (*word, 0)[3]
             elif opcode in _TYPES:
@@ -221,9 +213,9 @@ class CountedModule:
 
     def _counter_variable(self) -> int:
         if not self.counter:
-            pointer = self._type(_TYPE_POINTER, _PRIVATE, self._type(TYPE_INT, 32, 0))
+            pointer = self._type(_TYPE_POINTER, PRIVATE, self._type(TYPE_INT, 32, 0))
             self.counter = self.new()
-            self._added.append(instruction(VARIABLE, pointer, self.counter, _PRIVATE))
+            self._added.append(instruction(VARIABLE, pointer, self.counter, PRIVATE))
         return self.counter
 
     def _add_way(self, function: Function, merge: int, end: int) -> None:

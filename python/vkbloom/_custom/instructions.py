@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import Final
 
 from vkbloom._custom.spirv import HEADER_WORDS
@@ -36,3 +36,17 @@ def split(words: tuple[int, ...]) -> Iterator[Instruction]:
             raise ValueError("the SPIR-V ends within an instruction")
         yield words[position:end]
         position = end
+
+
+def split_functions(
+    instructions: Iterable[Instruction],
+) -> tuple[list[Instruction], dict[int, list[Instruction]]]:
+    """Return what a compiler's module declares, and the instructions of each function by its id."""
+    declared: list[Instruction] = []
+    bodies: dict[int, list[Instruction]] = {}
+    into = declared
+    for word in instructions:
+        if opcode_of(word) == FUNCTION:
+            into = bodies[word[2]] = []
+        into.append(word)
+    return declared, bodies

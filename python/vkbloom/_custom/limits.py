@@ -7,7 +7,7 @@ from typing import Final
 
 from vkbloom._custom.calls import callees_first
 from vkbloom._custom.flow import BRANCH_CONDITIONAL, SWITCH
-from vkbloom._custom.instructions import FUNCTION, Instruction, opcode_of, split
+from vkbloom._custom.instructions import Instruction, opcode_of, split, split_functions
 from vkbloom._custom.rounds import limit_rounds
 from vkbloom._custom.spirv import private_bytes
 
@@ -25,12 +25,7 @@ MAX_PRIVATE_BYTES: Final = 128 << 10
 
 def limit_shader(words: tuple[int, ...]) -> tuple[int, ...]:
     """Return a module whose loops end; raise ValueError for one that is too long or too large."""
-    bodies: dict[int, list[Instruction]] = {}
-    body: list[Instruction] = []
-    for word in split(words):
-        if opcode_of(word) == FUNCTION:
-            body = bodies[word[2]] = []
-        body.append(word)
+    _, bodies = split_functions(split(words))
     calls = callees_first(bodies)
     lengths = {key: len(each) for key, each in bodies.items()}
     _check_sum(calls, lengths, MAX_INSTRUCTIONS, "instructions")

@@ -17,21 +17,21 @@ from vkbloom._custom.flow import (
 from vkbloom._custom.instructions import (
     ACCESS_CHAINS,
     CONSTANTS,
-    FUNCTION,
     FUNCTION_CALL,
     LOAD,
     VARIABLE,
     Instruction,
     opcode_of,
     split,
+    split_functions,
 )
+from vkbloom._custom.spirv import LOCAL, PRIVATE
 
 ALL, EQUAL = 155, 170
 #: Constants and variables.
 _DECLARED: Final = (*CONSTANTS, VARIABLE)
 #: Storage classes: what is the same for all of a run, and what a function may change.
 _STEADY: Final = (0, 1, 2, 9)
-_FUNCTION, _PRIVATE = 7, 6
 #: Instructions whose result depends on their operands alone.
 _PURE: Final = frozenset(
     {12, 79, 80, 81, 82, 83, *range(109, 153), *range(154, 192), *range(194, 206)}
@@ -41,16 +41,9 @@ _MAX_WORD: Final = 0xFFFFFFFF
 
 def has_endless_loop(words: tuple[int, ...]) -> bool:
     """Whether a function of a module has a loop that does not end; the module is a compiler's."""
-    defined: dict[int, Instruction] = {}
-    bodies: list[list[Instruction]] = []
-    for word in split(words):
-        if opcode_of(word) == FUNCTION:
-            bodies.append([])
-        if bodies:
-            bodies[-1].append(word)
-        elif opcode_of(word) in _DECLARED and len(word) > 2:
-            defined[word[2]] = word
-    return any(is_endless(defined, body) for body in bodies)
+    declared, bodies = split_functions(split(words))
+    defined = {word[2]: word for word in declared if opcode_of(word) in _DECLARED}
+    return any(is_endless(defined, body) for body in bodies.values())
 
 
 def is_endless(defined: Mapping[int, Instruction], body: list[Instruction]) -> bool:
@@ -142,7 +135,7 @@ class _Check:
         storage = variable[3]
         if storage in _STEADY:
             return True
-        steady = storage == _FUNCTION or (storage == _PRIVATE and not self._calls)
+        steady = storage == LOCAL or (storage == PRIVATE and not self._calls)
         return steady and pointer not in self._changed
 
     def is_bound(self, identity: int) -> bool:

@@ -9,8 +9,8 @@ TYPES = range(19, 40)
 FLOAT_ARITHMETIC = {127, 129, 131, 133, 136, 140, 141, *range(142, 149)}
 DECORATE = 3 << 16 | 71
 NO_CONTRACTION = 42
-# Storage classes: memory that a workgroup shares, and that of an invocation.
-WORKGROUP, PRIVATE, FUNCTION = 4, 6, 7
+# Storage classes: memory that a workgroup shares, and that of an invocation or a function.
+WORKGROUP, PRIVATE, LOCAL = 4, 6, 7
 
 
 def without_contraction(words: tuple[int, ...]) -> tuple[int, ...]:
@@ -45,7 +45,7 @@ def shared_bytes(words: tuple[int, ...]) -> int:
 
 def private_bytes(words: tuple[int, ...]) -> list[int]:
     """Return the sizes of the variables that each invocation has, without padding."""
-    return _bytes(words, {PRIVATE, FUNCTION})
+    return _bytes(words, {PRIVATE, LOCAL})
 
 
 def _bytes(words: tuple[int, ...], storage: set[int]) -> list[int]:

@@ -14,7 +14,6 @@ from vkbloom._custom.instructions import LOAD, STORE, VARIABLE, Instruction, opc
 Number = int | float
 TYPE_BOOL, TYPE_INT, TYPE_FLOAT = 20, 21, 22
 _CONSTANT, _TRUE, _FALSE, _PHI = 43, 41, 42, 245
-_FUNCTION_STORAGE: Final = 7
 #: Less is flushed to 0 by some devices.
 _MIN_FLOAT: Final = 2.0**-126
 #: Of the instructions that are run for a function.
