@@ -14,7 +14,8 @@ from vkbloom._gradients.pulling import pull_each
 from vkbloom._renderer.adapter import bundled_driver
 from vkbloom._renderer.new_arrays import new_array, new_arrays
 from vkbloom._renderer.sources import Inputs, image_source
-from vkbloom._scene.blocks import scene_arguments
+from vkbloom._scene.blocks import contents_arguments, frame_block
+from vkbloom._scene.blocks import scene_source as frame_of
 
 __all__ = [
     "MESH",
@@ -26,13 +27,15 @@ __all__ = [
     "Row",
     "bundled_driver",
     "change",
+    "contents_arguments",
+    "frame_block",
+    "frame_of",
     "image_source",
     "in_floats",
     "new_array",
     "new_arrays",
     "pull_each",
     "rows",
-    "scene_arguments",
     "scene_plan",
     "scene_source",
     "watch_submissions",
@@ -68,7 +71,7 @@ def scene_source(
     size: Any = (1280, 720), *, has_sky: bool = True, shading: str = "forward"
 ) -> _core.Source:
     """Return a frame of a triangle."""
-    return _core.scene_source(*scene_arguments(SCENES[has_sky], size, shading, 0.0))
+    return frame_of(SCENES[has_sky], size, shading, 0.0)
 
 
 def scene_plan(

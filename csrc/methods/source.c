@@ -93,7 +93,19 @@ bool vkb_source_matches(const struct vkb_source *planned, const struct vkb_sourc
         && strcmp(planned->shading, given->shading) == 0;
 }
 
+// Whether a frame has the same camera, place of the body and intensity, to the bit.
+static bool same_frame(const struct vkb_scene_source *one, const struct vkb_scene_source *other)
+{
+    return memcmp(one->projection, other->projection, sizeof one->projection) == 0
+        && memcmp(one->model_view, other->model_view, sizeof one->model_view) == 0
+        && memcmp(one->sky, other->sky, sizeof one->sky) == 0
+        && memcmp(one->before, other->before, sizeof one->before) == 0
+        && memcmp(one->jitter, other->jitter, sizeof one->jitter) == 0
+        && one->glow_intensity == other->glow_intensity;
+}
+
 bool vkb_source_fits(const struct vkb_source *planned, const struct vkb_source *given)
 {
-    return given->kind == VKB_SOURCE_IMAGE && vkb_source_matches(planned, given);
+    return vkb_source_matches(planned, given)
+        && (given->kind == VKB_SOURCE_IMAGE || same_frame(&planned->scene, &given->scene));
 }

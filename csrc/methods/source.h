@@ -31,8 +31,8 @@ bool vkb_source_sizes(const struct vkb_source *source, const struct vkb_settings
 // and formats.
 bool vkb_source_matches(const struct vkb_source *planned, const struct vkb_source *given);
 
-// Whether a graph of the image `planned` can run with the data of `given`: both need the same size
-// and format, and the same optional parts. A graph of a scene depends on its camera.
+// Whether a graph of `planned` can run with the data of `given`: both need the same size and
+// format, and the same optional parts. A graph of a scene depends on its camera, too.
 bool vkb_source_fits(const struct vkb_source *planned, const struct vkb_source *given);
 
 #endif

@@ -46,18 +46,19 @@ bool vkb_read_exposure_mask(PyObject *object, Py_buffer *view, struct vkb_settin
 // Asks the stage of dirt, if there is one, for its picture.
 bool vkb_read_dirt(PyObject *object, Py_buffer *view, struct vkb_settings *settings);
 
-// The arrays of a scene, held until vkb_release_scene. Releasing a zeroed or half-read one is safe.
-struct vkb_held_scene {
+// The meshes and pictures of a scene: of the body and of the glow vertices, indices and, with
+// surfaces, texture coordinates and surfaces; then the levels of the sky and of the textures.
+struct vkb_contents_object {
+    PyObject_HEAD
     struct vkb_scene_data data;
+    bool has_emission;
     Py_buffer *views;
     size_t view_count;
 };
 
-// The arrays: of the body and of the glow vertices, indices and, with surfaces, texture coordinates
-// and surfaces; then the levels of the sky and of the textures.
-bool vkb_read_scene(PyObject *block, PyObject *pictures, PyObject *arrays,
-                    struct vkb_held_scene *scene, struct vkb_source *source);
-void vkb_release_scene(struct vkb_held_scene *scene);
+// Reads the block of a frame of that scene; false with an exception set.
+bool vkb_read_frame(PyObject *block, const struct vkb_contents_object *contents,
+                    struct vkb_source *source);
 
 // The pixels of an image. The view holds the array or, of an image in exported memory, the
 // Exported; it has no object where there is no image.

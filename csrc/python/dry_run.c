@@ -9,7 +9,7 @@ static uint64_t source_number(PyObject *object)
 {
     const struct vkb_source_object *source = (const struct vkb_source_object *)object;
 
-    return source->source.kind == VKB_SOURCE_SCENE ? source->scene.data.serial
+    return source->source.kind == VKB_SOURCE_SCENE ? source->contents->data.serial
                                                    : (uint64_t)(uintptr_t)source;
 }
 

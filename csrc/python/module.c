@@ -111,8 +111,10 @@ static PyMethodDef functions[] = {
     {"image_source", vkb_image_source, METH_VARARGS,
      "image_source(image, emission=None, mask=None, levels=()) -> Source. The levels are images "
      "that another part of a graph has made."},
+    {"scene_contents", vkb_scene_contents, METH_VARARGS,
+     "scene_contents(block, pictures, arrays) -> SceneContents. As _scene/blocks.py packs it."},
     {"scene_source", vkb_scene_source, METH_VARARGS,
-     "scene_source(block, pictures, arrays) -> Source. As _scene/blocks.py packs it."},
+     "scene_source(contents, block) -> Source. A frame, as _scene/blocks.py packs it."},
     {"plan", vkb_any_plan, METH_VARARGS,
      "plan(source, settings, names, variants=\"fragment\") -> Plan. For no renderer: what one with "
      "those variants would do; by default it draws every pass as its method defines it."},
@@ -231,6 +233,7 @@ static int execute(PyObject *module)
     state->errors[VKB_ERROR_VALUE] = Py_NewRef(PyExc_ValueError);
     return add_type(module, &vkb_renderer_spec, "Renderer", &state->renderer_type)
                 && add_type(module, &vkb_source_spec, "Source", &state->source_type)
+                && add_type(module, &vkb_contents_spec, "SceneContents", &state->contents_type)
                 && add_type(module, &vkb_plan_spec, "Plan", &state->plan_type)
                 && add_type(module, &vkb_submission_spec, "Submission", &state->submission_type)
                 && add_type(module, &vkb_pages_spec, "Pages", &state->pages_type)

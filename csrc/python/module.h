@@ -4,11 +4,12 @@
 
 #include "python/objects.h"
 
-extern PyType_Spec vkb_renderer_spec, vkb_source_spec, vkb_plan_spec, vkb_submission_spec,
-    vkb_pages_spec, vkb_exported_spec;
+extern PyType_Spec vkb_renderer_spec, vkb_source_spec, vkb_contents_spec, vkb_plan_spec,
+    vkb_submission_spec, vkb_pages_spec, vkb_exported_spec;
 
 // Functions of the module.
 PyObject *vkb_image_source(PyObject *module, PyObject *arguments);
+PyObject *vkb_scene_contents(PyObject *module, PyObject *arguments);
 PyObject *vkb_scene_source(PyObject *module, PyObject *arguments);
 PyObject *vkb_read_dlpack(PyObject *module, PyObject *capsule);
 PyObject *vkb_any_plan(PyObject *module, PyObject *arguments);

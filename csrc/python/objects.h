@@ -9,8 +9,8 @@
 #include "vulkan/adapter.h"
 
 struct vkb_module_state {
-    PyObject *renderer_type, *source_type, *plan_type, *submission_type, *pages_type,
-        *exported_type;
+    PyObject *renderer_type, *source_type, *contents_type, *plan_type, *submission_type,
+        *pages_type, *exported_type;
     // What the package gives the module when it is imported (connect). Exception classes by enum
     // vkb_error_kind, RuntimeError until then; a function that says which name may be meant.
     PyObject *errors[VKB_ERROR_VALUE + 1];

@@ -469,7 +469,7 @@ static PyObject *shares_images(PyObject *object, PyObject *other)
                                                  &((struct vkb_plan_object *)other)->plan.graph));
 }
 
-static PyObject *is_of_image(PyObject *object, PyObject *other)
+static PyObject *is_of(PyObject *object, PyObject *other)
 {
     const struct vkb_module_state *state = PyType_GetModuleState(Py_TYPE(object));
 
@@ -514,9 +514,9 @@ static PyMethodDef methods[] = {
     {"shares_images", shares_images, METH_O,
      "shares_images(plan) -> bool. Whether both have the same images, so that they can be run "
      "together."},
-    {"is_of_image", is_of_image, METH_O,
-     "is_of_image(source) -> bool. Whether the source is an image of which this is the plan, with "
-     "the same settings. (The plan of a scene depends on its camera.)"},
+    {"is_of", is_of, METH_O,
+     "is_of(source) -> bool. Whether this is the plan of the source, too, with the same settings: "
+     "of such an image, or of the same frame of such a scene."},
     {0},
 };
 

@@ -10,7 +10,7 @@
 struct vkb_source_object {
     PyObject_HEAD
     struct vkb_source source;
-    struct vkb_held_scene scene;
+    struct vkb_contents_object *contents;           // of a scene
     struct vkb_held_image images[VKB_INPUT_COUNT];  // by kind
     VKB_ATOMIC(struct vkb_resident *) resident;     // NULL: none, or taken by another source
     struct vkb_residents *residents;

@@ -220,7 +220,7 @@ static void describe_source(const struct vkb_source_object *source, bool in_plac
                             struct vkb_frame_source *data)
 {
     *data = (struct vkb_frame_source){
-        .scene = source->source.kind == VKB_SOURCE_SCENE ? &source->scene.data : NULL,
+        .scene = source->source.kind == VKB_SOURCE_SCENE ? &source->contents->data : NULL,
         .resident = source->resident,
         .in_place = in_place,
     };

@@ -110,13 +110,16 @@ PyObject *vkb_image_source(PyObject *module, PyObject *arguments)
 
 PyObject *vkb_scene_source(PyObject *module, PyObject *arguments)
 {
-    PyObject *block, *pictures, *arrays;
+    const struct vkb_module_state *state = vkb_module_state(module);
+    PyObject *contents, *block;
 
-    if (!PyArg_ParseTuple(arguments, "SSO!:scene_source", &block, &pictures, &PyTuple_Type,
-                          &arrays))
+    if (!PyArg_ParseTuple(arguments, "O!S:scene_source", state->contents_type, &contents, &block))
         return NULL;
-    struct vkb_source_object *self = vkb_new_object(vkb_module_state(module)->source_type);
-    if (self && !vkb_read_scene(block, pictures, arrays, &self->scene, &self->source))
+    struct vkb_source_object *self = vkb_new_object(state->source_type);
+    if (!self)
+        return NULL;
+    self->contents = (struct vkb_contents_object *)Py_NewRef(contents);
+    if (!vkb_read_frame(block, self->contents, &self->source))
         Py_CLEAR(self);
     return (PyObject *)self;
 }
@@ -245,8 +248,7 @@ static int traverse(PyObject *object, visitproc visit, void *arg)
     Py_VISIT(Py_TYPE(object));
     for (int kind = 0; kind < VKB_INPUT_COUNT; ++kind)
         Py_VISIT(self->images[kind].view.obj);
-    for (size_t i = 0; i < self->scene.view_count; ++i)
-        Py_VISIT(self->scene.views[i].obj);
+    Py_VISIT(self->contents);
     return 0;
 }
 
@@ -256,7 +258,7 @@ static int clear(PyObject *object)
     struct vkb_source_object *self = (struct vkb_source_object *)object;
 
     self->source = (struct vkb_source){0};
-    vkb_release_scene(&self->scene);
+    Py_CLEAR(self->contents);
     for (int kind = 0; kind < VKB_INPUT_COUNT; ++kind) {
         PyBuffer_Release(&self->images[kind].view);
         self->images[kind] = (struct vkb_held_image){0};

@@ -33,7 +33,7 @@ def stand_in(reason: ImportError) -> ModuleType:
             "x86-64 and aarch64; elsewhere, or for a newer core, build it from the source"
         )
 
-    types = ("Renderer", "Source", "Plan", "Submission", "Exported", "Pages")
+    types = ("Renderer", "Source", "SceneContents", "Plan", "Submission", "Exported", "Pages")
     for name in types:
         setattr(module, name, type(name, (), {"__module__": "vkbloom._core", "__new__": refuse}))
     # All else are functions.

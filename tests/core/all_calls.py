@@ -179,7 +179,7 @@ def look(renderer: Renderer, which: int, size: int) -> Any:
     settings = SETTINGS[which]
     plan, any_plan = core.plan(source, settings, None), _core.plan(source, settings, None)
     assert plan.shares_images(plan)
-    assert plan.is_of_image(source)
+    assert plan.is_of(source)
     scene = scene_source((64, 36))
     found: list[Any] = [plan.outputs, plan.passes, any_plan.passes, source.kind]
     found += [_core.dry_run(((source, plan), (source, plan))), core.info, source.exported]

@@ -11,7 +11,15 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
-from tests.planned import SCENES, bundled_driver, change, scene_arguments, scene_plan, scene_source
+from tests.planned import (
+    SCENES,
+    bundled_driver,
+    change,
+    contents_arguments,
+    frame_block,
+    scene_plan,
+    scene_source,
+)
 from tests.refusals import assert_refused, rows
 from vkbloom import Renderer, Scene, Separable, _core
 from vkbloom._custom.rows import CoreShader, Row
@@ -156,8 +164,8 @@ def arrays_for(*plans: _core.Plan) -> tuple[tuple[np.ndarray[Any, Any], ...], ..
 
 def triangle(
     at: Any = None, pictures: Any = None, sky: Any = None, textures: int = 0, **parts: Any
-) -> _core.Source:
-    """Return a scene of a triangle; its block has other numbers at some places, other arrays.
+) -> _core.SceneContents:
+    """Return the contents of a triangle; the block has other numbers at some places, other arrays.
 
     - `pictures`: Nine numbers of the sky and of each texture.
     - `sky`: The arrays of levels, those of textures after them.
@@ -170,13 +178,13 @@ def triangle(
         "surfaces": None,
         **parts,
     }
-    block, _, _ = scene_arguments(SCENES[False], (8, 8), "forward", 0.0)
-    # No glow mesh, whose counts are after those of the body, at 50 to 52.
-    none = {"at53": 0, "at54": 0, "at55": 0, "at57": textures}
+    block, _, _ = contents_arguments(SCENES[False])
+    # No glow mesh, whose counts are after those of the body, at 2 to 4.
+    none = {"at5": 0, "at6": 0, "at7": 0, "at9": textures}
     block = change(block, **(none | (at or {})))
     given = [array for array in arrays.values() if array is not None] + list(sky or ())
     numbers = np.array(pictures or [0] * 9, np.uint32)
-    return _core.scene_source(block, numbers.tobytes(), tuple(given))
+    return _core.scene_contents(block, numbers.tobytes(), tuple(given))
 
 
 @pytest.fixture(scope="module")
@@ -185,11 +193,11 @@ def names(renderer: Renderer, scene: Scene) -> dict[str, Any]:
     source, plans = planned(renderer, Separable())
     read_only = np.empty((4, 4, 4), np.uint8)
     read_only.flags.writeable = False
-    of_scene = scene_arguments(scene, (8, 8), "forward", 0.0)
-    given = dict(zip(("scene_block", "pictures", "parts"), of_scene, strict=True))
+    contents = contents_arguments(scene)
+    given = dict(zip(("scene_block", "pictures", "parts"), contents, strict=True))
 
-    def raw(**changes: Any) -> _core.Source:
-        return _core.scene_source(*(given | changes).values())
+    def raw(**changes: Any) -> _core.SceneContents:
+        return _core.scene_contents(*(given | changes).values())
 
     return {
         **globals(),
@@ -210,7 +218,8 @@ def names(renderer: Renderer, scene: Scene) -> dict[str, Any]:
         "plans": plans,
         "arrays": arrays_for(plans[0]),
         "read_only": read_only,
-        "of_scene": of_scene,
+        "frame": frame_block(scene, (8, 8), "forward", 0.0),
+        "draw": lambda frame: _core.scene_source(raw(), frame),
         "block": Separable()._core_block(),
         "driver": bundled_driver(),
     }
@@ -306,12 +315,26 @@ def test_the_ends_of_all_ranges_together(method: str, side: int) -> None:
 
 def test_plans_of_an_image(renderer: Renderer, scene: Scene) -> None:
     source, (plan,) = planned(renderer, Separable())
-    assert plan.is_of_image(source)
-    assert not plan.is_of_image(_core.image_source(np.zeros((4, 5, 3), np.uint8)))
-    # The camera is part of a scene's plan.
-    of_scene = _core.scene_source(*scene_arguments(scene, (4, 4), "forward", 0.0))
-    plan = renderer._core.plan(of_scene, Separable(), None)
-    assert not plan.is_of_image(of_scene)
+    assert plan.is_of(source)
+    assert not plan.is_of(_core.image_source(np.zeros((4, 5, 3), np.uint8)))
+
+
+def test_plans_of_a_frame(renderer: Renderer) -> None:
+    """What a plan has of a frame: all but the contents of the scene."""
+    first = scene_source((4, 4))
+    plan = renderer._core.plan(first, Separable(), None)
+    assert plan.is_of(first)
+    assert plan.is_of(scene_source((4, 4)))
+    others = [scene_source((4, 5)), scene_source((4, 4), shading="deferred")]
+    others += [scene_source((4, 4), has_sky=False), _core.image_source(IMAGE)]
+    contents = _core.scene_contents(*contents_arguments(SCENES[True]))
+    block = frame_block(SCENES[True], (4, 4), "forward", 0.0)
+    assert plan.is_of(_core.scene_source(contents, block))
+    # The intensity of the glow, and the numbers of all matrices.
+    for place in (1, *range(2, 46)):
+        number = np.frombuffer(block, np.uint32)[place] ^ 1
+        others.append(_core.scene_source(contents, change(block, **{f"at{place}": number})))
+    assert not any(plan.is_of(other) for other in others)
 
 
 def test_settings_that_close_the_renderer() -> None:

@@ -19,7 +19,7 @@ from hypothesis import strategies as st
 
 from tests.exhaustive import examples, some
 from tests.images import picture
-from tests.planned import Inputs, image_source, scene_arguments
+from tests.planned import Inputs, frame_of, image_source
 from vkbloom import (
     BlenderGlare,
     Convolution,
@@ -256,7 +256,7 @@ def test_a_dry_run_of_scenes_is_what_runs(
     steps, ran = [], []
     for method, turns, which in calls:
         shading: Any = ("forward", "deferred")[which]
-        source = _core.scene_source(*scene_arguments(scene, SIZE, shading, turns))
+        source = frame_of(scene, SIZE, shading, turns)
         steps.append((source, renderer._core.plan(source, method, None)))
         frames = renderer.render(scene, method, SIZE, shading=shading, time=turns)
         ran.append(list(frames.timings))

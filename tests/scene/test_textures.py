@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from tests.planned import change, new_arrays, scene_arguments
+from tests.planned import change, contents_arguments, frame_block, new_arrays
 from tests.refusals import assert_refused, rows
 from tests.scene.parts import Mesh, Texture, mip_levels
 from tests.screens import CAMERA, NOTHING, panel, rgb
@@ -344,16 +344,16 @@ def test_meshes_with_textures_can_be_pickled(renderer: Renderer) -> None:
 BODY = panel((4, 4))
 
 
-def pack(body: Mesh) -> Any:
-    return scene_arguments(Scene(body=body, camera=CAMERA), (4, 4), "forward", 0.0)
+PANEL = Scene(body=BODY, camera=CAMERA)
 
 
 def draw(renderer: Renderer, surfaces: Any = None, **places: int) -> None:
     """Draw a mesh with a texture; the core gets other surfaces and numbers of its pictures."""
-    block, pictures, arrays = pack(BODY)
+    block, pictures, arrays = contents_arguments(PANEL)
     if surfaces is not None:
         arrays = (*arrays[:3], np.array(surfaces, np.uint32), *arrays[4:])
-    source = _core.scene_source(block, change(pictures, **places), arrays)
+    contents = _core.scene_contents(block, change(pictures, **places), arrays)
+    source = _core.scene_source(contents, frame_block(PANEL, (4, 4), "forward", 0.0))
     plan = renderer._core.plan(source, Separable(), None)
     renderer._core.run(source, (plan,), (new_arrays(renderer._core, plan),))
 

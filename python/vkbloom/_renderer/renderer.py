@@ -1021,7 +1021,7 @@ class Renderer:
     ) -> _core.Plan | None:
         wanted = names, derivatives
         for index, (known, others, plan) in enumerate(self._planned):
-            if known is settings and others == wanted and plan.is_of_image(source):
+            if known is settings and others == wanted and plan.is_of(source):
                 if index > 0:
                     self._keep_plan(settings, wanted, plan)
                 return plan

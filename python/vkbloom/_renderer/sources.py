@@ -286,9 +286,9 @@ def scene_source(
     if not isinstance(scene, Scene):
         raise TypeError(f"{name}: {type(scene).__name__} is not a Scene")
     # Imported here, for the same reason.
-    from vkbloom._scene.blocks import scene_arguments  # noqa: PLC0415
+    from vkbloom._scene import blocks  # noqa: PLC0415
     from vkbloom._scene.view import ALONE, Step  # noqa: PLC0415
 
     pixels = check_size("size", size)
     step = ALONE if moment is None else Step(moment.before, moment.offset(pixels))
-    return _core.scene_source(*scene_arguments(scene, pixels, shading, turns, step))
+    return blocks.scene_source(scene, pixels, shading, turns, step)

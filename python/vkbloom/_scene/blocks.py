@@ -1,4 +1,4 @@
-"""A scene's frame as the core's scene_source takes it: blocks of bytes, and arrays."""
+"""A scene and its frames as the core takes them: blocks of bytes, and arrays."""
 
 from __future__ import annotations
 
@@ -20,35 +20,49 @@ from vkbloom._scene.view import ALONE, Step, matrices
 _ADDRESS_MODES: Final = ("repeat", "mirror-repeat", "clamp-to-edge")
 _FILTERS: Final = ("nearest", "linear")
 
-#: Arguments of scene_source: a block, one of each picture, and arrays.
-Arguments = tuple[bytes, bytes, tuple[NDArray[Any], ...]]
 
-
-def scene_arguments(
+def scene_source(
     scene: Scene, size: tuple[int, int], shading: str, turns: float, step: Step = ALONE
-) -> Arguments:
-    """Return the arguments of the core's scene_source, from checked values."""
+) -> _core.Source:
+    """Return the core's Source of a scene's frame, from checked values."""
+    contents = scene._contents
+    if contents.core is None:
+        contents.core = _core.scene_contents(*contents_arguments(scene))
+    return _core.scene_source(contents.core, frame_block(scene, size, shading, turns, step))
+
+
+def contents_arguments(scene: Scene) -> tuple[bytes, bytes, tuple[NDArray[Any], ...]]:
+    """Return a block, one of each picture, and arrays: what all frames of a scene have."""
     # Textures by identity, not by content: each is uploaded once.
     numbers: dict[Texture, int] = {}
     body, body_counts = _mesh(scene.body, numbers)
     glow, glow_counts = ([], (0, 0, 0)) if scene.glow is None else _mesh(scene.glow, numbers)
     sky = () if scene.skybox is None else scene.skybox.levels
     block = struct.pack(
-        "=Qd176s10I32s",
+        "=Q8I",
         scene.contents_serial,
-        scene.glow_intensity,
-        # `turns` has period 1. It is reduced first, so that large times keep their precision.
-        matrices(scene.camera, math.fmod(turns, 1.0), size[0] / size[1], step).tobytes(),
-        *size,
         *body_counts,
         *glow_counts,
         scene.body.emission is not None,
         len(numbers),
-        shading.encode(),
     )
     pictures = [_picture(sky), *map(_texture, numbers)]
     levels = [level for texture in numbers for level in texture.levels]
     return block, b"".join(pictures), (*body, *glow, *sky, *levels)
+
+
+def frame_block(
+    scene: Scene, size: tuple[int, int], shading: str, turns: float, step: Step = ALONE
+) -> bytes:
+    """Return the block of a frame of a scene."""
+    return struct.pack(
+        "=d176s2I32s",
+        scene.glow_intensity,
+        # `turns` has period 1. It is reduced first, so that large times keep their precision.
+        matrices(scene.camera, math.fmod(turns, 1.0), size[0] / size[1], step).tobytes(),
+        *size,
+        shading.encode(),
+    )
 
 
 def _mesh(

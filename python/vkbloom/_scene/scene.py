@@ -13,7 +13,7 @@ import sys
 import weakref
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -26,14 +26,22 @@ from vkbloom._scene.arrays import Constructed
 from vkbloom._scene.mesh import Mesh
 from vkbloom._scene.skybox import Cubemap, SkyboxSource
 
+if TYPE_CHECKING:
+    from vkbloom import _core
+
 _serials = itertools.count(1)
 
 
 class _Contents:
-    """A serial that is shared by all living scenes with the same meshes and sky."""
+    """What all living scenes with the same meshes and sky share.
+
+    - `serial`: Their number.
+    - `core`: What the core has checked and holds of them; None: no frame was rendered.
+    """
 
     def __init__(self) -> None:
         self.serial = next(_serials)
+        self.core: _core.SceneContents | None = None
 
 
 #: By the ids of body, glow and sky. A scene refers to its contents and to these three, so that no

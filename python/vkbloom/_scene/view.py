@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Final, NamedTuple
@@ -48,6 +49,16 @@ class Step(NamedTuple):
 ALONE: Final = Step()
 
 
+@functools.lru_cache(maxsize=8)
+def _view(camera: Camera) -> NDArray[np.float64]:
+    """Return the matrix of a camera, which is the same in all frames; read-only."""
+    view = _translation(camera.position)
+    for axis, angle in enumerate(camera.rotation):
+        view = view @ _rotation(axis, angle * _DEGREE)
+    view.flags.writeable = False
+    return view
+
+
 def _model(turns: float) -> NDArray[np.float64]:
     """Return the matrix of the body at a time."""
     angle = _TURN * turns
@@ -73,10 +84,7 @@ def matrices(
     tangent = math.tan(camera.fov * _DEGREE / 2.0)
     focal = 1.0 / tangent if tangent else math.inf
     depth = camera.near - camera.far
-    view = _translation(camera.position)
-    for axis, angle in enumerate(camera.rotation):
-        view = view @ _rotation(axis, angle * _DEGREE)
-    model = _model(turns)
+    view, model = _view(camera), _model(turns)
     rows = np.zeros((11, 4))
     rows[0] = focal / aspect, focal, camera.far / depth, camera.near * camera.far / depth
     rows[1:4] = (view @ model)[:3]
