@@ -11,7 +11,7 @@ from typing import Any, Literal, TypeAlias
 from vkbloom._extras import import_extra
 from vkbloom._gradients.operators import (
     number_of,
-    on_host_together,
+    read_ahead,
     refuse_capture,
     refuse_tangents,
     replace,
@@ -174,15 +174,24 @@ class Bloom(torch.nn.Module):  # type: ignore[misc]
         parameters = [self._parameter(name) for name in self._names]
         # Compiled code cannot depend on values.
         compiling = torch.compiler.is_compiling()
-        read = parameters if compiling else on_host_together(parameters)
+        read = parameters if compiling else read_ahead(parameters)
         with torch.no_grad():
             for name, parameter, values in zip(self._names, parameters, read, strict=True):
-                held = _clamp(values, self._ranges[name])
+                ends = self._ranges[name]
+                # The following tensors would take a tenth of a step.
+                if not compiling and _is_within(values, ends):
+                    continue
+                held = _clamp(values, ends)
                 # A write, also of an equal value, makes what earlier calls have saved unusable.
                 # (Compiled code saves copies.)
                 if compiling or not torch.equal(held, values):
                     parameter.copy_(held)
         return parameters
+
+
+def _is_within(value: Any, ends: tuple[float, float] | None) -> bool:
+    """Return whether a tensor on the host is a number between the ends, or has none."""
+    return ends is None or (value.ndim == 0 and ends[0] <= value.item() <= ends[1])
 
 
 def _clamp(value: Any, ends: tuple[float, float] | None) -> Any:

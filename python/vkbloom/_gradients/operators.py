@@ -7,6 +7,7 @@ number, is a constant of code that `torch.compile` made.
 from __future__ import annotations
 
 import functools
+import threading
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, Final, NamedTuple, cast
 
@@ -20,7 +21,7 @@ from vkbloom._psf.values import ARRAYS, ArrayValue
 from vkbloom._renderer.default import default_renderer, renderer_on
 from vkbloom._renderer.device_arrays import DeviceArray, ImportedArray, merge, take
 from vkbloom._renderer.frames import Frames
-from vkbloom._renderer.renderer import RENDERERS, Renderer
+from vkbloom._renderer.renderer import RENDERERS, Renderer, Taken
 from vkbloom._renderer.sources import Inputs, check_inputs
 from vkbloom._settings.fields import fields_of
 from vkbloom._settings.records import Record
@@ -99,12 +100,34 @@ def on_host_together(tensors: Sequence[Any]) -> list[Any]:
     return [part.cpu() for part in parts]
 
 
+class _Reads(threading.local):
+    """What a thread has read for the operator that it calls next: keys of tensors, and numbers."""
+
+    last: tuple[Any, list[Any]] | None = None
+
+
+_reads = _Reads()
+
+
+def read_ahead(tensors: Sequence[Any]) -> list[Any]:
+    """Return tensors on the host, as `on_host_together`, and keep them for the next operator."""
+    read = on_host_together(tensors)
+    # A tensor within a transform of torch.func has no address.
+    try:
+        _reads.last = _keys_of(tensors), read
+    except RuntimeError:
+        _reads.last = None
+    return read
+
+
 def replace(settings: Settings, values: Mapping[str, Any]) -> Settings:
     """Return settings with the values of tensors."""
     if not values:
         return settings
-    parts = zip(values, on_host_together([*values.values()]), strict=True)
-    given = {name: _field_value(part) for name, part in parts}
+    tensors = [*values.values()]
+    ahead, _reads.last = _reads.last, None
+    read = ahead[1] if ahead and ahead[0] == _keys_of(tensors) else on_host_together(tensors)
+    given = {name: _field_value(part) for name, part in zip(values, read, strict=True)}
     if any(isinstance(value, np.ndarray) for value in given.values()):
         return settings.replace(**given)
     return _replaced(settings, tuple(given.items()))
@@ -207,32 +230,37 @@ def _pull(
     return next(pulled)
 
 
-def _key_of(image: Any) -> tuple[Any, ...]:
-    """Return what two tensors with the same pixels have in common while one of them exists."""
-    return image.data_ptr(), image._version, image.dtype, image.shape, image.stride()
+def _keys_of(tensors: Iterable[Any]) -> tuple[Any, ...] | None:
+    """Return what tensors with the same elements have in common while some of them exist.
+
+    None: the version of an inference tensor is not known.
+    """
+    keys = []
+    for tensor in tensors:
+        if tensor.is_inference():
+            return None
+        keys += [tensor.data_ptr(), tensor._version, tensor.dtype, tensor.shape, tensor.stride()]
+    return tuple(keys)
 
 
-def _take_forward(call: _Call, renderer: Renderer) -> ImportedArray:
-    """Copy the images, and keep the copy if a backward pass may follow.
+def _take_forward(call: _Call, renderer: Renderer, settings: Settings) -> ImportedArray:
+    """Copy the images, and keep copy and settings if a backward pass may follow.
 
-    Each forward pass replaces it, and the backward pass of an image comes after its forward pass
+    Each forward pass replaces them, and the backward pass of an image comes after its forward pass
     and before its memory is freed: so another image has another key. On the device, passes find
     what the forward pass has drawn of the same copy.
     """
     renderer._taken = None
     images = _take_ordered(call.image, "image", renderer)
-    # The version of an inference tensor is not known.
     is_learned = call.image.requires_grad or any(part.requires_grad for part in call.values)
-    if is_learned and not call.image.is_inference():
-        renderer._taken = _key_of(call.image), images
+    if is_learned and (key := _key_of(call)) is not None:
+        renderer._taken = Taken(key, images, settings)
     return images
 
 
-def _take_backward(call: _Call, renderer: Renderer) -> ImportedArray:
-    taken, renderer._taken = renderer._taken, None
-    if taken and taken[0] == _key_of(call.image):
-        return taken[1]
-    return _take_ordered(call.image, "image", renderer)
+def _key_of(call: _Call) -> Any:
+    keys = _keys_of((call.image, *call.values))
+    return keys and (*keys, call.names, call.settings)
 
 
 def _take_ordered(tensor: Any, name: str, renderer: Renderer) -> ImportedArray:
@@ -246,10 +274,13 @@ def _take_ordered(tensor: Any, name: str, renderer: Renderer) -> ImportedArray:
 def _pull_on_device(call: _Call, cotangent: Any, by_images: bool) -> Iterator[Any]:
     """Yield the derivatives of each image, with those by images as tensors of the GPU."""
     renderer, mask = _renderer(call.renderer, call.image), call.mask
+    taken, renderer._taken = renderer._taken, None
+    if taken and taken.key != _key_of(call):
+        taken = None
     # Before the waits, since the device still works.
-    settings = replace(in_floats(_settings(call.settings)), call.fields)
+    settings = taken.settings if taken else _settings_of(call)
     masks = None if mask is None else mask.detach().reshape(-1, *mask.shape[-2:]).cpu().numpy()
-    images = _take_backward(call, renderer)
+    images = taken.images if taken else _take_ordered(call.image, "image", renderer)
     emissions, cotangents = (
         None if tensor is None else _take_ordered(tensor, name, renderer)
         for name, tensor in (("emission", call.emission), ("cotangent", cotangent))
@@ -267,6 +298,10 @@ def _pull_on_device(call: _Call, cotangent: Any, by_images: bool) -> Iterator[An
         for index in range(images.shape[0])
     )
     yield from pull_each(renderer, settings, sequence, call.fields, "cuda", images=by_images)
+
+
+def _settings_of(call: _Call) -> Settings:
+    return replace(in_floats(_settings(call.settings)), call.fields)
 
 
 def _batch(tensor: Any) -> Any:
@@ -328,14 +363,14 @@ def _bloom(*given: Any) -> Any:
 
 def _on_device(call: _Call) -> Any:
     """Run the operator without the host; a batch without masks changes the context once."""
-    settings = replace(in_floats(_settings(call.settings)), call.fields)
-    renderer, images = _renderer(call.renderer, call.image), _batch(call.image)
+    settings, renderer = _settings_of(call), _renderer(call.renderer, call.image)
+    images = _batch(call.image)
     frames: Iterable[Frames]
     if call.mask is None and call.emission is None and len(images) > 1:
         renderer._taken = None
         frames = renderer.map(images, settings, framebuffers="final")
     elif call.mask is None and call.emission is None and len(images) == 1:
-        inputs = Inputs(_take_forward(call, renderer).at(0))
+        inputs = Inputs(_take_forward(call, renderer, settings).at(0))
         frames = [renderer._apply_inputs(inputs, settings, ("final",))]
     else:
         renderer._taken = None
@@ -385,11 +420,18 @@ def _backward(cotangent: Any, by_images: bool, *given: Any) -> list[Any]:
             parts.append(_as_tensor(gradients[name]))
     return [
         *(_join(derivatives[name], part) for name, part in images.items()),
-        *(
-            sum(derivatives[name], torch.zeros(part.shape)).to(part)
-            for name, part in fields.items()
-        ),
+        *_add_up([derivatives[name] for name in fields], call.values),
     ]
+
+
+def _add_up(parts: Sequence[list[Any]], like: Sequence[Any]) -> list[Any]:
+    """Return the sums of derivatives as tensors like others. Numbers go to a GPU at once."""
+    totals = [sum(each, torch.zeros(one.shape)) for each, one in zip(parts, like, strict=True)]
+    kinds = {(one.device, one.dtype, one.shape) for one in like}
+    if len(like) > 1 and len(kinds) == 1 and like[0].is_cuda and like[0].ndim == 0:
+        # Results of an operator share no memory.
+        return [one.clone() for one in torch.stack(totals).to(like[0])]
+    return [total.to(one) for total, one in zip(totals, like, strict=True)]
 
 
 def _as_tensor(part: Any) -> Any:

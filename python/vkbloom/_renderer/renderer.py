@@ -10,7 +10,7 @@ import os
 import re
 import weakref
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Sized
-from typing import TYPE_CHECKING, Any, Final, Literal, NoReturn, cast
+from typing import TYPE_CHECKING, Any, Final, Literal, NamedTuple, NoReturn, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -84,6 +84,19 @@ def _end_instances() -> None:
 
 #: What adjoint passes compute: derivatives by images, or sums of derivatives by fields.
 DerivativeKind = Literal["images", "sums", "all", "weights"]
+
+
+class Taken(NamedTuple):
+    """What the forward pass of an operator of PyTorch leaves to the backward pass.
+
+    - `key`: What identifies the tensors of the call.
+    - `images`: The copy of its images.
+    - `settings`: Those of the call, with the values of tensors.
+    """
+
+    key: tuple[Any, ...]
+    images: ImportedArray
+    settings: Settings
 
 
 def _frame_seconds() -> float:
@@ -338,8 +351,7 @@ class Renderer:
         # The last plans, the latest first, each with its settings and what was wanted of it. Other
         # threads read the list, so it never changes.
         self._planned: tuple[tuple[Settings, Any, _core.Plan], ...] = ()
-        # The copy of the tensor that PyTorch gave last, by what identifies the tensor.
-        self._taken: tuple[tuple[Any, ...], ImportedArray] | None = None
+        self._taken: Taken | None = None
         self._pending = requests.PendingSubmissions()
         self._batches = Batches(self._core, self._pending)
         # What map has checked last.
