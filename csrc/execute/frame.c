@@ -205,8 +205,9 @@ static bool record_request(struct vkb_run *run, struct vkb_request *request,
     return true;
 }
 
-static bool record_and_submit(struct vkb_run *run, struct vkb_request *requests,
-                              uint32_t request_count, struct vkb_error *error)
+static bool record_and_submit(struct vkb_run *run, const struct vkb_frame_source *source,
+                              struct vkb_request *requests, uint32_t request_count,
+                              struct vkb_error *error)
 {
     struct vkb_device *device = run->device;
     struct vkb_submission *submission = run->submission;
@@ -229,6 +230,7 @@ static bool record_and_submit(struct vkb_run *run, struct vkb_request *requests,
     // After all copies and stores to buffers.
     vkb_barrier_record(device, commands, NULL, true, VKB_ACCESS_RESOURCE, VKB_ACCESS_HOST_READ);
     return vkb_buffer_flush(device, &submission->uniforms, error)
+        && vkb_exported_fill(run, source, error)
         && vkb_submission_submit(device, submission, &run->sync, error);
 }
 
@@ -267,7 +269,7 @@ static bool submit(struct vkb_run *run, const struct vkb_frame_source *source,
         && vkb_sources_stage(run, source, requests, request_count, error)
         && reserve(run, requests, request_count, error)
         && vkb_probe_texels(run, requests, request_count, error)
-        && record_and_submit(run, requests, request_count, error);
+        && record_and_submit(run, source, requests, request_count, error);
 }
 
 // The images that the submission has written become those of the next call. So one that fails

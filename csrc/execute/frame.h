@@ -52,6 +52,11 @@ struct vkb_frame_source {
     // The inputs do not change until the device has run the submission, so that it may read them
     // where they are.
     bool in_place;
+    // Begins the copy that CUDA is to make to an exported input. Called when all earlier
+    // submissions have ended, just before this one is submitted: beside the device's passes, CUDA
+    // would take the GPU in slices of time.
+    bool (*fill)(void *context, struct vkb_export *exported, struct vkb_error *error);
+    void *context;
 };
 
 struct vkb_timing {

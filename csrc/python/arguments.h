@@ -77,6 +77,8 @@ bool vkb_read_grey(PyObject *array, const char *name, struct vkb_held_image *ima
 // Whether the object is memory that CUDA shares; that memory, and to what it belongs.
 bool vkb_is_exported(PyObject *object);
 struct vkb_export *vkb_export_of(PyObject *object, const struct vkb_exports **exports);
+// As vkb_frame_source has it; `context` is the renderer.
+bool vkb_fill_exported(void *context, struct vkb_export *exported, struct vkb_error *error);
 
 // The passes of a method that was given at run time, held until vkb_release_passes, which may be
 // called on a zeroed one. The tuple keeps their shaders and resources, to which the rows of a graph

@@ -219,32 +219,55 @@ PyObject *vkb_renderer_in_context(PyObject *object, PyObject *function)
     return vkb_raise(state, &error);
 }
 
+// Begins the copy that CUDA is to make to the memory, if there is one, or makes it.
+static bool fill(struct vkb_export *run, struct vkb_error *error)
+{
+    struct vkb_cuda *cuda = run->exports->cuda;
+    bool done;
+
+    if (run->origin_size == 0)
+        return true;
+    Py_BEGIN_ALLOW_THREADS
+    done = vkb_cuda_begin_copy(cuda, &run->memory, run->origin, run->origin_size, error);
+    Py_END_ALLOW_THREADS
+    VKB_LOCK(vkb_memory);
+    const bool ordered = done && vkb_export_order_copy(run);
+    VKB_UNLOCK(vkb_memory);
+    if (done && !ordered) {
+        Py_BEGIN_ALLOW_THREADS
+        done = vkb_cuda_end_copy(cuda, &run->memory, error);
+        Py_END_ALLOW_THREADS
+    }
+    run->origin_size = done ? 0 : run->origin_size;
+    return done;
+}
+
+bool vkb_fill_exported(void *context, struct vkb_export *exported, struct vkb_error *error)
+{
+    struct vkb_renderer *renderer = context;
+
+    PyEval_RestoreThread(renderer->thread);
+    const bool done = fill(exported, error);
+    renderer->thread = PyEval_SaveThread();
+    return done;
+}
+
 PyObject *vkb_renderer_snapshot(PyObject *object, PyObject *arguments)
 {
     unsigned long long address;
     Py_ssize_t size;
+    int later = false;
     struct vkb_error error = {0};
-    bool done;
 
-    if (!PyArg_ParseTuple(arguments, "Kn:snapshot", &address, &size)
+    if (!PyArg_ParseTuple(arguments, "Kn|p:snapshot", &address, &size, &later)
         || !vkb_check_bytes("snapshot", size))
         return NULL;
     struct exported_object *self = new_exported((struct vkb_renderer *)object, size);
     if (!self)
         return NULL;
-    struct vkb_cuda *cuda = self->exports->cuda;
-    Py_BEGIN_ALLOW_THREADS
-    done = vkb_cuda_begin_copy(cuda, &self->run->memory, address, (size_t)size, &error);
-    Py_END_ALLOW_THREADS
-    VKB_LOCK(vkb_memory);
-    const bool ordered = done && vkb_export_order_copy(self->run);
-    VKB_UNLOCK(vkb_memory);
-    if (done && !ordered) {
-        Py_BEGIN_ALLOW_THREADS
-        done = vkb_cuda_end_copy(cuda, &self->run->memory, &error);
-        Py_END_ALLOW_THREADS
-    }
-    if (done)
+    self->run->origin = address;
+    self->run->origin_size = (size_t)size;
+    if (later || fill(self->run, &error))
         return (PyObject *)self;
     Py_DECREF(self);
     return vkb_raise(PyType_GetModuleState(Py_TYPE(object)), &error);
@@ -253,6 +276,8 @@ PyObject *vkb_renderer_snapshot(PyObject *object, PyObject *arguments)
 // Orders a stream of CUDA, NULL: the renderer's, after what the device draws to the memory.
 static bool order_stream(const struct exported_object *self, void *stream, struct vkb_error *error)
 {
+    if (!fill(self->run, error))
+        return false;
     VKB_LOCK(vkb_memory);
     const bool done = vkb_export_drawn(self->run, stream, error);
     VKB_UNLOCK(vkb_memory);

@@ -340,7 +340,9 @@ static PyMethodDef methods[] = {
     {"export", vkb_renderer_export, METH_O,
      "export(size) -> Exported. Memory of the device for an array; reused when it is gone."},
     {"snapshot", vkb_renderer_snapshot, METH_VARARGS,
-     "snapshot(address, size) -> Exported. A copy of CUDA's memory, on the renderer's stream."},
+     "snapshot(address, size, later=False) -> Exported. A copy of CUDA's memory, on the renderer's "
+     "stream. `later`: it is begun by the submission that reads the copy first, or by who else "
+     "does; until then CUDA's memory does not change."},
     {"pipeline_cache", pipeline_cache, METH_NOARGS, "The driver's pipeline cache as bytes."},
     {0},
 };

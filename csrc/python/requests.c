@@ -284,6 +284,8 @@ PyObject *vkb_renderer_run(PyObject *object, PyObject *arguments)
     if (!self)
         return NULL;
     describe_source(given, in_place, &data);
+    data.fill = vkb_fill_exported;
+    data.context = renderer;
     if (histories != Py_None
         && !(self->histories = vkb_hold_histories(renderer, self->pending, histories, &data))) {
         Py_DECREF(self);

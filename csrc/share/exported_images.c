@@ -177,6 +177,22 @@ bool vkb_exported_record_input(struct vkb_run *run, struct vkb_staged_input *sta
     return true;
 }
 
+bool vkb_exported_fill(struct vkb_run *run, const struct vkb_frame_source *source,
+                       struct vkb_error *error)
+{
+    for (int kind = 0; kind < VKB_INPUT_COUNT; ++kind) {
+        const struct vkb_input *input = run->inputs[kind].input;
+        if (!input)
+            continue;
+        if (input->exported->origin_size > 0
+            && (!vkb_submissions_wait(run->device, &run->frame->submissions, error)
+                || !source->fill(source->context, input->exported, error)))
+            return false;
+        vkb_export_wait(input->exported, &run->sync.waits[VKB_EXTERNAL_CUDA]);
+    }
+    return true;
+}
+
 // The next exported output from `*output` of `*request` on; NULL: there is none. Both are advanced.
 static struct vkb_export *next_output(const struct vkb_request *requests, uint32_t request_count,
                                       uint32_t *request, uint32_t *output)

@@ -16,4 +16,9 @@ bool vkb_exported_check(const struct vkb_device *device, const struct vkb_input 
 bool vkb_exported_record_input(struct vkb_run *run, struct vkb_staged_input *staged,
                                struct vkb_error *error);
 
+// Begins the copies that CUDA is to make to the inputs, and lets the submission wait for them. Call
+// it last before the submission.
+bool vkb_exported_fill(struct vkb_run *run, const struct vkb_frame_source *source,
+                       struct vkb_error *error);
+
 #endif

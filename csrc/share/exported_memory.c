@@ -137,6 +137,7 @@ struct vkb_export *vkb_exports_take(struct vkb_exports *exports, uint64_t size,
         return NULL;
     one->marked = false;
     one->filled = one->drawn = 0;
+    one->origin_size = 0;
     vkb_export_renew(one);
     return one;
 }

@@ -17,6 +17,9 @@ struct vkb_export {
     bool marked;      // of an idle one: its event tells when its last use is over
     // The points at which CUDA has filled it and the device has drawn to it. 0: it was waited for.
     uint64_t filled, drawn;
+    // What CUDA is to copy to it before it is used; of 0 bytes: nothing.
+    vkb_cuda_address origin;
+    size_t origin_size;
 };
 
 // A timeline of Vulkan that CUDA shares. `value` is the last point that was given away.

@@ -228,7 +228,6 @@ static bool stage_exported(struct vkb_run *run, const struct pixels *pixels, boo
     if (!vkb_exported_check(run->device, input, error)
         || !vkb_run_resolve(run, pixels->image, error))
         return false;
-    vkb_export_wait(input->exported, &run->sync.waits[VKB_EXTERNAL_CUDA]);
     staged->image = run->images[pixels->image];
     staged->input = input;
     staged->send =

@@ -178,7 +178,7 @@ class Bloom(torch.nn.Module):  # type: ignore[misc]
         with torch.no_grad():
             for name, parameter, values in zip(self._names, parameters, read, strict=True):
                 ends = self._ranges[name]
-                # The following tensors would take a tenth of a step.
+                # Without the tensors that follow.
                 if not compiling and _is_within(values, ends):
                     continue
                 held = _clamp(values, ends)

@@ -46,8 +46,9 @@ def test_a_thousand_sizes_take_no_more_memory_than_a_few(
     early, late = (np.max(half, axis=0) for half in (cached[:HALF], cached[HALF:]))
     pipelines, image_bytes, _ = late
     assert pipelines <= early[0]
-    # 3 images of the size and the levels, all of them smaller, and as much spare memory.
-    assert image_bytes <= 2 * 6 * 70 * 70 * 16
+    # 3 images of the size and the levels, all of them smaller, and as much spare memory. GPUs round
+    # up the memory of small levels: 4 KiB on an H200.
+    assert image_bytes <= 2 * (6 * 70 * 70 * 16 + 2 * 16 * 4096)
     assert created[-1] == created[HALF - 1]
 
 

@@ -28,8 +28,8 @@ from tests.images import picture
 from tests.taa.moving import moving_frame
 from vkbloom import Convolution, Pyramid, Renderer, Separable
 from vkbloom._gradients.pulling import pull_each
-from vkbloom._renderer.device_arrays import merge
-from vkbloom._renderer.sources import check_inputs
+from vkbloom._renderer.device_arrays import merge, take_later
+from vkbloom._renderer.sources import Inputs, check_inputs
 
 VALIDATION = "validated" in sys.argv
 #: Whether calls return before the device has finished.
@@ -203,6 +203,44 @@ def streams(renderer: Any) -> None:
     renderer.apply(image)
     assert len(image.streams) == 1
     assert image.streams[0] not in (None, 0)
+
+
+def later(renderer: Any) -> None:
+    """What is taken for later is copied once: when a submission, or somebody else, reads it."""
+    images = [picture(24, 16, 3, seed=seed) for seed in range(3)]
+    expected = [renderer.apply(image, LOW, framebuffers="final") for image in images]
+    batch = np.zeros((1, 16, 24, 3), np.float32)
+
+    def take() -> Any:
+        return take_later(OnDevice(batch), "image", renderer._core)
+
+    def run(taken: Any) -> Any:
+        return renderer._apply_inputs(Inputs(taken.at(0)), LOW, ("final",))
+
+    # The array changes before each copy, which shows when that is made.
+    first = take()
+    pending = []
+    for image, right in zip(images, expected, strict=True):
+        taken = take()
+        batch[0] = image
+        frames = run(taken)
+        np.testing.assert_array_equal(taken.numpy()[0], image)
+        batch[0] = np.nan
+        same(run(taken), right)
+        pending.append((frames, right))
+    for frames, right in pending:
+        same(frames, right)
+    batch[0] = images[1]
+    np.testing.assert_array_equal(first.numpy()[0], images[1])
+    batch[0] = np.nan
+    same(run(first), expected[1])
+    del first, taken
+    # Memory that is used again has nothing left to copy.
+    renderer.apply(OnDevice(images[0]), LOW)
+    assert np.isnan(take().numpy()).all()
+    take()
+    batch[0] = images[2]
+    same(renderer.apply(OnDevice(images[0]), LOW, framebuffers="final"), expected[0])
 
 
 def sequences(renderer: Any) -> None:
@@ -592,7 +630,19 @@ def ranges(renderer: Any) -> None:
 
 
 WORK = (
-    *(layouts, streams, sequences, layers, places, capsules, ends, recycling, lifetime, errors),
+    *(
+        layouts,
+        streams,
+        later,
+        sequences,
+        layers,
+        places,
+        capsules,
+        ends,
+        recycling,
+        lifetime,
+        errors,
+    ),
     *(histories, geometries, copies, gradients, gradient_places),
 )
 

@@ -29,8 +29,8 @@ RUNS = (
     (
         "waits,cpu",
         WORK,
-        "validated layouts histories geometries copies sequences layers places ends recycling "
-        "gradients",
+        "validated layouts later histories geometries copies sequences layers places ends "
+        "recycling gradients",
     ),
     *([("waits", WORK, "validated"), ("cpu", WORK, "validated")] if EXHAUSTIVE else []),
     # What exceeds the range of buffers.

@@ -395,6 +395,52 @@ def test_backward_passes_read_the_image_of_their_own_call(renderer: Renderer) ->
             torch.testing.assert_close(part, other)
 
 
+@pytest.mark.skipif(DEVICE != "cuda", reason="there are no tensors of CUDA here")
+def test_backward_passes_have_the_values_of_their_own_call(renderer: Renderer) -> None:
+    """Two calls with the same image, where a backward pass follows the other call."""
+    image = tensor(31, 18, 3, seed=1).detach().requires_grad_()
+    modules = [
+        vkbloom_torch.Bloom(SETTINGS.replace(intensity=intensity), learn=learn, renderer=renderer)
+        for intensity in (0.25, 0.75)
+        for learn in (("intensity",), ("intensity", "threshold", "knee"))
+    ]
+    modules = [module.to(DEVICE) for module in modules]
+
+    def gradients(module: Any, final: Any) -> list[Any]:
+        image.grad = None
+        module.zero_grad()
+        final.square().sum().backward()
+        return [image.grad.clone(), *(one.grad.clone() for one in module.parameters())]
+
+    alone = [gradients(module, module(image)) for module in modules]
+    finals = [module(image) for module in modules]
+    for module, final, right in zip(modules, finals, alone, strict=True):
+        for part, other in zip(gradients(module, final), right, strict=True):
+            assert part.device == other.device
+            torch.testing.assert_close(part, other)
+    # Results share no memory, so that optimizers may write to them.
+    assert len({part.data_ptr() for part in alone[1]}) == len(alone[1])
+
+
+@pytest.mark.parametrize("out", [-3.0, 0.4, 7.0, float("nan")])
+def test_parameters_are_read_as_they_are(renderer: Renderer, out: float) -> None:
+    """Each call has the values at its time, those of `data` too, moved into their ranges."""
+    module = vkbloom_torch.Bloom(SETTINGS, learn=("intensity", "threshold"), renderer=renderer)
+    module, image = module.to(DEVICE), tensor(9, 8, 3, seed=1).detach()
+    for value in (0.25, out, 0.75):
+        module.learned["intensity"].data.fill_(value)
+        if np.isnan(value):
+            with pytest.raises(ValueError, match="nan"):
+                module(image)
+            continue
+        held = min(max(value, 0.0), module._ranges["intensity"][1])
+        settings = SETTINGS.replace(intensity=held)
+        torch.testing.assert_close(
+            module(image), vkbloom_torch.bloom(image, settings, renderer=renderer)
+        )
+        assert module.learned["intensity"].item() == pytest.approx(held)
+
+
 @pytest.mark.parametrize(
     "settings",
     [

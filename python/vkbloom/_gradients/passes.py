@@ -176,6 +176,7 @@ class Passes:
         submission = None
         if arrays:
             submission = requests.PendingSubmission(core.run(source, (plan,), (arrays,)))
+            self.renderer._pending.wait()
             if submission.exports_ordered:
                 self.renderer._pending.add(submission)
         return Running(self, plan, arrays, submission, results)

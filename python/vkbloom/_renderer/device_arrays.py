@@ -399,6 +399,31 @@ def take(
     channels: tuple[int, ...] = (3, 4),
 ) -> ImportedArray:
     """Copy an array of CUDA to memory that Vulkan shares, ordered after its producer's work."""
+    return _import(_find(image, name, core, sides, channels), core, later=False)
+
+
+def take_later(image: Any, name: str, core: _core.Renderer) -> ImportedArray:
+    """Do the same for a batch of images when a submission first reads it, or somebody else does.
+
+    The array must not change until then.
+    """
+    return _import(_find(image, name, core, (4,), (3, 4)), core, later=True)
+
+
+def _import(array: _Array, core: _core.Renderer, *, later: bool) -> ImportedArray:
+    low, high = _span(array.shape, array.strides, array.dtype)
+    memory = core.snapshot(array.address + low, high - low, later)
+    return ImportedArray(memory, -low, array.shape, array.strides, array.dtype)
+
+
+def _find(
+    image: Any,
+    name: str,
+    core: _core.Renderer,
+    sides: tuple[int, ...],
+    channels: tuple[int, ...],
+) -> _Array:
+    """Return an array of CUDA that has so many sides and, with three and more, channels."""
     _require_no_capture()
     try:
         core.cuda()
@@ -419,6 +444,4 @@ def take(
                 else ""
             )
         )
-    low, high = _span(shape, array.strides, array.dtype)
-    memory = core.snapshot(array.address + low, high - low)
-    return ImportedArray(memory, -low, shape, array.strides, array.dtype)
+    return array

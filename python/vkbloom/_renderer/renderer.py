@@ -933,7 +933,7 @@ class Renderer:
     def _apply_inputs(
         self, inputs: Inputs, settings: Settings, names: tuple[str, ...] | None
     ) -> Frames:
-        """As `apply`, of checked arguments, after the wait for pending submissions."""
+        """As `apply`, of checked arguments."""
         return self._run_one(inputs.source(), settings, names, None, None, state=None)
 
     def _run_one(
@@ -947,14 +947,14 @@ class Renderer:
         state: Mapping[str, NDArray[Any]] | None,
     ) -> Frames:
         destination = self._choose_destination(device)(source)
-        self._pending.wait()
         plan = self._plan_of(source, settings, names)
         before = _as_state(state)
         before.check(plan)
         arrays = _arrays_for(self._core, plan, out, destination)
         histories = before.histories(self._core, plan)
         submission = self._core.run(source, (plan,), (arrays,), True, None, histories)
-        # While the device works.
+        # While the device works: earlier submissions end before this one.
+        self._pending.wait()
         after = before.advance(self._core, plan, submission)
         frames = self._frames(settings, requests.name_outputs(plan, arrays, destination), after)
         if not out and submission.ordered:
