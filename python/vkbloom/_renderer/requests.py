@@ -91,9 +91,10 @@ class PendingSubmission:
 class PendingSubmissions:
     """The pending submissions, the oldest first.
 
-    A call waits for them before it gives the GPU more to do. If CUDA copied the next image while
-    Vulkan works, the GPU would change between both after slices of 2 ms: on an H100, calls in a row
-    took 2.7 ms each instead of 0.7. So the memory of a caller who never waits is bounded, too.
+    A call waits for them before CUDA copies its image, or when it has submitted its own. If CUDA
+    copied the next image while Vulkan works, the GPU would change between both after slices of
+    2 ms: on an H100, calls in a row took 2.7 ms each instead of 0.7. So the memory of a caller who
+    never waits is bounded, too.
     """
 
     def __init__(self) -> None:
