@@ -3,7 +3,8 @@
 RGB in single floats, another image in each round, on the GPU of the adapter or on the CPU at a
 smaller size; each call is waited for. A step is the bloom and the derivatives by the image from
 given cotangents. PyTorch's pyramid is the same `Pyramid` in convolutions, by autograd, and compiled
-by `torch.compile`. Tensors of vkbloom have their channels last, those of PyTorch first.
+by `torch.compile`. Tensors of vkbloom have their channels last, those of PyTorch first. On a GPU
+the passes of both directions are timed, too, by its timestamps.
 """
 
 from __future__ import annotations
@@ -17,11 +18,14 @@ from numpy.typing import NDArray
 
 import vkbloom
 from benchmarks.inputs import pictures
-from benchmarks.ours import OURS, ratios
+from benchmarks.ours import ratios
 from benchmarks.peers import pytorch
 from benchmarks.plan import Plan
-from benchmarks.results import Section, agreement, side_by_side
-from benchmarks.timing import Times, alternate_seconds, wall_clock
+from benchmarks.results import Goal, Section, agreement, side_by_side
+from benchmarks.timing import PASSES, WALL, Times, alternate_seconds, wall_clock
+from vkbloom._gradients.passes import Passes, in_floats
+from vkbloom._renderer.device_arrays import take
+from vkbloom._renderer.sources import Inputs
 from vkbloom.psf import gaussian
 
 __all__ = ["run"]
@@ -34,6 +38,10 @@ FORWARD: Final = "forward"
 STEP: Final = "a step"
 AUTOGRAD: Final = "PyTorch with autograd"
 COMPILED: Final = "PyTorch, compiled"
+BOTH: Final = "passes of both directions"
+#: What a step may take more than its passes: the host, and the changes of the GPU between CUDA and
+#: Vulkan.
+MAX_OVERHEAD: Final = 2e-3
 PYRAMID: Final = "Pyramid(levels=4)"
 METHODS: Final[dict[str, vkbloom.Settings]] = {
     PYRAMID: vkbloom.Pyramid(levels=LEVELS),
@@ -42,8 +50,6 @@ METHODS: Final[dict[str, vkbloom.Settings]] = {
     "DualKawase": vkbloom.DualKawase(levels=LEVELS, threshold=0.5),
     "Convolution, a Gaussian of 40": vkbloom.Convolution(gaussian(40)),
 }
-
-Inputs = tuple[list[Any], list[Any]]
 
 
 def run(plan: Plan, section: Section) -> None:
@@ -76,11 +82,13 @@ def run(plan: Plan, section: Section) -> None:
             def bloom(image: Any, settings: vkbloom.Settings = settings) -> Any:
                 return operator.bloom(image, settings, renderer=renderer)
 
-            forward = _waiting(bloom, last, device)
-            steps = {OURS: _step(torch, bloom, last, device)}
-            if name == PYRAMID:
-                steps |= _peers(torch, first, device)
-            _time_steps(plan, section, name, forward, steps)
+            step = _step(torch, bloom, last, device)
+            clocks = {FORWARD: wall_clock(_waiting(bloom, last, device)), STEP: wall_clock(step)}
+            peers = _peers(torch, first, device) if name == PYRAMID else {}
+            clocks |= _that_agree(section, name, step(0), peers)
+            if not on_cpu:
+                clocks[BOTH] = _passes(renderer, settings, last)
+            _time_steps(plan, section, name, clocks)
 
 
 def _waiting(call: Callable[[Any], Any], inputs: Any, device: str) -> Callable[[int], Any]:
@@ -97,6 +105,25 @@ def _step(torch: Any, call: Callable[[Any], Any], inputs: Any, device: str) -> C
     return pytorch.synchronized(step, device)
 
 
+def _passes(
+    renderer: vkbloom.Renderer, settings: vkbloom.Settings, inputs: Any
+) -> Callable[[int], float]:
+    """Return a call that returns the seconds of all passes of a step on the device."""
+    floats = in_floats(settings)
+
+    def seconds(turn: int) -> float:
+        image, cotangent = (kind[turn % 3] for kind in inputs)
+        forward = renderer.apply(image, floats, framebuffers="final").timings
+        given, back = (take(one, "image", renderer._core) for one in (image, cotangent))
+        running = Passes(renderer, Inputs(given), floats, {"final": back}, "cuda").submit()
+        assert running is not None
+        assert running.submission is not None
+        (backward,), _ = running.submission.wait()
+        return sum(forward.values()) + sum(backward.values())
+
+    return seconds
+
+
 def _peers(torch: Any, inputs: Any, device: str) -> dict[str, Callable[[int], Any]]:
     def bloom(image: Any) -> Any:
         return image + pytorch.pyramid(image, LEVELS)
@@ -107,20 +134,14 @@ def _peers(torch: Any, inputs: Any, device: str) -> dict[str, Callable[[int], An
     }
 
 
-def _time_steps(
-    plan: Plan,
-    section: Section,
-    name: str,
-    forward: Callable[[int], Any],
-    steps: dict[str, Callable[[int], Any]],
-) -> None:
-    """Compare the derivatives of all, then time those that agree in turn."""
-    expected = _array(steps[OURS](0))
+def _that_agree(
+    section: Section, name: str, derivatives: Any, peers: dict[str, Callable[[int], Any]]
+) -> dict[str, Callable[[int], float]]:
+    """Return the clocks of the peers' steps with these derivatives."""
+    expected = _array(derivatives)
     most = 1e-5 * float(np.abs(expected).max())
-    calls = {FORWARD: forward, STEP: steps[OURS]}
-    for peer, step in steps.items():
-        if peer == OURS:
-            continue
+    clocks = {}
+    for peer, step in peers.items():
         try:
             made = np.moveaxis(_array(step(0))[0], 0, -1)
         except Exception as error:
@@ -131,14 +152,21 @@ def _time_steps(
         reason = "a hundred-thousandth of the largest derivative"
         section.agreements.append(agreement(f"{name}: {peer}", expected, made, most, reason))
         if section.agreements[-1].agrees:
-            calls[peer] = step
-    rounds = plan.times(ROUNDS)
-    times: dict[str, Times] = alternate_seconds(
-        {one: wall_clock(call) for one, call in calls.items()}, rounds, warm_up=3
-    )
-    section.add_times(name, times, ours=STEP)
+            clocks[peer] = wall_clock(step)
+    return clocks
+
+
+def _time_steps(
+    plan: Plan, section: Section, name: str, clocks: dict[str, Callable[[int], float]]
+) -> None:
+    times = alternate_seconds(clocks, plan.times(ROUNDS), warm_up=3)
+    section.add_times(name, times, {one: PASSES if one == BOTH else WALL for one in times}, STEP)
     section.tables.append(side_by_side(name, times, STEP))
     ratios(section, name, times, (STEP, AUTOGRAD, 0.6, True), (STEP, COMPILED, 0.75, True))
+    if BOTH in times:
+        most = Times(tuple(one + MAX_OVERHEAD for one in times[BOTH].seconds))
+        what = f"{name}: {STEP} / {BOTH} and {1e3 * MAX_OVERHEAD:g} ms"
+        section.goals.append(Goal(what, times[STEP].over(most), 1.0, at_most=True))
 
 
 def _array(tensor: Any) -> NDArray[np.float32]:
