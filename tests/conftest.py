@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import ctypes
 import dataclasses
+import functools
 import gc
 import os
 import shutil
 import signal
 import subprocess
 import sys
+import tempfile
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import hypothesis
 import pytest
@@ -49,6 +53,47 @@ def pytest_configure(config: pytest.Config) -> None:
     hypothesis.settings.load_profile("untimed")
     config.pluginmanager.register(TimeBudget(), "time-budget")
     config.addinivalue_line("markers", "slow: takes more than ten seconds, or needs a plain heap")
+    # What a collection of the tests makes is kept: a search for garbage finds none.
+    gc.disable()
+
+
+#: Seconds after which the other processes collect, whatever the first one does.
+LONGEST_COLLECTION = 120
+
+
+@functools.cache
+def is_compiled() -> bool:
+    """Whether a run before this one has compiled the tests."""
+    return any(Path(__file__).parent.glob("*/__pycache__/test_*-pytest-*.pyc"))
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_configure_node(node: Any) -> None:
+    """Where tests are not compiled yet, the first process of xdist does that for all others.
+
+    Each would compile all tests and the packages that they import, for eight seconds.
+    """
+    node.workerinput["waits"] = not (is_compiled() or sys.dont_write_bytecode)
+
+
+def collected(config: Any) -> Path | None:
+    """Return the file that the first process makes when it has collected the tests."""
+    given = getattr(config, "workerinput", {})
+    name = f"vkbloom-collected-{given['testrunuid']}" if given.get("waits") else None
+    return Path(tempfile.gettempdir(), name) if name else None
+
+
+def is_first(config: Any) -> bool:
+    return str(config.workerinput["workerid"]) == "gw0"
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection(session: pytest.Session) -> None:
+    """Wait for the first process."""
+    if (file := collected(session.config)) and not is_first(session.config):
+        end = time.monotonic() + LONGEST_COLLECTION
+        while not file.exists() and time.monotonic() < end:
+            time.sleep(0.1)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
@@ -58,16 +103,21 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             item.add_marker(pytest.mark.skip(reason=reason))
 
 
-def pytest_collection_finish() -> None:
+def pytest_collection_finish(session: pytest.Session) -> None:
     """Hide what there is by now from garbage collections: each took a quarter of a second."""
     gc.collect()
     gc.freeze()
+    gc.enable()
+    if (file := collected(session.config)) and is_first(session.config):
+        file.touch()
 
 
 def pytest_unconfigure(config: pytest.Config) -> None:
     """Look for leaks in a worker of xdist, which may end without the look at its exit."""
     # Libraries complain about objects that are never collected.
     gc.unfreeze()
+    if (file := collected(config)) and is_first(config):
+        file.unlink(missing_ok=True)
     if SANITIZED and hasattr(config, "workerinput"):
         gc.collect()
         # (Of the library that is preloaded.)
