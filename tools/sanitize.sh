@@ -6,8 +6,8 @@ set -eu
 
 cd "$(dirname "$0")/.."
 # A method, format or variant reaches no other code with a larger image, or where its values are
-# compared with the reference: tests of these, of Python alone and of other processes are left out.
-# Each preset is in test_matrix.py.
+# compared with the reference: tests of these, of Python alone and of other processes are left out,
+# and tests/tolerance.py compares no values. Each preset is in test_matrix.py.
 if [ $# = 0 ]; then
     # In this order, the longest first: at the end both processes have work.
     set -- tests/methods/test_matrix.py tests/core/test_threads.py tests/methods/test_variants.py
@@ -25,6 +25,10 @@ if [ $# = 0 ]; then
     for name in apply_input.py::test_longest_sides rg11b10.py::test_every_method \
         variants.py::test_large variants.py::test_the_forward_frame; do
         set -- "$@" --deselect "tests/methods/test_$name"
+    done
+    # First calls that only run Python.
+    for name in presets glares to_xarray names; do
+        set -- "$@" --deselect "tests/core/test_threads.py::test_first_calls_in_threads[$name]"
     done
     set -- "$@" -k "not count_of_a_point and not dry_run and not is_what_runs" -n 2 --dist loadfile \
         --no-loadscope-reorder

@@ -18,7 +18,7 @@ from collections import Counter, deque
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -275,33 +275,53 @@ def same(got: Any, right: Any) -> bool:
     )
 
 
+class Made(NamedTuple):
+    """A call of one thread."""
+
+    #: In `renderers` of `play`: 0 is the one that half of the threads share.
+    renderer: int
+    name: str
+    which: int
+    size: int
+
+    @property
+    def key(self) -> tuple[str, int, int]:
+        return self[1:]
+
+
+def plan_calls(thread: int, count: int) -> list[Made]:
+    """Return a thread's calls."""
+    dice = random.Random(thread)
+    names = [call.__name__ for call in CALLS]
+    found = []
+    for number in range(count):
+        (name,) = dice.choices(names, list(CALLS.values()))
+        if number == 0:
+            name = names[thread % len(names)]  # so that each is made
+        which, (size,) = dice.randrange(len(SETTINGS)), dice.choices(range(3), (8, 8, 1))
+        found.append(Made(0 if thread % 2 else dice.randrange(1, 1 + MANY), name, which, size))
+    return found
+
+
 def play(calls: int) -> Counter[str]:
     """Make so many calls; return how often each was made."""
     names = {call.__name__: call for call in CALLS}
-    kinds = range(len(SETTINGS))
-    keys = [(name, which, size) for name in names for which in kinds for size in range(3)]
+    planned = [plan_calls(thread, -(-calls // THREADS)) for thread in range(THREADS)]
+    keys = dict.fromkeys(one.key for row in planned for one in row)
     with Renderer() as single, tempfile.TemporaryDirectory() as folder:
         stand_in.load(Path(folder), single.info)
         right = {key: names[key[0]](single, *key[1:]) for key in keys}
     validation = "VKBLOOM_VALIDATED" in os.environ
     renderers = [Renderer(validation=validation) for _ in range(1 + MANY)]
     start = threading.Barrier(THREADS)
-    share = -(-calls // THREADS)
 
     def work(thread: int) -> Counter[str]:
-        dice = random.Random(thread)
-        made: Counter[str] = Counter()
         start.wait()
-        for done in range(share):
-            (name,) = dice.choices(list(names), list(CALLS.values()))
-            if done == 0:
-                name = list(names)[thread % len(names)]  # so that each is made
-            key = (name, dice.choice(kinds), dice.choices(range(3), (8, 8, 1))[0])
-            renderer = renderers[0 if thread % 2 else dice.randrange(1, 1 + MANY)]
+        for one in planned[thread]:
+            renderer = renderers[one.renderer]
             apply(renderer, 0, 0)  # what `ask` asks for is there then
-            assert same(names[name](renderer, *key[1:]), right[key]), key
-            made[name] += 1
-        return made
+            assert same(names[one.name](renderer, *one.key[1:]), right[one.key]), one.key
+        return Counter(one.name for one in planned[thread])
 
     with ThreadPoolExecutor(THREADS) as pool:
         made = sum(pool.map(work, range(THREADS)), Counter[str]())
