@@ -72,7 +72,9 @@ SIMPLER = f"""
     --eliminate-dead-branches --merge-blocks --simplify-instructions --compact-ids
 """.split()
 # Larger modules keep their loops: those of many filters, of which their constants leave little.
+# Those of shaders that the table says this of are not unrolled to find it out again.
 MAX_UNROLLED = 260_000
+KEEPS_LOOPS = "loops"
 
 
 # What a word of a module defines (shaders/modules.txt).
@@ -101,9 +103,10 @@ class Module(NamedTuple):
     name: str
     shader: Path
     options: tuple[str, ...] = ()
+    keeps_loops: bool = False
 
 
-def module_of(shader: Path, text: str) -> Module:
+def module_of(shader: Path, text: str, keeps_loops: bool) -> Module:
     """Return a module of a shader, with the options of its words."""
     words = text.split("_")
     if unknown := [word for word in words if word not in WORDS and word not in FORMATS]:
@@ -112,7 +115,7 @@ def module_of(shader: Path, text: str) -> Module:
         )
     glsl, size = next((FORMATS[word] for word in words if word in FORMATS), ("", 0))
     options = " ".join(WORDS.get(word, "") for word in words).format(glsl=glsl, bytes=size)
-    return Module(f"{shader.stem}_{text}", shader, tuple(options.split()))
+    return Module(f"{shader.stem}_{text}", shader, tuple(options.split()), keeps_loops)
 
 
 def all_modules() -> list[Module]:
@@ -124,9 +127,10 @@ def all_modules() -> list[Module]:
         lack = "has no row" if odd[0] in there else "is no file, and has a row"
         raise SystemExit(f"{TABLE}: {odd[0]} {lack}")
     return [
-        module_of(path, text.replace("FORMAT", form))
+        module_of(path, text.replace("FORMAT", form), KEEPS_LOOPS in named[path])
         for path in sorted(named, key=lambda path: path.name)
         for text in named[path]
+        if text != KEEPS_LOOPS
         for form in (FORMATS if "FORMAT" in text else ("",))
     ]
 
@@ -198,11 +202,12 @@ def build_module(module: Module, target: Path, recipe: str) -> None:
     if not (target.exists() and note.exists() and note.read_text() == digest):
         decorate(part)
         optimize(module, part, ONE_FUNCTION)
-        rolled = part.read_bytes()
-        optimize(module, part, ["--loop-unroll"])
-        if part.stat().st_size > MAX_UNROLLED:
-            part.write_bytes(rolled)
-        decorate(part)
+        if not module.keeps_loops and part.stat().st_size <= MAX_UNROLLED:
+            rolled = part.read_bytes()
+            optimize(module, part, ["--loop-unroll"])
+            if part.stat().st_size > MAX_UNROLLED:
+                part.write_bytes(rolled)
+            decorate(part)
         optimize(module, part, SIMPLER)
         part.replace(target)
         note.write_text(digest)

@@ -116,15 +116,18 @@ def table(build: ModuleType) -> Path:
 
 
 def test_modules_are_those_of_the_table(build: ModuleType, table: Path) -> None:
-    table.write_text("# a comment\n\na.frag frag dispatch_layers\nb.comp final_packed_FORMAT\n")
+    table.write_text(
+        "# a comment\n\na.frag frag dispatch_layers\nb.comp loops final_packed_FORMAT\n"
+    )
     linear = ("-DFINAL", "-DLINEAR_TEXELS")
-    assert {name: options for name, _, options in build.all_modules()} == {
+    assert {one.name: one.options for one in build.all_modules()} == {
         "a_frag": (),
         "a_dispatch_layers": ("-DDISPATCH", "-DLAYERS"),
         "b_final_packed_rgba8unorm": (*linear, "-DCHANNEL_BYTES=1", "-DTARGET_CHANNELS=3"),
         "b_final_packed_rgba16float": (*linear, "-DCHANNEL_BYTES=2", "-DTARGET_CHANNELS=3"),
         "b_final_packed_rgba32float": (*linear, "-DCHANNEL_BYTES=4", "-DTARGET_CHANNELS=3"),
     }
+    assert {one.shader.name for one in build.all_modules() if one.keeps_loops} == {"b.comp"}
 
 
 @pytest.mark.parametrize(
