@@ -5,9 +5,10 @@ from __future__ import annotations
 import itertools
 import os
 from collections.abc import Iterable
-from typing import Any, Final, TypeVar
+from typing import TYPE_CHECKING, Any, Final, TypeVar
 
-import pytest
+if TYPE_CHECKING:
+    import pytest
 
 #: Whether this run takes everything.
 EXHAUSTIVE: Final = os.environ.get("VKBLOOM_EXHAUSTIVE", "0") not in ("", "0")
@@ -17,6 +18,9 @@ T = TypeVar("T")
 
 def witness(reason: str) -> pytest.MarkDecorator:
     """Mark a test that only an exhaustive run takes; the reason names what states its main fact."""
+    # Programs of tests import this module, without pytest, which takes as long as NumPy.
+    import pytest
+
     return pytest.mark.skipif(not EXHAUSTIVE, reason=f"left to make exhaustive: {reason}")
 
 

@@ -12,7 +12,6 @@ import os
 import sys
 from collections.abc import Callable
 from typing import Any
-from unittest import mock
 
 import numpy as np
 
@@ -110,6 +109,9 @@ def count_frames(renderer: Renderer) -> None:
 
 def apply_wide(renderer: Renderer, settings: vkbloom.Settings) -> None:
     """Apply a bloom whose first level is as wide as the device's limit."""
+    # Here, since it imports asyncio, which most runs of this program do not need.
+    from unittest import mock
+
     image = picture(330, 1, 3, "float32")
     frames = renderer.apply(image, settings)
     width = frames["down_0"].shape[1]
