@@ -108,6 +108,7 @@ bool vkb_image_create_row(const struct vkb_device *device, const struct vkb_imag
             .array = row->layers > 0,
             .usage = row->usage,
             .mapped = device->linear_texels && row->format != VKB_FORMAT_DEPTH32_FLOAT,
+            .hosted = !vkb_is_given(row),
             .spares = spares,
         },
         image, error);

@@ -6,7 +6,6 @@
 // floats.
 #define KEPT_BYTES ((size_t)256 << 20)
 
-#define LARGE_PAGE ((size_t)2 << 20)
 #define SMALL_PAGE ((size_t)4096)
 
 struct vkb_pages {
@@ -27,22 +26,15 @@ struct vkb_pages *vkb_pages_create(const struct vkb_device *device, struct vkb_e
 static struct vkb_page_run *create_run(const struct vkb_device *device, size_t size,
                                        struct vkb_error *error)
 {
-    const size_t page = device && device->import_alignment > SMALL_PAGE
-                          ? (size_t)device->import_alignment
-                          : SMALL_PAGE;
-    const size_t align = size >= VKB_LARGE_BYTES && LARGE_PAGE > page ? LARGE_PAGE : page;
     struct vkb_page_run *run = vkb_alloc(error, 1, sizeof *run);
 
     if (!run)
         return NULL;
-    if (size > SIZE_MAX - align - page
-        || !(run->start = vkb_alloc(error, 1, size + align + page))) {
+    if (!(run->memory = vkb_alloc_pages(device, size, &run->start, error))) {
         vkb_free(run);
         return NULL;
     }
-    run->memory = (void *)(((uintptr_t)run->start + align - 1) / align * align);
-    run->size = (size + page - 1) / page * page;
-    vkb_advise_large(run->memory, run->size);
+    run->size = vkb_size_of_pages(device, size);
     return run;
 }
 

@@ -26,6 +26,7 @@ extern const char vkb_install_hint[];
     NAME(vkGetPhysicalDeviceFeatures2) \
     NAME(vkGetPhysicalDeviceFormatProperties) \
     NAME(vkGetPhysicalDeviceImageFormatProperties) \
+    NAME(vkGetPhysicalDeviceImageFormatProperties2) \
     NAME(vkGetPhysicalDeviceMemoryProperties) \
     NAME(vkGetPhysicalDeviceProperties) \
     NAME(vkGetPhysicalDeviceProperties2) \

@@ -8,16 +8,51 @@
 #include <sys/mman.h>
 #endif
 
-void vkb_advise_large(void *memory, size_t size)
+enum { LARGE_PAGE = 2 << 20, SMALL_PAGE = 4096 };
+
+static size_t round_up(size_t size, size_t step)
+{
+    return (size + step - 1) / step * step;
+}
+
+// Advises the system to use large pages for memory that has not been written yet.
+static void advise_large(void *memory, size_t size)
 {
 #ifdef MADV_HUGEPAGE
     // The range must start at a page. Where the system has no large ones, nothing is lost.
-    const size_t page = 4096, skipped = (size_t)(-(uintptr_t)memory % page);
+    const size_t skipped = (size_t)(-(uintptr_t)memory % SMALL_PAGE);
     if (size >= VKB_LARGE_BYTES)
         (void)madvise((char *)memory + skipped, size - skipped, MADV_HUGEPAGE);
 #else
     (void)memory, (void)size;
 #endif
+}
+
+// The smallest pages that the device can import.
+static size_t page_of(const struct vkb_device *device)
+{
+    return device && device->import_alignment > SMALL_PAGE ? (size_t)device->import_alignment
+                                                           : SMALL_PAGE;
+}
+
+size_t vkb_size_of_pages(const struct vkb_device *device, size_t size)
+{
+    return round_up(size, page_of(device));
+}
+
+void *vkb_alloc_pages(const struct vkb_device *device, size_t size, void **start,
+                      struct vkb_error *error)
+{
+    const size_t page = page_of(device);
+    const size_t align = size >= VKB_LARGE_BYTES && LARGE_PAGE > page ? LARGE_PAGE : page;
+
+    if (size > SIZE_MAX - align - page)
+        size = SIZE_MAX - align - page;
+    if (!(*start = vkb_alloc(error, 1, size + align + page)))
+        return NULL;
+    void *memory = (void *)round_up((uintptr_t)*start, align);
+    advise_large(memory, vkb_size_of_pages(device, size));
+    return memory;
 }
 
 // The required flags of a memory type, and the preferred ones.
@@ -72,9 +107,62 @@ static bool allocate(const struct vkb_device *device, const VkMemoryAllocateInfo
     return false;
 }
 
-// Memory of a kind that fits the requirements. `next`: what extends VkMemoryAllocateInfo.
+#define HOST_ALLOCATION VK_EXTERNAL_MEMORY_HANDLE_TYPE_HOST_ALLOCATION_BIT_EXT
+
+// The memory types that the host memory can be imported as; 0: none.
+static uint32_t import_types(const struct vkb_device *device, void *memory)
+{
+    VkMemoryHostPointerPropertiesEXT properties = {
+        .sType = VK_STRUCTURE_TYPE_MEMORY_HOST_POINTER_PROPERTIES_EXT,
+    };
+
+    return VK_RESULT(device->vk.vkGetMemoryHostPointerPropertiesEXT(device->handle, HOST_ALLOCATION,
+                                                                    memory, &properties))
+                == VK_SUCCESS
+             ? properties.memoryTypeBits
+             : 0;
+}
+
+static bool import_pages(const struct vkb_device *device, void *memory, VkDeviceSize size,
+                         uint32_t type, VkDeviceMemory *imported, struct vkb_error *error)
+{
+    return allocate(device,
+                    &(VkMemoryAllocateInfo){
+                        .sType = VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO,
+                        .pNext =
+                            &(VkImportMemoryHostPointerInfoEXT){
+                                .sType = VK_STRUCTURE_TYPE_IMPORT_MEMORY_HOST_POINTER_INFO_EXT,
+                                .handleType = HOST_ALLOCATION,
+                                .pHostPointer = memory,
+                            },
+                        .allocationSize = size,
+                        .memoryTypeIndex = type,
+                    },
+                    imported, error);
+}
+
+// New memory of the host's, in large pages. False without an error if there is none or the device
+// cannot import it.
+static bool allocate_hosted(const struct vkb_device *device, struct vkb_spare *made)
+{
+    const size_t size = vkb_size_of_pages(device, (size_t)made->size);
+    struct vkb_error ignored;
+    void *memory = vkb_alloc_pages(device, size, &made->host, &ignored);
+
+    if (memory && import_types(device, memory) >> made->type & 1
+        && import_pages(device, memory, size, made->type, &made->memory, &ignored)) {
+        made->size = size;
+        return true;
+    }
+    vkb_free(made->host);
+    made->host = NULL;
+    return false;
+}
+
+// Memory of a kind that fits the requirements. `next`: what extends VkMemoryAllocateInfo. `hosted`:
+// the host's, if possible.
 static bool allocate_kind(const struct vkb_device *device, enum vkb_memory_kind kind,
-                          const VkMemoryRequirements *requirements, const void *next,
+                          const VkMemoryRequirements *requirements, const void *next, bool hosted,
                           struct vkb_spares *spares, struct vkb_spare *made,
                           struct vkb_error *error)
 {
@@ -88,9 +176,11 @@ static bool allocate_kind(const struct vkb_device *device, enum vkb_memory_kind 
 
     if (type == UINT32_MAX)
         return vkb_fail(error, VKB_ERROR_GENERAL, "the adapter has no memory type that fits");
-    if (vkb_spares_take(spares, type, requirements->size, made))
+    if (vkb_spares_take(spares, type, hosted, requirements->size, made))
         return true;
     *made = (struct vkb_spare){.size = requirements->size, .type = type};
+    if (hosted && allocate_hosted(device, made))
+        return true;
     bool done = allocate(device, &info, &made->memory, error);
     if (!done && spares && spares->count) {
         vkb_spares_free(device, spares);
@@ -155,8 +245,8 @@ static bool create(const struct vkb_device *device, enum vkb_memory_kind kind,
         .pNext = &dedicated,
         .handleTypes = type,
     };
-    const bool allocated =
-        allocate_kind(device, kind, &requirements, type ? &exported : NULL, NULL, &made, error);
+    const bool allocated = allocate_kind(device, kind, &requirements, type ? &exported : NULL,
+                                         false, NULL, &made, error);
     buffer->memory = made.memory;
     if (!allocated
         || !VK(error, vk->vkBindBufferMemory(device->handle, buffer->handle, buffer->memory, 0))
@@ -167,7 +257,7 @@ static bool create(const struct vkb_device *device, enum vkb_memory_kind kind,
         return false;
     }
     if (device->linear_texels && buffer->mapped)
-        vkb_advise_large(buffer->mapped, (size_t)size);
+        advise_large(buffer->mapped, (size_t)size);
     vkb_label_object(device, VK_OBJECT_TYPE_BUFFER, (uint64_t)buffer->handle, buffer_name(usage));
     // Only a complete buffer has a size; vkb_buffer_reserve relies on that.
     buffer->size = type ? requirements.size : size;
@@ -205,7 +295,7 @@ bool vkb_buffer_export(const struct vkb_device *device, VkDeviceSize size,
 void vkb_buffer_destroy(const struct vkb_device *device, struct vkb_buffer *buffer)
 {
     device->vk.vkDestroyBuffer(device->handle, buffer->handle, NULL);
-    vkb_memory_free(device, buffer->memory);
+    vkb_memory_free(device, buffer->memory, NULL);
     *buffer = (struct vkb_buffer){0};
 }
 
@@ -222,17 +312,10 @@ bool vkb_buffer_reserve(const struct vkb_device *device, enum vkb_memory_kind ki
 // The first coherent memory type for the host memory; UINT32_MAX if there is none.
 static uint32_t find_import_type(const struct vkb_device *device, void *memory, uint32_t allowed)
 {
-    VkMemoryHostPointerPropertiesEXT properties = {
-        .sType = VK_STRUCTURE_TYPE_MEMORY_HOST_POINTER_PROPERTIES_EXT,
-    };
+    const uint32_t types = allowed & import_types(device, memory);
 
-    if (VK_RESULT(device->vk.vkGetMemoryHostPointerPropertiesEXT(
-            device->handle, VK_EXTERNAL_MEMORY_HANDLE_TYPE_HOST_ALLOCATION_BIT_EXT, memory,
-            &properties))
-        != VK_SUCCESS)
-        return UINT32_MAX;
     for (uint32_t i = 0; i < device->memory.memoryTypeCount; ++i)
-        if ((allowed & properties.memoryTypeBits) >> i & 1
+        if (types >> i & 1
             && device->memory.memoryTypes[i].propertyFlags & VK_MEMORY_PROPERTY_HOST_COHERENT_BIT)
             return i;
     return UINT32_MAX;
@@ -246,22 +329,8 @@ static bool import_memory(const struct vkb_device *device, void *memory, struct 
 
     vk->vkGetBufferMemoryRequirements(device->handle, buffer->handle, &requirements);
     const uint32_t type = find_import_type(device, memory, requirements.memoryTypeBits);
-    if (type == UINT32_MAX || requirements.size > buffer->size)
-        return false;
-    return allocate(
-               device,
-               &(VkMemoryAllocateInfo){
-                   .sType = VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO,
-                   .pNext =
-                       &(VkImportMemoryHostPointerInfoEXT){
-                           .sType = VK_STRUCTURE_TYPE_IMPORT_MEMORY_HOST_POINTER_INFO_EXT,
-                           .handleType = VK_EXTERNAL_MEMORY_HANDLE_TYPE_HOST_ALLOCATION_BIT_EXT,
-                           .pHostPointer = memory,
-                       },
-                   .allocationSize = buffer->size,
-                   .memoryTypeIndex = type,
-               },
-               &buffer->memory, error)
+    return type != UINT32_MAX && requirements.size <= buffer->size
+        && import_pages(device, memory, buffer->size, type, &buffer->memory, error)
         && VK(error, vk->vkBindBufferMemory(device->handle, buffer->handle, buffer->memory, 0));
 }
 
@@ -276,9 +345,7 @@ bool vkb_buffer_import(const struct vkb_device *device, VkBufferUsageFlags usage
         return false;
     *offset = (uintptr_t)memory % align;
     buffer->size = (*offset + size + align - 1) / align * align;
-    if (!create_buffer(device, usage, buffer->size,
-                       VK_EXTERNAL_MEMORY_HANDLE_TYPE_HOST_ALLOCATION_BIT_EXT, &buffer->handle,
-                       &ignored)
+    if (!create_buffer(device, usage, buffer->size, HOST_ALLOCATION, &buffer->handle, &ignored)
         || !import_memory(device, (char *)memory - *offset, buffer, &ignored)) {
         vkb_buffer_destroy(device, buffer);
         return false;
@@ -315,9 +382,10 @@ bool vkb_buffer_invalidate(const struct vkb_device *device, const struct vkb_buf
 }
 
 // Preinitialized: the content that the host writes before the device's first access is kept.
-static VkImageLayout initial_layout(bool mapped)
+// Images in memory that is imported cannot be that.
+static VkImageLayout initial_layout(bool mapped, bool hosted)
 {
-    return mapped ? VK_IMAGE_LAYOUT_PREINITIALIZED : VK_IMAGE_LAYOUT_UNDEFINED;
+    return mapped && !hosted ? VK_IMAGE_LAYOUT_PREINITIALIZED : VK_IMAGE_LAYOUT_UNDEFINED;
 }
 
 static VkFormat format_of(const struct vkb_image_spec *spec)
@@ -334,12 +402,18 @@ static VkImageType image_type(const struct vkb_image_spec *spec)
 static bool create_handle(const struct vkb_device *device, const struct vkb_image_spec *spec,
                           struct vkb_image *image, struct vkb_error *error)
 {
+    const VkExternalMemoryImageCreateInfo external = {
+        .sType = VK_STRUCTURE_TYPE_EXTERNAL_MEMORY_IMAGE_CREATE_INFO,
+        .handleTypes = HOST_ALLOCATION,
+    };
+
     return VK(
         error,
         device->vk.vkCreateImage(
             device->handle,
             &(VkImageCreateInfo){
                 .sType = VK_STRUCTURE_TYPE_IMAGE_CREATE_INFO,
+                .pNext = image->hosted ? &external : NULL,
                 .flags =
                     image->layers == 6 && !spec->array ? VK_IMAGE_CREATE_CUBE_COMPATIBLE_BIT : 0,
                 .imageType = image_type(spec),
@@ -350,9 +424,43 @@ static bool create_handle(const struct vkb_device *device, const struct vkb_imag
                 .samples = VK_SAMPLE_COUNT_1_BIT,
                 .tiling = spec->mapped ? VK_IMAGE_TILING_LINEAR : VK_IMAGE_TILING_OPTIMAL,
                 .usage = spec->usage,
-                .initialLayout = initial_layout(spec->mapped),
+                .initialLayout = initial_layout(spec->mapped, image->hosted),
             },
             NULL, &image->handle));
+}
+
+// Whether such an image can be in memory that is imported. It is in large pages, which drivers have
+// not for what they share with other processes (Mesa 25).
+static bool can_be_hosted(const struct vkb_device *device, const struct vkb_image_spec *spec)
+{
+    VkExternalImageFormatProperties external = {
+        .sType = VK_STRUCTURE_TYPE_EXTERNAL_IMAGE_FORMAT_PROPERTIES,
+    };
+    VkImageFormatProperties2 properties = {
+        .sType = VK_STRUCTURE_TYPE_IMAGE_FORMAT_PROPERTIES_2,
+        .pNext = &external,
+    };
+    const VkPhysicalDeviceExternalImageFormatInfo type = {
+        .sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_EXTERNAL_IMAGE_FORMAT_INFO,
+        .handleType = HOST_ALLOCATION,
+    };
+    const VkPhysicalDeviceImageFormatInfo2 info = {
+        .sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_IMAGE_FORMAT_INFO_2,
+        .pNext = &type,
+        .format = format_of(spec),
+        .type = image_type(spec),
+        .tiling = VK_IMAGE_TILING_LINEAR,
+        .usage = spec->usage,
+    };
+    const VkExternalMemoryProperties *memory = &external.externalMemoryProperties;
+
+    return spec->mapped && spec->hosted && device->import_alignment
+        && (size_t)spec->width * spec->height * vkb_pixel_size(spec->format) >= VKB_LARGE_BYTES
+        && VK_RESULT(device->instance->vk.vkGetPhysicalDeviceImageFormatProperties2(
+               device->adapter.physical, &info, &properties))
+               == VK_SUCCESS
+        && memory->externalMemoryFeatures & VK_EXTERNAL_MEMORY_FEATURE_IMPORTABLE_BIT
+        && !(memory->externalMemoryFeatures & VK_EXTERNAL_MEMORY_FEATURE_DEDICATED_ONLY_BIT);
 }
 
 static VkImageSubresourceRange range_of_image(const struct vkb_image *image)
@@ -421,11 +529,6 @@ bool vkb_image_borrow(const struct vkb_device *device, size_t row_size, struct v
     return false;
 }
 
-static size_t round_up(size_t size, size_t step)
-{
-    return (size + step - 1) / step * step;
-}
-
 size_t vkb_image_row_pitch(enum vkb_format format, uint32_t width)
 {
     // No driver aligns rows to more than that.
@@ -466,7 +569,8 @@ static bool create_image_buffer(const struct vkb_device *device, struct vkb_imag
     if (!create_buffer(device,
                        VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT | VK_BUFFER_USAGE_STORAGE_BUFFER_BIT
                            | VK_BUFFER_USAGE_TRANSFER_SRC_BIT,
-                       buffer_size(image), 0, &image->buffer, error))
+                       buffer_size(image), image->hosted ? HOST_ALLOCATION : 0, &image->buffer,
+                       error))
         return false;
     device->vk.vkGetBufferMemoryRequirements(device->handle, image->buffer, &own);
     requirements->memoryTypeBits &= own.memoryTypeBits;
@@ -482,7 +586,7 @@ static bool map_image(const struct vkb_device *device, struct vkb_image *image,
         || !VK(error, device->vk.vkMapMemory(device->handle, image->memory, 0, VK_WHOLE_SIZE, 0,
                                              &image->mapped)))
         return false;
-    vkb_advise_large(image->mapped, image->row_pitch * image->height);
+    advise_large(image->mapped, image->row_pitch * image->height);
     return true;
 }
 
@@ -510,6 +614,7 @@ bool vkb_image_create(const struct vkb_device *device, const struct vkb_image_sp
         .levels = spec->levels ? spec->levels : 1,
         .usage = spec->usage,
         .array = spec->array,
+        .hosted = can_be_hosted(device, spec),
         .channels = vkb_formats[spec->format].channels,
     };
     if (!create_handle(device, spec, image, error))
@@ -518,8 +623,9 @@ bool vkb_image_create(const struct vkb_device *device, const struct vkb_image_sp
     const bool allocated =
         (!spec->mapped || create_image_buffer(device, image, &requirements, error))
         && allocate_kind(device, spec->mapped ? VKB_MEMORY_SHARED : VKB_MEMORY_DEVICE,
-                         &requirements, NULL, spec->spares, &made, error);
+                         &requirements, NULL, image->hosted, spec->spares, &made, error);
     image->memory = made.memory;
+    image->host = made.host;
     image->memory_size = made.size;
     image->memory_type = made.type;
     if (!allocated
@@ -538,19 +644,26 @@ void vkb_image_destroy(const struct vkb_device *device, struct vkb_image *image)
     device->vk.vkDestroyBuffer(device->handle, image->buffer, NULL);
     device->vk.vkDestroyImageView(device->handle, image->view, NULL);
     device->vk.vkDestroyImage(device->handle, image->handle, NULL);
-    vkb_memory_free(device, image->memory);
+    vkb_memory_free(device, image->memory, image->host);
     *image = (struct vkb_image){0};
 }
 
 void vkb_image_spare(const struct vkb_device *device, struct vkb_image *image, uint64_t used,
                      struct vkb_spares *spares)
 {
-    const struct vkb_spare spare = {image->memory, image->memory_size, image->memory_type, used};
+    const struct vkb_spare spare = {
+        .memory = image->memory,
+        .host = image->host,
+        .size = image->memory_size,
+        .type = image->memory_type,
+        .used = used,
+    };
 
     if (image->memory && vkb_spares_add(spares, &spare)) {
         if (image->mapped)
             device->vk.vkUnmapMemory(device->handle, image->memory);
         image->memory = VK_NULL_HANDLE;
+        image->host = NULL;
     }
     vkb_image_destroy(device, image);
 }
@@ -558,7 +671,7 @@ void vkb_image_spare(const struct vkb_device *device, struct vkb_image *image, u
 VkImageLayout vkb_image_layout(const struct vkb_image *image, enum vkb_access access)
 {
     return !image->mapped            ? vkb_access_layout(access)
-         : access == VKB_ACCESS_NONE ? initial_layout(true)
+         : access == VKB_ACCESS_NONE ? initial_layout(true, image->hosted)
                                      : VK_IMAGE_LAYOUT_GENERAL;
 }
 

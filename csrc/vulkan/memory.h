@@ -28,6 +28,7 @@ struct vkb_buffer {
 struct vkb_image {
     VkImage handle;
     VkDeviceMemory memory;
+    void *host;  // what was allocated for memory of the host's; NULL: the device's
     VkDeviceSize memory_size;
     uint32_t memory_type;
     VkImageView view;  // of all levels
@@ -35,6 +36,7 @@ struct vkb_image {
     uint32_t width, height, depth, layers, levels;
     VkImageUsageFlags usage;
     bool array;              // its view is of an array, also of six layers
+    bool hosted;             // its memory may be imported
     enum vkb_access access;  // the last access recorded
     void *mapped;            // its pixels, row by row; NULL: not host-visible
     size_t row_pitch;        // of the mapped pixels, in bytes
@@ -52,14 +54,21 @@ struct vkb_image_spec {
     uint32_t width, height, layers, levels;
     VkImageUsageFlags usage;
     bool mapped, array;
+    // Of mapped images: may be in memory of the host's, so that the host cannot write it before the
+    // device does.
+    bool hosted;
     // Of colour images of other formats, whose `format` is NONE: 1 to 3 dimensions, and the third.
     VkFormat other;
     uint32_t dimensions, depth;
     struct vkb_spares *spares;  // what its memory is taken from, if one fits; NULL: none
 };
 
-// Advises the system to use large pages for memory that has not been written yet.
-void vkb_advise_large(void *memory, size_t size);
+// Allocates memory of whole pages, which are large ones from VKB_LARGE_BYTES on: at *start is what
+// is to be freed. Devices can import it. `device` may be NULL.
+void *vkb_alloc_pages(const struct vkb_device *device, size_t size, void **start,
+                      struct vkb_error *error);
+// The bytes of these pages.
+size_t vkb_size_of_pages(const struct vkb_device *device, size_t size);
 
 // On failure nothing leaks. Destroying a zeroed or half-created object is safe.
 bool vkb_buffer_create(const struct vkb_device *device, enum vkb_memory_kind kind,

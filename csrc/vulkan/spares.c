@@ -1,8 +1,9 @@
 #include "vulkan/spares.h"
 
-void vkb_memory_free(const struct vkb_device *device, VkDeviceMemory memory)
+void vkb_memory_free(const struct vkb_device *device, VkDeviceMemory memory, void *host)
 {
     device->vk.vkFreeMemory(device->handle, memory, NULL);
+    vkb_free(host);
     if (memory)
         atomic_fetch_sub(device->allocations, 1);
 }
@@ -28,15 +29,15 @@ static void remove_spare(struct vkb_spares *spares, struct vkb_spare *spare)
 // one that is much larger.
 enum { MAX_RATIO = 8 };
 
-bool vkb_spares_take(struct vkb_spares *spares, uint32_t type, VkDeviceSize size,
+bool vkb_spares_take(struct vkb_spares *spares, uint32_t type, bool host, VkDeviceSize size,
                      struct vkb_spare *taken)
 {
     struct vkb_spare *best = NULL;
 
     for (size_t i = 0; spares && i < spares->count; ++i) {
         struct vkb_spare *spare = &spares->spares[i];
-        if (spare->type == type && spare->size >= size && spare->size / MAX_RATIO <= size
-            && (!best || spare->size < best->size))
+        if (spare->type == type && (spare->host != NULL) == host && spare->size >= size
+            && spare->size / MAX_RATIO <= size && (!best || spare->size < best->size))
             best = spare;
     }
     if (!best) {
@@ -62,14 +63,14 @@ struct vkb_spare *vkb_spares_oldest(const struct vkb_spares *spares)
 void vkb_spares_free_one(const struct vkb_device *device, struct vkb_spares *spares,
                          struct vkb_spare *spare)
 {
-    vkb_memory_free(device, spare->memory);
+    vkb_memory_free(device, spare->memory, spare->host);
     remove_spare(spares, spare);
 }
 
 void vkb_spares_free(const struct vkb_device *device, struct vkb_spares *spares)
 {
     for (size_t i = 0; i < spares->count; ++i)
-        vkb_memory_free(device, spares->spares[i].memory);
+        vkb_memory_free(device, spares->spares[i].memory, spares->spares[i].host);
     vkb_free(spares->spares);
     *spares = (struct vkb_spares){.missed = spares->missed};
 }

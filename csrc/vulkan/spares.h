@@ -9,6 +9,7 @@
 
 struct vkb_spare {
     VkDeviceMemory memory;
+    void *host;  // what was allocated for memory of the host's; NULL: the device's
     VkDeviceSize size;
     uint32_t type;  // of memory
     uint64_t used;  // the last submission that used it
@@ -21,15 +22,16 @@ struct vkb_spares {
     uint64_t missed;  // how often none fitted
 };
 
-// Frees memory that is counted in device->allocations. It may be VK_NULL_HANDLE.
-void vkb_memory_free(const struct vkb_device *device, VkDeviceMemory memory);
+// Frees memory that is counted in device->allocations, and what of the host's it is. Both may be
+// null.
+void vkb_memory_free(const struct vkb_device *device, VkDeviceMemory memory, void *host);
 
 // False: there is no room for another one, which stays the caller's.
 bool vkb_spares_add(struct vkb_spares *spares, const struct vkb_spare *spare);
 
-// Takes the smallest of a type that has at least `size` bytes and not many times as many. `spares`
-// may be NULL. False: there is none.
-bool vkb_spares_take(struct vkb_spares *spares, uint32_t type, VkDeviceSize size,
+// Takes the smallest of a type, of the host's memory or not, that has at least `size` bytes and not
+// many times as many. `spares` may be NULL. False: there is none.
+bool vkb_spares_take(struct vkb_spares *spares, uint32_t type, bool host, VkDeviceSize size,
                      struct vkb_spare *taken);
 
 // The one that was used first; NULL: there is none.
