@@ -47,5 +47,11 @@ INLINE void clean(lanes *value, bool finite, float limit)
 
 #include "passes/host_beam_lanes.h"
 #include "passes/host_fft_lanes.h"
+#if LANES == 8
+#include "passes/host_ghost_lanes.h"
+#define GHOSTS ghosts
+#else
+#define GHOSTS NULL
+#endif
 
-const struct vkb_host_loops LOOPS = {LANES, rows_forth, columns, rows_back, beams};
+const struct vkb_host_loops LOOPS = {LANES, rows_forth, columns, rows_back, beams, GHOSTS};

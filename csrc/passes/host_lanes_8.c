@@ -1,9 +1,12 @@
-// Vectors of AVX2, without fused products and sums: the bits are those of host_lanes_4.c.
+// Vectors of AVX2, without fused products and sums: the bits are those of host_lanes_4.c. All
+// processors with AVX2 convert half floats, too.
 #if defined __x86_64__
+// Before the target of what follows: its functions have their own.
+#include <immintrin.h>
 #ifdef __clang__
-#pragma clang attribute push(__attribute__((target("avx2"))), apply_to = function)
+#pragma clang attribute push(__attribute__((target("avx2,f16c"))), apply_to = function)
 #else
-#pragma GCC target("avx2")
+#pragma GCC target("avx2,f16c")
 #endif
 #define LANES 8
 #define LOOPS vkb_host_loops_8

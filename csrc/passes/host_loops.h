@@ -10,6 +10,7 @@
 struct vkb_host_loops {
     uint32_t lanes;
     vkb_rows *rows_forth, *columns, *rows_back, *beams;
+    vkb_rows *ghosts;  // of rows; NULL: there are no conversions of half floats
 };
 extern const struct vkb_host_loops vkb_host_loops_4;
 #if defined __x86_64__

@@ -1,5 +1,6 @@
 // Passes on the host, where images are in its memory. They read and write single floats.
 #include "passes/host_beams.h"
+#include "passes/host_ghosts.h"
 #include "variants/variant.h"
 
 #include <stdio.h>
@@ -67,10 +68,20 @@ void vkb_read_host_floats(struct vkb_variant_choice *choice, struct vkb_pass_row
     row->reads[SLOT_SOURCE] = floats;
 }
 
+static bool run_on_host(struct vkb_variant_choice *choice, struct vkb_pass_row *row,
+                        vkb_host_pass *host)
+{
+    static const struct vkb_shader shader = {.name = "host"};
+
+    vkb_make_linear(row, &shader, 1, 1);
+    row->host = host;
+    row->vertex = NULL;
+    return vkb_add_variant_pass(choice, row);
+}
+
 bool vkb_add_host_pass(struct vkb_variant_choice *choice, struct vkb_pass_row *row,
                        vkb_host_pass *host)
 {
-    static const struct vkb_shader shader = {.name = "host"};
     const struct vkb_pass_row last = *row;
     const bool stores = is_single_float(choice, row->targets[0]);
 
@@ -78,10 +89,7 @@ bool vkb_add_host_pass(struct vkb_variant_choice *choice, struct vkb_pass_row *r
         row->constants.stage = 0;
         add_floats(choice, last.targets[0], &row->targets[0]);
     }
-    vkb_make_linear(row, &shader, 1, 1);
-    row->host = host;
-    row->vertex = NULL;
-    return vkb_add_variant_pass(choice, row)
+    return run_on_host(choice, row, host)
         && (stores || add_pixels(choice, &last, STAGE_LAST, row->targets[0], last.targets[0]));
 }
 
@@ -97,4 +105,18 @@ bool vkb_add_host_beams_variant(struct vkb_variant_choice *choice, const struct 
     memcpy(&row, pass, sizeof row);
     vkb_read_host_floats(choice, &row);
     return vkb_add_host_pass(choice, &row, vkb_host_sun_beams);
+}
+
+bool vkb_add_host_ghosts_variant(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
+{
+    const struct vkb_image_row *images = choice->graph->images;
+    const uint32_t target = pass->targets[0], source = pass->reads[SLOT_SOURCE];
+    struct vkb_pass_row row;
+
+    if (pass->shader != &vkb_shader_ghosts_frag || !vkb_fits_linear(choice, pass)
+        || images[target].format != VKB_FORMAT_RGBA16_FLOAT || images[target].width < 2
+        || !vkb_has_format_of(choice->graph, source, target) || !vkb_host_has_ghosts(pass))
+        return false;
+    memcpy(&row, pass, sizeof row);
+    return run_on_host(choice, &row, vkb_host_show_ghosts);
 }

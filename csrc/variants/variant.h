@@ -42,8 +42,8 @@ vkb_variant_add vkb_add_nine_variant;
 vkb_variant_add vkb_add_filtered_variant, vkb_add_filtered_final_variant, vkb_add_gathered_variant;
 // Iterations of streaks.
 vkb_variant_add vkb_add_streaks_variant;
-// Sun beams on the host.
-vkb_variant_add vkb_add_host_beams_variant;
+// Sun beams and ghosts on the host.
+vkb_variant_add vkb_add_host_beams_variant, vkb_add_host_ghosts_variant;
 // Transforms of complete lines: in shared memory, or on the host.
 vkb_variant_add vkb_add_transform_lines_variant, vkb_add_host_transform_variant;
 // Adjoint passes: of images with linear texels; of kernels; transposed filters in tiles and in

@@ -32,6 +32,7 @@ static const struct variant variants_table[] = {
     {VKB_VARIANTS_CPU, "strips", vkb_add_streaks_variant, 0},
     {VKB_VARIANTS_CPU, "host", vkb_add_host_beams_variant, 0},
     {VKB_VARIANTS_CPU, "host", vkb_add_host_transform_variant, 0},
+    {VKB_VARIANTS_CPU, "host", vkb_add_host_ghosts_variant, 0},
     {VKB_VARIANTS_CPU, "strips", vkb_add_adjoint_fused_variant, 0},
     {VKB_VARIANTS_CPU, "linear", vkb_add_adjoint_linear_variant, 0},
     {VKB_VARIANTS_CPU, "pixels", vkb_add_adjoint_kernels_variant, 0},

@@ -69,12 +69,13 @@ float halo_factor(vec2 place)
     return 1.0 - smoothstep(0.0, 1.0, abs(distance / height - params.radius) / params.width);
 }
 
-// What a ghost shows of its sample for a place: its tints, less towards the border.
+// What a ghost shows of its sample for a place: its tints, less towards the border. A power of 1 is exact, as the host
+// has it (csrc/passes/host_ghosts.c), which powers of llvmpipe are not.
 vec4 ghost_factor(vec4 ghost, vec2 place)
 {
     vec2 share = ghost.w * place / vec2(textureSize(source, 0));
     float left = max(1.0 - length(share) / params.radius, 0.0);
-    float weight = params.falloff > 0.0 ? pow(left, params.falloff) : 1.0;
+    float weight = params.falloff == 1.0 ? left : params.falloff > 0.0 ? pow(left, params.falloff) : 1.0;
     return weight * vec4(ghost.rgb, (ghost.r + ghost.g + ghost.b) / 3.0);
 }
 
