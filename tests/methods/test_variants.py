@@ -17,9 +17,11 @@ from tests.tolerance import assert_matches_reference, tolerance
 from tests.variants import VARIANTS, open_variant
 from vkbloom import (
     BevyBloom,
+    BlenderGlare,
     Convolution,
     DualKawase,
     Frames,
+    Ghosts,
     KinoBloom,
     Pyramid,
     Renderer,
@@ -282,6 +284,22 @@ def test_a_cpu_transforms_on_the_host(renderer: Renderer) -> None:
     names = [one.name for one in plan.passes if one.shader == "host"]
     expected = ["kernel", "kernel", "spectrum", "bloom", "bloom"]
     assert names == (expected if has_linear_texels(renderer) else [])
+
+
+@pytest.mark.parametrize("size", [(64, 48), (37, 5), (2, 3)])
+@pytest.mark.parametrize("alpha", ["keep", "blur"])
+def test_a_cpu_has_ghosts_with_the_bits_of_the_shader(
+    renderer: Renderer, unfused: Renderer, size: tuple[int, int], alpha: str
+) -> None:
+    """The host makes them: Blender's four at a time, and those of a stage."""
+    image = hdr_picture(*size, 4, "float16")
+    stage = Ghosts(scales=(-1.5, 0, 0.4), vignette=0, falloff=1, threshold=0, halvings=0)
+    for settings in (
+        BlenderGlare(type="ghosts", threshold=None, alpha=alpha),
+        Pyramid(levels=1, alpha=alpha, glare=(stage,)),
+    ):
+        frames, expected = (each.apply(image, settings) for each in (renderer, unfused))
+        assert_same(frames, expected)
 
 
 def test_texels_are_what_fused_passes_take_them_for(renderer: Renderer) -> None:
