@@ -289,7 +289,7 @@ def test_a_cpu_transforms_on_the_host(renderer: Renderer) -> None:
 @pytest.mark.parametrize("size", [(64, 48), (37, 5), (2, 3)])
 @pytest.mark.parametrize("alpha", ["keep", "blur"])
 def test_a_cpu_has_ghosts_with_the_bits_of_the_shader(
-    renderer: Renderer, unfused: Renderer, size: tuple[int, int], alpha: str
+    renderer: Renderer, unfused: Renderer, size: tuple[int, int], alpha: Any
 ) -> None:
     """The host makes them: Blender's four at a time, and those of a stage."""
     image = hdr_picture(*size, 4, "float16")
