@@ -70,6 +70,20 @@ static bool load_scene(struct vkb_run *run, const struct vkb_scene_data *data,
     return true;
 }
 
+// Whether passes of the requests read the image. What nothing else than the host reads, it reads
+// from what it was given.
+static bool is_read(const struct vkb_request *requests, uint32_t request_count, uint32_t index)
+{
+    for (uint32_t i = 0; i < request_count; ++i) {
+        const struct vkb_graph *graph = &requests[i].plan->graph;
+        for (uint32_t pass = 0; pass < graph->pass_count; ++pass)
+            for (uint32_t read = 0; read < graph->passes[pass].read_count; ++read)
+                if (graph->passes[pass].reads[read] == index)
+                    return true;
+    }
+    return false;
+}
+
 // Whether the host fills the image once, and it does not hold its pixels yet.
 static bool is_missing(const struct vkb_run *run, uint32_t index)
 {
@@ -77,7 +91,7 @@ static bool is_missing(const struct vkb_run *run, uint32_t index)
     const struct vkb_content *content = run->contents[index];
 
     // The content of a history may be what a call before has made.
-    return row->serial && !run->inputs[row->input].image
+    return row->serial && content && !run->inputs[row->input].image
         && !(content->valid && content->version == row->serial);
 }
 
@@ -121,7 +135,8 @@ static void copy_given(const struct vkb_run *run, uint32_t index, void *staged)
 }
 
 // Fills the images whose pixels the graph has: a kernel, a picture of dirt, weights.
-static bool fill_constants(struct vkb_run *run, struct vkb_error *error)
+static bool fill_constants(struct vkb_run *run, const struct vkb_request *requests,
+                           uint32_t request_count, struct vkb_error *error)
 {
     const struct vkb_graph *graph = run->graph;
     struct vkb_buffer *staging = &run->frame->constants;
@@ -129,7 +144,8 @@ static bool fill_constants(struct vkb_run *run, struct vkb_error *error)
     bool missing = false;
 
     for (uint32_t i = 0; i < graph->image_count; ++i) {
-        if (graph->images[i].serial && !vkb_run_resolve(run, i, error))
+        if (graph->images[i].serial && is_read(requests, request_count, i)
+            && !vkb_run_resolve(run, i, error))
             return false;
         if (is_missing(run, i)) {
             size += staged_size(run, i);
@@ -221,7 +237,7 @@ static bool record_and_submit(struct vkb_run *run, const struct vkb_frame_source
     if (!vkb_commands_begin(device, &submission->commands, error))
         return false;
     vkb_timer_reset(device, commands, &submission->timer);
-    if (!vkb_sources_record(run, error) || !fill_constants(run, error))
+    if (!vkb_sources_record(run, error) || !fill_constants(run, requests, request_count, error))
         return false;
     for (uint32_t i = 0; i < request_count; ++i)
         if (!record_request(run, &requests[i], i + 1 < request_count ? &requests[i + 1] : NULL,

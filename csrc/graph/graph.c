@@ -267,8 +267,9 @@ void vkb_copy_given_row(const struct vkb_image_row *image, uint32_t y, uint32_t 
     }
     if (image->grey) {
         const float *from = (const float *)image->pixels + (size_t)y * image->width;
-        channels == 3 ? repeat_grey(to, from, image->width, 3)
-                      : repeat_grey(to, from, image->width, 4);
+        channels == 1   ? memcpy(to, from, image->width * sizeof *from)
+        : channels == 3 ? repeat_grey(to, from, image->width, 3)
+                        : repeat_grey(to, from, image->width, 4);
         return;
     }
     const unsigned char *from = (const unsigned char *)image->pixels + y * size;

@@ -131,6 +131,59 @@ bool vkb_host_rows_forth(const struct vkb_pass_row *pass, const struct vkb_host_
                     workers);
 }
 
+// As fft_kernel.comp has them, for all places of a padded line.
+static struct vkb_kernel_places *find_places(int32_t padded, int boundary, int32_t extent,
+                                             int32_t period, int32_t before, int32_t after,
+                                             struct vkb_error *error)
+{
+    struct vkb_kernel_places *places = vkb_alloc(error, (size_t)padded, sizeof *places);
+
+    for (int32_t at = 0; places && at < padded; ++at) {
+        const int32_t offset = at <= after ? at : at - padded, place = extent / 2 + offset;
+        places[at] = (struct vkb_kernel_places){place, place, 1};
+        if (offset < -before)
+            places[at] = (struct vkb_kernel_places){0, -1, 1};
+        else if (boundary == BOUNDARY_EDGE && offset == -before)
+            places[at].first = 0;
+        else if (boundary == BOUNDARY_WRAP)
+            places[at] =
+                (struct vkb_kernel_places){(place % period + period) % period, extent - 1, period};
+        if (boundary == BOUNDARY_EDGE && offset == after)
+            places[at].last = extent - 1;
+    }
+    return places;
+}
+
+bool vkb_host_kernel_rows(const struct vkb_pass_row *pass, const struct vkb_host_image *reads,
+                          const struct vkb_host_image *target, struct vkb_workers *workers,
+                          struct vkb_error *error)
+{
+    const struct vkb_fft_kernel_params *params = &pass->params.fft_kernel;
+    const uint32_t length = (uint32_t)params->padded_x, lanes = vkb_host_loops()->lanes;
+    const uint32_t half = length / 2 + 1;
+    struct vkb_host_lines work = {
+        .half = half,
+        .channels = vkb_host_is_grey(target, half) ? 1 : 4,
+        .source = reads[SLOT_SOURCE],
+        .target = *target,
+        .gain = params->gain,
+        .space_size = ((size_t)6 * length * lanes * sizeof(float) + 63) & ~(size_t)63,
+    };
+    const bool prepared =
+        vkb_host_line_create(length, &work.line, error)
+        && (work.kernel_x = find_places(params->padded_x, params->boundary_x, params->extent_x,
+                                        params->period_x, params->before_x, params->after_x, error))
+        && (work.kernel_y = find_places(params->padded_y, params->boundary_y, params->extent_y,
+                                        params->period_y, params->before_y, params->after_y, error))
+        && (work.space = vkb_alloc(error, VKB_MAX_PARTS * work.space_size + 64, 1));
+    const bool done = run_loop(&work, prepared, vkb_host_loops()->kernel_rows,
+                               (target->height + 2 * lanes - 1) / (2 * lanes), workers);
+
+    vkb_free(work.kernel_x);
+    vkb_free(work.kernel_y);
+    return done;
+}
+
 bool vkb_host_columns(const struct vkb_pass_row *pass, const struct vkb_host_image *reads,
                       const struct vkb_host_image *target, struct vkb_workers *workers,
                       struct vkb_error *error)
@@ -195,8 +248,9 @@ static void add_products(void *context, uint32_t part, uint32_t first, uint32_t 
                 memset(to, 0, size);
             for (int32_t i = 0; i < work->pass->constants.products; ++i) {
                 const struct vkb_host_image *factors = &work->reads[SLOT_FACTORS + 2 * i];
+                const size_t of_kernel = vkb_host_is_grey(&factors[1], half) ? 0 : at;
                 add_product(factors[0].pixels + y * factors[0].pitch + at,
-                            factors[1].pixels + y * factors[1].pitch + at, sign, half, to);
+                            factors[1].pixels + y * factors[1].pitch + of_kernel, sign, half, to);
             }
         }
 }

@@ -3,7 +3,8 @@
 //
 // An image of spectra has those of the channels, each on its own: in each row the real parts of
 // channel 0 with the frequencies 0 to n / 2, their imaginary parts, then those of the next channel.
-// The transform of real numbers has no others. It is as wide as an image of four channels of that.
+// The transform of real numbers has no others. It is as wide as an image of four channels of that;
+// of a grey kernel it has one channel, and is as wide as that (vkb_host_is_grey).
 //
 // host_fft_lanes.h has the loops. A line is in one lane from its first to its last element.
 #ifndef VKB_HOST_FFT_H
@@ -25,6 +26,11 @@ struct vkb_host_line {
 bool vkb_host_line_create(uint32_t length, struct vkb_host_line *line, struct vkb_error *error);
 void vkb_host_line_destroy(struct vkb_host_line *line);
 
+// Of a place in a padded line: first, last and step of the places of the kernel that are added up.
+struct vkb_kernel_places {
+    int32_t first, last, step;
+};
+
 // What is done with all lines along an axis.
 struct vkb_host_lines {
     struct vkb_host_line line;
@@ -40,11 +46,29 @@ struct vkb_host_lines {
     int32_t weight, before_x, before_y;
     bool cleans;  // what is read: finite, up to FFT_LIMIT
     bool stores;  // as shaders store single floats, with an alpha of 1 if there are three channels
-    char *space;  // for each part: two lines
+    // Of the rows of a kernel: places along rows and columns, and what all values are multiplied
+    // by.
+    struct vkb_kernel_places *kernel_x, *kernel_y;
+    float gain;
+    char *space;  // for each part: two lines, and a third one of kernels
     size_t space_size;
 };
 
-// Host passes: all stages along an axis, and the sum of products of spectra.
-vkb_host_pass vkb_host_rows_forth, vkb_host_columns, vkb_host_rows_back, vkb_host_products;
+// Whether an image of spectra, of so many frequencies, has those of a grey kernel; the width of
+// such an image.
+static inline uint32_t vkb_host_grey_width(uint32_t half)
+{
+    return (2 * half + 3) / 4;
+}
+
+static inline bool vkb_host_is_grey(const struct vkb_host_image *spectra, uint32_t half)
+{
+    return spectra->width < 2 * half;
+}
+
+// Host passes: all stages along an axis, and the sum of products of spectra; of a kernel, which
+// they put to its places in the padded lines, all stages along rows.
+vkb_host_pass vkb_host_rows_forth, vkb_host_columns, vkb_host_rows_back, vkb_host_products,
+    vkb_host_kernel_rows;
 
 #endif

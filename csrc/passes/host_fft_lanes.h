@@ -215,7 +215,18 @@ INLINE void move_spectra(const struct vkb_host_lines *work, const struct vkb_hos
     }
 }
 
-// Both rows' spectra, from that of the first one and i times the second one.
+// The spectra of two rows at frequency j of some, from that of the first one and i times the second
+// one there, and at the mirrored place.
+INLINE void split_spectra(struct complex z, struct complex m, spectra values, uint32_t j)
+{
+    const lanes parts[SPECTRA] = {0.5f * (z.re + m.re), 0.5f * (z.im - m.im), 0.5f * (z.im + m.im),
+                                  0.5f * (m.re - z.re)};
+
+    for (uint32_t part = 0; part < SPECTRA; ++part)
+        memcpy(values[part][j], &parts[part], sizeof parts[part]);
+}
+
+// Both rows' spectra.
 static void store_spectra(const struct vkb_host_lines *work, const struct complex *line, uint32_t y)
 {
     const uint32_t n = work->line.length;
@@ -223,13 +234,8 @@ static void store_spectra(const struct vkb_host_lines *work, const struct comple
     for (uint32_t k = 0; k < work->half; k += LANES) {
         const uint32_t count = least(LANES, work->half - k);
         spectra values;
-        for (uint32_t j = 0; j < count; ++j) {
-            const struct complex z = line[k + j], m = line[k + j ? n - k - j : 0];
-            const lanes parts[SPECTRA] = {0.5f * (z.re + m.re), 0.5f * (z.im - m.im),
-                                          0.5f * (z.im + m.im), 0.5f * (m.re - z.re)};
-            for (uint32_t part = 0; part < SPECTRA; ++part)
-                memcpy(values[part][j], &parts[part], sizeof parts[part]);
-        }
+        for (uint32_t j = 0; j < count; ++j)
+            split_spectra(line[k + j], line[k + j ? n - k - j : 0], values, j);
         move_spectra(work, &work->target, y, k, count, true, values);
     }
 }
@@ -267,6 +273,99 @@ static void rows_forth(void *context, uint32_t part, uint32_t first, uint32_t en
         }
         store_spectra(work, transform(&work->line, line, other), y);
     }
+}
+
+// A row of a channel of a kernel at its places. False: it is 0.
+static bool place_row(const struct vkb_host_lines *work, uint32_t y, uint32_t channel, float *to)
+{
+    const uint32_t n = work->line.length, apart = work->channels;
+    const struct vkb_kernel_places *places = work->kernel_x;
+    struct vkb_kernel_places rows = {0, -1, 1};
+
+    memset(to, 0, n * sizeof *to);
+    if (y < work->target.height)
+        rows = work->kernel_y[y];
+    for (int32_t j = rows.first; j <= rows.last; j += rows.step) {
+        const float *from = work->source.pixels + (size_t)j * work->source.pitch + channel;
+        for (uint32_t x = 0; x < n; ++x) {
+            // Most places follow each other.
+            const int32_t first = places[x].first;
+            uint32_t count = 0;
+            while (x + count < n && places[x + count].first == first + (int32_t)count
+                   && places[x + count].last == first + (int32_t)count)
+                ++count;
+            for (uint32_t i = 0; i < count; ++i)
+                to[x + i] += from[((size_t)first + i) * apart];
+            for (int32_t i = first; count == 0 && i <= places[x].last; i += places[x].step)
+                to[x] += from[(size_t)i * apart];
+            x += count ? count - 1 : 0;
+        }
+    }
+    for (uint32_t x = 0; x < n; ++x)
+        to[x] *= work->gain;
+    return rows.first <= rows.last;
+}
+
+// Every second one of 2 * LANES rows to the parts of a line.
+INLINE void load_rows(const struct vkb_host_lines *work, const float *rows, uint32_t second,
+                      struct complex *line)
+{
+    const uint32_t n = work->line.length;
+    float from[LANES][LANES], to[LANES][LANES];
+
+    for (uint32_t x = 0; x < n; x += LANES) {
+        const uint32_t count = least(LANES, n - x);
+        for (uint32_t i = 0; i < LANES; ++i)
+            memcpy(from[i], rows + (size_t)(2 * i + second) * n + x, count * sizeof(float));
+        transpose(from, to);
+        for (uint32_t i = 0; i < count; ++i)
+            memcpy(second ? &line[x + i].im : &line[x + i].re, to[i], sizeof to[i]);
+    }
+}
+
+static void store_kernel(const struct vkb_host_lines *work, const struct complex *line, uint32_t y,
+                         uint32_t channel)
+{
+    const uint32_t n = work->line.length;
+
+    for (uint32_t k = 0; k < work->half; k += LANES) {
+        const uint32_t count = least(LANES, work->half - k);
+        float turned[LANES][LANES];
+        spectra values;
+        for (uint32_t j = 0; j < count; ++j)
+            split_spectra(line[k + j], line[k + j ? n - k - j : 0], values, j);
+        for (uint32_t part = 0; part < SPECTRA; ++part) {
+            transpose(values[part], turned);
+            for (uint32_t i = 0; i < LANES; ++i) {
+                const uint32_t row = y + 2 * i + (part >= SECOND_RE);
+                if (row < work->target.height)
+                    memcpy(work->target.pixels + (size_t)row * work->target.pitch
+                               + (size_t)(2 * channel + part % 2) * work->half + k,
+                           turned[i], count * sizeof(float));
+            }
+        }
+    }
+}
+
+static void kernel_rows(void *context, uint32_t part, uint32_t first, uint32_t end)
+{
+    const struct vkb_host_lines *work = context;
+    const uint32_t n = work->line.length;
+    struct complex *line = space_of(work, part), *other = line + n;
+    float *rows = (float *)(other + n);
+
+    for (uint32_t block = first; block < end; ++block)
+        for (uint32_t channel = 0; channel < work->channels; ++channel) {
+            bool placed = false;
+            for (uint32_t i = 0; i < 2 * LANES; ++i)
+                if (place_row(work, 2 * LANES * block + i, channel, rows + (size_t)i * n))
+                    placed = true;
+            load_rows(work, rows, 0, line);
+            load_rows(work, rows, 1, line);
+            // Rows of zeros have such spectra.
+            store_kernel(work, placed ? transform(&work->line, line, other) : line,
+                         2 * LANES * block, channel);
+        }
 }
 
 // Both rows as one line, with real and imaginary parts exchanged.
@@ -443,7 +542,8 @@ static void columns(void *context, uint32_t part, uint32_t first, uint32_t end)
             line = result;
         }
         if (work->kernel.pixels)
-            multiply_column(work, at, count, line);
+            multiply_column(work, vkb_host_is_grey(&work->kernel, work->half) ? k : at, count,
+                            line);
         if (work->back) {
             exchange(line, n);
             line = transform(&work->line, line, other);

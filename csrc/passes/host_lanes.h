@@ -54,4 +54,5 @@ INLINE void clean(lanes *value, bool finite, float limit)
 #define GHOSTS NULL
 #endif
 
-const struct vkb_host_loops LOOPS = {LANES, rows_forth, columns, rows_back, beams, GHOSTS};
+const struct vkb_host_loops LOOPS = {LANES,     rows_forth, kernel_rows, columns,
+                                     rows_back, beams,      GHOSTS};

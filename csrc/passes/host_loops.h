@@ -5,11 +5,12 @@
 
 #include "vulkan/parts.h"
 
-// Functions for vkb_in_parts. The rows of transforms (host_fft.h) are blocks: of four rows, or of
-// `lanes` columns of a channel. Those of sun beams (host_beams.h) are tiles.
+// Functions for vkb_in_parts. The rows of transforms (host_fft.h) are blocks: of four rows, of
+// 2 * `lanes` rows of a kernel, or of `lanes` columns of a channel. Those of sun beams
+// (host_beams.h) are tiles.
 struct vkb_host_loops {
     uint32_t lanes;
-    vkb_rows *rows_forth, *columns, *rows_back, *beams;
+    vkb_rows *rows_forth, *kernel_rows, *columns, *rows_back, *beams;
     vkb_rows *ghosts;  // of rows; NULL: there are no conversions of half floats
 };
 extern const struct vkb_host_loops vkb_host_loops_4;

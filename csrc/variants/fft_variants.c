@@ -5,6 +5,7 @@
 #include "passes/host_fft.h"
 #include "variants/variant.h"
 
+#include <stdio.h>
 #include <string.h>
 
 // Of a line in a workgroup.
@@ -238,14 +239,51 @@ static bool runs_on_host(const struct vkb_variant_choice *choice, const struct v
                                         spectra_width(pass), pass->transform.height);
 }
 
+// A kernel is transformed in place.
+static bool transforms_kernel(const struct vkb_pass_row *row)
+{
+    return row->reads[SLOT_SOURCE] == row->targets[0];
+}
+
 static bool add_host_transform(struct vkb_variant_choice *choice, struct vkb_pass_row *row,
                                vkb_host_pass *host)
 {
-    // A kernel, which is transformed in place, has those of cotangents, too.
-    const bool kernel = row->reads[SLOT_SOURCE] == row->targets[0];
+    const uint32_t width = choice->graph->images[row->targets[0]].width;
 
-    row->transform.channels = kernel || row->constants.alpha == ALPHA_BLUR ? 4 : 3;
+    // A kernel has that of cotangents, too, unless it is grey.
+    row->transform.channels = row->constants.alpha == ALPHA_BLUR || transforms_kernel(row) ? 4 : 3;
+    if (transforms_kernel(row) && width < spectra_width(row))
+        row->transform.channels = 1;
     return vkb_add_host_pass(choice, row, host);
+}
+
+// A given kernel as one channel.
+static uint32_t add_grey_kernel(struct vkb_variant_choice *choice, uint32_t kernel)
+{
+    const struct vkb_image_row *given = &choice->graph->images[kernel];
+    struct vkb_image_row row = *given;
+    uint32_t image = 0;
+
+    snprintf(row.name, sizeof row.name, "grey_%s", given->name + !given->framebuffer);
+    row.format = VKB_FORMAT_R32_FLOAT;
+    row.channels = 0;
+    row.framebuffer = false;
+    choice->failed =
+        choice->failed || !vkb_graph_add_image(choice->graph, &row, &image, choice->error);
+    return image;
+}
+
+// Puts the kernel to its places and transforms its rows.
+static bool add_host_kernel(struct vkb_variant_choice *choice, struct vkb_pass_row *row)
+{
+    uint32_t width = spectra_width(row);
+
+    if (row->params.fft_kernel.grey) {
+        width = vkb_host_grey_width(row->transform.width / 2 + 1);
+        vkb_read_only(row, add_grey_kernel(choice, row->reads[SLOT_SOURCE]));
+    }
+    choice->graph->images[row->targets[0]].width = width;
+    return vkb_add_host_pass(choice, row, vkb_host_kernel_rows);
 }
 
 static bool add_host_rows_forth(struct vkb_variant_choice *choice, struct vkb_pass_row *row)
@@ -278,7 +316,8 @@ static bool add_host_columns(struct vkb_variant_choice *choice, struct vkb_pass_
             row->params.fft.kernel_sign = pass->params.fft.kernel_sign;
             returns = true;
         }
-    target->width = spectra_width(row);
+    if (!transforms_kernel(row))
+        target->width = spectra_width(row);
     target->height = returns ? (uint32_t)end[-1].params.fft.kept : row->transform.height;
     row->params.fft.kept = (int)target->height;
     return add_host_transform(choice, row, vkb_host_columns);
@@ -293,17 +332,16 @@ bool vkb_add_host_transform_variant(struct vkb_variant_choice *choice,
     if (!runs_on_host(choice, pass))
         return false;
     memcpy(&row, pass, sizeof row);
-    if (pass->block == VKB_BLOCK_fft_kernel) {
-        row.params.fft_kernel.grey = 0;
-        choice->graph->images[row.targets[0]].width = spectra_width(pass);
-        return vkb_add_variant_pass(choice, &row);
-    }
+    if (pass->block == VKB_BLOCK_fft_kernel)
+        return add_host_kernel(choice, &row);
     if (pass->block == VKB_BLOCK_products) {
         choice->graph->images[row.targets[0]].width = spectra_width(pass);
         return add_host_transform(choice, &row, vkb_host_products);
     }
-    // The first stage along an axis stands for all.
-    if (pass->transform.stages == 0)
+    // The first stage along an axis stands for all. The rows of a kernel are transformed.
+    if (pass->transform.stages == 0
+        || (transforms_kernel(pass) && pass->constants.direction == DIRECTION_HORIZONTAL
+            && !pass->constants.inverse))
         return true;
     if (row.constants.inverse) {
         row.targets[0] = end[-1].targets[0];

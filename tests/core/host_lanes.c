@@ -1,6 +1,6 @@
 // Transforms a picture by the loops for 4 and for 8 floats (csrc/passes/host_lanes.h), forth along
-// rows, along columns with a product, and back, and makes its sun beams. Prints the first step
-// whose bits differ, or "same".
+// rows, along columns with a product, and back, makes its sun beams, and transforms it as a kernel
+// along rows. Prints the first step whose bits differ, or "same".
 #include "passes/host_beams.h"
 #include "passes/host_fft.h"
 #include "passes/host_loops.h"
@@ -78,6 +78,38 @@ static void run_beams(const struct vkb_host_loops *loops, bool jittered, float *
     loops->beams(&work, 0, 0, (width + VKB_BEAM_TILE - 1) / VKB_BEAM_TILE);
 }
 
+// The picture as a kernel of that many channels, with places that are empty, or where several are
+// added up.
+static void run_kernel(const struct vkb_host_loops *loops, uint32_t channels, float *result)
+{
+    static char space[6 * ROW * 8 * sizeof(float)] __attribute__((aligned(64)));
+    struct vkb_kernel_places x[ROW], y[COLUMN];
+    struct vkb_error error;
+    struct vkb_host_lines work = {
+        .half = HALF,
+        .channels = channels,
+        .source = {source[0], 4 * WIDTH, WIDTH, HEIGHT},
+        .target = {result, PITCH, channels == 1 ? vkb_host_grey_width(HALF) : 2 * HALF, COLUMN},
+        .kernel_x = x,
+        .kernel_y = y,
+        .gain = 0.3f,
+        .space = space,
+    };
+
+    for (int32_t i = 0; i < ROW; ++i)
+        x[i] = i == 3    ? (struct vkb_kernel_places){1, 21, 5}
+             : i < WIDTH ? (struct vkb_kernel_places){i, i, 1}
+                         : (struct vkb_kernel_places){0, -1, 1};
+    for (int32_t i = 0; i < COLUMN; ++i)
+        y[i] = i == 2 ? (struct vkb_kernel_places){0, 12, 3}
+             : i >= 9 ? (struct vkb_kernel_places){i - 8, i - 8, 1}
+                      : (struct vkb_kernel_places){0, -1, 1};
+    if (!vkb_host_line_create(ROW, &work.line, &error))
+        exit(1);
+    loops->kernel_rows(&work, 0, 0, (COLUMN + 2 * loops->lanes - 1) / (2 * loops->lanes));
+    vkb_host_line_destroy(&work.line);
+}
+
 static void fill(float *values, size_t count)
 {
     for (size_t i = 0; i < count; ++i)
@@ -100,6 +132,15 @@ int main(void)
         run_beams(&vkb_host_loops_8, channels == 4, beams[1]);
         if (memcmp(beams[0], beams[1], sizeof beams[0]) != 0 || beams[0][3] == 0.0f) {
             puts("beams");
+            return 0;
+        }
+        static float kernels[2][COLUMN * PITCH];
+        memset(kernels, 0, sizeof kernels);
+        run_kernel(&vkb_host_loops_4, channels == 4 ? 4 : 1, kernels[0]);
+        run_kernel(&vkb_host_loops_8, channels == 4 ? 4 : 1, kernels[1]);
+        if (memcmp(kernels[0], kernels[1], sizeof kernels[0]) != 0
+            || kernels[0][2 * PITCH] == 0.0f) {
+            puts("kernel");
             return 0;
         }
         for (int step = 0; step < 3; ++step)
