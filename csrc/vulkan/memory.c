@@ -232,8 +232,12 @@ static bool create(const struct vkb_device *device, enum vkb_memory_kind kind,
     VkMemoryRequirements requirements;
     struct vkb_spare made = {0};
 
+    const bool hosted = device->linear_texels && device->import_alignment && type == 0
+                     && kind != VKB_MEMORY_DEVICE && size >= VKB_LARGE_BYTES;
+
     *buffer = (struct vkb_buffer){0};
-    if (!create_buffer(device, usage, size, type, &buffer->handle, error))
+    if (!create_buffer(device, usage, size, hosted ? HOST_ALLOCATION : type, &buffer->handle,
+                       error))
         return false;
     vk->vkGetBufferMemoryRequirements(device->handle, buffer->handle, &requirements);
     const VkMemoryDedicatedAllocateInfo dedicated = {
@@ -246,8 +250,9 @@ static bool create(const struct vkb_device *device, enum vkb_memory_kind kind,
         .handleTypes = type,
     };
     const bool allocated = allocate_kind(device, kind, &requirements, type ? &exported : NULL,
-                                         false, NULL, &made, error);
+                                         hosted, NULL, &made, error);
     buffer->memory = made.memory;
+    buffer->host = made.host;
     if (!allocated
         || !VK(error, vk->vkBindBufferMemory(device->handle, buffer->handle, buffer->memory, 0))
         || (kind != VKB_MEMORY_DEVICE
@@ -295,7 +300,7 @@ bool vkb_buffer_export(const struct vkb_device *device, VkDeviceSize size,
 void vkb_buffer_destroy(const struct vkb_device *device, struct vkb_buffer *buffer)
 {
     device->vk.vkDestroyBuffer(device->handle, buffer->handle, NULL);
-    vkb_memory_free(device, buffer->memory, NULL);
+    vkb_memory_free(device, buffer->memory, buffer->host);
     *buffer = (struct vkb_buffer){0};
 }
 

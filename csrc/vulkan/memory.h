@@ -20,6 +20,7 @@ enum vkb_memory_kind {
 struct vkb_buffer {
     VkBuffer handle;
     VkDeviceMemory memory;
+    void *host;  // what was allocated for memory of the host's; NULL: the device's
     VkDeviceSize size;
     void *mapped;  // NULL for VKB_MEMORY_DEVICE
     bool coherent;
