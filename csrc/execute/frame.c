@@ -70,16 +70,20 @@ static bool load_scene(struct vkb_run *run, const struct vkb_scene_data *data,
     return true;
 }
 
-// Whether passes of the requests read the image. What nothing else than the host reads, it reads
-// from what it was given.
+// Whether passes of the requests, or their outputs, read the image. An output on the host is made
+// from what was given.
 static bool is_read(const struct vkb_request *requests, uint32_t request_count, uint32_t index)
 {
     for (uint32_t i = 0; i < request_count; ++i) {
-        const struct vkb_graph *graph = &requests[i].plan->graph;
+        const struct vkb_plan *plan = requests[i].plan;
+        const struct vkb_graph *graph = &plan->graph;
         for (uint32_t pass = 0; pass < graph->pass_count; ++pass)
-            for (uint32_t read = 0; read < graph->passes[pass].read_count; ++read)
-                if (graph->passes[pass].reads[read] == index)
-                    return true;
+            if (vkb_pass_reads(&graph->passes[pass], index))
+                return true;
+        for (uint32_t output = 0; output < plan->output_count; ++output)
+            if (plan->outputs[output] == index
+                && requests[i].outputs[output].sink != VKB_SINK_GIVEN)
+                return true;
     }
     return false;
 }
