@@ -10,7 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vkbloom import Pyramid, Renderer, Scene, Separable
+from tests.processes import output
+from vkbloom import AdapterInfo, Pyramid, Renderer, Scene, Separable
 from vkbloom._io import disk_cache
 
 SIZE = (16, 16)
@@ -239,3 +240,22 @@ def test_a_cpu_compiles_each_shader_of_a_plan_once(
     plan = renderer.plan(scene, size=SIZE, framebuffers="final")
     shaders = [step.shader for step in plan.passes]
     assert renderer._core.pipeline_count - created == len(set(shaders)) < len(shaders)
+
+
+def test_mesa_compiles_no_more_for_sizes_of_buffers(tmp_path: Path, software: AdapterInfo) -> None:
+    """Mesa 22.3 takes a byte of the size of texels for a level: of 64 x 768 it is 0."""
+    if software.driver != "llvmpipe":
+        pytest.skip("the cache on disk is Mesa's")
+    counts = []
+    for height in (704, 768):
+        folder = tmp_path / str(height)
+        folder.mkdir()
+        code = (
+            "import sys, numpy, vkbloom\n"
+            f"image = numpy.zeros(({height}, 64, 3), numpy.float16)\n"
+            "with vkbloom.Renderer(sys.argv[1]) as renderer:\n"
+            "    renderer.apply(image, vkbloom.Pyramid(levels=4), framebuffers=('final',))\n"
+        )
+        output("-c", code, software.name, MESA_SHADER_CACHE_DIR=str(folder))
+        counts.append(sum(file.is_file() for file in folder.rglob("*")))
+    assert counts[0] == counts[1] > 1
