@@ -45,7 +45,8 @@ runpy.run_path(str(_here / "exposure_pictures.py"))["write"](_here / "examples" 
 runpy.run_path(str(_here / "fault_pictures.py"))["write"](_here / "examples" / "faults")
 runpy.run_path(str(_here / "field_pictures.py"))["write"](_here / "examples" / "field")
 runpy.run_path(str(_here / "flare_pictures.py"))["write"](_here / "examples" / "flare")
-runpy.run_path(str(_here / "look_pictures.py"))["write"](_here / "examples" / "looks")
+_write_looks = runpy.run_path(str(_here / "look_pictures.py"))["write"]
+_write_looks(_here / "examples" / "looks", small="VKBLOOM_DOCS_SMALL" in os.environ)
 runpy.run_path(str(_here / "photo_pictures.py"))["write"](_here / "examples" / "photos")
 _write_laws = runpy.run_path(str(_here / "law_table.py"))["write"]
 _write_laws(_here / "examples" / "laws.md")

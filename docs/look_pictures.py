@@ -33,12 +33,13 @@ def cell(path: Path, row: int) -> NDArray[np.float64]:
     return transform.resize(image[row : row + height], CELL[::-1], anti_aliasing=True)
 
 
-def write(folder: Path) -> None:
+def write(folder: Path, *, small: bool = False) -> None:
     """Write a picture of each look, and the text that shows them."""
+    step = 4 if small else 1
     folder.mkdir(parents=True, exist_ok=True)
     files = [folder / f"{name}.png" for name, _ in PHOTOGRAPHS.values()]
     for file in files:
-        vkbloom.write(file, np.ascontiguousarray(getattr(data, file.stem)()))
+        vkbloom.write(file, np.ascontiguousarray(getattr(data, file.stem)()[::step, ::step]))
     rows = [row for _, row in PHOTOGRAPHS.values()]
     before = np.concatenate([*map(cell, files, rows)], axis=1)
     text: list[str] = []
