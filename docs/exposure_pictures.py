@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import os
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,8 @@ from numpy.typing import NDArray
 import vkbloom
 from vkbloom._io.srgb import encode_srgb
 
-RATE = 24
+#: Frames in a second.
+RATE = 10 if "VKBLOOM_DOCS_SMALL" in os.environ else 24
 #: Stops of the light by the second at which it changes: a lamp is lit, and goes out.
 LIGHT = {0.0: 0.0, 2.0: 5.0, 5.0: 0.0}
 SECONDS = 8.0
