@@ -23,7 +23,8 @@ if [ $# = 0 ]; then
         set -- "$@" "tests/scene/test_$name.py"
     done
     for name in apply_input.py::test_longest_sides rg11b10.py::test_every_method \
-        variants.py::test_large variants.py::test_the_forward_frame; do
+        variants.py::test_large variants.py::test_tiles[size0] variants.py::test_tiles[size2] \
+        variants.py::test_the_forward_frame; do
         set -- "$@" --deselect "tests/methods/test_$name"
     done
     # First calls that only run Python.
