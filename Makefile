@@ -111,7 +111,7 @@ check: build/stamp/core build/stamp/test build/stamp/lint
 # DOCS: options for sphinx. With "-D plot_gallery=0" the gallery's examples do not run.
 # EXPLORER=--quick: one picture and one preset in the page of stored pictures.
 # VKBLOOM_DOCS_SMALL=1: looks are shown with photographs of a quarter of their sides, exposures with fewer
-#   frames.
+#   frames, a lens with a larger tolerance.
 docs: build/stamp/core build/stamp/docs
 	rm -rf docs/api docs/examples
 	$(PYTHON) -m sphinx -q -W --keep-going -b html $(DOCS) docs build/docs
