@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Generator, Iterable
-from concurrent.futures import Future, ThreadPoolExecutor
-from typing import TypeVar
+from concurrent.futures import Future, ThreadPoolExecutor, wait
+from typing import Final, TypeVar
 
 Result = TypeVar("Result")
+
+#: Seconds after which a wait looks for signals: Python answers one that comes just before a wait
+#: without a limit only when that ends.
+_SLICE: Final = 0.2
 
 
 def write_in_background(
@@ -32,13 +36,20 @@ def write_in_background(
                 failure = error
                 break
             if behind is not None:
-                behind[1].result()
+                _finish(behind[1])
                 yield behind[0]
             behind = result, pool.submit(write)
             # The thread has the only references to what it writes.
             del write
         if behind is not None:
-            behind[1].result()
+            _finish(behind[1])
             yield behind[0]
     if failure is not None:
         raise failure
+
+
+def _finish(written: Future[object]) -> None:
+    """Wait, and raise what the function has raised."""
+    while not wait([written], _SLICE).done:
+        pass
+    written.result()
