@@ -114,19 +114,21 @@ def read_ahead(tensors: Sequence[Any]) -> list[Any]:
     read = on_host_together(tensors)
     # A tensor within a transform of torch.func has no address.
     try:
-        _reads.last = _keys_of(tensors), read
+        keys = _keys_of(tensors)
     except RuntimeError:
-        _reads.last = None
+        keys = None
+    _reads.last = None if keys is None else (keys, read)
     return read
 
 
-def replace(settings: Settings, values: Mapping[str, Any]) -> Settings:
-    """Return settings with the values of tensors."""
+def replace(
+    settings: Settings, values: Mapping[str, Any], read: Sequence[Any] | None = None
+) -> Settings:
+    """Return settings with the values of tensors; `read`: these on the host, if they are there."""
     if not values:
         return settings
-    tensors = [*values.values()]
-    ahead, _reads.last = _reads.last, None
-    read = ahead[1] if ahead and ahead[0] == _keys_of(tensors) else on_host_together(tensors)
+    if read is None:
+        read = on_host_together([*values.values()])
     given = {name: _field_value(part) for name, part in zip(values, read, strict=True)}
     if any(isinstance(value, np.ndarray) for value in given.values()):
         return settings.replace(**given)
@@ -200,12 +202,18 @@ class _Call(NamedTuple):
         """Whether the work stays on the GPU."""
         return bool(self.image.is_cuda and self.image.dtype != torch.float64)
 
+    def replace(self, settings: Settings) -> Settings:
+        """Return settings with the values of fields, as this thread has read them for the call."""
+        ahead, _reads.last = _reads.last, None
+        is_read = ahead is not None and ahead[0] == _keys_of(self.values)
+        return replace(settings, self.fields, ahead[1] if ahead and is_read else None)
+
     def each(self) -> Iterator[tuple[tuple[int, ...], dict[str, Any], Settings]]:
         """Yield the index, the arrays and the settings of each image of a batch."""
         arrays = {
             name: part.detach().cpu().contiguous().numpy() for name, part in self.images.items()
         }
-        settings = replace(_settings(self.settings), self.fields)
+        settings = self.replace(_settings(self.settings))
         for index in np.ndindex(tuple(self.image.shape[:-3])):
             yield index, {name: part[index] for name, part in arrays.items()}, settings
 
@@ -301,7 +309,7 @@ def _pull_on_device(call: _Call, cotangent: Any, by_images: bool) -> Iterator[An
 
 
 def _settings_of(call: _Call) -> Settings:
-    return replace(in_floats(_settings(call.settings)), call.fields)
+    return call.replace(in_floats(_settings(call.settings)))
 
 
 def _batch(tensor: Any) -> Any:
