@@ -194,6 +194,17 @@ PyObject *vkb_renderer_cuda_name(PyObject *object, PyObject *ordinal)
     return exports ? PyUnicode_FromString(name) : vkb_raise(state, &error);
 }
 
+PyObject *vkb_renderer_has_drawn(PyObject *object, PyObject *unused)
+{
+    const struct vkb_renderer *renderer = (struct vkb_renderer *)object;
+
+    (void)unused;
+    VKB_LOCK(vkb_memory);
+    const bool drawn = renderer->exports && vkb_exports_drawn(renderer->exports);
+    VKB_UNLOCK(vkb_memory);
+    return PyBool_FromLong(drawn);
+}
+
 PyObject *vkb_renderer_in_context(PyObject *object, PyObject *function)
 {
     const struct vkb_module_state *state = PyType_GetModuleState(Py_TYPE(object));
@@ -228,7 +239,8 @@ static bool fill(struct vkb_export *run, struct vkb_error *error)
     if (run->origin_size == 0)
         return true;
     Py_BEGIN_ALLOW_THREADS
-    done = vkb_cuda_begin_copy(cuda, &run->memory, run->origin, run->origin_size, error);
+    done = vkb_cuda_begin_copy(cuda, &run->memory, run->origin, run->origin_size,
+                               run->origin_stream, error);
     Py_END_ALLOW_THREADS
     VKB_LOCK(vkb_memory);
     const bool ordered = done && vkb_export_order_copy(run);
@@ -254,12 +266,12 @@ bool vkb_fill_exported(void *context, struct vkb_export *exported, struct vkb_er
 
 PyObject *vkb_renderer_snapshot(PyObject *object, PyObject *arguments)
 {
-    unsigned long long address;
+    unsigned long long address, stream = 0;
     Py_ssize_t size;
     int later = false;
     struct vkb_error error = {0};
 
-    if (!PyArg_ParseTuple(arguments, "Kn|p:snapshot", &address, &size, &later)
+    if (!PyArg_ParseTuple(arguments, "Kn|Kp:snapshot", &address, &size, &stream, &later)
         || !vkb_check_bytes("snapshot", size))
         return NULL;
     struct exported_object *self = new_exported((struct vkb_renderer *)object, size);
@@ -267,6 +279,7 @@ PyObject *vkb_renderer_snapshot(PyObject *object, PyObject *arguments)
         return NULL;
     self->run->origin = address;
     self->run->origin_size = (size_t)size;
+    self->run->origin_stream = (void *)(uintptr_t)stream;
     if (later || fill(self->run, &error))
         return (PyObject *)self;
     Py_DECREF(self);

@@ -470,18 +470,12 @@ bool vkb_cuda_settle_lost(struct vkb_cuda *cuda)
     return over;
 }
 
-static bool copy(struct vkb_cuda *cuda, vkb_cuda_address to, vkb_cuda_address from, size_t size,
-                 struct vkb_error *error)
-{
-    return CU(error, cuda->cuMemcpyAsync(to, from, size, cuda->stream));
-}
-
 bool vkb_cuda_copy(struct vkb_cuda *cuda, vkb_cuda_address to, vkb_cuda_address from, size_t size,
                    struct vkb_error *error)
 {
     if (!enter_streams(cuda, NULL, error))
         return false;
-    const bool begun = copy(cuda, to, from, size, error);
+    const bool begun = CU(error, cuda->cuMemcpyAsync(to, from, size, cuda->stream));
     const bool done = begun && CU(error, cuda->cuStreamSynchronize(cuda->stream));
     // The first wait may have failed for lack of memory. The caller frees the host's memory now.
     if (begun && !done)
@@ -491,12 +485,14 @@ bool vkb_cuda_copy(struct vkb_cuda *cuda, vkb_cuda_address to, vkb_cuda_address 
 }
 
 bool vkb_cuda_begin_copy(struct vkb_cuda *cuda, struct vkb_cuda_memory *to, vkb_cuda_address from,
-                         size_t size, struct vkb_error *error)
+                         size_t size, void *stream, struct vkb_error *error)
 {
-    if (!enter_streams(cuda, NULL, error))
+    if (!enter_streams(cuda, stream, error))
         return false;
-    const bool done = copy(cuda, to->address, from, size, error)
-                   && CU(error, cuda->cuEventRecord(to->event, cuda->stream));
+    if (!stream)
+        stream = cuda->stream;
+    const bool done = CU(error, cuda->cuMemcpyAsync(to->address, from, size, stream))
+                   && CU(error, cuda->cuEventRecord(to->event, stream));
     leave(cuda);
     return done;
 }

@@ -70,9 +70,10 @@ void vkb_cuda_free(struct vkb_cuda *cuda, struct vkb_cuda_memory *memory);
 // overlap with other calls.
 bool vkb_cuda_copy(struct vkb_cuda *cuda, vkb_cuda_address to, vkb_cuda_address from, size_t size,
                    struct vkb_error *error);
-// The same to imported memory, without the wait, which follows. Both may overlap with other calls.
+// The same to imported memory on a stream, NULL: the core's, without the wait, which follows. Both
+// may overlap with other calls.
 bool vkb_cuda_begin_copy(struct vkb_cuda *cuda, struct vkb_cuda_memory *to, vkb_cuda_address from,
-                         size_t size, struct vkb_error *error);
+                         size_t size, void *stream, struct vkb_error *error);
 bool vkb_cuda_end_copy(struct vkb_cuda *cuda, const struct vkb_cuda_memory *to,
                        struct vkb_error *error);
 // Makes all work that the context gets from now on wait for the copy, so that its source can be

@@ -10,6 +10,8 @@ from typing import Any, Literal, TypeAlias
 
 from vkbloom._extras import import_extra
 from vkbloom._gradients.operators import (
+    flatten,
+    names_of,
     number_of,
     read_ahead,
     refuse_capture,
@@ -84,7 +86,8 @@ def bloom(
     """
     settings = check_settings(settings, of_image=True)
     order: Order = "CHW" if channels_first else "HWC"
-    return _call(image, settings, {}, order, mask=mask, emission=emission, renderer=renderer)
+    arrays = {"mask": mask, "emission": emission}
+    return _call(image, settings, order, **arrays, renderer=renderer)
 
 
 class Bloom(torch.nn.Module):  # type: ignore[misc]
@@ -150,48 +153,50 @@ class Bloom(torch.nn.Module):  # type: ignore[misc]
         self.learned = torch.nn.ParameterDict(
             {name.replace(".", "_"): torch.tensor(known[name]) for name in self._names}
         )
+        self._fields = names_of({name: self._parameter(name) for name in self._names})
 
     @property
     def settings(self) -> Settings:
         """The settings with what was learned."""
         values = [_clamp(self._parameter(name), self._ranges[name]) for name in self._names]
-        return replace(self._start, dict(zip(self._names, values, strict=True)))
+        return replace(self._start, self._fields, flatten([value.cpu() for value in values]))
 
     def forward(self, image: Any, *, mask: Any = None, emission: Any = None) -> Any:
         """Add bloom, as `bloom` does."""
         if not torch.compiler.is_compiling():
             # Comparing parameters waits for the device, which would end the capture.
             refuse_capture(image)
-        values = dict(zip(self._names, self._values(), strict=True))
-        arrays = {"mask": mask, "emission": emission}
-        return _call(image, self._start, values, self._order, **arrays, renderer=self._renderer)
+        values = self._values() if self._names else None
+        arrays = {"mask": mask, "emission": emission, "renderer": self._renderer}
+        return _call(image, self._start, self._order, self._fields, values, **arrays)
 
     def _parameter(self, name: str) -> Any:
         return self.learned[name.replace(".", "_")]
 
-    def _values(self) -> list[Any]:
-        """Return the parameters, moved into the ranges of their fields."""
+    def _values(self) -> Any:
+        """Return the parameters, moved into the ranges of their fields, as `flatten` does."""
         parameters = [self._parameter(name) for name in self._names]
         # Compiled code cannot depend on values.
-        compiling = torch.compiler.is_compiling()
-        read = parameters if compiling else read_ahead(parameters)
+        if torch.compiler.is_compiling():
+            with torch.no_grad():
+                for name, parameter in zip(self._names, parameters, strict=True):
+                    parameter.copy_(_clamp(parameter, self._ranges[name]))
+            return flatten(parameters)
+        values, moved = flatten(parameters), False
+        parts = read_ahead(values).split([parameter.numel() for parameter in parameters])
         with torch.no_grad():
-            for name, parameter, values in zip(self._names, parameters, read, strict=True):
-                ends = self._ranges[name]
-                # Without the tensors that follow.
-                if not compiling and _is_within(values, ends):
-                    continue
-                held = _clamp(values, ends)
+            for name, parameter, part in zip(self._names, parameters, parts, strict=True):
                 # A write, also of an equal value, makes what earlier calls have saved unusable.
                 # (Compiled code saves copies.)
-                if compiling or not torch.equal(held, values):
-                    parameter.copy_(held)
-        return parameters
+                if not _is_within(part.tolist(), self._ranges[name]):
+                    parameter.copy_(_clamp(parameter, self._ranges[name]))
+                    moved = True
+        return flatten(parameters) if moved else values
 
 
-def _is_within(value: Any, ends: tuple[float, float] | None) -> bool:
-    """Return whether a tensor on the host is a number between the ends, or has none."""
-    return ends is None or (value.ndim == 0 and ends[0] <= value.item() <= ends[1])
+def _is_within(values: Any, ends: tuple[float, float] | None) -> bool:
+    """Return whether all numbers of a list are between the ends, or there are none."""
+    return ends is None or all(ends[0] <= value <= ends[1] for value in values)
 
 
 def _clamp(value: Any, ends: tuple[float, float] | None) -> Any:
@@ -211,20 +216,21 @@ def _check_renderer(renderer: object) -> Renderer | None:
 def _call(
     image: Any,
     settings: Settings,
-    values: dict[str, Any],
     order: Order,
+    fields: str = "",
+    values: Any = None,
     *,
     mask: Any,
     emission: Any,
     renderer: Renderer | None,
 ) -> Any:
-    """Run the operator; `values` are tensors of fields."""
+    """Run the operator; `fields` and `values` are what `names_of` and `flatten` return."""
     for name, tensor in (("image", image), ("mask", mask), ("emission", emission)):
         if not isinstance(tensor, torch.Tensor) and (tensor is not None or name == "image"):
             raise TypeError(f"{name}: a tensor is needed, not {type(tensor).__name__}")
     _check(image, mask, emission, order)
     _check_renderer(renderer)
-    refuse_tangents((image, mask, emission, *values.values()))
+    refuse_tangents((image, mask, emission, values))
     if order == "CHW":
         image = image.movedim(-3, -1)
         emission = None if emission is None else emission.movedim(-3, -1)
@@ -232,8 +238,8 @@ def _call(
         image,
         mask,
         emission,
-        [*values.values()],
-        ",".join(values),
+        values,
+        fields,
         text_of(settings),
         number_of(renderer),
     )

@@ -26,6 +26,7 @@ enum {
     CAPTURE_UNSUPPORTED = 900,
 };
 enum { CAPTURE_MODE_GLOBAL = 0 };
+#define DEFAULT_STREAM ((void *)(uintptr_t)1)
 
 // What is there now, by kind; and bytes that go to the host.
 static _Atomic long contexts, streams, events, memories, mappings, host_bytes, current;
@@ -481,7 +482,7 @@ EXPORT int cuMemcpyAsync(unsigned long long to, unsigned long long from, size_t 
         .from = (const void *)(uintptr_t)from,
         .size = size,
     });
-    return stream == &streams ? SUCCESS : INVALID_VALUE;
+    return stream == &streams || stream == DEFAULT_STREAM ? SUCCESS : INVALID_VALUE;
 }
 
 EXPORT int cuImportExternalSemaphore(void **handle, const struct semaphore_handle *given)

@@ -28,7 +28,7 @@ from tests.images import picture
 from tests.taa.moving import moving_frame
 from vkbloom import Convolution, Pyramid, Renderer, Separable
 from vkbloom._gradients.pulling import pull_each
-from vkbloom._renderer.device_arrays import merge, take_later
+from vkbloom._renderer.device_arrays import CudaArray, merge
 from vkbloom._renderer.sources import Inputs, check_inputs
 
 VALIDATION = "validated" in sys.argv
@@ -212,7 +212,9 @@ def later(renderer: Any) -> None:
     batch = np.zeros((1, 16, 24, 3), np.float32)
 
     def take() -> Any:
-        return take_later(OnDevice(batch), "image", renderer._core)
+        """Take it on CUDA's default stream."""
+        array = CudaArray(batch, batch.ctypes.data, batch.shape, batch.strides, "float32", 1)
+        return array.copy(renderer._core, later=True)
 
     def run(taken: Any) -> Any:
         return renderer._apply_inputs(Inputs(taken.at(0)), LOW, ("final",))
@@ -241,6 +243,9 @@ def later(renderer: Any) -> None:
     take()
     batch[0] = images[2]
     same(renderer.apply(OnDevice(images[0]), LOW, framebuffers="final"), expected[0])
+    renderer._pending.wait()
+    # The host knows what the device has drawn where both share a timeline with CUDA.
+    assert renderer._core.has_drawn() == LATE
 
 
 def sequences(renderer: Any) -> None:

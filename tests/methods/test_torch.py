@@ -33,10 +33,10 @@ def tensor(*shape: int, dtype: Any = None, seed: int = 1, requires_grad: bool = 
 
 
 def arguments(dtype: Any, settings: Any = SETTINGS) -> tuple[Any, ...]:
-    value = torch.tensor(0.7, dtype=dtype, device=DEVICE, requires_grad=True)
+    values = torch.tensor([0.7], dtype=dtype, device=DEVICE, requires_grad=True)
     image, emission = (tensor(4, 5, 3, dtype=dtype, seed=seed) for seed in (1, 2))
     mask = tensor(4, 5, dtype=dtype, seed=3).detach() * 0.8 + 0.1
-    return image, mask.requires_grad_(), emission, [value], "intensity", settings.to_json(), 0
+    return image, mask.requires_grad_(), emission, values, "intensity", settings.to_json(), 0
 
 
 def test_result_is_that_of_the_renderer(renderer: Renderer) -> None:
@@ -120,10 +120,8 @@ def test_derivatives_are_those_of_the_renderer(renderer: Renderer) -> None:
 
 def test_derivatives_of_doubles_pass_gradcheck() -> None:
     torch.autograd.gradcheck(
-        lambda image, mask, emission, value: torch.ops.vkbloom.bloom(
-            image, mask, emission, [value], *arguments(torch.float64)[4:]
-        ),
-        (*arguments(torch.float64)[:3], arguments(torch.float64)[3][0]),
+        lambda *tensors: torch.ops.vkbloom.bloom(*tensors, *arguments(torch.float64)[4:]),
+        arguments(torch.float64)[:4],
     )
 
 
@@ -135,12 +133,7 @@ def test_operators_pass_opcheck(name: str) -> None:
     torch.library.opcheck(torch.ops.vkbloom.bloom.default, arguments(dtype))
     cotangent = tensor(4, 5, 3, dtype=dtype, requires_grad=False)
     detached = [
-        [one.detach() for one in part]
-        if isinstance(part, list)
-        else part.detach()
-        if isinstance(part, torch.Tensor)
-        else part
-        for part in arguments(dtype)
+        part.detach() if isinstance(part, torch.Tensor) else part for part in arguments(dtype)
     ]
     for by_images in (True, False):
         given = cotangent, by_images, *detached

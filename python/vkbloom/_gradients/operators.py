@@ -7,6 +7,7 @@ number, is a constant of code that `torch.compile` made.
 from __future__ import annotations
 
 import functools
+import math
 import threading
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, Final, NamedTuple, cast
@@ -19,7 +20,14 @@ from vkbloom._gradients.pulling import pull_each, undefined
 from vkbloom._image_arguments import check_mask
 from vkbloom._psf.values import ARRAYS, ArrayValue
 from vkbloom._renderer.default import default_renderer, renderer_on
-from vkbloom._renderer.device_arrays import DeviceArray, ImportedArray, merge, take_later
+from vkbloom._renderer.device_arrays import (
+    LEGACY_STREAM,
+    CudaArray,
+    DeviceArray,
+    ImportedArray,
+    merge,
+    take,
+)
 from vkbloom._renderer.frames import Frames
 from vkbloom._renderer.renderer import RENDERERS, Renderer, Taken
 from vkbloom._renderer.sources import Inputs, check_inputs
@@ -91,45 +99,63 @@ def _settings(text: str) -> Settings:
     return Settings.from_json(text)
 
 
-def on_host_together(tensors: Sequence[Any]) -> list[Any]:
-    """Return tensors on the host. Numbers on a GPU are read at once: each wait takes 0.1 ms."""
-    parts = [tensor.detach() for tensor in tensors]
-    kinds = {(part.device, part.dtype, part.shape) for part in parts}
-    if len(parts) > 1 and len(kinds) == 1 and parts[0].is_cuda and parts[0].ndim == 0:
-        return [*torch.stack(parts).cpu()]
-    return [part.cpu() for part in parts]
-
-
 class _Reads(threading.local):
-    """What a thread has read for the operator that it calls next: keys of tensors, and numbers."""
+    """What a thread has read for the operator that it calls next: a tensor's key, and its copy."""
 
-    last: tuple[Any, list[Any]] | None = None
+    last: tuple[Any, Any] | None = None
 
 
 _reads = _Reads()
 
 
-def read_ahead(tensors: Sequence[Any]) -> list[Any]:
-    """Return tensors on the host, as `on_host_together`, and keep them for the next operator."""
-    read = on_host_together(tensors)
+def flatten(tensors: Sequence[Any]) -> Any:
+    """Return all numbers of tensors as one dimension, which an operator takes; None: no tensors.
+
+    PyTorch takes 40 us longer to call an operator with a list of tensors, and as long for its
+    derivative. Numbers on a GPU are read together: each wait takes 0.1 ms.
+    """
+    if not tensors:
+        return None
+    where = tensors[0].device
+    return torch.cat([tensor.to(where).reshape(-1) for tensor in tensors])
+
+
+def names_of(fields: Mapping[str, Any]) -> str:
+    """Return the names and the shapes of fields' tensors as the text that an operator takes."""
+    return ",".join(
+        name + ":" * (tensor.ndim > 0) + "x".join(map(str, tensor.shape))
+        for name, tensor in fields.items()
+    )
+
+
+@functools.lru_cache(64)
+def _shapes(names: str) -> dict[str, tuple[int, ...]]:
+    """Return the shapes by name of such a text."""
+    parts = (part.partition(":") for part in names.split(",") if part)
+    return {name: tuple(map(int, sides.split("x"))) if sides else () for name, _, sides in parts}
+
+
+def read_ahead(values: Any) -> Any:
+    """Return such numbers on the host, and keep them for the next operator."""
+    read = values.detach().cpu()
     # A tensor within a transform of torch.func has no address.
     try:
-        keys = _keys_of(tensors)
+        key = _key_of_each(values)
     except RuntimeError:
-        keys = None
-    _reads.last = None if keys is None else (keys, read)
+        key = None
+    _reads.last = None if key is None else (key, read)
     return read
 
 
-def replace(
-    settings: Settings, values: Mapping[str, Any], read: Sequence[Any] | None = None
-) -> Settings:
-    """Return settings with the values of tensors; `read`: these on the host, if they are there."""
-    if not values:
+def replace(settings: Settings, fields: str, values: Any) -> Settings:
+    """Return settings with the values of `flatten`, on the host, of the fields of `names_of`."""
+    if not fields:
         return settings
-    if read is None:
-        read = on_host_together([*values.values()])
-    given = {name: _field_value(part) for name, part in zip(values, read, strict=True)}
+    given, at = {}, 0
+    for name, shape in _shapes(fields).items():
+        part = values[at : at + math.prod(shape)].reshape(shape)
+        given[name] = part.numpy() if part.ndim == 3 else _numbers(part.tolist())
+        at += part.numel()
     if any(isinstance(value, np.ndarray) for value in given.values()):
         return settings.replace(**given)
     return _replaced(settings, tuple(given.items()))
@@ -139,11 +165,6 @@ def replace(
 @functools.lru_cache(16)
 def _replaced(settings: Settings, values: tuple[tuple[str, Any], ...]) -> Settings:
     return settings.replace(**dict(values))
-
-
-def _field_value(value: Any) -> Any:
-    """Return a tensor as an array if it is that of weights, or as numbers."""
-    return value.numpy() if value.ndim == 3 else _numbers(value.tolist())
 
 
 def _numbers(value: Any) -> Any:
@@ -176,12 +197,12 @@ def number_of(renderer: Renderer | None) -> int:
 
 
 class _Call(NamedTuple):
-    """The arguments of an operator: images, the tensors of fields, texts, and a renderer."""
+    """The arguments of an operator: images, the values of fields, texts, and a renderer."""
 
     image: Any
     mask: Any
     emission: Any
-    values: Sequence[Any]
+    values: Any
     names: str
     settings: str
     renderer: int
@@ -193,9 +214,9 @@ class _Call(NamedTuple):
         return {name: part for name, part in named.items() if part is not None}
 
     @property
-    def fields(self) -> dict[str, Any]:
-        """The tensors by field."""
-        return dict(zip(self.names.split(",") if self.names else [], self.values, strict=True))
+    def fields(self) -> dict[str, tuple[int, ...]]:
+        """The shapes of fields' values."""
+        return _shapes(self.names)
 
     @property
     def on_device(self) -> bool:
@@ -205,8 +226,11 @@ class _Call(NamedTuple):
     def replace(self, settings: Settings) -> Settings:
         """Return settings with the values of fields, as this thread has read them for the call."""
         ahead, _reads.last = _reads.last, None
-        is_read = ahead is not None and ahead[0] == _keys_of(self.values)
-        return replace(settings, self.fields, ahead[1] if ahead and is_read else None)
+        if self.values is None:
+            return settings
+        is_read = ahead is not None and ahead[0] == _key_of_each(self.values)
+        read = ahead[1] if ahead and is_read else self.values.detach().cpu()
+        return replace(settings, self.names, read)
 
     def each(self) -> Iterator[tuple[tuple[int, ...], dict[str, Any], Settings]]:
         """Yield the index, the arrays and the settings of each image of a batch."""
@@ -238,13 +262,15 @@ def _pull(
     return next(pulled)
 
 
-def _keys_of(tensors: Iterable[Any]) -> tuple[Any, ...] | None:
+def _key_of_each(*tensors: Any) -> tuple[Any, ...] | None:
     """Return what tensors with the same elements have in common while some of them exist.
 
     None: the version of an inference tensor is not known.
     """
     keys = []
     for tensor in tensors:
+        if tensor is None:
+            continue
         if tensor.is_inference():
             return None
         keys += [tensor.data_ptr(), tensor._version, tensor.dtype, tensor.shape, tensor.stride()]
@@ -259,24 +285,41 @@ def _take_forward(call: _Call, renderer: Renderer, settings: Settings) -> Import
     what the forward pass has drawn of the same copy.
     """
     renderer._taken = None
-    images = _take_later(call.image, "image", renderer)
-    is_learned = call.image.requires_grad or any(part.requires_grad for part in call.values)
+    images = _take_batch(call.image, "image", renderer)
+    is_learned = call.image.requires_grad or (call.values is not None and call.values.requires_grad)
     if is_learned and (key := _key_of(call)) is not None:
         renderer._taken = Taken(key, images, settings)
     return images
 
 
 def _key_of(call: _Call) -> Any:
-    keys = _keys_of((call.image, *call.values))
+    keys = _key_of_each(call.image, call.values)
     return keys and (*keys, call.names, call.settings)
 
 
-def _take_later(tensor: Any, name: str, renderer: Renderer) -> ImportedArray:
+def _take_batch(tensor: Any, name: str, renderer: Renderer) -> ImportedArray:
+    """Copy a batch, which does not change within the operator, on PyTorch's stream."""
+    core, batch = renderer._core, _batch(tensor)
+    dtype = _DTYPES.get(tensor.dtype)
+    if dtype is None or core.closed or core.cuda()[0] != tensor.device.index:
+        return take(batch, name, core, (4,))  # which says what is wrong
+    size = batch.element_size()
+    strides = tuple([size * stride for stride in batch.stride()])
+    address, stream = batch.data_ptr(), _stream_of(batch)
+    array = CudaArray(batch, address, tuple(batch.shape), strides, dtype, stream)
     # CUDA copies it when earlier passes have ended: beside passes the GPU would change between
     # both, and on an H200 a step of a convolution took 10.8 ms in place of 6.5. The passes that
     # read it are recorded before that wait: steps in a row take 2.43 ms in place of 2.64 (a
     # pyramid), 3.62 in place of 3.80 (kino; 2026-11-29).
-    return take_later(_batch(tensor), name, renderer._core)
+    return array.copy(core, later=not core.has_drawn())
+
+
+_DTYPES: Final = {torch.float16: "float16", torch.float32: "float32"}
+
+
+def _stream_of(tensor: Any) -> int:
+    """Return PyTorch's stream on a tensor's GPU as DLPack has it."""
+    return torch.cuda.current_stream(tensor.device).cuda_stream or LEGACY_STREAM
 
 
 def _pull_on_device(call: _Call, cotangent: Any, by_images: bool) -> Iterator[Any]:
@@ -288,9 +331,9 @@ def _pull_on_device(call: _Call, cotangent: Any, by_images: bool) -> Iterator[An
     # Before the waits, since the device still works.
     settings = taken.settings if taken else _settings_of(call)
     masks = None if mask is None else mask.detach().reshape(-1, *mask.shape[-2:]).cpu().numpy()
-    images = taken.images if taken else _take_later(call.image, "image", renderer)
+    images = taken.images if taken else _take_batch(call.image, "image", renderer)
     emissions, cotangents = (
-        None if tensor is None else _take_later(tensor, name, renderer)
+        None if tensor is None else _take_batch(tensor, name, renderer)
         for name, tensor in (("emission", call.emission), ("cotangent", cotangent))
     )
     assert cotangents
@@ -318,7 +361,7 @@ def _batch(tensor: Any) -> Any:
 
 def _operator(name: str, parameters: str, result: str) -> Any:
     """Declare an operator, whose types PyTorch cannot read from annotations of `Any`."""
-    schema = f"({parameters}Tensor image, Tensor? mask, Tensor? emission, Tensor[] values, "
+    schema = f"({parameters}Tensor image, Tensor? mask, Tensor? emission, Tensor? values, "
     schema += f"str names, str settings, int renderer) -> {result}"
     return torch.library.custom_op(name, mutates_args=(), schema=schema, **_TAGS)
 
@@ -396,7 +439,7 @@ def _on_device(call: _Call) -> Any:
         )
     # The images of a batch are in the same memory.
     batches = merge([cast("DeviceArray", tensor["final"]) for tensor in frames])
-    return _join([torch.from_dlpack(tensor) for tensor in batches], call.image, torch.cat)
+    return _join([_as_tensor(batch, call.image) for batch in batches], call.image, torch.cat)
 
 
 @_bloom.register_fake  # type: ignore[untyped-decorator]
@@ -404,9 +447,12 @@ def _(image: Any, *rest: Any) -> Any:
     return torch.empty(image.shape, dtype=image.dtype, device=image.device)
 
 
-@_operator("vkbloom::bloom_backward", "Tensor cotangent, bool by_images, ", "Tensor[]")  # type: ignore[untyped-decorator]
-def _backward(cotangent: Any, by_images: bool, *given: Any) -> list[Any]:
-    """Return the derivatives by the image, those of mask and emission that are there, and values.
+_FOUR: Final = "(Tensor, Tensor, Tensor, Tensor)"
+
+
+@_operator("vkbloom::bloom_backward", "Tensor cotangent, bool by_images, ", _FOUR)  # type: ignore[untyped-decorator]
+def _backward(cotangent: Any, by_images: bool, *given: Any) -> tuple[Any, ...]:
+    """Return the derivatives by image, mask, emission and values; without elements: of none.
 
     Of a batch, the derivatives by values are added. Without `by_images` they are by values alone.
     """
@@ -425,27 +471,33 @@ def _backward(cotangent: Any, by_images: bool, *given: Any) -> list[Any]:
         )
     for gradients in pulled:
         for name, parts in derivatives.items():
-            parts.append(_as_tensor(gradients[name]))
-    return [
-        *(_join(derivatives[name], part) for name, part in images.items()),
-        *_add_up([derivatives[name] for name in fields], call.values),
+            parts.append(_as_tensor(gradients[name], call.image))
+    return (
+        *(
+            _join(derivatives[name], images[name]) if name in images else torch.empty(0)
+            for name in ("image", "mask", "emission")
+        ),
+        torch.empty(0) if call.values is None else _add_up(derivatives, fields, call.values),
+    )
+
+
+def _add_up(
+    derivatives: Mapping[str, list[Any]], fields: Mapping[str, tuple[int, ...]], like: Any
+) -> Any:
+    """Return the sums of derivatives by fields as `flatten` does, like another tensor."""
+    totals = [
+        sum(derivatives[name], torch.zeros(shape)).reshape(-1) for name, shape in fields.items()
     ]
+    return torch.cat(totals).to(like)
 
 
-def _add_up(parts: Sequence[list[Any]], like: Sequence[Any]) -> list[Any]:
-    """Return the sums of derivatives as tensors like others. Numbers go to a GPU at once."""
-    totals = [sum(each, torch.zeros(one.shape)) for each, one in zip(parts, like, strict=True)]
-    kinds = {(one.device, one.dtype, one.shape) for one in like}
-    if len(like) > 1 and len(kinds) == 1 and like[0].is_cuda and like[0].ndim == 0:
-        # Results of an operator share no memory.
-        return [one.clone() for one in torch.stack(totals).to(like[0])]
-    return [total.to(one) for total, one in zip(totals, like, strict=True)]
+def _as_tensor(part: Any, image: Any) -> Any:
+    """Return a derivative as a tensor; one of NumPy in float64, so that sums are exact.
 
-
-def _as_tensor(part: Any) -> Any:
-    """Return a derivative as a tensor; one of NumPy in float64, so that sums are exact."""
+    PyTorch's stream waits for one on the GPU of an image.
+    """
     if isinstance(part, DeviceArray):
-        return torch.from_dlpack(part)
+        return torch.from_dlpack(part.__dlpack__(stream=_stream_of(image)))
     return torch.from_numpy(np.array(part, np.float64))
 
 
@@ -458,33 +510,36 @@ def _join(parts: list[Any], like: Any, join: Any = None) -> Any:
 
 
 @_backward.register_fake  # type: ignore[untyped-decorator]
-def _(cotangent: Any, by_images: bool, *given: Any) -> Any:
-    call = _Call(*given)
-    return [
-        torch.empty(part.shape, dtype=part.dtype, device=part.device)
-        for part in (*(call.images.values() if by_images else ()), *call.values)
-    ]
+def _(cotangent: Any, by_images: bool, *given: Any) -> tuple[Any, ...]:
+    image, mask, emission, values, *_ = given
+    return tuple(
+        torch.empty(0)
+        if part is None
+        else torch.empty(part.shape, dtype=part.dtype, device=part.device)
+        for part in (*((image, mask, emission) if by_images else (None,) * 3), values)
+    )
 
 
 def _keep(ctx: Any, inputs: tuple[Any, ...], output: Any) -> None:
-    image, mask, emission, values, *ctx.texts = inputs
+    *tensors, ctx.names, ctx.settings, ctx.number = inputs
     # Held until the backward pass, also if the caller lets it go before.
-    ctx.renderer = RENDERERS.get(ctx.texts[-1])
-    ctx.given = [part is not None for part in (image, mask, emission)]
-    ctx.save_for_backward(*(part for part in (image, mask, emission) if part is not None), *values)
+    ctx.renderer = RENDERERS.get(ctx.number)
+    ctx.save_for_backward(*tensors)
 
 
 def _back(ctx: Any, cotangent: Any) -> tuple[Any, ...]:
-    saved = iter(ctx.saved_tensors)
-    inputs = [next(saved) if given else None for given in ctx.given]
-    # A step that learns fields alone needs none of these.
-    by_images = any(ctx.needs_input_grad[: len(inputs)])
-    derivatives = iter(
-        torch.ops.vkbloom.bloom_backward(cotangent, by_images, *inputs, [*saved], *ctx.texts)
+    inputs = ctx.saved_tensors
+    # A step that learns fields alone needs none of the others.
+    by_images = any(ctx.needs_input_grad[:3])
+    derivatives = torch.ops.vkbloom.bloom_backward(
+        cotangent, by_images, *inputs, ctx.names, ctx.settings, ctx.number
     )
+    wanted = (by_images, by_images, by_images, True)
     return (
-        *(next(derivatives) if by_images and given else None for given in ctx.given),
-        [*derivatives],
+        *(
+            derivative if part is not None and is_wanted else None
+            for derivative, part, is_wanted in zip(derivatives, inputs, wanted, strict=True)
+        ),
         None,
         None,
         None,

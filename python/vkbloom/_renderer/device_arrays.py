@@ -30,8 +30,8 @@ _UINT, _FLOAT, _BFLOAT, _COMPLEX, _BOOL = 1, 2, 4, 5, 6
 _DTYPES = {(_UINT, 8): "uint8", (_FLOAT, 16): "float16", (_FLOAT, 32): "float32"}
 _READABLE: Final = f"{', '.join(IMAGE_DTYPES)} on the device"
 _CODES = {"u": _UINT, "f": _FLOAT}
-# CUDA's handles of the default stream and of each thread's; 0 is not one of DLPack.
-_LEGACY = 1
+# CUDA's handle of the default stream; 0 is not one of DLPack.
+LEGACY_STREAM: Final = 1
 
 
 @public("vkbloom")
@@ -163,7 +163,7 @@ class DeviceArray:
             8 * self.dtype.itemsize,
             versioned_capsule,
             offset,
-            _LEGACY if stream is None else max(stream, 0),
+            LEGACY_STREAM if stream is None else max(stream, 0),
         )
 
     @property
@@ -264,14 +264,28 @@ def likeness(image: Any) -> NDArray[Any]:
     return np.empty(tuple(image.shape), dtype)
 
 
-class _Array(NamedTuple):
-    """An array of CUDA, strides in bytes. The renderer's stream waits for its producer's work."""
+class CudaArray(NamedTuple):
+    """An array of CUDA, strides in bytes, and the stream that gets its producer's work.
+
+    The renderer's stream, 0, waits for it.
+    """
 
     owner: object
     address: int
     shape: tuple[int, ...]
     strides: tuple[int, ...]
     dtype: str
+    stream: int = 0
+
+    def copy(self, core: _core.Renderer, *, later: bool = False) -> ImportedArray:
+        """Copy it to memory that Vulkan shares, ordered after its producer's work.
+
+        `later`: When a submission first reads the copy, or somebody else does. The array must not
+        change until then.
+        """
+        low, high = _span(self.shape, self.strides, self.dtype)
+        memory = core.snapshot(self.address + low, high - low, self.stream, later)
+        return ImportedArray(memory, -low, self.shape, self.strides, self.dtype)
 
 
 class ImportedArray(NamedTuple):
@@ -348,7 +362,7 @@ def _capsule(image: Any, stream: int) -> Any:
         return image.__dlpack__(stream=stream)
 
 
-def _from_dlpack(image: Any, name: str, core: _core.Renderer) -> _Array:
+def _from_dlpack(image: Any, name: str, core: _core.Renderer) -> CudaArray:
     kind, ordinal = (int(number) for number in image.__dlpack_device__())
     if kind == _CUDA_MANAGED:
         raise ValueError(
@@ -371,7 +385,7 @@ def _from_dlpack(image: Any, name: str, core: _core.Renderer) -> _Array:
     elements = _contiguous(shape) if strides is None else strides
     # Modulo 2**64, since CuPy 14 divides negative strides as if they had no sign.
     in_bytes = [(size * stride + 2**63) % 2**64 - 2**63 for stride in elements]
-    return _Array(capsule, address, shape, tuple(in_bytes), dtype)
+    return CudaArray(capsule, address, shape, tuple(in_bytes), dtype)
 
 
 def fill(target: Any, name: str, made: DeviceArray, core: _core.Renderer) -> None:
@@ -399,31 +413,6 @@ def take(
     channels: tuple[int, ...] = (3, 4),
 ) -> ImportedArray:
     """Copy an array of CUDA to memory that Vulkan shares, ordered after its producer's work."""
-    return _import(_find(image, name, core, sides, channels), core, later=False)
-
-
-def take_later(image: Any, name: str, core: _core.Renderer) -> ImportedArray:
-    """Do the same for a batch of images when a submission first reads it, or somebody else does.
-
-    The array must not change until then.
-    """
-    return _import(_find(image, name, core, (4,), (3, 4)), core, later=True)
-
-
-def _import(array: _Array, core: _core.Renderer, *, later: bool) -> ImportedArray:
-    low, high = _span(array.shape, array.strides, array.dtype)
-    memory = core.snapshot(array.address + low, high - low, later)
-    return ImportedArray(memory, -low, array.shape, array.strides, array.dtype)
-
-
-def _find(
-    image: Any,
-    name: str,
-    core: _core.Renderer,
-    sides: tuple[int, ...],
-    channels: tuple[int, ...],
-) -> _Array:
-    """Return an array of CUDA that has so many sides and, with three and more, channels."""
     _require_no_capture()
     try:
         core.cuda()
@@ -444,4 +433,4 @@ def _find(
                 else ""
             )
         )
-    return array
+    return array.copy(core)
