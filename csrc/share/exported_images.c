@@ -160,13 +160,15 @@ bool vkb_exported_record_input(struct vkb_run *run, struct vkb_staged_input *sta
     const struct vkb_export *exported = staged->input->exported;
     const VkBuffer buffer = exported->buffer.handle;
     const enum vkb_input_kind kind = kind_of(run, staged);
-    const bool counts = !vkb_is_grey(kind) && staged->input->format != VKB_FORMAT_RGBA8_UNORM;
+    // Non-finite elements are counted again in each submission, but not beside cotangents, of which
+    // alone they are asked for.
+    const bool counts = !vkb_is_grey(kind) && staged->input->format != VKB_FORMAT_RGBA8_UNORM
+                     && (!run->inputs[VKB_INPUT_LEVEL].input || kind >= VKB_INPUT_LEVEL);
 
     if (!has_input(run, exported, 0, kind))
         vkb_barrier_record_owner(run->device, commands, buffer, VKB_ACCESS_NONE,
                                  VKB_ACCESS_DISPATCH_LOADED);
     vkb_image_transition(run->device, commands, &staged->image->image, VKB_ACCESS_DISPATCH_STORED);
-    // Non-finite elements are counted again in each submission.
     if ((staged->send || counts) && !copy_input(run, staged, error))
         return false;
     staged->image->content.valid = true;

@@ -7,7 +7,7 @@ enum {
     BINDINGS = 3,
     GROUP_SIZE = 128,  // of strided_copy.glsl
     TILE_WIDTH = 16,   // of the pixels of a group that writes to an image
-    TILE_HEIGHT = GROUP_SIZE / TILE_WIDTH,
+    TILE_HEIGHT = 4 * GROUP_SIZE / TILE_WIDTH,
     MAX_GROUPS = 0xffff,  // along x, which every device can do
 };
 
@@ -100,7 +100,7 @@ static VkExtent2D count_groups(const struct vkb_strided_copy_work *work)
             (layout->width + TILE_WIDTH - 1) / TILE_WIDTH,
             (layout->height + TILE_HEIGHT - 1) / TILE_HEIGHT,
         };
-    const uint64_t count = (uint64_t)layout->width * layout->height * layout->channels;
+    const uint64_t count = (uint64_t)layout->width * layout->height;
     const uint32_t per_group = GROUP_SIZE * (16 / layout->size);
     const uint32_t groups = (uint32_t)((count + per_group - 1) / per_group);
     const uint32_t rows = (groups + MAX_GROUPS - 1) / MAX_GROUPS;
