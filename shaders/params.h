@@ -337,18 +337,22 @@
     INPUT(B, int, before_y)
 
 // Writes the kernel into padded lines (fft_kernel.comp). For each axis: the kernel's number of
-// texels, how many of them before and after its centre count, and the period of the line. `grey`:
-// all channels are equal.
+// texels, the first and the last that are not 0, how many before and after its centre count, and the
+// period of the line. `grey`: all channels are equal.
 #define FFT_KERNEL_BLOCK(B, READS, INPUT, VEC4S) \
     INPUT(B, int, padded_x) \
     INPUT(B, int, boundary_x) \
     INPUT(B, int, extent_x) \
+    INPUT(B, int, first_x) \
+    INPUT(B, int, last_x) \
     INPUT(B, int, period_x) \
     INPUT(B, int, before_x) \
     INPUT(B, int, after_x) \
     INPUT(B, int, padded_y) \
     INPUT(B, int, boundary_y) \
     INPUT(B, int, extent_y) \
+    INPUT(B, int, first_y) \
+    INPUT(B, int, last_y) \
     INPUT(B, int, period_y) \
     INPUT(B, int, before_y) \
     INPUT(B, int, after_y) \

@@ -29,15 +29,17 @@ static uint32_t least(uint32_t a, uint32_t b)
 }
 
 static struct vkb_fft_axis make_axis(enum vkb_mode direction, enum vkb_boundary boundary,
-                                     uint32_t extent, struct vkb_reach *reach)
+                                     uint32_t extent, uint32_t furthest, struct vkb_reach *reach)
 {
-    const uint32_t kernel = reach->kernel;
+    const uint32_t centre = reach->kernel / 2;
     struct vkb_fft_axis axis = {.direction = direction, .boundary = boundary, .extent = extent};
 
-    reach->before = least(kernel / 2, boundary == BOUNDARY_MIRROR ? extent : extent - 1);
-    reach->after = least(kernel - 1 - kernel / 2, extent - 1);
+    reach->first = centre - least(centre, furthest);
+    reach->last = centre + least(reach->kernel - 1 - centre, furthest);
+    reach->before = least(centre - reach->first, boundary == BOUNDARY_MIRROR ? extent : extent - 1);
+    reach->after = least(reach->last - centre, extent - 1);
     uint32_t padding = reach->before + reach->after;
-    if (boundary == BOUNDARY_WRAP && kernel >= extent) {
+    if (boundary == BOUNDARY_WRAP && reach->last - reach->first >= extent - 1) {
         reach->before = extent / 2;
         reach->after = extent - 1 - extent / 2;
         padding = extent - 1;
@@ -63,9 +65,9 @@ struct vkb_convolution vkb_describe_convolution(const struct vkb_settings *setti
     };
 
     convolution.x = make_axis(DIRECTION_HORIZONTAL, wrap_x ? BOUNDARY_WRAP : boundary, size.width,
-                              &convolution.reach_x);
+                              settings->kernel.reach_x, &convolution.reach_x);
     convolution.y = make_axis(DIRECTION_VERTICAL, wrap_x ? BOUNDARY_EDGE : boundary, size.height,
-                              &convolution.reach_y);
+                              settings->kernel.reach_y, &convolution.reach_y);
     convolution.pads_rows = convolution.x.line.length > convolution.x.extent;
     convolution.pads_columns = convolution.y.line.length > convolution.y.extent;
     return convolution;
@@ -129,12 +131,16 @@ static void add_placing(const struct vkb_convolving *passes, uint32_t kernel, ui
         .padded_x = (int)x->line.length,
         .boundary_x = x->boundary,
         .extent_x = (int)convolution->reach_x.kernel,
+        .first_x = (int)convolution->reach_x.first,
+        .last_x = (int)convolution->reach_x.last,
         .period_x = (int)x->extent,
         .before_x = (int)convolution->reach_x.before,
         .after_x = (int)convolution->reach_x.after,
         .padded_y = (int)y->line.length,
         .boundary_y = y->boundary,
         .extent_y = (int)convolution->reach_y.kernel,
+        .first_y = (int)convolution->reach_y.first,
+        .last_y = (int)convolution->reach_y.last,
         .period_y = (int)y->extent,
         .before_y = (int)convolution->reach_y.before,
         .after_y = (int)convolution->reach_y.after,

@@ -7,7 +7,8 @@
 
 // Of the kernel along an axis: its pixels, and the offsets that count.
 struct vkb_reach {
-    uint32_t kernel, before, after;
+    uint32_t kernel, first, last;  // the kernel's texels, and those that are not 0
+    uint32_t before, after;        // of these, those that count
 };
 
 // Both axes of a convolution.

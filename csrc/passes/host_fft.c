@@ -133,8 +133,8 @@ bool vkb_host_rows_forth(const struct vkb_pass_row *pass, const struct vkb_host_
 
 // As fft_kernel.comp has them, for all places of a padded line.
 static struct vkb_kernel_places *find_places(int32_t padded, int boundary, int32_t extent,
-                                             int32_t period, int32_t before, int32_t after,
-                                             struct vkb_error *error)
+                                             const int32_t ends[2], int32_t period, int32_t before,
+                                             int32_t after, struct vkb_error *error)
 {
     struct vkb_kernel_places *places = vkb_alloc(error, (size_t)padded, sizeof *places);
 
@@ -144,12 +144,12 @@ static struct vkb_kernel_places *find_places(int32_t padded, int boundary, int32
         if (offset < -before)
             places[at] = (struct vkb_kernel_places){0, -1, 1};
         else if (boundary == BOUNDARY_EDGE && offset == -before)
-            places[at].first = 0;
+            places[at].first = ends[0];
         else if (boundary == BOUNDARY_WRAP)
-            places[at] =
-                (struct vkb_kernel_places){(place % period + period) % period, extent - 1, period};
+            places[at] = (struct vkb_kernel_places){
+                ends[0] + ((place - ends[0]) % period + period) % period, ends[1], period};
         if (boundary == BOUNDARY_EDGE && offset == after)
-            places[at].last = extent - 1;
+            places[at].last = ends[1];
     }
     return places;
 }
@@ -172,8 +172,10 @@ bool vkb_host_kernel_rows(const struct vkb_pass_row *pass, const struct vkb_host
     const bool prepared =
         vkb_host_line_create(length, &work.line, error)
         && (work.kernel_x = find_places(params->padded_x, params->boundary_x, params->extent_x,
+                                        (const int32_t[]){params->first_x, params->last_x},
                                         params->period_x, params->before_x, params->after_x, error))
         && (work.kernel_y = find_places(params->padded_y, params->boundary_y, params->extent_y,
+                                        (const int32_t[]){params->first_y, params->last_y},
                                         params->period_y, params->before_y, params->after_y, error))
         && (work.space = vkb_alloc(error, VKB_MAX_PARTS * work.space_size + 64, 1));
     const bool done = run_loop(&work, prepared, vkb_host_loops()->kernel_rows,

@@ -80,6 +80,8 @@ struct vkb_kernel_data {
     uint64_t serial;  // equal only for equal pixels
     bool grey;
     float prefilter[3];  // min, max, factor; min above max: none
+    // How far pixels that are not 0 lie from the centre at most.
+    uint32_t reach_x, reach_y;
 };
 
 enum { VKB_MAX_FIELD = 512 };  // kernels

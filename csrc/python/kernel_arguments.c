@@ -1,15 +1,17 @@
 // The kernels of convolutions and the picture of dirt, which are Python's arrays.
 #include "python/arguments.h"
 
-// (array (h, w, 4) of float32, of a grey kernel (h, w, 1), serial, (min, max, factor))
+// (array (h, w, 4) of float32, of a grey kernel (h, w, 1), serial, (min, max, factor), (reach x,
+// y))
 static bool read_kernel_tuple(PyObject *tuple, Py_buffer *view, struct vkb_kernel_data *kernel)
 {
     PyObject *pixels;
     unsigned long long serial;
 
     if (!vkb_require_tuple(tuple, "kernel")
-        || !PyArg_ParseTuple(tuple, "OK(fff):core_kernel", &pixels, &serial, &kernel->prefilter[0],
-                             &kernel->prefilter[1], &kernel->prefilter[2])
+        || !PyArg_ParseTuple(tuple, "OK(fff)(II):core_kernel", &pixels, &serial,
+                             &kernel->prefilter[0], &kernel->prefilter[1], &kernel->prefilter[2],
+                             &kernel->reach_x, &kernel->reach_y)
         || !vkb_hold_array(pixels, "kernel", VKB_FLOAT32, 0, view))
         return false;
     if (view->ndim != 3 || (view->shape[2] != 4 && view->shape[2] != 1) || view->len == 0)
@@ -40,6 +42,8 @@ bool vkb_read_kernel_size(PyObject *object, struct vkb_size frame, struct vkb_si
                           kernel->width, kernel->height));
 
     Py_XDECREF(tuple);
+    kernel->reach_x = kernel->width;
+    kernel->reach_y = kernel->height;
     // No other kernel has this number, and the check of memory is for graphs with one.
     kernel->serial = UINT64_MAX;
     return done;

@@ -16,11 +16,13 @@ class CoreKernel(NamedTuple):
       for alpha. Shape (h, w, 1) if all channels are equal.
     - `serial`: A hash of the pixels, so that a kernel that is made again is known to the device.
     - `prefilter`: min, max and mult of Unreal Engine's prefilter; no prefilter if min is above max.
+    - `reach`: How far pixels that are not 0 lie from [h // 2, w // 2] at most, along x and y.
     """
 
     pixels: NDArray[np.float32]
     serial: int
     prefilter: tuple[float, float, float] = (1.0, 0.0, 1.0)
+    reach: tuple[int, int] = (2**31 - 1, 2**31 - 1)
 
     @property
     def nbytes(self) -> int:

@@ -8,18 +8,18 @@ layout(local_size_x = PIXEL_INVOCATIONS, local_size_y = PIXEL_INVOCATIONS) in;
 SAMPLED_IMAGE(SLOT_SOURCE, kernel);
 layout(set = 0, binding = TARGET_BINDING) uniform writeonly image2D target;
 
-// First, last and step of the kernel's places along one axis.
-ivec3 places(int along, int padded, int boundary, int extent, int period, int before, int after)
+// First, last and step of the kernel's places along one axis; `ends`: of those that are not 0.
+ivec3 places(int along, int padded, int boundary, int extent, ivec2 ends, int period, int before, int after)
 {
     int offset = along <= after ? along : along - padded, centre = extent / 2;
     ivec3 found = ivec3(centre + offset, centre + offset, 1);
     if (offset < -before)
         return ivec3(0, -1, 1);
     if (boundary == BOUNDARY_EDGE) {
-        found.x = offset == -before ? 0 : found.x;
-        found.y = offset == after ? extent - 1 : found.y;
+        found.x = offset == -before ? ends.x : found.x;
+        found.y = offset == after ? ends.y : found.y;
     } else if (boundary == BOUNDARY_WRAP) {
-        found = ivec3(((found.x % period) + period) % period, extent - 1, period);
+        found = ivec3(ends.x + (((found.x - ends.x) % period) + period) % period, ends.y, period);
     }
     return found;
 }
@@ -29,10 +29,10 @@ void main()
     ivec2 at = ivec2(gl_GlobalInvocationID.xy);
     if (any(greaterThanEqual(at, imageSize(target))))
         return;
-    ivec3 x = places(at.x, params.padded_x, params.boundary_x, params.extent_x, params.period_x,
-                     params.before_x, params.after_x);
-    ivec3 y = places(at.y, params.padded_y, params.boundary_y, params.extent_y, params.period_y,
-                     params.before_y, params.after_y);
+    ivec3 x = places(at.x, params.padded_x, params.boundary_x, params.extent_x,
+                     ivec2(params.first_x, params.last_x), params.period_x, params.before_x, params.after_x);
+    ivec3 y = places(at.y, params.padded_y, params.boundary_y, params.extent_y,
+                     ivec2(params.first_y, params.last_y), params.period_y, params.before_y, params.after_y);
     vec4 sum = vec4(0.0);
     for (int j = y.x; j <= y.y; j += y.z)
         for (int i = x.x; i <= x.y; i += x.z)

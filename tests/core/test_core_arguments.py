@@ -100,13 +100,14 @@ class Passes(NamedTuple):
 
 
 def kernel(array: Any, serial: int = 1) -> Any:
-    return Kernel((array, serial, (0.0, 0.0, 0.0)))
+    return Kernel((array, serial, (0.0, 0.0, 0.0), (9, 9)))
 
 
 def field(*fields: Any, weights: Any = (2, 3, 4), places: Any = (2, 4, 4)) -> Any:
     """Return a convolution with two kernels of one pixel, with such weights and places."""
-    images = [(np.zeros(shape, np.float32), 1, (1.0, 0.0, 1.0)) for shape in (weights, places)]
-    kernels = np.ones((2, 1, 1), np.float32), 1, (1.0, 0.0, 1.0)
+    rest = 1, (1.0, 0.0, 1.0), (9, 9)
+    images = [(np.zeros(shape, np.float32), *rest) for shape in (weights, places)]
+    kernels = np.ones((2, 1, 1), np.float32), *rest
     return Kernel(kernels, field=(*(fields or (2, 1, False, True, 3, 2)), *images))
 
 
@@ -285,7 +286,7 @@ class Ends(Given):
         return 5, 5
 
     def core_kernel(self, frame: object, buffers: object) -> Any:
-        return np.ones((5, 5, 4), np.float32), 1, (0.0, 0.0, 0.0)
+        return np.ones((5, 5, 4), np.float32), 1, (0.0, 0.0, 0.0), (2, 2)
 
     def core_field(self, frame: object, buffers: object) -> None:
         return None

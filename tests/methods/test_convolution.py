@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from tests.device.abilities import max_side
 from tests.exhaustive import some
+from tests.planned import image_source
 from tests.variants import open_variant
 from vkbloom import AdapterInfo, Convolution, Renderer, Settings, psf, reference
 from vkbloom.reference._convolution import filter_bright
@@ -59,6 +60,34 @@ def test_convolution(
     """Odd sizes, kernels larger than the image, colour and grey."""
     settings = Convolution(kernel_of(*kernel, channels), boundary=boundary)
     assert_close(renderer, image_of(*size), settings)
+
+
+@pytest.mark.parametrize("boundary", BOUNDARIES)
+@pytest.mark.parametrize("border", [((9, 2), (0, 25)), ((8, 8), (31, 30))], ids=str)
+def test_a_border_of_zeros_makes_no_line_longer(
+    renderer: Renderer, gpu: Renderer, boundary: Any, border: tuple[tuple[int, int], ...]
+) -> None:
+    """The kernel that is shown has it. Subnormal numbers are zeros, too, for devices."""
+    kernel, image = kernel_of(6, 5), image_of(33, 21)
+    large = np.pad(kernel, (*border, (0, 0)), constant_values=1e-39)
+    settings = Convolution(large, boundary=boundary, format="rgba32float")
+    for each in (renderer, gpu):
+        assert_close(each, image, settings)
+    # Of the numbers around the kernel's point, the furthest that is not 0.
+    (top, _), (left, _) = border
+    down, across = (
+        max(middle - first, first + count - 1 - middle)
+        for first, middle, count in (
+            (top, large.shape[0] // 2, 5),
+            (left, large.shape[1] // 2, 6),
+        )
+    )
+    middle = settings.replace(psf=kernel_of(2 * across + 1, 2 * down + 1))
+    shown = 16 * (large.shape[0] * large.shape[1] - (2 * across + 1) * (2 * down + 1))
+    for each in (renderer, gpu):
+        plans = [each._plan_of(image_source(image), one, None) for one in (settings, middle)]
+        sizes = [plan.image_size for plan in plans]
+        assert sizes[0] - sizes[1] == shown
 
 
 def test_long_lines(renderer: Renderer) -> None:

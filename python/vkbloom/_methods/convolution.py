@@ -11,10 +11,11 @@ from typing import Any, ClassVar, Literal, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from vkbloom._core_kernel import CoreKernel
 from vkbloom._psf.base import PSF, in_grey
 from vkbloom._psf.components import facts_of
 from vkbloom._psf.core_fields import core_field
-from vkbloom._psf.core_kernels import WithKernel
+from vkbloom._psf.core_kernels import WithKernel, with_reach
 from vkbloom._psf.eye import spencer
 from vkbloom._psf.resampling import box_resample
 from vkbloom._psf.sampled import samples
@@ -164,6 +165,10 @@ class Convolution(WithKernel, Settings):
             max(side * to // of, 1) for side, to, of in zip(sides, buffers, frame, strict=True)
         )
         return width, height
+
+    def _with_reach(self, kernel: CoreKernel) -> CoreKernel:
+        # Those of a field are below each other.
+        return kernel if isinstance(self.psf, Varying) else with_reach(kernel)
 
     def core_field(self, frame: Size, buffers: Size) -> tuple[Any, ...] | None:
         """Return the weights of a field of kernels as the core reads them; None: there is none."""

@@ -31,8 +31,8 @@ CACHE: Final = DiskCache("kernels")
 #: Of processor time of the thread.
 MIN_SECONDS: Final = 0.02
 
-# Serial, width, height; left, top, width, height and channels of the part that is not 0.
-_HEADER: Final = struct.Struct("<Q7I")
+# Serial, reach, width, height; left, top, width, height and channels of the part that is not 0.
+_HEADER: Final = struct.Struct("<Q9I")
 _PACKAGE: Final = Path(__file__).parents[1]
 # Modules whose functions follow from their fields alone. Those of users may change at any time.
 _OURS: Final = ("vkbloom._methods.", "vkbloom._glare.")
@@ -58,6 +58,10 @@ class WithKernel:
         """Return the kernel in pixels of the bloom buffers."""
         raise NotImplementedError
 
+    def _with_reach(self, kernel: CoreKernel) -> CoreKernel:
+        """Return the kernel with its reach, if transforms are to be no larger than it needs."""
+        return kernel
+
     def core_kernel(self, frame: Size, buffers: Size) -> CoreKernel:
         """Return the kernel as the core reads it."""
         shape = type(self)(**{name: getattr(self, name) for name in self.shaping})
@@ -79,10 +83,25 @@ def _core_kernel(shape: WithKernel, frame: Size, buffers: Size) -> CoreKernel:
     if data is not None:
         return _unpack(data)
     start = time.thread_time()
-    kernel = core_kernel(shape._kernel(frame, buffers))
+    kernel = shape._with_reach(core_kernel(shape._kernel(frame, buffers)))
     if key and time.thread_time() - start >= MIN_SECONDS:
         CACHE.write(key, _pack(kernel))
     return kernel
+
+
+def with_reach(kernel: CoreKernel) -> CoreKernel:
+    """Return a kernel with its reach.
+
+    Devices read subnormal numbers as zeros, too. A Gaussian of 40 pixels has 1,100 x 1,100 of the
+    7,679 x 4,319 that reach everywhere in an image of 3840 x 2160, whose transforms then take a
+    third of the time.
+    """
+    filled = (np.abs(kernel.pixels) >= np.finfo(np.float32).tiny).any(axis=2)
+    reaches = [
+        max(side // 2 - lines.start, lines.stop - 1 - side // 2, 0)
+        for side, lines in zip(filled.shape, _extents(filled), strict=True)
+    ]
+    return kernel._replace(reach=(reaches[1], reaches[0]))
 
 
 def _key(what: tuple[object, ...]) -> bytes | None:
@@ -138,25 +157,25 @@ def _pack(kernel: CoreKernel) -> bytes:
     """Return the content of a kernel's file."""
     height, width = kernel.pixels.shape[:2]
     filled = np.asarray(kernel.pixels.any(axis=2))
-    rows, columns = _extent(filled, 1), _extent(filled, 0)
+    rows, columns = _extents(filled)
     part = kernel.pixels[rows, columns]
     sides = width, height, columns.start, rows.start, part.shape[1], part.shape[0], part.shape[2]
-    return _HEADER.pack(kernel.serial, *sides) + part.tobytes()
+    return _HEADER.pack(kernel.serial, *kernel.reach, *sides) + part.tobytes()
 
 
-def _extent(filled: NDArray[np.bool_], axis: int) -> slice:
-    """Return the first to the last of the lines along an axis that have a True."""
-    lines = np.flatnonzero(filled.any(axis=axis))
-    return slice(int(lines[0]), int(lines[-1]) + 1) if len(lines) else slice(0, 0)
+def _extents(filled: NDArray[np.bool_]) -> list[slice]:
+    """Return the first to the last of the rows, and of the columns, that have a True."""
+    lines = [np.flatnonzero(filled.any(axis=axis)) for axis in (1, 0)]
+    return [slice(int(at[0]), int(at[-1]) + 1) if len(at) else slice(0, 0) for at in lines]
 
 
 def _unpack(data: bytes) -> CoreKernel:
     """Return the kernel of a file."""
-    serial, width, height, left, top, across, down, channels = _HEADER.unpack_from(data)
+    serial, *reach, width, height, left, top, across, down, channels = _HEADER.unpack_from(data)
     values: NDArray[np.float32] = np.frombuffer(data, np.float32, offset=_HEADER.size)
     part = values.reshape(down, across, channels)
     if (down, across) == (height, width):
-        return CoreKernel(part, serial)
+        return CoreKernel(part, serial, reach=(reach[0], reach[1]))
     pixels = np.zeros((height, width, channels), np.float32)
     pixels[top : top + down, left : left + across] = part
-    return CoreKernel(pixels, serial)
+    return CoreKernel(pixels, serial, reach=(reach[0], reach[1]))
