@@ -194,17 +194,6 @@ PyObject *vkb_renderer_cuda_name(PyObject *object, PyObject *ordinal)
     return exports ? PyUnicode_FromString(name) : vkb_raise(state, &error);
 }
 
-PyObject *vkb_renderer_has_drawn(PyObject *object, PyObject *unused)
-{
-    const struct vkb_renderer *renderer = (struct vkb_renderer *)object;
-
-    (void)unused;
-    VKB_LOCK(vkb_memory);
-    const bool drawn = renderer->exports && vkb_exports_drawn(renderer->exports);
-    VKB_UNLOCK(vkb_memory);
-    return PyBool_FromLong(drawn);
-}
-
 PyObject *vkb_renderer_in_context(PyObject *object, PyObject *function)
 {
     const struct vkb_module_state *state = PyType_GetModuleState(Py_TYPE(object));

@@ -27,7 +27,6 @@ PyObject *vkb_renderer_export(PyObject *renderer, PyObject *size);
 PyObject *vkb_renderer_cuda(PyObject *renderer, PyObject *unused);
 PyObject *vkb_renderer_in_context(PyObject *renderer, PyObject *function);
 PyObject *vkb_renderer_cuda_name(PyObject *renderer, PyObject *ordinal);
-PyObject *vkb_renderer_has_drawn(PyObject *renderer, PyObject *unused);
 PyObject *vkb_renderer_snapshot(PyObject *renderer, PyObject *arguments);
 
 #ifdef VKBLOOM_FAULTS

@@ -343,9 +343,6 @@ static PyMethodDef methods[] = {
      "snapshot(address, size, stream=0, later=False) -> Exported. A copy of CUDA's memory, on a "
      "stream; 0: the renderer's. `later`: it is begun by the submission that reads the copy first, "
      "or by who else does; until then CUDA's memory does not change."},
-    {"has_drawn", vkb_renderer_has_drawn, METH_NOARGS,
-     "has_drawn() -> whether the device has drawn all memory that CUDA shares; False if that is "
-     "not known. Does not wait."},
     {"pipeline_cache", pipeline_cache, METH_NOARGS, "The driver's pipeline cache as bytes."},
     {0},
 };
