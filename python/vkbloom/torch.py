@@ -183,14 +183,16 @@ class Bloom(torch.nn.Module):  # type: ignore[misc]
                     parameter.copy_(_clamp(parameter, self._ranges[name]))
             return flatten(parameters)
         values, moved = flatten(parameters), False
-        parts = read_ahead(values).split([parameter.numel() for parameter in parameters])
-        with torch.no_grad():
-            for name, parameter, part in zip(self._names, parameters, parts, strict=True):
-                # A write, also of an equal value, makes what earlier calls have saved unusable.
-                # (Compiled code saves copies.)
-                if not _is_within(part.tolist(), self._ranges[name]):
-                    parameter.copy_(_clamp(parameter, self._ranges[name]))
-                    moved = True
+        numbers, at = read_ahead(values).tolist(), 0
+        for name, parameter in zip(self._names, parameters, strict=True):
+            ends, part = self._ranges[name], numbers[at : at + parameter.numel()]
+            at += len(part)
+            # A write, also of an equal value, makes what earlier calls have saved unusable.
+            # (Compiled code saves copies.)
+            if not _is_within(part, ends):
+                with torch.no_grad():
+                    parameter.copy_(_clamp(parameter, ends))
+                moved = True
         return flatten(parameters) if moved else values
 
 

