@@ -6,7 +6,7 @@
 
 #include "execute/age.h"
 #include "graph/plan.h"
-#include "vulkan/memory.h"
+#include "vulkan/image.h"
 
 struct vkb_cached_image {
     char name[VKB_NAME_SIZE];

@@ -6,7 +6,7 @@
 
 #include "execute/age.h"
 #include "graph/graph.h"
-#include "vulkan/memory.h"
+#include "vulkan/image.h"
 
 struct vkb_resource_entry {
     uint64_t serial;

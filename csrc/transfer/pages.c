@@ -6,8 +6,6 @@
 // floats.
 #define KEPT_BYTES ((size_t)256 << 20)
 
-#define SMALL_PAGE ((size_t)4096)
-
 struct vkb_pages {
     const struct vkb_device *device;    // NULL: closed
     struct vkb_page_run *taken, *idle;  // the latest first
@@ -56,7 +54,7 @@ static struct vkb_page_run *find_idle(const struct vkb_pages *pages, size_t size
     struct vkb_page_run *found = NULL;
 
     for (struct vkb_page_run *run = pages->idle; run; run = run->next)
-        if (run->size >= size && run->size - size <= size / 8 + SMALL_PAGE
+        if (run->size >= size && run->size - size <= size / 8 + VKB_SMALL_PAGE
             && (!found || run->size < found->size))
             found = run;
     return found;

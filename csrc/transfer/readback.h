@@ -5,6 +5,7 @@
 
 #include "share/exported_memory.h"
 #include "transfer/pages.h"
+#include "vulkan/image.h"
 
 // The device writes directly to the caller's memory if it has at least this size. On lavapipe
 // 22.3.6 (two Zen 3 cores) both ways take the same time up to 256 KiB. Without the host's copy, a

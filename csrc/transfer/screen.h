@@ -4,7 +4,7 @@
 #define VKB_SCREEN_H
 
 #include "execute/submission.h"
-#include "vulkan/memory.h"
+#include "vulkan/image.h"
 
 enum { VKB_MAX_SCREEN_IMAGES = 16 };
 

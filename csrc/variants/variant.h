@@ -6,7 +6,7 @@
 #include "passes/composite.h"
 #include "passes/threshold.h"
 #include "variants/variants.h"
-#include "vulkan/memory.h"
+#include "vulkan/image.h"
 
 // The choice of variants for one graph: from the passes of `plain` to those of `graph`. It keeps
 // the first failure.

@@ -2,7 +2,7 @@
 #ifndef VKB_STAGING_H
 #define VKB_STAGING_H
 
-#include "vulkan/memory.h"
+#include "vulkan/image.h"
 
 enum { VKB_MAX_MIP_LEVELS = 16 };  // of the longest side
 
