@@ -242,6 +242,12 @@ static bool begin(const struct vkb_device *device, struct vkb_upload *upload,
     return true;
 }
 
+static void count_row(struct vkb_upload *upload, uint32_t y, const void *row)
+{
+    upload->rows[y] = vkb_count_non_finite(
+        upload->format, row, (size_t)upload->width * vkb_formats[upload->format].channels);
+}
+
 static void pack_part(void *context, uint32_t part, uint32_t first, uint32_t end)
 {
     const struct rows *rows = context;
@@ -251,8 +257,7 @@ static void pack_part(void *context, uint32_t part, uint32_t first, uint32_t end
     for (uint32_t y = first; y < end; ++y) {
         unsigned char *to = kept_row(upload, y);
         pack_row(to, rows->input, y);
-        upload->rows[y] = vkb_count_non_finite(
-            upload->format, to, (size_t)upload->width * vkb_formats[upload->format].channels);
+        count_row(upload, y, to);
     }
 }
 
@@ -292,8 +297,7 @@ static void stream_part(void *context, uint32_t part, uint32_t first, uint32_t e
 
     for (uint32_t y = first; y < end; ++y) {
         const unsigned char *row = packed_row(rows, part, y);
-        upload->rows[y] = vkb_count_non_finite(
-            upload->format, row, (size_t)upload->width * vkb_formats[upload->format].channels);
+        count_row(upload, y, row);
         stream(kept_row(upload, y), row, row_size(rows->input));
     }
     end_streaming();
