@@ -241,8 +241,7 @@ static bool record_and_submit(struct vkb_run *run, const struct vkb_frame_source
     if (!vkb_commands_begin(device, &submission->commands, error))
         return false;
     vkb_timer_reset(device, commands, &submission->timer);
-    if (!vkb_exported_fill_early(run, source, error) || !vkb_sources_record(run, error)
-        || !fill_constants(run, requests, request_count, error))
+    if (!vkb_sources_record(run, error) || !fill_constants(run, requests, request_count, error))
         return false;
     for (uint32_t i = 0; i < request_count; ++i)
         if (!record_request(run, &requests[i], i + 1 < request_count ? &requests[i + 1] : NULL,

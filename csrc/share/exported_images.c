@@ -179,18 +179,6 @@ bool vkb_exported_record_input(struct vkb_run *run, struct vkb_staged_input *sta
     return true;
 }
 
-bool vkb_exported_fill_early(struct vkb_run *run, const struct vkb_frame_source *source,
-                             struct vkb_error *error)
-{
-    for (int kind = 0; kind < VKB_INPUT_COUNT; ++kind) {
-        const struct vkb_input *input = run->inputs[kind].input;
-        if (input && input->exported->origin_size > 0 && vkb_exports_drawn(input->exported->exports)
-            && !source->fill(source->context, input->exported, error))
-            return false;
-    }
-    return true;
-}
-
 bool vkb_exported_fill(struct vkb_run *run, const struct vkb_frame_source *source,
                        struct vkb_error *error)
 {

@@ -16,12 +16,8 @@ bool vkb_exported_check(const struct vkb_device *device, const struct vkb_input 
 bool vkb_exported_record_input(struct vkb_run *run, struct vkb_staged_input *staged,
                                struct vkb_error *error);
 
-// Begins the copies that CUDA is to make to the inputs if the device has nothing else to do, so that
-// they run while passes are recorded.
-bool vkb_exported_fill_early(struct vkb_run *run, const struct vkb_frame_source *source,
-                             struct vkb_error *error);
-// Begins those that are left, and lets the submission wait for all. Call it last before the
-// submission.
+// Begins the copies that CUDA is to make to the inputs, and lets the submission wait for them. Call
+// it last before the submission.
 bool vkb_exported_fill(struct vkb_run *run, const struct vkb_frame_source *source,
                        struct vkb_error *error);
 

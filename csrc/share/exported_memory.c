@@ -173,18 +173,6 @@ void vkb_export_signal(const struct vkb_export *one, struct vkb_sync_point *poin
         *point = (struct vkb_sync_point){timeline->semaphore, ++timeline->value};
 }
 
-bool vkb_exports_drawn(const struct vkb_exports *exports)
-{
-    const struct vkb_device *device = exports->device;
-    const struct vkb_shared_timeline *timeline = &exports->drawn;
-    uint64_t value = 0;
-
-    return device && !device->lost && timeline->semaphore
-        && device->vk.vkGetSemaphoreCounterValue(device->handle, timeline->semaphore, &value)
-               == VK_SUCCESS
-        && value >= timeline->value;
-}
-
 bool vkb_export_drawn(const struct vkb_export *one, void *stream, struct vkb_error *error)
 {
     const struct vkb_exports *exports = one->exports;

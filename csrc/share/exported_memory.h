@@ -27,7 +27,7 @@ struct vkb_export {
 struct vkb_shared_timeline {
     VkSemaphore semaphore;  // VK_NULL_HANDLE: there is none; the host waits instead
     void *cuda;
-    _Atomic uint64_t value;  // also read without the renderer's lock
+    uint64_t value;
 };
 
 struct vkb_exports {
@@ -64,8 +64,6 @@ bool vkb_export_order_copy(struct vkb_export *one);
 void vkb_export_wait(const struct vkb_export *one, struct vkb_sync_point *point);
 // The next point of the device's work, with the renderer's lock; none without timelines.
 void vkb_export_signal(const struct vkb_export *one, struct vkb_sync_point *point);
-// Whether the device has drawn to all memory that it was given. False if that is not known.
-bool vkb_exports_drawn(const struct vkb_exports *exports);
 // Makes a stream of CUDA wait until the device has drawn to the memory; NULL: CUDA's own stream
 // here. Fails if the device was lost before.
 bool vkb_export_drawn(const struct vkb_export *one, void *stream, struct vkb_error *error);

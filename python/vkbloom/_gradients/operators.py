@@ -312,8 +312,8 @@ def _take_batch(tensor: Any, name: str, renderer: Renderer) -> ImportedArray:
     array = CudaArray(batch, address, tuple(batch.shape), strides, dtype, stream)
     # CUDA copies it when earlier passes have ended: beside passes the GPU would change between
     # both, and on an H200 a step of a convolution took 10.8 ms in place of 6.5. The passes that
-    # read it are recorded before that wait, or while CUDA copies: steps in a row take 2.43 ms in
-    # place of 2.64 (a pyramid), 3.62 in place of 3.80 (kino; 2026-11-29).
+    # read it are recorded before that wait: steps in a row take 2.43 ms in place of 2.64 (a
+    # pyramid), 3.62 in place of 3.80 (kino; 2026-11-29).
     return array.copy(core, later=True)
 
 
