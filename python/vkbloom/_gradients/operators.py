@@ -14,6 +14,7 @@ from typing import Any, Final, NamedTuple, cast
 
 import numpy as np
 
+from vkbloom import _core
 from vkbloom._extras import import_extra
 from vkbloom._gradients.passes import MIN_SHARE, in_floats
 from vkbloom._gradients.pulling import pull_each, undefined
@@ -300,11 +301,14 @@ def _key_of(call: _Call) -> Any:
     return keys and (*keys, call.names, call.settings)
 
 
+_DTYPES: Final = {torch.float16: "float16", torch.float32: "float32"}
+
+
 def _take_batch(tensor: Any, name: str, renderer: Renderer) -> ImportedArray:
     """Copy a batch, which does not change within the operator, on PyTorch's stream."""
     core, batch = renderer._core, _batch(tensor)
     dtype = _DTYPES.get(tensor.dtype)
-    if dtype is None or core.closed or core.cuda()[0] != tensor.device.index:
+    if dtype is None or not _is_on(core, tensor):
         return take(batch, name, core, (4,))  # which says what is wrong
     size = batch.element_size()
     strides = tuple([size * stride for stride in batch.stride()])
@@ -317,7 +321,12 @@ def _take_batch(tensor: Any, name: str, renderer: Renderer) -> ImportedArray:
     return array.copy(core, later=True)
 
 
-_DTYPES: Final = {torch.float16: "float16", torch.float32: "float32"}
+def _is_on(core: _core.Renderer, tensor: Any) -> bool:
+    """Return whether an open renderer is on a tensor's GPU."""
+    try:
+        return not core.closed and bool(core.cuda()[0] == tensor.device.index)
+    except _core.Error:
+        return False
 
 
 def _stream_of(tensor: Any) -> int:
@@ -450,10 +459,10 @@ def _(image: Any, *rest: Any) -> Any:
     return torch.empty(image.shape, dtype=image.dtype, device=image.device)
 
 
-_FOUR: Final = "(Tensor, Tensor, Tensor, Tensor)"
+_FOUR_TENSORS: Final = "(Tensor, Tensor, Tensor, Tensor)"
 
 
-@_operator("vkbloom::bloom_backward", "Tensor cotangent, bool by_images, ", _FOUR)  # type: ignore[untyped-decorator]
+@_operator("vkbloom::bloom_backward", "Tensor cotangent, bool by_images, ", _FOUR_TENSORS)  # type: ignore[untyped-decorator]
 def _backward(cotangent: Any, by_images: bool, *given: Any) -> tuple[Any, ...]:
     """Return the derivatives by image, mask, emission and values; without elements: of none.
 
