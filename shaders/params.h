@@ -662,8 +662,8 @@
 #define STRIP_ROWS          8
 // Blocks of pixels that fill complete words, also with three channels. CHANNEL is the size of a
 // channel in bytes. Of floats a window has 4 columns: with 2, `dual_kawase` takes 33 ms in place of 22
-// and `unreal` 74 in place of 64 (1920 x 1080, lavapipe of Mesa 25.0.7; 26 and 24, and equal, with
-// 22.3.6; 2026-11-30).
+// and `unreal` 74 in place of 64 (1920 x 1080, lavapipe of Mesa 25.0.7, 2026-11-30). With 22.3.6 they
+// take 26 and 24, and the same; but `jimenez2014` 19 in place of 21 (25.0.7: 27 and 20).
 #define TAP_COLUMNS(CHANNEL)    ((CHANNEL) == 2 ? 8 : 4)
 #define TAP_ROWS                32
 #define TEXEL_COLUMNS(CHANNEL)  (16 / (CHANNEL))

@@ -4,9 +4,10 @@
 //
 // Along an axis the glow has `extent` pixels, and of the kernel count the offsets from -before to
 // after: what reaches farther falls outside everywhere (zero), is added to the last offset (edge),
-// or to the one a period away (wrap). Transforms are periodic, so that the lines are padded by as
-// much as the kernel reaches: on both sides for an edge or a mirror, whose pixels lie there; on the
-// longer side for zeros, which both sides share; not at all for a period that a transform can have.
+// or to the one a period away (wrap). Zeros around the kernel do not count. Transforms are
+// periodic, so that the lines are padded by as much as the kernel reaches: on both sides for an
+// edge or a mirror, whose pixels lie there; on the longer side for zeros, which both sides share;
+// not at all for a period that a transform can have.
 //
 // The transpose is the product with the conjugate spectrum, in lines of the same lengths, so that
 // the kernel's spectrum is there once. What the lines read beyond the edges is transposed, too:

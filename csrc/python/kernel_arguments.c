@@ -1,8 +1,8 @@
 // The kernels of convolutions and the picture of dirt, which are Python's arrays.
 #include "python/arguments.h"
 
-// (array (h, w, 4) of float32, of a grey kernel (h, w, 1), serial, (min, max, factor), (reach x,
-// y))
+// (array (h, w, 4) of float32, of a grey kernel (h, w, 1), serial, (min, max, factor), (reach along
+// x, along y))
 static bool read_kernel_tuple(PyObject *tuple, Py_buffer *view, struct vkb_kernel_data *kernel)
 {
     PyObject *pixels;

@@ -55,8 +55,8 @@ bool vkb_exported_check(const struct vkb_device *device, const struct vkb_input 
                        "make it contiguous, or give it from the host", error);
 }
 
-// What the framebuffer takes in exported memory. An invocation of strided_copy_from_image.comp
-// writes 16 bytes.
+// What the framebuffer takes in exported memory. strided_copy_from_image.comp writes words of 16
+// bytes.
 static VkDeviceSize exported_size(const struct vkb_run *run, const struct vkb_output *output)
 {
     const uint32_t layers = run->graph->layers;

@@ -7,7 +7,8 @@ enum {
     BINDINGS = 3,
     GROUP_SIZE = 128,  // of strided_copy.glsl
     TILE_WIDTH = 16,   // of the pixels of a group that writes to an image
-    TILE_HEIGHT = 4 * GROUP_SIZE / TILE_WIDTH,
+    TILE_PIXELS = 4,   // of an invocation, in a column of the tile
+    TILE_HEIGHT = TILE_PIXELS * GROUP_SIZE / TILE_WIDTH,
     MAX_GROUPS = 0xffff,  // along x, which every device can do
 };
 

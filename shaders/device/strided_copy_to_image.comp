@@ -16,9 +16,10 @@ layout(std430, binding = 2) buffer Counts
     uint counts[];  // NaN, infinity
 };
 
-const uint COUNTS_WORDS = 64;    // VKB_COUNTS_SIZE
+const uint COUNTS_WORDS = 64;  // VKB_COUNTS_SIZE
+// The invocations of a group, and the pixels of each: as in strided_copy.c.
 const ivec2 GROUP = ivec2(16, 8);
-const int PIXELS = 4;  // of an invocation; as in strided_copy.c, as GROUP
+const int PIXELS = 4;
 // enum vkb_non_finite_use
 const uint COUNTED = 0, IS_ZERO = 2;
 

@@ -112,13 +112,14 @@ _reads = _Reads()
 def flatten(tensors: Sequence[Any]) -> Any:
     """Return all numbers of tensors as one dimension, which an operator takes; None: no tensors.
 
-    PyTorch takes 40 us longer to call an operator with a list of tensors, and as long for its
-    derivative. Numbers on a GPU are read together: each wait takes 0.1 ms.
+    PyTorch takes 18 us longer to call an operator with a list of tensors, and as long for its
+    derivative (2.13 on a CPU, 2026-11-30). Numbers on a GPU are read together: each wait takes
+    0.1 ms.
     """
     if not tensors:
         return None
     where = tensors[0].device
-    # PyTorch takes 60 us less for the stack, and 100 us less for its derivative.
+    # Three numbers take 1.8 us in place of 4.9 as a stack, their derivatives 15 in place of 21.
     if all(tensor.ndim == 0 and tensor.device == where for tensor in tensors):
         return torch.stack([*tensors])
     return torch.cat([tensor.to(where).reshape(-1) for tensor in tensors])
