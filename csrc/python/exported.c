@@ -16,16 +16,15 @@ static struct exported_object *exported_of(PyObject *object)
     return (struct exported_object *)object;
 }
 
-// CUDA waits for streams when it frees memory, and these may wait for the GIL.
-void vkb_release_exports(struct vkb_exports *exports)
+// Frees idle memory that is not kept, or with `all` all of it. CUDA waits for streams then, and
+// these may wait for the GIL.
+static void free_surplus(struct vkb_exports *exports, bool all)
 {
     struct vkb_export *surplus;
-    bool last;
 
     do {
         VKB_LOCK(vkb_memory);
-        surplus = vkb_exports_surplus(exports);
-        last = !surplus && --exports->users == 0;
+        surplus = vkb_exports_surplus(exports, all);
         VKB_UNLOCK(vkb_memory);
         if (surplus) {
             Py_BEGIN_ALLOW_THREADS
@@ -36,6 +35,14 @@ void vkb_release_exports(struct vkb_exports *exports)
             VKB_UNLOCK(vkb_memory);
         }
     } while (surplus);
+}
+
+void vkb_release_exports(struct vkb_exports *exports)
+{
+    free_surplus(exports, false);
+    VKB_LOCK(vkb_memory);
+    const bool last = --exports->users == 0;
+    VKB_UNLOCK(vkb_memory);
     if (last) {
         Py_BEGIN_ALLOW_THREADS
         vkb_exports_free(exports);
@@ -139,7 +146,13 @@ static struct exported_object *new_exported(struct vkb_renderer *renderer, Py_ss
         return NULL;
     self->process = renderer->process;
     self->exports = use_exports(renderer, &error);
-    if (self->exports && take_memory(self, size, &error))
+    bool done = self->exports && take_memory(self, size, &error);
+    if (!done && self->exports && error.kind == VKB_ERROR_OUT_OF_MEMORY) {
+        free_surplus(self->exports, true);
+        error = (struct vkb_error){0};
+        done = take_memory(self, size, &error);
+    }
+    if (done)
         return self;
     Py_DECREF(self);
     return (void *)vkb_raise(state, &error);

@@ -2,9 +2,12 @@
 
 #include "execute/list.h"
 
-// The most idle memory that is kept, the latest first: seven 4K images of half floats.
+// Idle memory beyond this is freed, the oldest first: seven 4K images of half floats.
 #define KEPT_BYTES ((uint64_t)512 << 20)
-#define GRANULE    ((uint64_t)64 << 10)
+// Not so the latest, however large they are: a training step takes an image, the result, the
+// cotangent and the derivative, and streams may still use those of the step before.
+enum { KEPT_COUNT = 8 };
+#define GRANULE ((uint64_t)64 << 10)
 
 static void destroy_timeline(struct vkb_exports *exports, struct vkb_shared_timeline *timeline,
                              bool settled)
@@ -118,6 +121,7 @@ static void unlink_idle(struct vkb_exports *exports, struct vkb_export *one)
 {
     VKB_UNLINK(&exports->idle, one);
     exports->idle_size -= one->size;
+    --exports->idle_count;
     VKB_PUSH(&exports->taken, one);
 }
 
@@ -209,13 +213,20 @@ void vkb_exports_give_back(struct vkb_exports *exports, struct vkb_export *one)
     VKB_UNLINK(&exports->taken, one);
     VKB_PUSH(&exports->idle, one);
     exports->idle_size += one->size;
+    ++exports->idle_count;
 }
 
-struct vkb_export *vkb_exports_surplus(struct vkb_exports *exports)
+static bool has_surplus(const struct vkb_exports *exports, bool all)
+{
+    return all || !exports->device
+        || (exports->idle_size > KEPT_BYTES && exports->idle_count > KEPT_COUNT);
+}
+
+struct vkb_export *vkb_exports_surplus(struct vkb_exports *exports, bool all)
 {
     struct vkb_export *oldest = exports->idle;
 
-    if (!oldest || (exports->device && exports->idle_size <= KEPT_BYTES))
+    if (!oldest || !has_surplus(exports, all))
         return NULL;
     while (oldest->next)
         oldest = oldest->next;

@@ -37,6 +37,7 @@ struct vkb_exports {
     struct vkb_cuda *cuda;
     struct vkb_export *taken, *idle;  // the latest first
     uint64_t idle_size;
+    size_t idle_count;
     uint64_t serials;  // given away so far
     // Signalled by CUDA; and by the device, whose points are given away with the renderer's lock.
     struct vkb_shared_timeline filled, drawn;
@@ -79,9 +80,9 @@ bool vkb_exports_settle(const struct vkb_exports *exports);
 // so far may still use it.
 void vkb_exports_give_back(struct vkb_exports *exports, struct vkb_export *one);
 
-// Idle memory that is not kept, taken; NULL: none. The caller frees its `memory` with
-// vkb_cuda_free, which waits and so needs no lock, and then removes it.
-struct vkb_export *vkb_exports_surplus(struct vkb_exports *exports);
+// Idle memory that is not kept, or any with `all`, taken; NULL: none. The caller frees its `memory`
+// with vkb_cuda_free, which waits and so needs no lock, and then removes it.
+struct vkb_export *vkb_exports_surplus(struct vkb_exports *exports, bool all);
 void vkb_exports_remove(struct vkb_export *one);
 
 #endif

@@ -6,6 +6,7 @@
 // Tests make calls fail, put callbacks into the stream and capture one of the host's streams into a
 // graph, with functions that CUDA does not have. What NVIDIA's driver 580 does to captures was
 // tried.
+#include <limits.h>
 #include <pthread.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -48,6 +49,8 @@ struct event {
 
 // Names of the functions that fail.
 static char failing[128];
+// The most memories that are imported at once.
+static _Atomic long most_memories = LONG_MAX;
 
 // Calls for the whole context make captures invalid; others do unless the thread's mode is relaxed.
 static int refuses(const char *name, int whole)
@@ -398,6 +401,10 @@ EXPORT int cuImportExternalMemory(void **handle, const struct memory_handle *giv
     struct stat about;
 
     REFUSE(0);
+    if (memories >= most_memories) {
+        free(memory);
+        return OUT_OF_MEMORY;
+    }
     if (!memory || given->type != 1 || given->flags != 1
         || fstat(given->handle.descriptor, &about) != 0) {
         free(memory);
@@ -533,6 +540,12 @@ EXPORT int cuWaitExternalSemaphoresAsync(void *const *semaphores,
 EXPORT void stand_in_fail(const char *names)
 {
     snprintf(failing, sizeof failing, "%s", names);
+}
+
+// Not of CUDA: no more memories are imported than there are now; 0: as many as are asked for.
+EXPORT void stand_in_fill(int on)
+{
+    most_memories = on ? memories : LONG_MAX;
 }
 
 // Not of CUDA: begins a capture of a stream; NULL: ends it. Whether the last one was valid.

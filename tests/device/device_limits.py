@@ -82,6 +82,23 @@ def failing(renderer: Any) -> None:
     assert used & addresses(renderer)
 
 
+def short(renderer: Any) -> None:
+    """The latest idle memory is kept, and is freed for new memory of another size."""
+    core, size = renderer._core, 96 << 20
+    part = "CUDA_ERROR_OUT_OF_MEMORY"
+    large = [core.export(size) for _ in range(10)]
+    while large:
+        del large[0]
+    cuda.stand_in_fill(1)
+    # However large they are, but no more than eight.
+    large = [core.export(size) for _ in range(8)]
+    raises(vkbloom.OutOfMemoryError, part, lambda: core.export(size))
+    del large
+    small = core.export(1 << 20)
+    cuda.stand_in_fill(0)
+    assert small.address != core.export(1 << 20).address
+
+
 def join(stream: int | None) -> None:
     """Make a stream wait for the captured one, as producers do."""
     event = ctypes.c_void_p()
@@ -265,5 +282,7 @@ def lost(_: Any) -> None:
 
 if __name__ == "__main__":
     main(
-        (lost,) if "lost" in sys.argv else (closing, failing, captures, callbacks, bounds, opening)
+        (lost,)
+        if "lost" in sys.argv
+        else (closing, failing, short, captures, callbacks, bounds, opening)
     )
