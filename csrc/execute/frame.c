@@ -238,7 +238,8 @@ static bool record_and_submit(struct vkb_run *run, const struct vkb_frame_source
             return false;
     if (run->show && !run->show->acquired)
         return true;
-    if (!vkb_commands_begin(device, &submission->commands, error))
+    if (!vkb_exported_fill(run, source, error)
+        || !vkb_commands_begin(device, &submission->commands, error))
         return false;
     vkb_timer_reset(device, commands, &submission->timer);
     if (!vkb_sources_record(run, error) || !fill_constants(run, requests, request_count, error))
@@ -250,7 +251,6 @@ static bool record_and_submit(struct vkb_run *run, const struct vkb_frame_source
     // After all copies and stores to buffers.
     vkb_barrier_record(device, commands, NULL, true, VKB_ACCESS_RESOURCE, VKB_ACCESS_HOST_READ);
     return vkb_buffer_flush(device, &submission->uniforms, error)
-        && vkb_exported_fill(run, source, error)
         && vkb_submission_submit(device, submission, &run->sync, error);
 }
 
@@ -426,9 +426,10 @@ bool vkb_frame_collect(struct vkb_device *device, struct vkb_frame *frame,
     const bool done = *over && vkb_readback_end(device, &submission->readback, error)
                    && vkb_timer_fetch(device, &submission->timer, error);
 
-    if (done)
+    if (done) {
         fetch(device, submission);
-    else if (error->kind != VKB_ERROR_INTERRUPTED)
+        vkb_exported_take_counts(device, frame, submission);
+    } else if (error->kind != VKB_ERROR_INTERRUPTED)
         fail_frame(device, frame, submission, error);
     if (*over)
         vkb_submissions_give_back(device, &frame->submissions, submission);

@@ -31,6 +31,7 @@ struct vkb_frame {
     struct vkb_in_place in_place[VKB_INPUT_COUNT];
     struct vkb_strided_copies strided_copies;
     struct vkb_non_finite non_finite;  // of the inputs of the last submission
+    uint64_t finite_version;           // of the content last counted on the device that is finite
     struct vkb_buffer constants;       // staging memory of images that are filled once
     struct vkb_image_cache cache;
     struct vkb_resources resources;

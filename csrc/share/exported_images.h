@@ -16,8 +16,13 @@ bool vkb_exported_check(const struct vkb_device *device, const struct vkb_input 
 bool vkb_exported_record_input(struct vkb_run *run, struct vkb_staged_input *staged,
                                struct vkb_error *error);
 
+// Takes what a submission that is over has counted, for later ones.
+void vkb_exported_take_counts(const struct vkb_device *device, struct vkb_frame *frame,
+                              struct vkb_submission *submission);
+
 // Begins the copies that CUDA is to make to the inputs, and lets the submission wait for them. Call
-// it last before the submission.
+// it before the recording, which takes less time than the copies. It also finds out whether an
+// image is finite, which the recording asks.
 bool vkb_exported_fill(struct vkb_run *run, const struct vkb_frame_source *source,
                        struct vkb_error *error);
 

@@ -49,6 +49,7 @@ struct vkb_readback {
     size_t import_count, import_capacity;
     struct vkb_buffer counts;  // of NaN and infinity of each request, where CUDA shares memory
     bool counted;
+    uint64_t counted_version;  // of the content of one image that they are of; 0: it is none
 };
 
 void vkb_readback_destroy(const struct vkb_device *device, struct vkb_readback *readback);

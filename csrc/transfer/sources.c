@@ -232,7 +232,9 @@ static bool stage_exported(struct vkb_run *run, const struct pixels *pixels, boo
     staged->input = input;
     staged->send =
         !vkb_content_holds(&staged->image->content, &input->pixels, sizeof input->pixels);
-    run->unknown_non_finite = run->unknown_non_finite || !vkb_is_grey(pixels->kind);
+    // Cotangents may have them.
+    run->unknown_non_finite =
+        run->unknown_non_finite || (!vkb_is_grey(pixels->kind) && pixels->kind < VKB_INPUT_LEVEL);
     return !staged->send
         || vkb_content_begin_writing(&staged->image->content, &run->frame->cache.clock,
                                      &input->pixels, sizeof input->pixels, error);

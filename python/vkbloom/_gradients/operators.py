@@ -316,9 +316,9 @@ def _take_batch(tensor: Any, name: str, renderer: Renderer) -> ImportedArray:
     address, stream = batch.data_ptr(), _stream_of(batch)
     array = CudaArray(batch, address, tuple(batch.shape), strides, dtype, stream)
     # CUDA copies it when earlier passes have ended: beside passes the GPU would change between
-    # both, and on an H200 a step of a convolution took 10.8 ms in place of 6.5. The passes that
-    # read it are recorded before that wait: steps in a row take 2.43 ms in place of 2.64 (a
-    # pyramid), 3.62 in place of 3.80 (kino; 2026-11-29).
+    # both, and on an H200 a step of a convolution took 10.8 ms in place of 6.5. The core waits, so
+    # that what comes before the passes is ready by then: steps in a row take 2.43 ms in place of
+    # 2.64 (a pyramid), 3.62 in place of 3.80 (kino; 2026-11-29).
     return array.copy(core, later=True)
 
 
