@@ -236,7 +236,7 @@ def _call(
     if order == "CHW":
         image = image.movedim(-3, -1)
         emission = None if emission is None else emission.movedim(-3, -1)
-    final = torch.ops.vkbloom.bloom(
+    final = torch.ops.vkbloom.bloom.default(
         image,
         mask,
         emission,

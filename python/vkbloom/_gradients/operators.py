@@ -9,7 +9,7 @@ from __future__ import annotations
 import functools
 import math
 import threading
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any, Final, NamedTuple, cast
 
 import numpy as np
@@ -282,7 +282,9 @@ def _key_of_each(*tensors: Any) -> tuple[Any, ...] | None:
     return tuple(keys)
 
 
-def _take_forward(call: _Call, renderer: Renderer, settings: Settings) -> ImportedArray:
+def _take_forward(
+    call: _Call, renderer: Renderer, settings: Settings, stream: int
+) -> ImportedArray:
     """Copy the images, and keep copy and settings if a backward pass may follow.
 
     Each forward pass replaces them, and the backward pass of an image comes after its forward pass
@@ -290,7 +292,7 @@ def _take_forward(call: _Call, renderer: Renderer, settings: Settings) -> Import
     what the forward pass has drawn of the same copy.
     """
     renderer._taken = None
-    images = _take_batch(call.image, "image", renderer)
+    images = _take_batch(call.image, "image", renderer, stream)
     is_learned = call.image.requires_grad or (call.values is not None and call.values.requires_grad)
     if is_learned and (key := _key_of(call)) is not None:
         renderer._taken = Taken(key, images, settings)
@@ -305,7 +307,7 @@ def _key_of(call: _Call) -> Any:
 _DTYPES: Final = {torch.float16: "float16", torch.float32: "float32"}
 
 
-def _take_batch(tensor: Any, name: str, renderer: Renderer) -> ImportedArray:
+def _take_batch(tensor: Any, name: str, renderer: Renderer, stream: int) -> ImportedArray:
     """Copy a batch, which does not change within the operator, on PyTorch's stream."""
     core, batch = renderer._core, _batch(tensor)
     dtype = _DTYPES.get(tensor.dtype)
@@ -313,8 +315,7 @@ def _take_batch(tensor: Any, name: str, renderer: Renderer) -> ImportedArray:
         return take(batch, name, core, (4,))  # which says what is wrong
     size = batch.element_size()
     strides = tuple([size * stride for stride in batch.stride()])
-    address, stream = batch.data_ptr(), _stream_of(batch)
-    array = CudaArray(batch, address, tuple(batch.shape), strides, dtype, stream)
+    array = CudaArray(batch, batch.data_ptr(), tuple(batch.shape), strides, dtype, stream)
     # CUDA copies it when earlier passes have ended: beside passes the GPU would change between
     # both, and on an H200 a step of a convolution took 10.8 ms in place of 6.5. The core waits, so
     # that what comes before the passes is ready by then: steps in a row take 2.43 ms in place of
@@ -335,7 +336,7 @@ def _stream_of(tensor: Any) -> int:
     return torch.cuda.current_stream(tensor.device).cuda_stream or LEGACY_STREAM
 
 
-def _pull_on_device(call: _Call, cotangent: Any, by_images: bool) -> Iterator[Any]:
+def _pull_on_device(call: _Call, cotangent: Any, by_images: bool, stream: int) -> Iterator[Any]:
     """Yield the derivatives of each image, with those by images as tensors of the GPU."""
     renderer, mask = _renderer(call.renderer, call.image), call.mask
     taken, renderer._taken = renderer._taken, None
@@ -344,9 +345,9 @@ def _pull_on_device(call: _Call, cotangent: Any, by_images: bool) -> Iterator[An
     # Before the waits, since the device still works.
     settings = taken.settings if taken else _settings_of(call)
     masks = None if mask is None else mask.detach().reshape(-1, *mask.shape[-2:]).cpu().numpy()
-    images = taken.images if taken else _take_batch(call.image, "image", renderer)
+    images = taken.images if taken else _take_batch(call.image, "image", renderer, stream)
     emissions, cotangents = (
-        None if tensor is None else _take_batch(tensor, name, renderer)
+        None if tensor is None else _take_batch(tensor, name, renderer, stream)
         for name, tensor in (("emission", call.emission), ("cotangent", cotangent))
     )
     assert cotangents
@@ -372,13 +373,25 @@ def _batch(tensor: Any) -> Any:
     return tensor.detach().reshape(-1, *tensor.shape[-3:])
 
 
-def _operator(name: str, parameters: str, result: str) -> Any:
-    """Declare an operator, whose types PyTorch cannot read from annotations of `Any`."""
-    schema = f"({parameters}Tensor image, Tensor? mask, Tensor? emission, Tensor? values, "
-    schema += f"str names, str settings, int renderer) -> {result}"
-    return torch.library.custom_op(name, mutates_args=(), schema=schema, **_TAGS)
+def _operator(parameters: str, result: str) -> Callable[[Callable[..., Any]], Any]:
+    """Return a decorator that makes an operator of a function with the name `_NAME`.
+
+    `torch.library.custom_op` would check each call once more.
+    """
+
+    def make(function: Callable[..., Any]) -> Any:
+        name = function.__name__.removeprefix("_")
+        schema = f"{name}({parameters}Tensor image, Tensor? mask, Tensor? emission, "
+        schema += f"Tensor? values, str names, str settings, int renderer) -> {result}"
+        _LIBRARY.define(schema, **_TAGS)
+        _LIBRARY.impl(name, function, "CompositeExplicitAutograd")
+        return getattr(torch.ops.vkbloom, name).default
+
+    return make
 
 
+#: Holds the operators.
+_LIBRARY: Final[Any] = torch.library.Library("vkbloom", "FRAGMENT")
 #: What `torch.compile` must not put into a graph of CUDA. (PyTorch has the tag since 2.8.)
 _TAGS: Final[dict[str, Any]] = (
     {"tags": (torch.Tag.cudagraph_unsafe,)} if hasattr(torch.Tag, "cudagraph_unsafe") else {}
@@ -405,7 +418,7 @@ def refuse_tangents(tensors: Iterable[Any]) -> None:
             )
 
 
-@_operator("vkbloom::bloom", "", "Tensor")  # type: ignore[untyped-decorator]
+@_operator("", "Tensor")
 def _bloom(*given: Any) -> Any:
     call = _Call(*given)
     image = call.image
@@ -428,14 +441,15 @@ def _bloom(*given: Any) -> Any:
 def _on_device(call: _Call) -> Any:
     """Run the operator without the host; a batch without masks changes the context once."""
     settings, renderer = _settings_of(call), _renderer(call.renderer, call.image)
-    images = _batch(call.image)
+    images, stream = _batch(call.image), _stream_of(call.image)
     frames: Iterable[Frames]
     if call.mask is None and call.emission is None and len(images) > 1:
         renderer._taken = None
         frames = renderer.map(images, settings, framebuffers="final")
     elif call.mask is None and call.emission is None and len(images) == 1:
-        inputs = Inputs(_take_forward(call, renderer, settings).at(0))
-        frames = [renderer._apply_inputs(inputs, settings, ("final",))]
+        inputs = Inputs(_take_forward(call, renderer, settings, stream).at(0))
+        final = renderer._apply_inputs(inputs, settings, ("final",))["final"]
+        return _join([_as_tensor(final, stream)], call.image)
     else:
         renderer._taken = None
         masks, emissions = (
@@ -452,10 +466,10 @@ def _on_device(call: _Call) -> Any:
         )
     # The images of a batch are in the same memory.
     batches = merge([cast("DeviceArray", tensor["final"]) for tensor in frames])
-    return _join([_as_tensor(batch, call.image) for batch in batches], call.image, torch.cat)
+    return _join([_as_tensor(batch, stream) for batch in batches], call.image, torch.cat)
 
 
-@_bloom.register_fake  # type: ignore[untyped-decorator]
+@torch.library.register_fake(_bloom, lib=_LIBRARY)  # type: ignore[untyped-decorator]
 def _(image: Any, *rest: Any) -> Any:
     return torch.empty(image.shape, dtype=image.dtype, device=image.device)
 
@@ -463,8 +477,8 @@ def _(image: Any, *rest: Any) -> Any:
 _FOUR_TENSORS: Final = "(Tensor, Tensor, Tensor, Tensor)"
 
 
-@_operator("vkbloom::bloom_backward", "Tensor cotangent, bool by_images, ", _FOUR_TENSORS)  # type: ignore[untyped-decorator]
-def _backward(cotangent: Any, by_images: bool, *given: Any) -> tuple[Any, ...]:
+@_operator("Tensor cotangent, bool by_images, ", _FOUR_TENSORS)
+def _bloom_backward(cotangent: Any, by_images: bool, *given: Any) -> tuple[Any, ...]:
     """Return the derivatives by image, mask, emission and values; without elements: of none.
 
     Of a batch, the derivatives by values are added. Without `by_images` they are by values alone.
@@ -474,9 +488,11 @@ def _backward(cotangent: Any, by_images: bool, *given: Any) -> tuple[Any, ...]:
     images = call.images if by_images else {}
     derivatives: dict[str, list[Any]] = {name: [] for name in images}
     sums = {name: np.zeros(shape) for name, shape in call.fields.items()}
+    stream = None
     # An empty batch has nothing to take to the device.
     if call.on_device and call.image.numel() > 0:
-        pulled = _pull_on_device(call, cotangent, by_images)
+        stream = _stream_of(call.image)
+        pulled = _pull_on_device(call, cotangent, by_images, stream)
     else:
         wanted = cotangent.detach().cpu().numpy()
         pulled = (
@@ -485,7 +501,7 @@ def _backward(cotangent: Any, by_images: bool, *given: Any) -> tuple[Any, ...]:
         )
     for gradients in pulled:
         for name, parts in derivatives.items():
-            parts.append(_as_tensor(gradients[name], call.image))
+            parts.append(_as_tensor(gradients[name], stream))
         # Of numbers, the host waits for the device.
         for name in sums:
             sums[name] += gradients[name]
@@ -502,10 +518,10 @@ def _backward(cotangent: Any, by_images: bool, *given: Any) -> tuple[Any, ...]:
     )
 
 
-def _as_tensor(part: Any, image: Any) -> Any:
-    """Return a derivative as a tensor; PyTorch's stream waits for one on the GPU of an image."""
+def _as_tensor(part: Any, stream: int | None) -> Any:
+    """Return an array as a tensor; PyTorch's stream waits for one on its GPU."""
     if isinstance(part, DeviceArray):
-        return torch.from_dlpack(part.__dlpack__(stream=_stream_of(image)))
+        return torch.from_dlpack(part.__dlpack__(stream=stream))
     return torch.from_numpy(np.array(part, np.float64))
 
 
@@ -517,7 +533,7 @@ def _join(parts: list[Any], like: Any, join: Any = None) -> Any:
     return joined.reshape(like.shape).to(like)
 
 
-@_backward.register_fake  # type: ignore[untyped-decorator]
+@torch.library.register_fake(_bloom_backward, lib=_LIBRARY)  # type: ignore[untyped-decorator]
 def _(cotangent: Any, by_images: bool, *given: Any) -> tuple[Any, ...]:
     image, mask, emission, values, *_ = given
     return tuple(
@@ -539,7 +555,7 @@ def _back(ctx: Any, cotangent: Any) -> tuple[Any, ...]:
     inputs = ctx.saved_tensors
     # A step that learns fields alone needs none of the others.
     by_images = any(ctx.needs_input_grad[:3])
-    derivatives = torch.ops.vkbloom.bloom_backward(
+    derivatives = _bloom_backward(
         cotangent, by_images, *inputs, ctx.names, ctx.settings, ctx.number
     )
     wanted = (by_images, by_images, by_images, True)
@@ -561,5 +577,5 @@ def _refuse(ctx: Any, *cotangents: Any) -> Any:
     )
 
 
-_bloom.register_autograd(_back, setup_context=_keep)
-_backward.register_autograd(_refuse)
+torch.library.register_autograd(_bloom, _back, setup_context=_keep, lib=_LIBRARY)
+torch.library.register_autograd(_bloom_backward, _refuse, lib=_LIBRARY)
