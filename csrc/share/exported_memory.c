@@ -5,7 +5,9 @@
 // Idle memory beyond this is freed, the oldest first: seven 4K images of half floats.
 #define KEPT_BYTES ((uint64_t)512 << 20)
 // Not so the latest, however large they are: a training step takes an image, the result, the
-// cotangent and the derivative, and streams may still use those of the step before.
+// cotangent and the derivative, and streams may still use those of the step before. Otherwise a
+// step of a pyramid in turns with other calls took 3.2 ms in place of 2.3, since it allocated each
+// time (3840 x 2160, RGB in float32, H200, 2026-11-30).
 enum { KEPT_COUNT = 8 };
 #define GRANULE ((uint64_t)64 << 10)
 
