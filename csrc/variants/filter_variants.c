@@ -148,7 +148,8 @@ static const struct vkb_pass_row *nested_filter(const struct vkb_variant_choice 
                                                 const struct vkb_pass_row *pass)
 {
     const struct vkb_graph *plain = &choice->plain;
-    const struct vkb_pass_row *up = vkb_bloom_of(plain, pass);
+    const struct vkb_pass_row *up =
+        vkb_ends_bloom(pass) ? vkb_graph_writer(plain, pass->reads[SLOT_BLOOM]) : NULL;
     const uint32_t target = pass->targets[0];
 
     // The shaders are compiled for one format. The levels of a published method may have their own.
@@ -180,6 +181,9 @@ static struct vkb_pass_row nested_row(const struct vkb_variant_choice *choice,
     row.fused = true;
     vkb_read_only(&row, up->reads[SLOT_SOURCE]);
     vkb_read_at(&row, SLOT_SAME_SIZE, pass->reads[SLOT_SCENE]);
+    row.constants.adds_image = up->constants.adds_image;
+    if (up->constants.adds_image)
+        vkb_read_at(&row, SLOT_NESTED, up->reads[SLOT_SAME_SIZE]);
     row.block = VKB_BLOCK_filter_final;
     copy_filter(&row.params.filter_final, &up->params.filter);
     copy_composite(&row.params.filter_final, &pass->params.composite);

@@ -11,6 +11,9 @@ const int KEPT = IS_INSET ? WINDOW + 2 : WINDOW;
 
 READ_IMAGE(SLOT_SOURCE, source);
 READ_IMAGE(SLOT_SAME_SIZE, same_size);
+#ifdef FINAL
+READ_IMAGE(SLOT_NESTED, nested);
+#endif
 
 // The texels of a row are a run where the ratio of widths is simple. The compiler removes loads that no window needs.
 const int BEFORE = MAX_WINDOW / 2, LOADED = 2 * COLUMNS + MAX_WINDOW;
@@ -31,6 +34,8 @@ const int BEFORE = MAX_WINDOW / 2, LOADED = 2 * COLUMNS + MAX_WINDOW;
 uvec4 shade(uvec4 same_size_pixel, vec4 sum, ivec2 pixel)
 {
 #ifdef FINAL
+    if (ADDS_IMAGE != 0)
+        sum += params.same_size * value_of(raw_pixel(nested, read_shapes[SLOT_NESTED], pixel.x, pixel.y));
     return ended(same_size_pixel, as_stored(sum, FORMAT), pixel);
 #else
     if (ADDS_IMAGE != 0)

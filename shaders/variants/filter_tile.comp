@@ -4,6 +4,7 @@
 SAMPLED_IMAGE(SLOT_SOURCE, source);
 SAMPLED_IMAGE(SLOT_SAME_SIZE, same_size);
 #ifdef FINAL
+SAMPLED_IMAGE(SLOT_NESTED, nested);
 #include "lib/ended.glsl"
 #endif
 layout(set = 0, binding = TARGET_BINDING) uniform writeonly image2D target;
@@ -33,6 +34,8 @@ vec4 shade(vec4 same_size_pixel, vec4 sum, ivec2 pixel)
 {
     sum = params.coarse * (sum / params.divisor);
 #ifdef FINAL
+    if (ADDS_IMAGE != 0)
+        sum += params.same_size * texelFetch(nested, pixel, 0);
     return ended(same_size_pixel, as_stored(sum, FORMAT), pixel);
 #else
     if (ADDS_IMAGE != 0)

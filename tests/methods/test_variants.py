@@ -144,6 +144,19 @@ def is_fused(variant: str, renderer: Renderer) -> bool:
     return variant == "gpu" or (variant == "cpu" and has_linear_texels(renderer))
 
 
+@pytest.mark.parametrize("size", [(320, 180), (211, 97)])
+def test_the_last_pass_contains_a_filter_that_adds_an_image(
+    variant: str, varied: Renderer, size: tuple[int, int]
+) -> None:
+    image = hdr_picture(*size, 3, "float32")
+    frames = varied.apply(image, presets["unreal"])
+    varied.apply(image[::-1], presets["unreal"])
+    alone = varied.apply(image, presets["unreal"], framebuffers="final")
+    np.testing.assert_array_equal(alone["final"], frames["final"])
+    assert "bloom" in frames.timings
+    assert ("bloom" in alone.timings) == (variant == "fragment")
+
+
 def test_cached_framebuffers_run_no_pass(varied: Renderer) -> None:
     image = hdr_picture(33, 44, 4, "float32", seed=6)
     frames = varied.apply(image, Separable())
