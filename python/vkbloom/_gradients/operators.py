@@ -317,8 +317,8 @@ def _take_batch(tensor: Any, name: str, renderer: Renderer, stream: int) -> Impo
     strides = tuple([size * stride for stride in batch.stride()])
     array = CudaArray(batch, batch.data_ptr(), tuple(batch.shape), strides, dtype, stream)
     # CUDA copies it when earlier passes have ended: beside passes the GPU would change between
-    # both, and on an H200 a step of a convolution took 10.8 ms in place of 6.5. The core waits, so
-    # that what comes before the passes is ready by then: steps in a row take 2.43 ms in place of
+    # both, and on an H200 a step of a convolution took 10.8 ms in place of 6.5. The core waits for
+    # them when it has the plan and the memory of the call: steps in a row take 2.43 ms in place of
     # 2.64 (a pyramid), 3.62 in place of 3.80 (kino; 2026-11-29).
     return array.copy(core, later=True)
 
@@ -374,9 +374,10 @@ def _batch(tensor: Any) -> Any:
 
 
 def _operator(parameters: str, result: str) -> Callable[[Callable[..., Any]], Any]:
-    """Return a decorator that makes an operator of a function with the name `_NAME`.
+    """Return a decorator that makes the operator NAME of a function with the name `_NAME`.
 
-    `torch.library.custom_op` would check each call once more.
+    An operator of `torch.library.custom_op` takes PyTorch 22 us in place of 20 forward, and 23 in
+    place of 17 backward (2.13 on a CPU, 2026-11-30): it compares the results with the arguments.
     """
 
     def make(function: Callable[..., Any]) -> Any:
