@@ -182,8 +182,8 @@ static struct vkb_pass_row nested_row(const struct vkb_variant_choice *choice,
     vkb_read_only(&row, up->reads[SLOT_SOURCE]);
     vkb_read_at(&row, SLOT_SAME_SIZE, pass->reads[SLOT_SCENE]);
     row.constants.adds_image = up->constants.adds_image;
-    if (up->constants.adds_image)
-        vkb_read_at(&row, SLOT_NESTED, up->reads[SLOT_SAME_SIZE]);
+    vkb_read_at(&row, SLOT_NESTED,
+                up->constants.adds_image ? up->reads[SLOT_SAME_SIZE] : VKB_NO_IMAGE);
     row.block = VKB_BLOCK_filter_final;
     copy_filter(&row.params.filter_final, &up->params.filter);
     copy_composite(&row.params.filter_final, &pass->params.composite);
