@@ -92,6 +92,7 @@ WORDS = {
     "rgb": "-DRGB",
     "stored": "-DLINEAR_TEXELS -DCHANNEL_BYTES=4 -DTARGET_BYTES={bytes}",
     "image": "-DSOURCE_FORMAT={glsl}",
+    "spectra": "-DSOURCE_FORMAT=rg32f",
 }
 # The formats that a shader can be compiled for: their names in GLSL, and bytes of a channel.
 FORMATS = {"rgba8unorm": ("rgba8", 1), "rgba16float": ("rgba16f", 2), "rgba32float": ("rgba32f", 4)}

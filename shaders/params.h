@@ -309,7 +309,8 @@
 // `row_last` is the last one that is used), the rows' number of elements, and the radices of the
 // columns' stages without the last one. WEIGHTED: what is read on the way forth, or what is stored
 // on the way back, is multiplied by the channel `weight` of the weights; along columns by those of
-// the first column. The result has so many texels before the first one of the weights.
+// the first column. The result has so many texels before the first one of the weights. In complete
+// lines a row of a channel has so many `frequencies`.
 #define FFT_BLOCK(B, READS, INPUT, VEC4S) \
     INPUT(B, int, count) \
     INPUT(B, int, across) \
@@ -334,11 +335,13 @@
     INPUT(B, float, prefilter_factor) \
     INPUT(B, int, weight) \
     INPUT(B, int, before_x) \
-    INPUT(B, int, before_y)
+    INPUT(B, int, before_y) \
+    INPUT(B, int, frequencies)
 
 // Writes the kernel into padded lines (fft_kernel.comp). For each axis: the kernel's number of
 // texels, the first and the last that are not 0, how many before and after its centre count, and the
-// period of the line. `grey`: all channels are equal.
+// period of the line. `grey`: all channels are equal. Complete lines have so many `channels`; 0: a
+// texel has all.
 #define FFT_KERNEL_BLOCK(B, READS, INPUT, VEC4S) \
     INPUT(B, int, padded_x) \
     INPUT(B, int, boundary_x) \
@@ -357,10 +360,12 @@
     INPUT(B, int, before_y) \
     INPUT(B, int, after_y) \
     INPUT(B, int, grey) \
+    INPUT(B, int, channels) \
     INPUT(B, float, gain)
 
 // The sum of products of spectra (products.frag). Where the spectra of coloured kernels are in
-// stages, the radices of both axes, as above; `kernel_sign` as above.
+// stages, the radices of both axes, as above; `kernel_sign` as above. A grey kernel of complete lines
+// has so many `frequencies` for all channels; 0: it has as many texels as the image.
 #define PRODUCTS_BLOCK(B, READS, INPUT, VEC4S) \
     INPUT(B, float, kernel_sign) \
     INPUT(B, int, row_length) \
@@ -372,7 +377,8 @@
     INPUT(B, int, column_a) \
     INPUT(B, int, column_b) \
     INPUT(B, int, column_c) \
-    INPUT(B, int, column_d)
+    INPUT(B, int, column_d) \
+    INPUT(B, int, frequencies)
 
 // The weights of a field at each pixel (field_weights.frag): which four of them, columns and rows of
 // the grid of weights, and how many grids are side by side.
@@ -628,6 +634,7 @@
 // Of fields of kernels they have SLOT_WEIGHTS and SLOT_ADDED of the adjoint passes, too.
 #define TRANSFORM_SLOTS(SLOT) \
     SLOT(SLOT_SPECTRUM, 1) /* of the kernel, for the product */ \
+    SLOT(SLOT_ADDED_SPECTRUM, 2) /* of complete lines: what columns add on their way back */ \
     SLOT(SLOT_FACTORS, 1)  /* of up to MAX_PRODUCTS: the spectra of glow and kernel in turns */ \
     SLOT(SLOT_PLACES, 1)   /* where columns and rows are in the grid of weights */ \
     SLOT(SLOT_NODES, 5)    /* the same, beside up to four SLOT_FACTORS */
@@ -720,10 +727,13 @@
 #define FFT_INVOCATIONS 64
 #define FFT_ROW_COLUMNS 8
 #define FFT_MAX_RADIX   16
-// With the line in shared memory, a smaller radix needs fewer registers, so that more workgroups
-// run at a time: radices up to FFT_USUAL_GROUP_RADIX if the length has such factors.
-#define FFT_USUAL_GROUP_RADIX 10
 #define FFT_LIMIT             1e28
+// In shared memory: the padding after `step` * `radix` elements of a line of `length`, where each of as
+// many invocations stores `radix` elements `step` apart. It has them use different banks, of 32.
+#define FFT_PADDING(step, radix, length) \
+    ((step) * (radix) == (length) ? 0 \
+     : (step) == 1                ? 1 - (radix) % 2 \
+                                  : ((step) * (32 - (radix) % 32 + 1)) % 32)
 
 // Products of spectra that one pass adds up.
 #define MAX_PRODUCTS 3
@@ -789,10 +799,10 @@
     CONSTANT(28, PADDED, padded)                   /* a stage of a transform pads its lines */ \
     CONSTANT(29, STAGE, stage)                     /* of a transform: STAGE_* */ \
     CONSTANT(30, RADIX_1, radix_1)           /* elements of a stage, or of the first of a line */ \
-    CONSTANT(31, RADIX_2, radix_2)           /* of the second; 0: a pass is one stage */ \
+    CONSTANT(31, RADIX_2, radix_2)           /* of the second; 1: there is none */ \
     CONSTANT(32, RADIX_3, radix_3)           /* of the third; 1: there is none */ \
     CONSTANT(33, RADIX_4, radix_4)           /* of the fourth; 1: there is none */ \
-    CONSTANT(34, GROUP_WIDTH, group_width)   /* invocations of a transform's workgroup */ \
+    CONSTANT(34, GROUP_WIDTH, group_width)   /* invocations of a workgroup: transforms, line.comp */ \
     CONSTANT(35, GROUP_HEIGHT, group_height) /* its rows of invocations */ \
     CONSTANT(36, ROLLED, rolled) /* of line.comp: the loop over a line's pixels stays one */ \
     CONSTANT(37, FINITE, finite) /* the source is known to have no NaN and no infinity */ \
@@ -830,7 +840,11 @@
     CONSTANT(69, PRODUCTS, products)           /* of spectra, that are added up */ \
     CONSTANT(70, MOVING, moving)               /* how the motion is given: MOTION_*; 0: none */ \
     CONSTANT(71, DEEP, deep)                   /* there is an image of the depth */ \
-    CONSTANT(72, WEIGHTED, weighted)           /* a stage of a transform multiplies by weights */
+    CONSTANT(72, WEIGHTED, weighted)           /* a stage of a transform multiplies by weights */ \
+    CONSTANT(73, FILLED, filled)               /* elements of a line's first butterflies; others are 0 */ \
+    CONSTANT(74, KEPT_RESULTS, kept_results)   /* of a line's last butterflies */ \
+    CONSTANT(75, PITCH, pitch)                 /* floats of a line in shared memory */ \
+    CONSTANT(76, CHANNELS, channels)           /* that complete lines are of */
 
 // The names that a setting can have. Each list is a setting and a specialization constant.
 #define COMPOSITE_NAMES(NAME) \

@@ -152,8 +152,8 @@ typedef bool vkb_host_pass(const struct vkb_pass_row *pass, const struct vkb_hos
 
 // Of a pass of a convolution by transforms: the lengths of its lines along rows and columns,
 // whether these are padded, so that they may be longer, and how many stages along the same axis
-// follow each other from this one on; 0: it is not the first of them. `channels`: of a pass on the
-// host, that have spectra.
+// follow each other from this one on; 0: it is not the first of them. `channels`: those that are
+// convolved, also in the transpose, where the others have no cotangents.
 struct vkb_transform {
     uint32_t width, height;
     bool pads_rows, pads_columns;

@@ -102,15 +102,30 @@ uint32_t vkb_add_spectrum(const struct vkb_convolving *passes, const char *name,
     return vkb_levels_target(passes->levels, named, VKB_FORMAT_RGBA32_FLOAT, size, false);
 }
 
-struct vkb_transform vkb_transform_of(const struct vkb_convolution *convolution, uint32_t stages)
+struct vkb_transform vkb_transform_of(const struct vkb_convolving *passes, uint32_t stages)
 {
+    const struct vkb_convolution *convolution = passes->convolution;
+    const bool blurs_alpha = passes->levels->settings->choices[VKB_CHOICE_alpha] == ALPHA_BLUR;
+
     return (struct vkb_transform){
         .width = convolution->x.line.length,
         .height = convolution->y.line.length,
         .pads_rows = convolution->pads_rows,
         .pads_columns = convolution->pads_columns,
         .stages = stages,
+        .channels = blurs_alpha ? 4 : 3,
     };
+}
+
+// That of the kernel's own passes.
+static struct vkb_transform kernel_transform_of(const struct vkb_convolving *passes,
+                                                uint32_t stages)
+{
+    struct vkb_transform transform = vkb_transform_of(passes, stages);
+
+    if (passes->levels->settings->kernel.grey)
+        transform.channels = 1;
+    return transform;
 }
 
 // The pass that puts the kernel to its places in the padded lines.
@@ -127,7 +142,7 @@ static void add_placing(const struct vkb_convolving *passes, uint32_t kernel, ui
     row.block_width = row.block_height = PIXEL_INVOCATIONS;
     vkb_read_only(&row, kernel);
     row.block = VKB_BLOCK_fft_kernel;
-    row.transform = vkb_transform_of(convolution, 0);
+    row.transform = kernel_transform_of(passes, 0);
     *params = (struct vkb_fft_kernel_params){
         .padded_x = (int)x->line.length,
         .boundary_x = x->boundary,
@@ -158,7 +173,7 @@ static struct vkb_pass_row stage_row(const struct vkb_convolving *passes,
 {
     struct vkb_pass_row row = vkb_fft_row(passes->levels->graph, stage);
 
-    row.transform = vkb_transform_of(passes->convolution, stages);
+    row.transform = vkb_transform_of(passes, stages);
     // The alpha is one of a cotangent, not 1.
     if (passes->transposed)
         row.constants.alpha = ALPHA_BLUR;
@@ -195,8 +210,10 @@ static void add_kernel_stages(const struct vkb_convolving *passes, uint32_t spec
         stage.padded = i == 1 && axes[i]->line.length > axes[i]->extent;
         const uint32_t count = axes[i]->line.stage_count;
         for (; stage.number < count; ++stage.number) {
-            struct vkb_pass_row row = stage_row(passes, &stage, stage.number == 0 ? count : 0);
+            const uint32_t stages = stage.number == 0 ? count : 0;
+            struct vkb_pass_row row = stage_row(passes, &stage, stages);
             row.params.fft.extent = INT32_MAX;
+            row.transform = kernel_transform_of(passes, stages);
             vkb_levels_pass(passes->levels, &row);
             stage.padded = false;
         }

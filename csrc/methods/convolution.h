@@ -58,7 +58,7 @@ uint32_t vkb_convolve_back(struct vkb_levels *levels, const struct vkb_convoluti
 struct vkb_size vkb_padded_size(const struct vkb_convolution *convolution);
 uint32_t vkb_add_spectrum(const struct vkb_convolving *passes, const char *name,
                           struct vkb_size size);
-struct vkb_transform vkb_transform_of(const struct vkb_convolution *convolution, uint32_t stages);
+struct vkb_transform vkb_transform_of(const struct vkb_convolving *passes, uint32_t stages);
 bool vkb_conjugates(const struct vkb_convolving *passes);
 
 // Adds the spectrum of a kernel, which is an image of the host; that of an image, along its rows

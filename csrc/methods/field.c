@@ -148,7 +148,7 @@ static uint32_t add_products(const struct vkb_convolving *passes, const uint32_t
     row.constants.products = (int32_t)count;
     row.constants.stage = passes->levels->settings->kernel.grey ? STAGE_GREY : STAGE_PRODUCT;
     row.block = VKB_BLOCK_products;
-    row.transform = vkb_transform_of(passes->convolution, 0);
+    row.transform = vkb_transform_of(passes, 0);
     // The alpha is one of a cotangent.
     if (passes->transposed)
         row.constants.alpha = ALPHA_BLUR;

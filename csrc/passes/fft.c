@@ -85,26 +85,16 @@ struct vkb_fft_line vkb_fft_line(uint32_t least)
     return best;
 }
 
-// Splits the length into the fewest stages, of radices of up to `most`.
-static bool split_group(uint32_t length, uint32_t most, uint32_t *found)
-{
-    uint32_t first = 0;
-
-    for (uint32_t i = 0; i < VKB_FFT_STAGES; ++i)
-        found[i] = 1;
-    while (radices[first] > most)
-        ++first;
-    for (uint32_t stages = 1; stages <= VKB_FFT_STAGES; ++stages)
-        if (split(length, first, stages, found))
-            return true;
-    return false;
-}
-
 bool vkb_fft_group_radices(uint32_t length, uint32_t *found)
 {
-    return is_smooth(length)
-        && (split_group(length, FFT_USUAL_GROUP_RADIX, found)
-            || split_group(length, FFT_MAX_RADIX, found));
+    if (!is_smooth(length))
+        return false;
+    for (uint32_t i = 0; i < VKB_FFT_STAGES; ++i)
+        found[i] = 1;
+    for (uint32_t stages = 1; stages <= VKB_FFT_STAGES; ++stages)
+        if (split(length, 0, stages, found))
+            return true;
+    return false;
 }
 
 static const struct vkb_shader *const shaders[VKB_FORMAT_COUNT] = VKB_BY_FORMAT(fft_image);

@@ -163,7 +163,7 @@ bool vkb_host_kernel_rows(const struct vkb_pass_row *pass, const struct vkb_host
     const uint32_t half = length / 2 + 1;
     struct vkb_host_lines work = {
         .half = half,
-        .channels = vkb_host_is_grey(target, half) ? 1 : 4,
+        .channels = pass->transform.channels,
         .source = reads[SLOT_SOURCE],
         .target = *target,
         .gain = params->gain,
@@ -208,6 +208,7 @@ bool vkb_host_rows_back(const struct vkb_pass_row *pass, const struct vkb_host_i
     const bool prepared = prepare(pass, reads, target, &work, error);
 
     work.stores = pass->constants.stage == STAGE_LAST;
+    work.opaque = pass->constants.alpha != ALPHA_BLUR;
     return run_loop(&work, prepared, vkb_host_loops()->rows_back, (target->height + 3) / 4,
                     workers);
 }

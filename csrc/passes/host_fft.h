@@ -45,7 +45,8 @@ struct vkb_host_lines {
     // Weights: the channel, and the place of the first weight in the result of the way back.
     int32_t weight, before_x, before_y;
     bool cleans;  // what is read: finite, up to FFT_LIMIT
-    bool stores;  // as shaders store single floats, with an alpha of 1 if there are three channels
+    bool stores;  // as shaders store single floats
+    bool opaque;  // with an alpha of 1
     // Of the rows of a kernel: places along rows and columns, and what all values are multiplied
     // by.
     struct vkb_kernel_places *kernel_x, *kernel_y;

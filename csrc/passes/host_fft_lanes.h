@@ -280,7 +280,8 @@ static void rows_forth(void *context, uint32_t part, uint32_t first, uint32_t en
 // A row of a channel of a kernel at its places. False: it is 0.
 static bool place_row(const struct vkb_host_lines *work, uint32_t y, uint32_t channel, float *to)
 {
-    const uint32_t n = work->line.length, apart = work->channels;
+    // Grey kernels are images of one channel.
+    const uint32_t n = work->line.length, apart = work->channels == 1 ? 1 : 4;
     const struct vkb_kernel_places *places = work->kernel_x;
     struct vkb_kernel_places rows = {0, -1, 1};
 
@@ -404,7 +405,7 @@ INLINE void store_pixels(const struct vkb_host_lines *work, uint32_t x, uint32_t
     if (work->stores)
         clean(&pixels, false, (float)SINGLE_LIMIT);
     for (uint32_t i = 0; i < PIXELS; ++i) {
-        if (work->stores && work->channels == 3)
+        if (work->stores && work->opaque)
             pixels[4 * i + 3] = 1.0f;
         if (y + 2 * i < target->height)
             memcpy(target->pixels + (y + 2 * i) * target->pitch + (size_t)4 * x,

@@ -37,6 +37,7 @@ static const struct vkb_device any_device = {
             [VKB_FORMAT_RGBA16_FLOAT] = ALL_FEATURES,
             [VKB_FORMAT_RGBA32_FLOAT] = ALL_FEATURES,
             [VKB_FORMAT_R32_FLOAT] = ALL_FEATURES,
+            [VKB_FORMAT_RG32_FLOAT] = ALL_FEATURES,
             [VKB_FORMAT_DEPTH32_FLOAT] = ALL_FEATURES,
         },
     .dispatch = true,

@@ -13,20 +13,40 @@ struct group {
     uint32_t radices[VKB_FFT_STAGES];
     uint32_t size;   // invocations for each line
     uint32_t lines;  // of a workgroup
+    uint32_t pitch;  // floats of a line in shared memory
 };
 
 enum {
     // A workgroup of short lines has several: of fewer invocations too few would run at a time.
     USUAL_INVOCATIONS = 128,
     MAX_LINES = 16,
-    // Of more, each has too few registers: a GPU has 65536 for all.
+    // Of more, two workgroups would not have registers enough: a GPU has 65536 for all.
     MAX_INVOCATIONS = 640,
 };
 
-static bool group_fits(const struct vkb_device *device, const struct group *group, uint32_t length)
+static const VkFormatFeatureFlags spectrum_features =
+    VK_FORMAT_FEATURE_SAMPLED_IMAGE_BIT | VK_FORMAT_FEATURE_STORAGE_IMAGE_BIT;
+
+// The most floats of a line between two stages, on its way forth and back.
+static uint32_t find_pitch(const uint32_t *radices, uint32_t length)
+{
+    uint32_t most = length;
+
+    for (int back = 0; back < 2; ++back)
+        for (uint32_t i = 0, step = 1; i < VKB_FFT_STAGES; ++i) {
+            const uint32_t radix = radices[back ? VKB_FFT_STAGES - 1 - i : i];
+            const uint32_t blocks = length / (step * radix);
+            const uint32_t floats = length + blocks * FFT_PADDING(step, radix, length);
+            most = floats > most ? floats : most;
+            step *= radix;
+        }
+    return most;
+}
+
+static bool group_fits(const struct vkb_device *device, const struct group *group)
 {
     const VkPhysicalDeviceLimits *limits = &device->limits;
-    const uint64_t floats = (uint64_t)group->lines * (length + length / 32) + group->size + 1;
+    const uint64_t floats = (uint64_t)group->lines * group->pitch + 1;
 
     // Any device has MAX_LINES along an axis.
     return group->size <= limits->maxComputeWorkGroupSize[0]
@@ -35,7 +55,7 @@ static bool group_fits(const struct vkb_device *device, const struct group *grou
         && floats * sizeof(float) <= limits->maxComputeSharedMemorySize;
 }
 
-// False: the device cannot hold such a line.
+// Of a line of `length` complex numbers. False: the device cannot hold such a line.
 static bool make_group(const struct vkb_device *device, uint32_t length, struct group *group)
 {
     uint32_t least = length;
@@ -47,11 +67,12 @@ static bool make_group(const struct vkb_device *device, uint32_t length, struct 
         if (group->radices[i] > 1 && group->radices[i] < least)
             least = group->radices[i];
     group->size = length / least;
-    if (!group_fits(device, group, length))
+    group->pitch = find_pitch(group->radices, length);
+    if (!group_fits(device, group))
         return false;
     while (group->lines < MAX_LINES && group->size * group->lines < USUAL_INVOCATIONS) {
         group->lines *= 2;
-        if (!group_fits(device, group, length)) {
+        if (!group_fits(device, group)) {
             group->lines /= 2;
             break;
         }
@@ -59,14 +80,23 @@ static bool make_group(const struct vkb_device *device, uint32_t length, struct 
     return true;
 }
 
+// Of a column of so many elements, or of a row of so many pixels, which is a line of half the
+// length.
+static bool make_axis_group(const struct vkb_device *device, bool rows, uint32_t length,
+                            struct group *group)
+{
+    return rows ? length % 2 == 0 && make_group(device, length / 2, group)
+                : make_group(device, length, group);
+}
+
 // The length itself, or the next one up to an eighth longer whose lines have fewer invocations. On
-// an H100, rows of 4608 elements take 0.27 ms where 4500 take 0.35.
-static uint32_t longer_length(const struct vkb_device *device, uint32_t length)
+// an H200, columns of 4608 elements take 0.53 ms where 4320 take 0.82 (2026-11-30).
+static uint32_t longer_length(const struct vkb_device *device, bool rows, uint32_t length)
 {
     struct group group;
 
     for (uint32_t each = length; each <= length + length / 8; ++each)
-        if (make_group(device, each, &group) && group.size <= MAX_INVOCATIONS)
+        if (make_axis_group(device, rows, each, &group) && group.size <= MAX_INVOCATIONS)
             return each;
     return length;
 }
@@ -81,17 +111,27 @@ static uint32_t line_length(const struct vkb_variant_choice *choice,
     const uint32_t length = rows ? transform->width : transform->height;
 
     return (rows ? transform->pads_rows : transform->pads_columns)
-             ? longer_length(choice->device, length)
+             ? longer_length(choice->device, rows, length)
              : length;
 }
 
-// Whether the device can hold the lines along both axes.
+// The spectrum of a channel has so many texels in a row.
+static uint32_t count_frequencies(const struct vkb_variant_choice *choice,
+                                  const struct vkb_pass_row *pass)
+{
+    return line_length(choice, pass, DIRECTION_HORIZONTAL) / 2 + 1;
+}
+
+// Whether the device can hold the lines along both axes, and images of the spectra of all channels.
 static bool holds_lines(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
 {
+    const struct vkb_device *device = choice->device;
     struct group group;
 
-    return make_group(choice->device, line_length(choice, pass, DIRECTION_HORIZONTAL), &group)
-        && make_group(choice->device, line_length(choice, pass, DIRECTION_VERTICAL), &group);
+    return make_axis_group(device, true, line_length(choice, pass, DIRECTION_HORIZONTAL), &group)
+        && make_axis_group(device, false, line_length(choice, pass, DIRECTION_VERTICAL), &group)
+        && 4 * count_frequencies(choice, pass) <= device->max_side
+        && vkb_device_supports(device, VKB_FORMAT_RG32_FLOAT, spectrum_features);
 }
 
 static bool multiplies(const struct vkb_pass_row *pass)
@@ -111,71 +151,129 @@ static void copy_weighing(struct vkb_pass_row *row, const struct vkb_pass_row *l
     row->params.fft.before_y = last->params.fft.before_y;
 }
 
+// Has an image hold the spectra of all channels.
+static void hold_spectra(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
+                         uint32_t image)
+{
+    struct vkb_image_row *row = &choice->graph->images[image];
+
+    row->format = VKB_FORMAT_RG32_FLOAT;
+    row->width = pass->transform.channels * count_frequencies(choice, pass);
+}
+
+// The images of a row for all stages along an axis, from `first` to before `end`.
+static void set_images(const struct vkb_variant_choice *choice, const struct vkb_pass_row *first,
+                       const struct vkb_pass_row *end, struct vkb_pass_row *row)
+{
+    const struct vkb_graph *graph = choice->graph;
+    const struct vkb_pass_row *last = end - 1;
+    const bool rows = first->constants.direction == DIRECTION_HORIZONTAL;
+
+    vkb_read_at(row, SLOT_ADDED_SPECTRUM, VKB_NO_IMAGE);
+    row->targets[0] = first->targets[0];
+    if (first->constants.inverse) {
+        row->targets[0] = last->targets[0];
+        copy_weighing(row, last);
+    }
+    // Columns may have been transformed in place.
+    if (first->constants.inverse && rows)
+        row->reads[SLOT_SOURCE] = graph->passes[graph->pass_count - 1].targets[0];
+    if (!rows) {
+        row->reads[SLOT_ADDED_SPECTRUM] = row->reads[SLOT_ADDED];
+        row->reads[SLOT_ADDED] = VKB_NO_IMAGE;
+    }
+    for (const struct vkb_pass_row *pass = first; pass < end; ++pass)
+        if (multiplies(pass)) {
+            // Columns are transformed in place, forth and back.
+            if (!first->constants.inverse)
+                row->targets[0] = row->reads[SLOT_SOURCE];
+            row->constants.stage = pass->constants.stage;
+            row->reads[SLOT_SPECTRUM] = pass->reads[SLOT_SPECTRUM];
+            row->params.fft.kernel_sign = pass->params.fft.kernel_sign;
+        }
+}
+
+// How many elements of a butterfly have one of the first `pixels` of the row, or of the first
+// elements of the column. The elements are a radix-th part of the line apart.
+static uint32_t count_parts(const struct vkb_pass_row *row, uint32_t radix, int32_t pixels)
+{
+    const uint32_t adjacent = (uint32_t)row->params.fft.padded / radix;
+    const uint32_t parts = ((uint32_t)pixels + adjacent - 1) / adjacent;
+
+    return parts < radix ? parts : radix;
+}
+
+// Leaves out what is only padding on the way forth, and what is not kept on the way back.
+static void set_parts(const struct vkb_pass_row *first, const struct group *group,
+                      struct vkb_pass_row *row)
+{
+    const struct vkb_fft_params *params = &first->params.fft;
+    const bool zeros = first->constants.padded && first->constants.boundary == BOUNDARY_ZERO;
+    const bool returns = first->constants.inverse || multiplies(row);
+
+    row->constants.filled = row->constants.kept_results = FFT_MAX_RADIX;
+    // Behind the last texel are zeros.
+    if (zeros && !first->constants.inverse)
+        row->constants.filled =
+            (int32_t)count_parts(row, group->radices[0], params->first + params->extent);
+    if (returns)
+        row->constants.kept_results =
+            (int32_t)count_parts(row, group->radices[0], row->params.fft.kept);
+}
+
 // The row for all stages along an axis, from `first` to before `end`.
 static struct vkb_pass_row make_row(const struct vkb_variant_choice *choice,
                                     const struct vkb_pass_row *first,
                                     const struct vkb_pass_row *end)
 {
+    static const struct vkb_shader *const by_format[VKB_FORMAT_COUNT] =
+        VKB_BY_FORMAT(fft_lines_image);
     const struct vkb_graph *graph = choice->graph;
-    const struct vkb_pass_row *last = end - 1;
-    const bool horizontal = first->constants.direction == DIRECTION_HORIZONTAL;
+    const bool rows = first->constants.direction == DIRECTION_HORIZONTAL;
+    const bool makes_pixels = rows && first->constants.inverse;
     const uint32_t length = line_length(choice, first, (enum vkb_mode)first->constants.direction);
+    const uint32_t frequencies = count_frequencies(choice, first);
     struct vkb_pass_row row;
     struct group group;
 
     memcpy(&row, first, sizeof row);
-    // Columns may have been transformed in place.
-    if (first->constants.inverse && horizontal)
-        row.reads[SLOT_SOURCE] = graph->passes[graph->pass_count - 1].targets[0];
-    row.targets[0] = first->constants.inverse ? last->targets[0] : first->targets[0];
-    if (first->constants.inverse)
-        copy_weighing(&row, last);
-    if (first->constants.inverse && horizontal)
+    set_images(choice, first, end, &row);
+    row.shader = row.constants.stage == STAGE_FIRST
+                   ? by_format[graph->images[row.reads[SLOT_SOURCE]].format]
+                   : &vkb_shader_fft_lines_spectra;
+    if (makes_pixels)
         row.constants.stage = STAGE_LAST;
-    for (const struct vkb_pass_row *pass = first; pass < end; ++pass)
-        if (multiplies(pass)) {
-            // Columns are transformed in place, forth and back.
-            if (!first->constants.inverse)
-                row.targets[0] = row.reads[SLOT_SOURCE];
-            row.constants.stage = STAGE_PRODUCT;
-            row.reads[SLOT_SPECTRUM] = pass->reads[SLOT_SPECTRUM];
-            row.params.fft.kernel_sign = pass->params.fft.kernel_sign;
-        }
     row.constants.rotated = 0;
-    row.params.fft.padded = (int)length;
+    const struct vkb_image_row *source = &graph->images[row.reads[SLOT_SOURCE]];
+    struct vkb_image_row *target = &graph->images[row.targets[0]];
     // Without a product, columns forth and back have images of their own.
-    if (!horizontal && row.targets[0] != row.reads[SLOT_SOURCE]) {
-        struct vkb_image_row *columns = &graph->images[row.targets[0]];
-        columns->width = graph->images[row.reads[SLOT_SOURCE]].width;
-        columns->height = first->constants.inverse ? (uint32_t)last->params.fft.kept : length;
+    if (!rows && target != source) {
+        hold_spectra(choice, first, row.targets[0]);
+        target->height = first->constants.inverse ? (uint32_t)end[-1].params.fft.kept : length;
     }
-    const struct vkb_image_row *spectra =
-        &graph->images[first->constants.inverse ? row.reads[SLOT_SOURCE] : row.targets[0]];
-    row.params.fft.kept =
-        horizontal ? last->params.fft.kept : (int)graph->images[row.targets[0]].height;
-    // The kernel's rows are as many as the columns' elements, which are more here.
-    row.params.fft.across = !horizontal ? (int)spectra->width
-                          : first->constants.inverse || row.constants.stage == STAGE_FIRST
-                              ? first->params.fft.across
-                              : (int)spectra->height;
-    (void)make_group(choice->device, length, &group);
+    const struct vkb_image_row *spectra = makes_pixels ? source : target;
+    row.constants.channels = (int32_t)first->transform.channels;
+    row.params.fft.frequencies = (int)frequencies;
+    row.params.fft.padded = (int)length;
+    row.params.fft.kept = rows ? end[-1].params.fft.kept : (int)target->height;
+    row.params.fft.across = makes_pixels ? first->params.fft.across
+                          : !rows        ? row.constants.channels * (int)frequencies
+                          : row.constants.stage == STAGE_FIRST
+                              ? first->params.fft.across * row.constants.channels
+                              : (int)spectra->height * row.constants.channels;
+    (void)make_axis_group(choice->device, rows, length, &group);
     row.constants.radix_1 = (int32_t)group.radices[0];
     row.constants.radix_2 = (int32_t)group.radices[1];
     row.constants.radix_3 = (int32_t)group.radices[2];
     row.constants.radix_4 = (int32_t)group.radices[3];
+    row.constants.pitch = (int32_t)group.pitch;
+    set_parts(first, &group, &row);
     const uint32_t groups = ((uint32_t)row.params.fft.across + group.lines - 1) / group.lines;
-    row.constants.group_width = (int32_t)(horizontal ? group.size : group.lines);
-    row.constants.group_height = (int32_t)(horizontal ? group.lines : group.size);
-    row.groups_width = horizontal ? 1 : groups;
-    row.groups_height = horizontal ? groups : 1;
+    row.constants.group_width = (int32_t)(rows ? group.size : group.lines);
+    row.constants.group_height = (int32_t)(rows ? group.lines : group.size);
+    row.groups_width = rows ? 1 : groups;
+    row.groups_height = rows ? groups : 1;
     return row;
-}
-
-// An image of spectra has those of the channels, which are symmetric: half the frequencies, twice.
-static void hold_spectra(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
-{
-    choice->graph->images[pass->targets[0]].width =
-        2 * (line_length(choice, pass, DIRECTION_HORIZONTAL) / 2 + 1);
 }
 
 // The row that puts the kernel to its places, in lines of the lengths that are transformed.
@@ -187,13 +285,27 @@ static struct vkb_pass_row make_placing(const struct vkb_variant_choice *choice,
     struct vkb_pass_row row;
 
     memcpy(&row, pass, sizeof row);
-    row.params.fft_kernel.grey = 0;
+    row.params.fft_kernel.channels = (int)pass->transform.channels;
     row.params.fft_kernel.padded_x = (int)x;
     row.params.fft_kernel.padded_y = (int)y;
     row.params.fft_kernel.gain = (float)(1.0 / ((double)x * y));
-    hold_spectra(choice, pass);
+    hold_spectra(choice, pass, pass->targets[0]);
     choice->graph->images[row.targets[0]].height = y;
     return row;
+}
+
+// The products of complete spectra: each texel has a frequency of a channel.
+static bool add_products(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
+{
+    struct vkb_pass_row row;
+
+    memcpy(&row, pass, sizeof row);
+    if (row.constants.stage == STAGE_GREY)
+        row.params.products.frequencies = (int)count_frequencies(choice, pass);
+    row.constants.stage = STAGE_GREY;
+    hold_spectra(choice, pass, pass->targets[0]);
+    choice->graph->images[row.targets[0]].height = line_length(choice, pass, DIRECTION_VERTICAL);
+    return vkb_add_fullscreen_variant(choice, &row);
 }
 
 bool vkb_add_transform_lines_variant(struct vkb_variant_choice *choice,
@@ -207,20 +319,13 @@ bool vkb_add_transform_lines_variant(struct vkb_variant_choice *choice,
         row = make_placing(choice, pass);
         return vkb_add_variant_pass(choice, &row);
     }
-    if (pass->block == VKB_BLOCK_products) {
-        // Channels are separated, so that each frequency is multiplied by its own.
-        memcpy(&row, pass, sizeof row);
-        row.constants.stage = STAGE_GREY;
-        hold_spectra(choice, pass);
-        choice->graph->images[row.targets[0]].height =
-            line_length(choice, pass, DIRECTION_VERTICAL);
-        return vkb_add_fullscreen_variant(choice, &row);
-    }
+    if (pass->block == VKB_BLOCK_products)
+        return add_products(choice, pass);
     // The first stage along an axis stands for all.
     if (pass->transform.stages == 0)
         return true;
     if (pass->constants.stage == STAGE_FIRST)
-        hold_spectra(choice, pass);
+        hold_spectra(choice, pass, pass->targets[0]);
     row = make_row(choice, pass, pass + pass->transform.stages);
     return vkb_add_variant_pass(choice, &row);
 }
@@ -243,18 +348,6 @@ static bool runs_on_host(const struct vkb_variant_choice *choice, const struct v
 static bool transforms_kernel(const struct vkb_pass_row *row)
 {
     return row->reads[SLOT_SOURCE] == row->targets[0];
-}
-
-static bool add_host_transform(struct vkb_variant_choice *choice, struct vkb_pass_row *row,
-                               vkb_host_pass *host)
-{
-    const uint32_t width = choice->graph->images[row->targets[0]].width;
-
-    // A kernel has that of cotangents, too, unless it is grey.
-    row->transform.channels = row->constants.alpha == ALPHA_BLUR || transforms_kernel(row) ? 4 : 3;
-    if (transforms_kernel(row) && width < spectra_width(row))
-        row->transform.channels = 1;
-    return vkb_add_host_pass(choice, row, host);
 }
 
 // A given kernel as one channel.
@@ -292,14 +385,14 @@ static bool add_host_rows_forth(struct vkb_variant_choice *choice, struct vkb_pa
     if (row->constants.stage == STAGE_FIRST)
         vkb_read_host_floats(choice, row);
     choice->graph->images[row->targets[0]].width = spectra_width(row);
-    return add_host_transform(choice, row, vkb_host_rows_forth);
+    return vkb_add_host_pass(choice, row, vkb_host_rows_forth);
 }
 
 static bool add_host_rows_back(struct vkb_variant_choice *choice, struct vkb_pass_row *row)
 {
     row->constants.stage = STAGE_LAST;
     row->params.fft.kept = (int)choice->graph->images[row->targets[0]].width;
-    return add_host_transform(choice, row, vkb_host_rows_back);
+    return vkb_add_host_pass(choice, row, vkb_host_rows_back);
 }
 
 // Columns forth, also with the product and back, or columns back.
@@ -320,7 +413,7 @@ static bool add_host_columns(struct vkb_variant_choice *choice, struct vkb_pass_
         target->width = spectra_width(row);
     target->height = returns ? (uint32_t)end[-1].params.fft.kept : row->transform.height;
     row->params.fft.kept = (int)target->height;
-    return add_host_transform(choice, row, vkb_host_columns);
+    return vkb_add_host_pass(choice, row, vkb_host_columns);
 }
 
 bool vkb_add_host_transform_variant(struct vkb_variant_choice *choice,
@@ -336,7 +429,7 @@ bool vkb_add_host_transform_variant(struct vkb_variant_choice *choice,
         return add_host_kernel(choice, &row);
     if (pass->block == VKB_BLOCK_products) {
         choice->graph->images[row.targets[0]].width = spectra_width(pass);
-        return add_host_transform(choice, &row, vkb_host_products);
+        return vkb_add_host_pass(choice, &row, vkb_host_products);
     }
     // The first stage along an axis stands for all. The rows of a kernel are transformed.
     if (pass->transform.stages == 0

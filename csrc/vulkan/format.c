@@ -16,6 +16,8 @@ const struct vkb_format_info vkb_formats[VKB_FORMAT_COUNT] = {
 #undef FORMAT_ROW
         [VKB_FORMAT_R32_FLOAT] = {"r32float", "float32", VK_FORMAT_R32_SFLOAT, 1, 4, COLOUR,
                                   .limit = FLT_MAX},
+    [VKB_FORMAT_RG32_FLOAT] = {"rg32float", "float32", VK_FORMAT_R32G32_SFLOAT, 2, 4, COLOUR,
+                               .limit = FLT_MAX},
     [VKB_FORMAT_DEPTH32_FLOAT] = {"depth32float", "float32", VK_FORMAT_D32_SFLOAT, 1, 4,
                                   VK_IMAGE_ASPECT_DEPTH_BIT},
 };

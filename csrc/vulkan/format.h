@@ -32,6 +32,7 @@ enum vkb_format {
     VKB_BUFFER_FORMATS(VKB_FORMAT_ENUM, )
 #undef VKB_FORMAT_ENUM
         VKB_FORMAT_R32_FLOAT,  // of masks
+    VKB_FORMAT_RG32_FLOAT,     // of spectra in complete lines
     VKB_FORMAT_DEPTH32_FLOAT,
     VKB_FORMAT_COUNT,
 };

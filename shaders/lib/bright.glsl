@@ -20,10 +20,14 @@ vec3 back_prefiltered(vec3 colour, vec3 cotangent)
     return ratio * cotangent + LUMINANCE * (dot(cotangent, colour / luminance) * (slope - ratio));
 }
 
-// What a convolution spreads of a texel: finite, and so that sums are, too.
+// What a convolution spreads: finite, and so that sums are, too.
+vec3 kept_of(vec3 colour)
+{
+    return limited(finite_or_zero(vec4(colour, 0.0)).rgb, FFT_LIMIT);
+}
+
 vec4 glow_of(vec4 texel)
 {
-    vec4 finite = finite_or_zero(texel);
-    vec4 kept = vec4(limited(finite.rgb, FFT_LIMIT), limited(finite.aaa, FFT_LIMIT).r);
+    vec4 kept = vec4(kept_of(texel.rgb), kept_of(texel.aaa).r);
     return vec4(PREFILTERED != 0 ? prefiltered(kept.rgb) : kept.rgb, ALPHA == ALPHA_BLUR ? kept.a : 0.0);
 }

@@ -1,91 +1,61 @@
-// Discrete Fourier transforms of up to FFT_MAX_RADIX elements in named registers: of `held`, whose
-// elements are two complex numbers each. All loops are unrolled, so that no index is known only at run
-// time.
+// Discrete Fourier transforms of up to FFT_MAX_RADIX elements in named registers: of `held`, whose elements
+// are of the type ELEMENT, one complex number or two. All loops are unrolled, so that no index is known
+// only at run time.
 
-vec2 conjugate(vec2 value)
+#include "lib/complex.glsl"
+
+// Sets turns[q] to exp(-2 pi i k q / n) for q from 1 to before `radix`, for k < n / radix. Power q of the first turn would
+// have q times its error, so that the fourth is computed, too. Their products are within 6e-8, 7e-8 of radix 16; powers of
+// one within 1.9e-7.
+void find_turns(int radix, float k, int n, out vec2 turns[FFT_MAX_RADIX])
 {
-    return vec2(value.x, -value.y);
+    turns[1] = radix < 8 ? turn(k, n) : small_turn(8.0 * k * (1.0 / float(n)));
+    turns[2] = product(turns[1], turns[1]);
+    if (radix > 4) {
+        turns[4] = turn(4.0 * k, n);
+        turns[3] = product(turns[4], conjugate(turns[1]));
+    } else {
+        turns[3] = product(turns[2], turns[1]);
+    }
+    [[unroll]] for (int q = 5; q < radix; ++q)
+        turns[q] = (q & 3) == 0 ? product(turns[q - 4], turns[4]) : product(turns[q & ~3], turns[q & 3]);
 }
 
-vec2 product(vec2 a, vec2 b)
+void transform_2(inout ELEMENT a, inout ELEMENT b)
 {
-    return vec2(fma(a.x, b.x, -a.y * b.y), fma(a.x, b.y, a.y * b.x));
-}
-
-vec4 rotated(vec4 value, vec2 angle)
-{
-    return vec4(product(value.xy, angle), product(value.zw, angle));
-}
-
-// a / b, rounded down, for 0 <= a < 2^22 and b > 0. CPUs divide integers lane by lane. A sum with 3 * 2^22
-// is rounded to the nearest integer, also that of a negative number; half of 1 / b, the least distance to the
-// middle of two integers, is above its error.
-int quotient(int a, int b)
-{
-    return floatBitsToInt((float(a) + 0.5) * (1.0 / float(b)) - 0.5 + 12582912.0) & 0x3fffff;
-}
-
-// exp(-i pi p / 4) for -1 <= p <= 1, to the last bits of floats: the polynomials are within 2e-9, and pi / 4 is the sum of
-// two floats. A device's own sine may be good to 11 bits.
-vec2 small_turn(float p)
-{
-    float p2 = p * p;
-    float rest = -2.1855694e-8 + p2 * (-0.0807454347 + p2 * (0.00248998972 - p2 * 3.59390410e-5));
-    float less = -0.308425136 + p2 * (0.0158543278 + p2 * (-0.000325942007 + p2 * 3.53133426e-6));
-    return vec2(fma(p2, less, 1.0), -fma(p, 0.78539816339744831, p * rest));
-}
-
-// exp(-2 pi i k / n) for 0 <= k < n < 2^18, by quarters.
-vec2 turn(int k, int n)
-{
-    int quarters = quotient(8 * k + n, 2 * n);
-    vec2 small = small_turn(float(8 * k - 2 * n * quarters) * (1.0 / float(n)));
-    vec2 turned = (quarters & 1) == 1 ? vec2(small.y, -small.x) : small;
-    return (quarters & 2) == 2 ? -turned : turned;
-}
-
-// Multiplies both numbers by -i, or by i in the inverse transform.
-vec4 quarter(vec4 value, bool inverse)
-{
-    return inverse ? vec4(-value.y, value.x, -value.w, value.z)
-                   : vec4(value.y, -value.x, value.w, -value.z);
-}
-
-void transform_2(inout vec4 a, inout vec4 b)
-{
-    vec4 sum = a + b;
+    ELEMENT sum = a + b;
     b = a - b;
     a = sum;
 }
 
-void transform_3(inout vec4 v[8], bool inverse)
+void transform_3(inout ELEMENT v[8], bool inverse)
 {
-    vec4 sum = v[1] + v[2], turned = 0.86602540378443865 * quarter(v[1] - v[2], inverse);
-    vec4 middle = v[0] - 0.5 * sum;
+    ELEMENT sum = v[1] + v[2], turned = 0.86602540378443865 * quarter(v[1] - v[2], inverse);
+    ELEMENT middle = v[0] - 0.5 * sum;
     v[0] += sum;
     v[1] = middle + turned;
     v[2] = middle - turned;
 }
 
-void transform_4(inout vec4 p, inout vec4 q, inout vec4 r, inout vec4 s, bool inverse)
+void transform_4(inout ELEMENT p, inout ELEMENT q, inout ELEMENT r, inout ELEMENT s, bool inverse)
 {
-    vec4 a = p + r, b = p - r;
-    vec4 c = q + s, d = quarter(q - s, inverse);
+    ELEMENT a = p + r, b = p - r;
+    ELEMENT c = q + s, d = quarter(q - s, inverse);
     p = a + c;
     q = b + d;
     r = a - c;
     s = b - d;
 }
 
-void transform_5(inout vec4 v[8], bool inverse)
+void transform_5(inout ELEMENT v[8], bool inverse)
 {
     // Cosines and sines of 2 pi / 5 and 4 pi / 5.
     const float C1 = 0.30901699437494742, C2 = -0.80901699437494742;
     const float S1 = 0.95105651629515357, S2 = 0.58778525229247313;
-    vec4 a = v[1] + v[4], b = v[2] + v[3];
-    vec4 c = quarter(v[1] - v[4], inverse), d = quarter(v[2] - v[3], inverse);
-    vec4 first = v[0] + C1 * a + C2 * b, second = v[0] + C2 * a + C1 * b;
-    vec4 third = S1 * c + S2 * d, fourth = S2 * c - S1 * d;
+    ELEMENT a = v[1] + v[4], b = v[2] + v[3];
+    ELEMENT c = quarter(v[1] - v[4], inverse), d = quarter(v[2] - v[3], inverse);
+    ELEMENT first = v[0] + C1 * a + C2 * b, second = v[0] + C2 * a + C1 * b;
+    ELEMENT third = S1 * c + S2 * d, fourth = S2 * c - S1 * d;
     v[0] += a + b;
     v[1] = first + third;
     v[2] = second + fourth;
@@ -93,13 +63,13 @@ void transform_5(inout vec4 v[8], bool inverse)
     v[4] = first - third;
 }
 
-void transform_8(inout vec4 v[8], bool inverse)
+void transform_8(inout ELEMENT v[8], bool inverse)
 {
     const float HALF_ROOT = 0.70710678118654752;
-    vec4 even[4] = {v[0], v[2], v[4], v[6]}, odd[4] = {v[1], v[3], v[5], v[7]};
+    ELEMENT even[4] = {v[0], v[2], v[4], v[6]}, odd[4] = {v[1], v[3], v[5], v[7]};
     transform_4(even[0], even[1], even[2], even[3], inverse);
     transform_4(odd[0], odd[1], odd[2], odd[3], inverse);
-    vec4 turned = quarter(odd[1], inverse), last = quarter(odd[3], inverse);
+    ELEMENT turned = quarter(odd[1], inverse), last = quarter(odd[3], inverse);
     odd[1] = HALF_ROOT * (odd[1] + turned);
     odd[2] = quarter(odd[2], inverse);
     odd[3] = HALF_ROOT * (last - odd[3]);
@@ -109,12 +79,12 @@ void transform_8(inout vec4 v[8], bool inverse)
     }
 }
 
-vec4 held[FFT_MAX_RADIX];
+ELEMENT held[FFT_MAX_RADIX];
 
 // Transforms `count` elements that are `step` apart.
 void transform_few(int count, int first, int step, bool inverse)
 {
-    vec4 v[8];
+    ELEMENT v[8];
     [[unroll]] for (int i = 0; i < 8; ++i)
         if (i < count)
             v[i] = held[first + i * step];
@@ -159,7 +129,7 @@ void transform_held(int radix, bool inverse)
     [[unroll]] for (int q = 1; q < a; ++q) {
         [[unroll]] for (int j = 1; j < b; ++j) {
             // All operands are constants, so that the driver computes the angle once.
-            vec2 angle = turn(q * j, radix);
+            vec2 angle = turn(float(q * j), radix);
             held[b * q + j] = rotated(held[b * q + j], inverse ? conjugate(angle) : angle);
         }
     }

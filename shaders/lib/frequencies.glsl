@@ -1,5 +1,5 @@
 // Spectra whose frequencies are in the order of stages, with two channels in each complex number. Include
-// lib/fourier.glsl first.
+// lib/complex.glsl first.
 
 // The frequency at a place, and the place of a frequency: digits of the radices a to d.
 int frequency_at(int place, ivec4 radices)

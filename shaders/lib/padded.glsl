@@ -3,17 +3,9 @@
 
 #include "lib/bright.glsl"
 
-vec4 load_lit(int along, int across)
-{
-    vec4 texel = load_source(texel_at(along, across));
-    if (STAGE == STAGE_FIRST)
-        texel = glow_of(texel);
-    return WEIGHTED != 0 && INVERSE == 0 ? weight_at(along, across) * texel : texel;
-}
-
-// What the transform has at a place of the padded line. Where that lies before the source's first texel
-// it is from `turn` on.
-vec4 load_padded(int along, int across)
+// Where a place of the padded line has its texel, and whether it has one: positions before the source's
+// first texel are from `turn` on.
+int padded_place(int along, out bool has_texel)
 {
     int texel_place = along - params.first;
     bool inside = texel_place >= 0 && texel_place < params.extent, behind = along < params.turn;
@@ -24,12 +16,18 @@ vec4 load_padded(int along, int across)
         place = behind ? 2 * params.extent - 1 - along : params.padded - 1 - along;
     else
         place = behind ? params.extent - 1 : 0;
-    place = inside ? texel_place : clamp(place, 0, params.extent - 1);
-    vec4 texel = load_lit(place, across);
-    return inside || BOUNDARY != BOUNDARY_ZERO ? texel : vec4(0.0);
+    has_texel = inside || BOUNDARY != BOUNDARY_ZERO;
+    return inside ? texel_place : clamp(place, 0, params.extent - 1);
 }
 
 vec4 load(int along, int across)
 {
-    return PADDED != 0 ? load_padded(along, across) : load_lit(along, across);
+    bool has_texel = true;
+    int place = PADDED != 0 ? padded_place(along, has_texel) : along;
+    vec4 texel = load_source(texel_at(place, across));
+    if (STAGE == STAGE_FIRST)
+        texel = glow_of(texel);
+    if (WEIGHTED != 0 && INVERSE == 0)
+        texel *= weight_at(place, across);
+    return has_texel ? texel : vec4(0.0);
 }

@@ -24,11 +24,9 @@ ivec3 places(int along, int padded, int boundary, int extent, ivec2 ends, int pe
     return found;
 }
 
-void main()
+// Of the kernel's pixel at a place of the padded lines.
+vec4 sum_at(ivec2 at)
 {
-    ivec2 at = ivec2(gl_GlobalInvocationID.xy);
-    if (any(greaterThanEqual(at, imageSize(target))))
-        return;
     ivec3 x = places(at.x, params.padded_x, params.boundary_x, params.extent_x,
                      ivec2(params.first_x, params.last_x), params.period_x, params.before_x, params.after_x);
     ivec3 y = places(at.y, params.padded_y, params.boundary_y, params.extent_y,
@@ -37,7 +35,25 @@ void main()
     for (int j = y.x; j <= y.y; j += y.z)
         for (int i = x.x; i <= x.y; i += x.z)
             sum += texelFetch(kernel, ivec2(i, j), 0);
-    // A grey kernel is the same complex number for both pairs of channels.
-    sum = params.grey != 0 ? vec4(sum.r, 0.0, sum.r, 0.0) : sum;
-    imageStore(target, at, params.gain * sum);
+    return params.gain * sum;
+}
+
+void main()
+{
+    ivec2 at = ivec2(gl_GlobalInvocationID.xy);
+    if (any(greaterThanEqual(at, imageSize(target))))
+        return;
+    if (params.channels == 0) {
+        vec4 sum = sum_at(at);
+        // A grey kernel is the same complex number for both pairs of channels.
+        imageStore(target, at, params.grey != 0 ? vec4(sum.r, 0.0, sum.r, 0.0) : sum);
+        return;
+    }
+    // Complete lines have two pixels in a texel, and the channels beside each other (variants/fft_lines.comp).
+    int pairs = params.padded_x / 2;
+    if (at.x >= pairs)
+        return;
+    vec4 even = sum_at(ivec2(2 * at.x, at.y)), odd = sum_at(ivec2(2 * at.x + 1, at.y));
+    for (int i = 0; i < params.channels; ++i)
+        imageStore(target, ivec2(i * (pairs + 1) + at.x, at.y), vec4(even[i], odd[i], 0.0, 0.0));
 }

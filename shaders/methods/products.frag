@@ -1,7 +1,7 @@
-// Adds up products of spectra of images and kernels, each at its own frequency. Complete lines have separated channels,
-// and a grey kernel is one number for both channels; the product with a kernel with colours in stages needs the frequency
-// of the opposite sign (STAGE_PRODUCT).
-#include "lib/fourier.glsl"
+// Adds up products of spectra of images and kernels, each at its own frequency. A texel of complete lines is one channel's,
+// and a grey kernel in stages is one number for both channels; the product with a kernel with colours in stages needs the
+// frequency of the opposite sign (STAGE_PRODUCT).
+#include "lib/complex.glsl"
 #include "lib/frequencies.glsl"
 
 UNIFORM_BLOCK(PRODUCTS_BLOCK);
@@ -41,11 +41,15 @@ ivec2 mirror_of(ivec2 at)
 #define PRODUCT(number) \
     (STAGE == STAGE_PRODUCT \
          ? product_of(GLOW(number, at), GLOW(number, mirror), KERNEL(number, at), KERNEL(number, mirror)) \
-         : product_of(GLOW(number, at), KERNEL(number, at)))
+         : product_of(GLOW(number, at), KERNEL(number, of_kernel)))
 
 vec4 sum_of_products(ivec2 at)
 {
     ivec2 mirror = STAGE == STAGE_PRODUCT ? mirror_of(at) : at;
+    // Channels are beside each other.
+    ivec2 of_kernel = at;
+    if (params.frequencies > 0)
+        of_kernel.x -= params.frequencies * quotient(at.x, params.frequencies);
     vec4 total = ADDS_IMAGE != 0 ? texelFetch(sum, at, 0) : vec4(0.0);
     total += PRODUCT(0);
     if (PRODUCTS > 1)
