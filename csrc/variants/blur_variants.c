@@ -25,9 +25,13 @@ static struct vkb_pass_row line_row(const struct vkb_variant_choice *choice,
     memcpy(&row, blur, sizeof row);
     row.constants = (struct vkb_constants){.alpha = blur->constants.alpha};
     memset(&row.params, 0, sizeof row.params);
+    // On a GPU a workgroup of one row of invocations would leave most of its lanes idle.
+    const uint32_t rows = choice->variants == VKB_VARIANTS_GPU ? ROW_INVOCATIONS : 1;
     vkb_make_dispatch(&row, line_shaders[graph->images[blur->reads[SLOT_SOURCE]].format],
                       vertical ? ROW_INVOCATIONS : ROW_INVOCATIONS * LINE_OUTPUTS,
-                      vertical ? LINE_OUTPUTS : 1);
+                      vertical ? rows * LINE_OUTPUTS : rows);
+    row.constants.group_width = ROW_INVOCATIONS;
+    row.constants.group_height = (int32_t)rows;
     row.reading = VKB_READING_LOADED;
     row.targets[0] = target;
     const bool is_short = radius <= LINE_SHORT_RADIUS;

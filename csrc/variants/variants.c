@@ -43,6 +43,7 @@ static const struct variant variants_table[] = {
     {VKB_VARIANTS_GPU, "tiles", vkb_add_adjoint_fused_variant, 0},
     {VKB_VARIANTS_GPU, "tiles", vkb_add_adjoint_filter_variant, 0},
     {VKB_VARIANTS_GPU, "pixels", vkb_add_adjoint_kernels_variant, 0},
+    {VKB_VARIANTS_GPU, "line", vkb_add_line_variant, 0},
     {VKB_VARIANTS_GPU, "lines", vkb_add_transform_lines_variant, 0},
     {VKB_VARIANTS_GPU, "tiles", vkb_add_filtered_variant, TILES},
     {VKB_VARIANTS_GPU, "tiles_final", vkb_add_filtered_final_variant, 0},

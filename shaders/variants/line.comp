@@ -3,7 +3,7 @@
 
 UNIFORM_BLOCK(LINE_BLOCK);
 
-layout(local_size_x = ROW_INVOCATIONS) in;
+layout(local_size_x_id = 34, local_size_y_id = 35) in;
 layout(set = 0, binding = BINDING_OF(SLOT_SOURCE), SOURCE_FORMAT) uniform readonly image2D source;
 layout(set = 0, binding = TARGET_BINDING) uniform writeonly image2D target;
 
@@ -113,7 +113,11 @@ void blur_rolled()
 
 void blur_unrolled()
 {
-    ivec2 first = ivec2(gl_GlobalInvocationID.xy) * (along() * (LINE_OUTPUTS - 1) + 1);
+    // Of a square, neighbours lie across the lines, so that their texels are adjacent.
+    bool turned = GROUP_WIDTH == GROUP_HEIGHT && DIRECTION == DIRECTION_HORIZONTAL;
+    ivec2 local = turned ? ivec2(gl_LocalInvocationID.yx) : ivec2(gl_LocalInvocationID.xy);
+    ivec2 place = ivec2(gl_WorkGroupID.xy) * ivec2(GROUP_WIDTH, GROUP_HEIGHT) + local;
+    ivec2 first = place * (along() * (LINE_OUTPUTS - 1) + 1);
     vec4 sums[LINE_OUTPUTS];
 
     if (any(greaterThanEqual(first, imageSize(target))))
