@@ -172,7 +172,8 @@ static bool find_bloom(const struct vkb_graph *graph, const struct vkb_pass_row 
     uint32_t glow;
 
     *bloom = (struct bloom){.last = vkb_bloom_of(graph, pass), .composite = pass};
-    if (!bloom->last || !bloom->last->joined || !graph->images[pass->reads[SLOT_SCENE]].input
+    if (!bloom->last || !bloom->last->joined || bloom->last->filter_count != 1
+        || !graph->images[pass->reads[SLOT_SCENE]].input
         || !vkb_is_written_once(graph, pass->reads[SLOT_BLOOM])
         || !find_kernels(bloom->last, radius, bloom, &glow))
         return false;

@@ -148,8 +148,7 @@ static const struct vkb_pass_row *nested_filter(const struct vkb_variant_choice 
                                                 const struct vkb_pass_row *pass)
 {
     const struct vkb_graph *plain = &choice->plain;
-    const struct vkb_pass_row *up =
-        vkb_ends_bloom(pass) ? vkb_graph_writer(plain, pass->reads[SLOT_BLOOM]) : NULL;
+    const struct vkb_pass_row *up = vkb_bloom_of(plain, pass);
     const uint32_t target = pass->targets[0];
 
     // The shaders are compiled for one format. The levels of a published method may have their own.

@@ -91,7 +91,7 @@ const struct vkb_pass_row *vkb_bloom_of(const struct vkb_graph *graph,
     const struct vkb_pass_row *pass =
         vkb_ends_bloom(composite) ? vkb_graph_writer(graph, composite->reads[SLOT_BLOOM]) : NULL;
 
-    return pass && pass->filter_count == 1 && vkb_computes(pass, VKB_BLOCK_filter) ? pass : NULL;
+    return pass && vkb_computes(pass, VKB_BLOCK_filter) ? pass : NULL;
 }
 
 const struct vkb_pass_row *vkb_threshold_of(const struct vkb_graph *graph, uint32_t image)

@@ -61,7 +61,7 @@ bool vkb_has_format_of(const struct vkb_graph *graph, uint32_t a, uint32_t b);
 
 bool vkb_is_written_once(const struct vkb_graph *graph, uint32_t image);
 // The last pass of the filter that makes the bloom which a composite ends (vkb_ends_bloom); NULL:
-// it is no filter of one image.
+// it is no filter.
 const struct vkb_pass_row *vkb_bloom_of(const struct vkb_graph *graph,
                                         const struct vkb_pass_row *composite);
 // The threshold pass that writes `image` from an image of the same size and format; NULL: no such
