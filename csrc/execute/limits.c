@@ -61,6 +61,16 @@ static bool check_needs(const struct vkb_device *device, const struct vkb_pass_r
     return check(device, pass, needs, dispatch ? sizeof needs / sizeof *needs : DRAW_NEEDS, error);
 }
 
+// Of a pass that loads what it reads: other passes of methods need no more than every device has.
+static bool check_loads(const struct vkb_device *device, const struct vkb_pass_row *pass,
+                        struct vkb_error *error)
+{
+    const struct need need = NEED("storage images", pass->read_count + pass->target_count,
+                                  &device->limits, maxPerStageDescriptorStorageImages);
+
+    return pass->reading != VKB_READING_LOADED || check(device, pass, &need, 1, error);
+}
+
 bool vkb_limits_check_image(const struct vkb_device *device, const struct vkb_image_row *row,
                             struct vkb_error *error)
 {
@@ -112,8 +122,9 @@ static bool check_passes(const struct vkb_device *device, const struct vkb_graph
                             "needs",
                             device->adapter.name, vkb_graph_label(graph, pass->name));
         // Plans without a renderer know no limits.
-        if (pass->block == VKB_BLOCK_custom && device->limits.maxPerStageResources
-            && !check_needs(device, pass, error))
+        if (device->limits.maxPerStageResources
+            && !(pass->block == VKB_BLOCK_custom ? check_needs(device, pass, error)
+                                                 : check_loads(device, pass, error)))
             return false;
     }
     return true;

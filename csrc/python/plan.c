@@ -41,6 +41,7 @@ static const struct vkb_device any_device = {
             [VKB_FORMAT_DEPTH32_FLOAT] = ALL_FEATURES,
         },
     .dispatch = true,
+    .extended_formats = true,
     .linear_texels = true,
 };
 

@@ -130,7 +130,7 @@ static bool holds_lines(const struct vkb_variant_choice *choice, const struct vk
 
     return make_axis_group(device, true, line_length(choice, pass, DIRECTION_HORIZONTAL), &group)
         && make_axis_group(device, false, line_length(choice, pass, DIRECTION_VERTICAL), &group)
-        && 4 * count_frequencies(choice, pass) <= device->max_side
+        && 4 * count_frequencies(choice, pass) <= device->max_side && device->extended_formats
         && vkb_device_supports(device, VKB_FORMAT_RG32_FLOAT, spectrum_features);
 }
 

@@ -149,6 +149,7 @@ static void choose_features(struct vkb_device *device, struct features *chosen)
 
     device->instance->vk.vkGetPhysicalDeviceFeatures2(device->adapter.physical, &available2);
     device->dispatch = available->shaderStorageImageWriteWithoutFormat;
+    device->extended_formats = available->shaderStorageImageExtendedFormats;
     // Of the drivers for CPUs, llvmpipe alone does with linear tiling all that it does with optimal
     // tiling.
     device->linear_texels = device->adapter.device_type == VK_PHYSICAL_DEVICE_TYPE_CPU
@@ -161,7 +162,7 @@ static void choose_features(struct vkb_device *device, struct features *chosen)
         .shaderInt64 = available->shaderInt64,  // linear texels
         .shaderInt16 = available->shaderInt16,
         .fragmentStoresAndAtomics = available->fragmentStoresAndAtomics,
-        .shaderStorageImageExtendedFormats = available->shaderStorageImageExtendedFormats,
+        .shaderStorageImageExtendedFormats = device->extended_formats,
         .shaderImageGatherExtended = available->shaderImageGatherExtended,
     };
     chosen->vulkan13 = (VkPhysicalDeviceVulkan13Features){
@@ -259,13 +260,13 @@ static void read_properties(struct vkb_device *device)
     }
 }
 
-// Whether compute shaders can write images of every format. (Drawing must do elsewhere.)
+// Whether compute shaders can write images of every format that methods have. (Drawing must do
+// elsewhere. Spectra in complete lines are a variant's.)
 static bool stores_all(const struct vkb_device *device)
 {
-    for (int format = VKB_FORMAT_NONE + 1; format < VKB_FORMAT_COUNT; ++format)
-        if (format != VKB_FORMAT_DEPTH32_FLOAT
-            && !vkb_device_supports(device, (enum vkb_format)format,
-                                    VK_FORMAT_FEATURE_STORAGE_IMAGE_BIT))
+    for (int format = VKB_FORMAT_NONE + 1; format <= VKB_FORMAT_R32_FLOAT; ++format)
+        if (!vkb_device_supports(device, (enum vkb_format)format,
+                                 VK_FORMAT_FEATURE_STORAGE_IMAGE_BIT))
             return false;
     return true;
 }

@@ -40,7 +40,8 @@ struct vkb_device {
     uint32_t max_side;                                // of images that passes write
     VkFormatFeatureFlags features[VKB_FORMAT_COUNT];  // of images with optimal tiling
     enum vkb_texels texels;                           // found when it is first needed (probe.c)
-    bool dispatch;  // compute shaders can write images of every format
+    bool dispatch;          // compute shaders can write images of every format that methods have
+    bool extended_formats;  // shaders can load images of formats such as rg32f
     // Colour images have linear tiling and lie in host-visible memory, which shaders also access as
     // buffers of 16-byte words. This is the case on a CPU: its memory is host memory.
     bool linear_texels;

@@ -1,7 +1,28 @@
 // The elements of the lines that a Fourier transform starts from: the glow, and what lies beyond its
-// edges. Include this after the functions `load_source(ivec2)`, `texel_at` and `weight_at`.
+// edges.
 
 #include "lib/bright.glsl"
+
+#define LOADED_IMAGE(slot, name, format) \
+    layout(set = 0, binding = BINDING_OF(slot), format) uniform readonly image2D name
+
+LOADED_IMAGE(SLOT_SOURCE, source, SOURCE_FORMAT);
+LOADED_IMAGE(SLOT_WEIGHTS, weights, rgba32f);
+
+const bool IS_ROW = DIRECTION == DIRECTION_HORIZONTAL;
+
+ivec2 texel_at(int along, int across)
+{
+    return IS_ROW ? ivec2(along, across) : ivec2(across, along);
+}
+
+// The weight of a field's kernel at a pixel.
+float weight_at(int along, int across)
+{
+    ivec2 place = IS_ROW ? ivec2(along, across) : ivec2(0, along);
+    vec4 four = imageLoad(weights, clamp(place, ivec2(0), imageSize(weights) - 1));
+    return inner_product(four, vec4(equal(ivec4(0, 1, 2, 3), ivec4(params.weight))));
+}
 
 // Where a place of the padded line has its texel, and whether it has one: positions before the source's
 // first texel are from `turn` on.
@@ -24,7 +45,7 @@ vec4 load(int along, int across)
 {
     bool has_texel = true;
     int place = PADDED != 0 ? padded_place(along, has_texel) : along;
-    vec4 texel = load_source(texel_at(place, across));
+    vec4 texel = imageLoad(source, texel_at(place, across));
     if (STAGE == STAGE_FIRST)
         texel = glow_of(texel);
     if (WEIGHTED != 0 && INVERSE == 0)

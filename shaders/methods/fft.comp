@@ -11,50 +11,14 @@
 
 #define ELEMENT vec4
 UNIFORM_BLOCK(FFT_BLOCK);
-#define READ_IMAGE(slot, name) \
-    layout(set = 0, binding = BINDING_OF(slot), SOURCE_FORMAT) uniform readonly image2D name
-#define READ_FLOATS(slot, name) layout(set = 0, binding = BINDING_OF(slot), rgba32f) uniform readonly image2D name
 #include "lib/fourier.glsl"
 #include "lib/frequencies.glsl"
+#include "lib/padded.glsl"
 
 layout(local_size_x_id = 34, local_size_y_id = 35) in;
-READ_IMAGE(SLOT_SOURCE, source);
-READ_FLOATS(SLOT_SPECTRUM, factor);
-READ_FLOATS(SLOT_WEIGHTS, weights);
-READ_FLOATS(SLOT_ADDED, added);
+LOADED_IMAGE(SLOT_SPECTRUM, factor, rgba32f);
+LOADED_IMAGE(SLOT_ADDED, added, rgba32f);
 layout(set = 0, binding = TARGET_BINDING) uniform writeonly image2D target;
-
-const bool IS_ROW = DIRECTION == DIRECTION_HORIZONTAL;
-
-ivec2 texel_at(int along, int across)
-{
-    return IS_ROW ? ivec2(along, across) : ivec2(across, along);
-}
-
-vec4 load_source(ivec2 at)
-{
-    return imageLoad(source, at);
-}
-
-vec4 load_factor(ivec2 at)
-{
-    return imageLoad(factor, at);
-}
-
-// The weight of a field's kernel at a pixel.
-float weight_at(int along, int across)
-{
-    ivec2 place = IS_ROW ? ivec2(along, across) : ivec2(0, along);
-    vec4 four = imageLoad(weights, clamp(place, ivec2(0), imageSize(weights) - 1));
-    return inner_product(four, vec4(equal(ivec4(0, 1, 2, 3), ivec4(params.weight))));
-}
-
-void store(ivec2 at, vec4 value)
-{
-    imageStore(target, at, value);
-}
-
-#include "lib/padded.glsl"
 
 // The place of element i of a butterfly, before and after the pass.
 int place_at(int number, int i)
@@ -118,7 +82,7 @@ void store_line(int number, int across)
         int along = place_at(number, i);
         vec4 value = held[place_of(i, RADIX_1)];
         if (along < params.kept)
-            store(texel_at(along, across), STAGE == STAGE_LAST ? stored(value) : value);
+            imageStore(target, texel_at(along, across), STAGE == STAGE_LAST ? stored(value) : value);
     }
 }
 
@@ -131,7 +95,7 @@ void multiply_each(int number, int across)
     vec4 signs = vec2(1.0, params.kernel_sign).xyxy;
     [[unroll]] for (int i = 0; i < RADIX_1; ++i) {
         vec4 value = held[INVERSE != 0 ? i : place_of(i, RADIX_1)];
-        vec4 by = signs * load_factor(ivec2(across, place_at(number, i)));
+        vec4 by = signs * imageLoad(factor, ivec2(across, place_at(number, i)));
         values[i] = vec4(product(value.xy, by.xy), product(value.zw, by.zw));
     }
     [[unroll]] for (int i = 0; i < RADIX_1; ++i)
@@ -161,9 +125,9 @@ void multiply(int block, int index)
     // Before the transforms: between them CPUs wait for memory, and the pass takes 1.6 times as long.
     int first = block * RADIX, first_other = other_block * RADIX + (own ? RADIX : RADIX - 1);
     [[unroll]] for (int i = 0; i < RADIX; ++i) {
-        here[i] = load_factor(texel_at(first + i, across));
+        here[i] = imageLoad(factor, texel_at(first + i, across));
         // In the block of frequency 0, the opposite frequency is in the same block.
-        there[i] = load_factor(texel_at(own && i == 0 ? 0 : first_other - i, other_across));
+        there[i] = imageLoad(factor, texel_at(own && i == 0 ? 0 : first_other - i, other_across));
     }
     load_line(block, across);
     transform_held(RADIX, false);

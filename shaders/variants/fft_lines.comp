@@ -15,39 +15,15 @@
 UNIFORM_BLOCK(FFT_BLOCK);
 #include "lib/fourier.glsl"
 
-#define READ_IMAGE(slot, name, format) \
-    layout(set = 0, binding = BINDING_OF(slot), format) uniform readonly image2D name
+#include "lib/padded.glsl"
 
 layout(local_size_x_id = 34, local_size_y_id = 35) in;
-READ_IMAGE(SLOT_SOURCE, source, SOURCE_FORMAT);
-READ_IMAGE(SLOT_SPECTRUM, factor, rg32f);
-READ_IMAGE(SLOT_ADDED_SPECTRUM, added_spectrum, rg32f);
-READ_IMAGE(SLOT_WEIGHTS, weights, rgba32f);
-READ_IMAGE(SLOT_ADDED, added, rgba32f);
+LOADED_IMAGE(SLOT_SPECTRUM, factor, rg32f);
+LOADED_IMAGE(SLOT_ADDED_SPECTRUM, added_spectrum, rg32f);
+LOADED_IMAGE(SLOT_ADDED, added, rgba32f);
 layout(set = 0, binding = TARGET_BINDING) uniform writeonly image2D target;
 
-const bool IS_ROW = DIRECTION == DIRECTION_HORIZONTAL;
 const bool MULTIPLIES = STAGE == STAGE_PRODUCT || STAGE == STAGE_GREY;
-
-ivec2 texel_at(int along, int across)
-{
-    return IS_ROW ? ivec2(along, across) : ivec2(across, along);
-}
-
-vec4 load_source(ivec2 at)
-{
-    return imageLoad(source, at);
-}
-
-// The weight of a field's kernel at a pixel.
-float weight_at(int along, int across)
-{
-    ivec2 place = IS_ROW ? ivec2(along, across) : ivec2(0, along);
-    vec4 four = imageLoad(weights, clamp(place, ivec2(0), imageSize(weights) - 1));
-    return inner_product(four, vec4(equal(ivec4(0, 1, 2, 3), ivec4(params.weight))));
-}
-
-#include "lib/padded.glsl"
 
 // The line, and how many invocations of the workgroup have the same one.
 const int LENGTH = RADIX_1 * RADIX_2 * RADIX_3 * RADIX_4;
@@ -159,7 +135,7 @@ float load_glow(int along)
 {
     bool has_texel = true;
     int place = PADDED != 0 ? padded_place(along, has_texel) : along;
-    vec4 texel = load_source(texel_at(place, row));
+    vec4 texel = imageLoad(source, texel_at(place, row));
     float glow = PREFILTERED != 0 ? channel_of(glow_of(texel)) : kept_of(vec3(channel_of(texel))).x;
     if (WEIGHTED != 0)
         glow *= weight_at(place, row);
@@ -177,8 +153,8 @@ vec2 turn_of_row(vec2 first, int i, int radix)
 vec2 load_folded(int frequency, vec2 turned)
 {
     int first = channel * FREQUENCIES;
-    vec2 here = load_source(ivec2(first + frequency, row)).xy;
-    vec2 mirror = conjugate(load_source(ivec2(first + LENGTH - frequency, row)).xy);
+    vec2 here = imageLoad(source, ivec2(first + frequency, row)).xy;
+    vec2 mirror = conjugate(imageLoad(source, ivec2(first + LENGTH - frequency, row)).xy);
     vec2 odd = product(here - mirror, conjugate(turned));
     return here + mirror + vec2(-odd.y, odd.x);
 }
@@ -198,7 +174,7 @@ void load_line(int radix)
         else if (STAGE == STAGE_FIRST)
             held[i] = vec2(load_glow(2 * place), load_glow(2 * place + 1));
         else
-            held[i] = load_source(ivec2(channel * FREQUENCIES + place, row)).xy;
+            held[i] = imageLoad(source, ivec2(channel * FREQUENCIES + place, row)).xy;
     }
 }
 

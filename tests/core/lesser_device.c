@@ -166,7 +166,7 @@ static void change_properties(VkPhysicalDeviceProperties *properties)
         lower_limits(&properties->limits);
     // Less than any device may have: the validation layer must object.
     if (lacks("bindings"))
-        properties->limits.maxPerStageDescriptorStorageImages = 0;
+        properties->limits.maxPerStageDescriptorUniformBuffers = 0;
     if (lacks("allocations"))
         properties->limits.maxMemoryAllocationCount = 24;
     // Less than the largest image of the test has.
@@ -227,6 +227,8 @@ static VKAPI_ATTR void VKAPI_CALL get_features(VkPhysicalDevice physical,
     below.vkGetPhysicalDeviceFeatures2(physical, features);
     if (lacks("storage"))
         features->features.shaderStorageImageWriteWithoutFormat = VK_FALSE;
+    if (lacks("extended"))
+        features->features.shaderStorageImageExtendedFormats = VK_FALSE;
 }
 
 static void change_format(VkFormat format, VkFormatProperties *properties)
@@ -240,7 +242,8 @@ static void change_format(VkFormat format, VkFormatProperties *properties)
     if ((format == VK_FORMAT_R8G8B8A8_UNORM && lacks("store8"))
         || (format == VK_FORMAT_R16G16B16A16_SFLOAT && lacks("store16"))
         || (format == VK_FORMAT_R32G32B32A32_SFLOAT && lacks("store32"))
-        || (format == VK_FORMAT_R32_SFLOAT && lacks("store1")))
+        || (format == VK_FORMAT_R32_SFLOAT && lacks("store1"))
+        || (format == VK_FORMAT_R32G32_SFLOAT && lacks("store2")))
         taken |= VK_FORMAT_FEATURE_STORAGE_IMAGE_BIT;
     if (format == VK_FORMAT_D32_SFLOAT && lacks("depth"))
         taken |= VK_FORMAT_FEATURE_DEPTH_STENCIL_ATTACHMENT_BIT;

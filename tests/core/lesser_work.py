@@ -22,7 +22,7 @@ from tests.exhaustive import EXHAUSTIVE
 from tests.images import DTYPES, picture
 from tests.scene.parts import Texture, load_sky
 from tests.screens import CAMERA, panel
-from vkbloom import DualKawase, Frames, Pyramid, Renderer, Scene, Separable, ThreeBloom
+from vkbloom import DualKawase, Frames, Pyramid, Renderer, Scene, Separable, ThreeBloom, psf
 
 # One of each variant: lines, strips and tiles, levels half and twice as large, sums of all levels.
 SETTINGS = {
@@ -121,6 +121,13 @@ def apply_wide(renderer: Renderer, settings: vkbloom.Settings) -> None:
         tolerance.assert_matches_reference(frames, image, settings)
 
 
+def convolve(renderer: Renderer) -> None:
+    image, settings = picture(28, 20, 3), vkbloom.Convolution(psf.gaussian(3))
+    variants = [one.variant for one in renderer.plan(image, settings).passes]
+    PASSES["lines"] = variants.count("lines")
+    tolerance.assert_matches_reference(renderer.apply(image, settings), image, settings)
+
+
 def try_all(renderer: Renderer) -> dict[str, str]:
     """Return the errors by workload."""
     wrong: dict[str, str] = {}
@@ -168,6 +175,7 @@ def try_all(renderer: Renderer) -> dict[str, str]:
                 lambda: renderer.render(scene, settings, (40, 30), shading=shading),  # noqa: B023
             )
     attempt("fuse", fuse)
+    attempt("convolve", lambda: convolve(renderer))
     attempt("handles", lambda: use_handles(renderer))
     attempt("surfaces", lambda: draw_surfaces(renderer))
     if "state" in sys.argv:

@@ -33,6 +33,9 @@ LESS_WORK = ("whole", "smaller", "pyramid", "gathered", "handles", "bands")
 LAYERS = {
     "layers float32": "Error: .* cannot add up layers in rgba32float images, but in rgba16float"
 }
+#: Transforms load images, of which the least of all devices binds four.
+LOADS = {"convolve": "ValueError: passes: kernel needs 7 storage images; .* allows 4 "}
+DRAWN = {"convolve": "Error: the compute shaders of .* cannot write images"}
 SKY = {"sky float32": "ValueError: skybox: the adapter .* cannot filter float32; uint8 and float16"}
 
 
@@ -77,12 +80,12 @@ def run(
 #: What is taken away, and the expected errors: of each once from a CPU or from a GPU.
 LESSER: list[tuple[str, dict[str, str]]] = [
     # No more than every device has, of what limits say.
-    ("cpu,limits", too_large(4096)),
+    ("cpu,limits", {**too_large(4096), **LOADS}),
     # An image may be no larger than the least of several limits; nothing is timed; no memory
     # comes from the host.
     ("wide,timestamps,import", too_large(5000)),
     # The same; compute shaders cannot write images.
-    ("high,storage", too_large(5000)),
+    ("high,storage", {**too_large(5000), **DRAWN}),
     # Memory of the device's own, and the host's, which is coherent or cached; a buffer does not
     # reach all rows of a large image.
     ("cpu,memory,bands,portability", {}),
@@ -91,7 +94,7 @@ LESSER: list[tuple[str, dict[str, str]]] = [
     ("blend,filter,bands", {**LAYERS, **SKY}),
 ]
 OTHER: list[tuple[str, dict[str, str]]] = [
-    ("limits", too_large(4096)),
+    ("limits", {**too_large(4096), **LOADS}),
     ("memory", {}),
     ("cpu,blend,filter", {**LAYERS, **SKY}),
 ]
@@ -175,6 +178,18 @@ def test_fused_passes_read_levels_as_the_device_does(layer: Path, name: str) -> 
         assert result["wrong"] == {}
         passes.append(sum(result["passes"].values()))
     assert passes[0] == passes[1] < passes[2], passes
+
+
+@pytest.mark.parametrize("lesser", ["cpu", "cpu,extended", "cpu,store2"])
+def test_spectra_of_complete_lines_need_images_of_complex_numbers(
+    layer: Path, name: str, lesser: str
+) -> None:
+    """Without these, and shaders that load them, transforms run stage by stage."""
+    done = run(layer, name, lesser, (*WORK, "convolve"))
+    assert done.returncode == 0, done.stderr
+    result = json.loads(done.stdout)
+    assert result["wrong"] == {}
+    assert result["passes"]["lines"] == (6 if lesser == "cpu" else 0)
 
 
 def test_an_adapter_of_the_portability_subset_is_found(tmp_path: Path) -> None:
@@ -498,7 +513,7 @@ def test_waits_for_presentations_have_a_limit(
 def test_validation_sees_the_lesser_device(layer: Path, name: str) -> None:
     done = run(layer, name, "bindings", (*WORK, "whole"))
     assert "VUID-VkPipelineLayoutCreateInfo" in done.stdout
-    assert "maxPerStageDescriptorStorageImages limit (0)" in done.stdout
+    assert "maxPerStageDescriptorUniformBuffers limit (0)" in done.stdout
 
 
 # Prints which of several equal GPUs each choice opens, or its error, where CUDA sees some of them.
