@@ -22,10 +22,10 @@ vec4 rotated(vec4 value, vec2 angle)
 
 // a / b, rounded down, for 0 <= a < 2^22 and b > 0. CPUs divide integers lane by lane. A sum with 3 * 2^22
 // is rounded to the nearest integer, also that of a negative number; half of 1 / b, the least distance to the
-// middle of two integers, is above its error.
+// middle of two integers, is above its error. (SwiftShader would add up two constants before.)
 int quotient(int a, int b)
 {
-    return floatBitsToInt((float(a) + 0.5) * (1.0 / float(b)) - 0.5 + 12582912.0) & 0x3fffff;
+    return floatBitsToInt(float(2 * a + 1 - b) * (0.5 / float(b)) + 12582912.0) & 0x3fffff;
 }
 
 // exp(-i pi p / 4) for -1 <= p <= 1, to the last bits of floats: the polynomials are within 2e-9, and pi / 4 is the sum of
@@ -38,12 +38,12 @@ vec2 small_turn(float p)
     return vec2(fma(p2, less, 1.0), -fma(p, 0.78539816339744831, p * rest));
 }
 
-// exp(-2 pi i k / n) for integers 0 <= k < n < 2^18, by quarters: `rounded` is their number and 3 * 2^22, as in quotient().
-// All are exact until the last division.
+// exp(-2 pi i k / n) for integers 0 <= k < n < 2^18, by quarters: `rounded` is the nearest number of them and 3 * 2^22, as
+// in quotient(). What is left of k is exact.
 vec2 turn(float k, int n)
 {
     const float SHIFT = 12582912.0;
-    float rounded = (8.0 * k + float(n) + 0.5) * (1.0 / float(2 * n)) - 0.5 + SHIFT;
+    float rounded = (16.0 * k + 1.0) * (0.25 / float(n)) + SHIFT;
     int quarters = floatBitsToInt(rounded);
     vec2 small = small_turn((8.0 * k - float(2 * n) * (rounded - SHIFT)) * (1.0 / float(n)));
     vec2 turned = (quarters & 1) == 1 ? vec2(small.y, -small.x) : small;
