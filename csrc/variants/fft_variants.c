@@ -101,37 +101,32 @@ static uint32_t longer_length(const struct vkb_device *device, bool rows, uint32
     return length;
 }
 
-// The length of the lines along an axis of the convolution that the pass is of. A period cannot be
-// longer.
-static uint32_t line_length(const struct vkb_variant_choice *choice,
-                            const struct vkb_pass_row *pass, enum vkb_mode direction)
-{
-    const struct vkb_transform *transform = &pass->transform;
-    const bool rows = direction == DIRECTION_HORIZONTAL;
-    const uint32_t length = rows ? transform->width : transform->height;
-
-    return (rows ? transform->pads_rows : transform->pads_columns)
-             ? longer_length(choice->device, rows, length)
-             : length;
-}
-
-// The spectrum of a channel has so many texels in a row.
-static uint32_t count_frequencies(const struct vkb_variant_choice *choice,
-                                  const struct vkb_pass_row *pass)
-{
-    return line_length(choice, pass, DIRECTION_HORIZONTAL) / 2 + 1;
-}
-
-// Whether the device can hold the lines along both axes, and images of the spectra of all channels.
-static bool holds_lines(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
+// Finds the lines of the convolution that the pass is of. A period cannot be longer. Images have
+// the spectra of four channels.
+static const struct vkb_lines *find_lines(struct vkb_variant_choice *choice,
+                                          const struct vkb_pass_row *pass)
 {
     const struct vkb_device *device = choice->device;
+    const struct vkb_transform *of = &pass->transform;
+    struct vkb_lines *lines = &choice->lines;
     struct group group;
 
-    return make_axis_group(device, true, line_length(choice, pass, DIRECTION_HORIZONTAL), &group)
-        && make_axis_group(device, false, line_length(choice, pass, DIRECTION_VERTICAL), &group)
-        && 4 * count_frequencies(choice, pass) <= device->max_side && device->extended_formats
-        && vkb_device_supports(device, VKB_FORMAT_RG32_FLOAT, spectrum_features);
+    if (lines->width == of->width && lines->height == of->height
+        && lines->pads_rows == of->pads_rows && lines->pads_columns == of->pads_columns)
+        return lines;
+    *lines = (struct vkb_lines){
+        .width = of->width,
+        .height = of->height,
+        .pads_rows = of->pads_rows,
+        .pads_columns = of->pads_columns,
+        .x = of->pads_rows ? longer_length(device, true, of->width) : of->width,
+        .y = of->pads_columns ? longer_length(device, false, of->height) : of->height,
+    };
+    lines->held = make_axis_group(device, true, lines->x, &group)
+               && make_axis_group(device, false, lines->y, &group)
+               && 4 * (lines->x / 2 + 1) <= device->max_side && device->extended_formats
+               && vkb_device_supports(device, VKB_FORMAT_RG32_FLOAT, spectrum_features);
+    return lines;
 }
 
 static bool multiplies(const struct vkb_pass_row *pass)
@@ -151,14 +146,34 @@ static void copy_weighing(struct vkb_pass_row *row, const struct vkb_pass_row *l
     row->params.fft.before_y = last->params.fft.before_y;
 }
 
-// Has an image hold the spectra of all channels.
+// Gives a row the product of one of the passes that it stands for. False: there is none.
+static bool copy_product(struct vkb_pass_row *row, const struct vkb_pass_row *first,
+                         const struct vkb_pass_row *end)
+{
+    while (first < end && !multiplies(first))
+        ++first;
+    if (first == end)
+        return false;
+    row->constants.stage = first->constants.stage;
+    row->reads[SLOT_SPECTRUM] = first->reads[SLOT_SPECTRUM];
+    row->params.fft.kernel_sign = first->params.fft.kernel_sign;
+    return true;
+}
+
+// Each channel has so many texels in a row of an image of spectra.
+static uint32_t count_frequencies(const struct vkb_variant_choice *choice)
+{
+    return choice->lines.x / 2 + 1;
+}
+
+// Has an image hold the spectra of all channels of a pass.
 static void hold_spectra(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
                          uint32_t image)
 {
     struct vkb_image_row *row = &choice->graph->images[image];
 
     row->format = VKB_FORMAT_RG32_FLOAT;
-    row->width = pass->transform.channels * count_frequencies(choice, pass);
+    row->width = pass->transform.channels * count_frequencies(choice);
 }
 
 // The images of a row for all stages along an axis, from `first` to before `end`.
@@ -182,15 +197,9 @@ static void set_images(const struct vkb_variant_choice *choice, const struct vkb
         row->reads[SLOT_ADDED_SPECTRUM] = row->reads[SLOT_ADDED];
         row->reads[SLOT_ADDED] = VKB_NO_IMAGE;
     }
-    for (const struct vkb_pass_row *pass = first; pass < end; ++pass)
-        if (multiplies(pass)) {
-            // Columns are transformed in place, forth and back.
-            if (!first->constants.inverse)
-                row->targets[0] = row->reads[SLOT_SOURCE];
-            row->constants.stage = pass->constants.stage;
-            row->reads[SLOT_SPECTRUM] = pass->reads[SLOT_SPECTRUM];
-            row->params.fft.kernel_sign = pass->params.fft.kernel_sign;
-        }
+    // Columns are transformed in place, forth and back.
+    if (copy_product(row, first, end) && !first->constants.inverse)
+        row->targets[0] = row->reads[SLOT_SOURCE];
 }
 
 // How many elements of a butterfly have one of the first `pixels` of the row, or of the first
@@ -231,8 +240,8 @@ static struct vkb_pass_row make_row(const struct vkb_variant_choice *choice,
     const struct vkb_graph *graph = choice->graph;
     const bool rows = first->constants.direction == DIRECTION_HORIZONTAL;
     const bool makes_pixels = rows && first->constants.inverse;
-    const uint32_t length = line_length(choice, first, (enum vkb_mode)first->constants.direction);
-    const uint32_t frequencies = count_frequencies(choice, first);
+    const uint32_t length = rows ? choice->lines.x : choice->lines.y;
+    const uint32_t frequencies = count_frequencies(choice);
     struct vkb_pass_row row;
     struct group group;
 
@@ -251,7 +260,6 @@ static struct vkb_pass_row make_row(const struct vkb_variant_choice *choice,
         hold_spectra(choice, first, row.targets[0]);
         target->height = first->constants.inverse ? (uint32_t)end[-1].params.fft.kept : length;
     }
-    const struct vkb_image_row *spectra = makes_pixels ? source : target;
     row.constants.channels = (int32_t)first->transform.channels;
     row.params.fft.frequencies = (int)frequencies;
     row.params.fft.padded = (int)length;
@@ -260,7 +268,7 @@ static struct vkb_pass_row make_row(const struct vkb_variant_choice *choice,
                           : !rows        ? row.constants.channels * (int)frequencies
                           : row.constants.stage == STAGE_FIRST
                               ? first->params.fft.across * row.constants.channels
-                              : (int)spectra->height * row.constants.channels;
+                              : (int)target->height * row.constants.channels;
     (void)make_axis_group(choice->device, rows, length, &group);
     row.constants.radix_1 = (int32_t)group.radices[0];
     row.constants.radix_2 = (int32_t)group.radices[1];
@@ -280,8 +288,7 @@ static struct vkb_pass_row make_row(const struct vkb_variant_choice *choice,
 static struct vkb_pass_row make_placing(const struct vkb_variant_choice *choice,
                                         const struct vkb_pass_row *pass)
 {
-    const uint32_t x = line_length(choice, pass, DIRECTION_HORIZONTAL);
-    const uint32_t y = line_length(choice, pass, DIRECTION_VERTICAL);
+    const uint32_t x = choice->lines.x, y = choice->lines.y;
     struct vkb_pass_row row;
 
     memcpy(&row, pass, sizeof row);
@@ -301,10 +308,10 @@ static bool add_products(struct vkb_variant_choice *choice, const struct vkb_pas
 
     memcpy(&row, pass, sizeof row);
     if (row.constants.stage == STAGE_GREY)
-        row.params.products.frequencies = (int)count_frequencies(choice, pass);
+        row.params.products.frequencies = (int)count_frequencies(choice);
     row.constants.stage = STAGE_GREY;
     hold_spectra(choice, pass, pass->targets[0]);
-    choice->graph->images[row.targets[0]].height = line_length(choice, pass, DIRECTION_VERTICAL);
+    choice->graph->images[row.targets[0]].height = choice->lines.y;
     return vkb_add_fullscreen_variant(choice, &row);
 }
 
@@ -313,7 +320,7 @@ bool vkb_add_transform_lines_variant(struct vkb_variant_choice *choice,
 {
     struct vkb_pass_row row;
 
-    if (!(pass->transform.width && holds_lines(choice, pass)))
+    if (!pass->transform.width || !find_lines(choice, pass)->held)
         return false;
     if (pass->block == VKB_BLOCK_fft_kernel) {
         row = make_placing(choice, pass);
@@ -400,15 +407,9 @@ static bool add_host_columns(struct vkb_variant_choice *choice, struct vkb_pass_
                              const struct vkb_pass_row *end)
 {
     struct vkb_image_row *target = &choice->graph->images[row->targets[0]];
-    bool returns = row->constants.inverse;
+    const bool returns =
+        copy_product(row, end - row->transform.stages, end) || row->constants.inverse;
 
-    for (const struct vkb_pass_row *pass = end - row->transform.stages; pass < end; ++pass)
-        if (multiplies(pass)) {
-            row->reads[SLOT_SPECTRUM] = pass->reads[SLOT_SPECTRUM];
-            row->constants.stage = STAGE_PRODUCT;
-            row->params.fft.kernel_sign = pass->params.fft.kernel_sign;
-            returns = true;
-        }
     if (!transforms_kernel(row))
         target->width = spectra_width(row);
     target->height = returns ? (uint32_t)end[-1].params.fft.kept : row->transform.height;

@@ -8,6 +8,14 @@
 #include "variants/variants.h"
 #include "vulkan/image.h"
 
+// The complete lines of a convolution of those lengths (struct vkb_transform).
+struct vkb_lines {
+    uint32_t width, height;
+    bool pads_rows, pads_columns;
+    uint32_t x, y;  // elements of the lines
+    bool held;      // the device can hold them
+};
+
 // The choice of variants for one graph: from the passes of `plain` to those of `graph`. It keeps
 // the first failure.
 struct vkb_variant_choice {
@@ -17,6 +25,9 @@ struct vkb_variant_choice {
     struct vkb_graph *graph;
     struct vkb_error *error;
     bool failed;
+    // The lines that were found last: all passes of a convolution ask for the same ones, and with a
+    // search for each a plan of `camera_lens` takes 0.39 ms in place of 0.11.
+    struct vkb_lines lines;
 };
 
 // Adds a pass to the graph. True, as every function that adds a variant.

@@ -14,7 +14,6 @@
 #define ELEMENT vec2
 UNIFORM_BLOCK(FFT_BLOCK);
 #include "lib/fourier.glsl"
-
 #include "lib/padded.glsl"
 
 layout(local_size_x_id = 34, local_size_y_id = 35) in;
@@ -68,12 +67,11 @@ void rotate(int radix, float k, int n, bool inverse)
         held[q] = rotated(held[q], inverse ? conjugate(turns[q]) : turns[q]);
 }
 
-// The place of an element in shared memory, which has padding after each `block` elements. The places of elements that are
-// multiples of `block` apart are constants apart.
-int slot(int place, int block, int padding)
+// Where the line begins in shared memory. Between stages it has padding after each `step` * `radix` elements. The places of
+// elements that are multiples of that apart are constants apart.
+int start_of_line()
 {
-    int line = int(IS_ROW ? gl_LocalInvocationID.y : gl_LocalInvocationID.x);
-    return line * PITCH + place + (padding == 0 ? 0 : quotient(place, block) * padding);
+    return PITCH * int(IS_ROW ? gl_LocalInvocationID.y : gl_LocalInvocationID.x);
 }
 
 // Writes a component of a butterfly's results, `step` apart, to shared memory.
@@ -81,7 +79,7 @@ void leave(int component, int radix, int step)
 {
     int padding = FFT_PADDING(step, radix, LENGTH);
     int block = quotient(number, step);
-    int first = slot(0, 1, 0) + number + block * (step * (radix - 1) + padding);
+    int first = start_of_line() + number + block * (step * (radix - 1) + padding);
     barrier();
     if (has_butterfly(radix)) {
         [[unroll]] for (int i = 0; i < radix; ++i)
@@ -96,7 +94,8 @@ void go_on(int radix, int step, int next, bool inverse)
     if (next <= 1)
         return;
     int apart = LENGTH / next, block = step * radix, padding = FFT_PADDING(step, radix, LENGTH);
-    int first = slot(GROUP_SIZE == apart ? number : min(number, apart - 1), block, padding);
+    int place = GROUP_SIZE == apart ? number : min(number, apart - 1);
+    int first = start_of_line() + place + quotient(place, block) * padding;
     [[unroll]] for (int component = 0; component < 2; ++component) {
         leave(component, radix, step);
         [[unroll]] for (int i = 0; i < next; ++i)
@@ -130,7 +129,7 @@ float channel_of(vec4 texel)
     return channel == 0 ? texel.r : channel == 1 ? texel.g : channel == 2 ? texel.b : texel.a;
 }
 
-// What a convolution spreads of a pixel's channel.
+// What a convolution spreads of a pixel's channel: as load(), which would make all four finite.
 float load_glow(int along)
 {
     bool has_texel = true;
@@ -186,7 +185,7 @@ void store_unfolded()
         leave(component, LAST_RADIX, LENGTH / LAST_RADIX);
         [[unroll]] for (int i = 0; i < LAST_RADIX; ++i) {
             int frequency = place_in_line(i, LAST_RADIX);
-            mirrors[i][component] = exchanged[slot(frequency == 0 ? 0 : LENGTH - frequency, 1, 0)];
+            mirrors[i][component] = exchanged[start_of_line() + (frequency == 0 ? 0 : LENGTH - frequency)];
         }
     }
     if (idle || !has_butterfly(LAST_RADIX))
