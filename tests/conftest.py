@@ -261,7 +261,9 @@ def display(environment: None) -> Iterator[dict[str, str]]:
     if shutil.which("Xvfb") is None:
         pytest.skip("Xvfb is not here, whose windows no screen shows (Debian: xvfb)")
     read, write = os.pipe()
-    command = ["Xvfb", "-displayfd", str(write), "-screen", "0", "800x600x24", "-nolisten", "tcp"]
+    # A server that resets itself when its last client leaves refuses the next one for a moment.
+    options = ("-screen", "0", "800x600x24", "-nolisten", "tcp", "-noreset")
+    command = ["Xvfb", "-displayfd", str(write), *options]
     with subprocess.Popen(command, pass_fds=[write], stderr=subprocess.DEVNULL) as server:
         os.close(write)
         with os.fdopen(read) as pipe:
