@@ -47,7 +47,7 @@ static bool reserve(struct vkb_run *run, const struct vkb_request *requests, uin
     for (uint32_t i = 0; i < request_count; ++i)
         passes += requests[i].plan->graph.pass_count;
     return vkb_descriptors_reset(run->device, &submission->descriptors, error)
-        && vkb_timer_reserve(run->device, passes, &submission->timer, error)
+        && vkb_timer_reserve(run->device, passes + request_count, &submission->timer, error)
         && vkb_buffer_reserve(run->device, VKB_MEMORY_UPLOAD, VK_BUFFER_USAGE_UNIFORM_BUFFER_BIT,
                               params * passes, &submission->uniforms, error);
 }
@@ -197,7 +197,7 @@ static bool record_request(struct vkb_run *run, struct vkb_request *request,
     run->request = request;
     run->graph = graph;
     request->timing_count = 0;
-    request->first_span = submission->timer.span_count;
+    request->first_stamp = submission->timer.count;
     for (uint32_t i = 0; i < graph->image_count; ++i) {
         const struct vkb_image_row row = vkb_run_row(run, i);
         struct vkb_cached_image *given = run->inputs[row.input].image;
@@ -413,7 +413,7 @@ static void fetch(const struct vkb_device *device, const struct vkb_submission *
         }
         for (uint32_t timing = 0; timing < request->timing_count; ++timing)
             request->timings[timing].seconds =
-                vkb_timer_seconds(device, &submission->timer, request->first_span + timing);
+                vkb_timer_seconds(device, &submission->timer, request->first_stamp + timing);
         for (uint32_t output = 0; output < request->plan->output_count; ++output)
             vkb_readback_fetch(device, &submission->readback, &request->outputs[output]);
     }

@@ -78,7 +78,7 @@ struct vkb_request {
     struct vkb_output *outputs;
     struct vkb_timing *timings;
     uint32_t timing_count;
-    uint32_t first_span;                      // of its timings, in the submission's timer
+    uint32_t first_stamp;                     // of its timings, in the submission's timer
     struct vkb_non_finite non_finite;         // of the inputs; complete after the submission
     struct vkb_non_finite *layer_non_finite;  // of each image of a batch; NULL: it is none
     // Get the images of these framebuffers for the next call; NULL: there is none.

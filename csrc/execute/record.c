@@ -511,8 +511,10 @@ static bool record_passes(struct vkb_run *run, uint32_t first, uint32_t end,
     const VkCommandBuffer commands = run->submission->commands.buffer;
     struct vkb_timing *timing = &run->request->timings[run->request->timing_count++];
 
-    // The timer starts before the barriers, since lavapipe takes a timestamp at the next barrier.
-    vkb_timer_start(device, commands, timer);
+    // The time of a pass starts at the end of the one before it. It contains the barriers, since
+    // lavapipe takes a timestamp at the next one.
+    if (run->request->timing_count == 1)
+        vkb_timer_stamp(device, commands, timer);
     transition_reads(run, first, end);
     if (draws)
         begin_rendering(run, pass);
@@ -525,7 +527,7 @@ static bool record_passes(struct vkb_run *run, uint32_t first, uint32_t end,
             return false;
     if (draws)
         device->vk.vkCmdEndRendering(commands);
-    vkb_timer_stop(device, commands, timer);
+    vkb_timer_stamp(device, commands, timer);
     snprintf(timing->name, sizeof timing->name, "%s", vkb_graph_timed_as(run->graph, first));
     return true;
 }

@@ -9,61 +9,47 @@ void vkb_timer_destroy(const struct vkb_device *device, struct vkb_timer *timer)
     *timer = (struct vkb_timer){0};
 }
 
-bool vkb_timer_reserve(const struct vkb_device *device, uint32_t spans, struct vkb_timer *timer,
+bool vkb_timer_reserve(const struct vkb_device *device, uint32_t count, struct vkb_timer *timer,
                        struct vkb_error *error)
 {
-    if (spans <= timer->capacity || device->adapter.timestamp_mask == 0)
+    if (count <= timer->capacity || device->adapter.timestamp_mask == 0)
         return true;
     vkb_timer_destroy(device, timer);
-    if (!(timer->stamps = vkb_alloc(error, (size_t)2 * spans, sizeof *timer->stamps))
+    if (!(timer->stamps = vkb_alloc(error, count, sizeof *timer->stamps))
         || !VK(error,
                device->vk.vkCreateQueryPool(device->handle,
                                             &(VkQueryPoolCreateInfo){
                                                 .sType = VK_STRUCTURE_TYPE_QUERY_POOL_CREATE_INFO,
                                                 .queryType = VK_QUERY_TYPE_TIMESTAMP,
-                                                .queryCount = 2 * spans,
+                                                .queryCount = count,
                                             },
                                             NULL, &timer->queries)))
         return false;
-    timer->capacity = spans;
+    timer->capacity = count;
     return true;
 }
 
 void vkb_timer_reset(const struct vkb_device *device, VkCommandBuffer commands,
                      struct vkb_timer *timer)
 {
-    timer->span_count = 0;
+    timer->count = 0;
     if (timer->queries)
-        device->vk.vkCmdResetQueryPool(commands, timer->queries, 0, 2 * timer->capacity);
+        device->vk.vkCmdResetQueryPool(commands, timer->queries, 0, timer->capacity);
 }
 
-// Both timestamps are at the bottom of the pipe: from the end of all earlier work to the end of the
-// span.
-static void write_timestamp(const struct vkb_device *device, VkCommandBuffer commands,
-                            const struct vkb_timer *timer, uint32_t query)
+void vkb_timer_stamp(const struct vkb_device *device, VkCommandBuffer commands,
+                     struct vkb_timer *timer)
 {
     if (timer->queries)
         device->vk.vkCmdWriteTimestamp(commands, VK_PIPELINE_STAGE_BOTTOM_OF_PIPE_BIT,
-                                       timer->queries, query);
-}
-
-void vkb_timer_start(const struct vkb_device *device, VkCommandBuffer commands,
-                     const struct vkb_timer *timer)
-{
-    write_timestamp(device, commands, timer, 2 * timer->span_count);
-}
-
-void vkb_timer_stop(const struct vkb_device *device, VkCommandBuffer commands,
-                    struct vkb_timer *timer)
-{
-    write_timestamp(device, commands, timer, 2 * timer->span_count + 1);
-    ++timer->span_count;
+                                       timer->queries, timer->count);
+    ++timer->count;
 }
 
 bool vkb_timer_fetch(const struct vkb_device *device, struct vkb_timer *timer,
                      struct vkb_error *error)
 {
-    const uint32_t count = 2 * timer->span_count;
+    const uint32_t count = timer->count;
 
     return !timer->queries || count == 0
         || VK(error, device->vk.vkGetQueryPoolResults(
@@ -73,11 +59,11 @@ bool vkb_timer_fetch(const struct vkb_device *device, struct vkb_timer *timer,
 }
 
 double vkb_timer_seconds(const struct vkb_device *device, const struct vkb_timer *timer,
-                         uint32_t span)
+                         uint32_t first)
 {
     if (!timer->queries)
         return NAN;
     uint64_t ticks =
-        (timer->stamps[2 * span + 1] - timer->stamps[2 * span]) & device->adapter.timestamp_mask;
+        (timer->stamps[first + 1] - timer->stamps[first]) & device->adapter.timestamp_mask;
     return (double)ticks * device->limits.timestampPeriod * 1e-9;
 }
