@@ -36,6 +36,24 @@ static void add_blur(struct vkb_levels *levels, enum vkb_mode direction, bool fi
     vkb_levels_pass(levels, &row);
 }
 
+// Adds up the levels that have a share; the first one, if none has.
+static void add_sum(struct vkb_levels *levels, const double *shares, enum vkb_mode upsample,
+                    uint32_t bloom)
+{
+    struct vkb_levels taken = *levels;
+    double taken_shares[GATHERED_LEVELS] = {0};
+
+    taken.count = 0;
+    for (uint32_t level = 0; level < levels->count; ++level)
+        if (shares[level] > 0.0) {
+            taken_shares[taken.count] = shares[level];
+            taken.downs[taken.count++] = levels->downs[level];
+        }
+    taken.count = taken.count ? taken.count : 1;
+    vkb_levels_gather(&taken, taken_shares, upsample, bloom);
+    levels->failed = taken.failed;
+}
+
 uint32_t vkb_add_godot_method(struct vkb_levels *levels)
 {
     const struct vkb_settings *settings = levels->settings;
@@ -63,6 +81,6 @@ uint32_t vkb_add_godot_method(struct vkb_levels *levels)
         size = vkb_halved(size);
     }
     const uint32_t bloom = vkb_levels_bloom(levels);
-    vkb_levels_gather(levels, shares, upsample, bloom);
+    add_sum(levels, shares, upsample, bloom);
     return bloom;
 }

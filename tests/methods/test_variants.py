@@ -22,6 +22,7 @@ from vkbloom import (
     DualKawase,
     Frames,
     Ghosts,
+    GodotBloom,
     KinoBloom,
     Pyramid,
     Renderer,
@@ -75,6 +76,17 @@ def test_levels_of_another_format_than_the_frame(varied: Renderer, scene: Scene,
     frames = varied.render(scene, presets[name], (128, 96), shading="deferred", time=0.5)
     frames = varied.render(scene, presets[name], (128, 96), shading="deferred")
     np.testing.assert_array_equal(alone["final"], frames["final"])
+
+
+def test_levels_without_a_weight_are_not_added_up(varied: Renderer) -> None:
+    """As the engine does. With a weight of 0, they took `godot_4_5` half of its time on a GPU."""
+    image, weights = hdr_picture(70, 90, 3, "float32"), (0.0, 0.5, 1e-4, 0.2, 0.0, 0.0, 0.0)
+    settings = GodotBloom(level_weights=weights)
+    assert_matches_reference(varied.apply(image, settings), image, settings)
+    for given, read in ((weights, ["down_1", "down_3"]), ((0.0,) * 7, ["down_0"])):
+        passes = varied.plan(image, GodotBloom(level_weights=given)).passes
+        names = {name for each in passes if each.name.startswith("bloom") for name in each.reads}
+        assert sorted(name for name in names if name.startswith("down_")) == read
 
 
 @pytest.mark.parametrize("dtype", ["float16", "float32"])

@@ -36,8 +36,8 @@ def passes(source: BlurInput, settings: GodotBloom) -> dict[str, Array]:
     divided by 1 + L, after it by 1 - L, with L = (0.299, 0.587, 0.114) . c / max(cap, 6), at
     least 0. Strength and exposure follow, then the factor
     max(smoothstep(threshold, threshold + scale, max(c)), bloom) and the cap. The bloom is the
-    weighted sum of the levels, enlarged by the cubic B-spline or bilinearly. Weights up to 0.0001
-    are replaced by 0.
+    weighted sum of the levels, enlarged by the cubic B-spline or bilinearly. Levels with weights
+    up to 0.0001 are left out of it.
     """
     height, width, channels = source.image.shape
     framebuffers: dict[str, Array] = {}
@@ -51,7 +51,8 @@ def passes(source: BlurInput, settings: GodotBloom) -> dict[str, Array]:
         else:
             image = source.store(_later(samples, settings))
         framebuffers[f"down_{level}"] = image
-        total += weight * enlarge(image, source.size)
+        if weight:
+            total += weight * enlarge(image, source.size)
     framebuffers["bloom"] = source.store.end(total)
     return framebuffers
 
