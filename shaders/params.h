@@ -743,10 +743,11 @@
 #define TABLE_WIDTH 1024
 #define SUM_SIDE    8
 #define NODE_PIXELS 16
-// Transposed filters in blocks: the texels along an axis whose weights are together in the table,
-// and the rows of an invocation that writes words.
-#define ADJOINT_SIDE 4
-#define ADJOINT_ROWS 16
+// Transposed filters in blocks: the texels along an axis whose weights are together in the table;
+// those that an invocation writes of a line; the rows of an invocation that writes words.
+#define ADJOINT_SIDE    4
+#define ADJOINT_OUTPUTS 8
+#define ADJOINT_ROWS    16
 
 // Filament's taps of a level with even sides: their distance in texels, and the share of the outer
 // ones along an axis.
@@ -844,7 +845,8 @@
     CONSTANT(73, FILLED, filled)               /* elements of a line's first butterflies; others are 0 */ \
     CONSTANT(74, KEPT_RESULTS, kept_results)   /* of a line's last butterflies */ \
     CONSTANT(75, PITCH, pitch)                 /* floats of a line in shared memory */ \
-    CONSTANT(76, CHANNELS, channels)           /* that complete lines are of */
+    CONSTANT(76, CHANNELS, channels)           /* that complete lines are of */ \
+    CONSTANT(77, INNER, inner)                 /* of PICTURES: a window's texels away from edges */
 
 // The names that a setting can have. Each list is a setting and a specialization constant.
 #define COMPOSITE_NAMES(NAME) \

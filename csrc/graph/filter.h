@@ -42,6 +42,7 @@ struct vkb_readers {
     int32_t start;   // below 0: the axis stays as it is
     int32_t span;    // pixels whose weights a block of texels has
     int32_t most;    // of a texel; MAX_READERS + 1: those of a texel begin before those before it
+    int32_t usual;   // the most of a texel in the middle half
     int32_t window;  // that has all of them, in the ratio of sides (WINDOW_FIRST); 0: none has
     // Whether all texels that are not near an edge have the same weights in their windows of one
     // kernel, but for rounding: those of even texels, then those of odd ones. (Where tiles take

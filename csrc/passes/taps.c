@@ -266,13 +266,13 @@ static bool write_table(const struct vkb_axis *axis, uint32_t kernels,
     return true;
 }
 
-// The most readers of a texel; too many for tiles where those of a texel begin before those of the
-// one before.
-static int32_t most_readers(const struct vkb_axis *axis, const struct readers *readers)
+// The most readers of a texel from `first` to before `end`; too many for tiles where those of a
+// texel begin before those of the one before.
+static int32_t most_readers(const struct readers *readers, uint32_t first, uint32_t end)
 {
     uint32_t most = 1;
 
-    for (uint32_t texel = 0; texel < axis->from; ++texel) {
+    for (uint32_t texel = first; texel < end; ++texel) {
         const uint32_t count = readers[texel].end - readers[texel].first;
         if (texel > 0 && readers[texel].first < readers[texel - 1].first)
             return MAX_READERS + 1;
@@ -334,7 +334,8 @@ static void find_inner(const struct vkb_axis *axis, const struct readers *reader
 
 void vkb_axis_keep(struct vkb_axis *axis)
 {
-    axis->readers = (struct vkb_readers){.start = -1, .span = 1, .most = 1, .window = 1};
+    axis->readers =
+        (struct vkb_readers){.start = -1, .span = 1, .most = 1, .usual = 1, .window = 1};
 }
 
 bool vkb_axis_build(const struct vkb_axis *axis, uint32_t kernels, struct vkb_transposed *found,
@@ -348,7 +349,8 @@ bool vkb_axis_build(const struct vkb_axis *axis, uint32_t kernels, struct vkb_tr
     if (done) {
         add_weights(axis, readers, weights);
         found->readers.span = (int32_t)most_of_blocks(axis, readers);
-        found->readers.most = most_readers(axis, readers);
+        found->readers.most = most_readers(readers, 0, axis->from);
+        found->readers.usual = most_readers(readers, axis->from / 4, axis->from - axis->from / 4);
         found->readers.window = find_window(axis, readers, found->readers.most);
         if (kernels == 1)
             find_inner(axis, readers, weights, &found->readers);

@@ -70,7 +70,8 @@ static bool is_kept(const struct vkb_readers *readers)
 static const struct vkb_readers *readers_along(const struct vkb_axis *axis, bool vertical,
                                                int32_t direction)
 {
-    static const struct vkb_readers kept = {.start = -1, .span = 1, .most = 1, .window = 1};
+    static const struct vkb_readers kept = {
+        .start = -1, .span = 1, .most = 1, .usual = 1, .window = 1};
 
     return direction == (vertical ? DIRECTION_HORIZONTAL : DIRECTION_VERTICAL) ? &kept
                                                                                : &axis->readers;
@@ -226,12 +227,25 @@ static bool make_tiles(const struct vkb_variant_choice *choice, const struct vkb
     return true;
 }
 
+// Whether a workgroup can hold the windows of all its columns and rows in so many pictures: the
+// first texels and the weights, which are one more than `side`.
+static bool holds_windows(const struct vkb_variant_choice *choice, uint32_t pictures, int32_t side)
+{
+    const size_t windows =
+        pictures * (FILTER_TILE_COLUMNS + (size_t)FILTER_TILE_RUN * FILTER_TILE_RUNS);
+    // The rest of the shared memory of tiles without sums.
+    const size_t rest = 4 * sizeof(float) * (FILTER_TILE_COLUMNS + 2);
+
+    return windows * (size_t)(side + 2) * sizeof(float) + rest
+        <= choice->device->limits.maxComputeSharedMemorySize;
+}
+
 // After the last one of several passes that add up the pictures of one image, adds a fused pass.
 static bool add_pictures(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
 {
     const struct vkb_pass_row *first = pass + 1 - pass->joined_count;
     struct vkb_pass_row row;
-    int32_t width = 1, height = 1;
+    int32_t width = 1, height = 1, inner = 1;
 
     if (pass->joined_count < 2)
         return true;
@@ -247,24 +261,35 @@ static bool add_pictures(struct vkb_variant_choice *choice, const struct vkb_pas
         const struct vkb_readers *x = &pass->joined[i].x.readers, *y = &pass->joined[i].y.readers;
         width = x->most > width ? x->most : width;
         height = y->most > height ? y->most : height;
+        inner = x->usual > inner ? x->usual : inner;
+        inner = y->usual > inner ? y->usual : inner;
         row.params.adjoint_filter.pictures[i][0] = (float)x->start;
         row.params.adjoint_filter.pictures[i][1] = (float)y->start;
     }
     vkb_make_tiles(choice, &row, &vkb_shader_adjoint_filter_tile_comp, width, height);
     row.constants.pictures = (int32_t)pass->joined_count;
-    return width > MAX_WINDOW || height > MAX_WINDOW || vkb_add_variant_pass(choice, &row);
+    row.constants.inner = inner;
+    return width > MAX_WINDOW || height > MAX_WINDOW
+        || !holds_windows(choice, pass->joined_count, width > height ? width : height)
+        || vkb_add_variant_pass(choice, &row);
 }
 
-// Makes `row` blocks of texels along its only axis. False: it has two, or several kernels.
-static bool make_lines(struct vkb_pass_row *row)
+// Makes `row` blocks of texels along its only axis. False: it has two, or several kernels, or so
+// many weights that a workgroup cannot hold them.
+static bool make_lines(const struct vkb_variant_choice *choice, struct vkb_pass_row *row)
 {
     const bool along_x = row->constants.direction == DIRECTION_HORIZONTAL;
+    const struct vkb_filter *filter = row->filters;
+    const int32_t span = along_x ? filter->x.readers.span : filter->y.readers.span;
 
-    if (row->constants.direction == DIRECTION_BOTH || row->constants.kernels > 1)
+    if (row->constants.direction == DIRECTION_BOTH || row->constants.kernels > 1
+        || 4 * sizeof(float) * ((size_t)span + 2 * ADJOINT_OUTPUTS)
+               > choice->device->limits.maxComputeSharedMemorySize)
         return false;
+    row->constants.span_width = span;
     vkb_make_dispatch(row, &vkb_shader_adjoint_line_comp,
-                      PIXEL_INVOCATIONS * (along_x ? ADJOINT_SIDE : 1),
-                      PIXEL_INVOCATIONS * (along_x ? 1 : ADJOINT_SIDE));
+                      PIXEL_INVOCATIONS * (along_x ? ADJOINT_OUTPUTS : 1),
+                      PIXEL_INVOCATIONS * (along_x ? 1 : ADJOINT_OUTPUTS));
     return true;
 }
 
@@ -277,7 +302,7 @@ bool vkb_add_adjoint_filter_variant(struct vkb_variant_choice *choice,
         return false;
     memcpy(&row, pass, sizeof row);
     row.gains_if_finite = true;
-    const bool in_blocks = make_tiles(choice, pass, &row) || make_lines(&row);
+    const bool in_blocks = make_tiles(choice, pass, &row) || make_lines(choice, &row);
     read_composite(&choice->plain, &row);
     return (in_blocks ? vkb_add_variant_pass(choice, &row)
                       : vkb_add_fullscreen_variant(choice, &row))

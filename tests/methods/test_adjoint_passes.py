@@ -599,6 +599,21 @@ def test_tiles_have_the_derivatives_of_the_reference(varied: Any, name: str) -> 
     check(found, expected, "image")
 
 
+@pytest.mark.parametrize("size", [(150, 11), (11, 150), (61, 90)])
+def test_long_lines_have_the_derivatives_of_the_reference(varied: Any, size: Any) -> None:
+    """Of several workgroups, of which some are far from edges, and blocks that are cut off."""
+    weights = np.exp(-0.5 * (np.arange(25) / 9.0) ** 2)
+    settings = Separable(weights=tuple(weights / (2 * weights.sum() - weights[0])), threshold=0.2)
+    image = random_image(size[0], size[1], channels=4, seed=1).astype(np.float32)
+    pullback, cotangents, expected = pull(varied["gpu"], image, settings)
+    found = pullback(cotangents)
+    check(found, expected, "image")
+    source = Inputs(image).source((cotangents["final"],))
+    plan = varied["gpu"]._core.plan(source, settings.replace(**SINGLE), None, ("final",), "images")
+    assert plan
+    assert "adjoint_line_comp" in [shader for _, shader, *_ in plan.passes]
+
+
 def test_the_alpha_gets_nothing_of_the_bloom(renderer: Renderer) -> None:
     """Also where the image itself is the source, and cotangents of the bloom go to it directly."""
     image = random_image(9, 14, channels=4, seed=1).astype(np.float32)
