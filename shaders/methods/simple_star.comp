@@ -55,9 +55,8 @@ vec4 fetch(Line line, int at)
     return at < line.count ? texel : vec4(0.0);
 }
 
-// The most pixels that a pixel is away from the one that it is mixed with, and the pixels that an invocation loads before
-// it mixes them, so that few have to wait for memory: a training step takes 7.7 ms in place of 11.7 (3840 x 2160, H200,
-// 2026-11-30).
+// The most pixels between a pixel and the one that it is mixed with. The pixels that an invocation loads before it mixes
+// them, so that few wait for memory: a training step takes 7.7 ms in place of 11.7 (3840 x 2160, H200, 2026-11-30).
 const int MAX_DISTANCE = STAR_ITERATIONS - 1, LOADED = 8;
 
 // Appends a value to the last DISTANCE ones, of which the first is the oldest. All are moved: llvmpipe loads and stores

@@ -1,6 +1,6 @@
 // The transpose of a filter along one axis, in blocks: an invocation loads each pixel once that the texels of BLOCKS
-// blocks are read by. Columns of a Gaussian of 65 taps take 0.73 ms in place of 2.09, as single blocks with weights from
-// the table (3840 x 2160 in float32, H200, 2026-11-28). Of 49 taps, columns then take 0.34 ms and rows 0.60, as here 0.18
+// blocks are read by. With single blocks, and weights from the table, columns of a Gaussian of 65 taps take 0.73 ms in
+// place of 2.09 (3840 x 2160 in float32, H200, 2026-11-28); those of 49 taps 0.34 and their rows 0.60, as it is here 0.18
 // and 0.19 (2026-11-30).
 #include "lib/adjoint_filter.glsl"
 
@@ -10,8 +10,8 @@ const int BLOCKS = ADJOINT_OUTPUTS / ADJOINT_SIDE, LOADED = 4;
 layout(local_size_x = PIXEL_INVOCATIONS, local_size_y = PIXEL_INVOCATIONS) in;
 layout(set = 0, binding = TARGET_BINDING) uniform writeonly image2D target;
 
-// The weights of the block in the middle of the workgroup, which all blocks have that are not near an edge, between zeros:
-// the first block is not read by the last pixels, nor the last block by the first ones.
+// The weights of the block in the middle of the workgroup, which all blocks have that are not near an edge. They are
+// between zeros: the first block is not read by the last pixels, nor the last block by the first ones.
 const int PADDING = ADJOINT_OUTPUTS - ADJOINT_SIDE, KEPT = SPAN_WIDTH + 2 * PADDING + LOADED;
 shared vec4 kept[KEPT];
 

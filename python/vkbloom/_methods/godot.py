@@ -63,8 +63,8 @@ class GodotBloom(PublishedSettings):
     In the first level, c is divided by 1 + L before the blur and by 1 - L after it, with
     L = max((0.299, 0.587, 0.114) . c, 0) / max(cap, 6). Strength and exposure follow, then the
     factor max(smoothstep(threshold, threshold + scale, max(c)), glow_bloom), then the cap.
-    ``bloom`` is the weighted sum of the enlarged levels. A weight up to 0.0001 counts as 0, and
-    levels after the last weight that is not 0 do not exist.
+    ``bloom`` is the weighted sum of the enlarged levels. Those with a weight up to 0.0001 are left
+    out of it, and levels after the last one that has a greater weight do not exist.
 
     Source: godotengine/godot, servers/rendering/renderer_rd/shaders/effects: copy.glsl
     @ 0a5efd02df51, tonemap.glsl @ 001c8c9c24dc.
