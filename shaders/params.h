@@ -602,11 +602,10 @@
     SLOT(SLOT_ADDED, 5)          /* what other readers of the image have accumulated */ \
     SLOT(SLOT_DIFFERENTIATED, 6) /* the image itself, if it is a source's */
 
-// Fused passes that end with a composite: the scene is at SLOT_SOURCE, or with a filter at
-// SLOT_SAME_SIZE.
+// Fused passes that end with a composite. Its scene is at SLOT_SOURCE, or, of a filter, at
+// SLOT_ENDED.
 #define FUSED_SLOTS(SLOT) \
-    SLOT(SLOT_ENDED, 2)        /* see lib/ended.glsl */ \
-    SLOT(SLOT_NESTED, 3)       /* what the filter adds that such a pass contains */
+    SLOT(SLOT_ENDED, 2)        /* see lib/ended.glsl */
 
 // Filters, and sums of up to GATHERED_LEVELS levels.
 #define FILTER_SLOTS(SLOT) \
@@ -782,7 +781,7 @@
     CONSTANT(10, FIRST_LEVEL, first_level)      /* of HDRP's blurs: they make the first level */ \
     CONSTANT(11, DIRECTION, direction)          /* along which axis: DIRECTION_* */ \
     CONSTANT(12, RADIUS, radius)                /* texels of a half-kernel without its middle */ \
-    CONSTANT(13, ADDS_IMAGE, adds_image)   /* what is at SLOT_SAME_SIZE, SLOT_NESTED, SLOT_BEFORE or SLOT_ADDED is added */ \
+    CONSTANT(13, ADDS_IMAGE, adds_image)   /* what is at SLOT_SAME_SIZE, SLOT_BEFORE or SLOT_ADDED is added */ \
     CONSTANT(14, UPSAMPLE, upsample) /* what a tap samples: UPSAMPLE_* */ \
     CONSTANT(15, FROM_IMAGE, from_image) /* a variant reads the threshold pass's image */ \
     CONSTANT(16, EMITTERS, emitters)     /* how many passes add up in the target by blending */ \

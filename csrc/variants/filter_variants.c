@@ -179,10 +179,10 @@ static struct vkb_pass_row nested_row(const struct vkb_variant_choice *choice,
     memset(&row.params, 0, sizeof row.params);
     row.fused = true;
     vkb_read_only(&row, up->reads[SLOT_SOURCE]);
-    vkb_read_at(&row, SLOT_SAME_SIZE, pass->reads[SLOT_SCENE]);
     row.constants.adds_image = up->constants.adds_image;
-    vkb_read_at(&row, SLOT_NESTED,
+    vkb_read_at(&row, SLOT_SAME_SIZE,
                 up->constants.adds_image ? up->reads[SLOT_SAME_SIZE] : VKB_NO_IMAGE);
+    vkb_read_at(&row, SLOT_ENDED, pass->reads[SLOT_SCENE]);
     row.block = VKB_BLOCK_filter_final;
     copy_filter(&row.params.filter_final, &up->params.filter);
     copy_composite(&row.params.filter_final, &pass->params.composite);

@@ -1,8 +1,8 @@
 // How a fused pass ends a bloom: with the finished picture; with MIXED, with the cotangents of the picture before
 // exposure and curves, from those of the finished one; with TRANSPOSED, with the derivatives by the image, from the
 // cotangents of a composite without a curve, which is a factor, and their transposed blur, or, unless ADDS_IMAGE, with
-// those by the glow, which are the blur's. The image of SLOT_ENDED
-// is then these cotangents or the image. The including shader has composite.glsl and, for linear texels, pixels.glsl.
+// those by the glow, which are the blur's. The image of SLOT_ENDED is then these cotangents or the image. The including
+// shader has composite.glsl and, for linear texels, pixels.glsl.
 #ifndef TRANSPOSED
 #define TRANSPOSED 0
 #endif

@@ -12,7 +12,7 @@ const int KEPT = IS_INSET ? WINDOW + 2 : WINDOW;
 READ_IMAGE(SLOT_SOURCE, source);
 READ_IMAGE(SLOT_SAME_SIZE, same_size);
 #ifdef FINAL
-READ_IMAGE(SLOT_NESTED, nested);
+READ_IMAGE(SLOT_ENDED, scene);
 #endif
 
 // The texels of a row are a run where the ratio of widths is simple. The compiler removes loads that no window needs.
@@ -24,22 +24,29 @@ const int BEFORE = MAX_WINDOW / 2, LOADED = 2 * COLUMNS + MAX_WINDOW;
 
 #ifdef FINAL
 #include "lib/ended.glsl"
-#define HAS_SAME_SIZE true
-#else
-#define HAS_SAME_SIZE (ADDS_IMAGE != 0)
 #endif
 #include "variants/store.glsl"
 
+// What is added to a pixel of the target: of a bloom the scene.
+uvec4 added_in_run(int first, int i, int y)
+{
+#ifdef FINAL
+    return raw_in_run(scene, read_shapes[SLOT_ENDED], first, i, y);
+#else
+    return ADDS_IMAGE != 0 ? raw_in_run(same_size, read_shapes[SLOT_SAME_SIZE], first, i, y) : uvec4(0);
+#endif
+}
+
 // What becomes of a filtered pixel.
-uvec4 shade(uvec4 same_size_pixel, vec4 sum, ivec2 pixel)
+uvec4 shade(uvec4 own, vec4 sum, ivec2 pixel)
 {
 #ifdef FINAL
     if (ADDS_IMAGE != 0)
-        sum += params.same_size * value_of(raw_pixel(nested, read_shapes[SLOT_NESTED], pixel.x, pixel.y));
-    return ended(same_size_pixel, as_stored(sum, FORMAT), pixel);
+        sum += params.same_size * value_of(raw_pixel(same_size, read_shapes[SLOT_SAME_SIZE], pixel.x, pixel.y));
+    return ended(own, as_stored(sum, FORMAT), pixel);
 #else
     if (ADDS_IMAGE != 0)
-        sum += params.same_size * value_of(same_size_pixel);
+        sum += params.same_size * value_of(own);
     return buffer_of(sum);
 #endif
 }
@@ -104,7 +111,7 @@ void write_row(int first, int y, int texel, float part, int phase)
     uvec4 raw[COLUMNS];
 
     [[unroll]] for (int i = 0; i < COLUMNS; ++i)
-        raw[i] = HAS_SAME_SIZE ? raw_in_run(same_size, read_shapes[SLOT_SAME_SIZE], first, i, y) : uvec4(0);
+        raw[i] = added_in_run(first, i, y);
     [[unroll]] for (int i = 0; i < COLUMNS; ++i)
         raw[i] = shade(raw[i], coarse * (column_of(window, i) / shares), ivec2(first + i, y));
     store(first, y, raw);

@@ -4,7 +4,7 @@
 SAMPLED_IMAGE(SLOT_SOURCE, source);
 SAMPLED_IMAGE(SLOT_SAME_SIZE, same_size);
 #ifdef FINAL
-SAMPLED_IMAGE(SLOT_NESTED, nested);
+SAMPLED_IMAGE(SLOT_ENDED, scene);
 #include "lib/ended.glsl"
 #endif
 layout(set = 0, binding = TARGET_BINDING) uniform writeonly image2D target;
@@ -21,25 +21,33 @@ vec4 texel_at(ivec2 texel)
     return seen(fetch_clamped(source, texel + ivec2(params.first_x, params.first_y)));
 }
 
-vec4 added_at(ivec2 pixel)
+vec4 same_size_at(ivec2 pixel)
 {
-#ifndef FINAL
-    if (ADDS_IMAGE == 0)
-        return vec4(0.0);
-#endif
-    return texelFetch(same_size, pixel, 0);
+    return ADDS_IMAGE != 0 ? texelFetch(same_size, pixel, 0) : vec4(0.0);
 }
 
-vec4 shade(vec4 same_size_pixel, vec4 sum, ivec2 pixel)
+#ifdef FINAL
+vec4 added_at(ivec2 pixel)
+{
+    return texelFetch(scene, pixel, 0);
+}
+#else
+vec4 added_at(ivec2 pixel)
+{
+    return same_size_at(pixel);
+}
+#endif
+
+vec4 shade(vec4 own, vec4 sum, ivec2 pixel)
 {
     sum = params.coarse * (sum / params.divisor);
 #ifdef FINAL
     if (ADDS_IMAGE != 0)
-        sum += params.same_size * texelFetch(nested, pixel, 0);
-    return ended(same_size_pixel, as_stored(sum, FORMAT), pixel);
+        sum += params.same_size * same_size_at(pixel);
+    return ended(own, as_stored(sum, FORMAT), pixel);
 #else
     if (ADDS_IMAGE != 0)
-        sum += params.same_size * same_size_pixel;
+        sum += params.same_size * own;
     return stored(sum);
 #endif
 }
