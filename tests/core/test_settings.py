@@ -78,6 +78,17 @@ def test_values_that_are_equal_and_hashable() -> None:
     assert pickle.loads(pickle.dumps(settings)) == settings
 
 
+def test_what_is_sent_is_the_fields_alone() -> None:
+    """Not the block of the core, which settings keep once they have been planned."""
+    settings = Separable(threshold=0.5)
+    stored = pickle.dumps(settings)
+    block = settings._core_block()
+    assert settings._core_block() is block
+    assert pickle.dumps(settings) == stored
+    assert pickle.loads(stored)._core_block() == block
+    assert settings.replace(threshold=0.6)._core_block() != block
+
+
 def test_as_dict_is_plain() -> None:
     settings = make(
         blur_scale=np.float32(0.5),

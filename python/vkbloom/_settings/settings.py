@@ -7,6 +7,7 @@ declared once for the shaders, the core and Python.
 from __future__ import annotations
 
 import dataclasses
+import functools
 from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any, ClassVar, Final, Literal, Self, get_args
@@ -250,11 +251,20 @@ class Settings(Record):
 
     def _core_block(self) -> bytes:
         """Return the settings as the core reads them."""
+        return self._block
+
+    # A step of a training loop plans three times, each step with new settings.
+    @functools.cached_property
+    def _block(self) -> bytes:
         # What stages of glare read has passed this threshold, however the method counts its own.
         stages = None if self.threshold is None else (self.threshold, self.knee)
         return settings_block(
             self.method, vars(self) | {"stage_threshold": stages} | self._core_values()
         )
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return the fields, without what was computed from them."""
+        return {name: value for name, value in vars(self).items() if name != "_block"}
 
     def _core_values(self) -> dict[str, Any]:
         """Return what the core names or counts otherwise."""
