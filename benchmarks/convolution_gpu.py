@@ -8,6 +8,7 @@ images of the others stay on the device.
 
 from __future__ import annotations
 
+import itertools
 from contextlib import ExitStack
 from typing import Any, Final
 
@@ -17,8 +18,8 @@ from numpy.typing import NDArray
 import vkbloom
 from benchmarks import peers
 from benchmarks.convolution import ALLOWED, kernel_sizes, place, settings_of
-from benchmarks.inputs import COUNT, THRESHOLD, pictures
-from benchmarks.ours import OURS, contest, prepare_call, ratios
+from benchmarks.inputs import THRESHOLD, pictures
+from benchmarks.ours import OURS, contender, contest, ratios
 from benchmarks.plan import Plan
 from benchmarks.results import Section, Table
 from benchmarks.timing import Contender, device_clock
@@ -68,24 +69,20 @@ def _time_one(
         section.missing,
     )
     ours, stages = renderers
-    clock = device_clock(ours.info)
-    # Each call of a renderer has another image than the call before, or no pass would run.
-    final, staged = (
-        prepare_call(one, [*images[::2], *images[1::2]], settings) for one in (ours, stages)
-    )
-    alone = prepare_call(ours, images, settings, "bloom", 1)
+    feed = itertools.cycle(images)
     contenders = [
-        Contender(OURS, final, clock),
+        contender(OURS, ours, feed, settings),
         Contender(
             OURS_ALONE,
-            alone,
+            lambda _: ours.apply(next(feed), settings, framebuffers=("bloom",)),
             lambda frames: sum(frames.timings.get(name, 0.0) for name in PASSES),
         ),
-        Contender(STAGES, staged, clock),
+        contender(STAGES, stages, itertools.cycle(images), settings),
     ]
     contenders += [Contender(name, call, seconds) for name, (call, seconds, _) in theirs.items()]
-    expected = {"final": final(0)["final"], "bloom": alone(COUNT - 1)["bloom"]}
-    made = [(STAGES, expected["final"], staged(0)["final"])]
+    expected = ours.apply(images[0], settings, framebuffers=("bloom", "final"))
+    staged = stages.apply(images[0], settings, framebuffers=("final",))
+    made = [(STAGES, expected["final"], staged["final"])]
     made += [
         (name, expected["bloom" if name == TORCH_ALONE else "final"], fetch(call(0)))
         for name, (call, _, fetch) in theirs.items()
@@ -102,7 +99,8 @@ def _time_one(
         warm_up=5,
     )
     ours.apply(images[1], settings, framebuffers=("final",))
-    rows = [(name, f"{1e3 * seconds:.3f}") for name, seconds in final(0).timings.items()]
+    frames = ours.apply(images[0], settings, framebuffers=("final",))
+    rows = [(name, f"{1e3 * seconds:.3f}") for name, seconds in frames.timings.items()]
     section.tables.append(Table(f"{group}: passes", ("", "ms"), tuple(rows)))
     ratios(
         section,

@@ -29,13 +29,9 @@ def prepare_call(
     renderer: vkbloom.Renderer,
     images: Sequence[NDArray[Any]],
     settings: vkbloom.Settings,
-    name: str = "final",
-    first: int = 0,
 ) -> Callable[[int], vkbloom.Frames]:
-    """Return a call that renders a framebuffer of another image in each round."""
-    return lambda turn: renderer.apply(
-        images[(turn + first) % COUNT], settings, framebuffers=(name,)
-    )
+    """Return a call that renders the bloom of another image in each round."""
+    return lambda turn: renderer.apply(images[turn % COUNT], settings, framebuffers=("final",))
 
 
 def contender(
