@@ -742,11 +742,10 @@
 #define TABLE_WIDTH 1024
 #define SUM_SIDE    8
 #define NODE_PIXELS 16
-// Transposed filters in blocks: the texels along an axis whose weights are together in the table;
-// those that an invocation writes of a line; the rows of an invocation that writes words.
-#define ADJOINT_SIDE    4
-#define ADJOINT_OUTPUTS 8
-#define ADJOINT_ROWS    16
+// Transposed filters in blocks: the texels along an axis whose weights are together in the table,
+// and the rows of an invocation that writes words.
+#define ADJOINT_SIDE 4
+#define ADJOINT_ROWS 16
 
 // Filament's taps of a level with even sides: their distance in texels, and the share of the outer
 // ones along an axis.

@@ -283,13 +283,13 @@ static bool make_lines(const struct vkb_variant_choice *choice, struct vkb_pass_
     const int32_t span = along_x ? filter->x.readers.span : filter->y.readers.span;
 
     if (row->constants.direction == DIRECTION_BOTH || row->constants.kernels > 1
-        || 4 * sizeof(float) * ((size_t)span + 2 * ADJOINT_OUTPUTS)
+        || 4 * sizeof(float) * ((size_t)span + ADJOINT_SIDE)
                > choice->device->limits.maxComputeSharedMemorySize)
         return false;
     row->constants.span_width = span;
     vkb_make_dispatch(row, &vkb_shader_adjoint_line_comp,
-                      PIXEL_INVOCATIONS * (along_x ? ADJOINT_OUTPUTS : 1),
-                      PIXEL_INVOCATIONS * (along_x ? 1 : ADJOINT_OUTPUTS));
+                      PIXEL_INVOCATIONS * (along_x ? ADJOINT_SIDE : 1),
+                      PIXEL_INVOCATIONS * (along_x ? 1 : ADJOINT_SIDE));
     return true;
 }
 
