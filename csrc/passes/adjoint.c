@@ -136,8 +136,8 @@ static const struct vkb_filter *add_weights(struct vkb_adjoint *adjoint,
 {
     struct vkb_filter filter = *given;
 
-    vkb_axis_keep(&filter.x);
-    vkb_axis_keep(&filter.y);
+    filter.x.readers = vkb_kept_readers;
+    filter.y.readers = vkb_kept_readers;
     return (direction == DIRECTION_VERTICAL
             || vkb_axis_transpose(&filter.x, filter.kernels, &adjoint->table, error))
                 && (direction == DIRECTION_HORIZONTAL

@@ -332,11 +332,8 @@ static void find_inner(const struct vkb_axis *axis, const struct readers *reader
     }
 }
 
-void vkb_axis_keep(struct vkb_axis *axis)
-{
-    axis->readers =
-        (struct vkb_readers){.start = -1, .span = 1, .most = 1, .usual = 1, .window = 1};
-}
+const struct vkb_readers vkb_kept_readers = {
+    .start = -1, .span = 1, .most = 1, .usual = 1, .window = 1};
 
 bool vkb_axis_build(const struct vkb_axis *axis, uint32_t kernels, struct vkb_transposed *found,
                     struct vkb_error *error)

@@ -28,6 +28,6 @@ double vkb_axis_readers(const struct vkb_axis *axis);
 bool vkb_axis_build(const struct vkb_axis *axis, uint32_t kernels, struct vkb_transposed *found,
                     struct vkb_error *error);
 // The readers of an axis that a pass keeps.
-void vkb_axis_keep(struct vkb_axis *axis);
+extern const struct vkb_readers vkb_kept_readers;
 
 #endif

@@ -70,10 +70,7 @@ static bool is_kept(const struct vkb_readers *readers)
 static const struct vkb_readers *readers_along(const struct vkb_axis *axis, bool vertical,
                                                int32_t direction)
 {
-    static const struct vkb_readers kept = {
-        .start = -1, .span = 1, .most = 1, .usual = 1, .window = 1};
-
-    return direction == (vertical ? DIRECTION_HORIZONTAL : DIRECTION_VERTICAL) ? &kept
+    return direction == (vertical ? DIRECTION_HORIZONTAL : DIRECTION_VERTICAL) ? &vkb_kept_readers
                                                                                : &axis->readers;
 }
 

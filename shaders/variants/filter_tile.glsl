@@ -196,13 +196,13 @@ void add_windows(int width, int height, Run run, inout vec4 sums[RUN][3])
     [[unroll]] for (int picture = 0; picture < PICTURES; ++picture) {
         int column = picture * WINDOWS + run.column;
         [[unroll]] for (int i = 0; i < RUN; ++i) {
-            int row = picture * WINDOWS + WINDOWS_X + run.top + i;
-            ivec2 first = ivec2(firsts[column], firsts[row]);
+            int row = picture * WINDOWS + run.top + i;
+            ivec2 first = ivec2(firsts[column], firsts[WINDOWS_X + row]);
             [[unroll]] for (int y = 0; y < height; ++y) {
                 vec4 sum = vec4(0.0);
                 [[unroll]] for (int x = 0; x < width; ++x)
-                    sum += weights[x][column][0] * texel_at(first + ivec2(x, y));
-                sums[i][0] += weights[y][row][0] * sum;
+                    sum += column_weight(0, x, column) * texel_at(first + ivec2(x, y));
+                sums[i][0] += row_weight(0, y, row) * sum;
             }
         }
     }

@@ -237,8 +237,8 @@ def _level(cotangent: NDArray[Any] | ImportedArray) -> NDArray[Any] | ImportedAr
 @functools.lru_cache(16)
 def in_floats(settings: Settings) -> Settings:
     """Return settings whose bloom buffers are floats; the same object, whose plan is kept."""
-    is_so = settings.format == "rgba32float"
-    return settings if is_so else settings.replace(format="rgba32float")
+    floats = "rgba32float"
+    return settings if settings.format == floats else settings.replace(format=floats)
 
 
 def on_device(renderer: Renderer, settings: Settings) -> bool:
