@@ -354,7 +354,7 @@ static bool add_sum_pass(struct vkb_adjoint *adjoint, struct vkb_pass_row *row,
     size->height = (size->height + SUM_SIDE - 1) / SUM_SIDE;
     // The squares are below the sums.
     const struct vkb_size both = {size->width, 2 * size->height};
-    return add_numbered_pass(adjoint, "sum", adjoint->summed++, row, both, image, error);
+    return add_numbered_pass(adjoint, "adjoint_sum", adjoint->summed++, row, both, image, error);
 }
 
 bool vkb_add_sum_passes(struct vkb_adjoint *adjoint, const struct vkb_pass_row *given,
