@@ -1092,14 +1092,18 @@
     SELECT(COMBINE_MEDIAN, 8, median)
 
 // Functions of a value: POINT(name, value, function), in lib/points.glsl, where `back_` and the
-// name is the slope.
+// name is the slope. THRESHOLD_POINTS are thresholds with slopes by what they read (SUMS), too.
 #define POINTS(POINT) \
     POINT(POINT_CAPPED, 1, capped) \
     POINT(POINT_FINITE, 2, finite) \
     POINT(POINT_TINTED, 3, tinted) \
+    POINT(POINT_LIGHTNESS, 6, bright_lightness) \
+    POINT(POINT_BABYLON, 14, babylon) \
+    POINT(POINT_DIMMED, 15, dimmed) \
+    THRESHOLD_POINTS(POINT)
+#define THRESHOLD_POINTS(POINT) \
     POINT(POINT_ROLLED, 4, rolled) \
     POINT(POINT_HIGHLIGHTS, 5, highlights) \
-    POINT(POINT_LIGHTNESS, 6, bright_lightness) \
     POINT(POINT_BEVY, 7, bevy) \
     POINT(POINT_KINO, 8, kino) \
     POINT(POINT_URP, 9, urp) \
@@ -1107,8 +1111,6 @@
     POINT(POINT_THREE, 11, three) \
     POINT(POINT_THREE_NODE, 12, three_node) \
     POINT(POINT_UNREAL, 13, unreal) \
-    POINT(POINT_BABYLON, 14, babylon) \
-    POINT(POINT_DIMMED, 15, dimmed) \
     POINT(POINT_GLOWING, 16, glowing)
 #define POINT_NONE 0
 

@@ -379,3 +379,19 @@ bool vkb_add_sum_passes(struct vkb_adjoint *adjoint, const struct vkb_pass_row *
     }
     return vkb_graph_show_image(adjoint->graph, image, name, error);
 }
+
+bool vkb_add_threshold_sums(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
+                            const struct vkb_pass_row *row, const struct vkb_shader *shader,
+                            struct vkb_error *error)
+{
+    const struct vkb_image_row *target = &adjoint->graph->images[pass->targets[0]];
+    const struct vkb_size size = {target->width, target->height};
+    bool has_slopes = false;
+
+#define VKB_HAS_SLOPES(name, value, function) \
+    has_slopes = has_slopes || pass->constants.after == name;
+    THRESHOLD_POINTS(VKB_HAS_SLOPES)
+#undef VKB_HAS_SLOPES
+    return !pass->constants.thresholded || !has_slopes
+        || vkb_add_sum_passes(adjoint, row, shader, size, ".by_own_threshold", error);
+}

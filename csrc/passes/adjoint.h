@@ -107,6 +107,10 @@ bool vkb_accumulate_mask(struct vkb_adjoint *adjoint, const struct vkb_pass_row 
 bool vkb_add_sum_passes(struct vkb_adjoint *adjoint, const struct vkb_pass_row *row,
                         const struct vkb_shader *shader, struct vkb_size size, const char *name,
                         struct vkb_error *error);
+// The same by what a threshold within a pass of taps reads, if it has one.
+bool vkb_add_threshold_sums(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
+                            const struct vkb_pass_row *row, const struct vkb_shader *shader,
+                            struct vkb_error *error);
 
 // Whether a composite adds the bloom times the intensity, and its cotangents do not depend on it.
 bool vkb_adds_bloom(const struct vkb_pass_row *composite);

@@ -49,6 +49,8 @@ bool vkb_transpose_nine(struct vkb_adjoint *adjoint, const struct vkb_pass_row *
     const struct vkb_size size = {blur->x.to, blur->y.to};
     struct vkb_pass_row row = vkb_slope_row(adjoint, pass, &vkb_shader_adjoint_nine_frag);
 
+    if (!vkb_add_threshold_sums(adjoint, pass, &row, &vkb_shader_adjoint_nine_sums_frag, error))
+        return false;
     if (pass->constants.direction == DIRECTION_HORIZONTAL)
         return vkb_filter_to_image(adjoint, blur, row.reads[SLOT_COTANGENTS], size,
                                    &row.reads[SLOT_COTANGENTS], error)

@@ -1,5 +1,6 @@
 // Functions of a value before and after it is combined with others (POINTS of params.h), each with its slope: `back_`
-// takes cotangents of the result to those of the value. For shaders with PREFILTER_BLOCK.
+// takes cotangents of the result to those of the value. With SUMS, `by_` takes them to those of what a threshold reads,
+// in the order of `_threshold_slopes` of the method's settings. For shaders with PREFILTER_BLOCK.
 #include "lib/lab.glsl"
 
 // An upper bound of colours.
@@ -68,6 +69,21 @@ vec4 back_rolled(vec4 value, vec4 cotangent)
     return back_part_above(value, back_through_factor(above / divisor, factor, cotangent), params.threshold);
 }
 
+#ifdef SUMS
+vec4 by_rolled(vec4 value, vec4 cotangent)
+{
+    vec4 above = part_above(value, params.threshold);
+    float most = largest(above.rgb), brightest = largest(value.rgb), divisor = 1.0 + most / params.highlight;
+    float slope = -1.0 / (params.highlight * divisor), by_divisor = inner_product(above / divisor, cotangent);
+    vec4 by_above = vec4(cotangent.rgb / divisor + slope * by_divisor * shares_of_brightest(above.rgb),
+                         cotangent.a / divisor);
+    // Alpha is multiplied by the share of the brightest channel that is above.
+    float by_threshold = -dot(by_above.rgb, larger(value, vec4(params.threshold)).rgb)
+                       - by_above.a * value.a * larger(brightest, params.threshold) / max(brightest, 1e-30);
+    return vec4(by_threshold, -slope * by_divisor * most / params.highlight, 0.0, 0.0);
+}
+#endif
+
 // The highlights of Blender's Glare node (formulas of the compositor of Blender 4.5).
 
 // The value that a smooth transition of this width subtracts (minimum) or adds (maximum) at a
@@ -120,6 +136,30 @@ vec4 back_highlights(vec4 value, vec4 cotangent)
     return factor * cotangent + vec4(slope * shares_of_brightest(value.rgb), 0.0);
 }
 
+#ifdef SUMS
+// The derivative of the value that a transition subtracts or adds, by its width.
+float rounding_by_width(float distance_to_end, float width)
+{
+    float h = width > 0.0 ? max(1.0 - abs(distance_to_end) / width, 0.0) : 0.0;
+    return 0.5 * h - 0.25 * h * h;
+}
+
+vec4 by_highlights(vec4 value, vec4 cotangent)
+{
+    float brightest = largest(value.rgb), low = params.threshold, range = params.maximum;
+    if (brightest <= 0.0)
+        return vec4(0.0);
+    float width = min(params.smoothness, range), at_low = min(width, low), above = brightest - low;
+    float kept = max(above, 0.0) + rounding(above, at_low);
+    float slope = larger(range, kept) - rounding_slope(kept - range, width);
+    float by_low = rounding_by_width(above, at_low), width_by_smoothness = larger(range, params.smoothness);
+    float by_threshold = by_low * larger(width, low) - larger(above, 0.0) - rounding_slope(above, at_low);
+    float by_width = slope * by_low * larger(low, width) - rounding_by_width(kept - range, width);
+    return inner_product(cotangent, value / brightest)
+         * vec4(slope * by_threshold, by_width * width_by_smoothness, 0.0, 0.0);
+}
+#endif
+
 // darktable's: a step of the lightness (darktable 4.2.1, src/iop/bloom.c).
 vec4 bright_lightness(vec4 value)
 {
@@ -161,31 +201,56 @@ vec4 back_through_factor_and_tint(vec4 value, vec4 factor, vec4 cotangent)
         return back_through_factor_and_tint(value, name##_factor(value.rgb), cotangent); \
     }
 
-// Quadratic knees, whose sources differ in what keeps a width of 0 and black from a division by 0.
-vec4 kneed_factor(vec3 colour, float wider, float divisor, float least)
+// That of a threshold, with the derivatives of the factor by what it reads.
+#ifdef SUMS
+#define BY_THRESHOLD(name) \
+    BY_FACTOR(name) \
+    vec4 by_##name(vec4 value, vec4 cotangent) \
+    { \
+        float by_factor = inner_product(back_clamped(value, back_tinted(value, cotangent)), value); \
+        return vec4(by_factor * name##_slopes(value.rgb), 0.0, 0.0); \
+    }
+#else
+#define BY_THRESHOLD(name) BY_FACTOR(name)
+#endif
+
+// That of a quadratic knee.
+#define BY_KNEE(name) \
+    vec4 name##_factor(vec3 colour) \
+    { \
+        return soft_factor(name##_knee(largest(colour)), colour); \
+    } \
+    vec2 name##_slopes(vec3 colour) \
+    { \
+        return by_threshold_and_knee(name##_knee(largest(colour)), params.threshold, params.knee); \
+    } \
+    BY_THRESHOLD(name)
+
+// Their sources differ in what keeps a width of 0 and black from a division by 0.
+Soft knee_with(float brightness, float wider, float divisor, float least)
 {
-    return soft_factor(colour, params.threshold, params.threshold * params.knee + wider, divisor, least);
+    return soft_threshold(brightness, params.threshold, params.threshold * params.knee + wider, divisor, least);
 }
 
-vec4 kino_factor(vec3 colour)
+Soft kino_knee(float brightness)
 {
-    return kneed_factor(colour, 1e-5, 4.0 * (params.threshold * params.knee + 1e-5), 1e-5);
+    return knee_with(brightness, 1e-5, 4.0 * (params.threshold * params.knee + 1e-5), 1e-5);
 }
-BY_FACTOR(kino)
+BY_KNEE(kino)
 
 // Unity-Technologies/PostProcessing @ 32c3155207d3, Bloom.shader.
-vec4 ppv2_factor(vec3 colour)
+Soft ppv2_knee(float brightness)
 {
-    return kneed_factor(colour, 1e-5, 4.0 * (params.threshold * params.knee + 1e-5), 1e-4);
+    return knee_with(brightness, 1e-5, 4.0 * (params.threshold * params.knee + 1e-5), 1e-4);
 }
-BY_FACTOR(ppv2)
+BY_KNEE(ppv2)
 
 // Unity-Technologies/Graphics, com.unity.render-pipelines.universal, Bloom.shader @ 00d472fae509.
-vec4 urp_factor(vec3 colour)
+Soft urp_knee(float brightness)
 {
-    return kneed_factor(colour, 0.0, 4.0 * (params.threshold * params.knee) + 1e-4, 1e-4);
+    return knee_with(brightness, 0.0, 4.0 * (params.threshold * params.knee) + 1e-4, 1e-4);
 }
-BY_FACTOR(urp)
+BY_KNEE(urp)
 
 // A step at the luminance threshold^(1 / 2.2) (BabylonJS/Babylon.js, extractHighlights.fragment.fx @ bc81a5f32960).
 vec4 babylon_factor(vec3 colour)
@@ -196,44 +261,83 @@ BY_FACTOR(babylon)
 
 // three.js' high pass: a smooth step of the luminance (mrdoob/three.js,
 // examples/jsm/shaders/LuminosityHighPassShader.js @ 0255e15dd1d4).
+float smooth_place(float luminance)
+{
+    return (luminance - params.threshold) / params.smooth_width;
+}
+
+float smooth_slope(float place)
+{
+    float t = clamp(place, 0.0, 1.0);
+    return t == place ? 6.0 * t * (1.0 - t) / params.smooth_width : 0.0;
+}
+
 vec4 smooth_step_factor(vec3 colour, vec3 weights)
 {
-    float luminance = dot(colour, weights);
-    float place = (luminance - params.threshold) / params.smooth_width, t = clamp(place, 0.0, 1.0);
-    float slope = t == place ? 6.0 * t * (1.0 - t) / params.smooth_width : 0.0;
+    float place = smooth_place(dot(colour, weights)), t = clamp(place, 0.0, 1.0);
     // Not smoothstep(), which is undefined where rounding makes both ends equal.
-    return vec4(slope * weights, t * t * (3.0 - 2.0 * t));
+    return vec4(smooth_slope(place) * weights, t * t * (3.0 - 2.0 * t));
 }
+
+// By the threshold and the width.
+vec2 smooth_step_slopes(float luminance)
+{
+    float place = smooth_place(luminance);
+    return -smooth_slope(place) * vec2(1.0, place);
+}
+
+const vec3 THREE_LUMINANCE = vec3(0.2126729, 0.7151522, 0.0721750);
 
 vec4 three_factor(vec3 colour)
 {
-    return smooth_step_factor(colour, vec3(0.2126729, 0.7151522, 0.0721750));
+    return smooth_step_factor(colour, THREE_LUMINANCE);
 }
-BY_FACTOR(three)
+
+vec2 three_slopes(vec3 colour)
+{
+    return smooth_step_slopes(dot(colour, THREE_LUMINANCE));
+}
+BY_THRESHOLD(three)
 
 // BloomNode's luminance is that of three.js' colour management.
 vec4 three_node_factor(vec3 colour)
 {
     return smooth_step_factor(colour, LUMINANCE);
 }
-BY_FACTOR(three_node)
+
+vec2 three_node_slopes(vec3 colour)
+{
+    return smooth_step_slopes(dot(colour, LUMINANCE));
+}
+BY_THRESHOLD(three_node)
 
 // Unreal's: the luminance above the threshold, of which 1 more is stored (Epic Games, "Bloom").
-vec4 unreal_factor(vec3 colour)
+vec2 unreal_share(vec3 colour)
 {
     float share = dot(colour, LUMINANCE) + 1.0 - params.threshold;
-    return vec4(larger(share, 0.0) * larger(1.0, share) * LUMINANCE, clamp(share, 0.0, 1.0));
+    return vec2(share, larger(share, 0.0) * larger(1.0, share));
 }
-BY_FACTOR(unreal)
+
+vec4 unreal_factor(vec3 colour)
+{
+    vec2 share = unreal_share(colour);
+    return vec4(share.y * LUMINANCE, clamp(share.x, 0.0, 1.0));
+}
+
+vec2 unreal_slopes(vec3 colour)
+{
+    return vec2(-unreal_share(colour).y, 0.0);
+}
+BY_THRESHOLD(unreal)
 
 // Bevy's colours have a floor before the threshold (bevyengine/bevy v0.19.1, bloom.wgsl).
 const float BEVY_FLOOR = 1e-4;
 
-vec4 held_factor(vec3 colour)
+Soft held_knee(float brightness)
 {
-    return kneed_factor(colour, 0.0, 4.0 * (params.threshold * params.knee + 1e-5), 1e-5);
+    return knee_with(brightness, 0.0, 4.0 * (params.threshold * params.knee + 1e-5), 1e-5);
 }
-BY_FACTOR(held)
+BY_KNEE(held)
 
 vec4 bevy(vec4 value)
 {
@@ -245,6 +349,13 @@ vec4 back_bevy(vec4 value, vec4 cotangent)
     cotangent = back_held(vec4(max(value.rgb, vec3(BEVY_FLOOR)), value.a), cotangent);
     return vec4(cotangent.rgb * larger(value, vec4(BEVY_FLOOR)).rgb, cotangent.a);
 }
+
+#ifdef SUMS
+vec4 by_bevy(vec4 value, vec4 cotangent)
+{
+    return by_held(vec4(max(value.rgb, vec3(BEVY_FLOOR)), value.a), cotangent);
+}
+#endif
 
 // Godot's (godotengine/godot, copy.glsl @ 0a5efd02df51): brighter samples of the frame weigh less, against fireflies,
 // and the blurred frame is divided by what is left.
@@ -283,14 +394,33 @@ vec4 exposed(vec4 sum)
     return value;
 }
 
+// How far a colour is from the threshold to the full glow, 0 to 1. A scale of 0 means a step.
+float glow_scale()
+{
+    return max(params.threshold_scale, 1e-6);
+}
+
+float glow_place(vec3 colour)
+{
+    return clamp((largest(colour) - params.threshold) / glow_scale(), 0.0, 1.0);
+}
+
+float glow_share(float place)
+{
+    return place * place * (3.0 - 2.0 * place);
+}
+
+// The slope of the factor by the brightest channel.
+float glow_slope(float place)
+{
+    return larger(glow_share(place), params.glow_bloom) * 6.0 * place * (1.0 - place) / glow_scale();
+}
+
 // The factor of what is above the threshold, in alpha, and its derivatives by the channels.
 vec4 glow_factor(vec3 colour)
 {
-    float brightest = max(colour.r, max(colour.g, colour.b)), scale = max(params.threshold_scale, 1e-6);
-    // A scale of 0 means a step.
-    float t = clamp((brightest - params.threshold) / scale, 0.0, 1.0), share = t * t * (3.0 - 2.0 * t);
-    float slope = larger(share, params.glow_bloom) * 6.0 * t * (1.0 - t) / scale;
-    return vec4(slope * shares_of_brightest(colour), max(share, params.glow_bloom));
+    float place = glow_place(colour);
+    return vec4(glow_slope(place) * shares_of_brightest(colour), max(glow_share(place), params.glow_bloom));
 }
 
 // What glows of it.
@@ -311,6 +441,18 @@ vec4 back_glowing(vec4 sum, vec4 cotangent)
     return back_divided(sum, params.strength * cotangent, -1.0);
 }
 
+#ifdef SUMS
+vec4 by_glowing(vec4 sum, vec4 cotangent)
+{
+    vec4 value = exposed(sum);
+    cotangent.rgb *= larger(vec4(params.luminance_cap), glow_factor(value.rgb).a * value).rgb;
+    float place = glow_place(value.rgb), slope = glow_slope(place);
+    float by_scale = params.threshold_scale > 1e-6 ? -slope * place : 0.0;
+    return inner_product(cotangent, value)
+         * vec4(-slope, by_scale, larger(params.glow_bloom, glow_share(place)), 0.0);
+}
+#endif
+
 #define CALL_POINT(name, number, function) \
     if (point == name) \
         return function(value);
@@ -329,3 +471,15 @@ vec4 back_point(int point, vec4 value, vec4 cotangent)
     POINTS(CALL_SLOPE)
     return cotangent;
 }
+
+#ifdef SUMS
+#define CALL_THRESHOLD(name, number, function) \
+    if (point == name) \
+        return by_##function(value, cotangent);
+
+vec4 by_point(int point, vec4 value, vec4 cotangent)
+{
+    THRESHOLD_POINTS(CALL_THRESHOLD)
+    return vec4(0.0);
+}
+#endif

@@ -50,17 +50,27 @@ Soft soft_threshold(float brightness, float threshold, float width, float diviso
 }
 
 // The factor, in alpha, and its derivatives by the channels.
-vec4 soft_factor(vec3 colour, float threshold, float width, float divisor, float least)
+vec4 soft_factor(Soft soft, vec3 colour)
 {
-    Soft soft = soft_threshold(largest(colour), threshold, width, divisor, least);
     return vec4(soft.by_brightness * shares_of_brightest(colour), soft.factor);
 }
 
-// The same of the setting `knee`.
-vec4 knee_factor(vec3 colour, float threshold, float knee)
+// The derivatives of the factor by threshold and knee, whose product is the width or a part of it.
+vec2 by_threshold_and_knee(Soft soft, float threshold, float knee)
+{
+    return vec2(soft.by_threshold + knee * soft.by_width, threshold * soft.by_width);
+}
+
+// The factor of the setting `knee`.
+Soft knee_of(vec3 colour, float threshold, float knee)
 {
     float width = threshold * knee;
-    return soft_factor(colour, threshold, width, 4.0 * width + 1e-5, 1e-5);
+    return soft_threshold(largest(colour), threshold, width, 4.0 * width + 1e-5, 1e-5);
+}
+
+vec4 knee_factor(vec3 colour, float threshold, float knee)
+{
+    return soft_factor(knee_of(colour, threshold, knee), colour);
 }
 
 // Hard: the colour if its luminance is above the threshold, else black.

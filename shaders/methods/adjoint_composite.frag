@@ -27,16 +27,9 @@ vec4 cotangent_by(int by)
 
 #ifdef SUMS
 
-ivec2 summed_size()
+vec4 summed()
 {
-    return textureSize(cotangents, 0);
-}
-
-void add_pixel(inout vec4 sum, inout vec4 squares)
-{
-    vec4 values = cotangent_by(BY_VALUES);
-    sum += values;
-    squares += values * values;
+    return cotangent_by(BY_VALUES);
 }
 
 #else

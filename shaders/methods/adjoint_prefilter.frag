@@ -1,6 +1,7 @@
 // The cotangents of what a pass with PREFILTER_BLOCK combines, of STACKED_SAMPLES from number FIRST_SAMPLE on: of its
 // kernels; with BY_TAPS of its taps, which have point functions or weights of their own; of a mean, whose kernels all
-// have a share of them, of the mean. Or the cotangents of the mask.
+// have a share of them, of the mean. Or the cotangents of the mask, or those of a threshold by what it reads, whose sums
+// are the derivatives.
 #include "lib/sampling.glsl"
 
 UNIFORM_BLOCK(PREFILTER_BLOCK);
@@ -9,12 +10,31 @@ UNIFORM_BLOCK(PREFILTER_BLOCK);
 SAMPLED_IMAGE(SLOT_SOURCE, source);
 SAMPLED_IMAGE(SLOT_COTANGENTS, cotangents);
 
+#ifdef SUMS
+#include "lib/sums.glsl"
+#else
 #define STACKED STACKED_SAMPLES
 #define STACKED_HEIGHT params.target_height
 #include "lib/fullscreen.glsl"
-#include "lib/mask.glsl"
 #include "lib/adjoint.glsl"
+#endif
+#include "lib/mask.glsl"
+#include "lib/target_cotangents.glsl"
 #include "lib/prefilter_taps.glsl"
+
+#ifdef SUMS
+
+vec4 summed()
+{
+    Place place = PLACE_IN(source);
+    vec4 cotangent = mask_value() * cotangent_of_target();
+    // What they would be multiplied by may be infinite.
+    if (cotangent == vec4(0.0))
+        return vec4(0.0);
+    return by_point(POINT_AFTER, combined(samples_of(taps_at(place), place.part), kernel_count()), cotangent);
+}
+
+#else
 
 vec4 taps[MAX_SET_TAPS], result, cotangent;
 Samples samples;
@@ -45,9 +65,7 @@ void start()
     taps = taps_at(place);
     samples = samples_of(taps, place.part);
     result = combined(samples, kernel_count());
-    cotangent = texelFetch(cotangents, PIXEL, 0);
-    if (ALPHA != ALPHA_BLUR)
-        cotangent.a = 0.0;
+    cotangent = cotangent_of_target();
 }
 
 vec4 shade()
@@ -63,3 +81,5 @@ vec4 shade()
         return gathered(back_tap(number, by_combined));
     return gathered(back_combined(samples, kernel_count(), number, by_combined));
 }
+
+#endif

@@ -6,15 +6,8 @@ SAMPLED_IMAGE(SLOT_COTANGENTS, cotangents);
 
 #include "lib/sums.glsl"
 
-ivec2 summed_size()
-{
-    return textureSize(cotangents, 0);
-}
-
-void add_pixel(inout vec4 sums, inout vec4 squares)
+vec4 summed()
 {
     vec4 cotangent = texelFetch(cotangents, PIXEL, 0);
-    vec2 products = vec2(dot(cotangent, texelFetch(level, PIXEL, 0)), dot(cotangent, texelFetch(sum, PIXEL, 0)));
-    sums.xy += products;
-    squares.xy += products * products;
+    return vec4(dot(cotangent, texelFetch(level, PIXEL, 0)), dot(cotangent, texelFetch(sum, PIXEL, 0)), 0.0, 0.0);
 }

@@ -16,6 +16,7 @@ SAMPLED_IMAGE(SLOT_COTANGENTS, cotangents);
 #include "lib/adjoint.glsl"
 #endif
 #include "lib/mask.glsl"
+#include "lib/target_cotangents.glsl"
 
 vec4 reduced()
 {
@@ -24,28 +25,14 @@ vec4 reduced()
     return within ? fetch_within(image, place) : sample_at(image, place, vec2(0.0), SAMPLING);
 }
 
-vec4 cotangent_of_target()
-{
-    vec4 cotangent = texelFetch(cotangents, PIXEL, 0);
-    return ALPHA == ALPHA_BLUR ? cotangent : vec4(cotangent.rgb, 0.0);
-}
-
 #ifdef SUMS
 
-ivec2 summed_size()
-{
-    return ivec2(params.target_width, params.target_height);
-}
-
-void add_pixel(inout vec4 sum, inout vec4 squares)
+vec4 summed()
 {
     vec4 colour = reduced();
-    float width = params.threshold * params.knee;
-    Soft soft = soft_threshold(largest(colour.rgb), params.threshold, width, 4.0 * width + 1e-5, 1e-5);
-    vec3 values = vec3(soft.by_threshold + params.knee * soft.by_width, params.threshold * soft.by_width, soft.factor);
-    values *= inner_product(cotangent_of_target(), colour) * mask_value();
-    sum.rgb += values;
-    squares.rgb += values * values;
+    Soft soft = knee_of(colour.rgb, params.threshold, params.knee);
+    vec3 values = vec3(by_threshold_and_knee(soft, params.threshold, params.knee), soft.factor);
+    return vec4(values * (inner_product(cotangent_of_target(), colour) * mask_value()), 0.0);
 }
 
 #else

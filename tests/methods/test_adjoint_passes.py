@@ -279,6 +279,81 @@ def test_fields_of_the_composite_are_sums(renderer: Renderer, method: str) -> No
         assert np.allclose(fields[field], expected[field], rtol=1e-4, atol=1e-4), field
 
 
+#: Settings of published methods, and the fields that their thresholds read.
+THRESHOLDS: dict[str, tuple[Any, tuple[str, ...]]] = {
+    "kino": (vkbloom.KinoBloom(threshold=0.6), ("threshold", "knee")),
+    "kino median": (
+        vkbloom.KinoBloom(threshold=0.6, knee=0.0, anti_flicker=True),
+        ("threshold", "knee"),
+    ),
+    "bevy": (vkbloom.BevyBloom(threshold=0.5, knee=0.4), ("threshold", "knee")),
+    "urp": (
+        vkbloom.UrpBloom(threshold=0.5, knee=0.4, tint=(0.9, 0.4, 0.7)),
+        ("threshold", "knee"),
+    ),
+    "playcanvas": (vkbloom.PlayCanvasBloom(threshold=0.5), ("threshold",)),
+    # Its curve has a kink at 1.
+    "ppv2": (vkbloom.PostProcessingBloom(threshold=1.0), ("threshold", "knee")),
+    "ppv2 dark": (vkbloom.PostProcessingBloom(threshold=0.5), ("threshold", "knee")),
+    "three": (vkbloom.ThreeBloom(threshold=0.5, smooth_width=0.7), ("threshold", "smooth_width")),
+    "three node": (
+        vkbloom.ThreeBloom(variant="node", threshold=0.5, smooth_width=0.7),
+        ("threshold", "smooth_width"),
+    ),
+    "pmndrs": (vkbloom.PmndrsBloom(threshold=0.4, smoothing=0.9), ("threshold", "smoothing")),
+    "pmndrs step": (vkbloom.PmndrsBloom(threshold=0.4, smoothing=0.0), ("threshold", "smoothing")),
+    "unreal": (vkbloom.UnrealBloom(threshold=0.3), ("threshold",)),
+    "filament": (vkbloom.FilamentBloom(threshold=0.5, highlight=10.0), ("threshold", "highlight")),
+    "godot": (
+        vkbloom.GodotBloom(threshold=0.5, threshold_scale=0.8, glow_bloom=0.2),
+        ("threshold", "threshold_scale", "glow_bloom"),
+    ),
+    "godot step": (
+        vkbloom.GodotBloom(threshold=0.5, threshold_scale=0.0, luminance_cap=1.5, exposure=0.4),
+        ("threshold", "threshold_scale", "glow_bloom"),
+    ),
+    "blender": (BlenderGlare(threshold=0.5, smoothness=0.3), ("threshold", "smoothness")),
+    "blender ends": (
+        BlenderGlare(type="ghosts", threshold=0.2, smoothness=0.7, maximum=0.5, quality="medium"),
+        ("threshold", "smoothness"),
+    ),
+    "blender hard": (
+        BlenderGlare(type="streaks", threshold=0.2, smoothness=0.0, maximum=0.5),
+        ("threshold", "smoothness"),
+    ),
+}
+
+
+@pytest.mark.parametrize("name", THRESHOLDS)
+def test_fields_of_published_thresholds_are_sums(renderer: Renderer, name: str) -> None:
+    settings, fields = THRESHOLDS[name]
+    settings = settings.replace(**SINGLE)
+    image = 2 * random_image(45, 70, channels=4, seed=1).astype(np.float32)
+    image[3, 4, 1], image[5:9, 6:9], image[9, 9] = np.nan, 0.0, -1.0
+    mask = random_image(45, 70, channels=1, seed=3)[..., 0].astype(np.float32)
+    for given, alpha in (({}, "keep"), ({"mask": mask}, "blur")):
+        chosen = settings.replace(alpha=alpha)
+        cotangents = {"final": np.random.default_rng(2).random(image.shape).astype(np.float32)}
+        passes = Passes(renderer, Inputs(image, **given), chosen, cotangents)
+        running = passes.submit("all", fields)
+        assert running
+        assert ".by_own_threshold" in [output for output, *_ in running.plan.outputs]
+        found = running.sums(min_share=0.0)
+        expected = reference.vjp(image, chosen, **given)[1](cotangents)
+        for field in fields:
+            assert np.allclose(found[field], expected[field], rtol=1e-4, atol=1e-4), field
+
+
+@pytest.mark.parametrize("preset", vkbloom.presets)
+def test_sums_of_large_images_have_plans(renderer: Renderer, preset: str) -> None:
+    """With the images of several passes that add up, and of all levels."""
+    image = np.zeros((700, 1100, 3), np.float32)
+    settings = in_floats(vkbloom.presets[preset])
+    source = Inputs(image).source((image,))
+    plan = renderer._core.plan(source, settings, None, ("final",), "all")
+    assert plan is not None
+
+
 LEARNED: dict[str, Any] = {"threshold": 0.4, "knee": 0.3, "intensity": 0.7}
 EXPOSED = ("threshold", "intensity", "exposure")
 #: Settings, fields that are learned, and the sums that these need. Light is what is above the

@@ -217,9 +217,38 @@ def test_cotangents_that_are_not_finite_reach_the_derivatives(
     image, cotangent = tensor(7, 9, 3, dtype=dtype), torch.ones(7, 9, 3, dtype=dtype)
     cotangent[3, 4, 1] = value
     module = vkbloom_torch.Bloom(SETTINGS, learn=("intensity", "knee"), renderer=renderer)
-    module(image).backward(cotangent.to(DEVICE))
-    assert not image.grad[3, 4].isfinite().all()
-    assert not any(parameter.grad.isfinite() for parameter in module.parameters())
+    for place in ("cpu", DEVICE):
+        module.to(place)(image).backward(cotangent.to(DEVICE))
+        assert not image.grad[3, 4].isfinite().all()
+        assert not any(parameter.grad.isfinite() for parameter in module.parameters())
+        module.zero_grad()
+
+
+@pytest.mark.parametrize(
+    ("settings", "learn"),
+    [
+        (SETTINGS, ("knee", "intensity")),
+        (SETTINGS.replace(intensity=0.0), ("intensity", "threshold")),
+        (vkbloom.Separable(threshold=0.2, exposure=0.5), ("exposure", "threshold")),
+        (
+            vkbloom.presets["bevy_natural"],
+            ("low_frequency_boost", "intensity", "high_pass_frequency"),
+        ),
+    ],
+)
+def test_derivatives_are_the_same_where_parameters_are_on_the_gpu(
+    renderer: Renderer, settings: vkbloom.Settings, learn: tuple[str, ...]
+) -> None:
+    """Sums are combined there, so that the host does not wait for them."""
+    module = vkbloom_torch.Bloom(settings, learn=learn, renderer=renderer)
+    images, cotangents = tensor(2, 37, 29, 3), tensor(2, 37, 29, 3, seed=2, requires_grad=False)
+    for by_images in (True, False):
+        found = []
+        for place in ("cpu", DEVICE):
+            module.to(place).zero_grad()
+            module(images.detach().requires_grad_(by_images)).backward(cotangents)
+            found.append([one.grad.cpu().clone() for one in module.parameters()])
+        torch.testing.assert_close(*found, rtol=1e-6, atol=0.0)
 
 
 def test_an_empty_batch_is_empty(renderer: Renderer) -> None:

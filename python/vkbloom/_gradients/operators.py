@@ -16,7 +16,7 @@ import numpy as np
 
 from vkbloom import _core
 from vkbloom._extras import import_extra
-from vkbloom._gradients.passes import MIN_SHARE, in_floats
+from vkbloom._gradients.passes import MIN_SHARE, DeviceGradients, device_fields, in_floats
 from vkbloom._gradients.pulling import pull_each, undefined
 from vkbloom._image_arguments import check_mask
 from vkbloom._psf.values import ARRAYS, ArrayValue
@@ -362,7 +362,18 @@ def _pull_on_device(call: _Call, cotangent: Any, by_images: bool, stream: int) -
         )
         for index in range(images.shape[0])
     )
-    yield from pull_each(renderer, settings, sequence, call.fields, "cuda", images=by_images)
+    # Beside values on the host, or derivatives that the host computes, the host waits.
+    stays = call.values is not None and call.values.is_cuda
+    stays = stays and device_fields(settings).issuperset(call.fields)
+    yield from pull_each(
+        renderer,
+        settings,
+        sequence,
+        call.fields,
+        "cuda",
+        images=by_images,
+        sums_destination="cuda" if stays else "host",
+    )
 
 
 def _settings_of(call: _Call) -> Settings:
@@ -488,7 +499,7 @@ def _bloom_backward(cotangent: Any, by_images: bool, *given: Any) -> tuple[Any, 
     refuse_capture(call.image)
     images = call.images if by_images else {}
     derivatives: dict[str, list[Any]] = {name: [] for name in images}
-    sums = {name: np.zeros(shape) for name, shape in call.fields.items()}
+    values: list[Any] = []
     stream = None
     # An empty batch has nothing to take to the device.
     if call.on_device and call.image.numel() > 0:
@@ -503,20 +514,34 @@ def _bloom_backward(cotangent: Any, by_images: bool, *given: Any) -> tuple[Any, 
     for gradients in pulled:
         for name, parts in derivatives.items():
             parts.append(_as_tensor(gradients[name], stream))
-        # Of numbers, the host waits for the device.
-        for name in sums:
-            sums[name] += gradients[name]
-    values = torch.empty(0)
-    if call.values is not None:
-        each = np.concatenate([total.reshape(-1) for total in sums.values()])
-        values = torch.from_numpy(each).to(call.values)
+        if call.values is not None:
+            values.append(_by_values(gradients, call, stream))
     return (
         *(
             _join(derivatives[name], images[name]) if name in images else torch.empty(0)
             for name in ("image", "mask", "emission")
         ),
-        values,
+        torch.empty(0) if call.values is None else _sum(values, call.values),
     )
+
+
+def _by_values(gradients: Any, call: _Call, stream: int | None) -> Any:
+    """Return the derivatives by values as float64, combined where the sums are."""
+    if isinstance(gradients, DeviceGradients) and gradients.combinations:
+        sums = gradients.combinations(call.fields)
+        if sums.fields == tuple(call.fields):
+            by_channel = torch.cat([_as_tensor(part, stream)[0, 0] for part in sums.arrays])
+            factors = torch.from_numpy(sums.factors).to(by_channel.device, non_blocking=True)
+            # What a field does not need may be infinite.
+            return torch.where(factors == 0, 0, factors * by_channel).sum(1)
+    # Of numbers, the host waits for the device.
+    each = [np.asarray(gradients[name], np.float64).reshape(-1) for name in call.fields]
+    return torch.from_numpy(np.concatenate(each))
+
+
+def _sum(parts: list[Any], like: Any) -> Any:
+    """Return the sum of tensors as one of the kind of another; without any, 0."""
+    return (sum(parts[1:], parts[0]) if parts else torch.zeros_like(like)).to(like)
 
 
 def _as_tensor(part: Any, stream: int | None) -> Any:

@@ -5,13 +5,13 @@ from __future__ import annotations
 import functools
 from collections.abc import Callable, Collection, Container, Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final, cast
+from typing import TYPE_CHECKING, Any, Final, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom import _core
-from vkbloom._gradients.shares import share_fields, sums_by_shares
+from vkbloom._gradients.shares import factors_by_shares, share_fields
 from vkbloom._locks import ProcessLock
 from vkbloom._renderer import requests
 from vkbloom._renderer.device_arrays import Destination, ImportedArray, on_host, place
@@ -28,15 +28,10 @@ _MAX_LEVELS: Final = 7
 #: The framebuffers of derivatives by images.
 _BY_IMAGES: Final = (".by_image", ".by_emission", ".by_mask")
 _BY_LIGHT: Final = ".by_light"
-#: The fields whose derivatives are the channels of a sum. The intensity's is divided by it in the
-#: sum by light.
-_SUMS: Final = {
-    ".by_composite": ("intensity", "exposure", "reference_white"),
-    ".by_threshold": ("threshold", "knee"),
-    _BY_LIGHT: ("threshold", "knee", "intensity"),
-}
 #: The weights of a field of kernels.
 WEIGHTS: Final = "psf.weights"
+#: The fields that the composite reads.
+_OF_COMPOSITE: Final = ("intensity", "exposure", "reference_white")
 #: With the number of the sum of two levels, from the largest on.
 _BY_SHARES: Final = ".by_shares_"
 #: A sum that is less than this, relative to the root of the sum of its squares, has lost digits.
@@ -50,6 +45,18 @@ def check_finite(cotangents: Mapping[str, NDArray[Any] | ImportedArray]) -> None
     for name, part in cotangents.items():
         if isinstance(part, ImportedArray) and not np.isfinite(part.numpy()).all():
             raise ValueError(f"cotangents: {name!r} has NaN or infinity")
+
+
+class Sums(NamedTuple):
+    """Sums of the device, and the fields whose derivatives are combinations of them.
+
+    - `factors`: For each field a row, with a factor for each channel of each array.
+    - `arrays`: Of shape (2, 1, channels): the sums, and those of the squares of their terms.
+    """
+
+    fields: tuple[str, ...]
+    factors: NDArray[np.float64]
+    arrays: tuple[NDArray[Any], ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,17 +104,28 @@ class Running:
 
         A sum that is less than `min_share` of the root of the sum of its squares is left out.
         """
-        results: dict[str, NDArray[np.float32]] = {}
-        wanted = device_fields(self.passes.settings)
-        if not wanted:
-            return results
         running = self if self.results in ("sums", "all") else self.passes.submit("sums")
-        totals = running.by_name() if running else {}
-        for name, (total, square) in _sums_of(self.passes.settings, totals).items():
+        if running is None:
+            return {}
+        sums = running.combinations(device_fields(self.passes.settings))
+        kinds = [on_host(array)[:, 0].astype(np.float64) for array in sums.arrays]
+        # Without fields there are no sums.
+        by_channel, squares = np.concatenate([np.zeros((2, 0)), *kinds], axis=1)
+        results: dict[str, NDArray[np.float32]] = {}
+        for name, factors in zip(sums.fields, sums.factors, strict=True):
+            # What a field does not need may be infinite.
+            used = factors != 0
+            total = factors[used] @ by_channel[used]
+            square = factors[used] ** 2 @ squares[used]
             # Infinite sums are left to the reference.
-            if name in wanted and np.isfinite(square) and total**2 >= min_share**2 * square:
+            if np.isfinite(square) and total**2 >= min_share**2 * square:
                 results[name] = np.asarray(total, np.float32)
         return results
+
+    def combinations(self, fields: Collection[str]) -> Sums:
+        """Return the sums of these passes, and the fields of some whose derivatives they give."""
+        totals = {name: array for name, array in self.by_name().items() if name not in _BY_IMAGES}
+        return _sums_of(self.passes.settings, totals, fields)
 
     def weights(self) -> dict[str, NDArray[np.float32]]:
         """Return the derivative by `WEIGHTS`, if there are any, unless the reference has to."""
@@ -133,6 +151,7 @@ class Passes:
 
     - `cotangents`: Checked, by framebuffer; those on the device but for NaN and infinity.
     - `destination`: Where the derivatives by images go.
+    - `sums_destination`: Where the sums go.
     """
 
     renderer: Renderer
@@ -140,6 +159,7 @@ class Passes:
     settings: Settings
     cotangents: Mapping[str, NDArray[Any] | ImportedArray]
     destination: Destination = "host"
+    sums_destination: Destination = "host"
 
     def submit(
         self, results: DerivativeKind = "images", fields: Collection[str] | None = None
@@ -168,9 +188,10 @@ class Passes:
             plan = made(_outputs_for(self.settings, plan, fields))
         if plan is None:
             return None
-        # The host reads the sums.
+        # The host reads weights.
+        others = "host" if results == "weights" else self.sums_destination
         arrays = tuple(
-            new_memory(core, shape, dtype, self.destination if name in _BY_IMAGES else "host")
+            new_memory(core, shape, dtype, self.destination if name in _BY_IMAGES else others)
             for name, shape, dtype in plan.outputs
         )
         submission = None
@@ -191,11 +212,9 @@ def _outputs_for(
     if left & {*share_fields(settings)}:
         return None
     chosen = []
-    # The sum by light needs no bloom.
-    for kind in reversed(_SUMS):
-        given = left.intersection(_SUMS[kind])
-        if kind == _BY_LIGHT and settings.value_of("intensity") == 0:
-            given -= {"intensity"}
+    # The sum by light, which needs no bloom, comes before others.
+    for kind, factors in reversed(_channels(settings).items()):
+        given = left.intersection(name for name, factor in factors.items() if factor is not None)
         if kind in names and given:
             chosen.append(kind)
             left -= given
@@ -203,28 +222,45 @@ def _outputs_for(
     return tuple([name for name in names if name in wanted])
 
 
+def _channels(settings: Settings) -> dict[str, dict[str, float | None]]:
+    """Return the fields of the channels of each sum, and what is multiplied for a derivative.
+
+    None: it does not have the derivative.
+    """
+    threshold: dict[str, float | None] = {"threshold": 1.0, "knee": 1.0}
+    intensity = settings.value_of("intensity")
+    return {
+        ".by_composite": dict.fromkeys(_OF_COMPOSITE, 1.0),
+        ".by_threshold": threshold,
+        ".by_own_threshold": {**settings._threshold_slopes()},
+        # The intensity's derivative, times the intensity.
+        _BY_LIGHT: threshold | {"intensity": 1.0 / intensity if intensity != 0 else None},
+    }
+
+
 def _sums_of(
-    settings: Settings, totals: Mapping[str, NDArray[Any]]
-) -> dict[str, tuple[float, float]]:
-    """Return the sums of the device by field, each with the sum of the squares of its terms."""
-    found: dict[str, tuple[float, float]] = {}
-    for kind, names in _SUMS.items():
-        if kind in totals:
-            pairs = on_host(totals[kind])[:, 0].astype(np.float64).T
-            for name, (total, square) in zip(names, pairs, strict=False):
-                scale = 1.0
-                if (kind, name) == (_BY_LIGHT, "intensity"):
-                    scale = settings.value_of("intensity")
-                if scale != 0:
-                    found.setdefault(name, (total / scale, square / scale**2))
-    shares = {name: on_host(totals[name]) for name in totals if name.startswith(_BY_SHARES)}
-    if shares:
-        levels = [shares[f"{_BY_SHARES}{number}"][:, 0, :2] for number in range(len(shares))]
-        for name, (total, square) in sums_by_shares(settings, levels).items():
-            # The composite reads the field, too.
-            others = found.get(name, (0.0, 0.0))
-            found[name] = total + others[0], square + others[1]
-    return found
+    settings: Settings, totals: Mapping[str, NDArray[Any]], fields: Collection[str]
+) -> Sums:
+    """Return the sums of the device with what they are multiplied by for each of the fields."""
+    starts = np.cumsum([0, *(array.shape[-1] for array in totals.values())])
+    columns = dict(zip(totals, starts[:-1].tolist(), strict=True))
+    found: dict[str, NDArray[np.float64]] = {}
+    for kind, by_field in _channels(settings).items():
+        for channel, (name, factor) in enumerate(by_field.items() if kind in totals else ()):
+            if factor is not None and name not in found:
+                found[name] = np.zeros(starts[-1])
+                found[name][columns[kind] + channel] = factor
+    levels = [name for name in totals if name.startswith(_BY_SHARES)]
+    for name, pairs in (factors_by_shares(settings) if levels else {}).items():
+        # The composite reads the field, too.
+        row = found.setdefault(name, np.zeros(starts[-1]))
+        for number, pair in enumerate(pairs):
+            start = columns[f"{_BY_SHARES}{number}"]
+            row[start : start + 2] = pair
+    # Other derivatives are left to the reference.
+    known = [name for name in fields if name in found and np.isfinite(found[name]).all()]
+    factors = np.array([found[name] for name in known]).reshape(len(known), starts[-1])
+    return Sums(tuple(known), factors, tuple(totals.values()))
 
 
 def _level(cotangent: NDArray[Any] | ImportedArray) -> NDArray[Any] | ImportedArray:
@@ -253,15 +289,17 @@ def on_device(renderer: Renderer, settings: Settings) -> bool:
 def device_fields(settings: Settings) -> frozenset[str]:
     """Return the fields by which the device has the derivatives.
 
-    These are what only the composite, the threshold pass, or the shares of levels read. Published
-    methods have thresholds of their own. With glare, the intensity is that of the sum before the
-    composite.
+    These are what only the composite, the threshold, or the shares of levels read. With glare, the
+    intensity is that of the sum before the composite, and stages read the threshold of a published
+    method, too.
     """
     if {settings.tonemap, settings.encoding} & _STEEP:
         return frozenset()
-    known = {*_SUMS[".by_composite"]} - settings._fields_before_composite
+    known = {*_OF_COMPOSITE} - settings._fields_before_composite
     if not settings.published:
-        known |= {*_SUMS[".by_threshold"]}
+        known |= {"threshold", "knee"}
+    elif settings.threshold is not None and not settings.glare:
+        known |= settings._threshold_slopes().keys()
     known |= {*share_fields(settings)}
     if settings.glare:
         known -= {"intensity"}
@@ -277,6 +315,7 @@ class DeviceGradients(Mapping[str, NDArray[Any]]):
     - `names`: All names, in the order of the reference.
     - `sources`: Names, and what returns their derivatives or leaves some to the reference, which
       is the last source and has all names.
+    - `combinations`: What returns the sums for some fields, if these are on the device.
     """
 
     def __init__(
@@ -284,11 +323,13 @@ class DeviceGradients(Mapping[str, NDArray[Any]]):
         known: Mapping[str, NDArray[Any]],
         names: Iterable[str],
         *sources: tuple[Container[str], Callable[[], Mapping[str, NDArray[Any]]]],
+        combinations: Callable[[Collection[str]], Sums] | None = None,
     ) -> None:
         self._known = dict(known)
         self._names = tuple(names)
         self._sources = list(sources)
         self._lock = ProcessLock()
+        self.combinations = combinations
 
     def __getitem__(self, name: str) -> NDArray[Any]:
         check_known(name, self._names)

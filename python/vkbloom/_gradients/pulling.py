@@ -220,14 +220,15 @@ def pull_each(
     destination: Destination = "host",
     *,
     images: bool = True,
+    sums_destination: Destination = "host",
     min_share: float = 0.0,
 ) -> Iterator[Derivatives]:
     """Yield the derivatives of each image. The device works on later ones meanwhile.
 
     Without `images`, those by images are not computed unless they are read.
 
-    The host waits for those on a GPU only if some by `fields` are there, too. So cotangents may be
-    NaN and infinite, and so are the derivatives then. A sum by a field has the accuracy of single
+    The host waits for those on a GPU only where it reads one by `fields`. So cotangents may be NaN
+    and infinite, and so are the derivatives then. A sum by a field has the accuracy of single
     floats relative to the root of the sum of its squares.
     """
     has_sums = not device_fields(settings).isdisjoint(fields)
@@ -236,7 +237,7 @@ def pull_each(
         kind = "sums" if has_sums else "weights"
     started: deque[Callable[[], Derivatives]] = deque()
     for inputs, cotangents in sequence:
-        adjoint = _Adjoint(renderer, inputs, settings, destination, min_share)
+        adjoint = _Adjoint(renderer, inputs, settings, destination, sums_destination, min_share)
         running = adjoint.passes(cotangents).submit(kind, fields if has_sums else None)
         started.append(functools.partial(adjoint.derivatives, cotangents, running))
         if len(started) == IMAGES_AHEAD:
@@ -253,12 +254,14 @@ class _Adjoint:
     inputs: Inputs
     settings: Settings
     destination: Destination
+    sums_destination: Destination = "host"
     min_share: float = MIN_SHARE
 
     def passes(self, cotangents: Checked) -> Passes:
         """Return the passes that take cotangents back."""
         floats = in_floats(self.settings)
-        return Passes(self.renderer, self.inputs, floats, cotangents, self.destination)
+        places = self.destination, self.sums_destination
+        return Passes(self.renderer, self.inputs, floats, cotangents, *places)
 
     def derivatives(self, cotangents: Checked, running: Running | None) -> Derivatives:
         """Return the derivatives of passes; None: those of the reference."""
@@ -272,6 +275,7 @@ class _Adjoint:
             ({WEIGHTS}, running.weights),
             (device_fields(self.settings), functools.partial(running.sums, self.min_share)),
             (names, functools.partial(self._by_reference, cotangents)),
+            combinations=running.combinations if self.sums_destination == "cuda" else None,
         )
 
     @functools.cached_property

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any, Final, NamedTuple
 
@@ -43,16 +43,13 @@ def share_fields(settings: Settings) -> tuple[str, ...]:
     return method.fields if method else ()
 
 
-def sums_by_shares(
-    settings: Settings, sums: Sequence[NDArray[Any]]
-) -> dict[str, tuple[float, float]]:
-    """Return the derivatives by these fields, each with the sum of the squares of its terms.
+def factors_by_shares(settings: Settings) -> dict[str, NDArray[np.float64]]:
+    """Return what sums are multiplied by for the derivatives by these fields.
 
-    - `sums`: Of up_0, up_1, ..., each of shape (2, 2): the sums of its cotangents times the level
-      of its size, and times itself; then those of the squares.
+    Each array has two factors for each of up_0, up_1, ...: of the sum of its cotangents times the
+    level of its size, and of that of its cotangents times itself.
     """
     method = _METHODS[settings.method]
-    (by_fine, by_sum), (fine_squares, sum_squares) = np.array(sums, np.float64).transpose(1, 2, 0)
     fine, coarse = _shares(method, settings, {})
     results = {}
     for name in method.fields:
@@ -60,13 +57,10 @@ def sums_by_shares(
         ends = [_shares(method, settings, {name: value + step}) for step in (_STEP, -_STEP)]
         of_fine, of_coarse = (ends[0] - ends[1]) / (2 * _STEP)
         # The sum without the level is the smaller one times its share. A share of 0 that changes
-        # leaves nothing to divide: then the derivative is not finite, and the reference has it.
+        # leaves nothing to divide: then the factor is not finite.
         with np.errstate(divide="ignore", invalid="ignore"):
             of_sum = np.where(of_coarse != 0.0, of_coarse / coarse, 0.0)
-            of_level = of_fine - of_sum * fine
-            total = of_level @ by_fine + of_sum @ by_sum
-            squares = of_level**2 @ fine_squares + of_sum**2 @ sum_squares
-        results[name] = float(total), float(squares)
+            results[name] = np.stack([of_fine - of_sum * fine, of_sum], axis=1)
     return results
 
 

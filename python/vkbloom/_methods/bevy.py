@@ -65,6 +65,7 @@ class BevyBloom(PublishedSettings):
     _level_height: ClassVar[str] = "max_mip_dimension"
     _knobs: ClassVar[tuple[str, ...]] = ("low_frequency_boost", "max_mip_dimension")
     _pass_sentences: ClassVar[Mapping[str, str]] = MappingProxyType({"down": HALVED_BY_13})
+    _threshold_fields: ClassVar[tuple[str, ...]] = ("threshold", "knee")
 
     knee: float = number_field(fixed="")
     composite: Composite = choice_field(("mix", "add"))

@@ -139,6 +139,7 @@ class BlenderGlare(WithKernel, PublishedSettings):
     shaping: ClassVar[tuple[str, ...]] = ("type", "quality", "version", "size", "kernel")
     #: `glow` is the node's output Highlights.
     _has_threshold_pass: ClassVar[bool] = True
+    _threshold_fields: ClassVar[tuple[str, ...]] = ("threshold", "smoothness")
 
     threshold: float | None = 1.0
     intensity: float = number_field(range=(0, 1))

@@ -58,6 +58,7 @@ class FilamentBloom(PublishedSettings):
     _pass_sentences: ClassVar[Mapping[str, str]] = MappingProxyType(
         {"down": "halves the size with 9 taps, or 13 of an odd size: small lights do not flicker"}
     )
+    _threshold_fields: ClassVar[tuple[str, ...]] = ("threshold", "highlight")
 
     threshold: float | None = 1.0
     intensity: float = number_field(default=0.1, range=(0, 1))

@@ -74,6 +74,7 @@ class GodotBloom(PublishedSettings):
     _knobs: ClassVar[tuple[str, ...]] = ("threshold", "strength", "glow_bloom")
     _fields_before_composite: ClassVar[frozenset[str]] = frozenset(("exposure",))
     _pass_sentences: ClassVar[Mapping[str, str]] = MappingProxyType({"down": BLURRED_DOWN})
+    _threshold_fields: ClassVar[tuple[str, ...]] = ("threshold", "threshold_scale", "glow_bloom")
 
     threshold: float | None = 1.0
     composite: Composite = choice_field(("screen", "soft_light", "add", "replace", "mix"))

@@ -51,6 +51,7 @@ class KinoBloom(PublishedSettings):
     _pass_sentences: ClassVar[Mapping[str, str]] = MappingProxyType(
         {"down": "halves the size by the mean of four taps"}
     )
+    _threshold_fields: ClassVar[tuple[str, ...]] = ("threshold", "knee")
 
     threshold: float | None = ((0.8 + 0.055) / 1.055) ** 2.4  # 0.8 in sRGB
     knee: float = number_field(fixed="", default=0.5)

@@ -46,6 +46,7 @@ class PlayCanvasBloom(PublishedSettings):
     method: ClassVar[str] = "playcanvas"
     _knobs: ClassVar[tuple[str, ...]] = ("threshold", "blur_level")
     _pass_sentences: ClassVar[Mapping[str, str]] = MappingProxyType({"down": HALVED_BY_13})
+    _threshold_fields: ClassVar[tuple[str, ...]] = ("threshold",)
 
     intensity: float = number_field(default=0.01, slider=(0, 0.1))
     blur_level: int = number_field(default=16, range=(1, 16))

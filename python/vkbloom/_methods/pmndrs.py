@@ -50,6 +50,7 @@ class PmndrsBloom(PublishedSettings):
     method: ClassVar[str] = "pmndrs"
     _knobs: ClassVar[tuple[str, ...]] = ("threshold", "radius")
     _pass_sentences: ClassVar[Mapping[str, str]] = MappingProxyType({"down": HALVED_BY_13})
+    _threshold_fields: ClassVar[tuple[str, ...]] = ("threshold", "smoothing")
 
     threshold: float | None = number_field(default=1.0, slider=(0, 4))
     composite: Composite = choice_field(("screen", "add"))
@@ -63,3 +64,6 @@ class PmndrsBloom(PublishedSettings):
             "smooth_width": max(self.smoothing, 1e-4),
             "threshold": None if self.threshold == self.smoothing == 0 else self.threshold,
         }
+
+    def _threshold_slopes(self) -> dict[str, float]:
+        return super()._threshold_slopes() | {"smoothing": float(self.smoothing > 1e-4)}

@@ -68,6 +68,7 @@ class ThreeBloom(PublishedSettings):
     method: ClassVar[str] = "three"
     _knobs: ClassVar[tuple[str, ...]] = ("threshold", "radius")
     _pass_sentences: ClassVar[Mapping[str, str]] = MappingProxyType({"down": BLURRED_DOWN})
+    _threshold_fields: ClassVar[tuple[str, ...]] = ("threshold", "smooth_width")
 
     threshold: float | None = 0.0
     intensity: float = number_field(default=3.0)

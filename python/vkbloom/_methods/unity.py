@@ -97,6 +97,7 @@ class UrpBloom(PublishedSettings):
     _pass_sentences: ClassVar[Mapping[str, str]] = MappingProxyType(
         {"down": "makes the next smaller level and blurs it"}
     )
+    _threshold_fields: ClassVar[tuple[str, ...]] = ("threshold", "knee")
 
     threshold: float | None = ((0.9 + 0.055) / 1.055) ** 2.4  # 0.9 in sRGB
     knee: float = number_field(fixed="", default=0.5)
@@ -228,6 +229,7 @@ class PostProcessingBloom(PublishedSettings):
     method: ClassVar[str] = "post_processing"
     _knobs: ClassVar[tuple[str, ...]] = ("threshold", "diffusion")
     _pass_sentences: ClassVar[Mapping[str, str]] = MappingProxyType({"down": HALVED_BY_13})
+    _threshold_fields: ClassVar[tuple[str, ...]] = ("threshold", "knee")
 
     threshold: float | None = number_field(default=1.0, slider=(0, 4))
     knee: float = number_field(fixed="", default=0.5)
@@ -245,3 +247,12 @@ class PostProcessingBloom(PublishedSettings):
             "anamorphism": self.anamorphic_ratio,
             "tint": self.color,
         }
+
+    def _threshold_slopes(self) -> dict[str, float]:
+        slopes = super()._threshold_slopes()
+        if self.threshold is not None:
+            # At a kink of the curve this is the mean of both sides. The truncated terms are 1e-10.
+            step = 1e-5
+            ends = _linear(self.threshold + step) - _linear(self.threshold - step)
+            slopes["threshold"] = ends / (2 * step)
+        return slopes

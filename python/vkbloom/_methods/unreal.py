@@ -58,6 +58,7 @@ class UnrealBloom(GaussianSum):
     _knobs: ClassVar[tuple[str, ...]] = ("size_scale",)
     boundary: ClassVar[str] = "edge"
     shaping: ClassVar[tuple[str, ...]] = ("sizes", "tints", "size_scale")
+    _threshold_fields: ClassVar[tuple[str, ...]] = ("threshold",)
 
     threshold: float | None = number_field(default=-1.0, range=(-1, MAX_HALF), slider=(-1, 4))
     intensity: float = number_field(default=0.675)

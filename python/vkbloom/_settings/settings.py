@@ -157,6 +157,8 @@ class Settings(Record):
     _level_height: ClassVar[str] = ""
     #: The fields of the composite that other passes read, too, but for shares of levels.
     _fields_before_composite: ClassVar[frozenset[str]] = frozenset()
+    #: The fields that the threshold of a published method reads, in the order of the core's sums.
+    _threshold_fields: ClassVar[tuple[str, ...]] = ()
     #: Whether `glow` is what has passed the threshold; other methods apply it in a later pass.
     _has_threshold_pass: ClassVar[bool] = True
     #: What the method's passes do, where that differs from `PASS_SENTENCES`.
@@ -269,6 +271,10 @@ class Settings(Record):
     def _core_values(self) -> dict[str, Any]:
         """Return what the core names or counts otherwise."""
         return {}
+
+    def _threshold_slopes(self) -> dict[str, float]:
+        """Return the slopes of what the core reads in place of `_threshold_fields`, by these."""
+        return dict.fromkeys(self._threshold_fields, 1.0)
 
     @property
     def _has_state(self) -> bool:
