@@ -9,7 +9,7 @@ import pytest
 
 from tests.scene.parts import Cubemap, Mesh
 from vkbloom import Scene, _core
-from vkbloom._gradients.passes import DeviceGradients, Passes, in_floats
+from vkbloom._gradients.passes import DeviceGradients, Passes, device_fields, in_floats
 from vkbloom._gradients.pulling import pull_each
 from vkbloom._renderer.adapter import bundled_driver
 from vkbloom._renderer.new_arrays import new_array, new_arrays
@@ -28,6 +28,7 @@ __all__ = [
     "bundled_driver",
     "change",
     "contents_arguments",
+    "device_fields",
     "frame_block",
     "frame_of",
     "image_source",

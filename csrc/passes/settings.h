@@ -15,8 +15,8 @@
     METHOD(BEVY, bevy, .published = true, .learns_shares = true) \
     METHOD(KINO, kino, .published = true) \
     METHOD(FILAMENT, filament, .published = true) \
-    METHOD(URP, urp, .published = true) \
-    METHOD(HDRP, hdrp, .published = true) \
+    METHOD(URP, urp, .published = true, .learns_shares = true) \
+    METHOD(HDRP, hdrp, .published = true, .learns_shares = true) \
     METHOD(THREE, three, .published = true) \
     METHOD(GODOT, godot, .published = true, .exposes_scene = true) \
     METHOD(BLENDER, blender, .published = true, .first = "frame", \
@@ -27,7 +27,8 @@
     METHOD(UNREAL, unreal, .published = true, .kernel_types = VKB_ALL_TYPES, \
            .sums_gaussians = true) \
     METHOD(HALATION, halation, .published = true, .kernel_types = VKB_ALL_TYPES) \
-    METHOD(PMNDRS, pmndrs, .published = true, .composite_screen = COMPOSITE_UNCLAMPED_SCREEN) \
+    METHOD(PMNDRS, pmndrs, .published = true, .learns_shares = true, \
+           .composite_screen = COMPOSITE_UNCLAMPED_SCREEN) \
     METHOD(BABYLON, babylon, .published = true, .min_weights = 1) \
     METHOD(PLAYCANVAS, playcanvas, .published = true) \
     METHOD(DARKTABLE, darktable, .published = true, \

@@ -13,7 +13,7 @@ from tests.device.abilities import has_linear_texels
 from tests.exhaustive import EXHAUSTIVE, some
 from tests.images import random_image
 from tests.methods.cases import METHODS, OTHERS, presets_of_low_levels
-from tests.planned import DeviceGradients, Inputs, Passes, in_floats
+from tests.planned import DeviceGradients, Inputs, Passes, device_fields, in_floats
 from tests.variants import open_variant
 from vkbloom import (
     BevyBloom,
@@ -259,8 +259,18 @@ def test_all_methods_and_stages_are_among_them() -> None:
 ONE_OF_EACH = {
     **{settings.method: settings for settings in vkbloom.presets.values()},
     "darktable": vkbloom.DarktableBloom(),
+    "urp": vkbloom.presets["unity_urp"],
     # A share of 0 that changes is left to the reference.
     "bevy": vkbloom.presets["photo"].replace(max_mip_dimension=64),
+}
+
+
+#: What sets the shares of levels.
+BY_SHARES: dict[str, tuple[str, ...]] = {
+    "bevy": ("low_frequency_boost", "low_frequency_boost_curvature", "high_pass_frequency"),
+    "urp": ("scatter",),
+    "hdrp": ("scatter",),
+    "pmndrs": ("radius",),
 }
 
 
@@ -268,18 +278,17 @@ ONE_OF_EACH = {
 def test_fields_of_the_composite_are_sums(renderer: Renderer, method: str) -> None:
     """And those of shares of levels, but not those that other passes read."""
     settings = ONE_OF_EACH[method].replace(**SINGLE, exposure=0.3, tonemap="none", encoding="none")
-    image = 4 * random_image(17, 26, channels=3, seed=1).astype(np.float32)
+    image = 4 * random_image(35, 54, channels=3, seed=1).astype(np.float32)
     cotangents = {"final": np.random.default_rng(2).random(image.shape).astype(np.float32)}
     running = Passes(renderer, Inputs(image), settings, cotangents).submit("sums")
     fields = running.sums(min_share=0.0) if running else {}
     expected = reference.vjp(image, settings)[1](cotangents)
     composite = {"intensity", "exposure", "reference_white"} - settings._fields_before_composite
-    boosts = ("low_frequency_boost", "low_frequency_boost_curvature", "high_pass_frequency")
-    for field in (*composite, *(boosts if method == "bevy" else ())):
+    for field in (*composite, *BY_SHARES.get(method, ())):
         assert np.allclose(fields[field], expected[field], rtol=1e-4, atol=1e-4), field
 
 
-#: Settings of published methods, and the fields that their thresholds read.
+#: Settings of published methods, and fields, of those that their thresholds read.
 THRESHOLDS: dict[str, tuple[Any, tuple[str, ...]]] = {
     "kino": (vkbloom.KinoBloom(threshold=0.6), ("threshold", "knee")),
     "kino median": (
@@ -302,6 +311,9 @@ THRESHOLDS: dict[str, tuple[Any, tuple[str, ...]]] = {
     ),
     "pmndrs": (vkbloom.PmndrsBloom(threshold=0.4, smoothing=0.9), ("threshold", "smoothing")),
     "pmndrs step": (vkbloom.PmndrsBloom(threshold=0.4, smoothing=0.0), ("threshold", "smoothing")),
+    "pmndrs one level": (vkbloom.PmndrsBloom(levels=1, radius=0.3), ("threshold", "radius")),
+    "urp dual": (vkbloom.UrpBloom(filter="dual", scatter=0.2), ("threshold", "knee")),
+    "urp kawase": (vkbloom.UrpBloom(filter="kawase", scatter=0.2), ("threshold", "knee")),
     "unreal": (vkbloom.UnrealBloom(threshold=0.3), ("threshold",)),
     "filament": (vkbloom.FilamentBloom(threshold=0.5, highlight=10.0), ("threshold", "highlight")),
     "godot": (
@@ -342,6 +354,46 @@ def test_fields_of_published_thresholds_are_sums(renderer: Renderer, name: str) 
         expected = reference.vjp(image, chosen, **given)[1](cotangents)
         for field in fields:
             assert np.allclose(found[field], expected[field], rtol=1e-4, atol=1e-4), field
+
+
+#: Settings, and fields that do not change their bloom.
+UNREAD: tuple[tuple[Any, tuple[str, ...]], ...] = (
+    (vkbloom.Pyramid(levels=2), ("knee",)),
+    (vkbloom.Separable(threshold=0.5), ("threshold", "knee")),
+    (vkbloom.KinoBloom(threshold=None), ("knee",)),
+    (vkbloom.ThreeBloom(threshold=None), ("smooth_width",)),
+    (vkbloom.GodotBloom(threshold=None), ("threshold_scale", "glow_bloom")),
+    (BlenderGlare(threshold=None), ("smoothness",)),
+    (vkbloom.FilamentBloom(threshold=None), ("highlight",)),
+    (vkbloom.UnrealBloom(threshold=-1.0), ("threshold",)),
+    (vkbloom.PlayCanvasBloom(threshold=0.0), ("threshold",)),
+    (vkbloom.PmndrsBloom(threshold=0.0, smoothing=0.0), ("threshold", "smoothing")),
+    (vkbloom.BabylonBloom(threshold=0.5), ("threshold",)),
+    (vkbloom.DarktableBloom(threshold=50.0), ("threshold",)),
+)
+
+
+@pytest.mark.parametrize(("settings", "fields"), UNREAD)
+def test_fields_that_change_nothing_need_no_sums(
+    renderer: Renderer, settings: Any, fields: tuple[str, ...]
+) -> None:
+    settings = settings.replace(**SINGLE)
+    image = 2 * random_image(15, 20, channels=3, seed=1).astype(np.float32)
+    passes = Passes(renderer, Inputs(image), settings, {"final": image})
+    expected = reference.vjp(image, settings)[1]({"final": image})
+    for results in ("all", "sums"):
+        running = passes.submit(results, fields)
+        assert running
+        assert not {output for output, *_ in running.plan.outputs} - {".by_image"}
+        found = running.sums()
+        for field in fields:
+            assert found[field] == expected[field] == 0, field
+
+
+def test_shares_of_other_filters_are_not_those_of_a_chain() -> None:
+    known = {name: device_fields(in_floats(settings)) for name, (settings, _) in THRESHOLDS.items()}
+    assert "scatter" in known["urp"]
+    assert not {"scatter"} & (known["urp dual"] | known["urp kawase"])
 
 
 @pytest.mark.parametrize("preset", vkbloom.presets)

@@ -16,7 +16,7 @@ import numpy as np
 
 from vkbloom import _core
 from vkbloom._extras import import_extra
-from vkbloom._gradients.passes import MIN_SHARE, DeviceGradients, device_fields, in_floats
+from vkbloom._gradients.passes import DeviceGradients, device_fields, in_floats
 from vkbloom._gradients.pulling import pull_each, undefined
 from vkbloom._image_arguments import check_mask
 from vkbloom._psf.values import ARRAYS, ArrayValue
@@ -262,7 +262,6 @@ def _pull(
         [(check_inputs(**arrays), cotangents)],
         call.fields,
         images=by_images,
-        min_share=MIN_SHARE,
     )
     return next(pulled)
 
@@ -529,7 +528,7 @@ def _by_values(gradients: Any, call: _Call, stream: int | None) -> Any:
     """Return the derivatives by values as float64, combined where the sums are."""
     if isinstance(gradients, DeviceGradients) and gradients.combinations:
         sums = gradients.combinations(call.fields)
-        if sums.fields == tuple(call.fields):
+        if sums.arrays and sums.fields == tuple(call.fields):
             by_channel = torch.cat([_as_tensor(part, stream)[0, 0] for part in sums.arrays])
             factors = torch.from_numpy(sums.factors).to(by_channel.device, non_blocking=True)
             # What a field does not need may be infinite.

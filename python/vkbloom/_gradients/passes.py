@@ -214,6 +214,7 @@ def _outputs_for(
     chosen = []
     # The sum by light, which needs no bloom, comes before others.
     for kind, factors in reversed(_channels(settings).items()):
+        left -= {name for name, factor in factors.items() if factor == 0}
         given = left.intersection(name for name, factor in factors.items() if factor is not None)
         if kind in names and given:
             chosen.append(kind)
@@ -225,14 +226,18 @@ def _outputs_for(
 def _channels(settings: Settings) -> dict[str, dict[str, float | None]]:
     """Return the fields of the channels of each sum, and what is multiplied for a derivative.
 
-    None: it does not have the derivative.
+    0: the derivative is 0, also without the sum. None: it is not that of the field.
     """
-    threshold: dict[str, float | None] = {"threshold": 1.0, "knee": 1.0}
-    intensity = settings.value_of("intensity")
+    is_set, intensity = settings.threshold is not None, settings.value_of("intensity")
+    threshold: dict[str, float | None] = {}
+    if not settings.published:
+        # Without a knee it is a step.
+        threshold = dict.fromkeys(("threshold", "knee"), float(is_set and settings.knee != 0))
+    own = settings._threshold_slopes()
     return {
         ".by_composite": dict.fromkeys(_OF_COMPOSITE, 1.0),
         ".by_threshold": threshold,
-        ".by_own_threshold": {**settings._threshold_slopes()},
+        ".by_own_threshold": {name: slope * is_set for name, slope in own.items()},
         # The intensity's derivative, times the intensity.
         _BY_LIGHT: threshold | {"intensity": 1.0 / intensity if intensity != 0 else None},
     }
@@ -246,15 +251,17 @@ def _sums_of(
     columns = dict(zip(totals, starts[:-1].tolist(), strict=True))
     found: dict[str, NDArray[np.float64]] = {}
     for kind, by_field in _channels(settings).items():
-        for channel, (name, factor) in enumerate(by_field.items() if kind in totals else ()):
-            if factor is not None and name not in found:
+        for channel, (name, factor) in enumerate(by_field.items()):
+            if factor == 0 or (kind in totals and factor is not None and name not in found):
                 found[name] = np.zeros(starts[-1])
-                found[name][columns[kind] + channel] = factor
-    levels = [name for name in totals if name.startswith(_BY_SHARES)]
-    for name, pairs in (factors_by_shares(settings) if levels else {}).items():
+                if factor != 0:
+                    found[name][columns[kind] + channel] = factor
+    count = sum(name.startswith(_BY_SHARES) for name in totals)
+    by_shares = factors_by_shares(settings) if count and share_fields(settings) else {}
+    for name, pairs in by_shares.items():
         # The composite reads the field, too.
         row = found.setdefault(name, np.zeros(starts[-1]))
-        for number, pair in enumerate(pairs):
+        for number, pair in enumerate(np.broadcast_to(pairs, (count, 2))):
             start = columns[f"{_BY_SHARES}{number}"]
             row[start : start + 2] = pair
     # Other derivatives are left to the reference.
@@ -298,7 +305,7 @@ def device_fields(settings: Settings) -> frozenset[str]:
     known = {*_OF_COMPOSITE} - settings._fields_before_composite
     if not settings.published:
         known |= {"threshold", "knee"}
-    elif settings.threshold is not None and not settings.glare:
+    elif not settings.glare:
         known |= settings._threshold_slopes().keys()
     known |= {*share_fields(settings)}
     if settings.glare:

@@ -55,6 +55,7 @@ class BabylonBloom(PublishedSettings):
     _knobs: ClassVar[tuple[str, ...]] = ("threshold", "kernel")
     _fields_before_composite: ClassVar[frozenset[str]] = frozenset(("intensity",))
     _pass_sentences: ClassVar[Mapping[str, str]] = MappingProxyType({"down": BLURRED_DOWN})
+    _threshold_fields: ClassVar[tuple[str, ...]] = ("threshold",)
 
     threshold: float | None = number_field(default=0.9, slider=(0, 4))
     kernel: float = number_field(
@@ -93,3 +94,7 @@ class BabylonBloom(PublishedSettings):
             "weights": self.blur_weights,
             "intensity": self.intensity * self.weight,
         }
+
+    def _threshold_slopes(self) -> dict[str, float]:
+        # A step.
+        return {"threshold": 0.0}

@@ -41,6 +41,7 @@ class DarktableBloom(PublishedSettings):
 
     method: ClassVar[str] = "darktable"
     _knobs: ClassVar[tuple[str, ...]] = ("threshold", "blur_size", "strength")
+    _threshold_fields: ClassVar[tuple[str, ...]] = ("threshold",)
 
     threshold: float | None = number_field(default=90.0, range=(0, 100))
     composite: Composite = choice_field(("screen",))
@@ -56,3 +57,7 @@ class DarktableBloom(PublishedSettings):
         """Return what the core names or counts otherwise."""
         gain = 2 ** (min(100.0, self.strength + 1) / 100)
         return {"size": self.box_radius / 256, "strength": gain}
+
+    def _threshold_slopes(self) -> dict[str, float]:
+        # A step.
+        return {"threshold": 0.0}

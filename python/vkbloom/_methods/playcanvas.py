@@ -58,3 +58,7 @@ class PlayCanvasBloom(PublishedSettings):
             "knee": 0.5,
             "levels": self.blur_level,
         }
+
+    def _threshold_slopes(self) -> dict[str, float]:
+        # 0 stands for none.
+        return {"threshold": float(self.threshold != 0)}

@@ -66,4 +66,6 @@ class PmndrsBloom(PublishedSettings):
         }
 
     def _threshold_slopes(self) -> dict[str, float]:
-        return super()._threshold_slopes() | {"smoothing": float(self.smoothing > 1e-4)}
+        # Two zeros stand for none, and a narrow step for the narrowest.
+        is_none = self.threshold == self.smoothing == 0
+        return {"threshold": float(not is_none), "smoothing": float(self.smoothing > 1e-4)}

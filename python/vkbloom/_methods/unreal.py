@@ -96,6 +96,10 @@ class UnrealBloom(GaussianSum):
             "gaussian_tints": self.tints,
         }
 
+    def _threshold_slopes(self) -> dict[str, float]:
+        # -1 stands for none.
+        return {"threshold": float(self.threshold != -1)}
+
 
 def _line(deviation: float, length: int) -> NDArray[np.float64]:
     """Return a Gaussian over 2 length - 1 pixels.

@@ -273,7 +273,10 @@ class Settings(Record):
         return {}
 
     def _threshold_slopes(self) -> dict[str, float]:
-        """Return the slopes of what the core reads in place of `_threshold_fields`, by these."""
+        """Return the slopes of what the core reads in place of `_threshold_fields`, by these.
+
+        0: the bloom does not change.
+        """
         return dict.fromkeys(self._threshold_fields, 1.0)
 
     @property
