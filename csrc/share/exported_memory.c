@@ -10,6 +10,8 @@
 // time (3840 x 2160, RGB in float32, H200, 2026-11-30).
 enum { KEPT_COUNT = 8 };
 #define GRANULE ((uint64_t)64 << 10)
+// Less than this is kept, whatever there is: sums of derivatives, of which Bevy's steps take eight.
+#define COUNTED_BYTES ((uint64_t)1 << 20)
 
 static void destroy_timeline(struct vkb_exports *exports, struct vkb_shared_timeline *timeline,
                              bool settled)
@@ -119,11 +121,18 @@ static struct vkb_export *find_idle(const struct vkb_exports *exports, uint64_t 
     return found;
 }
 
+static bool is_counted(const struct vkb_export *one)
+{
+    return one->size >= COUNTED_BYTES;
+}
+
 static void unlink_idle(struct vkb_exports *exports, struct vkb_export *one)
 {
     VKB_UNLINK(&exports->idle, one);
-    exports->idle_size -= one->size;
-    --exports->idle_count;
+    if (is_counted(one)) {
+        exports->idle_size -= one->size;
+        --exports->idle_count;
+    }
     VKB_PUSH(&exports->taken, one);
 }
 
@@ -214,25 +223,23 @@ void vkb_exports_give_back(struct vkb_exports *exports, struct vkb_export *one)
 {
     VKB_UNLINK(&exports->taken, one);
     VKB_PUSH(&exports->idle, one);
-    exports->idle_size += one->size;
-    ++exports->idle_count;
-}
-
-static bool has_surplus(const struct vkb_exports *exports, bool all)
-{
-    return all || !exports->device
-        || (exports->idle_size > KEPT_BYTES && exports->idle_count > KEPT_COUNT);
+    if (is_counted(one)) {
+        exports->idle_size += one->size;
+        ++exports->idle_count;
+    }
 }
 
 struct vkb_export *vkb_exports_surplus(struct vkb_exports *exports, bool all)
 {
-    struct vkb_export *oldest = exports->idle;
+    const bool any = all || !exports->device;
+    const bool many = exports->idle_size > KEPT_BYTES && exports->idle_count > KEPT_COUNT;
+    struct vkb_export *oldest = NULL;
 
-    if (!oldest || !has_surplus(exports, all))
-        return NULL;
-    while (oldest->next)
-        oldest = oldest->next;
-    unlink_idle(exports, oldest);
+    for (struct vkb_export *one = exports->idle; one; one = one->next)
+        if (any || (many && is_counted(one)))
+            oldest = one;
+    if (oldest)
+        unlink_idle(exports, oldest);
     return oldest;
 }
 

@@ -6,6 +6,7 @@ of graphs come in the middle of calls.
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import faulthandler
 import gc
@@ -86,6 +87,14 @@ def short(renderer: Any) -> None:
     """The latest idle memory is kept, and is freed for new memory of another size."""
     core, size = renderer._core, 96 << 20
     part = "CUDA_ERROR_OUT_OF_MEMORY"
+    # Small memory, which is kept, is freed for large memory, too.
+    cuda.stand_in_fill(1)
+    large = []
+    with contextlib.suppress(vkbloom.OutOfMemoryError):
+        while True:
+            large.append(core.export(size))
+    assert large
+    cuda.stand_in_fill(0)
     large = [core.export(size) for _ in range(10)]
     while large:
         del large[0]

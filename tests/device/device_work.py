@@ -565,7 +565,9 @@ def gradient_places(renderer: Any) -> None:
     ]
     for name, given, kind, part in refused:
         raises(kind, part, functools.partial(pullback, {name: given}))
-    # An operator of PyTorch does not look at them, since the host does not wait.
+    # An operator of PyTorch does not look at them, since the host does not wait. (Without a knee the
+    # derivative by the threshold is 0.)
+    settings = settings.replace(knee=0.2)
     pulled = (check_inputs(OnDevice(image), core=renderer._core), {"final": wrong})
     for fields in ((), ("threshold", "intensity")):
         (derivatives,) = pull_each(renderer, settings, [pulled], fields, "cuda")
