@@ -2,11 +2,12 @@
 
 RGB in single floats, another image in each round, on the GPU of the adapter or on the CPU at a
 smaller size; each call is waited for. A step is the bloom and the derivatives by the image from
-given cotangents. One that learns has `vkbloom.torch.Bloom`, whose parameters, on the tensors'
-device, change in each step: threshold, knee and intensity where the device has their derivatives.
-PyTorch's pyramid is the same `Pyramid` in convolutions, by autograd, and compiled
-by `torch.compile`. Tensors of vkbloom have their channels last, those of PyTorch first. On a GPU
-the passes of both directions are timed, too, by its timestamps.
+given cotangents. One that learns has `vkbloom.torch.Bloom`, and the derivatives by parameters, too:
+threshold, knee and intensity where the device has them. Parameters are on the tensors' device, and
+have other values in each step, as an optimizer makes them. PyTorch's pyramid is the same `Pyramid`
+in convolutions, by autograd, and compiled by `torch.compile`. Tensors of vkbloom have their
+channels last, those of PyTorch first. On a GPU the passes of both directions are timed, too, by its
+timestamps.
 """
 
 from __future__ import annotations
@@ -46,6 +47,8 @@ BOTH: Final = "passes of both directions"
 #: Vulkan.
 MAX_OVERHEAD: Final = 2e-3
 FIELDS: Final = ("threshold", "knee", "intensity")
+#: More than settings and plans that are kept.
+MODULES: Final = 40
 #: What a step of `METHODS` may take more if it learns these on a GPU; else how many steps it takes.
 MAX_LEARNING: Final = 0.5e-3
 MAX_RATIO: Final = 3.0
@@ -95,8 +98,11 @@ def run(plan: Plan, section: Section) -> None:
             clocks = {FORWARD: wall_clock(_waiting(bloom, last, device)), STEP: wall_clock(step)}
             fields = [name for name in FIELDS if name in device_fields(in_floats(settings))]
             if fields:
-                module = operator.Bloom(settings, learn=fields, renderer=renderer).to(device)
-                clocks[LEARNS] = wall_clock(_learning_step(torch, module, last, device))
+                modules = [
+                    operator.Bloom(settings, learn=fields, renderer=renderer).to(device)
+                    for _ in range(MODULES)
+                ]
+                clocks[LEARNS] = wall_clock(_learning_step(torch, modules, last, device))
             peers = _peers(torch, first, device) if name == PYRAMID else {}
             clocks |= _that_agree(section, name, step(0), peers)
             if not on_cpu:
@@ -118,19 +124,21 @@ def _step(torch: Any, call: Callable[[Any], Any], inputs: Any, device: str) -> C
     return pytorch.synchronized(step, device)
 
 
-def _learning_step(torch: Any, module: Any, inputs: Any, device: str) -> Callable[[int], Any]:
-    """Return a call that waits for such a step, and for parameters that have changed by it."""
-    # Which changes the numbers, but not what is drawn.
-    optimizer = torch.optim.SGD(module.parameters(), lr=1e-6)
+def _learning_step(
+    torch: Any, modules: list[Any], inputs: Any, device: str
+) -> Callable[[int], Any]:
+    """Return a call that waits for such a step, with a module of other values in each round."""
+    parameters = [list(module.parameters()) for module in modules]
+    with torch.no_grad():
+        for number, each in enumerate(parameters):
+            for parameter in each:
+                parameter.mul_(1 - 1e-4 * number)
 
     def step(turn: int) -> Any:
         image = inputs[0][turn % 3].detach().requires_grad_()
-        optimizer.zero_grad()
-        module(image).backward(inputs[1][turn % 3])
-        for parameter in module.parameters():
-            parameter.grad.sign_()
-        optimizer.step()
-        return image.grad
+        wanted = [image, *parameters[turn % len(modules)]]
+        final = modules[turn % len(modules)](image)
+        return torch.autograd.grad(final, wanted, inputs[1][turn % 3])[0]
 
     return pytorch.synchronized(step, device)
 

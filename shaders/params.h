@@ -740,7 +740,7 @@
 // Adjoint passes: the pixels of a row of the table of weights, the root of the number of pixels
 // that are added up at once, and how many of a line are, of those between two places of a grid.
 #define TABLE_WIDTH 1024
-#define SUM_SIDE    8
+#define SUM_SIDE    64
 #define NODE_PIXELS 16
 // Transposed filters in blocks: the texels along an axis whose weights are together in the table,
 // and the rows of an invocation that writes words.

@@ -372,6 +372,7 @@ bool vkb_add_sum_passes(struct vkb_adjoint *adjoint, const struct vkb_pass_row *
         return false;
     while (size.width > 1 || size.height > 1) {
         row = vkb_fullscreen_row("", &vkb_shader_adjoint_sum_frag, VKB_NO_IMAGE);
+        row.constants.by = BY_VALUES;
         row.transposed = true;
         vkb_read_only(&row, image);
         if (!add_sum_pass(adjoint, &row, &size, &image, error))

@@ -38,14 +38,26 @@ static void load_pixels(const struct vkb_graph *graph, struct vkb_pass_row *row,
                     TEXEL_ROWS);
 }
 
+// A workgroup for a pixel of the sums and one of the squares below, which fragments would compute one
+// by one (lib/sums.glsl).
+static void add_up(const struct vkb_graph *graph, struct vkb_pass_row *row)
+{
+    const struct vkb_image_row *target = &graph->images[row->targets[0]];
+
+    vkb_make_dispatch(row, row->shader->dispatch, 1, 1);
+    row->groups_width = target->width;
+    row->groups_height = target->height / 2;
+}
+
 bool vkb_add_fullscreen_variant(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
 {
     const struct vkb_graph *graph = choice->graph;
     struct vkb_pass_row row;
 
     memcpy(&row, pass, sizeof row);
-    // An invocation computes sums and squares together, which fragments would do one by one.
-    if (choice->variants == VKB_VARIANTS_GPU || pass->constants.by == BY_VALUES)
+    if (pass->constants.by == BY_VALUES)
+        add_up(graph, &row);
+    else if (choice->variants == VKB_VARIANTS_GPU)
         vkb_make_dispatch(&row, pass->shader->dispatch, PIXEL_INVOCATIONS, PIXEL_INVOCATIONS);
     else if (vkb_fits_linear(choice, pass) && blends(graph, pass))
         load_pixels(graph, &row, blend_shaders);

@@ -1,4 +1,4 @@
-// The cotangents of what a pass writes, for a shader that includes fullscreen.glsl or sums.glsl after SLOT_COTANGENTS.
+// The cotangents of what a pass writes, for a shader that includes fullscreen.glsl or values.glsl after SLOT_COTANGENTS.
 
 // A bloom without alpha has none of it.
 vec4 cotangent_of_target()

@@ -11,7 +11,7 @@ SAMPLED_IMAGE(SLOT_MASK, mask);
 SAMPLED_IMAGE(SLOT_COTANGENTS, cotangents);
 
 #ifdef SUMS
-#include "lib/sums.glsl"
+#include "lib/values.glsl"
 #else
 #include "lib/fullscreen.glsl"
 #include "lib/adjoint.glsl"
@@ -27,7 +27,7 @@ vec4 cotangent_by(int by)
 
 #ifdef SUMS
 
-vec4 summed()
+vec4 values()
 {
     return cotangent_by(BY_VALUES);
 }

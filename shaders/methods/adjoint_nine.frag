@@ -8,7 +8,7 @@ SAMPLED_IMAGE(SLOT_SOURCE, source);
 SAMPLED_IMAGE(SLOT_COTANGENTS, cotangents);
 
 #ifdef SUMS
-#include "lib/sums.glsl"
+#include "lib/values.glsl"
 #else
 #include "lib/fullscreen.glsl"
 #include "lib/adjoint.glsl"
@@ -20,7 +20,7 @@ SAMPLED_IMAGE(SLOT_COTANGENTS, cotangents);
 
 #ifdef SUMS
 
-vec4 summed()
+vec4 values()
 {
     vec4 cotangent = mask_value() * cotangent_of_target();
     // What they would be multiplied by may be infinite.

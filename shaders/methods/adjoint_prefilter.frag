@@ -11,7 +11,7 @@ SAMPLED_IMAGE(SLOT_SOURCE, source);
 SAMPLED_IMAGE(SLOT_COTANGENTS, cotangents);
 
 #ifdef SUMS
-#include "lib/sums.glsl"
+#include "lib/values.glsl"
 #else
 #define STACKED STACKED_SAMPLES
 #define STACKED_HEIGHT params.target_height
@@ -24,7 +24,7 @@ SAMPLED_IMAGE(SLOT_COTANGENTS, cotangents);
 
 #ifdef SUMS
 
-vec4 summed()
+vec4 values()
 {
     Place place = PLACE_IN(source);
     vec4 cotangent = mask_value() * cotangent_of_target();

@@ -4,9 +4,9 @@ SAMPLED_IMAGE(SLOT_SOURCE, sum);
 SAMPLED_IMAGE(SLOT_SAME_SIZE, level);
 SAMPLED_IMAGE(SLOT_COTANGENTS, cotangents);
 
-#include "lib/sums.glsl"
+#include "lib/values.glsl"
 
-vec4 summed()
+vec4 values()
 {
     vec4 cotangent = texelFetch(cotangents, PIXEL, 0);
     return vec4(dot(cotangent, texelFetch(level, PIXEL, 0)), dot(cotangent, texelFetch(sum, PIXEL, 0)), 0.0, 0.0);

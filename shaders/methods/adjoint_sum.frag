@@ -1,32 +1,16 @@
-// Adds up an image of sums, and one of squares below it, as lib/sums.glsl does.
+// Adds up an image of sums, and one of squares below it.
 
 SAMPLED_IMAGE(SLOT_SOURCE, source);
 
-#define STACKED 2
-#define STACKED_HEIGHT ((summed_size().y + SUM_SIDE - 1) / SUM_SIDE)
+#include "lib/sums.glsl"
 
 ivec2 summed_size()
 {
-    return textureSize(source, 0) / ivec2(1, STACKED);
+    return textureSize(source, 0) / ivec2(1, 2);
 }
 
-#include "lib/fullscreen.glsl"
-
-void start() {}
-
-vec4 shade()
+void add_pixel(inout vec4 sum, inout vec4 squares)
 {
-    ivec2 size = summed_size(), apart = (size + SUM_SIDE - 1) / SUM_SIDE, first = PIXEL;
-    vec4 sum = vec4(0.0);
-    for (int y = first.y; y < size.y; y += apart.y) {
-        vec4 row = vec4(0.0);
-        // Without a condition for each load they are all under way together.
-        [[unroll]] for (int i = 0; i < SUM_SIDE; ++i) {
-            int x = first.x + i * apart.x;
-            vec4 texel = texelFetch(source, ivec2(min(x, size.x - 1), y + picture * size.y), 0);
-            row += x < size.x ? texel : vec4(0.0);
-        }
-        sum += row;
-    }
-    return sum;
+    sum += texelFetch(source, PIXEL, 0);
+    squares += texelFetch(source, PIXEL + ivec2(0, summed_size().y), 0);
 }

@@ -10,7 +10,7 @@ SAMPLED_IMAGE(SLOT_SOURCE, image);
 SAMPLED_IMAGE(SLOT_COTANGENTS, cotangents);
 
 #ifdef SUMS
-#include "lib/sums.glsl"
+#include "lib/values.glsl"
 #else
 #include "lib/fullscreen.glsl"
 #include "lib/adjoint.glsl"
@@ -27,7 +27,7 @@ vec4 reduced()
 
 #ifdef SUMS
 
-vec4 summed()
+vec4 values()
 {
     vec4 colour = reduced();
     Soft soft = knee_of(colour.rgb, params.threshold, params.knee);

@@ -565,8 +565,8 @@ def gradient_places(renderer: Any) -> None:
     ]
     for name, given, kind, part in refused:
         raises(kind, part, functools.partial(pullback, {name: given}))
-    # An operator of PyTorch does not look at them, since the host does not wait. (Without a knee the
-    # derivative by the threshold is 0.)
+    # An operator of PyTorch does not look at them, since the host does not wait. (The derivative by
+    # a threshold without a knee is 0.)
     settings = settings.replace(knee=0.2)
     pulled = (check_inputs(OnDevice(image), core=renderer._core), {"final": wrong})
     for fields in ((), ("threshold", "intensity")):
