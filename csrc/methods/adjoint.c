@@ -98,24 +98,40 @@ static void find_glow(struct vkb_adjoint *adjoint, const struct vkb_cotangents *
 }
 
 // Whether "final" alone has cotangents, and adds the bloom times the intensity, which is linear in
-// what the only threshold pass writes. Then no bloom is needed for the derivative by the intensity:
-// a step of Separable that learns threshold and intensity took 1.06 ms of passes with it, and
-// 0.49 without (H200, 3840 x 2160, 2026-11-29).
+// what the only threshold pass writes, by a knee. Then the threshold's sum has the derivative by
+// the intensity, too, and needs no bloom: a step of Separable that learns threshold and intensity
+// took 1.06 ms of passes with the composite's, and 0.49 without (H200, 3840 x 2160, 2026-11-29).
 static bool scales_light(const struct vkb_graph *graph, const struct vkb_cotangents *cotangents)
 {
-    uint32_t thresholds = 0, composites = 0;
+    uint32_t thresholds = 0, knees = 0, composites = 0;
 
     for (uint32_t i = 0; i < graph->pass_count; ++i) {
         const struct vkb_pass_row *pass = &graph->passes[i];
         const bool adds = pass->block == VKB_BLOCK_composite && vkb_adds_bloom(pass);
         thresholds += pass->block == VKB_BLOCK_threshold;
+        knees +=
+            pass->block == VKB_BLOCK_threshold && pass->constants.threshold_mode == THRESHOLD_KNEE;
         composites += adds;
         if (!adds && pass->block != VKB_BLOCK_threshold && pass->block != VKB_BLOCK_filter
             && pass->block != VKB_BLOCK_fft && pass->block != VKB_BLOCK_fft_kernel)
             return false;
     }
-    return thresholds == 1 && composites == 1 && cotangents->count == 1
+    return thresholds == 1 && knees == 1 && composites == 1 && cotangents->count == 1
         && strcmp(cotangents->names[0], "final") == 0;
+}
+
+// The sums that are computed for those that are wanted.
+static struct vkb_wanted_sums choose_sums(const struct vkb_graph *graph,
+                                          const struct vkb_settings *settings,
+                                          const struct vkb_cotangents *cotangents)
+{
+    struct vkb_wanted_sums sums = cotangents->sums;
+    const bool wanted = sums.intensity;
+
+    sums.intensity = scales_light(graph, cotangents);
+    *(sums.intensity ? &sums.threshold : &sums.composite) |= wanted;
+    sums.shares = sums.shares && vkb_method_of(settings)->learns_shares;
+    return sums;
 }
 
 // Makes the cotangents of the source's images framebuffers. A custom method may have framebuffers
@@ -151,8 +167,6 @@ bool vkb_build_adjoint(const struct vkb_source *source, const struct vkb_setting
         .graph = graph,
         .table = {.transposes = transposes, .hash = VKB_HASH_START},
         .max_side = max_side,
-        .sums = cotangents->sums,
-        .shares = vkb_method_of(settings)->learns_shares,
         .weights = cotangents->weights,
         .scene = VKB_NO_IMAGE,
         .glow = VKB_NO_IMAGE,
@@ -162,7 +176,7 @@ bool vkb_build_adjoint(const struct vkb_source *source, const struct vkb_setting
     if (!vkb_source_build(source, settings, max_side, graph, error))
         return false;
     find_glow(&adjoint, cotangents);
-    adjoint.light = scales_light(graph, cotangents);
+    adjoint.sums = choose_sums(graph, settings, cotangents);
     const uint32_t image_count = *first = graph->image_count;
     adjoint.cotangents = vkb_alloc(error, image_count, sizeof *adjoint.cotangents);
     bool done = adjoint.cotangents && add_table(&adjoint, error);

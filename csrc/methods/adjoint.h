@@ -11,9 +11,9 @@
 struct vkb_cotangents {
     vkb_image_name names[GATHERED_LEVELS];
     uint32_t count;
-    bool images;   // the derivatives by images are wanted
-    bool sums;     // those by fields
-    bool weights;  // those by the weights of a field of kernels
+    bool images;                  // the derivatives by images are wanted
+    bool weights;                 // those by the weights of a field of kernels
+    struct vkb_wanted_sums sums;  // those by fields
 };
 
 // Adds the framebuffers ".by_image", ".by_emission" and ".by_mask", of those that the source has

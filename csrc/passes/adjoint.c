@@ -364,8 +364,6 @@ bool vkb_add_sum_passes(struct vkb_adjoint *adjoint, const struct vkb_pass_row *
     struct vkb_pass_row row = *given;
     uint32_t image;
 
-    if (!adjoint->sums)
-        return true;
     row.shader = shader;
     row.constants.by = BY_VALUES;
     if (!add_sum_pass(adjoint, &row, &size, &image, error))
@@ -393,6 +391,6 @@ bool vkb_add_threshold_sums(struct vkb_adjoint *adjoint, const struct vkb_pass_r
     has_slopes = has_slopes || pass->constants.after == name;
     THRESHOLD_POINTS(VKB_HAS_SLOPES)
 #undef VKB_HAS_SLOPES
-    return !pass->constants.thresholded || !has_slopes
+    return !adjoint->sums.threshold || !pass->constants.thresholded || !has_slopes
         || vkb_add_sum_passes(adjoint, row, shader, size, ".by_own_threshold", error);
 }

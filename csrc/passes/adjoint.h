@@ -21,11 +21,9 @@ struct vkb_adjoint {
     // so that a plan of sums finds what that of derivatives by images has made.
     uint32_t added, summed;
     uint32_t max_side;
-    uint32_t mixed;  // sums of two levels so far
-    bool sums;       // the derivatives by fields are wanted
-    bool shares;     // also those by shares of levels
-    bool light;      // the intensity is a factor of what the threshold pass writes
-    bool weights;    // those by the weights of a field of kernels
+    uint32_t mixed;               // sums of two levels so far
+    struct vkb_wanted_sums sums;  // intensity: the threshold's has it
+    bool weights;                 // those by the weights of a field of kernels
     // The cotangents of the scene of a composite without a curve are a share of those that the
     // composite has. The next pass that accumulates cotangents of the scene adds them itself.
     uint32_t scene;  // VKB_NO_IMAGE: there is no such composite, or its row was added
@@ -101,7 +99,7 @@ bool vkb_accumulate_moved(struct vkb_adjoint *adjoint, const struct vkb_pass_row
 bool vkb_accumulate_mask(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
                          struct vkb_pass_row *row, struct vkb_error *error);
 
-// If sums are wanted: adds the row with a shader of lib/sums.glsl, and the passes that add its sums
+// Adds the row with a shader of lib/sums.glsl, and the passes that add its sums
 // up to one pixel of the framebuffer `name`; below it is the sum of the squares, which tells how
 // exact the sum is.
 bool vkb_add_sum_passes(struct vkb_adjoint *adjoint, const struct vkb_pass_row *row,

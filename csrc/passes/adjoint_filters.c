@@ -14,7 +14,7 @@ static bool add_share_sums(struct vkb_adjoint *adjoint, const struct vkb_pass_ro
         vkb_adjoint_row(&vkb_shader_adjoint_shares_frag, vkb_cotangent_of(adjoint, pass));
     char name[VKB_NAME_SIZE];
 
-    if (!adjoint->shares || !pass->constants.adds_image)
+    if (!adjoint->sums.shares || !pass->constants.adds_image)
         return true;
     row.reads[SLOT_SOURCE] = pass->targets[0];
     vkb_read_at(&row, SLOT_SAME_SIZE, pass->reads[SLOT_SAME_SIZE]);

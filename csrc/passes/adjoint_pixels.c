@@ -125,8 +125,9 @@ bool vkb_transpose_composite(struct vkb_adjoint *adjoint, const struct vkb_pass_
     row.reads[SLOT_BLOOM] = pass->reads[SLOT_BLOOM];
     row.constants.clamped = is_clamped(adjoint->graph);
     row.constants.thresholded = row.constants.alpha == ALPHA_BLUR && is_thresholded(adjoint->graph);
-    if (!vkb_add_sum_passes(adjoint, &row, &vkb_shader_adjoint_composite_sums_frag,
-                            size_of(adjoint, pass->targets[0]), ".by_composite", error)
+    if ((adjoint->sums.composite
+         && !vkb_add_sum_passes(adjoint, &row, &vkb_shader_adjoint_composite_sums_frag,
+                                size_of(adjoint, pass->targets[0]), ".by_composite", error))
         || (is_sum(&row.constants) && depends_on_bloom(&row) && !add_curves(adjoint, &row, error)))
         return false;
     return accumulate_composite(adjoint, &row, error);
@@ -153,10 +154,10 @@ bool vkb_transpose_threshold(struct vkb_adjoint *adjoint, const struct vkb_pass_
     const uint32_t target = pass->targets[0];
     struct vkb_pass_row row = vkb_slope_row(adjoint, pass, &vkb_shader_adjoint_threshold_frag);
 
-    if (pass->constants.threshold_mode == THRESHOLD_KNEE
+    if (adjoint->sums.threshold && pass->constants.threshold_mode == THRESHOLD_KNEE
         && !vkb_add_sum_passes(adjoint, &row, &vkb_shader_adjoint_threshold_sums_frag,
                                size_of(adjoint, target),
-                               adjoint->light ? ".by_light" : ".by_threshold", error))
+                               adjoint->sums.intensity ? ".by_light" : ".by_threshold", error))
         return false;
     row.constants.by = BY_SCENE;
     return vkb_accumulate_sampled(adjoint, &row, pass->reads[SLOT_SOURCE], target, error)

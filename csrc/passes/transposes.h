@@ -4,6 +4,13 @@
 
 #include "graph/graph.h"
 
+// The derivatives by fields that are wanted, which are sums: by what the composite reads, what a
+// threshold reads, and the shares of levels. That by the intensity is one of the composite, unless
+// the threshold's sum has it.
+struct vkb_wanted_sums {
+    bool composite, threshold, shares, intensity;
+};
+
 struct vkb_transposed;
 
 // The transposes that were used last, the newest first. The owner sees to it that one thread at a

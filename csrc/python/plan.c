@@ -307,30 +307,59 @@ static bool read_cotangents(PyObject *tuple, struct vkb_cotangents *cotangents)
 
 static bool read_results(const char *name, struct vkb_cotangents *cotangents)
 {
-    const bool all = strcmp(name, "all") == 0;
+    const bool all = strcmp(name, "all") == 0, sums = all || strcmp(name, "sums") == 0;
 
     cotangents->images = all || strcmp(name, "images") == 0;
-    cotangents->sums = all || strcmp(name, "sums") == 0;
     cotangents->weights = strcmp(name, "weights") == 0;
-    return cotangents->images || cotangents->sums || cotangents->weights
+    cotangents->sums = (struct vkb_wanted_sums){sums, sums, sums, sums};
+    return cotangents->images || sums || cotangents->weights
         || vkb_refuse("results: '%s' is not 'images', 'sums', 'all' or 'weights'", name);
+}
+
+// Leaves out the sums that the tuple has not. None: it has all of them.
+static bool read_sums(PyObject *tuple, struct vkb_wanted_sums *sums)
+{
+    const struct {
+        const char *name;
+        bool *wanted;
+    } rows[] = {
+        {"composite", &sums->composite},
+        {"threshold", &sums->threshold},
+        {"shares", &sums->shares},
+        {"intensity", &sums->intensity},
+    };
+
+    if (!vkb_require_tuple(tuple, "sums"))
+        return false;
+    for (size_t row = 0; row < sizeof rows / sizeof *rows; ++row) {
+        bool given = false;
+        for (Py_ssize_t i = 0; i < PyTuple_Size(tuple); ++i) {
+            const char *name = PyUnicode_AsUTF8AndSize(PyTuple_GetItem(tuple, i), NULL);
+            if (!name)
+                return false;
+            given = given || strcmp(name, rows[row].name) == 0;
+        }
+        *rows[row].wanted = *rows[row].wanted && given;
+    }
+    return true;
 }
 
 PyObject *vkb_renderer_plan(PyObject *object, PyObject *arguments)
 {
     struct vkb_renderer *renderer = (struct vkb_renderer *)object;
     const struct vkb_module_state *state = PyType_GetModuleState(Py_TYPE(object));
-    PyObject *source, *settings_object, *names, *cotangents = NULL;
+    PyObject *source, *settings_object, *names, *cotangents = NULL, *sums = Py_None;
     struct vkb_cotangents given;
     struct portion portion = {.renderer = renderer, .cotangents = &given, .is_possible = true};
     struct vkb_settings settings;
     struct vkb_error error = {0};
     const char *results = "images";
 
-    if (!PyArg_ParseTuple(arguments, "O!OO|O!s:plan", state->source_type, &source, &settings_object,
-                          &names, &PyTuple_Type, &cotangents, &results)
+    if (!PyArg_ParseTuple(arguments, "O!OO|O!sO:plan", state->source_type, &source,
+                          &settings_object, &names, &PyTuple_Type, &cotangents, &results, &sums)
         || !vkb_read_settings(settings_object, &settings)
-        || (cotangents && !read_cotangents(cotangents, &given)) || !read_results(results, &given))
+        || (cotangents && !read_cotangents(cotangents, &given)) || !read_results(results, &given)
+        || (sums != Py_None && !read_sums(sums, &given.sums)))
         return NULL;
     if (cotangents && ((struct vkb_source_object *)source)->source.kind != VKB_SOURCE_IMAGE) {
         vkb_refuse("cotangents: the source is not an image");

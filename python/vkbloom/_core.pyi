@@ -103,6 +103,7 @@ class Renderer:
         names: None,
         cotangents: tuple[str, ...],
         results: str,
+        sums: tuple[str, ...] | None = None,
         /,
     ) -> Plan | None: ...
     @overload

@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Callable, Collection, Container, Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from math import isfinite
 from typing import TYPE_CHECKING, Any, Final, NamedTuple, cast
 
 import numpy as np
@@ -176,16 +177,10 @@ class Passes:
         if any(len(level.shape) != 3 or level.shape[2] not in (3, 4) for level in levels):
             return None
         source = self.inputs.source(levels)
-        made = functools.partial(
-            self.renderer._plan_derivatives,
-            source,
-            self.settings,
-            tuple(self.cotangents),
-            results,
+        sums = None if fields is None else _sums_for(self.settings, fields)
+        plan = self.renderer._plan_derivatives(
+            source, self.settings, tuple(self.cotangents), results, sums
         )
-        plan = made()
-        if plan is not None and fields is not None:
-            plan = made(_outputs_for(self.settings, plan, fields))
         if plan is None:
             return None
         # The host reads weights.
@@ -203,24 +198,22 @@ class Passes:
         return Running(self, plan, arrays, submission, results)
 
 
-def _outputs_for(
-    settings: Settings, plan: _core.Plan, fields: Collection[str]
-) -> tuple[str, ...] | None:
-    """Return the names of the images and of the sums that fields need; None: of all sums."""
-    names = tuple([name for name, *_ in plan.outputs])
-    left = device_fields(settings).intersection(fields)
-    if left & {*share_fields(settings)}:
-        return None
-    chosen = []
-    # The sum by light, which needs no bloom, comes before others.
-    for kind, factors in reversed(_channels(settings).items()):
-        left -= {name for name, factor in factors.items() if factor == 0}
-        given = left.intersection(name for name, factor in factors.items() if factor is not None)
-        if kind in names and given:
-            chosen.append(kind)
-            left -= given
-    wanted = (*_BY_IMAGES, *chosen)
-    return tuple([name for name in names if name in wanted])
+def _sums_for(settings: Settings, fields: Collection[str]) -> tuple[str, ...]:
+    """Return what the core calls the sums that fields need."""
+    wanted = device_fields(settings).intersection(fields)
+    by_shares, channels = share_fields(settings), _channels(settings)
+    zeros = {name for factors in channels.values() for name, one in factors.items() if one == 0}
+    sums = set()
+    for name in wanted - zeros:
+        if name in by_shares:
+            sums.add("shares")
+        if name == "intensity":
+            sums.add("composite" if settings.value_of(name) == 0 else name)
+        elif name in _OF_COMPOSITE:
+            sums.add("composite")
+        elif name not in by_shares:
+            sums.add("threshold")
+    return tuple(sorted(sums))
 
 
 def _channels(settings: Settings) -> dict[str, dict[str, float | None]]:
@@ -247,27 +240,29 @@ def _sums_of(
     settings: Settings, totals: Mapping[str, NDArray[Any]], fields: Collection[str]
 ) -> Sums:
     """Return the sums of the device with what they are multiplied by for each of the fields."""
-    starts = np.cumsum([0, *(array.shape[-1] for array in totals.values())])
-    columns = dict(zip(totals, starts[:-1].tolist(), strict=True))
-    found: dict[str, NDArray[np.float64]] = {}
-    for kind, by_field in _channels(settings).items():
-        for channel, (name, factor) in enumerate(by_field.items()):
-            if factor == 0 or (kind in totals and factor is not None and name not in found):
-                found[name] = np.zeros(starts[-1])
+    starts, width = {}, 0
+    for name, array in totals.items():
+        starts[name] = width
+        width += array.shape[-1]
+    found: dict[str, list[float]] = {}
+    for kind, factors in _channels(settings).items():
+        for channel, (name, factor) in enumerate(factors.items()):
+            if factor == 0 or (kind in starts and factor is not None and name not in found):
+                found[name] = [0.0] * width
                 if factor != 0:
-                    found[name][columns[kind] + channel] = factor
+                    found[name][starts[kind] + channel] = factor
     count = sum(name.startswith(_BY_SHARES) for name in totals)
     by_shares = factors_by_shares(settings) if count and share_fields(settings) else {}
     for name, pairs in by_shares.items():
         # The composite reads the field, too.
-        row = found.setdefault(name, np.zeros(starts[-1]))
-        for number, pair in enumerate(np.broadcast_to(pairs, (count, 2))):
-            start = columns[f"{_BY_SHARES}{number}"]
+        row = found.setdefault(name, [0.0] * width)
+        for number, pair in enumerate(np.broadcast_to(pairs, (count, 2)).tolist()):
+            start = starts[f"{_BY_SHARES}{number}"]
             row[start : start + 2] = pair
     # Other derivatives are left to the reference.
-    known = [name for name in fields if name in found and np.isfinite(found[name]).all()]
-    factors = np.array([found[name] for name in known]).reshape(len(known), starts[-1])
-    return Sums(tuple(known), factors, tuple(totals.values()))
+    known = tuple([name for name in fields if name in found and all(map(isfinite, found[name]))])
+    rows = np.array([found[name] for name in known]).reshape(len(known), width)
+    return Sums(known, rows, tuple(totals.values()))
 
 
 def _level(cotangent: NDArray[Any] | ImportedArray) -> NDArray[Any] | ImportedArray:

@@ -1019,10 +1019,14 @@ class Renderer:
         settings: Settings,
         cotangents: tuple[str, ...],
         results: DerivativeKind,
-        names: tuple[str, ...] | None = None,
+        sums: tuple[str, ...] | None = None,
     ) -> _core.Plan | None:
-        """Return the plan of derivatives, as `_plan_of` does, or None if a pass has none."""
-        return self._find_plan(source, settings, names, cotangents, results)
+        """Return the plan of derivatives, as `_plan_of` does, or None if a pass has none.
+
+        `sums`: Those that are computed of "composite", "threshold", "shares", and "intensity",
+        which is one of the first two. None: all, where `results` has them.
+        """
+        return self._find_plan(source, settings, None, cotangents, results, sums)
 
     def _find_plan(
         self,

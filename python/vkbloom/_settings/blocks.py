@@ -19,9 +19,16 @@ Values = Mapping[str, tuple[float, float, float]]
 _CODES: Final = {"f4": "f", "f8": "d", "i4": "i", "u4": "I"}
 
 
+#: What packs single numbers.
+_PACK: Final = {code: struct.Struct(f"={letter}").pack_into for code, letter in _CODES.items()}
+
+
 def _pack(block: bytearray, table: Table, name: str, *numbers: float) -> None:
     offset, code, _ = table[name]
-    struct.pack_into(f"={len(numbers)}{_CODES[code]}", block, offset, *numbers)
+    if len(numbers) == 1:
+        _PACK[code](block, offset, *numbers)
+    else:
+        struct.pack_into(f"={len(numbers)}{_CODES[code]}", block, offset, *numbers)
 
 
 def _defaults(table: Table, values: Values) -> bytes:
@@ -49,7 +56,10 @@ def _index(name: str, value: object, names: Sequence[str]) -> int:
 def _pack_value(block: bytearray, table: Table, name: str, value: float, values: Values) -> None:
     """Store a number of a table; raise ValueError if it is out of its range."""
     default, low, high = values[name]
-    if not low <= value <= high and value != default:
+    # The block has it.
+    if value == default:
+        return
+    if not low <= value <= high:
         raise ValueError(f"{name}: {value!r} is out of range, {low!r} to {high!r}")
     _pack(block, table, name, int(value) if table[name][1] == "i4" else value)
 
