@@ -290,8 +290,6 @@
 #define ADJOINT_FILTER_BLOCK(B, READS, INPUT, VEC4S) \
     INPUT(B, int, start_x) \
     INPUT(B, int, start_y) \
-    INPUT(B, int, span_x) \
-    INPUT(B, int, span_y) \
     INPUT(B, float, gain) \
     INPUT(B, float, share) \
     INPUT(B, float, share_of_mask) \

@@ -40,7 +40,7 @@ enum vkb_border {
 // pixels read the texels.
 struct vkb_readers {
     int32_t start;   // below 0: the axis stays as it is
-    int32_t span;    // pixels whose weights a block of texels has
+    int32_t span;    // pixels whose weights each block of texels has; 0: blocks differ
     int32_t most;    // of a texel; MAX_READERS + 1: those of a texel begin before those before it
     int32_t usual;   // the most of a texel in the middle half
     int32_t window;  // that has all of them, in the ratio of sides (WINDOW_FIRST); 0: none has

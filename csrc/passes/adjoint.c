@@ -162,14 +162,10 @@ static struct vkb_pass_row filter_row(const struct vkb_adjoint *adjoint,
     row.filter_count = 1;
     params->gain = (float)(filter->gain / filter->divisor);
     params->share = 1.0f;
-    if (direction != DIRECTION_VERTICAL) {
+    if (direction != DIRECTION_VERTICAL)
         params->start_x = filter->x.readers.start;
-        params->span_x = filter->x.readers.span;
-    }
-    if (direction != DIRECTION_HORIZONTAL) {
+    if (direction != DIRECTION_HORIZONTAL)
         params->start_y = filter->y.readers.start;
-        params->span_y = filter->y.readers.span;
-    }
     return row;
 }
 

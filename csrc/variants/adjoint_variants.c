@@ -85,7 +85,8 @@ bool vkb_add_adjoint_linear_variant(struct vkb_variant_choice *choice,
     const int32_t direction = pass->constants.direction;
     const int32_t span_x = readers_along(&filter->x, false, direction)->span;
     const int32_t span_y = readers_along(&filter->y, true, direction)->span;
-    if ((int32_t)filter->kernels * span_x > MAX_LINEAR || !vkb_are_floats(choice, pass))
+    if (span_x == 0 || span_y == 0 || (int32_t)filter->kernels * span_x > MAX_LINEAR
+        || !vkb_are_floats(choice, pass))
         return false;
     memcpy(&row, pass, sizeof row);
     row.constants.span_width = span_x;
@@ -271,15 +272,15 @@ static bool add_pictures(struct vkb_variant_choice *choice, const struct vkb_pas
         || vkb_add_variant_pass(choice, &row);
 }
 
-// Makes `row` blocks of texels along its only axis. False: it has two, or several kernels, or so
-// many weights that a workgroup cannot hold them.
+// Makes `row` blocks of texels along its only axis. False: it has two, or several kernels, or
+// blocks that differ, or so many weights that a workgroup cannot hold them.
 static bool make_lines(const struct vkb_variant_choice *choice, struct vkb_pass_row *row)
 {
     const bool along_x = row->constants.direction == DIRECTION_HORIZONTAL;
     const struct vkb_filter *filter = row->filters;
     const int32_t span = along_x ? filter->x.readers.span : filter->y.readers.span;
 
-    if (row->constants.direction == DIRECTION_BOTH || row->constants.kernels > 1
+    if (row->constants.direction == DIRECTION_BOTH || row->constants.kernels > 1 || span == 0
         || 4 * sizeof(float) * ((size_t)span + ADJOINT_SIDE)
                > choice->device->limits.maxComputeSharedMemorySize)
         return false;
