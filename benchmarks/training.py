@@ -118,8 +118,10 @@ def _step(torch: Any, call: Callable[[Any], Any], inputs: Any, device: str) -> C
     """Return a call that waits for the derivatives by the image of its round."""
 
     def step(turn: int) -> Any:
-        image = inputs[0][turn % 3].detach().requires_grad_()
-        return torch.autograd.grad(call(image), image, inputs[1][turn % 3])[0]
+        # Another image than the call before had.
+        number = (turn + 1) % 3
+        image = inputs[0][number].detach().requires_grad_()
+        return torch.autograd.grad(call(image), image, inputs[1][number])[0]
 
     return pytorch.synchronized(step, device)
 
@@ -135,10 +137,11 @@ def _learning_step(
                 parameter.mul_(1 - 1e-4 * number)
 
     def step(turn: int) -> Any:
-        image = inputs[0][turn % 3].detach().requires_grad_()
+        number = (turn + 2) % 3
+        image = inputs[0][number].detach().requires_grad_()
         wanted = [image, *parameters[turn % len(modules)]]
         final = modules[turn % len(modules)](image)
-        return torch.autograd.grad(final, wanted, inputs[1][turn % 3])[0]
+        return torch.autograd.grad(final, wanted, inputs[1][number])[0]
 
     return pytorch.synchronized(step, device)
 
