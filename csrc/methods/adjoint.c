@@ -129,7 +129,8 @@ static struct vkb_wanted_sums choose_sums(const struct vkb_graph *graph,
     const bool wanted = sums.intensity;
 
     sums.intensity = scales_light(graph, cotangents);
-    *(sums.intensity ? &sums.threshold : &sums.composite) |= wanted;
+    sums.threshold = sums.threshold || (wanted && sums.intensity);
+    sums.composite = sums.composite || (wanted && !sums.intensity);
     sums.shares = sums.shares && vkb_method_of(settings)->learns_shares;
     return sums;
 }

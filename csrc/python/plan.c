@@ -316,31 +316,36 @@ static bool read_results(const char *name, struct vkb_cotangents *cotangents)
         || vkb_refuse("results: '%s' is not 'images', 'sums', 'all' or 'weights'", name);
 }
 
-// Leaves out the sums that the tuple has not. None: it has all of them.
+// Leaves out the sums whose names are not in the tuple.
 static bool read_sums(PyObject *tuple, struct vkb_wanted_sums *sums)
 {
+    struct vkb_wanted_sums given = {0};
     const struct {
         const char *name;
-        bool *wanted;
+        bool *is_given;
     } rows[] = {
-        {"composite", &sums->composite},
-        {"threshold", &sums->threshold},
-        {"shares", &sums->shares},
-        {"intensity", &sums->intensity},
+        {"composite", &given.composite},
+        {"threshold", &given.threshold},
+        {"shares", &given.shares},
+        {"intensity", &given.intensity},
     };
+    const size_t count = sizeof rows / sizeof *rows;
 
     if (!vkb_require_tuple(tuple, "sums"))
         return false;
-    for (size_t row = 0; row < sizeof rows / sizeof *rows; ++row) {
-        bool given = false;
-        for (Py_ssize_t i = 0; i < PyTuple_Size(tuple); ++i) {
-            const char *name = PyUnicode_AsUTF8AndSize(PyTuple_GetItem(tuple, i), NULL);
-            if (!name)
-                return false;
-            given = given || strcmp(name, rows[row].name) == 0;
-        }
-        *rows[row].wanted = *rows[row].wanted && given;
+    for (Py_ssize_t i = 0; i < PyTuple_Size(tuple); ++i) {
+        const char *name = PyUnicode_AsUTF8AndSize(PyTuple_GetItem(tuple, i), NULL);
+        size_t row = 0;
+        while (name && row < count && strcmp(name, rows[row].name) != 0)
+            ++row;
+        if (!name || row == count)
+            return name && vkb_refuse("sums: there is none named '%s'", name);
+        *rows[row].is_given = true;
     }
+    sums->composite = sums->composite && given.composite;
+    sums->threshold = sums->threshold && given.threshold;
+    sums->shares = sums->shares && given.shares;
+    sums->intensity = sums->intensity && given.intensity;
     return true;
 }
 

@@ -38,8 +38,8 @@ static void load_pixels(const struct vkb_graph *graph, struct vkb_pass_row *row,
                     TEXEL_ROWS);
 }
 
-// A workgroup for a pixel of the sums and one of the squares below, which fragments would compute one
-// by one (lib/sums.glsl).
+// A workgroup for a pixel of the sums and one of the squares below, which fragments would compute
+// one by one (lib/sums.glsl).
 static void add_up(const struct vkb_graph *graph, struct vkb_pass_row *row)
 {
     const struct vkb_image_row *target = &graph->images[row->targets[0]];

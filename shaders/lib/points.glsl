@@ -1,6 +1,6 @@
 // Functions of a value before and after it is combined with others (POINTS of params.h), each with its slope: `back_`
 // takes cotangents of the result to those of the value. With SUMS, `by_` takes them to those of what a threshold reads,
-// in the order of `_threshold_slopes` of the method's settings. For shaders with PREFILTER_BLOCK.
+// in the order of `_threshold_fields` of the method's settings. For shaders with PREFILTER_BLOCK.
 #include "lib/lab.glsl"
 
 // An upper bound of colours.
@@ -203,7 +203,7 @@ vec4 back_through_factor_and_tint(vec4 value, vec4 factor, vec4 cotangent)
 
 // That of a threshold, with the derivatives of the factor by what it reads.
 #ifdef SUMS
-#define BY_THRESHOLD(name) \
+#define THRESHOLD_OF_FACTOR(name) \
     BY_FACTOR(name) \
     vec4 by_##name(vec4 value, vec4 cotangent) \
     { \
@@ -211,11 +211,11 @@ vec4 back_through_factor_and_tint(vec4 value, vec4 factor, vec4 cotangent)
         return vec4(by_factor * name##_slopes(value.rgb), 0.0, 0.0); \
     }
 #else
-#define BY_THRESHOLD(name) BY_FACTOR(name)
+#define THRESHOLD_OF_FACTOR(name) BY_FACTOR(name)
 #endif
 
 // That of a quadratic knee.
-#define BY_KNEE(name) \
+#define THRESHOLD_OF_KNEE(name) \
     vec4 name##_factor(vec3 colour) \
     { \
         return soft_factor(name##_knee(largest(colour)), colour); \
@@ -224,7 +224,7 @@ vec4 back_through_factor_and_tint(vec4 value, vec4 factor, vec4 cotangent)
     { \
         return by_threshold_and_knee(name##_knee(largest(colour)), params.threshold, params.knee); \
     } \
-    BY_THRESHOLD(name)
+    THRESHOLD_OF_FACTOR(name)
 
 // Their sources differ in what keeps a width of 0 and black from a division by 0.
 Soft knee_with(float brightness, float wider, float divisor, float least)
@@ -236,21 +236,21 @@ Soft kino_knee(float brightness)
 {
     return knee_with(brightness, 1e-5, 4.0 * (params.threshold * params.knee + 1e-5), 1e-5);
 }
-BY_KNEE(kino)
+THRESHOLD_OF_KNEE(kino)
 
 // Unity-Technologies/PostProcessing @ 32c3155207d3, Bloom.shader.
 Soft ppv2_knee(float brightness)
 {
     return knee_with(brightness, 1e-5, 4.0 * (params.threshold * params.knee + 1e-5), 1e-4);
 }
-BY_KNEE(ppv2)
+THRESHOLD_OF_KNEE(ppv2)
 
 // Unity-Technologies/Graphics, com.unity.render-pipelines.universal, Bloom.shader @ 00d472fae509.
 Soft urp_knee(float brightness)
 {
     return knee_with(brightness, 0.0, 4.0 * (params.threshold * params.knee) + 1e-4, 1e-4);
 }
-BY_KNEE(urp)
+THRESHOLD_OF_KNEE(urp)
 
 // A step at the luminance threshold^(1 / 2.2) (BabylonJS/Babylon.js, extractHighlights.fragment.fx @ bc81a5f32960).
 vec4 babylon_factor(vec3 colour)
@@ -297,7 +297,7 @@ vec2 three_slopes(vec3 colour)
 {
     return smooth_step_slopes(dot(colour, THREE_LUMINANCE));
 }
-BY_THRESHOLD(three)
+THRESHOLD_OF_FACTOR(three)
 
 // BloomNode's luminance is that of three.js' colour management.
 vec4 three_node_factor(vec3 colour)
@@ -309,7 +309,7 @@ vec2 three_node_slopes(vec3 colour)
 {
     return smooth_step_slopes(dot(colour, LUMINANCE));
 }
-BY_THRESHOLD(three_node)
+THRESHOLD_OF_FACTOR(three_node)
 
 // Unreal's: the luminance above the threshold, of which 1 more is stored (Epic Games, "Bloom").
 vec2 unreal_share(vec3 colour)
@@ -328,7 +328,7 @@ vec2 unreal_slopes(vec3 colour)
 {
     return vec2(-unreal_share(colour).y, 0.0);
 }
-BY_THRESHOLD(unreal)
+THRESHOLD_OF_FACTOR(unreal)
 
 // Bevy's colours have a floor before the threshold (bevyengine/bevy v0.19.1, bloom.wgsl).
 const float BEVY_FLOOR = 1e-4;
@@ -337,7 +337,7 @@ Soft held_knee(float brightness)
 {
     return knee_with(brightness, 0.0, 4.0 * (params.threshold * params.knee + 1e-5), 1e-5);
 }
-BY_KNEE(held)
+THRESHOLD_OF_KNEE(held)
 
 vec4 bevy(vec4 value)
 {

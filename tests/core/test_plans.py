@@ -399,6 +399,20 @@ def passes_of(renderer: Renderer, settings: Settings, results: str | None = None
     return {*renderer._core.run(source, (plan,), (arrays,), True).wait()[0][0]}
 
 
+def test_sums_that_do_not_exist_are_refused(renderer: Renderer) -> None:
+    image = np.zeros((9, 8, 4), np.float32)
+    source, settings = Inputs(image).source((image,)), Pyramid(levels=2, threshold=0.3, knee=0.2)
+
+    def plan(sums: Any) -> Any:
+        return renderer._core.plan(source, settings, None, ("final",), "sums", sums)
+
+    assert [name for name, *_ in plan(("intensity", "threshold")).outputs] == [".by_light"]
+    with pytest.raises(ValueError, match="sums: there is none named 'threshod'"):
+        plan(("intensity", "threshod"))
+    with pytest.raises(TypeError, match="sums"):
+        plan("intensity")
+
+
 @pytest.mark.parametrize("boundary", ["zero", "edge", "wrap", "wrap_x"])
 def test_a_convolution_and_its_transpose_have_one_spectrum(
     renderer: Renderer, boundary: Any
