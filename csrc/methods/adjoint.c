@@ -120,19 +120,18 @@ static bool scales_light(const struct vkb_graph *graph, const struct vkb_cotange
         && strcmp(cotangents->names[0], "final") == 0;
 }
 
-// The sums that are computed for those that are wanted.
-static struct vkb_wanted_sums choose_sums(const struct vkb_graph *graph,
-                                          const struct vkb_settings *settings,
-                                          const struct vkb_cotangents *cotangents)
+// Sets which sums are computed for those that are wanted.
+static void choose_sums(struct vkb_adjoint *adjoint, const struct vkb_settings *settings,
+                        const struct vkb_cotangents *cotangents)
 {
-    struct vkb_wanted_sums sums = cotangents->sums;
-    const bool wanted = sums.intensity;
+    const struct vkb_wanted_sums *wanted = &cotangents->sums;
 
-    sums.intensity = scales_light(graph, cotangents);
-    sums.threshold = sums.threshold || (wanted && sums.intensity);
-    sums.composite = sums.composite || (wanted && !sums.intensity);
-    sums.shares = sums.shares && vkb_method_of(settings)->learns_shares;
-    return sums;
+    adjoint->light = scales_light(adjoint->graph, cotangents);
+    adjoint->sums = (struct vkb_wanted_sums){
+        .composite = wanted->composite || (wanted->intensity && !adjoint->light),
+        .threshold = wanted->threshold || (wanted->intensity && adjoint->light),
+        .shares = wanted->shares && vkb_method_of(settings)->learns_shares,
+    };
 }
 
 // Makes the cotangents of the source's images framebuffers. A custom method may have framebuffers
@@ -177,7 +176,7 @@ bool vkb_build_adjoint(const struct vkb_source *source, const struct vkb_setting
     if (!vkb_source_build(source, settings, max_side, graph, error))
         return false;
     find_glow(&adjoint, cotangents);
-    adjoint.sums = choose_sums(graph, settings, cotangents);
+    choose_sums(&adjoint, settings, cotangents);
     const uint32_t image_count = *first = graph->image_count;
     adjoint.cotangents = vkb_alloc(error, image_count, sizeof *adjoint.cotangents);
     bool done = adjoint.cotangents && add_table(&adjoint, error);

@@ -342,6 +342,8 @@ bool vkb_accumulate_mask(struct vkb_adjoint *adjoint, const struct vkb_pass_row 
         || vkb_accumulate_sampled(adjoint, row, pass->reads[SLOT_MASK], pass->targets[0], error);
 }
 
+_Static_assert(SUM_SIDE % PIXEL_INVOCATIONS == 0, "a workgroup has whole blocks");
+
 // Adds a pass of lib/sums.glsl over a picture, whose size becomes that of the sums.
 static bool add_sum_pass(struct vkb_adjoint *adjoint, struct vkb_pass_row *row,
                          struct vkb_size *size, uint32_t *image, struct vkb_error *error)

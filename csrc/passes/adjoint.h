@@ -21,9 +21,10 @@ struct vkb_adjoint {
     // so that a plan of sums finds what that of derivatives by images has made.
     uint32_t added, summed;
     uint32_t max_side;
-    uint32_t mixed;               // sums of two levels so far
-    struct vkb_wanted_sums sums;  // intensity: the threshold's has it
-    bool weights;                 // those by the weights of a field of kernels
+    uint32_t mixed;  // sums of two levels so far
+    struct vkb_wanted_sums sums;
+    bool light;    // the threshold's sum has the derivative by the intensity
+    bool weights;  // those by the weights of a field of kernels are wanted
     // The cotangents of the scene of a composite without a curve are a share of those that the
     // composite has. The next pass that accumulates cotangents of the scene adds them itself.
     uint32_t scene;  // VKB_NO_IMAGE: there is no such composite, or its row was added
@@ -105,7 +106,7 @@ bool vkb_accumulate_mask(struct vkb_adjoint *adjoint, const struct vkb_pass_row 
 bool vkb_add_sum_passes(struct vkb_adjoint *adjoint, const struct vkb_pass_row *row,
                         const struct vkb_shader *shader, struct vkb_size size, const char *name,
                         struct vkb_error *error);
-// The same by what a threshold within a pass of taps reads, if it has one.
+// Adds those by what the threshold of a pass of taps reads, if it has one and they are wanted.
 bool vkb_add_threshold_sums(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
                             const struct vkb_pass_row *row, const struct vkb_shader *shader,
                             struct vkb_error *error);

@@ -157,7 +157,7 @@ bool vkb_transpose_threshold(struct vkb_adjoint *adjoint, const struct vkb_pass_
     if (adjoint->sums.threshold && pass->constants.threshold_mode == THRESHOLD_KNEE
         && !vkb_add_sum_passes(adjoint, &row, &vkb_shader_adjoint_threshold_sums_frag,
                                size_of(adjoint, target),
-                               adjoint->sums.intensity ? ".by_light" : ".by_threshold", error))
+                               adjoint->light ? ".by_light" : ".by_threshold", error))
         return false;
     row.constants.by = BY_SCENE;
     return vkb_accumulate_sampled(adjoint, &row, pass->reads[SLOT_SOURCE], target, error)

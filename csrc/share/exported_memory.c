@@ -10,8 +10,9 @@
 // time (3840 x 2160, RGB in float32, H200, 2026-11-30).
 enum { KEPT_COUNT = 8 };
 #define GRANULE ((uint64_t)64 << 10)
-// Less than this is kept, whatever there is: sums of derivatives, of which Bevy's steps take eight.
-#define COUNTED_BYTES ((uint64_t)1 << 20)
+// Of memory of one granule, which is not counted there, these are kept: sums of derivatives, of
+// which Bevy's steps take eight.
+enum { KEPT_SMALL = 256 };
 
 static void destroy_timeline(struct vkb_exports *exports, struct vkb_shared_timeline *timeline,
                              bool settled)
@@ -121,18 +122,25 @@ static struct vkb_export *find_idle(const struct vkb_exports *exports, uint64_t 
     return found;
 }
 
-static bool is_counted(const struct vkb_export *one)
+static bool is_small(const struct vkb_export *one)
 {
-    return one->size >= COUNTED_BYTES;
+    return one->size <= GRANULE;
+}
+
+// Memory has become idle, or was.
+static void count_idle(struct vkb_exports *exports, const struct vkb_export *one, bool added)
+{
+    size_t *count = is_small(one) ? &exports->small_count : &exports->idle_count;
+    const uint64_t size = is_small(one) ? 0 : one->size;
+
+    *count = added ? *count + 1 : *count - 1;
+    exports->idle_size = added ? exports->idle_size + size : exports->idle_size - size;
 }
 
 static void unlink_idle(struct vkb_exports *exports, struct vkb_export *one)
 {
     VKB_UNLINK(&exports->idle, one);
-    if (is_counted(one)) {
-        exports->idle_size -= one->size;
-        --exports->idle_count;
-    }
+    count_idle(exports, one, false);
     VKB_PUSH(&exports->taken, one);
 }
 
@@ -223,20 +231,18 @@ void vkb_exports_give_back(struct vkb_exports *exports, struct vkb_export *one)
 {
     VKB_UNLINK(&exports->taken, one);
     VKB_PUSH(&exports->idle, one);
-    if (is_counted(one)) {
-        exports->idle_size += one->size;
-        ++exports->idle_count;
-    }
+    count_idle(exports, one, true);
 }
 
 struct vkb_export *vkb_exports_surplus(struct vkb_exports *exports, bool all)
 {
     const bool any = all || !exports->device;
     const bool many = exports->idle_size > KEPT_BYTES && exports->idle_count > KEPT_COUNT;
+    const bool many_small = exports->small_count > KEPT_SMALL;
     struct vkb_export *oldest = NULL;
 
     for (struct vkb_export *one = exports->idle; one; one = one->next)
-        if (any || (many && is_counted(one)))
+        if (any || (is_small(one) ? many_small : many))
             oldest = one;
     if (oldest)
         unlink_idle(exports, oldest);

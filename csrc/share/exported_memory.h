@@ -37,8 +37,8 @@ struct vkb_exports {
     struct vkb_cuda *cuda;
     struct vkb_export *taken, *idle;  // the latest first
     uint64_t idle_size;
-    size_t idle_count;
-    uint64_t serials;  // given away so far
+    size_t idle_count, small_count;  // small ones are not in the former two
+    uint64_t serials;                // given away so far
     // Signalled by CUDA; and by the device, whose points are given away with the renderer's lock.
     struct vkb_shared_timeline filled, drawn;
 };

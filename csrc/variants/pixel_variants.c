@@ -55,9 +55,10 @@ bool vkb_add_fullscreen_variant(struct vkb_variant_choice *choice, const struct 
     struct vkb_pass_row row;
 
     memcpy(&row, pass, sizeof row);
-    if (pass->constants.by == BY_VALUES)
+    const bool sums = pass->constants.by == BY_VALUES;
+    if (sums && pass->block != VKB_BLOCK_node_sums)
         add_up(graph, &row);
-    else if (choice->variants == VKB_VARIANTS_GPU)
+    else if (sums || choice->variants == VKB_VARIANTS_GPU)
         vkb_make_dispatch(&row, pass->shader->dispatch, PIXEL_INVOCATIONS, PIXEL_INVOCATIONS);
     else if (vkb_fits_linear(choice, pass) && blends(graph, pass))
         load_pixels(graph, &row, blend_shaders);

@@ -201,7 +201,7 @@ vec4 back_through_factor_and_tint(vec4 value, vec4 factor, vec4 cotangent)
         return back_through_factor_and_tint(value, name##_factor(value.rgb), cotangent); \
     }
 
-// That of a threshold, with the derivatives of the factor by what it reads.
+// The point function of a threshold, with the derivatives of its factor by what it reads.
 #ifdef SUMS
 #define THRESHOLD_OF_FACTOR(name) \
     BY_FACTOR(name) \
@@ -214,7 +214,7 @@ vec4 back_through_factor_and_tint(vec4 value, vec4 factor, vec4 cotangent)
 #define THRESHOLD_OF_FACTOR(name) BY_FACTOR(name)
 #endif
 
-// That of a quadratic knee.
+// The point function of a threshold that is a quadratic knee.
 #define THRESHOLD_OF_KNEE(name) \
     vec4 name##_factor(vec3 colour) \
     { \
@@ -226,7 +226,7 @@ vec4 back_through_factor_and_tint(vec4 value, vec4 factor, vec4 cotangent)
     } \
     THRESHOLD_OF_FACTOR(name)
 
-// Their sources differ in what keeps a width of 0 and black from a division by 0.
+// Sources differ in what keeps a width of 0 and black from a division by 0.
 Soft knee_with(float brightness, float wider, float divisor, float least)
 {
     return soft_threshold(brightness, params.threshold, params.threshold * params.knee + wider, divisor, least);
@@ -447,7 +447,7 @@ vec4 by_glowing(vec4 sum, vec4 cotangent)
     vec4 value = exposed(sum);
     cotangent.rgb *= larger(vec4(params.luminance_cap), glow_factor(value.rgb).a * value).rgb;
     float place = glow_place(value.rgb), slope = glow_slope(place);
-    float by_scale = params.threshold_scale > 1e-6 ? -slope * place : 0.0;
+    float by_scale = -slope * place * larger(params.threshold_scale, 1e-6);
     return inner_product(cotangent, value)
          * vec4(-slope, by_scale, larger(params.glow_bloom, glow_share(place)), 0.0);
 }

@@ -7,11 +7,9 @@ SAMPLED_IMAGE(SLOT_COTANGENTS, cotangents);
 
 #include "lib/fullscreen.glsl"
 #include "lib/adjoint.glsl"
+#include "lib/target_cotangents.glsl"
 
 vec4 shade()
 {
-    vec4 cotangent = texelFetch(cotangents, PIXEL, 0);
-    if (ALPHA != ALPHA_BLUR)
-        cotangent.a = 0.0;
-    return gathered(back_part_above(texelFetch(source, PIXEL, 0), cotangent, params.threshold));
+    return gathered(back_part_above(texelFetch(source, PIXEL, 0), cotangent_of_target(), params.threshold));
 }

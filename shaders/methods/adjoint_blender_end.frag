@@ -9,11 +9,10 @@ SAMPLED_IMAGE(SLOT_COTANGENTS, cotangents);
 #include "lib/fullscreen.glsl"
 #include "lib/blender_end.glsl"
 #include "lib/adjoint.glsl"
+#include "lib/target_cotangents.glsl"
 
 vec4 shade()
 {
-    vec4 cotangent = params.factors[0] * texelFetch(cotangents, PIXEL, 0);
-    if (ALPHA != ALPHA_BLUR)
-        cotangent.a = 0.0;
+    vec4 cotangent = params.factors[0] * cotangent_of_target();
     return gathered(vec4(back_saturated(settled(enlarged().rgb), cotangent.rgb), cotangent.a));
 }

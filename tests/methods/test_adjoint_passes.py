@@ -13,7 +13,7 @@ from tests.device.abilities import has_linear_texels
 from tests.exhaustive import EXHAUSTIVE, some
 from tests.images import random_image
 from tests.methods.cases import METHODS, OTHERS, presets_of_low_levels
-from tests.planned import DeviceGradients, Inputs, Passes, device_fields, in_floats
+from tests.planned import DeviceGradients, Inputs, Passes, device_fields, in_floats, pull_each
 from tests.variants import open_variant
 from vkbloom import (
     BevyBloom,
@@ -267,7 +267,7 @@ ONE_OF_EACH = {
 
 def check_sums(running: Any, expected: Any, fields: tuple[str, ...]) -> None:
     """Their error is relative to the root of the sum of squares, of which a part cancels."""
-    found, sums = running.sums(min_share=0.0), running.combinations(fields)
+    found, sums = running.sums(min_share=0.0), running.sums_for(fields)
     squares = np.concatenate([array[1, 0] for array in sums.arrays]).astype(np.float64)
     roots = dict(zip(sums.fields, np.sqrt(sums.factors**2 @ squares), strict=True))
     for field in fields:
@@ -321,6 +321,7 @@ THRESHOLDS: dict[str, tuple[Any, tuple[str, ...]]] = {
     ),
     "pmndrs": (vkbloom.PmndrsBloom(threshold=0.4, smoothing=0.9), ("threshold", "smoothing")),
     "pmndrs step": (vkbloom.PmndrsBloom(threshold=0.4, smoothing=0.0), ("threshold", "smoothing")),
+    "pmndrs narrow": (vkbloom.PmndrsBloom(threshold=0.4, smoothing=1e-4), ("threshold",)),
     "pmndrs one level": (vkbloom.PmndrsBloom(levels=1, radius=0.3), ("threshold", "radius")),
     "urp dual": (vkbloom.UrpBloom(filter="dual", scatter=0.2), ("threshold", "knee")),
     "urp kawase": (vkbloom.UrpBloom(filter="kawase", scatter=0.2), ("threshold", "knee")),
@@ -395,6 +396,31 @@ def test_fields_that_change_nothing_need_no_sums(
         found = running.sums()
         for field in fields:
             assert found[field] == expected[field] == 0, field
+
+
+@pytest.mark.parametrize("names", [("up_1",), ("up_2", "down_1")])
+def test_shares_have_sums_of_the_levels_with_cotangents(
+    renderer: Renderer, names: tuple[str, ...]
+) -> None:
+    settings = BevyBloom(max_mip_dimension=48, format="rgba32float")
+    image = random_image(45, 70, channels=3, seed=1).astype(np.float32)
+    shapes = {name: part.shape for name, part in renderer.apply(image, settings).items()}
+    cotangents = {name: np.ones(shapes[name], np.float32) for name in names}
+    running = Passes(renderer, Inputs(image), settings, cotangents).submit("all")
+    assert running
+    check_sums(running, reference.vjp(image, settings)[1](cotangents), BY_SHARES["bevy"])
+
+
+def test_fields_without_sums_are_left_to_the_reference(renderer: Renderer) -> None:
+    """Bevy's intensity has a part in the sum of the composite, and one in those of shares."""
+    settings = BevyBloom(max_mip_dimension=16)
+    image = random_image(17, 26, channels=3, seed=1).astype(np.float32)
+    given, cotangents = Inputs(image), {"final": image}
+    expected = reference.vjp(image, in_floats(settings))[1](cotangents)
+    for fields in (("low_frequency_boost",), ("exposure",)):
+        (found,) = pull_each(renderer, settings, [(given, cotangents)], fields)
+        for field in (*fields, "intensity"):
+            assert np.isclose(found[field], expected[field], rtol=1e-4), field
 
 
 def test_shares_of_other_filters_are_not_those_of_a_chain() -> None:

@@ -255,3 +255,12 @@ def test_settings() -> None:
     assert again == settings
     assert hash(again) == hash(settings)
     assert repr(Streaks(directions=cast("Any", np.int64(4)))).startswith("Streaks(intensity=1.0")
+
+
+def test_stages_read_all_light_where_a_threshold_is_below_0(renderer: Renderer) -> None:
+    """Unreal's may be: then negative light passes it, too."""
+    image = 4 * np.random.default_rng(0).random((33, 41, 3), np.float32) ** 3 - 1
+    settings = UnrealBloom(threshold=-0.5, glare=(Streaks(threshold=0.1),), format="rgba32float")
+    expected = reference.apply(image, settings)["final"]
+    found = renderer.apply(image, settings)["final"]
+    assert np.allclose(found, expected, rtol=0, atol=5e-5)

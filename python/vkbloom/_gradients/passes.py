@@ -69,6 +69,8 @@ class Running:
     arrays: tuple[NDArray[Any] | _core.Exported, ...]
     submission: requests.PendingSubmission | None
     results: DerivativeKind
+    #: Those whose sums were computed; None: all.
+    fields: Collection[str] | None = None
 
     def check(self) -> None:
         """Wait, and raise ValueError if a cotangent is not finite."""
@@ -108,7 +110,8 @@ class Running:
         running = self if self.results in ("sums", "all") else self.passes.submit("sums")
         if running is None:
             return {}
-        sums = running.combinations(device_fields(self.passes.settings))
+        known = device_fields(self.passes.settings)
+        sums = running.sums_for(known if self.fields is None else known.intersection(self.fields))
         kinds = [on_host(array)[:, 0].astype(np.float64) for array in sums.arrays]
         # Without fields there are no sums.
         by_channel, squares = np.concatenate([np.zeros((2, 0)), *kinds], axis=1)
@@ -123,8 +126,8 @@ class Running:
                 results[name] = np.asarray(total, np.float32)
         return results
 
-    def combinations(self, fields: Collection[str]) -> Sums:
-        """Return the sums of these passes, and the fields of some whose derivatives they give."""
+    def sums_for(self, fields: Collection[str]) -> Sums:
+        """Return the sums of these passes, with those of the fields whose derivatives they give."""
         totals = {name: array for name, array in self.by_name().items() if name not in _BY_IMAGES}
         return _sums_of(self.passes.settings, totals, fields)
 
@@ -177,7 +180,7 @@ class Passes:
         if any(len(level.shape) != 3 or level.shape[2] not in (3, 4) for level in levels):
             return None
         source = self.inputs.source(levels)
-        sums = None if fields is None else _sums_for(self.settings, fields)
+        sums = None if fields is None else _wanted_sums(self.settings, fields)
         plan = self.renderer._plan_derivatives(
             source, self.settings, tuple(self.cotangents), results, sums
         )
@@ -195,10 +198,10 @@ class Passes:
             self.renderer._pending.wait()
             if submission.exports_ordered:
                 self.renderer._pending.add(submission)
-        return Running(self, plan, arrays, submission, results)
+        return Running(self, plan, arrays, submission, results, fields)
 
 
-def _sums_for(settings: Settings, fields: Collection[str]) -> tuple[str, ...]:
+def _wanted_sums(settings: Settings, fields: Collection[str]) -> tuple[str, ...]:
     """Return what the core calls the sums that fields need."""
     wanted = device_fields(settings).intersection(fields)
     by_shares, channels = share_fields(settings), _channels(settings)
@@ -217,7 +220,7 @@ def _sums_for(settings: Settings, fields: Collection[str]) -> tuple[str, ...]:
 
 
 def _channels(settings: Settings) -> dict[str, dict[str, float | None]]:
-    """Return the fields of the channels of each sum, and what is multiplied for a derivative.
+    """Return for each sum the fields whose derivatives its channels are, times a factor.
 
     0: the derivative is 0, also without the sum. None: it is not that of the field.
     """
@@ -254,9 +257,9 @@ def _sums_of(
     count = sum(name.startswith(_BY_SHARES) for name in totals)
     by_shares = factors_by_shares(settings) if count and share_fields(settings) else {}
     for name, pairs in by_shares.items():
-        # The composite reads the field, too.
+        # The composite reads the field, too. Without cotangents the largest levels have no sums.
         row = found.setdefault(name, [0.0] * width)
-        for number, pair in enumerate(np.broadcast_to(pairs, (count, 2)).tolist()):
+        for number, pair in enumerate(np.broadcast_to(pairs[-count:], (count, 2)).tolist()):
             start = starts[f"{_BY_SHARES}{number}"]
             row[start : start + 2] = pair
     # Other derivatives are left to the reference.
@@ -286,7 +289,7 @@ def on_device(renderer: Renderer, settings: Settings) -> bool:
     return Passes(renderer, Inputs(pixels), floats, {"final": pixels}).submit() is not None
 
 
-# Each step of a training loop asks twice.
+# Each step of a training loop asks several times.
 @functools.lru_cache(16)
 def device_fields(settings: Settings) -> frozenset[str]:
     """Return the fields by which the device has the derivatives.
@@ -317,7 +320,7 @@ class DeviceGradients(Mapping[str, NDArray[Any]]):
     - `names`: All names, in the order of the reference.
     - `sources`: Names, and what returns their derivatives or leaves some to the reference, which
       is the last source and has all names.
-    - `combinations`: What returns the sums for some fields, if these are on the device.
+    - `sums_for`: What returns the sums for some fields, if these are on the device.
     """
 
     def __init__(
@@ -325,13 +328,13 @@ class DeviceGradients(Mapping[str, NDArray[Any]]):
         known: Mapping[str, NDArray[Any]],
         names: Iterable[str],
         *sources: tuple[Container[str], Callable[[], Mapping[str, NDArray[Any]]]],
-        combinations: Callable[[Collection[str]], Sums] | None = None,
+        sums_for: Callable[[Collection[str]], Sums] | None = None,
     ) -> None:
         self._known = dict(known)
         self._names = tuple(names)
         self._sources = list(sources)
         self._lock = ProcessLock()
-        self.combinations = combinations
+        self.sums_for = sums_for
 
     def __getitem__(self, name: str) -> NDArray[Any]:
         check_known(name, self._names)

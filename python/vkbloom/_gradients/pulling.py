@@ -275,7 +275,7 @@ class _Adjoint:
             ({WEIGHTS}, running.weights),
             (device_fields(self.settings), functools.partial(running.sums, self.min_share)),
             (names, functools.partial(self._by_reference, cotangents)),
-            combinations=running.combinations if self.sums_destination == "cuda" else None,
+            sums_for=running.sums_for if self.sums_destination == "cuda" else None,
         )
 
     @functools.cached_property

@@ -66,6 +66,7 @@ class PmndrsBloom(PublishedSettings):
         }
 
     def _threshold_slopes(self) -> dict[str, float]:
-        # Two zeros stand for none, and a narrow step for the narrowest.
+        # Two zeros stand for none, and a narrow step for the narrowest, with the mean at this kink.
         is_none = self.threshold == self.smoothing == 0
-        return {"threshold": float(not is_none), "smoothing": float(self.smoothing > 1e-4)}
+        wider = ((self.smoothing > 1e-4) + (self.smoothing >= 1e-4)) / 2
+        return {"threshold": float(not is_none), "smoothing": wider}

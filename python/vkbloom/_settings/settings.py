@@ -259,7 +259,9 @@ class Settings(Record):
     @functools.cached_property
     def _block(self) -> bytes:
         # What stages of glare read has passed this threshold, however the method counts its own.
-        stages = None if self.threshold is None else (self.threshold, self.knee)
+        # (Unreal's may be below 0, which changes nothing.)
+        is_set = self.threshold is not None and self.threshold >= 0
+        stages = (self.threshold, self.knee) if is_set else None
         return settings_block(
             self.method, vars(self) | {"stage_threshold": stages} | self._core_values()
         )
