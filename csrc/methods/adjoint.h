@@ -24,10 +24,9 @@ struct vkb_cotangents {
 // ".by_shares_0" and so on (the cotangents of a sum of two levels times the one of its size, and
 // times the sum), where fields are learned by them; and ".by_own_threshold" of a method whose
 // threshold is within a pass of taps (what by_point() of lib/points.glsl has). Of the weights of a
-// field of kernels:
-// ".by_weights_0" and so on, of four weights each at the places of their grid, unless that has more
-// places than images have pixels. *first is the index of the first image that is added. *possible
-// becomes false if a pass has no adjoint.
+// field of kernels: ".by_weights_0" and so on, of four weights each at the places of their grid,
+// unless that has more places than images have pixels. *first is the index of the first image that
+// is added. *possible becomes false if a pass has no adjoint.
 bool vkb_build_adjoint(const struct vkb_source *source, const struct vkb_settings *settings,
                        const struct vkb_cotangents *cotangents, uint32_t max_side,
                        struct vkb_transposes *transposes, struct vkb_graph *graph, uint32_t *first,

@@ -305,7 +305,6 @@ static uint32_t add_node_sums(struct vkb_levels *levels, struct vkb_pass_row row
     row.transposed = true;
     row.block = VKB_BLOCK_node_sums;
     row.constants.direction = vertical ? DIRECTION_VERTICAL : DIRECTION_HORIZONTAL;
-    row.constants.by = BY_VALUES;
     snprintf(of_parts, sizeof of_parts, "%s_parts", name);
     row.targets[0] = vkb_levels_target(levels, of_parts, VKB_FORMAT_RGBA32_FLOAT, of_sums, false);
     vkb_levels_pass(levels, &row);

@@ -100,9 +100,8 @@ bool vkb_accumulate_moved(struct vkb_adjoint *adjoint, const struct vkb_pass_row
 bool vkb_accumulate_mask(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
                          struct vkb_pass_row *row, struct vkb_error *error);
 
-// Adds the row with a shader of lib/sums.glsl, and the passes that add its sums
-// up to one pixel of the framebuffer `name`; below it is the sum of the squares, which tells how
-// exact the sum is.
+// Adds the row with a shader of lib/sums.glsl, and the passes that add its sums up to one pixel of
+// the framebuffer `name`; below it is the sum of the squares, which tells how exact the sum is.
 bool vkb_add_sum_passes(struct vkb_adjoint *adjoint, const struct vkb_pass_row *row,
                         const struct vkb_shader *shader, struct vkb_size size, const char *name,
                         struct vkb_error *error);

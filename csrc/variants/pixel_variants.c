@@ -55,10 +55,10 @@ bool vkb_add_fullscreen_variant(struct vkb_variant_choice *choice, const struct 
     struct vkb_pass_row row;
 
     memcpy(&row, pass, sizeof row);
-    const bool sums = pass->constants.by == BY_VALUES;
-    if (sums && pass->block != VKB_BLOCK_node_sums)
+    if (pass->constants.by == BY_VALUES)
         add_up(graph, &row);
-    else if (sums || choice->variants == VKB_VARIANTS_GPU)
+    // An invocation computes sums and squares between nodes together, too.
+    else if (choice->variants == VKB_VARIANTS_GPU || pass->block == VKB_BLOCK_node_sums)
         vkb_make_dispatch(&row, pass->shader->dispatch, PIXEL_INVOCATIONS, PIXEL_INVOCATIONS);
     else if (vkb_fits_linear(choice, pass) && blends(graph, pass))
         load_pixels(graph, &row, blend_shaders);

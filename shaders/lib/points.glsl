@@ -259,6 +259,12 @@ vec4 babylon_factor(vec3 colour)
 }
 BY_FACTOR(babylon)
 
+// A smooth step of a share, 0 to 1.
+float smooth_share(float share)
+{
+    return share * share * (3.0 - 2.0 * share);
+}
+
 // three.js' high pass: a smooth step of the luminance (mrdoob/three.js,
 // examples/jsm/shaders/LuminosityHighPassShader.js @ 0255e15dd1d4).
 float smooth_place(float luminance)
@@ -276,7 +282,7 @@ vec4 smooth_step_factor(vec3 colour, vec3 weights)
 {
     float place = smooth_place(dot(colour, weights)), t = clamp(place, 0.0, 1.0);
     // Not smoothstep(), which is undefined where rounding makes both ends equal.
-    return vec4(smooth_slope(place) * weights, t * t * (3.0 - 2.0 * t));
+    return vec4(smooth_slope(place) * weights, smooth_share(t));
 }
 
 // By the threshold and the width.
@@ -405,22 +411,17 @@ float glow_place(vec3 colour)
     return clamp((largest(colour) - params.threshold) / glow_scale(), 0.0, 1.0);
 }
 
-float glow_share(float place)
-{
-    return place * place * (3.0 - 2.0 * place);
-}
-
 // The slope of the factor by the brightest channel.
 float glow_slope(float place)
 {
-    return larger(glow_share(place), params.glow_bloom) * 6.0 * place * (1.0 - place) / glow_scale();
+    return larger(smooth_share(place), params.glow_bloom) * 6.0 * place * (1.0 - place) / glow_scale();
 }
 
 // The factor of what is above the threshold, in alpha, and its derivatives by the channels.
 vec4 glow_factor(vec3 colour)
 {
     float place = glow_place(colour);
-    return vec4(glow_slope(place) * shares_of_brightest(colour), max(glow_share(place), params.glow_bloom));
+    return vec4(glow_slope(place) * shares_of_brightest(colour), max(smooth_share(place), params.glow_bloom));
 }
 
 // What glows of it.
@@ -449,7 +450,7 @@ vec4 by_glowing(vec4 sum, vec4 cotangent)
     float place = glow_place(value.rgb), slope = glow_slope(place);
     float by_scale = -slope * place * larger(params.threshold_scale, 1e-6);
     return inner_product(cotangent, value)
-         * vec4(-slope, by_scale, larger(params.glow_bloom, glow_share(place)), 0.0);
+         * vec4(-slope, by_scale, larger(params.glow_bloom, smooth_share(place)), 0.0);
 }
 #endif
 
