@@ -298,6 +298,24 @@ def test_fields_of_the_composite_are_sums(renderer: Renderer, method: str) -> No
     check_sums(running, expected, (*composite, *BY_SHARES.get(method, ())))
 
 
+LEARNED: dict[str, Any] = {"threshold": 0.4, "knee": 0.3, "intensity": 0.7}
+
+
+@pytest.mark.parametrize(
+    "curve", [("aces", "srgb"), ("agx", "none"), ("none", "pq"), ("none", "hlg")]
+)
+def test_sums_behind_a_steep_curve(renderer: Renderer, curve: tuple[str, str]) -> None:
+    """They are asked for where the digits of the reference are not needed."""
+    tonemap, encoding = curve
+    settings = in_floats(Pyramid(tonemap=tonemap, encoding=encoding, **LEARNED))
+    image = 4 * random_image(35, 54, channels=4, seed=1).astype(np.float32)
+    cotangents = {"final": np.random.default_rng(2).normal(size=image.shape).astype(np.float32)}
+    running = Passes(renderer, Inputs(image), settings, cotangents).submit("all", tuple(LEARNED))
+    assert running
+    assert not running.sums()
+    check_sums(running, reference.vjp(image, settings)[1](cotangents), tuple(LEARNED))
+
+
 #: Settings of published methods, and fields, of those that their thresholds read.
 THRESHOLDS: dict[str, tuple[Any, tuple[str, ...]]] = {
     "kino": (vkbloom.KinoBloom(threshold=0.6), ("threshold", "knee")),
@@ -445,7 +463,6 @@ def test_sums_of_large_images_have_plans(renderer: Renderer, method: str) -> Non
     assert plan is not None
 
 
-LEARNED: dict[str, Any] = {"threshold": 0.4, "knee": 0.3, "intensity": 0.7}
 EXPOSED = ("threshold", "intensity", "exposure")
 #: Settings, fields that are learned, and the sums that these need. Light is what is above the
 #: threshold: where the bloom is linear in it, the derivative by the intensity needs no bloom.

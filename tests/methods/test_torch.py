@@ -230,6 +230,7 @@ def test_cotangents_that_are_not_finite_reach_the_derivatives(
         (SETTINGS, ("knee", "intensity")),
         (SETTINGS.replace(intensity=0.0), ("intensity", "threshold")),
         (vkbloom.Separable(threshold=0.2, exposure=0.5), ("exposure", "threshold")),
+        (SETTINGS.replace(tonemap="aces"), ("knee", "intensity")),
         (
             vkbloom.presets["bevy_natural"],
             ("low_frequency_boost", "intensity", "high_pass_frequency"),

@@ -105,8 +105,11 @@ class Running:
     def sums(self, min_share: float = MIN_SHARE) -> dict[str, NDArray[np.float32]]:
         """Return the derivatives by `device_fields`.
 
-        A sum that is less than `min_share` of the root of the sum of its squares is left out.
+        A sum that is less than `min_share` of the root of the sum of its squares is left out, and
+        so are those behind a steep curve unless `min_share` is 0.
         """
+        if min_share > 0 and {self.passes.settings.tonemap, self.passes.settings.encoding} & _STEEP:
+            return {}
         running = self if self.results in ("sums", "all") else self.passes.submit("sums")
         if running is None:
             return {}
@@ -298,8 +301,6 @@ def device_fields(settings: Settings) -> frozenset[str]:
     intensity is that of the sum before the composite, and stages read the threshold of a published
     method, too.
     """
-    if {settings.tonemap, settings.encoding} & _STEEP:
-        return frozenset()
     known = {*_OF_COMPOSITE} - settings._fields_before_composite
     if not settings.published:
         known |= {"threshold", "knee"}
