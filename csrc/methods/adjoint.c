@@ -121,17 +121,13 @@ static bool scales_light(const struct vkb_graph *graph, const struct vkb_cotange
 }
 
 // Sets which sums are computed for those that are wanted.
-static void choose_sums(struct vkb_adjoint *adjoint, const struct vkb_settings *settings,
-                        const struct vkb_cotangents *cotangents)
+static void choose_sums(struct vkb_adjoint *adjoint, const struct vkb_cotangents *cotangents)
 {
-    const struct vkb_wanted_sums *wanted = &cotangents->sums;
+    struct vkb_wanted_sums *sums = &adjoint->sums;
 
+    *sums = cotangents->sums;
     adjoint->light = scales_light(adjoint->graph, cotangents);
-    adjoint->sums = (struct vkb_wanted_sums){
-        .composite = wanted->composite || (wanted->intensity && !adjoint->light),
-        .threshold = wanted->threshold || (wanted->intensity && adjoint->light),
-        .shares = wanted->shares && vkb_method_of(settings)->learns_shares,
-    };
+    *(adjoint->light ? &sums->threshold : &sums->composite) |= sums->intensity;
 }
 
 // Makes the cotangents of the source's images framebuffers. A custom method may have framebuffers
@@ -176,7 +172,7 @@ bool vkb_build_adjoint(const struct vkb_source *source, const struct vkb_setting
     if (!vkb_source_build(source, settings, max_side, graph, error))
         return false;
     find_glow(&adjoint, cotangents);
-    choose_sums(&adjoint, settings, cotangents);
+    choose_sums(&adjoint, cotangents);
     const uint32_t image_count = *first = graph->image_count;
     adjoint.cotangents = vkb_alloc(error, image_count, sizeof *adjoint.cotangents);
     bool done = adjoint.cotangents && add_table(&adjoint, error);

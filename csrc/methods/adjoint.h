@@ -22,8 +22,10 @@ struct vkb_cotangents {
 // where the passes read these; ".by_light" in place of the latter has the derivative by a factor of
 // the light above the threshold, too, if that is the intensity's times the intensity; and
 // ".by_shares_0" and so on (the cotangents of a sum of two levels times the one of its size, and
-// times the sum), where fields are learned by them; and ".by_own_threshold" of a method whose
-// threshold is within a pass of taps (what by_point() of lib/points.glsl has). Of the weights of a
+// times the sum); ".by_levels_0" and so on (each channel of a level that a pass adds up to others,
+// times its cotangents from this pass), and ".by_colour" (the same of the first level), whose
+// factors are fields; and ".by_own_threshold" of a method whose threshold is within a pass of taps
+// (what by_point() of lib/points.glsl has). Of the weights of a
 // field of kernels: ".by_weights_0" and so on, of four weights each at the places of their grid,
 // unless that has more places than images have pixels. *first is the index of the first image that
 // is added. *possible becomes false if a pass has no adjoint.

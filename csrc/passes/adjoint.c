@@ -377,6 +377,17 @@ bool vkb_add_sum_passes(struct vkb_adjoint *adjoint, const struct vkb_pass_row *
     return vkb_graph_show_image(adjoint->graph, image, name, error);
 }
 
+bool vkb_add_product_sums(struct vkb_adjoint *adjoint, uint32_t cotangents, uint32_t image,
+                          const char *name, struct vkb_error *error)
+{
+    const struct vkb_image_row *of = &adjoint->graph->images[image];
+    struct vkb_pass_row row = vkb_adjoint_row(&vkb_shader_adjoint_products_frag, cotangents);
+
+    row.reads[SLOT_SOURCE] = image;
+    return vkb_add_sum_passes(adjoint, &row, row.shader, (struct vkb_size){of->width, of->height},
+                              name, error);
+}
+
 bool vkb_add_threshold_sums(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
                             const struct vkb_pass_row *row, const struct vkb_shader *shader,
                             struct vkb_error *error)

@@ -105,6 +105,9 @@ bool vkb_accumulate_mask(struct vkb_adjoint *adjoint, const struct vkb_pass_row 
 bool vkb_add_sum_passes(struct vkb_adjoint *adjoint, const struct vkb_pass_row *row,
                         const struct vkb_shader *shader, struct vkb_size size, const char *name,
                         struct vkb_error *error);
+// Adds those of the products of cotangents and an image, for each channel.
+bool vkb_add_product_sums(struct vkb_adjoint *adjoint, uint32_t cotangents, uint32_t image,
+                          const char *name, struct vkb_error *error);
 // Adds those by what the threshold of a pass of taps reads, if it has one and they are wanted.
 bool vkb_add_threshold_sums(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
                             const struct vkb_pass_row *row, const struct vkb_shader *shader,

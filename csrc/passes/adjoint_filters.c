@@ -22,6 +22,19 @@ static bool add_share_sums(struct vkb_adjoint *adjoint, const struct vkb_pass_ro
     return vkb_add_sum_passes(adjoint, &row, row.shader, size, name, error);
 }
 
+// If they are wanted, the sums by factors of one of the levels that a pass adds up, all of whose
+// cotangents are from this pass so far.
+static bool add_level_sums(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
+                           uint32_t level, uint32_t number, struct vkb_error *error)
+{
+    char name[VKB_NAME_SIZE];
+
+    if (!adjoint->sums.levels || pass->shader != &vkb_shader_gather_frag)
+        return true;
+    snprintf(name, sizeof name, ".by_levels_%u", number);
+    return vkb_add_product_sums(adjoint, adjoint->cotangents[level], level, name, error);
+}
+
 bool vkb_transpose_filters(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
                            struct vkb_error *error)
 {
@@ -32,10 +45,13 @@ bool vkb_transpose_filters(struct vkb_adjoint *adjoint, const struct vkb_pass_ro
     // The pass before has no cotangents then, unless its result is a framebuffer that has its own.
     if (pass->joined)
         return vkb_accumulate_filter(adjoint, pass->joined, cotangents, pass->joined_from, error);
-    for (uint32_t i = 0; i < pass->filter_count; ++i)
-        if (!vkb_accumulate_filter(adjoint, &pass->filters[i], cotangents,
-                                   pass->reads[SLOT_LEVELS + i], error))
+    for (uint32_t i = 0; i < pass->filter_count; ++i) {
+        const uint32_t level = pass->reads[SLOT_LEVELS + i];
+        const bool is_alone = adjoint->cotangents[level] == VKB_NO_IMAGE;
+        if (!vkb_accumulate_filter(adjoint, &pass->filters[i], cotangents, level, error)
+            || (is_alone && !add_level_sums(adjoint, pass, level, i, error)))
             return false;
+    }
     return true;
 }
 

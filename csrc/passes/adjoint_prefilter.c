@@ -113,8 +113,10 @@ bool vkb_transpose_prefilter(struct vkb_adjoint *adjoint, const struct vkb_pass_
     if (vkb_has_texel_places(set) && vkb_same_size(graph, row.reads[SLOT_SOURCE], target)
         && (!row.constants.masked || vkb_same_size(graph, row.reads[SLOT_MASK], target)))
         row.constants.sampling = SAMPLING_TEXEL;
-    if (!vkb_add_threshold_sums(adjoint, pass, &row, &vkb_shader_adjoint_prefilter_sums_frag,
-                                error))
+    if (!vkb_add_threshold_sums(adjoint, pass, &row, &vkb_shader_adjoint_prefilter_sums_frag, error)
+        || (adjoint->sums.colour && vkb_has_colour(pass)
+            && !vkb_add_product_sums(adjoint, vkb_cotangent_of(adjoint, pass), target, ".by_colour",
+                                     error)))
         return false;
     const bool done = vkb_is_mean(pass) ? accumulate_mean(adjoint, pass, &row, error)
                     : stacked           ? accumulate_stacked(adjoint, pass, &row, count, error)

@@ -50,6 +50,11 @@ bool vkb_is_linear(const struct vkb_pass_row *pass)
     return vkb_is_mean(pass) && pass->constants.after == POINT_NONE && !pass->constants.masked;
 }
 
+bool vkb_has_colour(const struct vkb_pass_row *pass)
+{
+    return pass->constants.after == POINT_URP || pass->constants.after == POINT_PPV2;
+}
+
 #define IS_COMBINATION(name, value, weight) || combine == name
 #define SKIP_COMBINATION(name, value, weight)
 

@@ -27,6 +27,9 @@ void vkb_set_tint(struct vkb_pass_row *row, const float *tint);
 bool vkb_is_mean(const struct vkb_pass_row *pass);
 bool vkb_is_linear(const struct vkb_pass_row *pass);
 
+// Whether its tint is a colour of the settings, by which it multiplies in the end.
+bool vkb_has_colour(const struct vkb_pass_row *pass);
+
 // Whether cotangents of what it combines are those of its taps, not of its kernels.
 bool vkb_differs_by_tap(const struct vkb_pass_row *pass);
 

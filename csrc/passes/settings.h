@@ -12,11 +12,11 @@
     METHOD(PYRAMID, pyramid, .published = false) \
     METHOD(DUAL_KAWASE, dual_kawase, .published = false) \
     METHOD(CONVOLUTION, convolution, .kernel_types = VKB_ALL_TYPES) \
-    METHOD(BEVY, bevy, .published = true, .learns_shares = true) \
+    METHOD(BEVY, bevy, .published = true) \
     METHOD(KINO, kino, .published = true) \
     METHOD(FILAMENT, filament, .published = true) \
-    METHOD(URP, urp, .published = true, .learns_shares = true) \
-    METHOD(HDRP, hdrp, .published = true, .learns_shares = true) \
+    METHOD(URP, urp, .published = true) \
+    METHOD(HDRP, hdrp, .published = true) \
     METHOD(THREE, three, .published = true) \
     METHOD(GODOT, godot, .published = true, .exposes_scene = true) \
     METHOD(BLENDER, blender, .published = true, .first = "frame", \
@@ -27,8 +27,7 @@
     METHOD(UNREAL, unreal, .published = true, .kernel_types = VKB_ALL_TYPES, \
            .sums_gaussians = true) \
     METHOD(HALATION, halation, .published = true, .kernel_types = VKB_ALL_TYPES) \
-    METHOD(PMNDRS, pmndrs, .published = true, .learns_shares = true, \
-           .composite_screen = COMPOSITE_UNCLAMPED_SCREEN) \
+    METHOD(PMNDRS, pmndrs, .published = true, .composite_screen = COMPOSITE_UNCLAMPED_SCREEN) \
     METHOD(BABYLON, babylon, .published = true, .min_weights = 1) \
     METHOD(PLAYCANVAS, playcanvas, .published = true) \
     METHOD(DARKTABLE, darktable, .published = true, \
@@ -44,8 +43,6 @@ struct vkb_method_row {
     bool custom;
     // The exposure multiplies the scene before the composite, not the result.
     bool exposes_scene;
-    // Its fields have derivatives by the shares of levels.
-    bool learns_shares;
     // The name of the first image of the bloom, which then is no framebuffer; NULL: it is "glow".
     const char *first;
     // A bit for each type (VKB_CHOICE_type) that convolves with a kernel that Python makes.

@@ -4,11 +4,25 @@
 
 #include "graph/graph.h"
 
-// The derivatives by fields that are wanted, which are sums: by what the composite reads, what a
-// threshold reads, and the shares of levels. That by the intensity is one of the composite, unless
-// the threshold's sum has it.
+// The derivatives by fields that may be wanted, which are sums:
+// - composite: by what the composite reads;
+// - intensity: one of the composite, unless the threshold's sum has it;
+// - threshold: by what a threshold reads;
+// - shares: by the shares of a level and a smaller one;
+// - levels: by factors of the channels of the levels that one pass adds up;
+// - colour: by factors of the channels of the first level.
+#define VKB_SUMS(SUM) \
+    SUM(composite) \
+    SUM(intensity) \
+    SUM(threshold) \
+    SUM(shares) \
+    SUM(levels) \
+    SUM(colour)
+
 struct vkb_wanted_sums {
-    bool composite, threshold, shares, intensity;
+#define VKB_SUM_MEMBER(name) bool name;
+    VKB_SUMS(VKB_SUM_MEMBER)
+#undef VKB_SUM_MEMBER
 };
 
 struct vkb_transposed;

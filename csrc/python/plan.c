@@ -307,32 +307,26 @@ static bool read_cotangents(PyObject *tuple, struct vkb_cotangents *cotangents)
 
 static bool read_results(const char *name, struct vkb_cotangents *cotangents)
 {
-    const bool all = strcmp(name, "all") == 0, sums = all || strcmp(name, "sums") == 0;
+    const bool all = strcmp(name, "all") == 0;
 
     cotangents->images = all || strcmp(name, "images") == 0;
     cotangents->weights = strcmp(name, "weights") == 0;
-    cotangents->sums = (struct vkb_wanted_sums){sums, sums, sums, sums};
-    return cotangents->images || sums || cotangents->weights
+    return cotangents->images || cotangents->weights || strcmp(name, "sums") == 0
         || vkb_refuse("results: '%s' is not 'images', 'sums', 'all' or 'weights'", name);
 }
 
-// Leaves out the sums whose names are not in the tuple.
 static bool read_sums(PyObject *tuple, struct vkb_wanted_sums *sums)
 {
-    struct vkb_wanted_sums given = {0};
     const struct {
         const char *name;
-        bool *is_given;
+        bool *is_wanted;
     } rows[] = {
-        {"composite", &given.composite},
-        {"threshold", &given.threshold},
-        {"shares", &given.shares},
-        {"intensity", &given.intensity},
+#define VKB_SUM_ROW(name) {#name, &sums->name},
+        VKB_SUMS(VKB_SUM_ROW)
+#undef VKB_SUM_ROW
     };
     const size_t count = sizeof rows / sizeof *rows;
 
-    if (!vkb_require_tuple(tuple, "sums"))
-        return false;
     for (Py_ssize_t i = 0; i < PyTuple_Size(tuple); ++i) {
         const char *name = PyUnicode_AsUTF8AndSize(PyTuple_GetItem(tuple, i), NULL);
         size_t row = 0;
@@ -340,12 +334,8 @@ static bool read_sums(PyObject *tuple, struct vkb_wanted_sums *sums)
             ++row;
         if (!name || row == count)
             return name && vkb_refuse("sums: there is none named '%s'", name);
-        *rows[row].is_given = true;
+        *rows[row].is_wanted = true;
     }
-    sums->composite = sums->composite && given.composite;
-    sums->threshold = sums->threshold && given.threshold;
-    sums->shares = sums->shares && given.shares;
-    sums->intensity = sums->intensity && given.intensity;
     return true;
 }
 
@@ -353,18 +343,19 @@ PyObject *vkb_renderer_plan(PyObject *object, PyObject *arguments)
 {
     struct vkb_renderer *renderer = (struct vkb_renderer *)object;
     const struct vkb_module_state *state = PyType_GetModuleState(Py_TYPE(object));
-    PyObject *source, *settings_object, *names, *cotangents = NULL, *sums = Py_None;
-    struct vkb_cotangents given;
+    PyObject *source, *settings_object, *names, *cotangents = NULL, *sums = NULL;
+    struct vkb_cotangents given = {0};
     struct portion portion = {.renderer = renderer, .cotangents = &given, .is_possible = true};
     struct vkb_settings settings;
     struct vkb_error error = {0};
     const char *results = "images";
 
-    if (!PyArg_ParseTuple(arguments, "O!OO|O!sO:plan", state->source_type, &source,
-                          &settings_object, &names, &PyTuple_Type, &cotangents, &results, &sums)
+    if (!PyArg_ParseTuple(arguments, "O!OO|O!sO!:plan", state->source_type, &source,
+                          &settings_object, &names, &PyTuple_Type, &cotangents, &results,
+                          &PyTuple_Type, &sums)
         || !vkb_read_settings(settings_object, &settings)
         || (cotangents && !read_cotangents(cotangents, &given)) || !read_results(results, &given)
-        || (sums != Py_None && !read_sums(sums, &given.sums)))
+        || (sums && !read_sums(sums, &given.sums)))
         return NULL;
     if (cotangents && ((struct vkb_source_object *)source)->source.kind != VKB_SOURCE_IMAGE) {
         vkb_refuse("cotangents: the source is not an image");

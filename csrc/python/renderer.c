@@ -307,13 +307,12 @@ static PyObject *get_cached(PyObject *object, void *unused)
 static PyMethodDef methods[] = {
     {"close", close_renderer, METH_NOARGS, "Releases the device; may be called twice."},
     {"plan", vkb_renderer_plan, METH_VARARGS,
-     "plan(source, settings, names, cotangents=None, results='images', sums=None) -> Plan. Makes "
-     "no device "
-     "call; names None: all framebuffers. With cotangents, the names of framebuffers whose "
+     "plan(source, settings, names, cotangents=None, results='images', sums=()) -> Plan. Makes no "
+     "device call; names None: all framebuffers. With cotangents, the names of framebuffers whose "
      "cotangents are the source's levels: of the derivatives by images, of the sums by fields "
      "('sums'; methods/adjoint.h), of both ('all'), or by the weights of a field of kernels "
      "('weights'); None if a pass has no adjoint. `sums` has the names of those that are wanted of "
-     "'composite', 'threshold', 'shares' and 'intensity'; None: all."},
+     "VKB_SUMS (passes/transposes.h)."},
     {"run", vkb_renderer_run, METH_VARARGS,
      "run(source, plans, arrays, in_place=False, show=None, histories=None) -> Submission. Submits "
      "plans with the "

@@ -103,7 +103,7 @@ class Renderer:
         names: None,
         cotangents: tuple[str, ...],
         results: str,
-        sums: tuple[str, ...] | None = None,
+        sums: tuple[str, ...] = (),
         /,
     ) -> Plan | None: ...
     @overload

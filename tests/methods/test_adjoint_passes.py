@@ -269,11 +269,11 @@ def check_sums(running: Any, expected: Any, fields: tuple[str, ...]) -> None:
     """Their error is relative to the root of the sum of squares, of which a part cancels."""
     found, sums = running.sums(min_share=0.0), running.sums_for(fields)
     squares = np.concatenate([array[1, 0] for array in sums.arrays]).astype(np.float64)
-    roots = dict(zip(sums.fields, np.sqrt(sums.factors**2 @ squares), strict=True))
     for field in fields:
-        assert abs(found[field] - expected[field]) <= 5e-5 * (
-            roots[field] + abs(expected[field])
-        ), field
+        roots = np.sqrt(sums.factors[field] ** 2 @ squares)
+        errors = np.abs(found[field] - expected[field])
+        assert found[field].shape == np.shape(expected[field])
+        assert (errors <= 5e-5 * (roots + np.abs(expected[field]))).all(), field
 
 
 #: What sets the shares of levels.
@@ -304,7 +304,7 @@ LEARNED: dict[str, Any] = {"threshold": 0.4, "knee": 0.3, "intensity": 0.7}
 @pytest.mark.parametrize(
     "curve", [("aces", "srgb"), ("agx", "none"), ("none", "pq"), ("none", "hlg")]
 )
-def test_sums_behind_a_steep_curve(renderer: Renderer, curve: tuple[str, str]) -> None:
+def test_sums_behind_a_steep_curve(renderer: Renderer, curve: Any) -> None:
     """They are asked for where the digits of the reference are not needed."""
     tonemap, encoding = curve
     settings = in_floats(Pyramid(tonemap=tonemap, encoding=encoding, **LEARNED))
@@ -447,6 +447,62 @@ def test_fields_without_sums_are_left_to_the_reference(renderer: Renderer) -> No
             assert np.isclose(found[field], expected[field], rtol=1e-4), field
 
 
+#: Settings, and fields that are factors of levels.
+FACTORS: dict[str, tuple[Any, tuple[str, ...]]] = {
+    "three": (vkbloom.ThreeBloom(radius=0.3), ("radius", "tints", "intensity")),
+    "three tinted": (
+        vkbloom.ThreeBloom(
+            threshold=0.2,
+            tints=((1.0, 0.5, 2.0), (1.0,) * 3, (0.2, 0.4, 0.6), (1.0, 1.0, 0.9), (3.0, 1.0, 0.1)),
+        ),
+        ("radius", "tints", "threshold"),
+    ),
+    "three node": (
+        vkbloom.ThreeBloom(variant="node", resolution_scale=1.0, tonemap="aces"),
+        ("radius", "tints"),
+    ),
+    "godot": (
+        vkbloom.GodotBloom(level_weights=(0.5, 0.0, 0.7, 1e-4, 2e-4, 0.0, 0.3)),
+        ("level_weights", "intensity"),
+    ),
+    "godot bilinear": (
+        vkbloom.GodotBloom(level_weights=(1.0,) * 7, bicubic=False, composite="screen"),
+        ("level_weights", "threshold"),
+    ),
+    "urp": (vkbloom.UrpBloom(tint=(0.9, 0.03, 1.2)), ("tint", "threshold", "scatter")),
+    "urp dual": (vkbloom.UrpBloom(tint=(0.9, 0.4, 0.7), filter="dual"), ("tint", "knee")),
+    "urp kawase": (vkbloom.UrpBloom(tint=(0.9, 0.4, 0.7), filter="kawase"), ("tint",)),
+    "ppv2": (vkbloom.PostProcessingBloom(color=(0.9, 0.4, 3.0)), ("color", "threshold")),
+    "ppv2 fast": (vkbloom.PostProcessingBloom(fast=True, threshold=None), ("color",)),
+}
+
+
+@pytest.mark.parametrize("name", FACTORS)
+def test_fields_that_are_factors_of_levels_are_sums(renderer: Renderer, name: str) -> None:
+    settings, fields = FACTORS[name]
+    image = 2 * random_image(45, 70, channels=4, seed=1).astype(np.float32)
+    mask = random_image(45, 70, channels=1, seed=3)[..., 0].astype(np.float32)
+    for given, alpha in (({}, "keep"), ({"mask": mask}, "blur")):
+        chosen = settings.replace(**SINGLE, alpha=alpha)
+        cotangents = {"final": np.random.default_rng(2).random(image.shape).astype(np.float32)}
+        running = Passes(renderer, Inputs(image, **given), chosen, cotangents).submit("all", fields)
+        assert running
+        check_sums(running, reference.vjp(image, chosen, **given)[1](cotangents), fields)
+
+
+def test_factors_without_sums_are_left_to_the_reference(renderer: Renderer) -> None:
+    """A factor of 0 leaves nothing of a channel; levels with cotangents have those of others."""
+    image = 2 * random_image(17, 26, channels=3, seed=1).astype(np.float32)
+    settings = vkbloom.ThreeBloom(tints=((0.0, 1.0, 1.0), *((1.0,) * 3,) * 4))
+    shapes = {name: part.shape for name, part in renderer.apply(image, settings).items()}
+    for names in (("final",), ("final", "down_1")):
+        cotangents = {name: np.ones(shapes[name], np.float32) for name in names}
+        found = vkbloom.vjp(image, settings, renderer=renderer)[1](cotangents)
+        expected = reference.vjp(image, settings)[1](cotangents)
+        for field in ("tints", "radius"):
+            assert np.allclose(found[field], expected[field], rtol=1e-4), (names, field)
+
+
 def test_shares_of_other_filters_are_not_those_of_a_chain() -> None:
     known = {name: device_fields(in_floats(settings)) for name, (settings, _) in THRESHOLDS.items()}
     assert "scatter" in known["urp"]
@@ -458,9 +514,7 @@ def test_sums_of_large_images_have_plans(renderer: Renderer, method: str) -> Non
     """With the images of several passes that add up, and of all levels."""
     image = np.zeros((700, 1100, 3), np.float32)
     settings = in_floats(ONE_OF_EACH[method])
-    source = Inputs(image).source((image,))
-    plan = renderer._core.plan(source, settings, None, ("final",), "all")
-    assert plan is not None
+    assert Passes(renderer, Inputs(image), settings, {"final": image}).submit("all") is not None
 
 
 EXPOSED = ("threshold", "intensity", "exposure")

@@ -528,12 +528,14 @@ def _by_values(gradients: Any, call: _Call, stream: int | None) -> Any:
     """Return the derivatives by values as float64, combined where the sums are."""
     if isinstance(gradients, DeviceGradients) and gradients.sums_for:
         sums = gradients.sums_for(call.fields)
-        if sums.arrays and sums.fields == tuple(call.fields):
+        if sums.arrays and [*sums.factors] == [*call.fields]:
             # Few calls: one takes 20 to 30 us after a wait for the GPU. So an infinite channel
             # makes all derivatives NaN, also those that do not need it.
             each = [_as_tensor(part, stream)[0, 0] for part in sums.arrays]
             by_channel = each[0] if len(each) == 1 else torch.cat(each)
-            factors = torch.from_numpy(sums.factors).to(by_channel.device, non_blocking=True)
+            width = by_channel.numel()
+            rows = np.concatenate([part.reshape(-1, width) for part in sums.factors.values()])
+            factors = torch.from_numpy(rows).to(by_channel.device, non_blocking=True)
             return (factors * by_channel).sum(1)
     # Of numbers, the host waits for the device.
     numbers = [np.asarray(gradients[name], np.float64).reshape(-1) for name in call.fields]

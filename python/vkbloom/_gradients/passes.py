@@ -5,14 +5,18 @@ from __future__ import annotations
 import functools
 from collections.abc import Callable, Collection, Container, Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from math import isfinite
 from typing import TYPE_CHECKING, Any, Final, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom import _core
-from vkbloom._gradients.shares import factors_by_shares, share_fields
+from vkbloom._gradients.levels import (
+    factor_fields,
+    factors_by_shares,
+    factors_of_levels,
+    share_fields,
+)
 from vkbloom._locks import ProcessLock
 from vkbloom._renderer import requests
 from vkbloom._renderer.device_arrays import Destination, ImportedArray, on_host, place
@@ -51,12 +55,11 @@ def check_finite(cotangents: Mapping[str, NDArray[Any] | ImportedArray]) -> None
 class Sums(NamedTuple):
     """Sums of the device, and the fields whose derivatives are combinations of them.
 
-    - `factors`: For each field a row, with a factor for each channel of each array.
+    - `factors`: By field, of its shape, and with a factor for each channel of each array.
     - `arrays`: Of shape (2, 1, channels): the sums, and those of the squares of their terms.
     """
 
-    fields: tuple[str, ...]
-    factors: NDArray[np.float64]
+    factors: Mapping[str, NDArray[np.float64]]
     arrays: tuple[NDArray[Any], ...]
 
 
@@ -119,14 +122,14 @@ class Running:
         # Without fields there are no sums.
         by_channel, squares = np.concatenate([np.zeros((2, 0)), *kinds], axis=1)
         results: dict[str, NDArray[np.float32]] = {}
-        for name, factors in zip(sums.fields, sums.factors, strict=True):
+        for name, factors in sums.factors.items():
             # What a field does not need may be infinite.
-            used = factors != 0
-            total = factors[used] @ by_channel[used]
-            square = factors[used] ** 2 @ squares[used]
+            used = factors.any(axis=tuple(range(factors.ndim - 1)))
+            total = factors[..., used] @ by_channel[used]
+            square = factors[..., used] ** 2 @ squares[used]
             # Infinite sums are left to the reference.
-            if np.isfinite(square) and total**2 >= min_share**2 * square:
-                results[name] = np.asarray(total, np.float32)
+            if np.isfinite(square).all() and (total**2 >= min_share**2 * square).all():
+                results[name] = total.astype(np.float32)
         return results
 
     def sums_for(self, fields: Collection[str]) -> Sums:
@@ -183,7 +186,10 @@ class Passes:
         if any(len(level.shape) != 3 or level.shape[2] not in (3, 4) for level in levels):
             return None
         source = self.inputs.source(levels)
-        sums = None if fields is None else _wanted_sums(self.settings, fields)
+        sums: tuple[str, ...] = ()
+        if results in ("sums", "all"):
+            known = device_fields(self.settings)
+            sums = _wanted_sums(self.settings, known if fields is None else known & {*fields})
         plan = self.renderer._plan_derivatives(
             source, self.settings, tuple(self.cotangents), results, sums
         )
@@ -204,13 +210,16 @@ class Passes:
         return Running(self, plan, arrays, submission, results, fields)
 
 
-def _wanted_sums(settings: Settings, fields: Collection[str]) -> tuple[str, ...]:
-    """Return what the core calls the sums that fields need."""
-    wanted = device_fields(settings).intersection(fields)
-    by_shares, channels = share_fields(settings), _channels(settings)
+def _wanted_sums(settings: Settings, wanted: Collection[str]) -> tuple[str, ...]:
+    """Return what the core calls the sums that some of `device_fields` need."""
+    by_shares, factors, channels = (
+        share_fields(settings),
+        factor_fields(settings),
+        _channels(settings),
+    )
     zeros = {name for factors in channels.values() for name, one in factors.items() if one == 0}
     sums = set()
-    for name in wanted - zeros:
+    for name in {*wanted} - zeros:
         if name in by_shares:
             sums.add("shares")
         if name == "intensity":
@@ -218,7 +227,7 @@ def _wanted_sums(settings: Settings, fields: Collection[str]) -> tuple[str, ...]
         elif name in _OF_COMPOSITE:
             sums.add("composite")
         elif name not in by_shares:
-            sums.add("threshold")
+            sums.add(factors.get(name, "threshold"))
     return tuple(sorted(sums))
 
 
@@ -250,25 +259,45 @@ def _sums_of(
     for name, array in totals.items():
         starts[name] = width
         width += array.shape[-1]
-    found: dict[str, list[float]] = {}
+    found: dict[str, NDArray[np.float64]] = {}
     for kind, factors in _channels(settings).items():
         for channel, (name, factor) in enumerate(factors.items()):
             if factor == 0 or (kind in starts and factor is not None and name not in found):
-                found[name] = [0.0] * width
+                found[name] = np.zeros(width)
                 if factor != 0:
                     found[name][starts[kind] + channel] = factor
     count = sum(name.startswith(_BY_SHARES) for name in totals)
     by_shares = factors_by_shares(settings) if count and share_fields(settings) else {}
     for name, pairs in by_shares.items():
         # The composite reads the field, too. Without cotangents the largest levels have no sums.
-        row = found.setdefault(name, [0.0] * width)
-        for number, pair in enumerate(np.broadcast_to(pairs[-count:], (count, 2)).tolist()):
+        row = found.setdefault(name, np.zeros(width))
+        for number, pair in enumerate(np.broadcast_to(pairs[-count:], (count, 2))):
             start = starts[f"{_BY_SHARES}{number}"]
             row[start : start + 2] = pair
+    if not {*factor_fields(settings)}.isdisjoint(fields):
+        found |= _by_factors(settings, starts, width)
     # Other derivatives are left to the reference.
-    known = tuple([name for name in fields if name in found and all(map(isfinite, found[name]))])
-    rows = np.array([found[name] for name in known]).reshape(len(known), width)
-    return Sums(known, rows, tuple(totals.values()))
+    known = {name: found[name] for name in fields if name in found}
+    known = {name: factors for name, factors in known.items() if np.isfinite(factors).all()}
+    return Sums(known, tuple(totals.values()))
+
+
+def _by_factors(
+    settings: Settings, starts: Mapping[str, int], width: int
+) -> dict[str, NDArray[np.float64]]:
+    """Return the factors of all sums for the fields that multiply channels of levels."""
+    found = {}
+    for name, by_level in factors_of_levels(settings).items():
+        kind, count = factor_fields(settings)[name], by_level.shape[-2]
+        kinds = [".by_colour"] if kind == "colour" else [f".by_levels_{i}" for i in range(count)]
+        # A level that has cotangents of its own has no sum.
+        if not all(level in starts for level in kinds):
+            continue
+        found[name] = np.zeros((*by_level.shape[:-2], width))
+        for number, level in enumerate(kinds):
+            start = starts[level]
+            found[name][..., start : start + 4] = by_level[..., number, :]
+    return found
 
 
 def _level(cotangent: NDArray[Any] | ImportedArray) -> NDArray[Any] | ImportedArray:
@@ -297,7 +326,7 @@ def on_device(renderer: Renderer, settings: Settings) -> bool:
 def device_fields(settings: Settings) -> frozenset[str]:
     """Return the fields by which the device has the derivatives.
 
-    These are what only the composite, the threshold, or the shares of levels read. With glare, the
+    These are what only the composite, the threshold, or the sums of levels read. With glare, the
     intensity is that of the sum before the composite, and stages read the threshold of a published
     method, too.
     """
@@ -306,7 +335,7 @@ def device_fields(settings: Settings) -> frozenset[str]:
         known |= {"threshold", "knee"}
     elif not settings.glare:
         known |= settings._threshold_slopes().keys()
-    known |= {*share_fields(settings)}
+    known |= {*share_fields(settings), *factor_fields(settings)}
     if settings.glare:
         known -= {"intensity"}
     return frozenset(known & differentiable(settings).keys())

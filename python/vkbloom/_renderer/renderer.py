@@ -1019,12 +1019,11 @@ class Renderer:
         settings: Settings,
         cotangents: tuple[str, ...],
         results: DerivativeKind,
-        sums: tuple[str, ...] | None = None,
+        sums: tuple[str, ...],
     ) -> _core.Plan | None:
         """Return the plan of derivatives, as `_plan_of` does, or None if a pass has none.
 
-        `sums`: Those that are computed of "composite", "threshold", "shares", and "intensity",
-        which is one of the first two. None: all, where `results` has them.
+        `sums`: Those that are computed, where `results` has them (VKB_SUMS of the core).
         """
         return self._find_plan(source, settings, None, cotangents, results, sums)
 
