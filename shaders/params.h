@@ -15,11 +15,10 @@
 //
 // The block of a fused pass has the rows of the passes that it replaces.
 
-// The settings that shaders read, and `radius`: floats, SETTING(name, default, min, max).
+// The settings that shaders read: floats, SETTING(name, default, min, max).
 #define SETTING_ROWS(SETTING) \
     SETTING(threshold, 0.0, 0.0, 65504.0) \
     SETTING(knee, 0.0, 0.0, 1.0) \
-    SETTING(radius, 1.0, 0.0, 16.0) \
     SETTING(highlight, 1000.0, 10.0, 65504.0) \
     SETTING(clamp_max, 65472.0, 0.0, 65504.0) \
     SETTING(smooth_width, 0.01, 0.0001, 65504.0) \
@@ -31,7 +30,6 @@
     SETTING(smoothness, 0.1, 0.0, 1.0) \
     SETTING(maximum, 3.4e38, 0.0, 65504.0) \
     SETTING(saturation, 1.0, 0.0, 16.0) \
-    SETTING(offset, 1.0, 0.0, 16.0) \
     SETTING(intensity, 1.0, 0.0, 65504.0) \
     SETTING(exposure, 0.0, -32.0, 32.0) \
     SETTING(reference_white, 203.0, 1.0, 10000.0)
@@ -452,6 +450,8 @@
     REAL(blur_scale, 1.0, 0.0, 16.0) \
     REAL(blur_strength, 1.5, 0.0, 16.0) \
     REAL(bloom_scale, 1.0, 0.001, 4.0) \
+    REAL(radius, 1.0, 0.0, 16.0) \
+    REAL(offset, 1.0, 0.0, 16.0) \
     REAL(low_frequency_boost, 0.7, 0.0, 1.0) \
     REAL(low_frequency_boost_curvature, 0.95, 0.0, 0.99) \
     REAL(high_pass_frequency, 1.0, 0.001, 1.0) \

@@ -110,11 +110,21 @@ int32_t vkb_axis_ratio(const struct vkb_axis *axis)
                              : 0;
 }
 
+bool vkb_axis_has_distances(const struct vkb_axis *axis)
+{
+    bool has_distances = false;
+
+    for (uint32_t i = 0; i < vkb_axis_count(axis); ++i)
+        has_distances = has_distances || vkb_axis_tap(axis, i).offset != 0.0;
+    return has_distances && axis->kind == UPSAMPLE_LINEAR && axis->border == VKB_BORDER_NONE
+        && axis->next == 0;
+}
+
 bool vkb_axis_is_identity(const struct vkb_axis *axis)
 {
     const struct vkb_tap tap = vkb_axis_tap(axis, 0);
 
     return axis->from == axis->to && axis->origin == 0.0 && axis->step == 1.0 && axis->first == 0
-        && axis->kind == UPSAMPLE_LINEAR && axis->next == 0 && vkb_axis_count(axis) == 1
-        && tap.offset == 0.0 && tap.weights[0] == 1.0;
+        && axis->kind == UPSAMPLE_LINEAR && !axis->slopes && axis->next == 0
+        && vkb_axis_count(axis) == 1 && tap.offset == 0.0 && tap.weights[0] == 1.0;
 }

@@ -56,6 +56,7 @@ struct vkb_axis {
     uint32_t from, to;
     double origin, step;
     enum vkb_mode kind;  // what a tap samples at its position: UPSAMPLE_*
+    bool slopes;         // of UPSAMPLE_LINEAR: taps have derivatives by a factor of their offsets
     enum vkb_border border;
     // Bits of next_texel() (shaders/lib/sampling.glsl): at which texels the one after it is read,
     // if there are any; whether texels are counted from the last one.
@@ -107,6 +108,9 @@ void vkb_filter_next(struct vkb_filter *filter, const float next[4]);
 // Whether sides, or positions, are in a simple ratio: EXACT_*; 0: they are not.
 int32_t vkb_ratio_of(uint32_t source, uint32_t target);
 int32_t vkb_axis_ratio(const struct vkb_axis *axis);
+
+// Whether taps sample linearly beside the positions of the pixels.
+bool vkb_axis_has_distances(const struct vkb_axis *axis);
 
 // Whether the axis leaves an image as it is.
 bool vkb_axis_is_identity(const struct vkb_axis *axis);

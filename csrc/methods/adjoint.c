@@ -169,6 +169,7 @@ bool vkb_build_adjoint(const struct vkb_source *source, const struct vkb_setting
         .image = VKB_NO_IMAGE,
     };
 
+    graph->keeps_distances = cotangents->sums.enlarging || cotangents->sums.reducing;
     if (!vkb_source_build(source, settings, max_side, graph, error))
         return false;
     find_glow(&adjoint, cotangents);

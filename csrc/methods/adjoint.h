@@ -17,18 +17,23 @@ struct vkb_cotangents {
 };
 
 // Adds the framebuffers ".by_image", ".by_emission" and ".by_mask", of those that the source has
-// and that the cotangents depend on, and, as sums of one pixel with those of the squares below,
-// ".by_composite" (intensity, exposure, reference white) and ".by_threshold" (threshold, knee),
-// where the passes read these; ".by_light" in place of the latter has the derivative by a factor of
-// the light above the threshold, too, if that is the intensity's times the intensity; and
-// ".by_shares_0" and so on (the cotangents of a sum of two levels times the one of its size, and
-// times the sum); ".by_levels_0" and so on (each channel of a level that a pass adds up to others,
-// times its cotangents from this pass), and ".by_colour" (the same of the first level), whose
-// factors are fields; and ".by_own_threshold" of a method whose threshold is within a pass of taps
-// (what by_point() of lib/points.glsl has). Of the weights of a
-// field of kernels: ".by_weights_0" and so on, of four weights each at the places of their grid,
-// unless that has more places than images have pixels. *first is the index of the first image that
-// is added. *possible becomes false if a pass has no adjoint.
+// and that the cotangents depend on. And those of the sums that are wanted, where passes have them.
+// They are of one pixel, with the sums of the squares below it:
+// - ".by_composite": by intensity, exposure, reference white;
+// - ".by_threshold": by threshold and knee; in its place ".by_light": the derivative by a factor of
+//   the light above the threshold, too, if that is the one by the intensity, times the intensity;
+// - ".by_own_threshold": of a threshold within a pass of taps, what by_point() of lib/points.glsl
+//   has;
+// - ".by_shares_0" and so on: the cotangents of a sum of two levels times the one of its size, and
+//   times the sum;
+// - ".by_levels_0" and so on: of a level that a pass adds up to others, each channel times its
+//   cotangents from this pass;
+// - ".by_colour": the same of the first level;
+// - ".by_enlarging_x_0", ".by_reducing_y_1" and so on: of a pass and an axis, what the pass reads
+//   times the transpose of its slopes.
+// Of the weights of a field of kernels: ".by_weights_0" and so on, of four weights each at the
+// places of their grid, unless that has more places than images have pixels. *first is the index of
+// the first image that is added. *possible becomes false if a pass has no adjoint.
 bool vkb_build_adjoint(const struct vkb_source *source, const struct vkb_settings *settings,
                        const struct vkb_cotangents *cotangents, uint32_t max_side,
                        struct vkb_transposes *transposes, struct vkb_graph *graph, uint32_t *first,

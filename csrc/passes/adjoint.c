@@ -59,7 +59,10 @@ static bool add_numbered_pass(struct vkb_adjoint *adjoint, const char *prefix, u
 bool vkb_add_adjoint_pass(struct vkb_adjoint *adjoint, struct vkb_pass_row *row,
                           struct vkb_size size, uint32_t *image, struct vkb_error *error)
 {
-    return add_numbered_pass(adjoint, "adjoint", adjoint->added++, row, size, image, error);
+    return adjoint->sloped
+             ? add_numbered_pass(adjoint, "adjoint_slope", adjoint->slopes++, row, size, image,
+                                 error)
+             : add_numbered_pass(adjoint, "adjoint", adjoint->added++, row, size, image, error);
 }
 
 void vkb_delay_scene(struct vkb_adjoint *adjoint, const struct vkb_pass_row *row,

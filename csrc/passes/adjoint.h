@@ -19,7 +19,9 @@ struct vkb_adjoint {
     uint32_t *cotangents;  // by forward image: its cotangents so far; VKB_NO_IMAGE: none
     // Images so far, of sums and others. These have the same names whether sums are wanted or not,
     // so that a plan of sums finds what that of derivatives by images has made.
-    uint32_t added, summed;
+    uint32_t added, summed, slopes;
+    bool sloped;     // what is added is for a sum by the distances of taps
+    uint32_t moved;  // the axes that have such a sum so far
     uint32_t max_side;
     uint32_t mixed;  // sums of two levels so far
     struct vkb_wanted_sums sums;

@@ -35,6 +35,51 @@ static bool add_level_sums(struct vkb_adjoint *adjoint, const struct vkb_pass_ro
     return vkb_add_product_sums(adjoint, adjoint->cotangents[level], level, name, error);
 }
 
+// The transpose of a filter with slopes along one axis, times the image that it reads: the sum by a
+// factor of its taps' distances.
+static bool add_slope_sums(struct vkb_adjoint *adjoint, const struct vkb_filter *filter,
+                           const char *kind, uint32_t cotangents, uint32_t image,
+                           struct vkb_error *error)
+{
+    const struct vkb_adjoint kept = *adjoint;
+    const uint32_t before = kept.cotangents[image];
+    char name[VKB_NAME_SIZE];
+
+    // The result is the only cotangents of the image for a moment, and none of another one.
+    adjoint->cotangents[image] = adjoint->scene = adjoint->glow = VKB_NO_IMAGE;
+    adjoint->sloped = true;
+    const bool done = vkb_accumulate_filter(adjoint, filter, cotangents, image, error);
+    const uint32_t slopes = adjoint->cotangents[image];
+    adjoint->cotangents[image] = before;
+    adjoint->scene = kept.scene;
+    adjoint->glow = kept.glow;
+    adjoint->sloped = false;
+    snprintf(name, sizeof name, ".by_%s_%u", kind, adjoint->moved++);
+    return done && vkb_add_product_sums(adjoint, slopes, image, name, error);
+}
+
+// If they are wanted, the sums by factors of the distances of a filter's taps along each axis.
+static bool add_distance_sums(struct vkb_adjoint *adjoint, const struct vkb_filter *given,
+                              uint32_t cotangents, uint32_t image, struct vkb_error *error)
+{
+    const struct vkb_axis *x = &given->x, *y = &given->y;
+    const bool enlarging = (uint64_t)x->to * y->to > (uint64_t)x->from * y->from;
+    struct vkb_filter filter = *given;
+
+    if (!(enlarging ? adjoint->sums.enlarging : adjoint->sums.reducing))
+        return true;
+    filter.x.slopes = true;
+    if (vkb_axis_has_distances(x)
+        && !add_slope_sums(adjoint, &filter, enlarging ? "enlarging_x" : "reducing_x", cotangents,
+                           image, error))
+        return false;
+    filter.x.slopes = false;
+    filter.y.slopes = true;
+    return !vkb_axis_has_distances(y)
+        || add_slope_sums(adjoint, &filter, enlarging ? "enlarging_y" : "reducing_y", cotangents,
+                          image, error);
+}
+
 bool vkb_transpose_filters(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
                            struct vkb_error *error)
 {
@@ -44,11 +89,13 @@ bool vkb_transpose_filters(struct vkb_adjoint *adjoint, const struct vkb_pass_ro
         return false;
     // The pass before has no cotangents then, unless its result is a framebuffer that has its own.
     if (pass->joined)
-        return vkb_accumulate_filter(adjoint, pass->joined, cotangents, pass->joined_from, error);
+        return add_distance_sums(adjoint, pass->joined, cotangents, pass->joined_from, error)
+            && vkb_accumulate_filter(adjoint, pass->joined, cotangents, pass->joined_from, error);
     for (uint32_t i = 0; i < pass->filter_count; ++i) {
         const uint32_t level = pass->reads[SLOT_LEVELS + i];
         const bool is_alone = adjoint->cotangents[level] == VKB_NO_IMAGE;
-        if (!vkb_accumulate_filter(adjoint, &pass->filters[i], cotangents, level, error)
+        if (!add_distance_sums(adjoint, &pass->filters[i], cotangents, level, error)
+            || !vkb_accumulate_filter(adjoint, &pass->filters[i], cotangents, level, error)
             || (is_alone && !add_level_sums(adjoint, pass, level, i, error)))
             return false;
     }

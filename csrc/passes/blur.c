@@ -63,7 +63,7 @@ struct vkb_pass_row vkb_blur_row(struct vkb_levels *levels, const struct vkb_fil
         direction == DIRECTION_VERTICAL ? &filter.y.kernel : &filter.x.kernel;
 
     if (!kernel->placed && filter.x.kind == UPSAMPLE_LINEAR && !both
-        && (keeps_size(&filter) || is_integer(kernel->step)))
+        && (is_integer(kernel->step) || (keeps_size(&filter) && !levels->graph->keeps_distances)))
         move_to_texels(kernel);
     vkb_read_only(&row, from);
     row.block = VKB_BLOCK_filter;
@@ -92,7 +92,7 @@ const struct vkb_kernel *vkb_texel_kernel(const struct vkb_axis *axis, uint32_t 
     const struct vkb_kernel *kernel = &axis->kernel;
 
     return kernel->count && !kernel->placed && kernel->step == 1.0 && kernel->count - 1 <= limit
-                && axis->kind == UPSAMPLE_LINEAR && axis->border == VKB_BORDER_NONE
+                && axis->kind == UPSAMPLE_LINEAR && !axis->slopes && axis->border == VKB_BORDER_NONE
              ? kernel
              : NULL;
 }

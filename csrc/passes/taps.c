@@ -70,6 +70,16 @@ static struct sample linear_sample(double position)
     return (struct sample){texel, part > 0.0 ? 2 : 1, {1.0 - part, part}};
 }
 
+// The derivative of a linear sample by a factor of the tap's offset: on a texel's centre the mean
+// of both sides.
+static struct sample slope_sample(double position, double offset)
+{
+    const double texel = floor(position);
+
+    return position > texel ? (struct sample){texel, 2, {-offset, offset}}
+                            : (struct sample){texel - 1.0, 3, {-0.5 * offset, 0.0, 0.5 * offset}};
+}
+
 static struct sample cubic_sample(double position)
 {
     const double texel = floor(position), part = position - texel, rest = 1.0 - part;
@@ -118,7 +128,7 @@ static struct sample sample_at(const struct vkb_axis *axis, uint32_t pixel, doub
     case UPSAMPLE_RIGHT_PAIR:
         return linear_sample(position + PAIR_PLACE(1, part));
     default:
-        return linear_sample(position);
+        return axis->slopes ? slope_sample(position, offset) : linear_sample(position);
     }
 }
 

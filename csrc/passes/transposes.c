@@ -10,7 +10,7 @@ enum { MAX_TEXELS = 1 << 24 };
 static const size_t MAX_KEPT_BYTES = (size_t)32 << 20;
 
 enum {
-    AXIS_NUMBERS = 10,
+    AXIS_NUMBERS = 11,
     TAP_NUMBERS = 1 + MAX_KERNELS,
     MAX_LONG_TAPS = 2 * MAX_WEIGHTS - 1,
     MAX_NUMBERS = AXIS_NUMBERS + TAP_NUMBERS * MAX_LONG_TAPS,
@@ -21,8 +21,8 @@ _Static_assert((int)VKB_MAX_TAPS <= (int)MAX_LONG_TAPS, "a description has space
 static size_t describe(const struct vkb_axis *axis, uint32_t kernels, double *numbers)
 {
     const double of_axis[AXIS_NUMBERS] = {
-        axis->from,   axis->to,   axis->origin,    axis->step,  axis->kind,
-        axis->border, axis->next, axis->backwards, axis->first, kernels,
+        axis->from, axis->to,        axis->origin, axis->step,   axis->kind, axis->border,
+        axis->next, axis->backwards, axis->first,  axis->slopes, kernels,
     };
     const uint32_t count = vkb_axis_count(axis);
 

@@ -10,6 +10,8 @@
 // - threshold: by what a threshold reads;
 // - shares: by the shares of a level and a smaller one;
 // - levels: by factors of the channels of the levels that one pass adds up;
+// - enlarging, reducing: by factors of the distances of taps in passes that make an image larger,
+//   and in others;
 // - colour: by factors of the channels of the first level.
 #define VKB_SUMS(SUM) \
     SUM(composite) \
@@ -17,6 +19,8 @@
     SUM(threshold) \
     SUM(shares) \
     SUM(levels) \
+    SUM(enlarging) \
+    SUM(reducing) \
     SUM(colour)
 
 struct vkb_wanted_sums {

@@ -1,19 +1,28 @@
-"""Derivatives by fields that set the shares of levels, or factors, from sums on the device."""
+"""What the device's sums are multiplied by for derivatives by fields of a chain of levels.
+
+Such a field sets shares of the levels in their sum, factors of their channels, or distances of the
+taps of passes between them.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from types import SimpleNamespace
-from typing import Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom._formats import LUMINANCE_7_DIGITS
 from vkbloom._settings.settings import Settings
-from vkbloom.reference import _bevy
+from vkbloom.reference import _bevy, _kino
 from vkbloom.reference._post_processing import linear_light
+from vkbloom.reference._sampling import level_sizes
 from vkbloom.reference._upsampling import mix
+
+if TYPE_CHECKING:
+    from vkbloom._methods.kino import KinoBloom
+    from vkbloom._methods.mip_chain import Pyramid
 
 # Of a central difference. The truncated terms are 1e-10 of the slope, and so is the rounding.
 _STEP: Final = 1e-5
@@ -51,18 +60,23 @@ _METHODS: Final = {
 
 def share_fields(settings: Settings) -> tuple[str, ...]:
     """Return the fields that only the shares of levels and the composite read."""
+    if settings.method == "pyramid":
+        return ("level_weights",)
     method = _METHODS.get(settings.method)
     # The other filters of URP are no chains of levels.
     is_chain = getattr(settings, "filter", "gaussian") == "gaussian"
     return method.fields if method and is_chain else ()
 
 
-def factors_by_shares(settings: Settings) -> dict[str, NDArray[np.float64]]:
+def factors_by_shares(settings: Settings, size: tuple[int, int]) -> dict[str, NDArray[np.float64]]:
     """Return what sums are multiplied by for the derivatives by these fields.
 
-    Each array has two factors for each of up_0, up_1, ..., or for all of them: of the sum of its
-    cotangents times the level of its size, and of that of its cotangents times itself.
+    Each array, after the dimensions of the field, has two factors for each of up_0, up_1, ..., or
+    for all of them: of the sum of its cotangents times the level of its size, and of that of its
+    cotangents times itself. `size`: of the bloom buffers.
     """
+    if settings.method == "pyramid":
+        return {"level_weights": _by_level_weights(cast("Pyramid", settings), size)}
     method = _METHODS[settings.method]
     fine, coarse = _shares(method, settings, {})
     results = {}
@@ -76,6 +90,19 @@ def factors_by_shares(settings: Settings) -> dict[str, NDArray[np.float64]]:
             of_sum = np.where(of_coarse != 0.0, of_coarse / coarse, 0.0)
             results[name] = np.stack([of_fine - of_sum * fine, of_sum], axis=1)
     return results
+
+
+def _by_level_weights(settings: Pyramid, size: tuple[int, int]) -> NDArray[np.float64]:
+    weights = np.array(settings.level_weights)
+    last = len(level_sizes(size, settings.levels)) - 1
+    factors = np.zeros((len(weights), last, 2))
+    each = np.arange(last)
+    factors[each, each, 0] = 1.0
+    # up_N-2 less its level is the enlarged last level, times its weight.
+    if last:
+        with np.errstate(divide="ignore"):
+            factors[last, last - 1] = np.array([-weights[last - 1], 1.0]) / weights[last]
+    return factors
 
 
 def _shares(method: _Shares, settings: Settings, changes: dict[str, float]) -> NDArray[np.float64]:
@@ -146,3 +173,46 @@ def factors_of_levels(settings: Settings) -> Factors:
     """
     with np.errstate(divide="ignore", invalid="ignore"):
         return _FACTORS[settings.method][1](settings)
+
+
+_UP: Final = ("enlarging_x", "enlarging_y")
+_ALL: Final = (*_UP, "reducing_x", "reducing_y")
+#: By method: the fields that only set distances of taps, with the sums of these.
+_DISTANCES: Final[dict[str, dict[str, tuple[str, ...]]]] = {
+    "dual_kawase": {"offset": _ALL},
+    "kino": {"radius": _UP},
+    "pygfx": {"filter_radius": _UP},
+    "pyramid": {
+        "radius": _UP,
+        "scale_x": ("enlarging_x", "reducing_x"),
+        "scale_y": ("enlarging_y", "reducing_y"),
+    },
+    "separable": {"blur_scale": _ALL},
+    "urp": {"scatter": _UP},
+}
+
+
+def distance_fields(settings: Settings) -> dict[str, tuple[str, ...]]:
+    """Return the fields that only set distances of taps, with the kinds of these.
+
+    These are distances along x or y, in passes that enlarge an image or in others.
+    """
+    fields = _DISTANCES.get(settings.method, {})
+    # Stages of glare have taps of their own.
+    if settings.glare or (settings.method == "urp" and settings.value_of("filter") != "dual"):
+        return {}
+    # The weights against fireflies depend on the places of the taps.
+    if settings.method == "pyramid" and settings.value_of("firefly_filter"):
+        return {"radius": fields["radius"]}
+    return fields
+
+
+def distance_by(settings: Settings, name: str, size: tuple[int, int]) -> float:
+    """Return what the distances are proportional to: the field, but for a number added to it.
+
+    The sums are derivatives by a factor of the distances. `size`: of the bloom buffers.
+    """
+    value: float = settings.value_of(name)
+    if settings.method == "kino":
+        return _kino._count_and_step(cast("KinoBloom", settings), size[1])[1]
+    return value + 0.3 if settings.method == "urp" else value

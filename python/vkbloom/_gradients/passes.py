@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 
 from vkbloom import _core
 from vkbloom._gradients.levels import (
+    distance_by,
+    distance_fields,
     factor_fields,
     factors_by_shares,
     factors_of_levels,
@@ -24,6 +26,7 @@ from vkbloom._renderer.new_arrays import new_memory
 from vkbloom._renderer.renderer import DerivativeKind, Renderer
 from vkbloom._renderer.sources import Inputs
 from vkbloom.reference._derivatives import Gradients, check_known, differentiable
+from vkbloom.reference._sampling import scale_size
 
 if TYPE_CHECKING:
     from vkbloom._settings.settings import Settings
@@ -135,7 +138,8 @@ class Running:
     def sums_for(self, fields: Collection[str]) -> Sums:
         """Return the sums of these passes, with those of the fields whose derivatives they give."""
         totals = {name: array for name, array in self.by_name().items() if name not in _BY_IMAGES}
-        return _sums_of(self.passes.settings, totals, fields)
+        height, width = self.passes.inputs.image.shape[:2]
+        return _sums_of(self.passes.settings, (width, height), totals, fields)
 
     def weights(self) -> dict[str, NDArray[np.float32]]:
         """Return the derivative by `WEIGHTS`, if there are any, unless the reference has to."""
@@ -212,11 +216,8 @@ class Passes:
 
 def _wanted_sums(settings: Settings, wanted: Collection[str]) -> tuple[str, ...]:
     """Return what the core calls the sums that some of `device_fields` need."""
-    by_shares, factors, channels = (
-        share_fields(settings),
-        factor_fields(settings),
-        _channels(settings),
-    )
+    by_shares, factors = share_fields(settings), factor_fields(settings)
+    distances, channels = distance_fields(settings), _channels(settings)
     zeros = {name for factors in channels.values() for name, one in factors.items() if one == 0}
     sums = set()
     for name in {*wanted} - zeros:
@@ -226,6 +227,8 @@ def _wanted_sums(settings: Settings, wanted: Collection[str]) -> tuple[str, ...]
             sums.add("composite" if settings.value_of(name) == 0 else name)
         elif name in _OF_COMPOSITE:
             sums.add("composite")
+        elif name in distances:
+            sums |= {kind[: -len("_x")] for kind in distances[name]}
         elif name not in by_shares:
             sums.add(factors.get(name, "threshold"))
     return tuple(sorted(sums))
@@ -252,9 +255,16 @@ def _channels(settings: Settings) -> dict[str, dict[str, float | None]]:
 
 
 def _sums_of(
-    settings: Settings, totals: Mapping[str, NDArray[Any]], fields: Collection[str]
+    settings: Settings,
+    size: tuple[int, int],
+    totals: Mapping[str, NDArray[Any]],
+    fields: Collection[str],
 ) -> Sums:
-    """Return the sums of the device with what they are multiplied by for each of the fields."""
+    """Return the sums of the device with what they are multiplied by for each of the fields.
+
+    `size`: of the image.
+    """
+    size = settings.bloom_size or scale_size(size, settings.bloom_scale)
     starts, width = {}, 0
     for name, array in totals.items():
         starts[name] = width
@@ -267,26 +277,49 @@ def _sums_of(
                 if factor != 0:
                     found[name][starts[kind] + channel] = factor
     count = sum(name.startswith(_BY_SHARES) for name in totals)
-    by_shares = factors_by_shares(settings) if count and share_fields(settings) else {}
-    for name, pairs in by_shares.items():
+    by_shares = factors_by_shares(settings, size) if count and share_fields(settings) else {}
+    for name, given in by_shares.items():
         # The composite reads the field, too. Without cotangents the largest levels have no sums.
-        row = found.setdefault(name, np.zeros(width))
-        for number, pair in enumerate(np.broadcast_to(pairs[-count:], (count, 2))):
+        pairs = np.broadcast_to(given[..., -count:, :], (*given.shape[:-2], count, 2))
+        rows = found.setdefault(name, np.zeros((*given.shape[:-2], width)))
+        for number in range(count):
             start = starts[f"{_BY_SHARES}{number}"]
-            row[start : start + 2] = pair
+            rows[..., start : start + 2] = pairs[..., number, :]
+            if _blurred(settings) == 4:
+                rows[..., start + 2 : start + 4] = pairs[..., number, :]
     if not {*factor_fields(settings)}.isdisjoint(fields):
         found |= _by_factors(settings, starts, width)
+    for name in distance_fields(settings).keys() & {*fields}:
+        found[name] = _by_distance(settings, name, size, starts, width)
     # Other derivatives are left to the reference.
     known = {name: found[name] for name in fields if name in found}
     known = {name: factors for name, factors in known.items() if np.isfinite(factors).all()}
     return Sums(known, tuple(totals.values()))
 
 
+def _by_distance(
+    settings: Settings, name: str, size: tuple[int, int], starts: Mapping[str, int], width: int
+) -> NDArray[np.float64]:
+    """Return the factors of all sums for a field that sets distances of taps."""
+    kinds, distance = distance_fields(settings)[name], distance_by(settings, name, size)
+    found = np.zeros(width)
+    for total, start in starts.items():
+        if total.removeprefix(".by_").rpartition("_")[0] in kinds:
+            # A distance of 0 leaves nothing of the slopes.
+            found[start : start + _blurred(settings)] = 1 / distance if distance else np.inf
+    return found
+
+
+def _blurred(settings: Settings) -> int:
+    """Return how many channels of levels the composite reads."""
+    return 4 if settings.alpha == "blur" else 3
+
+
 def _by_factors(
     settings: Settings, starts: Mapping[str, int], width: int
 ) -> dict[str, NDArray[np.float64]]:
     """Return the factors of all sums for the fields that multiply channels of levels."""
-    found = {}
+    found, channels = {}, _blurred(settings)
     for name, by_level in factors_of_levels(settings).items():
         kind, count = factor_fields(settings)[name], by_level.shape[-2]
         kinds = [".by_colour"] if kind == "colour" else [f".by_levels_{i}" for i in range(count)]
@@ -296,7 +329,7 @@ def _by_factors(
         found[name] = np.zeros((*by_level.shape[:-2], width))
         for number, level in enumerate(kinds):
             start = starts[level]
-            found[name][..., start : start + 4] = by_level[..., number, :]
+            found[name][..., start : start + channels] = by_level[..., number, :channels]
     return found
 
 
@@ -335,7 +368,7 @@ def device_fields(settings: Settings) -> frozenset[str]:
         known |= {"threshold", "knee"}
     elif not settings.glare:
         known |= settings._threshold_slopes().keys()
-    known |= {*share_fields(settings), *factor_fields(settings)}
+    known |= {*share_fields(settings), *factor_fields(settings), *distance_fields(settings)}
     if settings.glare:
         known -= {"intensity"}
     return frozenset(known & differentiable(settings).keys())
