@@ -204,6 +204,51 @@ static void add_weights(const struct vkb_axis *axis, const struct readers *reade
         }
 }
 
+// Texels in the middle of an axis, from `at` on, and the pixels that read them, whose weights are
+// those of the block before, again and again.
+struct repeat {
+    uint32_t at, texels, pixels;
+};
+
+// Of positions in a simple ratio. Without it a plan of new distances at 3840 x 2160 takes 7.2 ms in
+// place of 1.2 (DualKawase, 2026-11-30).
+static struct repeat find_repeat(const struct vkb_axis *axis)
+{
+    const double end = axis->origin + axis->step * (axis->to - 1.0) - (axis->from - 1.0);
+    double reach = fmax(fabs(axis->origin), fabs(end));
+
+    for (uint32_t i = 0; i < vkb_axis_count(axis); ++i)
+        reach = fmax(reach, fabs(vkb_axis_tap(axis, i).offset));
+    // Samples, and the sum of both distances.
+    const double edge = 2.0 * reach + 4.0, middle = axis->from - 2.0 * edge - 3.0 * ADJOINT_SIDE;
+    if (vkb_axis_ratio(axis) == 0 || axis->border > VKB_BORDER_ZERO || axis->next != 0
+        || middle <= 0.0)
+        return (struct repeat){0};
+    const uint32_t blocks = (uint32_t)middle / ADJOINT_SIDE;
+    return (struct repeat){
+        .at = ((uint32_t)edge / ADJOINT_SIDE + 2) * ADJOINT_SIDE,
+        .texels = blocks * ADJOINT_SIDE,
+        .pixels = (uint32_t)(blocks * ADJOINT_SIDE / axis->step),
+    };
+}
+
+// Adds the readers that were left out.
+static void repeat_readers(const struct repeat *repeat, uint32_t count, struct readers *readers)
+{
+    const uint32_t pixels = repeat->texels ? repeat->pixels / (repeat->texels / ADJOINT_SIDE) : 0;
+
+    memmove(readers + repeat->at + repeat->texels, readers + repeat->at,
+            (count - repeat->at) * sizeof *readers);
+    for (uint32_t texel = repeat->at; texel < count + repeat->texels; ++texel) {
+        const bool repeats = texel < repeat->at + repeat->texels;
+        struct readers *own = &readers[texel];
+        if (repeats)
+            *own = readers[texel - ADJOINT_SIDE];
+        own->first += repeats ? pixels : repeat->pixels;
+        own->end += repeats ? pixels : repeat->pixels;
+    }
+}
+
 // The pixels that read the texels of a block. Those of an axis that is mirrored come in the
 // opposite order.
 static struct readers readers_of_block(const struct vkb_axis *axis, const struct readers *readers,
@@ -356,13 +401,18 @@ const struct vkb_readers vkb_kept_readers = {
 bool vkb_axis_build(const struct vkb_axis *axis, uint32_t kernels, struct vkb_transposed *found,
                     struct vkb_error *error)
 {
+    const struct repeat repeat = find_repeat(axis);
+    struct vkb_axis ends = *axis;
+    ends.from -= repeat.texels;
+    ends.to -= repeat.pixels;
     struct readers *readers = vkb_alloc(error, axis->from, sizeof *readers);
     double (*weights)[MAX_KERNELS] =
-        readers ? vkb_alloc(error, find_readers(axis, readers), sizeof *weights) : NULL;
+        readers ? vkb_alloc(error, find_readers(&ends, readers), sizeof *weights) : NULL;
     bool done = weights != NULL;
 
     if (done) {
-        add_weights(axis, readers, weights);
+        add_weights(&ends, readers, weights);
+        repeat_readers(&repeat, ends.from, readers);
         found->readers.span = (int32_t)span_of_blocks(axis, readers);
         found->readers.most = most_readers(readers, 0, axis->from);
         found->readers.usual = most_readers(readers, axis->from / 4, axis->from - axis->from / 4);
