@@ -12,10 +12,8 @@
 
 // The transpose of an axis: its table, whose places count from its first texel, and its readers.
 struct vkb_transposed {
-    struct vkb_transposed *next;
     double *description;  // of the axis (passes/transposes.c)
     size_t described;     // numbers of it
-    uint64_t hash;        // of the description
     float (*texels)[4];
     size_t count;
     struct vkb_readers readers;

@@ -65,26 +65,24 @@ static size_t size_of(const struct vkb_transposed *transposed)
 // Destroys the oldest ones: what is beyond so many bytes.
 static void trim(struct vkb_transposes *transposes, size_t most)
 {
-    struct vkb_transposed **link = &transposes->newest;
-    size_t newer = 0;
+    size_t old = 0;
 
-    if (transposes->bytes <= most)
-        return;
-    while (*link && newer + size_of(*link) <= most) {
-        newer += size_of(*link);
-        link = &(*link)->next;
+    while (old < transposes->count && transposes->bytes > most) {
+        struct vkb_transposed *oldest = transposes->kept[old++].transposed;
+        transposes->bytes -= size_of(oldest);
+        destroy(oldest);
     }
-    while (*link) {
-        struct vkb_transposed *old = *link;
-        *link = old->next;
-        destroy(old);
-    }
-    transposes->bytes = newer;
+    transposes->count -= old;
+    if (old)
+        memmove(transposes->kept, transposes->kept + old,
+                transposes->count * sizeof *transposes->kept);
 }
 
 void vkb_transposes_destroy(struct vkb_transposes *transposes)
 {
     trim(transposes, 0);
+    vkb_free(transposes->kept);
+    *transposes = (struct vkb_transposes){.built = transposes->built};
 }
 
 static struct vkb_transposed *build(const struct vkb_axis *axis, uint32_t kernels,
@@ -104,38 +102,46 @@ static struct vkb_transposed *build(const struct vkb_axis *axis, uint32_t kernel
     return built;
 }
 
-// The transpose of an axis, which becomes the newest one; NULL on failure.
+// The transpose of an axis, which becomes the newest one, and the hash of its description; NULL on
+// failure.
 static const struct vkb_transposed *find(struct vkb_transposes *transposes,
                                          const struct vkb_axis *axis, uint32_t kernels,
-                                         struct vkb_error *error)
+                                         uint64_t *hash, struct vkb_error *error)
 {
     double numbers[MAX_NUMBERS];
     const size_t count = describe(axis, kernels, numbers);
-    const uint64_t hash = hash_of(numbers, count);
-    struct vkb_transposed **link = &transposes->newest;
+    size_t at = transposes->count;
 
-    while (*link
-           && ((*link)->hash != hash || (*link)->described != count
-               || memcmp((*link)->description, numbers, count * sizeof *numbers) != 0))
-        link = &(*link)->next;
-    struct vkb_transposed *found = *link;
-    if (found) {
-        *link = found->next;
-    } else {
-        found = build(axis, kernels, numbers, count, error);
-        if (!found)
-            return NULL;
-        found->hash = hash;
+    *hash = hash_of(numbers, count);
+    while (at-- > 0) {
+        const struct vkb_transposed *known = transposes->kept[at].transposed;
+        if (transposes->kept[at].hash == *hash && known->described == count
+            && memcmp(known->description, numbers, count * sizeof *numbers) == 0)
+            break;
+    }
+    const bool is_new = at == SIZE_MAX;
+    if (is_new
+        && !vkb_grow(error, &transposes->kept, &transposes->capacity, transposes->count + 1,
+                     sizeof *transposes->kept))
+        return NULL;
+    struct vkb_transposed *found =
+        is_new ? build(axis, kernels, numbers, count, error) : transposes->kept[at].transposed;
+    if (!found)
+        return NULL;
+    if (is_new) {
         transposes->bytes += size_of(found);
         ++transposes->built;
+        at = transposes->count++;
     }
-    found->next = transposes->newest;
-    transposes->newest = found;
+    memmove(transposes->kept + at, transposes->kept + at + 1,
+            (transposes->count - at - 1) * sizeof *transposes->kept);
+    transposes->kept[transposes->count - 1].hash = *hash;
+    transposes->kept[transposes->count - 1].transposed = found;
     return found;
 }
 
 // Places count from the first texel of the table.
-static void append(const struct vkb_transposed *transposed, uint32_t entries,
+static void append(const struct vkb_transposed *transposed, uint64_t hash, uint32_t entries,
                    struct vkb_table *table)
 {
     float (*texels)[4] = table->texels + table->count;
@@ -144,13 +150,14 @@ static void append(const struct vkb_transposed *transposed, uint32_t entries,
     for (uint32_t i = 0; i < entries; ++i)
         texels[i][2] += (float)table->count;
     table->count += transposed->count;
-    table->hash = vkb_hash_word(table->hash, transposed->hash);
+    table->hash = vkb_hash_word(table->hash, hash);
 }
 
 bool vkb_axis_transpose(struct vkb_axis *axis, uint32_t kernels, struct vkb_table *table,
                         struct vkb_error *error)
 {
-    const struct vkb_transposed *found = find(table->transposes, axis, kernels, error);
+    uint64_t hash;
+    const struct vkb_transposed *found = find(table->transposes, axis, kernels, &hash, error);
 
     if (!found)
         return false;
@@ -164,7 +171,7 @@ bool vkb_axis_transpose(struct vkb_axis *axis, uint32_t kernels, struct vkb_tabl
     if (done) {
         axis->readers = found->readers;
         axis->readers.start = (int32_t)table->count;
-        append(found, axis->from, table);
+        append(found, hash, axis->from, table);
     }
     trim(table->transposes, MAX_KEPT_BYTES);
     return done;

@@ -31,10 +31,14 @@ struct vkb_wanted_sums {
 
 struct vkb_transposed;
 
-// The transposes that were used last, the newest first. The owner sees to it that one thread at a
-// time uses them.
+// The transposes that were used last, the newest at the end, with the hashes of their descriptions:
+// a plan looks for dozens among hundreds. The owner sees to it that one thread at a time uses them.
 struct vkb_transposes {
-    struct vkb_transposed *newest;
+    struct {
+        uint64_t hash;
+        struct vkb_transposed *transposed;
+    } *kept;
+    size_t count, capacity;
     size_t bytes;
     size_t built;  // so far
 };
