@@ -164,6 +164,7 @@ bool vkb_build_adjoint(const struct vkb_source *source, const struct vkb_setting
         .table = {.transposes = transposes, .hash = VKB_HASH_START},
         .max_side = max_side,
         .weights = cotangents->weights,
+        .lights = VKB_NO_IMAGE,
         .scene = VKB_NO_IMAGE,
         .glow = VKB_NO_IMAGE,
         .image = VKB_NO_IMAGE,
@@ -173,6 +174,10 @@ bool vkb_build_adjoint(const struct vkb_source *source, const struct vkb_setting
     if (!vkb_source_build(source, settings, max_side, graph, error))
         return false;
     find_glow(&adjoint, cotangents);
+    // It is the last pass that adds up images.
+    for (uint32_t i = 0; vkb_has_glare(settings) && i < graph->pass_count; ++i)
+        if (graph->passes[i].shader == &vkb_shader_gather_frag)
+            adjoint.lights = graph->passes[i].targets[0];
     choose_sums(&adjoint, cotangents);
     const uint32_t image_count = *first = graph->image_count;
     adjoint.cotangents = vkb_alloc(error, image_count, sizeof *adjoint.cotangents);

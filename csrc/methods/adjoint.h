@@ -27,7 +27,8 @@ struct vkb_cotangents {
 // - ".by_shares_0" and so on: the cotangents of a sum of two levels times the one of its size, and
 //   times the sum;
 // - ".by_levels_0" and so on: of a level that a pass adds up to others, each channel times its
-//   cotangents from this pass;
+//   cotangents from this pass; ".by_stages_0" and so on: the same of the bloom, and of stages of
+//   glare without dirt;
 // - ".by_colour": the same of the first level;
 // - ".by_enlarging_x_0", ".by_reducing_y_1" and so on: of a pass and an axis, what the pass reads
 //   times the transpose of its slopes.

@@ -34,6 +34,7 @@ struct vkb_adjoint {
     struct vkb_pass_row scene_row;  // the composite's own pass, for the case that none adds them
     // A bloom source that is the image but for NaN and infinity: its cotangents are the image's.
     uint32_t glow, image;  // VKB_NO_IMAGE: there is none
+    uint32_t lights;  // the sum of the bloom and the stages of glare; VKB_NO_IMAGE: without glare
 };
 
 // Adds the adjoint passes of a forward row, which is a copy: adding passes moves those of the

@@ -22,16 +22,18 @@ static bool add_share_sums(struct vkb_adjoint *adjoint, const struct vkb_pass_ro
     return vkb_add_sum_passes(adjoint, &row, row.shader, size, name, error);
 }
 
-// If they are wanted, the sums by factors of one of the levels that a pass adds up, all of whose
-// cotangents are from this pass so far.
+// If they are wanted, the sums by factors of one of the images that a pass adds up, all of whose
+// cotangents are from this pass so far: of levels, or of the bloom and the stages of glare.
 static bool add_level_sums(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
                            uint32_t level, uint32_t number, struct vkb_error *error)
 {
+    const bool stages = pass->targets[0] == adjoint->lights;
     char name[VKB_NAME_SIZE];
 
-    if (!adjoint->sums.levels || pass->shader != &vkb_shader_gather_frag)
+    if (!(stages ? adjoint->sums.stages : adjoint->sums.levels)
+        || pass->shader != &vkb_shader_gather_frag)
         return true;
-    snprintf(name, sizeof name, ".by_levels_%u", number);
+    snprintf(name, sizeof name, stages ? ".by_stages_%u" : ".by_levels_%u", number);
     return vkb_add_product_sums(adjoint, adjoint->cotangents[level], level, name, error);
 }
 

@@ -9,6 +9,7 @@
 // - intensity: one of the composite, unless the threshold's sum has it;
 // - threshold: by what a threshold reads;
 // - shares: by the shares of a level and a smaller one;
+// - stages: by the intensities of the bloom and of the stages of glare;
 // - levels: by factors of the channels of the levels that one pass adds up;
 // - enlarging, reducing: by factors of the distances of taps in passes that make an image larger,
 //   and in others;
@@ -18,6 +19,7 @@
     SUM(intensity) \
     SUM(threshold) \
     SUM(shares) \
+    SUM(stages) \
     SUM(levels) \
     SUM(enlarging) \
     SUM(reducing) \

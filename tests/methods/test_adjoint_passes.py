@@ -562,6 +562,49 @@ def test_distances_without_sums_are_left_to_the_reference(renderer: Renderer) ->
         assert np.isclose(found["radius"], expected["radius"], rtol=1e-4)
 
 
+RAYS = vkbloom.Streaks(halvings=1, iterations=1, intensity=0.4)
+GHOSTS = vkbloom.Ghosts(halvings=2, intensity=1.7, threshold=0.2)
+PICTURE = random_image(8, 10, channels=3, seed=7).astype(np.float32)
+#: Settings with glare, and fields that are intensities, beside others.
+STAGES: dict[str, tuple[Any, tuple[str, ...]]] = {
+    "separable": (
+        Separable(glare=(RAYS, GHOSTS), intensity=0.6, threshold=0.3, knee=0.2),
+        ("intensity", "threshold", "glare.0.intensity", "glare.1.intensity", "exposure"),
+    ),
+    "dirt": (
+        Pyramid(levels=2, glare=(vkbloom.Dirt(image=PICTURE), GHOSTS), composite="screen"),
+        ("glare.1.intensity", "intensity"),
+    ),
+    "three": (
+        vkbloom.ThreeBloom(glare=(RAYS,), intensity=0.6),
+        ("tints", "radius", "intensity", "glare.0.intensity"),
+    ),
+    "bevy": (
+        BEVY.replace(glare=(RAYS,), composite="add"),
+        ("intensity", "low_frequency_boost"),
+    ),
+    "mix": (Separable(glare=(RAYS,), composite="mix"), ("glare.0.intensity",)),
+}
+
+
+@pytest.mark.parametrize("name", STAGES)
+def test_intensities_of_glare_are_sums(renderer: Renderer, name: str) -> None:
+    settings, fields = STAGES[name]
+    settings = settings.replace(**SINGLE)
+    image = 2 * random_image(45, 70, channels=4, seed=1).astype(np.float32)
+    shapes = {name: part.shape for name, part in renderer.apply(image, settings).items()}
+    cotangents = {"final": np.random.default_rng(2).random(image.shape).astype(np.float32)}
+    running = Passes(renderer, Inputs(image), settings, cotangents).submit("all", fields)
+    assert running
+    check_sums(running, reference.vjp(image, settings)[1](cotangents), fields)
+    # With cotangents of its own, the bloom has no sum of those of the stages' sum.
+    cotangents["bloom"] = np.ones(shapes["bloom"], np.float32)
+    found = vkbloom.vjp(image, settings, renderer=renderer)[1](cotangents)
+    expected = reference.vjp(image, settings)[1](cotangents)
+    for field in fields:
+        assert np.allclose(found[field], expected[field], rtol=1e-4), field
+
+
 @pytest.mark.parametrize("alpha", ["keep", "blur"])
 @pytest.mark.parametrize("name", ["hdrp", "pyramid", "three", "dual"])
 def test_sums_leave_out_an_alpha_that_is_not_blurred(

@@ -1,7 +1,7 @@
 """What the device's sums are multiplied by for derivatives by fields of a chain of levels.
 
-Such a field sets shares of the levels in their sum, factors of their channels, or distances of the
-taps of passes between them.
+Such a field sets shares of the levels in their sum, factors of their channels or of the stages of
+glare, or distances of the taps of passes between them.
 """
 
 from __future__ import annotations
@@ -173,6 +173,20 @@ def factors_of_levels(settings: Settings) -> Factors:
     """
     with np.errstate(divide="ignore", invalid="ignore"):
         return _FACTORS[settings.method][1](settings)
+
+
+def stage_fields(settings: Settings) -> dict[str, int]:
+    """Return the factors in the sum of the bloom and the stages of glare, with their places in it.
+
+    Without glare there is no such sum.
+    """
+    lights = [f"glare.{i}" for i, stage in enumerate(settings.glare) if stage.stage != "dirt"]
+    names = ["intensity", *(f"{light}.intensity" for light in lights)] if settings.glare else []
+    places = {name: place for place, name in enumerate(names)}
+    # A mix takes the intensity of the scene, too.
+    if settings.composite == "mix" or "intensity" in settings._fields_before_composite:
+        places.pop("intensity", None)
+    return places
 
 
 _UP: Final = ("enlarging_x", "enlarging_y")

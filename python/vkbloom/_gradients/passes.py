@@ -18,6 +18,7 @@ from vkbloom._gradients.levels import (
     factors_by_shares,
     factors_of_levels,
     share_fields,
+    stage_fields,
 )
 from vkbloom._locks import ProcessLock
 from vkbloom._renderer import requests
@@ -217,13 +218,16 @@ class Passes:
 def _wanted_sums(settings: Settings, wanted: Collection[str]) -> tuple[str, ...]:
     """Return what the core calls the sums that some of `device_fields` need."""
     by_shares, factors = share_fields(settings), factor_fields(settings)
-    distances, channels = distance_fields(settings), _channels(settings)
+    distances, stages = distance_fields(settings), stage_fields(settings)
+    channels = _channels(settings)
     zeros = {name for factors in channels.values() for name, one in factors.items() if one == 0}
     sums = set()
     for name in {*wanted} - zeros:
         if name in by_shares:
             sums.add("shares")
-        if name == "intensity":
+        if name in stages:
+            sums.add("stages")
+        elif name == "intensity":
             sums.add("composite" if settings.value_of(name) == 0 else name)
         elif name in _OF_COMPOSITE:
             sums.add("composite")
@@ -245,8 +249,12 @@ def _channels(settings: Settings) -> dict[str, dict[str, float | None]]:
         # Without a knee it is a step.
         threshold = dict.fromkeys(("threshold", "knee"), float(is_set and settings.knee != 0))
     own = settings._threshold_slopes()
+    composite: dict[str, float | None] = dict.fromkeys(_OF_COMPOSITE, 1.0)
+    if settings.glare:
+        # It is that of the sum of the bloom and the stages.
+        composite["intensity"] = None
     return {
-        ".by_composite": dict.fromkeys(_OF_COMPOSITE, 1.0),
+        ".by_composite": composite,
         ".by_threshold": threshold,
         ".by_own_threshold": {name: slope * is_set for name, slope in own.items()},
         # The intensity's derivative, times the intensity.
@@ -289,6 +297,13 @@ def _sums_of(
                 rows[..., start + 2 : start + 4] = pairs[..., number, :]
     if not {*factor_fields(settings)}.isdisjoint(fields):
         found |= _by_factors(settings, starts, width)
+    for name, number in stage_fields(settings).items():
+        start, value = starts.get(f".by_stages_{number}"), settings.value_of(name)
+        if start is None:
+            found.pop(name, None)
+            continue
+        row = found.setdefault(name, np.zeros(width))
+        row[start : start + _blurred(settings)] = 1 / value if value else np.inf
     for name in distance_fields(settings).keys() & {*fields}:
         found[name] = _by_distance(settings, name, size, starts, width)
     # Other derivatives are left to the reference.
@@ -359,9 +374,8 @@ def on_device(renderer: Renderer, settings: Settings) -> bool:
 def device_fields(settings: Settings) -> frozenset[str]:
     """Return the fields by which the device has the derivatives.
 
-    These are what only the composite, the threshold, or the sums of levels read. With glare, the
-    intensity is that of the sum before the composite, and stages read the threshold of a published
-    method, too.
+    These are what only the composite, the threshold, or the sums of levels and of stages read.
+    Stages of glare read the threshold of a published method, too.
     """
     known = {*_OF_COMPOSITE} - settings._fields_before_composite
     if not settings.published:
@@ -370,7 +384,7 @@ def device_fields(settings: Settings) -> frozenset[str]:
         known |= settings._threshold_slopes().keys()
     known |= {*share_fields(settings), *factor_fields(settings), *distance_fields(settings)}
     if settings.glare:
-        known -= {"intensity"}
+        known = (known - {"intensity"}) | stage_fields(settings).keys()
     return frozenset(known & differentiable(settings).keys())
 
 
