@@ -26,7 +26,8 @@ from benchmarks.peers import pytorch
 from benchmarks.plan import Plan
 from benchmarks.results import Goal, Section, agreement, side_by_side
 from benchmarks.timing import PASSES, WALL, Times, alternate_seconds, wall_clock
-from vkbloom._gradients.passes import Passes, device_fields, in_floats
+from vkbloom._gradients.passes import Passes, in_floats
+from vkbloom._gradients.sums import device_fields
 from vkbloom._renderer.device_arrays import take
 from vkbloom._renderer.sources import Inputs
 from vkbloom.psf import gaussian

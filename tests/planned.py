@@ -9,8 +9,9 @@ import pytest
 
 from tests.scene.parts import Cubemap, Mesh
 from vkbloom import Scene, _core
-from vkbloom._gradients.passes import DeviceGradients, Passes, device_fields, in_floats
+from vkbloom._gradients.passes import DeviceGradients, Passes, in_floats
 from vkbloom._gradients.pulling import pull_each
+from vkbloom._gradients.sums import device_fields
 from vkbloom._renderer.adapter import bundled_driver
 from vkbloom._renderer.new_arrays import new_array, new_arrays
 from vkbloom._renderer.sources import Inputs, image_source

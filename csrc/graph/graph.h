@@ -230,9 +230,8 @@ struct vkb_graph {
     size_t filter_capacity;
     // Of levels whose width follows from the aspect of the frame: the adapter's limit; 0: none.
     uint32_t max_width;
-    uint32_t layers;  // of a batch; 0: of one image
-    // Taps of blurs stay at their distances, and are not moved to texels.
-    bool keeps_distances;
+    uint32_t layers;     // of a batch; 0: of one image
+    bool keeps_kernels;  // those of blurs stay as they are, and are not moved to texels
 };
 
 void vkb_graph_destroy(struct vkb_graph *graph);

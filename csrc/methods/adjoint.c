@@ -165,12 +165,14 @@ bool vkb_build_adjoint(const struct vkb_source *source, const struct vkb_setting
         .max_side = max_side,
         .weights = cotangents->weights,
         .lights = VKB_NO_IMAGE,
+        .alpha = settings->choices[VKB_CHOICE_alpha],
         .scene = VKB_NO_IMAGE,
         .glow = VKB_NO_IMAGE,
         .image = VKB_NO_IMAGE,
     };
 
-    graph->keeps_distances = cotangents->sums.enlarging || cotangents->sums.reducing;
+    graph->keeps_kernels =
+        cotangents->sums.enlarging || cotangents->sums.reducing || cotangents->sums.weight;
     if (!vkb_source_build(source, settings, max_side, graph, error))
         return false;
     find_glow(&adjoint, cotangents);

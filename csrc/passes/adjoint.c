@@ -59,8 +59,8 @@ static bool add_numbered_pass(struct vkb_adjoint *adjoint, const char *prefix, u
 bool vkb_add_adjoint_pass(struct vkb_adjoint *adjoint, struct vkb_pass_row *row,
                           struct vkb_size size, uint32_t *image, struct vkb_error *error)
 {
-    return adjoint->sloped
-             ? add_numbered_pass(adjoint, "adjoint_slope", adjoint->slopes++, row, size, image,
+    return adjoint->of_sums
+             ? add_numbered_pass(adjoint, "adjoint_of_sum", adjoint->between++, row, size, image,
                                  error)
              : add_numbered_pass(adjoint, "adjoint", adjoint->added++, row, size, image, error);
 }
@@ -386,6 +386,7 @@ bool vkb_add_product_sums(struct vkb_adjoint *adjoint, uint32_t cotangents, uint
     const struct vkb_image_row *of = &adjoint->graph->images[image];
     struct vkb_pass_row row = vkb_adjoint_row(&vkb_shader_adjoint_products_frag, cotangents);
 
+    row.constants.alpha = adjoint->alpha;
     row.reads[SLOT_SOURCE] = image;
     return vkb_add_sum_passes(adjoint, &row, row.shader, (struct vkb_size){of->width, of->height},
                               name, error);

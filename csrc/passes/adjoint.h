@@ -19,13 +19,14 @@ struct vkb_adjoint {
     uint32_t *cotangents;  // by forward image: its cotangents so far; VKB_NO_IMAGE: none
     // Images so far, of sums and others. These have the same names whether sums are wanted or not,
     // so that a plan of sums finds what that of derivatives by images has made.
-    uint32_t added, summed, slopes;
-    bool sloped;     // what is added is for a sum by the distances of taps
-    uint32_t moved;  // the axes that have such a sum so far
+    uint32_t added, summed, between;
+    bool of_sums;    // what is added is for a sum by what taps have
+    uint32_t moved;  // such sums so far
     uint32_t max_side;
     uint32_t mixed;  // sums of two levels so far
     struct vkb_wanted_sums sums;
-    bool light;    // the threshold's sum has the derivative by the intensity
+    bool light;  // the threshold's sum has the derivative by the intensity
+    int32_t alpha;
     bool weights;  // those by the weights of a field of kernels are wanted
     // The cotangents of the scene of a composite without a curve are a share of those that the
     // composite has. The next pass that accumulates cotangents of the scene adds them itself.

@@ -3,6 +3,7 @@
 #include "passes/filter.h"
 
 #include <stdio.h>
+#include <string.h>
 
 // If they are wanted, the sums by the shares of a level and of a smaller one.
 static bool add_share_sums(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
@@ -16,6 +17,7 @@ static bool add_share_sums(struct vkb_adjoint *adjoint, const struct vkb_pass_ro
 
     if (!adjoint->sums.shares || !pass->constants.adds_image)
         return true;
+    row.constants.alpha = adjoint->alpha;
     row.reads[SLOT_SOURCE] = pass->targets[0];
     vkb_read_at(&row, SLOT_SAME_SIZE, pass->reads[SLOT_SAME_SIZE]);
     snprintf(name, sizeof name, ".by_shares_%u", adjoint->mixed++);
@@ -37,49 +39,76 @@ static bool add_level_sums(struct vkb_adjoint *adjoint, const struct vkb_pass_ro
     return vkb_add_product_sums(adjoint, adjoint->cotangents[level], level, name, error);
 }
 
-// The transpose of a filter with slopes along one axis, times the image that it reads: the sum by a
-// factor of its taps' distances.
-static bool add_slope_sums(struct vkb_adjoint *adjoint, const struct vkb_filter *filter,
-                           const char *kind, uint32_t cotangents, uint32_t image,
-                           struct vkb_error *error)
+// The sum of the image that a filter reads, times the filter's transpose.
+static bool add_filter_sums(struct vkb_adjoint *adjoint, const struct vkb_filter *filter,
+                            const char *name, uint32_t cotangents, uint32_t image,
+                            struct vkb_error *error)
 {
     const struct vkb_adjoint kept = *adjoint;
     const uint32_t before = kept.cotangents[image];
-    char name[VKB_NAME_SIZE];
 
     // The result is the only cotangents of the image for a moment, and none of another one.
     adjoint->cotangents[image] = adjoint->scene = adjoint->glow = VKB_NO_IMAGE;
-    adjoint->sloped = true;
+    adjoint->of_sums = true;
     const bool done = vkb_accumulate_filter(adjoint, filter, cotangents, image, error);
-    const uint32_t slopes = adjoint->cotangents[image];
+    const uint32_t made = adjoint->cotangents[image];
     adjoint->cotangents[image] = before;
     adjoint->scene = kept.scene;
     adjoint->glow = kept.glow;
-    adjoint->sloped = false;
-    snprintf(name, sizeof name, ".by_%s_%u", kind, adjoint->moved++);
-    return done && vkb_add_product_sums(adjoint, slopes, image, name, error);
+    adjoint->of_sums = false;
+    return done && vkb_add_product_sums(adjoint, made, image, name, error);
 }
 
-// If they are wanted, the sums by factors of the distances of a filter's taps along each axis.
-static bool add_distance_sums(struct vkb_adjoint *adjoint, const struct vkb_filter *given,
-                              uint32_t cotangents, uint32_t image, struct vkb_error *error)
+// If they are wanted, the sums by a factor of the distances of an axis' taps: with slopes in place
+// of samples. The axis is one of the filter, which stays as it is.
+static bool add_distance_sums(struct vkb_adjoint *adjoint, const struct vkb_filter *filter,
+                              struct vkb_axis *axis, uint32_t cotangents, uint32_t image,
+                              struct vkb_error *error)
 {
-    const struct vkb_axis *x = &given->x, *y = &given->y;
+    const struct vkb_axis *x = &filter->x, *y = &filter->y;
     const bool enlarging = (uint64_t)x->to * y->to > (uint64_t)x->from * y->from;
+    char name[VKB_NAME_SIZE];
+
+    if (!(enlarging ? adjoint->sums.enlarging : adjoint->sums.reducing)
+        || !vkb_axis_has_distances(axis))
+        return true;
+    snprintf(name, sizeof name, ".by_%s_%s_%u", enlarging ? "enlarging" : "reducing",
+             axis == x ? "x" : "y", adjoint->moved++);
+    axis->slopes = true;
+    const bool done = add_filter_sums(adjoint, filter, name, cotangents, image, error);
+    axis->slopes = false;
+    return done;
+}
+
+// If they are wanted, the sums by each weight of an axis' kernel, in the same way.
+static bool add_weight_sums(struct vkb_adjoint *adjoint, const struct vkb_filter *filter,
+                            struct vkb_axis *axis, uint32_t cotangents, uint32_t image,
+                            struct vkb_error *error)
+{
+    const struct vkb_kernel kernel = axis->kernel;
+    bool done = true;
+
+    for (uint32_t i = 0; done && adjoint->sums.weight && i < kernel.count; ++i) {
+        char name[VKB_NAME_SIZE];
+        snprintf(name, sizeof name, ".by_weight_%u_%u", i, adjoint->moved++);
+        memset(axis->kernel.weights, 0, sizeof axis->kernel.weights);
+        axis->kernel.weights[i] = 1.0;
+        done = add_filter_sums(adjoint, filter, name, cotangents, image, error);
+    }
+    axis->kernel = kernel;
+    return done;
+}
+
+// The sums by what the taps of a filter have.
+static bool add_tap_sums(struct vkb_adjoint *adjoint, const struct vkb_filter *given,
+                         uint32_t cotangents, uint32_t image, struct vkb_error *error)
+{
     struct vkb_filter filter = *given;
 
-    if (!(enlarging ? adjoint->sums.enlarging : adjoint->sums.reducing))
-        return true;
-    filter.x.slopes = true;
-    if (vkb_axis_has_distances(x)
-        && !add_slope_sums(adjoint, &filter, enlarging ? "enlarging_x" : "reducing_x", cotangents,
-                           image, error))
-        return false;
-    filter.x.slopes = false;
-    filter.y.slopes = true;
-    return !vkb_axis_has_distances(y)
-        || add_slope_sums(adjoint, &filter, enlarging ? "enlarging_y" : "reducing_y", cotangents,
-                          image, error);
+    return add_distance_sums(adjoint, &filter, &filter.x, cotangents, image, error)
+        && add_distance_sums(adjoint, &filter, &filter.y, cotangents, image, error)
+        && add_weight_sums(adjoint, &filter, &filter.x, cotangents, image, error)
+        && add_weight_sums(adjoint, &filter, &filter.y, cotangents, image, error);
 }
 
 bool vkb_transpose_filters(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
@@ -91,12 +120,12 @@ bool vkb_transpose_filters(struct vkb_adjoint *adjoint, const struct vkb_pass_ro
         return false;
     // The pass before has no cotangents then, unless its result is a framebuffer that has its own.
     if (pass->joined)
-        return add_distance_sums(adjoint, pass->joined, cotangents, pass->joined_from, error)
+        return add_tap_sums(adjoint, pass->joined, cotangents, pass->joined_from, error)
             && vkb_accumulate_filter(adjoint, pass->joined, cotangents, pass->joined_from, error);
     for (uint32_t i = 0; i < pass->filter_count; ++i) {
         const uint32_t level = pass->reads[SLOT_LEVELS + i];
         const bool is_alone = adjoint->cotangents[level] == VKB_NO_IMAGE;
-        if (!add_distance_sums(adjoint, &pass->filters[i], cotangents, level, error)
+        if (!add_tap_sums(adjoint, &pass->filters[i], cotangents, level, error)
             || !vkb_accumulate_filter(adjoint, &pass->filters[i], cotangents, level, error)
             || (is_alone && !add_level_sums(adjoint, pass, level, i, error)))
             return false;

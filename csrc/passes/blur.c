@@ -63,7 +63,7 @@ struct vkb_pass_row vkb_blur_row(struct vkb_levels *levels, const struct vkb_fil
         direction == DIRECTION_VERTICAL ? &filter.y.kernel : &filter.x.kernel;
 
     if (!kernel->placed && filter.x.kind == UPSAMPLE_LINEAR && !both
-        && (is_integer(kernel->step) || (keeps_size(&filter) && !levels->graph->keeps_distances)))
+        && (keeps_size(&filter) || is_integer(kernel->step)) && !levels->graph->keeps_kernels)
         move_to_texels(kernel);
     vkb_read_only(&row, from);
     row.block = VKB_BLOCK_filter;

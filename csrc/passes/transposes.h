@@ -13,6 +13,7 @@
 // - levels: by factors of the channels of the levels that one pass adds up;
 // - enlarging, reducing: by factors of the distances of taps in passes that make an image larger,
 //   and in others;
+// - weight: by each weight of blurs;
 // - colour: by factors of the channels of the first level.
 #define VKB_SUMS(SUM) \
     SUM(composite) \
@@ -23,6 +24,7 @@
     SUM(levels) \
     SUM(enlarging) \
     SUM(reducing) \
+    SUM(weight) \
     SUM(colour)
 
 struct vkb_wanted_sums {

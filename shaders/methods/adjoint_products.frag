@@ -4,10 +4,11 @@ SAMPLED_IMAGE(SLOT_SOURCE, source);
 SAMPLED_IMAGE(SLOT_COTANGENTS, cotangents);
 
 #include "lib/values.glsl"
+#include "lib/target_cotangents.glsl"
 
 vec4 values()
 {
-    vec4 cotangent = texelFetch(cotangents, PIXEL, 0);
+    vec4 cotangent = cotangent_of_target();
     // What it would be multiplied by may be infinite.
     return mix(vec4(0.0), cotangent * texelFetch(source, PIXEL, 0), notEqual(cotangent, vec4(0.0)));
 }

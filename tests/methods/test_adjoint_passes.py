@@ -518,14 +518,17 @@ DISTANCES: dict[str, tuple[Any, tuple[str, ...]]] = {
         ("radius", "level_weights"),
     ),
     "dual": (vkbloom.DualKawase(levels=2, offset=1.7, composite="mix"), ("offset", "intensity")),
-    "separable": (vkbloom.Separable(), ("blur_scale",)),
+    "separable": (vkbloom.Separable(), ("blur_scale", "weights", "blur_strength")),
     "separable loops": (
         vkbloom.Separable(
             blur_scale=1.37, loops=2, layers=((1.0, 0.5), (2.0, 0.7)), bloom_scale=0.5, texel="x"
         ),
-        ("blur_scale",),
+        ("blur_scale", "weights", "blur_strength"),
     ),
-    "separable direct": (vkbloom.Separable(blur_scale=1.37, direct=True), ("blur_scale",)),
+    "separable direct": (
+        vkbloom.Separable(blur_scale=1.37, direct=True, first_tap=0, weights=(0.4, 0.0, 0.2)),
+        ("blur_scale", "weights", "blur_strength"),
+    ),
     "kino": (vkbloom.KinoBloom(radius=4.6, bloom_scale=0.8), ("radius", "threshold")),
     "pygfx": (vkbloom.PygfxBloom(filter_radius=0.02), ("filter_radius",)),
     "urp dual": (vkbloom.UrpBloom(filter="dual", scatter=0.4), ("scatter", "tint")),

@@ -16,8 +16,9 @@ import numpy as np
 
 from vkbloom import _core
 from vkbloom._extras import import_extra
-from vkbloom._gradients.passes import DeviceGradients, device_fields, in_floats
+from vkbloom._gradients.passes import DeviceGradients, in_floats
 from vkbloom._gradients.pulling import pull_each, undefined
+from vkbloom._gradients.sums import device_fields
 from vkbloom._image_arguments import check_mask
 from vkbloom._psf.values import ARRAYS, ArrayValue
 from vkbloom._renderer.default import default_renderer, renderer_on

@@ -5,21 +5,13 @@ from __future__ import annotations
 import functools
 from collections.abc import Callable, Collection, Container, Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final, NamedTuple, cast
+from typing import TYPE_CHECKING, Any, Final, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom import _core
-from vkbloom._gradients.levels import (
-    distance_by,
-    distance_fields,
-    factor_fields,
-    factors_by_shares,
-    factors_of_levels,
-    share_fields,
-    stage_fields,
-)
+from vkbloom._gradients.sums import Sums, device_fields, sums_of, wanted_sums
 from vkbloom._locks import ProcessLock
 from vkbloom._renderer import requests
 from vkbloom._renderer.device_arrays import Destination, ImportedArray, on_host, place
@@ -27,7 +19,6 @@ from vkbloom._renderer.new_arrays import new_memory
 from vkbloom._renderer.renderer import DerivativeKind, Renderer
 from vkbloom._renderer.sources import Inputs
 from vkbloom.reference._derivatives import Gradients, check_known, differentiable
-from vkbloom.reference._sampling import scale_size
 
 if TYPE_CHECKING:
     from vkbloom._settings.settings import Settings
@@ -36,13 +27,8 @@ if TYPE_CHECKING:
 _MAX_LEVELS: Final = 7
 #: The framebuffers of derivatives by images.
 _BY_IMAGES: Final = (".by_image", ".by_emission", ".by_mask")
-_BY_LIGHT: Final = ".by_light"
 #: The weights of a field of kernels.
 WEIGHTS: Final = "psf.weights"
-#: The fields that the composite reads.
-_OF_COMPOSITE: Final = ("intensity", "exposure", "reference_white")
-#: With the number of the sum of two levels, from the largest on.
-_BY_SHARES: Final = ".by_shares_"
 #: A sum that is less than this, relative to the root of the sum of its squares, has lost digits.
 MIN_SHARE: Final = 0.3
 #: Curves that magnify the rounding of a float.
@@ -54,17 +40,6 @@ def check_finite(cotangents: Mapping[str, NDArray[Any] | ImportedArray]) -> None
     for name, part in cotangents.items():
         if isinstance(part, ImportedArray) and not np.isfinite(part.numpy()).all():
             raise ValueError(f"cotangents: {name!r} has NaN or infinity")
-
-
-class Sums(NamedTuple):
-    """Sums of the device, and the fields whose derivatives are combinations of them.
-
-    - `factors`: By field, of its shape, and with a factor for each channel of each array.
-    - `arrays`: Of shape (2, 1, channels): the sums, and those of the squares of their terms.
-    """
-
-    factors: Mapping[str, NDArray[np.float64]]
-    arrays: tuple[NDArray[Any], ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,7 +115,7 @@ class Running:
         """Return the sums of these passes, with those of the fields whose derivatives they give."""
         totals = {name: array for name, array in self.by_name().items() if name not in _BY_IMAGES}
         height, width = self.passes.inputs.image.shape[:2]
-        return _sums_of(self.passes.settings, (width, height), totals, fields)
+        return sums_of(self.passes.settings, (width, height), totals, fields)
 
     def weights(self) -> dict[str, NDArray[np.float32]]:
         """Return the derivative by `WEIGHTS`, if there are any, unless the reference has to."""
@@ -194,7 +169,7 @@ class Passes:
         sums: tuple[str, ...] = ()
         if results in ("sums", "all"):
             known = device_fields(self.settings)
-            sums = _wanted_sums(self.settings, known if fields is None else known & {*fields})
+            sums = wanted_sums(self.settings, known if fields is None else known & {*fields})
         plan = self.renderer._plan_derivatives(
             source, self.settings, tuple(self.cotangents), results, sums
         )
@@ -213,139 +188,6 @@ class Passes:
             if submission.exports_ordered:
                 self.renderer._pending.add(submission)
         return Running(self, plan, arrays, submission, results, fields)
-
-
-def _wanted_sums(settings: Settings, wanted: Collection[str]) -> tuple[str, ...]:
-    """Return what the core calls the sums that some of `device_fields` need."""
-    by_shares, factors = share_fields(settings), factor_fields(settings)
-    distances, stages = distance_fields(settings), stage_fields(settings)
-    channels = _channels(settings)
-    zeros = {name for factors in channels.values() for name, one in factors.items() if one == 0}
-    sums = set()
-    for name in {*wanted} - zeros:
-        if name in by_shares:
-            sums.add("shares")
-        if name in stages:
-            sums.add("stages")
-        elif name == "intensity":
-            sums.add("composite" if settings.value_of(name) == 0 else name)
-        elif name in _OF_COMPOSITE:
-            sums.add("composite")
-        elif name in distances:
-            sums |= {kind[: -len("_x")] for kind in distances[name]}
-        elif name not in by_shares:
-            sums.add(factors.get(name, "threshold"))
-    return tuple(sorted(sums))
-
-
-def _channels(settings: Settings) -> dict[str, dict[str, float | None]]:
-    """Return for each sum the fields whose derivatives its channels are, times a factor.
-
-    0: the derivative is 0, also without the sum. None: it is not that of the field.
-    """
-    is_set, intensity = settings.threshold is not None, settings.value_of("intensity")
-    threshold: dict[str, float | None] = {}
-    if not settings.published:
-        # Without a knee it is a step.
-        threshold = dict.fromkeys(("threshold", "knee"), float(is_set and settings.knee != 0))
-    own = settings._threshold_slopes()
-    composite: dict[str, float | None] = dict.fromkeys(_OF_COMPOSITE, 1.0)
-    if settings.glare:
-        # It is that of the sum of the bloom and the stages.
-        composite["intensity"] = None
-    return {
-        ".by_composite": composite,
-        ".by_threshold": threshold,
-        ".by_own_threshold": {name: slope * is_set for name, slope in own.items()},
-        # The intensity's derivative, times the intensity.
-        _BY_LIGHT: threshold | {"intensity": 1.0 / intensity if intensity != 0 else None},
-    }
-
-
-def _sums_of(
-    settings: Settings,
-    size: tuple[int, int],
-    totals: Mapping[str, NDArray[Any]],
-    fields: Collection[str],
-) -> Sums:
-    """Return the sums of the device with what they are multiplied by for each of the fields.
-
-    `size`: of the image.
-    """
-    size = settings.bloom_size or scale_size(size, settings.bloom_scale)
-    starts, width = {}, 0
-    for name, array in totals.items():
-        starts[name] = width
-        width += array.shape[-1]
-    found: dict[str, NDArray[np.float64]] = {}
-    for kind, factors in _channels(settings).items():
-        for channel, (name, factor) in enumerate(factors.items()):
-            if factor == 0 or (kind in starts and factor is not None and name not in found):
-                found[name] = np.zeros(width)
-                if factor != 0:
-                    found[name][starts[kind] + channel] = factor
-    count = sum(name.startswith(_BY_SHARES) for name in totals)
-    by_shares = factors_by_shares(settings, size) if count and share_fields(settings) else {}
-    for name, given in by_shares.items():
-        # The composite reads the field, too. Without cotangents the largest levels have no sums.
-        pairs = np.broadcast_to(given[..., -count:, :], (*given.shape[:-2], count, 2))
-        rows = found.setdefault(name, np.zeros((*given.shape[:-2], width)))
-        for number in range(count):
-            start = starts[f"{_BY_SHARES}{number}"]
-            rows[..., start : start + 2] = pairs[..., number, :]
-            if _blurred(settings) == 4:
-                rows[..., start + 2 : start + 4] = pairs[..., number, :]
-    if not {*factor_fields(settings)}.isdisjoint(fields):
-        found |= _by_factors(settings, starts, width)
-    for name, number in stage_fields(settings).items():
-        start, value = starts.get(f".by_stages_{number}"), settings.value_of(name)
-        if start is None:
-            found.pop(name, None)
-            continue
-        row = found.setdefault(name, np.zeros(width))
-        row[start : start + _blurred(settings)] = 1 / value if value else np.inf
-    for name in distance_fields(settings).keys() & {*fields}:
-        found[name] = _by_distance(settings, name, size, starts, width)
-    # Other derivatives are left to the reference.
-    known = {name: found[name] for name in fields if name in found}
-    known = {name: factors for name, factors in known.items() if np.isfinite(factors).all()}
-    return Sums(known, tuple(totals.values()))
-
-
-def _by_distance(
-    settings: Settings, name: str, size: tuple[int, int], starts: Mapping[str, int], width: int
-) -> NDArray[np.float64]:
-    """Return the factors of all sums for a field that sets distances of taps."""
-    kinds, distance = distance_fields(settings)[name], distance_by(settings, name, size)
-    found = np.zeros(width)
-    for total, start in starts.items():
-        if total.removeprefix(".by_").rpartition("_")[0] in kinds:
-            # A distance of 0 leaves nothing of the slopes.
-            found[start : start + _blurred(settings)] = 1 / distance if distance else np.inf
-    return found
-
-
-def _blurred(settings: Settings) -> int:
-    """Return how many channels of levels the composite reads."""
-    return 4 if settings.alpha == "blur" else 3
-
-
-def _by_factors(
-    settings: Settings, starts: Mapping[str, int], width: int
-) -> dict[str, NDArray[np.float64]]:
-    """Return the factors of all sums for the fields that multiply channels of levels."""
-    found, channels = {}, _blurred(settings)
-    for name, by_level in factors_of_levels(settings).items():
-        kind, count = factor_fields(settings)[name], by_level.shape[-2]
-        kinds = [".by_colour"] if kind == "colour" else [f".by_levels_{i}" for i in range(count)]
-        # A level that has cotangents of its own has no sum.
-        if not all(level in starts for level in kinds):
-            continue
-        found[name] = np.zeros((*by_level.shape[:-2], width))
-        for number, level in enumerate(kinds):
-            start = starts[level]
-            found[name][..., start : start + channels] = by_level[..., number, :channels]
-    return found
 
 
 def _level(cotangent: NDArray[Any] | ImportedArray) -> NDArray[Any] | ImportedArray:
@@ -367,25 +209,6 @@ def on_device(renderer: Renderer, settings: Settings) -> bool:
     pixels = np.zeros((32, 40, 4), np.float32)
     floats = in_floats(settings)
     return Passes(renderer, Inputs(pixels), floats, {"final": pixels}).submit() is not None
-
-
-# Each step of a training loop asks several times.
-@functools.lru_cache(16)
-def device_fields(settings: Settings) -> frozenset[str]:
-    """Return the fields by which the device has the derivatives.
-
-    These are what only the composite, the threshold, or the sums of levels and of stages read.
-    Stages of glare read the threshold of a published method, too.
-    """
-    known = {*_OF_COMPOSITE} - settings._fields_before_composite
-    if not settings.published:
-        known |= {"threshold", "knee"}
-    elif not settings.glare:
-        known |= settings._threshold_slopes().keys()
-    known |= {*share_fields(settings), *factor_fields(settings), *distance_fields(settings)}
-    if settings.glare:
-        known = (known - {"intensity"}) | stage_fields(settings).keys()
-    return frozenset(known & differentiable(settings).keys())
 
 
 class DeviceGradients(Mapping[str, NDArray[Any]]):

@@ -19,9 +19,9 @@ from vkbloom._gradients.passes import (
     Passes,
     Running,
     check_finite,
-    device_fields,
     in_floats,
 )
+from vkbloom._gradients.sums import device_fields
 from vkbloom._public import public
 from vkbloom._renderer.default import default_renderer
 from vkbloom._renderer.device_arrays import (
