@@ -32,9 +32,7 @@ struct vkb_cotangents {
 // - ".by_colour": the same of the first level;
 // - ".by_enlarging_x_0", ".by_reducing_y_1" and so on: of a pass and an axis, what the pass reads
 //   times the transpose of its slopes;
-// - ".by_weight_0_0" and so on: the same with the weight of this number as 1, and others of the
-// axis
-//   as 0.
+// - ".by_weight_0_0" and so on: of a blur's axis, by four weights, from four times this number on.
 // Of the weights of a field of kernels: ".by_weights_0" and so on, of four weights each at the
 // places of their grid, unless that has more places than images have pixels. *first is the index of
 // the first image that is added. *possible becomes false if a pass has no adjoint.

@@ -2,8 +2,8 @@
 #include "passes/adjoint.h"
 #include "passes/filter.h"
 
+#include <math.h>
 #include <stdio.h>
-#include <string.h>
 
 // If they are wanted, the sums by the shares of a level and of a smaller one.
 static bool add_share_sums(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
@@ -80,22 +80,43 @@ static bool add_distance_sums(struct vkb_adjoint *adjoint, const struct vkb_filt
     return done;
 }
 
-// If they are wanted, the sums by each weight of an axis' kernel, in the same way.
+// If they are wanted, the sums by the weights of an axis' kernel, four in each.
 static bool add_weight_sums(struct vkb_adjoint *adjoint, const struct vkb_filter *filter,
-                            struct vkb_axis *axis, uint32_t cotangents, uint32_t image,
+                            const struct vkb_axis *axis, uint32_t cotangents, uint32_t image,
                             struct vkb_error *error)
 {
-    const struct vkb_kernel kernel = axis->kernel;
+    const bool along_x = axis == &filter->x;
+    const struct vkb_kernel *kernel = &axis->kernel;
+    struct vkb_filter across = *filter;
     bool done = true;
+    uint32_t half;
 
-    for (uint32_t i = 0; done && adjoint->sums.weight && i < kernel.count; ++i) {
+    if (!adjoint->sums.weight || kernel->count == 0)
+        return true;
+    vkb_axis_move(along_x ? &across.x : &across.y, axis->to, axis->to, 0.0);
+    const struct vkb_size size = {across.x.from, across.y.from};
+    adjoint->of_sums = true;
+    done = vkb_filter_to_image(adjoint, &across, cotangents, size, &half, error);
+    adjoint->of_sums = false;
+    if (!done)
+        return false;
+    struct vkb_pass_row row = vkb_adjoint_row(&vkb_shader_adjoint_kernel_frag, half);
+    row.reads[SLOT_SOURCE] = image;
+    row.block = VKB_BLOCK_filter;
+    row.params.filter.step_x = along_x ? (float)kernel->step : 0.0f;
+    row.params.filter.step_y = along_x ? 0.0f : (float)kernel->step;
+    VKB_SET_TARGET(&row, filter, &adjoint->graph->images[half]);
+    row.constants.alpha = adjoint->alpha;
+    row.constants.radius = (int32_t)kernel->count - 1;
+    row.constants.sampling = axis->from == axis->to && kernel->step == floor(kernel->step)
+                               ? SAMPLING_TEXEL
+                               : SAMPLING_FETCH;
+    for (uint32_t four = 0; done && 4 * four < kernel->count; ++four) {
         char name[VKB_NAME_SIZE];
-        snprintf(name, sizeof name, ".by_weight_%u_%u", i, adjoint->moved++);
-        memset(axis->kernel.weights, 0, sizeof axis->kernel.weights);
-        axis->kernel.weights[i] = 1.0;
-        done = add_filter_sums(adjoint, filter, name, cotangents, image, error);
+        snprintf(name, sizeof name, ".by_weight_%u_%u", four, adjoint->moved++);
+        row.constants.first_sample = (int32_t)(4 * four);
+        done = vkb_add_sum_passes(adjoint, &row, row.shader, size, name, error);
     }
-    axis->kernel = kernel;
     return done;
 }
 
@@ -107,8 +128,8 @@ static bool add_tap_sums(struct vkb_adjoint *adjoint, const struct vkb_filter *g
 
     return add_distance_sums(adjoint, &filter, &filter.x, cotangents, image, error)
         && add_distance_sums(adjoint, &filter, &filter.y, cotangents, image, error)
-        && add_weight_sums(adjoint, &filter, &filter.x, cotangents, image, error)
-        && add_weight_sums(adjoint, &filter, &filter.y, cotangents, image, error);
+        && add_weight_sums(adjoint, given, &given->x, cotangents, image, error)
+        && add_weight_sums(adjoint, given, &given->y, cotangents, image, error);
 }
 
 bool vkb_transpose_filters(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,

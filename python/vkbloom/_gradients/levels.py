@@ -9,7 +9,7 @@ glare, distances of the taps of passes, or weights of blurs. The sums have kinds
   and the stages of glare, and of the first level: times its cotangents.
 - "enlarging_x", "reducing_y", ...: Of each pass that enlarges an image or does not: the derivative
   by a factor of the distances of its taps along an axis.
-- "weight": The derivatives by each weight of a blur along an axis.
+- "weight": Of each blur along an axis: the derivatives by four of its weights.
 """
 
 from __future__ import annotations
@@ -216,9 +216,15 @@ def _separable_factors(settings: Any, size: _Size) -> dict[str, Factors]:
     by_weights[0], by_strength[0] = (1 + 2 * strength, 2 * weights[0]) if twice else (1.0, 0.0)
     return {
         "blur_scale": _by_distance(settings.blur_scale),
-        "weights": {"weight": np.diag(by_weights)[..., None]},
-        "blur_strength": {"weight": by_strength[:, None]},
+        "weights": {"weight": _by_fours(np.diag(by_weights))},
+        "blur_strength": {"weight": _by_fours(by_strength)},
     }
+
+
+def _by_fours(factors: _Array) -> _Array:
+    """Return the last dimension as two, of which the second one has four."""
+    padding = [(0, 0)] * (factors.ndim - 1) + [(0, -factors.shape[-1] % 4)]
+    return np.pad(factors, padding).reshape(*factors.shape[:-1], -1, 4)
 
 
 _FACTORS: Final[dict[str, Callable[[Any, _Size], dict[str, Factors]]]] = {
