@@ -3,11 +3,11 @@
 RGB in single floats, another image in each round, on the GPU of the adapter or on the CPU at a
 smaller size; each call is waited for. A step is the bloom and the derivatives by the image from
 given cotangents. One that learns has `vkbloom.torch.Bloom`, and the derivatives by parameters, too:
-threshold, knee and intensity where the device has them. Parameters are on the tensors' device, and
-have other values in each step, as an optimizer makes them. PyTorch's pyramid is the same `Pyramid`
-in convolutions, by autograd, and compiled by `torch.compile`. Tensors of vkbloom have their
-channels last, those of PyTorch first. On a GPU the passes of both directions are timed, too, by its
-timestamps.
+threshold, knee and intensity where the device has them, or all fields that it has. Parameters are
+on the tensors' device, and have other values in each step, as an optimizer makes them. PyTorch's
+pyramid is the same `Pyramid` in convolutions, by autograd, and compiled by `torch.compile`. Tensors
+of vkbloom have their channels last, those of PyTorch first. On a GPU the passes of both directions
+are timed, too, by its timestamps.
 """
 
 from __future__ import annotations
@@ -41,6 +41,7 @@ LEVELS: Final = 4
 FORWARD: Final = "forward"
 STEP: Final = "a step"
 LEARNS: Final = "a step that learns"
+LEARNS_ALL: Final = "a step that learns all fields"
 AUTOGRAD: Final = "PyTorch with autograd"
 COMPILED: Final = "PyTorch, compiled"
 BOTH: Final = "passes of both directions"
@@ -102,16 +103,18 @@ def run(plan: Plan, section: Section) -> None:
             if not on_cpu:
                 clocks[BOTH] = _passes(renderer, settings, last)
             _time_steps(plan, section, name, clocks)
-            fields = [name for name in FIELDS if name in device_fields(in_floats(settings))]
-            if fields:
+            known = device_fields(in_floats(settings))
+            learned = {LEARNS: [one for one in FIELDS if one in known], LEARNS_ALL: sorted(known)}
+            clocks = {STEP: clocks[STEP]}
+            for kind, fields in learned.items():
                 modules = [
                     operator.Bloom(settings, learn=fields, renderer=renderer).to(device)
-                    for _ in range(MODULES)
+                    for _ in range(MODULES if fields else 0)
                 ]
-                learns = _learning_step(torch, modules, last, device)
-                clocks = {STEP: clocks[STEP], LEARNS: wall_clock(learns)}
-                limit = MAX_LEARNING if name in METHODS and not on_cpu else None
-                _time_learning(plan, section, name, clocks, limit)
+                if modules:
+                    clocks[kind] = wall_clock(_learning_step(torch, modules, last, device))
+            limit = MAX_LEARNING if name in METHODS and not on_cpu else None
+            _time_learning(plan, section, name, clocks, limit)
 
 
 def _waiting(call: Callable[[Any], Any], inputs: Any, device: str) -> Callable[[int], Any]:
@@ -219,15 +222,16 @@ def _time_learning(
     clocks: dict[str, Callable[[int], float]],
     limit: float | None,
 ) -> None:
-    """Time steps that learn. `limit`: What they take more at most; None: a multiple is."""
+    """Time steps that learn. `limit`: What those of few fields take more; None: a multiple is."""
     times = alternate_seconds(clocks, plan.times(ROUNDS), warm_up=3)
     group = f"{name}, fields"
     section.add_times(group, times, dict.fromkeys(times, WALL), STEP)
     section.tables.append(side_by_side(group, times, STEP))
-    if limit is None:
-        ratios(section, name, times, (LEARNS, STEP, MAX_RATIO, True))
-    else:
+    multiples = [kind for kind in (LEARNS, LEARNS_ALL) if kind in times]
+    if limit is not None and LEARNS in times:
+        multiples.remove(LEARNS)
         _at_most_more(section, name, times, (LEARNS, STEP, limit))
+    ratios(section, name, times, *((kind, STEP, MAX_RATIO, True) for kind in multiples))
 
 
 def _at_most_more(

@@ -65,7 +65,9 @@ struct vkb_axis {
     uint32_t first;  // where pixel 0 is in the image that the transpose reads
     uint32_t count;
     struct vkb_tap taps[VKB_MAX_TAPS];
-    struct vkb_kernel kernel;    // in place of the taps, if it has weights
+    struct vkb_kernel kernel;  // in place of the taps, if it has weights
+    // What it was before its kernel was moved to texels, if the graph keeps that; else NULL.
+    const struct vkb_axis *unmoved;
     struct vkb_readers readers;  // of a row of the transpose
 };
 

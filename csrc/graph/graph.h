@@ -231,7 +231,7 @@ struct vkb_graph {
     // Of levels whose width follows from the aspect of the frame: the adapter's limit; 0: none.
     uint32_t max_width;
     uint32_t layers;     // of a batch; 0: of one image
-    bool keeps_kernels;  // those of blurs stay as they are, and are not moved to texels
+    bool keeps_unmoved;  // axes whose kernels are moved to texels
 };
 
 void vkb_graph_destroy(struct vkb_graph *graph);

@@ -171,7 +171,7 @@ bool vkb_build_adjoint(const struct vkb_source *source, const struct vkb_setting
         .image = VKB_NO_IMAGE,
     };
 
-    graph->keeps_kernels =
+    graph->keeps_unmoved =
         cotangents->sums.enlarging || cotangents->sums.reducing || cotangents->sums.weight;
     if (!vkb_source_build(source, settings, max_side, graph, error))
         return false;

@@ -126,10 +126,14 @@ static bool add_tap_sums(struct vkb_adjoint *adjoint, const struct vkb_filter *g
 {
     struct vkb_filter filter = *given;
 
+    if (given->x.unmoved)
+        filter.x = *given->x.unmoved;
+    if (given->y.unmoved)
+        filter.y = *given->y.unmoved;
     return add_distance_sums(adjoint, &filter, &filter.x, cotangents, image, error)
         && add_distance_sums(adjoint, &filter, &filter.y, cotangents, image, error)
-        && add_weight_sums(adjoint, given, &given->x, cotangents, image, error)
-        && add_weight_sums(adjoint, given, &given->y, cotangents, image, error);
+        && add_weight_sums(adjoint, &filter, &filter.x, cotangents, image, error)
+        && add_weight_sums(adjoint, &filter, &filter.y, cotangents, image, error);
 }
 
 bool vkb_transpose_filters(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,

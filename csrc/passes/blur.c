@@ -48,6 +48,17 @@ void vkb_fill_weights(const struct vkb_kernel *kernel, double gain, float (*weig
         weights[i / 4][i % 4] = (float)(gain * kernel->weights[i]);
 }
 
+static void keep_unmoved(struct vkb_levels *levels, struct vkb_axis *axis)
+{
+    const struct vkb_filter along = {.x = *axis};
+
+    if (levels->failed)
+        return;
+    const struct vkb_filter *kept = vkb_graph_keep_filters(levels->graph, &along, 1, levels->error);
+    axis->unmoved = kept ? &kept->x : NULL;
+    levels->failed = !kept;
+}
+
 struct vkb_pass_row vkb_blur_row(struct vkb_levels *levels, const struct vkb_filter *given,
                                  bool sampled, uint32_t from, uint32_t to)
 {
@@ -63,8 +74,11 @@ struct vkb_pass_row vkb_blur_row(struct vkb_levels *levels, const struct vkb_fil
         direction == DIRECTION_VERTICAL ? &filter.y.kernel : &filter.x.kernel;
 
     if (!kernel->placed && filter.x.kind == UPSAMPLE_LINEAR && !both
-        && (keeps_size(&filter) || is_integer(kernel->step)) && !levels->graph->keeps_kernels)
+        && (keeps_size(&filter) || is_integer(kernel->step))) {
+        if (levels->graph->keeps_unmoved)
+            keep_unmoved(levels, direction == DIRECTION_VERTICAL ? &filter.y : &filter.x);
         move_to_texels(kernel);
+    }
     vkb_read_only(&row, from);
     row.block = VKB_BLOCK_filter;
     params->step_x = (float)filter.x.kernel.step;

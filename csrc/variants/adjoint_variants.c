@@ -8,6 +8,8 @@
 
 // The most weights of columns that an invocation keeps: the driver compiles a load of each.
 enum { MAX_LINEAR = 128 };
+// The most pixels that read a texel in tiles along both axes without sums of rows.
+enum { MAX_WITHOUT_SUMS = 64 };
 
 bool vkb_are_floats(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
 {
@@ -130,6 +132,11 @@ struct part {
     uint32_t from;
 };
 
+static struct part own_part(const struct vkb_pass_row *pass)
+{
+    return (struct part){pass->filters, pass->constants.direction, pass->reads[SLOT_COTANGENTS]};
+}
+
 // What a pass adds: with the row before it, along the other axis, if few pixels read a texel.
 static struct part part_of(const struct vkb_pass_row *pass)
 {
@@ -137,8 +144,7 @@ static struct part part_of(const struct vkb_pass_row *pass)
 
     return joined && joined->x.readers.most <= MAX_WINDOW && joined->y.readers.most <= MAX_WINDOW
              ? (struct part){joined, DIRECTION_BOTH, pass->joined_from}
-             : (struct part){pass->filters, pass->constants.direction,
-                             pass->reads[SLOT_COTANGENTS]};
+             : own_part(pass);
 }
 
 // The ratio of a side of the image that is read to the side of an axis, if its windows have it.
@@ -215,11 +221,19 @@ static void set_tiles(const struct vkb_variant_choice *choice, const struct tile
 static bool make_tiles(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
                        struct vkb_pass_row *row)
 {
-    const struct part part = part_of(pass);
+    struct part part = part_of(pass);
     struct tiles tiles;
 
     if (!find_tiles(choice, &part, &tiles))
         return false;
+    // Tiles that keep no sums of rows take the product of both windows: 0.9 ms for 3840 x 2160
+    // pixels that 10 x 10 ones read, and 0.47 along one axis after the other (H200, 2026-11-30).
+    if (part.filter == pass->joined && !tiles.keeps
+        && tiles.width * tiles.height > MAX_WITHOUT_SUMS) {
+        part = own_part(pass);
+        if (!find_tiles(choice, &part, &tiles))
+            return false;
+    }
     row->reads[SLOT_COTANGENTS] = part.from;
     set_tiles(choice, &tiles, row);
     return true;
