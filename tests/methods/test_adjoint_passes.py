@@ -609,7 +609,7 @@ def test_intensities_of_glare_are_sums(renderer: Renderer, name: str) -> None:
 
 
 @pytest.mark.parametrize("alpha", ["keep", "blur"])
-@pytest.mark.parametrize("name", ["hdrp", "pyramid", "three", "dual"])
+@pytest.mark.parametrize("name", ["hdrp", "pyramid", "godot"])
 def test_sums_leave_out_an_alpha_that_is_not_blurred(
     renderer: Renderer, name: str, alpha: str
 ) -> None:
@@ -617,8 +617,7 @@ def test_sums_leave_out_an_alpha_that_is_not_blurred(
     known: dict[str, tuple[Any, tuple[str, ...]]] = {
         "hdrp": (HdrpBloom(), ("scatter",)),
         "pyramid": (Pyramid(levels=3, level_weights=(0.5, 0.2, 0.1)), ("level_weights", "radius")),
-        "three": (vkbloom.ThreeBloom(), ("tints", "radius")),
-        "dual": (vkbloom.DualKawase(levels=2), ("offset",)),
+        "godot": (GodotBloom(), ("level_weights",)),
     }
     settings, fields = known[name]
     settings = settings.replace(**SINGLE, alpha=alpha)
