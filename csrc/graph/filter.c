@@ -24,6 +24,7 @@ void vkb_filter_begin(const struct vkb_graph *graph, uint32_t from, uint32_t to,
     filter->kernels = 1;
     filter->gain = 1.0;
     filter->divisor = 1.0;
+    filter->enlarges = false;
 }
 
 void vkb_axis_move(struct vkb_axis *axis, uint32_t from, uint32_t to, double origin)

@@ -76,6 +76,7 @@ struct vkb_filter {
     struct vkb_axis x, y;
     uint32_t kernels;
     double gain, divisor;
+    bool enlarges;  // a level, whatever the size of the target is
 };
 
 struct vkb_graph;

@@ -65,15 +65,13 @@ static bool add_distance_sums(struct vkb_adjoint *adjoint, const struct vkb_filt
                               struct vkb_axis *axis, uint32_t cotangents, uint32_t image,
                               struct vkb_error *error)
 {
-    const struct vkb_axis *x = &filter->x, *y = &filter->y;
-    const bool enlarging = (uint64_t)x->to * y->to > (uint64_t)x->from * y->from;
     char name[VKB_NAME_SIZE];
 
-    if (!(enlarging ? adjoint->sums.enlarging : adjoint->sums.reducing)
+    if (!(filter->enlarges ? adjoint->sums.enlarging : adjoint->sums.reducing)
         || !vkb_axis_has_distances(axis))
         return true;
-    snprintf(name, sizeof name, ".by_%s_%s_%u", enlarging ? "enlarging" : "reducing",
-             axis == x ? "x" : "y", adjoint->moved++);
+    snprintf(name, sizeof name, ".by_%s_%s_%u", filter->enlarges ? "enlarging" : "reducing",
+             axis == &filter->x ? "x" : "y", adjoint->moved++);
     axis->slopes = true;
     const bool done = add_filter_sums(adjoint, filter, name, cotangents, image, error);
     axis->slopes = false;
@@ -107,6 +105,7 @@ static bool add_weight_sums(struct vkb_adjoint *adjoint, const struct vkb_filter
     row.params.filter.step_y = along_x ? 0.0f : (float)kernel->step;
     VKB_SET_TARGET(&row, filter, &adjoint->graph->images[half]);
     row.constants.alpha = adjoint->alpha;
+    row.constants.direction = along_x ? DIRECTION_HORIZONTAL : DIRECTION_VERTICAL;
     row.constants.radius = (int32_t)kernel->count - 1;
     row.constants.sampling = axis->from == axis->to && kernel->step == floor(kernel->step)
                                ? SAMPLING_TEXEL

@@ -254,6 +254,7 @@ void vkb_kawase_up(struct vkb_levels *levels, double offset, uint32_t from, uint
     struct vkb_filter filter = vkb_make_filter(levels->graph, from, to, kernels, 3, 1.0);
 
     filter.divisor = 12.0;  // Its inverse is no float.
+    filter.enlarges = true;
     vkb_add_filter_pass(levels, &filter, from, to);
 }
 

@@ -171,15 +171,18 @@ static struct vkb_filter enlarging(const struct vkb_graph *graph, uint32_t from,
 
     switch (kernel) {
     case UPSAMPLE_TENT:
-        return vkb_make_filter(graph, from, to, tent, 1, gain);
+        filter = vkb_make_filter(graph, from, to, tent, 1, gain);
+        break;
     case UPSAMPLE_CORNERS:
-        return vkb_make_filter(graph, from, to, corners, 1, gain);
+        filter = vkb_make_filter(graph, from, to, corners, 1, gain);
+        break;
     default:
         filter = vkb_make_filter(graph, from, to, kernel == UPSAMPLE_INSET_CUBIC ? halves : centre,
                                  1, gain);
         vkb_set_kind(&filter, kernel);
-        return filter;
     }
+    filter.enlarges = true;
+    return filter;
 }
 
 // Upsamples the smaller level `from` to `to`, and adds the level `same_size`, if there is one.

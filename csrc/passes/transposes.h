@@ -11,8 +11,8 @@
 // - shares: by the shares of a level and a smaller one;
 // - stages: by the intensities of the bloom and of the stages of glare;
 // - levels: by factors of the channels of the levels that one pass adds up;
-// - enlarging, reducing: by factors of the distances of taps in passes that make an image larger,
-//   and in others;
+// - enlarging, reducing: by factors of the distances of taps in passes that enlarge a level, and in
+//   others;
 // - weight: by each weight of blurs;
 // - colour: by factors of the channels of the first level.
 #define VKB_SUMS(SUM) \

@@ -33,7 +33,7 @@ vec4 values()
         return products;
     Place place = PLACE_IN(source);
     vec2 apart = vec2(params.step_x, params.step_y);
-    ivec2 next = ivec2(greaterThan(apart, vec2(0.0)));
+    ivec2 next = DIRECTION == DIRECTION_VERTICAL ? ivec2(0, 1) : ivec2(1, 0);
     for (int i = 0; i < 4; ++i) {
         int tap = FIRST_SAMPLE + i;
         vec4 taken = sample_tap(place, float(tap) * apart, next);

@@ -529,7 +529,14 @@ DISTANCES: dict[str, tuple[Any, tuple[str, ...]]] = {
         vkbloom.Separable(blur_scale=1.37, direct=True, first_tap=0, weights=(0.4, 0.0, 0.2)),
         ("blur_scale", "weights", "blur_strength"),
     ),
+    "separable at a point": (
+        vkbloom.Separable(layers=((0.0, 1.0), (1.0, 0.5)), bloom_scale=0.5, weights=(0.5, 0.2)),
+        ("weights", "blur_strength"),
+    ),
     "kino": (vkbloom.KinoBloom(radius=4.6, bloom_scale=0.8), ("radius", "threshold")),
+    # The levels are as large as the image, or larger.
+    "kino enlarged": (vkbloom.KinoBloom(radius=4.6, bloom_scale=2.0), ("radius",)),
+    "pyramid enlarged": (Pyramid(levels=2, radius=0.83, bloom_scale=4.0), SCALES),
     "pygfx": (vkbloom.PygfxBloom(filter_radius=0.02), ("filter_radius",)),
     "urp dual": (vkbloom.UrpBloom(filter="dual", scatter=0.4), ("scatter", "tint")),
 }

@@ -7,7 +7,7 @@ glare, distances of the taps of passes, or weights of blurs. The sums have kinds
   times itself.
 - "levels", "stages", "colour": Of each channel of the levels that one pass adds up, of the bloom
   and the stages of glare, and of the first level: times its cotangents.
-- "enlarging_x", "reducing_y", ...: Of each pass that enlarges an image or does not: the derivative
+- "enlarging_x", "reducing_y", ...: Of each pass that enlarges a level or does not: the derivative
   by a factor of the distances of its taps along an axis.
 - "weight": Of each blur along an axis: the derivatives by four of its weights.
 """
