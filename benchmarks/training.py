@@ -106,13 +106,13 @@ def run(plan: Plan, section: Section) -> None:
             known = device_fields(in_floats(settings))
             learned = {LEARNS: [one for one in FIELDS if one in known], LEARNS_ALL: sorted(known)}
             clocks = {STEP: clocks[STEP]}
-            for kind, fields in learned.items():
+            for place, (kind, fields) in enumerate(learned.items(), start=2):
                 modules = [
                     operator.Bloom(settings, learn=fields, renderer=renderer).to(device)
                     for _ in range(MODULES if fields else 0)
                 ]
                 if modules:
-                    clocks[kind] = wall_clock(_learning_step(torch, modules, last, device))
+                    clocks[kind] = wall_clock(_learning_step(torch, modules, last, device, place))
             limit = MAX_LEARNING if name in METHODS and not on_cpu else None
             _time_learning(plan, section, name, clocks, limit)
 
@@ -134,9 +134,12 @@ def _step(torch: Any, call: Callable[[Any], Any], inputs: Any, device: str) -> C
 
 
 def _learning_step(
-    torch: Any, modules: list[Any], inputs: Any, device: str
+    torch: Any, modules: list[Any], inputs: Any, device: str, place: int
 ) -> Callable[[int], Any]:
-    """Return a call that waits for such a step, with a module of other values in each round."""
+    """Return a call that waits for such a step, with a module of other values in each round.
+
+    `place`: Of the call in its round. The call before has another image.
+    """
     parameters = [list(module.parameters()) for module in modules]
     with torch.no_grad():
         for number, each in enumerate(parameters):
@@ -144,10 +147,11 @@ def _learning_step(
                 parameter.mul_(1 - 1e-4 * number)
 
     def step(turn: int) -> Any:
-        image = inputs[0][turn % 3].detach().requires_grad_()
+        number = (turn + place) % 3
+        image = inputs[0][number].detach().requires_grad_()
         wanted = [image, *parameters[turn % len(modules)]]
         final = modules[turn % len(modules)](image)
-        return torch.autograd.grad(final, wanted, inputs[1][turn % 3])[0]
+        return torch.autograd.grad(final, wanted, inputs[1][number])[0]
 
     return pytorch.synchronized(step, device)
 

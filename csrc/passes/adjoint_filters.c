@@ -86,7 +86,6 @@ static bool add_weight_sums(struct vkb_adjoint *adjoint, const struct vkb_filter
     const bool along_x = axis == &filter->x;
     const struct vkb_kernel *kernel = &axis->kernel;
     struct vkb_filter across = *filter;
-    bool done = true;
     uint32_t half;
 
     if (!adjoint->sums.weight || kernel->count == 0)
@@ -94,7 +93,7 @@ static bool add_weight_sums(struct vkb_adjoint *adjoint, const struct vkb_filter
     vkb_axis_move(along_x ? &across.x : &across.y, axis->to, axis->to, 0.0);
     const struct vkb_size size = {across.x.from, across.y.from};
     adjoint->of_sums = true;
-    done = vkb_filter_to_image(adjoint, &across, cotangents, size, &half, error);
+    bool done = vkb_filter_to_image(adjoint, &across, cotangents, size, &half, error);
     adjoint->of_sums = false;
     if (!done)
         return false;
