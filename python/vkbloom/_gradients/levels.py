@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom._formats import LUMINANCE_7_DIGITS
-from vkbloom.reference import _bevy, _kino
+from vkbloom.reference import _bevy, _godot, _kino, _three
 from vkbloom.reference._post_processing import linear_light
 from vkbloom.reference._sampling import level_sizes
 from vkbloom.reference._upsampling import mix
@@ -144,12 +144,13 @@ def _by_slopes(of: Callable[[Any], Any], *names: str) -> Callable[[Any, _Size], 
     return factors
 
 
-def _distances(name: str, more: float = 0.0) -> Callable[[Any, _Size], dict[str, Factors]]:
-    """Return a function for a field to which, with a number added, distances are proportional."""
-    return lambda settings, size: {name: _by_distance(getattr(settings, name) + more)}
+def _distances(name: str) -> Callable[[Any, _Size], dict[str, Factors]]:
+    """Return a function for a field that multiplies distances."""
+    return lambda settings, size: {name: _by_distance(getattr(settings, name))}
 
 
 def _by_distance(distance: float) -> Factors:
+    """Return the factors for a field that is this distance, or less by a constant."""
     return dict.fromkeys(_EVERYWHERE, np.divide(np.ones((1, 1)), distance))
 
 
@@ -174,8 +175,7 @@ def _pyramid_factors(settings: Any, size: _Size) -> dict[str, Factors]:
 
 
 def _three_factors(settings: Any, size: _Size) -> dict[str, Factors]:
-    slopes = 1.2 - 2 * np.array([1.0, 0.8, 0.6, 0.4, 0.2])
-    shares = (1.2 - slopes) / 2 + slopes * settings.radius
+    shares, slopes = np.array(_three._factors(settings.radius)), 1.2 - 2 * np.array(_three._FACTORS)
     by_tints = np.zeros((5, 3, 5, 4))
     level, channel = np.indices((5, 3))
     by_tints[level, channel, level, channel] = 1 / np.array(settings.tints)
@@ -185,7 +185,7 @@ def _three_factors(settings: Any, size: _Size) -> dict[str, Factors]:
 def _godot_factors(settings: Any, size: _Size) -> dict[str, Factors]:
     weights = np.array(settings.level_weights, np.float32)
     # Others are left out.
-    taken = np.flatnonzero(weights > np.float32(1e-4))
+    taken = np.flatnonzero(weights > np.float32(_godot._MIN_WEIGHT))
     by_weights = np.zeros((len(weights), max(len(taken), 1), 1))
     by_weights[taken, np.arange(len(taken)), 0] = 1 / weights[taken]
     return {"level_weights": {"levels": by_weights}}
