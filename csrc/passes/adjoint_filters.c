@@ -44,8 +44,8 @@ static bool add_filter_sums(struct vkb_adjoint *adjoint, const struct vkb_filter
                             const char *name, uint32_t cotangents, uint32_t image,
                             struct vkb_error *error)
 {
-    const struct vkb_adjoint kept = *adjoint;
-    const uint32_t before = kept.cotangents[image];
+    const uint32_t before = adjoint->cotangents[image];
+    const uint32_t scene = adjoint->scene, glow = adjoint->glow;
 
     // The result is the only cotangents of the image for a moment, and none of another one.
     adjoint->cotangents[image] = adjoint->scene = adjoint->glow = VKB_NO_IMAGE;
@@ -53,8 +53,8 @@ static bool add_filter_sums(struct vkb_adjoint *adjoint, const struct vkb_filter
     const bool done = vkb_accumulate_filter(adjoint, filter, cotangents, image, error);
     const uint32_t made = adjoint->cotangents[image];
     adjoint->cotangents[image] = before;
-    adjoint->scene = kept.scene;
-    adjoint->glow = kept.glow;
+    adjoint->scene = scene;
+    adjoint->glow = glow;
     adjoint->of_sums = false;
     return done && vkb_add_product_sums(adjoint, made, image, name, error);
 }
@@ -118,12 +118,16 @@ static bool add_weight_sums(struct vkb_adjoint *adjoint, const struct vkb_filter
     return done;
 }
 
-// The sums by what the taps of a filter have.
+// The sums by what the taps of a filter have, if any are wanted.
 static bool add_tap_sums(struct vkb_adjoint *adjoint, const struct vkb_filter *given,
                          uint32_t cotangents, uint32_t image, struct vkb_error *error)
 {
-    struct vkb_filter filter = *given;
+    const struct vkb_wanted_sums *sums = &adjoint->sums;
+    struct vkb_filter filter;
 
+    if (!sums->enlarging && !sums->reducing && !sums->weight)
+        return true;
+    filter = *given;
     if (given->x.unmoved)
         filter.x = *given->x.unmoved;
     if (given->y.unmoved)

@@ -144,6 +144,9 @@ def _by_slopes(of: Callable[[Any], Any], *names: str) -> Callable[[Any, _Size], 
     return factors
 
 
+_by_scatter = _by_slopes(lambda settings: mix(0.05 + 0.9 * settings.scatter, 1), "scatter")
+
+
 def _distances(name: str) -> Callable[[Any, _Size], dict[str, Factors]]:
     """Return a function for a field that multiplies distances."""
     return lambda settings, size: {name: _by_distance(getattr(settings, name))}
@@ -199,8 +202,8 @@ def _urp_factors(settings: Any, size: _Size) -> dict[str, Factors]:
     # Black counts as white.
     if grey:
         by_tint[:, 0, :3] = slopes[:, None] * (np.diag(1 / light) - luminance[:, None] / grey)
-    by_shares = _by_slopes(lambda given: mix(0.05 + 0.9 * given.scatter, 1), "scatter")
-    by_scatter = {**by_shares(settings, size)["scatter"], **_by_distance(settings.scatter + 0.3)}
+    by_shares = _by_scatter(settings, size)["scatter"]
+    by_scatter = {**by_shares, **_by_distance(settings.scatter + 0.3)}
     return {"tint": {"colour": by_tint}, "scatter": by_scatter}
 
 
@@ -231,7 +234,7 @@ _FACTORS: Final[dict[str, Callable[[Any, _Size], dict[str, Factors]]]] = {
     "bevy": _by_slopes(_bevy.shares, *_KINDS["bevy"]),
     "dual_kawase": _distances("offset"),
     "godot": _godot_factors,
-    "hdrp": _by_slopes(lambda settings: mix(0.05 + 0.9 * settings.scatter, 1), "scatter"),
+    "hdrp": _by_scatter,
     "kino": _kino_factors,
     "pmndrs": _by_slopes(lambda settings: mix(settings.radius, 1), "radius"),
     "post_processing": _post_processing_factors,

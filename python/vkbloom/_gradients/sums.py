@@ -16,7 +16,6 @@ from vkbloom.reference._sampling import scale_size
 if TYPE_CHECKING:
     from vkbloom._settings.settings import Settings
 
-_BY_LIGHT: Final = ".by_light"
 #: The fields that the composite reads.
 _OF_COMPOSITE: Final = ("intensity", "exposure", "reference_white")
 
@@ -88,7 +87,7 @@ def _channels(settings: Settings) -> dict[str, dict[str, float | None]]:
         ".by_threshold": threshold,
         ".by_own_threshold": {name: slope * is_set for name, slope in own.items()},
         # The intensity's derivative, times the intensity.
-        _BY_LIGHT: threshold | {"intensity": 1.0 / intensity if intensity != 0 else None},
+        ".by_light": threshold | {"intensity": 1.0 / intensity if intensity != 0 else None},
     }
 
 
