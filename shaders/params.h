@@ -306,7 +306,8 @@
 // columns' stages without the last one. WEIGHTED: what is read on the way forth, or what is stored
 // on the way back, is multiplied by the channel `weight` of the weights; along columns by those of
 // the first column. The result has so many texels before the first one of the weights. In complete
-// lines a row of a channel has so many `frequencies`.
+// lines a row of a channel has so many `frequencies`. THROUGH_COMPOSITE: what is read is multiplied by
+// the `gain` where the composite's scene is finite.
 #define FFT_BLOCK(B, READS, INPUT, VEC4S) \
     INPUT(B, int, count) \
     INPUT(B, int, across) \
@@ -332,7 +333,8 @@
     INPUT(B, int, weight) \
     INPUT(B, int, before_x) \
     INPUT(B, int, before_y) \
-    INPUT(B, int, frequencies)
+    INPUT(B, int, frequencies) \
+    INPUT(B, float, gain)
 
 // Writes the kernel into padded lines (fft_kernel.comp). For each axis: the kernel's number of
 // texels, the first and the last that are not 0, how many before and after its centre count, and the
@@ -600,8 +602,8 @@
     SLOT(SLOT_ADDED, 5)          /* what other readers of the image have accumulated */ \
     SLOT(SLOT_DIFFERENTIATED, 6) /* the image itself, if it is a source's */
 
-// Fused passes that end with a composite. Its scene is at SLOT_SOURCE, or, of a filter, at
-// SLOT_ENDED.
+// Fused passes that end with a composite, or begin with its transpose. Its scene is at SLOT_SOURCE,
+// or, where that is another image, at SLOT_ENDED.
 #define FUSED_SLOTS(SLOT) \
     SLOT(SLOT_ENDED, 2)        /* see lib/ended.glsl */
 
@@ -632,6 +634,7 @@
 #define TRANSFORM_SLOTS(SLOT) \
     SLOT(SLOT_SPECTRUM, 1) /* of the kernel, for the product */ \
     SLOT(SLOT_ADDED_SPECTRUM, 2) /* of complete lines: what columns add on their way back */ \
+    SLOT(SLOT_LIT, 3) /* the same: the scene of the composite whose cotangents are read */ \
     SLOT(SLOT_FACTORS, 1)  /* of up to MAX_PRODUCTS: the spectra of glow and kernel in turns */ \
     SLOT(SLOT_PLACES, 1)   /* where columns and rows are in the grid of weights */ \
     SLOT(SLOT_NODES, 5)    /* the same, beside up to four SLOT_FACTORS */
@@ -842,7 +845,8 @@
     CONSTANT(74, KEPT_RESULTS, kept_results)   /* of a line's last butterflies */ \
     CONSTANT(75, PITCH, pitch)                 /* floats of a line in shared memory */ \
     CONSTANT(76, CHANNELS, channels)           /* that complete lines are of */ \
-    CONSTANT(77, INNER, inner)                 /* of PICTURES: a window's texels away from edges */
+    CONSTANT(77, INNER, inner)                 /* of PICTURES: a window's texels away from edges */ \
+    CONSTANT(78, OF_POSITIVE, of_positive)     /* of ADDS_IMAGE: the scene's positive colours alone */
 
 // The names that a setting can have. Each list is a setting and a specialization constant.
 #define COMPOSITE_NAMES(NAME) \

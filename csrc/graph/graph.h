@@ -88,6 +88,12 @@ static inline bool vkb_is_given(const struct vkb_image_row *row)
     return row->input || row->serial;
 }
 
+// What a bloom is made from, with NaN and infinity.
+static inline bool vkb_is_of_source(const struct vkb_image_row *row)
+{
+    return row->input == VKB_INPUT_IMAGE || row->input == VKB_INPUT_EMISSION;
+}
+
 static inline bool vkb_is_history(const struct vkb_image_row *row)
 {
     return row->input >= VKB_INPUT_HISTORY;

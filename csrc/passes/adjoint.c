@@ -85,20 +85,23 @@ bool vkb_end_scene(struct vkb_adjoint *adjoint, struct vkb_error *error)
     return vkb_accumulate_cotangent(adjoint, &adjoint->scene_row, image, error);
 }
 
-// Has the row add what the composite has left to the next pass. Only filters have a share for it.
+// Has the row add what the composite has left to the next pass. Only filters have a share for it,
+// and only other passes leave out what is not positive.
 static bool take_scene(struct vkb_adjoint *adjoint, struct vkb_pass_row *row,
                        struct vkb_error *error)
 {
     const struct vkb_share share = adjoint->share;
 
-    if (row->block == VKB_BLOCK_adjoint_filter) {
+    if (row->block == VKB_BLOCK_adjoint_filter && !share.of_positive) {
         row->params.adjoint_filter.share = (float)share.factor;
         row->params.adjoint_filter.share_of_mask = (float)share.by_mask;
         row->constants.masked = adjoint->scene_row.constants.masked;
         row->reads[SLOT_MASK] = adjoint->scene_row.reads[SLOT_MASK];
-    } else if (share.factor != 1.0 || adjoint->scene_row.constants.masked) {
+    } else if (row->block == VKB_BLOCK_adjoint_filter || share.factor != 1.0
+               || adjoint->scene_row.constants.masked) {
         return vkb_end_scene(adjoint, error);
     }
+    row->constants.of_positive = share.of_positive;
     adjoint->scene = VKB_NO_IMAGE;
     return true;
 }
@@ -116,8 +119,7 @@ bool vkb_accumulate_cotangent(struct vkb_adjoint *adjoint, const struct vkb_pass
     const struct vkb_size size = {forward->width, forward->height};
     row.constants.adds_image = *cotangent != VKB_NO_IMAGE;
     row.reads[SLOT_ADDED] = *cotangent;
-    row.constants.of_source =
-        forward->input == VKB_INPUT_IMAGE || forward->input == VKB_INPUT_EMISSION;
+    row.constants.of_source = vkb_is_of_source(forward);
     if (row.constants.of_source)
         row.reads[SLOT_DIFFERENTIATED] = image;
     return vkb_add_adjoint_pass(adjoint, &row, size, cotangent, error);

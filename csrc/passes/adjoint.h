@@ -7,9 +7,10 @@
 #include "passes/pass.h"
 #include "passes/transposes.h"
 
-// A factor of all colours, less `by_mask` times the mask of the row.
+// A factor of all colours, less `by_mask` times the mask of the row; or of those that are positive.
 struct vkb_share {
     double factor, by_mask;
+    bool of_positive;
 };
 
 struct vkb_adjoint {

@@ -30,12 +30,16 @@ bool vkb_adds_bloom(const struct vkb_pass_row *composite)
         && !composite->constants.lit;
 }
 
-// Whether the derivatives by the scene are a share of all colours.
-static bool scales_scene(const struct vkb_pass_row *row)
+// Whether the derivatives by the scene are a share of all colours, or of those that are positive. A
+// pass that takes these has a source's image at hand.
+static bool scales_scene(const struct vkb_graph *graph, const struct vkb_pass_row *row)
 {
     const int32_t composite = row->constants.composite;
 
-    return !depends_on_bloom(row) && (composite == COMPOSITE_ADD || composite == COMPOSITE_MIX);
+    return !depends_on_bloom(row)
+        && (composite == COMPOSITE_ADD || composite == COMPOSITE_MIX
+            || (composite == COMPOSITE_ADD_TO_POSITIVE
+                && vkb_is_of_source(&graph->images[row->reads[SLOT_SCENE]])));
 }
 
 static struct vkb_share share_of_scene(const struct vkb_pass_row *row)
@@ -44,8 +48,11 @@ static struct vkb_share share_of_scene(const struct vkb_pass_row *row)
     const double exposed = exp2(params->exposure);
     const double lost = row->constants.composite == COMPOSITE_MIX ? exposed * params->intensity : 0;
 
-    return row->constants.masked ? (struct vkb_share){exposed, lost}
-                                 : (struct vkb_share){exposed - lost, 0.0};
+    return (struct vkb_share){
+        .factor = row->constants.masked ? exposed : exposed - lost,
+        .by_mask = row->constants.masked ? lost : 0.0,
+        .of_positive = row->constants.composite == COMPOSITE_ADD_TO_POSITIVE,
+    };
 }
 
 // By scene, bloom and mask, with the row of a shader that reads these and the cotangents.
@@ -66,7 +73,8 @@ static bool accumulate_composite(struct vkb_adjoint *adjoint, struct vkb_pass_ro
         if ((by == BY_BLOOM && constants->composite == COMPOSITE_OFF)
             || (by == BY_MASK && !constants->masked))
             continue;
-        if (by == BY_SCENE && scales_scene(row) && adjoint->cotangents[images[by]] == VKB_NO_IMAGE)
+        if (by == BY_SCENE && scales_scene(adjoint->graph, row)
+            && adjoint->cotangents[images[by]] == VKB_NO_IMAGE)
             vkb_delay_scene(adjoint, row, share_of_scene(row), images[by]);
         else if (!vkb_accumulate_cotangent(adjoint, row, images[by], error))
             return false;

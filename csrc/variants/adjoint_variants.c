@@ -31,24 +31,31 @@ bool vkb_is_factor(const struct vkb_pass_row *pass)
         && !pass->constants.adds_image && !pass->constants.of_source
         && pass->reads[SLOT_BLOOM] == VKB_NO_IMAGE
         && (pass->constants.composite == COMPOSITE_ADD
+            || pass->constants.composite == COMPOSITE_ADD_TO_POSITIVE
             || pass->constants.composite == COMPOSITE_MIX);
 }
 
-// Reads the cotangents of a composite without a curve in place of those of its bloom.
-static void read_composite(const struct vkb_graph *graph, struct vkb_pass_row *row)
+float vkb_read_composite(const struct vkb_graph *graph, enum vkb_slot cotangents,
+                         enum vkb_slot scene, struct vkb_pass_row *row)
 {
-    const struct vkb_pass_row *pass = vkb_graph_writer(graph, row->reads[SLOT_COTANGENTS]);
+    const struct vkb_pass_row *pass = vkb_graph_writer(graph, row->reads[cotangents]);
 
     if (!pass || !vkb_is_factor(pass))
-        return;
+        return 1.0f;
     const struct vkb_composite_params *params = &pass->params.composite;
     const float intensity = pass->constants.lit ? 1.0f : params->intensity;
     // Godot's exposure is of the scene alone.
     const float exposure = pass->constants.exposed_scene ? 0.0f : params->exposure;
-    row->params.adjoint_filter.gain *= intensity * exp2f(exposure);
     row->constants.through_composite = true;
-    row->reads[SLOT_COTANGENTS] = pass->reads[SLOT_COTANGENTS];
-    row->reads[SLOT_SCENE] = pass->reads[SLOT_SCENE];
+    row->reads[cotangents] = pass->reads[SLOT_COTANGENTS];
+    row->reads[scene] = pass->reads[SLOT_SCENE];
+    return intensity * exp2f(exposure);
+}
+
+// The same of a filter.
+static void read_composite(const struct vkb_graph *graph, struct vkb_pass_row *row)
+{
+    row->params.adjoint_filter.gain *= vkb_read_composite(graph, SLOT_COTANGENTS, SLOT_SCENE, row);
 }
 
 // The same, if its images have linear texels, too.
@@ -100,13 +107,10 @@ bool vkb_add_adjoint_linear_variant(struct vkb_variant_choice *choice,
 }
 
 // An invocation for all kernels of a pixel, which fragments would compute anew for each.
-bool vkb_add_adjoint_kernels_variant(struct vkb_variant_choice *choice,
-                                     const struct vkb_pass_row *pass)
+static bool add_kernels(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
 {
     struct vkb_pass_row row;
 
-    if (!(vkb_transposes(pass, VKB_BLOCK_prefilter) && pass->constants.stacked_samples > 1))
-        return false;
     memcpy(&row, pass, sizeof row);
     vkb_make_dispatch(&row, pass->shader->dispatch, PIXEL_INVOCATIONS, PIXEL_INVOCATIONS);
     // Those of one picture, since llvmpipe also runs what an early end leaves out.
@@ -115,6 +119,34 @@ bool vkb_add_adjoint_kernels_variant(struct vkb_variant_choice *choice,
     row.groups_width = (target->width + PIXEL_INVOCATIONS - 1) / PIXEL_INVOCATIONS;
     row.groups_height = (height + PIXEL_INVOCATIONS - 1) / PIXEL_INVOCATIONS;
     return vkb_add_variant_pass(choice, &row);
+}
+
+bool vkb_add_adjoint_prefilter_variant(struct vkb_variant_choice *choice,
+                                       const struct vkb_pass_row *pass)
+{
+    struct vkb_pass_row row;
+
+    if (pass->shader != &vkb_shader_adjoint_prefilter_frag)
+        return false;
+    (pass->constants.stacked_samples > 1 ? add_kernels : vkb_add_fullscreen_variant)(choice, pass);
+    if (choice->failed)
+        return true;
+    memcpy(&row, &choice->graph->passes[choice->graph->pass_count - 1], sizeof row);
+    return vkb_add_from_image_variant(choice, pass, &row);
+}
+
+bool vkb_add_adjoint_end_variant(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
+{
+    struct vkb_pass_row row;
+
+    if (!vkb_transposes(pass, VKB_BLOCK_blender_end))
+        return false;
+    memcpy(&row, pass, sizeof row);
+    row.gains_if_finite = true;
+    const float gain = vkb_read_composite(&choice->plain, SLOT_COTANGENTS, SLOT_ENDED, &row);
+    for (int channel = 0; channel < 4; ++channel)
+        row.params.blender_end.factors[0][channel] *= gain;
+    return vkb_add_fullscreen_variant(choice, &row);
 }
 
 // The transpose of a filter in tiles: windows along both axes, the sizes of the images' ratios, and

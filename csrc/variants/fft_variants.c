@@ -230,13 +230,14 @@ static void set_parts(const struct vkb_pass_row *first, const struct group *grou
             (int32_t)count_parts(row, group->radices[0], row->params.fft.kept);
 }
 
+static const struct vkb_shader *const first_shaders[VKB_FORMAT_COUNT] =
+    VKB_BY_FORMAT(fft_lines_image);
+
 // The row for all stages along an axis, from `first` to before `end`.
 static struct vkb_pass_row make_row(const struct vkb_variant_choice *choice,
                                     const struct vkb_pass_row *first,
                                     const struct vkb_pass_row *end)
 {
-    static const struct vkb_shader *const by_format[VKB_FORMAT_COUNT] =
-        VKB_BY_FORMAT(fft_lines_image);
     const struct vkb_graph *graph = choice->graph;
     const bool rows = first->constants.direction == DIRECTION_HORIZONTAL;
     const bool makes_pixels = rows && first->constants.inverse;
@@ -248,7 +249,7 @@ static struct vkb_pass_row make_row(const struct vkb_variant_choice *choice,
     memcpy(&row, first, sizeof row);
     set_images(choice, first, end, &row);
     row.shader = row.constants.stage == STAGE_FIRST
-                   ? by_format[graph->images[row.reads[SLOT_SOURCE]].format]
+                   ? first_shaders[graph->images[row.reads[SLOT_SOURCE]].format]
                    : &vkb_shader_fft_lines_spectra;
     if (makes_pixels)
         row.constants.stage = STAGE_LAST;
@@ -282,6 +283,22 @@ static struct vkb_pass_row make_row(const struct vkb_variant_choice *choice,
     row.groups_width = rows ? 1 : groups;
     row.groups_height = rows ? groups : 1;
     return row;
+}
+
+// Has the first stage of a transpose read the cotangents of a composite.
+static void read_composite(const struct vkb_variant_choice *choice, struct vkb_pass_row *row)
+{
+    const struct vkb_graph *graph = choice->graph;
+    struct vkb_pass_row fused;
+
+    memcpy(&fused, row, sizeof fused);
+    fused.params.fft.gain = vkb_read_composite(&choice->plain, SLOT_SOURCE, SLOT_LIT, &fused);
+    if (!fused.constants.through_composite
+        || !vkb_has_format_of(graph, fused.reads[SLOT_SOURCE], fused.reads[SLOT_LIT]))
+        return;
+    fused.shader = first_shaders[graph->images[fused.reads[SLOT_SOURCE]].format];
+    fused.gains_if_finite = true;
+    memcpy(row, &fused, sizeof *row);
 }
 
 // The row that puts the kernel to its places, in lines of the lengths that are transformed.
@@ -334,6 +351,8 @@ bool vkb_add_transform_lines_variant(struct vkb_variant_choice *choice,
     if (pass->constants.stage == STAGE_FIRST)
         hold_spectra(choice, pass, pass->targets[0]);
     row = make_row(choice, pass, pass + pass->transform.stages);
+    if (pass->constants.stage == STAGE_FIRST)
+        read_composite(choice, &row);
     return vkb_add_variant_pass(choice, &row);
 }
 

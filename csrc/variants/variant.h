@@ -57,10 +57,11 @@ vkb_variant_add vkb_add_streaks_variant;
 vkb_variant_add vkb_add_host_beams_variant, vkb_add_host_ghosts_variant;
 // Transforms of complete lines: in shared memory, or on the host.
 vkb_variant_add vkb_add_transform_lines_variant, vkb_add_host_transform_variant;
-// Adjoint passes: of images with linear texels; of kernels; transposed filters in tiles and in
-// lines, fused with the composite's, and with those of the other pictures of an image.
-vkb_variant_add vkb_add_adjoint_linear_variant, vkb_add_adjoint_kernels_variant,
-    vkb_add_adjoint_filter_variant;
+// Adjoint passes: of images with linear texels; of downsamplings that are not linear, and of first
+// passes; of the end of Blender's glare, fused with the composite's; transposed filters in tiles
+// and in lines, fused with the composite's, and with those of the other pictures of an image.
+vkb_variant_add vkb_add_adjoint_linear_variant, vkb_add_adjoint_prefilter_variant,
+    vkb_add_adjoint_end_variant, vkb_add_adjoint_filter_variant;
 // Passes that load the pixel at their own position; any other pass as a compute shader.
 vkb_variant_add vkb_add_pixels_variant;
 
@@ -89,6 +90,10 @@ bool vkb_add_from_image_variant(struct vkb_variant_choice *choice, const struct 
 
 // Whether a pass gives the bloom a factor of the cotangents of its composite.
 bool vkb_is_factor(const struct vkb_pass_row *pass);
+// If such a pass writes the cotangents that a row reads, has the row read those of the composite in
+// their place. Its own are these times the result, where the composite's scene is finite.
+float vkb_read_composite(const struct vkb_graph *graph, enum vkb_slot cotangents,
+                         enum vkb_slot scene, struct vkb_pass_row *row);
 
 // Whether the images that a pass reads have linear texels of single floats.
 bool vkb_are_floats(const struct vkb_variant_choice *choice, const struct vkb_pass_row *pass);

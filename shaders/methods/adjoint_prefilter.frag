@@ -2,6 +2,9 @@
 // kernels; with BY_TAPS of its taps, which have point functions or weights of their own; of a mean, whose kernels all
 // have a share of them, of the mean. Or the cotangents of the mask, or those of a threshold by what it reads, whose sums
 // are the derivatives.
+
+// Where the pass reads the image itself, as the threshold pass does.
+#define TEXEL(value) (FROM_IMAGE != 0 ? finite_or_zero(value) : (value))
 #include "lib/sampling.glsl"
 
 UNIFORM_BLOCK(PREFILTER_BLOCK);

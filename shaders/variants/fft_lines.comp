@@ -20,6 +20,7 @@ layout(local_size_x_id = 34, local_size_y_id = 35) in;
 LOADED_IMAGE(SLOT_SPECTRUM, factor, rg32f);
 LOADED_IMAGE(SLOT_ADDED_SPECTRUM, added_spectrum, rg32f);
 LOADED_IMAGE(SLOT_ADDED, added, rgba32f);
+LOADED_IMAGE(SLOT_LIT, scene, SOURCE_FORMAT);
 layout(set = 0, binding = TARGET_BINDING) uniform writeonly image2D target;
 
 const bool MULTIPLIES = STAGE == STAGE_PRODUCT || STAGE == STAGE_GREY;
@@ -135,6 +136,8 @@ float load_glow(int along)
     bool has_texel = true;
     int place = PADDED != 0 ? padded_place(along, has_texel) : along;
     vec4 texel = imageLoad(source, texel_at(place, row));
+    if (THROUGH_COMPOSITE != 0)
+        texel = params.gain * where_finite(texel, imageLoad(scene, texel_at(place, row)));
     float glow = PREFILTERED != 0 ? channel_of(glow_of(texel)) : kept_of(vec3(channel_of(texel))).x;
     if (WEIGHTED != 0)
         glow *= weight_at(place, row);
