@@ -307,7 +307,7 @@
 // on the way back, is multiplied by the channel `weight` of the weights; along columns by those of
 // the first column. The result has so many texels before the first one of the weights. In complete
 // lines a row of a channel has so many `frequencies`. THROUGH_COMPOSITE: what is read is multiplied by
-// the `gain` where the composite's scene is finite.
+// the `gain` where the composite's scene is finite. ADDS_IMAGE: a `share` of the colours is added.
 #define FFT_BLOCK(B, READS, INPUT, VEC4S) \
     INPUT(B, int, count) \
     INPUT(B, int, across) \
@@ -334,7 +334,8 @@
     INPUT(B, int, before_x) \
     INPUT(B, int, before_y) \
     INPUT(B, int, frequencies) \
-    INPUT(B, float, gain)
+    INPUT(B, float, gain) \
+    INPUT(B, float, share)
 
 // Writes the kernel into padded lines (fft_kernel.comp). For each axis: the kernel's number of
 // texels, the first and the last that are not 0, how many before and after its centre count, and the
@@ -634,7 +635,7 @@
 #define TRANSFORM_SLOTS(SLOT) \
     SLOT(SLOT_SPECTRUM, 1) /* of the kernel, for the product */ \
     SLOT(SLOT_ADDED_SPECTRUM, 2) /* of complete lines: what columns add on their way back */ \
-    SLOT(SLOT_LIT, 3) /* the same: the scene of the composite whose cotangents are read */ \
+    SLOT(SLOT_THROUGH, 3) /* the same: the scene of THROUGH_COMPOSITE */ \
     SLOT(SLOT_FACTORS, 1)  /* of up to MAX_PRODUCTS: the spectra of glow and kernel in turns */ \
     SLOT(SLOT_PLACES, 1)   /* where columns and rows are in the grid of weights */ \
     SLOT(SLOT_NODES, 5)    /* the same, beside up to four SLOT_FACTORS */

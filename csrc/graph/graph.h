@@ -183,7 +183,7 @@ struct vkb_pass_row {
     uint8_t sampling[VKB_MAX_READS];  // by slot, of VKB_SAMPLING_*
     enum vkb_reading reading;
     vkb_host_pass *host;   // of a dispatch that the host runs; NULL: the device does
-    bool fused;            // a fused pass: may replace the pass before it, with the same target
+    bool fused;            // its group may replace the one before, with the same target
     bool gains_if_finite;  // is compiled a second time, for sources without NaN and infinity
     uint32_t block_width, block_height;    // of a dispatch: pixels of a workgroup
     uint32_t groups_width, groups_height;  // number of workgroups; 0: what covers the target

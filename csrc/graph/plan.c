@@ -311,21 +311,34 @@ static bool same_pass(const struct vkb_graph *graph, const struct neighbour *nei
     return first.size == other->size && memcmp(first.bytes, other->bytes, first.size) == 0;
 }
 
-// Whether the plan before or after has the same passes as those that the fused pass saves, except
-// the pass that it replaces. Then running them once serves both plans.
-static bool shares(const struct vkb_graph *graph, const struct neighbour *neighbour, uint32_t fused,
-                   const bool *plain, const bool *needed, const bool *current)
+// Whether the plan before or after has the same passes as those that a fused group saves, except
+// the group that it replaces, from `replaced` to before `fused`. Then running them once serves both
+// plans.
+static bool shares(const struct vkb_graph *graph, const struct neighbour *neighbour,
+                   uint32_t replaced, uint32_t fused, const bool *plain, const bool *needed,
+                   const bool *current)
 {
-    if (!neighbour->count || same_pass(graph, neighbour, fused - 1))
+    bool same = true;
+
+    for (uint32_t i = replaced; i < fused; ++i)
+        same = same && same_pass(graph, neighbour, i);
+    if (!neighbour->count || same)
         return false;
     for (uint32_t i = 0; i < graph->pass_count; ++i)
-        if (plain[i] && !needed[i] && !current[i] && i != fused - 1
+        if (plain[i] && !needed[i] && !current[i] && (i < replaced || i >= fused)
             && !same_pass(graph, neighbour, i))
             return false;
     return true;
 }
 
-// Selects each fused pass that reduces the number of passes to run.
+// Whether the passes of a fused group are skipped, or those of the group that it replaces.
+static void skip(uint32_t replaced, uint32_t fused, uint32_t end, bool skips_fused, bool *skipped)
+{
+    for (uint32_t i = replaced; i < end; ++i)
+        skipped[i] = (i >= fused) == skips_fused;
+}
+
+// Selects each fused group that reduces the number of passes to run.
 static bool mark_needed(struct vkb_planner *planner, const struct vkb_plan_step *step,
                         struct vkb_error *error)
 {
@@ -345,19 +358,19 @@ static bool mark_needed(struct vkb_planner *planner, const struct vkb_plan_step 
     for (uint32_t i = 0; i < graph->pass_count; ++i)
         skipped[i] = graph->passes[i].fused;
     mark(step->plan, skipped, needed, wanted);
-    for (uint32_t i = 0; i < graph->pass_count; ++i) {
-        if (!graph->passes[i].fused || step->unfused)
+    for (uint32_t before = 0, first = 0, end; first < graph->pass_count;
+         before = first, first = end) {
+        end = vkb_graph_group_end(graph, first);
+        if (!graph->passes[first].fused || step->unfused)
             continue;
         memcpy(plain, needed, graph->pass_count * sizeof *plain);
-        skipped[i] = false;
-        skipped[i - 1] = true;
+        skip(before, first, end, false, skipped);
         mark(step->plan, skipped, needed, wanted);
         if (count_running(graph, needed, current) < count_running(graph, plain, current)
-            && !shares(graph, &previous, i, plain, needed, current)
-            && !shares(graph, &next, i, plain, needed, current))
+            && !shares(graph, &previous, before, first, plain, needed, current)
+            && !shares(graph, &next, before, first, plain, needed, current))
             continue;
-        skipped[i] = true;
-        skipped[i - 1] = false;
+        skip(before, first, end, true, skipped);
         mark(step->plan, skipped, needed, wanted);
     }
     vkb_free(skipped);

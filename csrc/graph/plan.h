@@ -74,9 +74,9 @@ bool vkb_planner_reads(const struct vkb_planner *planner, const struct vkb_plan 
 void vkb_planner_destroy(struct vkb_planner *planner);
 
 // Marks the passes that the step's framebuffers need, and the images that these passes read or
-// write. A fused pass replaces the pass before it if fewer passes run then. It does not if the plan
-// before or after shares all passes that it would save: in a sequence, shared passes run once, and
-// then only the passes that change.
+// write. A fused pass, with those that go on in place, replaces the group before it if fewer passes
+// run then. It does not if the plan before or after shares all passes that it would save: in a
+// sequence, shared passes run once, and then only the passes that change.
 bool vkb_planner_mark(struct vkb_planner *planner, const struct vkb_plan_step *step,
                       struct vkb_error *error);
 

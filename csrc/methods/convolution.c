@@ -189,6 +189,7 @@ static void set_weighing(const struct vkb_convolving *passes, const struct vkb_w
     row->constants.weighted = weighing->weights != VKB_NO_IMAGE;
     row->constants.adds_image = weighing->added != VKB_NO_IMAGE;
     row->params.fft.weight = (int)weighing->channel;
+    row->params.fft.share = 1.0f;
     row->params.fft.before_x = (int)passes->convolution->x.first;
     row->params.fft.before_y = (int)passes->convolution->y.first;
 }

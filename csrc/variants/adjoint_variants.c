@@ -121,12 +121,13 @@ static bool add_kernels(struct vkb_variant_choice *choice, const struct vkb_pass
     return vkb_add_variant_pass(choice, &row);
 }
 
-bool vkb_add_adjoint_prefilter_variant(struct vkb_variant_choice *choice,
-                                       const struct vkb_pass_row *pass)
+bool vkb_add_adjoint_first_variant(struct vkb_variant_choice *choice,
+                                   const struct vkb_pass_row *pass)
 {
     struct vkb_pass_row row;
 
-    if (pass->shader != &vkb_shader_adjoint_prefilter_frag)
+    if (pass->shader != &vkb_shader_adjoint_prefilter_frag
+        && pass->shader != &vkb_shader_adjoint_bright_frag)
         return false;
     (pass->constants.stacked_samples > 1 ? add_kernels : vkb_add_fullscreen_variant)(choice, pass);
     if (choice->failed)
@@ -350,5 +351,5 @@ bool vkb_add_adjoint_filter_variant(struct vkb_variant_choice *choice,
     read_composite(&choice->plain, &row);
     return (in_blocks ? vkb_add_variant_pass(choice, &row)
                       : vkb_add_fullscreen_variant(choice, &row))
-        && add_pictures(choice, pass);
+        && add_pictures(choice, pass) && vkb_add_ended_lines_variant(choice, pass);
 }

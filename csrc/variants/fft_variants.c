@@ -142,6 +142,7 @@ static void copy_weighing(struct vkb_pass_row *row, const struct vkb_pass_row *l
     row->reads[SLOT_WEIGHTS] = last->reads[SLOT_WEIGHTS];
     row->reads[SLOT_ADDED] = last->reads[SLOT_ADDED];
     row->params.fft.weight = last->params.fft.weight;
+    row->params.fft.share = last->params.fft.share;
     row->params.fft.before_x = last->params.fft.before_x;
     row->params.fft.before_y = last->params.fft.before_y;
 }
@@ -292,9 +293,9 @@ static void read_composite(const struct vkb_variant_choice *choice, struct vkb_p
     struct vkb_pass_row fused;
 
     memcpy(&fused, row, sizeof fused);
-    fused.params.fft.gain = vkb_read_composite(&choice->plain, SLOT_SOURCE, SLOT_LIT, &fused);
+    fused.params.fft.gain = vkb_read_composite(&choice->plain, SLOT_SOURCE, SLOT_THROUGH, &fused);
     if (!fused.constants.through_composite
-        || !vkb_has_format_of(graph, fused.reads[SLOT_SOURCE], fused.reads[SLOT_LIT]))
+        || !vkb_has_format_of(graph, fused.reads[SLOT_SOURCE], fused.reads[SLOT_THROUGH]))
         return;
     fused.shader = first_shaders[graph->images[fused.reads[SLOT_SOURCE]].format];
     fused.gains_if_finite = true;
@@ -332,6 +333,53 @@ static bool add_products(struct vkb_variant_choice *choice, const struct vkb_pas
     return vkb_add_fullscreen_variant(choice, &row);
 }
 
+// After the rows and the columns in place that transform a glow, adds both once more, with rows
+// that read the image itself.
+static bool add_from_image(struct vkb_variant_choice *choice, const struct vkb_pass_row *columns)
+{
+    const struct vkb_graph *graph = choice->graph;
+    const uint32_t count = graph->pass_count;
+    struct vkb_pass_row row;
+
+    if (choice->failed || count < 2 || graph->passes[count - 2].constants.stage != STAGE_FIRST)
+        return true;
+    memcpy(&row, &graph->passes[count - 2], sizeof row);
+    vkb_add_from_image_variant(choice, &row, &row);
+    memcpy(&row, columns, sizeof row);
+    row.fused = true;
+    return graph->pass_count == count || vkb_add_variant_pass(choice, &row);
+}
+
+bool vkb_add_ended_lines_variant(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass)
+{
+    const struct vkb_graph *graph = choice->graph;
+    const struct vkb_filter *filter = pass->filters;
+    const struct vkb_adjoint_filter_params *params = &pass->params.adjoint_filter;
+    const struct vkb_pass_row *last =
+        graph->pass_count >= 2 ? &graph->passes[graph->pass_count - 2] : NULL;
+    struct vkb_pass_row row;
+
+    if (choice->failed || !last || last->shader != &vkb_shader_fft_lines_spectra
+        || last->constants.stage != STAGE_LAST || last->targets[0] != pass->reads[SLOT_COTANGENTS]
+        || last->constants.weighted || last->constants.adds_image || filter->kernels > 1
+        || params->gain != 1.0f || pass->constants.masked || !vkb_axis_is_identity(&filter->x)
+        || !vkb_axis_is_identity(&filter->y))
+        return true;
+    memcpy(&row, last, sizeof row);
+    row.targets[0] = pass->targets[0];
+    row.fused = row.gains_if_finite = true;
+    row.constants.adds_image = pass->constants.adds_image;
+    row.constants.of_source = pass->constants.of_source;
+    row.params.fft.share = params->share;
+    row.reads[SLOT_ADDED] = pass->reads[SLOT_ADDED];
+    vkb_read_at(&row, SLOT_DIFFERENTIATED, pass->reads[SLOT_DIFFERENTIATED]);
+    for (enum vkb_slot slot = SLOT_ADDED; slot <= SLOT_DIFFERENTIATED; ++slot)
+        if (row.reads[slot] != VKB_NO_IMAGE
+            && graph->images[row.reads[slot]].format != VKB_FORMAT_RGBA32_FLOAT)
+            return true;
+    return vkb_add_variant_pass(choice, &row);
+}
+
 bool vkb_add_transform_lines_variant(struct vkb_variant_choice *choice,
                                      const struct vkb_pass_row *pass)
 {
@@ -353,7 +401,8 @@ bool vkb_add_transform_lines_variant(struct vkb_variant_choice *choice,
     row = make_row(choice, pass, pass + pass->transform.stages);
     if (pass->constants.stage == STAGE_FIRST)
         read_composite(choice, &row);
-    return vkb_add_variant_pass(choice, &row);
+    return vkb_add_variant_pass(choice, &row)
+        && (!vkb_pass_in_place(&row) || add_from_image(choice, &row));
 }
 
 // Half of the frequencies of each channel.

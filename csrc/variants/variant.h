@@ -57,10 +57,11 @@ vkb_variant_add vkb_add_streaks_variant;
 vkb_variant_add vkb_add_host_beams_variant, vkb_add_host_ghosts_variant;
 // Transforms of complete lines: in shared memory, or on the host.
 vkb_variant_add vkb_add_transform_lines_variant, vkb_add_host_transform_variant;
-// Adjoint passes: of images with linear texels; of downsamplings that are not linear, and of first
-// passes; of the end of Blender's glare, fused with the composite's; transposed filters in tiles
-// and in lines, fused with the composite's, and with those of the other pictures of an image.
-vkb_variant_add vkb_add_adjoint_linear_variant, vkb_add_adjoint_prefilter_variant,
+// Adjoint passes: of images with linear texels; of downsamplings that are not linear, and of
+// filters of bright colours, whose source may be the image itself; of the end of Blender's glare,
+// fused with the composite's; transposed filters in tiles and in lines, fused with the composite's,
+// and with those of the other pictures of an image.
+vkb_variant_add vkb_add_adjoint_linear_variant, vkb_add_adjoint_first_variant,
     vkb_add_adjoint_end_variant, vkb_add_adjoint_filter_variant;
 // Passes that load the pixel at their own position; any other pass as a compute shader.
 vkb_variant_add vkb_add_pixels_variant;
@@ -87,6 +88,11 @@ const struct vkb_pass_row *vkb_threshold_of(const struct vkb_graph *graph, uint3
 // H200, 2026-11-28).
 bool vkb_add_from_image_variant(struct vkb_variant_choice *choice, const struct vkb_pass_row *pass,
                                 const struct vkb_pass_row *variant);
+
+// After an adjoint filter that keeps the places of a transform's pixels, adds the last pass of the
+// transform once more, as a fused pass that adds and leaves out what the filter does.
+bool vkb_add_ended_lines_variant(struct vkb_variant_choice *choice,
+                                 const struct vkb_pass_row *pass);
 
 // Whether a pass gives the bloom a factor of the cotangents of its composite.
 bool vkb_is_factor(const struct vkb_pass_row *pass);

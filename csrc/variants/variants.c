@@ -35,7 +35,7 @@ static const struct variant variants_table[] = {
     {VKB_VARIANTS_CPU, "host", vkb_add_host_ghosts_variant, 0},
     {VKB_VARIANTS_CPU, "strips", vkb_add_adjoint_fused_variant, 0},
     {VKB_VARIANTS_CPU, "linear", vkb_add_adjoint_linear_variant, 0},
-    {VKB_VARIANTS_CPU, "pixels", vkb_add_adjoint_prefilter_variant, 0},
+    {VKB_VARIANTS_CPU, "pixels", vkb_add_adjoint_first_variant, 0},
     {VKB_VARIANTS_CPU, "pixels", vkb_add_adjoint_end_variant, 0},
     {VKB_VARIANTS_CPU, "pixels", vkb_add_pixels_variant, 0},
     {VKB_VARIANTS_GPU, "pixels", vkb_add_windowed_variant, 0},
@@ -43,7 +43,7 @@ static const struct variant variants_table[] = {
     {VKB_VARIANTS_GPU, "tiles", vkb_add_fused_variant, 0},
     {VKB_VARIANTS_GPU, "tiles", vkb_add_adjoint_fused_variant, 0},
     {VKB_VARIANTS_GPU, "tiles", vkb_add_adjoint_filter_variant, 0},
-    {VKB_VARIANTS_GPU, "pixels", vkb_add_adjoint_prefilter_variant, 0},
+    {VKB_VARIANTS_GPU, "pixels", vkb_add_adjoint_first_variant, 0},
     {VKB_VARIANTS_GPU, "pixels", vkb_add_adjoint_end_variant, 0},
     {VKB_VARIANTS_GPU, "line", vkb_add_line_variant, 0},
     {VKB_VARIANTS_GPU, "lines", vkb_add_transform_lines_variant, 0},
@@ -107,12 +107,13 @@ bool vkb_variants_by_name(const char *name, const struct vkb_device *device,
 }
 
 // Names the rows from `first` on after the table's variant. A row before a fused pass is the
-// method's own pass.
+// method's own pass, unless it goes on in place.
 static void name_variant(struct vkb_graph *graph, uint32_t first, const char *name)
 {
     for (uint32_t i = first; i < graph->pass_count; ++i) {
         struct vkb_pass_row *pass = &graph->passes[i];
-        const bool own = i + 1 < graph->pass_count && pass[1].fused;
+        const bool own =
+            i + 1 < graph->pass_count && pass[1].fused && !pass->fused && !vkb_pass_in_place(pass);
         pass->variant = !own ? name : pass->geometry == VKB_GEOMETRY_DISPATCH ? "pixels" : NULL;
     }
 }

@@ -1,4 +1,5 @@
-// The cotangents of what is convolved, from those of what its filter of bright colours makes of it.
+// The cotangents of what is convolved, from those of what its filter of bright colours makes of it. FROM_IMAGE: it is
+// the image itself, as the threshold pass reads it.
 
 UNIFORM_BLOCK(FFT_BLOCK);
 #include "lib/bright.glsl"
@@ -12,6 +13,7 @@ SAMPLED_IMAGE(SLOT_COTANGENTS, cotangents);
 vec4 shade()
 {
     vec4 cotangent = texelFetch(cotangents, PIXEL, 0);
-    cotangent.rgb = back_prefiltered(texelFetch(source, PIXEL, 0).rgb, cotangent.rgb);
+    vec4 texel = texelFetch(source, PIXEL, 0);
+    cotangent.rgb = back_prefiltered((FROM_IMAGE != 0 ? finite_or_zero(texel) : texel).rgb, cotangent.rgb);
     return gathered(cotangent);
 }

@@ -20,7 +20,8 @@ layout(local_size_x_id = 34, local_size_y_id = 35) in;
 LOADED_IMAGE(SLOT_SPECTRUM, factor, rg32f);
 LOADED_IMAGE(SLOT_ADDED_SPECTRUM, added_spectrum, rg32f);
 LOADED_IMAGE(SLOT_ADDED, added, rgba32f);
-LOADED_IMAGE(SLOT_LIT, scene, SOURCE_FORMAT);
+LOADED_IMAGE(SLOT_THROUGH, scene, SOURCE_FORMAT);
+LOADED_IMAGE(SLOT_DIFFERENTIATED, differentiated, rgba32f);
 layout(set = 0, binding = TARGET_BINDING) uniform writeonly image2D target;
 
 const bool MULTIPLIES = STAGE == STAGE_PRODUCT || STAGE == STAGE_GREY;
@@ -241,8 +242,12 @@ void store_pixel(int x, vec4 value)
         return;
     if (WEIGHTED != 0)
         value *= weight_at(x - params.before_x, row - params.before_y);
+    if (CHANNELS == 3)
+        value.a = 0.0;
     if (ADDS_IMAGE != 0)
-        value += imageLoad(added, ivec2(x, row));
+        value += vec4(vec3(params.share), 1.0) * imageLoad(added, ivec2(x, row));
+    if (OF_SOURCE != 0)
+        value = where_finite(value, imageLoad(differentiated, ivec2(x, row)));
     imageStore(target, ivec2(x, row), stored(value));
 }
 
