@@ -15,7 +15,7 @@ import numpy as np
 import vkbloom
 from tests.exhaustive import EXHAUSTIVE
 from tests.images import random_image
-from tests.methods.test_adjoint_passes import CASES as DERIVATIVES
+from tests.methods.adjoints import CASES as DERIVATIVES
 from tests.methods.test_matrix import CASES as FORWARDS
 from tests.variants import VARIANTS, open_variant
 from vkbloom import Renderer, Scene, Settings, _core

@@ -16,7 +16,7 @@ import numpy as np
 
 import vkbloom
 from tests.exhaustive import EXHAUSTIVE
-from tests.methods.test_adjoint_passes import CASES
+from tests.methods.adjoints import CASES
 from tests.variants import VARIANTS, open_variant
 from vkbloom import Pyramid, Renderer, Scene, glares
 from vkbloom._doctor.cases import METHODS, presets_of_low_levels

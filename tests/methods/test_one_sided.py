@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 import vkbloom
 from tests.exhaustive import EXHAUSTIVE, some
-from tests.methods.test_adjoint_passes import CASES as METHODS
+from tests.methods.adjoints import CASES as METHODS
 from tests.methods.test_derivatives import BOUNDARIES, CURVED, KERNEL
 from vkbloom import BlenderGlare, GodotBloom, Pyramid, Renderer, Separable, reference
 from vkbloom._doctor.cases import COMPOSITES, ENCODINGS, TONEMAPS
