@@ -45,7 +45,7 @@ bool vkb_transpose_convolution(struct vkb_adjoint *adjoint, const struct vkb_set
     struct vkb_graph *graph = adjoint->graph;
     const struct vkb_pass_row first_stage = vkb_find_transform(graph);
     const uint32_t glow = first_stage.reads[SLOT_SOURCE];
-    const struct vkb_size size = {graph->images[glow].width, graph->images[glow].height};
+    const struct vkb_size size = vkb_size_of(graph, glow);
     struct vkb_convolution convolution = vkb_describe_convolution(settings, size);
     struct vkb_bloom_source source = {.buffers = size, .glow = vkb_cotangent_of(adjoint, pass)};
     const struct vkb_image_row result = {.name = "adjoint_convolved",

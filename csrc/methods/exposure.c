@@ -27,12 +27,6 @@ static uint32_t at_least_one(uint32_t side)
     return side ? side : 1;
 }
 
-static struct vkb_size size_of(const struct vkb_levels *levels, uint32_t image)
-{
-    const struct vkb_image_row *row = &levels->graph->images[image];
-    return (struct vkb_size){row->width, row->height};
-}
-
 static uint32_t add_image(struct vkb_levels *levels, const char *name, struct vkb_size size,
                           bool framebuffer)
 {
@@ -75,7 +69,7 @@ static uint32_t add_mask(struct vkb_levels *levels, uint32_t other)
 static uint32_t add_histogram(struct vkb_levels *levels, uint32_t from, uint32_t mask)
 {
     const struct engine *engine = &engines[levels->settings->exposure_engine];
-    const struct vkb_size size = size_of(levels, from);
+    const struct vkb_size size = vkb_size_of(levels->graph, from);
     const uint32_t across = ceiling(ceiling(size.width, engine->apart), METER_TILE);
     const uint32_t down = ceiling(ceiling(size.height, engine->apart), METER_TILE);
     const struct vkb_size tiles = {across * engine->bins / 4, down}, bins = {engine->bins, 1};
@@ -127,7 +121,7 @@ static uint32_t add_sums(struct vkb_levels *levels, int first, uint32_t from, ui
     int meter = first;
 
     while (!levels->failed) {
-        struct vkb_size size = size_of(levels, from);
+        struct vkb_size size = vkb_size_of(levels->graph, from);
         if (meter != METER_LIGHT && size.width == 1 && size.height == 1)
             return from;
         size.width =
@@ -149,7 +143,7 @@ static struct vkb_size half_of(struct vkb_size size)
 static uint32_t add_logarithms(struct vkb_levels *levels, uint32_t from)
 {
     enum { LEVELS = 4 };
-    struct vkb_size size = half_of(size_of(levels, from));
+    struct vkb_size size = half_of(vkb_size_of(levels->graph, from));
     uint32_t image = add_step(levels, METER_SAMPLES, from, from, size);
 
     for (int i = 0; i < LEVELS && !levels->failed; ++i) {
@@ -167,7 +161,7 @@ static uint32_t add_meter(struct vkb_levels *levels, uint32_t from, struct vkb_s
                                    METER_POINTS / METER_TILE_POINTS};
     const uint32_t engine = levels->settings->exposure_engine;
 
-    *counted = size_of(levels, from);
+    *counted = vkb_size_of(levels->graph, from);
     if (engine == EXPOSURE_FIXED || engine == EXPOSURE_KEYFRAMED)
         return from;
     if (engines[engine].bins)
@@ -180,7 +174,7 @@ static uint32_t add_meter(struct vkb_levels *levels, uint32_t from, struct vkb_s
         return add_sums(levels, METER_LIGHT, from, from);
     const uint32_t logarithms = add_logarithms(levels, from);
     if (!levels->failed)
-        *counted = size_of(levels, logarithms);
+        *counted = vkb_size_of(levels->graph, logarithms);
     return add_sums(levels, METER_SUM, logarithms, from);
 }
 

@@ -295,8 +295,7 @@ static uint32_t add_node_sums(struct vkb_levels *levels, struct vkb_pass_row row
                               const char *name, bool framebuffer)
 {
     const struct vkb_field *data = &levels->settings->field;
-    const struct vkb_image_row *image = &levels->graph->images[row.reads[SLOT_SOURCE]];
-    const struct vkb_size size = {image->width, image->height};
+    const struct vkb_size size = vkb_size_of(levels->graph, row.reads[SLOT_SOURCE]);
     const struct vkb_size nodes = {vertical ? size.width : data->columns, data->rows};
     struct vkb_node_sums_params *params = &row.params.node_sums;
     const struct vkb_size of_sums = size_sums(data, size, vertical, params);

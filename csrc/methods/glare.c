@@ -33,12 +33,6 @@ static const struct {
 #undef STAGE_ROW
 };
 
-static struct vkb_size size_of(const struct stage *stage, uint32_t image)
-{
-    const struct vkb_image_row *row = &stage->levels.graph->images[image];
-    return (struct vkb_size){row->width, row->height};
-}
-
 // The weights of iteration i: f^(k base^i) for tap k, all divided by their sum, times a gain. Of
 // each tap but the first two channels, which alternate, are less.
 static void set_weights(const struct vkb_glare_values *values, int iteration, double gain,
@@ -98,7 +92,8 @@ void vkb_add_ray_pass(struct vkb_levels *levels, const struct vkb_ray *ray)
 // The framebuffer of a stage.
 static uint32_t add_end(struct stage *stage)
 {
-    return vkb_levels_image(&stage->levels, size_of(stage, stage->from), "%s", stage->name);
+    return vkb_levels_image(&stage->levels, vkb_size_of(stage->levels.graph, stage->from), "%s",
+                            stage->name);
 }
 
 // Each ray is iterated by itself; its last iteration adds the rays before.
@@ -117,7 +112,8 @@ static uint32_t add_streaks(struct stage *stage)
             snprintf(name, sizeof name, "%s_%d_%d", stage->name, ray, iteration);
             image = last && ray == rays - 1
                       ? add_end(stage)
-                      : vkb_levels_step(&stage->levels, size_of(stage, stage->from), "%s", name);
+                      : vkb_levels_step(&stage->levels,
+                                        vkb_size_of(stage->levels.graph, stage->from), "%s", name);
             const struct vkb_ray row = {
                 .values = values,
                 .angle = acos(-1.0) * (values->angle / 180.0 + 2.0 * ray / rays),
@@ -203,8 +199,7 @@ static void add_halvings(struct vkb_levels *levels, int halvings, uint32_t *imag
 {
     for (; *count <= halvings; ++*count) {
         const uint32_t from = images[*count - 1];
-        const struct vkb_image_row *above = &levels->graph->images[from];
-        const struct vkb_size size = vkb_halved((struct vkb_size){above->width, above->height});
+        const struct vkb_size size = vkb_halved(vkb_size_of(levels->graph, from));
         images[*count] = vkb_levels_step(levels, size, "glare_down_%u", (uint32_t)*count - 1);
         vkb_levels_reduce(levels, 1.0, 1.0, from, images[*count]);
     }

@@ -116,7 +116,7 @@ bool vkb_accumulate_cotangent(struct vkb_adjoint *adjoint, const struct vkb_pass
     if (image == adjoint->scene && !take_scene(adjoint, &row, error))
         return false;
     const struct vkb_image_row *forward = &adjoint->graph->images[image];
-    const struct vkb_size size = {forward->width, forward->height};
+    const struct vkb_size size = vkb_size_of(adjoint->graph, image);
     row.constants.adds_image = *cotangent != VKB_NO_IMAGE;
     row.reads[SLOT_ADDED] = *cotangent;
     row.constants.of_source = vkb_is_of_source(forward);
@@ -385,21 +385,19 @@ bool vkb_add_sum_passes(struct vkb_adjoint *adjoint, const struct vkb_pass_row *
 bool vkb_add_product_sums(struct vkb_adjoint *adjoint, uint32_t cotangents, uint32_t image,
                           const char *name, struct vkb_error *error)
 {
-    const struct vkb_image_row *of = &adjoint->graph->images[image];
     struct vkb_pass_row row = vkb_adjoint_row(&vkb_shader_adjoint_products_frag, cotangents);
 
     row.constants.alpha = adjoint->alpha;
     row.reads[SLOT_SOURCE] = image;
-    return vkb_add_sum_passes(adjoint, &row, row.shader, (struct vkb_size){of->width, of->height},
-                              name, error);
+    return vkb_add_sum_passes(adjoint, &row, row.shader, vkb_size_of(adjoint->graph, image), name,
+                              error);
 }
 
 bool vkb_add_threshold_sums(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
                             const struct vkb_pass_row *row, const struct vkb_shader *shader,
                             struct vkb_error *error)
 {
-    const struct vkb_image_row *target = &adjoint->graph->images[pass->targets[0]];
-    const struct vkb_size size = {target->width, target->height};
+    const struct vkb_size size = vkb_size_of(adjoint->graph, pass->targets[0]);
     bool has_slopes = false;
 
 #define VKB_HAS_SLOPES(name, value, function) \

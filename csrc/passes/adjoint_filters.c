@@ -9,8 +9,7 @@
 static bool add_share_sums(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
                            struct vkb_error *error)
 {
-    const struct vkb_image_row *target = &adjoint->graph->images[pass->targets[0]];
-    const struct vkb_size size = {target->width, target->height};
+    const struct vkb_size size = vkb_size_of(adjoint->graph, pass->targets[0]);
     struct vkb_pass_row row =
         vkb_adjoint_row(&vkb_shader_adjoint_shares_frag, vkb_cotangent_of(adjoint, pass));
     char name[VKB_NAME_SIZE];

@@ -44,8 +44,7 @@ static struct vkb_pass_row transpose_row(const struct vkb_adjoint *adjoint,
 static bool add_transpose_row(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
                               struct vkb_pass_row *row, uint32_t *image, struct vkb_error *error)
 {
-    const struct vkb_image_row *source = &adjoint->graph->images[pass->reads[SLOT_SOURCE]];
-    const struct vkb_size size = {source->width, source->height};
+    const struct vkb_size size = vkb_size_of(adjoint->graph, pass->reads[SLOT_SOURCE]);
 
     return vkb_add_adjoint_pass(adjoint, row, size, image, error);
 }

@@ -195,8 +195,7 @@ static struct flare flare_of(const struct vkb_pass_row *row, struct vkb_size siz
 bool vkb_accumulate_moved(struct vkb_adjoint *adjoint, const struct vkb_pass_row *row,
                           uint32_t source, struct vkb_error *error)
 {
-    const struct vkb_image_row *image = &adjoint->graph->images[source];
-    const struct vkb_size size = {image->width, image->height};
+    const struct vkb_size size = vkb_size_of(adjoint->graph, source);
     const struct flare flare = flare_of(row, size);
     const struct gathering gathering = {
         .iterations = flare_iterations,

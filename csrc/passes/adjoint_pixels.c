@@ -4,13 +4,6 @@
 
 #include <math.h>
 
-static struct vkb_size size_of(const struct vkb_adjoint *adjoint, uint32_t image)
-{
-    const struct vkb_image_row *row = &adjoint->graph->images[image];
-
-    return (struct vkb_size){row->width, row->height};
-}
-
 // Whether the derivatives by images depend on the bloom. Otherwise it need not be rendered for
 // them.
 static bool depends_on_bloom(const struct vkb_pass_row *row)
@@ -121,7 +114,8 @@ static bool add_curves(struct vkb_adjoint *adjoint, struct vkb_pass_row *row,
     row->constants.encoding = ENCODING_NONE;
     row->params.composite.exposure = 0.0f;
     row->params.composite.limit = (float)SINGLE_LIMIT;
-    return vkb_add_adjoint_image(adjoint, &curves, size_of(adjoint, row->reads[SLOT_SCENE]),
+    return vkb_add_adjoint_image(adjoint, &curves,
+                                 vkb_size_of(adjoint->graph, row->reads[SLOT_SCENE]),
                                  &row->reads[SLOT_COTANGENTS], error);
 }
 
@@ -135,7 +129,8 @@ bool vkb_transpose_composite(struct vkb_adjoint *adjoint, const struct vkb_pass_
     row.constants.thresholded = row.constants.alpha == ALPHA_BLUR && is_thresholded(adjoint->graph);
     if ((adjoint->sums.composite
          && !vkb_add_sum_passes(adjoint, &row, &vkb_shader_adjoint_composite_sums_frag,
-                                size_of(adjoint, pass->targets[0]), ".by_composite", error))
+                                vkb_size_of(adjoint->graph, pass->targets[0]), ".by_composite",
+                                error))
         || (is_sum(&row.constants) && depends_on_bloom(&row) && !add_curves(adjoint, &row, error)))
         return false;
     return accumulate_composite(adjoint, &row, error);
@@ -164,7 +159,7 @@ bool vkb_transpose_threshold(struct vkb_adjoint *adjoint, const struct vkb_pass_
 
     if (adjoint->sums.threshold && pass->constants.threshold_mode == THRESHOLD_KNEE
         && !vkb_add_sum_passes(adjoint, &row, &vkb_shader_adjoint_threshold_sums_frag,
-                               size_of(adjoint, target),
+                               vkb_size_of(adjoint->graph, target),
                                adjoint->light ? ".by_light" : ".by_threshold", error))
         return false;
     row.constants.by = BY_SCENE;

@@ -41,6 +41,11 @@ void vkb_read_only(struct vkb_pass_row *row, uint32_t source)
     vkb_read_at(row, SLOT_SOURCE, source);
 }
 
+struct vkb_size vkb_size_of(const struct vkb_graph *graph, uint32_t image)
+{
+    return (struct vkb_size){graph->images[image].width, graph->images[image].height};
+}
+
 bool vkb_same_size(const struct vkb_graph *graph, uint32_t a, uint32_t b)
 {
     const struct vkb_image_row *first = &graph->images[a], *second = &graph->images[b];

@@ -43,6 +43,7 @@ enum vkb_format vkb_end_format(const struct vkb_settings *settings, enum vkb_for
         (row)->params.B.target_height = (int)set_target->height; \
     } while (0)
 
+struct vkb_size vkb_size_of(const struct vkb_graph *graph, uint32_t image);
 bool vkb_same_size(const struct vkb_graph *graph, uint32_t a, uint32_t b);
 
 // A row with the defaults of a fullscreen pass; the caller fills in the rest.

@@ -39,7 +39,7 @@ static bool add_pixels(struct vkb_variant_choice *choice, const struct vkb_pass_
 static bool add_floats(struct vkb_variant_choice *choice, uint32_t of, uint32_t *floats)
 {
     const struct vkb_image_row *row = &choice->graph->images[of];
-    const struct vkb_size size = {row->width, row->height};
+    const struct vkb_size size = vkb_size_of(choice->graph, of);
     char name[VKB_NAME_SIZE];
 
     snprintf(name, sizeof name, "%cfloats_of_%.*s", VKB_INTERNAL_NAME, VKB_NAME_SIZE - 12,
