@@ -67,7 +67,7 @@ enum vkb_method {
 extern const struct vkb_method_row vkb_method_rows[VKB_METHOD_COUNT];
 
 struct vkb_layer {
-    float scale, strength;
+    double scale, strength;
 };
 
 // The kernel of a convolution in pixels of the bloom buffers: four floats each, row by row, which

@@ -29,7 +29,7 @@ static const struct member settings_members[] = {
     MEMBER(vkb_settings, format, "i4"),
     MEMBER(vkb_settings, weights, "f4"),
     MEMBER(vkb_settings, weight_count, "u4"),
-    MEMBER(vkb_settings, layers, "f4"),
+    MEMBER(vkb_settings, layers, "f8"),
     MEMBER(vkb_settings, layer_count, "u4"),
     MEMBER(vkb_settings, level_weights, "f4"),
     MEMBER(vkb_settings, level_weight_count, "u4"),
@@ -139,6 +139,14 @@ static bool check_finite(const char *name, const float *numbers, size_t count)
     return true;
 }
 
+static bool check_finite_doubles(const char *name, const double *numbers, size_t count)
+{
+    for (size_t i = 0; i < count; ++i)
+        if (!isfinite(numbers[i]))
+            return vkb_refuse("%s: %g is out of range, finite numbers", name, numbers[i]);
+    return true;
+}
+
 static bool check_count(const char *name, uint32_t count, uint32_t least, uint32_t most)
 {
     return (count >= least && count <= most)
@@ -211,12 +219,14 @@ static bool check_settings(const struct vkb_settings *settings)
         && check_finite("weights", settings->weights, settings->weight_count)
         && check_count("layers", settings->layer_count, vkb_method_of(settings)->min_layers,
                        MAX_LAYERS)
-        && check_finite("layers", &settings->layers[0].scale, 2 * settings->layer_count)
+        && check_finite_doubles("layers", &settings->layers[0].scale, 2 * settings->layer_count)
         && check_count("level_weights", settings->level_weight_count, 0, MAX_LEVELS)
         && check_finite("level_weights", settings->level_weights, settings->level_weight_count)
         && check_finite("tint", settings->tint, 3)
-        && check_finite("sun_position", settings->sun_position, 2) && check_stages(settings)
-        && check_exposure(settings) && check_taa(settings);
+        && check_finite("sun_position", settings->sun_position, 2)
+        && check_finite_doubles("gaussian_sizes", settings->gaussian_sizes, MAX_GAUSSIANS)
+        && check_finite_doubles("gaussian_tints", settings->gaussian_tints, MAX_GAUSSIANS)
+        && check_stages(settings) && check_exposure(settings) && check_taa(settings);
 }
 
 bool vkb_read_settings(PyObject *object, struct vkb_settings *settings)

@@ -3,7 +3,6 @@
 
 #include "passes/taps.h"
 
-#include <math.h>
 #include <string.h>
 
 // The most weights of columns that an invocation keeps: the driver compiles a load of each.
@@ -25,34 +24,7 @@ bool vkb_are_floats(const struct vkb_variant_choice *choice, const struct vkb_pa
     return fits;
 }
 
-bool vkb_is_factor(const struct vkb_pass_row *pass)
-{
-    return vkb_transposes(pass, VKB_BLOCK_composite) && pass->constants.by == BY_BLOOM
-        && !pass->constants.adds_image && !pass->constants.of_source
-        && pass->reads[SLOT_BLOOM] == VKB_NO_IMAGE
-        && (pass->constants.composite == COMPOSITE_ADD
-            || pass->constants.composite == COMPOSITE_ADD_TO_POSITIVE
-            || pass->constants.composite == COMPOSITE_MIX);
-}
-
-float vkb_read_composite(const struct vkb_graph *graph, enum vkb_slot cotangents,
-                         enum vkb_slot scene, struct vkb_pass_row *row)
-{
-    const struct vkb_pass_row *pass = vkb_graph_writer(graph, row->reads[cotangents]);
-
-    if (!pass || !vkb_is_factor(pass))
-        return 1.0f;
-    const struct vkb_composite_params *params = &pass->params.composite;
-    const float intensity = pass->constants.lit ? 1.0f : params->intensity;
-    // Godot's exposure is of the scene alone.
-    const float exposure = pass->constants.exposed_scene ? 0.0f : params->exposure;
-    row->constants.through_composite = true;
-    row->reads[cotangents] = pass->reads[SLOT_COTANGENTS];
-    row->reads[scene] = pass->reads[SLOT_SCENE];
-    return intensity * exp2f(exposure);
-}
-
-// The same of a filter.
+// Has a filter read the cotangents of a composite in place of those of its bloom.
 static void read_composite(const struct vkb_graph *graph, struct vkb_pass_row *row)
 {
     row->params.adjoint_filter.gain *= vkb_read_composite(graph, SLOT_COTANGENTS, SLOT_SCENE, row);

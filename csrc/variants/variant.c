@@ -2,6 +2,7 @@
 
 #include "passes/filter.h"
 
+#include <math.h>
 #include <string.h>
 
 bool vkb_has_format_of(const struct vkb_graph *graph, uint32_t a, uint32_t b)
@@ -127,4 +128,31 @@ bool vkb_add_from_image_variant(struct vkb_variant_choice *choice, const struct 
         copy_threshold(&row.params.filter, &threshold->params.threshold);
     }
     return vkb_add_variant_pass(choice, &row);
+}
+
+bool vkb_is_factor(const struct vkb_pass_row *pass)
+{
+    return vkb_transposes(pass, VKB_BLOCK_composite) && pass->constants.by == BY_BLOOM
+        && !pass->constants.adds_image && !pass->constants.of_source
+        && pass->reads[SLOT_BLOOM] == VKB_NO_IMAGE
+        && (pass->constants.composite == COMPOSITE_ADD
+            || pass->constants.composite == COMPOSITE_ADD_TO_POSITIVE
+            || pass->constants.composite == COMPOSITE_MIX);
+}
+
+float vkb_read_composite(const struct vkb_graph *graph, enum vkb_slot cotangents,
+                         enum vkb_slot scene, struct vkb_pass_row *row)
+{
+    const struct vkb_pass_row *pass = vkb_graph_writer(graph, row->reads[cotangents]);
+
+    if (!pass || !vkb_is_factor(pass))
+        return 1.0f;
+    const struct vkb_composite_params *params = &pass->params.composite;
+    const float intensity = pass->constants.lit ? 1.0f : params->intensity;
+    // Godot's exposure is of the scene alone.
+    const float exposure = pass->constants.exposed_scene ? 0.0f : params->exposure;
+    row->constants.through_composite = true;
+    row->reads[cotangents] = pass->reads[SLOT_COTANGENTS];
+    row->reads[scene] = pass->reads[SLOT_SCENE];
+    return intensity * exp2f(exposure);
 }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from tests.methods.adjoints import (
     check,
 )
 from tests.planned import Inputs, Passes, device_fields, in_floats, pull_each
+from tests.variants import open_variant
 from vkbloom import (
     BevyBloom,
     BlenderGlare,
@@ -304,6 +306,11 @@ DISTANCES: dict[str, tuple[Any, tuple[str, ...]]] = {
         vkbloom.Separable(layers=((0.0, 1.0), (1.0, 0.5)), bloom_scale=0.5, weights=(0.5, 0.2)),
         ("weights", "blur_strength"),
     ),
+    # In floats the last tap would be beside a texel's centre, and not at it.
+    "separable at a centre": (
+        vkbloom.Separable(layers=((1.6, 1.0),), weights=(0.2, 0.1, 0.1, 0.1, 0.1, 0.1)),
+        ("blur_scale",),
+    ),
     "kino": (vkbloom.KinoBloom(radius=4.6, bloom_scale=0.8), ("radius", "threshold")),
     # The levels are as large as the image, or larger.
     "kino enlarged": (vkbloom.KinoBloom(radius=4.6, bloom_scale=2.0), ("radius",)),
@@ -313,12 +320,19 @@ DISTANCES: dict[str, tuple[Any, tuple[str, ...]]] = {
 }
 
 
+@pytest.fixture(scope="module")
+def gpu() -> Iterator[Renderer]:
+    """A renderer with the variants of GPUs."""
+    with open_variant("gpu", "software", validation=False) as renderer:
+        yield renderer
+
+
 @pytest.mark.parametrize("variant", ["own", "gpu"])
 @pytest.mark.parametrize("name", DISTANCES)
 def test_fields_that_are_distances_of_taps_are_sums(
     renderer: Renderer, request: pytest.FixtureRequest, name: str, variant: str
 ) -> None:
-    used = renderer if variant == "own" else request.getfixturevalue("varied")["gpu"]
+    used = renderer if variant == "own" else request.getfixturevalue("gpu")
     settings, fields = DISTANCES[name]
     image = 2 * random_image(45, 70, channels=4, seed=1).astype(np.float32)
     image[3, 4, 1] = np.nan
