@@ -10,6 +10,7 @@ from typing import Any, Literal, TypeAlias
 
 from vkbloom._extras import import_extra
 from vkbloom._gradients.operators import (
+    draw,
     flatten,
     names_of,
     number_of,
@@ -236,7 +237,7 @@ def _call(
     if order == "CHW":
         image = image.movedim(-3, -1)
         emission = None if emission is None else emission.movedim(-3, -1)
-    final = torch.ops.vkbloom.bloom.default(
+    final = draw(
         image,
         mask,
         emission,

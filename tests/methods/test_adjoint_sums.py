@@ -321,7 +321,7 @@ DISTANCES: dict[str, tuple[Any, tuple[str, ...]]] = {
 
 
 @pytest.fixture(scope="module")
-def gpu() -> Iterator[Renderer]:
+def gpu(software: Any) -> Iterator[Renderer]:
     """A renderer with the variants of GPUs."""
     with open_variant("gpu", "software", validation=False) as renderer:
         yield renderer

@@ -16,6 +16,7 @@ from tests.refusals import assert_refused, rows
 from vkbloom import Renderer, reference, testing
 
 torch = pytest.importorskip("torch", reason="PyTorch is not installed; run make test-torch")
+tracing = pytest.importorskip("torch.fx.experimental.proxy_tensor")
 
 from tests.planned import watch_submissions  # noqa: E402
 from vkbloom import torch as vkbloom_torch  # noqa: E402
@@ -138,6 +139,27 @@ def test_operators_pass_opcheck(name: str) -> None:
     for by_images in (True, False):
         given = cotangent, by_images, *detached
         torch.library.opcheck(torch.ops.vkbloom.bloom_backward.default, given)
+
+
+@pytest.mark.filterwarnings("ignore:There is a performance drop")
+def test_what_looks_at_operators_sees_one(renderer: Renderer) -> None:
+    """Transforms, fake tensors, traces and subclasses; plain tensors pass the dispatcher by."""
+    images = tensor(2, 4, 5, 3, requires_grad=False)
+
+    def bloom(image: Any) -> Any:
+        return vkbloom_torch.bloom(image, SETTINGS, renderer=renderer)
+
+    assert torch.equal(torch.vmap(bloom)(images), bloom(images))
+    assert "vkbloom.bloom" in tracing.make_fx(bloom)(images).code
+    with torch._subclasses.FakeTensorMode():
+        fake = torch.empty(4, 5, 3, requires_grad=True)
+        bloom(fake).sum().backward()
+        assert fake.grad.shape == fake.shape
+    subclass = type("Subclass", (torch.Tensor,), {})
+    assert type(bloom(images.as_subclass(subclass))) is subclass
+    with torch.profiler.profile() as profile:
+        bloom(images)
+    assert [one.name for one in profile.events() if "bloom" in one.name] == ["VkbloomBloom"]
 
 
 def test_second_derivative_is_refused_with_a_reason(renderer: Renderer) -> None:
