@@ -58,17 +58,21 @@ static bool add_filter_sums(struct vkb_adjoint *adjoint, const struct vkb_filter
     return done && vkb_add_product_sums(adjoint, made, image, name, error);
 }
 
-// If they are wanted, the sums by a factor of the distances of an axis' taps: with slopes in place
-// of samples. The axis is one of the filter, which stays as it is.
+static bool wants_distances(const struct vkb_adjoint *adjoint, const struct vkb_filter *filter,
+                            const struct vkb_axis *axis)
+{
+    return (filter->enlarges ? adjoint->sums.enlarging : adjoint->sums.reducing)
+        && vkb_axis_has_distances(axis);
+}
+
+// The sums by a factor of the distances of an axis' taps: with slopes in place of samples. The axis
+// is one of the filter, which stays as it is.
 static bool add_distance_sums(struct vkb_adjoint *adjoint, const struct vkb_filter *filter,
                               struct vkb_axis *axis, uint32_t cotangents, uint32_t image,
                               struct vkb_error *error)
 {
     char name[VKB_NAME_SIZE];
 
-    if (!(filter->enlarges ? adjoint->sums.enlarging : adjoint->sums.reducing)
-        || !vkb_axis_has_distances(axis))
-        return true;
     snprintf(name, sizeof name, ".by_%s_%s_%u", filter->enlarges ? "enlarging" : "reducing",
              axis == &filter->x ? "x" : "y", adjoint->moved++);
     axis->slopes = true;
@@ -77,26 +81,15 @@ static bool add_distance_sums(struct vkb_adjoint *adjoint, const struct vkb_filt
     return done;
 }
 
-// If they are wanted, the sums by the weights of an axis' kernel, four in each.
-static bool add_weight_sums(struct vkb_adjoint *adjoint, const struct vkb_filter *filter,
-                            const struct vkb_axis *axis, uint32_t cotangents, uint32_t image,
-                            struct vkb_error *error)
+// The sums by the weights of an axis' kernel, four in each, from what the transpose along the other
+// axis has made of the cotangents.
+static bool add_weight_sums(struct vkb_adjoint *adjoint, const struct vkb_axis *axis, bool along_x,
+                            uint32_t half, uint32_t image, struct vkb_error *error)
 {
-    const bool along_x = axis == &filter->x;
     const struct vkb_kernel *kernel = &axis->kernel;
-    struct vkb_filter across = *filter;
-    uint32_t half;
-
-    if (!adjoint->sums.weight || kernel->count == 0)
-        return true;
-    vkb_axis_move(along_x ? &across.x : &across.y, axis->to, axis->to, 0.0);
-    const struct vkb_size size = {across.x.from, across.y.from};
-    adjoint->of_sums = true;
-    bool done = vkb_filter_to_image(adjoint, &across, cotangents, size, &half, error);
-    adjoint->of_sums = false;
-    if (!done)
-        return false;
     struct vkb_pass_row row = vkb_adjoint_row(&vkb_shader_adjoint_kernel_frag, half);
+    bool done = true;
+
     row.reads[SLOT_SOURCE] = image;
     row.block = VKB_BLOCK_filter;
     row.params.filter.step_x = along_x ? (float)kernel->step : 0.0f;
@@ -112,12 +105,41 @@ static bool add_weight_sums(struct vkb_adjoint *adjoint, const struct vkb_filter
         char name[VKB_NAME_SIZE];
         snprintf(name, sizeof name, ".by_weight_%u_%u", four, adjoint->moved++);
         row.constants.first_sample = (int32_t)(4 * four);
-        done = vkb_add_sum_passes(adjoint, &row, row.shader, size, name, error);
+        done = vkb_add_sum_passes(adjoint, &row, row.shader, vkb_size_of(adjoint->graph, half),
+                                  name, error);
     }
     return done;
 }
 
-// The sums by what the taps of a filter have, if any are wanted.
+// The sums by what the taps of an axis have, if any are wanted. The axis is one of the filter.
+static bool add_axis_sums(struct vkb_adjoint *adjoint, struct vkb_filter *filter,
+                          struct vkb_axis *axis, uint32_t cotangents, uint32_t image,
+                          struct vkb_error *error)
+{
+    const bool along_x = axis == &filter->x;
+    const bool moves = wants_distances(adjoint, filter, axis);
+    struct vkb_filter across = *filter, along = *filter;
+    uint32_t half;
+
+    if (!adjoint->sums.weight || axis->kernel.count == 0)
+        return !moves || add_distance_sums(adjoint, filter, axis, cotangents, image, error);
+    // Both sums take the transpose along the other axis from here.
+    vkb_axis_move(along_x ? &across.x : &across.y, axis->to, axis->to, 0.0);
+    adjoint->of_sums = true;
+    const bool done =
+        vkb_filter_to_image(adjoint, &across, cotangents,
+                            (struct vkb_size){across.x.from, across.y.from}, &half, error);
+    adjoint->of_sums = false;
+    struct vkb_axis *kept = along_x ? &along.y : &along.x;
+    vkb_axis_move(kept, kept->from, kept->from, 0.0);
+    along.gain = along.divisor;
+    return done
+        && (!moves
+            || add_distance_sums(adjoint, &along, along_x ? &along.x : &along.y, half, image,
+                                 error))
+        && add_weight_sums(adjoint, axis, along_x, half, image, error);
+}
+
 static bool add_tap_sums(struct vkb_adjoint *adjoint, const struct vkb_filter *given,
                          uint32_t cotangents, uint32_t image, struct vkb_error *error)
 {
@@ -131,10 +153,8 @@ static bool add_tap_sums(struct vkb_adjoint *adjoint, const struct vkb_filter *g
         filter.x = *given->x.unmoved;
     if (given->y.unmoved)
         filter.y = *given->y.unmoved;
-    return add_distance_sums(adjoint, &filter, &filter.x, cotangents, image, error)
-        && add_distance_sums(adjoint, &filter, &filter.y, cotangents, image, error)
-        && add_weight_sums(adjoint, &filter, &filter.x, cotangents, image, error)
-        && add_weight_sums(adjoint, &filter, &filter.y, cotangents, image, error);
+    return add_axis_sums(adjoint, &filter, &filter.x, cotangents, image, error)
+        && add_axis_sums(adjoint, &filter, &filter.y, cotangents, image, error);
 }
 
 bool vkb_transpose_filters(struct vkb_adjoint *adjoint, const struct vkb_pass_row *pass,
