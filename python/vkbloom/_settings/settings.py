@@ -233,7 +233,14 @@ class Settings(Record):
         if nested:
             glare = _read_glare(changes.get("glare", self.glare))
             changes["glare"] = replace_stages(glare, nested)
-        return dataclasses.replace(self, **changes)
+        own, known = vars(self), fields_of(type(self))
+        if not known.keys() >= changes.keys():
+            return dataclasses.replace(self, **changes)  # which says what is wrong
+        # It would take 10 us in place of 7, in each step of a loop that learns fields.
+        made = object.__new__(type(self))
+        vars(made).update({name: own[name] for name in known}, **changes)
+        made.__post_init__()
+        return made
 
     def value_of(self, name: str) -> Any:
         """Return the value of a field, also of a stage's or a function's: "glare.0.intensity"."""
