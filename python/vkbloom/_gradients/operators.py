@@ -336,7 +336,7 @@ def _is_on(core: _core.Renderer, tensor: Any) -> bool:
 
 def _stream_of(tensor: Any) -> int:
     """Return PyTorch's stream on a tensor's GPU as DLPack has it."""
-    # (`torch.cuda.current_stream` makes an object of it, in 22 us after a wait for the GPU.)
+    # torch.cuda.current_stream makes an object of it, in 22 us after a wait for the GPU.
     return torch._C._cuda_getCurrentRawStream(tensor.device.index) or LEGACY_STREAM
 
 
