@@ -638,11 +638,17 @@ def draw(*inputs: Any) -> Any:
     Where the caches are cold, as after a wait for a GPU, a call with a derivative takes 62 us in
     place of 140 to 176 (2.13, an operator that does nothing on a CPU, 2026-11-30).
     """
-    is_watched = (
-        torch.compiler.is_compiling()
-        or torch.jit.is_tracing()
+    # Dynamo traces no further than the first condition.
+    if torch.compiler.is_compiling() or _is_watched(inputs[:4]):
+        return _bloom(*inputs)
+    return VkbloomBloom.apply(*inputs)
+
+
+def _is_watched(tensors: Iterable[Any]) -> bool:
+    """Return whether a trace, a transform, a mode or a subclass looks at operators."""
+    return (
+        torch.jit.is_tracing()
         or torch._C._are_functorch_transforms_active()
         or torch._C._len_torch_dispatch_stack() > 0
+        or not all(type(one) in _PLAIN for one in tensors)
     )
-    is_plain = all(type(one) in _PLAIN for one in inputs[:4])
-    return VkbloomBloom.apply(*inputs) if is_plain and not is_watched else _bloom(*inputs)
