@@ -66,8 +66,7 @@ class CustomMethod(Settings, metaclass=CustomType):
     _place: ClassVar[int] = 0
     _state: ClassVar[dict[Any, Any] | None] = None
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
+    def _check_together(self) -> None:
         if not self.file.saves_bloom:
             for name in COMPOSITED:
                 if getattr(self, name) != getattr(type(self), name):

@@ -64,8 +64,7 @@ class BabylonBloom(PublishedSettings):
     scale: float = number_field(default=0.5, range=(0.01, 1), differentiable=False)
     weight: float = number_field(default=0.15, range=(0, MAX_HALF), slider=(0, 2))
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
+    def _check_together(self) -> None:
         if self.kernel * self.scale > 129:
             raise ValueError(
                 f"kernel: {self.kernel:g} times the scale {self.scale:g} is out of range, up to 129"

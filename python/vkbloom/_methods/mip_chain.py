@@ -70,8 +70,7 @@ class Pyramid(Settings):
     scale_x: float = number_field(slider=(0, 8), everyday=0)
     scale_y: float = number_field(slider=(0, 8), everyday=0)
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
+    def _check_together(self) -> None:
         if self.level_weights is not None:
             weights, count = check_floats("level_weights", self.level_weights), self.levels
             if len(weights) != count:
