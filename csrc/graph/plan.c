@@ -331,7 +331,7 @@ static bool shares(const struct vkb_graph *graph, const struct neighbour *neighb
     return true;
 }
 
-// Whether the passes of a fused group are skipped, or those of the group that it replaces.
+// Skips the passes of a fused group, or those of the group that it replaces.
 static void skip(uint32_t replaced, uint32_t fused, uint32_t end, bool skips_fused, bool *skipped)
 {
     for (uint32_t i = replaced; i < end; ++i)

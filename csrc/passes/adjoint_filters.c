@@ -140,6 +140,7 @@ static bool add_axis_sums(struct vkb_adjoint *adjoint, struct vkb_filter *filter
         && add_weight_sums(adjoint, axis, along_x, half, image, error);
 }
 
+// The sums by what the taps of a filter have, if any are wanted.
 static bool add_tap_sums(struct vkb_adjoint *adjoint, const struct vkb_filter *given,
                          uint32_t cotangents, uint32_t image, struct vkb_error *error)
 {

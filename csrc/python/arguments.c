@@ -131,21 +131,17 @@ static bool check_values(const struct vkb_value_row *rows, size_t count, const v
     return true;
 }
 
-static bool check_finite(const char *name, const float *numbers, size_t count)
-{
-    for (size_t i = 0; i < count; ++i)
-        if (!isfinite(numbers[i]))
-            return vkb_refuse("%s: %g is out of range, finite numbers", name, numbers[i]);
-    return true;
-}
+#define CHECK_FINITE_FUNCTION(function, type) \
+    static bool function(const char *name, const type *numbers, size_t count) \
+    { \
+        for (size_t i = 0; i < count; ++i) \
+            if (!isfinite(numbers[i])) \
+                return vkb_refuse("%s: %g is out of range, finite numbers", name, numbers[i]); \
+        return true; \
+    }
 
-static bool check_finite_doubles(const char *name, const double *numbers, size_t count)
-{
-    for (size_t i = 0; i < count; ++i)
-        if (!isfinite(numbers[i]))
-            return vkb_refuse("%s: %g is out of range, finite numbers", name, numbers[i]);
-    return true;
-}
+CHECK_FINITE_FUNCTION(check_finite, float)
+CHECK_FINITE_FUNCTION(check_finite_doubles, double)
 
 static bool check_count(const char *name, uint32_t count, uint32_t least, uint32_t most)
 {

@@ -242,6 +242,7 @@ void store_pixel(int x, vec4 value)
         return;
     if (WEIGHTED != 0)
         value *= weight_at(x - params.before_x, row - params.before_y);
+    // It is 0, but compilers do not know that, and have fewer registers left.
     if (CHANNELS == 3)
         value.a = 0.0;
     if (ADDS_IMAGE != 0)

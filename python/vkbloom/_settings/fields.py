@@ -374,12 +374,13 @@ def _describe(
     return FieldInfo(**{"name": field.name, "option": field.name, **described, **declared})
 
 
-def check_fields(record: Any) -> None:
-    """Check the fields of a frozen dataclass, and store the values that `FieldInfo.check` returns.
+def check_fields(record: Any, names: Iterable[str] | None = None) -> None:
+    """Check fields of a frozen dataclass, and store the values that `FieldInfo.check` returns.
 
-    A default is not checked: `Settings.replace` makes settings often, with few other values.
+    `names`: Default: all. A default value is not checked: most are one.
     """
-    for name, info in fields_of(type(record)).items():
-        value = getattr(record, name)
+    known = fields_of(type(record))
+    for name in known if names is None else names:
+        info, value = known[name], getattr(record, name)
         if value is not info.default:
             object.__setattr__(record, name, info.check(value))
