@@ -528,7 +528,7 @@ static bool record_passes(struct vkb_run *run, uint32_t first, uint32_t end,
     if (draws)
         device->vk.vkCmdEndRendering(commands);
     vkb_timer_stamp(device, commands, timer);
-    snprintf(timing->name, sizeof timing->name, "%s", vkb_graph_timed_as(run->graph, first));
+    vkb_set_name(timing->name, sizeof timing->name, vkb_graph_timed_as(run->graph, first));
     return true;
 }
 

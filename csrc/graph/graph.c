@@ -14,6 +14,16 @@ void vkb_graph_destroy(struct vkb_graph *graph)
     *graph = (struct vkb_graph){0};
 }
 
+void vkb_set_name(char *name, size_t size, const char *text)
+{
+    size_t length = 0;
+
+    while (length + 1 < size && text[length])
+        ++length;
+    memcpy(name, text, length);
+    memset(name + length, 0, size - length);
+}
+
 // Whether the image keeps its name as it is: a framebuffer, and what a source gives. Custom methods
 // cannot give their framebuffers the names of these (methods/custom.c).
 static bool is_named_by_itself(const struct vkb_image_row *row)
@@ -30,7 +40,7 @@ static bool name_image(struct vkb_graph *graph, uint32_t image, const char *name
 
     if (named != VKB_NO_IMAGE && named != image)
         return vkb_fail(error, VKB_ERROR_GENERAL, "graph: there are two images named %s", name);
-    snprintf(graph->images[image].name, sizeof graph->images[image].name, "%s", name);
+    vkb_set_name(graph->images[image].name, sizeof graph->images[image].name, name);
     return true;
 }
 
@@ -40,7 +50,7 @@ bool vkb_graph_add_image(struct vkb_graph *graph, const struct vkb_image_row *ro
     vkb_image_name name = {VKB_INTERNAL_NAME};
     const size_t prefix = is_named_by_itself(row) ? 0 : 1;
 
-    snprintf(name + prefix, sizeof name - prefix, "%s", row->name);
+    vkb_set_name(name + prefix, sizeof name - prefix, row->name);
     if (!vkb_grow(error, &graph->images, &graph->image_capacity, graph->image_count + 1,
                   sizeof *graph->images))
         return false;

@@ -192,7 +192,7 @@ bool vkb_build_adjoint(const struct vkb_source *source, const struct vkb_setting
     done = done && add_passes(&adjoint, settings, possible, error)
         && vkb_table_end(&adjoint.table, graph, adjoint.table_image, error)
         && (!cotangents->images || show_results(&adjoint, image_count, error));
-    vkb_free(adjoint.table.texels);
+    vkb_table_destroy(&adjoint.table);
     vkb_free(adjoint.cotangents);
     return done;
 }

@@ -50,7 +50,7 @@ static bool is_free(const struct vkb_levels *levels, const char *name)
 static void name_image(const struct vkb_levels *levels, const struct vkb_custom_pass *pass,
                        vkb_image_name name)
 {
-    snprintf(name, VKB_NAME_SIZE, "%s", pass->name);
+    vkb_set_name(name, VKB_NAME_SIZE, pass->name);
     if (!pass->framebuffer || vkb_graph_find(levels->graph, name) == VKB_NO_IMAGE)
         return;
     snprintf(name, VKB_NAME_SIZE, "saved_%.25s", pass->name);

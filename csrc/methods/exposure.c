@@ -219,7 +219,7 @@ uint32_t vkb_add_exposed(struct vkb_levels *levels, const char *name, bool frame
         .channels = from->channels,
         .framebuffer = framebuffer,
     };
-    snprintf(row.name, sizeof row.name, "%s", name);
+    vkb_set_name(row.name, sizeof row.name, name);
     const uint32_t exposed = vkb_levels_add(levels, &row);
     if (levels->failed)
         return 0;

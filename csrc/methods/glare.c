@@ -216,7 +216,7 @@ static void name_stage(const struct vkb_settings *settings, uint32_t index, char
         number += i < index && settings->stages[i].kind == kind;
     }
     if (count == 1)
-        snprintf(name, VKB_NAME_SIZE, "%s", kinds[kind].name);
+        vkb_set_name(name, VKB_NAME_SIZE, kinds[kind].name);
     else
         snprintf(name, VKB_NAME_SIZE, "%s_%u", kinds[kind].name, number);
 }

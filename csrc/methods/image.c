@@ -22,7 +22,7 @@ static uint32_t add_input(struct vkb_levels *levels, const struct vkb_image_sour
         .input = kind,
     };
 
-    snprintf(row.name, sizeof row.name, "%s", names[kind]);
+    vkb_set_name(row.name, sizeof row.name, names[kind]);
     return vkb_levels_add(levels, &row);
 }
 

@@ -51,7 +51,7 @@ static bool add_numbered_pass(struct vkb_adjoint *adjoint, const char *prefix, u
     if (!vkb_add_target_image(adjoint->graph, name, VKB_FORMAT_RGBA32_FLOAT, size, false, image,
                               error))
         return false;
-    snprintf(row->name, sizeof row->name, "%s", name);
+    vkb_set_name(row->name, sizeof row->name, name);
     row->targets[0] = *image;
     return vkb_graph_add_pass(adjoint->graph, row, error);
 }

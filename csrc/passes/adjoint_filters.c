@@ -1,6 +1,7 @@
 // The adjoints of linear filters, and of passes that are linear but for points before or after.
 #include "passes/adjoint.h"
 #include "passes/filter.h"
+#include "passes/taps.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -81,34 +82,75 @@ static bool add_distance_sums(struct vkb_adjoint *adjoint, const struct vkb_filt
     return done;
 }
 
-// The sums by the weights of an axis' kernel, four in each, from what the transpose along the other
-// axis has made of the cotangents.
+// Adds the sums by so many weights of an axis' kernel in each pass, from what the transpose along
+// the other axis has made of the cotangents.
+static bool add_kernel_passes(struct vkb_adjoint *adjoint, struct vkb_pass_row *row,
+                              const struct vkb_axis *axis, uint32_t in_each, const char *kind,
+                              struct vkb_error *error)
+{
+    const struct vkb_size size = vkb_size_of(adjoint->graph, row->reads[SLOT_COTANGENTS]);
+    bool done = true;
+
+    row->block = VKB_BLOCK_filter;
+    row->constants.alpha = adjoint->alpha;
+    row->constants.radius = (int32_t)axis->kernel.count - 1;
+    for (uint32_t pass = 0; done && in_each * pass < axis->kernel.count; ++pass) {
+        char name[VKB_NAME_SIZE];
+        snprintf(name, sizeof name, ".by_%s_%u_%u", kind, pass, adjoint->moved++);
+        row->constants.first_sample = (int32_t)(in_each * pass);
+        done = vkb_add_sum_passes(adjoint, row, row->shader, size, name, error);
+    }
+    return done;
+}
+
+// The sums by the weights of an axis' kernel.
 static bool add_weight_sums(struct vkb_adjoint *adjoint, const struct vkb_axis *axis, bool along_x,
                             uint32_t half, uint32_t image, struct vkb_error *error)
 {
-    const struct vkb_kernel *kernel = &axis->kernel;
+    const double step = axis->kernel.step;
     struct vkb_pass_row row = vkb_adjoint_row(&vkb_shader_adjoint_kernel_frag, half);
-    bool done = true;
 
     row.reads[SLOT_SOURCE] = image;
-    row.block = VKB_BLOCK_filter;
-    row.params.filter.step_x = along_x ? (float)kernel->step : 0.0f;
-    row.params.filter.step_y = along_x ? 0.0f : (float)kernel->step;
+    row.params.filter.step_x = along_x ? (float)step : 0.0f;
+    row.params.filter.step_y = along_x ? 0.0f : (float)step;
     VKB_SET_TARGET(&row, filter, &adjoint->graph->images[half]);
-    row.constants.alpha = adjoint->alpha;
     row.constants.direction = along_x ? DIRECTION_HORIZONTAL : DIRECTION_VERTICAL;
-    row.constants.radius = (int32_t)kernel->count - 1;
-    row.constants.sampling = axis->from == axis->to && kernel->step == floor(kernel->step)
-                               ? SAMPLING_TEXEL
-                               : SAMPLING_FETCH;
-    for (uint32_t four = 0; done && 4 * four < kernel->count; ++four) {
-        char name[VKB_NAME_SIZE];
-        snprintf(name, sizeof name, ".by_weight_%u_%u", four, adjoint->moved++);
-        row.constants.first_sample = (int32_t)(4 * four);
-        done = vkb_add_sum_passes(adjoint, &row, row.shader, vkb_size_of(adjoint->graph, half),
-                                  name, error);
+    row.constants.sampling =
+        axis->from == axis->to && step == floor(step) ? SAMPLING_TEXEL : SAMPLING_FETCH;
+    return add_kernel_passes(adjoint, &row, axis, 4, "weight", error);
+}
+
+// Whether the taps of an axis are at the same distances from all texels, and adjoint_taps.frag has
+// room for their numbers.
+static bool has_fixed_taps(const struct vkb_axis *axis)
+{
+    const struct vkb_pass_row *const row = NULL;
+
+    return axis->from == axis->to && axis->origin == 0.0 && axis->step == 1.0 && axis->first == 0
+        && axis->kernel.count
+               <= sizeof row->params.filter.weights / sizeof *row->params.filter.weights;
+}
+
+// The sums by the weights of such an axis, and by a factor of the distances of its taps.
+static bool add_fixed_tap_sums(struct vkb_adjoint *adjoint, const struct vkb_axis *axis,
+                               bool along_x, uint32_t half, uint32_t image, struct vkb_error *error)
+{
+    const uint32_t middle = axis->kernel.count - 1;
+    struct vkb_pass_row row = vkb_adjoint_row(&vkb_shader_adjoint_taps_frag, half);
+
+    row.reads[SLOT_SOURCE] = image;
+    row.constants.direction = along_x ? DIRECTION_HORIZONTAL : DIRECTION_VERTICAL;
+    for (uint32_t i = 1; i <= middle; ++i) {
+        const struct vkb_tap tap = vkb_axis_tap(axis, middle + i);
+        float *const numbers = row.params.filter.weights[i];
+        const bool centred = vkb_is_centred(tap.offset);
+        const double whole = floor(tap.offset + (centred ? 0.5 : 0.0));
+        numbers[0] = (float)whole;
+        numbers[1] = centred ? 0.0f : (float)(tap.offset - whole);
+        numbers[2] = (float)(tap.weights[0] * tap.offset * (centred ? 0.5 : 1.0));
+        numbers[3] = centred;
     }
-    return done;
+    return add_kernel_passes(adjoint, &row, axis, 3, "taps", error);
 }
 
 // The sums by what the taps of an axis have, if any are wanted. The axis is one of the filter.
@@ -130,13 +172,15 @@ static bool add_axis_sums(struct vkb_adjoint *adjoint, struct vkb_filter *filter
         vkb_filter_to_image(adjoint, &across, cotangents,
                             (struct vkb_size){across.x.from, across.y.from}, &half, error);
     adjoint->of_sums = false;
+    if (!done)
+        return false;
     struct vkb_axis *kept = along_x ? &along.y : &along.x;
     vkb_axis_move(kept, kept->from, kept->from, 0.0);
     along.gain = along.divisor;
-    return done
-        && (!moves
-            || add_distance_sums(adjoint, &along, along_x ? &along.x : &along.y, half, image,
-                                 error))
+    struct vkb_axis *own = along_x ? &along.x : &along.y;
+    if (moves && has_fixed_taps(own))
+        return add_fixed_tap_sums(adjoint, own, along_x, half, image, error);
+    return (!moves || add_distance_sums(adjoint, &along, own, half, image, error))
         && add_weight_sums(adjoint, axis, along_x, half, image, error);
 }
 

@@ -11,7 +11,7 @@ struct vkb_pass_row vkb_fullscreen_row(const char *name, const struct vkb_shader
 
     // memset, since an initializer sets only the first member of the union of parameters.
     memset(&row, 0, sizeof row);
-    snprintf(row.name, sizeof row.name, "%s", name);
+    vkb_set_name(row.name, sizeof row.name, name);
     row.geometry = VKB_GEOMETRY_FULLSCREEN;
     row.vertex = &vkb_shader_fullscreen_vert;
     row.shader = fragment;
@@ -63,7 +63,7 @@ bool vkb_add_target_image(struct vkb_graph *graph, const char *name, enum vkb_fo
         .framebuffer = framebuffer,
     };
 
-    snprintf(row.name, sizeof row.name, "%s", name);
+    vkb_set_name(row.name, sizeof row.name, name);
     return vkb_graph_add_image(graph, &row, index, error);
 }
 
@@ -98,7 +98,7 @@ struct vkb_image_row vkb_given_image(const char *name, const struct vkb_kernel_d
         .serial = data->serial,
     };
 
-    snprintf(row.name, sizeof row.name, "%s", name);
+    vkb_set_name(row.name, sizeof row.name, name);
     return row;
 }
 

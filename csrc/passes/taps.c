@@ -51,14 +51,17 @@ static double next_step(const struct vkb_axis *axis, double at)
     return 0.0;
 }
 
+bool vkb_is_centred(double position)
+{
+    return fabs(position - floor(position + 0.5)) < 1e-9;
+}
+
 static double position_of(const struct vkb_axis *axis, uint32_t pixel, double offset)
 {
     const double position = axis->border >= VKB_BORDER_LAST
                               ? axis->origin + axis->step * at_border(axis, pixel + offset)
                               : axis->origin + axis->step * pixel + offset;
-    // A texel's centre is met with roundings.
-    const double nearest = floor(position + 0.5);
-    const double settled = fabs(position - nearest) < 1e-9 ? nearest : position;
+    const double settled = vkb_is_centred(position) ? floor(position + 0.5) : position;
 
     return settled + next_step(axis, floor(settled));
 }

@@ -14,10 +14,14 @@
 struct vkb_transposed {
     double *description;  // of the axis (passes/transposes.c)
     size_t described;     // numbers of it
+    size_t number;        // that no other transpose of the renderer has had
     float (*texels)[4];
     size_t count;
     struct vkb_readers readers;
 };
+
+// Whether a position is a texel's centre, which is met with roundings.
+bool vkb_is_centred(double position);
 
 // About how many pixels read a texel.
 double vkb_axis_readers(const struct vkb_axis *axis);

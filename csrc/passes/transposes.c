@@ -130,7 +130,7 @@ static const struct vkb_transposed *find(struct vkb_transposes *transposes,
         return NULL;
     if (is_new) {
         transposes->bytes += size_of(found);
-        ++transposes->built;
+        found->number = transposes->built++;
         at = transposes->count++;
     }
     memmove(transposes->kept + at, transposes->kept + at + 1,
@@ -140,17 +140,42 @@ static const struct vkb_transposed *find(struct vkb_transposes *transposes,
     return found;
 }
 
-// Places count from the first texel of the table.
-static void append(const struct vkb_transposed *transposed, uint64_t hash, uint32_t entries,
-                   struct vkb_table *table)
+void vkb_table_destroy(struct vkb_table *table)
 {
-    float (*texels)[4] = table->texels + table->count;
+    vkb_free(table->texels);
+    vkb_free(table->parts);
+}
 
-    memcpy(texels, transposed->texels, transposed->count * sizeof *texels);
+// The first texel of a transpose in the table; SIZE_MAX: it is not there.
+static size_t find_part(const struct vkb_table *table, const struct vkb_transposed *transposed)
+{
+    for (size_t i = 0; i < table->part_count; ++i)
+        if (table->parts[i].number == transposed->number)
+            return table->parts[i].start;
+    return SIZE_MAX;
+}
+
+// Places count from the first texel of the table.
+static bool append(const struct vkb_transposed *transposed, uint64_t hash, uint32_t entries,
+                   struct vkb_table *table, struct vkb_error *error)
+{
+    const size_t start = table->count, count = start + transposed->count;
+
+    if (count > MAX_TEXELS)
+        return vkb_fail(error, VKB_ERROR_VALUE,
+                        "derivatives: filters need %zu weights, more than %d", count, MAX_TEXELS);
+    if (!vkb_grow(error, &table->texels, &table->capacity, count, sizeof *table->texels)
+        || !vkb_grow(error, &table->parts, &table->part_capacity, table->part_count + 1,
+                     sizeof *table->parts))
+        return false;
+    memcpy(table->texels + start, transposed->texels, transposed->count * sizeof *table->texels);
     for (uint32_t i = 0; i < entries; ++i)
-        texels[i][2] += (float)table->count;
-    table->count += transposed->count;
+        table->texels[start + i][2] += (float)start;
+    table->parts[table->part_count].number = transposed->number;
+    table->parts[table->part_count++].start = start;
+    table->count = count;
     table->hash = vkb_hash_word(table->hash, hash);
+    return true;
 }
 
 bool vkb_axis_transpose(struct vkb_axis *axis, uint32_t kernels, struct vkb_table *table,
@@ -161,17 +186,11 @@ bool vkb_axis_transpose(struct vkb_axis *axis, uint32_t kernels, struct vkb_tabl
 
     if (!found)
         return false;
-    const size_t count = table->count + found->count;
-    if (count > MAX_TEXELS)
-        vkb_fail(error, VKB_ERROR_VALUE, "derivatives: filters need %zu weights, more than %d",
-                 count, MAX_TEXELS);
-    const bool done =
-        count <= MAX_TEXELS
-        && vkb_grow(error, &table->texels, &table->capacity, count, sizeof *table->texels);
+    const size_t known = find_part(table, found), start = known == SIZE_MAX ? table->count : known;
+    const bool done = known != SIZE_MAX || append(found, hash, axis->from, table, error);
     if (done) {
         axis->readers = found->readers;
-        axis->readers.start = (int32_t)table->count;
-        append(found, hash, axis->from, table);
+        axis->readers.start = (int32_t)start;
     }
     trim(table->transposes, MAX_KEPT_BYTES);
     return done;

@@ -49,15 +49,25 @@ struct vkb_transposes {
 
 void vkb_transposes_destroy(struct vkb_transposes *transposes);
 
-// The texels of all axes, one after the other, and the hash of their descriptions.
+// The texels of the transposes of all axes, one after the other, and the hash of their
+// descriptions. Axes with the same transpose share its texels, such as those of a blur that is
+// repeated.
 struct vkb_table {
     struct vkb_transposes *transposes;
     float (*texels)[4];
     size_t count, capacity;
     uint64_t hash;
+    struct {
+        size_t number;  // of the transpose
+        size_t start;   // its first texel
+    } *parts;
+    size_t part_count, part_capacity;
 };
 
-// Adds the transpose of an axis to the table, and sets its readers.
+// Destroying an empty table is safe.
+void vkb_table_destroy(struct vkb_table *table);
+
+// Adds the transpose of an axis to the table, unless it is there, and sets the axis' readers.
 bool vkb_axis_transpose(struct vkb_axis *axis, uint32_t kernels, struct vkb_table *table,
                         struct vkb_error *error);
 

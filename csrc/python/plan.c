@@ -300,7 +300,7 @@ static bool read_cotangents(PyObject *tuple, struct vkb_cotangents *cotangents)
         const char *name = PyUnicode_AsUTF8AndSize(PyTuple_GetItem(tuple, i), NULL);
         if (!name)
             return false;
-        snprintf(cotangents->names[i], VKB_NAME_SIZE, "%s", name);
+        vkb_set_name(cotangents->names[i], VKB_NAME_SIZE, name);
     }
     return true;
 }

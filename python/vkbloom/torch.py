@@ -11,14 +11,13 @@ from typing import Any, Literal, TypeAlias
 from vkbloom._extras import import_extra
 from vkbloom._gradients.operators import (
     draw,
-    flatten,
     names_of,
     number_of,
-    read_ahead,
+    read,
     refuse_capture,
     refuse_tangents,
-    replace,
     text_of,
+    values_of,
 )
 from vkbloom._renderer.renderer import Renderer
 from vkbloom._settings.settings import Settings, check_settings, field_info
@@ -160,41 +159,42 @@ class Bloom(torch.nn.Module):  # type: ignore[misc]
     def settings(self) -> Settings:
         """The settings with what was learned."""
         values = [_clamp(self._parameter(name), self._ranges[name]) for name in self._names]
-        return replace(self._start, self._fields, flatten([value.cpu() for value in values]))
+        return self._start.replace(**values_of(self._fields, read(values)))
 
     def forward(self, image: Any, *, mask: Any = None, emission: Any = None) -> Any:
         """Add bloom, as `bloom` does."""
         if not torch.compiler.is_compiling():
             # Comparing parameters waits for the device, which would end the capture.
             refuse_capture(image)
-        values = self._values() if self._names else None
+        parameters = [self._parameter(name) for name in self._names]
+        numbers = self._move_into_ranges(parameters)
+        learned = self._fields, parameters, numbers
         arrays = {"mask": mask, "emission": emission, "renderer": self._renderer}
-        return _call(image, self._start, self._order, self._fields, values, **arrays)
+        return _call(image, self._start, self._order, learned, **arrays)
 
     def _parameter(self, name: str) -> Any:
         return self.learned[name.replace(".", "_")]
 
-    def _values(self) -> Any:
-        """Return the parameters, moved into the ranges of their fields, as `flatten` does."""
-        parameters = [self._parameter(name) for name in self._names]
-        # Compiled code cannot depend on values.
+    def _move_into_ranges(self, parameters: list[Any]) -> Any:
+        """Move parameters into the ranges of their fields, and return their numbers.
+
+        Compiled code, which cannot depend on values, has no numbers.
+        """
         if torch.compiler.is_compiling():
             with torch.no_grad():
                 for name, parameter in zip(self._names, parameters, strict=True):
                     parameter.copy_(_clamp(parameter, self._ranges[name]))
-            return flatten(parameters)
-        values, moved = flatten(parameters), False
-        numbers, at = read_ahead(values).tolist(), 0
+            return None
+        numbers, at, moved = read(parameters), 0, False
         for name, parameter in zip(self._names, parameters, strict=True):
             ends, part = self._ranges[name], numbers[at : at + parameter.numel()]
             at += len(part)
-            # A write, also of an equal value, makes what earlier calls have saved unusable.
-            # (Compiled code saves copies.)
-            if not _is_within(part, ends):
+            # A write, also of an equal value, makes what other operators have saved unusable.
+            if not _is_within(part.tolist(), ends):
                 with torch.no_grad():
                     parameter.copy_(_clamp(parameter, ends))
                 moved = True
-        return flatten(parameters) if moved else values
+        return read(parameters) if moved else numbers
 
 
 def _is_within(values: Any, ends: tuple[float, float] | None) -> bool:
@@ -220,32 +220,25 @@ def _call(
     image: Any,
     settings: Settings,
     order: Order,
-    fields: str = "",
-    values: Any = None,
+    learned: tuple[str, list[Any], Any] = ("", [], None),
     *,
     mask: Any,
     emission: Any,
     renderer: Renderer | None,
 ) -> Any:
-    """Run the operator; `fields` and `values` are what `names_of` and `flatten` return."""
+    """Run the operator; `learned` is what `names_of` returns, the parameters and their numbers."""
+    fields, parameters, numbers = learned
     for name, tensor in (("image", image), ("mask", mask), ("emission", emission)):
         if not isinstance(tensor, torch.Tensor) and (tensor is not None or name == "image"):
             raise TypeError(f"{name}: a tensor is needed, not {type(tensor).__name__}")
     _check(image, mask, emission, order)
     _check_renderer(renderer)
-    refuse_tangents((image, mask, emission, values))
+    refuse_tangents((image, mask, emission, *parameters))
     if order == "CHW":
         image = image.movedim(-3, -1)
         emission = None if emission is None else emission.movedim(-3, -1)
-    final = draw(
-        image,
-        mask,
-        emission,
-        values,
-        fields,
-        text_of(settings),
-        number_of(renderer),
-    )
+    given = fields, text_of(settings), number_of(renderer)
+    final = draw((image, mask, emission), given, parameters, numbers)
     return final.movedim(-1, -3) if order == "CHW" else final
 
 

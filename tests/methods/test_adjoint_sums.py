@@ -311,6 +311,14 @@ DISTANCES: dict[str, tuple[Any, tuple[str, ...]]] = {
         vkbloom.Separable(layers=((1.6, 1.0),), weights=(0.2, 0.1, 0.1, 0.1, 0.1, 0.1)),
         ("blur_scale",),
     ),
+    "separable and weights at a centre": (
+        vkbloom.Separable(layers=((1.6, 1.0),), weights=(0.2, 0.1, 0.1, 0.1, 0.1, 0.1)),
+        ("blur_scale", "weights"),
+    ),
+    "separable of many taps": (
+        vkbloom.Separable(blur_scale=1.37, weights=(*np.linspace(0.1, 0.01, 20).tolist(),)),
+        ("blur_scale", "weights"),
+    ),
     "kino": (vkbloom.KinoBloom(radius=4.6, bloom_scale=0.8), ("radius", "threshold")),
     # The levels are as large as the image, or larger.
     "kino enlarged": (vkbloom.KinoBloom(radius=4.6, bloom_scale=2.0), ("radius",)),

@@ -142,6 +142,7 @@ def test_operators_pass_opcheck(name: str) -> None:
 
 
 @pytest.mark.filterwarnings("ignore:There is a performance drop")
+@pytest.mark.filterwarnings("ignore:Warning. Profiler clears events")
 def test_what_looks_at_operators_sees_one(renderer: Renderer) -> None:
     """Transforms, fake tensors, traces and subclasses; plain tensors pass the dispatcher by."""
     images = tensor(2, 4, 5, 3, requires_grad=False)

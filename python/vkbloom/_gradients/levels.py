@@ -10,6 +10,7 @@ glare, distances of the taps of passes, or weights of blurs. The sums have kinds
 - "enlarging_x", "reducing_y", ...: Of each pass that enlarges a level or does not: the derivative
   by a factor of the distances of its taps along an axis.
 - "weight": Of each blur along an axis: the derivatives by four of its weights.
+- "taps": The same by three of them, and by a factor of the distances of the taps with these.
 """
 
 from __future__ import annotations
@@ -42,7 +43,7 @@ _STEP: Final = 1e-5
 _SHARES: Final = ("shares",)
 _LEVELS: Final = ("levels",)
 _COLOUR: Final = ("colour",)
-_WEIGHT: Final = ("weight",)
+_WEIGHT: Final = ("weight", "taps")
 _UP: Final = ("enlarging_x", "enlarging_y")
 _EVERYWHERE: Final = (*_UP, "reducing_x", "reducing_y")
 #: By method: the fields that only these sums have, beside the composite, with the kinds of each.
@@ -66,7 +67,11 @@ _KINDS: Final[dict[str, dict[str, tuple[str, ...]]]] = {
         "scale_x": ("enlarging_x", "reducing_x"),
         "scale_y": ("enlarging_y", "reducing_y"),
     },
-    "separable": {"blur_scale": _EVERYWHERE, "weights": _WEIGHT, "blur_strength": _WEIGHT},
+    "separable": {
+        "blur_scale": (*_EVERYWHERE, "taps"),
+        "weights": _WEIGHT,
+        "blur_strength": _WEIGHT,
+    },
     "three": {"radius": _LEVELS, "tints": _LEVELS},
     "urp": {"scatter": _SHARES, "tint": _COLOUR},
 }
@@ -217,17 +222,25 @@ def _separable_factors(settings: Any, size: _Size) -> dict[str, Factors]:
     # The centre is added twice more, with the strength, or has none.
     twice = settings.first_tap == 0
     by_weights[0], by_strength[0] = (1 + 2 * strength, 2 * weights[0]) if twice else (1.0, 0.0)
+    of_taps = np.zeros((-(-len(weights) // 3), 4))
+    of_taps[:, 3] = 1 / settings.blur_scale
     return {
-        "blur_scale": _by_distance(settings.blur_scale),
-        "weights": {"weight": _by_fours(np.diag(by_weights))},
-        "blur_strength": {"weight": _by_fours(by_strength)},
+        "blur_scale": {**_by_distance(settings.blur_scale), "taps": of_taps},
+        "weights": _by_weights(np.diag(by_weights)),
+        "blur_strength": _by_weights(by_strength),
     }
 
 
-def _by_fours(factors: _Array) -> _Array:
-    """Return the last dimension as two, of which the second one has four."""
-    padding = [(0, 0)] * (factors.ndim - 1) + [(0, -factors.shape[-1] % 4)]
-    return np.pad(factors, padding).reshape(*factors.shape[:-1], -1, 4)
+def _by_weights(factors: _Array) -> Factors:
+    """Return the factors of a field by those of the weights, the last dimension."""
+    fours, threes = (_in_parts(factors, size) for size in (4, 3))
+    return {"weight": fours, "taps": np.concatenate([threes, 0 * threes[..., :1]], axis=-1)}
+
+
+def _in_parts(factors: _Array, size: int) -> _Array:
+    """Return the last dimension as two, of which the second one has so many."""
+    padding = [(0, 0)] * (factors.ndim - 1) + [(0, -factors.shape[-1] % size)]
+    return np.pad(factors, padding).reshape(*factors.shape[:-1], -1, size)
 
 
 _FACTORS: Final[dict[str, Callable[[Any, _Size], dict[str, Factors]]]] = {

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import functools
 import math
-import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any, Final, NamedTuple, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vkbloom import _core
 from vkbloom._extras import import_extra
@@ -41,6 +41,9 @@ from vkbloom.reference import vjp as reference_vjp
 from vkbloom.reference._derivatives import check_cotangents
 
 torch: Any = import_extra("torch", "torch", "vkbloom.torch")
+
+#: The most tensors that are read one by one.
+_FEW: Final = 8
 
 
 @functools.lru_cache(64)
@@ -101,27 +104,17 @@ def _settings(text: str) -> Settings:
     return Settings.from_json(text)
 
 
-class _Reads(threading.local):
-    """What a thread has read for the operator that it calls next: a tensor's key, and its copy."""
-
-    last: tuple[Any, Any] | None = None
-
-
-_reads = _Reads()
-
-
 def flatten(tensors: Sequence[Any]) -> Any:
     """Return all numbers of tensors as one dimension, which an operator takes; None: no tensors.
 
     PyTorch takes 18 us longer to call an operator with a list of tensors, and as long for its
-    derivative (2.13 on a CPU, 2026-11-30). Numbers on a GPU are read together: each wait takes
-    0.1 ms.
+    derivative (2.13 on a CPU, 2026-11-30).
     """
     if not tensors:
         return None
     where = tensors[0].device
     # Three numbers take 1.8 us in place of 4.9 as a stack, their derivatives 15 in place of 21.
-    if all(tensor.ndim == 0 and tensor.device == where for tensor in tensors):
+    if _are_numbers(tensors) and all(tensor.device == where for tensor in tensors):
         return torch.stack([*tensors])
     return torch.cat([tensor.to(where).reshape(-1) for tensor in tensors])
 
@@ -141,36 +134,36 @@ def _shapes(names: str) -> dict[str, tuple[int, ...]]:
     return {name: tuple(map(int, sides.split("x"))) if sides else () for name, _, sides in parts}
 
 
-def read_ahead(values: Any) -> Any:
-    """Return such numbers on the host, and keep them for the next operator."""
-    read = values.detach().cpu()
-    # A tensor within a transform of torch.func has no address.
-    try:
-        key = _key_of_each(values)
-    except RuntimeError:
-        key = None
-    _reads.last = None if key is None else (key, read)
-    return read
+def read(tensors: Sequence[Any]) -> NDArray[Any]:
+    """Return all numbers of tensors as an array of one dimension on the host."""
+    # After a wait for the GPU three numbers take 46 us in place of 111, eight 92 in place of 123
+    # (H200, 2026-11-30).
+    if len(tensors) <= _FEW:
+        parts = [_number(tensor) for tensor in tensors]
+        return np.array(parts) if _are_numbers(tensors) else np.hstack(parts)
+    with torch.no_grad():
+        found: NDArray[Any] = flatten(tensors).cpu().numpy()
+    return found
 
 
-def replace(settings: Settings, fields: str, values: Any) -> Settings:
-    """Return settings with the values of `flatten`, on the host, of the fields of `names_of`."""
-    if not fields:
-        return settings
-    given, at, array = {}, 0, values.numpy()
-    for name, shape in _shapes(fields).items():
-        part = array[at : at + math.prod(shape)].reshape(shape)
-        given[name] = part if part.ndim == 3 else _numbers(part.tolist())
+def _are_numbers(tensors: Iterable[Any]) -> bool:
+    return all(tensor.ndim == 0 for tensor in tensors)
+
+
+def _number(tensor: Any) -> Any:
+    """Return the number of a tensor without dimensions, or an array of one dimension."""
+    return tensor.item() if tensor.ndim == 0 else tensor.detach().cpu().numpy().reshape(-1)
+
+
+def values_of(names: str, numbers: NDArray[Any]) -> dict[str, Any]:
+    """Return the values of the fields of `names_of`, whose numbers `read` has returned."""
+    values: dict[str, Any] = {}
+    at = 0
+    for name, shape in _shapes(names).items():
+        part = numbers[at : at + math.prod(shape)].reshape(shape)
+        values[name] = part if part.ndim == 3 else _numbers(part.tolist())
         at += part.size
-    if any(isinstance(value, np.ndarray) for value in given.values()):
-        return settings.replace(**given)
-    return _replaced(settings, tuple(given.items()))
-
-
-# Both directions of a step have the same values.
-@functools.lru_cache(16)
-def _replaced(settings: Settings, values: tuple[tuple[str, Any], ...]) -> Settings:
-    return settings.replace(**dict(values))
+    return values
 
 
 def _numbers(value: Any) -> Any:
@@ -203,15 +196,24 @@ def number_of(renderer: Renderer | None) -> int:
 
 
 class _Call(NamedTuple):
-    """The arguments of an operator: images, the values of fields, texts, and a renderer."""
+    """What is drawn or differentiated.
+
+    - `settings`: With the values of the fields.
+    - `fields`: The shapes of the fields that are tensors.
+    - `number`: The renderer's.
+    - `on_gpu`: Whether the fields' tensors are on a GPU.
+    - `key`: What the forward and the backward pass of a call have in common, and no other call.
+      None: no backward pass follows, or it is not known.
+    """
 
     image: Any
     mask: Any
     emission: Any
-    values: Any
-    names: str
-    settings: str
-    renderer: int
+    settings: Settings
+    fields: dict[str, tuple[int, ...]]
+    number: int
+    on_gpu: bool
+    key: Any
 
     @property
     def images(self) -> dict[str, Any]:
@@ -220,45 +222,69 @@ class _Call(NamedTuple):
         return {name: part for name, part in named.items() if part is not None}
 
     @property
-    def fields(self) -> dict[str, tuple[int, ...]]:
-        """The shapes of fields' values."""
-        return _shapes(self.names)
-
-    @property
     def on_device(self) -> bool:
         """Whether the work stays on the GPU."""
         return bool(self.image.is_cuda and self.image.dtype != torch.float64)
 
-    def replace(self, settings: Settings) -> Settings:
-        """Return settings with the values of fields, as this thread has read them for the call."""
-        ahead, _reads.last = _reads.last, None
-        if self.values is None:
-            return settings
-        is_read = ahead is not None and ahead[0] == _key_of_each(self.values)
-        read = ahead[1] if ahead and is_read else self.values.detach().cpu()
-        return replace(settings, self.names, read)
+    @property
+    def renderer(self) -> Renderer:
+        """The open renderer; for tensors of CUDA, the default is on their GPU."""
+        return _renderer(self.number, self.image if self.on_device else None)
 
-    def each(self) -> Iterator[tuple[tuple[int, ...], dict[str, Any], Settings]]:
-        """Yield the index, the arrays and the settings of each image of a batch."""
+    def each(self) -> Iterator[tuple[tuple[int, ...], dict[str, Any]]]:
+        """Yield the index and the arrays of each image of a batch."""
         arrays = {
             name: part.detach().cpu().contiguous().numpy() for name, part in self.images.items()
         }
-        settings = self.replace(_settings(self.settings))
         for index in np.ndindex(tuple(self.image.shape[:-3])):
-            yield index, {name: part[index] for name, part in arrays.items()}, settings
+            yield index, {name: part[index] for name, part in arrays.items()}
 
 
-def _pull(
-    arrays: dict[str, Any], settings: Settings, call: _Call, cotangent: Any, by_images: bool
-) -> Any:
+# Calls with the same values have the same object, whose plan is kept.
+@functools.lru_cache(16)
+def _replaced(text: str, in_doubles: bool, values: tuple[tuple[str, Any], ...]) -> Settings:
+    settings = _settings(text)
+    if not in_doubles:
+        settings = in_floats(settings)
+    return settings._replaced(dict(values)) if values else settings
+
+
+def _chosen(text: str, names: str, numbers: NDArray[Any], in_doubles: bool) -> Settings:
+    """Return the settings of a text, with the numbers that `read` has returned."""
+    values = values_of(names, numbers)
+    arrays = {name: value for name, value in values.items() if isinstance(value, np.ndarray)}
+    others = tuple([one for one in values.items() if one[0] not in arrays])
+    # Arrays may be large: they are not kept.
+    settings = _replaced(text, in_doubles, others)
+    return settings._replaced(arrays) if arrays else settings
+
+
+def _call_of_operator(given: tuple[Any, ...], *, goes_back: bool) -> _Call:
+    """Return what the arguments of an operator stand for."""
+    image, mask, emission, values, names, text, number = given
+    refuse_capture(image)
+    key = _key_of_each(image, values)
+    key = key and (*key, names, text)
+    on_gpu = values is not None and values.is_cuda
+    call = _Call(image, mask, emission, _settings(text), _shapes(names), number, on_gpu, key)
+    taken = call.renderer._taken if goes_back and call.on_device else None
+    if taken and taken.key == key:
+        # The device still works: no wait for the values.
+        return call._replace(settings=taken.settings)
+    numbers = read(() if values is None else (values,))
+    return call._replace(settings=_chosen(text, names, numbers, image.dtype == torch.float64))
+
+
+def _pull(arrays: dict[str, Any], call: _Call, cotangent: Any, by_images: bool) -> Any:
     """Return the derivatives: of the reference for float64, else of the renderer."""
+    settings = call.settings
     if not np.isfinite(cotangent).all():
         return undefined(arrays, settings)
     if arrays["image"].dtype == np.float64:
         return reference_vjp(settings=settings, **arrays)[1]({"final": cotangent})
     cotangents = check_cotangents({"final": cotangent}, {"final": cotangent})
     pulled = pull_each(
-        _renderer(call.renderer),
+        call.renderer,
         settings,
         [(check_inputs(**arrays), cotangents)],
         call.fields,
@@ -282,9 +308,7 @@ def _key_of_each(*tensors: Any) -> tuple[Any, ...] | None:
     return tuple(keys)
 
 
-def _take_forward(
-    call: _Call, renderer: Renderer, settings: Settings, stream: int
-) -> ImportedArray:
+def _take_forward(call: _Call, renderer: Renderer, stream: int) -> ImportedArray:
     """Copy the images, and keep copy and settings if a backward pass may follow.
 
     Each forward pass replaces them, and the backward pass of an image comes after its forward pass
@@ -293,15 +317,9 @@ def _take_forward(
     """
     renderer._taken = None
     images = _take_batch(call.image, "image", renderer, stream)
-    is_learned = call.image.requires_grad or (call.values is not None and call.values.requires_grad)
-    if is_learned and (key := _key_of(call)) is not None:
-        renderer._taken = Taken(key, images, settings)
+    if call.key is not None:
+        renderer._taken = Taken(call.key, images, call.settings)
     return images
-
-
-def _key_of(call: _Call) -> Any:
-    keys = _key_of_each(call.image, call.values)
-    return keys and (*keys, call.names, call.settings)
 
 
 _DTYPES: Final = {torch.float16: "float16", torch.float32: "float32"}
@@ -342,12 +360,10 @@ def _stream_of(tensor: Any) -> int:
 
 def _pull_on_device(call: _Call, cotangent: Any, by_images: bool, stream: int) -> Iterator[Any]:
     """Yield the derivatives of each image, with those by images as tensors of the GPU."""
-    renderer, mask = _renderer(call.renderer, call.image), call.mask
+    renderer, settings, mask = call.renderer, call.settings, call.mask
     taken, renderer._taken = renderer._taken, None
-    if taken and taken.key != _key_of(call):
+    if taken and taken.key != call.key:
         taken = None
-    # Before the waits, since the device still works.
-    settings = taken.settings if taken else _settings_of(call)
     masks = None if mask is None else mask.detach().reshape(-1, *mask.shape[-2:]).cpu().numpy()
     images = taken.images if taken else _take_batch(call.image, "image", renderer, stream)
     emissions, cotangents = (
@@ -367,8 +383,7 @@ def _pull_on_device(call: _Call, cotangent: Any, by_images: bool, stream: int) -
         for index in range(images.shape[0])
     )
     # Beside values on the host, or derivatives that the host computes, the host waits.
-    stays = call.values is not None and call.values.is_cuda
-    stays = stays and device_fields(settings).issuperset(call.fields)
+    stays = call.on_gpu and device_fields(settings).issuperset(call.fields)
     yield from pull_each(
         renderer,
         settings,
@@ -378,10 +393,6 @@ def _pull_on_device(call: _Call, cotangent: Any, by_images: bool, stream: int) -
         images=by_images,
         sums_destination="cuda" if stays else "host",
     )
-
-
-def _settings_of(call: _Call) -> Settings:
-    return call.replace(in_floats(_settings(call.settings)))
 
 
 def _batch(tensor: Any) -> Any:
@@ -429,35 +440,38 @@ def refuse_tangents(tensors: Iterable[Any]) -> None:
             )
 
 
-def _draw(*given: Any) -> Any:
-    call = _Call(*given)
+def _bloom_of(*given: Any) -> Any:
+    call = _call_of_operator(given, goes_back=False)
+    is_learned = any(one is not None and one.requires_grad for one in (given[0], given[3]))
+    return _draw(call if is_learned else call._replace(key=None))
+
+
+def _draw(call: _Call) -> Any:
     image = call.image
     refuse_capture(image)
     if call.on_device:
         return _on_device(call)
     final = torch.empty(image.shape, dtype=image.dtype).numpy()
-    for index, arrays, chosen in call.each():
+    for index, arrays in call.each():
         pixels = arrays.pop("image")
         if pixels.dtype == np.float64:
-            final[index] = reference_apply(pixels, chosen, **arrays)["final"]
+            final[index] = reference_apply(pixels, call.settings, **arrays)["final"]
         else:
-            frames = _renderer(call.renderer).apply(
-                pixels, in_floats(chosen), framebuffers="final", **arrays
-            )
+            frames = call.renderer.apply(pixels, call.settings, framebuffers="final", **arrays)
             final[index] = frames["final"]
     return torch.from_numpy(final).to(image.device)
 
 
 def _on_device(call: _Call) -> Any:
     """Run the operator without the host; a batch without masks changes the context once."""
-    settings, renderer = _settings_of(call), _renderer(call.renderer, call.image)
+    settings, renderer = call.settings, call.renderer
     count, stream = call.image.shape[:-3].numel(), _stream_of(call.image)
     frames: Iterable[Frames]
     if call.mask is None and call.emission is None and count > 1:
         renderer._taken = None
         frames = renderer.map(_batch(call.image), settings, framebuffers="final")
     elif call.mask is None and call.emission is None and count == 1:
-        inputs = Inputs(_take_forward(call, renderer, settings, stream).at(0))
+        inputs = Inputs(_take_forward(call, renderer, stream).at(0))
         final = renderer._apply_inputs(inputs, settings, ("final",))["final"]
         return _join([_as_tensor(final, stream)], call.image)
     else:
@@ -479,7 +493,7 @@ def _on_device(call: _Call) -> Any:
     return _join([_as_tensor(batch, stream) for batch in batches], call.image, torch.cat)
 
 
-_bloom: Final[Any] = _operator("bloom", _draw, "", "Tensor")
+_bloom: Final[Any] = _operator("bloom", _bloom_of, "", "Tensor")
 
 
 @torch.library.register_fake(_bloom, lib=_LIBRARY)  # type: ignore[untyped-decorator]
@@ -487,12 +501,20 @@ def _(image: Any, *rest: Any) -> Any:
     return torch.empty(image.shape, dtype=image.dtype, device=image.device)
 
 
-def _differentiate(cotangent: Any, by_images: bool, *given: Any) -> tuple[Any, ...]:
-    """Return the derivatives by image, mask, emission and values; without elements: of none.
+def _bloom_backward_of(cotangent: Any, by_images: bool, *given: Any) -> tuple[Any, ...]:
+    """Return the derivatives by image, mask, emission and values; without elements: of none."""
+    call = _call_of_operator(given, goes_back=True)
+    *by_image, by_values = _differentiate(call, cotangent, by_images)
+    if by_values is not None:
+        by_values = by_values.to(given[3])
+    return tuple(torch.empty(0) if one is None else one for one in (*by_image, by_values))
+
+
+def _differentiate(call: _Call, cotangent: Any, by_images: bool) -> tuple[Any, ...]:
+    """Return the derivatives by image, mask, emission and values; None: there are none.
 
     Of a batch, the derivatives by values are added. Without `by_images` they are by values alone.
     """
-    call = _Call(*given)
     refuse_capture(call.image)
     images = call.images if by_images else {}
     derivatives: dict[str, list[Any]] = {name: [] for name in images}
@@ -504,21 +526,18 @@ def _differentiate(cotangent: Any, by_images: bool, *given: Any) -> tuple[Any, .
         pulled = _pull_on_device(call, cotangent, by_images, stream)
     else:
         wanted = cotangent.detach().cpu().numpy()
-        pulled = (
-            _pull(arrays, chosen, call, wanted[index], by_images)
-            for index, arrays, chosen in call.each()
-        )
+        pulled = (_pull(arrays, call, wanted[index], by_images) for index, arrays in call.each())
     for gradients in pulled:
         for name, parts in derivatives.items():
             parts.append(_as_tensor(gradients[name], stream))
-        if call.values is not None:
+        if call.fields:
             values.append(_by_values(gradients, call, stream))
     return (
         *(
-            _join(derivatives[name], images[name]) if name in images else torch.empty(0)
+            _join(derivatives[name], images[name]) if name in images else None
             for name in ("image", "mask", "emission")
         ),
-        torch.empty(0) if call.values is None else _sum(values, call.values),
+        _sum(values, call) if call.fields else None,
     )
 
 
@@ -540,9 +559,11 @@ def _by_values(gradients: Any, call: _Call, stream: int | None) -> Any:
     return torch.from_numpy(np.concatenate(numbers))
 
 
-def _sum(parts: list[Any], like: Any) -> Any:
-    """Return the sum of tensors as one of the kind of another; without any, 0."""
-    return (sum(parts[1:], parts[0]) if parts else torch.zeros_like(like)).to(like)
+def _sum(parts: list[Any], call: _Call) -> Any:
+    """Return the sum of derivatives by values; without any, 0."""
+    if parts:
+        return sum(parts[1:], parts[0])
+    return torch.zeros(sum(map(math.prod, call.fields.values())), dtype=torch.float64)
 
 
 def _as_tensor(part: Any, stream: int | None) -> Any:
@@ -564,7 +585,7 @@ def _join(parts: list[Any], like: Any, join: Any = None) -> Any:
 
 _bloom_backward: Final[Any] = _operator(
     "bloom_backward",
-    _differentiate,
+    _bloom_backward_of,
     "Tensor cotangent, bool by_images, ",
     "(Tensor, Tensor, Tensor, Tensor)",
 )
@@ -619,29 +640,76 @@ torch.library.register_autograd(_bloom_backward, _refuse, lib=_LIBRARY)
 
 
 class VkbloomBloom(torch.autograd.Function):  # type: ignore[misc]
-    """What the operator computes, beside PyTorch's dispatcher; profilers show its name."""
+    """What the operator computes, beside PyTorch's dispatcher; profilers show its name.
+
+    Of parameters only what was read is kept: they may change before the backward pass.
+    """
 
     @staticmethod
     def forward(ctx: Any, *inputs: Any) -> Any:
-        _keep(ctx, inputs, None)
-        return _draw(*inputs)
+        *images, ctx.rest, ctx.given, ctx.numbers = inputs[:6]
+        ctx.save_for_backward(*images)
+        ctx.kinds = [(one.dtype, one.device) for one in inputs[6:]]
+        call = _Call(*images, *ctx.rest)
+        # Held until the backward pass, also if the caller lets it go before.
+        ctx.renderer = RENDERERS.get(call.number)
+        return _draw(call)
 
-    backward = staticmethod(_back)
+    @staticmethod
+    def backward(ctx: Any, cotangent: Any) -> tuple[Any, ...]:
+        images, by_images = ctx.saved_tensors, any(ctx.needs_input_grad[:3])
+        # A second derivative, which the operator refuses, is asked for.
+        if torch.is_grad_enabled() or _is_watched((cotangent, *images)):
+            values = torch.tensor(ctx.numbers).to(cotangent.device) if ctx.kinds else None
+            found = _bloom_backward(cotangent, by_images, *images, values, *ctx.given)
+        else:
+            found = _differentiate(_Call(*images, *ctx.rest), cotangent, by_images)
+        *by_image, by_values = found
+        is_given = [by_images and one is not None for one in images]
+        return (
+            *(one if given else None for one, given in zip(by_image, is_given, strict=True)),
+            *(None,) * 3,
+            *_split(by_values, _shapes(ctx.given[0]), ctx.kinds),
+        )
+
+
+def _split(values: Any, shapes: Mapping[str, tuple[int, ...]], kinds: list[Any]) -> Iterator[Any]:
+    """Yield the derivatives by each parameter, of its shape, dtype and device."""
+    if kinds:
+        # Most have the kind of the first one: one conversion for all.
+        dtype, device = kinds[0]
+        parts = values.to(device, dtype).split([math.prod(shape) for shape in shapes.values()])
+        for part, shape, (dtype, device) in zip(parts, shapes.values(), kinds, strict=True):
+            yield part.reshape(shape).to(device, dtype)
 
 
 _PLAIN: Final = {torch.Tensor, torch.nn.Parameter, type(None)}
 
 
-def draw(*inputs: Any) -> Any:
+def draw(
+    images: tuple[Any, Any, Any],
+    given: tuple[str, str, int],
+    parameters: Sequence[Any],
+    numbers: NDArray[Any],
+) -> Any:
     """Call the operator; of plain tensors, which nothing else looks at, without the dispatcher.
 
     Where the caches are cold, as after a wait for a GPU, a call with a derivative takes 62 us in
     place of 140 to 176 (2.13, an operator that does nothing on a CPU, 2026-11-30).
+
+    `given`: What `names_of`, `text_of` and `number_of` return. `numbers`: Of the parameters, as
+    `read` returns them.
     """
     # Dynamo traces no further than the first condition.
-    if torch.compiler.is_compiling() or _is_watched(inputs[:4]):
-        return _bloom(*inputs)
-    return VkbloomBloom.apply(*inputs)
+    if torch.compiler.is_compiling() or _is_watched((*images, *parameters)):
+        return _bloom(*images, flatten(parameters), *given)
+    names, text, number = given
+    settings = _chosen(text, names, numbers, images[0].dtype == torch.float64)
+    on_gpu = bool(parameters) and all(one.is_cuda for one in parameters)
+    is_learned = any(one is not None and one.requires_grad for one in (*images, *parameters))
+    key = object() if is_learned and torch.is_grad_enabled() else None
+    rest = settings, _shapes(names), number, on_gpu, key
+    return VkbloomBloom.apply(*images, rest, given, numbers, *parameters)
 
 
 def _is_watched(tensors: Iterable[Any]) -> bool:

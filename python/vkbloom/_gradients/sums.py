@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom._gradients.levels import Factors, level_factors, level_fields
-from vkbloom.reference._derivatives import differentiable
+from vkbloom.reference._derivatives import is_differentiable
 from vkbloom.reference._sampling import scale_size
 
 if TYPE_CHECKING:
@@ -47,7 +47,7 @@ def device_fields(settings: Settings) -> frozenset[str]:
     if settings.glare:
         known -= {"intensity"}
     known |= level_fields(settings).keys()
-    return frozenset(known & differentiable(settings).keys())
+    return frozenset([name for name in known if is_differentiable(settings, name)])
 
 
 def wanted_sums(settings: Settings, wanted: Iterable[str]) -> tuple[str, ...]:
@@ -56,8 +56,8 @@ def wanted_sums(settings: Settings, wanted: Iterable[str]) -> tuple[str, ...]:
     zeros = {name for factors in channels.values() for name, one in factors.items() if one == 0}
     sums = set()
     for name in {*wanted} - zeros:
-        # Such as "enlarging_x".
-        sums |= {kind.partition("_")[0] for kind in of_levels.get(name, ())}
+        # Such as "enlarging_x". The core has "taps" where it can, in place of "weight".
+        sums |= {kind.partition("_")[0] for kind in of_levels.get(name, ())} - {"taps"}
         if name == "intensity" and not settings.glare:
             sums.add("composite" if settings.value_of(name) == 0 else name)
         elif name in _OF_COMPOSITE and name != "intensity":
@@ -156,4 +156,4 @@ def _places(kind: str, count: int, starts: Mapping[str, int]) -> list[tuple[int,
         return numbered if len(numbered) == count else None
     if kind == "colour":
         return [(0, starts[".by_colour"])] if ".by_colour" in starts else None
-    return numbered if kind == "weight" else [(0, start) for _, start in numbered]
+    return numbered if kind in ("weight", "taps") else [(0, start) for _, start in numbered]

@@ -232,24 +232,34 @@ class Settings(Record):
             "glare.0.intensity": ``replace(**{"glare.0.intensity": 2})``. Those of a point-spread
             function have names such as "psf.sigma".
         """
-        nested = {name: changes.pop(name) for name in [*changes] if "." in name}
-        of_psf = {name: nested.pop(name) for name in [*nested] if name.startswith(_PSF)}
-        if of_psf:
-            given: Any = changes.get("psf", getattr(self, "psf", None))
-            values = {_field_of_psf(given, name): value for name, value in of_psf.items()}
-            changes["psf"] = dataclasses.replace(given, **values)
-        if nested:
-            glare = _read_glare(changes.get("glare", self.glare))
-            changes["glare"] = replace_stages(glare, nested)
-        own, known = vars(self), fields_of(type(self))
-        if not known.keys() >= changes.keys():
-            return dataclasses.replace(self, **changes)  # which says what is wrong
-        # It would take 10 us in place of 5, in each step of a loop that learns fields.
+        return dataclasses.replace(self, **self._own_fields(changes))
+
+    def _replaced(self, changes: Mapping[str, Any]) -> Self:
+        """As `replace`, in 5 us in place of 10, for loops that learn fields.
+
+        Dynamo of PyTorch 2.11 cannot follow it.
+        """
+        changes, own = self._own_fields(changes), vars(self)
         made = object.__new__(type(self))
-        vars(made).update({name: own[name] for name in known}, **changes)
+        vars(made).update({name: own[name] for name in fields_of(type(self))}, **changes)
         check_fields(made, changes)
         made._check_together()
         return made
+
+    def _own_fields(self, changes: Mapping[str, Any]) -> dict[str, Any]:
+        """Return changes with those of stages and functions as values of `glare` and `psf`."""
+        own = {name: value for name, value in changes.items() if "." not in name}
+        if len(own) == len(changes):
+            return own
+        nested = {name: value for name, value in changes.items() if "." in name}
+        of_psf = {name: nested.pop(name) for name in [*nested] if name.startswith(_PSF)}
+        if of_psf:
+            given: Any = own.get("psf", getattr(self, "psf", None))
+            values = {_field_of_psf(given, name): value for name, value in of_psf.items()}
+            own["psf"] = dataclasses.replace(given, **values)
+        if nested:
+            own["glare"] = replace_stages(_read_glare(own.get("glare", self.glare)), nested)
+        return own
 
     def value_of(self, name: str) -> Any:
         """Return the value of a field, also of a stage's or a function's: "glare.0.intensity"."""
