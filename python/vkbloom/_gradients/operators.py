@@ -157,9 +157,10 @@ def _number(tensor: Any) -> Any:
 
 def values_of(names: str, numbers: NDArray[Any]) -> dict[str, Any]:
     """Return the values of the fields of `names_of`, whose numbers `read` has returned."""
-    values: dict[str, Any] = {}
-    at = 0
-    for name, shape in _shapes(names).items():
+    shapes, values, at = _shapes(names), {}, 0
+    if not any(shapes.values()):
+        return dict(zip(shapes, numbers.tolist(), strict=True)) if shapes else {}
+    for name, shape in shapes.items():
         part = numbers[at : at + math.prod(shape)].reshape(shape)
         values[name] = part if part.ndim == 3 else _numbers(part.tolist())
         at += part.size

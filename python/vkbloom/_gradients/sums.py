@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vkbloom._gradients.levels import Factors, level_factors, level_fields
-from vkbloom.reference._derivatives import is_differentiable
+from vkbloom.reference._derivatives import differentiable
 from vkbloom.reference._sampling import scale_size
 
 if TYPE_CHECKING:
@@ -31,14 +31,18 @@ class Sums(NamedTuple):
     arrays: tuple[NDArray[Any], ...]
 
 
-# Each step of a training loop asks several times.
-@functools.lru_cache(16)
 def device_fields(settings: Settings) -> frozenset[str]:
     """Return the fields by which the device has the derivatives.
 
     These are what only the composite, the threshold, or `level_fields` read. Stages of glare read
     the threshold of a published method, too.
     """
+    return _device_fields(settings._origin)
+
+
+# Each step of a training loop asks several times, with other numbers.
+@functools.lru_cache(16)
+def _device_fields(settings: Settings) -> frozenset[str]:
     known = {*_OF_COMPOSITE} - settings._fields_before_composite
     if not settings.published:
         known |= {"threshold", "knee"}
@@ -47,7 +51,7 @@ def device_fields(settings: Settings) -> frozenset[str]:
     if settings.glare:
         known -= {"intensity"}
     known |= level_fields(settings).keys()
-    return frozenset([name for name in known if is_differentiable(settings, name)])
+    return frozenset(known & differentiable(settings).keys())
 
 
 def wanted_sums(settings: Settings, wanted: Iterable[str]) -> tuple[str, ...]:

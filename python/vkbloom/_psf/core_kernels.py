@@ -64,8 +64,9 @@ class WithKernel:
 
     def core_kernel(self, frame: Size, buffers: Size) -> CoreKernel:
         """Return the kernel as the core reads it."""
-        shape = type(self)(**{name: getattr(self, name) for name in self.shaping})
-        return _core_kernel(shape, frame, buffers)._replace(prefilter=self.prefilter)
+        fields = tuple([getattr(self, name) for name in self.shaping])
+        kernel = _core_kernel(type(self), fields, frame, buffers)
+        return kernel._replace(prefilter=self.prefilter)
 
     def core_field(self, frame: Size, buffers: Size) -> tuple[Any, ...] | None:
         """Return the weights of a field of kernels as the core reads them; None: there is none."""
@@ -73,9 +74,9 @@ class WithKernel:
 
 
 @keep
-def _core_kernel(shape: WithKernel, frame: Size, buffers: Size) -> CoreKernel:
-    fields = tuple(getattr(shape, name) for name in shape.shaping)
-    kind = type(shape)
+def _core_kernel(
+    kind: type[WithKernel], fields: tuple[Any, ...], frame: Size, buffers: Size
+) -> CoreKernel:
     # A subclass of a user's may have another formula under the same name.
     is_ours = defining_module(kind).startswith(_OURS) and _is_there(kind)
     key = _key((kind.__name__, *fields, frame, buffers)) if is_ours else None
@@ -83,6 +84,7 @@ def _core_kernel(shape: WithKernel, frame: Size, buffers: Size) -> CoreKernel:
     if data is not None:
         return _unpack(data)
     start = time.thread_time()
+    shape = kind(**dict(zip(kind.shaping, fields, strict=True)))
     kernel = shape._with_reach(core_kernel(shape._kernel(frame, buffers)))
     if key and time.thread_time() - start >= MIN_SECONDS:
         CACHE.write(key, _pack(kernel))

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from vkbloom._argument_types import check_arguments
 from vkbloom._arrays import plain_array
 from vkbloom._public import public
-from vkbloom._settings.fields import FieldInfo, fields_of
+from vkbloom._settings.fields import fields_of
 from vkbloom._settings.settings import Settings, resolve_settings
 
 from ._framebuffers import check_scene, framebuffers
@@ -165,7 +165,7 @@ def differentiable(settings: Any) -> dict[str, Any]:
     fields = {
         name: getattr(settings, name)
         for name, info in fields_of(type(settings)).items()
-        if _has_derivative(settings, info)
+        if info.differentiable and not info.fixed and _is_real(getattr(settings, name))
     }
     weights = getattr(getattr(settings, "psf", None), "weights", None)
     if weights is not None:
@@ -173,18 +173,6 @@ def differentiable(settings: Any) -> dict[str, Any]:
     for index, stage in enumerate(getattr(settings, "glare", ())):
         fields |= {f"glare.{index}.{name}": value for name, value in differentiable(stage).items()}
     return fields
-
-
-def is_differentiable(settings: Any, name: str) -> bool:
-    """Whether `differentiable` has a name, without all others where that is possible."""
-    if "." in name:
-        return name in differentiable(settings)
-    info = fields_of(type(settings)).get(name)
-    return info is not None and _has_derivative(settings, info)
-
-
-def _has_derivative(settings: Any, info: FieldInfo) -> bool:
-    return info.differentiable and not info.fixed and _is_real(getattr(settings, info.name))
 
 
 def is_unset(settings: Any, name: str) -> bool:
