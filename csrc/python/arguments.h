@@ -30,8 +30,10 @@ PyObject *vkb_stage_block_table(void);
 // Asks a settings object for its block; false with an exception set.
 bool vkb_read_settings(PyObject *object, struct vkb_settings *settings);
 
-// Asks a convolution's settings for the kernel of these sizes, which `view` holds, or only for
-// about its size.
+// Asks a convolution's settings for the kernel of these sizes, which `view` holds; for one that is
+// kept from an earlier call; or only for about its size.
+bool vkb_find_kernel(PyObject *object, struct vkb_size frame, struct vkb_size buffers,
+                     Py_buffer *view, struct vkb_kernel_data *kernel, bool *found);
 bool vkb_read_kernel_size(PyObject *object, struct vkb_size frame, struct vkb_size buffers,
                           struct vkb_kernel_data *kernel);
 bool vkb_read_kernel(PyObject *object, struct vkb_size frame, struct vkb_size buffers,

@@ -60,6 +60,18 @@ bool vkb_read_kernel(PyObject *object, struct vkb_size frame, struct vkb_size bu
     return done;
 }
 
+bool vkb_find_kernel(PyObject *object, struct vkb_size frame, struct vkb_size buffers,
+                     Py_buffer *view, struct vkb_kernel_data *kernel, bool *found)
+{
+    PyObject *tuple = PyObject_CallMethod(object, "kept_kernel", "(II)(II)", frame.width,
+                                          frame.height, buffers.width, buffers.height);
+    *found = tuple && tuple != Py_None;
+    const bool done = tuple && (!*found || read_kernel_tuple(tuple, view, kernel));
+
+    Py_XDECREF(tuple);
+    return done;
+}
+
 // (kernels, those in a column of a grid, whether they gather, whether the first has no weights,
 // columns and rows of the weights, weights and places as kernels)
 static bool read_field_tuple(PyObject *tuple, struct vkb_size buffers, Py_buffer *weights,

@@ -210,9 +210,9 @@ static bool build_graph(const struct vkb_device *device, struct vkb_variants var
         && (!graph->layers || layer_graph(device, graph, error));
 }
 
-// The kernel of a convolution for the source's sizes. The graph is built once before it is
-// computed, so that images which do not fit the device are refused at once: a large kernel takes
-// long. (Other plans need no memory, and are checked when they are run.)
+// The kernel of a convolution for the source's sizes. Unless it is kept, the graph is built once
+// before it is computed, so that images which do not fit the device are refused at once: a large
+// kernel takes long. (Other plans need no memory, and are checked when they are run.)
 static bool hold_kernel(const struct vkb_module_state *state, const struct vkb_device *device,
                         PyObject *settings_object, struct vkb_settings *settings,
                         struct vkb_plan_object *self)
@@ -220,28 +220,35 @@ static bool hold_kernel(const struct vkb_module_state *state, const struct vkb_d
     struct vkb_size frame, buffers;
     struct vkb_graph graph = {0};
     struct vkb_error error = {0};
+    bool is_kept;
 
     if (!vkb_needs_kernel(settings))
         return true;
-    if (vkb_source_sizes(&self->source, settings, device->max_side, &frame, &buffers, &error)) {
-        if (vkb_has_gaussian_levels(settings, frame, buffers))
-            return true;
-        if (!vkb_read_kernel_size(settings_object, frame, buffers, &settings->kernel))
-            return false;
-        const bool fits = build_graph(device, (struct vkb_variants){0}, &self->source, settings,
-                                      NULL, &graph, &error)
-                       && vkb_limits_check_memory(device, &graph, vkb_graph_size(&graph), &error);
-        vkb_graph_destroy(&graph);
-        if (fits)
-            return vkb_read_kernel(settings_object, frame, buffers, &self->kernel,
-                                   &settings->kernel)
-                && vkb_read_field(settings_object, frame, buffers, &self->field_weights,
-                                  &self->field_places, settings);
+    if (!vkb_source_sizes(&self->source, settings, device->max_side, &frame, &buffers, &error)) {
+        vkb_raise(state, &error);
+        return false;
+    }
+    if (vkb_has_gaussian_levels(settings, frame, buffers))
+        return true;
+    if (!vkb_find_kernel(settings_object, frame, buffers, &self->kernel, &settings->kernel,
+                         &is_kept)
+        || (!is_kept && !vkb_read_kernel_size(settings_object, frame, buffers, &settings->kernel)))
+        return false;
+    const bool fits = is_kept
+                   || (build_graph(device, (struct vkb_variants){0}, &self->source, settings, NULL,
+                                   &graph, &error)
+                       && vkb_limits_check_memory(device, &graph, vkb_graph_size(&graph), &error));
+    vkb_graph_destroy(&graph);
+    if (!fits) {
         if (error.kind == VKB_ERROR_VALUE)
             vkb_add_words(&error, ". A smaller bloom_scale or kernel_size makes it so");
+        vkb_raise(state, &error);
+        return false;
     }
-    vkb_raise(state, &error);
-    return false;
+    return (is_kept
+            || vkb_read_kernel(settings_object, frame, buffers, &self->kernel, &settings->kernel))
+        && vkb_read_field(settings_object, frame, buffers, &self->field_weights,
+                          &self->field_places, settings);
 }
 
 // `portion` may be NULL.

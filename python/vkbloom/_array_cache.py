@@ -6,7 +6,7 @@ import functools
 import weakref
 from collections import OrderedDict
 from collections.abc import Callable, Hashable
-from typing import Any, Final, Protocol, TypeVar, cast
+from typing import Any, Final, Generic, Protocol, TypeVar, cast
 
 from vkbloom._locks import ProcessLock
 
@@ -74,17 +74,24 @@ def shared_cache() -> ArrayCache:
     return arrays
 
 
-def keep(make: Callable[..., _Made]) -> Callable[..., _Made]:
-    """Keep the results of a function of hashable arguments."""
+class keep(Generic[_Made]):
+    """Keeps the results of a function of hashable arguments."""
 
-    @functools.wraps(make)
-    def find_or_make(*arguments: Any) -> _Made:
-        arrays = _of_renderers() or _IN_PROCESS
-        key = make, arguments
-        array = arrays.find(key)
+    def __init__(self, make: Callable[..., _Made]) -> None:
+        functools.update_wrapper(self, make)
+        self._make = make
+
+    def __call__(self, *arguments: Any) -> _Made:
+        array = self.find(*arguments)
         if array is None:
-            array = make(*arguments)
-            arrays.add(key, array)
-        return cast("_Made", array)
+            array = self._make(*arguments)
+            _arrays().add((self._make, arguments), array)
+        return array
 
-    return find_or_make
+    def find(self, *arguments: Any) -> _Made | None:
+        """Return the result of a call with these arguments, if it is kept."""
+        return cast("_Made | None", _arrays().find((self._make, arguments)))
+
+
+def _arrays() -> ArrayCache:
+    return _of_renderers() or _IN_PROCESS

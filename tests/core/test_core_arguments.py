@@ -68,6 +68,9 @@ class Kernel(NamedTuple):
     def _core_block(self) -> bytes:
         return settings_block("convolution", {})
 
+    def kept_kernel(self, frame: object, buffers: object) -> None:
+        return None
+
     def core_kernel_size(self, frame: object, buffers: object) -> Any:
         return self.size
 
@@ -281,6 +284,9 @@ def test_every_number_of_glare_has_a_range(name: str) -> None:
 
 class Ends(Given):
     """Settings of any method, with a kernel for those that need one."""
+
+    def kept_kernel(self, frame: object, buffers: object) -> None:
+        return None
 
     def core_kernel_size(self, frame: object, buffers: object) -> tuple[int, int]:
         return 5, 5

@@ -64,9 +64,17 @@ class WithKernel:
 
     def core_kernel(self, frame: Size, buffers: Size) -> CoreKernel:
         """Return the kernel as the core reads it."""
-        fields = tuple([getattr(self, name) for name in self.shaping])
-        kernel = _core_kernel(type(self), fields, frame, buffers)
+        kernel = _core_kernel(type(self), self._shape, frame, buffers)
         return kernel._replace(prefilter=self.prefilter)
+
+    def kept_kernel(self, frame: Size, buffers: Size) -> CoreKernel | None:
+        """Return the same if it is kept from an earlier call."""
+        kernel = _core_kernel.find(type(self), self._shape, frame, buffers)
+        return kernel and kernel._replace(prefilter=self.prefilter)
+
+    @property
+    def _shape(self) -> tuple[Any, ...]:
+        return tuple([getattr(self, name) for name in self.shaping])
 
     def core_field(self, frame: Size, buffers: Size) -> tuple[Any, ...] | None:
         """Return the weights of a field of kernels as the core reads them; None: there is none."""
