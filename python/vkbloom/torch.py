@@ -185,12 +185,13 @@ class Bloom(torch.nn.Module):  # type: ignore[misc]
                 for name, parameter in zip(self._names, parameters, strict=True):
                     parameter.copy_(_clamp(parameter, self._ranges[name]))
             return None
-        numbers, at, moved = read(parameters), 0, False
+        numbers = read(parameters)
+        values, at, moved = numbers.tolist(), 0, False
         for name, parameter in zip(self._names, parameters, strict=True):
-            ends, part = self._ranges[name], numbers[at : at + parameter.numel()]
+            ends, part = self._ranges[name], values[at : at + parameter.numel()]
             at += len(part)
             # A write, also of an equal value, makes what other operators have saved unusable.
-            if not _is_within(part.tolist(), ends):
+            if not _is_within(part, ends):
                 with torch.no_grad():
                     parameter.copy_(_clamp(parameter, ends))
                 moved = True

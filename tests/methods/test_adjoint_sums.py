@@ -434,6 +434,15 @@ def test_shares_of_other_filters_are_not_those_of_a_chain() -> None:
     assert "scatter" not in known["urp kawase"]
 
 
+@pytest.mark.parametrize("name", vkbloom.presets)
+def test_which_fields_have_sums_does_not_depend_on_numbers(name: str) -> None:
+    """What is known of settings is kept for those with other numbers."""
+    settings = in_floats(vkbloom.presets[name])
+    fields = device_fields(settings)
+    values = {field: np.multiply(settings.value_of(field), 0.75).tolist() for field in fields}
+    assert device_fields(settings.replace(**values, bloom_scale=0.5)) == fields
+
+
 @pytest.mark.parametrize("method", ONE_OF_EACH)
 def test_sums_of_large_images_have_plans(renderer: Renderer, method: str) -> None:
     """With the images of several passes that add up, and of all levels."""

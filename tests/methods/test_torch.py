@@ -468,6 +468,38 @@ def test_backward_passes_have_the_values_of_their_own_call(renderer: Renderer) -
     assert len({part.data_ptr() for part in alone[1]}) == len(alone[1])
 
 
+def test_parameters_may_change_before_the_backward_pass(renderer: Renderer) -> None:
+    module = vkbloom_torch.Bloom(SETTINGS, learn=("intensity", "threshold"), renderer=renderer)
+    image = tensor(9, 8, 3)
+    found = []
+    for value in (None, 0.1):
+        module.to(DEVICE).zero_grad()
+        final = module(image)
+        with torch.no_grad():
+            if value is not None:
+                module.learned["intensity"].fill_(value)
+        (gradient,) = torch.autograd.grad(final.sum(), image, retain_graph=True)
+        final.sum().backward()
+        found.append([gradient, *(one.grad.clone() for one in module.parameters())])
+    torch.testing.assert_close(*found, rtol=0.0, atol=0.0)
+
+
+@pytest.mark.parametrize("learn", [("intensity",), ("level_weights", "intensity", "radius")])
+def test_second_derivatives_by_parameters_are_refused(
+    renderer: Renderer, learn: tuple[str, ...]
+) -> None:
+    """Where a graph of the derivatives is made, these are the same."""
+    settings = SETTINGS.replace(level_weights=(0.5, 0.5))
+    module = vkbloom_torch.Bloom(settings, learn=learn, renderer=renderer).to(DEVICE)
+    parameters = [*module.parameters()]
+    final = module(tensor(9, 8, 3))
+    alone = torch.autograd.grad(final.sum(), parameters, retain_graph=True)
+    found = torch.autograd.grad(final.sum(), parameters, create_graph=True)
+    torch.testing.assert_close(alone, [one.detach() for one in found], rtol=1e-6, atol=0.0)
+    with pytest.raises(RuntimeError, match="its second derivative is not implemented"):
+        found[0].sum().backward()
+
+
 @pytest.mark.parametrize("out", [-3.0, 0.4, 7.0, float("nan")])
 def test_parameters_are_read_as_they_are(renderer: Renderer, out: float) -> None:
     """Each call has the values at its time, those of `data` too, moved into their ranges."""

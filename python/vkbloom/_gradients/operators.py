@@ -159,7 +159,7 @@ def values_of(names: str, numbers: NDArray[Any]) -> dict[str, Any]:
     """Return the values of the fields of `names_of`, whose numbers `read` has returned."""
     shapes, values, at = _shapes(names), {}, 0
     if not any(shapes.values()):
-        return dict(zip(shapes, numbers.tolist(), strict=True)) if shapes else {}
+        return dict(zip(shapes, numbers.tolist(), strict=True))
     for name, shape in shapes.items():
         part = numbers[at : at + math.prod(shape)].reshape(shape)
         values[name] = part if part.ndim == 3 else _numbers(part.tolist())
@@ -241,7 +241,6 @@ class _Call(NamedTuple):
             yield index, {name: part[index] for name, part in arrays.items()}
 
 
-# Calls with the same values have the same object, whose plan is kept.
 @functools.lru_cache(16)
 def _replaced(text: str, in_doubles: bool, values: tuple[tuple[str, Any], ...]) -> Settings:
     settings = _settings(text)
@@ -250,9 +249,12 @@ def _replaced(text: str, in_doubles: bool, values: tuple[tuple[str, Any], ...]) 
     return settings._replaced(dict(values)) if values else settings
 
 
-def _chosen(text: str, names: str, numbers: NDArray[Any], in_doubles: bool) -> Settings:
-    """Return the settings of a text, with the numbers that `read` has returned."""
-    values = values_of(names, numbers)
+def _chosen(text: str, names: str, numbers: Any, in_doubles: bool) -> Settings:
+    """Return the settings of a text, with the numbers that `read` has returned, if names are given.
+
+    Calls with the same numbers get the same object, whose plan is kept.
+    """
+    values = values_of(names, numbers) if names else {}
     arrays = {name: value for name, value in values.items() if isinstance(value, np.ndarray)}
     others = tuple([one for one in values.items() if one[0] not in arrays])
     # Arrays may be large: they are not kept.
@@ -691,7 +693,7 @@ def draw(
     images: tuple[Any, Any, Any],
     given: tuple[str, str, int],
     parameters: Sequence[Any],
-    numbers: NDArray[Any],
+    numbers: NDArray[Any] | None,
 ) -> Any:
     """Call the operator; of plain tensors, which nothing else looks at, without the dispatcher.
 
@@ -699,7 +701,7 @@ def draw(
     place of 140 to 176 (2.13, an operator that does nothing on a CPU, 2026-11-30).
 
     `given`: What `names_of`, `text_of` and `number_of` return. `numbers`: Of the parameters, as
-    `read` returns them.
+    `read` returns them; None: there are none, or Dynamo traces.
     """
     # Dynamo traces no further than the first condition.
     if torch.compiler.is_compiling() or _is_watched((*images, *parameters)):
