@@ -306,6 +306,10 @@ DISTANCES: dict[str, tuple[Any, tuple[str, ...]]] = {
         vkbloom.Separable(layers=((0.0, 1.0), (1.0, 0.5)), bloom_scale=0.5, weights=(0.5, 0.2)),
         ("weights", "blur_strength"),
     ),
+    "separable and still": (
+        vkbloom.Separable(blur_scale=0.0, threshold=0.3, knee=0.5),
+        ("weights", "blur_strength", "threshold"),
+    ),
     # In floats the last tap would be beside a texel's centre, and not at it.
     "separable at a centre": (
         vkbloom.Separable(layers=((1.6, 1.0),), weights=(0.2, 0.1, 0.1, 0.1, 0.1, 0.1)),

@@ -223,7 +223,7 @@ def _separable_factors(settings: Any, size: _Size) -> dict[str, Factors]:
     twice = settings.first_tap == 0
     by_weights[0], by_strength[0] = (1 + 2 * strength, 2 * weights[0]) if twice else (1.0, 0.0)
     of_taps = np.zeros((-(-len(weights) // 3), 4))
-    of_taps[:, 3] = 1 / settings.blur_scale
+    of_taps[:, 3] = np.divide(1.0, settings.blur_scale)
     return {
         "blur_scale": {**_by_distance(settings.blur_scale), "taps": of_taps},
         "weights": _by_weights(np.diag(by_weights)),
