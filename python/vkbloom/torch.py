@@ -153,6 +153,7 @@ class Bloom(torch.nn.Module):  # type: ignore[misc]
         self.learned = torch.nn.ParameterDict(
             {name.replace(".", "_"): torch.tensor(known[name]) for name in self._names}
         )
+        self._sizes = {name: self._parameter(name).numel() for name in self._names}
         self._fields = names_of({name: self._parameter(name) for name in self._names})
 
     @property
@@ -189,6 +190,10 @@ class Bloom(torch.nn.Module):  # type: ignore[misc]
         values, at, moved = numbers.tolist(), 0, False
         for name, parameter in zip(self._names, parameters, strict=True):
             ends, part = self._ranges[name], values[at : at + parameter.numel()]
+            if len(part) != self._sizes[name]:
+                raise ValueError(
+                    f"{name}: a parameter of {len(part)} numbers is not one of {self._sizes[name]}"
+                )
             at += len(part)
             # A write, also of an equal value, makes what other operators have saved unusable.
             if not _is_within(part, ends):

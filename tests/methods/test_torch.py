@@ -500,6 +500,56 @@ def test_second_derivatives_by_parameters_are_refused(
         found[0].sum().backward()
 
 
+def test_second_derivatives_by_parameters_alone_are_refused(renderer: Renderer) -> None:
+    """Also of a loss that is linear in the result, whose cotangents have no graph."""
+    module = vkbloom_torch.Bloom(SETTINGS, learn=("threshold", "intensity"), renderer=renderer)
+    loss = module(tensor(9, 8, 3, requires_grad=False)).mean()
+    found = torch.autograd.grad(loss, [*module.parameters()], create_graph=True)
+    with pytest.raises(RuntimeError, match="its second derivative is not implemented"):
+        (loss + sum(one.square() for one in found)).backward()
+
+
+def test_parameters_have_derivatives_of_their_own_kind(renderer: Renderer) -> None:
+    """One of halves does not round the others, and one of another shape has its shape."""
+    settings = vkbloom.Separable(threshold=0.4, knee=0.3)
+    learn = ("weights", "blur_scale", "intensity")
+    module = vkbloom_torch.Bloom(settings, learn=learn, renderer=renderer).to(DEVICE)
+    image = 2 * tensor(20, 26, 3, requires_grad=False)
+
+    def pull() -> dict[str, Any]:
+        module.zero_grad()
+        (1e4 * module(image)).sum().backward()
+        return {name: one.grad for name, one in module.learned.items()}
+
+    expected = pull()
+    module.learned["weights"].data = module.learned["weights"].data.bfloat16().float()
+    rounded = pull()
+    module.learned["weights"].data = module.learned["weights"].data.bfloat16()
+    module.learned["intensity"] = torch.nn.Parameter(torch.ones(1, device=DEVICE))
+    found = pull()
+    assert found["weights"].dtype == torch.bfloat16
+    assert found["intensity"].shape == (1,)
+    torch.testing.assert_close(found["intensity"][0], rounded["intensity"], rtol=1e-6, atol=0.0)
+    torch.testing.assert_close(found["blur_scale"], rounded["blur_scale"], rtol=1e-5, atol=0.0)
+    torch.testing.assert_close(found["blur_scale"], expected["blur_scale"], rtol=0.02, atol=0.0)
+    module.learned["weights"] = torch.nn.Parameter(torch.ones(6, device=DEVICE))
+    with pytest.raises(ValueError, match="weights: a parameter of 6 numbers is not one of 5"):
+        module(image)
+
+
+@pytest.mark.filterwarnings("ignore:There is a performance drop")
+def test_a_batch_of_cotangents_has_a_batch_of_derivatives(renderer: Renderer) -> None:
+    module = vkbloom_torch.Bloom(SETTINGS, learn=("intensity", "knee"), renderer=renderer)
+    image, cotangents = tensor(4, 5, 3), tensor(2, 4, 5, 3, seed=2, requires_grad=False)
+    wanted = [image, *module.to(DEVICE).parameters()]
+    final = module(image)
+    found = torch.autograd.grad(final, wanted, cotangents, is_grads_batched=True, retain_graph=True)
+    for number, cotangent in enumerate(cotangents):
+        alone = torch.autograd.grad(final, wanted, cotangent, retain_graph=True)
+        for part, whole in zip(alone, found, strict=True):
+            torch.testing.assert_close(whole[number], part, rtol=1e-5, atol=1e-6)
+
+
 @pytest.mark.parametrize("out", [-3.0, 0.4, 7.0, float("nan")])
 def test_parameters_are_read_as_they_are(renderer: Renderer, out: float) -> None:
     """Each call has the values at its time, those of `data` too, moved into their ranges."""

@@ -142,8 +142,7 @@ def read(tensors: Sequence[Any]) -> NDArray[Any]:
         parts = [_number(tensor) for tensor in tensors]
         return np.array(parts) if _are_numbers(tensors) else np.hstack(parts)
     with torch.no_grad():
-        found: NDArray[Any] = flatten(tensors).cpu().numpy()
-    return found
+        return _on_host(flatten(tensors))
 
 
 def _are_numbers(tensors: Iterable[Any]) -> bool:
@@ -152,7 +151,13 @@ def _are_numbers(tensors: Iterable[Any]) -> bool:
 
 def _number(tensor: Any) -> Any:
     """Return the number of a tensor without dimensions, or an array of one dimension."""
-    return tensor.item() if tensor.ndim == 0 else tensor.detach().cpu().numpy().reshape(-1)
+    return tensor.item() if tensor.ndim == 0 else _on_host(tensor).reshape(-1)
+
+
+def _on_host(tensor: Any) -> NDArray[Any]:
+    copy = tensor.detach().cpu()
+    array: NDArray[Any] = (copy.float() if copy.dtype == torch.bfloat16 else copy).numpy()
+    return array
 
 
 def values_of(names: str, numbers: NDArray[Any]) -> dict[str, Any]:
@@ -652,7 +657,7 @@ class VkbloomBloom(torch.autograd.Function):  # type: ignore[misc]
     def forward(ctx: Any, *inputs: Any) -> Any:
         *images, ctx.rest, ctx.given, ctx.numbers = inputs[:6]
         ctx.save_for_backward(*images)
-        ctx.kinds = [(one.dtype, one.device) for one in inputs[6:]]
+        ctx.kinds = [(one.shape, one.dtype, one.device) for one in inputs[6:]]
         call = _Call(*images, *ctx.rest)
         # Held until the backward pass, also if the caller lets it go before.
         ctx.renderer = RENDERERS.get(call.number)
@@ -662,8 +667,11 @@ class VkbloomBloom(torch.autograd.Function):  # type: ignore[misc]
     def backward(ctx: Any, cotangent: Any) -> tuple[Any, ...]:
         images, by_images = ctx.saved_tensors, any(ctx.needs_input_grad[:3])
         # A second derivative, which the operator refuses, is asked for.
-        if torch.is_grad_enabled() or _is_watched((cotangent, *images)):
-            values = torch.tensor(ctx.numbers).to(cotangent.device) if ctx.kinds else None
+        if torch.is_grad_enabled() or _is_watched((cotangent, *images)) or _is_batched(cotangent):
+            values = None
+            if ctx.kinds:
+                values = torch.tensor(ctx.numbers).to(cotangent.device)
+                values.requires_grad_(any(ctx.needs_input_grad[6:]))
             found = _bloom_backward(cotangent, by_images, *images, values, *ctx.given)
         else:
             found = _differentiate(_Call(*images, *ctx.rest), cotangent, by_images)
@@ -672,18 +680,25 @@ class VkbloomBloom(torch.autograd.Function):  # type: ignore[misc]
         return (
             *(one if given else None for one, given in zip(by_image, is_given, strict=True)),
             *(None,) * 3,
-            *_split(by_values, _shapes(ctx.given[0]), ctx.kinds),
+            *_split(by_values, ctx.kinds),
         )
 
 
-def _split(values: Any, shapes: Mapping[str, tuple[int, ...]], kinds: list[Any]) -> Iterator[Any]:
+def _is_batched(tensor: Any) -> bool:
+    """Return whether it is of the vmap by which autograd takes a batch of cotangents."""
+    return not torch._C._has_storage(tensor)
+
+
+def _split(values: Any, kinds: list[tuple[Any, Any, Any]]) -> Iterator[Any]:
     """Yield the derivatives by each parameter, of its shape, dtype and device."""
-    if kinds:
-        # Most have the kind of the first one: one conversion for all.
-        dtype, device = kinds[0]
-        parts = values.to(device, dtype).split([math.prod(shape) for shape in shapes.values()])
-        for part, shape, (dtype, device) in zip(parts, shapes.values(), kinds, strict=True):
-            yield part.reshape(shape).to(device, dtype)
+    if not kinds:
+        return
+    # One conversion for all. Of several kinds each is converted from doubles.
+    if len({kind[1:] for kind in kinds}) == 1:
+        values = values.to(kinds[0][2], kinds[0][1])
+    parts = values.split([shape.numel() for shape, _, _ in kinds])
+    for part, (shape, dtype, device) in zip(parts, kinds, strict=True):
+        yield part.reshape(shape).to(device, dtype)
 
 
 _PLAIN: Final = {torch.Tensor, torch.nn.Parameter, type(None)}
