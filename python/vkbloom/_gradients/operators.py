@@ -621,19 +621,17 @@ def _back(ctx: Any, cotangent: Any) -> tuple[Any, ...]:
     inputs = ctx.saved_tensors
     # A step that learns fields alone needs none of the others.
     by_images = any(ctx.needs_input_grad[:3])
-    derivatives = _bloom_backward(
+    *by_image, by_values = _bloom_backward(
         cotangent, by_images, *inputs, ctx.names, ctx.settings, ctx.number
     )
-    wanted = (by_images, by_images, by_images, True)
-    return (
-        *(
-            derivative if part is not None and is_wanted else None
-            for derivative, part, is_wanted in zip(derivatives, inputs, wanted, strict=True)
-        ),
-        None,
-        None,
-        None,
-    )
+    by_values = None if inputs[3] is None else by_values
+    return *_of_images(by_image, inputs[:3], by_images), by_values, None, None, None
+
+
+def _of_images(derivatives: list[Any], images: Iterable[Any], by_images: bool) -> list[Any]:
+    """Return the derivatives by image, mask and emission; None for those that are not given."""
+    pairs = zip(derivatives, images, strict=True)
+    return [one if by_images and image is not None else None for one, image in pairs]
 
 
 def _refuse(ctx: Any, *cotangents: Any) -> Any:
@@ -666,22 +664,19 @@ class VkbloomBloom(torch.autograd.Function):  # type: ignore[misc]
     @staticmethod
     def backward(ctx: Any, cotangent: Any) -> tuple[Any, ...]:
         images, by_images = ctx.saved_tensors, any(ctx.needs_input_grad[:3])
-        # A second derivative, which the operator refuses, is asked for.
+        # The operator refuses second derivatives, and is there for what looks at operators.
         if torch.is_grad_enabled() or _is_watched((cotangent, *images)) or _is_batched(cotangent):
             values = None
             if ctx.kinds:
                 values = torch.tensor(ctx.numbers).to(cotangent.device)
+                # Or a second derivative by parameters alone would be 0, and not refused.
                 values.requires_grad_(any(ctx.needs_input_grad[6:]))
             found = _bloom_backward(cotangent, by_images, *images, values, *ctx.given)
         else:
             found = _differentiate(_Call(*images, *ctx.rest), cotangent, by_images)
         *by_image, by_values = found
-        is_given = [by_images and one is not None for one in images]
-        return (
-            *(one if given else None for one, given in zip(by_image, is_given, strict=True)),
-            *(None,) * 3,
-            *_split(by_values, ctx.kinds),
-        )
+        rest = None, None, None
+        return *_of_images(by_image, images, by_images), *rest, *_split(by_values, ctx.kinds)
 
 
 def _is_batched(tensor: Any) -> bool:
